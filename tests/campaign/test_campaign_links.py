@@ -18,9 +18,11 @@ from microrad.campaign.rows.evaluator import Evaluator
 from microrad.campaign.rows.missions import MissionBuilder
 from microrad.campaign.statistics.summary import summarise_campaign
 from microrad.core import reads
-from microrad.link import LitAperture, radial_error, under_jitter
-from microrad.link.inputs import LINK_TABLES
-from microrad.link.under_jitter import Exposure
+from microrad.link.beams import LitAperture
+from microrad.link.pointing import outage as under_jitter
+from microrad.link.pointing import radial_error
+from microrad.link.pointing.outage import Exposure
+from microrad.link.variation import LINK_TABLES
 from microrad.mission.fields import Several
 from microrad.mission.file import load_link, open_mission
 from microrad.mission.toml import MissionError

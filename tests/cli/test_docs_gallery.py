@@ -14,7 +14,7 @@ from microrad.core.units import parse_quantity
 from microrad.loop import fine_pointing
 from microrad.mission import presets
 from microrad.report.identification import page as identification
-from microrad.study import story as study
+from microrad.study import study
 from places import ROOT
 from scenes import scene_of
 from shipped import whole_drawn, whole_study
@@ -100,7 +100,7 @@ def walk(folder, call, capsys):
 
 def run_once(monkeypatch):
     """What `reproduce` runs and draws again is what `run` found and drew; tests/test_reproduce.py does it twice."""
-    found, drawn, run, write, shipped = {}, [], study.run, report.write, whole_study()[0]
+    found, drawn, run, write, shipped = {}, [], study.run_study, report.write, whole_study()[0]
 
     def remembered(file, on_progress, parts=None):
         if file.sha256 not in found:
@@ -115,7 +115,7 @@ def run_once(monkeypatch):
             shutil.copytree(drawn[0], target)
         return target / "report.html"
 
-    monkeypatch.setattr(study, "run", remembered)
+    monkeypatch.setattr(study, "run_study", remembered)
     figures = whole_drawn()
     monkeypatch.setattr(report, "study_figures", lambda *args: figures)
     monkeypatch.setattr(report, "write", copied)

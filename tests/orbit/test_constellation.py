@@ -11,9 +11,10 @@ import pytest
 from day_files import BY_FILE, day_file, element_set
 from microrad import orbit
 from microrad.link import study as link_study
-from microrad.orbit import constellation, operations
+from microrad.orbit import constellation, files, operations
 from microrad.orbit import day as day_study
 from microrad.orbit.constellation import opportunities
+from microrad.orbit.propagation import mean_elements
 from microrad.report.day.constellation import plan_data, plan_sentences, plan_text, satellites_table
 
 SIX_HOURS = {"orbit.duration": "6 h"}
@@ -31,8 +32,8 @@ def made(folder, *changes):
 
 
 def planned(folder, *changes):
-    links = link_study.run(day_file(folder, *changes))
-    return constellation.run(links.file, day_study.given_loss(links)), links
+    links = link_study.run_link_study(day_file(folder, *changes))
+    return constellation.run_constellation(links.file, day_study.given_loss(links)), links
 
 
 @pytest.fixture(scope="module")
@@ -214,9 +215,9 @@ def test_a_session_over_several_rates_has_the_one_that_closes_throughout(tmp_pat
 
 
 def test_an_outage_takes_its_share_of_the_volume(tmp_path, plan):
-    links = link_study.run(day_file(tmp_path, SIX_HOURS))
+    links = link_study.run_link_study(day_file(tmp_path, SIX_HOURS))
     loss = day_study.given_loss(links)
-    worse = constellation.run(links.file, day_study.PointingLoss(loss.loss_db, 0.2, "test"))
+    worse = constellation.run_constellation(links.file, day_study.PointingLoss(loss.loss_db, 0.2, "test"))
     assert worse.volume_bit == pytest.approx(0.8 * plan.volume_bit)
 
 
@@ -231,10 +232,10 @@ def test_a_file_of_elements_is_a_constellation(tmp_path):
     plan = with_elements(tmp_path, text)
     assert plan.satellites == ("EXAMPLE 1", "EXAMPLE 2", "EXAMPLE 3")
     assert {one.satellite for one in plan.planned} == set(plan.satellites)
-    sets = orbit.read_elements(tmp_path / "a.tle")
+    sets = files.read_elements(tmp_path / "a.tle")
     pair, own, relays = made(tmp_path, SIX_HOURS, FILED)
     for elements, satellite in zip(sets, own, strict=True):
-        alone = orbit.sgp4_orbit(elements, pair.epoch)
+        alone = mean_elements.Sgp4Orbit(elements, pair.epoch)
         time_s = np.array([0.0, 7000.0])
         np.testing.assert_array_equal(satellite.orbit.states(time_s).position_m, alone.states(time_s).position_m)
         assert satellite.limits == pair.leo.limits
@@ -306,6 +307,6 @@ def test_a_long_table_is_cut_and_says_so(tmp_path):
 
 def test_the_tables_that_a_plan_needs(tmp_path):
     loss = day_study.PointingLoss(1.0, 0.0, "test")
-    links = link_study.run(day_file(tmp_path, {"constellation": None}))
+    links = link_study.run_link_study(day_file(tmp_path, {"constellation": None}))
     with pytest.raises(operations.OperationsError, match=r"no table \[constellation\]"):
-        constellation.run(links.file, loss)
+        constellation.run_constellation(links.file, loss)

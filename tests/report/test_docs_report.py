@@ -22,7 +22,7 @@ from microrad.studio.guard import address
 from microrad.studio.guard import middleware as guard
 from microrad.studio.jobs import process as jobs_process
 from microrad.studio.recordings import reading, uploads
-from microrad.study import story as study
+from microrad.study import study
 from places import ROOT
 from shipped import DEFAULT
 
@@ -152,5 +152,5 @@ def test_targets_of_make_exist(target):
 
 def test_the_text_in_the_readme_is_what_the_shipped_mission_prints():
     text = (ROOT / "README.md").read_text(encoding="utf-8")
-    assert f"```text\n{report.verdict_text(study.run(load_mission(DEFAULT)), 80)}\n```\n" in text
+    assert f"```text\n{report.verdict_text(study.run_study(load_mission(DEFAULT)), 80)}\n```\n" in text
     assert all(len(line) <= 80 for line in text.partition("```text\n")[2].partition("```")[0].splitlines())

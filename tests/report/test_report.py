@@ -27,8 +27,8 @@ from microrad.report.requirements import requirements_paragraph
 from microrad.report.study import chain, page, words
 from microrad.report.study import contributors as requirement_views
 from microrad.report.study import words as study_words
-from microrad.study import story as study
-from microrad.study.pointing_cost import Cost
+from microrad.study import study
+from microrad.study.pointing_penalty import Cost
 from report_pages import assert_sound
 from shipped import SHIPPED, edited_file, plain_drawn, plain_study
 
@@ -49,7 +49,7 @@ def paper():
 @pytest.fixture(scope="module")
 def small(tmp_path_factory):
     """A study of a second."""
-    return study.run(edited_file(tmp_path_factory.mktemp("small"), day=False))
+    return study.run_study(edited_file(tmp_path_factory.mktemp("small"), day=False))
 
 
 @pytest.fixture(scope="module")
@@ -184,7 +184,7 @@ def test_the_paragraph_says_what_fails_and_by_what_then_what_holds(paper):
     )
     assert count == f"{sum(r.met for r in paper.requirements)} of {len(paper.requirements)} requirements are met."
     for r in paper.requirements:
-        here = f"{r.name} {requirements.signed(r)}"
+        here = f"{r.name} {requirements.margin_text(r)}"
         assert (f"{here}, by {r.limited_by}" in failed, here in passed) == (not r.met, r.met)
     met = tuple(r for r in paper.requirements if r.met)
     assert " FAIL: " not in requirements_paragraph(met)
@@ -287,7 +287,7 @@ def test_the_virtual_bench_stands_where_the_paper_measures(written, paper):
 
 
 def test_another_kind_of_mirror_leaves_the_bench_out(no_scan, tmp_path):
-    other = study.run(edited_file(tmp_path, day=False))
+    other = study.run_study(edited_file(tmp_path, day=False))
     visible = " ".join(parsed(report.write(other, tmp_path / "out").read_text(encoding="utf-8")).text)
     assert not (tmp_path / "out" / "figures" / "fig4-chirp.csv").exists()
     assert "Fig. 4, what differs from the paper: Not drawn: the mission's mirror is not of the paper's kind" in visible
@@ -491,7 +491,7 @@ def test_text_of_the_mission_is_escaped(tmp_path):
     file = edited_file(
         tmp_path, ('name = "LEO-to-GEO relay of a 100 kg satellite"', 'name = "<script>alert(1)</script>"'), day=False
     )
-    text = report.write(study.run(file), tmp_path / "out").read_text(encoding="utf-8")
+    text = report.write(study.run_study(file), tmp_path / "out").read_text(encoding="utf-8")
     assert "<script>alert" not in text
     assert "&lt;script&gt;alert(1)&lt;/script&gt;" in text
     manifest = text.partition('<script type="application/json" id="manifest">')[2].partition("</script>")[0]
@@ -501,7 +501,7 @@ def test_text_of_the_mission_is_escaped(tmp_path):
 @pytest.mark.usefixtures("no_scan", "no_bench")
 def test_a_hopeless_link_is_reported_not_refused(tmp_path):
     file = edited_file(tmp_path, ('data_rate = "300 Mbit/s"', 'data_rate = "30 Gbit/s"'), day=False)
-    hopeless = study.run(file)
+    hopeless = study.run_study(file)
     assert not hopeless.closes
     assert hopeless.communication.margin_db == pytest.approx(3.0 - 20.0, abs=0.02)
     assert math.isnan(hopeless.margin_map.largest_error_rad)
@@ -526,7 +526,7 @@ def test_verdict_and_summary_say_the_same(paper):
 
 
 def test_a_drive_beyond_the_identified_rate_is_the_first_thing_said(paper, tmp_path):
-    slow = study.run(edited_file(tmp_path, ('rate_limit = "3770 V/s"', 'rate_limit = "100 V/s"'), day=False))
+    slow = study.run_study(edited_file(tmp_path, ('rate_limit = "3770 V/s"', 'rate_limit = "100 V/s"'), day=False))
     text = report.verdict_text(slow)
     assert "The mirror model is extrapolated." in " ".join(text.partition("\n\n")[0].split())
     assert "Not to be relied on" in text
@@ -542,14 +542,14 @@ def no_scan(monkeypatch):
 
 def test_the_headline_names_the_link_that_does_not_close(no_scan, tmp_path):
     file = edited_file(tmp_path, ('required_power = "10 pW"', 'required_power = "1 nW"'), day=False)
-    text = report.verdict_text(study.run(file))
+    text = report.verdict_text(study.run_study(file))
     said = " ".join(text.partition("\n\n")[0].split())
     assert said.startswith("The link does not close: beacon \u221213.70 dB, at 300 Mbit/s")
     assert "communication" not in said
 
 
 def test_an_amplifier_at_its_limits_is_named_as_the_cause_and_claims_are_not_judged(no_scan, tmp_path):
-    weak = study.run(edited_file(tmp_path, ('output_max = "180 V"', 'output_max = "100 V"'), day=False))
+    weak = study.run_study(edited_file(tmp_path, ('output_max = "180 V"', 'output_max = "100 V"'), day=False))
     assert "What limits it: the amplifier's limits (" in report.verdict_text(weak, 160, verbose=True)
     assert {c.agrees for c in weak.claims if c.where in ("Fig. 6", "Fig. 8")} == {"not judged"}
     assert any("beyond the amplifier's range" in w for w in report.summary(weak)["warnings"])
@@ -560,14 +560,14 @@ def test_a_changed_value_does_not_keep_the_papers_name(paper, tmp_path):
     assert missionfile.changed_from_shipped(paper.file.sources) == ()
     file = edited_file(tmp_path, ('leo_aperture = "5 cm"', 'leo_aperture = "6 cm"'), day=False)
     assert missionfile.changed_from_shipped(file.sources) == (("terminals.leo_aperture", '"6 cm"', '"5 cm"'),)
-    changed = study.run(file)
+    changed = study.run_study(file)
     assert any("names the paper as its source" in w for w in report.summary(changed)["warnings"])
     text = report.write(changed, tmp_path / "out").read_text(encoding="utf-8")
     assert "This mission is not the paper" in text
 
 
 def test_a_radial_residual_is_two_axes(no_scan, paper, tmp_path):
-    radial = study.run(edited_file(tmp_path, ('residual = "per-axis"', 'residual = "radial"'), day=False))
+    radial = study.run_study(edited_file(tmp_path, ('residual = "per-axis"', 'residual = "radial"'), day=False))
     used, one_axis = report.summary(radial)["residual"]["used_rad"], report.summary(paper)["residual"]["used_rad"]
     assert used == pytest.approx(math.sqrt(2.0) * one_axis, rel=1e-12)
     assert "times √2 for two equal axes" in report.verdict_text(radial, verbose=True)
@@ -575,7 +575,7 @@ def test_a_radial_residual_is_two_axes(no_scan, paper, tmp_path):
 
 
 def test_a_drive_beyond_the_identified_range_is_said(no_scan, tmp_path):
-    narrow = study.run(edited_file(tmp_path, ('drive_max = "12 V"', 'drive_max = "8 V"'), day=False))
+    narrow = study.run_study(edited_file(tmp_path, ('drive_max = "12 V"', 'drive_max = "8 V"'), day=False))
     text = report.verdict_text(narrow)
     assert "The mirror model is extrapolated." in " ".join(text.partition("\n\n")[0].split())
     assert "(identified from 0 to 8 V)" in text

@@ -23,8 +23,7 @@ from microrad.report.day import words as day_words
 from microrad.report.day.contact_run import contact_sentences, windows_table
 from microrad.report.day.figures import day_figures
 from microrad.report.results.manifest import manifest_of
-from microrad.study import contact_run
-from microrad.study import story as study
+from microrad.study import contact_run, study
 from scenes import scene_of
 from shipped import SHIPPED, edited_file, plain_study
 
@@ -194,7 +193,7 @@ def test_a_contact_beyond_those_of_the_span_is_refused(found, tmp_path):
     file = edited_file(tmp_path, ("number = 1 ", "number = 99 "), whole=True)
     links = replace(found.links, file=replace(found.links.file, mission=file.mission))
     with pytest.raises(OperationsError, match=r"operations\.contact\.number is 99, and the span has 15 contacts"):
-        day_study.run(links)
+        day_study.run_day_study(links)
 
 
 def test_the_words_say_when_data_begin_and_how_much_flows(found):
@@ -230,7 +229,7 @@ def test_a_mission_without_orbits_has_no_day(tmp_path, monkeypatch):
     mission.write_text(
         text[:begin] + text[end : text.index("# ---", text.index("loop_amplitude = "))], encoding="utf-8"
     )
-    result = study.run(load_mission(mission))
+    result = study.run_study(load_mission(mission))
     assert (result.day, result.contact, result.plan) == (None, None, None)
     assert not any("orbits a day" in c.claim for c in result.claims)
     page = report.write(result, tmp_path / "out").read_text(encoding="utf-8")

@@ -34,8 +34,8 @@ from microrad.report.study import page as report_page
 from microrad.report.study import words as study_words
 from microrad.report.study.data import summary
 from microrad.report.study.page import StudyFigures
-from microrad.study import pointing_cost as performance
-from microrad.study import story as study
+from microrad.study import pointing_penalty as performance
+from microrad.study import study
 from scenes import scene_of
 from shipped import plain_study
 
@@ -138,7 +138,9 @@ def verified_of(scene, design, i, freq):
 
 def with_fine(plain, fine):
     """The study with this fine-pointing loop in it, and its requirements."""
-    found = performance.run(plain.links.data, plain.file.mission.conventions.residual, plain.runs, fine)
+    found = performance.performance_of_loops(
+        plain.links.data, plain.file.mission.conventions.residual, plain.runs, fine
+    )
     case = study.best_case(found, fine)
     judged, papers_loop = study.judged(plain.links, plain.requirements[-2:], fine, case)
     return replace(plain, fine_pointing=fine, performance=found, requirements=judged, papers_loop=papers_loop)

@@ -33,7 +33,7 @@ from microrad.report.links.page import (
     residuals_sentence,
 )
 from microrad.report.quantities import apart, quantity
-from microrad.study.pointing_cost import FINE, Cost, LinkPerformance
+from microrad.study.pointing_penalty import FINE, Cost, LinkPerformance
 from report_pages import without_scripts
 
 FEW = {"acquisition.runs": 100}
@@ -46,7 +46,7 @@ SVG = "{http://www.w3.org/2000/svg}"
 
 
 def studied(folder, *changes):
-    return link_study.run(link_file(folder, *changes))
+    return link_study.run_link_study(link_file(folder, *changes))
 
 
 @pytest.fixture(scope="module")
@@ -460,7 +460,7 @@ def test_every_text_of_the_mission_is_escaped(tmp_path):
     line = 'transmit_power = "5 W"'
     assert text.count(line) == 1
     path.write_text(text.replace(line, f"{line} # literature: <img src=x onerror=y> 2021"), encoding="utf-8")
-    page = without_scripts(links_page(link_study.run(load_link(path))))
+    page = without_scripts(links_page(link_study.run_link_study(load_link(path))))
     assert "<script" not in page
     assert "<img" not in page
     assert page.count("&lt;script&gt;alert(1)&lt;/script&gt; &amp; co") == 3  # title, heading and inputs
@@ -473,7 +473,7 @@ def test_brackets_of_a_comment_are_no_markup_of_the_terminal(tmp_path):
         'transmit_power = "5 W"', 'transmit_power = "5 W" # paper: [bold] 2'
     )
     path.write_text(text, encoding="utf-8")
-    assert "paper: [bold] 2" in links_text(link_study.run(load_link(path)), 160, verbose=True)
+    assert "paper: [bold] 2" in links_text(link_study.run_link_study(load_link(path)), 160, verbose=True)
 
 
 def test_the_page_holds_every_line_and_no_hyphen_for_a_minus(plain):

@@ -17,7 +17,7 @@ from microrad.report.results import manifest_reader, reproduce, tolerances
 from microrad.report.results.manifest import with_manifest
 from microrad.report.results.reproduce import reproduction_data
 from microrad.report.study import page
-from microrad.study import story as study
+from microrad.study import study
 from shipped import SHIPPED, edited_file, without_fine_pointing
 
 
@@ -31,7 +31,7 @@ def no_scan():
 
 @pytest.fixture(scope="module")
 def ran(tmp_path_factory):
-    return study.run(edited_file(tmp_path_factory.mktemp("mission"), ("runs = 4000 ", "runs = 100 ")))
+    return study.run_study(edited_file(tmp_path_factory.mktemp("mission"), ("runs = 4000 ", "runs = 100 ")))
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +44,7 @@ def written(ran, tmp_path_factory):
 @pytest.fixture
 def not_run(monkeypatch, ran, written):
     """The study and its report as they were, without the time that they take."""
-    monkeypatch.setattr(reproduce.study, "run", lambda file, on_progress: ran)
+    monkeypatch.setattr(reproduce.study, "run_study", lambda file, on_progress: ran)
 
     def copied(found, target, **settings):
         shutil.copytree(written, target)

@@ -17,7 +17,7 @@ from microrad.report.results.arrays import study_netcdf
 from microrad.report.study.data import summary
 from microrad.studio.draft.draft import Draft
 from microrad.studio.draft.keys import value_of
-from microrad.study import story as study
+from microrad.study import study
 from shipped import DEFAULT, SHIPPED
 
 SHORTER = {
@@ -163,7 +163,7 @@ def numbers(text, folder, parts):
     path = folder / "mission.toml"
     path.write_text(text, encoding="utf-8")
     try:
-        found = study.run(load_mission(path), parts=parts)
+        found = study.run_study(load_mission(path), parts=parts)
     except (MissionError, ValueError) as error:
         return {"refused": str(error)}
     drawn = {

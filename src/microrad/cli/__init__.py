@@ -107,14 +107,14 @@ def run(
     from microrad import report
     from microrad.core import kept
     from microrad.mission.file import load_mission
-    from microrad.study import story
+    from microrad.study.study import run_study
 
     mission = load_mission(file, mirror)
     folder = output or Path(f"{file.stem}-study")
     report.check_folder(folder, overwrite)
     parts = kept.NOTHING if fresh else kept.of_user()
     with progress_bar() as progress, refusal_of(mission.path):
-        study = story.run(mission, progress, parts)
+        study = run_study(mission, progress, parts)
 
     def write() -> str:
         with progress_bar() as progress:

@@ -35,7 +35,7 @@ def _links(file: Path) -> "LinkStudy":
 
     given = load_link(file)
     with refusal_of(file):
-        return link_study.run(given)
+        return link_study.run_link_study(given)
 
 
 @app.command(
@@ -67,7 +67,7 @@ def contacts(
 
     links = _links(file)
     with refusal_of(file), progress_bar() as progress:
-        day = day_study.run(links, on_progress=progress)
+        day = day_study.run_day_study(links, on_progress=progress)
     code = MET if day.relay.capacity_bit > 0.0 else UNMET
     if as_json:
         return Outcome(json_text({"mission": links.file.mission.name, **day_data(day)}), code)
@@ -111,7 +111,7 @@ def constellation(
     links = _links(file)
     with refusal_of(file):
         with progress_bar() as progress:
-            plan = plans.run(links.file, day_study.given_loss(links), progress)
+            plan = plans.run_constellation(links.file, day_study.given_loss(links), progress)
         code = MET if plan.volume_bit > 0.0 else UNMET
         if as_csv:
             return Outcome(operations.csv_text(plan.planned, plan.epoch.utc), code)

@@ -71,8 +71,8 @@ def budget(  # noqa: PLR0913, PLR0917  each is an option
         )
     given = _changed(loaded, data_rate, pointing_error)
     with refusal_of(file):
-        solution = None if solve is None else link_study.solve(given, solve)
-        study = link_study.run(given if solution is None else solution.file)
+        solution = None if solve is None else link_study.solve_key(given, solve)
+        study = link_study.run_link_study(given if solution is None else solution.file)
     code = exit_on.code(met=met(study), closes=study.closes)
     if as_json:
         return Outcome(json_text(links_data(study, solution)), code)

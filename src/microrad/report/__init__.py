@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from microrad.report.study.data import summary
     from microrad.report.study.page import StudyFigures
     from microrad.report.study.words import verdict_text
-    from microrad.study.story import Study
+    from microrad.study.study import Study
 
 _LAZY = {
     "ReportError": "identification.page",

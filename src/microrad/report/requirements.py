@@ -119,7 +119,7 @@ def advice_for_power(beam: Beam, r: Requirement, tornado: link.Tornado) -> str:
 
 
 def _of_jitter(study: LinkStudy, r: Requirement) -> str:
-    solved = link_study.solve(study.file, "jitter.rms").solved.intervals
+    solved = link_study.solve_key(study.file, "jitter.rms").solved.intervals
     if not solved:
         return advise_change(r, "jitter.rms")
     return advise_at_most(r, "jitter.rms", solved[-1].high, "rad")

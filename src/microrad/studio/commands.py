@@ -57,7 +57,7 @@ def design(file: Path) -> Action:
     """The controllers of the fine-pointing loop."""
     python = _joined(
         "from microrad import load_mission, mirror",
-        "from microrad.link.tracking_light import tracking_light_w",
+        "from microrad.link import tracking_light_w",
         "from microrad.loop import fine_pointing",
         "",
         f"mission = load_mission({str(file)!r})",

@@ -9,7 +9,7 @@ from microrad.campaign.definition.tables import LoopTable
 from microrad.campaign.records import CampaignError
 from microrad.campaign.rows.missions import MissionBuilder
 from microrad.core.progress import Progress
-from microrad.link.tracking_light import tracking_light_w
+from microrad.link import tracking_light_w
 from microrad.loop import fine_pointing
 from microrad.loop.control import AxisController
 from microrad.loop.fine_loop.ensemble import Span

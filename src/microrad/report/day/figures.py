@@ -389,11 +389,11 @@ def _along_figure(day: DayStudy) -> list[Figure]:
     """The contact that the mission looks at in time, the first where it names none."""
     if not day.view.encounters:
         return []
-    o, found = day.mission.operations, day.view.encounters
+    o, found = day.operations, day.view.encounters
     number = 1 if o is None or o.contact is None else o.contact.number
     contact, pair = found[number - 1].contact, day.view.pair
     seen = orbit.sight(pair.leo.orbit, pair.geo.orbit, times(contact))
-    doppler = seen.doppler_hz(day.mission.communication.wavelength_m)
+    doppler = seen.doppler_hz(day.data.table.wavelength_m)
     since_s = seen.time_s - contact.start_s
     rise = pair.epoch.utc(contact.start_s)[:19].replace("T", " ")
     return [
@@ -436,7 +436,7 @@ def _distribution(way: Way) -> tuple[Floats, Floats]:
 
 def ground_map(day: DayStudy) -> Figure:
     """The world with the ground track, the relay and the stations."""
-    o = day.mission.operations
+    o = day.operations
     track = ground_track(day.view, _ways(day), None if o is None else o.downlink)
     places = Places(track.latitude_rad, track.longitude_rad)
     relay, stations = dict([_marked(track.relay)]), dict(_marked(station) for station in track.stations)
@@ -479,4 +479,4 @@ def _contact_run_figure(day: DayStudy, run: ContactRun) -> Figure:
         np.array([w.rms_rad for w in run.windows]),
         np.array([w.largest_rad for w in run.windows]),
     )
-    return contact_run(states, windows, day.mission.requirement.pointing_error_rad)
+    return contact_run(states, windows, day.data.requirement.pointing_error_rad)

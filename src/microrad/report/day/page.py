@@ -15,7 +15,12 @@ from microrad.report.plotting.figure import Figure
 def day_page(day: DayStudy, links: LinkStudy) -> str:
     """The day as one page that loads nothing, with its figures."""
     section = day_section(day, day_figures(day), files=False)
-    context = {"study": links, "mission": day.mission, "day": section, "inputs": list(links.file.sources.items())}
+    context = {
+        "study": links,
+        "mission": links.file.mission,
+        "day": section,
+        "inputs": list(links.file.sources.items()),
+    }
     return render("day/day_page.html", context)
 
 

@@ -17,14 +17,14 @@ def sentences(day: DayStudy) -> list[str]:
 def headline(day: DayStudy) -> list[str]:
     """What the relay and the direct downlink could carry."""
     relay, span = day.relay, duration(day.view.duration_s)
-    whole = day.mission.operations is None or day.mission.operations.relay_share == 1.0
+    whole = day.operations is None or day.operations.relay_share == 1.0
     said = (
         f"In {span} the relay {'is in view' if whole else 'grants the link'} {_how_much(day, relay)}, and could take "
         f"{volume(relay.capacity_bit)}{_a_day(day, volume(relay.capacity_bit / day.view.days))}"
     )
     if day.direct is None:
         return [f"{said}."]
-    d, down = day.direct, day.mission.operations.downlink if day.mission.operations else None
+    d, down = day.direct, day.operations.downlink if day.operations else None
     stations = ", ".join(down.stations) if down else ""
     carried = f"{volume(d.capacity_bit)}{_a_day(day, volume(d.capacity_bit / day.view.days))}"
     return [f"{said}; the ground ({stations}) {_how_much(day, d)}, and could take {carried}{_compared(day.ratio)}."]
@@ -94,7 +94,7 @@ def _never(day: DayStudy) -> str:
 
 def rate_words(day: DayStudy) -> str:
     """The rates, and how far each reaches."""
-    o, furthest = day.mission.operations, day.view.largest("range_most_m")
+    o, furthest = day.operations, day.view.largest("range_most_m")
     assert o is not None
     if not day.closings:
         return "The receiver takes none of the mission's data rates."

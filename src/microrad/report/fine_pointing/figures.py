@@ -15,7 +15,7 @@ from microrad.report.plotting.figure import Figure
 from microrad.report.plotting.palette import BLACK, BLUE, GREEN, GREY, ORANGE, SKY, VERMILION, WHITE
 from microrad.report.plotting.sheet import Bars, Dash, Legend, Line, Panel, Rule, Sheet, Words, grid
 from microrad.report.quantities import micro, share_of_time
-from microrad.study.story import Study
+from microrad.study.study import Study
 
 _COLOURS = (VERMILION, BLUE, GREEN)
 _SHAPES = ("o", "s", "^")  # beside the colours, for print in grey

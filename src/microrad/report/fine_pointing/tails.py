@@ -16,7 +16,7 @@ from microrad.report.plotting.figure import Figure
 from microrad.report.plotting.palette import BLACK, BLUE, GREEN, ORANGE
 from microrad.report.plotting.sheet import Legend, Line, Rule, Words, grid
 from microrad.report.quantities import given_angle, micro, percent, share_of_time
-from microrad.study.story import Study
+from microrad.study.study import Study
 
 SIGMAS = 2.576  # 99 %, as of the interval of the rms
 SHARES = (0.5, 0.9, 0.99, 0.999, 0.9999, 0.99999)

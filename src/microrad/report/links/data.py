@@ -5,11 +5,11 @@ from typing import Any
 
 from microrad.core.budget import Line
 from microrad.link import Swing
-from microrad.link.partner_search import Finding, Found, Tracking
+from microrad.link.acquisition.partner_search import Finding, Found, Tracking
 from microrad.link.pointing import OpenLoopPointing
+from microrad.link.pointing.outage import Performance
 from microrad.link.requirement import met, of_links
 from microrad.link.study import LinkStudy, Solution
-from microrad.link.under_jitter import Performance
 from microrad.report.data import fields
 from microrad.report.requirements import requirement_data
 

@@ -5,11 +5,11 @@ from collections.abc import Sequence
 from typing import Any
 
 from microrad.core.units import format_quantity
-from microrad.link.partner_search import LONGEST_LOOK_S, Finding, Found, Scanned
+from microrad.link.acquisition.partner_search import LONGEST_LOOK_S, Finding, Found, Scanned
 from microrad.link.pointing import OpenLoopPointing
+from microrad.link.pointing.outage import Performance, stated_outage
 from microrad.link.requirement import met, of_links
 from microrad.link.study import LinkStudy, Solution
-from microrad.link.under_jitter import Performance, stated_outage
 from microrad.mirror import Variant
 from microrad.report.data import fields
 from microrad.report.links import words
@@ -18,7 +18,7 @@ from microrad.report.page.templates import render
 from microrad.report.plotting.figure import Figure
 from microrad.report.quantities import minus, quantity
 from microrad.report.requirements import requirements_paragraph
-from microrad.study.pointing_cost import FINE, Cost, LinkPerformance
+from microrad.study.pointing_penalty import FINE, Cost, LinkPerformance
 
 Row = dict[str, Any]
 EARLY = 0.9

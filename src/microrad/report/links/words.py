@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from microrad import link
 from microrad.core.units import format_input
 from microrad.link import Swing
-from microrad.link.partner_search import Finding, Found, Tracking
+from microrad.link.acquisition.partner_search import Finding, Found, Tracking
 from microrad.link.pointing import OpenLoopPointing
+from microrad.link.pointing.outage import Performance, error_rad, required_error_rad
 from microrad.link.requirement import of_links, outage_words
 from microrad.link.study import BeamRadius, LinkStudy, Solution
-from microrad.link.under_jitter import Performance, error_rad, required_error_rad
 from microrad.report.quantities import quantity, signed
 from microrad.report.requirements import advice_for_links, derived_words, first_warning, met_words, nearest
 

@@ -17,7 +17,7 @@ from microrad.lab.recording import Recording
 from microrad.report.plotting.figure import Figure
 from microrad.report.plotting.palette import BLACK, BLUE, GREEN, VERMILION
 from microrad.report.plotting.sheet import Legend, Line, grid
-from microrad.study.story import Study
+from microrad.study.study import Study
 
 PLAN = "paper-experiment"
 SEED = 1

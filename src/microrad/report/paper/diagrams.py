@@ -6,7 +6,7 @@ from microrad.core.units import format_quantity
 from microrad.lab import bench
 from microrad.mission.model import Mission
 from microrad.report.quantities import quantity
-from microrad.study.story import Study
+from microrad.study.study import Study
 
 _COLOURS = ("#E69F00", "#56B4E9", "#009E73", "#CC79A7")
 _BAR = 200.0  # longest bar of the errors, in the units of the drawing

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from microrad.core.arrays import Floats
-from microrad.link.under_jitter import required_error_rad
+from microrad.link.pointing.outage import required_error_rad
 from microrad.loop import sine_run as simulate
 from microrad.loop.paper_cases import PID, PID_WITH_INVERSE, Run
 from microrad.mirror import Variant
@@ -28,7 +28,7 @@ from microrad.report.plotting.sheet import (
     region,
 )
 from microrad.study import paper
-from microrad.study.story import Study
+from microrad.study.study import Study
 
 _LOOKS: tuple[tuple[str, Dash], ...] = ((VERMILION, "--"), (BLUE, "-"))
 

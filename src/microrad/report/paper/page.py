@@ -7,7 +7,7 @@ from microrad.core.units import format_quantity
 from microrad.report.paper import diagrams
 from microrad.report.plotting.figure import Figure
 from microrad.report.quantities import quantity
-from microrad.study.story import Study
+from microrad.study.study import Study
 
 # Table 1 of the paper: year, LEO satellite, its mass, rate in Mbit/s, GEO satellite
 PROJECTS = (

@@ -19,7 +19,7 @@ from microrad.orbit.constellation import ConstellationPlan
 from microrad.orbit.day import DayStudy, Way
 from microrad.report.fine_pointing.data import margins, rms_by_source, sources
 from microrad.study.contact_run import ContactRun
-from microrad.study.story import Study
+from microrad.study.study import Study
 
 
 @dataclass(frozen=True, slots=True)
@@ -350,7 +350,7 @@ def _contacts(day: DayStudy) -> Group:
 def _line_of_sight(day: DayStudy) -> Group:
     """Every contact in time, one after the other."""
     dims, each = ("sample",), day.encounters
-    wavelength = day.mission.communication.wavelength_m
+    wavelength = day.data.table.wavelength_m
     quantities = {
         "time": ("s", "time since the epoch", [e.sight.time_s for e in each]),
         "range": ("m", "range", [e.sight.range_m for e in each]),

@@ -10,7 +10,7 @@ from typing import Any
 from microrad.core.machine import machine, versions
 from microrad.report.data import finite
 from microrad.report.paper.bench import PLAN, SEED
-from microrad.study.story import Study
+from microrad.study.study import Study
 
 MOST_INPUT_BYTES = 1_000_000
 """Length up to which a file that the mission names is carried in the manifest."""

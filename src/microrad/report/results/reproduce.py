@@ -27,7 +27,7 @@ from microrad.report.results.manifest_reader import (
     unpack_mission,
 )
 from microrad.report.results.tolerances import ConverterSteps, converter_steps
-from microrad.study import story as study
+from microrad.study import study
 
 MOST_SHOWN = 40
 """Differences that the text lists."""
@@ -82,7 +82,7 @@ def reproduce(path: Path, on_progress: Progress = lambda done, total, what: None
     with scratch("reproduce") as folder:
         file, moved = unpack_mission(manifest, folder / "study")
         try:
-            ran = study.run(file, on_progress)
+            ran = study.run_study(file, on_progress)
         except ValueError as error:  # an unstable loop, a mirror without inverse, a table that is none
             raise ReproduceError(f"{path}: the mission that it carries does not run: {error}") from error
         page = report.write(ran, folder / "again", on_progress=on_progress)

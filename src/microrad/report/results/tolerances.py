@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 from functools import cache
 
 from microrad.mirror.hysteresis import slow_gain
-from microrad.orbit.events import TOLERANCE_S
-from microrad.study.story import Study
+from microrad.orbit.visibility.events import TOLERANCE_S
+from microrad.study.study import Study
 
 APART = 2.0
 """Steps by which a statistic of one run may move: 3.5 standard deviations of what two roundings differ by.

@@ -14,7 +14,7 @@ from microrad.link import pointing
 from microrad.mirror import Variant
 from microrad.mirror.hysteresis import output_amplitude
 from microrad.report.quantities import micro, quantity, share_of_time, signed
-from microrad.study.story import Study
+from microrad.study.study import Study
 
 _TITLE_HEIGHT, _LINE_HEIGHT, _PAD = 30, 18, 12
 _CHARACTER_WIDTH = 6.5  # of the text, in the mean of a line

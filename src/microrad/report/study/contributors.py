@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from microrad import link
-from microrad.link.budget import FREE_SPACE_LOSS, POINTING_LOSS
+from microrad.link.budget.lines import FREE_SPACE_LOSS, POINTING_LOSS
 from microrad.link.requirement import Requirement, Subject
 from microrad.loop.fine_pointing.parts import GAUGE_NOISE, OPTICAL_NOISE
 from microrad.mirror import Variant
@@ -14,7 +14,7 @@ from microrad.report.fine_pointing.words import source_name
 from microrad.report.quantities import apart, percent, quantity
 from microrad.report.requirements import advice_for_links, advice_for_power, advise_at_most, advise_change, margin_text
 from microrad.study.alternatives import Reading
-from microrad.study.story import Study
+from microrad.study.study import Study
 from microrad.study.verdict import unknown
 
 Row = dict[str, Any]

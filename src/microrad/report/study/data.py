@@ -11,7 +11,7 @@ from microrad.report.fine_pointing.data import fine_pointing_data
 from microrad.report.links.data import budgets_data, performance_data
 from microrad.report.requirements import requirement_data
 from microrad.report.study import words
-from microrad.study.story import Study
+from microrad.study.study import Study
 
 
 def summary(study: Study) -> dict[str, Any]:

@@ -23,8 +23,8 @@ from microrad.report.quantities import given_angle
 from microrad.report.requirements import requirements_paragraph
 from microrad.report.results.manifest import embedded, hash_of_page, with_manifest
 from microrad.report.study import chain, contributors, words
-from microrad.study.pointing_cost import FINE
-from microrad.study.story import Study
+from microrad.study.pointing_penalty import FINE
+from microrad.study.study import Study
 
 PARTS = (
     ("verdict", "Verdict"),
@@ -138,10 +138,10 @@ def _day(study: Study, figures: Sequence[Figure]) -> dict[str, Any] | None:
     day, run, plan = study.day, study.contact, study.plan
     if day is None:
         return None
-    o, fine = day.mission.operations, study.fine_pointing
+    o, fine = day.operations, study.fine_pointing
     shown = None
     if run is not None and fine is not None and o is not None and o.contact is not None:
-        rate = day.mission.communication.data_rate_bit_s if o.rates_bit_s is None else None
+        rate = day.data.table.data_rate_bit_s if o.rates_bit_s is None else None
         name = fine.best.design.name
         shown = {
             "sentences": contact_sentences(run, o.contact.number, name, rate),

@@ -3,7 +3,7 @@
 import math
 
 from microrad.core.units import format_quantity
-from microrad.link.budget import DEEPEST_DB, POINT_AHEAD_LOSS, POINTING_LOSS
+from microrad.link.budget.lines import DEEPEST_DB, POINT_AHEAD_LOSS, POINTING_LOSS
 from microrad.link.requirement import IMPOSSIBLE, outage_words
 from microrad.loop.paper_cases import Run
 from microrad.mirror import Variant
@@ -21,8 +21,8 @@ from microrad.report.requirements import (
 )
 from microrad.report.study import contributors
 from microrad.report.tables import table_text, tables_text
-from microrad.study.pointing_cost import FINE, Cost
-from microrad.study.story import Study
+from microrad.study.pointing_penalty import FINE, Cost
+from microrad.study.study import Study
 
 
 def headline(study: Study) -> str:

@@ -21,9 +21,9 @@ Row = dict[str, Any]
 def run(file: LinkFile, on_progress: Progress) -> DayStudy:
     """The links of a mission, then its day; raises ValueError with the reason where a day cannot be had."""
     on_progress(0, 0, "links")
-    links = link_study.run(file)
+    links = link_study.run_link_study(file)
     on_progress(0, 0, "contacts")
-    return day_study.run(links, on_progress=on_progress)
+    return day_study.run_day_study(links, on_progress=on_progress)
 
 
 def missing(file: LinkFile) -> str:

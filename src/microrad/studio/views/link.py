@@ -14,8 +14,8 @@ from microrad.core.arrays import Floats
 from microrad.core.budget import Line as BudgetLine
 from microrad.core.units import format_quantity
 from microrad.link import study as link_study
+from microrad.link.pointing.outage import error_rad, required_error_rad
 from microrad.link.study import LinkStudy
-from microrad.link.under_jitter import error_rad, required_error_rad
 from microrad.mission.file import LinkFile
 from microrad.report.links.budgets import jitter_lines
 from microrad.report.links.figures import tornado
