@@ -60,8 +60,8 @@ def write_identification(  # noqa: PLR0913  all but the first two are named opti
 ) -> Path:
     """Write the report of an identification as one HTML file that loads nothing, and return its path.
 
-    `mirror_file` and `mirror_text` are the mirror file that goes with it, of the model `written` (default: the chosen
-    one). `recordings` are those that `identify` was given to fit: `found` does not keep the broadband ones, and without
+    `mirror_file` and `mirror_text` are the mirror file that goes with it, of the model `written` (the chosen one unless
+    it is given). `recordings` are those that `identify` was given to fit: `found` does not keep the broadband ones, and without
     them their excitation and time response are not drawn. `virtual` says that they come from the virtual bench, and the
     page and each figure say so too. The file appears whole or not at all. Raises ReportError if ``target`` holds
     something that must not be replaced.
