@@ -243,10 +243,9 @@ class Slow:
         self.folder = folder
         (folder / "mission.toml").write_text(SHIPPED.read_text(encoding="utf-8"), encoding="utf-8")
         campaign = self.campaign("1 s")
-        self.axis = loops.tuned(campaign.mission, campaign.table.loop)
-        loop = loops.row_loop(campaign.mission, campaign.table.loop)
-        held = loops.cell_controller(campaign.mission, campaign.table.loop, self.axis)
-        covariance = importance_sampling.end_covariance(linear.close(loop, held), 5000)
+        own = loops.mission_loop(campaign.mission, campaign.table.loop, campaign.table.seed)
+        self.axis = own.tuned()
+        covariance = importance_sampling.end_covariance(linear.close(own.row, own.controller(self.axis)), 5000)
         assert covariance == pytest.approx(covariance[0, 0] * np.eye(2), abs=1e-9 * covariance[0, 0])
         self.sigma = math.sqrt(covariance[0, 0])
 

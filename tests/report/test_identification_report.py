@@ -16,7 +16,7 @@ from scipy.signal import cont2discrete, lfilter
 from microrad import report
 from microrad.core.kernels import play_response
 from microrad.lab.identify import Refused, identify, mirror_file_text
-from microrad.lab.identify.records import rounded_to_error
+from microrad.lab.identify.statistics import rounded_to_error
 from microrad.lab.recording import Finding, recording_from_arrays
 from microrad.report.identification import figures, words
 from microrad.report.identification import page as identification_page

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from microrad.lab.identify import BoucWenFit, PrandtlIshlinskiiFit
 from microrad.lab.identify.hysteresis.bouc_wen import PARAMETER_UNITS, PARAMETERS
 from microrad.lab.identify.hysteresis.joint import JointFit
-from microrad.lab.identify.records import rounded_to_error
 from microrad.lab.identify.selection.predictions import Fit
+from microrad.lab.identify.statistics import rounded_to_error
 
 HIGH_CORRELATION = 0.95
 
