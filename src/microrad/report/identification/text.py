@@ -7,8 +7,8 @@ from typing import Any
 
 from microrad.lab.identify import Identification, Score
 from microrad.lab.identify.linear.fit import LinearFit
-from microrad.lab.identify.records import rounded_to_error
 from microrad.lab.identify.selection.predictions import Fit
+from microrad.lab.identify.statistics import rounded_to_error
 from microrad.report.identification import words
 from microrad.report.identification.parameters import (
     not_identified,
