@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 import budgets
 from microrad.core.budget import Line, root_sum_square, total_db
-from microrad.link.pointing import open_loop
 from microrad.mission.file import load_mission
 from microrad.mission.model import LinkMission
 from microrad.mission.tables.pointing import PointAhead, PointingLine
