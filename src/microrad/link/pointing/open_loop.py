@@ -85,8 +85,8 @@ class OpenLoopPointing:
 
     `lines` hold the stated half widths, `terms` in the same order what they mean: mean and standard deviation about x
     and y. `variance_shares` is the part of each line in the sum of squared half widths; zeros when every line is zero.
-    `error` is mean and standard deviation of the sum. `confidence` is a share as `interpretation` says, see `error_term`:
-    of the time of the worst-case satellite ("temporal"), or of the times of all satellites ("mixed").
+    `error` is mean and standard deviation of the sum. `confidence` is a share of the time of the worst-case
+    satellite ("temporal") or of the times of all satellites ("mixed"), as `interpretation` says: see `error_term`.
 
     `convention` is the mission's own for a divergence. `required_divergence_rad` has the root sum square as its half
     angle, `confident_divergence_rad` covers with the mission's confidence. `reading` and its counterpart under the
