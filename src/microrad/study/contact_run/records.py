@@ -1,4 +1,4 @@
-"""What a run of a contact is given and what comes of it."""
+"""Inputs and results of one contact in the time domain: its states, settings, windows and log."""
 
 import math
 from collections.abc import Callable
