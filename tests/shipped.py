@@ -56,13 +56,13 @@ def plain_study():
 @cache
 def whole_drawn():
     """The figures of the whole study as its page holds them; once for all tests."""
-    return once("whole drawn", lambda: report.draw(whole_study()[0]))
+    return once("whole drawn", lambda: report.study_figures(whole_study()[0]))
 
 
 @cache
 def plain_drawn():
     """The figures of that study as its page holds them; once for all tests."""
-    return once("plain drawn", lambda: report.draw(plain_study()))
+    return once("plain drawn", lambda: report.study_figures(plain_study()))
 
 
 def edited_file(folder, *changes, whole=False, day=True):

@@ -26,7 +26,7 @@ from microrad.cli import frame, installation, lab
 from microrad.lab import identify
 from microrad.loop import control, fine_pointing
 from microrad.loop.fine_pointing import designs
-from microrad.report import identification_figures
+from microrad.report.identification import page as identification
 from microrad.study import study
 from places import ROOT
 from shipped import plain_study, without_day, without_fine_pointing
@@ -74,7 +74,7 @@ def loop_mirror(tmp_path_factory):
     home = tmp_path_factory.mktemp("identified")
     recording, mirror = write_recording(home / "loop.csv"), home / "loop-mirror.toml"
     with pytest.raises(SystemExit) as stop, pytest.MonkeyPatch.context() as patch:
-        patch.setattr(identification_figures, "draw", lambda *args, **more: {})
+        patch.setattr(identification, "identification_figures", lambda *args, **more: {})
         cli.app(args=["identify", str(recording), *COLUMNS, "--mirror-file", str(mirror)], prog_name="microrad")
     assert not stop.value.code
     return mirror

@@ -13,7 +13,7 @@ from microrad import load_link, load_mirror, report
 from microrad.core.units import parse_quantity
 from microrad.loop import fine_pointing
 from microrad.mission import presets
-from microrad.report import identification_figures
+from microrad.report.identification import page as identification
 from microrad.study import study
 from places import ROOT
 from scenes import scene_of
@@ -117,7 +117,7 @@ def run_once(monkeypatch):
 
     monkeypatch.setattr(study, "run_study", remembered)
     figures = whole_drawn()
-    monkeypatch.setattr(report, "draw", lambda *args: figures)
+    monkeypatch.setattr(report, "study_figures", lambda *args: figures)
     monkeypatch.setattr(report, "write", copied)
     return found
 
@@ -139,7 +139,9 @@ def test_the_papers_mission(walk, monkeypatch):
 
 
 def test_a_lab_identifies_its_mirror(walk, monkeypatch):
-    monkeypatch.setattr(identification_figures, "draw", lambda *args, **kwargs: {})  # drawing has tests of its own
+    monkeypatch.setattr(
+        identification, "identification_figures", lambda *args, **kwargs: {}
+    )  # drawing has tests of its own
     walk.through(EXAMPLES[LAB])
     m = walk.known["file"].mission
     assert (m.requirement.pointing_error_rad, m.requirement.margin_db) == (10e-6, 3.0)

@@ -13,7 +13,7 @@ from microrad.loop.fine_pointing import scenario
 from microrad.mission import file as missionfile
 from microrad.mission.file import NamedFile, load_mission, with_contents
 from microrad.orbit import day
-from microrad.report.page import Drawn
+from microrad.report.study.page import StudyFigures
 from microrad.study import study
 from shipped import SHIPPED
 
@@ -64,7 +64,7 @@ def quick():
         patch.setattr(scenario.disturbance, "table", lambda freq_hz, density, **_: density.tolist())
         patch.setattr(study.paper, "applies", lambda mission: False)
         patch.setattr(day, "swings", lambda *args: ())
-        patch.setattr(report, "draw", lambda *args: Drawn())
+        patch.setattr(report, "study_figures", lambda *args: StudyFigures())
         yield
 
 

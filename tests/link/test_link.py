@@ -17,7 +17,7 @@ from microrad.link import gains, requirement
 from microrad.link import study as link_study
 from microrad.mission.file import load_mission
 from microrad.mission.tables.link import Channel
-from microrad.report import budget_views
+from microrad.report.links import words as links_words
 from places import ROOT
 
 FILE = load_mission(ROOT / "missions" / "paper.toml")
@@ -203,7 +203,7 @@ def test_more_light_received_than_sent_is_no_margin(tmp_path):
     assert not study.communication.possible and not study.closes
     (row,) = [r for r in requirement.of_links(study) if r.subject == "communication"]
     assert (row.met, row.mark, row.because) == (False, "FAIL", requirement.IMPOSSIBLE)
-    assert "The links do not close" in budget_views.verdict(study)
+    assert "The links do not close" in links_words.verdict(study)
     assert link_study.run_link_study(link_file(tmp_path)).communication.possible
 
 

@@ -20,7 +20,12 @@ from microrad.link.budget.lines import LEFT_AT_ZERO
 from microrad.link.pointing.radial_error import Jitter
 from microrad.loop import sensor
 from microrad.mission.file import LinkFile
-from microrad.report import budget_views, links, requirements
+from microrad.report import requirements
+from microrad.report.links import budgets as budget_views
+from microrad.report.links import words as links_words
+from microrad.report.links.budgets import links_text
+from microrad.report.links.data import finding_data, links_data
+from microrad.report.links.page import acquisition_paragraphs, acquisition_section
 from microrad.report.quantities import quantity
 from preset_files import NAMES, completed
 from shipped import edited_file
@@ -67,7 +72,7 @@ def test_the_beacon_is_judged_by_how_often_it_covers_its_partner(tmp_path):
         assert row.actual == pytest.approx(100 * share, abs=0.1)
         assert row.required == 100 * confidence
         assert row.margin == row.actual - row.required
-        assert re.search(rf"covers its partner +{100 * confidence:g} % +98\.\d %", budget_views.text(found, 80))
+        assert re.search(rf"covers its partner +{100 * confidence:g} % +98\.\d %", links_text(found, 80))
 
 
 def test_errors_that_were_derived_from_the_cone_are_held_against_their_root_sum_square_alone(tmp_path):
@@ -108,7 +113,7 @@ def test_what_to_change_just_meets_the_requirement(tmp_path, changes, key, unit,
     found = studied(tmp_path, changes)
     judged = requirement.of_links(found)
     row = requirements.nearest(judged)
-    (said,) = [re.search(RATHER, sentence) for sentence in budget_views.short(found) if RATHER[:5] in sentence]
+    (said,) = [re.search(RATHER, sentence) for sentence in links_words.short(found) if RATHER[:5] in sentence]
     assert (said[1], said[3]) == (key, word) and row.met is (word == "least")
     value = parse_quantity(said[2], unit)
     side = -1 if word == "less" else 1
@@ -123,7 +128,7 @@ def test_what_to_change_just_meets_the_requirement(tmp_path, changes, key, unit,
 
 def test_far_more_power_than_there_is_is_no_advice(tmp_path):
     found = studied(tmp_path, {"pointing.confidence": 0.5, "communication.distance": "400000 km"})
-    (said,) = [sentence for sentence in budget_views.short(found) if "; to meet it, " in sentence]
+    (said,) = [sentence for sentence in links_words.short(found) if "; to meet it, " in sentence]
     assert said.endswith(f"; to meet it, change {found.tornados[0].swings[0].key}.")
 
 
@@ -541,7 +546,7 @@ def test_the_scan_waits_for_the_light_that_the_sensor_needs(tmp_path, monkeypatc
     assert plain.finding.scanned.half_angle_rad == pytest.approx(half, rel=1e-12)
     assert plain.finding.scanned.needed_detection_s == pytest.approx(0.01 * (10e-12 / edge) ** 2, rel=1e-9)
     assert plain.finding.scanned.needed_detection_s < plain.finding.scanned.stated_detection_s == 1e-3
-    assert "needs" not in links.acquisition_words(plain.finding)[1]
+    assert "needs" not in acquisition_paragraphs(plain.finding)[1]
 
     dim = link_study.run_link_study(link_file(tmp_path, FEW, {"beacon.required_power": "10 nW"})).finding
     needed = 0.01 * (10e-9 / edge) ** 2
@@ -549,8 +554,8 @@ def test_the_scan_waits_for_the_light_that_the_sensor_needs(tmp_path, monkeypatc
     assert needed > 1e-3
     assert dim.scanned.duration_s == pytest.approx(plain.finding.scanned.duration_s * needed / 1e-3, rel=1e-9)
     assert dim.scanned.speed_rad_s == pytest.approx(dim.trade.speed_rad_s, rel=1e-9)
-    assert f"needs {quantity(needed, 's')} in place of the 1 ms" in links.acquisition_words(dim)[1]
-    data = budget_views.finding_data(dim)
+    assert f"needs {quantity(needed, 's')} in place of the 1 ms" in acquisition_paragraphs(dim)[1]
+    data = finding_data(dim)
     assert (data["scan_stated_detection_s"], data["scan_needed_detection_s"]) == pytest.approx((1e-3, needed))
 
 
@@ -575,17 +580,17 @@ def test_a_scan_with_too_little_light_never_finds(tmp_path, changes):
     assert not found.scanned.detects
     assert not any(way.possible for way in found.ways)
     assert found.trade is None
-    assert "It detects nothing" in links.acquisition_words(found)[1]
-    assert all("never" in sentence for sentence in budget_views.acquisition(found))
-    assert [budget_views.finding_data(found)[key] for key in ("scan_s", "scan_needed_detection_s")] == [None, None]
+    assert "It detects nothing" in acquisition_paragraphs(found)[1]
+    assert all("never" in sentence for sentence in links_words.acquisition_sentences(found))
+    assert [finding_data(found)[key] for key in ("scan_s", "scan_needed_detection_s")] == [None, None]
 
 
 def test_a_way_that_never_locks_has_no_times(tmp_path):
     found = studied(tmp_path, {"answer.required_power": "1 uW"}).finding
-    (row,) = links.acquisition(found)["ways"]
+    (row,) = acquisition_section(found)["ways"]
     assert row["cells"] == ["never", "0.0000", "\u2013", "none locks", "\u2013"]
-    assert budget_views.acquisition(found) == ["Acquisition by wide beacon: never (simulated 0.0000)."]
-    (way,) = budget_views.finding_data(found)["ways"]
+    assert links_words.acquisition_sentences(found) == ["Acquisition by wide beacon: never (simulated 0.0000)."]
+    (way,) = finding_data(found)["ways"]
     assert (way["mean_time_s"], way["simulated_mean_time_s"]) == (None, None)
 
 
@@ -601,8 +606,8 @@ def test_an_answer_without_light_is_a_result_and_no_refusal(tmp_path, changes):
     assert found.tracking.signal_to_noise < 1e-6
     assert found.finding.chances.answer_detection == pytest.approx(norm.sf(5.0), rel=1e-3)
     assert not found.finding.wide.possible
-    assert any("less than its noise" in sentence for sentence in budget_views.sentences(found))
-    assert budget_views.data(found)["tracking"]["noise_equivalent_angle_rad"] is None
+    assert any("less than its noise" in sentence for sentence in links_words.sentences(found))
+    assert links_data(found)["tracking"]["noise_equivalent_angle_rad"] is None
     names = [line.name for name, line in budget_views.lines(found) if name == "Tracking sensor"]
     assert names == [line.name for line in found.tracking.noise_lines]
 
@@ -707,7 +712,7 @@ def test_the_best_radius_of_a_beam_is_the_published_one(tmp_path):
 def test_an_aperture_that_grows_around_an_unchanged_beam_is_pointed_out(tmp_path):
     def told(aperture):
         study = lit_by(tmp_path, "20 mm", aperture, "2 urad")
-        return study.communication.margin_db, [s for s in budget_views.short(study) if "radius" in s]
+        return study.communication.margin_db, [s for s in links_words.short(study) if "radius" in s]
 
     (filled, quiet), (hollow, said) = told("5 cm"), told("10 cm")
     assert hollow - filled < 3.0  # where an aperture that is filled brings 6 dB at either end

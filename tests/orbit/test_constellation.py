@@ -15,7 +15,7 @@ from microrad.orbit import constellation, files, operations
 from microrad.orbit import day as day_study
 from microrad.orbit.constellation import opportunities
 from microrad.orbit.propagation import mean_elements
-from microrad.report import constellation_views
+from microrad.report.day.constellation import plan_data, plan_sentences, plan_text, satellites_table
 
 SIX_HOURS = {"orbit.duration": "6 h"}
 TWO_TERMINALS = {"constellation.terminals": 2}
@@ -284,22 +284,22 @@ def test_the_contact_plan_has_every_session_with_data_in_whole_seconds(plan):
 
 
 def test_the_words_add_up(plan):
-    first, second, third = constellation_views.sentences(plan)
+    first, second, third = plan_sentences(plan)
     seen = float(np.sum(plan.opportunities.end_s - plan.opportunities.start_s)) / 3600.0
     assert f"12 satellites share 2 relays of one terminal each: in 6 h {len(plan.opportunities.start_s)} conta" in first
     assert f"{seen:.0f} h in all" in first
     assert f"{len(plan.planned)} sessions" in first
     assert all(f"{name} {100 * use:.0f} %" in second for name, use in zip(plan.relays, plan.use, strict=True))
     assert third.endswith(f" a pointing loss of {plan.loss.loss_db:.2f} dB ({plan.loss.source}).")
-    data = constellation_views.data(plan)
+    data = plan_data(plan)
     assert sum(s["sessions"] for s in data["satellites"]) == data["sessions"] == len(plan.planned)
     assert sum(s["volume_bit"] for s in data["satellites"]) == pytest.approx(data["volume_bit"])
-    assert len(constellation_views.rows(plan)) == 12
+    assert len(satellites_table(plan).rows) == 12
 
 
 def test_a_long_table_is_cut_and_says_so(tmp_path):
     plan, _ = planned(tmp_path, {"orbit.duration": "1 h", "constellation.satellites": 45})
-    text = constellation_views.text(plan, 120)
+    text = plan_text(plan, 120)
     assert "The first 40 of 45 satellites; --csv has every session." in text
     assert " 3-10 " in text.replace("\n", " ")
     assert "3-11" not in text

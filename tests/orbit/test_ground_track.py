@@ -13,7 +13,7 @@ from microrad.orbit import EARTH_RADIUS_M, GEOSTATIONARY_RADIUS_M
 from microrad.orbit import day as day_study
 from microrad.orbit.day import NOTHING, Numbers, Swing
 from microrad.orbit.day.ground_track import LONGEST_S, STEP_S, ground_track
-from microrad.report import day_plots
+from microrad.report.day.figures import day_figures
 
 SIX_HOURS = {"orbit.duration": "6 h", **ALONE}
 HIGH = {"kind": "circular", "altitude": "8000 km", "inclination": "30 deg", "node": "0 deg", "phase": "0 deg"}
@@ -155,7 +155,7 @@ def drawn(tmp_path, monkeypatch):
         day = day_study.run_day_study(
             link_study.run_link_study(day_file(tmp_path, SIX_HOURS, {"operations.runs": 1}, *changes))
         )
-        return day, {figure.name: figure for figure in day_plots.draw(day)}
+        return day, {figure.name: figure for figure in day_figures(day)}
 
     return draw
 

@@ -12,8 +12,11 @@ from microrad import cli, report
 from microrad.core import machine
 from microrad.mission import toml as document
 from microrad.mission.file import load_mission
-from microrad.report import compared, page, results, tolerances
 from microrad.report.plotting import palette
+from microrad.report.results import comparison as compared
+from microrad.report.results import tolerances
+from microrad.report.results.manifest import MOST_INPUT_BYTES
+from microrad.report.study.page import PARTS
 from microrad.studio import server, session
 from microrad.studio.guard import address
 from microrad.studio.guard import middleware as guard
@@ -67,7 +70,7 @@ def test_pages_that_are_linked_exist(text):
 # -------------------------------------------------------------------------------------------------------------- report
 def test_the_parts_of_the_report_are_those_of_the_page():
     parts = re.findall(r"(?m)^\| (\d) (.+?) \|", REPORT)
-    assert parts == [(str(number), title) for number, (_, title) in enumerate(page.PARTS, start=1)]
+    assert parts == [(str(number), title) for number, (_, title) in enumerate(PARTS, start=1)]
 
 
 def test_each_requirement_stands_in_the_table():
@@ -85,7 +88,7 @@ def test_each_requirement_stands_in_the_table():
 def test_the_numbers_of_the_report_are_those_of_the_code():
     told(REPORT, f"in words to {100 * compared.WORDS_SHARE:g} %", f"at most {palette.MOST_POINTS} points")
     assert set(re.findall(r"`([A-Z0-9_]+)`", REPORT)) == set(machine.VARIABLES)
-    told(REPORT, f"up to {results.MOST_INPUT_BYTES / 1e6:g} MB each")
+    told(REPORT, f"up to {MOST_INPUT_BYTES / 1e6:g} MB each")
 
 
 def test_each_kind_of_tolerance_has_its_row():

@@ -17,18 +17,16 @@ import xarray as xr
 from microrad import report
 from microrad.core import folder
 from microrad.mission import file as missionfile
-from microrad.report import (
-    chain,
-    drawings,
-    figures,
-    link_figures,
-    page,
-    paper_bench,
-    paper_views,
-    requirement_views,
-    requirements,
-    words,
-)
+from microrad.report import requirements
+from microrad.report.links import figures as link_module
+from microrad.report.paper import bench, figures
+from microrad.report.paper import diagrams as drawings
+from microrad.report.paper import page as paper_views
+from microrad.report.paper.page import paper_section
+from microrad.report.requirements import requirements_paragraph
+from microrad.report.study import chain, page, words
+from microrad.report.study import contributors as requirement_views
+from microrad.report.study import words as study_words
 from microrad.study import study
 from microrad.study.pointing_penalty import Cost
 from report_pages import assert_sound
@@ -108,7 +106,7 @@ def test_the_page_opens_with_the_verdict_and_keeps_its_order(written, paper):
     links = parsed(text)
     visible = " ".join(links.text)
     wanted = (
-        report.words.headline(paper),
+        study_words.headline(paper),
         "5 requirements are met. FAIL: ",
         "Contents",
         "Each arrow hands a result on",
@@ -178,7 +176,7 @@ def test_a_requirement_moved_most_by_a_share_says_by_what_factor(paper):
 
 
 def test_the_paragraph_says_what_fails_and_by_what_then_what_holds(paper):
-    said = requirements.paragraph(paper.requirements)
+    said = requirements_paragraph(paper.requirements)
     count, _, rest = said.partition(" FAIL: ")
     failed, _, passed = rest.partition(" PASS: ")
     assert (
@@ -189,7 +187,7 @@ def test_the_paragraph_says_what_fails_and_by_what_then_what_holds(paper):
         here = f"{r.name} {requirements.signed(r)}"
         assert (f"{here}, by {r.limited_by}" in failed, here in passed) == (not r.met, r.met)
     met = tuple(r for r in paper.requirements if r.met)
-    assert " FAIL: " not in requirements.paragraph(met)
+    assert " FAIL: " not in requirements_paragraph(met)
 
 
 def test_each_box_of_the_chain_holds_its_own_numbers(paper):
@@ -274,7 +272,7 @@ def test_long_lines_of_the_chain_are_broken_to_their_box():
 
 
 def test_the_virtual_bench_stands_where_the_paper_measures(written, paper):
-    found = paper_bench.chirp()
+    found = bench.chirp()
     assert 96.9 <= found.fit_percent < 97.1
     visible = " ".join(parsed((written / "report.html").read_text(encoding="utf-8")).text)
     assert f"explains {found.fit_percent:.1f} % of it (the paper: about 97 %)" in visible
@@ -283,9 +281,9 @@ def test_the_virtual_bench_stands_where_the_paper_measures(written, paper):
         "Fig. 5  Hysteresis measured and modelled (virtual",
     ):
         assert title in visible
-    assert [loop.freq_hz for loop in paper_bench.loops()] == [60.0, 80.0, 100.0]
-    assert {loop.fitted_hz for loop in paper_bench.loops()} == {100.0}
-    assert all(0.0 < loop.error_percent < 0.2 for loop in paper_bench.loops())
+    assert [loop.freq_hz for loop in bench.loops()] == [60.0, 80.0, 100.0]
+    assert {loop.fitted_hz for loop in bench.loops()} == {100.0}
+    assert all(0.0 < loop.error_percent < 0.2 for loop in bench.loops())
 
 
 def test_another_kind_of_mirror_leaves_the_bench_out(no_scan, tmp_path):
@@ -308,7 +306,7 @@ def test_table_2_sets_the_mission_beside_the_paper(written, paper):
 
 def test_each_figure_of_the_paper_is_the_one_of_ours_that_stands_for_it(paper):
     drawn = plain_drawn()
-    found = paper_views.context(paper, (*drawn.study, *drawn.bench))
+    found = paper_section(paper, (*drawn.study, *drawn.bench))
     assert {number: [f.name for f in several] for number, several in found["figures"].items()} == {
         "Fig. 2": ["fig2-margin-map"],
         "Fig. 4": ["fig4-chirp"],
@@ -320,7 +318,7 @@ def test_each_figure_of_the_paper_is_the_one_of_ours_that_stands_for_it(paper):
     assert all(figure.title.startswith(number) for number, several in found["figures"].items() for figure in several)
     assert [n for n, several in found["figures"].items() if "virtual bench" in several[0].title] == ["Fig. 4", "Fig. 5"]
     assert [*found["differs"]] == [f"Fig. {n}" for n in range(1, 9)]
-    without = paper_views.context(paper, drawn.study)
+    without = paper_section(paper, drawn.study)
     assert without["differs"]["Fig. 4"].startswith("Not drawn: ")
 
 
@@ -438,8 +436,8 @@ def test_two_runs_write_the_same_page_and_figures(paper, written, tmp_path):
 
 
 def test_results_are_never_replaced_silently(small, tmp_path, monkeypatch):
-    for module in (figures, link_figures, paper_bench):
-        monkeypatch.setattr(module, "draw", lambda *args: ())
+    for module, name in ((figures, "paper_figures"), (link_module, "link_figures"), (bench, "bench_figures")):
+        monkeypatch.setattr(module, name, lambda *args: ())
     target = tmp_path / "out"
     report.write(small, target)
     before = {p: p.read_bytes() for p in target.rglob("*") if p.is_file()}
@@ -485,7 +483,7 @@ def test_an_interrupted_write_leaves_nothing_and_keeps_the_old(tmp_path, error):
 @pytest.fixture
 def no_bench(monkeypatch):
     """The paper's experiment is the same in every mission's report."""
-    monkeypatch.setattr(paper_bench, "draw", lambda *args: ())
+    monkeypatch.setattr(bench, "bench_figures", lambda *args: ())
 
 
 @pytest.mark.usefixtures("no_scan", "no_bench")

@@ -15,7 +15,7 @@ from microrad import link
 from microrad.link import study as link_study
 from microrad.link.pointing import outage as under_jitter
 from microrad.orbit import day as day_study
-from microrad.report import day_plots
+from microrad.report.day import figures as day_plots
 from microrad.report.plotting.sheet import Axis, Line, Rule, grid
 from microrad.studio.draft.draft import Draft
 from microrad.studio.views import attempts, plots, sliders

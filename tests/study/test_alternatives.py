@@ -7,7 +7,8 @@ import pytest
 
 from microrad import link, report
 from microrad.loop import paper_cases as tracking
-from microrad.report import requirement_views, words
+from microrad.report.study import contributors as requirement_views
+from microrad.report.study import words
 from microrad.study import alternatives as readings
 from scenes import cases_of
 from shipped import edited, plain_study

@@ -13,9 +13,13 @@ from microrad.link.requirement import IMPOSSIBLE
 from microrad.loop import sine_run as simulate
 from microrad.mirror.summary import summarise, unknown_dynamics
 from microrad.mission.file import load_mission
-from microrad.report import chain, figures, links, requirement_views, words
-from microrad.report.fine_pointing_words import not_reliable
-from microrad.report.words import headline
+from microrad.report.fine_pointing.words import not_reliable
+from microrad.report.links.page import links_section, performance_section
+from microrad.report.paper import figures
+from microrad.report.study import chain, words
+from microrad.report.study import contributors as requirement_views
+from microrad.report.study.data import summary
+from microrad.report.study.words import headline
 from microrad.study import paper, study, verdict
 from scenes import scene_of
 from shipped import DEFAULT, SHIPPED, edited_file, whole_study
@@ -169,7 +173,7 @@ def test_what_hysteresis_costs_the_link(shipped, source, controller, margin_db, 
     assert_allclose(-cost.data_rate_bit_s, cost_mbit_s * 1e6, atol=0.06e6)
     (row,) = [
         r
-        for r in links.performance(found, "", None)["performance"]
+        for r in performance_section(found, "", None)["performance"]
         if r["source"] == source and r["controller"] == controller and r["mirror"] == "given"
     ]
     assert row["cells"][4] == f"{margin_db:+.2f}".replace("-", "\u2212")
@@ -181,7 +185,7 @@ def test_the_beacon_brings_four_times_what_its_partners_sensor_needs(shipped):
     assert_allclose(beacon.irradiance_w_m2, 2.42e-9, atol=0.005e-9)
     assert_allclose(beacon.required_irradiance_w_m2, 566e-12, atol=0.5e-12)
     assert_allclose(beacon.required_irradiance_w_m2, 10e-12 / (pi / 4 * 0.15**2), rtol=1e-9)
-    said = links.context(shipped[0].links, budgets=(), figures=(), files=False)["sentences"]
+    said = links_section(shipped[0].links, budgets=(), figures=(), files=False)["sentences"]
     (line,) = [each for each in said if each.startswith("Beacon at its partner")]
     assert "2.42 nW/m^2 at the pointing error" in line
     assert line.endswith("needs 566 pW/m^2.")
@@ -377,7 +381,7 @@ def test_a_jitter_is_not_summed_with_what_the_simulated_loop_leaves(tmp_path):
     texts = [row["contributor"] for row in requirement_views.rows(shaken)]
     assert texts == [row["contributor"] for row in requirement_views.rows(plain)]
     assert "outage" not in texts[-1] and "moves most with terminals.geo_aperture: 1.74 dB" in texts[-1]
-    margins = words.summary(shaken)["margin_db"]
+    margins = summary(shaken)["margin_db"]
     assert margins["communication_as_budgeted"] == shaken.communication.margin_db
     assert (margins["communication_static"], margins["judged"]) == (shaken.static.margin_db, plain.margin_db)
     drawn, other = figures.margin_map(shaken), figures.margin_map(plain)

@@ -62,7 +62,7 @@ class BeamRadius:
 class LinkStudy:
     """Everything that follows from the tables of the links alone. The links that a mission lacks are None.
 
-    The communication budget is made at the error of `under_jitter.error_rad`: under a jitter its margin is the one
+    The communication budget is made at the error of `outage.error_rad`: under a jitter its margin is the one
     that is kept but for the outage, and the margin at the static pointing error stands below it. ``receiver_noise`` are
     the noise terms of the communication receiver at the received power, where it is given by what it is made of.
     ``data`` is the communication link assembled. ``tornados`` has one of each budget, in the same order.
@@ -215,7 +215,7 @@ def run_link_study(file: LinkFile, parts: kept.Kept = kept.NOTHING) -> LinkStudy
 
 
 def communication_budget(data: link.DataLink, sources: Mapping[str, Source]) -> link.LinkBudget:
-    """The budget of the communication link at `under_jitter.error_rad`, with the static margin under a jitter.
+    """The budget of the communication link at `outage.error_rad`, with the static margin under a jitter.
 
     Raises ValueError for a data rate that the receiver does not take.
     """

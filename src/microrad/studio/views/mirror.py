@@ -11,7 +11,8 @@ import numpy as np
 
 from microrad.core.units import format_quantity
 from microrad.lab.live_fit import LiveFit
-from microrad.report.plotting.sheet import BLACK, BLUE, GREY, SKY, VERMILION, Axis, Line, Span, grid
+from microrad.report.plotting.palette import BLACK, BLUE, GREY, SKY, VERMILION
+from microrad.report.plotting.sheet import Axis, Line, Span, grid
 from microrad.studio.jobs.queue import Job
 from microrad.studio.recordings.reading import View
 from microrad.studio.views.live_fit import leader
