@@ -10,7 +10,7 @@ from functools import partial
 import pytest
 
 from microrad.core import threads
-from microrad.core.threads import aside, both, in_threads, shared_out
+from microrad.core.threads import aside, beside, both, in_threads, shared_out
 from waiting import HANG_S
 
 
@@ -94,6 +94,23 @@ def test_an_error_in_a_shared_job_is_the_callers(forks, monkeypatch):
     with shared_out([broken, lambda: 2]) as results, pytest.raises(ValueError, match="broken"):
         results()
     assert both(lambda: 1, lambda: "two") == (1, "two")
+    with beside(broken) as result, pytest.raises(ValueError, match="broken"):
+        result()
+    with beside(lambda: 3) as result:
+        assert result() == 3
+
+
+@pytest.mark.skipif(sys.platform != "linux" or os.cpu_count() == 1, reason="nothing is forked")
+def test_a_job_is_done_beside_what_the_caller_does_meanwhile():
+    code = """
+import os
+from microrad.core.threads import beside
+with beside(os.getpid) as result:
+    os.waitid(os.P_ALL, 0, os.WEXITED | os.WNOWAIT)
+    assert result() != os.getpid()
+"""
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (ran.returncode, ran.stderr) == (0, "")
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="nothing is forked")

@@ -38,17 +38,21 @@ def in_threads(
 
 @contextlib.contextmanager
 def shared_out(
-    jobs: Sequence[Callable[[], _Result]], on_turn: Callable[[int], None] = lambda number: None
+    jobs: Sequence[Callable[[], _Result]],
+    on_turn: Callable[[int], None] = lambda number: None,
+    *,
+    meanwhile: bool = False,
 ) -> Iterator[Callable[[], list[_Result]]]:
     """Jobs in Python that forked processes begin with, at most 256; the callable takes part and returns their results.
 
-    ``on_turn`` hears the number of each job that the callable itself begins.
+    ``on_turn`` hears the number of each job that the callable itself begins. ``meanwhile`` says that the caller has
+    other work to do first: all jobs may then be done by others.
 
     A result is pickled. A process that fails leaves its jobs to the caller, so an error is the one that the job raises
     there. Where no process can be forked the callable does all of them: that is safe on Linux alone, while no other
     thread runs.
     """
-    helpers = min((os.cpu_count() or 1) - 1, len(jobs) - 1) if _may_fork() else 0
+    helpers = min((os.cpu_count() or 1) - 1, len(jobs) - (not meanwhile)) if _may_fork() else 0
     turns, given = os.pipe()
     os.write(given, bytes(range(len(jobs))))
     os.close(given)
@@ -84,6 +88,16 @@ def both(first: Callable[[], _First], second: Callable[[], _Second]) -> tuple[_F
     with shared_out(jobs) as results:
         of_first, of_second = results()
     return of_first, of_second
+
+
+@contextlib.contextmanager
+def beside(job: Callable[[], _Result]) -> Iterator[Callable[[], _Result]]:
+    """A job in Python beside what the caller does meanwhile, where that is possible; the callable returns its result.
+
+    It is done by the callable itself where no other process has begun with it (see `shared_out`).
+    """
+    with shared_out([job], meanwhile=True) as results:
+        yield lambda: results()[0]
 
 
 def aside(job: Callable[[], object]) -> Callable[[], None]:

@@ -3,6 +3,7 @@
 import csv
 import io
 from collections.abc import Mapping
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from microrad.core.folder import MANIFEST, FolderError, check_folder, whole_folder
 from microrad.core.kept import NOTHING, Kept
 from microrad.core.progress import Progress
+from microrad.core.threads import beside
 from microrad.report.tables import Column, rows_of
 
 if TYPE_CHECKING:
@@ -73,9 +75,10 @@ def write(
     from microrad.report.study.data import summary
     from microrad.report.study.page import study_page
 
-    with whole_folder(folder, overwrite) as draft:
+    numbers_of = partial(parts.part, study_netcdf, study)
+    with whole_folder(folder, overwrite) as draft, beside(numbers_of) as numbers:
         on_progress(0, 3, "figures")
-        drawn, numbers = study_figures(study, parts), parts.part(study_netcdf, study)
+        drawn = study_figures(study, parts)
         (draft / "figures").mkdir()
         for figure in drawn.every:
             (draft / "figures" / f"{figure.name}.svg").write_text(figure.svg, encoding="utf-8")
@@ -86,7 +89,7 @@ def write(
         on_progress(2, 3, "results")
         if study.plan is not None:
             write_plan(study.plan, draft)
-        (draft / "results.nc").write_bytes(numbers)
+        (draft / "results.nc").write_bytes(numbers())
         write_manifest(made, draft, MANIFEST)
         on_progress(3, 3, "done")
     return folder / "report.html"

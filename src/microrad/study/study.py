@@ -10,7 +10,7 @@ from microrad import link, mirror, orbit
 from microrad.core import kept
 from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
-from microrad.core.threads import both
+from microrad.core.threads import beside, both
 from microrad.link import pointing, requirement
 from microrad.link import study as link_study
 from microrad.link.pointing.outage import Performance
@@ -176,26 +176,32 @@ def run_study(
 
     compiled = ensemble.compile_aside(lambda: scene().loop) if m.fine_pointing else lambda: None
     on_progress(0, 3, "budgets, acquisition, mirror and tracking")
-    (summary, loops, margins, runs), (links, fig2) = both(
-        lambda: (mirror_summary.summarise(m.mirror), *parts.part(paper_cases.results, cases)), linked
-    )
+    with beside(linked) as of_links:
+        summary = mirror_summary.summarise(m.mirror)
+        loops, margins, runs = parts.part(paper_cases.results, cases)
+        residual = paper_cases.worst(runs, q.residual_statistic)
+        as_read = alternatives.other_readings(m, residual, parts)
+        on_progress(1, 3, "claims of the paper")
+        scan = parts.part(paper.scan, cases, on_progress=on_progress) if paper.applies(m.mirror) else None
+        fine = None
+        try:
+            if m.fine_pointing is not None:
+                compiled()
+                fine = parts.part(fine_pointing.run, scene(), on_progress=on_progress)
+        except ValueError:
+            of_links()  # what is wrong with the links is said first
+            raise
+        links, fig2 = of_links()
     data = links.data
-    residual = paper_cases.worst(runs, q.residual_statistic)
     left_rad = paper_cases.residual_rad(q, m.conventions, residual.trace)
     simulated = f"simulated: {residual.trace.name}, {q.residual_statistic} ({m.conventions.residual})"
     achieved = link.communication_budget(data, sources, pointing_error_rad=left_rad, given_source=simulated)
-    as_read, compared = alternatives.other_readings(m, residual, parts), None
+    compared = None
     if m.mirror.comparison is not None:
         other = paper_cases.worst(runs, q.residual_statistic, Variant.COMPARISON)
         at_rad = paper_cases.residual_rad(q, m.conventions, other.trace)
         compared = Comparison(other, float(link.margin_of_error(data, at_rad)))
 
-    on_progress(1, 3, "claims of the paper")
-    scan = parts.part(paper.scan, cases, on_progress=on_progress) if paper.applies(m.mirror) else None
-    fine = None
-    if m.fine_pointing is not None:
-        compiled()
-        fine = parts.part(fine_pointing.run, scene(), on_progress=on_progress)
     on_progress(2, 3, "the day")
     found = pointing_penalty.performance_of_loops(data, m.conventions.residual, runs, fine)
     case = best_case(found, fine)

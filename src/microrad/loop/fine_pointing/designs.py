@@ -74,6 +74,8 @@ def design(
 
     Raises ValueError for a name that `names` does not list, and with the reason when a modulus margin cannot be met.
     """
+    import scipy.optimize  # noqa: F401  slow to import: once, ahead of the other process
+
     of, wanted = plants(scene, scene.table.seed), tuple(only) or names(scene.table)
     groups = _groups(wanted, scene.table)
     jobs = [partial(_tuned_in_turn, {name: _tuning(name, scene.table, of) for name in group}) for group in groups]
