@@ -27,7 +27,7 @@ from microrad.campaign.rows.loops import mission_loop
 from microrad.campaign.statistics.tails import tail_of_time, tail_weighted
 from microrad.core.threads import in_threads
 from microrad.loop.control import AxisController
-from microrad.loop.fine_loop.ensemble import bin_edges_rad
+from microrad.loop.pointing_loop.ensemble import bin_edges_rad
 
 MISSION = Path(__file__).resolve().parent.parent / "missions" / "leo-geo.toml"
 PROBABILITY, CONFIDENCE = 1e-6, 0.99

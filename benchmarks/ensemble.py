@@ -24,8 +24,8 @@ from microrad import mirror
 from microrad.core import kernels, lti
 from microrad.loop import control, disturbance
 from microrad.loop import sine_run as simulate
-from microrad.loop.fine_loop import ensemble
-from microrad.loop.fine_loop import loop as fine
+from microrad.loop.pointing_loop import ensemble, kernel_arrays, traces
+from microrad.loop.pointing_loop import loop as fine
 from microrad.loop.sensor import OpticalSensor
 from microrad.mission import file as missionfile
 
@@ -66,8 +66,8 @@ def ratio() -> None:
         return np.ascontiguousarray(p.references[0].at(np.arange(samples + 1) * PERIOD_S)[:, None])
 
     def side_by_side(loop: fine.PointingLoop) -> Callable[[], None]:
-        arrays = ensemble.arrays(loop, c, 1)
-        state, reference = ensemble.start(loop, arrays, 0), reference_of(PIECE)
+        arrays = kernel_arrays.arrays(loop, c, 1)
+        state, reference = kernel_arrays.start(loop, arrays, 0), reference_of(PIECE)
         state.place[kernels.COUNTING] = 1
         return lambda: kernels.ensemble_loop(arrays, state, reference[:, :, None], nothing, nothing, kernels.UNSHIFTED)
 
@@ -89,7 +89,7 @@ def ratio() -> None:
         times = {name: min(each[name] for each in rounds) for name in pieces}
         run_twin, theirs = c_twin(10_000)
         run_twin()
-    traced = ensemble.trace(p, c, ensemble.Span(10_000 * PERIOD_S, 0.0, 1))
+    traced = traces.trace(p, c, ensemble.Span(10_000 * PERIOD_S, 0.0, 1))
     np.testing.assert_allclose(traced.mirror_rad[:, 0], theirs[:, 0], rtol=0.0, atol=1e-9 * np.abs(theirs).max())
     steps = PIECE * STEPS * runs
     kernel, noise, c_step = (times[name] / steps * 1e9 for name in ("kernel", "noisy", "twin"))
@@ -103,16 +103,16 @@ def many_runs(runs: int = 1000, seconds: float = 10.0) -> None:
     p, c, _ = scene()
     p = replace(p, disturbances=((disturbance.olympus(),),), optical=replace(p.optical, noise_rad=1e-6))
     span = ensemble.Span(seconds, 1.0, 1)
-    ensemble.run(p, c, replace(span, duration_s=1.1), 1)
+    ensemble.simulate(p, c, replace(span, duration_s=1.1), 1)
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     began = time.perf_counter()
-    two = ensemble.run(p, c, span, runs, threads=2)
+    two = ensemble.simulate(p, c, span, runs, threads=2)
     took = time.perf_counter() - began
     grown = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
     print(f"\n{runs} runs of {seconds:g} s at 50 kHz with disturbance and noise: {took:.1f} s on two threads")
     print(f"  {runs * seconds / took:.0f} times real time; memory grew by {grown:.0f} MB above one run")
     print(f"  rms {two.axis_rms_rad[0] * 1e6:.3f} µrad, 99.7 % {two.quantile_rad(0.997) * 1e6:.3f} µrad")
-    one = ensemble.run(p, c, span, 128, threads=1)
+    one = ensemble.simulate(p, c, span, 128, threads=1)
     same = np.array_equal(one.rms_rad, two.rms_rad[:128]) and np.array_equal(one.histogram, two.histogram[:128])
     print(f"  the first 128 runs on one thread: {'identical' if same else 'DIFFERENT'}")
 

@@ -2,12 +2,12 @@
 
 from microrad import mirror
 from microrad.link import tracking_light_w
-from microrad.loop import fine_pointing, paper_cases
+from microrad.loop import controller_study, paper_cases
 
 
 def scene_of(file):
     """The fine-pointing loop of a mission file."""
-    return fine_pointing.scene(file, mirror.of(file.mission), tracking_light_w(file))
+    return controller_study.scene(file, mirror.of(file.mission), tracking_light_w(file))
 
 
 def cases_of(mission):

@@ -47,7 +47,7 @@ def plain_study():
 
     def run():
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(study.fine_pointing, "run", lambda *args, **more: None)
+            patch.setattr(study.controller_study, "design_and_simulate", lambda *args, **more: None)
             return study.run_study(load_mission(SHIPPED))
 
     return once("plain study", run)

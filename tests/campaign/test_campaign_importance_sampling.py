@@ -19,10 +19,11 @@ from microrad.campaign.rows.importance_sampling import (
     runs,
 )
 from microrad.loop import disturbance
-from microrad.loop.fine_loop import ensemble, linear
-from microrad.loop.fine_loop.ensemble import LANES, Span
-from microrad.loop.fine_loop.loop import assemble
-from microrad.loop.fine_pointing import designs, parts, scenario
+from microrad.loop.controller_study import designs, parts, scenario
+from microrad.loop.pointing_loop import ensemble, linear, traces
+from microrad.loop.pointing_loop.ensemble import Span
+from microrad.loop.pointing_loop.kernel_arrays import LANES
+from microrad.loop.pointing_loop.loop import assemble
 from microrad.mission.file import load_mission
 from scenes import scene_of
 from shipped import SHIPPED
@@ -262,7 +263,7 @@ def test_the_tail_with_a_line(gaussian, controller):
 
 def test_with_hysteresis_and_limits_the_tail_is_that_of_plain_runs(scene, mission, controller):
     loop = scenario.with_mirror(scene.loop, scene.mirrors, "comparison")
-    plain = ensemble.run(loop, controller, Span(1.6, 0.5, 8), 3 * LANES)
+    plain = ensemble.simulate(loop, controller, Span(1.6, 0.5, 8), 3 * LANES)
     counts = plain.histogram.astype(float)
     span = Span(1.0, 0.5, 3)
     edges = ensemble.bin_edges_rad()
@@ -291,7 +292,7 @@ def test_towards_no_error_the_runs_are_plain_bit_for_bit(scene, controller):
     longer = replace(SPAN, duration_s=SPAN.duration_s + scene.loop.timing.period_s)
     aimed, _ = runs(scene.loop, controller, SPAN, proposal(scene.loop, controller, SPAN, 5e-6), 0)
     for run in (0, 41):
-        error = ensemble.trace(scene.loop, controller, longer, run).error_rad[-1]
+        error = traces.trace(scene.loop, controller, longer, run).error_rad[-1]
         assert math.sqrt(np.sum(error**2)) == radius[run]
         assert aimed[run] != radius[run]
 

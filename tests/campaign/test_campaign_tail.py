@@ -27,8 +27,9 @@ from microrad.campaign.statistics.summary import summarise_campaign
 from microrad.campaign.statistics.tails import tail_of_time, tail_weighted
 from microrad.core.arrays import Floats
 from microrad.core.threads import in_threads
-from microrad.loop.fine_loop import linear
-from microrad.loop.fine_loop.ensemble import LANES, bin_edges_rad, histogram_quantile
+from microrad.loop.pointing_loop import linear
+from microrad.loop.pointing_loop.ensemble import bin_edges_rad, histogram_quantile
+from microrad.loop.pointing_loop.kernel_arrays import LANES
 from microrad.mission.file import load_mission
 from microrad.report.campaign import words as campaign_words
 from microrad.report.campaign.data import campaign_data

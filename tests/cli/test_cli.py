@@ -24,8 +24,8 @@ from command_line import listing
 from microrad import cli, report
 from microrad.cli import frame, installation, lab
 from microrad.lab import identify
-from microrad.loop import control, fine_pointing
-from microrad.loop.fine_pointing import designs
+from microrad.loop import control, controller_study
+from microrad.loop.controller_study import designs
 from microrad.report.identification import page as identification
 from microrad.study import study
 from places import ROOT
@@ -245,13 +245,13 @@ def few_controllers(monkeypatch):
 @pytest.fixture
 def designed_once(monkeypatch):
     """Controllers of the one mission of a test, designed once for all that is printed of them."""
-    made, design = [], fine_pointing.design
+    made, design = [], controller_study.design
 
     def known(scene, on_progress):
         made[:] = made or [design(scene, on_progress)]
         return made[0]
 
-    monkeypatch.setattr(fine_pointing, "design", known)
+    monkeypatch.setattr(controller_study, "design", known)
 
 
 @pytest.mark.usefixtures("few_controllers", "designed_once")

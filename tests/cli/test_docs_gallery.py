@@ -11,7 +11,7 @@ import pytest
 
 from microrad import load_link, load_mirror, report
 from microrad.core.units import parse_quantity
-from microrad.loop import fine_pointing
+from microrad.loop import controller_study
 from microrad.mission import presets
 from microrad.report.identification import page as identification
 from microrad.study import study
@@ -131,11 +131,11 @@ def test_the_papers_mission(walk, monkeypatch):
     (ran,) = found.values()
     assert sorted(path.name for path in Path("paper-study").iterdir() if path.stat().st_size) == WRITTEN
     listed = {each.design.name: each for each in ran.fine_pointing.verified}
-    alone = fine_pointing.run_one(scene_of(ran.file), "PI")
+    alone = controller_study.design_and_simulate_one(scene_of(ran.file), "PI")
     assert alone.simulated["given"].quantile_rad == listed["PI"].simulated["given"].quantile_rad
     assert alone.design.tuned.values == listed["PI"].design.tuned.values != listed["PI + notch"].design.tuned.values
     with pytest.raises(ValueError, match="'PID' is no controller of this mission; it has PI, best"):
-        fine_pointing.run_one(scene_of(ran.file), "PID")
+        controller_study.design_and_simulate_one(scene_of(ran.file), "PID")
 
 
 def test_a_lab_identifies_its_mirror(walk, monkeypatch):

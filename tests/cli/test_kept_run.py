@@ -4,12 +4,13 @@ import hashlib
 import json
 import os
 import re
+from types import SimpleNamespace
 
 import pytest
 
 from microrad import report
 from microrad.core.kept import Kept
-from microrad.loop.fine_pointing import scenario
+from microrad.loop.controller_study import scenario
 from microrad.mission import file as missionfile
 from microrad.mission.file import NamedFile, load_mission, with_contents
 from microrad.orbit import day
@@ -60,8 +61,12 @@ def shaken(scene, on_progress):
 def quick():
     """Without what takes long and reads no file; a page has no figures."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(study.fine_pointing, "run", shaken)
-        patch.setattr(scenario.disturbance, "table", lambda freq_hz, density, **_: density.tolist())
+        patch.setattr(study.controller_study, "design_and_simulate", shaken)
+        patch.setattr(
+            scenario.disturbance,
+            "fit_table",
+            lambda freq_hz, density, **_: SimpleNamespace(disturbance=density.tolist()),
+        )
         patch.setattr(study.paper, "applies", lambda mission: False)
         patch.setattr(day, "swings", lambda *args: ())
         patch.setattr(report, "study_figures", lambda *args: StudyFigures())

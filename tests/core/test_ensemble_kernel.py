@@ -721,7 +721,7 @@ def test_every_counter_is_its_twins():
 
 
 def test_the_histogram_counts_the_radial_error_at_the_end_of_each_control_sample():
-    from microrad.loop.fine_loop.ensemble import bin_edges_rad  # the rest of this file needs the kernel alone
+    from microrad.loop.pointing_loop.ensemble import bin_edges_rad  # the rest of this file needs the kernel alone
 
     edges = bin_edges_rad()
     assert edges.size == kernels.BINS + 1

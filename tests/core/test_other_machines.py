@@ -12,11 +12,11 @@ _CASE = """
 import numpy as np
 from microrad import load_mission, mirror
 from microrad.link import tracking_light_w
-from microrad.loop import fine_pointing
+from microrad.loop import controller_study
 
 file = load_mission({path!r})
-scene = fine_pointing.scene(file, mirror.of(file.mission), tracking_light_w(file))
-found = fine_pointing.run_one(scene, {name!r})
+scene = controller_study.scene(file, mirror.of(file.mission), tracking_light_w(file))
+found = controller_study.design_and_simulate_one(scene, {name!r})
 print(found.design.tuned.values)
 for variant, of in sorted(found.simulated.items()):
     print(variant, of.rms_rad, of.quantile_rad, of.largest_rad)

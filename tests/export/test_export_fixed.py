@@ -295,7 +295,7 @@ def test_the_report_is_true(name):
     fixed, r = form_of(name), form_of(name).report
     read, n = fixed_form.readings(fixed, v.inputs), of.actuators
     near = fixed_form.dequantised(form, fixed)
-    exact = double_run.run(of, near, v.inputs)
+    exact = double_run.run_in_double(of, near, v.inputs)
     found = drive_the_linear_part(fixed, read, np.zeros((len(read), n), int)) * np.exp2(-np.array(fixed.output_scale))
     assert not np.any(exact.excess)
     for i, o in enumerate(r.outputs):
@@ -305,7 +305,7 @@ def test_the_report_is_true(name):
         assert 0.0 <= o.cycle_found <= o.cycle_bound
     assert any(o.noise_measured > 0.3 * o.noise_predicted for o in r.outputs)
     ranges = fixed.word * np.exp2(-np.array(fixed.state_scale))
-    peaks = np.max(np.abs(double_run.run(of, form, v.inputs).states), axis=0)
+    peaks = np.max(np.abs(double_run.run_in_double(of, form, v.inputs).states), axis=0)
     moving = peaks > 0.0
     assert np.array(r.head_room_bits)[moving] == pytest.approx(np.log2(ranges[moving] / peaks[moving]))
     assert np.all(np.array(r.head_room_bits) >= 2.0)
@@ -443,7 +443,7 @@ def test_without_converter_and_limits_commands_are_words(tmp_path):
     expected = np.array([twin.step(reading) for reading in readings])
     found, (saturated, _) = Compiled(of, form, fixed, tmp_path).run(readings, np.zeros((200, 1), int), "steps")
     assert np.array_equal(found, expected)
-    ideal = double_run.run(of, form, noise(200)).free
+    ideal = double_run.run_in_double(of, form, noise(200)).free
     assert found * 2.0 ** -fixed.output_scale[0] == pytest.approx(ideal, abs=1e-6 * np.max(np.abs(ideal)))
     assert saturated == 0
     assert fixed.converter == ()
@@ -464,7 +464,7 @@ def test_the_anti_windup_holds_the_state_at_the_limit():
     of = one_axis([[1.0]], [[300.0]], [[1.0]], [[3000.0]], limit_v=1.0, windup=0.09)
     inputs = np.full((400, 1), 8e-4)
     fixed = made(of, inputs)
-    twin, ideal = Twin(fixed), double_run.run(of, sections(of), inputs)
+    twin, ideal = Twin(fixed), double_run.run_in_double(of, sections(of), inputs)
     for reading in fixed_form.readings(fixed, inputs):
         command = twin.step(reading)
     assert command == [1000]

@@ -23,8 +23,8 @@ from microrad.export.records import ExportError, Origin, Signal
 from microrad.export.templating import comment, real, render, table, terms
 from microrad.loop import control, disturbance
 from microrad.loop.control import AxisController, Drive, Timing
-from microrad.loop.fine_loop import loop as fine
-from microrad.loop.fine_loop.loop import PointingLoop, ReferenceFilter, with_inverse
+from microrad.loop.pointing_loop import loop as fine
+from microrad.loop.pointing_loop.loop import PointingLoop, ReferenceFilter, with_inverse
 from microrad.loop.sensor import OpticalSensor
 from microrad.mirror import model as mirror
 from microrad.mirror.hysteresis import NO_CREEP, BoucWen, Creep, Play

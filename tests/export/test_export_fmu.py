@@ -29,8 +29,8 @@ from microrad.export.fmi.description import variables
 from microrad.export.records import ExportError, Origin, PlantUnit, Signal
 from microrad.loop import control
 from microrad.loop import sine_run as simulate
-from microrad.loop.fine_loop import ensemble
-from microrad.loop.fine_loop.loop import LoopController, PointingLoop
+from microrad.loop.pointing_loop import kernel_arrays
+from microrad.loop.pointing_loop.loop import LoopController, PointingLoop
 from microrad.mirror import hysteresis
 from microrad.mirror import model as mirror
 
@@ -429,9 +429,9 @@ def test_the_loop_follows_the_kernel_in_the_jitter(tmp_path, name, version):
     """Fine pointing, plant step by plant step; also with a late, coarse optical sensor that loses the spot."""
     chosen = quiet(pointing(name), **POINTING[name])
     loop, samples = chosen.scene.loop, 800
-    p = ensemble.arrays(loop, chosen.controller, 11)
-    state = ensemble.start(loop, p, 0)
-    by_sample = ensemble.reference(loop, 0, samples)
+    p = kernel_arrays.arrays(loop, chosen.controller, 11)
+    state = kernel_arrays.start(loop, p, 0)
+    by_sample = kernel_arrays.reference(loop, 0, samples)
     by_sample[700:760] += 3e-4  # further than the narrow field of view
     reference, disturbance = outside(loop, p, state, by_sample[:, :, 0])
     axes, m, outputs = loop.axes, loop.mirror.actuators, loop.mirror.axes
@@ -499,8 +499,8 @@ def by_kernel(of, optics, drive, commands, steps, step_s):
     through = np.zeros((m, inputs))
     through[:, axes + of.axes : axes + of.axes + m] = np.eye(m)
     system = lti.StateSpace(np.zeros((0, 0)), np.zeros((0, inputs)), np.zeros((m, 0)), through)
-    p = ensemble.arrays(loop, LoopController("through", system, np.zeros((0, m))), 0)
-    state = ensemble.start(loop, p, 0)
+    p = kernel_arrays.arrays(loop, LoopController("through", system, np.zeros((0, m))), 0)
+    state = kernel_arrays.start(loop, p, 0)
     reference = np.zeros((samples + 2, axes, 1))
     reference[:samples, :m, 0] = commands
     trace = np.empty((samples + 1, axes + kernels.DRIVE_FIELDS * m + of.axes + inputs, kernels.LANES))

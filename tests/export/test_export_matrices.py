@@ -23,7 +23,7 @@ from microrad.export.records import ExportError, Origin
 from microrad.loop import control
 from microrad.loop import sine_run as simulate
 from microrad.loop.control.analysis import loop_response
-from microrad.loop.fine_loop.design import design_plant
+from microrad.loop.pointing_loop.design import design_plant
 from microrad.mirror import model as mirror
 from microrad.mission.file import MissionFile, load_mission
 from shipped import SHIPPED

@@ -178,7 +178,7 @@ def single_run(of, form, inputs):
 @pytest.mark.parametrize("name", SHIPPED)
 def test_the_run_in_double_is_the_recorded_one(name):
     of, form, v = shipped(name)
-    found = double_run.run(of, form, v.inputs)
+    found = double_run.run_in_double(of, form, v.inputs)
     r = of.resolution_v
     commands = np.floor(np.clip(found.free, of.minimum_v, of.maximum_v) / r + 0.5) * r
     assert np.max(np.abs(commands - v.commands)) <= 1e-12
@@ -191,7 +191,7 @@ def test_single_precision_stays_within_its_bound(name):
     bound = rounding.rounding_bound(of, form, v)
     ahead = rounding.errors_before_converter(of, form, v)
     free, commands = single_run(of, form, v.inputs)
-    wrong = np.abs(free - double_run.run(of, form, v.inputs).free)
+    wrong = np.abs(free - double_run.run_in_double(of, form, v.inputs).free)
     assert np.all(wrong <= ahead)
     assert np.max(ahead) <= 100.0 * np.max(wrong)
     difference = np.max(np.abs(commands - v.commands))
@@ -309,7 +309,7 @@ def test_the_bound_holds_for_each_kind_of_inverse(name):
     of = one_axis(system, inverse=LAWS[name])
     form, v = sections(of), vectors_of(tracking_reference())
     ahead = rounding.errors_before_converter(of, form, v)
-    wrong = np.abs(single_run(of, form, v.inputs)[0] - double_run.run(of, form, v.inputs).free)
+    wrong = np.abs(single_run(of, form, v.inputs)[0] - double_run.run_in_double(of, form, v.inputs).free)
     assert np.all(wrong <= ahead)
     assert np.max(ahead) <= 300.0 * np.max(wrong)
     assert np.max(wrong) > 1e-8
@@ -352,7 +352,7 @@ def test_a_slow_oscillation_counts_as_what_it_is():
     of, inputs = one_axis(system), 1e-4 * np.random.default_rng(1).standard_normal((3000, 1))
     form = sections(of)
     ahead = rounding.errors_before_converter(of, form, vectors_of(inputs))
-    wrong = np.abs(single_run(of, form, inputs)[0] - double_run.run(of, form, inputs).free)
+    wrong = np.abs(single_run(of, form, inputs)[0] - double_run.run_in_double(of, form, inputs).free)
     assert np.all(wrong <= ahead)
     assert np.max(ahead) <= 300.0 * np.max(wrong)
     assert np.max(np.linalg.matrix_power(np.abs(A), 100)) > 1e10
@@ -362,7 +362,7 @@ def held(of, inputs):
     """Errors ahead of the converter, as bounded and as the twin makes them."""
     form = sections(of)
     ahead = rounding.errors_before_converter(of, form, vectors_of(inputs))
-    return ahead, np.abs(single_run(of, form, inputs)[0] - double_run.run(of, form, inputs).free)
+    return ahead, np.abs(single_run(of, form, inputs)[0] - double_run.run_in_double(of, form, inputs).free)
 
 
 def test_a_memory_that_single_precision_cannot_move_is_bounded():
@@ -432,7 +432,7 @@ def test_a_small_difference_of_large_readings_is_bounded():
 def test_the_bound_holds_where_commands_are_clipped():
     of = one_axis(integral(), windup=0.09, limit_v=1.0, resolution_v=1e-3)
     inputs = 3.5e-4 * np.sin(2 * np.pi * np.arange(300) / 30.0)[:, None]
-    form, found = sections(of), double_run.run(of, sections(of), inputs)
+    form, found = sections(of), double_run.run_in_double(of, sections(of), inputs)
     assert 20 < np.count_nonzero(found.excess) < 100
     ahead, wrong = held(of, inputs)
     assert np.all(wrong <= ahead)
@@ -447,7 +447,7 @@ def test_the_bound_holds_where_commands_are_clipped():
 def test_errors_that_may_feed_themselves_are_bounded_by_the_limits_alone():
     of = one_axis(integral(), windup=1.5, limit_v=1.0)
     inputs = np.full((400, 1), 8e-4)
-    assert np.max(np.abs(double_run.run(of, sections(of), inputs).free)) < 10.0
+    assert np.max(np.abs(double_run.run_in_double(of, sections(of), inputs).free)) < 10.0
     bound = rounding.rounding_bound(of, sections(of), vectors_of(inputs))
     assert bound.command_v == 2.0
     assert "not bounded" in bound.words

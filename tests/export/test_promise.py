@@ -8,9 +8,9 @@ import pytest
 from microrad.export import choice
 from microrad.export.flight import write
 from microrad.export.records import ExportError
-from microrad.loop import fine_pointing
-from microrad.loop.fine_loop import ensemble
-from microrad.loop.fine_pointing import designs
+from microrad.loop import controller_study
+from microrad.loop.controller_study import designs
+from microrad.loop.pointing_loop import ensemble
 from microrad.mission.file import load_mission
 from scenes import scene_of
 from shipped import SHIPPED
@@ -39,18 +39,18 @@ def light(folder):
 def test_the_simulated_figure_is_that_of_the_missions_runs(light):
     file = load_mission(light)
     scene = scene_of(file)
-    (made,) = fine_pointing.design(scene, only=(fine_pointing.BASELINE,))
-    (left,) = fine_pointing.outlook(scene, [made])
-    run = ensemble.run(scene.loop, made.controller, ensemble.Span(0.4, 0.1, file.mission.fine_pointing.seed), 4)
+    (made,) = controller_study.design(scene, only=(controller_study.BASELINE,))
+    (left,) = controller_study.outlook(scene, [made])
+    run = ensemble.simulate(scene.loop, made.controller, ensemble.Span(0.4, 0.1, file.mission.fine_pointing.seed), 4)
     assert left.simulated_rad == pytest.approx(math.sqrt((run.axis_rms_rad**2).mean()), rel=1e-12)
     assert left.linear_rad == made.tuned.residual_rms_rad
-    assert fine_pointing.Outlook(1.0, 1.5).holds
-    assert not fine_pointing.Outlook(1.0, 1.51).holds
-    assert not fine_pointing.Outlook(1.0, math.nan).holds
+    assert controller_study.Outlook(1.0, 1.5).holds
+    assert not controller_study.Outlook(1.0, 1.51).holds
+    assert not controller_study.Outlook(1.0, math.nan).holds
 
 
 def test_design_shows_both_figures_and_refuses_by_the_simulated_one(light, call, monkeypatch):
-    monkeypatch.setattr(designs, "names", lambda m: (fine_pointing.BASELINE, OBSERVER))
+    monkeypatch.setattr(designs, "names", lambda m: (controller_study.BASELINE, OBSERVER))
     done = call("design", "light.toml", "--json")
     assert done.code == 1
     found = json.loads(done.out)
@@ -66,7 +66,7 @@ def test_design_shows_both_figures_and_refuses_by_the_simulated_one(light, call,
     row = row_of(printed.out, OBSERVER)
     assert f"{broken['residual_rms_rad_per_axis'] * 1e6:.3f} " in row
     assert f"{broken['simulated_rms_rad_per_axis'] * 1e6:.3f} refused " in row
-    assert "refused" not in row_of(printed.out, fine_pointing.BASELINE)
+    assert "refused" not in row_of(printed.out, controller_study.BASELINE)
     assert f"Warning: {warning}." in " ".join(printed.out.split())
     taken = call("design", "light.toml", "--accept")
     assert taken.code == 0
@@ -75,7 +75,7 @@ def test_design_shows_both_figures_and_refuses_by_the_simulated_one(light, call,
 
 
 def test_design_ends_well_where_each_figure_is_a_promise(light, call, monkeypatch):
-    monkeypatch.setattr(designs, "names", lambda m: (fine_pointing.BASELINE,))
+    monkeypatch.setattr(designs, "names", lambda m: (controller_study.BASELINE,))
     done = call("design", "light.toml")
     assert done.code == 0
     assert "refused" not in done.out and "Warning" not in done.out

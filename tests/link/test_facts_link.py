@@ -279,9 +279,9 @@ def test_olympus_leaves_80_pi_over_one_more_than_the_bandwidth_and_half_of_it_ab
     assert_allclose(2 * disturbance.psd(disturbance.olympus(), freq) / URAD**2, 160 / (1 + freq**2), rtol=1e-12)
 
 
-MICIUS = disturbance.bands(
+MICIUS = disturbance.fit_bands(
     disturbance.MICIUS_EDGES_HZ, disturbance.MICIUS_RMS_RAD, convention="per-axis", name="Micius", source="literature"
-)
+).disturbance
 
 
 @show(

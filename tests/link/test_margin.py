@@ -167,7 +167,7 @@ def test_budget_and_a_campaign_of_one_row_end_alike(call, tmp_path, monkeypatch,
 @cache
 def _left_rad():
     m = load_mission(DEFAULT).mission
-    runs = paper_cases.tracking_runs(cases_of(m))
+    runs = paper_cases.sine_runs(cases_of(m))
     return paper_cases.residual_rad(
         m.requirement, m.conventions, paper_cases.worst(runs, m.requirement.residual_statistic).trace
     )

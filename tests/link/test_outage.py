@@ -17,8 +17,8 @@ from microrad.link.pointing import outage as link_performance
 from microrad.link.pointing.outage import ErrorDistribution
 from microrad.loop import paper_cases as tracking
 from microrad.loop import sine_run as simulate
-from microrad.loop.fine_loop.ensemble import bin_edges_rad
-from microrad.loop.fine_pointing import FinePointingStudy, Residual, Verified
+from microrad.loop.controller_study import FinePointingStudy, Residual, Verified
+from microrad.loop.pointing_loop.ensemble import bin_edges_rad
 from microrad.study import pointing_penalty as performance
 from shipped import edited
 

@@ -22,7 +22,6 @@ from microrad.loop.disturbance import (
     Reference,
     SpectralLine,
     band_rms,
-    bands,
     body_pointing,
     combine,
     discretise,
@@ -34,7 +33,6 @@ from microrad.loop.disturbance import (
     one_input,
     psd,
     read_table,
-    table,
     wheels,
 )
 
@@ -67,7 +65,7 @@ def resonance(freq_hz=7.0, damping=0.02, rms_rad=3 * URAD, name="resonance"):
 
 @lru_cache
 def micius():
-    return bands(MICIUS_EDGES_HZ, MICIUS_RMS_RAD, convention="per-axis", name="Micius", source="test")
+    return fit_bands(MICIUS_EDGES_HZ, MICIUS_RMS_RAD, convention="per-axis", name="Micius", source="test").disturbance
 
 
 def mixture():
@@ -350,13 +348,13 @@ def test_the_micius_bands_are_met_with_one_white_input(convention, part):
     ],
 )
 def test_bands_that_rise_and_fall_are_met_within_5_percent(edges_hz, rms_urad):
-    d = bands(edges_hz, URAD * np.array(rms_urad), convention="per-axis")
+    d = fit_bands(edges_hz, URAD * np.array(rms_urad), convention="per-axis").disturbance
     assert_allclose(band_rms(d, edges_hz), URAD * np.array(rms_urad), rtol=0.05)
 
 
 def test_bands_that_no_filter_can_have_are_refused_with_the_band():
     with pytest.raises(ValueError, match=r"times the given rms between 1 and 2 Hz, and 5 % is allowed"):
-        bands((0, 1, 2, 3), (1e-5, 1e-7, 1e-5), convention="radial")
+        fit_bands((0, 1, 2, 3), (1e-5, 1e-7, 1e-5), convention="radial")
 
 
 def peak(f, freq_hz, damping, height):
@@ -411,7 +409,7 @@ def test_a_table_whose_rms_the_fit_misses_is_refused():
     with pytest.raises(
         ValueError, match=r"has 0\.8\d* times the rms of the table, and 10 % is allowed; give the table more"
     ):
-        table(np.geomspace(1, 100, 4), [1e-14, 1e-14, 1e-14, 1e-12], convention="radial")
+        fit_table(np.geomspace(1, 100, 4), [1e-14, 1e-14, 1e-14, 1e-12], convention="radial")
 
 
 def test_a_table_with_a_narrow_line_is_refused_with_its_frequency():
@@ -419,13 +417,13 @@ def test_a_table_with_a_narrow_line_is_refused_with_its_frequency():
     rows = measured_spectrum(f)
     rows[829] *= 1e5
     with pytest.raises(ValueError, match=r"dB below the table near 8\d\.?\d* Hz.*give narrow lines as spectral lines"):
-        table(f, rows, convention="radial")
+        fit_table(f, rows, convention="radial")
 
 
 def test_a_table_that_falls_too_steeply_is_refused():
     f = np.geomspace(0.1, 2000, 100)
     with pytest.raises(ValueError, match=r"above the table near .*end the table where it falls faster than 1/f\^4"):
-        table(f, 1e-12 / (1 + (f / 30) ** 8), convention="radial")
+        fit_table(f, 1e-12 / (1 + (f / 30) ** 8), convention="radial")
 
 
 # tables
@@ -545,17 +543,23 @@ FILTER = Disturbance("given", -np.eye(2), np.ones((2, 1)), np.ones((1, 2)), (), 
         (lambda: SpectralLine(nan, 1), "amplitude of a spectral line is nan rad"),
         (lambda: SpectralLine(1e-6, 0), "frequency of a spectral line is 0 Hz"),
         (
-            lambda: bands((0, 2, 1), (1, 1), convention="radial"),
+            lambda: fit_bands((0, 2, 1), (1, 1), convention="radial"),
             "edges of the bands are .*; give two or more that rise",
         ),
-        (lambda: bands((0, nan), (1,), convention="radial"), "edges of the bands are .*nan"),
-        (lambda: bands((-1, 2), (1,), convention="radial"), r"edges of the bands are \[-1.0, 2.0\] Hz"),
-        (lambda: bands((0, 1, 2), (1,), convention="radial"), "3 edges and 1 rms values; give finite edges, one more"),
-        (lambda: bands((0, 1, inf), (1, 1), convention="radial"), "3 edges and 2 rms values; give finite edges"),
-        (lambda: bands((0, 1, 2), (1, 0), convention="radial"), '"bands": rms between 1 and 2 Hz is 0 rad'),
-        (lambda: table([1, 2, 3], [1, -1, 1], convention="radial"), 'table", row 2: .* has a negative density'),
-        (lambda: table([1, 2, 3], [1, 0, 1], convention="radial"), "the density at 2 Hz is zero, which no filter has"),
-        (lambda: table([1, 2, 3], [1, 1], convention="radial"), "3 frequencies and 2 densities"),
+        (lambda: fit_bands((0, nan), (1,), convention="radial"), "edges of the bands are .*nan"),
+        (lambda: fit_bands((-1, 2), (1,), convention="radial"), r"edges of the bands are \[-1.0, 2.0\] Hz"),
+        (
+            lambda: fit_bands((0, 1, 2), (1,), convention="radial"),
+            "3 edges and 1 rms values; give finite edges, one more",
+        ),
+        (lambda: fit_bands((0, 1, inf), (1, 1), convention="radial"), "3 edges and 2 rms values; give finite edges"),
+        (lambda: fit_bands((0, 1, 2), (1, 0), convention="radial"), '"bands": rms between 1 and 2 Hz is 0 rad'),
+        (lambda: fit_table([1, 2, 3], [1, -1, 1], convention="radial"), 'table", row 2: .* has a negative density'),
+        (
+            lambda: fit_table([1, 2, 3], [1, 0, 1], convention="radial"),
+            "the density at 2 Hz is zero, which no filter has",
+        ),
+        (lambda: fit_table([1, 2, 3], [1, 1], convention="radial"), "3 frequencies and 2 densities"),
         (lambda: band_rms(olympus(), [1]), r"edges of the bands are \[1.0\] Hz"),
         (lambda: band_rms(replace(FILTER, A=np.array([[-1.0, 1], [0, -1]])), [0, 1]), '"given": poles coincide'),
         (combine, "no disturbance to combine; give one or more"),

@@ -38,7 +38,7 @@ def mission():
 
 @pytest.fixture(scope="module")
 def runs(mission):
-    return tracking.tracking_runs(cases_of(mission))
+    return tracking.sine_runs(cases_of(mission))
 
 
 def papers_mirror(model):
@@ -163,7 +163,7 @@ def test_the_runs_are_those_of_the_scenario(runs):
 
 
 def test_halving_the_plant_step_moves_no_error_by_one_percent(tmp_path, runs):
-    halved = tracking.tracking_runs(cases_of(edited(tmp_path, ('plant_step = "10 us"', 'plant_step = "5 us"'))))
+    halved = tracking.sine_runs(cases_of(edited(tmp_path, ('plant_step = "10 us"', 'plant_step = "5 us"'))))
     moved = []
     for coarse, fine in zip(runs, halved, strict=True):
         assert coarse.trace.name == fine.trace.name

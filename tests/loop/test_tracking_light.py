@@ -5,13 +5,13 @@ import pytest
 import budgets
 from microrad import mirror
 from microrad.link import tracking_light_w
-from microrad.loop import fine_pointing
+from microrad.loop import controller_study
 from microrad.mission.file import load_mission
 from shipped import DEFAULT, SHIPPED
 
 
 def noise_rad(file, power_w):
-    return fine_pointing.scene(file, mirror.of(file.mission), power_w).loop.optical.noise_rad
+    return controller_study.scene(file, mirror.of(file.mission), power_w).loop.optical.noise_rad
 
 
 def test_the_light_is_the_answers_unless_the_cell_states_it_or_the_noise_is_given(tmp_path):

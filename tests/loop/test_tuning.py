@@ -14,7 +14,7 @@ from microrad.core import lti
 from microrad.loop.control import analysis, classical, descent, judge, lqg, search, tuning
 from microrad.loop.control.lqg import LQG
 from microrad.loop.control.problem import RESIDUAL, AxisController, Family, Parameter, Specification
-from microrad.loop.fine_pointing import designs
+from microrad.loop.controller_study import designs
 from microrad.mission.file import load_mission
 from scenes import scene_of
 from shipped import SHIPPED

@@ -10,9 +10,9 @@ import pytest
 from microrad import link, orbit
 from microrad.core.units import SPEED_OF_LIGHT_M_S
 from microrad.link import study as link_study
-from microrad.loop import control, fine_pointing
-from microrad.loop.fine_loop.loop import assemble
-from microrad.loop.fine_pointing import designs
+from microrad.loop import control, controller_study
+from microrad.loop.controller_study import designs
+from microrad.loop.pointing_loop.loop import assemble
 from microrad.mission import file as missionfile
 from microrad.orbit import constellation, files
 from microrad.orbit import day as day_study
@@ -259,12 +259,12 @@ def lqg():
     scene, f = scene_of(file), file.mission.fine_pointing
     wanted = control.Specification(f.modulus_margin)
     tuned = control.tune(control.LQG, designs.plants(scene, f.seed), wanted, seed=f.seed)
-    return file.mission, scene, fine_pointing.Design("LQG", tuned, assemble("LQG", scene.loop, tuned.controller))
+    return file.mission, scene, controller_study.Design("LQG", tuned, assemble("LQG", scene.loop, tuned.controller))
 
 
 def test_what_the_simulated_loop_leaves(lqg, links, day):
     m, scene, design = lqg
-    (verified,) = fine_pointing.verify(scene, (design,))
+    (verified,) = controller_study.verify(scene, (design,))
     left = verified.simulated["given"].quantile_rad
     loss = float(link.of(links.file.mission).beam.fall.loss_db(left))
     told(f"{left * 1e6:.2f} µrad at 99.7 %, a pointing loss of {loss:.2f} dB in place of {day.loss.loss_db:.2f} dB")

@@ -37,7 +37,7 @@ from shipped import SHIPPED, edited_file, plain_drawn, plain_study
 def no_fine_pointing():
     """The fine-pointing loop has tests of its own and takes the longest."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(study.fine_pointing, "run", lambda *args, **more: None)
+        patch.setattr(study.controller_study, "design_and_simulate", lambda *args, **more: None)
         yield
 
 

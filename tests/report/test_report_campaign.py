@@ -29,7 +29,7 @@ from microrad.campaign.records import (
     Tail,
     WorstTrace,
 )
-from microrad.loop.fine_loop.ensemble import bin_edges_rad
+from microrad.loop.pointing_loop.ensemble import bin_edges_rad
 from microrad.report.campaign import figures as drawing
 from microrad.report.campaign import numbers as campaign_numbers
 from microrad.report.campaign import page as campaign_module

@@ -13,9 +13,9 @@ import pytest
 import xarray as xr
 
 from microrad import report
-from microrad.loop import control, fine_pointing
-from microrad.loop.fine_loop.loop import assemble
-from microrad.loop.fine_pointing import designs
+from microrad.loop import control, controller_study
+from microrad.loop.controller_study import designs
+from microrad.loop.pointing_loop.loop import assemble
 from microrad.mission.file import load_mission, with_contents
 from microrad.orbit import day as day_study
 from microrad.orbit.operations import OperationsError
@@ -40,7 +40,7 @@ def fine(file):
     """A fine-pointing study as far as a contact asks for it: the PI of the grid, made in half a second."""
     scene = scene_of(file)
     tuned = designs.grid_baseline(designs.plants(scene, 1)[:1], control.Specification(0.5))
-    design = fine_pointing.Design("PI", tuned, assemble("PI", scene.loop, tuned.controller))
+    design = controller_study.Design("PI", tuned, assemble("PI", scene.loop, tuned.controller))
     return SimpleNamespace(scene=scene, best=SimpleNamespace(design=design), quantile=0.997)
 
 
@@ -64,7 +64,7 @@ def test_the_study_has_a_day_and_a_plan_but_no_contact_in_time_without_a_fine_lo
     assert found.day is not None
     assert found.plan is not None
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(study.fine_pointing, "run", lambda *args, **more: None)
+        patch.setattr(study.controller_study, "design_and_simulate", lambda *args, **more: None)
         m = found.file.mission
         links = found.links
         assert contact_run.of_mission(m.operations, m.acquisition, links.data, found.day, links.finding, None) is None

@@ -15,13 +15,13 @@ import xarray as xr
 from numpy.testing import assert_allclose, assert_array_equal
 
 from microrad import report
-from microrad.loop import control, fine_pointing
+from microrad.loop import control, controller_study
 from microrad.loop.control.tuning import MARGIN
-from microrad.loop.fine_loop.design import design_plant, residual_spectrum
-from microrad.loop.fine_loop.ensemble import bin_edges_rad
-from microrad.loop.fine_loop.linear import close, stationary
-from microrad.loop.fine_loop.loop import ReferenceFilter, assemble, with_inverse
-from microrad.loop.fine_pointing import Difference, ErrorBudget, FinePointingStudy, Part, Residual, Sine, Verified
+from microrad.loop.controller_study import Difference, ErrorBudget, FinePointingStudy, Part, Residual, Sine, Verified
+from microrad.loop.pointing_loop.design import design_plant
+from microrad.loop.pointing_loop.ensemble import bin_edges_rad
+from microrad.loop.pointing_loop.linear import close, residual_spectrum, stationary
+from microrad.loop.pointing_loop.loop import ReferenceFilter, assemble, with_inverse
 from microrad.report.fine_pointing import figures, words
 from microrad.report.fine_pointing import page as section
 from microrad.report.fine_pointing.figures import fine_pointing_figures
@@ -77,7 +77,7 @@ def made_up(file):
     scene = scene_of(file)
     freq = np.linspace(0.0, 0.5 / scene.loop.timing.period_s, 129)
     plant, path, made = design_plant(scene.axis), ReferenceFilter(1000.0), []
-    for name, gains in ((fine_pointing.BASELINE, (150.0, 400.0)), (SECOND, (120.0, 300.0)), (THIRD, (190.0, 500.0))):
+    for name, gains in ((controller_study.BASELINE, (150.0, 400.0)), (SECOND, (120.0, 300.0)), (THIRD, (190.0, 500.0))):
         axis = control.PI.build(plant, np.array(gains))
         values, margins = (
             dict(zip(("integral frequency", "zero"), gains, strict=True)),
@@ -88,7 +88,7 @@ def made_up(file):
             loop = with_inverse(name, scene.loop, axis, control.inverse(scene.loop.mirror), path, True)
         else:
             loop = assemble(name, scene.loop, axis)
-        made.append(fine_pointing.Design(name, tuned, loop, "in series" if name == SECOND else ""))
+        made.append(controller_study.Design(name, tuned, loop, "in series" if name == SECOND else ""))
     verified = tuple(verified_of(scene, design, i, freq) for i, design in enumerate(made))
     budget = ErrorBudget(
         SECOND,
@@ -403,7 +403,7 @@ def test_the_tail_stands_by_itself_with_its_intervals(page, fine, written):
         f"{SECOND}, mission's mirror",
         f"{SECOND}, comparison model",
         f"{SECOND}, no hysteresis",
-        f"{fine_pointing.BASELINE}, mission's mirror",
+        f"{controller_study.BASELINE}, mission's mirror",
     ]
     assert re.fullmatch(r"4\.23 4\.\d+ to 4\.\d+", rows[0][4])
     with (written / "figures" / "monte-carlo-tail.csv").open(newline="", encoding="utf-8") as file:
@@ -531,7 +531,7 @@ LIMITS = {
 
 @pytest.mark.parametrize("limit", LIMITS)
 def test_a_limit_that_a_controller_met_is_a_warning_and_on_the_page(fine, mission, limit):
-    assert set(LIMITS) == set(fine_pointing.COUNTERS)
+    assert set(LIMITS) == set(controller_study.COUNTERS)
     met = with_residual(fine, THIRD, "comparison", shares={limit: LIMITS[limit]})
     percent = "< 0.001 %" if LIMITS[limit] == 1e-6 else f"{100 * LIMITS[limit]:g} %"
     assert f"fine pointing: {THIRD} on the comparison model: {percent} {limit}" in warned(met, mission)
@@ -608,7 +608,7 @@ def test_theory_that_the_simulation_contradicts_is_a_warning(fine, mission):
 def test_the_summary_survives_json_and_holds_the_record(plain, fine):
     data = report.summary(with_fine(plain, fine))["fine_pointing"]
     assert json.loads(json.dumps(data, allow_nan=False)) == data
-    assert (data["best"], data["baseline"], data["quantile"]) == (SECOND, fine_pointing.BASELINE, 0.997)
+    assert (data["best"], data["baseline"], data["quantile"]) == (SECOND, controller_study.BASELINE, 0.997)
     for v, entry in zip(fine.verified, data["controllers"], strict=True):
         assert entry["name"] == v.design.name
         assert entry["theory_rms_rad"] == v.theory.radial_rms_rad
@@ -711,7 +711,7 @@ def test_each_figure_is_an_svg_with_its_data_and_units(written, drawn, fine):
 
 def test_the_sensitivity_drawn_peaks_at_the_inverse_of_the_modulus_margin(drawn, fine):
     sensitivity = drawn[-1]
-    for name in (fine_pointing.BASELINE, THIRD):
+    for name in (controller_study.BASELINE, THIRD):
         margin = next(v for v in fine.verified if v.design.name == name).design.tuned.margins.modulus
         assert np.max(sensitivity.columns[name]) == pytest.approx(1.0 / margin, rel=2e-3)
 
@@ -729,10 +729,10 @@ def test_a_part_that_helps_is_drawn_as_taken_off(fine):
 
 
 def test_three_different_controllers_are_drawn_the_baseline_first(fine):
-    assert [each.name for each in figures.shown(fine)] == [fine_pointing.BASELINE, SECOND, THIRD]
+    assert [each.name for each in figures.shown(fine)] == [controller_study.BASELINE, SECOND, THIRD]
     assert len({each.colour for each in figures.shown(fine)} | {each.marker for each in figures.shown(fine)}) == 6
     best = replace(fine, best=fine.verified[2])
-    assert [each.name for each in figures.shown(best)] == [fine_pointing.BASELINE, THIRD, SECOND]
+    assert [each.name for each in figures.shown(best)] == [controller_study.BASELINE, THIRD, SECOND]
 
 
 def test_a_sensor_slower_than_the_control_has_no_sensitivity_drawn(plain, fine):

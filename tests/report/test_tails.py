@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from microrad.loop.fine_loop.ensemble import bin_edges_rad
-from microrad.loop.fine_pointing import Residual
+from microrad.loop.controller_study import Residual
+from microrad.loop.pointing_loop.ensemble import bin_edges_rad
 from microrad.report.fine_pointing import tails
 
 RUNS, SAMPLES, KEPT = 48, 1500, 0.9

@@ -11,9 +11,9 @@ from microrad.core.kernels import bouc_wen_response
 from microrad.lab.identify import STATIC, identify
 from microrad.lab.live_fit import LIVE_FITS, LiveFit, Loop, live_fit_writer, thin_fit
 from microrad.lab.recording import RecordingError, read_recording, recording_from_arrays
-from microrad.loop import fine_pointing
+from microrad.loop import controller_study
 from microrad.loop import paper_cases as tracking
-from microrad.loop.fine_loop import linear
+from microrad.loop.pointing_loop import linear
 from microrad.mission.file import load_mission
 from microrad.studio.draft.draft import Draft
 from microrad.studio.draft.mirror_file import with_mirror_file
@@ -461,7 +461,7 @@ def answers(pi):
 
 def test_the_controllers_are_those_of_the_study_and_of_control(mission):
     names = control_model.names(mission.mission.fine_pointing)
-    assert names == (*fine_pointing.names(mission.mission.fine_pointing), PID, PID_INVERSE)
+    assert names == (*controller_study.names(mission.mission.fine_pointing), PID, PID_INVERSE)
     assert control_model.names(None) == (PID, PID_INVERSE)
     with pytest.raises(ValueError, match="'none' is no controller of this mission"):
         control_model.controller(mission, "none")
@@ -469,13 +469,13 @@ def test_the_controllers_are_those_of_the_study_and_of_control(mission):
 
 def test_a_tuned_controller_has_the_numbers_of_the_study(mission, pi):
     scene = scene_of(mission)
-    tuned = fine_pointing.tune("PI", scene.table, fine_pointing.plants(scene, scene.table.seed))
+    tuned = controller_study.tune("PI", scene.table, controller_study.plants(scene, scene.table.seed))
     assert pi.residual_rad == tuned.residual_rms_rad
     assert (pi.margins["modulus"], pi.margins["gain"]) == (tuned.margins.modulus, tuned.margins.gain_up)
     assert pi.margins["modulus"] >= pi.asked_modulus == scene.table.modulus_margin
     assert {name: value for name, (value, _) in pi.values.items()} == tuned.values
     assert {unit for _, unit in pi.values.values()} == {"Hz"}
-    closed = linear.close(scene.loop, fine_pointing.build("PI", scene, tuned.controller))
+    closed = linear.close(scene.loop, controller_study.build("PI", scene, tuned.controller))
     at = np.array([10.0, 100.0, 1000.0])
     expected = np.abs(linear.sensitivity(closed, at)[:, 0, 0])
     np.testing.assert_allclose(np.interp(at, pi.freq_hz, pi.sensitivity), expected, rtol=2e-3)
@@ -526,7 +526,7 @@ def test_the_paper_s_loop_has_the_numbers_of_the_study(mission, name):
     assert found.margins["crossover"] == margins.crossover_hz
     assert found.margins["bandwidth"] == pytest.approx(358, rel=0.02)
     asked = found.ask(control_view.ask_of("100 urad", "300 urad", "15 Hz", 5000.0), (WITH, WITHOUT))
-    runs = tracking.tracking_runs(cases_of(mission.mission))
+    runs = tracking.sine_runs(cases_of(mission.mission))
     kind = "PID" if name == PID else "PID + inverse"
     for variant, which in ((WITH, "given"), (WITHOUT, "no hysteresis")):
         run = next(r for r in runs if (r.mirror, r.controller, r.freq_hz) == (which, kind, 15.0))

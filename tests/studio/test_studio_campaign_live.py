@@ -17,7 +17,7 @@ from microrad.campaign.rows.plan import planned
 from microrad.campaign.statistics import interim
 from microrad.campaign.statistics.interim import Interim
 from microrad.campaign.statistics.summary import summarise_campaign
-from microrad.loop.fine_loop.ensemble import bin_edges_rad
+from microrad.loop.pointing_loop.ensemble import bin_edges_rad
 from microrad.report.campaign import words as campaign_words
 from microrad.studio.jobs import ledgers as campaign_live
 from microrad.studio.jobs.ledgers import Live, LiveCampaigns

@@ -46,7 +46,7 @@ def test_every_reading_that_fits_is_there_once(found):
 )
 def test_a_reading_is_the_mission_written_so(tmp_path, found, key, change):
     m = edited(tmp_path, change)
-    run = tracking.worst(tracking.tracking_runs(cases_of(m), ("given",)), m.requirement.residual_statistic)
+    run = tracking.worst(tracking.sine_runs(cases_of(m), ("given",)), m.requirement.residual_statistic)
     left = tracking.residual_rad(m.requirement, m.conventions, run.trace)
     assert found[key].residual_rad == pytest.approx(left, rel=1e-12)
     assert found[key].margin_db == pytest.approx(float(link.margin_of_error(link.of(m), np.array([left]))[0]), abs=1e-9)
@@ -79,7 +79,7 @@ def test_a_loop_that_cannot_be_run_so_says_why(monkeypatch):
     def unstable(*given):
         raise ValueError("the loop is unstable")
 
-    monkeypatch.setattr(readings.paper_cases, "tracking_runs", unstable)
+    monkeypatch.setattr(readings.paper_cases, "sine_runs", unstable)
     made = {(r.key, r.other): r for r in readings.other_readings(study.file.mission, study.residual)}
     failed = made["mirror.composition", "additive"]
     assert failed.failure == "the loop is unstable" and math.isnan(failed.residual_rad) and not failed.closes

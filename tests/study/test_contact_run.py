@@ -14,11 +14,11 @@ from microrad import link
 from microrad.core import kernels
 from microrad.link import acquisition
 from microrad.link import study as link_study
-from microrad.loop import control, fine_pointing
+from microrad.loop import control, controller_study
+from microrad.loop.controller_study import designs
 from microrad.loop.disturbance import Reference
-from microrad.loop.fine_loop import ensemble
-from microrad.loop.fine_loop.loop import assemble
-from microrad.loop.fine_pointing import designs
+from microrad.loop.pointing_loop import ensemble, traces
+from microrad.loop.pointing_loop.loop import assemble
 from microrad.mission.file import LinkFile, load_mission
 from microrad.study.contact_run import sequence
 from microrad.study.contact_run.records import STATES, Contact, Loss, Settings, Sight
@@ -84,7 +84,7 @@ def scene(file):
 def design(file, scene):
     """The PI controller of the grid, for the nominal mirror alone: made in half a second."""
     tuned = designs.grid_baseline(designs.plants(scene, 1)[:1], control.Specification(0.5))
-    return fine_pointing.Design("PI", tuned, assemble("PI", scene.loop, tuned.controller))
+    return controller_study.Design("PI", tuned, assemble("PI", scene.loop, tuned.controller))
 
 
 @pytest.fixture(scope="module")
@@ -221,9 +221,9 @@ def test_the_residual_of_a_window_is_the_ensembles_with_the_same_references(file
     loop = replace(scene.loop, references=(Reference(30e-6 + lag, 0.0, 0.1), scene.loop.references[1]))
     span = ensemble.Span(2.0, 0.5, 7)
     for number in (0, 3):
-        error = ensemble.trace(loop, design.controller, span, number).error_rad[2500:]
+        error = traces.trace(loop, design.controller, span, number).error_rad[2500:]
         assert_allclose(windows[number].radial_rad, np.hypot(error[:, 0], error[:, 1]), rtol=1e-9, atol=1e-15)
-    together = ensemble.run(loop, design.controller, span, 64)
+    together = ensemble.simulate(loop, design.controller, span, 64)
     single = np.sqrt(np.sum(together.rms_rad**2, axis=1))[:4]
     assert_allclose([w.rms_rad for w in windows], single, rtol=0.02)  # control samples against plant steps
     mean = math.sqrt(np.mean([w.rms_rad**2 for w in windows]))
@@ -626,7 +626,7 @@ def test_a_spot_beyond_the_field_of_view_is_lost_at_once(run, shaken, design):
     (first, *_) = [e for e in found.log if e.state == "loss"]
     assert (first.time_s, first.cause) == (lost.time_s, "seen by its own sensor")
     span = ensemble.Span(0.6, 0.2, 1)
-    assert ensemble.run(scene.loop, design.controller, span, 1).counts[0, kernels.COUNT_LOST] > 0
+    assert ensemble.simulate(scene.loop, design.controller, span, 1).counts[0, kernels.COUNT_LOST] > 0
 
 
 def test_a_slow_sensor_loses_the_spot_only_where_it_looks(sampler, scene):

@@ -9,8 +9,8 @@ from microrad.core import threads
 from microrad.core.kept import NOTHING, Kept
 from microrad.core.reads import digest
 from microrad.loop.control import PI
-from microrad.loop.fine_pointing import designs
-from microrad.loop.fine_pointing import results as fine_results
+from microrad.loop.controller_study import designs
+from microrad.loop.controller_study import results as fine_results
 from microrad.mission.file import MissionError, load_mission
 from microrad.orbit.day import assumptions
 from microrad.report.results.arrays import study_netcdf

@@ -4,8 +4,8 @@ from collections import Counter
 
 from microrad import link
 from microrad.core import threads
-from microrad.loop import fine_pointing
-from microrad.loop.fine_pointing import designs
+from microrad.loop import controller_study
+from microrad.loop.controller_study import designs
 from microrad.mirror import model, variants
 from microrad.study import study
 from shipped import edited_file
@@ -25,7 +25,7 @@ def test_one_study_assembles_its_link_and_each_variant_of_its_mirror_once(tmp_pa
     monkeypatch.setattr(link, "of", lambda m: linked.append(m) or of(m))
     monkeypatch.setattr(threads, "_may_fork", lambda: False)
     monkeypatch.setattr(study.alternatives, "other_readings", lambda *args: ())  # they read the mission in another way
-    monkeypatch.setattr(fine_pointing, "design", lambda scene, told: designs.design(scene, told, only=("PI",)))
+    monkeypatch.setattr(controller_study, "design", lambda scene, told: designs.design(scene, told, only=("PI",)))
     found = study.run_study(file)
     assert entered == [file.mission]
     assert sum(m is file.mission for m in linked) == 1

@@ -17,7 +17,7 @@ from microrad.campaign.rows import evaluate
 from microrad.campaign.rows.loops import mission_loop
 from microrad.campaign.rows.missions import MissionBuilder
 from microrad.core import reads
-from microrad.loop.fine_loop import ensemble
+from microrad.loop.pointing_loop import ensemble
 from microrad.mission.fields import Table
 from microrad.mission.file import LinkFile
 from microrad.mission.toml import Document, MissionError

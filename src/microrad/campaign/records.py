@@ -31,8 +31,8 @@ class Chunk:
     ``columns`` (rows,) by name in a fixed order: ``row`` (its number in the cell), ``weight`` (1 but for importance
     sampling), the inputs drawn by key in SI units, the outputs by name; nan in the outputs of a failed row.
     ``survival`` (bins,) is the sum over the good rows of weight times the share of the time that the radial error
-    exceeded the lower edge of each bin of `fine_loop.ensemble.bin_edges_rad`, ``survival_square`` that of the squared
-    terms; both empty in a campaign without a loop.
+    exceeded the lower edge of each bin of `pointing_loop.ensemble.bin_edges_rad`, ``survival_square`` that of the
+    squared terms; both empty in a campaign without a loop.
     """
 
     cell: int

@@ -9,7 +9,7 @@ from microrad.campaign.records import Job
 from microrad.campaign.rows.evaluator import Evaluator
 from microrad.campaign.rows.loops import mission_loop
 from microrad.campaign.rows.plan import planned
-from microrad.loop.fine_loop import ensemble
+from microrad.loop.pointing_loop import ensemble, traces
 
 __all__ = ["Work", "code_sha256", "open_work"]
 
@@ -28,7 +28,7 @@ class Work:
         self.evaluator = Evaluator(self.campaign, dict(enumerate(self.opened.controllers)))
         if self.campaign.table.loop is not None:
             loop = mission_loop(self.campaign.mission, self.campaign.table.loop, 0).row
-            ensemble.trace(loop, self.evaluator.controller(0), ensemble.Span(2.0 * loop.timing.period_s, 0.0, 0))
+            traces.trace(loop, self.evaluator.controller(0), ensemble.Span(2.0 * loop.timing.period_s, 0.0, 0))
 
     def do(self, job: Job, beat: Callable[[], None]) -> bytes:
         """A chunk, a chunk of one row, or a trace, as the job asks, in the format that the ledger keeps."""

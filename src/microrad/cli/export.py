@@ -131,7 +131,7 @@ def c(  # noqa: PLR0913, PLR0917  each is an option
             on_progress=progress,
         )
     if as_json:
-        return Outcome(json_text({**write.data(found), "folder": str(folder)}))
+        return Outcome(json_text({**write.export_data(found), "folder": str(folder)}))
     return Outcome(f"{write.report_text(found)}\n\n{folder}")
 
 

@@ -22,7 +22,7 @@ from microrad.cli.frame import (
 )
 
 if TYPE_CHECKING:
-    from microrad.loop.fine_pointing import Design, Outlook, Scene
+    from microrad.loop.controller_study import Design, Outlook, Scene
 
 
 @app.command(
@@ -48,15 +48,15 @@ def design(
     """
     from microrad import mirror as mirror_room
     from microrad.link import tracking_light_w
-    from microrad.loop import fine_pointing
+    from microrad.loop import controller_study
     from microrad.mirror.summary import unknown_dynamics
     from microrad.mission.file import load_mission
 
     mission = load_mission(file, mirror)
     with progress_bar() as progress, refusal_of(mission.path):
-        scene = fine_pointing.scene(mission, mirror_room.of(mission.mission), tracking_light_w(mission))
-        designs = fine_pointing.design(scene, progress)
-        left = fine_pointing.outlook(scene, designs, progress)
+        scene = controller_study.scene(mission, mirror_room.of(mission.mission), tracking_light_w(mission))
+        designs = controller_study.design(scene, progress)
+        left = controller_study.outlook(scene, designs, progress)
     marks = [each.mark(accept) for each in left]
     warnings = list(filter(None, [unknown_dynamics(mission.mission.mirror), _broken(designs, left, accept)]))
     code = UNMET if "refused" in marks else MET
@@ -69,7 +69,7 @@ def design(
 
 def _broken(designs: "tuple[Design, ...]", left: "tuple[Outlook, ...]", accept: bool) -> str:
     """The designs whose linear figure the mirror does not keep, in a sentence."""
-    from microrad.loop.fine_pointing import PROMISE
+    from microrad.loop.controller_study import PROMISE
 
     named = [f"{d.name} ({x.times:.2f} times)" for d, x in zip(designs, left, strict=True) if not x.holds]
     if not named:

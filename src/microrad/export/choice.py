@@ -31,10 +31,10 @@ from microrad.export.records import (
     Vectors,
 )
 from microrad.link import tracking_light_w
-from microrad.loop import control, fine_pointing, paper_cases, sine_run
-from microrad.loop.fine_loop.loop import LoopController
-from microrad.loop.fine_loop.replay import replay
+from microrad.loop import control, controller_study, paper_cases, sine_run
 from microrad.loop.paper_cases import PID, PID_WITH_INVERSE
+from microrad.loop.pointing_loop.loop import LoopController
+from microrad.loop.pointing_loop.traces import replay
 from microrad.mirror import Variant, model
 from microrad.mission.file import MissionFile
 from microrad.mission.model import Scenario
@@ -62,13 +62,13 @@ class PointingChoice:
     """A controller of the fine-pointing loop."""
 
     source: Source
-    scene: fine_pointing.Scene
+    scene: controller_study.Scene
     tuned: control.Tuned
     controller: LoopController
 
 
 @dataclass(frozen=True, slots=True)
-class TrackingChoice:
+class PaperLoopChoice:
     """A controller of the table [control]: one axis that tracks the scenario's sines, the paper's Fig. 6 and 8."""
 
     source: Source
@@ -79,12 +79,12 @@ class TrackingChoice:
     inverse: control.Inverse
 
 
-Choice = PointingChoice | TrackingChoice
+Choice = PointingChoice | PaperLoopChoice
 
 
 def names(table: FinePointing | None) -> tuple[str, ...]:
     """The controllers of a mission with this table of its fine-pointing loop, or without one."""
-    return (*(() if table is None else fine_pointing.names(table)), PID, PID_WITH_INVERSE)
+    return (*(() if table is None else controller_study.names(table)), PID, PID_WITH_INVERSE)
 
 
 def source(file: MissionFile) -> Source:
@@ -110,26 +110,26 @@ def choose(file: MissionFile, name: str, on_progress: Progress = lambda done, to
     try:
         mirrors = mirror.of(m)
         if name in (PID, PID_WITH_INVERSE):
-            return _tracking(source(file), paper_cases.of(m, mirrors), name)
+            return _paper_loop(source(file), paper_cases.of(m, mirrors), name)
         on_progress(0, 2, f"tuning {name}")
-        scene = fine_pointing.scene(file, mirrors, tracking_light_w(file))
-        tuned = fine_pointing.tune(name, scene.table, fine_pointing.plants(scene, scene.table.seed))
+        scene = controller_study.scene(file, mirrors, tracking_light_w(file))
+        tuned = controller_study.tune(name, scene.table, controller_study.plants(scene, scene.table.seed))
         on_progress(1, 2, f"{name} tuned")
-        return PointingChoice(source(file), scene, tuned, fine_pointing.build(name, scene, tuned.controller))
+        return PointingChoice(source(file), scene, tuned, controller_study.build(name, scene, tuned.controller))
     except ValueError as error:
         raise ExportError(f"{file.path}: {error}") from error
 
 
-def outlook(choice: Choice) -> fine_pointing.Outlook | None:
+def outlook(choice: Choice) -> controller_study.Outlook | None:
     """What a controller of the fine-pointing loop leaves, linear and simulated; the loop of [control] has no theory."""
-    if isinstance(choice, TrackingChoice):
+    if isinstance(choice, PaperLoopChoice):
         return None
-    design = fine_pointing.Design(choice.controller.name, choice.tuned, choice.controller)
-    (found,) = fine_pointing.outlook(choice.scene, [design])
+    design = controller_study.Design(choice.controller.name, choice.tuned, choice.controller)
+    (found,) = controller_study.outlook(choice.scene, [design])
     return found
 
 
-def promised(choice: Choice, accept: bool = False) -> fine_pointing.Outlook | None:
+def promised(choice: Choice, accept: bool = False) -> controller_study.Outlook | None:
     """What a controller leaves; raises ExportError, but for ``accept``, where its linear figure is no promise."""
     left = outlook(choice)
     if isinstance(choice, PointingChoice) and left is not None and not (left.holds or accept):
@@ -137,13 +137,13 @@ def promised(choice: Choice, accept: bool = False) -> fine_pointing.Outlook | No
     return left
 
 
-def _broken(choice: PointingChoice, left: fine_pointing.Outlook) -> str:
+def _broken(choice: PointingChoice, left: controller_study.Outlook) -> str:
     found, said = rms_text(left.simulated_rad), rms_text(left.linear_rad)
     return (
         f"{choice.source.path}: {choice.controller.name} leaves {found} on the mission's mirror, simulated with its "
-        f"hysteresis: {left.times:.2f} times the {said} of linear theory, where {fine_pointing.PROMISE:g} times is the "
-        "most. Choose another controller by the simulated figures of microrad design, or write this one all the same "
-        "with --accept."
+        f"hysteresis: {left.times:.2f} times the {said} of linear theory, where {controller_study.PROMISE:g} times "
+        "is the most. Choose another controller by the simulated figures of microrad design, or write this one all "
+        "the same with --accept."
     )
 
 
@@ -152,10 +152,10 @@ def rms_text(rad: float) -> str:
     return f"{format_quantity(rad, 'rad', 4)} rms an axis"
 
 
-def _tracking(of: Source, cases: paper_cases.PaperCases, name: str) -> TrackingChoice:
+def _paper_loop(of: Source, cases: paper_cases.PaperCases, name: str) -> PaperLoopChoice:
     plant = cases.mirrors.line_of_sight[Variant.GIVEN].plant
     inverse = control.inverse(plant) if name == PID_WITH_INVERSE else control.no_feedforward(plant)
-    return TrackingChoice(of, cases.scenario, name, plant, cases.setup, inverse)
+    return PaperLoopChoice(of, cases.scenario, name, plant, cases.setup, inverse)
 
 
 # ------------------------------------------------------------------------------------------------------ the controller
@@ -171,7 +171,7 @@ def flight_controller(choice: Choice) -> FlightController:
 
 
 def _whole_controller(choice: Choice) -> FlightController:
-    return _pointing_controller(choice) if isinstance(choice, PointingChoice) else _tracking_controller(choice)
+    return _pointing_controller(choice) if isinstance(choice, PointingChoice) else _paper_controller(choice)
 
 
 def columns(inputs: tuple[Signal, ...]) -> dict[str, slice]:
@@ -202,6 +202,15 @@ def inverse_law(of: control.Inverse, period_s: float, by_difference: bool) -> In
     return InverseLaw(**arrays, by_difference=by_difference)
 
 
+def _margins(of: control.LoopMargins) -> tuple[tuple[str, float, str], ...]:
+    return (
+        ("modulus margin", of.modulus, ""),
+        ("gain margin", 20.0 * math.log10(of.gain_up), "dB"),
+        ("phase margin", math.degrees(of.phase_rad), "deg"),
+        ("delay margin", of.delay_s, "s"),
+    )
+
+
 def _pointing_controller(choice: PointingChoice) -> FlightController:
     loop, made, margins = choice.scene.loop, choice.controller, choice.tuned.margins
     period = loop.timing.period_s
@@ -224,19 +233,12 @@ def _pointing_controller(choice: PointingChoice) -> FlightController:
         maximum_v=loop.drive.maximum_v,
         resolution_v=loop.drive.drive_resolution_v,
         bias_v=choice.source.mirror.bias_v,
-        margins=(
-            ("modulus margin", margins.modulus, ""),
-            ("gain margin", 20.0 * math.log10(margins.gain_up), "dB"),
-            ("phase margin", math.degrees(margins.phase_rad), "deg"),
-            ("delay margin", margins.delay_s, "s"),
-            ("bandwidth", margins.bandwidth_hz, "Hz"),
-        ),
+        margins=(*_margins(margins), ("bandwidth", margins.bandwidth_hz, "Hz")),
     )
 
 
-def _tracking_controller(choice: TrackingChoice) -> FlightController:
+def _paper_controller(choice: PaperLoopChoice) -> FlightController:
     setup, s, axes = choice.setup, choice.setup.controller, choice.mirror.axes
-    margins = sine_run.margins(choice.mirror, setup)
     inverse = None
     D = np.hstack([-s.D, s.D])
     C = s.C
@@ -260,12 +262,7 @@ def _tracking_controller(choice: TrackingChoice) -> FlightController:
         maximum_v=setup.drive.maximum_v,
         resolution_v=setup.drive.drive_resolution_v,
         bias_v=choice.source.mirror.bias_v,
-        margins=(
-            ("modulus margin", margins.modulus, ""),
-            ("gain margin", 20.0 * math.log10(margins.gain_up), "dB"),
-            ("phase margin", math.degrees(margins.phase_rad), "deg"),
-            ("delay margin", margins.delay_s, "s"),
-        ),
+        margins=_margins(sine_run.margins(choice.mirror, setup)),
     )
 
 
@@ -285,9 +282,9 @@ def plant_unit(file: MissionFile, loop: str) -> PlantUnit:
     try:
         mirrors = mirror.of(file.mission)
         if loop == LOOPS[0]:
-            made = fine_pointing.scene(file, mirrors, tracking_light_w(file)).loop
+            made = controller_study.scene(file, mirrors, tracking_light_w(file)).loop
             return _plant_unit(source(file), made.mirror, made.optics, made.drive, made.timing)
-        one = _tracking(source(file), paper_cases.of(file.mission, mirrors), PID)
+        one = _paper_loop(source(file), paper_cases.of(file.mission, mirrors), PID)
         return _plant_unit(one.source, one.mirror, np.eye(one.mirror.axes), one.setup.drive, one.setup.timing)
     except ValueError as error:
         raise ExportError(f"{file.path}: {error}") from error
@@ -339,12 +336,12 @@ def vectors(choice: Choice, samples: int) -> Vectors:
         saturated, clamped = (int(run.counts[c]) for c in (kernels.COUNT_SATURATED, kernels.COUNT_INVERSE_CLAMPED))
         found = Vectors(run.inputs, run.commands, saturated, clamped)
     else:
-        found = _tracking_vectors(choice, samples)
+        found = _paper_vectors(choice, samples)
     kept = _looked_at(_whole_controller(choice)).values()
     return replace(found, inputs=np.hstack([found.inputs[:, at] for at in kept]))
 
 
-def _tracking_vectors(choice: TrackingChoice, samples: int) -> Vectors:
+def _paper_vectors(choice: PaperLoopChoice, samples: int) -> Vectors:
     scenario, setup = choice.scenario, choice.setup
     time: Floats = np.arange(samples, dtype=float) * setup.timing.period_s
     reference = scenario.amplitude_rad * np.sin(2.0 * np.pi * max(scenario.inverse_frequencies_hz) * time)[:, None]

@@ -66,9 +66,9 @@ class Run:
         return float(np.max(np.abs(np.diff(self.trace.drive_v, axis=0))) / period)
 
 
-def results(cases: PaperCases) -> tuple[tuple[HysteresisLoop, ...], control.LoopMargins, tuple[Run, ...]]:
-    """The settled loops, the margins and the tracked sines. Raises ValueError as `loop_margins` and `tracking_runs`."""
-    return hysteresis_loops(cases), loop_margins(cases), tracking_runs(cases)
+def simulate(cases: PaperCases) -> tuple[tuple[HysteresisLoop, ...], control.LoopMargins, tuple[Run, ...]]:
+    """The settled loops, the margins and the tracked sines. Raises ValueError as `loop_margins` and `sine_runs`."""
+    return hysteresis_loops(cases), loop_margins(cases), sine_runs(cases)
 
 
 def hysteresis_loops(cases: PaperCases) -> tuple[HysteresisLoop, ...]:
@@ -84,7 +84,7 @@ def loop_margins(cases: PaperCases) -> control.LoopMargins:
     return margins(cases.mirrors.line_of_sight[Variant.GIVEN].plant, cases.setup)
 
 
-def tracking_runs(cases: PaperCases, variants: Collection[Variant] = tuple(Variant)) -> tuple[Run, ...]:
+def sine_runs(cases: PaperCases, variants: Collection[Variant] = tuple(Variant)) -> tuple[Run, ...]:
     """Fig. 6 and 8: the sines of the scenario under PID and PID + inverse, on variants of the mirror that it has.
 
     Raises ValueError when the mirror has no inverse.

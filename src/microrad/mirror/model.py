@@ -183,7 +183,7 @@ def _routes(composition: str, elements: int) -> tuple[Floats, Floats]:
 
 def combine(*mirrors: Mirror) -> Mirror:
     """Independent mirrors side by side: the axes, actuators and elements of the first, then of the next."""
-    from scipy.linalg import block_diag  # slow to import, not needed to show help
+    from scipy.linalg import block_diag
 
     bw = [len(m.bouc_wen) for m in mirrors]
     total = np.cumsum([0] + [len(m.bouc_wen) + len(m.plays) for m in mirrors])

@@ -80,4 +80,4 @@ def other_readings(m: Mission, residual: paper_cases.Run, parts: kept.Kept = kep
 
 def _largest(cases: paper_cases.PaperCases, statistic: str) -> paper_cases.Run:
     """The run on the mission's mirror that leaves the largest error."""
-    return paper_cases.worst(paper_cases.tracking_runs(cases, (Variant.GIVEN,)), statistic)
+    return paper_cases.worst(paper_cases.sine_runs(cases, (Variant.GIVEN,)), statistic)

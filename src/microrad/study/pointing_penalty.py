@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from microrad import link
 from microrad.link import pointing
 from microrad.link.pointing.outage import ErrorDistribution, Performance, performance, stated_outage
-from microrad.loop import fine_pointing, paper_cases
-from microrad.loop.fine_loop.ensemble import bin_edges_rad, histogram_quantile
+from microrad.loop import controller_study, paper_cases
+from microrad.loop.pointing_loop.ensemble import bin_edges_rad, histogram_quantile
 from microrad.mirror import Variant
 
 _PARTS = 32  # of a bin of the histogram, which is 3 % wide in the square of the error
@@ -24,7 +24,7 @@ class Binned(ErrorDistribution):
 
     @classmethod
     def of(cls, counts: NDArray[np.int64]) -> "Binned":
-        """The errors that these counts stand for, in the bins of `fine_loop.ensemble.bin_edges_rad`."""
+        """The errors that these counts stand for, in the bins of `pointing_loop.ensemble.bin_edges_rad`."""
         squares = bin_edges_rad() ** 2
         middles = (np.arange(_PARTS) + 0.5) / _PARTS
         within = squares[:-1, None] + np.diff(squares)[:, None] * middles
@@ -68,7 +68,7 @@ def performance_of_loops(
     data: link.DataLink,
     residual: str,
     runs: tuple[paper_cases.Run, ...],
-    fine: fine_pointing.FinePointingStudy | None,
+    fine: controller_study.FinePointingStudy | None,
 ) -> LinkPerformance:
     """The communication link under the residuals of the clean sines and of the fine-pointing loop.
 
@@ -110,7 +110,7 @@ def _sine(data: link.DataLink, radial: bool, run: paper_cases.Run) -> Performanc
 
 
 def _fine(
-    data: link.DataLink, fine: fine_pointing.FinePointingStudy, verified: fine_pointing.Verified, mirror: str
+    data: link.DataLink, fine: controller_study.FinePointingStudy, verified: controller_study.Verified, mirror: str
 ) -> Performance:
     """One controller of the fine-pointing loop; the spectrum is known on the mission's own mirror."""
     left = verified.simulated[mirror]

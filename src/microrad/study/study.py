@@ -14,8 +14,8 @@ from microrad.core.threads import beside, both
 from microrad.link import pointing, requirement
 from microrad.link import study as link_study
 from microrad.link.pointing.outage import Performance
-from microrad.loop import control, fine_pointing, paper_cases, sine_run
-from microrad.loop.fine_loop import ensemble
+from microrad.loop import control, controller_study, paper_cases, sine_run
+from microrad.loop.pointing_loop import ensemble
 from microrad.mirror import Variant
 from microrad.mirror import summary as mirror_summary
 from microrad.mission.file import MissionFile, with_contents
@@ -77,7 +77,7 @@ class Study:
     comparison: Comparison | None
     other_readings: tuple[alternatives.Reading, ...]
     scan: paper.Scan | None
-    fine_pointing: fine_pointing.FinePointingStudy | None
+    fine_pointing: controller_study.FinePointingStudy | None
     performance: pointing_penalty.LinkPerformance
     tornado: link.Tornado
     day: day_study.DayStudy | None
@@ -167,8 +167,8 @@ def run_study(
     mirrors = mirror.of(m)
     cases = paper_cases.of(m, mirrors)
 
-    def scene() -> fine_pointing.Scene:
-        return fine_pointing.scene(file, mirrors, link.tracking_light_w(file))
+    def scene() -> controller_study.Scene:
+        return controller_study.scene(file, mirrors, link.tracking_light_w(file))
 
     def linked() -> tuple[link_study.LinkStudy, MarginMap]:
         found = link_study.run_link_study(file, parts)
@@ -178,7 +178,7 @@ def run_study(
     on_progress(0, 3, "budgets, acquisition, mirror and tracking")
     with beside(linked) as of_links:
         summary = mirror_summary.summarise(m.mirror)
-        loops, margins, runs = parts.part(paper_cases.results, cases)
+        loops, margins, runs = parts.part(paper_cases.simulate, cases)
         residual = paper_cases.worst(runs, q.residual_statistic)
         as_read = alternatives.other_readings(m, residual, parts)
         on_progress(1, 3, "claims of the paper")
@@ -187,7 +187,7 @@ def run_study(
         try:
             if m.fine_pointing is not None:
                 compiled()
-                fine = parts.part(fine_pointing.run, scene(), on_progress=on_progress)
+                fine = parts.part(controller_study.design_and_simulate, scene(), on_progress=on_progress)
         except ValueError:
             of_links()  # what is wrong with the links is said first
             raise
@@ -244,7 +244,7 @@ def run_study(
 def judged(
     links: link_study.LinkStudy,
     by_paper: Requirements,
-    fine: fine_pointing.FinePointingStudy | None,
+    fine: controller_study.FinePointingStudy | None,
     case: Performance | None,
 ) -> tuple[Requirements, Requirements]:
     """What the verdict judges, and what the paper's loop is held against beside it where it is not that.
@@ -258,7 +258,7 @@ def judged(
 
 
 def best_case(
-    found: pointing_penalty.LinkPerformance, fine: fine_pointing.FinePointingStudy | None
+    found: pointing_penalty.LinkPerformance, fine: controller_study.FinePointingStudy | None
 ) -> Performance | None:
     """The link under the fine-pointing loop's best controller on the mission's mirror, or None without that loop."""
     return None if fine is None else found.case(pointing_penalty.FINE, fine.best.design.name, Variant.GIVEN)
@@ -280,7 +280,7 @@ def tornado(links: link_study.LinkStudy, error_rad: float) -> link.Tornado:
 def delivered(
     links: link_study.LinkStudy,
     loss: day_study.PointingLoss,
-    fine: fine_pointing.FinePointingStudy | None,
+    fine: controller_study.FinePointingStudy | None,
     parts: kept.Kept = kept.NOTHING,
 ) -> tuple[day_study.DayStudy | None, contact_run.ContactRun | None, constellation.ConstellationPlan | None]:
     """The day at a pointing loss, its contact in time under the best controller, and the plan of a constellation.

@@ -11,7 +11,7 @@ from microrad.link import pointing
 from microrad.link.pointing.outage import Performance
 from microrad.link.requirement import IMPOSSIBLE, Requirement, Subject, derived_from, outage_words
 from microrad.loop import sine_run
-from microrad.loop.fine_pointing import FinePointingStudy
+from microrad.loop.controller_study import FinePointingStudy
 from microrad.loop.paper_cases import PID, PID_WITH_INVERSE, PaperCases, Run
 from microrad.mirror import MirrorParts, Variant, hysteresis
 from microrad.mirror import summary as mirror_summary

@@ -10,7 +10,7 @@ from microrad.campaign.definition.tables import MOST_RUNS, CampaignTable, LimitT
 from microrad.campaign.definition.values import FILE_WORD, NotedError, ValueReader, quoted_near
 from microrad.campaign.records import Limit
 from microrad.core.units import format_quantity
-from microrad.loop import fine_pointing
+from microrad.loop import controller_study
 from microrad.mirror import Variant
 from microrad.mission.fields import Quantity
 from microrad.mission.model import LinkMission, Mission
@@ -40,7 +40,7 @@ def check_loop(reader: ValueReader, table: LoopTable, missions: Sequence[LinkMis
 
 
 def _has_controller(reader: ValueReader, controller: str, of: FinePointing) -> bool:
-    names = fine_pointing.names(of)
+    names = controller_study.names(of)
     if controller in names:
         return True
     expected = " or ".join(f'"{name}"' for name in names)

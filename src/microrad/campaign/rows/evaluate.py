@@ -13,8 +13,8 @@ from microrad.core import kernels
 from microrad.core.arrays import Floats
 from microrad.link.pointing.outage import Exposure, stated_outage
 from microrad.link.requirement import IMPOSSIBLE
-from microrad.loop import fine_pointing
-from microrad.loop.fine_loop import ensemble
+from microrad.loop import controller_study
+from microrad.loop.pointing_loop import ensemble
 from microrad.mission.file import LinkFile
 from microrad.mission.model import Mission, Source
 from microrad.mission.tables.fine_pointing import FinePointing
@@ -63,7 +63,7 @@ def _residual(
 ) -> dict[str, Callable[[], float]]:
     return {
         "residual_rms": lambda: runs.radial_rms_rad,
-        "residual_quantile": lambda: runs.quantile_rad(fine_pointing.table(table).quantile),
+        "residual_quantile": lambda: runs.quantile_rad(controller_study.table(table).quantile),
         "residual_largest": lambda: float(np.max(runs.largest_rad)),
         "beyond_share": lambda: runs.beyond(required.pointing_error_rad),
         "lost_share": lambda: runs.share(kernels.COUNT_LOST),

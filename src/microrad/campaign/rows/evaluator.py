@@ -16,8 +16,8 @@ from microrad.campaign.rows.missions import MissionBuilder
 from microrad.core import kernels
 from microrad.core.arrays import Floats
 from microrad.loop.control import AxisController
-from microrad.loop.fine_loop import ensemble
-from microrad.loop.fine_loop.loop import LoopController
+from microrad.loop.pointing_loop import ensemble, traces
+from microrad.loop.pointing_loop.loop import LoopController
 from microrad.mission.file import LinkFile
 
 Beat = Callable[[], None]
@@ -216,7 +216,7 @@ class Evaluator:
             return _Weighted(rows.start, radius, log_weight)
         each = self.campaign.realisations
         first, count = rows.start * each, len(rows) * each  # the numbers of the runs follow the rows'
-        runs = ensemble.run(own.row, controller, own.span, count, first_run=first, threads=1, beat=watch)
+        runs = ensemble.simulate(own.row, controller, own.span, count, first_run=first, threads=1, beat=watch)
         found = Simulated(rows.start, each, runs)
         if self.memory is not None:
             self.memory[key] = found
@@ -249,7 +249,7 @@ class Evaluator:
             raise CampaignError(file)
         beat()
         own = self._loop(file)
-        found = ensemble.trace(own.row, self.controller(cell), own.span, row * self.campaign.realisations)
+        found = traces.trace(own.row, self.controller(cell), own.span, row * self.campaign.realisations)
         settled = found.time_s >= own.span.settle_s
         return WorstTrace(
             cell, row, "", math.nan, found.time_s[settled], found.error_rad[settled], found.drive_v[settled]

@@ -25,10 +25,11 @@ from numpy.typing import NDArray
 
 from microrad.core import kernels, lti
 from microrad.core.arrays import Floats
-from microrad.loop.fine_loop import ensemble, linear
-from microrad.loop.fine_loop.ensemble import LANES, SLICE_SAMPLES, Span
-from microrad.loop.fine_loop.loop import LoopController, PointingLoop
-from microrad.loop.fine_pointing import parts
+from microrad.loop.controller_study import parts
+from microrad.loop.pointing_loop import ensemble, kernel_arrays, linear
+from microrad.loop.pointing_loop.ensemble import SLICE_SAMPLES, Span
+from microrad.loop.pointing_loop.kernel_arrays import LANES
+from microrad.loop.pointing_loop.loop import LoopController, PointingLoop
 
 STREAM = 0x54494C54
 """Second word of the key of the Philox streams that levels and directions are drawn from, behind the seed."""
@@ -141,13 +142,13 @@ def _lines_rad(closed: linear.ClosedLoop) -> float:
 def _pilot(loop: PointingLoop, controller: LoopController, span: Span) -> Floats:
     """Errors (samples, axes, LANES) of one batch behind the settling time, at most a slice of them."""
     total, settle = ensemble.control_samples(loop, span)
-    p = ensemble.arrays(loop, controller, span.seed)
-    state, nothing = ensemble.start(loop, p, 0), np.empty((0, 0, 0))
+    p = kernel_arrays.arrays(loop, controller, span.seed)
+    state, nothing = kernel_arrays.start(loop, p, 0), np.empty((0, 0, 0))
     end = min(total, settle + SLICE_SAMPLES)
     error = np.empty((end - settle, loop.axes, LANES))
     for at, until in pairwise([*range(0, settle, SLICE_SAMPLES), settle, end]):
         kept = error if until == end else nothing
-        kernels.ensemble_loop(p, state, ensemble.reference(loop, at, until), kept, nothing, kernels.UNSHIFTED)
+        kernels.ensemble_loop(p, state, kernel_arrays.reference(loop, at, until), kept, nothing, kernels.UNSHIFTED)
     return error
 
 
@@ -251,8 +252,8 @@ def runs(
     The mean over runs of weight times 1(error > x) is the probability of an error beyond x. ``beat`` is called between
     slices of compiled code and ends the runs by raising. The numbers go by the seed and the run's number alone.
     """
-    p = ensemble.arrays(loop, controller, span.seed)
-    state = ensemble.start(loop, p, first_run)
+    p = kernel_arrays.arrays(loop, controller, span.seed)
+    state = kernel_arrays.start(loop, p, first_run)
     total, _ = ensemble.control_samples(loop, span)
     along, log_weight = drawn(by, span.seed, first_run)
     shift = kernels.UNSHIFTED
@@ -263,7 +264,7 @@ def runs(
     for at in range(0, total, SLICE_SAMPLES):
         beat()
         end = min(at + SLICE_SAMPLES, total)
-        kernels.ensemble_loop(p, state, ensemble.reference(loop, at, end), nothing, nothing, shift)
+        kernels.ensemble_loop(p, state, kernel_arrays.reference(loop, at, end), nothing, nothing, shift)
     error = state.error.reshape(-1, LANES)[: loop.axes]
     return np.asarray(np.sqrt(np.sum(error**2, axis=0))), log_weight
 

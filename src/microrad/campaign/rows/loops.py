@@ -10,10 +10,10 @@ from microrad.campaign.records import CampaignError
 from microrad.campaign.rows.missions import MissionBuilder
 from microrad.core.progress import Progress
 from microrad.link import tracking_light_w
-from microrad.loop import fine_pointing
+from microrad.loop import controller_study
 from microrad.loop.control import AxisController
-from microrad.loop.fine_loop.ensemble import Span
-from microrad.loop.fine_loop.loop import LoopController, PointingLoop
+from microrad.loop.pointing_loop.ensemble import Span
+from microrad.loop.pointing_loop.loop import LoopController, PointingLoop
 from microrad.mission.file import LinkFile, MissionFile
 from microrad.mission.model import Mission
 from microrad.mission.tables.fine_pointing import FinePointing
@@ -23,7 +23,7 @@ def settings(file: LinkFile) -> FinePointing:
     """The fine-pointing table of a mission that has a loop: the campaign file's own check has seen to it."""
     m = file.mission
     assert isinstance(m, Mission)
-    return fine_pointing.table(m.fine_pointing)
+    return controller_study.table(m.fine_pointing)
 
 
 def span(table: LoopTable, f: FinePointing, seed: int) -> Span:
@@ -41,18 +41,18 @@ class MissionLoop:
     """
 
     table: LoopTable
-    scene: fine_pointing.Scene
+    scene: controller_study.Scene
     row: PointingLoop
     span: Span
 
     def tuned(self) -> AxisController:
         """The controller that the campaign names, tuned for this loop. Raises `ValueError` if none can be."""
         f = self.scene.table
-        return fine_pointing.tune(self.table.controller, f, fine_pointing.plants(self.scene, f.seed)).controller
+        return controller_study.tune(self.table.controller, f, controller_study.plants(self.scene, f.seed)).controller
 
     def controller(self, axis: AxisController) -> LoopController:
         """A tuned controller on the axes of this loop."""
-        return fine_pointing.build(self.table.controller, replace(self.scene, loop=self.row), axis)
+        return controller_study.build(self.table.controller, replace(self.scene, loop=self.row), axis)
 
 
 def mission_loop(file: LinkFile, table: LoopTable, seed: int) -> MissionLoop:
@@ -64,10 +64,12 @@ def mission_loop(file: LinkFile, table: LoopTable, seed: int) -> MissionLoop:
         seed: the campaign's.
     """
     assert isinstance(file, MissionFile)
-    scene = fine_pointing.scene(file, mirror.of(file.mission), tracking_light_w(file))
+    scene = controller_study.scene(file, mirror.of(file.mission), tracking_light_w(file))
     if table.axes == "one":
         scene = replace(scene, loop=scene.axis)
-    return MissionLoop(table, scene, fine_pointing.on_variant(scene, table.mirror), span(table, settings(file), seed))
+    return MissionLoop(
+        table, scene, controller_study.on_variant(scene, table.mirror), span(table, settings(file), seed)
+    )
 
 
 class ControllerTuner:

@@ -12,7 +12,7 @@ from microrad.campaign.statistics.intervals import Fold, Moments, moments, quant
 from microrad.core import kernels
 from microrad.core.arrays import Floats
 from microrad.core.units import format_quantity
-from microrad.loop.fine_loop.ensemble import bin_edges_rad
+from microrad.loop.pointing_loop.ensemble import bin_edges_rad
 
 CONFIDENCE = 0.95
 """Of every interval, but for those that the campaign file asks for."""

@@ -94,7 +94,7 @@ def widened(law: InverseLaw, rate: Floats) -> Floats:
     return np.asarray(law.widening[:, 0] * np.minimum(np.abs(rate), law.widening[:, 1]))
 
 
-def run(of: FlightController, form: Sections, inputs: Floats) -> Run:
+def run_in_double(of: FlightController, form: Sections, inputs: Floats) -> Run:
     """The controller in this form over recorded ``inputs`` (samples, numbers), in double precision and from rest."""
     samples, A, pushed = inputs.shape[0], form.A, inputs @ form.B.T
     x, direct = np.zeros(A.shape[0]), inputs @ form.D.T

@@ -10,7 +10,7 @@ import numpy as np
 from microrad.core import lti
 from microrad.core.arrays import Floats
 from microrad.export.flight.c_code import flight_code
-from microrad.export.flight.double_run import Run, run
+from microrad.export.flight.double_run import Run, run_in_double
 from microrad.export.flight.fixed_form import (
     HEAD_ROOM,
     FixedForm,
@@ -58,7 +58,7 @@ def quantised(
     """
     if not LEAST_BITS <= bits <= MOST_BITS:
         raise ExportError(f"{bits} bits in fixed point: give {LEAST_BITS} to {MOST_BITS} (sums have 64)")
-    ideal = run(of, form, v.inputs)
+    ideal = run_in_double(of, form, v.inputs)
     made = scaled(of, form, v.inputs, ideal, bits)
     _refuse_what_does_not_fit(of, made)
     moved = _poles(form, made)
@@ -123,7 +123,7 @@ def _report(
         samples=len(inputs),
         period_s=of.period_s,
         poles=moved,
-        outputs=_qualities(of, form, near, made, outputs - run(of, near, inputs).outputs, states),
+        outputs=_qualities(of, form, near, made, outputs - run_in_double(of, near, inputs).outputs, states),
         head_room_bits=tuple(float(np.log2(a / b)) for a, b in zip(ranges, rest, strict=True)),
         error_v=float(np.max(error)),
         inverse_v=float(np.max(single)),

@@ -15,7 +15,7 @@ import numpy as np
 
 from microrad.core import kernels
 from microrad.core.arrays import Floats
-from microrad.export.flight.double_run import InverseRun, Run, run, widened
+from microrad.export.flight.double_run import InverseRun, Run, run_in_double, widened
 from microrad.export.linear_part.sections import Sections, compensated_states
 from microrad.export.records import FlightController, InverseLaw, Vectors
 
@@ -92,7 +92,7 @@ def errors_before_converter(of: FlightController, form: Sections, v: Vectors) ->
 
     Infinite where no bound was found: errors may feed themselves while commands are clipped.
     """
-    r = run(of, form, v.inputs)
+    r = run_in_double(of, form, v.inputs)
     return _settled(of, form, r, *_local(form, v.inputs, r))
 
 

@@ -21,7 +21,7 @@ from microrad.export.flight.rounding import RoundingBound, rounding_bound
 from microrad.export.identifiers import identifier, suggested
 from microrad.export.linear_part.sections import Sections, sections
 from microrad.export.records import FlightController, Vectors
-from microrad.loop.fine_pointing import Outlook
+from microrad.loop.controller_study import Outlook
 
 Precision = Literal["double", "single", "fixed"]
 PRECISIONS: dict[Precision, str] = {"double": "double precision", "single": "single precision", "fixed": "fixed point"}
@@ -173,8 +173,8 @@ def _measured(b: BenchResult | None) -> list[tuple[str, str]]:
     ]
 
 
-def data(of: FlightExport) -> dict[str, Any]:
-    """The same for machines."""
+def export_data(of: FlightExport) -> dict[str, Any]:
+    """The numbers of the report, for JSON."""
     c = of.controller
     return {
         "name": of.name,

@@ -175,7 +175,7 @@ def _plain(value: Any) -> Any:
 def python_control() -> Any:
     """The library python-control. Raises ExportError where it is not installed."""
     try:
-        return import_module("control")  # slow to import, and an extra
+        return import_module("control")
     except ImportError as error:
         raise ExportError(
             "python-control is not installed, and its objects cannot be made or read without it: install it "

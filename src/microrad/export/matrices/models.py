@@ -5,16 +5,16 @@ from dataclasses import replace
 import numpy as np
 
 from microrad.core import lti
-from microrad.export.choice import Choice, PointingChoice, Source, TrackingChoice, flight_controller
+from microrad.export.choice import Choice, PaperLoopChoice, PointingChoice, Source, flight_controller
 from microrad.export.matrices.forms import LinearModel, Port
 from microrad.export.matrices.structure import without_copies, without_state
 from microrad.export.records import ExportError, FlightController
 from microrad.loop import control, sine_run
 from microrad.loop.control import GAUGE, OPTICAL, RESIDUAL
 from microrad.loop.control.analysis import moved
-from microrad.loop.fine_loop.design import behind_filter, design_plant
-from microrad.loop.fine_loop.loop import ReferenceFilter
-from microrad.loop.fine_pointing.designs import IN_SERIES
+from microrad.loop.controller_study.designs import IN_SERIES
+from microrad.loop.pointing_loop.design import behind_filter, design_plant
+from microrad.loop.pointing_loop.loop import ReferenceFilter
 from microrad.loop.sensor import StrainGauge
 from microrad.mirror import model as mirror
 
@@ -34,7 +34,7 @@ def models(of: Source | Choice) -> tuple[LinearModel, ...]:
         found = _mirror_models(start)
         if isinstance(of, Source) or controller is None:
             return tuple(found)
-        plant, loop = _pointing_models(of) if isinstance(of, PointingChoice) else _tracking_models(of)
+        plant, loop = _pointing_models(of) if isinstance(of, PointingChoice) else _paper_models(of)
         return (*found, plant, controller, loop)
     except ValueError as error:
         raise ExportError(f"{start.path}: {error}") from error
@@ -76,7 +76,7 @@ def _mirror_models(of: Source) -> list[LinearModel]:
     return [*found, _model(of, MIRROR, meaning, made.linear_loop, 0.0, {"drive_v": "V"}, {"mirror_rad": "rad"})]
 
 
-def _tracking_models(of: TrackingChoice) -> tuple[LinearModel, LinearModel]:
+def _paper_models(of: PaperLoopChoice) -> tuple[LinearModel, LinearModel]:
     """Sampled plant and loop of a controller of [control]."""
     setup, angle = of.setup, {"line_of_sight_rad": "rad"}
     plant = without_copies(control.sampled_plant(of.mirror, setup.drive, setup.timing))

@@ -12,7 +12,6 @@ from microrad.loop.control.classical import (
     FAMILIES,
     PI,
     PI_NOTCH,
-    PID,
     RESONANT_DAMPING,
     peak_family,
 )
@@ -24,7 +23,6 @@ from microrad.loop.control.problem import (
     AxisController,
     DesignPlant,
     Family,
-    Parameter,
     Specification,
 )
 from microrad.loop.control.sampled import (
@@ -57,7 +55,6 @@ __all__ = [
     "LQG",
     "OPTICAL",
     "PI",
-    "PID",
     "PI_NOTCH",
     "RESIDUAL",
     "RESONANT_DAMPING",
@@ -69,7 +66,6 @@ __all__ = [
     "Inverse",
     "LoopMargins",
     "MultiloopMargin",
-    "Parameter",
     "Specification",
     "Timing",
     "Tuned",

@@ -146,12 +146,33 @@ def by_source(plant: DesignPlant, controller: AxisController, output: int = 0) -
 
 
 @dataclass(frozen=True, slots=True)
-class LoopMargins:
+class DiskMargin:
+    """A symmetric disk margin: 2 / max |S - T|, over changes of all loops at once where there are several.
+
+    Source: Seiler, Packard and Gahinet, An introduction to disk margins, IEEE Control Systems Magazine 40 (2020) 78.
+    """
+
+    disk: float
+
+    @property
+    def disk_gain(self) -> tuple[float, float]:
+        """Lowest and highest factor on the gain within the disk: (1 - disk/2) / (1 + disk/2) and its reciprocal."""
+        lowest = max(0.0, (2.0 - self.disk) / (2.0 + self.disk)) if math.isfinite(self.disk) else 0.0
+        return lowest, 1.0 / lowest if lowest else math.inf
+
+    @property
+    def disk_phase_rad(self) -> float:
+        """Change of the phase, in either direction, within the disk: 2 atan(disk / 2)."""
+        return 2.0 * math.atan(self.disk / 2.0)
+
+
+@dataclass(frozen=True, slots=True)
+class LoopMargins(DiskMargin):
     """Margins of one stable loop, and how far it reaches.
 
     ``gain_up`` and ``gain_down`` are the factors nearest 1 that make it unstable (infinite and 0 without one),
     ``phase_rad`` the smallest phase margin in either direction, ``delay_s`` the smallest additional delay, ``modulus``
-    is min |1 + L|, ``disk`` the symmetric disk margin 2 / max |S - T|. ``crossover_hz`` is the highest frequency with
+    is min |1 + L|. ``crossover_hz`` is the highest frequency with
     |L| = 1 (nan without one), ``bandwidth_hz`` the lowest with |S| = 1, ``peak`` the largest |S|.
     """
 
@@ -160,36 +181,10 @@ class LoopMargins:
     phase_rad: float
     delay_s: float
     modulus: float
-    disk: float
     crossover_hz: float
     bandwidth_hz: float
     peak: float
     peak_hz: float
-
-    @property
-    def disk_gain(self) -> tuple[float, float]:
-        """Range of gain that the disk contains; see `disk_gain`."""
-        return disk_gain(self.disk)
-
-    @property
-    def disk_phase_rad(self) -> float:
-        """Phase, in either direction, that the disk contains; see `disk_phase_rad`."""
-        return disk_phase_rad(self.disk)
-
-
-def disk_gain(disk: float) -> tuple[float, float]:
-    """Factors on the loop's gain, lowest and highest, within a symmetric disk margin.
-
-    (1 - disk/2) / (1 + disk/2) and its reciprocal. Source: Seiler, Packard and Gahinet, An introduction to disk
-    margins, IEEE Control Systems Magazine 40 (2020) 78.
-    """
-    lowest = max(0.0, (2.0 - disk) / (2.0 + disk)) if math.isfinite(disk) else 0.0
-    return lowest, 1.0 / lowest if lowest else math.inf
-
-
-def disk_phase_rad(disk: float) -> float:
-    """Change of the loop's phase, in either direction, within a symmetric disk margin: 2 atan(disk / 2), as there."""
-    return 2.0 * math.atan(disk / 2.0)
 
 
 def loop_response(
@@ -389,21 +384,10 @@ def _least(distance: Distance, response: Response, freq_hz: Floats, L: Complexes
 
 
 @dataclass(frozen=True, slots=True)
-class MultiloopMargin:
+class MultiloopMargin(DiskMargin):
     """Disk margin of two loops whose gain and phase change at once, each on its own, and where it is smallest."""
 
-    disk: float
     freq_hz: float
-
-    @property
-    def disk_gain(self) -> tuple[float, float]:
-        """Factors on both loops' gains at once; see `disk_gain`."""
-        return disk_gain(self.disk)
-
-    @property
-    def disk_phase_rad(self) -> float:
-        """Phase of both loops at once; see `disk_phase_rad`."""
-        return disk_phase_rad(self.disk)
 
 
 def multiloop_disk_margin(freq_hz: Floats, L: Complexes) -> MultiloopMargin:

@@ -431,7 +431,7 @@ def follow_command(system: lti.StateSpace) -> Floats:
     independent: A - L C is stable wherever the controller's zeros are. Source: the observer form of Astrom and
     Wittenmark, Computer-Controlled Systems, 3rd ed., chapter 9, Nonlinear actuators.
     """
-    from scipy.linalg import solve_discrete_are  # slow to import, not needed to show help
+    from scipy.linalg import solve_discrete_are
 
     A, C, R = system.A, system.C, system.D @ system.D.T
     P = solve_discrete_are(A.T, C.T, system.B @ system.B.T, R)

@@ -105,7 +105,7 @@ def _programmed(
 
     By SLSQP: Kraft, DFVLR-FB 88-28, 1988. ``ending`` is `ROUGH` or `EXACT`.
     """
-    from scipy.optimize import minimize  # slow to import, not needed to show help
+    from scipy.optimize import minimize
 
     (low, high), (gain, iterations), eye = bounds, ending, np.eye(start.size)
     inside = {

@@ -76,7 +76,7 @@ def refuse_beyond_rate(freq_hz: float, period_s: float, what: str) -> None:
 
 def parallel(*systems: lti.StateSpace) -> lti.StateSpace:
     """Sum of the outputs of systems that share their input."""
-    from scipy.linalg import block_diag  # slow to import, not needed to show help
+    from scipy.linalg import block_diag
 
     return lti.StateSpace(
         A=block_diag(*(s.A for s in systems)),

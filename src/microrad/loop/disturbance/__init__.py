@@ -1,9 +1,8 @@
 """Disturbances of the line of sight: one-sided spectra as data, shaping filters that realise them, references."""
 
 from microrad.loop.disturbance.discrete import Discrete, discretise, initial_state
-from microrad.loop.disturbance.fits import Fit, bands, fit_bands, fit_table, table
+from microrad.loop.disturbance.fits import fit_bands, fit_table
 from microrad.loop.disturbance.records import (
-    Convention,
     Disturbance,
     SpectralLine,
     band_rms,
@@ -25,14 +24,11 @@ from microrad.loop.disturbance.tables import read_table
 __all__ = [
     "MICIUS_EDGES_HZ",
     "MICIUS_RMS_RAD",
-    "Convention",
     "Discrete",
     "Disturbance",
-    "Fit",
     "Reference",
     "SpectralLine",
     "band_rms",
-    "bands",
     "body_pointing",
     "combine",
     "discretise",
@@ -44,6 +40,5 @@ __all__ = [
     "one_input",
     "psd",
     "read_table",
-    "table",
     "wheels",
 ]

@@ -64,7 +64,7 @@ def discretise(disturbance: Disturbance, step_s: float) -> Discrete:
 
 def _sampled_filter(disturbance: Disturbance, step_s: float) -> tuple[Floats, Floats]:
     """Ad and Bd of the shaping filter alone, Bd with the fewest columns that keep the output."""
-    from scipy.linalg import expm  # slow to import, not needed to show help
+    from scipy.linalg import expm
 
     A, B, C = disturbance.A, disturbance.B, disturbance.C
     if A.size == 0:
@@ -87,7 +87,7 @@ def _noise_covariance(A: Floats, b: Floats, step_s: float) -> Floats:
 
     Doubled because the exponential also holds exp(-A s), which overflows where a pole is fast against the step.
     """
-    from scipy.linalg import expm  # slow to import, not needed to show help
+    from scipy.linalg import expm
 
     n = A.shape[0]
     doublings = max(0, math.ceil(math.log2(float(np.linalg.norm(A, 1)) * step_s)))

@@ -36,13 +36,6 @@ class Fit:
     worst_at_hz: float
 
 
-def bands(
-    edges_hz: ArrayLike, rms_rad: ArrayLike, *, convention: Convention, name: str = "bands", source: str = "given"
-) -> Disturbance:
-    """The disturbance of `fit_bands`."""
-    return fit_bands(edges_hz, rms_rad, convention=convention, name=name, source=source).disturbance
-
-
 def fit_bands(
     edges_hz: ArrayLike, rms_rad: ArrayLike, *, convention: Convention, name: str = "bands", source: str = "given"
 ) -> Fit:
@@ -80,13 +73,6 @@ def _refuse_poor_bands(fit: Fit, name: str) -> None:
             f"given rms between {fit.edges_hz[worst]:g} and {fit.edges_hz[worst + 1]:g} Hz, and {100 * _BAND:g} % is "
             "allowed: a density cannot fall faster than 1/f^4 from one band to the next; merge bands or give a table"
         )
-
-
-def table(
-    freq_hz: ArrayLike, psd_rad2_hz: ArrayLike, *, convention: Convention, name: str = "table", source: str = "given"
-) -> Disturbance:
-    """The disturbance of `fit_table`."""
-    return fit_table(freq_hz, psd_rad2_hz, convention=convention, name=name, source=source).disturbance
 
 
 def fit_table(

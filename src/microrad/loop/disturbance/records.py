@@ -105,7 +105,7 @@ def rising(values: Floats, what: str) -> Floats:
 
 def covariance(A: Floats, B: Floats) -> Floats:
     """Stationary covariance P of x' = A x + B w: A P + P A' + B B' = 0."""
-    from scipy.linalg import solve_continuous_lyapunov  # slow to import, not needed to show help
+    from scipy.linalg import solve_continuous_lyapunov
 
     return np.zeros((0, 0)) if A.size == 0 else np.asarray(solve_continuous_lyapunov(A, -B @ B.T))
 
@@ -144,27 +144,18 @@ def combine(*disturbances: Disturbance) -> Disturbance:
 
     States that come in pairs stand before single ones, so that every pair begins at an even row.
     """
+    from scipy.linalg import block_diag
+
     if not disturbances:
         raise ValueError("no disturbance to combine; give one or more")
-    first, *others = disturbances
-    A, B, C = first.A, first.B, first.C
-    for other in others:
-        A, B, C = _diagonal(A, other.A), _diagonal(B, other.B), np.hstack([C, other.C])
+    A, B = (block_diag(*matrices) for matrices in zip(*((d.A, d.B) for d in disturbances), strict=True))
+    C = np.hstack([d.C for d in disturbances])
     return Disturbance(
         " + ".join(d.name for d in disturbances),
         *_pairs_first(A, B, C),
         tuple(line for d in disturbances for line in d.lines),
         "; ".join(d.basis for d in disturbances),
         "; ".join(dict.fromkeys(d.source for d in disturbances)),
-    )
-
-
-def _diagonal(upper: Floats, lower: Floats) -> Floats:
-    return np.block(
-        [
-            [upper, np.zeros((upper.shape[0], lower.shape[1]))],
-            [np.zeros((lower.shape[0], upper.shape[1])), lower],
-        ]
     )
 
 

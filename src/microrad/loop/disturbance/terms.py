@@ -188,7 +188,7 @@ def _spread(samples: Samples, terms: list[Term]) -> float:
 
 def _powers(samples: Samples, terms: list[Term]) -> list[Term]:
     """The same terms with the non-negative variances of the least relative error, strongest first, without zeros."""
-    from scipy.optimize import nnls  # slow to import, not needed to show help
+    from scipy.optimize import nnls
 
     unit = [Term(t.kind, 1.0, t.freq_hz, t.damping) for t in terms]
     rows = np.column_stack([samples.rows([t]) for t in unit]) / samples.wanted[:, None]

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from microrad.loop import control
-from microrad.loop.fine_loop.design import design_plant
-from microrad.loop.fine_pointing import Design, ErrorBudget, FinePointingStudy, Residual, Sine, Verified
+from microrad.loop.controller_study import Design, ErrorBudget, FinePointingStudy, Residual, Sine, Verified
+from microrad.loop.pointing_loop.design import design_plant
 from microrad.mirror.geometry import StrokeBudget
 from microrad.mirror.summary import unknown_dynamics
 from microrad.report.data import fields, finite

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from microrad.core.arrays import Floats
-from microrad.loop.fine_loop.linear import close, sensitivity
-from microrad.loop.fine_pointing import ErrorBudget, FinePointingStudy, Verified
+from microrad.loop.controller_study import ErrorBudget, FinePointingStudy, Verified
+from microrad.loop.pointing_loop.linear import close, sensitivity
 from microrad.mirror import Variant
 from microrad.mission.model import Mission
 from microrad.report.fine_pointing.words import NAMES, source_name

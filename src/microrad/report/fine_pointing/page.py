@@ -6,8 +6,8 @@ from typing import Any
 
 from microrad.core.units import format_quantity
 from microrad.loop.control import LoopMargins
-from microrad.loop.fine_pointing import FinePointingStudy, Residual, Sine
-from microrad.loop.fine_pointing.parts import DELAY
+from microrad.loop.controller_study import FinePointingStudy, Residual, Sine
+from microrad.loop.controller_study.parts import DELAY
 from microrad.mirror.geometry import StrokeBudget
 from microrad.mirror.summary import unknown_dynamics
 from microrad.report.fine_pointing import words

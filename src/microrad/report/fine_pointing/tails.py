@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from microrad.core.arrays import Floats
-from microrad.loop.fine_loop.ensemble import bin_edges_rad, histogram_beyond, histogram_quantile
-from microrad.loop.fine_pointing import FinePointingStudy, Residual
+from microrad.loop.controller_study import FinePointingStudy, Residual
+from microrad.loop.pointing_loop.ensemble import bin_edges_rad, histogram_beyond, histogram_quantile
 from microrad.mirror import Variant
 from microrad.report.fine_pointing import words
 from microrad.report.plotting.figure import Figure

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from microrad.core.units import format_quantity
 from microrad.loop.control.tuning import MARGIN
-from microrad.loop.fine_pointing import FinePointingStudy, Verified
+from microrad.loop.controller_study import FinePointingStudy, Verified
 from microrad.mirror import Variant
 from microrad.mirror.geometry import StrokeBudget
 from microrad.mirror.summary import unknown_dynamics

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad.core.arrays import Floats
-from microrad.loop.fine_pointing import COUNTERS, FinePointingStudy, Residual
+from microrad.loop.controller_study import COUNTERS, FinePointingStudy, Residual
 from microrad.loop.paper_cases import Run
 from microrad.orbit import Contact
 from microrad.orbit.constellation import ConstellationPlan

@@ -7,7 +7,7 @@ from typing import Any
 from microrad import link
 from microrad.link.budget.lines import FREE_SPACE_LOSS, POINTING_LOSS
 from microrad.link.requirement import Requirement, Subject
-from microrad.loop.fine_pointing.parts import GAUGE_NOISE, OPTICAL_NOISE
+from microrad.loop.controller_study.parts import GAUGE_NOISE, OPTICAL_NOISE
 from microrad.mirror import Variant
 from microrad.mirror.geometry import StrokeBudget
 from microrad.report.fine_pointing.words import source_name

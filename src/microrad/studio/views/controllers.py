@@ -18,15 +18,15 @@ from microrad import mirror
 from microrad.core import lti
 from microrad.core.arrays import Floats
 from microrad.link import tracking_light_w
-from microrad.loop import control, fine_pointing, paper_cases
+from microrad.loop import control, controller_study, paper_cases
 from microrad.loop import sine_run as simulate
+from microrad.loop.controller_study import parts
+from microrad.loop.controller_study.designs import families
+from microrad.loop.controller_study.results import for_mirror
+from microrad.loop.controller_study.scenario import BODY_POINTING, with_mirror
 from microrad.loop.disturbance import Reference
-from microrad.loop.fine_loop import ensemble, linear
-from microrad.loop.fine_loop.loop import LoopController, PointingLoop
-from microrad.loop.fine_pointing import parts
-from microrad.loop.fine_pointing.designs import families
-from microrad.loop.fine_pointing.results import for_mirror
-from microrad.loop.fine_pointing.scenario import BODY_POINTING, with_mirror
+from microrad.loop.pointing_loop import ensemble, linear, traces
+from microrad.loop.pointing_loop.loop import LoopController, PointingLoop
 from microrad.mirror import Variant
 from microrad.mission.file import MissionFile
 from microrad.mission.tables.fine_pointing import FinePointing
@@ -117,7 +117,7 @@ class Controller:
 
 def names(table: FinePointing | None) -> tuple[str, ...]:
     """The controllers that a mission has: of its fine-pointing loop, where it has one, and of [control]."""
-    return (*(() if table is None else fine_pointing.names(table)), PID, PID_INVERSE)
+    return (*(() if table is None else controller_study.names(table)), PID, PID_INVERSE)
 
 
 _tuning = threading.Lock()  # two pages that want the same controller tune it once
@@ -153,19 +153,19 @@ def _controller(of: _Keyed, name: str) -> Controller:
     if name in (PID, PID_INVERSE):
         made = _pid(paper_cases.of(file.mission, mirrors), name)
     else:
-        made = _fine(fine_pointing.scene(file, mirrors, tracking_light_w(file)), name)
+        made = _fine(controller_study.scene(file, mirrors, tracking_light_w(file)), name)
     text = "" if file.mirror_file is None else file.mirror_file.text
     return replace(made, warnings=mirror_warnings(mirrors.table.linear is not None, text))
 
 
 # ------------------------------------------------------------------------------------------- the fine-pointing loop
-def _fine(scene: fine_pointing.Scene, name: str) -> Controller:
+def _fine(scene: controller_study.Scene, name: str) -> Controller:
     table = scene.table
-    plants = fine_pointing.plants(scene, table.seed)
-    tuned = fine_pointing.tune(name, table, plants)
+    plants = controller_study.plants(scene, table.seed)
+    tuned = controller_study.tune(name, table, plants)
     family = next((each for each in families(table) if each.name == name), control.PI)
     units = {each.name: each.unit for each in family.parameters(plants[0])}
-    built = fine_pointing.build(name, scene, tuned.controller)
+    built = controller_study.build(name, scene, tuned.controller)
     half = 0.5 / scene.loop.timing.period_s
     freq = np.geomspace(half * 1e-4, half * 0.999, _POINTS)
     gain, sensitivity = _responses(scene.loop, built, freq)
@@ -217,7 +217,7 @@ def _responses(loop: PointingLoop, of: LoopController, freq: Floats) -> tuple[Fl
 
 
 def _fine_answers(
-    scene: fine_pointing.Scene, of: LoopController, bandwidth_hz: float, wanted: Ask, variants: tuple[str, ...]
+    scene: controller_study.Scene, of: LoopController, bandwidth_hz: float, wanted: Ask, variants: tuple[str, ...]
 ) -> Answers:
     table = scene.table
     loops = {WITH: scene.loop, WITHOUT: with_mirror(scene.loop, scene.mirrors, Variant.STRAIGHT)}
@@ -257,7 +257,7 @@ def _first_reference(loop: PointingLoop, first: Reference) -> PointingLoop:
 
 
 def _curve(loop: PointingLoop, of: LoopController, span: ensemble.Span, from_s: float) -> Curve:
-    run = ensemble.trace(loop, of, span)
+    run = traces.trace(loop, of, span)
     shown = run.time_s >= from_s - 1e-12
     wanted = run.reference_rad[shown]
     error = run.error_rad[shown]

@@ -9,7 +9,7 @@ from microrad.core.arrays import Floats
 from microrad.core.units import format_quantity
 from microrad.link import acquisition
 from microrad.link.acquisition.partner_search import Finding, Found
-from microrad.loop.fine_pointing import Design, FinePointingStudy, Scene
+from microrad.loop.controller_study import Design, FinePointingStudy, Scene
 from microrad.mission.tables.acquisition import Acquisition
 from microrad.mission.tables.operations import Operations
 from microrad.orbit.day import DayStudy

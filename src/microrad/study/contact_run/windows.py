@@ -11,8 +11,8 @@ from microrad import link
 from microrad.core.arrays import Floats
 from microrad.core.units import SPEED_OF_LIGHT_M_S, format_quantity
 from microrad.loop.disturbance import Reference
-from microrad.loop.fine_loop import ensemble
-from microrad.loop.fine_loop.loop import LoopController, PointingLoop
+from microrad.loop.pointing_loop import ensemble, traces
+from microrad.loop.pointing_loop.loop import LoopController, PointingLoop
 from microrad.mission.tables.fine_pointing import FinePointing
 from microrad.study.contact_run.records import Contact, Loss, Settings, Sight, Window
 
@@ -97,7 +97,7 @@ class Sampler:
         last_s = self.contact.end_s
         ends = [self.contact.sight(np.array([begin, min(begin + length_s, last_s)])) for begin, _ in planned]
         moving = [self._moving(each, length_s, settling * period) for each in ends]
-        errors, turned = ensemble.side_by_side(self.loop, self.controller, span, moving, first)
+        errors, turned = traces.side_by_side(self.loop, self.controller, span, moving, first)
         each = zip(planned, ends, errors, turned, strict=True)
         return [self._of(begin, at, length_s, error, angle, settling) for (begin, _), at, error, angle in each]
 

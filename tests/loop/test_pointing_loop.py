@@ -15,18 +15,18 @@ from microrad.core import kernels, lti
 from microrad.loop import control, disturbance
 from microrad.loop.control import AxisController, Drive, Timing
 from microrad.loop.disturbance import Disturbance, Reference
-from microrad.loop.fine_loop import ensemble, linear
-from microrad.loop.fine_loop import loop as fine
-from microrad.loop.fine_loop.design import (
+from microrad.loop.pointing_loop import ensemble, kernel_arrays, linear, traces
+from microrad.loop.pointing_loop import loop as fine
+from microrad.loop.pointing_loop.design import (
     LINE_DAMPING,
     behind_filter,
     close_axis,
     design_plant,
     narrow_band,
-    residual_spectrum,
 )
-from microrad.loop.fine_loop.ensemble import Span
-from microrad.loop.fine_loop.loop import LoopController, PointingLoop
+from microrad.loop.pointing_loop.ensemble import Span
+from microrad.loop.pointing_loop.linear import residual_spectrum
+from microrad.loop.pointing_loop.loop import LoopController, PointingLoop
 from microrad.loop.sensor import OpticalSensor, StrainGauge
 from microrad.mirror import model as mirror
 from microrad.mirror.geometry import Geometry, line_of_sight_matrix
@@ -146,7 +146,7 @@ def test_a_first_order_loop_on_olympus_leaves_80_pi_over_1_plus_bandwidth(bandwi
     assert_allclose(2 * first_order_rad2(bandwidth_hz, period), theory, rtol=1.1e-3)
     loop, controller = first_order_loop(bandwidth_hz, period)
     settle = 5 / (2 * pi * bandwidth_hz)
-    found = ensemble.run(loop, controller, Span(settle + 2.5e5 * period, settle, 1), 64)
+    found = ensemble.simulate(loop, controller, Span(settle + 2.5e5 * period, settle, 1), 64)
     half = found.radial_rms_interval_rad()
     print(f"{bandwidth_hz:g} Hz: {found.radial_rms_rad / URAD:.4f} +- {half / URAD:.4f} urad radial")
     assert abs(found.radial_rms_rad - sqrt(theory)) < half
@@ -164,7 +164,7 @@ def test_at_50_khz_the_simulated_loop_is_the_sampled_one_and_not_the_continuous_
     """At 500 Hz and 50 kHz sampling adds 6 % to the variance: the ensemble tells the two closed forms apart."""
     sampled, continuous = sqrt(2 * first_order_rad2(500.0, 20e-6)), sqrt(80 * pi / 501) * URAD
     loop, controller = first_order_loop(500.0, 20e-6)
-    found = ensemble.run(loop, controller, Span(2.0, 0.01, 2), 64)
+    found = ensemble.simulate(loop, controller, Span(2.0, 0.01, 2), 64)
     assert abs(found.radial_rms_rad - sampled) < found.radial_rms_interval_rad()
     assert found.radial_rms_rad - continuous > 3 * found.radial_rms_interval_rad()
 
@@ -378,7 +378,7 @@ def test_white_sensor_noise_simulated_leaves_the_lyapunov_value_within_1_percent
     """Noise alone in the shipped loop; the 99 % interval of the variance is below 1 %."""
     loop = replace(scenario(2), disturbances=((), ()))
     controller = pi_for(loop)
-    found = ensemble.run(loop, controller, Span(2.0, 0.5, 3), 64)
+    found = ensemble.simulate(loop, controller, Span(2.0, 0.5, 3), 64)
     theory = linear.stationary(linear.close(loop, controller))
     assert 2 * found.radial_rms_interval_rad() < 0.01 * found.radial_rms_rad
     assert_allclose(found.radial_rms_rad**2, np.sum(theory.error), rtol=0.01)
@@ -416,7 +416,7 @@ def measured_sensitivity(loop, controller, freqs_hz=LINES_HZ, settle_s=3.0, ampl
     for axis in range(loop.axes):
         given = [STILL] * loop.axes
         given[axis] = Multisine(freqs_hz, amplitude_rad)
-        found = ensemble.trace(
+        found = traces.trace(
             replace(loop, references=tuple(given)), controller, Span(settle_s + 5 * per_line * period, 0.0, 1)
         )
         last = slice(-4 * per_line, None)
@@ -443,7 +443,7 @@ def test_the_sensitivity_measured_by_multisine_is_the_designed_one_up_to_0_45_of
 @variants
 def test_without_hysteresis_the_simulated_residual_is_the_lyapunov_value(variant):
     loop, controller = VARIANTS[variant]()
-    found = ensemble.run(loop, controller, Span(1.3, 0.3, 4), 64)
+    found = ensemble.simulate(loop, controller, Span(1.3, 0.3, 4), 64)
     theory = linear.stationary(linear.close(loop, controller))
     assert_allclose(found.axis_rms_rad, np.sqrt(theory.error), rtol=0.01)
     assert abs(found.radial_rms_rad - theory.radial_rms_rad) < found.radial_rms_interval_rad()
@@ -512,7 +512,7 @@ def test_a_line_leaves_in_theory_what_it_leaves_simulated_whatever_the_rate_of_t
     """Also above half the sensor's rate, where the loop answers at other frequencies than the line's."""
     loop, controller = on_a_line(freq_hz, every)
     theory = linear.stationary(linear.close(loop, controller))
-    found = ensemble.run(loop, controller, Span(2.0, 1.0, 1), 64)
+    found = ensemble.simulate(loop, controller, Span(2.0, 1.0, 1), 64)
     assert_allclose(found.radial_rms_rad, theory.radial_rms_rad, rtol=1e-4)
     assert found.radial_rms_rad > 0.2 * URAD
 
@@ -520,7 +520,7 @@ def test_a_line_leaves_in_theory_what_it_leaves_simulated_whatever_the_rate_of_t
 @pytest.mark.parametrize("every", [1, 2])
 def test_a_line_drives_the_mirror_in_theory_as_it_does_simulated(every):
     loop, controller = on_a_line(300.0, every, timing=Timing(2e-4, 1, 1))
-    traced = ensemble.trace(loop, controller, Span(2.0, 0.0, 1))
+    traced = traces.trace(loop, controller, Span(2.0, 0.0, 1))
     theory = linear.stationary(linear.close(loop, controller))
     assert_allclose(np.mean(traced.drive_v[5000:] ** 2, axis=0), theory.drive, rtol=1e-4)
     assert_allclose(np.mean(traced.error_rad[5000:] ** 2, axis=0), theory.error, rtol=1e-4)
@@ -533,7 +533,7 @@ def test_lines_and_noise_of_several_disturbances_add_up_on_two_axes_behind_a_slo
     loop = coupled(disturbances=(shaking, shaking), optical=OpticalSensor(URAD, inf, 0.0, 2, 0))
     controller = pi_for(loop, 100.0)
     theory = linear.stationary(linear.close(loop, controller))
-    found = ensemble.run(loop, controller, Span(1.3, 0.3, 4), 64)
+    found = ensemble.simulate(loop, controller, Span(1.3, 0.3, 4), 64)
     assert_allclose(found.axis_rms_rad, np.sqrt(theory.error), rtol=0.01)
     alone = linear.stationary(linear.close(replace(quiet(loop), disturbances=((lines,), (lines,))), controller))
     assert_allclose(theory.error_by_source["reaction wheel"], alone.error, rtol=1e-9)
@@ -548,7 +548,7 @@ def test_the_residual_spectrum_is_that_of_the_ensemble_within_its_interval(varia
     """Averaged over bands of 8 bins and more, each of which has 320 periodograms of 64 runs."""
     loop, controller = VARIANTS[variant]()
     segments = 5
-    found = ensemble.run(loop, controller, Span(0.3 + segments * 2048 * loop.timing.period_s, 0.3, 5), 64)
+    found = ensemble.simulate(loop, controller, Span(0.3 + segments * 2048 * loop.timing.period_s, 0.3, 5), 64)
     assert found.freq_hz.size == 1025
     predicted = residual_spectrum(linear.close(loop, controller), found.freq_hz)
     ratio = (found.psd_rad2_hz / predicted)[4:-1]  # the window takes in neighbours at the lowest frequencies
@@ -780,9 +780,9 @@ def test_a_controller_with_a_number_that_is_not_finite_is_refused_by_the_matrix(
     else:
         matrix = with_one(getattr(controller.system, key), bad)
         spoiled = replace(controller, system=replace(controller.system, **{key: matrix}))
-    ensemble.check_controller(loop, controller)
+    kernel_arrays.check_controller(loop, controller)
     with pytest.raises(ValueError, match=f"controller 'PI': matrix {key} holds a number that is not finite"):
-        ensemble.run(loop, spoiled, Span(0.1, 0.0, 1), 1)
+        ensemble.simulate(loop, spoiled, Span(0.1, 0.0, 1), 1)
 
 
 def with_one(matrix, value):
@@ -794,14 +794,14 @@ def with_one(matrix, value):
 def test_a_controller_of_the_wrong_size_is_refused_by_the_matrix_and_the_size_that_would_do():
     loop, one = scenario(2), scenario(1)
     with pytest.raises(ValueError) as refused:
-        ensemble.trace(loop, pi_for(one), Span(0.1, 0.0, 1))
+        traces.trace(loop, pi_for(one), Span(0.1, 0.0, 1))
     words = "controller 'PI': matrix B has the shape (1, 3), the loop needs (1, 6)"
     assert words + " (2 optical, 2 gauge and 2 reference inputs; 2 outputs)" in str(refused.value)
     s = pi_for(loop).system
     for key, wrong in (("C", s.C[:1]), ("D", s.D[:, :5])):
         shaped = replace(pi_for(loop), system=replace(s, **{key: wrong}))
         with pytest.raises(ValueError, match=rf"matrix {key} has the shape \({wrong.shape[0]}, {wrong.shape[1]}\)"):
-            ensemble.check_controller(loop, shaped)
+            kernel_arrays.check_controller(loop, shaped)
 
 
 @pytest.mark.parametrize(("key", "shape"), [("A", "(2, 3)"), ("L", "(1, 2)"), ("L", "(2, 1)"), ("L", "(2, 3)")])
@@ -811,7 +811,7 @@ def test_a_controller_whose_state_matrix_or_anti_windup_does_not_fit_is_refused(
     wrong = np.zeros(tuple(int(n) for n in shape[1:-1].split(", ")))
     given = {"anti_windup": wrong} if key == "L" else {"system": replace(good.system, A=wrong)}
     with pytest.raises(ValueError, match=rf"matrix {key} has the shape \({shape[1:-1]}\), the loop needs \(2, 2\)"):
-        ensemble.check_controller(loop, replace(good, **given))
+        kernel_arrays.check_controller(loop, replace(good, **given))
 
 
 def test_a_controller_that_reads_a_gauge_that_is_not_there_is_refused():
@@ -827,22 +827,22 @@ def test_a_run_without_anything_behind_its_settling_time_is_refused():
     loop, controller = VARIANTS["one axis"]()
     message = "a run of 0.5 s has nothing left behind a settling time of 0.5 s: make the run longer"
     with pytest.raises(ValueError, match=message):
-        ensemble.run(loop, controller, Span(0.5, 0.5, 1), 1)
+        ensemble.simulate(loop, controller, Span(0.5, 0.5, 1), 1)
     with pytest.raises(ValueError, match="make the run longer"):
-        ensemble.trace(loop, controller, Span(0.1, -0.1, 1))
+        traces.trace(loop, controller, Span(0.1, -0.1, 1))
 
 
 @pytest.mark.parametrize("runs", [0, -3])
 def test_an_ensemble_without_a_run_is_refused(runs):
     loop, controller = VARIANTS["one axis"]()
     with pytest.raises(ValueError, match=f"an ensemble of {runs} runs has no statistics: ask for 1 run or more"):
-        ensemble.run(loop, controller, Span(0.1, 0.0, 1), runs)
+        ensemble.simulate(loop, controller, Span(0.1, 0.0, 1), runs)
 
 
 @pytest.mark.parametrize("samples", [1, 2, 3])
 def test_a_run_of_a_few_samples_has_finite_statistics(samples):
     loop, controller = VARIANTS["one axis"]()
-    found = ensemble.run(loop, controller, Span(0.1 + samples * 2e-4, 0.1, 1), 2)
+    found = ensemble.simulate(loop, controller, Span(0.1 + samples * 2e-4, 0.1, 1), 2)
     assert found.samples == found.histogram.sum(axis=1)[0] == samples
     assert np.all(np.isfinite(found.psd_rad2_hz))
     assert found.psd_rad2_hz.shape[0] == found.freq_hz.size
@@ -852,20 +852,20 @@ def test_two_disturbances_of_one_name_on_an_axis_are_refused():
     loop, controller = VARIANTS["one axis"]()
     twice = replace(loop, disturbances=((disturbance.olympus(), disturbance.olympus()),))
     with pytest.raises(ValueError, match="share a name: OLYMPUS, OLYMPUS; give each its own"):
-        ensemble.run(twice, controller, Span(0.1, 0.0, 1), 1)
+        ensemble.simulate(twice, controller, Span(0.1, 0.0, 1), 1)
     with pytest.raises(ValueError, match="share a name"):
-        ensemble.trace(twice, controller, Span(0.1, 0.0, 1))
+        traces.trace(twice, controller, Span(0.1, 0.0, 1))
 
 
 def test_two_disturbances_whose_names_come_to_the_same_random_numbers_are_refused():
     loop, controller = VARIANTS["one axis"]()
     one, other = (replace(disturbance.olympus(), name=name) for name in ("drive x", "gyro x"))
-    assert ensemble.purpose_of(one.name, 0) == ensemble.purpose_of(other.name, 0)
+    assert kernel_arrays.purpose_of(one.name, 0) == kernel_arrays.purpose_of(other.name, 0)
     message = "'drive x' and 'gyro x' of one axis would take the same random numbers.*change one of the names"
     with pytest.raises(ValueError, match=message):
-        ensemble.run(replace(loop, disturbances=((one, other),)), controller, Span(0.1, 0.0, 1), 1)
+        ensemble.simulate(replace(loop, disturbances=((one, other),)), controller, Span(0.1, 0.0, 1), 1)
     two = replace(scenario(2), disturbances=((one,), (other,)))  # an axis has its own
-    assert np.unique(ensemble.combined_shaping(two).purpose).size == 2
+    assert np.unique(kernel_arrays.combined_shaping(two).purpose).size == 2
 
 
 def test_a_disturbance_out_of_modal_form_is_refused():
@@ -880,7 +880,7 @@ def test_a_disturbance_out_of_modal_form_is_refused():
     )
     loop, controller = VARIANTS["one axis"]()
     with pytest.raises(ValueError, match="states do not come in pairs: give its filter in modal form"):
-        ensemble.run(replace(loop, disturbances=((dense,),)), controller, Span(0.1, 0.0, 1), 1)
+        ensemble.simulate(replace(loop, disturbances=((dense,),)), controller, Span(0.1, 0.0, 1), 1)
 
 
 def test_a_response_by_frequency_of_a_slow_sensor_is_refused():
@@ -917,12 +917,12 @@ FIELDS = ("rms_rad", "mean_rad", "largest_rad", "histogram", "counts", "psd_rad2
 def test_results_are_those_of_the_run_whatever_the_threads_and_the_number_of_runs():
     loop, controller = noisy()
     span, told = Span(0.2, 0.05, 7), []
-    many = ensemble.run(loop, controller, span, 150, threads=1, on_progress=lambda *a: told.append(a))
+    many = ensemble.simulate(loop, controller, span, 150, threads=1, on_progress=lambda *a: told.append(a))
     assert told == [(64, 150, "PI"), (128, 150, "PI"), (150, 150, "PI")]
     assert many.rms_rad.shape == (150, 2)
     assert (many.samples, many.steps) == (750, 1500)
     for runs, threads in ((150, 2), (70, 2), (3, 1)):
-        other = ensemble.run(loop, controller, span, runs, threads=threads)
+        other = ensemble.simulate(loop, controller, span, runs, threads=threads)
         for field in FIELDS:
             mine, theirs = getattr(many, field), getattr(other, field)
             assert_array_equal(mine if field == "psd_rad2_hz" else mine[:runs], theirs)
@@ -941,8 +941,8 @@ def test_cases_that_share_what_they_draw_are_the_runs_that_each_would_be_alone()
     cases = [ensemble.Case(each, with_it) for each in loops for with_it in (controller, slow)]
     cases[3] = replace(cases[3], spectrum=False)
     span = Span(0.2, 0.05, 7)
-    for case, found in zip(cases, ensemble.several(cases, span, 70), strict=True):
-        alone = ensemble.run(case.loop, case.controller, span, 70)
+    for case, found in zip(cases, ensemble.simulate_cases(cases, span, 70), strict=True):
+        alone = ensemble.simulate(case.loop, case.controller, span, 70)
         for field in FIELDS:
             if field == "psd_rad2_hz" and not case.spectrum:
                 assert np.all(np.isnan(found.psd_rad2_hz)) and not np.any(np.isnan(alone.psd_rad2_hz))
@@ -953,7 +953,7 @@ def test_cases_that_share_what_they_draw_are_the_runs_that_each_would_be_alone()
 def test_another_seed_gives_other_numbers_and_the_same_seed_the_same():
     loop, controller = noisy()
     first, again, other, high = (
-        ensemble.run(loop, controller, Span(0.1, 0.0, seed), 64).rms_rad for seed in (1, 1, 2, 1 + (1 << 32))
+        ensemble.simulate(loop, controller, Span(0.1, 0.0, seed), 64).rms_rad for seed in (1, 1, 2, 1 + (1 << 32))
     )
     assert_array_equal(first, again)
     for another in (other, high):
@@ -966,8 +966,8 @@ def test_a_trace_is_the_run_of_its_number(run):
     """One plant step a sample: rms, mean and largest are those of the samples behind the settling time."""
     loop, controller = noisy()
     loop = replace(loop, timing=Timing(2e-4, 1, 1))
-    found = ensemble.run(loop, controller, Span(0.4, 0.1, 3), 70)
-    traced = ensemble.trace(loop, controller, Span(0.4002, 0.1, 3), run)
+    found = ensemble.simulate(loop, controller, Span(0.4, 0.1, 3), 70)
+    traced = traces.trace(loop, controller, Span(0.4002, 0.1, 3), run)
     errors = traced.error_rad[501:2001]
     radial = np.hypot(*errors.T)
     assert_allclose(found.rms_rad[run], np.sqrt(np.mean(errors**2, axis=0)), rtol=1e-12)
@@ -979,8 +979,8 @@ def test_a_trace_is_the_run_of_its_number(run):
 
 def test_the_mean_is_that_of_the_control_samples_and_the_rms_that_of_all_plant_steps():
     loop, controller = noisy(1)
-    found = ensemble.run(loop, controller, Span(0.2, 0.1, 1), 1)
-    errors = ensemble.trace(loop, controller, Span(0.2002, 0.1, 1)).error_rad[501:]
+    found = ensemble.simulate(loop, controller, Span(0.2, 0.1, 1), 1)
+    errors = traces.trace(loop, controller, Span(0.2002, 0.1, 1)).error_rad[501:]
     assert_allclose(found.mean_rad[0], np.mean(errors, axis=0), rtol=1e-9)
     assert_allclose(found.rms_rad[0], np.sqrt(np.mean(errors**2, axis=0)), rtol=0.01)
     assert not np.allclose(found.rms_rad[0], np.sqrt(np.mean(errors**2, axis=0)), rtol=1e-9, atol=0)
@@ -996,9 +996,9 @@ def test_runs_side_by_side_have_references_of_their_own():
         (Reference(k * 3 * URAD, k * URAD, 1.0 + k), Reference(-k * URAD, 0.0, 1.0)) for k in range(kernels.LANES + 2)
     ]
     span = Span(0.02, 0.0, 5)
-    errors, turned = ensemble.side_by_side(loop, controller, span, each, first_run=7)
+    errors, turned = traces.side_by_side(loop, controller, span, each, first_run=7)
     for k in (0, 1, kernels.LANES - 1, kernels.LANES, kernels.LANES + 1):
-        alone = ensemble.trace(replace(loop, references=each[k]), controller, span, 7 + k)
+        alone = traces.trace(replace(loop, references=each[k]), controller, span, 7 + k)
         assert_array_equal(errors[k], alone.error_rad)
         assert_array_equal(turned[k], alone.mirror_rad)
     assert not np.allclose(errors[0], errors[1], rtol=0.0, atol=URAD)
@@ -1008,7 +1008,7 @@ def test_a_trace_adds_up():
     """Reference and disturbance less the mirror is the error; the sensor reads it with its noise, one sample late."""
     loop, controller = VARIANTS["two coupled axes"]()
     loop = replace(loop, optical=OpticalSensor(URAD, inf, 0.0, 1, 10), references=(Reference(7 * URAD, 0, 1), STILL))
-    traced = ensemble.trace(loop, controller, Span(1.0, 0.0, 1), 3)
+    traced = traces.trace(loop, controller, Span(1.0, 0.0, 1), 3)
     assert_allclose(traced.time_s, np.arange(5000) * 2e-4, rtol=1e-12)
     assert_allclose(traced.reference_rad, np.tile([7 * URAD, 0.0], (5000, 1)), rtol=1e-12)
     line_of_sight = traced.mirror_rad @ loop.optics.T
@@ -1023,17 +1023,17 @@ def test_a_trace_adds_up():
 def test_disturbances_of_the_two_axes_and_of_two_runs_are_independent():
     loop, controller = noisy()
     loop = replace(loop, disturbances=((disturbance.first_order(1e-12, 200.0, convention="per-axis"),),) * 2)
-    one, other = (ensemble.trace(loop, controller, Span(2.0, 0.0, 1), run).disturbance_rad for run in (0, 1))
+    one, other = (traces.trace(loop, controller, Span(2.0, 0.0, 1), run).disturbance_rad for run in (0, 1))
     for a, b in ((one[:, 0], one[:, 1]), (one[:, 0], other[:, 0])):
         assert abs(np.corrcoef(a, b)[0, 1]) < 0.1  # 10 000 samples of 0.8 ms correlation: 4 standard deviations
-    assert_array_equal(one, ensemble.trace(loop, controller, Span(2.0, 0.0, 1), 0).disturbance_rad)
+    assert_array_equal(one, traces.trace(loop, controller, Span(2.0, 0.0, 1), 0).disturbance_rad)
 
 
 def test_a_disturbance_of_many_inputs_shares_no_random_numbers_with_the_next_axis():
     several = [disturbance.first_order(1e-12, 3.0 * 1.3**i, convention="per-axis", name=f"{i}") for i in range(20)]
     broad = replace(disturbance.combine(*several), name="broad")
     loop = scenario(2, disturbances=((broad,), (broad,)))
-    purposes = ensemble.combined_shaping(loop).purpose
+    purposes = kernel_arrays.combined_shaping(loop).purpose
     assert np.unique(purposes).size == purposes.size
 
 
@@ -1041,7 +1041,7 @@ def test_a_disturbance_line_starts_at_another_phase_in_each_run_and_axis():
     line = disturbance.wheels(250.0, (1.0,), (URAD / 250.0**2,), convention="per-axis")
     loop = quiet(scenario(2))
     loop = replace(loop, disturbances=((line,), (line,)))
-    runs = [ensemble.trace(loop, pi_for(loop), Span(0.004, 0.0, 1), run).disturbance_rad for run in range(40)]
+    runs = [traces.trace(loop, pi_for(loop), Span(0.004, 0.0, 1), run).disturbance_rad for run in range(40)]
     turned = np.mean(np.array(runs) * np.exp(-0.1j * pi * np.arange(20))[:, None], axis=1)  # 250 Hz: one turn
     assert_allclose(np.abs(turned), 0.5 * URAD, rtol=1e-9)
     phases = np.angle(turned).ravel() / (2 * pi) + 0.5
@@ -1051,7 +1051,7 @@ def test_a_disturbance_line_starts_at_another_phase_in_each_run_and_axis():
 
 def test_a_late_sensor_reads_the_error_at_the_begin_until_it_has_others():
     loop = replace(scenario(optical=OpticalSensor(0.0, inf, 0.0, 1, 23)), references=(Reference(7 * URAD, 0, 1),))
-    traced = ensemble.trace(loop, pi_for(loop, 60.0), Span(0.01, 0.0, 1))
+    traced = traces.trace(loop, pi_for(loop, 60.0), Span(0.01, 0.0, 1))
     assert_array_equal(traced.measured_rad[:3], np.broadcast_to(traced.error_rad[0], (3, 1)))
     assert abs(traced.error_rad[0, 0] - 7 * URAD) > URAD  # OLYMPUS is in it
     assert traced.measured_rad[4, 0] != traced.error_rad[0, 0]
@@ -1077,7 +1077,7 @@ def test_leaving_a_disturbance_out_changes_nothing_of_the_others():
     controller = pi_for(loop)
 
     def traced(loop):
-        found = ensemble.trace(loop, controller, Span(0.3, 0.0, 11), 2)
+        found = traces.trace(loop, controller, Span(0.3, 0.0, 11), 2)
         return np.hstack([found.error_rad, found.disturbance_rad, found.drive_v])
 
     silent = quiet(replace(loop, references=(STILL, STILL)))
@@ -1092,8 +1092,8 @@ def test_leaving_a_disturbance_out_changes_nothing_of_the_others():
 
 def test_quantiles_from_the_histogram_are_those_of_the_trace_within_1_percent():
     loop, controller = noisy()
-    found = ensemble.run(loop, controller, Span(4.1, 0.1, 3), 1)
-    traced = ensemble.trace(loop, controller, Span(4.1002, 0.1, 3), 0)
+    found = ensemble.simulate(loop, controller, Span(4.1, 0.1, 3), 1)
+    traced = traces.trace(loop, controller, Span(4.1002, 0.1, 3), 0)
     radial = np.hypot(*traced.error_rad[501:].T)
     assert radial.size == found.samples == found.histogram.sum()
     for share in (0.01, 0.1, 0.5, 0.9, 0.99, 0.997):
@@ -1122,7 +1122,7 @@ def test_the_ends_of_a_histogram_have_quantiles_too():
 
 def test_one_run_has_an_infinite_interval_and_two_have_a_finite_one():
     loop, controller = VARIANTS["one axis"]()
-    one, two = (ensemble.run(loop, controller, Span(0.1, 0.05, 1), runs) for runs in (1, 2))
+    one, two = (ensemble.simulate(loop, controller, Span(0.1, 0.05, 1), runs) for runs in (1, 2))
     assert one.radial_rms_interval_rad() == inf
     assert 0.0 < two.radial_rms_interval_rad() < inf
 
@@ -1131,7 +1131,7 @@ def test_the_interval_of_the_rms_is_the_spread_of_other_ensembles():
     """99 % intervals of 20 seeds cover the Lyapunov value as they should, and are as wide as the seeds differ."""
     loop, controller = VARIANTS["two and a half samples of delay"]()
     theory = linear.stationary(linear.close(loop, controller)).radial_rms_rad
-    found = [ensemble.run(loop, controller, Span(0.15, 0.1, seed), 64) for seed in range(20)]
+    found = [ensemble.simulate(loop, controller, Span(0.15, 0.1, seed), 64) for seed in range(20)]
     away = np.array([each.radial_rms_rad - theory for each in found])
     half = np.array([each.radial_rms_interval_rad(1.0) for each in found])
     assert 0.7 < np.std(away) / np.mean(half) < 1.4
@@ -1182,7 +1182,7 @@ def test_a_spectrum_holds_the_power_of_its_window(samples):
 def test_the_interval_of_the_rms_is_that_of_the_scatter_of_its_square():
     """Two runs with squares of 1 and 9: their mean is known to 4, the root of it to 4 / (2 sqrt 5)."""
     loop, controller = excursion(1.0)
-    found = ensemble.run(loop, controller, Span(0.01, 0.0, 1), 2)
+    found = ensemble.simulate(loop, controller, Span(0.01, 0.0, 1), 2)
     rms = np.zeros_like(found.rms_rad)
     rms[:, 0] = 1.0, 3.0
     assert replace(found, rms_rad=rms).radial_rms_interval_rad(1.0) == pytest.approx(2.0 / np.sqrt(5.0), rel=1e-12)
@@ -1192,7 +1192,7 @@ def test_the_interval_of_the_rms_is_that_of_the_scatter_of_its_square():
 def test_each_counter_is_a_share_of_what_it_counts():
     """Saturation and the inverse's rate by control sample, lost spots by reading, the rest by plant step."""
     loop, controller = excursion(1.0)
-    found = ensemble.run(loop, controller, Span(0.01, 0.0, 1), 2)
+    found = ensemble.simulate(loop, controller, Span(0.01, 0.0, 1), 2)
     found = replace(found, counts=np.full_like(found.counts, 60.0), samples=100, steps=500, readings=20)
     of = {kernels.COUNT_SATURATED: 100, kernels.COUNT_INVERSE_CLAMPED: 100, kernels.COUNT_LOST: 20}
     steps = (kernels.COUNT_SLEW, kernels.COUNT_CLAMPED, kernels.COUNT_OUTSIDE)
@@ -1205,7 +1205,7 @@ def test_beyond_its_stroke_the_loop_counts_stays_bounded_and_recovers(size):
     """20 ms behind an excursion beyond the stroke the error is that of one that stays within; windup would not end."""
     loop, controller = excursion(size)
     span = Span(0.6, 0.0, 1)
-    found, traced = ensemble.run(loop, controller, span, 1), ensemble.trace(loop, controller, span)
+    found, traced = ensemble.simulate(loop, controller, span, 1), traces.trace(loop, controller, span)
     out = slice(600, 2000)
     assert_allclose(traced.drive_v[out], 6.0 * np.sign(size), rtol=1e-9)
     assert np.max(np.abs(traced.drive_v)) <= 6.0
@@ -1214,24 +1214,24 @@ def test_beyond_its_stroke_the_loop_counts_stays_bounded_and_recovers(size):
     assert_allclose(found.share(kernels.COUNT_OUTSIDE), 0.5, atol=0.01)  # beyond 3 V either way
     assert found.counts[0, kernels.COUNT_SLEW] > 0
     assert np.max(np.abs(traced.drive_v[1:] - traced.drive_v[:-1])) <= 2e4 * 2e-4 * (1 + 1e-12)
-    within = ensemble.trace(excursion(0.9 * np.sign(size))[0], controller, span)
+    within = traces.trace(excursion(0.9 * np.sign(size))[0], controller, span)
     late = slice(2100, None)
     assert np.max(np.abs(traced.error_rad[late] - within.error_rad[late])) < 0.05 * URAD
     assert np.max(np.abs(traced.error_rad[late])) < 0.05 * URAD
     winding = replace(controller, anti_windup=np.zeros_like(controller.anti_windup))
-    assert np.min(np.abs(ensemble.trace(loop, winding, span).error_rad[late])) > 400 * URAD
+    assert np.min(np.abs(traces.trace(loop, winding, span).error_rad[late])) > 400 * URAD
 
 
 def test_within_its_stroke_nothing_is_counted():
     loop, controller = excursion(0.3, drive=Drive(-6.0, 6.0, 1e3, 1e6, 0.0, 0.0))
-    found = ensemble.run(loop, controller, Span(0.6, 0.0, 1), 1)
+    found = ensemble.simulate(loop, controller, Span(0.6, 0.0, 1), 1)
     assert_array_equal(found.counts, 0.0)
-    assert np.all(np.abs(ensemble.trace(loop, controller, Span(0.4, 0.0, 1)).error_rad[1600:]) < 0.05 * URAD)
+    assert np.all(np.abs(traces.trace(loop, controller, Span(0.4, 0.0, 1)).error_rad[1600:]) < 0.05 * URAD)
 
 
 def test_what_happens_while_the_loop_settles_is_not_counted():
     loop, controller = excursion(3.0)
-    found = ensemble.run(loop, controller, Span(0.6, 0.45, 1), 1)
+    found = ensemble.simulate(loop, controller, Span(0.6, 0.45, 1), 1)
     assert_array_equal(found.counts, 0.0)
     assert found.largest_rad[0] < URAD
     assert found.histogram.sum() == found.samples == 750
@@ -1251,7 +1251,7 @@ def test_what_happens_while_the_loop_settles_is_not_counted():
 def test_a_sensor_that_never_sees_its_spot_loses_each_of_its_readings(every, settle, samples, readings):
     """Readings fall on multiples of the sensor's period, wherever the settling ends."""
     loop = scenario(optical=OpticalSensor(URAD, 1e-12, 0.0, every, 0))
-    found = ensemble.run(loop, pi_for(loop, 50.0), Span((settle + samples) * 2e-4, settle * 2e-4, 1), 2)
+    found = ensemble.simulate(loop, pi_for(loop, 50.0), Span((settle + samples) * 2e-4, settle * 2e-4, 1), 2)
     assert found.readings == readings
     assert_array_equal(found.counts[:, kernels.COUNT_LOST], readings)
     assert found.share(kernels.COUNT_LOST) == (1.0 if readings else 0.0)
@@ -1261,7 +1261,7 @@ def test_an_axis_beyond_its_stroke_leaves_the_other_as_it_is():
     loop = scenario(2, drive=Drive(-6.0, 6.0, 1e3, 2e4, 0.0, 0.0))
     away = replace(loop, references=(Excursion(2e-3, 0.01, 0.05), STILL))
     controller = pi_for(loop)
-    near, far = (ensemble.trace(each, controller, Span(0.1, 0.0, 1)) for each in (loop, away))
+    near, far = (traces.trace(each, controller, Span(0.1, 0.0, 1)) for each in (loop, away))
     assert np.max(np.abs(far.drive_v[:, 0])) > 5.999
     assert np.max(np.abs(near.drive_v[:, 0])) < 1.0
     for field in ("error_rad", "drive_v", "measured_rad"):
@@ -1272,14 +1272,14 @@ def test_a_lost_spot_is_counted_its_last_reading_held_and_the_loop_recovers():
     """The reading from before the excursion stays for its 0.3 s; the loop integrates that, and is back 20 ms after."""
     seen = 200 * URAD
     loop, controller = excursion(0.6, optical=OpticalSensor(0.0, seen, 0.0, 1, 0))
-    traced = ensemble.trace(loop, controller, Span(0.6, 0.0, 1))
-    found = ensemble.run(loop, controller, Span(0.6, 0.0, 1), 1)
+    traced = traces.trace(loop, controller, Span(0.6, 0.0, 1))
+    found = ensemble.simulate(loop, controller, Span(0.6, 0.0, 1), 1)
     lost = np.abs(traced.error_rad[:, 0]) > seen
     assert found.counts[0, kernels.COUNT_LOST] == np.sum(lost) > 1400
     assert_array_equal(traced.measured_rad[lost], traced.measured_rad[np.flatnonzero(lost) - 1])
     assert_array_equal(traced.measured_rad[~lost], traced.error_rad[~lost])
     assert np.max(np.abs(traced.error_rad[2100:])) < 0.05 * URAD
-    assert ensemble.run(*excursion(0.6), Span(0.6, 0.0, 1), 1).counts[0, kernels.COUNT_LOST] == 0
+    assert ensemble.simulate(*excursion(0.6), Span(0.6, 0.0, 1), 1).counts[0, kernels.COUNT_LOST] == 0
 
 
 # --------------------------------------------------------------------------------------------------- compiled ahead
@@ -1295,5 +1295,5 @@ def test_the_kernels_are_compiled_aside_for_loops_of_any_kind_where_the_cache_la
     assert ensemble.compile_aside(coupled) == "wait"
     heard[0]()
     compiled = list(kernels.ensemble_loop.signatures)
-    ensemble.run(scenario(), pi_for(scenario()), Span(0.01, 0.0, 1), 1)
+    ensemble.simulate(scenario(), pi_for(scenario()), Span(0.01, 0.0, 1), 1)
     assert kernels.ensemble_loop.signatures == compiled != []

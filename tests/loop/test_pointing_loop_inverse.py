@@ -12,10 +12,10 @@ from microrad.core import kernels, lti
 from microrad.loop import control, disturbance
 from microrad.loop.control import AxisController, Drive, Inverse, Timing
 from microrad.loop.disturbance import Reference
-from microrad.loop.fine_loop import ensemble, linear
-from microrad.loop.fine_loop import loop as fine
-from microrad.loop.fine_loop.ensemble import Span
-from microrad.loop.fine_loop.loop import PointingLoop, ReferenceFilter, with_inverse
+from microrad.loop.pointing_loop import ensemble, linear, traces
+from microrad.loop.pointing_loop import loop as fine
+from microrad.loop.pointing_loop.ensemble import Span
+from microrad.loop.pointing_loop.loop import PointingLoop, ReferenceFilter, with_inverse
 from microrad.loop.sensor import OpticalSensor
 from microrad.mirror import model as mirror
 from microrad.mirror.geometry import Geometry, line_of_sight_matrix
@@ -216,7 +216,7 @@ SPAN = Span(0.2, 0.0, 1)
 
 def following_error(loop, controller):
     """Mirror less the filtered reference (rad) behind the first 50 ms, and the trace."""
-    traced = ensemble.trace(loop, controller, SPAN)
+    traced = traces.trace(loop, controller, SPAN)
     wanted = filtered(loop.references[0], traced.time_s)[:, 0]
     return (traced.mirror_rad[:, 0] - wanted)[traced.time_s > 0.05], traced
 
@@ -234,7 +234,7 @@ def test_without_feedback_the_mirror_follows_the_filtered_reference_with_the_inv
     assert np.max(np.abs(with_gain)) / np.max(np.abs(with_it)) > peak
     stroke = np.ptp(traced.mirror_rad)
     assert np.sqrt(np.mean(with_it**2)) < (0.001 if "Prandtl" in model else 0.015) * stroke
-    assert_array_equal(ensemble.run(loop, exact, SPAN, 1).counts[0, kernels.COUNT_INVERSE_CLAMPED], 0.0)
+    assert_array_equal(ensemble.simulate(loop, exact, SPAN, 1).counts[0, kernels.COUNT_INVERSE_CLAMPED], 0.0)
 
 
 @pytest.mark.parametrize("model", [m for m in MODELS if "creep" in m])
@@ -252,7 +252,7 @@ def test_coupled_axes_follow_their_filtered_references_without_feedback(layout):
     bent = mirror.combine(*[static("Prandtl-Ishlinskii")] * optics.shape[1])
     references = (Sweep(), Sweep(90 * URAD, 22.0))
     loop = loop_of("Prandtl-Ishlinskii", mirror=bent, optics=optics, disturbances=((), ()), references=references)
-    traced = ensemble.trace(loop, ahead(loop, control.inverse(bent)), Span(0.2, 0.0, 1))
+    traced = traces.trace(loop, ahead(loop, control.inverse(bent)), Span(0.2, 0.0, 1))
     wanted = np.stack([filtered(r, traced.time_s)[:, 0] for r in references], axis=1)
     away = traced.mirror_rad @ optics.T - wanted
     assert np.max(np.abs(away)) < 0.1 * URAD
@@ -267,7 +267,7 @@ def test_sensor_noise_does_not_reach_an_inverse_that_the_reference_drives(model)
     """Without feedback the drive is the same to the last bit, whatever the sensor reads."""
     quiet, loud = loop_of(model), loop_of(model, optical=OpticalSensor(10 * URAD, inf, 0.0, 1, 0))
     controller = ahead(quiet, control.inverse(quiet.mirror))
-    one, other = (ensemble.trace(each, controller, Span(0.1, 0.0, 1)) for each in (quiet, loud))
+    one, other = (traces.trace(each, controller, Span(0.1, 0.0, 1)) for each in (quiet, loud))
     assert_array_equal(one.drive_v, other.drive_v)
     assert np.std(other.measured_rad - one.measured_rad) > 9 * URAD
 
@@ -280,12 +280,12 @@ def test_with_feedback_and_noise_the_drive_chatters_no_more_than_under_feedback_
     both = ahead(loop, control.inverse(loop.mirror), pi_axis(loop))
     swept = replace(loop, references=(Sweep(),))
     span = Span(0.2, 0.0, 1)
-    still, driven = ensemble.trace(loop, alone, span), ensemble.trace(swept, both, span)
+    still, driven = traces.trace(loop, alone, span), traces.trace(swept, both, span)
     chatter, base = (np.std(np.diff(each.drive_v[:, 0], 2)) for each in (driven, still))
     assert 0.9 < chatter / base < 1.1
-    assert ensemble.run(swept, both, span, 1).counts[0, kernels.COUNT_INVERSE_CLAMPED] == 0
+    assert ensemble.simulate(swept, both, span, 1).counts[0, kernels.COUNT_INVERSE_CLAMPED] == 0
     series = with_inverse("series", swept, pi_axis(loop), control.inverse(loop.mirror), FILTER, in_series=True)
-    assert not np.array_equal(ensemble.trace(swept, series, span).drive_v, driven.drive_v)
+    assert not np.array_equal(traces.trace(swept, series, span).drive_v, driven.drive_v)
 
 
 # ------------------------------------------------------------------------------------------------ outside the range
@@ -306,11 +306,11 @@ def test_a_reference_faster_than_the_identified_rate_is_counted_and_the_drive_st
     reference = Sweep(300 * URAD, freq_hz)
     loop = loop_of(model, references=(reference,))
     controller, span = ahead(loop, control.inverse(loop.mirror)), Span(0.1, 0.0, 1)
-    traced = ensemble.trace(loop, controller, span)
+    traced = traces.trace(loop, controller, span)
     gain = slow_gain(loop.mirror.inverse[0])
     rate = filtered(reference, np.append(traced.time_s, 0.1))[1:, 1] / gain
     beyond = np.sum(np.abs(rate) > RATE_LIMIT_V_S)
-    found = ensemble.run(loop, controller, span, 1)
+    found = ensemble.simulate(loop, controller, span, 1)
     assert 50 < beyond < found.samples
     assert found.counts[0, kernels.COUNT_INVERSE_CLAMPED] == beyond
     assert_allclose(found.share(kernels.COUNT_INVERSE_CLAMPED), beyond / traced.time_s.size, rtol=1e-12)
@@ -324,7 +324,7 @@ def test_without_a_rate_limit_the_same_drive_leaves_all_bounds():
     loop = loop_of("Bouc-Wen", references=(Step(3e-3),))
     inverse = control.inverse(loop.mirror)
     largest = [
-        np.max(np.abs(ensemble.trace(loop, ahead(loop, each), Span(0.02, 0.0, 1)).drive_v))
+        np.max(np.abs(traces.trace(loop, ahead(loop, each), Span(0.02, 0.0, 1)).drive_v))
         for each in (inverse, replace(inverse, bouc_wen=(free,)))
     ]
     assert largest[0] < 1.1 * 3e-3 / 89e-6
@@ -336,23 +336,23 @@ def test_a_step_of_the_reference_is_bounded_and_ends_where_it_should(model):
     """The filter makes a ramp of it, beyond the identified rate where that is limited; it settles in 100 ms."""
     loop = loop_of(model, references=(Step(1e-3),))
     controller = ahead(loop, control.inverse(loop.mirror))
-    traced = ensemble.trace(loop, controller, Span(0.11, 0.0, 1))
+    traced = traces.trace(loop, controller, Span(0.11, 0.0, 1))
     assert np.max(np.abs(traced.drive_v)) < 1.2e-3 / slow_gain(loop.mirror.inverse[0])
     assert_allclose(traced.mirror_rad[-1], 1e-3, rtol=0.05)
-    counted = ensemble.run(loop, controller, Span(0.11, 0.0, 1), 1).counts[0, kernels.COUNT_INVERSE_CLAMPED]
+    counted = ensemble.simulate(loop, controller, Span(0.11, 0.0, 1), 1).counts[0, kernels.COUNT_INVERSE_CLAMPED]
     assert (counted > 0) == (not model.startswith("Prandtl"))
 
 
 def test_a_drive_beyond_the_identified_range_is_counted_at_each_plant_step():
     loop = loop_of("Prandtl-Ishlinskii", drive_range_v=(-0.5, 2.0))
     controller, span = ahead(loop, control.inverse(loop.mirror)), Span(0.2, 0.0, 1)
-    drive = ensemble.trace(loop, controller, span).drive_v
-    found = ensemble.run(loop, controller, span, 1)
+    drive = traces.trace(loop, controller, span).drive_v
+    found = ensemble.simulate(loop, controller, span, 1)
     share = np.mean((drive < -0.5) | (drive > 2.0))
     assert 0.1 < share < 0.9
     assert_allclose(found.share(kernels.COUNT_OUTSIDE), share, atol=2e-3)
     wide = replace(loop, drive_range_v=(-20.0, 20.0))
-    assert ensemble.run(wide, controller, span, 1).counts[0, kernels.COUNT_OUTSIDE] == 0
+    assert ensemble.simulate(wide, controller, span, 1).counts[0, kernels.COUNT_OUTSIDE] == 0
 
 
 # ------------------------------------------------------------------------------------------------ in series
@@ -374,7 +374,7 @@ def in_series(loop, inverse):
 def measured_sensitivity(loop, controller, amplitude_rad):
     """Error over disturbance at `LINES_HZ`: lines of a wheel that stands, all of one amplitude; the reference rests."""
     lines = disturbance.wheels(1.0, LINES_HZ, (amplitude_rad,) * len(LINES_HZ), convention="per-axis")
-    traced = ensemble.trace(replace(loop, disturbances=((lines,),)), controller, Span(0.6, 0.0, 1))
+    traced = traces.trace(replace(loop, disturbances=((lines,),)), controller, Span(0.6, 0.0, 1))
     last = slice(-1000, None)  # two periods of the slowest line
     at = np.rint(np.array(LINES_HZ) * 0.2).astype(int)
     error, shaken = (np.fft.rfft(a[last, 0])[at] for a in (traced.error_rad, traced.disturbance_rad))
@@ -409,7 +409,7 @@ def test_a_series_inverse_of_a_mirror_without_hysteresis_leaves_the_lyapunov_val
     shaken = {"disturbances": ((disturbance.olympus(),),), "optical": OpticalSensor(URAD, inf, 0.0, 1, 0)}
     loop = fine.without_hysteresis(sampled("Bouc-Wen", **shaken))
     controller = in_series(loop, control.inverse(loop.mirror))
-    found = ensemble.run(loop, controller, Span(1.3, 0.3, 1), 64)
+    found = ensemble.simulate(loop, controller, Span(1.3, 0.3, 1), 64)
     theory = linear.stationary(linear.close(loop, controller)).radial_rms_rad
     assert_allclose(found.radial_rms_rad, theory, rtol=0.01)
     plain = linear.stationary(linear.close(loop, fine.assemble("PI", loop, pi_axis(loop)))).radial_rms_rad
@@ -421,7 +421,7 @@ def test_a_series_inverse_at_its_stroke_is_counted_and_recovers():
         "Prandtl-Ishlinskii", drive=Drive(-6.0, 6.0, 5e3, inf, 0.0, 0.0), references=(Step(2e-3, 0.05, 0.2),)
     )
     controller, span = in_series(loop, control.inverse(loop.mirror)), Span(0.4, 0.0, 1)
-    traced, found = ensemble.trace(loop, controller, span), ensemble.run(loop, controller, span, 1)
+    traced, found = traces.trace(loop, controller, span), ensemble.simulate(loop, controller, span, 1)
     assert_allclose(traced.drive_v[260:1000], 6.0, rtol=1e-6)
     assert_allclose(found.counts[0, kernels.COUNT_SATURATED], 750, atol=20)
     assert np.max(np.abs(traced.error_rad[1100:])) < 0.1 * URAD

@@ -11,13 +11,12 @@ from microrad.core import kernels
 from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
 from microrad.loop.control import inverse
-from microrad.loop.fine_loop import ensemble
-from microrad.loop.fine_loop.design import residual_spectrum
-from microrad.loop.fine_loop.linear import Stationary, close, stationary
-from microrad.loop.fine_loop.loop import LoopController, PointingLoop
-from microrad.loop.fine_pointing import parts
-from microrad.loop.fine_pointing.designs import BASELINE, Design
-from microrad.loop.fine_pointing.scenario import BODY_POINTING, Scene, with_mirror
+from microrad.loop.controller_study import parts
+from microrad.loop.controller_study.designs import BASELINE, Design
+from microrad.loop.controller_study.scenario import BODY_POINTING, Scene, with_mirror
+from microrad.loop.pointing_loop import ensemble, kernel_arrays
+from microrad.loop.pointing_loop.linear import Stationary, close, residual_spectrum, stationary
+from microrad.loop.pointing_loop.loop import LoopController, PointingLoop
 from microrad.mirror import Variant
 from microrad.mission.tables.fine_pointing import FinePointing
 
@@ -66,7 +65,7 @@ class Residual:
     ``rms_interval_rad`` is the half width of the 99 % interval over the runs, infinite where there is but one.
     ``quantile_rad`` is the error that the mission's share of the time stays below; ``shares`` say how often each limit
     was met, by name, where it was. ``axis_rms_rad`` is about zero; ``radial_counts`` counts the control samples by
-    radial error, in the bins of `fine_loop.ensemble.bin_edges_rad`.
+    radial error, in the bins of `pointing_loop.ensemble.bin_edges_rad`.
     """
 
     rms_rad: float
@@ -179,7 +178,7 @@ def verify(
         _case(loop, d.controller, spectrum=variant == Variant.GIVEN) for d in designs for variant, loop in loops.items()
     ]
     f = scene.table
-    runs = iter(ensemble.several(cases, span(f), f.runs, _telling(on_progress, "simulating controllers")))
+    runs = iter(ensemble.simulate_cases(cases, span(f), f.runs, _telling(on_progress, "simulating controllers")))
     return tuple(_verified(scene, d, {variant: next(runs) for variant in loops}) for d in designs)
 
 
@@ -187,10 +186,10 @@ def outlook(
     scene: Scene, designs: Sequence[Design], on_progress: Progress = lambda done, total, what: None
 ) -> tuple[Outlook, ...]:
     """Each design beside its linear figure, simulated in one batch of the mission's runs with its hysteresis."""
-    whole, runs = span(scene.table), min(scene.table.runs, ensemble.LANES)
+    whole, runs = span(scene.table), min(scene.table.runs, kernel_arrays.LANES)
     few = replace(whole, duration_s=min(whole.duration_s, whole.settle_s + FEW_SAMPLES * scene.loop.timing.period_s))
     cases = [_case(scene.loop, d.controller) for d in designs]
-    found = ensemble.several(cases, few, runs, _telling(on_progress, "simulating controllers"))
+    found = ensemble.simulate_cases(cases, few, runs, _telling(on_progress, "simulating controllers"))
     return tuple(
         Outlook(d.tuned.residual_rms_rad, each.radial_rms_rad / math.sqrt(scene.loop.axes))
         for d, each in zip(designs, found, strict=True)
@@ -264,7 +263,7 @@ def error_budget(scene: Scene, of: Verified, on_progress: Progress = lambda done
     alone = [parts.without(fine, *(other for other in names if other != name)) for name in names]
     fewer = [parts.without(scene.loop, name) for name in left_out]
     cases = [_case(loop, of.design.controller) for loop in (*alone, *fewer)]
-    runs = ensemble.several(cases, span(scene.table), scene.table.runs, _telling(on_progress, "error budget"))
+    runs = ensemble.simulate_cases(cases, span(scene.table), scene.table.runs, _telling(on_progress, "error budget"))
     rms = [run.radial_rms_rad for run in runs]
     theory = of.theory.error_by_source
     lines = tuple(
@@ -277,7 +276,7 @@ def error_budget(scene: Scene, of: Verified, on_progress: Progress = lambda done
     return ErrorBudget(of.design.name, lines, together, full, differences)
 
 
-def _tracking(loop: PointingLoop, amplitude_rad: float, freq_hz: float) -> PointingLoop:
+def _following_sine(loop: PointingLoop, amplitude_rad: float, freq_hz: float) -> PointingLoop:
     alone = parts.without(loop, parts.REFERENCE, BODY_POINTING)
     first = replace(alone.references[0], sine_amplitude_rad=amplitude_rad, sine_freq_hz=freq_hz)
     return replace(alone, references=(first, *alone.references[1:]))
@@ -300,11 +299,13 @@ def sines(
         loop = with_mirror(scene.loop, scene.mirrors, variant)
         for design in designs:
             for freq in scene.sine_frequencies_hz:
-                tracking = _tracking(loop, scene.sine_amplitude_rad, freq)
-                cases.append(_case(tracking, design.controller))
+                following = _following_sine(loop, scene.sine_amplitude_rad, freq)
+                cases.append(_case(following, design.controller))
                 what.append((design.name, variant, freq))
     short = ensemble.Span(SINE_S, SINE_SETTLE_S, f.seed)
-    runs = ensemble.several(cases, short, ensemble.LANES, _telling(on_progress, "sines under vibration and noise"))
+    runs = ensemble.simulate_cases(
+        cases, short, kernel_arrays.LANES, _telling(on_progress, "sines under vibration and noise")
+    )
     return tuple(
         Sine(name, variant, freq, run.radial_rms_rad, run.quantile_rad(f.quantile))
         for (name, variant, freq), run in zip(what, runs, strict=True)

@@ -8,7 +8,7 @@ import numpy as np
 from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
 from microrad.loop import disturbance
-from microrad.loop.fine_pointing.designs import (
+from microrad.loop.controller_study.designs import (
     BASELINE,
     Design,
     build,
@@ -18,7 +18,7 @@ from microrad.loop.fine_pointing.designs import (
     plants,
     tune,
 )
-from microrad.loop.fine_pointing.results import (
+from microrad.loop.controller_study.results import (
     COUNTERS,
     PROMISE,
     Difference,
@@ -35,7 +35,7 @@ from microrad.loop.fine_pointing.results import (
     sines,
     verify,
 )
-from microrad.loop.fine_pointing.scenario import Scene, scene, table
+from microrad.loop.controller_study.scenario import Scene, scene, table
 
 __all__ = [
     "BASELINE",
@@ -54,14 +54,14 @@ __all__ = [
     "best",
     "build",
     "design",
+    "design_and_simulate",
+    "design_and_simulate_one",
     "error_budget",
     "names",
     "on_variant",
     "optimum_rms_rad",
     "outlook",
     "plants",
-    "run",
-    "run_one",
     "scene",
     "sines",
     "table",
@@ -90,7 +90,7 @@ class FinePointingStudy:
     optimum_rad: float
 
 
-def run(scene: Scene, on_progress: Progress = lambda done, total, what: None) -> FinePointingStudy:
+def design_and_simulate(scene: Scene, on_progress: Progress = lambda done, total, what: None) -> FinePointingStudy:
     """Design, tune and simulate controllers for a fine-pointing loop; seeded by its table.
 
     Raises ValueError with the reason for a controller that cannot meet its margin.
@@ -113,10 +113,15 @@ def run(scene: Scene, on_progress: Progress = lambda done, total, what: None) ->
     )
 
 
-def run_one(scene: Scene, name: str) -> Verified:
-    """One controller of the loop, tuned and simulated as `run` does it, without the others; `names` lists them.
+def design_and_simulate_one(scene: Scene, name: str) -> Verified:
+    """One controller of the loop as `design_and_simulate` has it, without the others.
 
-    Raises ValueError for another name, and as `run`.
+    Args:
+        scene: The mission's fine-pointing loop.
+        name: One of `names`.
+
+    Raises:
+        ValueError: Another name, or the controller cannot meet its margin.
     """
     (found,) = verify(scene, design(scene, only=(name,)))
     return found

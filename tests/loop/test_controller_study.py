@@ -12,12 +12,12 @@ import pytest
 from numpy.testing import assert_allclose
 
 from microrad import mirror
-from microrad.loop import control, fine_pointing
-from microrad.loop.fine_loop import ensemble
-from microrad.loop.fine_loop.design import design_plant
-from microrad.loop.fine_loop.linear import close, stationary
-from microrad.loop.fine_loop.loop import assemble
-from microrad.loop.fine_pointing import designs, parts, results, scenario
+from microrad.loop import control, controller_study
+from microrad.loop.controller_study import designs, parts, results, scenario
+from microrad.loop.pointing_loop import ensemble, traces
+from microrad.loop.pointing_loop.design import design_plant
+from microrad.loop.pointing_loop.linear import close, stationary
+from microrad.loop.pointing_loop.loop import assemble
 from microrad.mirror import hysteresis
 from microrad.mirror import spread as mirror_spread
 from microrad.mission.file import load_mission
@@ -67,7 +67,7 @@ def tuned():
 def best():
     """LQG and the baseline, simulated on each variant of the mirror."""
     found = {v.design.name: v for v in whole_study()[0].fine_pointing.verified}
-    return {name: found[name] for name in (fine_pointing.BASELINE, "LQG")}
+    return {name: found[name] for name in (controller_study.BASELINE, "LQG")}
 
 
 def by_name(found):
@@ -126,8 +126,8 @@ def test_the_stroke_of_the_papers_mission_with_and_without_point_ahead(scene):
 
 def test_every_design_meets_its_margin_and_none_beats_the_optimum(scene, tuned):
     found, said = tuned
-    bound = fine_pointing.optimum_rms_rad(scene.axis)
-    assert [d.name for d in found][:3] == [fine_pointing.BASELINE, "PI", "PI + inverse"]
+    bound = controller_study.optimum_rms_rad(scene.axis)
+    assert [d.name for d in found][:3] == [controller_study.BASELINE, "PI", "PI + inverse"]
     assert {"PI + notch", "resonant damping", "disturbance observer", "LQG", "PI + inverse in series"} <= set(
         by_name(found)
     )
@@ -144,7 +144,7 @@ import os, traceback
 from contextlib import suppress
 from microrad.core import threads
 from microrad.core.reads import watched_call
-from microrad.loop.fine_pointing import designs
+from microrad.loop.controller_study import designs
 from microrad.mission.file import load_mission
 from scenes import scene_of
 from shipped import SHIPPED
@@ -172,7 +172,7 @@ watched_call(designs.design, of, on_progress=wait, only=(designs.BASELINE, desig
 
 def test_theory_allows_no_20_percent_in_the_shipped_scenario(scene, tuned):
     """The best PI of the grid is within 4 % of the best that any linear controller can do."""
-    bound, baseline = fine_pointing.optimum_rms_rad(scene.axis), by_name(tuned[0])[fine_pointing.BASELINE]
+    bound, baseline = controller_study.optimum_rms_rad(scene.axis), by_name(tuned[0])[controller_study.BASELINE]
     assert 1.0 < baseline.tuned.residual_rms_rad / bound < 1.04
     assert by_name(tuned[0])["LQG"].tuned.residual_rms_rad < 1.01 * baseline.tuned.residual_rms_rad
 
@@ -192,7 +192,7 @@ def test_with_wheel_lines_the_tuned_loop_beats_the_best_pi_by_20_percent(tmp_pat
     }.items():
         assert found.margins.modulus >= 0.5
         controller = assemble(name, straight, found.controller)
-        run = ensemble.run(straight, controller, results.span(m.fine_pointing), 64)
+        run = ensemble.simulate(straight, controller, results.span(m.fine_pointing), 64)
         theory = stationary(close(straight, controller)).radial_rms_rad
         assert_allclose(run.radial_rms_rad, theory, rtol=0.02)
         rms[name] = run.radial_rms_rad
@@ -211,7 +211,7 @@ def test_wheels_and_a_sensor_at_half_the_rate_of_the_control_are_verified_also_w
     assert scene.loop.optical.every == 2
     tuned = designs.grid_baseline([design_plant(scene.axis)], control.Specification(0.5))
     design = designs.Design("PI", tuned, assemble("PI", scene.loop, tuned.controller))
-    (found,) = fine_pointing.verify(scene, [design])
+    (found,) = controller_study.verify(scene, [design])
     straight = found.simulated["no hysteresis"]
     assert straight.rms_interval_rad == math.inf
     assert_allclose(straight.rms_rad, found.theory.radial_rms_rad, rtol=0.1)  # one run
@@ -239,13 +239,13 @@ def test_halving_the_plant_step_moves_no_residual_by_one_percent(scene, file, tu
     design = by_name(tuned[0])["PI"]
     fine = replace(scene.loop, timing=control.Timing(2e-4, 10, 10))
     span = ensemble.Span(1.5, 0.5, 1)
-    coarse, halved = (ensemble.run(loop, design.controller, span, 64) for loop in (scene.loop, fine))
+    coarse, halved = (ensemble.simulate(loop, design.controller, span, 64) for loop in (scene.loop, fine))
     assert_allclose(halved.radial_rms_rad, coarse.radial_rms_rad, rtol=0.01)
     assert_allclose(halved.quantile_rad(0.997), coarse.quantile_rad(0.997), rtol=0.02)
 
 
 def test_the_parts_of_the_error_budget_combine_where_the_loop_is_linear(scene, file, best):
-    budget = fine_pointing.error_budget(scene, best["LQG"])
+    budget = controller_study.error_budget(scene, best["LQG"])
     assert [p.name for p in budget.parts][:3] == ["OLYMPUS", "body pointing", "optical sensor noise"]
     assert_allclose(budget.combined_rad, budget.together_rad, rtol=0.02)
     for part in budget.parts:
@@ -259,23 +259,23 @@ def test_the_parts_of_the_error_budget_combine_where_the_loop_is_linear(scene, f
     assert as_linear.linear
 
 
-@pytest.mark.parametrize("name", [fine_pointing.BASELINE, "PI + inverse"])
+@pytest.mark.parametrize("name", [controller_study.BASELINE, "PI + inverse"])
 def test_the_budget_takes_the_whole_from_what_is_simulated_already(scene, file, tuned, monkeypatch, name):
     """To the bit the rms that the whole loop and the one without hysteresis leave when they are simulated again."""
-    (verified,) = fine_pointing.verify(scene, [by_name(tuned[0])[name]])
-    simulate, simulated = ensemble.several, []
+    (verified,) = controller_study.verify(scene, [by_name(tuned[0])[name]])
+    simulate, simulated = ensemble.simulate_cases, []
 
     def counted(cases, *rest):
         simulated.extend(cases)
         return simulate(cases, *rest)
 
-    monkeypatch.setattr(ensemble, "several", counted)
-    budget = fine_pointing.error_budget(scene, verified)
+    monkeypatch.setattr(ensemble, "simulate_cases", counted)
+    budget = controller_study.error_budget(scene, verified)
     assert len(simulated) == len(budget.parts) + len(budget.differences) - 1
     span, runs = results.span(file.mission.fine_pointing), file.mission.fine_pointing.runs
     straight = parts.without(scene.loop, parts.HYSTERESIS)
     full, together = (
-        ensemble.run(loop, results.for_mirror(verified.design.controller, loop), span, runs).radial_rms_rad
+        ensemble.simulate(loop, results.for_mirror(verified.design.controller, loop), span, runs).radial_rms_rad
         for loop in (scene.loop, straight)
     )
     assert (budget.full_rad, budget.together_rad) == (full, together)
@@ -327,8 +327,10 @@ def test_without_hysteresis_each_play_of_an_additive_mirror_keeps_its_own_route(
     scene, m = scene_of(changed), changed.mission
     tuned = designs.grid_baseline([design_plant(scene.axis)], control.Specification(0.5))
     controller = assemble("PI", scene.loop, tuned.controller)
-    (found,) = fine_pointing.verify(scene, [designs.Design("PI", tuned, controller)])
-    straight = ensemble.run(parts.without(scene.loop, parts.HYSTERESIS), controller, results.span(m.fine_pointing), 64)
+    (found,) = controller_study.verify(scene, [designs.Design("PI", tuned, controller)])
+    straight = ensemble.simulate(
+        parts.without(scene.loop, parts.HYSTERESIS), controller, results.span(m.fine_pointing), 64
+    )
     assert found.simulated["no hysteresis"].rms_rad == straight.radial_rms_rad
     assert_allclose(straight.radial_rms_rad, found.theory.radial_rms_rad, rtol=0.01)
 
@@ -338,11 +340,11 @@ def test_a_part_that_is_left_out_leaves_the_others_as_they_were(scene, tuned):
     loop = parts.without(scene.loop, parts.HYSTERESIS, parts.QUANTISATION, parts.LIMITS)
     design, span = by_name(tuned[0])["PI"], ensemble.Span(0.05, 0.0, 3)
     names = parts.sources(loop)
-    whole = ensemble.trace(loop, design.controller, span).error_rad
+    whole = traces.trace(loop, design.controller, span).error_rad
     total = np.zeros_like(whole)
     for name in names:
         alone = parts.without(loop, *(n for n in names if n != name))
-        total += ensemble.trace(alone, design.controller, span).error_rad
+        total += traces.trace(alone, design.controller, span).error_rad
     assert_allclose(total, whole, atol=1e-9 * np.abs(whole).max())
     assert np.abs(whole).max() > 1e-6
 
@@ -354,7 +356,7 @@ def test_an_unknown_part_is_refused_with_those_there_are(scene):
 
 def test_a_sine_is_tracked_better_with_the_inverse(scene, file, tuned):
     found = by_name(tuned[0])
-    runs = fine_pointing.sines(scene, [found["PI"], found["PI + inverse"]])
+    runs = controller_study.sines(scene, [found["PI"], found["PI + inverse"]])
     rms = {(s.controller, s.variant, s.freq_hz): s.rms_rad for s in runs}
     assert {f for _, _, f in rms} == {1.0, 15.0, 25.0}
     for variant in ("given", "comparison"):
@@ -390,14 +392,14 @@ def test_a_mission_without_the_table_has_no_scene(tmp_path):
 def test_a_margin_out_of_reach_is_refused_with_the_best_there_is(tmp_path):
     changed = edited_file(tmp_path, ("modulus_margin = 0.5 ", "modulus_margin = 0.999 "))
     with pytest.raises(ValueError, match=r"modulus margin"):
-        fine_pointing.design(scene_of(changed))
+        controller_study.design(scene_of(changed))
 
 
 def test_designs_are_plain_data_for_other_tools(scene, tuned):
     from microrad.cli.pointing import _data
 
     for d in tuned[0]:
-        again = json.loads(json.dumps(_data(d, fine_pointing.Outlook(1e-6, 2e-6), "refused")))
+        again = json.loads(json.dumps(_data(d, controller_study.Outlook(1e-6, 2e-6), "refused")))
         assert_allclose(again["matrices"]["A"], d.controller.system.A)
         assert again["margins"]["modulus"] >= 0.5
     assert tuple(scene.mirrors.own) == ("given", "comparison", "no hysteresis")

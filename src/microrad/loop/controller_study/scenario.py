@@ -9,7 +9,7 @@ import numpy as np
 
 from microrad import mirror
 from microrad.loop import control, disturbance, sensor
-from microrad.loop.fine_loop import loop as fine
+from microrad.loop.pointing_loop import loop as fine
 from microrad.mirror import MirrorParts, Variant, geometry, hysteresis
 from microrad.mission.file import MissionFile, NamedFile, content_of
 from microrad.mission.model import Source, source_text
@@ -138,10 +138,10 @@ def vibration(v: VibrationTable, folder: Path, contents: tuple[NamedFile, ...]) 
         return disturbance.first_order(v.level_rad2_hz, v.corner_hz, convention=v.convention, name="vibration")
     if v.spectrum == "bands":
         assert v.edges_hz is not None and v.rms_rad is not None
-        return disturbance.bands(v.edges_hz, v.rms_rad, convention=v.convention, name="vibration")
+        return disturbance.fit_bands(v.edges_hz, v.rms_rad, convention=v.convention, name="vibration").disturbance
     assert v.file is not None
     freq_hz, density = disturbance.read_table(folder / v.file, data=content_of(v.file, contents))
-    return disturbance.table(freq_hz, density, convention=v.convention, name="vibration")
+    return disturbance.fit_table(freq_hz, density, convention=v.convention, name="vibration").disturbance
 
 
 def optical_sensor(

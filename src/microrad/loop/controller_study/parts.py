@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from microrad.loop.control import Drive
 from microrad.loop.disturbance import Reference
-from microrad.loop.fine_loop.loop import PointingLoop, without_hysteresis
+from microrad.loop.pointing_loop.loop import PointingLoop, without_hysteresis
 
 REFERENCE, OPTICAL_NOISE, GAUGE_NOISE = "reference", "optical sensor noise", "gauge noise"
 QUANTISATION, LIMITS, HYSTERESIS, DELAY = "quantisation", "limits", "hysteresis", "computation delay"

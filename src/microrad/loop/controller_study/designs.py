@@ -12,9 +12,9 @@ from microrad.core.progress import Progress
 from microrad.core.threads import shared_out
 from microrad.loop import control
 from microrad.loop.control import DesignPlant, Family, Specification, Tuned
-from microrad.loop.fine_loop.design import behind_filter, design_plant
-from microrad.loop.fine_loop.loop import LoopController, PointingLoop, ReferenceFilter, assemble, with_inverse
-from microrad.loop.fine_pointing.scenario import Scene
+from microrad.loop.controller_study.scenario import Scene
+from microrad.loop.pointing_loop.design import behind_filter, design_plant
+from microrad.loop.pointing_loop.loop import LoopController, PointingLoop, ReferenceFilter, assemble, with_inverse
 from microrad.mirror import from_table, spread
 from microrad.mission.tables.fine_pointing import FinePointing
 

@@ -15,7 +15,7 @@ from microrad.core import lti
 from microrad.core.arrays import Complexes, Floats
 from microrad.loop import disturbance
 from microrad.loop.control import amplifier_factor
-from microrad.loop.fine_loop.loop import LoopController, PointingLoop, in_band_gain
+from microrad.loop.pointing_loop.loop import LoopController, PointingLoop, in_band_gain
 
 
 @dataclass(frozen=True, slots=True)
@@ -404,3 +404,32 @@ def loop_response(closed: ClosedLoop, freq_hz: Floats) -> Complexes:
     A, B = (step_map @ act)[np.ix_(keep, keep)], (step_map @ into)[keep]
     system = lti.StateSpace(A, B, -reading[:, keep], np.zeros((axes, axes)))
     return lti.frequency_response(system, freq_hz, loop.timing.period_s)
+
+
+def residual_spectrum(closed: ClosedLoop, freq_hz: Floats) -> Floats:
+    """One-sided spectrum of the residual at the control samples, (frequencies, axes), lines left out."""
+    o, loop = closed.open, closed.open.loop
+    whole = closed.step_noise.shape[0]
+    if loop.optical.every != 1:
+        raise ValueError("a residual spectrum needs an optical reading at every control sample")
+    monodromy = closed.monodromy
+    reading = np.zeros((loop.axes, whole))
+    reading[:, : o.at.order] = o.error
+    keep = np.ones(whole, dtype=bool)
+    for line in o.lines:
+        keep[line.states] = False
+    # From every state to the error, then the covariance: its factor would lose what is small in other units.
+    points = np.exp(2j * math.pi * np.asarray(freq_hz) * loop.timing.period_s)
+    rows = lti.resolvent_rows(monodromy[None][:, keep][:, :, keep], reading[None][:, :, keep], points)[0]
+    added = _added_in_a_period(closed)[np.ix_(keep, keep)]
+    power = np.sum((rows * (added @ rows.conj())).real, axis=1).T
+    return np.asarray(2.0 * loop.timing.period_s * power)
+
+
+def _added_in_a_period(closed: ClosedLoop) -> Floats:
+    """Covariance that the noises of one control period add to the state at its end."""
+    (sample_noise,) = closed.sample_noise
+    P = sample_noise @ sample_noise.T
+    for step in closed.steps:
+        P = step @ P @ step.T + closed.step_noise @ closed.step_noise.T
+    return P
