@@ -8,7 +8,7 @@ from nicegui import ui
 
 from microrad.mission import presets
 from microrad.studio.draft.draft import Draft
-from microrad.studio.draft.optional_tables import offered, with_table
+from microrad.studio.draft.tables import offered, with_table
 from microrad.studio.guard.names import NameRefusedError, safe_name, typed_words
 from microrad.studio.pages import layout
 from microrad.studio.session import Session

@@ -15,8 +15,7 @@ from microrad.studio.pages import layout
 from microrad.studio.pages.in_thread import in_thread, pause, stay
 from microrad.studio.pages.sliders import SliderBoard
 from microrad.studio.session import Session
-from microrad.studio.views.attempts import Attempt, attempt, seen
-from microrad.studio.views.sliders import Slider, faulty
+from microrad.studio.views.sliders import Attempt, Slider, attempt, faulty, seen
 
 T = TypeVar("T")
 _SHORT_S, _REST_S = 0.01, 0.15

@@ -177,11 +177,17 @@ def _files(place: Path) -> list[Path]:
         return []
 
 
-def _is_plain(path: Path) -> bool:
+def _status(path: Path) -> os.stat_result | None:
+    """What the system says of a file, and of a link itself; None where there is none any more."""
     try:
-        return stat.S_ISREG(path.lstat().st_mode)
+        return path.lstat()
     except FileNotFoundError:
-        return False
+        return None
+
+
+def _is_plain(path: Path) -> bool:
+    found = _status(path)
+    return found is not None and stat.S_ISREG(found.st_mode)
 
 
 def _remove(path: Path) -> None:
@@ -194,17 +200,13 @@ def _remove(path: Path) -> None:
 
 
 def _size(path: Path) -> int:
-    try:
-        return path.stat().st_size
-    except FileNotFoundError:
-        return 0
+    found = _status(path)
+    return 0 if found is None else found.st_size
 
 
 def _time_ns(path: Path) -> int:
-    try:
-        return path.stat().st_mtime_ns
-    except FileNotFoundError:
-        return 0
+    found = _status(path)
+    return 0 if found is None else found.st_mtime_ns
 
 
 def _forgotten(path: Path) -> bool:
