@@ -420,7 +420,7 @@ def test_what_cannot_be_cancelled_or_removed_is_told(studio, tmp_path, monkeypat
         with pytest.raises(JobError, match=r"job 1 cannot be asked to stop: .*: Permission denied; check free space"):
             studio.cancel(1)
     with monkeypatch.context() as patch:
-        patch.setattr(Path, "rename", refuse)
+        patch.setattr(shutil, "rmtree", refuse)
         with pytest.raises(JobError, match=r"job 2 cannot be removed: .*: Permission denied; check free space"):
             studio.remove(2)
     assert sorted(each.name for each in studio.folder.iterdir()) == ["1", "2"]

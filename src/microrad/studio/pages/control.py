@@ -12,7 +12,7 @@ from microrad.mission.file import MissionFile
 from microrad.mission.tables.fine_pointing import FinePointing
 from microrad.studio import commands
 from microrad.studio.pages import layout
-from microrad.studio.pages.elements import Figure, numbers
+from microrad.studio.pages.elements import Column, Figure, numbers, table
 from microrad.studio.pages.in_thread import in_thread, stay
 from microrad.studio.session import Session
 from microrad.studio.views import control as control_view
@@ -22,14 +22,14 @@ from microrad.studio.views.plots import empty
 TITLE = "Control"
 PATH = "/control"
 
-_COLUMNS = [
-    {"name": "name", "label": "Controller", "field": "name", "align": "left"},
-    {"name": "residual", "label": "Residual of an axis (rms, linear)", "field": "residual", "align": "right"},
-    {"name": "modulus", "label": "Modulus margin", "field": "modulus", "align": "right"},
-    {"name": "gain", "label": "Gain margin", "field": "gain", "align": "right"},
-    {"name": "phase", "label": "Phase margin", "field": "phase", "align": "right"},
-    {"name": "bandwidth", "label": "Bandwidth", "field": "bandwidth", "align": "right"},
-]
+_COLUMNS = (
+    Column("name", "Controller"),
+    Column("residual", "Residual of an axis (rms, linear)", number=True),
+    Column("modulus", "Modulus margin", number=True),
+    Column("gain", "Gain margin", number=True),
+    Column("phase", "Phase margin", number=True),
+    Column("bandwidth", "Bandwidth", number=True),
+)
 _PLOTS = {
     "sensitivity": "Sensitivity by frequency",
     "gain": "Loop gain by frequency",
@@ -72,8 +72,7 @@ class ControlPage:
             self.tune = ui.button("Tune all", on_click=self.tune_all).props("no-caps dense outline")
             self.stop = ui.button("Stop", on_click=self.stop_all).props("no-caps dense flat")
             self.stop.visible = False
-        self.table = ui.table(rows=[], columns=_COLUMNS, row_key="name").props("flat dense hide-bottom wrap-cells")
-        self.table.props(":pagination='{rowsPerPage: 0}'").classes("w-full")
+        self.table = table(_COLUMNS, "name")
 
     def _one(self) -> None:
         layout.heading("One controller")
@@ -129,7 +128,8 @@ class ControlPage:
         if not self.name.value:
             self.amplitude.value = f"{1e6 * file.mission.scenario.amplitude_rad:g} urad"
             self.frequency.value = f"{file.mission.scenario.pid_frequencies_hz[-1]:g} Hz"
-        self.name.set_options(list(names), value=self.name.value if self.name.value in names else _first(names))
+        first = names[1] if len(names) > 3 else names[0]  # the tuned PI rather than the baseline
+        self.name.set_options(list(names), value=self.name.value if self.name.value in names else first)
         self.filling = False
         await self.show()
 
@@ -252,8 +252,3 @@ def _controller(file: MissionFile, name: str) -> Controller:
     from microrad.studio.views import controllers
 
     return controllers.controller(file, name)
-
-
-def _first(names: tuple[str, ...]) -> str:
-    """The controller that is shown first: the tuned PI rather than the baseline."""
-    return names[1] if len(names) > 3 else names[0]

@@ -11,19 +11,19 @@ from microrad.lab.live_fit import LiveFit
 from microrad.studio.draft.tables import with_mirror_file
 from microrad.studio.jobs.queue import Job
 from microrad.studio.pages import layout
-from microrad.studio.pages.elements import Figure, numbers
+from microrad.studio.pages.elements import Column, Figure, numbers, table
 from microrad.studio.pages.in_thread import in_thread
 from microrad.studio.session import Session
 from microrad.studio.views import mirror as mirror_view
 
 _LOOK_S = 0.5
 _BEST = -1
-_COLUMNS = [
-    {"name": "model", "label": "Model", "field": "model", "align": "left"},
-    {"name": "held_out", "label": "Held out (rms)", "field": "held_out", "align": "right"},
-    {"name": "fit", "label": "Fitted (rms)", "field": "fit", "align": "right"},
-    {"name": "note", "label": "Note", "field": "note", "align": "left"},
-]
+_COLUMNS = (
+    Column("model", "Model"),
+    Column("held_out", "Held out (rms)", number=True),
+    Column("fit", "Fitted (rms)", number=True),
+    Column("note", "Note"),
+)
 
 
 class JobView:
@@ -60,8 +60,7 @@ class JobView:
                 self.loop = Figure("Measured loop and that of the model")
                 self.residual = Figure("Residual over time")
             ui.label("Residuals in per cent of the peak-to-peak output.").classes("soft small")
-            self.table = ui.table(rows=[], columns=_COLUMNS, row_key="id").props("flat dense hide-bottom")
-            self.table.props(":pagination='{rowsPerPage: 0}'").classes("w-full")
+            self.table = table(_COLUMNS)
 
     # --------------------------------------------------------------------------------------------------------- the job
     async def follow(self, number: int) -> None:

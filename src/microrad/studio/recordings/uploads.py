@@ -59,9 +59,6 @@ class Uploads:
         """Make the folder private; raises `UploadError` where it is something else or somebody else's."""
         self.limits = limits or UploadLimits()
         self.folder = _private(folder)
-        for place in self._places():  # left by a studio that was killed
-            if _stored(place) is None and _forgotten(place) and all(_forgotten(path) for path in _files(place)):
-                shutil.rmtree(place, ignore_errors=True)
 
     def hold_temporary_files(self) -> None:
         """Have this program's temporary files lie in the private folder, too: a form is spooled before it is read.
@@ -166,7 +163,9 @@ def _stored(place: Path) -> Upload | None:
 
     A link is none: the folder may have come from a stranger, and a link could name any file of this machine.
     """
-    found = next((path for path in _files(place) if path.name != _PART and _is_plain(path)), None)
+    found = next(
+        (path for path in _files(place) if path.name != _PART and path.is_file() and not path.is_symlink()), None
+    )
     return None if found is None else Upload(place.name, found.name, found, _size(found))
 
 
@@ -183,11 +182,6 @@ def _status(path: Path) -> os.stat_result | None:
         return path.lstat()
     except FileNotFoundError:
         return None
-
-
-def _is_plain(path: Path) -> bool:
-    found = _status(path)
-    return found is not None and stat.S_ISREG(found.st_mode)
 
 
 def _remove(path: Path) -> None:

@@ -139,7 +139,10 @@ def _fine_answers(
     return Answers(
         {v: _step(*each, wanted, bandwidth_hz) for v, each in chosen.items()},
         {v: _sine(*each, wanted) for v, each in chosen.items()},
-        {v: _jitter(*each, wanted, table.settle_s, table.duration_s) for v, each in chosen.items()},
+        {
+            v: _curve(*each, ensemble.Span(table.duration_s, table.settle_s, wanted.seed), table.settle_s)
+            for v, each in chosen.items()
+        },
     )
 
 
@@ -159,11 +162,6 @@ def _sine(loop: PointingLoop, of: LoopController, wanted: Ask) -> Curve:
     shown = _SHOWN_PERIODS / wanted.sine_hz
     settle = max(0.4, 1.0 / wanted.sine_hz)
     return _curve(_first_reference(alone, sine), of, ensemble.Span(settle + shown, settle, wanted.seed), settle)
-
-
-def _jitter(loop: PointingLoop, of: LoopController, wanted: Ask, settle_s: float, duration_s: float) -> Curve:
-    """Everything that disturbs the loop, behind the settling time."""
-    return _curve(loop, of, ensemble.Span(duration_s, settle_s, wanted.seed), settle_s)
 
 
 def _first_reference(loop: PointingLoop, first: Reference) -> PointingLoop:

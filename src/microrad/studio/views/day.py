@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterable
 from typing import Any
 
 from microrad.core.progress import Progress
@@ -41,11 +40,10 @@ def ways(day: DayStudy) -> tuple[Way, ...]:
 
 def way_rows(day: DayStudy) -> list[Row]:
     """Relay and direct downlink side by side."""
-    return [{"id": place, "what": row[0], **_cells(row[1:])} for place, row in enumerate(day_tables.way_rows(day))]
-
-
-def _cells(cells: Iterable[str]) -> Row:
-    return dict(zip(("relay", "direct"), cells, strict=False))
+    return [
+        {"id": place, "what": row[0], **dict(zip(("relay", "direct"), row[1:], strict=False))}
+        for place, row in enumerate(day_tables.way_rows(day))
+    ]
 
 
 def contact_headings() -> tuple[str, ...]:

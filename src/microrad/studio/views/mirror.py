@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -10,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import TypeAdapter
 
 from microrad.core.units import format_quantity
 from microrad.lab.live_fit import FITS, LiveFit
@@ -26,8 +28,6 @@ _MOST_BYTES = 20_000_000  # of the fits of a job
 # ------------------------------------------------------------------------------------------------ what a job has fitted
 def read_fits(folder: Path) -> tuple[LiveFit, ...]:
     """The models of a job so far, in the order in which they were fitted; a line that is being written is left out."""
-    from pydantic import TypeAdapter
-
     try:
         with plain_files.opened(folder / FITS) as file:
             lines = file.read(_MOST_BYTES).splitlines()
@@ -131,8 +131,6 @@ class Outcome:
 
 def outcome(said: str) -> Outcome | None:
     """The end of an identification from what its job has printed; None where it has printed no result."""
-    import json
-
     try:
         data = json.loads(said)
         return Outcome(
