@@ -21,10 +21,12 @@ import time
 from contextlib import closing
 from pathlib import Path
 
-from microrad.campaign import bundle, plan, run, work
+from microrad.campaign import bundle, run
 from microrad.campaign.file import load_campaign
-from microrad.campaign.inputs import Builder
 from microrad.campaign.records import Engine, Job
+from microrad.campaign.rows import plan
+from microrad.campaign.rows.evaluator import Evaluator
+from microrad.campaign.rows.loops import controllers
 
 HERE = Path(__file__).resolve().parent
 MISSION = HERE.parent / "missions" / "leo-geo.toml"
@@ -74,8 +76,8 @@ def efficiency(runs: int) -> None:
     """Each way of doing the work in turn, on the same chunks."""
     with tempfile.TemporaryDirectory() as folder:
         campaign = load_campaign(written(folder, runs))
-        spec = bundle.packed(campaign, run.controllers(campaign, lambda done, total, what: None))
-        jobs = plan.chunks(campaign, 0, campaign.rows)
+        spec = bundle.packed(campaign, controllers(campaign, lambda done, total, what: None))
+        jobs = plan.planned(campaign).chunks(0, campaign.rows)
         rounds: list[dict[str, float]] = []
         started: dict[str, float] = {}
         for _ in range(ROUNDS):
@@ -111,7 +113,7 @@ def memory(runs: int) -> None:
 
 def peak(path: Path) -> None:
     """Run a campaign and say how much memory it took."""
-    run.begin(path, path.with_suffix(".ledger"), run.Means(threads=2))
+    run.run_campaign(path, path.with_suffix(".ledger"), run.Means(threads=2))
     own, child = (resource.getrusage(who).ru_maxrss / 1024 for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
     print(f"{own:.0f} MB and {child:.0f} MB")
 
@@ -160,7 +162,7 @@ def links(rows: int) -> None:
                 head = f'mission = "mission.toml"\nseed = {len(name + key)}\nruns = {rows + 8}\nsampling = "random"\n'
                 path.write_text(head + "".join(tables), encoding="utf-8")
                 campaign = load_campaign(path)
-            evaluator = work.Evaluator(campaign, Builder(campaign), {}, {})
+            evaluator = Evaluator(campaign, {})
             evaluator.rows(0, range(rows, rows + 8), lambda: None)  # whatever is slow to load
             began = time.process_time()
             chunk = evaluator.rows(0, range(rows), lambda: None)

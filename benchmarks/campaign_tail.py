@@ -7,7 +7,7 @@ Both axes of the shipped mission under PI, runs of 0.4 s of which 0.35 s count: 
 the answer is known, and on the comparison set. Tilted runs tell of one error each, plain runs of all their samples.
 The plain runs needed are projected from the interval that few of them give at 1e-4, by a hundredth of the excursions
 at 1e-6 and by the slope of a Rayleigh tail: its logarithm falls with the square of the radius. Then plain runs are made
-until the interval of the radius is as narrow as that of the tilted ones.
+until the interval of the radius is as narrow as that of the weighted ones.
 """
 
 import math
@@ -19,13 +19,12 @@ from pathlib import Path
 
 import numpy as np
 
-from microrad.campaign import loops
-from microrad.campaign.definition import CampaignFile
+from microrad.campaign.definition.records import CampaignFile
 from microrad.campaign.file import load_campaign
-from microrad.campaign.inputs import Builder
 from microrad.campaign.records import Chunk, Interval, Tail
-from microrad.campaign.tails import tail_of_time, tail_weighted
-from microrad.campaign.work import Evaluator
+from microrad.campaign.rows import loops
+from microrad.campaign.rows.evaluator import Evaluator
+from microrad.campaign.statistics.tails import tail_of_time, tail_weighted
 from microrad.core.threads import in_threads
 from microrad.loop.control import AxisController
 from microrad.loop.fine_loop.ensemble import bin_edges_rad
@@ -33,7 +32,7 @@ from microrad.loop.fine_loop.ensemble import bin_edges_rad
 MISSION = Path(__file__).resolve().parent.parent / "missions" / "leo-geo.toml"
 PROBABILITY, CONFIDENCE = 1e-6, 0.99
 SEEN = 1e-4
-TILTED, PART, MOST = 256, 2048, 400_000  # runs: tilted, plain ones of a part and at most
+WEIGHTED, PART, MOST = 256, 2048, 400_000  # runs: weighted, plain ones of a part and at most
 TEXT = """
 mission = "mission.toml"
 seed = 1
@@ -74,12 +73,12 @@ class Bench:
         return load_campaign(path)
 
     def _rows(self, campaign: CampaignFile, rows: range) -> Chunk:
-        return Evaluator(campaign, Builder(campaign), {}, {0: self.axis}).rows(0, rows, lambda: None)
+        return Evaluator(campaign, {0: self.axis}).rows(0, rows, lambda: None)
 
-    def tilted(self, error_rad: float) -> Tail:
+    def weighted(self, error_rad: float) -> Tail:
         """The tail from runs aimed at an error."""
-        of = self._campaign(TILTED, "", TAIL.format(error_urad=error_rad * 1e6, probability=PROBABILITY))
-        columns = self._rows(of, range(TILTED)).columns
+        of = self._campaign(WEIGHTED, "", TAIL.format(error_urad=error_rad * 1e6, probability=PROBABILITY))
+        columns = self._rows(of, range(WEIGHTED)).columns
         return tail_weighted(columns["tail_radius"], columns["tail_log_weight"], (PROBABILITY,), CONFIDENCE)
 
     def more(self) -> None:
@@ -123,14 +122,14 @@ def compared(mirror: str, quick: bool) -> None:
         error = visible.wanted[SEEN].value * math.sqrt(math.log(PROBABILITY) / math.log(SEEN))
         print(f'mirror "{mirror}": radius exceeded with probability {PROBABILITY:g}, at {100 * CONFIDENCE:g} %')
         plain_s, began = time.perf_counter() - began, time.perf_counter()
-        tail = bench.tilted(error)
+        tail = bench.weighted(error)
         found = tail.wanted[PROBABILITY]
-        said(TILTED, "tilted", found, time.perf_counter() - began)
+        said(WEIGHTED, "weighted", found, time.perf_counter() - began)
         need = projected(bench.runs, visible.wanted[SEEN], found)
-        print(f"    projected: {need:.0f} plain runs, {need / TILTED:.0f} x as many")
+        print(f"    projected: {need:.0f} plain runs, {need / WEIGHTED:.0f} x as many")
         if quick:
             return
-        began, told = time.perf_counter(), 20 * TILTED
+        began, told = time.perf_counter(), 20 * WEIGHTED
         while width(bench.tail(PROBABILITY).wanted[PROBABILITY]) > width(found) and bench.runs < MOST - 2 * PART:
             bench.more()
             if bench.runs >= told:
@@ -144,7 +143,7 @@ def compared(mirror: str, quick: bool) -> None:
         seconds = plain_s + time.perf_counter() - began
         said(bench.runs, "plain", bench.tail(PROBABILITY).wanted[PROBABILITY], seconds)
         narrow = width(bench.tail(PROBABILITY).wanted[PROBABILITY]) <= width(found)
-        print(f"    measured: {'' if narrow else 'more than '}{bench.runs / TILTED:.0f} x as many plain runs\n")
+        print(f"    measured: {'' if narrow else 'more than '}{bench.runs / WEIGHTED:.0f} x as many plain runs\n")
 
 
 if __name__ == "__main__":

@@ -25,8 +25,8 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import OptimizeResult, least_squares
 
 from microrad.core.kernels import bouc_wen_response
-from microrad.lab.identify.hysteresis.axis import hysteretic_oscillator
-from microrad.lab.identify.hysteresis.plant_fit import Run, simulate, upsampled
+from microrad.lab.identify.hysteresis.plant_fit import FitRecord, simulate_record, upsampled
+from microrad.lab.identify.hysteresis.structures import hysteretic_oscillator
 from microrad.mirror import model as mirror
 
 Model = Callable[[np.ndarray], np.ndarray]
@@ -130,10 +130,10 @@ def oscillator() -> Case:
     fine = upsampled(one, factor, "band-limited")
     both = np.concatenate([fine, fine])
     structure = hysteretic_oscillator(*PUBLISHED.tolist())
-    run = Run("", both.copy(), np.zeros((2 * 8192, 1)), step, factor, 0, np.zeros((2 * 8192, 0)))
+    run = FitRecord("", both.copy(), np.zeros((2 * 8192, 1)), step, factor, 0, np.zeros((2 * 8192, 0)))
 
     def compiled(values: np.ndarray) -> np.ndarray:
-        return simulate(mirror.discretise(structure.build(values), step), run)[8192:, 0]
+        return simulate_record(mirror.discretise(structure.build(values), step), run)[8192:, 0]
 
     def solved(values: np.ndarray) -> np.ndarray:
         return oscillator_solved(values, both[:, 0], step, factor)[8192:]

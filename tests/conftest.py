@@ -46,7 +46,7 @@ LONGEST = (
     "test_studio_jobs.py",
     "test_studio_design_browser.py",
     "test_export_flight.py",
-    "test_ladder.py",
+    "test_selection.py",
     "test_linear_model.py",
     "test_report.py",
     "test_reproduce.py",

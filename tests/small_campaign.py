@@ -12,7 +12,8 @@ from pathlib import Path
 
 import psutil
 
-from microrad.campaign import run, worker
+from microrad.campaign import run
+from microrad.campaign.engines import worker
 from microrad.campaign.records import Outcome
 from shipped import SHIPPED
 from waiting import HANG_S, any_moment, beside, until

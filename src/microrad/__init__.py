@@ -25,9 +25,9 @@ _PUBLIC = {
     "run_constellation": "orbit.constellation.run",
     "ConstellationPlan": "orbit.constellation.ConstellationPlan",
     "load_campaign": "campaign.file.load_campaign",
-    "run_campaign": "campaign.run.begin",
-    "resume_campaign": "campaign.run.resume",
-    "summarise_campaign": "campaign.summary.summarise",
+    "run_campaign": "campaign.run.run_campaign",
+    "resume_campaign": "campaign.run.resume_campaign",
+    "summarise_campaign": "campaign.statistics.summary.summarise_campaign",
     "CampaignMeans": "campaign.run.Means",
     "CampaignError": "campaign.records.CampaignError",
     "write_report": "report.write",
@@ -54,7 +54,7 @@ _PUBLIC = {
 def __getattr__(name: str) -> Any:
     """A public name, from its module; the version, from the installed package."""
     if name == "__version__":
-        from importlib.metadata import version  # slow to load, and rarely asked for
+        from importlib.metadata import version
 
         return version("microrad")
     if name == "__all__":

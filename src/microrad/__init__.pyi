@@ -3,9 +3,9 @@
 from microrad.campaign.file import load_campaign
 from microrad.campaign.records import CampaignError
 from microrad.campaign.run import Means as CampaignMeans
-from microrad.campaign.run import begin as run_campaign
-from microrad.campaign.run import resume as resume_campaign
-from microrad.campaign.summary import summarise as summarise_campaign
+from microrad.campaign.run import resume_campaign
+from microrad.campaign.run import run_campaign
+from microrad.campaign.statistics.summary import summarise_campaign
 from microrad.core.folder import FolderError
 from microrad.core.units import UnitError
 from microrad.core.units import format_quantity

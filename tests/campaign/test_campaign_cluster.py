@@ -13,9 +13,9 @@ from types import SimpleNamespace
 import psutil
 import pytest
 
-from microrad.campaign import cluster
-from microrad.campaign.cluster import DaskEngine
-from microrad.campaign.engines import Flight, Waiting, late_flights
+from microrad.campaign.engines import cluster
+from microrad.campaign.engines.cluster import DaskEngine
+from microrad.campaign.engines.threads import Flight, JobQueue, late_flights
 from microrad.campaign.records import CampaignError, Job
 from small_campaign import import_path, killing
 from small_campaign import kill as kill_process
@@ -141,7 +141,7 @@ def test_a_job_whose_worker_ended_has_died_and_is_not_late_however_slowly_that_i
         engine._look()
     assert list(engine._stop_the_late()) == []
     last = SimpleNamespace(address=ended)
-    (outcome,) = engine._failed(0, KilledWorker("job", last, 0), Waiting(iter(())))
+    (outcome,) = engine._failed(0, KilledWorker("job", last, 0), JobQueue(iter(())))
     assert (outcome.kind, outcome.reason) == ("died", f"its worker at {ended} ended")
     engine._kill(ended)  # as where it ends between the look and this
 
@@ -226,7 +226,7 @@ def test_close_stops_at_once_whatever_runs_and_leaves_nothing(deed, tmp_path, mo
 
 PARENT = """
 import sys
-from microrad.campaign.cluster import DaskEngine
+from microrad.campaign.engines.cluster import DaskEngine
 from microrad.campaign.records import Job
 if __name__ == "__main__":
     table = '{"0": "work", "else": "hog %s"}' % sys.argv[1]

@@ -14,10 +14,10 @@ from types import SimpleNamespace
 import psutil
 import pytest
 
-from microrad.campaign import engines
-from microrad.campaign.engines import Clock, Flight, LocalEngine, late_flights
+from microrad.campaign.engines import threads
+from microrad.campaign.engines.threads import Clock, Flight, LocalEngine, late_flights
+from microrad.campaign.engines.worker import Beat
 from microrad.campaign.records import CampaignError, Job
-from microrad.campaign.worker import Beat
 from small_campaign import hears_ctrl_c, import_path, killing
 from waiting import HANG_S, alive, beside, gone, no_hang, until
 
@@ -42,7 +42,7 @@ def engine(monkeypatch):
 
 
 def children():
-    return [p for p in psutil.Process().children(recursive=True) if "microrad.campaign.worker" in command(p)]
+    return [p for p in psutil.Process().children(recursive=True) if "microrad.campaign.engines.worker" in command(p)]
 
 
 def command(process):
@@ -292,7 +292,8 @@ def test_a_caller_that_goes_away_leaves_nothing_running(engine):
 # ------------------------------------------------------------------------------------------- the parent's own end
 PARENT = """
 import sys
-from microrad.campaign.engines import LocalEngine
+from microrad.campaign.engines import threads
+from microrad.campaign.engines.threads import LocalEngine
 from microrad.campaign.records import Job
 engine = LocalEngine(sys.argv[1].encode(), "campaign_target:open_work", 2, float(sys.argv[2]))
 try:
@@ -374,7 +375,7 @@ def test_a_campaign_stopped_for_a_while_calls_only_that_late_which_is(
             worker.resume()
         end.touch()
 
-    monkeypatch.setattr(engines, "time", SimpleNamespace(monotonic=monotonic))
+    monkeypatch.setattr(threads, "time", SimpleNamespace(monotonic=monotonic))
     own = f" {end}" if deed == "quiet" else ""
     one = engine(f'{{"2": "{deed} {begun}{own}"}}', late_s=late_s)
     halted = beside(halt)
@@ -393,7 +394,7 @@ def in_another_process(code, tmp_path):
 def test_a_process_stuck_in_code_that_keeps_the_lock_ends_by_itself(tmp_path):
     code = """
         import ctypes
-        from microrad.campaign.worker import end_when_stuck
+        from microrad.campaign.engines.worker import end_when_stuck
         end_when_stuck(0.5)
         ctypes.PyDLL(None).sleep(86400)
     """
@@ -405,7 +406,7 @@ def test_a_process_stuck_in_code_that_keeps_the_lock_ends_by_itself(tmp_path):
 def test_the_alarm_of_a_process_that_is_not_stuck_is_wound_again_before_it_rings(tmp_path):
     code = """
         import ctypes, faulthandler, time
-        from microrad.campaign.worker import end_when_stuck
+        from microrad.campaign.engines.worker import end_when_stuck
         wound, slept, sleep = [], [], time.sleep
         faulthandler.dump_traceback_later = lambda after_s, exit: wound.append((after_s, exit))
         time.sleep = lambda seconds: (slept.append(seconds), sleep(0.001))
@@ -440,7 +441,7 @@ def test_beats_are_told_at_once_and_then_not_too_often():
 
 def test_a_clock_counts_seconds_awake(monkeypatch):
     times = iter([5.0, 5.1, 5.25, 1005.25, 1005.3])  # a halt of 1000 s is in it
-    monkeypatch.setattr(engines, "time", SimpleNamespace(monotonic=lambda: next(times, 1005.3)))
+    monkeypatch.setattr(threads, "time", SimpleNamespace(monotonic=lambda: next(times, 1005.3)))
     clock = Clock()
     until(lambda: clock.now() > 0.49, "the last of these times")
     clock.close()

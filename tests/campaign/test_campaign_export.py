@@ -14,9 +14,9 @@ import pyarrow.parquet as pq
 import pytest
 import xarray as xr
 
-from microrad.campaign import blob, export
-from microrad.campaign.blob import Column, Head
-from microrad.campaign.ledger import Ledger
+from microrad.campaign import export
+from microrad.campaign.ledger import Ledger, chunk_format
+from microrad.campaign.ledger.chunk_format import Column, Head
 from microrad.campaign.records import CampaignError, Chunk, Failed
 
 COLUMNS = (
@@ -51,7 +51,7 @@ def write(folder, numbers=((0, 2, 1), (1, 0)), cells=None, order=1, rows=ROWS):
     with Ledger.create(path, head(cells) if cells else head()) as ledger:
         for cell, each in list(enumerate(numbers))[::order]:
             for number in each[::order]:
-                ledger.put(cell, number, blob.pack_chunk(chunk(number, cell, rows)))
+                ledger.put(cell, number, chunk_format.pack_chunk(chunk(number, cell, rows)))
     return path
 
 
@@ -258,7 +258,7 @@ def test_a_damaged_chunk_stops_the_export_and_leaves_the_old_file(tmp_path, kind
     path, target = write(tmp_path), tmp_path / f"rows.{kind}"
     target.write_text("last week's")
     data = bytearray(path.read_bytes())
-    data[data.index(blob.pack_chunk(chunk(2, 0))[-300:-200])] ^= 1
+    data[data.index(chunk_format.pack_chunk(chunk(2, 0))[-300:-200])] ^= 1
     path.write_bytes(data)
     assert "chunk 2 of cell 0 is damaged" in said(exported, path, target)
     assert target.read_text() == "last week's"
@@ -276,7 +276,7 @@ def test_a_missing_pyarrow_is_told_by_what_to_install(tmp_path, monkeypatch):
 FULL = """
     import sys
     from pathlib import Path
-    from microrad.campaign.export import export
+    from microrad.campaign.export import export_rows
     from microrad.campaign.ledger import Ledger
     from microrad.campaign.records import CampaignError
     with Ledger.open(Path(sys.argv[1]), write=False) as ledger:
@@ -310,7 +310,7 @@ def test_a_full_disk_leaves_the_old_file_and_no_part_of_a_new_one(tmp_path, kind
 PEAK = """
     import resource, sys
     from pathlib import Path
-    from microrad.campaign.export import export
+    from microrad.campaign.export import export_rows
     from microrad.campaign.ledger import Ledger
     with Ledger.open(Path(sys.argv[1]), write=False) as ledger:
         export(ledger, Path(sys.argv[2]))

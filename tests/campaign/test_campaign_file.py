@@ -11,10 +11,13 @@ import numpy as np
 import pytest
 
 from campaign_files import HEAD, IDENTIFIED, LOOP, NOISE, POWER, UNCERTAINTY, loaded, written
-from microrad.campaign import evaluate, keys, ledger_file, sampling
+from microrad.campaign.definition import keys
+from microrad.campaign.definition.records import Variable
 from microrad.campaign.file import load_campaign
-from microrad.campaign.inputs import Builder
+from microrad.campaign.ledger import file
 from microrad.campaign.records import CampaignError
+from microrad.campaign.rows import evaluate, sampling
+from microrad.campaign.rows.missions import MissionBuilder
 from microrad.mission.file import MissionError, load_mission, named_files, open_mission
 from scenes import scene_of
 from shipped import SHIPPED
@@ -74,9 +77,12 @@ high = "12 cm"
     assert (c.table.row_limit_s, c.table.worst, c.keep) == (60.0, 5, ("residual_rms", "margin"))
     assert c.half_width == 0.05
     assert [(each.output, each.least, each.most) for each in c.limits] == [("margin", 2.0, None)]
-    assert c.cells == tuple({"terminals.geo_aperture": size, "mirror": "mirror.toml"} for size in ("15 cm", "20 cm"))
-    assert [b.file.mission.terminals.geo_aperture_m for b in c.bases] == [0.15, 0.2]
-    assert c.dimensions == (
+    sizes = ("15 cm", "20 cm")
+    assert [each.values for each in c.cells] == [
+        {"terminals.geo_aperture": size, "mirror": "mirror.toml"} for size in sizes
+    ]
+    assert [b.file.mission.terminals.geo_aperture_m for b in c.cells] == [0.15, 0.2]
+    assert tuple((each.key, each.unit) for each in c.inputs) == (
         ("communication.transmit_power", "W"),
         ("fine_pointing.optical_sensor.noise", "rad"),
         ("mirror.bouc_wen.d1", "rad/V"),
@@ -88,12 +94,12 @@ high = "12 cm"
         "log-uniform, 500 nrad to 2 µrad",
         "identified, standard error 2 %",
     ]
-    assert c.variables == (("terminals.leo_aperture", "m", 0.03, 0.12),)
+    assert c.variables == (Variable("terminals.leo_aperture", "m", 0.03, 0.12),)
     assert c.fixed == {"fine_pointing.strain_gauge.noise": "0.2 urad"}
     gauge = c.mission.sources["fine_pointing.strain_gauge.noise"]
     assert (gauge.value, gauge.comment, gauge.file) == ("0.2 urad", "campaign: measured: on the bench", "campaign file")
     assert gauge.line == line_of(tmp_path, "strain_gauge")
-    gridded = c.bases[1].file.sources["terminals.geo_aperture"]
+    gridded = c.cells[1].file.sources["terminals.geo_aperture"]
     assert (gridded.value, gridded.comment, gridded.line) == ("20 cm", "campaign: [grid]", line_of(tmp_path, "geo_"))
     assert [path.name for path in c.files] == ["campaign.toml", "mission.toml", "mirror.toml"]
     assert len(c.warnings) == 2
@@ -107,7 +113,7 @@ def test_what_is_left_out_has_its_default(tmp_path):
     assert (c.table.row_limit_s, c.table.worst, c.table.loop) == (300.0, 3, None)
     assert c.keep == ("margin", "outage", "short", "data_rate", "beacon_margin", "answer_margin")
     assert [(each.output, each.least, each.source) for each in c.limits] == [("margin", 3.0, "requirement.margin")]
-    assert (c.cells, c.warnings, c.fixed, np.isnan(c.half_width)) == (({},), (), {}, True)
+    assert ([cell.values for cell in c.cells], c.warnings, c.fixed, np.isnan(c.half_width)) == ([{}], (), {}, True)
     with_loop = loaded(tmp_path, HEAD + LOOP + POWER)
     assert "residual_rms" in with_loop.keep
     assert "volume" not in with_loop.keep
@@ -149,7 +155,7 @@ def test_a_grid_may_give_what_the_mission_leaves_open(tmp_path):
     unknown = (('leo_aperture = "5 cm"', 'leo_aperture = "unknown"'),)
     text = HEAD + POWER + '[grid]\n"terminals.leo_aperture" = ["6 cm", "7 cm"]\n'
     c = loaded(tmp_path, text, changes=unknown)
-    assert [b.file.mission.terminals.leo_aperture_m for b in c.bases] == [0.06, 0.07]
+    assert [b.file.mission.terminals.leo_aperture_m for b in c.cells] == [0.06, 0.07]
     assert c.mission.mission.terminals.leo_aperture_m == 0.06
     assert "in no source" in faults(tmp_path, HEAD, changes=unknown)[0].reason
 
@@ -166,8 +172,11 @@ def test_words_lists_and_switches_in_set_and_grid(tmp_path):
 """
     c = loaded(tmp_path, text)
     assert len(c.cells) == 4
-    assert c.cells[1] == {"conventions.strehl": "decibel", "fine_pointing.geometry.coupling": "[1.0, 0.1, 0.0, 1.0]"}
-    m = c.bases[3].file.mission
+    assert c.cells[1].values == {
+        "conventions.strehl": "decibel",
+        "fine_pointing.geometry.coupling": "[1.0, 0.1, 0.0, 1.0]",
+    }
+    m = c.cells[3].file.mission
     assert (m.conventions.residual, m.point_ahead.corrected, m.conventions.strehl) == ("radial", False, "ratio")
     assert m.scenario.pid_frequencies_hz == (2.0, 20.0)
     assert m.fine_pointing.geometry.coupling == (1.0, 0.1, 0.0, 1.0)
@@ -564,7 +573,7 @@ def test_draws_that_a_key_does_not_take_are_warned_of_with_their_share(tmp_path)
 
 def test_the_share_that_is_warned_of_is_that_of_rows_that_fail(tmp_path):
     c = loaded(tmp_path, beyond("5 W", runs=1024))
-    builder, (columns, _) = Builder(c), sampling.rows(c, 0, 0, 1024)
+    builder, (columns, _) = MissionBuilder(c), sampling.rows(c, 0, 0, 1024)
     failed = 0
     for watt in columns["communication.transmit_power"]:
         try:
@@ -612,7 +621,7 @@ def test_a_mirror_that_was_not_identified_is_told_where_one_goes(tmp_path):
     (found,) = faults(tmp_path, HEAD + IDENTIFIED)
     assert found.expected.startswith('[set] with mirror = "FILE", or [grid] with mirror = ["FILE"]')
     for table in ('[set]\nmirror = "mirror.toml"\n', '[grid]\nmirror = ["mirror.toml"]\n'):
-        assert len(loaded(tmp_path, HEAD + IDENTIFIED + table).dimensions) == 3
+        assert len(loaded(tmp_path, HEAD + IDENTIFIED + table).inputs) == 3
 
 
 @pytest.mark.parametrize(
@@ -646,16 +655,16 @@ def test_radius_is_among_what_a_precision_may_ask_for_and_no_limit(tmp_path):
 
 def test_a_ledger_is_no_campaign_file_and_the_other_way_round(tmp_path):
     path = tmp_path / "a b.ledger"
-    ledger_file.make_empty(path)
+    file.make_empty(path)
     with pytest.raises(MissionError, match="is a ledger, not a campaign file") as caught:
         load_campaign(path)
     assert "microrad campaign resume '" in caught.value.faults[0].expected
     text = written(tmp_path, HEAD + POWER)
     with pytest.raises(CampaignError, match=rf"is text, not a ledger: begin it with `microrad campaign run {text}`"):
-        ledger_file.refuse_foreign(text)
+        file.refuse_foreign(text)
     (tmp_path / "table.csv").write_text("row\n1\n")
     with pytest.raises(CampaignError, match="is text, not a ledger: name the file"):
-        ledger_file.refuse_foreign(tmp_path / "table.csv")
+        file.refuse_foreign(tmp_path / "table.csv")
 
 
 def test_more_runs_than_noise_streams_have_numbers_for(tmp_path):
@@ -668,7 +677,7 @@ def test_more_runs_than_noise_streams_have_numbers_for(tmp_path):
 # ---------------------------------------------------------------------------------------------------- missions of rows
 def test_a_row_has_the_drawn_values_to_the_last_bit(tmp_path):
     c = loaded(tmp_path, f'{HEAD}{LOOP}{POWER}{NOISE}{IDENTIFIED}[set]\nmirror = "mirror.toml"\n')
-    builder = Builder(c)
+    builder = MissionBuilder(c)
     columns, _ = sampling.rows(c, 0, 0, 16)
     for i in range(16):
         values = {key: float(column[i]) for key, column in columns.items()}
@@ -683,14 +692,14 @@ def test_a_row_has_the_drawn_values_to_the_last_bit(tmp_path):
         for key in ("communication.transmit_power", "mirror.bouc_wen.d1"):
             assert file.sources[key].comment.startswith("campaign: drawn")
         assert file.sources["terminals.leo_aperture"].comment.startswith("paper")
-    assert builder.mission(0, {}) is c.bases[0].file
+    assert builder.mission(0, {}) is c.cells[0].file
     assert builder.mission(0, {"mirror.bouc_wen.d1": 9e-5}).mission.mirror.uncertainty is None
-    assert c.bases[0].file.mission.mirror.uncertainty is not None
+    assert c.cells[0].file.mission.mirror.uncertainty is not None
 
 
 def test_a_row_is_the_mission_that_a_file_with_its_values_would_be(tmp_path):
     c = loaded(tmp_path, HEAD + POWER + distributed("terminals.leo_aperture", TABLE + 'values = ["5 cm", "7 cm"]'))
-    row = Builder(c).mission(0, {"communication.transmit_power": 4.5, "terminals.leo_aperture": 0.07}).mission
+    row = MissionBuilder(c).mission(0, {"communication.transmit_power": 4.5, "terminals.leo_aperture": 0.07}).mission
     text = SHIPPED.read_text(encoding="utf-8")
     for old, new in (('transmit_power = "5 W"', 'transmit_power = "4.5 W"'), ('= "5 cm"', '= "7 cm"')):
         text = text.replace(old, new)
@@ -707,14 +716,14 @@ def test_words_of_a_table_are_drawn_by_their_place(tmp_path):
     drawn = columns["conventions.strehl"]
     assert set(drawn) == {1.0, 2.0}
     assert np.mean(drawn == 2.0) == 0.75  # eight Sobol sets
-    builder = Builder(c)
+    builder = MissionBuilder(c)
     words = [builder.mission(0, {"conventions.strehl": place}).mission.conventions.strehl for place in (1.0, 2.0)]
     assert words == ["decibel", "ratio"]
 
 
 def test_whole_numbers_of_a_table_stay_whole(tmp_path):
     c = loaded(tmp_path, 'keep = ["volume"]\n' + HEAD + distributed("acquisition.attempts", TABLE + "values = [1, 2]"))
-    assert Builder(c).mission(0, {"acquisition.attempts": 2.0}).mission.acquisition.attempts == 2
+    assert MissionBuilder(c).mission(0, {"acquisition.attempts": 2.0}).mission.acquisition.attempts == 2
 
 
 @pytest.mark.parametrize(
@@ -764,7 +773,7 @@ def test_every_drawable_key_moves_an_output_or_is_refused(tmp_path, jitter):
     refused = {fault.key.removeprefix("inputs.") for fault in caught.value.faults}
     assert {fault.reason.partition(" (")[0] for fault in caught.value.faults} == {"is read by nothing that is kept"}
     plain = loaded(tmp_path, HEAD + POWER, changes=tuple(changes))
-    builder, names = Builder(plain), plain.keep
+    builder, names = MissionBuilder(plain), plain.keep
     own, moved = evaluate.outputs(builder.mission(0, {}), None, names), {}
     for text, (at, near) in found.items():
         if at:
@@ -785,10 +794,13 @@ def test_a_drawn_key_is_read_where_one_cell_reads_it(tmp_path):
 def test_a_row_that_is_no_mission_says_key_value_and_reason(tmp_path):
     c = loaded(tmp_path, HEAD + POWER)
     with pytest.raises(CampaignError, match=r'communication\.transmit_power = "-1\.0 W" is not above 0 W'):
-        Builder(c).mission(0, {"communication.transmit_power": -1.0})
+        MissionBuilder(c).mission(0, {"communication.transmit_power": -1.0})
     with pytest.raises(CampaignError, match=r"beacon\.divergence = 1e-06 rad is below diffraction"):
-        Builder(c).mission(0, {"beacon.divergence": 1e-6})
-    assert Builder(c).mission(0, {"communication.transmit_power": 1.0}).mission.communication.transmit_power_w == 1.0
+        MissionBuilder(c).mission(0, {"beacon.divergence": 1e-6})
+    assert (
+        MissionBuilder(c).mission(0, {"communication.transmit_power": 1.0}).mission.communication.transmit_power_w
+        == 1.0
+    )
 
 
 def test_mirrors_of_a_grid_are_each_drawn_from_their_own_covariance(tmp_path):
@@ -798,13 +810,13 @@ def test_mirrors_of_a_grid_are_each_drawn_from_their_own_covariance(tmp_path):
     other += '[uncertainty]\nparameters = ["linear.poles.1", "bouc_wen.epsilon"]\nstandard_errors = [0.02, 0.1]\n'
     (tmp_path / "other.toml").write_text(other, encoding="utf-8")
     c = load_campaign(path)
-    assert len(c.dimensions) == 4  # what either mirror has
+    assert len(c.inputs) == 4  # what either mirror has
     first, second = (sampling.rows(c, cell, 0, 64)[0] for cell in (0, 1))
     assert np.all(np.isnan(second["mirror.bouc_wen.d1"]))
     assert np.all(np.isnan(first["mirror.bouc_wen.epsilon"]))
     assert 1900 < np.mean(second["mirror.linear.poles.1"]) < 2100
     values = {key: float(column[3]) for key, column in second.items()}
-    m = Builder(c).mission(1, values).mission
+    m = MissionBuilder(c).mission(1, values).mission
     assert m.mirror.bouc_wen.epsilon_rad_v == values["mirror.bouc_wen.epsilon"]
     assert m.mirror.bouc_wen.d1_rad_v == pytest.approx(0.089e-3, rel=1e-12)
 
@@ -818,8 +830,8 @@ def test_a_list_that_scales_together_is_one_column(tmp_path):
     )
     (tmp_path / "mirror.toml").write_text(text, encoding="utf-8")
     c = load_campaign(path)
-    assert c.dimensions == (("mirror.linear.poles", ""),)
-    m = Builder(c).mission(0, {"mirror.linear.poles": 1.5}).mission
+    assert [(each.key, each.unit) for each in c.inputs] == [("mirror.linear.poles", "")]
+    m = MissionBuilder(c).mission(0, {"mirror.linear.poles": 1.5}).mission
     assert m.mirror.linear.poles_hz == (1500.0, 3000.0)
 
 
@@ -875,7 +887,7 @@ def test_only_keys_that_touch_the_loop_change_it(tmp_path, sensor):
 def test_rows_with_the_same_loop_have_the_same_key(tmp_path):
     text = f'{HEAD}{LOOP}{POWER}{NOISE}[grid]\n"terminals.geo_aperture" = ["15 cm", "20 cm"]\n'
     text += '"fine_pointing.strain_gauge.noise" = ["0.1 urad", "0.2 urad"]\n'
-    builder = Builder(loaded(tmp_path, text))
+    builder = MissionBuilder(loaded(tmp_path, text))
     power, noise = "communication.transmit_power", "fine_pointing.optical_sensor.noise"
     one = builder.loop_key(0, {power: 4.0, noise: 1e-6})
     assert one == builder.loop_key(0, {power: 5.0, noise: 1e-6})

@@ -15,11 +15,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from microrad.campaign import blob
-from microrad.campaign.blob import Column, Head
-from microrad.campaign.ledger import Ledger, check_same
-from microrad.campaign.ledger_file import FORMAT, argument, is_written, refuse_damaged_log
-from microrad.campaign.mending import mend, verify
+from microrad.campaign.ledger import Ledger, check_same, chunk_format, mend, verify
+from microrad.campaign.ledger.chunk_format import Column, Head
+from microrad.campaign.ledger.file import FORMAT, argument, is_written, refuse_damaged_log
 from microrad.campaign.records import CampaignError, Chunk, Failed, WorstTrace
 from places import TESTS
 from waiting import any_moment
@@ -50,7 +48,7 @@ def chunk(number, cell=0, rows=16, reason="raised ValueError: no µ"):
 
 
 def packed(number, cell=0):
-    return blob.pack_chunk(chunk(number, cell))
+    return chunk_format.pack_chunk(chunk(number, cell))
 
 
 def filled(path, count=20):
@@ -91,7 +89,7 @@ def test_a_chunk_comes_back_bit_by_bit_with_its_columns_in_order():
     for rows in (0, 1, 5):
         columns = {"z": odd[:rows], "row": np.arange(float(rows)), "a": np.full(rows, np.nan)}
         sent = Chunk(3, 7, columns, (Failed(2, 2**64 - 1, 2, "half \udc80 of a pair"),), np.zeros(1056), np.zeros(0))
-        got = blob.unpack_chunk(blob.pack_chunk(sent))
+        got = chunk_format.unpack_chunk(chunk_format.pack_chunk(sent))
         assert (got.cell, got.number, got.failed, list(got.columns)) == (3, 7, sent.failed, ["z", "row", "a"])
         assert all(same_bits(got.columns[name], columns[name]) for name in columns)
         assert same_bits(got.survival, sent.survival) and same_bits(got.survival_square, sent.survival_square)
@@ -103,27 +101,29 @@ def test_a_chunk_comes_back_bit_by_bit_with_its_columns_in_order():
 )
 def test_runs_at_the_ends_are_left_out_and_put_back(values):
     sent = np.array(values, dtype=float)
-    got = blob.unpack("trace", blob.pack("trace", {}, {"x": sent, "next": np.arange(3.0)}))
+    got = chunk_format.unpack("trace", chunk_format.pack("trace", {}, {"x": sent, "next": np.arange(3.0)}))
     assert same_bits(got.arrays["x"], sent) and same_bits(got.arrays["next"], np.arange(3.0))
     long = np.concatenate([np.full(1000, sent[0]), sent, np.full(1000, sent[-1])])
-    data = blob.pack("trace", {}, {"x": long})
-    assert same_bits(blob.unpack("trace", data).arrays["x"], long)
+    data = chunk_format.pack("trace", {}, {"x": long})
+    assert same_bits(chunk_format.unpack("trace", data).arrays["x"], long)
     assert len(data) < 300
 
 
 def test_a_trace_and_a_head_come_back():
-    got = blob.unpack_trace(blob.pack_trace(replace(TRACE, value=np.nan)))
+    got = chunk_format.unpack_trace(chunk_format.pack_trace(replace(TRACE, value=np.nan)))
     assert (got.cell, got.row, got.output) == (0, 17, "margin") and np.isnan(got.value)
     assert same_bits(got.error_rad, TRACE.error_rad) and same_bits(got.drive_v, TRACE.drive_v)
     keys = {"z": "1", "a": "2"}
-    head = blob.unpack_head(blob.pack_head(replace(HEAD, cells=(keys,))))
+    head = chunk_format.unpack_head(chunk_format.pack_head(replace(HEAD, cells=(keys,))))
     assert head == replace(HEAD, cells=(keys,)) != HEAD and list(head.cells[0]) == ["z", "a"]
 
 
 def test_the_same_chunk_gives_the_same_bytes_on_any_machine():
     columns = {"row": np.arange(4.0), "weight": np.ones(4), "margin": np.array([0.1, np.nan, 3.0, -0.0])}
-    data = blob.pack_chunk(Chunk(0, 0, columns, (Failed(1, 9, 2, "why"),), np.array([4.0, 2.5, 0.0]), np.zeros(3)))
-    assert data == blob.pack_chunk(blob.unpack_chunk(data))
+    data = chunk_format.pack_chunk(
+        Chunk(0, 0, columns, (Failed(1, 9, 2, "why"),), np.array([4.0, 2.5, 0.0]), np.zeros(3))
+    )
+    assert data == chunk_format.pack_chunk(chunk_format.unpack_chunk(data))
     assert hashlib.sha256(data).hexdigest() == "03960011ee16b928ebaa57956de692445ea838dcc57a37c245365dd9b9526bee"
 
 
@@ -134,25 +134,29 @@ def test_a_flipped_bit_anywhere_in_a_chunk_is_refused():
         bad = bytearray(data)
         bad[at] ^= 1 << draw.randrange(8)
         with pytest.raises(CampaignError, match=r"damaged|is no chunk"):
-            blob.unpack_chunk(bytes(bad))
-    assert blob.unpack_chunk(data).number == 0
+            chunk_format.unpack_chunk(bytes(bad))
+    assert chunk_format.unpack_chunk(data).number == 0
 
 
 def test_other_bytes_are_refused_by_what_they_are():
     data = packed(0)
-    assert "is no chunk of microrad" in said(blob.unpack_chunk, b"")
-    assert "is no chunk of microrad" in said(blob.unpack_chunk, b"PK" + data)
-    assert "damaged" in said(blob.unpack_chunk, data[:-1])
-    assert "these bytes are a trace, not a chunk" in said(blob.unpack_chunk, blob.pack_trace(TRACE))
+    assert "is no chunk of microrad" in said(chunk_format.unpack_chunk, b"")
+    assert "is no chunk of microrad" in said(chunk_format.unpack_chunk, b"PK" + data)
+    assert "damaged" in said(chunk_format.unpack_chunk, data[:-1])
+    assert "these bytes are a trace, not a chunk" in said(chunk_format.unpack_chunk, chunk_format.pack_trace(TRACE))
     newer = data[:8] + (2).to_bytes(2, "little") + data[10:-32]
-    assert "format 2, and this microrad reads 1" in said(blob.unpack_chunk, newer + hashlib.sha256(newer).digest())
+    assert "format 2, and this microrad reads 1" in said(
+        chunk_format.unpack_chunk, newer + hashlib.sha256(newer).digest()
+    )
 
 
 def test_columns_of_unequal_length_are_refused():
     columns = {"row": np.arange(4.0), "margin": np.arange(3.0)}
-    message = said(blob.pack_chunk, Chunk(1, 2, columns, (), np.zeros(0), np.zeros(0)))
+    message = said(chunk_format.pack_chunk, Chunk(1, 2, columns, (), np.zeros(0), np.zeros(0)))
     assert "chunk 2 of cell 1" in message and "(3,)" in message and "(4,)" in message
-    assert "shapes" in said(blob.pack_chunk, Chunk(1, 2, {"row": np.zeros((2, 2))}, (), np.zeros(0), np.zeros(0)))
+    assert "shapes" in said(
+        chunk_format.pack_chunk, Chunk(1, 2, {"row": np.zeros((2, 2))}, (), np.zeros(0), np.zeros(0))
+    )
 
 
 def forged(kind, header, table):
@@ -181,14 +185,14 @@ def forged(kind, header, table):
 )
 def test_bytes_of_a_stranger_with_the_right_checksum_ask_for_no_memory_and_are_refused(table):
     header = {"cell": 0, "number": 0, "columns": [], "failed": []}
-    assert "is laid out as microrad never does" in said(blob.unpack_chunk, forged("chunk", header, table))
+    assert "is laid out as microrad never does" in said(chunk_format.unpack_chunk, forged("chunk", header, table))
 
 
 @pytest.mark.parametrize("header", [[], 7, {}, {"cell": 0, "number": 0, "columns": ["x"], "failed": []}])
 def test_a_header_of_a_stranger_is_refused(header):
-    assert "is laid out as microrad never does" in said(blob.unpack_chunk, forged("chunk", header, []))
-    assert "is laid out as microrad never does" in said(blob.unpack_trace, forged("trace", header, []))
-    assert "is laid out as microrad never does" in said(blob.unpack_head, forged("head", header, []))
+    assert "is laid out as microrad never does" in said(chunk_format.unpack_chunk, forged("chunk", header, []))
+    assert "is laid out as microrad never does" in said(chunk_format.unpack_trace, forged("trace", header, []))
+    assert "is laid out as microrad never does" in said(chunk_format.unpack_head, forged("head", header, []))
 
 
 # ----------------------------------------------------------------------------------------------------------- the rows
@@ -213,13 +217,13 @@ def test_a_chunk_twice_is_one_chunk_and_with_other_content_is_refused(path):
     with Ledger.create(path, HEAD) as ledger:
         ledger.put(0, 0, packed(0))
         ledger.put(0, 0, packed(0))
-        message = said(ledger.put, 0, 0, blob.pack_chunk(other))
+        message = said(ledger.put, 0, 0, chunk_format.pack_chunk(other))
         assert "chunk 0 of cell 0 came out otherwise" in message and "same microrad" in message
         assert ledger.get(0, 0) == packed(0)
         ledger.drop(0, 0)
         assert ledger.done() == set()
-        ledger.put(0, 0, blob.pack_chunk(other))
-        assert ledger.get(0, 0) == blob.pack_chunk(other)
+        ledger.put(0, 0, chunk_format.pack_chunk(other))
+        assert ledger.get(0, 0) == chunk_format.pack_chunk(other)
 
 
 def test_what_is_no_chunk_of_this_campaign_is_refused(path):
@@ -227,7 +231,7 @@ def test_what_is_no_chunk_of_this_campaign_is_refused(path):
     with Ledger.create(path, HEAD) as ledger:
         assert "chunk 1 of cell 0 came for chunk 0 of cell 0" in said(ledger.put, 0, 0, packed(1))
         assert "damaged" in said(ledger.put, 0, 0, packed(0)[:-1])
-        message = said(ledger.put, 0, 0, blob.pack_chunk(renamed))
+        message = said(ledger.put, 0, 0, chunk_format.pack_chunk(renamed))
         assert "columns row, margin" in message and "row, weight, margin" in message
         assert ledger.done() == set()
         ledger.put(0, 0, packed(0))
@@ -304,10 +308,10 @@ def test_another_format_of_the_ledger_is_refused(path):
 
 
 def test_a_ledger_of_a_later_microrad_is_not_mended_into_this_format(path, monkeypatch):
-    assert blob.VERSION == FORMAT  # else the head of a later ledger could be read
+    assert chunk_format.VERSION == FORMAT  # else the head of a later ledger could be read
     with monkeypatch.context() as later:
-        later.setattr("microrad.campaign.blob.VERSION", 2)
-        later.setattr("microrad.campaign.ledger_file.FORMAT", 2)
+        later.setattr("microrad.campaign.ledger.chunk_format.VERSION", 2)
+        later.setattr("microrad.campaign.ledger.file.FORMAT", 2)
         filled(path, 2)
         assert verify(path).sound
     whole = path.read_bytes()
@@ -540,7 +544,7 @@ def test_a_log_that_begins_anew_while_it_is_read_is_no_damage(path, monkeypatch)
     left_behind(path, 2)
     flip(path.with_name(path.name + "-wal"), 100)
     answers = iter([False, True])
-    monkeypatch.setattr("microrad.campaign.ledger_file.is_written", lambda path: next(answers))
+    monkeypatch.setattr("microrad.campaign.ledger.file.is_written", lambda path: next(answers))
     refuse_damaged_log(path)
     assert next(answers, None) is None
 
@@ -684,7 +688,7 @@ def test_a_read_only_disk_can_be_read_and_verified_but_not_written(small_disk):
 
 
 def test_a_program_that_holds_the_file_is_told(path, monkeypatch):
-    monkeypatch.setattr("microrad.campaign.ledger_file.PATIENCE_S", 0.1)
+    monkeypatch.setattr("microrad.campaign.ledger.file.PATIENCE_S", 0.1)
     filled(path, 1)
     with Ledger.open(path, write=True) as ledger, contextlib.closing(sqlite3.connect(path)) as other:
         other.execute("BEGIN IMMEDIATE")

@@ -7,14 +7,16 @@ import numpy as np
 import pytest
 
 from microrad import link
-from microrad.campaign import bundle, plan, run, work
-from microrad.campaign.export import export
+from microrad.campaign import bundle, run
+from microrad.campaign.definition.keys import find, flat
+from microrad.campaign.export import export_rows
 from microrad.campaign.file import load_campaign
-from microrad.campaign.inputs import Builder
-from microrad.campaign.keys import find, flat
 from microrad.campaign.ledger import Ledger
 from microrad.campaign.records import CampaignError
-from microrad.campaign.summary import summarise
+from microrad.campaign.rows import plan
+from microrad.campaign.rows.evaluator import Evaluator
+from microrad.campaign.rows.missions import MissionBuilder
+from microrad.campaign.statistics.summary import summarise_campaign
 from microrad.core import reads
 from microrad.link import LitAperture, radial_error, under_jitter
 from microrad.link.inputs import LINK_TABLES
@@ -52,7 +54,7 @@ def loaded(folder, name, body, head=HEAD):
 
 def rows(campaign, count=4):
     """The first rows of a campaign, all of which have results."""
-    chunk = work.Evaluator(campaign, Builder(campaign), {}, {}).rows(0, range(count), lambda: None)
+    chunk = Evaluator(campaign, {}).rows(0, range(count), lambda: None)
     assert chunk.failed == ()
     return chunk.columns
 
@@ -92,9 +94,9 @@ def test_the_largest_rate_is_solved_for_once_for_each_cell(tmp_path):
     mission(tmp_path, "gallery")
     fixed = '[set]\n"communication.data_rate" = "largest"\n[grid]\n"communication.distance" = ["500 km", "1000 km"]\n'
     campaign = loaded(tmp_path, "gallery", POWER + fixed)
-    evaluator = work.Evaluator(campaign, Builder(campaign), {}, {})
+    evaluator = Evaluator(campaign, {})
     near, far = (evaluator.rows(cell, range(4), lambda: None).columns for cell in (0, 1))
-    nominal = campaign.bases[0].file.mission
+    nominal = campaign.cells[0].file.mission
     gained = 10.0 * np.log10(near["communication.transmit_power"] / nominal.communication.transmit_power_w)
     np.testing.assert_allclose(near["margin"] - gained, nominal.requirement.margin_db, atol=1e-9)
     np.testing.assert_allclose(far["margin"], near["margin"], atol=1e-9)
@@ -162,9 +164,9 @@ def test_each_item_of_a_list_has_its_own_key(tmp_path):
     mission(tmp_path, "gallery")
     first = '[inputs."jitter.rms.1"]\ndistribution = "uniform"\nlow = "1 urad"\nhigh = "9 urad"\n'
     campaign = loaded(tmp_path, "gallery", first)
-    drawn = Builder(campaign).mission(0, {"jitter.rms.1": 5e-6}).mission
+    drawn = MissionBuilder(campaign).mission(0, {"jitter.rms.1": 5e-6}).mission
     assert drawn.jitter.rms_rad == (5e-6, 6e-6) and drawn.jitter.bias_rad == (4e-6, 0.0)
-    assert (campaign.dimensions[0].key, campaign.dimensions[0].unit) == ("jitter.rms.1", "rad")
+    assert (campaign.inputs[0].key, campaign.inputs[0].unit) == ("jitter.rms.1", "rad")
     both = loaded(tmp_path, "gallery", first + '[set]\n"jitter.rms.2" = "2 urad"\n')
     assert both.mission.mission.jitter.rms_rad == (6e-6, 2e-6)
     (found,) = faults(tmp_path, "gallery", first.replace("rms.1", "rms.3"))
@@ -184,11 +186,11 @@ def test_a_list_is_drawn_as_one_number_which_its_items_follow_in_proportion(tmp_
     path.write_text(text.replace('bias = ["4 urad", "0 urad"]', 'bias = ["4 urad", "-2 urad"]'), encoding="utf-8")
     both = '[inputs."jitter.rms"]\ndistribution = "uniform"\nlow = "1 urad"\nhigh = "9 urad"\n'
     campaign = loaded(tmp_path, "gallery", both)
-    assert (campaign.dimensions[0].key, campaign.dimensions[0].unit) == ("jitter.rms", "rad")
+    assert (campaign.inputs[0].key, campaign.inputs[0].unit) == ("jitter.rms", "rad")
     found = rows(campaign, 4)
     assert np.ptp(found["jitter.rms"]) > 1e-6
     for drawn_rad, margin_db in zip(found["jitter.rms"], found["margin"], strict=True):
-        m = Builder(campaign).mission(0, {"jitter.rms": float(drawn_rad)}).mission
+        m = MissionBuilder(campaign).mission(0, {"jitter.rms": float(drawn_rad)}).mission
         assert m.jitter.rms_rad == (drawn_rad, drawn_rad / 2)
         assert margin_db == pytest.approx(under_jitter.margin_db(link.of(m)), abs=1e-12)
     (wrong,) = faults(tmp_path, "gallery", both.replace('"9 urad"', '"9 W"'))
@@ -226,7 +228,7 @@ def begun(folder, book, monkeypatch, row_s, progress=lambda *_: None, **means):
     """A campaign of 64 rows that are taken to last ``row_s`` each, run to its end."""
     loaded(folder, "gallery", DRAWN, EVEN)
     monkeypatch.setattr(run, "row_s", lambda _: row_s)
-    run.begin(folder / "campaign-gallery.toml", folder / book, run.Means(**(means or {"threads": 1})), progress)
+    run.run_campaign(folder / "campaign-gallery.toml", folder / book, run.Means(**(means or {"threads": 1})), progress)
     return folder / book
 
 
@@ -234,21 +236,21 @@ def content(book):
     """Rows of each chunk, the exported rows, and all that they say but for the pace."""
     with Ledger.open(book, write=False) as opened:
         sizes = [chunk.columns["row"].size for chunk in opened.chunks(0)]
-        export(opened, book.with_suffix(".csv"))
-    said = replace(summarise(book), progress=None)
+        export_rows(opened, book.with_suffix(".csv"))
+    said = replace(summarise_campaign(book), progress=None)
     return sizes, book.with_suffix(".csv").read_bytes(), reads.digest(said)
 
 
 def test_chunks_are_cut_to_what_a_row_costs(tmp_path):
     mission(tmp_path, "gallery")
     campaign = loaded(tmp_path, "gallery", DRAWN, EVEN.replace("64", "4096"))
-    assert plan.is_timed(campaign) and plan.chunk_rows(campaign) == 1024
-    sizes = {row_s: plan.chunk_rows(plan.timed(campaign, row_s)) for row_s in (0.0, 1e-4, 0.01, 0.1, 0.9, 5.0)}
+    assert plan.is_timed(campaign) and plan.planned(campaign).chunk_rows == 1024
+    sizes = {row_s: plan.planned(plan.timed(campaign, row_s)).chunk_rows for row_s in (0.0, 1e-4, 0.01, 0.1, 0.9, 5.0)}
     assert sizes == {0.0: 1024, 1e-4: 1024, 0.01: 128, 0.1: 16, 0.9: 2, 5.0: 1}
-    assert plan.rows_of(plan.timed(campaign, 0.1), 3) == range(48, 64)
+    assert plan.planned(plan.timed(campaign, 0.1)).rows_of(3) == range(48, 64)
     precise = '[precision]\noutput = "margin"\nquantile = 0.1\nhalf_width = "1 dB"\nconfidence = 0.9\nat_most = 9999\n'
     campaign = loaded(tmp_path, "gallery", DRAWN + precise, EVEN.replace("64", "4096"))
-    assert plan.rounds(plan.timed(campaign, 0.1)) == plan.rounds(campaign)
+    assert plan.planned(plan.timed(campaign, 0.1)).rounds == plan.planned(campaign).rounds
 
 
 def test_a_row_costs_the_mean_of_some_without_the_first(tmp_path):
@@ -280,7 +282,7 @@ def test_a_campaign_that_is_resumed_keeps_its_chunks(tmp_path, monkeypatch):
     with pytest.raises(KeyboardInterrupt, match=r"^stopped; 8 rows are in"):
         begun(tmp_path, "stopped.ledger", monkeypatch, 0.2, stop)
     monkeypatch.setattr(run, "row_s", lambda _: 1e-6)
-    run.resume(tmp_path / "stopped.ledger", run.Means(threads=1))
+    run.resume_campaign(tmp_path / "stopped.ledger", run.Means(threads=1))
     whole = content(begun(tmp_path, "whole.ledger", monkeypatch, 1e-6))
     sizes, *rest = content(tmp_path / "stopped.ledger")
     assert sizes == [8] * 8 and tuple(rest) == whole[1:]

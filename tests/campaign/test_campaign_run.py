@@ -12,14 +12,16 @@ import numpy as np
 import pytest
 
 import microrad
-from microrad.campaign import blob, bundle, mending, plan, records, run, work
-from microrad.campaign.export import export
+from microrad.campaign import bundle, records, run
+from microrad.campaign.export import export_rows
 from microrad.campaign.file import load_campaign
-from microrad.campaign.inputs import Builder
-from microrad.campaign.ledger import Ledger
-from microrad.campaign.ledger_file import is_written
+from microrad.campaign.ledger import Ledger, chunk_format, mending
+from microrad.campaign.ledger.file import is_written
 from microrad.campaign.records import CampaignError, Job, Outcome
-from microrad.campaign.summary import summarise
+from microrad.campaign.rows import evaluate, plan
+from microrad.campaign.rows.evaluator import Evaluator
+from microrad.campaign.rows.loops import controllers
+from microrad.campaign.statistics.summary import is_precise, summarise_campaign
 from microrad.core import kernels
 from small_campaign import campaign_file, children, finished, halted, halting, kill, started
 from waiting import HANG_S, any_moment, gone, until
@@ -31,7 +33,7 @@ KILLS = 20 if OFTEN else 2
 def begun(folder, path=None, **means):
     """A campaign run to its end in this process's own worker; its ledger."""
     book = folder / "campaign.ledger"
-    run.begin(path or folder / "campaign.toml", book, run.Means(**(means or {"threads": 2})))
+    run.run_campaign(path or folder / "campaign.toml", book, run.Means(**(means or {"threads": 2})))
     return book
 
 
@@ -39,15 +41,14 @@ def table(book):
     """The exported rows as text."""
     file = book.with_suffix(".csv")
     with Ledger.open(book, write=False) as opened:
-        export(opened, file)
+        export_rows(opened, file)
     return file.read_text(encoding="utf-8")
 
 
 def whole(book, campaign):
     """That every chunk is in once, with a right checksum."""
-    jobs = [
-        (job.cell, job.number) for c in range(len(campaign.cells)) for job in plan.chunks(campaign, c, campaign.rows)
-    ]
+    cells, planned = range(len(campaign.cells)), plan.planned(campaign)
+    jobs = [(job.cell, job.number) for cell in cells for job in planned.chunks(cell, campaign.rows)]
     with Ledger.open(book, write=False) as opened:
         assert opened.done() == set(jobs)
     with sqlite3.connect(book) as raw:
@@ -131,7 +132,7 @@ def test_ctrl_c_stops_at_once_and_says_how_to_go_on(call, long, tmp_path):
     assert process.returncode == 130
     assert f"microrad campaign resume {book}" in err and "Traceback" not in err
     assert workers and gone(*workers)
-    assert summarise(book).progress.state == "stopped"
+    assert summarise_campaign(book).progress.state == "stopped"
     assert call("campaign", "resume", book).code in (0, 1)
     assert table(book) == undisturbed
 
@@ -174,13 +175,13 @@ GRID = """
 @pytest.mark.parametrize("means", [{"threads": 1}, {"workers": 2 if OFTEN else 1}], ids=["one thread", "dask"])
 def test_one_thread_two_threads_and_dask_workers_give_the_same_bits(short, tmp_path, means):
     path, campaign, undisturbed = short
-    assert len(plan.chunks(campaign, 0, campaign.rows)) > 2
+    assert len(plan.planned(campaign).chunks(0, campaign.rows)) > 2
     assert table(begun(tmp_path, path, **means)) == undisturbed
 
 
 def test_rows_by_themselves_and_in_any_chunk_are_the_same(short):
     _, campaign, _ = short
-    evaluator = work.Evaluator(campaign, Builder(campaign), {}, dict(enumerate(run.controllers(campaign, _quiet))))
+    evaluator = Evaluator(campaign, dict(enumerate(controllers(campaign, _quiet))))
     together = evaluator.rows(1, range(5, 9), _still)
     apart = [evaluator.rows(1, range(row, row + 1), _still) for row in range(5, 9)]
     joined = records.joined(Job(1, 0), apart)
@@ -269,10 +270,10 @@ def test_another_mission_or_campaign_is_refused_with_both_hashes(short, tmp_path
         (tmp_path / name).write_text(text + "\n# changed\n", encoding="utf-8")
         now = bundle.hashes(load_campaign(tmp_path / "campaign.toml"))
         with pytest.raises(CampaignError) as error:
-            run.resume(book, run.Means(threads=1))
+            run.resume_campaign(book, run.Means(threads=1))
         assert kept[key] in str(error.value) and now[key] in str(error.value)
         (tmp_path / name).write_text(text, encoding="utf-8")
-    run.resume(book, run.Means(threads=1))
+    run.resume_campaign(book, run.Means(threads=1))
 
 
 def test_other_code_is_refused_with_both_hashes(short, tmp_path):
@@ -306,7 +307,7 @@ weights = [9, 1]
         assert old in campaign_text
         campaign_text = campaign_text.replace(old, new)
     path.write_text(campaign_text, encoding="utf-8")
-    found = summarise(begun(tmp_path))
+    found = summarise_campaign(begun(tmp_path))
     reasons = {failed.row: failed for _, failed in found.failed}
     power, duration = found.sample["communication.transmit_power"], found.sample["fine_pointing.duration"]
     raising, endless = power <= 0.0, (duration == duration.max()) & (power > 0.0)
@@ -319,7 +320,7 @@ weights = [9, 1]
     good = ~(raising | endless)
     assert np.isfinite(found.sample["margin"][good]).all() and np.isnan(found.sample["margin"][~good]).all()
     campaign = load_campaign(path)
-    evaluator = work.Evaluator(campaign, Builder(campaign), {}, dict(enumerate(run.controllers(campaign, _quiet))))
+    evaluator = Evaluator(campaign, dict(enumerate(controllers(campaign, _quiet))))
     for row in np.flatnonzero(good)[:3]:
         alone = evaluator.rows(0, range(row, row + 1), _still)
         assert alone.columns["margin"][0] == found.sample["margin"][row]
@@ -327,9 +328,9 @@ weights = [9, 1]
 
 def test_a_row_without_a_number_is_tried_again_by_itself_and_then_blamed(tmp_path, monkeypatch):
     campaign = load_campaign(campaign_file(tmp_path, runs=4))
-    evaluator = work.Evaluator(campaign, Builder(campaign), {}, dict(enumerate(run.controllers(campaign, _quiet))))
+    evaluator = Evaluator(campaign, dict(enumerate(controllers(campaign, _quiet))))
     good = evaluator.rows(0, range(4), _still)
-    asked, outputs = [], work.evaluate.outputs
+    asked, outputs = [], evaluate.outputs
 
     def broken(file, runs, keep):
         found = outputs(file, runs, keep)
@@ -338,7 +339,7 @@ def test_a_row_without_a_number_is_tried_again_by_itself_and_then_blamed(tmp_pat
             return found | {"margin": float("nan")}
         return found
 
-    monkeypatch.setattr(work.evaluate, "outputs", broken)
+    monkeypatch.setattr(evaluate, "outputs", broken)
     found = evaluator.rows(0, range(4), _still)
     (failed,) = found.failed
     assert (failed.row, failed.attempts, failed.reason) == (2, 2, "gives nan for margin")
@@ -356,12 +357,14 @@ class _Fragile:
     def outcomes(self, jobs):
         for job in jobs:
             self.asked.append(job)
-            rows = plan.rows_of(self.evaluator.campaign, job.number)
+            rows = plan.planned(self.evaluator.campaign).rows_of(job.number)
             rows = range(job.row, job.row + 1) if job.kind == "row" else rows
             if job.kind != "trace" and self.deadly in rows:
                 yield Outcome(job, "died", reason="the worker was killed by signal 9")
             elif job.kind != "trace":
-                yield Outcome(job, "done", blob.pack_chunk(self.evaluator.rows(0, rows, _still, number=job.number)))
+                yield Outcome(
+                    job, "done", chunk_format.pack_chunk(self.evaluator.rows(0, rows, _still, number=job.number))
+                )
 
     def close(self):
         pass
@@ -370,15 +373,15 @@ class _Fragile:
 def test_a_row_that_takes_its_worker_down_is_found_and_the_rest_of_its_chunk_kept(tmp_path, monkeypatch):
     path = campaign_file(tmp_path, runs=4 * kernels.LANES, duration="10 s")
     campaign = load_campaign(path)
-    rows = plan.chunk_rows(campaign)
+    rows = plan.planned(campaign).chunk_rows
     assert campaign.rows > rows
-    evaluator = work.Evaluator(campaign, Builder(campaign), {}, dict(enumerate(run.controllers(campaign, _quiet))))
+    evaluator = Evaluator(campaign, dict(enumerate(controllers(campaign, _quiet))))
     evaluator = _Cheap(evaluator)
     engine = _Fragile(evaluator, deadly=rows + 3)
     monkeypatch.setattr(run.Means, "engine", lambda self, spec, late_s: engine)
     book = begun(tmp_path)
     whole(book, campaign)
-    found = summarise(book)
+    found = summarise_campaign(book)
     ((_, failed),) = found.failed
     assert (failed.row, failed.attempts) == (rows + 3, 2) and "signal 9" in failed.reason
     times = [(job.kind, job.row if job.kind == "row" else job.number) for job in engine.asked]
@@ -396,9 +399,9 @@ class _Cheap:
     def rows(self, cell, rows, beat, number=0):
         drawn = self.evaluator._drawn(cell, rows)
         columns = {"row": np.array(rows, dtype=float), "weight": drawn.weight, **drawn.columns}
-        columns |= {output.name: np.ones(len(rows)) for output in plan.outputs(self.campaign)}
+        columns |= {output.name: np.ones(len(rows)) for output in self.campaign.outputs}
         survival = np.linspace(1.0, 0.0, kernels.BINS) * len(rows)
-        return blob.Chunk(cell, number, columns, (), survival, survival**2 / len(rows))
+        return chunk_format.Chunk(cell, number, columns, (), survival, survival**2 / len(rows))
 
 
 # ----------------------------------------------------------------------------------------------------------- precision
@@ -415,18 +418,16 @@ at_most = {most}
 @pytest.mark.usefixtures("rows_here")
 def test_it_stops_when_the_wanted_quantile_is_known_well_enough(tmp_path):
     path = campaign_file(tmp_path, runs=64, more=PRECISION.format(width="0.02 dB", most=20_000))
-    found = summarise(begun(tmp_path, path))
+    found = summarise_campaign(begun(tmp_path, path))
     median = found.cells[0].outputs["margin"].quantiles[0.5]
     campaign = load_campaign(path)
-    rounds = plan.rounds(campaign)
+    rounds = plan.planned(campaign).rounds
     assert found.progress.state == "complete" and found.cells[0].rows in rounds[:-1]
     assert (median.high - median.low) / 2.0 <= 0.02
     before = rounds[rounds.index(found.cells[0].rows) - 1] if found.cells[0].rows > rounds[0] else None
     if before is not None:
         with Ledger.open(tmp_path / "campaign.ledger", write=False) as book:
-            from microrad.campaign import summary
-
-            assert not summary.reached(campaign, book, 0, before)
+            assert not is_precise(campaign, book, 0, before)
 
 
 RADIUS = """
@@ -443,7 +444,7 @@ at_most = 1024
 @pytest.mark.parametrize(("width", "rounds_done"), [("1 mrad", 1), ("0.0001 nrad", 0)])
 def test_a_precision_of_the_radial_error_counts_the_time_of_all_rows(tmp_path, width, rounds_done):
     path = campaign_file(tmp_path, runs=256, more=RADIUS.format(width=width))
-    rounds = plan.rounds(load_campaign(path))
-    found = summarise(begun(tmp_path, path))
+    rounds = plan.planned(load_campaign(path)).rounds
+    found = summarise_campaign(begun(tmp_path, path))
     assert found.cells[0].rows == rounds[rounds_done - 1] and len(rounds) > 1
     assert found.progress.state == "complete"

@@ -7,9 +7,11 @@ import pytest
 from scipy import stats
 
 from campaign_files import HEAD, IDENTIFIED, LOOP, POWER, loaded, written
-from microrad.campaign import distributions, sampling
-from microrad.campaign.distributions import LogUniform, Normal, OneOf, Uniform
+from microrad.campaign.definition import distributions
+from microrad.campaign.definition.distributions import LogUniform, Normal, OneOf, Uniform
+from microrad.campaign.definition.reader import block_rows
 from microrad.campaign.file import load_campaign
+from microrad.campaign.rows import sampling
 from microrad.core import lti
 from microrad.mirror import spread as mirror_spread
 
@@ -105,7 +107,7 @@ def test_words_at_the_ends_of_their_range_stay_inside():
 # ---------------------------------------------------------------------------------------------------------- even cubes
 @pytest.mark.parametrize(("runs", "block"), [(1, 16), (100, 16), (128, 16), (256, 32), (2048, 256), (10**6, 4096)])
 def test_a_block_is_an_eighth_of_the_runs_within_bounds(runs, block):
-    assert sampling.block_rows(runs) == block
+    assert block_rows(runs) == block
 
 
 def strata(points):

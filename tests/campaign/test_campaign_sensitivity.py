@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 from scipy import stats
 
 from microrad.campaign.records import Sensitivity
-from microrad.campaign.sensitivity import MOST_ROWS, sensitivity
+from microrad.campaign.statistics.sensitivity import MOST_ROWS, sensitivity
 from microrad.core.arrays import Floats
 from truths import philox
 

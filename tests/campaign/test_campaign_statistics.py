@@ -8,8 +8,8 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy import stats
 
-from microrad.campaign.sketch import LARGEST, RELATIVE_ERROR, SMALLEST, Sketch
-from microrad.campaign.statistics import (
+from microrad.campaign.definition.outputs import OUTPUTS
+from microrad.campaign.statistics.intervals import (
     Fold,
     Moments,
     mean_interval,
@@ -18,6 +18,7 @@ from microrad.campaign.statistics import (
     quantile_interval,
     share_interval,
 )
+from microrad.campaign.statistics.sketch import LARGEST, RELATIVE_ERROR, SMALLEST, Sketch
 from microrad.core.arrays import Floats
 from truths import philox
 
@@ -241,7 +242,7 @@ def test_a_fold_does_not_depend_on_where_chunks_end() -> None:
         parts.add(begin, values[begin:end])
     assert (whole.blocks.count, parts.blocks.count) == (4, 4)
     assert_allclose(parts.mean(0.95).high, whole.mean(0.95).high, rtol=1e-13)
-    summary = parts.summary("margin", "dB", "the margin", (0.5, 0.003), 0.95)
+    summary = parts.summary(OUTPUTS["margin"], (0.5, 0.003), 0.95)
     assert (summary.rows, summary.counts.sum()) == (254, pytest.approx(254.0))
     assert summary.quantiles[0.5].low < summary.quantiles[0.5].value < summary.quantiles[0.5].high
     assert summary.sketch_error == RELATIVE_ERROR
@@ -262,7 +263,7 @@ def test_a_block_with_missing_chunks_is_no_draw_of_the_mean() -> None:
 def test_a_fold_of_no_good_rows_has_a_summary() -> None:
     fold = Fold(block=16)
     fold.add(0, np.full(16, math.nan))
-    summary = fold.summary("margin", "dB", "the margin", (0.5,), 0.95)
+    summary = fold.summary(OUTPUTS["margin"], (0.5,), 0.95)
     assert summary.rows == summary.counts.size == 0
     assert math.isnan(summary.mean.value)
     assert math.isnan(summary.quantiles[0.5].value)

@@ -1,4 +1,4 @@
-"""Tails of the radial error: how often their intervals hold the truth, of toy processes, of tilted draws, of a loop."""
+"""Tails of the radial error: how often their intervals hold the truth, of toy processes, weighted draws and a loop."""
 
 import math
 import os
@@ -14,16 +14,17 @@ from scipy.special import i0e
 
 import budgets
 from microrad import link
-from microrad.campaign import evaluate, loops, run, tails, tilt
-from microrad.campaign.definition import CampaignFile
+from microrad.campaign import run
+from microrad.campaign.definition.records import CampaignFile
 from microrad.campaign.file import load_campaign
-from microrad.campaign.inputs import Builder
 from microrad.campaign.ledger import Ledger
 from microrad.campaign.records import Chunk, Interval
-from microrad.campaign.statistics import proportion_interval
-from microrad.campaign.summary import summarise
-from microrad.campaign.tails import tail_of_time, tail_weighted
-from microrad.campaign.work import Evaluator
+from microrad.campaign.rows import evaluate, importance_sampling, loops
+from microrad.campaign.rows.evaluator import Evaluator
+from microrad.campaign.statistics import tails
+from microrad.campaign.statistics.intervals import proportion_interval
+from microrad.campaign.statistics.summary import summarise_campaign
+from microrad.campaign.statistics.tails import tail_of_time, tail_weighted
 from microrad.core.arrays import Floats
 from microrad.core.threads import in_threads
 from microrad.loop.fine_loop import linear
@@ -115,8 +116,8 @@ def test_what_few_rows_cannot_tell_is_not_known() -> None:
         tail_of_time(share[0], share[0], 0, EDGES, (0.3,), 0.99)
 
 
-# -------------------------------------------------------------------------------------------------------- tilted draws
-def tilted(seed: int, draws: int, shift: float) -> tuple[Floats, Floats]:
+# ------------------------------------------------------------------------------------------------------ weighted draws
+def weighted(seed: int, draws: int, shift: float) -> tuple[Floats, Floats]:
     """Radii of two normal numbers that are shifted in any direction, and the logarithm of their weights."""
     random = philox(1000 * 16 + seed)
     angle = random.uniform(0.0, 2.0 * math.pi, draws)
@@ -129,7 +130,7 @@ def test_interval_of_a_weighted_tail_holds_rayleighs_quantile(draws: int, miss: 
     probability, held, widths = 1e-6, 0, []
     exact = math.sqrt(-2.0 * math.log(probability))
     for seed in range(200):
-        tail = tail_weighted(*tilted(seed, draws, miss * exact), [probability], 0.99)
+        tail = tail_weighted(*weighted(seed, draws, miss * exact), [probability], 0.99)
         found = tail.wanted[probability]
         held += holds(found, exact)
         widths.append(found.high - found.low)
@@ -138,12 +139,12 @@ def test_interval_of_a_weighted_tail_holds_rayleighs_quantile(draws: int, miss: 
     assert np.median(widths) < 0.12 * exact  # 9 % of the radius is a factor of 10 in probability
 
 
-def test_draws_that_are_not_tilted_know_nothing_of_a_rare_tail() -> None:
-    tail = tail_weighted(*tilted(1, 640, 0.0), (0.5, 1e-6), 0.99)
+def test_draws_that_are_not_weighted_know_nothing_of_a_rare_tail() -> None:
+    tail = tail_weighted(*weighted(1, 640, 0.0), (0.5, 1e-6), 0.99)
     assert tail.wanted[0.5].low < math.sqrt(2.0 * math.log(2.0)) < tail.wanted[0.5].high
     assert math.isnan(tail.wanted[1e-6].high)
     assert tail.effective_runs == pytest.approx(640, rel=0.02)
-    many = tail_weighted(*tilted(1, 5000, 5.0), (1e-6,), 0.99)
+    many = tail_weighted(*weighted(1, 5000, 5.0), (1e-6,), 0.99)
     assert many.radius_rad.size <= 200
     assert np.all((many.low <= many.survival) & (many.survival <= many.high))
     with pytest.raises(ValueError, match="no draws"):
@@ -156,15 +157,15 @@ def rayleigh(probability: float, sigma: float = 1.0) -> float:
 
 
 def mixed(seed: int, draws: int, aim: float) -> tuple[Floats, Floats]:
-    """Radii drawn as tilted runs of a linear loop draw them, aimed at a probability, and the logarithm of weights."""
+    """Radii drawn as weighted runs of a linear loop draw them, aimed at a probability, and the logarithm of weights."""
     level = -math.log(aim)
-    by = tilt.Tilt(0, np.zeros((1, 1, 1)), np.zeros((1, 1, 1)), np.ones(2), level - 0.3, level + 1.0)
-    found = [tilt.drawn(by, 5000 + seed, LANES * batch) for batch in range(draws // LANES)]
+    by = importance_sampling.Proposal(0, np.zeros((1, 1, 1)), np.zeros((1, 1, 1)), np.ones(2), level - 0.3, level + 1.0)
+    found = [importance_sampling.drawn(by, 5000 + seed, LANES * batch) for batch in range(draws // LANES)]
     return np.concatenate([np.hypot(*unit) for unit, _ in found]), np.concatenate([weight for _, weight in found])
 
 
 @pytest.mark.parametrize("draws", [64, 256])
-def test_intervals_of_tilted_draws_hold_at_all_radii(draws: int) -> None:
+def test_intervals_of_weighted_draws_hold_at_all_radii(draws: int) -> None:
     """Also where the weighted share is near 1, and those of the probability beyond a radius."""
     probabilities = (0.9, 0.5, 0.1, 1e-3, 1e-6)
     radii, repetitions = {p: rayleigh(p) for p in probabilities}, 100
@@ -242,8 +243,8 @@ class Slow:
         campaign = self.campaign("1 s")
         self.axis = loops.tuned(campaign.mission, campaign.table.loop)
         loop = loops.row_loop(campaign.mission, campaign.table.loop)
-        held = loops.held(loops.scene(campaign.mission, campaign.table.loop), campaign.table.loop, self.axis)
-        covariance = tilt.end_covariance(linear.close(loop, held), 5000)
+        held = loops.cell_controller(campaign.mission, campaign.table.loop, self.axis)
+        covariance = importance_sampling.end_covariance(linear.close(loop, held), 5000)
         assert covariance == pytest.approx(covariance[0, 0] * np.eye(2), abs=1e-9 * covariance[0, 0])
         self.sigma = math.sqrt(covariance[0, 0])
 
@@ -256,7 +257,7 @@ class Slow:
     def chunk(self, campaign: CampaignFile, rows: range, seed: int = 1) -> Chunk:
         """These rows under another seed."""
         seeded = replace(campaign, table=campaign.table.model_copy(update={"seed": seed}))
-        found = Evaluator(seeded, Builder(seeded), {}, {0: self.axis}).rows(0, rows, lambda: None)
+        found = Evaluator(seeded, {0: self.axis}).rows(0, rows, lambda: None)
         assert not found.failed
         return found
 
@@ -320,8 +321,8 @@ def test_a_campaign_says_how_likely_its_error_is(slow: Slow) -> None:
     exact = rayleigh(1e-6, slow.sigma)
     tables = f'[tail]\nerror = "{exact * 1e6:.6f} urad"\nprobability = 1e-5\n'
     campaign, book = slow.campaign("0.3 s", tables), slow.folder / "tail.ledger"
-    run.begin(campaign.path, book, run.Means(threads=2))
-    found = summarise(book)
+    run.run_campaign(campaign.path, book, run.Means(threads=2))
+    found = summarise_campaign(book)
     (cell,) = found.cells
     assert cell.tail is not None
     ((error, past),) = cell.tail.beyond.items()

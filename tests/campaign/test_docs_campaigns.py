@@ -17,8 +17,13 @@ import pytest
 
 from command_line import Result
 from microrad import cli
-from microrad.campaign import bundle, cluster, run, sampling, sensitivity, sketch, tables
+from microrad.campaign import bundle, run
+from microrad.campaign.definition import tables
+from microrad.campaign.definition.reader import block_rows
+from microrad.campaign.engines import cluster
 from microrad.campaign.file import load_campaign
+from microrad.campaign.rows import sampling
+from microrad.campaign.statistics import sensitivity, sketch
 from places import ROOT
 from small_campaign import without_worker
 from waiting import HANG_S
@@ -247,7 +252,7 @@ def test_figures_of_the_page_are_those_of_the_program():
     assert sketch.RELATIVE_ERROR == 5e-4
     assert (sensitivity.SURROGATE_Q2, sensitivity.FEWEST_ROWS, sensitivity.MOST_ROWS) == (0.8, 64, 20_000)
     told("an eighth of the runs, a power of two from 16 to 4096", "no sign of life for `row_limit` and 30 s more")
-    assert [sampling.block_rows(runs) for runs in (1, 512, 10**6)] == [16, 64, 4096]
+    assert [block_rows(runs) for runs in (1, 512, 10**6)] == [16, 64, 4096]
     assert run.LATE_S == 30.0
     told("`row_limit` (5 min)", "`worst` (3)")
     fields = tables.CampaignTable.model_fields

@@ -11,9 +11,9 @@ import pytest
 
 from campaign_files import HEAD, POWER, written
 from command_line import listing
-from microrad.campaign import mending, run
+from microrad.campaign import run
 from microrad.campaign.file import load_campaign
-from microrad.campaign.ledger import Ledger
+from microrad.campaign.ledger import Ledger, mending
 from microrad.cli.campaign import campaigns
 from small_campaign import without_worker
 
@@ -53,7 +53,7 @@ def done(tmp_path_factory):
     folder = tmp_path_factory.mktemp("a done one")
     with pytest.MonkeyPatch.context() as patch:
         without_worker(patch)
-        run.begin(written(folder, LINKS, whole=False), folder / "campaign.ledger", run.Means(threads=1))
+        run.run_campaign(written(folder, LINKS, whole=False), folder / "campaign.ledger", run.Means(threads=1))
     (folder / "campaign.ledger.lock").unlink()
     return folder
 
@@ -155,7 +155,7 @@ def test_what_is_no_address_of_a_scheduler_is_refused(there, refused, address):
 
 
 def test_a_scheduler_that_is_not_there_leaves_no_ledger_behind(there, refused, monkeypatch):
-    monkeypatch.setattr("microrad.campaign.cluster._CONNECT_S", 1.0)
+    monkeypatch.setattr("microrad.campaign.engines.cluster._CONNECT_S", 1.0)
     address = "tcp://127.0.0.1:1"
     said = refused("campaign", "run", "campaign.toml", "--ledger", "new.ledger", "--scheduler", address)
     assert said.count("\n") == 1 and f"no scheduler answers at {address}" in said
@@ -253,7 +253,7 @@ def test_an_interrupt_says_how_to_go_on(there, call, monkeypatch):
     assert (shown.code, shown.out) == (130, "")
     assert re.search(r"stopped; \d+ rows are in my rows.ledger. Go on with: microrad campaign resume 'my", shown.err)
     with monkeypatch.context() as patched:  # after the rows, while they are read
-        patched.setattr("microrad.campaign.summary.summarise", interrupt)
+        patched.setattr("microrad.campaign.statistics.summary.summarise_campaign", interrupt)
         shown = call("campaign", "resume", "my rows.ledger", "--threads", 1)
     assert shown.code == 130 and "Go on with: microrad campaign resume 'my rows.ledger'" in shown.err
     with monkeypatch.context() as patched:  # before there is a ledger

@@ -12,9 +12,9 @@ from pathlib import Path
 _FLAG = Path(os.environ.get("MICRORAD_TEST_HALT", os.devnull))
 
 if "campaign" in sys.orig_argv and _FLAG.is_file():
-    from microrad.campaign.run import _Run
+    from microrad.campaign.run import _Runner
 
-    _keep = _Run._keep
+    _keep = _Runner._keep
 
     def _keep_and_halt(run, job, payload):
         _keep(run, job, payload)
@@ -22,4 +22,4 @@ if "campaign" in sys.orig_argv and _FLAG.is_file():
             _FLAG.unlink()
             os.kill(os.getpid(), signal.SIGSTOP)
 
-    _Run._keep = _keep_and_halt
+    _Runner._keep = _keep_and_halt

@@ -23,8 +23,8 @@ from microrad.lab.identify import (
     predict,
 )
 from microrad.lab.identify.hysteresis.bouc_wen import _bound_gradient
-from microrad.lab.identify.ladder.choice import _best
-from microrad.lab.identify.prepared import colour_inflation, fastest_rate, prepare, transient
+from microrad.lab.identify.records import colour_inflation, fastest_rate, si_records, transient
+from microrad.lab.identify.selection.choice import choose_best
 from microrad.lab.recording import read_recording, recording_from_arrays
 from microrad.mission.file import load_mirror
 from places import DATA
@@ -350,7 +350,7 @@ def test_fastest_rate_ignores_spikes_and_noise():
     drive = clean.drive[:, 0] + 0.003 * philox(2).standard_normal(clean.samples)
     drive[1000] += 2.0
     for r in (clean, replace(clean, drive=drive[:, None])):
-        assert fastest_rate(prepare([r], Units())) == pytest.approx(exact, rel=0.02)
+        assert fastest_rate(si_records([r], Units())) == pytest.approx(exact, rel=0.02)
     assert np.max(np.abs(np.diff(drive))) * RATE_HZ > 10 * exact
 
 
@@ -413,7 +413,7 @@ def test_other_refusals(fit_100hz):
 
 def test_a_drive_of_steps_has_a_rate():
     drive = np.where(np.sin(2 * np.pi * 7 * np.arange(2000) / 1000) > 0, 1.0, 0.0)
-    assert fastest_rate(prepare([recording_from_arrays(drive, drive, 1000.0)], Units())) > 100
+    assert fastest_rate(si_records([recording_from_arrays(drive, drive, 1000.0)], Units())) > 100
     assert identify([recording_from_arrays(drive, drive + 0.01 * philox(1).standard_normal(2000), 1000.0)]).warnings
 
 
@@ -506,9 +506,9 @@ def test_a_tie_goes_to_the_admissible_model(fit_100hz, extra, best):
     noise, other = philox(1).standard_normal((2, 1000))
     good, near, bad = [noise], [noise + extra * other], [noise + 2 * other]
     assert np.sum(good[0] ** 2) < np.sum(near[0] ** 2)
-    assert _best([fit_100hz, admissible, admissible], [good, near, bad]) == best
-    assert _best([admissible, fit_100hz, admissible], [good, near, bad]) == 0
-    assert _best([fit_100hz, fit_100hz], [near, good]) == 1
+    assert choose_best([fit_100hz, admissible, admissible], [good, near, bad]) == best
+    assert choose_best([admissible, fit_100hz, admissible], [good, near, bad]) == 0
+    assert choose_best([fit_100hz, fit_100hz], [near, good]) == 1
 
 
 def test_progress_of_the_whole():

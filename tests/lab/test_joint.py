@@ -18,11 +18,11 @@ from microrad.lab.identify import (
     predict,
 )
 from microrad.lab.identify.hysteresis import joint
-from microrad.lab.identify.hysteresis.axis import LinearPoles, Roots, poles_of, propagated
-from microrad.lab.identify.hysteresis.joint import thinned, time_constants
+from microrad.lab.identify.hysteresis.joint import thin_record, time_constants
 from microrad.lab.identify.hysteresis.plant_fit import fit_plant, runs
 from microrad.lab.identify.hysteresis.prandtl_ishlinskii import threshold_grid
-from microrad.lab.identify.prepared import prepare
+from microrad.lab.identify.hysteresis.structures import LinearPoles, Roots, poles_of, propagated
+from microrad.lab.identify.records import si_records
 from microrad.lab.recording import read_recording
 from microrad.mirror import model as mirror
 from places import DATA
@@ -185,7 +185,7 @@ def test_without_its_tail_an_older_creep_would_bias_the_weights():
     """With an offset alone beside it, the same structure leaves twice the noise and moves a weight by many errors."""
     record = crept(0.0)
     fit = fit_joint([record], "prandtl_ishlinskii_creep", UNITS)
-    (prepared,) = prepare([record], UNITS)
+    (prepared,) = si_records([record], UNITS)
     offset_only = runs([replace(record, output=1e-3 * record.output)], drop=prepared.start)
     without = fit_plant(fit.structure, offset_only)
     assert without.residual_rms[0, 0] > 2 * fit.residual_rms_rad
@@ -203,7 +203,7 @@ def test_creep_beside_a_resonance():
 def test_time_constants_are_decades_that_the_records_show():
     def times(samples, rate_hz):
         drive = two_sines(samples, rate_hz, 10 * rate_hz / samples)
-        return time_constants(prepare([recorded(drive, drive * 1e-4, rate_hz)], UNITS))
+        return time_constants(si_records([recorded(drive, drive * 1e-4, rate_hz)], UNITS))
 
     assert times(3000, 1000.0) == (0.01, 0.1, 1.0)
     assert times(4000, 1000.0) == (0.01, 0.1, 1.0, 10.0)
@@ -285,7 +285,7 @@ def test_the_classical_exponent_is_recovered():
 @pytest.fixture(scope="module")
 def paper_loops():
     plan = bench.load_plan("paper-experiment")
-    whole = bench.play(bench.only(plan, ["loop-60hz", "loop-100hz"]), seed=1)
+    whole = bench.play(bench.select_records(plan, ["loop-60hz", "loop-100hz"]), seed=1)
     return [replace(r, drive=r.drive[:2000], output=r.output[:2000]) for r in whole]
 
 
@@ -330,13 +330,13 @@ def test_a_long_record_does_not_drown_a_short_one():
 def test_thinning_keeps_the_fit_and_never_bends_the_drive(monkeypatch):
     drive = two_sines(20_000, 10_000.0)
     record = recorded(drive, plays(drive, THRESHOLDS, WEIGHTS), 10_000.0, noise=1e-4)
-    (prepared,) = prepare([record], UNITS)
+    (prepared,) = si_records([record], UNITS)
     whole = fit_joint([record], "prandtl_ishlinskii_joint", UNITS)
-    assert thinned(prepared) is not None
-    assert thinned(prepared).drive_v.size == 20_000
+    assert thin_record(prepared) is not None
+    assert thin_record(prepared).drive_v.size == 20_000
 
     monkeypatch.setattr(joint, "_MOST_SAMPLES", 2500)
-    fewer = thinned(prepared)
+    fewer = thin_record(prepared)
     assert fewer.drive_v.size == 2500
     assert fewer.step_s == pytest.approx(8e-4)
     assert fewer.start == math.ceil(prepared.start / 8)
@@ -349,11 +349,11 @@ def test_thinning_keeps_the_fit_and_never_bends_the_drive(monkeypatch):
     assert 0 < np.max(np.abs(responses[0] - responses[1])) < 2e-4 * np.ptp(responses[0])
 
     rough = two_sines(20_000, 10_000.0, freq_hz=300.0)
-    (kept,) = prepare([recorded(rough, rough * 1e-4, 10_000.0)], UNITS)
-    assert thinned(kept).drive_v.size == 20_000
+    (kept,) = si_records([recorded(rough, rough * 1e-4, 10_000.0)], UNITS)
+    assert thin_record(kept).drive_v.size == 20_000
     corner = 5.0 + np.abs((np.arange(20_000) / 100) % 2 - 1)  # a triangle of 200 samples a period
-    (kept,) = prepare([recorded(corner, corner * 1e-4, 10_000.0)], UNITS)
-    assert thinned(kept).drive_v.size in (10_000, 5_000, 2_500)
+    (kept,) = si_records([recorded(corner, corner * 1e-4, 10_000.0)], UNITS)
+    assert thin_record(kept).drive_v.size in (10_000, 5_000, 2_500)
 
 
 # --------------------------------------------------------------------------------------------------------- predictions

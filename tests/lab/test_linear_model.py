@@ -1,5 +1,6 @@
 """The linear model: the paper's chirp, order, polish, uncertainty, warnings, and the real CubeSpec mirror."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -10,11 +11,11 @@ from microrad.core import lti
 from microrad.lab.identify.linear import order
 from microrad.lab.identify.linear.amplitude import amplitude_dependence
 from microrad.lab.identify.linear.fit import (
-    at,
     fit_linear,
     fit_percent,
     output_error,
     parameter_covariance,
+    transfer_matrix,
     transmission_zeros,
 )
 from microrad.lab.identify.linear.modal import ModalModel, order_modes, simulate, simulate_periodic
@@ -29,7 +30,7 @@ from microrad.lab.identify.linear.polish import (
 )
 from microrad.lab.identify.linear.response import response_from_periods
 from microrad.lab.identify.linear.vector_fitting import vector_fit
-from microrad.lab.identify.prepared import IdentificationError
+from microrad.lab.identify.records import IdentificationError, rounded_to_error
 from microrad.lab.recording import Recording, multisine_recordings
 from places import DATA
 
@@ -358,9 +359,9 @@ def test_transmission_zeros():
     zeros = transmission_zeros(truth, 1e5)
     assert zeros.size > 0
     for zero in zeros:
-        size = np.linalg.svd(at(truth, np.array([zero]))[0], compute_uv=False)
+        size = np.linalg.svd(transfer_matrix(truth, np.array([zero]))[0], compute_uv=False)
         assert size[-1] < 1e-6 * size[0]
-    off = np.linalg.svd(at(truth, zeros[:1] * 1.1)[0], compute_uv=False)
+    off = np.linalg.svd(transfer_matrix(truth, zeros[:1] * 1.1)[0], compute_uv=False)
     assert off[-1] > 1e-4 * off[0]
     wide = ModalModel(truth.poles_rad_s, truth.input_vectors[:, :1], truth.output_vectors, truth.direct[:, :1])
     assert transmission_zeros(wide, 1e5).size == 0
@@ -432,3 +433,22 @@ def test_cubespec_softens_with_amplitude(cubespec):
     assert -3.3 < change.resonance_shift_hz < -2.3
     assert (change.damping_ratio > 0.005).all()
     assert (change.damping_ratio < 0.02).all()
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "shown"),
+    [
+        (11.736, 8.04, "11.7"),
+        (5330.9, 3400.0, "5300"),
+        (2542.1, 13.2, "2542"),
+        (0.065431, 0.0013, "0.0654"),
+        (0.065431, 0.00996, "0.065"),
+        (-3.2036812e-7, 4.2e-8, "-3.2e-07"),
+        (-0.3, 50.0, "0"),
+        (38.114738, 1e-9, "38.115"),
+        (38.114738, 0.0, "38.115"),
+        (38.114738, math.nan, "38.115"),
+    ],
+)
+def test_a_value_is_printed_with_the_digits_that_its_error_leaves(value, error, shown):
+    assert rounded_to_error(value, error) == shown

@@ -7,18 +7,18 @@ import pytest
 from numpy.testing import assert_allclose
 
 from microrad.lab.identify import IdentificationError
-from microrad.lab.identify.hysteresis.axis import hysteretic_oscillator
 from microrad.lab.identify.hysteresis.plant_fit import (
+    FitRecord,
     Parameter,
     Problem,
-    Run,
     Structure,
     _covariance,
     fit_plant,
-    runs,
-    simulate,
+    fit_records,
+    simulate_record,
     upsampled,
 )
+from microrad.lab.identify.hysteresis.structures import hysteretic_oscillator
 from microrad.lab.recording import read_recording, recording_from_arrays
 from microrad.mirror import model as mirror
 from places import DATA
@@ -72,13 +72,13 @@ def fine_multisine(samples, times, seed):
 
 
 def predicted(fit, drive, step_s):
-    run = Run("unseen", drive[:, None].copy(), np.zeros((drive.size, 1)), step_s, 1, 0, np.zeros((drive.size, 0)))
-    return simulate(mirror.discretise(fit.mirror, step_s), run)[:, 0]
+    run = FitRecord("unseen", drive[:, None].copy(), np.zeros((drive.size, 1)), step_s, 1, 0, np.zeros((drive.size, 0)))
+    return simulate_record(mirror.discretise(fit.mirror, step_s), run)[:, 0]
 
 
 @pytest.fixture(scope="module")
 def benchmark():
-    return runs([read_benchmark()], factor=FINE, hold="band-limited")
+    return fit_records([read_benchmark()], factor=FINE, hold="band-limited")
 
 
 def read_benchmark():
@@ -133,16 +133,16 @@ def low_pass(seed=0, noise=1e-3, samples=2000):
     drive = np.cumsum(rng.standard_normal(samples)) * 0.3
     drive -= drive[0]
     truth = hysteretic_oscillator(2.0, 300.0, 5e4, 2e4, 300.0, 100.0)
-    run = Run("", drive[:, None].copy(), np.zeros((samples, 1)), 1e-3, 1, 0, np.zeros((samples, 0)))
+    run = FitRecord("", drive[:, None].copy(), np.zeros((samples, 1)), 1e-3, 1, 0, np.zeros((samples, 0)))
     plant = mirror.discretise(truth.build(np.array([p.start for p in truth.parameters])), 1e-3)
-    output = simulate(plant, run)[:, 0]
+    output = simulate_record(plant, run)[:, 0]
     return recording_from_arrays(drive, output + 5.0 + noise * output.std() * rng.standard_normal(samples), 1000.0)
 
 
 def test_standard_errors_match_the_scatter():
     truth = np.array([2.0, 300.0, 5e4, 2e4, 300.0, 100.0])
     structure = hysteretic_oscillator(*(1.1 * truth).tolist())
-    fits = [fit_plant(structure, runs([low_pass(seed, 0.01)], drop=20)) for seed in range(12)]
+    fits = [fit_plant(structure, fit_records([low_pass(seed, 0.01)], drop=20)) for seed in range(12)]
     scatter = (np.array([f.values for f in fits]) - truth) / np.array([f.standard_errors for f in fits])
     assert 0.5 < np.sqrt(np.mean(scatter**2)) < 1.6
     assert all(f.agreeing_starts == 1 for f in fits)
@@ -150,9 +150,9 @@ def test_standard_errors_match_the_scatter():
 
 def test_the_offset_of_a_sensor_is_no_parameter_and_drops_out():
     structure = hysteretic_oscillator(2.2, 270.0, 5.5e4, 1.8e4, 330.0, 90.0)
-    with_offset = fit_plant(structure, runs([low_pass(1, 0.0)]))
+    with_offset = fit_plant(structure, fit_records([low_pass(1, 0.0)]))
     assert_allclose(with_offset.values, [2.0, 300.0, 5e4, 2e4, 300.0, 100.0], rtol=1e-4)
-    held = fit_plant(structure, runs([low_pass(1, 0.0)], offset=False))
+    held = fit_plant(structure, fit_records([low_pass(1, 0.0)], offset=False))
     assert np.max(np.abs(held.values / with_offset.values - 1)) > 0.01
 
 
@@ -164,11 +164,11 @@ def test_what_is_not_identified_is_named():
         return base.build(np.array([*values[:2], values[2] + values[6], *values[3:6]]))
 
     twins = Structure("twins", (*base.parameters, Parameter("second stiffness", "N/m", 1e3)), build)
-    fit = fit_plant(twins, runs([low_pass(2)]))
+    fit = fit_plant(twins, fit_records([low_pass(2)]))
     named = dict(fit.not_identified)
     assert "second stiffness" in named
     assert fit.condition_number > 1e5
-    single = fit_plant(base, runs([low_pass(2)]))
+    single = fit_plant(base, fit_records([low_pass(2)]))
     assert "mass" not in dict(single.not_identified)
     assert single.condition_number < 1e3
 
@@ -177,7 +177,9 @@ def test_several_starts_are_counted():
     structure = hysteretic_oscillator(2.0, 300.0, 5e4, 2e4, 300.0, 100.0)
     near = np.array([2.1, 290.0, 5.2e4, 1.9e4, 320.0, 90.0])
     calls = []
-    fit = fit_plant(structure, runs([low_pass(3)]), starts=[near, 1.05 * near], on_progress=lambda *a: calls.append(a))
+    fit = fit_plant(
+        structure, fit_records([low_pass(3)]), starts=[near, 1.05 * near], on_progress=lambda *a: calls.append(a)
+    )
     assert len(fit.start_costs) == 3
     assert fit.agreeing_starts == 3
     assert [c[:2] for c in calls] == [(1, 3), (2, 3), (3, 3)]
@@ -193,11 +195,13 @@ def test_a_start_that_cannot_be_simulated_is_refused():
     with pytest.raises(
         IdentificationError, match=r"cannot be simulated from any start at a step of 0\.001 s; begin nearer"
     ):
-        fit_plant(Structure("stiff", structure.parameters, lambda _: frozen.build(np.zeros(0))), runs([low_pass(4)]))
+        fit_plant(
+            Structure("stiff", structure.parameters, lambda _: frozen.build(np.zeros(0))), fit_records([low_pass(4)])
+        )
 
 
 def test_a_slope_that_is_no_number_is_refused_and_no_fault_of_the_program():
-    problem = Problem(hysteretic_oscillator(2.0, 300.0, 5e4, 2e4, 300.0, 100.0), runs([low_pass(3)]))
+    problem = Problem(hysteretic_oscillator(2.0, 300.0, 5e4, 2e4, 300.0, 100.0), fit_records([low_pass(3)]))
     slopes = np.ones((20, 6))
     assert np.isfinite(_covariance(slopes, np.ones(20), problem)[0]).all()
     slopes[3, 2] = 1e200
@@ -207,7 +211,7 @@ def test_a_slope_that_is_no_number_is_refused_and_no_fault_of_the_program():
 
 def test_nothing_left_to_fit_is_refused():
     with pytest.raises(IdentificationError, match="2000 samples, of which the first 2000 are left out"):
-        runs([low_pass(0)], drop=2000)
+        fit_records([low_pass(0)], drop=2000)
 
 
 @pytest.mark.parametrize("hold", ["linear", "band-limited"])

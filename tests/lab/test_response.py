@@ -9,7 +9,7 @@ import pytest
 from microrad.core import lti
 from microrad.lab.identify.linear.modal import order_modes, simulate
 from microrad.lab.identify.linear.response import response_from_periods, response_from_records
-from microrad.lab.identify.prepared import IdentificationError
+from microrad.lab.identify.records import IdentificationError
 from microrad.lab.recording import Recording
 
 RATE_HZ = 10_000.0

@@ -8,7 +8,7 @@ import pytest
 
 from microrad.core import kernels
 from microrad.lab.identify import fit_hysteretic_stiffness, fit_linear, output_error, predicted_error
-from microrad.lab.identify.prepared import IdentificationError
+from microrad.lab.identify.records import IdentificationError
 from microrad.lab.identify.stiffness import fit as stiffness_fit
 from microrad.lab.identify.stiffness import tangents
 from microrad.lab.identify.stiffness.fit import StiffnessOptions, simulate_hysteretic_stiffness
@@ -64,7 +64,7 @@ STEADY = tangents.Steady("record", multisine(3), np.zeros((PERIOD, 2)), RATE_HZ,
 def path_of(numbers):
     plant = tangents.play_plant(numbers, STEADY.step_s)
     drive = tangents.two_periods(STEADY, numbers.delay_s)
-    return plant, drive, tangents.run(plant, drive)
+    return plant, drive, tangents.simulate_path(plant, drive)
 
 
 def test_the_path_is_that_of_the_open_loop(numbers):
@@ -114,7 +114,7 @@ def test_the_scales_of_states_and_operators_change_nothing(numbers):
     assert sum(getattr(numbers, name).size for name in FIELDS) + 1 == numbers.vector().size
     wide = replace(STEADY, drive=10 * STEADY.drive)
     plant = tangents.play_plant(scaled(numbers, 10.0, 3.0), STEADY.step_s)
-    output = tangents.run(plant, tangents.two_periods(wide, numbers.delay_s)).output
+    output = tangents.simulate_path(plant, tangents.two_periods(wide, numbers.delay_s)).output
     np.testing.assert_allclose(output, 3 * plain, rtol=0, atol=1e-10)
 
 

@@ -14,7 +14,7 @@ from microrad.lab.identify.linear.modal import (
     simulate_periodic,
 )
 from microrad.lab.identify.linear.vector_fitting import vector_fit
-from microrad.lab.identify.prepared import IdentificationError
+from microrad.lab.identify.records import IdentificationError
 
 EQ2 = ((1.979e11, 7.051e13, 2.973e13), (1, 2.15e4, 3.737e8, 2.615e12, 8.489e14, 1.829e14))
 RATE_HZ = 50_000.0

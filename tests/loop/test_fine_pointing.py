@@ -2,6 +2,9 @@
 
 import json
 import math
+import os
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -132,6 +135,39 @@ def test_every_design_meets_its_margin_and_none_beats_the_optimum(scene, tuned):
         assert d.tuned.margins.modulus >= 0.5
         assert d.tuned.residual_rms_rad >= 0.999 * bound
     assert said[-1][0] == said[-1][1]
+
+
+@pytest.mark.skipif(sys.platform != "linux" or os.cpu_count() == 1, reason="nothing is forked")
+def test_a_part_that_is_kept_is_tuned_in_two_processes():
+    code = """
+import os, traceback
+from contextlib import suppress
+from microrad.core import threads
+from microrad.core.reads import watched_call
+from microrad.loop.fine_pointing import designs
+from microrad.mission.file import load_mission
+from scenes import scene_of
+from shipped import SHIPPED
+
+def helped(jobs, turns, mouth):
+    try:
+        done = threads._done(jobs, turns)
+        mouth.send(done)
+    except BaseException:
+        traceback.print_exc()
+    print(len(done))
+
+def wait(done, total, what):
+    with suppress(ChildProcessError):
+        os.waitid(os.P_ALL, 0, os.WEXITED | os.WNOWAIT)  # the other process takes the other turn, or both
+
+threads._help = helped
+of = scene_of(load_mission(SHIPPED))
+watched_call(designs.design, of, on_progress=wait, only=(designs.BASELINE, designs.IN_SERIES))
+"""
+    own = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), "OPENBLAS_NUM_THREADS": "1"}
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, env=own)
+    assert (ran.stderr, ran.stdout) in {("", "1\n"), ("", "2\n")}
 
 
 def test_theory_allows_no_20_percent_in_the_shipped_scenario(scene, tuned):

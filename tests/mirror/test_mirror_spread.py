@@ -13,11 +13,11 @@ from scipy.stats import truncnorm
 import truths
 from microrad.core.lti import frequency_response
 from microrad.lab.identify import FORMS, Units, fit_joint, identify, mirror_file_text
-from microrad.lab.identify.hysteresis.axis import LinearPoles, Roots, one_axis
 from microrad.lab.identify.hysteresis.bouc_wen import PARAMETERS
 from microrad.lab.identify.hysteresis.joint import JointFit
 from microrad.lab.identify.hysteresis.plant_fit import PlantFit
 from microrad.lab.identify.hysteresis.prandtl_ishlinskii import threshold_grid
+from microrad.lab.identify.hysteresis.structures import LinearPoles, Roots, one_axis
 from microrad.mirror import spread as mirror_spread
 from microrad.mirror.hysteresis import NO_CREEP, BoucWen, Creep, Play, slow_gain
 from microrad.mirror.model import hysteresis_model, linear_part

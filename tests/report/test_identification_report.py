@@ -16,6 +16,7 @@ from scipy.signal import cont2discrete, lfilter
 from microrad import report
 from microrad.core.kernels import play_response
 from microrad.lab.identify import Refused, identify, mirror_file_text
+from microrad.lab.identify.records import rounded_to_error
 from microrad.lab.recording import Finding, recording_from_arrays
 from microrad.report import identification_figures as figures
 from microrad.report import identification_words as words
@@ -195,7 +196,7 @@ def test_the_parameter_table_holds_value_and_error_of_every_model(page, full):
         assert len(rows) == len(expected) > 0
         for cells, row in zip(rows, expected, strict=True):
             value, error, unit = row.shown
-            assert cells[:4] == [row.name, f"{value:.5g}", two_digits(error), unit]
+            assert cells[:4] == [row.name, rounded_to_error(value, error), two_digits(error), unit]
         for name, why in not_identified(fit):
             assert any(cells[0] == name and why in cells[4] for cells in rows)
         below = part[part.index("</table>") : part.index("</details>")]
@@ -207,20 +208,24 @@ def test_parameters_are_shown_in_their_units(page, full):
     rows = rows_of(part[part.index("<summary>bouc_wen") :])
     d1, alpha = (next(row for row in rows if row[0] == name) for name in ("d1", "alpha"))
     errors = fit.standard_errors
-    assert d1[1:4] == [f"{1e3 * fit.model.d1_rad_v:.5g}", f"{float(f'{1e3 * errors[0]:.2g}'):g}", "mrad/V"]
-    assert alpha[1:4] == [f"{fit.model.alpha_1_v:.5g}", f"{float(f'{errors[4]:.2g}'):g}", "1/V"]
+    shown = rounded_to_error(1e3 * fit.model.d1_rad_v, 1e3 * errors[0])
+    assert d1[1:4] == [shown, f"{float(f'{1e3 * errors[0]:.2g}'):g}", "mrad/V"]
+    shown = rounded_to_error(fit.model.alpha_1_v, errors[4])
+    assert alpha[1:4] == [shown, f"{float(f'{errors[4]:.2g}'):g}", "1/V"]
 
 
 def test_poles_order_and_gains_are_those_of_the_linear_fit(page, full):
     text, linear = text_of(page), full.linear
     upper = linear.poles_rad_s[np.argmax(linear.poles_rad_s.imag)]
     assert abs(upper) / (2 * np.pi) == pytest.approx(150.0, rel=0.01)
-    assert row_of(text, "pole pair")[1] == f"{abs(upper) / (2 * np.pi):.5g} Hz"
-    assert row_of(text, "pole pair")[3] == f"{-upper.real / abs(upper):.4g}"
-    assert row_of(text, "gain at zero frequency")[1] == f"{1e3 * linear.dc_gain[0, 0]:.5g} mrad/V"
+    error = linear.poles_error_rad_s[np.argmax(linear.poles_rad_s.imag)]
+    assert row_of(text, "pole pair")[1] == f"{rounded_to_error(abs(upper) / (2 * np.pi), error / (2 * np.pi))} Hz"
+    assert row_of(text, "pole pair")[3] == rounded_to_error(-upper.real / abs(upper), error / abs(upper))
+    gain = rounded_to_error(1e3 * linear.dc_gain[0, 0], 1e3 * linear.dc_gain_error[0, 0])
+    assert row_of(text, "gain at zero frequency")[1] == f"{gain} mrad/V"
     edge = row_of(text, f"gain at {linear.excited_hz[0]:.3g} Hz")
     assert edge[1:3] == [
-        f"{1e3 * linear.edge_gain[0, 0]:.5g} mrad/V",
+        f"{rounded_to_error(1e3 * linear.edge_gain[0, 0], 1e3 * linear.edge_gain_error[0, 0])} mrad/V",
         f"{1e3 * linear.edge_gain_error[0, 0]:.2g} mrad/V",
     ]
     for score in linear.scan:

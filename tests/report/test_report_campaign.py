@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from microrad.campaign.outputs import OUTPUTS
+from microrad.campaign.definition.outputs import OUTPUTS
 from microrad.campaign.records import (
     CampaignSummary,
     CellSummary,

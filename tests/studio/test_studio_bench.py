@@ -9,7 +9,7 @@ import pytest
 
 from microrad.core.kernels import bouc_wen_response
 from microrad.lab.identify import STATIC, identify
-from microrad.lab.live_fit import FITS, LiveFit, Loop, looker_on, thinned
+from microrad.lab.live_fit import LIVE_FITS, LiveFit, Loop, live_fit_writer, thin_fit
 from microrad.lab.recording import RecordingError, read_recording, recording_from_arrays
 from microrad.loop import fine_pointing
 from microrad.loop import paper_cases as tracking
@@ -57,13 +57,13 @@ def test_each_model_is_handed_over_as_it_is_scored_in_the_end(identified):
 
 def test_fits_are_read_as_they_were_written(identified, tmp_path):
     _, seen = identified
-    look = looker_on(str(tmp_path / "progress"))
+    look = live_fit_writer(str(tmp_path / "progress"))
     assert mirror_view.read_fits(tmp_path) == ()
     for n, each in enumerate(seen, start=1):
         look(each)
         assert len(mirror_view.read_fits(tmp_path)) == n
     fits = mirror_view.read_fits(tmp_path)
-    assert fits == tuple(thinned(each) for each in seen)
+    assert fits == tuple(thin_fit(each) for each in seen)
     loop = fits[1].loops[0]
     assert loop.name == "50Hz.csv"
     assert len(loop.drive) == len(loop.model_rad) == len(loop.measured_rad) == 200  # two periods of 100 samples
@@ -75,23 +75,23 @@ def test_fits_are_read_as_they_were_written(identified, tmp_path):
 
 
 def test_a_line_that_is_being_written_is_left_out(identified, tmp_path):
-    look = looker_on(str(tmp_path / "progress"))
+    look = live_fit_writer(str(tmp_path / "progress"))
     look(identified[1][0])
-    with (tmp_path / FITS).open("a") as file:
+    with (tmp_path / LIVE_FITS).open("a") as file:
         file.write('{"model": "bouc_w')
     assert [each.model for each in mirror_view.read_fits(tmp_path)] == ["prandtl_ishlinskii"]
 
 
 def test_nobody_looks_on_without_a_file_and_a_disk_that_refuses_does_not_end_the_fit(identified, tmp_path):
-    looker_on(None)(identified[1][0])
-    (tmp_path / FITS).mkdir()
-    looker_on(str(tmp_path / "progress"))(identified[1][0])
+    live_fit_writer(None)(identified[1][0])
+    (tmp_path / LIVE_FITS).mkdir()
+    live_fit_writer(str(tmp_path / "progress"))(identified[1][0])
     assert mirror_view.read_fits(tmp_path) == ()
-    assert [each.name for each in tmp_path.iterdir()] == [FITS]
+    assert [each.name for each in tmp_path.iterdir()] == [LIVE_FITS]
 
 
 def test_the_command_writes_its_fits_beside_its_progress(call, folder, monkeypatch):
-    """`microrad identify` hands `looker_on` to `identify`: without it the page shows no live fit."""
+    """`microrad identify` hands `live_fit_writer` to `identify`: without it the page shows no live fit."""
     record = recorded()
     np.savetxt(folder / "loop.csv", np.hstack([record.drive, record.output]), delimiter=",", header="drive,angle")
     monkeypatch.setenv("MICRORAD_PROGRESS", str(folder / "progress"))

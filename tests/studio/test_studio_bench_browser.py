@@ -37,7 +37,7 @@ def recording(tmp_path_factory):
             "arm": "50 mm",
             "said": "type the sample rate",
         }
-    files = bench.write(
+    files = bench.write_folder(
         bench.load_plan("paper-experiment"), folder / "played", 0, False, lambda done, total, what: None
     )
     loop = next(path for path in files if path.stem == "loop-100hz")

@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 
 from browser import Studio, settled, until, violations
-from microrad.campaign.interim import Interim
-from microrad.campaign.summary import summarise
+from microrad.campaign.statistics.interim import Interim
+from microrad.campaign.statistics.summary import summarise_campaign
 from microrad.report import campaign_words
 from microrad.studio import server
 from microrad.studio.draft.draft import Draft
@@ -343,7 +343,7 @@ def test_a_campaign_shows_its_figures_while_it_runs_goes_on_after_a_cancel_and_h
     again.get_by_text(f"Of all {rows} rows").wait_for()
     assert first.get_by_role("button", name="Go on").count() == 0
     api.expect(there.get_by_text("rows so far")).to_be_hidden()  # the ledger is the newer job's now
-    headline = campaign_words.headline(summarise(studio.folder / "campaign.ledger"))
+    headline = campaign_words.headline(summarise_campaign(studio.folder / "campaign.ledger"))
     api.expect(again.locator(".runs-figures").get_by_text(headline)).to_be_visible()
     again.get_by_role("button", name="Write its report").click()
     again.get_by_role("button", name="Show campaign.html here").click()

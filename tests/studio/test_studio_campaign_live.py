@@ -8,12 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from microrad.campaign import blob, bundle, interim, plan, run, sampling
+from microrad.campaign import bundle, run
 from microrad.campaign.file import load_campaign
-from microrad.campaign.interim import Interim
-from microrad.campaign.ledger import Ledger
+from microrad.campaign.ledger import Ledger, chunk_format
 from microrad.campaign.records import CampaignError, Chunk, Failed
-from microrad.campaign.summary import summarise
+from microrad.campaign.rows import plan, sampling
+from microrad.campaign.statistics import interim
+from microrad.campaign.statistics.interim import Interim
+from microrad.campaign.statistics.summary import summarise_campaign
 from microrad.loop.fine_loop.ensemble import bin_edges_rad
 from microrad.report import campaign_words
 from microrad.studio.jobs import ledgers as campaign_live
@@ -37,8 +39,8 @@ class Growing:
         self.path, self.failed = folder / "x.ledger", failed
         self.campaign = load_campaign(campaign_file(folder, runs=runs, duration="16 s", more=LIMIT + more))
         self.head = run._head(self.campaign, bundle.packed(self.campaign, ()))
-        self.rows = plan.chunk_rows(self.campaign)
-        self.every = len(plan.chunks(self.campaign, 0, runs))
+        self.rows = plan.planned(self.campaign).chunk_rows
+        self.every = len(plan.planned(self.campaign).chunks(0, runs))
         self.begin()
 
     def begin(self, seed=1):
@@ -50,14 +52,14 @@ class Growing:
     def put(self, *numbers, cell=0):
         with Ledger.open(self.path, write=True) as book:
             for number in numbers:
-                book.put(cell, number, blob.pack_chunk(self.chunk(number, cell)))
+                book.put(cell, number, chunk_format.pack_chunk(self.chunk(number, cell)))
 
     def chunk(self, number, cell=0):
-        rows = plan.rows_of(self.campaign, number)
+        rows = plan.planned(self.campaign).rows_of(number)
         drawn, weight = sampling.rows(self.campaign, cell, rows.start, len(rows))
         columns = {"row": np.arange(rows.start, rows.stop, dtype=float), "weight": weight, **drawn}
         lost = np.isin(columns["row"], self.failed)
-        for output in plan.outputs(self.campaign):
+        for output in self.campaign.outputs:
             values = self.random.lognormal(math.log(4e-6), 0.2, len(rows))
             columns[output.name] = np.where(lost, math.nan, values)
         failed = tuple(Failed(row, 7, 2, "the reason") for row in rows if row in self.failed)
@@ -106,27 +108,27 @@ def test_a_growing_ledger_says_at_each_time_what_its_rows_say(growing):
     growing.failed = (3, 70)
     growing.put(1)
     first = reader.look()
-    same(first, summarise(growing.path))
+    same(first, summarise_campaign(growing.path))
     assert first.progress.rows_done == growing.rows
     assert reader.look() is first  # nothing is new
     growing.put(3, 0)
     second = reader.look()
     assert second is not first
-    same(second, summarise(growing.path))
+    same(second, summarise_campaign(growing.path))
     assert second.cells[0].rows == 3 * growing.rows
     assert 0.0 < second.cells[0].missed.low < second.cells[0].missed.value < second.cells[0].missed.high < 1.0
     growing.put(*(n for n in range(growing.every) if n not in (0, 1, 3)))
     growing.end()
     whole = reader.look()
-    same(whole, summarise(growing.path))
+    same(whole, summarise_campaign(growing.path))
     assert (whole.progress.state, whole.progress.rows_done, whole.cells[0].failed) == ("complete", ROWS, 2)
-    assert campaign_words.headline(whole) == campaign_words.headline(summarise(growing.path))
+    assert campaign_words.headline(whole) == campaign_words.headline(summarise_campaign(growing.path))
 
 
 def test_each_chunk_is_read_once(growing, monkeypatch):
     taken = []
-    take = interim.summary.take
-    monkeypatch.setattr(interim.summary, "take", lambda *all: (taken.append(all[2].number), take(*all)))
+    take = interim.CellFold.take
+    monkeypatch.setattr(interim.CellFold, "take", lambda fold, chunk: (taken.append(chunk.number), take(fold, chunk)))
     reader = Interim(growing.path)
     for number in (0, 2, 1):
         growing.put(number)
@@ -144,7 +146,7 @@ def test_a_long_ledger_is_read_a_little_at_a_time(growing):
         seen.append(found.cells[0].rows)
         assert found.progress.rows_done == ROWS
     assert seen == [growing.rows * (k + 1) for k in range(growing.every)]
-    same(found, summarise(growing.path))
+    same(found, summarise_campaign(growing.path))
 
 
 def test_a_reader_in_the_middle_of_a_writers_transaction_sees_whole_chunks(growing):
@@ -165,13 +167,13 @@ def test_another_campaign_in_the_same_place_and_chunks_taken_out_are_read_anew(g
     assert reader.look().cells[0].rows == 3 * growing.rows
     with Ledger.open(growing.path, write=True) as book:
         book.drop(0, 2)
-    same(reader.look(), summarise(growing.path))
+    same(reader.look(), summarise_campaign(growing.path))
     assert reader.found.cells[0].rows == 2 * growing.rows
     for path in growing.path.parent.glob("x.ledger*"):
         path.unlink()
     growing.begin(seed=2)
     growing.put(0, 1, 2)
-    same(reader.look(), summarise(growing.path))
+    same(reader.look(), summarise_campaign(growing.path))
     assert reader.found.cells[0].rows == 3 * growing.rows
 
 
@@ -179,7 +181,7 @@ def test_of_a_grid_the_cell_that_is_shown_alone_has_outputs(tmp_path):
     growing = Growing(tmp_path, GRID, runs=64)
     growing.put(0)
     growing.put(0, cell=1)
-    found, wanted = Interim(growing.path).look(), summarise(growing.path)
+    found, wanted = Interim(growing.path).look(), summarise_campaign(growing.path)
     same(found, wanted)
     shown = [bool(cell.outputs) for cell in found.cells]
     assert sorted(shown) == [False, True]
@@ -286,7 +288,7 @@ def test_the_figures_say_of_how_many_rows_they_are(growing, at_once):
     assert found.notes[0] == "1 of them failed."
     titles = [table.title for table in found.tables]
     assert titles == ["Limits", TAIL, "Outputs and their quantiles over the rows", "Failed rows"]
-    cell = summarise(growing.path).cells[0]
+    cell = summarise_campaign(growing.path).cells[0]
     (limit,) = found.tables[0].rows
     kept = 100.0 * (1.0 - cell.missed_by["residual_rms"].value)
     assert limit[0] == "residual_rms ≤ 5 µrad"
@@ -312,7 +314,7 @@ def test_the_plot_shows_the_share_below_its_quantiles_and_the_limit(growing, at_
     assert next(iter(found.plots)) == "residual_rms"  # the one with a limit comes first
     plot = found.plots["residual_rms"]
     (rows, quantiles), (limit,) = plot["data"], plot["layout"]["shapes"]
-    output = summarise(growing.path).cells[0].outputs["residual_rms"]
+    output = summarise_campaign(growing.path).cells[0].outputs["residual_rms"]
     assert (rows["y"][0], rows["y"][-1]) == (0.0, pytest.approx(100.0))
     assert all(a <= b for a, b in zip(rows["y"][:-1], rows["y"][1:], strict=True))
     at = dict(zip(quantiles["y"], quantiles["x"], strict=True))
@@ -329,7 +331,7 @@ def test_the_plot_shows_the_share_below_its_quantiles_and_the_limit(growing, at_
 
 def test_a_limit_far_from_all_rows_is_named_and_not_drawn(growing):
     growing.put(0)
-    output = summarise(growing.path).cells[0].outputs["residual_rms"]
+    output = summarise_campaign(growing.path).cells[0].outputs["residual_rms"]
     (limit,) = growing.campaign.limits
     far = campaign_view.distribution_plot(output, replace(limit, most=1e-3))["data"][-1]
     assert (far["name"], far["x"]) == ("limit ≤ 1 mrad, right of here", [None])

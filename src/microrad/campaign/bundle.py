@@ -4,18 +4,20 @@ import base64
 import hashlib
 import json
 import os
+import platform
 import shutil
 import weakref
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
+from importlib.metadata import version
 from pathlib import Path, PurePosixPath
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad.campaign.definition import CampaignFile
+from microrad.campaign.definition.records import CampaignFile
 from microrad.campaign.file import load_campaign
 from microrad.campaign.records import CampaignError
 from microrad.core import lti
@@ -32,9 +34,6 @@ LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "sgp4", "skyfield")
 @cache
 def code_sha256() -> str:
     """SHA-256 over microrad's own source files and the versions of Python and the libraries that rows depend on."""
-    import platform
-    from importlib.metadata import version
-
     digest = hashlib.sha256(source_sha256().encode())
     digest.update(repr([platform.python_version(), *((name, version(name)) for name in LIBRARIES)]).encode())
     return digest.hexdigest()
@@ -69,28 +68,32 @@ def packed(campaign: CampaignFile, controllers: Sequence[AxisController]) -> byt
     named = _named(campaign.files)
     files = {name: base64.b64encode(read_bytes(path, _MOST_BYTES)).decode() for name, path in named.items()}
     name = next(name for name, path in named.items() if path == campaign.path)
-    made = [_written(controller) for controller in controllers]
-    own = {"campaign": name, "code": code_sha256(), "chunk_rows": campaign.chunk_rows}
-    data = {**own, "files": files, "controllers": made}
+    data = {
+        "campaign": name,
+        "code": code_sha256(),
+        "chunk_rows": campaign.chunk_rows,
+        "files": files,
+        "controllers": [_written_controller(controller) for controller in controllers],
+    }
     return json.dumps(data, sort_keys=True).encode()
 
 
 def opened(spec: bytes, any_code: bool = False) -> Opened:
-    """What `packed` put together. Raises `CampaignError` when it was packed by other code, if that is not allowed."""
-    name, code, files, rows, controllers = _unpacked(spec)
-    if code != code_sha256() and not any_code:
+    """What `packed` put together. Raises `CampaignError` if it was packed by other code, if that is not allowed."""
+    content = _unpacked(spec)
+    if content.code != code_sha256() and not any_code:
         raise CampaignError(
-            f"this worker runs other code than the campaign: {code_sha256()} here, {code} there; install the "
+            f"this worker runs other code than the campaign: {code_sha256()} here, {content.code} there; install the "
             "same microrad, Python and libraries on every worker"
         )
     folder = scratch_folder("campaign")
     try:
-        for inside, content in files.items():
-            path = _inside(folder, inside)
+        for name, data in content.files.items():
+            path = _inside(folder, name)
             path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(content)
-        campaign = replace(load_campaign(_inside(folder, name)), chunk_rows=rows)
-        found = Opened(campaign, controllers)
+            path.write_bytes(data)
+        campaign = load_campaign(_inside(folder, content.campaign))
+        found = Opened(replace(campaign, chunk_rows=content.chunk_rows), content.controllers)
     except BaseException:
         shutil.rmtree(folder, ignore_errors=True)
         raise
@@ -98,25 +101,33 @@ def opened(spec: bytes, any_code: bool = False) -> Opened:
     return found
 
 
-def _unpacked(spec: bytes) -> tuple[str, str, dict[str, bytes], int | None, tuple[AxisController, ...]]:
-    """Name of the campaign file, code, files by name, rows of a chunk and controllers of a bundle.
+class _Content(NamedTuple):
+    """What a bundle holds: the name of the campaign file, the code that packed it, and files by name."""
 
-    Raises `CampaignError` for one that is none of ours: anyone may make a ledger.
-    """
+    campaign: str
+    code: str
+    files: dict[str, bytes]
+    chunk_rows: int | None
+    controllers: tuple[AxisController, ...]
+
+
+def _unpacked(spec: bytes) -> _Content:
+    """The content of a bundle. Raises `CampaignError` for one that is none of ours: anyone may make a ledger."""
     try:
         data = json.loads(spec)
         files = {name: base64.b64decode(content) for name, content in data["files"].items()}
-        controllers = tuple(_read(each) for each in data["controllers"])
-        name, code, rows = str(data["campaign"]), str(data["code"]), data.get("chunk_rows")
+        controllers = tuple(_read_controller(each) for each in data["controllers"])
+        found = _Content(str(data["campaign"]), str(data["code"]), files, data.get("chunk_rows"), controllers)
     except (AttributeError, LookupError, RecursionError, TypeError, ValueError) as error:
         raise CampaignError("the ledger holds a campaign as microrad never writes it: leave it alone") from error
+    rows = found.chunk_rows
     if rows is None or (type(rows) is int and rows > 0 and not rows & (rows - 1)):
-        return name, code, files, rows, controllers
+        return found
     raise CampaignError(f"the ledger has chunks of {rows!r} rows, which microrad never makes: leave it alone")
 
 
 def _inside(folder: Path, name: str) -> Path:
-    """The path of a file of a bundle. Raises `CampaignError` where it leaves the folder: anyone may make a ledger."""
+    """The path of a file of a bundle. Raises `CampaignError` if it leaves the folder: anyone may make a ledger."""
     path = Path(os.path.abspath(folder.joinpath(*PurePosixPath(name).parts)))  # noqa: PTH100  nothing is there yet
     if not path.is_relative_to(folder) or path == folder or "\0" in name:
         raise CampaignError(f"the ledger holds a file {name!r}, which microrad never puts there: leave it alone")
@@ -126,7 +137,7 @@ def _inside(folder: Path, name: str) -> Path:
 def _refuse_absolute(campaign: CampaignFile) -> None:
     """Every worker reads the bundle's own copies, which are found by relative names alone."""
     named = [campaign.table.mission, *named_files(campaign.mission.mission)]
-    named += [cell["mirror"] for cell in campaign.cells if "mirror" in cell]
+    named += [cell.values["mirror"] for cell in campaign.cells if "mirror" in cell.values]
     for name in named:
         if Path(name).is_absolute():
             raise CampaignError(
@@ -142,13 +153,13 @@ def _named(files: Sequence[Path]) -> dict[str, Path]:
     return {path.relative_to(above).as_posix(): given for path, given in zip(there, files, strict=True)}
 
 
-def _written(controller: AxisController) -> dict[str, Any]:
+def _written_controller(controller: AxisController) -> dict[str, Any]:
     s = controller.system
     arrays = {"A": s.A, "B": s.B, "C": s.C, "D": s.D, "L": controller.anti_windup}
     return {"name": controller.name, **{key: [list(m.shape), m.ravel().tolist()] for key, m in arrays.items()}}
 
 
-def _read(data: dict[str, Any]) -> AxisController:
+def _read_controller(data: dict[str, Any]) -> AxisController:
     def array(key: str) -> NDArray[np.float64]:
         shape, values = data[key]
         return np.array(values, dtype=float).reshape(shape)

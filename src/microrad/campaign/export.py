@@ -18,8 +18,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad.campaign.blob import Head
-from microrad.campaign.ledger import Ledger
+from microrad.campaign.ledger import Head, Ledger
 from microrad.campaign.records import CampaignError, Chunk
 from microrad.core.installing import advice
 from microrad.orbit.operations import spreadsheet_text
@@ -39,11 +38,15 @@ class _Field(NamedTuple):
 _Block = dict[str, NDArray[Any]]
 
 
-def export(ledger: Ledger, path: Path) -> int:
-    """Write the rows that are done to a file of the kind that its suffix says; how many they are.
+def export_rows(ledger: Ledger, path: Path) -> int:
+    """Write the rows that are done to a table; how many they are.
 
-    What was in ``path`` is replaced once the new table is whole. Raises `CampaignError` for another suffix, a missing
-    library, a damaged chunk, no rows, and a file that cannot be written.
+    Args:
+        ledger: an open ledger.
+        path: the file, .nc, .parquet or .csv; what was in it is replaced once the new table is whole.
+
+    Raises `CampaignError` for another suffix, a missing library, a damaged chunk, no rows, and a file that cannot be
+    written.
     """
     writers: dict[str, Callable[[Ledger, Path], int]] = {".nc": _netcdf, ".parquet": _parquet, ".csv": _csv}
     writer = writers.get(path.suffix.lower())

@@ -8,22 +8,36 @@ from collections.abc import Callable, Sequence
 from contextlib import closing, suppress
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
 
-from microrad.campaign import blob, bundle, loops, mending, plan, sampling, summary, work
-from microrad.campaign.blob import Column, Head
-from microrad.campaign.definition import CampaignFile
+from microrad.campaign import bundle
+from microrad.campaign.definition.outputs import OUTPUTS
+from microrad.campaign.definition.records import CampaignFile
+from microrad.campaign.engines.cluster import DaskEngine
+from microrad.campaign.engines.threads import LocalEngine
 from microrad.campaign.file import load_campaign
-from microrad.campaign.inputs import Builder
-from microrad.campaign.ledger import Ledger, check_same
-from microrad.campaign.ledger_file import argument, refuse_existing
+from microrad.campaign.ledger import (
+    Column,
+    Head,
+    Ledger,
+    argument,
+    check_same,
+    chunk_format,
+    mend,
+    refuse_existing,
+    verify,
+)
 from microrad.campaign.records import CampaignError, Chunk, Engine, Failed, Job, Outcome, joined
-from microrad.campaign.sketch import Sketch
+from microrad.campaign.rows import plan, sampling
+from microrad.campaign.rows.evaluator import ATTEMPTS, Evaluator
+from microrad.campaign.rows.loops import controllers
+from microrad.campaign.statistics.sketch import Sketch
+from microrad.campaign.statistics.summary import is_precise
 from microrad.core.progress import Progress
 from microrad.core.units import format_quantity
-from microrad.loop.control import AxisController
 
 TARGET = "microrad.campaign.work:open_work"
 _TIMED_S = 0.2  # of rows, before a campaign of links alone begins
@@ -45,19 +59,21 @@ class Means:
     def engine(self, spec: bytes, late_s: float) -> Engine:
         """The engine, started."""
         if self.workers is None and self.scheduler is None:
-            from microrad.campaign.engines import LocalEngine
-
             return LocalEngine(spec, TARGET, self.threads or os.cpu_count() or 1, late_s)
-        from microrad.campaign.cluster import DaskEngine  # dask is an extra
-
         return DaskEngine(spec, TARGET, address=self.scheduler, workers=self.workers, late_s=late_s)
 
 
-def begin(file: Path, path: Path, means: Means, on_progress: Progress = lambda done, total, what: None) -> None:
+def run_campaign(file: Path, path: Path, means: Means, on_progress: Progress = lambda done, total, what: None) -> None:
     """Run a campaign file into a new ledger.
 
-    Raises `CampaignError` and `missionfile.MissionError` for what cannot be run, and KeyboardInterrupt with words that
-    say how to go on; what was finished by then is in the ledger.
+    Args:
+        file: the campaign file.
+        path: where the ledger is made.
+        means: what does the work.
+        on_progress: called with the rows done, all rows and what is said beside them.
+
+    Raises `CampaignError` and `MissionError` for what cannot be run, and KeyboardInterrupt with words that say how to
+    go on; what was finished by then is in the ledger.
     """
     campaign = load_campaign(file)
     refuse_existing(path)  # before the controllers are tuned
@@ -69,17 +85,22 @@ def begin(file: Path, path: Path, means: Means, on_progress: Progress = lambda d
             workers.engine()  # one that is not there leaves no ledger behind
         with Ledger.create(path, _head(campaign, spec)) as book:
             book.note("file", str(file.resolve()))
-            _Run(campaign, workers, book, on_progress).whole()
+            _Runner(campaign, workers, book, on_progress).run()
 
 
-def resume(path: Path, means: Means, on_progress: Progress = lambda done, total, what: None) -> None:
+def resume_campaign(path: Path, means: Means, on_progress: Progress = lambda done, total, what: None) -> None:
     """Go on with a campaign that stopped; one that is complete stays as it is. Damaged chunks are done again.
+
+    Args:
+        path: its ledger.
+        means: what does the work.
+        on_progress: called with the rows done, all rows and what is said beside them.
 
     Raises `CampaignError` with both hashes when microrad, the campaign file or the mission is no longer what it was;
     files that are no longer there are taken from the ledger.
     """
-    if not mending.verify(path).sound:
-        mending.mend(path)
+    if not verify(path).sound:
+        mend(path)
     with Ledger.open(path, write=True) as book:
         head = book.head
         file = Path(book.notes().get("file", ""))
@@ -87,7 +108,7 @@ def resume(path: Path, means: Means, on_progress: Progress = lambda done, total,
         campaign = load_campaign(file) if file.is_file() else opened.campaign
         check_same(head.hashes, bundle.hashes(campaign), path)
         with closing(_Workers(opened.campaign, head.bundle, means)) as workers:
-            _Run(opened.campaign, workers, book, on_progress).whole()
+            _Runner(opened.campaign, workers, book, on_progress).run()
 
 
 def row_s(campaign: CampaignFile, clock: Callable[[], float] = time.perf_counter) -> float:
@@ -95,7 +116,7 @@ def row_s(campaign: CampaignFile, clock: Callable[[], float] = time.perf_counter
 
     The first one, which loads what it needs, does not count.
     """
-    evaluator, cells = work.Evaluator(campaign, Builder(campaign), {}, {}), len(campaign.cells)
+    evaluator, cells = Evaluator(campaign, {}), len(campaign.cells)
     began = took = 0.0
     for done in range(max(cells * campaign.rows, 2)):
         row = done // cells % campaign.rows
@@ -106,32 +127,10 @@ def row_s(campaign: CampaignFile, clock: Callable[[], float] = time.perf_counter
     return took / done
 
 
-def controllers(campaign: CampaignFile, on_progress: Progress) -> tuple[AxisController, ...]:
-    """The controller of each cell, tuned; none without a loop."""
-    table = campaign.table.loop
-    if table is None:
-        return ()
-    builder = Builder(campaign)
-    made: dict[object, AxisController] = {}
-    found = []
-    for cell in range(len(campaign.cells)):
-        on_progress(cell, len(campaign.cells), f"tuning {table.controller}")
-        key = builder.loop_key(cell, {})
-        if key not in made:
-            made[key] = loops.tuned(builder.mission(cell, {}), table)
-        found.append(made[key])
-    return tuple(found)
-
-
 def _head(campaign: CampaignFile, spec: bytes) -> Head:
-    from importlib.metadata import version
-
-    outputs = plan.outputs(campaign)
-    drawn = sampling.rows(campaign, 0, 0, 1)[0]
-    units = dict(campaign.dimensions)
     columns = [Column("row", "", "number of the row in its cell"), Column("weight", "", "weight of the row")]
-    columns += [Column(name, units[name], "drawn") for name in drawn]
-    columns += [Column(output.name, output.unit, output.meaning) for output in outputs]
+    columns += [Column(each.key, each.unit, "drawn") for each in campaign.inputs]
+    columns += [Column(output.name, output.unit, output.meaning) for output in campaign.outputs]
     return Head(
         campaign_name=campaign.path.stem,
         campaign_text=campaign.text,
@@ -140,7 +139,7 @@ def _head(campaign: CampaignFile, spec: bytes) -> Head:
         hashes=bundle.hashes(campaign),
         versions={name: version(name) for name in ("microrad", *bundle.LIBRARIES)},
         created=datetime.now(UTC).isoformat(timespec="seconds"),
-        cells=tuple(campaign.cells),
+        cells=tuple(cell.values for cell in campaign.cells),
         columns=tuple(columns),
         bundle=spec,
     )
@@ -195,26 +194,26 @@ class _Workers:
             self._engine.close()
 
 
-class _Run:
-    """One campaign on its way into its ledger."""
+class _Runner:
+    """Has the work of a campaign done and keeps it in the ledger."""
 
     def __init__(self, campaign: CampaignFile, workers: _Workers, book: Ledger, on_progress: Progress) -> None:
         self.campaign, self.workers, self.book, self.on_progress = campaign, workers, book, on_progress
-        done = book.done()
-        rows = sum(len(plan.rows_of(campaign, number)) for _, number in done)
+        self.plan = plan.planned(campaign)
+        rows = sum(len(self.plan.rows_of(number)) for _, number in book.done())
         self.pace = _Pace(rows, float(book.notes().get("seconds", 0.0)))
         self.total = 0
 
-    def whole(self) -> None:
+    def run(self) -> None:
         """All rounds, then the traces; whatever stops it, what is done stays."""
         self.book.note("state", "running")
         try:
             cells = list(range(len(self.campaign.cells)))
-            for rows in plan.rounds(self.campaign):
+            for rows in self.plan.rounds:
                 done = self.book.done()
-                jobs = [job for cell in cells for job in plan.chunks(self.campaign, cell, rows)]
+                jobs = [job for cell in cells for job in self.plan.chunks(cell, rows)]
                 missing = [job for job in jobs if (job.cell, job.number) not in done]
-                self.total = self.pace.done + sum(len(plan.rows_of(self.campaign, job.number)) for job in missing)
+                self.total = self.pace.done + sum(len(self.plan.rows_of(job.number)) for job in missing)
                 self._round(missing)
                 cells = [cell for cell in cells if not self._precise(cell, rows)]
             self._traces()
@@ -241,7 +240,7 @@ class _Run:
     # ---------------------------------------------------------------------------------------------------------- rounds
     def _precise(self, cell: int, rows: int) -> bool:
         """Whether a cell's first rows know what is wanted well enough; never where nothing is wanted."""
-        return self.campaign.table.precision is not None and summary.reached(self.campaign, self.book, cell, rows)
+        return self.campaign.table.precision is not None and is_precise(self.campaign, self.book, cell, rows)
 
     def _round(self, jobs: Sequence[Job]) -> None:
         """Do these chunks: each at most twice as a whole, then the rows of those that failed one by one."""
@@ -262,7 +261,7 @@ class _Run:
 
     def _keep(self, job: Job, payload: bytes) -> None:
         self.book.put(job.cell, job.number, payload)
-        rows = len(plan.rows_of(self.campaign, job.number))
+        rows = len(self.plan.rows_of(job.number))
         self.pace.done, self.pace.here = self.pace.done + rows, self.pace.here + rows
         self.book.note("seconds", self.pace.seconds)
         self.on_progress(self.pace.done, self.total, self.pace.words(self.total, self._interim(payload)))
@@ -272,10 +271,8 @@ class _Run:
         if not self.campaign.limits:
             return ""
         limit = self.campaign.limits[0]
-        output = next((each for each in plan.outputs(self.campaign) if each.name == limit.output), None)
-        if output is None:
-            return ""
-        self.pace.sketch.add(blob.unpack_chunk(payload).columns[output.name])
+        output = OUTPUTS[limit.output]
+        self.pace.sketch.add(chunk_format.unpack_chunk(payload).columns[output.name])
         share = 0.01 if limit.least is not None else 0.99
         value = self.pace.sketch.quantile(share)
         shown = "-" if math.isnan(value) else format_quantity(value, output.unit or "1", 3)
@@ -283,32 +280,26 @@ class _Run:
 
     def _by_rows(self, job: Job) -> None:
         """The rows of a chunk that cannot be done whole, each by itself and at most twice; the rest have failed."""
-        rows = [Job(job.cell, job.number, row, "row") for row in plan.rows_of(self.campaign, job.number)]
+        rows = [Job(job.cell, job.number, row, "row") for row in self.plan.rows_of(job.number)]
         found: dict[int, Chunk] = {}
         lost: dict[int, str] = {}
-        for _ in range(work.ATTEMPTS):
+        for _ in range(ATTEMPTS):
             todo = [each for each in rows if each.row not in found or found[each.row].failed]
             for outcome in self.workers.engine().outcomes(iter(todo)) if todo else ():
                 if outcome.kind == "done":
-                    found[outcome.job.row] = blob.unpack_chunk(outcome.payload)
+                    found[outcome.job.row] = chunk_format.unpack_chunk(outcome.payload)
                 else:
                     lost[outcome.job.row] = outcome.reason
-        parts = [
-            self._tried(found[each.row]) if each.row in found else self._lost(each, lost[each.row]) for each in rows
-        ]
-        self._keep(job, blob.pack_chunk(joined(job, parts)))
-
-    @staticmethod
-    def _tried(chunk: Chunk) -> Chunk:
-        """A chunk of one row with the number of its tries, if it failed."""
-        return replace(chunk, failed=tuple(replace(each, attempts=work.ATTEMPTS) for each in chunk.failed))
+        parts = [found[each.row] if each.row in found else self._lost(each, lost[each.row]) for each in rows]
+        parts = [replace(p, failed=tuple(replace(each, attempts=ATTEMPTS) for each in p.failed)) for p in parts]
+        self._keep(job, chunk_format.pack_chunk(joined(job, parts)))
 
     def _lost(self, job: Job, reason: str) -> Chunk:
         """A row that took its worker down, or that was stopped."""
         drawn, weight = sampling.rows(self.campaign, job.cell, job.row, 1)
         columns = {"row": np.array([float(job.row)]), "weight": weight, **drawn}
-        columns |= {output.name: np.array([math.nan]) for output in plan.outputs(self.campaign)}
-        failed = Failed(job.row, self.campaign.table.seed, work.ATTEMPTS, reason)
+        columns |= {output.name: np.array([math.nan]) for output in self.campaign.outputs}
+        failed = Failed(job.row, self.campaign.table.seed, ATTEMPTS, reason)
         return Chunk(job.cell, job.number, columns, (failed,), np.zeros(0), np.zeros(0))
 
     # ---------------------------------------------------------------------------------------------------------- traces
@@ -327,7 +318,7 @@ class _Run:
             return
         for outcome in self.workers.engine().outcomes(iter(jobs)):
             if outcome.kind == "done":
-                found = blob.unpack_trace(outcome.payload)
+                found = chunk_format.unpack_trace(outcome.payload)
                 value = wanted[found.cell, found.row]
                 self.book.put_trace(replace(found, output=output, value=value))
 

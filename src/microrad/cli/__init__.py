@@ -25,12 +25,11 @@ from microrad.cli.frame import (
     main,
     option,
     progress_bar,
+    refusal_of,
     say,
     width,
 )
 from microrad.core.folder import write_whole
-
-# Everything else is imported inside the commands: numpy, numba and pydantic take longer to load than help may take.
 
 __all__ = ["app", "main"]
 
@@ -114,11 +113,8 @@ def run(
     folder = output or Path(f"{file.stem}-study")
     report.check_folder(folder, overwrite)
     parts = kept.NOTHING if fresh else kept.of_user()
-    with progress_bar() as progress:
-        try:
-            study = story.run(mission, progress, parts)
-        except ValueError as error:  # an unstable loop, or a mirror without inverse
-            raise Refusal(f"{mission.path}: {error}") from error
+    with progress_bar() as progress, refusal_of(mission.path):
+        study = story.run(mission, progress, parts)
 
     def write() -> str:
         with progress_bar() as progress:

@@ -28,7 +28,6 @@ from microrad.cli.frame import (
 )
 from microrad.core.folder import read_bytes, write_whole
 
-# Everything else is imported inside the commands: it takes longer to load than help may take.
 if TYPE_CHECKING:
     from microrad.campaign.run import Means
 
@@ -91,7 +90,7 @@ def _kept(path: Path) -> Iterator[None]:
         said = isinstance(error, KeyboardInterrupt) and str(error)
         if not interrupted(error) or said or not path.is_file():
             raise
-        from microrad.campaign.ledger_file import argument
+        from microrad.campaign.ledger import argument
 
         words = f"stopped; finished rows are in {path}. Go on with: microrad campaign resume {argument(path)}"
         raise KeyboardInterrupt(words) from None
@@ -99,10 +98,10 @@ def _kept(path: Path) -> Iterator[None]:
 
 def _shown(path: Path, as_json: bool, output: str = "") -> Outcome:
     """The state of a ledger, as text or JSON; the exit code says whether the rows keep the limits."""
-    from microrad.campaign.summary import summarise
+    from microrad.campaign.statistics.summary import summarise_campaign
     from microrad.report import campaign_words
 
-    found = summarise(path)
+    found = summarise_campaign(path)
     code = MET if campaign_words.verdict(found) == "pass" else UNMET
     if as_json:
         return Outcome(json_text({**campaign_words.data(found), "ledger": str(path)}), code)
@@ -120,7 +119,7 @@ def init(
     """
     from importlib import resources
 
-    from microrad.campaign.ledger_file import argument
+    from microrad.campaign.ledger import argument
 
     file = file or Path("campaign.toml")
     check_target(file, "name another one: microrad campaign init other.toml")
@@ -155,13 +154,13 @@ def run(
     on to the same results. The exit code is 0 when all rows keep all limits (with a grid: in one of its cells at
     least), and 1 when they do not.
     """
-    from microrad.campaign.run import begin
+    from microrad.campaign.run import run_campaign
 
     means = _means(threads, workers, scheduler)
     path = ledger or file.parent / f"{file.stem}.ledger"
     with _kept(path):
         with progress_bar(_LINE_S) as progress:
-            begin(file, path, means, progress)
+            run_campaign(file, path, means, progress)
         return _shown(path, as_json)
 
 
@@ -178,12 +177,12 @@ def resume(
 
     Refused where microrad, the campaign file or the mission is no longer what it was.
     """
-    from microrad.campaign.run import resume as go_on
+    from microrad.campaign.run import resume_campaign
 
     means = _means(threads, workers, scheduler)
     with _kept(ledger):
         with progress_bar(_LINE_S) as progress:
-            go_on(ledger, means, progress)
+            resume_campaign(ledger, means, progress)
         return _shown(ledger, as_json)
 
 
@@ -204,10 +203,10 @@ def verify(ledger: _Ledger, as_json: Json = False) -> Outcome:
 
     The exit code is 1 when something is damaged; microrad campaign resume does just that again.
     """
-    from microrad.campaign import mending
-    from microrad.campaign.ledger_file import argument
+    from microrad.campaign import ledger as ledgers
+    from microrad.campaign.ledger import argument
 
-    found = mending.verify(ledger)
+    found = ledgers.verify(ledger)
     if as_json:
         return Outcome(json_text({**asdict(found), "sound": found.sound}), int(not found.sound))
     lines = [f"{found.checked} chunks with a right checksum"]
@@ -232,12 +231,12 @@ def export(
     overwrite: Overwrite = False,
 ) -> Outcome:
     """Write the table of rows: drawn inputs, weights, outputs, and why a row failed."""
-    from microrad.campaign.export import export as write
+    from microrad.campaign.export import export_rows
     from microrad.campaign.ledger import Ledger
 
     _check_output(file, overwrite)
     with Ledger.open(ledger, write=False) as book:
-        write(book, file)
+        export_rows(book, file)
     return Outcome(str(file))
 
 
@@ -251,12 +250,12 @@ def report(
     overwrite: Overwrite = False,
 ) -> Outcome:
     """Write one page with the pictures: distributions, tail, sensitivity, failure region, worst rows."""
-    from microrad.campaign.summary import summarise
+    from microrad.campaign.statistics.summary import summarise_campaign
     from microrad.report import campaign_page
 
     file = file or ledger.parent / f"{ledger.stem}.html"
     _check_output(file, overwrite)
-    write_whole(file, campaign_page.html(summarise(ledger)))
+    write_whole(file, campaign_page.html(summarise_campaign(ledger)))
     return Outcome(str(file))
 
 
@@ -269,11 +268,11 @@ def optimise(file: _File, threads: _Threads = None, as_json: Json = False) -> Ou
     not seen. The exit code is 0 when these agree (the 95 % interval of the share of them that keeps each limit reaches
     optimise.confidence, the share that is wanted), and 1 when they do not or no design keeps the limits.
     """
-    from microrad.campaign import search
+    from microrad.campaign.optimisation.campaign import optimise_campaign
     from microrad.report import campaign_optimum
 
     with progress_bar(_LINE_S) as progress:
-        found = search.run(file, threads, progress)
+        found = optimise_campaign(file, threads, progress)
     code = MET if found.confirmed else UNMET
     if as_json:
         return Outcome(json_text(campaign_optimum.data(found)), code)

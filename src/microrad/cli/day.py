@@ -16,10 +16,10 @@ from microrad.cli.frame import (
     examples,
     json_text,
     progress_bar,
+    refusal_of,
     width,
 )
 
-# Everything else is imported inside the commands: it takes longer to load than help may take.
 if TYPE_CHECKING:
     from microrad.link.study import LinkStudy
 
@@ -34,10 +34,8 @@ def _links(file: Path) -> "LinkStudy":
     from microrad.mission.file import load_link
 
     given = load_link(file)
-    try:
+    with refusal_of(file):
         return link_study.run(given)
-    except ValueError as error:  # a rate that the receiver does not take, a scan without time to detect
-        raise Refusal(f"{file}: {error}") from error
 
 
 @app.command(
@@ -67,18 +65,15 @@ def contacts(
     from microrad.report import day_tables, day_views
 
     links = _links(file)
-    try:
-        with progress_bar() as progress:
-            day = day_study.run(links, on_progress=progress)
-    except ValueError as error:  # a table that is missing, an orbit that does not hold
-        raise Refusal(f"{file}: {error}") from error
+    with refusal_of(file), progress_bar() as progress:
+        day = day_study.run(links, on_progress=progress)
     code = MET if day.relay.capacity_bit > 0.0 else UNMET
     if as_json:
         return Outcome(json_text({"mission": links.file.mission.name, **day_tables.data(day)}), code)
     if as_csv:
         return Outcome(day_views.csv_text(day), code)
     if as_html:
-        from microrad.report import single_pages  # drawing takes longer to load than a table needs
+        from microrad.report import single_pages
 
         return Outcome(single_pages.day(day, links), code)
     return Outcome(day_views.text(day, width()), code)
@@ -113,7 +108,7 @@ def constellation(
     from microrad.report import constellation_views
 
     links = _links(file)
-    try:
+    with refusal_of(file):
         with progress_bar() as progress:
             plan = plans.run(links.file, day_study.given_loss(links), progress)
         code = MET if plan.volume_bit > 0.0 else UNMET
@@ -121,8 +116,6 @@ def constellation(
             return Outcome(operations.csv_text(plan.planned, plan.epoch.utc), code)
         if as_plan:
             return Outcome(plan.contact_plan(), code)
-    except ValueError as error:  # a table that is missing, an orbit that does not hold
-        raise Refusal(f"{file}: {error}") from error
     if as_json:
         return Outcome(json_text({"mission": links.file.mission.name, **constellation_views.data(plan)}), code)
     return Outcome(constellation_views.text(plan, width()), code)

@@ -24,7 +24,6 @@ from microrad.cli.frame import (
 )
 from microrad.core.folder import read_bytes, write_whole
 
-# Everything else is imported inside the commands: it takes longer to load than help may take.
 if TYPE_CHECKING:
     from microrad.export.choice import Choice
     from microrad.mission.file import MissionFile
@@ -84,17 +83,6 @@ _Kind = Annotated[
 _Folder = Annotated[Path | None, option("--output", "FOLDER", "Folder to write [default: <mission>-<identifier>].")]
 
 
-def _mission(file: Path, mirror: Path | None) -> "MissionFile":
-    from microrad.mission.file import load_mission
-
-    return load_mission(file, mirror)
-
-
-def _default_controller(has_fine_loop: bool) -> str:
-    """Feedback with the inverse of the hysteresis ahead of it: the paper's choice, in the loop that the mission has."""
-    return DEFAULT_CONTROLLER if has_fine_loop else "PID + inverse"
-
-
 @exports.command(
     epilog=examples(
         "microrad export c leo-geo.toml",
@@ -122,9 +110,12 @@ def c(  # noqa: PLR0913, PLR0917  each is an option
     from microrad.export import choice
     from microrad.export.flight import write
     from microrad.export.identifiers import identifier, suggested
+    from microrad.mission.file import load_mission
 
-    mission = _mission(file, mirror)
-    wanted = controller if controller is not None else _default_controller(mission.mission.fine_pointing is not None)
+    mission = load_mission(file, mirror)
+    # Feedback with the inverse of the hysteresis ahead of it: the paper's choice, in the loop that the mission has.
+    default = DEFAULT_CONTROLLER if mission.mission.fine_pointing is not None else "PID + inverse"
+    wanted = controller if controller is not None else default
     name = identifier(name) if name is not None else suggested(wanted)
     folder = output or Path(f"{file.stem}-{name}")
     write.check_output(folder, overwrite)
@@ -175,10 +166,11 @@ def fmu(  # noqa: PLR0913, PLR0917  each is an option
     from microrad.export import choice
     from microrad.export.fmi.fmu import write_unit
     from microrad.export.identifiers import identifier, suggested
+    from microrad.mission.file import load_mission
 
     if controller is not None and loop is not None:
         raise Refusal("--controller and --loop exclude each other: a controller stands in one loop of the mission.")
-    mission = _mission(file, mirror)
+    mission = load_mission(file, mirror)
     name = identifier(name) if name is not None else suggested(f"{controller} loop" if controller else "mirror")
     path = output or Path(f"{file.stem}-{name}.fmu")
     _check_file(path, overwrite, b"PK")
@@ -219,8 +211,9 @@ def matrices(
     """
     from microrad.export import choice
     from microrad.export import matrices as linear
+    from microrad.mission.file import load_mission
 
-    mission = _mission(file, mirror)
+    mission = load_mission(file, mirror)
     path = output or Path(f"{file.stem}.mat")
     if not as_json:
         _check_file(path, overwrite, b"MATLAB 5.0")

@@ -205,6 +205,15 @@ def _failed(error: BaseException) -> int:
     return BUG
 
 
+@contextlib.contextmanager
+def refusal_of(file: Path) -> Iterator[None]:
+    """Name the file in front of what cannot be done with it: a rate that a receiver does not take, an unstable loop."""
+    try:
+        yield
+    except ValueError as error:
+        raise Refusal(f"{file}: {error}") from error
+
+
 def interrupted(error: BaseException | None) -> bool:
     """Whether an interrupt is behind an error: one that falls into an import comes out as another error."""
     while error is not None and not isinstance(error, KeyboardInterrupt):

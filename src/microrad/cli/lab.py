@@ -27,7 +27,6 @@ from microrad.cli.frame import (
 )
 from microrad.core.folder import write_whole
 
-# Everything else is imported inside the commands: it takes longer to load than help may take.
 if TYPE_CHECKING:
     from microrad.lab.identify import Identification
     from microrad.lab.recording import Recording
@@ -131,7 +130,7 @@ def identify(  # noqa: PLR0913  every argument is a named option
     """
     from microrad import report
     from microrad.lab import identify as identification
-    from microrad.lab.live_fit import looker_on
+    from microrad.lab.live_fit import live_fit_writer
     from microrad.lab.recording import stated_units
 
     target = mirror_file or Path(f"{files[0].stem}-mirror.toml")
@@ -162,7 +161,7 @@ def identify(  # noqa: PLR0913  every argument is a named option
             output_unit=output_unit,
             lever_arm_m=lever_arm,
             input_unit=input_unit,
-            on_fit=looker_on(os.environ.get(PROGRESS_FILE)),
+            on_fit=live_fit_writer(os.environ.get(PROGRESS_FILE)),
         )
     if found.unsupported:
         raise Refusal(found.unsupported)
@@ -288,7 +287,7 @@ def bench(
     folder = output or Path(f"{Path(plan).stem}-bench")
     virtual.check_folder(folder, overwrite)
     with progress_bar() as progress:
-        files = virtual.write(found, folder, seed, overwrite, progress)
+        files = virtual.write_folder(found, folder, seed, overwrite, progress)
     if as_json:
         return Outcome(json_text({"plan": found.name, "folder": str(folder), "files": [str(f) for f in files]}))
     listed = "\n".join(map(str, files))

@@ -18,10 +18,10 @@ from microrad.cli.frame import (
     examples,
     json_text,
     option,
+    refusal_of,
     width,
 )
 
-# Everything else is imported inside the commands: it takes longer to load than help may take.
 if TYPE_CHECKING:
     from microrad.mission.file import LinkFile
 
@@ -69,18 +69,16 @@ def budget(  # noqa: PLR0913, PLR0917  each is an option
             "requirement.outage. Change jitter.bias and jitter.rms, or take the table out."
         )
     given = _changed(loaded, data_rate, pointing_error)
-    try:
+    with refusal_of(file):
         solution = None if solve is None else link_study.solve(given, solve)
         study = link_study.run(given if solution is None else solution.file)
-    except ValueError as error:  # a rate that the receiver does not take, a scan without time to detect
-        raise Refusal(f"{file}: {error}") from error
     code = exit_on.code(met=met(study), closes=study.closes)
     if as_json:
         return Outcome(json_text(budget_views.data(study, solution)), code)
     if as_csv:
         return Outcome(budget_views.csv_text(study, solution), code)
     if as_html:
-        from microrad.report import single_pages  # drawing takes longer to load than a table needs
+        from microrad.report import single_pages
 
         return Outcome(single_pages.budget(study, solution), code)
     return Outcome(budget_views.text(study, width(), verbose=verbose, solution=solution), code)

@@ -11,17 +11,16 @@ from microrad.cli.frame import (
     Accept,
     Json,
     Outcome,
-    Refusal,
     app,
     command,
     examples,
     json_text,
     option,
     progress_bar,
+    refusal_of,
     width,
 )
 
-# Everything else is imported inside the commands: it takes longer to load than help may take.
 if TYPE_CHECKING:
     from microrad.loop.fine_pointing import Design, Outlook, Scene
 
@@ -47,21 +46,17 @@ def design(
     run simulates all of it. --json also prints their matrices. The exit code is 1 when one of them is refused: its
     simulated figure is more than 1.5 times its linear one.
     """
+    from microrad import mirror as mirror_room
+    from microrad.link.tracking_light import tracking_light_w
+    from microrad.loop import fine_pointing
     from microrad.mirror.summary import unknown_dynamics
     from microrad.mission.file import load_mission
 
     mission = load_mission(file, mirror)
-    with progress_bar() as progress:
-        try:
-            from microrad import mirror as mirror_room
-            from microrad.link.tracking_light import tracking_light_w
-            from microrad.loop import fine_pointing
-
-            scene = fine_pointing.scene(mission, mirror_room.of(mission.mission), tracking_light_w(mission))
-            designs = fine_pointing.design(scene, progress)
-            left = fine_pointing.outlook(scene, designs, progress)
-        except ValueError as error:  # a loop that cannot be built, a margin out of reach
-            raise Refusal(f"{mission.path}: {error}") from error
+    with progress_bar() as progress, refusal_of(mission.path):
+        scene = fine_pointing.scene(mission, mirror_room.of(mission.mission), tracking_light_w(mission))
+        designs = fine_pointing.design(scene, progress)
+        left = fine_pointing.outlook(scene, designs, progress)
     marks = [each.mark(accept) for each in left]
     warnings = list(filter(None, [unknown_dynamics(mission.mission.mirror), _broken(designs, left, accept)]))
     code = UNMET if "refused" in marks else MET

@@ -12,8 +12,6 @@ if TYPE_CHECKING:
     from microrad.studio.server import Entrance
     from microrad.studio.session import Session
 
-# Everything else is imported inside the command: it takes longer to load than help may take.
-
 
 @app.command(
     epilog=examples(

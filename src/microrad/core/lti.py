@@ -118,7 +118,7 @@ def resolvent_rows(A: Floats, C: Floats, points: Complexes) -> Complexes:
     States in volts beside states in radians cost Schur's rotations the digits of the small ones: they are scaled first,
     by powers of 2 that make rows and columns of A alike, and the rows are corrected once by what they leave of C.
     """
-    from scipy.linalg.lapack import dgebal, zgees  # slow to import, not needed to show help
+    from scipy.linalg.lapack import dgebal, zgees
 
     (several, order), outputs = A.shape[:2], C.shape[1]
     balanced, scale = np.empty_like(A), np.empty((several, order))
@@ -146,7 +146,7 @@ def resolvent_rows(A: Floats, C: Floats, points: Complexes) -> Complexes:
 
 def zeros(system: StateSpace) -> Complexes:
     """Finite invariant zeros of a square system: where [[A - s, B], [C, D]] loses rank."""
-    from scipy.linalg import eig  # slow to import, not needed to show help
+    from scipy.linalg import eig
 
     n = system.order
     pencil = np.block([[system.A, system.B], [system.C, system.D]])
@@ -160,7 +160,7 @@ def zeros(system: StateSpace) -> Complexes:
 
 def first_order_hold(A: Floats, B: Floats, step_s: float) -> tuple[Floats, Floats, Floats]:
     """Exact step for an input linear over it: x[k+1] = Ad x[k] + B0 u[k] + B1 u[k+1]; returns Ad, B0, B1."""
-    from scipy.linalg import expm  # slow to import, not needed to show help
+    from scipy.linalg import expm
 
     n, m = A.shape[0], B.shape[1]
     block = np.zeros((n + 2 * m, n + 2 * m))

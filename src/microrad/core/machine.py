@@ -65,7 +65,7 @@ def as_stated(stated: Any) -> dict[str, str]:
 
 def _processor() -> str:
     """The processor's kind, as the compiler of the loops names it."""
-    from llvmlite.binding import get_host_cpu_name  # type: ignore[import-untyped]  # here: slow to load
+    from llvmlite.binding import get_host_cpu_name  # type: ignore[import-untyped]
 
     return str(get_host_cpu_name())
 
@@ -77,7 +77,7 @@ def _instruction_sets() -> str:
 
 
 def _scipy_blas() -> str:
-    import scipy  # here: slow to load
+    import scipy
 
     return _blas(scipy)
 

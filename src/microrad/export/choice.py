@@ -262,7 +262,7 @@ def _tracking_controller(choice: TrackingChoice) -> FlightController:
         bias_v=choice.source.mirror.bias_v,
         margins=(
             ("modulus margin", margins.modulus, ""),
-            ("gain margin", 20.0 * math.log10(margins.gain), "dB"),
+            ("gain margin", 20.0 * math.log10(margins.gain_up), "dB"),
             ("phase margin", math.degrees(margins.phase_rad), "deg"),
             ("delay margin", margins.delay_s, "s"),
         ),

@@ -16,11 +16,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from microrad.core.arrays import Floats
+
 if TYPE_CHECKING:
-    from microrad.lab.identify.ladder.predictions import Judged, Prediction
+    from microrad.lab.identify.selection.predictions import Prediction, ScoredModel
     from microrad.lab.recording import Recording
 
-FITS = "fits"
+LIVE_FITS = "fits"
 """Name of the file, beside that of the progress."""
 
 _LOOPS = 6  # recordings that are kept; a bench writes a dozen
@@ -52,24 +54,24 @@ class LiveFit:
     loops: tuple[Loop, ...]
 
 
-def looker_on(progress: str | None) -> Callable[[Judged], None]:
+def live_fit_writer(progress: str | None) -> Callable[[ScoredModel], None]:
     """What `identify` gives its models to: a file beside that of the progress, or nothing where there is none.
 
     A disk that is full costs the picture, not the identification.
     """
     if not progress:
         return lambda judged: None
-    path = Path(progress).with_name(FITS)
+    path = Path(progress).with_name(LIVE_FITS)
 
-    def write(judged: Judged) -> None:
-        line = json.dumps(asdict(thinned(judged)), allow_nan=False)
+    def write(judged: ScoredModel) -> None:
+        line = json.dumps(asdict(thin_fit(judged)), allow_nan=False)
         with suppress(OSError), path.open("a", encoding="ascii") as file:
             file.write(f"{line}\n")
 
     return write
 
 
-def thinned(judged: Judged) -> LiveFit:
+def thin_fit(judged: ScoredModel) -> LiveFit:
     """A model with its curves, thinned for drawing."""
     pairs = zip(judged.recordings[:_LOOPS], judged.predictions[:_LOOPS], strict=True)
     loops = tuple(_loop(recording, prediction) for recording, prediction in pairs)
@@ -98,7 +100,7 @@ def _digits(values: object) -> tuple[float, ...]:
     return tuple(float(f"{value:.7g}") for value in np.asarray(values, dtype=float))
 
 
-def extremes(columns: list[NDArray[np.float64]], points: int) -> NDArray[np.intp]:
+def extremes(columns: list[Floats], points: int) -> NDArray[np.intp]:
     """Rows, in order, that hold the smallest and largest value of every column in each of `points`/2 stretches.
 
     A recording of at most `points` samples is kept whole.

@@ -66,7 +66,7 @@ class Run:
         return float(np.max(np.abs(np.diff(self.trace.drive_v, axis=0))) / period)
 
 
-def results(cases: PaperCases) -> tuple[tuple[HysteresisLoop, ...], control.Margins, tuple[Run, ...]]:
+def results(cases: PaperCases) -> tuple[tuple[HysteresisLoop, ...], control.LoopMargins, tuple[Run, ...]]:
     """The settled loops, the margins and the tracked sines. Raises ValueError as `loop_margins` and `tracking_runs`."""
     return hysteresis_loops(cases), loop_margins(cases), tracking_runs(cases)
 
@@ -79,7 +79,7 @@ def hysteresis_loops(cases: PaperCases) -> tuple[HysteresisLoop, ...]:
     )
 
 
-def loop_margins(cases: PaperCases) -> control.Margins:
+def loop_margins(cases: PaperCases) -> control.LoopMargins:
     """Margins of the loop as it is sampled; raises ValueError when it is unstable."""
     return margins(cases.mirrors.line_of_sight[Variant.GIVEN].plant, cases.setup)
 

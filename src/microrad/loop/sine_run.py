@@ -83,7 +83,7 @@ def sampled_loop(m: Mirror, setup: Setup) -> lti.StateSpace:
     return lti.series(setup.controller, control.sampled_plant(m, setup.drive, setup.timing))
 
 
-def margins(m: Mirror, setup: Setup) -> control.Margins:
+def margins(m: Mirror, setup: Setup) -> control.LoopMargins:
     """Margins of the loop as it is sampled; raises ValueError when it is unstable."""
     plant = control.sampled_plant(m, setup.drive, setup.timing)
     return control.margins(setup.controller, plant, setup.timing.period_s)

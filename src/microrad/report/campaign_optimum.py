@@ -4,9 +4,10 @@ from dataclasses import asdict
 from math import isnan
 from typing import Any
 
-from microrad.campaign.candidates import INTERVAL_CONFIDENCE, Candidate, Kept, Variable
-from microrad.campaign.optimise import Optimum
-from microrad.campaign.outputs import OUTPUTS
+from microrad.campaign.definition.outputs import OUTPUTS
+from microrad.campaign.definition.records import Variable
+from microrad.campaign.optimisation.candidates import INTERVAL_CONFIDENCE, Candidate, Kept
+from microrad.campaign.optimisation.search import Optimum
 from microrad.report.quantities import quantity
 
 _SLACK = "for slack draw more rows (optimise.rows) or ask for a larger share (optimise.confidence)"
@@ -81,14 +82,11 @@ def _costs(optimum: Optimum, best: Candidate) -> list[str]:
 
 
 def _cost_name(optimum: Optimum) -> str:
-    """The cost, and for an output which statistic of the rows it is."""
+    """The cost, and for an output that it is the mean."""
     problem = optimum.problem
     if problem.cost_name in {variable.key for variable in problem.variables}:
         return problem.cost_name
-    statistic = (
-        "mean over the rows" if problem.quantile is None else f"{_percent(problem.quantile)} quantile of the rows"
-    )
-    return f"{problem.cost_name} ({statistic})"
+    return f"{problem.cost_name} (mean over the rows)"
 
 
 def _limits(optimum: Optimum) -> list[tuple[str, ...]]:

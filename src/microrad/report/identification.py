@@ -10,7 +10,8 @@ from typing import Any
 from microrad.core.folder import write_whole
 from microrad.core.units import format_quantity
 from microrad.lab.identify import Identification
-from microrad.lab.identify.ladder.predictions import Fit
+from microrad.lab.identify.records import rounded_to_error
+from microrad.lab.identify.selection.predictions import Fit
 from microrad.lab.recording import Finding, Recording
 from microrad.report import identification_parameters as parameters
 from microrad.report import identification_words as words
@@ -119,6 +120,7 @@ def render(
         "ranking": _ranking(found),
         "span": format_quantity(found.span_rad, "rad", 4),
         "two_digits": parameters.two_digits,
+        "rounded_to_error": rounded_to_error,
         "figures": figures.draw(found, recordings, virtual=virtual),
         "versions": versions(),
     }
@@ -173,8 +175,8 @@ def _model(name: str, fit: Fit) -> dict[str, Any]:
     for row in parameters.parameter_rows(fit):
         value, error, unit = row.shown
         note = row.note or (f"not identified: {unknown[row.name]}" if row.name in unknown else "")
-        error_text = parameters.two_digits(error)
-        rows.append({"name": row.name, "value": f"{value:.5g}", "error": error_text, "unit": unit, "note": note})
+        shown = {"value": rounded_to_error(value, error), "error": parameters.two_digits(error)}
+        rows.append({"name": row.name, **shown, "unit": unit, "note": note})
     return {"name": name, "rows": rows, "notes": parameters.notes(fit)}
 
 

@@ -14,9 +14,9 @@ import numpy as np
 
 from microrad.core.arrays import Floats
 from microrad.lab.identify import Identification
-from microrad.lab.identify.ladder.predictions import Prediction
-from microrad.lab.identify.ladder.roles import roles
 from microrad.lab.identify.linear.fit import LinearFit, fit_percent, output_error
+from microrad.lab.identify.selection.predictions import Prediction
+from microrad.lab.identify.selection.roles import roles
 from microrad.lab.recording import Recording
 from microrad.report import identification_words as words
 from microrad.report.plotting.figure import Figure

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from microrad.lab.identify import BoucWenFit, PrandtlIshlinskiiFit
 from microrad.lab.identify.hysteresis.bouc_wen import PARAMETER_UNITS, PARAMETERS
 from microrad.lab.identify.hysteresis.joint import JointFit
-from microrad.lab.identify.ladder.predictions import Fit
+from microrad.lab.identify.records import rounded_to_error
+from microrad.lab.identify.selection.predictions import Fit
 
 HIGH_CORRELATION = 0.95
 
@@ -133,7 +134,7 @@ def notes(fit: Fit) -> list[str]:
         value, error = fit.settled_hysteresis_rad
         found.append(
             f"Better fixed than its parts: the hysteresis of a slow settled loop, |epsilon| / (alpha + sign(epsilon) "
-            f"beta) = {1e6 * value:.4g} ± {1e6 * error:.2g} µrad."
+            f"beta) = {rounded_to_error(1e6 * value, 1e6 * error)} ± {1e6 * error:.2g} µrad."
         )
     found.append(
         f"Condition number {condition_number(fit):.3g}; the variances are inflated {colour(fit):.3g} times for the "

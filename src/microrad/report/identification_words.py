@@ -13,9 +13,10 @@ from microrad.core.arrays import Floats
 from microrad.core.units import format_quantity
 from microrad.lab.identify import Identification, PrandtlIshlinskiiFit, Score
 from microrad.lab.identify.hysteresis.joint import JointFit
-from microrad.lab.identify.ladder.doubts import fit_warnings
-from microrad.lab.identify.ladder.predictions import Fit, Prediction
 from microrad.lab.identify.linear.fit import LinearFit
+from microrad.lab.identify.records import rounded_to_error
+from microrad.lab.identify.selection.predictions import Fit, Prediction
+from microrad.lab.identify.selection.warnings import fit_warnings
 from microrad.lab.recording import Recording
 from microrad.mirror.hysteresis import Play
 from microrad.report.identification_parameters import (
@@ -227,10 +228,14 @@ def _linear_lines(linear: LinearFit) -> list[str]:
         f"  {linear.reason}",
     ]
     lines += [
-        f"  {r.kind} {r.freq_hz:10.5g} ± {two_digits(r.freq_error_hz)} Hz  damping {r.damping:.4g}"
+        f"  {r.kind} {rounded_to_error(r.freq_hz, r.freq_error_hz):>10} ± {two_digits(r.freq_error_hz)} Hz  "
+        f"damping {rounded_to_error(r.damping, r.damping_error)}"
         for r in roots(linear)
     ]
-    return lines + [f"  gain at {name}: {1e3 * g:.5g} ± {two_digits(1e3 * e)} mrad/V" for name, g, e in gains(linear)]
+    return lines + [
+        f"  gain at {name}: {rounded_to_error(1e3 * g, 1e3 * e)} ± {two_digits(1e3 * e)} mrad/V"
+        for name, g, e in gains(linear)
+    ]
 
 
 def _parameter_lines(fit: Fit) -> list[str]:
@@ -240,7 +245,7 @@ def _parameter_lines(fit: Fit) -> list[str]:
     for row in rows:
         value, error, unit = row.shown
         given = f"± {two_digits(error)} {unit}".rstrip() if math.isfinite(error) else f"{unit} ({row.note})".strip()
-        lines.append(f"  {row.name:{width}}{value:12.5g} {given}")
+        lines.append(f"  {row.name:{width}}{rounded_to_error(value, error):>12} {given}")
     unknown = not_identified(fit)
     if len(unknown) > _MOST_REASONS:
         lines.append(f"  not identified: {len(unknown)} of {len(rows)}, {', '.join(name for name, _ in unknown)}")

@@ -228,7 +228,7 @@ def _inputs(sources: Any) -> list[tuple[str, Source]]:
 
 def _margins(study: Study) -> list[tuple[str, str]]:
     s = study.margins
-    gain = "none needed" if math.isinf(s.gain) else f"{20 * math.log10(s.gain):.1f} dB"
+    gain = "none needed" if math.isinf(s.gain_up) else f"{20 * math.log10(s.gain_up):.1f} dB"
     return [
         ("gain margin", gain),
         ("phase margin", f"{math.degrees(s.phase_rad):.0f}°"),

@@ -58,7 +58,7 @@ class Loop:
 @cache
 def chirp() -> Chirp:
     """Play the paper's chirp and fit the five poles of Eq. 1 to it; the same every time."""
-    (record,) = bench.play(bench.only(bench.load_plan(PLAN), ["chirp"]), SEED)
+    (record,) = bench.play(bench.select_records(bench.load_plan(PLAN), ["chirp"]), SEED)
     found = identify.response_from_records([record])
     weight = 1.0 / found.standard_error
     fit = identify.vector_fit(
@@ -90,7 +90,7 @@ def loops() -> tuple[Loop, ...]:
     """Play the paper's sines, fit Eq. 3 to the fastest alone as the paper does, predict all; the same every time."""
     plan = bench.load_plan(PLAN)
     names = [r.excitation.name for r in plan.records if r.kind == "sines"]
-    records = {_freq_hz(r): r for r in bench.play(bench.only(plan, names), SEED)}
+    records = {_freq_hz(r): r for r in bench.play(bench.select_records(plan, names), SEED)}
     fitted = max(records)
     fit = identify.fit_bouc_wen([records[fitted]], starts=4)
     return tuple(_loop(fit, record, freq, fitted) for freq, record in sorted(records.items()))

@@ -72,7 +72,7 @@ class Study:
     margin_map: MarginMap
     summary: mirror_summary.Summary
     loops: tuple[sine_run.HysteresisLoop, ...]
-    margins: control.Margins
+    margins: control.LoopMargins
     runs: tuple[paper_cases.Run, ...]
     residual: paper_cases.Run
     comparison: Comparison | None

@@ -10,9 +10,8 @@ from fractions import Fraction
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from microrad.core.arrays import Floats
+from microrad.core.arrays import Floats, Integers
 from microrad.core.units import format_quantity
 from microrad.lab.recording.records import frozen
 from microrad.mission.fields import Problem, ProblemsError
@@ -337,7 +336,7 @@ def _whole_period(limits: Limits, name: str, period_s: float) -> int:
     raise DesignError(name, Problem("period", f"is {exact:.6g} samples, no whole number of at least 2", near))
 
 
-def _harmonics(lines: Lines, name: str, rng: np.random.Generator) -> NDArray[np.int64]:
+def _harmonics(lines: Lines, name: str, rng: np.random.Generator) -> Integers:
     beyond = 2.0 * MOST_SAMPLES  # the lines of any record
     first = max(math.ceil(min(lines.start_hz * lines.period_s, beyond) - _WHOLE), 1)
     last = math.floor(min(lines.stop_hz * lines.period_s, beyond) + _WHOLE)
@@ -356,7 +355,7 @@ def _harmonics(lines: Lines, name: str, rng: np.random.Generator) -> NDArray[np.
 
 
 def _orthogonal_set(
-    harmonics: NDArray[np.int64], length: int, inputs: int, realisations: int, rng: np.random.Generator
+    harmonics: Integers, length: int, inputs: int, realisations: int, rng: np.random.Generator
 ) -> list[Floats]:
     """One period of each realisation, shape (samples, inputs), each input with an rms of 1."""
     turns = np.exp(2j * np.pi * np.outer(np.arange(inputs), np.arange(inputs)) / inputs)  # (realisation, input)

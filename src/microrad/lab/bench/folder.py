@@ -17,7 +17,7 @@ from microrad.core.folder import check_folder as check
 from microrad.core.installing import advice
 from microrad.core.progress import Progress
 from microrad.lab.bench.plan import Plan, Record
-from microrad.lab.bench.play import BenchError, played
+from microrad.lab.bench.play import BenchError, play_records
 from microrad.lab.recording import Recording, read_recording
 
 _ROWS = 1 << 16  # of text written at once
@@ -183,7 +183,7 @@ PLAN = "plan.toml"
 _MOST_MANIFEST = 16_000_000
 
 
-def write(
+def write_folder(
     plan: Plan, folder: str | Path, seed: int, overwrite: bool = False, on_progress: Progress | None = None
 ) -> tuple[Path, ...]:
     """Play a plan into a folder: the files of its records in the plan's formats, plan.toml and manifest.json.
@@ -207,7 +207,7 @@ def write(
     folder = Path(folder)
     entries: list[dict[str, Any]] = []
     with whole_folder(folder, overwrite, "plan", "recordings") as draft:
-        for record, recording in played(plan, seed, on_progress):
+        for record, recording in play_records(plan, seed, on_progress):
             files = [write_file(recording, form, draft).name for form in plan.formats]
             entries.append(_entry(record, recording, files))
         (draft / PLAN).write_text(plan.text, encoding="utf-8", newline="\n")
@@ -255,7 +255,7 @@ def check_folder(folder: Path, overwrite: bool) -> None:
 
 
 def read_folder(folder: Path, accept: tuple[str, ...] = ()) -> tuple[tuple[Recording, str], ...]:
-    """Recordings of a folder that `write` made, each with its use ("identification" or "validation").
+    """Recordings of a folder that `write_folder` made, each with its use ("identification" or "validation").
 
     Of several formats the first is read.
 

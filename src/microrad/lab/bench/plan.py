@@ -304,7 +304,7 @@ class Plan:
     sha256: str
 
 
-def only(plan: Plan, names: Sequence[str]) -> Plan:
+def select_records(plan: Plan, names: Sequence[str]) -> Plan:
     """The plan cut down to some of its records; their noise stays the same.
 
     Args:

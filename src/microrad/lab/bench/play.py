@@ -9,8 +9,8 @@ import numpy as np
 from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
 from microrad.core.units import format_quantity
+from microrad.lab.bench.mirrors import Amplifier, bench_output, bouc_wen_output, linear_output
 from microrad.lab.bench.plan import ConvertersTable, Plan, Record
-from microrad.lab.bench.truth import Amplifier, bench_output, bouc_wen_output, linear_output
 from microrad.lab.recording.records import Recording, digest_of, frozen
 
 _MRAD = 1e3  # recordings are in volts and mrad
@@ -57,10 +57,10 @@ def play(plan: Plan, seed: int, on_progress: Progress | None = None) -> tuple[Re
     Raises:
         BenchError: When an output leaves the range of its converter.
     """
-    return tuple(recording for _, recording in played(plan, seed, on_progress))
+    return tuple(recording for _, recording in play_records(plan, seed, on_progress))
 
 
-def played(plan: Plan, seed: int, on_progress: Progress | None = None) -> Iterator[tuple[Record, Recording]]:
+def play_records(plan: Plan, seed: int, on_progress: Progress | None = None) -> Iterator[tuple[Record, Recording]]:
     """Each record with its recording, one after the other, see `play`."""
     if seed < 0:
         raise BenchError(f"the seed is {seed}; give a whole number of at least 0")

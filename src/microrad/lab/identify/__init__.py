@@ -9,13 +9,14 @@ outputs in radians. Its steps stand alone too, for any number of inputs and outp
 from microrad.lab.identify.hysteresis.bouc_wen import BoucWenFit, fit_bouc_wen
 from microrad.lab.identify.hysteresis.joint import FORMS, JointFit, fit_joint
 from microrad.lab.identify.hysteresis.prandtl_ishlinskii import PrandtlIshlinskiiFit, fit_prandtl_ishlinskii
-from microrad.lab.identify.ladder.choice import MODELS, STATIC, Identification, Refused, identify
-from microrad.lab.identify.ladder.mirror_file import mirror_file_text
-from microrad.lab.identify.ladder.predictions import Score, predict
 from microrad.lab.identify.linear.fit import fit_linear, output_error
 from microrad.lab.identify.linear.response import response_from_records
 from microrad.lab.identify.linear.vector_fitting import vector_fit
-from microrad.lab.identify.prepared import IdentificationError, Units
+from microrad.lab.identify.mirror_file import mirror_file_text
+from microrad.lab.identify.records import IdentificationError, Units
+from microrad.lab.identify.selection.candidates import MODELS, STATIC, Refused
+from microrad.lab.identify.selection.choice import Identification, identify
+from microrad.lab.identify.selection.predictions import Score, predict
 from microrad.lab.identify.stiffness.fit import fit_hysteretic_stiffness, predicted_error
 
 __all__ = [

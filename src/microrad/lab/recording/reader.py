@@ -6,15 +6,20 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
+from microrad.core.arrays import Floats
 from microrad.lab.recording.checks.sample_rate import agreed_rate, check_rate, rate_of_time
 from microrad.lab.recording.checks.signals import check_signals
 from microrad.lab.recording.files import check_file, file_format
+from microrad.lab.recording.formats.lvm import LvmSource
+from microrad.lab.recording.formats.matlab import MatlabSource
+from microrad.lab.recording.formats.numpy_files import NumpySource
 from microrad.lab.recording.formats.source import SECONDS, Source, StatedRate, time_unit
+from microrad.lab.recording.formats.tdms import TdmsSource
+from microrad.lab.recording.formats.text import TextSource
 from microrad.lab.recording.records import (
     ACCEPTABLE,
     MIN_SAMPLES,
     Finding,
-    FloatArray,
     Recording,
     RecordingError,
     digest_of,
@@ -63,7 +68,7 @@ def read_recording(
     _check_distinct(source, ins, outs)
     clock = _clock(source, [*ins, *outs], time)
     optional = time is None and rate_hz is not None
-    columns, rates, findings = _load(source, [*ins, *outs], clock, optional)
+    columns, rates, findings = _load_columns(source, [*ins, *outs], clock, optional)
     rate = agreed_rate(str(path), rate_hz, [*source.rates([*ins, *outs]), *rates])
     _check_lengths(source, [*ins, *outs], columns)
     drives = {f"the input, {source.label(i)}": column for i, column in zip(ins, columns, strict=False)}
@@ -81,7 +86,7 @@ def read_recording(
         _checked_period(str(path), period_samples, drive.shape[0]),
         tuple(source.units[i] for i in ins),
         tuple(source.units[i] for i in outs),
-        _judged(str(path), findings, accept),
+        _carried(str(path), findings, accept),
     )
 
 
@@ -134,7 +139,7 @@ def recording_from_arrays(
         input_names,
         output_names,
         _checked_period(name, period_samples, len(u)),
-        findings=_judged(name, findings, accept),
+        findings=_carried(name, findings, accept),
     )
 
 
@@ -163,32 +168,16 @@ def multisine_recordings(
 
 # ---------------------------------------------------------------------------------------------------------- opening
 def open_source(path: Path) -> Source:
-    """The file as named channels; libraries are imported only for the format at hand."""
-    # One import per format: each pulls a library that the others do not need.
+    """The file as named channels. Raises RecordingError for a file of no known format, or a damaged one."""
     kind = file_format(path)
-    if kind == "tdms":
-        from microrad.lab.recording.formats.tdms import TdmsSource
-
-        return TdmsSource(path)
-    if kind == "lvm":
-        from microrad.lab.recording.formats.lvm import LvmSource
-
-        return LvmSource(path)
-    if kind == "mat":
-        from microrad.lab.recording.formats.matlab import MatlabSource
-
-        return MatlabSource(path)
     if kind in ("hdf5", "mat73"):
         from microrad.lab.recording.formats.hdf5 import Hdf5Source
 
         return Hdf5Source(path, matlab=kind == "mat73")
     if kind in ("npy", "npz"):
-        from microrad.lab.recording.formats.numpy_files import NumpySource
-
         return NumpySource(path, archive=kind == "npz")
-    from microrad.lab.recording.formats.text import TextSource
-
-    return TextSource(path)
+    sources = {"tdms": TdmsSource, "lvm": LvmSource, "mat": MatlabSource, "text": TextSource}
+    return sources[kind](path)
 
 
 def _columns(source: Source, wanted: Column | Sequence[Column], role: str) -> list[int]:
@@ -221,9 +210,9 @@ def _clock(source: Source, used: Sequence[int], time: Column | None) -> int | No
     return index
 
 
-def _load(
+def _load_columns(
     source: Source, used: list[int], clock: int | None, optional: bool
-) -> tuple[list[FloatArray], list[StatedRate], list[Finding]]:
+) -> tuple[list[Floats], list[StatedRate], list[Finding]]:
     """Columns of the channels, and what the time column says; `optional` lets one pass that is not made of numbers."""
     if clock is None:
         return source.load(used), [], []
@@ -249,7 +238,7 @@ def _load(
     return columns, [rate], findings
 
 
-def _check_lengths(source: Source, indices: Sequence[int], columns: Sequence[FloatArray]) -> None:
+def _check_lengths(source: Source, indices: Sequence[int], columns: Sequence[Floats]) -> None:
     for index, column in zip(indices, columns, strict=True):
         if column.size != columns[0].size:
             raise RecordingError(
@@ -269,7 +258,7 @@ def _check_accept(where: str, accept: Sequence[str]) -> None:
         )
 
 
-def _judged(where: str, findings: Sequence[Finding], accept: Sequence[str]) -> tuple[Finding, ...]:
+def _carried(where: str, findings: Sequence[Finding], accept: Sequence[str]) -> tuple[Finding, ...]:
     refused = [f for f in findings if f.refused and f.kind not in accept]
     if refused:
         kinds = list(dict.fromkeys(f.kind for f in refused))
@@ -294,5 +283,5 @@ def _checked_period(where: str, period_samples: int | None, samples: int) -> int
     return int(period_samples)
 
 
-def _table(columns: Sequence[FloatArray]) -> FloatArray:
+def _table(columns: Sequence[Floats]) -> Floats:
     return frozen(columns[0][:, None] if len(columns) == 1 else np.column_stack(columns))

@@ -3,12 +3,11 @@
 import hashlib
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from microrad.core.arrays import Floats
 
 MIN_SAMPLES = 200
 
@@ -55,8 +54,8 @@ class Recording:
 
     path: str
     sha256: str
-    drive: FloatArray
-    output: FloatArray
+    drive: Floats
+    output: Floats
     rate_hz: float
     input_names: tuple[str, ...]
     output_names: tuple[str, ...]
@@ -75,15 +74,19 @@ class Recording:
         """Number of samples."""
         return int(self.drive.shape[0])
 
+    def first(self, samples: int) -> "Recording":
+        """The first `samples` of it, or all where there are fewer."""
+        return replace(self, drive=self.drive[:samples], output=self.output[:samples])
 
-def frozen(values: FloatArray) -> FloatArray:
+
+def frozen(values: Floats) -> Floats:
     """The same values, contiguous and read-only."""
     values = np.ascontiguousarray(values)
     values.flags.writeable = False
     return values
 
 
-def digest_of(*arrays: FloatArray) -> str:
+def digest_of(*arrays: Floats) -> str:
     """SHA-256 of the bytes of arrays, one behind the other, without copying contiguous ones."""
     digest = hashlib.sha256()
     for array in arrays:

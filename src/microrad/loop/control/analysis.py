@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,9 @@ BREAKS = ("command", "optical")
 """Where a loop is cut: at the command all paths at once, at the optical sensor with the gauge's loop closed."""
 
 _POINTS = 3000
+
+NEAR_LEAST = 1.3
+"""Dips within this factor of the deepest point of a grid may be deeper than it between the points."""
 
 
 # ------------------------------------------------------------------------------------------------ closed loop
@@ -102,7 +105,7 @@ def refuse_unstable(plant: DesignPlant, controller: AxisController) -> None:
     worst = loop_poles(plant, controller)[0]
     if abs(worst) < 1.0:
         return
-    response, f = _respond(plant, controller, "command"), _frequencies(plant, controller)
+    response, f = _respond(plant, controller, "command"), _resolving(plant, controller)
     least, _ = _least(_modulus, response, f, response(f))
     raise ValueError(
         f"controller {controller.name!r} makes the loop unstable: a pole at |z| = {abs(worst):.6f} (the limit is 1), "
@@ -223,10 +226,14 @@ def _respond(plant: DesignPlant, controller: AxisController, broken_at: str) -> 
     def response(freq_hz: Floats) -> Complexes:
         K = lti.frequency_response(controller.system, freq_hz, plant.period_s)[:, 0, :]
         G = lti.frequency_response(mirror, freq_hz, plant.period_s)[:, :, 0]
-        L = cut(K, G, broken_at)
-        return np.asarray(np.where(freq_hz * plant.period_s > 0.5 - 1e-9, L.real, L))  # at half the rate L is real
+        return real_at_half_the_rate(cut(K, G, broken_at), freq_hz * plant.period_s)
 
     return response
+
+
+def real_at_half_the_rate(L: Complexes, cycles: Floats) -> Complexes:
+    """The loop gain at frequencies in cycles a sample, without what rounding leaves of an imaginary part at 0.5."""
+    return np.where(cycles > 0.5 - 1e-9, L.real, L)
 
 
 def around_poles(poles: Complexes, period_s: float, ratio: float) -> Floats:
@@ -242,38 +249,80 @@ def around_poles(poles: Complexes, period_s: float, ratio: float) -> Floats:
     return near[(near > 0.0) & (near < 0.5 / period_s)]
 
 
-def _frequencies(plant: DesignPlant, controller: AxisController) -> Floats:
-    """Grid that resolves every resonance of the open and the closed loop."""
-    whole = np.geomspace(1e-7, 0.5, _POINTS) / plant.period_s
-    poles = [loop_poles(plant, controller), *(np.linalg.eigvals(s.A) for s in (moved(plant).system, controller.system))]
-    near = around_poles(np.unique(np.concatenate(poles)), plant.period_s, 1.3)
-    near = near * (1.0 + 1e-9)  # an undamped filter has no response at its own frequency
-    return np.unique(np.concatenate([whole, near]).clip(max=0.5 / plant.period_s))
+def resolving(poles: Complexes, period_s: float) -> Floats:
+    """Frequencies (Hz) to half the rate on which a loop with these poles, open and closed, shows every resonance."""
+    near = around_poles(np.unique(poles), period_s, 1.3) * (1.0 + 1e-9)  # an undamped filter has no response at its own
+    return np.unique(np.concatenate([np.geomspace(1e-7, 0.5, _POINTS) / period_s, near]).clip(max=0.5 / period_s))
+
+
+def _resolving(plant: DesignPlant, controller: AxisController) -> Floats:
+    open_loop = (np.linalg.eigvals(s.A) for s in (moved(plant).system, controller.system))
+    return resolving(np.concatenate([loop_poles(plant, controller), *open_loop]), plant.period_s)
 
 
 def margins_at(plant: DesignPlant, controller: AxisController, broken_at: str = "command") -> LoopMargins:
     """Margins of the loop cut at one of `BREAKS`. Raises ValueError as `refuse_misfit` and `refuse_unstable` do."""
     refuse_misfit(plant, controller)
     refuse_unstable(plant, controller)
-    response = _respond(plant, controller, broken_at)
-    f = _frequencies(plant, controller)
-    f, L = _closer(f, response(f), response)
-    up, down = gain_margins(L)
-    crossing, phase = crossings(f, L)
-    modulus, where = _least(_modulus, response, f, L)
-    both_ways = np.minimum(phase, 2 * math.pi - phase)
+    return margins_of(_respond(plant, controller, broken_at), _resolving(plant, controller))
+
+
+def margins_of(response: Response, freq_hz: Floats) -> LoopMargins:
+    """Margins of a stable loop.
+
+    Each crossing and each dip is followed between the frequencies to where it is, so that the margins do not depend on
+    which frequencies these are, as long as they resolve the loop.
+
+    Args:
+        response: Loop gain L at frequencies in Hz; 1 + L = 0 is the limit of stability.
+        freq_hz: Where the crossings and dips are looked for, rising; see `resolving`.
+    """
+    L = response(freq_hz)
+    size = np.abs(L)
+    crossing = _roots(lambda f: np.log(np.abs(response(f))), freq_hz, np.log(np.maximum(size, 1e-300)))
+    lag = np.mod(np.angle(-response(crossing)), 2 * math.pi)  # what would bring L to -1
+    up, down = _gain_margins(response, freq_hz, L)
+    modulus, where = _least(_modulus, response, freq_hz, L)
     return LoopMargins(
         gain_up=up,
         gain_down=down,
-        phase_rad=float(np.min(both_ways, initial=math.inf)),
-        delay_s=float(np.min(phase / (2 * math.pi * crossing), initial=math.inf)),
+        phase_rad=float(np.min(np.minimum(lag, 2 * math.pi - lag), initial=math.inf)),
+        delay_s=float(np.min(lag / (2 * math.pi * crossing), initial=math.inf)),
         modulus=modulus,
-        disk=2.0 * _least(_balanced, response, f, L)[0],
+        disk=2.0 * _least(_balanced, response, freq_hz, L)[0],
         crossover_hz=float(np.max(crossing)) if crossing.size else math.nan,
-        bandwidth_hz=bandwidth_hz(f, np.abs(1.0 + L)),
+        bandwidth_hz=_bandwidth_hz(response, freq_hz, L),
         peak=1.0 / modulus,
         peak_hz=where,
     )
+
+
+def _gain_margins(response: Response, freq_hz: Floats, L: Complexes) -> tuple[float, float]:
+    """Factors nearest 1, above and below, that bring the loop to -1: where it crosses the negative real axis."""
+    crossing = response(_roots(lambda f: response(f).imag, freq_hz, L.imag)).real
+    ends = L[[0, -1]]  # a positive feedback is limited at rest, and L is real at half the rate
+    size = -np.append(crossing, ends.real[np.abs(ends.imag) < 1e-3 * np.abs(ends.real)])
+    size = size[size > 0.0]
+    return float(np.min(1.0 / size[size < 1.0], initial=math.inf)), float(np.max(1.0 / size[size > 1.0], initial=0.0))
+
+
+def _bandwidth_hz(response: Response, freq_hz: Floats, L: Complexes) -> float:
+    """Lowest frequency at which |S| = 1 / |1 + L| reaches 1 from below; 0 where it never lies below."""
+    beyond = np.log(_modulus(L))
+    if beyond[0] <= 0.0:
+        return 0.0
+    ends = slice(0, 1 + int(np.argmax(beyond <= 0.0)))
+    found = _roots(lambda f: np.log(_modulus(response(f))), freq_hz[ends], beyond[ends])
+    return float(found[0]) if found.size else float(freq_hz[-1])
+
+
+def _roots(of: Callable[[Floats], Floats], freq_hz: Floats, values: Floats) -> Floats:
+    """Where a function of frequency changes its sign; ``values`` are its own at ``freq_hz``."""
+    from scipy.optimize import elementwise
+
+    at = np.flatnonzero((values[:-1] >= 0.0) != (values[1:] >= 0.0))
+    ends = freq_hz[at], freq_hz[at + 1]
+    return np.asarray(elementwise.find_root(of, ends).x if at.size else ends[0])
 
 
 def loop_margins(plant: DesignPlant, controller: AxisController) -> LoopMargins:
@@ -286,17 +335,11 @@ def loop_margins(plant: DesignPlant, controller: AxisController) -> LoopMargins:
     if not uses_both(controller):
         return whole
     optical = margins_at(plant, controller, "optical")
-    return LoopMargins(
-        gain_up=min(whole.gain_up, optical.gain_up),
+    least = ("gain_up", "phase_rad", "delay_s", "modulus", "disk")
+    return replace(
+        optical,
         gain_down=max(whole.gain_down, optical.gain_down),
-        phase_rad=min(whole.phase_rad, optical.phase_rad),
-        delay_s=min(whole.delay_s, optical.delay_s),
-        modulus=min(whole.modulus, optical.modulus),
-        disk=min(whole.disk, optical.disk),
-        crossover_hz=optical.crossover_hz,
-        bandwidth_hz=optical.bandwidth_hz,
-        peak=optical.peak,
-        peak_hz=optical.peak_hz,
+        **{name: min(getattr(whole, name), getattr(optical, name)) for name in least},
     )
 
 
@@ -328,46 +371,21 @@ def _balanced(L: Complexes) -> Floats:
     return np.asarray(np.abs(1.0 + L) / np.maximum(np.abs(1.0 - L), 1e-9))
 
 
-def _least(distance: Distance, response: Response, f: Floats, L: Complexes) -> tuple[float, float]:
-    """Smallest distance and its frequency, the grid made finer around it."""
+def _least(distance: Distance, response: Response, freq_hz: Floats, L: Complexes) -> tuple[float, float]:
+    """Smallest distance and its frequency: each dip that may be the deepest one is followed to its end."""
+    from scipy.optimize import elementwise
+
     found = distance(L)
-    for _ in range(3):
-        at = int(np.argmin(found))
-        f = np.linspace(f[max(at - 1, 0)], f[min(at + 1, f.size - 1)], 41)
-        found = distance(response(f))
     at = int(np.argmin(found))
-    return float(found[at]), float(f[at])
-
-
-def _closer(f: Floats, L: Complexes, response: Response) -> tuple[Floats, Complexes]:
-    """Grid and loop with more points where L crosses the real axis or the unit circle, so that straight lines do."""
-    beyond, below = np.abs(L) >= 1.0, L.imag < 0.0
-    at = np.flatnonzero((beyond[:-1] != beyond[1:]) | (below[:-1] != below[1:]))
-    more = np.linspace(f[at], f[at + 1], 33)[1:-1].ravel()
-    whole, first = np.unique(np.concatenate([f, more]), return_index=True)
-    return whole, np.concatenate([L, response(more)])[first]
-
-
-def crossings(f: Floats, L: Complexes) -> tuple[Floats, Floats]:
-    """Frequencies with |L| = 1, and there the lag in (0, 2 pi) that would bring L to -1."""
-    size = np.log(np.maximum(np.abs(L), 1e-300))
-    at = np.flatnonzero((size[:-1] >= 0.0) != (size[1:] >= 0.0))
-    share = size[at] / (size[at] - size[at + 1])
-    turned = np.angle(L[at + 1] * L[at].conj())
-    phase = np.angle(-L[at]) + share * turned
-    return f[at] * (f[at + 1] / f[at]) ** share, np.mod(phase, 2 * math.pi)
-
-
-def gain_margins(L: Complexes) -> tuple[float, float]:
-    """Factors nearest 1, above and below, that bring the loop to -1: where it crosses the negative real axis."""
-    imag, real = L.imag, L.real
-    at = np.flatnonzero((imag[:-1] * imag[1:] <= 0.0) & (imag[:-1] != imag[1:]))
-    share = imag[at] / (imag[at] - imag[at + 1])
-    crossing = -(real[at] + share * (real[at + 1] - real[at]))
-    still = abs(imag[0]) < 1e-3 * abs(real[0])
-    size = np.append(crossing, -real[0] if still else 0.0)
-    size = size[size > 0.0]
-    return float(np.min(1.0 / size[size < 1.0], initial=math.inf)), float(np.max(1.0 / size[size > 1.0], initial=0.0))
+    least = (float(found[at]), float(freq_hz[at]))
+    dips = 1 + np.flatnonzero((found[1:-1] < found[:-2]) & (found[1:-1] <= found[2:]))
+    dips = dips[found[dips] < NEAR_LEAST * least[0]]
+    if not dips.size:
+        return least
+    ends = freq_hz[dips - 1], freq_hz[dips], freq_hz[dips + 1]
+    ended = elementwise.find_minimum(lambda f: distance(response(f)), ends)
+    best = int(np.argmin(ended.f_x))
+    return min(least, (float(ended.f_x[best]), float(ended.x[best])))
 
 
 @dataclass(frozen=True, slots=True)

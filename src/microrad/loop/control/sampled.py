@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from microrad.core import kernels, lti
-from microrad.core.arrays import Floats
-from microrad.loop.control.analysis import crossings, gain_margins
+from microrad.core.arrays import Complexes, Floats
+from microrad.loop.control.analysis import LoopMargins, margins_of, real_at_half_the_rate, resolving
 from microrad.mirror.hysteresis import LINE_OF_SIGHT, BoucWen, Creep, Play, slow_gain
 from microrad.mirror.model import Mirror
 from microrad.mission.model import Control, Mission
@@ -238,47 +238,31 @@ def amplifier_factor(drive: Drive, step_s: float) -> float:
     return 1.0 if math.isinf(drive.bandwidth_hz) else -math.expm1(-2.0 * math.pi * drive.bandwidth_hz * step_s)
 
 
-@dataclass(frozen=True, slots=True)
-class Margins:
-    """Margins of one sampled loop: gain as a ratio, phase in radians, delay in seconds, modulus = min |1 + L|.
+def margins(controller: lti.StateSpace, plant: lti.StateSpace, period_s: float) -> LoopMargins:
+    """Margins of controller and sampled plant under unit negative feedback.
 
-    ``crossover_hz`` is the highest frequency at which |L| is 1; nan, with infinite margins, without one. ``delay_s`` is
-    the smallest phase margin at that frequency: a bound where there are several crossovers.
-    """
+    Args:
+        controller: From the error to the command (V), one axis, discrete.
+        plant: From the command (V) to the angle (rad), one axis, discrete at the same period.
+        period_s: Control period.
 
-    gain: float
-    phase_rad: float
-    delay_s: float
-    modulus: float
-    crossover_hz: float
-    slowest_pole: float
-
-
-def margins(controller: lti.StateSpace, plant: lti.StateSpace, period_s: float) -> Margins:
-    """Margins of controller and sampled plant (one axis, both discrete) under unit negative feedback.
-
-    Raises ValueError with the offending pole when the closed loop is unstable.
+    Raises:
+        ValueError: The closed loop is unstable; names the pole.
     """
     loop = lti.series(controller, plant)
-    worst = slowest_pole(loop)
+    poles = lti.feedback_poles(loop)
+    worst = float(np.max(np.abs(poles), initial=0.0))
     if worst >= 1.0:
         raise ValueError(
             f"the closed loop is unstable: a pole at |z| = {worst:.6f} (the limit is 1) for a control period of "
             f"{period_s:g} s; lower the gains in [control]{_advice(controller, plant)}, or shorten its delay"
         )
-    f = np.geomspace(1e-6, 0.5, 4000) / period_s
-    response = lti.frequency_response(loop, f, period_s)[:, 0, 0]
-    response[-1] = response[-1].real  # at half the sample rate
-    crossing, lag = crossings(f, response)
-    crossover, phase = max(crossing, default=math.nan), min(np.minimum(lag, 2 * math.pi - lag), default=math.inf)
-    return Margins(
-        gain=gain_margins(response)[0],
-        phase_rad=float(phase),
-        delay_s=math.inf if math.isnan(crossover) else float(phase / (2 * math.pi * crossover)),
-        modulus=float(np.min(np.abs(1.0 + response))),
-        crossover_hz=float(crossover),
-        slowest_pole=worst,
-    )
+
+    def response(freq_hz: Floats) -> Complexes:
+        L = lti.frequency_response(loop, freq_hz, period_s)[:, 0, 0]
+        return real_at_half_the_rate(L, freq_hz * period_s)
+
+    return margins_of(response, resolving(np.concatenate([poles, np.linalg.eigvals(loop.A)]), period_s))
 
 
 def _advice(controller: lti.StateSpace, plant: lti.StateSpace) -> str:

@@ -2,7 +2,7 @@
 
 import math
 from collections import ChainMap
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -76,7 +76,7 @@ def design(
     """
     of, wanted = plants(scene, scene.table.seed), tuple(only) or names(scene.table)
     groups = _groups(wanted, scene.table)
-    jobs = [partial(_tuned_in_turn, group, scene.table, of) for group in groups]
+    jobs = [partial(_tuned_in_turn, {name: _tuning(name, scene.table, of) for name in group}) for group in groups]
 
     def told(turn: int) -> None:
         on_progress(sum(map(len, groups[:turn])), len(wanted), f"tuning {groups[turn][0]}")
@@ -98,12 +98,15 @@ def _groups(wanted: Sequence[str], f: FinePointing) -> list[list[str]]:
     return sorted([group for group in (together, *alone) if group], key=lambda group: group != [control.LQG.name])
 
 
-def _tuned_in_turn(group: Sequence[str], f: FinePointing, of: Sequence[DesignPlant]) -> dict[str, Tuned]:
+def _tuned_in_turn(group: Mapping[str, Callable[..., Tuned]]) -> dict[str, Tuned]:
     """The controllers of a group, by name; the PI, where it is one of them, is tuned once and stands first."""
     found: dict[str, Tuned] = {}
-    for name in group:
-        pi = found.get(group[0]) if group[0] in {control.PI.name, WITH_INVERSE} else None
-        found[name] = pi if pi is not None and name == WITH_INVERSE else _tuning(name, f, of, pi)()
+    for name, tuning in group.items():
+        pi = found.get(next(iter(group))) if {control.PI.name, WITH_INVERSE} & {*found} else None
+        if pi is None:
+            found[name] = tuning()
+        else:
+            found[name] = pi if name == WITH_INVERSE else tuning(base=pi)
     return found
 
 
@@ -115,8 +118,8 @@ def tune(name: str, f: FinePointing, of: Sequence[DesignPlant]) -> Tuned:
     return _tuning(name, f, of)()
 
 
-def _tuning(name: str, f: FinePointing, of: Sequence[DesignPlant], known: Tuned | None = None) -> Callable[[], Tuned]:
-    """What tunes one, and reads no table: it may run in another process. Families with the PI begin with ``known``."""
+def _tuning(name: str, f: FinePointing, of: Sequence[DesignPlant]) -> Callable[..., Tuned]:
+    """What tunes one, and reads no table: it may run in another process. Families with the PI take that as ``base``."""
     wanted = Specification(f.modulus_margin)
     if name == BASELINE:
         return partial(grid_baseline, of, wanted)
@@ -127,7 +130,7 @@ def _tuning(name: str, f: FinePointing, of: Sequence[DesignPlant], known: Tuned 
     wanted_family = control.PI.name if name == WITH_INVERSE else name
     for family in families(f):
         if family.name == wanted_family:
-            return partial(control.tune, family, of, wanted, seed=f.seed, base=known)
+            return partial(control.tune, family, of, wanted, seed=f.seed)
     raise ValueError(f"{name!r} is no controller of this mission; it has {', '.join(names(f))}")
 
 

@@ -102,7 +102,7 @@ class LinearPart(Table):
     def roots(self) -> tuple[tuple[complex, ...], tuple[complex, ...]]:
         """Zeros and poles in rad/s, conjugates included."""
         if self.poles_hz is None:
-            import numpy as np  # here, to keep the schema quick to load
+            import numpy as np
 
             found = (np.roots(each or ()) for each in (self.numerator, self.denominator))
             zeros, poles = (tuple(complex(r) for r in roots) for roots in found)
@@ -299,7 +299,7 @@ class Uncertainty(Table):
     def _least_eigenvalue(self) -> float:
         if not self.correlation:
             return 1.0
-        import numpy as np  # here, to keep the schema quick to load
+        import numpy as np
 
         return float(np.linalg.eigvalsh(np.array(self.correlation_rows))[0])
 

@@ -34,7 +34,7 @@ def _taken_stdin() -> int:
 def main() -> None:
     """Run microrad with the arguments behind the number of the watcher."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command line does, before numpy is loaded
-    from microrad.campaign.worker import die_with_parent
+    from microrad.campaign.engines.worker import die_with_parent
 
     watcher, *arguments = sys.argv[1:]
     pipe = _taken_stdin()

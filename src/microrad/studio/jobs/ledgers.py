@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from microrad.campaign.interim import Interim
     from microrad.campaign.records import CampaignSummary
+    from microrad.campaign.statistics.interim import Interim
 
 _MOST = 8  # ledgers that are kept in mind
 _READ_S = 0.3  # for what is new, at a time: the pages stay quick, and a long ledger shows figures at once
@@ -65,7 +65,7 @@ class _Reader:
         return self.last
 
     def _read(self) -> Live:
-        from microrad.campaign.interim import Interim
+        from microrad.campaign.statistics.interim import Interim
 
         if not self.path.exists():  # not begun yet, or removed
             self.interim = None

@@ -189,7 +189,7 @@ def _pid(cases: paper_cases.PaperCases, name: str) -> Controller:
     return Controller(
         name,
         {
-            "gain": found.gain,
+            "gain": found.gain_up,
             "phase": found.phase_rad,
             "delay": found.delay_s,
             "modulus": found.modulus,

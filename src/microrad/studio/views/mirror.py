@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import TypeAdapter
 
 from microrad.core.units import format_quantity
-from microrad.lab.live_fit import FITS, LiveFit
+from microrad.lab.live_fit import LIVE_FITS, LiveFit
 from microrad.report.plotting.sheet import BLACK, BLUE, GREY, SKY, VERMILION, Axis, Line, Span, grid
 from microrad.studio.guard import plain_files
 from microrad.studio.jobs.queue import Job
@@ -29,7 +29,7 @@ _MOST_BYTES = 20_000_000  # of the fits of a job
 def read_fits(folder: Path) -> tuple[LiveFit, ...]:
     """The models of a job so far, in the order in which they were fitted; a line that is being written is left out."""
     try:
-        with plain_files.opened(folder / FITS) as file:
+        with plain_files.opened(folder / LIVE_FITS) as file:
             lines = file.read(_MOST_BYTES).splitlines()
     except OSError:
         return ()

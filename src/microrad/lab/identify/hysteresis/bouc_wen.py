@@ -21,24 +21,24 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from microrad.core.arrays import Floats
 from microrad.core.kernels import bouc_wen_response
 from microrad.core.progress import Progress
-from microrad.lab.identify.prepared import (
+from microrad.lab.identify.records import (
     DEFAULT_UNITS,
-    FloatArray,
     IdentificationError,
-    Prepared,
+    SiRecord,
     Units,
     centred,
     colour_inflation,
     correlation,
     fastest_rate,
+    no_progress,
     one_rate_only,
     percent,
-    prepare,
+    si_records,
     span,
     split_by_record,
-    unheard,
 )
 from microrad.lab.recording import Recording
 from microrad.mirror.hysteresis import BoucWen
@@ -51,7 +51,7 @@ _UPPER = np.array([1.0, 10.0, math.log(1e5), math.log(1e5)])
 class Problem:
     """The projected residual of a set of records as a function of the four searched numbers, scaled to order one."""
 
-    def __init__(self, records: tuple[Prepared, ...], share: float, rate_limit: float | None = None) -> None:
+    def __init__(self, records: tuple[SiRecord, ...], share: float, rate_limit: float | None = None) -> None:
         """`share` is the largest part of d1 that epsilon may take back after a slow reversal; inf leaves it free."""
         self.records = records
         self.share = share
@@ -62,7 +62,7 @@ class Problem:
         self.target = centred(self.measured, records)
         self.scale = 1.0 / (self.output_span_rad * math.sqrt(self.target.size))
 
-    def physical(self, theta: FloatArray) -> tuple[float, float, float, float]:
+    def physical(self, theta: Floats) -> tuple[float, float, float, float]:
         """d2, delta (s/V), k_settled and k_reversal (1/V)."""
         return (
             float(theta[0]) / self.rate_limit,
@@ -71,7 +71,7 @@ class Problem:
             math.exp(theta[3]) / self.drive_span_v,
         )
 
-    def columns(self, theta: FloatArray) -> FloatArray:
+    def columns(self, theta: Floats) -> Floats:
         """Responses to unit d1 and to unit epsilon over the used samples, less their mean in each record."""
         d2, delta, settled, reversal = self.physical(theta)
         alpha, beta = (settled + reversal) / 2, (settled - reversal) / 2
@@ -82,7 +82,7 @@ class Problem:
             parts.append(np.column_stack((output - h, h))[record.start :])
         return centred(np.concatenate(parts), self.records)
 
-    def linear(self, columns: FloatArray, theta: FloatArray) -> FloatArray:
+    def linear(self, columns: Floats, theta: Floats) -> Floats:
         """The best d1 and epsilon; where epsilon takes back more of d1 than allowed, the best on that bound."""
         size = np.sqrt(np.einsum("ij,ij->j", columns, columns)) + 1e-300
         gram = (columns.T @ columns) / np.outer(size, size) + 1e-13 * np.eye(2)
@@ -94,17 +94,17 @@ class Problem:
         d1 = float(joint @ self.target) / float(joint @ joint)
         return np.array([d1, -bound * d1])
 
-    def bound(self, theta: FloatArray) -> float:
+    def bound(self, theta: Floats) -> float:
         """Largest -epsilon / d1: after a slow reversal dy/du = d1 + epsilon 2 alpha / k_settled >= (1 - share) d1."""
         _, _, settled, reversal = self.physical(theta)
         return self.share * settled / (settled + reversal)
 
-    def residual(self, theta: FloatArray) -> FloatArray:
+    def residual(self, theta: Floats) -> Floats:
         """Measured less modelled, scaled so that half the squared norm is half the squared relative rms."""
         columns = self.columns(theta)
         return np.asarray((self.target - columns @ self.linear(columns, theta)) * self.scale)
 
-    def solve(self, theta: FloatArray) -> FloatArray:
+    def solve(self, theta: Floats) -> Floats:
         """The six parameters at a point: the signs of epsilon and beta follow from the linear part."""
         d2, delta, settled, reversal = self.physical(theta)
         d1, epsilon = self.linear(self.columns(theta), theta)
@@ -112,13 +112,13 @@ class Problem:
         return np.array([d1, d2, epsilon, delta, (settled + reversal) / 2, beta])
 
 
-def _thinned(problem: Problem) -> Problem:
+def _thin_problem(problem: Problem) -> Problem:
     """The same problem on at most about 12 000 samples: the kernel is exact for a drive linear between any samples."""
     stride = math.ceil(sum(r.drive_v.size for r in problem.records) / 12_000)
     if stride == 1:
         return problem
     records = tuple(
-        Prepared(r.name, r.sha256, r.drive_v[::stride].copy(), r.output_rad[::stride].copy(), r.step_s * stride, start)
+        SiRecord(r.name, r.sha256, r.drive_v[::stride].copy(), r.output_rad[::stride].copy(), r.step_s * stride, start)
         for r in problem.records
         for start in (-(-r.start // stride),)
     )
@@ -126,9 +126,9 @@ def _thinned(problem: Problem) -> Problem:
 
 
 # ----------------------------------------------------------------------------------------------------------- search
-def multi_start(problem: Problem, starts: int, seed: int, on_progress: Progress) -> tuple[FloatArray, FloatArray]:
+def search_from_starts(problem: Problem, starts: int, seed: int, on_progress: Progress) -> tuple[Floats, Floats]:
     """Cost reached from each start, and the best point polished on all samples."""
-    screen = _thinned(problem)
+    screen = _thin_problem(problem)
     points, costs = [], []
     for done, start in enumerate(_starts(screen, starts, seed), start=1):
         solution = _search(screen, start)
@@ -138,7 +138,7 @@ def multi_start(problem: Problem, starts: int, seed: int, on_progress: Progress)
     return np.array(costs), _search(problem, points[int(np.argmin(costs))]).x
 
 
-def _starts(problem: Problem, starts: int, seed: int) -> list[FloatArray]:
+def _starts(problem: Problem, starts: int, seed: int) -> list[Floats]:
     """The four best points of a coarse grid in turn, the first as it is and the rest scattered by a factor e^0.4."""
     grid = [
         np.array([0.0, delta, math.log(settled), math.log(settled * ratio)])
@@ -154,14 +154,14 @@ def _starts(problem: Problem, starts: int, seed: int) -> list[FloatArray]:
     return [np.clip(_scattered(centres[i % 4], scatter[i]), _LOWER + 1e-6, _UPPER - 1e-6) for i in range(starts)]
 
 
-def _scattered(centre: FloatArray, scatter: FloatArray) -> FloatArray:
+def _scattered(centre: Floats, scatter: Floats) -> Floats:
     """Log-normal in delta and in the two decay constants, normal in d2, whose sign is open."""
     point = centre + scatter
     point[1] = max(centre[1], 0.2) * math.exp(scatter[1])
     return np.asarray(point)
 
 
-def _search(problem: Problem, start: FloatArray) -> Any:
+def _search(problem: Problem, start: Floats) -> Any:
     from scipy.optimize import least_squares  # here, to keep start-up cheap
 
     return least_squares(
@@ -177,7 +177,7 @@ def _search(problem: Problem, start: FloatArray) -> Any:
     )
 
 
-def tightened(problem: Problem, best: FloatArray) -> tuple[Problem, FloatArray]:
+def with_tightened_bound(problem: Problem, best: Floats) -> tuple[Problem, Floats]:
     """Lower the share of d1 that epsilon may take back until no slope along the recordings is negative.
 
     The bound holds for slow reversals; at a fast one h is larger than its slow settled value by exp(delta |u'|).
@@ -193,18 +193,18 @@ def tightened(problem: Problem, best: FloatArray) -> tuple[Problem, FloatArray]:
 
 
 # ---------------------------------------------------------------------------------------------------------- values
-def stacked(problem: Problem, values: FloatArray) -> FloatArray:
+def stacked_output(problem: Problem, values: Floats) -> Floats:
     """Model output of the used samples of all records, without offset."""
     row = np.array([*values, problem.rate_limit, 0.0])
     return np.concatenate([bouc_wen_response(r.drive_v, r.step_s, row, 0.0)[0][r.start :] for r in problem.records])
 
 
-def k_settled(values: FloatArray) -> float:
+def k_settled(values: Floats) -> float:
     """Decay (1/V) towards the settled loop, alpha + sign(epsilon) beta."""
     return float(values[4] + math.copysign(1.0, values[2]) * values[5])
 
 
-def turned_over(model: BoucWen) -> BoucWen:
+def sign_reversed(model: BoucWen) -> BoucWen:
     """The model of a sensor turned over: -h has the terms of h with the signs of epsilon, beta and gamma changed."""
     return replace(
         model,
@@ -215,12 +215,12 @@ def turned_over(model: BoucWen) -> BoucWen:
     )
 
 
-def rising(model: BoucWen) -> BoucWen:
+def made_rising(model: BoucWen) -> BoucWen:
     """The model, turned over where its d1 is negative."""
-    return model if model.d1_rad_v > 0.0 else turned_over(model)
+    return model if model.d1_rad_v > 0.0 else sign_reversed(model)
 
 
-def lowest_slope(problem: Problem, values: FloatArray) -> float:
+def lowest_slope(problem: Problem, values: Floats) -> float:
     """Lowest dy/du along the used samples, at the begin of each step, positive in the direction of d1."""
     d1, d2, epsilon, delta, alpha, beta = values
     row = np.array([*values, problem.rate_limit, 0.0])
@@ -265,7 +265,7 @@ class BoucWenFit:
     model: BoucWen
     offsets_rad: tuple[float, ...]
     units: Units
-    covariance: FloatArray
+    covariance: Floats
     colour_inflation: float
     condition_number: float
     not_identified: tuple[NotIdentified, ...]
@@ -278,10 +278,20 @@ class BoucWenFit:
     constrained: bool
     samples_used: int
 
-    name = "bouc_wen"
+    parameter_count = 6
 
     @property
-    def values(self) -> FloatArray:
+    def name(self) -> str:
+        """The name of the model, as in `MODELS`."""
+        return "bouc_wen_admissible" if self.constrained else "bouc_wen"
+
+    @property
+    def falling(self) -> bool:
+        """Whether the output falls with the drive."""
+        return self.model.d1_rad_v < 0
+
+    @property
+    def values(self) -> Floats:
         """The six parameters in the order of `PARAMETERS`, SI units."""
         return np.array(self.model.row[:6])
 
@@ -291,12 +301,12 @@ class BoucWenFit:
         return self.model.rate_limit_v_s
 
     @property
-    def standard_errors(self) -> FloatArray:
+    def standard_errors(self) -> Floats:
         """Standard errors in the order of `PARAMETERS`, SI units."""
         return np.asarray(np.sqrt(np.diag(self.covariance)))
 
     @property
-    def correlation(self) -> FloatArray:
+    def correlation(self) -> Floats:
         """Correlation matrix of the parameters."""
         return correlation(self.covariance)
 
@@ -309,7 +319,7 @@ class BoucWenFit:
         gradient = np.array([0, 0, sign / settled, 0, -value / settled, -sign * value / settled])
         return value, float(math.sqrt(max(0.0, gradient @ self.covariance @ gradient)))
 
-    def response(self, drive_v: FloatArray, step_s: float) -> tuple[FloatArray, int]:
+    def response(self, drive_v: Floats, step_s: float) -> tuple[Floats, int]:
         """Output (rad) without offset for a drive (V) from h = 0, and the number of rate-clamped samples."""
         output, _, clamped = bouc_wen_response(drive_v, step_s, np.array(self.model.row[:8]), 0.0)
         return output, int(clamped)
@@ -343,16 +353,16 @@ def fit_bouc_wen(
     """
     if starts < 1:
         raise IdentificationError(f"{starts} starts were asked for; give at least 1, better 10 or more.")
-    problem = Problem(prepare(recordings, units), 1.0 if admissible else math.inf)
-    costs, best = multi_start(problem, starts, seed, on_progress or unheard)
+    problem = Problem(si_records(recordings, units), 1.0 if admissible else math.inf)
+    costs, best = search_from_starts(problem, starts, seed, on_progress or no_progress)
     if admissible:
-        problem, best = tightened(problem, best)
+        problem, best = with_tightened_bound(problem, best)
     return _report(problem, problem.solve(best), units, costs, admissible)
 
 
 # ---------------------------------------------------------------------------------------------------------- report
-def _report(problem: Problem, values: FloatArray, units: Units, costs: FloatArray, constrained: bool) -> BoucWenFit:
-    residual = problem.measured - stacked(problem, values)
+def _report(problem: Problem, values: Floats, units: Units, costs: Floats, constrained: bool) -> BoucWenFit:
+    residual = problem.measured - stacked_output(problem, values)
     offsets = tuple(float(part.mean()) for part in split_by_record(residual, problem.records))
     residual = centred(residual, problem.records)
     colour = colour_inflation(split_by_record(residual, problem.records))
@@ -365,7 +375,7 @@ def _report(problem: Problem, values: FloatArray, units: Units, costs: FloatArra
     rms, _ = percent(residual, problem.output_span_rad)
     d1, d2, epsilon, delta, alpha, beta = values.tolist()
     model = BoucWen(d1, d2, epsilon, delta, alpha, beta, problem.rate_limit)
-    slope, lowest = rising(model).reversal_slope_rad_v(), lowest_slope(problem, values)
+    slope, lowest = made_rising(model).reversal_slope_rad_v(), lowest_slope(problem, values)
     return BoucWenFit(
         model=model,
         offsets_rad=offsets,
@@ -385,7 +395,7 @@ def _report(problem: Problem, values: FloatArray, units: Units, costs: FloatArra
     )
 
 
-def _sizes(problem: Problem, values: FloatArray) -> FloatArray:
+def _sizes(problem: Problem, values: Floats) -> Floats:
     """A step of order one for each parameter: its own size, or what matters at the fastest rate."""
     least = np.array(
         [0, 1e-3 / problem.rate_limit, 1e-9 * abs(values[0]), 1e-2 / problem.rate_limit, 0, 1e-3 * values[4]]
@@ -393,17 +403,17 @@ def _sizes(problem: Problem, values: FloatArray) -> FloatArray:
     return np.asarray(np.maximum(np.abs(values), least))
 
 
-def _jacobian(problem: Problem, values: FloatArray, sizes: FloatArray) -> FloatArray:
+def _jacobian(problem: Problem, values: Floats, sizes: Floats) -> Floats:
     """d output / d parameter by central differences, less the mean in each record (the offsets are marginalised)."""
     columns = []
     for i, size in enumerate(1e-4 * sizes):
         step = np.zeros(6)
         step[i] = size
-        columns.append((stacked(problem, values + step) - stacked(problem, values - step)) / (2 * size))
+        columns.append((stacked_output(problem, values + step) - stacked_output(problem, values - step)) / (2 * size))
     return centred(np.column_stack(columns), problem.records)
 
 
-def _covariance(jacobian: FloatArray, sizes: FloatArray, variance: float, bounded: FloatArray | None) -> FloatArray:
+def _covariance(jacobian: Floats, sizes: Floats, variance: float, bounded: Floats | None) -> Floats:
     """variance (J^T J)^-1, on the plane of the active slope bound where there is one."""
     free = np.eye(6)
     if bounded is not None:
@@ -415,7 +425,7 @@ def _covariance(jacobian: FloatArray, sizes: FloatArray, variance: float, bounde
     return np.asarray(variance * root @ root.T)
 
 
-def _bound_gradient(values: FloatArray) -> FloatArray:
+def _bound_gradient(values: Floats) -> Floats:
     """Gradient of epsilon 2 alpha / (k_settled d1), which the active bound holds constant, over the six parameters."""
     d1, _, epsilon, _, alpha, _ = values
     settled = k_settled(values)
@@ -424,9 +434,7 @@ def _bound_gradient(values: FloatArray) -> FloatArray:
     return np.array([-share / d1, 0, share / epsilon, 0, share / alpha - share / settled, -sign * share / settled])
 
 
-def _not_identified(
-    values: FloatArray, covariance: FloatArray, one_rate: bool, at_bound: bool
-) -> tuple[NotIdentified, ...]:
+def _not_identified(values: Floats, covariance: Floats, one_rate: bool, at_bound: bool) -> tuple[NotIdentified, ...]:
     """Parameters with a relative standard error above 0.5 or a correlation above 0.95, each with its reason."""
     error = np.sqrt(np.diag(covariance)) / np.maximum(np.abs(values), 1e-300)
     between = np.abs(correlation(covariance)) - np.eye(6)

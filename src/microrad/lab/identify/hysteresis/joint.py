@@ -11,12 +11,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from microrad.core import kernels
+from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
-from microrad.lab.identify.hysteresis.axis import AxisStructure, LinearPoles, one_axis
-from microrad.lab.identify.hysteresis.bouc_wen import BoucWenFit, fit_bouc_wen, rising
-from microrad.lab.identify.hysteresis.plant_fit import PlantFit, Run, fit_plant, without
-from microrad.lab.identify.hysteresis.prandtl_ishlinskii import non_negative, threshold_grid
-from microrad.lab.identify.prepared import FloatArray, Prepared, Units, fastest_rate, prepare, span
+from microrad.lab.identify.hysteresis.bouc_wen import BoucWenFit, fit_bouc_wen, made_rising
+from microrad.lab.identify.hysteresis.plant_fit import FitRecord, PlantFit, fit_plant, without_nuisance
+from microrad.lab.identify.hysteresis.prandtl_ishlinskii import non_negative_weights, threshold_grid
+from microrad.lab.identify.hysteresis.structures import AxisStructure, LinearPoles, one_axis
+from microrad.lab.identify.records import SiRecord, Units, fastest_rate, si_records, span
 from microrad.lab.recording import Recording
 from microrad.mirror import model as mirror
 from microrad.mirror.hysteresis import NO_CREEP, BoucWen, Creep, Play, slow_gain
@@ -76,11 +77,21 @@ class JointFit:
     samples_used: int
 
     @property
+    def falling(self) -> bool:
+        """Whether the output falls with the drive."""
+        return slow_gain(self.model) < 0
+
+    @property
+    def parameter_count(self) -> int:
+        """Number of parameters that were fitted."""
+        return len(self.structure.parameters)
+
+    @property
     def admissible(self) -> bool:
         """Whether the modelled mirror never moves against its drive just after a slow reversal."""
         if isinstance(self.model, Play):
             return all(w * slow_gain(self.model) >= 0.0 for w in self.model.weights_rad_v)
-        turned = rising(self.model)
+        turned = made_rising(self.model)
         return turned.reversal_slope_rad_v() >= -1e-3 * turned.d1_rad_v
 
     @property
@@ -90,7 +101,7 @@ class JointFit:
         found = self.fit.not_identified
         return tuple((name, f"{fact}; {_WHY.get(name.partition(' ')[0], reversals)}") for name, fact in found)
 
-    def response(self, drive_v: FloatArray, step_s: float) -> tuple[FloatArray, int]:
+    def response(self, drive_v: Floats, step_s: float) -> tuple[Floats, int]:
         """Output (rad) without offset for a drive (V), at rest at the first drive value, and the clamped samples."""
         plant = mirror.discretise(self.mirror, step_s)
         state = mirror.at_rest(plant)
@@ -99,7 +110,7 @@ class JointFit:
         kernels.open_loop(plant, state, drive, output, np.empty((drive_v.size, 0)))
         return output[:, 0], int(state.clamped.sum())
 
-    def nuisance(self, samples: int, step_s: float) -> FloatArray:
+    def nuisance(self, samples: int, step_s: float) -> Floats:
         """What a record may add by itself (samples, columns): an offset, and the tail of a creep begun before it."""
         return _nuisance(samples, step_s, self.creep.time_constants_s)
 
@@ -133,21 +144,32 @@ def fit_joint(  # noqa: PLR0913  all but the first three are named options
 ) -> JointFit:
     """Fit one of `FORMS` to all recordings at once, in cascade with a linear part where one is given.
 
-    `linear` is that part, whose poles and zeros are moved with the rest where `free_linear` says so; the `broadband`
-    recordings then belong to the fit, so that they keep hold of the poles. `admissible` bounds epsilon so that the
-    slope behind a slow reversal never turns. A Bouc-Wen form begins at its `static` fit (`static_fit`, made where it is
-    not given) and at `starts` - 1 points scattered about it (Philox stream of `seed`). Raises `IdentificationError`.
+    Args:
+        recordings: Loops of one drive and one output each.
+        name: Name of the form.
+        units: Units of the recordings.
+        linear: The linear part.
+        free_linear: Whether its poles and zeros are fitted with the rest.
+        admissible: Whether epsilon is bounded so that the slope behind a slow reversal never turns.
+        broadband: Recordings that belong to the fit where `free_linear` is set, so that they keep hold of the poles.
+        static: The fit of Eq. 3 at which a Bouc-Wen form begins; by default it is made here.
+        starts: Number of starts of a Bouc-Wen form; those behind the first are scattered about it.
+        seed: Seed of the Philox stream that scatters them.
+        on_progress: Called with the starts done, their number and the name.
+
+    Raises:
+        IdentificationError: If a recording cannot be used, or if no start can be simulated.
     """
     form = FORMS[name]
-    records = tuple(thinned(record) for record in prepare(recordings, units))
+    records = tuple(thin_record(record) for record in si_records(recordings, units))
     creep_times = time_constants(records) if form.creep else ()
-    run_list = [_run(record, creep_times) for record in records]
+    fit_list = [_fit_record(record, creep_times) for record in records]
     model: BoucWen | Play
     if form.family == "bouc_wen":
-        model = _bouc_wen_start(form, records, static or static_fit(recordings, units, seed))
+        model = _bouc_wen_start(form, records, static or fit_static_start(recordings, units, seed))
         creep_rad_v = 1e-3 * model.d1_rad_v
     else:
-        model, creep_rad_v = _play_start(form, records, run_list, linear, creep_times)
+        model, creep_rad_v = _play_start(form, records, fit_list, linear, creep_times)
     structure = one_axis(
         name,
         model,
@@ -158,11 +180,13 @@ def fit_joint(  # noqa: PLR0913  all but the first three are named options
         admissible=admissible,
     )
     if broadband:
-        run_list += [_run(record, creep_times) for record in prepare([_shortened(r) for r in broadband], units)]
+        # Of periods that only repeat, two say it all.
+        short = [r.first(2 * r.period_samples) if r.period_samples else r for r in broadband]
+        fit_list += [_fit_record(record, creep_times) for record in si_records(short, units)]
     fit = fit_plant(
         structure,
-        run_list,
-        starts=_scattered(structure, starts, seed) if form.family == "bouc_wen" else (),
+        fit_list,
+        starts=_scattered_starts(structure, starts, seed) if form.family == "bouc_wen" else (),
         tolerance=1e-12 if free_linear else 1e-9,  # a candidate is only compared
         most_evaluations=_POLISHING if free_linear else _EVALUATIONS,
         on_progress=on_progress,
@@ -188,12 +212,12 @@ def fit_joint(  # noqa: PLR0913  all but the first three are named options
 
 
 # ---------------------------------------------------------------------------------------------------------- starts
-def static_fit(recordings: Sequence[Recording], units: Units, seed: int) -> BoucWenFit:
+def fit_static_start(recordings: Sequence[Recording], units: Units, seed: int) -> BoucWenFit:
     """The fit of Eq. 3 at which all Bouc-Wen forms begin."""
     return fit_bouc_wen(recordings, starts=6, seed=seed, units=units)
 
 
-def time_constants(records: Sequence[Prepared]) -> tuple[float, ...]:
+def time_constants(records: Sequence[SiRecord]) -> tuple[float, ...]:
     """Decades of creep that the records can show: from ten samples or 10 ms to three times the longest record."""
     longest = max(r.drive_v.size * r.step_s for r in records)
     shortest = max(10 * min(r.step_s for r in records), 1e-2)
@@ -202,13 +226,7 @@ def time_constants(records: Sequence[Prepared]) -> tuple[float, ...]:
     return tuple(10.0**k for k in range(first, last + 1))
 
 
-def _shortened(recording: Recording) -> Recording:
-    """A broadband recording without the periods that only repeat what two of them say."""
-    keep = recording.samples if recording.period_samples is None else 2 * recording.period_samples
-    return replace(recording, drive=recording.drive[:keep], output=recording.output[:keep])
-
-
-def thinned(record: Prepared) -> Prepared:
+def thin_record(record: SiRecord) -> SiRecord:
     """Every n-th sample of a long record, as long as straight lines between them still make the drive.
 
     The kernel is exact for such a drive at any step, so only samples are lost, and neighbouring ones say the same.
@@ -232,7 +250,7 @@ def thinned(record: Prepared) -> Prepared:
     )
 
 
-def _nuisance(samples: int, step_s: float, creep_times: Sequence[float]) -> FloatArray:
+def _nuisance(samples: int, step_s: float, creep_times: Sequence[float]) -> Floats:
     """Orthonormal columns: an offset and, with creep, the tail that a level before the record leaves in all lags."""
     columns = [np.ones(samples)]
     if creep_times:
@@ -241,12 +259,12 @@ def _nuisance(samples: int, step_s: float, creep_times: Sequence[float]) -> Floa
     return np.asarray(np.linalg.qr(np.column_stack(columns))[0])
 
 
-def _run(record: Prepared, creep_times: Sequence[float]) -> Run:
+def _fit_record(record: SiRecord, creep_times: Sequence[float]) -> FitRecord:
     """A record about its first drive value; its weight makes it count as every other does."""
     used = record.output_rad[record.start :]
     nuisance = _nuisance(record.drive_v.size, record.step_s, creep_times)[record.start :]
     weight = 1.0 / (float(np.std(used)) * math.sqrt(used.size))
-    return Run(
+    return FitRecord(
         record.name,
         (record.drive_v - record.drive_v[0])[:, None].copy(),
         record.output_rad[:, None],
@@ -258,13 +276,13 @@ def _run(record: Prepared, creep_times: Sequence[float]) -> Run:
     )
 
 
-def _bouc_wen_start(form: Form, records: tuple[Prepared, ...], static: BoucWenFit) -> BoucWen:
+def _bouc_wen_start(form: Form, records: tuple[SiRecord, ...], static: BoucWenFit) -> BoucWen:
     """The static fit of Eq. 3, about the mean drive at which the records begin."""
     model = replace(static.model, bias_v=float(np.mean([r.drive_v[0] for r in records])))
     return model if "delta" in form.free else replace(model, d2_s_v=0.0, delta_s_v=0.0)
 
 
-def _scattered(structure: AxisStructure, starts: int, seed: int) -> list[FloatArray]:
+def _scattered_starts(structure: AxisStructure, starts: int, seed: int) -> list[Floats]:
     """Values of `starts` - 1 more starts, epsilon and alpha scattered about those of the structure."""
     own = np.array([p.start for p in structure.parameters])
     rng = np.random.Generator(np.random.Philox(seed))
@@ -274,8 +292,8 @@ def _scattered(structure: AxisStructure, starts: int, seed: int) -> list[FloatAr
 
 def _play_start(
     form: Form,
-    records: tuple[Prepared, ...],
-    run_list: Sequence[Run],
+    records: tuple[SiRecord, ...],
+    fit_list: Sequence[FitRecord],
     linear: LinearPoles | None,
     creep_times: Sequence[float],
 ) -> tuple[Play, float]:
@@ -283,16 +301,16 @@ def _play_start(
     operators = 1 if form.family == "linear" else _OPERATORS
     thresholds = threshold_grid(max(float(np.ptp(r.drive_v)) for r in records), operators)
     columns, targets = [], []
-    for record, run in zip(records, run_list, strict=True):
+    for record, run in zip(records, fit_list, strict=True):
         drive = run.drive[:, 0]
-        plays = filtered(kernels.play_response(drive, thresholds, np.zeros(operators)), linear, record.step_s)
+        plays = behind_linear_part(kernels.play_response(drive, thresholds, np.zeros(operators)), linear, record.step_s)
         lags = kernels.lag_response(drive, record.step_s, np.array(creep_times), np.zeros(len(creep_times)))
         both = np.column_stack([plays, lags.sum(axis=1)] if creep_times else [plays])
-        columns.append(run.weight * without(run.nuisance, both[run.first :]))
+        columns.append(run.weight * without_nuisance(run.nuisance, both[run.first :]))
         targets.append(run.weight * run.target[:, 0])
     matrix, target = np.concatenate(columns), np.concatenate(targets)
     sign = 1.0 if float(matrix[:, 0] @ target) >= 0.0 else -1.0
-    weights = sign * non_negative(matrix, sign * target)
+    weights = sign * non_negative_weights(matrix, sign * target)
     kept = np.abs(weights[:operators]) > 0.0
     kept[0] = True
     limit = fastest_rate(records)
@@ -300,7 +318,7 @@ def _play_start(
     return model, float(weights[-1]) if creep_times else 0.0
 
 
-def filtered(columns: FloatArray, linear: LinearPoles | None, step_s: float) -> FloatArray:
+def behind_linear_part(columns: Floats, linear: LinearPoles | None, step_s: float) -> Floats:
     """Columns (samples, any) behind the linear part, each from rest and straight between its samples."""
     if linear is None:
         return columns

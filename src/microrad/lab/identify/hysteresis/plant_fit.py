@@ -8,16 +8,17 @@ element.
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache, partial
 from typing import Any, Literal
 
 import numpy as np
 
 from microrad.core import kernels
+from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
 from microrad.core.threads import in_threads
-from microrad.lab.identify.prepared import FloatArray, IdentificationError, colour_inflation, correlation, unheard
+from microrad.lab.identify.records import IdentificationError, colour_inflation, correlation, no_progress
 from microrad.lab.recording import Recording
 from microrad.mirror import model as mirror
 from microrad.mirror.model import Mirror
@@ -56,16 +57,11 @@ class Structure:
 
     name: str
     parameters: tuple[Parameter, ...]
-    build: Callable[[FloatArray], Mirror]
-
-    def at(self, values: Sequence[float] | FloatArray) -> "Structure":
-        """The same structure with the search beginning elsewhere."""
-        pairs = zip(self.parameters, values, strict=True)
-        return replace(self, parameters=tuple(replace(p, start=float(v), size=p.scale) for p, v in pairs))
+    build: Callable[[Floats], Mirror]
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class FitRecord:
     """One record as the fit sees it.
 
     `drive` (steps of `step_s`, actuators) goes to the plant, about its rest; every `stride`-th output, from the first,
@@ -75,26 +71,26 @@ class Run:
     """
 
     name: str
-    drive: FloatArray
-    output: FloatArray
+    drive: Floats
+    output: Floats
     step_s: float
     stride: int
     first: int
-    nuisance: FloatArray
+    nuisance: Floats
     weight: float = 1.0
 
     @property
-    def target(self) -> FloatArray:
+    def target(self) -> Floats:
         """The used part of the output without its nuisance."""
-        return without(self.nuisance, self.output[self.first :])
+        return without_nuisance(self.nuisance, self.output[self.first :])
 
 
-def without(nuisance: FloatArray, signal: FloatArray) -> FloatArray:
+def without_nuisance(nuisance: Floats, signal: Floats) -> Floats:
     """A signal (samples, outputs) less its projection onto orthonormal columns (samples, columns)."""
     return np.asarray(signal - nuisance @ (nuisance.T @ signal)) if nuisance.size else signal
 
 
-def upsampled(drive: FloatArray, factor: int, hold: Hold) -> FloatArray:
+def upsampled(drive: Floats, factor: int, hold: Hold) -> Floats:
     """A drive (samples, inputs) at `factor` times the rate; row factor * k belongs to sample k.
 
     "linear": straight between samples. "band-limited": trigonometric, for a drive of whole periods.
@@ -109,9 +105,9 @@ def upsampled(drive: FloatArray, factor: int, hold: Hold) -> FloatArray:
     return np.asarray(np.fft.irfft(spectrum, factor * samples, axis=0) * factor)
 
 
-def runs(
+def fit_records(
     recordings: Sequence[Recording], *, factor: int = 1, hold: Hold = "linear", drop: int = 0, offset: bool = True
-) -> tuple[Run, ...]:
+) -> tuple[FitRecord, ...]:
     """Recordings as runs of the plant, `factor` plant steps a sample, the first `drop` samples left out of the fit.
 
     A periodic recording (period_samples) whose periods share their drive is reduced to one period, the mean of its
@@ -135,7 +131,7 @@ def runs(
             )
         used = len(output) - first
         nuisance = np.full((used, 1), 1.0 / math.sqrt(used)) if offset else np.zeros((used, 0))
-        made.append(Run(recording.path, drive.copy(), output, recording.step_s / factor, factor, first, nuisance))
+        made.append(FitRecord(recording.path, drive.copy(), output, recording.step_s / factor, factor, first, nuisance))
     return tuple(made)
 
 
@@ -147,7 +143,7 @@ def _repeats(recording: Recording) -> bool:
     return bool(spread <= 1e-6 * np.abs(recording.drive).max())
 
 
-def _one_period(recording: Recording, factor: int, hold: Hold) -> tuple[FloatArray, FloatArray, int]:
+def _one_period(recording: Recording, factor: int, hold: Hold) -> tuple[Floats, Floats, int]:
     """Two periods of the drive, the output with its mean period as the second one, and the first sample of that."""
     period = recording.period_samples or recording.samples
     whole = recording.samples // period
@@ -160,7 +156,7 @@ def _one_period(recording: Recording, factor: int, hold: Hold) -> tuple[FloatArr
     return np.concatenate([one, one]), np.concatenate([np.zeros((period, mean.shape[1])), mean]), period
 
 
-def simulate(plant: kernels.Plant, run: Run) -> FloatArray:
+def simulate_record(plant: kernels.Plant, run: FitRecord) -> Floats:
     """Output (samples, outputs) of the plant over a run, from rest."""
     state = mirror.at_rest(plant)
     output = np.empty((run.drive.shape[0], len(plant.outputs)))
@@ -176,7 +172,7 @@ class PlantFit:
     """What came out: the mirror, its parameters with their covariance, and how well it follows the records.
 
     `covariance`, over the parameters in their order, comes from the residuals of each run by themselves (the sandwich
-    (J'J)^-1 J'VJ (J'J)^-1), inflated by their colour (`prepared.colour_inflation`, the largest one is kept).
+    (J'J)^-1 J'VJ (J'J)^-1), inflated by their colour (`records.colour_inflation`, the largest one is kept).
     `residual_rms` has the shape (runs, outputs), in the units of the recordings, without the weights. `start_costs` are
     the costs reached from each start, `agreeing_starts` how many came to within 0.1 % of the best. `not_identified`
     names each parameter that the records do not fix, with the reason. Where the search was not `converged` it stopped
@@ -184,13 +180,13 @@ class PlantFit:
     """
 
     structure: Structure
-    values: FloatArray
-    covariance: FloatArray
+    values: Floats
+    covariance: Floats
     colour_inflation: float
     condition_number: float
     not_identified: tuple[tuple[str, str], ...]
-    residual_rms: FloatArray
-    residuals: tuple[FloatArray, ...]
+    residual_rms: Floats
+    residuals: tuple[Floats, ...]
     start_costs: tuple[float, ...]
     agreeing_starts: int
     evaluations: int
@@ -202,12 +198,12 @@ class PlantFit:
         return self.structure.build(self.values)
 
     @property
-    def standard_errors(self) -> FloatArray:
+    def standard_errors(self) -> Floats:
         """Standard errors of the parameters."""
         return np.asarray(np.sqrt(np.diag(self.covariance)))
 
     @property
-    def correlation(self) -> FloatArray:
+    def correlation(self) -> Floats:
         """Correlation matrix of the parameters."""
         return correlation(self.covariance)
 
@@ -215,9 +211,9 @@ class PlantFit:
 class Problem:
     """The weighted residual of a structure on its runs, and its Jacobian by differences, as functions of the values."""
 
-    def __init__(self, structure: Structure, run_list: Sequence[Run]) -> None:
+    def __init__(self, structure: Structure, records: Sequence[FitRecord]) -> None:
         """The parameters are searched in units of their scale."""
-        self.structure, self.runs = structure, tuple(run_list)
+        self.structure, self.runs = structure, tuple(records)
         self.scale = np.array([p.scale for p in structure.parameters])
         self.lower = np.array([p.lower for p in structure.parameters]) / self.scale
         self.upper = np.array([p.upper for p in structure.parameters]) / self.scale
@@ -229,17 +225,19 @@ class Problem:
         # A point is asked for up to three times: by the search, by the derivatives there and by the report.
         self.simulated = lru_cache(maxsize=2 * self.scale.size + 2)(self._simulate)
 
-    def outputs(self, values: FloatArray) -> list[FloatArray]:
+    def outputs(self, values: Floats) -> list[Floats]:
         """Used outputs of each run without their nuisance, weighted."""
         model = self.structure.build(values)
         plants = {step: mirror.discretise(model, step, often=True) for step in {run.step_s for run in self.runs}}
-        return [run.weight * without(run.nuisance, simulate(plants[run.step_s], run)[run.first :]) for run in self.runs]
+        return [
+            r.weight * without_nuisance(r.nuisance, simulate_record(plants[r.step_s], r)[r.first :]) for r in self.runs
+        ]
 
-    def modelled(self, point: FloatArray) -> FloatArray:
+    def modelled(self, point: Floats) -> Floats:
         """All used outputs as one vector, at a scaled point; far off where the plant cannot be stepped or runs away."""
         return self.simulated(point.tobytes())
 
-    def _simulate(self, point: bytes) -> FloatArray:
+    def _simulate(self, point: bytes) -> Floats:
         try:
             parts = self.outputs(np.frombuffer(point) * self.scale)
         except ValueError:
@@ -247,25 +245,25 @@ class Problem:
         whole = np.concatenate([part.ravel() for part in parts])
         return np.where(np.abs(whole) < self.far, whole, self.far)  # nan and inf too
 
-    def residual(self, point: FloatArray) -> FloatArray:
+    def residual(self, point: Floats) -> Floats:
         """Modelled less measured, weighted."""
         return np.asarray(self.modelled(point) - self.measured)
 
-    def slopes(self, point: FloatArray) -> FloatArray:
+    def slopes(self, point: Floats) -> Floats:
         """Derivative of the residual by differences to one side, for the way to an optimum: half the simulations."""
         here = self.modelled(point)
 
-        def column(i: int) -> FloatArray:
+        def column(i: int) -> Floats:
             step = np.zeros(point.size)
             step[i] = _DIFFERENCE if point[i] + _DIFFERENCE <= self.upper[i] else -_DIFFERENCE
             return np.asarray((self.modelled(point + step) - here) / step[i])
 
         return _columns(column, point.size)
 
-    def jacobian(self, point: FloatArray) -> FloatArray:
+    def jacobian(self, point: Floats) -> Floats:
         """Derivative of the residual by central differences."""
 
-        def column(i: int) -> FloatArray:
+        def column(i: int) -> Floats:
             step = np.zeros(point.size)
             up = min(point[i] + _DIFFERENCE, self.upper[i]) - point[i]
             down = point[i] - max(point[i] - _DIFFERENCE, self.lower[i])
@@ -276,16 +274,16 @@ class Problem:
         return _columns(column, point.size)
 
 
-def _columns(column: Callable[[int], FloatArray], count: int) -> FloatArray:
+def _columns(column: Callable[[int], Floats], count: int) -> Floats:
     """Columns side by side, made on all cores."""
     return np.column_stack(in_threads([partial(column, i) for i in range(count)]))
 
 
 def fit_plant(
     structure: Structure,
-    run_list: Sequence[Run],
+    records: Sequence[FitRecord],
     *,
-    starts: Sequence[FloatArray] = (),
+    starts: Sequence[Floats] = (),
     tolerance: float = 1e-9,
     most_evaluations: int = 60,
     on_progress: Progress | None = None,
@@ -295,25 +293,25 @@ def fit_plant(
     The search begins at the parameters' own starts and at each of `starts` (values in their order); trust-region
     reflective least squares within their bounds. Raises `IdentificationError` when no start can be simulated.
     """
-    problem = Problem(structure, run_list)
+    problem = Problem(structure, records)
     own = np.array([p.start for p in structure.parameters])
     solutions = []
     for done, start in enumerate([own, *starts], 1):
         solutions.append(_search(problem, start / problem.scale, tolerance, most_evaluations))
-        (on_progress or unheard)(done, 1 + len(starts), structure.name)
+        (on_progress or no_progress)(done, 1 + len(starts), structure.name)
     best = min(solutions, key=lambda s: float(s.cost))
     if best.cost >= 0.4 * problem.size * problem.far**2:
         raise IdentificationError(
             f"{structure.name}: the mirror cannot be simulated from any start at a step of "
-            f"{max(run.step_s for run in run_list):g} s; begin nearer, or take more steps a sample."
+            f"{max(run.step_s for run in records):g} s; begin nearer, or take more steps a sample."
         )
     return _report(problem, best, [float(s.cost) for s in solutions])
 
 
-def _search(problem: Problem, start: FloatArray, tolerance: float, most_evaluations: int) -> Any:
+def _search(problem: Problem, start: Floats, tolerance: float, most_evaluations: int) -> Any:
     from scipy.optimize import least_squares  # here, to keep start-up cheap
 
-    def search(begin: FloatArray, jacobian: Callable[[FloatArray], FloatArray], ending: float, most: int) -> Any:
+    def search(begin: Floats, jacobian: Callable[[Floats], Floats], ending: float, most: int) -> Any:
         return least_squares(
             problem.residual,
             begin,
@@ -367,7 +365,7 @@ def _report(problem: Problem, best: Any, costs: list[float]) -> PlantFit:
     )
 
 
-def _covariance(jacobian: FloatArray, variance: FloatArray, problem: Problem) -> tuple[FloatArray, float]:
+def _covariance(jacobian: Floats, variance: Floats, problem: Problem) -> tuple[Floats, float]:
     """The sandwich in the parameters' units, and the condition number of J with columns of length 1."""
     length = np.sqrt(np.einsum("ij,ij->j", jacobian, jacobian)) + 1e-300
     if not np.isfinite(length).all():
@@ -384,7 +382,7 @@ def _covariance(jacobian: FloatArray, variance: FloatArray, problem: Problem) ->
     return np.asarray(size[:, None] * (half @ half.T) * size), float(math.sqrt(values[-1] / values[0]))
 
 
-def _not_identified(structure: Structure, values: FloatArray, covariance: FloatArray) -> list[tuple[str, str]]:
+def _not_identified(structure: Structure, values: Floats, covariance: Floats) -> list[tuple[str, str]]:
     """Parameters with a relative standard error above 0.5, or a correlation above 0.95 with another, and why."""
     errors = np.sqrt(np.diag(covariance))
     between = np.abs(correlation(covariance)) - np.eye(values.size)

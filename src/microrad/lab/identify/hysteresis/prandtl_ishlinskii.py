@@ -11,18 +11,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from microrad.core.arrays import Floats
 from microrad.core.kernels import play_response
-from microrad.lab.identify.prepared import (
+from microrad.lab.identify.records import (
     DEFAULT_UNITS,
-    FloatArray,
     IdentificationError,
-    Prepared,
+    SiRecord,
     Units,
     centred,
     colour_inflation,
     fastest_rate,
     percent,
-    prepare,
+    si_records,
     span,
     split_by_record,
 )
@@ -39,9 +39,9 @@ class PrandtlIshlinskiiFit:
     `rate_limit_v_per_s` is the fastest rate at which it was seen.
     """
 
-    thresholds_v: FloatArray
-    weights_rad_per_v: FloatArray
-    standard_errors_rad_per_v: FloatArray
+    thresholds_v: Floats
+    weights_rad_per_v: Floats
+    standard_errors_rad_per_v: Floats
     sign: int
     offsets_rad: tuple[float, ...]
     rate_limit_v_per_s: float
@@ -52,8 +52,21 @@ class PrandtlIshlinskiiFit:
     samples_used: int
 
     name = "prandtl_ishlinskii"
+    admissible = True
+    """Play operators with weights of 0 or more never turn against the drive."""
+    not_identified: tuple[tuple[str, str], ...] = ()
 
-    def response(self, drive_v: FloatArray, step_s: float) -> tuple[FloatArray, int]:
+    @property
+    def falling(self) -> bool:
+        """Whether the output falls with the drive."""
+        return self.sign < 0
+
+    @property
+    def parameter_count(self) -> int:
+        """Number of parameters: the weights in use."""
+        return int(np.sum(self.weights_rad_per_v > 0))
+
+    def response(self, drive_v: Floats, step_s: float) -> tuple[Floats, int]:
         """Output (rad) without offset for a drive (V), every operator starting at the first drive value; 0 clamped."""
         active = self.weights_rad_per_v > 0
         states = _states(drive_v, self.thresholds_v[active])
@@ -73,13 +86,13 @@ def fit_prandtl_ishlinskii(
     largest peak-to-peak drive: an operator of half of it would never move both ways. States are carried through each
     record; samples before the drive has swept its range once are left out. Raises `IdentificationError`.
     """
-    records = prepare(recordings, units)
+    records = si_records(recordings, units)
     thresholds = _thresholds(records, thresholds_v, operators)
     stacked = np.concatenate([_states(r.drive_v, thresholds)[r.start :] for r in records])
     measured = np.concatenate([r.output_rad[r.start :] for r in records])
     states, output = centred(stacked, records), centred(measured, records)
     sign = 1 if float(states[:, 0] @ output) >= 0 else -1
-    weights = non_negative(states, sign * output)
+    weights = non_negative_weights(states, sign * output)
     residual = measured - sign * stacked @ weights
     offsets = tuple(float(part.mean()) for part in split_by_record(residual, records))
     residual = centred(residual, records)
@@ -102,16 +115,16 @@ def fit_prandtl_ishlinskii(
     )
 
 
-def _states(drive_v: FloatArray, thresholds_v: FloatArray) -> FloatArray:
+def _states(drive_v: Floats, thresholds_v: Floats) -> Floats:
     return np.asarray(play_response(drive_v, thresholds_v, np.full(thresholds_v.size, drive_v[0])))
 
 
-def threshold_grid(drive_span: float, operators: int) -> FloatArray:
+def threshold_grid(drive_span: float, operators: int) -> Floats:
     """Thresholds spread evenly from 0 to 0.47 of the peak-to-peak drive."""
     return np.linspace(0.0, 0.47 * drive_span, operators)
 
 
-def _thresholds(records: Sequence[Prepared], given: ArrayLike | None, operators: int) -> FloatArray:
+def _thresholds(records: Sequence[SiRecord], given: ArrayLike | None, operators: int) -> Floats:
     drive_span = max(float(np.ptp(r.drive_v)) for r in records)
     if given is None:
         if operators < 1:
@@ -127,7 +140,7 @@ def _thresholds(records: Sequence[Prepared], given: ArrayLike | None, operators:
     return thresholds
 
 
-def non_negative(states: FloatArray, output: FloatArray) -> FloatArray:
+def non_negative_weights(states: Floats, output: Floats) -> Floats:
     """Weights >= 0 by least squares; the triangle of a QR decomposition holds the same problem in a few rows."""
     from scipy.optimize import nnls  # here, to keep start-up cheap
 
@@ -136,7 +149,7 @@ def non_negative(states: FloatArray, output: FloatArray) -> FloatArray:
     return np.asarray(nnls(triangle[:, :-1] / size, triangle[:, -1] / size)[0])
 
 
-def _errors(states: FloatArray, weights: FloatArray, variance: float) -> tuple[FloatArray, float]:
+def _errors(states: Floats, weights: Floats, variance: float) -> tuple[Floats, float]:
     """Standard errors of the positive weights (nan for the others) and the condition number of their columns."""
     active = weights > 0
     errors = np.full(weights.size, np.nan)

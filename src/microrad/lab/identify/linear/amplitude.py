@@ -8,7 +8,7 @@ import numpy as np
 from microrad.core.arrays import Floats
 from microrad.lab.identify.linear.fit import LinearFit
 from microrad.lab.identify.linear.modal import ModalModel
-from microrad.lab.identify.prepared import IdentificationError
+from microrad.lab.identify.records import IdentificationError
 
 _LOW = 0.1
 

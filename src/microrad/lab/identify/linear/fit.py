@@ -18,7 +18,7 @@ from microrad.lab.identify.linear.order import fit_order
 from microrad.lab.identify.linear.polish import Polished, TimeEquations, pack, polish, unpack
 from microrad.lab.identify.linear.response import FrequencyResponse, response_from_periods, response_from_records
 from microrad.lab.identify.linear.vector_fitting import check_order
-from microrad.lab.identify.prepared import IdentificationError, colour_inflation, unheard
+from microrad.lab.identify.records import IdentificationError, colour_inflation, no_progress, rounded_to_error
 from microrad.lab.recording import Recording
 
 _STEP = 1e-6
@@ -55,7 +55,7 @@ def uncertainty(polished: Polished, response: FrequencyResponse, direct: bool, i
     zeros = transmission_zeros(model, np.pi * response.rate_hz)
     points = np.concatenate([[0.0, 2j * np.pi * response.excited_hz[0]], zeros])
     slopes = _slopes(model, points, direct)
-    values = at(model, points[:2])
+    values = transfer_matrix(model, points[:2])
     errors = [np.sqrt(np.maximum(_variance(slopes[k], covariance), 0.0)) for k in (0, 1)]
     # A gain is real in phase: only the change along the value moves its magnitude.
     direction = values[1].conj() / np.maximum(np.abs(values[1]), 1e-300)
@@ -83,7 +83,7 @@ def parameter_covariance(polished: Polished) -> Floats:
     return np.asarray(inverse * polished.cost / freedom)
 
 
-def at(model: ModalModel, points: Complexes) -> Complexes:
+def transfer_matrix(model: ModalModel, points: Complexes) -> Complexes:
     """Transfer matrix at any complex frequencies (rad/s), shape (points, outputs, inputs)."""
     return model.combined(1.0 / (np.asarray(points)[:, None] - model.all_poles_rad_s))
 
@@ -121,7 +121,7 @@ def _slopes(model: ModalModel, points: Complexes, direct: bool) -> Complexes:
         for sign in (1.0, -1.0):
             moved = theta.copy()
             moved[k] += sign * step
-            ends.append(at(unpack(moved, model), points))
+            ends.append(transfer_matrix(unpack(moved, model), points))
         slopes[..., k] = (ends[0] - ends[1]) / (2 * step)
     return slopes
 
@@ -135,10 +135,10 @@ def _zero_errors(model: ModalModel, zeros: Complexes, slopes: Complexes, covaria
     """At a zero w^H G v = 0, so dz = -(w^H dG v) / (w^H G' v)."""
     errors = np.empty(zeros.size)
     for k, zero in enumerate(zeros):
-        left, _, right = np.linalg.svd(at(model, np.array([zero]))[0])
+        left, _, right = np.linalg.svd(transfer_matrix(model, np.array([zero]))[0])
         w, v = left[:, -1].conj(), right[-1].conj()
         step = 1e-6 * max(abs(zero), 1e-6)
-        ends = at(model, np.array([zero + step, zero - step]))
+        ends = transfer_matrix(model, np.array([zero + step, zero - step]))
         slope = w @ ((ends[0] - ends[1]) / (2 * step)) @ v
         moved = np.einsum("o,oip,i->p", w, slopes[k], v) / slope
         errors[k] = np.sqrt(max(float(_variance(moved, covariance)), 0.0))
@@ -221,7 +221,7 @@ def fit_linear(
     several = response.response[0].size > 1
     candidates = _candidates(response, orders)
     tried = candidates if several else range(1, candidates[-1] + 1)  # each sets out from the one before, too
-    total, report = len(tried) + 2, on_progress or unheard
+    total, report = len(tried) + 2, on_progress or no_progress
     fits: dict[int, Polished] = {}
     for done, order in enumerate(tried, start=1):
         smaller = None if several or order == 1 else fits[order - 1].model
@@ -235,7 +235,7 @@ def fit_linear(
     if not periodic:
         polished = polish(TimeEquations(records, response.hold, drop, direct=direct), polished.model, iterations=30)
     report(total, total, "polish in time")
-    return _finish(records, response, polished, scan, reason, drop, direct)
+    return _linear_fit(records, response, polished, scan, reason, drop, direct)
 
 
 # ---------------------------------------------------------------------------------------------------------------- order
@@ -329,7 +329,7 @@ def fit_percent(measured: Floats, error: Floats) -> Floats:
     return np.asarray(100.0 * (1.0 - np.linalg.norm(error, axis=0) / spread))
 
 
-def _finish(
+def _linear_fit(
     records: Sequence[Recording],
     response: FrequencyResponse,
     polished: Polished,
@@ -371,7 +371,7 @@ def _tones(model: ModalModel, records: Sequence[Recording], residual_rms: Floats
     for k, pole in enumerate(model.poles_rad_s):
         hz, decay_s = abs(pole) / (2 * np.pi), -1.0 / pole.real
         if decay_s > _RINGS * longest_s and hz * longest_s > _CYCLES:
-            tone = _share(model, k, records, hold, residual_rms) > _TONE
+            tone = _mode_share(model, k, records, hold, residual_rms) > _TONE
             found.append(
                 f"pole at {hz:.4g} Hz rings for {decay_s:.3g} s, the recording lasts {longest_s:.3g} s and cannot show "
                 f"that: {_STEADY if tone else _SPARE}; do not design a controller for it."
@@ -379,7 +379,7 @@ def _tones(model: ModalModel, records: Sequence[Recording], residual_rms: Floats
     return found
 
 
-def _share(model: ModalModel, k: int, records: Sequence[Recording], hold: Hold, residual_rms: Floats) -> float:
+def _mode_share(model: ModalModel, k: int, records: Sequence[Recording], hold: Hold, residual_rms: Floats) -> float:
     """Largest rms output of a mode by itself, in that of the residual of the whole model."""
     alone = ModalModel(
         model.poles_rad_s[k : k + 1],
@@ -406,11 +406,13 @@ def _warnings(known: Uncertainty, response: FrequencyResponse) -> tuple[str, ...
                 "delay), not as dynamics of the mirror."
             )
     q, i = np.unravel_index(int(np.argmax(np.abs(known.edge_gain))), known.edge_gain.shape)
-    dc, edge = float(known.dc_gain[q, i]), float(known.edge_gain[q, i])
+    dc, dc_error = float(known.dc_gain[q, i]), float(known.dc_gain_error[q, i])
+    edge, edge_error = float(known.edge_gain[q, i]), float(known.edge_gain_error[q, i])
     if abs(abs(dc) / edge - 1) > 0.05:
+        extrapolated = f"{rounded_to_error(dc, dc_error)} ± {dc_error:.2g}"
+        seen = f"{rounded_to_error(edge, edge_error)} ± {edge_error:.2g}"
         found.append(
-            f"the gain at zero frequency, {dc:.4g} ± {known.dc_gain_error[q, i]:.2g}, is extrapolated: at "
-            f"{low:.3g} Hz, the lowest excited frequency, it is {edge:.4g} ± {known.edge_gain_error[q, i]:.2g}; use "
-            "the latter."
+            f"the gain at zero frequency, {extrapolated}, is extrapolated: at {low:.3g} Hz, the lowest excited "
+            f"frequency, it is {seen}; use the latter."
         )
     return tuple(found)

@@ -21,7 +21,7 @@ import numpy as np
 
 from microrad.core.arrays import Complexes, Floats
 from microrad.core.lti import StateSpace
-from microrad.lab.identify.prepared import IdentificationError
+from microrad.lab.identify.records import IdentificationError
 
 Hold = Literal["zero-order", "first-order", "band-limited"]
 

@@ -14,11 +14,10 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from microrad.core.arrays import Complexes, Floats
+from microrad.core.arrays import Complexes, Floats, Integers
 from microrad.lab.identify.linear.modal import Hold
-from microrad.lab.identify.prepared import IdentificationError
+from microrad.lab.identify.records import IdentificationError
 from microrad.lab.recording import Recording
 
 BANDS = 300
@@ -98,7 +97,7 @@ def response_from_records(
     edges = _band_edges(spectra.freq_hz, low, high, bands, max(MIN_LINES, 4 * records[0].drive.shape[1]))
     if detrend:
         line = np.linspace(-1.0, 1.0, records[0].samples)[:, None]
-        slopes = _lines_left(spectra, edges, records[0].samples)
+        slopes = _unexplained_slopes(spectra, edges, records[0].samples)
         outputs = [r.output - line * slope for r, slope in zip(records, slopes, strict=True)]
         spectra = _transform(records, outputs)
     return _banded(records, spectra, edges)
@@ -211,7 +210,7 @@ def _banded(records: Sequence[Recording], spectra: _Spectra, edges: list[tuple[i
         residual_power=left,
         excited_hz=excited,
         method="band-averaged cross-spectrum",
-        **_common(records),
+        **_of_records(records),
     )
 
 
@@ -238,7 +237,7 @@ def _independent(auto: Complexes, freq_hz: Floats) -> Complexes:
     return np.asarray(np.linalg.pinv(auto / scale, hermitian=True) / scale)
 
 
-def _common(records: Sequence[Recording]) -> dict[str, Any]:
+def _of_records(records: Sequence[Recording]) -> dict[str, Any]:
     """What a response takes from its records as it is."""
     drive_rms = np.sqrt(np.mean([np.var(r.drive, axis=0) for r in records], axis=0))
     return {
@@ -247,7 +246,7 @@ def _common(records: Sequence[Recording]) -> dict[str, Any]:
     }
 
 
-def _lines_left(spectra: _Spectra, edges: list[tuple[int, int]], samples: int) -> Floats:
+def _unexplained_slopes(spectra: _Spectra, edges: list[tuple[int, int]], samples: int) -> Floats:
     """Slope of the straight line in each record that no response to the drive explains, shape (records, outputs).
 
     Least squares over all bands at once, with the response of each band eliminated: the ramp and the output are both
@@ -302,7 +301,7 @@ def response_from_periods(records: Sequence[Recording], *, skip_periods: int = 0
     total_variance = rest / (m - inputs) if m > inputs else noise_variance
     assert total_variance is not None
     spread = np.diagonal(inverse, axis1=1, axis2=2).real[:, None, :]
-    total, noise, distortion = _levels(total_variance, noise_variance, spread, m > inputs)
+    total, noise, distortion = _standard_errors(total_variance, noise_variance, spread, m > inputs)
     coherence = 1.0 - total_variance * m / np.maximum(np.sum(np.abs(y) ** 2, axis=0), 1e-300)
     return FrequencyResponse(
         freq_hz=freq,
@@ -315,7 +314,7 @@ def response_from_periods(records: Sequence[Recording], *, skip_periods: int = 0
         residual_power=total_variance,
         excited_hz=(float(freq[0]), float(freq[-1])),
         method=f"best linear approximation, realisations: {m}, periods of each: {p}",
-        **_common(records),
+        **_of_records(records),
     )
 
 
@@ -341,7 +340,7 @@ def _periods(records: Sequence[Recording], name: str, period: int, skip: int) ->
     return np.asarray(np.fft.rfft(np.stack(parts), axis=2) * (np.sqrt(2.0) / period))
 
 
-def _excited_lines(drive: Complexes) -> NDArray[np.int64]:
+def _excited_lines(drive: Complexes) -> Integers:
     """Lines, without zero and half the rate, whose drive power is above a thousandth of the strongest line's."""
     power = np.mean(np.abs(drive) ** 2, axis=(0, 1)).max(axis=1)
     power[0] = 0.0
@@ -351,7 +350,7 @@ def _excited_lines(drive: Complexes) -> NDArray[np.int64]:
     return np.flatnonzero(power > _EXCITED * power.max())
 
 
-def _noise_variance(drive: Complexes, output: Complexes, response: Complexes, lines: NDArray[np.int64]) -> Floats:
+def _noise_variance(drive: Complexes, output: Complexes, response: Complexes, lines: Integers) -> Floats:
     """Variance of the mean over periods of what the response leaves, mean over realisations; (lines, outputs)."""
     left = output[:, :, lines] - np.einsum("foi,mpfi->mpfo", response, drive[:, :, lines], optimize=True)
     periods = left.shape[1]
@@ -359,7 +358,7 @@ def _noise_variance(drive: Complexes, output: Complexes, response: Complexes, li
     return np.asarray(scatter.mean(axis=0) / periods)
 
 
-def _levels(
+def _standard_errors(
     total: Floats, noise: Floats | None, spread: Floats, spare: bool
 ) -> tuple[Floats, Floats | None, Floats | None]:
     """Standard errors of the response: total, noise part, distortion part."""

@@ -15,7 +15,7 @@ import numpy as np
 
 from microrad.core.arrays import Complexes, Floats
 from microrad.lab.identify.linear.modal import Hold, ModalModel, hold_basis, rank_one_modes, real_columns
-from microrad.lab.identify.prepared import IdentificationError
+from microrad.lab.identify.records import IdentificationError
 
 _REAL = 1e-9
 

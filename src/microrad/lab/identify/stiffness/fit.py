@@ -19,7 +19,7 @@ from microrad.core import kernels
 from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
 from microrad.lab.identify.linear.response import check_alike, response_from_periods
-from microrad.lab.identify.prepared import IdentificationError, unheard
+from microrad.lab.identify.records import IdentificationError, no_progress
 from microrad.lab.identify.stiffness import tangents
 from microrad.lab.identify.stiffness.model import (
     FIELDS,
@@ -27,9 +27,9 @@ from microrad.lab.identify.stiffness.model import (
     Source,
     balanced,
     delayed,
-    first_numbers,
     linear_start,
     scaled,
+    starting_numbers,
 )
 from microrad.lab.identify.stiffness.tangents import Normal, Steady
 from microrad.lab.recording import Recording
@@ -171,7 +171,7 @@ def fit_hysteretic_stiffness(
     levels = _levels(groups, outputs, units[1], skip_periods)
     search = _Search(steady, classes, levels, fixed_delay=options.delay_s is not None)
     with ThreadPoolExecutor(min(len(steady), os.cpu_count() or 1)) as pool:
-        search.run(balanced(start), pool, iterations, options.tolerance, on_progress or unheard)
+        search.minimise(balanced(start), pool, iterations, options.tolerance, on_progress or no_progress)
     if (growth := search.numbers.growth_1_s) >= 0.0:
         raise IdentificationError(
             f"the fitted mirror runs away: where its plays slide it grows by {growth:.3g} 1/s, whatever the drive; fit "
@@ -193,7 +193,7 @@ def _start(
     middle = int(np.argmin(np.abs(size - np.mean(size[np.asarray(classes)]))))
     response = response_from_periods(groups[middle], skip_periods=skip_periods)
     model, late_s = linear_start(response, order, options.sub_steps, options.delay_s, options.exchanges)
-    return first_numbers(model, late_s, options.sources, response.excited_hz[0], len(options.thresholds))
+    return starting_numbers(model, late_s, options.sources, response.excited_hz[0], len(options.thresholds))
 
 
 # --------------------------------------------------------------------------------------------------------- the records
@@ -270,7 +270,7 @@ def _with_thresholds(numbers: Numbers, steady: Sequence[Steady], thresholds: Seq
     far = replace(numbers, thresholds=np.full_like(numbers.thresholds, 1e300))  # plays that never move: the linear part
     plant = tangents.play_plant(far, largest.step_s)
     drive = tangents.two_periods(largest, numbers.delay_s)
-    path = tangents.run(plant, drive)
+    path = tangents.simulate_path(plant, drive)
     half = drive.shape[0] // 2
     q = path.x[half:, : numbers.B.shape[0]] @ numbers.F.T + drive[half:] @ numbers.G.T
     return replace(numbers, thresholds=np.zeros_like(numbers.thresholds) + np.abs(q).max() * np.asarray(thresholds))
@@ -295,7 +295,7 @@ class _Search:
         self.held = False
         """Whether a trial of the last step was refused because it would run away."""
 
-    def run(
+    def minimise(
         self, start: Numbers, pool: ThreadPoolExecutor, iterations: int, tolerance: float, on_progress: Progress
     ) -> None:
         """From a start to the end; the result is in `numbers` and `parts`."""
@@ -322,10 +322,11 @@ class _Search:
 
     def _linearise(self, pool: ThreadPoolExecutor) -> None:
         plant = self._plant(self.numbers)
-        self.parts: list[Normal] = list(pool.map(lambda r: tangents.normal(plant, self.numbers, r), self.steady))
+        parts = pool.map(lambda r: tangents.normal_equations(plant, self.numbers, r), self.steady)
+        self.parts: list[Normal] = list(parts)
         self.costs.append(math.sqrt(float(self.weights @ np.array([part.cost for part in self.parts]))))
 
-    def system(self) -> tuple[Floats, Floats]:
+    def normal_equations(self) -> tuple[Floats, Floats]:
         """Weighed normal matrix and gradient over all numbers."""
         matrix = sum((w * p.matrix for w, p in zip(self.weights, self.parts, strict=True)), np.zeros(()))
         gradient = sum((w * p.gradient for w, p in zip(self.weights, self.parts, strict=True)), np.zeros(()))
@@ -334,7 +335,7 @@ class _Search:
     def _step(self, pool: ThreadPoolExecutor, damping: float) -> tuple[float, bool]:
         """Try damped steps until one lowers the cost; the damping for the next one."""
         self.held = False
-        matrix, gradient = self.system()
+        matrix, gradient = self.normal_equations()
         free = np.ones(gradient.size, dtype=bool)
         free[-1] = not self.fixed_delay
         size = np.sqrt(np.diag(matrix) + self._floors(np.diag(matrix)))[free]
@@ -406,7 +407,7 @@ def _standard_errors(search: _Search) -> tuple[Floats, Floats, float]:
     modes, pairs = search.numbers.decay.size, search.numbers.frequency.size
     if int(np.bincount(np.asarray(search.classes)).min()) < 2:
         return np.full(modes, np.nan), np.full(pairs, np.nan), math.nan
-    matrix, total = search.system()
+    matrix, total = search.normal_equations()
     size = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
     inverse = np.linalg.pinv(matrix / np.outer(size, size), rcond=1e-6, hermitian=True) / np.outer(size, size)
     pulls = np.array(

@@ -172,7 +172,7 @@ def linear_start(
     return fit_order(behind(delay_s), order, exchanges=exchanges).model, delay_s
 
 
-def first_numbers(
+def starting_numbers(
     model: ModalModel, delay_s: float, sources: Sequence[Source], lowest_hz: float, plays: int
 ) -> Numbers:
     """A linear model with an operator of next to no weight per actuator and source, which acts as its drive does.

@@ -52,7 +52,7 @@ def play_plant(numbers: Numbers, step_s: float) -> kernels.PlayPlant:
     return kernels.PlayPlant(**values | {"play_start": plant.play_start.astype(np.int64)})
 
 
-def run(plant: kernels.PlayPlant, drive: Floats) -> kernels.Path:
+def simulate_path(plant: kernels.PlayPlant, drive: Floats) -> kernels.Path:
     """The path of a plant from rest."""
     steps, operators = drive.shape[0], plant.K.shape[1]
     path = kernels.Path(
@@ -73,10 +73,10 @@ def two_periods(record: Steady, delay_s: float) -> Floats:
     return np.concatenate([one, one])
 
 
-def error_of(plant: kernels.PlayPlant, record: Steady, delay_s: float) -> tuple[Floats, kernels.Path, Floats]:
+def steady_error(plant: kernels.PlayPlant, record: Steady, delay_s: float) -> tuple[Floats, kernels.Path, Floats]:
     """Modelled less measured output (samples, outputs), without its mean; the path, and the drive."""
     drive = two_periods(record, delay_s)
-    path = run(plant, drive)
+    path = simulate_path(plant, drive)
     error = path.output[drive.shape[0] // 2 :: record.sub_steps] - record.output
     return error - error.mean(axis=0), path, drive
 
@@ -84,13 +84,13 @@ def error_of(plant: kernels.PlayPlant, record: Steady, delay_s: float) -> tuple[
 def squared_error(plant: kernels.PlayPlant, record: Steady, delay_s: float) -> float:
     """Sum of the squared error; infinite where the model runs away."""
     with np.errstate(all="ignore"):
-        cost = float(np.sum(error_of(plant, record, delay_s)[0] ** 2))
+        cost = float(np.sum(steady_error(plant, record, delay_s)[0] ** 2))
     return cost if math.isfinite(cost) else math.inf
 
 
-def normal(plant: kernels.PlayPlant, numbers: Numbers, record: Steady) -> Normal:
+def normal_equations(plant: kernels.PlayPlant, numbers: Numbers, record: Steady) -> Normal:
     """Normal equations of a record in the order of `Numbers.vector`, in single precision, summed in double."""
-    error, path, drive = error_of(plant, record, numbers.delay_s)
+    error, path, drive = steady_error(plant, record, numbers.delay_s)
     J = jacobian(plant, numbers, record, (path, drive), np.float32)
     J -= J.mean(axis=0)
     J = J.reshape(-1, J.shape[2])
@@ -122,7 +122,7 @@ def jacobian(
     J: Floats = np.empty((rows, outputs, numbers.vector().size), dtype=kind)
     _state_columns(J, (plant, numbers, record.step_s), (part, drive[cut]), (lead + 1, record.sub_steps))
     _output_columns(J, numbers, (path, drive), (period, record.sub_steps))
-    later = run(plant, two_periods(record, numbers.delay_s + _LATER * record.step_s)).output
+    later = simulate_path(plant, two_periods(record, numbers.delay_s + _LATER * record.step_s)).output
     J[:, :, -1] = (later - path.output)[period :: record.sub_steps] / (_LATER * record.step_s)
     return J
 

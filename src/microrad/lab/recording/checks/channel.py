@@ -9,10 +9,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad.lab.recording.records import Finding, FloatArray
-
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.int_]
+from microrad.core.arrays import Floats, Integers
+from microrad.lab.recording.records import Finding
 
 _SUBSAMPLE = 20_000
 # The narrowest loops of piezo mirrors are about 2 % of peak-to-peak wide. With fewer than 50 levels such a loop is
@@ -26,7 +24,7 @@ _BLOCKS = 8
 _CROSSINGS = 4
 
 
-def subsample(values: FloatArray) -> FloatArray:
+def subsample(values: Floats) -> Floats:
     """Runs of neighbours from all over the record."""
     if values.size <= _SUBSAMPLE:
         return values
@@ -35,7 +33,7 @@ def subsample(values: FloatArray) -> FloatArray:
     return np.concatenate([values[s : s + length] for s in starts])
 
 
-def quantum(values: FloatArray) -> float:
+def quantum(values: Floats) -> float:
     """The quantisation step: the smallest distance of two values of which all others are multiples, else 0."""
     unique = np.unique(subsample(values))
     if unique.size < 2:
@@ -54,7 +52,7 @@ def quantum(values: FloatArray) -> float:
     return step
 
 
-def quantisation(label: str, values: FloatArray, drives: Sequence[FloatArray] | None) -> list[Finding]:
+def quantisation(label: str, values: Floats, drives: Sequence[Floats] | None) -> list[Finding]:
     """Levels that an output resolves, where the drive itself has more of them than the output.
 
     Noise of half a step or more between neighbours dithers: averaging then recovers what lies between two levels, and
@@ -80,18 +78,18 @@ def quantisation(label: str, values: FloatArray, drives: Sequence[FloatArray] | 
     return [Finding("quantisation", label, None, text, refused)]
 
 
-def _places(drive: FloatArray, share: float) -> int:
+def _places(drive: Floats, share: float) -> int:
     """How many places the drive visits, when told apart ten times as finely as the output's steps."""
     return int(np.unique(np.floor(subsample(drive) / (0.1 * share * np.ptp(drive)))).size)
 
 
-def _flicker(values: FloatArray, step: float) -> float:
+def _flicker(values: Floats, step: float) -> float:
     """Share of the samples that reverse the direction of the change before: that is noise, not motion."""
     changes = np.sign(np.diff(subsample(values)))
     return float(np.count_nonzero(changes[1:] * changes[:-1] < 0)) / max(changes.size, 1)
 
 
-def drift(label: str, values: FloatArray, drives: Sequence[FloatArray]) -> list[Finding]:
+def drift(label: str, values: Floats, drives: Sequence[Floats]) -> list[Finding]:
     """The linear trend that the drives do not explain, as a share of peak-to-peak.
 
     Regression of the output on drives, time and a constant; the standard error of the trend follows from the scatter of
@@ -115,13 +113,13 @@ def drift(label: str, values: FloatArray, drives: Sequence[FloatArray]) -> list[
     return [Finding("drift", label, None, text, refused)]
 
 
-def _crossings(drive: FloatArray) -> int:
+def _crossings(drive: Floats) -> int:
     """How often the drive crosses the middle of its range."""
     above = drive > 0.5 * (drive.max() + drive.min())
     return int(np.count_nonzero(above[1:] != above[:-1]))
 
 
-def _trend(y: FloatArray, drives: Sequence[FloatArray]) -> tuple[float, float]:
+def _trend(y: Floats, drives: Sequence[Floats]) -> tuple[float, float]:
     """Change of `y` over the record that is linear in time and not in the drives, and its standard error."""
     time = np.linspace(-0.5, 0.5, y.size)
     table = np.column_stack([*(c - c.mean() for c in drives), np.ones(y.size)])
@@ -139,7 +137,7 @@ def _trend(y: FloatArray, drives: Sequence[FloatArray]) -> tuple[float, float]:
     return trend, math.sqrt(12 * float(np.var(blocks)) / (_BLOCKS - 2))
 
 
-def _slow(drives: Sequence[FloatArray]) -> list[FloatArray]:
+def _slow(drives: Sequence[Floats]) -> list[Floats]:
     """The drives behind first-order low-passes with time constants of 1, 3 and 10 % of the record."""
     from scipy.signal import lfilter
 
@@ -147,7 +145,7 @@ def _slow(drives: Sequence[FloatArray]) -> list[FloatArray]:
     return [lfilter([1 - pole], [1, -pole], drive - drive[0]) for drive, pole in poles]
 
 
-def block_means(values: FloatArray, length: int) -> FloatArray:
+def block_means(values: Floats, length: int) -> Floats:
     """Means of blocks of `length` samples; what is left at the end is left out."""
     if length == 1:
         return values
@@ -166,9 +164,7 @@ _ASYMMETRY = 4.0
 _SLOWING = 0.97
 
 
-def clipping(
-    label: str, values: FloatArray, place: Callable[[int], str], drives: Sequence[FloatArray] | None
-) -> list[Finding]:
+def clipping(label: str, values: Floats, place: Callable[[int], str], drives: Sequence[Floats] | None) -> list[Finding]:
     """Judge one channel; `drives` are the inputs where it is an output, None where it is an input itself.
 
     A flat top counts when its flanks are smooth and steep enough to hide more than rounding, on at least two peaks.
@@ -210,13 +206,13 @@ def clipping(
 
 
 def _flat_tops(
-    values: FloatArray,
-    at: IntArray,
+    values: Floats,
+    at: Integers,
     sign: float,
     step: float,
     span: float,
-    drives: Sequence[FloatArray] | None,
-) -> tuple[IntArray, FloatArray]:
+    drives: Sequence[Floats] | None,
+) -> tuple[Integers, Floats]:
     """First rows of the flat tops, and how much each of them hides."""
     breaks = np.flatnonzero(np.diff(at) > 1)
     starts = at[np.concatenate(([0], breaks + 1))] if at.size else at
@@ -242,25 +238,25 @@ def _flat_tops(
 
 
 def _curved(
-    values: FloatArray,
-    starts: IntArray,
-    ends: IntArray,
-    width: IntArray,
+    values: Floats,
+    starts: Integers,
+    ends: Integers,
+    width: Integers,
     sign: float,
-    entry: FloatArray,
-    leave: FloatArray,
-) -> BoolArray:
+    entry: Floats,
+    leave: Floats,
+) -> NDArray[np.bool_]:
     """Whether both flanks are steeper farther away, as those of a rounded peak are."""
     before, after = starts - 1 - width, ends + 1 + width
     inside = (before - width >= 0) & (after + width < values.size)
     before, after = np.where(inside, before, width), np.where(inside, after, 0)
     farther = sign * (values[before] - values[before - width]) / width
     later = sign * (values[after] - values[np.minimum(after + width, values.size - 1)]) / width
-    curved: BoolArray = inside & (entry < _SLOWING * farther) & (leave < _SLOWING * later)
+    curved: NDArray[np.bool_] = inside & (entry < _SLOWING * farther) & (leave < _SLOWING * later)
     return curved
 
 
-def _moves(drives: Sequence[FloatArray], starts: IntArray, ends: IntArray, hidden: FloatArray) -> BoolArray:
+def _moves(drives: Sequence[Floats], starts: Integers, ends: Integers, hidden: Floats) -> NDArray[np.bool_]:
     """Whether a drive moves in the inner half of the flat top, by a tenth at least of what the output hides.
 
     The outer quarters do not count: there a delayed output rests while the drive is already on its way.
@@ -276,13 +272,13 @@ def _moves(drives: Sequence[FloatArray], starts: IntArray, ends: IntArray, hidde
     return moving
 
 
-def _resting(drive: FloatArray) -> int:
+def _resting(drive: Floats) -> int:
     """Samples that a drive spends at one of its extremes, if it stays there for two at least."""
     ends = (drive == drive.max(), drive == drive.min())
     return max((int(np.count_nonzero(at)) for at in ends if np.any(at[1:] & at[:-1])), default=0)
 
 
-def _piles_up(values: FloatArray, at: IntArray, limit: float, step: float, span: float) -> bool:
+def _piles_up(values: Floats, at: Integers, limit: float, step: float, span: float) -> bool:
     """Whether single samples gather at the limit of a signal too fast to show flat tops.
 
     Below the limit a band of 1 % of peak-to-peak is counted: a signal that turns there spends longer in the band than

@@ -5,12 +5,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from microrad.core.arrays import Complexes, Floats
 from microrad.lab.recording.checks.channel import block_means
-from microrad.lab.recording.records import Finding, FloatArray
-
-ComplexArray = NDArray[np.complex128]
+from microrad.lab.recording.records import Finding
 
 _BAND_BLOCK = 1 << 20
 _MAX_SEGMENT, _SHORT_SEGMENT = 1 << 16, 1 << 12
@@ -27,7 +25,7 @@ _NARROW_RAD = math.radians(25)
 
 
 def excitation(
-    inputs: Sequence[FloatArray], labels: Sequence[str], rate_hz: float
+    inputs: Sequence[Floats], labels: Sequence[str], rate_hz: float
 ) -> tuple[tuple[float, float], list[Finding]]:
     """The band in Hz that holds 99.9 % of the power of all inputs, and a finding with the band of each."""
     bands, powers = zip(*(_band(values, rate_hz) for values in inputs), strict=True)
@@ -49,7 +47,7 @@ def excitation(
     return (min(low for low, _ in bands), max(high for _, high in bands)), findings
 
 
-def _band(values: FloatArray, rate_hz: float) -> tuple[tuple[float, float], float]:
+def _band(values: Floats, rate_hz: float) -> tuple[tuple[float, float], float]:
     """Band with 99.9 % of the power about the mean, and that power."""
     size = min(values.size, _BAND_BLOCK)
     mean = float(values.mean())
@@ -70,18 +68,18 @@ class _Response:
     """Averaged response of one output: frequencies, response per input, multiple coherence, share and
     cross-power of each input, number of independent averages."""
 
-    freq_hz: FloatArray
-    response: ComplexArray
-    coherence: FloatArray
-    share: FloatArray
-    cross: FloatArray
+    freq_hz: Floats
+    response: Complexes
+    coherence: Floats
+    share: Floats
+    cross: Floats
     averages: float
 
 
 def follows(
     label: str,
-    output: FloatArray,
-    inputs: Sequence[FloatArray],
+    output: Floats,
+    inputs: Sequence[Floats],
     labels: Sequence[str],
     rate_hz: float,
     band: tuple[float, float],
@@ -109,7 +107,7 @@ def follows(
     return found if lag * factor < -0.25 else []
 
 
-def _unrelated(label: str, slow: Sequence[FloatArray], found: _Response, long: _Response) -> str:
+def _unrelated(label: str, slow: Sequence[Floats], found: _Response, long: _Response) -> str:
     """The evidence that an output has nothing to do with the inputs, or nothing.
 
     Four looks must all fail: the best bin of many short segments, the mean over the bins of few long ones (a lightly
@@ -135,7 +133,7 @@ def _unrelated(label: str, slow: Sequence[FloatArray], found: _Response, long: _
     )
 
 
-def _correlation(inputs: Sequence[FloatArray], output: FloatArray, reach: int) -> tuple[float, float]:
+def _correlation(inputs: Sequence[Floats], output: Floats, reach: int) -> tuple[float, float]:
     """Lag in samples, and size, of the largest correlation of the output with an input; a negative lag is a lead."""
     output, *inputs = (column[:_BAND_BLOCK] for column in (output, *inputs))
     reach = max(2, min(reach, output.size // 4))
@@ -155,12 +153,12 @@ def _correlation(inputs: Sequence[FloatArray], output: FloatArray, reach: int) -
     return lag, best
 
 
-def _predicts(inputs: Sequence[FloatArray], output: FloatArray) -> bool:
+def _predicts(inputs: Sequence[Floats], output: Floats) -> bool:
     """Whether inputs improve the prediction of the output from its own past (Granger 1969), beyond any chance."""
     size = min(output.size, _SHORT_RECORD)
     rows = size - _ORDER
 
-    def lags(column: FloatArray, first: int) -> list[FloatArray]:
+    def lags(column: Floats, first: int) -> list[Floats]:
         return [column[_ORDER - k : size - k] for k in range(first, _ORDER + 1)]
 
     past = np.column_stack([np.ones(rows), *lags(output, 1)])
@@ -174,7 +172,7 @@ def _predicts(inputs: Sequence[FloatArray], output: FloatArray) -> bool:
     return joint <= 0 or rows * math.log(alone / joint) > added + 6 * math.sqrt(2 * added)
 
 
-def _response(inputs: Sequence[FloatArray], output: FloatArray, rate_hz: float, wanted: float) -> _Response | None:
+def _response(inputs: Sequence[Floats], output: Floats, rate_hz: float, wanted: float) -> _Response | None:
     """Welch's averages over half-overlapping segments of about the wanted length."""
     samples = output.size
     size = 1 << max(4, math.floor(math.log2(max(min(wanted, _MAX_SEGMENT), 16))))
@@ -251,7 +249,7 @@ def _lead(
     return [Finding("lead", label, None, text + "align the channels in time", True)]
 
 
-def _mean(freq: FloatArray, phase: FloatArray, weight: FloatArray, error: FloatArray) -> tuple[float, float, float]:
+def _mean(freq: Floats, phase: Floats, weight: Floats, error: Floats) -> tuple[float, float, float]:
     """Power-weighted frequency and phase, and the standard error of the phase."""
     weight = weight / weight.sum()
     return float(weight @ freq), float(weight @ phase), float(np.sqrt(weight**2 @ error**2))

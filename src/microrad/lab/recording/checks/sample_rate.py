@@ -5,8 +5,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from microrad.core.arrays import Floats
 from microrad.lab.recording.formats.source import StatedRate
-from microrad.lab.recording.records import Finding, FloatArray, RecordingError
+from microrad.lab.recording.records import Finding, RecordingError
 
 # Two statements of one rate differ by rounding, by clock tolerance (below 100 ppm), or they are two rates.
 _SAME_RATE = 1e-3
@@ -47,7 +48,7 @@ def agreed_rate(where: str, rate_hz: float | None, stated: Sequence[StatedRate])
 
 
 def rate_of_time(
-    where: str, label: str, time_s: FloatArray, place: Callable[[int], str]
+    where: str, label: str, time_s: Floats, place: Callable[[int], str]
 ) -> tuple[StatedRate, list[Finding]]:
     """Rate and findings of a time column in seconds; raises `RecordingError` where time stops, jumps or runs back."""
     bad = ~np.isfinite(time_s)
@@ -68,7 +69,7 @@ def rate_of_time(
     ), findings
 
 
-def _resolution(time_s: FloatArray) -> float:
+def _resolution(time_s: Floats) -> float:
     """Smallest step that the digits, or the type before it became float64, can show."""
     sample = time_s[:: max(1, time_s.size // 2000)]
     largest = float(np.max(np.abs(time_s[[0, -1]])))
@@ -82,7 +83,7 @@ def _resolution(time_s: FloatArray) -> float:
     return rounding
 
 
-def _slack(steps: FloatArray, step_s: float, resolution_s: float) -> float:
+def _slack(steps: Floats, step_s: float, resolution_s: float) -> float:
     """How far rounding of the digits alone can move a step: nothing where the step is a multiple of the last digit.
 
     A grid with a constant step strays from its own straight line by one unit of the last digit at most; what strays
@@ -96,7 +97,7 @@ def _slack(steps: FloatArray, step_s: float, resolution_s: float) -> float:
 
 
 def _steps(
-    where: str, label: str, steps: FloatArray, step_s: float, resolution_s: float, place: Callable[[int], str]
+    where: str, label: str, steps: Floats, step_s: float, resolution_s: float, place: Callable[[int], str]
 ) -> list[Finding]:
     """Findings of the steps of a time column: `step_s` is their mean, `resolution_s` what its digits can show."""
     usual = float(np.median(steps)) or step_s

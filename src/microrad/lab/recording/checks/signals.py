@@ -4,9 +4,10 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
+from microrad.core.arrays import Floats
 from microrad.lab.recording.checks.channel import clipping, drift, quantisation
 from microrad.lab.recording.checks.drive_and_output import excitation, follows
-from microrad.lab.recording.records import MIN_SAMPLES, Finding, FloatArray, RecordingError
+from microrad.lab.recording.records import MIN_SAMPLES, Finding, RecordingError
 
 # The share of an input's variance that the other inputs do not explain; below it the noise of any sensor hides which
 # of them moved the mirror.
@@ -15,8 +16,8 @@ _OWN_SHARE = 1e-6
 
 def check_signals(
     where: str,
-    inputs: Mapping[str, FloatArray],
-    outputs: Mapping[str, FloatArray],
+    inputs: Mapping[str, Floats],
+    outputs: Mapping[str, Floats],
     rate_hz: float,
     place: Callable[[int], str],
 ) -> list[Finding]:
@@ -56,7 +57,7 @@ def check_signals(
     return findings
 
 
-def _check_finite(where: str, label: str, values: FloatArray, place: Callable[[int], str]) -> None:
+def _check_finite(where: str, label: str, values: Floats, place: Callable[[int], str]) -> None:
     # One sum tells: nan and inf survive it. An overflow of the sum alone is caught by the second look.
     if np.isfinite(np.sum(values)):
         return
@@ -69,7 +70,7 @@ def _check_finite(where: str, label: str, values: FloatArray, place: Callable[[i
         )
 
 
-def _check_varies(where: str, role: str, label: str, values: FloatArray) -> None:
+def _check_varies(where: str, role: str, label: str, values: Floats) -> None:
     low, high = float(values.min()), float(values.max())
     if high - low <= 1e-12 * max(abs(low), abs(high)):
         remedy = "drive the mirror up and down" if role == "input" else "check the sensor's wiring and range"
@@ -80,7 +81,7 @@ def _check_varies(where: str, role: str, label: str, values: FloatArray) -> None
         )
 
 
-def _check_separable(where: str, inputs: Sequence[FloatArray], labels: Sequence[str]) -> None:
+def _check_separable(where: str, inputs: Sequence[Floats], labels: Sequence[str]) -> None:
     """Raises `RecordingError` for an input that is a linear combination of those before it."""
     if len(inputs) < 2:
         return
@@ -99,7 +100,7 @@ def _check_separable(where: str, inputs: Sequence[FloatArray], labels: Sequence[
             )
 
 
-def _covariance(columns: Sequence[FloatArray]) -> FloatArray:
+def _covariance(columns: Sequence[Floats]) -> Floats:
     means = [float(column.mean()) for column in columns]
     total = np.zeros((len(columns), len(columns)))
     for at in range(0, columns[0].size, 1 << 18):

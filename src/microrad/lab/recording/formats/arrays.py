@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from microrad.core.arrays import Floats
 from microrad.lab.recording.formats.source import Channel, Container, StatedRate
-from microrad.lab.recording.records import FloatArray
 
 # fmt: off
 RATE_NAMES = frozenset({
@@ -118,7 +118,7 @@ def _channel(variable: Variable, index: tuple[int, ...]) -> Channel:
     for k, i in zip(wide, index, strict=True):
         key[k] = i
 
-    def load() -> FloatArray:
+    def load() -> Floats:
         with np.errstate(invalid="ignore"):  # a signalling NaN becomes a quiet one, and is found as such
             return np.ascontiguousarray(variable.load(tuple(key)), dtype=np.float64).reshape(-1)
 

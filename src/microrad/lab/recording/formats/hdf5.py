@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 
 from microrad.lab.recording.files import sha256_of, too_large
@@ -18,7 +19,7 @@ from microrad.lab.recording.formats.arrays import (
     channels_of,
     stated_rate,
 )
-from microrad.lab.recording.formats.source import StatedRate, damaged, missing_library
+from microrad.lab.recording.formats.source import StatedRate, damaged
 from microrad.lab.recording.records import RecordingError
 
 ELSEWHERE = "and no other file is opened; copy the values into this one"
@@ -65,8 +66,6 @@ def _by_matlab(item: Any) -> str:
 
 
 def _by_type(item: Any) -> str:
-    import h5py
-
     try:
         dtype = item.dtype
     except TypeError as error:
@@ -94,8 +93,6 @@ def _filters(item: Any) -> list[tuple[int, str]]:
 
 
 def _foreign_filter(item: Any) -> str:
-    import h5py
-
     filters = _filters(item)
     for code, name in filters:
         if code in _UNCHECKED:
@@ -194,10 +191,6 @@ class Hdf5Source(ArraySource):
 
     def __init__(self, path: Path, matlab: bool = False) -> None:
         """List the datasets, and the scalars and attributes that state a rate."""
-        try:
-            import h5py
-        except ImportError:
-            raise missing_library(path, "an HDF5 file", "h5py") from None
         kind = "a MATLAB v7.3 file" if matlab else "an HDF5 file"
         self.variables = []
         unusable: dict[str, str] = {}
@@ -215,8 +208,6 @@ class Hdf5Source(ArraySource):
     def _search(
         self, file: Any, path: Path, matlab: bool, unusable: dict[str, str], stated: dict[str, tuple[StatedRate, ...]]
     ) -> None:
-        import h5py
-
         def note(group: str, name: str, value: Any) -> None:
             if rate := stated_rate(name, value):
                 stated[group] = (*stated.get(group, ()), rate)
@@ -272,8 +263,6 @@ def _unit(attributes: Mapping[str, Any]) -> str:
 
 def _variable(path: Path, name: str, item: Any, matlab: bool) -> Variable:
     def load(key: tuple[int | slice, ...]) -> Any:
-        import h5py
-
         with h5py.File(path, "r") as file:
             check_pieces(path, name, file[name])
             return file[name][key[::-1] if matlab else key]

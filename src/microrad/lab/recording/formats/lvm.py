@@ -15,9 +15,10 @@ from typing import Any
 
 import numpy as np
 
+from microrad.core.arrays import Floats
 from microrad.lab.recording.files import sha256_of
 from microrad.lab.recording.formats.source import Container, StatedRate
-from microrad.lab.recording.records import FloatArray, RecordingError
+from microrad.lab.recording.records import RecordingError
 
 _END = b"***End_of_Header***"
 _SEPARATORS = {"tab": "\t", "comma": ",", "": "\t"}
@@ -58,10 +59,10 @@ class LvmSource(Container):
         if not names:
             raise RecordingError(f"{path}: the LVM file has headers and no channel; record again.")
 
-    def load(self, indices: Sequence[int]) -> list[FloatArray]:
+    def load(self, indices: Sequence[int]) -> list[Floats]:
         """The columns of the channels, segment behind segment where they are joined."""
         chosen = [self._columns[i] for i in indices]
-        parts: dict[int, list[FloatArray]] = {}
+        parts: dict[int, list[Floats]] = {}
         for number in dict.fromkeys(segment for segment, _ in chosen):
             mine = [k for k, (segment, _) in enumerate(chosen) if segment == number]
             followers = range(len(self._segments)) if self._joined else (number,)
@@ -153,7 +154,7 @@ class LvmSource(Container):
         return True
 
     # ----------------------------------------------------------------------------------------------------- reading
-    def _parse(self, segment: _Segment, columns: list[int], indices: list[int]) -> list[FloatArray]:
+    def _parse(self, segment: _Segment, columns: list[int], indices: list[int]) -> list[Floats]:
         layout: dict[str, Any] = {"delimiter": self._separator, "comments": None, "usecols": tuple(columns), "ndmin": 2}
         with self.path.open("rb") as file:
             file.seek(segment.span[0])

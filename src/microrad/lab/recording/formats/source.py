@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from microrad.core.installing import advice
-from microrad.lab.recording.records import FloatArray, RecordingError
+from microrad.core.arrays import Floats
+from microrad.lab.recording.records import RecordingError
 
 _TIME_NAME = re.compile(
     r"(?i:time|zeit|temps|tiempo|x_value|time_?stamp|seconds|sec|(?-i:t))(_?(s|ms|us|ns))?\s*([(\[].*[)\]])?"
@@ -61,7 +61,7 @@ class Source(ABC):
         """Number of the channel with that name or number; raises `RecordingError`."""
 
     @abstractmethod
-    def load(self, indices: Sequence[int]) -> list[FloatArray]:
+    def load(self, indices: Sequence[int]) -> list[Floats]:
         """Values of channels, one-dimensional; those of an array container may hold nan."""
 
     @abstractmethod
@@ -90,7 +90,7 @@ class Channel:
 
     name: str
     samples: int
-    load: Callable[[], FloatArray]
+    load: Callable[[], Floats]
     unit: str = ""
     rate: StatedRate | None = None
 
@@ -174,7 +174,7 @@ class Container(Source):
             "counted from 0 does as well."
         )
 
-    def load(self, indices: Sequence[int]) -> list[FloatArray]:
+    def load(self, indices: Sequence[int]) -> list[Floats]:
         """Load channels; raises `RecordingError` for a fault of the file that shows only now."""
         values = []
         for index in indices:
@@ -222,11 +222,4 @@ def damaged(path: Path, kind: str, error: BaseException) -> RecordingError:
     return RecordingError(
         f"{path}: this cannot be read as {kind} ({_first_line(error)}); the file is damaged or truncated: copy it "
         "again from its source."
-    )
-
-
-def missing_library(path: Path, kind: str, library: str) -> RecordingError:
-    """The refusal where an optional library is not installed."""
-    return RecordingError(
-        f"{path}: reading {kind} needs the library {library}, which is not installed; install it {advice('lab')}"
     )

@@ -13,9 +13,11 @@ from typing import Any
 
 import numpy as np
 
+from microrad.core.arrays import Floats
+from microrad.core.installing import advice
 from microrad.lab.recording.files import sha256_of
-from microrad.lab.recording.formats.source import Channel, Container, StatedRate, damaged, missing_library
-from microrad.lab.recording.records import FloatArray, RecordingError
+from microrad.lab.recording.formats.source import Channel, Container, StatedRate, damaged
+from microrad.lab.recording.records import RecordingError
 
 _LEAD_IN = 28
 _INCOMPLETE = 0xFFFF_FFFF_FFFF_FFFF
@@ -33,7 +35,10 @@ class TdmsSource(Container):
         try:
             import nptdms  # noqa: F401
         except ImportError:
-            raise missing_library(path, "a TDMS file", "npTDMS") from None
+            raise RecordingError(
+                f"{path}: reading a TDMS file needs the library npTDMS, which is not installed; install it "
+                f"{advice('lab')}"
+            ) from None
         unusable: dict[str, str] = {}
         try:
             with _opened(path) as tdms:
@@ -46,7 +51,7 @@ class TdmsSource(Container):
             raise damaged(path, "a TDMS file", error) from None
         super().__init__(path, "TDMS", channels, sha256_of(path), unusable)
 
-    def load(self, indices: Sequence[int]) -> list[FloatArray]:
+    def load(self, indices: Sequence[int]) -> list[Floats]:
         """Scaled values of the channels; raises `RecordingError` for channels that were not sampled together."""
         self._check_together(indices)
         return super().load(indices)
@@ -126,7 +131,7 @@ def _channels(tdms: Any, unusable: dict[str, str]) -> Iterator[tuple[str, Any]]:
 def _channel(path: Path, name: str, channel: Any) -> Channel:
     group_name, channel_name = channel.group_name, channel.name
 
-    def load() -> FloatArray:
+    def load() -> Floats:
         with _opened(path) as tdms:
             return np.ascontiguousarray(tdms[group_name][channel_name][:], dtype=np.float64)
 

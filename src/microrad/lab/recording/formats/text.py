@@ -12,9 +12,10 @@ from pathlib import Path
 
 import numpy as np
 
+from microrad.core.arrays import Floats
 from microrad.lab.recording.files import read_head
 from microrad.lab.recording.formats.source import Source, StatedRate, bracketed_unit
-from microrad.lab.recording.records import FloatArray, RecordingError
+from microrad.lab.recording.records import RecordingError
 
 _HEAD_BYTES = 1_000_000
 COMMENT = ("#", "%")
@@ -232,7 +233,7 @@ class TextSource(Source):
         """Header name or number."""
         return column_of(self.path, self.layout, wanted, role)
 
-    def load(self, indices: Sequence[int]) -> list[FloatArray]:
+    def load(self, indices: Sequence[int]) -> list[Floats]:
         """Finite values of the columns; raises `RecordingError` at the first line or cell that is wrong."""
         values = _parse_fast(self.path, self.layout, indices) if self._regular else None
         return _parse_slowly(self.path, self.layout, indices) if values is None else values
@@ -298,7 +299,7 @@ def _is_regular(text: bytes, layout: Layout) -> bool:
     return bool(np.all(counts[filled] == expected))
 
 
-def _parse_fast(path: Path, layout: Layout, indices: Sequence[int]) -> list[FloatArray] | None:
+def _parse_fast(path: Path, layout: Layout, indices: Sequence[int]) -> list[Floats] | None:
     """The columns by the compiled reader, or nothing where it stumbles: the slow reader then says where."""
     try:
         table = np.loadtxt(
@@ -316,7 +317,7 @@ def _parse_fast(path: Path, layout: Layout, indices: Sequence[int]) -> list[Floa
     return columns if all(np.isfinite(column).all() for column in columns) else None
 
 
-def _parse_slowly(path: Path, layout: Layout, indices: Sequence[int]) -> list[FloatArray]:
+def _parse_slowly(path: Path, layout: Layout, indices: Sequence[int]) -> list[Floats]:
     """The columns line by line; raises at the first line or cell that is wrong."""
     columns: list[list[float]] = [[] for _ in indices]
     with path.open(encoding=layout.encoding, errors="replace") as file:

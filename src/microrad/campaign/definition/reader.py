@@ -1,0 +1,233 @@
+"""Reads a campaign file against the mission that it draws from, and reports every fault at once."""
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from microrad.campaign.definition import checks
+from microrad.campaign.definition import draws as drawing
+from microrad.campaign.definition.cells import CellReader
+from microrad.campaign.definition.distributions import OneOf
+from microrad.campaign.definition.draws import DrawReader
+from microrad.campaign.definition.keys import MIRROR, flat, flat_tables, touches_loop
+from microrad.campaign.definition.records import CampaignFile, Cell, Draw, Variable
+from microrad.campaign.definition.tables import CampaignTable, VariableTable
+from microrad.campaign.definition.values import FILE_WORD, ValueReader, text_of
+from microrad.campaign.ledger import argument, is_ledger
+from microrad.campaign.records import Limit
+from microrad.mission.file import MissionFile, check_table, named_files, open_mission
+from microrad.mission.tables.link import LinkRequirement
+from microrad.mission.toml import Document, Fault, MissionError, UnreadableError, clipped
+
+LANES = 64
+"""Runs that the compiled loop advances side by side: as many realisations cost no more than one."""
+
+
+def read_definition(path: Path) -> tuple[CampaignFile, Document]:
+    """The campaign that a file defines, and the file as it stands, to note further faults in.
+
+    Raises `MissionError` with every fault of the campaign file, of the mission under its [set] and in the cells of its
+    grid.
+    """
+    if is_ledger(path):
+        name = argument(path)
+        expected = f"`microrad campaign resume {name}` goes on with it, `microrad campaign status {name}` looks at it"
+        fault = Fault("", "", 0, f"is a ledger, not a {FILE_WORD}", expected, file=clipped(str(path)))
+        raise MissionError(path, [fault])
+    try:
+        document = Document.read(path, FILE_WORD)
+    except UnreadableError as error:
+        expected = error.expected.replace("`microrad init`", "`microrad campaign init`")
+        fault = Fault("", "", 0, f"the {FILE_WORD} {error.reason}", expected, file=clipped(str(path)))
+        raise MissionError(path, [fault]) from None
+    campaign = _DefinitionReader(document).read()
+    if campaign is None or document.faults:
+        raise MissionError(path, document.faults)
+    return campaign, document
+
+
+def block_rows(runs: int) -> int:
+    """Rows of one Latin hypercube or Sobol set: a power of two, about eight sets in the runs, within 16 to 4096."""
+    return min(max(1 << max((runs // 8).bit_length() - 1, 0), 16), 4096)
+
+
+class _DefinitionReader:
+    """Reads a campaign file step by step; what is wrong is noted in its document, and the next step goes on."""
+
+    def __init__(self, document: Document) -> None:
+        self.document = document
+        self.reader = ValueReader(document)
+        self.fixed = flat(self._table("set"))
+        self.grid = flat(self._table("grid"))
+        self.inputs = flat_tables(self._table("inputs"), ("drawn_as",))
+        self.limits = self._table("limits")
+        self.table = check_table(document, CampaignTable, _flat_variables(document.data))
+        precision = document.data.get("precision")
+        checks.tell_half_width(self.reader, precision.get("output") if isinstance(precision, dict) else None)
+
+    def _table(self, name: str) -> dict[str, Any]:
+        found = self.document.data.get(name, {})
+        if isinstance(found, dict):
+            return found
+        self.reader.fault(name, found, "is no table", f"[{name}] with a key on each line below it")
+        return {}
+
+    @property
+    def _variables(self) -> dict[str, VariableTable]:
+        optimise = None if self.table is None else self.table.optimise
+        return {} if optimise is None else optimise.variables
+
+    def read(self) -> CampaignFile | None:
+        """The campaign, or None where something is wrong."""
+        self._check_doubles()
+        keep = checks.kept(self.reader, self.document.data.get("keep"), self.table)
+        mission = self._mission()
+        if mission is None:
+            return None
+        cell_reader = CellReader(self.reader, mission, self.fixed, self.grid)
+        data = cell_reader.under_set()
+        axes = cell_reader.axes(data)
+        cells = () if self.document.faults else cell_reader.cells(data, axes)
+        draws = self._draws(data, cells)
+        items = ((self.reader, key, table, data) for key, table in self._variables.items())
+        variables = self.reader.each(drawing.variable, items)
+        if self.table is None or not cells:
+            return None
+        try:
+            nominal = cell_reader.cell(data, {})
+        except MissionError:  # no mission without the values of the grid
+            nominal = cells[0]
+        return self._campaign(self.table, mission, nominal, cells, draws, keep, variables)
+
+    def _check_doubles(self) -> None:
+        """No key in two tables; a grid of mirrors may be drawn from, each by its own covariance."""
+        tables = {"set": self.fixed, "grid": self.grid, "inputs": self.inputs, "optimise.variables": self._variables}
+        taken: dict[str, str] = {}
+        for name, keys in tables.items():
+            for key in keys:
+                if key in taken and not (key == MIRROR and name == "inputs"):
+                    reason = f"stands in [{taken[key]}] too"
+                    self.reader.fault(f"{name}.{key}", None, reason, "the key in one of the two tables")
+                taken.setdefault(key, name)
+        order = list(tables)
+        for key, name in taken.items():
+            whole = key.rpartition(".")[0]
+            above = taken.get(whole)
+            if whole != MIRROR and above and (above not in ("set", "grid") or order.index(above) >= order.index(name)):
+                reason = f"is an item of {whole}, which stands in [{above}] as a whole"
+                self.reader.fault(f"{name}.{key}", None, reason, "the list, or its items, in one of the two tables")
+
+    def _mission(self) -> Document | None:
+        name = self.document.data.get("mission")
+        if not isinstance(name, str) or not name:
+            return None  # has been said
+        try:
+            return open_mission(self.document.path.parent / name)
+        except MissionError as error:
+            self.document.faults.extend(error.faults)
+            return None
+
+    def _draws(self, data: Mapping[str, Any], cells: tuple[Cell, ...]) -> tuple[Draw, ...]:
+        given = frozenset((*self.fixed, *self.grid, *self.inputs, *self._variables))
+        draw_reader = DrawReader(self.reader, data, tuple(cell.mirror for cell in cells), given)
+        return self.reader.each(draw_reader.draw, self.inputs.items())
+
+    def _limits(self, keep: tuple[str, ...], required: LinkRequirement) -> tuple[Limit, ...]:
+        if "limits" not in self.document.data:
+            varied = {"grid": self.grid, "inputs": self.inputs}
+            return checks.default_limits(self.reader, keep, required, varied)
+        return self.reader.each(checks.limit, ((self.reader, name, raw, keep) for name, raw in self.limits.items()))
+
+    def _campaign(
+        self,
+        table: CampaignTable,
+        mission: Document,
+        nominal: Cell,
+        cells: tuple[Cell, ...],
+        draws: tuple[Draw, ...],
+        keep: tuple[str, ...],
+        variables: tuple[Variable, ...],
+    ) -> CampaignFile | None:
+        """The record, where everything in it fits together."""
+        missions, required = [cell.file.mission for cell in cells], nominal.file.mission.requirement
+        keep = checks.with_tables(self.reader, self.document.data.get("keep"), keep, missions)
+        varying = [draw.key for draw in draws if any(touches_loop(draw.key, m) for m in missions)]
+        if table.loop is not None:
+            checks.check_loop(self.reader, table.loop, missions)
+        checks.check_day(self.reader, keep, missions)
+        checks.check_tail(self.reader, table, varying, self.document.data)
+        checks.check_minimise(self.reader, table)
+        limits = () if table.tail is not None else self._limits(keep, required)
+        width = checks.half_width(self.reader, table, keep)
+        block = block_rows(table.runs)
+        rows = _whole_blocks(table.runs, block, table.sampling)
+        most = rows if table.precision is None else _whole_blocks(table.precision.at_most, block, table.sampling)
+        loop_varies = table.loop is not None and bool(varying)
+        realisations = table.realisations or (LANES if loop_varies else 1)
+        checks.check_size(self.reader, rows, most, realisations)
+        checks.check_repeats(self.reader, table, bool(self.inputs), rows, most)
+        files = self._files(mission, cells, draws)
+        if self.document.faults:
+            return None
+        warnings = [*_warnings(table, rows, loop_varies), *drawing.failing(draws, cells[0].data, most)]
+        if table.tail is None and "limits" in self.document.data:
+            warnings += checks.unchecked(self.limits, keep, required, {*self.grid, *self.inputs})
+        return CampaignFile(
+            path=self.document.path,
+            text=self.document.text,
+            sha256=self.document.sha256,
+            table=table,
+            mission=nominal.file,
+            cells=cells,
+            draws=draws,
+            inputs=drawing.input_texts(draws, [cell.mirror for cell in cells]),
+            fixed={key: text_of(value) for key, value in self.fixed.items()},
+            keep=keep,
+            limits=limits,
+            variables=variables,
+            rows=rows,
+            most_rows=most,
+            realisations=realisations,
+            block=block,
+            half_width=width,
+            loop_varies=loop_varies,
+            files=files,
+            warnings=tuple(warnings),
+        )
+
+    def _files(self, mission: Document, cells: tuple[Cell, ...], draws: tuple[Draw, ...]) -> tuple[Path, ...]:
+        """Every file that the campaign depends on; those that do not exist are noted."""
+        folder = mission.path.parent
+        named = [folder / name for cell in cells for name in named_files(cell.file.mission)]
+        for draw in draws:
+            if isinstance(draw.distribution, OneOf) and draw.key.endswith(".file"):
+                named += [folder / str(word) for word in draw.distribution.written]
+        for path in dict.fromkeys(named):
+            if not path.is_file():
+                self.reader.fault(
+                    "mission", str(path), "is named by the mission and does not exist", "an existing file"
+                )
+        inner = [cell.file.mirror_file for cell in cells if isinstance(cell.file, MissionFile)]
+        mirrors = [each.path for each in inner if each is not None]
+        own = [each.path for each in mission.inner.values()]
+        return tuple(dict.fromkeys([self.document.path, mission.path, *own, *mirrors, *named]))
+
+
+def _flat_variables(data: Mapping[str, Any]) -> dict[str, Any]:
+    """The data of a campaign file with the tables [optimise.variables.KEY] by dotted key."""
+    optimise = data.get("optimise")
+    if not isinstance(optimise, dict) or not isinstance(optimise.get("variables"), dict):
+        return dict(data)
+    return {**data, "optimise": {**optimise, "variables": flat_tables(optimise["variables"], ())}}
+
+
+def _whole_blocks(rows: int, block: int, sampling: str) -> int:
+    return rows if sampling == "random" else -(-rows // block) * block
+
+
+def _warnings(table: CampaignTable, rows: int, loop_varies: bool) -> Iterator[str]:
+    if rows != table.runs:
+        yield f"runs = {table.runs} is rounded up to {rows} rows, whole sets of {table.sampling} sampling"
+    if loop_varies and table.realisations is not None and table.realisations % LANES:
+        full = -(-table.realisations // LANES) * LANES
+        yield f"realisations = {table.realisations} takes as long as {full}: runs are advanced {LANES} side by side"

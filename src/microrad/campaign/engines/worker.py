@@ -1,0 +1,227 @@
+"""The worker process of a campaign: jobs come in at stdin, and what became of them goes out at stdout.
+
+Started by `threads.LocalEngine` as ``python -m microrad.campaign.engines.worker TARGET THREADS LATE_S PARENT``. It
+ends when its parent does, in whatever way that ends.
+"""
+
+import ctypes
+import faulthandler
+import importlib
+import json
+import os
+import signal
+import struct
+import sys
+import threading
+import time
+from collections.abc import Callable
+from enum import IntEnum
+from queue import SimpleQueue
+from typing import IO, NamedTuple, Protocol
+
+from microrad.campaign.records import CampaignError, Job
+
+_HEAD = struct.Struct("<BQQ")  # kind, serial number of the job, bytes that follow
+_LONGEST_REASON = 1000
+_STUCK_S = 600.0
+
+
+class Work(Protocol):
+    """What a target's function makes of the specification: it does jobs, from several threads at once."""
+
+    def do(self, job: Job, beat: Callable[[], None]) -> bytes:
+        """The job's result; calls ``beat`` at each sign of life, at least every 0.2 s or so."""
+        ...
+
+
+class Kind(IntEnum):
+    """What a message says: the first two go to the worker, the others come from it."""
+
+    OPEN = 1
+    JOB = 2
+    READY = 3
+    BEAT = 4
+    DONE = 5
+    RAISED = 6
+    REFUSED = 7
+
+
+class Message(NamedTuple):
+    """One message: what it says, the serial number of the job that it is about, and its content."""
+
+    kind: Kind
+    serial: int = 0
+    body: bytes = b""
+
+
+def read_message(stream: IO[bytes]) -> Message | None:
+    """The next message, None where the other side has ended, be it within a message."""
+    head = stream.read(_HEAD.size)
+    if len(head) < _HEAD.size:
+        return None
+    kind, serial, size = _HEAD.unpack(head)
+    body = stream.read(size)
+    return Message(Kind(kind), serial, body) if len(body) == size else None
+
+
+def write_message(stream: IO[bytes], message: Message) -> None:
+    """Write a message whole; OSError where the other side has ended."""
+    stream.write(_HEAD.pack(message.kind, message.serial, len(message.body)))
+    stream.write(message.body)
+    stream.flush()
+
+
+def pack_job(job: Job) -> bytes:
+    """The job as it travels."""
+    return json.dumps(list(job)).encode()
+
+
+def unpack_job(body: bytes) -> Job:
+    """The job that has travelled."""
+    return Job(*json.loads(body))
+
+
+def open_target(target: str, spec: bytes) -> Work:
+    """The work that the function ``target`` ("module:function") makes of ``spec``."""
+    module, function = target.split(":")
+    work: Work = getattr(importlib.import_module(module), function)(spec)
+    return work
+
+
+def code_sha256(target: str) -> str:
+    """SHA-256 of the code that the target runs: what its module's ``code_sha256()`` says."""
+    module = importlib.import_module(target.partition(":")[0])
+    return str(module.code_sha256())
+
+
+def words(error: BaseException) -> str:
+    """An error in one line: its kind and message, for a `CampaignError` the message alone."""
+    text = " ".join(str(error).split())[:_LONGEST_REASON]
+    if isinstance(error, CampaignError):
+        return text
+    return f"{type(error).__name__}: {text}" if text else type(error).__name__
+
+
+def die_with_parent(parent: int) -> bool:
+    """Be killed when the parent (its process number) ends, even with all threads stuck; False where only Linux can."""
+    if sys.platform != "linux":
+        return False
+    set_parent_death_signal = 1
+    ctypes.CDLL(None).prctl(set_parent_death_signal, signal.SIGKILL)
+    if os.getppid() != parent:  # it ended before the call
+        os._exit(1)
+    return True
+
+
+def end_when_stuck(stuck_s: float) -> None:
+    """End this process when its interpreter has been stuck for ``stuck_s``: in code that never gives its lock back.
+
+    Then the thread that would notice the parent's end cannot run. A thread winds the alarm of faulthandler, which
+    needs no lock itself, again and again.
+    """
+
+    def wind() -> None:
+        while True:
+            time.sleep(stuck_s / 5.0)
+            faulthandler.dump_traceback_later(stuck_s, exit=True)
+
+    faulthandler.dump_traceback_later(stuck_s, exit=True)  # that thread may come too late
+    threading.Thread(target=wind, daemon=True, name="alarm").start()
+
+
+class _ToParent:
+    """The way to the parent, shared by threads; without a parent the process ends."""
+
+    def __init__(self, stream: IO[bytes]) -> None:
+        self._stream = stream
+        self._lock = threading.Lock()
+
+    def send(self, message: Message) -> None:
+        with self._lock:
+            try:
+                write_message(self._stream, message)
+            except OSError:
+                os._exit(1)
+
+
+class Beat:
+    """Tells of a job's signs of life, at most every ``every_s``; the first at once."""
+
+    def __init__(self, tell: Callable[[], None], every_s: float) -> None:
+        """Nothing is told yet."""
+        self._tell = tell
+        self._every_s = every_s
+        self._next_s = 0.0
+
+    def __call__(self) -> None:
+        """A sign of life."""
+        now = time.monotonic()
+        if now >= self._next_s:
+            self._next_s = now + self._every_s
+            self._tell()
+
+
+def beat_every_s(late_s: float) -> float:
+    """How often beats are worth telling where ``late_s`` without one is too late (both s)."""
+    return min(1.0, late_s / 10.0)
+
+
+def _do_jobs(work: Work, jobs: "SimpleQueue[Message]", port: _ToParent, late_s: float) -> None:
+    """One thread: job after job."""
+    while True:
+        asked = jobs.get()
+        beat = Beat(lambda serial=asked.serial: port.send(Message(Kind.BEAT, serial)), beat_every_s(late_s))  # type: ignore[misc]
+        beat()  # says that it has begun
+        try:
+            answer = Message(Kind.DONE, asked.serial, work.do(unpack_job(asked.body), beat))
+        except BaseException as error:  # whatever it was, it is this job's
+            answer = Message(Kind.RAISED, asked.serial, words(error).encode())
+        port.send(answer)
+
+
+def _serve(target: str, threads: int, late_s: float, jobs: "SimpleQueue[Message]", port: _ToParent) -> None:
+    """Open the work with the first message, then do jobs in ``threads`` threads.
+
+    The parent is told of which code the work is, or why it cannot be opened.
+    """
+    try:
+        work = open_target(target, jobs.get().body)
+        code = code_sha256(target)
+    except BaseException as error:
+        port.send(Message(Kind.REFUSED, 0, words(error).encode()))
+        return
+    port.send(Message(Kind.READY, 0, code.encode()))
+    for k in range(threads):
+        threading.Thread(target=_do_jobs, args=(work, jobs, port, late_s), daemon=True, name=f"jobs {k}").start()
+
+
+def _take_pipes() -> tuple[IO[bytes], IO[bytes]]:
+    """The pipes at stdin and stdout for the messages alone: what anything prints goes to stderr instead."""
+    incoming, outgoing = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    nothing = os.open(os.devnull, os.O_RDONLY)
+    os.dup2(nothing, 0)
+    os.close(nothing)
+    os.dup2(2, 1)
+    sys.stdout = sys.stderr
+    return incoming, outgoing
+
+
+def main() -> None:
+    """Work until the parent ends; this thread only reads, so that it notices at once."""
+    target, threads, late_s, parent = sys.argv[1], int(sys.argv[2]), float(sys.argv[3]), int(sys.argv[4])
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's matter
+    sys.setswitchinterval(5e-4)  # a thread that comes back from compiled code waits no longer for the others
+    if not die_with_parent(parent):
+        end_when_stuck(late_s + _STUCK_S)  # a living parent is quicker
+    incoming, outgoing = _take_pipes()
+    jobs: SimpleQueue[Message] = SimpleQueue()
+    threading.Thread(
+        target=_serve, args=(target, threads, late_s, jobs, _ToParent(outgoing)), daemon=True, name="open"
+    ).start()
+    while (message := read_message(incoming)) is not None:
+        jobs.put(message)
+    os._exit(0)
+
+
+if __name__ == "__main__":
+    main()

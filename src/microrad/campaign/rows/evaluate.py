@@ -1,0 +1,128 @@
+"""The outputs of one row: from its runs to the residual, the links under it, and the day."""
+
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, field
+from functools import cache, lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from microrad import link
+from microrad.campaign.definition.outputs import OUTPUTS
+from microrad.core import kernels
+from microrad.core.arrays import Floats
+from microrad.link.requirement import IMPOSSIBLE
+from microrad.link.under_jitter import Exposure, stated_outage
+from microrad.loop import fine_pointing
+from microrad.loop.fine_loop import ensemble
+from microrad.mission.file import LinkFile
+from microrad.mission.model import Mission, Source
+from microrad.mission.tables.fine_pointing import FinePointing
+from microrad.mission.tables.link import Beacon, LinkRequirement
+
+if TYPE_CHECKING:
+    from microrad.orbit import day as day_study
+
+
+def outputs(file: LinkFile, runs: ensemble.Ensemble | None, keep: Collection[str]) -> dict[str, float]:
+    """The kept outputs of a row, by name in the order of `OUTPUTS`; nothing is computed, or read, for any other.
+
+    ``runs`` is None in a campaign without a loop. A link that no rate closes has a data rate of 0. Raises `LinkError`
+    for a link by whose budget more light arrives than was sent.
+    """
+    m = file.mission
+    known: dict[str, Callable[[], float]] = {}
+    if runs is not None:
+        assert isinstance(m, Mission)  # it has the loop
+        known = _residual(m.requirement, m.fine_pointing, runs)
+    data = cache(lambda: link.of(m))
+    under = cache(lambda: _exposure(data(), runs))
+    day = cache(lambda: _day(file, under()))
+    known |= {
+        "margin": lambda: under().margin_db,
+        "outage": lambda: under().short_of(0.0),
+        "short": lambda: under().short_of(m.requirement.margin_db),
+        "data_rate": lambda: _rate(data(), under().outage_loss_db),
+        "beacon_margin": lambda: _beam_margin(_Beam.of("beacon", link.Shared.of(m), m.beacon, file.sources)),
+        "answer_margin": lambda: _beam_margin(_Beam.of("answer", link.Shared.of(m), m.answer, file.sources)),
+        "volume": lambda: day().capacity_bit,
+        "contact_time": lambda: day().contact_s,
+    }
+    return {name: known[name]() for name in OUTPUTS if name in keep}
+
+
+def exceeded(runs: ensemble.Ensemble) -> Floats:
+    """Share of the time with a radial error of at least the lower edge of each bin, (bins,)."""
+    counts = runs.histogram.sum(axis=0, dtype=np.int64)
+    return np.asarray(1.0 - (np.cumsum(counts) - counts) / np.sum(counts))
+
+
+# ------------------------------------------------------------------------------------------------------------ residual
+def _residual(
+    required: LinkRequirement, table: FinePointing | None, runs: ensemble.Ensemble
+) -> dict[str, Callable[[], float]]:
+    return {
+        "residual_rms": lambda: runs.radial_rms_rad,
+        "residual_quantile": lambda: runs.quantile_rad(fine_pointing.table(table).quantile),
+        "residual_largest": lambda: float(np.max(runs.largest_rad)),
+        "beyond_share": lambda: runs.beyond(required.pointing_error_rad),
+        "lost_share": lambda: runs.share(kernels.COUNT_LOST),
+        "saturated_share": lambda: runs.share(kernels.COUNT_SATURATED),
+        "beyond_rate_share": lambda: runs.share(kernels.COUNT_CLAMPED),
+        "outside_share": lambda: runs.share(kernels.COUNT_OUTSIDE),
+    }
+
+
+# --------------------------------------------------------------------------------------------------------------- links
+def _exposure(data: link.DataLink, runs: ensemble.Ensemble | None) -> Exposure:
+    """The link under its own errors, or under those of runs, from the histogram of the radial error alone."""
+    if runs is None:
+        under = Exposure.stated(data)
+    else:
+        under = Exposure.of(data, runs.quantile_rad(1.0 - stated_outage(data.requirement)), runs.beyond)
+    if not under.possible:
+        raise link.LinkError(f"not known is {IMPOSSIBLE}")
+    return under
+
+
+@dataclass(frozen=True, slots=True)
+class _Beam:
+    """A beacon or answer with what its budget reads, equal to another with the same tables: most rows draw others."""
+
+    name: str
+    tables: tuple[object, ...]
+    shared: link.Shared = field(compare=False)
+    beam: Beacon | None = field(compare=False)
+    sources: Mapping[str, Source] = field(compare=False)
+
+    @classmethod
+    def of(cls, name: str, shared: link.Shared, beam: Beacon | None, sources: Mapping[str, Source]) -> "_Beam":
+        """The beam; of point-ahead it is told by the angle that is left alone."""
+        tables = beam, shared.point_ahead_rad, shared.terminals, shared.conventions, shared.channel
+        return cls(name, tables, shared, beam, sources)
+
+
+@lru_cache(maxsize=256)
+def _beam_margin(of: _Beam) -> float:
+    found = link.beam_budget(of.name, of.shared, of.beam, of.sources)
+    if not found.possible:
+        raise link.LinkError(f"{of.name}: not known is {IMPOSSIBLE}")
+    return found.margin_db
+
+
+def _rate(data: link.DataLink, loss_db: float) -> float:
+    try:
+        return link.rate_at_loss(data, data.requirement.margin_db, loss_db)
+    except link.LinkError:
+        return 0.0
+
+
+# ----------------------------------------------------------------------------------------------------------------- day
+def _day(file: LinkFile, under: Exposure) -> "day_study.Way":
+    """What the relay takes under this pointing; nothing where the link has no contact."""
+    from microrad.link import study as link_study
+    from microrad.orbit import day as day_study
+
+    links = link_study.run(file)
+    loss = day_study.PointingLoss(under.outage_loss_db, under.short_of(0.0), "campaign")
+    return day_study.relay(links, loss)

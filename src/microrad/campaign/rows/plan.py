@@ -1,0 +1,92 @@
+"""Which rows a campaign has, in which chunks: whoever does the work.
+
+It follows from the campaign file alone, but for the chunks of links alone, which are cut to what their rows cost where
+the campaign begins. No number depends on that.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+from microrad.campaign.definition.records import CampaignFile
+from microrad.campaign.records import Job
+from microrad.campaign.rows import loops
+from microrad.core import kernels
+
+_CHUNK_STEPS = 2e7  # plant steps of all runs in a chunk: about a second
+_CHUNK_S = 2.0  # at most, of rows that were timed
+_CHUNK_ROWS = 1024  # at most
+_DAY_ROWS = 8  # with outputs of the day, which take a second each
+_GROWTH = 1.5  # of the rows from one round to the next, until the precision is reached
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """The rows of each cell in rounds and chunks.
+
+    ``chunk_rows`` are the rows in a chunk: a power of two, about a second of work. ``largest_chunk`` are those as far
+    as the file says it: a power of two that holds whole chunks. ``rounds`` are the rows of a cell at the end of each
+    round, rising: one round, or more until a wanted precision is reached.
+    """
+
+    chunk_rows: int
+    largest_chunk: int
+    rounds: tuple[int, ...]
+
+    def chunks(self, cell: int, rows: int) -> list[Job]:
+        """The chunks that the first ``rows`` rows of a cell are in."""
+        return [Job(cell, number) for number in range(-(-rows // self.chunk_rows))]
+
+    def rows_of(self, number: int) -> range:
+        """The rows of a chunk; the last one of a campaign may be shorter."""
+        return range(number * self.chunk_rows, min((number + 1) * self.chunk_rows, self.rounds[-1]))
+
+
+def planned(campaign: CampaignFile) -> Plan:
+    """The plan of a campaign."""
+    largest = _largest_chunk(campaign)
+    return Plan(campaign.chunk_rows or largest, largest, _rounds(campaign, largest))
+
+
+def is_timed(campaign: CampaignFile) -> bool:
+    """Whether what a row costs does not follow from the file: that of links alone, by their beams and receivers."""
+    return campaign.table.loop is None and not _has_day(campaign)
+
+
+def timed(campaign: CampaignFile, row_s: float) -> CampaignFile:
+    """The campaign with chunks of rows that take this long each."""
+    rows = 1 << int(math.log2(max(_CHUNK_S / max(row_s, 1e-9), 1.0)))
+    return replace(campaign, chunk_rows=min(rows, _largest_chunk(campaign)))
+
+
+def _has_day(campaign: CampaignFile) -> bool:
+    return any(output.group == "day" for output in campaign.outputs)
+
+
+def _largest_chunk(campaign: CampaignFile) -> int:
+    few = 1 << int(math.log2(campaign.rows))
+    if _has_day(campaign):
+        return min(_DAY_ROWS, few)
+    if campaign.table.loop is None:
+        return min(_CHUNK_ROWS, few)
+    own = campaign.realisations
+    lanes = kernels.LANES * math.ceil(own / kernels.LANES) if campaign.loop_varies else own
+    span_s, step_s = loops.span(campaign, campaign.mission).duration_s, loops.settings(campaign.mission).plant_step_s
+    full = 1 if campaign.loop_varies else math.ceil(kernels.LANES / own)  # rows that fill the lanes of a batch
+    wanted = max(_CHUNK_STEPS / (span_s / step_s * lanes), 1.0)
+    return max(min(1 << int(math.log2(wanted)), _CHUNK_ROWS, few), 1 << math.ceil(math.log2(full)))
+
+
+def _rounds(campaign: CampaignFile, largest_chunk: int) -> tuple[int, ...]:
+    """Rows of a cell at the end of each round.
+
+    With a precision each round has whole chunks and blocks, so that what is done does not depend on where it stops;
+    the last one ends at the most rows that are wanted, or less than a chunk or block before.
+    """
+    wanted = campaign.table.precision
+    if wanted is None:
+        return (campaign.rows,)
+    unit = max(largest_chunk, campaign.block)  # powers of two, so the larger holds whole ones of the other
+    totals, most = [-(-campaign.rows // unit) * unit], wanted.at_most // unit * unit
+    while totals[-1] < most:
+        totals.append(min(-(-math.ceil(_GROWTH * totals[-1]) // unit) * unit, most))
+    return tuple(totals)

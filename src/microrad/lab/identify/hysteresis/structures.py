@@ -1,0 +1,282 @@
+"""Structures for the joint fit: one axis of a mirror (hysteresis, linear part, creep), and a hysteretic oscillator."""
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from microrad.core import lti
+from microrad.core.arrays import Floats
+from microrad.lab.identify.hysteresis.plant_fit import Parameter, Structure
+from microrad.mirror import model as mirror
+from microrad.mirror.hysteresis import NO_CREEP, BoucWen, Creep, Play, slow_gain
+from microrad.mirror.model import Mirror
+from microrad.mission.tables.mirror import roots_from_damping
+
+_RATIO = 0.999  # of alpha, at most: beyond it h would grow without bound
+_DAMPING = (1e-4, 0.9999)
+
+
+@dataclass(frozen=True, slots=True)
+class Roots:
+    """Poles or zeros as natural frequencies (Hz) and damping ratios; at 1 or more (-1 or less) one real root each."""
+
+    frequencies_hz: tuple[float, ...]
+    dampings: tuple[float, ...]
+
+    @property
+    def values(self) -> np.ndarray[tuple[int], np.dtype[np.complex128]]:
+        """The roots in rad/s, conjugates included."""
+        return np.array(roots_from_damping(self.frequencies_hz, self.dampings), dtype=complex)
+
+    @classmethod
+    def of(cls, roots: Iterable[complex]) -> "Roots":
+        """Natural frequencies and dampings of roots in rad/s; of a conjugate pair one is looked at."""
+        kept = [complex(r) for r in roots if complex(r).imag >= 0.0]
+        kept.sort(key=abs)
+        real = [abs(r.imag) <= 1e-12 * abs(r) for r in kept]
+        dampings = [
+            math.copysign(1.0, -r.real) if flat else -r.real / abs(r) for r, flat in zip(kept, real, strict=True)
+        ]
+        return cls(tuple(abs(r) / (2 * math.pi) for r in kept), tuple(dampings))
+
+
+@dataclass(frozen=True, slots=True)
+class LinearPoles:
+    """A linear part of unit gain: poles, zeros, and the frequency (Hz) at which its magnitude is 1."""
+
+    poles: Roots
+    zeros: Roots
+    normalise_at_hz: float
+
+    @property
+    def system(self) -> lti.StateSpace:
+        """The linear part in real modal form."""
+        return lti.modal_from_roots(self.zeros.values, self.poles.values, self.normalise_at_hz)
+
+
+def poles_of(system: lti.StateSpace, excited_hz: tuple[float, float], rate_hz: float) -> LinearPoles:
+    """Poles and zeros of a strictly proper system with one input and output.
+
+    It is normalised at the geometric middle between the lowest excited frequency and a tenth of the lowest resonance,
+    where its gain should be flat. Zeros above the sample rate do nothing that it could show, and are left out; so are
+    as many poles as zeros below the excited band, a flank fitted as dynamics that would only move the gain at rest.
+    """
+    poles = [complex(p) for p in np.linalg.eigvals(system.A)]
+    zeros = [complex(z) for z in lti.zeros(system) if abs(z) < 2.0 * math.pi * rate_hz]
+    slow = 2.0 * math.pi * excited_hz[0]
+    below = [sorted((r for r in roots if abs(r) < slow), key=abs) for roots in (poles, zeros)]
+    if len(below[0]) == len(below[1]):
+        poles = [p for p in poles if p not in below[0]]
+        zeros = [z for z in zeros if z not in below[1]]
+    resonant = [abs(p) / (2 * math.pi) for p in poles if p.imag > 0.0]
+    top = max(min([excited_hz[1], *(f / 10.0 for f in resonant)]), excited_hz[0])
+    return LinearPoles(Roots.of(poles), Roots.of(zeros), math.sqrt(excited_hz[0] * top))
+
+
+def hysteretic_oscillator(
+    mass: float, damping: float, stiffness: float, slope: float, decay: float, asymmetry: float
+) -> Structure:
+    """A mass on a spring with hysteretic stiffness: m y'' + c y' + k y + z = u, z a Bouc-Wen element driven by y.
+
+    z' = slope y' - decay |y'| z - asymmetry y' |z|. In the notation of Noël and Schoukens (2016), with exponent 1,
+    these are alpha, beta gamma and beta delta, of which only the products can be told apart. The arguments are where
+    the search begins (kg, N s/m, N/m, N/m, 1/m, 1/m); drive in N, output in m.
+    """
+
+    def build(values: Floats) -> Mirror:
+        m, c, k, epsilon, alpha, beta = (float(v) for v in values)
+        return Mirror(
+            name="hysteretic oscillator",
+            A=np.array([[0.0, 1.0], [-k / m, -c / m]]),
+            B=np.array([[0.0], [1.0 / m]]),
+            E=np.array([[0.0], [-1.0 / m]]),
+            F=np.array([[1.0, 0.0]]),
+            G=np.zeros((1, 1)),
+            C=np.array([[1.0, 0.0]]),
+            D=np.zeros((1, 1)),
+            K=np.zeros((1, 1)),
+            bouc_wen=(BoucWen(0.0, 0.0, epsilon, 0.0, alpha, beta),),
+            plays=(),
+            inverse=(),
+        )
+
+    parameters = (
+        Parameter("mass", "kg", mass, lower=0.05 * mass),
+        Parameter("damping", "N s/m", damping, lower=0.0),
+        Parameter("stiffness", "N/m", stiffness, lower=0.0),
+        Parameter("slope", "N/m", slope),
+        Parameter("decay", "1/m", decay, lower=0.0),
+        Parameter("asymmetry", "1/m", asymmetry),
+    )
+    return Structure("hysteretic oscillator", parameters, build)
+
+
+# ------------------------------------------------------------------------------------------------ one axis of a mirror
+class Axis(NamedTuple):
+    """What one axis consists of."""
+
+    model: BoucWen | Play
+    creep: Creep
+    linear: LinearPoles | None
+
+
+@dataclass(frozen=True, eq=False)
+class AxisStructure(Structure):
+    """A `Structure` of one axis, whose parts can be had by themselves."""
+
+    parts: Callable[[Floats], Axis]
+
+
+def one_axis(
+    name: str,
+    model: BoucWen | Play,
+    *,
+    linear: LinearPoles | None = None,
+    creep: Creep = NO_CREEP,
+    free: Sequence[str] = (),
+    free_linear: bool = True,
+    admissible: bool = False,
+) -> AxisStructure:
+    """One axis: hysteresis, behind it a linear part of unit gain where there is one (cascade), creep beside both.
+
+    `model`, `linear` and `creep` are where the search begins. Of a Bouc-Wen model d1, epsilon, alpha and beta are
+    fitted, and those of d2, delta, gamma, eta and exponent that `free` names; beta, gamma and eta as shares of alpha,
+    so that h stays bounded. Of a Prandtl-Ishlinskii model the weights are fitted, the thresholds are not, and the
+    widening is where `free` names it. Creep is one weight for all its lags. `free_linear=False` keeps the linear part,
+    and `admissible` keeps the slope of a Bouc-Wen model behind a slow reversal from turning against d1.
+    """
+    hysteresis, make_model = (
+        _bouc_wen_part(model, free, admissible) if isinstance(model, BoucWen) else _play_part(model, free)
+    )
+    lags, make_creep = _creep_part(creep, slow_gain(model))
+    roots, make_linear = _linear_part(linear, free_linear)
+    first, second = len(hysteresis), len(hysteresis) + len(lags)
+    composition = "static" if linear is None else "cascade"
+
+    def parts(values: Floats) -> Axis:
+        return Axis(make_model(values[:first]), make_creep(values[first:second]), make_linear(values[second:]))
+
+    def build(values: Floats) -> Mirror:
+        axis = parts(values)
+        system = None if axis.linear is None else axis.linear.system
+        return mirror.assemble(name, composition, system, axis.model, axis.creep)
+
+    return AxisStructure(name, (*hysteresis, *lags, *roots), build, parts)
+
+
+def _bouc_wen_part(
+    model: BoucWen, free: Sequence[str], admissible: bool
+) -> tuple[tuple[Parameter, ...], Callable[[Floats], BoucWen]]:
+    fastest = model.rate_limit_v_s if math.isfinite(model.rate_limit_v_s) else 1.0
+    all_of_them = (
+        Parameter("d1", "rad/V", model.d1_rad_v),
+        Parameter(
+            "epsilon", "rad/V", model.epsilon_rad_v, size=max(abs(model.epsilon_rad_v), 1e-3 * abs(model.d1_rad_v))
+        ),
+        Parameter("alpha", "1/V", model.alpha_1_v, lower=1e-3 * model.alpha_1_v),
+        Parameter("beta over alpha", "", model.beta_1_v / model.alpha_1_v, -_RATIO, _RATIO, 0.1),
+        Parameter("d2", "s/V", model.d2_s_v, -1.0 / fastest, 1.0 / fastest, 0.01 / fastest),
+        Parameter("delta", "s/V", model.delta_s_v, -3.0 / fastest, 10.0 / fastest, 0.1 / fastest),
+        Parameter("gamma over alpha", "", model.gamma_1_v / model.alpha_1_v, -_RATIO, _RATIO, 0.1),
+        Parameter("eta over alpha", "", model.eta_1_v / model.alpha_1_v, -_RATIO, _RATIO, 0.1),
+        Parameter("exponent", "", model.exponent, 1.0, 10.0, 0.1),
+    )
+    used = [p for p in all_of_them if p.name.split()[0] in ("d1", "epsilon", "alpha", "beta", *free)]
+    if admissible:  # 1 is where the slope behind a slow reversal is 0
+        share = min(-model.epsilon_rad_v * model.reversal_swing / model.d1_rad_v, 0.95)
+        used[1] = Parameter("epsilon over its limit", "", share, -10.0, 1.0, 0.1)
+
+    def make(values: Floats) -> BoucWen:
+        at = {p.name.split()[0]: float(v) for p, v in zip(used, values, strict=True)}
+        alpha = at["alpha"]
+        found = replace(
+            model,
+            d1_rad_v=at["d1"],
+            epsilon_rad_v=-math.copysign(1.0, at["epsilon"] * at["d1"]) if admissible else at["epsilon"],
+            alpha_1_v=alpha,
+            beta_1_v=at["beta"] * alpha,
+            d2_s_v=at.get("d2", model.d2_s_v),
+            delta_s_v=at.get("delta", model.delta_s_v),
+            gamma_1_v=at["gamma"] * alpha if "gamma" in at else model.gamma_1_v,
+            eta_1_v=at["eta"] * alpha if "eta" in at else model.eta_1_v,
+            exponent=at.get("exponent", model.exponent),
+        )
+        if not admissible:
+            return found
+        return replace(found, epsilon_rad_v=-at["epsilon"] * found.d1_rad_v / found.reversal_swing)
+
+    return tuple(used), make
+
+
+def _play_part(model: Play, free: Sequence[str]) -> tuple[tuple[Parameter, ...], Callable[[Floats], Play]]:
+    total = abs(slow_gain(model)) or 1.0
+    count = len(model.thresholds_v)
+    rising = math.copysign(1.0, slow_gain(model))
+    bounds = (0.0, math.inf) if rising > 0.0 else (-math.inf, 0.0)
+    parameters = [
+        Parameter(f"weight at {r:.4g} V", "rad/V", w, *bounds, size=max(abs(w), 0.01 * total))
+        for r, w in zip(model.thresholds_v, model.weights_rad_v, strict=True)
+    ]
+    if "widening" in free:
+        travel = max(model.thresholds_v) or 1.0
+        most = travel / (model.rate_limit_v_s if math.isfinite(model.rate_limit_v_s) else 1.0)
+        parameters.append(Parameter("widening", "s", max(model.widening_s, 0.01 * most), 0.0, 3 * most, 0.1 * most))
+
+    def make(values: Floats) -> Play:
+        widening = float(values[count]) if len(values) > count else model.widening_s
+        return replace(model, weights_rad_v=tuple(float(w) for w in values[:count]), widening_s=widening)
+
+    return tuple(parameters), make
+
+
+def _creep_part(creep: Creep, gain: float) -> tuple[tuple[Parameter, ...], Callable[[Floats], Creep]]:
+    if not creep.weights_rad_v:
+        return (), lambda _: creep
+    parameter = Parameter(
+        "creep", "rad/V", creep.weights_rad_v[0], size=max(abs(creep.weights_rad_v[0]), 1e-3 * abs(gain))
+    )
+
+    def make(values: Floats) -> Creep:
+        return replace(creep, weights_rad_v=(float(values[0]),) * len(creep.time_constants_s))
+
+    return (parameter,), make
+
+
+def _linear_part(
+    linear: LinearPoles | None, free: bool
+) -> tuple[tuple[Parameter, ...], Callable[[Floats], LinearPoles | None]]:
+    if linear is None or not free:
+        return (), lambda _: linear
+    parameters: list[Parameter] = []
+    for kind, roots in (("pole", linear.poles), ("zero", linear.zeros)):
+        for number, (f, damping) in enumerate(zip(roots.frequencies_hz, roots.dampings, strict=True), 1):
+            parameters.append(Parameter(f"{kind} {number}", "Hz", f, lower=0.05 * f, upper=20.0 * f))
+            if abs(damping) < 1.0:
+                low, high = _DAMPING if kind == "pole" else (-_DAMPING[1], _DAMPING[1])
+                parameters.append(Parameter(f"{kind} {number} damping", "", damping, low, high, 0.1 * abs(damping)))
+
+    def make(values: Floats) -> LinearPoles:
+        at = iter(values)
+
+        def moved(roots: Roots) -> Roots:
+            pairs = [(float(next(at)), float(next(at)) if abs(d) < 1.0 else d) for d in roots.dampings]
+            return Roots(tuple(f for f, _ in pairs), tuple(d for _, d in pairs))
+
+        return replace(linear, poles=moved(linear.poles), zeros=moved(linear.zeros))
+
+    return tuple(parameters), make
+
+
+def propagated(quantity: Callable[[Floats], Floats], values: Floats, covariance: Floats) -> Floats:
+    """Standard errors of what is computed from parameters with this covariance, to first order."""
+    deviation = np.sqrt(np.diag(covariance))
+    columns = []
+    for i, step in enumerate(np.maximum(1e-4 * deviation, 1e-9 * np.abs(values))):
+        move = np.zeros(values.size)
+        move[i] = step or 1e-12
+        columns.append((quantity(values + move) - quantity(values - move)) / (2 * move[i]))
+    jacobian = np.column_stack(columns)
+    return np.asarray(np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", jacobian, covariance, jacobian), 0.0)))

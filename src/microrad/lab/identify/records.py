@@ -1,0 +1,233 @@
+"""What every identification shares: units, prepared records, the initial transient, the fastest rate, noise colour."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from microrad.core.arrays import Floats
+from microrad.lab.recording import Recording
+
+
+def no_progress(done: int, total: int, what: str) -> None:
+    """What is called with the progress where nobody asked for it."""
+
+
+_VOLTS = {"V": 1.0, "mV": 1e-3}
+_RADIANS = {"rad": 1.0, "mrad": 1e-3, "urad": 1e-6}
+_METRES = {"m": 1.0, "mm": 1e-3, "um": 1e-6}
+
+
+class IdentificationError(ValueError):
+    """An identification that cannot be done as asked: the message says why and what to do."""
+
+
+@dataclass(frozen=True)
+class Units:
+    """Units of a recording's columns, and the lever arm that turns a displacement into a tilt (small angle)."""
+
+    drive: str = "V"
+    output: str = "mrad"
+    lever_arm_m: float | None = None
+
+    def __post_init__(self) -> None:
+        """Raises `IdentificationError` for unknown units, a length without lever arm and an angle with one."""
+        if self.drive not in _VOLTS:
+            raise IdentificationError(f"input unit '{self.drive}' is not known; use one of {', '.join(_VOLTS)}.")
+        if self.output not in _RADIANS | _METRES:
+            raise IdentificationError(
+                f"output unit '{self.output}' is not known; use an angle ({', '.join(_RADIANS)}) or a length "
+                f"({', '.join(_METRES)}) with its lever arm."
+            )
+        arm = self.lever_arm_m
+        if self.output in _METRES and arm is None:
+            raise IdentificationError(
+                f"the output is a length ({self.output}) and a mirror model needs an angle: give the lever arm "
+                "(--lever-arm, lever_arm_m), the distance in metres from the axis of rotation to the point measured "
+                "(tilt = displacement / lever arm)."
+            )
+        if arm is not None and not 0 < arm < math.inf:
+            raise IdentificationError(f"the lever arm is {arm!r} m; give a positive length in metres.")
+        if arm is not None and self.output in _RADIANS:
+            raise IdentificationError(
+                f"a lever arm of {arm} m was given for an output that is already an angle ({self.output}); leave the "
+                "lever arm out, or name the unit of length."
+            )
+
+    @property
+    def volts(self) -> float:
+        """Volts per unit of the input column."""
+        return _VOLTS[self.drive]
+
+    @property
+    def radians(self) -> float:
+        """Radians per unit of the output column."""
+        return _RADIANS.get(self.output) or _METRES[self.output] / (self.lever_arm_m or math.nan)
+
+
+DEFAULT_UNITS = Units()
+
+
+@dataclass(frozen=True, eq=False)
+class SiRecord:
+    """A recording in volts and radians, with the samples before `start` set aside as the initial transient."""
+
+    name: str
+    sha256: str
+    drive_v: Floats
+    output_rad: Floats
+    step_s: float
+    start: int
+
+    @property
+    def used(self) -> int:
+        """Samples behind the initial transient."""
+        return self.drive_v.size - self.start
+
+
+def si_records(recordings: Sequence[Recording], units: Units) -> tuple[SiRecord, ...]:
+    """Recordings in volts and radians; raises `IdentificationError` where a drive never reverses."""
+    if not recordings:
+        raise IdentificationError("no recording was given; name at least one.")
+    return tuple(_si_record(recording, units) for recording in recordings)
+
+
+def _si_record(recording: Recording, units: Units) -> SiRecord:
+    if recording.drive.shape[1] != 1 or recording.output.shape[1] != 1:
+        raise IdentificationError(
+            f"{recording.path}: {recording.drive.shape[1]} drives and {recording.output.shape[1]} outputs; a mirror "
+            "file holds one of each: choose one column, or fit several with fit_linear or fit_hysteretic_stiffness."
+        )
+    drive = recording.drive[:, 0] * units.volts
+    if np.ptp(drive) == 0 or np.ptp(recording.output) == 0:
+        raise IdentificationError(f"{recording.path}: drive or output is constant in the part that is fitted.")
+    if len(_sweeps(drive, recording.step_s)) < 2:
+        raise IdentificationError(
+            f"{recording.path}: the drive never reverses in the part that is fitted, and hysteresis shows only "
+            "behind a reversal; record at least one full period of the drive."
+        )
+    output = recording.output[:, 0] * units.radians
+    return SiRecord(recording.path, recording.sha256, drive, output, recording.step_s, transient(drive))
+
+
+def transient(drive: Floats) -> int:
+    """Number of first samples to set aside: until the drive has swept 99 % of its range once, at most half of them.
+
+    The state before the first sample is unknown. A play operator forgets it when the drive has swept its full range;
+    a Bouc-Wen term when the drive has travelled a few times 1 / (alpha - |beta|), which is less in practice.
+    """
+    low, high = float(drive.min()), float(drive.max())
+    margin = 0.01 * (high - low)
+    swept = max(int(np.argmax(drive >= high - margin)), int(np.argmax(drive <= low + margin)))
+    return min(swept + 1, drive.size // 2)
+
+
+def smoothed_rate(drive: Floats, step_s: float) -> Floats:
+    """Rate of the drive over a hundredth of the period of its highest strong line, so that noise does not count."""
+    spectrum = np.abs(np.fft.rfft(drive - drive.mean()))
+    highest = int(np.flatnonzero(spectrum >= 0.05 * spectrum.max())[-1])
+    span = max(1, drive.size // (100 * max(highest, 1)))
+    return (drive[span:] - drive[:-span]) / (span * step_s)
+
+
+def fastest_rate(records: Sequence[SiRecord]) -> float:
+    """Fastest rate of the drive (V/s) over all records: 99.5 % of the smoothed rate, so that a spike does not count.
+
+    Samples at rest do not count either: a drive of steps moves in few of them.
+    """
+    rates = [np.abs(smoothed_rate(r.drive_v, r.step_s)) for r in records]
+    return max(float(np.quantile(rate[rate > 0], 0.995)) for rate in rates)
+
+
+def noisiness(records: Sequence[SiRecord]) -> float:
+    """Rms scatter of the sample-to-sample rate about the smoothed rate, over the fastest rate."""
+    scatter = 0.0
+    for record in records:
+        smooth = smoothed_rate(record.drive_v, record.step_s)
+        sample = np.diff(record.drive_v) / record.step_s
+        lag = (sample.size - smooth.size) // 2
+        scatter = max(scatter, float(np.std(sample[lag : lag + smooth.size] - smooth)))
+    return scatter / fastest_rate(records)
+
+
+def _sweeps(drive: Floats, step_s: float) -> Floats:
+    """Peak rate (V/s) of each sweep between two reversals; sweeps of less than a fifth of the longest are left out."""
+    rate = smoothed_rate(drive, step_s)
+    moving = rate[np.abs(rate) > 0.05 * np.abs(rate).max()]
+    starts = np.concatenate(([0], np.flatnonzero(np.diff(np.sign(moving)) != 0) + 1))
+    travel = np.add.reduceat(np.abs(moving), starts)
+    peaks = np.maximum.reduceat(np.abs(moving), starts)
+    return np.asarray(peaks[travel >= 0.2 * travel.max()])
+
+
+def loop_rates(records: Sequence[SiRecord]) -> tuple[float, float]:
+    """Slowest and fastest peak rate (V/s) among the loops of all records, without the outermost twentieths."""
+    peaks = np.concatenate([_sweeps(r.drive_v, r.step_s) for r in records])
+    medians = [float(np.median(_sweeps(r.drive_v, r.step_s))) for r in records]
+    low, high = np.quantile(peaks, [0.05, 0.95])
+    return min(float(low), *medians), max(float(high), *medians)
+
+
+def one_rate_only(records: Sequence[SiRecord]) -> bool:
+    """True where all loops have the same peak rate within a quarter, so that rate dependence rests on one rate."""
+    slowest, fastest = loop_rates(records)
+    return fastest < 1.25 * slowest
+
+
+def colour_inflation(residuals: Sequence[Floats]) -> float:
+    """Factor (1 for white noise) by which correlation between samples inflates the variance of an estimate.
+
+    1 + 2 sum of autocorrelations, summed over pairs of lags until a pair turns negative (Geyer's initial positive
+    sequence), the largest over the records.
+    """
+    return max(_inflation(residual) for residual in residuals)
+
+
+def _inflation(residual: Floats) -> float:
+    n = residual.size
+    spectrum = np.abs(np.fft.rfft(residual - residual.mean(), 2 * n)) ** 2
+    correlation = np.fft.irfft(spectrum)[: 2 * (n // 4)]
+    if correlation[0] <= 0:
+        return 1.0
+    pairs = (correlation / correlation[0]).reshape(-1, 2).sum(axis=1)
+    negative = np.flatnonzero(pairs < 0)
+    last = int(negative[0]) if negative.size else pairs.size
+    return max(1.0, float(2 * pairs[:last].sum() - 1))
+
+
+def rounded_to_error(value: float, standard_error: float) -> str:
+    """A fitted value as it is printed: no digits beyond the two of its standard error, and five at most.
+
+    Further digits would tell nothing and differ between processors. A value without error (nan or 0) has five digits.
+    """
+    if 0.0 < standard_error < math.inf:
+        decimals = 1 - math.floor(math.log10(float(f"{standard_error:.2g}")))
+        value = round(value, decimals) + 0.0  # no -0
+    return f"{value:.5g}"
+
+
+def correlation(covariance: Floats) -> Floats:
+    """Correlation matrix of a covariance."""
+    deviation = np.sqrt(np.diag(covariance)) + 1e-300
+    return np.asarray(covariance / np.outer(deviation, deviation))
+
+
+def percent(residual: Floats, span_rad: float) -> tuple[float, float]:
+    """Rms and peak of a residual in per cent of a peak-to-peak span."""
+    return 100 * float(np.sqrt(np.mean(residual**2))) / span_rad, 100 * float(np.max(np.abs(residual))) / span_rad
+
+
+def span(records: Sequence[SiRecord]) -> float:
+    """Largest peak-to-peak output (rad) of the records: the measure for every percentage."""
+    return max(float(np.ptp(r.output_rad)) for r in records)
+
+
+def centred(columns: Floats, records: Sequence[SiRecord]) -> Floats:
+    """Stacked columns less their mean in each record: solving without them is solving with one offset per record."""
+    return np.concatenate([part - part.mean(axis=0) for part in split_by_record(columns, records)])
+
+
+def split_by_record(values: Floats, records: Sequence[SiRecord]) -> list[Floats]:
+    """Stacked values of the used samples, one array per record."""
+    return np.split(values, np.cumsum([r.used for r in records])[:-1])

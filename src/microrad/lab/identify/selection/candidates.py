@@ -1,0 +1,228 @@
+"""The models that an identification compares: which ones the recordings support, their fits, and how well they predict.
+
+A static model has hysteresis alone; a joint one has the linear part, hysteresis and creep together.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from microrad.core.progress import Progress
+from microrad.lab.identify.hysteresis.bouc_wen import BoucWenFit, fit_bouc_wen
+from microrad.lab.identify.hysteresis.joint import FORMS, JointFit, fit_joint, fit_static_start, time_constants
+from microrad.lab.identify.hysteresis.prandtl_ishlinskii import fit_prandtl_ishlinskii
+from microrad.lab.identify.hysteresis.structures import LinearPoles, poles_of
+from microrad.lab.identify.linear.fit import LinearFit, fit_linear
+from microrad.lab.identify.records import IdentificationError, SiRecord, Units, percent
+from microrad.lab.identify.selection.predictions import Fit, Prediction, Score, ScoredModel, predict
+from microrad.lab.recording import Recording
+
+STATIC = ("prandtl_ishlinskii", "bouc_wen", "bouc_wen_admissible")
+"""Models of the hysteresis alone; bouc_wen is the paper's Eq. 3."""
+
+MODELS = (*STATIC, *FORMS)
+_STARTS = 12
+
+
+@dataclass(frozen=True)
+class Refused:
+    """A model that the recordings cannot support, and why."""
+
+    model: str
+    reason: str
+
+
+def fit_linear_part(
+    response: Sequence[Recording], units: Units, models: Sequence[str], on_progress: Progress
+) -> LinearFit | None:
+    """The linear part of the broadband recordings, in volts and radians; None where no model asks for it.
+
+    Args:
+        response: Broadband recordings that can be averaged together.
+        units: Their units.
+        models: The models that are to be fitted.
+        on_progress: Called with the steps done, their number and what is done.
+    """
+    if not response or not set(models) & set(FORMS):
+        return None
+    scaled = [  # about the first drive value, where the mirror rests
+        replace(r, drive=(r.drive - r.drive[:1]) * units.volts, output=r.output * units.radians) for r in response
+    ]
+    return fit_linear(scaled, strictly_proper=True, on_progress=on_progress)
+
+
+def supported_models(
+    models: Sequence[str], records: Sequence[SiRecord], has_linear: bool
+) -> tuple[list[str], list[Refused]]:
+    """Models that the recordings can support, and the others with the number that speaks against each.
+
+    Args:
+        models: The models asked for.
+        records: The fitted parts of the loops.
+        has_linear: Whether a linear part is known.
+
+    Raises:
+        IdentificationError: Where no model is supported.
+    """
+    names, refused = [], []
+    longest = max(r.drive_v.size * r.step_s for r in records)
+    short = f"the longest recording lasts {longest:.3g} s, and creep shows over seconds; record a staircase of 10 s"
+    for model in models:
+        form = FORMS.get(model)
+        if form is not None and form.creep and (longest < 1.0 or len(time_constants(records)) < 2):
+            refused.append(Refused(model, short))
+        elif form is not None and form.needs_linear and not has_linear:
+            why = "no recording is broadband, so there is no linear part; record a small chirp or multisine as well"
+            refused.append(Refused(model, why))
+        else:
+            names.append(model)
+    if not names:
+        raise IdentificationError(f"the recordings do not support {refused[0].model}: {refused[0].reason}.")
+    return names, refused
+
+
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """The recordings that the models are fitted to and judged by, and how.
+
+    `heads` are the fitted parts of `loops`, up to `splits`; `span_rad` is the peak-to-peak output that percentages
+    refer to, `seed` that of scattered starts.
+    """
+
+    loops: Sequence[Recording]
+    splits: Sequence[int]
+    heads: Sequence[Recording]
+    validation: tuple[Recording, ...]
+    broadband: Sequence[Recording]
+    linear: LinearFit | None
+    units: Units
+    span_rad: float
+    seed: int
+    admissible: bool
+
+    def fit_all(
+        self, models: Sequence[str], on_progress: Progress, on_fit: Callable[[Fit], None]
+    ) -> tuple[list[Fit], list[Refused]]:
+        """One fit a model; a joint fit that fails is refused with its reason, a static one raises.
+
+        Args:
+            models: The models to fit.
+            on_progress: Called with the starts done, their number and what is done.
+            on_fit: Called with each fit.
+
+        Raises:
+            IdentificationError: Where a static fit fails, or every fit.
+        """
+        poles = None
+        if self.linear is not None:
+            poles = poles_of(self.linear.system, self.linear.excited_hz, self.linear.rate_hz)
+        efforts = [_STARTS if model in ("bouc_wen", "bouc_wen_admissible") else 1 for model in models]
+        fits: list[Fit] = []
+        failed = []
+        for i, model in enumerate(models):
+
+            def progress(done: int, _total: int, what: str, before: int = sum(efforts[:i])) -> None:
+                on_progress(before + done, sum(efforts), what)
+
+            try:
+                fits.append(
+                    self._fit_static(model, progress) if model in STATIC else self.fit_joint(model, poles, progress)
+                )
+            except IdentificationError as error:
+                if model in STATIC:
+                    raise
+                failed.append(Refused(model, str(error)))
+            else:
+                on_fit(fits[-1])
+            if model not in STATIC:
+                progress(1, 1, model)
+        if not fits:
+            raise IdentificationError(failed[0].reason)
+        return fits, failed
+
+    def _fit_static(self, model: str, progress: Progress) -> Fit:
+        if model == "prandtl_ishlinskii":
+            plays = fit_prandtl_ishlinskii(self.heads, units=self.units)
+            progress(1, 1, "play operators")
+            return plays
+        return fit_bouc_wen(
+            self.heads,
+            starts=_STARTS,
+            seed=self.seed,
+            admissible=model == "bouc_wen_admissible",
+            on_progress=progress,
+            units=self.units,
+        )
+
+    def fit_joint(
+        self, model: str, poles: LinearPoles | None, progress: Progress, *, free_linear: bool = False
+    ) -> JointFit:
+        """The fit of one of `FORMS`.
+
+        Args:
+            model: Its name.
+            poles: The linear part in cascade.
+            progress: Called once, before the fit.
+            free_linear: Whether poles and zeros are fitted with the rest, and the broadband recording with the loops.
+        """
+        progress(0, 1, "linear part, hysteresis and creep together" if free_linear else f"fitting {model}")
+        return fit_joint(
+            self.heads,
+            model,
+            self.units,
+            linear=poles,
+            free_linear=free_linear,
+            admissible=self.admissible,
+            broadband=self.broadband if free_linear else (),
+            static=self._static_start if FORMS[model].family == "bouc_wen" else None,
+            seed=self.seed,
+        )
+
+    @cached_property
+    def _static_start(self) -> BoucWenFit:
+        """Where all Bouc-Wen forms begin; fitted once."""
+        return fit_static_start(self.heads, self.units, self.seed)
+
+    @property
+    def recordings(self) -> tuple[Recording, ...]:
+        """All that is judged by."""
+        return (*self.loops, *self.validation)
+
+    @property
+    def all_splits(self) -> list[int]:
+        """First sample of each of them that no fit has seen."""
+        return [*self.splits, *(0 for _ in self.validation)]
+
+    def predict(self, fit: Fit) -> tuple[Prediction, ...]:
+        """The predictions of a fit, in the order of `recordings`."""
+        pairs = zip(self.recordings, self.all_splits, strict=True)
+        return tuple(predict(fit, recording, split) for recording, split in pairs)
+
+    def scored(self, fit: Fit, predictions: tuple[Prediction, ...]) -> ScoredModel:
+        """A fit with its score, for whoever looks on."""
+        return ScoredModel(fit.name, self.score(fit.name, predictions), predictions, self.recordings)
+
+    def score(self, model: str, predictions: Sequence[Prediction]) -> Score:
+        """Residuals of a model on the fitted and on the held-out samples, in per cent of the span."""
+        fitted = [p.residual_rad[p.start : p.split] for p in predictions[: len(self.loops)]]
+        unseen = [p.residual_rad[p.split :] for p in predictions]
+        return Score(
+            model, *(value for parts in (fitted, unseen) for value in percent(np.concatenate(parts), self.span_rad))
+        )
+
+
+def refit_winner(
+    candidates: Candidates, winner: Fit, predictions: tuple[Prediction, ...], on_progress: Progress
+) -> tuple[Fit, tuple[Prediction, ...]]:
+    """The winner with all its numbers free, its linear part among them, where that is no worse on the held-out part."""
+    if not isinstance(winner, JointFit) or winner.linear is None:
+        return winner, predictions
+    free = candidates.fit_joint(winner.name, winner.linear, on_progress, free_linear=True)
+    seen = candidates.predict(free)
+    return (free, seen) if _held_out_squares(seen) <= _held_out_squares(predictions) else (winner, predictions)
+
+
+def _held_out_squares(predictions: Sequence[Prediction]) -> float:
+    return float(sum(np.sum(p.residual_rad[p.split :] ** 2) for p in predictions))

@@ -1,0 +1,372 @@
+"""Many models on the same recordings, judged on samples that none of them has seen."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from microrad.core.arrays import Floats
+from microrad.core.progress import Progress
+from microrad.lab.identify.linear.fit import LinearFit
+from microrad.lab.identify.records import (
+    IdentificationError,
+    SiRecord,
+    Units,
+    colour_inflation,
+    no_progress,
+    si_records,
+    span,
+)
+from microrad.lab.identify.selection.candidates import (
+    MODELS,
+    STATIC,
+    Candidates,
+    Refused,
+    fit_linear_part,
+    refit_winner,
+    supported_models,
+)
+from microrad.lab.identify.selection.predictions import Fit, Prediction, Score, ScoredModel, straight_line
+from microrad.lab.identify.selection.roles import roles, whole_periods
+from microrad.lab.identify.selection.warnings import (
+    ResidualTest,
+    drift,
+    fit_warnings,
+    held_out_warnings,
+    range_warnings,
+    rate_warnings,
+    residual_test,
+    residual_warnings,
+    score_warnings,
+    set_aside_warnings,
+)
+from microrad.lab.recording import Recording
+
+_MIN_PART = 100
+_EXPLAINED = 0.5
+_HARDLY = (
+    "The output hardly follows the drive: check that the channels belong together, and record a larger drive, or with "
+    "less noise and drift."
+)
+_OTHER_MOTION = (
+    "It follows the part that was fitted, so the rest moves in another way (a chirp goes on to other frequencies), or "
+    "drowns in noise or drift: record loops of several periods, a chirp or multisine beside them for the dynamics, and "
+    "another recording to judge by."
+)
+
+
+@dataclass(frozen=True)
+class Source:
+    """One recording: path, digest of the file, samples fitted and held out, and what it served for.
+
+    `role` is "loops", "broadband" (for the linear part) or "validation" (for the scores alone).
+    """
+
+    path: str
+    sha256: str
+    fitted: int
+    held_out: int
+    role: str = "loops"
+
+
+@dataclass(frozen=True, eq=False)
+class Identification:
+    """The fits, their scores, the choice with its reason, and the limits within which it holds.
+
+    `fits` see the first part of each recording alone; `scores` has the same order, as has `predictions` (models, then
+    recordings in the order of `recordings`: loops, then validation), and `straight_line` is the best line through the
+    same samples. `refused` names the models that were not fitted, and `unsupported` says, where it is not empty, why
+    not even the chosen one should be used. `linear` is the linear part of the broadband recordings (volts and radians),
+    where there are any. `span_rad` is the peak-to-peak output that the percentages refer to, and `travel_rad` the range
+    of the chosen model's output over the fitted drive from `drive_min_v` to `drive_max_v`. `residual` tests the chosen
+    model's residual on the held-out samples.
+    """
+
+    fits: tuple[Fit, ...]
+    scores: tuple[Score, ...]
+    straight_line: Score
+    chosen: str
+    reason: str
+    warnings: tuple[str, ...]
+    refused: tuple[Refused, ...]
+    unsupported: str
+    sources: tuple[Source, ...]
+    recordings: tuple[Recording, ...]
+    predictions: tuple[tuple[Prediction, ...], ...]
+    linear: LinearFit | None
+    residual: ResidualTest
+    units: Units
+    span_rad: float
+    travel_rad: float
+    drive_min_v: float
+    drive_max_v: float
+    rate_limit_v_per_s: float
+    drift_rad: float
+
+    @property
+    def bias_v(self) -> float:
+        """Middle of the fitted drive range."""
+        return (self.drive_min_v + self.drive_max_v) / 2
+
+    def fit(self, model: str | None = None) -> Fit:
+        """The fit of a model, of the chosen one by default."""
+        return self.fits[self._index(model)]
+
+    def score(self, model: str | None = None) -> Score:
+        """The score of a model, of the chosen one by default."""
+        return self.scores[self._index(model)]
+
+    def _index(self, model: str | None) -> int:
+        names = [score.model for score in self.scores]
+        if (model or self.chosen) not in names:
+            raise IdentificationError(f"no model '{model}' was fitted; there are {', '.join(names)}.")
+        return names.index(model or self.chosen)
+
+
+def identify(  # noqa: PLR0913  all but the first are named options in practice
+    recordings: Sequence[Recording],
+    hold_out: float | None = None,
+    seed: int = 0,
+    models: Sequence[str] = STATIC[:2],
+    on_progress: Progress | None = None,
+    *,
+    validation: Sequence[Recording] = (),
+    admissible: bool = False,
+    output_unit: str = "mrad",
+    lever_arm_m: float | None = None,
+    input_unit: str = "V",
+    on_fit: Callable[[ScoredModel], None] = lambda judged: None,
+) -> Identification:
+    """Fit the models on the first part of each recording and choose the one that is better on the rest.
+
+    Broadband recordings (chirps, multisines; see `roles`) give the linear part, which the joint models have in cascade;
+    they are not split. The lowest residual rms over all held-out samples wins; where the difference may be chance an
+    admissible model goes before one that is not, and fewer parameters before more. A winner with a linear part is
+    fitted once more with everything free.
+
+    Args:
+        recordings: One drive and one output each.
+        hold_out: Share at the end of each loop that no fit sees; states are carried through into it. By default 0.5,
+            and 0 where there are recordings for validation.
+        seed: Seed of the scattered starts of the Bouc-Wen fits.
+        models: The models to fit, out of `MODELS`.
+        on_progress: Called with the fits done, their number and what is done.
+        validation: Recordings that no fit sees at all.
+        admissible: Whether each Bouc-Wen model is kept from moving against its gain behind a reversal.
+        output_unit: Unit of the outputs: rad, mrad, urad, or m, mm, um with a lever arm.
+        lever_arm_m: Distance from the axis of rotation to the point measured, where that is a length.
+        input_unit: Unit of the drives: V or mV.
+        on_fit: Given each model as soon as it is fitted, and the winner again when everything was free.
+
+    Raises:
+        IdentificationError: For what cannot be fitted as asked, and where not even the best model follows the output.
+    """
+    units, on_progress = Units(input_unit, output_unit, lever_arm_m), on_progress or no_progress
+    if not models or not set(models) <= set(MODELS) or len(set(models)) != len(models):
+        raise IdentificationError(f"models {tuple(models)} cannot be used; name each once, out of {', '.join(MODELS)}.")
+    if admissible:
+        models = tuple(dict.fromkeys("bouc_wen_admissible" if m == "bouc_wen" else m for m in models))
+    if not recordings:
+        raise IdentificationError("no recording was given; name at least one.")
+    _check_distinct(recordings, validation)
+    response, broadband, loops = roles(recordings)
+    splits = _splits(loops, hold_out, bool(validation))
+    heads = [r.first(k) for r, k in zip(loops, splits, strict=True)]
+    prepared = si_records(heads, units)
+    seen = {id(r): head for r, head in zip(loops, heads, strict=True)}
+    response = [whole_periods(seen[id(r)]) if id(r) in seen else r for r in response]
+    linear = fit_linear_part(response, units, models, on_progress)
+    names, refused = supported_models(models, prepared, linear is not None)
+    candidates = Candidates(
+        loops=loops,
+        splits=splits,
+        heads=heads,
+        validation=tuple(validation),
+        broadband=response[:1],
+        linear=linear,
+        units=units,
+        span_rad=span(prepared),
+        seed=seed,
+        admissible=admissible,
+    )
+    predictions: list[tuple[Prediction, ...]] = []
+
+    def judge(fit: Fit) -> None:
+        predictions.append(candidates.predict(fit))
+        on_fit(candidates.scored(fit, predictions[-1]))
+
+    fits, failed = candidates.fit_all(names, on_progress, judge)
+    best = choose_best(fits, [[r for p in each if (r := p.residual_rad[p.split :]).size] for each in predictions])
+    winner = fits[best]
+    fits[best], predictions[best] = refit_winner(candidates, winner, predictions[best], on_progress)
+    if fits[best] is not winner:
+        on_fit(candidates.scored(fits[best], predictions[best]))
+    sources = _sources(candidates, broadband, response if linear is not None else ())
+    return _identification(candidates, prepared, fits, predictions, best, [*refused, *failed], sources)
+
+
+def _splits(recordings: Sequence[Recording], hold_out: float | None, validated: bool) -> list[int]:
+    share = (0.0 if validated else 0.5) if hold_out is None else hold_out
+    if not (0 < share < 1 or (share == 0 and validated)):
+        raise IdentificationError(
+            f"--hold-out (hold_out) is {share}; give the share of each recording kept for the check, between 0 "
+            "and 1, e.g. 0.5, or 0 with recordings for validation."
+        )
+    splits = [round(r.samples * (1 - share)) for r in recordings]
+    for recording, split in zip(recordings, splits, strict=True):
+        if split < _MIN_PART or (share > 0 and recording.samples - split < _MIN_PART):
+            raise IdentificationError(
+                f"{recording.path}: {split} samples to fit and {recording.samples - split} to check; each part needs "
+                f"at least {_MIN_PART}; record longer or choose hold_out nearer to 0.5."
+            )
+    return splits
+
+
+def _check_distinct(recordings: Sequence[Recording], validation: Sequence[Recording]) -> None:
+    """Raises `IdentificationError` for a recording that is given twice, or to fit and for validation."""
+    seen: dict[str, str] = {}
+    for recording in (*recordings, *validation):
+        key = f"{recording.sha256} {recording.rate_hz}"
+        if recording.sha256 and key in seen:
+            raise IdentificationError(
+                f"{recording.path}: the same data as {seen[key]}; give each recording once, and for validation one "
+                "that is not fitted."
+            )
+        seen[key] = recording.path
+
+
+def _identification(
+    candidates: Candidates,
+    prepared: tuple[SiRecord, ...],
+    fits: Sequence[Fit],
+    predictions: Sequence[tuple[Prediction, ...]],
+    best: int,
+    refused: Sequence[Refused],
+    sources: tuple[Source, ...],
+) -> Identification:
+    scores = tuple(candidates.score(f.name, p) for f, p in zip(fits, predictions, strict=True))
+    straight = straight_line(prepared, candidates.recordings, candidates.all_splits, candidates.units)
+    line = candidates.score("straight line", straight)
+    fit, chosen, linear = fits[best], predictions[best], candidates.linear
+    of_loops = chosen[: len(candidates.loops)]
+    fitted = [(p.measured_rad[p.start : p.split], p.residual_rad[p.start : p.split]) for p in of_loops]
+    if text := _unexplained(scores[best], fitted, "on the very samples it was fitted to"):
+        raise IdentificationError(f"{text} {_HARDLY}")
+    low, high = min(float(r.drive_v.min()) for r in prepared), max(float(r.drive_v.max()) for r in prepared)
+    drift_rad, drift_warnings = drift(chosen, candidates.recordings, candidates.span_rad)
+    # Of the longest held-out part: correlations across the joint of two records would mean nothing.
+    pairs = zip(candidates.recordings, chosen, strict=True)
+    recording, longest = max(pairs, key=lambda pair: pair[1].residual_rad.size - pair[1].split)
+    test = residual_test(longest.residual_rad[longest.split :], recording.drive[longest.split :, 0])
+    warnings = [
+        *range_warnings((low, high), fit.rate_limit_v_per_s),
+        *rate_warnings(prepared, fit),
+        *set_aside_warnings(candidates.loops, of_loops),
+        *held_out_warnings(candidates.recordings, candidates.units, (low, high), chosen),
+        *score_warnings(scores[best], line),
+        *fit_warnings(fit),
+        *drift_warnings,
+        *residual_warnings(test),
+        *(f"Linear part (in rad/V): {text}" for text in (linear.warnings if linear is not None else ())),
+    ]
+    return Identification(
+        fits=tuple(fits),
+        scores=scores,
+        straight_line=line,
+        chosen=fit.name,
+        reason=_reason(scores, line, best),
+        warnings=tuple(warnings),
+        refused=tuple(refused),
+        unsupported=_unsupported(scores[best], line, chosen),
+        sources=sources,
+        recordings=candidates.recordings,
+        predictions=tuple(predictions),
+        linear=linear,
+        residual=test,
+        units=candidates.units,
+        span_rad=candidates.span_rad,
+        travel_rad=max(float(np.ptp(p.model_rad[p.start : p.split])) for p in of_loops),
+        drive_min_v=low,
+        drive_max_v=high,
+        rate_limit_v_per_s=fit.rate_limit_v_per_s,
+        drift_rad=drift_rad,
+    )
+
+
+def _sources(
+    candidates: Candidates, broadband: Sequence[Recording], response: Sequence[Recording]
+) -> tuple[Source, ...]:
+    """What each recording served for; a broadband one counts where the linear part was fitted to it."""
+    loops = [
+        Source(r.path, r.sha256, k, r.samples - k) for r, k in zip(candidates.loops, candidates.splits, strict=True)
+    ]
+    both, used = {id(r) for r in candidates.loops}, {id(r) for r in response}
+    others = [r for r in broadband if id(r) not in both]
+    wide = [Source(r.path, r.sha256, r.samples * (id(r) in used), 0, "broadband") for r in others]
+    return (*loops, *wide, *(Source(r.path, r.sha256, 0, r.samples, "validation") for r in candidates.validation))
+
+
+def _unsupported(score: Score, line: Score, predictions: Sequence[Prediction]) -> str:
+    """Why the chosen model should not be used at all, judged by the held-out samples; nothing where it may be."""
+    if score.held_out_rms_percent <= 0.9 * line.held_out_rms_percent:
+        return ""
+    unseen = [(p.measured_rad[p.split :], p.residual_rad[p.split :]) for p in predictions]
+    text = _unexplained(score, unseen, "on the held-out samples, where a straight line does as well")
+    return f"{text} {_OTHER_MOTION}" if text else ""
+
+
+def _unexplained(score: Score, parts: Sequence[tuple[Floats, Floats]], where: str) -> str:
+    filled = [(measured, residual) for measured, residual in parts if measured.size]
+    spread = math.sqrt(float(np.mean(np.concatenate([m - m.mean() for m, _ in filled]) ** 2)))
+    left = math.sqrt(float(np.mean(np.concatenate([r for _, r in filled]) ** 2)))
+    if left <= _EXPLAINED * spread:
+        return ""
+    return (
+        f"the recordings do not support a model: the chosen one, {score.model}, leaves {left:.3g} rad rms of "
+        f"{spread:.3g} rad {where} ({100 * left / spread:.0f} %, at most {100 * _EXPLAINED:.0f} % is a model)."
+    )
+
+
+def choose_best(fits: Sequence[Fit], residuals: Sequence[Sequence[Floats]]) -> int:
+    """Number of the fit with the lowest residual on the held-out samples.
+
+    Where the difference may be chance an admissible model goes first, then the one with fewer parameters.
+
+    Args:
+        fits: The fits.
+        residuals: Of each fit, the residual (rad) on the held-out samples of each recording.
+    """
+    losses = [[residual**2 for residual in each] for each in residuals]
+    sums = [float(sum(np.sum(loss) for loss in each)) for each in losses]
+    lowest = int(np.argmin(sums))
+    ties = [i for i, each in enumerate(losses) if _may_be_chance(each, losses[lowest])]
+    return min(ties, key=lambda i: (not fits[i].admissible, fits[i].parameter_count, sums[i]))
+
+
+def _may_be_chance(losses: Sequence[Floats], best: Sequence[Floats]) -> bool:
+    """Whether the mean difference of squared residuals is below two of its standard errors, noise colour counted.
+
+    F. X. Diebold and R. S. Mariano, Comparing predictive accuracy, J. Business & Economic Statistics 13 (1995) 253.
+    """
+    difference = np.concatenate([a - b for a, b in zip(losses, best, strict=True)])
+    if not difference.any():
+        return True
+    colour = colour_inflation([a - b for a, b in zip(losses, best, strict=True)])
+    return float(difference.mean()) <= 2 * math.sqrt(colour * float(difference.var()) / difference.size)
+
+
+def _reason(scores: Sequence[Score], line: Score, best: int) -> str:
+    others = [f"{s.held_out_rms_percent:.3g} % by {s.model}" for i, s in enumerate(scores) if i != best]
+    rest = ", ".join([*others, f"{line.held_out_rms_percent:.3g} % by a straight line"])
+    reason = (
+        f"{scores[best].model} leaves {scores[best].held_out_rms_percent:.3g} % of the peak-to-peak output (rms) on "
+        f"the held-out samples, against {rest}."
+    )
+    lower = [s.model for s in scores if s.held_out_rms_percent < scores[best].held_out_rms_percent]
+    if lower:
+        reason += (
+            f" The difference to {' and '.join(lower)} is below two standard errors; among such models those that "
+            "never move the wrong way after a reversal go first, then those with fewer parameters."
+        )
+    return reason

@@ -1,0 +1,110 @@
+"""A fitted model run over a recording, beside the straight line through the same samples."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from microrad.core.arrays import Floats
+from microrad.lab.identify.hysteresis.bouc_wen import BoucWenFit
+from microrad.lab.identify.hysteresis.joint import JointFit
+from microrad.lab.identify.hysteresis.prandtl_ishlinskii import PrandtlIshlinskiiFit
+from microrad.lab.identify.records import IdentificationError, SiRecord, Units, transient
+from microrad.lab.recording import Recording
+
+Fit = BoucWenFit | PrandtlIshlinskiiFit | JointFit
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """Model against measurement over one record, offset included (rad); samples before `start` are the transient.
+
+    Behind `split` the record is unseen. What a record may add by itself (an offset; with creep the tail of what went
+    before it) is fitted over the samples from `start` to `split`, or over all where the whole record is unseen.
+    """
+
+    model_rad: Floats
+    measured_rad: Floats
+    start: int
+    split: int
+    clamped: int
+
+    @property
+    def residual_rad(self) -> Floats:
+        """Measured less modelled."""
+        return self.measured_rad - self.model_rad
+
+
+@dataclass(frozen=True)
+class Score:
+    """Residuals of one model in per cent of the peak-to-peak output, on the fitted and on the held-out samples."""
+
+    model: str
+    fit_rms_percent: float
+    fit_peak_percent: float
+    held_out_rms_percent: float
+    held_out_peak_percent: float
+
+
+@dataclass(frozen=True, eq=False)
+class ScoredModel:
+    """A model as soon as it is fitted: its score, and its predictions in the order of the recordings judged on."""
+
+    model: str
+    score: Score
+    predictions: tuple[Prediction, ...]
+    recordings: tuple[Recording, ...]
+
+
+def predict(fit: Fit, recording: Recording, split: int | None = None) -> Prediction:
+    """Run a fitted model over a recording with the units of the fit, states carried through from the first sample.
+
+    A sensor's zero is not part of the model: the offset is taken from the samples before `split`.
+
+    Args:
+        fit: A fitted model.
+        recording: The recording, in the units of the fit.
+        split: First sample that the fit has not seen; None where it has seen all (the default), 0 where it has seen
+            none: then the offset is taken from all samples, too.
+
+    Raises:
+        IdentificationError: For a split outside the recording.
+    """
+    drive, measured = recording.drive[:, 0] * fit.units.volts, recording.output[:, 0] * fit.units.radians
+    whole = split is None or split == 0
+    end = recording.samples if whole else split
+    if not (end and 2 <= end <= recording.samples):
+        raise IdentificationError(
+            f"split {split} does not lie within the {recording.samples} samples of {recording.path}; give a number "
+            "from 2 to that."
+        )
+    start = transient(drive[:end])
+    model, clamped = fit.response(drive, recording.step_s)
+    added = _added(fit, measured - model, recording.step_s, slice(start, end))
+    return Prediction(model + added, measured, start, start if split == 0 else end, clamped)
+
+
+def _added(fit: Fit, difference: Floats, step_s: float, known: slice) -> Floats | float:
+    if isinstance(fit, JointFit):
+        columns = fit.nuisance(difference.size, step_s)
+        share = np.linalg.lstsq(columns[known], difference[known], rcond=None)[0]
+        return np.asarray(columns @ share)
+    return float(np.mean(difference[known]))
+
+
+def straight_line(
+    prepared: Sequence[SiRecord], recordings: Sequence[Recording], splits: Sequence[int], units: Units
+) -> list[Prediction]:
+    """One slope for all recordings and one offset for each, from the fitted samples; a split of 0 is all unseen."""
+    above = [(p.drive_v[p.start :], p.output_rad[p.start :]) for p in prepared]
+    slope = sum(float((u - u.mean()) @ (y - y.mean())) for u, y in above) / sum(
+        float((u - u.mean()) @ (u - u.mean())) for u, _ in above
+    )
+    lines = []
+    for recording, split in zip(recordings, splits, strict=True):
+        drive = recording.drive[:, 0] * units.volts
+        model, measured = slope * drive, recording.output[:, 0] * units.radians
+        start = transient(drive[: split or None])
+        offset = float(np.mean((measured - model)[start : split or None]))
+        lines.append(Prediction(model + offset, measured, start, split or start, 0))
+    return lines

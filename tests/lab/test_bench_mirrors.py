@@ -1,0 +1,195 @@
+"""The mirrors of the virtual bench: against slow twins, and for what a real mirror shows - loops, rate, creep."""
+
+import math
+
+import numpy as np
+import pytest
+
+from microrad.core import lti
+from microrad.lab.bench.mirrors import (
+    EQ2_DENOMINATOR,
+    EQ2_NUMERATOR,
+    EQ3,
+    FINE_STEP_S,
+    Amplifier,
+    BenchMirror,
+    bench_output,
+    bouc_wen_output,
+    linear_output,
+)
+
+RATE_HZ = 50e3
+AMPLIFIER = Amplifier(5e3, 1e6 / 15)
+HALVING_MRAD = 2e-5  # 0.02 microradian, as `FINE_STEP_S` says
+
+
+def philox(seed):
+    return np.random.Generator(np.random.Philox(seed))
+
+
+def sine(freq_hz, amplitude_v, periods, rate_hz=RATE_HZ):
+    n = round(periods * rate_hz / freq_hz)
+    return 6.0 + amplitude_v * np.sin(2 * np.pi * freq_hz * np.arange(n) / rate_hz)
+
+
+def lag_deg(freq_hz, amplitude_v):
+    """Phase lag of the fundamental in the second period, which a loop's area makes grow."""
+    drive = sine(freq_hz, amplitude_v, 2)
+    output = bench_output(drive, 6.0, RATE_HZ, AMPLIFIER)
+    half = drive.size // 2
+    spectra = [np.fft.rfft(values[half:])[1] for values in (drive, output)]
+    return -math.degrees(np.angle(spectra[1] / spectra[0])), abs(spectra[1] / spectra[0])
+
+
+# ---- slow twins
+def slow_bench_output(drive, rest_v, rate_hz, amplifier, substeps):
+    """The equations of the module's docstring in small steps, one after the other, without creep's closed form."""
+    m = BenchMirror()
+    step_s = 1.0 / rate_hz / substeps
+    poles, zeros = np.roots(EQ2_DENOMINATOR), np.roots(EQ2_NUMERATOR)
+    poles, zeros = (r[np.argsort(np.abs(r))][1:] for r in (poles, zeros))
+    num, den = np.real(np.poly(zeros)), np.real(np.poly(poles))
+    system = lti.modal_from_polynomials(tuple(num * den[-1] / num[-1]), tuple(den))
+    Ad, B0, B1 = lti.first_order_hold(system.A, system.B, step_s)
+    v = smooth = rest_v
+    plays, thresholds, weights = np.full(m.operators, rest_v), m.thresholds_v, m.weights_mrad_v
+    settled = strain = m.at_rest(rest_v)
+    x, lags = np.zeros(system.order), np.zeros(m.lag_times_s.size)
+    output = []
+    for command in drive:
+        creep = m.creep_share_decade / m.lags_per_decade * lags.sum()
+        output.append(settled + float((system.C @ x)[0]) + creep)
+        for _ in range(substeps):
+            rate = np.clip((command - v) / amplifier.time_constant_s, -amplifier.slew_v_s, amplifier.slew_v_s)
+            v = v + step_s * rate
+            smooth = smooth + step_s * (v - smooth) / m.viscous_smoothing_s
+            q = v - m.viscous_v * math.asinh((v - smooth) / m.viscous_smoothing_s / m.viscous_rate_v_s)
+            plays = np.maximum(q - thresholds, np.minimum(q + thresholds, plays))
+            extension = m.direct_mrad_v * v + float(weights @ plays)
+            before, strain = strain, extension + m.curvature_1_mrad * extension**2
+            x = Ad @ x + B0[:, 0] * (before - settled) + B1[:, 0] * (strain - settled)
+            lags = lags + step_s * (strain - settled - lags) / m.lag_times_s
+    return np.array(output)
+
+
+@pytest.mark.parametrize("kind", ["smooth", "slewing"])
+def test_the_benchs_mirror_agrees_with_small_euler_steps(kind):
+    if kind == "smooth":
+        drive, amplifier = sine(1000.0, 3.0, 2), AMPLIFIER
+    else:
+        drive, amplifier = np.repeat([6.0, 9.0, 2.0], 30), Amplifier(5e3, 2e4)
+    fast = bench_output(drive, 6.0, RATE_HZ, amplifier)
+    errors = [np.abs(slow_bench_output(drive, 6.0, RATE_HZ, amplifier, n) - fast).max() for n in (20, 40)]
+    assert errors[1] < 0.01 * np.ptp(fast)
+    assert 1.8 < errors[0] / errors[1] < 2.2  # Euler's first order, towards the fast one
+    assert np.ptp(fast) > 0.1
+
+
+def test_halving_the_fine_step_changes_nothing_beyond_the_stated_bound():
+    chirp = 6.0 + 0.5 * np.sin(2 * np.pi * (10.0 * np.arange(20_000) / RATE_HZ) * 10.0 ** np.linspace(0, 2.4, 20_000))
+    for drive, rate_hz in (
+        (chirp, RATE_HZ),
+        (sine(100.0, 6.0, 2), RATE_HZ),
+        (np.repeat([6.0, 12.0, 1.0], 1000), RATE_HZ),
+        (sine(1.0, 5.0, 0.2, 1e3), 1e3),
+    ):
+        once, twice, coarse = (
+            bench_output(drive, 6.0, rate_hz, AMPLIFIER, fine_step_s=s) for s in (FINE_STEP_S, FINE_STEP_S / 2, 2e-5)
+        )
+        assert 0.0 < np.abs(once - twice).max() < HALVING_MRAD
+        assert np.abs(coarse - twice).max() > np.abs(once - twice).max()
+
+
+def test_standing_still_is_stepped_by_samples_without_a_difference():
+    """A creep record at a low rate: the long waits take one step a sample, the moves many."""
+    drive = np.concatenate([np.full(50, 6.0), np.linspace(6.0, 9.0, 6), np.full(400, 9.0), np.full(400, 4.0)])
+    whole = bench_output(drive, 6.0, 1e3, AMPLIFIER)
+    wiggling = drive + 1e-13 * (-1.0) ** np.arange(drive.size)  # never at rest: always fine
+    fine = bench_output(wiggling, 6.0, 1e3, AMPLIFIER)
+    assert np.abs(whole - fine).max() < 1e-9
+    assert np.ptp(whole) > 0.4
+
+
+def test_eq2_is_played_as_printed():
+    drive = 6.0 + 0.5 * philox(1).standard_normal(2000)
+    system = lti.modal_from_polynomials(EQ2_NUMERATOR, EQ2_DENOMINATOR)
+    Ad, Bd = lti.zero_order_hold(system.A, system.B, 1 / RATE_HZ)
+    x, expected = np.zeros(system.order), []
+    for u in drive - 6.0:
+        expected.append(float((system.C @ x)[0]))
+        x = Ad @ x + Bd[:, 0] * u
+    output = linear_output(drive, 6.0, RATE_HZ)
+    assert output[0] == pytest.approx(6.0 * 0.16255, rel=1e-4)  # settled, at the printed gain at rest
+    assert np.allclose(output - output[0], expected, rtol=0, atol=1e-10)
+    assert np.ptp(expected) > 0.05
+
+
+def test_eq3_is_played_as_printed():
+    drive = sine(100.0, 6.0, 3)
+    output = bouc_wen_output(drive, 6.0, RATE_HZ)
+    rate = np.diff(drive, prepend=6.0) * RATE_HZ
+    h = (output - EQ3[0] * np.exp(-EQ3[1] * rate) * drive)[drive.size // 3 :]
+    assert np.abs(h).max() == pytest.approx(0.074443, rel=2e-3)  # an adaptive solver's number
+    assert 100 * np.ptp(h) / np.ptp(output[drive.size // 3 :]) == pytest.approx(14.05, rel=2e-3)
+
+
+# ---- what a real mirror shows
+def test_gain_and_loop_grow_with_amplitude():
+    lags, gains = zip(*(lag_deg(10.0, amplitude) for amplitude in (0.1, 0.5, 2.0, 6.0)), strict=True)
+    assert np.all(np.diff(lags) > 0.1)
+    assert np.all(np.diff(gains) > 1e-4)
+    assert 0.076 < gains[0] < 0.080
+    assert 0.088 < gains[-1] < 0.092
+
+
+def test_the_loop_grows_mildly_with_rate():
+    """Beyond the lag that a small sine has at the same frequency, which is linear."""
+    slow, fast = (lag_deg(f, 6.0)[0] - lag_deg(f, 0.1)[0] for f in (2.0, 60.0))
+    assert 1.05 < fast / slow < 1.5
+
+
+def test_the_two_branches_of_a_loop_differ():
+    drive = sine(5.0, 6.0, 2)
+    output = bench_output(drive, 6.0, RATE_HZ, AMPLIFIER)[drive.size // 2 :]
+    second = np.fft.rfft(output)[:4]
+    assert 0.002 < abs(second[2]) / abs(second[1]) < 0.02
+
+
+def test_creep_behind_a_step_is_logarithmic_over_decades():
+    rate_hz = 50.0
+    drive = np.concatenate([np.full(20, 6.0), np.full(round(1000 * rate_hz), 9.0)])
+    output = bench_output(drive, 6.0, rate_hz, AMPLIFIER)[20:]
+    at = [output[round(t * rate_hz)] for t in (0.1, 1.0, 10.0, 100.0, 999.0)]
+    step = at[0] - BenchMirror().at_rest(6.0)
+    decades = np.diff(at) / step
+    assert 0.2 < step < 0.3
+    assert np.all((decades > 0.007) & (decades < 0.012))
+    assert decades.max() / decades.min() < 1.25
+    back = bench_output(np.repeat([6.0, 3.0], [20, 500]), 6.0, rate_hz, AMPLIFIER)
+    assert np.all(np.diff(back[70::50]) < 0)
+
+
+def test_a_resting_mirror_stays_where_it_is():
+    output = bench_output(np.full(5000, 7.0), 7.0, RATE_HZ, AMPLIFIER)
+    assert np.ptp(output) < 1e-12
+    assert output[0] == pytest.approx(BenchMirror().at_rest(7.0))
+
+
+def test_a_slow_amplifier_and_a_slew_limit_hold_the_mirror_back():
+    drive = np.repeat([6.0, 9.0], [10, 4000])
+    usual, narrow, slewing = (
+        bench_output(drive, 6.0, RATE_HZ, amplifier)
+        for amplifier in (AMPLIFIER, Amplifier(50.0, 1e6), Amplifier(5e3, 1e3))
+    )
+    reach = [np.argmax(y - y[0] > 0.8 * (y[-1] - y[0])) - 10 for y in (usual, narrow, slewing)]
+    assert reach[0] < 20
+    assert 200 < reach[1] < 400  # 1.6 time constants of 3.2 ms
+    assert 100 < reach[2] < 150  # 2.4 V at 1 V/ms
+
+
+def test_the_density_of_plays_is_smooth():
+    weights = BenchMirror().weights_mrad_v
+    assert weights.size == 60
+    assert np.all(weights > 0)
+    assert weights.sum() == pytest.approx(0.021)
+    assert np.abs(np.diff(weights, 2)).max() < 0.2 * weights.max()
