@@ -3,8 +3,9 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 DEMO := demo
-# Three processes for two cores: some tests wait for a browser, a worker or a child.
-SIDE_BY_SIDE := --numprocesses 3 --dist loadfile --no-loadscope-reorder
+# Three processes for two cores: some tests wait for a browser, a worker or a child. One that crashes ends the run: the
+# files that it has left would be waited for in vain.
+SIDE_BY_SIDE := --numprocesses 3 --dist loadfile --no-loadscope-reorder --max-worker-restart 0
 
 # Without the bytecode of its modules each command of a test begins half a second later.
 unexport PYTHONDONTWRITEBYTECODE
@@ -15,11 +16,12 @@ unexport PYTHONDONTWRITEBYTECODE
 demo: $(VENV)/.run
 	$(BIN)/microrad run missions/leo-geo.toml --output $(DEMO) --overwrite
 
-# Types are checked on one core; what most tests wait for is compiled on another one. The numbers are compared beside the
-# tests that wait: those are handed out first.
+# What most tests wait for is compiled first. Types are checked and the numbers compared beside the tests that wait: those
+# are handed out first.
 test: contract lint
-	@$(MAKE) --no-print-directory --jobs=2 types compiled
-	@$(MAKE) --no-print-directory --jobs=2 numbers unit
+	@$(MAKE) --no-print-directory --jobs=3 FIRST=compiled types numbers unit
+
+numbers unit: | $(FIRST)
 
 contract: $(VENV)/.test
 	$(BIN)/lint-imports

@@ -24,9 +24,9 @@ from pathlib import Path
 from microrad.campaign import bundle, run
 from microrad.campaign.file import load_campaign
 from microrad.campaign.records import Engine, Job
-from microrad.campaign.rows import plan
 from microrad.campaign.rows.evaluator import Evaluator
 from microrad.campaign.rows.loops import controllers
+from microrad.campaign.rows.plan import planned
 
 HERE = Path(__file__).resolve().parent
 MISSION = HERE.parent / "missions" / "leo-geo.toml"
@@ -77,7 +77,7 @@ def efficiency(runs: int) -> None:
     with tempfile.TemporaryDirectory() as folder:
         campaign = load_campaign(written(folder, runs))
         spec = bundle.packed(campaign, controllers(campaign, lambda done, total, what: None))
-        jobs = plan.planned(campaign).chunks(0, campaign.rows)
+        jobs = planned(campaign).chunks(0, campaign.rows)
         rounds: list[dict[str, float]] = []
         started: dict[str, float] = {}
         for _ in range(ROUNDS):

@@ -22,8 +22,8 @@ import numpy as np
 from microrad.campaign.definition.records import CampaignFile
 from microrad.campaign.file import load_campaign
 from microrad.campaign.records import Chunk, Interval, Tail
-from microrad.campaign.rows import loops
 from microrad.campaign.rows.evaluator import Evaluator
+from microrad.campaign.rows.loops import mission_loop
 from microrad.campaign.statistics.tails import tail_of_time, tail_weighted
 from microrad.core.threads import in_threads
 from microrad.loop.control import AxisController
@@ -64,7 +64,7 @@ class Bench:
         self.plain = self._campaign(MOST, KEEP)
         table = self.plain.table.loop
         assert table is not None
-        self.axis: AxisController = loops.tuned(self.plain.mission, table)
+        self.axis: AxisController = mission_loop(self.plain.mission, table, 1).tuned()
         self.survival, self.square, self.runs = np.zeros(0), np.zeros(0), 0
 
     def _campaign(self, runs: int, more: str, tail: str = "") -> CampaignFile:

@@ -18,7 +18,8 @@ from skyfield.api import EarthSatellite, load, wgs84
 
 from microrad import orbit
 from microrad.mission.file import load_mission
-from microrad.orbit import constellation, operations
+from microrad.orbit import constellation, files, operations
+from microrad.orbit.propagation import mean_elements
 
 FILE = load_mission(Path(__file__).resolve().parents[1] / "missions" / "leo-geo.toml")
 DAY_S = 86400.0
@@ -93,12 +94,12 @@ def beside_skyfield() -> None:
     """Passes over one station in a week, from the same element set."""
     scale = load.timescale(builtin=True)
     satellite, place = EarthSatellite(*ISS, "ISS", scale), wgs84.latlon(67.86, 20.96, 400.0)
-    epoch = orbit.Epoch.from_text("2019-12-10T00:00:00Z")
+    epoch = orbit.Epoch("2019-12-10T00:00:00Z")
     station = orbit.Station("station", np.radians(67.86), np.radians(20.96), 400.0, 0.0)
     with tempfile.TemporaryDirectory() as folder:
         elements = Path(folder) / "iss.tle"
         elements.write_text("ISS\n" + "\n".join(ISS) + "\n", encoding="ascii")
-        own = orbit.sgp4_orbit(orbit.read_elements(elements)[0], epoch)
+        own = mean_elements.Sgp4Orbit(files.read_elements(elements)[0], epoch)
     begin, end = scale.utc(2019, 12, 10), scale.utc(2019, 12, 17)
     peer = seconds(lambda: satellite.find_events(place, begin, end, altitude_degrees=0.0), 3)
     ours = seconds(lambda: orbit.passes(own, station, epoch, (0.0, 7 * DAY_S)), 3)

@@ -20,6 +20,8 @@ from scipy.integrate import quad
 from scipy.special import j0, j1
 
 from microrad import link
+from microrad.link import beams, gains
+from microrad.link.budget import assembly
 from microrad.link.gains import dbm, photon_energy_j, watt
 from microrad.mission.file import load_mission
 from microrad.mission.model import Mission
@@ -30,7 +32,7 @@ FILE = load_mission(Path(__file__).resolve().parents[1] / "missions" / "paper.to
 PAPER = FILE.mission
 ERROR_RAD = 10e-6  # required of the paper's fine pointing
 TO_INSTALL = "not installed: pip install ogs-linkbudget-live"
-BEST = link.BEST_TRUNCATION
+BEST = beams.BEST_TRUNCATION
 TARGET_S = 0.1
 
 
@@ -239,7 +241,7 @@ def paper_chain() -> Chain:
         transmit_aperture_m=terminals.leo_aperture_m,
         receive_aperture_m=terminals.geo_aperture_m,
         distance_m=beam.distance_m,
-        transmit_efficiency=10 ** (-link.strehl_db(beam, "decibel") / 10),
+        transmit_efficiency=10 ** (-assembly.strehl_db(beam, "decibel") / 10),
         receive_efficiency=1.0,
         transmit_error_rad=ERROR_RAD,
         receive_error_rad=0.0,
@@ -295,8 +297,8 @@ def term_rows() -> list[Row]:
     """Terms on their own: microrad's default reading against the others, 5 cm, 1.55 um, 10 urad."""
     c = paper_chain()
     d, wavelength = c.transmit_aperture_m, c.wavelength_m
-    gain = link.aperture_gain_db(d, wavelength)
-    loss = float(link.pointing_loss_db(ERROR_RAD, d, wavelength, "gaussian"))
+    gain = gains.aperture_gain_db(d, wavelength)
+    loss = float(gains.pointing_loss_db(ERROR_RAD, d, wavelength, "gaussian"))
     uniform = mathworks(c)["Transmit gain"]
     uncut = 10 * math.log10(8 / (wavelength / (math.pi * d / 2)) ** 2)
     cut, best = (uniform + cut_gaussian_gain_db(each) for each in (1.0, BEST))
@@ -318,7 +320,9 @@ def term_rows() -> list[Row]:
         Row("Loss: receive side, fibre, exact", 0.0, fibre, "single-mode: belongs into receive_optics_loss"),
         Row("Gain less loss: even light", gain - loss, uniform - disc, "microrad's default is the lower one"),
         Row("Gain less loss: best Gaussian", gain - loss, best - best_loss, "and here"),
-        Row("Loss: Strehl 0.4 as a ratio", link.strehl_loss_db(0.4, "decibel"), -10 * math.log10(0.4), "paper: 0.4 dB"),
+        Row(
+            "Loss: Strehl 0.4 as a ratio", gains.strehl_loss_db(0.4, "decibel"), -10 * math.log10(0.4), "paper: 0.4 dB"
+        ),
     ]
 
 
@@ -340,7 +344,7 @@ def package_rows() -> list[Row]:
     config.satellite_a.jitter_sigma_rad = config.satellite_b.jitter_sigma_rad = 0.0
     config.satellite_a.aperture_diameter_m, config.link.boresight_bias_rad = d, ERROR_RAD
     run = run_continuous(config, 1.0, 0.5, "Rician")
-    default = float(link.pointing_loss_db(ERROR_RAD, d, wavelength, "gaussian"))
+    default = float(gains.pointing_loss_db(ERROR_RAD, d, wavelength, "gaussian"))
     return [
         Row("Free space", space, -snapshot.path_loss_db),
         Row("Margin", margin(ours), snapshot.margin_db, "as MathWorks: both pointing terms"),
@@ -413,7 +417,7 @@ def in_numpy(mission: Mission) -> np.ndarray:
     beam, terminals = mission.communication, mission.terminals
     gain, receive = ((math.pi * each / beam.wavelength_m) ** 2 for each in terminals_m(terminals))
     space = (4 * math.pi * beam.distance_m / beam.wavelength_m) ** 2
-    on_axis = 10 * math.log10(beam.transmit_power_w * gain * receive / space) - link.strehl_db(beam, "decibel")
+    on_axis = 10 * math.log10(beam.transmit_power_w * gain * receive / space) - assembly.strehl_db(beam, "decibel")
     energy = photon_energy_j(beam.wavelength_m) * (beam.receiver_sensitivity_photon_bit or math.nan)
     required = 10 * np.log10(energy * RATES_BIT_S)
     margins: np.ndarray = (on_axis - required)[:, None] - (10 / math.log(10) * gain / 2 * ERRORS_RAD**2)[None, :]
@@ -430,7 +434,9 @@ def in_a_loop(mission: Mission, rows: int) -> np.ndarray:
             gain = (math.pi * transmit_m / beam.wavelength_m) ** 2
             receive = (math.pi * receive_m / beam.wavelength_m) ** 2
             space = (4 * math.pi * beam.distance_m / beam.wavelength_m) ** 2
-            received = 10 * math.log10(beam.transmit_power_w * gain * receive / space) - link.strehl_db(beam, "decibel")
+            received = 10 * math.log10(beam.transmit_power_w * gain * receive / space) - assembly.strehl_db(
+                beam, "decibel"
+            )
             lost = 10 / math.log(10) * gain / 2 * error**2
             needed = photon_energy_j(beam.wavelength_m) * (beam.receiver_sensitivity_photon_bit or math.nan) * rate
             cells.append(received - lost - 10 * math.log10(needed))

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from microrad import load_mission, mirror
-from microrad.link.tracking_light import tracking_light_w
+from microrad.link import tracking_light_w
 from microrad.loop import fine_pointing, paper_cases
 from microrad.study import alternatives
 
@@ -15,4 +15,4 @@ for name in ("PI", "LQG"):
 cases = paper_cases.of(file.mission, mirrors)
 paper_cases.hysteresis_loops(cases)
 runs = paper_cases.tracking_runs(cases)
-alternatives.others(file.mission, paper_cases.worst(runs, file.mission.requirement.residual_statistic))
+alternatives.other_readings(file.mission, paper_cases.worst(runs, file.mission.requirement.residual_statistic))

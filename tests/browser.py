@@ -121,7 +121,9 @@ def browser():
         pytest.skip("Chromium is not installed")
     api.expect.set_options(timeout=HANG_MS)
     with api.sync_playwright() as play:
-        found = play.chromium.launch(executable_path=program, args=["--no-sandbox"])
+        # Few processes: a browser for one studio needs none of a renderer's own for each tab, nor one for the pictures.
+        few = ["--in-process-gpu", "--process-per-site", "--renderer-process-limit=1"]
+        found = play.chromium.launch(executable_path=program, args=["--no-sandbox", *few])
         yield found
         found.close()
 

@@ -36,26 +36,42 @@ if os.environ.get("HYPOTHESIS_PROFILE", "gate") == "gate":
 LONGEST = (
     "test_studio_browser.py",
     "test_campaign_run.py",
+    "test_selection.py",
     "test_campaign_cluster.py",
-    "test_study.py",
-    "test_report_browser.py",
-    "test_campaign_engines.py",
     "test_cli.py",
     "test_docs_gallery.py",
-    "test_studio_bench_browser.py",
-    "test_studio_jobs.py",
-    "test_studio_design_browser.py",
+    "test_report_browser.py",
+    "test_study.py",
     "test_export_flight.py",
-    "test_selection.py",
-    "test_linear_model.py",
-    "test_report.py",
-    "test_reproduce.py",
-    "test_tuning.py",
-    "test_report_campaign.py",
-    "test_kept_study.py",
-    "test_campaign_ledger.py",
+    "test_studio_jobs.py",
     "test_studio_pages_closed.py",
+    "test_campaign_optimise.py",
+    "test_report.py",
+    "test_studio_bench_browser.py",
+    "test_tuning.py",
+    "test_studio_design_browser.py",
+    "test_export_fmu.py",
+    "test_docs_campaigns.py",
+    "test_identify.py",
     "test_kernels.py",
+    "test_stiffness.py",
+    "test_campaign_export.py",
+    "test_docs_report.py",
+    "test_campaign_engines.py",
+    "test_export_fixed.py",
+    "test_linear_model.py",
+    "test_cli_day.py",
+    "test_reproduce.py",
+    "test_kept_study.py",
+    "test_fine_pointing.py",
+    "test_fine_loop.py",
+    "test_day_study.py",
+    "test_export_operations.py",
+    "test_studio_commands.py",
+    "test_link_study.py",
+    "test_studio_server.py",
+    "test_campaign_ledger.py",
+    "test_mission.py",
 )
 """Files that processes are handed first: none of them is left with a long one when the others have ended."""
 
@@ -73,11 +89,17 @@ def pytest_collection_modifyitems(config, items):
 def pytest_configure(config):
     shared.begin(config)
     waiting.told = os.dup(2)  # before what tests write is taken in
+    if not hasattr(config, "workerinput") and config.getoption("numprocesses", None):
+        waiting.end_all_later()  # this process has no tests of its own
     gc.disable()  # while modules and tests are read: none of that is garbage
 
 
 def pytest_collection_finish():
-    """From here on there may be garbage, which clusters need to have found: it ends what closed workers still hold."""
+    """From here on there may be garbage, which clusters need to have found: it ends what closed workers still hold.
+
+    What is there by now stays: nobody looks through it again.
+    """
+    gc.freeze()
     gc.enable()
 
 
@@ -100,17 +122,19 @@ def folder(tmp_path, monkeypatch):
 @pytest.fixture
 def undrawn(monkeypatch):
     """Reports without figures; `test_init_then_run` and `test_identify_prints_both_models…` draw them."""
-    from microrad.report import (  # not for every file of tests
-        day_plots,
-        figures,
-        identification_figures,
-        link_figures,
-        paper_bench,
-    )
+    from microrad.report.day import figures as day
+    from microrad.report.identification import page as identification
+    from microrad.report.links import figures as links
+    from microrad.report.paper import bench, figures
 
-    for module in (day_plots, figures, link_figures, paper_bench):
-        monkeypatch.setattr(module, "draw", lambda *args: ())
-    monkeypatch.setattr(identification_figures, "draw", lambda *args, **more: {})
+    for module, name in (
+        (day, "day_figures"),
+        (figures, "paper_figures"),
+        (links, "link_figures"),
+        (bench, "bench_figures"),
+    ):
+        monkeypatch.setattr(module, name, lambda *args: ())
+    monkeypatch.setattr(identification, "identification_figures", lambda *args, **more: {})
 
 
 @pytest.fixture

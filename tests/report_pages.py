@@ -4,7 +4,7 @@ import re
 from collections import Counter
 from html.parser import HTMLParser
 
-from microrad.report import scripts
+from microrad.report.page import templates as scripts
 
 
 def without_scripts(page):

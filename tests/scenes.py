@@ -1,7 +1,7 @@
 """The parts of a mission's loops, as a study assembles them."""
 
 from microrad import mirror
-from microrad.link.tracking_light import tracking_light_w
+from microrad.link import tracking_light_w
 from microrad.loop import fine_pointing, paper_cases
 
 

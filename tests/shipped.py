@@ -6,7 +6,7 @@ import pytest
 
 from microrad import report
 from microrad.mission.file import load_mission
-from microrad.study import story as study
+from microrad.study import study
 from places import ROOT
 from shared import once
 
@@ -36,7 +36,9 @@ def without_day(text):
 def whole_study():
     """The whole study of the shipped mission, and what it said of its progress; once for all tests."""
     said = []
-    return once("whole study", lambda: (study.run(load_mission(SHIPPED), lambda *message: said.append(message)), said))
+    return once(
+        "whole study", lambda: (study.run_study(load_mission(SHIPPED), lambda *message: said.append(message)), said)
+    )
 
 
 @cache
@@ -46,7 +48,7 @@ def plain_study():
     def run():
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(study.fine_pointing, "run", lambda *args, **more: None)
-            return study.run(load_mission(SHIPPED))
+            return study.run_study(load_mission(SHIPPED))
 
     return once("plain study", run)
 
@@ -54,13 +56,13 @@ def plain_study():
 @cache
 def whole_drawn():
     """The figures of the whole study as its page holds them; once for all tests."""
-    return once("whole drawn", lambda: report.draw(whole_study()[0]))
+    return once("whole drawn", lambda: report.study_figures(whole_study()[0]))
 
 
 @cache
 def plain_drawn():
     """The figures of that study as its page holds them; once for all tests."""
-    return once("plain drawn", lambda: report.draw(plain_study()))
+    return once("plain drawn", lambda: report.study_figures(plain_study()))
 
 
 def edited_file(folder, *changes, whole=False, day=True):

@@ -8,7 +8,7 @@ import shutil
 
 import pytest
 
-from microrad.study import story as study
+from microrad.study import study
 from places import TESTS
 from shared import found_once
 from shipped import SHIPPED
@@ -28,7 +28,7 @@ READS = {
     "reports": ("reproduce", "{file}", "--json"),
 }
 """The public command that reads each kind."""
-STUDY = found_once(study.run)
+STUDY = found_once(study.run_study)
 
 
 def read(path, folder, call):
@@ -48,7 +48,7 @@ def reads_or_says_how_to_migrate(done):
 @pytest.fixture
 def once(monkeypatch):
     """A mission is studied once, whatever carries it."""
-    monkeypatch.setattr(study, "run", STUDY)
+    monkeypatch.setattr(study, "run_study", STUDY)
 
 
 @pytest.mark.usefixtures("once", "undrawn", "rows_here")

@@ -17,7 +17,7 @@ from microrad.lab.bench.play import BenchError
 from microrad.loop import disturbance
 from microrad.mission import file as mission_file
 from microrad.mission.file import MissionError
-from microrad.report import carried
+from microrad.report.results import manifest_reader
 from microrad.studio.draft.draft import Draft, DraftError
 from microrad.studio.session import Session
 from microrad.studio.views import compare as compare_view
@@ -55,8 +55,18 @@ def of_campaign(path):
     ("name", "read", "refusal", "words"),
     [
         ("table.csv", disturbance.read_table, ValueError, f"cannot be read as text \\({MISSING}\\); save it as CSV"),
-        ("report.html", carried.read, carried.ReproduceError, f"cannot be read: {MISSING}; name a report.html"),
-        ("manifest.json", carried.read, carried.ReproduceError, f"cannot be read: {MISSING}; name a report.html"),
+        (
+            "report.html",
+            manifest_reader.read_manifest,
+            manifest_reader.ReproduceError,
+            f"cannot be read: {MISSING}; name a report.html",
+        ),
+        (
+            "manifest.json",
+            manifest_reader.read_manifest,
+            manifest_reader.ReproduceError,
+            f"cannot be read: {MISSING}; name a report.html",
+        ),
         ("model.mat", matlab.load, ExportError, f"cannot be read \\({MISSING}\\); check the path"),
         ("m.toml", Draft.open, MissionError, f"cannot be read: {MISSING}"),
         ("m.toml", lambda path: Draft.shipped(path).save(), DraftError, "cannot be written: it is no file on disk"),
@@ -65,7 +75,12 @@ def of_campaign(path):
         ("page.html", lambda p: frame.check_target(p, "choose another", "<!"), BlockingIOError, MISSING),
         ("page.html", lambda p: cli_campaign._check_output(p, True), BlockingIOError, MISSING),
         ("model.mat", lambda p: cli_export._check_file(p, True, b"MATLAB"), BlockingIOError, MISSING),
-        ("a.csv", lambda p: carried.held(carried.Carried(p, {}, ""), p.name), BlockingIOError, MISSING),
+        (
+            "a.csv",
+            lambda p: manifest_reader.content_beside(manifest_reader.ReadManifest(p, {}, ""), p.name),
+            BlockingIOError,
+            MISSING,
+        ),
         ("m.toml", lambda p: bundle.mission_sha256(of_campaign(p)), BlockingIOError, MISSING),
     ],
 )

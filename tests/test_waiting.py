@@ -1,11 +1,13 @@
 """The tests themselves: none measures time, and none has a limit of its own for what may take long."""
 
 import ast
+import subprocess
+import sys
 
 import pytest
 
 import waiting
-from places import TESTS
+from places import ROOT, TESTS
 
 CLOCKS = {"perf_counter", "monotonic", "process_time", "thread_time", "perf_counter_ns", "monotonic_ns", "timeit"}
 LIMITED = {
@@ -100,3 +102,32 @@ def test_what_never_happens_fails_with_what_was_waited_for(monkeypatch):
     with pytest.raises(pytest.fail.Exception, match="waited in vain for rain"):
         waiting.until(lambda: False, "rain")
     assert waiting.until(lambda: "rain", "rain") == "rain"
+
+
+# ---------------------------------------------------------------------------------------------------- what hangs all
+OF_MAKE = ROOT.joinpath("Makefile").read_text("utf-8").partition("SIDE_BY_SIDE := ")[2].partition("\n")[0].split()
+
+
+def all_tests(folder, **texts):
+    """A run of all tests of a folder, as `make unit` begins it; exit code and what was said."""
+    for name, text in texts.items():
+        (folder / f"{name}.py").write_text(text, "utf-8")
+    command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", *OF_MAKE, "."]
+    ran = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=waiting.HANG_S, check=False)
+    return ran.returncode, ran.stdout + ran.stderr
+
+
+@pytest.mark.endurance
+def test_a_process_of_tests_that_crashes_ends_the_run(tmp_path):
+    fine = "import time\ndef test_one(): time.sleep(0.1)\ndef test_two(): time.sleep(0.1)\n"
+    bad = "import os\ndef test_bad(): os.abort()\ndef test_behind(): pass\n"
+    code, said = all_tests(tmp_path, test_a=bad, **{f"test_{name}": fine for name in "bcdefg"})
+    assert code == 1 and "crashed while running 'test_a.py::test_bad'" in said
+
+
+@pytest.mark.endurance
+def test_a_run_of_all_tests_that_does_not_end_is_ended(tmp_path):
+    limit = f"import sys\nsys.path.insert(0, {str(TESTS)!r})\nimport waiting\nwaiting.ALL_S = 0.25\n"
+    limit += "def pytest_configure(config):\n    if not hasattr(config, 'workerinput'): waiting.end_all_later()\n"
+    code, said = all_tests(tmp_path, conftest=limit, test_a="import time\ndef test_long(): time.sleep(86400)\n")
+    assert code == 1 and "Timeout (0:00:01)!" in said

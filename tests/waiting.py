@@ -4,6 +4,7 @@ No test asserts how long something took. `test_waiting.py` holds the other files
 """
 
 import faulthandler
+import os
 import threading
 import time
 from contextlib import contextmanager
@@ -14,6 +15,8 @@ import pytest
 HANG_S = 300.0
 """What has not happened after this time (s) never will, on a machine with other work to do, too."""
 HANG_MS = 1000.0 * HANG_S
+ALL_S = 2 * 3600.0
+"""What a run of all tests may take (s), on a busy machine, too; four times as long with all repetitions."""
 _LOOK_S = 0.02
 
 
@@ -80,3 +83,9 @@ def no_hang():
         yield
     finally:
         faulthandler.cancel_dump_traceback_later()
+
+
+def end_all_later():
+    """End this process, and say where it is, when it has not ended by itself after `ALL_S`: a gate that hangs fails."""
+    most_s = ALL_S * (4 if os.environ.get("MICRORAD_ENDURANCE") else 1)
+    faulthandler.dump_traceback_later(most_s, exit=True, file=told)

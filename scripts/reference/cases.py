@@ -4,6 +4,7 @@ Nothing is imported from microrad: code that moves between modules leaves the ca
 """
 
 import csv
+import functools
 import json
 import os
 import re
@@ -189,11 +190,18 @@ GIVEN = {
 """What is given where a preset says "unknown": any value, for the sums to go through."""
 
 
+@functools.cache
+def listed_presets() -> Any:
+    """What the command line lists, asked once for all presets."""
+    with tempfile.TemporaryDirectory(prefix="microrad-numbers-") as folder:
+        return Place(Path(folder)).json("presets")
+
+
 def preset(name: str) -> Callable[[Place], Any]:
     """The budget of a preset with `GIVEN` in its gaps, and which gaps it has."""
 
     def measure(place: Place) -> Any:
-        (listed,) = (each for each in place.json("presets") if each["name"] == name)
+        (listed,) = (each for each in listed_presets() if each["name"] == name)
         place.run("init", "--preset", name, "preset.toml")
         text = filled((place.folder / "preset.toml").read_text(encoding="utf-8"))
         return {"unknown": listed["unknown"], "budget": place.json("budget", place.write("given.toml", text))}

@@ -20,7 +20,7 @@ from microrad.lab.recording import read_recording
 from microrad.lab.recording import recording_from_arrays
 from microrad.link import LinkError
 from microrad.link.study import LinkStudy
-from microrad.link.study import run as run_link_study
+from microrad.link.study import run_link_study
 from microrad.mission.file import LinkFile
 from microrad.mission.file import MissionError
 from microrad.mission.file import MissionFile
@@ -30,16 +30,16 @@ from microrad.mission.file import load_mission
 from microrad.mission.model import mission_schema
 from microrad.orbit import OrbitError
 from microrad.orbit.constellation import ConstellationPlan
-from microrad.orbit.constellation import run as run_constellation
+from microrad.orbit.constellation import run_constellation
 from microrad.orbit.day import DayStudy
 from microrad.orbit.day import PointingLoss
-from microrad.orbit.day import run as run_day_study
+from microrad.orbit.day import run_day_study
 from microrad.orbit.operations import OperationsError
 from microrad.report import summary
 from microrad.report import verdict_text
 from microrad.report import write as write_report
-from microrad.study.story import Study
-from microrad.study.story import run as run_study
+from microrad.study.study import Study
+from microrad.study.study import run_study
 
 __all__ = [
     "load_mission",

@@ -15,7 +15,7 @@ import pytest
 
 from microrad.campaign.engines import cluster
 from microrad.campaign.engines.cluster import DaskEngine
-from microrad.campaign.engines.threads import Flight, JobQueue, late_flights
+from microrad.campaign.engines.flights import Flight, JobQueue, late_flights
 from microrad.campaign.records import CampaignError, Job
 from small_campaign import import_path, killing
 from small_campaign import kill as kill_process
@@ -200,7 +200,7 @@ def test_a_worker_that_was_given_up_is_started_anew(engine):
     assert nanny not in own.workers.values()
 
 
-@pytest.mark.parametrize("deed", ["endless", "hog"])
+@pytest.mark.parametrize("deed", [pytest.param("endless", marks=pytest.mark.endurance), "hog"])
 def test_close_stops_at_once_whatever_runs_and_leaves_nothing(deed, tmp_path, monkeypatch):
     """At once: its workers are killed before anything is waited for; what they do has no end of its own."""
     table = {"else": f"{deed} {tmp_path}/begun", "0": "work"}

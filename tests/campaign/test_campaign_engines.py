@@ -14,8 +14,9 @@ from types import SimpleNamespace
 import psutil
 import pytest
 
-from microrad.campaign.engines import threads
-from microrad.campaign.engines.threads import Clock, Flight, LocalEngine, late_flights
+from microrad.campaign.engines import flights
+from microrad.campaign.engines.flights import Clock, Flight, late_flights
+from microrad.campaign.engines.threads import LocalEngine
 from microrad.campaign.engines.worker import Beat
 from microrad.campaign.records import CampaignError, Job
 from small_campaign import hears_ctrl_c, import_path, killing
@@ -292,7 +293,6 @@ def test_a_caller_that_goes_away_leaves_nothing_running(engine):
 # ------------------------------------------------------------------------------------------- the parent's own end
 PARENT = """
 import sys
-from microrad.campaign.engines import threads
 from microrad.campaign.engines.threads import LocalEngine
 from microrad.campaign.records import Job
 engine = LocalEngine(sys.argv[1].encode(), "campaign_target:open_work", 2, float(sys.argv[2]))
@@ -375,7 +375,7 @@ def test_a_campaign_stopped_for_a_while_calls_only_that_late_which_is(
             worker.resume()
         end.touch()
 
-    monkeypatch.setattr(threads, "time", SimpleNamespace(monotonic=monotonic))
+    monkeypatch.setattr(flights, "time", SimpleNamespace(monotonic=monotonic))
     own = f" {end}" if deed == "quiet" else ""
     one = engine(f'{{"2": "{deed} {begun}{own}"}}', late_s=late_s)
     halted = beside(halt)
@@ -441,7 +441,7 @@ def test_beats_are_told_at_once_and_then_not_too_often():
 
 def test_a_clock_counts_seconds_awake(monkeypatch):
     times = iter([5.0, 5.1, 5.25, 1005.25, 1005.3])  # a halt of 1000 s is in it
-    monkeypatch.setattr(threads, "time", SimpleNamespace(monotonic=lambda: next(times, 1005.3)))
+    monkeypatch.setattr(flights, "time", SimpleNamespace(monotonic=lambda: next(times, 1005.3)))
     clock = Clock()
     until(lambda: clock.now() > 0.49, "the last of these times")
     clock.close()

@@ -13,14 +13,16 @@ from microrad.campaign.export import export_rows
 from microrad.campaign.file import load_campaign
 from microrad.campaign.ledger import Ledger
 from microrad.campaign.records import CampaignError
-from microrad.campaign.rows import plan
 from microrad.campaign.rows.evaluator import Evaluator
 from microrad.campaign.rows.missions import MissionBuilder
+from microrad.campaign.rows.plan import planned
 from microrad.campaign.statistics.summary import summarise_campaign
 from microrad.core import reads
-from microrad.link import LitAperture, radial_error, under_jitter
-from microrad.link.inputs import LINK_TABLES
-from microrad.link.under_jitter import Exposure
+from microrad.link.beams import LitAperture
+from microrad.link.pointing import outage as under_jitter
+from microrad.link.pointing import radial_error
+from microrad.link.pointing.outage import Exposure
+from microrad.link.variation import LINK_TABLES
 from microrad.mission.fields import Several
 from microrad.mission.file import load_link, open_mission
 from microrad.mission.toml import MissionError
@@ -244,13 +246,15 @@ def content(book):
 def test_chunks_are_cut_to_what_a_row_costs(tmp_path):
     mission(tmp_path, "gallery")
     campaign = loaded(tmp_path, "gallery", DRAWN, EVEN.replace("64", "4096"))
-    assert plan.is_timed(campaign) and plan.planned(campaign).chunk_rows == 1024
-    sizes = {row_s: plan.planned(plan.timed(campaign, row_s)).chunk_rows for row_s in (0.0, 1e-4, 0.01, 0.1, 0.9, 5.0)}
+    whole = planned(campaign)
+    assert whole.is_timed and whole.chunk_rows == 1024
+    sizes = {row_s: whole.timed_chunk(row_s) for row_s in (0.0, 1e-4, 0.01, 0.1, 0.9, 5.0)}
     assert sizes == {0.0: 1024, 1e-4: 1024, 0.01: 128, 0.1: 16, 0.9: 2, 5.0: 1}
-    assert plan.planned(plan.timed(campaign, 0.1)).rows_of(3) == range(48, 64)
+    timed = planned(replace(campaign, chunk_rows=whole.timed_chunk(0.1)))
+    assert timed.rows_of(3) == range(48, 64)
     precise = '[precision]\noutput = "margin"\nquantile = 0.1\nhalf_width = "1 dB"\nconfidence = 0.9\nat_most = 9999\n'
     campaign = loaded(tmp_path, "gallery", DRAWN + precise, EVEN.replace("64", "4096"))
-    assert plan.planned(plan.timed(campaign, 0.1)).rounds == plan.planned(campaign).rounds
+    assert timed.rounds == whole.rounds
 
 
 def test_a_row_costs_the_mean_of_some_without_the_first(tmp_path):

@@ -15,7 +15,7 @@ from microrad.campaign.optimisation.search import optimise
 from microrad.campaign.records import CampaignError, Limit
 from microrad.mission.file import load_link
 from microrad.mission.presets import preset_text
-from microrad.report import campaign_optimum
+from microrad.report.campaign.optimum import fresh_rows_sentence, optimum_data, optimum_text
 
 MARGIN = Limit("margin", 3.0, None, "test")
 ANSWER = Limit("answer_margin", 3.0, None, "test")
@@ -363,7 +363,7 @@ def test_an_optimum_that_leans_on_its_rows_is_told():
     assert found.feasible and not found.confirmed and found.warnings == ()
     share = found.fresh.kept[0].share
     assert share.high < 0.99
-    headline, said = campaign_optimum.text(found).splitlines()[:2]
+    headline, said = optimum_text(found).splitlines()[:2]
     assert headline == (
         f"NOT CONFIRMED: least x0: {found.best.cost:.3g}, with each limit kept by at least 99 % of the searched rows"
     )
@@ -373,7 +373,7 @@ def test_an_optimum_that_leans_on_its_rows_is_told():
     )
     good = optimise(problem(), rising(), rising(rows=400, seed=5, spread=0.9), quiet)
     assert good.confirmed and good.fresh.feasible
-    assert campaign_optimum.text(good).splitlines()[1] == "Fresh rows agree."
+    assert optimum_text(good).splitlines()[1] == "Fresh rows agree."
 
 
 def test_fresh_rows_that_fall_short_by_chance_agree_within_their_interval():
@@ -381,7 +381,7 @@ def test_fresh_rows_that_fall_short_by_chance_agree_within_their_interval():
     share = found.fresh.kept[0].share
     assert share.value < 0.99 < share.high
     assert not found.fresh.feasible and found.confirmed
-    headline, said = campaign_optimum.text(found).splitlines()[:2]
+    headline, said = optimum_text(found).splitlines()[:2]
     assert headline.startswith("least x0: ")
     assert said == (
         f"Fresh rows keep margin ≥ 3 dB in {100 * share.value:.4g} % ({100 * share.low:.4g} to "
@@ -411,14 +411,14 @@ def test_fresh_rows_that_cannot_be_drawn_leave_the_optimum():
     assert found.feasible and found.fresh is None
     assert found.warnings == ("the optimum could not be checked with fresh rows: row 7 is no mission",)
     assert not found.confirmed
-    assert campaign_optimum.text(found).splitlines()[1] == "It has not been checked with fresh rows."
+    assert optimum_text(found).splitlines()[1] == "It has not been checked with fresh rows."
 
 
 def test_fresh_rows_that_all_fail_refuse_the_optimum():
     asked = problem(minimise="-margin", limits=())
     found = optimise(asked, rising(), lambda x: {"margin": np.full(400, np.nan)}, quiet)
     assert found.feasible and not found.confirmed
-    assert campaign_optimum.text(found).splitlines()[1] == "Fresh rows refuse it: no row has a margin."
+    assert optimum_text(found).splitlines()[1] == "Fresh rows refuse it: no row has a margin."
     assert optimise(asked, rising(), rising(seed=1), quiet).confirmed
 
 
@@ -537,7 +537,7 @@ def test_infinite_outputs_do_not_lead_astray():
 def test_the_text_heads_its_columns_and_says_what_each_number_is():
     found = optimise(problem(confidence=0.9), rising(), rising(seed=1), quiet)
     best, fresh = found.best.kept[0], found.fresh.kept[0]
-    lines = [line.split("  ") for line in campaign_optimum.text(found).splitlines()]
+    lines = [line.split("  ") for line in optimum_text(found).splitlines()]
     rows = [[cell.strip() for cell in line if cell.strip()] for line in lines]
     assert ["variable", "value", "searched range"] in rows
     assert ["x0", f"{found.best.cost:.3g}", "0 to 1"] in rows
@@ -548,13 +548,13 @@ def test_the_text_heads_its_columns_and_says_what_each_number_is():
     assert rows[at + 3] == ["deciding row: no row is worse but the 10 % that may miss the limit."]
     assert rows[at + 4] == ["90 % (optimise.confidence) is the share of the rows that is to keep each limit."]
     # columns stand below each other
-    table = campaign_optimum.text(found).splitlines()[at : at + 3]
+    table = optimum_text(found).splitlines()[at : at + 3]
     assert len({line.index(word) for line, word in zip(table, ("rows", "searched", "fresh"), strict=True)}) == 1
 
 
 def test_the_text_says_which_statistic_an_output_as_cost_is():
     def said(**changes):
-        return campaign_optimum.text(optimise(problem(limits=(), **changes), rising(), rising(seed=1), quiet))
+        return optimum_text(optimise(problem(limits=(), **changes), rising(), rising(seed=1), quiet))
 
     mean = said(minimise="-margin")
     assert mean.startswith("largest margin (mean over the rows): ")
@@ -566,17 +566,17 @@ def test_the_text_says_which_statistic_an_output_as_cost_is():
 
 def test_a_deciding_row_that_failed_is_called_so():
     found = optimise(problem(), lambda x: {"margin": np.full(400, np.nan)}, never, quiet)
-    assert re.search(r"\nmargin ≥ 3 dB  searched  failed  +0 %", campaign_optimum.text(found))
-    assert campaign_optimum.text(found).startswith("NO DESIGN KEEPS THE LIMITS: ")
-    assert "nan" not in campaign_optimum.text(found)
+    assert re.search(r"\nmargin ≥ 3 dB  searched  failed  +0 %", optimum_text(found))
+    assert optimum_text(found).startswith("NO DESIGN KEEPS THE LIMITS: ")
+    assert "nan" not in optimum_text(found)
 
 
 def test_data_has_the_check():
     found = optimise(problem(), rising(), rising(seed=5, spread=1.1), quiet)
-    data = campaign_optimum.data(found)
+    data = optimum_data(found)
     assert data["confirmed"] is True and data["fresh"]["feasible"] is False
-    assert data["check"] == campaign_optimum.check(found)
-    none = campaign_optimum.data(optimise(problem(), rising(slope=1.0), never, quiet))
+    assert data["check"] == fresh_rows_sentence(found)
+    none = optimum_data(optimise(problem(), rising(slope=1.0), never, quiet))
     assert none["confirmed"] is False and none["check"] == ""
 
 

@@ -18,12 +18,13 @@ from microrad.campaign.file import load_campaign
 from microrad.campaign.ledger import Ledger, chunk_format, mending
 from microrad.campaign.ledger.file import is_written
 from microrad.campaign.records import CampaignError, Job, Outcome
-from microrad.campaign.rows import evaluate, plan
+from microrad.campaign.rows import evaluate
 from microrad.campaign.rows.evaluator import Evaluator
 from microrad.campaign.rows.loops import controllers
+from microrad.campaign.rows.plan import planned
 from microrad.campaign.statistics.summary import is_precise, summarise_campaign
 from microrad.core import kernels
-from small_campaign import campaign_file, children, finished, halted, halting, kill, started
+from small_campaign import campaign_file, children, finished, halted, halting, kill, started, without_worker
 from waiting import HANG_S, any_moment, gone, until
 
 OFTEN = bool(os.environ.get("MICRORAD_ENDURANCE"))
@@ -47,8 +48,8 @@ def table(book):
 
 def whole(book, campaign):
     """That every chunk is in once, with a right checksum."""
-    cells, planned = range(len(campaign.cells)), plan.planned(campaign)
-    jobs = [(job.cell, job.number) for cell in cells for job in planned.chunks(cell, campaign.rows)]
+    cells, plan = range(len(campaign.cells)), planned(campaign)
+    jobs = [(job.cell, job.number) for cell in cells for job in plan.chunks(cell, campaign.rows)]
     with Ledger.open(book, write=False) as opened:
         assert opened.done() == set(jobs)
     with sqlite3.connect(book) as raw:
@@ -61,8 +62,11 @@ def long(tmp_path_factory):
     """A campaign of 32 chunks, and the table of an undisturbed run."""
     folder = tmp_path_factory.mktemp("long")
     rates = ", ".join(f'"{100 + 10 * i} Mbit/s"' for i in range(16))
-    path = campaign_file(folder, runs=96, duration="0.3 s", more=f'[grid]\n"communication.data_rate" = [{rates}]\n')
-    book = begun(folder)
+    grid = f'[grid]\n"communication.data_rate" = [{rates}]\n'
+    path = campaign_file(folder, runs=96 if OFTEN else 65, duration="0.3 s", more=grid)  # two chunks of a cell
+    with pytest.MonkeyPatch.context() as patch:
+        without_worker(patch)
+        book = begun(folder)
     return path, load_campaign(path), table(book)
 
 
@@ -118,6 +122,7 @@ def test_kills_of_worker_and_parent_change_nothing(call, long, tmp_path):
     assert gone(*dead)
 
 
+@pytest.mark.usefixtures("rows_here")
 def test_ctrl_c_stops_at_once_and_says_how_to_go_on(call, long, tmp_path):
     """At once: of the chunks that workers finish from then on, no more is taken in than the one that was at hand."""
     path, campaign, undisturbed = long
@@ -156,7 +161,7 @@ def test_a_second_process_on_a_ledger_is_refused_and_a_reader_is_not(long, tmp_p
 def short(tmp_path_factory):
     """A campaign of few chunks whose rows have loops of their own, and its table."""
     folder = tmp_path_factory.mktemp("short")
-    path = campaign_file(folder, runs=16, sampling="sobol", duration="2 s", worst=1, more=NOISE + GRID)
+    path = campaign_file(folder, runs=16, sampling="sobol", duration="1.6 s", worst=1, more=NOISE + GRID)
     return path, load_campaign(path), table(begun(folder))
 
 
@@ -175,7 +180,7 @@ GRID = """
 @pytest.mark.parametrize("means", [{"threads": 1}, {"workers": 2 if OFTEN else 1}], ids=["one thread", "dask"])
 def test_one_thread_two_threads_and_dask_workers_give_the_same_bits(short, tmp_path, means):
     path, campaign, undisturbed = short
-    assert len(plan.planned(campaign).chunks(0, campaign.rows)) > 2
+    assert len(planned(campaign).chunks(0, campaign.rows)) > 2
     assert table(begun(tmp_path, path, **means)) == undisturbed
 
 
@@ -212,6 +217,7 @@ def test_cells_have_the_same_draws_and_differ_by_their_value(short):
 
 
 # -------------------------------------------------------------------------------------------------------------- damage
+@pytest.mark.usefixtures("rows_here")
 def test_a_flipped_bit_is_found_and_only_its_chunk_done_again(call, short, tmp_path):
     path, campaign, undisturbed = short
     book = tmp_path / "campaign.ledger"
@@ -235,6 +241,7 @@ def test_a_flipped_bit_is_found_and_only_its_chunk_done_again(call, short, tmp_p
     assert call("campaign", "verify", book).code == 0
 
 
+@pytest.mark.usefixtures("rows_here")
 def test_a_full_disk_stops_it_in_words_and_it_goes_on_once_there_is_room(call, short, tmp_path):
     path, _, undisturbed = short
     disk = tmp_path / "disk"
@@ -357,7 +364,7 @@ class _Fragile:
     def outcomes(self, jobs):
         for job in jobs:
             self.asked.append(job)
-            rows = plan.planned(self.evaluator.campaign).rows_of(job.number)
+            rows = planned(self.evaluator.campaign).rows_of(job.number)
             rows = range(job.row, job.row + 1) if job.kind == "row" else rows
             if job.kind != "trace" and self.deadly in rows:
                 yield Outcome(job, "died", reason="the worker was killed by signal 9")
@@ -373,7 +380,7 @@ class _Fragile:
 def test_a_row_that_takes_its_worker_down_is_found_and_the_rest_of_its_chunk_kept(tmp_path, monkeypatch):
     path = campaign_file(tmp_path, runs=4 * kernels.LANES, duration="10 s")
     campaign = load_campaign(path)
-    rows = plan.planned(campaign).chunk_rows
+    rows = planned(campaign).chunk_rows
     assert campaign.rows > rows
     evaluator = Evaluator(campaign, dict(enumerate(controllers(campaign, _quiet))))
     evaluator = _Cheap(evaluator)
@@ -421,7 +428,7 @@ def test_it_stops_when_the_wanted_quantile_is_known_well_enough(tmp_path):
     found = summarise_campaign(begun(tmp_path, path))
     median = found.cells[0].outputs["margin"].quantiles[0.5]
     campaign = load_campaign(path)
-    rounds = plan.planned(campaign).rounds
+    rounds = planned(campaign).rounds
     assert found.progress.state == "complete" and found.cells[0].rows in rounds[:-1]
     assert (median.high - median.low) / 2.0 <= 0.02
     before = rounds[rounds.index(found.cells[0].rows) - 1] if found.cells[0].rows > rounds[0] else None
@@ -444,7 +451,7 @@ at_most = 1024
 @pytest.mark.parametrize(("width", "rounds_done"), [("1 mrad", 1), ("0.0001 nrad", 0)])
 def test_a_precision_of_the_radial_error_counts_the_time_of_all_rows(tmp_path, width, rounds_done):
     path = campaign_file(tmp_path, runs=256, more=RADIUS.format(width=width))
-    rounds = plan.planned(load_campaign(path)).rounds
+    rounds = planned(load_campaign(path)).rounds
     found = summarise_campaign(begun(tmp_path, path))
     assert found.cells[0].rows == rounds[rounds_done - 1] and len(rounds) > 1
     assert found.progress.state == "complete"

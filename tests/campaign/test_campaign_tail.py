@@ -30,7 +30,9 @@ from microrad.core.threads import in_threads
 from microrad.loop.fine_loop import linear
 from microrad.loop.fine_loop.ensemble import LANES, bin_edges_rad, histogram_quantile
 from microrad.mission.file import load_mission
-from microrad.report import campaign_words
+from microrad.report.campaign import words as campaign_words
+from microrad.report.campaign.data import campaign_data
+from microrad.report.campaign.text import campaign_text
 from microrad.report.quantities import quantity
 from shipped import SHIPPED
 from truths import philox
@@ -241,10 +243,9 @@ class Slow:
         self.folder = folder
         (folder / "mission.toml").write_text(SHIPPED.read_text(encoding="utf-8"), encoding="utf-8")
         campaign = self.campaign("1 s")
-        self.axis = loops.tuned(campaign.mission, campaign.table.loop)
-        loop = loops.row_loop(campaign.mission, campaign.table.loop)
-        held = loops.cell_controller(campaign.mission, campaign.table.loop, self.axis)
-        covariance = importance_sampling.end_covariance(linear.close(loop, held), 5000)
+        own = loops.mission_loop(campaign.mission, campaign.table.loop, campaign.table.seed)
+        self.axis = own.tuned()
+        covariance = importance_sampling.end_covariance(linear.close(own.row, own.controller(self.axis)), 5000)
         assert covariance == pytest.approx(covariance[0, 0] * np.eye(2), abs=1e-9 * covariance[0, 0])
         self.sigma = math.sqrt(covariance[0, 0])
 
@@ -329,11 +330,11 @@ def test_a_campaign_says_how_likely_its_error_is(slow: Slow) -> None:
     assert error == pytest.approx(exact, rel=1e-6)
     assert past.low <= 1e-6 <= past.high < 20.0 * past.low
     radius, likely = campaign_words.tail_sentences(found, cell)
-    assert radius.startswith("The radial error exceeds ") and "with probability 1e-5 (" in radius
+    assert radius.startswith("The radial error exceeds ") and "with probability 10⁻⁵ (" in radius
     said = campaign_words.share(past.value)
     assert likely.startswith(f"The radial error is beyond {quantity(error, 'rad')} with probability {said} (")
-    assert "at 99 % confidence" in likely and likely in campaign_words.text(found, 10_000)
-    (told,) = campaign_words.data(found)["cells"][0]["tail"]["beyond"]
+    assert "at 99 % confidence" in likely and likely in campaign_text(found, 10_000)
+    (told,) = campaign_data(found)["cells"][0]["tail"]["beyond"]
     assert told == {"error_rad": error, **asdict(past), "variance": cell.tail.variance[error]}
     assert f"The variance of that estimate is {told['variance']:.2g}, as of " in likely
     with Ledger.open(book, write=False) as opened:

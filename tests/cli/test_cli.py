@@ -26,8 +26,8 @@ from microrad.cli import frame, installation, lab
 from microrad.lab import identify
 from microrad.loop import control, fine_pointing
 from microrad.loop.fine_pointing import designs
-from microrad.report import identification_figures
-from microrad.study import story as study
+from microrad.report.identification import page as identification
+from microrad.study import study
 from places import ROOT
 from shipped import plain_study, without_day, without_fine_pointing
 from waiting import HANG_S, lines_of, until
@@ -74,7 +74,7 @@ def loop_mirror(tmp_path_factory):
     home = tmp_path_factory.mktemp("identified")
     recording, mirror = write_recording(home / "loop.csv"), home / "loop-mirror.toml"
     with pytest.raises(SystemExit) as stop, pytest.MonkeyPatch.context() as patch:
-        patch.setattr(identification_figures, "draw", lambda *args, **more: {})
+        patch.setattr(identification, "identification_figures", lambda *args, **more: {})
         cli.app(args=["identify", str(recording), *COLUMNS, "--mirror-file", str(mirror)], prog_name="microrad")
     assert not stop.value.code
     return mirror
@@ -299,7 +299,7 @@ def test_run_refuses_missing_and_faulty_files(refused, folder):
 
 
 def test_run_never_replaces_what_it_did_not_write_and_says_so_before_computing(refused, folder, monkeypatch):
-    monkeypatch.setattr(study, "run", lambda *args: pytest.fail("computed first"))
+    monkeypatch.setattr(study, "run_study", lambda *args: pytest.fail("computed first"))
     (folder / "photos").mkdir()
     (folder / "photos" / "a.jpg").write_text("mine")
     for extra in ([], ["--overwrite"]):
@@ -342,7 +342,7 @@ def test_a_cache_folder_that_cannot_be_used_is_told_once_and_the_run_goes_on(cal
     found = plain_study()
     monkeypatch.delenv("MICRORAD_KEEP")
     monkeypatch.setenv("XDG_CACHE_HOME", str(folder / "cache"))
-    monkeypatch.setattr(study, "run", lambda *args: found)
+    monkeypatch.setattr(study, "run_study", lambda *args: found)
     result = call("run", PAPER)
     assert result.code == 1  # of the paper's loop
     assert result.err.count("\n") == 1
@@ -356,7 +356,7 @@ def test_a_cache_folder_that_cannot_be_written_is_told_once_and_the_run_goes_on(
     found, access = plain_study(), os.access
     monkeypatch.delenv("MICRORAD_KEEP")
     monkeypatch.setenv("XDG_CACHE_HOME", str(folder / "cache"))
-    monkeypatch.setattr(study, "run", lambda *args: found)
+    monkeypatch.setattr(study, "run_study", lambda *args: found)
     monkeypatch.setattr(os, "access", lambda path, mode: Path(path).name != "parts" and access(path, mode))
     result = call("run", PAPER)
     place = folder / "cache" / "microrad" / "parts"
@@ -402,7 +402,7 @@ def test_an_unexpected_exception_asks_for_a_report(call, folder, monkeypatch):
     def broken(*args):
         raise RuntimeError("a bolt fell off")
 
-    monkeypatch.setattr(study, "run", broken)
+    monkeypatch.setattr(study, "run_study", broken)
     result = call("run", PAPER)
     assert (result.code, result.out) == (70, "")
     for words in ("Traceback", "a bolt fell off", "microrad doctor", "report the lines above"):
@@ -435,7 +435,7 @@ def interruptible():
 @pytest.mark.usefixtures("interruptible")
 @pytest.mark.parametrize(
     ("name", "package", "module", "function"),
-    [("SIGINT", "microrad.study", "story", "run"), ("SIGTERM", "microrad", "report", "write_columns")],
+    [("SIGINT", "microrad.study", "study", "run_study"), ("SIGTERM", "microrad", "report", "write_columns")],
 )
 def test_an_interrupt_during_run_leaves_nothing(
     folder, loop_mirror, plain, name, package, module, function, tmp_path_factory
@@ -447,7 +447,7 @@ def test_an_interrupt_during_run_leaves_nothing(
     environment = os.environ | {frame.PROGRESS_FILE: str(progress)}
     process = subprocess.Popen(args, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     assert process.stderr.readline() == "here\n"
-    lines_of(progress, 2 if module == "story" else 0)  # the study is in its second step
+    lines_of(progress, 2 if module == "study" else 0)  # the study is in its second step
     process.send_signal(getattr(signal, name))
     out, err = process.communicate(timeout=HANG_S)
     assert (process.returncode, out.startswith("Not every requirement is met: ")) == (130, module == "report"), out
@@ -505,7 +505,7 @@ def test_an_interrupt_behind_another_error_is_an_interrupt(call, folder, monkeyp
         except KeyboardInterrupt:
             raise ImportError("half a module") from None
 
-    monkeypatch.setattr(study, "run", interrupted)
+    monkeypatch.setattr(study, "run_study", interrupted)
     assert call("run", PAPER) == (130, "", "microrad: interrupted, nothing was written\n")
 
 

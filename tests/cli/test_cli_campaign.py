@@ -95,7 +95,7 @@ def test_init_writes_a_campaign_and_its_mission_and_never_overwrites(call, folde
     shown = call("campaign", "init")
     assert (shown.code, sorted(listing(folder))) == (0, ["campaign.toml", "leo-geo.toml"])
     assert shown.out.endswith("Next: microrad campaign run campaign.toml\n")
-    assert len(load_campaign(folder / "campaign.toml").dimensions) == 4  # it can run
+    assert len(load_campaign(folder / "campaign.toml").inputs) == 4  # it can run
     assert "campaign.toml exists and is left as it is" in refused("campaign", "init")
 
 

@@ -35,17 +35,17 @@ MISSIONS = {
     "a share": {"operations.relay_share": 0.5},
 }
 ONCE = (
-    (link_study, found_once(link_study.run)),
-    (day_study, found_once(day_study.run, lambda links: links.file)),
-    (plans, found_once(plans.run)),
+    (link_study, "run_link_study", found_once(link_study.run_link_study)),
+    (day_study, "run_day_study", found_once(day_study.run_day_study, lambda links: links.file)),
+    (plans, "run_constellation", found_once(plans.run_constellation)),
 )
 
 
 @pytest.fixture(autouse=True)
 def once(monkeypatch):
     """Each mission is studied once: these tests read what is said of it, in several forms."""
-    for module, run in ONCE:
-        monkeypatch.setattr(module, "run", run)
+    for module, name, found in ONCE:
+        monkeypatch.setattr(module, name, found)
 
 
 def path_of(folder, *changes):
@@ -308,7 +308,7 @@ def test_the_loss_is_the_jitters_where_the_mission_has_one(call, folder):
     jitter = {"jitter": {"bias": ["1 urad", "0 urad"], "rms": ["3 urad", "3 urad"], "bandwidth": "50 Hz"}}
     path = path_of(folder, jitter)
     data = json.loads(call("contacts", path, "--json").out)
-    found = link_study.run(load_link(path)).under_jitter
+    found = link_study.run_link_study(load_link(path)).under_jitter
     assert (data["pointing_loss_db"], data["outage"]) == (found.outage_loss_db, found.outage)
     assert data["pointing_loss_source"] == "jitter as given"
     plain = json.loads(call("contacts", path_of(folder), "--json").out)

@@ -16,7 +16,7 @@ from microrad import cli
 from microrad.link import study as link_study
 from microrad.mission.file import load_link
 from microrad.mission.presets import preset_text
-from microrad.report import budget_views
+from microrad.report.links.budgets import links_text
 from preset_files import EXAMPLES, NAMES, as_file, statements
 from report_pages import assert_sound, without_scripts
 from shipped import SHIPPED, without_fine_pointing
@@ -29,7 +29,7 @@ FORMS = ((), ("--csv",), ("--json",), ("--html",))
 NO_NUMBER = re.compile(r"\b(nan|inf|NaN|Infinity|None)\b")
 
 
-study_of = link_study.run
+study_of = link_study.run_link_study
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +48,7 @@ def each_study_once(monkeypatch, studies):
             studies[key] = study_of(file)
         return studies[key]
 
-    monkeypatch.setattr(link_study, "run", run)
+    monkeypatch.setattr(link_study, "run_link_study", run)
 
 
 def file_with(folder, *changes):
@@ -105,8 +105,8 @@ def test_a_link_that_does_not_close_is_exit_code_1_with_a_minus_sign(call, folde
 
 @pytest.mark.parametrize("width", [80, 120, 160])
 def test_the_tables_keep_to_their_width_and_cut_no_word(folder, width):
-    study = link_study.run(load_link(file_with(folder, DARK, JITTER)))
-    for text in (budget_views.text(study, width, verbose=verbose) for verbose in (False, True)):
+    study = link_study.run_link_study(load_link(file_with(folder, DARK, JITTER)))
+    for text in (links_text(study, width, verbose=verbose) for verbose in (False, True)):
         assert width - 10 < max(map(len, text.splitlines())) <= width
         assert "\u2026" not in text
         assert not any(line != line.rstrip() for line in text.splitlines())

@@ -13,8 +13,8 @@ from microrad import load_link, load_mirror, report
 from microrad.core.units import parse_quantity
 from microrad.loop import fine_pointing
 from microrad.mission import presets
-from microrad.report import identification_figures
-from microrad.study import story as study
+from microrad.report.identification import page as identification
+from microrad.study import study
 from places import ROOT
 from scenes import scene_of
 from shipped import whole_drawn, whole_study
@@ -100,7 +100,7 @@ def walk(folder, call, capsys):
 
 def run_once(monkeypatch):
     """What `reproduce` runs and draws again is what `run` found and drew; tests/test_reproduce.py does it twice."""
-    found, drawn, run, write, shipped = {}, [], study.run, report.write, whole_study()[0]
+    found, drawn, run, write, shipped = {}, [], study.run_study, report.write, whole_study()[0]
 
     def remembered(file, on_progress, parts=None):
         if file.sha256 not in found:
@@ -115,9 +115,9 @@ def run_once(monkeypatch):
             shutil.copytree(drawn[0], target)
         return target / "report.html"
 
-    monkeypatch.setattr(study, "run", remembered)
+    monkeypatch.setattr(study, "run_study", remembered)
     figures = whole_drawn()
-    monkeypatch.setattr(report, "draw", lambda *args: figures)
+    monkeypatch.setattr(report, "study_figures", lambda *args: figures)
     monkeypatch.setattr(report, "write", copied)
     return found
 
@@ -139,7 +139,9 @@ def test_the_papers_mission(walk, monkeypatch):
 
 
 def test_a_lab_identifies_its_mirror(walk, monkeypatch):
-    monkeypatch.setattr(identification_figures, "draw", lambda *args, **kwargs: {})  # drawing has tests of its own
+    monkeypatch.setattr(
+        identification, "identification_figures", lambda *args, **kwargs: {}
+    )  # drawing has tests of its own
     walk.through(EXAMPLES[LAB])
     m = walk.known["file"].mission
     assert (m.requirement.pointing_error_rad, m.requirement.margin_db) == (10e-6, 3.0)

@@ -13,8 +13,8 @@ from microrad.loop.fine_pointing import scenario
 from microrad.mission import file as missionfile
 from microrad.mission.file import NamedFile, load_mission, with_contents
 from microrad.orbit import day
-from microrad.report.page import Drawn
-from microrad.study import story as study
+from microrad.report.study.page import StudyFigures
+from microrad.study import study
 from shipped import SHIPPED
 
 ELEMENTS = """EXAMPLE 1
@@ -64,7 +64,7 @@ def quick():
         patch.setattr(scenario.disturbance, "table", lambda freq_hz, density, **_: density.tolist())
         patch.setattr(study.paper, "applies", lambda mission: False)
         patch.setattr(day, "swings", lambda *args: ())
-        patch.setattr(report, "draw", lambda *args: Drawn())
+        patch.setattr(report, "study_figures", lambda *args: StudyFigures())
         yield
 
 
@@ -99,13 +99,13 @@ def manifest_of(call, output, *more):
 
 @pytest.mark.parametrize("change", [rewrite, delete])
 def test_a_run_is_of_what_was_read(call, files, monkeypatch, change):
-    run, meanwhile = study.run, []
+    run, meanwhile = study.run_study, []
 
     def changing(file, on_progress, parts):
         return run(file, lambda *said: meanwhile or meanwhile.append(change(files)), parts)
 
     with monkeypatch.context() as patch:
-        patch.setattr(study, "run", changing)
+        patch.setattr(study, "run_study", changing)
         changed = manifest_of(call, files / "changed")
     assert len(meanwhile) == 1
     said = {name: hashlib.sha256(text.encode()).hexdigest() for name, text in TEXTS.items()}
@@ -157,10 +157,10 @@ def test_a_file_that_comes_meanwhile_is_part_of_no_kept_part(files):
                 (files / f"later-{name}").rename(files / name)
 
     parts = Kept(files / "parts")
-    assert study.run(file, comes, parts).day is not None
+    assert study.run_study(file, comes, parts).day is not None
     assert parts.trouble == ""
     assert list((files / "parts").rglob("*.part")) == []
-    study.run(file, parts=parts)
+    study.run_study(file, parts=parts)
     assert list((files / "parts").rglob("*.part")) != []
 
 
@@ -178,4 +178,4 @@ def test_what_is_no_file_or_too_large_is_not_taken_in(files, monkeypatch):
     (files / "shake.csv").rmdir()
     (files / "shake.csv").write_text(SPECTRUM)
     with pytest.raises(ValueError, match=r"leo\.tle: this is a device or a pipe"):
-        study.run(file)
+        study.run_study(file)

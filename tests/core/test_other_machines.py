@@ -11,7 +11,7 @@ from shipped import SHIPPED
 _CASE = """
 import numpy as np
 from microrad import load_mission, mirror
-from microrad.link.tracking_light import tracking_light_w
+from microrad.link import tracking_light_w
 from microrad.loop import fine_pointing
 
 file = load_mission({path!r})

@@ -448,7 +448,12 @@ FUZZED = {
 
 
 @pytest.mark.parametrize(
-    ("name", "precision"), [*((name, "double") for name in FUZZED), ("printed, widening plays that creep", "single")]
+    ("name", "precision"),
+    [
+        pytest.param("printed, widening plays that creep", "double", marks=pytest.mark.endurance),
+        ("without a limit, exponent 2", "double"),
+        ("printed, widening plays that creep", "single"),
+    ],
 )
 def test_garbage_is_held_off_and_never_leaves_the_limits(name, precision, shipped, tmp_path):
     of, vectors = pair(shipped, FUZZED[name], resolution_v=0.35e-3)  # 2.5 V would be rounded to 2.50005 V

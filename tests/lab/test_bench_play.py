@@ -13,7 +13,7 @@ import scipy.io
 from nptdms import TdmsFile
 
 from microrad.core.folder import FolderError
-from microrad.lab.bench import load_plan, only, play, write
+from microrad.lab.bench import load_plan, play, select_records, write_folder
 from microrad.lab.bench.plan import FORMATS, PlanError
 from microrad.lab.bench.play import BenchError, true_output
 
@@ -28,7 +28,7 @@ def paper():
 @pytest.fixture(scope="module")
 def short(paper):
     """One quick record of the paper's experiment."""
-    return only(paper, ["loop-100hz"])
+    return select_records(paper, ["loop-100hz"])
 
 
 def with_sensor(plan, **changes):
@@ -60,14 +60,14 @@ def test_a_recording_is_in_volts_and_mrad_with_its_names(short):
 
 
 def test_the_same_seed_gives_the_same_samples_and_another_one_others(paper):
-    plan = only(paper, ["loop-60hz", "loop-100hz"])
+    plan = select_records(paper, ["loop-60hz", "loop-100hz"])
     one, again, other = play(plan, 1), play(plan, 1), play(plan, 2)
     for a, b, c in zip(one, again, other, strict=True):
         assert np.array_equal(a.drive, b.drive)
         assert np.array_equal(a.output, b.output)
         assert np.array_equal(a.drive, c.drive)
         assert not np.array_equal(a.output, c.output)
-    (alone,) = play(only(paper, ["loop-100hz"]), 1)
+    (alone,) = play(select_records(paper, ["loop-100hz"]), 1)
     assert np.array_equal(alone.output, one[1].output)  # a record's noise does not depend on the others
     noise = [r.output[:6000] - true_output(plan, p)[1][:6000] for r, p in zip(one, plan.records, strict=True)]
     assert abs(np.corrcoef(noise[0][:, 0], noise[1][:, 0])[0, 1]) < 0.1
@@ -77,7 +77,7 @@ def test_the_same_seed_gives_the_same_samples_and_another_one_others(paper):
 
 # ---- sensor and converters
 def test_noise_is_a_share_of_the_outputs_rms_about_its_mean(paper):
-    plan = only(paper, ["chirp"])
+    plan = select_records(paper, ["chirp"])
     (recording,) = play(plan, SEED)
     truth = true_output(plan, plan.records[0])[1]
     share = np.std(recording.output - truth) / np.std(truth)
@@ -157,7 +157,7 @@ def test_axes_answer_their_own_drive_and_some_of_the_others(tmp_path, paper):
 
 def test_progress_names_each_record(paper):
     seen = []
-    play(only(paper, ["loop-60hz", "loop-80hz"]), SEED, lambda *told: seen.append(told))
+    play(select_records(paper, ["loop-60hz", "loop-80hz"]), SEED, lambda *told: seen.append(told))
     assert seen == [(0, 2, "loop-60hz"), (1, 2, "loop-80hz"), (2, 2, paper.name)]
 
 
@@ -240,7 +240,7 @@ READERS = {
 @pytest.fixture(scope="module")
 def folder(short, tmp_path_factory):
     folder = tmp_path_factory.mktemp("bench") / "records"
-    files = write(replace(short, formats=FORMATS), folder, SEED)
+    files = write_folder(replace(short, formats=FORMATS), folder, SEED)
     assert [path.name for path in files] == [READERS[form][0] for form in FORMATS]
     return folder
 
@@ -271,22 +271,22 @@ def test_the_folder_holds_plan_and_manifest(folder, short):
 
 def test_a_folder_is_not_replaced_unless_asked_and_ours(short, tmp_path):
     folder = tmp_path / "out"
-    (first,) = write(short, folder, 1)
+    (first,) = write_folder(short, folder, 1)
     before = first.read_bytes()
     with pytest.raises(FolderError, match="already holds recordings: choose another --output, or replace them with"):
-        write(short, folder, 2)
+        write_folder(short, folder, 2)
     assert first.read_bytes() == before
-    write(short, folder, 2, overwrite=True)
+    write_folder(short, folder, 2, overwrite=True)
     assert first.read_bytes() != before
-    write(short, folder, 1, overwrite=True)
+    write_folder(short, folder, 1, overwrite=True)
     assert first.read_bytes() == before
     foreign = tmp_path / "foreign"
     foreign.mkdir()
     (foreign / "thesis.tex").write_text("years of work", encoding="utf-8")
     with pytest.raises(FolderError, match="holds files that are not recordings of microrad"):
-        write(short, foreign, 1, overwrite=True)
+        write_folder(short, foreign, 1, overwrite=True)
     with pytest.raises(FolderError, match="is a file, not a folder"):
-        write(short, first, 1, overwrite=True)
+        write_folder(short, first, 1, overwrite=True)
     assert (foreign / "thesis.tex").exists()
 
 
@@ -294,12 +294,12 @@ def test_a_folder_is_never_half_written(short, tmp_path):
     folder = tmp_path / "out"
     bad = with_sensor(short, converters_output_max_rad=1e-3)
     with pytest.raises(BenchError, match="widen output_min"):
-        write(bad, folder, SEED)
+        write_folder(bad, folder, SEED)
     assert list(tmp_path.iterdir()) == []
-    write(short, folder, SEED)
+    write_folder(short, folder, SEED)
     names = sorted(path.name for path in folder.iterdir())
     with pytest.raises(BenchError, match="widen output_min"):
-        write(bad, folder, SEED, overwrite=True)
+        write_folder(bad, folder, SEED, overwrite=True)
     assert sorted(path.name for path in folder.iterdir()) == names
     assert list(tmp_path.iterdir()) == [folder]
 
@@ -307,5 +307,5 @@ def test_a_folder_is_never_half_written(short, tmp_path):
 def test_a_format_without_its_library_says_what_to_install(short, tmp_path, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "nptdms", None)
     with pytest.raises(BenchError, match=r"needs npTDMS, which is not installed: .* constraints.txt '\.\[lab\]'"):
-        write(short, tmp_path / "out", SEED)
+        write_folder(short, tmp_path / "out", SEED)
     assert list(tmp_path.iterdir()) == []

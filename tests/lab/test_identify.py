@@ -23,8 +23,9 @@ from microrad.lab.identify import (
     predict,
 )
 from microrad.lab.identify.hysteresis.bouc_wen import _bound_gradient
-from microrad.lab.identify.records import colour_inflation, fastest_rate, si_records, transient
+from microrad.lab.identify.records import fastest_rate, si_records, transient
 from microrad.lab.identify.selection.choice import choose_best
+from microrad.lab.identify.statistics import colour_inflation
 from microrad.lab.recording import read_recording, recording_from_arrays
 from microrad.mission.file import load_mirror
 from places import DATA

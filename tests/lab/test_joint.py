@@ -19,10 +19,11 @@ from microrad.lab.identify import (
 )
 from microrad.lab.identify.hysteresis import joint
 from microrad.lab.identify.hysteresis.joint import thin_record, time_constants
-from microrad.lab.identify.hysteresis.plant_fit import fit_plant, runs
+from microrad.lab.identify.hysteresis.plant_fit import fit_plant, fit_records
 from microrad.lab.identify.hysteresis.prandtl_ishlinskii import threshold_grid
-from microrad.lab.identify.hysteresis.structures import LinearPoles, Roots, poles_of, propagated
+from microrad.lab.identify.hysteresis.structures import LinearPoles, Roots, poles_of
 from microrad.lab.identify.records import si_records
+from microrad.lab.identify.statistics import propagated
 from microrad.lab.recording import read_recording
 from microrad.mirror import model as mirror
 from places import DATA
@@ -186,7 +187,7 @@ def test_without_its_tail_an_older_creep_would_bias_the_weights():
     record = crept(0.0)
     fit = fit_joint([record], "prandtl_ishlinskii_creep", UNITS)
     (prepared,) = si_records([record], UNITS)
-    offset_only = runs([replace(record, output=1e-3 * record.output)], drop=prepared.start)
+    offset_only = fit_records([replace(record, output=1e-3 * record.output)], drop=prepared.start)
     without = fit_plant(fit.structure, offset_only)
     assert without.residual_rms[0, 0] > 2 * fit.residual_rms_rad
     assert np.max(np.abs(without.values - fit.fit.values) / fit.fit.standard_errors) > 10

@@ -30,7 +30,8 @@ from microrad.lab.identify.linear.polish import (
 )
 from microrad.lab.identify.linear.response import response_from_periods
 from microrad.lab.identify.linear.vector_fitting import vector_fit
-from microrad.lab.identify.records import IdentificationError, rounded_to_error
+from microrad.lab.identify.records import IdentificationError
+from microrad.lab.identify.statistics import rounded_to_error
 from microrad.lab.recording import Recording, multisine_recordings
 from places import DATA
 

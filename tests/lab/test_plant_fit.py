@@ -10,7 +10,7 @@ from microrad.lab.identify import IdentificationError
 from microrad.lab.identify.hysteresis.plant_fit import (
     FitRecord,
     Parameter,
-    Problem,
+    PlantProblem,
     Structure,
     _covariance,
     fit_plant,
@@ -201,7 +201,7 @@ def test_a_start_that_cannot_be_simulated_is_refused():
 
 
 def test_a_slope_that_is_no_number_is_refused_and_no_fault_of_the_program():
-    problem = Problem(hysteretic_oscillator(2.0, 300.0, 5e4, 2e4, 300.0, 100.0), fit_records([low_pass(3)]))
+    problem = PlantProblem(hysteretic_oscillator(2.0, 300.0, 5e4, 2e4, 300.0, 100.0), fit_records([low_pass(3)]))
     slopes = np.ones((20, 6))
     assert np.isfinite(_covariance(slopes, np.ones(20), problem)[0]).all()
     slopes[3, 2] = 1e200

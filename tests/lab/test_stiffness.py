@@ -248,10 +248,10 @@ def test_no_fit_runs_away_where_its_plays_slide(training):
 def test_a_mirror_that_runs_away_is_refused(training, monkeypatch):
     """The play that slides takes more than the stiffness there is: x' = (A + E W F) x has a pole above 0."""
 
-    def run(search, start, *_):
+    def minimise(search, start, *_):
         search.numbers = replace(start, weights=500 * start.weights)
 
-    monkeypatch.setattr(stiffness_fit._Search, "run", run)
+    monkeypatch.setattr(stiffness_fit._Search, "minimise", minimise)
     with pytest.raises(IdentificationError, match=r"runs away: where its plays slide it grows by \d.* 1/s.*order"):
         fit_hysteretic_stiffness(training, order=4, options=StiffnessOptions(delay_s=7e-4, exchanges=0))
 

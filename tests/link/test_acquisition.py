@@ -18,20 +18,19 @@ from microrad.link.acquisition import (
     Search,
     Spiral,
     Stage,
-    TimeDistribution,
     Timing,
     answer_stages,
-    beacon_stages,
     detection_times,
     frame_detection_probability,
-    frames_detection_probability,
     paper_sequence,
     scan_stages,
     simulate,
     simulate_log,
-    solve,
+    solve_sequence,
     wide_against_scan,
 )
+from microrad.link.acquisition.sequence import beacon_stages, frames_detection_probability
+from microrad.link.acquisition.times import TimeDistribution
 
 URAD = 1e-6
 NORMAL_99 = 2.5758  # one seed in a hundred misses it; larger studies of each pair show no bias
@@ -94,7 +93,7 @@ def test_the_papers_sequence_has_its_order_and_its_light_times():
     ]
     light = 44e6 / 299_792_458
     assert TIMING.light_time_s == pytest.approx(light, rel=1e-14)
-    sure = solve(paper_sequence(TIMING, Chances(1, 1, 1, 1, 1, 1)), 1)
+    sure = solve_sequence(paper_sequence(TIMING, Chances(1, 1, 1, 1, 1, 1)), 1)
     assert sure.success_probability == 1.0 and sure.failure_probability == 0.0
     assert sure.locked.time_s == pytest.approx([20 + 0.5 + 3 + 0.5 + 0.01 + 2 * 1.0 + 4 * light], rel=1e-12)
     assert stages[2].success_probability == pytest.approx(0.57 * (1 - 0.1**5), rel=1e-12)
@@ -109,7 +108,10 @@ def test_stages_call_the_terminals_by_their_names():
     scan = scan_stages(named, TimeDistribution(np.array([1.0]), np.array([0.5])), 2.0)
     assert [s.name for s in scan] == ["OICETS points the scan", "beam travels", "ARTEMIS detects"]
     assert scan[2].on_failure == scan[0].name
-    assert solve(chain, 3).success_probability == solve(paper_sequence(TIMING, CHANCES), 3).success_probability
+    assert (
+        solve_sequence(chain, 3).success_probability
+        == solve_sequence(paper_sequence(TIMING, CHANCES), 3).success_probability
+    )
 
 
 def test_frames_do_not_help_a_beacon_that_does_not_land():
@@ -142,7 +144,7 @@ def by_matrix(stages, attempts):
 @pytest.mark.parametrize("attempts", [1, 2, 5])
 def test_the_solution_is_that_of_the_absorbing_chain(attempts):
     stages = paper_sequence(TIMING, CHANCES)
-    outcome = solve(stages, attempts)
+    outcome = solve_sequence(stages, attempts)
     probability, mean = by_matrix(stages, attempts)
     assert outcome.success_probability == pytest.approx(probability, rel=1e-12)
     assert outcome.mean_time_s == pytest.approx(mean, rel=1e-10)
@@ -150,7 +152,7 @@ def test_the_solution_is_that_of_the_absorbing_chain(attempts):
 
 
 def test_times_are_exact_for_one_stage_that_is_repeated():
-    outcome = solve([Stage("try", 2.0, 0.25, 5.0)], 4)
+    outcome = solve_sequence([Stage("try", 2.0, 0.25, 5.0)], 4)
     assert outcome.locked.time_s == pytest.approx([2, 7, 12, 17], rel=1e-14)
     assert outcome.locked.weight == pytest.approx([0.25 * 0.75**k for k in range(4)], rel=1e-14)
     assert outcome.lost.time_s == pytest.approx([20.0]) and outcome.lost.weight == pytest.approx([0.75**4])
@@ -158,7 +160,7 @@ def test_times_are_exact_for_one_stage_that_is_repeated():
 
 def test_the_sequence_and_its_simulation_agree():
     stages, attempts, runs = paper_sequence(TIMING, CHANCES), 4, 20_000
-    outcome, drawn = solve(stages, attempts), simulate(stages, attempts, runs, seed=100)
+    outcome, drawn = solve_sequence(stages, attempts), simulate(stages, attempts, runs, seed=100)
     p = outcome.success_probability
     assert abs(drawn.locked.mean() - p) <= NORMAL_99 * math.sqrt(p * (1 - p) / runs)
     locked, lost = drawn.time_s[drawn.locked], drawn.time_s[~drawn.locked]
@@ -176,13 +178,13 @@ def test_a_scan_takes_the_place_of_the_beacon():
     scan = Spiral(Search(300 * URAD, 20 * URAD, 0.25, 0.9), Detector(2e-3, 0.9), 8e-3)
     times = detection_times(scan)
     stages = (*scan_stages(TIMING, times, scan.duration_s), *answer_stages(TIMING, CHANCES))
-    outcome, runs = solve(stages, 3), 8000
+    outcome, runs = solve_sequence(stages, 3), 8000
     drawn = simulate(stages, 3, runs, seed=9)
     p = outcome.success_probability
     assert abs(drawn.locked.mean() - p) <= NORMAL_99 * math.sqrt(p * (1 - p) / runs)
     locked = drawn.time_s[drawn.locked]
     assert abs(locked.mean() - outcome.mean_time_s) <= NORMAL_99 * locked.std() / math.sqrt(locked.size)
-    first = solve(stages, 1)
+    first = solve_sequence(stages, 1)
     rest = 20 + 3 + 0.5 + 0.01 + 2.0 + 4 * TIMING.light_time_s
     assert first.mean_time_s == pytest.approx(times.mean_s + rest, rel=1e-9)
     assert first.success_probability == pytest.approx(times.probability * 0.95 * 0.99 * 0.97 * 0.98**2, rel=1e-9)
@@ -280,11 +282,11 @@ REFUSALS = [
     (lambda: replace(TIMING, frame_time_s=0.0), r"the time of a frame is 0 s"),
     (lambda: replace(TIMING, geo_response_s=-1.0), r"geo_response_s is -1 s: it must be 0 s or more"),
     (lambda: replace(CHANCES, return_coverage=1.2), r"return_coverage is 1\.2: it must lie above 0 and be 1 or less"),
-    (lambda: solve([STAGE], 0), r"the number of attempts is 0: it must be 1 or more"),
-    (lambda: solve([], 1), r"the sequence has no stage"),
-    (lambda: solve([STAGE, STAGE], 1), r"two stages have the same name among see, see"),
+    (lambda: solve_sequence([STAGE], 0), r"the number of attempts is 0: it must be 1 or more"),
+    (lambda: solve_sequence([], 1), r"the sequence has no stage"),
+    (lambda: solve_sequence([STAGE, STAGE], 1), r"two stages have the same name among see, see"),
     (
-        lambda: solve([replace(STAGE, on_failure="lock"), Stage("lock", 1.0)], 1),
+        lambda: solve_sequence([replace(STAGE, on_failure="lock"), Stage("lock", 1.0)], 1),
         r'"see" goes back to "lock" on failure: it must be itself or an earlier stage, one of see',
     ),
     (lambda: simulate([STAGE], 1, 0, 1), r"the number of runs is 0"),

@@ -17,8 +17,9 @@ from numpy.testing import assert_allclose
 
 import budgets
 from microrad import link
-from microrad.link import acquisition, pointing
+from microrad.link import acquisition, beams, gains, pointing
 from microrad.link import study as link_study
+from microrad.link.pointing import statistics
 from microrad.link.receivers import PpmCounting
 from microrad.loop import disturbance, sensor
 from microrad.mirror.geometry import Geometry, line_of_sight_matrix
@@ -60,16 +61,16 @@ def lossless_dbm():
 
 @show(
     [
-        (link.aperture_gain_db(LEO_M, WAVE_M), "100.12", "checked: 5 cm at 1.55 um"),
-        (link.aperture_gain_db(GEO_M, WAVE_M), "109.66", "checked: 15 cm at 1.55 um"),
-        (link.free_space_loss_db(42e6, WAVE_M), "290.64", "checked: 42 000 km"),
-        (link.free_space_loss_db(44e6, WAVE_M), "291.05", "checked: 44 000 km"),
+        (gains.aperture_gain_db(LEO_M, WAVE_M), "100.12", "checked: 5 cm at 1.55 um"),
+        (gains.aperture_gain_db(GEO_M, WAVE_M), "109.66", "checked: 15 cm at 1.55 um"),
+        (gains.free_space_loss_db(42e6, WAVE_M), "290.64", "checked: 42 000 km"),
+        (gains.free_space_loss_db(44e6, WAVE_M), "291.05", "checked: 44 000 km"),
         (lossless_dbm(), "-43.88", "checked: 5 W without losses"),
-        (float(link.pointing_loss_db(10 * URAD, LEO_M, WAVE_M, "gaussian")), "2.23", "checked: Gaussian, w = D/2"),
-        (float(link.pointing_loss_db(10 * URAD, LEO_M, WAVE_M, "gain")), "4.46", "checked: exp(-G theta^2)"),
-        (link.strehl_loss_db(0.4, "ratio"), "3.98", "checked: Strehl 0.4 as a ratio"),
-        (link.strehl_loss_db(0.4, "decibel"), "0.4", "paper, Table 2: Strehl 0.4 dB"),
-        (float(link.gaussian_pointing_loss_db(BEAM_HALF_RAD, BEAM_HALF_RAD)), "8.686", "checked: loss at 1/e2"),
+        (float(gains.pointing_loss_db(10 * URAD, LEO_M, WAVE_M, "gaussian")), "2.23", "checked: Gaussian, w = D/2"),
+        (float(gains.pointing_loss_db(10 * URAD, LEO_M, WAVE_M, "gain")), "4.46", "checked: exp(-G theta^2)"),
+        (gains.strehl_loss_db(0.4, "ratio"), "3.98", "checked: Strehl 0.4 as a ratio"),
+        (gains.strehl_loss_db(0.4, "decibel"), "0.4", "paper, Table 2: Strehl 0.4 dB"),
+        (float(gains.gaussian_pointing_loss_db(BEAM_HALF_RAD, BEAM_HALF_RAD)), "8.686", "checked: loss at 1/e2"),
         (budgets.communication(MISSION, SOURCES).margin_db, "3.0", "paper, section 2.2: 300 Mbit/s, 10 urad"),
     ]
 )
@@ -117,7 +118,7 @@ def test_words_of_pulse_position_are_erased_as_no_photon_comes(order, counts):
         order=order,
     )
     rate = 1e8
-    power = counts / math.log2(order) * link.photon_energy_j(WAVE_M) * rate
+    power = counts / math.log2(order) * gains.photon_energy_j(WAVE_M) * rate
     words = float(receiver.bit_error_ratio_at(power, rate)) * 2 * (order - 1) / order
     assert words == pytest.approx((order - 1) / order * math.exp(-counts), rel=1e-10)
 
@@ -142,7 +143,7 @@ def test_the_beacons_irradiance_is_that_of_its_reading(value, text):
 # --------------------------------------------------------------------------------------------------------- beams
 def truncated(truncation):
     """Gain of an aperture lit by a Gaussian beam, over that of an even light."""
-    return link.LitAperture(LEO_M, WAVE_M, truncation, 0.0).efficiency
+    return beams.LitAperture(LEO_M, WAVE_M, truncation, 0.0).efficiency
 
 
 LUCE_W, LUCE_HALF_RAD, LUCE_MEASURED_W_SR = 0.09, 9.4e-6 / 2, 560e6  # OICETS engineering model, full angle at 1/e2
@@ -150,10 +151,10 @@ LUCE_W, LUCE_HALF_RAD, LUCE_MEASURED_W_SR = 0.09, 9.4e-6 / 2, 560e6  # OICETS en
 
 @show(
     [
-        (link.BEST_TRUNCATION, "1.1209", "Klein and Degnan 1974: best truncation"),
-        (truncated(link.BEST_TRUNCATION), "0.81453", "Klein and Degnan 1974: its efficiency"),
-        (1e-9 * link.peak_radiant_intensity_w_sr(LUCE_W, LUCE_HALF_RAD), "2.594", "checked: LUCE, ideal GW/sr"),
-        (link.implied_transmission_db(LUCE_MEASURED_W_SR, LUCE_W, LUCE_HALF_RAD), "-6.66", "checked: LUCE, 560 MW/sr"),
+        (beams.BEST_TRUNCATION, "1.1209", "Klein and Degnan 1974: best truncation"),
+        (truncated(beams.BEST_TRUNCATION), "0.81453", "Klein and Degnan 1974: its efficiency"),
+        (1e-9 * gains.peak_radiant_intensity_w_sr(LUCE_W, LUCE_HALF_RAD), "2.594", "checked: LUCE, ideal GW/sr"),
+        (gains.implied_transmission_db(LUCE_MEASURED_W_SR, LUCE_W, LUCE_HALF_RAD), "-6.66", "checked: LUCE, 560 MW/sr"),
         (1e6 * BEAM_HALF_RAD, "19.7", "checked: lambda / (pi w0), w0 = 2.5 cm, in urad"),
     ]
 )
@@ -162,13 +163,13 @@ def test_beams_have_their_published_gain(value, text):
 
 
 def test_no_other_truncation_has_more_gain():
-    assert all(truncated(link.BEST_TRUNCATION) > truncated(link.BEST_TRUNCATION + step) for step in (-1e-3, 1e-3))
+    assert all(truncated(beams.BEST_TRUNCATION) > truncated(beams.BEST_TRUNCATION + step) for step in (-1e-3, 1e-3))
 
 
 @pytest.mark.parametrize("share", [0.0, 1 / 50, 1 / 14])
 def test_the_strehl_ratio_is_that_of_marechal(share):
     # literature: S = exp(-(2 pi sigma / lambda)^2); "diffraction-limited" at a fourteenth of a wavelength, S about 0.8
-    assert link.strehl_ratio(share * WAVE_M, WAVE_M) == pytest.approx(
+    assert gains.strehl_ratio(share * WAVE_M, WAVE_M) == pytest.approx(
         math.exp(-((2 * math.pi * share) ** 2)), rel=1e-14
     )
 
@@ -178,7 +179,7 @@ def test_the_pointing_loss_grows_with_the_square_of_the_error():
     half = WAVE_M / (math.pi * LEO_M / 2)
     assert half == pytest.approx(BEAM_HALF_RAD, rel=1e-12)
     error = np.array([0.1, 1.0, 2.0]) * half
-    assert_allclose(link.gaussian_pointing_loss_db(error, half), 20 / math.log(10) * (error / half) ** 2, rtol=1e-12)
+    assert_allclose(gains.gaussian_pointing_loss_db(error, half), 20 / math.log(10) * (error / half) ** 2, rtol=1e-12)
 
 
 # -------------------------------------------------------------------------------------------------------- jitter
@@ -194,7 +195,7 @@ def in_best_beam(outage, rms_rad=3 * URAD):
 
 @show(
     [
-        (float(pointing.mean_transmission(even(0.7206 * URAD), 10 * URAD)), "0.97965", "checked: 0.7206 on 10 urad"),
+        (float(statistics.mean_transmission(even(0.7206 * URAD), 10 * URAD)), "0.97965", "checked: 0.7206 on 10 urad"),
         (in_best_beam(1e-3).loss_db, "4.343", "checked: loss in the best divergence, outage 1e-3"),
         (in_best_beam(0.3).loss_db, "4.343", "checked: loss in the best divergence, outage 0.3"),
         (
@@ -213,12 +214,12 @@ def test_jitter_follows_the_power_law_of_toyoshima(beta):
     # Toyoshima 2002: beta = theta_d^2 / (4 sigma^2), p(h) = beta h^(beta - 1), P(h < x) = x^beta
     half = 10 * URAD
     jitter = even(half / (2 * math.sqrt(beta)))
-    assert float(pointing.mean_transmission(jitter, half)) == pytest.approx(beta / (beta + 1), rel=1e-12)
+    assert float(statistics.mean_transmission(jitter, half)) == pytest.approx(beta / (beta + 1), rel=1e-12)
     assert beta / (beta + 1) == pytest.approx(1 / (1 + 4 * jitter.rms_rad[0] ** 2 / half**2), rel=1e-12)
     h, step = np.array([0.3, 0.6, 0.9]), 1e-5
 
     def below(x):
-        return pointing.outage_probability(jitter, half, -10 * np.log10(x))
+        return statistics.outage_probability(jitter, half, -10 * np.log10(x))
 
     assert_allclose(below(h), h**beta, rtol=1e-9)
     assert_allclose((below(h + step) - below(h - step)) / (2 * step), beta * h ** (beta - 1), rtol=1e-5)
@@ -322,12 +323,13 @@ def test_the_papers_sum_stands_next_to_those_of_the_standard_and_is_not_authoris
 
 # --------------------------------------------------------------------------------------------------- acquisition
 SEARCH = acquisition.Search(sigma_rad=300 * URAD, beam_radius_rad=20 * URAD, overlap=0.25, coverage=0.995)
+HALF_RADIUS_STEPS = int(math.pi * SEARCH.radius_rad**2 / (SEARCH.pitch_rad * SEARCH.beam_radius_rad / 2))
 
 
 @show(
     [
         (SEARCH.radius_rad / URAD, "976.6", "checked: R = sigma sqrt(-2 ln(1 - P))"),
-        (acquisition.dwells_along_track(SEARCH, SEARCH.beam_radius_rad / 2), "9987", "checked: half-radius steps"),
+        (HALF_RADIUS_STEPS, "9987", "checked: half-radius steps"),
     ]
 )
 def test_the_spiral_is_that_of_the_worked_example(value, text):

@@ -10,8 +10,8 @@ from scipy.integrate import dblquad, quad
 from scipy.optimize import minimize_scalar
 from scipy.special import j0, j1, jn_zeros
 
-from microrad import link
-from microrad.link import BEST_TRUNCATION, GaussianFall, LitAperture
+from microrad.link import gains
+from microrad.link.beams import BEST_TRUNCATION, GaussianFall, LitAperture
 from microrad.mission.tables.link import narrowest_radius
 
 D, WAVELENGTH = 0.05, 1.55e-6
@@ -87,7 +87,7 @@ def test_an_uncut_beam_is_the_gaussian_of_half_angle_lambda_over_pi_w():
         half = WAVELENGTH / (math.pi * (D / 2 / truncation))
         shape = lit(truncation)
         assert shape.half_angle_rad == pytest.approx(half, rel=1e-5)
-        assert shape.gain_db == pytest.approx(link.gaussian_beam_gain_db(half), abs=1e-5)
+        assert shape.gain_db == pytest.approx(gains.gaussian_beam_gain_db(half), abs=1e-5)
         assert shape.passed == pytest.approx(1.0, abs=1e-12)
         errors = np.linspace(0.0, 2.0, 9) * half
         np.testing.assert_allclose(shape.loss_db(errors), GaussianFall(half).loss_db(errors), atol=2e-3)
@@ -256,34 +256,34 @@ def test_a_beam_of_which_one_hundredth_passes_the_obscuration_is_taken():
 @pytest.mark.parametrize(("elevation", "printed"), [(90.0, 1.0), (30.0, 1.9943), (10.0, 5.586), (0.0, 37.92)])
 def test_air_mass_of_kasten_and_young(elevation, printed):
     # Kasten and Young 1989: 0.50572, 6.07995 deg, 1.6364; the horizon has 37.9
-    assert link.air_mass(math.radians(elevation)) == pytest.approx(printed, rel=5e-4)
+    assert gains.air_mass(math.radians(elevation)) == pytest.approx(printed, rel=5e-4)
 
 
 @pytest.mark.parametrize("elevation", [-0.1, 90.1, math.nan])
 def test_an_elevation_beyond_horizon_or_zenith_is_refused(elevation):
     with pytest.raises(ValueError, match="is not between 0 and 90 deg, horizon and zenith"):
-        link.air_mass(math.radians(elevation))
+        gains.air_mass(math.radians(elevation))
 
 
 def test_a_clear_sky_costs_its_zenith_times_the_air_mass():
-    assert link.clear_sky_loss_db(0.5, math.pi / 2) == pytest.approx(3.0103, abs=2e-3)
-    at_thirty = link.clear_sky_loss_db(0.8, math.radians(30.0))
-    assert 10 ** (-at_thirty / 10) == pytest.approx(0.8 ** link.air_mass(math.radians(30.0)), rel=1e-12)
-    assert link.clear_sky_loss_db(1.0, math.radians(30.0)) == 0.0
+    assert gains.clear_sky_loss_db(0.5, math.pi / 2) == pytest.approx(3.0103, abs=2e-3)
+    at_thirty = gains.clear_sky_loss_db(0.8, math.radians(30.0))
+    assert 10 ** (-at_thirty / 10) == pytest.approx(0.8 ** gains.air_mass(math.radians(30.0)), rel=1e-12)
+    assert gains.clear_sky_loss_db(1.0, math.radians(30.0)) == 0.0
 
 
 @pytest.mark.parametrize("transmission", [0.0, -0.1, 1.01, math.nan])
 def test_a_sky_that_adds_light_or_lets_none_through_is_refused(transmission):
     with pytest.raises(ValueError, match="is not above 0 and at most 1; 1 is vacuum"):
-        link.clear_sky_loss_db(transmission, 1.0)
+        gains.clear_sky_loss_db(transmission, 1.0)
 
 
 def test_strehl_of_a_wavefront_error():
     # a fourteenth of a wave rms is the diffraction limit by convention, Strehl 0.8
-    assert link.strehl_ratio(WAVELENGTH / 14, WAVELENGTH) == pytest.approx(0.8176, abs=1e-4)
-    assert link.strehl_ratio(0.0, WAVELENGTH) == 1.0
+    assert gains.strehl_ratio(WAVELENGTH / 14, WAVELENGTH) == pytest.approx(0.8176, abs=1e-4)
+    assert gains.strehl_ratio(0.0, WAVELENGTH) == 1.0
     small = 1e-3
-    assert link.strehl_ratio(small * WAVELENGTH, WAVELENGTH) == pytest.approx(1 - (2 * math.pi * small) ** 2, abs=1e-8)
+    assert gains.strehl_ratio(small * WAVELENGTH, WAVELENGTH) == pytest.approx(1 - (2 * math.pi * small) ** 2, abs=1e-8)
 
 
 @pytest.mark.parametrize(
@@ -298,37 +298,37 @@ def test_strehl_of_a_wavefront_error():
 )
 def test_a_strehl_that_amplifies_is_refused(strehl, convention, said):
     with pytest.raises(ValueError, match=said):
-        link.strehl_loss_db(strehl, convention)
+        gains.strehl_loss_db(strehl, convention)
 
 
 def test_a_perfect_wavefront_loses_nothing():
-    assert link.strehl_loss_db(1.0, "ratio") == 0.0
-    assert link.strehl_loss_db(0.0, "decibel") == 0.0
+    assert gains.strehl_loss_db(1.0, "ratio") == 0.0
+    assert gains.strehl_loss_db(0.0, "decibel") == 0.0
 
 
 def test_an_obscuration_takes_its_area():
-    assert link.obscuration_loss_db(0.0) == 0.0
-    assert link.obscuration_loss_db(math.sqrt(0.5)) == pytest.approx(3.0103, abs=1e-4)
+    assert gains.obscuration_loss_db(0.0) == 0.0
+    assert gains.obscuration_loss_db(math.sqrt(0.5)) == pytest.approx(3.0103, abs=1e-4)
     for hole in (1.0, -0.1, 1.5, math.nan):
         with pytest.raises(ValueError, match="is not at least 0 and below 1, the whole aperture"):
-            link.obscuration_loss_db(hole)
+            gains.obscuration_loss_db(hole)
 
 
 def test_a_terminal_measured_before_flight():
     # LUCE engineering model: 90 mW, 9.4 urad full angle at 1/e2, 560 MW/sr measured
-    assert link.peak_radiant_intensity_w_sr(0.09, 4.7e-6) == pytest.approx(2.594e9, rel=2e-4)
-    assert link.implied_transmission_db(560e6, 0.09, 4.7e-6) == pytest.approx(-6.66, abs=0.005)
-    gain = 10 ** (link.gaussian_beam_gain_db(4.7e-6) / 10)
-    assert link.peak_radiant_intensity_w_sr(0.09, 4.7e-6) == pytest.approx(0.09 * gain / (4 * math.pi), rel=1e-12)
+    assert gains.peak_radiant_intensity_w_sr(0.09, 4.7e-6) == pytest.approx(2.594e9, rel=2e-4)
+    assert gains.implied_transmission_db(560e6, 0.09, 4.7e-6) == pytest.approx(-6.66, abs=0.005)
+    gain = 10 ** (gains.gaussian_beam_gain_db(4.7e-6) / 10)
+    assert gains.peak_radiant_intensity_w_sr(0.09, 4.7e-6) == pytest.approx(0.09 * gain / (4 * math.pi), rel=1e-12)
 
 
 def test_a_peak_above_the_lossless_beams_is_refused():
-    ideal = link.peak_radiant_intensity_w_sr(0.09, 4.7e-6)
-    assert link.implied_transmission_db(ideal, 0.09, 4.7e-6) == 0.0
+    ideal = gains.peak_radiant_intensity_w_sr(0.09, 4.7e-6)
+    assert gains.implied_transmission_db(ideal, 0.09, 4.7e-6) == 0.0
     for peak in (ideal * 1.001, 0.0, -1.0, math.nan):
         with pytest.raises(ValueError, match=r"at most 2\.594e\+09 W/sr, which 90 mW in a half angle of 4\.7 .rad at"):
-            link.implied_transmission_db(peak, 0.09, 4.7e-6)
+            gains.implied_transmission_db(peak, 0.09, 4.7e-6)
 
 
 def test_the_far_field_begins_at_twice_the_squared_aperture_over_the_wavelength():
-    assert link.far_field_m(0.15, 1.55e-6) == pytest.approx(29.032e3, rel=1e-4)
+    assert gains.far_field_m(0.15, 1.55e-6) == pytest.approx(29.032e3, rel=1e-4)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from microrad import link
+from microrad.link import beams, gains
 from places import ROOT
 
 SPEC = importlib.util.spec_from_file_location("link_conventions", ROOT / "benchmarks" / "link_conventions.py")
@@ -138,7 +139,7 @@ def test_a_fibre_loses_what_its_mode_overlaps_less():
     radius, tilt = 0.075, 2 * math.pi / 1.55e-6 * 10e-6
     x = (np.arange(1000) + 0.5) / 500 - 1
     rho2 = x[:, None] ** 2 + x[None, :] ** 2
-    mode = np.where(rho2 <= 1.0, np.exp(-(link.BEST_TRUNCATION**2) * rho2), 0.0)
+    mode = np.where(rho2 <= 1.0, np.exp(-(beams.BEST_TRUNCATION**2) * rho2), 0.0)
     overlap = abs(np.sum(mode * np.exp(1j * tilt * radius * x)[None, :]) / np.sum(mode)) ** 2
     row = by_term(peers.term_rows())["Loss: receive side, fibre, exact"]
     assert row.peer == pytest.approx(-10 * math.log10(overlap), abs=2e-3)
@@ -146,8 +147,8 @@ def test_a_fibre_loses_what_its_mode_overlaps_less():
 
 
 def test_near_the_axis_the_three_readings_are_as_four_to_two_to_one():
-    gain, gaussian = (float(link.pointing_loss_db(1e-7, 0.05, 1.55e-6, each)) for each in ("gain", "gaussian"))
-    disc = float(link.LitAperture(0.05, 1.55e-6, 0.0, 0.0).loss_db(1e-7))
+    gain, gaussian = (float(gains.pointing_loss_db(1e-7, 0.05, 1.55e-6, each)) for each in ("gain", "gaussian"))
+    disc = float(beams.LitAperture(0.05, 1.55e-6, 0.0, 0.0).loss_db(1e-7))
     assert gain / disc == pytest.approx(4.0, rel=1e-4)
     assert gaussian / disc == pytest.approx(2.0, rel=1e-4)
 

@@ -13,8 +13,9 @@ import budgets
 from link_files import GAUSSIAN, PATTERN, RECEIVERS, SKY, link_file, received_with
 from microrad import link
 from microrad.core.units import PLANCK_J_S, SPEED_OF_LIGHT_M_S
-from microrad.link import receivers
+from microrad.link import beams, receivers
 from microrad.link import study as link_study
+from microrad.link.budget.lines import LEFT_AT_ZERO
 
 WAVELENGTH, RATE = 1.55e-6, 300e6
 PHOTON_J = PLANCK_J_S * SPEED_OF_LIGHT_M_S / WAVELENGTH
@@ -289,7 +290,7 @@ def test_a_mission_without_beacon_or_answer_says_so(read):
         budgets.beacon(file.mission, file.sources)
     with pytest.raises(ValueError, match=r"the mission has no table \[answer\]"):
         budgets.answer(file.mission, file.sources)
-    study = link_study.run(file)
+    study = link_study.run_link_study(file)
     assert (study.beacon, study.answer, study.finding, study.tracking) == (None, None, None, None)
     assert study.budgets == (study.communication,)
 
@@ -306,7 +307,7 @@ def test_terms_left_at_zero_are_said_in_one_warning(read):
     names = ("Transmit optics loss", "Strehl loss", "Point-ahead loss", "Receive optics loss", "Implementation loss")
     assert budget.at_zero == names
     assert budget.warnings == (
-        f"Communication budget: {link.LEFT_AT_ZERO}: {', '.join(names)}; what the hardware has comes off the margin",
+        f"Communication budget: {LEFT_AT_ZERO}: {', '.join(names)}; what the hardware has comes off the margin",
     )
     losses = {f"communication.{key}_loss": "1 dB" for key in ("transmit_optics", "receive_optics", "implementation")}
     assert budget_of(read(losses, {"communication.tracking_split_loss": "1 dB"})).warnings == ()
@@ -531,7 +532,7 @@ def test_a_wavefront_error_has_one_reading_and_a_pattern_is_read_as_even_light(r
 
 
 def test_a_pattern_needs_to_know_how_its_aperture_is_lit(read):
-    assert link.of(read(PATTERN).mission).beam.fall == link.LitAperture(0.05, WAVELENGTH, 1.25, 0.0, 1.2)
+    assert link.of(read(PATTERN).mission).beam.fall == beams.LitAperture(0.05, WAVELENGTH, 1.25, 0.0, 1.2)
     with pytest.raises(ValueError, match=r"needs the table \[communication.beam\]: how the aperture is lit"):
         link.of(read().mission.with_value("conventions.pointing_loss", "pattern"))
     assert GAUSSIAN["radius"] == "2 cm"

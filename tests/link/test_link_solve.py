@@ -11,7 +11,8 @@ import budgets
 from link_files import GAUSSIAN, PATTERN, data_with, link_file, received_with, written
 from microrad import link
 from microrad.link import study as link_study
-from microrad.link import under_jitter as link_performance
+from microrad.link import variation
+from microrad.link.pointing import outage as link_performance
 
 NO_BEAMS = dict.fromkeys(("beacon", "answer", "acquisition"))
 JITTER = {"jitter": {"bias": ["0 urad", "0 urad"], "rms": ["3 urad", "3 urad"], "bandwidth": "50 Hz"}}
@@ -19,7 +20,7 @@ UNLIKE = {"jitter": {"bias": ["1 urad", "0 urad"], "rms": ["3 urad", "2 urad"], 
 
 
 def solved(folder, key, *changes):
-    return link_study.solve(link_file(folder, *changes), key)
+    return link_study.solve_key(link_file(folder, *changes), key)
 
 
 def only(solution):
@@ -65,9 +66,11 @@ def test_a_jitter_of_equal_axes_is_that_of_rayleigh(tmp_path):
     on_axis = budgets.communication(m, {}, pointing_error_rad=0.0).margin_db
     half = 2.0 * 1.55e-6 / (math.pi * 0.05)
     allowed = half * math.sqrt((on_axis - 3.0) / (20.0 * math.log10(math.e)))
-    found = only(link_study.solve(file, "jitter.rms"))
+    found = only(link_study.solve_key(file, "jitter.rms"))
     assert found.high == pytest.approx(allowed / math.sqrt(-2.0 * math.log(m.requirement.outage)), rel=1e-6)
-    assert link_study.run(link_study.solve(file, "jitter.rms").file).communication.margin_db == pytest.approx(3.0)
+    assert link_study.run_link_study(
+        link_study.solve_key(file, "jitter.rms").file
+    ).communication.margin_db == pytest.approx(3.0)
 
 
 def test_a_key_of_two_axes_keeps_their_proportion_and_an_axis_stands_by_itself(tmp_path):
@@ -86,7 +89,9 @@ def test_a_beam_is_looked_for_at_its_own_margin_and_above_diffraction(tmp_path):
     assert budgets.answer(m.with_value("answer.divergence_rad", found.high), {}).margin_db == pytest.approx(
         0.0, abs=1e-9
     )
-    assert link.fits("answer")(m) and not link.fits("answer")(m.with_value("answer.divergence_rad", found.low * 0.999))
+    assert variation.divergence_possible("answer")(m) and not variation.divergence_possible("answer")(
+        m.with_value("answer.divergence_rad", found.low * 0.999)
+    )
 
 
 @pytest.mark.parametrize(
@@ -96,25 +101,25 @@ def test_every_key_has_its_margin_inside_and_not_beyond_its_ends(tmp_path, chang
     file = link_file(tmp_path, changes, UNLIKE, {"communication.data_rate": "100 Mbit/s"})
     m = file.mission
     tables = ("terminals", "communication", "communication.receiver", "communication.beam", "jitter")
-    keys = [each.shown for table in tables for each in link.inputs(m, table) if each.value != 0.0]
+    keys = [each.shown for table in tables for each in variation.inputs(m, table) if each.value != 0.0]
     assert len(keys) > 10
     for key in keys:
         try:
-            solution = link_study.solve(file, key)
+            solution = link_study.solve_key(file, key)
         except ValueError as error:
             assert "moves this margin by nothing" in str(error), key
             continue
-        found = tuple(each for table in tables for each in link.inputs(m, table) if each.shown == key)
+        found = tuple(each for table in tables for each in variation.inputs(m, table) if each.shown == key)
         for interval in solution.solved.intervals:
             for end, outside, is_open in (
                 (interval.low, 1.0 - 1e-6, interval.low_open),
                 (interval.high, 1.0 + 1e-6, interval.high_open),
             ):
-                there = link.moved(m, found, end)
+                there = variation.moved(m, found, end)
                 assert link_performance.margin_db(link.of(there)) >= 3.0, key
-                beyond = link.moved(m, found, end * outside)
-                if not is_open and beyond is not None and link.lit(beyond):
-                    assert link.margin_or_none(link.of(beyond), link_performance.margin_db) < 3.0, key
+                beyond = variation.moved(m, found, end * outside)
+                if not is_open and beyond is not None and link.beam_passes(beyond):
+                    assert variation.margin_or_none(link.of(beyond), link_performance.margin_db) < 3.0, key
 
 
 def test_what_no_value_leaves_is_said_with_the_most(call, tmp_path):

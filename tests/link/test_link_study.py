@@ -14,12 +14,18 @@ from link_files import PATTERN, RECEIVERS, link_file, received_with
 from microrad import link
 from microrad.core.units import parse_quantity
 from microrad.link import acquisition, requirement
-from microrad.link import partner_search as link_acquisition
 from microrad.link import study as link_study
-from microrad.link.radial_error import Jitter
+from microrad.link.acquisition import partner_search as link_acquisition
+from microrad.link.budget.lines import LEFT_AT_ZERO
+from microrad.link.pointing.radial_error import Jitter
 from microrad.loop import sensor
 from microrad.mission.file import LinkFile
-from microrad.report import budget_views, links, requirements
+from microrad.report import requirements
+from microrad.report.links import budgets as budget_views
+from microrad.report.links import words as links_words
+from microrad.report.links.budgets import links_text
+from microrad.report.links.data import finding_data, links_data
+from microrad.report.links.page import acquisition_paragraphs, acquisition_section
 from microrad.report.quantities import quantity
 from preset_files import NAMES, completed
 from shipped import edited_file
@@ -35,19 +41,19 @@ WEAK = {"answer.transmit_power": "4 mW"}  # an answer that the quad cell hardly 
 
 def studied(folder, *changes):
     """The paper's links with changes, with few simulated acquisitions and no scan, unless they are asked for."""
-    return link_study.run(link_file(folder, NO_SCAN, *changes))
+    return link_study.run_link_study(link_file(folder, NO_SCAN, *changes))
 
 
 @pytest.fixture(scope="module")
 def plain(tmp_path_factory):
     """The paper's links, with scan, as they are but for the count of runs."""
-    return link_study.run(link_file(tmp_path_factory.mktemp("plain"), {"acquisition.runs": 2000}))
+    return link_study.run_link_study(link_file(tmp_path_factory.mktemp("plain"), {"acquisition.runs": 2000}))
 
 
 # ------------------------------------------------------------------------------------------------- budgets
 def test_the_shipped_mission_has_the_study_of_its_links(tmp_path, plain):
     file = edited_file(tmp_path, ("runs = 4000 ", "runs = 2000 "))
-    found = link_study.run(LinkFile(file.mission, file.path, file.text, file.sha256, file.sources))
+    found = link_study.run_link_study(LinkFile(file.mission, file.path, file.text, file.sha256, file.sources))
     assert [each.margin_db for each in found.budgets] == [each.margin_db for each in plain.budgets]
     assert found.finding.chances == plain.finding.chances
     assert found.finding.wide.outcome.mean_time_s == plain.finding.wide.outcome.mean_time_s
@@ -66,14 +72,14 @@ def test_the_beacon_is_judged_by_how_often_it_covers_its_partner(tmp_path):
         assert row.actual == pytest.approx(100 * share, abs=0.1)
         assert row.required == 100 * confidence
         assert row.margin == row.actual - row.required
-        assert re.search(rf"covers its partner +{100 * confidence:g} % +98\.\d %", budget_views.text(found, 80))
+        assert re.search(rf"covers its partner +{100 * confidence:g} % +98\.\d %", links_text(found, 80))
 
 
 def test_errors_that_were_derived_from_the_cone_are_held_against_their_root_sum_square_alone(tmp_path):
     def row(*change):
         file = edited_file(tmp_path, ("runs = 4000 ", "runs = 100 "), *change)
         links = LinkFile(file.mission, file.path, file.text, file.sha256, file.sources)
-        return requirement.of_beams(link_study.run(links))[0]
+        return requirement.of_beams(link_study.run_link_study(links))[0]
 
     own, other = row(), row(('error = "248 urad"', 'error = "247 urad"'))
     assert (own.name, own.unit, own.mark) == ("beacon cone over the root sum square", "rad", "derived")
@@ -107,7 +113,7 @@ def test_what_to_change_just_meets_the_requirement(tmp_path, changes, key, unit,
     found = studied(tmp_path, changes)
     judged = requirement.of_links(found)
     row = requirements.nearest(judged)
-    (said,) = [re.search(RATHER, sentence) for sentence in budget_views.short(found) if RATHER[:5] in sentence]
+    (said,) = [re.search(RATHER, sentence) for sentence in links_words.short(found) if RATHER[:5] in sentence]
     assert (said[1], said[3]) == (key, word) and row.met is (word == "least")
     value = parse_quantity(said[2], unit)
     side = -1 if word == "less" else 1
@@ -122,7 +128,7 @@ def test_what_to_change_just_meets_the_requirement(tmp_path, changes, key, unit,
 
 def test_far_more_power_than_there_is_is_no_advice(tmp_path):
     found = studied(tmp_path, {"pointing.confidence": 0.5, "communication.distance": "400000 km"})
-    (said,) = [sentence for sentence in budget_views.short(found) if "; to meet it, " in sentence]
+    (said,) = [sentence for sentence in links_words.short(found) if "; to meet it, " in sentence]
     assert said.endswith(f"; to meet it, change {found.tornados[0].swings[0].key}.")
 
 
@@ -145,7 +151,7 @@ def test_all_three_budgets_are_there_and_communication_is_the_first(plain):
     ],
 )
 def test_a_link_that_is_not_there_has_no_budget_and_nothing_finds_the_partner(tmp_path, absent, names):
-    found = link_study.run(link_file(tmp_path, dict.fromkeys(absent)))
+    found = link_study.run_link_study(link_file(tmp_path, dict.fromkeys(absent)))
     assert [each.name for each in found.budgets] == names
     assert found.finding is None
     assert (found.tracking is None) == ("answer" in absent)
@@ -165,7 +171,7 @@ def test_links_close_when_each_of_them_does(tmp_path, plain):
 
 def test_warnings_are_those_of_every_budget_and_none_where_all_is_given(tmp_path, plain):
     assert len(plain.warnings) == 3
-    assert all(link.LEFT_AT_ZERO in warning for warning in plain.warnings)
+    assert all(LEFT_AT_ZERO in warning for warning in plain.warnings)
     assert [warning.partition(" ")[0] for warning in plain.warnings] == ["Communication", "Beacon", "Answer"]
     assert "Transmit optics loss, Receive optics loss, Tracking split loss" in plain.warnings[0]
     losses = {
@@ -204,7 +210,7 @@ def test_each_preset_with_its_gaps_filled_is_studied(tmp_path, name):
     if m.acquisition is not None:
         few = m.acquisition.model_copy(update={"runs": 100, "scan": None})
         m = m.model_copy(update={"acquisition": few})
-    found = link_study.run(LinkFile(m, file.path, file.text, file.sha256, file.sources))
+    found = link_study.run_link_study(LinkFile(m, file.path, file.text, file.sha256, file.sources))
     assert all(math.isfinite(each.margin_db) for each in found.budgets)
     assert len(found.budgets) == 1 + (m.beacon is not None) + (m.answer is not None)
     assert found.largest_rate_bit_s > 0.0
@@ -442,7 +448,9 @@ def agrees(found):
 
 def test_the_closed_form_and_the_simulation_agree_and_the_log_is_the_first_run(tmp_path, plain):
     assert plain.finding.wide.name == "wide beacon"
-    twice = link_study.run(link_file(tmp_path, {"acquisition.runs": 2000, "acquisition.attempts": 2})).finding
+    twice = link_study.run_link_study(
+        link_file(tmp_path, {"acquisition.runs": 2000, "acquisition.attempts": 2})
+    ).finding
     assert 0.8 < twice.wide.outcome.success_probability < 0.95
     for found in (plain.finding.wide, plain.finding.scan, twice.wide, twice.scan):
         assert agrees(found)
@@ -487,7 +495,9 @@ def rows():
 )
 def test_each_kind_of_scan_is_as_fast_as_its_detector_allows(tmp_path, monkeypatch, pattern, duration_s, speed_rad_s):
     monkeypatch.setattr(link_acquisition, "TRADE_RAD", np.array([1e-4]))
-    found = link_study.run(link_file(tmp_path, {"acquisition.runs": 1000, "acquisition.scan.pattern": pattern})).finding
+    found = link_study.run_link_study(
+        link_file(tmp_path, {"acquisition.runs": 1000, "acquisition.scan.pattern": pattern})
+    ).finding
     scanned = found.scanned
     assert scanned.radius_rad == pytest.approx(RADIUS_RAD, rel=1e-6)
     assert scanned.duration_s == pytest.approx(duration_s, rel=1e-5)
@@ -515,7 +525,7 @@ def test_tracks_must_overlap(tmp_path, pattern, overlap, allowed):
 
 def test_dwells_need_no_overlap_and_have_no_trade_then(tmp_path):
     dwells = {"acquisition.scan.overlap": 0.0, "acquisition.scan.pattern": "step-stare"}
-    found = link_study.run(link_file(tmp_path, FEW, dwells)).finding
+    found = link_study.run_link_study(link_file(tmp_path, FEW, dwells)).finding
     assert 0.5 < found.scan.stages[2].success_probability < 0.995
     assert found.trade is None
 
@@ -524,7 +534,7 @@ def test_a_direction_that_is_known_without_error_is_not_scanned(tmp_path):
     lines = ("body_pointing", "orbit_knowledge", "misalignment")
     sure = {f"pointing.lines.{name}.error": "0 urad" for name in lines} | {"point_ahead": None}
     with pytest.raises(ValueError, match=r"pointing\.lines: every error is 0 rad"):
-        link_study.run(link_file(tmp_path, FEW, sure))
+        link_study.run_link_study(link_file(tmp_path, FEW, sure))
     assert studied(tmp_path, sure).finding.chances.beacon_coverage == 1.0
 
 
@@ -536,16 +546,16 @@ def test_the_scan_waits_for_the_light_that_the_sensor_needs(tmp_path, monkeypatc
     assert plain.finding.scanned.half_angle_rad == pytest.approx(half, rel=1e-12)
     assert plain.finding.scanned.needed_detection_s == pytest.approx(0.01 * (10e-12 / edge) ** 2, rel=1e-9)
     assert plain.finding.scanned.needed_detection_s < plain.finding.scanned.stated_detection_s == 1e-3
-    assert "needs" not in links.acquisition_words(plain.finding)[1]
+    assert "needs" not in acquisition_paragraphs(plain.finding)[1]
 
-    dim = link_study.run(link_file(tmp_path, FEW, {"beacon.required_power": "10 nW"})).finding
+    dim = link_study.run_link_study(link_file(tmp_path, FEW, {"beacon.required_power": "10 nW"})).finding
     needed = 0.01 * (10e-9 / edge) ** 2
     assert dim.scanned.needed_detection_s == pytest.approx(needed, rel=1e-9)
     assert needed > 1e-3
     assert dim.scanned.duration_s == pytest.approx(plain.finding.scanned.duration_s * needed / 1e-3, rel=1e-9)
     assert dim.scanned.speed_rad_s == pytest.approx(dim.trade.speed_rad_s, rel=1e-9)
-    assert f"needs {quantity(needed, 's')} in place of the 1 ms" in links.acquisition_words(dim)[1]
-    data = budget_views.finding_data(dim)
+    assert f"needs {quantity(needed, 's')} in place of the 1 ms" in acquisition_paragraphs(dim)[1]
+    data = finding_data(dim)
     assert (data["scan_stated_detection_s"], data["scan_needed_detection_s"]) == pytest.approx((1e-3, needed))
 
 
@@ -566,21 +576,21 @@ def test_no_beam_of_a_scan_is_brighter_than_its_aperture_makes_it(tmp_path, used
 
 @pytest.mark.parametrize("changes", [{"beacon.required_power": "1 mW"}, {"beacon.transmit_optics_loss": "900 dB"}])
 def test_a_scan_with_too_little_light_never_finds(tmp_path, changes):
-    found = link_study.run(link_file(tmp_path, FEW, changes)).finding
+    found = link_study.run_link_study(link_file(tmp_path, FEW, changes)).finding
     assert not found.scanned.detects
     assert not any(way.possible for way in found.ways)
     assert found.trade is None
-    assert "It detects nothing" in links.acquisition_words(found)[1]
-    assert all("never" in sentence for sentence in budget_views.acquisition(found))
-    assert [budget_views.finding_data(found)[key] for key in ("scan_s", "scan_needed_detection_s")] == [None, None]
+    assert "It detects nothing" in acquisition_paragraphs(found)[1]
+    assert all("never" in sentence for sentence in links_words.acquisition_sentences(found))
+    assert [finding_data(found)[key] for key in ("scan_s", "scan_needed_detection_s")] == [None, None]
 
 
 def test_a_way_that_never_locks_has_no_times(tmp_path):
     found = studied(tmp_path, {"answer.required_power": "1 uW"}).finding
-    (row,) = links.acquisition(found)["ways"]
+    (row,) = acquisition_section(found)["ways"]
     assert row["cells"] == ["never", "0.0000", "\u2013", "none locks", "\u2013"]
-    assert budget_views.acquisition(found) == ["Acquisition by wide beacon: never (simulated 0.0000)."]
-    (way,) = budget_views.finding_data(found)["ways"]
+    assert links_words.acquisition_sentences(found) == ["Acquisition by wide beacon: never (simulated 0.0000)."]
+    (way,) = finding_data(found)["ways"]
     assert (way["mean_time_s"], way["simulated_mean_time_s"]) == (None, None)
 
 
@@ -596,8 +606,8 @@ def test_an_answer_without_light_is_a_result_and_no_refusal(tmp_path, changes):
     assert found.tracking.signal_to_noise < 1e-6
     assert found.finding.chances.answer_detection == pytest.approx(norm.sf(5.0), rel=1e-3)
     assert not found.finding.wide.possible
-    assert any("less than its noise" in sentence for sentence in budget_views.sentences(found))
-    assert budget_views.data(found)["tracking"]["noise_equivalent_angle_rad"] is None
+    assert any("less than its noise" in sentence for sentence in links_words.sentences(found))
+    assert links_data(found)["tracking"]["noise_equivalent_angle_rad"] is None
     names = [line.name for name, line in budget_views.lines(found) if name == "Tracking sensor"]
     assert names == [line.name for line in found.tracking.noise_lines]
 
@@ -668,17 +678,17 @@ def test_the_trade_spreads_the_beacons_power_or_leads_it_over_the_uncertainty(pl
 def test_the_trade_counts_all_losses_but_those_off_axis(tmp_path, monkeypatch, changes, receive):
     sigma = np.array([3e-4, 1e-3])
     monkeypatch.setattr(link_acquisition, "TRADE_RAD", sigma)
-    found = link_study.run(link_file(tmp_path, FEW, changes)).finding
+    found = link_study.run_link_study(link_file(tmp_path, FEW, changes)).finding
     assert_allclose(found.trade.wide_time_s, wide_time_s(sigma, receive), rtol=1e-9)
 
 
 def test_the_uncertainty_of_a_search_is_that_of_the_worse_axis(tmp_path):
     """With its bias, and whichever axis that is."""
-    study = link_study.run(link_file(tmp_path, {"acquisition.runs": 2000}))
+    study = link_study.run_link_study(link_file(tmp_path, {"acquisition.runs": 2000}))
     for bias, rms in (((30e-6, 0.0), (40e-6, 20e-6)), ((0.0, 30e-6), (20e-6, 40e-6))):
         m = study.file.mission
         beams = (link_acquisition.Sent(*each) for each in ((m.beacon, study.beacon), (m.answer, study.answer)))
-        found = link_acquisition.finding(m.acquisition, study.data, Jitter(bias, rms), *beams, study.tracking)
+        found = link_acquisition.find_partner(m.acquisition, study.data, Jitter(bias, rms), *beams, study.tracking)
         assert found.sigma_rad == pytest.approx(50e-6, rel=1e-12)
 
 
@@ -686,7 +696,7 @@ def test_the_uncertainty_of_a_search_is_that_of_the_worse_axis(tmp_path):
 def lit_by(folder, radius, aperture="5 cm", error="0 urad"):
     changes = {"communication.beam": {"profile": "gaussian", "radius": radius, "m_squared": 1.0}}
     changes |= {"terminals.leo_aperture": aperture, "communication.pointing_error": error}
-    return link_study.run(link_file(folder, PATTERN, changes))
+    return link_study.run_link_study(link_file(folder, PATTERN, changes))
 
 
 def test_the_best_radius_of_a_beam_is_the_published_one(tmp_path):
@@ -702,11 +712,11 @@ def test_the_best_radius_of_a_beam_is_the_published_one(tmp_path):
 def test_an_aperture_that_grows_around_an_unchanged_beam_is_pointed_out(tmp_path):
     def told(aperture):
         study = lit_by(tmp_path, "20 mm", aperture, "2 urad")
-        return study.communication.margin_db, [s for s in budget_views.short(study) if "radius" in s]
+        return study.communication.margin_db, [s for s in links_words.short(study) if "radius" in s]
 
     (filled, quiet), (hollow, said) = told("5 cm"), told("10 cm")
     assert hollow - filled < 3.0  # where an aperture that is filled brings 6 dB at either end
     assert quiet == []
     (sentence,) = said
     assert sentence.startswith("The beam's radius of 20 mm leaves ")
-    assert link_study.run(link_file(tmp_path)).beam_radius is None
+    assert link_study.run_link_study(link_file(tmp_path)).beam_radius is None

@@ -16,7 +16,7 @@ from microrad.link.requirement import IMPOSSIBLE
 from microrad.loop import paper_cases
 from microrad.mission.file import load_link, load_mission
 from microrad.report.quantities import quantity, signed
-from microrad.study import story
+from microrad.study import study
 from scenes import cases_of
 from shipped import DEFAULT, without_day, without_fine_pointing
 
@@ -48,19 +48,19 @@ def test_a_link_that_is_below_0_db_most_of_the_time_does_not_close(call, tmp_pat
 @pytest.mark.parametrize("changes", [[], [PATTERN]], ids=["gaussian", "pattern"])
 def test_the_margin_of_the_budget_is_the_one_under_the_jitter(tmp_path, changes):
     jitter = {"jitter": {"bias": ["1 urad", "2 urad"], "rms": ["3 urad", "4 urad"], "bandwidth": "50 Hz"}}
-    found = link_study.run(link_file(tmp_path, NO_BEAMS, jitter, *changes))
+    found = link_study.run_link_study(link_file(tmp_path, NO_BEAMS, jitter, *changes))
     assert found.communication.margin_db == pytest.approx(found.under_jitter.margin_db, abs=1e-9)
     static = budgets.communication(found.file.mission, {}).margin_db
     assert found.communication.totals[-1].name == "Static margin"
     assert found.communication.totals[-1].value == static
     assert "10 µrad" in found.communication.totals[-1].basis
-    plain = link_study.run(link_file(tmp_path, NO_BEAMS, *changes))
+    plain = link_study.run_link_study(link_file(tmp_path, NO_BEAMS, *changes))
     assert [line.name for line in plain.communication.totals] == ["Received power", "Required power", "Margin"]
 
 
 def test_a_rate_is_solved_for_at_the_error_of_the_outage(tmp_path):
     jitter = {"jitter": {"bias": ["0 urad", "0 urad"], "rms": ["5 urad", "5 urad"], "bandwidth": "50 Hz"}}
-    found = link_study.run(link_file(tmp_path, NO_BEAMS, jitter, {"communication.data_rate": "largest"}))
+    found = link_study.run_link_study(link_file(tmp_path, NO_BEAMS, jitter, {"communication.data_rate": "largest"}))
     assert found.communication.margin_db == pytest.approx(3.0, abs=1e-9)
     assert found.largest_rate_bit_s == pytest.approx(found.file.mission.communication.data_rate_bit_s, rel=1e-12)
     assert found.under_jitter.data_rate_bit_s == pytest.approx(found.largest_rate_bit_s, rel=1e-9)
@@ -75,7 +75,7 @@ def test_a_static_error_in_place_of_a_jitter_is_refused(call, tmp_path):
 def test_the_mean_loss_is_that_of_the_closed_form(tmp_path):
     """10 µrad per axis on 5 cm at 1.55 µm without bias: 3.0686 dB."""
     jitter = {"jitter": {"bias": ["0 urad", "0 urad"], "rms": ["10 urad", "10 urad"], "bandwidth": "50 Hz"}}
-    found = link_study.run(link_file(tmp_path, NO_BEAMS, jitter)).under_jitter
+    found = link_study.run_link_study(link_file(tmp_path, NO_BEAMS, jitter)).under_jitter
     half = 2 * 1.55e-6 / (math.pi * 0.05)
     assert found.mean_loss_db == pytest.approx(10 * math.log10(1 + 4 * (10e-6 / half) ** 2), rel=1e-6)
     assert f"{found.mean_loss_db:.4f}" == "3.0686"
@@ -116,7 +116,7 @@ def test_a_link_that_closes_keeps_its_margin_by_simulation(tmp_path, seed):
     """1e5 errors are drawn; the share below 0 dB is at most the outage, but for five deviations of that share."""
     rng = np.random.default_rng(seed)
     changes = drawn(rng)
-    found = link_study.run(link_file(tmp_path, changes))
+    found = link_study.run_link_study(link_file(tmp_path, changes))
     m, runs = found.file.mission, 100_000
     errors = rng.normal(m.jitter.bias_rad, m.jitter.rms_rad, (runs, 2))
     ahead = 0.0 if m.point_ahead.corrected else 2.0 * m.point_ahead.transverse_velocity_m_s / 299792458.0
@@ -191,7 +191,7 @@ def shaken_by_its_own_loop(rng, **communication):
 def test_budget_run_and_a_campaign_of_one_row_end_alike(call, tmp_path, monkeypatch):
     """Random whole missions, and one at 1 m, whose budget has more light arrive than was sent."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(story.paper, "applies", lambda m: False)  # this and the page take longer than all the rest
+    monkeypatch.setattr(study.paper, "applies", lambda m: False)  # this and the page take longer than all the rest
     monkeypatch.setattr(report, "write", lambda *args, **more: None)
     codes = []
     for name, seed, changes in (("meets", 0, {}), ("closes", 4, {}), ("near", 2, {"distance": "1 m"})):

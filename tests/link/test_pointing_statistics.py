@@ -12,7 +12,7 @@ from scipy.stats import t as student
 
 from microrad.link.pointing import fading as pf
 from microrad.link.pointing import statistics as ps
-from microrad.link.radial_error import Jitter
+from microrad.link.pointing.radial_error import Jitter
 
 URAD = 1e-6
 THETA = 10.0 * URAD

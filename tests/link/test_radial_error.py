@@ -9,7 +9,7 @@ from scipy.integrate import quad
 from scipy.special import erfc
 from scipy.stats import ncx2, norm
 
-from microrad.link.radial_error import Jitter, density_on_circle, radial_cdf, radial_quantile, radial_survival
+from microrad.link.pointing.radial_error import Jitter, density_on_circle, radial_cdf, radial_quantile, radial_survival
 
 URAD = 1e-6
 EQUAL = Jitter((0.0, 0.0), (3.0 * URAD, 3.0 * URAD))

@@ -566,13 +566,13 @@ def test_background_that_cannot_be_is_refused(call, message):
         call()
 
 
-@pytest.mark.parametrize(("gamma", "sign"), [(gammaincc, 1.0), (gammainc, -1.0)])
-def test_temmes_expansion_has_its_second_term(gamma, sign, monkeypatch):
+@pytest.mark.parametrize(("gamma", "above"), [(gammaincc, False), (gammainc, True)])
+def test_temmes_expansion_has_its_second_term(gamma, above, monkeypatch):
     """Taken for a thousand counts, where scipy is exact: one term alone errs by 5e-8, two by 1e-10."""
     monkeypatch.setattr(counting, "_MANY", 100.0)
     count = np.full(13, 999.0)
     mean = 1000.0 + np.sqrt(1000.0) * np.linspace(-3.0, 3.0, 13)
-    found = counting._tail(gamma, sign, count, mean)
+    found = counting._tail(count, mean, above)
     assert_allclose(found, gamma(count + 1.0, mean), rtol=0, atol=1e-9)
 
 

@@ -10,8 +10,9 @@ import budgets
 from link_files import GAUSSIAN, PATTERN, RECEIVERS, SKY, link_file, received_with
 from microrad import link
 from microrad.link import study as link_study
-from microrad.link import under_jitter as link_performance
-from microrad.link.tornado import RELATIVE, STEP_DB
+from microrad.link import variation
+from microrad.link.pointing import outage as link_performance
+from microrad.link.variation import RELATIVE, STEP_DB
 from microrad.mission.fields import Quantity
 from microrad.mission.file import load_link
 from shipped import SHIPPED
@@ -134,7 +135,12 @@ def test_equal_swings_stand_as_the_mission_has_their_keys(tmp_path, seed):
         return link_performance.margin_db(link.of(m)) + draw.uniform(-1e-12, 1e-12)
 
     found = link.swings(
-        file.mission, file.sources, ("terminals", "communication"), "decibel", as_a_processor_leaves_it, link.lit
+        file.mission,
+        file.sources,
+        ("terminals", "communication"),
+        "decibel",
+        as_a_processor_leaves_it,
+        link.beam_passes,
     )
     aperture, distance = (
         next(s for s in found if s.key == k) for k in ("terminals.geo_aperture", "communication.distance")
@@ -158,7 +164,7 @@ def test_what_does_not_move_the_margin_is_left_out(tmp_path):
 def test_the_margin_of_the_other_beams_over_their_own_inputs(tmp_path, name, end, other):
     file = link_file(tmp_path, CHANNEL, LEFT, {f"terminals.{other}_obscuration": 0.3})
     m, budget = file.mission, {"beacon": budgets.beacon, "answer": budgets.answer}[name]
-    found = {each.key: each for each in link.beam_tornado(m, file.sources, name)}
+    found = {each.key: each for each in variation.beam_tornado(m, file.sources, name)}
     keys = {f"{name}.{key}" for key in ("transmit_power", "divergence", "pointing_error", "distance", "strehl")}
     keys |= {f"{name}.{key}" for key in ("required_power", "transmit_optics_loss", "receive_optics_loss")}
     keys |= {f"terminals.{other}_{key}" for key in ("aperture", "obscuration")}
@@ -180,7 +186,7 @@ def test_the_margin_of_the_other_beams_over_their_own_inputs(tmp_path, name, end
 def test_no_beam_is_moved_below_diffraction(tmp_path, name, diameter):
     least = 2 * math.sqrt(8) * 1.55e-6 / (math.pi * diameter)
     file = link_file(tmp_path, {f"{name}.divergence": f"{1.05 * least * 1e6} urad", f"{name}.pointing_error": "9 urad"})
-    found = {each.key: each for each in link.beam_tornado(file.mission, file.sources, name)}
+    found = {each.key: each for each in variation.beam_tornado(file.mission, file.sources, name)}
     moved = found[f"{name}.divergence"]
     assert least <= moved.low < moved.value
     assert moved.low == pytest.approx(1.05 * least * (1 - RELATIVE / 4), rel=1e-9)  # halved twice from 10 %
@@ -195,7 +201,7 @@ def test_the_margin_under_jitter_over_its_inputs(tmp_path, changes):
     m = file.mission
     under = of_communication(file)
     assert under.of == "Communication"
-    assert under.margin_db == pytest.approx(link_performance.of_jitter(link.of(m)).margin_db, abs=1e-9)
+    assert under.margin_db == pytest.approx(link_performance.performance_under_jitter(link.of(m)).margin_db, abs=1e-9)
     found = {each.key: each for each in under.swings}
     assert {"jitter.bias.1", "jitter.rms.1", "jitter.rms.2", "requirement.outage"} <= found.keys()
     assert {"communication.transmit_power", "terminals.leo_aperture"} <= found.keys()
@@ -219,7 +225,8 @@ def test_the_margin_under_jitter_over_its_inputs(tmp_path, changes):
             both = list(getattr(m.jitter, place))
             both[item] = value
             moved = changed(m, f"jitter.{place}", tuple(both))
-            assert link_performance.of_jitter(link.of(moved)).margin_db == pytest.approx(margin, abs=1e-9)
+            found_db = link_performance.performance_under_jitter(link.of(moved)).margin_db
+            assert found_db == pytest.approx(margin, abs=1e-9)
         assert each.margin_low_db > under.margin_db > each.margin_high_db
 
 
@@ -243,8 +250,8 @@ def test_a_study_holds_a_tornado_for_each_margin_that_there_is(tmp_path):
     found = link_study.tornados(m, sources, all_three)
     assert [each.of for each in found] == ["Communication", "Beacon", "Answer"]
     assert [each.margin_db for each in found] == [each.margin_db for each in all_three]
-    assert found[1].swings == link.beam_tornado(m, file.sources, "beacon")
-    assert found[2].swings == link.beam_tornado(m, file.sources, "answer")
+    assert found[1].swings == variation.beam_tornado(m, file.sources, "beacon")
+    assert found[2].swings == variation.beam_tornado(m, file.sources, "answer")
 
 
 @pytest.mark.parametrize("name", RECEIVERS)
@@ -340,7 +347,7 @@ def test_only_a_receiver_too_slow_is_left_without_a_margin(tmp_path):
 
     file = link_file(tmp_path)
     with pytest.raises(ValueError, match="a value without meaning"):
-        link.swings(file.mission, file.sources, link.LINK_TABLES, "decibel", refused, link.lit)
+        link.swings(file.mission, file.sources, link.LINK_TABLES, "decibel", refused, link.beam_passes)
 
 
 def test_a_beam_moves_no_further_than_the_obscuration_lets_some_of_it_pass(tmp_path):

@@ -4,7 +4,7 @@ import pytest
 
 import budgets
 from microrad import mirror
-from microrad.link.tracking_light import tracking_light_w
+from microrad.link import tracking_light_w
 from microrad.loop import fine_pointing
 from microrad.mission.file import load_mission
 from shipped import DEFAULT, SHIPPED

@@ -10,7 +10,8 @@ from day_files import ALONE, BY_FILE, EPOCH, HELD, KEPLERIAN, KIRUNA, LIMITS, da
 from microrad import orbit
 from microrad.mission.file import MissionError, load_link, load_mission
 from microrad.mission.tables.operations import Constellation, Downlink
-from microrad.orbit import constellation
+from microrad.orbit import operations
+from microrad.orbit.base import required
 from shipped import SHIPPED, edited_file, without_fine_pointing
 
 
@@ -252,7 +253,7 @@ def with_epoch(folder, text):
 def test_a_date_with_its_zone_is_taken_quoted_or_not(tmp_path, text, epoch):
     file = load_link(with_epoch(tmp_path, text))
     assert file.mission.orbit.epoch == epoch
-    assert orbit.Epoch.from_text(epoch).utc(0.0) == f"2026-03-20T12:00:00.{'250' if '.25' in text else '000'}Z"
+    assert orbit.Epoch(epoch).utc(0.0) == f"2026-03-20T12:00:00.{'250' if '.25' in text else '000'}Z"
 
 
 @pytest.mark.parametrize(
@@ -334,7 +335,7 @@ def test_a_file_or_a_satellite_that_is_not_there(tmp_path):
     has(text, "orbit.leo: ", "is of 'EXEMPLAR'", "nearest are EXAMPLE 1")
 
 
-LOW = orbit.circular("low", orbit.Epoch.from_text(EPOCH), 500e3, math.radians(97.4), 0.0, 0.0, True)
+LOW = orbit.circular("low", orbit.Epoch(EPOCH), 500e3, math.radians(97.4), 0.0, 0.0, True)
 BY_EPHEMERIS = {"orbit.leo": {"kind": "ephemeris", "file": "a.oem"}, **ALONE}
 
 
@@ -422,7 +423,7 @@ def test_without_tables_the_refusal_names_the_table(tmp_path):
     with pytest.raises(orbit.OrbitError, match=r"no table \[orbit\]: microrad init writes one"):
         orbit.pair(file.mission.orbit, file.mission.terminals, tmp_path)
     with pytest.raises(ValueError, match=r"no table \[constellation\]: microrad init writes one"):
-        constellation.table(file.mission.constellation)
+        required(file.mission.constellation, "constellation", operations.OperationsError)
 
 
 def test_tables_with_stations_and_relays_are_hashed_by_what_is_in_them(tmp_path):

@@ -6,7 +6,8 @@ import pytest
 
 from link_files import GAUSSIAN, PATTERN, RECEIVERS, SKY, data_with, link_file, received_with, written
 from microrad.core.units import parse_quantity
-from microrad.link import LitAperture, gaussian_beam_gain_db
+from microrad.link.beams import LitAperture
+from microrad.link.gains import gaussian_beam_gain_db
 from microrad.mission.file import MissionError, load_link
 from microrad.mission.model import LinkMission, Mission, mission_schema
 from microrad.mission.tables.link import Receiver, half_angle_rad, narrowest_half_angle_rad

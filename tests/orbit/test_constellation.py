@@ -11,10 +11,11 @@ import pytest
 from day_files import BY_FILE, day_file, element_set
 from microrad import orbit
 from microrad.link import study as link_study
-from microrad.orbit import constellation, operations
+from microrad.orbit import constellation, files, operations
 from microrad.orbit import day as day_study
 from microrad.orbit.constellation import opportunities
-from microrad.report import constellation_views
+from microrad.orbit.propagation import mean_elements
+from microrad.report.day.constellation import plan_data, plan_sentences, plan_text, satellites_table
 
 SIX_HOURS = {"orbit.duration": "6 h"}
 TWO_TERMINALS = {"constellation.terminals": 2}
@@ -31,8 +32,8 @@ def made(folder, *changes):
 
 
 def planned(folder, *changes):
-    links = link_study.run(day_file(folder, *changes))
-    return constellation.run(links.file, day_study.given_loss(links)), links
+    links = link_study.run_link_study(day_file(folder, *changes))
+    return constellation.run_constellation(links.file, day_study.given_loss(links)), links
 
 
 @pytest.fixture(scope="module")
@@ -214,9 +215,9 @@ def test_a_session_over_several_rates_has_the_one_that_closes_throughout(tmp_pat
 
 
 def test_an_outage_takes_its_share_of_the_volume(tmp_path, plan):
-    links = link_study.run(day_file(tmp_path, SIX_HOURS))
+    links = link_study.run_link_study(day_file(tmp_path, SIX_HOURS))
     loss = day_study.given_loss(links)
-    worse = constellation.run(links.file, day_study.PointingLoss(loss.loss_db, 0.2, "test"))
+    worse = constellation.run_constellation(links.file, day_study.PointingLoss(loss.loss_db, 0.2, "test"))
     assert worse.volume_bit == pytest.approx(0.8 * plan.volume_bit)
 
 
@@ -231,10 +232,10 @@ def test_a_file_of_elements_is_a_constellation(tmp_path):
     plan = with_elements(tmp_path, text)
     assert plan.satellites == ("EXAMPLE 1", "EXAMPLE 2", "EXAMPLE 3")
     assert {one.satellite for one in plan.planned} == set(plan.satellites)
-    sets = orbit.read_elements(tmp_path / "a.tle")
+    sets = files.read_elements(tmp_path / "a.tle")
     pair, own, relays = made(tmp_path, SIX_HOURS, FILED)
     for elements, satellite in zip(sets, own, strict=True):
-        alone = orbit.sgp4_orbit(elements, pair.epoch)
+        alone = mean_elements.Sgp4Orbit(elements, pair.epoch)
         time_s = np.array([0.0, 7000.0])
         np.testing.assert_array_equal(satellite.orbit.states(time_s).position_m, alone.states(time_s).position_m)
         assert satellite.limits == pair.leo.limits
@@ -283,22 +284,22 @@ def test_the_contact_plan_has_every_session_with_data_in_whole_seconds(plan):
 
 
 def test_the_words_add_up(plan):
-    first, second, third = constellation_views.sentences(plan)
+    first, second, third = plan_sentences(plan)
     seen = float(np.sum(plan.opportunities.end_s - plan.opportunities.start_s)) / 3600.0
     assert f"12 satellites share 2 relays of one terminal each: in 6 h {len(plan.opportunities.start_s)} conta" in first
     assert f"{seen:.0f} h in all" in first
     assert f"{len(plan.planned)} sessions" in first
     assert all(f"{name} {100 * use:.0f} %" in second for name, use in zip(plan.relays, plan.use, strict=True))
     assert third.endswith(f" a pointing loss of {plan.loss.loss_db:.2f} dB ({plan.loss.source}).")
-    data = constellation_views.data(plan)
+    data = plan_data(plan)
     assert sum(s["sessions"] for s in data["satellites"]) == data["sessions"] == len(plan.planned)
     assert sum(s["volume_bit"] for s in data["satellites"]) == pytest.approx(data["volume_bit"])
-    assert len(constellation_views.rows(plan)) == 12
+    assert len(satellites_table(plan).rows) == 12
 
 
 def test_a_long_table_is_cut_and_says_so(tmp_path):
     plan, _ = planned(tmp_path, {"orbit.duration": "1 h", "constellation.satellites": 45})
-    text = constellation_views.text(plan, 120)
+    text = plan_text(plan, 120)
     assert "The first 40 of 45 satellites; --csv has every session." in text
     assert " 3-10 " in text.replace("\n", " ")
     assert "3-11" not in text
@@ -306,6 +307,6 @@ def test_a_long_table_is_cut_and_says_so(tmp_path):
 
 def test_the_tables_that_a_plan_needs(tmp_path):
     loss = day_study.PointingLoss(1.0, 0.0, "test")
-    links = link_study.run(day_file(tmp_path, {"constellation": None}))
+    links = link_study.run_link_study(day_file(tmp_path, {"constellation": None}))
     with pytest.raises(operations.OperationsError, match=r"no table \[constellation\]"):
-        constellation.run(links.file, loss)
+        constellation.run_constellation(links.file, loss)

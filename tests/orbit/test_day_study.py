@@ -13,6 +13,8 @@ from microrad.link import study as link_study
 from microrad.orbit import EARTH_RADIUS_M
 from microrad.orbit import day as day_study
 from microrad.orbit.day import NOTHING, Numbers, PointingLoss, Swing, assumptions, flow, geometry, given_loss
+from microrad.orbit.earth import figure
+from microrad.orbit.propagation.ephemeris import EphemerisOrbit
 
 C_M_S = 299_792_458.0
 EARTH_POLAR_M = EARTH_RADIUS_M * (1.0 - 1.0 / 298.257223563)
@@ -27,12 +29,12 @@ RATES = {"operations.rates": ["50 Mbit/s", "280 Mbit/s", "320 Mbit/s", "400 Mbit
 @pytest.fixture(scope="module")
 def links(tmp_path_factory):
     """The links of the shipped mission, its acquisition simulated a hundred times."""
-    return link_study.run(day_file(tmp_path_factory.mktemp("shipped"), ALONE))
+    return link_study.run_link_study(day_file(tmp_path_factory.mktemp("shipped"), ALONE))
 
 
 @pytest.fixture(scope="module")
 def day(links):
-    return day_study.run(links)
+    return day_study.run_day_study(links)
 
 
 @pytest.fixture
@@ -41,7 +43,7 @@ def quick(tmp_path, monkeypatch):
     monkeypatch.setattr(day_study, "swings", lambda *given: ())
 
     def run(*changes, loss=None):
-        return day_study.run(link_study.run(day_file(tmp_path, ALONE, *changes)), loss)
+        return day_study.run_day_study(link_study.run_link_study(day_file(tmp_path, ALONE, *changes)), loss)
 
     return run
 
@@ -51,14 +53,14 @@ class Seconds:
     """Each second of a day and its tail, looked at in its middle; nothing here knows of contacts."""
 
     def __init__(self, day):
-        pair, m = day.view.pair, day.mission
+        pair = day.view.pair
         self.span_s = pair.span_s[1]
         self.time_s = np.arange(0.0, pair.whole_s[1]) + 0.5
         self.own, self.far = (t.orbit.states(self.time_s).position_m for t in (pair.leo, pair.geo))
         self.range_m = np.sqrt(np.sum((self.far - self.own) ** 2, axis=0))
-        self.epoch, self.operations, self.day = pair.epoch, m.operations, day
+        self.epoch, self.operations, self.day = pair.epoch, day.operations, day
         self.inside = self.time_s < self.span_s
-        grazing = m.orbit.grazing_height_m
+        grazing = pair.earth.grazing_height_m
         self.seen = self.clear(grazing) & self.off_sun(5.0) & self.below_geo(10.5)
 
     def clear(self, height_m):
@@ -190,7 +192,7 @@ def test_the_range_between_samples_is_the_orbits(day, seconds):
 
 def test_without_acquisition_volume_and_latency_are_those_of_packets(quick, seconds, links):
     found = quick(NO_SEARCH)
-    o, way = found.mission.operations, found.relay
+    o, way = found.operations, found.relay
     rate = seconds.rate_bit_s(links, [300e6], 3.0)
     inside = rate[seconds.inside]
     assert way.capacity_bit == pytest.approx(np.sum(inside), rel=1e-3)
@@ -233,7 +235,7 @@ def test_delays_add_to_every_latency(quick):
 
 def test_the_time_to_lock_is_drawn_from_the_acquisitions(day, links, seconds):
     rate = seconds.rate_bit_s(links, [300e6], 3.0)
-    o, simulated = day.mission.operations, links.finding.wide.simulated
+    o, simulated = day.operations, links.finding.wide.simulated
     volumes = []
     for run in range(o.runs):
         draw = np.random.Generator(np.random.Philox(key=[o.seed, run]))
@@ -252,7 +254,7 @@ def test_the_time_to_lock_is_drawn_from_the_acquisitions(day, links, seconds):
 def test_acquisitions_that_fail_are_counted_and_carry_nothing(quick, tmp_path):
     hard = {"acquisition.lock_probability": 0.5, "acquisition.attempts": 1, "operations.runs": 200}
     found, easy = quick(SIX_HOURS, hard), quick(SIX_HOURS, NO_SEARCH)
-    found_share = link_study.run(day_file(tmp_path, SIX_HOURS, hard)).finding.wide.simulated_probability
+    found_share = link_study.run_link_study(day_file(tmp_path, SIX_HOURS, hard)).finding.wide.simulated_probability
     share = found.relay.failed_contacts / len(found.relay.contacts)
     assert 0.3 < share < 0.9
     assert share == pytest.approx(1.0 - found_share, abs=0.06)
@@ -262,7 +264,7 @@ def test_acquisitions_that_fail_are_counted_and_carry_nothing(quick, tmp_path):
 
 def test_rates_stepped_with_range(quick, seconds, links):
     found = quick(NO_SEARCH, RATES)
-    rates = found.mission.operations.rates_bit_s
+    rates = found.operations.rates_bit_s
     rate = seconds.rate_bit_s(links, rates, 3.0)
     assert set(np.unique(rate)) == {0.0, 50e6, 280e6, 320e6, 400e6}
     assert found.relay.capacity_bit == pytest.approx(np.sum(rate[seconds.inside]), rel=1e-3)
@@ -303,7 +305,7 @@ def test_the_relays_share_is_granted_from_the_beginning(quick, seconds, links):
 
 def test_a_full_store_loses_the_newest(quick, seconds, links):
     found = quick(NO_SEARCH, {"operations.store": "0.6 GB"})
-    o, rate = found.mission.operations, seconds.rate_bit_s(links, [300e6], 3.0)
+    o, rate = found.operations, seconds.rate_bit_s(links, [300e6], 3.0)
     made = np.where(seconds.inside, o.instrument_rate_bit_s, 0.0)
     sent, lost, left = packets(rate, made, o.store_bit, o.relay_delay_s)
     assert lost > 1e9
@@ -316,10 +318,10 @@ def test_a_full_store_loses_the_newest(quick, seconds, links):
 # ------------------------------------------------------------------------------------------------------ direct downlink
 def stations_by_second(day, setup_s):
     """Rate of the radio in each second: the station that rose first is kept until the satellite sets there."""
-    down, pair = day.mission.operations.downlink, day.view.pair
+    down, pair = day.operations.downlink, day.view.pair
     time_s = np.arange(0.0, pair.whole_s[1]) + 0.5
     own = pair.leo.orbit.states(time_s).position_m
-    seen = {s.name: orbit.elevation_rad(s, pair.epoch, time_s, own) > s.mask_rad for s in orbit.stations(down)}
+    seen = {s.name: figure.elevation_rad(s, pair.epoch, time_s, own) > s.mask_rad for s in orbit.stations(down)}
     rose: dict[str, int] = {}
     serving, since, rate, log = "", 0, np.zeros(time_s.size), []
     for second in range(time_s.size):
@@ -341,7 +343,7 @@ def stations_by_second(day, setup_s):
 @pytest.mark.parametrize("stations", [{}, {"operations.downlink.stations.tromso": TROMSO}])
 def test_the_direct_downlink_has_one_station_at_a_time(quick, seconds, stations):
     found = quick(NO_SEARCH, stations)
-    way, o = found.direct, found.mission.operations
+    way, o = found.direct, found.operations
     rate, log = stations_by_second(found, 20.0)
     log = [(name, at) for name, at in log if at < 86400]
     assert list(way.stations) == [name for name, _ in log]
@@ -421,7 +423,7 @@ def test_an_ephemeris_of_the_same_orbit_has_the_same_contacts(quick, day, tmp_pa
     (tmp_path / "a.oem").write_text(ephemeris(own, np.arange(0.0, 172801.0, 60.0)), encoding="utf-8")
     limits = {"attitude": "free", "slew_limit": "0.5 deg/s", "sun_exclusion": "5 deg", "in_eclipse": True}
     found = quick({"orbit.leo": {"kind": "ephemeris", "file": "a.oem", "limits": limits}})
-    assert isinstance(found.view.pair.leo.orbit, orbit.EphemerisOrbit)
+    assert isinstance(found.view.pair.leo.orbit, EphemerisOrbit)
     assert len(found.view.contacts) == len(day.view.contacts)
     for one, other in zip(found.view.contacts, day.view.contacts, strict=True):
         assert (one.begins, one.ends) == (other.begins, other.ends)
@@ -570,7 +572,7 @@ def test_each_side_is_the_day_of_a_mission_edited_so(quick, tmp_path, monkeypatc
     ],
 )
 def test_an_assumption_that_leaves_no_orbit_is_left_as_it_is(tmp_path, changes, name, sides):
-    found = day_study.run(link_study.run(day_file(tmp_path, SIX_HOURS, NO_SEARCH, changes)))
+    found = day_study.run_day_study(link_study.run_link_study(day_file(tmp_path, SIX_HOURS, NO_SEARCH, changes)))
     (swing,) = [s for s in found.swings if s.name == name]
     assert (swing.low, swing.high) == sides
     unchanged = swing.at_low if sides[0] == NOTHING else swing.at_high
@@ -632,7 +634,7 @@ def test_the_longest_time_without_contact_is_followed_beyond_the_span(day):
     passes, span, whole = day.direct.contacts, day.view.pair.span_s, day.view.pair.whole_s
     later = min(
         each.start_s
-        for station in orbit.stations(day.mission.operations.downlink)
+        for station in orbit.stations(day.operations.downlink)
         for each in orbit.passes(day.view.pair.leo.orbit, station, day.view.pair.epoch, whole)
         if each.start_s > passes[-1].end_s
     )
@@ -646,7 +648,7 @@ def test_the_longest_time_without_contact_is_followed_beyond_the_span(day):
 def test_the_track_is_open_where_the_contacts_are(day, seconds):
     from microrad.orbit.day.ground_track import ground_track
 
-    track = ground_track(day.view, (day.relay, day.direct), day.mission.operations.downlink)
+    track = ground_track(day.view, (day.relay, day.direct), day.operations.downlink)
     at = track.time_s.astype(int)
     near_edge = np.array([np.any(np.diff(seconds.seen[max(k - 3, 0) : k + 3].astype(int))) for k in at])
     np.testing.assert_array_equal(track.open["relay"][~near_edge], seconds.seen[at][~near_edge])
@@ -656,21 +658,21 @@ def test_the_track_is_open_where_the_contacts_are(day, seconds):
     assert track.relay.latitude_rad == pytest.approx(0.0, abs=1e-9)
     (kiruna,) = track.stations
     # the outline is where a satellite at the mean height stands at the mask
-    station = orbit.stations(day.mission.operations.downlink)[0]
+    station = orbit.stations(day.operations.downlink)[0]
     assert (kiruna.latitude_rad, kiruna.longitude_rad) == (station.latitude_rad, station.longitude_rad)
 
 
 def test_nothing_about_a_day_is_asked_of_a_mission_without_its_tables(tmp_path):
-    links = link_study.run(day_file(tmp_path, ALONE, {"operations": None}))
+    links = link_study.run_link_study(day_file(tmp_path, ALONE, {"operations": None}))
     with pytest.raises(ValueError, match=r"no table \[operations\]: microrad init writes one"):
-        day_study.run(links)
+        day_study.run_day_study(links)
     assert geometry.view(
         orbit.pair(links.file.mission.orbit, links.file.mission.terminals, tmp_path), 1.55e-6
     ).encounters
 
 
 def test_an_uncorrected_point_ahead_is_in_the_loss_and_so_in_the_reach(tmp_path):
-    links = link_study.run(day_file(tmp_path, SIX_HOURS, {"point_ahead.corrected": False}))
+    links = link_study.run_link_study(day_file(tmp_path, SIX_HOURS, {"point_ahead.corrected": False}))
     loss = day_study.given_loss(links)
     assert loss.loss_db > 100.0
     (closing,) = flow.closings(links.file.mission.operations, link.of(links.file.mission), loss)

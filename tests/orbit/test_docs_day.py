@@ -14,9 +14,10 @@ from microrad.loop import control, fine_pointing
 from microrad.loop.fine_loop.loop import assemble
 from microrad.loop.fine_pointing import designs
 from microrad.mission import file as missionfile
-from microrad.orbit import constellation
+from microrad.orbit import constellation, files
 from microrad.orbit import day as day_study
 from microrad.orbit.day import flow, geometry
+from microrad.orbit.propagation import analytic, mean_elements
 from microrad.study import contact_run
 from places import ROOT
 from scenes import scene_of
@@ -62,9 +63,11 @@ def folder(tmp_path_factory):
     """A folder with the element set, and with an ephemeris of it each minute."""
     path = tmp_path_factory.mktemp("orbits")
     (path / "satellite.tle").write_text(ELEMENTS, encoding="utf-8")
-    epoch = orbit.Epoch.from_text("2026-03-20T12:00:00Z")
+    epoch = orbit.Epoch("2026-03-20T12:00:00Z")
     time_s = np.arange(0.0, 172801.0, 60.0)
-    rows = 1e-3 * np.vstack(orbit.sgp4_orbit(orbit.read_elements(path / "satellite.tle")[0], epoch).states(time_s))
+    rows = 1e-3 * np.vstack(
+        mean_elements.Sgp4Orbit(files.read_elements(path / "satellite.tle")[0], epoch).states(time_s)
+    )
     lines = [epoch.utc(t)[:-1] + "".join(f" {x:.9f}" for x in row) for t, row in zip(time_s, rows.T, strict=True)]
     (path / "satellite.oem").write_text(EPHEMERIS + "\n".join(lines) + "\n", encoding="utf-8")
     return path
@@ -99,12 +102,12 @@ def view(replaced, folder):
 
 @pytest.fixture(scope="module")
 def links():
-    return link_study.run(missionfile.load_link(ROOT / "missions" / "paper.toml"))
+    return link_study.run_link_study(missionfile.load_link(ROOT / "missions" / "paper.toml"))
 
 
 @pytest.fixture(scope="module")
 def day(links):
-    return day_study.run(links)
+    return day_study.run_day_study(links)
 
 
 def ends(seen):
@@ -141,7 +144,7 @@ def test_the_commands_of_the_page_run(call, tmp_path):
 # --------------------------------------------------------------------------------------------------------- the words
 def test_what_moves_the_ends_of_contacts(view, day):
     own = day.view
-    inclination = f'inclination = "{math.degrees(orbit.sun_synchronous_inclination_rad(500e3))!r} deg"'
+    inclination = f'inclination = "{math.degrees(analytic.sun_synchronous_inclination_rad(500e3))!r} deg"'
     still = ORBITS[0].replace('gravity = "j2"', 'gravity = "two-body"')
     still = still.replace('inclination = "sun-synchronous"', inclination)
     j2 = np.abs(ends(view(still)) - ends(own)).max()
@@ -201,9 +204,10 @@ def test_rates_share_and_store(replaced, links, day):
         m = replaced(OPERATIONS.replace(*change) if change else OPERATIONS).mission
         o, seen = m.operations, day.view
         found = flow.closings(m.operations, link.of(m), day.loss)
-        relay = flow.relay(o, seen, flow.rate_table(found), day.loss.outage, day_study.acquired(links), 1.0)
+        way = links.finding.way(day.operations.acquisition)
+        relay = flow.relay(o, seen, flow.rate_table(found), day.loss.outage, way, 1.0)
         return SimpleNamespace(
-            closings=found, relay=relay, direct=flow.direct(o, seen, flow.heard(o.downlink, seen.pair))
+            closings=found, relay=relay, direct=flow.direct(o, seen, flow.station_passes(o.downlink, seen.pair))
         )
 
     stepped = of()
@@ -215,7 +219,7 @@ def test_rates_share_and_store(replaced, links, day):
     told(f"in place of {day.relay.capacity_bit / 8e12:.2f} TB at 300 Mbit/s alone")
     told(f"within {stepped.relay.slow_s / 60:.1f} min in place of {day.relay.slow_s / 60:.1f} min")
     told("Without `[acquisition]` lock is there at once")
-    at_once = flow.relay(day.mission.operations, day.view, flow.rate_table(day.closings), 0.0, None, 1.0)
+    at_once = flow.relay(day.operations, day.view, flow.rate_table(day.closings), 0.0, None, 1.0)
     assert np.ptp(at_once.capacity_spread_bit) == 0.0 and at_once.capacity_bit > day.relay.capacity_bit
     half = of("relay_share = 1.0", "relay_share = 0.5")
     told(f"`relay_share = 0.5` {half.relay.capacity_bit / 8e12:.2f} TB are left", f"{half.relay.slow_s / 60:.1f} min")
@@ -282,7 +286,7 @@ def test_one_contact_in_time(lqg, links, day):
 
 # ---------------------------------------------------------------------------------------------------- constellation
 def test_the_constellation(links):
-    plan = constellation.run(links.file, day_study.given_loss(links))
+    plan = constellation.run_constellation(links.file, day_study.given_loss(links))
     reach = np.sum(plan.opportunities.end_s - plan.opportunities.start_s) / 3600.0
     told(
         f"`microrad constellation leo-geo.toml` has {len(plan.planned)} of them, in {reach:.0f} h of contacts in reach"
@@ -302,11 +306,11 @@ def test_a_pattern_repeats_elements_and_a_file_goes_with_every_kind(folder):
     path.write_text(TEXT.replace(shipped("orbit.leo"), ORBITS[2] + "\n\n"), encoding="utf-8")
     m = missionfile.load_link(path).mission
     with pytest.raises(orbit.OrbitError, match='of kind "elements" has nothing to repeat: give pattern = "file"'):
-        tuple(orbit.satellites(m.constellation, m.orbit, orbit.Epoch.from_text(m.orbit.epoch), folder))
+        tuple(orbit.satellites(m.constellation, m.orbit, orbit.Epoch(m.orbit.epoch), folder))
     text = re.sub(r"(?m)^(satellites|planes|phasing) = .*\n", "", path.read_text(encoding="utf-8"))
     path.write_text(text.replace('pattern = "delta"', 'pattern = "file"\nfile = "satellite.tle"'), encoding="utf-8")
     m = missionfile.load_link(path).mission
-    (only,) = orbit.satellites(m.constellation, m.orbit, orbit.Epoch.from_text(m.orbit.epoch), folder)
+    (only,) = orbit.satellites(m.constellation, m.orbit, orbit.Epoch(m.orbit.epoch), folder)
     assert only.name == "DEMO"
 
 
@@ -314,7 +318,7 @@ def test_a_pattern_repeats_elements_and_a_file_goes_with_every_kind(folder):
 def test_walkers_patterns_are_as_told(links, pattern, round_deg):
     told('`"delta"` spreads the nodes over 360 deg, `"star"` over 180 deg', "360 deg F / `satellites` apart in phase")
     m, c = links.file.mission, links.file.mission.constellation.model_copy(update={"pattern": pattern})
-    epoch = orbit.Epoch.from_text(m.orbit.epoch)
+    epoch = orbit.Epoch(m.orbit.epoch)
     first, *_, later = list(orbit.satellites(c, m.orbit, epoch, ROOT))[: c.satellites // c.planes + 1]
     assert math.degrees(later.orbit.node_rad - first.orbit.node_rad) == pytest.approx(round_deg / c.planes)
     apart = math.degrees(later.orbit.mean_anomaly_rad - first.orbit.mean_anomaly_rad)

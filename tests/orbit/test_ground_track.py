@@ -13,7 +13,7 @@ from microrad.orbit import EARTH_RADIUS_M, GEOSTATIONARY_RADIUS_M
 from microrad.orbit import day as day_study
 from microrad.orbit.day import NOTHING, Numbers, Swing
 from microrad.orbit.day.ground_track import LONGEST_S, STEP_S, ground_track
-from microrad.report import day_plots
+from microrad.report.day.figures import day_figures
 
 SIX_HOURS = {"orbit.duration": "6 h", **ALONE}
 HIGH = {"kind": "circular", "altitude": "8000 km", "inclination": "30 deg", "node": "0 deg", "phase": "0 deg"}
@@ -109,7 +109,7 @@ def test_a_relay_stands_still_within_a_degree(track_of, inclination_deg, stands)
 
 
 def test_a_relay_from_a_file_stands_still_too(track_of, tmp_path):
-    slot = orbit.GeostationarySlot("EXAMPLE 1", orbit.Epoch.from_text(EPOCH), math.radians(100.0))
+    slot = orbit.GeostationarySlot("EXAMPLE 1", orbit.Epoch(EPOCH), math.radians(100.0))
     (tmp_path / "relay.oem").write_text(ephemeris(slot, np.arange(0.0, 21601.0, 600.0)), encoding="utf-8")
     track, _ = track_of(SIX_HOURS, {"orbit.geo": {"kind": "ephemeris", "file": "relay.oem"}})
     assert np.degrees(track.relay.longitude_rad) == pytest.approx([100.0], abs=1e-3)
@@ -152,8 +152,10 @@ def drawn(tmp_path, monkeypatch):
     monkeypatch.setattr(day_study, "swings", lambda *given: tuple(swings))
 
     def draw(*changes):
-        day = day_study.run(link_study.run(day_file(tmp_path, SIX_HOURS, {"operations.runs": 1}, *changes)))
-        return day, {figure.name: figure for figure in day_plots.draw(day)}
+        day = day_study.run_day_study(
+            link_study.run_link_study(day_file(tmp_path, SIX_HOURS, {"operations.runs": 1}, *changes))
+        )
+        return day, {figure.name: figure for figure in day_figures(day)}
 
     return draw
 

@@ -20,11 +20,13 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from microrad.core.units import SPEED_OF_LIGHT_M_S
-from microrad.orbit import analytic, earth, sun
 from microrad.orbit.base import OrbitError
-from microrad.orbit.epoch import Epoch
+from microrad.orbit.earth import figure as earth
+from microrad.orbit.earth import sun
+from microrad.orbit.earth.epoch import Epoch
+from microrad.orbit.propagation import analytic
 
-START = Epoch.from_text("2026-03-20T12:00:00Z")
+START = Epoch("2026-03-20T12:00:00Z")
 DAY_S = 86400.0
 MINUTE_S = 60.0
 RE = earth.EARTH_RADIUS_M
@@ -76,7 +78,7 @@ def wrapped(angle):
     ],
 )
 def test_an_instant_is_brought_to_one_form(text, normal):
-    epoch = Epoch.from_text(text)
+    epoch = Epoch(text)
     assert epoch.text == normal
     assert epoch == Epoch(normal)
 
@@ -102,7 +104,7 @@ def test_an_instant_is_brought_to_one_form(text, normal):
 )
 def test_a_text_that_is_no_instant_is_refused_in_words(text, words):
     with pytest.raises(OrbitError, match=words) as refused:
-        Epoch.from_text(text)
+        Epoch(text)
     assert repr(text) in str(refused.value)
     assert "2026-03-20T12:00:00Z" in str(refused.value) or "take an instant" in str(refused.value)
 
@@ -191,7 +193,8 @@ def test_the_angle_is_the_same_seen_from_an_instant_decades_before():
 
 def test_the_tables_of_time_are_read_only_when_an_instant_needs_them():
     code = (
-        "import sys; from microrad.orbit import analytic, sun; from microrad.orbit.epoch import Epoch;"
+        "import sys; from microrad.orbit.earth import sun; from microrad.orbit.earth.epoch import Epoch;"
+        "from microrad.orbit.propagation import analytic;"
         "Epoch('2026-03-20T12:00:00Z'); assert 'skyfield' not in sys.modules and 'sgp4' not in sys.modules"
     )
     subprocess.run([sys.executable, "-c", code], check=True)

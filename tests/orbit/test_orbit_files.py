@@ -21,10 +21,10 @@ from skyfield.framelib import ICRS_to_J2000, itrs, true_equator_and_equinox_of_d
 from skyfield.sgp4lib import TEME
 
 from microrad.orbit.base import OrbitError, States
-from microrad.orbit.epoch import Epoch
+from microrad.orbit.earth.epoch import Epoch
 from microrad.orbit.files import frames, messages, oem, read_elements, read_oem
 from microrad.orbit.files.elements import _EXPECTED, checksum
-from microrad.orbit.mean_elements import closest_elements, sgp4_orbit
+from microrad.orbit.propagation.mean_elements import Sgp4Orbit, closest_elements
 
 EPOCH = Epoch("2026-03-20T12:00:00Z")
 SCALE = load.timescale(builtin=True)
@@ -141,7 +141,7 @@ def test_sgp4_against_the_published_verification(tmp_path):
         lines = [summed(line.ljust(69)) for line in (one, two)]
         try:
             (found,) = elements(tmp_path, "\n".join(lines))
-            states = sgp4_orbit(found, found.epoch).states(60.0 * table[:, 0])
+            states = Sgp4Orbit(found, found.epoch).states(60.0 * table[:, 0])
         except OrbitError as error:
             refusals[one[2:7]] = str(error)
             continue
@@ -156,7 +156,7 @@ def test_sgp4_against_the_published_verification(tmp_path):
 
 def test_sgp4_against_skyfield_in_teme_and_gcrs(tmp_path):
     (found,) = elements(tmp_path, NAMED)
-    orbit = sgp4_orbit(found, Epoch("2026-03-22T03:04:05.25Z"))
+    orbit = Sgp4Orbit(found, Epoch("2026-03-22T03:04:05.25Z"))
     time_s = np.linspace(0.0, 2 * 86400.0, 97)
     states = orbit.states(time_s)
     peer = EarthSatellite(LINE_1, LINE_2, ts=SCALE)
@@ -170,7 +170,7 @@ def test_sgp4_against_skyfield_in_teme_and_gcrs(tmp_path):
 
 
 def test_states_in_any_order_and_for_one_time(tmp_path):
-    orbit = sgp4_orbit(elements(tmp_path, NAMED)[0], EPOCH)
+    orbit = Sgp4Orbit(elements(tmp_path, NAMED)[0], EPOCH)
     time_s = np.array([5000.0, -300.0, 0.0])
     states = orbit.states(time_s)
     assert isinstance(states, States) and states.position_m.shape == (3, 3)
@@ -183,11 +183,11 @@ def test_leap_second_is_an_elapsed_second(tmp_path):
     """From before to after the leap second of 2016-12-31 one second more passes than UTC shows."""
     line_1 = edited(LINE_1, 19, "16366.50000000")
     (found,) = elements(tmp_path, f"{line_1}\n{LINE_2}")
-    assert sgp4_orbit(found, Epoch("2017-01-01T12:00:00Z")).elements_age_s == 86401.0
+    assert Sgp4Orbit(found, Epoch("2017-01-01T12:00:00Z")).elements_age_s == 86401.0
 
 
 def test_copies_give_the_same_states(tmp_path):
-    orbit = sgp4_orbit(elements(tmp_path, NAMED)[0], EPOCH)
+    orbit = Sgp4Orbit(elements(tmp_path, NAMED)[0], EPOCH)
     again = pickle.loads(pickle.dumps(orbit))
     assert again == orbit
     np.testing.assert_array_equal(again.states(60.0).position_m, orbit.states(60.0).position_m)
@@ -315,7 +315,7 @@ def test_what_is_no_file_of_text_is_refused_with_its_own_reason(tmp_path, monkey
 # --------------------------------------------------------------------------------------------------------------- decay
 def test_expired_elements(tmp_path):
     (found,) = elements(tmp_path, NAMED)
-    late = sgp4_orbit(found, Epoch("2026-04-02T12:00:00Z"))
+    late = Sgp4Orbit(found, Epoch("2026-04-02T12:00:00Z"))
     assert late.elements_age_s == 13 * 86400.0
     late.require(0.0, 86400.0)
     with pytest.raises(OrbitError) as caught:
@@ -332,7 +332,7 @@ def test_expired_elements(tmp_path):
         assert word in message
     with pytest.raises(OrbitError, match="expired"):
         late.states(np.array([0.0, 86402.0]))
-    early = sgp4_orbit(found, Epoch("2026-03-01T12:00:00Z"))
+    early = Sgp4Orbit(found, Epoch("2026-03-01T12:00:00Z"))
     with pytest.raises(OrbitError, match=r"not valid yet.*19\.00 days.*older elements"):
         early.require(0.0, 86400.0)
     with pytest.raises(OrbitError, match="not a finite number"):
@@ -342,13 +342,13 @@ def test_expired_elements(tmp_path):
 def test_low_perigee_at_the_epoch_and_later(tmp_path):
     one, two = export_tle(invented(mean_motion_rev_day=16.56))
     with pytest.raises(OrbitError, match=r"the perigee is \d+ km high at 2026-03-20T12:00:00.000Z; below 120 km"):
-        sgp4_orbit(elements(tmp_path, f"{one}\n{two}")[0], EPOCH)
+        Sgp4Orbit(elements(tmp_path, f"{one}\n{two}")[0], EPOCH)
     one, two = export_tle(invented(mean_motion_rev_day=16.2, drag=2e-3))
-    orbit = sgp4_orbit(elements(tmp_path, f"{one}\n{two}")[0], EPOCH)
+    orbit = Sgp4Orbit(elements(tmp_path, f"{one}\n{two}")[0], EPOCH)
     orbit.require(0.0, 3600.0)
     with pytest.raises(OrbitError, match=r"perigee is|SGP4 stops"):
         orbit.require(0.0, 10 * 86400.0)
-    later = sgp4_orbit(orbit.elements, Epoch("2026-03-30T12:00:00Z"))
+    later = Sgp4Orbit(orbit.elements, Epoch("2026-03-30T12:00:00Z"))
     later.require(-10 * 86400.0, -10 * 86400.0 + 3600.0)
     with pytest.raises(OrbitError, match=r"perigee is|SGP4 stops at 2026-03-30"):
         later.require(0.0, 3600.0)
@@ -358,7 +358,7 @@ def test_decay_in_sgp4(tmp_path):
     """Catalogue number 28872 of the published verification decays within an hour of its epoch (error 6)."""
     one, two, _ = next(case for case in verification_cases() if case[0][2:7] == "28350")
     (found,) = elements(tmp_path, f"{one}\n{two}")
-    orbit = sgp4_orbit(found, found.epoch)
+    orbit = Sgp4Orbit(found, found.epoch)
     with pytest.raises(OrbitError, match=r"SGP4 stops at 2006-.*it has decayed|perigee is"):
         orbit.require(0.0, 13 * 86400.0)
 
@@ -386,7 +386,7 @@ WORDS = {
 
 @pytest.mark.parametrize("code", WORDS)
 def test_each_error_of_sgp4_in_words(tmp_path, code):
-    orbit = sgp4_orbit(elements(tmp_path, NAMED)[0], EPOCH)
+    orbit = Sgp4Orbit(elements(tmp_path, NAMED)[0], EPOCH)
     object.__setattr__(orbit, "_satellite", Stopped(code))
     for call in (lambda: orbit.states(np.array([0.0, 60.0])), lambda: orbit.require(60.0, 60.0)):
         with pytest.raises(OrbitError) as caught:
@@ -441,14 +441,14 @@ def test_omm_gives_the_orbit_of_the_tle(tmp_path, notation):
     (found,) = elements(tmp_path, NOTATIONS[notation](FIELDS))
     assert found.name == "EXAMPLE 1" and found.catalogue_number == "90001"
     time_s = np.linspace(-86400.0, 86400.0, 25)
-    of_message = sgp4_orbit(found, EPOCH).states(time_s)
+    of_message = Sgp4Orbit(found, EPOCH).states(time_s)
     satellite = invented()
     _, position, velocity = satellite.sgp4_array(
         np.full(25, satellite.jdsatepoch), satellite.jdsatepochF + time_s / 86400
     )
     close(of_message.position_m, 1000 * position.T, atol=ONE_MM)
     close(of_message.velocity_m_s, 1000 * velocity.T, atol=1e-6)
-    of_lines = sgp4_orbit(elements(tmp_path, NAMED)[0], EPOCH).states(time_s)
+    of_lines = Sgp4Orbit(elements(tmp_path, NAMED)[0], EPOCH).states(time_s)
     # a TLE keeps angles to 1e-4 deg (12 m) and the mean motion to 1e-8 revolutions a day
     assert 0.1 < np.max(np.abs(of_message.position_m - of_lines.position_m)) < 30.0
 
@@ -986,7 +986,7 @@ def test_malformed_oem(tmp_path, fault):
 
 def test_ephemeris_of_sgp4_states(tmp_path):
     """The states of an element set, sampled each minute, written and read again."""
-    orbit = sgp4_orbit(elements(tmp_path, NAMED)[0], EPOCH)
+    orbit = Sgp4Orbit(elements(tmp_path, NAMED)[0], EPOCH)
     # SGP4's velocity is not the exact slope of its position (2 cm/s here), so Hermite would err by 0.2 m
     method = {"INTERPOLATION": "LAGRANGE", "INTERPOLATION_DEGREE": "7"}
     again = ephemeris(tmp_path, HEAD + segment(GRID, orbit.states(GRID), **method))

@@ -8,21 +8,23 @@ import numpy as np
 import pytest
 
 from microrad.report import write_columns
-from microrad.report.day_assumptions import MOST_BARS, Assumed, assumptions, in_lines
-from microrad.report.day_figures import (
+from microrad.report.day.figures import (
+    MOST_BARS,
+    Assumed,
     Windows,
     along_contact,
+    assumptions,
     contact_run,
-    duration,
+    data_volume,
     latency,
     reached_s,
-    short,
     timeline,
-    volume,
 )
-from microrad.report.day_map import Marked, Places, broken, land, odd, other_side, world_map
+from microrad.report.day.world_map import Marked, Places, broken, land, odd, other_side, world_map
 from microrad.report.plotting import scales
-from microrad.report.plotting.sheet import Area, Bars, Line
+from microrad.report.plotting.sheet import Area, Bars, Line, shortened
+from microrad.report.plotting.swings import in_lines
+from microrad.report.quantities import duration
 
 NAME = 'Kiruna <b>"A&B"</b> $x$ $\\nonsense$'
 NOTHING = np.empty(0)
@@ -85,7 +87,7 @@ def a_contact():
 
 def a_volume():
     t = np.linspace(0.0, 86400.0, 50)
-    return volume({"generated": (t, t * 8e5), NAME: (t, t * 4e5)}, {NAME: (t, t * 4e5)})
+    return data_volume({"generated": (t, t * 8e5), NAME: (t, t * 4e5)}, {NAME: (t, t * 4e5)})
 
 
 def a_latency():
@@ -154,14 +156,14 @@ def test_labels_and_units_stand_in_the_picture_and_two_calls_agree(draw):
 def test_a_name_of_the_mission_stays_text(draw):
     figure = draw()
     assert "<b>" not in figure.svg
-    assert any(short(NAME, 24)[:-1] in text for text in texts(figure))
+    assert any(shortened(NAME, 24)[:-1] in text for text in texts(figure))
     assert any(NAME in heading for heading in figure.columns)
 
 
 def test_a_name_is_cut_and_kept_on_one_line():
-    assert short("Kiruna") == "Kiruna"
-    assert short("a\nb\x00c") == "a b c"
-    assert short("x" * 35) == "x" * 33 + "…"
+    assert shortened("Kiruna") == "Kiruna"
+    assert shortened("a\nb\x00c") == "a b c"
+    assert shortened("x" * 35) == "x" * 33 + "…"
     assert [duration(s) for s in (0.0, 119.0, 120.0, 7199.0, 7200.0)] == ["0 s", "119 s", "2 min", "120 min", "2 h"]
 
 
@@ -171,7 +173,7 @@ def test_a_name_is_cut_and_kept_on_one_line():
         (lambda: timeline([], SPAN_S, EPOCH), "no contacts and no eclipses to show"),
         (lambda: timeline([("relay", np.empty((0, 2)))], SPAN_S, EPOCH), "none"),
         (lambda: along_contact(*[NOTHING] * 5, **THIRD), "no contact in this span"),
-        (lambda: volume({}, {}), "no data were generated"),
+        (lambda: data_volume({}, {}), "no data were generated"),
         (lambda: latency({}), "nothing was delivered"),
         (lambda: latency({"relay": (NOTHING, NOTHING)}), "nothing was delivered"),
         (lambda: world_map(NO_PLACES, {"relay": np.empty(0, bool)}, {}, {}), "no ground track"),
@@ -222,7 +224,7 @@ def test_the_tables_of_curves_are_in_si():
     assert [*found] == headings
     for heading, values in zip(headings, (t, a, 2 * a, 3 * a, 4 * a), strict=True):
         assert list(found[heading]) == list(values)
-    found = volume({"relay": (t, a)}, {"relay": (t, 2 * a)}).columns
+    found = data_volume({"relay": (t, a)}, {"relay": (t, 2 * a)}).columns
     assert list(found["relay, since the start (bit)"]) == list(a)
     assert list(found["relay, stored (bit)"]) == list(2 * a)
     found = latency({"relay": (a, t / 4.0)}).columns
@@ -272,7 +274,7 @@ def test_curves_are_drawn_in_the_unit_of_their_axis():
     assert along[0].all_of(Line)[0].x[-1] == pytest.approx(40.0)
     above, below = panels(a_volume())
     assert lines(above)["generated"][:, -1] == pytest.approx([24.0, 8.64])
-    assert lines(below)[short(NAME)][:, -1] == pytest.approx([24.0, 4.32])
+    assert lines(below)[shortened(NAME)][:, -1] == pytest.approx([24.0, 4.32])
     assert above.all_of(Line)[1].colour == below.all_of(Line)[0].colour
     errors = lines(panels(a_run())[1])
     assert (set(errors["rms"][1]), set(errors["largest"][1])) == ({1.5}, {5.0})
@@ -336,12 +338,12 @@ def test_the_map_of_a_long_span_says_that_it_shows_its_beginning():
 )
 def test_the_unit_of_the_volume_suits_the_largest(bits, unit):
     t = np.array([0.0, 3600.0])
-    assert f"since the start ({unit})" in texts(volume({"generated": (t, np.array([0.0, bits]))}, {}))
+    assert f"since the start ({unit})" in texts(data_volume({"generated": (t, np.array([0.0, bits]))}, {}))
 
 
 def test_a_day_without_data_has_an_axis_in_bytes():
     t = np.array([0.0, 3600.0])
-    assert "stored on board (byte)" in texts(volume({"relay": (t, 0 * t)}, {"relay": (t, 0 * t)}))
+    assert "stored on board (byte)" in texts(data_volume({"relay": (t, 0 * t)}, {"relay": (t, 0 * t)}))
 
 
 def test_median_and_99_percent_are_those_of_the_sample():

@@ -12,14 +12,17 @@ from microrad import cli, report
 from microrad.core import machine
 from microrad.mission import toml as document
 from microrad.mission.file import load_mission
-from microrad.report import compared, page, results, tolerances
 from microrad.report.plotting import palette
+from microrad.report.results import comparison as compared
+from microrad.report.results import tolerances
+from microrad.report.results.manifest import MOST_INPUT_BYTES
+from microrad.report.study.page import PARTS
 from microrad.studio import server, session
 from microrad.studio.guard import address
 from microrad.studio.guard import middleware as guard
 from microrad.studio.jobs import process as jobs_process
 from microrad.studio.recordings import reading, uploads
-from microrad.study import story as study
+from microrad.study import study
 from places import ROOT
 from shipped import DEFAULT
 
@@ -67,7 +70,7 @@ def test_pages_that_are_linked_exist(text):
 # -------------------------------------------------------------------------------------------------------------- report
 def test_the_parts_of_the_report_are_those_of_the_page():
     parts = re.findall(r"(?m)^\| (\d) (.+?) \|", REPORT)
-    assert parts == [(str(number), title) for number, (_, title) in enumerate(page.PARTS, start=1)]
+    assert parts == [(str(number), title) for number, (_, title) in enumerate(PARTS, start=1)]
 
 
 def test_each_requirement_stands_in_the_table():
@@ -85,7 +88,7 @@ def test_each_requirement_stands_in_the_table():
 def test_the_numbers_of_the_report_are_those_of_the_code():
     told(REPORT, f"in words to {100 * compared.WORDS_SHARE:g} %", f"at most {palette.MOST_POINTS} points")
     assert set(re.findall(r"`([A-Z0-9_]+)`", REPORT)) == set(machine.VARIABLES)
-    told(REPORT, f"up to {results.MOST_INPUT_BYTES / 1e6:g} MB each")
+    told(REPORT, f"up to {MOST_INPUT_BYTES / 1e6:g} MB each")
 
 
 def test_each_kind_of_tolerance_has_its_row():
@@ -149,5 +152,5 @@ def test_targets_of_make_exist(target):
 
 def test_the_text_in_the_readme_is_what_the_shipped_mission_prints():
     text = (ROOT / "README.md").read_text(encoding="utf-8")
-    assert f"```text\n{report.verdict_text(study.run(load_mission(DEFAULT)), 80)}\n```\n" in text
+    assert f"```text\n{report.verdict_text(study.run_study(load_mission(DEFAULT)), 80)}\n```\n" in text
     assert all(len(line) <= 80 for line in text.partition("```text\n")[2].partition("```")[0].splitlines())

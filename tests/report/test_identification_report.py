@@ -16,12 +16,13 @@ from scipy.signal import cont2discrete, lfilter
 from microrad import report
 from microrad.core.kernels import play_response
 from microrad.lab.identify import Refused, identify, mirror_file_text
-from microrad.lab.identify.records import rounded_to_error
+from microrad.lab.identify.statistics import rounded_to_error
 from microrad.lab.recording import Finding, recording_from_arrays
-from microrad.report import identification_figures as figures
-from microrad.report import identification_words as words
-from microrad.report.identification import BEGINS
-from microrad.report.identification_parameters import (
+from microrad.report.identification import figures, words
+from microrad.report.identification import page as identification_page
+from microrad.report.identification.figures import identification_figures
+from microrad.report.identification.page import BEGINS
+from microrad.report.identification.parameters import (
     ParameterRow,
     not_identified,
     parameter_rows,
@@ -29,8 +30,8 @@ from microrad.report.identification_parameters import (
     two_digits,
 )
 from microrad.report.plotting.interactive import plot_of
-from microrad.report.plotting.palette import MOST_POINTS
-from microrad.report.plotting.sheet import BLUE, SKY, VERMILION, Line
+from microrad.report.plotting.palette import BLUE, MOST_POINTS, SKY, VERMILION
+from microrad.report.plotting.sheet import Line
 from report_pages import assert_sound, without_scripts
 
 RATE_HZ = 2000.0
@@ -109,7 +110,7 @@ def write(found, target, **options):
 @pytest.fixture
 def no_figures(monkeypatch):
     """Drawing has tests of its own and takes the longest."""
-    monkeypatch.setattr(figures, "draw", lambda *args, **kwargs: {})
+    monkeypatch.setattr(identification_page, "identification_figures", lambda *args, **kwargs: {})
 
 
 def text_of(path):
@@ -272,7 +273,7 @@ def test_a_page_without_linear_part_says_why(static, tmp_path):
 
 # ------------------------------------------------------------------------------------------------------ the figures
 def test_every_axis_has_a_label_with_its_unit(full, recordings):
-    drawn = figures.draw(full, recordings)
+    drawn = identification_figures(full, recordings)
     for figure in drawn.values():
         for panel in figure.sheet.panels:
             assert re.fullmatch(r"[a-z ]+ \([^()]+\)", panel.y.title), (figure.title, panel.y.title)
@@ -305,7 +306,7 @@ def test_loops_show_measured_and_modelled_output_and_the_hysteresis(full, record
 
 
 def test_the_papers_figures_are_named_only_where_they_are_shown(full, recordings):
-    drawn = figures.draw(full, recordings)
+    drawn = identification_figures(full, recordings)
     assert list(drawn) == ["excitation", "response", "poles", "loops", "time", "residuals", "tests"]
     assert drawn["loops"].title.startswith("Fig. 5")
     assert drawn["time"].title.startswith("Fig. 4")

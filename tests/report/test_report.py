@@ -17,20 +17,18 @@ import xarray as xr
 from microrad import report
 from microrad.core import folder
 from microrad.mission import file as missionfile
-from microrad.report import (
-    chain,
-    drawings,
-    figures,
-    link_figures,
-    page,
-    paper_bench,
-    paper_views,
-    requirement_views,
-    requirements,
-    words,
-)
-from microrad.study import story as study
-from microrad.study.pointing_cost import Cost
+from microrad.report import requirements
+from microrad.report.links import figures as link_module
+from microrad.report.paper import bench, figures
+from microrad.report.paper import diagrams as drawings
+from microrad.report.paper import page as paper_views
+from microrad.report.paper.page import paper_section
+from microrad.report.requirements import requirements_paragraph
+from microrad.report.study import chain, page, words
+from microrad.report.study import contributors as requirement_views
+from microrad.report.study import words as study_words
+from microrad.study import study
+from microrad.study.pointing_penalty import Cost
 from report_pages import assert_sound
 from shipped import SHIPPED, edited_file, plain_drawn, plain_study
 
@@ -51,7 +49,7 @@ def paper():
 @pytest.fixture(scope="module")
 def small(tmp_path_factory):
     """A study of a second."""
-    return study.run(edited_file(tmp_path_factory.mktemp("small"), day=False))
+    return study.run_study(edited_file(tmp_path_factory.mktemp("small"), day=False))
 
 
 @pytest.fixture(scope="module")
@@ -108,7 +106,7 @@ def test_the_page_opens_with_the_verdict_and_keeps_its_order(written, paper):
     links = parsed(text)
     visible = " ".join(links.text)
     wanted = (
-        report.words.headline(paper),
+        study_words.headline(paper),
         "5 requirements are met. FAIL: ",
         "Contents",
         "Each arrow hands a result on",
@@ -178,7 +176,7 @@ def test_a_requirement_moved_most_by_a_share_says_by_what_factor(paper):
 
 
 def test_the_paragraph_says_what_fails_and_by_what_then_what_holds(paper):
-    said = requirements.paragraph(paper.requirements)
+    said = requirements_paragraph(paper.requirements)
     count, _, rest = said.partition(" FAIL: ")
     failed, _, passed = rest.partition(" PASS: ")
     assert (
@@ -189,7 +187,7 @@ def test_the_paragraph_says_what_fails_and_by_what_then_what_holds(paper):
         here = f"{r.name} {requirements.signed(r)}"
         assert (f"{here}, by {r.limited_by}" in failed, here in passed) == (not r.met, r.met)
     met = tuple(r for r in paper.requirements if r.met)
-    assert " FAIL: " not in requirements.paragraph(met)
+    assert " FAIL: " not in requirements_paragraph(met)
 
 
 def test_each_box_of_the_chain_holds_its_own_numbers(paper):
@@ -274,7 +272,7 @@ def test_long_lines_of_the_chain_are_broken_to_their_box():
 
 
 def test_the_virtual_bench_stands_where_the_paper_measures(written, paper):
-    found = paper_bench.chirp()
+    found = bench.chirp()
     assert 96.9 <= found.fit_percent < 97.1
     visible = " ".join(parsed((written / "report.html").read_text(encoding="utf-8")).text)
     assert f"explains {found.fit_percent:.1f} % of it (the paper: about 97 %)" in visible
@@ -283,13 +281,13 @@ def test_the_virtual_bench_stands_where_the_paper_measures(written, paper):
         "Fig. 5  Hysteresis measured and modelled (virtual",
     ):
         assert title in visible
-    assert [loop.freq_hz for loop in paper_bench.loops()] == [60.0, 80.0, 100.0]
-    assert {loop.fitted_hz for loop in paper_bench.loops()} == {100.0}
-    assert all(0.0 < loop.error_percent < 0.2 for loop in paper_bench.loops())
+    assert [loop.freq_hz for loop in bench.loops()] == [60.0, 80.0, 100.0]
+    assert {loop.fitted_hz for loop in bench.loops()} == {100.0}
+    assert all(0.0 < loop.error_percent < 0.2 for loop in bench.loops())
 
 
 def test_another_kind_of_mirror_leaves_the_bench_out(no_scan, tmp_path):
-    other = study.run(edited_file(tmp_path, day=False))
+    other = study.run_study(edited_file(tmp_path, day=False))
     visible = " ".join(parsed(report.write(other, tmp_path / "out").read_text(encoding="utf-8")).text)
     assert not (tmp_path / "out" / "figures" / "fig4-chirp.csv").exists()
     assert "Fig. 4, what differs from the paper: Not drawn: the mission's mirror is not of the paper's kind" in visible
@@ -308,7 +306,7 @@ def test_table_2_sets_the_mission_beside_the_paper(written, paper):
 
 def test_each_figure_of_the_paper_is_the_one_of_ours_that_stands_for_it(paper):
     drawn = plain_drawn()
-    found = paper_views.context(paper, (*drawn.study, *drawn.bench))
+    found = paper_section(paper, (*drawn.study, *drawn.bench))
     assert {number: [f.name for f in several] for number, several in found["figures"].items()} == {
         "Fig. 2": ["fig2-margin-map"],
         "Fig. 4": ["fig4-chirp"],
@@ -320,7 +318,7 @@ def test_each_figure_of_the_paper_is_the_one_of_ours_that_stands_for_it(paper):
     assert all(figure.title.startswith(number) for number, several in found["figures"].items() for figure in several)
     assert [n for n, several in found["figures"].items() if "virtual bench" in several[0].title] == ["Fig. 4", "Fig. 5"]
     assert [*found["differs"]] == [f"Fig. {n}" for n in range(1, 9)]
-    without = paper_views.context(paper, drawn.study)
+    without = paper_section(paper, drawn.study)
     assert without["differs"]["Fig. 4"].startswith("Not drawn: ")
 
 
@@ -438,8 +436,8 @@ def test_two_runs_write_the_same_page_and_figures(paper, written, tmp_path):
 
 
 def test_results_are_never_replaced_silently(small, tmp_path, monkeypatch):
-    for module in (figures, link_figures, paper_bench):
-        monkeypatch.setattr(module, "draw", lambda *args: ())
+    for module, name in ((figures, "paper_figures"), (link_module, "link_figures"), (bench, "bench_figures")):
+        monkeypatch.setattr(module, name, lambda *args: ())
     target = tmp_path / "out"
     report.write(small, target)
     before = {p: p.read_bytes() for p in target.rglob("*") if p.is_file()}
@@ -485,7 +483,7 @@ def test_an_interrupted_write_leaves_nothing_and_keeps_the_old(tmp_path, error):
 @pytest.fixture
 def no_bench(monkeypatch):
     """The paper's experiment is the same in every mission's report."""
-    monkeypatch.setattr(paper_bench, "draw", lambda *args: ())
+    monkeypatch.setattr(bench, "bench_figures", lambda *args: ())
 
 
 @pytest.mark.usefixtures("no_scan", "no_bench")
@@ -493,7 +491,7 @@ def test_text_of_the_mission_is_escaped(tmp_path):
     file = edited_file(
         tmp_path, ('name = "LEO-to-GEO relay of a 100 kg satellite"', 'name = "<script>alert(1)</script>"'), day=False
     )
-    text = report.write(study.run(file), tmp_path / "out").read_text(encoding="utf-8")
+    text = report.write(study.run_study(file), tmp_path / "out").read_text(encoding="utf-8")
     assert "<script>alert" not in text
     assert "&lt;script&gt;alert(1)&lt;/script&gt;" in text
     manifest = text.partition('<script type="application/json" id="manifest">')[2].partition("</script>")[0]
@@ -503,7 +501,7 @@ def test_text_of_the_mission_is_escaped(tmp_path):
 @pytest.mark.usefixtures("no_scan", "no_bench")
 def test_a_hopeless_link_is_reported_not_refused(tmp_path):
     file = edited_file(tmp_path, ('data_rate = "300 Mbit/s"', 'data_rate = "30 Gbit/s"'), day=False)
-    hopeless = study.run(file)
+    hopeless = study.run_study(file)
     assert not hopeless.closes
     assert hopeless.communication.margin_db == pytest.approx(3.0 - 20.0, abs=0.02)
     assert math.isnan(hopeless.margin_map.largest_error_rad)
@@ -528,7 +526,7 @@ def test_verdict_and_summary_say_the_same(paper):
 
 
 def test_a_drive_beyond_the_identified_rate_is_the_first_thing_said(paper, tmp_path):
-    slow = study.run(edited_file(tmp_path, ('rate_limit = "3770 V/s"', 'rate_limit = "100 V/s"'), day=False))
+    slow = study.run_study(edited_file(tmp_path, ('rate_limit = "3770 V/s"', 'rate_limit = "100 V/s"'), day=False))
     text = report.verdict_text(slow)
     assert "The mirror model is extrapolated." in " ".join(text.partition("\n\n")[0].split())
     assert "Not to be relied on" in text
@@ -544,14 +542,14 @@ def no_scan(monkeypatch):
 
 def test_the_headline_names_the_link_that_does_not_close(no_scan, tmp_path):
     file = edited_file(tmp_path, ('required_power = "10 pW"', 'required_power = "1 nW"'), day=False)
-    text = report.verdict_text(study.run(file))
+    text = report.verdict_text(study.run_study(file))
     said = " ".join(text.partition("\n\n")[0].split())
     assert said.startswith("The link does not close: beacon \u221213.70 dB, at 300 Mbit/s")
     assert "communication" not in said
 
 
 def test_an_amplifier_at_its_limits_is_named_as_the_cause_and_claims_are_not_judged(no_scan, tmp_path):
-    weak = study.run(edited_file(tmp_path, ('output_max = "180 V"', 'output_max = "100 V"'), day=False))
+    weak = study.run_study(edited_file(tmp_path, ('output_max = "180 V"', 'output_max = "100 V"'), day=False))
     assert "What limits it: the amplifier's limits (" in report.verdict_text(weak, 160, verbose=True)
     assert {c.agrees for c in weak.claims if c.where in ("Fig. 6", "Fig. 8")} == {"not judged"}
     assert any("beyond the amplifier's range" in w for w in report.summary(weak)["warnings"])
@@ -562,14 +560,14 @@ def test_a_changed_value_does_not_keep_the_papers_name(paper, tmp_path):
     assert missionfile.changed_from_shipped(paper.file.sources) == ()
     file = edited_file(tmp_path, ('leo_aperture = "5 cm"', 'leo_aperture = "6 cm"'), day=False)
     assert missionfile.changed_from_shipped(file.sources) == (("terminals.leo_aperture", '"6 cm"', '"5 cm"'),)
-    changed = study.run(file)
+    changed = study.run_study(file)
     assert any("names the paper as its source" in w for w in report.summary(changed)["warnings"])
     text = report.write(changed, tmp_path / "out").read_text(encoding="utf-8")
     assert "This mission is not the paper" in text
 
 
 def test_a_radial_residual_is_two_axes(no_scan, paper, tmp_path):
-    radial = study.run(edited_file(tmp_path, ('residual = "per-axis"', 'residual = "radial"'), day=False))
+    radial = study.run_study(edited_file(tmp_path, ('residual = "per-axis"', 'residual = "radial"'), day=False))
     used, one_axis = report.summary(radial)["residual"]["used_rad"], report.summary(paper)["residual"]["used_rad"]
     assert used == pytest.approx(math.sqrt(2.0) * one_axis, rel=1e-12)
     assert "times √2 for two equal axes" in report.verdict_text(radial, verbose=True)
@@ -577,7 +575,7 @@ def test_a_radial_residual_is_two_axes(no_scan, paper, tmp_path):
 
 
 def test_a_drive_beyond_the_identified_range_is_said(no_scan, tmp_path):
-    narrow = study.run(edited_file(tmp_path, ('drive_max = "12 V"', 'drive_max = "8 V"'), day=False))
+    narrow = study.run_study(edited_file(tmp_path, ('drive_max = "12 V"', 'drive_max = "8 V"'), day=False))
     text = report.verdict_text(narrow)
     assert "The mirror model is extrapolated." in " ".join(text.partition("\n\n")[0].split())
     assert "(identified from 0 to 8 V)" in text

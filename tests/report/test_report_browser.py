@@ -9,7 +9,9 @@ import pytest
 from browser import violations
 from microrad import report
 from microrad.lab.identify import identify
-from microrad.report import campaign_page, single_pages
+from microrad.report.campaign.page import campaign_page
+from microrad.report.day.page import day_page
+from microrad.report.links.page import links_page
 from report import test_identification_report as identified
 from report import test_report_campaign as campaigns
 from report import test_report_fine_pointing as fine_loops
@@ -40,9 +42,9 @@ def files(found, tmp_path_factory):
     fine = fine_loops.made_up(found.file)
     recordings = [identified.loop(60.0, 1, "60.csv"), identified.loop(100.0, 3, "100.csv"), identified.chirp()]
     texts = {
-        "day": lambda: single_pages.day(found.day, found.links),
-        "budget": lambda: single_pages.budget(found.links),
-        "campaign": lambda: campaign_page.html(campaigns.CASES["two inputs"]()),
+        "day": lambda: day_page(found.day, found.links),
+        "budget": lambda: links_page(found.links),
+        "campaign": lambda: campaign_page(campaigns.CASES["two inputs"]()),
     }
 
     @cache
@@ -96,6 +98,14 @@ def opened(browser, files):
         each.page.close()
 
 
+@pytest.fixture(scope="module")
+def report_page(browser, files):
+    """The report at its full width, for tests that leave it so."""
+    found = Opened(browser, files("report"))
+    yield found
+    found.page.close()
+
+
 def visible(figure, selector):
     return figure.query_selector(selector).is_visible()
 
@@ -141,8 +151,8 @@ def test_the_page_of_budgets_is_pictures_with_their_numbers_below(opened, files,
     assert_no_barrier(here.page)
 
 
-def test_a_legend_switches_a_curve_by_the_keyboard(opened):
-    here = opened()
+def test_a_legend_switches_a_curve_by_the_keyboard(report_page):
+    here = report_page
     figure = here.figure("Fig. 8")
     button = figure.query_selector(".keys button")
     shown = "figure => figure.querySelectorAll('.scatterlayer .trace').length"
@@ -156,8 +166,8 @@ def test_a_legend_switches_a_curve_by_the_keyboard(opened):
     here.page.wait_for_function(f"([figure, count]) => ({shown})(figure) === count", arg=[figure, before])
 
 
-def test_hovering_gives_values_with_units(opened):
-    here = opened()
+def test_hovering_gives_values_with_units(report_page):
+    here = report_page
     figure = here.figure("Fig. 2")
     box = figure.query_selector(".nsewdrag").bounding_box()
     here.page.mouse.move(box["x"] + 0.3 * box["width"], box["y"] + 0.8 * box["height"])
@@ -166,8 +176,8 @@ def test_hovering_gives_values_with_units(opened):
     assert re.search(r"data rate: [\d.]+ Mbit/s.*pointing error: [\d.]+ µrad.*link margin: [\d.−]+ dB", said)
 
 
-def test_zoom_and_reset(opened):
-    here = opened()
+def test_zoom_and_reset(report_page):
+    here = report_page
     figure = here.figure("Fig. 5")
     limits = "figure => { const drawn = figure.querySelector('.js-plotly-plot').layout; return drawn.xaxis.range }"
     first = here.page.evaluate(limits, figure)

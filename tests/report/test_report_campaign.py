@@ -30,15 +30,16 @@ from microrad.campaign.records import (
     WorstTrace,
 )
 from microrad.loop.fine_loop.ensemble import bin_edges_rad
-from microrad.report import (
-    campaign_figures,
-    campaign_numbers,
-    campaign_page,
-    campaign_scale,
-    campaign_tables,
-    campaign_words,
-)
-from microrad.report.campaign_numbers import share, value
+from microrad.report.campaign import figures as drawing
+from microrad.report.campaign import numbers as campaign_numbers
+from microrad.report.campaign import page as campaign_module
+from microrad.report.campaign import tables as campaign_tables
+from microrad.report.campaign import words as campaign_words
+from microrad.report.campaign.data import campaign_data
+from microrad.report.campaign.numbers import share, value
+from microrad.report.campaign.page import campaign_figures, campaign_page
+from microrad.report.campaign.tables import failed_table
+from microrad.report.campaign.text import campaign_text
 from report_pages import assert_sound, without_scripts
 
 NAME = 'LEO <b>"A&B"</b> $x$'
@@ -268,10 +269,10 @@ CASES = {
 def made(name):
     """A summary with its figures and its page, drawn once."""
     summary = CASES[name]()
-    figures = campaign_page.draw(summary)
+    figures = campaign_figures(summary)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(campaign_page, "draw", lambda _: figures)
-        return SimpleNamespace(summary=summary, figures=figures, html=without_scripts(campaign_page.html(summary)))
+        patch.setattr(campaign_module, "campaign_figures", lambda _: figures)
+        return SimpleNamespace(summary=summary, figures=figures, html=without_scripts(campaign_page(summary)))
 
 
 @pytest.fixture(params=CASES)
@@ -363,7 +364,7 @@ def test_no_picture_is_empty_or_has_texts_that_overlap(case):
 
 def test_the_terminal_has_the_verdict_first_and_the_progress_last_within_its_width(case):
     for width in (80, 140):
-        text = campaign_words.text(case.summary, width)
+        text = campaign_text(case.summary, width)
         lines = text.splitlines()
         assert max(map(len, lines)) <= width
         joined = " ".join(text.split())
@@ -373,7 +374,7 @@ def test_the_terminal_has_the_verdict_first_and_the_progress_last_within_its_wid
 
 
 def test_the_data_is_json_without_arrays_and_says_the_same(case):
-    found = campaign_words.data(case.summary)
+    found = campaign_data(case.summary)
     back = json.loads(json.dumps(found))  # an array or a record would raise
     assert back["verdict"] == campaign_words.headline(case.summary)
     assert back["seed"] == 2**64 - 1
@@ -414,7 +415,7 @@ def test_the_data_is_json_without_arrays_and_says_the_same(case):
         ("not begun", "No row has been simulated yet.", "open"),
         (
             "tail alone",
-            "The radial error exceeds 10.5 µrad with probability 1e-6 (at least 10.3 µrad at 99 % confidence).",
+            "The radial error exceeds 10.5 µrad with probability 10⁻⁶ (at least 10.3 µrad at 99 % confidence).",
             "open",
         ),
     ],
@@ -458,8 +459,8 @@ def test_a_cell_without_results_is_never_the_best():
         (0.0123, "1.23 %"),
         (0.99987, "99.987 %"),
         (0.999999, "99.99990 %"),
-        (1e-6, "1e-6"),
-        (3.14e-4, "3.1e-4"),
+        (1e-6, "10⁻⁶"),
+        (3.14e-4, "3.1×10⁻⁴"),
         (math.nan, "not known"),
     ],
 )
@@ -523,14 +524,14 @@ def test_the_tail_says_the_least_probability_that_is_known():
     cell = summary.cells[0]
     known = {**cell.tail.wanted, 1e-7: Interval(math.nan, math.nan, math.nan, CONFIDENCE)}
     said = campaign_words.tail_sentences(summary, replace(cell, tail=replace(cell.tail, wanted=known)))
-    assert said[0].startswith("The radial error exceeds 10.5 µrad with probability 1e-6 (at least 10.3 µrad")
-    assert said[1].startswith("The radial error is beyond 10 µrad with probability 3.7e-6 (")
+    assert said[0].startswith("The radial error exceeds 10.5 µrad with probability 10⁻⁶ (at least 10.3 µrad")
+    assert said[1].startswith("The radial error is beyond 10 µrad with probability 3.7×10⁻⁶ (")
     assert campaign_words.tail_sentences(summary, replace(cell, tail=None)) == []
     far = replace(summary, limits=(replace(LIMITS[1], most=20e-6),))
     unseen = campaign_words.tail_sentences(far, cell)[1]
     assert unseen.startswith("No radial error beyond 20 µrad was seen (0 to ")
     _, rows = campaign_tables.tail_table(replace(cell.tail, wanted=known))
-    assert rows[-1] == ("1e-7", "not known", "")
+    assert rows[-1] == ("10⁻⁷", "not known", "")
     assert rows[0][:2] == ("10 %", "4.29 µrad")
 
 
@@ -552,27 +553,27 @@ def test_the_progress_has_pace_and_time_left_while_it_runs(state, done, rate, le
 
 def test_failed_rows_stand_with_seed_and_reason_and_the_rest_is_counted():
     summary = summary_of(2, rows=60, failed=60)
-    text, page = campaign_words.text(summary, 140), Page(campaign_page.html(summary))
+    text, page = campaign_text(summary, 140), Page(campaign_page(summary))
     assert str(2**63 + 9) in text
     assert str(2**63 + 10) not in text
     assert "50 more failed rows are in the export." in text
     rows = [row for row in page.rows if row[1:2] == [str(2**63 + 39)]]
     assert rows == [["39", str(2**63 + 39), "2", summary.failed[39][1].reason]]
     assert not any(row[1:2] == [str(2**63 + 40)] for row in page.rows)
-    assert "20 more failed rows" in campaign_page.html(summary)
+    assert "20 more failed rows" in campaign_page(summary)
     few = made("two inputs").html
     assert "more failed" not in few
 
 
 def test_a_failed_row_of_a_grid_names_its_combination():
     summary = summary_of(1, rows=64, failed=1, grid=APERTURES)
-    assert campaign_tables.failed_rows(summary, 9)[1][0] == "0 of terminals.leo_aperture = 5 cm"
-    assert campaign_tables.failed_rows(summary_of(1, rows=64, failed=1), 9)[0][0] == "0"
+    assert failed_table(summary, 9).rows[1][0] == "0 of terminals.leo_aperture = 5 cm"
+    assert failed_table(summary_of(1, rows=64, failed=1), 9).rows[0][0] == "0"
 
 
 def test_a_narrow_terminal_has_fewer_quantiles_the_median_among_them():
     summary = summary_of(2)
-    wide, narrow = campaign_words.text(summary, 140), campaign_words.text(summary, 72)
+    wide, narrow = campaign_text(summary, 140), campaign_text(summary, 72)
     assert "99.7 %" in wide.split("Outputs")[1]
     heading = next(line for line in narrow.splitlines() if line.split()[:2] == ["output", "mean"])
     assert "50 %" in heading
@@ -586,7 +587,7 @@ def test_outputs_that_are_the_same_in_every_row_stand_in_a_sentence_not_in_the_t
     assert campaign_words.few_values(cell) == ["The same in every row: beacon_margin 6.10 dB."]
     assert campaign_words.few_values(replace(cell, outputs={"margin": cell.outputs["margin"]})) == []
     assert campaign_tables.output_table(summary_of(0, rows=64).cells[0], 3)[1] == []
-    for shown in (made("no inputs").html, campaign_words.text(made("no inputs").summary, 140)):
+    for shown in (made("no inputs").html, campaign_text(made("no inputs").summary, 140)):
         assert "The same in every row: margin 3.66 dB, beacon_margin 6.10 dB, residual_quantile 6.50 µrad" in shown
 
 
@@ -610,19 +611,19 @@ def test_sections_are_there_where_they_have_something_to_show_and_only_there():
 def test_a_distribution_shows_its_limit_its_quantiles_and_all_of_its_rows():
     summary = summary_of(2)
     output = summary.cells[0].outputs["margin"]
-    figure = campaign_figures.distribution(output, LIMITS[0])
+    figure = drawing.distribution(output, LIMITS[0])
     assert {"limit ≥ 3.00 dB", "margin (dB)", "rows (%)"} <= set(texts(figure))
     assert any(t.startswith("50 %: 3.6") for t in texts(figure))
     assert figure.columns["rows (%)"].sum() == pytest.approx(100.0)
-    assert not any("limit" in t for t in texts(campaign_figures.distribution(output, None)))
-    far = texts(campaign_figures.distribution(output, replace(LIMITS[0], least=-40.0)))
+    assert not any("limit" in t for t in texts(drawing.distribution(output, None)))
+    far = texts(drawing.distribution(output, replace(LIMITS[0], least=-40.0)))
     assert "far from here" in " ".join(far)
-    both = texts(campaign_figures.distribution(output, replace(LIMITS[0], most=4.5)))
+    both = texts(drawing.distribution(output, replace(LIMITS[0], most=4.5)))
     assert {"limit ≥ 3.00 dB", "limit ≤ 4.50 dB"} <= set(both)
 
 
 def test_an_axis_has_a_prefix_that_suits_its_values():
-    scale = campaign_scale.scale_of
+    scale = campaign_numbers.scale_of
     for values, unit, name, factor, label in (
         ([2e-6, 9e-6], "rad", "residual_rms", 1e6, "µrad"),
         ([3e8], "bit/s", "data_rate", 1e-6, "Mbit/s"),
@@ -641,16 +642,16 @@ def test_an_axis_has_a_prefix_that_suits_its_values():
 
 def test_the_tail_marks_what_was_wanted_and_the_limit():
     summary = summary_of(2, grid=APERTURES, rows=64)
-    (figure,) = campaign_figures.tail(summary, summary.cells[0])
+    (figure,) = drawing.tail(summary, summary.cells[0])
     seen = texts(figure)
-    assert {"1e-4: 8.58 µrad", "1e-6: 10.5 µrad", "limit ≤ 10 µrad", "other combinations"} <= set(seen)
+    assert {"10⁻⁴: 8.58 µrad", "10⁻⁶: 10.5 µrad", "limit ≤ 10 µrad", "other combinations"} <= set(seen)
     assert "10⁻⁵" in seen  # a decade of the axis
     single = summary_of(2, limits=LIMITS[:1], rows=64)
-    (alone,) = campaign_figures.tail(single, single.cells[0])
+    (alone,) = drawing.tail(single, single.cells[0])
     assert "other combinations" not in texts(alone)
     assert not any("limit" in t for t in texts(alone))
     dark = replace(summary.cells[0], tail=replace(summary.cells[0].tail, survival=np.zeros(4), radius_rad=np.ones(4)))
-    assert campaign_figures.tail(summary, dark) == ()
+    assert drawing.tail(summary, dark) == ()
 
 
 def test_many_inputs_are_cut_in_the_picture_but_not_in_its_data():
@@ -658,25 +659,25 @@ def test_many_inputs_are_cut_in_the_picture_but_not_in_its_data():
     index = summary.sensitivities[0].first["communication.transmit_power"]
     many = {f"mirror.parameter_{k}": replace(index, value=0.9 - 0.01 * k) for k in range(40)}
     each = replace(summary.sensitivities[0], first=many, total={}, rank_correlation=many)
-    (figure,) = campaign_figures.sensitivity(replace(summary, sensitivities=(each,)))
+    (figure,) = drawing.sensitivity(replace(summary, sensitivities=(each,)))
     shown = [t for t in texts(figure) if t.startswith("mirror.parameter_")]
-    assert shown == [f"mirror.parameter_{k}" for k in range(campaign_figures.MOST_INPUTS)]
+    assert shown == [f"mirror.parameter_{k}" for k in range(drawing.MOST_INPUTS)]
     assert "26 inputs with smaller indices" in figure.caption
     assert len(figure.columns) == 40
 
 
 def test_a_key_is_cut_to_what_tells_it_from_the_others():
     keys = ["a.b.left.gain", "a.b.right.gain", "mirror", "x.y.right.gain"]
-    cut = [campaign_figures.label_of(key, keys) for key in keys]
+    cut = [drawing.label_of(key, keys) for key in keys]
     assert cut == ["left.gain", "b.right.gain", "mirror", "y.right.gain"]
-    long = campaign_figures.label_of(f"table.{'long_' * 30}", ["x"])
+    long = drawing.label_of(f"table.{'long_' * 30}", ["x"])
     assert max(map(len, long.splitlines())) <= 30
     assert long.endswith("…")
 
 
 def test_the_failure_region_is_of_the_limit_most_often_missed_over_what_matters_to_it():
     summary = summary_of(6, rows=400, shift_db=0.3)
-    (figure,) = campaign_page.region(summary)
+    (figure,) = campaign_module.region(summary)
     worst = max(summary.cells[0].missed_by, key=lambda name: summary.cells[0].missed_by[name].value)
     assert figure.title == f"Where {worst} misses its limit"
     assert list(figure.columns)[-1] == worst
@@ -686,12 +687,12 @@ def test_the_failure_region_is_of_the_limit_most_often_missed_over_what_matters_
     assert list(figure.columns)[:2] == leading
     assert {"kept", "missed"} <= set(texts(figure))
     assert "no results" not in texts(figure)
-    (failing,) = campaign_page.region(summary_of(2, failed=5))
+    (failing,) = campaign_module.region(summary_of(2, failed=5))
     assert "no results" in texts(failing)
 
 
 def test_with_one_input_the_region_has_the_output_beside_it():
-    (figure,) = campaign_page.region(summary_of(1, shift_db=-0.6))
+    (figure,) = campaign_module.region(summary_of(1, shift_db=-0.6))
     assert {"communication.transmit_power (W)", "margin (dB)", "limit ≥ 3.00 dB"} <= set(texts(figure))
     assert "the input that matters most" in figure.caption
 
@@ -699,13 +700,13 @@ def test_with_one_input_the_region_has_the_output_beside_it():
 def test_the_region_is_of_the_combination_shown_in_detail_unless_it_misses_nothing():
     summary = summary_of(2, grid=APERTURES, rows=256, shift_db=-1.5)
     best = campaign_words.best(summary)
-    (figure,) = campaign_page.region(summary)
+    (figure,) = campaign_module.region(summary)
     assert 0.0 < best.missed.value < 1.0
     assert f"256 rows of {best.label}" in figure.caption
     assert "on both of its sides" not in figure.caption
     kept = summary_of(2, grid=APERTURES, rows=256)
     best = campaign_words.best(kept)
-    (figure,) = campaign_page.region(kept)
+    (figure,) = campaign_module.region(kept)
     assert best.missed.value == 0.0
     assert f"256 rows of {best.label}" not in figure.caption
     assert figure.caption.endswith(f"No limit has rows of {best.label} on both of its sides.")
@@ -713,49 +714,49 @@ def test_the_region_is_of_the_combination_shown_in_detail_unless_it_misses_nothi
 
 def test_a_grid_of_two_keys_is_a_map_with_a_number_in_each_field():
     summary = summary_of(1, grid=TWO_KEYS, rows=128)
-    (figure,) = campaign_figures.grid(summary)
+    (figure,) = drawing.grid(summary)
     shown = [f"{cell.outputs['margin'].quantiles[0.5].value:.3g}" for cell in summary.cells]
     assert set(shown) <= set(texts(figure))
     gap = replace(summary, cells=(replace(summary.cells[0], rows=0, failed=0, outputs={}), *summary.cells[1:]))
-    assert texts(campaign_figures.grid(gap)[0]).count("none") == 2
+    assert texts(drawing.grid(gap)[0]).count("none") == 2
     assert texts(figure).count("none") == 0
 
 
 def test_other_grids_have_a_row_for_each_combination():
     for keys in (APERTURES, THREE_KEYS):
         summary = summary_of(1, grid=keys, rows=64)
-        (figure,) = campaign_figures.grid(summary)
+        (figure,) = drawing.grid(summary)
         for cell in summary.cells:
             assert ", ".join(cell.values.values()) in texts(figure)
-    assert campaign_figures.grid(summary_of(1, rows=64)) == ()
+    assert drawing.grid(summary_of(1, rows=64)) == ()
 
 
 def test_a_grid_without_limits_shows_medians():
     summary = summary_of(1, grid=APERTURES, rows=64, limits=())
-    (figure,) = campaign_figures.grid(summary)
+    (figure,) = drawing.grid(summary)
     assert "rows that miss a limit" not in " ".join(texts(figure))
     assert "median margin" in " ".join(texts(figure))
 
 
 def test_a_worst_row_of_one_axis_and_one_of_two():
     summary = summary_of(2)
-    two = campaign_figures.worst(summary, trace_of(0), 1)
+    two = drawing.worst(summary, trace_of(0), 1)
     assert two.columns["radial error (rad)"] == pytest.approx(np.hypot(*trace_of(0).error_rad.T))
     assert {"drive 1", "drive 2"} <= set(texts(two))
     trace = trace_of(0)
     single = replace(trace, error_rad=trace.error_rad[:, :1], drive_v=trace.drive_v[:, 0])
-    one = campaign_figures.worst(summary, single, 1)
+    one = drawing.worst(summary, single, 1)
     assert one.columns["radial error (rad)"] == pytest.approx(np.abs(trace.error_rad[:, 0]))
     assert "drive 1" not in texts(one)
     assert one.caption == "Row 100: of its rows the worst in margin, 1.20 dB. Shown is the first run of the row's."
     assert one.title == "Worst row in time"
-    assert campaign_figures.worst(summary, single, 2).title == "Second worst row in time"
+    assert drawing.worst(summary, single, 2).title == "Second worst row in time"
     trace.error_rad[0] = 500e-6  # the loop only closes
-    begun = campaign_figures.worst(summary, trace, 1)
+    begun = drawing.worst(summary, trace, 1)
     assert begun.caption.endswith("Its begin, up to 707 µrad, is cut off.")
     assert begun.sheet.panels[0].y.high < 20.0
     trace.error_rad[[0, -1]] = 0.0, 500e-6  # a real excursion is never cut
-    late = campaign_figures.worst(summary, trace, 1)
+    late = drawing.worst(summary, trace, 1)
     assert "cut off" not in late.caption
     assert late.sheet.panels[0].y.high is None
     assert late.sheet.panels[0].marks[0].y.max() == pytest.approx(500.0)
@@ -783,16 +784,16 @@ def test_a_quantile_that_the_rows_cannot_know_is_a_dash_and_is_not_in_the_pictur
     assert [rows[0][headings.index(p)] for p in ("0.3 %", "99.7 %")] == ["–", "–"]
     assert "–" not in rows[0][headings.index("1 %")]
     assert not any("–" in row for row in campaign_tables.output_table(whole.cells[0], 9)[1])
-    assert "–: not known, there are too few rows" in campaign_words.text(few, 140)
-    assert "there are too few rows" not in campaign_words.text(whole, 140)
-    shown, before = (texts(campaign_figures.distribution(s.cells[0].outputs["margin"], None)) for s in (few, whole))
+    assert "–: not known, there are too few rows" in campaign_text(few, 140)
+    assert "there are too few rows" not in campaign_text(whole, 140)
+    shown, before = (texts(drawing.distribution(s.cells[0].outputs["margin"], None)) for s in (few, whole))
     assert any(t.startswith("0.3 %: ") for t in before)
     assert not any(t.startswith(("0.3 %: ", "99.7 %: ")) for t in shown)
     assert any(t.startswith("1 %: ") for t in shown)
-    span = campaign_figures._span(few.cells[0].outputs["margin"])
+    span = drawing._span(few.cells[0].outputs["margin"])
     assert span.low == whole.cells[0].outputs["margin"].quantiles[0.01].value
     nothing = unknown_beyond(whole, 0.5, 0.5).cells[0].outputs["margin"]
-    assert campaign_figures._span(nothing).low == nothing.least
+    assert drawing._span(nothing).low == nothing.least
 
 
 def test_quantiles_come_in_pairs_and_those_known_first():
@@ -813,7 +814,7 @@ def test_the_page_has_the_intervals_of_the_quantiles():
     made_of = made("two inputs")
     median = made_of.summary.cells[0].outputs["margin"].quantiles[0.5]
     assert f"{value(median.low, 'dB')} to {value(median.high, 'dB')}</span>" in made_of.html
-    assert f"{value(median.low, 'dB')} to" not in campaign_words.text(made_of.summary, 140)
+    assert f"{value(median.low, 'dB')} to" not in campaign_text(made_of.summary, 140)
 
 
 def test_failed_rows_stand_before_the_share_of_the_others():
@@ -834,13 +835,13 @@ def test_where_it_is_not_known_what_matters_nothing_matters_most():
     blind = replace(summary, sensitivities=few)
     said = campaign_words.matters(blind)
     assert said == ["What matters to margin and residual_quantile is not known: 32 good rows are too few."]
-    assert "matter" not in campaign_page.region(blind)[0].caption
-    assert "the inputs that matter most" in campaign_page.region(summary_of(6, rows=400, shift_db=0.3))[0].caption
+    assert "matter" not in campaign_module.region(blind)[0].caption
+    assert "the inputs that matter most" in campaign_module.region(summary_of(6, rows=400, shift_db=0.3))[0].caption
 
 
 def test_each_output_is_explained_and_the_rate_that_is_possible_is_not_the_grids():
     summary = summary_of(2)
-    for shown in (campaign_words.text(summary, 140), campaign_page.html(summary)):
+    for shown in (campaign_text(summary, 140), campaign_page(summary)):
         for output in summary.cells[0].outputs.values():
             assert output.meaning in shown
     cell = summary.cells[0]
@@ -848,13 +849,13 @@ def test_each_output_is_explained_and_the_rate_that_is_possible_is_not_the_grids
     of_rate = replace(cell, outputs={"data_rate": rate})
     assert campaign_tables.output_table(of_rate, 3)[1][0][0] == "data_rate (possible)"
     assert campaign_tables.output_table(cell, 3)[1][0][0] == "margin"
-    assert campaign_figures.distribution(rate, None).title == "Distribution of data_rate (possible)"
+    assert drawing.distribution(rate, None).title == "Distribution of data_rate (possible)"
 
 
 def test_a_low_end_that_is_as_good_as_nothing_reads_0():
     ends = campaign_numbers.ends
-    assert ends(Interval(3.5e-7, 7.5e-39, 2.6e-5, 0.99), "", "outage") == "0 to 2.6e-5"
-    assert ends(Interval(3.5e-7, 7.5e-11, 2.6e-5, 0.99), "", "outage") == "7.5e-11 to 2.6e-5"
+    assert ends(Interval(3.5e-7, 7.5e-39, 2.6e-5, 0.99), "", "outage") == "0 to 2.6×10⁻⁵"
+    assert ends(Interval(3.5e-7, 7.5e-11, 2.6e-5, 0.99), "", "outage") == "7.5×10⁻¹¹ to 2.6×10⁻⁵"
     assert ends(Interval(0.01, 0.0, 0.02, 0.99), "", "outage") == "0 % to 2 %"
 
 
@@ -862,7 +863,7 @@ def test_the_tails_worth_stands_in_plain_english():
     tail = replace(rayleigh_tail(2e-6), effective_runs=2.44e7)
     said = campaign_words.tail_method(tail)
     assert said.startswith("It comes from the share of the time of 64 rows")
-    assert said.endswith("24 million independent samples of the error would tell as much of 1e-6.")
+    assert said.endswith("24 million independent samples of the error would tell as much of 10⁻⁶.")
     assert "samples" not in campaign_words.tail_method(replace(tail, effective_runs=math.nan))
     for count, words in ((1.3e5, "130000 "), (3.21e9, "3.2 billion ")):
         assert f" {words}independent" in campaign_words.tail_method(replace(tail, effective_runs=count))
@@ -871,7 +872,7 @@ def test_the_tails_worth_stands_in_plain_english():
 def test_worst_rows_are_numbered_in_their_cell():
     summary = summary_of(2, grid=APERTURES, rows=64)
     traces = (trace_of(0), trace_of(1), trace_of(2, cell=1))
-    drawn_ = campaign_page.draw(replace(summary, worst=traces))["worst"]
+    drawn_ = campaign_figures(replace(summary, worst=traces))["worst"]
     assert [figure.title.split(" row")[0] for figure in drawn_] == ["Worst", "Second worst", "Worst"]
     assert len({figure.name for figure in drawn_}) == 3
 
@@ -882,10 +883,10 @@ def test_no_axis_has_a_factor_beside_it():
     tiny = replace(output, name="outage", unit="", edges=output.edges * 1e-6, least=1e-6, most=5e-6, quantiles={})
     near = replace(output, edges=output.edges * 1e-5 + 7.0, least=7.0, most=7.00005, quantiles={})
     for each in (tiny, near):
-        seen = texts(campaign_figures.distribution(each, None))
+        seen = texts(drawing.distribution(each, None))
         assert not any(t.startswith(("10⁻", "+")) for t in seen)
-    assert any(re.fullmatch(r"[2-4](\.\d+)?×10⁻⁶", t) for t in texts(campaign_figures.distribution(tiny, None)))
-    assert "7.000020" in texts(campaign_figures.distribution(near, None))
+    assert any(re.fullmatch(r"[2-4](\.\d+)?×10⁻⁶", t) for t in texts(drawing.distribution(tiny, None)))
+    assert "7.000020" in texts(drawing.distribution(near, None))
 
 
 def test_an_output_of_two_values_has_a_sentence_and_no_picture():
@@ -896,13 +897,13 @@ def test_an_output_of_two_values_has_a_sentence_and_no_picture():
     for output, pictures in ((two, 0), (three, 1)):
         summary = replace(summary_of(2), cells=(replace(cell, outputs={"lost_share": output}),))
         said = "lost_share has two values: 0 % in 75 % of the rows, 25 % in 25 %."
-        assert (said in campaign_words.text(summary, 140)) == (not pictures)
-        assert len(campaign_page.draw(summary)["outputs"]) == pictures
+        assert (said in campaign_text(summary, 140)) == (not pictures)
+        assert len(campaign_figures(summary)["outputs"]) == pictures
 
 
 def test_the_grid_lists_mean_and_misses_of_each_limit_for_every_combination():
     summary = summary_of(2, grid=APERTURES, rows=256, shift_db=-1.5)
-    wide, narrow = campaign_words.text(summary, 200), campaign_words.text(summary, 90)
+    wide, narrow = campaign_text(summary, 200), campaign_text(summary, 90)
     assert "Limits by combination" in narrow
     assert "Limits by combination" not in wide
     for text in (wide, narrow):
@@ -910,22 +911,22 @@ def test_the_grid_lists_mean_and_misses_of_each_limit_for_every_combination():
         for cell in summary.cells:
             line = f"{value(cell.outputs['margin'].mean.value, 'dB')} +{share(cell.missed_by['margin'].value)}"
             assert re.search(line, text)
-    assert any("mean margin" in row for row in Page(campaign_page.html(summary)).rows)
+    assert any("mean margin" in row for row in Page(campaign_page(summary)).rows)
 
 
 def test_findings_stand_under_the_verdict_in_text_page_and_data():
     plain = summary_of(2)
     told = replace(plain, findings=("The 1 % quantile of margin is known within 0.05 dB, as asked.",))
-    lines = campaign_words.text(told, 140).splitlines()
+    lines = campaign_text(told, 140).splitlines()
     assert lines[2] == told.findings[0]
     assert lines[0] == campaign_words.headline(told)
-    assert f"<p>{told.findings[0]}</p>" in campaign_page.html(told).split("</section>")[0]
-    assert campaign_words.data(told)["findings"] == list(told.findings)
-    assert campaign_words.data(plain)["findings"] == []
-    assert "Limits" in campaign_words.text(plain, 140).splitlines()[2]
+    assert f"<p>{told.findings[0]}</p>" in campaign_page(told).split("</section>")[0]
+    assert campaign_data(told)["findings"] == list(told.findings)
+    assert campaign_data(plain)["findings"] == []
+    assert "Limits" in campaign_text(plain, 140).splitlines()[2]
 
 
 def test_the_same_summary_gives_the_same_page_twice():
-    again = without_scripts(campaign_page.html(CASES["few rows"]()))
+    again = without_scripts(campaign_page(CASES["few rows"]()))
     assert again == made("few rows").html
     assert again != made("one row").html

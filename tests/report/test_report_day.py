@@ -19,9 +19,11 @@ from microrad.loop.fine_pointing import designs
 from microrad.mission.file import load_mission, with_contents
 from microrad.orbit import day as day_study
 from microrad.orbit.operations import OperationsError
-from microrad.report import contact_run_words, day_plots, day_words, results
-from microrad.study import contact_run
-from microrad.study import story as study
+from microrad.report.day import words as day_words
+from microrad.report.day.contact_run import contact_sentences, windows_table
+from microrad.report.day.figures import day_figures
+from microrad.report.results.manifest import manifest_of
+from microrad.study import contact_run, study
 from scenes import scene_of
 from shipped import SHIPPED, edited_file, plain_study
 
@@ -96,13 +98,13 @@ def test_each_claim_of_the_paper_about_contacts_is_judged(found):
 
 
 def test_each_figure_of_the_day_stands_with_its_data(written, found):
-    names = [f.name for f in day_plots.draw(found.day, found.contact)]
+    names = [f.name for f in day_figures(found.day, found.contact)]
     assert names == [*FIGURES, "contact-run"]
     for name in names:
         assert (written / "figures" / f"{name}.svg").stat().st_size > 1000
         with (written / "figures" / f"{name}.csv").open(encoding="utf-8") as lines:
             assert len(list(csv.reader(lines))) > 1
-    assert [f.name for f in day_plots.draw(found.day)] == FIGURES
+    assert [f.name for f in day_figures(found.day)] == FIGURES
 
 
 def test_along_the_contact_time_counts_from_the_rise(written):
@@ -113,7 +115,7 @@ def test_along_the_contact_time_counts_from_the_rise(written):
 
 
 def test_the_latency_curve_is_the_distribution(found):
-    drawn = next(f for f in day_plots.draw(found.day) if f.name == "latency")
+    drawn = next(f for f in day_figures(found.day) if f.name == "latency")
     latency, share = drawn.columns["relay, latency (s)"], drawn.columns["relay, share"]
     assert np.all(np.diff(latency) > 0)
     assert np.all(np.diff(share) >= 0)
@@ -191,25 +193,25 @@ def test_a_contact_beyond_those_of_the_span_is_refused(found, tmp_path):
     file = edited_file(tmp_path, ("number = 1 ", "number = 99 "), whole=True)
     links = replace(found.links, file=replace(found.links.file, mission=file.mission))
     with pytest.raises(OperationsError, match=r"operations\.contact\.number is 99, and the span has 15 contacts"):
-        day_study.run(links)
+        day_study.run_day_study(links)
 
 
 def test_the_words_say_when_data_begin_and_how_much_flows(found):
     run = found.contact
-    (said,) = contact_run_words.sentences(run, 1, "PI", 3e8)
+    (said,) = contact_sentences(run, 1, "PI", 3e8)
     assert "data begin" in said
     assert f"{100 * run.data_share:.1f} % of the contact" in said
     assert "never lost" in said
-    rows = contact_run_words.window_rows(run)
+    headings, rows = windows_table(run, 0.997)
     assert len(rows) == len(run.windows)
-    assert len(rows[0]) == len(contact_run_words.window_headings(0.997))
-    assert contact_run_words.window_headings(0.95)[5] == "95 % (µrad)"
+    assert len(rows[0]) == len(headings)
+    assert windows_table(run, 0.95).headings[5] == "95 % (µrad)"
 
 
 def test_the_words_of_a_contact_without_data_say_why(found):
     log = found.contact.log
     none = replace(found.contact, log=(*log[:2], replace(log[-1], state=log[1].to, cause="given up")), windows=())
-    (said,) = contact_run_words.sentences(none, 1, "PI", 3e8)
+    (said,) = contact_sentences(none, 1, "PI", 3e8)
     assert "never comes to data: given up" in said
 
 
@@ -227,7 +229,7 @@ def test_a_mission_without_orbits_has_no_day(tmp_path, monkeypatch):
     mission.write_text(
         text[:begin] + text[end : text.index("# ---", text.index("loop_amplitude = "))], encoding="utf-8"
     )
-    result = study.run(load_mission(mission))
+    result = study.run_study(load_mission(mission))
     assert (result.day, result.contact, result.plan) == (None, None, None)
     assert not any("orbits a day" in c.claim for c in result.claims)
     page = report.write(result, tmp_path / "out").read_text(encoding="utf-8")
@@ -242,8 +244,8 @@ def test_the_manifest_has_the_hash_of_each_file_that_the_mission_names_as_it_was
     study = replace(found, file=with_contents(replace(found.file, mission=m, path=tmp_path / "mission.toml")))
     (tmp_path / "a.tle").write_bytes(b"others")
     (tmp_path / "out").mkdir()
-    made = results.manifest(study, tmp_path / "out")
+    made = manifest_of(study, {}, tmp_path / "out")
     assert made["inputs_sha256"] == {"a.tle": hashlib.sha256(b"elements").hexdigest()}
     assert made["inputs"] == {"a.tle": "elements"}
     assert "seed 1 of [operations], 20 runs" in made["randomness"]
-    assert results.manifest(found, tmp_path / "out")["inputs_sha256"] == {}
+    assert manifest_of(found, {}, tmp_path / "out")["inputs_sha256"] == {}

@@ -22,13 +22,20 @@ from microrad.loop.fine_loop.ensemble import bin_edges_rad
 from microrad.loop.fine_loop.linear import close, stationary
 from microrad.loop.fine_loop.loop import ReferenceFilter, assemble, with_inverse
 from microrad.loop.fine_pointing import Difference, ErrorBudget, FinePointingStudy, Part, Residual, Sine, Verified
-from microrad.report import chain, requirement_views, requirements, results
-from microrad.report import fine_pointing as section
-from microrad.report import fine_pointing_figures as figures
-from microrad.report import fine_pointing_words as words
-from microrad.report import page as report_page
-from microrad.study import pointing_cost as performance
-from microrad.study import story as study
+from microrad.report.fine_pointing import figures, words
+from microrad.report.fine_pointing import page as section
+from microrad.report.fine_pointing.figures import fine_pointing_figures
+from microrad.report.requirements import requirement_table
+from microrad.report.results.arrays import study_netcdf
+from microrad.report.results.manifest import manifest_of
+from microrad.report.study import chain
+from microrad.report.study import contributors as requirement_views
+from microrad.report.study import page as report_page
+from microrad.report.study import words as study_words
+from microrad.report.study.data import summary
+from microrad.report.study.page import StudyFigures
+from microrad.study import pointing_penalty as performance
+from microrad.study import study
 from scenes import scene_of
 from shipped import plain_study
 
@@ -131,7 +138,9 @@ def verified_of(scene, design, i, freq):
 
 def with_fine(plain, fine):
     """The study with this fine-pointing loop in it, and its requirements."""
-    found = performance.run(plain.links.data, plain.file.mission.conventions.residual, plain.runs, fine)
+    found = performance.performance_of_loops(
+        plain.links.data, plain.file.mission.conventions.residual, plain.runs, fine
+    )
     case = study.best_case(found, fine)
     judged, papers_loop = study.judged(plain.links, plain.requirements[-2:], fine, case)
     return replace(plain, fine_pointing=fine, performance=found, requirements=judged, papers_loop=papers_loop)
@@ -160,12 +169,12 @@ def written(plain, fine, tmp_path_factory):
 def render(of, drawn=()):
     """The page without its other figures, which take most of the time."""
     with tempfile.TemporaryDirectory() as nothing:
-        return report_page.render(of, report_page.Drawn(fine=tuple(drawn)), results.manifest(of, Path(nothing)))
+        return report_page.study_page(of, StudyFigures(fine=tuple(drawn)), manifest_of(of, summary(of), Path(nothing)))
 
 
 def results_of(of, folder):
     """What results.nc holds, with one trace."""
-    (folder / "results.nc").write_bytes(results.netcdf(replace(of, runs=of.runs[:1])))
+    (folder / "results.nc").write_bytes(study_netcdf(replace(of, runs=of.runs[:1])))
     return xr.open_datatree(folder / "results.nc", engine="h5netcdf")
 
 
@@ -330,14 +339,14 @@ def test_the_section_opens_with_the_verdict_and_its_distance_from_theory(page, f
 
 
 def test_a_study_without_the_loop_has_no_section(plain, tmp_path):
-    drawn = figures.draw(plain)
+    drawn = fine_pointing_figures(plain)
     text = render(plain, drawn)
     assert HEADING not in text and "Turbulence; " not in text
     assert "Vibration, sensor noise and turbulence" in text
     assert drawn == ()
     assert report.summary(plain)["fine_pointing"] is None
     assert "ine pointing" not in report.verdict_text(plain)
-    assert not [w for w in report.words.warnings(plain) if "fine pointing" in w]
+    assert not [w for w in study_words.warnings(plain) if "fine pointing" in w]
     with results_of(plain, tmp_path) as tree:
         assert "fine_pointing" not in tree.children and "tracking" in tree.children
 
@@ -367,11 +376,11 @@ def test_the_verdict_is_that_of_the_missions_own_loop(plain, fine):
     said = report.verdict_text(plain, 400, verbose=True)
     assert said.startswith("Not every requirement is met: residual pointing error (")
     assert "closes" not in said.splitlines()[0]
-    brief = report.words.short(whole)
+    brief = study_words.short(whole)
     assert len(brief) == 6 and all(sentence.endswith(".") for sentence in brief)
     assert brief[-1].startswith("For comparison alone: the paper's loop (PID + inverse, sine of 25 Hz) would miss res")
-    assert len(report.words.short(plain)) == 5 and "For comparison alone" not in said
-    added = [line for line in report.words.explanation(whole) if line not in report.words.explanation(plain)]
+    assert len(study_words.short(plain)) == 5 and "For comparison alone" not in said
+    added = [line for line in study_words.explanation(whole) if line not in study_words.explanation(plain)]
     assert added.pop(0) == "What limits it: Body pointing."
     assert added[0].startswith(f"{HEADING}: {SECOND} leaves 4.23 µrad radial at 99.7 %")
     assert "10 µrad is allowed" in added[0]
@@ -381,7 +390,7 @@ def test_the_verdict_is_that_of_the_missions_own_loop(plain, fine):
     assert "better (rms) than the best PI of the gain grid" in added[1]
     assert "axis x needs 623 µrad to either side and has 534 µrad" in added[2]
     assert len(added) == 3
-    fine_row, margin_row = (" ".join(cells) for cells in requirements.table(whole.requirements).rows[-2:])
+    fine_row, margin_row = (" ".join(cells) for cells in requirement_table(whole.requirements).rows[-2:])
     assert fine_row == f"fine pointing at 99.7 % ({SECOND}) 10 µrad 4.23 µrad +5.77 µrad PASS"
     assert margin_row.startswith(f"link margin but for 0.3 % of the time ({SECOND}) 3.00 dB 4.8")
 
@@ -491,7 +500,7 @@ def test_a_stroke_that_fits_is_said_to_fit(fine, mission):
     ],
 )
 def test_angles_have_three_digits_and_at_most_three_decimals(value_rad, text):
-    assert words.micro(value_rad) == text
+    assert micro(value_rad) == text
 
 
 @pytest.mark.parametrize(
@@ -677,7 +686,7 @@ def test_limits_and_a_variant_that_is_missing_reach_results(plain, fine, tmp_pat
 
 @pytest.fixture(scope="module")
 def drawn(plain, fine):
-    return figures.draw(with_fine(plain, fine))
+    return fine_pointing_figures(with_fine(plain, fine))
 
 
 def test_each_figure_is_an_svg_with_its_data_and_units(written, drawn, fine):
@@ -729,4 +738,4 @@ def test_three_different_controllers_are_drawn_the_baseline_first(fine):
 def test_a_sensor_slower_than_the_control_has_no_sensitivity_drawn(plain, fine):
     optical = replace(fine.scene.loop.optical, every=2)
     slow = replace(fine, scene=replace(fine.scene, loop=replace(fine.scene.loop, optical=optical)))
-    assert [f.name[14:] for f in figures.draw(with_fine(plain, slow))] == ["spectrum", "errors", "budget"]
+    assert [f.name[14:] for f in fine_pointing_figures(with_fine(plain, slow))] == ["spectrum", "errors", "budget"]

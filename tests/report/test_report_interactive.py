@@ -9,22 +9,26 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 
-from microrad.report import scripts
-from microrad.report.day_assumptions import Assumed, assumptions
-from microrad.report.day_figures import empty
-from microrad.report.page import pages
+from microrad.report.day.figures import Assumed, assumptions, empty
+from microrad.report.page import templates as scripts
+from microrad.report.page.templates import templates
 from microrad.report.plotting import scales
 from microrad.report.plotting.figure import Figure
 from microrad.report.plotting.interactive import numbers, plot_of, text_of, words
 from microrad.report.plotting.layout import layout
-from microrad.report.plotting.palette import CIVIDIS, MOST_POINTS, colour_at, thinned
-from microrad.report.plotting.sheet import (
+from microrad.report.plotting.palette import (
     BLACK,
     BLUE,
+    CIVIDIS,
     GREY,
+    MOST_POINTS,
     SKY,
     VERMILION,
     WHITE,
+    colour_at,
+    thinned,
+)
+from microrad.report.plotting.sheet import (
     Area,
     Axis,
     Bars,
@@ -497,8 +501,10 @@ def test_hostile_names_are_words_and_end_nothing():
 
 
 def page_of(*drawn, files=False):
-    env = pages()
-    source = '{% from "figure.html" import drawn %}<!DOCTYPE html><html><body>{{ drawn(figures, files) }}</body></html>'
+    env = templates()
+    source = (
+        '{% from "page/figure.html" import drawn %}<!DOCTYPE html><html><body>{{ drawn(figures, files) }}</body></html>'
+    )
     return scripts.with_scripts(env.from_string(source).render(figures=drawn, files=files))
 
 
@@ -520,6 +526,18 @@ def test_two_pictures_of_a_page_share_no_id_and_keep_what_theirs_refer_to():
         assert "<style" not in picture  # it would hold for the whole page
 
 
+@pytest.mark.parametrize(("low", "high"), [(0.0, None), (0.0, 100.0), (-1.0, None), (None, 0.0)])
+def test_a_logarithmic_axis_takes_no_end_that_is_not_positive(low, high):
+    sheet, (panel,) = grid(4.0, 3.0)
+    panel.y = Axis("time (s)", log=True, low=low, high=high)
+    panel.add(Line(np.array([0.0, 1.0]), np.array([2.0, 50.0])))
+    ends = scales.limits(panel.y, "y", [panel])
+    assert 1.0 < ends[0] < 2.0
+    assert ends[1] == 100.0 if high else 50.0 < ends[1] < 100.0
+    assert "<path" in svg_of(sheet)
+    assert plot_of(sheet)["layout"]["yaxis"]["range"] == pytest.approx(np.log10(ends), abs=1e-5)
+
+
 def test_columns_become_rows_of_text_with_gaps_left_empty():
     columns = {"input": ("a", "b", "c"), "value (m)": np.array([1.0 / 3.0, math.nan]), "n": np.array([1e9])}
     assert rows_of(columns, 3) == [("a", "0.333", "1e+09"), ("b", "", ""), ("c", "", "")]
@@ -529,8 +547,8 @@ def test_numbers_stand_below_a_picture_where_they_are_wanted():
     figure = a_figure(columns={"input <b>": ("x&y",), "value (m)": np.array([0.25])})
     assert figure.static.plot == ""
     assert figure.static.svg == figure.svg
-    source = '{% from "figure.html" import drawn %}{{ drawn(figures, false, true) }}'
-    page = pages().from_string(source).render(figures=[figure.static])
+    source = '{% from "page/figure.html" import drawn %}{{ drawn(figures, false, true) }}'
+    page = templates().from_string(source).render(figures=[figure.static])
     assert "<script" not in page
     assert '<th>input &lt;b&gt;</th><th class="number">value (m)</th>' in page
     assert '<td>x&amp;y</td><td class="number">0.25</td>' in page
@@ -557,7 +575,7 @@ def test_the_library_is_whole_licensed_and_ends_no_element():
     assert "plotly.js (cartesian - minified) v4" in found[0]
     assert "Licensed under the MIT license" in found[0]
     assert len(scripts.library().encode()) < 1.6e6
-    folder = scripts.resources.files("microrad.report")
+    folder = scripts.resources.files("microrad.report.page")
     assert "MIT License" in folder.joinpath("vendor/plotly-LICENSE.txt").read_text(encoding="utf-8")
 
 

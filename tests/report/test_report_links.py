@@ -14,9 +14,26 @@ from link_files import RECEIVERS, data_with, link_file, received_with, written
 from microrad.link import Swing
 from microrad.link import study as link_study
 from microrad.mission.file import load_link
-from microrad.report import budget_views, link_figures, links, single_pages
+from microrad.report.links import budgets as budget_views
+from microrad.report.links import figures as link_module
+from microrad.report.links import page as links
+from microrad.report.links import words as links_words
+from microrad.report.links.budgets import links_csv, links_text
+from microrad.report.links.data import performance_data
+from microrad.report.links.figures import link_figures
+from microrad.report.links.page import (
+    acquisition_paragraphs,
+    acquisition_section,
+    fade_sentences,
+    links_page,
+    links_section,
+    performance_note,
+    performance_section,
+    pointing_section,
+    residuals_sentence,
+)
 from microrad.report.quantities import apart, quantity
-from microrad.study.pointing_cost import FINE, Cost, LinkPerformance
+from microrad.study.pointing_penalty import FINE, Cost, LinkPerformance
 from report_pages import without_scripts
 
 FEW = {"acquisition.runs": 100}
@@ -29,7 +46,7 @@ SVG = "{http://www.w3.org/2000/svg}"
 
 
 def studied(folder, *changes):
-    return link_study.run(link_file(folder, *changes))
+    return link_study.run_link_study(link_file(folder, *changes))
 
 
 @pytest.fixture(scope="module")
@@ -128,20 +145,20 @@ def test_the_reference_without_hysteresis_has_no_row_and_the_missions_own_jitter
     shown = case(plain, source="sine of 1 Hz", controller="PID", mirror="given")
     cases = (shown, replace(shown, mirror="no hysteresis"))
     cost = Cost("sine of 1 Hz", "PID", "given", -1.0, -2e6)
-    context = links.performance(LinkPerformance(0.003, 20e-6, cases, (cost,)), "", None)
+    context = performance_section(LinkPerformance(0.003, 20e-6, cases, (cost,)), "", None)
     assert [(row["source"], row["mirror"]) for row in context["performance"]] == [("sine of 1 Hz", "given")]
-    own = links.performance(LinkPerformance(0.003, 20e-6, cases, (cost,)), "", case(plain))
+    own = performance_section(LinkPerformance(0.003, 20e-6, cases, (cost,)), "", case(plain))
     assert [row["source"] for row in own["performance"]] == ["jitter as given", "sine of 1 Hz"]
     assert context["outage"] == "0.3 %"
     assert context["performance_note"].endswith("on a mirror without it.")
-    assert links.note(costs=False).endswith("at that loss.")
-    assert "a star: the present one" in links.note(costs=False)
+    assert performance_note(costs=False).endswith("at that loss.")
+    assert "a star: the present one" in performance_note(costs=False)
 
 
 def test_the_loop_under_vibration_is_named_only_where_it_was_simulated(plain):
     sine = case(plain, source="sine of 1 Hz", controller="PID", mirror="given")
     alone, both = (
-        links.in_words(LinkPerformance(0.003, 19.7e-6, cases, ()))
+        residuals_sentence(LinkPerformance(0.003, 19.7e-6, cases, ()))
         for cases in ((sine,), (sine, replace(sine, source=FINE)))
     )
     assert "Clean sines (one axis, as in the paper)." in alone
@@ -165,23 +182,23 @@ def test_two_values_have_the_digits_that_tell_them_apart(one, other, unit, texts
 
 # --------------------------------------------------------------------------------------------------------------- fades
 def test_fades_that_no_spectrum_tells_are_not_spoken_of(plain):
-    assert links.fades(()) == []
-    assert links.fades([case(plain, fades_per_s=math.nan)]) == []
+    assert fade_sentences(()) == []
+    assert fade_sentences([case(plain, fades_per_s=math.nan)]) == []
 
 
 def test_fades_rarer_than_one_in_a_year_are_not_counted(plain):
     rare = case(plain, fades_per_s=0.99 / YEAR_S)
-    assert links.fades([rare]) == [
+    assert fade_sentences([rare]) == [
         "Fades below the required margin: less than one a year, for Gaussian errors of these spectra."
     ]
     once = case(plain, fades_per_s=1.01 / YEAR_S, fade_s=2e-3)
-    assert "3.2e-08 a second of 2 ms each" in links.fades([once])[0]
+    assert "3.2e-08 a second of 2 ms each" in fade_sentences([once])[0]
 
 
 def test_each_case_has_its_own_fades(plain):
     often = case(plain, controller="PID", fades_per_s=75.66, fade_s=7.512e-3, uncoded_penalty_db=1.234)
     rare = case(plain, controller="", source="jitter as given", fades_per_s=0.0, uncoded_penalty_db=math.nan)
-    said = links.fades([often, rare, case(plain, controller="unknown", fades_per_s=math.nan)])
+    said = fade_sentences([often, rare, case(plain, controller="unknown", fades_per_s=math.nan)])
     assert said[0].endswith(": PID: 75.7 a second of 7.51 ms each; jitter as given: less than one a year.")
     assert len(said) == 1
 
@@ -201,17 +218,17 @@ def test_the_penalty_is_said_with_a_code_and_without_however_rare_the_fades(plai
         c = case(
             plain, mean_loss_db=0.414, outage_loss_db=2.456, uncoded_penalty_db=penalty_db, fades_per_s=fades_per_s
         )
-        said = budget_views.performance(c, plain)
+        said = links_words.under_jitter_sentence(c, plain)
         coded = "with a code 0.41 dB where its interleaver spans many fades, 2.46 dB where it spans none; "
         assert said.endswith(coded + words)
         assert not re.search(r"\b(nan|inf)\b", said)
-        data = budget_views.performance_data(c)
+        data = performance_data(c)
         assert (data["coded_penalty_many_fades_db"], data["coded_penalty_no_interleaver_db"]) == (0.414, 2.456)
 
 
 def test_a_receiver_that_is_known_has_its_penalty_on_the_page_although_no_fade_is_as_deep(tmp_path):
     found = studied(tmp_path, NO_SCAN, JITTER, received_with("preamplified dpsk"))
-    page = single_pages.budget(found)
+    page = links_page(found)
     assert "less than one a year" in page
     assert 0.5 < found.under_jitter.uncoded_penalty_db < 2.0
     assert f'<td class="number">{found.under_jitter.uncoded_penalty_db:.2f}</td>' in page
@@ -222,7 +239,7 @@ def test_a_receiver_that_is_known_has_its_penalty_on_the_page_although_no_fade_i
 def test_the_rows_of_the_jitter_stand_in_the_csv(tmp_path, name):
     found = studied(tmp_path, NO_SCAN, JITTER, received_with(name) if name else {})
     p, known = found.under_jitter, name is not None
-    rows = {r[1]: r for r in csv.reader(io.StringIO(budget_views.csv_text(found))) if r[0] == UNDER_JITTER}
+    rows = {r[1]: r for r in csv.reader(io.StringIO(links_csv(found))) if r[0] == UNDER_JITTER}
     expected = {
         "Mean pointing loss": -p.mean_loss_db,
         "Outage": p.outage,
@@ -232,19 +249,19 @@ def test_the_rows_of_the_jitter_stand_in_the_csv(tmp_path, name):
     assert rows["Mean pointing loss"][-1] == (
         "" if known else "the penalty without a code is unknown, as the receiver is given by its sensitivity alone"
     )
-    assert UNDER_JITTER not in budget_views.csv_text(studied(tmp_path, NO_SCAN))
+    assert UNDER_JITTER not in links_csv(studied(tmp_path, NO_SCAN))
 
 
 def test_what_there_is_to_doubt_of_fades_is_said_once(plain):
     doubtful = case(
         plain, fades_per_s=1.0, fade_s=1e-3, uncoded_penalty_db=math.nan, fade_warning="half of it is noise"
     )
-    assert links.fades([doubtful, doubtful])[1:] == ["Half of it is noise."]
+    assert fade_sentences([doubtful, doubtful])[1:] == ["Half of it is noise."]
 
 
 # ------------------------------------------------------------------------------------------------------------ pointing
 def test_the_column_of_what_is_left_fills_the_beacons_cone(plain):
-    shown = links.pointing(plain.open_loop)
+    shown = pointing_section(plain.open_loop)
     lines = [row["line"] for row in shown["rows"]]
     square = sum((line.value * 1e6) ** 2 for line in lines)
     for row, line in zip(shown["rows"], lines, strict=True):
@@ -258,14 +275,14 @@ def test_the_column_of_what_is_left_fills_the_beacons_cone(plain):
 
 def test_without_a_beacon_nothing_is_left_for_anything(tmp_path):
     found = studied(tmp_path, {"beacon": None, "acquisition": None})
-    shown = links.pointing(found.open_loop)
+    shown = pointing_section(found.open_loop)
     assert [row["left"] for row in shown["rows"]] == [""] * len(shown["rows"])
     assert (shown["left_for"], shown["sentences"]) == ("", [])
 
 
 def test_a_line_that_the_others_leave_nothing_is_told_so(tmp_path):
     found = studied(tmp_path, NO_SCAN, {"pointing.lines.body_pointing.error": "400 urad"})
-    left = {row["line"].name: row["left"] for row in links.pointing(found.open_loop)["rows"]}
+    left = {row["line"].name: row["left"] for row in pointing_section(found.open_loop)["rows"]}
     assert left.pop("Body pointing") == "300 \u00b5rad"
     assert set(left.values()) == {"nothing"}
 
@@ -281,13 +298,13 @@ def test_the_sentence_on_coverage_tells_both_readings(plain, tmp_path):
 
 
 def test_no_sentence_is_said_twice_on_the_page(plain):
-    context = links.context(plain, budgets=(), figures=(), files=False)
-    everywhere = budget_views.sentences(plain)
+    context = links_section(plain, budgets=(), figures=(), files=False)
+    everywhere = links_words.sentences(plain)
     elsewhere = [
-        budget_views.verdict(plain),
-        *budget_views.pointing_sentences(plain.open_loop),
+        links_words.verdict(plain),
+        *links_words.pointing_sentences(plain.open_loop),
         *context["performance_words"],
-        *budget_views.acquisition(plain.finding),
+        *links_words.acquisition_sentences(plain.finding),
     ]
     assert sorted([*context["sentences"], *elsewhere]) == sorted(everywhere)
     assert len(context["sentences"]) == 8
@@ -295,7 +312,7 @@ def test_no_sentence_is_said_twice_on_the_page(plain):
 
 # --------------------------------------------------------------------------------------------------------- acquisition
 def test_the_rows_of_acquisition_are_those_of_the_record(plain):
-    shown = links.acquisition(plain.finding)
+    shown = acquisition_section(plain.finding)
     assert [row["name"] for row in shown["ways"]] == ["wide beacon", "spiral scan"]
     assert shown["early"] == "90 %"
     for row, way in zip(shown["ways"], (plain.finding.wide, plain.finding.scan), strict=True):
@@ -314,7 +331,7 @@ def test_the_rows_of_acquisition_are_those_of_the_record(plain):
 
 def test_acquisition_that_never_locks_has_no_simulated_time(tmp_path):
     found = studied(tmp_path, NO_SCAN, {"answer.transmit_power": "1 mW"})
-    (way,) = links.acquisition(found.finding)["ways"]
+    (way,) = acquisition_section(found.finding)["ways"]
     assert way["cells"][1] == "0.0000"
     assert way["cells"][3] == "none locks"
     assert not any("nan" in cell for cell in way["cells"])
@@ -322,11 +339,11 @@ def test_acquisition_that_never_locks_has_no_simulated_time(tmp_path):
 
 def test_the_words_on_acquisition_give_each_chance(plain, tmp_path):
     chances = plain.finding.chances
-    words, scan = links.acquisition_words(plain.finding)
+    words, scan = acquisition_paragraphs(plain.finding)
     for value in (chances.beacon_coverage, chances.answer_coverage, chances.answer_detection, chances.return_coverage):
         assert f"{value:.4f}" in words
     assert f"in {quantity(plain.finding.scanned.duration_s, 's')} at most." in scan
-    assert len(links.acquisition_words(studied(tmp_path, NO_SCAN).finding)) == 1
+    assert len(acquisition_paragraphs(studied(tmp_path, NO_SCAN).finding)) == 1
 
 
 # ------------------------------------------------------------------------------------------------------------- figures
@@ -336,7 +353,7 @@ def texts(figure):
 
 
 def test_the_figures_are_svg_with_their_numbers_beside_them(plain):
-    drawn = link_figures.draw(plain)
+    drawn = link_figures(plain)
     assert [figure.name for figure in drawn] == [*TORNADOS, "wide-beam-or-scan"]
     trade = drawn[-1]
     for figure in drawn:
@@ -357,7 +374,7 @@ def test_the_figures_are_svg_with_their_numbers_beside_them(plain):
 
 
 def test_the_captions_give_the_missions_own_numbers(plain):
-    trade = link_figures.draw(plain)[-1]
+    trade = link_figures(plain)[-1]
     assert "99.5 % coverage" in trade.caption
     assert (
         "a beam of 27.9 \u00b5rad half angle at 1/e2, used out to 20 \u00b5rad and led over it with an overlap of 0.25 "
@@ -369,10 +386,10 @@ def test_the_captions_give_the_missions_own_numbers(plain):
 
 def test_there_is_no_trade_without_a_scan(tmp_path):
     both = ["tornado", "tornado-beacon", "tornado-answer"]
-    assert [figure.name for figure in link_figures.draw(studied(tmp_path, NO_SCAN))] == both
-    assert [figure.name for figure in link_figures.draw(studied(tmp_path, {"acquisition": None}))] == both
+    assert [figure.name for figure in link_figures(studied(tmp_path, NO_SCAN))] == both
+    assert [figure.name for figure in link_figures(studied(tmp_path, {"acquisition": None}))] == both
     alone = studied(tmp_path, dict.fromkeys(("acquisition", "beacon", "answer")))
-    assert [figure.name for figure in link_figures.draw(alone)] == ["tornado"]
+    assert [figure.name for figure in link_figures(alone)] == ["tornado"]
 
 
 def swing(plain, low_db, high_db, **others):
@@ -395,7 +412,7 @@ def swing(plain, low_db, high_db, **others):
 def test_a_tornado_is_drawn_whatever_its_swings(plain, ends):
     own, *others = plain.tornados
     found = replace(plain, tornados=(replace(own, swings=tuple(swing(plain, *each) for each in ends)), *others))
-    figure = link_figures.draw(found)[0]
+    figure = link_figures(found)[0]
     ET.fromstring(figure.svg)
     assert not re.search(r"\b(nan|inf)\b", figure.svg)
     slow = sum(not all(map(math.isfinite, each)) for each in ends)
@@ -404,13 +421,13 @@ def test_a_tornado_is_drawn_whatever_its_swings(plain, ends):
 
 
 def test_no_swing_is_no_tornado(plain):
-    assert [figure.name for figure in link_figures.draw(replace(plain, tornados=()))] == ["wide-beam-or-scan"]
+    assert [figure.name for figure in link_figures(replace(plain, tornados=()))] == ["wide-beam-or-scan"]
 
 
 def test_a_receiver_near_its_bandwidth_is_drawn_and_listed(tmp_path):
     found = studied(tmp_path, NO_SCAN, received_with("preamplified dpsk"), {"communication.data_rate": "3.1 Gbit/s"})
     assert math.isinf(found.tornados[0].swings[0].swing_db)
-    figure = link_figures.draw(found)[0]
+    figure = link_figures(found)[0]
     assert texts(figure).count("< no margin: receiver too slow") == 3  # rate, code rate and bandwidth
     assert math.isinf(figure.columns["margin higher (dB)"].min())
 
@@ -421,9 +438,9 @@ def test_a_tornado_shows_its_longest_bars_and_names_assumptions(plain):
         for n, x in enumerate(np.linspace(2, 1, 30))
     ]
     own, *others = plain.tornados
-    figure = link_figures.draw(replace(plain, tornados=(replace(own, swings=tuple(many)), *others)))[0]
+    figure = link_figures(replace(plain, tornados=(replace(own, swings=tuple(many)), *others)))[0]
     labels = [text for text in texts(figure) if text and text.startswith("k")]
-    assert len(labels) == link_figures.MOST_BARS
+    assert len(labels) == link_module.MOST_BARS
     assert labels[0] == "k0 = 300 Mbit/s"
     assert figure.caption.endswith("Assumptions among them: communication.k1.")
     assert {len(column) for column in figure.columns.values()} == {30}
@@ -431,9 +448,9 @@ def test_a_tornado_shows_its_longest_bars_and_names_assumptions(plain):
 
 
 def test_the_required_margin_is_marked_where_it_is_in_sight(plain, tmp_path):
-    assert "required" in texts(link_figures.draw(plain)[0])
+    assert "required" in texts(link_figures(plain)[0])
     far = studied(tmp_path, NO_SCAN, {"requirement.margin": "30 dB"})
-    assert "required" not in texts(link_figures.draw(far)[0])
+    assert "required" not in texts(link_figures(far)[0])
 
 
 # ------------------------------------------------------------------------------------------------------------ the page
@@ -443,7 +460,7 @@ def test_every_text_of_the_mission_is_escaped(tmp_path):
     line = 'transmit_power = "5 W"'
     assert text.count(line) == 1
     path.write_text(text.replace(line, f"{line} # literature: <img src=x onerror=y> 2021"), encoding="utf-8")
-    page = without_scripts(single_pages.budget(link_study.run(load_link(path))))
+    page = without_scripts(links_page(link_study.run_link_study(load_link(path))))
     assert "<script" not in page
     assert "<img" not in page
     assert page.count("&lt;script&gt;alert(1)&lt;/script&gt; &amp; co") == 3  # title, heading and inputs
@@ -456,11 +473,11 @@ def test_brackets_of_a_comment_are_no_markup_of_the_terminal(tmp_path):
         'transmit_power = "5 W"', 'transmit_power = "5 W" # paper: [bold] 2'
     )
     path.write_text(text, encoding="utf-8")
-    assert "paper: [bold] 2" in budget_views.text(link_study.run(load_link(path)), 160, verbose=True)
+    assert "paper: [bold] 2" in links_text(link_study.run_link_study(load_link(path)), 160, verbose=True)
 
 
 def test_the_page_holds_every_line_and_no_hyphen_for_a_minus(plain):
-    page = without_scripts(single_pages.budget(plain))
+    page = without_scripts(links_page(plain))
     for _, line in budget_views.lines(plain):
         assert f">{quantity(line.value, line.unit)}</td>" in page
     plain_text = re.sub(r"<(svg|style).*?</\1>|<[^>]*>", " ", page, flags=re.DOTALL)
@@ -474,10 +491,10 @@ def test_the_noise_of_a_receiver_has_its_table(tmp_path, plain, name):
     assert name in RECEIVERS
     found = studied(tmp_path, NO_SCAN, received_with(name))
     heading = "Noise of the communication receiver"
-    assert (heading in single_pages.budget(found)) is bool(found.receiver_noise)
-    assert heading not in single_pages.budget(plain)
+    assert (heading in links_page(found)) is bool(found.receiver_noise)
+    assert heading not in links_page(plain)
 
 
 def test_figures_name_their_data_only_where_they_stand_beside_the_page(plain):
-    assert "figures/tornado.csv" not in single_pages.budget(plain)
-    assert links.context(plain, budgets=(), figures=(), files=True)["files"] is True
+    assert "figures/tornado.csv" not in links_page(plain)
+    assert links_section(plain, budgets=(), figures=(), files=True)["files"] is True

@@ -12,8 +12,12 @@ import pytest
 from microrad import cli, report
 from microrad.core import machine
 from microrad.mission import file as missionfile
-from microrad.report import carried, compared, page, reproduce, tolerances
-from microrad.study import story as study
+from microrad.report.results import comparison as compared
+from microrad.report.results import manifest_reader, reproduce, tolerances
+from microrad.report.results.manifest import with_manifest
+from microrad.report.results.reproduce import reproduction_data
+from microrad.report.study import page
+from microrad.study import study
 from shipped import SHIPPED, edited_file, without_fine_pointing
 
 
@@ -27,7 +31,7 @@ def no_scan():
 
 @pytest.fixture(scope="module")
 def ran(tmp_path_factory):
-    return study.run(edited_file(tmp_path_factory.mktemp("mission"), ("runs = 4000 ", "runs = 100 ")))
+    return study.run_study(edited_file(tmp_path_factory.mktemp("mission"), ("runs = 4000 ", "runs = 100 ")))
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +44,7 @@ def written(ran, tmp_path_factory):
 @pytest.fixture
 def not_run(monkeypatch, ran, written):
     """The study and its report as they were, without the time that they take."""
-    monkeypatch.setattr(reproduce.study, "run", lambda file, on_progress: ran)
+    monkeypatch.setattr(reproduce.study, "run_study", lambda file, on_progress: ran)
 
     def copied(found, target, **settings):
         shutil.copytree(written, target)
@@ -58,13 +62,13 @@ def changed(written, tmp_path):
     """The report with its manifest edited, as a file of its own; the hash of its summary is stated anew."""
 
     def edit(change, restated=True):
-        found = carried.read(written / "report.html")
+        found = manifest_reader.read_manifest(written / "report.html")
         data = json.loads(json.dumps(found.data))
         change(data)
         if restated and isinstance(data["summary"], dict):
-            data["summary_sha256"] = carried.hash_of_summary(data["summary"])
+            data["summary_sha256"] = manifest_reader.hash_of_summary(data["summary"])
         path = tmp_path / "changed.html"
-        path.write_text(carried.with_manifest(found.page, page.embedded(data)), encoding="utf-8")
+        path.write_text(with_manifest(found.page, page.embedded(data)), encoding="utf-8")
         return path
 
     return edit
@@ -103,9 +107,11 @@ def test_a_folder_or_its_manifest_will_do(not_run, written, capsys, name):
 
 
 def test_the_page_and_the_manifest_beside_it_carry_the_same(written, ran):
-    inside, beside = carried.read(written / "report.html").data, manifest_of(written)
+    inside, beside = manifest_reader.read_manifest(written / "report.html").data, manifest_of(written)
     hashes = [each.pop("files_sha256") for each in (inside, beside)]
-    assert inside.pop("page_sha256") == carried.hash_of_page((written / "report.html").read_text(encoding="utf-8"))
+    assert inside.pop("page_sha256") == manifest_reader.hash_of_page(
+        (written / "report.html").read_text(encoding="utf-8")
+    )
     assert inside == beside
     assert inside["mission"]["text"] == ran.file.text
     assert set(hashes[1]) - set(hashes[0]) >= {"report.html", "results.nc"}
@@ -267,12 +273,12 @@ def test_a_file_beside_a_manifest_that_was_changed_is_told(not_run, copy, capsys
 
 
 def test_another_layout_and_other_words_of_the_page_leave_the_numbers_agreeing(not_run, written, tmp_path, capsys):
-    found = carried.read(written / "report.html")
+    found = manifest_reader.read_manifest(written / "report.html")
 
     def of_another_version(old, new):
         text = found.page.replace(old, new)
         assert text != found.page
-        text = carried.with_manifest(text, page.embedded({**found.data, "page_sha256": carried.hash_of_page(text)}))
+        text = with_manifest(text, page.embedded({**found.data, "page_sha256": manifest_reader.hash_of_page(text)}))
         path = tmp_path / "report.html"
         path.write_text(text, encoding="utf-8")
         return call(capsys, path)[:2]
@@ -330,9 +336,9 @@ def test_a_file_with_other_line_ends_is_not_called_changed(tmp_path):
     path.write_bytes(b"\xef\xbb\xbf" + text.replace("\n", "\r\n").encode())
     file = missionfile.load_mission(path)
     data = {"mission": report_entry(file), "summary": {}}
-    held = carried.Carried(path, data, "")
-    assert carried.altered(held) == ()
-    again, moved = carried.unpack(held, tmp_path / "again")
+    held = manifest_reader.ReadManifest(path, data, "")
+    assert manifest_reader.altered_parts(held) == ()
+    again, moved = manifest_reader.unpack_mission(held, tmp_path / "again")
     assert again.sha256 == file.sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
     assert (again.mission, moved) == (file.mission, {})
 
@@ -351,7 +357,7 @@ def cut(where):
     return text
 
 
-OPENING = carried.OPENING
+OPENING = manifest_reader.OPENING
 REFUSED = {
     "cut before its manifest": (cut("The paper against"[:9]), "carries no manifest: it was cut short"),
     "cut within its manifest": (cut(OPENING + '{"mission"'), "ends within its manifest: it was cut short"),
@@ -388,10 +394,10 @@ def test_what_is_no_text_or_not_there_is_refused_in_words(tmp_path, capsys):
 def test_a_huge_report_is_refused_before_it_is_read(tmp_path, monkeypatch):
     path = tmp_path / "report.html"
     with path.open("wb") as file:
-        file.truncate(carried.MOST_BYTES + 1)
+        file.truncate(manifest_reader.MOST_BYTES + 1)
     monkeypatch.setattr(type(path), "read_bytes", lambda self: pytest.fail("read"))
     with pytest.raises(reproduce.ReproduceError, match=r"is 64 MB long; a report of microrad has at most 64 MB"):
-        carried.read(path)
+        manifest_reader.read_manifest(path)
 
 
 @pytest.mark.parametrize(
@@ -409,13 +415,13 @@ def test_a_huge_report_is_refused_before_it_is_read(tmp_path, monkeypatch):
 )
 def test_values_of_another_kind_are_refused_in_words(changed, change, words):
     with pytest.raises(reproduce.ReproduceError, match=words):
-        carried.read(changed(lambda data: data.update(change)))
+        manifest_reader.read_manifest(changed(lambda data: data.update(change)))
 
 
 def test_a_text_that_is_too_long_is_refused(changed, monkeypatch):
-    monkeypatch.setattr(carried, "MOST_TEXT", 1000)
+    monkeypatch.setattr(manifest_reader, "MOST_TEXT", 1000)
     with pytest.raises(reproduce.ReproduceError, match=r"a mission text of \d+ characters"):
-        carried.read(changed(lambda data: None))
+        manifest_reader.read_manifest(changed(lambda data: None))
 
 
 def test_a_mission_that_is_none_is_refused_by_its_faults(changed, capsys):
@@ -482,7 +488,9 @@ def test_no_name_leads_out_of_the_folder(tmp_path, name):
     inside = tmp_path / "a" / "b" / "inside"
     inside.parent.mkdir(parents=True)
     before = set(tmp_path.parent.iterdir())
-    file, moved = carried.unpack(carried.Carried(tmp_path / "report.html", data, ""), inside)
+    file, moved = manifest_reader.unpack_mission(
+        manifest_reader.ReadManifest(tmp_path / "report.html", data, ""), inside
+    )
     found = [path for path in tmp_path.rglob("*") if path.is_file()]
     assert len(found) == 3
     assert all(path.resolve().is_relative_to(inside) for path in found)
@@ -495,8 +503,8 @@ def test_no_name_leads_out_of_the_folder(tmp_path, name):
 
 def test_a_plain_name_is_kept():
     for name in ("leo.tle", "orbits/leo 2.oem", "Bahn-Übergabe.csv"):
-        assert carried.plain(name) == name
-    assert [carried.plain(name) for name in EVIL] == [""] * len(EVIL)
+        assert manifest_reader.plain(name) == name
+    assert [manifest_reader.plain(name) for name in EVIL] == [""] * len(EVIL)
 
 
 def test_names_that_were_replaced_are_put_back_before_comparing():
@@ -510,11 +518,11 @@ def test_a_mirror_file_that_is_not_carried_is_not_read(tmp_path, ran):
     secret.write_text('password = "open"\n')
     text = ran.file.text
     text = text[: text.index("[mirror]\n")] + f'[mirror]\nfile = "{secret}"\n' + text[text.index("[amplifier]\n") :]
-    held = carried.Carried(tmp_path / "report.html", {"mission": report_entry(ran.file, text=text)}, "")
+    held = manifest_reader.ReadManifest(tmp_path / "report.html", {"mission": report_entry(ran.file, text=text)}, "")
     with pytest.raises(
         reproduce.ReproduceError, match="which the report does not carry; run the mission itself"
     ) as told:
-        carried.unpack(held, tmp_path / "inside")
+        manifest_reader.unpack_mission(held, tmp_path / "inside")
     assert "password" not in str(told.value)
 
 
@@ -522,11 +530,11 @@ def test_a_named_file_that_is_not_carried_is_refused(tmp_path):
     text = SHIPPED.read_text(encoding="utf-8")
     text = re.sub(r'(?m)^spectrum = "olympus".*\n', 'spectrum = "table"\nfile = "/etc/passwd"\n', text)
     file = missionfile.load_mission(SHIPPED)
-    held = carried.Carried(tmp_path / "report.html", {"mission": report_entry(file, text=text)}, "")
+    held = manifest_reader.ReadManifest(tmp_path / "report.html", {"mission": report_entry(file, text=text)}, "")
     with pytest.raises(
         reproduce.ReproduceError, match="the mission names /etc/passwd, which the report does not carry"
     ):
-        carried.unpack(held, tmp_path / "inside")
+        manifest_reader.unpack_mission(held, tmp_path / "inside")
 
 
 def test_control_characters_of_a_report_do_not_reach_the_terminal(not_run, changed, capsys):
@@ -623,4 +631,4 @@ def test_a_number_of_thousands_of_digits_is_no_way_to_stop_it(changed, not_run):
     found = reproduce.reproduce(path)
     assert [d.place for d in found.differences] == ["margin_db.beacon"]
     assert found.largest == float("inf")
-    json.loads(json.dumps(reproduce.data(found), allow_nan=True))
+    json.loads(json.dumps(reproduction_data(found), allow_nan=True))

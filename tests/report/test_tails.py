@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 
 from microrad.loop.fine_loop.ensemble import bin_edges_rad
 from microrad.loop.fine_pointing import Residual
-from microrad.report import tails
+from microrad.report.fine_pointing import tails
 
 RUNS, SAMPLES, KEPT = 48, 1500, 0.9
 SIGMA_RAD = 2e-6  # of each axis

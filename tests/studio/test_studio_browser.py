@@ -15,7 +15,7 @@ import pytest
 from browser import Studio, settled, until, violations
 from microrad.campaign.statistics.interim import Interim
 from microrad.campaign.statistics.summary import summarise_campaign
-from microrad.report import campaign_words
+from microrad.report.campaign import words as campaign_words
 from microrad.studio import server
 from microrad.studio.draft.draft import Draft
 from small_campaign import campaign_file, children, halted
@@ -309,8 +309,8 @@ def rows_in(ledger):
 def test_a_campaign_shows_its_figures_while_it_runs_goes_on_after_a_cancel_and_has_its_report(
     studio, tab, opened, picture
 ):
-    rows, ledger = 768, studio.folder / "campaign.ledger"
-    campaign_file(studio.folder, runs=rows, duration="4 s")  # in six chunks
+    rows, ledger = 384, studio.folder / "campaign.ledger"
+    campaign_file(studio.folder, runs=rows, duration="4 s")  # in three chunks
     (studio.folder / "halt").touch()
     tab.get_by_role("link", name="Runs").click()
     api.expect(tab.get_by_label("Ledger")).to_have_value("campaign.ledger")

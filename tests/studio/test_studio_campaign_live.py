@@ -12,12 +12,13 @@ from microrad.campaign import bundle, run
 from microrad.campaign.file import load_campaign
 from microrad.campaign.ledger import Ledger, chunk_format
 from microrad.campaign.records import CampaignError, Chunk, Failed
-from microrad.campaign.rows import plan, sampling
+from microrad.campaign.rows import sampling
+from microrad.campaign.rows.plan import planned
 from microrad.campaign.statistics import interim
 from microrad.campaign.statistics.interim import Interim
 from microrad.campaign.statistics.summary import summarise_campaign
 from microrad.loop.fine_loop.ensemble import bin_edges_rad
-from microrad.report import campaign_words
+from microrad.report.campaign import words as campaign_words
 from microrad.studio.jobs import ledgers as campaign_live
 from microrad.studio.jobs.ledgers import Live, LiveCampaigns
 from microrad.studio.views import campaign as campaign_view
@@ -39,8 +40,8 @@ class Growing:
         self.path, self.failed = folder / "x.ledger", failed
         self.campaign = load_campaign(campaign_file(folder, runs=runs, duration="16 s", more=LIMIT + more))
         self.head = run._head(self.campaign, bundle.packed(self.campaign, ()))
-        self.rows = plan.planned(self.campaign).chunk_rows
-        self.every = len(plan.planned(self.campaign).chunks(0, runs))
+        self.rows = planned(self.campaign).chunk_rows
+        self.every = len(planned(self.campaign).chunks(0, runs))
         self.begin()
 
     def begin(self, seed=1):
@@ -55,7 +56,7 @@ class Growing:
                 book.put(cell, number, chunk_format.pack_chunk(self.chunk(number, cell)))
 
     def chunk(self, number, cell=0):
-        rows = plan.planned(self.campaign).rows_of(number)
+        rows = planned(self.campaign).rows_of(number)
         drawn, weight = sampling.rows(self.campaign, cell, rows.start, len(rows))
         columns = {"row": np.arange(rows.start, rows.stop, dtype=float), "weight": weight, **drawn}
         lost = np.isin(columns["row"], self.failed)

@@ -19,9 +19,9 @@ from microrad.loop import control, fine_pointing
 from microrad.loop.fine_pointing import designs
 from microrad.mission.toml import MissionError
 from microrad.orbit.day import assumptions
-from microrad.report.page import Drawn
+from microrad.report.study.page import StudyFigures
 from microrad.studio import commands
-from microrad.study import story as study
+from microrad.study import study
 from shipped import SHIPPED, without_day, without_fine_pointing
 from small_campaign import campaign_file
 
@@ -82,9 +82,9 @@ def test_what_prints_prints_the_same(home, capsys, monkeypatch, action):
 
 
 def test_a_study_gives_the_same_verdict_and_the_same_files(home, capsys, monkeypatch):
-    monkeypatch.setattr(study, "run", once(study.run))
-    monkeypatch.setattr(microrad, "run_study", study.run, raising=False)
-    monkeypatch.setattr(report, "draw", lambda *args: Drawn())
+    monkeypatch.setattr(study, "run_study", once(study.run_study))
+    monkeypatch.setattr(microrad, "run_study", study.run_study, raising=False)
+    monkeypatch.setattr(report, "study_figures", lambda *args: StudyFigures())
     action, again = commands.study(MISSION, Path("out")), commands.study(MISSION, Path("out again"))
     out, _, _ = typed(action.command, capsys)
     assert executed(again.python).strip() == out[: out.index("\n\nout/report.html")]

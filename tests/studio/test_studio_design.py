@@ -13,9 +13,9 @@ import pytest
 from link_files import RECEIVERS, data_with, link_file, received_with
 from microrad import link
 from microrad.link import study as link_study
-from microrad.link import under_jitter
+from microrad.link.pointing import outage as under_jitter
 from microrad.orbit import day as day_study
-from microrad.report import day_plots
+from microrad.report.day import figures as day_plots
 from microrad.report.plotting.sheet import Axis, Line, Rule, grid
 from microrad.studio.draft.draft import Draft
 from microrad.studio.views import day as day_view
@@ -38,7 +38,7 @@ def view(draft):
 
 @pytest.fixture(scope="module")
 def day(draft):
-    return day_view.run(draft.set("operations.runs", "2").link(), lambda done, total, what: None)
+    return day_view.compute_day(draft.set("operations.runs", "2").link(), lambda done, total, what: None)
 
 
 def slider_of(draft, key):
@@ -128,7 +128,7 @@ def test_a_fault_is_told_beside_its_slider_in_the_words_of_the_command_line(draf
 def test_an_attempt_is_the_study_of_the_changed_file_and_leaves_the_draft(draft):
     found = sliders.attempt(draft, "terminals.leo_aperture", "6 cm", link_view.view)
     margin = found.view.margins[0]
-    alone = link_study.run(draft.set("terminals.leo_aperture", "6 cm").link())
+    alone = link_study.run_link_study(draft.set("terminals.leo_aperture", "6 cm").link())
     assert margin.margin_db == alone.communication.margin_db
     assert margin.margin_db > link_view.view(draft.link()).margins[0].margin_db + 0.5
     assert draft.values["terminals.leo_aperture"].typed == "5 cm"
@@ -195,7 +195,7 @@ def test_under_a_jitter_the_page_has_the_margin_of_the_outage(tmp_path):
     assert f"{error * 1e6:.2f}" in link_view.map_words(found) and "10 \u00b5rad" in link_view.map_words(still)
     assert link.margin_map(found.data, found.data.table.data_rate_bit_s, error)[0, 0] == pytest.approx(margin, abs=1e-6)
     assert found.frame.pointing_error_rad[-1] > error
-    shown = {row["line"] for row in link_view.tables(link_study.run(file))["Under jitter"]}
+    shown = {row["line"] for row in link_view.tables(link_study.run_link_study(file))["Under jitter"]}
     assert {"Mean pointing loss", "Outage", "Below required margin"} <= {name.removesuffix(" !") for name in shown}
 
 
@@ -264,7 +264,7 @@ def test_sliders_are_those_of_the_links_and_the_seldom_moved_stand_behind(draft)
 
 
 def test_the_study_of_the_links_gives_tables_sentences_and_what_moves_the_margin(draft):
-    study = link_study.run(draft.link())
+    study = link_study.run_link_study(draft.link())
     drawn = link_view.tornado_plot(study)
     first = study.tornados[0].swings[0]
     assert drawn["layout"]["yaxis"]["ticktext"][0].startswith(first.key.removeprefix("communication."))
@@ -274,7 +274,7 @@ def test_the_study_of_the_links_gives_tables_sentences_and_what_moves_the_margin
     assert "Tracking sensor" in link_view.tables(study)
     assert any(sentence.startswith("The links close") for sentence in link_view.consequences(study))
     assert not any(sentence.startswith("Warning: ") for sentence in link_view.consequences(study))
-    far = link_study.run(draft.set("communication.pointing_error", "60 urad").link())
+    far = link_study.run_link_study(draft.set("communication.pointing_error", "60 urad").link())
     assert any(sentence.startswith("Warning: ") for sentence in link_view.consequences(far))
 
 

@@ -313,7 +313,7 @@ def test_a_table_of_one_mission_alone_is_one_difference(draft):
 
 def test_the_numbers_are_those_of_the_link_study(session, draft):
     found = {each.name: each for each in compare_view.link_numbers(draft)}
-    study = link_study.run(load_link(session.folder / "leo-geo.toml"))
+    study = link_study.run_link_study(load_link(session.folder / "leo-geo.toml"))
     for budget in study.budgets:
         assert found[f"{budget.name}: margin"].value == budget.margin_db
         assert found[f"{budget.name}: received power"].value == budget.received_power_w

@@ -7,7 +7,8 @@ import pytest
 
 from microrad import link, report
 from microrad.loop import paper_cases as tracking
-from microrad.report import requirement_views, words
+from microrad.report.study import contributors as requirement_views
+from microrad.report.study import words
 from microrad.study import alternatives as readings
 from scenes import cases_of
 from shipped import edited, plain_study
@@ -79,7 +80,7 @@ def test_a_loop_that_cannot_be_run_so_says_why(monkeypatch):
         raise ValueError("the loop is unstable")
 
     monkeypatch.setattr(readings.paper_cases, "tracking_runs", unstable)
-    made = {(r.key, r.other): r for r in readings.others(study.file.mission, study.residual)}
+    made = {(r.key, r.other): r for r in readings.other_readings(study.file.mission, study.residual)}
     failed = made["mirror.composition", "additive"]
     assert failed.failure == "the loop is unstable" and math.isnan(failed.residual_rad) and not failed.closes
     assert made["conventions.residual", "radial"].failure == ""

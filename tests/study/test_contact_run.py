@@ -20,9 +20,9 @@ from microrad.loop.fine_loop import ensemble
 from microrad.loop.fine_loop.loop import assemble
 from microrad.loop.fine_pointing import designs
 from microrad.mission.file import LinkFile, load_mission
-from microrad.study import contact_run
-from microrad.study.contact_run import Contact, MovingReference, Sampler, Settings, Sight, plan
-from microrad.study.contact_run.windows import first_run
+from microrad.study.contact_run import sequence
+from microrad.study.contact_run.records import STATES, Contact, Loss, Settings, Sight
+from microrad.study.contact_run.windows import MovingReference, Sampler, first_run, plan
 from scenes import scene_of
 from shipped import SHIPPED, edited_file
 
@@ -67,7 +67,7 @@ def settings(**changes):
 
 
 def links(file):
-    return link_study.run(LinkFile(file.mission, file.path, file.text, file.sha256, file.sources))
+    return link_study.run_link_study(LinkFile(file.mission, file.path, file.text, file.sha256, file.sources))
 
 
 @pytest.fixture(scope="module")
@@ -97,7 +97,7 @@ def run(file, scene, design, finding):
     """A contact of the shipped mission, or of another scene or way to find the partner."""
 
     def made(of, how, *, scene=scene, finding=finding, mission=file.mission):
-        return contact_run.run(link.of(mission), finding, scene, design, of, how)
+        return sequence.run_contact(link.of(mission), finding, scene, design, of, how)
 
     return made
 
@@ -147,7 +147,7 @@ def check_order(found):
     assert all(entry.cause for entry in found.log)
     ends = found.log[-1].time_s - found.log[0].time_s
     assert sum(found.seconds.values()) == pytest.approx(ends, abs=1e-9)
-    assert tuple(found.seconds) == contact_run.STATES
+    assert tuple(found.seconds) == STATES
 
 
 # ------------------------------------------------------------------------------------------------- a whole contact
@@ -559,7 +559,7 @@ def test_windows_that_a_new_acquisition_covers_are_left_out(run, whole, monkeypa
 
         def window(self, number, start_s, length_s, came=came, at=losing_at):
             came.append(number)
-            loss = contact_run.Loss(start_s + 0.3, start_s + 0.5, start_s + 0.75, "made up") if number == at else None
+            loss = Loss(start_s + 0.3, start_s + 0.5, start_s + 0.75, "made up") if number == at else None
             return replace(whole.windows[0], start_s=start_s, seconds=0.5 if loss else length_s, loss=loss)
 
         monkeypatch.setattr(Sampler, "windows", lambda *args: list(one_by_one(*args)))
@@ -600,7 +600,7 @@ def test_a_whole_window_ends_a_row_of_losses(run, whole, monkeypatch):
         loss = None
         if lost_at and start_s > lost_at[0]:
             lost_at.pop(0)
-            loss = contact_run.Loss(start_s, start_s + 0.1, start_s + 0.1, "made up")
+            loss = Loss(start_s, start_s + 0.1, start_s + 0.1, "made up")
         return replace(whole.windows[0], start_s=start_s, seconds=0.1 if loss else length_s, loss=loss)
 
     monkeypatch.setattr(Sampler, "windows", one_by_one)

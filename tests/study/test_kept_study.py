@@ -13,10 +13,11 @@ from microrad.loop.fine_pointing import designs
 from microrad.loop.fine_pointing import results as fine_results
 from microrad.mission.file import MissionError, load_mission
 from microrad.orbit.day import assumptions
-from microrad.report import results, words
+from microrad.report.results.arrays import study_netcdf
+from microrad.report.study.data import summary
 from microrad.studio.draft.draft import Draft
 from microrad.studio.draft.keys import value_of
-from microrad.study import story as study
+from microrad.study import study
 from shipped import DEFAULT, SHIPPED
 
 SHORTER = {
@@ -162,12 +163,14 @@ def numbers(text, folder, parts):
     path = folder / "mission.toml"
     path.write_text(text, encoding="utf-8")
     try:
-        found = study.run(load_mission(path), parts=parts)
+        found = study.run_study(load_mission(path), parts=parts)
     except (MissionError, ValueError) as error:
         return {"refused": str(error)}
-    drawn = {each.name: (each.title, each.caption, digest(each.columns)) for each in report.draw(found, parts).every}
+    drawn = {
+        each.name: (each.title, each.caption, digest(each.columns)) for each in report.study_figures(found, parts).every
+    }
     assert parts.trouble == ""
-    return {"summary": repr(words.summary(found)), "results.nc": parts.part(results.netcdf, found), **drawn}
+    return {"summary": repr(summary(found)), "results.nc": parts.part(study_netcdf, found), **drawn}
 
 
 @pytest.fixture(scope="module")

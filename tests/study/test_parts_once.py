@@ -7,7 +7,7 @@ from microrad.core import threads
 from microrad.loop import fine_pointing
 from microrad.loop.fine_pointing import designs
 from microrad.mirror import model, variants
-from microrad.study import story
+from microrad.study import study
 from shipped import edited_file
 
 
@@ -21,12 +21,12 @@ def test_one_study_assembles_its_link_and_each_variant_of_its_mirror_once(tmp_pa
         return whole(name, composition, system, hysteresis, creep)
 
     monkeypatch.setattr(model, "assemble", counted)
-    monkeypatch.setattr(story.mirror, "of", lambda m: entered.append(m) or variants.of(m))
+    monkeypatch.setattr(study.mirror, "of", lambda m: entered.append(m) or variants.of(m))
     monkeypatch.setattr(link, "of", lambda m: linked.append(m) or of(m))
     monkeypatch.setattr(threads, "_may_fork", lambda: False)
-    monkeypatch.setattr(story.alternatives, "others", lambda *args: ())  # they read the mission in another way
+    monkeypatch.setattr(study.alternatives, "other_readings", lambda *args: ())  # they read the mission in another way
     monkeypatch.setattr(fine_pointing, "design", lambda scene, told: designs.design(scene, told, only=("PI",)))
-    found = story.run(file)
+    found = study.run_study(file)
     assert entered == [file.mission]
     assert sum(m is file.mission for m in linked) == 1
     own = found.fine_pointing.scene.mirrors.own

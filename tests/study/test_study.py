@@ -13,11 +13,14 @@ from microrad.link.requirement import IMPOSSIBLE
 from microrad.loop import sine_run as simulate
 from microrad.mirror.summary import summarise, unknown_dynamics
 from microrad.mission.file import load_mission
-from microrad.report import chain, figures, links, requirement_views, words
-from microrad.report.fine_pointing_words import not_reliable
-from microrad.report.words import headline
-from microrad.study import paper, verdict
-from microrad.study import story as study
+from microrad.report.fine_pointing.words import not_reliable
+from microrad.report.links.page import links_section, performance_section
+from microrad.report.paper import figures
+from microrad.report.study import chain, words
+from microrad.report.study import contributors as requirement_views
+from microrad.report.study.data import summary
+from microrad.report.study.words import headline
+from microrad.study import paper, study, verdict
 from scenes import scene_of
 from shipped import DEFAULT, SHIPPED, edited_file, whole_study
 
@@ -41,7 +44,7 @@ def shipped():
 def variant(coarse, monkeypatch, tmp_path):
     """The study of the shipped mission with pieces of its text replaced, without a scan and without its day."""
     monkeypatch.setattr(paper, "applies", lambda mission: False)
-    return lambda *changes: study.run(edited_file(tmp_path, *changes, day=False))
+    return lambda *changes: study.run_study(edited_file(tmp_path, *changes, day=False))
 
 
 def requirement(result, name):
@@ -170,7 +173,7 @@ def test_what_hysteresis_costs_the_link(shipped, source, controller, margin_db, 
     assert_allclose(-cost.data_rate_bit_s, cost_mbit_s * 1e6, atol=0.06e6)
     (row,) = [
         r
-        for r in links.performance(found, "", None)["performance"]
+        for r in performance_section(found, "", None)["performance"]
         if r["source"] == source and r["controller"] == controller and r["mirror"] == "given"
     ]
     assert row["cells"][4] == f"{margin_db:+.2f}".replace("-", "\u2212")
@@ -182,7 +185,7 @@ def test_the_beacon_brings_four_times_what_its_partners_sensor_needs(shipped):
     assert_allclose(beacon.irradiance_w_m2, 2.42e-9, atol=0.005e-9)
     assert_allclose(beacon.required_irradiance_w_m2, 566e-12, atol=0.5e-12)
     assert_allclose(beacon.required_irradiance_w_m2, 10e-12 / (pi / 4 * 0.15**2), rtol=1e-9)
-    said = links.context(shipped[0].links, budgets=(), figures=(), files=False)["sentences"]
+    said = links_section(shipped[0].links, budgets=(), figures=(), files=False)["sentences"]
     (line,) = [each for each in said if each.startswith("Beacon at its partner")]
     assert "2.42 nW/m^2 at the pointing error" in line
     assert line.endswith("needs 566 pW/m^2.")
@@ -280,7 +283,7 @@ def plays(weights='"60 urad/V", "20 urad/V", "9 urad/V"'):
 
 
 def test_a_static_mirror_of_plays_runs_through(coarse, tmp_path):
-    result = study.run(edited_file(tmp_path, *plays(), day=False))
+    result = study.run_study(edited_file(tmp_path, *plays(), day=False))
     assert result.scan is None
     assert result.comparison is None
     claims = [(c.where, c.claim) for c in result.claims]
@@ -298,7 +301,7 @@ def test_a_static_mirror_of_plays_runs_through(coarse, tmp_path):
 
 def test_a_mirror_without_inverse_is_refused(coarse, tmp_path):
     with pytest.raises(ValueError, match="no weight at threshold 0"):
-        study.run(edited_file(tmp_path, *plays('"0 urad/V", "80 urad/V", "9 urad/V"'), day=False))
+        study.run_study(edited_file(tmp_path, *plays('"0 urad/V", "80 urad/V", "9 urad/V"'), day=False))
 
 
 def test_a_mechanical_angle_is_doubled_and_the_loop_stays(shipped, variant):
@@ -339,7 +342,7 @@ def test_the_residual_in_the_budget_says_which_run_it_is_from(shipped):
 def test_a_link_with_more_light_received_than_sent_does_not_close(tmp_path):
     """The paper's terminals at 1 m, without a fine-pointing loop and with one."""
     far, near = (
-        study.run(edited_file(tmp_path, ('distance = "42000 km"', f'distance = "{text}"'), day=False))
+        study.run_study(edited_file(tmp_path, ('distance = "42000 km"', f'distance = "{text}"'), day=False))
         for text in ("42000 km", "1 m")
     )
     assert (far.achieved.possible, far.closes, far.requirements[-1].unknown) == (True, True, "")
@@ -356,7 +359,7 @@ def test_a_jitter_is_not_summed_with_what_the_simulated_loop_leaves(tmp_path):
     """The paper's mission with [jitter]: one margin is judged, and each other one stands under its own name."""
     jitter = '[jitter]\nbias = ["0 urad", "0 urad"]\nrms = ["10 urad", "10 urad"]\nbandwidth = "50 Hz"\n\n'
     plain, shaken = (
-        study.run(edited_file(tmp_path, ("[requirement]", text), day=False))
+        study.run_study(edited_file(tmp_path, ("[requirement]", text), day=False))
         for text in ("[requirement]", jitter + "[requirement]")
     )
     assert shaken.requirements == plain.requirements and headline(shaken) == headline(plain)
@@ -378,7 +381,7 @@ def test_a_jitter_is_not_summed_with_what_the_simulated_loop_leaves(tmp_path):
     texts = [row["contributor"] for row in requirement_views.rows(shaken)]
     assert texts == [row["contributor"] for row in requirement_views.rows(plain)]
     assert "outage" not in texts[-1] and "moves most with terminals.geo_aperture: 1.74 dB" in texts[-1]
-    margins = words.summary(shaken)["margin_db"]
+    margins = summary(shaken)["margin_db"]
     assert margins["communication_as_budgeted"] == shaken.communication.margin_db
     assert (margins["communication_static"], margins["judged"]) == (shaken.static.margin_db, plain.margin_db)
     drawn, other = figures.margin_map(shaken), figures.margin_map(plain)
@@ -423,12 +426,12 @@ def test_a_judged_pointing_loss_beyond_20_db_is_warned_of(tmp_path):
     """A beam of 15 cm that its loop leaves 12 µrad off: the budget at its static error of 1 µrad warns of nothing."""
     wide = ('leo_aperture = "5 cm"', 'leo_aperture = "15 cm"')
     error = 'pointing_error = "10 urad"            # paper: Table 2'
-    found = study.run(edited_file(tmp_path, wide, (error, error.replace("10 urad", "1 urad")), day=False))
+    found = study.run_study(edited_file(tmp_path, wide, (error, error.replace("10 urad", "1 urad")), day=False))
     assert found.achieved.loss_db("Pointing loss") > 20.0 > found.static.loss_db("Pointing loss")
     warning = words.warnings(found)[0]
     assert warning.startswith(f"the verdict's pointing loss of {found.achieved.loss_db('Pointing loss'):.2f} dB is bey")
     assert not any("Pointing loss" in each for each in found.links.communication.warnings)
-    assert not any("20 dB" in each for each in words.warnings(study.run(edited_file(tmp_path, day=False))))
+    assert not any("20 dB" in each for each in words.warnings(study.run_study(edited_file(tmp_path, day=False))))
 
 
 def test_claims_of_the_links_are_judged_on_the_papers_numbers_whatever_the_receiver(tmp_path):
@@ -441,7 +444,7 @@ def test_claims_of_the_links_are_judged_on_the_papers_numbers_whatever_the_recei
     head = f"# {'-' * 97} what is required"
     largest = ('data_rate = "300 Mbit/s"', 'data_rate = "largest"')
     file = edited_file(tmp_path, (sensitivity, ""), (head, receiver + head), largest, day=False)
-    result = study.run(file)
+    result = study.run_study(file)
     claim = next(c for c in result.claims if c.where == "section 2.2, Fig. 2")
     assert (claim.agrees, claim.ours) == ("inferred", "3.00 dB at 300 Mbit/s and 10 µrad")  # on the paper's receiver
     assert result.file.mission.communication.data_rate_bit_s == 100e6

@@ -3,7 +3,7 @@
 A drawn key that no output of that row reads would change nothing, and nothing would say so: it is refused.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, cast
 
@@ -13,7 +13,8 @@ from microrad.campaign.definition.keys import MIRROR, touches_loop
 from microrad.campaign.definition.reader import read_definition
 from microrad.campaign.definition.records import CampaignFile
 from microrad.campaign.records import CampaignError
-from microrad.campaign.rows import evaluate, loops
+from microrad.campaign.rows import evaluate
+from microrad.campaign.rows.loops import mission_loop
 from microrad.campaign.rows.missions import MissionBuilder
 from microrad.core import reads
 from microrad.loop.fine_loop import ensemble
@@ -66,38 +67,25 @@ def _refuse_unread(campaign: CampaignFile, missions: list[LinkFile], document: D
 
 
 # ----------------------------------------------------------------------------------------------------- what is read
-def _unread(campaign: CampaignFile, rows: Iterable[LinkFile]) -> Iterator[str]:
-    """The drawn keys that are read in none of these rows, one of each cell."""
+def _unread(campaign: CampaignFile, missions: list[LinkFile]) -> Iterator[str]:
+    """The drawn keys that are read in none of these missions, one of each cell."""
+    table, outputs = campaign.table.loop, [output.name for output in campaign.outputs]
+    runs = None if table is None else cast("ensemble.Ensemble", _Runs())
     left = [draw.key for draw in campaign.draws if draw.key != MIRROR]
-    for file in rows:
+    for file in missions:
         if not left:
             return
         try:
-            m, of_loop, of_outputs = file.mission, _of_loop(campaign, file), _of_outputs(campaign, file)
+            by_outputs = reads.watched_call(lambda f: evaluate.outputs(f, runs, outputs), file)[1]
+            by_loop = reads.Reads()
+            if table is not None:
+                by_loop = reads.watched_call(lambda f: mission_loop(f, table, campaign.table.seed), file)[1]
         except ValueError:
             return  # a row that fails does not tell what the others read
-        left = [
-            key
-            for key in left
-            if not _is_read(of_outputs, _path(m, key))
-            and not (touches_loop(key, m) and _is_read(of_loop, _path(m, key)))
-        ]
+        paths = {key: _path(file.mission, key) for key in left}
+        in_loop = {key for key in left if touches_loop(key, file.mission) and _is_read(by_loop, paths[key])}
+        left = [key for key in left if key not in in_loop and not _is_read(by_outputs, paths[key])]
     yield from left
-
-
-def _of_loop(campaign: CampaignFile, file: LinkFile) -> reads.Reads:
-    """What making the loop of a row reads; nothing in a campaign without one."""
-    table = campaign.table.loop
-    if table is None:
-        return reads.Reads()
-    return reads.watched_call(lambda f: (loops.row_loop(f, table), loops.span(campaign, f)), file)[1]
-
-
-def _of_outputs(campaign: CampaignFile, file: LinkFile) -> reads.Reads:
-    """What the outputs of a row read, but for its runs."""
-    names = [output.name for output in campaign.outputs]
-    runs = None if campaign.table.loop is None else cast("ensemble.Ensemble", _Runs())
-    return reads.watched_call(lambda f: evaluate.outputs(f, runs, names), file)[1]
 
 
 class _Runs:

@@ -31,9 +31,10 @@ from microrad.campaign.ledger import (
     verify,
 )
 from microrad.campaign.records import CampaignError, Chunk, Engine, Failed, Job, Outcome, joined
-from microrad.campaign.rows import plan, sampling
+from microrad.campaign.rows import sampling
 from microrad.campaign.rows.evaluator import ATTEMPTS, Evaluator
 from microrad.campaign.rows.loops import controllers
+from microrad.campaign.rows.plan import planned
 from microrad.campaign.statistics.sketch import Sketch
 from microrad.campaign.statistics.summary import is_precise
 from microrad.core.progress import Progress
@@ -77,8 +78,9 @@ def run_campaign(file: Path, path: Path, means: Means, on_progress: Progress = l
     """
     campaign = load_campaign(file)
     refuse_existing(path)  # before the controllers are tuned
-    if plan.is_timed(campaign):
-        campaign = plan.timed(campaign, row_s(campaign))
+    plan = planned(campaign)
+    if plan.is_timed:
+        campaign = replace(campaign, chunk_rows=plan.timed_chunk(row_s(campaign)))
     spec = bundle.packed(campaign, controllers(campaign, on_progress))
     with closing(_Workers(campaign, spec, means)) as workers:
         if means.scheduler is not None:
@@ -199,7 +201,7 @@ class _Runner:
 
     def __init__(self, campaign: CampaignFile, workers: _Workers, book: Ledger, on_progress: Progress) -> None:
         self.campaign, self.workers, self.book, self.on_progress = campaign, workers, book, on_progress
-        self.plan = plan.planned(campaign)
+        self.plan = planned(campaign)
         rows = sum(len(self.plan.rows_of(number)) for _, number in book.done())
         self.pace = _Pace(rows, float(book.notes().get("seconds", 0.0)))
         self.total = 0

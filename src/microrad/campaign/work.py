@@ -6,8 +6,8 @@ from functools import lru_cache
 from microrad.campaign.bundle import code_sha256, opened
 from microrad.campaign.ledger import chunk_format
 from microrad.campaign.records import Job
-from microrad.campaign.rows import loops
 from microrad.campaign.rows.evaluator import Evaluator
+from microrad.campaign.rows.loops import mission_loop
 from microrad.campaign.rows.plan import planned
 from microrad.loop.fine_loop import ensemble
 
@@ -27,9 +27,8 @@ class Work:
         self.plan = planned(self.campaign)
         self.evaluator = Evaluator(self.campaign, dict(enumerate(self.opened.controllers)))
         if self.campaign.table.loop is not None:
-            period_s, file = 1.0 / loops.settings(self.campaign.mission).rate_hz, self.campaign.mission
-            loop = loops.row_loop(file, self.campaign.table.loop)
-            ensemble.trace(loop, self.evaluator.controller(0), ensemble.Span(2.0 * period_s, 0.0, 0))
+            loop = mission_loop(self.campaign.mission, self.campaign.table.loop, 0).row
+            ensemble.trace(loop, self.evaluator.controller(0), ensemble.Span(2.0 * loop.timing.period_s, 0.0, 0))
 
     def do(self, job: Job, beat: Callable[[], None]) -> bytes:
         """A chunk, a chunk of one row, or a trace, as the job asks, in the format that the ledger keeps."""

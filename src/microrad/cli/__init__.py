@@ -107,14 +107,14 @@ def run(
     from microrad import report
     from microrad.core import kept
     from microrad.mission.file import load_mission
-    from microrad.study import story
+    from microrad.study.study import run_study
 
     mission = load_mission(file, mirror)
     folder = output or Path(f"{file.stem}-study")
     report.check_folder(folder, overwrite)
     parts = kept.NOTHING if fresh else kept.of_user()
     with progress_bar() as progress, refusal_of(mission.path):
-        study = story.run(mission, progress, parts)
+        study = run_study(mission, progress, parts)
 
     def write() -> str:
         with progress_bar() as progress:
@@ -151,11 +151,12 @@ def reproduce(
     the numbers agree, 1 when one does not or the report was changed after it was written, and 2 for a file that is no
     whole report.
     """
-    from microrad.report import reproduce as again
+    from microrad.report.results.reproduce import reproduce as run_again
+    from microrad.report.results.reproduce import reproduction_data, reproduction_text
 
     with progress_bar() as progress:
-        found = again.reproduce(report_file, progress)
-    text = json_text(again.data(found)) if as_json else again.words(found)
+        found = run_again(report_file, progress)
+    text = json_text(reproduction_data(found)) if as_json else reproduction_text(found)
     return Outcome(text, MET if found.same else UNMET)
 
 

@@ -99,13 +99,15 @@ def _kept(path: Path) -> Iterator[None]:
 def _shown(path: Path, as_json: bool, output: str = "") -> Outcome:
     """The state of a ledger, as text or JSON; the exit code says whether the rows keep the limits."""
     from microrad.campaign.statistics.summary import summarise_campaign
-    from microrad.report import campaign_words
+    from microrad.report.campaign.data import campaign_data
+    from microrad.report.campaign.text import campaign_text
+    from microrad.report.campaign.words import verdict
 
     found = summarise_campaign(path)
-    code = MET if campaign_words.verdict(found) == "pass" else UNMET
+    code = MET if verdict(found) == "pass" else UNMET
     if as_json:
-        return Outcome(json_text({**campaign_words.data(found), "ledger": str(path)}), code)
-    return Outcome(f"{campaign_words.text(found, width())}\n\n{output or path}", code)
+        return Outcome(json_text({**campaign_data(found), "ledger": str(path)}), code)
+    return Outcome(f"{campaign_text(found, width())}\n\n{output or path}", code)
 
 
 @campaigns.command(epilog=examples("microrad campaign init", "microrad campaign init tails.toml"))
@@ -251,11 +253,11 @@ def report(
 ) -> Outcome:
     """Write one page with the pictures: distributions, tail, sensitivity, failure region, worst rows."""
     from microrad.campaign.statistics.summary import summarise_campaign
-    from microrad.report import campaign_page
+    from microrad.report.campaign.page import campaign_page
 
     file = file or ledger.parent / f"{ledger.stem}.html"
     _check_output(file, overwrite)
-    write_whole(file, campaign_page.html(summarise_campaign(ledger)))
+    write_whole(file, campaign_page(summarise_campaign(ledger)))
     return Outcome(str(file))
 
 
@@ -269,11 +271,11 @@ def optimise(file: _File, threads: _Threads = None, as_json: Json = False) -> Ou
     optimise.confidence, the share that is wanted), and 1 when they do not or no design keeps the limits.
     """
     from microrad.campaign.optimisation.campaign import optimise_campaign
-    from microrad.report import campaign_optimum
+    from microrad.report.campaign.optimum import optimum_data, optimum_text
 
     with progress_bar(_LINE_S) as progress:
         found = optimise_campaign(file, threads, progress)
     code = MET if found.confirmed else UNMET
     if as_json:
-        return Outcome(json_text(campaign_optimum.data(found)), code)
-    return Outcome(campaign_optimum.text(found), code)
+        return Outcome(json_text(optimum_data(found)), code)
+    return Outcome(optimum_text(found), code)

@@ -35,7 +35,7 @@ def _links(file: Path) -> "LinkStudy":
 
     given = load_link(file)
     with refusal_of(file):
-        return link_study.run(given)
+        return link_study.run_link_study(given)
 
 
 @app.command(
@@ -62,21 +62,22 @@ def contacts(
     if sum((as_csv, as_html, as_json)) > 1:
         raise Refusal("--csv, --html and --json exclude each other; give one of them.")
     from microrad.orbit import day as day_study
-    from microrad.report import day_tables, day_views
+    from microrad.report.day.data import day_data
+    from microrad.report.day.text import day_csv, day_text
 
     links = _links(file)
     with refusal_of(file), progress_bar() as progress:
-        day = day_study.run(links, on_progress=progress)
+        day = day_study.run_day_study(links, on_progress=progress)
     code = MET if day.relay.capacity_bit > 0.0 else UNMET
     if as_json:
-        return Outcome(json_text({"mission": links.file.mission.name, **day_tables.data(day)}), code)
+        return Outcome(json_text({"mission": links.file.mission.name, **day_data(day)}), code)
     if as_csv:
-        return Outcome(day_views.csv_text(day), code)
+        return Outcome(day_csv(day), code)
     if as_html:
-        from microrad.report import single_pages
+        from microrad.report.day.page import day_page
 
-        return Outcome(single_pages.day(day, links), code)
-    return Outcome(day_views.text(day, width()), code)
+        return Outcome(day_page(day, links), code)
+    return Outcome(day_text(day, width()), code)
 
 
 @app.command(
@@ -105,17 +106,17 @@ def constellation(
     from microrad.orbit import constellation as plans
     from microrad.orbit import day as day_study
     from microrad.orbit import operations
-    from microrad.report import constellation_views
+    from microrad.report.day.constellation import plan_data, plan_text
 
     links = _links(file)
     with refusal_of(file):
         with progress_bar() as progress:
-            plan = plans.run(links.file, day_study.given_loss(links), progress)
+            plan = plans.run_constellation(links.file, day_study.given_loss(links), progress)
         code = MET if plan.volume_bit > 0.0 else UNMET
         if as_csv:
             return Outcome(operations.csv_text(plan.planned, plan.epoch.utc), code)
         if as_plan:
             return Outcome(plan.contact_plan(), code)
     if as_json:
-        return Outcome(json_text({"mission": links.file.mission.name, **constellation_views.data(plan)}), code)
-    return Outcome(constellation_views.text(plan, width()), code)
+        return Outcome(json_text({"mission": links.file.mission.name, **plan_data(plan)}), code)
+    return Outcome(plan_text(plan, width()), code)

@@ -60,7 +60,8 @@ def budget(  # noqa: PLR0913, PLR0917  each is an option
     from microrad.link import study as link_study
     from microrad.link.requirement import met
     from microrad.mission.file import load_link
-    from microrad.report import budget_views
+    from microrad.report.links.budgets import links_csv, links_text
+    from microrad.report.links.data import links_data
 
     loaded = load_link(file)
     if pointing_error is not None and loaded.mission.jitter is not None:
@@ -70,18 +71,18 @@ def budget(  # noqa: PLR0913, PLR0917  each is an option
         )
     given = _changed(loaded, data_rate, pointing_error)
     with refusal_of(file):
-        solution = None if solve is None else link_study.solve(given, solve)
-        study = link_study.run(given if solution is None else solution.file)
+        solution = None if solve is None else link_study.solve_key(given, solve)
+        study = link_study.run_link_study(given if solution is None else solution.file)
     code = exit_on.code(met=met(study), closes=study.closes)
     if as_json:
-        return Outcome(json_text(budget_views.data(study, solution)), code)
+        return Outcome(json_text(links_data(study, solution)), code)
     if as_csv:
-        return Outcome(budget_views.csv_text(study, solution), code)
+        return Outcome(links_csv(study, solution), code)
     if as_html:
-        from microrad.report import single_pages
+        from microrad.report.links.page import links_page
 
-        return Outcome(single_pages.budget(study, solution), code)
-    return Outcome(budget_views.text(study, width(), verbose=verbose, solution=solution), code)
+        return Outcome(links_page(study, solution), code)
+    return Outcome(links_text(study, width(), verbose=verbose, solution=solution), code)
 
 
 def _changed(file: "LinkFile", data_rate: str | None, pointing_error: str | None) -> "LinkFile":

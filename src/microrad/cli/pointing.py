@@ -47,7 +47,7 @@ def design(
     simulated figure is more than 1.5 times its linear one.
     """
     from microrad import mirror as mirror_room
-    from microrad.link.tracking_light import tracking_light_w
+    from microrad.link import tracking_light_w
     from microrad.loop import fine_pointing
     from microrad.mirror.summary import unknown_dynamics
     from microrad.mission.file import load_mission

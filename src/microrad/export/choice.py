@@ -30,7 +30,7 @@ from microrad.export.records import (
     Signal,
     Vectors,
 )
-from microrad.link.tracking_light import tracking_light_w
+from microrad.link import tracking_light_w
 from microrad.loop import control, fine_pointing, paper_cases, sine_run
 from microrad.loop.fine_loop.loop import LoopController
 from microrad.loop.fine_loop.replay import replay

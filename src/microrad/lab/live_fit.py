@@ -1,4 +1,4 @@
-"""The models of an identification as they are fitted, written to a file for whoever looks on.
+"""The models of an identification as they are fitted, written to a file that the studio shows meanwhile.
 
 The file has one line of JSON for each model: its score, and its curve beside the measured one, thinned.
 """
@@ -55,9 +55,9 @@ class LiveFit:
 
 
 def live_fit_writer(progress: str | None) -> Callable[[ScoredModel], None]:
-    """What `identify` gives its models to: a file beside that of the progress, or nothing where there is none.
+    """A function that writes each fitted model to a file beside that of the progress, or does nothing without one.
 
-    A disk that is full costs the picture, not the identification.
+    A disk that is full does not end the identification.
     """
     if not progress:
         return lambda judged: None
@@ -104,6 +104,10 @@ def extremes(columns: list[Floats], points: int) -> NDArray[np.intp]:
     """Rows, in order, that hold the smallest and largest value of every column in each of `points`/2 stretches.
 
     A recording of at most `points` samples is kept whole.
+
+    Args:
+        columns: Columns of equal length.
+        points: Number of points to draw.
     """
     samples = len(columns[0])
     if samples <= points:

@@ -1,32 +1,8 @@
 """Link budgets: of the beacon, its answer and the communication link, and what follows from them."""
 
-from microrad.link.beams import BEST_TRUNCATION, GaussianFall, LitAperture, OffAxis
-from microrad.link.budget import (
-    DEEPEST_DB,
-    LEFT_AT_ZERO,
-    LinkBudget,
-    beam_budget,
-    communication_budget,
-)
-from microrad.link.gains import (
-    air_mass,
-    aperture_gain_db,
-    clear_sky_loss_db,
-    dbm,
-    far_field_m,
-    free_space_loss_db,
-    gaussian_beam_gain_db,
-    gaussian_pointing_loss_db,
-    implied_transmission_db,
-    obscuration_loss_db,
-    peak_radiant_intensity_w_sr,
-    photon_energy_j,
-    pointing_loss_db,
-    strehl_loss_db,
-    strehl_ratio,
-)
-from microrad.link.inputs import LINK_TABLES, fits, inputs, lit, margin_or_none, moved, unit_of
-from microrad.link.maps import (
+from microrad.link.budget.assembly import DataLink, LinkError, Shared, of, required_dbm
+from microrad.link.budget.lines import DEEPEST_DB, LinkBudget, beam_budget, communication_budget, tracking_light_w
+from microrad.link.budget.maps import (
     IdealReceiver,
     SensitivityReading,
     convention_maps,
@@ -39,66 +15,34 @@ from microrad.link.maps import (
     rate_at_loss,
     received_on_axis_dbm,
 )
-from microrad.link.model import DataLink, LinkError, Shared, assembled, of, required_dbm, strehl_db
-from microrad.link.solve import Interval, Solved, solve
-from microrad.link.tornado import Swing, Tornado, beam_margin, beam_tornado, swings
+from microrad.link.variation import LINK_TABLES, Interval, Swing, Tornado, beam_passes, swings
 
 __all__ = [
-    "BEST_TRUNCATION",
     "DEEPEST_DB",
-    "LEFT_AT_ZERO",
     "LINK_TABLES",
     "DataLink",
-    "GaussianFall",
     "IdealReceiver",
     "Interval",
     "LinkBudget",
     "LinkError",
-    "LitAperture",
-    "OffAxis",
     "SensitivityReading",
     "Shared",
-    "Solved",
     "Swing",
     "Tornado",
-    "air_mass",
-    "aperture_gain_db",
-    "assembled",
     "beam_budget",
-    "beam_margin",
-    "beam_tornado",
-    "clear_sky_loss_db",
+    "beam_passes",
     "communication_budget",
     "convention_maps",
-    "dbm",
-    "far_field_m",
-    "fits",
-    "free_space_loss_db",
-    "gaussian_beam_gain_db",
-    "gaussian_pointing_loss_db",
     "ideal_receivers",
     "implied_sensitivity",
-    "implied_transmission_db",
-    "inputs",
     "largest_data_rate",
     "largest_pointing_error",
-    "lit",
     "margin_map",
     "margin_of_error",
-    "margin_or_none",
-    "moved",
-    "obscuration_loss_db",
     "of",
-    "peak_radiant_intensity_w_sr",
-    "photon_energy_j",
-    "pointing_loss_db",
     "rate_at_loss",
     "received_on_axis_dbm",
     "required_dbm",
-    "solve",
-    "strehl_db",
-    "strehl_loss_db",
-    "strehl_ratio",
     "swings",
-    "unit_of",
+    "tracking_light_w",
 ]

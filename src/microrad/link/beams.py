@@ -75,7 +75,7 @@ class LitAperture:
     m_squared: float = 1.0
 
     def __post_init__(self) -> None:
-        """Refuse what is no aperture, and what lights none of it."""
+        """Raises ValueError if a value is out of range, or the obscuration stops the beam."""
         _require(self.diameter_m > 0.0, "the aperture", self.diameter_m, "above 0 m")
         _require(self.wavelength_m > 0.0, "the wavelength", self.wavelength_m, "above 0 m")
         _require(self.truncation >= 0.0, "the truncation", self.truncation, "at least 0, which is an even light")

@@ -5,9 +5,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 from microrad import link
-from microrad.link.budget import FREE_SPACE_LOSS
+from microrad.link.budget.lines import FREE_SPACE_LOSS
+from microrad.link.pointing import OpenLoopPointing
+from microrad.link.pointing.outage import stated_outage
 from microrad.link.study import LinkStudy
-from microrad.link.under_jitter import stated_outage
 from microrad.mission.model import Source
 from microrad.mission.tables.link import LinkRequirement
 
@@ -63,7 +64,10 @@ def of_links(study: LinkStudy) -> tuple[Requirement, ...]:
     """What the budgets alone are held against: what is required of the beacon, the answer and communication."""
     m = study.file.mission
     name = "communication margin" + ("" if m.jitter is None else f" but for {outage_words(m.requirement)}")
-    return (*of_beams(study), _of_budget(study, "communication", study.communication, m.requirement.margin_db, name))
+    return (
+        *of_beams(study),
+        _of_budget(study.file.sources, "communication", study.communication, m.requirement.margin_db, name),
+    )
 
 
 def met(study: LinkStudy) -> bool:
@@ -73,8 +77,12 @@ def met(study: LinkStudy) -> bool:
 
 def of_beams(study: LinkStudy) -> tuple[Requirement, ...]:
     """What is required of beacon and answer, where the mission has them: the beacon's cone, and 0 dB of each."""
-    found = [] if study.beacon is None else [_cone(study), _of_budget(study, "beacon", study.beacon)]
-    found += [] if study.answer is None else [_of_budget(study, "answer", study.answer)]
+    sources, found = study.file.sources, []
+    if study.beacon is not None:
+        assert study.open_loop is not None  # it has a beacon
+        found += [_cone(study.open_loop, sources), _of_budget(sources, "beacon", study.beacon)]
+    if study.answer is not None:
+        found.append(_of_budget(sources, "answer", study.answer))
     return tuple(found)
 
 
@@ -89,37 +97,33 @@ def derived_from(sources: Mapping[str, Source], *keys: str) -> tuple[str, ...]:
     A value that was changed since is none of them.
     """
     found = [(key, s) for key, s in sources.items() if s.kind == "derived" and not s.was and key.startswith(keys)]
-    return tuple(f"{key} = {_bare(s.value)} ({s.comment.partition(': ')[2]})" for key, s in found)
+    unquoted = ((key, s.value.strip('"'), s.comment.partition(": ")[2]) for key, s in found)
+    return tuple(f"{key} = {value} ({what})" for key, value, what in unquoted)
 
 
-def _bare(value: str) -> str:
-    return value.strip('"')
-
-
-def _cone(study: LinkStudy) -> Requirement:
+def _cone(p: OpenLoopPointing, sources: Mapping[str, Source]) -> Requirement:
     """How often the beacon has its partner inside its cone: the exact share, both axes and biases counted.
 
     Errors that were derived from the cone by their root sum square, as in the paper, are held against that alone: it
     is one axis, and meeting it proves nothing.
     """
-    assert study.open_loop is not None  # it has a beacon
-    assert study.open_loop.reading is not None
-    p, derived = study.open_loop, derived_from(study.file.sources, "pointing.", "beacon.divergence")
+    assert p.reading is not None  # there is a beacon
+    derived = derived_from(sources, "pointing.", "beacon.divergence")
     largest = max(zip(p.variance_shares, p.lines, strict=True), key=lambda pair: pair[0])[1].name
     if derived:
         half, name = p.beacon_half_angle_rad, "beacon cone over the root sum square"
         return Requirement("cone", name, "rad", p.rss_rad, half, half - p.rss_rad, largest, derived=derived)
-    wanted, covered = 100.0 * p.confidence, 100.0 * study.open_loop.reading.coverage
+    wanted, covered = 100.0 * p.confidence, 100.0 * p.reading.coverage
     return Requirement("cone", "beacon covers its partner", "%", wanted, covered, covered - wanted, largest)
 
 
 def _of_budget(
-    study: LinkStudy, subject: Subject, budget: link.LinkBudget, required_db: float = 0.0, name: str = ""
+    sources: Mapping[str, Source], subject: Subject, budget: link.LinkBudget, required_db: float = 0.0, name: str = ""
 ) -> Requirement:
     # Free space is lost by everyone: name the largest loss that a design can change.
     losses = [line for line in budget.lines if line.unit == "dB" and line.name != FREE_SPACE_LOSS]
     limit, spare = min(losses, key=lambda line: line.value).name, budget.margin_db - required_db
-    doubt, derived = "" if budget.possible else IMPOSSIBLE, derived_from(study.file.sources, f"{subject}.")
+    doubt, derived = "" if budget.possible else IMPOSSIBLE, derived_from(sources, f"{subject}.")
     return Requirement(
         subject, name or f"{subject} margin", "dB", required_db, budget.margin_db, spare, limit, doubt, derived
     )

@@ -12,9 +12,17 @@ from microrad import link
 from microrad.core import kept
 from microrad.core.budget import Line
 from microrad.core.units import format_quantity
-from microrad.link import pointing
-from microrad.link.partner_search import Finding, Sent, Tracking, finding, tracking
-from microrad.link.under_jitter import Performance, error_rad, margin_db, of_jitter, required_error_rad, stated_outage
+from microrad.link import pointing, variation
+from microrad.link.acquisition.partner_search import Finding, Sent, Tracking, answer_on_sensor, find_partner
+from microrad.link.budget import assembly
+from microrad.link.pointing.outage import (
+    Performance,
+    error_rad,
+    margin_db,
+    performance_under_jitter,
+    required_error_rad,
+    stated_outage,
+)
 from microrad.mission.file import LinkFile
 from microrad.mission.model import LinkMission, Source, source_text
 
@@ -54,7 +62,7 @@ class BeamRadius:
 class LinkStudy:
     """Everything that follows from the tables of the links alone. The links that a mission lacks are None.
 
-    The communication budget is made at the error of `under_jitter.error_rad`: under a jitter its margin is the one
+    The communication budget is made at the error of `outage.error_rad`: under a jitter its margin is the one
     that is kept but for the outage, and the margin at the static pointing error stands below it. ``receiver_noise`` are
     the noise terms of the communication receiver at the received power, where it is given by what it is made of.
     ``data`` is the communication link assembled. ``tornados`` has one of each budget, in the same order.
@@ -95,7 +103,7 @@ class LinkStudy:
 def solve_rate(file: _File) -> _File:
     """The file with a data rate of "largest" replaced by the rate that it stands for.
 
-    Raises `LinkError` when no rate has the required margin.
+    Raises LinkError when no rate has the required margin.
     """
     m = file.mission
     if not math.isnan(m.communication.data_rate_bit_s):
@@ -122,12 +130,12 @@ class Solution:
     unit: str
     of: str
     required_db: float
-    solved: link.Solved
+    solved: variation.Solved
     value: float
     file: LinkFile
 
 
-def solve(file: LinkFile, key: str) -> Solution:
+def solve_key(file: LinkFile, key: str) -> Solution:
     """The values of a key of the links' tables that leave the required margin: of communication, but for the outage.
 
     A key of the beacon's table is looked for at 0 dB of the beacon, one of the answer's at 0 dB of the answer. Raises
@@ -136,21 +144,21 @@ def solve(file: LinkFile, key: str) -> Solution:
     file = solve_rate(file)
     m, sources = file.mission, file.sources
     tables = ("jitter", *link.LINK_TABLES, *(name for name in ("beacon", "answer") if getattr(m, name) is not None))
-    every = [each for table in tables for each in link.inputs(m, table)]
+    every = [each for table in tables for each in variation.inputs(m, table)]
     found = tuple(each for each in every if key in (each.key, each.shown))
     if not found:
         raise ValueError(_no_such_key(key, dict.fromkeys(each.key for each in every)))
-    of, unit = found[0].table, link.unit_of(found[0], m.conventions.strehl)
+    of, unit = found[0].table, variation.unit_of(found[0], m.conventions.strehl)
     if of in ("beacon", "answer"):
-        required, margin, possible = 0.0, link.beam_margin(of, sources), link.fits(of)
+        required, margin, possible = 0.0, variation.beam_margin(of, sources), variation.divergence_possible(of)
     else:
-        of, required, margin, possible = "communication", m.requirement.margin_db, _margin_db, link.lit
-    solved = link.solve(m, found, unit, margin, required, possible)
+        of, required, margin, possible = "communication", m.requirement.margin_db, _margin_db, link.beam_passes
+    solved = variation.solve(m, found, unit, margin, required, possible)
     if not solved.intervals:
         return Solution(key, unit, of, required, solved, max(each.value for each in found), file)
     first, last = solved.intervals[0], solved.intervals[-1]
     value = last.high if first.low_open else first.low
-    mission = link.moved(m, found, value)
+    mission = variation.moved(m, found, value)
     assert mission is not None  # it leaves the margin
     was = sources.get(found[0].key)
     shown = format_quantity(value, unit) if unit else f"{value:.4g}"
@@ -167,7 +175,7 @@ def _no_such_key(key: str, keys: Iterable[str]) -> str:
     return f'no table of the links has a quantity "{key[:60]}"; {hint}'
 
 
-def run(file: LinkFile, parts: kept.Kept = kept.NOTHING) -> LinkStudy:
+def run_link_study(file: LinkFile, parts: kept.Kept = kept.NOTHING) -> LinkStudy:
     """Budgets of every link of a mission and what follows from them.
 
     Raises ValueError with the reason when a receiver does not take the data rate, or a scan has no time to detect.
@@ -179,14 +187,14 @@ def run(file: LinkFile, parts: kept.Kept = kept.NOTHING) -> LinkStudy:
         for name, table in (("beacon", m.beacon), ("answer", m.answer))
     )
     open_loop = None if m.pointing is None else pointing.open_loop_budget(m.pointing, shared, m.beacon, sources)
-    light = tracking(m.acquisition, m.terminals.leo_aperture_m, answer, sources)
+    light = answer_on_sensor(m.acquisition, m.terminals.leo_aperture_m, answer, sources)
     data = link.of(m)
     communication, rate = communication_budget(data, sources), m.communication.data_rate_bit_s
     noise = () if data.receiver is None else data.receiver.noise_lines(communication.received_power_w, rate)
     found = None
     if m.acquisition is not None and beacon is not None and answer is not None:
         assert open_loop is not None  # the relations of the mission
-        found = parts.part(finding, m.acquisition, data, open_loop.error, beacon, answer, light)
+        found = parts.part(find_partner, m.acquisition, data, open_loop.error, beacon, answer, light)
     budgets = (communication, *(each.budget for each in (beacon, answer) if each is not None))
     return LinkStudy(
         file=file,
@@ -198,7 +206,7 @@ def run(file: LinkFile, parts: kept.Kept = kept.NOTHING) -> LinkStudy:
         receiver_noise=noise,
         largest_rate_bit_s=largest_rate(data),
         tornados=tornados(m, sources, budgets),
-        under_jitter=of_jitter(data),
+        under_jitter=performance_under_jitter(data),
         tracking=light,
         point_ahead=point_ahead(data),
         beam_radius=beam_radius(data),
@@ -207,9 +215,9 @@ def run(file: LinkFile, parts: kept.Kept = kept.NOTHING) -> LinkStudy:
 
 
 def communication_budget(data: link.DataLink, sources: Mapping[str, Source]) -> link.LinkBudget:
-    """The budget of the communication link at `under_jitter.error_rad`, with the static margin under a jitter.
+    """The budget of the communication link at `outage.error_rad`, with the static margin under a jitter.
 
-    Raises `ValueError` for a data rate that the receiver does not take.
+    Raises ValueError for a data rate that the receiver does not take.
     """
     static = link.communication_budget(data, sources)
     if data.jitter is None:
@@ -227,8 +235,8 @@ def tornados(
 ) -> tuple[link.Tornado, ...]:
     """What moves the margin of each budget, communication first."""
     tables = ("jitter", "requirement", *link.LINK_TABLES)
-    swings = [link.swings(m, sources, tables, m.conventions.strehl, _margin_db, link.lit)]
-    swings += [link.beam_tornado(m, sources, each.name.lower()) for each in budgets[1:]]
+    swings = [link.swings(m, sources, tables, m.conventions.strehl, _margin_db, link.beam_passes)]
+    swings += [variation.beam_tornado(m, sources, each.name.lower()) for each in budgets[1:]]
     return tuple(link.Tornado(each.name, each.margin_db, own) for each, own in zip(budgets, swings, strict=True))
 
 
@@ -249,10 +257,10 @@ def beam_radius(data: link.DataLink) -> BeamRadius | None:
     def at(radius_m: float) -> float:
         table = data.table.with_value("beam.radius_m", radius_m)
         try:
-            changed = link.assembled(data.shared, table, data.requirement, data.jitter)
+            changed = assembly.assembled(data.shared, table, data.requirement, data.jitter)
         except ValueError:  # the obscuration stops it
             return -math.inf
-        return link.margin_or_none(changed, margin_db)
+        return variation.margin_or_none(changed, margin_db)
 
     margins = [at(float(each)) for each in radii]
     best = max(range(len(radii)), key=margins.__getitem__)

@@ -5,7 +5,7 @@ turned about z by Greenwich mean sidereal time (IAU 1982) at UT1; polar motion (
 Times are elapsed seconds since the epoch of the mission. Vectors are axis first: shape (3, n) for n times.
 """
 
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, TypeVar
 
 from microrad.core.arrays import Floats
 
@@ -16,6 +16,16 @@ class OrbitError(ValueError):
 
 class OperationsError(ValueError):
     """A table, a rate or a plan of the day that is refused: which value it is, and what to give."""
+
+
+_Table = TypeVar("_Table")
+
+
+def required(table: _Table | None, name: str, error: type[ValueError]) -> _Table:
+    """The mission's table of that name; raises this error where the mission has none."""
+    if table is None:
+        raise error(f"the mission has no table [{name}]: microrad init writes one")
+    return table
 
 
 class States(NamedTuple):
@@ -36,6 +46,6 @@ class Orbit(Protocol):
     def states(self, time_s: Floats) -> States:
         """States at `time_s`, elapsed seconds since the epoch of the mission, in any order.
 
-        Raises `OrbitError` for a time at which the rule does not hold.
+        Raises OrbitError for a time at which the rule does not hold.
         """
         ...

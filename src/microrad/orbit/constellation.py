@@ -10,12 +10,10 @@ from microrad import link, orbit
 from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
 from microrad.mission.file import LinkFile
-from microrad.mission.tables.operations import Constellation
 from microrad.orbit import operations
-from microrad.orbit.contacts import Sampled, coarse_step_s, contacts_with_each
+from microrad.orbit.base import required
 from microrad.orbit.day.flow import PointingLoss, closings, rate_table
-from microrad.orbit.day.flow import table as operations_table
-from microrad.orbit.from_mission import orbits_table
+from microrad.orbit.visibility.contacts import Sampled, coarse_step_s, contacts_with_each
 
 Span = tuple[float, float]
 
@@ -88,7 +86,7 @@ def opportunities(
     return operations.Opportunities(who[:, 0], who[:, 1], when[:, 0], when[:, 1])
 
 
-def run(
+def run_constellation(
     file: LinkFile, loss: PointingLoss, on_progress: Progress = lambda done, total, what: None
 ) -> ConstellationPlan:
     """The constellation of a mission: contacts, sessions by the rule of `operations.schedule`, and their volumes.
@@ -105,9 +103,9 @@ def run(
     orbits that do not hold.
     """
     m, folder, contents = file.mission, file.path.parent, file.contents
-    c = table(m.constellation)
-    rates = rate_table(closings(operations_table(m.operations), link.of(m), loss))
-    orbits, pair = orbits_table(m.orbit), orbit.pair(m.orbit, m.terminals, folder, contents)
+    c = required(m.constellation, "constellation", operations.OperationsError)
+    rates = rate_table(closings(required(m.operations, "operations", operations.OperationsError), link.of(m), loss))
+    orbits, pair = required(m.orbit, "orbit", orbit.OrbitError), orbit.pair(m.orbit, m.terminals, folder, contents)
     own = tuple(orbit.satellites(c, orbits, pair.epoch, folder, contents))
     relays = orbit.relays(c, orbits, pair.epoch)
     furthest = 0.0 if rates is None else rates.steps[-1].largest_range_m
@@ -137,13 +135,6 @@ def run(
         by_satellite=operations.totals_by_satellite(sessions, len(own), volumes, pair.span_s),
         by_relay=operations.totals_by_relay(sessions, len(relays), volumes, pair.span_s),
     )
-
-
-def table(given: Constellation | None) -> Constellation:
-    """The mission's table of its constellation; `operations.OperationsError` without one."""
-    if given is None:
-        raise operations.OperationsError("the mission has no table [constellation]: microrad init writes one")
-    return given
 
 
 def _planned(

@@ -10,14 +10,24 @@ from microrad.mission.file import NamedFile, content_of
 from microrad.mission.tables.link import Terminals
 from microrad.mission.tables.operations import Constellation, Downlink
 from microrad.mission.tables.orbit import Orbits, OrbitTable, VisibilityLimits
-from microrad.orbit.analytic import GeostationarySlot, KeplerOrbit, node_of_local_time, sun_synchronous_inclination_rad
-from microrad.orbit.base import Orbit, OrbitError
-from microrad.orbit.earth import EARTH_RADIUS_M, Earth, Station
-from microrad.orbit.ephemeris import EphemerisOrbit
-from microrad.orbit.epoch import Epoch
+from microrad.orbit.base import Orbit, OrbitError, required
+from microrad.orbit.earth.epoch import Epoch
+from microrad.orbit.earth.figure import EARTH_RADIUS_M, Earth, Station
 from microrad.orbit.files import read_elements, read_oem
-from microrad.orbit.limits import UNLIMITED, Limits, Terminal
-from microrad.orbit.mean_elements import MOST_ELEMENTS_AGE_S, ElementSet, Sgp4Orbit, closest_elements, sgp4_orbit
+from microrad.orbit.propagation.analytic import (
+    GeostationarySlot,
+    KeplerOrbit,
+    node_of_local_time,
+    sun_synchronous_inclination_rad,
+)
+from microrad.orbit.propagation.ephemeris import EphemerisOrbit
+from microrad.orbit.propagation.mean_elements import (
+    MOST_ELEMENTS_AGE_S,
+    ElementSet,
+    Sgp4Orbit,
+    closest_elements,
+)
+from microrad.orbit.visibility.limits import UNLIMITED, Limits, Terminal
 
 Contents = tuple[NamedFile, ...]
 """The files that a mission names, read once with it."""
@@ -54,9 +64,9 @@ def pair(orbits: Orbits | None, ends: Terminals, folder: Path, contents: Content
         folder: the folder of its file.
         contents: the files that it names, where they were read with it.
 
-    Raises `OrbitError` for an orbit that is none, or that does not hold over the mission's span.
+    Raises OrbitError for an orbit that is none, or that does not hold over the mission's span.
     """
-    orbits = orbits_table(orbits)
+    orbits = required(orbits, "orbit", OrbitError)
     try:
         epoch = Epoch(orbits.epoch)
     except OrbitError as error:
@@ -77,15 +87,8 @@ def pair(orbits: Orbits | None, ends: Terminals, folder: Path, contents: Content
     return Pair(epoch, earth, found[0], found[1], (0.0, orbits.duration_s), tail)
 
 
-def orbits_table(given: Orbits | None) -> Orbits:
-    """The mission's table of orbits; `OrbitError` without one."""
-    if given is None:
-        raise OrbitError("the mission has no table [orbit]: microrad init writes one")
-    return given
-
-
 def _tail(orbit: Orbit, epoch: Epoch, duration_s: float) -> float:
-    """How far behind the span an orbit holds; raises `OrbitError` where it does not hold over it."""
+    """How far behind the span an orbit holds; raises OrbitError where it does not hold over it."""
     if isinstance(orbit, EphemerisOrbit):
         orbit.require(0.0, duration_s)
         return min(TAIL_S, max(orbit.span_s[1] - duration_s, 0.0))
@@ -112,7 +115,7 @@ def _orbit(t: OrbitTable, name: str, epoch: Epoch, folder: Path, contents: Conte
     path, data = folder / t.file, content_of(t.file, contents)
     if t.kind == "ephemeris":
         return read_oem(path, epoch, t.object, data)
-    return sgp4_orbit(closest_elements(read_elements(path, t.object, data), epoch), epoch)
+    return Sgp4Orbit(closest_elements(read_elements(path, t.object, data), epoch), epoch)
 
 
 def _kepler(t: OrbitTable, name: str, epoch: Epoch) -> KeplerOrbit:
@@ -188,13 +191,13 @@ def satellites(
         folder: where files are looked for that are not among the contents.
         contents: the files that the mission names.
 
-    Raises `OrbitError` for a file that is refused, and an orbit that no pattern can repeat.
+    Raises OrbitError for a file that is refused, and an orbit that no pattern can repeat.
     """
     shared = _limits(orbits.leo.limits)
     if c.file is not None:
         sets = read_elements(folder / c.file, data=content_of(c.file, contents))
         for elements, name in zip(sets, _names(sets, folder / c.file), strict=True):
-            own = sgp4_orbit(elements, epoch)
+            own = Sgp4Orbit(elements, epoch)
             own.require(0.0, orbits.duration_s)
             yield Terminal(own, shared, name)
         return

@@ -14,35 +14,37 @@ from microrad.report.tables import Column, rows_of
 
 if TYPE_CHECKING:
     from microrad.orbit.constellation import ConstellationPlan
-    from microrad.report.identification import ReportError, check_identification, write_identification
-    from microrad.report.identification_words import identification_data, identification_text
-    from microrad.report.page import Drawn
-    from microrad.report.words import summary, verdict_text
-    from microrad.study.story import Study
+    from microrad.report.identification.data import identification_data
+    from microrad.report.identification.page import ReportError, check_identification, write_identification
+    from microrad.report.identification.text import identification_text
+    from microrad.report.study.data import summary
+    from microrad.report.study.page import StudyFigures
+    from microrad.report.study.words import verdict_text
+    from microrad.study.study import Study
+
+_LAZY = {
+    "ReportError": "identification.page",
+    "check_identification": "identification.page",
+    "write_identification": "identification.page",
+    "identification_data": "identification.data",
+    "identification_text": "identification.text",
+    "summary": "study.data",
+    "verdict_text": "study.words",
+}
 
 __all__ = [
     "FolderError",
     "ReportError",
     "check_folder",
     "check_identification",
-    "draw",
     "identification_data",
     "identification_text",
+    "study_figures",
     "summary",
     "verdict_text",
     "write",
     "write_identification",
 ]
-
-_LAZY = {
-    "ReportError": "identification",
-    "check_identification": "identification",
-    "write_identification": "identification",
-    "identification_data": "identification_words",
-    "identification_text": "identification_words",
-    "summary": "words",
-    "verdict_text": "words",
-}
 
 
 def __getattr__(name: str) -> Any:
@@ -64,41 +66,52 @@ def write(
 
     ``parts`` are those of earlier runs that are kept: none by default.
 
-    Raises FolderError when the folder holds something that must not be replaced. Returns the page's path.
+    Raises FolderError if the folder holds something that must not be replaced. Returns the page's path.
     """
-    from microrad.report import page, results  # drawing and writing libraries take longer to load than help should
+    from microrad.report.results.arrays import study_netcdf
+    from microrad.report.results.manifest import manifest_of, write_manifest
+    from microrad.report.study.data import summary
+    from microrad.report.study.page import study_page
 
     with whole_folder(folder, overwrite) as draft:
         on_progress(0, 3, "figures")
-        drawn, numbers = draw(study, parts), parts.part(results.netcdf, study)
+        drawn, numbers = study_figures(study, parts), parts.part(study_netcdf, study)
         (draft / "figures").mkdir()
         for figure in drawn.every:
             (draft / "figures" / f"{figure.name}.svg").write_text(figure.svg, encoding="utf-8")
             write_columns(figure.columns, draft / "figures" / f"{figure.name}.csv")
         on_progress(1, 3, "page")
-        made = results.manifest(study, draft)
-        text = page.render(study, drawn, made)
-        (draft / "report.html").write_text(text, encoding="utf-8")
+        made = manifest_of(study, summary(study), draft)
+        (draft / "report.html").write_text(study_page(study, drawn, made), encoding="utf-8")
         on_progress(2, 3, "results")
         if study.plan is not None:
             write_plan(study.plan, draft)
         (draft / "results.nc").write_bytes(numbers)
-        results.write_manifest(made, draft, MANIFEST)
+        write_manifest(made, draft, MANIFEST)
         on_progress(3, 3, "done")
     return folder / "report.html"
 
 
-def draw(study: "Study", parts: Kept = NOTHING) -> "Drawn":
-    """The figures of a study's page, by its parts."""
-    from microrad.report import day_plots, figures, fine_pointing_figures, link_figures, page, paper_bench, tails
+def study_figures(study: "Study", parts: Kept = NOTHING) -> "StudyFigures":
+    """The figures of a study's page, by its parts.
 
-    return page.Drawn(
-        figures.draw(study),
-        paper_bench.draw(study, parts),
-        fine_pointing_figures.draw(study),
-        tails.draw(study),
-        link_figures.draw(study.links),
-        () if study.day is None else day_plots.draw(study.day, study.contact),
+    ``parts`` are those of earlier runs that are kept: none by default.
+    """
+    from microrad.report.day.figures import day_figures
+    from microrad.report.fine_pointing.figures import fine_pointing_figures
+    from microrad.report.fine_pointing.tails import tail_figures
+    from microrad.report.links.figures import link_figures
+    from microrad.report.paper.bench import bench_figures
+    from microrad.report.paper.figures import paper_figures
+    from microrad.report.study.page import StudyFigures
+
+    return StudyFigures(
+        paper_figures(study),
+        bench_figures(study, parts),
+        fine_pointing_figures(study),
+        tail_figures(study),
+        link_figures(study.links),
+        () if study.day is None else day_figures(study.day, study.contact),
     )
 
 

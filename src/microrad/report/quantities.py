@@ -1,8 +1,13 @@
-"""How a value with its unit stands in tables."""
+"""Numbers as text: values with their units, angles, shares, lengths of time and powers of ten."""
+
+import math
 
 from microrad.core.units import format_quantity
-from microrad.link.radial_error import SMALLEST_PROBABILITY
+from microrad.link.pointing.radial_error import SMALLEST_PROBABILITY
 
+MINUS = "\u2212"
+"""The sign in front of a negative number, which is no hyphen."""
+_RAISED = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 _NOTHING_DB = 1e-9  # what rounding leaves of a margin that is none
 
 
@@ -32,10 +37,77 @@ def quantity(value: float, unit: str, digits: int = 3) -> str:
         text = text.removeprefix("-") if -_NOTHING_DB <= value < 0 else text
     else:
         text = format_quantity(value, unit, digits)
-    return text.replace("-", "\u2212", 1) if text.startswith("-") else text  # a minus sign, not a hyphen
+    return f"{MINUS}{text[1:]}" if text.startswith("-") else text
 
 
 def signed(value: float, unit: str, digits: int = 3) -> str:
     """A margin, as `quantity` has it, with its sign."""
     text = quantity(value, unit, digits)
-    return text if text.startswith("\u2212") else f"+{text}"
+    return text if text.startswith(MINUS) else f"+{text}"
+
+
+def minus(text: str) -> str:
+    """A text with minus signs in place of its hyphens."""
+    return text.replace("-", MINUS)
+
+
+def power_text(number: float, digits: int = 3) -> str:
+    """A number with its power of ten, as it is printed in books: 3×10⁻⁴."""
+    if not number:
+        return "0"
+    mantissa, _, exponent = f"{number:.{digits - 1}e}".partition("e")
+    raised = f"10{str(int(exponent)).translate(_RAISED)}"
+    mantissa = minus(f"{float(mantissa):g}")
+    return {"1": raised, f"{MINUS}1": f"{MINUS}{raised}"}.get(mantissa, f"{mantissa}×{raised}")
+
+
+# -------------------------------------------------------------------------------------------------------------- angles
+def micro(value_rad: float) -> str:
+    """An angle in microradians, three digits but no more than three decimals, without its unit; "" for nan."""
+    value = 1e6 * value_rad
+    if math.isnan(value):
+        return ""
+    if value == 0.0 or abs(value) >= 99.95:
+        return minus(f"{value:.0f}")
+    if abs(value) < 1e-3:
+        return "< 0.001"
+    return minus(f"{value:.{min(3, max(0, 2 - math.floor(math.log10(abs(value)))))}f}")
+
+
+def angle(value_rad: float) -> str:
+    """An angle as it was found: in microradians with the digits of the tables, from 1 mrad on in larger units."""
+    return f"{micro(value_rad)} µrad" if abs(value_rad) < 1e-3 else format_quantity(value_rad, "rad", 3)
+
+
+def given_angle(value_rad: float) -> str:
+    """An angle as it was asked for, without digits that say nothing."""
+    return format_quantity(value_rad, "rad")
+
+
+# ----------------------------------------------------------------------------------------------------- shares and time
+def percent(share: float) -> str:
+    """A share in two digits: "2.3 %"."""
+    value = 100.0 * share
+    if 0.0 < abs(value) < 1e-3:
+        return "< 0.001 %"
+    return minus(f"{float(f'{value:.2g}'):.15g} %")
+
+
+def share_of_time(quantile: float) -> str:
+    """A quantile as it was asked for: "99.7 %"."""
+    return f"{100.0 * quantile:.6g} %"
+
+
+def volume(bit: float) -> str:
+    """An amount of data in bytes."""
+    return quantity(bit / 8.0, "B")
+
+
+def duration(time_s: float) -> str:
+    """A length of time in the unit that reads best."""
+    if math.isinf(time_s):
+        return "never"
+    for unit_s, unit in ((3600.0, "h"), (60.0, "min")):
+        if abs(time_s) >= 2.0 * unit_s:
+            return f"{time_s / unit_s:.3g} {unit}"
+    return f"{time_s:.3g} s"

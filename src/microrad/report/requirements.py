@@ -1,30 +1,36 @@
-"""Requirements of a study or of the links alone, however they are shown: a table, a paragraph, plain data."""
+"""Requirements of a study or of the links alone: a table, sentences, plain data, and what to change to meet them."""
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
+from microrad import link
+from microrad.core.units import format_quantity
+from microrad.link import study as link_study
 from microrad.link.requirement import DERIVED, Requirement
-from microrad.report import quantities
-from microrad.report.quantities import apart
+from microrad.link.study import LinkStudy
+from microrad.mission.tables.link import Beam
+from microrad.report.data import fields
+from microrad.report.quantities import apart, signed
 from microrad.report.tables import Table
 
 
-def table(found: Sequence[Requirement]) -> Table:
+def requirement_table(found: Sequence[Requirement]) -> Table:
     """Requirements for a terminal."""
-    cells = [(r.name, *reversed(apart(r.actual, r.required, r.unit)), signed(r), r.mark) for r in found]
+    cells = [(r.name, *reversed(apart(r.actual, r.required, r.unit)), margin_text(r), r.mark) for r in found]
     return Table("", ("requirement", "required", "achieved", "to spare", ""), cells, (0,))
 
 
-def paragraph(found: Sequence[Requirement]) -> str:
+def requirements_paragraph(found: Sequence[Requirement]) -> str:
     """What holds and what does not, a clause for each requirement."""
     failed = [r for r in found if not r.met]
     parts = [f"{len(found) - len(failed)} of {len(found)} requirements are met."]
     if failed:
-        parts.append(f"FAIL: {'; '.join(f'{r.name} {signed(r)}, by {r.because}' for r in failed)}.")
+        parts.append(f"FAIL: {'; '.join(f'{r.name} {margin_text(r)}, by {r.because}' for r in failed)}.")
     for mark in ("PASS", DERIVED):
         held = [r for r in found if r.mark == mark]
         if held:
-            parts.append(f"{mark[:1].upper() + mark[1:]}: {'; '.join(f'{r.name} {signed(r)}' for r in held)}.")
+            parts.append(f"{mark[:1].upper() + mark[1:]}: {'; '.join(f'{r.name} {margin_text(r)}' for r in held)}.")
     return " ".join((*parts, *filter(None, [derived_words(found)])))
 
 
@@ -60,29 +66,93 @@ def nearest(found: Sequence[Requirement]) -> Requirement:
     return min(found, key=order)
 
 
-def signed(r: Requirement) -> str:
+def margin_text(r: Requirement) -> str:
     """The margin with its sign."""
-    return quantities.signed(r.margin, r.unit)
+    return signed(r.margin, r.unit)
 
 
-def data(r: Requirement) -> dict[str, Any]:
+def requirement_data(r: Requirement) -> dict[str, Any]:
     """A requirement as plain data, in its own unit."""
-    return {
-        "name": r.name,
-        "unit": r.unit,
-        "required": r.required,
-        "actual": r.actual,
-        "margin": r.margin,
-        "met": r.met,
-        "mark": r.mark,
-        "derived": list(r.derived),
-        "limited_by": r.because,
-    }
+    found = fields(r, "name", "unit", "required", "actual", "margin", "met", "mark")
+    return {**found, "derived": list(r.derived), "limited_by": r.because}
 
 
-def warned(warnings: Sequence[str]) -> str:
+def first_warning(warnings: Sequence[str]) -> str:
     """The first warning in short, with how many there are; nothing without one."""
     if not warnings:
         return ""
     which = f"Warning 1 of {len(warnings)} (all by --verbose)" if len(warnings) > 1 else "Warning"
     return f"{which}: {warnings[0]}."
+
+
+# -------------------------------------------------------------------------------------------------------------- advice
+_MOST = 10.0  # times the power that there is: more of it is no advice
+
+
+def advice_for_links(study: LinkStudy, r: Requirement) -> str:
+    """What to change for a requirement of the links, as the end of a sentence, or nothing."""
+    m = study.file.mission
+    if r.unknown:
+        return ""
+    if r.subject == "cone":
+        return advice_for_cone(study, r)
+    if r.subject == "communication" and m.jitter is not None and _factor(r) > _MOST and max(m.jitter.rms_rad) > 0.0:
+        return _of_jitter(study, r)
+    return advice_for_power(getattr(m, r.subject), r, next(t for t in study.tornados if t.of.lower() == r.subject))
+
+
+def advice_for_cone(study: LinkStudy, r: Requirement) -> str:
+    """What to change for the beacon to cover its partner, or to hold the root sum square of the errors."""
+    p = study.open_loop
+    assert p is not None  # such a requirement has one
+    needed = p.confident_divergence_rad if r.unit == "%" else p.required_divergence_rad
+    return advise_at_least(r, "beacon.divergence", needed, "rad")
+
+
+def advice_for_power(beam: Beam, r: Requirement, tornado: link.Tornado) -> str:
+    """What to change for a margin: the transmit power, or what moves it most where that would be far too much."""
+    factor = _factor(r)
+    if factor <= _MOST:
+        return advise_at_least(r, f"{r.subject}.transmit_power", factor * beam.transmit_power_w, "W")
+    known = [s for s in tornado.swings if math.isfinite(s.swing_db) and not s.key.startswith("requirement.")]
+    return advise_change(r, known[0].key) if known else ""
+
+
+def _of_jitter(study: LinkStudy, r: Requirement) -> str:
+    solved = link_study.solve_key(study.file, "jitter.rms").solved.intervals
+    if not solved:
+        return advise_change(r, "jitter.rms")
+    return advise_at_most(r, "jitter.rms", solved[-1].high, "rad")
+
+
+def _factor(r: Requirement) -> float:
+    """How many times the power would just meet a margin."""
+    return float(10.0 ** (-r.margin / 10.0))
+
+
+# -------------------------------------------------------------------------------------------------------------- clauses
+def advise_change(r: Requirement, key: str, verb: str = "change") -> str:
+    """That a key moves a requirement."""
+    return f"; to {'move' if r.met else 'meet'} it, {verb} {key}"
+
+
+def advise_at_least(r: Requirement, key: str, value: float, unit: str) -> str:
+    """That a key meets a requirement from a value on, which is rounded so that it does."""
+    shown = format_quantity(_rounded(value, 1.0), unit)
+    return f"{advise_change(r, key)}, which may be {shown} at least" if r.met else _take(key, shown, "more")
+
+
+def advise_at_most(r: Requirement, key: str, value: float, unit: str) -> str:
+    """That a key meets a requirement up to a value, which is rounded so that it does."""
+    shown = format_quantity(_rounded(value, -1.0), unit)
+    return f"{advise_change(r, key)}, which may be {shown} at most" if r.met else _take(key, shown, "less")
+
+
+def _take(key: str, shown: str, further: str) -> str:
+    return f"; to meet it, take {key} = {shown} or {further}"
+
+
+def _rounded(value: float, sign: float) -> float:
+    """The value with three digits, the last one up for a sign of 1 and down for -1."""
+    step = 10.0 ** (math.floor(math.log10(value)) - 2)
+    return sign * math.ceil(sign * value / step - 1e-9) * step

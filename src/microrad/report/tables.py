@@ -24,6 +24,13 @@ def _texts(column: Column, digits: int) -> Sequence[str]:
     return ["" if text == "nan" else text for text in found] if "nan" in found else found
 
 
+class Rows(NamedTuple):
+    """Headings and rows of a table that has its title elsewhere."""
+
+    headings: tuple[str, ...]
+    rows: Sequence[tuple[str, ...]]
+
+
 class Table(NamedTuple):
     """A table with its title; the columns in ``broken`` give way where a line has no room for all."""
 

@@ -33,10 +33,10 @@ def budget(file: Path) -> Action:
     """The link budgets of a mission's file."""
     python = _joined(
         "from microrad import load_link, run_link_study",
-        "from microrad.report import budget_views",
+        "from microrad.report.links.budgets import links_text",
         "",
         f"study = run_link_study(load_link({str(file)!r}))",
-        f"print(budget_views.text(study, {_WIDTH}))",
+        f"print(links_text(study, {_WIDTH}))",
     )
     return Action(("budget", path_argument(file)), python)
 
@@ -45,10 +45,10 @@ def contacts(file: Path) -> Action:
     """Contacts with the relay and the ground, and what they deliver."""
     python = _joined(
         "from microrad import load_link, run_day_study, run_link_study",
-        "from microrad.report import day_views",
+        "from microrad.report.day.text import day_text",
         "",
         f"day = run_day_study(run_link_study(load_link({str(file)!r})))",
-        f"print(day_views.text(day, {_WIDTH}))",
+        f"print(day_text(day, {_WIDTH}))",
     )
     return Action(("contacts", path_argument(file)), python)
 
@@ -57,7 +57,7 @@ def design(file: Path) -> Action:
     """The controllers of the fine-pointing loop."""
     python = _joined(
         "from microrad import load_mission, mirror",
-        "from microrad.link.tracking_light import tracking_light_w",
+        "from microrad.link import tracking_light_w",
         "from microrad.loop import fine_pointing",
         "",
         f"mission = load_mission({str(file)!r})",
@@ -107,11 +107,11 @@ def _campaign(ledger: Path, function: str, arguments: str) -> str:
         "from pathlib import Path",
         "",
         f"from microrad import CampaignMeans, {function}, summarise_campaign",
-        "from microrad.report import campaign_words",
+        "from microrad.report.campaign.text import campaign_text",
         "",
         f"ledger = {_path(ledger)}",
         f"{function}({arguments}, CampaignMeans())",
-        f"print(campaign_words.text(summarise_campaign(ledger), {_WIDTH}))",
+        f"print(campaign_text(summarise_campaign(ledger), {_WIDTH}))",
     )
 
 
@@ -121,9 +121,9 @@ def campaign_report(ledger: Path, page: Path) -> Action:
         "from pathlib import Path",
         "",
         "from microrad import summarise_campaign",
-        "from microrad.report import campaign_page",
+        "from microrad.report.campaign.page import campaign_page",
         "",
-        f"text = campaign_page.html(summarise_campaign({_path(ledger)}))",
+        f"text = campaign_page(summarise_campaign({_path(ledger)}))",
         f'{_path(page)}.write_text(text, encoding="utf-8")',
     )
     arguments = ("campaign", "report", path_argument(ledger), path_argument(page), "--overwrite")

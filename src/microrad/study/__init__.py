@@ -1,1 +1,1 @@
-"""One mission to one verdict: the story, the paper's claims, other readings, what pointing costs, a contact in time."""
+"""One mission to one verdict: the whole study, the paper's claims, other readings, what pointing costs, one contact."""

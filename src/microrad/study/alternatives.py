@@ -1,7 +1,6 @@
 """What the verdict would be by other readings of what the paper leaves open, each changed alone."""
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, get_args
 
@@ -49,39 +48,34 @@ class Reading:
         return self.residual_rad <= q.pointing_error_rad and self.margin_db >= q.margin_db
 
 
-def others(m: Mission, residual: paper_cases.Run, parts: kept.Kept = kept.NOTHING) -> tuple[Reading, ...]:
-    """Every other reading that fits the mission; ``residual`` is the run that the verdict rests on.
+def other_readings(m: Mission, residual: paper_cases.Run, parts: kept.Kept = kept.NOTHING) -> tuple[Reading, ...]:
+    """Every other reading that fits the mission's other tables.
 
-    Those of the loop are simulated (PID + inverse at the mission's frequencies); the others read the same run anew.
+    Readings of the loop are simulated (PID + inverse at the mission's frequencies); the others read one run anew.
+
+    Args:
+        m: the mission as it is.
+        residual: the run that the verdict rests on.
+        parts: the runs of earlier studies that are kept.
     """
-    return tuple(_reading(m, key, other, residual, parts) for key, other in _choices(m))
-
-
-def _choices(m: Mission) -> Iterator[tuple[str, str]]:
-    """Keys with what else they could be, where that fits the other tables."""
+    found = []
     for key, table in _OPEN:
-        for other in get_args(table.model_fields[key.partition(".")[2]].annotation):
-            as_read = m.with_value(key, other)
-            if other not in (_given(m, key), UNUSED) and not [*as_read.problems(), *as_read.mirror.problems()]:
-                yield key, other
-
-
-def _given(m: Mission, key: str) -> str:
-    table, _, name = key.partition(".")
-    return str(getattr(getattr(m, table), name))
-
-
-def _reading(m: Mission, key: str, other: str, residual: paper_cases.Run, parts: kept.Kept) -> Reading:
-    as_read, run = m.with_value(key, other), residual
-    try:
-        if key in _SIMULATED:
-            cases = paper_cases.of(as_read, mirror.of(as_read))
-            run = parts.part(_largest, cases, as_read.requirement.residual_statistic)
-        left = paper_cases.residual_rad(as_read.requirement, as_read.conventions, run.trace)
-        margin_db = float(link.margin_of_error(link.of(as_read), left))
-    except ValueError as error:  # an unstable loop, a mirror without an inverse
-        return Reading(key, _given(m, key), other, math.nan, math.nan, str(error))
-    return Reading(key, _given(m, key), other, left, margin_db)
+        section, _, name = key.partition(".")
+        given = str(getattr(getattr(m, section), name))
+        for other in get_args(table.model_fields[name].annotation):
+            as_read, run = m.with_value(key, other), residual
+            if other in (given, UNUSED) or [*as_read.problems(), *as_read.mirror.problems()]:
+                continue
+            try:
+                if key in _SIMULATED:
+                    cases = paper_cases.of(as_read, mirror.of(as_read))
+                    run = parts.part(_largest, cases, as_read.requirement.residual_statistic)
+                left = paper_cases.residual_rad(as_read.requirement, as_read.conventions, run.trace)
+                margin_db = float(link.margin_of_error(link.of(as_read), left))
+                found.append(Reading(key, given, other, left, margin_db))
+            except ValueError as error:  # an unstable loop, a mirror without an inverse
+                found.append(Reading(key, given, other, math.nan, math.nan, str(error)))
+    return tuple(found)
 
 
 def _largest(cases: paper_cases.PaperCases, statistic: str) -> paper_cases.Run:

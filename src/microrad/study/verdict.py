@@ -7,16 +7,14 @@ from itertools import pairwise
 import numpy as np
 
 from microrad import link
-from microrad.core.arrays import Floats
 from microrad.link import pointing
+from microrad.link.pointing.outage import Performance
 from microrad.link.requirement import IMPOSSIBLE, Requirement, Subject, derived_from, outage_words
-from microrad.link.under_jitter import Performance
 from microrad.loop import sine_run
 from microrad.loop.fine_pointing import FinePointingStudy
 from microrad.loop.paper_cases import PID, PID_WITH_INVERSE, PaperCases, Run
 from microrad.mirror import MirrorParts, Variant, hysteresis
 from microrad.mirror import summary as mirror_summary
-from microrad.mission.file import LinkFile
 from microrad.mission.model import Amplifier, Source
 from microrad.mission.tables import mirror as mirror_table
 from microrad.mission.tables.link import LinkRequirement
@@ -128,16 +126,16 @@ class Evidence:
 
 def against_paper(e: Evidence) -> tuple[Claim, ...]:
     """Each printed claim in the order of the paper: those of its links on its own numbers, the others on this run."""
-    claims = [*_link_claims(paper.links()), _travel_claim(e)]
-    if e.cases.mirrors.table.linear is not None:
-        claims.append(_linear_claim(e.summary))
-    claims.append(_loops_claim(e.loops))
-    claims += [_worse_claim(e), *_drop_claims(e)]
-    if e.scan is not None:
-        claims.append(_together_claim(e.scan))
-    if e.day is not None:
-        claims += _day_claims(e.day)
-    return tuple(claims)
+    return (
+        *_link_claims(),
+        _travel_claim(e),
+        *([] if e.cases.mirrors.table.linear is None else [_linear_claim(e.summary)]),
+        _loops_claim(e.loops),
+        _worse_claim(e),
+        *_drop_claims(e),
+        *([] if e.scan is None else [_together_claim(e.scan)]),
+        *([] if e.day is None else _day_claims(e.day)),
+    )
 
 
 def _day_claims(day: day_study.DayStudy) -> list[Claim]:
@@ -183,8 +181,9 @@ def _minutes(time_s: float) -> str:
     return "never" if np.isinf(time_s) else f"{time_s / 60.0:.2g} min" if time_s >= 60.0 else f"{time_s:.2g} s"
 
 
-def _link_claims(links: LinkFile) -> tuple[Claim, ...]:
-    m, sources, data = links.mission, links.sources, link.of(links.mission)
+def _link_claims() -> tuple[Claim, ...]:
+    m, sources = paper.links().mission, paper.links().sources
+    data = link.of(m)
     open_loop = pointing.open_loop_budget(m.pointing, data.shared, m.beacon, sources)
     beacon = link.beam_budget("beacon", data.shared, m.beacon, sources).margin_db
     communication = link.communication_budget(data, sources).margin_db
@@ -266,7 +265,8 @@ def _pairs(e: Evidence, controller: str) -> list[tuple[Run, Run]]:
 
 def _worse_claim(e: Evidence) -> Claim:
     pairs = [p for p in _pairs(e, PID) if p[0].freq_hz in e.cases.scenario.pid_frequencies_hz]
-    added = [_rms(a.trace.error_rad[a.trace.steady] - b.trace.error_rad[b.trace.steady]) for a, b in pairs]
+    apart = [a.trace.error_rad[a.trace.steady] - b.trace.error_rad[b.trace.steady] for a, b in pairs]
+    added = [float(np.sqrt(np.mean(each**2))) for each in apart]
     ours = "; ".join(
         f"{a.freq_hz:g} Hz: peak {b.trace.peak_rad * 1e6:.1f} → {a.trace.peak_rad * 1e6:.1f} µrad, "
         f"difference {d * 1e6:.1f} µrad rms"
@@ -284,10 +284,6 @@ def _worse_claim(e: Evidence) -> Claim:
 
 def _agrees(holds: bool, judged: bool) -> str:
     return ("yes" if holds else "no") if judged else "not judged"
-
-
-def _rms(values: Floats) -> float:
-    return float(np.sqrt(np.mean(values**2)))
 
 
 def _drop_claims(e: Evidence) -> list[Claim]:

@@ -64,13 +64,14 @@ def kept(reader: ValueReader, raw: object, table: CampaignTable | None) -> tuple
     return tuple(name for name in OUTPUTS if name in raw)
 
 
-def with_tables(
-    reader: ValueReader, raw: object, keep: tuple[str, ...], missions: Sequence[LinkMission]
-) -> tuple[str, ...]:
-    """The outputs to keep, by default without the margin of a beam that the mission has not; it is refused if asked."""
+def with_tables(reader: ValueReader, raw: object, keep: tuple[str, ...], absent: Collection[str]) -> tuple[str, ...]:
+    """The outputs to keep, by default without the margin of a beam that the mission has not; it is refused if asked.
+
+    ``absent`` are tables that the mission of a cell has not.
+    """
     for name in ("beacon", "answer"):
         output = f"{name}_margin"
-        if output in keep and any(getattr(m, name) is None for m in missions):
+        if output in keep and name in absent:
             if raw is not None:
                 expected = f"a mission with [{name}], or this output left out"
                 reader.fault("keep", output, f"needs the mission's table [{name}]", expected)
@@ -78,10 +79,10 @@ def with_tables(
     return keep
 
 
-def check_day(reader: ValueReader, keep: Sequence[str], missions: Sequence[LinkMission]) -> None:
+def check_day(reader: ValueReader, keep: Sequence[str], absent: Collection[str]) -> None:
     """Outputs of the day only from missions that have a day."""
     day = [name for name in keep if OUTPUTS[name].group == "day"]
-    if day and any(m.orbit is None or m.operations is None for m in missions):
+    if day and not {"orbit", "operations"}.isdisjoint(absent):
         expected = "a mission with [orbit] and [operations], which microrad init writes, or these outputs left out"
         reader.fault("keep", day, "needs the mission's tables [orbit] and [operations]", expected)
 

@@ -150,11 +150,13 @@ class _DefinitionReader:
     ) -> CampaignFile | None:
         """The record, where everything in it fits together."""
         missions, required = [cell.file.mission for cell in cells], nominal.file.mission.requirement
-        keep = checks.with_tables(self.reader, self.document.data.get("keep"), keep, missions)
+        optional = ("beacon", "answer", "orbit", "operations")
+        absent = [name for name in optional if any(getattr(m, name) is None for m in missions)]
+        keep = checks.with_tables(self.reader, self.document.data.get("keep"), keep, absent)
         varying = [draw.key for draw in draws if any(touches_loop(draw.key, m) for m in missions)]
         if table.loop is not None:
             checks.check_loop(self.reader, table.loop, missions)
-        checks.check_day(self.reader, keep, missions)
+        checks.check_day(self.reader, keep, absent)
         checks.check_tail(self.reader, table, varying, self.document.data)
         checks.check_minimise(self.reader, table)
         limits = () if table.tail is not None else self._limits(keep, required)

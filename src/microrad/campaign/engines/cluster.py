@@ -20,7 +20,7 @@ from hashlib import sha256
 from queue import Empty, SimpleQueue
 from typing import Any
 
-from microrad.campaign.engines.threads import SLICE_S, Clock, Flight, JobQueue, late_flights, late_reason
+from microrad.campaign.engines.flights import SLICE_S, Clock, Flight, JobQueue, late_flights, late_reason
 from microrad.campaign.engines.worker import (
     Beat,
     Kind,

@@ -58,7 +58,7 @@ class Head:
     bundle: bytes = field(repr=False)
 
 
-class Blob(NamedTuple):
+class Unpacked(NamedTuple):
     """What bytes hold: a header of JSON values, arrays by name in their order, and bytes that nobody looks into."""
 
     header: dict[str, Any]
@@ -141,12 +141,12 @@ def pack(kind: str, header: Mapping[str, Any], arrays: Mapping[str, Floats], res
     text = json.dumps({"arrays": table, "rest": len(rest), "header": header}, sort_keys=True, allow_nan=False)
     words = text.encode("utf-8", "surrogatepass")
     parts = [_PREFIX.pack(_MAGIC, VERSION, _KINDS[kind], len(words)), words]
-    parts += [_middle(array.ravel(), *ends[name]).tobytes() for name, array in values.items()]
+    parts += [array.ravel()[_held(array.size, *ends[name])].tobytes() for name, array in values.items()]
     body = b"".join([*parts, rest])
     return body + hashlib.sha256(body).digest()
 
 
-def unpack(kind: str, data: bytes) -> Blob:
+def unpack(kind: str, data: bytes) -> Unpacked:
     """What `pack` made bytes of; the arrays are copies. Raises `CampaignError` for damaged or other bytes."""
     _check(kind, data)
     body = memoryview(data)[:-_DIGEST]
@@ -158,10 +158,13 @@ def unpack(kind: str, data: bytes) -> Blob:
         _check_sizes(table["arrays"])
         for name, shape, lead, trail in table["arrays"]:
             size = math.prod(shape)
-            stored = _stored(size, lead, trail)
-            arrays[name] = _whole(np.frombuffer(body, "<f8", stored, at), size, lead, trail).reshape(shape)
-            at += 8 * stored
-        return Blob(dict(table["header"]), arrays, bytes(body[at : at + table["rest"]]))
+            held = _held(size, lead, trail)
+            stored, whole = np.frombuffer(body, "<f8", held.stop - held.start, at), np.empty(size)
+            if size:
+                whole[: held.start], whole[held], whole[held.stop :] = stored[0], stored, stored[-1]
+            arrays[name] = whole.reshape(shape)
+            at += stored.nbytes
+        return Unpacked(dict(table["header"]), arrays, bytes(body[at : at + table["rest"]]))
 
 
 @contextmanager
@@ -204,20 +207,6 @@ def _ends(bits: "np.ndarray[Any, np.dtype[np.uint64]]") -> tuple[int, int]:
     return (int(other[0]), int(bits.size - other[-1])) if other.size else (int(bits.size), 0)
 
 
-def _middle(flat: Floats, lead: int, trail: int) -> Floats:
-    """The array with one value left of each of its runs."""
-    return flat[max(lead - 1, 0) : flat.size - max(trail - 1, 0)]
-
-
-def _stored(size: int, lead: int, trail: int) -> int:
-    """How many values of an array are stored."""
-    return size - max(lead - 1, 0) - max(trail - 1, 0)
-
-
-def _whole(stored: Floats, size: int, lead: int, trail: int) -> Floats:
-    """The array whose runs were left out."""
-    whole = np.empty(size)
-    if size:
-        first, last = max(lead - 1, 0), size - max(trail - 1, 0)
-        whole[:first], whole[first:last], whole[last:] = stored[0], stored, stored[-1]
-    return whole
+def _held(size: int, lead: int, trail: int) -> slice:
+    """The part of an array that is stored: with one value left of the run at each end."""
+    return slice(max(lead - 1, 0), size - max(trail - 1, 0))

@@ -5,7 +5,7 @@ The log needs shared memory, so the file must be on a disk of this machine, not 
 writes: it holds a lock on the empty file ``<ledger>.lock``, which the operating system drops however the process ends;
 the file itself stays, since taking it away would let two writers pass each other. Anybody may read meanwhile.
 
-The file itself is in `ledger_file`; checks of every byte and mending are in `mending`.
+The file itself is in `file`; checks of every byte and mending are in `mending`.
 """
 
 import json

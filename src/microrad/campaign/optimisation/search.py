@@ -19,13 +19,13 @@ unless a number lies within some 1e-12 of where its digits turn.
 """
 
 import contextlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from microrad.campaign.optimisation.candidates import Candidate, Problem, judged, percent, quantity_text
-from microrad.campaign.records import CampaignError, Limit
+from microrad.campaign.records import CampaignError
 from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
 from microrad.loop import control
@@ -207,9 +207,8 @@ class _Search:
             self.at(place)
         seen = [candidate for _, candidate in self.accepted]
         self.cost_scale = _spread([c.cost for c in seen])
-        self.scales = np.array(
-            [_spread([c.kept[i].excess for c in seen], _bounds(x)) for i, x in enumerate(self.problem.limits)]
-        )
+        bounds = [[bound for bound in (x.least, x.most) if bound is not None] for x in self.problem.limits]
+        self.scales = np.array([_spread([c.kept[i].excess for c in seen], x) for i, x in enumerate(bounds)])
 
     def starts(self) -> list[Floats]:
         """Places to set out from, the most promising first, no two close together."""
@@ -261,7 +260,7 @@ def _distance(place: Floats, other: Floats) -> float:
     return float(np.linalg.norm(place - other))
 
 
-def _spread(numbers: list[float], bounds: tuple[float, ...] = ()) -> float:
+def _spread(numbers: list[float], bounds: Sequence[float] = ()) -> float:
     """Distance of the quartiles, or of the extremes where these agree; where all agree the largest size, or 1."""
     finite = np.array([x for x in numbers if np.isfinite(x)])
     for share in (0.25, 0.0):
@@ -270,10 +269,6 @@ def _spread(numbers: list[float], bounds: tuple[float, ...] = ()) -> float:
             return width
     # not 1 at once: in SI units what no variable moves may be a millionth of it, and would look like being on the limit
     return max(map(abs, (*finite.tolist(), *bounds)), default=0.0) or 1.0
-
-
-def _bounds(limit: Limit) -> tuple[float, ...]:
-    return tuple(bound for bound in (limit.least, limit.most) if bound is not None)
 
 
 # ------------------------------------------------------------------------------------------------------------- the end

@@ -11,8 +11,8 @@ from microrad import link
 from microrad.campaign.definition.outputs import OUTPUTS
 from microrad.core import kernels
 from microrad.core.arrays import Floats
+from microrad.link.pointing.outage import Exposure, stated_outage
 from microrad.link.requirement import IMPOSSIBLE
-from microrad.link.under_jitter import Exposure, stated_outage
 from microrad.loop import fine_pointing
 from microrad.loop.fine_loop import ensemble
 from microrad.mission.file import LinkFile
@@ -123,6 +123,6 @@ def _day(file: LinkFile, under: Exposure) -> "day_study.Way":
     from microrad.link import study as link_study
     from microrad.orbit import day as day_study
 
-    links = link_study.run(file)
+    links = link_study.run_link_study(file)
     loss = day_study.PointingLoss(under.outage_loss_db, under.short_of(0.0), "campaign")
     return day_study.relay(links, loss)

@@ -10,13 +10,14 @@ import numpy as np
 
 from microrad.campaign.definition.records import CampaignFile
 from microrad.campaign.records import CampaignError, Chunk, Failed, WorstTrace
-from microrad.campaign.rows import evaluate, importance_sampling, loops, sampling
+from microrad.campaign.rows import evaluate, importance_sampling, sampling
+from microrad.campaign.rows.loops import MissionLoop, mission_loop
 from microrad.campaign.rows.missions import MissionBuilder
 from microrad.core import kernels
 from microrad.core.arrays import Floats
 from microrad.loop.control import AxisController
 from microrad.loop.fine_loop import ensemble
-from microrad.loop.fine_loop.loop import LoopController, PointingLoop
+from microrad.loop.fine_loop.loop import LoopController
 from microrad.mission.file import LinkFile
 
 Beat = Callable[[], None]
@@ -207,43 +208,38 @@ class Evaluator:
         key = (drawn.keys[group.start], rows)
         if self.memory is not None and key in self.memory:
             return self.memory[key]
-        loop, span = self._loop(file)
-        controller = self.controller(drawn.cell)
+        own, controller = self._loop(file), self.controller(drawn.cell)
         if self.campaign.table.tail is not None:
             by, firsts = self._proposal(drawn.cell), range(rows.start, rows.stop, kernels.LANES)
-            parts = [importance_sampling.runs(loop, controller, span, by, first, watch) for first in firsts]
+            parts = [importance_sampling.runs(own.row, controller, own.span, by, first, watch) for first in firsts]
             radius, log_weight = (np.concatenate(each)[: len(rows)] for each in zip(*parts, strict=True))
             return _Weighted(rows.start, radius, log_weight)
         each = self.campaign.realisations
         first, count = rows.start * each, len(rows) * each  # the numbers of the runs follow the rows'
-        runs = ensemble.run(loop, controller, span, count, first_run=first, threads=1, beat=watch)
+        runs = ensemble.run(own.row, controller, own.span, count, first_run=first, threads=1, beat=watch)
         found = Simulated(rows.start, each, runs)
         if self.memory is not None:
             self.memory[key] = found
         return found
 
-    def _loop(self, file: LinkFile) -> tuple[PointingLoop, ensemble.Span]:
-        """The loop of a mission, and how long its runs are."""
+    def _loop(self, file: LinkFile) -> MissionLoop:
         table = self.campaign.table.loop
         assert table is not None
-        return loops.row_loop(file, table), loops.span(self.campaign, file)
+        return mission_loop(file, table, self.campaign.table.seed)
 
     def controller(self, cell: int) -> LoopController:
         """The controller of a cell, on the cell's own mission."""
         if cell not in self._cell_controllers:
-            table = self.campaign.table.loop
-            assert table is not None
-            file = self.builder.mission(cell, self.fixed)
-            self._cell_controllers[cell] = loops.cell_controller(file, table, self.controllers[cell])
+            own = self._loop(self.builder.mission(cell, self.fixed))
+            self._cell_controllers[cell] = own.controller(self.controllers[cell])
         return self._cell_controllers[cell]
 
     def _proposal(self, cell: int) -> importance_sampling.Proposal:
         if cell not in self._proposals:
             wanted = self.campaign.table.tail
             assert wanted is not None
-            loop, span = self._loop(self.builder.mission(cell, self.fixed))
-            controller = self.controller(cell)
-            self._proposals[cell] = importance_sampling.proposal(loop, controller, span, wanted.error_rad)
+            own, controller = self._loop(self.builder.mission(cell, self.fixed)), self.controller(cell)
+            self._proposals[cell] = importance_sampling.proposal(own.row, controller, own.span, wanted.error_rad)
         return self._proposals[cell]
 
     def trace(self, cell: int, row: int, beat: Beat) -> WorstTrace:
@@ -252,9 +248,9 @@ class Evaluator:
         if isinstance(file, str):
             raise CampaignError(file)
         beat()
-        loop, span = self._loop(file)
-        found = ensemble.trace(loop, self.controller(cell), span, row * self.campaign.realisations)
-        settled = found.time_s >= span.settle_s
+        own = self._loop(file)
+        found = ensemble.trace(own.row, self.controller(cell), own.span, row * self.campaign.realisations)
+        settled = found.time_s >= own.span.settle_s
         return WorstTrace(
             cell, row, "", math.nan, found.time_s[settled], found.error_rad[settled], found.drive_v[settled]
         )

@@ -5,9 +5,10 @@ the campaign begins. No number depends on that.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from microrad.campaign.definition.records import CampaignFile
+from microrad.campaign.definition.tables import LoopTable
 from microrad.campaign.records import Job
 from microrad.campaign.rows import loops
 from microrad.core import kernels
@@ -25,12 +26,14 @@ class Plan:
 
     ``chunk_rows`` are the rows in a chunk: a power of two, about a second of work. ``largest_chunk`` are those as far
     as the file says it: a power of two that holds whole chunks. ``rounds`` are the rows of a cell at the end of each
-    round, rising: one round, or more until a wanted precision is reached.
+    round, rising: one round, or more until a wanted precision is reached. ``is_timed``: what a row costs does not
+    follow from the file, as it is for links alone, by their beams and receivers.
     """
 
     chunk_rows: int
     largest_chunk: int
     rounds: tuple[int, ...]
+    is_timed: bool
 
     def chunks(self, cell: int, rows: int) -> list[Job]:
         """The chunks that the first ``rows`` rows of a cell are in."""
@@ -40,39 +43,30 @@ class Plan:
         """The rows of a chunk; the last one of a campaign may be shorter."""
         return range(number * self.chunk_rows, min((number + 1) * self.chunk_rows, self.rounds[-1]))
 
+    def timed_chunk(self, row_s: float) -> int:
+        """Rows in a chunk where each takes so long (s)."""
+        return min(1 << int(math.log2(max(_CHUNK_S / max(row_s, 1e-9), 1.0))), self.largest_chunk)
+
 
 def planned(campaign: CampaignFile) -> Plan:
     """The plan of a campaign."""
-    largest = _largest_chunk(campaign)
-    return Plan(campaign.chunk_rows or largest, largest, _rounds(campaign, largest))
-
-
-def is_timed(campaign: CampaignFile) -> bool:
-    """Whether what a row costs does not follow from the file: that of links alone, by their beams and receivers."""
-    return campaign.table.loop is None and not _has_day(campaign)
-
-
-def timed(campaign: CampaignFile, row_s: float) -> CampaignFile:
-    """The campaign with chunks of rows that take this long each."""
-    rows = 1 << int(math.log2(max(_CHUNK_S / max(row_s, 1e-9), 1.0)))
-    return replace(campaign, chunk_rows=min(rows, _largest_chunk(campaign)))
-
-
-def _has_day(campaign: CampaignFile) -> bool:
-    return any(output.group == "day" for output in campaign.outputs)
-
-
-def _largest_chunk(campaign: CampaignFile) -> int:
+    has_day = any(output.group == "day" for output in campaign.outputs)
     few = 1 << int(math.log2(campaign.rows))
-    if _has_day(campaign):
-        return min(_DAY_ROWS, few)
-    if campaign.table.loop is None:
-        return min(_CHUNK_ROWS, few)
-    own = campaign.realisations
+    if campaign.table.loop is not None and not has_day:
+        largest = _rows_of_a_second(campaign, campaign.table.loop, few)
+    else:
+        largest = min(_DAY_ROWS if has_day else _CHUNK_ROWS, few)
+    is_timed = campaign.table.loop is None and not has_day
+    return Plan(campaign.chunk_rows or largest, largest, _rounds(campaign, largest), is_timed)
+
+
+def _rows_of_a_second(campaign: CampaignFile, table: LoopTable, few: int) -> int:
+    """Rows that are simulated in about a second, a power of two: ``few`` at most, but whole batches of the loop."""
+    own, f = campaign.realisations, loops.settings(campaign.mission)
     lanes = kernels.LANES * math.ceil(own / kernels.LANES) if campaign.loop_varies else own
-    span_s, step_s = loops.span(campaign, campaign.mission).duration_s, loops.settings(campaign.mission).plant_step_s
+    steps = loops.span(table, f, campaign.table.seed).duration_s / f.plant_step_s * lanes
     full = 1 if campaign.loop_varies else math.ceil(kernels.LANES / own)  # rows that fill the lanes of a batch
-    wanted = max(_CHUNK_STEPS / (span_s / step_s * lanes), 1.0)
+    wanted = max(_CHUNK_STEPS / steps, 1.0)
     return max(min(1 << int(math.log2(wanted)), _CHUNK_ROWS, few), 1 << math.ceil(math.log2(full)))
 
 

@@ -76,8 +76,9 @@ class Interim:
         cells = [fold.summary(()) for fold in self._folds]
         shown = min(range(len(cells)), key=lambda number: _order(cells[number]))
         cells[shown] = self._folds[shown].summary(QUANTILES)
-        done = sum(fold.rows for fold in self._folds) + unread * planned(campaign).chunk_rows
-        pace = summary.progress(campaign, done, notes, written=True)
+        plan = planned(campaign)
+        done = sum(fold.rows for fold in self._folds) + unread * plan.chunk_rows
+        pace = summary.progress(done, plan.rounds[0] * len(cells), notes, written=True)
         return summary.assembled(head, campaign, self._folds, cells, pace)
 
 

@@ -10,12 +10,14 @@ import numpy as np
 
 from microrad.campaign import bundle
 from microrad.campaign.definition.records import CampaignFile
+from microrad.campaign.definition.tables import LoopTable
 from microrad.campaign.ledger import Head, Ledger, is_written
 from microrad.campaign.records import (
     CampaignSummary,
     CellSummary,
     Chunk,
     Job,
+    Limit,
     Progress,
     Sensitivity,
     WorstTrace,
@@ -40,12 +42,13 @@ def summarise_campaign(path: Path) -> CampaignSummary:
         plan = planned(campaign)
         sample = _Sample(book, plan)
         folds = [_folded(campaign, plan, number, sample.passing(number)) for number in range(len(campaign.cells))]
-        pace = progress(campaign, sum(fold.rows for fold in folds), notes, is_written(path))
+        first_round = plan.rounds[0] * len(campaign.cells)
+        pace = progress(sum(fold.rows for fold in folds), first_round, notes, is_written(path))
         return replace(
             assembled(head, campaign, folds, [fold.summary() for fold in folds], pace),
             sensitivities=_sensitivities(campaign, plan, book),
             sample=sample.columns(),
-            worst=_worst_first(campaign, book.traces()),
+            worst=_worst_first(campaign.limits, book.traces()),
         )
 
 
@@ -74,7 +77,7 @@ def assembled(
         hashes=head.hashes,
         seed=head.seed,
         sampling=campaign.table.sampling,
-        loop=_loop_words(campaign),
+        loop="" if campaign.table.loop is None else _loop_words(campaign.table.loop, campaign.realisations),
         inputs=campaign.inputs,
         fixed=campaign.fixed,
         limits=campaign.limits,
@@ -89,19 +92,19 @@ def assembled(
     )
 
 
-def progress(campaign: CampaignFile, done: int, notes: Mapping[str, object], written: bool) -> Progress:
+def progress(done: int, first_round: int, notes: Mapping[str, object], written: bool) -> Progress:
     """How far a campaign is.
 
     Args:
-        campaign: the campaign.
         done: rows in its ledger.
+        first_round: rows of its first round, in all cells.
         notes: what its ledger notes.
         written: whether a process writes to it.
     """
     seconds, state = float(str(notes.get("seconds", 0.0))), str(notes.get("state", "waiting"))
     if state == "running" and not written:  # whoever ran it was killed
         state = "stopped"
-    total = done if state == "complete" else max(done, planned(campaign).rounds[0] * len(campaign.cells))
+    total = done if state == "complete" else max(done, first_round)
     rate = done / seconds if seconds > 0.0 else math.nan
     left = (total - done) / rate if rate > 0.0 else math.nan
     assert state in {"waiting", "running", "stopped", "complete"}
@@ -172,8 +175,8 @@ def _sensitivities(campaign: CampaignFile, plan: Plan, book: Ledger) -> tuple[Se
     return tuple(sensitivity({name: columns[name] for name in drawn}, columns[name], name) for name in names)
 
 
-def _worst_first(campaign: CampaignFile, traces: tuple[WorstTrace, ...]) -> tuple[WorstTrace, ...]:
-    sign = -1.0 if campaign.limits and campaign.limits[0].most is not None else 1.0
+def _worst_first(limits: Sequence[Limit], traces: Sequence[WorstTrace]) -> tuple[WorstTrace, ...]:
+    sign = -1.0 if limits and limits[0].most is not None else 1.0
     return tuple(sorted(traces, key=lambda trace: (trace.cell, sign * trace.value, trace.row)))
 
 
@@ -201,10 +204,7 @@ def _warnings(campaign: CampaignFile, folds: Sequence[CellFold]) -> tuple[str, .
     return tuple(found)
 
 
-def _loop_words(campaign: CampaignFile) -> str:
-    table = campaign.table.loop
-    if table is None:
-        return ""
+def _loop_words(table: LoopTable, runs: int) -> str:
     axes = "one axis" if table.axes == "one" else "both axes"
     mirror = "" if table.mirror is Variant.GIVEN else f", mirror: {table.mirror}"
-    return f"{table.controller}, {axes}{mirror}, {campaign.realisations} run{'s'[: campaign.realisations > 1]} a row"
+    return f"{table.controller}, {axes}{mirror}, {runs} run{'s'[: runs > 1]} a row"

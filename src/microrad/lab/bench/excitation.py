@@ -17,7 +17,7 @@ from microrad.lab.recording.records import frozen
 from microrad.mission.fields import Problem, ProblemsError
 
 MOST_SAMPLES = 20_000_000
-"""Samples of one record, all drives together, beyond which a duration is taken for a slip of the pen."""
+"""Samples of one record, all drives together, beyond which a duration is taken for a mistake."""
 
 _WHOLE = 1e-6  # how far, in samples, a whole number of them may be off
 _ROUNDING = 1e-9  # how far, relatively, a limit may be passed by rounding
@@ -101,9 +101,20 @@ def logarithmic_chirp(
     axis: int = 0,
     name: str = "chirp",
 ) -> Excitation:
-    """u = offset + amplitude sin(phase), its frequency growing exponentially in time from `start_hz` to `stop_hz`.
+    """u = offset + amplitude sin(phase), its frequency growing exponentially in time.
 
-    Drives input `axis` (from 0); the others rest at the offset. Raises `DesignError`.
+    Args:
+        limits: Those of the bench.
+        start_hz: First frequency.
+        stop_hz: Last frequency.
+        duration_s: Length.
+        amplitude_v: Amplitude about the offset.
+        offset_v: Where all other inputs rest.
+        axis: Number of the input that is driven, from 0.
+        name: Name of the record.
+
+    Raises:
+        DesignError: If the drive leaves the limits or contradicts itself.
     """
     samples = _samples(limits, name, "duration", duration_s)
     if not start_hz < stop_hz:
@@ -132,12 +143,25 @@ def multisine(
     seed: int,
     name: str = "multisine",
 ) -> tuple[Excitation, ...]:
-    """Flat multisines with random phases, one record a realisation; each input has `rms_v` about the offset.
+    """Flat multisines with random phases, one record a realisation.
 
     With n inputs the realisations come in groups of n, orthogonal at every line: input i has the phase
     phi_i(line) + 2 pi e i / n in realisation e of its group, a column of the unitary discrete Fourier matrix
     (T. Dobrowiecki, J. Schoukens and P. Guillaume, IEEE Trans. Instrum. Meas. 55, 2006). Each record begins where its
-    inputs are nearest to rest: a common delay changes neither spectrum nor orthogonality. Raises `DesignError`.
+    inputs are nearest to rest: a common delay changes neither spectrum nor orthogonality.
+
+    Args:
+        limits: Those of the bench.
+        lines: The harmonics.
+        rms_v: Rms of each input about the offset.
+        offset_v: The offset.
+        periods: Periods of each record.
+        realisations: Number of records, a multiple of the inputs.
+        seed: Seed of the phases.
+        name: Name of the records, before the number of the realisation.
+
+    Raises:
+        DesignError: If the drive leaves the limits or contradicts itself.
     """
     length = _whole_period(limits, name, lines.period_s)
     _samples(limits, name, "periods", periods * lines.period_s)
@@ -177,9 +201,19 @@ def growing_sines(
     axis: int = 0,
     name: str = "sines",
 ) -> Excitation:
-    """u = offset + amplitude sin(2 pi f t), `periods` whole periods at each amplitude, one behind the other.
+    """u = offset + amplitude sin(2 pi f t), whole periods at each amplitude, one behind the other.
 
-    The periods at an amplitude must fill a whole number of samples. Raises `DesignError`.
+    Args:
+        limits: Those of the bench.
+        freq_hz: Frequency.
+        amplitudes_v: The amplitudes.
+        periods: Periods at each; they must fill a whole number of samples.
+        offset_v: Where all other inputs rest.
+        axis: Number of the input that is driven, from 0.
+        name: Name of the record.
+
+    Raises:
+        DesignError: If the drive leaves the limits or contradicts itself.
     """
     block = _whole_block(limits, name, freq_hz, periods)
     _samples(limits, name, "periods", block * len(amplitudes_v) / limits.rate_hz)
@@ -203,9 +237,18 @@ def staircase(
     axis: int = 0,
     name: str = "staircase",
 ) -> Excitation:
-    """Levels held for `dwell_s` each, joined by straight ramps of `rise_s`; the mirror rests at the first one.
+    """Levels joined by straight ramps; the mirror rests at the first one. A single step is two levels.
 
-    A single step is two levels. Raises `DesignError`.
+    Args:
+        limits: Those of the bench.
+        levels_v: The levels.
+        dwell_s: Time at each level.
+        rise_s: Time from one level to the next.
+        axis: Number of the input that is driven, from 0.
+        name: Name of the record.
+
+    Raises:
+        DesignError: If the drive leaves the limits or contradicts itself.
     """
     if len(levels_v) < 2:
         raise DesignError(name, Problem("levels", "has one item, which is no step", "at least two levels"))

@@ -25,9 +25,15 @@ _NO_CLOCK = ("1904/01/01", "00:00:00")  # the virtual bench has none: LabVIEW's 
 
 
 def write_file(recording: Recording, form: str, folder: Path) -> Path:
-    """Write a recording in one of `FORMATS` under its own name (its `path`), and return the file's path.
+    """Write a recording under its own name (its `path`), and return the file's path.
 
-    Raises `BenchError` where the format's library is not installed.
+    Args:
+        recording: The recording.
+        form: One of `FORMATS`.
+        folder: Where the file goes.
+
+    Raises:
+        BenchError: If the format's library is not installed.
     """
     suffix, writer = _WRITERS[form]
     path = folder / f"{recording.path}{suffix}"
@@ -250,7 +256,12 @@ def _manifest(plan: Plan, seed: int, entries: list[dict[str, Any]], draft: Path)
 
 
 def check_folder(folder: Path, overwrite: bool) -> None:
-    """Raise `FolderError` when `folder` holds something that must not be replaced."""
+    """Raises FolderError if `folder` holds something that must not be replaced.
+
+    Args:
+        folder: The folder to write.
+        overwrite: Whether a folder that a bench wrote may be replaced.
+    """
     check(folder, overwrite, "plan", "recordings")
 
 

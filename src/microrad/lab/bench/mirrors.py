@@ -127,12 +127,19 @@ def bench_output(
 ) -> Floats:
     """Angle of the bench's own mirror (mrad) at the samples of a drive that is held between them.
 
-    Before the first sample the mirror rests at `rest_v`, see `BenchMirror.at_rest`. While the drive moves the mirror
-    is stepped by at most `fine_step_s`: the amplifier's answer within a sample is an exponential, and the dynamics
-    behind it have their resonance at 2.5 kHz, so a straight line from sample to sample would not do. Where drive and
-    amplifier stand still a sample is a step, which is exact.
+    While the drive moves the mirror is stepped finely: the amplifier's answer within a sample is an exponential, and
+    the dynamics behind it have their resonance at 2.5 kHz, so a straight line from sample to sample would not do. Where
+    drive and amplifier stand still a sample is a step, which is exact.
+
+    Args:
+        drive: The drive (V), shape (samples,).
+        rest_v: Where the mirror rests before the first sample, see `BenchMirror.at_rest`.
+        rate_hz: Samples per second.
+        amplifier: The amplifier before the mirror.
+        mirror: The mirror; by default that of the bench.
+        fine_step_s: Longest step while the drive moves.
     """
-    from scipy.signal import lfilter  # slow to import, not needed to show help
+    from scipy.signal import lfilter
 
     mirror = mirror or BenchMirror()
     run = _MirrorState(mirror, amplifier, rest_v, 1.0 / rate_hz)

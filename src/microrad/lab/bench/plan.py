@@ -81,7 +81,7 @@ class LimitsTable(Table):
     samples_per_period: Annotated[float, Quantity("", above=2.0)] = Field(description="at the highest frequency")
 
     def problems(self) -> Iterator[Problem]:
-        """A range that goes up."""
+        """The range must go up."""
         if not self.drive_min_v < self.drive_max_v:
             low = format_quantity(self.drive_min_v, "V")
             yield Problem("drive_max", f"is not above drive_min ({low})", f"a voltage above {low}")
@@ -97,7 +97,7 @@ class ConvertersTable(Table):
     output_max_rad: Annotated[float, Quantity("rad", "mrad")] = Field(alias="output_max")
 
     def problems(self) -> Iterator[Problem]:
-        """Ranges that go up."""
+        """The ranges must go up."""
         for name, low, high, unit in (
             ("drive", self.drive_min_v, self.drive_max_v, "V"),
             ("output", self.output_min_rad, self.output_max_rad, "rad"),
@@ -116,7 +116,7 @@ class SensorTable(Table):
     drift_rad_s: Annotated[float, Quantity("rad/s", "nrad/s")] = Field(alias="drift", description="of the zero")
 
     def problems(self) -> Iterator[Problem]:
-        """Noise said once."""
+        """Noise must be given once."""
         if (self.noise_rad is None) == (self.noise_share is None):
             found = "are both missing" if self.noise_rad is None else "are both given"
             yield Problem("", f"noise and noise_share {found}", 'one of them: noise = "1 urad" or noise_share = 0.03')
@@ -253,7 +253,7 @@ class PlanTable(Table):
     excitation: dict[str, Any] = Field(description="tables [excitation.NAME], each with its kind")
 
     def problems(self) -> Iterator[Problem]:
-        """Drives that converters and amplifier can follow."""
+        """Converters and amplifier must be able to follow the drives."""
         limits, converters, amplifier = self.limits, self.bench.converters, self.bench.amplifier
         ranges = (
             ("the converters", converters.drive_min_v, converters.drive_max_v),
@@ -338,7 +338,7 @@ def packaged_plans() -> tuple[str, ...]:
 def load_plan(path: str | Path) -> Plan:
     """Read a plan file, or a packaged plan by its name where no such file exists, and design its excitations.
 
-    Raises `PlanError` with every fault: what is no TOML, no key, no quantity, and each excitation that leaves a limit.
+    Raises PlanError with every fault: what is no TOML, an unknown key, no quantity, an excitation that leaves a limit.
     """
     if not Path(path).exists() and str(path) in packaged_plans():
         with resources.as_file(resources.files("microrad.lab") / "plans" / f"{path}.toml") as packaged:

@@ -55,7 +55,7 @@ def play(plan: Plan, seed: int, on_progress: Progress | None = None) -> tuple[Re
         on_progress: Called with the records done, their number and the name of the next one.
 
     Raises:
-        BenchError: When an output leaves the range of its converter.
+        BenchError: If an output leaves the range of its converter, or if the seed is negative.
     """
     return tuple(recording for _, recording in play_records(plan, seed, on_progress))
 
@@ -124,7 +124,7 @@ def _sensor_error(plan: Plan, record: Record, angle: Floats, seed: int) -> Float
 
 
 def _check_range(plan: Plan, record: Record, measured: Floats) -> None:
-    """Raises `BenchError` for an output that its converter would clip: a clipped record is of no use."""
+    """Raises BenchError if the converter would clip the output: a clipped record is of no use."""
     table = plan.bench.converters
     low, high = float(measured.min()) / _MRAD, float(measured.max()) / _MRAD
     if low < table.output_min_rad or high > table.output_max_rad:

@@ -1,9 +1,9 @@
 """Recordings of a mirror to a mirror model with its uncertainty.
 
-`identify` runs the whole ladder: frequency response, linear part, hysteresis and creep, alone and together, judged on
-samples that no fit has seen; `mirror_file_text` writes the result for a mission. Inside, drives are in volts and
-outputs in radians. Its steps stand alone too, for any number of inputs and outputs and in any units: see the folders
-`linear`, `hysteresis` and `stiffness`.
+`identify` fits all models and chooses one of them (`selection`), by samples that no fit has seen; `mirror_file_text`
+writes it for a mission. Drives are in volts there and outputs in radians. The steps stand alone too: `linear` for the
+linear part and `stiffness` for hysteretic stiffness, both for any number of inputs and outputs and in any units, and
+`hysteresis` for the hysteresis of one axis.
 """
 
 from microrad.lab.identify.hysteresis.bouc_wen import BoucWenFit, fit_bouc_wen

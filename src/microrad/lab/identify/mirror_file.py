@@ -15,11 +15,12 @@ from microrad.core.arrays import Floats
 from microrad.lab.identify.hysteresis.bouc_wen import PARAMETERS, BoucWenFit, sign_reversed
 from microrad.lab.identify.hysteresis.joint import JointFit
 from microrad.lab.identify.hysteresis.prandtl_ishlinskii import PrandtlIshlinskiiFit
-from microrad.lab.identify.hysteresis.structures import LinearPoles, propagated
-from microrad.lab.identify.records import IdentificationError, centred, correlation, si_records
+from microrad.lab.identify.hysteresis.structures import LinearPoles
+from microrad.lab.identify.records import IdentificationError, centred, si_records
 from microrad.lab.identify.selection.choice import Identification
 from microrad.lab.identify.selection.predictions import Fit
 from microrad.lab.identify.selection.warnings import fit_warnings
+from microrad.lab.identify.statistics import central_differences, correlation, propagated
 from microrad.mirror.hysteresis import BoucWen, Play, scaled, slow_gain
 
 _LOST = 100.0  # relative standard error of a value that is as good as held
@@ -260,8 +261,7 @@ def _joint_covariance(fit: JointFit) -> tuple[dict[str, float], Floats]:
     def values(where: Floats) -> Floats:
         return np.array(list(_numbers(fit, where).values()))
 
-    steps = np.diag(1e-6 * scale)
-    jacobian = np.column_stack([(values(at + step) - values(at - step)) / (2.0 * step.sum()) for step in steps])
+    jacobian = central_differences(values, at, 1e-6 * scale)
     covariance = _holding(fit.fit.covariance, distance <= _BOUND * scale)
     return _numbers(fit, at), np.asarray(jacobian @ covariance @ jacobian.T)
 

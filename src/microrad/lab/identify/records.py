@@ -1,8 +1,8 @@
-"""What every identification shares: units, prepared records, the initial transient, the fastest rate, noise colour."""
+"""Recordings of one axis in volts and radians: their units, the initial transient, the rates of their drives."""
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -32,7 +32,7 @@ class Units:
     lever_arm_m: float | None = None
 
     def __post_init__(self) -> None:
-        """Raises `IdentificationError` for unknown units, a length without lever arm and an angle with one."""
+        """Raises IdentificationError if a unit is unknown, a length has no lever arm or an angle has one."""
         if self.drive not in _VOLTS:
             raise IdentificationError(f"input unit '{self.drive}' is not known; use one of {', '.join(_VOLTS)}.")
         if self.output not in _RADIANS | _METRES:
@@ -80,6 +80,16 @@ class SiRecord:
     step_s: float
     start: int
 
+    def every(self, stride: int) -> "SiRecord":
+        """Every `stride`-th sample of it; what is exact for a drive linear between samples loses only samples."""
+        return replace(
+            self,
+            drive_v=self.drive_v[::stride].copy(),
+            output_rad=self.output_rad[::stride].copy(),
+            step_s=self.step_s * stride,
+            start=-(-self.start // stride),
+        )
+
     @property
     def used(self) -> int:
         """Samples behind the initial transient."""
@@ -87,7 +97,16 @@ class SiRecord:
 
 
 def si_records(recordings: Sequence[Recording], units: Units) -> tuple[SiRecord, ...]:
-    """Recordings in volts and radians; raises `IdentificationError` where a drive never reverses."""
+    """Recordings in volts and radians.
+
+    Args:
+        recordings: One drive and one output each.
+        units: Their units.
+
+    Raises:
+        IdentificationError: If there is no recording, one has several channels, or its drive is constant or never
+            reverses.
+    """
     if not recordings:
         raise IdentificationError("no recording was given; name at least one.")
     return tuple(_si_record(recording, units) for recording in recordings)
@@ -173,49 +192,6 @@ def one_rate_only(records: Sequence[SiRecord]) -> bool:
     """True where all loops have the same peak rate within a quarter, so that rate dependence rests on one rate."""
     slowest, fastest = loop_rates(records)
     return fastest < 1.25 * slowest
-
-
-def colour_inflation(residuals: Sequence[Floats]) -> float:
-    """Factor (1 for white noise) by which correlation between samples inflates the variance of an estimate.
-
-    1 + 2 sum of autocorrelations, summed over pairs of lags until a pair turns negative (Geyer's initial positive
-    sequence), the largest over the records.
-    """
-    return max(_inflation(residual) for residual in residuals)
-
-
-def _inflation(residual: Floats) -> float:
-    n = residual.size
-    spectrum = np.abs(np.fft.rfft(residual - residual.mean(), 2 * n)) ** 2
-    correlation = np.fft.irfft(spectrum)[: 2 * (n // 4)]
-    if correlation[0] <= 0:
-        return 1.0
-    pairs = (correlation / correlation[0]).reshape(-1, 2).sum(axis=1)
-    negative = np.flatnonzero(pairs < 0)
-    last = int(negative[0]) if negative.size else pairs.size
-    return max(1.0, float(2 * pairs[:last].sum() - 1))
-
-
-def rounded_to_error(value: float, standard_error: float) -> str:
-    """A fitted value as it is printed: no digits beyond the two of its standard error, and five at most.
-
-    Further digits would tell nothing and differ between processors. A value without error (nan or 0) has five digits.
-    """
-    if 0.0 < standard_error < math.inf:
-        decimals = 1 - math.floor(math.log10(float(f"{standard_error:.2g}")))
-        value = round(value, decimals) + 0.0  # no -0
-    return f"{value:.5g}"
-
-
-def correlation(covariance: Floats) -> Floats:
-    """Correlation matrix of a covariance."""
-    deviation = np.sqrt(np.diag(covariance)) + 1e-300
-    return np.asarray(covariance / np.outer(deviation, deviation))
-
-
-def percent(residual: Floats, span_rad: float) -> tuple[float, float]:
-    """Rms and peak of a residual in per cent of a peak-to-peak span."""
-    return 100 * float(np.sqrt(np.mean(residual**2))) / span_rad, 100 * float(np.max(np.abs(residual))) / span_rad
 
 
 def span(records: Sequence[SiRecord]) -> float:

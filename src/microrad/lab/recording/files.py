@@ -1,10 +1,11 @@
-"""The file before its numbers: does it exist, how big is it, and what is it in truth?"""
+"""Whether a file can be read at all, and which format it has by its content."""
 
 import difflib
 import hashlib
 import math
 from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 from microrad.core.folder import read_bytes
 from microrad.lab.recording.records import RecordingError
@@ -12,38 +13,33 @@ from microrad.lab.recording.records import RecordingError
 MAX_BYTES = 2_000_000_000
 _UNPACKED_BYTES, _UNPACKED_TIMES = 256_000_000, 20
 _HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
-_FORMAT_NAMES = {
-    "tdms": "a LabVIEW TDMS file",
-    "lvm": "a LabVIEW measurement file",
-    "mat": "a MATLAB file",
-    "mat73": "a MATLAB v7.3 file",
-    "npy": "a NumPy array",
-    "npz": "a NumPy archive",
-    "hdf5": "an HDF5 file",
-    "text": "text",
-}
-_SUFFIXES = {
-    ".tdms": ("tdms",),
-    ".lvm": ("lvm", "text"),
-    ".mat": ("mat", "mat73"),
-    ".npy": ("npy",),
-    ".npz": ("npz",),
-    ".h5": ("hdf5", "mat73"),
-    ".hdf5": ("hdf5", "mat73"),
-    ".hdf": ("hdf5", "mat73"),
-}
-_RIGHT_SUFFIX = {"tdms": ".tdms", "mat": ".mat", "mat73": ".mat", "npy": ".npy", "npz": ".npz", "hdf5": ".h5"}
-_STARTS = {
-    "tdms": "'TDSm'",
-    "mat": "'MATLAB 5.0 MAT-file' or the HDF5 signature",
-    "npy": "'NUMPY'",
-    "npz": "a ZIP signature",
-    "hdf5": "the HDF5 signature",
-}
+
+
+class _Format(NamedTuple):
+    """A format: its name here and in words, the suffixes that it may have (the usual one first), how it begins."""
+
+    name: str
+    words: str
+    suffixes: tuple[str, ...]
+    begins: str = "its header"
+    signature: bytes | None = None
+
+
+_FORMATS = (
+    _Format("tdms", "a LabVIEW TDMS file", (".tdms",), "'TDSm'", b"TDSm"),
+    _Format("lvm", "a LabVIEW measurement file", (".lvm",)),
+    _Format("mat", "a MATLAB file", (".mat",), "'MATLAB 5.0 MAT-file' or the HDF5 signature", b"MATLAB 5.0"),
+    _Format("npy", "a NumPy array", (".npy",), "'NUMPY'", b"\x93NUMPY"),
+    _Format("npz", "a NumPy archive", (".npz",), "a ZIP signature", b"PK\x03\x04"),
+    _Format("hdf5", "an HDF5 file", (".h5", ".hdf5", ".hdf"), "the HDF5 signature", _HDF5_SIGNATURE),
+    _Format("mat73", "a MATLAB v7.3 file", (".mat", ".h5", ".hdf5", ".hdf")),
+    _Format("text", "text", (".csv", ".lvm")),
+)
+_BY_NAME = {each.name: each for each in _FORMATS}
 
 
 def check_file(path: Path) -> None:
-    """Raises `RecordingError` for what is not a readable file, is empty, or has more than `MAX_BYTES`."""
+    """Raises RecordingError if the path is no readable file, or the file is empty or has more than `MAX_BYTES`."""
     try:
         if path.is_dir():
             raise RecordingError(f"{path}: this is a directory; name one file in it.")
@@ -83,12 +79,18 @@ def read_head(path: Path, size: int) -> bytes:
 
 
 def most_unpacked(path: Path) -> int:
-    """Bytes that an array of a file may unpack to: no recording packs better, and a few kB could fill the memory."""
+    """Bytes that an array of a file may unpack to: a few kB that claim more could fill the memory."""
     return min(max(_UNPACKED_BYTES, _UNPACKED_TIMES * path.stat().st_size), MAX_BYTES)
 
 
 def too_large(path: Path, shape: Sequence[int], itemsize: int) -> str:
-    """Words for an array that states more than its file may unpack to; empty for any other."""
+    """Why an array cannot be read that states more than its file may unpack to; empty where it can.
+
+    Args:
+        path: The file.
+        shape: Shape that the array states.
+        itemsize: Bytes of one number.
+    """
     size, most = math.prod(shape) * itemsize, most_unpacked(path)
     if size <= most:
         return ""
@@ -108,33 +110,29 @@ def sha256_of(path: Path) -> str:
 def file_format(path: Path) -> str:
     """The format by content: tdms, lvm, mat, mat73, npy, npz, hdf5 or text.
 
-    Raises `RecordingError` where the content and the suffix of the name contradict each other, and for an index file,
-    an old or a compressed one.
+    Raises RecordingError if content and suffix contradict each other, or if the file is an index, old or compressed.
     """
     head = read_head(path, 1024)
-    found = _content(path, head)
+    found = _BY_NAME[_content(path, head)]
     suffix = path.suffix.lower()
-    expected = _SUFFIXES.get(suffix)
-    if expected is None:
-        if found not in ("text", "lvm"):
-            right = _RIGHT_SUFFIX[found]
-            raise RecordingError(
-                f"{path}: the name ends in '{suffix}' and the content is {_FORMAT_NAMES[found]}; rename the file to "
-                f"'{path.stem}{right}', so that nobody takes it for something else."
-            )
-        return found
-    if found not in expected:
-        hint = f"; rename it to '{path.stem}{_RIGHT_SUFFIX[found]}'" if found in _RIGHT_SUFFIX else ""
-        start = head[:24].decode("latin-1").encode("ascii", "backslashreplace").decode().splitlines()[0]
-        if found in ("text", "lvm"):
-            hint = (
-                f"; if it is text, rename it to '{path.stem}.{'csv' if found == 'text' else 'lvm'}', else record again"
-            )
+    expected = [each for each in _FORMATS if suffix in each.suffixes and suffix != ".csv"]
+    is_text = found.name in ("text", "lvm")
+    renamed = f"{path.stem}{found.suffixes[0]}"
+    if not expected and not is_text:
         raise RecordingError(
-            f"{path}: the name says {_FORMAT_NAMES[expected[0]]}, which begins with "
-            f"{_STARTS.get(expected[0], 'its header')}, and the first bytes are '{start}'{hint}."
+            f"{path}: the name ends in '{suffix}' and the content is {found.words}; rename the file to '{renamed}', so "
+            "that nobody takes it for something else."
         )
-    return found
+    if expected and found not in expected:
+        start = head[:24].decode("latin-1").encode("ascii", "backslashreplace").decode().splitlines()[0]
+        advice = (
+            f"if it is text, rename it to '{renamed}', else record again" if is_text else f"rename it to '{renamed}'"
+        )
+        raise RecordingError(
+            f"{path}: the name says {expected[0].words}, which begins with {expected[0].begins}, and the first bytes "
+            f"are '{start}'; {advice}."
+        )
+    return found.name
 
 
 def _content(path: Path, head: bytes) -> str:
@@ -146,10 +144,9 @@ def _content(path: Path, head: bytes) -> str:
         raise RecordingError(f"{path}: the file is compressed; unpack it first.")
     if head.startswith(b"MATLAB 7.3") or (head.startswith(b"MATLAB") and _HDF5_SIGNATURE in head):
         return "mat73"
-    starts = {b"TDSm": "tdms", b"MATLAB 5.0": "mat", b"\x93NUMPY": "npy", b"PK\x03\x04": "npz", _HDF5_SIGNATURE: "hdf5"}
-    for start, name in starts.items():
-        if head.startswith(start):
-            return name
+    for each in _FORMATS:
+        if each.signature and head.startswith(each.signature):
+            return each.name
     if head.removeprefix(b"\xef\xbb\xbf").lstrip(b'"').startswith(b"LabVIEW Measurement"):
         return "lvm"
     if path.suffix.lower() == ".mat" and b"\x00" in head[:20]:

@@ -1,6 +1,7 @@
 """From a file, or from arrays, to a checked `Recording`."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -146,11 +147,17 @@ def recording_from_arrays(
 def multisine_recordings(
     drive: ArrayLike, output: ArrayLike, rate_hz: float, name: str = "multisine", *, accept: Sequence[str] = ()
 ) -> tuple[Recording, ...]:
-    """One recording per realisation of a periodic multisine experiment.
+    """One recording per realisation of a periodic multisine experiment, its periods joined in time.
 
-    `drive` has the shape (samples of one period, inputs, realisations, periods) and `output` (samples of one period,
-    outputs, realisations, periods). The periods are joined in time and `period_samples` is set. Raises
-    `RecordingError`.
+    Args:
+        drive: Shape (samples of one period, inputs, realisations, periods).
+        output: Shape (samples of one period, outputs, realisations, periods).
+        rate_hz: Samples per second.
+        name: Stands where the path of a file would, before the number of the realisation.
+        accept: Findings of degree to take on, see `read_recording`.
+
+    Raises:
+        RecordingError: If the shapes do not agree, or for anything that cannot be relied upon.
     """
     u, y = (np.asarray(a) for a in (drive, output))
     if u.ndim != 4 or y.ndim != 4 or (u.shape[0], *u.shape[2:]) != (y.shape[0], *y.shape[2:]):
@@ -169,15 +176,25 @@ def multisine_recordings(
 # ---------------------------------------------------------------------------------------------------------- opening
 def open_source(path: Path) -> Source:
     """The file as named channels. Raises RecordingError for a file of no known format, or a damaged one."""
-    kind = file_format(path)
-    if kind in ("hdf5", "mat73"):
-        from microrad.lab.recording.formats.hdf5 import Hdf5Source
+    return _SOURCES[file_format(path)](path)
 
-        return Hdf5Source(path, matlab=kind == "mat73")
-    if kind in ("npy", "npz"):
-        return NumpySource(path, archive=kind == "npz")
-    sources = {"tdms": TdmsSource, "lvm": LvmSource, "mat": MatlabSource, "text": TextSource}
-    return sources[kind](path)
+
+def _open_hdf5(path: Path, matlab: bool) -> Source:
+    from microrad.lab.recording.formats.hdf5 import Hdf5Source
+
+    return Hdf5Source(path, matlab)
+
+
+_SOURCES: dict[str, Callable[[Path], Source]] = {
+    "tdms": TdmsSource,
+    "lvm": LvmSource,
+    "mat": MatlabSource,
+    "mat73": partial(_open_hdf5, matlab=True),
+    "npy": partial(NumpySource, archive=False),
+    "npz": partial(NumpySource, archive=True),
+    "hdf5": partial(_open_hdf5, matlab=False),
+    "text": TextSource,
+}
 
 
 def _columns(source: Source, wanted: Column | Sequence[Column], role: str) -> list[int]:

@@ -100,7 +100,12 @@ _BRACKETS = re.compile(r"[(\[]\s*([^)\]]*?)\s*[)\]]\s*$")
 
 
 def stated_units(units: Sequence[str], names: Sequence[str]) -> set[str]:
-    """Units that a file states for its channels, by itself or in brackets behind a name it knows the unit of."""
+    """Units that a file states for its channels, by itself or in brackets behind a name it knows the unit of.
+
+    Args:
+        units: The units of the channels as the file states them, '' where it states none.
+        names: The names of the channels.
+    """
     said = {unit.strip() for unit in units if unit.strip()}
     if not said:
         behind = [found[1] for name in names if (found := _BRACKETS.search(name))]
@@ -109,9 +114,15 @@ def stated_units(units: Sequence[str], names: Sequence[str]) -> set[str]:
 
 
 def read_in(recording: Recording, input_unit: str, output_unit: str) -> Recording:
-    """The recording, whose drives are read in one unit and whose outputs in another, both spelled as in "V" and "urad".
+    """The recording, where its file states no other units than those in which it is to be read.
 
-    Raises `RecordingError` where its file states other units: the mirror would be larger or smaller than it is.
+    Args:
+        recording: The recording.
+        input_unit: Unit of its drives, spelled as in "V".
+        output_unit: Unit of its outputs, spelled as in "urad".
+
+    Raises:
+        RecordingError: If its file states other units: the mirror would be larger or smaller than it is.
     """
     r = recording
     for which, given, units, names in (

@@ -1,41 +1,24 @@
 """Acquisition of the laser link: scans, the sequence of beacon, answer and lock, and their trade."""
 
-from microrad.link.acquisition.detection import detection_times, gap_probability
-from microrad.link.acquisition.scan import (
-    Detector,
-    Raster,
-    Scan,
-    Search,
-    Spiral,
-    StepStare,
-    dwells_along_track,
-    highest_speed,
-    scan_detection_probability,
-)
+from microrad.link.acquisition.detection import Vibration, detection_times, gap_probability, simulate_scan
+from microrad.link.acquisition.scan import Detector, Raster, Scan, Search, Spiral, StepStare, highest_speed
 from microrad.link.acquisition.sequence import (
     LOCKED,
     LOST,
     Chances,
     Outcome,
+    SequenceRuns,
     Stage,
     Timing,
+    Transition,
     answer_stages,
-    beacon_stages,
     frame_detection_probability,
-    frames_detection_probability,
     paper_sequence,
     scan_stages,
-    solve,
-)
-from microrad.link.acquisition.simulate import (
-    SequenceRuns,
-    Transition,
-    Vibration,
     simulate,
     simulate_log,
-    simulate_scan,
+    solve_sequence,
 )
-from microrad.link.acquisition.times import TimeDistribution
 from microrad.link.acquisition.trade import Beams, Receiver, Trade, wide_against_scan
 
 __all__ = [
@@ -53,25 +36,20 @@ __all__ = [
     "Spiral",
     "Stage",
     "StepStare",
-    "TimeDistribution",
     "Timing",
     "Trade",
     "Transition",
     "Vibration",
     "answer_stages",
-    "beacon_stages",
     "detection_times",
-    "dwells_along_track",
     "frame_detection_probability",
-    "frames_detection_probability",
     "gap_probability",
     "highest_speed",
     "paper_sequence",
-    "scan_detection_probability",
     "scan_stages",
     "simulate",
     "simulate_log",
     "simulate_scan",
-    "solve",
+    "solve_sequence",
     "wide_against_scan",
 ]

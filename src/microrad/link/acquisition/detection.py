@@ -1,4 +1,4 @@
-"""Probability and time of detection by a scan, with the gaps that vibration opens between its tracks.
+"""Probability and time of detection by a scan, with the gaps that vibration opens between its tracks; and simulated.
 
 The closed form takes the vibration as constant within one crossing and independent from track to track (from dwell to
 dwell): its correlation time is long against a crossing and short against the return of the beam on the next track.
@@ -7,15 +7,16 @@ breaks up the crossings, or gives a long dwell more chances than one: simulate i
 """
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad.link.acquisition.limits import require_not_negative
+from microrad.core.arrays import Floats
+from microrad.link.acquisition.checks import require_count, require_not_negative, require_positive
 from microrad.link.acquisition.scan import Raster, Scan, Spiral, StepStare
 from microrad.link.acquisition.times import TimeDistribution, merged
 
-_Array = NDArray[np.float64]
 _REACH = 8.0  # standard deviations of the vibration
 _TIMES = 2048
 _RADII = 2048
@@ -53,7 +54,7 @@ def detection_times(scan: Scan, jitter_rms_rad: float = 0.0) -> TimeDistribution
     return _dwell_times(scan, jitter_rms_rad)
 
 
-def _levels(scan: Spiral | Raster) -> tuple[_Array, _Array]:
+def _levels(scan: Spiral | Raster) -> tuple[Floats, Floats]:
     """Half width of the swath with at least n looks, n = 1, 2, ..., and the probability that look n detects first."""
     p = scan.detector.probability
     look = scan.speed_rad_s * scan.detector.detection_time_s  # path of the beam in one look
@@ -66,12 +67,12 @@ def _levels(scan: Spiral | Raster) -> tuple[_Array, _Array]:
     return half, np.asarray(p * (1.0 - p) ** (number - 1.0), dtype=np.float64)
 
 
-def _track_probability(scan: Spiral | Raster, offset: _Array, jitter_rms_rad: float) -> _Array:
+def _track_probability(scan: Spiral | Raster, offset: Floats, jitter_rms_rad: float) -> Floats:
     """Probability of detection by a track at each offset from the target."""
     total = np.zeros_like(offset)
     for half, weight in zip(*_levels(scan), strict=True):
         if jitter_rms_rad > 0.0:
-            from scipy.special import ndtr  # slow to load
+            from scipy.special import ndtr
 
             inside = ndtr((half - offset) / jitter_rms_rad) - ndtr((-half - offset) / jitter_rms_rad)
         else:
@@ -80,7 +81,7 @@ def _track_probability(scan: Spiral | Raster, offset: _Array, jitter_rms_rad: fl
     return total
 
 
-def _first(scan: Spiral | Raster, offset: _Array, jitter_rms_rad: float, before: int | None = None) -> _Array:
+def _first(scan: Spiral | Raster, offset: Floats, jitter_rms_rad: float, before: int | None = None) -> Floats:
     """Probability that the track at each offset detects, and none of the tracks `before` it did."""
     pitch = scan.search.pitch_rad
     all_before = math.ceil((float(np.max(offset)) - float(np.min(offset))) / pitch)
@@ -90,7 +91,7 @@ def _first(scan: Spiral | Raster, offset: _Array, jitter_rms_rad: float, before:
     return first
 
 
-def _offsets(scan: Spiral | Raster, jitter_rms_rad: float) -> tuple[_Array, _Array]:
+def _offsets(scan: Spiral | Raster, jitter_rms_rad: float) -> tuple[Floats, Floats]:
     """Offsets of a track from the target and their weights for a quadrature, split where the swath's edges lie."""
     pitch = scan.search.pitch_rad
     reach = scan.search.beam_radius_rad + _REACH * jitter_rms_rad
@@ -127,7 +128,7 @@ def _spiral_times(scan: Spiral, jitter_rms_rad: float) -> TimeDistribution:
 
 
 def _raster_times(scan: Raster, jitter_rms_rad: float) -> TimeDistribution:
-    from scipy.special import ndtr  # slow to load
+    from scipy.special import ndtr
 
     search, row = scan.search, scan.row_rad
     offset, weight = _offsets(scan, jitter_rms_rad)
@@ -143,11 +144,11 @@ def _raster_times(scan: Raster, jitter_rms_rad: float) -> TimeDistribution:
     return merged(np.asarray(time.ravel(), dtype=np.float64), np.multiply.outer(across, along).ravel())
 
 
-def _density(place: _Array, sigma_rad: float) -> _Array:
+def _density(place: Floats, sigma_rad: float) -> Floats:
     return np.asarray(np.exp(-((place / sigma_rad) ** 2) / 2.0) / (sigma_rad * math.sqrt(2.0 * math.pi)))
 
 
-def _cell(scan: StepStare, jitter_rms_rad: float) -> tuple[_Array, NDArray[np.int64], _Array]:
+def _cell(scan: StepStare, jitter_rms_rad: float) -> tuple[Floats, NDArray[np.int64], Floats]:
     """The rectangle of one pitch by one row around a dwell, in parts, and the dwells that may see it.
 
     Edges of the parts along each side, (2, n + 1); grid steps to the dwells, (steps, 2); the probability that each of
@@ -166,11 +167,11 @@ def _cell(scan: StepStare, jitter_rms_rad: float) -> tuple[_Array, NDArray[np.in
     return edge, step[used], seen * inside[:, :, used]
 
 
-def _landing(away_rad: _Array, beam_radius_rad: float, jitter_rms_rad: float) -> _Array:
+def _landing(away_rad: Floats, beam_radius_rad: float, jitter_rms_rad: float) -> Floats:
     """Probability that the beam, shifted by the vibration, reaches a target at each distance."""
     if jitter_rms_rad == 0.0:
         return np.asarray(away_rad < beam_radius_rad, dtype=np.float64)
-    from scipy.stats import ncx2  # slow to load
+    from scipy.stats import ncx2
 
     distance = np.linspace(0.0, float(np.max(away_rad)), _DISTANCES)  # a table: each value is slow
     inside = ncx2.cdf((beam_radius_rad / jitter_rms_rad) ** 2, 2, (distance / jitter_rms_rad) ** 2)
@@ -178,7 +179,7 @@ def _landing(away_rad: _Array, beam_radius_rad: float, jitter_rms_rad: float) ->
 
 
 def _dwell_times(scan: StepStare, jitter_rms_rad: float) -> TimeDistribution:
-    from scipy.special import ndtr  # slow to load
+    from scipy.special import ndtr
 
     search = scan.search
     sigma = search.sigma_rad
@@ -210,3 +211,96 @@ def _mean_look(scan: StepStare) -> float:
     look = np.arange(1.0, float(scan.detector.looks(np.array([scan.dwell_s]))[0]) + 1.0)
     chance = (1.0 - scan.detector.probability) ** (look - 1.0)
     return float(np.sum(look * chance) / np.sum(chance))
+
+
+# ------------------------------------------------------------------------------------------------------------ simulated
+@dataclass(frozen=True, slots=True)
+class Vibration:
+    """Ornstein-Uhlenbeck jitter of the beam: rms in each axis and correlation time (spectrum 1/(2 pi time) wide)."""
+
+    rms_rad: float
+    correlation_time_s: float
+
+    def __post_init__(self) -> None:
+        """Raises ValueError if the rms is negative or the correlation time not above 0."""
+        require_not_negative("the vibration's rms", self.rms_rad, "rad")
+        require_positive("the vibration's correlation time", self.correlation_time_s, "s")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ScanRuns:
+    """One simulated scan per run: where the target was, whether it was detected, and the time then or of the end."""
+
+    target_x_rad: Floats
+    target_y_rad: Floats
+    detected: NDArray[np.bool_]
+    time_s: Floats
+
+
+def simulate_scan(scan: Scan, runs: int, seed: int, vibration: Vibration | None = None, samples: int = 128) -> ScanRuns:
+    """Draw targets from the uncertainty and let the beam pass over each; (runs,) arrays.
+
+    The beam follows its real path, `samples` points of it near the target in each pass, shifted by one continuous
+    vibration of the whole scan. Every whole detection time that the beam stays on the target is one look.
+    Raises ValueError for no run and for less than 2 samples.
+    """
+    require_count("the number of runs", runs)
+    if samples < 2:
+        raise ValueError(f"the number of samples in a pass is {samples}: it must be 2 or more")
+    draw = np.random.Generator(np.random.Philox(key=seed))
+    x, y = (draw.normal(0.0, scan.search.sigma_rad, runs) for _ in range(2))
+    shake = vibration or Vibration(0.0, 1.0)
+    start, end = scan.windows(x, y, scan.search.beam_radius_rad + 6.0 * shake.rms_rad)
+    state = _Pass(scan, x, y, shake, draw)
+    for window in range(start.shape[1]):
+        begin, span = start[:, window], end[:, window] - start[:, window]
+        for sample in range(samples):
+            state.move(begin + span * (sample / (samples - 1)), begin + span / 2.0)
+    return ScanRuns(x, y, state.detected, np.where(state.detected, state.found_s, scan.duration_s))
+
+
+class _Pass:
+    """The beam relative to the target in every run: time, vibration and how long the target has been lit."""
+
+    def __init__(self, scan: Scan, x_rad: Floats, y_rad: Floats, shake: Vibration, draw: np.random.Generator) -> None:
+        self.scan, self.shake, self.draw = scan, shake, draw
+        self.target = np.stack([x_rad, y_rad])
+        self.jitter = draw.normal(0.0, shake.rms_rad, self.target.shape) if shake.rms_rad else np.zeros((2, x_rad.size))
+        self.time_s = np.zeros(x_rad.size)
+        self.within_s = np.full(x_rad.size, -1.0)
+        self.margin = np.ones(x_rad.size)  # squared distance less squared beam radius: negative when lit
+        self.lit_s = np.zeros(x_rad.size)
+        self.detected = np.zeros(x_rad.size, dtype=bool)
+        self.found_s = np.zeros(x_rad.size)
+
+    def move(self, time_s: Floats, within_s: Floats) -> None:
+        """Go on to `time_s`; a gap in the path, or a new pass, ends what was lit."""
+        step = np.maximum(time_s - self.time_s, 0.0)
+        if self.shake.rms_rad:
+            kept = np.exp(-step / self.shake.correlation_time_s)
+            noise = self.draw.normal(0.0, self.shake.rms_rad, self.jitter.shape)
+            self.jitter = kept * self.jitter + np.sqrt(1.0 - kept**2) * noise
+        beam = np.stack(self.scan.beam_at(time_s, within_s))
+        margin = np.sum((beam + self.jitter - self.target) ** 2, axis=0) - self.scan.search.beam_radius_rad**2
+        gap = (within_s != self.within_s) & (step > 0.0)
+        before = np.where(gap, margin, self.margin)
+        length = np.where(gap, 0.0, step)
+        change = np.where(before == margin, 1.0, before - margin)
+        part = np.clip(before / change, 0.0, 1.0)  # share of the step before the edge of the beam passes
+        lit = margin < 0.0
+        was = before < 0.0
+        added = length * np.where(was, np.where(lit, 1.0, part), np.where(lit, 1.0 - part, 0.0))
+        self.lit_s = np.where(was & ~gap, self.lit_s, 0.0) + added
+        self._look(time_s)
+        self.time_s, self.within_s, self.margin = np.maximum(time_s, self.time_s), within_s, margin
+
+    def _look(self, time_s: Floats) -> None:
+        needed = self.scan.detector.detection_time_s
+        while True:
+            ready = self.lit_s >= needed * (1.0 - 1e-6)
+            if not np.any(ready):
+                return
+            self.lit_s = np.where(ready, self.lit_s - needed, self.lit_s)
+            seen = ready & ~self.detected & (self.draw.random(ready.size) < self.scan.detector.probability)
+            self.found_s[seen] = time_s[seen]
+            self.detected |= seen

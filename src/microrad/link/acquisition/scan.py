@@ -7,16 +7,16 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from microrad.core.arrays import Floats
 from microrad.core.units import format_quantity
-from microrad.link.acquisition.limits import (
+from microrad.link.acquisition.checks import (
     require_angle,
     require_inside,
     require_not_negative,
+    require_overlap,
     require_positive,
     require_probability,
 )
-
-_Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,12 +35,9 @@ class Search:
     coverage: float
 
     def __post_init__(self) -> None:
-        """Refuse values that no search has."""
+        """Raises ValueError if an angle, the overlap or the coverage is out of its range."""
         require_angle("the beam's radius", self.beam_radius_rad)
-        if not 0.0 <= self.overlap < 1.0:
-            raise ValueError(
-                f"the overlap is {self.overlap:g}: it must be 0 or more and below 1, a share of a diameter"
-            )
+        require_overlap(self.overlap)
         require_positive("the standard deviation of the pointing error", self.sigma_rad, "rad")
         require_inside("the coverage probability", self.coverage)
         require_angle("the radius that covers the pointing error", self.radius_rad)
@@ -67,15 +64,15 @@ class Detector:
     probability: float = 1.0
 
     def __post_init__(self) -> None:
-        """Refuse a time that is not positive and a probability outside (0, 1]."""
+        """Raises ValueError if the time is not above 0 or the probability not in (0, 1]."""
         require_positive("the detection time", self.detection_time_s, "s")
         require_probability("the probability of detection in one look", self.probability)
 
-    def looks(self, duration_s: _Array) -> _Array:
+    def looks(self, duration_s: Floats) -> Floats:
         """Whole looks in a crossing of each duration."""
         return np.floor(duration_s / self.detection_time_s * (1.0 + 1e-9))
 
-    def crossing_probability(self, duration_s: _Array) -> _Array:
+    def crossing_probability(self, duration_s: Floats) -> Floats:
         """Probability of detection in a crossing of each duration."""
         return np.asarray(1.0 - (1.0 - self.probability) ** self.looks(duration_s), dtype=np.float64)
 
@@ -89,7 +86,7 @@ class Spiral:
     speed_rad_s: float
 
     def __post_init__(self) -> None:
-        """Refuse a speed at which the beam leaves the target before it is detected."""
+        """Raises ValueError if the beam leaves the target before it is detected."""
         _require_speed(self.search, self.detector, self.speed_rad_s)
 
     @property
@@ -97,21 +94,21 @@ class Spiral:
         """Time of one scan, pi R^2 / (pitch speed)."""
         return math.pi * self.search.radius_rad**2 / (self.search.pitch_rad * self.speed_rad_s)
 
-    def track_radius(self, time_s: _Array) -> _Array:
+    def track_radius(self, time_s: Floats) -> Floats:
         """Distance of the beam from the middle at each time."""
         return np.sqrt(self.search.pitch_rad * self.speed_rad_s * time_s / math.pi)
 
-    def time_at(self, track_radius_rad: _Array) -> _Array:
+    def time_at(self, track_radius_rad: Floats) -> Floats:
         """Time at which the track has each radius; zero for a negative one."""
         return math.pi * np.maximum(track_radius_rad, 0.0) ** 2 / (self.search.pitch_rad * self.speed_rad_s)
 
-    def beam_at(self, time_s: _Array, within_s: _Array) -> tuple[_Array, _Array]:
+    def beam_at(self, time_s: Floats, within_s: Floats) -> tuple[Floats, Floats]:
         """Beam's centre at each time; `within_s` is not needed here."""
         radius = self.track_radius(time_s)
         angle = 2.0 * math.pi * radius / self.search.pitch_rad
         return radius * np.cos(angle), radius * np.sin(angle)
 
-    def windows(self, x_rad: _Array, y_rad: _Array, reach_rad: float) -> tuple[_Array, _Array]:
+    def windows(self, x_rad: Floats, y_rad: Floats, reach_rad: float) -> tuple[Floats, Floats]:
         """Start and end of the times when the beam may be within `reach_rad` of each target, (targets, windows)."""
         pitch = self.search.pitch_rad
         radius, azimuth = np.hypot(x_rad, y_rad), np.arctan2(y_rad, x_rad) % (2.0 * math.pi)
@@ -129,21 +126,6 @@ class Spiral:
         end = np.where(near[:, None], last * slots[1:], end)
         return np.minimum(start, self.duration_s), np.minimum(end, self.duration_s)
 
-    def crossings(self, x_rad: float, y_rad: float) -> tuple[_Array, _Array]:
-        """Middle time and duration of each crossing of the beam over a target, in the order they come.
-
-        Each turn counts as a circle whose radius is that of the track at the target's azimuth; a target within a
-        beam's radius of the middle sees the first turns as one crossing, which are several here.
-        """
-        pitch, beam = self.search.pitch_rad, self.search.beam_radius_rad
-        radius, azimuth = math.hypot(x_rad, y_rad), math.atan2(y_rad, x_rad) % (2.0 * math.pi)
-        last = int(self.search.radius_rad / pitch - azimuth / (2.0 * math.pi))
-        track = pitch * (azimuth / (2.0 * math.pi) + np.arange(last + 1))
-        track = track[np.abs(track - radius) < beam]
-        product = np.maximum(2.0 * track * radius, 1e-300)
-        half_turn = np.arccos(np.clip((track**2 + radius**2 - beam**2) / product, -1.0, 1.0))
-        return self.time_at(track), 2.0 * track * half_turn / self.speed_rad_s
-
 
 @dataclass(frozen=True, slots=True)
 class Raster:
@@ -158,7 +140,7 @@ class Raster:
     turn_around_s: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse a negative time and a speed at which the beam leaves the target before it is detected."""
+        """Raises ValueError if a time is negative, or the beam leaves the target before it is detected."""
         require_not_negative("the turn-around time", self.turn_around_s, "s")
         _require_speed(self.search, self.detector, self.speed_rad_s)
 
@@ -178,18 +160,18 @@ class Raster:
         return self.rows * self.row_time_s + (self.rows - 1) * self.turn_around_s
 
     @property
-    def row_rad(self) -> _Array:
+    def row_rad(self) -> Floats:
         """Offset of each row from the middle, ascending: the order in which they are scanned."""
         return np.asarray((np.arange(self.rows) - (self.rows - 1) / 2.0) * self.search.pitch_rad, dtype=np.float64)
 
-    def beam_at(self, time_s: _Array, within_s: _Array) -> tuple[_Array, _Array]:
+    def beam_at(self, time_s: Floats, within_s: Floats) -> tuple[Floats, Floats]:
         """Beam's centre at each time, on the row that is scanned at `within_s`."""
         period = self.row_time_s + self.turn_around_s
         row = np.clip(np.floor(within_s / period), 0, self.rows - 1)
         along = np.clip(time_s - row * period, 0.0, self.row_time_s) * self.speed_rad_s - self.search.radius_rad
         return np.where(row % 2 == 0, along, -along), (row - (self.rows - 1) / 2.0) * self.search.pitch_rad
 
-    def windows(self, x_rad: _Array, y_rad: _Array, reach_rad: float) -> tuple[_Array, _Array]:
+    def windows(self, x_rad: Floats, y_rad: Floats, reach_rad: float) -> tuple[Floats, Floats]:
         """Start and end of the times when the beam may be within `reach_rad` of each target, (targets, windows)."""
         count = min(math.ceil(2.0 * reach_rad / self.search.pitch_rad) + 1, self.rows)
         nearest = y_rad / self.search.pitch_rad + (self.rows - 1) / 2.0
@@ -200,18 +182,6 @@ class Raster:
         low = np.clip((along - reach_rad) / self.speed_rad_s, 0.0, self.row_time_s)
         high = np.clip((along + reach_rad) / self.speed_rad_s, 0.0, self.row_time_s)
         return begin + low, begin + high
-
-    def crossings(self, x_rad: float, y_rad: float) -> tuple[_Array, _Array]:
-        """Middle time and duration of each crossing of the beam over a target, in the order they come."""
-        beam, radius = self.search.beam_radius_rad, self.search.radius_rad
-        row = np.flatnonzero(np.abs(self.row_rad - y_rad) < beam)
-        half = np.sqrt(beam**2 - (self.row_rad[row] - y_rad) ** 2)
-        along = np.where(row % 2 == 0, x_rad, -x_rad)
-        low, high = np.maximum(along - half, -radius), np.minimum(along + half, radius)
-        begin = row * (self.row_time_s + self.turn_around_s)
-        seen = high > low
-        middle = begin + ((low + high) / 2.0 + radius) / self.speed_rad_s
-        return middle[seen], ((high - low) / self.speed_rad_s)[seen]
 
 
 @dataclass(frozen=True, slots=True)
@@ -227,7 +197,7 @@ class StepStare:
     settle_s: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse a negative time and a dwell that is shorter than the detection time."""
+        """Raises ValueError if a time is negative or the dwell shorter than the detection time."""
         require_not_negative("the settling time", self.settle_s, "s")
         require_positive("the dwell time", self.dwell_s, "s")
         if self.dwell_s < self.detector.detection_time_s * (1.0 - 1e-9):
@@ -237,7 +207,7 @@ class StepStare:
             )
 
     @property
-    def basis_rad(self) -> _Array:
+    def basis_rad(self) -> Floats:
         """The two steps of the grid as rows, (2, 2)."""
         pitch = self.search.pitch_rad
         return np.array([(pitch, 0.0), (pitch / 2.0, pitch * math.sqrt(3.0) / 2.0)])
@@ -251,7 +221,7 @@ class StepStare:
         return np.where(inside, table[clipped[..., 0], clipped[..., 1]], size)
 
     @property
-    def centres_rad(self) -> _Array:
+    def centres_rad(self) -> Floats:
         """Centre of each dwell in the order they come, (dwells, 2)."""
         return _dwell_indices(self) @ self.basis_rad
 
@@ -272,13 +242,13 @@ class StepStare:
         length = np.hypot(*(steps @ self.basis_rad).T)
         return np.asarray(steps[length <= reach_rad + self.search.pitch_rad], dtype=np.int64)
 
-    def beam_at(self, time_s: _Array, within_s: _Array) -> tuple[_Array, _Array]:
+    def beam_at(self, time_s: Floats, within_s: Floats) -> tuple[Floats, Floats]:
         """Beam's centre in the dwell that is under way at `within_s`."""
         dwell = np.clip(np.floor(within_s / (self.dwell_s + self.settle_s)), 0, self.dwells - 1).astype(np.int64)
         place = _dwell_indices(self)[dwell] @ self.basis_rad
         return place[..., 0], place[..., 1]
 
-    def windows(self, x_rad: _Array, y_rad: _Array, reach_rad: float) -> tuple[_Array, _Array]:
+    def windows(self, x_rad: Floats, y_rad: Floats, reach_rad: float) -> tuple[Floats, Floats]:
         """Start and end of the dwells within reach of each target, (targets, windows); empty ones at the end."""
         place = np.stack([x_rad, y_rad], axis=-1) @ np.linalg.inv(self.basis_rad)
         nearest = np.round(place).astype(np.int64)
@@ -286,13 +256,6 @@ class StepStare:
         start = number * (self.dwell_s + self.settle_s)
         end = np.where(number < self.dwells, start + self.dwell_s, self.duration_s)
         return np.minimum(start, self.duration_s), end
-
-    def crossings(self, x_rad: float, y_rad: float) -> tuple[_Array, _Array]:
-        """Middle time and duration of each dwell that sees a target, in the order they come."""
-        away = np.hypot(*(self.centres_rad - (x_rad, y_rad)).T)
-        seen = np.flatnonzero(away < self.search.beam_radius_rad)
-        middle = np.asarray(seen * (self.dwell_s + self.settle_s) + self.dwell_s / 2.0, dtype=np.float64)
-        return middle, np.full(seen.size, self.dwell_s)
 
 
 Scan = Spiral | Raster | StepStare
@@ -307,21 +270,6 @@ def highest_speed(search: Search, detection_time_s: float) -> float:
     require_positive("the detection time", detection_time_s, "s")
     chord = 2.0 * search.beam_radius_rad * math.sqrt(1.0 - (1.0 - search.overlap) ** 2)
     return chord / detection_time_s
-
-
-def dwells_along_track(search: Search, step_rad: float) -> int:
-    """Beam positions a step apart along tracks a pitch apart, pi R^2 / (pitch step), rounded down.
-
-    It is no count of independent looks: neighbouring positions see the same target.
-    """
-    require_angle("the step along the track", step_rad)
-    return int(math.pi * search.radius_rad**2 / (search.pitch_rad * step_rad))
-
-
-def scan_detection_probability(scan: Scan, x_rad: float, y_rad: float) -> float:
-    """Probability that one scan without vibration detects a target at this place: 1 - prod(1 - p) over crossings."""
-    _, duration = scan.crossings(x_rad, y_rad)
-    return float(1.0 - np.prod(1.0 - scan.detector.crossing_probability(duration)))
 
 
 def _require_speed(search: Search, detector: Detector, speed_rad_s: float) -> None:

@@ -4,8 +4,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
+from microrad.core.arrays import Floats
 from microrad.core.units import SPEED_OF_LIGHT_M_S, format_quantity
-from microrad.link.acquisition.limits import require_count, require_not_negative, require_positive, require_probability
+from microrad.link.acquisition.checks import require_count, require_not_negative, require_positive, require_probability
 from microrad.link.acquisition.times import TimeDistribution, fixed_time, joined
 
 LOCKED = "locked"
@@ -27,7 +31,7 @@ class Stage:
     on_failure: str = ""
 
     def __post_init__(self) -> None:
-        """Refuse a probability outside (0, 1], a negative time and a time-out shorter than the stage."""
+        """Raises ValueError if the probability is not in (0, 1], a time negative, or the time-out too short."""
         require_probability(f'the probability of success of the stage "{self.name}"', self.success_probability)
         require_not_negative(f'the duration of the stage "{self.name}"', self.longest_s, "s")
         require_not_negative(f'the time-out of the stage "{self.name}"', self.failure_s, "s")
@@ -101,7 +105,7 @@ class Timing:
     partner_name: str = "GEO"
 
     def __post_init__(self) -> None:
-        """Refuse negative times, a range that is not positive and less than one frame."""
+        """Raises ValueError if a time is negative, the range not above 0, or there is less than one frame."""
         require_positive("the range", self.range_m, "m")
         require_positive("the time of a frame", self.frame_time_s, "s")
         require_count("the number of frames", self.frames)
@@ -132,7 +136,7 @@ class Chances:
     lock: float = 1.0
 
     def __post_init__(self) -> None:
-        """Refuse a probability outside (0, 1]."""
+        """Raises ValueError if a probability is not in (0, 1]."""
         for name in self.__slots__:
             require_probability(name, getattr(self, name))
 
@@ -217,11 +221,17 @@ def paper_sequence(timing: Timing, chances: Chances) -> tuple[Stage, ...]:
     return (*beacon_stages(timing, chances), *answer_stages(timing, chances))
 
 
-def solve(stages: Sequence[Stage], attempts: int) -> Outcome:
-    """Distribution of the time until lock when every failure takes one of `attempts`; the last one gives up.
+def solve_sequence(stages: Sequence[Stage], attempts: int) -> Outcome:
+    """Distribution of the time until lock when every failure takes one attempt; the last one gives up.
 
-    Exact: all orders of failures are summed; times that are distributions are convolved. Raises `ValueError` for no
-    attempt, no stage, two stages of one name and a failure that goes back to a stage that is not there or comes later.
+    Exact: all orders of failures are summed; times that are distributions are convolved.
+
+    Args:
+        stages: in order, each of another name.
+        attempts: failures until the sequence is given up, at least 1.
+
+    Raises ValueError if there is no attempt or no stage, if two stages have one name, or a failure goes back to a stage
+    that is not there or comes later.
     """
     back = check_sequence(stages, attempts)
     locked: list[TimeDistribution] = []
@@ -245,7 +255,7 @@ def solve(stages: Sequence[Stage], attempts: int) -> Outcome:
 
 
 def check_sequence(stages: Sequence[Stage], attempts: int) -> tuple[int, ...]:
-    """Index of the stage to which each stage goes back; raises `ValueError` as `solve` does."""
+    """Index of the stage to which each stage goes back; raises ValueError as `solve_sequence` does."""
     require_count("the number of attempts", attempts)
     names = [stage.name for stage in stages]
     if not names:
@@ -259,3 +269,69 @@ def check_sequence(stages: Sequence[Stage], attempts: int) -> tuple[int, ...]:
                 f" one of {', '.join(names[: index + 1])}"
             )
     return tuple(names.index(s.on_failure) if s.on_failure else i for i, s in enumerate(stages))
+
+
+# ------------------------------------------------------------------------------------------------------------ simulated
+@dataclass(frozen=True, slots=True)
+class Transition:
+    """One entry of a log: at `time_s` the chain leaves `stage` for `to`, and why."""
+
+    time_s: float
+    stage: str
+    to: str
+    cause: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SequenceRuns:
+    """Simulated sequences: whether each locked, and when it locked or was given up; (runs,) arrays."""
+
+    locked: NDArray[np.bool_]
+    time_s: Floats
+
+
+def simulate(stages: Sequence[Stage], attempts: int, runs: int, seed: int) -> SequenceRuns:
+    """Draw the sequence event by event; `attempts` as in `solve_sequence`.
+
+    Raises ValueError as it does, and for no run.
+    """
+    require_count("the number of runs", runs)
+    back = check_sequence(stages, attempts)
+    draw = np.random.Generator(np.random.Philox(key=seed))
+    logs = [_run(stages, back, attempts, draw) for _ in range(runs)]
+    return SequenceRuns(np.array([log[-1].to == LOCKED for log in logs]), np.array([log[-1].time_s for log in logs]))
+
+
+def simulate_log(stages: Sequence[Stage], attempts: int, seed: int) -> tuple[Transition, ...]:
+    """Log of one run: that of the first run of `simulate` with the same seed."""
+    back = check_sequence(stages, attempts)
+    return tuple(_run(stages, back, attempts, np.random.Generator(np.random.Philox(key=seed))))
+
+
+_DONE = "done"
+
+
+def _run(stages: Sequence[Stage], back: Sequence[int], attempts: int, draw: np.random.Generator) -> list[Transition]:
+    time_s, index, failures = 0.0, 0, 0
+    log: list[Transition] = []
+    while index < len(stages) and failures < attempts:
+        stage = stages[index]
+        if draw.random() < stage.success_probability:
+            time_s += _duration(stage, draw)
+            following, cause = index + 1, _DONE
+        else:
+            time_s += stage.failure_s
+            failures += 1
+            following, cause = back[index], f"time-out, failure {failures} of {attempts}"
+        name = stages[following].name if following < len(stages) else LOCKED
+        log.append(Transition(time_s, stage.name, LOST if failures == attempts else name, cause))
+        index = following
+    return log
+
+
+def _duration(stage: Stage, draw: np.random.Generator) -> float:
+    if not isinstance(stage.duration_s, TimeDistribution):
+        return stage.duration_s
+    cumulative = np.cumsum(stage.duration_s.weight)
+    index = int(np.searchsorted(cumulative, draw.random() * cumulative[-1], side="right"))
+    return float(stage.duration_s.time_s[min(index, cumulative.size - 1)])

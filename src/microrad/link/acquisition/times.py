@@ -28,7 +28,7 @@ class TimeDistribution:
 
     @property
     def mean_s(self) -> float:
-        """Mean time given success; raises `ValueError` when success never comes."""
+        """Mean time given success; raises ValueError when success never comes."""
         return float(np.dot(self.time_s, self.weight)) / self._certain()
 
     @property
@@ -44,7 +44,7 @@ class TimeDistribution:
     def quantile(self, probability: float) -> float:
         """Earliest time by which success has come with `probability`, failure counted, in s.
 
-        Raises `ValueError` for a probability that is not above 0 or is above the probability of success.
+        Raises ValueError for a probability that is not above 0 or is above the probability of success.
         """
         if not 0.0 < probability <= self.probability * (1.0 + 1e-12):
             raise ValueError(

@@ -4,14 +4,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from microrad.core.arrays import Floats
+from microrad.link.acquisition.checks import require_angle, require_not_negative, require_overlap, require_positive
 from microrad.link.acquisition.detection import detection_times
-from microrad.link.acquisition.limits import require_angle, require_not_negative, require_positive
 from microrad.link.acquisition.scan import Detector, Search, Spiral, highest_speed
-
-_Array = NDArray[np.float64]
-
 
 _WIDE_PER_RADIUS = math.sqrt(2.0)
 """Half angle at 1/e2 of the beam with the most irradiance at a radius that it has to cover, over that radius."""
@@ -31,13 +29,13 @@ class Receiver:
     shortest_s: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse values that are not positive."""
+        """Raises ValueError if a value is not above 0, or the shortest time below 0."""
         require_positive("the receiver's aperture area", self.aperture_area_m2, "m^2")
         require_positive("the power that the receiver needs", self.power_w, "W")
         require_positive("the time in which it does", self.time_s, "s")
         require_not_negative("the shortest detection time", self.shortest_s, "s")
 
-    def detection_time_s(self, power_w: ArrayLike) -> _Array:
+    def detection_time_s(self, power_w: ArrayLike) -> Floats:
         """Time to detection at each received power, at least `shortest_s`."""
         less = self.power_w / np.asarray(power_w, dtype=np.float64)
         return np.asarray(np.maximum(self.time_s * less**2, self.shortest_s))
@@ -59,22 +57,19 @@ class Beams:
     overlap: float
 
     def __post_init__(self) -> None:
-        """Refuse values that are not positive, and an overlap that is no share."""
+        """Raises ValueError if a value is not above 0, or the overlap not from 0 to below 1."""
         require_positive("the transmitted power", self.power_w, "W")
         require_positive("the range", self.range_m, "m")
         require_angle("the narrow beam's half angle", self.narrow_half_angle_rad)
         require_angle("the beam's radius", self.beam_radius_rad)
-        if not 0.0 <= self.overlap < 1.0:
-            raise ValueError(
-                f"the overlap is {self.overlap:g}: it must be 0 or more and below 1, a share of a diameter"
-            )
+        require_overlap(self.overlap)
 
     @property
     def edge_irradiance_w_m2(self) -> float:
         """Irradiance at the partner where the narrow beam is just used."""
         return float(self.irradiance_w_m2(self.narrow_half_angle_rad, self.beam_radius_rad))
 
-    def irradiance_w_m2(self, half_angle_rad: ArrayLike, off_axis_rad: ArrayLike) -> _Array:
+    def irradiance_w_m2(self, half_angle_rad: ArrayLike, off_axis_rad: ArrayLike) -> Floats:
         """Irradiance of a Gaussian beam at the partner: 2 P / (pi w^2 L^2) exp(-2 (angle / w)^2), w at 1/e2."""
         half = np.asarray(half_angle_rad, dtype=np.float64)
         off = np.asarray(off_axis_rad, dtype=np.float64)
@@ -90,14 +85,14 @@ class Trade:
     `scan_time_s`, detects with `scan_probability` and then takes `scan_mean_time_s` in the mean, at `speed_rad_s`.
     """
 
-    sigma_rad: _Array
-    radius_rad: _Array
-    wide_full_angle_rad: _Array
-    wide_time_s: _Array
-    wide_probability: _Array
-    scan_time_s: _Array
-    scan_mean_time_s: _Array
-    scan_probability: _Array
+    sigma_rad: Floats
+    radius_rad: Floats
+    wide_full_angle_rad: Floats
+    wide_time_s: Floats
+    wide_probability: Floats
+    scan_time_s: Floats
+    scan_mean_time_s: Floats
+    scan_probability: Floats
     speed_rad_s: float
 
 
@@ -113,7 +108,7 @@ def wide_against_scan(
     Both are dimensioned at the edge: the wide beacon integrates until a target on the radius of `coverage` is
     detected, the scan is as slow as a target half way between two tracks and `beam_radius_rad` off the axis needs. The
     wide beam's half angle at 1/e2 is sqrt(2) times the radius: no other is brighter there. It sees no `jitter_rms_rad`,
-    which is small against it. Raises `ValueError` for tracks that do not overlap.
+    which is small against it. Raises ValueError for tracks that do not overlap.
     """
     sigma = np.atleast_1d(np.asarray(sigma_rad, dtype=np.float64))
     if beams.overlap == 0.0:

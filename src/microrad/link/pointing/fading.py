@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 
 from microrad.core.arrays import Floats
 from microrad.core.units import format_quantity
+from microrad.link.pointing.radial_error import Jitter, density_on_circle, radial_survival
 from microrad.link.pointing.statistics import outage_probability, radius_of_loss_rad, transmission
-from microrad.link.radial_error import Jitter, density_on_circle, radial_survival
 
 ErrorRatio = Callable[[Floats], Floats]
 """Bit error ratio over received power; the power 1 is what the target needs without pointing error."""
@@ -68,7 +68,7 @@ def motion_of_spectrum(freq_hz: ArrayLike, psd_rad2_hz: ArrayLike) -> SpectralMo
     `freq_hz` has the shape (freqs,) and rises; `psd_rad2_hz` has the shape (2, freqs), axis x first. The velocity
     variance is the integral of (2 pi f)^2 S. The grid must resolve the peaks of the spectrum.
 
-    Raises `ValueError` for a grid that does not rise or is negative, a density that is negative or of another shape,
+    Raises ValueError for a grid that does not rise or is negative, a density that is negative or of another shape,
     and values that are not finite.
     """
     freq, psd = _checked_spectrum(freq_hz, psd_rad2_hz)
@@ -124,7 +124,7 @@ def level_crossing_rate_hz(jitter: Jitter, velocity_rms_rad_s: tuple[float, floa
     sv_n^2 = cos^2 sv_x^2 + sin^2 sv_y^2 (Rice 1944, for two axes): velocity and angle at the same instant are
     independent. Equal axes without bias give sv / sqrt(2 pi) R / s^2 exp(-R^2 / (2 s^2)).
 
-    `velocity_rms_rad_s` is per axis. Raises `ValueError` for a velocity that is negative or not finite, an axis that
+    `velocity_rms_rad_s` is per axis. Raises ValueError for a velocity that is negative or not finite, an axis that
     moves without jitter or jitters without moving, and a negative radius.
     """
     _check_velocity(jitter, velocity_rms_rad_s)
@@ -168,7 +168,7 @@ def fades(
 ) -> Fades:
     """Fades by more than `margin_db` below the power on axis; half angle and margin are broadcast.
 
-    Raises `ValueError` as `level_crossing_rate_hz` and `outage_probability`. A velocity rms from a spectrum that ends
+    Raises ValueError as `level_crossing_rate_hz` and `outage_probability`. A velocity rms from a spectrum that ends
     too early makes the fades too few and too long: see `SpectralMotion.warning`.
     """
     rate = level_crossing_rate_hz(jitter, velocity_rms_rad_s, radius_of_loss_rad(half_angle_rad, margin_db))
@@ -181,7 +181,7 @@ def fades(
 def mean_error_ratio(jitter: Jitter, half_angle_rad: float, extra_power_db: float, error_ratio: ErrorRatio) -> float:
     """Mean over the pointing error of `error_ratio` at the received power 10^(extra_power_db / 10) h.
 
-    Raises `ValueError` when `error_ratio` does not give one ratio from 0 to 1 for each power, or one that grows with
+    Raises ValueError when `error_ratio` does not give one ratio from 0 to 1 for each power, or one that grows with
     the power, and for a half angle not above 0.
     """
     power, share = _power_shares(jitter, half_angle_rad)
@@ -215,7 +215,7 @@ def uncoded_penalty_db(jitter: Jitter, half_angle_rad: float, error_ratio: Error
     if there is one, over the power relative to what the target needs without pointing error: its value at 1 is the
     target.
 
-    Raises `NoPowerError` when `MOST_POWER_DB` do not reach the target, `ValueError` when that is not between 0 and 1,
+    Raises NoPowerError when `MOST_POWER_DB` do not reach the target, `ValueError` when that is not between 0 and 1,
     and as `mean_error_ratio`.
     """
     power, share = _power_shares(jitter, half_angle_rad)
@@ -233,6 +233,6 @@ def uncoded_penalty_db(jitter: Jitter, half_angle_rad: float, error_ratio: Error
             f"the mean bit error ratio stays above {target:g} even with {MOST_POWER_DB:g} dB more power; "
             "widen the beam or reduce the jitter"
         )
-    from scipy.optimize import brentq  # here: slow to load
+    from scipy.optimize import brentq
 
     return float(brentq(missed, 0.0, MOST_POWER_DB, xtol=1e-9))

@@ -7,21 +7,55 @@ from numpy.typing import ArrayLike
 
 from microrad.core.arrays import Floats
 from microrad.core.budget import Line, root_sum_square
-from microrad.link.model import Shared
-from microrad.link.pointing.allocation import Allocation, allocate
-from microrad.link.pointing.classes import ErrorTerm, Interpretation, StatedError, basis, error_term
-from microrad.link.pointing.point_ahead import NAME, PointAheadAngle, point_ahead
+from microrad.core.units import format_quantity
+from microrad.link.budget.assembly import Shared
+from microrad.link.pointing.error_classes import ErrorTerm, Interpretation, StatedError, basis, error_term
+from microrad.link.pointing.radial_error import Jitter, radial_cdf
 from microrad.link.pointing.summation import (
+    Allocation,
     Rule,
     Summation,
+    allocate,
     exact_total_rad,
     mean_and_sigma,
     summations,
 )
-from microrad.link.radial_error import Jitter, radial_cdf
 from microrad.mission.model import Source, source_text
 from microrad.mission.tables.link import Beacon, half_angle_rad
-from microrad.mission.tables.pointing import Pointing
+from microrad.mission.tables.pointing import PointAhead, Pointing, point_ahead_rad
+
+NAME = "Point-ahead"
+"""What the budget calls its line."""
+
+
+@dataclass(frozen=True, slots=True)
+class PointAheadAngle:
+    """The point-ahead angle of a mission, and what the budget has to carry of it.
+
+    `error_rad` is what the correction leaves, radial, or the whole angle about one axis when `corrected` is false.
+    """
+
+    angle_rad: float
+    corrected: bool
+    error_rad: float
+
+    @property
+    def stated(self) -> StatedError:
+        """The line of the budget: a constant error, and its largest value."""
+        return StatedError(NAME, self.error_rad, "bias", "bound", "radial" if self.corrected else "x")
+
+    @property
+    def basis(self) -> str:
+        """How the line comes about."""
+        shown = format_quantity(self.angle_rad, "rad", 3)
+        return f"what correcting {shown} leaves" if self.corrected else f"2 v / c = {shown}, not corrected"
+
+
+def point_ahead(table: PointAhead) -> PointAheadAngle:
+    """The angle of a mission and what is left of it."""
+    angle = point_ahead_rad(table.transverse_velocity_m_s)
+    return PointAheadAngle(angle, table.corrected, table.error_rad if table.corrected else angle)
+
 
 INTERPRETATIONS: dict[Interpretation, str] = {
     "temporal": "share of the time of the worst-case satellite, at 3 sigma of all satellites or at the stated bound",
@@ -84,7 +118,7 @@ class OpenLoopPointing:
     def total_rad(self, rule: str) -> float:
         """The total by a rule: "rss", "esa-1993", "ecss-axis", "ecss-radial", "rayleigh" or "exact".
 
-        Raises `ValueError` for another.
+        Raises ValueError for another.
         """
         for each in self.summations:
             if each.rule == rule:
@@ -94,19 +128,19 @@ class OpenLoopPointing:
     def coverage(self, radius_rad: ArrayLike) -> Floats:
         """Probability that the radial error is below each radius, for instance where the beacon's power suffices.
 
-        Exact for the Gaussian of `error`. Raises `ValueError` for a negative radius.
+        Exact for the Gaussian of `error`. Raises ValueError for a negative radius.
         """
         return radial_cdf(self.error, radius_rad)
 
     def allocation(self, total_rad: float, rule: Rule = "ecss-radial") -> tuple[Allocation, ...]:
-        """What a total leaves for each line, the others unchanged; raises `ValueError` as `allocate`."""
+        """What a total leaves for each line, the others unchanged; raises ValueError as `allocate`."""
         return allocate(
             self.stated, total_rad, rule=rule, confidence=self.confidence, interpretation=self.interpretation
         )
 
     @property
     def beacon_half_angle_rad(self) -> float:
-        """Half angle of the beacon at 1/e2; raises `ValueError` for a mission without one, as the two below."""
+        """Half angle of the beacon at 1/e2; raises ValueError for a mission without one, as the two below."""
         return _of_beacon(self.reading).half_angle_rad
 
     @property
@@ -130,10 +164,17 @@ def open_loop_budget(
 ) -> OpenLoopPointing:
     """Open-loop errors by every rule against the beacon (paper, section 2.1: 780 µrad cover their root sum square).
 
-    One statistical interpretation holds for all lines. "temporal" asks for the mission's confidence as a share of the
-    time of the worst-case satellite, "mixed" over the times of all satellites: see `error_term`. Point-ahead is a line
-    where the mission has it. Raises `ValueError` for a mission without pointing errors, and for a line that stands for
-    point-ahead as well.
+    Point-ahead is a line where the mission has it.
+
+    Args:
+        pointing: the mission's table of errors and confidence.
+        shared: terminals, conventions and point-ahead of the mission.
+        beacon: the beam that has to cover the errors; None where the mission has none.
+        sources: where each value of the mission comes from, by key.
+        interpretation: of all lines. "temporal": the confidence is a share of the time of the worst-case satellite,
+            "mixed": of the times of all satellites; see `error_term`.
+
+    Raises ValueError if the mission states no pointing errors, or a line stands for point-ahead as well.
     """
     if pointing is None:
         raise ValueError("the mission states no pointing errors; give it the table [pointing]")

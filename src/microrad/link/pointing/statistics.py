@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from microrad.core.arrays import Floats
 from microrad.core.units import format_quantity
-from microrad.link.radial_error import Jitter, at_least_zero, radial_quantile, radial_survival
+from microrad.link.pointing.radial_error import Jitter, at_least_zero, radial_quantile, radial_survival
 
 _DB_PER_SQUARE = 20.0 / math.log(10.0)  # loss in dB is 8.686 (r / theta)^2
 
@@ -51,7 +51,7 @@ def mean_transmission(jitter: Jitter, half_angle_rad: ArrayLike) -> Floats:
 
     b is the bias and s the rms of the axis (the Gaussian integral, done). Equal axes without bias give
     1 / (1 + 4 s^2 / theta^2), as the density beta h^(beta - 1), beta = theta^2 / (4 s^2), of Toyoshima et al. (2002).
-    Raises `ValueError` for a half angle that is not above 0.
+    Raises ValueError for a half angle that is not above 0.
     """
     return np.asarray(10.0 ** (-0.1 * mean_loss_db(jitter, half_angle_rad)))
 
@@ -61,7 +61,7 @@ def outage_probability(jitter: Jitter, half_angle_rad: ArrayLike, margin_db: Arr
     """P(pointing loss > margin): the share of time that a fade margin above the power on axis does not cover.
 
     Half angle and margin are broadcast. Equal axes without bias give P(h < x) = x^beta, beta as in
-    `mean_transmission`. Raises `ValueError` for a negative margin or a half angle not above 0.
+    `mean_transmission`. Raises ValueError for a negative margin or a half angle not above 0.
     """
     return radial_survival(jitter, radius_of_loss_rad(half_angle_rad, margin_db))
 
@@ -106,7 +106,7 @@ def best_divergence_for_outage(
     """Half angle with the most power at the loss exceeded with `probability`: sqrt(2) times that radial error.
 
     The loss there is 4.343 dB whatever the bias and the axes, unless the limit binds. Equal axes s without bias give
-    2 s sqrt(ln(1/p)). Raises `ValueError` as `best_divergence_for_static_error` and `radial_quantile`.
+    2 s sqrt(ln(1/p)). Raises ValueError as `best_divergence_for_static_error` and `radial_quantile`.
     """
     radius = float(radial_quantile(jitter, probability))
     return best_divergence_for_static_error(
@@ -119,7 +119,7 @@ def best_divergence_for_static_error(
 ) -> BestDivergence:
     """Half angle with the most power at a static radial error: sqrt(2) times it, where 8/theta^2 h is largest.
 
-    Raises `ValueError` for a negative error, a current half angle below the smallest, or no error and no limit.
+    Raises ValueError for a negative error, a current half angle below the smallest, or no error and no limit.
     """
     error = float(at_least_zero(error_rad, "radial error", "rad"))
     limit = float(at_least_zero(smallest_half_angle_rad, "smallest half angle", "rad"))

@@ -6,21 +6,82 @@ Powers are averages over marks and spaces (or slots) at the detector; rates are 
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from microrad.core.arrays import Floats
 from microrad.core.budget import Line
+from microrad.core.units import format_quantity
 from microrad.link.gains import photon_energy_j
-from microrad.link.receivers.checks import (
-    LEAST_RATIO,
-    checked_powers,
-    require,
-    require_above_zero,
-    require_zero_or_more,
-    shown,
-)
+
+SOURCE = "receiver and power as given"
+LEAST_RATIO = 1e-18  # sums over Poisson counts are cut at about 1e-22
+LEAST_COUNT = 1e-30  # stands for none, so that logarithms exist
+
+
+def normal_deviate(ratio: float) -> float:
+    """Q for which the normal tail is `ratio`."""
+    return -NormalDist().inv_cdf(ratio)
+
+
+def mark_and_space(extinction_ratio: float) -> tuple[float, float]:
+    """Power of a mark and of a space over the average."""
+    space = 2.0 / (extinction_ratio + 1.0)
+    return 2.0 - space, space
+
+
+def spontaneous_photons(noise_figure_db: float) -> float:
+    """n_sp = F / 2 at high gain; "3 dB" is taken as 10 log10 2."""
+    return max(float(10.0 ** (noise_figure_db / 10.0)) / 2.0, 1.0)
+
+
+def checked_powers(power_w: ArrayLike) -> Floats:
+    """The powers as an array; raises ValueError if one is negative or not finite."""
+    powers = np.asarray(power_w, dtype=np.float64)
+    for power in powers[~((powers >= 0.0) & (powers < math.inf))].flat[:1]:
+        require_zero_or_more("the received power", float(power), "W")
+    return powers
+
+
+def shown(value: float, unit: str) -> str:
+    """A value with its unit for a message."""
+    return format_quantity(value, unit).rstrip()
+
+
+def require(holds: bool, what: str, value: float, unit: str, limit: str) -> None:
+    """Raises ValueError, which names the value and its limit, unless it holds."""
+    if not holds:
+        raise ValueError(f"{what} is {shown(value, unit)}: {limit}")
+
+
+def require_zero_or_more(what: str, value: float, unit: str, advice: str = "") -> None:
+    """Raises ValueError if the value is below zero or not finite."""
+    zero = f"0 {unit}".rstrip()
+    require(0.0 <= value < math.inf, what, value, unit, f"it must be finite and not below {zero}{advice}")
+
+
+def require_above_zero(what: str, value: float, unit: str) -> None:
+    """Raises ValueError if the value is not above zero, or not finite."""
+    require(0.0 < value < math.inf, what, value, unit, f"it must be finite and above 0 {unit}")
+
+
+def require_efficiency(what: str, value: float) -> None:
+    """Raises ValueError if the efficiency is not above 0 and at most 1."""
+    require(0.0 < value <= 1.0, what, value, "", "it must lie above 0, up to 1 (one count or electron for each photon)")
+
+
+def require_extinction(ratio: float) -> None:
+    """Raises ValueError if a mark is no brighter than a space."""
+    limit = "it is the power of a mark over that of a space, as a ratio and above 1 (inf: dark spaces)"
+    require(ratio > 1.0, "the extinction ratio", ratio, "", limit)
+
+
+def require_noise_figure(noise_figure_db: float) -> None:
+    """Raises ValueError if the noise figure is below the quantum limit."""
+    limit = "it must be at least 3 dB, the quantum limit of an amplifier of both quadratures at high gain"
+    require(3.0 <= noise_figure_db < math.inf, "the noise figure", noise_figure_db, "dB", limit)
 
 
 class RateError(ValueError):
@@ -40,7 +101,7 @@ class Receiver(ABC):
     (20 log10 Q) counts half in optical power for a receiver limited by thermal noise. The gain is one number: at
     another ratio than the target, `bit_error_ratio_at` takes it as unchanged.
 
-    Raises `ValueError` for a value without meaning.
+    Raises ValueError for a value without meaning.
     """
 
     wavelength_m: float
@@ -50,7 +111,7 @@ class Receiver(ABC):
     code_rate: float = 1.0
 
     def __post_init__(self) -> None:
-        """Refuse what is no receiver."""
+        """Raises ValueError if a value is outside the limits that the class names."""
         require_above_zero("the wavelength", self.wavelength_m, "m")
         require(
             LEAST_RATIO <= self.bit_error_ratio < 0.5,
@@ -68,7 +129,7 @@ class Receiver(ABC):
     def bit_error_ratio_at(self, power_w: ArrayLike, data_rate_bit_s: ArrayLike) -> Floats:
         """Bit error ratio (after the decoder) at the average power `power_w` and the data rate; the two broadcast.
 
-        Raises `ValueError` for a negative power and a rate that is not positive, `RateError` for a rate above the
+        Raises ValueError for a negative power and a rate that is not positive, `RateError` for a rate above the
         bandwidth.
         """
         powers = checked_powers(power_w)
@@ -78,7 +139,7 @@ class Receiver(ABC):
     def required_power_w(self, data_rate_bit_s: ArrayLike) -> Floats:
         """Average power that reaches the target bit error ratio at each data rate.
 
-        Raises `ValueError` for a rate that is not positive, `RateError` for one above the bandwidth.
+        Raises ValueError for a rate that is not positive, `RateError` for one above the bandwidth.
         """
         rate = self._rates(data_rate_bit_s)
         return np.asarray(self._power_w(rate) / self._code_gain, dtype=np.float64)

@@ -7,9 +7,9 @@ import numpy as np
 
 from microrad.core.arrays import Floats
 from microrad.core.budget import Line
-from microrad.link.receivers.base import Receiver
-from microrad.link.receivers.checks import (
+from microrad.link.receivers.base import (
     SOURCE,
+    Receiver,
     normal_deviate,
     require_efficiency,
     require_noise_figure,
@@ -32,7 +32,7 @@ class DpskPreamplified(Receiver):
     background_photons_per_mode: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse what is no preamplifier."""
+        """Raises ValueError if the noise figure is below 3 dB or the background negative."""
         Receiver.__post_init__(self)
         require_noise_figure(self.noise_figure_db)
         require_zero_or_more("the background in one mode", self.background_photons_per_mode, "photon")
@@ -70,7 +70,7 @@ class BpskHomodyne(Receiver):
     background_photons_per_mode: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse what is no detector."""
+        """Raises ValueError if the efficiency is not in (0, 1] or the background negative."""
         Receiver.__post_init__(self)
         require_efficiency("the quantum efficiency", self.quantum_efficiency)
         require_zero_or_more("the background in one mode", self.background_photons_per_mode, "photon")

@@ -6,12 +6,12 @@ from functools import partial
 from microrad import link, orbit
 from microrad.core.progress import Progress
 from microrad.core.units import format_quantity
-from microrad.link.partner_search import Found
+from microrad.link.acquisition.partner_search import Found
 from microrad.link.requirement import derived_from
 from microrad.link.study import LinkStudy
-from microrad.mission.model import LinkMission
-from microrad.mission.tables.orbit import Orbits
+from microrad.mission.tables.operations import Operations
 from microrad.orbit import operations
+from microrad.orbit.base import required
 from microrad.orbit.day import flow
 from microrad.orbit.day.assumptions import NOTHING, Case, Known, Numbers, Swing, swings
 from microrad.orbit.day.flow import Closing, PointingLoss, Way
@@ -25,13 +25,11 @@ __all__ = [
     "Numbers",
     "PointingLoss",
     "Swing",
-    "View",
     "Way",
-    "acquired",
     "given_loss",
     "loss_at",
     "relay",
-    "run",
+    "run_day_study",
     "times",
     "view",
 ]
@@ -41,12 +39,14 @@ __all__ = [
 class DayStudy:
     """The span of a mission by both ways, and the assumptions that move the comparison, the weightiest first.
 
-    ``encounters`` are the contacts of the relay as it grants them, with what their line of sight reaches. ``closings``
-    are the laser's rates, highest first, with how far each reaches under ``loss``; ``derived`` are the inputs of the
-    laser link that were chosen for its margin (`requirement.derived_from`), so that its reach follows from that choice.
+    ``operations`` is the mission's table, ``data`` its communication link. ``encounters`` are the contacts of the relay
+    as it grants them, with what their line of sight reaches. ``closings`` are the laser's rates, highest first, with
+    how far each reaches under ``loss``; ``derived`` are the inputs of the laser link that were chosen for its margin
+    (`requirement.derived_from`), so that its reach follows from that choice.
     """
 
-    mission: LinkMission
+    operations: Operations
+    data: link.DataLink
     view: View
     encounters: tuple[Encounter, ...]
     loss: PointingLoss
@@ -83,29 +83,27 @@ def loss_at(data: link.DataLink, margin_db: float, source: str) -> PointingLoss:
     return PointingLoss(link.received_on_axis_dbm(data) - needed - margin_db, 0.0, source)
 
 
-def acquired(links: LinkStudy) -> Found | None:
-    """The acquisition by which the mission's partner is found, or None where it has none."""
-    o, finding = links.file.mission.operations, links.finding
-    if finding is None or o is None:
-        return None
-    return finding.wide if o.acquisition == "wide beacon" else finding.scan
-
-
-def _pair(links: LinkStudy, orbits: Orbits | None) -> orbit.Pair:
-    """The terminals of the links on orbits whose files are those of the links'."""
-    return orbit.pair(orbits, links.data.shared.terminals, links.file.path.parent, links.file.contents)
+def _begin(links: LinkStudy) -> tuple[Operations, partial[orbit.Pair], View, Found | None]:
+    """The table of operations; what makes the terminals of given orbits; their contacts, and their acquisition."""
+    m, file = links.file.mission, links.file
+    pair_of = partial(orbit.pair, ends=m.terminals, folder=file.path.parent, contents=file.contents)
+    seen = view(pair_of(m.orbit), m.communication.wavelength_m)
+    o = required(m.operations, "operations", operations.OperationsError)
+    return o, pair_of, seen, None if links.finding is None else links.finding.way(o.acquisition)
 
 
 def relay(links: LinkStudy, loss: PointingLoss) -> Way:
-    """The way by the relay alone: what `run` finds of it, without the rest of the day."""
-    m = links.file.mission
-    seen = view(_pair(links, m.orbit), m.communication.wavelength_m)
-    o = flow.table(m.operations)
-    rates = flow.rate_table(flow.closings(o, links.data, loss))
-    return flow.relay(o, seen, rates, loss.outage, acquired(links), 1.0)
+    """The way by the relay alone: what `run_day_study` finds of it, without the rest of the day.
+
+    Args:
+        links: the links of the mission, with their acquisition.
+        loss: what pointing costs the laser link.
+    """
+    o, _, seen, found = _begin(links)
+    return flow.relay(o, seen, flow.rate_table(flow.closings(o, links.data, loss)), loss.outage, found, 1.0)
 
 
-def run(
+def run_day_study(
     links: LinkStudy, loss: PointingLoss | None = None, on_progress: Progress = lambda done, total, what: None
 ) -> DayStudy:
     """The day of a mission that has the tables `orbit` and `operations`.
@@ -120,19 +118,20 @@ def run(
     """
     m = links.file.mission
     loss = given_loss(links) if loss is None else loss
-    seen, o = view(_pair(links, m.orbit), m.communication.wavelength_m), flow.table(m.operations)
+    o, pair_of, seen, found = _begin(links)
     if o.contact is not None and seen.encounters and o.contact.number > len(seen.encounters):
         raise operations.OperationsError(
             f"operations.contact.number is {o.contact.number}, and the span has {len(seen.encounters)} contacts: give "
             "a number up to that, or a longer orbit.duration"
         )
-    found, closing = acquired(links), flow.closings(o, links.data, loss)
-    heard = flow.heard(o.downlink, seen.pair)
+    closing = flow.closings(o, links.data, loss)
+    heard = flow.station_passes(o.downlink, seen.pair)
     relay = flow.relay(o, seen, flow.rate_table(closing), loss.outage, found, 1.0)
     assert m.orbit is not None  # else there are no terminals
-    known = Known(Case(o, m.orbit, links.data, loss), partial(_pair, links), seen, heard, found)
+    known = Known(Case(o, m.orbit, links.data, loss), pair_of, seen, heard, found)
     return DayStudy(
-        mission=m,
+        operations=o,
+        data=links.data,
         view=seen,
         loss=loss,
         closings=closing,

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 from microrad import link, orbit
 from microrad.core.units import format_quantity
-from microrad.link.partner_search import Found
+from microrad.link.acquisition.partner_search import Found
 from microrad.mission.tables.operations import Operations
 from microrad.mission.tables.orbit import HIGHEST_MASK_RAD, Orbits, VisibilityLimits
 from microrad.orbit.day import flow, geometry
@@ -75,7 +75,7 @@ class Known:
     own: Case
     pair_of: Callable[[Orbits], orbit.Pair]
     seen: geometry.View
-    heard: tuple[flow.Heard, ...]
+    heard: tuple[flow.StationPass, ...]
     found: Found | None
 
 
@@ -86,7 +86,7 @@ def numbers(case: Case, known: Known) -> Numbers:
     if moved:
         seen = geometry.view(known.pair_of(case.orbits), case.data.table.wavelength_m)
     if moved or (o.downlink and own.downlink and o.downlink.stations is not own.downlink.stations):
-        heard = flow.heard(o.downlink, seen.pair)
+        heard = flow.station_passes(o.downlink, seen.pair)
     rates = flow.rate_table(flow.closings(o, case.data, case.loss))
     relay = flow.relay(o, seen, rates, case.loss.outage, known.found, case.slower)
     direct = flow.direct(o, seen, heard)

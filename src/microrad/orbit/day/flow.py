@@ -8,7 +8,7 @@ import numpy as np
 
 from microrad import link, orbit
 from microrad.core.arrays import Floats
-from microrad.link.partner_search import Found
+from microrad.link.acquisition.partner_search import Found
 from microrad.mission.tables.operations import Downlink, Operations
 from microrad.orbit import operations
 from microrad.orbit.day.geometry import View, cut_at, longest_gap_s
@@ -96,13 +96,6 @@ def closings(o: Operations, data: link.DataLink, loss: PointingLoss) -> tuple[Cl
     return tuple(found)
 
 
-def table(given: Operations | None) -> Operations:
-    """The mission's table of operations; `operations.OperationsError` without one."""
-    if given is None:
-        raise operations.OperationsError("the mission has no table [operations]: microrad init writes one")
-    return given
-
-
 def rate_table(found: tuple[Closing, ...]) -> operations.RateTable | None:
     """The rates as steps of range; None where the receiver takes none."""
     steps: list[operations.Step] = []
@@ -147,6 +140,7 @@ def relay(
 
 
 def _of_span(contacts: tuple[orbit.Contact, ...], seen: View) -> int:
+    """How many of the contacts begin within the span."""
     return sum(c.start_s < seen.duration_s for c in contacts)
 
 
@@ -180,11 +174,11 @@ def _locks(found: Found | None, contacts: int, seed: int, run: int, slower: floa
 
 
 # -------------------------------------------------------------------------------------------------------------- direct
-Heard = tuple[orbit.Pass, str]
+StationPass = tuple[orbit.Pass, str]
 """A pass and the station that hears it."""
 
 
-def heard(down: Downlink | None, pair: orbit.Pair) -> tuple[Heard, ...]:
+def station_passes(down: Downlink | None, pair: orbit.Pair) -> tuple[StationPass, ...]:
     """Every pass over every station of the direct downlink; none without one."""
     return tuple(
         (each, station.name)
@@ -193,7 +187,7 @@ def heard(down: Downlink | None, pair: orbit.Pair) -> tuple[Heard, ...]:
     )
 
 
-def direct(o: Operations, seen: View, passes: tuple[Heard, ...]) -> Way | None:
+def direct(o: Operations, seen: View, passes: tuple[StationPass, ...]) -> Way | None:
     """The radio downlink, or None without one. The station that rises first is kept until the satellite sets there."""
     down = o.downlink
     if down is None:
@@ -226,7 +220,11 @@ def _way(
         operations.deliver(o.instrument_rate_bit_s, span, o.store_bit, services, whole, delay_s) for services in runs
     ]
     inside = _of_span(contacts, seen)
-    carried = np.array([[_until(s, span[1]) for s in services[:inside]] for services in runs]).reshape(len(runs), -1)
+    before = [
+        [float(np.dot(s.mean_rate_bit_s, np.diff(np.minimum(s.edges_s, span[1])))) for s in services[:inside]]
+        for services in runs
+    ]  # what each contact could carry before the end of the span
+    carried = np.array(before).reshape(len(runs), -1)
     total, shown = carried.sum(axis=1), tuple(cut_at(c, span[1]) for c in contacts[:inside])
     return Way(
         name=name,
@@ -244,9 +242,3 @@ def _way(
         history=histories[0],
         latency=operations.pool([h.latency for h in histories]),
     )
-
-
-def _until(service: operations.Service, end_s: float) -> float:
-    """What a contact could carry before the end of the span."""
-    edges = np.minimum(service.edges_s, end_s)
-    return float(np.dot(service.mean_rate_bit_s, np.diff(edges)))

@@ -11,10 +11,10 @@ from microrad import orbit
 from microrad.core.arrays import Floats
 from microrad.core.units import SPEED_OF_LIGHT_M_S, format_quantity
 from microrad.mission.model import LinkMission
-from microrad.orbit.contacts import EARTH, END, START, coarse_step_s, coarse_times
-from microrad.orbit.events import positive
+from microrad.orbit.earth.sun import shadow_rad
 from microrad.orbit.from_mission import TAIL_S
-from microrad.orbit.sun import shadow_rad
+from microrad.orbit.visibility.contacts import EARTH, END, START, coarse_step_s, coarse_times
+from microrad.orbit.visibility.events import positive
 
 _C = TypeVar("_C", bound=orbit.Contact)
 
@@ -123,7 +123,7 @@ def cut_at(contact: _C, end_s: float) -> _C:
 
 def view(pair: orbit.Pair, wavelength_m: float) -> View:
     """The contacts of a pair of terminals, with the Doppler shift at a wavelength; raises `orbit.OrbitError`."""
-    from scipy.interpolate import CubicHermiteSpline  # late: it loads slowly
+    from scipy.interpolate import CubicHermiteSpline
 
     found = orbit.contacts(pair.leo, pair.geo, pair.earth, pair.epoch, pair.whole_s)
     sights, own, end = [_sight(pair, c) for c in found], pair.leo.orbit, pair.span_s[1]

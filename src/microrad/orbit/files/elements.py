@@ -15,9 +15,9 @@ from decimal import Decimal
 from pathlib import Path
 
 from microrad.orbit.base import OrbitError
-from microrad.orbit.epoch import DAY_S, Epoch
+from microrad.orbit.earth.epoch import DAY_S, Epoch
 from microrad.orbit.files.messages import Field, add_field, finite, kvn_field, read_text, utc_epoch, xml_fields
-from microrad.orbit.mean_elements import REVOLUTION_RAD, ElementSet, check_theory, checked
+from microrad.orbit.propagation.mean_elements import REVOLUTION_RAD, ElementSet, check_theory, checked
 
 
 def read_elements(path: Path, name: str | None = None, data: bytes | None = None) -> tuple[ElementSet, ...]:
@@ -25,7 +25,7 @@ def read_elements(path: Path, name: str | None = None, data: bytes | None = None
 
     With `data`, these are the bytes of the file, which is not read again.
 
-    Raises `OrbitError` for a file that is not one of the formats, for the first fault in it with its line, and for a
+    Raises OrbitError for a file that is not one of the formats, for the first fault in it with its line, and for a
     name that is not in it.
     """
     text = read_text(path, data)
@@ -92,7 +92,7 @@ def checksum(line: str) -> int:
 def _two_lines(path: Path, text: str) -> Iterator[ElementSet]:
     """Element sets of two lines each, with or without a line before them that holds the name.
 
-    Raises `OrbitError` for the first fault, with its line.
+    Raises OrbitError for the first fault, with its line.
     """
     name: tuple[int, str] | None = None
     first: tuple[int, str] | None = None
@@ -120,7 +120,7 @@ def _two_lines(path: Path, text: str) -> Iterator[ElementSet]:
 
 
 def _check_line(path: Path, number: int, line: str, kind: str) -> None:
-    """Raise `OrbitError` unless this is line 1 or 2 (`kind`) of an element set, with its length and its checksum."""
+    """Raises OrbitError unless this is line 1 or 2 (`kind`) of an element set, with its length and its checksum."""
     where = f"{path}, line {number}"
     if not line.startswith(f"{kind} "):
         raise OrbitError(

@@ -10,8 +10,8 @@ import numpy as np
 
 from microrad.core.arrays import Floats
 from microrad.orbit.base import States
-from microrad.orbit.earth import ROTATION_RAD_S
-from microrad.orbit.epoch import Epoch
+from microrad.orbit.earth.epoch import Epoch
+from microrad.orbit.earth.figure import ROTATION_RAD_S
 
 FRAMES = re.compile(r"TEME|TOD|EME2000|GCRF\d*|ICRF\d*|ITRF-?\d*")
 """Names of the frames that are read, as `frame_name` gives them."""
@@ -52,7 +52,7 @@ def _from_earth_fixed(angle: Floats, position: Floats, velocity: Floats) -> Stat
 
 def _rotations(frame: str, epoch: Epoch, time: Floats) -> tuple[Floats, Floats]:
     """Matrices from `frame` to TEME and their rates, each of shape (n, 3, 3), by splines between knots."""
-    from scipy.interpolate import CubicSpline  # heavy, and only files in such frames need them
+    from scipy.interpolate import CubicSpline
     from skyfield.api import load
 
     first, last = float(time[0]), float(time[-1])

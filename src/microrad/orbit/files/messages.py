@@ -19,7 +19,7 @@ import numpy as np
 from microrad.core.arrays import Floats
 from microrad.core.folder import read_bytes
 from microrad.orbit.base import OrbitError
-from microrad.orbit.epoch import DAY_S, Epoch
+from microrad.orbit.earth.epoch import DAY_S, Epoch
 
 MOST_BYTES = 50_000_000
 """Largest file that is read: a state vector each second for four days, or each minute for most of a year."""
@@ -48,7 +48,7 @@ class Field(NamedTuple):
 
 
 def read_text(path: Path, data: bytes | None = None) -> str:
-    """Text of a file in UTF-8, lines ending in a newline; raises `OrbitError` for one that is none, or too large.
+    """Text of a file in UTF-8, lines ending in a newline; raises OrbitError for one that is none, or too large.
 
     With ``data``, these are the bytes of the file, which is not read again.
     """
@@ -79,7 +79,7 @@ def read_text(path: Path, data: bytes | None = None) -> str:
 
 
 def _check_file(path: Path) -> None:
-    """Raise `OrbitError` for a folder, a device, an empty file and one too large, `OSError` for one not found."""
+    """Raises OrbitError for a folder, a device, an empty file and one too large, `OSError` for one not found."""
     found = path.stat()
     if stat.S_ISDIR(found.st_mode):
         raise OrbitError(f"{path}: this is a folder; name the file in it")
@@ -106,7 +106,7 @@ def _binary(path: Path, byte: int) -> OrbitError:
 
 
 def kvn_field(path: Path, number: int, line: str) -> Field:
-    """The key, value and unit of a line `KEY = value [unit]`; raises `OrbitError` for any other line."""
+    """The key, value and unit of a line `KEY = value [unit]`; raises OrbitError for any other line."""
     match = _KVN.fullmatch(line) if len(line) <= _MOST_LINE else None
     if match is None:
         raise OrbitError(
@@ -117,7 +117,7 @@ def kvn_field(path: Path, number: int, line: str) -> Field:
 
 
 def add_field(fields: dict[str, Field], new: Field, path: Path) -> None:
-    """Put a field among the others; raises `OrbitError` when its key is there with another value."""
+    """Put a field among the others; raises OrbitError when its key is there with another value."""
     if new.key == "COMMENT" or new.key.startswith("USER_DEFINED"):
         return
     old = fields.setdefault(new.key, new)
@@ -169,7 +169,7 @@ class _XmlReader:
 def xml_fields(path: Path, text: str) -> Iterator[Field]:
     """The elements of an XML text in their order: those without children as fields, others as `<tag` and `</tag`.
 
-    Raises `OrbitError` for text that is not well formed, and for any document type.
+    Raises OrbitError for text that is not well formed, and for any document type.
     """
     reader = _XmlReader(path)
     for start in range(0, len(text) + 1, _BLOCK):
@@ -185,7 +185,7 @@ def xml_fields(path: Path, text: str) -> Iterator[Field]:
 
 
 def finite(path: Path, given: Field) -> float:
-    """The number of a field; raises `OrbitError` for anything else, nan and inf among it."""
+    """The number of a field; raises OrbitError for anything else, nan and inf among it."""
     try:
         number = float(given.value) if "_" not in given.value else math.nan
     except ValueError:
@@ -219,7 +219,7 @@ def _ordinal(text: str) -> int:
 
 
 def instant(path: Path, given: Field, system: str) -> tuple[int, float]:
-    """Ordinal of the day and seconds in it of a time code of CCSDS 301.0-B, A or B; raises `OrbitError`."""
+    """Ordinal of the day and seconds in it of a time code of CCSDS 301.0-B, A or B; raises OrbitError."""
     day, _, clock = given.value.partition("T")
     match = _CLOCK.fullmatch(clock)
     try:
@@ -263,7 +263,7 @@ def _minutes(text: str) -> int:
 
 
 def utc_epoch(path: Path, given: Field) -> Epoch:
-    """The instant of a field in UTC; raises `OrbitError` with its place."""
+    """The instant of a field in UTC; raises OrbitError with its place."""
     day, _ = instant(path, given, "UTC")
     clock = given.value.partition("T")[2].rstrip("Z").rstrip(".")
     try:
@@ -275,7 +275,7 @@ def utc_epoch(path: Path, given: Field) -> Epoch:
 def elapsed_s(system: str, epoch: Epoch, instants: list[tuple[int, float]], where: str) -> Floats:
     """Seconds since `epoch` of instants, each the ordinal of a day and seconds in it, in one of `TIME_SYSTEMS`.
 
-    Raises `OrbitError`, beginning with `where`, for a day of UTC outside the years of `Epoch`.
+    Raises OrbitError, beginning with `where`, for a day of UTC outside the years of `Epoch`.
     """
     days = np.array([day for day, _ in instants], dtype=np.int64)
     seconds = np.array([second for _, second in instants])

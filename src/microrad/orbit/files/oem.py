@@ -13,9 +13,8 @@ import numpy as np
 
 from microrad.core.arrays import Floats
 from microrad.orbit.base import OrbitError, States
-from microrad.orbit.earth import MU_M3_S2
-from microrad.orbit.ephemeris import SLACK_S, EphemerisOrbit, Segment
-from microrad.orbit.epoch import Epoch
+from microrad.orbit.earth.epoch import Epoch
+from microrad.orbit.earth.figure import MU_M3_S2
 from microrad.orbit.files.frames import FRAMES, frame_name, to_teme
 from microrad.orbit.files.messages import (
     TIME_SYSTEMS,
@@ -29,6 +28,7 @@ from microrad.orbit.files.messages import (
     read_text,
     xml_fields,
 )
+from microrad.orbit.propagation.ephemeris import SLACK_S, EphemerisOrbit, Segment
 
 DEFAULT_DEGREE = 7
 """Degree of the Hermite interpolation of a file that names no method: four state vectors around each time."""
@@ -54,7 +54,7 @@ class _Draft:
     values: list[list[float]] = field(default_factory=list)
 
     def add(self, path: Path, place: str, time: str, words: list[str]) -> None:
-        """Take a state vector; raises `OrbitError` for too many or too few words, and what is not a number."""
+        """Take a state vector; raises OrbitError for too many or too few words, and what is not a number."""
         if len(words) not in (6, 9):
             raise OrbitError(
                 f"{path}, {place}: {len(words) + 1} columns; a state vector has a time, three of position in km and "
@@ -78,7 +78,7 @@ def read_oem(path: Path, epoch: Epoch, name: str | None = None, data: bytes | No
     Time systems: UTC, TAI, TT, GPS. Frames: TEME, TOD, EME2000 (J2000), GCRF, ICRF, and ITRF without polar motion;
     velocities of ITRF gain the Earth's rotation. Interpolation: LAGRANGE (degree + 1 state vectors) or HERMITE
     ((degree + 1) / 2, rounded up); Hermite of degree 7 when the file names none. Covariances and accelerations are
-    passed over. Raises `OrbitError` with file, line and value for all else, for a hole within the usable times of a
+    passed over. Raises OrbitError with file, line and value for all else, for a hole within the usable times of a
     segment (a step of more than `MOST_STEPS` median ones), and for velocities that are not those of the positions.
     """
     text = read_text(path, data)
@@ -180,7 +180,7 @@ def _xml_row(path: Path, draft: _Draft, row: dict[str, Field], place: str) -> No
 
 
 def _check_metadata(path: Path, draft: _Draft) -> None:
-    """Raise `OrbitError` for a segment whose keys are missing, or whose centre, time system or frame is not read."""
+    """Raises OrbitError for a segment whose keys are missing, or whose centre, time system or frame is not read."""
     given = draft.metadata
     for key in _REQUIRED:
         if not given.get(key, Field(key, "", "", "")).value:
@@ -237,7 +237,7 @@ def _segment(path: Path, draft: _Draft, epoch: Epoch) -> Segment:
 
 
 def _check_rows(path: Path, draft: _Draft, time: Floats) -> None:
-    """Raise `OrbitError` for numbers that are not finite, times that do not rise, distances that no satellite has."""
+    """Raises OrbitError for numbers that are not finite, times that do not rise, distances that no satellite has."""
     values = np.array(draft.values)
     bad = np.flatnonzero(~np.all(np.isfinite(values), axis=1))
     if bad.size:
@@ -262,7 +262,7 @@ def _check_rows(path: Path, draft: _Draft, time: Floats) -> None:
 
 
 def _check_velocities(path: Path, draft: _Draft, time: Floats, states: States) -> None:
-    """Raise `OrbitError` for velocities that are not those of the positions, and steps that no satellite can make.
+    """Raises OrbitError for velocities that are not those of the positions, and steps that no satellite can make.
 
     On a circle of which a step covers the angle 2 x, half the sum of the velocities at its ends is the mean velocity
     between them times x / tan x. Three times what that leaves, at the largest rate that a satellite has at this
@@ -300,7 +300,7 @@ def _check_velocities(path: Path, draft: _Draft, time: Floats, states: States) -
 
 
 def _check_holes(path: Path, draft: _Draft, time: Floats, usable: tuple[float, float]) -> None:
-    """Raise `OrbitError` for a segment that would be interpolated over a hole between its state vectors."""
+    """Raises OrbitError for a segment that would be interpolated over a hole between its state vectors."""
     step = np.diff(time)
     median = float(np.median(step))
     used = (time[1:] > usable[0] + SLACK_S) & (time[:-1] < usable[1] - SLACK_S)

@@ -98,7 +98,7 @@ def contact_plan(sessions: Sequence[PlannedSession], utc: Utc, satellites: Seque
     light time rounded up to whole seconds: 1 s up to a range of 299 792 km. A session of which nothing is left, or that
     has no rate, is named in a comment.
 
-    Raises `OperationsError` for a session of more than 2^32 - 1 byte/s.
+    Raises OperationsError for a session of more than 2^32 - 1 byte/s.
     """
     day, clock = utc(0.0).removesuffix("Z").split("T")
     nodes = {name: number for number, name in enumerate((*satellites, *relays), start=1)}

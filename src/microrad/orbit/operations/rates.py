@@ -32,13 +32,13 @@ class RateTable:
     """Steps of the data rate, the highest first; in service is the first whose largest range is not exceeded.
 
     A largest range of inf never ends; one of 0 m is a rate at which the link never closes. The rates fall and the
-    ranges rise from step to step. Raises `OperationsError` for a range that is negative or nan.
+    ranges rise from step to step. Raises OperationsError for a range that is negative or nan.
     """
 
     steps: tuple[Step, ...]
 
     def __post_init__(self) -> None:
-        """Check the ranges."""
+        """Raises OperationsError if a range is negative or nan."""
         for place, step in enumerate(self.steps):
             if not step.largest_range_m >= 0.0:
                 raise OperationsError(
@@ -59,7 +59,7 @@ class Service:
     `availability` is 1 less the share of time in outage. Outages are taken as short against the pieces and their data
     as sent again: they cost volume, spread evenly, and no latency of their own.
 
-    The edges rise. Raises `OperationsError` for an availability that is not from 0 to 1.
+    The edges rise. Raises OperationsError for an availability that is not from 0 to 1.
     """
 
     edges_s: Floats
@@ -67,7 +67,7 @@ class Service:
     availability: float
 
     def __post_init__(self) -> None:
-        """Check the availability."""
+        """Raises OperationsError if the availability is not from 0 to 1."""
         if not 0.0 <= self.availability <= 1.0:
             raise OperationsError(f"the availability is {self.availability:g}; give a share of time from 0 to 1")
 

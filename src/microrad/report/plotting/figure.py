@@ -1,13 +1,14 @@
 """One figure of a report: its sheet with a title, a caption and the data it shows."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from html import escape
 
-from microrad.report.inlined import inlined
 from microrad.report.plotting import interactive
 from microrad.report.plotting.sheet import Sheet
-from microrad.report.plotting.svg import svg_of
+from microrad.report.plotting.svg import HATCH_FILL, HATCH_ID, svg_of
 from microrad.report.tables import Column, rows_of
 
 
@@ -34,8 +35,10 @@ class Figure:
 
     @property
     def labelled(self) -> str:
-        """The picture with its text alternative and ids of its own, for the page."""
-        return inlined(self.svg, self.name, self.title)
+        """The picture with its text alternative, for the page, where the id of its hatching is this figure's own."""
+        own = f"{re.sub('[^A-Za-z0-9_.-]', '-', self.name)}-1"
+        text = self.svg.replace(HATCH_ID, f'id="{own}"', 1).replace(HATCH_FILL, f'fill="url(#{own})"')
+        return text.replace("<svg ", f'<svg role="img" aria-label="{escape(self.title)}" ', 1)
 
     @property
     def static(self) -> "Figure":

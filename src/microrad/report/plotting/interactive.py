@@ -17,22 +17,8 @@ import numpy as np
 from microrad.core.arrays import Floats
 from microrad.report.plotting import scales
 from microrad.report.plotting.layout import INCH, Box, Entry, Key, Layout, Placed, layout
-from microrad.report.plotting.palette import CIVIDIS, clear, thinned
-from microrad.report.plotting.sheet import (
-    BLACK,
-    GREY,
-    WHITE,
-    Area,
-    Axis,
-    Bars,
-    Dash,
-    Field,
-    Line,
-    Rule,
-    Sheet,
-    Span,
-    Words,
-)
+from microrad.report.plotting.palette import BLACK, CIVIDIS, GREY, WHITE, clear, thinned
+from microrad.report.plotting.sheet import Area, Axis, Bars, Dash, Field, Line, Rule, Sheet, Span, Words
 
 DIGITS = 6
 _POWERS = 1.25  # by so much plotly sets powers of ten larger than other texts

@@ -1,9 +1,13 @@
-"""Colours of values, and fewer points of a curve: what both forms of a figure have in common."""
+"""Colours, and fewer points of a curve: what both forms of a figure have in common."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from microrad.core.arrays import Floats
+
+# Okabe and Ito's palette: told apart by colour-blind readers. Line styles differ too, for print in grey.
+BLACK, ORANGE, SKY, GREEN, BLUE, VERMILION = "#000000", "#E69F00", "#56B4E9", "#009E73", "#0072B2", "#D55E00"
+WHITE, GREY = "#ffffff", "#777777"
 
 MOST_POINTS = 1200  # of a curve; extremes are kept
 _PICKS = 5  # of a stretch: lowest and highest of both coordinates, and a gap

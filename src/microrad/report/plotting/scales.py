@@ -9,6 +9,7 @@ import numpy as np
 
 from microrad.core.arrays import Floats
 from microrad.report.plotting.sheet import Area, Axis, Bars, Field, Line, Mark, Panel, Rule, Span
+from microrad.report.quantities import minus, power_text
 
 LINE = 1.2  # height of a line of text over its size
 _MARGIN = 0.05  # of the data, to either side
@@ -16,7 +17,6 @@ _EACH = {"x": 40.0, "y": 22.0}  # points that a tick needs
 _LEAST_GAP = 6.0
 _DECADES_WITH_MINOR_TICKS = 6
 _STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
-_ABOVE = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 # Advance widths of DejaVu Sans from the blank to the tilde, hundredths of an em; other fonts are mostly narrower.
 _WIDTHS = (
     32, 40, 46, 84, 64, 95, 78, 27, 39, 39, 50, 84, 32, 36, 32, 34, 64, 64, 64, 64, 64, 64, 64, 64, 64, 64, 34, 34, 84,
@@ -45,9 +45,13 @@ def _hundredths(character: str) -> int:
 
 # ------------------------------------------------------------------------------------------------ limits
 def limits(axis: Axis, which: str, panels: Sequence[Panel]) -> tuple[float, float]:
-    """Those that the axis sets, and else those of the data of the panels that share it, with a margin."""
-    if axis.low is not None and axis.high is not None:
-        return axis.low, axis.high
+    """Those that the axis sets, and else those of the data of the panels that share it, with a margin.
+
+    ``which`` is "x" or "y". A logarithmic axis has no place for an end that is not positive: it follows from the data.
+    """
+    given_low, given_high = (None if end is None or (axis.log and end <= 0.0) else end for end in (axis.low, axis.high))
+    if given_low is not None and given_high is not None:
+        return given_low, given_high
     marks = [mark for panel in panels for mark in panel.marks]
     known = [np.ravel(values) for mark in marks for values in _extent(mark, which)]
     values = np.concatenate([np.empty(0), *known])
@@ -64,7 +68,7 @@ def limits(axis: Axis, which: str, panels: Sequence[Panel]) -> tuple[float, floa
             low - (below * wide if high > low else 0.5 * wide),
             high + (above * wide if high > low else 0.5 * wide),
         )
-    return low if axis.low is None else axis.low, high if axis.high is None else axis.high
+    return low if given_low is None else given_low, high if given_high is None else given_high
 
 
 def _extent(mark: Mark, which: str) -> Iterator[Floats]:
@@ -187,7 +191,7 @@ def texts(at: Sequence[float]) -> list[str]:
     if most and not 1e-3 <= most < 1e7:
         return [power_text(each) for each in at]
     decimals = next((d for d in range(9) if all(abs(round(each, d) - each) <= 1e-9 * most for each in at)), 9)
-    return [f"{each:.{decimals}f}".replace("-", "−") if each else "0" for each in at]
+    return [minus(f"{each:.{decimals}f}") if each else "0" for each in at]
 
 
 def powers(at: Sequence[float]) -> list[str]:
@@ -200,13 +204,3 @@ def powers(at: Sequence[float]) -> list[str]:
 def plain(numbers: Sequence[float]) -> bool:
     """Whether numbers on a logarithmic axis are read best without powers of ten."""
     return all(1e-3 <= each <= 1e4 for each in numbers)
-
-
-def power_text(number: float) -> str:
-    """A number as it is printed in books: 3×10⁻⁴."""
-    if not number:
-        return "0"
-    mantissa, _, exponent = f"{number:.2e}".partition("e")
-    raised = f"10{str(int(exponent)).translate(_ABOVE)}"
-    mantissa = f"{float(mantissa):g}".replace("-", "−")
-    return {"1": raised, "−1": f"−{raised}"}.get(mantissa, f"{mantissa}×{raised}")

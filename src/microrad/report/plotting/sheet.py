@@ -14,15 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad.core.arrays import Floats
-from microrad.report.plotting.palette import thinned
-
-# Okabe and Ito's palette: told apart by colour-blind readers. Line styles differ too, for print in grey.
-BLACK, ORANGE, SKY, GREEN, BLUE, VERMILION = "#000000", "#E69F00", "#56B4E9", "#009E73", "#0072B2", "#D55E00"
-WHITE, GREY = "#ffffff", "#777777"
+from microrad.report.plotting.palette import BLACK, GREY, thinned
 
 Dash = str | tuple[float, ...]
 Ends = tuple[float, float]
 Place = Literal["above", "below", "right", "upper left", "upper right", "lower left", "lower right", "best"]
+WIDTH = 7.6
+"""Of most sheets, in inches."""
 _Mark = TypeVar("_Mark", bound="Mark")
 
 
@@ -292,7 +290,7 @@ def stairs(edges: Floats, values: Floats, colour: str, edge: str) -> tuple[Bars,
 
 def contour(x: Floats, y: Floats, z: Floats, level: float) -> tuple[Floats, Floats]:
     """Where the values (m, n) over x (n,) and y (m,) have a level, as one curve with gaps."""
-    import contourpy  # here, to keep start-up cheap
+    import contourpy
 
     lines = [line for line in contourpy.contour_generator(x, y, z).lines(level) if len(line)]
     gap = np.full((1, 2), np.nan)
@@ -302,7 +300,7 @@ def contour(x: Floats, y: Floats, z: Floats, level: float) -> tuple[Floats, Floa
 
 def region(x: Floats, y: Floats, z: Floats, least: float, most: float) -> tuple[Floats, ...]:
     """Rings around where the values lie between two levels."""
-    import contourpy  # here, to keep start-up cheap
+    import contourpy
 
     filled: Any = contourpy.contour_generator(x, y, z, fill_type="OuterOffset").filled(least, most)
     parts, offsets = filled
@@ -320,3 +318,14 @@ def labelled(marks: Sequence[Mark]) -> Iterator[Line | Rule | Span | Area | Bars
         if not isinstance(mark, Field | Words) and mark.label and mark.label not in seen:
             seen.add(mark.label)
             yield mark
+
+
+def shortened(name: str, most: int = 34) -> str:
+    """The name as it stands in a figure: on one line, and cut where it would leave no room for the data."""
+    plain = " ".join("".join(c if c.isprintable() else " " for c in name).split())
+    return plain if len(plain) <= most else plain[: most - 1] + "…"
+
+
+def empty(words: str) -> Sheet:
+    """A picture that says why there is nothing to see."""
+    return Sheet(WIDTH, 0.9, heading=words, heading_colour=GREY)

@@ -25,14 +25,15 @@ from microrad.report.plotting.layout import (
     at,
     layout,
 )
-from microrad.report.plotting.palette import colour_at, thinned
+from microrad.report.plotting.palette import BLACK, WHITE, colour_at, thinned
 from microrad.report.plotting.scales import LINE
-from microrad.report.plotting.sheet import BLACK, WHITE, Area, Bars, Dash, Field, Line, Rule, Sheet, Span, Words
+from microrad.report.plotting.sheet import Area, Bars, Dash, Field, Line, Rule, Sheet, Span, Words, region
 
 _GRID, _FRAME = "#dddddd", "#1b1f24"
 _DASHES: dict[str, tuple[float, ...]] = {"-": (), "--": (3.7, 1.6), "-.": (6.4, 1.6, 1.0, 1.6), ":": (1.0, 1.65)}
+HATCH_ID, HATCH_FILL = 'id="hatch"', 'fill="url(#hatch)"'
 _HATCH = (
-    '<defs><pattern id="hatch" width="5" height="5" patternUnits="userSpaceOnUse" patternTransform="rotate(45)">'
+    f'<defs><pattern {HATCH_ID} width="5" height="5" patternUnits="userSpaceOnUse" patternTransform="rotate(45)">'
     '<path d="M0 0V5" stroke="#000000" stroke-width="1.2"/></pattern></defs>'
 )
 _FONT = "system-ui, 'DejaVu Sans', sans-serif"
@@ -267,11 +268,9 @@ def _rect(box: Box) -> str:
 
 def _area(of: Placed, area: Area) -> list[str]:
     path = "".join(_curve(*at(of, *ring[thinned(*ring.T)].T)) + "Z" for ring in area.rings if len(ring) > 2)
-    fill = "url(#hatch)" if area.hatched else area.colour
+    fill = HATCH_FILL if area.hatched else f'fill="{area.colour}"'
     edge = f' stroke="{area.edge}" stroke-width="{area.edge_width:g}"' if area.edge else ""
-    return (
-        [f'<path d="{path}" fill="{fill}" fill-opacity="{area.opacity:g}" fill-rule="evenodd"{edge}/>'] if path else []
-    )
+    return [f'<path d="{path}" {fill} fill-opacity="{area.opacity:g}" fill-rule="evenodd"{edge}/>'] if path else []
 
 
 def _bars(of: Placed, bars: Bars) -> list[str]:
@@ -307,8 +306,6 @@ def _field(of: Placed, field: Field) -> list[str]:
 
 def _levels(of: Placed, field: Field, levels: Floats) -> list[str]:
     """Areas between levels, and beyond the first and the last of them."""
-    from microrad.report.plotting.sheet import region
-
     ends = [-1e300, *levels.tolist(), 1e300]
     made = []
     for low, high in itertools.pairwise(ends):

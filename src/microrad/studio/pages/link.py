@@ -147,4 +147,4 @@ def _told(study: LinkStudy) -> tuple[list[str], dict[str, list[link_view.Row]], 
 
 def _study(file: LinkFile, progress: Progress) -> LinkStudy:
     progress(0, 0, "links")
-    return link_study.run(file)
+    return link_study.run_link_study(file)

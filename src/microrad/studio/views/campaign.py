@@ -10,12 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from microrad.campaign.records import CampaignSummary, CellSummary, Interval, Limit, OutputSummary
-from microrad.report import campaign_figures
-from microrad.report import campaign_numbers as numbers
-from microrad.report import campaign_tables as tables
-from microrad.report import campaign_words as words
-from microrad.report.campaign_scale import Scale, scale_of
-from microrad.report.plotting.sheet import BLUE, GREY, VERMILION, Axis, Line, Mark, Rule
+from microrad.report.campaign import figures as campaign_figures
+from microrad.report.campaign import numbers, tables, words
+from microrad.report.campaign.numbers import Scale, scale_of
+from microrad.report.plotting.palette import BLUE, GREY, VERMILION
+from microrad.report.plotting.sheet import Axis, Line, Mark, Rule
 from microrad.studio.jobs.ledgers import Live
 from microrad.studio.views.plots import Plot, empty, figure, plot
 
@@ -81,8 +80,8 @@ def _rows(live: Live, summary: CampaignSummary) -> str:
 
 # --------------------------------------------------------------------------------------------------------------- tables
 def _tables(summary: CampaignSummary, cell: CellSummary | None) -> list[Table]:
-    failed = tuple(tables.failed_rows(summary, _FAILED))
-    told = Table("Failed rows", tables.FAILED_HEADINGS, failed, wide=True)
+    headings, failed = tables.failed_table(summary, _FAILED)
+    told = Table("Failed rows", headings, tuple(failed), wide=True)
     if cell is None:
         return [told]
     of = f" where {cell.label}" if cell.values else ""

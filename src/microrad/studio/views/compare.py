@@ -121,7 +121,7 @@ def _meant(value: Value) -> object:
 # ------------------------------------------------------------------------------------------------------------- numbers
 def link_numbers(draft: Draft) -> tuple[Number, ...]:
     """What follows from the tables of the links; raises ValueError with the reason where nothing does."""
-    study = link_study.run(draft.link())
+    study = link_study.run_link_study(draft.link())
     required = study.file.mission.requirement.margin_db
     found = []
     for budget in study.budgets:

@@ -14,7 +14,8 @@ import numpy as np
 
 from microrad.core.arrays import Floats
 from microrad.core.units import UnitError, format_quantity, parse_quantity
-from microrad.report.plotting.sheet import BLACK, BLUE, GREEN, GREY, VERMILION, Axis, Line, Mark, Rule
+from microrad.report.plotting.palette import BLACK, BLUE, GREEN, GREY, VERMILION
+from microrad.report.plotting.sheet import Axis, Line, Mark, Rule
 from microrad.studio.views.plots import Plot, empty, plot
 
 PID, PID_INVERSE = "PID of [control]", "PID of [control] + inverse"

@@ -16,7 +16,7 @@ import numpy as np
 from microrad import mirror
 from microrad.core import lti
 from microrad.core.arrays import Floats
-from microrad.link.tracking_light import tracking_light_w
+from microrad.link import tracking_light_w
 from microrad.loop import control, fine_pointing, paper_cases
 from microrad.loop import sine_run as simulate
 from microrad.loop.disturbance import Reference

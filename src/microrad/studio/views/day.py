@@ -10,18 +10,19 @@ from microrad.link import study as link_study
 from microrad.mission.file import LinkFile
 from microrad.orbit import day as day_study
 from microrad.orbit.day import DayStudy, Way
-from microrad.report import day_tables, day_words
+from microrad.report.day import words as day_words
+from microrad.report.day.tables import CONTACT_COLUMNS, assumptions_table, contacts_table, ways_table
 from microrad.report.plotting.figure import Figure
 
 Row = dict[str, Any]
 
 
-def run(file: LinkFile, on_progress: Progress) -> DayStudy:
+def compute_day(file: LinkFile, on_progress: Progress) -> DayStudy:
     """The links of a mission, then its day; raises ValueError with the reason where a day cannot be had."""
     on_progress(0, 0, "links")
-    links = link_study.run(file)
+    links = link_study.run_link_study(file)
     on_progress(0, 0, "contacts")
-    return day_study.run(links, on_progress=on_progress)
+    return day_study.run_day_study(links, on_progress=on_progress)
 
 
 def missing(file: LinkFile) -> str:
@@ -42,25 +43,27 @@ def way_rows(day: DayStudy) -> list[Row]:
     """Relay and direct downlink side by side."""
     return [
         {"id": place, "what": row[0], **dict(zip(("relay", "direct"), row[1:], strict=False))}
-        for place, row in enumerate(day_tables.way_rows(day))
+        for place, row in enumerate(ways_table(day).rows)
     ]
 
 
 def contact_headings() -> tuple[str, ...]:
     """Headings of the contacts, on one line each."""
-    return tuple(heading.replace("\n", " ") for heading in day_tables.CONTACT_COLUMNS)
+    return tuple(heading.replace("\n", " ") for heading in CONTACT_COLUMNS)
 
 
 def contact_rows(day: DayStudy) -> list[Row]:
     """Each contact by both ways, in the order of their rise; cells by the number of their column."""
-    rows = day_tables.contact_rows(day)
+    rows = contacts_table(day).rows
     return [{"id": place, **{f"c{k}": cell for k, cell in enumerate(row)}} for place, row in enumerate(rows)]
 
 
 def swing_rows(day: DayStudy) -> list[Row]:
     """What each assumption changes, alone."""
     names = ("assumption", "changed", "relay", "direct", "ratio", "slow_relay", "slow_direct")
-    return [{"id": place, **dict(zip(names, row, strict=True))} for place, row in enumerate(day_tables.swing_rows(day))]
+    return [
+        {"id": place, **dict(zip(names, row, strict=True))} for place, row in enumerate(assumptions_table(day).rows)
+    ]
 
 
 def words(day: DayStudy) -> list[str]:
@@ -71,9 +74,9 @@ def words(day: DayStudy) -> list[str]:
 # ------------------------------------------------------------------------------------------------------------ figures
 def figures(day: DayStudy) -> dict[str, Figure]:
     """The report's figures of a day by their names, without that of a simulated contact."""
-    from microrad.report import day_plots
+    from microrad.report.day.figures import day_figures
 
-    return {figure.name: figure for figure in day_plots.draw(day)}
+    return {figure.name: figure for figure in day_figures(day)}
 
 
 def image(figure: Figure) -> str:

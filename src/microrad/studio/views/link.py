@@ -14,12 +14,14 @@ from microrad.core.arrays import Floats
 from microrad.core.budget import Line as BudgetLine
 from microrad.core.units import format_quantity
 from microrad.link import study as link_study
+from microrad.link.pointing.outage import error_rad, required_error_rad
 from microrad.link.study import LinkStudy
-from microrad.link.under_jitter import error_rad, required_error_rad
 from microrad.mission.file import LinkFile
-from microrad.report import link_figures
-from microrad.report.budget_views import jitter_lines, sentences
-from microrad.report.plotting.sheet import VERMILION, WHITE, Axis, Field, Line
+from microrad.report.links.budgets import jitter_lines
+from microrad.report.links.figures import tornado
+from microrad.report.links.words import sentences
+from microrad.report.plotting.palette import VERMILION, WHITE
+from microrad.report.plotting.sheet import Axis, Field, Line
 from microrad.report.quantities import quantity, signed
 from microrad.studio.draft.draft import Draft
 from microrad.studio.views.plots import Plot, empty, figure, plot
@@ -274,4 +276,4 @@ def consequences(study: LinkStudy) -> list[str]:
 def tornado_plot(study: LinkStudy) -> Plot:
     """What moves the margin of the communication link: one input at a time, the weightiest on top."""
     of = study.tornados[0]
-    return figure(link_figures.tornado(study, of).sheet) if of.swings else empty("no input moves the margin")
+    return figure(tornado(study, of).sheet) if of.swings else empty("no input moves the margin")

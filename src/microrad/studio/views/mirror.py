@@ -15,7 +15,8 @@ from pydantic import TypeAdapter
 
 from microrad.core.units import format_quantity
 from microrad.lab.live_fit import LIVE_FITS, LiveFit
-from microrad.report.plotting.sheet import BLACK, BLUE, GREY, SKY, VERMILION, Axis, Line, Span, grid
+from microrad.report.plotting.palette import BLACK, BLUE, GREY, SKY, VERMILION
+from microrad.report.plotting.sheet import Axis, Line, Span, grid
 from microrad.studio.guard import plain_files
 from microrad.studio.jobs.queue import Job
 from microrad.studio.recordings.reading import View

@@ -15,21 +15,8 @@ from microrad.link import study as link_study
 from microrad.link.pointing import OpenLoopPointing
 from microrad.link.study import PointAheadEffect
 from microrad.mission.file import LinkFile
-from microrad.report.day_figures import short
-from microrad.report.plotting.sheet import (
-    BLACK,
-    BLUE,
-    GREEN,
-    GREY,
-    ORANGE,
-    SKY,
-    VERMILION,
-    Axis,
-    Bars,
-    Line,
-    Mark,
-    Rule,
-)
+from microrad.report.plotting.palette import BLACK, BLUE, GREEN, GREY, ORANGE, SKY, VERMILION
+from microrad.report.plotting.sheet import Axis, Bars, Line, Mark, Rule, shortened
 from microrad.report.quantities import quantity
 from microrad.studio.draft.draft import Draft
 from microrad.studio.views.plots import Plot, plot, rows
@@ -164,7 +151,7 @@ def ahead_rows(v: PointingView) -> list[Row]:
 
 def words(v: PointingView) -> list[str]:
     """What the beacon covers, in sentences; that there is none, where there is none."""
-    from microrad.report.links import coverage
+    from microrad.report.links.page import coverage
 
     return coverage(v.budget) or ["The mission has no beacon, so nothing is to be covered."]
 
@@ -178,7 +165,7 @@ def lines_plot(v: PointingView) -> Plot:
     if not math.isnan(v.half_angle_rad):
         name = f"beacon's half angle: {quantity(v.half_angle_rad, 'rad')}"
         marks.append(Rule(v.half_angle_rad * 1e6, True, VERMILION, "--", 1.5, name))
-    names = rows([short(name, 40) for name in (*(e.name for e in lines), *(e.name for e in totals))])
+    names = rows([shortened(name, 40) for name in (*(e.name for e in lines), *(e.name for e in totals))])
     return plot(Axis("angle (µrad)", low=0.0), names, *marks, height=1.0 + 0.27 * len(errors))
 
 

@@ -2,7 +2,7 @@
 
 What is taken for granted:
 
-- The stages of an acquisition are those of `link_acquisition`, with the light time of the beacon's distance.
+- The stages of an acquisition are those of `link.acquisition`, with the light time of the beacon's distance.
 - The fine loop is simulated in sampled windows of the data phase. Between them the state holds: a contact that has
   lock at the end of a window keeps it up to the next one. A window follows each re-acquisition, so that what is lost at
   once is not counted as data; what is lost once in minutes is seen only by chance (`ContactRun.losses_per_s`).
@@ -12,32 +12,7 @@ What is taken for granted:
 - The receiver's power is that of the moment of sending. What a correction of the point-ahead leaves is not in it.
 """
 
-from microrad.study.contact_run.of_mission import of_mission
-from microrad.study.contact_run.records import (
-    DATA,
-    LOCK,
-    STATES,
-    Contact,
-    ContactRun,
-    Loss,
-    Settings,
-    Sight,
-)
-from microrad.study.contact_run.sequence import run
-from microrad.study.contact_run.windows import MovingReference, Sampler, plan
+from microrad.study.contact_run.records import DATA, LOCK, ContactRun
+from microrad.study.contact_run.sequence import of_mission
 
-__all__ = [
-    "DATA",
-    "LOCK",
-    "STATES",
-    "Contact",
-    "ContactRun",
-    "Loss",
-    "MovingReference",
-    "Sampler",
-    "Settings",
-    "Sight",
-    "of_mission",
-    "plan",
-    "run",
-]
+__all__ = ["DATA", "LOCK", "ContactRun", "of_mission"]

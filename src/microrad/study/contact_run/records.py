@@ -51,7 +51,7 @@ class Contact:
     geometry: Geometry
 
     def __post_init__(self) -> None:
-        """Refuse a contact without length, and a body that is free only once it has begun."""
+        """Raises ValueError if the times do not follow one another."""
         if not -math.inf < self.start_s < self.end_s < math.inf:
             raise ValueError(
                 f"a contact from {self.start_s:g} s to {self.end_s:g} s has no length: its end must be finite and "
@@ -64,7 +64,7 @@ class Contact:
             )
 
     def sight(self, time_s: Floats) -> Sight:
-        """The line of sight at these times. Raises ValueError for a geometry that is none, with the place."""
+        """The line of sight at these times. Raises ValueError if the geometry gives another shape or no number."""
         found = Sight(*(np.asarray(values, dtype=float) for values in self.geometry(time_s)))
         for name, values, least in zip(Sight._fields, found, ("above", "at least", "at least"), strict=True):
             if values.shape != np.shape(time_s):
@@ -105,7 +105,7 @@ class Settings:
     way: Literal["wide beacon", "scan"] = "wide beacon"
 
     def __post_init__(self) -> None:
-        """Refuse what is no slew, no window and no seed."""
+        """Raises ValueError if a value is out of range."""
         _limit("slew_angle_rad", self.slew_angle_rad, 0.0 <= self.slew_angle_rad <= math.pi, "from 0 to pi rad")
         _limit("slew_rate_rad_s", self.slew_rate_rad_s, self.slew_rate_rad_s > 0.0, "above 0 rad/s")
         _limit("windows", self.windows, 1 <= self.windows <= _MOST_WINDOWS, f"from 1 to {_MOST_WINDOWS}")
@@ -139,7 +139,7 @@ class Transition:
 
 @dataclass(frozen=True, slots=True)
 class Loss:
-    """Lock is lost at ``time_s``, by what has been so since ``since_s``; the terminal knows it at ``known_s``."""
+    """Lock is lost at ``time_s``, from a cause that began at ``since_s``; the terminal knows of it at ``known_s``."""
 
     since_s: float
     time_s: float

@@ -1,10 +1,18 @@
 """The order of a contact: slew, acquisition, data, and what follows a loss of lock; each step with its cause."""
 
-from microrad import link
+from functools import partial
+
+import numpy as np
+
+from microrad import link, orbit
+from microrad.core.arrays import Floats
 from microrad.core.units import format_quantity
 from microrad.link import acquisition
-from microrad.link.partner_search import Finding, Found
-from microrad.loop.fine_pointing import Design, Scene
+from microrad.link.acquisition.partner_search import Finding, Found
+from microrad.loop.fine_pointing import Design, FinePointingStudy, Scene
+from microrad.mission.tables.acquisition import Acquisition
+from microrad.mission.tables.operations import Operations
+from microrad.orbit.day import DayStudy
 from microrad.study.contact_run.records import (
     ANSWER,
     BEACON,
@@ -20,6 +28,7 @@ from microrad.study.contact_run.records import (
     ContactRun,
     Loss,
     Settings,
+    Sight,
     Transition,
     Window,
 )
@@ -29,7 +38,7 @@ _STATE_OF_STAGE = (BEACON, BEACON, DETECT, ANSWER, ANSWER, ANSWER, LOCK, LOCK, L
 """Of the stages of an acquisition, wide or scanned: three to the detection, eight from the answer on."""
 
 
-def run(
+def run_contact(
     data: link.DataLink, finding: Finding, scene: Scene, design: Design, contact: Contact, settings: Settings
 ) -> ContactRun:
     """One contact from the slew to its end, under one controller of the mission's fine-pointing loop; seeded.
@@ -43,23 +52,19 @@ def run(
     Raises ValueError for a scan that the mission does not have, a data rate that is still to be solved for, and a
     geometry that gives no numbers.
     """
+    found = finding.way(settings.way)
+    if found is None:
+        raise ValueError(
+            'the mission has no table [acquisition.scan]: give it one, or run the contact by "wide beacon"'
+        )
     sampler = Sampler(data, scene.table, scene.loop, design.controller, contact, settings)
     log = Log(contact)
-    acquire = _Acquisitions(log, _way(finding, settings), settings.attempts, settings.seed)
+    acquire = _Acquisitions(log, found, settings.attempts, settings.seed)
     windows: list[Window] = []
     if _turn(log, settings) and acquire():
         windows = _data(log, acquire, sampler)
     log.finish()
     return ContactRun(contact, tuple(log.entries), tuple(windows))
-
-
-def _way(finding: Finding, settings: Settings) -> Found:
-    found = finding.wide if settings.way == "wide beacon" else finding.scan
-    if found is None:
-        raise ValueError(
-            'the mission has no table [acquisition.scan]: give it one, or run the contact by "wide beacon"'
-        )
-    return found
 
 
 class Log:
@@ -179,3 +184,43 @@ def _regain(log: Log, acquire: _Acquisitions, lost: Loss, losses: int) -> bool:
     if losses >= acquire.attempts:
         return log.go(lost.known_s, END, f"given up after {losses} losses of lock in as many windows in a row; {known}")
     return log.go(lost.known_s, REACQUIRE, known) and acquire()
+
+
+def of_mission(
+    o: Operations,
+    a: Acquisition | None,
+    data: link.DataLink,
+    day: DayStudy,
+    finding: Finding | None,
+    fine: FinePointingStudy | None,
+) -> ContactRun | None:
+    """The run of `operations.contact` under the best controller; None without that table or what it needs."""
+    asked = o.contact
+    if asked is None or a is None or finding is None or fine is None or not day.relay.contacts:
+        return None
+    settings = Settings(
+        slew_angle_rad=asked.slew_angle_rad,
+        slew_rate_rad_s=asked.slew_rate_rad_s,
+        windows=asked.windows,
+        window_s=asked.window_s,
+        settle_s=fine.scene.table.settle_s,
+        hold_s=asked.hold_s,
+        seed=o.seed,
+        attempts=a.attempts,
+        way=o.acquisition,
+    )
+    return run_contact(data, finding, fine.scene, fine.best.design, _contact(day, asked.number - 1), settings)
+
+
+def _contact(day: DayStudy, place: int) -> Contact:
+    """One contact that the relay grants, with its geometry; the body is free from the end of the one before."""
+    pair, chosen = day.view.pair, day.relay.contacts[place]
+    free = day.relay.contacts[place - 1].end_s if place else pair.span_s[0]
+
+    return Contact(chosen.start_s, chosen.end_s, chosen.begins, chosen.ends, free, partial(_geometry, pair))
+
+
+def _geometry(pair: orbit.Pair, time_s: Floats) -> Sight:
+    found = orbit.sight(pair.leo.orbit, pair.geo.orbit, np.ravel(time_s))
+    shape = np.shape(time_s)
+    return Sight(*(each.reshape(shape) for each in (found.range_m, found.rate_rad_s, found.point_ahead_rad)))

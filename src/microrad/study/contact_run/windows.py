@@ -68,7 +68,7 @@ class Sampler:
     settings: Settings
 
     def __post_init__(self) -> None:
-        """Refuse a window without a control sample, and more of them than memory holds."""
+        """Raises ValueError if a window holds no control sample, or all together more than memory holds."""
         period = self.loop.timing.period_s
         if round(self.settings.window_s / period) < 1:
             raise ValueError(

@@ -17,6 +17,7 @@ Both positive is alpha > |beta|, hence a bounded h, whatever the signs. At a rat
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -30,16 +31,14 @@ from microrad.lab.identify.records import (
     SiRecord,
     Units,
     centred,
-    colour_inflation,
-    correlation,
     fastest_rate,
     no_progress,
     one_rate_only,
-    percent,
     si_records,
     span,
     split_by_record,
 )
+from microrad.lab.identify.statistics import Estimate, central_differences, colour_inflation, correlation, percent
 from microrad.lab.recording import Recording
 from microrad.mirror.hysteresis import BoucWen
 
@@ -48,7 +47,7 @@ _LOWER = np.array([-1.0, -3.0, math.log(0.05), math.log(0.05)])
 _UPPER = np.array([1.0, 10.0, math.log(1e5), math.log(1e5)])
 
 
-class Problem:
+class BoucWenProblem:
     """The projected residual of a set of records as a function of the four searched numbers, scaled to order one."""
 
     def __init__(self, records: tuple[SiRecord, ...], share: float, rate_limit: float | None = None) -> None:
@@ -112,21 +111,16 @@ class Problem:
         return np.array([d1, d2, epsilon, delta, (settled + reversal) / 2, beta])
 
 
-def _thin_problem(problem: Problem) -> Problem:
+def _thin_problem(problem: BoucWenProblem) -> BoucWenProblem:
     """The same problem on at most about 12 000 samples: the kernel is exact for a drive linear between any samples."""
     stride = math.ceil(sum(r.drive_v.size for r in problem.records) / 12_000)
     if stride == 1:
         return problem
-    records = tuple(
-        SiRecord(r.name, r.sha256, r.drive_v[::stride].copy(), r.output_rad[::stride].copy(), r.step_s * stride, start)
-        for r in problem.records
-        for start in (-(-r.start // stride),)
-    )
-    return Problem(records, problem.share, problem.rate_limit)
+    return BoucWenProblem(tuple(r.every(stride) for r in problem.records), problem.share, problem.rate_limit)
 
 
 # ----------------------------------------------------------------------------------------------------------- search
-def search_from_starts(problem: Problem, starts: int, seed: int, on_progress: Progress) -> tuple[Floats, Floats]:
+def search_from_starts(problem: BoucWenProblem, starts: int, seed: int, on_progress: Progress) -> tuple[Floats, Floats]:
     """Cost reached from each start, and the best point polished on all samples."""
     screen = _thin_problem(problem)
     points, costs = [], []
@@ -138,8 +132,11 @@ def search_from_starts(problem: Problem, starts: int, seed: int, on_progress: Pr
     return np.array(costs), _search(problem, points[int(np.argmin(costs))]).x
 
 
-def _starts(problem: Problem, starts: int, seed: int) -> list[Floats]:
-    """The four best points of a coarse grid in turn, the first as it is and the rest scattered by a factor e^0.4."""
+def _starts(problem: BoucWenProblem, starts: int, seed: int) -> list[Floats]:
+    """The four best points of a coarse grid in turn, the first as it is and the rest scattered.
+
+    The scatter is log-normal (e^0.4) in delta and in the two decay constants, and normal in d2, whose sign is open.
+    """
     grid = [
         np.array([0.0, delta, math.log(settled), math.log(settled * ratio)])
         for delta in (0.0, 1.0, 2.0, 4.0)
@@ -151,18 +148,16 @@ def _starts(problem: Problem, starts: int, seed: int) -> list[Floats]:
     scatter = 0.4 * rng.standard_normal((starts, 4))
     scatter[0] = 0.0
     scatter[:, 0] *= 0.1
-    return [np.clip(_scattered(centres[i % 4], scatter[i]), _LOWER + 1e-6, _UPPER - 1e-6) for i in range(starts)]
+    found = []
+    for i in range(starts):
+        point = centres[i % 4] + scatter[i]
+        point[1] = max(centres[i % 4][1], 0.2) * math.exp(scatter[i, 1])
+        found.append(np.clip(point, _LOWER + 1e-6, _UPPER - 1e-6))
+    return found
 
 
-def _scattered(centre: Floats, scatter: Floats) -> Floats:
-    """Log-normal in delta and in the two decay constants, normal in d2, whose sign is open."""
-    point = centre + scatter
-    point[1] = max(centre[1], 0.2) * math.exp(scatter[1])
-    return np.asarray(point)
-
-
-def _search(problem: Problem, start: Floats) -> Any:
-    from scipy.optimize import least_squares  # here, to keep start-up cheap
+def _search(problem: BoucWenProblem, start: Floats) -> Any:
+    from scipy.optimize import least_squares
 
     return least_squares(
         problem.residual,
@@ -177,7 +172,7 @@ def _search(problem: Problem, start: Floats) -> Any:
     )
 
 
-def with_tightened_bound(problem: Problem, best: Floats) -> tuple[Problem, Floats]:
+def with_tightened_bound(problem: BoucWenProblem, best: Floats) -> tuple[BoucWenProblem, Floats]:
     """Lower the share of d1 that epsilon may take back until no slope along the recordings is negative.
 
     The bound holds for slow reversals; at a fast one h is larger than its slow settled value by exp(delta |u'|).
@@ -193,7 +188,7 @@ def with_tightened_bound(problem: Problem, best: Floats) -> tuple[Problem, Float
 
 
 # ---------------------------------------------------------------------------------------------------------- values
-def stacked_output(problem: Problem, values: Floats) -> Floats:
+def stacked_output(problem: BoucWenProblem, values: Floats) -> Floats:
     """Model output of the used samples of all records, without offset."""
     row = np.array([*values, problem.rate_limit, 0.0])
     return np.concatenate([bouc_wen_response(r.drive_v, r.step_s, row, 0.0)[0][r.start :] for r in problem.records])
@@ -220,7 +215,7 @@ def made_rising(model: BoucWen) -> BoucWen:
     return model if model.d1_rad_v > 0.0 else sign_reversed(model)
 
 
-def lowest_slope(problem: Problem, values: Floats) -> float:
+def lowest_slope(problem: BoucWenProblem, values: Floats) -> float:
     """Lowest dy/du along the used samples, at the begin of each step, positive in the direction of d1."""
     d1, d2, epsilon, delta, alpha, beta = values
     row = np.array([*values, problem.rate_limit, 0.0])
@@ -250,7 +245,7 @@ class NotIdentified(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class BoucWenFit:
+class BoucWenFit(Estimate):
     """A model of Eq. 3 in SI units, with what is known about the uncertainty of its six parameters.
 
     The signs follow the recordings: d1 is negative where the output falls with the drive. `covariance` (6 x 6, order
@@ -301,16 +296,6 @@ class BoucWenFit:
         return self.model.rate_limit_v_s
 
     @property
-    def standard_errors(self) -> Floats:
-        """Standard errors in the order of `PARAMETERS`, SI units."""
-        return np.asarray(np.sqrt(np.diag(self.covariance)))
-
-    @property
-    def correlation(self) -> Floats:
-        """Correlation matrix of the parameters."""
-        return correlation(self.covariance)
-
-    @property
     def settled_hysteresis_rad(self) -> tuple[float, float]:
         """|h| of a slow settled loop, |epsilon| / k_settled, and its standard error; better fixed than its parts."""
         settled = k_settled(self.values)
@@ -353,7 +338,7 @@ def fit_bouc_wen(
     """
     if starts < 1:
         raise IdentificationError(f"{starts} starts were asked for; give at least 1, better 10 or more.")
-    problem = Problem(si_records(recordings, units), 1.0 if admissible else math.inf)
+    problem = BoucWenProblem(si_records(recordings, units), 1.0 if admissible else math.inf)
     costs, best = search_from_starts(problem, starts, seed, on_progress or no_progress)
     if admissible:
         problem, best = with_tightened_bound(problem, best)
@@ -361,7 +346,7 @@ def fit_bouc_wen(
 
 
 # ---------------------------------------------------------------------------------------------------------- report
-def _report(problem: Problem, values: Floats, units: Units, costs: Floats, constrained: bool) -> BoucWenFit:
+def _report(problem: BoucWenProblem, values: Floats, units: Units, costs: Floats, constrained: bool) -> BoucWenFit:
     residual = problem.measured - stacked_output(problem, values)
     offsets = tuple(float(part.mean()) for part in split_by_record(residual, problem.records))
     residual = centred(residual, problem.records)
@@ -395,7 +380,7 @@ def _report(problem: Problem, values: Floats, units: Units, costs: Floats, const
     )
 
 
-def _sizes(problem: Problem, values: Floats) -> Floats:
+def _sizes(problem: BoucWenProblem, values: Floats) -> Floats:
     """A step of order one for each parameter: its own size, or what matters at the fastest rate."""
     least = np.array(
         [0, 1e-3 / problem.rate_limit, 1e-9 * abs(values[0]), 1e-2 / problem.rate_limit, 0, 1e-3 * values[4]]
@@ -403,14 +388,9 @@ def _sizes(problem: Problem, values: Floats) -> Floats:
     return np.asarray(np.maximum(np.abs(values), least))
 
 
-def _jacobian(problem: Problem, values: Floats, sizes: Floats) -> Floats:
+def _jacobian(problem: BoucWenProblem, values: Floats, sizes: Floats) -> Floats:
     """d output / d parameter by central differences, less the mean in each record (the offsets are marginalised)."""
-    columns = []
-    for i, size in enumerate(1e-4 * sizes):
-        step = np.zeros(6)
-        step[i] = size
-        columns.append((stacked_output(problem, values + step) - stacked_output(problem, values - step)) / (2 * size))
-    return centred(np.column_stack(columns), problem.records)
+    return centred(central_differences(partial(stacked_output, problem), values, 1e-4 * sizes), problem.records)
 
 
 def _covariance(jacobian: Floats, sizes: Floats, variance: float, bounded: Floats | None) -> Floats:

@@ -166,7 +166,10 @@ def fit_joint(  # noqa: PLR0913  all but the first three are named options
     fit_list = [_fit_record(record, creep_times) for record in records]
     model: BoucWen | Play
     if form.family == "bouc_wen":
-        model = _bouc_wen_start(form, records, static or fit_static_start(recordings, units, seed))
+        static = static or fit_static_start(recordings, units, seed)
+        model = replace(static.model, bias_v=float(np.mean([r.drive_v[0] for r in records])))
+        if "delta" not in form.free:
+            model = replace(model, d2_s_v=0.0, delta_s_v=0.0)
         creep_rad_v = 1e-3 * model.d1_rad_v
     else:
         model, creep_rad_v = _play_start(form, records, fit_list, linear, creep_times)
@@ -241,13 +244,7 @@ def thin_record(record: SiRecord) -> SiRecord:
         if float(np.sqrt(np.mean(bent**2))) <= 2e-3 * spread:
             break
         stride //= 2
-    return replace(
-        record,
-        drive_v=record.drive_v[::stride].copy(),
-        output_rad=record.output_rad[::stride].copy(),
-        step_s=record.step_s * stride,
-        start=-(-record.start // stride),
-    )
+    return record.every(stride)
 
 
 def _nuisance(samples: int, step_s: float, creep_times: Sequence[float]) -> Floats:
@@ -274,12 +271,6 @@ def _fit_record(record: SiRecord, creep_times: Sequence[float]) -> FitRecord:
         np.asarray(np.linalg.qr(nuisance)[0]),
         weight,
     )
-
-
-def _bouc_wen_start(form: Form, records: tuple[SiRecord, ...], static: BoucWenFit) -> BoucWen:
-    """The static fit of Eq. 3, about the mean drive at which the records begin."""
-    model = replace(static.model, bias_v=float(np.mean([r.drive_v[0] for r in records])))
-    return model if "delta" in form.free else replace(model, d2_s_v=0.0, delta_s_v=0.0)
 
 
 def _scattered_starts(structure: AxisStructure, starts: int, seed: int) -> list[Floats]:

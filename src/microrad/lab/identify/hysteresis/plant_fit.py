@@ -18,12 +18,13 @@ from microrad.core import kernels
 from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
 from microrad.core.threads import in_threads
-from microrad.lab.identify.records import IdentificationError, colour_inflation, correlation, no_progress
+from microrad.lab.identify.records import IdentificationError, no_progress
+from microrad.lab.identify.statistics import Estimate, colour_inflation, correlation
 from microrad.lab.recording import Recording
 from microrad.mirror import model as mirror
 from microrad.mirror.model import Mirror
 
-Hold = Literal["linear", "band-limited"]
+Interpolation = Literal["linear", "band-limited"]
 
 _ROUGH = 1e-8  # relative change of cost or place from which a search goes on by central differences
 _DIFFERENCE = 1e-5
@@ -90,10 +91,13 @@ def without_nuisance(nuisance: Floats, signal: Floats) -> Floats:
     return np.asarray(signal - nuisance @ (nuisance.T @ signal)) if nuisance.size else signal
 
 
-def upsampled(drive: Floats, factor: int, hold: Hold) -> Floats:
-    """A drive (samples, inputs) at `factor` times the rate; row factor * k belongs to sample k.
+def upsampled(drive: Floats, factor: int, hold: Interpolation) -> Floats:
+    """A drive at a multiple of its rate; row factor * k belongs to sample k.
 
-    "linear": straight between samples. "band-limited": trigonometric, for a drive of whole periods.
+    Args:
+        drive: The drive, shape (samples, inputs).
+        factor: The multiple.
+        hold: "linear": straight between samples; "band-limited": trigonometric, for a drive of whole periods.
     """
     samples = drive.shape[0]
     if factor == 1:
@@ -106,13 +110,28 @@ def upsampled(drive: Floats, factor: int, hold: Hold) -> Floats:
 
 
 def fit_records(
-    recordings: Sequence[Recording], *, factor: int = 1, hold: Hold = "linear", drop: int = 0, offset: bool = True
+    recordings: Sequence[Recording],
+    *,
+    factor: int = 1,
+    hold: Interpolation = "linear",
+    drop: int = 0,
+    offset: bool = True,
 ) -> tuple[FitRecord, ...]:
-    """Recordings as runs of the plant, `factor` plant steps a sample, the first `drop` samples left out of the fit.
+    """Recordings as the records of a fit.
 
     A periodic recording (period_samples) whose periods share their drive is reduced to one period, the mean of its
     periods from the second on, behind a run-in of one period of the same drive. Others start at rest at their first
-    drive value. Without `offset` no output has a free zero. Raises `IdentificationError` where nothing is left.
+    drive value.
+
+    Args:
+        recordings: The recordings.
+        factor: Plant steps a sample.
+        hold: How the drive is interpolated, see `upsampled`.
+        drop: First samples that are left out of the fit, where a recording is not periodic.
+        offset: Whether each output has a free zero.
+
+    Raises:
+        IdentificationError: If nothing is left to fit.
     """
     made = []
     for recording in recordings:
@@ -143,7 +162,7 @@ def _repeats(recording: Recording) -> bool:
     return bool(spread <= 1e-6 * np.abs(recording.drive).max())
 
 
-def _one_period(recording: Recording, factor: int, hold: Hold) -> tuple[Floats, Floats, int]:
+def _one_period(recording: Recording, factor: int, hold: Interpolation) -> tuple[Floats, Floats, int]:
     """Two periods of the drive, the output with its mean period as the second one, and the first sample of that."""
     period = recording.period_samples or recording.samples
     whole = recording.samples // period
@@ -161,18 +180,18 @@ def simulate_record(plant: kernels.Plant, run: FitRecord) -> Floats:
     state = mirror.at_rest(plant)
     output = np.empty((run.drive.shape[0], len(plant.outputs)))
     bank = np.empty((run.drive.shape[0], 0))
-    for begin in range(0, run.drive.shape[0], _SLICE):  # the kernel is not to be away from the interpreter for long
+    for begin in range(0, run.drive.shape[0], _SLICE):  # the interpreter answers Ctrl-C between two of them
         part = slice(begin, begin + _SLICE)
         kernels.open_loop(plant, state, run.drive[part], output[part], bank[part])
     return output[:: run.stride]
 
 
 @dataclass(frozen=True, eq=False)
-class PlantFit:
+class PlantFit(Estimate):
     """What came out: the mirror, its parameters with their covariance, and how well it follows the records.
 
     `covariance`, over the parameters in their order, comes from the residuals of each run by themselves (the sandwich
-    (J'J)^-1 J'VJ (J'J)^-1), inflated by their colour (`records.colour_inflation`, the largest one is kept).
+    (J'J)^-1 J'VJ (J'J)^-1), inflated by their colour (`statistics.colour_inflation`, the largest one is kept).
     `residual_rms` has the shape (runs, outputs), in the units of the recordings, without the weights. `start_costs` are
     the costs reached from each start, `agreeing_starts` how many came to within 0.1 % of the best. `not_identified`
     names each parameter that the records do not fix, with the reason. Where the search was not `converged` it stopped
@@ -197,18 +216,8 @@ class PlantFit:
         """The fitted mirror."""
         return self.structure.build(self.values)
 
-    @property
-    def standard_errors(self) -> Floats:
-        """Standard errors of the parameters."""
-        return np.asarray(np.sqrt(np.diag(self.covariance)))
 
-    @property
-    def correlation(self) -> Floats:
-        """Correlation matrix of the parameters."""
-        return correlation(self.covariance)
-
-
-class Problem:
+class PlantProblem:
     """The weighted residual of a structure on its runs, and its Jacobian by differences, as functions of the values."""
 
     def __init__(self, structure: Structure, records: Sequence[FitRecord]) -> None:
@@ -288,12 +297,20 @@ def fit_plant(
     most_evaluations: int = 60,
     on_progress: Progress | None = None,
 ) -> PlantFit:
-    """Fit all parameters of a structure to all runs at once.
+    """Fit all parameters of a structure to all records at once, by trust-region least squares within their bounds.
 
-    The search begins at the parameters' own starts and at each of `starts` (values in their order); trust-region
-    reflective least squares within their bounds. Raises `IdentificationError` when no start can be simulated.
+    Args:
+        structure: The parameters, with the point where the search begins, and the mirror that they make.
+        records: What is fitted to.
+        starts: Further points where a search begins, values in the order of the parameters.
+        tolerance: Relative change of cost or place at which a search ends.
+        most_evaluations: Largest number of simulations of all records in a search, without those for derivatives.
+        on_progress: Called with the searches done, their number and the name of the structure.
+
+    Raises:
+        IdentificationError: If no start can be simulated.
     """
-    problem = Problem(structure, records)
+    problem = PlantProblem(structure, records)
     own = np.array([p.start for p in structure.parameters])
     solutions = []
     for done, start in enumerate([own, *starts], 1):
@@ -308,8 +325,8 @@ def fit_plant(
     return _report(problem, best, [float(s.cost) for s in solutions])
 
 
-def _search(problem: Problem, start: Floats, tolerance: float, most_evaluations: int) -> Any:
-    from scipy.optimize import least_squares  # here, to keep start-up cheap
+def _search(problem: PlantProblem, start: Floats, tolerance: float, most_evaluations: int) -> Any:
+    from scipy.optimize import least_squares
 
     def search(begin: Floats, jacobian: Callable[[Floats], Floats], ending: float, most: int) -> Any:
         return least_squares(
@@ -332,7 +349,7 @@ def _search(problem: Problem, start: Floats, tolerance: float, most_evaluations:
 
 
 # ---------------------------------------------------------------------------------------------------------- report
-def _report(problem: Problem, best: Any, costs: list[float]) -> PlantFit:
+def _report(problem: PlantProblem, best: Any, costs: list[float]) -> PlantFit:
     values = best.x * problem.scale
     edges = np.cumsum([target.size for target in problem.targets])[:-1]
     residuals = tuple(
@@ -365,7 +382,7 @@ def _report(problem: Problem, best: Any, costs: list[float]) -> PlantFit:
     )
 
 
-def _covariance(jacobian: Floats, variance: Floats, problem: Problem) -> tuple[Floats, float]:
+def _covariance(jacobian: Floats, variance: Floats, problem: PlantProblem) -> tuple[Floats, float]:
     """The sandwich in the parameters' units, and the condition number of J with columns of length 1."""
     length = np.sqrt(np.einsum("ij,ij->j", jacobian, jacobian)) + 1e-300
     if not np.isfinite(length).all():

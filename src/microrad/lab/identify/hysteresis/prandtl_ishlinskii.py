@@ -19,13 +19,12 @@ from microrad.lab.identify.records import (
     SiRecord,
     Units,
     centred,
-    colour_inflation,
     fastest_rate,
-    percent,
     si_records,
     span,
     split_by_record,
 )
+from microrad.lab.identify.statistics import colour_inflation, percent
 from microrad.lab.recording import Recording
 
 
@@ -82,9 +81,17 @@ def fit_prandtl_ishlinskii(
 ) -> PrandtlIshlinskiiFit:
     """Fit the weights of play operators to all recordings at once, every sample with equal weight.
 
-    Without `thresholds_v` (strictly increasing from 0), `operators` thresholds are spread evenly from 0 to 0.47 of the
-    largest peak-to-peak drive: an operator of half of it would never move both ways. States are carried through each
-    record; samples before the drive has swept its range once are left out. Raises `IdentificationError`.
+    States are carried through each record; samples before the drive has swept its range once are left out.
+
+    Args:
+        recordings: Loops of one drive and one output each.
+        thresholds_v: Thresholds (V), strictly increasing from 0.
+        operators: Number of thresholds where none are given: spread evenly from 0 to 0.47 of the largest peak-to-peak
+            drive. (An operator of half of it would never move both ways.)
+        units: Units of the recordings.
+
+    Raises:
+        IdentificationError: If a recording or the thresholds cannot be used.
     """
     records = si_records(recordings, units)
     thresholds = _thresholds(records, thresholds_v, operators)
@@ -142,7 +149,7 @@ def _thresholds(records: Sequence[SiRecord], given: ArrayLike | None, operators:
 
 def non_negative_weights(states: Floats, output: Floats) -> Floats:
     """Weights >= 0 by least squares; the triangle of a QR decomposition holds the same problem in a few rows."""
-    from scipy.optimize import nnls  # here, to keep start-up cheap
+    from scipy.optimize import nnls
 
     triangle = np.asarray(np.linalg.qr(np.column_stack((states, output)), mode="r"))
     size = float(np.abs(triangle).max())

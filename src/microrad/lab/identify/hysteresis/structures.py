@@ -63,6 +63,11 @@ def poles_of(system: lti.StateSpace, excited_hz: tuple[float, float], rate_hz: f
     It is normalised at the geometric middle between the lowest excited frequency and a tenth of the lowest resonance,
     where its gain should be flat. Zeros above the sample rate do nothing that it could show, and are left out; so are
     as many poles as zeros below the excited band, a flank fitted as dynamics that would only move the gain at rest.
+
+    Args:
+        system: The system.
+        excited_hz: Lowest and highest excited frequency.
+        rate_hz: Sample rate.
     """
     poles = [complex(p) for p in np.linalg.eigvals(system.A)]
     zeros = [complex(z) for z in lti.zeros(system) if abs(z) < 2.0 * math.pi * rate_hz]
@@ -82,8 +87,16 @@ def hysteretic_oscillator(
     """A mass on a spring with hysteretic stiffness: m y'' + c y' + k y + z = u, z a Bouc-Wen element driven by y.
 
     z' = slope y' - decay |y'| z - asymmetry y' |z|. In the notation of Noël and Schoukens (2016), with exponent 1,
-    these are alpha, beta gamma and beta delta, of which only the products can be told apart. The arguments are where
-    the search begins (kg, N s/m, N/m, N/m, 1/m, 1/m); drive in N, output in m.
+    these are alpha, beta gamma and beta delta, of which only the products can be told apart. Drive in N, output in m.
+    The arguments are where the search begins.
+
+    Args:
+        mass: m (kg).
+        damping: c (N s/m).
+        stiffness: k (N/m).
+        slope: N/m.
+        decay: 1/m.
+        asymmetry: 1/m.
     """
 
     def build(values: Floats) -> Mirror:
@@ -142,11 +155,19 @@ def one_axis(
 ) -> AxisStructure:
     """One axis: hysteresis, behind it a linear part of unit gain where there is one (cascade), creep beside both.
 
-    `model`, `linear` and `creep` are where the search begins. Of a Bouc-Wen model d1, epsilon, alpha and beta are
-    fitted, and those of d2, delta, gamma, eta and exponent that `free` names; beta, gamma and eta as shares of alpha,
-    so that h stays bounded. Of a Prandtl-Ishlinskii model the weights are fitted, the thresholds are not, and the
-    widening is where `free` names it. Creep is one weight for all its lags. `free_linear=False` keeps the linear part,
-    and `admissible` keeps the slope of a Bouc-Wen model behind a slow reversal from turning against d1.
+    Of a Bouc-Wen model d1, epsilon, alpha and beta are fitted; beta, gamma and eta as shares of alpha, so that h stays
+    bounded. Of a Prandtl-Ishlinskii model the weights are fitted, the thresholds are not. Creep is one weight for all
+    its lags.
+
+    Args:
+        name: Name of the mirror.
+        model: The hysteresis at which the search begins.
+        linear: The linear part at which it begins.
+        creep: The creep at which it begins.
+        free: What is fitted as well: d2, delta, gamma, eta, exponent of a Bouc-Wen model, widening of a
+            Prandtl-Ishlinskii model.
+        free_linear: Whether poles and zeros are fitted.
+        admissible: Whether the slope of a Bouc-Wen model behind a slow reversal is kept from turning against d1.
     """
     hysteresis, make_model = (
         _bouc_wen_part(model, free, admissible) if isinstance(model, BoucWen) else _play_part(model, free)
@@ -268,15 +289,3 @@ def _linear_part(
         return replace(linear, poles=moved(linear.poles), zeros=moved(linear.zeros))
 
     return tuple(parameters), make
-
-
-def propagated(quantity: Callable[[Floats], Floats], values: Floats, covariance: Floats) -> Floats:
-    """Standard errors of what is computed from parameters with this covariance, to first order."""
-    deviation = np.sqrt(np.diag(covariance))
-    columns = []
-    for i, step in enumerate(np.maximum(1e-4 * deviation, 1e-9 * np.abs(values))):
-        move = np.zeros(values.size)
-        move[i] = step or 1e-12
-        columns.append((quantity(values + move) - quantity(values - move)) / (2 * move[i]))
-    jacobian = np.column_stack(columns)
-    return np.asarray(np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", jacobian, covariance, jacobian), 0.0)))

@@ -18,7 +18,8 @@ from microrad.lab.identify.linear.order import fit_order
 from microrad.lab.identify.linear.polish import Polished, TimeEquations, pack, polish, unpack
 from microrad.lab.identify.linear.response import FrequencyResponse, response_from_periods, response_from_records
 from microrad.lab.identify.linear.vector_fitting import check_order
-from microrad.lab.identify.records import IdentificationError, colour_inflation, no_progress, rounded_to_error
+from microrad.lab.identify.records import IdentificationError, no_progress
+from microrad.lab.identify.statistics import central_differences, colour_inflation, rounded_to_error
 from microrad.lab.recording import Recording
 
 _STEP = 1e-6
@@ -44,7 +45,14 @@ class Uncertainty:
 
 
 def uncertainty(polished: Polished, response: FrequencyResponse, direct: bool, inflation: float) -> Uncertainty:
-    """Values and standard errors; `inflation` is the factor by which colour raises the variance (1 for white)."""
+    """Poles, zeros and gains of a polished model, with their standard errors.
+
+    Args:
+        polished: The model and its normal equations.
+        response: The response that it was fitted to.
+        direct: Whether the direct term was fitted.
+        inflation: Factor by which the colour of the residual raises the variance; 1 for white noise.
+    """
     model = polished.model
     covariance = parameter_covariance(polished) * inflation
     m, n = model.real_poles, model.poles_rad_s.size
@@ -92,7 +100,7 @@ def transmission_zeros(model: ModalModel, below_rad_s: float) -> Complexes:
     """Complex frequencies at which the square transfer matrix loses rank, up to `below_rad_s`; none where not
     square.
     """
-    from scipy.linalg import eig  # here, to keep start-up cheap
+    from scipy.linalg import eig
 
     outputs, inputs = model.direct.shape
     if outputs != inputs:
@@ -114,16 +122,8 @@ def transmission_zeros(model: ModalModel, below_rad_s: float) -> Complexes:
 def _slopes(model: ModalModel, points: Complexes, direct: bool) -> Complexes:
     """Derivative of the transfer matrix at the points by each parameter: (points, outputs, inputs, parameters)."""
     theta = pack(model, direct)
-    slopes = np.empty((points.size, *model.direct.shape, theta.size), dtype=complex)
-    for k, value in enumerate(theta):
-        step = _STEP * max(abs(value), 1e-9)
-        ends = []
-        for sign in (1.0, -1.0):
-            moved = theta.copy()
-            moved[k] += sign * step
-            ends.append(transfer_matrix(unpack(moved, model), points))
-        slopes[..., k] = (ends[0] - ends[1]) / (2 * step)
-    return slopes
+    steps = _STEP * np.maximum(np.abs(theta), 1e-9)
+    return central_differences(lambda moved: transfer_matrix(unpack(moved, model), points), theta, steps)
 
 
 def _variance(slopes: Complexes, covariance: Floats) -> Floats:
@@ -206,14 +206,20 @@ def fit_linear(
 ) -> LinearFit:
     """Fit a stable continuous model with common poles to recordings of any number of inputs and outputs.
 
-    `orders` is a number of states, or several to compare; by default 1 to 8, or 4, 8, ... 28 with several channels.
     Periodic recordings are fitted in frequency, where the error at the excited lines is the output error of the steady
-    state; others first in frequency and then as output error in time from rest, the first `drop` samples not counted.
-    `strictly_proper` leaves out the direct term. `exchanges` is the largest number of weak modes exchanged for better
-    ones (several channels only; see `order`).
+    state; others first in frequency and then as output error in time, from rest.
 
-    Raises `IdentificationError` for what `response_from_records` and `response_from_periods` refuse, and for an order
-    below 1 or beyond what the response can fix.
+    Args:
+        records: Recordings of one rate, with the same channels.
+        orders: A number of states, or several to compare; by default 1 to 8, or 4, 8, ... 28 with several channels.
+        strictly_proper: Whether the direct term is left out.
+        drop: First samples of each record that do not count in time.
+        exchanges: Largest number of weak modes that are exchanged for better ones (several channels only, see `order`).
+        on_progress: Called with the steps done, their number and what is done.
+
+    Raises:
+        IdentificationError: If no response can be had from the records (`response_from_records`,
+            `response_from_periods`), or if an order is below 1 or beyond what the response can fix.
     """
     periodic = bool(records) and all(r.period_samples is not None for r in records)
     response = response_from_periods(records) if periodic else response_from_records(records)
@@ -302,11 +308,14 @@ def _choose(scan: Sequence[OrderScore]) -> tuple[int, str]:
 def output_error(
     modes: ModalModel, record: Recording, hold: Hold = "zero-order", *, steady: bool = False, drop: int = 0
 ) -> Floats:
-    """Measured less modelled output (samples, outputs) of a record, without its mean, the first `drop` samples left
-    out.
+    """Measured less modelled output (samples, outputs) of a record, without its mean.
 
-    From rest at the first sample's drive; with `steady`, each period in the steady state of its own drive
-    (`period_samples`).
+    Args:
+        modes: The model.
+        record: The record, from rest at its first drive value.
+        hold: What stands between the samples of the drive.
+        steady: Whether each period (`period_samples`) is in the steady state of its own drive instead.
+        drop: First samples that are left out.
     """
     modelled = _modelled(modes, record, hold, steady)
     error = (record.output[: len(modelled)] - modelled)[drop:]
@@ -324,7 +333,12 @@ def _modelled(modes: ModalModel, record: Recording, hold: Hold, steady: bool) ->
 
 
 def fit_percent(measured: Floats, error: Floats) -> Floats:
-    """100 (1 - |y - yhat| / |y - mean y|) of each output; arrays (samples, outputs)."""
+    """100 (1 - |y - yhat| / |y - mean y|) of each output, shape (outputs,).
+
+    Args:
+        measured: y, shape (samples, outputs).
+        error: y - yhat, of the same shape.
+    """
     spread = np.linalg.norm(measured - measured.mean(axis=0), axis=0)
     return np.asarray(100.0 * (1.0 - np.linalg.norm(error, axis=0) / spread))
 

@@ -209,7 +209,7 @@ def filtered(
     poles_rad_s: Complexes, drive: Floats, hold: Hold, rate_hz: float, *, rates: bool = False
 ) -> tuple[Complexes, Complexes | None]:
     """Each drive behind each mode from rest, and the derivative by the pole; shapes (modes, inputs, samples)."""
-    from scipy.signal import lfilter  # here, to keep start-up cheap
+    from scipy.signal import lfilter
 
     step = hold_step(poles_rad_s, hold, rate_hz)
     u = np.ascontiguousarray(drive.T)

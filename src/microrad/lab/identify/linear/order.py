@@ -28,7 +28,7 @@ _DAMPING = (0.003, 0.01, 0.03, 0.1, 0.4)
 _CHUNK = 40
 
 
-class Candidate(NamedTuple):
+class CandidateMode(NamedTuple):
     """A mode that would lower the cost by about `gain`."""
 
     gain: float
@@ -181,7 +181,7 @@ def _without_weakest(equations: Equations, model: ModalModel) -> list[tuple[Comp
     return [(poles, inputs) for _, poles, inputs in costs[:2]]
 
 
-def _candidates(equations: Equations, model: ModalModel, band: tuple[float, float]) -> list[Candidate]:
+def _candidates(equations: Equations, model: ModalModel, band: tuple[float, float]) -> list[CandidateMode]:
     """Rank-one pairs over the band by the cost they would take, the output vectors of all modes refitted; best
     first.
     """
@@ -189,7 +189,7 @@ def _candidates(equations: Equations, model: ModalModel, band: tuple[float, floa
     freq = np.unique(np.concatenate([np.geomspace(low, high, 30), np.linspace(low, high, 61)]))
     zeta = np.array(_DAMPING)
     poles = (2 * np.pi * freq[:, None] * (-zeta + 1j * np.sqrt(1 - zeta**2))).ravel()
-    found: list[Candidate] = []
+    found: list[CandidateMode] = []
     own, left = _left_over(equations, model)
     for begin in range(0, poles.size, _CHUNK):
         found += _gains(equations, poles[begin : begin + _CHUNK], own, left)
@@ -204,7 +204,7 @@ def _left_over(equations: Equations, model: ModalModel) -> tuple[Floats, Floats]
     return basis, block.target - (block.target @ basis.T) @ basis
 
 
-def _gains(equations: Equations, poles: Complexes, own: Floats, left: Floats) -> list[Candidate]:
+def _gains(equations: Equations, poles: Complexes, own: Floats, left: Floats) -> list[CandidateMode]:
     (block,) = equations.blocks(poles, rates=False)
     count = poles.size
     inputs = block.behind.shape[1]
@@ -222,5 +222,5 @@ def _gains(equations: Equations, poles: Complexes, own: Floats, left: Floats) ->
         one = s[0] * np.outer(u[:, 0], vh[0]).T
         taken = np.concatenate([one.real, one.imag]) * size
         gain = 2 * float(np.sum(taken * cross)) - float(np.sum(taken * (gram @ taken)))
-        found.append(Candidate(gain, complex(poles[k]), vh[0]))
+        found.append(CandidateMode(gain, complex(poles[k]), vh[0]))
     return found

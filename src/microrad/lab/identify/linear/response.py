@@ -74,18 +74,24 @@ def response_from_records(
     bands: int = BANDS,
     detrend: bool = True,
 ) -> FrequencyResponse:
-    """Band-averaged cross-spectrum, solved for all inputs at once; needs as many records as inputs, or broadband
-    drives.
+    """Band-averaged cross-spectrum, solved for all inputs at once.
 
-    Each of `bands` logarithmic bands holds at least eight lines of the transform. There is no window: a chirp passes
-    each frequency once, and a window would weigh frequencies by the time at which it does. The frequency of a band is
-    the centroid of the drive's power in it, which removes the first-order bias of a response that changes within the
-    band (a delay turns its phase); a resonance narrower than a band is smeared: raise `bands`. With `detrend`, the
-    straight line that no response to the drive explains is removed from each output; the line through the output
-    itself is partly the chirp's own. `band_hz` defaults to where the drive has power.
+    It needs as many records as inputs, or broadband drives.
 
-    Raises `IdentificationError` for records that differ in rate, channels or length, and where inputs are not excited
-    independently.
+    Each band holds at least eight lines of the transform. There is no window: a chirp passes each frequency once, and a
+    window would weigh frequencies by the time at which it does. The frequency of a band is the centroid of the drive's
+    power in it, which removes the first-order bias of a response that changes within the band (a delay turns its
+    phase).
+
+    Args:
+        records: Recordings of one rate and length, with the same channels.
+        band_hz: Lowest and highest frequency; by default where the drive has power.
+        bands: Number of logarithmic bands. A resonance narrower than a band is smeared: raise it.
+        detrend: Whether the straight line that no response to the drive explains is removed from each output. (The line
+            through the output itself is partly the chirp's own.)
+
+    Raises:
+        IdentificationError: If records differ in rate, channels or length, or inputs are not excited independently.
     """
     _check(records)
     if len({r.samples for r in records}) > 1:
@@ -110,7 +116,7 @@ def _check(records: Sequence[Recording]) -> None:
 
 
 def check_alike(records: Sequence[Recording], done: str) -> None:
-    """Raises `IdentificationError` for records of different rates or channels; `done` is what is done to them."""
+    """Raises IdentificationError if records differ in rate or channels; `done` says what is done to them."""
     first = records[0]
     for other in records[1:]:
         if other.rate_hz != first.rate_hz:
@@ -215,7 +221,9 @@ def _banded(records: Sequence[Recording], spectra: _Spectra, edges: list[tuple[i
 
 
 def _independent(auto: Complexes, freq_hz: Floats) -> Complexes:
-    """Inverse of the drives' cross-power at each frequency; refuses drives that are not independent at most of them.
+    """Inverse of the drives' cross-power at each frequency.
+
+    Raises IdentificationError if the drives are not independent at most frequencies.
 
     A single line at which random phases happen to agree is kept: its standard error says what it is worth.
     """
@@ -266,16 +274,21 @@ def _unexplained_slopes(spectra: _Spectra, edges: list[tuple[int, int]], samples
 
 # ---------------------------------------------------------------------------------------------------- periodic drives
 def response_from_periods(records: Sequence[Recording], *, skip_periods: int = 0) -> FrequencyResponse:
-    """Best linear approximation from periodic records, one realisation of the same lines each, period_samples set.
+    """Best linear approximation from periodic records, one realisation of the same lines each.
 
-    The first `skip_periods` of each record are dropped as transient. At each excited line the outputs of all
-    realisations are solved for the response by least squares, which for orthogonal multisines in groups as large as
-    the number of inputs is the mean over the groups. What is left over gives the total standard error; the scatter
-    between the periods of a realisation gives the noise part; their difference is nonlinear distortion. With as many
-    realisations as inputs nothing is left over: the total is then the noise part, and the distortion None.
+    At each excited line the outputs of all realisations are solved for the response by least squares, which for
+    orthogonal multisines in groups as large as the number of inputs is the mean over the groups. What is left over
+    gives the total standard error; the scatter between the periods of a realisation gives the noise part; their
+    difference is nonlinear distortion. With as many realisations as inputs nothing is left over: the total is then the
+    noise part, and the distortion None.
 
-    Raises `IdentificationError` for a missing or unequal period, fewer records than inputs, fewer than two periods
-    with no record to spare, and drives that are not independent.
+    Args:
+        records: Recordings of one rate, with the same channels and `period_samples`.
+        skip_periods: First periods of each record that are dropped as transient.
+
+    Raises:
+        IdentificationError: If a period is missing or differs, if there are fewer records than inputs, or fewer than
+            two periods with no record to spare, or if the drives are not independent.
     """
     _check(records)
     period = _period(records)

@@ -60,17 +60,31 @@ def vector_fit(
     strictly_proper: bool = False,
     iterations: int = 30,
 ) -> VectorFit:
-    """Fit `order` common stable poles to a response of shape (frequencies, outputs, inputs) or (frequencies,).
+    """Fit common stable poles to a frequency response; the best of all iterations is returned.
 
-    `weight` multiplies the error, shape (frequencies,) or that of the response; one over the standard error is the
-    maximum-likelihood choice. Poles that a step makes unstable are mirrored. The best of all iterations is returned.
-    Raises `IdentificationError` for too few frequencies, or frequencies at or above half of `rate_hz`.
+    Poles that a step makes unstable are mirrored.
+
+    Args:
+        freq_hz: Frequencies, shape (frequencies,).
+        response: The response, shape (frequencies, outputs, inputs) or (frequencies,).
+        order: Number of poles.
+        weight: Factor on the error, shape (frequencies,) or that of the response; one over the standard error is the
+            maximum-likelihood choice.
+        hold: What stands between the samples of the drive.
+        rate_hz: Sample rate; a hold other than band-limited needs it.
+        strictly_proper: Whether the direct term is left out.
+        iterations: Largest number of steps.
+
+    Raises:
+        IdentificationError: If there are too few frequencies, one at or above half of `rate_hz`, or a response that is
+            not finite.
     """
     freq = np.asarray(freq_hz, dtype=float)
     data = np.asarray(response, dtype=complex).reshape(freq.size, -1)
     outputs, inputs = (*np.shape(response), 1, 1)[1:3]
     _check(freq, order, data, hold, rate_hz)
-    scale = np.ones(data.shape) if weight is None else _weights(weight, data.shape)
+    weights = np.ones(freq.size) if weight is None else np.asarray(weight, dtype=float)
+    scale = np.broadcast_to(weights.reshape(freq.size, -1), data.shape)
     plane_hz = None if hold == "band-limited" else rate_hz
     points = _to_plane(2j * np.pi * freq, plane_hz)
     size = float(np.linalg.norm(scale * data)) / np.sqrt(data.size)
@@ -94,7 +108,7 @@ def vector_fit(
 
 
 def check_order(freq: Floats, order: int) -> None:
-    """Raise `IdentificationError` for a number of poles below 1 or beyond what so many frequencies can fix."""
+    """Raises IdentificationError if the number of poles is below 1 or beyond what so many frequencies can fix."""
     if order < 1:
         raise IdentificationError(f"the order is {order}; give at least one pole.")
     if freq.size < order + 1:
@@ -117,11 +131,6 @@ def _check(freq: Floats, order: int, data: Complexes, hold: Hold, rate_hz: float
         raise IdentificationError(
             f"the response reaches {freq.max():g} Hz, half the sample rate of {rate_hz:g} Hz or more; leave that out."
         )
-
-
-def _weights(weight: Floats, shape: tuple[int, ...]) -> Floats:
-    values = np.asarray(weight, dtype=float)
-    return np.broadcast_to(values[:, None], shape) if values.ndim == 1 else values.reshape(shape)
 
 
 def starting_poles(freq_hz: Floats, order: int) -> Complexes:

@@ -15,8 +15,9 @@ from microrad.lab.identify.hysteresis.joint import FORMS, JointFit, fit_joint, f
 from microrad.lab.identify.hysteresis.prandtl_ishlinskii import fit_prandtl_ishlinskii
 from microrad.lab.identify.hysteresis.structures import LinearPoles, poles_of
 from microrad.lab.identify.linear.fit import LinearFit, fit_linear
-from microrad.lab.identify.records import IdentificationError, SiRecord, Units, percent
+from microrad.lab.identify.records import IdentificationError, SiRecord, Units
 from microrad.lab.identify.selection.predictions import Fit, Prediction, Score, ScoredModel, predict
+from microrad.lab.identify.statistics import percent
 from microrad.lab.recording import Recording
 
 STATIC = ("prandtl_ishlinskii", "bouc_wen", "bouc_wen_admissible")

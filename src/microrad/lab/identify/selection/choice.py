@@ -9,15 +9,7 @@ import numpy as np
 from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
 from microrad.lab.identify.linear.fit import LinearFit
-from microrad.lab.identify.records import (
-    IdentificationError,
-    SiRecord,
-    Units,
-    colour_inflation,
-    no_progress,
-    si_records,
-    span,
-)
+from microrad.lab.identify.records import IdentificationError, SiRecord, Units, no_progress, si_records, span
 from microrad.lab.identify.selection.candidates import (
     MODELS,
     STATIC,
@@ -41,6 +33,7 @@ from microrad.lab.identify.selection.warnings import (
     score_warnings,
     set_aside_warnings,
 )
+from microrad.lab.identify.statistics import colour_inflation
 from microrad.lab.recording import Recording
 
 _MIN_PART = 100
@@ -57,7 +50,7 @@ _OTHER_MOTION = (
 
 
 @dataclass(frozen=True)
-class Source:
+class RecordingUse:
     """One recording: path, digest of the file, samples fitted and held out, and what it served for.
 
     `role` is "loops", "broadband" (for the linear part) or "validation" (for the scores alone).
@@ -91,7 +84,7 @@ class Identification:
     warnings: tuple[str, ...]
     refused: tuple[Refused, ...]
     unsupported: str
-    sources: tuple[Source, ...]
+    sources: tuple[RecordingUse, ...]
     recordings: tuple[Recording, ...]
     predictions: tuple[tuple[Prediction, ...], ...]
     linear: LinearFit | None
@@ -224,7 +217,7 @@ def _splits(recordings: Sequence[Recording], hold_out: float | None, validated: 
 
 
 def _check_distinct(recordings: Sequence[Recording], validation: Sequence[Recording]) -> None:
-    """Raises `IdentificationError` for a recording that is given twice, or to fit and for validation."""
+    """Raises IdentificationError if a recording is given twice, or both to fit and for validation."""
     seen: dict[str, str] = {}
     for recording in (*recordings, *validation):
         key = f"{recording.sha256} {recording.rate_hz}"
@@ -243,7 +236,7 @@ def _identification(
     predictions: Sequence[tuple[Prediction, ...]],
     best: int,
     refused: Sequence[Refused],
-    sources: tuple[Source, ...],
+    sources: tuple[RecordingUse, ...],
 ) -> Identification:
     scores = tuple(candidates.score(f.name, p) for f, p in zip(fits, predictions, strict=True))
     straight = straight_line(prepared, candidates.recordings, candidates.all_splits, candidates.units)
@@ -296,15 +289,14 @@ def _identification(
 
 def _sources(
     candidates: Candidates, broadband: Sequence[Recording], response: Sequence[Recording]
-) -> tuple[Source, ...]:
+) -> tuple[RecordingUse, ...]:
     """What each recording served for; a broadband one counts where the linear part was fitted to it."""
-    loops = [
-        Source(r.path, r.sha256, k, r.samples - k) for r, k in zip(candidates.loops, candidates.splits, strict=True)
-    ]
+    pairs = zip(candidates.loops, candidates.splits, strict=True)
+    loops = [RecordingUse(r.path, r.sha256, k, r.samples - k) for r, k in pairs]
     both, used = {id(r) for r in candidates.loops}, {id(r) for r in response}
     others = [r for r in broadband if id(r) not in both]
-    wide = [Source(r.path, r.sha256, r.samples * (id(r) in used), 0, "broadband") for r in others]
-    return (*loops, *wide, *(Source(r.path, r.sha256, 0, r.samples, "validation") for r in candidates.validation))
+    wide = [RecordingUse(r.path, r.sha256, r.samples * (id(r) in used), 0, "broadband") for r in others]
+    return (*loops, *wide, *(RecordingUse(r.path, r.sha256, 0, r.samples, "validation") for r in candidates.validation))
 
 
 def _unsupported(score: Score, line: Score, predictions: Sequence[Prediction]) -> str:

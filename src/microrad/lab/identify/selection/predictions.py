@@ -80,16 +80,13 @@ def predict(fit: Fit, recording: Recording, split: int | None = None) -> Predict
         )
     start = transient(drive[:end])
     model, clamped = fit.response(drive, recording.step_s)
-    added = _added(fit, measured - model, recording.step_s, slice(start, end))
-    return Prediction(model + added, measured, start, start if split == 0 else end, clamped)
-
-
-def _added(fit: Fit, difference: Floats, step_s: float, known: slice) -> Floats | float:
+    difference = measured - model
     if isinstance(fit, JointFit):
-        columns = fit.nuisance(difference.size, step_s)
-        share = np.linalg.lstsq(columns[known], difference[known], rcond=None)[0]
-        return np.asarray(columns @ share)
-    return float(np.mean(difference[known]))
+        columns = fit.nuisance(difference.size, recording.step_s)
+        model = model + columns @ np.linalg.lstsq(columns[start:end], difference[start:end], rcond=None)[0]
+    else:
+        model = model + float(np.mean(difference[start:end]))
+    return Prediction(model, measured, start, start if split == 0 else end, clamped)
 
 
 def straight_line(

@@ -10,8 +10,9 @@ from microrad.core.arrays import Floats
 from microrad.lab.identify.hysteresis.bouc_wen import BoucWenFit, made_rising
 from microrad.lab.identify.hysteresis.joint import JointFit
 from microrad.lab.identify.hysteresis.prandtl_ishlinskii import PrandtlIshlinskiiFit
-from microrad.lab.identify.records import SiRecord, Units, colour_inflation, loop_rates, noisiness, one_rate_only
+from microrad.lab.identify.records import SiRecord, Units, loop_rates, noisiness, one_rate_only
 from microrad.lab.identify.selection.predictions import Fit, Prediction, Score
+from microrad.lab.identify.statistics import colour_inflation, rounded_to_error
 from microrad.lab.recording import Recording
 from microrad.mirror.hysteresis import BoucWen
 
@@ -145,8 +146,9 @@ def drift(
         if abs(trend) > abs(largest):
             largest = trend
         if abs(trend) > max(3 * error, 0.2 / 100 * span_rad):
+            shown = rounded_to_error(1e6 * trend, 1e6 * error)
             warnings.append(
-                f"{recording.path}: the residual drifts by {1e6 * trend:.3g} ± {1e6 * error:.2g} urad "
+                f"{recording.path}: the residual drifts by {shown} ± {1e6 * error:.2g} urad "
                 f"({100 * trend / span_rad:.2g} % of the peak-to-peak output) in "
                 f"{residual.size * recording.step_s:.3g} s: creep beyond what the model holds, or a warming sensor."
             )

@@ -23,8 +23,8 @@ from microrad.lab.identify.records import IdentificationError, no_progress
 from microrad.lab.identify.stiffness import tangents
 from microrad.lab.identify.stiffness.model import (
     FIELDS,
+    HysteresisSource,
     Numbers,
-    Source,
     balanced,
     delayed,
     linear_start,
@@ -36,7 +36,7 @@ from microrad.lab.recording import Recording
 from microrad.mirror import model as mirror
 from microrad.mirror.model import Mirror
 
-SOURCES: tuple[Source, ...] = ("strain", "drive")
+SOURCES: tuple[HysteresisSource, ...] = ("strain", "drive")
 THRESHOLDS = tuple(np.geomspace(0.006, 0.6, 6).tolist())
 
 _DAMPING = 1e-2
@@ -55,7 +55,7 @@ class StiffnessOptions:
     The search ends when three iterations in a row gain less than ``tolerance`` of the error.
     """
 
-    sources: tuple[Source, ...] = SOURCES
+    sources: tuple[HysteresisSource, ...] = SOURCES
     thresholds: tuple[float, ...] = THRESHOLDS
     sub_steps: int = 2
     delay_s: float | None = None
@@ -106,11 +106,15 @@ class HystereticStiffnessFit:
 
 
 def simulate_hysteretic_stiffness(fit: HystereticStiffnessFit, drive: Floats) -> Floats:
-    """Output (samples, outputs) from rest for a drive (samples, inputs) at the rate of the fit.
+    """Output (samples, outputs) of a fitted mirror from rest.
 
     Between samples the drive is interpolated without content above half the rate and shifted by the delay, both around
-    the corner: the drive is to hold whole periods, or to begin and end at rest. Then the mirror runs from rest with
-    `kernels.open_loop`, the drive straight over each of its steps.
+    the corner: the drive is to hold whole periods, or to begin and end at rest. Then the mirror runs from rest, the
+    drive straight over each of its steps.
+
+    Args:
+        fit: The fit.
+        drive: The drive, shape (samples, inputs), at the rate of the fit.
     """
     fine = delayed(drive, fit.rate_hz, fit.delay_s, fit.sub_steps)
     plant = mirror.discretise(fit.mirror, 1.0 / (fit.rate_hz * fit.sub_steps))
@@ -120,9 +124,15 @@ def simulate_hysteretic_stiffness(fit: HystereticStiffnessFit, drive: Floats) ->
 
 
 def predicted_error(fit: HystereticStiffnessFit, record: Recording, drop: int = 0) -> Floats:
-    """Measured less predicted output (samples, outputs) of a record from rest, the first `drop` samples left out.
+    """Measured less predicted output (samples, outputs) of a record from rest.
 
-    Raises `IdentificationError` for another rate or other channels than those of the fit.
+    Args:
+        fit: The fit.
+        record: A record with the rate and channels of those fitted.
+        drop: First samples that are left out.
+
+    Raises:
+        IdentificationError: If the record has another rate or other channels.
     """
     shape = (record.drive.shape[1], record.output.shape[1])
     if record.rate_hz != fit.rate_hz or shape != (fit.mirror.actuators, fit.mirror.axes):
@@ -144,21 +154,28 @@ def fit_hysteretic_stiffness(
 ) -> HystereticStiffnessFit:
     """Fit one mirror to periodic multisines of several amplitudes, any number of inputs and outputs.
 
-    The start is a linear model of ``order`` states of the middle amplitude (at least as many records of it as inputs),
-    behind a pure delay. Each record counts by its mean-square error (steady state, mean of the periods behind the first
-    ``skip_periods``, without its mean) over what no linear model of its amplitude could follow, where there are more
-    records of each amplitude than inputs, and else over its mean-square output. ``iterations`` is the most that are
-    done; `StiffnessOptions` has the rest.
+    The search begins at a linear model of the middle amplitude (at least as many records of it as inputs), behind a
+    pure delay. Each record counts by its mean-square error (steady state, mean of the periods, without its mean) over
+    what no linear model of its amplitude could follow, where there are more records of each amplitude than inputs, and
+    else over its mean-square output. No step leads to a mirror that runs away where plays slide; a search that ends at
+    that bound has not converged.
 
     Records are worked on in parallel, one a processor, each with a Jacobian in single precision: 4 bytes x samples of a
-    period x outputs x numbers, and about as much for what it is made from. With two processors, 15 records of 8192
-    samples, 3 outputs and 613 numbers the whole process has been seen to take 640 MB.
+    period x outputs x parameters, and about as much for what it is made from. With two processors, 15 records of 8192
+    samples, 3 outputs and 613 parameters the whole process has been seen to take 640 MB.
 
-    No step leads to a mirror that runs away where plays slide; a search that ends at that bound has not converged.
+    Args:
+        records: The multisines, of one rate, with the same channels and `period_samples`.
+        order: States of the linear model.
+        options: What is fitted and how.
+        skip_periods: First periods of each record that are dropped as transient.
+        iterations: Largest number of iterations.
+        on_progress: Called with the iterations done, their largest number, and the error.
 
-    Raises `IdentificationError` for records of one amplitude (they cannot tell hysteresis from linear stiffness), of
-    different rates or channels, without a period, for thresholds that do not ascend from 0, and for a mirror that runs
-    away all the same.
+    Raises:
+        IdentificationError: If all records have one amplitude (they cannot tell hysteresis from linear stiffness), if
+            they differ in rate or channels or have no period, if the thresholds do not ascend from 0, or if the mirror
+            runs away all the same.
     """
     _check(records, skip_periods, options)
     amplitudes, classes = _classes(records)
@@ -167,7 +184,8 @@ def fit_hysteretic_stiffness(
     groups = [[r for r, c in zip(records, classes, strict=True) if c == own] for own in range(len(amplitudes))]
     start = _start(groups, amplitudes, classes, order, options, skip_periods)
     start = _with_thresholds(scaled(start, 1 / units[0], 1 / units[1]), steady, options.thresholds)
-    outputs = _class_rms(np.array([np.mean(r.output**2) for r in steady]), classes)
+    squares, group = np.array([np.mean(r.output**2) for r in steady]), np.asarray(classes)
+    outputs = np.sqrt([np.mean(squares[group == c]) for c in range(len(amplitudes))])
     levels = _levels(groups, outputs, units[1], skip_periods)
     search = _Search(steady, classes, levels, fixed_delay=options.delay_s is not None)
     with ThreadPoolExecutor(min(len(steady), os.cpu_count() or 1)) as pool:
@@ -274,11 +292,6 @@ def _with_thresholds(numbers: Numbers, steady: Sequence[Steady], thresholds: Seq
     half = drive.shape[0] // 2
     q = path.x[half:, : numbers.B.shape[0]] @ numbers.F.T + drive[half:] @ numbers.G.T
     return replace(numbers, thresholds=np.zeros_like(numbers.thresholds) + np.abs(q).max() * np.asarray(thresholds))
-
-
-def _class_rms(mean_squares: Floats, classes: Sequence[int]) -> Floats:
-    groups = np.asarray(classes)
-    return np.array([np.sqrt(np.mean(mean_squares[groups == c])) for c in range(int(groups.max()) + 1)])
 
 
 # ---------------------------------------------------------------------------------------------------------- the search

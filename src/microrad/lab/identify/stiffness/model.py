@@ -23,7 +23,7 @@ from microrad.lab.identify.linear.response import FrequencyResponse
 from microrad.mirror.hysteresis import Play
 from microrad.mirror.model import Mirror
 
-Source = Literal["strain", "drive"]
+HysteresisSource = Literal["strain", "drive"]
 
 FIELDS = ("decay", "frequency", "B", "E", "F", "G", "weights", "C", "D", "K")
 _MOST_COMBINED = 6
@@ -173,7 +173,7 @@ def linear_start(
 
 
 def starting_numbers(
-    model: ModalModel, delay_s: float, sources: Sequence[Source], lowest_hz: float, plays: int
+    model: ModalModel, delay_s: float, sources: Sequence[HysteresisSource], lowest_hz: float, plays: int
 ) -> Numbers:
     """A linear model with an operator of next to no weight per actuator and source, which acts as its drive does.
 

@@ -84,7 +84,7 @@ def follows(
     rate_hz: float,
     band: tuple[float, float],
 ) -> list[Finding]:
-    """Whether an output has anything to do with the inputs, and whether it answers before they ask."""
+    """Findings: an output that does not follow the inputs, or that comes before them."""
     factor = max(1, int(rate_hz / (16 * band[1])))
     factor = min(factor, max(1, output.size // 4096))
     slow = [block_means(column, factor) for column in (*inputs, output)]
@@ -220,7 +220,7 @@ def _lead(
     weight = found.share[good, column]
     error = np.sqrt((1 - found.coherence[good]) / (2 * found.coherence[good] * found.averages)) + 1e-9
     jumps = np.flatnonzero(np.abs(np.angle(np.exp(1j * np.diff(phase)))) > math.pi / 2)
-    last = int(jumps[0]) + 1 if jumps.size else freq.size  # behind a resonance the phase is anyone's guess
+    last = int(jumps[0]) + 1 if jumps.size else freq.size  # behind a resonance the phase is ambiguous
     freq, phase, weight, error = freq[:last], np.unwrap(phase[:last]), weight[:last], error[:last]
     broad = band[1] > 3 * band[0] and freq[-1] > 2 * freq[0] and freq.size > 6
     if broad:

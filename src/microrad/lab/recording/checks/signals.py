@@ -82,10 +82,11 @@ def _check_varies(where: str, role: str, label: str, values: Floats) -> None:
 
 
 def _check_separable(where: str, inputs: Sequence[Floats], labels: Sequence[str]) -> None:
-    """Raises `RecordingError` for an input that is a linear combination of those before it."""
+    """Raises RecordingError if an input is a linear combination of those before it."""
     if len(inputs) < 2:
         return
-    covariance = np.cov(np.stack(inputs)) if inputs[0].size <= 1 << 20 else _covariance(inputs)
+    centred = [column - column.mean() for column in inputs]
+    covariance = np.array([[float(a @ b) for b in centred] for a in centred])
     scale = np.sqrt(np.diag(covariance))
     correlation = covariance / np.outer(scale, scale)
     for k, label in enumerate(labels[1:], 1):
@@ -98,12 +99,3 @@ def _check_separable(where: str, inputs: Sequence[Floats], labels: Sequence[str]
                 "its variance is its own, so their effects cannot be told apart; drive the inputs independently "
                 "(orthogonal multisines), or leave one out."
             )
-
-
-def _covariance(columns: Sequence[Floats]) -> Floats:
-    means = [float(column.mean()) for column in columns]
-    total = np.zeros((len(columns), len(columns)))
-    for at in range(0, columns[0].size, 1 << 18):
-        block = np.stack([c[at : at + (1 << 18)] - m for c, m in zip(columns, means, strict=True)])
-        total += block @ block.T
-    return total / columns[0].size

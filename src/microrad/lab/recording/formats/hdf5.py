@@ -116,7 +116,7 @@ def _too_large(path: Path, item: Any) -> str:
 
 
 def check_pieces(path: Path, name: str, item: Any) -> None:
-    """Raises `RecordingError` for a piece that does not unpack to the number of bytes that it states.
+    """Raises RecordingError if a piece does not unpack to the number of bytes that it states.
 
     Of one that holds more the library would make room for all; behind one that holds less it reads on in the memory.
     """
@@ -243,7 +243,7 @@ class Hdf5Source(ArraySource):
 
 
 def _check_depth(path: Path, name: str) -> None:
-    """Raises `RecordingError` for groups so deep that the library takes minutes to get there."""
+    """Raises RecordingError if groups are so deep that the library would take minutes to get there."""
     if name.count("/") > _MOST_DEEP:
         raise RecordingError(
             f"{path}: groups are nested more than {_MOST_DEEP} deep, which no recording needs; copy the datasets into "

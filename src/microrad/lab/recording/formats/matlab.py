@@ -3,7 +3,8 @@
 The structures of an array are numbered from 0, `structure[1]/field`.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -24,19 +25,15 @@ class MatlabSource(ArraySource):
         try:
             file = MatlabFile(path, most_unpacked(path))
         except MatlabFileError as error:
-            raise _refused(path, error) from None
+            if not error.remedy:
+                raise damaged(path, "a MATLAB file", error) from None
+            raise RecordingError(f"{path}: this cannot be read as a MATLAB file ({error}); {error.remedy}.") from None
         except OSError as error:
             raise damaged(path, "a MATLAB file", error) from None
         unusable: dict[str, str] = {}
         self.variables = [v for name, value in file.variables.items() for v in _variables(file, name, value, unusable)]
         channels = channels_of(self.variables, unusable)
         super().__init__(path, "MATLAB", channels, sha256_of(path), unusable, rates_of(self.variables))
-
-
-def _refused(path: Path, error: MatlabFileError) -> RecordingError:
-    if not error.remedy:
-        return damaged(path, "a MATLAB file", error)
-    return RecordingError(f"{path}: this cannot be read as a MATLAB file ({error}); {error.remedy}.")
 
 
 def _variables(file: MatlabFile, name: str, value: Any, unusable: dict[str, str]) -> Iterator[Variable]:
@@ -51,12 +48,9 @@ def _variables(file: MatlabFile, name: str, value: Any, unusable: dict[str, str]
             for field, inner in fields.items():
                 yield from _variables(file, f"{group}/{field}", inner, unusable)
     else:
-        yield Variable(name, value.shape, value.dtype, _loader(file, value))
+        yield Variable(name, value.shape, value.dtype, partial(_load, file, value))
 
 
-def _loader(file: MatlabFile, value: Any) -> Callable[[tuple[int | slice, ...]], Any]:
-    def load(key: tuple[int | slice, ...]) -> Any:
-        values = file.numbers(value) if isinstance(value, Left) else value
-        return np.array(values[key])  # a copy lets go of the other columns
-
-    return load
+def _load(file: MatlabFile, value: Any, key: tuple[int | slice, ...]) -> Any:
+    values = file.numbers(value) if isinstance(value, Left) else value
+    return np.array(values[key])  # a copy lets go of the other columns

@@ -3,7 +3,7 @@
 import io
 import struct
 import zipfile
-from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import IO, Any
 
@@ -84,7 +84,7 @@ def _of_archive(path: Path, unusable: dict[str, str]) -> list[Variable]:
             if not dtype.hasobject and (reason := _unfit(path, shape, dtype.itemsize, member.file_size)):
                 unusable[name] = reason
                 continue
-            variables.append(Variable(name, shape, dtype, _loader(path, name)))
+            variables.append(Variable(name, shape, dtype, partial(_load, path, name)))
     return variables
 
 
@@ -98,9 +98,6 @@ def _unfit(path: Path, shape: tuple[int, ...], itemsize: int, present: int) -> s
     return too_large(path, shape, itemsize)
 
 
-def _loader(path: Path, name: str) -> Callable[[tuple[int | slice, ...]], Any]:
-    def load(key: tuple[int | slice, ...]) -> Any:
-        with np.load(path, allow_pickle=False) as archive:
-            return archive[name][key]
-
-    return load
+def _load(path: Path, name: str, key: tuple[int | slice, ...]) -> Any:
+    with np.load(path, allow_pickle=False) as archive:
+        return archive[name][key]

@@ -91,7 +91,7 @@ class _Listener(logging.Handler):
 def _opened(path: Path) -> Iterator[Any]:
     """The file, opened: given its path, the library would believe an old .tdms_index beside it.
 
-    Its warnings are not printed. Raises `RecordingError` at the end where one says that numbers are in doubt.
+    The warnings of the library are not printed. Raises RecordingError at the end if one says that numbers are in doubt.
     """
     from nptdms import TdmsFile
     from nptdms.log import log_manager

@@ -98,7 +98,7 @@ def _encoding(path: Path, head: bytes) -> str:
 
 
 def refuse_binary(path: Path, chunk: bytes) -> None:
-    """Raises `RecordingError`, which names what the file is instead of text."""
+    """Raises RecordingError, whose message names what the file is instead of text."""
     what = "UTF-16 text" if chunk[:2] in (b"\xff\xfe", b"\xfe\xff") else "a binary file, not text"
     raise RecordingError(f"{path}: this is {what}; export the recording as plain text (CSV, UTF-8).")
 

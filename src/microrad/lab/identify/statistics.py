@@ -1,0 +1,92 @@
+"""What is said of estimates: covariance and correlation, the colour of residuals, how many digits are known."""
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from microrad.core.arrays import Floats
+
+
+class Estimate:
+    """Something that was estimated, with the covariance of its parameters."""
+
+    covariance: Floats
+
+    @property
+    def standard_errors(self) -> Floats:
+        """Standard errors of the parameters, in their order."""
+        return np.asarray(np.sqrt(np.diag(self.covariance)))
+
+    @property
+    def correlation(self) -> Floats:
+        """Correlation matrix of the parameters."""
+        return correlation(self.covariance)
+
+
+def colour_inflation(residuals: Sequence[Floats]) -> float:
+    """Factor (1 for white noise) by which correlation between samples inflates the variance of an estimate.
+
+    1 + 2 sum of autocorrelations, summed over pairs of lags until a pair turns negative (Geyer's initial positive
+    sequence), the largest over the records.
+    """
+    return max(_inflation(residual) for residual in residuals)
+
+
+def _inflation(residual: Floats) -> float:
+    n = residual.size
+    spectrum = np.abs(np.fft.rfft(residual - residual.mean(), 2 * n)) ** 2
+    correlation = np.fft.irfft(spectrum)[: 2 * (n // 4)]
+    if correlation[0] <= 0:
+        return 1.0
+    pairs = (correlation / correlation[0]).reshape(-1, 2).sum(axis=1)
+    negative = np.flatnonzero(pairs < 0)
+    last = int(negative[0]) if negative.size else pairs.size
+    return max(1.0, float(2 * pairs[:last].sum() - 1))
+
+
+def correlation(covariance: Floats) -> Floats:
+    """Correlation matrix of a covariance."""
+    deviation = np.sqrt(np.diag(covariance)) + 1e-300
+    return np.asarray(covariance / np.outer(deviation, deviation))
+
+
+def central_differences(quantity: Callable[[Floats], np.ndarray], at: Floats, steps: Floats) -> np.ndarray:
+    """Derivative of a quantity by each parameter, along the last axis.
+
+    Args:
+        quantity: What is computed from the parameters, any shape.
+        at: The parameters.
+        steps: Step of each, to either side.
+    """
+    columns = [(quantity(at + move) - quantity(at - move)) / (2 * move.sum()) for move in np.diag(steps)]
+    return np.stack(columns, axis=-1)
+
+
+def propagated(quantity: Callable[[Floats], Floats], values: Floats, covariance: Floats) -> Floats:
+    """Standard errors of what is computed from estimates, to first order.
+
+    Args:
+        quantity: What is computed, shape (quantities,).
+        values: The estimates.
+        covariance: Their covariance.
+    """
+    steps = np.maximum(1e-4 * np.sqrt(np.diag(covariance)), 1e-9 * np.abs(values))
+    jacobian = central_differences(quantity, values, np.where(steps > 0.0, steps, 1e-12))
+    return np.asarray(np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", jacobian, covariance, jacobian), 0.0)))
+
+
+def percent(residual: Floats, span_rad: float) -> tuple[float, float]:
+    """Rms and peak of a residual in per cent of a peak-to-peak span."""
+    return 100 * float(np.sqrt(np.mean(residual**2))) / span_rad, 100 * float(np.max(np.abs(residual))) / span_rad
+
+
+def rounded_to_error(value: float, standard_error: float) -> str:
+    """A fitted value as it is printed: no digits beyond the two of its standard error, and five at most.
+
+    Further digits would tell nothing and differ between processors. A value without error (nan or 0) has five digits.
+    """
+    if 0.0 < standard_error < math.inf:
+        decimals = 1 - math.floor(math.log10(float(f"{standard_error:.2g}")))
+        value = round(value, decimals) + 0.0  # no -0
+    return f"{value:.5g}"

@@ -1,0 +1,220 @@
+"""From the tables of a mission to the physics of its links: beams, receivers, losses by convention."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from microrad.core.arrays import Floats
+from microrad.link import gains, receivers
+from microrad.link.beams import GaussianFall, LitAperture, OffAxis
+from microrad.mission.model import LinkMission
+from microrad.mission.tables import pointing as pointing_table
+from microrad.mission.tables.link import Beam, Channel, Communication, LinkConventions, LinkRequirement, Terminals
+from microrad.mission.tables.link import Receiver as ReceiverTable
+from microrad.mission.tables.pointing import JitterTable, PointAhead
+
+
+class LinkError(ValueError):
+    """A question to which this link has no answer; the message says by how many decibels."""
+
+
+@dataclass(frozen=True, slots=True)
+class TransmittedBeam:
+    """What leaves an aperture: gain on the axis, relative to an isotropic antenna, and how it falls off."""
+
+    gain_db: float
+    fall: OffAxis
+
+
+@dataclass(frozen=True, slots=True)
+class Shared:
+    """What a mission's links share: the terminals at their ends, the air between them, point-ahead, conventions."""
+
+    terminals: Terminals
+    conventions: LinkConventions
+    channel: Channel | None
+    point_ahead: PointAhead | None
+
+    @classmethod
+    def of(cls, m: LinkMission) -> "Shared":
+        """What the links of this mission share."""
+        return cls(m.terminals, m.conventions, m.channel, m.point_ahead)
+
+    @property
+    def clear_sky_db(self) -> float:
+        """Loss of a clear atmosphere on the path; 0 in vacuum."""
+        air = self.channel
+        return 0.0 if air is None else gains.clear_sky_loss_db(air.zenith_transmission, air.elevation_rad)
+
+    @property
+    def point_ahead_rad(self) -> float:
+        """Point-ahead angle 2 v / c that is left in the pointing error: 0 when it is corrected or not given."""
+        ahead = self.point_ahead
+        if ahead is None or ahead.corrected:
+            return 0.0
+        return pointing_table.point_ahead_rad(ahead.transverse_velocity_m_s)
+
+    @property
+    def point_ahead_left_rad(self) -> float:
+        """What point-ahead adds to a residual that does not hold it: all of it, or what its correction leaves."""
+        ahead = self.point_ahead
+        return 0.0 if ahead is None else ahead.error_rad if ahead.corrected else self.point_ahead_rad
+
+
+@dataclass(frozen=True, slots=True)
+class DataLink:
+    """The communication link, assembled from its table: its beam, its receiver, and what is required of it.
+
+    ``receiver`` is None where its sensitivity is given as measured.
+    """
+
+    shared: Shared
+    table: Communication
+    requirement: LinkRequirement
+    jitter: JitterTable | None
+    beam: TransmittedBeam
+    receiver: receivers.Receiver | None
+
+
+def of(m: LinkMission) -> DataLink:
+    """Assemble the communication link of a mission.
+
+    Raises ValueError where the mission does not say how its aperture is lit, or its obscuration stops the beam.
+    """
+    return assembled(Shared.of(m), m.communication, m.requirement, m.jitter)
+
+
+def assembled(
+    shared: Shared, table: Communication, requirement: LinkRequirement, jitter: JitterTable | None
+) -> DataLink:
+    """The communication link of these tables; raises ValueError as `of` does."""
+    beam = communication_beam(shared.terminals, table, shared.conventions.pointing_loss)
+    return DataLink(shared, table, requirement, jitter, beam, _receiver(shared.terminals, table))
+
+
+def communication_beam(terminals: Terminals, beam: Communication, convention: str) -> TransmittedBeam:
+    """The beam of the communication link, by a convention for its pointing loss.
+
+    Raises ValueError as `of` does.
+    """
+    if convention == "pattern":
+        lit = _lit_aperture(terminals, beam)
+        return TransmittedBeam(lit.gain_db, lit)
+    per_rad2 = gains.pointing_db_per_rad2(terminals.leo_aperture_m, beam.wavelength_m, convention)
+    half = math.sqrt(2.0 * gains.DB_PER_NEPER / per_rad2)
+    return TransmittedBeam(gains.aperture_gain_db(terminals.leo_aperture_m, beam.wavelength_m), GaussianFall(half))
+
+
+def _lit_aperture(terminals: Terminals, beam: Communication) -> LitAperture:
+    if beam.beam is None:
+        raise ValueError('pointing loss "pattern" needs the table [communication.beam]: how the aperture is lit')
+    radius = beam.beam.radius_m
+    truncation = 0.0 if radius is None else terminals.leo_aperture_m / 2.0 / radius
+    hole = terminals.leo_obscuration or 0.0
+    return LitAperture(terminals.leo_aperture_m, beam.wavelength_m, truncation, hole, beam.beam.m_squared or 1.0)
+
+
+def strehl_db(beam: Beam, convention: str) -> float:
+    """Loss by wavefront error of a link, from its Strehl or from the rms wavefront error."""
+    if beam.strehl is not None:
+        return gains.strehl_loss_db(beam.strehl, convention)
+    ratio = gains.strehl_ratio(beam.wavefront_error_m or 0.0, beam.wavelength_m)
+    return gains.strehl_loss_db(ratio, "ratio")
+
+
+def _receiver(terminals: Terminals, link: Communication) -> receivers.Receiver | None:
+    table = link.receiver
+    if table is None:
+        return None
+    common: dict[str, Any] = {
+        "wavelength_m": link.wavelength_m,
+        "bit_error_ratio": table.bit_error_ratio,
+        "bandwidth_hz": table.bandwidth_hz,
+        "code_gain_db": table.code_gain_db,
+        "code_rate": table.code_rate,
+    }
+    extinction = math.inf if table.extinction_ratio_db is None else float(10.0 ** (table.extinction_ratio_db / 10.0))
+    diode = {
+        "quantum_efficiency": table.efficiency,
+        "thermal_noise_a_sqrt_hz": table.thermal_noise_a_sqrt_hz,
+        "dark_current_a": table.dark_current_a,
+        "extinction_ratio": extinction,
+    }
+    counter = {"detection_efficiency": table.efficiency, "dark_count_rate_hz": table.dark_count_rate_1_s}
+    filtered = {"gain_db": table.amplifier_gain_db, "optical_bandwidth_hz": table.optical_bandwidth_hz}
+    avalanche = {"gain": table.avalanche_gain or 1.0, "ionisation_ratio": table.ionisation_ratio or 0.0}
+    kind: Callable[..., receivers.Receiver]
+    own: dict[str, Any]
+    match table.detector, table.modulation:
+        case "homodyne", _:
+            kind, own = receivers.BpskHomodyne, {"quantum_efficiency": table.efficiency or 1.0}
+        case "preamplified", "dpsk":
+            kind, own = receivers.DpskPreamplified, {"noise_figure_db": table.noise_figure_db}
+        case "preamplified", _:
+            kind, own = receivers.OokPreamplified, {"noise_figure_db": table.noise_figure_db, **filtered}
+            own["extinction_ratio"] = extinction
+        case "photon-counting", "ppm":
+            kind, own = receivers.PpmCounting, {**counter, "order": table.order or 2}
+        case "photon-counting", _:
+            kind, own = receivers.OokCounting, {**counter, "extinction_ratio": extinction}
+        case "pin", _:
+            kind, own = receivers.OokPin, diode
+        case _:
+            kind, own = receivers.OokApd, {**diode, **avalanche}
+    if table.detector in ("homodyne", "preamplified"):
+        own["background_photons_per_mode"] = _per_mode(link)
+    else:
+        own["background_power_w"] = _background_w(terminals, link, table)
+    return kind(**common, **own)
+
+
+def _per_mode(link: Communication) -> float:
+    table = link.receiver
+    if table is None or table.background is None:
+        return 0.0
+    radiance = table.background.spectral_radiance_w_m3_sr
+    sky = receivers.background_photons_per_mode(radiance, link.wavelength_m)
+    return sky * _receiving_transmission(link)
+
+
+def _receiving_transmission(link: Communication) -> float:
+    """What the receiving optics leave, of signal and background alike."""
+    lost = link.receive_optics_loss_db + link.tracking_split_loss_db
+    return float(10.0 ** (-lost / 10.0))
+
+
+def _background_w(terminals: Terminals, link: Communication, table: ReceiverTable) -> float:
+    """Background on the detector, behind the losses of the receiving optics."""
+    if table.background is None:
+        return table.background_power_w or 0.0
+    b = table.background
+    area = math.pi / 4.0 * terminals.geo_aperture_m**2 * (1.0 - (terminals.geo_obscuration or 0.0) ** 2)
+    sky = receivers.background_power_w(b.spectral_radiance_w_m3_sr, area, b.field_of_view_rad, b.filter_bandwidth_m)
+    return sky * _receiving_transmission(link)
+
+
+def required_dbm(data: DataLink, data_rate_bit_s: ArrayLike) -> Floats:
+    """Power at the receiver that each data rate needs, in dBm.
+
+    Raises ValueError for a rate that the receiver does not take, with the highest that it does.
+    """
+    rate = np.asarray(data_rate_bit_s, dtype=np.float64)
+    if data.receiver is not None:
+        level: Floats = 10.0 * np.log10(data.receiver.required_power_w(rate)) + 30.0
+        return level
+    photons = data.table.receiver_sensitivity_photon_bit
+    assert photons is not None
+    measured: Floats = 10.0 * np.log10(photons * gains.photon_energy_j(data.table.wavelength_m) * rate) + 30.0
+    return measured
+
+
+def check_grid(data_rate_bit_s: Floats, pointing_error_rad: Floats) -> None:
+    """Raises ValueError if a data rate is not above 0, a pointing error below 0, or either not finite."""
+    if not np.all((data_rate_bit_s > 0.0) & (data_rate_bit_s < np.inf)):
+        raise ValueError('data rates must be finite and above 0 bit/s; "largest" has to be solved for first')
+    if not np.all((pointing_error_rad >= 0.0) & (pointing_error_rad < np.inf)):
+        raise ValueError("pointing errors must be finite and at least 0 rad: they are radial")

@@ -1,0 +1,445 @@
+"""Budgets of the beacon, its answer and the communication link, line by line.
+
+Gains and losses are in dB; a line carries the sign. Angles are radial, measured from the line of sight.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from microrad.core.budget import Line, total_db
+from microrad.core.units import format_input, format_quantity
+from microrad.link import gains
+from microrad.link.budget.assembly import DataLink, Shared, check_grid, required_dbm, strehl_db
+from microrad.mission.file import MissionFile
+from microrad.mission.model import Source, source_text
+from microrad.mission.tables.link import Beacon, Communication, half_angle_rad
+
+_GIVEN = "whatever the pointing error and the data rate"
+_TRANSMITTING = (
+    "uniformly lit, unobscured, diffraction-limited: an upper bound, of which a Gaussian beam cut by the aperture "
+    "reaches 0.81 at best (Klein and Degnan 1974)"
+)
+_AS_LINES = "where every line holds"
+_POINTING_BASIS = {
+    "gaussian": (
+        "exp(-2 (error / theta)^2), theta = 2 lambda / (pi D)",
+        "Gaussian beam of 1/e2 radius D/2 at the aperture",
+    ),
+    "gain": ("exp(-G error^2), G = (pi D / lambda)^2", "beam that falls off as a Gaussian set by its own gain"),
+    "pattern": ("far field of the lit aperture, by its diffraction integral", "main lobe of a perfect wavefront"),
+}
+_RECEIVING = "area pi D^2 / 4, all of its light on the detector"
+CHOSEN = "chosen for this evaluation"
+_NOT_GIVEN = "not given"
+LEFT_AT_ZERO = "left at 0 dB"
+"""The warning of a loss that is stated as nothing."""
+STREHL_LOSS, POINTING_LOSS, POINT_AHEAD_LOSS = "Strehl loss", "Pointing loss", "Point-ahead loss"
+_ROUNDING_DB = 1e-9  # of a link whose rate is solved for 0 dB
+FREE_SPACE_LOSS, CLEAR_SKY_LOSS = "Free-space loss", "Clear-sky loss"
+DEEPEST_DB = 20.0  # pointing loss beyond which side lobes and scatter decide, not the main lobe
+WIDEST_RAD = 0.1  # half angle or error beyond which a small angle is none
+_CUT_DB = 0.1  # gain beyond which it counts that the aperture cuts a beam that is taken as whole
+_WORST_STREHL_DB = 5.0  # beyond it the core of the beam no longer has the shape of the perfect one
+
+
+@dataclass(frozen=True, slots=True)
+class LinkBudget:
+    """One link: `lines` add up to the received power in dBm, `totals` are received power, required power and margin.
+
+    `irradiance_w_m2` stands at the receiving aperture with every loss up to there, at the pointing error;
+    `irradiance_on_axis_w_m2` is that of the same beam pointed without error and before Strehl.
+    `required_irradiance_w_m2` is the irradiance there, pointing error and all, that leaves no margin.
+    `radiant_intensity_w_sr` leaves the terminal along the beam's axis, optics and Strehl counted: what a far-field test
+    of the terminal measures. `received_photons_per_bit` is None for a beam without a data rate.
+    """
+
+    name: str
+    lines: tuple[Line, ...]
+    totals: tuple[Line, ...]
+    received_power_w: float
+    required_power_w: float
+    margin_db: float
+    irradiance_w_m2: float
+    irradiance_on_axis_w_m2: float
+    required_irradiance_w_m2: float
+    radiant_intensity_w_sr: float
+    received_photons_per_bit: float | None
+
+    @property
+    def possible(self) -> bool:
+        """Whether no more light arrives than was sent: a far field taken far into the near field has more."""
+        return self.received_power_w <= gains.watt(self.lines[0].value)
+
+    @property
+    def closes(self) -> bool:
+        """Whether there is a margin of at least 0 dB, by a budget that may be relied on."""
+        return self.margin_db >= -_ROUNDING_DB and self.possible
+
+    def loss_db(self, *names: str) -> float:
+        """The loss of these lines together, positive; 0 for those that the budget has not."""
+        return 0.0 - math.fsum(line.value for line in self.lines if line.name in names)
+
+    @property
+    def at_zero(self) -> tuple[str, ...]:
+        """Names of the losses that are stated as 0 dB, or not given at all."""
+        return tuple(line.name for line in self.lines if line.warning == LEFT_AT_ZERO)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a reader must not overlook: terms left at zero, and lines beyond where they hold."""
+        lines = [line for line in (*self.lines, *self.totals) if line.warning not in ("", LEFT_AT_ZERO)]
+        found = [f"{line.name}: {line.warning}" for line in lines]
+        if self.at_zero:
+            found.append(f"{LEFT_AT_ZERO}: {', '.join(self.at_zero)}; what the hardware has comes off the margin")
+        return tuple(f"{self.name} budget: {each}" for each in found)
+
+
+def communication_budget(
+    data: DataLink,
+    sources: Mapping[str, Source],
+    pointing_error_rad: float | None = None,
+    data_rate_bit_s: float | None = None,
+    given_source: str = CHOSEN,
+) -> LinkBudget:
+    """Budget of the data link from LEO to GEO, at its own pointing error and data rate or at those given.
+
+    Args:
+        data: the communication link.
+        sources: where each value of the mission comes from, by key.
+        pointing_error_rad: static radial error, rad; by default the mission's.
+        data_rate_bit_s: information rate, bit/s; by default the mission's.
+        given_source: where a given value comes from: the source of its line.
+
+    Raises ValueError if the pointing error is negative, the data rate not above zero, or the receiver does not take it.
+    """
+    beam = data.table
+    write = Writer("communication", beam, data.shared, sources, "leo")
+    error, error_source = given_or_own(
+        beam.pointing_error_rad, pointing_error_rad, write.source("pointing_error"), given_source
+    )
+    rate, rate_source = given_or_own(beam.data_rate_bit_s, data_rate_bit_s, write.source("data_rate"), given_source)
+    check_grid(np.asarray(rate), np.asarray(error))
+    with_ahead = float(data.beam.fall.loss_db(error + data.shared.point_ahead_rad))
+    transmit = write.transmit(_lit_gain(write, data), _pointing_line(data, error, error_source), with_ahead)
+    receive = (
+        *write.receive("geo"),
+        write.loss("Tracking split loss", "tracking_split_loss"),
+        write.loss("Implementation loss", "implementation_loss"),
+    )
+    return _budget("Communication", transmit, receive, _required_line(data, rate, write, rate_source), beam, rate)
+
+
+def beam_budget(name: str, shared: Shared, beam: Beacon | None, sources: Mapping[str, Source]) -> LinkBudget:
+    """Budget of the wide "beacon" from LEO to GEO, or of the narrow beam with which GEO gives its "answer".
+
+    It is a Gaussian beam, its divergence read by the mission's convention.
+
+    Args:
+        name: "beacon" or "answer", the name of its table.
+        shared: terminals, conventions, air and point-ahead of the mission.
+        beam: the table itself; None where the mission has none.
+        sources: where each value of the mission comes from, by key.
+
+    Raises ValueError if the mission has no such beam.
+    """
+    if beam is None:
+        raise ValueError(f"the mission has no table [{name}]")
+    ends = ("leo", "geo") if name == "beacon" else ("geo", "leo")
+    return _gaussian_budget(Writer(name, beam, shared, sources, ends[0]), beam, ends[1])
+
+
+def _gaussian_budget(write: "Writer", beam: Beacon, receiver: str) -> LinkBudget:
+    half, error = half_angle_rad(beam.divergence_rad, write.shared.conventions.divergence), beam.pointing_error_rad
+    theta = f"theta = {format_quantity(half, 'rad')} half angle at 1/e2"
+    far = "Gaussian beam, far field, not cut by its aperture"
+    shape = source_text(write.sources, f"{write.table}.divergence", "conventions.divergence")
+    doubts = _both(
+        _wide("the half angle", half),
+        _cut_by_aperture(half, write.aperture_m(write.end), beam.wavelength_m),
+        _blocked(getattr(write.shared.terminals, f"{write.end}_obscuration") or 0.0),
+    )
+    gain = Line("Beam gain", gains.gaussian_beam_gain_db(half), "dB", f"8 / theta^2, {theta}", shape, far, doubts)
+    basis = f"exp(-2 (error / theta)^2), error = {format_input(error, 'rad')}, {theta}"
+    loss = 0.0 - float(gains.gaussian_pointing_loss_db(error, half))
+    doubts = _both(_wide("the error", error), _deep(loss))
+    source, regime = write.source("pointing_error"), f"{far}; static error"
+    pointing = Line(POINTING_LOSS, loss, "dB", basis, source, regime, doubts)
+    with_ahead = float(gains.gaussian_pointing_loss_db(error + write.shared.point_ahead_rad, half))
+    level = gains.dbm(beam.required_power_w)
+    required = Line("Required power", level, "dBm", "as given", write.source("required_power"), _GIVEN)
+    transmit = write.transmit((gain,), pointing, with_ahead)
+    return _budget(write.table.capitalize(), transmit, write.receive(receiver), required, beam)
+
+
+def _cut_by_aperture(half_angle_rad: float, aperture_m: float, wavelength_m: float) -> str:
+    """The warning that a Gaussian beam of this half angle has less gain, as the aperture that it leaves cuts it."""
+    radius = wavelength_m / (math.pi * half_angle_rad)
+    truncation = aperture_m / 2.0 / radius
+    lost = -20.0 * math.log10(-math.expm1(-(truncation**2)))  # (1 - exp(-a^2))^2, Klein and Degnan 1974
+    if lost <= _CUT_DB:
+        return ""
+    return (
+        f"a Gaussian beam this narrow is {format_quantity(2.0 * radius, 'm')} wide at 1/e2, and the aperture of "
+        f"{format_input(aperture_m, 'm')} cuts it: {lost:.2f} dB less gain than this, and a wider core"
+    )
+
+
+def _blocked(obscuration: float) -> str:
+    """The warning that an obscuration of the terminal that sends a Gaussian beam is not in its gain."""
+    if not obscuration:
+        return ""
+    return (
+        f"the obscuration of {obscuration:g} is not in it: what it stops of the beam belongs into transmit_optics_loss"
+    )
+
+
+def _wide(what: str, angle_rad: float) -> str:
+    """The warning that an angle is not small."""
+    if angle_rad <= WIDEST_RAD:
+        return ""
+    return f"{what} of {format_quantity(angle_rad, 'rad', 3)} is above {WIDEST_RAD:g} rad, where small angles end"
+
+
+def _both(*warnings: str) -> str:
+    """The warnings that there are, as one."""
+    return "; ".join(each for each in warnings if each)
+
+
+def _deep(loss_db: float) -> str:
+    if abs(loss_db) <= DEEPEST_DB:
+        return ""
+    return f"beyond {DEEPEST_DB:g} dB the wings and the scatter of a real beam decide, not this formula"
+
+
+def given_or_own(own: float, given: float | None, source: str, given_source: str) -> tuple[float, str]:
+    """The value in force and its source: the one given, else the mission's own."""
+    return (own, source) if given is None else (float(given), given_source)
+
+
+@dataclass(frozen=True, slots=True)
+class Writer:
+    """Writes the lines of one link, the table `table` of the mission, which leaves the terminal `end`."""
+
+    table: str
+    beam: Beacon | Communication
+    shared: Shared
+    sources: Mapping[str, Source]
+    end: str
+
+    def source(self, key: str) -> str:
+        """Where a key of the link's table comes from."""
+        return source_text(self.sources, f"{self.table}.{key}")
+
+    def aperture_m(self, end: str) -> float:
+        """Diameter of the terminal "leo" or "geo"."""
+        return float(getattr(self.shared.terminals, f"{end}_aperture_m"))
+
+    def loss(self, name: str, key: str) -> Line:
+        """A loss that the mission gives in dB; 0 dB is a line like any other."""
+        value = getattr(self.beam, f"{key}_db")
+        return Line(name, 0.0 - value, "dB", "as given", self.source(key), _GIVEN, "" if value else LEFT_AT_ZERO)
+
+    def gain(self, end: str, regime: str) -> Line:
+        """Gain of a whole, evenly lit aperture."""
+        diameter, wavelength = self.aperture_m(end), self.beam.wavelength_m
+        shown = f"D = {format_input(diameter, 'm')}, lambda = {format_input(wavelength, 'm')}"
+        source = source_text(self.sources, f"terminals.{end}_aperture", f"{self.table}.wavelength")
+        name = f"{self.shared.terminals.called(end)} aperture gain"
+        return Line(
+            name, gains.aperture_gain_db(diameter, wavelength), "dB", f"(pi D / lambda)^2, {shown}", source, regime
+        )
+
+    def receive(self, end: str) -> tuple[Line, ...]:
+        """From the receiving aperture on: its gain, its obscuration where the mission gives one, and its optics."""
+        hole = getattr(self.shared.terminals, f"{end}_obscuration")
+        lines = [self.gain(end, _RECEIVING)]
+        if hole is not None:
+            name = f"{self.shared.terminals.called(end)} obscuration loss"
+            source = source_text(self.sources, f"terminals.{end}_obscuration")
+            value, basis = 0.0 - gains.obscuration_loss_db(hole), f"1 - e^2, e = {hole:g}"
+            lines.append(Line(name, value, "dB", basis, source, _RECEIVING))
+        return (*lines, self.loss("Receive optics loss", "receive_optics_loss"))
+
+    def transmit(self, gain: tuple[Line, ...], pointing: Line, with_ahead_db: float) -> tuple[Line, ...]:
+        """Everything up to the receiving aperture.
+
+        ``with_ahead_db`` is the pointing loss once an uncorrected point-ahead is added to the error.
+        """
+        beam = self.beam
+        power = f"P = {format_input(beam.transmit_power_w, 'W')}"
+        channel = [] if self.shared.channel is None else [self._channel()]
+        return (
+            Line(
+                "Transmit power", gains.dbm(beam.transmit_power_w), "dBm", power, self.source("transmit_power"), _GIVEN
+            ),
+            *gain,
+            self.loss("Transmit optics loss", "transmit_optics_loss"),
+            self._strehl(),
+            pointing,
+            self._ahead(with_ahead_db, pointing.value),
+            self._space(),
+            *channel,
+        )
+
+    def _space(self) -> Line:
+        beam = self.beam
+        basis = f"(lambda / (4 pi R))^2, R = {format_input(beam.distance_m, 'm')}"
+        value = -gains.free_space_loss_db(beam.distance_m, beam.wavelength_m)
+        largest = max(self.shared.terminals.leo_aperture_m, self.shared.terminals.geo_aperture_m)
+        far = gains.far_field_m(largest, beam.wavelength_m)
+        near = (
+            "" if beam.distance_m >= far else f"nearer than the far field, which begins at {format_quantity(far, 'm')}"
+        )
+        return Line(FREE_SPACE_LOSS, value, "dB", basis, self.source("distance"), "vacuum, far field", near)
+
+    def _channel(self) -> Line:
+        channel = self.shared.channel
+        assert channel is not None
+        mass = gains.air_mass(channel.elevation_rad)
+        basis = (
+            f"T^m, T = {channel.zenith_transmission:g} to the zenith, air mass m = {mass:.3f} (Kasten and Young 1989)"
+        )
+        source = source_text(self.sources, "channel.zenith_transmission", "channel.elevation")
+        regime = "clear sky, from 10 degrees of elevation; no turbulence, no clouds"
+        doubt = "turbulence is not in this budget: scintillation and beam wander come on top"
+        return Line(CLEAR_SKY_LOSS, 0.0 - self.shared.clear_sky_db, "dB", basis, source, regime, doubt)
+
+    def _ahead(self, with_ahead_db: float, pointing_db: float) -> Line:
+        ahead = self.shared.point_ahead
+        regime = "added to the pointing error in its worst direction"
+        if ahead is None:
+            return Line(POINT_AHEAD_LOSS, 0.0, "dB", "taken as corrected", _NOT_GIVEN, regime, LEFT_AT_ZERO)
+        source = source_text(self.sources, "point_ahead.transverse_velocity", "point_ahead.corrected")
+        if ahead.corrected:
+            return Line(
+                POINT_AHEAD_LOSS,
+                0.0,
+                "dB",
+                "corrected; what that leaves is for the pointing error to hold",
+                source,
+                regime,
+            )
+        basis = f"not corrected: 2 v / c = {format_quantity(self.shared.point_ahead_rad, 'rad')}"
+        return Line(POINT_AHEAD_LOSS, -with_ahead_db - pointing_db, "dB", basis, source, regime, _deep(with_ahead_db))
+
+    def _strehl(self) -> Line:
+        beam, convention = self.beam, self.shared.conventions.strehl
+        loss = strehl_db(beam, convention)
+        regime = "on axis, small wavefront error (Marechal)"
+        doubt = "" if loss <= _WORST_STREHL_DB else f"beyond {_WORST_STREHL_DB:g} dB a beam has no core to speak of"
+        if beam.wavefront_error_m is not None:
+            basis = f"exp(-(2 pi s / lambda)^2), s = {format_input(beam.wavefront_error_m, 'm')} rms"
+            source = source_text(self.sources, f"{self.table}.wavefront_error")
+        else:
+            basis = "as given in dB" if convention == "decibel" else f"Strehl ratio {beam.strehl:g}"
+            source = source_text(self.sources, f"{self.table}.strehl", "conventions.strehl")
+        return Line(STREHL_LOSS, 0.0 - loss, "dB", basis, source, regime, doubt if loss else LEFT_AT_ZERO)
+
+
+def _lit_gain(write: Writer, data: DataLink) -> tuple[Line, ...]:
+    """Gain of the transmitting aperture and, where the mission says how it is lit, what that changes."""
+    beam, lit = data.table, data.beam
+    wide = _wide("the half angle", lit.fall.half_angle_rad)
+    if beam.beam is None:
+        hole = data.shared.terminals.leo_obscuration or 0.0
+        left_out = f'the obscuration of {hole:g} is not in it: only pointing_loss = "pattern" takes it into account'
+        doubts = _both(wide, left_out if hole else "")
+        return (replace(write.gain("leo", _TRANSMITTING), warning=doubts),)
+    whole = replace(write.gain("leo", "evenly lit and unobscured; how it is lit stands below"), warning=wide)
+    shape, hole = beam.beam, data.shared.terminals.leo_obscuration or 0.0
+    keys = ["communication.beam.profile"]
+    if shape.radius_m is None:
+        basis, regime = "1 - e^2, lit evenly over the open area", "power counted behind the aperture"
+    else:
+        truncation = write.aperture_m("leo") / 2.0 / shape.radius_m
+        basis = f"2/a^2 (exp(-a^2) - exp(-a^2 e^2))^2, a = {truncation:.4g}, M^2 = {shape.m_squared:g}"
+        regime = "Gaussian beam, light cut off included (Klein and Degnan 1974); M^2 widens the far field"
+        keys += ["communication.beam.radius", "communication.beam.m_squared"]
+    basis += f", e = {hole:g}"
+    source = source_text(write.sources, *keys)
+    return (whole, Line("Illumination", lit.gain_db - whole.value, "dB", basis, source, regime))
+
+
+def _pointing_line(data: DataLink, error_rad: float, source: str) -> Line:
+    loss = 0.0 - float(data.beam.fall.loss_db(error_rad))
+    formula, regime = _POINTING_BASIS[data.shared.conventions.pointing_loss]
+    basis = f"{formula}, error = {format_input(error_rad, 'rad')}"
+    doubts = _both(_wide("the error", error_rad), _deep(loss))
+    return Line(POINTING_LOSS, loss, "dB", basis, source, f"{regime}; static error", doubts)
+
+
+def _required_line(data: DataLink, rate_bit_s: float, write: Writer, rate_source: str) -> Line:
+    beam, level = data.table, float(required_dbm(data, rate_bit_s))
+    rate = f"R = {format_input(rate_bit_s, 'bit/s')}"
+    if beam.receiver is None:
+        sensitivity = format_input(beam.receiver_sensitivity_photon_bit or math.nan, "photon/bit")
+        basis, key = f"n (h c / lambda) R, n = {sensitivity}, {rate}", "receiver_sensitivity"
+        regime = "sensitivity the same at every data rate"
+    else:
+        r = beam.receiver
+        photons = gains.watt(level) / gains.photon_energy_j(beam.wavelength_m) / rate_bit_s
+        basis = (
+            f"{r.modulation.upper()}, {r.detector}: {photons:.4g} photon/bit at a bit error ratio of "
+            f"{r.bit_error_ratio:g}, code gain {r.code_gain_db:g} dB, {rate}"
+        )
+        key, regime = "receiver.modulation", "noise of the receiver as given, white; no intersymbol interference"
+    return Line("Required power", level, "dBm", basis, f"{write.source(key)}; {rate_source}", regime)
+
+
+def _budget(
+    name: str,
+    transmit: tuple[Line, ...],
+    receive: tuple[Line, ...],
+    required: Line,
+    beam: Beacon | Communication,
+    rate_bit_s: float | None = None,
+) -> LinkBudget:
+    received_dbm = total_db(transmit + receive)
+    photons, light = None, "sum of the lines above"
+    if rate_bit_s is not None:
+        photons = gains.watt(received_dbm) / gains.photon_energy_j(beam.wavelength_m) / rate_bit_s
+        light += f": {photons:.4g} photon/bit"
+    margin = received_dbm - required.value
+    mispointing = (STREHL_LOSS, POINTING_LOSS, POINT_AHEAD_LOSS)
+    on_axis = [line for line in transmit if line.name not in mispointing]
+    path = (POINTING_LOSS, POINT_AHEAD_LOSS, FREE_SPACE_LOSS, CLEAR_SKY_LOSS)
+    leaving = [line for line in transmit if line.name not in path]
+    return LinkBudget(
+        name=name,
+        lines=transmit + receive,
+        totals=(
+            Line("Received power", received_dbm, "dBm", light, "computed", _AS_LINES),
+            required,
+            Line("Margin", margin, "dB", "received power less required power", "computed", _AS_LINES),
+        ),
+        received_power_w=gains.watt(received_dbm),
+        required_power_w=gains.watt(required.value),
+        margin_db=margin,
+        irradiance_w_m2=_irradiance(total_db(transmit), beam.wavelength_m),
+        irradiance_on_axis_w_m2=_irradiance(total_db(on_axis), beam.wavelength_m),
+        required_irradiance_w_m2=_irradiance(total_db(transmit) - margin, beam.wavelength_m),
+        radiant_intensity_w_sr=gains.watt(total_db(leaving)) / (4.0 * math.pi),
+        received_photons_per_bit=photons,
+    )
+
+
+def _irradiance(isotropic_dbm: float, wavelength_m: float) -> float:
+    """Irradiance from the power that an isotropic antenna, of effective area lambda^2 / (4 pi), would receive."""
+    return gains.watt(isotropic_dbm) * 4.0 * math.pi / wavelength_m**2
+
+
+def tracking_light_w(file: MissionFile) -> float | None:
+    """Power (W) on the tracking sensor of `[fine_pointing]`, of which its noise follows.
+
+    As its quad cell states it, else that of the answer's budget. None where the noise is given or there is no loop.
+    """
+    f = file.mission.fine_pointing
+    cell = None if f is None else f.optical_sensor.quad_cell
+    if cell is None:
+        return None
+    if cell.received_power_w is not None:
+        return cell.received_power_w
+    return beam_budget("answer", Shared.of(file.mission), file.mission.answer, file.sources).received_power_w

@@ -1,0 +1,350 @@
+"""Which input moves a margin most: each one alone, a little down and up."""
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+from pydantic.fields import FieldInfo
+
+from microrad.link.budget.assembly import Shared, communication_beam
+from microrad.link.budget.lines import beam_budget
+from microrad.link.receivers import RateError
+from microrad.mission.fields import Quantity, Several, Share, Table
+from microrad.mission.model import LinkMission, Source, source_text
+from microrad.mission.tables.link import divergence_fits
+
+LINK_TABLES = (
+    "terminals",
+    "communication",
+    "communication.receiver",
+    "communication.receiver.background",
+    "communication.beam",
+    "channel",
+    "point_ahead",
+)
+"""The tables with the inputs of the communication link."""
+
+_Link = TypeVar("_Link")
+Varied = TypeVar("Varied", bound=Table)
+"""A table of tables, such as a mission, of which one number after the other is moved."""
+
+
+@dataclass(frozen=True, slots=True)
+class Input:
+    """One number of a mission: a field of a table, or an item of one that holds a list."""
+
+    key: str
+    table: str
+    field: str
+    item: int | None
+    value: float
+    rule: Quantity
+
+    @property
+    def shown(self) -> str:
+        """The key, of an item with its place from 1 behind it, as campaigns name it."""
+        return self.key if self.item is None else f"{self.key}.{self.item + 1}"
+
+    def moved(self, tables: Varied, value: float) -> Varied:
+        """The tables with this number replaced."""
+        if self.item is None:
+            return tables.with_value(f"{self.table}.{self.field}", value)
+        items = list(getattr(_table(tables, self.table), self.field))
+        items[self.item] = value
+        return tables.with_value(f"{self.table}.{self.field}", tuple(items))
+
+
+def inputs(tables: Table, name: str) -> Iterator[Input]:
+    """Every quantity of one of the tables that has a value."""
+    table = _table(tables, name)
+    if table is None:
+        return
+    for field, info in type(table).model_fields.items():
+        value, key = getattr(table, field), f"{name}.{info.alias or field}"
+        rules = _rules(info)
+        if rules and isinstance(value, float):
+            yield Input(key, name, field, None, value, rules[0])
+        for rule in (each for each in info.metadata if isinstance(each, Several)):
+            for item, number in enumerate(value):
+                yield Input(key, name, field, item, number, rule.each)
+
+
+def moved(tables: Varied, found: tuple[Input, ...], value: float) -> Varied | None:
+    """The tables with the input at a value, its axes in proportion, or None where their rule does not allow it."""
+    largest = max(each.value for each in found)
+    for each in found:
+        own = value if each.value == largest else value * each.value / largest
+        if each.rule.out_of_bounds(own) or (isinstance(each.rule, Share) and not 0.0 < own < each.rule.below):
+            return None
+        tables = each.moved(tables, own)
+    return tables
+
+
+def _rules(info: FieldInfo) -> list[Quantity]:
+    """The rule of a quantity; that of one that may be left out stands inside the union."""
+    kinds = getattr(info.annotation, "__args__", ())
+    inner = [rule for kind in kinds for rule in getattr(kind, "__metadata__", ())]
+    return [rule for rule in (*info.metadata, *inner) if isinstance(rule, Quantity)]
+
+
+def unit_of(each: Input, strehl: str) -> str:
+    """Unit of an input; a Strehl has one of its own where the convention reads it as a loss."""
+    return "dB" if (each.field, strehl) == ("strehl", "decibel") else each.rule.unit
+
+
+def _table(tables: Table, name: str) -> Table | None:
+    table: Table | None = tables
+    for part in name.split("."):
+        table = None if table is None else getattr(table, part)
+    return table
+
+
+def beam_passes(m: LinkMission) -> bool:
+    """Whether the obscuration lets some of the data's beam pass."""
+    try:
+        communication_beam(m.terminals, m.communication, m.conventions.pointing_loss)
+    except ValueError:
+        return False
+    return True
+
+
+def margin_or_none(of: _Link, margin_db: Callable[[_Link], float]) -> float:
+    """The margin of a link; a receiver too slow for the rate has none."""
+    try:
+        return margin_db(of)
+    except RateError:
+        return -math.inf
+
+
+def divergence_possible(name: str) -> Callable[[Any], bool]:
+    """Whether the aperture of the beacon, or of the answer, can make its divergence; asked of a mission."""
+    too_narrow = divergence_fits(name, "geo" if name == "answer" else "leo")
+    return lambda m: not any(too_narrow(m.conventions, m.terminals, getattr(m, name)))
+
+
+RELATIVE = 0.1
+"""How far a quantity is moved, as a share of itself."""
+STEP_DB = 0.5
+"""How far a quantity in decibels is moved."""
+_BY_TEN = ("bit_error_ratio", "outage")  # shares that are judged by their order of magnitude
+_TIE_DIGITS = 6  # of decibels: equal swings stand as the mission has their keys, not as a processor rounds them
+
+
+@dataclass(frozen=True, slots=True)
+class Swing:
+    """The margin with one input moved down to ``low`` and up to ``high``, both in ``unit``, all others as they are.
+
+    ``kind`` is the kind of source that the input has, "assumption" for one. An item of a list has its place
+    from 1 behind the key.
+    """
+
+    key: str
+    unit: str
+    value: float
+    low: float
+    high: float
+    margin_low_db: float
+    margin_high_db: float
+    kind: str
+    source: str
+
+    @property
+    def swing_db(self) -> float:
+        """Distance between the two margins."""
+        return abs(self.margin_high_db - self.margin_low_db)
+
+
+@dataclass(frozen=True, slots=True)
+class Tornado:
+    """One margin, ``of`` what it is, and its swings over each of its inputs, the largest first."""
+
+    of: str
+    margin_db: float
+    swings: tuple[Swing, ...]
+
+
+def beam_margin(name: str, sources: Mapping[str, Source]) -> Callable[[LinkMission], float]:
+    """The margin of the "beacon" or of the "answer", asked of a mission, which has that beam."""
+    return lambda m: beam_budget(name, Shared.of(m), getattr(m, name), sources).margin_db
+
+
+def beam_tornado(m: LinkMission, sources: Mapping[str, Source], name: str) -> tuple[Swing, ...]:
+    """The margin of the "beacon" or of the "answer" over each of its inputs, as `swings` moves them.
+
+    Raises ValueError for a beam that the mission has not.
+    """
+    tables = ("terminals", name, "channel", "point_ahead")
+    return swings(m, sources, tables, m.conventions.strehl, beam_margin(name, sources), divergence_possible(name))
+
+
+def swings(
+    mission: Varied,
+    sources: Mapping[str, Source],
+    tables: tuple[str, ...],
+    strehl: str,
+    margin_db: Callable[[Varied], float],
+    possible: Callable[[Varied], bool],
+) -> tuple[Swing, ...]:
+    """A margin over each input of these tables, one at a time, the largest swing first.
+
+    Every quantity is moved by 10 % both ways, one in decibels by 0.5 dB, a bit error ratio and an outage by a factor of
+    ten; none beyond the bounds of its key. Inputs that do not move the margin are left out.
+
+    Args:
+        mission: the tables as they are.
+        sources: where each value comes from, by key.
+        tables: names of the tables whose inputs are moved.
+        strehl: the convention by which a Strehl is read, "ratio" or "decibel".
+        margin_db: the margin (dB) of the tables.
+        possible: whether such tables can be, so that no obscuration stops the whole beam, for instance.
+    """
+
+    def swing(each: Input) -> Swing:
+        ends = _ends(each.field, each.value, each.rule, strehl)
+        low, high = (_nearest(mission, each, end, possible) for end in ends)
+        return Swing(
+            key=each.shown,
+            unit=unit_of(each, strehl),
+            value=each.value,
+            low=low,
+            high=high,
+            margin_low_db=margin_or_none(each.moved(mission, low), margin_db),
+            margin_high_db=margin_or_none(each.moved(mission, high), margin_db),
+            kind=sources[each.key].kind if each.key in sources else "",
+            source=source_text(sources, each.key),
+        )
+
+    found = [swing(each) for name in tables for each in inputs(mission, name)]
+    return tuple(sorted((s for s in found if s.swing_db > 1e-9), key=lambda swing: -round(swing.swing_db, _TIE_DIGITS)))
+
+
+def _ends(field: str, value: float, rule: Quantity, strehl: str) -> tuple[float, float]:
+    step = STEP_DB if field.endswith("_db") or (field, strehl) == ("strehl", "decibel") else RELATIVE * abs(value)
+    low, high = (value / 10.0, value * 10.0) if field in _BY_TEN else (value - step, value + step)
+    ratio = (field, strehl) == ("strehl", "ratio")
+    least = -math.inf if rule.least is None else rule.least
+    most = 1.0 if ratio else math.inf if rule.most is None else rule.most
+    # bounds that are not reached are approached by half
+    if rule.above is not None and low <= rule.above:
+        low = (value + rule.above) / 2.0
+    if isinstance(rule, Share) and high >= rule.below:
+        high = (value + rule.below) / 2.0
+    return max(low, least), min(high, most)
+
+
+def _nearest(mission: Varied, each: Input, end: float, possible: Callable[[Varied], bool]) -> float:
+    """The end of a swing, its step halved until there is such a mission."""
+    while end != each.value and not possible(each.moved(mission, end)):
+        end = (each.value + end) / 2.0
+    return end
+
+
+DECADES = 6
+"""How far from its own value an input is looked for, up and down."""
+STEPS = 16
+"""Of a decade, or of ten decibels: an interval that is narrower than one step may be missed."""
+
+_BISECTIONS = 60
+_MOVES_DB = 1e-9
+_BESIDE = 1e-6  # of a step: just outside of an interval
+
+
+@dataclass(frozen=True, slots=True)
+class Interval:
+    """Values from ``low`` to ``high`` that leave the margin.
+
+    An end is open where they go on as far as was looked, or as the rule of the input allows.
+    """
+
+    low: float
+    high: float
+    low_open: bool
+    high_open: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Solved:
+    """The intervals of an input that leave a margin, and the value with the largest one, with that margin.
+
+    ``searched`` are the least and the most value that was looked at: `DECADES` from its own, or as far as its rule
+    allows. Values of an input of two axes are those of the larger one.
+    """
+
+    intervals: tuple[Interval, ...]
+    searched: tuple[float, float]
+    best: float
+    best_db: float
+
+
+def solve(
+    mission: Varied,
+    found: tuple[Input, ...],
+    unit: str,
+    margin_db: Callable[[Varied], float],
+    required_db: float,
+    possible: Callable[[Varied], bool],
+) -> Solved:
+    """Where an input leaves a margin, looked for in steps and then found to the last digits.
+
+    Args:
+        mission: the tables as they are.
+        found: the input, or its axes, which keep their proportion.
+        unit: its unit; decibels are moved by steps, all else by factors.
+        margin_db: the margin (dB) of the tables; none where their rule or ``possible`` does not allow the value.
+        required_db: the margin that has to be left, dB.
+        possible: whether such tables can be.
+
+    Raises ValueError if the input is 0 and no decibels, which no factor moves, or does not move the margin.
+    """
+    value, count = max(each.value for each in found), DECADES * STEPS
+    linear = unit.startswith("dB")
+    if not linear and value == 0.0:
+        raise ValueError(f"{found[0].key} is 0, which no factor moves: give it a value to begin with")
+
+    def at(step: float) -> float:
+        return value + 10.0 * step / STEPS if linear else value * 10.0 ** (step / STEPS)
+
+    def margin(step: float) -> float:
+        m = moved(mission, found, at(step))
+        return -math.inf if m is None or not possible(m) else margin_or_none(m, margin_db)
+
+    def enough(step: float) -> bool:
+        return margin(step) >= required_db
+
+    def allowed(step: float) -> bool:
+        return moved(mission, found, at(step)) is not None
+
+    margins = [margin(float(step)) for step in range(-count, count + 1)]
+    known = [each for each in margins if each > -math.inf]
+    if known and max(known) - min(known) < _MOVES_DB:
+        raise ValueError(f"{found[0].key} moves this margin by nothing")
+    intervals, begin = [], None
+    for place, here in enumerate(margins):
+        step = float(place - count)
+        if here >= required_db and begin is None:
+            begin = step if place == 0 else _edge(step, step - 1.0, enough)
+        last = place == len(margins) - 1
+        if begin is not None and (here < required_db or last):
+            end = step if here >= required_db else _edge(step - 1.0, step, enough)
+            beyond = begin - _BESIDE, end + _BESIDE
+            low_open, high_open = (not allowed(each) or abs(each) >= count for each in beyond)
+            intervals.append(Interval(at(begin), at(end), low_open, high_open))
+            begin = None
+    best = max(range(len(margins)), key=margins.__getitem__)
+    searched = at(_farthest(-count, allowed)), at(_farthest(count, allowed))
+    return Solved(tuple(intervals), searched, at(float(best - count)), margins[best])
+
+
+def _farthest(last: int, allowed: Callable[[float], bool]) -> float:
+    """The step farthest from 0 that is allowed, between 0 and the last one."""
+    outward = 1 if last > 0 else -1
+    step = next((each for each in range(0, last, outward) if not allowed(float(each + outward))), last)
+    return float(step) if step == last else _edge(float(step), float(step + outward), allowed)
+
+
+def _edge(inside: float, outside: float, enough: Callable[[float], bool]) -> float:
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (inside + outside)
+        inside, outside = (middle, outside) if enough(middle) else (inside, middle)
+    return inside

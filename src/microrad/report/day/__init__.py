@@ -1,0 +1,1 @@
+"""A day in orbit: what the link delivers, a contact in time, and a constellation."""

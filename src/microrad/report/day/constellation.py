@@ -1,0 +1,76 @@
+"""The plan of a constellation in words, as a table in a terminal and as plain data."""
+
+from typing import Any
+
+import numpy as np
+
+from microrad.orbit.constellation import ConstellationPlan
+from microrad.report.quantities import duration, volume
+from microrad.report.tables import Table, tables_text
+
+MOST_ROWS = 40
+"""Satellites of a table; there may be thousands."""
+
+
+def plan_sentences(plan: ConstellationPlan) -> list[str]:
+    """What the plan comes to."""
+    served, gaps = plan.by_satellite.served_s, plan.by_satellite.longest_gap_s
+    seen = float(np.sum(plan.opportunities.end_s - plan.opportunities.start_s))
+    span = plan.span_s[1] - plan.span_s[0]
+    used = ", ".join(f"{name} {100 * use:.0f} %" for name, use in zip(plan.relays, plan.use, strict=True))
+    satellites = "1 satellite shares" if len(plan.satellites) == 1 else f"{len(plan.satellites)} satellites share"
+    relays = "1 relay" if len(plan.relays) == 1 else f"{len(plan.relays)} relays"
+    each = "" if len(plan.relays) == 1 else " each"
+    terminals = "one terminal" if plan.terminals == 1 else f"{plan.terminals} terminals"
+    views, busy = plan.opportunities.start_s.size, float(np.sum(plan.by_satellite.busy_s))
+    return [
+        f"{satellites} {relays} of {terminals}{each}: in {duration(span)} "
+        f"{views} contacts in reach, {seen / 3600.0:.0f} h in all, of which {len(plan.planned)} sessions take "
+        f"{busy / 3600.0:.0f} h and carry {volume(plan.volume_bit)}.",
+        f"A satellite has data for {duration(float(np.min(served)))} to {duration(float(np.max(served)))}, and waits "
+        f"{duration(float(np.max(gaps)))} at most. Terminals in use: {used}.",
+        f"In reach is where the link closes at its lowest rate, with a pointing loss of {plan.loss.loss_db:.2f} dB "
+        f"({plan.loss.source}).",
+    ]
+
+
+def satellites_table(plan: ConstellationPlan) -> Table:
+    """What each satellite gets, the first `MOST_ROWS` of them."""
+    t = plan.by_satellite
+    rows = [
+        (name, str(int(t.sessions[k])), duration(t.served_s[k]), duration(t.longest_gap_s[k]), volume(t.volume_bit[k]))
+        for k, name in enumerate(plan.satellites[:MOST_ROWS])
+    ]
+    headings = ("satellite", "sessions", "with data", "longest time without", "volume")
+    return Table("What each satellite gets", headings, rows, (0,))
+
+
+def plan_text(plan: ConstellationPlan, width: int) -> str:
+    """Sentences and a table of at most ``width`` columns."""
+    shown, count = plan_sentences(plan), len(plan.satellites)
+    if count > MOST_ROWS:
+        shown.append(f"The first {MOST_ROWS} of {count} satellites; --csv has every session.")
+    return tables_text([satellites_table(plan)], shown, width)
+
+
+def plan_data(plan: ConstellationPlan) -> dict[str, Any]:
+    """The plan as plain data, in SI units with the unit in each key."""
+    by = plan.by_satellite
+    return {
+        "epoch": plan.epoch.text,
+        "duration_s": plan.span_s[1] - plan.span_s[0],
+        "contacts": int(plan.opportunities.start_s.size),
+        "sessions": len(plan.planned),
+        "volume_bit": plan.volume_bit,
+        "relays": [{"name": n, "use": float(u)} for n, u in zip(plan.relays, plan.use, strict=True)],
+        "satellites": [
+            {
+                "name": name,
+                "sessions": int(by.sessions[k]),
+                "with_data_s": float(by.served_s[k]),
+                "longest_gap_s": float(by.longest_gap_s[k]),
+                "volume_bit": float(by.volume_bit[k]),
+            }
+            for k, name in enumerate(plan.satellites)
+        ],
+    }

@@ -1,0 +1,102 @@
+"""A day of the link as tables: every contact, relay and direct downlink side by side, and each assumption changed."""
+
+import math
+
+from microrad.orbit import Contact, Pass
+from microrad.orbit.day import NOTHING, DayStudy, Encounter, Numbers
+from microrad.report.day.words import contact_time, kilometres, ratio_text
+from microrad.report.quantities import duration, volume
+from microrad.report.tables import Table
+
+CONTACT_COLUMNS = (
+    "by",
+    "rise (UTC)",
+    "set",
+    "min",
+    "range\n(km)",
+    "point-ahead\n(µrad)",
+    "rate\n(µrad/s)",
+    "Doppler\n(GHz)",
+    "highest\n(deg)",
+    "could\ncarry",
+    "begins and ends by",
+)
+
+
+def contacts_table(day: DayStudy) -> Table:
+    """Each contact by both ways, in the order of their rise."""
+    rows = [
+        (e.contact.start_s, _relay_row(day, e, bit))
+        for e, bit in zip(day.encounters, day.relay.carried_bit, strict=True)
+    ]
+    if day.direct is not None:
+        d = day.direct
+        rows += [
+            (c.start_s, _row(day, station, c, ("", "", "", "", f"{math.degrees(c.highest_rad):.1f}"), bit))
+            for c, station, bit in zip(d.contacts, d.stations, d.carried_bit, strict=True)
+            if isinstance(c, Pass)
+        ]
+    found = [row for _, row in sorted(rows, key=lambda item: item[0])]
+    return Table("Contacts", CONTACT_COLUMNS, found, (len(CONTACT_COLUMNS) - 1,))
+
+
+def _row(day: DayStudy, partner: str, c: Contact, between: tuple[str, ...], bit: float) -> tuple[str, ...]:
+    rise, sets = (day.view.pair.epoch.utc(t)[:19] for t in (c.start_s, c.end_s))
+    causes = " to ".join(dict.fromkeys((_cause(c.begins), _cause(c.ends))))
+    first = partner, rise.replace("T", " "), sets[11:], f"{c.duration_s / 60.0:.2f}"
+    return (*first, *between, volume(bit), causes)
+
+
+def _cause(words: str) -> str:
+    """A cause as it stands in a table beside the partner's name."""
+    return "mask" if words.startswith("elevation mask of ") else words
+
+
+def _relay_row(day: DayStudy, e: Encounter, bit: float) -> tuple[str, ...]:
+    between = (
+        f"{kilometres(e.range_least_m)} to {kilometres(e.range_most_m)}",
+        f"{e.point_ahead_most_rad * 1e6:.1f}",
+        f"{e.rate_most_rad_s * 1e6:.0f}",
+        f"{e.doppler_most_hz / 1e9:.2f}",
+        "",
+    )
+    return _row(day, day.view.pair.geo.name, e.contact, between, bit)
+
+
+def ways_table(day: DayStudy) -> Table:
+    """Relay and direct downlink side by side."""
+    ways = (day.relay,) if day.direct is None else (day.relay, day.direct)
+    rows = [
+        ("contacts", *(str(len(w.contacts)) for w in ways)),
+        ("time in contact", *(contact_time(w.contact_s) for w in ways)),
+        ("longest time without contact", *(duration(w.gap_s) for w in ways)),
+        ("could carry", *(volume(w.capacity_bit) for w in ways)),
+        ("contacts without acquisition", f"{day.relay.failed_contacts:.3g}", *[""] * (len(ways) - 1)),
+        ("made by the instrument", *(volume(w.generated_bit) for w in ways)),
+        ("lost for want of room", *(volume(w.lost_bit) for w in ways)),
+        ("on board at most", *(volume(w.history.largest_stored_bit) for w in ways)),
+        ("on board at the end of what is followed", *(volume(w.on_board_bit) for w in ways)),
+        ("arrive", *(volume(w.arrived_bit) for w in ways)),
+        ("latency of what is kept, median", *(duration(w.median_s) for w in ways)),
+        ("latency of what is kept, 99 %", *(duration(w.slow_s) for w in ways)),
+    ]
+    return Table("Relay and direct downlink", ("", *(w.name for w in ways)), rows, (0,))
+
+
+def assumptions_table(day: DayStudy) -> Table:
+    """Each assumption with both of its values and what they come to."""
+    rows = [
+        (s.name, text, *_numbers(n, day.direct is not None))
+        for s in day.swings
+        for text, n in ((s.low, s.at_low), (s.high, s.at_high))
+        if text != NOTHING
+    ]
+    headings = ("assumption", "changed to", "relay", "direct", "ratio", "99 % by\nrelay", "99 %\ndirect")
+    return Table("One assumption changed", headings, rows, (0, 1))
+
+
+def _numbers(n: Numbers, direct: bool) -> tuple[str, ...]:
+    if not direct:
+        return volume(n.relay_bit), "", "", duration(n.relay_slow_s), ""
+    waits = duration(n.relay_slow_s), duration(n.direct_slow_s)
+    return volume(n.relay_bit), volume(n.direct_bit), ratio_text(n), *waits

@@ -1,0 +1,1 @@
+"""An identification: sentences, parameters, data, figures and its page."""

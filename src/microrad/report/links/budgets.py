@@ -1,0 +1,132 @@
+"""The budgets of the links as text for a terminal and as CSV."""
+
+import csv
+import io
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+from microrad import link
+from microrad.core.budget import Line
+from microrad.link.requirement import of_links
+from microrad.link.study import LinkStudy, Solution
+from microrad.mission.model import source_text
+from microrad.orbit.operations import spreadsheet_text
+from microrad.report.links import words
+from microrad.report.quantities import quantity
+from microrad.report.requirements import requirement_table
+from microrad.report.tables import Table, table_text, tables_text
+
+UNDER_JITTER = "Communication under jitter"
+"""The lines of what the jitter does to the communication link, beside its budget."""
+SOLVED = "Solved"
+"""The values of a key that leave the required margin, ahead of the budgets."""
+_ROOM = 120  # columns for a table of all that a line has
+COLUMNS = ("budget", "line", "value", "unit", "basis", "source", "holds for", "warning")
+
+
+def lines(study: LinkStudy) -> list[tuple[str, Line]]:
+    """Every line of every budget with the name of its budget, totals included, in the order of the page."""
+    found = [(b.name, line) for b in study.budgets for line in (*b.lines, *b.totals)]
+    found += [("Communication receiver", line) for line in study.receiver_noise]
+    if study.open_loop is not None:
+        found += [("Open-loop pointing", line) for line in study.open_loop.lines]
+    if study.tracking is not None:
+        found += [("Tracking sensor", line) for line in study.tracking.noise_lines]
+        if study.tracking.noise_equivalent_angle is not None:
+            found.append(("Tracking sensor", study.tracking.noise_equivalent_angle))
+    return found
+
+
+def jitter_lines(study: LinkStudy) -> list[Line]:
+    """What stands in no budget of the link under its jitter: costs with and without a code, shares of the time."""
+    p = study.under_jitter
+    if p is None:
+        return []
+    source = source_text(study.file.sources, "jitter.bias", "jitter.rms", "requirement.outage")
+    regime, known = "Gaussian errors about the bias, two axes", math.isfinite(p.uncoded_penalty_db)
+    back = "power that brings the mean bit error ratio back to its target"
+    rows = [
+        ("Mean pointing loss", 0.0 - p.mean_loss_db, "dB", "what a code pays whose interleaver spans many fades"),
+        ("Penalty without a code", 0.0 - p.uncoded_penalty_db, "dB", f"{back}, Gaussian beam"),
+        ("Outage", p.outage, "", "share of the time with a margin below 0 dB"),
+        ("Below required margin", p.short, "", "share of the time"),
+    ]
+    found = [Line(*row, source, regime) for row in rows if math.isfinite(row[1])]
+    doubt = "" if known else f"the penalty without a code is {words.uncoded(p)}"
+    return [replace(found[0], warning=doubt), *found[1:]]
+
+
+def links_csv(study: LinkStudy, solution: Solution | None = None) -> str:
+    """Every line with its value in full, for a spreadsheet; first the values that were solved for."""
+    buffer = io.StringIO()
+    writer = csv.writer(buffer, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    for solved in [] if solution is None else _solution_rows(solution):
+        writer.writerow([SOLVED, *solved, "", "", ""])
+    jitter = [(UNDER_JITTER, line) for line in jitter_lines(study)]
+    for name, line in (*lines(study), *jitter):
+        value = repr(float(line.value))  # every digit, as JSON has it
+        texts = map(spreadsheet_text, (line.basis, line.source, line.regime, line.warning))
+        writer.writerow([name, spreadsheet_text(line.name), value, line.unit, *texts])
+    return buffer.getvalue().rstrip("\n")
+
+
+def links_text(study: LinkStudy, width: int, verbose: bool = False, solution: Solution | None = None) -> str:
+    """The verdict with a line for each requirement, what limits it, and the budgets, in at most ``width`` columns.
+
+    ``verbose`` adds to the lines where they come from and hold, the other tables, every sentence and every warning.
+    The values that were solved for stand first.
+    """
+    judged = of_links(study)
+    blocks = [] if solution is None else [tables_text([], [words.solution_text(solution)], width)]
+    blocks += [tables_text([], [words.verdict(study)], width), table_text(requirement_table(judged), width)]
+    if not verbose:
+        tables = [Table(b.name, ("line", "value", "basis"), _brief(b), (2,)) for b in study.budgets]
+        return "\n\n".join((*blocks, tables_text([], words.short(study), width), tables_text(tables, [], width)))
+    said = [*words.short(study), *words.sentences(study)[1:]]
+    blocks += [_tables(study, width), tables_text([], list(dict.fromkeys(said)), width)]
+    if study.warnings:
+        blocks.append(tables_text([], ["Warnings (! in the tables)", *(f"- {w}" for w in study.warnings)], width))
+    return "\n\n".join(blocks)
+
+
+def _solution_rows(s: Solution) -> Iterator[tuple[str, str, str, str]]:
+    """Name, value in full, unit and basis of what was solved for."""
+    leaves = f"leaves the required {s.required_db:g} dB of {s.of}"
+    for each in s.solved.intervals:
+        for name, value, is_open in (("from", each.low, each.low_open), ("to", each.high, each.high_open)):
+            yield f"{s.key} {name}", repr(value), s.unit, leaves + (", as far as was looked" if is_open else "")
+    for name, value in zip(("from", "to"), s.solved.searched, strict=True):
+        yield f"{s.key} looked at {name}", repr(value), s.unit, ""
+    yield f"{s.key} with the largest margin", repr(s.solved.best), s.unit, ""
+    yield "Largest margin", repr(float(s.solved.best_db)), "dB", ""
+    yield f"{s.key} in the budgets below", repr(s.value), s.unit, ""
+
+
+def _brief(budget: link.LinkBudget) -> list[tuple[str, ...]]:
+    found = (*budget.lines, *budget.totals)
+    return [(line.name + _mark(line), quantity(line.value, line.unit), line.basis) for line in found]
+
+
+def _mark(line: Line) -> str:
+    return " !" if line.warning else ""
+
+
+def _tables(study: LinkStudy, width: int) -> str:
+    """Every table with basis, source and where each line holds: in columns, or below each other in a narrow one."""
+    headings = ("line", "value", "basis", "source", "holds for")
+    groups: dict[str, list[tuple[str, ...]]] = {}
+    for name, line in lines(study):
+        texts = line.name + _mark(line), quantity(line.value, line.unit), line.basis, line.source, line.regime
+        groups.setdefault(name, []).append(texts)
+    if width >= _ROOM:
+        return tables_text([Table(name, headings, rows, (0, 2, 3, 4)) for name, rows in groups.items()], [], width)
+    tables = [Table(name, headings[:3], [_stacked(row) for row in rows], (2,)) for name, rows in groups.items()]
+    return tables_text(tables, [], width)
+
+
+def _stacked(row: tuple[str, ...]) -> tuple[str, ...]:
+    """Basis, source and where it holds, one below the other."""
+    name, value, basis, source, regime = row
+    return name, value, f"{basis}\nfrom: {source}\nholds for: {regime}"

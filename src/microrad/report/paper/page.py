@@ -1,0 +1,102 @@
+"""The paper's figures 1 to 8 and tables 1 and 2 beside this run: which figure of ours stands for each, what differs."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from microrad.core.units import format_quantity
+from microrad.report.paper import diagrams
+from microrad.report.plotting.figure import Figure
+from microrad.report.quantities import quantity
+from microrad.study.study import Study
+
+# Table 1 of the paper: year, LEO satellite, its mass, rate in Mbit/s, GEO satellite
+PROJECTS = (
+    ("2001", "SPOT-4", "2550 kg", "50", "ARTEMIS"),
+    ("2005", "OICETS", "570 kg", "50", "ARTEMIS"),
+    ("2017", "SENTINEL 1A", "≈ 2300 kg", "1800", "EDRS-A"),
+)
+_FIGURES = {
+    "Fig. 2": ("fig2-margin-map",),
+    "Fig. 4": ("fig4-chirp",),
+    "Fig. 5": ("fig5-bench-loops", "fig5-hysteresis-loops"),
+    "Fig. 6": ("fig6-pid",),
+    "Fig. 8": ("fig8-inverse",),
+}
+_NOT_PLAYED = "Not drawn: the mission's mirror is not of the paper's kind, Eq. 2 and Eq. 3."
+
+
+def paper_section(study: Study, figures: Sequence[Figure]) -> dict[str, Any]:
+    """What the template needs; figures of ours that stand for none of the paper's come last."""
+    by_name = {figure.name: figure for figure in figures}
+    taken = {name for names in _FIGURES.values() for name in names}
+    shown = {number: [by_name[name] for name in names if name in by_name] for number, names in _FIGURES.items()}
+    return {
+        "relay": diagrams.relay(study),
+        "setup": diagrams.setup(),
+        "control": diagrams.control(study),
+        "figures": shown,
+        "others": [figure for figure in figures if figure.name not in taken],
+        "differs": differs(study, played=bool(shown["Fig. 4"])),
+        "projects": projects(study),
+        "link_table": link_table(study),
+    }
+
+
+def differs(study: Study, *, played: bool) -> dict[str, str]:
+    """What is not as in the paper, by figure or table."""
+    m = study.file.mission
+    c = m.conventions
+    return {
+        "Fig. 1": "The paper draws the three error sources without numbers but for the 300 µrad of body pointing; the "
+        "other two are inputs of this mission. The bars are half widths.",
+        "Fig. 2": f"The paper prints neither the receiver's sensitivity nor its reading of pointing loss and Strehl; "
+        f"here {c.pointing_loss} pointing loss, Strehl as {c.strehl}, the others as a band.",
+        "Fig. 3": "The paper's bench is hardware: a NI USB-6343 card, LabVIEW, a Core Tomorrow mirror with its own "
+        "controller. Here each block is a model.",
+        "Fig. 4": "The paper plots a measured record, which it does not publish, against its model of five poles and "
+        "two zeros; here the record is played by Eq. 2 as printed, and the zeros are left free."
+        if played
+        else _NOT_PLAYED,
+        "Fig. 5": "The paper plots measured loops against its model; here the records of the first figure are played "
+        "by Eq. 3 as printed, so that its model holds by construction, and the second shows the mission's model alone."
+        if played
+        else "The paper plots measured loops against its model; here the mission's model alone.",
+        "Fig. 6": "The paper prints no gains, no control rate and no way of joining Eq. 2 and Eq. 3; those of this run "
+        "are under Assumptions.",
+        "Fig. 7": "As in the paper; the feedforward is given the reference and its rate, so that h is that of an "
+        "undisturbed mirror.",
+        "Fig. 8": "As Fig. 6. Eq. 4 is not made causal in the paper; here the rate is taken from the reference.",
+    }
+
+
+def projects(study: Study) -> list[tuple[str, ...]]:
+    """Table 1 of the paper, and this mission below it."""
+    m = study.file.mission
+    rate = f"{m.communication.data_rate_bit_s * 1e-6:g}"
+    return [*PROJECTS, ("", f"this mission: {m.name}", "", rate, "")]
+
+
+def link_table(study: Study) -> list[tuple[str, ...]]:
+    """Table 2 of the paper: item, and for beacon and communication the paper's value and this mission's."""
+    m = study.file.mission
+    b, c, t = study.file.mission.beacon, m.communication, m.terminals
+    assert b is not None  # a whole mission has one
+
+    def both(beacon: float, communication: float, unit: str) -> tuple[str, str]:
+        return format_quantity(beacon, unit), format_quantity(communication, unit)
+
+    strehl = "dB" if m.conventions.strehl == "decibel" else "as a ratio"
+    power, wavelength = both(b.transmit_power_w, c.transmit_power_w, "W"), both(b.wavelength_m, c.wavelength_m, "m")
+    error, distance = both(b.pointing_error_rad, c.pointing_error_rad, "rad"), both(b.distance_m, c.distance_m, "m")
+    leo, geo = (format_quantity(a, "m") for a in (t.leo_aperture_m, t.geo_aperture_m))
+    margins = quantity(study.beacon.margin_db, "dB"), quantity(study.static.margin_db, "dB")
+    return [
+        ("Transmit power", "4 W", power[0], "5 W", power[1]),
+        ("Wavelength", "1.55 µm", wavelength[0], "1.55 µm", wavelength[1]),
+        ("LEO transmit aperture", "5 cm", leo, "5 cm", leo),
+        ("Strehl ratio", "0.4 dB", f"{b.strehl:g} {strehl}", "0.4 dB", f"{c.strehl:g} {strehl}"),
+        ("Pointing accuracy", "300 µrad", error[0], "10 µrad", error[1]),
+        ("Distance", "44 000 km", distance[0], "42 000 km", distance[1]),
+        ("GEO receive aperture", "15 cm", geo, "15 cm", geo),
+        ("Margin", "+", margins[0], "+", margins[1]),
+    ]

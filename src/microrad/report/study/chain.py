@@ -1,0 +1,223 @@
+"""The chain as a picture with this run's numbers on it: orbit, link, pointing, mirror, loop, residual, volume, verdict.
+
+Drawn as SVG twice, in rows for a wide page and for print, in one column for a narrow one; the page shows one of them.
+"""
+
+import math
+import textwrap
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+from microrad.core.units import format_quantity
+from microrad.link import pointing
+from microrad.mirror import Variant
+from microrad.mirror.hysteresis import output_amplitude
+from microrad.report.quantities import micro, quantity, share_of_time, signed
+from microrad.study.study import Study
+
+_TITLE_HEIGHT, _LINE_HEIGHT, _PAD = 30, 18, 12
+_CHARACTER_WIDTH = 6.5  # of the text, in the mean of a line
+
+
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """One box: its name, its numbers, a line each, and PASS, FAIL or nothing."""
+
+    name: str
+    lines: tuple[str, ...]
+    mark: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Box:
+    """A stage with its place in the drawing."""
+
+    stage: Stage
+    x: float
+    y: float
+    width: float
+    height: float
+
+
+@dataclass(frozen=True, slots=True)
+class Drawing:
+    """Boxes and the paths of the arrows between them, in the units of the drawing."""
+
+    width: float
+    height: float
+    boxes: tuple[Box, ...]
+    arrows: tuple[str, ...]
+
+
+# ----------------------------------------------------------------------------------------------------------- numbers
+def stages(study: Study) -> tuple[Stage, ...]:
+    """The chain's boxes, in the order of the chain."""
+    return (
+        _orbit(study),
+        _link(study),
+        _pointing(study),
+        _mirror(study),
+        _loop(study),
+        _residual(study),
+        _volume(study),
+        _verdict(study),
+    )
+
+
+def alternative(found: Sequence[Stage]) -> str:
+    """The picture as a sentence for those who do not see it."""
+    return " ".join(
+        f"{s.name}{f' ({s.mark})' if s.mark else ''}: {', '.join(line.rstrip(',') for line in s.lines)}." for s in found
+    )
+
+
+def _angle(value_rad: float) -> str:
+    return format_quantity(value_rad, "rad", 3)
+
+
+def _orbit(study: Study) -> Stage:
+    m, day = study.file.mission, study.day
+    lines = [f"{quantity(m.communication.distance_m, 'm')} as budgeted"]
+    if day is not None:
+        reach = max((e.range_most_m for e in day.encounters), default=math.nan)
+        lines = [f"{len(day.relay.contacts)} contacts in {day.view.days * 24:.4g} h"]
+        lines.append(f"{day.relay.contact_s / 60:.0f} min in view of the relay")
+        far = "" if math.isnan(reach) else f", up to {quantity(reach, 'm')}"
+        lines.append(f"{quantity(m.communication.distance_m, 'm')}{far}")
+    if m.point_ahead is not None:
+        ahead = pointing.point_ahead_rad(m.point_ahead.transverse_velocity_m_s)
+        lines.append(f"point-ahead {_angle(ahead)}, {'corrected' if m.point_ahead.corrected else 'NOT corrected'}")
+    return Stage("Orbit", tuple(lines))
+
+
+def _link(study: Study) -> Stage:
+    m = study.file.mission
+    c, kind = m.communication, "margin" if m.jitter is None else "static margin"
+    beam = study.links.data.beam.fall.half_angle_rad
+    return Stage(
+        "Link",
+        (
+            f"{format_quantity(c.data_rate_bit_s, 'bit/s')} with {format_quantity(c.transmit_power_w, 'W')}",
+            f"beam {_angle(beam)} (half, 1/e²)",
+            f"{kind} {signed(study.static.margin_db, 'dB')} as budgeted,",
+            f"at {_angle(c.pointing_error_rad)} off axis",
+        ),
+    )
+
+
+def _pointing(study: Study) -> Stage:
+    p, fine = study.open_loop, study.fine_pointing
+    cone = next(r for r in study.requirements if r.subject == "cone")
+    lines = [
+        f"open loop {_angle(p.rss_rad)} (rss)",
+        f"beacon's cone {_angle(p.beacon_half_angle_rad)}, covers {quantity(100.0 * _covered(study), '%')}",
+    ]
+    if fine is not None:
+        before = math.hypot(*(d.rms_rad for several in fine.scene.loop.disturbances for d in several))
+        lines.append(f"disturbed by {_angle(before)} rms")
+    lines.append(f"fine: {_angle(study.file.mission.requirement.pointing_error_rad)} allowed")
+    return Stage("Pointing", tuple(lines), cone.mark)
+
+
+def _covered(study: Study) -> float:
+    reading = study.open_loop.reading
+    assert reading is not None  # a whole mission has a beacon
+    return reading.coverage
+
+
+def _mirror(study: Study) -> Stage:
+    m = study.file.mission
+    widths = [100.0 * loop.width for loop in study.loops]
+    half = (m.amplifier.output_max_v - m.amplifier.output_min_v) / m.amplifier.gain / 2.0
+    lines = [f"reach {_angle(2.0 * output_amplitude(study.summary.model, half))} over {2 * half:g} V"]
+    if widths:
+        low, high = min(study.loops, key=lambda loop: loop.freq_hz), max(study.loops, key=lambda loop: loop.freq_hz)
+        lines.append(f"hysteresis {100 * low.width:.1f} % at {low.freq_hz:g} Hz,")
+        lines.append(f"{100 * high.width:.1f} % at {high.freq_hz:g} Hz")
+    if study.fine_pointing is None:
+        return Stage("Mirror", tuple(lines))
+    axis = min(study.fine_pointing.scene.own_stroke, key=lambda a: a.margin_rad)
+    lines.append(f"stroke {micro(axis.needed_rad)} of {micro(axis.available_rad)} µrad ({axis.name})")
+    return Stage("Mirror", tuple(lines), next(r.mark for r in study.requirements if r.subject == "stroke"))
+
+
+def _loop(study: Study) -> Stage:
+    m, margins, fine = study.file.mission, study.margins, study.fine_pointing
+    lines = [
+        f"{study.residual.controller} at {format_quantity(m.control.rate_hz, 'Hz')}",
+        f"modulus margin {margins.modulus:.2f}",
+    ]
+    if fine is not None:
+        design = fine.best.design
+        lines.append(f"{design.name} at {format_quantity(1.0 / fine.scene.loop.timing.period_s, 'Hz')}")
+        lines.append(f"modulus {design.tuned.margins.modulus:.2f}, {design.tuned.margins.bandwidth_hz:.3g} Hz wide")
+    return Stage("Loop", tuple(lines))
+
+
+def _residual(study: Study) -> Stage:
+    m, run, fine = study.file.mission, study.residual, study.fine_pointing
+    left = study.left_rad(run)
+    lines = [f"{_angle(left)} {m.requirement.residual_statistic}, {run.freq_hz:g} Hz sine"]
+    if fine is not None:
+        quantile_rad = fine.best.simulated[Variant.GIVEN].quantile_rad
+        lines = [f"{micro(quantile_rad)} µrad at {share_of_time(fine.quantile)}, vibration", f"({lines[0]})"]
+    met = all(r.met for r in study.requirements if r.subject in ("residual", "fine pointing"))
+    lines.append(f"allowed {_angle(m.requirement.pointing_error_rad)}")
+    return Stage("Residual", tuple(lines), "PASS" if met else "FAIL")
+
+
+def _volume(study: Study) -> Stage:
+    day = study.day
+    if day is None:
+        rate = study.margin_map.largest_rate_bit_s
+        text = "no rate has the required margin" if math.isnan(rate) else f"up to {quantity(rate, 'bit/s')}"
+        return Stage("Volume", (text, "no orbits given: no volume a day"))
+    lines = [
+        f"{quantity(day.relay.capacity_bit / 8.0, 'B')} possible by the relay",
+        f"{quantity(day.relay.arrived_bit / 8.0, 'B')} of the instrument's",
+    ]
+    if day.direct is not None:
+        lines.append(f"{quantity(day.direct.capacity_bit / 8.0, 'B')} direct to ground")
+    return Stage("Volume", tuple(lines))
+
+
+def _verdict(study: Study) -> Stage:
+    passed = sum(r.met for r in study.requirements)
+    lines = (
+        f"{passed} of {len(study.requirements)} requirements met",
+        f"link at {'the residual' if study.fine_case is None else 'the outage'} {signed(study.margin_db, 'dB')},",
+        f"{study.file.mission.requirement.margin_db:g} dB required",
+    )
+    return Stage("Verdict", lines, "PASS" if study.met else "FAIL")
+
+
+# ------------------------------------------------------------------------------------------------------------ drawing
+def layout(found: Sequence[Stage], columns: int, width: float, gap: float) -> Drawing:
+    """Boxes in rows of ``columns``, arrows from each to the next; ``width`` is that of the whole drawing."""
+    own = (width - (columns - 1) * gap) / columns
+    found = [_wrapped(s, int((own - 16.0) / _CHARACTER_WIDTH)) for s in found]
+    rows = [found[at : at + columns] for at in range(0, len(found), columns)]
+    boxes: list[Box] = []
+    y = 1.0
+    for row in rows:
+        height = _TITLE_HEIGHT + _LINE_HEIGHT * max(len(s.lines) for s in row) + _PAD
+        boxes += [Box(s, i * (own + gap) + 1.0, y, own - 2.0, height) for i, s in enumerate(row)]
+        y += height + gap
+    arrows = [_arrow(a, b, gap) for a, b in pairwise(boxes)]
+    return Drawing(width, y - gap + 1.0, tuple(boxes), tuple(arrows))
+
+
+def _wrapped(stage: Stage, most: int) -> Stage:
+    """The stage with its lines broken at so many characters."""
+    return replace(stage, lines=tuple(part for line in stage.lines for part in textwrap.wrap(line, most)))
+
+
+def _arrow(a: Box, b: Box, gap: float) -> str:
+    """To the right within a row, else down and back to the left."""
+    tip = 7.0  # length of the arrow's head, which stands before the end of the path
+    if a.y == b.y:
+        y = a.y + a.height / 2.0
+        return f"M{a.x + a.width:.1f} {y:.1f}H{b.x - tip:.1f}"
+    from_x, to_x = a.x + a.width / 2.0, b.x + b.width / 2.0
+    return f"M{from_x:.1f} {a.y + a.height:.1f}v{gap / 2.0 - tip / 2.0:.1f}H{to_x:.1f}V{b.y - tip:.1f}"

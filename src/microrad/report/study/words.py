@@ -1,0 +1,297 @@
+"""What a study found, in words and as plain data."""
+
+import math
+
+from microrad.core.units import format_quantity
+from microrad.link.budget.lines import DEEPEST_DB, POINT_AHEAD_LOSS, POINTING_LOSS
+from microrad.link.requirement import IMPOSSIBLE, outage_words
+from microrad.loop.paper_cases import Run
+from microrad.mirror import Variant
+from microrad.mission.file import changed_from_shipped
+from microrad.report.day import words as day_words
+from microrad.report.fine_pointing import words as fine_pointing_words
+from microrad.report.quantities import quantity, signed
+from microrad.report.requirements import (
+    derived_words,
+    first_warning,
+    margin_text,
+    met_words,
+    nearest,
+    requirement_table,
+)
+from microrad.report.study import contributors
+from microrad.report.tables import table_text, tables_text
+from microrad.study.pointing_penalty import FINE, Cost
+from microrad.study.study import Study
+
+
+def headline(study: Study) -> str:
+    """The verdict in one sentence. "The link closes" stands above no requirement that is not met."""
+    at = _judged_at(study)
+    if not study.closes:
+        links = {"beacon": study.beacon.margin_db, "answer": study.answer.margin_db, "communication": study.margin_db}
+        failing = [f"{name} {signed(margin, 'dB')}" for name, margin in links.items() if margin < 0.0]
+        return f"The link does not close: {', '.join(failing) or IMPOSSIBLE}, at {at}."
+    margin, failed = signed(study.margin_db, "dB"), [r for r in study.requirements if not r.met]
+    if failed:
+        names = " and ".join(f"{r.name} ({r.unknown or margin_text(r)})" for r in failed)
+        return f"Not every requirement is met: {names}. The margin is {margin} at {at}.{_extrapolated(study)}"
+    met = met_words(study.requirements)
+    return f"The link closes, with a margin of {margin} at {at}, and {met}.{_extrapolated(study)}"
+
+
+def _judged_at(study: Study) -> str:
+    """The working point at which the verdict has its margin."""
+    m, case = study.file.mission, study.fine_case
+    rate = format_quantity(m.communication.data_rate_bit_s, "bit/s")
+    if case is not None:
+        return f"{rate} but for {outage_words(m.requirement)}"
+    left = format_quantity(study.left_rad(study.residual), "rad", 3)
+    return f"{rate} and a simulated residual of {left} ({m.requirement.residual_statistic})"
+
+
+def _extrapolated(study: Study) -> str:
+    return " The mirror model is extrapolated." if _judged_beyond(study) else ""
+
+
+def _judged_beyond(study: Study) -> str:
+    """How far the mirror of the judged loop is driven beyond where it was identified, or nothing."""
+    return beyond_identified(study, study.residual) if study.fine_case is None else ""
+
+
+def short(study: Study) -> list[str]:
+    """What limits the terminal and what to do about it, in six sentences at most."""
+    case = study.fine_case
+    under = "" if case is None else f", with what {case.controller} leaves of {case.source}"
+    found = [
+        f"The margin is received over required power of the communication link at {_judged_at(study)}{under}.",
+        _limit(study),
+        derived_words(study.requirements),
+        _largest_warning(study),
+        "" if study.day is None else day_words.headline(study.day)[0],
+        _papers_loop(study),
+    ]
+    return list(filter(None, found))
+
+
+def _limit(study: Study) -> str:
+    r = nearest(study.requirements)
+    said = contributors.contributor(study, r)
+    which, todo = "Nearest to its limit is" if r.met else "What limits it is", contributors.advice(study, r)
+    return f"{which} the {r.name}: {said[:1].lower()}{said[1:]}{todo}."
+
+
+def _largest_warning(study: Study) -> str:
+    if beyond := _judged_beyond(study):
+        return f"Not to be relied on: {beyond}."
+    found = warnings(study)
+    return first_warning(found)
+
+
+def _papers_loop(study: Study) -> str:
+    """How the paper's loop does, where it is not what the verdict judges, or nothing."""
+    failed = [r.name for r in study.papers_loop if not r.met]
+    if not study.papers_loop:
+        return ""
+    m, run = study.file.mission, study.residual
+    q, found_rad = m.requirement, study.left_rad(run)
+    left, most = (format_quantity(rad, "rad", 3) for rad in (found_rad, q.pointing_error_rad))
+    judged = f"would miss {' and '.join(failed)}" if failed else "would meet what is required"
+    return (
+        f"For comparison alone: the paper's loop ({run.controller}, sine of {run.freq_hz:g} Hz) {judged}; it leaves "
+        f"{left} ({q.residual_statistic}) of {most}, and {signed(study.achieved.margin_db, 'dB')} where "
+        f"{q.margin_db:.2f} dB are required."
+    )
+
+
+def explanation(study: Study) -> list[str]:
+    """What the headline rests on, a sentence each."""
+    m = study.file.mission
+    sentences = []
+    failed = [r for r in study.requirements if not r.met]
+    if failed:
+        causes = dict.fromkeys(r.because.removeprefix("the residual: ") for r in failed)
+        sentences.append(f"What limits it: {'; '.join(causes)}.")
+    if study.fine_pointing is not None:
+        sentences += fine_pointing_words.short(study.fine_pointing, m.requirement.pointing_error_rad)
+    sentences += filter(None, (hysteresis_cost(study), found(study)))
+    if study.day is not None:
+        day = study.day
+        sentences += [*day_words.headline(day), *day_words.latency_words(day), *day_words.assumption_words(day)[:1]]
+    return sentences
+
+
+def papers_loop(study: Study) -> list[str]:
+    """What the paper's loop leaves in the worst of its sines, a sentence each."""
+    m, run = study.file.mission, study.residual
+    trace, q, kind = run.trace, m.requirement, "margin" if m.jitter is None else "static margin"
+    two_axes = ", times √2 for two equal axes" if m.conventions.residual == "radial" else ""
+    sentences = [
+        f"As budgeted, at {format_quantity(m.communication.pointing_error_rad, 'rad', 3)}, the {kind} is "
+        f"{signed(study.static.margin_db, 'dB')}; {m.requirement.margin_db:g} dB is required.",
+        f"The loop ({run.controller}, {run.freq_hz:g} Hz) leaves {format_quantity(trace.peak_rad, 'rad', 3)} at its "
+        f"peaks and {format_quantity(trace.rms_rad, 'rad', 3)} rms on its axis{two_axes}; "
+        f"{format_quantity(q.pointing_error_rad, 'rad', 3)} ({q.residual_statistic}) is allowed.",
+    ]
+    if extrapolated := beyond_identified(study, run):
+        sentences.append(f"Not to be relied on: {extrapolated}.")
+    if study.comparison is not None:
+        left = study.left_rad(study.comparison.residual)
+        sentences.append(
+            f"On the mission's comparison model of the mirror the residual is {format_quantity(left, 'rad', 3)} and "
+            f"the margin {signed(study.comparison.margin_db, 'dB')}."
+        )
+    return [*sentences, *read_otherwise(study)]
+
+
+def read_otherwise(study: Study) -> list[str]:
+    """Which readings of what the paper leaves open, each changed alone, would turn the communication link's verdict."""
+    closes = study.achieved.margin_db >= 0.0
+    run = [r for r in study.other_readings if not r.failure]
+    turned = [f"{r.key} = {r.other} ({quantity(r.margin_db, 'dB')})" for r in run if r.closes != closes]
+    if not run:
+        return []
+    if not turned:
+        return [f"None of {len(run)} other readings, each changed alone, changes whether that link closes."]
+    would = "would not close" if closes else "would close"
+    return [f"By another reading, one changed alone, that link {would}: {', '.join(turned)}."]
+
+
+def hysteresis_cost(study: Study) -> str:
+    """What hysteresis costs the link with the controllers that the verdict names, or nothing."""
+    run = study.residual
+    named = [(f"sine of {run.freq_hz:g} Hz", run.controller)]
+    if study.fine_pointing is not None:
+        named.append((FINE, study.fine_pointing.best.design.name))
+    said = [
+        f"{-c.margin_db:.2f} dB{_rate_lost(c)} with {c.controller} ({c.source})"
+        for c in study.performance.costs
+        if c.mirror == "given" and (c.source, c.controller) in named and c.margin_db < 0.0
+    ]
+    outage = f"{100 * study.performance.outage:g} %"
+    return (
+        f"Hysteresis costs the link, at the loss exceeded {outage} of the time, {' and '.join(said)}." if said else ""
+    )
+
+
+def _rate_lost(cost: Cost) -> str:
+    """The data rate that goes with a cost, where there is one."""
+    return "" if math.isnan(cost.data_rate_bit_s) else f" or {-cost.data_rate_bit_s * 1e-6:.0f} Mbit/s"
+
+
+def found(study: Study) -> str:
+    """How the partner is found, or nothing."""
+    f, p = study.links.finding, study.open_loop.reading
+    if f is None or p is None:
+        return ""
+    said = "; ".join(
+        f"{w.name} {w.outcome.success_probability:.4f} in {quantity(w.outcome.mean_time_s, 's')}"
+        if w.possible
+        else f"{w.name} never"
+        for w in f.ways
+    )
+    return (
+        f"Acquisition, with its retries: {said} (mean). The beacon's cone at 1/e2 covers its partner with a "
+        f"probability of {p.coverage:.2f}, biases at their bounds about both axes."
+    )
+
+
+def verdict_text(study: Study, width: int = 80, verbose: bool = False) -> str:
+    """The verdict as plain text: headline, a line for each requirement, and what limits them.
+
+    ``verbose`` adds everything else that the first part of the report says, and its warnings.
+    """
+    judged = [tables_text([], [headline(study)], width), table_text(requirement_table(study.requirements), width)]
+    if not verbose:
+        return "\n\n".join((*judged, tables_text([], short(study), width)))
+    blocks = [*judged, tables_text([], [*short(study), *explanation(study)], width)]
+    by_paper = tables_text([], ["The paper's loop", *papers_loop(study)], width)
+    own = study.papers_loop
+    blocks += [by_paper, table_text(requirement_table(own), width)] if own else [by_paper]
+    if said := warnings(study):
+        blocks.append(tables_text([], ["Warnings", *(f"- {each}" for each in said)], width))
+    return "\n\n".join(blocks)
+
+
+def beyond_identified(study: Study, run: Run) -> str:
+    """The warning that a run drives the mirror faster or further than its model was identified for, or nothing."""
+    table, (low, high) = study.file.mission.mirror, run.drive_span_v
+    beyond = []
+    if run.fastest_drive_v_s > table.rate_limit_v_s:
+        beyond.append(f"{run.fastest_drive_v_s:.3g} V/s (identified up to {table.rate_limit_v_s:.3g} V/s)")
+    if low + table.bias_v < table.drive_min_v or high + table.bias_v > table.drive_max_v:
+        known = f"identified from {table.drive_min_v:.3g} to {table.drive_max_v:.3g} V"
+        beyond.append(f"{low + table.bias_v:.3g} to {high + table.bias_v:.3g} V ({known})")
+    if run.mirror == Variant.STRAIGHT or not beyond:
+        return ""
+    return f"{run.trace.name}: the mirror model is extrapolated to a drive of {' and of '.join(beyond)}"
+
+
+def warnings(study: Study) -> list[str]:
+    """What a reader must not overlook: the mirror's own warnings, and runs outside their range."""
+    found = [
+        f"{key} = {value} names the paper as its source, but the paper's mission has {shipped}"
+        for key, value, shipped in changed_from_shipped(study.file.sources)
+    ]
+    found = [*_of_verdict(study), *found, *study.summary.warnings, *study.links.warnings]
+    if study.day is not None:
+        found += study.day.warnings
+        found += _not_run(study)
+    m = study.file.mission
+    half, bias = m.scenario.loop_amplitude_v, m.mirror.bias_v
+    if not m.mirror.drive_min_v <= bias - half <= bias + half <= m.mirror.drive_max_v:
+        found.append("the hysteresis loops are drawn for a drive beyond the range that the mirror was identified for")
+    if (
+        not m.amplifier.output_min_v
+        <= m.amplifier.gain * (bias - half)
+        <= m.amplifier.gain * (bias + half)
+        <= (m.amplifier.output_max_v)
+    ):
+        found.append("the hysteresis loops are drawn for a drive beyond the amplifier's range")
+    found += filter(None, (beyond_identified(study, run) for run in study.runs))
+    for run in study.runs:
+        c = run.trace.counts
+        counts = {
+            "steps beyond the identified rate": c.clamped + c.inverse_clamped,
+            "saturated samples": c.saturated,
+            "slew-limited steps": c.slew_limited,
+            "reversals of the command within 10 samples of the last": c.alternating,
+        }
+        found += [f"{run.trace.name}: {count} {what}" for what, count in counts.items() if count]
+    found += [
+        f"hysteresis loop at {loop.freq_hz:g} Hz: {loop.clamped} samples beyond the identified rate"
+        for loop in study.loops
+        if loop.clamped
+    ]
+    if study.fine_pointing is not None:
+        found += fine_pointing_words.warnings(study.fine_pointing, m.control, m.amplifier)
+    return found
+
+
+def _of_verdict(study: Study) -> list[str]:
+    """What the judged margin leaves out, or may not be relied on for."""
+    m, case, found = study.file.mission, study.fine_case, []
+    if m.jitter is not None:
+        found.append(
+            "[jitter] is not in this verdict, which judges the pointing error that the simulated loop leaves: the two "
+            f"are not summed. Under [jitter] alone the margin is {signed(study.communication.margin_db, 'dB')} but for "
+            f"{outage_words(m.requirement)}, as microrad budget judges it"
+        )
+    lost = study.achieved.loss_db(POINTING_LOSS, POINT_AHEAD_LOSS) if case is None else case.outage_loss_db
+    if lost > DEEPEST_DB:
+        found.append(
+            f"the verdict's pointing loss of {quantity(lost, 'dB')} is beyond {DEEPEST_DB:g} dB, where the wings and "
+            "the scatter of a real beam decide, not the formula of its main lobe"
+        )
+    return found
+
+
+def _not_run(study: Study) -> list[str]:
+    """Tables of the day that this study has no use for, and why."""
+    m, found = study.file.mission, []
+    asked = m.operations is not None and m.operations.contact is not None
+    if asked and study.contact is None and study.day is not None and study.day.relay.contacts:
+        found.append("operations.contact is not run: it takes the tables acquisition and fine_pointing")
+    if m.constellation is not None and study.plan is None:
+        found.append("constellation is left out: its pattern cannot repeat an orbit.leo from a file, or a slot")
+    return found
