@@ -94,7 +94,7 @@ def test_the_papers_sequence_has_its_order_and_its_light_times():
     light = 44e6 / 299_792_458
     assert TIMING.light_time_s == pytest.approx(light, rel=1e-14)
     sure = solve_sequence(paper_sequence(TIMING, Chances(1, 1, 1, 1, 1, 1)), 1)
-    assert sure.success_probability == 1.0 and sure.failure_probability == 0.0
+    assert sure.success_probability == 1.0 and sure.lost.probability == 0.0
     assert sure.locked.time_s == pytest.approx([20 + 0.5 + 3 + 0.5 + 0.01 + 2 * 1.0 + 4 * light], rel=1e-12)
     assert stages[2].success_probability == pytest.approx(0.57 * (1 - 0.1**5), rel=1e-12)
 
@@ -148,7 +148,7 @@ def test_the_solution_is_that_of_the_absorbing_chain(attempts):
     probability, mean = by_matrix(stages, attempts)
     assert outcome.success_probability == pytest.approx(probability, rel=1e-12)
     assert outcome.mean_time_s == pytest.approx(mean, rel=1e-10)
-    assert outcome.success_probability + outcome.failure_probability == pytest.approx(1.0, rel=1e-12)
+    assert outcome.success_probability + outcome.lost.probability == pytest.approx(1.0, rel=1e-12)
 
 
 def test_times_are_exact_for_one_stage_that_is_repeated():

@@ -457,7 +457,7 @@ def test_the_closed_form_and_the_simulation_agree_and_the_log_is_the_first_run(t
         assert found.simulated.locked.size == 2000
         assert found.log[-1].time_s == found.simulated.time_s[0]
         assert found.log[-1].to == (acquisition.LOCKED if found.simulated.locked[0] else acquisition.LOST)
-        assert found.outcome.success_probability + found.outcome.failure_probability == pytest.approx(1.0)
+        assert found.outcome.success_probability + found.outcome.lost.probability == pytest.approx(1.0)
 
 
 def test_the_seed_decides_the_runs(tmp_path):

@@ -184,7 +184,7 @@ def test_the_paragraph_says_what_fails_and_by_what_then_what_holds(paper):
     )
     assert count == f"{sum(r.met for r in paper.requirements)} of {len(paper.requirements)} requirements are met."
     for r in paper.requirements:
-        here = f"{r.name} {requirements.signed(r)}"
+        here = f"{r.name} {requirements.margin_text(r)}"
         assert (f"{here}, by {r.limited_by}" in failed, here in passed) == (not r.met, r.met)
     met = tuple(r for r in paper.requirements if r.met)
     assert " FAIL: " not in requirements_paragraph(met)

@@ -16,13 +16,13 @@ from microrad.loop import paper_cases as tracking
 from microrad.loop.pointing_loop import linear
 from microrad.mission.file import load_mission
 from microrad.studio.draft.draft import Draft
-from microrad.studio.draft.mirror_file import with_mirror_file
+from microrad.studio.draft.tables import with_mirror_file
 from microrad.studio.jobs.files import Job, Progress
 from microrad.studio.recordings.reading import ChannelInfo, Listing, Note, View
 from microrad.studio.views import control as control_view
 from microrad.studio.views import controllers as control_model
-from microrad.studio.views import live_fit, mirror_form
 from microrad.studio.views import mirror as mirror_view
+from microrad.studio.views import mirror_form
 from microrad.studio.views.controllers import PID, PID_INVERSE, WITH, WITHOUT
 from microrad.studio.views.mirror_form import Dropped, Form, Setting, SettingError
 from scenes import cases_of, scene_of
@@ -58,11 +58,11 @@ def test_each_model_is_handed_over_as_it_is_scored_in_the_end(identified):
 def test_fits_are_read_as_they_were_written(identified, tmp_path):
     _, seen = identified
     look = live_fit_writer(str(tmp_path / "progress"))
-    assert live_fit.read_fits(tmp_path) == ()
+    assert mirror_view.read_fits(tmp_path) == ()
     for n, each in enumerate(seen, start=1):
         look(each)
-        assert len(live_fit.read_fits(tmp_path)) == n
-    fits = live_fit.read_fits(tmp_path)
+        assert len(mirror_view.read_fits(tmp_path)) == n
+    fits = mirror_view.read_fits(tmp_path)
     assert fits == tuple(thin_fit(each) for each in seen)
     loop = fits[1].loops[0]
     assert loop.name == "50Hz.csv"
@@ -79,14 +79,14 @@ def test_a_line_that_is_being_written_is_left_out(identified, tmp_path):
     look(identified[1][0])
     with (tmp_path / LIVE_FITS).open("a") as file:
         file.write('{"model": "bouc_w')
-    assert [each.model for each in live_fit.read_fits(tmp_path)] == ["prandtl_ishlinskii"]
+    assert [each.model for each in mirror_view.read_fits(tmp_path)] == ["prandtl_ishlinskii"]
 
 
 def test_nobody_looks_on_without_a_file_and_a_disk_that_refuses_does_not_end_the_fit(identified, tmp_path):
     live_fit_writer(None)(identified[1][0])
     (tmp_path / LIVE_FITS).mkdir()
     live_fit_writer(str(tmp_path / "progress"))(identified[1][0])
-    assert live_fit.read_fits(tmp_path) == ()
+    assert mirror_view.read_fits(tmp_path) == ()
     assert [each.name for each in tmp_path.iterdir()] == [LIVE_FITS]
 
 
@@ -97,7 +97,7 @@ def test_the_command_writes_its_fits_beside_its_progress(call, folder, monkeypat
     monkeypatch.setenv("MICRORAD_PROGRESS", str(folder / "progress"))
     result = call("identify", "loop.csv", "--input", "0", "--output", "1", "--rate", "5000", "--static")
     assert result.code == 0, result.err
-    assert [each.model for each in live_fit.read_fits(folder)] == ["prandtl_ishlinskii", "bouc_wen"]
+    assert [each.model for each in mirror_view.read_fits(folder)] == ["prandtl_ishlinskii", "bouc_wen"]
 
 
 def fitted(model, held_out, fit=0.5):
@@ -107,11 +107,11 @@ def fitted(model, held_out, fit=0.5):
 
 def test_the_best_is_the_one_that_leaves_least_of_what_no_fit_has_seen():
     fits = fitted("a", 0.9, 0.1), fitted("b", 0.4), fitted("c", 0.6)
-    assert live_fit.best(fits).model == "b"
-    assert live_fit.best((*fits, fitted("b, free", 0.4))).model == "b, free"
-    assert live_fit.best(()) is None
-    assert live_fit.leader(fits).model == "b"
-    assert live_fit.leader((*fits, fitted("a", 0.8)), "a").held_out_rms_percent == 0.8
+    assert mirror_view.best(fits).model == "b"
+    assert mirror_view.best((*fits, fitted("b, free", 0.4))).model == "b, free"
+    assert mirror_view.best(()) is None
+    assert mirror_view.leader(fits).model == "b"
+    assert mirror_view.leader((*fits, fitted("a", 0.8)), "a").held_out_rms_percent == 0.8
     assert [row["note"] for row in mirror_view.score_rows(fits, "c")] == ["", "chosen", ""]
     rows = mirror_view.score_rows(fits)
     assert [row["model"] for row in rows] == ["b", "c", "a"]
@@ -486,8 +486,9 @@ def test_a_controller_is_tuned_once_for_a_text(mission, pi, tmp_path):
     assert control_model.controller(load_mission(SHIPPED), "PI") is pi
     text = SHIPPED.read_text("utf-8").replace("modulus_margin = 0.5", "modulus_margin = 0.6")
     other = load_mission(tmp_path / "m.toml", text=text)
-    assert control_model._Keyed(other) != control_model._Keyed(mission)
-    assert control_model._Keyed(load_mission(SHIPPED)) == control_model._Keyed(mission)
+    found = control_model.controller(other, "PI")
+    assert (found.asked_modulus, pi.asked_modulus) == (0.6, 0.5)
+    assert control_model.controller(load_mission(SHIPPED), "PI") is pi
 
 
 def test_step_sine_and_jitter_answer_what_they_are_asked(mission, pi, answers):

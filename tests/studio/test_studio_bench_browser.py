@@ -14,7 +14,7 @@ import pytest
 from browser import until
 from cli.test_cli import write_recording
 from microrad.lab import bench
-from microrad.studio.views.live_fit import read_fits
+from microrad.studio.views.mirror import read_fits
 from microrad.studio.views.mirror_form import kept_form
 from places import DATA
 

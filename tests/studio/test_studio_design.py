@@ -18,9 +18,9 @@ from microrad.orbit import day as day_study
 from microrad.report.day import figures as day_plots
 from microrad.report.plotting.sheet import Axis, Line, Rule, grid
 from microrad.studio.draft.draft import Draft
-from microrad.studio.views import attempts, plots, sliders
 from microrad.studio.views import day as day_view
 from microrad.studio.views import link as link_view
+from microrad.studio.views import plots, sliders
 from microrad.studio.views import pointing as pointing_view
 from microrad.studio.views.latest import Latest, shared
 from waiting import HANG_S
@@ -38,7 +38,7 @@ def view(draft):
 
 @pytest.fixture(scope="module")
 def day(draft):
-    return day_view.run(draft.set("operations.runs", "2").link(), lambda done, total, what: None)
+    return day_view.compute_day(draft.set("operations.runs", "2").link(), lambda done, total, what: None)
 
 
 def slider_of(draft, key):
@@ -126,7 +126,7 @@ def test_a_fault_is_told_beside_its_slider_in_the_words_of_the_command_line(draf
 
 # ------------------------------------------------------------------------------------------------------------ attempts
 def test_an_attempt_is_the_study_of_the_changed_file_and_leaves_the_draft(draft):
-    found = attempts.attempt(draft, "terminals.leo_aperture", "6 cm", link_view.view)
+    found = sliders.attempt(draft, "terminals.leo_aperture", "6 cm", link_view.view)
     margin = found.view.margins[0]
     alone = link_study.run_link_study(draft.set("terminals.leo_aperture", "6 cm").link())
     assert margin.margin_db == alone.communication.margin_db
@@ -135,12 +135,12 @@ def test_an_attempt_is_the_study_of_the_changed_file_and_leaves_the_draft(draft)
 
 
 def test_an_attempt_with_a_fault_has_no_view_and_one_that_cannot_be_budgeted_says_why(draft):
-    wrong = attempts.attempt(draft, "terminals.leo_aperture", "5 W", link_view.view)
+    wrong = sliders.attempt(draft, "terminals.leo_aperture", "5 W", link_view.view)
     assert wrong.view is None
     assert wrong.refusal == ""
     assert wrong.draft.problems
     hopeless = draft.set("communication.data_rate", "largest").set("communication.transmit_power", "1 pW")
-    refused = attempts.attempt(hopeless, "requirement.margin", "300 dB", link_view.view)
+    refused = sliders.attempt(hopeless, "requirement.margin", "300 dB", link_view.view)
     assert refused.view is None
     assert "not even" in refused.refusal
     assert not refused.draft.problems

@@ -196,6 +196,16 @@ def test_the_coverage_follows_the_beacon_s_divergence(studio, opened):
     page.get_by_text("with a probability of 0.53").wait_for()
 
 
+def test_a_narrow_page_has_one_column_and_a_long_legend_does_not_take_the_room_of_the_data(opened):
+    page = opened("pointing")
+    page.set_viewport_size({"width": 400, "height": 900})
+    page.get_by_text("with a probability of").wait_for()
+    page.wait_for_function(
+        """() => [...document.querySelectorAll('.js-plotly-plot')]
+            .every(plot => plot.clientWidth > 300 && plot._fullLayout?._size.h > 190)"""
+    )
+
+
 # ----------------------------------------------------------------------------------------------------------------- day
 def test_the_day_is_computed_with_progress_and_a_second_tab_finds_it(opened):
     page = opened("day")

@@ -18,8 +18,8 @@ pytest.importorskip("nicegui", reason="the studio is not installed (nicegui)")
 from nicegui.client import Client
 from nicegui.page import page as at
 
-from microrad.studio.pages import layout, mission, mission_files, runs
-from microrad.studio.pages.slider_page import SliderPage
+from microrad.studio.pages import layout, mission, runs
+from microrad.studio.pages.sliders import SliderPage
 from waiting import until
 
 LEO, GEO = "terminals.leo_aperture", "terminals.geo_aperture"
@@ -81,16 +81,16 @@ def test_the_editor_cannot_undo_its_way_from_one_mission_into_another(session, o
 
 def test_a_mission_that_was_never_saved_is_not_dropped_without_a_word(tmp_path):
     session = Session(tmp_path)
-    assert mission_files._lost(session) == ""  # as it began: it can be begun again
+    assert mission._lost(session) == ""  # as it began: it can be begun again
     session.set(LEO, "6 cm")
-    assert mission_files._lost(session) == "leo-geo.toml is not on disk and will be lost; save it first to keep it."
+    assert mission._lost(session) == "leo-geo.toml is not on disk and will be lost; save it first to keep it."
     session.save()
-    assert mission_files._lost(session) == ""
+    assert mission._lost(session) == ""
     session.set(LEO, "7 cm")
-    assert mission_files._lost(session) == "Changes that are not saved will be lost."
+    assert mission._lost(session) == "Changes that are not saved will be lost."
     session.save()
     (tmp_path / "leo-geo.toml").unlink()
-    assert "will be lost" in mission_files._lost(session)
+    assert "will be lost" in mission._lost(session)
 
 
 def test_a_change_of_another_thread_is_not_lost_by_saving(session, monkeypatch):

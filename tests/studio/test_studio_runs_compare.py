@@ -14,7 +14,7 @@ from microrad.mission.file import load_link
 from microrad.mission.presets import preset_text
 from microrad.studio import commands
 from microrad.studio.draft.draft import Draft, DraftError
-from microrad.studio.draft.optional_tables import offered, with_table
+from microrad.studio.draft.tables import offered, with_table
 from microrad.studio.jobs.queue import Job, JobError, Progress
 from microrad.studio.session import Session
 from microrad.studio.views import compare as compare_view

@@ -12,7 +12,6 @@ import struct
 import subprocess
 import sys
 import tempfile
-import time
 import zipfile
 from dataclasses import replace
 from functools import partial
@@ -344,21 +343,6 @@ def test_the_folder_is_made_private_and_no_link(tmp_path):
     (tmp_path / "link").symlink_to(tmp_path / "open")
     with pytest.raises(UploadError, match="is a link or belongs to somebody else"):
         Uploads(tmp_path / "link")
-
-
-def test_what_a_killed_studio_left_is_cleared_away_after_an_hour(tmp_path):
-    uploads = Uploads(tmp_path, LIMITS)
-    kept = save(uploads, "kept.csv", b"1")
-    for key, age_s in (("0" * 16, 7200), ("1" * 16, 60)):
-        (tmp_path / key).mkdir()
-        (tmp_path / key / ".part").touch()
-        for path in (tmp_path / key / ".part", tmp_path / key):
-            os.utime(path, (time.time() - age_s,) * 2)
-    os.utime(kept.path, (0, 0))
-    os.utime(kept.path.parent, (0, 0))
-    (tmp_path / "other").mkdir()
-    assert Uploads(tmp_path).listed() == (kept,)
-    assert {p.name for p in tmp_path.iterdir()} == {kept.key, "1" * 16, "other"}
 
 
 @posix

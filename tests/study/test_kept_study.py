@@ -151,7 +151,7 @@ def quick():
         patch.setattr(fine_results, "SINE_SETTLE_S", 0.1)
         patch.setattr(study.paper, "PROPORTIONAL_V_MRAD", (1.0,))
         patch.setattr(study.paper, "INTEGRAL_V_MRAD_S", (8e3, 16e3))
-        patch.setattr(study.alternatives, "others", lambda *args: ())  # no part is kept of them
+        patch.setattr(study.alternatives, "other_readings", lambda *args: ())  # no part is kept of them
         every = assumptions._changes
         patch.setattr(assumptions, "_changes", lambda *args: list(every(*args))[::5])
         patch.setattr(threads, "_may_fork", lambda: False)

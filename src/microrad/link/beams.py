@@ -53,7 +53,7 @@ class GaussianFall:
         return 2.0 * DB_PER_NEPER * error**2
 
     def error_rad(self, loss_db: float) -> float:
-        """The loss turned round; 0 for no loss."""
+        """Error with this loss, the inverse of `loss_db`; 0 for no loss."""
         return self.half_angle_rad * math.sqrt(max(loss_db, 0.0) / (2.0 * DB_PER_NEPER))
 
 

@@ -172,7 +172,7 @@ def beam_margin(name: str, sources: Mapping[str, Source]) -> Callable[[LinkMissi
 def beam_tornado(m: LinkMission, sources: Mapping[str, Source], name: str) -> tuple[Swing, ...]:
     """The margin of the "beacon" or of the "answer" over each of its inputs, as `swings` moves them.
 
-    Raises ValueError for a beam that the mission has not.
+    Raises ValueError if the mission has no such beam.
     """
     tables = ("terminals", name, "channel", "point_ahead")
     return swings(m, sources, tables, m.conventions.strehl, beam_margin(name, sources), divergence_possible(name))

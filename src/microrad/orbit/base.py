@@ -1,4 +1,4 @@
-"""What every orbit gives, and the refusals of the room.
+"""What every orbit gives, and the errors of this room.
 
 The inertial frame is TEME (true equator, mean equinox of date), the frame of SGP4. The frame fixed in the Earth is TEME
 turned about z by Greenwich mean sidereal time (IAU 1982) at UT1; polar motion (at most 0.6 arcsec) is neglected.
@@ -11,11 +11,11 @@ from microrad.core.arrays import Floats
 
 
 class OrbitError(ValueError):
-    """An orbit, an instant or a place that is refused: what it is, why, and what to do."""
+    """An orbit, an instant or a place is not possible; the message says why, and what to do."""
 
 
 class OperationsError(ValueError):
-    """A table, a rate or a plan of the day that is refused: which value it is, and what to give."""
+    """A table, a rate or a plan of the day is not possible; the message says which value, and what to give."""
 
 
 _Table = TypeVar("_Table")

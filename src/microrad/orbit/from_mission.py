@@ -64,7 +64,7 @@ def pair(orbits: Orbits | None, ends: Terminals, folder: Path, contents: Content
         folder: the folder of its file.
         contents: the files that it names, where they were read with it.
 
-    Raises OrbitError for an orbit that is none, or that does not hold over the mission's span.
+    Raises OrbitError if an orbit is impossible, or does not hold over the mission's span.
     """
     orbits = required(orbits, "orbit", OrbitError)
     try:

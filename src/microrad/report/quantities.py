@@ -12,7 +12,7 @@ _NOTHING_DB = 1e-9  # what rounding leaves of a margin that is none
 
 
 def apart(one: float, other: float, unit: str) -> tuple[str, str]:
-    """Two values with as many more digits as it takes to tell them apart, seven at most."""
+    """Two values of one SI ``unit`` with as many more digits as it takes to tell them apart, seven at most."""
     texts = (quantity(one, unit), quantity(other, unit))
     for digits in range(4, 8):
         if one == other or texts[0] != texts[1]:
@@ -23,6 +23,11 @@ def apart(one: float, other: float, unit: str) -> tuple[str, str]:
 
 def quantity(value: float, unit: str, digits: int = 3) -> str:
     """A value with its unit as it stands in tables: in three digits, decibels with two decimals, unless told else.
+
+    Args:
+        value: in SI units.
+        unit: its SI unit, which gets a prefix; "" for a share.
+        digits: significant ones; decibels have one decimal less.
 
     A shortfall of decibels that two decimals would make none has as many as show it. A share, which has no unit, is no
     smaller than a Gaussian tail means anything.

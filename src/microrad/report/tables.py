@@ -41,7 +41,13 @@ class Table(NamedTuple):
 
 
 def tables_text(tables: Sequence[Table], sentences: Sequence[str], width: int) -> str:
-    """Tables and below them sentences, in lines of at most ``width`` columns."""
+    """Tables and below them sentences, for a terminal.
+
+    Args:
+        tables: each with its title above it.
+        sentences: a paragraph each.
+        width: columns of the terminal.
+    """
     from rich import box
     from rich.console import Console
     from rich.table import Table as Drawn
@@ -62,5 +68,5 @@ def tables_text(tables: Sequence[Table], sentences: Sequence[str], width: int) -
 
 
 def table_text(table: Table, width: int) -> str:
-    """One table without blank lines around it."""
+    """One table for a terminal of ``width`` columns, without blank lines around it."""
     return tables_text([table], [], width).strip("\n")

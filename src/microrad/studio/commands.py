@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -176,7 +176,7 @@ def identify(  # noqa: PLR0913  all but the first four are named options
     settings = (
         f"models=identify.{'STATIC[:2]' if static else 'MODELS'}",
         f"validation=[read(file) for file in {list(map(str, validate))}]",
-        *_named(lever_arm_m=lever_arm_m, admissible=admissible or None, input_unit=units[0], output_unit=units[1]),
+        f"lever_arm_m={lever_arm_m!r}, admissible={admissible!r}, input_unit={units[0]!r}, output_unit={units[1]!r}",
     )
     python = _joined(
         "from pathlib import Path",
@@ -231,11 +231,6 @@ def _option(name: str, value: object) -> tuple[str, ...]:
 def _path(path: Path) -> str:
     """A path in Python."""
     return f"Path({str(path)!r})"
-
-
-def _named(**values: object) -> Iterable[str]:
-    """Named arguments of Python for those values that are given."""
-    return (f"{name}={value!r}" for name, value in values.items() if value is not None)
 
 
 def _joined(*lines: str) -> str:

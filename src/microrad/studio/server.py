@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import logging
 import os
@@ -18,7 +19,12 @@ from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 from microrad.core.installing import advice
-from microrad.studio.guard import address, plain_files
+from microrad.studio.guard import address, plain_files, policy
+from microrad.studio.guard.middleware import Guard
+from microrad.studio.guard.names import NameRefusedError, within
+from microrad.studio.jobs.files import held, note
+from microrad.studio.jobs.queue import JobError
+from microrad.studio.recordings.uploads import Uploads
 from microrad.studio.session import Session
 
 # NiceGUI and what it stands on take a second to load, and are not there in an installation without the studio.
@@ -26,7 +32,6 @@ if TYPE_CHECKING:
     import uvicorn
     from starlette.responses import Response
 
-    from microrad.studio.guard.middleware import Guard
 
 PAGES = ("mission", "link", "pointing", "day", "mirror", "control", "runs", "compare")
 """Modules of `microrad.studio.pages`, in the order of the navigation."""
@@ -88,7 +93,7 @@ def listen(port: int = 0, exposed: str | None = None) -> Entrance:
             f"'{exposed}' is no address that a browser could open; give this machine's own address or name in the "
             "network, such as 192.168.1.7"
         )
-    listener = _bound(address.bind_address(host, exposed=exposed is not None), port)
+    listener = _bound("127.0.0.1" if host == "localhost" else host, port)
     given = listener.getsockname()[1]
     own = () if exposed is None else (f"[{host}]" if ":" in host else host,)
     names = address.hosts(given, own) if own else address.hosts(given)
@@ -124,8 +129,6 @@ def _bound(host: str, port: int) -> socket.socket:
 
 def _unbound(host: str, port: int, error: OSError) -> str:
     """Why a port could not be taken, and what to do."""
-    import errno
-
     if error.errno == errno.EADDRINUSE:
         why = "is in use, perhaps by another studio; give another one with --port, or leave --port out for a free one"
         return f"port {port} {why}"
@@ -141,8 +144,6 @@ def alone(studio: Path) -> Iterator[None]:
 
     Raises `StudioError` where there is one, and `JobError` where that cannot be told.
     """
-    from microrad.studio.jobs.files import held, note
-
     with held(studio / _LOCK, 0.0) as mine:
         if not mine:
             raise StudioError(
@@ -153,10 +154,10 @@ def alone(studio: Path) -> Iterator[None]:
         yield
 
 
-def _process(note: Path) -> str:
+def _process(path: Path) -> str:
     """The process of the studio that has left a note, in words; nothing where the note cannot be read."""
     with suppress(OSError, ValueError, LookupError, TypeError, RecursionError):
-        return f", process {int(json.loads(plain_files.content(note))['pid'])}"
+        return f", process {int(json.loads(plain_files.content(path))['pid'])}"
     return ""
 
 
@@ -231,10 +232,6 @@ def application(session: Session, entrance: Entrance) -> Guard:
     from nicegui import ui
     from nicegui.client import templates
 
-    from microrad.studio.guard import policy
-    from microrad.studio.guard.middleware import Guard
-    from microrad.studio.recordings.uploads import Uploads
-
     Uploads(session.studio / "uploads").hold_temporary_files()
     policy.sign_template(templates.env)
     inner = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
@@ -287,9 +284,6 @@ def _documents(session: Session) -> Callable[[int, int], Response]:
 
 def result(session: Session, number: int, place: int) -> Path | None:
     """A file that a job has written, where it lies in the working folder; None where there is none."""
-    from microrad.studio.guard.names import NameRefusedError, within
-    from microrad.studio.jobs.queue import JobError
-
     try:
         job = session.jobs.get(number)
         path = within(session.folder, job.cwd / job.results[place])

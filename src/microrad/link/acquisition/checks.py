@@ -1,4 +1,4 @@
-"""Refusals shared by the acquisition modules: what, the value, the limit and what to do."""
+"""Checks shared by the acquisition modules; each error says what is wrong, the value, and its limit."""
 
 import math
 

@@ -69,11 +69,11 @@ def _levels(scan: Spiral | Raster) -> tuple[Floats, Floats]:
 
 def _track_probability(scan: Spiral | Raster, offset: Floats, jitter_rms_rad: float) -> Floats:
     """Probability of detection by a track at each offset from the target."""
+    from scipy.special import ndtr
+
     total = np.zeros_like(offset)
     for half, weight in zip(*_levels(scan), strict=True):
         if jitter_rms_rad > 0.0:
-            from scipy.special import ndtr
-
             inside = ndtr((half - offset) / jitter_rms_rad) - ndtr((-half - offset) / jitter_rms_rad)
         else:
             inside = np.abs(offset) < half

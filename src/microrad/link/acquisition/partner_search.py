@@ -1,4 +1,4 @@
-"""How the partner is found: the light on the tracking sensor, the sequence of the paper, and a scan instead."""
+"""The acquisition of a mission's partner: light on the tracking sensor, the paper's sequence, and a scan instead."""
 
 import math
 from collections.abc import Mapping
@@ -131,7 +131,7 @@ class Finding:
         return None if self.scanned is None else self.scanned.trade
 
     def way(self, name: str) -> Found | None:
-        """The way of this name, "wide beacon" or "scan"; None for a scan that the mission has not."""
+        """The way of this name, "wide beacon" or "scan"; None for a scan in a mission without one."""
         return self.wide if name == "wide beacon" else self.scan
 
     @property
@@ -234,7 +234,7 @@ def _return_coverage(shared: link.Shared, light: Tracking | None, radius_rad: fl
 
 
 def _equal_axes(bias_rad: float, rms_rad: float) -> pointing.Jitter:
-    """A direction with the same spread about both axes, and a bias about one of them."""
+    """A direction with the same rms about both axes, and a bias about one of them."""
     return pointing.Jitter((bias_rad, 0.0), (rms_rad, rms_rad))
 
 

@@ -74,11 +74,6 @@ class Outcome:
         return self.locked.probability
 
     @property
-    def failure_probability(self) -> float:
-        """Probability that the sequence is given up."""
-        return self.lost.probability
-
-    @property
     def mean_time_s(self) -> float:
         """Mean time until lock, given lock."""
         return self.locked.mean_s

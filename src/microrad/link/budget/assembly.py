@@ -60,7 +60,7 @@ class Shared:
 
     @property
     def point_ahead_left_rad(self) -> float:
-        """What point-ahead adds to a residual that does not hold it: all of it, or what its correction leaves."""
+        """What point-ahead adds to a residual without it: the whole angle, or the error that its correction leaves."""
         ahead = self.point_ahead
         return 0.0 if ahead is None else ahead.error_rad if ahead.corrected else self.point_ahead_rad
 
@@ -91,7 +91,7 @@ def of(m: LinkMission) -> DataLink:
 def assembled(
     shared: Shared, table: Communication, requirement: LinkRequirement, jitter: JitterTable | None
 ) -> DataLink:
-    """The communication link of these tables; raises ValueError as `of` does."""
+    """The communication link of these tables; errors as of `of`."""
     beam = communication_beam(shared.terminals, table, shared.conventions.pointing_loss)
     return DataLink(shared, table, requirement, jitter, beam, _receiver(shared.terminals, table))
 

@@ -75,11 +75,11 @@ class LinkBudget:
 
     @property
     def closes(self) -> bool:
-        """Whether there is a margin of at least 0 dB, by a budget that may be relied on."""
+        """Whether there is a margin of at least 0 dB, and the budget is physically possible."""
         return self.margin_db >= -_ROUNDING_DB and self.possible
 
     def loss_db(self, *names: str) -> float:
-        """The loss of these lines together, positive; 0 for those that the budget has not."""
+        """The loss of these lines together, positive; 0 for a name that is not among the lines."""
         return 0.0 - math.fsum(line.value for line in self.lines if line.name in names)
 
     @property

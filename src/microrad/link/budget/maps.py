@@ -26,7 +26,7 @@ _SLOWEST_BIT_S = 1.0
 
 
 def received_on_axis_dbm(data: DataLink, strehl_loss_db: float | None = None) -> float:
-    """Received power of the communication link pointed without error; the budget's lines say the same one by one."""
+    """Received power (dBm) of the communication link pointed without error: its budget without the pointing lines."""
     beam, terminals = data.table, data.shared.terminals
     losses = (
         beam.transmit_optics_loss_db

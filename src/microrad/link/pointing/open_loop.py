@@ -57,12 +57,6 @@ def point_ahead(table: PointAhead) -> PointAheadAngle:
     return PointAheadAngle(angle, table.corrected, table.error_rad if table.corrected else angle)
 
 
-INTERPRETATIONS: dict[Interpretation, str] = {
-    "temporal": "share of the time of the worst-case satellite, at 3 sigma of all satellites or at the stated bound",
-    "mixed": "share of the times of all satellites",
-}
-"""What the confidence of a budget is a share of, ECSS-E-ST-60-10C A.1.2."""
-
 _CONVENTIONS = ("full-1/e2", "half-1/e2")
 _REGIME = "uncorrelated with the other lines"
 _OWN_FORMULA = f"{_REGIME}; our own formula, ECSS-E-ST-60-10C has no such class"
@@ -91,8 +85,8 @@ class OpenLoopPointing:
 
     `lines` hold the stated half widths, `terms` in the same order what they mean: mean and standard deviation about x
     and y. `variance_shares` is the part of each line in the sum of squared half widths; zeros when every line is zero.
-    `error` is mean and standard deviation of the sum. `confidence` is to be read by `interpretation`, which
-    `INTERPRETATIONS` puts in words.
+    `error` is mean and standard deviation of the sum. `confidence` is a share of the time of the worst-case
+    satellite ("temporal") or of the times of all satellites ("mixed"), as `interpretation` says: see `error_term`.
 
     `convention` is the mission's own for a divergence. `required_divergence_rad` has the root sum square as its half
     angle, `confident_divergence_rad` covers with the mission's confidence. `reading` and its counterpart under the

@@ -25,7 +25,7 @@ class Jitter:
     """Pointing error of two axes, x and y, at the line of sight: independent Gaussians about a static bias.
 
     `rms_rad` is the standard deviation per axis about `bias_rad`, not the radial one. The axes may differ, and either
-    rms may be 0. Errors that are correlated need the axes in which they are not. Raises ValueError for a value that
+    rms may be 0. Turn the axes until the errors are uncorrelated. Raises ValueError for a value that
     is not finite, or a negative rms.
     """
 

@@ -145,7 +145,7 @@ class Receiver(ABC):
         return np.asarray(self._power_w(rate) / self._code_gain, dtype=np.float64)
 
     def photons_per_bit(self, data_rate_bit_s: ArrayLike) -> Floats:
-        """Photons at the detector for each information bit, at the required power. Raises as `required_power_w`."""
+        """Photons at the detector for each information bit, at the required power; errors as of `required_power_w`."""
         rate = np.asarray(data_rate_bit_s, dtype=np.float64)
         return np.asarray(self.required_power_w(rate) / (rate * self._photon_j), dtype=np.float64)
 
@@ -162,7 +162,7 @@ class Receiver(ABC):
     def noise_lines(self, power_w: float, data_rate_bit_s: float) -> tuple[Line, ...]:
         """The independent terms of the noise at this power, each a standard deviation in one symbol of the line.
 
-        The symbols are those on the line, code included. Raises as `bit_error_ratio_at`.
+        The symbols are those on the line, code included. Errors as of `bit_error_ratio_at`.
         """
         power, rate = float(checked_powers(power_w)), float(self._rates(data_rate_bit_s))
         return self._noise(power, float(self.symbol_rate_hz(rate)))

@@ -1,4 +1,4 @@
-"""Which assumption the comparison of relay and direct downlink rests on most: each one alone, changed on purpose."""
+"""Which assumption moves the comparison of relay and direct downlink most: each one changed alone."""
 
 import math
 from collections.abc import Callable, Iterator

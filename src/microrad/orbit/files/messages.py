@@ -48,7 +48,7 @@ class Field(NamedTuple):
 
 
 def read_text(path: Path, data: bytes | None = None) -> str:
-    """Text of a file in UTF-8, lines ending in a newline; raises OrbitError for one that is none, or too large.
+    """Text of a file in UTF-8, lines ending in a newline; raises OrbitError if it is no text, or too large.
 
     With ``data``, these are the bytes of the file, which is not read again.
     """
@@ -185,7 +185,7 @@ def xml_fields(path: Path, text: str) -> Iterator[Field]:
 
 
 def finite(path: Path, given: Field) -> float:
-    """The number of a field; raises OrbitError for anything else, nan and inf among it."""
+    """The number of a field; raises OrbitError for anything else, nan and inf included."""
     try:
         number = float(given.value) if "_" not in given.value else math.nan
     except ValueError:

@@ -1,4 +1,4 @@
-"""From contacts to data: rates, the store and its latencies, terminals that are shared, plans that are written."""
+"""From contacts to data: rates, the store and its latencies, the schedule of shared terminals, contact plans."""
 
 from microrad.orbit.base import OperationsError
 from microrad.orbit.operations.plan import COLUMNS, PlannedSession, contact_plan, csv_text, spreadsheet_text

@@ -69,7 +69,7 @@ def coarse_step_s(orbit: Orbit, time_s: float) -> float:
     Raises OrbitError for a state that falls straight to the Earth's centre.
     """
     position, velocity = (vector[:, 0] for vector in orbit.states(np.array([time_s])))
-    with np.errstate(over="ignore", invalid="ignore"):  # of a state that is none
+    with np.errstate(over="ignore", invalid="ignore"):  # of a state that is no number
         momentum = np.cross(position, velocity)
         eccentricity = np.linalg.norm(np.cross(velocity, momentum) / MU_M3_S2 - position / np.linalg.norm(position))
         square = float(momentum @ momentum)
@@ -135,7 +135,7 @@ def contacts(first: Terminal, second: Terminal, earth: Earth, epoch: Epoch, span
         span_s: start and end of the search, s.
 
     Raises OrbitError for two terminals of one name, a span that holds no time, two orbits that meet, a terminal below
-    the surface that the line of sight must clear, and what the orbits raise.
+    the surface that the line of sight must clear, or a time at which an orbit does not hold.
     """
     return contacts_with_each(first, (second,), earth, epoch, span_s)[0]
 
@@ -255,7 +255,7 @@ def passes(orbit: Orbit, station: Station, epoch: Epoch, span_s: Span) -> tuple[
         epoch: from which all times count.
         span_s: start and end of the search, s.
 
-    Raises OrbitError for a span that holds no time, and what the orbit raises.
+    Raises OrbitError if the span holds no time, or the orbit does not hold over it.
     """
     step = coarse_step_s(orbit, span_s[0])
     time_s = coarse_times(span_s, step)

@@ -55,7 +55,7 @@ def sight(first: Orbit, second: Orbit, time_s: ArrayLike) -> LineOfSight:
         second: the orbit that it leads to.
         time_s: times since the epoch of both, s, shape (n,).
 
-    Raises OrbitError where both are at the same place, and what the orbits raise.
+    Raises OrbitError if both are at the same place, or an orbit does not hold at one of the times.
     """
     time = np.atleast_1d(np.asarray(time_s, dtype=np.float64))
     one, other = first.states(time), second.states(time)

@@ -13,7 +13,12 @@ _MOST_CELLS = 40
 
 
 def campaign_text(summary: CampaignSummary, width: int) -> str:
-    """The campaign for a terminal of ``width`` columns: the verdict first, how far it is last."""
+    """The campaign for a terminal: the verdict first, how far it is last.
+
+    Args:
+        summary: what the rows of the ledger come to.
+        width: columns of the terminal.
+    """
     cell = words.best(summary)
     found, below = _tables(summary, cell, width), [*words.few_values(cell), *words.answers(summary, cell)]
     last = [*(f"Warning: {warning}" for warning in summary.warnings), words.progress_words(summary)]

@@ -46,7 +46,12 @@ def satellites_table(plan: ConstellationPlan) -> Table:
 
 
 def plan_text(plan: ConstellationPlan, width: int) -> str:
-    """Sentences and a table of at most ``width`` columns."""
+    """The plan in sentences and a table for a terminal.
+
+    Args:
+        plan: who is served when.
+        width: columns of the terminal.
+    """
     shown, count = plan_sentences(plan), len(plan.satellites)
     if count > MOST_ROWS:
         shown.append(f"The first {MOST_ROWS} of {count} satellites; --csv has every session.")

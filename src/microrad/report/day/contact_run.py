@@ -5,7 +5,7 @@ from typing import Any
 from microrad.report.data import fields
 from microrad.report.quantities import duration, minus, quantity, volume
 from microrad.report.tables import Rows
-from microrad.study.contact_run import DATA, LOCK, ContactRun
+from microrad.study.contact_run import ContactRun, State
 
 
 def contact_sentences(run: ContactRun, number: int, controller: str, rate_bit_s: float | None) -> list[str]:
@@ -24,7 +24,7 @@ def contact_sentences(run: ContactRun, number: int, controller: str, rate_bit_s:
         carried = f": {volume(run.bits(rate_bit_s))} at {quantity(rate_bit_s, 'bit/s')}"
     return [
         f"Contact {number} ({duration(length)}) under {controller}: data begin {quantity(before, 's')} after the rise, "
-        f"{quantity(spent[LOCK], 's')} of it to lock, and flow for {duration(spent[DATA])}, "
+        f"{quantity(spent[State.LOCK], 's')} of it to lock, and flow for {duration(spent[State.DATA])}, "
         f"{100 * run.data_share:.1f} % of the contact{carried}. The fine loop is simulated in {len(run.windows)} "
         f"windows, {duration(run.sampled_s)} in all, with the point-ahead and the rate of the line of sight of each; "
         f"{lost}."

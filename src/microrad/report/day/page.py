@@ -13,7 +13,12 @@ from microrad.report.plotting.figure import Figure
 
 
 def day_page(day: DayStudy, links: LinkStudy) -> str:
-    """The day as one page that loads nothing, with its figures."""
+    """The day as one page that loads nothing, with its figures.
+
+    Args:
+        day: what the links deliver.
+        links: the study of the links that the day is of; its file has the sources of the inputs.
+    """
     section = day_section(day, day_figures(day), files=False)
     context = {
         "study": links,

@@ -35,7 +35,12 @@ _COLUMNS = {
 
 
 def day_text(day: DayStudy, width: int) -> str:
-    """Tables of at most ``width`` columns, the answers, and the warnings."""
+    """Tables of the day for a terminal, then the answers and the warnings.
+
+    Args:
+        day: what the links deliver.
+        width: columns of the terminal; below `WIDE` a contact loses what it asks of the terminals.
+    """
     contacts = contacts_table(day)
     if width < WIDE:
         rows = [tuple(row[k] for k in _NARROW) for row in contacts.rows]

@@ -60,11 +60,19 @@ def write_identification(  # noqa: PLR0913  all but the first two are named opti
 ) -> Path:
     """Write the report of an identification as one HTML file that loads nothing, and return its path.
 
-    `mirror_file` and `mirror_text` are the mirror file that goes with it, of the model `written` (default: the chosen
-    one). `recordings` are those that `identify` was given to fit: `found` does not keep the broadband ones, and without
-    them their excitation and time response are not drawn. `virtual` says that they come from the virtual bench, and the
-    page and each figure say so too. The file appears whole or not at all. Raises ReportError if ``target`` holds
-    something that must not be replaced.
+    Args:
+        found: what was identified.
+        target: the file of the report; it appears whole or not at all.
+        mirror_file: the mirror file that goes with it.
+        mirror_text: its text.
+        title: the heading of the page.
+        written: the model in the mirror file; the chosen one unless it is given.
+        recordings: those that `identify` was given to fit: ``found`` does not keep the broadband ones, and without them
+            their excitation and time response are not drawn.
+        overwrite: whether a report that is there may be replaced.
+        virtual: whether they come from the virtual bench: the page and each figure say so.
+
+    Raises ReportError if ``target`` holds something that must not be replaced.
     """
     check_identification(target, overwrite)
     text = identification_page(

@@ -58,7 +58,7 @@ def jitter_lines(study: LinkStudy) -> list[Line]:
 
 
 def links_csv(study: LinkStudy, solution: Solution | None = None) -> str:
-    """Every line with its value in full, for a spreadsheet; first the values that were solved for."""
+    """Every line with its value in full, for a spreadsheet, behind the values of a key that were solved for."""
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
     writer.writerow(COLUMNS)
@@ -73,10 +73,13 @@ def links_csv(study: LinkStudy, solution: Solution | None = None) -> str:
 
 
 def links_text(study: LinkStudy, width: int, verbose: bool = False, solution: Solution | None = None) -> str:
-    """The verdict with a line for each requirement, what limits it, and the budgets, in at most ``width`` columns.
+    """The verdict with a line for each requirement, what limits it, and the budgets, for a terminal.
 
-    ``verbose`` adds to the lines where they come from and hold, the other tables, every sentence and every warning.
-    The values that were solved for stand first.
+    Args:
+        study: the links, at their budgeted errors or under their jitter.
+        width: columns of the terminal.
+        verbose: adds where each line comes from and holds, the other tables, every sentence and every warning.
+        solution: the values of a key that leave the required margin, which stand first.
     """
     judged = of_links(study)
     blocks = [] if solution is None else [tables_text([], [words.solution_text(solution)], width)]

@@ -29,10 +29,11 @@ RAREST_FADE_HZ = 1.0 / (365.25 * 86400.0)
 
 
 def links_page(study: LinkStudy, solution: Solution | None = None) -> str:
-    """The budgets as one page that loads nothing, with their figures, and what was solved for.
+    """The budgets as one page that loads nothing, with their figures and no drawing library: their numbers stand below.
 
-    They are bars and a few curves, with their numbers in tables below them: no reason to carry a drawing library eight
-    times as long as the page.
+    Args:
+        study: the links, at their budgeted errors or under their jitter.
+        solution: the values of a key that leave the required margin, if one was solved for.
     """
     figures = [figure.static for figure in link_figures(study)]
     budgets = [(budget, "") for budget in study.budgets]

@@ -321,7 +321,7 @@ def labelled(marks: Sequence[Mark]) -> Iterator[Line | Rule | Span | Area | Bars
 
 
 def shortened(name: str, most: int = 34) -> str:
-    """The name as it stands in a figure: on one line, and cut where it would leave no room for the data."""
+    """The name as it stands in a figure: on one line, and cut at ``most`` characters, where data would have no room."""
     plain = " ".join("".join(c if c.isprintable() else " " for c in name).split())
     return plain if len(plain) <= most else plain[: most - 1] + "…"
 

@@ -75,6 +75,10 @@ class Reproduction:
 def reproduce(path: Path, on_progress: Progress = lambda done, total, what: None) -> Reproduction:
     """Run the study of a report again and compare.
 
+    Args:
+        path: a report.html, a manifest.json, or a folder of results.
+        on_progress: is told how far the study is.
+
     Raises ReproduceError for a file that is no whole report, lacks a file that its mission names, or has a mission that
     does not run, and MissionError for one that this version does not read.
     """

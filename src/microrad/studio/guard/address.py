@@ -15,28 +15,12 @@ _SHOWN = 120
 
 
 class ExposureError(ValueError):
-    """The studio was to be opened to other machines, or under a name that is none; the message says what to do."""
+    """The studio was to be opened under a name that is none; the message says what to do."""
 
 
 def new_token() -> str:
     """The secret of one session: 256 random bits as text for an address."""
     return secrets.token_urlsafe(32)
-
-
-def bind_address(host: str = "127.0.0.1", exposed: bool = False) -> str:
-    """The address to listen on; any but a loopback address is refused unless `exposed` was asked for in so many words.
-
-    Raises `ExposureError`.
-    """
-    if host in ("127.0.0.1", "::1", "localhost"):
-        return "127.0.0.1" if host == "localhost" else host
-    if not exposed:
-        raise ExposureError(
-            f"the studio listens on this machine only, and '{host[:_SHOWN]}' is open to others: whoever reads the "
-            "address on its way, which is not encrypted, may then read and write your missions. Leave the host at "
-            "127.0.0.1 and come in by an SSH tunnel (ssh -L), or add --expose-to-network if you want just that"
-        )
-    return host
 
 
 def hosts(port: int, names: tuple[str, ...] = _LOOPBACK) -> tuple[str, ...]:

@@ -65,7 +65,7 @@ class _Reader:
         return self.last
 
     def _read(self) -> Live:
-        from microrad.campaign.statistics.interim import Interim  # loads numpy
+        from microrad.campaign.statistics.interim import Interim
 
         if not self.path.exists():  # not begun yet, or removed
             self.interim = None

@@ -58,15 +58,11 @@ def start_waiting(jobs: Path, at_once: int) -> None:
 
 def _waiting(jobs: Path, at_once: int) -> Path | None:
     """The job that may start now, or None."""
-    found = [(folder, read_job(folder).state) for folder in job_folders(jobs) if not _is_over(folder)]
+    # at a glance: most of a long list have ended
+    found = [(folder, read_job(folder).state) for folder in job_folders(jobs) if not (folder / EXIT).exists()]
     if sum(state == "running" for _, state in found) >= at_once:
         return None
     return next((folder for folder, state in reversed(found) if state == "queued"), None)
-
-
-def _is_over(folder: Path) -> bool:
-    """Whether a job has ended, at a glance: most of a long list have."""
-    return (folder / EXIT).exists()
 
 
 def _start(folder: Path, at_once: int) -> None:
@@ -158,25 +154,13 @@ def _ended(command: subprocess.Popen[bytes], cancel: Path, waits_s: tuple[float,
     while not cancel.exists():
         with suppress(subprocess.TimeoutExpired):
             return command.wait(look_s)
-    for ask, patience_s in zip((_interrupt, _terminate), waits_s, strict=True):
-        ask(command)
+    interrupt = getattr(signal, "CTRL_BREAK_EVENT", signal.SIGINT)  # what a campaign has finished is in its ledger
+    for number, patience_s in zip((interrupt, signal.SIGTERM), waits_s, strict=True):
+        _signal(command, number)
         with suppress(subprocess.TimeoutExpired):
             return command.wait(patience_s)
-    _kill(command)
-    return command.wait()
-
-
-def _interrupt(command: subprocess.Popen[bytes]) -> None:
-    """Ctrl-C for the command and what it has started; what a campaign has finished is in its ledger."""
-    _signal(command, getattr(signal, "CTRL_BREAK_EVENT", signal.SIGINT))
-
-
-def _terminate(command: subprocess.Popen[bytes]) -> None:
-    _signal(command, signal.SIGTERM)
-
-
-def _kill(command: subprocess.Popen[bytes]) -> None:
     _signal(command, getattr(signal, "SIGKILL", signal.SIGTERM))
+    return command.wait()
 
 
 def _signal(command: subprocess.Popen[bytes], number: int) -> None:

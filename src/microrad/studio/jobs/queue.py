@@ -11,7 +11,6 @@ import json
 import os
 import shutil
 import tempfile
-import time
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -41,8 +40,7 @@ __all__ = ["Job", "JobError", "Jobs", "Kind", "Order", "Progress", "State"]
 
 _LAST = "last"
 _LAST_FIGURES = 9  # of a last number that is believed
-_NEW, _REMOVED = ".new-", ".removed-"  # folders that are a job not yet, and not any more
-_FORGOTTEN_S = 3600.0
+_NEW = ".new-"  # a folder that is a job not yet
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +68,6 @@ class Jobs:
         self.at_once = at_once
         for folder in (studio, self.folder):
             _make_private(folder)
-        _clear_away(self.folder)
 
     def submit(self, order: Order) -> Job:
         """Put a job into the queue, and start it if there is room. Raises `JobError`."""
@@ -166,11 +163,7 @@ class Jobs:
         if not job.finished:
             raise JobError(f"job {number} is {job.state}; cancel it first")
         try:
-            gone = Path(tempfile.mkdtemp(prefix=_REMOVED, dir=self.folder))
-            try:
-                job.folder.rename(gone / job.folder.name)
-            finally:
-                shutil.rmtree(gone, ignore_errors=True)
+            shutil.rmtree(job.folder)
         except OSError as error:
             where = f"job {number} cannot be removed: {self.folder}: {error.strerror}"
             raise JobError(f"{where}; check free space and permissions") from error
@@ -190,13 +183,3 @@ def _make_private(folder: Path) -> None:
         folder.chmod(0o700)
     except OSError as error:
         raise JobError(f"{folder} cannot be made or made private: {error.strerror}; choose another folder") from error
-
-
-def _clear_away(jobs: Path) -> None:
-    """Remove what a program that was killed has left half made or half removed."""
-    now_s = time.time()
-    for prefix, age_s in ((_NEW, _FORGOTTEN_S), (_REMOVED, 0.0)):
-        for folder in filter(plain_files.is_folder, jobs.glob(f"{prefix}*")):
-            with suppress(OSError):
-                if folder.stat().st_mtime <= now_s - age_s:
-                    shutil.rmtree(folder)

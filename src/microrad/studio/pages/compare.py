@@ -182,15 +182,15 @@ def _numbers(both: _Both, names: tuple[str, str]) -> None:
 def _studies(both: _Both, names: tuple[str, str]) -> None:
     layout.heading("Verdicts")
     for name, found in zip(names, both.studies, strict=True):
-        words = f"{name}: {found.verdict} ({found.folder})" if found else _no_study(name)
+        words = (
+            f"{name}: {found.verdict} ({found.folder})"
+            if found
+            else f"{name}: no study of this text is in the folder; the page Runs makes one."
+        )
         ui.label(words).classes("soft" if found is None else "yes" if found.met else "no")
     if any(both.studies):
         ours, theirs = (() if found is None else found.numbers for found in both.studies)
         _table(compare_view.beside(ours, theirs), names)
-
-
-def _no_study(name: str) -> str:
-    return f"{name}: no study of this text is in the folder; the page Runs makes one."
 
 
 def _table(rows: tuple[Beside, ...], names: tuple[str, str]) -> None:

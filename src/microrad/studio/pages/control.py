@@ -12,22 +12,24 @@ from microrad.mission.file import MissionFile
 from microrad.mission.tables.fine_pointing import FinePointing
 from microrad.studio import commands
 from microrad.studio.pages import layout
-from microrad.studio.pages.elements import Figure, numbers
+from microrad.studio.pages.elements import Column, Figure, numbers, table
 from microrad.studio.pages.in_thread import in_thread, stay
 from microrad.studio.session import Session
+from microrad.studio.views import control as control_view
+from microrad.studio.views.control import Answers, Controller
 from microrad.studio.views.plots import empty
 
 TITLE = "Control"
 PATH = "/control"
 
-_COLUMNS = [
-    {"name": "name", "label": "Controller", "field": "name", "align": "left"},
-    {"name": "residual", "label": "Residual of an axis (rms, linear)", "field": "residual", "align": "right"},
-    {"name": "modulus", "label": "Modulus margin", "field": "modulus", "align": "right"},
-    {"name": "gain", "label": "Gain margin", "field": "gain", "align": "right"},
-    {"name": "phase", "label": "Phase margin", "field": "phase", "align": "right"},
-    {"name": "bandwidth", "label": "Bandwidth", "field": "bandwidth", "align": "right"},
-]
+_COLUMNS = (
+    Column("name", "Controller"),
+    Column("residual", "Residual of an axis (rms, linear)", number=True),
+    Column("modulus", "Modulus margin", number=True),
+    Column("gain", "Gain margin", number=True),
+    Column("phase", "Phase margin", number=True),
+    Column("bandwidth", "Bandwidth", number=True),
+)
 _PLOTS = {
     "sensitivity": "Sensitivity by frequency",
     "gain": "Loop gain by frequency",
@@ -48,7 +50,7 @@ def page(session: Session) -> None:
 
 
 class ControlPage:
-    """The page of one tab; what is tuned is kept for all tabs by `control_model`."""
+    """The page of one tab; what is tuned is kept for all tabs by `controllers`."""
 
     def __init__(self, session: Session) -> None:
         """Build the body, and have it follow the session."""
@@ -70,8 +72,7 @@ class ControlPage:
             self.tune = ui.button("Tune all", on_click=self.tune_all).props("no-caps dense outline")
             self.stop = ui.button("Stop", on_click=self.stop_all).props("no-caps dense flat")
             self.stop.visible = False
-        self.table = ui.table(rows=[], columns=_COLUMNS, row_key="name").props("flat dense hide-bottom wrap-cells")
-        self.table.props(":pagination='{rowsPerPage: 0}'").classes("w-full")
+        self.table = table(_COLUMNS, "name")
 
     def _one(self) -> None:
         layout.heading("One controller")
@@ -119,8 +120,6 @@ class ControlPage:
         self.words.text = self.session.faults()
         if file is None or (self.file is not None and file.sha256 == self.file.sha256 and file == self.file):
             return
-        from microrad.studio.views import control as control_view
-
         names = await in_thread(self.table, _names, file.mission.fine_pointing)
         self.file, self.round = file, self.round + 1
         self.rows = {name: control_view.waiting_row(name) for name in names}
@@ -129,7 +128,8 @@ class ControlPage:
         if not self.name.value:
             self.amplitude.value = f"{1e6 * file.mission.scenario.amplitude_rad:g} urad"
             self.frequency.value = f"{file.mission.scenario.pid_frequencies_hz[-1]:g} Hz"
-        self.name.set_options(list(names), value=self.name.value if self.name.value in names else _first(names))
+        first = names[1] if len(names) > 3 else names[0]  # the tuned PI rather than the baseline
+        self.name.set_options(list(names), value=self.name.value if self.name.value in names else first)
         self.filling = False
         await self.show()
 
@@ -153,9 +153,8 @@ class ControlPage:
         self.round += 1
         self.tune.visible, self.stop.visible = True, False
 
-    async def _tuned(self, file: MissionFile, name: str) -> Any:
+    async def _tuned(self, file: MissionFile, name: str) -> Controller | None:
         """A controller, and its row; None where it cannot be built, which its row says."""
-        from microrad.studio.views import control as control_view
 
         def told(row: dict[str, Any]) -> None:
             if file is self.file:
@@ -178,8 +177,6 @@ class ControlPage:
     # -------------------------------------------------------------------------------------------------------------- one
     async def show(self) -> None:
         """Show the chosen controller; a late answer to an older question is dropped."""
-        from microrad.studio.views import control as control_view
-
         file, name = self.file, self.name.value
         if self.filling or file is None or not name:
             return
@@ -216,9 +213,7 @@ class ControlPage:
         for each in (*self.plots.values(), *told, self.numbers, self.notes):
             layout.grey(each, each in grey)
 
-    def _controller(self, found: Any) -> None:
-        from microrad.studio.views import control as control_view
-
+    def _controller(self, found: Controller) -> None:
         self.notes.clear()
         with self.notes:
             for note in control_view.notes(found):
@@ -229,38 +224,31 @@ class ControlPage:
         self.plots["sensitivity"].show(control_view.sensitivity_plot(found))
         self.plots["gain"].show(control_view.gain_plot(found))
 
-    def _answers(self, found: Any, answers: Any) -> None:
-        from microrad.studio.views import control as view
-
+    def _answers(self, found: Controller, answers: Answers) -> None:
         self.shaken.visible = bool(answers.jitter)
-        self.told_step.text = view.answer_words(answers.step, "Error", found.field_of_view_rad)
-        self.told_sine.text = view.answer_words(answers.sine, "Radial error", found.field_of_view_rad)
-        self.told_jitter.text = view.answer_words(answers.jitter, "Radial error", found.field_of_view_rad)
+        self.told_step.text = control_view.answer_words(answers.step, "Error", found.field_of_view_rad)
+        self.told_sine.text = control_view.answer_words(answers.sine, "Radial error", found.field_of_view_rad)
+        self.told_jitter.text = control_view.answer_words(answers.jitter, "Radial error", found.field_of_view_rad)
         drawn = {
-            "step": view.step_plot(answers),
-            "step_drive": view.drive_plot(found, answers.step),
-            "sine": view.sine_plot(answers),
-            "sine_drive": view.drive_plot(found, answers.sine),
-            "jitter": view.jitter_plot(answers),
-            "motion": view.motion_plot(answers),
-            "jitter_drive": view.drive_plot(found, answers.jitter, view.SECONDS),
+            "step": control_view.step_plot(answers),
+            "step_drive": control_view.drive_plot(found, answers.step),
+            "sine": control_view.sine_plot(answers),
+            "sine_drive": control_view.drive_plot(found, answers.sine),
+            "jitter": control_view.jitter_plot(answers),
+            "motion": control_view.motion_plot(answers),
+            "jitter_drive": control_view.drive_plot(found, answers.jitter, control_view.SECONDS),
         }
         for name, figure in drawn.items():
             self.plots[name].show(figure)
 
 
 def _names(table: FinePointing | None) -> tuple[str, ...]:
-    from microrad.studio.views import controllers as control_model  # loads the kernels, in a thread
+    from microrad.studio.views import controllers
 
-    return control_model.names(table)
-
-
-def _controller(file: MissionFile, name: str) -> Any:
-    from microrad.studio.views import controllers as control_model
-
-    return control_model.controller(file, name)
+    return controllers.names(table)
 
 
-def _first(names: tuple[str, ...]) -> str:
-    """The controller that is shown first: the tuned PI rather than the baseline."""
-    return names[1] if len(names) > 3 else names[0]
+def _controller(file: MissionFile, name: str) -> Controller:
+    from microrad.studio.views import controllers
+
+    return controllers.controller(file, name)

@@ -99,7 +99,7 @@ class DayPage:
         self.faults.text = draft.report if file is None else lacking
         self.faults.visible = file is None or bool(lacking)
         if file is not None and not lacking:
-            self.latest.ask(draft.sha256, partial(day_view.run, file))
+            self.latest.ask(draft.sha256, partial(day_view.compute_day, file))
 
     async def look(self) -> None:
         """Show how far it is, and the day once it is there."""

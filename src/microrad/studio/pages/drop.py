@@ -8,7 +8,7 @@ from contextlib import suppress
 from typing import Any
 
 from nicegui import app, ui
-from starlette.datastructures import FormData, UploadFile
+from starlette.datastructures import UploadFile
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import PlainTextResponse, Response
 
@@ -84,9 +84,10 @@ class Drop:
         """The file of a request as it is stored; nothing where it is refused, or its sender is gone."""
         try:
             async with _TURNS:
-                form = await asyncio.wait_for(_form(request), _MOST_S)
+                form = await asyncio.wait_for(request.form(max_files=1, max_fields=1), _MOST_S)
+                sent = [each for each in form.values() if isinstance(each, UploadFile)]
                 try:
-                    return [await self._uploads.save(f.filename or "", _blocks(f)) for f in _files(form)]
+                    return [await self._uploads.save(f.filename or "", _blocks(f)) for f in sent]
                 finally:
                     await form.close()
         except ClientDisconnect:
@@ -101,14 +102,6 @@ class Drop:
         except OSError as error:  # of the temporary file that a form is kept in
             self._refused(f"the file could not be stored: {error.strerror or error}; check free space and permissions")
         return []
-
-
-async def _form(request: Request) -> FormData:
-    return await request.form(max_files=1, max_fields=1)
-
-
-def _files(form: FormData) -> list[UploadFile]:
-    return [each for each in form.values() if isinstance(each, UploadFile)]
 
 
 async def _blocks(sent: UploadFile) -> AsyncIterator[bytes]:

@@ -58,9 +58,9 @@ class Column(NamedTuple):
     number: bool = False
 
 
-def table(of: Sequence[Column]) -> ui.table:
-    """A table of text that is still empty; rows with a true "total" stand out."""
-    made = ui.table(rows=[], columns=columns(of), row_key="id").props("flat dense wrap-cells hide-bottom")
+def table(of: Sequence[Column], key: str = "id") -> ui.table:
+    """A table of text that is still empty; `key` tells its rows apart, and those with a true "total" stand out."""
+    made = ui.table(rows=[], columns=columns(of), row_key=key).props("flat dense wrap-cells hide-bottom")
     made.props(""":pagination='{rowsPerPage: 0}' :table-row-class-fn="row => row.total ? 'total' : ''" """)
     return made.classes("wide-table")
 

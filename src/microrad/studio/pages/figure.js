@@ -19,28 +19,32 @@ export default {
   methods: {
     async draw(figure) {
       const { Plotly } = await this.loaded;
-      const { height, ...layout } = figure.layout;
       this.rows = figure.rows;
-      if (height) this.$el.style.height = `${height}px`;
+      this.width = this.$el.clientWidth;
+      const layout = { ...figure.layout, ...(this.width ? { width: this.width } : {}) };
       await Plotly.react(this.$el, figure.data, layout, { ...figure.config, responsive: false });
       await this.keepRows(Plotly);
       if (!this.observer) {
-        this.observer = new ResizeObserver(async () => {
-          await Plotly.Plots.resize(this.$el);
-          await this.keepRows(Plotly);
-        });
+        this.observer = new ResizeObserver(() => this.fit(Plotly));
         this.observer.observe(this.$el);
       }
       await nextFrame();
     },
+    async fit(Plotly) {
+      const width = this.$el.clientWidth;
+      if (!width || width === this.width) return;
+      this.width = width;
+      await Plotly.relayout(this.$el, { width });
+      await this.keepRows(Plotly);
+    },
     // A legend that needs more lines in a narrow place makes the figure higher, not its data smaller. A higher figure may
-    // have more of its legend shown, so this takes a few steps.
+    // show more of its legend, so this takes a few steps.
     async keepRows(Plotly) {
       for (let step = 0; step < 4; step++) {
-        const missing = this.rows ? Math.round(this.rows - this.$el._fullLayout._size.h) : 0;
-        if (Math.abs(missing) < 8 || !this.$el.clientHeight) return;
-        this.$el.style.height = `${this.$el.clientHeight + missing}px`;
-        await Plotly.Plots.resize(this.$el);
+        const { height, _size } = this.$el._fullLayout;
+        const missing = this.rows ? Math.round(this.rows - _size.h) : 0;
+        if (Math.abs(missing) < 8) return;
+        await Plotly.relayout(this.$el, { height: height + missing });
       }
     },
   },

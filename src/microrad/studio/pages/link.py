@@ -17,7 +17,7 @@ from microrad.studio.draft.draft import Draft
 from microrad.studio.pages import layout
 from microrad.studio.pages.elements import Column, Figure, MarginCards, table
 from microrad.studio.pages.in_thread import in_thread
-from microrad.studio.pages.slider_page import SliderPage
+from microrad.studio.pages.sliders import SliderPage
 from microrad.studio.session import Session
 from microrad.studio.views import link as link_view
 from microrad.studio.views.latest import Latest, shared

@@ -8,23 +8,22 @@ from typing import Any
 from nicegui import ui
 
 from microrad.lab.live_fit import LiveFit
-from microrad.studio.draft.mirror_file import with_mirror_file
+from microrad.studio.draft.tables import with_mirror_file
 from microrad.studio.jobs.queue import Job
 from microrad.studio.pages import layout
-from microrad.studio.pages.elements import Figure, numbers
+from microrad.studio.pages.elements import Column, Figure, numbers, table
 from microrad.studio.pages.in_thread import in_thread
 from microrad.studio.session import Session
-from microrad.studio.views import live_fit
 from microrad.studio.views import mirror as mirror_view
 
 _LOOK_S = 0.5
 _BEST = -1
-_COLUMNS = [
-    {"name": "model", "label": "Model", "field": "model", "align": "left"},
-    {"name": "held_out", "label": "Held out (rms)", "field": "held_out", "align": "right"},
-    {"name": "fit", "label": "Fitted (rms)", "field": "fit", "align": "right"},
-    {"name": "note", "label": "Note", "field": "note", "align": "left"},
-]
+_COLUMNS = (
+    Column("model", "Model"),
+    Column("held_out", "Held out (rms)", number=True),
+    Column("fit", "Fitted (rms)", number=True),
+    Column("note", "Note"),
+)
 
 
 class JobView:
@@ -61,8 +60,7 @@ class JobView:
                 self.loop = Figure("Measured loop and that of the model")
                 self.residual = Figure("Residual over time")
             ui.label("Residuals in per cent of the peak-to-peak output.").classes("soft small")
-            self.table = ui.table(rows=[], columns=_COLUMNS, row_key="id").props("flat dense hide-bottom")
-            self.table.props(":pagination='{rowsPerPage: 0}'").classes("w-full")
+            self.table = table(_COLUMNS)
 
     # --------------------------------------------------------------------------------------------------------- the job
     async def follow(self, number: int) -> None:
@@ -98,14 +96,14 @@ class JobView:
     def _read(self) -> tuple[list[Job], tuple[LiveFit, ...]]:
         jobs = [job for job in self.session.jobs.listed() if job.kind == "identification"]
         found = next((job for job in jobs if job.number == self.number), jobs[0] if jobs else None)
-        return jobs, () if found is None else live_fit.read_fits(found.folder)
+        return jobs, () if found is None else mirror_view.read_fits(found.folder)
 
     # --------------------------------------------------------------------------------------------------------- showing
     def _show(self, job: Job) -> None:
         self.drive_unit = mirror_view.argument(job, "--input-unit", "V")
         self.found = mirror_view.outcome(self.session.jobs.output(job.number)) if job.state == "done" else None
         self.chosen = "" if self.found is None else self.found.model
-        self.words.text = mirror_view.state_words(job, live_fit.leader(self.fits, self.chosen))
+        self.words.text = mirror_view.state_words(job, mirror_view.leader(self.fits, self.chosen))
         self.bar.visible = self.cancel.visible = not job.finished
         self.bar.value = 0.0 if job.progress is None else job.progress.share
         self.live.visible = bool(self.fits)
@@ -126,7 +124,7 @@ class JobView:
         """Draw the model and the recording that were chosen."""
         chosen = self.model.value
         fit = (
-            live_fit.leader(self.fits, self.chosen)
+            mirror_view.leader(self.fits, self.chosen)
             if chosen == _BEST or chosen >= len(self.fits)
             else self.fits[chosen]
         )

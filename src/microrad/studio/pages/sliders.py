@@ -1,14 +1,20 @@
-"""A number of the mission as a field and a slider side by side, with what is wrong with it."""
+"""A page with sliders: what it shows follows them at once, and the mission when one is let go."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from functools import partial
+from typing import Any, Generic, TypeVar
 
-from nicegui import ui
+from nicegui import background_tasks, ui
 from nicegui.element import Element
 
-from microrad.studio.views.sliders import Slider
+from microrad.mission.file import LinkFile
+from microrad.studio.draft.draft import Draft
+from microrad.studio.pages import layout
+from microrad.studio.pages.in_thread import in_thread, pause, stay
+from microrad.studio.session import Session
+from microrad.studio.views.sliders import Attempt, Slider, attempt, faulty, seen
 
 Told = Callable[[str, str], Any]
 
@@ -132,3 +138,128 @@ class SliderBoard:
     def _add(self, sliders: list[Slider]) -> None:
         for slider in sliders:
             self.rows[slider.key] = SliderRow(slider, self._try, self._set)
+
+
+T = TypeVar("T")
+_SHORT_S, _REST_S = 0.01, 0.15
+_OLD = "Shown in grey: the mission before this."
+_NONE = "Nothing can be shown before the mission is corrected."
+
+
+class SliderPage(Generic[T]):
+    """The sliders of one tab and what follows them.
+
+    It shows the session's draft, and while a slider moves, the draft with its value. Answers are computed in a thread;
+    of questions that wait, the newest alone is asked, once the browser has drawn the answer before. `dimmed` turns grey
+    while the draft has no view.
+    """
+
+    dimmed: tuple[Element, ...] = ()
+
+    def __init__(self, session: Session, seldom: Callable[[str], bool] = lambda key: False) -> None:
+        """Build sliders at the left and results at the right, and have them follow the session."""
+        self.session = session
+        self.view_now: T | None = None
+        self.last: Attempt[T] | None = None
+        self._wanted: Callable[[], Attempt[T]] | None = None
+        self._busy = self._grey = False
+        with ui.element("div").classes("beside"):
+            with ui.element("div").classes("slider-column"):
+                self.board = SliderBoard(self._try, self._set, seldom)
+            with ui.column():
+                self._faults = ui.label().classes("faults kept").props('role="alert"')
+                self._faults.visible = False
+                self.build()
+        self._mark = layout.follow(session, lambda: background_tasks.create(self._reload()))
+
+    # ------------------------------------------------------------------------------------------ what a page is made of
+    def build(self) -> None:
+        """Build what stands at the right."""
+        raise NotImplementedError
+
+    def sliders(self, draft: Draft) -> Mapping[str, tuple[Slider, ...]]:
+        """The sliders of a draft in groups."""
+        raise NotImplementedError
+
+    def view(self, file: LinkFile) -> T:
+        """What is to be shown of a mission; runs in a thread."""
+        raise NotImplementedError
+
+    async def show(self, view: T) -> None:
+        """Show at once what one looks at while a slider moves; returns when the browser has drawn it."""
+        raise NotImplementedError
+
+    def show_rest(self, view: T) -> None:
+        """Show what is read, and not looked at, once the sliders rest."""
+        raise NotImplementedError
+
+    # --------------------------------------------------------------------------------------------------------- changes
+    async def _try(self, key: str, typed: str) -> None:
+        """Show what a value would do, without writing it."""
+        await self._ask(partial(attempt, self.session.draft, key, typed, self.view))
+
+    async def _set(self, key: str, typed: str) -> None:
+        """Write a value into the draft at once, before anything else that the same click asks for, and show it."""
+        try:
+            self.session.set(key, typed)
+        except (ValueError, OSError) as error:
+            layout.refuse(str(error))
+            return
+        while self._busy:
+            await pause(self._faults, _SHORT_S)
+        self._mark()
+        await self._reload()
+
+    async def _reload(self) -> None:
+        """Show the draft as it is, but for a slider that moves."""
+        stay(self._faults)
+        draft, moved = self.session.draft, self.board.moved
+        self.board.show(self.sliders(draft))
+        if moved is not None:
+            await self._try(*moved)
+        elif self.last is None or self.last.draft.text != draft.text:
+            await self._ask(partial(seen, draft, self.view))
+
+    async def _ask(self, question: Callable[[], Attempt[T]]) -> None:
+        """Have a question answered in a thread; one that waits is dropped for it."""
+        self._wanted = question
+        if self._busy:
+            return
+        self._busy = True
+        try:
+            while self._wanted is not None:
+                question, self._wanted = self._wanted, None
+                await self._answer(await in_thread(self._faults, question))
+        except ValueError as error:
+            layout.refuse(str(error))
+        finally:
+            self._busy = False
+
+    # --------------------------------------------------------------------------------------------------------- showing
+    async def _answer(self, found: Attempt[T]) -> None:
+        """Show a draft, or why it has no view."""
+        same = self.last is not None and self.last.draft.text == found.draft.text and self.last.view is not None
+        self.last = found
+        rows = {key: row.slider for key, row in self.board.rows.items()}
+        told = faulty(found.draft, rows)
+        self.board.faults(told)
+        others = [str(fault) for fault in found.draft.problems if fault.key not in told]
+        state = _NONE if self.view_now is None else _OLD
+        self._faults.text = "\n".join([state, *others, *([found.refusal] if found.refusal else [])])
+        self._faults.visible = found.view is None
+        self._dim(found.view is None)
+        if found.view is not None and not same:
+            self.view_now = found.view
+            background_tasks.create_lazy(self._rest(found.view), name=f"rest {id(self)}")
+            await self.show(found.view)
+
+    async def _rest(self, view: T) -> None:
+        await pause(self._faults, _REST_S)
+        if view is self.view_now:
+            self.show_rest(view)
+
+    def _dim(self, grey: bool) -> None:
+        if grey != self._grey:
+            self._grey = grey
+            for element in self.dimmed:
+                layout.grey(element, grey)

@@ -18,6 +18,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
+from pydantic import TypeAdapter, ValidationError
+
 from microrad.studio.guard.names import shown
 
 _PROCESS = "microrad.studio.recordings.process"
@@ -129,8 +131,6 @@ def view(path: Path, columns: Columns, limits: ReadingLimits | None = None) -> V
 
 
 def _read(path: Path, request: dict[str, Any], limits: ReadingLimits, kind: type[Found]) -> Found:
-    from pydantic import TypeAdapter, ValidationError
-
     request |= {"folder": str(path.parent), "name": path.name, "limits": asdict(limits)}
     text = json.dumps(request).encode("ascii")
     if len(text) > _MAX_REQUEST_BYTES:

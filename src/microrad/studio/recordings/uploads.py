@@ -59,9 +59,6 @@ class Uploads:
         """Make the folder private; raises `UploadError` where it is something else or somebody else's."""
         self.limits = limits or UploadLimits()
         self.folder = _private(folder)
-        for place in self._places():  # left by a studio that was killed
-            if _stored(place) is None and _forgotten(place) and all(_forgotten(path) for path in _files(place)):
-                shutil.rmtree(place, ignore_errors=True)
 
     def hold_temporary_files(self) -> None:
         """Have this program's temporary files lie in the private folder, too: a form is spooled before it is read.
@@ -166,7 +163,9 @@ def _stored(place: Path) -> Upload | None:
 
     A link is none: the folder may have come from a stranger, and a link could name any file of this machine.
     """
-    found = next((path for path in _files(place) if path.name != _PART and _is_plain(path)), None)
+    found = next(
+        (path for path in _files(place) if path.name != _PART and path.is_file() and not path.is_symlink()), None
+    )
     return None if found is None else Upload(place.name, found.name, found, _size(found))
 
 
@@ -177,11 +176,12 @@ def _files(place: Path) -> list[Path]:
         return []
 
 
-def _is_plain(path: Path) -> bool:
+def _status(path: Path) -> os.stat_result | None:
+    """What the system says of a file, and of a link itself; None where there is none any more."""
     try:
-        return stat.S_ISREG(path.lstat().st_mode)
+        return path.lstat()
     except FileNotFoundError:
-        return False
+        return None
 
 
 def _remove(path: Path) -> None:
@@ -194,17 +194,13 @@ def _remove(path: Path) -> None:
 
 
 def _size(path: Path) -> int:
-    try:
-        return path.stat().st_size
-    except FileNotFoundError:
-        return 0
+    found = _status(path)
+    return 0 if found is None else found.st_size
 
 
 def _time_ns(path: Path) -> int:
-    try:
-        return path.stat().st_mtime_ns
-    except FileNotFoundError:
-        return 0
+    found = _status(path)
+    return 0 if found is None else found.st_mtime_ns
 
 
 def _forgotten(path: Path) -> bool:

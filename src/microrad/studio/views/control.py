@@ -1,9 +1,13 @@
-"""What the control page shows of a controller: margins as rows, responses by frequency and in time as plots."""
+"""What the control page shows of a controller: margins as rows, responses by frequency and in time as plots.
+
+`controllers` computes it, and loads the kernels for it. Times are in s, angles in rad, drives in V from the bias.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,8 +16,10 @@ from microrad.core.arrays import Floats
 from microrad.core.units import UnitError, format_quantity, parse_quantity
 from microrad.report.plotting.palette import BLACK, BLUE, GREEN, GREY, VERMILION
 from microrad.report.plotting.sheet import Axis, Line, Mark, Rule
-from microrad.studio.views.controllers import PID, PID_INVERSE, WITH, WITHOUT, Answers, Ask, Controller, Curve
 from microrad.studio.views.plots import Plot, empty, plot
+
+PID, PID_INVERSE = "PID of [control]", "PID of [control] + inverse"
+WITH, WITHOUT = "with hysteresis", "without hysteresis"
 
 SHOWN = {"both": (WITH, WITHOUT), "with": (WITH,), "without": (WITHOUT,)}
 """What the switch of the hysteresis shows."""
@@ -22,6 +28,79 @@ _STYLES = {WITH: (VERMILION, "-"), WITHOUT: (BLUE, "--")}
 MILLISECONDS, SECONDS = "time (ms)", "time (s)"
 _NOTHING = "Nothing disturbs this loop, or nothing was asked."
 _LEAST = 1e-4  # of what is drawn on a logarithmic axis
+
+
+@dataclass(frozen=True, slots=True)
+class Ask:
+    """What a loop is to answer: a step and a sine of the reference on axis x, the sine's frequency in Hz."""
+
+    step_rad: float
+    sine_rad: float
+    sine_hz: float
+    seed: int = 1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Curve:
+    """One run: time, wanted and found line of sight of axis x, error by axis (samples, axes), drives, disturbance.
+
+    ``disturbance_rad`` is what the loop has to reject, (samples, axes), None where there is nothing.
+    """
+
+    time_s: Floats
+    wanted_rad: Floats
+    found_rad: Floats
+    error_rad: Floats
+    drive_v: Floats
+    disturbance_rad: Floats | None = None
+
+    @property
+    def rms_rad(self) -> float:
+        """Root mean square of the radial error over what is shown."""
+        return float(np.sqrt(np.mean(np.sum(self.error_rad**2, axis=1))))
+
+    @property
+    def peak_rad(self) -> float:
+        """Largest radial error of what is shown."""
+        return float(np.max(np.linalg.norm(self.error_rad, axis=1)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Answers:
+    """What a loop does, by the variant of its mirror (`WITH` or `WITHOUT`); no jitter where nothing disturbs it."""
+
+    step: dict[str, Curve]
+    sine: dict[str, Curve]
+    jitter: dict[str, Curve]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Controller:
+    """A controller, ready to be asked.
+
+    ``margins`` hold gain (a factor), phase (rad), delay (s), modulus, crossover, bandwidth (Hz) and the peak of |S|;
+    ``values`` are what it was tuned to by name, each with its unit. ``loop_gain`` and ``sensitivity`` are magnitudes at
+    ``freq_hz``, None where a slower sensor folds frequencies. ``limits_v`` are the amplifier's about the bias,
+    ``identified_v`` the range that the mirror was identified in. ``rate_hz`` is that of the control,
+    ``field_of_view_rad`` the radial error beyond which the sensor holds its last reading. ``warnings`` say what
+    the mirror leaves out.
+    """
+
+    name: str
+    margins: dict[str, float]
+    values: dict[str, tuple[float, str]]
+    residual_rad: float
+    bound_by: tuple[str, ...]
+    asked_modulus: float
+    freq_hz: Floats
+    loop_gain: Floats | None
+    sensitivity: Floats | None
+    limits_v: tuple[float, float]
+    identified_v: tuple[float, float]
+    rate_hz: float
+    field_of_view_rad: float
+    warnings: tuple[str, ...]
+    ask: Callable[[Ask, tuple[str, ...]], Answers]
 
 
 class AskError(ValueError):

@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from functools import lru_cache, partial
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -30,9 +29,8 @@ from microrad.loop.pointing_loop.loop import LoopController, PointingLoop
 from microrad.mirror import Variant
 from microrad.mission.file import MissionFile
 from microrad.mission.tables.fine_pointing import FinePointing
+from microrad.studio.views.control import PID, PID_INVERSE, WITH, WITHOUT, Answers, Ask, Controller, Curve
 
-PID, PID_INVERSE = "PID of [control]", "PID of [control] + inverse"
-WITH, WITHOUT = "with hysteresis", "without hysteresis"
 _POINTS = 500
 _STEP_PERIODS = 6.0  # of the bandwidth
 _SHOWN_PERIODS = 2.0
@@ -42,114 +40,30 @@ _NO_LINEAR_PART = (
 )
 
 
-@dataclass(frozen=True, slots=True)
-class Ask:
-    """What a loop is to answer: a step and a sine of the reference on axis x, the sine's frequency in Hz."""
-
-    step_rad: float
-    sine_rad: float
-    sine_hz: float
-    seed: int = 1
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Curve:
-    """One run: time, wanted and found line of sight of axis x, error by axis (samples, axes), drives, disturbance.
-
-    ``disturbance_rad`` is what the loop has to reject, (samples, axes), None where there is nothing.
-    """
-
-    time_s: Floats
-    wanted_rad: Floats
-    found_rad: Floats
-    error_rad: Floats
-    drive_v: Floats
-    disturbance_rad: Floats | None = None
-
-    @property
-    def rms_rad(self) -> float:
-        """Root mean square of the radial error over what is shown."""
-        return float(np.sqrt(np.mean(np.sum(self.error_rad**2, axis=1))))
-
-    @property
-    def peak_rad(self) -> float:
-        """Largest radial error of what is shown."""
-        return float(np.max(np.linalg.norm(self.error_rad, axis=1)))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Answers:
-    """What a loop does, by the variant of its mirror (`WITH` or `WITHOUT`); no jitter where nothing disturbs it."""
-
-    step: dict[str, Curve]
-    sine: dict[str, Curve]
-    jitter: dict[str, Curve]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Controller:
-    """A controller, ready to be asked.
-
-    ``margins`` hold gain (a factor), phase (rad), delay (s), modulus, crossover, bandwidth (Hz) and the peak of |S|;
-    ``values`` are what it was tuned to by name, each with its unit. ``loop_gain`` and ``sensitivity`` are magnitudes at
-    ``freq_hz``, None where a slower sensor folds frequencies. ``limits_v`` are the amplifier's about the bias,
-    ``identified_v`` the range that the mirror was identified in. ``rate_hz`` is that of the control,
-    ``field_of_view_rad`` the radial error beyond which the sensor holds its last reading. ``warnings`` say what
-    the mirror leaves out.
-    """
-
-    name: str
-    margins: dict[str, float]
-    values: dict[str, tuple[float, str]]
-    residual_rad: float
-    bound_by: tuple[str, ...]
-    asked_modulus: float
-    freq_hz: Floats
-    loop_gain: Floats | None
-    sensitivity: Floats | None
-    limits_v: tuple[float, float]
-    identified_v: tuple[float, float]
-    rate_hz: float
-    field_of_view_rad: float
-    warnings: tuple[str, ...]
-    ask: Callable[[Ask, tuple[str, ...]], Answers]
-
-
 def names(table: FinePointing | None) -> tuple[str, ...]:
     """The controllers that a mission has: of its fine-pointing loop, where it has one, and of [control]."""
     return (*(() if table is None else controller_study.names(table)), PID, PID_INVERSE)
 
 
+_MOST_KEPT = 32
+_kept: dict[tuple[str, str, str], Controller] = {}
 _tuning = threading.Lock()  # two pages that want the same controller tune it once
 
 
 def controller(file: MissionFile, name: str) -> Controller:
     """A controller of the mission, tuned; takes seconds the first time. Raises ValueError with the reason."""
+    inner = file.mirror_file
+    key = file.sha256, "" if inner is None else inner.sha256, name
     with _tuning:
-        return _controller(_Keyed(file), name)
+        if key not in _kept:
+            _kept[key] = _controller(file, name)
+        while len(_kept) > _MOST_KEPT:
+            del _kept[next(iter(_kept))]
+        return _kept[key]
 
 
-@dataclass(frozen=True, slots=True)
-class _Keyed:
-    """A mission that is told from another one by its text and its mirror's."""
-
-    file: MissionFile
-
-    @property
-    def _key(self) -> tuple[str, str]:
-        inner = self.file.mirror_file
-        return self.file.sha256, "" if inner is None else inner.sha256
-
-    def __hash__(self) -> int:
-        return hash(self._key)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Keyed) and self._key == other._key
-
-
-@lru_cache(maxsize=32)
-def _controller(of: _Keyed, name: str) -> Controller:
-    file, mirrors = of.file, mirror.of(of.file.mission)
+def _controller(file: MissionFile, name: str) -> Controller:
+    mirrors = mirror.of(file.mission)
     if name in (PID, PID_INVERSE):
         made = _pid(paper_cases.of(file.mission, mirrors), name)
     else:
@@ -225,7 +139,10 @@ def _fine_answers(
     return Answers(
         {v: _step(*each, wanted, bandwidth_hz) for v, each in chosen.items()},
         {v: _sine(*each, wanted) for v, each in chosen.items()},
-        {v: _jitter(*each, wanted, table.settle_s, table.duration_s) for v, each in chosen.items()},
+        {
+            v: _curve(*each, ensemble.Span(table.duration_s, table.settle_s, wanted.seed), table.settle_s)
+            for v, each in chosen.items()
+        },
     )
 
 
@@ -245,11 +162,6 @@ def _sine(loop: PointingLoop, of: LoopController, wanted: Ask) -> Curve:
     shown = _SHOWN_PERIODS / wanted.sine_hz
     settle = max(0.4, 1.0 / wanted.sine_hz)
     return _curve(_first_reference(alone, sine), of, ensemble.Span(settle + shown, settle, wanted.seed), settle)
-
-
-def _jitter(loop: PointingLoop, of: LoopController, wanted: Ask, settle_s: float, duration_s: float) -> Curve:
-    """Everything that disturbs the loop, behind the settling time."""
-    return _curve(loop, of, ensemble.Span(duration_s, settle_s, wanted.seed), settle_s)
 
 
 def _first_reference(loop: PointingLoop, first: Reference) -> PointingLoop:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterable
 from typing import Any
 
 from microrad.core.progress import Progress
@@ -18,7 +17,7 @@ from microrad.report.plotting.figure import Figure
 Row = dict[str, Any]
 
 
-def run(file: LinkFile, on_progress: Progress) -> DayStudy:
+def compute_day(file: LinkFile, on_progress: Progress) -> DayStudy:
     """The links of a mission, then its day; raises ValueError with the reason where a day cannot be had."""
     on_progress(0, 0, "links")
     links = link_study.run_link_study(file)
@@ -42,11 +41,10 @@ def ways(day: DayStudy) -> tuple[Way, ...]:
 
 def way_rows(day: DayStudy) -> list[Row]:
     """Relay and direct downlink side by side."""
-    return [{"id": place, "what": row[0], **_cells(row[1:])} for place, row in enumerate(ways_table(day).rows)]
-
-
-def _cells(cells: Iterable[str]) -> Row:
-    return dict(zip(("relay", "direct"), cells, strict=False))
+    return [
+        {"id": place, "what": row[0], **dict(zip(("relay", "direct"), row[1:], strict=False))}
+        for place, row in enumerate(ways_table(day).rows)
+    ]
 
 
 def contact_headings() -> tuple[str, ...]:

@@ -2,22 +2,57 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import TypeAdapter
 
 from microrad.core.units import format_quantity
-from microrad.lab.live_fit import LiveFit
+from microrad.lab.live_fit import LIVE_FITS, LiveFit
 from microrad.report.plotting.palette import BLACK, BLUE, GREY, SKY, VERMILION
 from microrad.report.plotting.sheet import Axis, Line, Span, grid
+from microrad.studio.guard import plain_files
 from microrad.studio.jobs.queue import Job
 from microrad.studio.recordings.reading import View
-from microrad.studio.views.live_fit import leader
 from microrad.studio.views.mirror_form import Setting, written
 from microrad.studio.views.plots import WIDTH, Plot, empty, figure, plot
+
+_MOST_BYTES = 20_000_000  # of the fits of a job
+
+
+# ------------------------------------------------------------------------------------------------ what a job has fitted
+def read_fits(folder: Path) -> tuple[LiveFit, ...]:
+    """The models of a job so far, in the order in which they were fitted; a line that is being written is left out."""
+    try:
+        with plain_files.opened(folder / LIVE_FITS) as file:
+            lines = file.read(_MOST_BYTES).splitlines()
+    except OSError:
+        return ()
+    found, kind = [], TypeAdapter(LiveFit)
+    for line in lines:
+        with suppress(ValueError):
+            found.append(kind.validate_json(line))
+    return tuple(found)
+
+
+def leader(fits: tuple[LiveFit, ...], chosen: str = "") -> LiveFit | None:
+    """The model that was chosen in the end, as it was fitted last; until then the best so far. None without one.
+
+    Of models that differ by chance alone the end prefers what never moves the wrong way: it need not choose the best.
+    """
+    ended = [fit for fit in fits if fit.model == chosen]
+    return ended[-1] if ended else best(fits)
+
+
+def best(fits: tuple[LiveFit, ...]) -> LiveFit | None:
+    """The model with the least residual on the held-out samples, of two that are alike the later; None without one."""
+    return min(reversed(fits), key=lambda fit: fit.held_out_rms_percent, default=None)
 
 
 # ----------------------------------------------------------------------------------------------------------- the plots
@@ -97,8 +132,6 @@ class Outcome:
 
 def outcome(said: str) -> Outcome | None:
     """The end of an identification from what its job has printed; None where it has printed no result."""
-    import json
-
     try:
         data = json.loads(said)
         return Outcome(

@@ -10,6 +10,8 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
+from pydantic import TypeAdapter
+
 from microrad.core.folder import write_whole
 from microrad.core.units import UnitError, parse_quantity
 from microrad.lab.recording import ACCEPTABLE, stated_units
@@ -89,8 +91,6 @@ class Form:
 
 def kept_form(path: Path) -> Form:
     """The form that was kept in a file; an empty one where there is none, or none that can be read."""
-    from pydantic import TypeAdapter
-
     with suppress(OSError, ValueError):
         return _possible(TypeAdapter(Form).validate_json(plain_files.content(path)))
     return Form()
@@ -320,7 +320,7 @@ def identification(folder: Path, recordings: Sequence[Dropped], setting: Setting
 
 
 def _agree(name: str, listing: Listing, setting: Setting) -> None:
-    """Refuse a unit other than that which the file states: the mirror would be larger or smaller than it is."""
+    """Raises `SettingError` for a unit other than the file states: the mirror would be larger or smaller than it is."""
     for which, channel, unit in (
         ("drive", setting.drive, setting.drive_unit),
         ("output", setting.output, setting.output_unit),

@@ -90,7 +90,11 @@ def line_rows(v: PointingView) -> list[Row]:
     """Each error with its share of the squares and what is left for it."""
     rows = []
     for place, line in enumerate(v.budget.lines):
-        left = [_left(each) for each in v.left[place]] if v.left else ["", ""]
+        left = (
+            ["nothing" if each.note else quantity(each.largest_rad, "rad") for each in v.left[place]]
+            if v.left
+            else ["", ""]
+        )
         rows.append(
             {
                 "id": place,
@@ -103,10 +107,6 @@ def line_rows(v: PointingView) -> list[Row]:
             }
         )
     return rows
-
-
-def _left(each: pointing.Allocation) -> str:
-    return "nothing" if each.note else quantity(each.largest_rad, "rad")
 
 
 def total_rows(v: PointingView) -> list[Row]:
@@ -185,12 +185,12 @@ def coverage_plot(v: PointingView) -> Plot:
     if not math.isnan(v.half_angle_rad):
         half = f"beacon's half angle: {format_quantity(v.half_angle_rad, 'rad', 3)}"
         marks.append(Rule(v.half_angle_rad * 1e6, True, VERMILION, "-", 1.5, half))
-    named = ("root sum square", ORANGE, "--"), ("ECSS, two axes", GREEN, "-."), (_inside(p), BLACK, ":")
+    named = (
+        ("root sum square", ORANGE, "--"),
+        ("ECSS, two axes", GREEN, "-."),
+        (f"{100.0 * p.confidence:g} % inside", BLACK, ":"),
+    )
     for total_rad, (name, colour, dash) in zip(totals.values(), named, strict=True):
         marks.append(Rule(total_rad * 1e6, True, colour, dash, 1.5, f"{name}: {quantity(total_rad, 'rad')}"))
     x = Axis("angle off the line of sight (µrad)", low=0.0, high=most * 1e6)
     return plot(x, Axis("probability of an error below it (%)", low=0.0, high=101.0), *marks)
-
-
-def _inside(p: OpenLoopPointing) -> str:
-    return f"{100.0 * p.confidence:g} % inside"

@@ -46,16 +46,12 @@ def report_order(session: Session, ledger: Path) -> Order:
 # -------------------------------------------------------------------------------------------------- what can be started
 def free_name(session: Session, stem: str, ending: str = "") -> str:
     """A name in the working folder that nothing has yet, and no job that is still to run will take."""
-    taken = {Path(each).parts[0] for job in _unfinished(session) for each in job.results if each}
+    taken = {Path(each).parts[0] for job in session.jobs.listed() if not job.finished for each in job.results if each}
     number, name = 1, f"{stem}{ending}"
     while (session.folder / name).exists() or name in taken:
         number += 1
         name = f"{stem}-{number}{ending}"
     return name
-
-
-def _unfinished(session: Session) -> Iterable[Job]:
-    return (job for job in session.jobs.listed() if not job.finished)
 
 
 def campaign_files(session: Session) -> tuple[str, ...]:

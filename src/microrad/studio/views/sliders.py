@@ -1,4 +1,4 @@
-"""Numbers of a mission that a slider moves: over which range, on which scale, and as one types them.
+"""Numbers of a mission that a slider moves: over which range, on which scale, and what a page shows of a new value.
 
 A slider has whole positions from 0 to `Slider.steps`. What it writes keeps the unit that the mission has at that place.
 """
@@ -7,13 +7,16 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Generic, Literal, TypeVar
 
 from microrad.core.units import UnitError, parse_quantity
 from microrad.mission.fields import Quantity, Share
+from microrad.mission.file import LinkFile
 from microrad.studio.draft.draft import Draft, Value
+
+T = TypeVar("T")
 
 STEPS = 240
 """The last position of a slider that is not in decibels."""
@@ -171,3 +174,28 @@ def _round_down(value: float) -> float:
 def _decimals(span: float) -> int:
     """Decimals that tell the positions of a linear slider apart."""
     return max(0, 1 - math.floor(math.log10(span / 100.0))) if span > 0.0 else 2
+
+
+# ----------------------------------------------------------------------------------------------------------- attempts
+@dataclass(frozen=True, slots=True)
+class Attempt(Generic[T]):
+    """A draft and its view; without one, the draft's own faults say why, or `refusal` does."""
+
+    draft: Draft
+    view: T | None
+    refusal: str = ""
+
+
+def attempt(draft: Draft, key: str, typed: str, view: Callable[[LinkFile], T]) -> Attempt[T]:
+    """What a value would do, read as the mission file is; raises `DraftError` for a key that has no place."""
+    return seen(draft.set(key, typed), view)
+
+
+def seen(draft: Draft, view: Callable[[LinkFile], T]) -> Attempt[T]:
+    """A draft as it is; a ValueError of `view` becomes the refusal."""
+    if draft.problems:
+        return Attempt(draft, None)
+    try:
+        return Attempt(draft, view(draft.link()))
+    except ValueError as error:  # a mission that is read, and cannot be budgeted
+        return Attempt(draft, None, str(error))

@@ -12,7 +12,7 @@ What is taken for granted:
 - The receiver's power is that of the moment of sending. What a correction of the point-ahead leaves is not in it.
 """
 
-from microrad.study.contact_run.records import DATA, LOCK, ContactRun
+from microrad.study.contact_run.records import ContactRun, State
 from microrad.study.contact_run.sequence import of_mission
 
-__all__ = ["DATA", "LOCK", "ContactRun", "of_mission"]
+__all__ = ["ContactRun", "State", "of_mission"]

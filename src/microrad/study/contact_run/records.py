@@ -1,8 +1,9 @@
-"""What a run of a contact is given and what comes of it."""
+"""Inputs and results of one contact in the time domain: its states, settings, windows and log."""
 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from enum import StrEnum
 from itertools import pairwise
 from typing import Literal, NamedTuple
 
@@ -11,10 +12,24 @@ import numpy as np
 from microrad.core.arrays import Floats
 from microrad.core.units import format_quantity
 
-IDLE, SLEW, BEACON, DETECT, ANSWER, LOCK = "idle", "slew", "beacon", "detect", "answer", "lock"
-DATA, LOSS, REACQUIRE, END = "data", "loss", "re-acquire", "end"
-STATES = (SLEW, BEACON, DETECT, ANSWER, LOCK, DATA, LOSS, REACQUIRE)
-"""The states that last, in the order in which a contact first reaches them."""
+
+class State(StrEnum):
+    """What a terminal does in a contact, in the order in which it comes to it."""
+
+    IDLE = "idle"
+    SLEW = "slew"
+    BEACON = "beacon"
+    DETECT = "detect"
+    ANSWER = "answer"
+    LOCK = "lock"
+    DATA = "data"
+    LOSS = "loss"
+    REACQUIRE = "re-acquire"
+    END = "end"
+
+
+STATES = tuple(state for state in State if state not in (State.IDLE, State.END))
+"""The states that last."""
 
 _MOST_WINDOWS = 100_000
 _MOST_SEED = 2**63 - 1
@@ -132,8 +147,8 @@ class Transition:
     """
 
     time_s: float
-    state: str
-    to: str
+    state: State
+    to: State
     cause: str
 
 
@@ -184,9 +199,9 @@ class ContactRun:
     windows: tuple[Window, ...]
 
     @property
-    def seconds(self) -> dict[str, float]:
+    def seconds(self) -> dict[State, float]:
         """Time in each of `STATES`; a slew lies before the contact, as far as there is time."""
-        spent = dict.fromkeys(STATES, 0.0)
+        spent: dict[State, float] = dict.fromkeys(STATES, 0.0)
         for entered, left in pairwise(self.log):
             spent[left.state] += left.time_s - entered.time_s
         return spent
@@ -194,7 +209,7 @@ class ContactRun:
     @property
     def data_s(self) -> float:
         """Time with data."""
-        return self.seconds[DATA]
+        return self.seconds[State.DATA]
 
     @property
     def data_share(self) -> float:
@@ -204,7 +219,7 @@ class ContactRun:
     @property
     def losses(self) -> int:
         """How often lock was lost in a window."""
-        return sum(entry.to == LOSS for entry in self.log)
+        return sum(entry.to == State.LOSS for entry in self.log)
 
     @property
     def losses_per_s(self) -> float:
@@ -219,7 +234,7 @@ class ContactRun:
     @property
     def first_data_s(self) -> float:
         """When data begins; nan where it never does."""
-        return next((entry.time_s for entry in self.log if entry.to == DATA), math.nan)
+        return next((entry.time_s for entry in self.log if entry.to == State.DATA), math.nan)
 
     @property
     def share_below(self) -> float:

@@ -13,28 +13,10 @@ from microrad.loop.controller_study import Design, FinePointingStudy, Scene
 from microrad.mission.tables.acquisition import Acquisition
 from microrad.mission.tables.operations import Operations
 from microrad.orbit.day import DayStudy
-from microrad.study.contact_run.records import (
-    ANSWER,
-    BEACON,
-    DATA,
-    DETECT,
-    END,
-    IDLE,
-    LOCK,
-    LOSS,
-    REACQUIRE,
-    SLEW,
-    Contact,
-    ContactRun,
-    Loss,
-    Settings,
-    Sight,
-    Transition,
-    Window,
-)
+from microrad.study.contact_run.records import Contact, ContactRun, Loss, Settings, Sight, State, Transition, Window
 from microrad.study.contact_run.windows import Sampler, plan
 
-_STATE_OF_STAGE = (BEACON, BEACON, DETECT, ANSWER, ANSWER, ANSWER, LOCK, LOCK, LOCK, LOCK, LOCK)
+_STATE_OF_STAGE = (*[State.BEACON] * 2, State.DETECT, *[State.ANSWER] * 3, *[State.LOCK] * 5)
 """Of the stages of an acquisition, wide or scanned: three to the detection, eight from the answer on."""
 
 
@@ -74,26 +56,26 @@ class Log:
         """Idle until the first transition."""
         self.contact = contact
         self.entries: list[Transition] = []
-        self.state = IDLE
+        self.state = State.IDLE
 
     @property
     def since_s(self) -> float:
         """When the present state began."""
         return self.entries[-1].time_s
 
-    def go(self, time_s: float, to: str, cause: str) -> bool:
+    def go(self, time_s: float, to: State, cause: str) -> bool:
         """Change the state, unless the contact ends before; whether it goes on."""
-        if self.state == END:
+        if self.state == State.END:
             return False
         if time_s >= self.contact.end_s:
-            time_s, to, cause = self.contact.end_s, END, f"the contact ends: {self.contact.ends}"
+            time_s, to, cause = self.contact.end_s, State.END, f"the contact ends: {self.contact.ends}"
         self.entries.append(Transition(float(time_s), self.state, to, cause))
         self.state = to
-        return to != END
+        return to != State.END
 
     def finish(self) -> None:
         """The end of the contact, where nothing else has ended it."""
-        self.go(self.contact.end_s, END, "")
+        self.go(self.contact.end_s, State.END, "")
 
 
 def _turn(log: Log, settings: Settings) -> bool:
@@ -103,11 +85,11 @@ def _turn(log: Log, settings: Settings) -> bool:
     late = max(begin + lasts - contact.start_s, 0.0)
     how = f"{format_quantity(settings.slew_angle_rad, 'rad')} at {format_quantity(settings.slew_rate_rad_s, 'rad/s')}"
     if late <= 1e-9 * max(lasts, 1.0):
-        goes_on = log.go(begin, SLEW, f"{how}, so that the slew ends when the contact begins")
-        return goes_on and log.go(contact.start_s, BEACON, f"the contact begins: {contact.begins}")
-    goes_on = log.go(begin, SLEW, f"{how}, as soon as the body is free")
+        goes_on = log.go(begin, State.SLEW, f"{how}, so that the slew ends when the contact begins")
+        return goes_on and log.go(contact.start_s, State.BEACON, f"the contact begins: {contact.begins}")
+    goes_on = log.go(begin, State.SLEW, f"{how}, as soon as the body is free")
     after = f"{format_quantity(late, 's')} after the contact began: {contact.begins}"
-    return goes_on and log.go(begin + lasts, BEACON, f"the slew ends {after}")
+    return goes_on and log.go(begin + lasts, State.BEACON, f"the slew ends {after}")
 
 
 class _Acquisitions:
@@ -137,15 +119,15 @@ class _Acquisitions:
         """Log one stage's end where it fails or changes the state; whether the contact goes on."""
         cause = f"{entry.stage}: {entry.cause}"
         if entry.to == acquisition.LOST:
-            return self.log.go(time_s, END, f"acquisition given up after {self.attempts} failures; {cause}")
+            return self.log.go(time_s, State.END, f"acquisition given up after {self.attempts} failures; {cause}")
         if entry.to == acquisition.LOCKED:
-            return self.log.go(time_s, DATA, cause)
+            return self.log.go(time_s, State.DATA, cause)
         at, to = self.place[entry.stage], self.place[entry.to]
         before, after = _STATE_OF_STAGE[at], _STATE_OF_STAGE[to]
         if to > at and before == after:
             return time_s < self.log.contact.end_s or self.log.go(time_s, after, cause)
         if again:
-            return self.log.go(time_s, REACQUIRE, f"{before} to {after}; {cause}")
+            return self.log.go(time_s, State.REACQUIRE, f"{before} to {after}; {cause}")
         return self.log.go(time_s, after, cause)
 
 
@@ -179,11 +161,13 @@ def _regain(log: Log, acquire: _Acquisitions, lost: Loss, losses: int) -> bool:
     """Loss and re-acquisition; whether there is data again. As many losses in a row as attempts end the contact."""
     waited = format_quantity(lost.known_s - lost.time_s, "s", 3)
     known = f"the light has gone there and back, {waited}" if lost.known_s > lost.time_s else "seen by its own sensor"
-    if not log.go(lost.time_s, LOSS, lost.cause):
+    if not log.go(lost.time_s, State.LOSS, lost.cause):
         return False
     if losses >= acquire.attempts:
-        return log.go(lost.known_s, END, f"given up after {losses} losses of lock in as many windows in a row; {known}")
-    return log.go(lost.known_s, REACQUIRE, known) and acquire()
+        return log.go(
+            lost.known_s, State.END, f"given up after {losses} losses of lock in as many windows in a row; {known}"
+        )
+    return log.go(lost.known_s, State.REACQUIRE, known) and acquire()
 
 
 def of_mission(

@@ -1,4 +1,4 @@
-"""The fine loop in windows of a contact: references of the moment in, error and margin of the link out."""
+"""The fine-pointing loop in sampled windows of a contact: its error, and the margin that this leaves the link."""
 
 import math
 from collections.abc import Sequence
