@@ -221,17 +221,15 @@ def test_a_command_that_does_not_listen_is_asked_harder_each_time(tmp_path, monk
         f"time.sleep({2.0 * HANG_S})\n"
     )
 
-    def once_heard(ask, count):
+    heard = {signal.SIGINT: 0, signal.SIGTERM: 1, signal.SIGKILL: 2}
+    ask = jobs_process._signal
+
+    def ask_when_heard(command, number):
         """Ask harder when the command has heard what came before."""
+        lines_of(folder / jobs_files.STDOUT, heard[number])
+        ask(command, number)
 
-        def asked(command):
-            lines_of(folder / jobs_files.STDOUT, count)
-            ask(command)
-
-        return asked
-
-    monkeypatch.setattr(jobs_process, "_terminate", once_heard(jobs_process._terminate, 1))
-    monkeypatch.setattr(jobs_process, "_kill", once_heard(jobs_process._kill, 2))
+    monkeypatch.setattr(jobs_process, "_signal", ask_when_heard)
     jobs_process.run_job(folder, python(deaf), waits_s=(0.1, 0.1), look_s=0.02)
     job = jobs_files.read_job(folder)
     assert (job.state, job.code) == ("cancelled", -signal.SIGKILL)
