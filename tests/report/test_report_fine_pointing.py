@@ -22,6 +22,7 @@ from microrad.loop.pointing_loop.design import design_plant
 from microrad.loop.pointing_loop.ensemble import bin_edges_rad
 from microrad.loop.pointing_loop.linear import close, residual_spectrum, stationary
 from microrad.loop.pointing_loop.loop import ReferenceFilter, assemble, with_inverse
+from microrad.report import quantities
 from microrad.report.fine_pointing import figures, words
 from microrad.report.fine_pointing import page as section
 from microrad.report.fine_pointing.figures import fine_pointing_figures
@@ -500,7 +501,7 @@ def test_a_stroke_that_fits_is_said_to_fit(fine, mission):
     ],
 )
 def test_angles_have_three_digits_and_at_most_three_decimals(value_rad, text):
-    assert micro(value_rad) == text
+    assert quantities.micro(value_rad) == text
 
 
 @pytest.mark.parametrize(
