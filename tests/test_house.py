@@ -48,6 +48,24 @@ def test_the_house_is_drawn_with_the_rooms_of_the_contract_and_listed_in_its_ord
     assert [line.split("`")[1] for line in text.splitlines() if line.startswith("| `")][: len(ROOMS)] == ROOMS
 
 
+def test_every_file_and_name_that_the_recipes_give_is_there():
+    text = " ".join((ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8").partition("## Add ")[2].split())
+    paths = set(re.findall(r"`([\w.-]+/[\w./-]+)`", text))
+    named = set(re.findall(r"`(\w+)`(?: there)? in `([\w./-]+\.py)`", text))
+    assert len(paths) > 30 and len(named) > 10
+    assert [path for path in sorted(paths) if not _found(path).exists()] == []
+    missing = [
+        f"{name} in {path}"
+        for name, path in sorted(named)
+        if not re.search(rf"(?m)^(?:def |class )?{name}\b", _found(path).read_text(encoding="utf-8"))
+    ]
+    assert missing == []
+
+
+def _found(path):
+    return next((at for at in (PACKAGE / path, ROOT / path) if at.exists()), ROOT / path)
+
+
 def test_the_public_names_are_known_to_type_checkers(house):
     stub = (PACKAGE / "__init__.pyi").read_text(encoding="utf-8")
     assert stub == house.stub(microrad._PUBLIC), "run scripts/house stub"

@@ -1,7 +1,7 @@
 """The mission as frozen, checked data: the keys of a mission file, their units and bounds, and what must fit together.
 
 Every quantity is text with a unit in the file (`transmit_power = "5 W"`) and an SI float with the unit in its name here
-(`transmit_power_w`). No quantity of the mission has a default. `missionfile` reads the file and reports the faults.
+(`transmit_power_w`). No quantity of the mission has a default. `file` reads the file and reports the faults.
 """
 
 from collections.abc import Callable, Iterator, Mapping

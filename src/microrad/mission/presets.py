@@ -37,7 +37,7 @@ def presets() -> tuple[Preset, ...]:
 
 
 def preset_text(name: str) -> str:
-    """Text of the link file of a preset, to be written out, completed and read by `missionfile.load_link`.
+    """Text of the link file of a preset, to be written out, completed and read by `mission.file.load_link`.
 
     Raises `ValueError` for a name that no preset has, with the names nearest to it.
     """

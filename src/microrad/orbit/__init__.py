@@ -1,4 +1,7 @@
-"""Orbits: where satellites and stations are, when they see one another, how the line of sight moves meanwhile."""
+"""Orbits: where satellites and stations are, when they see one another, how the line of sight moves meanwhile.
+
+`operations` makes data of contacts, and `day` says what a link delivers in a day.
+"""
 
 from microrad.orbit.base import OrbitError
 from microrad.orbit.earth.epoch import Epoch

@@ -1,4 +1,7 @@
-"""Reports of a study and of an identification: a page that opens offline, the verdict in words, plain data."""
+"""What was found, for a reader: pages that open offline, sentences, tables, figures, plain data and files.
+
+A subject is a folder; `page`, `plotting` and `results` are shared.
+"""
 
 import csv
 import io

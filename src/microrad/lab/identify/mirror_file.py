@@ -1,6 +1,6 @@
 """The text of a mirror file: the keys of a mission's [mirror] table, each value with its uncertainty and source.
 
-Behind the values stands the table `uncertainty`, their covariance in a form that `mirror_spread` draws mirrors from.
+Behind the values stands the table `uncertainty`, their covariance in a form that `mirror.spread` draws mirrors from.
 """
 
 import json

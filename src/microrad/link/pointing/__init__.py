@@ -1,4 +1,8 @@
-"""Pointing: the budget of the open-loop errors, by every rule that a reviewer asks for; what jitter does to a link."""
+"""Pointing: the budget of the open-loop errors, by every rule that a reviewer asks for; what jitter does to a link.
+
+`outage` has the margin and the outage of a communication link under any distribution of errors, `statistics` the closed
+forms for a Gaussian beam, `fading` how long and how often a link fades.
+"""
 
 from microrad.link.pointing.fading import NoPowerError, SpectralMotion, fades, motion_of_spectrum, uncoded_penalty_db
 from microrad.link.pointing.open_loop import OpenLoopPointing, open_loop_budget

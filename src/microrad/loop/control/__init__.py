@@ -1,4 +1,8 @@
-"""Controllers: from gains or a specification to matrices, inverses of hysteresis, margins of the sampled loop."""
+"""Controllers: from gains or a specification to matrices, inverses of hysteresis, margins of the sampled loop.
+
+The fine-pointing loop has `problem`, `classical`, `lqg` and `tuning`, and its margins are in `analysis`. The loop of
+`[control]`, the paper's, has `sampled`, with its margins and the inverses of hysteresis.
+"""
 
 from microrad.loop.control.analysis import (
     LoopMargins,
@@ -9,7 +13,6 @@ from microrad.loop.control.analysis import (
 )
 from microrad.loop.control.classical import (
     DISTURBANCE_OBSERVER,
-    FAMILIES,
     PI,
     PI_NOTCH,
     RESONANT_DAMPING,
@@ -50,7 +53,6 @@ from microrad.loop.control.tuning import Tuned, grid_best, tune
 
 __all__ = [
     "DISTURBANCE_OBSERVER",
-    "FAMILIES",
     "GAUGE",
     "LQG",
     "OPTICAL",

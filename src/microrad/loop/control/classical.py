@@ -436,7 +436,3 @@ def follow_command(system: lti.StateSpace) -> Floats:
     A, C, R = system.A, system.C, system.D @ system.D.T
     P = solve_discrete_are(A.T, C.T, system.B @ system.B.T, R)
     return np.asarray(A @ P @ C.T / (C @ P @ C.T + R))
-
-
-FAMILIES = (PI, PID, PI_NOTCH, RESONANT_DAMPING, DISTURBANCE_OBSERVER)
-"""The families that need no more than a plant."""

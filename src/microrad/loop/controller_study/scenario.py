@@ -54,8 +54,8 @@ def scene(file: MissionFile, mirrors: MirrorParts, received_power_w: float | Non
     Args:
         file: The mission, with the folder that a file of its vibration is looked for in.
         mirrors: The mission's mirror, `mirror.of`.
-        received_power_w: Light on the tracking sensor (W), `link.tracking_light.tracking_light_w`; None where the table
-            gives the sensor's noise.
+        received_power_w: Light on the tracking sensor (W), `link.tracking_light_w`; None where the table gives the
+            sensor's noise.
 
     Raises:
         ValueError: The mission has no such loop, or it cannot be built; says why.

@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from microrad.loop import control
-from microrad.loop.controller_study import Design, ErrorBudget, FinePointingStudy, Residual, Sine, Verified
+from microrad.loop.controller_study import Design, ErrorBudget, FinePointingStudy, Residual, Sine, Verified, families
 from microrad.loop.pointing_loop.design import design_plant
 from microrad.mirror.geometry import StrokeBudget
 from microrad.mirror.summary import unknown_dynamics
@@ -47,7 +46,7 @@ def parameter_units(fine: FinePointingStudy) -> dict[str, str]:
     """Units of the parameters that controllers are tuned by, by name; "" is a plain number."""
     plant = design_plant(fine.scene.axis)
     units: dict[str, str] = {}
-    for family in (*control.FAMILIES, control.LQG):
+    for family in families(fine.scene.table):
         try:
             units |= {p.name: p.unit for p in family.parameters(plant)}
         except ValueError:  # this plant has no such controller
