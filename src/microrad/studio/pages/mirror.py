@@ -77,7 +77,7 @@ class MirrorPage:
             self._select("drive_unit", "Unit of the drive", list(mirror_form.DRIVE_UNITS))
             units = {unit: mirror_form.written(unit) for unit in mirror_form.OUTPUT_UNITS}
             self._select("output_unit", "Unit of the output", units)
-            self._text("rate", "Sample rate", "200 Hz; empty: as the file says")
+            self._text("rate", "Sample rate", "empty: as in the file")
             self._text("lever_arm", "Lever arm", "50 mm; for a displacement")
         self._select("accept", "Go on in spite of", list(ACCEPTABLE), "multiple use-chips clearable")
         layout.heading("Identification")
