@@ -10,7 +10,7 @@ from functools import partial
 import pytest
 
 from microrad.core import threads
-from microrad.core.threads import aside, beside, both, in_threads, shared_out
+from microrad.core.threads import beside, both, in_background, in_threads, shared_out
 from waiting import HANG_S
 
 
@@ -131,14 +131,14 @@ end.set()
 
 ASIDE = """
 import os, sys
-from microrad.core.threads import aside
+from microrad.core.threads import in_background
 
 def job():
     with open(sys.argv[1], "a") as file:
         file.write(str(os.getpid()))
     raise KeyboardInterrupt  # as Ctrl-C does in all processes of a terminal
 
-aside(job)()
+in_background(job)()
 assert open(sys.argv[1]).read() != str(os.getpid())
 """
 
@@ -154,5 +154,5 @@ def test_a_job_aside_is_done_in_another_process_that_says_nothing_of_its_end(tmp
 def test_no_job_is_done_aside_while_other_threads_run():
     done = []
     with ThreadPoolExecutor(1) as pool:
-        pool.submit(aside, lambda: done.append(1)).result()()
+        pool.submit(in_background, lambda: done.append(1)).result()()
     assert done == []

@@ -1287,12 +1287,12 @@ def test_a_lost_spot_is_counted_its_last_reading_held_and_the_loop_recovers():
 
 def test_the_kernels_are_compiled_aside_for_loops_of_any_kind_where_the_cache_lacks_them(monkeypatch):
     heard = []
-    monkeypatch.setattr(ensemble, "aside", lambda job: heard.append(job) or "wait")
+    monkeypatch.setattr(ensemble, "in_background", lambda job: heard.append(job) or "wait")
     monkeypatch.setattr(kernels, "is_compiled", lambda loop: loop is kernels.ensemble_loop)
-    assert ensemble.compile_aside(coupled)() is None
+    assert ensemble.compile_in_background(coupled)() is None
     assert heard == []
     monkeypatch.setattr(kernels, "is_compiled", lambda loop: loop is not kernels.ensemble_loop)
-    assert ensemble.compile_aside(coupled) == "wait"
+    assert ensemble.compile_in_background(coupled) == "wait"
     heard[0]()
     compiled = list(kernels.ensemble_loop.signatures)
     ensemble.simulate(scenario(), pi_for(scenario()), Span(0.01, 0.0, 1), 1)

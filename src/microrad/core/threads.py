@@ -100,7 +100,7 @@ def beside(job: Callable[[], _Result]) -> Iterator[Callable[[], _Result]]:
         yield lambda: results()[0]
 
 
-def aside(job: Callable[[], object]) -> Callable[[], None]:
+def in_background(job: Callable[[], object]) -> Callable[[], None]:
     """Begin a job in a forked process beside this one; the callable waits for its end.
 
     What it returns, and its errors, are dropped. Where there is a single core, or no process can be forked (see

@@ -174,7 +174,7 @@ def run_study(
         found = link_study.run_link_study(file, parts)
         return found, margin_map(found.data, sources)
 
-    compiled = ensemble.compile_aside(lambda: scene().loop) if m.fine_pointing else lambda: None
+    compiled = ensemble.compile_in_background(lambda: scene().loop) if m.fine_pointing else lambda: None
     on_progress(0, 3, "budgets, acquisition, mirror and tracking")
     with beside(linked) as of_links:
         summary = mirror_summary.summarise(m.mirror)

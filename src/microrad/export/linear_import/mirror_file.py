@@ -204,7 +204,7 @@ def _check_read_back(text: str, model: Roots, given: Given, source: str) -> None
 
 def _reasons(error: ValueError) -> str:
     """What the mirror's table found, key by key."""
-    from pydantic import ValidationError  # the table's own; here, beside its only use
+    from pydantic import ValidationError
 
     if not isinstance(error, ValidationError):
         return str(error)

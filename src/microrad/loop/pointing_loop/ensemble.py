@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from microrad.core import compiling, kernels, lti
 from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
-from microrad.core.threads import aside, in_threads
+from microrad.core.threads import in_background, in_threads
 from microrad.loop.pointing_loop.kernel_arrays import LANES, Shaping, arrays, combined_shaping, reference, start
 from microrad.loop.pointing_loop.loop import LoopController, PointingLoop
 
@@ -120,7 +120,7 @@ def histogram_beyond(counts: NDArray[np.integer], radius_rad: float) -> float:
     return 1.0 - float(np.interp(max(radius_rad, 0.0) ** 2, edges, below)) / total
 
 
-def compile_aside(of: Callable[[], PointingLoop]) -> Callable[[], None]:
+def compile_in_background(of: Callable[[], PointingLoop]) -> Callable[[], None]:
     """Begin to compile the kernels of an ensemble in a process beside this one, if the cache lacks them.
 
     They do not depend on the loop, ``of``: it is an example to compile them by. The callable waits for the end.
@@ -128,7 +128,7 @@ def compile_aside(of: Callable[[], PointingLoop]) -> Callable[[], None]:
     if kernels.is_compiled(kernels.ensemble_loop):
         return lambda: None
     compiling.begins()
-    return aside(lambda: _one_sample(of()))
+    return in_background(lambda: _one_sample(of()))
 
 
 def _one_sample(loop: PointingLoop) -> None:
