@@ -303,6 +303,14 @@ def test_the_relays_share_is_granted_from_the_beginning(quick, seconds, links):
     assert found.relay.contact_s == pytest.approx(0.4 * sum(c.contact.duration_s for c in found.view.encounters))
 
 
+def test_a_contact_that_goes_on_behind_the_span_is_granted_a_share_of_what_it_has_in_the_span(quick):
+    second = quick(NO_SEARCH).view.encounters[1].contact
+    end_s = round(second.start_s + 0.6 * second.duration_s)
+    cut = quick(NO_SEARCH, {"orbit.duration": f"{end_s} s", "operations.relay_share": 0.5}).relay.contacts[1]
+    assert cut.start_s == pytest.approx(second.start_s)
+    assert cut.duration_s == pytest.approx(0.5 * (end_s - second.start_s))
+
+
 def test_a_full_store_loses_the_newest(quick, seconds, links):
     found = quick(NO_SEARCH, {"operations.store": "0.6 GB"})
     o, rate = found.operations, seconds.rate_bit_s(links, [300e6], 3.0)
