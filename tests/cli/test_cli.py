@@ -328,7 +328,7 @@ def test_a_full_disk_during_run_leaves_nothing_but_the_verdict(call, folder, mon
         raise OSError(errno.ENOSPC, "No space left on device")
 
     before = listing(folder)
-    monkeypatch.setattr(report, "write_columns", full)
+    monkeypatch.setattr(report, "columns_csv", full)
     result = call("run", plain, "--mirror", loop_mirror)
     assert (result.code, result.err.count("\n")) == (2, 1)
     assert "No space left on device; nothing was written" in result.err
@@ -435,7 +435,7 @@ def interruptible():
 @pytest.mark.usefixtures("interruptible")
 @pytest.mark.parametrize(
     ("name", "package", "module", "function"),
-    [("SIGINT", "microrad.study", "study", "run_study"), ("SIGTERM", "microrad", "report", "write_columns")],
+    [("SIGINT", "microrad.study", "study", "run_study"), ("SIGTERM", "microrad", "report", "columns_csv")],
 )
 def test_an_interrupt_during_run_leaves_nothing(
     folder, loop_mirror, plain, name, package, module, function, tmp_path_factory
@@ -667,7 +667,7 @@ def test_progress_goes_to_a_terminal_and_never_to_stdout(call, folder, monkeypat
     result = call("identify", write_recording(folder / "loop.csv"), *COLUMNS, "--json")
     assert result.code == 0
     assert json.loads(result.out)["model"]
-    assert "Bouc-Wen starts" in result.err
+    assert "fitting bouc_wen" in result.err
 
 
 @pytest.mark.usefixtures("undrawn")

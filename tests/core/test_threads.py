@@ -85,6 +85,33 @@ def test_forked_processes_do_jobs_and_what_they_leave_is_done_by_the_caller(help
     assert ran.stdout.split() == [str(min(done_there, 1)), str(done_there)]
 
 
+@pytest.mark.skipif(sys.platform != "linux" or os.cpu_count() == 1, reason="nothing is forked")
+def test_a_process_that_dies_beside_others_is_not_waited_for():
+    code = """
+import multiprocessing, os
+from microrad.core.threads import shared_out
+
+sent = bytes(1 << 20)  # more than a pipe holds
+os.cpu_count = lambda: 3
+began, begins = os.pipe()
+
+def own():
+    name = multiprocessing.current_process().name
+    if name == "Process-1":
+        os.write(begins, b".")
+        os._exit(1)
+    if name == "Process-2":
+        os.write(begins, os.read(began, 1))  # it has a job, and the other has begun with one
+    return sent
+
+with shared_out([own] * 3) as results:
+    os.waitid(os.P_ALL, 0, os.WEXITED | os.WNOWAIT)
+    assert results() == [sent] * 3
+"""
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=HANG_S)
+    assert (ran.returncode, ran.stderr) == (0, "")
+
+
 @pytest.mark.parametrize("forks", [True, False])
 def test_an_error_in_a_shared_job_is_the_callers(forks, monkeypatch):
     def broken():

@@ -1,5 +1,6 @@
 """The ladder: what is fitted to what, the choice on samples that no fit has seen, its doubts, and the mirror file."""
 
+import pickle
 import re
 from dataclasses import replace
 
@@ -306,6 +307,43 @@ def test_progress_counts_fits_and_ends(loops, wide):
     assert fits == [(1, 3, "play operators"), (2, 3, "linear"), (3, 3, "prandtl_ishlinskii_joint")]
     assert calls[0][2].startswith("order")
     assert calls[-1][2] == "linear part, hysteresis and creep together"
+
+
+def test_models_fitted_side_by_side_are_those_fitted_in_turn(loops, wide):
+    models, told, heard = (*FEW, "bouc_wen_asymmetric"), [], []
+    one, other = (
+        identify(
+            [wide, *loops],
+            models=models,
+            side_by_side=both,
+            on_progress=lambda *args, both=both: told.append(args) if both else None,
+            on_fit=lambda judged: heard.append(judged.model),
+        )
+        for both in (False, True)
+    )
+    for model in models:  # to the last digit
+        assert mirror_file_text(one, "lab", model=model) == mirror_file_text(other, "lab", model=model)
+    assert heard[: len(heard) // 2] == heard[len(heard) // 2 :]
+    begun = [call[2].startswith("fitting ") for call in told].index(True)
+    beside = [call[:2] for call in told[begun:]]
+    beside = beside[: beside.index((len(models), len(models)))]
+    assert beside == sorted(beside)
+    assert {total for _, total in beside} == {len(models)}
+    fits = pickle.loads(
+        pickle.dumps(one.fits)
+    )  # what another process makes of them; one that cannot be is fitted twice
+    for name, fit in zip(models, fits, strict=True):
+        assert mirror_file_text(replace(one, fits=fits), "lab", model=name) == mirror_file_text(one, "lab", model=name)
+        assert not isinstance(fit, JointFit) or (fit.structure.build(fit.fit.values).A == fit.mirror.A).all()
+
+
+def test_error_of_a_model_fitted_side_by_side(loops, monkeypatch):
+    def fails(*args, **options):
+        raise IdentificationError("no plays")
+
+    monkeypatch.setattr("microrad.lab.identify.selection.candidates.fit_prandtl_ishlinskii", fails)
+    with pytest.raises(IdentificationError, match="no plays"):
+        identify(loops, models=STATIC[:2], side_by_side=True)
 
 
 def test_the_list_of_models_is_whole():

@@ -401,6 +401,7 @@ def test_two_sensors_report_the_worse_of_both_cuts():
     controller = both_sensors(plant)
     whole, optical = (analysis.margins_at(plant, controller, cut) for cut in analysis.BREAKS)
     found = analysis.loop_margins(plant, controller)
+    assert (whole, optical) == analysis.margins_of_cuts(plant, controller)
     assert abs(whole.modulus - optical.modulus) > 0.01
     assert found.modulus == min(whole.modulus, optical.modulus)
     assert found.disk == min(whole.disk, optical.disk)
@@ -418,10 +419,10 @@ def test_each_margin_is_the_worse_one_of_both_cuts(first, monkeypatch):
     worse = replace(real, gain_up=1.5, gain_down=0.8, phase_rad=0.3, delay_s=1e-4, modulus=0.4, disk=0.5)
     better = replace(real, gain_up=3.0, gain_down=0.2, phase_rad=0.9, delay_s=9e-4, modulus=0.7, disk=0.9)
 
-    def cut(plant, controller, broken_at="command"):
-        return worse if broken_at == first else better
+    def cuts(plant, controller):
+        return tuple(worse if broken_at == first else better for broken_at in analysis.BREAKS)
 
-    monkeypatch.setattr(analysis, "margins_at", cut)
+    monkeypatch.setattr(analysis, "margins_of_cuts", cuts)
     found = analysis.loop_margins(plant, both_sensors(plant))
     for name in ("gain_up", "gain_down", "phase_rad", "delay_s", "modulus", "disk"):
         assert getattr(found, name) == getattr(worse, name), name

@@ -149,6 +149,7 @@ def identify(  # noqa: PLR0913  every argument is a named option
     input_unit, drive_by = _unit(input_unit, drive_said, "--input-unit", "V")
     output_unit, output_by = _unit(output_unit, output_said, "--output-unit", "mrad")
     models = identification.STATIC[:2] if static else identification.MODELS
+    live = os.environ.get(PROGRESS_FILE)
     with progress_bar() as bar:
         found = identification.identify(
             records,
@@ -161,7 +162,8 @@ def identify(  # noqa: PLR0913  every argument is a named option
             output_unit=output_unit,
             lever_arm_m=lever_arm,
             input_unit=input_unit,
-            on_fit=live_fit_writer(os.environ.get(PROGRESS_FILE)),
+            on_fit=live_fit_writer(live),
+            side_by_side=not live,
         )
     if found.unsupported:
         raise Refusal(found.unsupported)

@@ -57,29 +57,32 @@ def shared_out(
     os.write(given, bytes(range(len(jobs))))
     os.close(given)
     context: Any = multiprocessing.get_context("fork" if helpers else None)
-    pipes = [context.Pipe(duplex=False) for _ in range(helpers)]
-    processes = [context.Process(target=_help, args=(jobs, turns, mouth), daemon=True) for _, mouth in pipes]
+    ears: list[Any] = []
+    processes: list[Any] = []
 
     def results() -> list[_Result]:
         done = _done(jobs, turns, on_turn)
-        for ear, mouth in pipes:
-            mouth.close()
+        for ear in ears:
             with contextlib.suppress(EOFError):
                 done |= ear.recv()
         return [done[number] if number in done else job() for number, job in enumerate(jobs)]
 
     try:
-        for process in processes:
-            process.start()
+        for _ in range(helpers):
+            ear, mouth = context.Pipe(duplex=False)
+            ears.append(ear)
+            with mouth:  # closed here before the next fork: so a process that dies is heard of, whoever else lives
+                process = context.Process(target=_help, args=(jobs, turns, mouth, ears), daemon=True)
+                process.start()
+            processes.append(process)
         yield results
     finally:
         os.close(turns)
         for process in processes:
-            if process.pid is not None:
-                process.kill()
-                process.join()
-        for end in (end for pipe in pipes for end in pipe):
-            end.close()
+            process.kill()
+            process.join()
+        for ear in ears:
+            ear.close()
 
 
 def both(first: Callable[[], _First], second: Callable[[], _Second]) -> tuple[_First, _Second]:
@@ -134,6 +137,8 @@ def _done(
     return done
 
 
-def _help(jobs: Sequence[Callable[[], Any]], turns: int, mouth: Any) -> None:
+def _help(jobs: Sequence[Callable[[], Any]], turns: int, mouth: Any, ears: Sequence[Any]) -> None:
+    for ear in ears:  # else nobody would tell it that the caller has gone
+        ear.close()
     with contextlib.suppress(BaseException):  # the caller does without
         mouth.send(_done(jobs, turns))

@@ -219,11 +219,18 @@ def _respond(plant: DesignPlant, controller: AxisController, broken_at: str) -> 
     mirror = moved(plant).from_command
 
     def response(freq_hz: Floats) -> Complexes:
-        K = lti.frequency_response(controller.system, freq_hz, plant.period_s)[:, 0, :]
-        G = lti.frequency_response(mirror, freq_hz, plant.period_s)[:, :, 0]
-        return real_at_half_the_rate(cut(K, G, broken_at), freq_hz * plant.period_s)
+        parts = _parts(mirror, controller, freq_hz, plant.period_s)
+        return real_at_half_the_rate(cut(*parts, broken_at), freq_hz * plant.period_s)
 
     return response
+
+
+def _parts(
+    mirror: lti.StateSpace, controller: AxisController, freq_hz: Floats, period_s: float
+) -> tuple[Complexes, Complexes]:
+    """Responses of controller (sensor to command) and plant (command to sensor), as `cut` takes them."""
+    K = lti.frequency_response(controller.system, freq_hz, period_s)[:, 0, :]
+    return K, lti.frequency_response(mirror, freq_hz, period_s)[:, :, 0]
 
 
 def real_at_half_the_rate(L: Complexes, cycles: Floats) -> Complexes:
@@ -262,7 +269,7 @@ def margins_at(plant: DesignPlant, controller: AxisController, broken_at: str = 
     return margins_of(_respond(plant, controller, broken_at), _resolving(plant, controller))
 
 
-def margins_of(response: Response, freq_hz: Floats) -> LoopMargins:
+def margins_of(response: Response, freq_hz: Floats, known: Complexes | None = None) -> LoopMargins:
     """Margins of a stable loop.
 
     Each crossing and each dip is followed between the frequencies to where it is, so that the margins do not depend on
@@ -271,8 +278,9 @@ def margins_of(response: Response, freq_hz: Floats) -> LoopMargins:
     Args:
         response: Loop gain L at frequencies in Hz; 1 + L = 0 is the limit of stability.
         freq_hz: Where the crossings and dips are looked for, rising; see `resolving`.
+        known: The response at these frequencies, where it is at hand.
     """
-    L = response(freq_hz)
+    L = response(freq_hz) if known is None else known
     size = np.abs(L)
     crossing = _roots(lambda f: np.log(np.abs(response(f))), freq_hz, np.log(np.maximum(size, 1e-300)))
     lag = np.mod(np.angle(-response(crossing)), 2 * math.pi)  # what would bring L to -1
@@ -326,16 +334,30 @@ def loop_margins(plant: DesignPlant, controller: AxisController) -> LoopMargins:
     A disturbance is rejected by 1 / (1 + L) of the loop cut at the optical sensor, or at the command where there is
     but one sensor. Raises ValueError as `margins_at` does.
     """
-    whole = margins_at(plant, controller)
     if not uses_both(controller):
-        return whole
-    optical = margins_at(plant, controller, "optical")
+        return margins_at(plant, controller)
+    whole, optical = margins_of_cuts(plant, controller)
     least = ("gain_up", "phase_rad", "delay_s", "modulus", "disk")
     return replace(
         optical,
         gain_down=max(whole.gain_down, optical.gain_down),
         **{name: min(getattr(whole, name), getattr(optical, name)) for name in least},
     )
+
+
+def margins_of_cuts(plant: DesignPlant, controller: AxisController) -> tuple[LoopMargins, LoopMargins]:
+    """`margins_at` each of `BREAKS`, in their order: both cuts share the responses of controller and plant."""
+    refuse_misfit(plant, controller)
+    refuse_unstable(plant, controller)
+    freq, period = _resolving(plant, controller), plant.period_s
+    parts = _parts(moved(plant).from_command, controller, freq, period)
+
+    def margins(broken_at: str) -> LoopMargins:
+        L = real_at_half_the_rate(cut(*parts, broken_at), freq * period)
+        return margins_of(_respond(plant, controller, broken_at), freq, L)
+
+    command, optical = BREAKS
+    return margins(command), margins(optical)
 
 
 def uses_both(controller: AxisController) -> bool:

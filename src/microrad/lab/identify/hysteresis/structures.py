@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -138,9 +139,14 @@ class Axis(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class AxisStructure(Structure):
-    """A `Structure` of one axis, whose parts can be had by themselves."""
+    """A `Structure` of one axis, whose parts can be had by themselves; another process makes it again from `recipe`."""
 
     parts: Callable[[Floats], Axis]
+    recipe: Callable[[], "AxisStructure"]
+
+    def __reduce__(self) -> tuple[Callable[[], "AxisStructure"], tuple[()]]:
+        """What pickles it: its closures cannot be."""
+        return self.recipe, ()
 
 
 def one_axis(
@@ -185,7 +191,17 @@ def one_axis(
         system = None if axis.linear is None else axis.linear.system
         return mirror.assemble(name, composition, system, axis.model, axis.creep)
 
-    return AxisStructure(name, (*hysteresis, *lags, *roots), build, parts)
+    again = partial(
+        one_axis,
+        name,
+        model,
+        linear=linear,
+        creep=creep,
+        free=tuple(free),
+        free_linear=free_linear,
+        admissible=admissible,
+    )
+    return AxisStructure(name, (*hysteresis, *lags, *roots), build, parts, again)
 
 
 def _bouc_wen_part(

@@ -4,18 +4,20 @@ A static model has hysteresis alone; a joint one has the linear part, hysteresis
 """
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
 from microrad.core.progress import Progress
+from microrad.core.threads import shared_out
 from microrad.lab.identify.hysteresis.bouc_wen import BoucWenFit, fit_bouc_wen
 from microrad.lab.identify.hysteresis.joint import FORMS, JointFit, fit_joint, fit_static_start, time_constants
 from microrad.lab.identify.hysteresis.prandtl_ishlinskii import fit_prandtl_ishlinskii
 from microrad.lab.identify.hysteresis.structures import LinearPoles, poles_of
 from microrad.lab.identify.linear.fit import LinearFit, fit_linear
-from microrad.lab.identify.records import IdentificationError, SiRecord, Units
+from microrad.lab.identify.records import IdentificationError, SiRecord, Units, no_progress
 from microrad.lab.identify.selection.predictions import Fit, Prediction, Score, ScoredModel, predict
 from microrad.lab.identify.statistics import percent
 from microrad.lab.recording import Recording
@@ -104,7 +106,7 @@ class Candidates:
     admissible: bool
 
     def fit_all(
-        self, models: Sequence[str], on_progress: Progress, on_fit: Callable[[Fit], None]
+        self, models: Sequence[str], on_progress: Progress, on_fit: Callable[[Fit], None], *, side_by_side: bool = False
     ) -> tuple[list[Fit], list[Refused]]:
         """One fit a model; a joint fit that fails is refused with its reason, a static one raises.
 
@@ -112,6 +114,7 @@ class Candidates:
             models: The models to fit.
             on_progress: Called with the starts done, their number and what is done.
             on_fit: Called with each fit.
+            side_by_side: Whether another process takes part; then the fits are heard of at the end.
 
         Raises:
             IdentificationError: Where a static fit fails, or every fit.
@@ -120,6 +123,7 @@ class Candidates:
         if self.linear is not None:
             poles = poles_of(self.linear.system, self.linear.excited_hz, self.linear.rate_hz)
         efforts = [_STARTS if model in ("bouc_wen", "bouc_wen_admissible") else 1 for model in models]
+        ahead = self._side_by_side(models, efforts, poles, on_progress) if side_by_side else {}
         fits: list[Fit] = []
         failed = []
         for i, model in enumerate(models):
@@ -128,20 +132,53 @@ class Candidates:
                 on_progress(before + done, sum(efforts), what)
 
             try:
-                fits.append(
-                    self._fit_static(model, progress) if model in STATIC else self.fit_joint(model, poles, progress)
-                )
+                fits.append(ahead[model]() if ahead else self._fit(model, poles, progress))
             except IdentificationError as error:
                 if model in STATIC:
                     raise
                 failed.append(Refused(model, str(error)))
             else:
                 on_fit(fits[-1])
-            if model not in STATIC:
+            if not ahead and model not in STATIC:
                 progress(1, 1, model)
+        if ahead:
+            on_progress(sum(efforts), sum(efforts), models[-1])
         if not fits:
             raise IdentificationError(failed[0].reason)
         return fits, failed
+
+    def _side_by_side(
+        self, models: Sequence[str], efforts: Sequence[int], poles: LinearPoles | None, on_progress: Progress
+    ) -> dict[str, Callable[[], Fit]]:
+        """What gives the fit of each model, or raises its error: all of them made, on all cores where that is possible.
+
+        What takes longest goes first.
+        """
+        turns = sorted(models, key=lambda model: (model in STATIC, model != "bouc_wen_classical"))
+        if any(FORMS[model].family == "bouc_wen" for model in set(models) - {*STATIC}):
+            with suppress(IdentificationError):  # each form says so
+                _ = self._static_start
+
+        def fitted(model: str) -> tuple[Fit | None, str]:
+            try:
+                return self._fit(model, poles, no_progress), ""
+            except IdentificationError as error:
+                return None, str(error)
+
+        def given(fit: Fit | None, error: str) -> Fit:
+            if fit is None:
+                raise IdentificationError(error)
+            return fit
+
+        def told(turn: int) -> None:
+            begun = sum(effort for model, effort in zip(models, efforts, strict=True) if model in turns[:turn])
+            on_progress(begun, sum(efforts), f"fitting {turns[turn]}")
+
+        with shared_out([partial(fitted, model) for model in turns], told) as results:
+            return {model: partial(given, *found) for model, found in zip(turns, results(), strict=True)}
+
+    def _fit(self, model: str, poles: LinearPoles | None, progress: Progress) -> Fit:
+        return self._fit_static(model, progress) if model in STATIC else self.fit_joint(model, poles, progress)
 
     def _fit_static(self, model: str, progress: Progress) -> Fit:
         if model == "prandtl_ishlinskii":

@@ -130,6 +130,7 @@ def identify(  # noqa: PLR0913  all but the first are named options in practice
     lever_arm_m: float | None = None,
     input_unit: str = "V",
     on_fit: Callable[[ScoredModel], None] = lambda judged: None,
+    side_by_side: bool = False,
 ) -> Identification:
     """Fit the models on the first part of each recording and choose the one that is better on the rest.
 
@@ -151,6 +152,8 @@ def identify(  # noqa: PLR0913  all but the first are named options in practice
         lever_arm_m: Distance from the axis of rotation to the point measured, where that is a length.
         input_unit: Unit of the drives: V or mV.
         on_fit: Given each model as soon as it is fitted, and the winner again when everything was free.
+        side_by_side: Whether several models are fitted at once, in another process too; then `on_fit` is given them
+            when all are fitted.
 
     Raises:
         IdentificationError: For what cannot be fitted as asked, and where not even the best model follows the output.
@@ -189,7 +192,7 @@ def identify(  # noqa: PLR0913  all but the first are named options in practice
         predictions.append(candidates.predict(fit))
         on_fit(candidates.scored(fit, predictions[-1]))
 
-    fits, failed = candidates.fit_all(names, on_progress, judge)
+    fits, failed = candidates.fit_all(names, on_progress, judge, side_by_side=side_by_side and len(names) > 1)
     best = choose_best(fits, [[r for p in each if (r := p.residual_rad[p.split :]).size] for each in predictions])
     winner = fits[best]
     fits[best], predictions[best] = refit_winner(candidates, winner, predictions[best], on_progress)
