@@ -1,12 +1,11 @@
-"""Campaigns: rows of links, efficiency on two cores by threads and by Dask, the price of 100 000 runs, memory.
+"""Campaigns: rows of links, efficiency on two cores, the price of 100 000 runs, memory.
 
     python benchmarks/campaign.py            # everything, some minutes
     python benchmarks/campaign.py --quick    # a tenth of the runs
 
 One axis of the shipped mission under PI, ten seconds a run, a drawn transmit power: 64 runs side by side in the
-compiled kernel, the link budgeted under each. One thread, two threads of one worker process and two Dask workers do
-the same chunks in turn, several times; the start of the workers is left out, and told apart. Efficiency is the time on
-one thread over twice the time on two, median of the rounds.
+compiled kernel, the link budgeted under each. One process and two do the same chunks in turn, several times; their
+start is left out, and told apart. Efficiency is the time on one over twice the time on two, median of the rounds.
 
 Rows of links alone under a jitter: the crosslink of docs/gallery, by the processor's time. The bar is 100 rows a second
 and core.
@@ -50,9 +49,8 @@ axes = "one"
 duration = "10 s"
 """
 MEANS = {
-    "one thread": run.Means(threads=1),
-    "two threads": run.Means(threads=2),
-    "two Dask workers": run.Means(workers=2),
+    "one process": run.Means(workers=1),
+    "two processes": run.Means(workers=2),
 }
 
 
@@ -91,11 +89,11 @@ def efficiency(runs: int) -> None:
     print(f"{campaign.rows} runs of 10 s, one axis, {len(jobs)} chunks; median of {ROUNDS} rounds")
     for name in MEANS:
         took = statistics.median(each[name] for each in rounds)
-        gain = statistics.median(each["one thread"] / (2.0 * each[name]) for each in rounds)
-        shown = "" if name == "one thread" else f", efficiency {gain:.2f}"
+        gain = statistics.median(each["one process"] / (2.0 * each[name]) for each in rounds)
+        shown = "" if name == "one process" else f", efficiency {gain:.2f}"
         each_ms = 1e3 * took / campaign.rows
         print(f"  {name:18} {took:6.2f} s, {each_ms:.2f} ms a run{shown}; begins in {started[name]:.1f} s")
-        if name == "two threads":
+        if name == "two processes":
             print(f"    100 000 such runs: {took / campaign.rows * 1e5 / 60.0:.0f} min, projected from these")
 
 

@@ -102,12 +102,3 @@ class Work:
         if not Path(mark).exists():
             Path(mark).touch()
             action()
-
-    def side_by_side(self, job, beat, folder):
-        mark = Path(folder) / f"{job.kind}-{job.number}"
-        mark.touch()
-        self.slow(job, beat)
-        others = sorted(p.name for p in Path(folder).iterdir())
-        mark.unlink()
-        if job.kind == "row" and len(others) > 1:
-            raise ValueError(f"not alone: {others}")

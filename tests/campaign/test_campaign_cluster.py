@@ -1,4 +1,4 @@
-"""The dask engine: workers of a cluster made here and of a scheduler elsewhere die, hang, differ and go away."""
+"""The dask engine: workers of a scheduler die, hang, differ and go away."""
 
 import json
 import os
@@ -7,7 +7,6 @@ import subprocess
 import sys
 import threading
 from contextlib import suppress
-from pathlib import Path
 from types import SimpleNamespace
 
 import psutil
@@ -19,7 +18,7 @@ from microrad.campaign.engines.flights import Flight, JobQueue, late_flights
 from microrad.campaign.records import CampaignError, Job
 from small_campaign import import_path, killing
 from small_campaign import kill as kill_process
-from waiting import HANG_S, alive, beside, gone, no_hang, until
+from waiting import HANG_S, beside, no_hang, until
 
 KilledWorker = pytest.importorskip("distributed.scheduler").KilledWorker
 
@@ -37,7 +36,7 @@ TABLE = {
 
 
 def workers_here(pid=None):
-    """Worker processes of clusters that a process (this one) has made; each may end meanwhile."""
+    """Worker processes behind the nannies that a process (this one) has started; each may end meanwhile."""
     found = []
     for process in psutil.Process(pid).children(recursive=True):
         with suppress(psutil.Error):
@@ -78,13 +77,60 @@ def stuck(tmp_path_factory):
     return tmp_path_factory.mktemp("mark") / "stuck"
 
 
+def whole(told):
+    """Whether a scheduler has said all about itself."""
+    return told.exists() and told.read_text("utf-8").endswith("}")
+
+
+class Elsewhere:
+    """A scheduler and workers started as one does by hand."""
+
+    def __init__(self, folder, **environment):
+        self.folder, self.started, self.count = folder, [], 0
+        told = folder / "scheduler.json"  # written once it listens, at a port that nobody else can have taken
+        own = ("--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", str(told))
+        self.scheduler = self.start("scheduler", *own, **environment)
+        until(lambda: self.scheduler.poll() is not None or whole(told), "a scheduler")
+        assert self.scheduler.poll() is None, self.log
+        self.address = json.loads(told.read_text("utf-8"))["address"]
+
+    def start(self, what, *arguments, prelude="", **environment):
+        code = f"{prelude}\nimport runpy; runpy.run_module('distributed.cli.dask_{what}', run_name='__main__')"
+        with (self.folder / "log").open("a") as log:
+            process = subprocess.Popen(
+                [sys.executable, "-c", code, *arguments],
+                cwd=self.folder, env=os.environ | environment, stdout=log, stderr=log,
+            )  # fmt: skip
+        self.started.append(process)
+        return process
+
+    @property
+    def log(self):
+        return (self.folder / "log").read_text("utf-8", "replace")
+
+    def worker(self, *arguments, **kwargs):
+        own = ("--nthreads", "1", "--no-dashboard", "--local-directory", str(self.folder), *arguments)
+        return self.start("worker", self.address, *own, **kwargs)
+
+    def close(self):
+        for process in reversed(self.started):
+            for child in psutil.Process(process.pid).children(recursive=True):
+                kill_process(child.pid)
+            process.kill()
+            process.wait()
+
+
 @pytest.fixture(scope="module")
-def engine(stuck):
-    """Two workers on this machine, whose jobs do what the table by number says."""
+def engine(stuck, tmp_path_factory):
+    """Two workers of a scheduler, whose jobs do what the table by number says; a death of a worker is its job's."""
+    there = Elsewhere(tmp_path_factory.mktemp("there"), DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES="0")
+    there.worker("--nworkers", "2")
     table = TABLE | {"107": f"endless_once {stuck}", "else": "slow"}
-    one = DaskEngine(json.dumps(table).encode(), TARGET, workers=2, late_s=LATE_S)
+    one = DaskEngine(json.dumps(table).encode(), TARGET, there.address, late_s=LATE_S)
+    until(lambda: len(one._client.scheduler_info()["workers"]) == 2, "two workers")
     yield one
     one.close()
+    there.close()
 
 
 def test_every_job_has_its_own_result_and_both_workers_work(engine):
@@ -181,123 +227,7 @@ def test_workers_killed_at_random_lose_and_double_nothing(engine, stuck):
     assert 107 in died
 
 
-def test_a_worker_that_was_given_up_is_started_anew(engine):
-    """As dask gives up one that is not back within 15 s, on a busy machine."""
-    own, known = engine._cluster._cluster, engine._cluster._cluster.scheduler.workers
-
-    def two_there() -> bool:
-        there = sorted(str(nanny.worker_address) for nanny in own.workers.values())
-        return len(there) == 2 and sorted(known) == there
-
-    until(two_there, "two workers")
-    name, nanny = next(iter(own.workers.items()))
-    address = nanny.worker_address
-    del own.workers[name]
-    own.sync(nanny.close)
-    until(lambda: address not in known, "its end")
-    assert kinds(run(engine, chunks(*range(20)))) == {}
-    until(lambda: run(engine, chunks(0)) and two_there(), "its successor")  # dask may give up that one too
-    assert nanny not in own.workers.values()
-
-
-@pytest.mark.parametrize("deed", [pytest.param("endless", marks=pytest.mark.endurance), "hog"])
-def test_close_stops_at_once_whatever_runs_and_leaves_nothing(deed, tmp_path, monkeypatch):
-    """At once: its workers are killed before anything is waited for; what they do has no end of its own."""
-    table = {"else": f"{deed} {tmp_path}/begun", "0": "work"}
-    one = DaskEngine(json.dumps(table).encode(), TARGET, workers=2, late_s=HANG_S)
-    own, place = one._cluster._cluster, Path(one._cluster._folder)
-    workers = [nanny.pid for nanny in own.workers.values()]
-    assert len(workers) == 2
-    assert place.is_dir()
-    outcomes, calls = one.outcomes(iter(chunks(*range(9)))), []
-    assert next(outcomes).kind == "done"
-    until((tmp_path / "begun").exists, "the deed")
-    monkeypatch.setattr(os, "kill", lambda pid, number, real=os.kill: (calls.append(pid), real(pid, number))[1])
-    monkeypatch.setattr(own, "close", lambda real=own.close, **more: (calls.append("close"), real(**more))[1])
-    with no_hang():
-        one.close()
-        one.close()
-    assert (sorted(calls[:2]), calls[2]) == (sorted(workers), "close")
-    assert not any(map(alive, workers))
-    assert not place.exists()
-    with pytest.raises(CampaignError, match="were stopped"):
-        run(one, chunks(1))
-
-
-PARENT = """
-import sys
-from microrad.campaign.engines.cluster import DaskEngine
-from microrad.campaign.records import Job
-if __name__ == "__main__":
-    table = '{"0": "work", "else": "hog %s"}' % sys.argv[1]
-    engine = DaskEngine(table.encode(), "campaign_target:open_work", workers=2, late_s=1000.0)
-    for outcome in engine.outcomes(Job(0, n) for n in range(9)):
-        print(outcome.kind, flush=True)
-"""
-
-
-def test_a_killed_parent_leaves_no_orphan(tmp_path):
-    (tmp_path / "parent.py").write_text(PARENT)
-    process = subprocess.Popen(
-        [sys.executable, tmp_path / "parent.py", tmp_path / "begun"],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-    )  # fmt: skip
-    alarm = threading.Timer(HANG_S, process.kill)
-    alarm.start()
-    assert process.stdout.readline() == "done\n"
-    alarm.cancel()
-    until((tmp_path / "begun").exists, "the hog")
-    workers = [worker.pid for worker in workers_here(process.pid)]
-    assert len(workers) == 2
-    process.kill()
-    process.communicate()
-    assert gone(*workers)
-
-
 # --------------------------------------------------------------------------------------------- a scheduler elsewhere
-def whole(told):
-    """Whether a scheduler has said all about itself."""
-    return told.exists() and told.read_text("utf-8").endswith("}")
-
-
-class Elsewhere:
-    """A scheduler and workers started as one does by hand."""
-
-    def __init__(self, folder):
-        self.folder, self.started, self.count = folder, [], 0
-        told = folder / "scheduler.json"  # written once it listens, at a port that nobody else can have taken
-        own = ("--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", str(told))
-        self.scheduler = self.start("scheduler", *own)
-        until(lambda: self.scheduler.poll() is not None or whole(told), "a scheduler")
-        assert self.scheduler.poll() is None, self.log
-        self.address = json.loads(told.read_text("utf-8"))["address"]
-
-    def start(self, what, *arguments, prelude="", **environment):
-        code = f"{prelude}\nimport runpy; runpy.run_module('distributed.cli.dask_{what}', run_name='__main__')"
-        with (self.folder / "log").open("a") as log:
-            process = subprocess.Popen(
-                [sys.executable, "-c", code, *arguments],
-                cwd=self.folder, env=os.environ | environment, stdout=log, stderr=log,
-            )  # fmt: skip
-        self.started.append(process)
-        return process
-
-    @property
-    def log(self):
-        return (self.folder / "log").read_text("utf-8", "replace")
-
-    def worker(self, *arguments, **kwargs):
-        own = ("--nthreads", "1", "--no-dashboard", "--local-directory", str(self.folder), *arguments)
-        return self.start("worker", self.address, *own, **kwargs)
-
-    def close(self):
-        for process in reversed(self.started):
-            for child in psutil.Process(process.pid).children(recursive=True):
-                kill_process(child.pid)
-            process.kill()
-            process.wait()
-
-
 @pytest.fixture
 def elsewhere(tmp_path):
     one = Elsewhere(tmp_path)
@@ -383,4 +313,4 @@ def test_an_address_without_a_scheduler_is_told(monkeypatch, address):
 def test_without_distributed_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(CampaignError, match=r"constraints.txt '\.\[cluster\]'"):
-        DaskEngine(b"{}", TARGET, workers=1)
+        DaskEngine(b"{}", TARGET, "tcp://127.0.0.1:9")

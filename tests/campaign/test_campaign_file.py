@@ -660,10 +660,10 @@ def test_a_ledger_is_no_campaign_file_and_the_other_way_round(tmp_path):
         load_campaign(path)
     assert "microrad campaign resume '" in caught.value.faults[0].expected
     text = written(tmp_path, HEAD + POWER)
-    with pytest.raises(CampaignError, match=rf"is text, not a ledger: begin it with `microrad campaign run {text}`"):
+    with pytest.raises(CampaignError, match=rf"is no ledger, .* begin it with `microrad campaign run {text}`"):
         file.refuse_foreign(text)
     (tmp_path / "table.csv").write_text("row\n1\n")
-    with pytest.raises(CampaignError, match="is text, not a ledger: name the file"):
+    with pytest.raises(CampaignError, match="is no ledger, or its first page is damaged: name the file"):
         file.refuse_foreign(tmp_path / "table.csv")
 
 

@@ -67,7 +67,7 @@ class Outcome:
 
 
 class Engine(Protocol):
-    """What runs jobs: threads of a worker process here, or the workers of a cluster."""
+    """What runs jobs: worker processes here, or the workers of a cluster."""
 
     def outcomes(self, jobs: Iterator[Job]) -> Iterator[Outcome]:
         """Outcomes in the order in which they come; takes jobs only as fast as it can start them.
@@ -96,8 +96,7 @@ class Interval:
 class OutputSummary:
     """One output over the good rows of a cell.
 
-    ``quantiles`` by probability, each from a sketch whose relative error is at most ``sketch_error``; ``edges`` and
-    ``counts`` are a histogram for a picture (len(edges) = len(counts) + 1).
+    ``quantiles`` by probability; ``edges`` and ``counts`` are a histogram for a picture (len(edges) = len(counts) + 1).
     """
 
     name: str
@@ -109,7 +108,6 @@ class OutputSummary:
     least: float
     most: float
     quantiles: dict[float, Interval]
-    sketch_error: float
     edges: Floats
     counts: Floats
 
@@ -246,14 +244,14 @@ class CampaignSummary:
     findings: tuple[str, ...] = field(default=())
 
 
-def joined(job: Job, parts: Sequence[Chunk]) -> Chunk:
-    """The chunk that these chunks of consecutive rows make up."""
+def joined(parts: Sequence[Chunk]) -> Chunk:
+    """One chunk of the rows of these chunks of a cell, one behind the other, with the number of the first."""
     names = parts[0].columns
     sums = [chunk for chunk in parts if chunk.survival.size]
     zeros = np.zeros(sums[0].survival.size) if sums else np.zeros(0)
     return Chunk(
-        job.cell,
-        job.number,
+        parts[0].cell,
+        parts[0].number,
         {name: np.concatenate([chunk.columns[name] for chunk in parts]) for name in names},
         tuple(failed for chunk in parts for failed in chunk.failed),
         sum((chunk.survival for chunk in sums), zeros),

@@ -17,7 +17,7 @@ from microrad.campaign import bundle
 from microrad.campaign.definition.outputs import OUTPUTS
 from microrad.campaign.definition.records import CampaignFile
 from microrad.campaign.engines.cluster import DaskEngine
-from microrad.campaign.engines.threads import LocalEngine
+from microrad.campaign.engines.local import LocalEngine
 from microrad.campaign.file import load_campaign
 from microrad.campaign.ledger import (
     Column,
@@ -35,8 +35,9 @@ from microrad.campaign.rows import sampling
 from microrad.campaign.rows.evaluator import ATTEMPTS, Evaluator
 from microrad.campaign.rows.loops import controllers
 from microrad.campaign.rows.plan import planned
-from microrad.campaign.statistics.sketch import Sketch
-from microrad.campaign.statistics.summary import is_precise
+from microrad.campaign.statistics.cell import CellRows
+from microrad.campaign.statistics.intervals import ordered
+from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
 from microrad.core.units import format_quantity
 
@@ -48,9 +49,9 @@ LATE_S = 30.0
 
 @dataclass(frozen=True, slots=True)
 class Means:
-    """What does the work: ``threads`` of one worker process, ``workers`` of a Dask cluster here, or a scheduler.
+    """What does the work: ``threads`` or ``workers``, both processes of this machine, or a running Dask ``scheduler``.
 
-    At most one is given; None of all is as many threads as the machine has cores.
+    At most one is given; None of all is as many processes as the machine has cores.
     """
 
     threads: int | None = None
@@ -59,9 +60,9 @@ class Means:
 
     def engine(self, spec: bytes, late_s: float) -> Engine:
         """The engine, started."""
-        if self.workers is None and self.scheduler is None:
-            return LocalEngine(spec, TARGET, self.threads or os.cpu_count() or 1, late_s)
-        return DaskEngine(spec, TARGET, address=self.scheduler, workers=self.workers, late_s=late_s)
+        if self.scheduler is not None:
+            return DaskEngine(spec, TARGET, self.scheduler, late_s)
+        return LocalEngine(spec, TARGET, self.threads or self.workers or os.cpu_count() or 1, late_s)
 
 
 def run_campaign(file: Path, path: Path, means: Means, on_progress: Progress = lambda done, total, what: None) -> None:
@@ -155,7 +156,7 @@ class _Pace:
     spent_s: float
     began_s: float = field(default_factory=time.monotonic)
     here: int = 0
-    sketch: Sketch = field(default_factory=Sketch)
+    values: list[Floats] = field(default_factory=list)
 
     @property
     def seconds(self) -> float:
@@ -242,7 +243,11 @@ class _Runner:
     # ---------------------------------------------------------------------------------------------------------- rounds
     def _precise(self, cell: int, rows: int) -> bool:
         """Whether a cell's first rows know what is wanted well enough; never where nothing is wanted."""
-        return self.campaign.table.precision is not None and is_precise(self.campaign, self.book, cell, rows)
+        if self.campaign.table.precision is None:
+            return False
+        last = len(self.plan.chunks(cell, rows))
+        first_rows = (each for each in self.book.chunks(cell) if each.number < last)
+        return CellRows(self.campaign, cell, first_rows).is_precise()
 
     def _round(self, jobs: Sequence[Job]) -> None:
         """Do these chunks: each at most twice as a whole, then the rows of those that failed one by one."""
@@ -274,9 +279,10 @@ class _Runner:
             return ""
         limit = self.campaign.limits[0]
         output = OUTPUTS[limit.output]
-        self.pace.sketch.add(chunk_format.unpack_chunk(payload).columns[output.name])
+        values = chunk_format.unpack_chunk(payload).columns[output.name]
+        self.pace.values.append(values[~np.isnan(values)])
         share = 0.01 if limit.least is not None else 0.99
-        value = self.pace.sketch.quantile(share)
+        value = ordered(np.concatenate(self.pace.values)).quantile(share)
         shown = "-" if math.isnan(value) else format_quantity(value, output.unit or "1", 3)
         return f"{output.name} {100 * share:g} %: {shown}"
 
@@ -294,7 +300,7 @@ class _Runner:
                     lost[outcome.job.row] = outcome.reason
         parts = [found[each.row] if each.row in found else self._lost(each, lost[each.row]) for each in rows]
         parts = [replace(p, failed=tuple(replace(each, attempts=ATTEMPTS) for each in p.failed)) for p in parts]
-        self._keep(job, chunk_format.pack_chunk(joined(job, parts)))
+        self._keep(job, chunk_format.pack_chunk(joined(parts)))
 
     def _lost(self, job: Job, reason: str) -> Chunk:
         """A row that took its worker down, or that was stopped."""

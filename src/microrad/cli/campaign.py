@@ -49,8 +49,8 @@ _LINE_S = 30.0  # between two lines of progress in a log
 
 _File = Annotated[Path, typer.Argument(help="Campaign file; microrad campaign init writes one.", metavar="FILE")]
 _Ledger = Annotated[Path, typer.Argument(help="Ledger that microrad campaign run wrote.", metavar="LEDGER")]
-_Threads = Annotated[int | None, option("--threads", "N", "Threads of this machine [default: all].", min=1)]
-_Workers = Annotated[int | None, option("--workers", "N", "A Dask cluster of N processes on this machine.", min=1)]
+_Threads = Annotated[int | None, option("--threads", "N", "Processes of this machine [default: one a core].", min=1)]
+_Workers = Annotated[int | None, option("--workers", "N", "The same as --threads.", min=1)]
 _Scheduler = Annotated[
     str | None, option("--scheduler", "ADDRESS", "A running Dask scheduler, such as tcp://head:8786.")
 ]

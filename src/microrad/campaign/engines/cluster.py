@@ -1,4 +1,4 @@
-"""What runs the jobs of a campaign on many machines: the workers of a dask cluster, or of one made here.
+"""What runs the jobs of a campaign on many machines: the workers of a dask cluster.
 
 Workers get the specification once, by name, and jobs as plain numbers; results are bytes. A worker says over the
 scheduler's log of events when it begins a job (and waits until the scheduler knows) and that it still lives; this
@@ -7,7 +7,6 @@ side hears it and stops the worker of a job that is late.
 
 import logging
 import os
-import shutil
 import signal
 import threading
 import time
@@ -27,12 +26,10 @@ from microrad.campaign.engines.worker import (
     Work,
     beat_every_s,
     code_sha256,
-    die_with_parent,
     open_target,
     words,
 )
 from microrad.campaign.records import CampaignError, Job, Outcome
-from microrad.core.folder import scratch_folder
 from microrad.core.installing import advice
 
 _ANSWER_S = 20.0  # a scheduler or worker that does not answer for so long is gone
@@ -74,10 +71,8 @@ class _Opening:
 _openings: dict[str, _Opening] = {}
 
 
-def install(name: str, target: str, spec: bytes, code: str, parent: int) -> None:
-    """Give this worker a specification; ``parent`` is the process to end with where that is the worker's own."""
-    if os.getppid() == parent:
-        die_with_parent(parent)
+def install(name: str, target: str, spec: bytes, code: str) -> None:
+    """Give this worker a specification."""
     _openings.setdefault(name, _Opening(target, spec, code))
 
 
@@ -155,57 +150,18 @@ def _quiet() -> Callable[[], None]:
     return undo
 
 
-class _Cluster:
-    """A scheduler and workers of one thread each, in processes of this machine, that vanish with it."""
-
-    def __init__(self, workers: int) -> None:
-        import dask
-        from distributed import LocalCluster
-
-        self.workers = workers
-        self._folder = str(scratch_folder("dask"))
-        with dask.config.set({"distributed.scheduler.allowed-failures": 0, "distributed.admin.event-loop": "tornado"}):
-            self._cluster: Any = LocalCluster(  # type: ignore[no-untyped-call]
-                n_workers=workers,
-                threads_per_worker=1,
-                processes=True,
-                host="127.0.0.1",
-                dashboard_address="127.0.0.1:0",  # any port, not one that another campaign has
-                silence_logs=logging.CRITICAL + 1,
-                local_directory=self._folder,
-            )
-        self.address: str = self._cluster.scheduler_address
-
-    def refill(self) -> None:
-        """Have workers started in place of those given up: dask gives up one that takes long to come back."""
-        self._cluster.scale(self.workers)
-
-    def close(self) -> None:
-        """Kill the workers, whatever they do, then the rest."""
-        for nanny in self._cluster.workers.values():
-            nanny.close_gracefully()  # so that it does not start another
-            if nanny.pid:
-                with suppress(OSError):
-                    os.kill(nanny.pid, _KILL)
-        with suppress(Exception):
-            self._cluster.close(timeout=2.0)
-        shutil.rmtree(self._folder, ignore_errors=True)
-
-
 class DaskEngine:
-    """Runs jobs on the workers of the scheduler at ``address``, or on ``workers`` processes started here.
+    """Runs jobs on the workers of the scheduler at ``address``.
 
-    See `records.Engine`. About two jobs a thread of the workers are under way. A job whose worker dies has died: at
-    once on workers started here, after as many deaths as the scheduler allows (``allowed-failures``) elsewhere; one
-    that only waited there is started again. A job that gives no sign of life for ``late_s`` (s) is late and its worker
-    is killed and started again by its nanny; a worker without one is sent away. Raises CampaignError where the package
-    distributed is missing, no scheduler answers, or a worker has no microrad or other code.
+    See `records.Engine`. About two jobs a thread of the workers are under way. A job whose worker dies has died after
+    as many deaths as the scheduler allows (``allowed-failures``); one that only waited there is started again. A job
+    that gives no sign of life for ``late_s`` (s) is late and its worker is killed and started again by its nanny; a
+    worker without one is sent away. Raises CampaignError where the package distributed is missing, no scheduler
+    answers, or a worker has no microrad or other code.
     """
 
-    def __init__(
-        self, spec: bytes, target: str, address: str | None = None, workers: int | None = None, late_s: float = 300.0
-    ) -> None:
-        """Connect, and start workers where no address is given."""
+    def __init__(self, spec: bytes, target: str, address: str, late_s: float = 300.0) -> None:
+        """Connect."""
         distributed = _distributed()
         self._code = code_sha256(target)
         self._undo_quiet = _quiet()
@@ -223,8 +179,7 @@ class DaskEngine:
         self._looked_s = float("-inf")
         self._closed = False
         self._clock = Clock()
-        self._cluster = None if address else _Cluster(workers or os.cpu_count() or 1)
-        self.address = address or (self._cluster.address if self._cluster else "")
+        self.address = address
         self._client = self._connect(distributed)
         self._workers_seen_s = self._clock.now()
 
@@ -234,8 +189,6 @@ class DaskEngine:
             client.subscribe_topic(self._topic, self._hear)
             return client
         except (OSError, ValueError, TimeoutError, AssertionError) as error:  # the last: its own loop did not start
-            if self._cluster:
-                self._cluster.close()
             self._clock.close()
             self._undo_quiet()
             raise CampaignError(
@@ -267,10 +220,7 @@ class DaskEngine:
         self._closed = True
         for serial in list(self._flights):
             self._drop(serial)
-        if self._cluster:
-            self._cluster.close()
-        else:
-            self._take_back()
+        self._take_back()
         with suppress(Exception):
             self._client.close(timeout=1.0)
         self._clock.close()
@@ -311,8 +261,6 @@ class DaskEngine:
             if self._client.status == "running" and not isinstance(error, TimeoutError):
                 return  # it is lost, or there again, at the next look
             raise self._gone(f"it did not answer for {_ANSWER_S:g} s") from None
-        if self._cluster and len(self._threads) < self._cluster.workers:
-            self._cluster.refill()
         self._installed &= set(self._threads)
         self._install([address for address in self._threads if address not in self._installed])
         for flight in self._flights.values():
@@ -342,11 +290,10 @@ class DaskEngine:
         """Give workers the specification; one without microrad, or with one too old for it, is refused."""
         if not addresses:
             return
-        parent = os.getpid() if self._cluster else -1
         for address in addresses:
             try:
                 self._call(
-                    self._client._run, install, self._name, self._target, self._spec, self._code, parent,
+                    self._client._run, install, self._name, self._target, self._spec, self._code,
                     workers=[address],
                 )  # fmt: skip
             except (OSError, TimeoutError):
@@ -371,7 +318,7 @@ class DaskEngine:
 
         A worker of others gets none before it was looked at: one without microrad would end of it, and never be told.
         """
-        while len(self._flights) < _AHEAD * (sum(self._threads.values()) or (1 if self._cluster else 0)):
+        while len(self._flights) < _AHEAD * sum(self._threads.values()):
             job = queue.next()
             if job is None:
                 return

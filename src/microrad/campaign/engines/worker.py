@@ -1,6 +1,6 @@
 """The worker process of a campaign: jobs come in at stdin, and what became of them goes out at stdout.
 
-Started by `threads.LocalEngine` as ``python -m microrad.campaign.engines.worker TARGET THREADS LATE_S PARENT``. It
+Started by `local.LocalEngine` as ``python -m microrad.campaign.engines.worker TARGET LATE_S PARENT``. It
 ends when its parent does, in whatever way that ends.
 """
 
@@ -21,13 +21,13 @@ from typing import IO, NamedTuple, Protocol
 
 from microrad.campaign.records import CampaignError, Job
 
-_HEAD = struct.Struct("<BQQ")  # kind, serial number of the job, bytes that follow
+_HEAD = struct.Struct("<BQ")  # kind, bytes that follow
 _LONGEST_REASON = 1000
 _STUCK_S = 600.0
 
 
 class Work(Protocol):
-    """What a target's function makes of the specification: it does jobs, from several threads at once."""
+    """What a target's function makes of the specification: it does jobs."""
 
     def do(self, job: Job, beat: Callable[[], None]) -> bytes:
         """The job's result; calls ``beat`` at each sign of life, at least every 0.2 s or so."""
@@ -47,10 +47,9 @@ class Kind(IntEnum):
 
 
 class Message(NamedTuple):
-    """One message: what it says, the serial number of the job that it is about, and its content."""
+    """One message: what it says, and its content."""
 
     kind: Kind
-    serial: int = 0
     body: bytes = b""
 
 
@@ -59,14 +58,14 @@ def read_message(stream: IO[bytes]) -> Message | None:
     head = stream.read(_HEAD.size)
     if len(head) < _HEAD.size:
         return None
-    kind, serial, size = _HEAD.unpack(head)
+    kind, size = _HEAD.unpack(head)
     body = stream.read(size)
-    return Message(Kind(kind), serial, body) if len(body) == size else None
+    return Message(Kind(kind), body) if len(body) == size else None
 
 
 def write_message(stream: IO[bytes], message: Message) -> None:
     """Write a message whole; OSError where the other side has ended."""
-    stream.write(_HEAD.pack(message.kind, message.serial, len(message.body)))
+    stream.write(_HEAD.pack(message.kind, len(message.body)))
     stream.write(message.body)
     stream.flush()
 
@@ -130,18 +129,16 @@ def end_when_stuck(stuck_s: float) -> None:
 
 
 class _ToParent:
-    """The way to the parent, shared by threads; without a parent the process ends."""
+    """The way to the parent; without a parent the process ends."""
 
     def __init__(self, stream: IO[bytes]) -> None:
         self._stream = stream
-        self._lock = threading.Lock()
 
     def send(self, message: Message) -> None:
-        with self._lock:
-            try:
-                write_message(self._stream, message)
-            except OSError:
-                os._exit(1)
+        try:
+            write_message(self._stream, message)
+        except OSError:
+            os._exit(1)
 
 
 class Beat:
@@ -166,33 +163,27 @@ def beat_every_s(late_s: float) -> float:
     return min(1.0, late_s / 10.0)
 
 
-def _do_jobs(work: Work, jobs: "SimpleQueue[Message]", port: _ToParent, late_s: float) -> None:
-    """One thread: job after job."""
-    while True:
-        asked = jobs.get()
-        beat = Beat(lambda serial=asked.serial: port.send(Message(Kind.BEAT, serial)), beat_every_s(late_s))  # type: ignore[misc]
-        beat()  # says that it has begun
-        try:
-            answer = Message(Kind.DONE, asked.serial, work.do(unpack_job(asked.body), beat))
-        except BaseException as error:  # whatever it was, it is this job's
-            answer = Message(Kind.RAISED, asked.serial, words(error).encode())
-        port.send(answer)
-
-
-def _serve(target: str, threads: int, late_s: float, jobs: "SimpleQueue[Message]", port: _ToParent) -> None:
-    """Open the work with the first message, then do jobs in ``threads`` threads.
+def _serve(target: str, late_s: float, messages: "SimpleQueue[Message]", port: _ToParent) -> None:
+    """Open the work with the first message, then do job after job.
 
     The parent is told of which code the work is, or why it cannot be opened.
     """
     try:
-        work = open_target(target, jobs.get().body)
+        work = open_target(target, messages.get().body)
         code = code_sha256(target)
     except BaseException as error:
-        port.send(Message(Kind.REFUSED, 0, words(error).encode()))
+        port.send(Message(Kind.REFUSED, words(error).encode()))
         return
-    port.send(Message(Kind.READY, 0, code.encode()))
-    for k in range(threads):
-        threading.Thread(target=_do_jobs, args=(work, jobs, port, late_s), daemon=True, name=f"jobs {k}").start()
+    port.send(Message(Kind.READY, code.encode()))
+    while True:
+        asked = messages.get()
+        beat = Beat(lambda: port.send(Message(Kind.BEAT)), beat_every_s(late_s))
+        beat()  # says that it has begun
+        try:
+            answer = Message(Kind.DONE, work.do(unpack_job(asked.body), beat))
+        except BaseException as error:  # whatever it was, it is this job's
+            answer = Message(Kind.RAISED, words(error).encode())
+        port.send(answer)
 
 
 def _take_pipes() -> tuple[IO[bytes], IO[bytes]]:
@@ -208,18 +199,16 @@ def _take_pipes() -> tuple[IO[bytes], IO[bytes]]:
 
 def main() -> None:
     """Work until the parent ends; this thread only reads, so that it notices at once."""
-    target, threads, late_s, parent = sys.argv[1], int(sys.argv[2]), float(sys.argv[3]), int(sys.argv[4])
+    target, late_s, parent = sys.argv[1], float(sys.argv[2]), int(sys.argv[3])
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's matter
-    sys.setswitchinterval(5e-4)  # a thread that comes back from compiled code waits no longer for the others
     if not die_with_parent(parent):
         end_when_stuck(late_s + _STUCK_S)  # a living parent is quicker
     incoming, outgoing = _take_pipes()
-    jobs: SimpleQueue[Message] = SimpleQueue()
-    threading.Thread(
-        target=_serve, args=(target, threads, late_s, jobs, _ToParent(outgoing)), daemon=True, name="open"
-    ).start()
+    messages: SimpleQueue[Message] = SimpleQueue()
+    arguments = (target, late_s, messages, _ToParent(outgoing))
+    threading.Thread(target=_serve, args=arguments, daemon=True, name="jobs").start()
     while (message := read_message(incoming)) is not None:
-        jobs.put(message)
+        messages.put(message)
     os._exit(0)
 
 

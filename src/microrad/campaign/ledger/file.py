@@ -1,6 +1,5 @@
 """The SQLite file that a ledger is kept in: making, opening and locking it, its errors in words, its checksums."""
 
-import codecs
 import hashlib
 import json
 import os
@@ -14,15 +13,11 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from microrad.campaign.ledger import chunk_format, log
+from microrad.campaign.ledger import chunk_format
 from microrad.campaign.ledger.chunk_format import Head
-from microrad.campaign.ledger.log import PAGE
 from microrad.campaign.records import CampaignError
-from microrad.core.folder import read_bytes
 
-FORMAT = (
-    chunk_format.VERSION
-)  # one number for both, so that what another microrad wrote is never mended into this format
+FORMAT = chunk_format.VERSION
 _APPLICATION = 0x6D726164  # "mrad": SQLite's application_id, so that another program's file is told from a ledger
 HEADS = ("head", "head_again")  # two tables, so that no page has both
 _GLANCE_S = 0.5  # longer than `is_written` holds the lock
@@ -43,7 +38,7 @@ def make_empty(path: Path) -> None:
     for name in files(path):
         name.unlink(missing_ok=True)
     with closing(sqlite3.connect(path, isolation_level=None)) as connection:
-        for pragma in (f"page_size = {PAGE}", f"application_id = {_APPLICATION}", f"user_version = {FORMAT}"):
+        for pragma in (f"application_id = {_APPLICATION}", f"user_version = {FORMAT}"):
             connection.execute(f"PRAGMA {pragma}")
         connection.execute("PRAGMA journal_mode = WAL")
         connection.execute("PRAGMA synchronous = FULL")
@@ -74,6 +69,11 @@ def install(draft: Path, path: Path) -> None:
             os.close(folder)
 
 
+def draft_of(path: Path) -> Path:
+    """Where a ledger is made before it is installed: what is there when the lock is free is a dead process's."""
+    return path.with_name(f".{path.name}.part")
+
+
 def files(path: Path) -> tuple[Path, ...]:
     """The files that SQLite keeps a ledger in."""
     return tuple(path.with_name(path.name + suffix) for suffix in ("", "-wal", "-shm", "-journal"))
@@ -98,54 +98,33 @@ def refuse_existing(path: Path) -> None:
 
 
 def is_ledger(path: Path) -> bool:
-    """Whether a file is one of SQLite's. Raises `CampaignError` if its log is damaged."""
+    """Whether a file is one of SQLite's.
+
+    Only SQLite opens it: to close it otherwise would drop the locks that other connections of this process hold on it
+    (SQLite, How To Corrupt, 2.2).
+    """
     if not path.is_file() or not path.stat().st_size:
         return False
-    refuse_damaged_log(path)
-    with suppress(sqlite3.Error), closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=rw", uri=True)) as probe:
-        probe.execute("PRAGMA application_id")
-        return True
-    return False
+    with closing(sqlite3.connect(f"{path.absolute().as_uri()}?immutable=1", uri=True)) as probe:
+        try:
+            probe.execute("PRAGMA application_id")
+        except sqlite3.Error as error:
+            return code_of(error) == sqlite3.SQLITE_CORRUPT
+    return True
 
 
 def refuse_foreign(path: Path) -> None:
-    """Raises `CampaignError` if this cannot have been a ledger, however damaged: no file, an empty one, or text.
-
-    A file of SQLite's is never opened but by SQLite: to close it again would drop the locks that other connections of
-    this process hold on it, and with them what they know of its log (SQLite, How To Corrupt, 2.2).
-    """
+    """Raises `CampaignError` if this is no file of SQLite's."""
     if path.is_dir():
         raise CampaignError(f"{path} is a folder, not a ledger: name the file that `microrad campaign run` wrote")
     if not path.is_file():
         raise CampaignError(f"there is no ledger {path}: begin the campaign with `microrad campaign run`")
-    if not path.stat().st_size:
-        if not files(path)[1].exists():
-            raise CampaignError(f"{path} is an empty file, not a ledger: name the file `microrad campaign run` wrote")
-        return
-    if is_ledger(path):
-        return
-    first = read_bytes(path, PAGE)
-    if _is_text(first):
+    if not is_ledger(path):
         begin = f"begin it with `microrad campaign run {argument(path)}`, or " if path.suffix == ".toml" else ""
-        raise CampaignError(f"{path} is text, not a ledger: {begin}name the file that `microrad campaign run` wrote")
-
-
-def refuse_damaged_log(path: Path) -> None:
-    """Raises `CampaignError` if a killed writer's log is damaged, before SQLite opens it and deletes what is left."""
-    if not path.is_file() or is_written(path) or not (damage := log.damage(files(path)[1])):
-        return
-    if not is_written(path):  # else it was begun anew while it was read
         raise CampaignError(
-            f"{path}: {damage}. `microrad campaign resume {argument(path)}` keeps what is whole and does the rest again"
+            f"{path} is no ledger, or its first page is damaged: {begin}name the file that `microrad campaign run` "
+            "wrote"
         )
-
-
-def _is_text(data: bytes) -> bool:
-    try:
-        codecs.getincrementaldecoder("utf-8")().decode(data)  # the last character may be cut
-    except UnicodeDecodeError:
-        return False
-    return b"\0" not in data
 
 
 def connected(path: Path, *, write: bool) -> sqlite3.Connection:
@@ -181,7 +160,8 @@ def _check_format(path: Path, connection: sqlite3.Connection) -> None:
     )
     if application != _APPLICATION:
         raise CampaignError(
-            f"{path} is an SQLite file, but no ledger of microrad, or its first page is damaged: choose another file"
+            f"{path} is an SQLite file, but no ledger of microrad, or its first page is damaged: name the file that "
+            "`microrad campaign run` wrote"
         )
     if version != FORMAT:
         raise CampaignError(
@@ -207,8 +187,8 @@ def _check_schema(path: Path, connection: sqlite3.Connection) -> None:
         odd = next((row for row in found if row not in _schema()), None)
         what = f"the {odd[0]} {str(odd[1])[:60]!r}, which no ledger has" if odd else "not all tables of a ledger"
         raise CampaignError(
-            f"{path} defines {what}, so nothing in it is read: another program has changed it, or it is damaged; "
-            f"`microrad campaign resume {argument(path)}` moves every whole chunk into new tables"
+            f"{path} defines {what}, so nothing in it is read: another program has changed it, or it is damaged; begin "
+            "the campaign anew in another file"
         )
 
 
@@ -311,7 +291,6 @@ def errors_in_words(path: Path, what: str) -> Iterator[None]:
 
 def _words(error: sqlite3.Error, path: Path) -> str:
     """What an error of SQLite means for the campaign, and what to do."""
-    check = f"`microrad campaign verify {argument(path)}`"
     by_code = {
         sqlite3.SQLITE_FULL: ("the disk is full", "Free space"),
         sqlite3.SQLITE_IOERR: (f"the disk does not take or give the data ({error})", "Check the disk and its space"),
@@ -319,12 +298,12 @@ def _words(error: sqlite3.Error, path: Path) -> str:
         sqlite3.SQLITE_CANTOPEN: (str(error), "Make file and folder readable and writable"),
         sqlite3.SQLITE_PERM: (str(error), "Make file and folder readable and writable"),
         sqlite3.SQLITE_BUSY: (f"another program held the file for longer than {PATIENCE_S:g} s", "Close that program"),
-        sqlite3.SQLITE_CORRUPT: (f"the file is damaged ({error})", f"See what is lost with {check}"),
-        sqlite3.SQLITE_NOTADB: (
-            "it is no ledger, or its first page is damaged",
-            f"If it was one, see what is lost with {check}",
-        ),
     }
+    if code_of(error) == sqlite3.SQLITE_CORRUPT:
+        return (
+            f"the file is damaged ({error}). `microrad campaign resume {argument(path)}` goes on with what can be "
+            "read of it; where nothing can, begin the campaign anew in another file"
+        )
     what, remedy = by_code.get(code_of(error), (str(error), "See to that"))
     return f"{what}. {_safe(path)}{remedy}, then go on with `microrad campaign resume {argument(path)}`"
 

@@ -22,6 +22,7 @@ from microrad.campaign.ledger.file import (
     argument,
     connected,
     digest,
+    draft_of,
     errors_in_words,
     install,
     locked,
@@ -52,7 +53,7 @@ class Ledger:
         with errors_in_words(path, "create the ledger"):
             refuse_existing(path)
             with closing(locked(path)):
-                draft = path.with_name(f".{path.name}.part")  # the lock is ours: what is there is a dead process's
+                draft = draft_of(path)
                 make_empty(draft)
                 put_head(draft, head)
                 refuse_existing(path)
@@ -153,11 +154,6 @@ class Ledger:
         """How many chunks are in."""
         with errors_in_words(self.path, "count what is done"):
             return int(self._connection.execute("SELECT count(*) FROM chunks").fetchone()[0])
-
-    def drop(self, cell: int, number: int) -> None:
-        """Take a chunk out, so that it is done again."""
-        with self._writing(f"drop chunk {number} of cell {cell}"):
-            self._connection.execute("DELETE FROM chunks WHERE cell = ? AND number = ?", (cell, number))
 
     @contextmanager
     def still(self) -> Iterator[None]:

@@ -1,15 +1,15 @@
-"""What the rows of one cell say together: folded chunk by chunk, in memory that does not grow with them."""
+"""What the rows of one cell say together."""
 
 import math
+from collections.abc import Iterable
 
 import numpy as np
 
 from microrad.campaign.definition.outputs import OUTPUTS, RADIUS
 from microrad.campaign.definition.records import CampaignFile
-from microrad.campaign.records import CellSummary, Chunk, Failed, Interval, Limit, Tail
+from microrad.campaign.records import CellSummary, Chunk, Interval, Limit, Tail, joined
 from microrad.campaign.statistics import tails
-from microrad.campaign.statistics.intervals import Fold, Moments, moments, quantile_interval, share_interval
-from microrad.core import kernels
+from microrad.campaign.statistics.intervals import moments, ordered, output_summary, quantile_interval, share_interval
 from microrad.core.arrays import Floats
 from microrad.core.units import format_quantity
 from microrad.loop.pointing_loop.ensemble import bin_edges_rad
@@ -19,112 +19,107 @@ CONFIDENCE = 0.95
 QUANTILES = (0.001, 0.003, 0.01, 0.05, 0.5, 0.95, 0.99, 0.997, 0.999)
 TAIL_CONFIDENCE = 0.99
 TAIL_SHARES = (0.1, 0.01, 0.003, 1e-3, 1e-4, 1e-5, 1e-6)
-MOST_FAILED = 1000
-"""Failed rows that are listed."""
 
 
-class CellFold:
-    """A cell as far as its chunks have been taken in."""
+class CellRows:
+    """The rows of a cell as far as they were read, all of their columns: 8 bytes for each value."""
 
-    def __init__(self, campaign: CampaignFile, number: int) -> None:
-        """No chunk yet."""
-        block = campaign.block if campaign.table.sampling != "random" else 0
-        self.campaign, self.cell = campaign, campaign.cells[number]
-        self.outputs = {output.name: Fold(block) for output in campaign.outputs}
-        self.missed = Moments()
-        self.missed_by: dict[str, Moments] = {}
-        self.rows = self.failed_rows = 0
-        self.failed: list[Failed] = []
-        self.survival, self.survival_square = np.zeros(kernels.BINS), np.zeros(kernels.BINS)
-        self.weighted: list[tuple[Floats, Floats]] = []
+    def __init__(self, campaign: CampaignFile, number: int, chunks: Iterable[Chunk] = ()) -> None:
+        """With these chunks of it."""
+        self.campaign, self.cell, self.chunks = campaign, campaign.cells[number], list(chunks)
+
+    def take(self, chunk: Chunk) -> None:
+        """Add a chunk, in any order."""
+        self.chunks.append(chunk)
 
     @property
-    def good(self) -> int:
-        """Rows with a result."""
-        return self.rows - self.failed_rows
+    def rows(self) -> int:
+        """Rows that were read."""
+        return sum(chunk.columns["row"].size for chunk in self.chunks)
+
+    @property
+    def failed(self) -> int:
+        """Rows without a result."""
+        return sum(len(chunk.failed) for chunk in self.chunks)
 
     @property
     def worth(self) -> float:
         """Rows of equal weight that would know a mean as well (Kish, Survey Sampling, 1965)."""
-        weights = next(iter(self.outputs.values())).moments
+        whole = self.whole()
+        if whole is None:
+            return 0.0
+        weights = moments(whole.columns[self.campaign.outputs[0].name], whole.columns["weight"])
         return weights.weight**2 / weights.weight_square if weights.count else 0.0
 
-    def take(self, chunk: Chunk) -> None:
-        """Take a chunk in. All but the intervals of means is the same in any order of the chunks, to rounding."""
-        weight = chunk.columns["weight"]
-        self.rows += weight.size
-        self.failed_rows += len(chunk.failed)
-        self.failed += chunk.failed[: MOST_FAILED - len(self.failed)]
-        for name, fold in self.outputs.items():
-            fold.add(int(chunk.columns["row"][0]), chunk.columns[name], weight)
-        every = np.zeros(weight.size)
-        for limit in self.campaign.limits:
-            bad = _missed(limit, chunk.columns[limit.output])
-            every = np.maximum(every, bad)
-            before = self.missed_by.get(limit.output, Moments())
-            self.missed_by[limit.output] = before.merged(moments(bad, weight))
-        self.missed = self.missed.merged(moments(every, weight))
-        if chunk.survival.size:
-            self.survival += chunk.survival
-            self.survival_square += chunk.survival_square
-        if self.campaign.table.tail is not None:
-            self.weighted.append((chunk.columns["tail_radius"], chunk.columns["tail_log_weight"]))
+    def whole(self) -> Chunk | None:
+        """All rows in their order as one chunk; None without any."""
+        return joined(sorted(self.chunks, key=lambda chunk: chunk.number)) if self.chunks else None
 
     def summary(self, quantiles: tuple[float, ...] = QUANTILES) -> CellSummary:
         """The cell as far as it was read; without ``quantiles``, how its rows keep the limits alone."""
-        shown = self.campaign.outputs if quantiles and self.campaign.table.tail is None else ()
+        whole, table = self.whole(), self.campaign.table
+        columns = {} if whole is None else whole.columns
+        shown = self.campaign.outputs if columns and quantiles and table.tail is None else ()
+        block = self.campaign.block if table.sampling != "random" else 0
+        missed = {limit.output: _missed(limit, columns[limit.output]) for limit in self.campaign.limits if columns}
+        weight = columns.get("weight", np.zeros(0))
+        any_missed = np.max(list(missed.values()), axis=0) if missed else np.zeros(weight.size)
         return CellSummary(
             values=dict(self.cell.values),
             rows=self.rows,
-            failed=self.failed_rows,
-            outputs={each.name: self.outputs[each.name].summary(each, quantiles, CONFIDENCE) for each in shown},
-            missed=share_interval(self.missed, CONFIDENCE),
-            missed_by={name: share_interval(share, CONFIDENCE) for name, share in self.missed_by.items()},
-            tail=self._tail() if quantiles else None,
+            failed=self.failed,
+            outputs={each.name: output_summary(each, columns, quantiles, CONFIDENCE, block) for each in shown},
+            missed=share_interval(moments(any_missed, weight), CONFIDENCE),
+            missed_by={name: share_interval(moments(bad, weight), CONFIDENCE) for name, bad in missed.items()},
+            tail=self._tail(whole) if whole is not None and quantiles else None,
         )
 
-    def _tail(self) -> Tail | None:
+    def _tail(self, whole: Chunk) -> Tail | None:
         wanted = self.campaign.table.tail
-        if self.campaign.table.loop is None or not self.good:
+        if self.campaign.table.loop is None or self.rows == self.failed:
             return None
         if wanted is None:
-            return self._tail_of_time(TAIL_SHARES, TAIL_CONFIDENCE)
-        radius, log_weight = (np.concatenate(part) for part in zip(*self.weighted, strict=True))
+            return self._tail_of_time(whole, TAIL_SHARES, TAIL_CONFIDENCE)
+        radius, log_weight = whole.columns["tail_radius"], whole.columns["tail_log_weight"]
         known, errors = np.isfinite(radius), (wanted.error_rad,)
         return tails.tail_weighted(radius[known], log_weight[known], (wanted.probability,), TAIL_CONFIDENCE, errors)
 
-    def _tail_of_time(self, shares: tuple[float, ...], confidence: float) -> Tail:
-        sums = self.survival, self.survival_square
-        return tails.tail_of_time(*sums, self.good, bin_edges_rad(), shares, confidence)
+    def _tail_of_time(self, whole: Chunk, shares: tuple[float, ...], confidence: float) -> Tail:
+        sums, good = (whole.survival, whole.survival_square), self.rows - self.failed
+        return tails.tail_of_time(*sums, good, bin_edges_rad(), shares, confidence)
 
     # ------------------------------------------------------------------------------------------------------ precision
     def is_precise(self) -> bool:
-        """Whether the quantile that the campaign asks for is known as precisely as it asks."""
+        """Whether the quantile that the campaign asks for is known as precisely as it asks; not without rows."""
         found = self._precision()
+        return found is not None and self._is_enough(found)
+
+    def _is_enough(self, found: Interval) -> bool:
         return (found.high - found.low) / 2.0 <= self.campaign.half_width  # nan is not narrow
 
-    def _precision(self) -> Interval:
-        """The quantile that the campaign asks for, as well as it is known."""
-        wanted = self.campaign.table.precision
-        assert wanted is not None
+    def _precision(self) -> Interval | None:
+        """The quantile that the campaign asks for, as well as it is known; None where no row has a result."""
+        wanted, whole = self.campaign.table.precision, self.whole()
+        if wanted is None or whole is None or self.rows == self.failed:
+            return None
         if wanted.output == RADIUS:
             beyond = 1.0 - wanted.quantile
-            return self._tail_of_time((beyond,), wanted.confidence).wanted[beyond]
-        return quantile_interval(self.outputs[wanted.output].sketch, wanted.quantile, wanted.confidence)
+            return self._tail_of_time(whole, (beyond,), wanted.confidence).wanted[beyond]
+        in_order = ordered(whole.columns[wanted.output], whole.columns["weight"])
+        return quantile_interval(in_order, wanted.quantile, wanted.confidence)
 
     def precision_words(self) -> str:
         """How well that quantile is known, and whether that is enough; "" where none is asked for."""
-        wanted = self.campaign.table.precision
-        if wanted is None or not self.good:
+        wanted, found = self.campaign.table.precision, self._precision()
+        if wanted is None or found is None:
             return ""
-        found = self._precision()
         unit = "rad" if wanted.output == RADIUS else OUTPUTS[wanted.output].unit
         value, low, high, half = (
             "unknown" if math.isnan(x) else format_quantity(x, unit, 4) if unit else f"{x:.4g}"
             for x in (found.value, found.low, found.high, self.campaign.half_width)
         )
         where = "".join(f" with {key} = {text}" for key, text in self.cell.values.items())
-        enough = "as precise" if self.is_precise() else "NOT as precise"
+        enough = "as precise" if self._is_enough(found) else "NOT as precise"
         return (
             f"{100 * wanted.quantile:g} % quantile of {wanted.output}{where}: {value}, {low} to {high} at "
             f"{100 * wanted.confidence:g} % confidence; {enough} as asked for (± {half})."

@@ -12,10 +12,7 @@ from microrad.campaign.ledger import Head, Ledger
 from microrad.campaign.records import CampaignSummary, CellSummary
 from microrad.campaign.rows.plan import planned
 from microrad.campaign.statistics import summary
-from microrad.campaign.statistics.cell import CellFold
-
-QUANTILES = (0.01, 0.05, 0.5, 0.95, 0.99)
-"""Those of `cell.QUANTILES` that a campaign which goes on knows soon: each takes its time, again and again."""
+from microrad.campaign.statistics.cell import CellRows
 
 
 class Interim:
@@ -30,7 +27,7 @@ class Interim:
         self.found: CampaignSummary | None = None
         self._head: Head | None = None
         self._campaign: CampaignFile | None = None
-        self._folds: list[CellFold] = []
+        self._cells: list[CellRows] = []
         self._mark, self._chunks = 0, 0
         self._state: object = None
 
@@ -58,14 +55,14 @@ class Interim:
         """Begin anew."""
         campaign = bundle.opened(head.bundle, any_code=True).campaign  # its files go at once: nothing reads them again
         self._head, self._campaign = head, campaign
-        self._folds = [CellFold(campaign, number) for number in range(len(campaign.cells))]
+        self._cells = [CellRows(campaign, number) for number in range(len(campaign.cells))]
         self._mark, self._chunks, self.found = 0, 0, None
 
     def _take(self, book: Ledger, end: float) -> bool:
         """Read what is new; whether anything was."""
         before = self._chunks
         for mark, chunk in book.added(self._mark):
-            self._folds[chunk.cell].take(chunk)
+            self._cells[chunk.cell].take(chunk)
             self._mark, self._chunks = mark, self._chunks + 1
             if time.monotonic() > end:
                 break
@@ -73,13 +70,13 @@ class Interim:
 
     def _summary(self, head: Head, campaign: CampaignFile, unread: int, notes: Mapping[str, Any]) -> CampaignSummary:
         """What was read, and how far it is with the chunks that were not."""
-        cells = [fold.summary(()) for fold in self._folds]
-        shown = min(range(len(cells)), key=lambda number: _order(cells[number]))
-        cells[shown] = self._folds[shown].summary(QUANTILES)
+        found = [cell.summary(()) for cell in self._cells]
+        shown = min(range(len(found)), key=lambda number: _order(found[number]))
+        found[shown] = self._cells[shown].summary()
         plan = planned(campaign)
-        done = sum(fold.rows for fold in self._folds) + unread * plan.chunk_rows
-        pace = summary.progress(done, plan.rounds[0] * len(cells), notes, written=True)
-        return summary.assembled(head, campaign, self._folds, cells, pace)
+        done = sum(cell.rows for cell in self._cells) + unread * plan.chunk_rows
+        pace = summary.progress(done, plan.rounds[0] * len(found), notes, written=True)
+        return summary.assembled(head, campaign, self._cells, found, pace)
 
 
 def _order(cell: CellSummary) -> tuple[bool, float]:

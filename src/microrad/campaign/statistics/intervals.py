@@ -1,14 +1,14 @@
-"""Statistics of rows as they come: means, quantiles and shares, with intervals that hold for few rows."""
+"""Statistics of rows: means, quantiles and shares, with intervals that hold for few rows."""
 
 import math
-from collections.abc import Iterable
+from bisect import bisect_left
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from microrad.campaign.definition.outputs import Output
 from microrad.campaign.records import Interval, OutputSummary
-from microrad.campaign.statistics.sketch import Sketch
 from microrad.core.arrays import Floats
 
 PICTURE_BINS = 40
@@ -19,8 +19,7 @@ class Moments:
     """Weighted moments of values: their number, sum of weights and of squared weights, mean, spread and range.
 
     ``spread`` is the sum of w (x - mean)^2; ``skewed`` and ``square`` are those of w^2 (x - mean) and
-    w^2 (x - mean)^2, from which the error of the mean follows. Parts are merged as in T. F. Chan, G. H. Golub and R. J.
-    LeVeque, Algorithms for computing the sample variance, Am. Stat. 37 (1983) 242, without loss of figures.
+    w^2 (x - mean)^2, from which the error of the mean follows.
     """
 
     count: int = 0
@@ -50,33 +49,6 @@ class Moments:
         if self.count < 2:
             return math.nan
         return self.square / self.weight**2 * self.count / (self.count - 1)
-
-    def merged(self, other: "Moments") -> "Moments":
-        """Moments of both together."""
-        if not self.count or not other.count:
-            return self if self.count else other
-        weight = self.weight + other.weight
-        with np.errstate(invalid="ignore"):  # a value without end
-            apart = float(np.subtract(other.mean, self.mean))
-        mean = self.mean + apart * (other.weight / weight)
-        here, there = self._about(mean), other._about(mean)
-        return Moments(
-            count=self.count + other.count,
-            weight=weight,
-            weight_square=self.weight_square + other.weight_square,
-            mean=mean,
-            spread=self.spread + other.spread + apart * apart * (self.weight * other.weight / weight),
-            skewed=here[0] + there[0],
-            square=here[1] + there[1],
-            least=min(self.least, other.least),
-            most=max(self.most, other.most),
-        )
-
-    def _about(self, mean: float) -> tuple[float, float]:
-        """Sums of w^2 (x - mean) and of w^2 (x - mean)^2 about another mean."""
-        moved = self.mean - mean
-        skewed = self.skewed + moved * self.weight_square
-        return skewed, self.square + moved * (2.0 * self.skewed + moved * self.weight_square)
 
 
 def moments(values: Floats, weights: Floats | None = None) -> Moments:
@@ -156,47 +128,69 @@ def share_interval(rows: Moments, confidence: float) -> Interval:
     return found if rare else Interval(1.0 - found.value, 1.0 - found.high, 1.0 - found.low, confidence)
 
 
-def quantile_interval(sketch: Sketch, probability: float, confidence: float) -> Interval:
-    """Quantile of the rows in a sketch, with an interval that holds for any distribution.
+@dataclass(frozen=True, slots=True)
+class Ordered:
+    """Values (n,), rising, with the sums (n + 1,) of the weights before each, and of their squares, from 0 on."""
 
-    Its ends are the order statistics between which the quantile is by the binomial distribution, to the sketch's error
-    outwards (H. A. David and H. N. Nagaraja, Order Statistics, 2003, section 7.1). With weights the number of rows is
-    that of independent ones which would know the share below as well. An end that so few rows cannot have is nan.
+    values: Floats
+    weight: Floats
+    square: Floats
+
+    def quantile(self, probability: float) -> float:
+        """Smallest value that a share of the weight is at most equal to; nan without values."""
+        if not self.values.size:
+            return math.nan
+        at = int(np.searchsorted(self.weight[1:], probability * float(self.weight[-1])))
+        return float(self.values[min(at, self.values.size - 1)])
+
+
+def ordered(values: Floats, weights: Floats | None = None) -> Ordered:
+    """Values (n,), nan left out, with weights (n,) above 0 that are 1 by default, in their order."""
+    given = np.ones(values.shape) if weights is None else weights
+    order = np.argsort(values, kind="stable")[: int(np.count_nonzero(~np.isnan(values)))]  # nan comes last
+    given = given[order]
+    weight, square = (np.concatenate([[0.0], np.cumsum(each)]) for each in (given, given**2))
+    return Ordered(values[order], weight, square)
+
+
+def quantile_interval(rows: Ordered, probability: float, confidence: float) -> Interval:
+    """Quantile of the rows, with an interval that holds for any distribution.
+
+    Its ends are the order statistics between which the quantile is by the binomial distribution (H. A. David and H. N.
+    Nagaraja, Order Statistics, 2003, section 7.1). With weights the number of rows is that of independent ones which
+    would know the share below as well. An end that so few rows cannot have is nan.
     """
-    value = sketch.quantile(probability)
-    if not sketch.bins:
+    value, count, beyond = rows.quantile(probability), rows.values.size, (1.0 - confidence) / 2.0
+    if not count:
         return Interval(value, math.nan, math.nan, confidence)
-    share, size = _share_below(sketch)
-    above, below = _binomial_tails(share, size, probability)
-    low, high = sketch.edges()
-    start = int(np.count_nonzero(above < (1.0 - confidence) / 2.0))  # the true share below is surely less there
-    stop = share.size - int(np.count_nonzero(below < (1.0 - confidence) / 2.0)) - 1
+    ranks = range(count + 1)
+    start = bisect_left(ranks, True, key=lambda rank: _tails(rows, rank, probability)[0] >= beyond)
+    stop = bisect_left(ranks, True, key=lambda rank: _tails(rows, rank, probability)[1] < beyond) - 1
     return Interval(
         value,
-        float(low[start - 1]) if start > 0 else math.nan,
-        float(high[stop]) if stop < high.size else math.nan,
+        float(rows.values[start - 1]) if start > 0 else math.nan,
+        float(rows.values[stop]) if stop < count else math.nan,
         confidence,
     )
 
 
-def _share_below(sketch: Sketch) -> tuple[Floats, Floats]:
-    """Share of the weight up to nothing and to each bin (bins + 1,), and the rows that would know it as well."""
-    weight, square = (np.concatenate([[0.0], sums]) for sums in sketch.cumulative())
-    share = weight / weight[-1]
-    spread = (1.0 - share) ** 2 * square + share**2 * (square[-1] - square)
-    most = weight[-1] ** 2 / square[-1]
-    with np.errstate(invalid="ignore", divide="ignore"):
-        size = share * (1.0 - share) * weight[-1] ** 2 / spread
-    return share, np.where((share > 0.0) & (share < 1.0), size, most)
+def _tails(rows: Ordered, rank: int, probability: float) -> tuple[float, float]:
+    """Probability of a share as small as that of the first ``rank`` rows, and of one as large.
 
-
-def _binomial_tails(share: Floats, size: Floats, probability: float) -> tuple[Floats, Floats]:
-    """Probability of so few hits as share x size, and of so many, where each of ``size`` hits with ``probability``."""
+    Each of as many independent rows as would know that share hits with ``probability``.
+    """
     from scipy.special import betainc, betaincc
 
+    total, squares = float(rows.weight[-1]), float(rows.square[-1])
+    share = float(rows.weight[rank]) / total
+    size = total**2 / squares
+    if 0.0 < share < 1.0:
+        square = float(rows.square[rank])
+        spread = (1.0 - share) ** 2 * square + share**2 * (squares - square)
+        size = share * (1.0 - share) * total**2 / spread
     hits = share * size
-    few = np.where(hits < size, betaincc(hits + 1.0, np.maximum(size - hits, 1e-300), probability), 1.0)
-    many = np.where(hits > 0.0, betainc(np.maximum(hits, 1e-300), size - hits + 1.0, probability), 1.0)
+    few = float(betaincc(hits + 1.0, max(size - hits, 1e-300), probability)) if hits < size else 1.0
+    many = float(betainc(max(hits, 1e-300), size - hits + 1.0, probability)) if hits > 0.0 else 1.0
     return few, many
 
 
@@ -217,61 +211,56 @@ def student(confidence: float, freedom: float) -> float:
     return float(stdtrit(freedom, 0.5 + confidence / 2.0))
 
 
-# ---------------------------------------------------------------------------------------------------------------- folds
-class Fold:
-    """One output of one cell, folded row by row in their order, in memory that does not grow with them.
+# ---------------------------------------------------------------------------------------------------------- one output
+def block_means(rows: Floats, values: Floats, weights: Floats, block: int) -> Moments:
+    """Moments of the means of the whole blocks; each mean is a draw of the mean, unless all its rows have failed.
+
+    ``rows`` (n,), rising, are the numbers of the rows, ``values`` (n,) are nan where one has failed. A block of which
+    rows are missing says nothing about the mean's interval.
+    """
+    _, first, count = np.unique(rows // block, return_index=True, return_counts=True)
+    whole = [slice(at, at + block) for at in first[count == block].tolist()]
+    means = [moments(values[each], weights[each]).mean for each in whole]
+    return moments(np.array(means))
+
+
+def output_summary(
+    output: Output, columns: Mapping[str, Floats], probabilities: Iterable[float], confidence: float, block: int = 0
+) -> OutputSummary:
+    """What the columns of rows, with ``row`` and ``weight``, say of an output.
 
     ``block`` is the number of rows in a block of the sampling, 0 where rows are independent.
     """
+    values, weights = columns[output.name], columns["weight"]
+    known, in_order = moments(values, weights), ordered(values, weights)
+    blocks = block_means(columns["row"], values, weights, block) if block else None
+    edges, counts = histogram(values, weights)
+    return OutputSummary(
+        name=output.name,
+        unit=output.unit,
+        meaning=output.meaning,
+        rows=known.count,
+        mean=mean_interval(known, confidence, blocks),
+        deviation=known.deviation,
+        least=known.least,
+        most=known.most,
+        quantiles={p: quantile_interval(in_order, p, confidence) for p in probabilities},
+        edges=edges,
+        counts=counts,
+    )
 
-    __slots__ = ("_block", "_number", "_part", "_rows", "blocks", "moments", "sketch")
 
-    def __init__(self, block: int = 0) -> None:
-        """Nothing folded yet."""
-        self.moments, self.sketch, self.blocks = Moments(), Sketch(), Moments()
-        self._block, self._number, self._rows, self._part = block, 0, 0, Moments()
+def histogram(values: Floats, weights: Floats, count: int = PICTURE_BINS) -> tuple[Floats, Floats]:
+    """Edges (count + 1,) and weights (count,) of even bins over the finite values, for a picture.
 
-    def add(self, first_row: int, values: Floats, weights: Floats | None = None) -> None:
-        """Take in the rows from ``first_row`` on, nan where a row has failed.
-
-        Chunks come in order. Some may be missing: a block that is not whole says nothing about the mean's interval.
-        """
-        given = np.ones(values.shape) if weights is None else weights
-        self.moments = self.moments.merged(moments(values, given))
-        self.sketch.add(values, given)
-        begin = 0
-        while self._block and begin < values.size:
-            number, done = divmod(first_row + begin, self._block)
-            end = min(values.size, begin + self._block - done)
-            self._take(number, moments(values[begin:end], given[begin:end]), end - begin)
-            begin = end
-
-    def _take(self, number: int, part: Moments, rows: int) -> None:
-        """Take in rows of one block; the mean of a whole one is a draw of the mean, unless all its rows have failed."""
-        if number != self._number:
-            self._number, self._rows, self._part = number, 0, Moments()
-        self._rows, self._part = self._rows + rows, self._part.merged(part)
-        if self._rows == self._block and self._part.count:
-            self.blocks = self.blocks.merged(moments(np.array([self._part.mean])))
-
-    def mean(self, confidence: float) -> Interval:
-        """Mean with its interval, from block to block where the sampling has blocks."""
-        return mean_interval(self.moments, confidence, self.blocks if self._block else None)
-
-    def summary(self, output: Output, probabilities: Iterable[float], confidence: float) -> OutputSummary:
-        """What is known of the output so far."""
-        edges, counts = self.sketch.histogram(PICTURE_BINS)
-        return OutputSummary(
-            name=output.name,
-            unit=output.unit,
-            meaning=output.meaning,
-            rows=self.moments.count,
-            mean=self.mean(confidence),
-            deviation=self.moments.deviation,
-            least=self.moments.least,
-            most=self.moments.most,
-            quantiles={p: quantile_interval(self.sketch, p, confidence) for p in probabilities},
-            sketch_error=self.sketch.error,
-            edges=edges,
-            counts=counts,
-        )
+    Values that are all the same get one bin about them; without any finite value both are empty.
+    """
+    finite = np.isfinite(values)
+    values, weights = values[finite], weights[finite]
+    if not values.size:
+        return np.empty(0), np.empty(0)
+    if np.ptp(values) == 0.0:
+        half = max(abs(float(values[0])), 1e-30) * 1e-3
+        return np.array([values[0] - half, values[0] + half]), np.array([float(np.sum(weights))])
+    counts, edges = np.histogram(values, count, weights=weights)
+    return edges, counts

@@ -1,9 +1,8 @@
-"""What the rows of a ledger say together, read chunk by chunk and always in their order: the same each time."""
+"""What the rows of a ledger say together, always in their order: the same each time."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from itertools import groupby
 from pathlib import Path
 
 import numpy as np
@@ -12,65 +11,40 @@ from microrad.campaign import bundle
 from microrad.campaign.definition.records import CampaignFile
 from microrad.campaign.definition.tables import LoopTable
 from microrad.campaign.ledger import Head, Ledger, is_written
-from microrad.campaign.records import (
-    CampaignSummary,
-    CellSummary,
-    Chunk,
-    Job,
-    Limit,
-    Progress,
-    Sensitivity,
-    WorstTrace,
-    joined,
-)
-from microrad.campaign.rows.plan import Plan, planned
-from microrad.campaign.statistics.cell import MOST_FAILED, CellFold
+from microrad.campaign.records import CampaignSummary, CellSummary, Limit, Progress, Sensitivity, WorstTrace
+from microrad.campaign.rows.plan import planned
+from microrad.campaign.statistics.cell import CellRows
 from microrad.campaign.statistics.sensitivity import sensitivity
 from microrad.core.arrays import Floats
 from microrad.mirror import Variant
 
 SAMPLE_ROWS = 4000
 """Rows of all cells that are kept for scatter plots."""
-SENSITIVITY_ROWS = 20_000
+MOST_FAILED = 1000
+"""Failed rows that are listed."""
 
 
 def summarise_campaign(path: Path) -> CampaignSummary:
     """Everything that a status, a page or a picture shows of the campaign in a ledger, finished or not."""
     with Ledger.open(path, write=False) as book, book.still():
-        head, notes = book.head, book.notes()
+        head, notes, traces = book.head, book.notes(), book.traces()
         campaign = bundle.opened(head.bundle, any_code=True).campaign
-        plan = planned(campaign)
-        sample = _Sample(book, plan)
-        folds = [_folded(campaign, plan, number, sample.passing(number)) for number in range(len(campaign.cells))]
-        first_round = plan.rounds[0] * len(campaign.cells)
-        pace = progress(sum(fold.rows for fold in folds), first_round, notes, is_written(path))
-        return replace(
-            assembled(head, campaign, folds, [fold.summary() for fold in folds], pace),
-            sensitivities=_sensitivities(campaign, plan, book),
-            sample=sample.columns(),
-            worst=_worst_first(campaign.limits, book.traces()),
-        )
-
-
-def is_precise(campaign: CampaignFile, book: Ledger, cell: int, rows: int) -> bool:
-    """Whether the first rows of a cell know the wanted quantile as precisely as the campaign asks.
-
-    Args:
-        campaign: one that has a precision.
-        book: its ledger.
-        cell: number of the cell.
-        rows: how many rows are looked at, whole chunks.
-    """
-    plan = planned(campaign)
-    last = len(plan.chunks(cell, rows))
-    return _folded(campaign, plan, cell, (each for each in book.chunks(cell) if each.number < last)).is_precise()
+        cells = [CellRows(campaign, number, book.chunks(number)) for number in range(len(campaign.cells))]
+    first_round = planned(campaign).rounds[0] * len(cells)
+    pace = progress(sum(cell.rows for cell in cells), first_round, notes, is_written(path))
+    return replace(
+        assembled(head, campaign, cells, [cell.summary() for cell in cells], pace),
+        sensitivities=_sensitivities(campaign, cells[0]),
+        sample=_sample(cells),
+        worst=_worst_first(campaign.limits, traces),
+    )
 
 
 def assembled(
-    head: Head, campaign: CampaignFile, folds: Sequence[CellFold], cells: Sequence[CellSummary], pace: Progress
+    head: Head, campaign: CampaignFile, cells: Sequence[CellRows], summaries: Sequence[CellSummary], pace: Progress
 ) -> CampaignSummary:
     """A summary without what needs single rows: sensitivities, a sample and the worst traces."""
-    failed = [(number, each) for number, fold in enumerate(folds) for each in fold.failed]
+    failed = [(number, each) for number, cell in enumerate(cells) for chunk in cell.chunks for each in chunk.failed]
     return CampaignSummary(
         name=head.campaign_name,
         mission_name=head.mission_name,
@@ -81,14 +55,14 @@ def assembled(
         inputs=campaign.inputs,
         fixed=campaign.fixed,
         limits=campaign.limits,
-        cells=tuple(cells),
+        cells=tuple(summaries),
         sensitivities=(),
         sample={},
         worst=(),
         failed=tuple(failed[:MOST_FAILED]),
         progress=pace,
-        warnings=_warnings(campaign, folds),
-        findings=tuple(words for fold in folds if (words := fold.precision_words())),
+        warnings=_warnings(campaign, cells),
+        findings=tuple(words for cell in cells if (words := cell.precision_words())),
     )
 
 
@@ -111,68 +85,28 @@ def progress(done: int, first_round: int, notes: Mapping[str, object], written: 
     return Progress(done, total, seconds, rate, left, state)  # type: ignore[arg-type]
 
 
-# --------------------------------------------------------------------------------------------------------------- chunks
-def _folded(campaign: CampaignFile, plan: Plan, number: int, chunks: Iterator[Chunk]) -> CellFold:
-    """A cell with these chunks of it."""
-    fold = CellFold(campaign, number)
-    for chunk in _together(plan, chunks):
-        fold.take(chunk)
-    return fold
-
-
-def _together(plan: Plan, chunks: Iterator[Chunk]) -> Iterator[Chunk]:
-    """Neighbouring chunks as one each, so that no last digit depends on the size that chunks have by the clock."""
-    several = plan.largest_chunk // plan.chunk_rows
-    neighbours = groupby(enumerate(chunks), lambda at: (at[1].number - at[0], at[1].number // several))
-    for _, group in neighbours:
-        parts = [chunk for _, chunk in group]
-        yield joined(Job(parts[0].cell, parts[0].number), parts) if len(parts) > 1 else parts[0]
-
-
-class _Sample:
-    """Rows of all cells, spread evenly, gathered while the chunks pass."""
-
-    def __init__(self, book: Ledger, plan: Plan) -> None:
-        rows = sum(len(plan.rows_of(number)) for _, number in book.done())
-        self.every = max(math.ceil(rows / SAMPLE_ROWS), 1)
-        self.book = book
-        self.parts: list[dict[str, Floats]] = []
-
-    def passing(self, cell: int) -> Iterator[Chunk]:
-        """The chunks of a cell."""
-        for chunk in self.book.chunks(cell):
-            here = chunk.columns["row"] % self.every == 0
-            part = {name: column[here] for name, column in chunk.columns.items()}
-            self.parts.append({"cell": np.full(int(here.sum()), float(cell)), **part})
-            yield chunk
-
-    def columns(self) -> dict[str, Floats]:
-        """The rows by column."""
-        return _by_column(self.parts)
-
-
-def _by_column(parts: Sequence[Mapping[str, Floats]]) -> dict[str, Floats]:
-    """Parts of the same columns one behind the other."""
+# ----------------------------------------------------------------------------------------------------------------- rows
+def _sample(cells: Sequence[CellRows]) -> dict[str, Floats]:
+    """Rows of all cells, spread evenly, by column."""
+    every = max(math.ceil(sum(cell.rows for cell in cells) / SAMPLE_ROWS), 1)
+    parts: list[dict[str, Floats]] = []
+    for number, cell in enumerate(cells):
+        if whole := cell.whole():
+            here = whole.columns["row"] % every == 0
+            picked = {name: column[here] for name, column in whole.columns.items()}
+            parts.append({"cell": np.full(int(here.sum()), float(number)), **picked})
     return {name: np.concatenate([part[name] for part in parts]) for name in (parts[0] if parts else ())}
 
 
-def _sensitivities(campaign: CampaignFile, plan: Plan, book: Ledger) -> tuple[Sensitivity, ...]:
-    """How the inputs act on the limited outputs, from the rows of the first cell."""
+def _sensitivities(campaign: CampaignFile, cell: CellRows) -> tuple[Sensitivity, ...]:
+    """How the inputs act on the limited outputs, from the rows of a cell."""
     drawn = [each.key for each in campaign.inputs]
     names = list(dict.fromkeys(limit.output for limit in campaign.limits))
-    if not drawn or not names:
-        return ()
-    parts: list[dict[str, Floats]] = []
-    rows = 0
-    for chunk in _together(plan, book.chunks(0)):
-        parts.append({name: chunk.columns[name] for name in ("weight", *drawn, *names)})
-        rows += chunk.columns["row"].size
-        if rows >= SENSITIVITY_ROWS:
-            break
-    columns = _by_column(parts)
-    if not parts or np.any(columns["weight"] != 1.0):
+    whole = cell.whole()
+    if not drawn or not names or whole is None or np.any(whole.columns["weight"] != 1.0):
         return ()  # weighted rows are not drawn as the inputs are distributed
-    return tuple(sensitivity({name: columns[name] for name in drawn}, columns[name], name) for name in names)
+    inputs = {name: whole.columns[name] for name in drawn}
+    return tuple(sensitivity(inputs, whole.columns[name], name) for name in names)
 
 
 def _worst_first(limits: Sequence[Limit], traces: Sequence[WorstTrace]) -> tuple[WorstTrace, ...]:
@@ -187,16 +121,17 @@ _EXTRAPOLATED = {
 }
 
 
-def _warnings(campaign: CampaignFile, folds: Sequence[CellFold]) -> tuple[str, ...]:
+def _warnings(campaign: CampaignFile, cells: Sequence[CellRows]) -> tuple[str, ...]:
     found = list(campaign.warnings)
-    failed, rows = sum(fold.failed_rows for fold in folds), sum(fold.rows for fold in folds)
+    failed, rows = sum(cell.failed for cell in cells), sum(cell.rows for cell in cells)
     if failed:
         found.append(f"{failed} of {rows} rows have no result; the figures are those of the others.")
+    chunks = [chunk.columns for cell in cells for chunk in cell.chunks]
     for name, words in _EXTRAPOLATED.items():
-        if any(name in fold.outputs and fold.outputs[name].moments.most > 0.0 for fold in folds):
+        if any(np.any(columns[name] > 0.0) for columns in chunks if name in columns):
             found.append(words)
     if any(draw.drawn_as is not None for draw in campaign.draws):
-        worth = min((fold.worth for fold in folds if fold.good), default=math.nan)
+        worth = min((cell.worth for cell in cells if cell.rows > cell.failed), default=math.nan)
         found.append(
             "Some inputs are drawn from another distribution than their own and weighted back: for a mean the rows are "
             f"worth {worth:.3g} equal ones."
