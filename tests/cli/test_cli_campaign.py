@@ -68,7 +68,7 @@ def there(folder, done):
 def shortened(folder):
     """Take one chunk out of the ledger, as if the campaign had been killed before it."""
     with Ledger.open(folder / "campaign.ledger", write=True) as book:
-        book.drop(*max(book.done()))
+        book._connection.execute("DELETE FROM chunks WHERE cell = ? AND number = ?", max(book.done()))
         book.note("state", "running")
 
 
@@ -173,7 +173,7 @@ def test_a_missing_package_is_named_with_its_extra(there, call, refused, monkeyp
     )
     for name in ("dask", "distributed"):
         monkeypatch.setitem(sys.modules, name, None)
-    shown = call("campaign", "run", "campaign.toml", "--ledger", "new.ledger", "--workers", 1)
+    shown = call("campaign", "run", "campaign.toml", "--ledger", "new.ledger", "--scheduler", "a:1")
     assert (
         shown.code == 2
         and "pip install --constraint constraints.txt '.[cluster]'" in shown.err
@@ -206,10 +206,10 @@ def test_what_is_no_ledger_is_refused_and_nothing_is_left_beside_it(there, refus
     for file, words in (
         ("nothing.ledger", "there is no ledger nothing.ledger: begin the campaign with `microrad campaign run`"),
         (".", "is a folder, not a ledger"),
-        ("empty", "is an empty file, not a ledger"),
-        ("table.csv", "is text, not a ledger"),
-        ("long.txt", "is text, not a ledger"),
-        ("campaign.toml", "is text, not a ledger"),
+        ("empty", "empty is no ledger, or its first page is damaged: name the file"),
+        ("table.csv", "table.csv is no ledger, or its first page is damaged: name the file"),
+        ("long.txt", "long.txt is no ledger"),
+        ("campaign.toml", "is no ledger, or its first page is damaged: begin it with `microrad campaign run campaign"),
     ):
         said = refused("campaign", name, file, *more)
         assert words in said and said.count("\n") == 1, file

@@ -25,8 +25,9 @@ from microrad.report.links import budgets as budget_views
 from microrad.report.links import words as links_words
 from microrad.report.links.budgets import links_text
 from microrad.report.links.data import finding_data, links_data
-from microrad.report.links.page import acquisition_paragraphs, acquisition_section
+from microrad.report.links.views import acquisition_paragraphs, acquisition_view
 from microrad.report.quantities import quantity
+from microrad.report.tables import Table
 from preset_files import NAMES, completed
 from shipped import edited_file
 
@@ -581,15 +582,15 @@ def test_a_scan_with_too_little_light_never_finds(tmp_path, changes):
     assert not any(way.possible for way in found.ways)
     assert found.trade is None
     assert "It detects nothing" in acquisition_paragraphs(found)[1]
-    assert all("never" in sentence for sentence in links_words.acquisition_sentences(found))
+    ways = next(block for block in acquisition_view(found, ()).blocks if isinstance(block, Table))
+    assert {row[1] for row in ways.rows} == {"never"}
     assert [finding_data(found)[key] for key in ("scan_s", "scan_needed_detection_s")] == [None, None]
 
 
 def test_a_way_that_never_locks_has_no_times(tmp_path):
     found = studied(tmp_path, {"answer.required_power": "1 uW"}).finding
-    (row,) = acquisition_section(found)["ways"]
-    assert row["cells"] == ["never", "0.0000", "\u2013", "none locks", "\u2013"]
-    assert links_words.acquisition_sentences(found) == ["Acquisition by wide beacon: never (simulated 0.0000)."]
+    (ways,) = (block for block in acquisition_view(found, ()).blocks if isinstance(block, Table))
+    assert [*ways.rows[0][1:]] == ["never", "0.0000", "\u2013", "none locks", "\u2013"]
     (way,) = finding_data(found)["ways"]
     assert (way["mean_time_s"], way["simulated_mean_time_s"]) == (None, None)
 
@@ -606,7 +607,7 @@ def test_an_answer_without_light_is_a_result_and_no_refusal(tmp_path, changes):
     assert found.tracking.signal_to_noise < 1e-6
     assert found.finding.chances.answer_detection == pytest.approx(norm.sf(5.0), rel=1e-3)
     assert not found.finding.wide.possible
-    assert any("less than its noise" in sentence for sentence in links_words.sentences(found))
+    assert any("less than its noise" in sentence for sentence in links_words.consequences(found))
     assert links_data(found)["tracking"]["noise_equivalent_angle_rad"] is None
     names = [line.name for name, line in budget_views.lines(found) if name == "Tracking sensor"]
     assert names == [line.name for line in found.tracking.noise_lines]

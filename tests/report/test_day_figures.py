@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from microrad.report import write_columns
+from microrad.report import columns_csv
 from microrad.report.day.figures import (
     MOST_BARS,
     Assumed,
@@ -186,7 +186,7 @@ def test_a_name_is_cut_and_kept_on_one_line():
 def test_what_is_missing_is_said_and_still_has_a_table(draw, words, tmp_path):
     figure = draw()
     assert words in texts(figure)
-    write_columns(figure.columns, tmp_path / "empty.csv")
+    (tmp_path / "empty.csv").write_bytes(columns_csv(figure.columns))
     assert (tmp_path / "empty.csv").read_text(encoding="utf-8").strip()
 
 
@@ -210,7 +210,7 @@ def test_the_tables_hold_what_was_given(tmp_path):
     figure = timeline([("relay", first), ("eclipse", second)], SPAN_S, EPOCH)
     assert list(figure.columns["relay, start (s)"]) == list(first[:, 0])
     assert list(figure.columns["eclipse, end (s)"]) == list(second[:, 1])
-    write_columns(figure.columns, tmp_path / "t.csv")
+    (tmp_path / "t.csv").write_bytes(columns_csv(figure.columns))
     with (tmp_path / "t.csv").open(encoding="utf-8") as file:
         rows = [*csv.DictReader(file)]
     assert [float(row["relay, end (s)"]) for row in rows] == pytest.approx(first[:, 1], rel=1e-8)

@@ -155,15 +155,15 @@ def test_the_page_loads_nothing_and_has_its_sections_in_order(page, full):
     assert links.scripts == 0
     assert "@import" not in text
     assert not re.search(r"url\((?!#)", text)
-    assert re.findall(r"<h2>(.*?)</h2>", text) == list(SECTIONS)
-    assert 0 < text.index(words.verdict(full)[0]) < text.index("<h2>")
+    assert re.findall(r"<h2 [^>]*>([^<]*)<a ", text) == list(SECTIONS)
+    assert 0 < text.index(words.verdict(full)[0]) < text.index("<h2 ")
     assert "nan" not in re.sub(r"<[^>]*>", " ", text).split()
     assert page.stat().st_size < 3e6
 
 
 def test_every_figure_stands_in_its_section(page):
     text = text_of(page)
-    parts = dict(zip(SECTIONS, re.split(r"<h2>.*?</h2>", text)[1:], strict=True))
+    parts = dict(zip(SECTIONS, re.split(r"<h2 .*?</h2>", text)[1:], strict=True))
     counted = {name: part.count("<figure") for name, part in parts.items() if "<figure" in part}
     assert counted == {"Recordings": 1, "Linear part": 2, "Loops": 1, "Time response": 1, "Residuals": 2}
 
@@ -191,7 +191,7 @@ def test_the_ranking_holds_the_numbers_of_the_scores(page, full):
 def test_the_parameter_table_holds_value_and_error_of_every_model(page, full):
     text = text_of(page)
     for score, fit in zip(full.scores, full.fits, strict=True):
-        part = text[text.index(f"<summary>{score.model}") :]
+        part = text[text.index(f"{score.model}", text.index(">Parameters<a")) :]
         rows = rows_of(part[: part.index("</table>")])[1:]
         expected = parameter_rows(fit)
         assert len(rows) == len(expected) > 0
@@ -200,13 +200,13 @@ def test_the_parameter_table_holds_value_and_error_of_every_model(page, full):
             assert cells[:4] == [row.name, rounded_to_error(value, error), two_digits(error), unit]
         for name, why in not_identified(fit):
             assert any(cells[0] == name and why in cells[4] for cells in rows)
-        below = part[part.index("</table>") : part.index("</details>")]
+        below = part[part.index("</table>") :][:2000]
         assert starts_text(fit)[1:] in below
 
 
 def test_parameters_are_shown_in_their_units(page, full):
     fit, part = full.fit("bouc_wen"), text_of(page)
-    rows = rows_of(part[part.index("<summary>bouc_wen") :])
+    rows = rows_of(part[part.index("bouc_wen", part.index(">Parameters<a")) :])
     d1, alpha = (next(row for row in rows if row[0] == name) for name in ("d1", "alpha"))
     errors = fit.standard_errors
     shown = rounded_to_error(1e3 * fit.model.d1_rad_v, 1e3 * errors[0])
@@ -261,12 +261,12 @@ def test_refused_models_and_warnings_stand_before_the_numbers(page, full):
     text = html.unescape(text_of(page))
     assert [r.model for r in full.refused] == ["prandtl_ishlinskii_creep"]
     for said in (*full.warnings, full.refused[0].reason):
-        assert text.index("Warnings and refusals") < text.index(said) < text.index("<h2>Recordings")
+        assert text.index("Warnings and refusals") < text.index(said) < text.index(">Recordings<a")
 
 
 def test_a_page_without_linear_part_says_why(static, tmp_path):
     text = text_of(write(static, tmp_path / "r.html"))
-    assert re.findall(r"<h2>(.*?)</h2>", text) == list(SECTIONS)
+    assert re.findall(r"<h2 [^>]*>([^<]*)<a ", text) == list(SECTIONS)
     assert "No recording is broadband" in text
     assert text.count("<figure") == 4
 

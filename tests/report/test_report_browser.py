@@ -61,9 +61,9 @@ def files(found, tmp_path_factory):
 
 
 class Opened:
-    """A page with what it said and asked for."""
+    """A page with what it said and asked for, unfolded unless told otherwise."""
 
-    def __init__(self, browser, file, width=1280, **options):
+    def __init__(self, browser, file, width=1280, unfolded=True, **options):
         self.page = browser.new_page(viewport={"width": width, "height": 900}, **options)
         self.page.set_default_timeout(HANG_MS)
         self.said, self.asked = [], []
@@ -71,6 +71,8 @@ class Opened:
         self.page.on("pageerror", lambda error: self.said.append(str(error)))
         self.page.on("request", lambda request: self.asked.append(request.url))
         self.page.goto(file.as_uri())
+        if unfolded:
+            self.page.evaluate("document.querySelectorAll('details.view').forEach(each => { each.open = true })")
 
     def figures(self, kind="figure:has(> script.plot)"):
         return self.page.query_selector_all(kind)
@@ -224,8 +226,8 @@ SHOWN = "each => each.getBoundingClientRect().height > 2 * each.querySelector('s
 
 @pytest.mark.parametrize("name", [*ALIVE, "budget"])
 def test_paper_is_wide_enough_and_shows_what_is_folded(opened, name):
-    here = opened(name, A4_PX)
-    folded = here.figures("details:not([open]):not(.data)")
+    here = opened(name, A4_PX, unfolded=False)
+    folded = here.figures("main details:not([open]):not(.data)")
     assert folded
     here.page.emulate_media(media="print")
     assert here.page.evaluate("document.documentElement.scrollWidth") <= A4_PX  # else all of it would print smaller
@@ -234,10 +236,11 @@ def test_paper_is_wide_enough_and_shows_what_is_folded(opened, name):
 
 
 def test_without_scripts_every_figure_is_its_picture(opened):
-    here = opened(java_script_enabled=False)
-    figures = here.figures("figure")
-    assert len(figures) > 10
-    assert all(visible(figure, "svg[role=img]") for figure in here.figures("figure:has(> script.plot)"))
+    here = opened(unfolded=False, java_script_enabled=False)
+    assert len(here.figures("figure")) > 10
+    shown = here.figures(":not(details) > figure:has(> script.plot)")
+    assert len(shown) > 4
+    assert all(visible(figure, "svg[role=img]") for figure in shown)
     assert here.page.query_selector(".interactive") is None
 
 

@@ -72,8 +72,8 @@ def test_the_study_has_a_day_and_a_plan_but_no_contact_in_time_without_a_fine_lo
 
 def test_the_page_answers_with_contacts_volumes_latencies_and_the_assumption(written, found):
     text = (written / "report.html").read_text(encoding="utf-8")
-    begin = text.index(">What the link delivers</h3>")
-    section = text[begin : text.index('<h2 class="part', begin)]
+    begin = text.index('<h2 id="delivers">What the link delivers<')
+    section = text[begin : text.index("<h2 ", begin + 1)]
     for sentence in day_words.sentences(found.day):
         assert sentence in html.unescape(section)
     for needed in ("15 times", "median", "99 % within", "What matters most", "GB", "Doppler"):
@@ -202,9 +202,9 @@ def test_the_words_say_when_data_begin_and_how_much_flows(found):
     assert "data begin" in said
     assert f"{100 * run.data_share:.1f} % of the contact" in said
     assert "never lost" in said
-    headings, rows = windows_table(run, 0.997)
-    assert len(rows) == len(run.windows)
-    assert len(rows[0]) == len(headings)
+    table = windows_table(run, 0.997)
+    assert len(table.rows) == len(run.windows)
+    assert len(table.rows[0]) == len(table.headings)
     assert windows_table(run, 0.95).headings[5] == "95 % (µrad)"
 
 

@@ -6,6 +6,7 @@ import math
 import re
 import xml.etree.ElementTree as ET
 from dataclasses import replace
+from html import escape
 
 import numpy as np
 import pytest
@@ -16,23 +17,24 @@ from microrad.link import study as link_study
 from microrad.mission.file import load_link
 from microrad.report.links import budgets as budget_views
 from microrad.report.links import figures as link_module
-from microrad.report.links import page as links
+from microrad.report.links import views as links
 from microrad.report.links import words as links_words
 from microrad.report.links.budgets import links_csv, links_text
 from microrad.report.links.data import performance_data
 from microrad.report.links.figures import link_figures
-from microrad.report.links.page import (
+from microrad.report.links.page import links_page
+from microrad.report.links.views import (
     acquisition_paragraphs,
-    acquisition_section,
+    acquisition_view,
     fade_sentences,
-    links_page,
-    links_section,
     performance_note,
-    performance_section,
-    pointing_section,
+    performance_table,
+    pointing_view,
     residuals_sentence,
 )
 from microrad.report.quantities import apart, quantity
+from microrad.report.tables import Table
+from microrad.report.view import Soft
 from microrad.study.pointing_penalty import FINE, Cost, LinkPerformance
 from report_pages import without_scripts
 
@@ -132,25 +134,19 @@ def test_costs_stand_in_the_row_of_their_case_and_the_best_controller_is_marked(
         for mirror in ("given", "comparison")
     ]
     costs = [Cost(FINE, "LQG", "given", -0.5, -1e6)]
-    rows = links.performance_rows(cases, "LQG", costs)
-    assert [(row["controller"], row["mirror"]) for row in rows] == [(c.controller, c.mirror) for c in cases]
-    assert [row["cells"][-2:] for row in rows] == [["", ""], ["", ""], ["0.50", "1"], ["", ""]]
-    assert [row["best"] for row in rows] == [False, False, True, False]
-    assert {len(row["cells"]) for row in rows} == {12}
-    assert {len(row["cells"]) for row in links.performance_rows(cases, "")} == {10}
-    assert not any(row["best"] for row in links.performance_rows([case(plain)], ""))
+    table = performance_table(cases, costs, 0.003, "LQG")
+    assert [tuple(row[1:3]) for row in table.rows] == [(c.controller, c.mirror) for c in cases]
+    assert [row[-2:] for row in table.rows] == [["", ""], ["", ""], ["0.50", "1"], ["", ""]]
+    assert [*table.best] == [2]
+    assert {len(row) for row in (*table.rows, table.headings)} == {15}
+    plainly = performance_table(cases, (), 0.003)
+    assert {len(row) for row in (*plainly.rows, plainly.headings)} == {13}
+    assert not performance_table([case(plain)], (), 0.003).best
 
 
-def test_the_reference_without_hysteresis_has_no_row_and_the_missions_own_jitter_stands_first(plain):
-    shown = case(plain, source="sine of 1 Hz", controller="PID", mirror="given")
-    cases = (shown, replace(shown, mirror="no hysteresis"))
-    cost = Cost("sine of 1 Hz", "PID", "given", -1.0, -2e6)
-    context = performance_section(LinkPerformance(0.003, 20e-6, cases, (cost,)), "", None)
-    assert [(row["source"], row["mirror"]) for row in context["performance"]] == [("sine of 1 Hz", "given")]
-    own = performance_section(LinkPerformance(0.003, 20e-6, cases, (cost,)), "", case(plain))
-    assert [row["source"] for row in own["performance"]] == ["jitter as given", "sine of 1 Hz"]
-    assert context["outage"] == "0.3 %"
-    assert context["performance_note"].endswith("on a mirror without it.")
+def test_the_note_says_how_the_columns_are_read(plain):
+    assert "loss at 0.3 % (dB)" in performance_table([case(plain)], (), 0.003).headings
+    assert performance_note(costs=True).endswith("on a mirror without it.")
     assert performance_note(costs=False).endswith("at that loss.")
     assert "a star: the present one" in performance_note(costs=False)
 
@@ -261,28 +257,30 @@ def test_what_there_is_to_doubt_of_fades_is_said_once(plain):
 
 # ------------------------------------------------------------------------------------------------------------ pointing
 def test_the_column_of_what_is_left_fills_the_beacons_cone(plain):
-    shown = pointing_section(plain.open_loop)
-    lines = [row["line"] for row in shown["rows"]]
+    table, note, totals, *_ = pointing_view(plain.open_loop).blocks
+    lines = plain.open_loop.lines
     square = sum((line.value * 1e6) ** 2 for line in lines)
-    for row, line in zip(shown["rows"], lines, strict=True):
+    for row, line in zip(table.rows, lines, strict=True):
         others = square - (line.value * 1e6) ** 2
-        assert micro(row["left"]) == pytest.approx(math.sqrt(390.0**2 - others), rel=6e-3)
-        assert float(row["share"].removesuffix(" %")) == pytest.approx(1e14 * line.value**2 / square, abs=0.06)
-    assert "half angle (390 \u00b5rad)" in shown["left_for"]
-    assert shown["confidence"] == "99.7 %"
-    assert shown["totals"] == plain.open_loop.summations
+        assert row[0] == line.name
+        assert micro(row[3]) == pytest.approx(math.sqrt(390.0**2 - others), rel=6e-3)
+        assert float(row[2].removesuffix(" %")) == pytest.approx(1e14 * line.value**2 / square, abs=0.06)
+    assert "half angle (390 \u00b5rad)" in note.text
+    assert totals.folded.startswith("Totals at 99.7 %: root sum square 390 \u00b5rad")
+    assert [row[0] for row in totals.rows] == [each.name for each in plain.open_loop.summations]
 
 
 def test_without_a_beacon_nothing_is_left_for_anything(tmp_path):
     found = studied(tmp_path, {"beacon": None, "acquisition": None})
-    shown = pointing_section(found.open_loop)
-    assert [row["left"] for row in shown["rows"]] == [""] * len(shown["rows"])
-    assert (shown["left_for"], shown["sentences"]) == ("", [])
+    lines, *others = pointing_view(found.open_loop).blocks
+    assert "largest allowed" not in lines.headings
+    assert [type(each) for each in others] == [Table]
+    assert not any(isinstance(each, Soft) for each in others)
 
 
 def test_a_line_that_the_others_leave_nothing_is_told_so(tmp_path):
     found = studied(tmp_path, NO_SCAN, {"pointing.lines.body_pointing.error": "400 urad"})
-    left = {row["line"].name: row["left"] for row in pointing_section(found.open_loop)["rows"]}
+    left = {row[0]: row[3] for row in pointing_view(found.open_loop).blocks[0].rows}
     assert left.pop("Body pointing") == "300 \u00b5rad"
     assert set(left.values()) == {"nothing"}
 
@@ -292,49 +290,48 @@ def test_the_sentence_on_coverage_tells_both_readings(plain, tmp_path):
     own, other = plain.open_loop.reading, plain.open_loop.counter_reading
     assert "Read as full-1/e2, the beacon's half angle is 390 \u00b5rad, at least the root sum square" in said
     assert f"with a probability of {own.coverage:.4f}" in said
-    assert said.endswith(f"Read as half-1/e2, the cone is 780 \u00b5rad and the probability {other.coverage:.4f}.")
+    assert said.endswith(
+        f"Read as half-1/e2, the half angle is 780 \u00b5rad and the probability {other.coverage:.4f}."
+    )
     narrow = studied(tmp_path, NO_SCAN, {"beacon.divergence": "600 urad"})
     assert "300 \u00b5rad, less than the root sum square" in links.coverage(narrow.open_loop)[0]
 
 
 def test_no_sentence_is_said_twice_on_the_page(plain):
-    context = links_section(plain, budgets=(), figures=(), files=False)
-    everywhere = links_words.sentences(plain)
-    elsewhere = [
-        links_words.verdict(plain),
-        *links_words.pointing_sentences(plain.open_loop),
-        *context["performance_words"],
-        *links_words.acquisition_sentences(plain.finding),
-    ]
-    assert sorted([*context["sentences"], *elsewhere]) == sorted(everywhere)
-    assert len(context["sentences"]) == 8
+    page = without_scripts(links_page(plain))
+    assert len(links_words.consequences(plain)) == 8
+    for sentence in (links_words.verdict(plain), *links_words.consequences(plain), *links.coverage(plain.open_loop)):
+        assert page.count(escape(sentence, quote=True).replace("&#x27;", "&#39;").replace("&quot;", "&#34;")) == 1
 
 
 # --------------------------------------------------------------------------------------------------------- acquisition
 def test_the_rows_of_acquisition_are_those_of_the_record(plain):
-    shown = acquisition_section(plain.finding)
-    assert [row["name"] for row in shown["ways"]] == ["wide beacon", "spiral scan"]
-    assert shown["early"] == "90 %"
-    for row, way in zip(shown["ways"], (plain.finding.wide, plain.finding.scan), strict=True):
+    view = acquisition_view(plain.finding, ())
+    (ways,) = (block for block in view.blocks if isinstance(block, Table))
+    assert [row[0] for row in ways.rows] == ["wide beacon", "spiral scan"]
+    assert ways.headings[-1] == "90 % within"
+    for row, way, more in zip(ways.rows, (plain.finding.wide, plain.finding.scan), view.views, strict=True):
         locked = way.simulated.locked
-        late = row["cells"].pop()
-        assert row["cells"] == [
+        _, *cells, late = row
+        assert cells == [
             f"{way.outcome.success_probability:.4f}",
             f"{np.mean(locked):.4f}",
             quantity(way.outcome.mean_time_s, "s"),
             quantity(float(np.mean(way.simulated.time_s[locked])), "s"),
         ]
         assert float(late.removesuffix(" s")) == pytest.approx(np.quantile(way.simulated.time_s[locked], 0.9), rel=0.25)
-        assert row["stages"] == way.stages
-        assert row["log"] == way.log
+        stages, log = more.blocks
+        assert [row[0] for row in stages.rows] == [each.name for each in way.stages]
+        assert [row[0] for row in log.rows] == [each.stage for each in way.log]
 
 
 def test_acquisition_that_never_locks_has_no_simulated_time(tmp_path):
     found = studied(tmp_path, NO_SCAN, {"answer.transmit_power": "1 mW"})
-    (way,) = acquisition_section(found.finding)["ways"]
-    assert way["cells"][1] == "0.0000"
-    assert way["cells"][3] == "none locks"
-    assert not any("nan" in cell for cell in way["cells"])
+    (ways,) = (block for block in acquisition_view(found.finding, ()).blocks if isinstance(block, Table))
+    (way,) = ways.rows
+    assert way[2] == "0.0000"
+    assert way[4] == "none locks"
+    assert not any("nan" in cell for cell in way)
 
 
 def test_the_words_on_acquisition_give_each_chance(plain, tmp_path):
@@ -367,7 +364,7 @@ def test_the_figures_are_svg_with_their_numbers_beside_them(plain):
         assert list(figure.columns["margin lower (dB)"]) == [s.margin_low_db for s in each.swings]
         assert list(figure.columns["margin higher (dB)"]) == [s.margin_high_db for s in each.swings]
         assert ("required" in texts(figure)) is (each.of == "Communication")
-    axis = "margin of the communication link, all but 0.3 % of the time (dB)"
+    axis = "margin of the communication link, for 99.7 % of the time (dB)"
     assert [axis in texts(figure) for figure in drawn[:3]] == [True, False, False]
     assert all(re.search(r"\((rad|s)\)|probability", name) for name in trade.columns)
     assert np.array_equal(trade.columns["scan, whole time (s)"], plain.finding.trade.scan_time_s)
@@ -497,4 +494,3 @@ def test_the_noise_of_a_receiver_has_its_table(tmp_path, plain, name):
 
 def test_figures_name_their_data_only_where_they_stand_beside_the_page(plain):
     assert "figures/tornado.csv" not in links_page(plain)
-    assert links_section(plain, budgets=(), figures=(), files=True)["files"] is True

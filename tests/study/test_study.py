@@ -14,7 +14,8 @@ from microrad.loop import sine_run as simulate
 from microrad.mirror.summary import summarise, unknown_dynamics
 from microrad.mission.file import load_mission
 from microrad.report.fine_pointing.words import not_reliable
-from microrad.report.links.page import links_section, performance_section
+from microrad.report.links.views import performance_table
+from microrad.report.links.words import consequences
 from microrad.report.paper import figures
 from microrad.report.study import chain, words
 from microrad.report.study import contributors as requirement_views
@@ -107,7 +108,7 @@ def test_the_lines_of_the_verdict(shipped):
     ]
     assert found[4][2].endswith(": " + cause)
     words = ("beacon cone", "beacon", "answer", "residual pointing error", "communication", "stroke", "fine pointing")
-    words += ("link margin but for 0.3 % of the time",)
+    words += ("link margin for 99.7 % of the time",)
     assert all(r.name.lower().startswith(word) for r, word in zip(rows, words, strict=True))
     assert [r.mark for r in rows] == ["derived", "PASS", "PASS", "FAIL", "FAIL", "FAIL", "PASS", "derived"]
     assert result.closes and not result.met and result.margin_db == rows[-1].actual > rows[4].actual
@@ -163,7 +164,7 @@ def test_the_claims_beside_our_values(shipped):
     ],
 )
 def test_what_hysteresis_costs_the_link(shipped, source, controller, margin_db, cost_db, cost_mbit_s):
-    """Margin but for 0.3 % of the time, the rate with 3 dB there, what hysteresis takes; two are in docs/link.md."""
+    """Margin for 99.7 % of the time, the rate with 3 dB there, what hysteresis takes; two are in docs/link.md."""
     found = shipped[0].performance
     case = found.case(source, controller, "given")
     (cost,) = [c for c in found.costs if (c.source, c.controller, c.mirror) == (source, controller, "given")]
@@ -173,11 +174,11 @@ def test_what_hysteresis_costs_the_link(shipped, source, controller, margin_db, 
     assert_allclose(-cost.data_rate_bit_s, cost_mbit_s * 1e6, atol=0.06e6)
     (row,) = [
         r
-        for r in performance_section(found, "", None)["performance"]
-        if r["source"] == source and r["controller"] == controller and r["mirror"] == "given"
+        for r in performance_table(found.cases, found.costs, found.outage).rows
+        if r[:3] == [source, controller, "given"]
     ]
-    assert row["cells"][4] == f"{margin_db:+.2f}".replace("-", "\u2212")
-    assert row["cells"][-2:] == [f"{cost_db:.2f}", f"{cost_mbit_s:.0f}"]
+    assert row[7] == f"{margin_db:+.2f}".replace("-", "\u2212")
+    assert row[-2:] == [f"{cost_db:.2f}", f"{cost_mbit_s:.0f}"]
 
 
 def test_the_beacon_brings_four_times_what_its_partners_sensor_needs(shipped):
@@ -185,7 +186,7 @@ def test_the_beacon_brings_four_times_what_its_partners_sensor_needs(shipped):
     assert_allclose(beacon.irradiance_w_m2, 2.42e-9, atol=0.005e-9)
     assert_allclose(beacon.required_irradiance_w_m2, 566e-12, atol=0.5e-12)
     assert_allclose(beacon.required_irradiance_w_m2, 10e-12 / (pi / 4 * 0.15**2), rtol=1e-9)
-    said = links_section(shipped[0].links, budgets=(), figures=(), files=False)["sentences"]
+    said = consequences(shipped[0].links)
     (line,) = [each for each in said if each.startswith("Beacon at its partner")]
     assert "2.42 nW/m^2 at the pointing error" in line
     assert line.endswith("needs 566 pW/m^2.")
@@ -371,15 +372,15 @@ def test_a_jitter_is_not_summed_with_what_the_simulated_loop_leaves(tmp_path):
     assert shaken.static.margin_db == plain.static.margin_db == plain.communication.margin_db
     first, *_ = words.warnings(shaken)
     assert first.startswith("[jitter] is not in this verdict, which judges the pointing error that the simulated loop")
-    assert f"Under [jitter] alone the margin is \u2212{-under_db:.2f} dB but for 0.3 % of the time" in first
+    assert f"Under [jitter] alone the margin is \u2212{-under_db:.2f} dB for 99.7 % of the time" in first
     assert first in " ".join(words.verdict_text(shaken, 80).split())
     assert not any("[jitter]" in warning for warning in words.warnings(plain))
     said = "As budgeted, at 10 µrad, the {} is +3.00 dB; 3 dB is required."
     assert words.papers_loop(shaken)[0] == said.format("static margin")
     assert words.papers_loop(plain)[0] == said.format("margin")
     assert "static margin +3.00 dB as budgeted," in chain.stages(shaken)[1].lines
-    texts = [row["contributor"] for row in requirement_views.rows(shaken)]
-    assert texts == [row["contributor"] for row in requirement_views.rows(plain)]
+    texts = [row[5] for row in requirement_views.judged_table(shaken, shaken.requirements).rows]
+    assert texts == [row[5] for row in requirement_views.judged_table(plain, plain.requirements).rows]
     assert "outage" not in texts[-1] and "moves most with terminals.geo_aperture: 1.74 dB" in texts[-1]
     margins = summary(shaken)["margin_db"]
     assert margins["communication_as_budgeted"] == shaken.communication.margin_db

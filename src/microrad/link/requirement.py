@@ -63,7 +63,7 @@ class Requirement:
 def of_links(study: LinkStudy) -> tuple[Requirement, ...]:
     """What the budgets alone are held against: what is required of the beacon, the answer and communication."""
     m = study.file.mission
-    name = "communication margin" + ("" if m.jitter is None else f" but for {outage_words(m.requirement)}")
+    name = "communication margin" + ("" if m.jitter is None else f" for {time_kept(m.requirement)}")
     return (
         *of_beams(study),
         _of_budget(study.file.sources, "communication", study.communication, m.requirement.margin_db, name),
@@ -86,9 +86,9 @@ def of_beams(study: LinkStudy) -> tuple[Requirement, ...]:
     return tuple(found)
 
 
-def outage_words(required: LinkRequirement) -> str:
-    """The share of the time that the required margin may be missed."""
-    return f"{100 * stated_outage(required):g} % of the time"
+def time_kept(required: LinkRequirement) -> str:
+    """The share of the time for which the required margin has to be there."""
+    return f"{100.0 * (1.0 - stated_outage(required)):.6g} % of the time"
 
 
 def derived_from(sources: Mapping[str, Source], *keys: str) -> tuple[str, ...]:

@@ -5,7 +5,8 @@ A subject is a folder; `page`, `plotting` and `results` are shared.
 
 import csv
 import io
-from collections.abc import Mapping
+import pickle
+from collections.abc import Mapping, Sequence
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -15,13 +16,14 @@ from microrad.core.folder import MANIFEST, FolderError, check_folder, whole_fold
 from microrad.core.kept import NOTHING, Kept
 from microrad.core.progress import Progress
 from microrad.core.threads import beside
-from microrad.report.tables import Column, rows_of
+from microrad.report.tables import Column, numbers_text, rows_of
 
 if TYPE_CHECKING:
     from microrad.orbit.constellation import ConstellationPlan
     from microrad.report.identification.data import identification_data
     from microrad.report.identification.page import ReportError, check_identification, write_identification
     from microrad.report.identification.text import identification_text
+    from microrad.report.plotting.figure import Figure
     from microrad.report.study.data import summary
     from microrad.report.study.page import StudyFigures
     from microrad.report.study.words import verdict_text
@@ -83,17 +85,19 @@ def write(
         on_progress(0, 3, "figures")
         drawn = study_figures(study, parts)
         (draft / "figures").mkdir()
-        for figure in drawn.every:
-            (draft / "figures" / f"{figure.name}.svg").write_text(figure.svg, encoding="utf-8")
-            write_columns(figure.columns, draft / "figures" / f"{figure.name}.csv")
+        made = parts.part(pictures, pickle.dumps(drawn.every, protocol=5))
+        for figure, (svg, plot, data) in zip(drawn.every, made, strict=True):
+            figure.take(svg, plot)
+            (draft / "figures" / f"{figure.name}.svg").write_text(svg, encoding="utf-8")
+            (draft / "figures" / f"{figure.name}.csv").write_bytes(data)
         on_progress(1, 3, "page")
-        made = manifest_of(study, summary(study), draft)
-        (draft / "report.html").write_text(study_page(study, drawn, made), encoding="utf-8")
+        manifest = manifest_of(study, summary(study), draft)
+        (draft / "report.html").write_text(study_page(study, drawn, manifest), encoding="utf-8")
         on_progress(2, 3, "results")
         if study.plan is not None:
             write_plan(study.plan, draft)
         (draft / "results.nc").write_bytes(numbers())
-        write_manifest(made, draft, MANIFEST)
+        write_manifest(manifest, draft, MANIFEST)
         on_progress(3, 3, "done")
     return folder / "report.html"
 
@@ -114,7 +118,7 @@ def study_figures(study: "Study", parts: Kept = NOTHING) -> "StudyFigures":
     return StudyFigures(
         paper_figures(study),
         bench_figures(study, parts),
-        fine_pointing_figures(study),
+        fine_pointing_figures(study, parts),
         tail_figures(study),
         link_figures(study.links),
         () if study.day is None else day_figures(study.day, study.contact),
@@ -129,10 +133,23 @@ def write_plan(plan: "ConstellationPlan", folder: Path) -> None:
     (folder / "contact-plan.ionrc").write_text(plan.contact_plan() + "\n", encoding="utf-8")
 
 
-def write_columns(columns: Mapping[str, Column], path: Path) -> None:
+def pictures(figures: bytes) -> tuple[tuple[str, str, bytes], ...]:
+    """Of each figure the static picture, what the page's script draws it from, and its data as CSV.
+
+    The figures are pickled: a picture shows all of its figure, and one digest of all is quicker than one of each array.
+    """
+    drawn: Sequence[Figure] = pickle.loads(figures)
+    return tuple((figure.svg, figure.plot, columns_csv(figure.columns)) for figure in drawn)
+
+
+def columns_csv(columns: Mapping[str, Column]) -> bytes:
     """Columns as CSV with a heading, numbers to nine digits; shorter columns end early."""
     text = io.StringIO(newline="")
     writer = csv.writer(text)
     writer.writerow(columns)
-    writer.writerows(rows_of(columns, 9))
-    path.write_bytes(text.getvalue().encode())
+    numbers = [column for column in columns.values() if not isinstance(column, tuple)]
+    if len(numbers) == len(columns) > 1:
+        text.write(numbers_text(numbers, 9, ",", "\r\n"))
+    else:
+        writer.writerows(rows_of(columns, 9))
+    return text.getvalue().encode()

@@ -12,26 +12,19 @@ from microrad.link.study import LinkStudy
 from microrad.mission.tables.link import Beam
 from microrad.report.data import fields
 from microrad.report.quantities import apart, signed
-from microrad.report.tables import Table
+from microrad.report.tables import Cell, Table
 
 
-def requirement_table(found: Sequence[Requirement]) -> Table:
-    """Requirements for a terminal."""
-    cells = [(r.name, *reversed(apart(r.actual, r.required, r.unit)), margin_text(r), r.mark) for r in found]
-    return Table("", ("requirement", "required", "achieved", "to spare", ""), cells, (0,))
-
-
-def requirements_paragraph(found: Sequence[Requirement]) -> str:
-    """What holds and what does not, a clause for each requirement."""
-    failed = [r for r in found if not r.met]
-    parts = [f"{len(found) - len(failed)} of {len(found)} requirements are met."]
-    if failed:
-        parts.append(f"FAIL: {'; '.join(f'{r.name} {margin_text(r)}, by {r.because}' for r in failed)}.")
-    for mark in ("PASS", DERIVED):
-        held = [r for r in found if r.mark == mark]
-        if held:
-            parts.append(f"{mark[:1].upper() + mark[1:]}: {'; '.join(f'{r.name} {margin_text(r)}' for r in held)}.")
-    return " ".join((*parts, *filter(None, [derived_words(found)])))
+def requirement_table(found: Sequence[Requirement], causes: Sequence[str] = ()) -> Table:
+    """Requirements with what is achieved; ``causes`` say what contributes most to each, where there is room for it."""
+    rows: list[list[str | Cell]] = [
+        [r.name, *reversed(apart(r.actual, r.required, r.unit)), margin_text(r), Cell("", r.mark), *causes[k : k + 1]]
+        for k, r in enumerate(found)
+    ]
+    headings, brief = ("requirement", "required", "achieved", "to spare", ""), (0, 1, 2, 3, 4)
+    if not causes:
+        return Table("", headings, rows, (0,), cards=True)
+    return Table("", (*headings, "contributes most"), rows, (0, 5), cards=True, brief=brief)
 
 
 def met_words(found: Sequence[Requirement]) -> str:

@@ -1,15 +1,18 @@
-"""Tables for a terminal, and columns of data as rows of text."""
+"""Tables, views of them as text for a terminal, and columns of data as rows of text."""
 
 import io
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import zip_longest
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 Column = NDArray[np.float64] | tuple[str, ...]
 """Of a table of data: numbers, or what the rows are called."""
+
+_ROOM = 120  # columns for a table with several columns of words at its end
 
 
 def rows_of(columns: Mapping[str, Column], digits: int) -> list[tuple[str, ...]]:
@@ -24,6 +27,15 @@ def _texts(column: Column, digits: int) -> Sequence[str]:
     return ["" if text == "nan" else text for text in found] if "nan" in found else found
 
 
+def numbers_text(columns: Sequence[NDArray[np.float64]], digits: int, between: str, end: str) -> str:
+    """Columns of numbers as `rows_of` has them, as one text: the quickest way for many of them."""
+    rows = np.full((max(column.size for column in columns), len(columns)), np.nan)
+    for place, column in enumerate(columns):
+        rows[: column.size, place] = column
+    row = between.join([f"%.{digits}g"] * len(columns)) + end
+    return (row * len(rows) % tuple(rows.ravel().tolist())).replace("nan", "")
+
+
 class Rows(NamedTuple):
     """Headings and rows of a table that has its title elsewhere."""
 
@@ -31,13 +43,66 @@ class Rows(NamedTuple):
     rows: Sequence[tuple[str, ...]]
 
 
-class Table(NamedTuple):
-    """A table with its title; the columns in ``broken`` give way where a line has no room for all."""
+class Cell(NamedTuple):
+    """A cell with a mark behind its text: PASS, FAIL, yes, no or "!", with a hint of what that means; or a key."""
 
+    text: str
+    mark: str = ""
+    hint: str = ""
+    code: bool = False
+
+    def __str__(self) -> str:
+        """Text and mark."""
+        return f"{self.text} {self.mark}".strip()
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A table with its title; "" where that stands elsewhere.
+
+    Columns in ``words`` hold words, which give way where a line has no room for all; the others hold numbers. Further
+    lines of a cell explain its first. ``groups`` are headings over several columns, with how many. Rows in ``best``
+    stand out, the last ``totals`` are sums. A page shows a ``folded`` table behind that sentence, one in ``cards`` with
+    each row as a card where it is narrow, and for each of ``filters`` a button that leaves only those rows. A terminal
+    that has no room for all columns shows those in ``brief``.
+    """
+
+    kind: ClassVar[str] = "table"
     title: str
     headings: Sequence[str]
-    rows: Sequence[Sequence[str]]
-    broken: Sequence[int]
+    rows: Sequence[Sequence[str | Cell]]
+    words: Sequence[int] = (0,)
+    groups: Sequence[tuple[str, int]] = ()
+    best: Sequence[int] = ()
+    totals: int = 0
+    folded: str = ""
+    cards: bool = False
+    filters: Mapping[str, Sequence[int]] = field(default_factory=dict)
+    brief: Sequence[int] = ()
+
+    def columns(self, kept: Sequence[int]) -> "Table":
+        """The table with some of its columns."""
+        words = [place for place, column in enumerate(kept) if column in self.words]
+        headings, rows = [self.headings[k] for k in kept], [[row[k] for k in kept] for row in self.rows]
+        return replace(self, headings=headings, rows=rows, words=words)
+
+    def narrowed(self) -> "Table":
+        """The table with what a narrow terminal has room for: its last words below each other, with their headings."""
+        return (self.columns(self.brief) if self.brief else self)._stacked()
+
+    def _stacked(self) -> "Table":
+        count = len(self.headings)
+        first = next(k for k in range(count, 0, -1) if k - 1 not in self.words)
+        if first + 1 >= count:
+            return self
+        more = self.headings[first + 1 :]
+
+        def last(row: Sequence[str | Cell]) -> str:
+            said = (f"{heading}: {cell}" for heading, cell in zip(more, row[first + 1 :], strict=True) if str(cell))
+            return "\n".join([str(row[first]), *said])
+
+        rows = [[*row[:first], last(row)] for row in self.rows]
+        return replace(self.columns(range(first + 1)), rows=rows)
 
 
 def tables_text(tables: Sequence[Table], sentences: Sequence[str], width: int) -> str:
@@ -54,11 +119,12 @@ def tables_text(tables: Sequence[Table], sentences: Sequence[str], width: int) -
 
     console = Console(file=io.StringIO(), width=width, color_system=None, highlight=False, markup=False)
     for each in tables:
+        shown = each if width >= _ROOM else each.narrowed()
         table = Drawn(title=each.title, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
-        for place, heading in enumerate(each.headings):
-            table.add_column(heading, overflow="fold", no_wrap=place not in each.broken)
-        for row in each.rows:
-            table.add_row(*row)
+        for place, heading in enumerate(shown.headings):
+            table.add_column(heading, overflow="fold", no_wrap=place not in shown.words)
+        for row in shown.rows:
+            table.add_row(*map(str, row))
         console.print(table)
     for sentence in sentences:
         console.print(sentence)

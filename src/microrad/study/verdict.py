@@ -9,7 +9,7 @@ import numpy as np
 from microrad import link
 from microrad.link import pointing
 from microrad.link.pointing.outage import Performance
-from microrad.link.requirement import IMPOSSIBLE, Requirement, Subject, derived_from, outage_words
+from microrad.link.requirement import IMPOSSIBLE, Requirement, Subject, derived_from, time_kept
 from microrad.loop import sine_run
 from microrad.loop.controller_study import FinePointingStudy
 from microrad.loop.paper_cases import PID, PID_WITH_INVERSE, PaperCases, Run
@@ -53,7 +53,7 @@ def of_fine_pointing(
     """
     controller, cause, lacking = fine.best.design.name, fine.budget.dominant, unknown(fine.scene.mirrors.table)
     left, title = fine.best.simulated[Variant.GIVEN].quantile_rad, f"fine pointing at {100 * fine.quantile:g} %"
-    name, derived = f"link margin but for {outage_words(q)} ({controller})", derived_from(sources, "communication.")
+    name, derived = f"link margin for {time_kept(q)} ({controller})", derived_from(sources, "communication.")
     spare, doubt = case.margin_db - q.margin_db, lacking if case.possible else IMPOSSIBLE
     return (
         _stroke(sources, fine),

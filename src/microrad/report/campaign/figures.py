@@ -49,13 +49,8 @@ _ACROSS = 3  # panels beside each other
 _LABEL = 30  # characters
 _NONE = np.empty(0)
 _LIMIT: dict[str, Any] = {"colour": VERMILION, "dash": (5.0, 2.0), "width": 1.4}
-_MARKED: tuple[tuple[str, Dash], ...] = (
-    (BLACK, "-"),
-    (GREEN, "--"),
-    (ORANGE, "-."),
-    (BLACK, ":"),
-    (GREY, (8.0, 2.0, 2.0, 2.0)),
-)
+_DASHES: tuple[Dash, ...] = ("-", "--", "-.", ":", (8.0, 2.0, 2.0, 2.0))
+_MARKED = tuple(zip((BLACK, GREEN, ORANGE, BLACK, GREY), _DASHES, strict=True))
 
 
 def label_of(key: str, keys: Sequence[str]) -> str:
@@ -105,9 +100,8 @@ def distribution(output: OutputSummary, limit: Limit | None) -> Figure:
         f"{output.name}, upper edge ({output.unit})": output.edges[1:],
         "rows (%)": shares,
     }
-    caption = (
-        f"{output.meaning[:1].upper()}{output.meaning[1:]}: share of the rows in each bin, and quantiles over them."
-    )
+    meaning = f"{output.meaning[:1].upper()}{output.meaning[1:]}"
+    caption = f"{meaning}: share of the rows in each bin, and quantiles over them."
     return Figure(f"campaign-{output.name}", f"Distribution of {numbers.label(output.name)}", caption, sheet, columns)
 
 
@@ -172,9 +166,8 @@ def _tail_band(panel: Panel, cell: CellSummary) -> dict[str, Floats]:
 
 def _tail_marks(panel: Panel, summary: CampaignSummary, found: Tail) -> None:
     """The radii that were asked for, each with its interval, and the limit of the residual."""
-    for (p, radius), (colour, marker) in zip(
-        found.wanted.items(), zip(cycle((VERMILION, GREEN, BLACK)), cycle("osD")), strict=False
-    ):
+    looks = zip(cycle((VERMILION, GREEN, BLACK)), cycle("osD"))
+    for (p, radius), (colour, marker) in zip(found.wanted.items(), looks, strict=False):
         if math.isfinite(radius.value):
             at = np.array([radius.value * 1e6]), np.array([p])
             arms = _arms([radius], 1e6) if numbers.ends(radius, "rad") else None
@@ -221,8 +214,7 @@ def _sensitivity(group: Sequence[Sensitivity], keys: Sequence[str], number: int,
     for panel, each in zip(panels, group, strict=True):
         panel.title = shortened(each.output, 30)
         panel.x = Axis("index", low=0.0, high=1.05, ticks=(0.0, 0.5, 1.0))
-        panel.y = _rows([label_of(key, keys) for key in shown])
-        panel.y.grid = False
+        panel.y = sheets.rows([label_of(key, keys) for key in shown])
         panel.add(*_index_bars(each, shown))
     columns = {
         f"{each.output}, {key}, {kind} index": np.array([i.value, i.low, i.high])
@@ -235,20 +227,12 @@ def _sensitivity(group: Sequence[Sensitivity], keys: Sequence[str], number: int,
     caption = (
         f"Sobol indices{of} from {min(each.rows for each in group)} rows: the share of an output's variance that an "
         "input makes by itself (first order), and with all its interactions (total); with intervals."
-        + ("".join(f" {note}." for note in notes))
-        + (
-            f" {len(keys) - len(shown)} inputs with smaller indices are in the table only."
-            if len(keys) > len(shown)
-            else ""
-        )
+        + "".join(f" {note}." for note in notes)
     )
+    if len(keys) > len(shown):
+        caption += f" {len(keys) - len(shown)} inputs with smaller indices are in the table only."
     names = ", ".join(each.output for each in group)
     return Figure(f"campaign-sensitivity-{number}", f"What matters to {names}", caption, sheet, columns)
-
-
-def _rows(texts: Sequence[str]) -> Axis:
-    """An axis with a text at each row, the first on top."""
-    return Axis(low=len(texts) - 0.4, high=-0.6, ticks=dict(enumerate(texts)), size=8.0)
 
 
 def _index_bars(each: Sensitivity, shown: Sequence[str]) -> Iterator[Bars | Line]:
@@ -304,9 +288,8 @@ def _scatter(
 ) -> Sheet:
     sheet, (panel,) = sheets.grid(WIDTH, 4.0)
     sheet.legend = Legend("upper right")
-    scales_ = [
-        scale_of(column, unit, limit.output if second and k else "") for k, (_, column, unit) in enumerate(axes_of)
-    ]
+    named = ("", limit.output if second else "")
+    scales_ = [scale_of(column, unit, name) for (_, column, unit), name in zip(axes_of, named, strict=True)]
     x, y = (column * scale.factor for (_, column, _), scale in zip(axes_of, scales_, strict=True))
     low = -math.inf if limit.least is None else limit.least
     high = math.inf if limit.most is None else limit.most
@@ -354,11 +337,8 @@ def grid(summary: CampaignSummary) -> tuple[Figure, ...]:
     maps = len(keys) == 2 and min(map(len, levels)) > 1 and max(map(len, levels)) <= 12 and min(map(len, levels)) <= 8
     sheet = _maps(summary, keys, levels, shown[:2]) if maps else _dots(summary, keys, shown)
     columns = {f"{p.name}, {what}": np.array([getattr(i, what) for i in p.of]) for p in shown for what in _WHAT}
-    drawn = (
-        "a number in each field"
-        if maps
-        else "bars: intervals of a share, else from the known quantiles nearest to 1 % and 99 %, or of all values"
-    )
+    bars = "bars: intervals of a share, else from the known quantiles nearest to 1 % and 99 %, or of all values"
+    drawn = "a number in each field" if maps else bars
     caption = f"Over {' and '.join(keys)}: {', '.join(p.name for p in shown[: 2 if maps else None])}; {drawn}."
     if not maps and len(summary.cells) > MOST_CELLS:
         caption += f" The first {MOST_CELLS} of {len(summary.cells)} combinations."
@@ -404,7 +384,7 @@ def _dots(summary: CampaignSummary, keys: Sequence[str], shown: Sequence[Shown])
         values = np.array([i.value for i in found]) * each.scale.factor
         arms = _arms(found, each.scale.factor)
         panel.x = Axis("\n".join(textwrap.wrap(each.scale.title(each.name), 28)))
-        panel.y = _rows([shortened(", ".join(cell.values.values()), 34) for cell in cells])
+        panel.y = replace(sheets.rows([shortened(", ".join(cell.values.values()), 34) for cell in cells]), grid=True)
         panel.add(Line(values, rows, BLUE, "", marker="o", size=4.5, x_arms=arms))
         panel.add(*_limit_lines(panel, summary, each))
     return sheet
@@ -482,19 +462,11 @@ def worst(summary: CampaignSummary, trace: WorstTrace, number: int) -> Figure:
     caption = f"Row {trace.row}{of}: of its rows the {_rank(number)}in {trace.output}, {found}."
     caption += " Shown is the first run of the row's."
     caption += f" Its begin, up to {numbers.value(float(radial.max()), 'rad')}, is cut off." if cut else ""
-    return Figure(
-        f"campaign-worst-{trace.cell + 1}-{number}",
-        f"{_rank(number).capitalize()}row in time",
-        caption,
-        sheet,
-        columns,
-    )
+    title = f"{_rank(number).capitalize()}row in time"
+    return Figure(f"campaign-worst-{trace.cell + 1}-{number}", title, caption, sheet, columns)
 
 
 def _rank(number: int) -> str:
     """How bad a row is, in words."""
-    return (
-        ("", "second ", "third ", "fourth ", "fifth ", "sixth ")[number - 1] + "worst "
-        if number <= 6
-        else f"{number}th worst "
-    )
+    ranks = ("", "second ", "third ", "fourth ", "fifth ", "sixth ")
+    return (ranks[number - 1] if number <= len(ranks) else f"{number}th ") + "worst "

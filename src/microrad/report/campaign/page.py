@@ -1,15 +1,17 @@
 """A campaign as one page that loads nothing, with its pictures."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from markupsafe import Markup
 
 from microrad.campaign.records import CampaignSummary, CellSummary, Limit, OutputSummary
 from microrad.report.campaign import figures, tables, words
-from microrad.report.page.templates import render
+from microrad.report.page.templates import page_of
 from microrad.report.plotting.figure import Figure
-from microrad.report.tables import Rows
+from microrad.report.tables import Rows, Table
+from microrad.report.view import Block, Points, Soft, Verdict, View, told
 
 MOST_FAILED, MOST_TRACES = 40, 6
 _MOST_QUANTILES = 5
@@ -17,49 +19,70 @@ _MOST_QUANTILES = 5
 
 def campaign_page(summary: CampaignSummary) -> str:
     """The page; every text of the campaign is escaped, and nothing is loaded from anywhere."""
-    return render("campaign/campaign.html", campaign_section(summary, campaign_figures(summary)))
+    name, sha256 = summary.name, summary.hashes.get("campaign", "")
+    of = Markup("<code>{}</code>, SHA-256 <code>{}\u2026</code>; mission: {}").format(
+        name, sha256[:16], summary.mission_name
+    )
+    good = {"pass": True, "fail": False}.get(words.verdict(summary))
+    lead = Verdict(words.headline(summary), [*summary.findings, *words.answers(summary, words.best(summary))], good)
+    warned: list[Block] = ["Warnings:", Points(summary.warnings)] if summary.warnings else []
+    blocks = [lead, Soft(words.progress_words(summary)), *warned]
+    views = campaign_views(summary, campaign_figures(summary))
+    return page_of(name.removesuffix(".toml"), "campaign", of, blocks, views, sha256=sha256)
 
 
-def campaign_section(summary: CampaignSummary, drawn: Mapping[str, Any]) -> dict[str, Any]:
-    """What the template needs; ``drawn`` are its figures by section."""
+def campaign_views(summary: CampaignSummary, drawn: Mapping[str, Sequence[Figure]]) -> tuple[View, ...]:
+    """The parts of the page that have something to show; ``drawn`` are its figures by part."""
     cell = words.best(summary)
-    failed, several = tables.failed_table(summary, MOST_FAILED), len(summary.cells) > 1
-    return {
-        "mission": {"name": summary.name.removesuffix(".toml")},
-        "mission_name": summary.mission_name,
-        "study": {"file": {"path": {"name": summary.name}, "sha256": summary.hashes.get("campaign", "")}},
-        **_of_cell(summary, cell),
-        "verdict": words.verdict(summary),
-        "headline": words.headline(summary),
-        "findings": summary.findings,
-        "answers": words.answers(summary, cell),
-        "progress": words.progress_words(summary),
-        "warnings": summary.warnings,
-        "combinations": tables.cell_table(summary, summary.cells) if several else None,
-        "limited": tables.limited_table(summary, summary.cells) if several and summary.limits else None,
-        "keys": len(summary.cells[0].values) if summary.cells else 0,
-        "indices": tables.index_table(summary.sensitivities),
-        "figures": drawn,
-        "failed": failed,
-        "more_failed": tables.more_failed(summary, len(failed.rows)),
-        "setting": words.setting(summary),
-        "inputs": Rows(("input", "distribution"), [(each.key, each.distribution) for each in summary.inputs]),
-        "hashes": Rows(("of", "SHA-256"), list(summary.hashes.items())),
+    indices, every = tables.index_table(summary.sensitivities), "Every index and rank correlation"
+    parts: dict[str, Sequence[Block]] = {
+        "Over the grid": _grid(summary, cell, drawn["grid"]) if len(summary.cells) > 1 else (),
+        "Limits": (_table(tables.limit_table(summary, cell), 9),) if cell is not None and summary.limits else (),
+        "Outputs": () if cell is None else _outputs(cell, drawn["outputs"]),
+        "Tail": () if cell is None or cell.tail is None else (*drawn["tail"], _table(tables.tail_table(cell.tail), 9)),
+        "What matters": (*drawn["sensitivity"], _table(indices, 2, every)) if indices.rows else (),
+        "Where rows miss a limit": drawn["region"],
+        "Worst rows in time": drawn["worst"],
+        "Rows without results": _failed(summary),
+        "How the rows were made": _made(summary),
     }
+    return tuple(View(title, blocks) for title, blocks in parts.items() if blocks)
 
 
-def _of_cell(summary: CampaignSummary, cell: CellSummary | None) -> dict[str, Any]:
-    """Limits and outputs of the cell shown in detail; nothing where no row has results."""
-    if cell is None:
-        return {"detail": "", "limits": None, "outputs": None, "even": [], "meanings": None, "tail": None}
-    return {
-        "detail": cell.label,
-        "limits": tables.limit_table(summary, cell) if summary.limits else None,
-        "outputs": tables.output_table(cell, _MOST_QUANTILES, intervals=True),
-        "tail": None if cell.tail is None else tables.tail_table(cell.tail),
-        "even": words.few_values(cell),
-        "meanings": tables.meanings_table(cell),
-    }
+def _table(found: Rows, words: int, folded: str = "") -> Table:
+    """A table whose first columns hold words."""
+    return Table("", *found, range(words), folded=folded)
+
+
+def _grid(summary: CampaignSummary, cell: CellSummary | None, drawn: Sequence[Figure]) -> tuple[Block, ...]:
+    keys = len(summary.cells[0].values)
+    every = [_table(tables.cell_table(summary, summary.cells), keys)]
+    every += [_table(tables.limited_table(summary, summary.cells), keys)] if summary.limits else []
+    detail = "" if cell is None else f"Below in detail: {cell.label}, the first of those that miss a limit least."
+    return told(*drawn, View("Every combination", every, folded=True), detail)
+
+
+def _outputs(cell: CellSummary, drawn: Sequence[Figure]) -> tuple[Block, ...]:
+    found, even = tables.output_table(cell, _MOST_QUANTILES, intervals=True), words.few_values(cell)
+    said = (
+        "Over the rows: mean, standard deviation, and the values that a share of the rows stays below, with their "
+        "intervals. \u201c\u2013\u201d: not known, there are too few rows."
+    )
+    numbers: list[Block] = [said, _table(found, 1)] if found.rows else []
+    meanings = View("What they are", [_table(tables.meanings_table(cell), 9)])
+    return told(*numbers, *even, meanings, *drawn) if numbers or even else ()
+
+
+def _failed(summary: CampaignSummary) -> tuple[Block, ...]:
+    found = tables.failed_table(summary, MOST_FAILED)
+    return told(_table(found, 9), tables.more_failed(summary, len(found.rows))) if found.rows else ()
+
+
+def _made(summary: CampaignSummary) -> tuple[Block, ...]:
+    inputs = Rows(("input", "distribution"), [(each.key, each.distribution) for each in summary.inputs])
+    hashes = Rows(("of", "SHA-256"), list(summary.hashes.items()))
+    drawn = _table(inputs, 9) if inputs.rows else None
+    return told(*words.setting(summary), drawn, _table(hashes, 9, "SHA-256 of what they depend on"))
 
 
 # ------------------------------------------------------------------------------------------------------------- figures

@@ -42,7 +42,7 @@ def satellites_table(plan: ConstellationPlan) -> Table:
         for k, name in enumerate(plan.satellites[:MOST_ROWS])
     ]
     headings = ("satellite", "sessions", "with data", "longest time without", "volume")
-    return Table("What each satellite gets", headings, rows, (0,))
+    return Table("What each satellite gets", headings, rows, (0,), folded="What each satellite gets")
 
 
 def plan_text(plan: ConstellationPlan, width: int) -> str:

@@ -4,7 +4,7 @@ from typing import Any
 
 from microrad.report.data import fields
 from microrad.report.quantities import duration, minus, quantity, volume
-from microrad.report.tables import Rows
+from microrad.report.tables import Table
 from microrad.study.contact_run import ContactRun, State
 
 
@@ -35,7 +35,7 @@ def _times(count: int) -> str:
     return "once" if count == 1 else f"{count} times"
 
 
-def windows_table(run: ContactRun, quantile: float) -> Rows:
+def windows_table(run: ContactRun, quantile: float) -> Table:
     """The windows that were simulated in full; the ``quantile`` of the error is the mission's."""
     headings = (
         "since rise (min)",
@@ -62,14 +62,15 @@ def windows_table(run: ContactRun, quantile: float) -> Rows:
         )
         for w in run.windows
     ]
-    return Rows(headings, rows)
+    return Table("", headings, rows, ())
 
 
-def transitions_table(run: ContactRun) -> Rows:
+def transitions_table(run: ContactRun) -> Table:
     """The transitions of the terminal, in seconds since the rise."""
     begin = run.contact.start_s
-    rows = [(minus(f"{t.time_s - begin:.3f} s"), t.state, t.to, t.cause) for t in run.log]
-    return Rows(("time", "state", "to", "cause"), rows)
+    rows = [(t.state, t.to, t.cause, minus(f"{t.time_s - begin:.3f} s")) for t in run.log]
+    folded = "Every transition of that contact"
+    return Table("", ("state", "to", "cause", "time"), rows, (0, 1, 2), folded=folded)
 
 
 def contact_run_data(run: ContactRun) -> dict[str, Any]:

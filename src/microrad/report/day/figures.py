@@ -16,7 +16,6 @@ from microrad.report.plotting.figure import Figure
 from microrad.report.plotting.palette import BLACK, BLUE, GREEN, GREY, ORANGE, SKY, VERMILION
 from microrad.report.plotting.sheet import (
     WIDTH,
-    Area,
     Bars,
     Dash,
     Legend,
@@ -29,7 +28,8 @@ from microrad.report.plotting.sheet import (
     grid,
     shortened,
 )
-from microrad.report.plotting.swings import in_lines, swing_bars
+from microrad.report.plotting.sheet import rows as named_rows
+from microrad.report.plotting.swings import in_lines, swing_bars, swing_legend
 from microrad.report.quantities import duration
 from microrad.study.contact_run import ContactRun
 
@@ -94,8 +94,7 @@ def _bars(panel: Panel, rows: Sequence[tuple[str, Floats]], colours: Sequence[st
         words = f"{start_s.size} · {duration(float(np.sum(end_s - start_s)))}" if start_s.size else "none"
         ink = BLACK if start_s.size else GREY
         panel.add(Words(words, 1.0, row, ink, 9.0, shift=(5.0, 0.0), of_panel="x"))
-    panel.y.ticks, panel.y.grid = {row: shortened(name) for row, (name, _) in enumerate(rows)}, False
-    panel.y.low, panel.y.high = len(rows) - 0.4, -0.6
+    panel.y = named_rows([shortened(name) for name, _ in rows], 9.0)
 
 
 def _hours(start_s: float, end_s: float) -> Floats:
@@ -344,9 +343,7 @@ def _tornado(shown: Sequence[Assumed], value: float, label: str) -> Sheet:
     most = max(label.count("\n") + 1 for label in labels)
     sheet, (panel,) = grid(WIDTH, 1.0 + max(0.27, 0.14 * most + 0.06) * len(shown))
     swing_bars(panel, labels, [(s.low, s.high) for s in shown], value)
-    panel.x.title = label
-    keys = Area((), ORANGE, label="assumption lower"), Area((), BLUE, label="assumption higher")
-    sheet.legend = Legend("above", 2, only=keys)
+    panel.x.title, sheet.legend = label, swing_legend("assumption", "above", 2)
     return sheet
 
 
@@ -355,14 +352,8 @@ def _tornado(shown: Sequence[Assumed], value: float, label: str) -> Sheet:
 
 def day_figures(day: DayStudy, run: ContactRun | None = None) -> tuple[Figure, ...]:
     """Every figure of a day; ``run`` is one of its contacts, simulated."""
-    found = [
-        _contacts_figure(day),
-        *_along_figure(day),
-        _volume_figure(day),
-        _latency_figure(day),
-        ground_map(day),
-        _assumptions_figure(day),
-    ]
+    found = [_contacts_figure(day), *_along_figure(day), _volume_figure(day), _latency_figure(day), ground_map(day)]
+    found.append(_assumptions_figure(day))
     return tuple(found if run is None else [*found, _contact_run_figure(day, run)])
 
 
@@ -396,17 +387,8 @@ def _along_figure(day: DayStudy) -> list[Figure]:
     doppler = seen.doppler_hz(day.data.table.wavelength_m)
     since_s = seen.time_s - contact.start_s
     rise = pair.epoch.utc(contact.start_s)[:19].replace("T", " ")
-    return [
-        along_contact(
-            since_s,
-            seen.range_m,
-            seen.point_ahead_rad,
-            seen.rate_rad_s,
-            doppler,
-            number=number,
-            rise_utc=rise,
-        )
-    ]
+    sight = since_s, seen.range_m, seen.point_ahead_rad, seen.rate_rad_s, doppler
+    return [along_contact(*sight, number=number, rise_utc=rise)]
 
 
 def _volume_figure(day: DayStudy) -> Figure:
@@ -451,17 +433,10 @@ def _marked(each: Outline) -> tuple[str, Marked]:
 
 def _assumptions_figure(day: DayStudy) -> Figure:
     """The bars stand in the order of `Swing.factor`, as the words about them do."""
-    direct = day.direct is not None
-    bars = [
-        Assumed(
-            _label(s),
-            s.at_low.ratio if direct else s.at_low.relay_bit / 8e12,
-            s.at_high.ratio if direct else s.at_high.relay_bit / 8e12,
-        )
-        for s in day.swings
-    ]
-    if direct:
+    if day.direct is not None:
+        bars = [Assumed(_label(s), s.at_low.ratio, s.at_high.ratio) for s in day.swings]
         return assumptions(bars, day.ratio, "volume by relay over volume direct")
+    bars = [Assumed(_label(s), s.at_low.relay_bit / 8e12, s.at_high.relay_bit / 8e12) for s in day.swings]
     return assumptions(bars, day.relay.capacity_bit / 8e12, "volume by the relay (TB)")
 
 

@@ -1,15 +1,20 @@
-"""What pages show of a day: its section in the page of a study, and a page of its own."""
+"""What pages show of a day: its view in the page of a study, and a page of its own."""
 
 from collections.abc import Sequence
-from typing import Any
 
 from microrad.link.study import LinkStudy
+from microrad.orbit.constellation import ConstellationPlan
 from microrad.orbit.day import DayStudy
 from microrad.report.day import words
+from microrad.report.day.constellation import plan_sentences, satellites_table
 from microrad.report.day.figures import day_figures
 from microrad.report.day.tables import assumptions_table, contacts_table, ways_table
-from microrad.report.page.templates import render
+from microrad.report.page.templates import inputs_view, mission_page
 from microrad.report.plotting.figure import Figure
+from microrad.report.view import Points, Verdict, View, told
+
+OPEN = ("day-timeline", "data-volume")
+"""Figures that a page shows at once; the others when it is asked."""
 
 
 def day_page(day: DayStudy, links: LinkStudy) -> str:
@@ -19,31 +24,32 @@ def day_page(day: DayStudy, links: LinkStudy) -> str:
         day: what the links deliver.
         links: the study of the links that the day is of; its file has the sources of the inputs.
     """
-    section = day_section(day, day_figures(day), files=False)
-    context = {
-        "study": links,
-        "mission": links.file.mission,
-        "day": section,
-        "inputs": list(links.file.sources.items()),
-    }
-    return render("day/day_page.html", context)
+    headline, *sentences = words.sentences(day)
+    lead = Verdict(headline, good=day.relay.capacity_bit > 0.0)
+    views = (day_view(day, sentences, day_figures(day)), inputs_view(links.file.sources))
+    return mission_page(links.file, "contacts", [lead], views)
 
 
-def day_section(day: DayStudy, figures: Sequence[Figure], *, files: bool) -> dict[str, Any]:
-    """What the template of a day needs.
+def day_view(day: DayStudy, sentences: Sequence[str], figures: Sequence[Figure], *more: View | None) -> View:
+    """What a day delivers.
 
-    ``figures`` are those of the day, and ``files`` says whether their data stand beside the page.
+    Args:
+        day: what the links deliver.
+        sentences: its answers.
+        figures: those of the day.
+        more: views at the end.
     """
-    return {
-        "delivers": day.relay.capacity_bit > 0.0,
-        "sentences": words.sentences(day)[0 if files else 1 :],  # a page of its own has the first as its verdict
-        "headline": words.headline(day)[0],
-        "warnings": day.warnings,
-        "ways": ways_table(day),
-        "contacts": contacts_table(day),
-        "assumptions": assumptions_table(day),
-        "figures": figures,
-        "files": files,
-        "run": None,
-        "constellation": None,
-    }
+    tables = (ways_table(day), contacts_table(day), assumptions_table(day))
+    drawn = [f if f.name in OPEN else View(f.title, [f], folded=True, listed=False) for f in figures]
+    return View(
+        "What the link delivers",
+        told(*sentences, "Warnings:" if day.warnings else None, Points(day.warnings), *tables, *drawn, *more),
+        "delivers",
+    )
+
+
+def constellation_view(plan: ConstellationPlan | None) -> View | None:
+    """Who is served when."""
+    return (
+        None if plan is None else View("A constellation", [*plan_sentences(plan), satellites_table(plan)], folded=True)
+    )

@@ -37,7 +37,7 @@ def contacts_table(day: DayStudy) -> Table:
             if isinstance(c, Pass)
         ]
     found = [row for _, row in sorted(rows, key=lambda item: item[0])]
-    return Table("Contacts", CONTACT_COLUMNS, found, (len(CONTACT_COLUMNS) - 1,))
+    return Table("Contacts", CONTACT_COLUMNS, found, (0, 10), brief=(0, 1, 2, 3, 9, 10), folded="Every contact")
 
 
 def _row(day: DayStudy, partner: str, c: Contact, between: tuple[str, ...], bit: float) -> tuple[str, ...]:
@@ -80,7 +80,9 @@ def ways_table(day: DayStudy) -> Table:
         ("latency of what is kept, median", *(duration(w.median_s) for w in ways)),
         ("latency of what is kept, 99 %", *(duration(w.slow_s) for w in ways)),
     ]
-    return Table("Relay and direct downlink", ("", *(w.name for w in ways)), rows, (0,))
+    carried = " and ".join(f"{volume(w.capacity_bit)} by {w.name}" for w in ways)
+    folded = f"What the ways could carry: {carried}; line by line"
+    return Table("Relay and direct downlink", ("", *(w.name for w in ways)), rows, (0,), folded=folded)
 
 
 def assumptions_table(day: DayStudy) -> Table:
@@ -92,7 +94,9 @@ def assumptions_table(day: DayStudy) -> Table:
         if text != NOTHING
     ]
     headings = ("assumption", "changed to", "relay", "direct", "ratio", "99 % by\nrelay", "99 %\ndirect")
-    return Table("One assumption changed", headings, rows, (0, 1))
+    return Table(
+        "One assumption changed", headings, rows, (0, 1), folded="One assumption changed, all others as they are"
+    )
 
 
 def _numbers(n: Numbers, direct: bool) -> tuple[str, ...]:

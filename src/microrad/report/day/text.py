@@ -10,9 +10,6 @@ from microrad.report.day.data import day_data
 from microrad.report.day.tables import assumptions_table, contacts_table, ways_table
 from microrad.report.tables import tables_text
 
-WIDE = 136
-"""Columns of a terminal from which every cell of a contact has its place."""
-_NARROW = (0, 1, 2, 3, 9, 10)  # columns of the contacts that are left where there is little room
 _COLUMNS = {
     "rise (UTC)": "start_utc",
     "set (UTC)": "end_utc",
@@ -39,15 +36,10 @@ def day_text(day: DayStudy, width: int) -> str:
 
     Args:
         day: what the links deliver.
-        width: columns of the terminal; below `WIDE` a contact loses what it asks of the terminals.
+        width: columns of the terminal.
     """
-    contacts = contacts_table(day)
-    if width < WIDE:
-        rows = [tuple(row[k] for k in _NARROW) for row in contacts.rows]
-        headings = [contacts.headings[k] for k in _NARROW]
-        contacts = contacts._replace(headings=headings, rows=rows, broken=(len(_NARROW) - 1,))
     warnings = [f"Warning: {warning}." for warning in day.warnings]
-    tables = [contacts, ways_table(day), assumptions_table(day)]
+    tables = [contacts_table(day), ways_table(day), assumptions_table(day)]
     return tables_text(tables, [*words.sentences(day), *warnings], width)
 
 

@@ -6,8 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from microrad.core.arrays import Floats
+from microrad.core.kept import NOTHING, Kept
 from microrad.loop.controller_study import ErrorBudget, FinePointingStudy, Verified
 from microrad.loop.pointing_loop.linear import close, sensitivity
+from microrad.loop.pointing_loop.loop import LoopController, PointingLoop
 from microrad.mirror import Variant
 from microrad.mission.model import Mission
 from microrad.report.fine_pointing.words import NAMES, source_name
@@ -45,15 +47,15 @@ class Shown:
         return Line(freq_hz, values, self.colour, label=self.name, marker=self.marker, size=5.0, every=marks)
 
 
-def fine_pointing_figures(study: Study) -> tuple[Figure, ...]:
-    """The figures of the study's fine-pointing loop; none without one."""
+def fine_pointing_figures(study: Study, parts: Kept = NOTHING) -> tuple[Figure, ...]:
+    """The figures of the study's fine-pointing loop; none without one. ``parts`` are those of earlier runs."""
     fine, m = study.fine_pointing, study.file.mission
     if fine is None:
         return ()
     controllers = shown(fine)
     figures = [spectra(fine, controllers), errors(fine, m), error_budget(fine.budget)]
     if fine.scene.loop.optical.every == 1:
-        figures.append(sensitivities(fine, m, controllers))
+        figures.append(sensitivities(fine, m, controllers, parts))
     return tuple(figures)
 
 
@@ -222,7 +224,7 @@ def error_budget(b: ErrorBudget) -> Figure:
 # ------------------------------------------------------------------------------------------------ sensitivity
 
 
-def sensitivities(fine: FinePointingStudy, m: Mission, controllers: tuple[Shown, ...]) -> Figure:
+def sensitivities(fine: FinePointingStudy, m: Mission, controllers: tuple[Shown, ...], parts: Kept = NOTHING) -> Figure:
     """|S| of the same controllers, with the ceiling that the modulus margin asked for puts on it."""
     half = 0.5 / fine.scene.loop.timing.period_s
     freq = np.geomspace(half * 1e-4, half * 0.999, _SENSITIVITY_POINTS)
@@ -230,7 +232,7 @@ def sensitivities(fine: FinePointingStudy, m: Mission, controllers: tuple[Shown,
     sheet.legend = Legend("above", 2)
     columns: dict[str, Floats] = {"frequency (Hz)": freq}
     for place, each in enumerate(controllers):
-        size = np.abs(sensitivity(close(fine.scene.loop, each.of.design.controller), freq)[:, 0, 0])
+        size = parts.part(sensitivity_size, fine.scene.loop, each.of.design.controller, freq)
         for panel in (whole, peak):
             panel.add(each.line(freq, size, place))
         columns[each.name] = size
@@ -245,6 +247,11 @@ def sensitivities(fine: FinePointingStudy, m: Mission, controllers: tuple[Shown,
         "Right: the same about its peak."
     )
     return Figure("fine-pointing-sensitivity", "Sensitivity", caption, sheet, columns)
+
+
+def sensitivity_size(loop: PointingLoop, controller: LoopController, freq_hz: Floats) -> Floats:
+    """|S| of axis x at each frequency."""
+    return np.asarray(np.abs(sensitivity(close(loop, controller), freq_hz)[:, 0, 0]))
 
 
 def _ceiling(panel: Panel, m: Mission) -> None:

@@ -1,8 +1,7 @@
-"""The section of the page on the fine-pointing loop: its sentences and tables, ready to be put down."""
+"""The fine-pointing loop as a view: what each controller leaves, its design, the error budget, stroke and sines."""
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Any
 
 from microrad.core.units import format_quantity
 from microrad.loop.control import LoopMargins
@@ -14,33 +13,33 @@ from microrad.report.fine_pointing import words
 from microrad.report.fine_pointing.data import parameter_units, rms_by_source, sources
 from microrad.report.plotting.figure import Figure
 from microrad.report.quantities import angle, given_angle, micro, minus, percent, share_of_time
+from microrad.report.tables import Cell, Table
+from microrad.report.view import Points, Soft, Verdict, View, told
 
-Row = dict[str, Any]
+OPEN = ("fine-pointing-budget",)
+"""Figures that a page shows at once; the others when it is asked."""
 
 
-def fine_pointing_section(fine: FinePointingStudy, required: float, figures: Sequence[Figure]) -> dict[str, Any]:
-    """What the template needs at a required pointing error (rad); its tables have microradians, as they say."""
-    variants = [v for v in words.NAMES if any(v in each.simulated for each in fine.verified)]
-    return {
-        "met": fine.best.meets(required) and not unknown_dynamics(fine.scene.mirrors.table),
-        "verdict": words.result(fine, required),
-        "theory": words.theory(fine),
-        "setting": setting(fine),
-        "quantile": share_of_time(fine.quantile),
-        "required": given_angle(required),
-        "variants": [(v, words.NAMES[v]) for v in variants],
-        "residuals": residual_rows(fine, variants, required),
-        "limits": limits(fine),
-        "designs": design_rows(fine),
-        "sources": [words.source_name(name) for name in sources(fine.verified)],
-        "by_source": source_rows(fine),
-        "budget": budget(fine),
-        "stroke_verdict": words.stroke(fine),
-        "stroke": stroke(fine),
-        "sines": sines(fine, required),
-        "amplitude": given_angle(fine.scene.sine_amplitude_rad),
-        "figures": figures,
-    }
+def fine_pointing_view(fine: FinePointingStudy, required: float, figures: Sequence[Figure]) -> View:
+    """The study at a required pointing error (rad) with its figures; its tables have microradians, as they say."""
+    met = fine.best.meets(required) and not unknown_dynamics(fine.scene.mirrors.table)
+    verdict = Verdict(" ".join(words.result(fine, required)), [" ".join(words.theory(fine))], met)
+    drawn = [f if f.name in OPEN else View(f.title, [f], folded=True, listed=False) for f in figures]
+    return View(
+        "Fine pointing under vibration and noise",
+        told(
+            verdict,
+            Soft(setting(fine)),
+            residuals_view(fine, required),
+            designs_view(fine),
+            sources_view(fine),
+            budget_view(fine),
+            stroke_view(fine),
+            sines_view(fine, required),
+            *drawn,
+        ),
+        "fine-pointing",
+    )
 
 
 def setting(fine: FinePointingStudy) -> str:
@@ -58,7 +57,9 @@ def setting(fine: FinePointingStudy) -> str:
     )
 
 
-# ------------------------------------------------------------------------------------------------ numbers
+def _best(fine: FinePointingStudy, names: Sequence[str]) -> list[int]:
+    """Rows of the best controller."""
+    return [place for place, name in enumerate(names) if name == fine.best.design.name]
 
 
 def with_interval(residual: Residual) -> str:
@@ -71,30 +72,54 @@ def with_interval(residual: Residual) -> str:
 
 
 # ------------------------------------------------------------------------------------------------ controllers
-
-
-def residual_rows(fine: FinePointingStudy, variants: Sequence[str], required_rad: float) -> list[Row]:
+def residuals_view(fine: FinePointingStudy, required_rad: float) -> View:
     """What each controller leaves, in theory and by variant of the mirror."""
-    return [
-        {
-            "name": v.design.name,
-            "best": v.design.name == fine.best.design.name,
-            "theory": micro(v.theory.radial_rms_rad),
-            "simulated": [_simulated(v.simulated.get(variant), required_rad) for variant in variants],
-        }
+    variants = [v for v in words.NAMES if any(v in each.simulated for each in fine.verified)]
+    time = share_of_time(fine.quantile)
+    rows = [
+        [
+            v.design.name,
+            micro(v.theory.radial_rms_rad),
+            *(cell for variant in variants for cell in _simulated(v.simulated.get(variant), required_rad)),
+        ]
         for v in fine.verified
     ]
+    table = Table(
+        "",
+        ("controller", "rms", *("rms", time, "largest") * len(variants)),
+        rows,
+        groups=(("", 1), ("theory", 1), *((words.NAMES[v], 3) for v in variants)),
+        best=_best(fine, [v.design.name for v in fine.verified]),
+    )
+    met = limits(fine)
+    shares = "Limits met, as a share of control samples (saturation, lost spot, the inverse's rate) or plant steps:"
+    none = "No controller met a limit: none saturates, none is beyond what was identified, and no spot is lost."
+    return View(
+        "What each controller leaves",
+        told(
+            "Radial error at the line of sight in µrad: rms in theory (linear: no hysteresis, no limits), then as "
+            f"simulated on each variant of the mirror. Required: at most {given_angle(required_rad)} for {time} of the "
+            "time.",
+            table,
+            Soft(
+                "± is the 99 % interval of the rms over the runs. Bold and shaded: the best, by its error at "
+                f"{time} on the mission's mirror; the first is the baseline."
+            ),
+            shares if met else none,
+            Points(met),
+        ),
+    )
 
 
-def _simulated(residual: Residual | None, required_rad: float) -> Row:
+def _simulated(residual: Residual | None, required_rad: float) -> tuple[str | Cell, ...]:
     if residual is None:
-        return {"rms": "", "quantile": "", "largest": "", "mark": ""}
-    return {
-        "rms": with_interval(residual),
-        "quantile": micro(residual.quantile_rad),
-        "largest": micro(residual.largest_rad),
-        "mark": "PASS" if residual.quantile_rad <= required_rad else "FAIL",
-    }
+        return "", "", ""
+    quantile = Cell(micro(residual.quantile_rad), _mark(residual.quantile_rad, required_rad))
+    return with_interval(residual), quantile, micro(residual.largest_rad)
+
+
+def _mark(value_rad: float, required_rad: float) -> str:
+    return "PASS" if value_rad <= required_rad else "FAIL"
 
 
 def limits(fine: FinePointingStudy) -> list[str]:
@@ -107,20 +132,30 @@ def limits(fine: FinePointingStudy) -> list[str]:
     ]
 
 
-def design_rows(fine: FinePointingStudy) -> list[Row]:
+def designs_view(fine: FinePointingStudy) -> View:
     """What each controller was tuned to, its margins and what it is bound by."""
     units = parameter_units(fine)
-    return [
-        {
-            "name": v.design.name,
-            "best": v.design.name == fine.best.design.name,
-            "inverse": v.design.inverse,
-            "tuned": ", ".join(_value(name, value, units) for name, value in v.design.tuned.values.items()),
-            "margins": _margins(v.design.tuned.margins),
-            "bound_by": ", ".join(v.design.tuned.bound_by) or "nothing",
-        }
-        for v in fine.verified
-    ]
+    rows = []
+    for v in fine.verified:
+        tuned = v.design.tuned
+        values = ", ".join(_value(name, value, units) for name, value in tuned.values.items())
+        inverse = f"; inverse {v.design.inverse}" if v.design.inverse else ""
+        rows.append((v.design.name, values + inverse, *_margins(tuned.margins), ", ".join(tuned.bound_by) or "nothing"))
+    margins = "modulus", "gain (dB)", "phase (°)", "delay (µs)", "disk", "bandwidth (Hz)", "crossover (Hz)"
+    best = _best(fine, [row[0] for row in rows])
+    table = Table("", ("controller", "tuned to", *margins, "bound by"), rows, (0, 1, 9), best=best)
+    return View(
+        "What each controller was tuned to, and its margins",
+        (
+            "One axis, linear, on the sampled loop with its delay: the worst of the places where the loop can be cut.",
+            table,
+            Soft(
+                "Bandwidth: lowest frequency at which the sensitivity reaches 0 dB. Crossover: highest frequency at "
+                "which the loop gain does."
+            ),
+        ),
+        folded=True,
+    )
 
 
 def _value(name: str, value: float, units: dict[str, str]) -> str:
@@ -146,57 +181,62 @@ def _or(text: str, value: float, instead: str) -> str:
     return text if math.isfinite(value) else instead
 
 
-def source_rows(fine: FinePointingStudy) -> list[Row]:
+def sources_view(fine: FinePointingStudy) -> View:
     """Radial rms by controller and source in theory, after a row of what the disturbances are before the loop."""
     names = sources(fine.verified)
     open_loop: dict[str, float] = {}
     for each in (d for several in fine.scene.loop.disturbances for d in several):
         open_loop[each.name] = math.hypot(open_loop.get(each.name, 0.0), each.rms_rad)
-    before = {"name": "before the loop", "cells": [micro(open_loop.get(n, math.nan)) for n in names], "total": ""}
-    rows: list[Row] = [{**before, "total": micro(math.hypot(*open_loop.values())), "best": False}]
+    before = [micro(open_loop.get(n, math.nan)) for n in names]
+    rows = [["before the loop", *before, micro(math.hypot(*open_loop.values()))]]
     for v in fine.verified:
         by_source = rms_by_source(v)
-        cells = [micro(by_source.get(name, math.nan)) for name in names]
-        best = v.design.name == fine.best.design.name
-        rows.append({"name": v.design.name, "cells": cells, "total": micro(v.theory.radial_rms_rad), "best": best})
-    return rows
+        left = [micro(by_source.get(name, math.nan)) for name in names]
+        rows.append([v.design.name, *left, micro(v.theory.radial_rms_rad)])
+    best = _best(fine, [row[0] for row in rows])
+    table = Table("", ("controller", *map(words.source_name, names), "all"), rows, (0,), best=best)
+    said = "Radial rms in theory (µrad) that each source leaves behind the loop by itself."
+    return View("Controllers against disturbances", (said, table), folded=True)
 
 
 # ------------------------------------------------------------------------------------------------ error budget
-
-
-def budget(fine: FinePointingStudy) -> Row:
+def budget_view(fine: FinePointingStudy) -> View:
     """Parts alone, their combinations, and what the rest changes, with the sentences to it."""
     b = fine.budget
     total = math.fsum(part.rms_rad**2 for part in b.parts)
     theory = math.hypot(*(part.theory_rad for part in b.parts if math.isfinite(part.theory_rad)))
-    return {
-        "controller": b.controller,
-        "parts": [
-            {
-                "name": words.source_name(part.name),
-                "rms": micro(part.rms_rad),
-                "theory": micro(part.theory_rad),
-                "share": _variance_share(part.rms_rad**2, total),
-            }
-            for part in b.parts
-        ],
-        "totals": [
-            ("Root sum square of the parts", micro(b.combined_rad), micro(theory)),
-            ("All together, without hysteresis", micro(b.together_rad), ""),
-            ("All together, the mission's mirror", micro(b.full_rad), ""),
-        ],
-        "differences": [
-            {
-                "name": d.name,
-                "with": micro(d.with_rad),
-                "without": micro(d.without_rad),
-                "added": micro(d.added_rad),
-            }
-            for d in b.differences
-        ],
-        "sentences": budget_sentences(fine),
-    }
+    parts = [
+        (
+            words.source_name(part.name),
+            micro(part.rms_rad),
+            micro(part.theory_rad),
+            _variance_share(part.rms_rad**2, total),
+        )
+        for part in b.parts
+    ]
+    totals = [
+        ("Root sum square of the parts", micro(b.combined_rad), micro(theory), ""),
+        ("All together, without hysteresis", micro(b.together_rad), "", ""),
+        ("All together, the mission's mirror", micro(b.full_rad), "", ""),
+    ]
+    headings = (
+        "part, by itself and without hysteresis",
+        "simulated, rms (µrad)",
+        "theory, rms (µrad)",
+        "share of variance",
+    )
+    left_out = [(d.name, micro(d.with_rad), micro(d.without_rad), micro(d.added_rad)) for d in b.differences]
+    effects = ("left out of the full loop", "rms with it (µrad)", "without it (µrad)", "it adds (µrad)")
+    return View(
+        f"Error budget of {b.controller}",
+        (
+            " ".join(budget_sentences(fine)),
+            Table("", headings, [*parts, *totals], totals=len(totals)),
+            Table("", effects, left_out),
+            Soft("Added is the root of the difference of the squares; it is negative where the part helps."),
+        ),
+        "error-budget-parts",
+    )
 
 
 def _variance_share(variance: float, total: float) -> str:
@@ -223,9 +263,7 @@ def budget_sentences(fine: FinePointingStudy) -> list[str]:
 
 
 # ------------------------------------------------------------------------------------------------ stroke
-
-
-def stroke(fine: FinePointingStudy) -> Row:
+def stroke_view(fine: FinePointingStudy) -> View:
     """The stroke budgets side by side, a column for each output of the mirror with and without the point-ahead."""
     ours = fine.scene.own_stroke
     groups = (
@@ -233,21 +271,20 @@ def stroke(fine: FinePointingStudy) -> Row:
         ("Point-ahead elsewhere", fine.scene.stroke_without_point_ahead),
     )
     axes = [axis for _, several in groups for axis in several]
-    rows: list[Row] = [
-        {"name": line.name, "cells": [micro(axis.lines[i].value) for axis in axes], "total": False}
-        for i, line in enumerate(axes[0].lines)
-    ]
-    rows += [_stroke_row(name, axes, show) for name, show in _stroke_rows(axes[0].travel_angle)]
-    return {
-        "groups": [(f"{name}{' (this mission)' if several is ours else ''}", len(several)) for name, several in groups],
-        "axes": [axis.name for axis in axes],
-        "rows": rows,
-        "notes": [(line.name, line.basis.partition(";")[0], line.source) for line in axes[0].lines],
-    }
-
-
-def _stroke_row(name: str, axes: Sequence[StrokeBudget], show: Callable[[StrokeBudget], str]) -> Row:
-    return {"name": name, "cells": [show(axis) for axis in axes], "total": name.startswith(("Total", "Margin"))}
+    rows = [[line.name, *(micro(axis.lines[i].value) for axis in axes)] for i, line in enumerate(axes[0].lines)]
+    sums = [[name, *map(show, axes)] for name, show in _stroke_rows(axes[0].travel_angle)]
+    named = [(f"{name}{' (this mission)' if several is ours else ''}", len(several)) for name, several in groups]
+    heading = "half range (µrad)\npairs: worst case / root sum square"
+    table = Table(
+        "", (heading, *(axis.name for axis in axes)), [*rows, *sums], groups=(("", 1), *named), totals=len(sums)
+    )
+    notes = [f"{line.name}: {line.basis.partition(';')[0]}. {line.source}" for line in axes[0].lines]
+    square = (
+        "The root sum square supposes independent terms of one class; ECSS-E-ST-60-10C does not grant that to bias and "
+        "random terms together."
+    )
+    lines = View("The stroke line by line", (table, Points(notes), square), folded=True, listed=False)
+    return View("Stroke", (" ".join(words.stroke(fine)), lines))
 
 
 def _both(worst: float, rss: float) -> str:
@@ -276,34 +313,31 @@ def _magnification(axis: StrokeBudget) -> str:
 
 
 # ------------------------------------------------------------------------------------------------ sines
-
-
-def sines(fine: FinePointingStudy, required_rad: float) -> Row:
+def sines_view(fine: FinePointingStudy, required_rad: float) -> View | None:
     """Controllers by sine: rms and quantile, a group of columns for each variant of the mirror."""
+    if not fine.sines:
+        return None
     found: dict[tuple[str, str, float], Sine] = {(s.controller, s.variant, s.freq_hz): s for s in fine.sines}
     columns = list(dict.fromkeys((s.variant, s.freq_hz) for s in fine.sines))
-    variants = list(dict.fromkeys(variant for variant, _ in columns))
-    return {
-        "groups": [(words.NAMES[v], sum(variant == v for variant, _ in columns)) for v in variants],
-        "frequencies": [f"{freq:g} Hz" for _, freq in columns],
-        "rows": [
-            {
-                "name": name,
-                "best": name == fine.best.design.name,
-                "cells": [_sine(found.get((name, *column)), required_rad) for column in columns],
-            }
-            for name in dict.fromkeys(s.controller for s in fine.sines)
-        ],
-        "sentence": words.tracked(fine, required_rad),
-    }
+    variants = dict.fromkeys(variant for variant, _ in columns)
+    groups = [(words.NAMES[v], sum(variant == v for variant, _ in columns)) for v in variants]
+    names = list(dict.fromkeys(s.controller for s in fine.sines))
+    rows = [[name, *(_sine(found.get((name, *column)), required_rad) for column in columns)] for name in names]
+    headings = ("controller", *(f"{freq:g} Hz" for _, freq in columns))
+    amplitude, time = given_angle(fine.scene.sine_amplitude_rad), share_of_time(fine.quantile)
+    return View(
+        "The paper's sines under vibration and noise",
+        (
+            f"Fig. 6 and 8 again: a {amplitude} sine on axis x with vibration and sensor noise on both axes. Body "
+            "pointing and point-ahead are left out: the stroke would not hold them beside it. Radial error in µrad: "
+            f"rms / {time}. {words.tracked(fine, required_rad)}",
+            Table("", headings, rows, groups=(("", 1), *groups), best=_best(fine, names)),
+        ),
+        folded=True,
+    )
 
 
-def _sine(sine: Sine | None, required_rad: float) -> Row:
+def _sine(sine: Sine | None, required_rad: float) -> str | Cell:
     if sine is None:
-        return {"rms": "", "quantile": "", "mark": ""}
-    met = sine.quantile_rad <= required_rad
-    return {
-        "rms": micro(sine.rms_rad),
-        "quantile": micro(sine.quantile_rad),
-        "mark": "PASS" if met else "FAIL",
-    }
+        return ""
+    return Cell(f"{micro(sine.rms_rad)} / {micro(sine.quantile_rad)}", _mark(sine.quantile_rad, required_rad))

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -16,6 +15,8 @@ from microrad.report.plotting.figure import Figure
 from microrad.report.plotting.palette import BLACK, BLUE, GREEN, ORANGE
 from microrad.report.plotting.sheet import Legend, Line, Rule, Words, grid
 from microrad.report.quantities import given_angle, micro, percent, share_of_time
+from microrad.report.tables import Table
+from microrad.report.view import Soft, View
 from microrad.study.study import Study
 
 SIGMAS = 2.576  # 99 %, as of the interval of the rms
@@ -83,27 +84,33 @@ def beyond(left: Residual, radius_rad: float) -> tuple[float, float, float]:
 
 
 # --------------------------------------------------------------------------------------------------------------- page
-def tail_section(fine: FinePointingStudy, required_rad: float, figures: Sequence[Figure]) -> dict[str, Any]:
-    """What the template needs: the best controller's tail on each variant of the mirror, beside the baseline's."""
+def tail_view(fine: FinePointingStudy, required_rad: float, figures: Sequence[Figure]) -> View:
+    """The best controller's tail on each variant of the mirror, beside the baseline's."""
     shares = sorted({*SHARES, fine.quantile})
     shown = shown_of(fine)
-    samples = int(shown[0][1].radial_counts.sum())
-    return {
-        "figures": figures,
-        "sentences": tail_sentences(fine, samples),
-        "headings": [share_of_time(s) for s in shares],
-        "required": given_angle(required_rad),
-        "rows": [
-            {
-                "name": name,
-                "cells": [cell(quantile(left, share), share == fine.quantile) for share in shares],
-                "largest": micro(left.largest_rad),
-                "beyond": _share(beyond(left, required_rad)),
-                "independent": _count(independent_samples(left)),
-            }
-            for name, left in shown
-        ],
-    }
+    rows = [
+        [
+            name,
+            *(cell(quantile(left, share)) for share in shares),
+            micro(left.largest_rad),
+            _share(beyond(left, required_rad)),
+            _count(independent_samples(left)),
+        ]
+        for name, left in shown
+    ]
+    first = "radial error (µrad)"
+    last = ("largest", f"time beyond {given_angle(required_rad)}", "independent samples")
+    table = Table("", (first, *map(share_of_time, shares), *last), rows, (0, len(shares) + 2), best=(0,))
+    judged = share_of_time(fine.quantile)
+    note = Soft(
+        "The radial error stays below each value for that share of the time; below it stands its 99 % interval. The "
+        f"requirement is judged at {judged}."
+    )
+    return View(
+        "Monte Carlo tails",
+        (*tail_sentences(fine, int(shown[0][1].radial_counts.sum())), table, note, *figures),
+        "tails",
+    )
 
 
 def shown_of(fine: FinePointingStudy) -> list[tuple[str, Residual]]:
@@ -115,11 +122,10 @@ def shown_of(fine: FinePointingStudy) -> list[tuple[str, Residual]]:
     return rows
 
 
-def cell(q: Quantile, judged: bool) -> dict[str, Any]:
-    """A quantile in µrad with its interval, as it stands in a cell."""
+def cell(q: Quantile) -> str:
+    """A quantile in µrad with its interval below it."""
     known = not math.isnan(q.low_rad)
-    interval = f"{micro(q.low_rad)} to {micro(q.high_rad)}" if known else "too few samples"
-    return {"value": micro(q.value_rad), "interval": interval, "judged": judged}
+    return f"{micro(q.value_rad)}\n{f'{micro(q.low_rad)} to {micro(q.high_rad)}' if known else 'too few samples'}"
 
 
 def _share(found: tuple[float, float, float]) -> str:

@@ -262,22 +262,26 @@ def _fit(where: str, several: tuple[StrokeBudget, ...]) -> str:
 # ------------------------------------------------------------------------------------------------ warnings
 
 
-def warnings(fine: FinePointingStudy, paper: Control, amplifier: Amplifier) -> list[str]:
-    """What a reader must not overlook: limits met, stroke, designs at a bound, a loop that is not linear.
+def warnings(fine: FinePointingStudy, paper: Control, amplifier: Amplifier) -> tuple[list[str], list[str]]:
+    """What a reader must not overlook: of the loop that is judged, and of the other controllers.
 
     ``paper`` is the table of the loop that tracks the paper's sines, with its ``amplifier``.
     """
-    found = [
-        f"{v.design.name} {VARIANTS.get(variant, variant)}: {limits_met(residual.shares)}"
+    name = fine.best.design.name
+    own = _stroke_warnings(fine) + _hardware_warnings(fine.scene.table, paper, amplifier)
+    others: list[str] = []
+    for names, text in (*_limit_warnings(fine), *_bound_warnings(fine), *_theory_warnings(fine)):
+        (own if name in names else others).append(text)
+    return [f"fine pointing: {text}" for text in own], [f"fine pointing: {text}" for text in others]
+
+
+def _limit_warnings(fine: FinePointingStudy) -> list[tuple[list[str], str]]:
+    return [
+        ([v.design.name], f"{v.design.name} {VARIANTS.get(variant, variant)}: {limits_met(residual.shares)}")
         for v in fine.verified
         for variant, residual in v.simulated.items()
         if residual.shares
     ]
-    found += _stroke_warnings(fine)
-    found += _bound_warnings(fine)
-    found += _hardware_warnings(fine.scene.table, paper, amplifier)
-    found += _theory_warnings(fine)
-    return [f"fine pointing: {text}" for text in found]
 
 
 def _stroke_warnings(fine: FinePointingStudy) -> list[str]:
@@ -305,36 +309,48 @@ def _hardware_warnings(f: FinePointing, c: Control, amplifier: Amplifier) -> lis
     return [f"judged at {own}; the residual and the communication margin at {paper}: one does not stand for the other"]
 
 
-def _bound_warnings(fine: FinePointingStudy) -> list[str]:
+def _bound_warnings(fine: FinePointingStudy) -> list[tuple[list[str], str]]:
     names: dict[str, list[str]] = {}
     for v in fine.verified:
         for bound in v.design.tuned.bound_by:
             names.setdefault(bound, []).append(v.design.name)
     return [
-        f"tuned up to a bound, {'the modulus margin asked for' if bound == MARGIN else bound}: {listed(held)}; "
-        "beyond it less error may be left"
+        (
+            held,
+            f"tuned up to a bound, {'the modulus margin asked for' if bound == MARGIN else bound}: {listed(held)}; "
+            "beyond it less error may be left",
+        )
         for bound, held in names.items()
     ]
 
 
-def _theory_warnings(fine: FinePointingStudy) -> list[str]:
+def _theory_warnings(fine: FinePointingStudy) -> list[tuple[list[str], str]]:
     budget, r = fine.budget, room(fine)
     found = []
     if not budget.linear:
         found.append(
-            f"the error budget of {budget.controller} is not linear: its parts combine to "
-            f"{angle(budget.combined_rad)}, the whole is {angle(budget.full_rad)} rms"
+            (
+                [budget.controller],
+                f"the error budget of {budget.controller} is not linear: its parts combine to "
+                f"{angle(budget.combined_rad)}, the whole is {angle(budget.full_rad)} rms",
+            )
         )
     for v in fine.verified:
         straight, linear = v.simulated.get(Variant.STRAIGHT), v.theory.radial_rms_rad
         if straight is not None and abs(straight.rms_rad / linear - 1.0) > 0.1:
             found.append(
-                f"{v.design.name} leaves {angle(straight.rms_rad)} rms without hysteresis, {angle(linear)} in theory: "
-                "its limits or quantisation act"
+                (
+                    [v.design.name],
+                    f"{v.design.name} leaves {angle(straight.rms_rad)} rms without hysteresis, {angle(linear)} in "
+                    "theory: its limits or quantisation act",
+                )
             )
     if not r.holds:
         found.append(
-            f"the linear bound of {angle(fine.optimum_rad)} rms lies above the "
-            f"{angle(r.nearest.theory.radial_rms_rad)} of {r.nearest.design.name}, so it is none"
+            (
+                [r.nearest.design.name],
+                f"the linear bound of {angle(fine.optimum_rad)} rms lies above the "
+                f"{angle(r.nearest.theory.radial_rms_rad)} of {r.nearest.design.name}, so it is none",
+            )
         )
     return found

@@ -3,20 +3,25 @@
 import hashlib
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+
+from markupsafe import Markup
 
 from microrad.core.folder import write_whole
 from microrad.core.machine import versions
 from microrad.core.units import format_quantity
 from microrad.lab.identify import Identification
+from microrad.lab.identify.linear.fit import LinearFit
 from microrad.lab.identify.selection.predictions import Fit
 from microrad.lab.identify.statistics import rounded_to_error
-from microrad.lab.recording import Finding, Recording
+from microrad.lab.recording import Recording
 from microrad.report.identification import parameters, words
 from microrad.report.identification.figures import identification_figures
-from microrad.report.page.templates import render
+from microrad.report.page.templates import page_of
+from microrad.report.plotting.figure import Figure
+from microrad.report.tables import Cell, Table
+from microrad.report.view import Points, Soft, Verbatim, Verdict, View, told
 
 BEGINS = '<!DOCTYPE html>\n<html lang="en" data-made-by="microrad identify">'
 
@@ -100,103 +105,186 @@ def identification_page(
     virtual: bool = False,
 ) -> str:
     """The page's HTML; every text that is not ours is escaped, and nothing is loaded from anywhere."""
-
     everything = [*found.recordings, *words.shown_recordings(found, recordings)]
-    context: dict[str, Any] = {
-        "begins": BEGINS,
-        "found": found,
-        "title": title,
-        "virtual": virtual,
-        "written": written,
-        "mirror_file": mirror_file,
-        "mirror_text": mirror_text,
-        "mirror_sha256": hashlib.sha256(mirror_text.encode()).hexdigest(),
-        "verdict": words.verdict(found, written),
-        "sound": words.sound(found),
-        "warnings": words.warnings(found, written),
-        "recordings": _recordings(found, everything),
-        "findings": _findings(everything),
-        "no_linear": words.no_linear(found),
-        "roots": [] if found.linear is None else words.roots(found.linear),
-        "gains": words.gains(found.linear),
-        "errors": _errors(found),
-        "residual": words.residual_sentences(found),
-        "models": [_model(s.model, fit) for s, fit in zip(found.scores, found.fits, strict=True)],
-        "ranking": _ranking(found),
-        "span": format_quantity(found.span_rad, "rad", 4),
-        "two_digits": parameters.two_digits,
-        "rounded_to_error": rounded_to_error,
-        "figures": identification_figures(found, recordings, virtual=virtual),
-        "versions": versions(),
-    }
-    return render("identification/identification.html", context)
+    figures = identification_figures(found, recordings, virtual=virtual)
+    no_time = "No broadband recording was used: there is no linear model to compare."
+    tests = figures.get("tests")
+    headline, *sentences = words.verdict(found, written)
+    own = "The recordings are those of the virtual bench: nothing here was measured on a mirror." if virtual else ""
+    lead = Verdict(headline, told(" ".join(sentences), own), words.sound(found))
+    views = (
+        _warnings(found, written),
+        _recordings(found, everything, figures),
+        _linear(found, figures),
+        View("Loops", told(figures.get("loops"), f"Error of {found.chosen} on each recording:", _errors(found))),
+        View("Time response", [figures.get("time", no_time)]),
+        View("Residuals", told(figures.get("residuals"), " ".join(words.residual_sentences(found)), tests)),
+        _parameters(found, written),
+        _ranking(found),
+        _origin(found, mirror_file, mirror_text, written),
+    )
+    count = len(found.sources)
+    of = Markup("{} recording{}, mirror file <code>{}</code>").format(count, "s" * (count > 1), mirror_file)
+    return page_of(
+        title,
+        "identification",
+        of,
+        [lead],
+        views,
+        sha256=hashlib.sha256(mirror_text.encode()).hexdigest(),
+        made_by="microrad identify",
+        badge="virtual bench" if virtual else "",
+    )
 
 
-def _recordings(found: Identification, everything: Sequence[Recording]) -> list[dict[str, Any]]:
+def _warnings(found: Identification, written: str) -> View:
+    refused = [f"{r.model}: {r.reason}" for r in found.refused]
+    cannot = "Models that these recordings cannot support:" if refused else ""
+    said = words.warnings(found, written) or ["No warnings."]
+    return View("Warnings and refusals", told(Points(said), cannot, Points(refused)))
+
+
+def _recordings(found: Identification, everything: Sequence[Recording], figures: Mapping[str, Figure]) -> View:
     """A row for each source; what only the recording knows is left out where it was not given."""
     known = {(r.path, r.sha256): r for r in everything}
     rows = []
     for source in found.sources:
         recording = known.get((source.path, source.sha256))
-        row = {"name": Path(source.path).name, "role": source.role, "fitted": source.fitted}
-        row |= {"held_out": source.held_out, "drive": "", "rate": "", "duration": ""}
+        drive = rate = duration = ""
         if recording is not None:
-            row["drive"] = words.drive_text(recording, found.units.volts)
-            row["rate"] = format_quantity(recording.rate_hz, "Hz")
-            row["duration"] = format_quantity(recording.samples * recording.step_s, "s")
-        rows.append(row)
-    return rows
+            drive = words.drive_text(recording, found.units.volts)
+            rate = format_quantity(recording.rate_hz, "Hz")
+            duration = format_quantity(recording.samples * recording.step_s, "s")
+        name = Cell(Path(source.path).name, code=True)
+        rows.append((name, source.role, drive, rate, str(source.fitted), str(source.held_out), duration))
+    headings = ("file", "serves as", "drive", "sample rate", "fitted", "held out", "duration")
+    noticed = [
+        f"{Path(r.path).name}, {f.kind}{' (accepted)' * f.refused}: {f.message}" for r in everything for f in r.findings
+    ]
+    checks = (
+        "What the checks of the recordings noticed:" if noticed else "The checks of the recordings noticed nothing."
+    )
+    table = Table("", headings, rows, (0, 1, 2))
+    return View("Recordings", told(table, checks, Points(noticed), figures.get("excitation")))
 
 
-def _findings(everything: Sequence[Recording]) -> list[tuple[str, Finding]]:
-    return [(Path(r.path).name, finding) for r in everything for finding in r.findings]
+def _linear(found: Identification, figures: Mapping[str, Figure]) -> View:
+    linear = found.linear
+    if linear is None:
+        return View("Linear part", [words.no_linear(found)])
+    order = View("Order", told(f"{linear.reason[0].upper()}{linear.reason[1:]}.", _scan(linear)))
+    roots = View("Poles, zeros and gains", told(figures.get("poles"), _roots(linear)))
+    return View("Linear part", told(figures.get("response"), order, roots))
 
 
-def _errors(found: Identification) -> list[dict[str, Any]]:
+def _scan(linear: LinearFit) -> Table | None:
+    """Each order that was tried, with its criterion."""
+    rows = [
+        (
+            str(s.order),
+            str(s.parameters),
+            f"{s.chi_square / max(s.freedom, 1):.4g}",
+            f"{s.criterion:.6g}",
+            f"{s.output_error_rms * 1e6:.4g} µrad",
+            "chosen" if s.order == linear.order else "",
+        )
+        for s in linear.scan
+    ]
+    headings = ("order", "parameters", "chi-square per degree of freedom", "criterion", "output error (rms)", "")
+    return Table("", headings, rows, (5,)) if rows else None
+
+
+def _roots(linear: LinearFit) -> Table:
+    outside, inside = Cell("", "no", "extrapolated"), Cell("", "yes")
+    rows: list[tuple[str | Cell, ...]] = [
+        (
+            f"{r.kind}{', real' if abs(r.damping) == 1.0 else ' pair'}",
+            f"{rounded_to_error(r.freq_hz, r.freq_error_hz)} Hz",
+            f"{parameters.two_digits(r.freq_error_hz)} Hz",
+            rounded_to_error(r.damping, r.damping_error),
+            parameters.two_digits(r.damping_error) if r.damping_error else "",
+            inside if r.excited else outside,
+        )
+        for r in words.roots(linear)
+    ]
+    for place, (name, gain, error) in enumerate(words.gains(linear)):
+        known = rounded_to_error(gain * 1e3, error * 1e3), parameters.two_digits(error * 1e3)
+        rows.append((f"gain at {name}", *(f"{text} mrad/V" for text in known), "", "", inside if place else outside))
+    return Table("", ("", "natural frequency", "±", "damping ratio", "±", "excited"), rows, (0, 5))
+
+
+def _errors(found: Identification) -> Table:
     """The choice's error on each recording by itself."""
     rows = []
     for recording, prediction in zip(found.recordings, words.chosen_predictions(found), strict=True):
         fitted, unseen = words.split_errors(prediction)
-        rows.append(
-            {
-                "name": Path(recording.path).name,
-                "drive": words.drive_text(recording, found.units.volts),
-                "fitted": _angle(fitted),
-                "unseen": _angle(unseen),
-                "percent": "" if math.isnan(unseen) else f"{100 * unseen / found.span_rad:.3g} %",
-                "clamped": prediction.clamped,
-            }
-        )
-    return rows
+        share = "" if math.isnan(unseen) else f"{100 * unseen / found.span_rad:.3g} %"
+        name, drive = Cell(Path(recording.path).name, code=True), words.drive_text(recording, found.units.volts)
+        rows.append((name, drive, _angle(fitted), _angle(unseen), share, str(prediction.clamped)))
+    headings = ("file", "drive", "fitted, rms", "unseen, rms", "unseen, rms", "rate-clamped")
+    return Table("", headings, rows, (0, 1))
 
 
 def _angle(value_rad: float) -> str:
     return "" if math.isnan(value_rad) else f"{1e6 * value_rad:.3g} µrad"
 
 
-def _model(name: str, fit: Fit) -> dict[str, Any]:
+def _parameters(found: Identification, written: str) -> View:
+    """The parameters of each model; those of the choice and of the mirror file stand open."""
+    views = []
+    for score, fit in zip(found.scores, found.fits, strict=True):
+        choice, held = ", the choice" * (score.model == found.chosen), ", in the mirror file" * (score.model == written)
+        blocks = (_model(fit), Soft(" ".join(parameters.notes(fit))))
+        views.append(View(f"{score.model}{choice}{held}", blocks, folded=not (choice or held)))
+    return View("Parameters", views)
+
+
+def _model(fit: Fit) -> Table:
     unknown = dict(parameters.not_identified(fit))
     rows = []
     for row in parameters.parameter_rows(fit):
         value, error, unit = row.shown
         note = row.note or (f"not identified: {unknown[row.name]}" if row.name in unknown else "")
-        shown = {"value": rounded_to_error(value, error), "error": parameters.two_digits(error)}
-        rows.append({"name": row.name, **shown, "unit": unit, "note": note})
-    return {"name": name, "rows": rows, "notes": parameters.notes(fit)}
+        rows.append((row.name, rounded_to_error(value, error), parameters.two_digits(error), unit, note))
+    return Table("", ("parameter", "value", "± standard error", "unit", ""), rows, (0, 3, 4))
 
 
-def _ranking(found: Identification) -> list[dict[str, Any]]:
+def _ranking(found: Identification) -> View:
     """All models and the straight line by their error on unseen samples, the lowest first."""
-    marks = {
-        s.model: "yes" if parameters.admissible(f) else "no" for s, f in zip(found.scores, found.fits, strict=True)
-    }
+    fits = dict(zip((s.model for s in found.scores), found.fits, strict=True))
+    scores = sorted((*found.scores, found.straight_line), key=lambda s: s.held_out_rms_percent)
     rows = [
-        {
-            "model": score.model,
-            "score": score,
-            "rms": _angle(score.held_out_rms_percent * found.span_rad / 100),
-            "admissible": marks.get(score.model, ""),
-        }
-        for score in (*found.scores, found.straight_line)
+        (
+            f"{s.model}{' (chosen)' * (s.model == found.chosen)}",
+            f"{s.fit_rms_percent:.3f}",
+            f"{s.fit_peak_percent:.2f}",
+            f"{s.held_out_rms_percent:.3f}",
+            f"{s.held_out_peak_percent:.2f}",
+            _angle(s.held_out_rms_percent * found.span_rad / 100),
+            Cell("", "yes" if parameters.admissible(fits[s.model]) else "no") if s.model in fits else "",
+        )
+        for s in scores
     ]
-    return sorted(rows, key=lambda row: row["score"].held_out_rms_percent)
+    first = f"residual in % of the peak-to-peak output, {format_quantity(found.span_rad, 'rad', 4)}"
+    headings = ("fitted, rms", "fitted, peak", "unseen, rms", "unseen, peak", "unseen, rms", "admissible")
+    best = [k for k, s in enumerate(scores) if s.model == found.chosen]
+    return View("All models", (found.reason, Table("", (first, *headings), rows, (0, 6), best=best)))
+
+
+def _origin(found: Identification, mirror_file: Path, mirror_text: str, written: str) -> View:
+    sha256 = hashlib.sha256(mirror_text.encode()).hexdigest()
+    rows = [(Cell(s.path, code=True), Cell(s.sha256, code=True)) for s in found.sources]
+    made = ", ".join(f"{name} {version}" for name, version in versions().items())
+    return View(
+        "Mirror file and origin",
+        (
+            f"{mirror_file} holds {written}:",
+            Verbatim(mirror_text),
+            Table("", ("recording", "SHA-256"), rows, (0, 1)),
+            Soft(
+                f"Mirror file SHA-256 {sha256}. Every number above is computed from these recordings. Standard errors "
+                "come from the residuals of the fitted samples."
+            ),
+            Soft(f"Made with {made}."),
+        ),
+    )

@@ -6,22 +6,20 @@ import math
 from collections.abc import Iterator
 from dataclasses import replace
 
-from microrad import link
 from microrad.core.budget import Line
 from microrad.link.requirement import of_links
 from microrad.link.study import LinkStudy, Solution
 from microrad.mission.model import source_text
 from microrad.orbit.operations import spreadsheet_text
 from microrad.report.links import words
-from microrad.report.quantities import quantity
+from microrad.report.links.views import budget_table, links_views
 from microrad.report.requirements import requirement_table
-from microrad.report.tables import Table, table_text, tables_text
+from microrad.report.view import Block, Soft, views_text
 
 UNDER_JITTER = "Communication under jitter"
 """The lines of what the jitter does to the communication link, beside its budget."""
 SOLVED = "Solved"
 """The values of a key that leave the required margin, ahead of the budgets."""
-_ROOM = 120  # columns for a table of all that a line has
 COLUMNS = ("budget", "line", "value", "unit", "basis", "source", "holds for", "warning")
 
 
@@ -82,16 +80,11 @@ def links_text(study: LinkStudy, width: int, verbose: bool = False, solution: So
         solution: the values of a key that leave the required margin, which stand first.
     """
     judged = of_links(study)
-    blocks = [] if solution is None else [tables_text([], [words.solution_text(solution)], width)]
-    blocks += [tables_text([], [words.verdict(study)], width), table_text(requirement_table(judged), width)]
+    blocks: list[Block] = [] if solution is None else [Soft(words.solution_text(solution))]
+    blocks += [words.verdict(study), requirement_table(judged), *words.short(study)]
     if not verbose:
-        tables = [Table(b.name, ("line", "value", "basis"), _brief(b), (2,)) for b in study.budgets]
-        return "\n\n".join((*blocks, tables_text([], words.short(study), width), tables_text(tables, [], width)))
-    said = [*words.short(study), *words.sentences(study)[1:]]
-    blocks += [_tables(study, width), tables_text([], list(dict.fromkeys(said)), width)]
-    if study.warnings:
-        blocks.append(tables_text([], ["Warnings (! in the tables)", *(f"- {w}" for w in study.warnings)], width))
-    return "\n\n".join(blocks)
+        return views_text([*blocks, *(budget_table(b).columns((0, 1, 2)) for b in study.budgets)], width)
+    return views_text([*blocks, *links_views(study)], width)
 
 
 def _solution_rows(s: Solution) -> Iterator[tuple[str, str, str, str]]:
@@ -105,31 +98,3 @@ def _solution_rows(s: Solution) -> Iterator[tuple[str, str, str, str]]:
     yield f"{s.key} with the largest margin", repr(s.solved.best), s.unit, ""
     yield "Largest margin", repr(float(s.solved.best_db)), "dB", ""
     yield f"{s.key} in the budgets below", repr(s.value), s.unit, ""
-
-
-def _brief(budget: link.LinkBudget) -> list[tuple[str, ...]]:
-    found = (*budget.lines, *budget.totals)
-    return [(line.name + _mark(line), quantity(line.value, line.unit), line.basis) for line in found]
-
-
-def _mark(line: Line) -> str:
-    return " !" if line.warning else ""
-
-
-def _tables(study: LinkStudy, width: int) -> str:
-    """Every table with basis, source and where each line holds: in columns, or below each other in a narrow one."""
-    headings = ("line", "value", "basis", "source", "holds for")
-    groups: dict[str, list[tuple[str, ...]]] = {}
-    for name, line in lines(study):
-        texts = line.name + _mark(line), quantity(line.value, line.unit), line.basis, line.source, line.regime
-        groups.setdefault(name, []).append(texts)
-    if width >= _ROOM:
-        return tables_text([Table(name, headings, rows, (0, 2, 3, 4)) for name, rows in groups.items()], [], width)
-    tables = [Table(name, headings[:3], [_stacked(row) for row in rows], (2,)) for name, rows in groups.items()]
-    return tables_text(tables, [], width)
-
-
-def _stacked(row: tuple[str, ...]) -> tuple[str, ...]:
-    """Basis, source and where it holds, one below the other."""
-    name, value, basis, source, regime = row
-    return name, value, f"{basis}\nfrom: {source}\nholds for: {regime}"

@@ -9,13 +9,13 @@ from microrad.core.units import format_quantity
 from microrad.link import Swing, Tornado
 from microrad.link.acquisition import Trade
 from microrad.link.acquisition.partner_search import Finding
-from microrad.link.requirement import outage_words
+from microrad.link.requirement import time_kept
 from microrad.link.study import LinkStudy
 from microrad.report.plotting.figure import Figure
 from microrad.report.plotting.palette import BLACK, BLUE, ORANGE, VERMILION, WHITE
 from microrad.report.plotting.scales import limits
-from microrad.report.plotting.sheet import Area, Legend, Line, Rule, Words, grid
-from microrad.report.plotting.swings import swing_bars
+from microrad.report.plotting.sheet import Axis, Legend, Line, Rule, Words, grid
+from microrad.report.plotting.swings import swing_bars, swing_legend
 from microrad.report.tables import Column
 
 MOST_BARS = 14
@@ -51,11 +51,9 @@ def tornado(study: LinkStudy, of: Tornado) -> Figure:
     if data and low < required < high:
         panel.add(Rule(required, True, VERMILION, "--"))
         panel.add(Words("required", required, -0.55, VERMILION, base="bottom", shift=(3.0, 0.0)))
-    judged = f", all but {outage_words(m.requirement)}" if data and m.jitter is not None else ""
+    judged = f", for {time_kept(m.requirement)}" if data and m.jitter is not None else ""
     panel.x.title = f"margin of the {'communication link' if data else of.of.lower()}{judged} (dB)"
-    panel.legend = Legend(
-        "lower right", only=(Area((), ORANGE, label="input lower"), Area((), BLUE, label="input higher"))
-    )
+    panel.legend = swing_legend("input", "lower right")
     assumed = [s.key for s in shown if s.kind == "assumption"]
     caption = (
         "Margin with one input at a time 10 % lower and higher (0.5 dB for those in decibels, a factor of ten for a "
@@ -97,12 +95,8 @@ def trade(study: LinkStudy, found: Finding, t: Trade) -> Figure:
     panel.add(Line(sigma, t.scan_mean_time_s, ORANGE, ":", label="spiral scan: mean until found"))
     panel.add(Rule(found.sigma_rad * 1e6, True, VERMILION))
     panel.add(Words("this mission", found.sigma_rad * 1e6, t.scan_time_s[-1], VERMILION, base="top", shift=(3.0, 0.0)))
-    panel.x.title, panel.x.log, panel.x.ticks = (
-        "pointing uncertainty, rms per axis (µrad)",
-        True,
-        (30.0, 100.0, 300.0, 1000.0),
-    )
-    panel.y.title, panel.y.log, panel.legend = "time (s)", True, Legend("upper left")
+    panel.x = Axis("pointing uncertainty, rms per axis (µrad)", log=True, ticks=(30.0, 100.0, 300.0, 1000.0))
+    panel.y, panel.legend = Axis("time (s)", log=True), Legend("upper left")
     m = study.file.mission
     assert m.acquisition is not None
     assert m.acquisition.scan is not None

@@ -6,10 +6,9 @@ from collections.abc import Sequence
 from microrad import link
 from microrad.core.units import format_input
 from microrad.link import Swing
-from microrad.link.acquisition.partner_search import Finding, Found, Tracking
-from microrad.link.pointing import OpenLoopPointing
+from microrad.link.acquisition.partner_search import Found, Tracking
 from microrad.link.pointing.outage import Performance, error_rad, required_error_rad
-from microrad.link.requirement import of_links, outage_words
+from microrad.link.requirement import of_links, time_kept
 from microrad.link.study import BeamRadius, LinkStudy, Solution
 from microrad.report.quantities import quantity, signed
 from microrad.report.requirements import advice_for_links, derived_words, first_warning, met_words, nearest
@@ -34,7 +33,7 @@ def short(study: LinkStudy) -> list[str]:
     at = f"at {quantity(m.communication.pointing_error_rad, 'rad')} of pointing error"
     if m.jitter is not None:
         error = quantity(error_rad(study.data), "rad")
-        at = f"but for {outage_words(m.requirement)} under the jitter, an error of {error}"
+        at = f"for {time_kept(m.requirement)} under the jitter, an error of {error}"
     said = [f"The margin is received over required power, for communication {at}.", *consequences(study)[:2]]
     r = nearest(found)
     which = "Nearest to its limit is" if r.met else "What limits it is"
@@ -42,18 +41,6 @@ def short(study: LinkStudy) -> list[str]:
     said.append(derived_words(found))
     said.append(first_warning(study.warnings))
     return list(filter(None, said))
-
-
-def sentences(study: LinkStudy) -> list[str]:
-    """What follows from the budgets, a sentence each."""
-    found = [verdict(study), *consequences(study)]
-    if study.open_loop is not None:
-        found += pointing_sentences(study.open_loop)
-    if study.under_jitter is not None:
-        found.append(under_jitter_sentence(study.under_jitter, study))
-    if study.finding is not None:
-        found += acquisition_sentences(study.finding)
-    return found
 
 
 def consequences(study: LinkStudy) -> list[str]:
@@ -69,7 +56,7 @@ def consequences(study: LinkStudy) -> list[str]:
         found.append(f"Largest data rate with {wanted}: {rate}{_rate_limit(study)}.")
     if study.beam_radius is not None and study.beam_radius.gained_db >= _WORTH_DB:
         found.append(_radius(study, study.beam_radius))
-    by = "each input by 10 % (0.5 dB; a bit error ratio or an outage by a factor of ten) both ways"
+    by = "each input by ±10 % (±0.5 dB; a bit error ratio or an outage ten times more or less)"
     own, *others = study.tornados
     if own.swings:
         found.append(f"What moves the margin most, {by}: {_top(own.swings)}.")
@@ -136,24 +123,12 @@ def point_ahead(study: LinkStudy) -> str:
     )
 
 
-def pointing_sentences(p: OpenLoopPointing) -> list[str]:
-    """The totals of the pointing budget side by side, and what the beacon covers."""
-    sums = "; ".join(f"{each.name} {quantity(each.total_rad, 'rad')}" for each in p.summations)
-    found = [f"Open-loop pointing at {100 * p.confidence:g} %: {sums}."]
-    if p.reading is not None:
-        found.append(
-            f"The beacon's cone of {quantity(p.reading.half_angle_rad, 'rad')} half angle at 1/e2 covers its partner "
-            f"with a probability of {p.reading.coverage:.4g}."
-        )
-    return found
-
-
 def under_jitter_sentence(p: Performance, study: LinkStudy) -> str:
     """The link under its jitter, in two sentences."""
     narrowest = ", the narrowest of the aperture" if p.best.at_limit else ""
     return (
-        f"Under the jitter: mean pointing loss {p.mean_loss_db:.2f} dB; {p.outage_loss_db:.2f} dB but for "
-        f"{outage_words(study.data.requirement)}, which leaves a margin of {signed(p.margin_db, 'dB')}; below 0 dB "
+        f"Under the jitter: mean pointing loss {p.mean_loss_db:.2f} dB; {p.outage_loss_db:.2f} dB at most for "
+        f"{time_kept(study.data.requirement)}, which leaves a margin of {signed(p.margin_db, 'dB')}; below 0 dB "
         f"for a share of {quantity(p.outage, '')} of the time; best half angle "
         f"{quantity(p.best.half_angle_rad, 'rad')}{narrowest}. "
         f"Power that it costs: with a code {p.mean_loss_db:.2f} dB where its interleaver spans many fades, "
@@ -173,21 +148,6 @@ def uncoded(p: Performance) -> str:
     if math.isnan(p.uncoded_penalty_db):
         return "unknown, as the receiver is given by its sensitivity alone"
     return without_code(p) + (" dB" if math.isfinite(p.uncoded_penalty_db) else "")
-
-
-def acquisition_sentences(f: Finding) -> list[str]:
-    """Time and probability of each way to find the partner."""
-    return [_lock(w) for w in f.ways]
-
-
-def _lock(w: Found) -> str:
-    if not w.possible:
-        return f"Acquisition by {w.name}: never (simulated {w.simulated_probability:.4f})."
-    return (
-        f"Acquisition by {w.name}: lock with a probability of {w.outcome.success_probability:.4f} "
-        f"(simulated {w.simulated_probability:.4f}), {quantity(w.outcome.mean_time_s, 's')} in the mean "
-        f"(simulated {simulated_mean(w)})."
-    )
 
 
 def simulated_mean(w: Found) -> str:

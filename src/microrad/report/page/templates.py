@@ -1,13 +1,19 @@
 """The templates of all pages, and the scripts that a page carries: drawing library, and what the keyboard reaches."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib import resources
-from typing import Any
+from typing import TYPE_CHECKING
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
 
-from microrad.report.quantities import given_angle, quantity
+from microrad.report.tables import Cell, Table
+from microrad.report.view import Block, View, anchored
+
+if TYPE_CHECKING:
+    from microrad.mission.file import LinkFile
+    from microrad.mission.model import Source
 
 MARK = '<script type="application/json" class="plot">'
 _LIBRARY = "vendor/plotly-cartesian.min.js"
@@ -19,13 +25,74 @@ def templates() -> Environment:
     made = Environment(
         loader=PackageLoader("microrad.report", "."), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )
-    made.globals |= {"quantity": quantity, "angle": given_angle}
     return made
 
 
-def render(template: str, context: Mapping[str, Any]) -> str:
-    """A page of a template, named by its path in this room, with its scripts at its end."""
-    return with_scripts(templates().get_template(template).render(context))
+def drawing(template: str, name: str, *arguments: object) -> Markup:
+    """A picture made by a macro of a template, named by its path in this room."""
+    made: Markup = getattr(templates().get_template(template).module, name)(*arguments)
+    return made
+
+
+def mission_page(
+    file: "LinkFile", kind: str, lead: Sequence[Block], views: Sequence[View], *, data: str = "", manifest: bool = False
+) -> str:
+    """A page on a mission.
+
+    Args:
+        file: the mission's file.
+        kind: what was made of it.
+        lead: what stands above all views.
+        views: the parts of the page.
+        data: where the data of its figures are: "beside" the page, "below" each, or nowhere.
+        manifest: whether it has an element for its manifest at its end.
+    """
+    of = Markup("<code>{}</code>, SHA-256 <code>{}\u2026</code>").format(file.path.name, file.sha256[:16])
+    return page_of(file.mission.name, kind, of, lead, views, sha256=file.sha256, data=data, manifest=manifest)
+
+
+def page_of(  # noqa: PLR0913  all but the first five are named options
+    title: str,
+    kind: str,
+    of: Markup,
+    lead: Sequence[Block],
+    views: Sequence[View],
+    *,
+    sha256: str,
+    data: str = "",
+    manifest: bool = False,
+    made_by: str = "",
+    badge: str = "",
+) -> str:
+    """A page that loads nothing, with its scripts at its end: the drawing library only where a figure needs it.
+
+    Arguments that `mission_page` does not have: ``sha256`` stands at the foot of each printed sheet, ``made_by`` marks
+    the page as ours, and ``badge`` warns beside its title.
+    """
+    context = {"title": title, "kind": kind, "of": of, "lead": lead, "views": anchored(views), "sha256": sha256}
+    more = {"data": data, "manifest": manifest, "made_by": made_by, "badge": badge}
+    return with_scripts(templates().get_template("page/page.html").render(context | more))
+
+
+def inputs_view(sources: "Mapping[str, Source]") -> View:
+    """Every input with its source; buttons leave the assumptions, what was inferred, and what is not as it was shipped.
+
+    The hundreds of numbers of a correlation are left to the mirror file.
+    """
+    from microrad.mission.file import changed_from_shipped
+
+    given = [item for item in sources.items() if item[0] != "mirror.uncertainty.correlation"]
+    changed = {key for key, *_ in changed_from_shipped(sources)}
+    filters = {
+        "assumptions": [k for k, (_, s) in enumerate(given) if s.kind == "assumption"],
+        "inferred from others": [k for k, (_, s) in enumerate(given) if s.kind == "derived"],
+        "changed by me": [k for k, (key, s) in enumerate(given) if s.was or key in changed],
+    }
+    counts = ", ".join(f"{len(rows)} {name}" for name, rows in filters.items())
+    rows = [(Cell(key, code=True), s.value, s.text) for key, s in given]
+    folded = f"All {len(given)} inputs with their sources: {counts}"
+    table = Table("", ("input", "value", "source"), rows, (0, 1, 2), filters=filters, folded=folded)
+    return View("Assumptions and inputs", [table], "assumptions")
 
 
 def with_scripts(page: str) -> str:

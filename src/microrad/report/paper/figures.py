@@ -1,7 +1,6 @@
 """The figures of a study, each with the data it shows as a table of columns."""
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -132,24 +131,19 @@ def hysteresis_loops(study: Study) -> Figure:
     return Figure("fig5-hysteresis-loops", "Fig. 5  Rate-dependent hysteresis", caption, sheet, columns)
 
 
-@dataclass(frozen=True, slots=True)
-class Curve:
-    """One line of a panel of tracking errors: its label, and which run it shows."""
-
-    label: str
-    mirror: str
-    controller: str
+Curve = tuple[str, str, str]
+"""One line of a panel of tracking errors: its label, and the mirror and the controller of the run that it shows."""
 
 
 def _tracking(
-    study: Study, frequencies: tuple[float, ...], curves: tuple[Curve, Curve], limit: bool
+    study: Study, frequencies: tuple[float, ...], curves: tuple[Curve, ...], limit: bool
 ) -> tuple[Sheet, dict[str, Floats]]:
     """The steady error of two runs, a panel a frequency, with peak and rms in the legend."""
     sheet, panels = grid(3.9 * len(frequencies), 3.5, 1, len(frequencies))
     columns: dict[str, Floats] = {}
     for panel, f in zip(panels, frequencies, strict=True):
-        for curve, look, width in zip(curves, _LOOKS, (1.6, 1.3), strict=True):
-            panel.add(_error_line(curve.label, _pick(study, curve.mirror, curve.controller, f), look, width, columns))
+        for (label, mirror, controller), look, width in zip(curves, _LOOKS, (1.6, 1.3), strict=True):
+            panel.add(_error_line(label, _pick(study, mirror, controller, f), look, width, columns))
         if limit:
             _limit(panel, study.file.mission)
         panel.title = f"{f:g} Hz"
@@ -175,7 +169,7 @@ def _pick(study: Study, mirror: str, controller: str, freq_hz: float) -> Run:
 def tracking_errors(study: Study) -> Figure:
     """Fig. 6: PID with and without hysteresis."""
     m = study.file.mission
-    curves = (Curve("with hysteresis", Variant.GIVEN, PID), Curve("without", Variant.STRAIGHT, PID))
+    curves = ("with hysteresis", Variant.GIVEN, PID), ("without", Variant.STRAIGHT, PID)
     sheet, columns = _tracking(study, m.scenario.pid_frequencies_hz, curves, limit=False)
     caption = (
         f"Tracking error of a {_amplitude(m)} sine under PID, on the mirror and on one of the same gain without "
@@ -187,7 +181,7 @@ def tracking_errors(study: Study) -> Figure:
 def inverse(study: Study) -> Figure:
     """Fig. 8: PID against PID with inverse feedforward."""
     m = study.file.mission
-    curves = (Curve(PID, Variant.GIVEN, PID), Curve(PID_WITH_INVERSE, Variant.GIVEN, PID_WITH_INVERSE))
+    curves = (PID, Variant.GIVEN, PID), (PID_WITH_INVERSE, Variant.GIVEN, PID_WITH_INVERSE)
     sheet, columns = _tracking(study, m.scenario.inverse_frequencies_hz, curves, limit=True)
     counts = "; ".join(_counts(r) for r in study.runs if (r.mirror, r.controller) == (Variant.GIVEN, PID_WITH_INVERSE))
     caption = (
@@ -200,10 +194,8 @@ def inverse(study: Study) -> Figure:
 
 def comparison(study: Study) -> Figure:
     """PID + inverse on the mission's hysteresis model and on its comparison model."""
-    curves = (
-        Curve("mirror's model", Variant.GIVEN, PID_WITH_INVERSE),
-        Curve("comparison model", Variant.COMPARISON, PID_WITH_INVERSE),
-    )
+    both = ("mirror's model", Variant.GIVEN), ("comparison model", Variant.COMPARISON)
+    curves = tuple((*each, PID_WITH_INVERSE) for each in both)
     sheet, columns = _tracking(study, study.file.mission.scenario.inverse_frequencies_hz, curves, limit=True)
     caption = "PID + inverse on the mirror as given and on the mission's comparison model, each with its own inverse."
     return Figure("comparison", "Hysteresis models compared", caption, sheet, columns)

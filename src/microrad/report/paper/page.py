@@ -1,12 +1,15 @@
 """The paper's figures 1 to 8 and tables 1 and 2 beside this run: which figure of ours stands for each, what differs."""
 
 from collections.abc import Sequence
-from typing import Any
 
 from microrad.core.units import format_quantity
+from microrad.mission.file import changed_from_shipped
+from microrad.report.page.templates import drawing
 from microrad.report.paper import diagrams
 from microrad.report.plotting.figure import Figure
 from microrad.report.quantities import quantity
+from microrad.report.tables import Cell, Table
+from microrad.report.view import Block, Drawing, Soft, View, slug, told
 from microrad.study.study import Study
 
 # Table 1 of the paper: year, LEO satellite, its mass, rate in Mbit/s, GEO satellite
@@ -22,24 +25,90 @@ _FIGURES = {
     "Fig. 6": ("fig6-pid",),
     "Fig. 8": ("fig8-inverse",),
 }
+_TITLES = {
+    "Fig. 1": "Fig. 1  Open-loop pointing: the relay and its sequence",
+    "Fig. 2": "Fig. 2  Link margin",
+    "Fig. 3": "Fig. 3  Experiment for the mirror model (virtual bench)",
+    "Fig. 4": "Fig. 4  Identified linear dynamics",
+    "Fig. 5": "Fig. 5  Rate-dependent hysteresis",
+    "Fig. 6": "Fig. 6  PID with and without hysteresis",
+    "Fig. 7": "Fig. 7  Feedforward and feedback combined",
+    "Fig. 8": "Fig. 8  PID against PID + inverse",
+}
 _NOT_PLAYED = "Not drawn: the mission's mirror is not of the paper's kind, Eq. 2 and Eq. 3."
 
 
-def paper_section(study: Study, figures: Sequence[Figure]) -> dict[str, Any]:
-    """What the template needs; figures of ours that stand for none of the paper's come last."""
+def paper_view(study: Study, figures: Sequence[Figure], *first: View) -> View:
+    """The paper's claims, figures and tables beside this run; figures of ours that stand for none of them come last.
+
+    Args:
+        study: a run of a whole mission.
+        figures: those of the paper's cases and of its bench.
+        first: views that stand behind the claims.
+    """
     by_name = {figure.name: figure for figure in figures}
     taken = {name for names in _FIGURES.values() for name in names}
-    shown = {number: [by_name[name] for name in names if name in by_name] for number, names in _FIGURES.items()}
-    return {
-        "relay": diagrams.relay(study),
-        "setup": diagrams.setup(),
-        "control": diagrams.control(study),
-        "figures": shown,
-        "others": [figure for figure in figures if figure.name not in taken],
-        "differs": differs(study, played=bool(shown["Fig. 4"])),
-        "projects": projects(study),
-        "link_table": link_table(study),
+    said = differs(study, played="fig4-chirp" in by_name)
+    ours = {
+        number: told(
+            *(by_name[name] for name in names if name in by_name),
+            Soft(f"{number}, what differs from the paper: {said[number]}"),
+        )
+        for number, names in _FIGURES.items()
     }
+    drawn = {
+        "Fig. 1": _sketch("Fig. 1", "relay", diagrams.relay(study), said),
+        "Fig. 3": _sketch("Fig. 3", "bench", diagrams.setup(), said),
+        "Fig. 7": _sketch("Fig. 7", "control", diagrams.control(study), said),
+    }
+    blocks = sorted((ours | drawn).items())
+    others = [figure for figure in figures if figure.name not in taken]
+    return View(
+        "The paper's figures and tables",
+        told(
+            'SPIE 11852, 118523B, as computed or drawn here. Nothing is copied from it. "Virtual bench" stands where '
+            "the paper shows a measurement.",
+            claims_view(study),
+            *first,
+            View(
+                "Table 1  Past LEO–GEO laser links, and this mission", [projects_table(study)], "table-1", folded=True
+            ),
+            View(
+                "Table 2  Link budgets, the paper's inputs and this mission's",
+                links_tables(study),
+                "table-2",
+                folded=True,
+            ),
+            *(View(_TITLES[number], found, f"paper-{slug(number)}", folded=True) for number, found in blocks),
+            *(View(figure.title, [figure], folded=True) for figure in others),
+        ),
+        "paper",
+    )
+
+
+def _sketch(number: str, name: str, values: object, said: dict[str, str]) -> tuple[Block, ...]:
+    return (Drawing(slug(number), _TITLES[number], said[number], drawing("paper/diagrams.html", name, values)),)
+
+
+def claims_view(study: Study) -> View:
+    """Each printed claim of the paper, what this run has instead, and whether they agree."""
+    rows = [(c.where, c.claim, c.ours, Cell("", c.agrees), c.why) for c in study.claims]
+    table = Table("", ("where", "claim", "this run", "agrees", "why"), rows, (0, 1, 2, 3, 4))
+    changed = "; ".join(
+        f"{key} is {value}, there {was}" for key, value, was in changed_from_shipped(study.file.sources)
+    )
+    return View(
+        "The paper's claims against this run",
+        told(
+            "Claims on its links are judged on the paper's own numbers, whatever this mission has (microrad init "
+            "--preset paper writes them). The others are judged on the mirror, the loop and the orbits of this "
+            "mission.",
+            table,
+            changed and f"This mission is not the paper's: {changed}.",
+            Soft('"inferred": one of our inputs was chosen from the claim itself, so that agreeing proves nothing.'),
+        ),
+        "claims",
+    )
 
 
 def differs(study: Study, *, played: bool) -> dict[str, str]:
@@ -69,14 +138,15 @@ def differs(study: Study, *, played: bool) -> dict[str, str]:
     }
 
 
-def projects(study: Study) -> list[tuple[str, ...]]:
+def projects_table(study: Study) -> Table:
     """Table 1 of the paper, and this mission below it."""
     m = study.file.mission
-    rate = f"{m.communication.data_rate_bit_s * 1e-6:g}"
-    return [*PROJECTS, ("", f"this mission: {m.name}", "", rate, "")]
+    own = ("", f"this mission: {m.name}", "", f"{m.communication.data_rate_bit_s * 1e-6:g}", "")
+    headings = ("year", "LEO satellite", "mass", "rate (Mbit/s)", "GEO satellite")
+    return Table("", headings, [*PROJECTS, own], (0, 1, 4), totals=1)
 
 
-def link_table(study: Study) -> list[tuple[str, ...]]:
+def links_tables(study: Study) -> tuple[Table, Soft]:
     """Table 2 of the paper: item, and for beacon and communication the paper's value and this mission's."""
     m = study.file.mission
     b, c, t = study.file.mission.beacon, m.communication, m.terminals
@@ -90,7 +160,7 @@ def link_table(study: Study) -> list[tuple[str, ...]]:
     error, distance = both(b.pointing_error_rad, c.pointing_error_rad, "rad"), both(b.distance_m, c.distance_m, "m")
     leo, geo = (format_quantity(a, "m") for a in (t.leo_aperture_m, t.geo_aperture_m))
     margins = quantity(study.beacon.margin_db, "dB"), quantity(study.static.margin_db, "dB")
-    return [
+    rows = [
         ("Transmit power", "4 W", power[0], "5 W", power[1]),
         ("Wavelength", "1.55 µm", wavelength[0], "1.55 µm", wavelength[1]),
         ("LEO transmit aperture", "5 cm", leo, "5 cm", leo),
@@ -100,3 +170,9 @@ def link_table(study: Study) -> list[tuple[str, ...]]:
         ("GEO receive aperture", "15 cm", geo, "15 cm", geo),
         ("Margin", "+", margins[0], "+", margins[1]),
     ]
+    groups = (("", 1), ("Beacon", 2), ("Communication", 2))
+    note = (
+        "The paper prints the sign of both margins and no number: the sensitivities of both receivers are assumptions "
+        "here. Line by line the budgets stand above."
+    )
+    return Table("", ("item", *("paper", "here") * 2), rows, groups=groups, totals=1), Soft(note)

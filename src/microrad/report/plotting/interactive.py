@@ -20,7 +20,7 @@ from microrad.report.plotting.layout import INCH, Box, Entry, Key, Layout, Place
 from microrad.report.plotting.palette import BLACK, CIVIDIS, GREY, WHITE, clear, thinned
 from microrad.report.plotting.sheet import Area, Axis, Bars, Dash, Field, Line, Rule, Sheet, Span, Words
 
-DIGITS = 6
+DIGITS = 5
 _POWERS = 1.25  # by so much plotly sets powers of ten larger than other texts
 _PER_POINT = 96.0 / INCH  # CSS pixels
 _WITH_UNIT = re.compile(r"(?P<name>.*\S)\s*\((?P<unit>[^()]+)\)", re.DOTALL)
@@ -31,14 +31,14 @@ _CLEAR, _FONT_PX, _ABOVE_PX = "rgba(0,0,0,0)", 12, 3
 _QUIET: dict[str, Any] = {"hoverinfo": "skip", "hovertemplate": None}
 
 
-def plot_of(sheet: Sheet) -> dict[str, Any]:
-    """A sheet as plain data.
+def plot_of(sheet: Sheet, found: Layout | None = None) -> dict[str, Any]:
+    """A sheet as plain data, from its ``found`` layout where there is one already.
 
     ``data`` and ``layout`` are plotly's but for the places of the panels: those stand in ``panels`` and ``scales``
     (colour bars) as boxes in CSS pixels for the width ``size[0]``, from which the page's script makes them for the
     width that it has. ``keys`` are the legends.
     """
-    found = layout(sheet)
+    found = found or layout(sheet)
     drawn = Drawn(found)
     for number, each in enumerate(found.placed):
         pen = Pen(drawn, number, each)
@@ -66,19 +66,13 @@ def text_of(plot: dict[str, Any]) -> str:
 
 # ------------------------------------------------------------------------------------------------ numbers and words
 def numbers(values: Any) -> list[float | int | None]:
-    """Numbers with six significant digits, more where they differ by little; None for what is not finite."""
+    """Numbers with five significant digits, more where they differ by little; None for what is not finite."""
     flat = np.asarray(values, dtype=np.float64).ravel()
     finite = flat[np.isfinite(flat)]
     span, most = (float(np.ptp(finite)), float(np.abs(finite).max())) if finite.size else (0.0, 0.0)
     digits = DIGITS + (max(0, math.floor(math.log10(most / span))) if span > 0.0 else 0)
-    return [_short(value, min(digits, 16)) for value in flat.tolist()]
-
-
-def _short(value: float, digits: int) -> float | int | None:
-    if not math.isfinite(value):
-        return None
-    short = float(f"{value:.{digits}g}")
-    return int(short) if short.is_integer() and abs(short) < 1e15 else short
+    short = map(float, (f"%.{min(digits, 16)}g " * flat.size % tuple(flat.tolist())).split())  # all in one go
+    return [int(s) if abs(s) < 1e15 and s.is_integer() else s if math.isfinite(s) else None for s in short]
 
 
 def words(text: str) -> str:
@@ -305,18 +299,12 @@ def _line(pen: Pen, line: Line) -> None:
     outside = {} if line.clip else {"cliponaxis": False}
     kept = line.kept
     if line.dash:
-        style = {
-            **_pen(line.colour, line.width, line.dash),
-            "shape": "hv" if line.steps else "linear",
-            "simplify": False,
-        }
+        shape = "hv" if line.steps else "linear"
+        style = {**_pen(line.colour, line.width, line.dash), "shape": shape, "simplify": False}
         curve = {**pen.scatter(line.x[kept], line.y[kept], "lines"), "line": style, **outside, **name}
         whole = line.marker and line.every is None and kept.size == line.x.size
-        pen.trace(
-            {**curve, **({"mode": "lines+markers", "marker": marker(line)} if whole else {}), **_arms(line)},
-            label,
-            look,
-        )
+        marked = {"mode": "lines+markers", "marker": marker(line)} if whole else {}
+        pen.trace({**curve, **marked, **_arms(line)}, label, look)
         if whole:
             return
     if line.marker:
@@ -336,14 +324,8 @@ def _arms(line: Line) -> dict[str, Any]:
     for which, arms in (("x", line.x_arms), ("y", line.y_arms)):
         if arms is not None:
             lengths = {"arrayminus": numbers(arms[0]), "array": numbers(arms[1])}
-            made[f"error_{which}"] = {
-                "type": "data",
-                "symmetric": False,
-                **lengths,
-                "color": line.colour,
-                "thickness": 1.3,
-                "width": 4,
-            }
+            look = {"color": line.colour, "thickness": 1.3, "width": 4}
+            made[f"error_{which}"] = {"type": "data", "symmetric": False, **lengths, **look}
     return made
 
 
@@ -379,19 +361,12 @@ def _area(pen: Pen, area: Area) -> None:
         gap = np.full((1, 2), np.nan)
         x, y = np.concatenate([part for ring in rings for part in (ring, gap)])[:-1].T
         pattern = {"shape": "/", "size": 6, "solidity": 0.15, "fgcolor": "#000000", "bgcolor": _CLEAR}
-        made = {
-            "type": "scatter",
-            "mode": "lines",
-            "x": numbers(x),
-            "y": numbers(y),
-            "fill": "toself",
-            "fillpattern": pattern,
-        }
+        made: dict[str, Any] = {"type": "scatter", "mode": "lines", "x": numbers(x), "y": numbers(y)}
+        made |= {"fill": "toself", "fillpattern": pattern}
         pen.trace({**made, "line": {"width": 0, "color": "#000000"}, "hoverinfo": "skip"}, area.label, Look(""))
         return
-    path = "".join(
-        "M" + "L".join(f"{a},{b}" for a, b in zip(*map(numbers, ring.T), strict=True)) + "Z" for ring in rings
-    )
+    points = [zip(*map(numbers, ring.T), strict=True) for ring in rings]
+    path = "".join("M" + "L".join(f"{a},{b}" for a, b in ring) + "Z" for ring in points)
     edge = {"color": area.edge, "width": _pixels(area.edge_width)} if area.edge else {"width": 0}
     shape = {"type": "path", "path": path, "fillrule": "evenodd", "xref": pen.x, "yref": pen.y, "layer": "between"}
     pen.shape({**shape, "fillcolor": tint, "line": edge}, area.label, Look(tint, "area"))
@@ -403,9 +378,8 @@ def _bars(pen: Pen, bars: Bars) -> None:
     axis = pen.of.panel.x if bars.upright else pen.of.panel.y
 
     def said(at: float, breadth: float, start: float, end: float) -> str:
-        of = _word(axis, row, at) or spoken(row, "@").replace(
-            "%{@:.5~g}", f"{at - breadth / 2:.5g} to {at + breadth / 2:.5g}"
-        )
+        ends = f"{at - breadth / 2:.5g} to {at + breadth / 2:.5g}"
+        of = _word(axis, row, at) or spoken(row, "@").replace("%{@:.5~g}", ends)
         shown = f"{end:.5g}" if start == 0.0 else f"{start:.5g} to {end:.5g}"
         return _joined([of, spoken(value, "@").replace("%{@:.5~g}", shown)])
 
@@ -434,19 +408,14 @@ def _field(pen: Pen, of: Field) -> None:
     trace |= pen.hover(spoken(of.title or of.spoken or pen.of.panel.title, "z"))
     if of.levels is not None:
         first, last, step = float(of.levels[0]), float(of.levels[-1]), float(of.levels[1] - of.levels[0])
-        trace |= {
-            "type": "contour",
-            "line": {"width": 0},
-            "contours": {"start": first, "end": last, "size": step, "coloring": "fill"},
-        }
+        contours = {"start": first, "end": last, "size": step, "coloring": "fill"}
+        trace |= {"type": "contour", "line": {"width": 0}, "contours": contours}
     elif pen.named:
         trace["text"] = [[pen.said(a, b) for a in of.x] for b in of.y]
     if of.title and pen.of.bar is not None:
         title = {"text": words(of.title), "side": "right"}
-        trace |= {
-            "showscale": True,
-            "colorbar": {"title": title, "tickvals": numbers([*pen.of.bar_ticks]), "outlinewidth": 0},
-        }
+        bar = {"title": title, "tickvals": numbers([*pen.of.bar_ticks]), "outlinewidth": 0}
+        trace |= {"showscale": True, "colorbar": bar}
         left, top, _, bottom = pen.of.bar
         boxes = {"inner": _box(pen.of.bar), "outer": _box((left, top, pen.of.outer[2], bottom))}
         pen.to.scales.append({"trace": len(pen.to.data), "panel": pen.number, **boxes})

@@ -261,6 +261,11 @@ def grid(width: float, height: float, rows: int = 1, columns: int = 1, **more: b
     return sheet, [sheet.panel(row, column) for row in range(rows) for column in range(columns)]
 
 
+def rows(texts: Sequence[str], size: float = 8.0) -> Axis:
+    """An upright axis with a text at each row from 0 on, the first on top."""
+    return Axis(low=len(texts) - 0.4, high=-0.6, ticks=dict(enumerate(texts)), size=size, grid=False)
+
+
 def between(x: Floats, low: Floats, high: Floats, colour: str, opacity: float, label: str = "") -> Area:
     """The area between two curves, parted where one of them is nan."""
     known = np.isfinite(low) & np.isfinite(high)

@@ -39,21 +39,20 @@ _HATCH = (
 _FONT = "system-ui, 'DejaVu Sans', sans-serif"
 
 
-def svg_of(sheet: Sheet) -> str:
-    """The sheet as the text of an <svg> element, its coordinates to a hundredth of a point."""
-    found = layout(sheet)
+def svg_of(sheet: Sheet, found: Layout | None = None) -> str:
+    """The sheet as the text of an <svg> element, its coordinates to a hundredth of a point.
+
+    ``found`` is its layout where there is one already.
+    """
+    found = found or layout(sheet)
     size = f'width="{found.width / INCH * 96:.0f}" height="{found.height / INCH * 96:.0f}"'
     head = (
         f'<svg xmlns="http://www.w3.org/2000/svg" {size} viewBox="0 0 {found.width:.5g} {found.height:.5g}" '
         f'font-family="{_FONT}" fill="{_FRAME}" stroke-linejoin="round">'
     )
     hatched = any(area.hatched for panel in sheet.panels for area in panel.all_of(Area))
-    parts = [
-        head,
-        _HATCH if hatched else "",
-        *_heading(found),
-        *(part for each in found.placed for part in _panel(each)),
-    ]
+    parts = [head, _HATCH if hatched else "", *_heading(found)]
+    parts += [part for each in found.placed for part in _panel(each)]
     parts += [part for key in found.keys for part in _key(key)]
     return "\n".join([*filter(None, parts), "</svg>\n"])
 
@@ -61,9 +60,8 @@ def svg_of(sheet: Sheet) -> str:
 def _heading(found: Layout) -> Iterator[str]:
     sheet = found.sheet
     if sheet.heading and not sheet.panels:
-        yield _text(
-            sheet.heading, found.width / 2.0, found.height / 2.0, TITLE, "middle", "middle", sheet.heading_colour
-        )
+        x, y = found.width / 2.0, found.height / 2.0
+        yield _text(sheet.heading, x, y, TITLE, "middle", "middle", sheet.heading_colour)
     elif sheet.heading:
         x, anchor = (PAD, "start") if sheet.heading_at_left else (found.width - PAD, "end")
         yield _text(sheet.heading, x, PAD, TITLE, anchor, "top", sheet.heading_colour)
@@ -115,11 +113,11 @@ def _frame(of: Placed) -> Iterator[str]:
     left, top, right, bottom = of.inner
     panel = of.panel
     outline = f"M{left:.2f} {top:.2f}V{bottom:.2f}H{right:.2f}" + (f"V{top:.2f}Z" if panel.framed else "")
-    strokes = "".join(f"M{p:.2f} {bottom:.2f}v{TICK}" for p in _along(of, of.x_ticks, True))
-    strokes += "".join(f"M{left:.2f} {p:.2f}h-{TICK}" for p in _along(of, of.y_ticks, False))
     small = scales.minor(panel.x, of.x_ends), scales.minor(panel.y, of.y_ends)
-    strokes += "".join(f"M{p:.2f} {bottom:.2f}v2" for p in _along(of, small[0], True))
-    strokes += "".join(f"M{left:.2f} {p:.2f}h-2" for p in _along(of, small[1], False))
+    strokes = ""
+    for long, x_ticks, y_ticks in ((TICK, of.x_ticks, of.y_ticks), (2, *small)):
+        strokes += "".join(f"M{p:.2f} {bottom:.2f}v{long}" for p in _along(of, x_ticks, True))
+        strokes += "".join(f"M{left:.2f} {p:.2f}h-{long}" for p in _along(of, y_ticks, False))
     yield f'<path d="{outline}{strokes}" stroke="{_FRAME}" stroke-width="0.8" fill="none"/>'
     if of.x_shown:
         for p, text in zip(_along(of, of.x_ticks, True), of.x_ticks.values(), strict=True):
@@ -135,15 +133,8 @@ def _frame(of: Placed) -> Iterator[str]:
         texts = [scales.width_of(text, panel.y.size) for text in of.y_ticks.values()]
         beside = TICK + PAD + max(texts, default=0.0) if of.y_shown else PAD
         high = scales.height_of(panel.y.title, TITLE)
-        yield _text(
-            panel.y.title,
-            left - beside - PAD - high / 2.0,
-            (top + bottom) / 2.0,
-            TITLE,
-            "middle",
-            "middle",
-            turned=True,
-        )
+        x = left - beside - PAD - high / 2.0
+        yield _text(panel.y.title, x, (top + bottom) / 2.0, TITLE, "middle", "middle", turned=True)
     if panel.title:
         yield _text(panel.title, left, top - PAD, panel.title_size, "start", "bottom")
 
@@ -213,9 +204,8 @@ def _arms(of: Placed, line: Line) -> str:
         ends = np.stack([*at(of, line.x - dx[0], line.y - dy[0]), *at(of, line.x + dx[1], line.y + dy[1])], axis=1)
         for a, b, c, d in ends[np.isfinite(ends).all(axis=1)].tolist():
             cap = (0.0, 3.0) if level else (3.0, 0.0)
-            caps = "".join(
-                f"M{p - cap[0]:.2f} {q - cap[1]:.2f}l{2 * cap[0]:g} {2 * cap[1]:g}" for p, q in ((a, b), (c, d))
-            )
+            stroke = f"l{2 * cap[0]:g} {2 * cap[1]:g}"
+            caps = "".join(f"M{p - cap[0]:.2f} {q - cap[1]:.2f}{stroke}" for p, q in ((a, b), (c, d)))
             path += f"M{a:.2f} {b:.2f}L{c:.2f} {d:.2f}{caps}" if (a, b) != (c, d) else ""
     return f'<path d="{path}" fill="none" stroke="{line.colour}" stroke-width="1"/>' if path else ""
 
@@ -331,9 +321,8 @@ def _words(of: Placed, words: Words) -> list[str]:
         wide, high = scales.width_of(words.text, words.size), scales.height_of(words.text, words.size)
         from_x = x - {"start": 0.0, "middle": 0.5, "end": 1.0}[words.anchor] * wide
         from_y = y - {"top": 0.0, "middle": 0.5, "bottom": 1.0}[words.base] * high
-        made.insert(
-            0, f'<rect {_rect((from_x, from_y, from_x + wide, from_y + high))} fill="{WHITE}" fill-opacity="0.75"/>'
-        )
+        box = _rect((from_x, from_y, from_x + wide, from_y + high))
+        made.insert(0, f'<rect {box} fill="{WHITE}" fill-opacity="0.75"/>')
     return made
 
 
@@ -355,9 +344,8 @@ def _text(
     """Lines of text, of which the first, the middle or the last one stands at y."""
     lines = text.split("\n")
     high = LINE * size * len(lines)
-    first = {"top": 0.0, "middle": -high / 2.0, "bottom": -high}[
-        base
-    ] + 0.95 * size  # to the line that letters stand on
+    above = {"top": 0.0, "middle": high / 2.0, "bottom": high}[base]
+    first = 0.95 * size - above  # to the line that letters stand on
     turn = f' transform="rotate(-90 {x:.2f} {y:.2f})"' if turned else ""
     fill = f' fill="{colour}"' if colour and colour not in (BLACK, _FRAME) else ""
     where = f'font-size="{size:g}"' + (f' text-anchor="{anchor}"' if anchor != "start" else "")
@@ -383,9 +371,8 @@ def _key(key: Key) -> Iterator[str]:
         down = y
         for entry in key.entries[number * key.rows : (number + 1) * key.rows]:
             yield from _swatch(entry, x, down + line / 2.0)
-            yield _text(
-                entry.label, x + SWATCH + SWATCH_GAP, down + (line - LINE * size) / 2.0, size, "start", "top", colour
-            )
+            left, top = x + SWATCH + SWATCH_GAP, down + (line - LINE * size) / 2.0
+            yield _text(entry.label, left, top, size, "start", "top", colour)
             down += line + LINE * size * entry.label.count("\n")
         x += wide + ENTRY_GAP
 
@@ -394,16 +381,12 @@ def _swatch(entry: Entry, x: float, y: float) -> Sequence[str]:
     """What stands beside a label."""
     middle = np.array([x + SWATCH / 2.0]), np.array([y])
     if isinstance(entry, Line | Rule):
-        made = []
-        if entry.dash:
-            made.append(
-                f'<path d="M{x:.2f} {y:.2f}h{SWATCH:g}" fill="none" {_stroke(entry.colour, entry.width, entry.dash)}/>'
-            )
+        stroke = _stroke(entry.colour, entry.width, entry.dash or "-")
+        made = [f'<path d="M{x:.2f} {y:.2f}h{SWATCH:g}" fill="none" {stroke}/>'] if entry.dash else []
         if isinstance(entry, Line) and entry.marker:
             made += _markers(*middle, entry)
         return made
     opacity = entry.opacity
     edge = f' stroke="{entry.edge}" stroke-width="0.5"' if isinstance(entry, Area | Bars) and entry.edge else ""
-    return [
-        f'<rect {_rect((x, y - 3.2, x + SWATCH, y + 3.2))} fill="{entry.colour}" fill-opacity="{opacity:g}"{edge}/>'
-    ]
+    box = _rect((x, y - 3.2, x + SWATCH, y + 3.2))
+    return [f'<rect {box} fill="{entry.colour}" fill-opacity="{opacity:g}"{edge}/>']

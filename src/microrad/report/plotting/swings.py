@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from microrad.report.plotting.palette import BLUE, GREY, ORANGE
-from microrad.report.plotting.sheet import Bars, Panel, Rule, Words, shortened
+from microrad.report.plotting.sheet import Area, Bars, Legend, Panel, Place, Rule, Words, rows, shortened
 
 _LINE = 44  # characters
 _MOST_LABEL = 1000
@@ -39,8 +39,14 @@ def swing_bars(panel: Panel, labels: Sequence[str], ends: Sequence[tuple[float, 
             panel.add(Bars(at, start, end_, breadth, colour, opacity=1.0 if bounded else 0.5))
         panel.add(Words(_remark(both, value), 1.0, row, GREY, shift=(5.0, 0.0), of_panel="x"))
     panel.add(Rule(value, True, width=0.8))
-    panel.y.ticks, panel.y.size, panel.y.grid = dict(enumerate(labels)), 8.0, False
-    panel.y.low, panel.y.high = len(labels) - 0.4, -0.6
+    panel.y = rows(labels)
+
+
+def swing_legend(what: str, place: Place, columns: int = 1) -> Legend:
+    """What the colours of the bars say of an input or assumption."""
+    return Legend(
+        place, columns, only=(Area((), ORANGE, label=f"{what} lower"), Area((), BLUE, label=f"{what} higher"))
+    )
 
 
 def _remark(both: tuple[float, float], value: float) -> str:

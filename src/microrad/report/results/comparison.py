@@ -108,9 +108,8 @@ def leaves(was: Any, now: Any, place: str, unit: str = "") -> Iterator[tuple[str
         beside = now.get("unit")
         for key in dict.fromkeys([*was, *now]):
             inner = f"{place}.{key}" if place else str(key)
-            yield from leaves(
-                was.get(key, MISSING), now.get(key, MISSING), inner, beside if isinstance(beside, str) else ""
-            )
+            of = beside if isinstance(beside, str) else ""
+            yield from leaves(was.get(key, MISSING), now.get(key, MISSING), inner, of)
     elif isinstance(was, list) and isinstance(now, list):
         for i in range(max(len(was), len(now))):
             a, b = (each[i] if i < len(each) else MISSING for each in (was, now))

@@ -25,15 +25,8 @@ def manifest_of(study: Study, summary: Mapping[str, Any], folder: Path) -> dict[
     5.
     """
     mirror, m = study.file.mirror_file, study.file.mission
-    drawn = [
-        f"seed {table.seed} of [{name}], {table.runs} runs"
-        for name, table in (
-            ("fine_pointing", m.fine_pointing),
-            ("acquisition", m.acquisition),
-            ("operations", m.operations),
-        )
-        if table is not None
-    ]
+    seeded = {"fine_pointing": m.fine_pointing, "acquisition": m.acquisition, "operations": m.operations}
+    drawn = [f"seed {each.seed} of [{name}], {each.runs} runs" for name, each in seeded.items() if each is not None]
     data = finite(summary)
     named = {each.name: each.content for each in study.file.contents if each.content is not None}
     drawn += [f"seed {SEED} of the virtual bench, {PLAN}"] if study.scan is not None else []

@@ -25,6 +25,7 @@ MOST_TEXT = 4_000_000
 MOST_FILES = 16
 _LONGEST_NAME = 100
 _NO_PART = re.compile(r'[\x00-\x1f\x7f\\:*?"<>|]|^[. ]|[. ]$|^$')  # of a name that is plain everywhere
+_NAME = "name a report.html or a folder of results"
 _ELSE = "run the mission itself with microrad run"
 
 
@@ -66,16 +67,13 @@ def _text_of(path: Path) -> str:
     try:
         size = path.stat().st_size
         if size > MOST_BYTES:
-            raise ReproduceError(
-                f"{path}: is {size / 1e6:.0f} MB long; a report of microrad has at most {MOST_BYTES / 1e6:.0f} MB"
-            )
+            most = f"a report of microrad has at most {MOST_BYTES / 1e6:.0f} MB"
+            raise ReproduceError(f"{path}: is {size / 1e6:.0f} MB long; {most}")
         return read_bytes(path, MOST_BYTES).decode("utf-8")
     except FileNotFoundError:
-        raise ReproduceError(f"{path}: there is no such file; name a report.html or a folder of results") from None
+        raise ReproduceError(f"{path}: there is no such file; {_NAME}") from None
     except IsADirectoryError:
-        raise ReproduceError(
-            f"{path}: is a folder without a {MANIFEST}; name a report.html or a folder of results"
-        ) from None
+        raise ReproduceError(f"{path}: is a folder without a {MANIFEST}; {_NAME}") from None
     except OSError as error:
         raise ReproduceError(f"{path}: cannot be read: {error.strerror}; name a report.html") from None
     except UnicodeDecodeError:
@@ -86,18 +84,15 @@ def _embedded(path: Path, page: str) -> str:
     """The text of the manifest in a page."""
     count = page.count(OPENING)
     if not count:
-        ours = "microrad study of" in page
-        reason = (
-            "carries no manifest: it was cut short, or an earlier version wrote it"
-            if ours
-            else "is no report of microrad"
-        )
-        advice = f"name the {MANIFEST} beside it" if ours else "name a report.html that microrad run wrote"
-        raise ReproduceError(f"{path}: {reason}; {advice}")
+        said = "is no report of microrad; name a report.html that microrad run wrote"
+        if "microrad study of" in page:
+            said = (
+                f"carries no manifest: it was cut short, or an earlier version wrote it; name the {MANIFEST} beside it"
+            )
+        raise ReproduceError(f"{path}: {said}")
     if count > 1:
-        raise ReproduceError(
-            f"{path}: carries {count} manifests; a report has one, so this one was put together by hand"
-        )
+        said = f"carries {count} manifests; a report has one, so this one was put together by hand"
+        raise ReproduceError(f"{path}: {said}")
     inside, ending, _ = page.partition(OPENING)[2].partition(ENDING)
     if not ending:
         raise ReproduceError(f"{path}: ends within its manifest: it was cut short; name the whole report")

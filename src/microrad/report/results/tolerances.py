@@ -164,127 +164,71 @@ def _link(s: ConverterSteps) -> Tolerance:
 
 
 # ------------------------------------------------------------------------------------------------------ where they hold
-_RUN_KEYS = "{rms_rad,quantile_rad}"
 SUMMARY: Mapping[str, tuple[str, ...]] = {
-    "exact": (
-        "residual.frequency_hz",
-        "runs[].{frequency_hz,rate_clamped,saturated,slew_limited,alternating}",
-        "links.acquisition.ways[].runs",
-        "day.{duration_s,outage}",
-        "day.rates[].rate_bit_s",
-        "day.{relay,direct}.contacts",
-        "contact.losses",
-        "contact.windows[].seconds",
-        "constellation.{contacts,sessions}",
-        "constellation.satellites[].sessions",
-        "constellation.duration_s",
-        "fine_pointing.{quantile,required_rad}",
-        "fine_pointing.controllers[].parameters[].value",
-        "fine_pointing.sines[].frequency_hz",
-    ),
-    "formula": (
-        "margin_db.{beacon,answer,communication_as_budgeted,communication_static}",
-        "{largest_data_rate_bit_s,largest_pointing_error_rad}",
-        "implied_sensitivity_photon_bit[]",
-        "links.budgets[].{margin_db,received_power_w,required_power_w,irradiance_w_m2,irradiance_on_axis_w_m2}",
-        "links.budgets[].{radiant_intensity_w_sr,required_irradiance_w_m2,received_photons_per_bit}",
-        "links.{budgets[].lines,budgets[].totals,pointing.lines,receiver_noise,tracking.lines}[].value",
-        "links.largest_data_rate_bit_s",
-        "links.{tornado,other_tornados[].tornado}[].{value,low,high,margin_low_db,margin_high_db}",
-        "links.other_tornados[].margin_db",
-        "links.pointing.{confidence,beacon_coverage}",
-        "links.pointing.totals[].total_rad",
-        "links.pointing.left_for_each[].{largest_rad,missing_rad}",
-        "links.point_ahead.{angle_rad,beam_half_angles,loss_db,mirror_range_rad}",
-        "links.tracking.{power_w,signal_to_noise,noise_equivalent_angle_rad}",
-        "links.acquisition.{uncertainty_per_axis_rad,beacon_coverage,answer_coverage,answer_detection,return_coverage}",
-        "links.acquisition.{scan_s,scan_radius_rad,scan_half_angle_rad,scan_stated_detection_s,scan_needed_detection_s}",
-        "links.acquisition.ways[].{success_probability,mean_time_s}",
-        "links.acquisition.ways[].stages[].{longest_s,success_probability}",
-        "links.under_jitter.{bias_rad[],rms_rad[],mean_loss_db,outage_loss_db,margin_db,outage,below_required_margin}",
-        "links.under_jitter.{data_rate_bit_s,best_half_angle_rad,wanted_half_angle_rad,lost_against_best_db}",
-        "links.under_jitter.{coded_penalty_many_fades_db,coded_penalty_no_interleaver_db,uncoded_penalty_db}",
-        "links.under_jitter.{fades_per_s,mean_fade_s}",
-        "fine_pointing.stroke.*[].lines_rad.*",
-        "fine_pointing.stroke.*[].{total_rad,total_rss_rad,needed_rad,needed_rss_rad,travel_rad,available_rad}",
-        "fine_pointing.stroke.*[].{margin_rad,margin_rss_rad,mirror_per_line_of_sight}",
-        "fine_pointing.stroke.*[].{largest_magnification,largest_magnification_rss}",
-    ),
-    "linear theory": (
-        "fine_pointing.linear_bound_rms_rad",
-        "fine_pointing.rms_left_to_gain.{linear_at_baseline,linear_at_nearest}",
-        "fine_pointing.controllers[].theory_rms_rad",
-        "fine_pointing.controllers[].theory_rms_by_source_rad.*",
-        "fine_pointing.controllers[].margins.{modulus,gain_up_db,phase_rad,delay_s,disk,bandwidth_hz,crossover_hz}",
-        "fine_pointing.error_budget.parts[].theory_rms_rad",
-    ),
-    "orbit": (
-        "day.{contacts,direct.passes}[].{start_s,end_s,duration_s}",
-        "day.contacts[].{range_least_m,range_most_m,point_ahead_most_rad,line_of_sight_rate_most_rad_s}",
-        "day.contacts[].{line_of_sight_acceleration_most_rad_s2,range_rate_most_m_s,doppler_most_hz}",
-        "day.direct.passes[].{highest_elevation_rad,could_carry_bit}",
-        "day.{visible_share,median_contact_s,closed_form_contact_s}",
-        "day.{relay,direct}.{contact_s,longest_gap_s,generated_bit}",
-        "contact.{start_s,end_s}",
-        "contact.windows[].{start_s,range_m,point_ahead_rad,rate_rad_s}",
-        "constellation.satellites[].longest_gap_s",
-    ),
-    "run": (
-        "residual.{peak_rad,rms_rad,used_rad}",
-        "runs[].{peak_rad,rms_rad}",
-        f"contact.windows[].{_RUN_KEYS}",
-        "other_readings[].residual_rad",
-    ),
-    "runs": (
-        f"fine_pointing.controllers[].simulated.*.{_RUN_KEYS}",
-        "fine_pointing.controllers[].simulated.*.axis_rms_rad[]",
-        f"fine_pointing.sines[].{_RUN_KEYS}",
-        "fine_pointing.error_budget.{combined_rms_rad,together_without_hysteresis_rms_rad,full_rms_rad}",
-        "fine_pointing.error_budget.parts[].rms_rad",
-        "fine_pointing.error_budget.differences[].{with_rms_rad,without_rms_rad}",
-    ),
+    "drawn": ("links.acquisition.ways[].{simulated_success_probability,simulated_mean_time_s}",),
+    "fades": ("performance[].{fades_per_s,mean_fade_s}",),
+    "failed": ("day.{relay,direct}.contacts_without_acquisition",),
     "largest": ("fine_pointing.controllers[].simulated.*.largest_rad", "contact.windows[].largest_rad"),
     "interval": ("fine_pointing.controllers[].simulated.*.rms_interval_rad",),
     "gain": ("fine_pointing.{rms_gained_over_baseline,rms_left_to_gain.baseline_with_hysteresis}",),
     "added": ("fine_pointing.error_budget.differences[].added_rms_rad",),
+    "exact": (
+        "{residual,runs[],fine_pointing.sines[]}.frequency_hz",
+        "runs[].{rate_clamped,saturated,slew_limited,alternating}",
+        "links.acquisition.ways[].runs",
+        "day.{duration_s,outage,rates[].rate_bit_s,relay.contacts,direct.contacts}",
+        "contact.{losses,windows[].seconds}",
+        "constellation.{contacts,sessions,satellites[].sessions,duration_s}",
+        "fine_pointing.{quantile,required_rad,controllers[].parameters[].value}",
+    ),
+    "linear theory": (
+        "fine_pointing.{linear_bound_rms_rad,rms_left_to_gain.linear_at_baseline,rms_left_to_gain.linear_at_nearest}",
+        "fine_pointing.controllers[].{theory_rms_rad,theory_rms_by_source_rad.*,margins.*}",
+        "fine_pointing.error_budget.parts[].theory_rms_rad",
+    ),
+    "run": (
+        "{residual,runs[]}.{peak_rad,rms_rad,used_rad}",
+        "contact.windows[].{rms_rad,quantile_rad}",
+        "other_readings[].residual_rad",
+    ),
+    "runs": (
+        "fine_pointing.{controllers[].simulated.*,sines[]}.{rms_rad,quantile_rad,axis_rms_rad[]}",
+        "fine_pointing.error_budget.{*_rms_rad,parts[].rms_rad}",
+    ),
     "link": (
         "margin_db.{judged,communication_at_residual}",
         "{requirements,papers_loop}[].{required,actual,margin}",
-        "other_readings[].margin_db",
-        "performance[].{bias_rad[],rms_rad[],mean_loss_db,outage_loss_db,margin_db,outage,below_required_margin}",
-        "performance[].{data_rate_bit_s,best_half_angle_rad,wanted_half_angle_rad,lost_against_best_db}",
-        "performance[].{coded_penalty_many_fades_db,coded_penalty_no_interleaver_db,uncoded_penalty_db}",
-        "hysteresis_costs[].{margin_change_db,data_rate_change_bit_s}",
-        "day.pointing_loss_db",
-        "day.rates[].{margin_db,largest_range_m}",
+        "{other_readings[].margin_db,performance[].*,hysteresis_costs[].*}",
+        "day.{pointing_loss_db,rates[].margin_db,rates[].largest_range_m}",
         "contact.windows[].{lowest_margin_db,share_below_0_db}",
         "fine_pointing.controllers[].simulated.*.shares.*",
     ),
-    "fades": ("performance[].{fades_per_s,mean_fade_s}",),
-    "drawn": ("links.acquisition.ways[].{simulated_success_probability,simulated_mean_time_s}",),
-    "failed": ("day.{relay,direct}.contacts_without_acquisition",),
     "volume": (
         "day.contacts[].could_carry_bit",
         "day.{relay,direct}.{could_carry_bit,could_carry_least_bit,could_carry_most_bit,arrived_bit,lost_bit}",
         "day.{relay,direct}.{on_board_at_end_bit,latency_median_s,latency_99_percent_s}",
-        "day.assumptions[].factor",
-        "day.assumptions[].{low,high}.{relay,direct}_{could_carry_bit,latency_99_percent_s}",
-        "contact.seconds_in_state.*",
-        "contact.log[].time_s",
-        "constellation.volume_bit",
-        "constellation.relays[].use",
-        "constellation.satellites[].{with_data_s,volume_bit}",
+        "day.assumptions[].*",
+        "contact.{seconds_in_state.*,log[].time_s}",
+        "constellation.{volume_bit,relays[].use,satellites[].with_data_s,satellites[].volume_bit}",
+    ),
+    "orbit": (
+        "day.{contacts[].*,direct.passes[].*,visible_share,median_contact_s,closed_form_contact_s}",
+        "day.{relay,direct}.{contact_s,longest_gap_s,generated_bit}",
+        "contact.{start_s,end_s,windows[].start_s,windows[].range_m,windows[].point_ahead_rad,windows[].rate_rad_s}",
+        "constellation.satellites[].longest_gap_s",
+    ),
+    "formula": (
+        "margin_db.{beacon,answer,communication_as_budgeted,communication_static}",
+        "{largest_data_rate_bit_s,largest_pointing_error_rad,implied_sensitivity_photon_bit[],links.*}",
+        "fine_pointing.stroke.*",
     ),
 }
-"""Where each kind of number stands in a summary: [] is any place of a list, * any name, {a,b} either."""
+"""Where each kind of number stands in a summary, the first that fits: [] is any place of a list, * any name or names,
+{a,b} either."""
 
 FIGURES: Mapping[str, tuple[str, ...]] = {
     "exact": ("claims-scan",),
-    "formula": (
-        "fig2-margin-map",
-        "{tornado,tornado-answer,tornado-beacon}",
-        "wide-beam-or-scan",
-    ),
+    "formula": ("fig2-margin-map", "{tornado,tornado-answer,tornado-beacon}", "wide-beam-or-scan"),
     "linear theory": ("fine-pointing-sensitivity",),
     "orbit": ("along-contact", "day-timeline", "world-map"),
     "run": ("comparison", "fig5-hysteresis-loops", "fig6-pid", "fig8-inverse", "fig4-chirp", "fig5-bench-loops"),
@@ -300,54 +244,37 @@ A curve has its points where the data are, so that its rows are others elsewhere
 """
 
 
+@cache
 def stated(place: str) -> str | None:
     """The kind of a number of the summary by its place there, or None where no tolerance is stated for it."""
-    return _kind_at(re.sub(r"\[\d+\]", "[]", place), "summary")
+    return _kind_at(SUMMARY, re.sub(r"\[\d+\]", "[]", place))
 
 
+@cache
 def stated_for_figure(name: str) -> str | None:
     """The kind of a figure's data by its name, or None."""
-    return _kind_at(name, "figures")
+    return _kind_at(FIGURES, name)
+
+
+def _kind_at(table: Mapping[str, tuple[str, ...]], place: str) -> str | None:
+    fits = (kind for kind, places in table.items() for each in places if _pattern(each).fullmatch(place))
+    return next(fits, None)
 
 
 @cache
-def _kind_at(place: str, of: str) -> str | None:
-    for kind, pattern in _patterns(of):
-        if pattern.fullmatch(place):
-            return kind
-    return None
-
-
-@cache
-def _patterns(of: str) -> tuple[tuple[str, re.Pattern[str]], ...]:
-    table = SUMMARY if of == "summary" else FIGURES
-    return tuple((kind, _pattern(each)) for kind, places in table.items() for each in places)
-
-
 def _pattern(text: str) -> re.Pattern[str]:
     either = re.sub(r"\{(.*?)\}", lambda found: f"(?:{found[1].replace(',', '|')})", text.replace(".", r"\."))
     return re.compile(either.replace("[]", r"\[\]").replace("*", ".+"))
 
 
 # ---------------------------------------------------------------------------------------------------------------- units
-_UNITS = {
-    "_rad_s2": "rad/s2",
-    "_rad_s": "rad/s",
-    "_m_s": "m/s",
-    "_bit_s": "bit/s",
-    "_rad": "rad",
-    "_db": "dB",
-    "_hz": "Hz",
-    "_bit": "bit",
-    "_m": "m",
-    "_s": "s",
-}
+_ENDING = re.compile(r"_(rad_s2|rad_s|m_s|bit_s|rad|db|hz|bit|m|s)$")
 
 
 def unit_of(place: str) -> str:
     """The unit that the last key with one has at its end, or ""."""
     for key in reversed(re.sub(r"\[\d+\]", "", place).split(".")):
-        for ending, unit in _UNITS.items():
-            if key.endswith(ending):
-                return unit
+        if found := _ENDING.search(key):
+            unit = found[1]
+            return {"db": "dB", "hz": "Hz"}.get(unit, "/".join(unit.rsplit("_", 1)))
     return ""

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
 
 from microrad import link
 from microrad.link.budget.lines import FREE_SPACE_LOSS, POINTING_LOSS
@@ -11,50 +10,44 @@ from microrad.loop.controller_study.parts import GAUGE_NOISE, OPTICAL_NOISE
 from microrad.mirror import Variant
 from microrad.mirror.geometry import StrokeBudget
 from microrad.report.fine_pointing.words import source_name
-from microrad.report.quantities import apart, percent, quantity
-from microrad.report.requirements import advice_for_links, advice_for_power, advise_at_most, advise_change, margin_text
+from microrad.report.quantities import percent, quantity
+from microrad.report.requirements import (
+    advice_for_links,
+    advice_for_power,
+    advise_at_most,
+    advise_change,
+    requirement_table,
+)
+from microrad.report.tables import Cell, Table
 from microrad.study.alternatives import Reading
 from microrad.study.study import Study
 from microrad.study.verdict import unknown
 
-Row = dict[str, Any]
 _OF_NOISE = {OPTICAL_NOISE: "fine_pointing.optical_sensor", GAUGE_NOISE: "fine_pointing.strain_gauge"}
 _BY_TEN = ("bit_error_ratio", "outage")  # inputs that a tornado moves by their order of magnitude
 
 
-def rows(study: Study) -> list[Row]:
-    """Each requirement as text: mark, required, achieved, margin, and its dominant contributor."""
-    return [_row(r, contributor(study, r)) for r in study.requirements]
+def judged_table(study: Study, found: Sequence[Requirement]) -> Table:
+    """Requirements with what contributes most to each."""
+    return requirement_table(found, [contributor(study, r) for r in found])
 
 
-def papers_rows(study: Study) -> list[Row]:
-    """What the paper's loop is held against, in the same form; nothing where it is what the verdict judges."""
-    return [_row(r, contributor(study, r)) for r in study.papers_loop]
-
-
-def _row(r: Requirement, text: str) -> Row:
-    required, achieved = apart(r.required, r.actual, r.unit)
-    texts = {"required": required, "achieved": achieved, "margin": margin_text(r), "contributor": text}
-    return {"name": r.name, "mark": r.mark, **texts}
-
-
-def readings(study: Study) -> list[Row]:
-    """The numbers that rest on the residual by each other reading, as text; first as the mission has them."""
+def readings_table(study: Study) -> Table:
+    """The numbers that rest on the residual by each other reading; first as the mission has them."""
     m = study.file.mission
     left, margin = study.left_rad(study.residual), study.achieved.margin_db
     own = Reading("as it stands", "", "", left, margin)
-    return [
-        {
-            "key": r.key,
-            "given": r.given,
-            "other": r.other,
-            "residual": r.failure or quantity(r.residual_rad, "rad"),
-            "margin": "" if r.failure else quantity(r.margin_db, "dB"),
-            "closes": "" if r.failure else "yes" if r.closes else "no",
-            "mark": "" if r.failure else "PASS" if r.meets(m.requirement) and not unknown(m.mirror) else "FAIL",
-        }
-        for r in (own, *study.other_readings)
-    ]
+    rows = [_reading(r, r.meets(m.requirement) and not unknown(m.mirror)) for r in (own, *study.other_readings)]
+    headings = ("key", "read as", "instead", "residual", "margin", "link closes", "residual and margin as required")
+    return Table("", headings, rows, (0, 1, 2, 5, 6), best=(0,))
+
+
+def _reading(r: Reading, met: bool) -> list[str | Cell]:
+    key = Cell(r.key, code=bool(r.other))
+    if r.failure:
+        return [key, r.given, r.other, r.failure, "", "", ""]
+    numbers = quantity(r.residual_rad, "rad"), quantity(r.margin_db, "dB"), "yes" if r.closes else "no"
+    return [key, r.given, r.other, *numbers, Cell("", "PASS" if met else "FAIL")]
 
 
 def contributor(study: Study, r: Requirement) -> str:
@@ -125,8 +118,10 @@ def most_sensitive(swings: Sequence[link.Swing]) -> str:
     if not known:
         return ""
     top = max(known, key=lambda s: s.swing_db)
-    step = "a factor of ten" if top.key.endswith(_BY_TEN) else "0.5 dB" if top.unit.startswith("dB") else "10 %"
-    return f"; the margin moves most with {top.key}: {quantity(top.swing_db, 'dB')} for {step} both ways"
+    step = (
+        "ten times more or less" if top.key.endswith(_BY_TEN) else "±0.5 dB" if top.unit.startswith("dB") else "±10 %"
+    )
+    return f"; the margin moves most with {top.key}: {quantity(top.swing_db, 'dB')} for {step}"
 
 
 def largest_loss(budget: link.LinkBudget) -> str:

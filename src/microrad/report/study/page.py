@@ -5,39 +5,37 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from markupsafe import Markup
+
 from microrad.core.machine import versions
 from microrad.core.units import format_quantity
+from microrad.loop.paper_cases import Run
 from microrad.mirror import Variant
-from microrad.mission.file import assumptions, changed_from_shipped
-from microrad.mission.model import Source
-from microrad.report.day.constellation import plan_sentences, satellites_table
+from microrad.orbit.day import DayStudy
+from microrad.report.day import words as day_words
 from microrad.report.day.contact_run import contact_sentences, transitions_table, windows_table
-from microrad.report.day.page import day_section
-from microrad.report.fine_pointing.page import fine_pointing_section
-from microrad.report.fine_pointing.tails import tail_section
-from microrad.report.links.page import links_section, performance_section
-from microrad.report.page.templates import render
-from microrad.report.paper.page import paper_section
+from microrad.report.day.page import constellation_view, day_view
+from microrad.report.fine_pointing.page import fine_pointing_view
+from microrad.report.fine_pointing.tails import tail_view
+from microrad.report.links.views import (
+    budget_table,
+    budgets_view,
+    links_views,
+    paired_tables,
+    performance_view,
+    residuals_sentence,
+)
+from microrad.report.page.templates import drawing, inputs_view, mission_page
+from microrad.report.paper.page import paper_view
 from microrad.report.plotting.figure import Figure
 from microrad.report.quantities import given_angle
-from microrad.report.requirements import requirements_paragraph
+from microrad.report.requirements import derived_words
 from microrad.report.results.manifest import embedded, hash_of_page, with_manifest
 from microrad.report.study import chain, contributors, words
+from microrad.report.tables import Table
+from microrad.report.view import Block, Drawing, Points, Soft, Verbatim, Verdict, View, told
 from microrad.study.pointing_penalty import FINE
 from microrad.study.study import Study
-
-PARTS = (
-    ("verdict", "Verdict"),
-    ("chain", "The chain"),
-    ("budgets", "Budgets and what the link delivers"),
-    ("paper", "The paper's figures and tables"),
-    ("error-budget", "Mirror, loop and error budget"),
-    ("tails", "Monte Carlo tails"),
-    ("assumptions", "Assumptions and inputs"),
-    ("warnings", "Warnings"),
-    ("origin", "Manifest"),
-)
-"""The page's parts in their order, by the name of their anchor."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,96 +60,188 @@ def study_page(study: Study, drawn: StudyFigures, manifest: Mapping[str, Any]) -
 
     ``manifest`` is put into the page as JSON: what `reproduce` runs again.
     """
-    m, fine = study.file.mission, study.fine_pointing
-    required = m.requirement.pointing_error_rad
-    titles = [(id, title) for id, title in PARTS if fine is not None or id != "tails"]
-    boxes = chain.stages(study)
-    context: dict[str, Any] = {
-        "study": study,
-        "mission": m,
-        "top": 3,  # level of the headings inside a part
-        "parts": titles,
-        "titles": dict(titles),
-        "numbers": {id: place for place, (id, _) in enumerate(titles, start=1)},
-        "headline": words.headline(study),
-        "paragraph": requirements_paragraph(study.requirements),
-        "explanation": words.explanation(study),
-        "warnings": words.warnings(study),
-        "requirements": contributors.rows(study),
-        "papers_loop": contributors.papers_rows(study),
-        "papers_words": words.papers_loop(study),
-        "other_readings": contributors.readings(study),
-        "chain_wide": chain.layout(boxes, 4, 960.0, 26.0),
-        "chain_narrow": chain.layout(boxes, 1, 340.0, 24.0),
-        "chain_words": chain.alternative(boxes),
-        "paper": paper_section(study, (*drawn.study, *drawn.bench)),
-        "links": _links(study, drawn.links),
-        "mirror_lines": [line for line in str(study.summary).splitlines() if not line.startswith("  warning")],
-        "sound": study.met and (study.fine_case is not None or not words.beyond_identified(study, study.residual)),
-        "changed": changed_from_shipped(study.file.sources),
-        "margins": _margins(study),
-        "assumptions": assumptions(study.file.sources),
-        "inputs": _inputs(study.file.sources),
-        "day": _day(study, drawn.day),
-        "fine": None if fine is None else fine_pointing_section(fine, required, drawn.fine),
-        "tails": None if fine is None else tail_section(fine, required, drawn.tails),
-        "versions": versions(),
-        "origin": _origin(manifest),
-    }
-    text = render("study/study.html", context)
+    views = study_views(study, drawn)
+    text = mission_page(study.file, "study", [], [*views, _origin(manifest)], data="beside", manifest=True)
     return with_manifest(text, embedded({**manifest, "page_sha256": hash_of_page(text)}))
 
 
-def _origin(manifest: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """The manifest's short entries, for the page."""
+def study_views(study: Study, drawn: StudyFigures) -> tuple[View, ...]:
+    """A whole study in the order of its page: the verdict, what to doubt, the chain part by part, the paper, inputs."""
+    required, fine = study.file.mission.requirement.pointing_error_rad, study.fine_pointing
+    found = told(
+        verdict_view(study),
+        warnings_view(study),
+        _chain(study),
+        View("Pointing and link budgets", _links(study, drawn.links), "budgets"),
+        _mirror_and_loop(study),
+        None if fine is None else fine_pointing_view(fine, required, drawn.fine),
+        None if fine is None else tail_view(fine, required, drawn.tails),
+        _day(study, drawn.day),
+        paper_view(study, (*drawn.study, *drawn.bench), _papers_loop(study), _readings(study)),
+        inputs_view(study.file.sources),
+        _not_in_study(study),
+    )
+    return tuple(block for block in found if isinstance(block, View))
+
+
+def verdict_view(study: Study) -> View:
+    """The verdict with its requirements, and what it rests on."""
+    good = study.met and (study.fine_case is not None or not words.beyond_identified(study, study.residual))
+    judged = contributors.judged_table(study, study.requirements)
+    box = Verdict(words.headline(study), told(judged, derived_words(study.requirements)), good)
+    return View("Verdict", [box, "What the verdict rests on:", Points(words.explanation(study))], "verdict")
+
+
+def warnings_view(study: Study) -> View:
+    """What a reader must not overlook, by what it puts in doubt."""
+    found = words.ranked_warnings(study)
+    said = [block for what, several in found.items() for block in (f"{what}:", Points(several))]
+    count = sum(map(len, found.values()))
+    return View(f"Warnings ({count}), the weightiest first" if count else "Warnings", said or ["None."], "warnings")
+
+
+def _chain(study: Study) -> View:
+    boxes = chain.stages(study)
+    said = chain.alternative(boxes)
+    sizes = (("wide", chain.layout(boxes, 4, 960.0, 26.0)), ("narrow", chain.layout(boxes, 1, 340.0, 24.0)))
+    svg = Markup("\n").join(drawing("study/chain.html", "chain", each, name, said) for name, each in sizes)
+    stroke = "" if study.fine_pointing is None else "; at the mirror, whether its stroke covers the worst case"
+    caption = (
+        "Each arrow hands a result on: from where the satellites are to what arrives. PASS and FAIL are those of the "
+        f"requirements above{stroke}."
+    )
+    return View("The chain", [Drawing("chain", "The chain with its numbers", caption, svg)], "chain")
+
+
+def _mirror_and_loop(study: Study) -> View:
+    """The mirror, the margins of the paper's loop, and each of its runs."""
+    lines = [line for line in str(study.summary).splitlines() if not line.startswith("  warning")]
+    heading = "margin of the sampled loop, hysteresis replaced by its gain"
+    counted = ("rate-clamped", "saturated", "slew-limited", "alternating")
+    runs = Table(
+        "",
+        ("mirror", "controller", "frequency", "peak", "rms", *counted),
+        [_run(run) for run in study.runs],
+        (0, 1),
+        folded=f"Each of {len(study.runs)} runs, with its counts",
+    )
+    margins = Table("", (heading, "value"), _margins(study))
+    return View("Mirror and loop", [Verbatim("\n".join(lines)), margins, runs], "mirror")
+
+
+def _run(run: Run) -> list[str]:
+    trace, counts = run.trace, run.trace.counts
+    errors = (f"{value * 1e6:.2f} µrad" for value in (trace.peak_rad, trace.rms_rad))
+    numbers = counts.clamped + counts.inverse_clamped, counts.saturated, counts.slew_limited, counts.alternating
+    return [run.mirror, run.controller, f"{run.freq_hz:g} Hz", *errors, *map(str, numbers)]
+
+
+def _papers_loop(study: Study) -> View:
+    found, said = study.papers_loop, words.papers_loop(study)
+    own = (
+        "The verdict judges the mission's own fine-pointing loop. This is the loop of the paper with its sines, judged "
+        "by itself."
+    )
+    judged: list[Block] = [own, contributors.judged_table(study, found)] if found else []
+    return View("The paper's loop", [*judged, Points(said)])
+
+
+def _readings(study: Study) -> View:
+    said = (
+        "What the paper leaves open is read in one way here. Each line reads one key of the mission in another way, "
+        "all else as it is; what concerns the loop is simulated anew."
+    )
+    return View("By other readings", [said, contributors.readings_table(study)], folded=True)
+
+
+def _not_in_study(study: Study) -> View:
+    fine = study.fine_pointing is not None
+    left = "Turbulence" if fine else "Vibration, sensor noise and turbulence"
+    day = (
+        "contact times" if study.day is None else "light time in the times of contacts, drag, weather over the stations"
+    )
+    sines = "" if fine else " The residual is that of one axis tracking clean sines."
+    return View(
+        "Not in this study",
+        [f"{left}; {day}; the pointing loss that a receiver into a single mode has on its own side.{sines}"],
+        "not-in-this-study",
+    )
+
+
+def _origin(manifest: Mapping[str, Any]) -> View:
+    """The manifest's short entries."""
     files = [("mission file", manifest["mission"])]
     files += [("mirror file", manifest["mirror"])] if manifest["mirror"] else []
     rows = [(what, f"{each['file']}, SHA-256 {each['sha256']}") for what, each in files]
     rows += [("named file", f"{name}, SHA-256 {digest}") for name, digest in manifest["inputs_sha256"].items()]
     arithmetic = "; ".join(f"{name}: {text}" for name, text in manifest["machine"].items())
     rows += [("random numbers", manifest["randomness"]), ("machine", arithmetic)]
-    return [*rows, ("figures, as data and drawn", f"{len(manifest['files_sha256'])} files with their hashes")]
-
-
-def _links(study: Study, figures: Sequence[Figure]) -> dict[str, Any]:
-    budgets = (
-        (study.communication, ", as budgeted"),
-        (study.achieved, ", at the simulated residual"),
-        (study.beacon, ""),
-        (study.answer, ""),
+    rows.append(("figures, as data and drawn", f"{len(manifest['files_sha256'])} files with their hashes"))
+    made = ", ".join(f"{name} {version}" for name, version in versions().items())
+    return View(
+        "Manifest",
+        [
+            "This page holds what made it, as JSON: the mission's text, the files that it names, versions, seeds, the "
+            "numbers of the summary and a hash of each figure's file. microrad reproduce report.html runs it again and "
+            "says whether the numbers agree.",
+            Table("", ("what", "value"), rows, (0, 1)),
+            Soft(f"Made with {made}. Hashes of every file, this page's too, are in manifest.json."),
+        ],
+        "origin",
     )
+
+
+def _links(study: Study, figures: Sequence[Figure]) -> tuple[View, ...]:
+    names = ("as budgeted", "at the simulated residual")
+    tables = [
+        *paired_tables(study.communication, study.achieved, names),
+        *map(budget_table, (study.beacon, study.answer)),
+    ]
+    budgets = budgets_view(study.links, tables, figures, _loop_noise(study), _implied(study))
     best = "" if study.fine_pointing is None else study.fine_pointing.best.design.name
-    context = links_section(study.links, budgets=budgets, figures=figures, files=True)
-    performance = performance_section(study.performance, best, study.links.under_jitter)
-    return {
-        **context,
-        **performance,
-        "performance_words": [*performance["performance_words"], *_left_out(study)],
-        "sentences": [*context["sentences"], *_loop_noise(study)],
-        "readings": study.margin_map.readings,
-        "ideal": study.margin_map.ideal,
-    }
+    found, under = study.performance, study.links.under_jitter
+    cases = [*([] if under is None else [under]), *(c for c in found.cases if c.mirror != Variant.STRAIGHT)]
+    said = [residuals_sentence(found), *_left_out(study)]
+    cost = performance_view(cases, found.costs, found.outage, said, best)
+    return links_views(study.links, figures, budgets=budgets, performance=cost)
 
 
-def _day(study: Study, figures: Sequence[Figure]) -> dict[str, Any] | None:
+def _implied(study: Study) -> View:
+    """The receiver's sensitivity that the required margin implies, and what ideal receivers would leave."""
+    found = study.margin_map
+    implied = [(r.pointing_loss, r.strehl, f"{r.photons_per_bit:.0f}") for r in found.readings]
+    ideal = [(r.name, f"{r.photons_per_bit:.2f}", f"{r.margin_db:.2f} dB", r.formula) for r in found.ideal]
+    return View(
+        "What the required margin implies for the receiver",
+        (
+            f"The required {study.file.mission.requirement.margin_db:g} dB at the required pointing error and the "
+            "mission's data rate imply a receiver sensitivity, so a budget that takes its sensitivity from there is "
+            "circular. By how pointing loss and Strehl are read:",
+            Table("", ("pointing loss", "Strehl", "photons per bit implied"), implied, (0, 1)),
+            "Margin with ideal receivers at a bit-error rate of 1e-9 instead, at the budgeted pointing error:",
+            Table("", ("receiver", "photons per bit", "margin", "formula"), ideal, (0, 3)),
+        ),
+        folded=True,
+        listed=False,
+    )
+
+
+def _day(study: Study, figures: Sequence[Figure]) -> View | None:
     """The day, one of its contacts in time, and the constellation; None for a mission without orbits."""
-    day, run, plan = study.day, study.contact, study.plan
+    day = study.day
     if day is None:
         return None
-    o, fine = day.operations, study.fine_pointing
-    shown = None
-    if run is not None and fine is not None and o is not None and o.contact is not None:
-        rate = day.data.table.data_rate_bit_s if o.rates_bit_s is None else None
-        name = fine.best.design.name
-        shown = {
-            "sentences": contact_sentences(run, o.contact.number, name, rate),
-            "windows": windows_table(run, fine.quantile),
-            "log": transitions_table(run),
-        }
-    context = {**day_section(day, figures, files=True), "run": shown}
-    if plan is not None:
-        context["constellation"] = {"sentences": plan_sentences(plan), "table": satellites_table(plan)}
-    return context
+    return day_view(day, day_words.sentences(day), figures, _contact(study, day), constellation_view(study.plan))
+
+
+def _contact(study: Study, day: DayStudy) -> View | None:
+    run, fine, o = study.contact, study.fine_pointing, day.operations
+    if run is None or fine is None or o is None or o.contact is None:
+        return None
+    rate = day.data.table.data_rate_bit_s if o.rates_bit_s is None else None
+    said = contact_sentences(run, o.contact.number, fine.best.design.name, rate)
+    blocks: list[Block] = [*said, windows_table(run, fine.quantile), transitions_table(run)]
+    return View("One contact in time", blocks, folded=True)
 
 
 def _left_out(study: Study) -> list[str]:
@@ -178,12 +268,6 @@ def _loop_noise(study: Study) -> list[str]:
     return [
         f"The fine-pointing loop is simulated with {used} of noise in its optical sensor; that light allows {allowed}."
     ]
-
-
-def _inputs(sources: Any) -> list[tuple[str, Source]]:
-    """What was given, but for the hundreds of numbers of a correlation, which stand in the mirror file."""
-    shown = (item for item in sources.items() if item[0] != "mirror.uncertainty.correlation")
-    return [(key, source) for key, source in shown if source.kind not in ("assumption", "derived")]
 
 
 def _margins(study: Study) -> list[tuple[str, str]]:

@@ -4,7 +4,7 @@ import math
 
 from microrad.core.units import format_quantity
 from microrad.link.budget.lines import DEEPEST_DB, POINT_AHEAD_LOSS, POINTING_LOSS
-from microrad.link.requirement import IMPOSSIBLE, outage_words
+from microrad.link.requirement import IMPOSSIBLE, time_kept
 from microrad.loop.paper_cases import Run
 from microrad.mirror import Variant
 from microrad.mission.file import changed_from_shipped
@@ -45,7 +45,7 @@ def _judged_at(study: Study) -> str:
     m, case = study.file.mission, study.fine_case
     rate = format_quantity(m.communication.data_rate_bit_s, "bit/s")
     if case is not None:
-        return f"{rate} but for {outage_words(m.requirement)}"
+        return f"{rate} for {time_kept(m.requirement)}"
     left = format_quantity(study.left_rad(study.residual), "rad", 3)
     return f"{rate} and a simulated residual of {left} ({m.requirement.residual_statistic})"
 
@@ -228,27 +228,56 @@ def beyond_identified(study: Study, run: Run) -> str:
 
 
 def warnings(study: Study) -> list[str]:
-    """What a reader must not overlook: the mirror's own warnings, and runs outside their range."""
-    found = [
+    """What a reader must not overlook, the weightiest first."""
+    return [each for several in ranked_warnings(study).values() for each in several]
+
+
+def ranked_warnings(study: Study) -> dict[str, list[str]]:
+    """The warnings by what they put in doubt: first the verdict itself, last what it does not rest on."""
+    own: list[str] = []
+    others: list[str] = []
+    if study.fine_pointing is not None:
+        m = study.file.mission
+        own, others = fine_pointing_words.warnings(study.fine_pointing, m.control, m.amplifier)
+    paper = [*_of_loops(study), *_of_runs(study)]
+    judged = paper if study.fine_pointing is None else []
+    found = {
+        "The verdict": [*_of_verdict(study), *_of_sources(study), *study.links.warnings],
+        "The model of the mirror": [*study.summary.warnings],
+        "The loop that is judged": own + judged,
+        "The day": [] if study.day is None else [*study.day.warnings, *_not_run(study)],
+        "Other controllers": others,
+        "The paper's loop and figures": [] if judged else paper,
+    }
+    return {what: said for what, said in found.items() if said}
+
+
+def _of_sources(study: Study) -> list[str]:
+    return [
         f"{key} = {value} names the paper as its source, but the paper's mission has {shipped}"
         for key, value, shipped in changed_from_shipped(study.file.sources)
     ]
-    found = [*_of_verdict(study), *found, *study.summary.warnings, *study.links.warnings]
-    if study.day is not None:
-        found += study.day.warnings
-        found += _not_run(study)
+
+
+def _of_loops(study: Study) -> list[str]:
+    """The hysteresis loops of the figures, driven beyond what is known of the mirror or than its amplifier can."""
     m = study.file.mission
-    half, bias = m.scenario.loop_amplitude_v, m.mirror.bias_v
-    if not m.mirror.drive_min_v <= bias - half <= bias + half <= m.mirror.drive_max_v:
-        found.append("the hysteresis loops are drawn for a drive beyond the range that the mirror was identified for")
-    if (
-        not m.amplifier.output_min_v
-        <= m.amplifier.gain * (bias - half)
-        <= m.amplifier.gain * (bias + half)
-        <= (m.amplifier.output_max_v)
-    ):
-        found.append("the hysteresis loops are drawn for a drive beyond the amplifier's range")
-    found += filter(None, (beyond_identified(study, run) for run in study.runs))
+    low, high = m.mirror.bias_v - m.scenario.loop_amplitude_v, m.mirror.bias_v + m.scenario.loop_amplitude_v
+    drawn, amplifier, found = "the hysteresis loops are drawn for a drive beyond", m.amplifier, []
+    if not m.mirror.drive_min_v <= low <= high <= m.mirror.drive_max_v:
+        found.append(f"{drawn} the range that the mirror was identified for")
+    if not amplifier.output_min_v <= amplifier.gain * low <= amplifier.gain * high <= amplifier.output_max_v:
+        found.append(f"{drawn} the amplifier's range")
+    return found + [
+        f"hysteresis loop at {loop.freq_hz:g} Hz: {loop.clamped} samples beyond the identified rate"
+        for loop in study.loops
+        if loop.clamped
+    ]
+
+
+def _of_runs(study: Study) -> list[str]:
+    """The paper's sines: extrapolated drives, and limits that were met."""
+    found = [*filter(None, (beyond_identified(study, run) for run in study.runs))]
     for run in study.runs:
         c = run.trace.counts
         counts = {
@@ -258,13 +287,6 @@ def warnings(study: Study) -> list[str]:
             "reversals of the command within 10 samples of the last": c.alternating,
         }
         found += [f"{run.trace.name}: {count} {what}" for what, count in counts.items() if count]
-    found += [
-        f"hysteresis loop at {loop.freq_hz:g} Hz: {loop.clamped} samples beyond the identified rate"
-        for loop in study.loops
-        if loop.clamped
-    ]
-    if study.fine_pointing is not None:
-        found += fine_pointing_words.warnings(study.fine_pointing, m.control, m.amplifier)
     return found
 
 
@@ -274,8 +296,8 @@ def _of_verdict(study: Study) -> list[str]:
     if m.jitter is not None:
         found.append(
             "[jitter] is not in this verdict, which judges the pointing error that the simulated loop leaves: the two "
-            f"are not summed. Under [jitter] alone the margin is {signed(study.communication.margin_db, 'dB')} but for "
-            f"{outage_words(m.requirement)}, as microrad budget judges it"
+            f"are not summed. Under [jitter] alone the margin is {signed(study.communication.margin_db, 'dB')} for "
+            f"{time_kept(m.requirement)}, as microrad budget judges it"
         )
     lost = study.achieved.loss_db(POINTING_LOSS, POINT_AHEAD_LOSS) if case is None else case.outage_loss_db
     if lost > DEEPEST_DB:

@@ -1,0 +1,379 @@
+"""The links as views: pointing, budgets, light, what pointing costs, acquisition."""
+
+import math
+from collections.abc import Sequence
+
+from microrad.core.budget import Line
+from microrad.core.units import format_quantity
+from microrad.link import LinkBudget
+from microrad.link.acquisition.partner_search import LONGEST_LOOK_S, Finding, Found, Scanned
+from microrad.link.pointing import OpenLoopPointing
+from microrad.link.pointing.outage import Performance, stated_outage
+from microrad.link.study import LinkStudy
+from microrad.mirror import Variant
+from microrad.report.links import words
+from microrad.report.plotting.figure import Figure
+from microrad.report.quantities import given_angle, minus, quantity
+from microrad.report.tables import Cell, Table
+from microrad.report.view import Block, Points, Soft, View, told
+from microrad.study.pointing_penalty import FINE, Cost, LinkPerformance
+
+EARLY = 0.9
+"""Share of the acquisitions that end in lock by the time that the table states."""
+
+RAREST_FADE_HZ = 1.0 / (365.25 * 86400.0)
+"""Fades rarer than one in a year are not counted."""
+
+_LINES = ("line", "value", "basis", "source", "holds for")
+_NO_VALUE = "\u2013"
+
+
+def links_views(
+    study: LinkStudy,
+    figures: Sequence[Figure] = (),
+    *,
+    budgets: View | None = None,
+    performance: View | None = None,
+) -> tuple[View, ...]:
+    """All that the links come to.
+
+    Args:
+        study: the links, at their budgeted errors or under their jitter.
+        figures: those of the links, where they are shown.
+        budgets: the budgets in another form.
+        performance: what other pointing errors cost the link than those of its jitter.
+    """
+    under = study.under_jitter
+    if performance is None and under is not None:
+        outage, said = stated_outage(study.data.requirement), words.under_jitter_sentence(under, study)
+        performance = performance_view((under,), (), outage, [said])
+    budgets = budgets or budgets_view(study, [budget_table(b) for b in study.budgets], figures)
+    return told(pointing_view(study.open_loop), budgets, performance, acquisition_view(study.finding, figures))  # type: ignore[return-value]
+
+
+# ------------------------------------------------------------------------------------------------------------ pointing
+def pointing_view(p: OpenLoopPointing | None) -> View | None:
+    """The pointing budget with the largest that each error may be, its totals by every rule, what the beacon covers."""
+    if p is None:
+        return None
+    half = None if p.reading is None else p.reading.half_angle_rad
+    most = [] if half is None else [_most(each.note, each.largest_rad) for each in p.allocation(half, "rss")]
+    rows = [
+        [line.name, given_angle(line.value), f"{100 * share:.1f} %", *most[k : k + 1], line.basis, line.source]
+        for k, (line, share) in enumerate(zip(p.lines, p.variance_shares, strict=True))
+    ]
+    largest = ["largest allowed"] if most else []
+    words_from = 3 + len(largest)
+    lines = Table(
+        "",
+        ("error source", "half width", "share of squares", *largest, "how it counts", "source"),
+        rows,
+        (0, words_from, words_from + 1),
+    )
+    sums = "; ".join(f"{each.name} {quantity(each.total_rad, 'rad')}" for each in p.summations)
+    totals = Table(
+        "",
+        ("total", "value", "of", "formula", "where it is authorised", "what speaks against it here"),
+        [(s.name, given_angle(s.total_rad), s.of, s.formula, s.authority, s.caveat) for s in p.summations],
+        (0, 2, 3, 4, 5),
+        folded=f"Totals at {100 * p.confidence:g} %: {sums}",
+    )
+    note = (
+        ""
+        if half is None
+        else (
+            "Largest allowed: the half width at which the root sum square equals the beacon's half angle "
+            f"({format_quantity(half, 'rad', 3)}), with all other errors as they are."
+        )
+    )
+    return View("Open-loop pointing", told(lines, note and Soft(note), totals, *coverage(p)))
+
+
+def _most(note: str, largest_rad: float) -> str:
+    return "nothing" if note else format_quantity(largest_rad, "rad", 3)  # the others alone may exceed the cone
+
+
+def coverage(p: OpenLoopPointing) -> list[str]:
+    """What the beacon's cone covers, by each reading of its divergence."""
+    if p.reading is None or p.counter_reading is None:
+        return []
+    own, other = p.reading, p.counter_reading
+    needed = format_quantity(own.confident_divergence_rad, "rad", 3)
+    return [
+        f"Read as {own.convention}, the beacon's half angle is {format_quantity(own.half_angle_rad, 'rad', 3)}, "
+        f"{'at least' if own.covers else 'less than'} the root sum square of one axis. It covers the partner with a "
+        f"probability of {own.coverage:.4f}; both axes and their biases are counted. {100 * p.confidence:g} % would "
+        f"take a divergence of {needed}. Read as {other.convention}, the half angle is "
+        f"{format_quantity(other.half_angle_rad, 'rad', 3)} and the probability {other.coverage:.4f}."
+    ]
+
+
+# ------------------------------------------------------------------------------------------------------------- budgets
+def lines_table(title: str, lines: Sequence[Line], totals: Sequence[Line] = ()) -> Table:
+    """Lines of a budget with its sums; a page shows the sums, and the lines when it is asked."""
+    sums = "; ".join(f"{line.name.lower()} {quantity(line.value, line.unit)}" for line in totals)
+    rows = [_row(line) for line in (*lines, *totals)]
+    folded = f"{title}: {sums}" if sums else title
+    return Table(title, _LINES, rows, (0, 2, 3, 4), totals=len(totals), folded=folded)
+
+
+def _row(line: Line) -> tuple[str | Cell, ...]:
+    name = Cell(line.name, "!", line.warning) if line.warning else line.name
+    return name, quantity(line.value, line.unit), line.basis, line.source, line.regime
+
+
+def budget_table(budget: LinkBudget) -> Table:
+    """A budget line by line."""
+    return lines_table(budget.name, budget.lines, budget.totals)
+
+
+def paired_tables(budget: LinkBudget, other: LinkBudget, headings: tuple[str, str]) -> tuple[Table, ...]:
+    """Two budgets of one link as one table, or as two where they do not have the same lines.
+
+    Where the bases of a line differ, that of the other stands below.
+    """
+    pairs = list(zip((*budget.lines, *budget.totals), (*other.lines, *other.totals), strict=False))
+    if len(budget.lines) != len(other.lines) or any(one.name != two.name for one, two in pairs):
+        named = zip((budget, other), headings, strict=True)
+        return tuple(lines_table(f"{b.name}, {heading}", b.lines, b.totals) for b, heading in named)
+    rows = []
+    for one, two in pairs:
+        name, value, basis, *rest = _row(one)
+        below = "" if one.basis == two.basis else f"\n{headings[1]}: {two.basis}"
+        rows.append((name, value, quantity(two.value, two.unit), f"{basis}{below}", *rest))
+    margins = f"{budget.name}: margin {rows[-1][1]} {headings[0]}, {rows[-1][2]} {headings[1]}"
+    columns = ("line", *headings, *_LINES[2:])
+    return (Table(budget.name, columns, rows, (0, 3, 4, 5), totals=len(budget.totals), folded=margins),)
+
+
+def budgets_view(
+    study: LinkStudy, tables: Sequence[Table], figures: Sequence[Figure], sentences: Sequence[str] = (), *more: View
+) -> View:
+    """The budgets, what follows from them, and what moves their margins.
+
+    Args:
+        study: the links.
+        tables: the budgets of beams.
+        figures: those of the links, where they are shown; the first is open.
+        sentences: more that follows.
+        more: views at the end.
+    """
+    noise, light = study.receiver_noise, study.tracking
+    tables = [*tables]
+    if noise:
+        tables.append(lines_table("Noise of the communication receiver, at the received power", noise))
+    if light is not None and light.noise_equivalent_angle is not None:
+        name = "The answer's light on the tracking sensor"
+        tables.append(lines_table(name, light.noise_lines, [light.noise_equivalent_angle]))
+    warned: list[Block] = ["Marked \u201c!\u201d in the tables:", Points(study.warnings)] if study.warnings else []
+    moving = [f for f in figures if f.name.startswith("tornado")]
+    folded = [View(f.title, [f], folded=True, listed=False) for f in moving[1:]]
+    said = Points([*words.consequences(study), *sentences])
+    return View("Link budgets", told(*tables, *warned, said, *moving[:1], *folded, *more))
+
+
+# --------------------------------------------------------------------------------------------------------- performance
+def performance_view(
+    cases: Sequence[Performance], costs: Sequence[Cost], outage: float, sentences: Sequence[str], best: str = ""
+) -> View:
+    """The link under each distribution of pointing errors; ``best`` names the controller to mark."""
+    return View(
+        "What pointing costs the link",
+        told(
+            *sentences,
+            performance_table(cases, costs, outage, best),
+            Soft(performance_note(costs=bool(costs))),
+            *fade_sentences(cases),
+        ),
+    )
+
+
+def performance_table(cases: Sequence[Performance], costs: Sequence[Cost], outage: float, best: str = "") -> Table:
+    """A row for each distribution of pointing errors.
+
+    Args:
+        cases: the link under each of them.
+        costs: what hysteresis takes from some of them.
+        outage: share of the time at which the loss is judged.
+        best: name of the controller to mark.
+    """
+    of = {(c.source, c.controller, c.mirror): cost_cells(c) for c in costs}
+    none = ["", ""] if costs else []
+    rows = [
+        [c.source, c.controller, c.mirror, *cells(c), *of.get((c.source, c.controller, c.mirror), none)] for c in cases
+    ]
+    marked = [k for k, c in enumerate(cases) if best and c.controller == best and c.mirror == Variant.GIVEN]
+    at = f"{100 * outage:g} %"
+    headings = (
+        "pointing error from",
+        "controller",
+        "mirror",
+        "rms (µrad)",
+        "mean loss (dB)",
+        f"loss at {at} (dB)",
+        "penalty without a code (dB)",
+        f"margin at {at} (dB)",
+        "outage",
+        "below required margin",
+        "best half angle (µrad)",
+        "lost against it (dB)",
+        "data rate (Mbit/s)",
+    )
+    more = ("hysteresis costs (dB)", "and (Mbit/s)") if costs else ()
+    return Table(
+        "",
+        (*headings, *more),
+        rows,
+        (0, 1, 2),
+        best=marked,
+        brief=(0, 1, 2, 3, 5, 7, 8),
+        folded=f"The link under each of {len(cases)} pointing errors" if len(cases) > 3 else "",
+    )
+
+
+def cells(c: Performance) -> list[str]:
+    """The numbers of one row."""
+    return [
+        f"{math.hypot(*c.jitter.bias_rad, *c.jitter.rms_rad) * 1e6:.2f}",
+        f"{c.mean_loss_db:.2f}",
+        f"{c.outage_loss_db:.2f}",
+        words.without_code(c),
+        minus(f"{c.margin_db:+.2f}"),
+        share(c.outage),
+        share(c.short),
+        f"{c.best.half_angle_rad * 1e6:.1f}{'*' if c.best.at_limit else ''}",
+        f"{c.best.current_excess_db:.2f}",
+        "none" if math.isnan(c.data_rate_bit_s) else f"{c.data_rate_bit_s * 1e-6:.0f}",
+    ]
+
+
+def share(value: float) -> str:
+    """A share of the time; nothing was seen of what is none."""
+    return "none" if value == 0.0 else f"{value:.1e}" if value < 1e-3 else f"{float(f'{100 * value:.2g}'):g} %"
+
+
+def performance_note(*, costs: bool) -> str:
+    """How the columns are to be read."""
+    how = (
+        "Rms: radial, about zero. Penalty, the power that the errors cost: with a code the mean loss where its "
+        "interleaver spans many fades, the loss at the outage where it spans none; without a code what brings the mean "
+        "bit error ratio back to its target, in a Gaussian beam, unknown for a receiver that is given by its "
+        "sensitivity alone. Outage: share of the time with a margin below 0 dB. Best half angle: of a Gaussian beam, "
+        "at 1/e2, with the most power at the error of that column; a star: the present one, since a narrower one would "
+        "take a larger aperture. Data rate: the largest with the required margin at that loss."
+    )
+    against = " What hysteresis costs: against the same controller and the same errors on a mirror without it."
+    return how + against if costs else how
+
+
+def residuals_sentence(found: LinkPerformance) -> str:
+    """How the residuals enter the link."""
+    half = format_quantity(found.half_angle_rad, "rad", 3)
+    fine = any(c.source == FINE for c in found.cases)
+    first, then = (" first", ", then the loop under vibration and noise") if fine else ("", "")
+    return (
+        "The communication link under every simulated residual, by its own distribution and not by one static number: "
+        f"the loss that is exceeded for {100 * found.outage:g} % of the time, against a beam of {half} half angle at "
+        f"1/e2. Clean sines{first} (one axis, as in the paper){then}."
+    )
+
+
+def cost_cells(c: Cost) -> list[str]:
+    """What hysteresis takes from one controller, as text: dB of margin, Mbit/s."""
+    rate = "" if math.isnan(c.data_rate_bit_s) else signed(-c.data_rate_bit_s * 1e-6, 0)
+    return [signed(-c.margin_db, 2), rate]
+
+
+def signed(value: float, decimals: int) -> str:
+    """A number that has no sign when it is shown as zero, and a minus sign, not a hyphen, when it is negative."""
+    return minus(f"{round(value, decimals) + 0.0:.{decimals}f}")
+
+
+def fade_sentences(cases: Sequence[Performance]) -> list[str]:
+    """Fades below the required margin, a sentence for each case whose spectrum is known, and what to doubt."""
+    known = [c for c in cases if not math.isnan(c.fades_per_s)]
+    if not known:
+        return []
+    if all(c.fades_per_s < RAREST_FADE_HZ for c in known):
+        return ["Fades below the required margin: less than one a year, for Gaussian errors of these spectra."]
+    said = "; ".join(
+        f"{c.controller or c.source}: "
+        + (
+            f"{c.fades_per_s:.3g} a second of {format_quantity(c.fade_s, 's', 3)} each"
+            if c.fades_per_s >= RAREST_FADE_HZ
+            else "less than one a year"
+        )
+        for c in known
+    )
+    found = [f"Fades below the required margin, for Gaussian errors of that rms and spectrum: {said}."]
+    return found + [f"{c.fade_warning[0].upper()}{c.fade_warning[1:]}." for c in known if c.fade_warning][:1]
+
+
+# --------------------------------------------------------------------------------------------------------- acquisition
+def acquisition_view(found: Finding | None, figures: Sequence[Figure]) -> View | None:
+    """Each way to find the partner, exact beside simulated, with its stages and one run."""
+    if found is None:
+        return None
+    at = f"{100 * EARLY:g} % within"
+    headings = ("way", "lock", "simulated", "mean time", "simulated", at)
+    ways = Table("", headings, [_way(w) for w in found.ways], (0,))
+    trade = [View(f.title, [f], folded=True, listed=False) for f in figures if not f.name.startswith("tornado")]
+    stages = [view for w in found.ways for view in (_stages(w),)]
+    return View("Acquisition", told(*acquisition_paragraphs(found), ways, *stages, *trade))
+
+
+def _way(w: Found) -> list[str]:
+    """One way; what never locks has no times."""
+    o, late = w.outcome, w.outcome.locked.given_success().quantile(EARLY) if w.possible else math.nan
+    return [
+        w.name,
+        f"{o.success_probability:.4f}" if w.possible else "never",
+        f"{w.simulated_probability:.4f}",
+        quantity(o.mean_time_s, "s") if w.possible else _NO_VALUE,
+        words.simulated_mean(w),
+        quantity(late, "s") if w.possible else _NO_VALUE,
+    ]
+
+
+def _stages(w: Found) -> View:
+    stages = [(s.name, quantity(s.longest_s, "s"), f"{s.success_probability:.4f}", s.on_failure) for s in w.stages]
+    run = [(t.stage, t.to, t.cause, f"{t.time_s:.3f} s") for t in w.log]
+    tables = (
+        Table("", ("stage", "at most", "succeeds", "else back to"), stages, (0, 3)),
+        Table("One simulated run", ("stage", "goes to", "cause", "time"), run, (0, 1, 2)),
+    )
+    return View(f"Stages of the {w.name}, and one simulated run", tables, folded=True, listed=False)
+
+
+def acquisition_paragraphs(f: Finding) -> list[str]:
+    """What makes up the probability, and how the scan is laid out."""
+    c = f.chances
+    found = [
+        "Exact sums over all orders of failures beside a seeded simulation of the same process. The wide beacon covers "
+        f"its partner with a probability of {c.beacon_coverage:.4f} (its power suffices out to "
+        f"{format_quantity(f.beacon_radius_rad, 'rad', 3)} off axis), the answer lands with {c.answer_coverage:.4f} "
+        f"and is seen with {c.answer_detection:.4f}, the narrow beam back lands with {c.return_coverage:.4f}. The "
+        "random part of the pointing error is drawn anew at each attempt; biases stand at their bounds."
+    ]
+    if f.scanned is not None:
+        found.append(scan_words(f.scanned, f.sigma_rad))
+    return found
+
+
+def scan_words(s: Scanned, sigma_rad: float) -> str:
+    """How the scan is laid out, and what its light does to it."""
+    covers = (
+        f"The scan covers {format_quantity(s.radius_rad, 'rad', 3)} about the predicted direction, for an uncertainty "
+        f"of {format_quantity(sigma_rad, 'rad', 3)} rms per axis with biases"
+    )
+    stated = f"the {quantity(s.stated_detection_s, 's')} that are stated"
+    if not s.detects:
+        return (
+            f"{covers}. It detects nothing: at the edge of its beam the partner's sensor would need more than "
+            f"{quantity(LONGEST_LOOK_S, 's')} in place of {stated}."
+        )
+    covers += f", in {quantity(s.duration_s, 's')} at most."
+    if s.needed_detection_s <= s.stated_detection_s:
+        return covers
+    needed = quantity(s.needed_detection_s, "s")
+    return f"{covers} At the edge of its beam the partner's sensor needs {needed} in place of {stated}; the scan waits."

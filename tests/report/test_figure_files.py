@@ -1,0 +1,45 @@
+"""Files of figures: the columns of their data, and pictures that an earlier run has kept."""
+
+import csv
+import json
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from microrad import report
+from microrad.core.kept import Kept
+from shipped import whole_drawn
+
+COLUMNS = json.loads(Path(__file__).with_name("figure_columns.json").read_text(encoding="utf-8"))
+"""Headings of the data of each figure of the shipped mission, which spreadsheets of users are made for."""
+
+
+def test_the_data_of_each_figure_have_their_columns():
+    found = {figure.name: [*figure.columns] for figure in whole_drawn().every}
+    assert {name: found.get(name) for name in COLUMNS} == COLUMNS
+    assert found.keys() == COLUMNS.keys()
+
+
+def test_pictures_are_kept_as_they_were_drawn(tmp_path, monkeypatch):
+    figures = tuple(f for f in whole_drawn().every if f.name in ("latency", "tornado", "claims-scan"))
+    assert len(figures) == 3
+    given, parts = pickle.dumps(figures), Kept(tmp_path / "parts")
+    drawn = parts.part(report.pictures, given)
+    assert drawn == tuple((f.svg, f.plot, report.columns_csv(f.columns)) for f in figures)
+    monkeypatch.setattr(report, "columns_csv", lambda columns: pytest.fail("written again"))
+    assert parts.part(report.pictures, given) == drawn
+
+
+def test_numbers_end_early_and_stay_empty_where_there_are_none():
+    columns = {"a (m)": [1.0, float("nan"), float("inf")], "b": [0.5]}
+    made = {name: np.array(values) for name, values in columns.items()}
+    assert report.columns_csv(made) == b"a (m),b\r\n1,0.5\r\n,\r\ninf,\r\n"
+    named = {"input": ("a,b", "c"), **made}
+    assert [*csv.reader(report.columns_csv(named).decode().splitlines())] == [
+        ["input", "a (m)", "b"],
+        ["a,b", "1", "0.5"],
+        ["c", "", ""],
+        ["", "inf", ""],
+    ]
