@@ -18,7 +18,7 @@ from microrad.mission.file import load_mission
 from microrad.studio.draft.draft import Draft
 from microrad.studio.draft.tables import with_mirror_file
 from microrad.studio.jobs.files import Job, Progress
-from microrad.studio.recordings.reading import ChannelInfo, Listing, Note, View
+from microrad.studio.recordings.reading import ChannelInfo, Listing, View
 from microrad.studio.views import control as control_view
 from microrad.studio.views import controllers as control_model
 from microrad.studio.views import mirror as mirror_view
@@ -112,11 +112,11 @@ def test_the_best_is_the_one_that_leaves_least_of_what_no_fit_has_seen():
     assert mirror_view.best(()) is None
     assert mirror_view.leader(fits).model == "b"
     assert mirror_view.leader((*fits, fitted("a", 0.8)), "a").held_out_rms_percent == 0.8
-    assert [row["note"] for row in mirror_view.score_rows(fits, "c")] == ["", "chosen", ""]
+    assert [row[3] for row in mirror_view.score_rows(fits, "c")] == ["", "chosen", ""]
     rows = mirror_view.score_rows(fits)
-    assert [row["model"] for row in rows] == ["b", "c", "a"]
-    assert [row["note"] for row in rows] == ["best so far", "", ""]
-    assert rows[0]["held_out"] == "0.4 %"
+    assert [row[0] for row in rows] == ["b", "c", "a"]
+    assert [row[3] for row in rows] == ["best so far", "", ""]
+    assert rows[0][1] == "0.4 %"
 
 
 # ------------------------------------------------------------------------------------------------------------ the form
@@ -326,9 +326,8 @@ def test_a_form_that_somebody_else_has_written_holds_what_can_be_chosen(tmp_path
 
 # ----------------------------------------------------------------------------------------------------------- the plots
 def viewed():
-    note = Note("drift", "y", None, "the output drifts", False)
     values = ((0.0, 1.0, 2.0),), ((5.0, 6.0, 7.0),)
-    return View("ab", 300, 100.0, ("u",), ("y",), ("V",), ("um",), (note,), (0, 150, 299), *values)
+    return View("ab", 300, 100.0, ("u",), ("y",), ("V",), ("um",), ("the output drifts",), (0, 150, 299), *values)
 
 
 def titles(figure):
@@ -471,15 +470,15 @@ def test_a_tuned_controller_has_the_numbers_of_the_study(mission, pi):
     scene = scene_of(mission)
     tuned = controller_study.tune("PI", scene.table, controller_study.plants(scene, scene.table.seed))
     assert pi.residual_rad == tuned.residual_rms_rad
-    assert (pi.margins["modulus"], pi.margins["gain"]) == (tuned.margins.modulus, tuned.margins.gain_up)
-    assert pi.margins["modulus"] >= pi.asked_modulus == scene.table.modulus_margin
+    assert (pi.margins.modulus, pi.margins.gain_up) == (tuned.margins.modulus, tuned.margins.gain_up)
+    assert pi.margins.modulus >= pi.asked_modulus == scene.table.modulus_margin
     assert {name: value for name, (value, _) in pi.values.items()} == tuned.values
     assert {unit for _, unit in pi.values.values()} == {"Hz"}
     closed = linear.close(scene.loop, controller_study.build("PI", scene, tuned.controller))
     at = np.array([10.0, 100.0, 1000.0])
     expected = np.abs(linear.sensitivity(closed, at)[:, 0, 0])
     np.testing.assert_allclose(np.interp(at, pi.freq_hz, pi.sensitivity), expected, rtol=2e-3)
-    assert pi.sensitivity.max() == pytest.approx(pi.margins["peak"], rel=1e-2)
+    assert pi.sensitivity.max() == pytest.approx(pi.margins.peak, rel=1e-2)
 
 
 def test_a_controller_is_tuned_once_for_a_text(mission, pi, tmp_path):
@@ -523,9 +522,9 @@ def test_only_the_variants_that_are_asked_for_are_simulated(pi):
 def test_the_paper_s_loop_has_the_numbers_of_the_study(mission, name):
     found = control_model.controller(mission, name)
     margins = tracking.loop_margins(cases_of(mission.mission))
-    assert found.margins["modulus"] == margins.modulus
-    assert found.margins["crossover"] == margins.crossover_hz
-    assert found.margins["bandwidth"] == pytest.approx(358, rel=0.02)
+    assert found.margins.modulus == margins.modulus
+    assert found.margins.crossover_hz == margins.crossover_hz
+    assert found.margins.bandwidth_hz == pytest.approx(358, rel=0.02)
     asked = found.ask(control_view.ask_of("100 urad", "300 urad", "15 Hz", 5000.0), (WITH, WITHOUT))
     runs = tracking.sine_runs(cases_of(mission.mission))
     kind = "PID" if name == PID else "PID + inverse"
@@ -563,17 +562,17 @@ def test_the_warnings_of_the_mirror_s_file_stand_beside_the_margins(mission, pi,
 
 def test_margins_in_words_against_what_is_asked_for(mission, pi):
     rows = dict(control_view.margin_rows(pi))
-    assert rows["Modulus margin, least |1 + L|"] == f"{pi.margins['modulus']:.3f} (asked for: 0.5)"
+    assert rows["Modulus margin, least |1 + L|"] == f"{pi.margins.modulus:.3f} (asked for: 0.5)"
     assert rows["Phase margin"].endswith("°")
     assert rows["Residual of an axis, rms, linear"].endswith(" µrad")
     assert control_view.value_rows(pi)[0][1].endswith(" Hz")
     assert "Integral frequency" in dict(control_view.value_rows(pi))
-    assert control_view.table_row(pi)["name"] == "PI"
-    assert control_view.waiting_row("PI")["modulus"] == ""
+    assert control_view.table_row(pi)[0] == "PI"
+    assert control_view.waiting_row("PI")[2] == ""
     assert control_view.notes(pi) == ()
     pid = control_model.controller(mission, PID)
-    assert control_view.table_row(pi)["residual"].endswith(" µrad")
-    assert control_view.table_row(pid)["residual"] == "not computed"
+    assert control_view.table_row(pi)[1].endswith(" µrad")
+    assert control_view.table_row(pid)[1] == "not computed"
     assert "asked for" not in dict(control_view.margin_rows(pid))["Modulus margin, least |1 + L|"]
     assert "nothing shakes it" in control_view.notes(pid)[0]
     bound = replace(pi, bound_by=("modulus margin",), sensitivity=None, loop_gain=None)

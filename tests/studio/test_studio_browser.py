@@ -23,7 +23,7 @@ from small_campaign import campaign_file, children, halted
 api = pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
 
 APERTURE = "terminals.leo_aperture"
-WIDTHS = (1000, 1400)
+WIDTHS = (400, 1280)
 LATE = {
     "mission": "[aria-label='Text of the mission']",
     "link": "text=every requirement is met",

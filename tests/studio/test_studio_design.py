@@ -6,6 +6,7 @@ import math
 import re
 import threading
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from microrad.orbit import day as day_study
 from microrad.report.day import figures as day_plots
 from microrad.report.plotting.sheet import Axis, Line, Rule, grid
 from microrad.studio.draft.draft import Draft
+from microrad.studio.pages import elements
 from microrad.studio.views import day as day_view
 from microrad.studio.views import link as link_view
 from microrad.studio.views import plots, sliders
@@ -195,7 +197,7 @@ def test_under_a_jitter_the_page_has_the_margin_of_the_outage(tmp_path):
     assert f"{error * 1e6:.2f}" in link_view.map_words(found) and "10 \u00b5rad" in link_view.map_words(still)
     assert link.margin_map(found.data, found.data.table.data_rate_bit_s, error)[0, 0] == pytest.approx(margin, abs=1e-6)
     assert found.frame.pointing_error_rad[-1] > error
-    shown = {row["line"] for row in link_view.tables(link_study.run_link_study(file))["Under jitter"]}
+    shown = {row[0] for row in link_view.tables(link_study.run_link_study(file))["Under jitter"]}
     assert {"Mean pointing loss", "Outage", "Below required margin"} <= {name.removesuffix(" !") for name in shown}
 
 
@@ -217,10 +219,21 @@ def test_margins_say_whether_they_are_met(draft):
 
 def test_rows_of_a_budget_are_its_lines_and_its_sums(view):
     budget = view.budgets[0]
-    rows = link_view.rows_of(budget)
-    assert [row["total"] for row in rows] == [False] * len(budget.lines) + [True] * len(budget.totals)
-    assert rows[-1]["line"] == "Margin"
-    assert rows[-1]["value"] == f"{budget.margin_db:.2f} dB"
+    rows = link_view.budget_rows((*budget.lines, *budget.totals))
+    assert len(rows) == len(budget.lines) + len(budget.totals)
+    assert rows[-1][:2] == ("Margin", f"{budget.margin_db:.2f} dB")
+
+
+def test_the_last_rows_of_a_table_stand_out_and_nothing_is_sent_twice():
+    made = SimpleNamespace(rows=[])
+    elements.fill(made, [("a", "1"), ("sum", "1")], totals=1)
+    assert made.rows == [
+        {"id": 0, "total": False, "c0": "a", "c1": "1"},
+        {"id": 1, "total": True, "c0": "sum", "c1": "1"},
+    ]
+    before = made.rows
+    elements.fill(made, [("a", "1"), ("sum", "1")], totals=1)
+    assert made.rows is before
 
 
 def lines(figure):
@@ -292,15 +305,15 @@ def test_what_is_left_for_a_line_meets_the_beacon_by_either_rule(draft):
 
 def test_the_tables_of_the_shipped_mission_say_what_its_beacon_covers(draft):
     found = pointing_view.view(draft.link())
-    totals = {row["rule"].partition(":")[0]: row for row in pointing_view.total_rows(found)}
-    assert totals["root sum square"]["value"] == "317 µrad"
-    assert totals["root sum square"]["beacon"].startswith("covered")
-    assert "means add linearly" in totals["root sum square"]["caveat"]
-    assert totals["ECSS, two axes"]["beacon"].endswith("short")
+    totals = {row[0].partition(":")[0]: row for row in pointing_view.total_rows(found)}
+    assert totals["root sum square"][1] == "317 µrad"
+    assert totals["root sum square"][2].startswith("covered")
+    assert "means add linearly" in totals["root sum square"][4]
+    assert totals["ECSS, two axes"][2].endswith("short")
     lines = pointing_view.line_rows(found)
-    assert [row["left_ecss"] for row in lines] == ["249 µrad", "nothing", "66.6 µrad", "nothing"]
+    assert [row[4] for row in lines] == ["249 µrad", "nothing", "66.6 µrad", "nothing"]
     assert "0.9822" in pointing_view.words(found)[0]
-    ahead = {row["what"]: row["value"] for row in pointing_view.ahead_rows(found)}
+    ahead = dict(pointing_view.ahead_rows(found))
     assert ahead["point-ahead angle, largest"] == "71 µrad"
 
 
@@ -310,7 +323,7 @@ def test_without_beacon_and_point_ahead_the_page_says_so(tmp_path):
     found = pointing_view.view(bare)
     assert pointing_view.words(found) == ["The mission has no beacon, so nothing is to be covered."]
     assert pointing_view.ahead_rows(found) == []
-    assert {row["beacon"] for row in pointing_view.total_rows(found)} == {"no beacon"}
+    assert {row[2] for row in pointing_view.total_rows(found)} == {"no beacon"}
     names = [line["name"] for line in lines(pointing_view.coverage_plot(found))]
     assert names[0] == "inside this angle"
     assert not any("beacon" in name for name in names)
@@ -321,7 +334,7 @@ def test_the_curve_of_coverage_is_the_budget_s(draft):
     found = pointing_view.view(draft.link())
     curve = pointing_view.coverage_plot(found)["data"][0]
     radius = np.array(curve["x"]) * 1e-6
-    assert np.allclose(np.array(curve["y"]) / 100.0, found.budget.coverage(radius), atol=1e-5)
+    assert np.allclose(np.array(curve["y"]) / 100.0, found.budget.coverage(radius), atol=1e-4)  # five digits
     assert curve["y"][0] == 0.0
     assert curve["y"][-1] > 99.0
 
@@ -369,13 +382,11 @@ def test_latencies_rise_to_what_arrives_and_pass_their_median(day):
 
 
 def test_the_tables_of_the_day_have_its_numbers(day):
-    ways = {row["what"]: row for row in day_view.way_rows(day)}
-    assert ways["contacts"]["relay"] == str(len(day.relay.contacts))
-    assert ways["contacts"]["direct"] == str(len(day.direct.contacts))
-    contacts = day_view.contact_rows(day)
-    assert len(contacts) == len(day.relay.contacts) + len(day.direct.contacts)
-    assert len(day_view.contact_headings()) == len(contacts[0]) - 1
-    assert len(day_view.swing_rows(day)) >= len(day.swings)
+    ways, contacts, swings = day_view.tables(day)
+    assert ways.rows[0] == ("contacts", str(len(day.relay.contacts)), str(len(day.direct.contacts)))
+    assert len(contacts.rows) == len(day.relay.contacts) + len(day.direct.contacts)
+    assert len(contacts.headings) == len(contacts.rows[0])
+    assert len(swings.rows) >= len(day.swings)
     assert day_view.words(day)[-1].startswith("Warning: communication.distance")
 
 

@@ -428,29 +428,6 @@ def test_an_answer_before_the_body_was_read_ends_the_connection():
     assert ask(guard(Inner(read=False))).headers.get(b"connection") is None
 
 
-def test_a_websocket_message_over_the_limit_ends_it():
-    inner = Inner()
-    small, large = text_message("a" * 1000), {"type": "websocket.receive", "bytes": b"a" * 1001}
-    reply = connect(guard(inner), [small, large, small])
-    assert reply.kinds == ["websocket.accept", "websocket.close"]
-    assert (reply.sent[1]["code"], inner.messages, inner.ends) == (1009, [small], [1009])
-    assert connect(guard(inner), [text_message("é" * 501)]).sent[-1]["code"] == 1009  # bytes, not characters
-
-
-def test_a_websocket_that_was_ended_hears_and_says_nothing_more():
-    heard = []
-
-    async def stubborn(scope, receive, send):
-        await receive()
-        await send({"type": "websocket.accept"})
-        heard.extend([(await receive())["type"], (await receive())["type"]])
-        await send({"type": "websocket.send", "text": "more"})
-
-    reply = connect(guard(stubborn), [text_message("a" * 1001), text_message("a")])
-    assert (reply.kinds, heard) == (["websocket.accept", "websocket.close"], ["websocket.disconnect"] * 2)
-    assert reply.pulled == 2  # the handshake and the message that was too large
-
-
 # ----------------------------------------------------------------------------------------------- what browsers are told
 def directives(reply):
     return dict(part.split(" ", 1) for part in reply.headers[b"content-security-policy"].decode().split("; "))
@@ -778,7 +755,16 @@ def test_a_message_that_announces_its_size_is_refused_before_it_is_sent(server):
     assert (1009).to_bytes(2, "big") in answer
 
 
-def test_messages_of_a_websocket_are_bounded_by_the_server(server):
+@pytest.mark.parametrize(
+    "large",
+    [
+        "a" * (address.MESSAGE_BYTES + 1),
+        "é" * (address.MESSAGE_BYTES // 2 + 1),
+        ["a" * (address.MESSAGE_BYTES // 2)] * 3,
+    ],
+    ids=["in one frame", "of two bytes a character", "in parts"],
+)
+def test_messages_of_a_websocket_are_bounded_by_the_server(server, large):
     from websockets.exceptions import ConnectionClosedError
     from websockets.sync.client import connect as open_socket
 
@@ -788,8 +774,8 @@ def test_messages_of_a_websocket_are_bounded_by_the_server(server):
     with open_socket(where, origin=f"http://127.0.0.1:{port}", additional_headers=cookie, compression=None) as link:
         link.send("a" * address.MESSAGE_BYTES)
         assert link.recv(60) == str(address.MESSAGE_BYTES)
-        link.send("a" * (address.MESSAGE_BYTES + 1))
         with pytest.raises(ConnectionClosedError) as ended:
+            link.send(large)
             link.recv(60)
     assert ended.value.rcvd.code == 1009
     assert process.poll() is None

@@ -285,17 +285,6 @@ def test_the_queue_goes_on_in_order_and_nothing_starts_twice(studio, tmp_path):
     assert [job.number for job in studio.listed()] == [4, 3, 2, 1]
 
 
-def test_two_may_run_at_once(tmp_path):
-    jobs = Jobs(tmp_path / "studio", at_once=2)
-    campaign_file(tmp_path, runs=4096, duration="1 s")
-    orders = [order(tmp_path, "campaign", "run", "campaign.toml", "--ledger", f"{n}.ledger") for n in range(3)]
-    found = [jobs.submit(each) for each in orders]
-    assert [job.state for job in found] == ["running", "running", "queued"]
-    for number in (3, 2, 1):
-        jobs.cancel(number)
-    assert {ended(job.folder).state for job in found} == {"cancelled"}
-
-
 def test_who_looks_at_the_list_starts_what_nobody_started(studio, tmp_path):
     written(studio.folder, arguments=["init", "late.toml"], cwd=str(tmp_path))
     assert jobs_files.read_job(studio.folder / "1").state == "queued"
@@ -457,11 +446,6 @@ def test_a_damaged_note_breaks_no_list(studio, tmp_path, name, text):
     (folder / name).write_text(text, "utf-8")
     (job,) = studio.listed()
     assert (job.state, job.code, job.progress) == ("failed", None if name == "exit.json" else 3, None)
-
-
-def test_no_jobs_at_once_is_refused(tmp_path):
-    with pytest.raises(JobError, match="0 jobs at once would never start one; give 1 or more"):
-        Jobs(tmp_path, at_once=0)
 
 
 def test_a_link_for_the_folder_is_refused(tmp_path):

@@ -31,7 +31,7 @@ def started(monkeypatch):
     """The folders that would be started."""
     found = []
 
-    def start(folder, at_once):
+    def start(folder):
         found.append(folder)
         jobs_files.note(folder / "started.json")
         jobs_files.note(folder / "exit.json", code=0)

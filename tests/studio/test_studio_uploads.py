@@ -448,7 +448,7 @@ def test_a_recording_is_read_checked_and_thinned(tmp_path, loop):
     seen = view(path, Columns((1,), ("output (urad)",)), ReadingLimits(points=400))
     assert (seen.sha256, seen.samples, seen.rate_hz) == (whole.sha256, N, whole.rate_hz)
     assert (seen.input_names, seen.output_names, seen.output_units) == (("drive (V)",), ("output (urad)",), ("urad",))
-    assert [f.message for f in seen.findings] == [f.message for f in whole.findings]
+    assert list(seen.findings) == [f.message for f in whole.findings]
     rows = np.array(seen.rows)
     assert 200 <= len(rows) <= 4 * 200 + 2
     assert np.all(np.diff(rows) > 0)

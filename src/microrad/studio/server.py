@@ -218,9 +218,8 @@ def way_in(studio: Path, url: str) -> str:
     """
     path = studio / _WAY_IN
     path.unlink(missing_ok=True)
-    handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
-    with os.fdopen(handle, "w", encoding="ascii") as file:
-        file.write(_PAGE.format(url=url))
+    with plain_files.new(path) as file:
+        file.write(_PAGE.format(url=url).encode("ascii"))
     return path.as_uri()
 
 

@@ -112,8 +112,7 @@ class Guard:
     async def _websocket(self, scope: Scope, receive: Receive, send: Send) -> None:
         answer = self._stranger(scope) or self._without_cookie(scope)
         if answer is None:
-            socket = _Socket(receive, send, self.limits.message_bytes)
-            await self.app(_inside(scope), socket.receive, socket.send)
+            await self.app(_inside(scope), receive, send)  # uvicorn bounds the messages
         elif "websocket.http.response" in (scope.get("extensions") or {}):
             await send_answer(answer, scope, send, "websocket.http.response")
         else:
@@ -247,31 +246,3 @@ class _Exchange:
             headers = policy.secured(list(message.get("headers", [])), self._rules)
             message = {**message, "headers": headers if self._whole else [*headers, CLOSE]}
         await self._send(message)
-
-
-class _Socket:
-    """Messages of a WebSocket on their way in: one that is too large ends it."""
-
-    def __init__(self, receive: Receive, send: Send, limit: int) -> None:
-        self._receive, self._send, self._limit = receive, send, limit
-        self._over = False
-
-    async def receive(self) -> Message:
-        """The next message, or the end."""
-        message: Message = {"type": "websocket.disconnect", "code": 1009} if self._over else await self._receive()
-        if message["type"] != "websocket.receive" or _size(message) <= self._limit:
-            return message
-        self._over = True
-        await self._send({"type": "websocket.close", "code": 1009, "reason": "The message is too large."})
-        return {"type": "websocket.disconnect", "code": 1009}
-
-    async def send(self, message: Message) -> None:
-        """Pass on a message unless the connection was ended here."""
-        if not self._over:
-            await self._send(message)
-
-
-def _size(message: Message) -> int:
-    """Bytes of a message; a character may have four."""
-    text, data = message.get("text") or "", message.get("bytes") or b""
-    return len(data) + (len(text.encode("utf-8", "replace")) if text else 0)

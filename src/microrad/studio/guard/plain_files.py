@@ -27,6 +27,12 @@ def opened(path: Path) -> BinaryIO:
     return file
 
 
+def new(path: Path) -> BinaryIO:
+    """A file to write to that was not there before, and that only its owner may read. Raises OSError."""
+    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
+    return os.fdopen(os.open(path, flags, 0o600), "wb")
+
+
 def content(path: Path, most: int = MOST_BYTES) -> bytes:
     """The bytes of a plain file. Raises OSError where there is none, a link included, and for more than `most`."""
     with opened(path) as file:

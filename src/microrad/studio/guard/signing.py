@@ -91,7 +91,7 @@ def _key() -> bytes | None:
 
 def _write_new(path: Path, content: bytes) -> None:
     """Write a file that is not there yet, for its owner alone; what cannot be written whole is taken back."""
-    with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
+    with plain_files.new(path) as file:
         try:
             file.write(content)
             file.flush()

@@ -46,28 +46,28 @@ _started: list[subprocess.Popen[bytes]] = []  # kept until they end: none is lef
 
 
 # ------------------------------------------------------------------------------------------------------------ the queue
-def start_waiting(jobs: Path, at_once: int) -> None:
-    """Start the oldest jobs that wait, while fewer than `at_once` run; whoever comes second finds them started."""
+def start_waiting(jobs: Path) -> None:
+    """Start the oldest job that waits, unless one runs; whoever comes second finds it started."""
     _started[:] = [each for each in _started if each.poll() is None]
-    if not _waiting(jobs, at_once):
+    if not _waiting(jobs):
         return
     with held(jobs / "lock", QUEUE_S) as mine:
-        while mine and (folder := _waiting(jobs, at_once)):
-            _start(folder, at_once)
+        while mine and (folder := _waiting(jobs)):
+            _start(folder)
 
 
-def _waiting(jobs: Path, at_once: int) -> Path | None:
+def _waiting(jobs: Path) -> Path | None:
     """The job that may start now, or None."""
     # at a glance: most of a long list have ended
     found = [(folder, read_job(folder).state) for folder in job_folders(jobs) if not (folder / EXIT).exists()]
-    if sum(state == "running" for _, state in found) >= at_once:
+    if any(state == "running" for _, state in found):
         return None
     return next((folder for folder, state in reversed(found) if state == "queued"), None)
 
 
-def _start(folder: Path, at_once: int) -> None:
+def _start(folder: Path) -> None:
     """Start the process of a job, and wait until it has taken the job up."""
-    command = [sys.executable, "-P", "-m", _OWN, str(folder.absolute()), str(at_once)]
+    command = [sys.executable, "-P", "-m", _OWN, str(folder.absolute())]
     with (folder / STDERR).open("ab") as errors:
         own = subprocess.Popen(
             command,
@@ -173,15 +173,15 @@ def _signal(command: subprocess.Popen[bytes], number: int) -> None:
 
 
 def main() -> None:
-    """Run the job of the folder that the first argument names, then go on with the queue; the second is its width."""
+    """Run the job of the folder that the first argument names, then go on with the queue."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: None)  # a handler, not SIG_IGN: the command shall not inherit deafness
     if hasattr(os, "nice"):
         os.nice(_NICENESS)
-    folder, at_once = Path(sys.argv[1]), int(sys.argv[2])
+    folder = Path(sys.argv[1])
     with suppress(OSError):  # of a full disk: this job is lost, the next may find room
         run_job(folder)
-    start_waiting(folder.parent, at_once)
+    start_waiting(folder.parent)
 
 
 if __name__ == "__main__":

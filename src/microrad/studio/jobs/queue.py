@@ -58,14 +58,11 @@ class Order:
 
 
 class Jobs:
-    """The jobs in the studio's working folder, `studio` / jobs; at most `at_once` run, the others wait in order."""
+    """The jobs in the studio's working folder, `studio` / jobs; one runs, the others wait in order."""
 
-    def __init__(self, studio: Path, at_once: int = 1) -> None:
+    def __init__(self, studio: Path) -> None:
         """Make the folders, for their owner alone; raises `JobError` where one is a link or cannot be made."""
-        if at_once < 1:
-            raise JobError(f"{at_once} jobs at once would never start one; give 1 or more")
         self.folder = (studio / "jobs").absolute()
-        self.at_once = at_once
         for folder in (studio, self.folder):
             _make_private(folder)
 
@@ -133,7 +130,7 @@ class Jobs:
     def _go_on(self) -> None:
         """Start what waits; a full disk or a lock that is none keeps it waiting, and nobody from looking."""
         with suppress(JobError, OSError):
-            start_waiting(self.folder, self.at_once)
+            start_waiting(self.folder)
 
     def get(self, number: int) -> Job:
         """The job of this number. Raises `JobError` where there is none."""

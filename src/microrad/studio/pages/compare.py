@@ -14,6 +14,7 @@ from microrad.studio import commands
 from microrad.studio.commands import Action
 from microrad.studio.draft.draft import Draft
 from microrad.studio.pages import layout
+from microrad.studio.pages.elements import text_table
 from microrad.studio.pages.in_thread import in_thread
 from microrad.studio.session import Session
 from microrad.studio.views import compare as compare_view
@@ -159,14 +160,12 @@ def _differences(here: Draft, there: Draft, names: tuple[str, str]) -> None:
     if not found:
         ui.label("Every key has the same value in both.").classes("soft")
         return
-    with ui.element("div").classes("compare-scroll"), layout.words("table").classes("compare-table"):
-        _head("Key", *names)
-        with ui.element("tbody"):
-            for each in found:
-                with ui.element("tr"):
-                    layout.words("th", each.key).props("scope=row")
-                    _cell(each.here, each.here_source)
-                    _cell(each.there, each.there_source)
+    with text_table("Key", *names):
+        for each in found:
+            with ui.element("tr"):
+                layout.words("th", each.key).props("scope=row")
+                _cell(each.here, each.here_source)
+                _cell(each.there, each.there_source)
 
 
 def _numbers(both: _Both, names: tuple[str, str]) -> None:
@@ -194,21 +193,13 @@ def _studies(both: _Both, names: tuple[str, str]) -> None:
 
 
 def _table(rows: tuple[Beside, ...], names: tuple[str, str]) -> None:
-    with ui.element("div").classes("compare-scroll"), layout.words("table").classes("compare-table"):
-        _head("Number", *names, "Change")
-        with ui.element("tbody"):
-            for row in rows:
-                with ui.element("tr"):
-                    layout.words("th", row.name).props("scope=row")
-                    _number(row.here)
-                    _number(row.there)
-                    layout.words("td", row.change).classes("number")
-
-
-def _head(*names: str) -> None:
-    with ui.element("thead"), ui.element("tr"):
-        for name in names:
-            layout.words("th", name).props("scope=col")
+    with text_table("Number", *names, "Change"):
+        for row in rows:
+            with ui.element("tr"):
+                layout.words("th", row.name).props("scope=row")
+                _number(row.here)
+                _number(row.there)
+                layout.words("td", row.change).classes("number")
 
 
 def _cell(typed: str, source: str) -> None:
@@ -224,6 +215,6 @@ def _number(number: Number | None) -> None:
             return
         layout.words("span", number.text)
         if number.met is not None:
-            mark, style = ("PASS", "PASS") if number.met else ("FAIL", "FAIL")
-            layout.words("span", f"  {mark}").classes(f"{style} compare-mark")
+            mark = "PASS" if number.met else "FAIL"
+            layout.words("span", f"  {mark}").classes(f"{mark} compare-mark")
             layout.words("div", f"required {number.required}").classes("small soft")

@@ -12,7 +12,7 @@ from microrad.mission.file import MissionFile
 from microrad.mission.tables.fine_pointing import FinePointing
 from microrad.studio import commands
 from microrad.studio.pages import layout
-from microrad.studio.pages.elements import Column, Figure, numbers, table
+from microrad.studio.pages.elements import Figure, fill, numbers, table
 from microrad.studio.pages.in_thread import in_thread, stay
 from microrad.studio.session import Session
 from microrad.studio.views import control as control_view
@@ -22,13 +22,13 @@ from microrad.studio.views.plots import empty
 TITLE = "Control"
 PATH = "/control"
 
-_COLUMNS = (
-    Column("name", "Controller"),
-    Column("residual", "Residual of an axis (rms, linear)", number=True),
-    Column("modulus", "Modulus margin", number=True),
-    Column("gain", "Gain margin", number=True),
-    Column("phase", "Phase margin", number=True),
-    Column("bandwidth", "Bandwidth", number=True),
+_TABLE = (
+    "Controller",
+    "Residual of an axis (rms, linear)",
+    "Modulus margin",
+    "Gain margin",
+    "Phase margin",
+    "Bandwidth",
 )
 _PLOTS = {
     "sensitivity": "Sensitivity by frequency",
@@ -57,7 +57,7 @@ class ControlPage:
         self.session = session
         self.file: MissionFile | None = None
         self.question, self.round, self.filling = 0, 0, False
-        self.rows: dict[str, dict[str, Any]] = {}
+        self.rows: dict[str, tuple[str, ...]] = {}
         self.plots: dict[str, Any] = {}
         layout.copy_buttons(lambda: commands.design(Path(session.name_of(session.draft.path))))
         self.words = ui.label().classes("no kept").props('role="alert"')
@@ -72,7 +72,7 @@ class ControlPage:
             self.tune = ui.button("Tune all", on_click=self.tune_all).props("no-caps dense outline")
             self.stop = ui.button("Stop", on_click=self.stop_all).props("no-caps dense flat")
             self.stop.visible = False
-        self.table = table(_COLUMNS, "name")
+        self.table = table(_TABLE, numbers=range(1, 6))
 
     def _one(self) -> None:
         layout.heading("One controller")
@@ -156,12 +156,12 @@ class ControlPage:
     async def _tuned(self, file: MissionFile, name: str) -> Controller | None:
         """A controller, and its row; None where it cannot be built, which its row says."""
 
-        def told(row: dict[str, Any]) -> None:
+        def told(row: tuple[str, ...]) -> None:
             if file is self.file:
-                self.rows[row["name"]] = row
+                self.rows[name] = row
                 self._table()
 
-        if not self.rows[name]["modulus"]:
+        if not self.rows[name][2]:
             told(control_view.waiting_row(name, "being tuned ..."))
         try:
             found = await in_thread(self.table, _controller, file, name)
@@ -172,7 +172,7 @@ class ControlPage:
         return found
 
     def _table(self) -> None:
-        self.table.rows = list(self.rows.values())
+        fill(self.table, list(self.rows.values()))
 
     # -------------------------------------------------------------------------------------------------------------- one
     async def show(self) -> None:

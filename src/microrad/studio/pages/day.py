@@ -10,7 +10,7 @@ from nicegui import ui
 from microrad.orbit.day import DayStudy
 from microrad.studio import commands
 from microrad.studio.pages import layout
-from microrad.studio.pages.elements import Column, Figure, columns, table
+from microrad.studio.pages.elements import Figure, put, table
 from microrad.studio.pages.in_thread import in_thread
 from microrad.studio.session import Session
 from microrad.studio.views import day as day_view
@@ -21,15 +21,6 @@ TITLE = "Day"
 PATH = "/day"
 
 _LOOK_S = 0.25
-_SWINGS = (
-    ("assumption", "Assumption"),
-    ("changed", "Changed to"),
-    ("relay", "Relay"),
-    ("direct", "Direct"),
-    ("ratio", "Ratio"),
-    ("slow_relay", "99 % by relay"),
-    ("slow_direct", "99 % direct"),
-)
 
 
 class Drawn(NamedTuple):
@@ -85,12 +76,11 @@ class DayPage:
         layout.heading("From recording to delivery")
         self.latency = Figure("Share of the data that has arrived within a time")
         layout.heading("Relay and direct downlink")
-        self.ways = table(())
+        self.ways = table()
         layout.heading("Contacts")
-        headings = [(f"c{k}", text) for k, text in enumerate(day_view.contact_headings())]
-        self.contacts = table([Column(name, text[:1].upper() + text[1:]) for name, text in headings])
+        self.contacts = table()
         layout.heading("One assumption changed")
-        self.swings = table([Column(*each) for each in _SWINGS])
+        self.swings = table()
 
     def reload(self) -> None:
         """Have the day of the draft computed, if it can be."""
@@ -131,10 +121,8 @@ class DayPage:
             element.show(made)
         self.map.props["src"], self.map.props["alt"] = drawn.map, "Map of the world: " + drawn.words
         self.map_words.text = drawn.words
-        names = [("what", ""), *zip(("relay", "direct"), (way.name for way in day_view.ways(day)), strict=False)]
-        self.ways.columns = columns([Column(*each) for each in names])
-        self.ways.rows, self.contacts.rows = day_view.way_rows(day), day_view.contact_rows(day)
-        self.swings.rows = day_view.swing_rows(day)
+        for shown, found in zip((self.ways, self.contacts, self.swings), day_view.tables(day), strict=True):
+            put(shown, found)
         self.results.visible = True
 
 

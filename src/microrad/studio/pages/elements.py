@@ -6,13 +6,14 @@ text NiceGUI builds the whole page anew, which takes longer than drawing.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from contextlib import suppress
-from typing import Any, NamedTuple
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from typing import Any
 
 from nicegui import ui
 from nicegui.element import Element
 
+from microrad.report.tables import Cell, Table
 from microrad.studio.pages import layout
 from microrad.studio.pages.in_thread import stay
 from microrad.studio.views.link import Margin
@@ -50,33 +51,56 @@ class MarginCards(Element, component="margin_cards.js"):
         self.run_method("show", [{"name": m.name, "value": m.words, "needs": m.needs, "met": m.met} for m in margins])
 
 
-class Column(NamedTuple):
-    """A column of a table: the key of its cells, its heading, and whether it holds numbers."""
-
-    name: str
-    label: str
-    number: bool = False
-
-
-def table(of: Sequence[Column], key: str = "id") -> ui.table:
-    """A table of text that is still empty; `key` tells its rows apart, and those with a true "total" stand out."""
-    made = ui.table(rows=[], columns=columns(of), row_key=key).props("flat dense wrap-cells hide-bottom")
+def table(headings: Sequence[str] = (), numbers: Collection[int] = ()) -> ui.table:
+    """A table of text that is still empty; the columns in `numbers` hold numbers, counted from 0."""
+    made = ui.table(rows=[], columns=_columns(headings, numbers), row_key="id").props(
+        "flat dense wrap-cells hide-bottom"
+    )
     made.props(""":pagination='{rowsPerPage: 0}' :table-row-class-fn="row => row.total ? 'total' : ''" """)
     return made.classes("wide-table")
 
 
-def columns(of: Sequence[Column]) -> list[dict[str, Any]]:
-    """Columns as the table takes them."""
+def fill(made: ui.table, rows: Sequence[Sequence[str | Cell]], totals: int = 0) -> None:
+    """Show these rows, of which the last `totals` stand out; nothing is sent where nothing changes."""
+    found = [
+        {"id": place, "total": place >= len(rows) - totals, **{f"c{k}": str(text) for k, text in enumerate(row)}}
+        for place, row in enumerate(rows)
+    ]
+    if found != made.rows:
+        made.rows = found
+
+
+def put(made: ui.table, of: Table) -> None:
+    """Show a table of the report."""
+    made.columns = _columns(of.headings, [k for k in range(len(of.headings)) if k not in of.words])
+    fill(made, of.rows, of.totals)
+
+
+def _columns(headings: Sequence[str], numbers: Collection[int] = ()) -> list[dict[str, Any]]:
+    """Columns as the table takes them, their headings on one line each."""
     return [
         {
-            "name": each.name,
-            "label": each.label,
-            "field": each.name,
-            "align": "right" if each.number else "left",
-            "classes": "text-no-wrap" if each.number else "",
+            "name": f"c{place}",
+            "label": heading[:1].upper() + heading[1:].replace("\n", " "),
+            "field": f"c{place}",
+            "align": "right" if place in numbers else "left",
+            "classes": "text-no-wrap" if place in numbers else "",
         }
-        for each in of
+        for place, heading in enumerate(headings)
     ]
+
+
+@contextmanager
+def text_table(*headings: str, caption: str = "") -> Iterator[None]:
+    """A table of elements, as wide as it must be, with its headings; the rows are filled in."""
+    with ui.element("div").classes("compare-scroll"), layout.words("table").classes("compare-table"):
+        if caption:
+            layout.words("caption", caption)
+        with ui.element("thead"), ui.element("tr"):
+            for heading in headings:
+                layout.words("th", heading).props("scope=col")
+        with ui.element("tbody"):
+            yield
 
 
 def numbers(pairs: Sequence[tuple[str, str]]) -> None:

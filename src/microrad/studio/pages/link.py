@@ -15,7 +15,7 @@ from microrad.mission.file import LinkFile
 from microrad.studio import commands
 from microrad.studio.draft.draft import Draft
 from microrad.studio.pages import layout
-from microrad.studio.pages.elements import Column, Figure, MarginCards, table
+from microrad.studio.pages.elements import Figure, MarginCards, fill, table
 from microrad.studio.pages.in_thread import in_thread
 from microrad.studio.pages.sliders import SliderPage
 from microrad.studio.session import Session
@@ -28,12 +28,6 @@ from microrad.studio.views.sliders import Slider
 TITLE = "Links"
 PATH = "/link"
 
-_COLUMNS = (
-    Column("line", "Line"),
-    Column("value", "Value", number=True),
-    Column("basis", "Basis"),
-    Column("source", "Source"),
-)
 _LOOK_S, _REST_S = 0.25, 0.8
 
 
@@ -64,7 +58,7 @@ class LinkPage(SliderPage[LinkView]):
         self.words = ui.label().props('role="status"')
         layout.heading("Budgets")
         self.which = ui.toggle([], on_change=self._show_table).props('no-caps dense aria-label="Budget shown"')
-        self.table = table(_COLUMNS)
+        self.table = table(("Line", "Value", "Basis", "Source"), numbers=(1,))
         ui.label("! marks a line with a warning: see the end of the next section.").classes("soft small")
         layout.heading("What follows")
         self.state = ui.label().classes("soft").props('role="status"')
@@ -103,9 +97,10 @@ class LinkPage(SliderPage[LinkView]):
     def _show_table(self) -> None:
         name = self.which.value
         budget = next((b for b in (self.view_now.budgets if self.view_now else ()) if b.name == name), None)
-        rows = self.slow.get(str(name), []) if budget is None else link_view.rows_of(budget)
-        if rows != self.table.rows:
-            self.table.rows = rows
+        if budget is None:
+            fill(self.table, self.slow.get(str(name), []))
+        else:
+            fill(self.table, link_view.budget_rows((*budget.lines, *budget.totals)), len(budget.totals))
 
     async def _look(self) -> None:
         """Have the study of the links made once a draft rests, and show it once it is there."""

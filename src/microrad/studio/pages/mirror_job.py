@@ -11,19 +11,13 @@ from microrad.lab.live_fit import LiveFit
 from microrad.studio.draft.tables import with_mirror_file
 from microrad.studio.jobs.queue import Job
 from microrad.studio.pages import layout
-from microrad.studio.pages.elements import Column, Figure, numbers, table
+from microrad.studio.pages.elements import Figure, fill, numbers, table
 from microrad.studio.pages.in_thread import in_thread
 from microrad.studio.session import Session
 from microrad.studio.views import mirror as mirror_view
 
 _LOOK_S = 0.5
 _BEST = -1
-_COLUMNS = (
-    Column("model", "Model"),
-    Column("held_out", "Held out (rms)", number=True),
-    Column("fit", "Fitted (rms)", number=True),
-    Column("note", "Note"),
-)
 
 
 class JobView:
@@ -60,7 +54,7 @@ class JobView:
                 self.loop = Figure("Measured loop and that of the model")
                 self.residual = Figure("Residual over time")
             ui.label("Residuals in per cent of the peak-to-peak output.").classes("soft small")
-            self.table = table(_COLUMNS)
+            self.table = table(("Model", "Held out (rms)", "Fitted (rms)", "Note"), numbers=(1, 2))
 
     # --------------------------------------------------------------------------------------------------------- the job
     async def follow(self, number: int) -> None:
@@ -107,7 +101,7 @@ class JobView:
         self.bar.visible = self.cancel.visible = not job.finished
         self.bar.value = 0.0 if job.progress is None else job.progress.share
         self.live.visible = bool(self.fits)
-        self.table.rows = mirror_view.score_rows(self.fits, self.chosen)
+        fill(self.table, mirror_view.score_rows(self.fits, self.chosen))
         models = {k: fit.model for k, fit in enumerate(self.fits)}
         self.model.set_options(
             {_BEST: "the chosen one" if self.chosen else "best so far", **models},

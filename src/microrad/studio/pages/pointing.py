@@ -10,7 +10,7 @@ from microrad.mission.file import LinkFile
 from microrad.studio import commands
 from microrad.studio.draft.draft import Draft
 from microrad.studio.pages import layout
-from microrad.studio.pages.elements import Column, Figure, table
+from microrad.studio.pages.elements import Figure, fill, table
 from microrad.studio.pages.in_thread import in_thread
 from microrad.studio.pages.sliders import SliderPage
 from microrad.studio.session import Session
@@ -22,21 +22,14 @@ TITLE = "Pointing"
 PATH = "/pointing"
 
 _LINES = (
-    Column("line", "Error"),
-    Column("value", "Half width", number=True),
-    Column("share", "Share of squares", number=True),
-    Column("left_rss", "Left for it, root sum square", number=True),
-    Column("left_ecss", "Left for it, ECSS two axes", number=True),
-    Column("basis", "How it counts, and where it is from"),
+    "Error",
+    "Half width",
+    "Share of squares",
+    "Left for it, root sum square",
+    "Left for it, ECSS two axes",
+    "How it counts, and where it is from",
 )
-_TOTALS = (
-    Column("rule", "Rule"),
-    Column("value", "Total", number=True),
-    Column("beacon", "Beacon's half angle"),
-    Column("formula", "Formula and authority"),
-    Column("caveat", "What speaks against it here"),
-)
-_AHEAD = (Column("what", "Point-ahead"), Column("value", "Value", number=True))
+_TOTALS = ("Rule", "Total", "Beacon's half angle", "Formula and authority", "What speaks against it here")
 
 
 def page(session: Session) -> None:
@@ -59,15 +52,15 @@ class PointingPage(SliderPage[PointingView]):
         self.coverage = Figure("Probability that the pointing error is below an angle; totals in the table below")
         layout.heading("Lines and totals")
         self.bars = Figure("Half widths of the lines and totals of the rules; in numbers in the tables below")
-        self.lines = table(_LINES)
+        self.lines = table(_LINES, numbers=range(1, 5))
         ui.label(
             "Left for it: the largest half width, all others as they are, with which the total equals the beacon's "
             "half angle."
         ).classes("soft")
         layout.heading("Root sum square against ECSS")
-        self.totals = table(_TOTALS)
+        self.totals = table(_TOTALS, numbers=(1,))
         layout.heading("Point-ahead")
-        self.ahead = table(_AHEAD).style("max-width: 36rem")
+        self.ahead = table(("Point-ahead", "Value"), numbers=(1,)).style("max-width: 36rem")
         self.no_ahead = ui.label("The mission has no table [point_ahead].").classes("soft")
         self.dimmed = (self.words, self.coverage, self.bars, self.lines, self.totals, self.ahead)
 
@@ -86,9 +79,9 @@ class PointingPage(SliderPage[PointingView]):
 
     def show_rest(self, view: PointingView) -> None:
         """The tables, and the sentences when they are there."""
-        self.lines.rows = pointing_view.line_rows(view)
-        self.totals.rows = pointing_view.total_rows(view)
-        self.ahead.rows = pointing_view.ahead_rows(view)
+        fill(self.lines, pointing_view.line_rows(view))
+        fill(self.totals, pointing_view.total_rows(view))
+        fill(self.ahead, pointing_view.ahead_rows(view))
         self.ahead.visible = bool(self.ahead.rows)
         self.no_ahead.visible = not self.ahead.rows
         background_tasks.create_lazy(self._say(view), name=f"pointing words {id(self)}")

@@ -14,7 +14,7 @@ from microrad.studio import commands
 from microrad.studio.jobs.ledgers import Live
 from microrad.studio.jobs.queue import Job, JobError, Order
 from microrad.studio.pages import layout
-from microrad.studio.pages.elements import Figure
+from microrad.studio.pages.elements import Figure, text_table
 from microrad.studio.pages.in_thread import in_thread
 from microrad.studio.session import Session
 from microrad.studio.views.campaign import Figures, Table, figures
@@ -191,17 +191,16 @@ class _Card:
         layout.attempt(lambda: self.session.jobs.remove(self.number))
 
     async def _go_on(self) -> None:
-        job = self._last
-        ledger = None if job is None else ledger_of(job)
-        if ledger is not None:
-            action = commands.resume(Path(ledger))
-            await submit(self.element, self.session, partial(order, self.session, "campaign", action))
+        await self._with_ledger(lambda ledger: order(self.session, "campaign", commands.resume(ledger)))
 
     async def _write_page(self) -> None:
-        job = self._last
-        ledger = None if job is None else ledger_of(job)
+        await self._with_ledger(partial(report_order, self.session))
+
+    async def _with_ledger(self, make: Callable[[Path], Order]) -> None:
+        """Queue what is made of the campaign's ledger."""
+        ledger = None if self._last is None else ledger_of(self._last)
         if ledger is not None:
-            await submit(self.element, self.session, partial(report_order, self.session, Path(ledger)))
+            await submit(self.element, self.session, partial(make, Path(ledger)))
 
 
 def _class(job: Job) -> str:
@@ -317,21 +316,12 @@ class _Table:
     def __init__(self, table: Table, place: ui.element) -> None:
         self.form = _form(table)
         self._cells: list[TextElement] = []
-        with (
-            place,
-            ui.element("div").classes("compare-scroll"),
-            layout.words("table").classes("compare-table runs-table"),
-        ):
-            layout.words("caption", table.title)
-            with ui.element("thead"), ui.element("tr"):
-                for heading in table.headings:
-                    layout.words("th", heading).props("scope=col")
-            with ui.element("tbody"):
-                for row in table.rows:
-                    with ui.element("tr"):
-                        for column, text in enumerate(row):
-                            tag, kind = ("th", "") if column == 0 else ("td", "text" if len(text) > _LONG else "number")
-                            self._cells.append(layout.words(tag, text).classes(kind))
+        with place, text_table(*table.headings, caption=table.title):
+            for row in table.rows:
+                with ui.element("tr"):
+                    for column, text in enumerate(row):
+                        tag, kind = ("th", "") if column == 0 else ("td", "text" if len(text) > _LONG else "number")
+                        self._cells.append(layout.words(tag, text).classes(kind))
 
     def set(self, table: Table) -> None:
         """Show the texts of another table of the same form."""

@@ -134,8 +134,6 @@ def view(path: Path, request: dict[str, Any]) -> dict[str, Any]:
         chosen["inputs"],
         chosen["outputs"],
         chosen["rate_hz"],
-        time=chosen["time"],
-        period_samples=chosen["period_samples"],
         accept=chosen["accept"],
     )
     rows = extremes([*r.drive.T, *r.output.T], request["limits"]["points"])
@@ -145,10 +143,7 @@ def view(path: Path, request: dict[str, Any]) -> dict[str, Any]:
         "rate_hz": r.rate_hz,
         **{key: [t[:_TEXT] for t in getattr(r, key)] for key in ("input_names", "output_names")},
         **{key: [t[:_TEXT] for t in getattr(r, key)] for key in ("input_units", "output_units")},
-        "findings": [
-            {"kind": f.kind, "channel": f.channel[:_TEXT], "row": f.row, "message": f.message, "refused": f.refused}
-            for f in r.findings[:_UNUSABLE]
-        ],
+        "findings": [f.message for f in r.findings[:_UNUSABLE]],
         "rows": rows.tolist(),
         "drive": [_digits(column[rows]) for column in r.drive.T],
         "output": [_digits(column[rows]) for column in r.output.T],

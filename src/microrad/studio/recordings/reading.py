@@ -57,8 +57,6 @@ class Columns:
     inputs: tuple[int | str, ...]
     outputs: tuple[int | str, ...]
     rate_hz: float | None = None
-    time: int | str | None = None
-    period_samples: int | None = None
     accept: tuple[str, ...] = ()
 
 
@@ -89,22 +87,12 @@ class Listing:
 
 
 @dataclass(frozen=True, slots=True)
-class Note:
-    """A finding of the checks that let the recording pass; see `recording.Finding`."""
-
-    kind: str
-    channel: str
-    row: int | None
-    message: str
-    refused: bool
-
-
-@dataclass(frozen=True, slots=True)
 class View:
     """A recording that passed the checks, thinned for drawing.
 
-    `rows` are the numbers of the samples shown, in order: in each stretch the extremes of every channel. `drive` and
-    `output` hold the values of each channel at these rows, to seven digits, in the units of the file.
+    `findings` are those that let it pass, in words. `rows` are the numbers of the samples shown, in order: in each
+    stretch the extremes of every channel. `drive` and `output` hold the values of each channel at these rows, to seven
+    digits, in the units of the file.
     """
 
     sha256: str
@@ -114,7 +102,7 @@ class View:
     output_names: tuple[str, ...]
     input_units: tuple[str, ...]
     output_units: tuple[str, ...]
-    findings: tuple[Note, ...]
+    findings: tuple[str, ...]
     rows: tuple[int, ...]
     drive: tuple[tuple[float, ...], ...]
     output: tuple[tuple[float, ...], ...]

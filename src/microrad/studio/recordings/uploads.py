@@ -84,7 +84,7 @@ class Uploads:
         try:
             place = self._reserve(name)
             try:
-                with _new_file(place / _PART) as file:
+                with plain_files.new(place / _PART) as file:
                     await self._fill(file, name, blocks)
                 (place / _PART).rename(place / name)
             except BaseException:  # the browser went away, too
@@ -206,12 +206,6 @@ def _time_ns(path: Path) -> int:
 def _forgotten(path: Path) -> bool:
     """Whether nothing was written there for an hour."""
     return _time_ns(path) < time.time_ns() - _FORGOTTEN_NS
-
-
-def _new_file(path: Path) -> BinaryIO:
-    """A file that was not there before and that only its owner may read."""
-    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
-    return os.fdopen(os.open(path, flags, 0o600), "wb")
 
 
 def _private(folder: Path) -> Path:

@@ -85,7 +85,8 @@ def differences(here: Draft, there: Draft) -> tuple[Difference, ...]:
             here_keys, there_keys = (_count(_keys_of(table, values)) for values in (ours, theirs))
             found[table] = Difference(f"[{table}]", here_keys, there_keys, "", "")
         elif a is None or b is None or _meant(a) != _meant(b):
-            found[key] = Difference(key, *_shown(a, b))
+            typed = ("" if each is None else each.typed for each in (a, b))
+            found[key] = Difference(key, *typed, *("" if each is None else each.source for each in (a, b)))
     return tuple(found.values())
 
 
@@ -95,15 +96,6 @@ def _keys_of(table: str, values: dict[str, Value]) -> int:
 
 def _count(keys: int) -> str:
     return f"{keys} key{'' if keys == 1 else 's'}" if keys else ""
-
-
-def _shown(a: Value | None, b: Value | None) -> tuple[str, str, str, str]:
-    return (
-        "" if a is None else a.typed,
-        "" if b is None else b.typed,
-        "" if a is None else a.source,
-        "" if b is None else b.source,
-    )
 
 
 def _meant(value: Value) -> object:

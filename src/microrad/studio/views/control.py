@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,6 +17,9 @@ from microrad.core.units import UnitError, format_quantity, parse_quantity
 from microrad.report.plotting.palette import BLACK, BLUE, GREEN, GREY, VERMILION
 from microrad.report.plotting.sheet import Axis, Line, Mark, Rule
 from microrad.studio.views.plots import Plot, empty, plot
+
+if TYPE_CHECKING:
+    from microrad.loop.control import LoopMargins
 
 PID, PID_INVERSE = "PID of [control]", "PID of [control] + inverse"
 WITH, WITHOUT = "with hysteresis", "without hysteresis"
@@ -78,7 +81,6 @@ class Answers:
 class Controller:
     """A controller, ready to be asked.
 
-    ``margins`` hold gain (a factor), phase (rad), delay (s), modulus, crossover, bandwidth (Hz) and the peak of |S|;
     ``values`` are what it was tuned to by name, each with its unit. ``loop_gain`` and ``sensitivity`` are magnitudes at
     ``freq_hz``, None where a slower sensor folds frequencies. ``limits_v`` are the amplifier's about the bias,
     ``identified_v`` the range that the mirror was identified in. ``rate_hz`` is that of the control,
@@ -87,7 +89,7 @@ class Controller:
     """
 
     name: str
-    margins: dict[str, float]
+    margins: LoopMargins
     values: dict[str, tuple[float, str]]
     residual_rad: float
     bound_by: tuple[str, ...]
@@ -145,13 +147,13 @@ def margin_rows(of: Controller) -> list[tuple[str, str]]:
     m = of.margins
     asked = "" if math.isnan(of.asked_modulus) else f" (asked for: {of.asked_modulus:g})"
     rows = [
-        ("Modulus margin, least |1 + L|", f"{m['modulus']:.3f}{asked}"),
-        ("Gain margin", _gain(m["gain"])),
-        ("Phase margin", "none" if math.isinf(m["phase"]) else f"{math.degrees(m['phase']):.1f}°"),
-        ("Delay margin", _told(m["delay"], "s")),
-        ("Crossover, |L| = 1", _told(m["crossover"], "Hz")),
-        ("Bandwidth, |S| = 1", _told(m["bandwidth"], "Hz")),
-        ("Largest |S|", f"{m['peak']:.3f} ({20 * math.log10(m['peak']):.2f} dB)"),
+        ("Modulus margin, least |1 + L|", f"{m.modulus:.3f}{asked}"),
+        ("Gain margin", _gain(m.gain_up)),
+        ("Phase margin", "none" if math.isinf(m.phase_rad) else f"{math.degrees(m.phase_rad):.1f}°"),
+        ("Delay margin", _told(m.delay_s, "s")),
+        ("Crossover, |L| = 1", _told(m.crossover_hz, "Hz")),
+        ("Bandwidth, |S| = 1", _told(m.bandwidth_hz, "Hz")),
+        ("Largest |S|", f"{m.peak:.3f} ({20 * math.log10(m.peak):.2f} dB)"),
     ]
     if math.isfinite(of.residual_rad):
         rows.append(("Residual of an axis, rms, linear", _told(of.residual_rad, "rad")))
@@ -187,22 +189,17 @@ def notes(of: Controller) -> tuple[str, ...]:
     return (*told, *of.warnings)
 
 
-def table_row(of: Controller) -> dict[str, Any]:
+def table_row(of: Controller) -> tuple[str, ...]:
     """The controller as a row of the table of all."""
     m = of.margins
-    return {
-        "name": of.name,
-        "residual": _told(of.residual_rad, "rad") if math.isfinite(of.residual_rad) else "not computed",
-        "modulus": f"{m['modulus']:.3f}",
-        "gain": _gain(m["gain"]),
-        "phase": f"{math.degrees(m['phase']):.1f}°" if math.isfinite(m["phase"]) else "none",
-        "bandwidth": _told(m["bandwidth"], "Hz"),
-    }
+    residual = _told(of.residual_rad, "rad") if math.isfinite(of.residual_rad) else "not computed"
+    phase = f"{math.degrees(m.phase_rad):.1f}°" if math.isfinite(m.phase_rad) else "none"
+    return (of.name, residual, f"{m.modulus:.3f}", _gain(m.gain_up), phase, _told(m.bandwidth_hz, "Hz"))
 
 
-def waiting_row(name: str, words: str = "not looked at yet") -> dict[str, Any]:
+def waiting_row(name: str, words: str = "not looked at yet") -> tuple[str, ...]:
     """A row of the table for a controller of which nothing is known."""
-    return {"name": name, "residual": words, "modulus": "", "gain": "", "phase": "", "bandwidth": ""}
+    return (name, words, "", "", "", "")
 
 
 def answer_words(curves: dict[str, Curve], what: str, field_of_view_rad: float = math.inf) -> str:
@@ -228,7 +225,7 @@ def sensitivity_plot(of: Controller) -> Plot:
     if math.isfinite(of.asked_modulus):
         name = f"1 / modulus margin asked for ({of.asked_modulus:g})"
         marks.append(Rule(1.0 / of.asked_modulus, False, BLACK, "--", 1.3, name))
-    return _by_frequency(of, of.sensitivity, "|S|, error over disturbance", "bandwidth", marks)
+    return _by_frequency(of, of.sensitivity, "|S|, error over disturbance", "bandwidth", of.margins.bandwidth_hz, marks)
 
 
 def gain_plot(of: Controller) -> Plot:
@@ -236,12 +233,12 @@ def gain_plot(of: Controller) -> Plot:
     if of.loop_gain is None:
         return empty("No response by frequency.")
     line = Line(of.freq_hz, of.loop_gain, BLUE, label="|L|")
-    return _by_frequency(of, of.loop_gain, "|L|, loop gain", "crossover", [line])
+    return _by_frequency(of, of.loop_gain, "|L|, loop gain", "crossover", of.margins.crossover_hz, [line])
 
 
-def _by_frequency(of: Controller, values: Floats, title: str, mark: str, marks: Sequence[Mark]) -> Plot:
+def _by_frequency(of: Controller, values: Floats, title: str, mark: str, at: float, marks: Sequence[Mark]) -> Plot:
     """Curves over the frequency, both axes logarithmic, with the frequency of a margin."""
-    low, high, at = max(float(np.min(values)), _LEAST), float(np.max(values)), of.margins[mark]
+    low, high = max(float(np.min(values)), _LEAST), float(np.max(values))
     shown: list[Mark] = [*marks, Rule(1.0, False, GREY, ":")]
     if math.isfinite(at) and at > 0.0:
         shown.append(Rule(at, True, GREEN, "-.", 1.3, f"{mark} {_told(at, 'Hz')}"))

@@ -85,7 +85,7 @@ def _fine(scene: controller_study.Scene, name: str) -> Controller:
     gain, sensitivity = _responses(scene.loop, built, freq)
     return Controller(
         name,
-        _numbers(tuned.margins),
+        tuned.margins,
         {key: (value, units.get(key, "")) for key, value in tuned.values.items()},
         tuned.residual_rms_rad,
         tuned.bound_by,
@@ -107,18 +107,6 @@ def mirror_warnings(has_linear_part: bool, text: str) -> tuple[str, ...]:
     own = [line.removeprefix(_WARNING) for line in text.splitlines() if line.startswith(_WARNING)]
     told = [] if has_linear_part else [_NO_LINEAR_PART]
     return (*told, *(f"Warning of the mirror's file: {warning}" for warning in own))
-
-
-def _numbers(of: control.LoopMargins) -> dict[str, float]:
-    return {
-        "gain": of.gain_up,
-        "phase": of.phase_rad,
-        "delay": of.delay_s,
-        "modulus": of.modulus,
-        "crossover": of.crossover_hz,
-        "bandwidth": of.bandwidth_hz,
-        "peak": of.peak,
-    }
 
 
 def _responses(loop: PointingLoop, of: LoopController, freq: Floats) -> tuple[Floats | None, Floats | None]:
@@ -185,25 +173,16 @@ def _pid(cases: paper_cases.PaperCases, name: str) -> Controller:
     found, period = simulate.margins(plants[WITH], setup), setup.timing.period_s
     freq = np.geomspace(0.5e-5 / period, 0.4995 / period, _POINTS)
     L = lti.frequency_response(simulate.sampled_loop(plants[WITH], setup), freq, period)[:, 0, 0]
-    sensitivity = np.abs(1.0 / (1.0 + L))
     return Controller(
         name,
-        {
-            "gain": found.gain_up,
-            "phase": found.phase_rad,
-            "delay": found.delay_s,
-            "modulus": found.modulus,
-            "crossover": found.crossover_hz,
-            "bandwidth": float(freq[int(np.argmax(sensitivity >= 1.0))]),
-            "peak": 1.0 / found.modulus,
-        },
+        found,
         {},
         math.nan,
         (),
         math.nan,
         freq,
         np.abs(L),
-        sensitivity,
+        np.abs(1.0 / (1.0 + L)),
         (setup.drive.minimum_v, setup.drive.maximum_v),
         cases.mirrors.drive_range_v,
         1.0 / period,

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import base64
-from typing import Any
 
 from microrad.core.progress import Progress
 from microrad.link import study as link_study
 from microrad.mission.file import LinkFile
 from microrad.orbit import day as day_study
-from microrad.orbit.day import DayStudy, Way
+from microrad.orbit.day import DayStudy
 from microrad.report.day import words as day_words
-from microrad.report.day.tables import CONTACT_COLUMNS, assumptions_table, contacts_table, ways_table
+from microrad.report.day.tables import assumptions_table, contacts_table, ways_table
 from microrad.report.plotting.figure import Figure
-
-Row = dict[str, Any]
+from microrad.report.tables import Table
 
 
 def compute_day(file: LinkFile, on_progress: Progress) -> DayStudy:
@@ -33,37 +31,10 @@ def missing(file: LinkFile) -> str:
     return f"The mission has no {' and no '.join(lacking)}, so it has no day; microrad init writes such tables."
 
 
-# ------------------------------------------------------------------------------------------------------------- tables
-def ways(day: DayStudy) -> tuple[Way, ...]:
-    """The ways down that the mission has."""
-    return (day.relay,) if day.direct is None else (day.relay, day.direct)
-
-
-def way_rows(day: DayStudy) -> list[Row]:
-    """Relay and direct downlink side by side."""
-    return [
-        {"id": place, "what": row[0], **dict(zip(("relay", "direct"), row[1:], strict=False))}
-        for place, row in enumerate(ways_table(day).rows)
-    ]
-
-
-def contact_headings() -> tuple[str, ...]:
-    """Headings of the contacts, on one line each."""
-    return tuple(heading.replace("\n", " ") for heading in CONTACT_COLUMNS)
-
-
-def contact_rows(day: DayStudy) -> list[Row]:
-    """Each contact by both ways, in the order of their rise; cells by the number of their column."""
-    rows = contacts_table(day).rows
-    return [{"id": place, **{f"c{k}": cell for k, cell in enumerate(row)}} for place, row in enumerate(rows)]
-
-
-def swing_rows(day: DayStudy) -> list[Row]:
-    """What each assumption changes, alone."""
-    names = ("assumption", "changed", "relay", "direct", "ratio", "slow_relay", "slow_direct")
-    return [
-        {"id": place, **dict(zip(names, row, strict=True))} for place, row in enumerate(assumptions_table(day).rows)
-    ]
+# -------------------------------------------------------------------------------------------------- tables and words
+def tables(day: DayStudy) -> tuple[Table, Table, Table]:
+    """Relay and direct downlink side by side, the contacts by both, and what each assumption changes alone."""
+    return ways_table(day), contacts_table(day), assumptions_table(day)
 
 
 def words(day: DayStudy) -> list[str]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -17,9 +16,9 @@ from microrad.link import study as link_study
 from microrad.link.pointing.outage import error_rad, required_error_rad
 from microrad.link.study import LinkStudy
 from microrad.mission.file import LinkFile
+from microrad.report.links import words
 from microrad.report.links.budgets import jitter_lines
 from microrad.report.links.figures import tornado
-from microrad.report.links.words import sentences
 from microrad.report.plotting.palette import VERMILION, WHITE
 from microrad.report.plotting.sheet import Axis, Field, Line
 from microrad.report.quantities import quantity, signed
@@ -27,7 +26,7 @@ from microrad.studio.draft.draft import Draft
 from microrad.studio.views.plots import Plot, empty, figure, plot
 from microrad.studio.views.sliders import Slider, slider
 
-Row = dict[str, Any]
+Row = tuple[str, ...]
 
 TABLES = {
     "terminals": "Telescopes",
@@ -210,24 +209,12 @@ def map_key(required: float) -> str:
     return f"Solid line: the required {required:g} dB.{none} Dot: the working point."
 
 
-def budget_rows(lines: Sequence[BudgetLine], totals: int = 0) -> list[Row]:
-    """Lines of a budget as rows of text; the last `totals` are sums."""
+def budget_rows(lines: Sequence[BudgetLine]) -> list[Row]:
+    """Lines of a budget as rows of text."""
     return [
-        {
-            "id": place,
-            "line": line.name + (" !" if line.warning else ""),
-            "value": quantity(line.value, line.unit),
-            "basis": line.basis,
-            "source": line.source,
-            "total": place >= len(lines) - totals,
-        }
-        for place, line in enumerate(lines)
+        (line.name + (" !" if line.warning else ""), quantity(line.value, line.unit), line.basis, line.source)
+        for line in lines
     ]
-
-
-def rows_of(budget: link.LinkBudget) -> list[Row]:
-    """A budget with its sums as rows of text."""
-    return budget_rows((*budget.lines, *budget.totals), len(budget.totals))
 
 
 def map_words(v: LinkView) -> str:
@@ -270,7 +257,7 @@ def tables(study: LinkStudy) -> dict[str, list[Row]]:
 
 def consequences(study: LinkStudy) -> list[str]:
     """What follows from the budgets, a sentence each, and the warnings."""
-    return [*sentences(study), *(f"Warning: {warning}" for warning in study.warnings)]
+    return [words.verdict(study), *words.consequences(study), *(f"Warning: {warning}" for warning in study.warnings)]
 
 
 def tornado_plot(study: LinkStudy) -> Plot:

@@ -103,19 +103,12 @@ def nothing() -> Plot:
 
 
 # ---------------------------------------------------------------------------------------------------------- the scores
-def score_rows(fits: Sequence[LiveFit], chosen: str = "") -> list[dict[str, Any]]:
-    """A row for each model, the best on the held-out samples first; the one that leads or was chosen is marked."""
+def score_rows(fits: Sequence[LiveFit], chosen: str = "") -> list[tuple[str, ...]]:
+    """Model, rms held out and fitted, and a note that marks the one that leads or was chosen; the best comes first."""
     first, mark = leader(tuple(fits), chosen), "chosen" if chosen else "best so far"
-    ranked = sorted(enumerate(fits), key=lambda pair: pair[1].held_out_rms_percent)
     return [
-        {
-            "id": k,
-            "model": fit.model,
-            "fit": f"{fit.fit_rms_percent:.3g} %",
-            "held_out": f"{fit.held_out_rms_percent:.3g} %",
-            "note": mark if fit is first else "",
-        }
-        for k, fit in ranked
+        (fit.model, f"{fit.held_out_rms_percent:.3g} %", f"{fit.fit_rms_percent:.3g} %", mark if fit is first else "")
+        for fit in sorted(fits, key=lambda fit: fit.held_out_rms_percent)
     ]
 
 
@@ -170,7 +163,7 @@ def about(view: View) -> str:
 
 def findings(view: View) -> list[str]:
     """What the checks of a recording have found, a sentence each."""
-    return [f"{note.message[:1].upper()}{note.message[1:].rstrip('.')}." for note in view.findings]
+    return [f"{each[:1].upper()}{each[1:].rstrip('.')}." for each in view.findings]
 
 
 def state_words(job: Job, first: LiveFit | None) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -22,7 +21,7 @@ from microrad.studio.draft.draft import Draft
 from microrad.studio.views.plots import Plot, plot, rows
 from microrad.studio.views.sliders import Slider, slider
 
-Row = dict[str, Any]
+Row = tuple[str, ...]
 
 POINTS = 241
 """Of the curve of coverage."""
@@ -87,41 +86,33 @@ def _named(made: Slider, key: str) -> Slider:
 
 # ------------------------------------------------------------------------------------------------------------- tables
 def line_rows(v: PointingView) -> list[Row]:
-    """Each error with its share of the squares and what is left for it."""
-    rows = []
-    for place, line in enumerate(v.budget.lines):
-        left = (
-            ["nothing" if each.note else quantity(each.largest_rad, "rad") for each in v.left[place]]
-            if v.left
-            else ["", ""]
+    """Each error with its half width, its share of the squares, what is left for it by both rules, and its origin."""
+    left = [["nothing" if a.note else quantity(a.largest_rad, "rad") for a in both] for both in v.left]
+    shared = zip(v.budget.lines, v.budget.variance_shares, left or [["", ""]] * len(v.budget.lines), strict=True)
+    return [
+        (
+            each.name,
+            quantity(each.value, each.unit),
+            f"{100.0 * share:.1f} %",
+            *both,
+            f"{each.basis}. From {each.source}",
         )
-        rows.append(
-            {
-                "id": place,
-                "line": line.name,
-                "value": quantity(line.value, line.unit),
-                "share": f"{100.0 * v.budget.variance_shares[place]:.1f} %",
-                "left_rss": left[0],
-                "left_ecss": left[1],
-                "basis": f"{line.basis}. From {line.source}",
-            }
-        )
-    return rows
+        for each, share, both in shared
+    ]
 
 
 def total_rows(v: PointingView) -> list[Row]:
-    """The total by each rule, beside the beacon's half angle."""
+    """The total by each rule, beside the beacon's half angle; formula, authority, and what speaks against it."""
     of = {"stated": "as stated", "axis": "one axis", "radial": "off the line of sight"}
     return [
-        {
-            "id": place,
-            "rule": f"{each.name}: {of[each.of]}",
-            "value": quantity(each.total_rad, "rad"),
-            "beacon": _against(v, each.total_rad),
-            "formula": f"{each.formula}; {each.authority}",
-            "caveat": each.caveat,
-        }
-        for place, each in enumerate(v.budget.summations)
+        (
+            f"{each.name}: {of[each.of]}",
+            quantity(each.total_rad, "rad"),
+            _against(v, each.total_rad),
+            f"{each.formula}; {each.authority}",
+            each.caveat,
+        )
+        for each in v.budget.summations
     ]
 
 
@@ -140,18 +131,17 @@ def ahead_rows(v: PointingView) -> list[Row]:
         return []
     left_out = "left out, it would cost" if a.corrected else "not corrected, it costs"
     most = f"more than {DEEPEST_DB:g} dB" if not a.loss_db <= DEEPEST_DB else f"{a.loss_db:.2f} dB"
-    cells = (
+    return [
         ("point-ahead angle, largest", quantity(a.angle_rad, "rad")),
         ("in half angles of the communication beam", f"{a.beam_half_angles:.2f}"),
         (left_out, most),
         ("range of a mirror that makes it, at the line of sight", quantity(a.mirror_range_rad, "rad")),
-    )
-    return [{"id": place, "what": what, "value": value} for place, (what, value) in enumerate(cells)]
+    ]
 
 
 def words(v: PointingView) -> list[str]:
     """What the beacon covers, in sentences; that there is none, where there is none."""
-    from microrad.report.links.page import coverage
+    from microrad.report.links.views import coverage
 
     return coverage(v.budget) or ["The mission has no beacon, so nothing is to be covered."]
 
