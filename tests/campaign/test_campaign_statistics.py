@@ -77,6 +77,16 @@ def test_picture_has_all_rows_where_they_are(kind: str) -> None:
     assert one.tolist() == [9.0]
 
 
+@pytest.mark.parametrize("value", [3.3, -2e-6, 1e300])
+def test_picture_of_values_a_step_of_rounding_apart_has_them_all(value: float) -> None:
+    values = np.array([value, np.nextafter(value, math.inf), value])
+    edges, counts = histogram(values, np.array([1.0, 2.0, 4.0]))
+    assert (edges.size, counts.size) == (41, 40)
+    assert (edges[0], edges[-1]) == (values.min(), values.max()) and edges[0] < edges[-1]
+    assert np.all(np.diff(edges) >= 0.0)
+    assert counts.sum() == 7.0
+
+
 # -------------------------------------------------------------------------------------------------------------- moments
 def test_moments_are_those_of_numpy_even_far_from_zero() -> None:
     values = 1e9 + philox(7).normal(size=1000)

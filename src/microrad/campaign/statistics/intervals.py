@@ -259,8 +259,9 @@ def histogram(values: Floats, weights: Floats, count: int = PICTURE_BINS) -> tup
     values, weights = values[finite], weights[finite]
     if not values.size:
         return np.empty(0), np.empty(0)
-    if np.ptp(values) == 0.0:
-        half = max(abs(float(values[0])), 1e-30) * 1e-3
-        return np.array([values[0] - half, values[0] + half]), np.array([float(np.sum(weights))])
-    counts, edges = np.histogram(values, count, weights=weights)
-    return edges, counts
+    least, most = float(values.min()), float(values.max())
+    if least == most:
+        half = max(abs(least), 1e-30) * 1e-3
+        return np.array([least - half, least + half]), np.array([float(np.sum(weights))])
+    edges = np.linspace(least, most, count + 1)  # np.histogram refuses values a few steps of rounding apart
+    return edges, np.bincount(np.searchsorted(edges[1:-1], values, side="right"), weights, count)
