@@ -667,6 +667,17 @@ def test_a_ledger_is_no_campaign_file_and_the_other_way_round(tmp_path):
         file.refuse_foreign(tmp_path / "table.csv")
 
 
+def test_a_campaign_file_whose_path_is_longer_than_sqlite_takes_is_read(tmp_path):
+    folder = tmp_path
+    while len(str(folder)) < 600:
+        folder /= "f" * 100
+    folder.mkdir(parents=True)
+    path = written(folder, HEAD + POWER)
+    assert load_campaign(path).rows == 256
+    with pytest.raises(CampaignError, match="cannot read whether it is a ledger"):
+        file.refuse_foreign(path)
+
+
 def test_more_runs_than_noise_streams_have_numbers_for(tmp_path):
     text = HEAD.replace("runs = 256", "runs = 4294967296")
     assert loaded(tmp_path, text + POWER).rows == 2**32

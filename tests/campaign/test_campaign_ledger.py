@@ -5,6 +5,7 @@ import hashlib
 import json
 import os
 import random
+import re
 import sqlite3
 import struct
 import subprocess
@@ -17,7 +18,7 @@ import pytest
 
 from microrad.campaign.ledger import Ledger, check_same, chunk_format, mend, verify
 from microrad.campaign.ledger.chunk_format import Column, Head
-from microrad.campaign.ledger.file import FORMAT, is_written
+from microrad.campaign.ledger.file import FORMAT, is_written, refuse_existing
 from microrad.campaign.records import CampaignError, Chunk, Failed, WorstTrace
 from places import TESTS
 from waiting import any_moment
@@ -281,19 +282,55 @@ def test_a_ledger_is_never_begun_over_a_file_nor_opened_where_none_is(path, tmp_
     assert list(tmp_path.iterdir()) == [path]
 
 
+ANEW = "name the file that `microrad campaign run` wrote, or, if it is this one, begin the campaign anew in another"
+
+
 @pytest.mark.parametrize("write", [True, False])
 def test_files_that_are_no_ledger_are_refused(path, write):
     path.write_text("my notes, which are long enough for SQLite to look at\n" * 100)
     assert "is no ledger, or its first page is damaged" in said(Ledger.open, path, write=write)
     path.write_bytes(bytes([0xA5]) * 5000)
-    assert "is no ledger, or its first page is damaged" in said(Ledger.open, path, write=write)
+    message = said(Ledger.open, path, write=write)
+    assert "is no ledger, or its first page is damaged" in message and message.endswith(ANEW)
     path.unlink()
     with contextlib.closing(sqlite3.connect(path)) as other, other:
         other.execute("CREATE TABLE birds(name)")
-    assert "no ledger of microrad" in said(Ledger.open, path, write=write)
+    message = said(Ledger.open, path, write=write)
+    assert "no ledger of microrad, or its first page is damaged" in message and message.endswith(ANEW)
     before = path.read_bytes()
     assert "no ledger of microrad" in said(verify, path) and "no ledger of microrad" in said(mend, path)
     assert path.read_bytes() == before
+
+
+UNREADABLE = r"microrad cannot read whether it is a ledger \(.+\): make file and folder readable, or name a file elsewhere"
+
+
+def test_a_file_that_sqlite_cannot_open_is_refused_in_words(tmp_path):
+    folder = tmp_path
+    while len(str(folder)) < 600:  # longer than SQLite takes, and not too long for the system
+        folder /= "f" * 100
+    folder.mkdir(parents=True)
+    path = folder / "c.ledger"
+    refuse_existing(path)
+    path.write_bytes(b"something")
+    for call in (refuse_existing, verify, lambda of: Ledger.open(of, write=False), lambda of: Ledger.create(of, HEAD)):
+        message = said(call, path)
+        assert message.startswith(str(path)) and re.search(UNREADABLE, message)
+    assert path.read_bytes() == b"something" and list(folder.iterdir()) == [path]
+
+
+def test_a_file_that_may_not_be_read_is_refused_in_words(path, tmp_path):
+    payloads = filled(path, 1)
+    for forbidden in (path, tmp_path):
+        mode = forbidden.stat().st_mode
+        forbidden.chmod(0)
+        try:
+            if os.access(path, os.R_OK):
+                pytest.skip("the superuser may read all")
+            assert re.search(UNREADABLE, said(refuse_existing, path)) and re.search(UNREADABLE, said(verify, path))
+        finally:
+            forbidden.chmod(mode)
+    assert verify(path, payloads).checked == 2
 
 
 def test_another_format_of_the_ledger_is_refused(path):

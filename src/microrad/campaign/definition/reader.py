@@ -1,6 +1,7 @@
 """Reads a campaign file against the mission that it draws from, and reports every fault at once."""
 
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from microrad.campaign.definition.records import CampaignFile, Cell, Draw, Varia
 from microrad.campaign.definition.tables import CampaignTable, VariableTable
 from microrad.campaign.definition.values import FILE_WORD, ValueReader, text_of
 from microrad.campaign.ledger import argument, is_ledger
-from microrad.campaign.records import Limit
+from microrad.campaign.records import CampaignError, Limit
 from microrad.mission.file import MissionFile, check_table, named_files, open_mission
 from microrad.mission.tables.link import LinkRequirement
 from microrad.mission.toml import Document, Fault, MissionError, UnreadableError, clipped
@@ -29,7 +30,7 @@ def read_definition(path: Path) -> tuple[CampaignFile, Document]:
     Raises `MissionError` with every fault of the campaign file, of the mission under its [set] and in the cells of its
     grid.
     """
-    if is_ledger(path):
+    if _is_ledger(path):
         name = argument(path)
         expected = f"`microrad campaign resume {name}` goes on with it, `microrad campaign status {name}` looks at it"
         fault = Fault("", "", 0, f"is a ledger, not a {FILE_WORD}", expected, file=clipped(str(path)))
@@ -44,6 +45,13 @@ def read_definition(path: Path) -> tuple[CampaignFile, Document]:
     if campaign is None or document.faults:
         raise MissionError(path, document.faults)
     return campaign, document
+
+
+def _is_ledger(path: Path) -> bool:
+    """Whether this is a ledger; of a file that cannot be read, what is wrong is said where it is read as a text."""
+    with suppress(CampaignError):
+        return is_ledger(path)
+    return False
 
 
 def block_rows(runs: int) -> int:

@@ -22,6 +22,7 @@ _APPLICATION = 0x6D726164  # "mrad": SQLite's application_id, so that another pr
 HEADS = ("head", "head_again")  # two tables, so that no page has both
 _GLANCE_S = 0.5  # longer than `is_written` holds the lock
 PATIENCE_S = 30.0  # how long another program may hold the file, such as a copy being made
+_OTHER = "name the file that `microrad campaign run` wrote, or, if it is this one, begin the campaign anew in another"
 _TABLES = """
 CREATE TABLE head(payload BLOB NOT NULL);
 CREATE TABLE head_again(payload BLOB NOT NULL);
@@ -98,33 +99,37 @@ def refuse_existing(path: Path) -> None:
 
 
 def is_ledger(path: Path) -> bool:
-    """Whether a file is one of SQLite's.
+    """Whether a file is one of SQLite's. Raises `CampaignError` where that cannot be read.
 
     Only SQLite opens it: to close it otherwise would drop the locks that other connections of this process hold on it
     (SQLite, How To Corrupt, 2.2).
     """
-    if not path.is_file() or not path.stat().st_size:
-        return False
-    with closing(sqlite3.connect(f"{path.absolute().as_uri()}?immutable=1", uri=True)) as probe:
-        try:
+    try:
+        if not path.is_file() or not path.stat().st_size:
+            return False
+        with closing(sqlite3.connect(f"{path.absolute().as_uri()}?immutable=1", uri=True)) as probe:
             probe.execute("PRAGMA application_id")
-        except sqlite3.Error as error:
+        return True
+    except (OSError, sqlite3.Error) as error:
+        if code_of(error) in (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB):
             return code_of(error) == sqlite3.SQLITE_CORRUPT
-    return True
+        raise CampaignError(
+            f"{path}: microrad cannot read whether it is a ledger ({getattr(error, 'strerror', None) or error}): make "
+            "file and folder readable, or name a file elsewhere, its path shorter than 500 bytes"
+        ) from error
 
 
 def refuse_foreign(path: Path) -> None:
     """Raises `CampaignError` if this is no file of SQLite's."""
+    if is_ledger(path):
+        return
     if path.is_dir():
         raise CampaignError(f"{path} is a folder, not a ledger: name the file that `microrad campaign run` wrote")
     if not path.is_file():
         raise CampaignError(f"there is no ledger {path}: begin the campaign with `microrad campaign run`")
-    if not is_ledger(path):
-        begin = f"begin it with `microrad campaign run {argument(path)}`, or " if path.suffix == ".toml" else ""
-        raise CampaignError(
-            f"{path} is no ledger, or its first page is damaged: {begin}name the file that `microrad campaign run` "
-            "wrote"
-        )
+    begin = f"begin it with `microrad campaign run {argument(path)}`, or name the file that this wrote"
+    remedy = begin if path.suffix == ".toml" else _OTHER
+    raise CampaignError(f"{path} is no ledger, or its first page is damaged: {remedy}")
 
 
 def connected(path: Path, *, write: bool) -> sqlite3.Connection:
@@ -160,8 +165,7 @@ def _check_format(path: Path, connection: sqlite3.Connection) -> None:
     )
     if application != _APPLICATION:
         raise CampaignError(
-            f"{path} is an SQLite file, but no ledger of microrad, or its first page is damaged: name the file that "
-            "`microrad campaign run` wrote"
+            f"{path} is an SQLite file, but no ledger of microrad, or its first page is damaged: {_OTHER}"
         )
     if version != FORMAT:
         raise CampaignError(
