@@ -486,3 +486,11 @@ def test_a_job_goes_on_when_the_studio_ends(file):
 def test_every_page_is_there():
     pages = Path(server.__file__).parent / "pages"
     assert [name for name in server.PAGES if not (pages / f"{name}.py").is_file()] == []
+
+
+@pytest.mark.parametrize("loads", [(), ("microrad.study.pointing_penalty",)], ids=["budgets", "with the study"])
+def test_a_budget_as_text_loads_no_compiled_loops(loads):
+    names = ", ".join(("sys", "microrad.report.links.budgets", *loads))
+    code = f"import {names}; print('numba' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == str(bool(loads))

@@ -1,7 +1,10 @@
 """The links as views: pointing, budgets, light, what pointing costs, acquisition."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from microrad.core.budget import Line
 from microrad.core.units import format_quantity
@@ -10,13 +13,14 @@ from microrad.link.acquisition.partner_search import LONGEST_LOOK_S, Finding, Fo
 from microrad.link.pointing import OpenLoopPointing
 from microrad.link.pointing.outage import Performance, stated_outage
 from microrad.link.study import LinkStudy
-from microrad.mirror import Variant
 from microrad.report.links import words
 from microrad.report.plotting.figure import Figure
 from microrad.report.quantities import given_angle, minus, quantity
 from microrad.report.tables import Cell, Table
 from microrad.report.view import Block, Points, Soft, View, told
-from microrad.study.pointing_penalty import FINE, Cost, LinkPerformance
+
+if TYPE_CHECKING:
+    from microrad.study.pointing_penalty import Cost, LinkPerformance
 
 EARLY = 0.9
 """Share of the acquisitions that end in lock by the time that the table states."""
@@ -202,7 +206,7 @@ def performance_table(cases: Sequence[Performance], costs: Sequence[Cost], outag
     rows = [
         [c.source, c.controller, c.mirror, *cells(c), *of.get((c.source, c.controller, c.mirror), none)] for c in cases
     ]
-    marked = [k for k, c in enumerate(cases) if best and c.controller == best and c.mirror == Variant.GIVEN]
+    marked = _as_given(cases, best) if best else []
     at = f"{100 * outage:g} %"
     headings = (
         "pointing error from",
@@ -229,6 +233,13 @@ def performance_table(cases: Sequence[Performance], costs: Sequence[Cost], outag
         brief=(0, 1, 2, 3, 5, 7, 8),
         folded=f"The link under each of {len(cases)} pointing errors" if len(cases) > 3 else "",
     )
+
+
+def _as_given(cases: Sequence[Performance], controller: str) -> list[int]:
+    """The rows of a controller with the mirror as it is given."""
+    from microrad.mirror import Variant
+
+    return [k for k, c in enumerate(cases) if c.controller == controller and c.mirror == Variant.GIVEN]
 
 
 def cells(c: Performance) -> list[str]:
@@ -268,6 +279,8 @@ def performance_note(*, costs: bool) -> str:
 
 def residuals_sentence(found: LinkPerformance) -> str:
     """How the residuals enter the link."""
+    from microrad.study.pointing_penalty import FINE
+
     half = format_quantity(found.half_angle_rad, "rad", 3)
     fine = any(c.source == FINE for c in found.cases)
     first, then = (" first", ", then the loop under vibration and noise") if fine else ("", "")
