@@ -27,6 +27,7 @@ from microrad.report.links.views import (
     acquisition_paragraphs,
     acquisition_view,
     fade_sentences,
+    paired_tables,
     performance_note,
     performance_table,
     pointing_view,
@@ -302,6 +303,63 @@ def test_no_sentence_is_said_twice_on_the_page(plain):
     assert len(links_words.consequences(plain)) == 8
     for sentence in (links_words.verdict(plain), *links_words.consequences(plain), *links.coverage(plain.open_loop)):
         assert page.count(escape(sentence, quote=True).replace("&#x27;", "&#39;").replace("&quot;", "&#34;")) == 1
+
+
+# ------------------------------------------------------------------------------------------------------ paired budgets
+NAMES = ("as budgeted", "simulated")
+
+
+def changed_line(budget, at, **values):
+    """The budget with one of its lines replaced."""
+    lines = list(budget.lines)
+    lines[at] = replace(lines[at], **values)
+    return replace(budget, lines=tuple(lines))
+
+
+def test_a_total_that_one_of_two_budgets_lacks_is_an_empty_cell(plain):
+    own = next(b for b in plain.budgets if b.name == "Communication")
+    other = replace(own, totals=own.totals[:3], margin_db=-1.234)
+    assert [line.name for line in own.totals] == ["Received power", "Required power", "Margin", "Static margin"]
+    for pair, empty in (((own, other), 2), ((other, own), 1)):
+        (table,) = paired_tables(*pair, NAMES)
+        last = table.rows[-1]
+        assert (last[0], last[empty], last[3 - empty]) == ("Static margin", "", quantity(own.totals[-1].value, "dB"))
+        assert table.totals == 4
+        assert len(table.rows) == len(own.lines) + 4
+        assert "" not in [cell for row in table.rows[:-1] for cell in row[1:3]]
+        margins = (quantity(own.margin_db, "dB"), quantity(-1.234, "dB"))
+        one, two = margins if empty == 2 else margins[::-1]
+        assert table.folded == f"Communication: margin {one} as budgeted, {two} simulated"
+    (equal,) = paired_tables(other, other, NAMES)
+    assert equal.totals == 3
+
+
+def test_what_two_budgets_say_of_a_line_stands_there_where_it_differs(plain):
+    own = next(b for b in plain.budgets if b.name == "Communication")
+    at = next(k for k, line in enumerate(own.lines) if k and not line.warning)
+    was = own.lines[at]
+    other = changed_line(own, at, basis="other basis", source="other source", regime="other regime", warning="too far")
+    (table,) = paired_tables(own, other, NAMES)
+    assert [tuple(map(str, row[3:])) for row in table.rows[:at]] == [
+        (line.basis, line.source, line.regime) for line in own.lines[:at]
+    ]
+    name, *_, basis, source, regime = table.rows[at]
+    assert (basis, source) == (f"{was.basis}\nsimulated: other basis", f"{was.source}\nsimulated: other source")
+    assert regime == f"{was.regime}\nsimulated: other regime"
+    assert (name.text, name.mark, name.hint) == (was.name, "!", "simulated: too far")
+    (back,) = paired_tables(other, own, NAMES)
+    assert back.rows[at][0].hint == "as budgeted: too far"
+    (both,) = paired_tables(other, changed_line(other, at, warning="farther"), NAMES)
+    assert both.rows[at][0].hint == "as budgeted: too far; simulated: farther"
+    (same,) = paired_tables(other, other, NAMES)
+    assert same.rows[at][0].hint == "too far"
+
+
+def test_two_budgets_of_other_lines_are_two_tables(plain):
+    own = next(b for b in plain.budgets if b.name == "Communication")
+    tables = paired_tables(own, replace(own, lines=own.lines[1:]), NAMES)
+    assert [table.title for table in tables] == ["Communication, as budgeted", "Communication, simulated"]
+    assert [len(table.rows) for table in tables] == [len(own.lines) + 4, len(own.lines) + 3]
 
 
 # --------------------------------------------------------------------------------------------------------- acquisition

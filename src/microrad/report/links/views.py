@@ -134,20 +134,39 @@ def budget_table(budget: LinkBudget) -> Table:
 def paired_tables(budget: LinkBudget, other: LinkBudget, headings: tuple[str, str]) -> tuple[Table, ...]:
     """Two budgets of one link as one table, or as two where they do not have the same lines.
 
-    Where the bases of a line differ, that of the other stands below.
+    Where basis, source or regime of a line differ, that of the other stands below. A total that one of them does not
+    have is an empty cell.
     """
-    pairs = list(zip((*budget.lines, *budget.totals), (*other.lines, *other.totals), strict=False))
-    if len(budget.lines) != len(other.lines) or any(one.name != two.name for one, two in pairs):
+    if [line.name for line in budget.lines] != [line.name for line in other.lines]:
         named = zip((budget, other), headings, strict=True)
         return tuple(lines_table(f"{b.name}, {heading}", b.lines, b.totals) for b, heading in named)
-    rows = []
-    for one, two in pairs:
-        name, value, basis, *rest = _row(one)
-        below = "" if one.basis == two.basis else f"\n{headings[1]}: {two.basis}"
-        rows.append((name, value, quantity(two.value, two.unit), f"{basis}{below}", *rest))
-    margins = f"{budget.name}: margin {rows[-1][1]} {headings[0]}, {rows[-1][2]} {headings[1]}"
-    columns = ("line", *headings, *_LINES[2:])
-    return (Table(budget.name, columns, rows, (0, 3, 4, 5), totals=len(budget.totals), folded=margins),)
+    own, others = ({line.name: line for line in b.totals} for b in (budget, other))
+    names = dict.fromkeys((*own, *others))
+    sums = [_paired(own.get(name), others.get(name), headings) for name in names]
+    rows = [*(_paired(one, two, headings) for one, two in zip(budget.lines, other.lines, strict=True)), *sums]
+    margins = ", ".join(
+        f"{quantity(b.margin_db, 'dB')} {heading}" for b, heading in zip((budget, other), headings, strict=True)
+    )
+    columns, folded = ("line", *headings, *_LINES[2:]), f"{budget.name}: margin {margins}"
+    return (Table(budget.name, columns, rows, (0, 3, 4, 5), totals=len(sums), folded=folded),)
+
+
+def _paired(one: Line | None, two: Line | None, headings: tuple[str, str]) -> tuple[str | Cell, ...]:
+    """A row for a line of two budgets; one of them may not have it."""
+    there = [(line, heading) for line, heading in zip((one, two), headings, strict=True) if line is not None]
+    values = ["" if line is None else quantity(line.value, line.unit) for line in (one, two)]
+    warned = [(line.warning, heading) for line, heading in there if line.warning]
+    alike = len({line.warning for line, _ in there}) == 1
+    hint = "; ".join(warning if alike else f"{heading}: {warning}" for warning, heading in warned[: 1 if alike else 2])
+    name = there[0][0].name
+    texts = [_both([(getattr(line, of), heading) for line, heading in there]) for of in ("basis", "source", "regime")]
+    return Cell(name, "!", hint) if hint else name, *values, *texts
+
+
+def _both(texts: Sequence[tuple[str, str]]) -> str:
+    """A text, and below it that of the other budget where it is another."""
+    (first, _), *more = texts
+    return "\n".join([first, *(f"{heading}: {text}" for text, heading in more if text != first)])
 
 
 def budgets_view(
