@@ -423,6 +423,34 @@ at_most = {most}
 """
 
 
+@pytest.mark.parametrize("looks", [(), (1, 3)], ids=["at the end", "meanwhile"])
+def test_rows_of_a_cell_are_in_their_order_and_their_curves_are_summed(tmp_path, looks):
+    campaign = load_campaign(campaign_file(tmp_path))
+    chunks = []
+    for number in range(6):
+        draw = np.random.default_rng(number)
+        curves = draw.integers(0, 9, (2, 1056)).astype(float) if number != 2 else np.zeros((2, 0))
+        columns = {"row": np.arange(4.0) + 4.0 * number, "weight": np.ones(4), "margin": draw.normal(size=4)}
+        failed = (records.Failed(4 * number + 1, 7, 2, "no"),)
+        chunks.append(records.Chunk(0, number, columns, failed, *curves))
+    cell = CellRows(campaign, 0)
+    assert cell.whole() is None
+    for taken, number in enumerate((3, 0, 5, 1, 4, 2)):
+        cell.take(chunks[number])
+        if taken in looks:
+            assert np.all(np.diff(cell.whole().columns["row"]) > 0.0)
+    found, wanted = cell.whole(), records.joined(chunks)
+    assert list(found.columns) == list(wanted.columns) and found.failed == wanted.failed
+    for name, column in wanted.columns.items():
+        np.testing.assert_array_equal(found.columns[name], column)
+    np.testing.assert_array_equal(found.survival, wanted.survival)
+    np.testing.assert_array_equal(found.survival_square, wanted.survival_square)
+    assert (cell.rows, cell.failed) == (24, 6) and wanted.survival.any()
+    held = sum(column.nbytes for chunk in cell.chunks for column in chunk.columns.values())
+    assert held == 3 * 24 * 8 and not any(chunk.survival.size for chunk in cell.chunks)
+    assert cell.whole().columns["margin"] is found.columns["margin"], "put together once"
+
+
 @pytest.mark.usefixtures("rows_here")
 def test_it_stops_when_the_wanted_quantile_is_known_well_enough(tmp_path):
     path = campaign_file(tmp_path, runs=64, more=PRECISION.format(width="0.02 dB", most=20_000))

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 
@@ -22,15 +23,28 @@ TAIL_SHARES = (0.1, 0.01, 0.003, 1e-3, 1e-4, 1e-5, 1e-6)
 
 
 class CellRows:
-    """The rows of a cell as far as they were read, all of their columns: 8 bytes for each value."""
+    """The rows of a cell as far as they were read, all of their columns: 8 bytes for each value.
+
+    Of the curves of a chunk, which are as long as a thousand rows of two columns, there is the sum over all chunks.
+    """
 
     def __init__(self, campaign: CampaignFile, number: int, chunks: Iterable[Chunk] = ()) -> None:
         """With these chunks of it."""
-        self.campaign, self.cell, self.chunks = campaign, campaign.cells[number], list(chunks)
+        self.campaign, self.cell = campaign, campaign.cells[number]
+        self.chunks: list[Chunk] = []
+        """Those taken since the rows were last asked for, and all before them as one; without their curves."""
+        self._survival, self._survival_square = np.zeros(0), np.zeros(0)
+        for chunk in chunks:
+            self.take(chunk)
 
     def take(self, chunk: Chunk) -> None:
-        """Add a chunk, in any order."""
-        self.chunks.append(chunk)
+        """Add a chunk. Any order gives the same rows; the last bits of the tail are those of this order."""
+        if not self._survival.size:
+            self._survival, self._survival_square = np.zeros((2, chunk.survival.size))
+        if chunk.survival.size:  # there is none of a chunk whose rows were all lost
+            self._survival = self._survival + chunk.survival
+            self._survival_square = self._survival_square + chunk.survival_square
+        self.chunks.append(replace(chunk, survival=np.zeros(0), survival_square=np.zeros(0)))
 
     @property
     def rows(self) -> int:
@@ -53,7 +67,11 @@ class CellRows:
 
     def whole(self) -> Chunk | None:
         """All rows in their order as one chunk; None without any."""
-        return joined(sorted(self.chunks, key=lambda chunk: chunk.number)) if self.chunks else None
+        if not self.chunks:
+            return None
+        if len(self.chunks) > 1:
+            self.chunks = [_in_order(joined(sorted(self.chunks, key=lambda chunk: chunk.number)))]
+        return replace(self.chunks[0], survival=self._survival, survival_square=self._survival_square)
 
     def summary(self, quantiles: tuple[float, ...] = QUANTILES) -> CellSummary:
         """The cell as far as it was read; without ``quantiles``, how its rows keep the limits alone."""
@@ -124,6 +142,16 @@ class CellRows:
             f"{100 * wanted.quantile:g} % quantile of {wanted.output}{where}: {value}, {low} to {high} at "
             f"{100 * wanted.confidence:g} % confidence; {enough} as asked for (± {half})."
         )
+
+
+def _in_order(chunk: Chunk) -> Chunk:
+    """The chunk with its rows in their order."""
+    rows = chunk.columns["row"]
+    if np.all(rows[1:] > rows[:-1]):
+        return chunk
+    order = np.argsort(rows, kind="stable")
+    columns = {name: column[order] for name, column in chunk.columns.items()}
+    return replace(chunk, columns=columns, failed=tuple(sorted(chunk.failed, key=lambda each: each.row)))
 
 
 def _missed(limit: Limit, values: Floats) -> Floats:
