@@ -13,6 +13,7 @@ Column = NDArray[np.float64] | tuple[str, ...]
 """Of a table of data: numbers, or what the rows are called."""
 
 _ROOM = 120  # columns for a table with several columns of words at its end
+_LEGIBLE = 16  # columns in which even the longest words may be folded
 
 
 def rows_of(columns: Mapping[str, Column], digits: int) -> list[tuple[str, ...]]:
@@ -86,13 +87,29 @@ class Table:
         headings, rows = [self.headings[k] for k in kept], [[row[k] for k in kept] for row in self.rows]
         return replace(self, headings=headings, rows=rows, words=words)
 
+    def for_width(self, width: int) -> "Table":
+        """The table as a terminal of so many columns has room for it."""
+        return self if width >= max(_ROOM, self._least()) else self.narrowed()
+
+    def _least(self) -> int:
+        """Columns of a terminal that the table takes with its numbers whole and with a word in each line of words."""
+        found = 0
+        for place, cells in enumerate(zip(self.headings, *self.rows, strict=True)):
+            texts = [line for cell in cells for line in str(cell).split("\n")]
+            if place in self.words:
+                longest = max((len(word) for text in texts for word in text.split()), default=0)
+                found += min(longest, _LEGIBLE) + 3
+            else:
+                found += max(map(len, texts)) + 3
+        return found
+
     def narrowed(self) -> "Table":
         """The table with what a narrow terminal has room for: its last words below each other, with their headings."""
         return (self.columns(self.brief) if self.brief else self)._stacked()
 
     def _stacked(self) -> "Table":
         count = len(self.headings)
-        first = next(k for k in range(count, 0, -1) if k - 1 not in self.words)
+        first = next((k for k in range(count, 0, -1) if k - 1 not in self.words), 1)
         if first + 1 >= count:
             return self
         more = self.headings[first + 1 :]
@@ -119,7 +136,7 @@ def tables_text(tables: Sequence[Table], sentences: Sequence[str], width: int) -
 
     console = Console(file=io.StringIO(), width=width, color_system=None, highlight=False, markup=False)
     for each in tables:
-        shown = each if width >= _ROOM else each.narrowed()
+        shown = each.for_width(width)
         table = Drawn(title=each.title, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
         for place, heading in enumerate(shown.headings):
             table.add_column(heading, overflow="fold", no_wrap=place not in shown.words)

@@ -1,0 +1,47 @@
+"""Tables on a terminal: which columns there is room for, and what becomes of the others."""
+
+import re
+
+import pytest
+
+from microrad.report.day.tables import CONTACT_COLUMNS, contacts_table
+from microrad.report.tables import Table, table_text
+from shipped import plain_study
+
+BRIEF = ("by", "rise", "set", "min", "could carry", "begins and ends by")
+
+
+def heading(text):
+    """Every word of the headings of a table as it stands on a terminal."""
+    above, _ = text.split("\u2500", 1)
+    return set(re.findall(r"[^\s()]+", above)) - {"Contacts"}
+
+
+def words(headings):
+    return {word for each in headings for word in re.findall(r"[^\s()]+", each)}
+
+
+@pytest.mark.parametrize("width", [80, 119, 125, 131])
+def test_contacts_leave_out_columns_where_words_would_be_broken(width):
+    text = table_text(contacts_table(plain_study().day), width)
+    assert heading(text) - {"UTC"} == words(BRIEF)
+    assert len(re.findall(r"^ *GEO ", text, re.MULTILINE)) == len(plain_study().day.encounters)
+    assert max(map(len, text.splitlines())) <= width
+
+
+def test_contacts_have_every_column_where_there_is_room():
+    text = table_text(contacts_table(plain_study().day), 132)
+    assert heading(text) == words(CONTACT_COLUMNS)
+    assert len(re.findall(r"^ *GEO ", text, re.MULTILINE)) == len(plain_study().day.encounters)
+    assert max(map(len, text.splitlines())) <= 132
+
+
+def test_the_last_words_stand_below_each_other_on_a_narrow_terminal():
+    number = Table("", ("name", "value", "basis", "source"), [("a", "1", "formula", "paper")], (0, 2, 3))
+    assert number.narrowed().rows == [["a", "1", "formula\nsource: paper"]]
+    wordy = Table("", ("input", "value", "source"), [("a", "one", "paper"), ("b", "two", "")], (0, 1, 2))
+    assert wordy.narrowed().rows == [["a", "one\nsource: paper"], ["b", "two"]]
+    pair = Table("", ("input", "value"), [("a", "one")], (0, 1))
+    assert pair.narrowed() == pair
+    assert "source: paper" in table_text(wordy, 40)
+    assert "source: paper" not in table_text(wordy, 140)
