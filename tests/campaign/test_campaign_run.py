@@ -6,6 +6,7 @@ import shutil
 import signal
 import sqlite3
 import subprocess
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +26,7 @@ from microrad.campaign.rows.plan import planned
 from microrad.campaign.statistics.cell import CellRows
 from microrad.campaign.statistics.summary import summarise_campaign
 from microrad.core import kernels
+from shipped import SHIPPED
 from small_campaign import campaign_file, children, finished, halted, halting, kill, started, without_worker
 from waiting import HANG_S, any_moment, gone, until
 
@@ -420,6 +422,43 @@ quantile = 0.5
 half_width = "{width}"
 confidence = 0.95
 at_most = {most}
+"""
+
+
+@pytest.mark.usefixtures("rows_here")
+def test_the_quantile_shown_meanwhile_is_of_nearly_all_rows_and_at_the_end_of_all(tmp_path, monkeypatch):
+    sizes, said, real = [], [], run.ordered
+    monkeypatch.setattr("microrad.campaign.rows.plan._CHUNK_ROWS", 2)
+    monkeypatch.setattr(run, "ordered", lambda values: sizes.append(values.size) or real(values))
+    (tmp_path / "mission.toml").write_text(SHIPPED.read_text(encoding="utf-8"), encoding="utf-8")
+    path, book = tmp_path / "campaign.toml", tmp_path / "campaign.ledger"
+    path.write_text(LINKS, encoding="utf-8")
+    run.run_campaign(path, book, run.Means(), lambda done, total, what: said.append((done, what)))
+    said = said[-128:]
+    assert [done for done, _ in said] == list(range(2, 258, 2)) and sizes[-1] == 256
+    assert sizes[:3] == [2, 4, 6] and len(sizes) < 64
+    assert all(later < 1.1 * size + 2 for size, later in pairwise(sizes) if size > 4)
+    with Ledger.open(book, write=False) as opened:
+        margin = np.concatenate([chunk.columns["margin"] for chunk in opened.chunks(0)])
+    for done, what in said:
+        of = max(size for size in sizes if size <= done)
+        assert what.endswith(f", margin 1 %: {np.quantile(margin[:of], 0.01, method='inverted_cdf'):.3g} dB")
+    assert len({what.split("margin")[1] for _, what in said}) > 3
+
+
+LINKS = """
+mission = "mission.toml"
+seed = 7
+runs = 256
+sampling = "random"
+
+[inputs."communication.transmit_power"]
+distribution = "normal"
+mean = "5 W"
+deviation = "0.2 W"
+
+[limits.margin]
+least = "1 dB"
 """
 
 

@@ -42,6 +42,7 @@ from microrad.core.progress import Progress
 from microrad.core.units import format_quantity
 
 TARGET = "microrad.campaign.work:open_work"
+_NEWS = 1.1  # times the rows that the quantile shown meanwhile is of, before it is computed again
 _TIMED_S = 0.2  # of rows, before a campaign of links alone begins
 LATE_S = 30.0
 """Without a sign of life for this long beyond the campaign's row_limit, a worker is stopped."""
@@ -150,13 +151,18 @@ def _head(campaign: CampaignFile, spec: bytes) -> Head:
 
 @dataclass
 class _Pace:
-    """Rows done here and before, the time that they took, and the first limit's output so far."""
+    """Rows done here and before, the time that they took, and the first limit's output so far.
+
+    ``quantile`` is that of the first ``quantile_of`` rows done here, in words.
+    """
 
     done: int
     spent_s: float
     began_s: float = field(default_factory=time.monotonic)
     here: int = 0
     values: list[Floats] = field(default_factory=list)
+    quantile: str = ""
+    quantile_of: int = 0
 
     @property
     def seconds(self) -> float:
@@ -274,17 +280,22 @@ class _Runner:
         self.on_progress(self.pace.done, self.total, self.pace.words(self.total, self._interim(payload)))
 
     def _interim(self, payload: bytes) -> str:
-        """The quantile of the first limit's output over the rows of this sitting."""
+        """The quantile of the first limit's output over the rows of this sitting, but for the last few of them.
+
+        To sort all rows again for each chunk would be the longer the more there are.
+        """
         if not self.campaign.limits:
             return ""
-        limit = self.campaign.limits[0]
+        limit, pace = self.campaign.limits[0], self.pace
         output = OUTPUTS[limit.output]
-        values = chunk_format.unpack_chunk(payload).columns[output.name]
-        self.pace.values.append(values[~np.isnan(values)])
+        pace.values.append(chunk_format.unpack_chunk(payload).columns[output.name])
+        if pace.here < _NEWS * pace.quantile_of and pace.done < self.total:
+            return pace.quantile
         share = 0.01 if limit.least is not None else 0.99
-        value = ordered(np.concatenate(self.pace.values)).quantile(share)
+        value = ordered(np.concatenate(pace.values)).quantile(share)
         shown = "-" if math.isnan(value) else format_quantity(value, output.unit or "1", 3)
-        return f"{output.name} {100 * share:g} %: {shown}"
+        pace.quantile, pace.quantile_of = f"{output.name} {100 * share:g} %: {shown}", pace.here
+        return pace.quantile
 
     def _by_rows(self, job: Job) -> None:
         """The rows of a chunk that cannot be done whole, each by itself and at most twice; the rest have failed."""
