@@ -16,7 +16,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from microrad.campaign.ledger import Ledger, check_same, chunk_format, mend, verify
+from microrad.campaign.ledger import Ledger, check_same, chunk_format, mend, mending, verify
 from microrad.campaign.ledger.chunk_format import Column, Head
 from microrad.campaign.ledger.file import FORMAT, is_written, refuse_existing
 from microrad.campaign.records import CampaignError, Chunk, Failed, WorstTrace
@@ -401,6 +401,14 @@ def test_a_bit_flipped_in_a_payload_or_its_checksum_costs_one_chunk(path):
             assert "chunk 7 of cell 0 is damaged" in said(list, ledger.chunks(0))
             assert ledger.get(0, 6) == payloads[0, 6]
         assert mended(path, payloads) == {(0, 7)}
+
+
+def test_mending_reads_each_chunk_once_where_sqlite_gets_to_the_end(path, monkeypatch):
+    payloads, hashed, real = filled(path), [], mending.digest
+    monkeypatch.setattr(mending, "digest", lambda *parts: hashed.append(parts[:-1]) or real(*parts))
+    flip(path, path.read_bytes().index(payloads[0, 7][-600:-500]), 5)
+    mend(path)
+    assert sorted(each for each in hashed if len(each) == 2) == sorted(payloads)
 
 
 def test_a_bit_flipped_in_one_copy_of_the_head_costs_nothing_and_in_both_is_told(path):

@@ -142,9 +142,10 @@ def mend(path: Path) -> None:
 
 
 def _whole_rows(damaged: sqlite3.Connection, table: str) -> Iterator[tuple[Any, ...]]:
-    """Rows with a right checksum, each behind its number: from the first as far as SQLite gets, then from the last."""
+    """Rows with a right checksum, each behind its number: from the first on, then from the last where SQLite fails."""
     columns, sound = _KEPT[table]
     for order in ("ASC", "DESC"):
         with suppress(sqlite3.Error):
             rows = damaged.execute(f"SELECT rowid, {columns} FROM {table} ORDER BY rowid {order}")
             yield from (row for row in rows if sound(row[1:]))
+            return
