@@ -305,6 +305,16 @@ def test_no_sentence_is_said_twice_on_the_page(plain):
         assert page.count(escape(sentence, quote=True).replace("&#x27;", "&#39;").replace("&quot;", "&#34;")) == 1
 
 
+def test_no_sentence_is_said_twice_in_the_terminal(plain):
+    limits = links_words.short(plain)
+    brief, whole = (" ".join(links_text(plain, 160, verbose=verbose).split()) for verbose in (False, True))
+    assert [brief.count(sentence) for sentence in limits] == [1] * len(limits)
+    everything = dict.fromkeys([*limits[:-1], *links_words.consequences(plain), *plain.warnings])
+    assert len(plain.warnings) > 1
+    assert limits[-1].startswith("Warning 1 of")
+    assert [sentence for sentence in everything if whole.count(" ".join(sentence.split())) != 1] == []
+
+
 # ------------------------------------------------------------------------------------------------------ paired budgets
 NAMES = ("as budgeted", "simulated")
 

@@ -13,7 +13,7 @@ from microrad.mission.model import source_text
 from microrad.orbit.operations import spreadsheet_text
 from microrad.report.links import words
 from microrad.report.links.views import budget_table, links_views
-from microrad.report.requirements import requirement_table
+from microrad.report.requirements import first_warning, requirement_table
 from microrad.report.view import Block, Soft, views_text
 
 UNDER_JITTER = "Communication under jitter"
@@ -79,9 +79,12 @@ def links_text(study: LinkStudy, width: int, verbose: bool = False, solution: So
         verbose: adds where each line comes from and holds, the other tables, every sentence and every warning.
         solution: the values of a key that leave the required margin, which stand first.
     """
-    judged = of_links(study)
+    below = (
+        [*words.consequences(study), first_warning(study.warnings)] if verbose else []
+    )  # said there, with the others
+    limits = [sentence for sentence in words.short(study) if sentence not in below]
     blocks: list[Block] = [] if solution is None else [Soft(words.solution_text(solution))]
-    blocks += [words.verdict(study), requirement_table(judged), *words.short(study)]
+    blocks += [words.verdict(study), requirement_table(of_links(study)), *limits]
     if not verbose:
         return views_text([*blocks, *(budget_table(b).columns((0, 1, 2)) for b in study.budgets)], width)
     return views_text([*blocks, *links_views(study)], width)
