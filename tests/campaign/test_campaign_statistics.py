@@ -10,6 +10,7 @@ from scipy import stats
 from microrad.campaign.definition.outputs import OUTPUTS
 from microrad.campaign.statistics.intervals import (
     Moments,
+    _tails,
     block_means,
     histogram,
     mean_interval,
@@ -193,6 +194,26 @@ def test_interval_of_a_weighted_quantile_holds() -> None:
         widths.append(found.high - found.low)
     assert 370 <= held <= 398
     assert np.median(widths) < 1.2
+
+
+@pytest.mark.parametrize("share", [0.003, 0.05, 0.5, 0.95, 0.997])
+@pytest.mark.parametrize("drawn", [4.7, 5.0, 5.3])
+def test_ends_of_a_weighted_quantile_are_those_of_a_look_at_each_rank(drawn: float, share: float) -> None:
+    known = set()
+    for seed in range(60):
+        x = philox(1000 * 17 + seed).normal(drawn, 0.15, 5 + seed)
+        weights = np.exp((((x - drawn) / 0.15) ** 2 - ((x - 5.0) / 0.15) ** 2) / 2.0)
+        rows = ordered(x, weights)
+        few, many = np.array([_tails(rows, rank, share) for rank in range(x.size + 1)]).T
+        within = range(1, x.size)
+        first = min((rank for rank in within if few[rank] >= 0.025), default=x.size)
+        last = min((rank for rank in within if many[rank] < 0.025), default=x.size)
+        low = rows.values[first - 1] if first > 1 or few[0] < 0.025 else math.nan
+        high = rows.values[last - 1] if last < x.size or many[-1] < 0.025 else math.nan
+        found = quantile_interval(rows, share, 0.95)
+        np.testing.assert_array_equal([found.low, found.high], [low, high])
+        known.add((math.isnan(low), math.isnan(high)))
+    assert known - {(True, True)}
 
 
 # ----------------------------------------------------------------------------------------------------------- one output

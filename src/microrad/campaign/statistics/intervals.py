@@ -163,13 +163,17 @@ def quantile_interval(rows: Ordered, probability: float, confidence: float) -> I
     value, count, beyond = rows.quantile(probability), rows.values.size, (1.0 - confidence) / 2.0
     if not count:
         return Interval(value, math.nan, math.nan, confidence)
-    ranks = range(count + 1)
-    start = bisect_left(ranks, True, key=lambda rank: _tails(rows, rank, probability)[0] >= beyond)
-    stop = bisect_left(ranks, True, key=lambda rank: _tails(rows, rank, probability)[1] < beyond) - 1
+    # the tails rise and fall with the rank, but with weights not to the ends: at none and at all of the rows they go by
+    # what all rows are worth, next to them by one row, which may be worth many; so the ends are asked last
+    inner = range(1, count)
+    above = 1 + bisect_left(inner, True, key=lambda rank: _tails(rows, rank, probability)[0] >= beyond)
+    below = 1 + bisect_left(inner, True, key=lambda rank: _tails(rows, rank, probability)[1] < beyond)
+    has_low = above > 1 or _tails(rows, 0, probability)[0] < beyond
+    has_high = below < count or _tails(rows, count, probability)[1] < beyond
     return Interval(
         value,
-        float(rows.values[start - 1]) if start > 0 else math.nan,
-        float(rows.values[stop]) if stop < count else math.nan,
+        float(rows.values[above - 1]) if has_low else math.nan,
+        float(rows.values[below - 1]) if has_high else math.nan,
         confidence,
     )
 
