@@ -361,7 +361,7 @@ def test_each_page_fits_and_has_no_serious_fault_for_those_who_do_not_see_it(ope
     for width in WIDTHS:
         tab.set_viewport_size({"width": width, "height": 900})
         settled(tab)
-        picture(tab, f"{name}-{width}.png")
+        picture(tab, f"{name}-{width}.png", full_page=True)
         assert tab.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth") <= 0
         if width != max(WIDTHS) and not os.environ.get("MICRORAD_ENDURANCE"):
             continue  # what cannot be seen is the same at all widths

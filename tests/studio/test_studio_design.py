@@ -18,6 +18,7 @@ from microrad.link.pointing import outage as under_jitter
 from microrad.orbit import day as day_study
 from microrad.report.day import figures as day_plots
 from microrad.report.plotting.sheet import Axis, Line, Rule, grid
+from microrad.report.view import Soft
 from microrad.studio.draft.draft import Draft
 from microrad.studio.pages import elements
 from microrad.studio.views import day as day_view
@@ -294,36 +295,36 @@ def test_the_study_of_the_links_gives_tables_sentences_and_what_moves_the_margin
 # ------------------------------------------------------------------------------------------------------------ pointing
 def test_what_is_left_for_a_line_meets_the_beacon_by_either_rule(draft):
     wide = draft.set("beacon.divergence", "2000 urad")
-    found = pointing_view.view(wide.link())
-    for by_rss, by_ecss in found.left:
-        assert by_rss.largest_rad > by_ecss.largest_rad > 0.0
-    body = found.left[0][1].largest_rad
-    again = wide.set("pointing.lines.body_pointing.error", f"{body * 1e6:.9f} urad")
-    total = pointing_view.view(again.link()).budget.total_rad("ecss-radial")
-    assert total == pytest.approx(found.half_angle_rad, rel=1e-6)
+    rows = pointing_view.blocks(pointing_view.view(wide.link()))[0].rows
+    body = {rule: float(rows[0][k].removesuffix(" \u00b5rad")) for k, rule in ((3, "rss"), (4, "ecss-radial"))}
+    assert body["rss"] > body["ecss-radial"] > 0.0
+    for rule, largest in body.items():
+        again = wide.set("pointing.lines.body_pointing.error", f"{largest:.9f} urad").link()
+        met = pointing_view.view(again)
+        assert met.budget.total_rad(rule) == pytest.approx(met.half_angle_rad, rel=3e-3)  # of three digits
 
 
 def test_the_tables_of_the_shipped_mission_say_what_its_beacon_covers(draft):
-    found = pointing_view.view(draft.link())
-    totals = {row[0].partition(":")[0]: row for row in pointing_view.total_rows(found)}
-    assert totals["root sum square"][1] == "317 µrad"
-    assert totals["root sum square"][2].startswith("covered")
-    assert "means add linearly" in totals["root sum square"][4]
+    lines, note, shown, said, ahead = pointing_view.blocks(pointing_view.view(draft.link()))
+    assert lines.headings[3:5] == ("largest allowed", "largest allowed,\nECSS")
+    assert [row[4] for row in lines.rows] == ["249 \u00b5rad", "nothing", "66.6 \u00b5rad", "nothing"]
+    assert "ECSS for two axes" in note.text
+    totals = {row[0]: row for row in shown.rows}
+    assert totals["root sum square"][1:3] == ("317.1 \u00b5rad", "covers it, 72.9 \u00b5rad left")
+    assert "means add linearly" in totals["root sum square"][-1]
     assert totals["ECSS, two axes"][2].endswith("short")
-    lines = pointing_view.line_rows(found)
-    assert [row[4] for row in lines] == ["249 µrad", "nothing", "66.6 µrad", "nothing"]
-    assert "0.9822" in pointing_view.words(found)[0]
-    ahead = dict(pointing_view.ahead_rows(found))
-    assert ahead["point-ahead angle, largest"] == "71 µrad"
+    assert "0.9822" in said
+    assert ahead.blocks[0].startswith("Point-ahead: up to 71 \u00b5rad")
 
 
 def test_without_beacon_and_point_ahead_the_page_says_so(tmp_path):
     gone = dict.fromkeys(("beacon", "answer", "acquisition", "point_ahead"))
     bare = link_file(tmp_path, {key: None for key in gone if key in data_with({})})
     found = pointing_view.view(bare)
-    assert pointing_view.words(found) == ["The mission has no beacon, so nothing is to be covered."]
-    assert pointing_view.ahead_rows(found) == []
-    assert {row[2] for row in pointing_view.total_rows(found)} == {"no beacon"}
+    said, errors, totals, ahead = pointing_view.blocks(found)
+    assert said == "The mission has no beacon, so nothing is to be covered."
+    assert ahead.blocks == [Soft("The mission has no table [point_ahead].")]
+    assert not any("beacon" in heading or "allowed" in heading for heading in (*errors.headings, *totals.headings))
     names = [line["name"] for line in lines(pointing_view.coverage_plot(found))]
     assert names[0] == "inside this angle"
     assert not any("beacon" in name for name in names)

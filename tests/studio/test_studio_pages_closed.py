@@ -2,8 +2,10 @@
 
 import ast
 import asyncio
+import base64
 import importlib
 import threading
+from dataclasses import replace
 from itertools import cycle
 from pathlib import Path
 from types import SimpleNamespace
@@ -11,11 +13,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from microrad.report.plotting.figure import Figure as Reported
+from microrad.report.plotting.sheet import Line, grid
+from microrad.report.tables import Cell, Table
+from microrad.report.view import Drawing, Points, Soft, Verbatim, Verdict, View
 from microrad.studio.jobs.queue import JobError
 from microrad.studio.recordings.uploads import Uploads
 from microrad.studio.session import Session
 from microrad.studio.views import compare as compare_view
-from microrad.studio.views import latest
+from microrad.studio.views import latest, plots
 from shipped import SHIPPED
 from studio_jobs import written
 
@@ -28,7 +34,7 @@ from nicegui.outbox import Outbox
 from nicegui.page import page as at
 
 from microrad.studio import pages
-from microrad.studio.pages import in_thread, link, mirror, runs
+from microrad.studio.pages import elements, in_thread, link, mirror, runs
 from waiting import HANG_S
 
 FOLDER = Path(pages.__file__).parent
@@ -160,7 +166,7 @@ def every_time(session, build):
         leave += 1
 
 
-WAITS = {"compare": 2, "control": 4, "day": 1, "link": 3, "mirror": 4, "mission": 0, "pointing": 4, "runs": 17}
+WAITS = {"compare": 2, "control": 4, "day": 1, "link": 3, "mirror": 4, "mission": 0, "pointing": 3, "runs": 17}
 
 
 @pytest.mark.parametrize("name", WAITS)
@@ -305,3 +311,49 @@ def test_pages_wait_by_the_one_way_that_ends_with_them():
         if isinstance(node, ast.Attribute) and node.attr in others
     }
     assert found == {("in_thread.py", "io_bound"), ("in_thread.py", "sleep")}
+
+
+def test_blocks_of_the_report_are_shown_as_text_and_what_was_unfolded_stays_so(monkeypatch):
+    """Every kind of block; a name in one is never markup."""
+    at, svg = np.array([0.0, 1.0]), "<svg xmlns='http://www.w3.org/2000/svg'/>"
+    sheet, (panel,) = grid(4.0, 3.0)
+    panel.add(Line(at, at))
+    moving = Reported("moving", "Moving", "of moving", sheet, {})
+    still = replace(moving, name="still").static
+    rows = Table("Rows", ("name", "value"), [(Cell("<b>", "!"), "1"), ("sum", "1")], totals=1)
+    blocks = (
+        "said",
+        Soft("soft"),
+        Points(["one", "two"]),
+        Verbatim("as it\n  is"),
+        Verdict("good", [replace(rows, title="", folded="Folded rows")], good=True),
+        rows,
+        View("Part", [moving, still, View("Inner", [Drawing("d", "Drawing", "of it", svg)], folded=True)]),
+    )
+
+    async def shown():
+        visit = Visit(monkeypatch)
+        with visit.tab:
+            box = elements.Blocks()
+            box.show_blocks(blocks, plots.drawn(blocks))
+            folds = {fold.text: fold for fold in box.descendants() if isinstance(fold, ui.expansion)}
+            assert [(name, fold.value) for name, fold in folds.items()] == [("Folded rows", False), ("Inner", False)]
+            folds["Inner"].value = True
+            box.show_blocks(blocks, plots.drawn(blocks))
+            found = [*box.descendants()]
+        visit.end()
+        return found, visit.told
+
+    found, told = asyncio.run(shown())
+    texts = [each.text for each in found if hasattr(each, "text")]
+    assert told == []
+    assert {"said", "soft", "one", "two", "as it\n  is", "good", "Rows", "Part", "of moving", "of it"} <= {*texts}
+    assert [each.value for each in found if isinstance(each, ui.expansion)] == [False, True]
+    tables = [each.rows for each in found if isinstance(each, ui.table)]
+    assert [row["c0"] for row in tables[1]] == ["<b> !", "sum"]
+    assert [row["total"] for row in tables[1]] == [False, True]
+    (drawn,) = (each for each in found if isinstance(each, elements.Figure))
+    assert drawn.props["begin"]["data"][0]["x"] == [0, 1]
+    pictures = [each.props["src"].partition(",") for each in found if each.tag == "img"]
+    assert {kind for kind, *_ in pictures} == {"data:image/svg+xml;base64"}
+    assert [base64.b64decode(data).decode()[:5] for *_, data in pictures] == ["<svg "] * 2

@@ -61,12 +61,13 @@ def pointing_view(p: OpenLoopPointing | None) -> View | None:
     if p is None:
         return None
     half = None if p.reading is None else p.reading.half_angle_rad
-    most = [] if half is None else [_most(each.note, each.largest_rad) for each in p.allocation(half, "rss")]
+    left = [] if half is None else [p.allocation(half, "rss"), p.allocation(half, "ecss-radial")]
+    most = [[_most(each.note, each.largest_rad) for each in by] for by in left]
+    largest = ("largest allowed", "largest allowed,\nECSS")[: len(most)]
     rows = [
-        [line.name, given_angle(line.value), f"{100 * share:.1f} %", *most[k : k + 1], line.basis, line.source]
+        [line.name, given_angle(line.value), f"{100 * share:.1f} %", *(by[k] for by in most), line.basis, line.source]
         for k, (line, share) in enumerate(zip(p.lines, p.variance_shares, strict=True))
     ]
-    largest = ["largest allowed"] if most else []
     words_from = 3 + len(largest)
     lines = Table(
         "",
@@ -75,19 +76,23 @@ def pointing_view(p: OpenLoopPointing | None) -> View | None:
         (0, words_from, words_from + 1),
     )
     sums = "; ".join(f"{each.name} {quantity(each.total_rad, 'rad')}" for each in p.summations)
+    beside = [] if half is None else ["beacon's half angle"]
     totals = Table(
         "",
-        ("total", "value", "of", "formula", "where it is authorised", "what speaks against it here"),
-        [(s.name, given_angle(s.total_rad), s.of, s.formula, s.authority, s.caveat) for s in p.summations],
-        (0, 2, 3, 4, 5),
+        ("total", "value", *beside, "of", "formula", "where it is authorised", "what speaks against it here"),
+        [
+            (s.name, given_angle(s.total_rad), *_covered(half, s.total_rad), s.of, s.formula, s.authority, s.caveat)
+            for s in p.summations
+        ],
+        (0, *range(2, 6 + len(beside))),
         folded=f"Totals at {100 * p.confidence:g} %: {sums}",
     )
     note = (
         ""
         if half is None
         else (
-            "Largest allowed: the half width at which the root sum square equals the beacon's half angle "
-            f"({format_quantity(half, 'rad', 3)}), with all other errors as they are."
+            "Largest allowed: the half width at which the root sum square, or the total of ECSS for two axes, equals "
+            f"the beacon's half angle ({format_quantity(half, 'rad', 3)}), with all other errors as they are."
         )
     )
     return View("Open-loop pointing", told(lines, note and Soft(note), totals, *coverage(p)))
@@ -95,6 +100,14 @@ def pointing_view(p: OpenLoopPointing | None) -> View | None:
 
 def _most(note: str, largest_rad: float) -> str:
     return "nothing" if note else format_quantity(largest_rad, "rad", 3)  # the others alone may exceed the cone
+
+
+def _covered(half_angle_rad: float | None, total_rad: float) -> list[str]:
+    """Whether the beacon's half angle covers a total, and by how much; nothing without a beacon."""
+    if half_angle_rad is None:
+        return []
+    spare = half_angle_rad - total_rad
+    return [f"covers it, {quantity(spare, 'rad')} left" if spare >= 0.0 else f"{quantity(-spare, 'rad')} short"]
 
 
 def coverage(p: OpenLoopPointing) -> list[str]:

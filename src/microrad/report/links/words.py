@@ -9,7 +9,7 @@ from microrad.link import Swing
 from microrad.link.acquisition.partner_search import Found, Tracking
 from microrad.link.pointing.outage import Performance, error_rad, required_error_rad
 from microrad.link.requirement import of_links, time_kept
-from microrad.link.study import BeamRadius, LinkStudy, Solution
+from microrad.link.study import BeamRadius, LinkStudy, PointAheadEffect, Solution
 from microrad.report.quantities import quantity, signed
 from microrad.report.requirements import advice_for_links, derived_words, first_warning, met_words, nearest
 
@@ -72,7 +72,7 @@ def consequences(study: LinkStudy) -> list[str]:
     if study.tracking is not None:
         found.append(_light(study.tracking))
     if study.point_ahead is not None:
-        found.append(point_ahead(study))
+        found.append(point_ahead(study.point_ahead))
     return found
 
 
@@ -110,10 +110,8 @@ def _light(t: Tracking) -> str:
     return f"{brings}noise-equivalent angle {angle} rms per axis and reading."
 
 
-def point_ahead(study: LinkStudy) -> str:
+def point_ahead(p: PointAheadEffect) -> str:
     """Point-ahead as an angle of the beam, a range of the mirror and a loss."""
-    p = study.point_ahead
-    assert p is not None
     state = "corrected here" if p.corrected else "NOT corrected here"
     lost = f"{p.loss_db:.1f} dB" if p.loss_db <= link.DEEPEST_DB else f"more than {link.DEEPEST_DB:g} dB"
     return (

@@ -6,7 +6,7 @@ text NiceGUI builds the whole page anew, which takes longer than drawing.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from typing import Any
 
@@ -14,6 +14,7 @@ from nicegui import ui
 from nicegui.element import Element
 
 from microrad.report.tables import Cell, Table
+from microrad.report.view import Block, Points, Soft, Verbatim, Verdict, View
 from microrad.studio.pages import layout
 from microrad.studio.pages.in_thread import stay
 from microrad.studio.views.link import Margin
@@ -74,6 +75,66 @@ def put(made: ui.table, of: Table) -> None:
     """Show a table of the report."""
     made.columns = _columns(of.headings, [k for k in range(len(of.headings)) if k not in of.words])
     fill(made, of.rows, of.totals)
+
+
+class Blocks(ui.column):
+    """What a view of the report holds; what is folded stays open, or shut, as its reader has left it."""
+
+    def __init__(self) -> None:
+        """Nothing is shown yet."""
+        super().__init__()
+        self.classes("w-full")
+        self._opened: set[str] = set()
+
+    def show_blocks(self, blocks: Sequence[Block], figures: Mapping[str, Plot | str] | None = None) -> None:
+        """Show these in place of what was there, with their figures as `views.plots.drawn` has them."""
+        self.clear()
+        with self:
+            self._add(blocks, figures or {}, 2)
+
+    def _add(self, blocks: Sequence[Block], figures: Mapping[str, Plot | str], level: int) -> None:
+        for block in blocks:
+            match block:
+                case str():
+                    ui.label(block)
+                case Soft():
+                    ui.label(block.text).classes("soft")
+                case Points():
+                    with ui.element("ul").classes("points"):
+                        for line in block.lines:
+                            layout.words("li", line)
+                case Verbatim():
+                    layout.words("pre", block.text).classes("kept mono")
+                case Verdict():
+                    ui.label(block.headline).classes({True: "PASS", False: "FAIL", None: ""}[block.good])
+                    self._add(block.blocks, figures, level)
+                case Table():
+                    with self._under(block.title, block.folded, level):
+                        put(table(), block)
+                case View():
+                    with self._under(block.title, block.title if block.folded else "", level):
+                        self._add(block.blocks, figures, level + 1)
+                case _:
+                    self._figure(block.title, block.caption, figures[block.name])
+
+    @contextmanager
+    def _under(self, title: str, folded: str, level: int) -> Iterator[None]:
+        """Under a heading, or behind the sentence of what is folded."""
+        if not folded:
+            if title:
+                layout.heading(title, level)
+            yield
+            return
+        with ui.expansion(folded, value=folded in self._opened).props("dense").classes("w-full") as fold:
+            yield
+        fold.on_value_change(lambda event: (self._opened.add if event.value else self._opened.discard)(folded))
+
+    def _figure(self, title: str, caption: str, figure: Plot | str) -> None:
+        if isinstance(figure, str):
+            ui.element("img").classes("picture").props["src"] = figure
+        else:
+            Figure(title, figure)
+        ui.label(caption).classes("soft small")
 
 
 def _columns(headings: Sequence[str], numbers: Collection[int] = ()) -> list[dict[str, Any]]:

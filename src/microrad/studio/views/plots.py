@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import base64
+from collections.abc import Sequence
 from typing import Any
 
+from microrad.report.plotting.figure import Figure
 from microrad.report.plotting.interactive import plot_of, words
 from microrad.report.plotting.sheet import Axis, Legend, Mark, Sheet, grid
+from microrad.report.view import Block, Drawing, Verdict, View
 
 Plot = dict[str, Any]
 
@@ -43,6 +47,25 @@ def empty(text: str) -> Plot:
     hidden = {"visible": False}
     layout = {**_WHITE, "margin": dict.fromkeys("lrtb", 10), "xaxis": hidden, "yaxis": hidden, "annotations": [note]}
     return {"data": [], "layout": layout, "config": CONFIG}
+
+
+def drawn(blocks: Sequence[Block]) -> dict[str, Plot | str]:
+    """The figures among these blocks by their names; the address of its picture for one that does not move."""
+    found: dict[str, Plot | str] = {}
+    for block in blocks:
+        match block:
+            case View() | Verdict():
+                found |= drawn(block.blocks)
+            case Figure():
+                found[block.name] = figure(block.sheet) if block.alive else address(block.svg)
+            case Drawing():
+                found[block.name] = address(block.svg)
+    return found
+
+
+def address(svg: str) -> str:
+    """A picture as the address of an image."""
+    return f"data:image/svg+xml;base64,{base64.b64encode(svg.encode()).decode()}"
 
 
 def figure(sheet: Sheet) -> Plot:

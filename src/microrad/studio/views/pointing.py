@@ -9,19 +9,20 @@ import numpy as np
 
 from microrad import link
 from microrad.core.units import format_quantity
-from microrad.link import DEEPEST_DB, pointing
+from microrad.link import pointing
 from microrad.link import study as link_study
 from microrad.link.pointing import OpenLoopPointing
 from microrad.link.study import PointAheadEffect
 from microrad.mission.file import LinkFile
+from microrad.report.links import views as links
+from microrad.report.links import words
 from microrad.report.plotting.palette import BLACK, BLUE, GREEN, GREY, ORANGE, SKY, VERMILION
 from microrad.report.plotting.sheet import Axis, Bars, Line, Mark, Rule, shortened
 from microrad.report.quantities import quantity
+from microrad.report.view import Block, Soft, View, told
 from microrad.studio.draft.draft import Draft
 from microrad.studio.views.plots import Plot, plot, rows
 from microrad.studio.views.sliders import Slider, slider
-
-Row = tuple[str, ...]
 
 POINTS = 241
 """Of the curve of coverage."""
@@ -33,14 +34,9 @@ _BEACON = "beacon.divergence"
 
 @dataclass(frozen=True, slots=True)
 class PointingView:
-    """The open-loop pointing budget of a mission, and its point-ahead where it has one.
-
-    `left` is for each line what the beacon's half angle leaves by the root sum square and by the rule of ECSS for two
-    axes; empty for a mission without a beacon.
-    """
+    """The open-loop pointing budget of a mission, and its point-ahead where it has one."""
 
     budget: OpenLoopPointing
-    left: tuple[tuple[pointing.Allocation, pointing.Allocation], ...]
     ahead: PointAheadEffect | None
 
     @property
@@ -53,11 +49,7 @@ def view(file: LinkFile) -> PointingView:
     """The pointing budget of a mission; raises ValueError as `pointing.open_loop_budget` does."""
     m, data = file.mission, link.of(file.mission)
     p = pointing.open_loop_budget(m.pointing, data.shared, m.beacon, file.sources)
-    left: tuple[tuple[pointing.Allocation, pointing.Allocation], ...] = ()
-    if p.reading is not None and p.reading.half_angle_rad > 0.0:
-        half = p.reading.half_angle_rad
-        left = tuple(zip(p.allocation(half, "rss"), p.allocation(half, "ecss-radial"), strict=True))
-    return PointingView(p, left, link_study.point_ahead(data))
+    return PointingView(p, link_study.point_ahead(data))
 
 
 def sliders(draft: Draft) -> dict[str, tuple[Slider, ...]]:
@@ -84,66 +76,13 @@ def _named(made: Slider, key: str) -> Slider:
     return replace(made, label=name[:1].upper() + name[1:])
 
 
-# ------------------------------------------------------------------------------------------------------------- tables
-def line_rows(v: PointingView) -> list[Row]:
-    """Each error with its half width, its share of the squares, what is left for it by both rules, and its origin."""
-    left = [["nothing" if a.note else quantity(a.largest_rad, "rad") for a in both] for both in v.left]
-    shared = zip(v.budget.lines, v.budget.variance_shares, left or [["", ""]] * len(v.budget.lines), strict=True)
-    return [
-        (
-            each.name,
-            quantity(each.value, each.unit),
-            f"{100.0 * share:.1f} %",
-            *both,
-            f"{each.basis}. From {each.source}",
-        )
-        for each, share, both in shared
-    ]
-
-
-def total_rows(v: PointingView) -> list[Row]:
-    """The total by each rule, beside the beacon's half angle; formula, authority, and what speaks against it."""
-    of = {"stated": "as stated", "axis": "one axis", "radial": "off the line of sight"}
-    return [
-        (
-            f"{each.name}: {of[each.of]}",
-            quantity(each.total_rad, "rad"),
-            _against(v, each.total_rad),
-            f"{each.formula}; {each.authority}",
-            each.caveat,
-        )
-        for each in v.budget.summations
-    ]
-
-
-def _against(v: PointingView, total_rad: float) -> str:
-    """Whether the beacon's half angle covers a total, and by how much."""
-    if math.isnan(v.half_angle_rad):
-        return "no beacon"
-    spare = v.half_angle_rad - total_rad
-    return f"covered, {quantity(spare, 'rad')} left" if spare >= 0.0 else f"{quantity(-spare, 'rad')} short"
-
-
-def ahead_rows(v: PointingView) -> list[Row]:
-    """Point-ahead as an angle, in half angles of the beam, as a loss and as a range of the mirror."""
-    a = v.ahead
-    if a is None:
-        return []
-    left_out = "left out, it would cost" if a.corrected else "not corrected, it costs"
-    most = f"more than {DEEPEST_DB:g} dB" if not a.loss_db <= DEEPEST_DB else f"{a.loss_db:.2f} dB"
-    return [
-        ("point-ahead angle, largest", quantity(a.angle_rad, "rad")),
-        ("in half angles of the communication beam", f"{a.beam_half_angles:.2f}"),
-        (left_out, most),
-        ("range of a mirror that makes it, at the line of sight", quantity(a.mirror_range_rad, "rad")),
-    ]
-
-
-def words(v: PointingView) -> list[str]:
-    """What the beacon covers, in sentences; that there is none, where there is none."""
-    from microrad.report.links.views import coverage
-
-    return coverage(v.budget) or ["The mission has no beacon, so nothing is to be covered."]
+# ------------------------------------------------------------------------------------------------------------- blocks
+def blocks(v: PointingView) -> tuple[Block, ...]:
+    """The report's view of the budget, and the point-ahead; says of both what a mission does not have."""
+    said = links.pointing_view(v.budget)
+    bare = "" if v.budget.reading else "The mission has no beacon, so nothing is to be covered."
+    ahead = Soft("The mission has no table [point_ahead].") if v.ahead is None else words.point_ahead(v.ahead)
+    return told(bare, *(said.blocks if said else ()), View("Point-ahead", [ahead]))
 
 
 # -------------------------------------------------------------------------------------------------------------- plots
