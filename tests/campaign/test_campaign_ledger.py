@@ -302,7 +302,9 @@ def test_files_that_are_no_ledger_are_refused(path, write):
     assert path.read_bytes() == before
 
 
-UNREADABLE = r"microrad cannot read whether it is a ledger \(.+\): make file and folder readable, or name a file elsewhere"
+UNREADABLE = (
+    r"microrad cannot read whether it is a ledger \(.+\): make file and folder readable, or name a file elsewhere"
+)
 
 
 def test_a_file_that_sqlite_cannot_open_is_refused_in_words(tmp_path):
