@@ -14,6 +14,7 @@ from scipy.stats import kstest
 
 import oracle_pointing as pointing
 from microrad.core import kernels
+from microrad.core.kernels import random_numbers, side_by_side
 from oracles import BoucWen, Operator, compose
 from places import TESTS
 
@@ -57,7 +58,7 @@ def gaussians(seed, first_run, purpose, first_block, blocks):
 @known_answers
 def test_philox_gives_the_known_answers(counter, key, answer):
     assert list(pointing.philox(counter, key)) == answer
-    assert [int(w) for w in kernels._philox(*map(np.uint64, (*counter, *key)))] == answer
+    assert [int(w) for w in random_numbers.philox(*map(np.uint64, (*counter, *key)))] == answer
 
 
 @known_answers
@@ -103,8 +104,8 @@ def test_gaussians_are_normal_and_those_of_other_places_independent():
 
 def test_uniforms_lie_in_the_middle_of_their_cells_and_never_at_zero_or_one():
     for word in (0, 1, 2, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFE, 0xFFFFFFFF):
-        assert kernels._uniform(np.uint64(word)) == (word + 0.5) / 2**32
-    assert 0 < kernels._uniform(np.uint64(0)) < kernels._uniform(np.uint64(0xFFFFFFFF)) < 1
+        assert random_numbers.uniform(np.uint64(word)) == (word + 0.5) / 2**32
+    assert 0 < random_numbers.uniform(np.uint64(0)) < random_numbers.uniform(np.uint64(0xFFFFFFFF)) < 1
 
 
 # ------------------------------------------------------------------------------------------------ row functions
@@ -116,27 +117,27 @@ def over(function, x):
 
 def test_row_exponential_is_libms():
     x = np.concatenate([np.linspace(-700, 700, 4001), np.linspace(-1, 1, 4001), [0.0, -0.0, 1e-300, -1e-17]])
-    error = np.max(np.abs(over(kernels._row_exp, x) / np.exp(x) - 1))
+    error = np.max(np.abs(over(side_by_side.row_exp, x) / np.exp(x) - 1))
     print(f"exp within {error:.1e}")
     assert error < 2e-14
-    assert kernels._row_exp(0.0) == 1.0
+    assert side_by_side.row_exp(0.0) == 1.0
 
 
 def test_row_exponential_is_held_outside_its_range():
-    top, bottom = kernels._row_exp(700.0), kernels._row_exp(-700.0)
-    assert [kernels._row_exp(x) for x in (700.1, 1e6, 1e300, inf)] == [top] * 4
-    assert [kernels._row_exp(x) for x in (-700.1, -1e6, -1e300, -inf)] == [bottom] * 4
-    assert kernels._row_exp(699.0) < top
-    assert kernels._row_exp(-699.0) > bottom
+    top, bottom = side_by_side.row_exp(700.0), side_by_side.row_exp(-700.0)
+    assert [side_by_side.row_exp(x) for x in (700.1, 1e6, 1e300, inf)] == [top] * 4
+    assert [side_by_side.row_exp(x) for x in (-700.1, -1e6, -1e300, -inf)] == [bottom] * 4
+    assert side_by_side.row_exp(699.0) < top
+    assert side_by_side.row_exp(-699.0) > bottom
 
 
 def test_row_relaxation_is_libms():
     size = np.concatenate([np.geomspace(1e-18, 690, 4001), np.linspace(0.1, 2, 2001), [1e-300, 5e-324]])
     k = np.concatenate([size, -size])
-    error = np.max(np.abs(over(kernels._row_relaxation, k) / (-np.expm1(-k) / k) - 1))
+    error = np.max(np.abs(over(side_by_side.row_relaxation, k) / (-np.expm1(-k) / k) - 1))
     print(f"(1 - exp(-k)) / k within {error:.1e}")
     assert error < 2e-14
-    assert kernels._row_relaxation(0.0) == kernels._row_relaxation(-0.0) == 1.0
+    assert side_by_side.row_relaxation(0.0) == side_by_side.row_relaxation(-0.0) == 1.0
 
 
 def test_row_logarithm_is_libms():
@@ -145,24 +146,24 @@ def test_row_logarithm_is_libms():
     )
     expected = np.log(x)
     away = np.abs(expected) > 1e-3
-    found = over(kernels._row_log, x)
+    found = over(side_by_side.row_log, x)
     error = np.max(np.abs(found[away] / expected[away] - 1))
     print(f"ln within {error:.1e}, near 1 absolutely within {np.max(np.abs(found - expected)[~away]):.1e}")
     assert error < 1e-14
     assert_allclose(found[~away], expected[~away], rtol=0, atol=1e-16)
-    assert kernels._row_log(1.0) == 0.0
+    assert side_by_side.row_log(1.0) == 0.0
 
 
 def test_row_logarithm_keeps_its_digits_beside_one():
     """Box-Muller takes the logarithm of 1 - 2^-33: a radius there is as exact as any other."""
     near = np.concatenate([s * np.geomspace(2.0**-52, 0.1, 400) for s in (1, -1)])
     x = 1.0 + near
-    assert_allclose(over(kernels._row_log, x), np.log1p(x - 1.0), rtol=1e-14)
+    assert_allclose(over(side_by_side.row_log, x), np.log1p(x - 1.0), rtol=1e-14)
 
 
 def test_cosine_and_sine_of_a_turn_are_libms():
     turns = np.concatenate([np.linspace(0, 1, 8193), np.linspace(0, 1, 10_001), [2.0**-33, 1 - 2.0**-33]])
-    found = np.array([kernels._cosine_sine(float(t)) for t in turns])
+    found = np.array([random_numbers.cosine_sine(float(t)) for t in turns])
     expected = np.column_stack([np.cos(2 * np.pi * turns), np.sin(2 * np.pi * turns)])
     error = np.max(np.abs(found - expected))
     print(f"cos and sin within {error:.1e}")

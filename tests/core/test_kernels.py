@@ -19,6 +19,7 @@ from scipy.signal import StateSpace, lsim
 
 import oracles
 from microrad.core import kernels, lti
+from microrad.core.kernels import compiler
 from microrad.mirror import model
 from microrad.mirror.hysteresis import Play
 from oracles import BoucWen, Operator, compose
@@ -1089,7 +1090,7 @@ def test_the_kernels_run_as_they_are_without_the_compiler(tmp_path):
 
 def features(**environment):
     """The processor's features that the kernels are compiled for, under these variables."""
-    script = "from microrad.core import kernels; print(kernels.config.CPU_FEATURES)"
+    script = "from microrad.core.kernels import compiler; print(compiler.config.CPU_FEATURES)"
     plain = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA_CPU")}
     done = subprocess.run(
         [sys.executable, "-c", script], env=plain | environment, capture_output=True, text=True, check=True
@@ -1098,24 +1099,24 @@ def features(**environment):
 
 
 def test_vectors_are_as_wide_as_pays_and_as_somebody_has_said():
-    wide = "+avx512vbmi2" in kernels.get_host_cpu_features()
+    wide = "+avx512vbmi2" in compiler.get_host_cpu_features()
     assert features().endswith(",-prefer-256-bit") == wide
     assert features(NUMBA_CPU_NAME="x86-64", NUMBA_CPU_FEATURES="+sse2") == "+sse2"
     assert features(NUMBA_CPU_NAME="haswell") == "None"
 
 
 def test_machine_code_of_one_signature_stays_beside_that_of_another(tmp_path):
-    cache = kernels._CacheFile(str(tmp_path), "kernel-1.py3", "stamp")
+    cache = compiler.CacheFile(str(tmp_path), "kernel-1.py3", "stamp")
     for signature in ("one", "another"):
         cache.save(signature, f"code of {signature}")
     for signature in ("one", "another"):
-        assert kernels._CacheFile(str(tmp_path), "kernel-1.py3", "stamp").load(signature) == f"code of {signature}"
+        assert compiler.CacheFile(str(tmp_path), "kernel-1.py3", "stamp").load(signature) == f"code of {signature}"
 
 
 def test_machine_code_of_two_processes_never_shares_a_file(tmp_path, monkeypatch):
     """Each process saves with the index it has read before the other wrote: a count of files would name both alike."""
-    first, second = (kernels._CacheFile(str(tmp_path), "kernel-1.py3", "stamp") for _ in range(2))
-    monkeypatch.setattr(kernels._CacheFile, "_load_index", lambda self: {})
+    first, second = (compiler.CacheFile(str(tmp_path), "kernel-1.py3", "stamp") for _ in range(2))
+    monkeypatch.setattr(compiler.CacheFile, "_load_index", lambda self: {})
     first.save("one signature", "code of one")
     second.save("another signature", "code of another")
     monkeypatch.undo()

@@ -14,6 +14,7 @@ import pytest
 
 import designs
 from microrad.core import kernels, lti
+from microrad.core.kernels.loop import inverse_drive
 from microrad.export.flight import double_run, rounding
 from microrad.export.flight.c_code import flight_code, vectors_text
 from microrad.export.linear_part.sections import compensated_states, sections
@@ -340,7 +341,7 @@ def kernel_inverse(of, reference):
         np.zeros(of.lag_keep.size), empty, np.zeros(1, np.int64), np.zeros((1, 2), np.int64), np.zeros(n + 1, np.int64),
     )  # fmt: skip
     found = np.zeros_like(reference)
-    kernels._inverse(loop, state, reference, PERIOD_S, found)
+    inverse_drive(loop, state, reference, PERIOD_S, found)
     return found
 
 

@@ -1,0 +1,178 @@
+"""What an ensemble is handed: many runs side by side, each array with a row of runs as its last index."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from microrad.core.kernels.compiler import Floats, Indices, Integers
+from microrad.core.kernels.records import SLEW_STEP, Rows
+
+# Runs in a row of memory: a count that the compiler knows, so that it works on several of them with one instruction.
+LANES = 64
+
+# Bins of the radial error's histogram: sixteen to an octave of its square, from 2^-66 rad^2 (0.1 nrad) to 1 rad^2.
+BINS_OCTAVE_BITS = 4
+BINS_LOWEST_OCTAVE = -66
+BINS = -BINS_LOWEST_OCTAVE << BINS_OCTAVE_BITS
+BIN_SHIFT = np.int64(52 - BINS_OCTAVE_BITS)
+BIN_OFFSET = np.int64((1023 + BINS_LOWEST_OCTAVE) << BINS_OCTAVE_BITS)
+
+# Fields of a bank element's rows, of an actuator's drive, and of the counters of a run.
+BANK_Q, BANK_H, BANK_Z, BANK_Z_BEFORE, BANK_Q_NEXT, BANK_TRAVEL, BANK_FORCING, BANK_H_BEFORE, BANK_FIELDS = range(9)
+DRIVE_BEFORE, DRIVE_NOW, DRIVE_FIELDS = range(3)
+(
+    COUNT_SATURATED,
+    COUNT_SLEW,
+    COUNT_CLAMPED,
+    COUNT_INVERSE_CLAMPED,
+    COUNT_OUTSIDE,
+    COUNT_LOST,
+    COUNT_FIELDS,
+) = range(7)
+
+# Columns of an actuator's parameters beyond those of a Loop: the drive's identified range.
+DRIVE_LOW, DRIVE_HIGH = SLEW_STEP + 1, SLEW_STEP + 2
+
+# Streams of random numbers: a disturbance's purposes lie below these; a sensor's word c has SENSOR_PURPOSE + c // 4.
+SENSOR_PURPOSE = 1 << 28
+START_PURPOSE = 1 << 29
+
+
+class Ensemble(NamedTuple):
+    """A sampled pointing loop for many runs side by side, as arrays.
+
+    The plant is that of `Plant`, without its counts in the type: one compiled kernel serves every mirror. ``optics``
+    (axes, outputs) turns its outputs into line-of-sight angles y. ``E_held`` is E0 + E1, ``E_back`` what takes it back,
+    -E1. Line-of-sight error e = reference + disturbance - y.
+
+    Disturbance: s[k+1] = As s + Bs g with independent standard normal g (one a source and plant step; ``purpose`` names
+    each source's stream), d = Cs s; As by diagonal and neighbour coupling, no rest. Sensors: the optical one delivers e
+    of ``sensor_delay_steps`` plant steps ago every ``sensor_every`` samples, with ``optical_noise`` (rms, by axis) and
+    ``optical_resolution``, and holds its last reading while the radial error is beyond ``field_of_view``; the gauge
+    delivers the plant's outputs with ``gauge_noise`` and ``gauge_resolution``.
+
+    Controller: m = (optical by axis, gauge by output, reference by axis); x[k+1] = A x + B m + L (clip(v) - v), and
+    C x + D m = (v by actuator, then, with ``feedforward``, the inverse's target and its rate by actuator); what the
+    inverse makes of the target is added to v ahead of the clip. Rows of ``actuator`` as in `Loop`, then DRIVE_LOW and
+    DRIVE_HIGH, the drive range that the mirror was identified in. Inverse as in `Loop`.
+    """
+
+    step_s: float
+    feedback: bool
+    diagonal: Floats
+    coupling: Floats
+    rest: Rows
+    B0: Floats
+    B1: Floats
+    E0: Floats
+    E1: Floats
+    E_held: Floats
+    E_back: Floats
+    F: Floats
+    G: Floats
+    Cy: Floats
+    Dy: Floats
+    Ky: Floats
+    bouc_wen: Floats
+    operator: Floats
+    play_start: Indices
+    play_threshold: Floats
+    play_weight: Floats
+    optics: Floats
+    shaping_diagonal: Floats
+    shaping_coupling: Floats
+    shaping_noise: Floats
+    shaping_output: Floats
+    purpose: Indices
+    seed: Indices
+    steps_per_sample: int
+    delay_steps: int
+    sensor_delay_steps: int
+    sensor_every: int
+    optical_noise: Floats
+    optical_resolution: float
+    field_of_view: float
+    gauge_noise: float
+    gauge_resolution: float
+    feedforward: bool
+    A: Floats
+    B: Floats
+    C: Floats
+    D: Floats
+    L: Floats
+    actuator: Floats
+    inverse_direct: Floats
+    inverse_bouc_wen: Floats
+    inverse_bouc_wen_actuator: Indices
+    inverse_play_threshold: Floats
+    inverse_play_weight: Floats
+    inverse_play_actuator: Indices
+    inverse_widening: Floats
+    inverse_lag_keep: Floats
+    inverse_lag_weight: Floats
+    inverse_lag_actuator: Indices
+
+
+class EnsembleState(NamedTuple):
+    """The memory of `LANES` runs; the kernel writes into these arrays. A row of LANES numbers for each quantity.
+
+    ``place``: control sample, plant step, and 1 where statistics are taken. Rows too: ``sum_square`` (axes) and
+    ``largest`` (radial error squared) of every plant step, ``sum`` (axes) of the control samples, ``counts`` (COUNT_*).
+    ``histogram`` (LANES, BINS) counts the radial error at the end of each control sample.
+
+    ``drawn`` is empty where the runs draw their random numbers themselves. Else it is what `draw_loop` has drawn for
+    the control samples of the next call: runs of other controllers and on other mirrors share it.
+    """
+
+    first_run: Indices
+    place: Integers
+    x: Floats
+    x_next: Floats
+    drive: Floats
+    bank: Floats
+    play: Floats
+    y: Floats
+    shaping: Floats
+    disturbance: Floats
+    gauss: Floats
+    sensor_gauss: Floats
+    error: Floats
+    error_ring: Floats
+    measured: Floats
+    xc: Floats
+    xc_next: Floats
+    output: Floats
+    command: Floats
+    target: Floats
+    inverse: Floats
+    inverse_play: Floats
+    inverse_lag: Floats
+    work: Floats
+    sum: Floats
+    sum_square: Floats
+    largest: Floats
+    counts: Floats
+    histogram: NDArray[np.int32]
+    drawn: Floats
+
+
+SAMPLE, STEP, COUNTING = range(3)  # of ``place``
+
+
+class Shift(NamedTuple):
+    """What is added to the random numbers of LANES runs from the control sample ``first_sample`` on.
+
+    The disturbances' number of source w at a plant step k from there grows by ``step[k, w]`` @ ``size``, the reading's
+    number i (optical by axis, then gauge by output) at a sample by ``sample[k, i]`` @ ``size``. ``size`` has a row of
+    runs for each direction, flat (directions x LANES), the others a last index by direction. Behind the end of ``step``
+    and ``sample``, which may be empty, the numbers are as they are drawn.
+    """
+
+    first_sample: int
+    step: Floats
+    sample: Floats
+    size: Floats
+
+
+UNSHIFTED = Shift(0, np.zeros((0, 0, 0)), np.zeros((0, 0, 0)), np.zeros(0))

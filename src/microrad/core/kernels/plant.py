@@ -1,0 +1,224 @@
+"""The mirror: a linear system in feedback with a bank of hysteresis elements, driven by a sampled drive."""
+
+from typing import Any, NamedTuple
+
+from numpy.typing import NDArray
+
+from microrad.core.kernels.compiler import Floats, Integers, compiled_loop, inlined, merged
+from microrad.core.kernels.hysteresis import bouc_wen_advance, clamp, near_exp, play_step, row_product, widened
+from microrad.core.kernels.records import BIAS, CHANGE, D1, D2, RATE_LIMIT, WIDENING, WIDENING_LIMIT, H, Q, Z
+
+
+@inlined
+def predict(plant, state):  # type: ignore[no-untyped-def]
+    """The part of the predicted x that needs nothing from the end of the step."""
+    x, x_next, first_operator = state.x, state.x_next, len(plant.elements)
+    for i in range(len(plant.states)):
+        total = plant.diagonal[i] * x[i] + plant.coupling[i] * x[i ^ 1]
+        if plant.direct:
+            for a in range(len(plant.actuators)):
+                total += plant.B0[i, a] * state.u[a]
+        for e in range(len(plant.elements)):
+            total += plant.E_held[i, e] * state.bank[e, Z]
+        for o in range(len(plant.operators)):
+            total += plant.E_held[i, first_operator + o] * state.bank[first_operator + o, Z]
+        x_next[i] = total
+    if plant.rest.value.size > 0:
+        for i in range(len(plant.states)):
+            x_next[i] += row_product(plant.rest, i, x)
+
+
+@inlined
+def _element_drive(plant, state, e):  # type: ignore[no-untyped-def]
+    """q of element e at the end of the step, from the predicted x."""
+    q = 0.0
+    for a in range(len(plant.actuators)):
+        q += plant.G[e, a] * state.u_next[a]
+    if plant.feedback:
+        for i in range(len(plant.states)):
+            q += plant.F[e, i] * state.x_next[i]
+    return q
+
+
+@merged
+def plant_step(plant, state):  # type: ignore[no-untyped-def]
+    """One step to ``u_next``, behind predict: second order, and nothing is iterated."""
+    x, x_next, y, bank, first_operator = state.x, state.x_next, state.y, state.bank, len(plant.elements)
+    if plant.direct:
+        for i in range(len(plant.states)):
+            for a in range(len(plant.actuators)):
+                x_next[i] += plant.B1[i, a] * state.u_next[a]
+    for i in range(len(plant.outputs)):
+        total = 0.0
+        for j in range(len(plant.states)):
+            total += plant.C[i, j] * x_next[j]
+        if plant.direct:
+            for a in range(len(plant.actuators)):
+                total += plant.D[i, a] * state.u_next[a]
+        y[i] = total
+    for e in range(len(plant.elements)):
+        _finish_element(bank, e, _bouc_wen_element(plant, state, e, _element_drive(plant, state, e)))
+    for o in range(len(plant.operators)):
+        e = first_operator + o
+        _finish_element(bank, e, _play_operator(plant, state, e, o, _element_drive(plant, state, e)))
+    for i in range(len(plant.states)):
+        total = x_next[i]
+        for e in range(len(plant.elements)):
+            total += plant.E1[i, e] * bank[e, CHANGE]
+        for o in range(len(plant.operators)):
+            total += plant.E1[i, first_operator + o] * bank[first_operator + o, CHANGE]
+        x[i] = total
+    for i in range(len(plant.outputs)):
+        for e in range(len(plant.elements)):
+            y[i] += plant.CE1[i, e] * bank[e, CHANGE] + plant.K[i, e] * bank[e, Z]
+        for o in range(len(plant.operators)):
+            e = first_operator + o
+            y[i] += plant.CE1[i, e] * bank[e, CHANGE] + plant.K[i, e] * bank[e, Z]
+    for a in range(len(plant.actuators)):
+        state.u[a] = state.u_next[a]
+
+
+@inlined
+def _finish_element(bank, e, z):  # type: ignore[no-untyped-def]
+    bank[e, CHANGE] = z - bank[e, Z]
+    bank[e, Z] = z
+
+
+@inlined
+def _bouc_wen_element(plant, state, e, q):  # type: ignore[no-untyped-def]
+    """z of Bouc-Wen element e, advanced exactly from its stored q to ``q``."""
+    row = plant.bouc_wen
+    travel = q - state.bank[e, Q]
+    rate = travel / plant.step_s
+    if abs(rate) > row[e, RATE_LIMIT]:
+        state.clamped[e] += 1
+        rate = clamp(rate, row[e, RATE_LIMIT])
+    h = bouc_wen_advance(state.bank[e, H], travel, rate, row, e)
+    state.bank[e, H] = h
+    state.bank[e, Q] = q
+    return row[e, D1] * (near_exp(-row[e, D2] * rate) * (q + row[e, BIAS]) - row[e, BIAS]) + h
+
+
+@inlined
+def _play_operator(plant, state, e, o, q):  # type: ignore[no-untyped-def]
+    """z of Prandtl-Ishlinskii operator o, which is element e, with its plays taken to the drive ``q``."""
+    widening = 0.0
+    if plant.operator[o, WIDENING] != 0.0:
+        rate = abs(q - state.bank[e, Q]) / plant.step_s
+        if rate > plant.operator[o, WIDENING_LIMIT]:
+            state.clamped[e] += 1
+            rate = plant.operator[o, WIDENING_LIMIT]
+        widening = plant.operator[o, WIDENING] * rate
+    total = 0.0
+    for j in range(plant.play_start[o], plant.play_start[o + 1]):
+        p = play_step(state.play[j], q, widened(plant.play_threshold[j], widening))
+        state.play[j] = p
+        total += plant.play_weight[j] * p
+    state.bank[e, Q] = q
+    return total
+
+
+@compiled_loop
+def open_loop(plant, state, drive, output, bank):  # type: ignore[no-untyped-def]
+    """Response of the mirror to ``drive`` (samples, actuators), linear between samples spaced by the plant's step.
+
+    Fills ``output`` (samples, outputs) and ``bank`` (samples, elements; z) and leaves ``state`` at the last sample,
+    so that a following call continues. The first sample is reached from the stored state in one step.
+    """
+    for k in range(drive.shape[0]):
+        for a in range(len(plant.actuators)):
+            state.u_next[a] = drive[k, a]
+        predict(plant, state)
+        plant_step(plant, state)
+        for i in range(len(plant.outputs)):
+            output[k, i] = state.y[i]
+        for i in range(bank.shape[1]):
+            bank[k, i] = state.bank[i, Z]
+
+
+class PlayPlant(NamedTuple):
+    """The arrays of a `Plant` with Prandtl-Ishlinskii operators only and an Ad without rest.
+
+    The thresholds of each operator ascend and do not depend on the rate.
+
+    Without the counts, for a search: it compiles once for all sizes, where a `Plant` compiles for each.
+    """
+
+    diagonal: NDArray[Any]
+    coupling: NDArray[Any]
+    B0: NDArray[Any]
+    B1: NDArray[Any]
+    E_held: NDArray[Any]
+    E1: NDArray[Any]
+    F: NDArray[Any]
+    G: NDArray[Any]
+    C: NDArray[Any]
+    D: NDArray[Any]
+    K: NDArray[Any]
+    play_start: Integers
+    play_threshold: NDArray[Any]
+    play_weight: NDArray[Any]
+
+
+class Path(NamedTuple):
+    """What a `PlayPlant` went through, one row a step: `play_path` fills it, `tangent_kernel` runs along it.
+
+    ``x`` is the predicted state (see `Plant`), ``state`` the one with the change of z in it, ``z`` and ``play`` the
+    outputs and the plays of the operators. ``moved`` counts for each operator the plays that its drive carries along:
+    always the first ones, for the memories of an operator that began at rest are nested.
+    """
+
+    output: Floats
+    x: Floats
+    state: Floats
+    z: Floats
+    play: Floats
+    moved: Integers
+
+
+@compiled_loop
+def play_path(plant, drive, path):  # type: ignore[no-untyped-def]
+    """`open_loop` from rest with the whole path kept; the same arithmetic, see `Plant`, in loops of any length."""
+    states, inputs, operators = plant.diagonal.size, drive.shape[1], path.z.shape[1]
+    for k in range(drive.shape[0]):
+        for i in range(states):
+            total = 0.0
+            for a in range(inputs):
+                total += plant.B1[i, a] * drive[k, a]
+            if k > 0:
+                total += plant.diagonal[i] * path.state[k - 1, i] + plant.coupling[i] * path.state[k - 1, i ^ 1]
+                for a in range(inputs):
+                    total += plant.B0[i, a] * drive[k - 1, a]
+                for e in range(operators):
+                    total += plant.E_held[i, e] * path.z[k - 1, e]
+            path.x[k, i] = total
+        for e in range(operators):
+            q = 0.0
+            for a in range(inputs):
+                q += plant.G[e, a] * drive[k, a]
+            for i in range(states):
+                q += plant.F[e, i] * path.x[k, i]
+            total, count = 0.0, 0
+            for j in range(plant.play_start[e], plant.play_start[e + 1]):
+                threshold = plant.play_threshold[j]
+                p = play_step(path.play[k - 1, j] if k > 0 else 0.0, q, threshold)
+                path.play[k, j] = p
+                total += plant.play_weight[j] * p
+                if p == q - threshold or p == q + threshold:
+                    count += 1
+            path.z[k, e] = total
+            path.moved[k, e] = count
+        for i in range(states):
+            total = path.x[k, i]
+            for e in range(operators):
+                total += plant.E1[i, e] * (path.z[k, e] - (path.z[k - 1, e] if k > 0 else 0.0))
+            path.state[k, i] = total
+        for o in range(path.output.shape[1]):
+            total = 0.0
+            for i in range(states):
+                total += plant.C[o, i] * path.state[k, i]
+            for a in range(inputs):
+                total += plant.D[o, a] * drive[k, a]
+            for e in range(operators):
+                total += plant.K[o, e] * path.z[k, e]
+            path.output[k, o] = total

@@ -1,0 +1,164 @@
+"""Derivatives of a mirror's output by its parameters, along the path that the mirror takes."""
+
+from typing import Any, NamedTuple
+
+from numpy.typing import NDArray
+
+from microrad.core.kernels.compiler import Integers, compiled_loop, inlined
+from microrad.core.kernels.plant import PlayPlant
+
+DRIVE_FROM, BANK_FROM = range(2)  # of a parameter's place
+
+
+class Tangents(NamedTuple):
+    """Parameters, where each enters a `PlayPlant` along a `Path`, and the working memory of their tangents.
+
+    The first ``places[DRIVE_FROM]`` parameters enter the state: row ``source`` of ``before`` adds to the predicted
+    state, and of ``after`` to the state once the operators have moved. Both have the shape (steps, sources, 2), for the
+    state ``row`` and its neighbour; with ``turned`` the pair (a, b) is (-b, a). Those up to ``places[BANK_FROM]`` enter
+    the drive of operator ``row``, by column ``source`` of ``signal`` (steps, columns), and the others its output, by
+    column ``source`` of ``plays``.
+
+    The plant, the signals and the working memory share one precision; single precision is twice as fast, and enough for
+    a search. The working memory has the tangents of all parameters in a row, and rows by state, operator or play; it is
+    zero at the begin of a path.
+    """
+
+    plant: PlayPlant
+    places: Integers
+    row: Integers
+    source: Integers
+    turned: Integers
+    before: NDArray[Any]
+    after: NDArray[Any]
+    signal: NDArray[Any]
+    plays: NDArray[Any]
+    x: NDArray[Any]
+    q: NDArray[Any]
+    q_before: NDArray[Any]
+    z: NDArray[Any]
+    change: NDArray[Any]
+    play: NDArray[Any]
+    still: NDArray[Any]
+    slope: NDArray[Any]
+    moved: Integers
+
+
+@inlined
+def _add(total, gain, row):  # type: ignore[no-untyped-def]
+    """total += gain row. Rows are taken out of their matrices before the loop: only then is it vectorised."""
+    for p in range(total.size):
+        total[p] += gain * row[p]
+
+
+@inlined
+def _inject(t, signals, k):  # type: ignore[no-untyped-def]
+    """Add what the parameters of the state contribute by themselves at step k."""
+    for p in range(t.places[DRIVE_FROM]):
+        i, s = t.row[p], t.source[p]
+        if t.turned[p] == 1:
+            t.x[i, p] -= signals[k, s, 1]
+            t.x[i + 1, p] += signals[k, s, 0]
+        else:
+            t.x[i, p] += signals[k, s, 0]
+            if signals[k, s, 1] != 0.0:  # a real pole has no neighbour
+                t.x[i + 1, p] += signals[k, s, 1]
+
+
+@inlined
+def _tangent_predict(t):  # type: ignore[no-untyped-def]
+    for i in range(0, t.x.shape[0], 2):
+        keep0, keep1, cross0, cross1 = (
+            t.plant.diagonal[i],
+            t.plant.diagonal[i + 1],
+            t.plant.coupling[i],
+            t.plant.coupling[i + 1],
+        )
+        x0, x1 = t.x[i], t.x[i + 1]
+        for p in range(x0.size):
+            a, b = x0[p], x1[p]
+            x0[p] = keep0 * a + cross0 * b
+            x1[p] = keep1 * b + cross1 * a
+    for i in range(t.x.shape[0]):
+        for e in range(t.z.shape[0]):
+            _add(t.x[i], t.plant.E_held[i, e], t.z[e])
+
+
+@inlined
+def _tangent_drive(t, k):  # type: ignore[no-untyped-def]
+    for e in range(t.q.shape[0]):
+        q, q_before = t.q[e], t.q_before[e]
+        for p in range(q.size):
+            q_before[p] = q[p]
+            q[p] = 0.0
+        for i in range(t.x.shape[0]):
+            _add(q, t.plant.F[e, i], t.x[i])
+    for p in range(t.places[DRIVE_FROM], t.places[BANK_FROM]):
+        t.q[t.row[p], p] += t.signal[k, t.source[p]]
+
+
+@inlined
+def _regroup(t, e, now):  # type: ignore[no-untyped-def]
+    """The first ``now`` plays of operator e move from here on: those that stop keep the drive's last tangent."""
+    begin, end = t.plant.play_start[e], t.plant.play_start[e + 1]
+    still, q_before = t.still[e], t.q_before[e]
+    for j in range(begin + now, begin + t.moved[e]):
+        play = t.play[j]
+        for p in range(play.size):
+            play[p] = q_before[p]
+    for p in range(still.size):
+        still[p] = 0.0
+    for j in range(begin + now, end):
+        _add(still, t.plant.play_weight[j], t.play[j])
+    t.slope[e] = 0.0
+    for j in range(begin, begin + now):
+        t.slope[e] += t.plant.play_weight[j]
+    t.moved[e] = now
+
+
+@inlined
+def _tangent_bank(t, moved, k):  # type: ignore[no-untyped-def]
+    """Plays that move follow the tangent of the drive; the others keep theirs, and their sum is kept too."""
+    for e in range(t.q.shape[0]):
+        if moved[k, e] != t.moved[e]:
+            _regroup(t, e, moved[k, e])
+        slope, z, change, still, q = t.slope[e], t.z[e], t.change[e], t.still[e], t.q[e]
+        for p in range(z.size):
+            now = still[p] + slope * q[p]
+            change[p] = now - z[p]
+            z[p] = now
+    # What a weight adds by itself is in z and its change now, and is taken off both before the next step's sum.
+    for p in range(t.places[BANK_FROM], t.row.size):
+        value = t.plays[k, t.source[p]]
+        t.z[t.row[p], p] += value
+        t.change[t.row[p], p] += value
+
+
+@compiled_loop
+def tangent_kernel(t, moved, begin, first, stride, output):  # type: ignore[no-untyped-def]
+    """Derivative of a plant's output by parameters, along its path (forward sensitivities of the plays' exact steps).
+
+    Starts with no tangent at step ``begin``, runs to the end of the path, whose ``moved`` is given, and fills
+    ``output`` (rows, outputs, parameters) from step ``first`` on, every ``stride`` steps. What enters the output itself
+    (C, D, K) is not a parameter here.
+    """
+    row = 0
+    for k in range(begin, moved.shape[0]):
+        _tangent_predict(t)
+        _inject(t, t.before, k)
+        _tangent_drive(t, k)
+        _tangent_bank(t, moved, k)
+        for i in range(t.x.shape[0]):
+            for e in range(t.z.shape[0]):
+                _add(t.x[i], t.plant.E1[i, e], t.change[e])
+        _inject(t, t.after, k)
+        if k >= first and (k - first) % stride == 0:
+            for o in range(output.shape[1]):
+                total = output[row, o]
+                for p in range(total.size):
+                    total[p] = 0.0
+                for i in range(t.x.shape[0]):
+                    _add(total, t.plant.C[o, i], t.x[i])
+                for e in range(t.z.shape[0]):
+                    _add(total, t.plant.K[o, e], t.z[e])
+            row += 1
