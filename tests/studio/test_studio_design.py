@@ -17,8 +17,10 @@ from microrad.link import study as link_study
 from microrad.link.pointing import outage as under_jitter
 from microrad.orbit import day as day_study
 from microrad.report.day import figures as day_plots
+from microrad.report.plotting.figure import Figure
 from microrad.report.plotting.sheet import Axis, Line, Rule, grid
-from microrad.report.view import Soft
+from microrad.report.tables import Table
+from microrad.report.view import Soft, View
 from microrad.studio.draft.draft import Draft
 from microrad.studio.pages import elements
 from microrad.studio.views import day as day_view
@@ -42,6 +44,14 @@ def view(draft):
 @pytest.fixture(scope="module")
 def day(draft):
     return day_view.compute_day(draft.set("operations.runs", "2").link(), lambda done, total, what: None)
+
+
+@pytest.fixture(scope="module")
+def figures(day):
+    """Those of the day's page by their names."""
+    blocks = day_view.blocks(day)
+    shown = [*blocks, *(each for view in blocks if isinstance(view, View) for each in view.blocks)]
+    return {each.name: each for each in shown if isinstance(each, Figure)}
 
 
 def slider_of(draft, key):
@@ -242,14 +252,14 @@ def lines(figure):
     return [each for each in (*figure["data"], *figure["layout"]["shapes"]) if each.get("showlegend")]
 
 
-def test_the_plots_are_plain_data_with_units_on_their_axes(view, draft, day):
+def test_the_plots_are_plain_data_with_units_on_their_axes(view, draft, figures):
     pointed = pointing_view.view(draft.link())
     drawn = {
         "map": link_view.map_plot(view),
         "lines": pointing_view.lines_plot(pointed),
         "coverage": pointing_view.coverage_plot(pointed),
-        "timeline": plots.figure(day_view.figures(day)["day-timeline"].sheet),
-        "volume": plots.figure(day_view.figures(day)["data-volume"].sheet),
+        "timeline": plots.figure(figures["day-timeline"].sheet),
+        "volume": plots.figure(figures["data-volume"].sheet),
     }
     units = {"map": "µrad", "lines": "µrad", "coverage": "µrad", "timeline": "hours", "volume": "GB"}
     for name, figure in drawn.items():
@@ -341,8 +351,8 @@ def test_the_curve_of_coverage_is_the_budget_s(draft):
 
 
 # ----------------------------------------------------------------------------------------------------------------- day
-def test_the_timeline_has_every_contact_of_either_way(day):
-    shown = day_view.figures(day)["day-timeline"]
+def test_the_timeline_has_every_contact_of_either_way(day, figures):
+    shown = figures["day-timeline"]
     begins, ends = shown.columns["relay, start (s)"], shown.columns["relay, end (s)"]
     assert {name.partition(",")[0] for name in shown.columns} == {"relay", "direct: kiruna", "eclipse of LEO"}
     assert len(begins) == len(day.relay.contacts)
@@ -351,29 +361,30 @@ def test_the_timeline_has_every_contact_of_either_way(day):
     assert bars["base"][0] == pytest.approx(day.direct.contacts[0].start_s / 3600.0, rel=1e-5)
 
 
-def test_the_map_is_that_of_the_report_and_loads_nothing(day):
-    shown = day_view.figures(day)["world-map"]
-    address, words = day_view.image(shown), shown.caption
-    kind, _, data = address.partition(",")
+def test_the_map_is_that_of_the_report_and_loads_nothing(day, figures):
+    shown = plots.drawn(day_view.blocks(day))
+    kind, _, data = shown["world-map"].partition(",")
     drawn = base64.b64decode(data, validate=True).decode()
     assert kind == "data:image/svg+xml;base64"
     assert drawn == day_plots.ground_map(day).svg
     assert drawn.startswith("<svg ")
     assert 'xmlns="http://www.w3.org/2000/svg"' in drawn
     assert not re.search(r'(?:href="|url\()(?!#)', drawn)
-    assert words.startswith("Ground track of the satellite, thick where it is in contact.")
+    assert figures["world-map"].caption.startswith("Ground track of the satellite, thick where it is in contact.")
+    assert shown.keys() == figures.keys()
+    assert not any(isinstance(each, str) for name, each in shown.items() if name != "world-map")
 
 
-def test_volumes_end_where_the_ways_do(day):
-    drawn = plots.figure(day_view.figures(day)["data-volume"].sheet)["data"]
+def test_volumes_end_where_the_ways_do(day, figures):
+    drawn = plots.figure(figures["data-volume"].sheet)["data"]
     names = "made by the instrument", "relay", "direct downlink"
     assert tuple(trace["name"] for trace in drawn) == (*names, *names[1:])
     assert drawn[1]["y"][-1] == pytest.approx(day.relay.history.delivered_bit[-1] / 8e9, rel=1e-4)
     assert max(drawn[4]["y"]) == pytest.approx(day.direct.history.largest_stored_bit / 8e9, rel=0.05)
 
 
-def test_latencies_rise_to_what_arrives_and_pass_their_median(day):
-    shown = day_view.figures(day)["latency"].columns
+def test_latencies_rise_to_what_arrives_and_pass_their_median(day, figures):
+    shown = figures["latency"].columns
     time_s, share = shown["relay, latency (s)"], shown["relay, share"]
     assert np.all(np.diff(time_s) > 0.0)
     assert np.all(np.diff(share) >= -1e-12)
@@ -382,13 +393,16 @@ def test_latencies_rise_to_what_arrives_and_pass_their_median(day):
     assert share[-1] == pytest.approx(1.0)
 
 
-def test_the_tables_of_the_day_have_its_numbers(day):
-    ways, contacts, swings = day_view.tables(day)
+def test_the_blocks_of_the_day_have_its_numbers_and_warnings(day):
+    blocks = day_view.blocks(day)
+    ways, contacts, swings = (each for each in blocks if isinstance(each, Table))
     assert ways.rows[0] == ("contacts", str(len(day.relay.contacts)), str(len(day.direct.contacts)))
     assert len(contacts.rows) == len(day.relay.contacts) + len(day.direct.contacts)
     assert len(contacts.headings) == len(contacts.rows[0])
     assert len(swings.rows) >= len(day.swings)
-    assert day_view.words(day)[-1].startswith("Warning: communication.distance")
+    warned = blocks[blocks.index("Warnings:") + 1].lines
+    assert warned == day.warnings
+    assert warned[-1].startswith("communication.distance")
 
 
 def test_a_mission_without_orbits_says_what_is_missing(draft, tmp_path):

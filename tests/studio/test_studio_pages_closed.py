@@ -166,7 +166,7 @@ def every_time(session, build):
         leave += 1
 
 
-WAITS = {"compare": 2, "control": 4, "day": 1, "link": 3, "mirror": 4, "mission": 0, "pointing": 3, "runs": 17}
+WAITS = {"compare": 2, "control": 4, "day": 2, "link": 3, "mirror": 4, "mission": 0, "pointing": 3, "runs": 17}
 
 
 @pytest.mark.parametrize("name", WAITS)
@@ -347,7 +347,18 @@ def test_blocks_of_the_report_are_shown_as_text_and_what_was_unfolded_stays_so(m
     found, told = asyncio.run(shown())
     texts = [each.text for each in found if hasattr(each, "text")]
     assert told == []
-    assert {"said", "soft", "one", "two", "as it\n  is", "good", "Rows", "Part", "of moving", "of it"} <= {*texts}
+    assert {
+        "said",
+        "soft",
+        "one",
+        "two",
+        "as it\n  is",
+        "good",
+        "Rows",
+        "Part",
+        "Moving. of moving",
+        "Drawing. of it",
+    } <= {*texts}
     assert [each.value for each in found if isinstance(each, ui.expansion)] == [False, True]
     tables = [each.rows for each in found if isinstance(each, ui.table)]
     assert [row["c0"] for row in tables[1]] == ["<b> !", "sum"]

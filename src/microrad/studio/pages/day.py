@@ -3,32 +3,23 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import NamedTuple
 
 from nicegui import ui
 
 from microrad.orbit.day import DayStudy
 from microrad.studio import commands
 from microrad.studio.pages import layout
-from microrad.studio.pages.elements import Figure, put, table
+from microrad.studio.pages.elements import Blocks
 from microrad.studio.pages.in_thread import in_thread
 from microrad.studio.session import Session
 from microrad.studio.views import day as day_view
 from microrad.studio.views.latest import Latest, State, shared
-from microrad.studio.views.plots import Plot, figure
+from microrad.studio.views.plots import drawn
 
 TITLE = "Day"
 PATH = "/day"
 
 _LOOK_S = 0.25
-
-
-class Drawn(NamedTuple):
-    """Timeline, volumes and latencies; the map as the address of an image, and what it shows."""
-
-    plots: tuple[Plot, Plot, Plot]
-    map: str
-    words: str
 
 
 def page(session: Session) -> None:
@@ -46,7 +37,10 @@ class DayPage:
         layout.copy_buttons(lambda: commands.contacts(layout.file_of(session)))
         self._progress()
         with ui.column().classes("w-full") as self.results:
-            self._results()
+            ui.label(
+                "A study of a whole mission takes the pointing loss that its loop leaves in place of this one."
+            ).classes("soft")
+            self.told = Blocks()
         self.results.visible = False
         layout.follow(session, self.reload)
         ui.timer(_LOOK_S, self.look)
@@ -60,27 +54,6 @@ class DayPage:
             self.again = ui.button("Compute", on_click=self.reload).props("dense no-caps outline")
         self.faults = ui.label().classes("faults kept").props('role="alert"')
         self.faults.visible = False
-
-    def _results(self) -> None:
-        self.words = ui.column()
-        ui.label(
-            "A study of a whole mission takes the pointing loss that its loop leaves in place of this one."
-        ).classes("soft")
-        layout.heading("Contacts over time")
-        self.timeline = Figure("Contacts and eclipses over time; in numbers in the table of contacts")
-        layout.heading("Over the Earth")
-        self.map = ui.element("img").style("width: 100%; max-width: 52rem")
-        self.map_words = ui.label().classes("soft small")
-        layout.heading("Data made, delivered and on board")
-        self.volume = Figure("Data made, delivered and on board over time")
-        layout.heading("From recording to delivery")
-        self.latency = Figure("Share of the data that has arrived within a time")
-        layout.heading("Relay and direct downlink")
-        self.ways = table()
-        layout.heading("Contacts")
-        self.contacts = table()
-        layout.heading("One assumption changed")
-        self.swings = table()
 
     def reload(self) -> None:
         """Have the day of the draft computed, if it can be."""
@@ -99,7 +72,9 @@ class DayPage:
         if state.result is None or key == self.shown:
             return
         self.shown = key
-        self._show(state.result, await in_thread(self.results, _drawn, state.result))
+        blocks = await in_thread(self.results, day_view.blocks, state.result)
+        self.told.show_blocks(blocks, await in_thread(self.results, drawn, blocks))
+        self.results.visible = True
 
     def _show_progress(self, state: State[DayStudy]) -> None:
         step = f": {state.done} of {state.total}" if state.total else ""
@@ -111,22 +86,3 @@ class DayPage:
         self.again.visible = not state.running and state.result is None and not self.faults.visible
         self.bar.value = state.done / state.total if state.total else 0.0
         layout.grey(self.results, not (now and state.result))
-
-    def _show(self, day: DayStudy, drawn: Drawn) -> None:
-        self.words.clear()
-        with self.words:
-            for sentence in day_view.words(day):
-                ui.label(sentence)
-        for element, made in zip((self.timeline, self.volume, self.latency), drawn.plots, strict=True):
-            element.show(made)
-        self.map.props["src"], self.map.props["alt"] = drawn.map, "Map of the world: " + drawn.words
-        self.map_words.text = drawn.words
-        for shown, found in zip((self.ways, self.contacts, self.swings), day_view.tables(day), strict=True):
-            put(shown, found)
-        self.results.visible = True
-
-
-def _drawn(day: DayStudy) -> Drawn:
-    found = day_view.figures(day)
-    timeline, volume, latency = (figure(found[name].sheet) for name in ("day-timeline", "data-volume", "latency"))
-    return Drawn((timeline, volume, latency), day_view.image(found["world-map"]), found["world-map"].caption)

@@ -134,7 +134,7 @@ class Blocks(ui.column):
             ui.element("img").classes("picture").props["src"] = figure
         else:
             Figure(title, figure)
-        ui.label(caption).classes("soft small")
+        ui.label(f"{title}. {caption}").classes("soft small")
 
 
 def _columns(headings: Sequence[str], numbers: Collection[int] = ()) -> list[dict[str, Any]]:

@@ -1,18 +1,16 @@
-"""What the page of the day shows: contacts over time, volumes and latencies, and the tables beside them."""
+"""What the page of the day shows: the report's view of it."""
 
 from __future__ import annotations
 
-import base64
+from collections.abc import Sequence
 
 from microrad.core.progress import Progress
 from microrad.link import study as link_study
 from microrad.mission.file import LinkFile
 from microrad.orbit import day as day_study
 from microrad.orbit.day import DayStudy
-from microrad.report.day import words as day_words
-from microrad.report.day.tables import assumptions_table, contacts_table, ways_table
-from microrad.report.plotting.figure import Figure
-from microrad.report.tables import Table
+from microrad.report.day.words import sentences
+from microrad.report.view import Block
 
 
 def compute_day(file: LinkFile, on_progress: Progress) -> DayStudy:
@@ -31,25 +29,10 @@ def missing(file: LinkFile) -> str:
     return f"The mission has no {' and no '.join(lacking)}, so it has no day; microrad init writes such tables."
 
 
-# -------------------------------------------------------------------------------------------------- tables and words
-def tables(day: DayStudy) -> tuple[Table, Table, Table]:
-    """Relay and direct downlink side by side, the contacts by both, and what each assumption changes alone."""
-    return ways_table(day), contacts_table(day), assumptions_table(day)
-
-
-def words(day: DayStudy) -> list[str]:
-    """The answers of the day, a sentence each, and the warnings."""
-    return [*day_words.sentences(day), *(f"Warning: {warning}." for warning in day.warnings)]
-
-
-# ------------------------------------------------------------------------------------------------------------ figures
-def figures(day: DayStudy) -> dict[str, Figure]:
-    """The report's figures of a day by their names, without that of a simulated contact."""
+def blocks(day: DayStudy) -> Sequence[Block]:
+    """The report's view of the day with its figures, of which the map is a picture."""
     from microrad.report.day.figures import day_figures
+    from microrad.report.day.page import day_view
 
-    return {figure.name: figure for figure in day_figures(day)}
-
-
-def image(figure: Figure) -> str:
-    """A figure's picture as the address of an image."""
-    return f"data:image/svg+xml;base64,{base64.b64encode(figure.svg.encode()).decode()}"
+    figures = [each.static if each.name == "world-map" else each for each in day_figures(day)]
+    return day_view(day, sentences(day), figures).blocks
