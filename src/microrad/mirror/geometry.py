@@ -268,16 +268,27 @@ def stroke_budget(
     usable_travel_rad: float | None = None,
     sources: Mapping[str, str] | None = None,
 ) -> tuple[StrokeBudget, ...]:
-    """Stroke budget of each output of the mirror: its axes, or the actuators of a tripod.
+    """Compare the stroke that each output of the mirror needs with the travel that it has.
 
-    ``travel_rad`` runs from stop to stop and is counted as ``travel_angle``, whatever the model's outputs count (for a
-    tripod: extension over radius, or twice that). ``usable_travel_rad``, counted alike, is what the drive range leaves
-    of it; all of it where none is given. ``sources`` says by key of `StrokeDemand` where a half range comes from.
+    An output is an axis, or an actuator of a tripod. The demand may lie anywhere within its half ranges on both axes:
+    an output called for by the line of sight along the unit vector d needs |d_x| x + |d_y| y, times the magnification,
+    halved where the angle is mechanical.
 
-    The demand may lie anywhere within its half ranges on both axes: an output called for by the line of sight along the
-    unit vector d needs |d_x| x + |d_y| y, times the magnification, halved where the angle is mechanical.
+    Args:
+        geometry: What stands between the mirror's outputs and the line of sight.
+        demand: Half ranges of the line of sight that the mirror has to follow.
+        travel_rad: Travel of an output from stop to stop, above 0; of a tripod's actuator, its extension over the
+            radius.
+        travel_angle: What both travels count, whatever the model's outputs do: the tilt ("mechanical") or twice it
+            ("optical").
+        usable_travel_rad: What the drive range leaves of the travel, counted alike; all of it where none is given.
+        sources: Where a half range comes from, by the name of its field of `StrokeDemand`.
 
-    Raises ValueError for a travel that is not above zero, a usable travel beyond it, and a singular geometry.
+    Returns:
+        One budget for each output: x and y, or actuators 1 to 3.
+
+    Raises:
+        ValueError: For a travel that is not above zero, a usable travel beyond it, and a singular geometry.
     """
     usable = _usable_travel(travel_rad, usable_travel_rad)
     _one_of("travel_angle", travel_angle, _ANGLES, "stroke budget")

@@ -55,11 +55,16 @@ class BoucWen:
         )
 
     def decay_1_v(self, rising: float, sign: float) -> float:
-        """Decay of |h| per volt of travel for a sign of the drive's rate and a sign of h, at exponent 1."""
+        """Decay of |h| per volt of travel, at exponent 1.
+
+        Args:
+            rising: Sign of the drive's rate: 1 where it rises, -1 where it falls.
+            sign: Sign of h, 1 or -1.
+        """
         return self.alpha_1_v + self.beta_1_v * rising * sign + self.gamma_1_v * sign + self.eta_1_v * rising
 
     def settled_branch_rad(self, rising: float) -> float:
-        """Where h settles on a slow, long ramp of one direction (1 up, -1 down)."""
+        """Where h settles on a slow, long ramp of the drive that runs in one direction (1 up, -1 down)."""
         sign = rising * math.copysign(1.0, self.epsilon_rad_v)
         decay = self.decay_1_v(rising, sign)
         if self.epsilon_rad_v == 0.0:
@@ -179,7 +184,12 @@ LINE_OF_SIGHT = {"line-of-sight": 1.0, "optical": 1.0, "mechanical": 2.0}
 
 
 def scaled(model: BoucWen | Play, times: float) -> BoucWen | Play:
-    """The model with its output times a factor."""
+    """The same model with its output multiplied by a factor.
+
+    Args:
+        model: Hysteresis model.
+        times: Factor on its output; 2 turns a mechanical angle into that of the line of sight.
+    """
     if isinstance(model, Play):
         return replace(model, weights_rad_v=tuple(times * w for w in model.weights_rad_v))
     return replace(model, d1_rad_v=times * model.d1_rad_v, epsilon_rad_v=times * model.epsilon_rad_v)
@@ -191,7 +201,12 @@ def slow_gain(model: BoucWen | Play) -> float:
 
 
 def output_amplitude(model: BoucWen | Play, drive_v: float) -> float:
-    """Amplitude of the settled output (rad) under a slow drive of amplitude ``drive_v``, Bouc-Wen's h left out."""
+    """Amplitude of the settled output (rad) under a slow sine of the drive, Bouc-Wen's h left out.
+
+    Args:
+        model: Hysteresis model.
+        drive_v: Amplitude of the drive, 0 or above.
+    """
     if isinstance(model, BoucWen):
         return model.d1_rad_v * drive_v
     pairs = zip(model.thresholds_v, model.weights_rad_v, strict=True)
@@ -199,9 +214,13 @@ def output_amplitude(model: BoucWen | Play, drive_v: float) -> float:
 
 
 def secant_gain(model: BoucWen | Play, output_rad: float) -> float:
-    """Output amplitude over the drive amplitude that gives it (rad/V), for slow sines of amplitude ``output_rad``.
+    """Amplitude of the output over that of the drive (rad/V), for slow sines.
 
-    A Prandtl-Ishlinskii model is softer for small drives; without amplitude (inf) this is its slow gain.
+    A Prandtl-Ishlinskii model is softer for small drives; a Bouc-Wen model has its slow gain at any amplitude.
+
+    Args:
+        model: Hysteresis model.
+        output_rad: Amplitude of the output; infinite gives the slow gain.
     """
     if isinstance(model, BoucWen) or math.isinf(output_rad):
         return slow_gain(model)
@@ -214,7 +233,13 @@ def secant_gain(model: BoucWen | Play, output_rad: float) -> float:
 
 
 def gain_only(model: BoucWen | Play, output_rad: float = math.inf) -> BoucWen:
-    """The model without hysteresis: its secant gain at an output amplitude, or its slow gain, and nothing else."""
+    """Replace a hysteresis model by its gain, and nothing else.
+
+    Args:
+        model: Hysteresis model.
+        output_rad: Amplitude of the output at which the secant gain is taken; infinite, as by default, gives the slow
+            gain.
+    """
     return BoucWen(secant_gain(model, output_rad), 0.0, 0.0, 0.0, 0.0, 0.0)
 
 

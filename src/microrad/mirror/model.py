@@ -79,7 +79,13 @@ def linear_part(table: mirror_table.LinearPart) -> tuple[lti.StateSpace, float]:
 def hysteresis_model(
     table: mirror_table.Mirror | mirror_table.Comparison, rate_limit_v_s: float, bias_v: float
 ) -> BoucWen | Play:
-    """The hysteresis model of a mirror table, as a record."""
+    """The hysteresis model of a mirror table, as a record.
+
+    Args:
+        table: A mirror, or its comparison model, with a Bouc-Wen or a Prandtl-Ishlinskii model.
+        rate_limit_v_s: Rate of the drive beyond which a model that depends on it is held.
+        bias_v: Resting drive, which a Bouc-Wen model needs.
+    """
     if table.bouc_wen is not None:
         b = table.bouc_wen
         return BoucWen(
@@ -113,12 +119,19 @@ def creep_model(table: mirror_table.Mirror) -> Creep:
 def from_mission(
     table: mirror_table.Mirror, model: BoucWen | Play, composition: str | None = None, times: float = 1.0
 ) -> Mirror:
-    """Assemble one axis of the mission's linear part, creep and a hysteresis model.
+    """Assemble one axis from the mission's linear part and creep, and a hysteresis model.
 
-    The composition is the mission's or another: cascade: the hysteresis drives the linear part (q = u, B = 0).
-    additive: the linear gain drives the linear part and the hysteresis is added behind it through K. static: no linear
-    part. Creep is added to the output in each of them, ``times`` what the table says: 2 where the model counts the line
-    of sight and the table a mechanical angle.
+    cascade: the hysteresis drives the linear part (q = u, B = 0). additive: the linear gain drives the linear part and
+    the hysteresis is added behind it through K. static: no linear part. Creep is added to the output in each of them.
+
+    Args:
+        table: The mission's mirror.
+        model: Its hysteresis model, or another.
+        composition: "cascade", "additive" or "static"; the table's where none is given.
+        times: Factor on the table's creep: 2 where the model counts the line of sight and the table a mechanical angle.
+
+    Raises:
+        ValueError: For a composition that lacks its linear part.
     """
     system = None if table.linear is None else linear_part(table.linear)[0]
     creep = creep_model(table)
@@ -129,9 +142,17 @@ def from_mission(
 def assemble(
     name: str, composition: str, system: lti.StateSpace | None, model: BoucWen | Play, creep: Creep = NO_CREEP
 ) -> Mirror:
-    """One axis from a linear part of unit gain (none for "static"), a hysteresis model and the creep beside it.
+    """Assemble one axis from a linear part, a hysteresis model and the creep beside it.
 
-    Raises ValueError for a composition that lacks its linear part.
+    Args:
+        name: What the mirror is called in messages.
+        composition: "cascade", "additive" or "static", see `from_mission`.
+        system: Linear part of unit gain, one input and one output; not used for "static".
+        model: Hysteresis from the drive (V) to the angle (rad).
+        creep: Creep that is added to the output.
+
+    Raises:
+        ValueError: For a composition that lacks its linear part.
     """
     if composition != "static" and system is None:
         raise ValueError(f'composition "{composition}" needs a linear part; give one or choose "static"')
@@ -208,12 +229,16 @@ def combine(*mirrors: Mirror) -> Mirror:
 
 
 def discretise(mirror: Mirror, step_s: float, *, often: bool = False) -> kernels.Plant:
-    """The mirror for a fixed step with u and z linear over it.
+    """The mirror for a fixed step, with u and z linear over it.
 
-    One that is simulated ``often``, as in a fit, has unrolled loops on one axis, whatever its size: they are compiled
-    once for it, in a second or two, and take half of the time.
+    Args:
+        mirror: The mirror, continuous in time.
+        step_s: Length of a step.
+        often: Whether it is simulated often, as in a fit: then its loops on one axis are unrolled whatever its size,
+            which takes a second or two to compile once and half of the time to run.
 
-    Raises ValueError, naming a step that would do, when q = F x closes a loop through one step that is no contraction.
+    Raises:
+        ValueError: Where q = F x closes a loop through one step that is no contraction; names a step that would do.
     """
     inputs = np.hstack([mirror.B, mirror.E])
     Ad, start, end = lti.first_order_hold(mirror.A, inputs, step_s)
@@ -247,7 +272,15 @@ def _sizes(mirror: Mirror) -> dict[str, int]:
 
 
 def plant_arrays(step_s: float, discrete: tuple[Floats, ...], mirror: Mirror, *, unroll: bool) -> kernels.Plant:
-    """The kernel's arrays from the discrete matrices Ad, B0, B1, E0, E1 and the mirror's F, G, C, D, K and bank."""
+    """The kernel's arrays from a mirror and its discrete matrices.
+
+    Args:
+        step_s: Length of a step.
+        discrete: Ad (states, states), B0 and B1 (states, actuators), E0 and E1 (states, elements); those that end in 0
+            go with the value at the start of a step, those in 1 with that at its end.
+        mirror: Gives F, G, C, D, K and the bank of hysteresis elements.
+        unroll: Whether the kernels' loops over this mirror are unrolled.
+    """
     Ad, B0, B1, E0, E1 = discrete
     n, odd = Ad.shape[0], Ad.shape[0] % 2  # the kernel pairs the states: an odd one gets an idle partner
     Ad = np.pad(Ad, (0, odd))
@@ -288,7 +321,17 @@ def plant_arrays(step_s: float, discrete: tuple[Floats, ...], mirror: Mirror, *,
 
 
 def contraction(mirror: Mirror, step_s: float) -> float:
-    """Bound on how much of an error in z at the end of a step returns through F and the steepest slope of the bank."""
+    """Bound on how much of an error in z at the end of a step returns through F and the steepest slope of the bank.
+
+    Below 1 the step can be solved by repetition; 0 where nothing is fed back.
+
+    Args:
+        mirror: The mirror, continuous in time.
+        step_s: Length of a step.
+
+    Raises:
+        ValueError: Where an element that is fed back has no bound on its slope, see `hysteresis.steepest_slope`.
+    """
     fed = np.any(mirror.F, axis=1)
     if not np.any(fed):
         return 0.0

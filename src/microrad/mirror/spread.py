@@ -18,12 +18,19 @@ TRIES = 10_000
 
 
 def draws(table: Mirror, count: int, seed: int) -> tuple[Mirror, ...]:
-    """`count` mirrors drawn from the normal distribution that the table's `uncertainty` describes.
+    """Draw mirrors from the normal distribution that the table's `uncertainty` describes.
 
     A draw in which a value would change its sign, or that the table's own checks would refuse in a file, is drawn
-    again: the distribution is cut off there. Each has a Philox stream of its own, so the first ones are the same for
-    a larger count. What is drawn is a mirror and no estimate: it has no `uncertainty`. Raises ValueError without an
-    `uncertainty`, and where `TRIES` draws in a row are no mirror.
+    again: the distribution is cut off there. Each has a Philox stream of its own, so the first ones are the same for a
+    larger count. What is drawn is a mirror and no estimate: it has no `uncertainty`.
+
+    Args:
+        table: The identified mirror.
+        count: How many mirrors are drawn.
+        seed: Seed of the random numbers.
+
+    Raises:
+        ValueError: Without an `uncertainty`, and where `TRIES` draws in a row are no mirror.
     """
     uncertainty = _uncertainty(table)
     places = [place(table, key) for key in uncertainty.parameters]
@@ -33,10 +40,18 @@ def draws(table: Mirror, count: int, seed: int) -> tuple[Mirror, ...]:
 
 
 def parameters(table: Mirror, normals: Floats, again: Callable[[int], Iterator[Floats]]) -> Floats:
-    """Values (count, n) of the n uncertain parameters, one mirror for each row of standard normal numbers (count, n).
+    """Values of the n uncertain parameters, shape (count, n) and in SI units: one mirror a row.
 
-    A row that is no mirror is drawn again from the numbers (n,) that ``again`` yields for its place among the rows. Of
-    a list that scales together the value is the factor of its items. Raises ValueError as `draws` does.
+    Of a list that scales together the value is the factor of its items.
+
+    Args:
+        table: The identified mirror.
+        normals: Standard normal numbers, shape (count, n), one row for each mirror.
+        again: Given the number of a row that is no mirror, yields other standard normal numbers, shape (n,), to draw it
+            from again.
+
+    Raises:
+        ValueError: Without an `uncertainty`, and where `TRIES` draws in a row are no mirror.
     """
     keys = _uncertainty(table).parameters
     places = [place(table, key) for key in keys]
