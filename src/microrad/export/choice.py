@@ -97,12 +97,12 @@ def choose(file: MissionFile, name: str, on_progress: Progress = lambda done, to
     """A controller of a mission, tuned where it belongs to the fine-pointing loop.
 
     Args:
-        file: the mission.
-        name: one of its `names`.
-        on_progress: is told what is being tuned.
+        file: The mission.
+        name: One of its `names`.
+        on_progress: Is told what is being tuned.
 
     Raises:
-        ExportError: the mission has no such controller, or it cannot be built on the mission's mirror.
+        ExportError: The mission has no such controller, or it cannot be built on the mission's mirror.
     """
     m, has = file.mission, names(file.mission.fine_pointing)
     if name not in has:
@@ -130,7 +130,17 @@ def outlook(choice: Choice) -> controller_study.Outlook | None:
 
 
 def promised(choice: Choice, accept: bool = False) -> controller_study.Outlook | None:
-    """What a controller leaves; raises ExportError, but for ``accept``, where its linear figure is no promise."""
+    """What a controller of the fine-pointing loop leaves, if its linear figure is a promise; None for a loop of
+    [control].
+
+    Args:
+        choice: The controller.
+        accept: Whether a figure that the simulation does not bear out is let pass.
+
+    Raises:
+        ExportError: Where the simulated residual is more than `controller_study.PROMISE` times the linear one, unless
+            accepted.
+    """
     left = outlook(choice)
     if isinstance(choice, PointingChoice) and left is not None and not (left.holds or accept):
         raise ExportError(_broken(choice, left))
@@ -197,7 +207,14 @@ def trimmed(of: FlightController) -> FlightController:
 
 
 def inverse_law(of: control.Inverse, period_s: float, by_difference: bool) -> InverseLaw:
-    """An inverse at a control period."""
+    """An inverse of hysteresis and creep, sampled at a control period, as arrays for exported code.
+
+    Args:
+        of: The inverse as it was designed.
+        period_s: The control period in seconds.
+        by_difference: Whether the target's rate is the difference of two samples; else the controller's linear part
+            gives it.
+    """
     arrays = {key.removeprefix("inverse_"): value for key, value in control.inverse_arrays(of, period_s).items()}
     return InverseLaw(**arrays, by_difference=by_difference)
 
@@ -271,11 +288,11 @@ def plant_unit(file: MissionFile, loop: str) -> PlantUnit:
     """Amplifier and mirror of a mission, at the plant step of one of its loops.
 
     Args:
-        file: the mission.
-        loop: one of `LOOPS`.
+        file: The mission.
+        loop: One of `LOOPS`.
 
     Raises:
-        ExportError: the mission has no such loop, or it cannot be built.
+        ExportError: The mission has no such loop, or it cannot be built.
     """
     if loop not in LOOPS or (loop == LOOPS[0] and file.mission.fine_pointing is None):
         raise ExportError(f"{file.path} has no loop {loop!r}: one of {', '.join(LOOPS)} that is a table of the mission")
@@ -328,8 +345,8 @@ def vectors(choice: Choice, samples: int) -> Vectors:
     sine that the scenario has for an inverse.
 
     Args:
-        choice: the controller.
-        samples: length of the run, in control periods.
+        choice: The controller.
+        samples: Length of the run, in control periods.
     """
     if isinstance(choice, PointingChoice):
         run = replay(choice.scene.loop, choice.controller, samples, choice.scene.table.seed)

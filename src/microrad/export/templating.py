@@ -23,8 +23,14 @@ LINE = 112
 def real(x: float, precision: Precision = "double") -> str:
     """A number as the shortest C literal that reads back to it; infinity becomes the largest finite number.
 
-    At most 17 significant digits; in single precision 9, with the suffix f. What is too small for the precision becomes
-    0 (a compiler warns of such a literal). Raises ExportError for nan, and for a finite number that is too large.
+    What is too small for the precision becomes 0 (a compiler warns of such a literal).
+
+    Args:
+        x: The number.
+        precision: "double", at most 17 significant digits, or "single", at most 9 and the suffix f.
+
+    Raises:
+        ExportError: For nan, and for a finite number that is too large for the precision.
     """
     range_of = np.finfo(np.float64 if precision == "double" else np.float32)
     largest = float(range_of.max)
@@ -42,7 +48,15 @@ def real(x: float, precision: Precision = "double") -> str:
 
 
 def table(matrix: Any, precision: Precision = "double") -> str:
-    """Numbers as a C initialiser: ``{a, b}`` of one dimension, a braced line for each row of two."""
+    """Numbers as a C initialiser: ``{a, b}`` of one dimension, a braced line for each row of two.
+
+    Args:
+        matrix: The numbers, of one or two axes.
+        precision: Precision of the code.
+
+    Raises:
+        ExportError: For a number that has no literal in the precision.
+    """
     numbers = np.asarray(matrix, dtype=float)
     if numbers.ndim == 1:
         return "{" + ", ".join(real(float(x), precision) for x in numbers) + "}"
@@ -55,7 +69,15 @@ def whole(numbers: Iterable[int]) -> str:
 
 
 def terms(of: Terms, precision: Precision = "double") -> str:
-    """Numbers of a matrix as braced rows, columns and values; each row of the matrix begins a line."""
+    """Numbers of a matrix as braced rows, columns and values; each row of the matrix begins a line.
+
+    Args:
+        of: The numbers, row by row.
+        precision: Precision of the code.
+
+    Raises:
+        ExportError: For a number that has no literal in the precision.
+    """
     lines: list[str] = []
     last = -1
     for row, column, value in of:
@@ -74,7 +96,12 @@ def entries(matrix: Any) -> list[tuple[int, int, Any]]:
 
 
 def comment(text: str, prefix: str = "") -> str:
-    """Text for a comment of C, in lines that begin with ``prefix``: nothing in it can end the comment or hide code."""
+    """Text for a comment of C, broken into lines: nothing in it can end the comment or hide code.
+
+    Args:
+        text: The text, with any characters.
+        prefix: What each line but the first begins with.
+    """
     plain = "".join(c if c.isprintable() else " " for c in text).replace("\\", "/").replace("??", "? ?")
     while "*/" in plain or "/*" in plain:
         plain = plain.replace("*/", "* /").replace("/*", "/ *")

@@ -90,11 +90,18 @@ def _words(text: str) -> tuple[str, ...]:
 
 
 def compile_and_run(folder: Path, name: str, passes: int = 20) -> BenchResult:
-    """Compiles the exported code ``name`` in a folder and runs its bench over ``vectors.csv`` there.
+    """Compile exported code and run its test bench over the recorded run beside it.
 
-    With a Makefile (and make on this machine) by ``make``, else by the compiler directly. The steps are timed in
-    ``passes`` passes, at least 1. Raises ExportError where there is no compiler or no such code, where it does not
-    compile, and where the bench fails, takes longer than `TIME_LIMIT_S` or finds a difference beyond its bound.
+    With a Makefile (and make on this machine) it is compiled by ``make``, else by the compiler directly.
+
+    Args:
+        folder: Folder with the code, its bench and ``vectors.csv``; the compiled bench is put there, too.
+        name: What the code is called: the bench is {name}_bench.c.
+        passes: Passes over the run in which the steps are timed, at least 1.
+
+    Raises:
+        ExportError: Where there is no compiler or no such code, where it does not compile, and where the bench fails,
+            takes longer than `TIME_LIMIT_S` or finds a difference beyond its bound.
     """
     if passes < 1:
         raise ExportError(f"{passes} passes of the bench: it takes at least 1 to time a step")

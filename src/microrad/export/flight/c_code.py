@@ -31,14 +31,14 @@ def flight_code(
     a recorded run (`vectors_text`), and a Makefile.
 
     Args:
-        of: the controller.
-        form: its linear part.
-        name: what the code is called, an identifier of C.
+        of: The controller.
+        form: Its linear part.
+        name: What the code is called, an identifier of C.
         precision: "double" or "single".
-        bound: what single precision may differ by over the recorded run.
+        bound: What single precision may differ by over the recorded run.
 
     Raises:
-        ExportError: a name that is no identifier; limits between which no command lies; numbers beyond the precision;
+        ExportError: A name that is no identifier; limits between which no command lies; numbers beyond the precision;
             single precision without a bound.
     """
     values = _values(of, form, identifier(name), precision)
@@ -62,13 +62,30 @@ def flight_code(
 
 
 def within_limits(of: FlightController, v: Vectors) -> Vectors:
-    """The recorded run with commands that leave no limit: the kernel rounds to the nearest count, the code inwards."""
+    """The recorded run with its commands held within what the code can give.
+
+    The kernel rounds a limit to the nearest count of the converter, the code to the next one inwards.
+
+    Args:
+        of: The controller, for its limits and resolution (V).
+        v: The recorded run.
+
+    Raises:
+        ExportError: Where no command lies between the limits.
+    """
     limits = _limits(of, "double")
     return replace(v, commands=np.clip(v.commands, limits.lowest, limits.highest))
 
 
 def vectors_text(of: FlightController, v: Vectors) -> str:
-    """The recorded run as the bench reads it: readings and commands by sample, with all their digits."""
+    """The recorded run as the text that the bench reads: a heading, then readings and commands of one sample a line.
+
+    Numbers have all their digits.
+
+    Args:
+        of: The controller, for the names of its inputs.
+        v: The recorded run.
+    """
     names = [f"{each.name}_{i}" for each in of.inputs for i in range(each.size)]
     names += [f"command_v_{a}" for a in range(of.actuators)]
     rows = np.hstack([v.inputs, v.commands]).tolist()

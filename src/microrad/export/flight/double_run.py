@@ -90,12 +90,23 @@ class Inverse:
 
 
 def widened(law: InverseLaw, rate: Floats) -> Floats:
-    """Growth of the thresholds above 0 at a rate of the target, by actuator (the last index of ``rate``)."""
+    """How far the inverse's plays widen at a rate of the target: what is added to each threshold above 0, in its unit.
+
+    Args:
+        law: The inverse.
+        rate: Rate of the target in rad/s, of any shape with the actuators last; the sign does not matter.
+    """
     return np.asarray(law.widening[:, 0] * np.minimum(np.abs(rate), law.widening[:, 1]))
 
 
 def run_in_double(of: FlightController, form: Sections, inputs: Floats) -> Run:
-    """The controller in this form over recorded ``inputs`` (samples, numbers), in double precision and from rest."""
+    """Run the controller over a recorded run in double precision, from rest.
+
+    Args:
+        of: The controller, for its limits and its inverse.
+        form: Its linear part.
+        inputs: The recorded readings, shape (samples, numbers), SI units.
+    """
     samples, A, pushed = inputs.shape[0], form.A, inputs @ form.B.T
     x, direct = np.zeros(A.shape[0]), inputs @ form.D.T
     states, outputs = np.empty((samples, x.size)), np.empty((samples, form.C.shape[0]))

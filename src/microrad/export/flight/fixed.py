@@ -46,14 +46,14 @@ def quantised(
     """The controller's linear part in fixed point, scaled by a recorded run, with its report.
 
     Args:
-        of: the controller.
-        form: its linear part.
-        v: the recorded run; each number gets a range of `HEAD_ROOM` times its largest size there.
-        bits: of coefficients and signals, 8 to 32; sums have 64.
-        beyond_a_count: accept commands that stray from double precision by more than a count of the converter.
+        of: The controller.
+        form: Its linear part.
+        v: The recorded run; each number gets a range of `HEAD_ROOM` times its largest size there.
+        bits: Of coefficients and signals, 8 to 32; sums have 64.
+        beyond_a_count: Accept commands that stray from double precision by more than a count of the converter.
 
     Raises:
-        ExportError: other bits; a pole that quantisation puts on or beyond the unit circle; numbers that do not fit;
+        ExportError: Other bits; a pole that quantisation puts on or beyond the unit circle; numbers that do not fit;
             commands that stray by more than a count.
     """
     if not LEAST_BITS <= bits <= MOST_BITS:
@@ -228,10 +228,18 @@ def _constant(name: str, first: int, size: int, unit: str, words: str, scale: in
 
 
 def fixed_code(of: FlightController, form: Sections, fixed: FixedForm, name: str) -> dict[str, str]:
-    """The fixed-point form as C99: {name}_fixed.h, {name}_fixed.c, their bench and Makefile; file names and texts.
+    """The fixed-point form as C99: {name}_fixed.h, {name}_fixed.c, their bench and Makefile; texts by file name.
 
-    With an inverse, {name}_inverse.h, .c and _hysteresis.h in single precision come with it. Raises ExportError for a
-    name that is no identifier.
+    With an inverse, {name}_inverse.h, .c and _hysteresis.h in single precision come with it.
+
+    Args:
+        of: The controller.
+        form: Its linear part.
+        fixed: The same in fixed point, see `quantised`.
+        name: What the code is called, an identifier of C that leaves room for "_fixed".
+
+    Raises:
+        ExportError: For a name that is no identifier.
     """
     whole = identifier(f"{identifier(name)}_fixed")
     n, m = form.order, form.B.shape[1]

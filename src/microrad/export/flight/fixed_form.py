@@ -125,7 +125,15 @@ class FixedForm:
 
 
 def scaled(of: FlightController, form: Sections, inputs: Floats, ideal: Run, bits: int) -> FixedForm:
-    """The controller in words of ``bits``, scaled by a recorded run; its report is empty yet."""
+    """The controller in fixed point, scaled by a recorded run; its report is still empty.
+
+    Args:
+        of: The controller.
+        form: Its linear part.
+        inputs: The recorded readings, shape (samples, numbers), SI units.
+        ideal: The same run in double precision.
+        bits: Bits of coefficients and signals, the sign among them.
+    """
     word = 2 ** (bits - 1) - 1
     peaks: list[float] = []  # of the inputs, the same for all numbers of a signal; its limit where it rests
     for s in of.inputs:
@@ -197,7 +205,12 @@ def _converter(of: FlightController, scale: int) -> Converter:
 
 
 def dequantised(form: Sections, made: FixedForm) -> Sections:
-    """The linear part with the coefficients that the whole numbers stand for."""
+    """The linear part with the coefficients that the whole numbers stand for.
+
+    Args:
+        form: The linear part as designed.
+        made: The same in fixed point.
+    """
     n, m = form.order, form.B.shape[1]
     columns = np.array([*made.state_scale, *made.input_scale, *made.output_scale[: form.L.shape[1]]])
     step = _values(made.state, columns)
@@ -243,15 +256,26 @@ def _rounded(x: Whole, shift: NDArray[np.integer[Any]]) -> Whole:
 
 
 def readings(made: FixedForm, inputs: Floats) -> Whole:
-    """Inputs as whole numbers of their scales, at the end of the range where they are beyond it."""
+    """Readings as whole numbers in the scales of the inputs; what is beyond the range stays at its end.
+
+    Args:
+        made: The controller in fixed point, for its scales.
+        inputs: The readings in SI units, shape (samples, numbers).
+    """
     counts = np.floor(np.ldexp(inputs, np.array(made.input_scale, dtype=int)) + 0.5)
     return np.asarray(np.clip(counts, -made.word, made.word).astype(np.int64))
 
 
 def fixed_run(of: FlightController, made: FixedForm, inputs: Floats) -> tuple[Floats, Floats, Whole]:
-    """Outputs and commands ahead of the clip (SI units) over a recorded run in fixed point, and the states at its end.
+    """Run the controller in fixed point: its outputs, its commands ahead of the clip, and its states at the end.
 
-    What an inverse adds is taken in double precision.
+    Outputs (samples, outputs) and commands (samples, actuators; V) are in SI units, the states whole numbers in their
+    scales. What an inverse adds is taken in double precision.
+
+    Args:
+        of: The controller, for its inverse.
+        made: Its linear part in fixed point.
+        inputs: The recorded readings in SI units, shape (samples, numbers).
     """
     read, step, n = readings(made, inputs), Step(made), of.actuators
     outputs, free = np.empty((len(read), len(made.output_scale))), np.empty((len(read), n))

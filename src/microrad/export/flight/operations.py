@@ -61,9 +61,9 @@ def operations(of: FlightController, form: Sections, precision: Precision) -> Op
     """The most that one call of {name}_step costs in floating point, whatever it reads.
 
     Args:
-        of: the controller.
-        form: its linear part.
-        precision: of the code.
+        of: The controller.
+        form: Its linear part.
+        precision: Of the code.
     """
     found = _mended(of, form, precision)  # whether the state is sound, then whether the readings are accepted
     found += Operations(comparisons=2) * sum(each.size for each in of.inputs)
@@ -104,7 +104,12 @@ def _counts(of: Operations | FixedOperations, names: Iterable[str]) -> str:
 
 
 def fixed_operations(of: FlightController, fixed: FixedForm) -> FixedOperations:
-    """The most that one call of {name}_fixed_step costs, whatever it reads; loops and counters not counted."""
+    """The most that one call of {name}_fixed_step costs, whatever it reads; loops and counters not counted.
+
+    Args:
+        of: The controller, for its actuators and its inverse.
+        fixed: Its linear part in fixed point.
+    """
     states, actuators, outputs = len(fixed.state_scale), of.actuators, len(fixed.output_scale)
     m, A, C = len(fixed.input_scale), fixed.state.value[:, :states], fixed.output.value[:, :states]
     terms = int(np.count_nonzero(fixed.state.value) + np.count_nonzero(fixed.output.value))

@@ -45,9 +45,9 @@ def rounding_bound(of: FlightController, form: Sections, v: Vectors) -> Rounding
     """The bound on what single precision does to the commands of a controller.
 
     Args:
-        of: the controller.
-        form: its linear part.
-        v: a recorded run of it.
+        of: The controller.
+        form: Its linear part.
+        v: A recorded run of it.
     """
     error = errors_before_converter(of, form, v)
     largest = float(np.max(error, initial=0.0))
@@ -57,9 +57,13 @@ def rounding_bound(of: FlightController, form: Sections, v: Vectors) -> Rounding
 
 
 def behind_converter(of: FlightController, error_v: Floats) -> Floats:
-    """Largest difference of two commands, by actuator, that differ by ``error_v`` at most ahead of clip and converter.
+    """The largest difference of two commands behind clip and converter, by actuator, from that ahead of them (V).
 
     Two numbers closer than a count fall on neighbouring counts at worst. No difference is beyond the limits' distance.
+
+    Args:
+        of: The controller, for its limits and resolution (V).
+        error_v: Largest difference ahead of the clip in V, by actuator, not negative.
     """
     r = of.resolution_v
     found = error_v if r == 0.0 else (np.floor(np.minimum(error_v / r, 1e9)) + 1.0) * r
@@ -91,13 +95,24 @@ def errors_before_converter(of: FlightController, form: Sections, v: Vectors) ->
     """Bound of the error of each command ahead of clip and converter in V, shape (samples, actuators).
 
     Infinite where no bound was found: errors may feed themselves while commands are clipped.
+
+    Args:
+        of: The controller, for its limits and its inverse.
+        form: Its linear part.
+        v: The recorded run that the bound holds for.
     """
     r = run_in_double(of, form, v.inputs)
     return _settled(of, form, r, *_local(form, v.inputs, r))
 
 
 def errors_of_inverse(of: FlightController, form: Sections, r: Run) -> Floats:
-    """The same where the inverse alone is in single precision: it reads the outputs of an exact linear part."""
+    """The same bound where the inverse alone is in single precision: it reads the outputs of an exact linear part.
+
+    Args:
+        of: The controller, for its limits and its inverse.
+        form: Its linear part.
+        r: The run in double precision.
+    """
     return _settled(of, form, r, np.zeros_like(r.states), 2.0 * UNIT * np.abs(r.outputs))
 
 
@@ -149,7 +164,15 @@ class _Response:
 
 
 def responses(row: Floats, A: Floats, count: int) -> Floats:
-    """row A^j for j = 0, 1, ..., shape (count, states), by doubling."""
+    """What each state adds to an output after j samples: row A^j for j = 0, 1, ..., shape (count, states).
+
+    The powers are found by doubling.
+
+    Args:
+        row: The output's row of C, shape (states,).
+        A: The discrete system's matrix, shape (states, states).
+        count: How many samples.
+    """
     found, power = row[None, :], A
     while found.shape[0] < count:
         found = np.vstack([found, found @ power])

@@ -52,7 +52,15 @@ class FlightExport:
 
 
 def check_output(folder: Path, overwrite: bool) -> None:
-    """Raises FolderError if ``folder`` holds something that must not be replaced (``overwrite``: by another export)."""
+    """Refuse a folder that holds something which an export must not replace.
+
+    Args:
+        folder: Where an export is to be written.
+        overwrite: Whether an earlier export there may be replaced.
+
+    Raises:
+        FolderError: Where the folder must not be replaced.
+    """
     check_folder(folder, overwrite, KIND, WHAT)
 
 
@@ -72,18 +80,18 @@ def export_flight(
     Where there is a C compiler, the code is compiled and its bench run over the recorded run before the folder appears.
 
     Args:
-        choice: the controller, see `choice.choose`.
-        folder: where to write; it appears whole or not at all.
-        name: what the code is called, an identifier of C; None makes one of the controller's name.
-        precision: of the code: "double", "single" or "fixed" point.
-        samples: length of the recorded run, in control periods.
-        overwrite: replace an earlier export in the folder.
-        accept: write also what `choice.promised` refuses.
-        on_progress: is told what is being done.
+        choice: The controller, see `choice.choose`.
+        folder: Where to write; it appears whole or not at all.
+        name: What the code is called, an identifier of C; None makes one of the controller's name.
+        precision: Of the code: "double", "single" or "fixed" point.
+        samples: Length of the recorded run, in control periods.
+        overwrite: Replace an earlier export in the folder.
+        accept: Write also what `choice.promised` refuses.
+        on_progress: Is told what is being done.
 
     Raises:
-        ExportError: the controller cannot be exported, its code strays from the kernel, or it leaves too much.
-        FolderError: the folder must not be replaced.
+        ExportError: The controller cannot be exported, its code strays from the kernel, or it leaves too much.
+        FolderError: The folder must not be replaced.
     """
     check_output(folder, overwrite)
     left = promised(choice, accept)

@@ -229,7 +229,15 @@ def _line(text: str) -> str:
 def model_description(
     unit: PlantUnit | LoopUnit, version: Version, name: str, guid: str, compiled: tuple[str, ...]
 ) -> str:
-    """modelDescription.xml of a unit in that version of FMI; ``compiled`` are its source files without headers."""
+    """The text of a unit's modelDescription.xml.
+
+    Args:
+        unit: The mirror with its amplifier, or a closed loop.
+        version: Version of FMI.
+        name: What the unit calls itself, an identifier of C.
+        guid: The identifier of its contents, in braces.
+        compiled: Names of its C source files, without headers.
+    """
     listed = variables(unit)
     places = {v.name: i for i, v in enumerate(listed)}
     unknowns = [(i, [places[d] for d in v.dependencies]) for i, v in enumerate(listed) if v.causality == "output"]

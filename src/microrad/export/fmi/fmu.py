@@ -80,13 +80,13 @@ def write_unit(unit: PlantUnit | LoopUnit, path: Path, version: Version, name: s
     The library inside is compiled here, if there is a C compiler. The same unit gives the same file.
 
     Args:
-        unit: the mirror with its amplifier, or a closed loop.
-        path: the file to write.
-        version: of the interface, "2.0" or "3.0".
-        name: what the unit calls itself, an identifier of C.
+        unit: The mirror with its amplifier, or a closed loop.
+        path: The file to write.
+        version: Of the interface, "2.0" or "3.0".
+        name: What the unit calls itself, an identifier of C.
 
     Raises:
-        ExportError: another version; a name that is no identifier or too long; a controller that cannot be exported
+        ExportError: Another version; a name that is no identifier or too long; a controller that cannot be exported
             (see `sections`); a compiler that fails.
     """
     if version not in HEADERS:
@@ -132,7 +132,16 @@ def _texts(unit: PlantUnit | LoopUnit, version: Version, name: str) -> tuple[dic
 
 # -------------------------------------------------------------------------------------------------------------- sources
 def unit_code(unit: PlantUnit | LoopUnit, name: str) -> dict[str, str]:
-    """The C of a unit without the functions of the standard: file names and texts. Raises ExportError as `sections`."""
+    """The C of a unit without the functions of the standard, as texts by file name.
+
+    Args:
+        unit: The mirror with its amplifier, or a closed loop.
+        name: What the unit calls itself, an identifier of C.
+
+    Raises:
+        ExportError: For a controller that cannot be exported (see `sections`), or that reads what a loop does not
+            measure.
+    """
     plant, loop, control = f"{name}_plant", f"{name}_loop", f"{name}_ctl"
     code = {f"{plant}_hysteresis.h": render("hysteresis.h.j2", name=plant, precision="double")}
     values = _plant_values(plant_of(unit))

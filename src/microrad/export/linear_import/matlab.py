@@ -38,9 +38,17 @@ def load(path: Path) -> dict[str, Any]:
 
 
 def select(path: Path, variable: str | None) -> tuple[str, dict[str, Any]]:
-    """The system of a file: the name of its structure ("" for variables of their own), and its fields.
+    """The linear system of a file: the name of its structure, and its fields by name.
 
-    Raises ExportError for a file without one, with several of which none is chosen, and for objects.
+    The name is "" where the system's matrices are variables of their own.
+
+    Args:
+        path: The MATLAB file, version 5 to 7.
+        variable: Name of the structure, "" for variables of their own; None takes the only system.
+
+    Raises:
+        ExportError: For a file that cannot be read, that has no such system or several of which none is chosen, or that
+            holds an object or an array of structures in place of one.
     """
     variables = load(path)
     systems = _systems(path, variables)
@@ -90,8 +98,15 @@ def form_of(fields: dict[str, Any]) -> tuple[str, ...]:
 def numbers(fields: dict[str, Any], key: str, source: str, *, is_complex: bool = False) -> Any:
     """A field as an array of two axes, of floats or of complex numbers.
 
-    Raises ExportError for text, cells of several entries, objects, sparse matrices, complex numbers where there must be
-    none, and numbers that are not finite or beyond `LARGEST`.
+    Args:
+        fields: The system's fields by name.
+        key: Name of the field.
+        source: What messages call the system.
+        is_complex: Whether complex numbers are allowed.
+
+    Raises:
+        ExportError: For text, cells of several entries, objects, sparse matrices, complex numbers where there must be
+            none, and numbers that are not finite or beyond `LARGEST`.
     """
     value = fields[key]
     if isinstance(value, np.ndarray) and value.dtype == object and value.size == 1:

@@ -55,12 +55,12 @@ def import_mat(path: Path, given: Given, variable: str | None = None) -> str:
     They are variables of their own or fields of one structure. Where there are several forms, A B C D count.
 
     Args:
-        path: the MATLAB file, version 5 to 7.
-        given: what a linear model does not say.
-        variable: name of the structure, where the file has several.
+        path: The MATLAB file, version 5 to 7.
+        given: What a linear model does not say.
+        variable: Name of the structure, where the file has several.
 
     Raises:
-        ExportError: what cannot be read, chosen or said in a mirror file, with the reason.
+        ExportError: What cannot be read, chosen or said in a mirror file, with the reason.
     """
     path = Path(path)
     chosen, found = select(path, variable)
@@ -75,12 +75,12 @@ def import_control(system: Any, given: Given, source: str = "python-control") ->
     """The text of a mirror file from an object of python-control.
 
     Args:
-        system: a `control.StateSpace` or a `control.TransferFunction`.
-        given: what a linear model does not say.
-        source: what the file's comments and messages call the model.
+        system: A `control.StateSpace` or a `control.TransferFunction`.
+        given: What a linear model does not say.
+        source: What the file's comments and messages call the model.
 
     Raises:
-        ExportError: what cannot be said in a mirror file, with the reason.
+        ExportError: What cannot be said in a mirror file, with the reason.
     """
     return _text(_factored(lambda: roots_of_control(system, source), source), given, source, (source,))
 

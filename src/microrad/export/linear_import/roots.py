@@ -35,13 +35,26 @@ class Roots:
 
 
 def response(of: Roots, freq_hz: Floats) -> Complexes:
-    """Frequency response."""
+    """The frequency response of zeros, poles and gain, complex, of the frequencies' shape.
+
+    Args:
+        of: The system.
+        freq_hz: Frequencies in Hz.
+    """
     return factored(of.zeros, of.poles, of.gain, np.asarray(2j * np.pi * freq_hz, dtype=complex))
 
 
 # --------------------------------------------------------------------------------------------------------------- forms
 def roots_of_fields(fields: dict[str, Any], source: str) -> Roots:
-    """Roots from a MATLAB file's fields. Raises ExportError with the reason for what is not one continuous system."""
+    """Zeros, poles and gain from a MATLAB file's fields.
+
+    Args:
+        fields: The system's fields by name: A B C D, z p k or num den, and Ts where it is given.
+        source: What messages call the system.
+
+    Raises:
+        ExportError: For what is not one continuous system of one input (in V where its unit is named) and one output.
+    """
     stated = fields.get("InputUnit")  # an export of microrad names its input's unit: a mirror takes volts
     unit = stated.item() if isinstance(stated, np.ndarray) and stated.size == 1 else ""
     if isinstance(unit, str) and unit not in ("V", ""):
@@ -81,7 +94,16 @@ def _row(values: Any, key: str, source: str) -> Any:
 
 
 def roots_of_states(system: lti.StateSpace, source: str) -> Roots:
-    """Roots of a continuous state space. Raises ExportError for shapes that do not fit, and for hidden modes."""
+    """Zeros, poles and gain of a continuous state space of one input and one output.
+
+    Args:
+        system: The state space, time in s; its shapes are checked here.
+        source: What messages call it.
+
+    Raises:
+        ExportError: For shapes that do not fit, for several inputs or outputs, for too many states, and for hidden
+            modes.
+    """
     n = system.A.shape[0]
     inputs, outputs = system.B.shape[1], system.C.shape[0]
     shapes = {"A": (n, n), "B": (n, inputs), "C": (outputs, n), "D": (outputs, inputs)}
@@ -100,7 +122,16 @@ def roots_of_states(system: lti.StateSpace, source: str) -> Roots:
 
 
 def roots_of_coefficients(numerator: Floats, denominator: Floats, source: str) -> Roots:
-    """Roots of a numerator and a denominator in powers of s (rad/s), highest first."""
+    """Zeros, poles and gain of a quotient of polynomials in s (rad/s).
+
+    Args:
+        numerator: Its coefficients, highest power first.
+        denominator: Those of the denominator, likewise.
+        source: What messages call the system.
+
+    Raises:
+        ExportError: Where one of the two is zero, and for too high an order.
+    """
     num, den = (np.trim_zeros(each, "f") for each in (numerator, denominator))
     if not den.size:
         raise ExportError(f"{source}: the denominator is zero; save one with a coefficient other than 0")
@@ -115,7 +146,16 @@ def roots_of_coefficients(numerator: Floats, denominator: Floats, source: str) -
 
 
 def roots_of_control(system: Any, source: str) -> Roots:
-    """Roots of an object of python-control. Raises ExportError for other objects, several inputs, and sampled ones."""
+    """Zeros, poles and gain of an object of python-control.
+
+    Args:
+        system: A `control.StateSpace` or a `control.TransferFunction`.
+        source: What messages call it.
+
+    Raises:
+        ExportError: For other objects, several inputs or outputs, sampled ones, and where python-control is not
+            installed.
+    """
     library = python_control()
     if not isinstance(system, library.StateSpace | library.TransferFunction):
         raise ExportError(
@@ -138,7 +178,16 @@ def roots_of_control(system: Any, source: str) -> Roots:
 
 # -------------------------------------------------------------------------------------------------------------- checks
 def paired(found: Complexes, key: str, source: str) -> Complexes:
-    """Real roots, and pairs of conjugates that agree to the last bit. Raises ExportError for a root without its own."""
+    """Real roots as they are, and complex ones in pairs of conjugates that agree to the last bit.
+
+    Args:
+        found: The roots in rad/s, shape (roots,).
+        key: What messages call the roots.
+        source: What messages call the system.
+
+    Raises:
+        ExportError: For a complex root without its conjugate.
+    """
     real = np.abs(found.imag) <= 1e-14 * np.abs(found)
     upper, lower = (list(found[~real & (sign * found.imag > 0.0)]) for sign in (1.0, -1.0))
     both = [complex(r.real) for r in found[real]]
@@ -158,7 +207,16 @@ def paired(found: Complexes, key: str, source: str) -> Complexes:
 
 
 def checked(of: Roots, source: str) -> Roots:
-    """The same roots, where a mirror file can say them. Raises ExportError with the reason where it cannot."""
+    """The same zeros, poles and gain, where a mirror file can say them.
+
+    Args:
+        of: The system.
+        source: What messages call it.
+
+    Raises:
+        ExportError: For a system that is not strictly proper, unstable, not minimal or without a gain at 0 Hz; for
+            integrators and for poles that coincide.
+    """
     if of.zeros.size >= of.poles.size:
         raise ExportError(
             f"{source}: {of.zeros.size} zeros over {of.poles.size} poles, not strictly proper; a mirror does not "

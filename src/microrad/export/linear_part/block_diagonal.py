@@ -66,11 +66,15 @@ def slices(sizes: tuple[int, ...]) -> list[slice]:
 
 
 def block_diagonal(A: Floats | Wide, C: Floats | Wide, bound: float) -> BlockDiagonal:
-    """The form of a finite square A in which no Sylvester solution, and no ratio within a pair, exceeds ``bound``.
+    """The block-diagonal form of a square matrix with the smallest blocks that the bound allows.
 
-    Scale the states to comparable sizes first: the bound is absolute. With a bound of 0 each connected part of A is one
-    block. Within a block those modes stand first whose eigenvectors the outputs ``C`` (outputs, states) show least: a
-    mode that a zero cancels then drives nothing, however large it grows.
+    With a bound of 0 each connected part of A is one block. Within a block those modes stand first whose eigenvectors
+    the outputs show least: a mode that a zero cancels then drives nothing, however large it grows.
+
+    Args:
+        A: The matrix, finite, shape (states, states), with states of comparable sizes: the bound is absolute.
+        C: What the outputs show of the states, shape (outputs, states).
+        bound: The most that an entry of a Sylvester solution, or a ratio within a pair of states, may be.
     """
     if not A.size:
         return BlockDiagonal(*(np.zeros(A.shape, dtype=np.longdouble),) * 3, ())

@@ -72,9 +72,13 @@ def _parted(A: Floats | Wide, B: Floats | Wide, L: Floats | Wide, C: Floats | Wi
 
 
 def sizes(A: Floats, driven: Floats) -> Floats:
-    """Powers of two near each state's size when the columns of ``driven`` carry white noise of 1; 1 for one at rest.
+    """Powers of two near each state's rms under white noise of 1 at the inputs; 1 for a state that stays at rest.
 
     The poles are drawn in by a thousandth (and inside the circle, where one is not): an integrator has a size, too.
+
+    Args:
+        A: The discrete system's matrix, shape (states, states).
+        driven: What each of the noises drives, shape (states, noises).
     """
     if not A.size:
         return np.ones(0)

@@ -39,11 +39,11 @@ def write_mat(models: Sequence[LinearModel], path: Path) -> None:
     zpkRefused and tfRefused (why a form is missing), meaning, Mission MissionSha256 Mirror.
 
     Args:
-        models: what to write.
-        path: the file.
+        models: What to write.
+        path: The file.
 
     Raises:
-        ExportError: a name that MATLAB does not take, the same name twice, or a file that cannot be written.
+        ExportError: A name that MATLAB does not take, the same name twice, or a file that cannot be written.
     """
     _check_names(models)
     draft = io.BytesIO()

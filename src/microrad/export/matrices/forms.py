@@ -117,7 +117,16 @@ def _of_entries(model: LinearModel, make: Callable[..., Any]) -> tuple[tuple[Any
 
 
 def factors(numerator: list[Fraction], denominator: list[Fraction]) -> tuple[Complexes, Complexes, float]:
-    """Zeros, poles and gain of the `polynomials` of an entry; no zeros and no poles where the numerator is 0."""
+    """Zeros, poles and gain of an entry from its `polynomials`; no zeros, no poles and a gain of 0 for a numerator of
+    0.
+
+    Args:
+        numerator: Its coefficients, highest power first, the first one not 0; empty for 0.
+        denominator: Those of the denominator, likewise.
+
+    Raises:
+        ExportError: For a coefficient beyond the range of a float.
+    """
     if not numerator:
         return np.zeros(0, complex), np.zeros(0, complex), 0.0
     return roots(numerator), roots(denominator), float(floats(numerator[:1])[0])
@@ -135,7 +144,16 @@ def _zero_pole_gain(
 
 
 def factored(zeros: Complexes, poles: Complexes, gain: float, s: Complexes) -> Complexes:
-    """gain x product of (s - zero) / (s - pole) at each s, in an order that stays within the range of a float."""
+    """The frequency response gain x product of (s - zero) / (s - pole).
+
+    The factors are taken in an order that stays within the range of a float.
+
+    Args:
+        zeros: Zeros, shape (zeros,): in rad/s, or plain numbers of the z plane where sampled.
+        poles: Poles, likewise.
+        gain: The factor in front.
+        s: Where the response is wanted, of any shape, in the unit of the roots.
+    """
     response = np.full(s.shape, gain, dtype=complex)
     with np.errstate(all="ignore"):  # what leaves the range shows in the result
         for i in range(max(zeros.size, poles.size)):

@@ -19,7 +19,15 @@ _OUTSIDE = 1e-9  # how far |z| of an integrator may lie beyond 1 by rounding
 
 
 def entry_of(system: lti.StateSpace, output: int, number: int) -> lti.StateSpace:
-    """One input to one output, without the states that no chain of entries other than 0 joins to both."""
+    """One entry of a linear model: one input to one output, without the states that are not on a way between the two.
+
+    A state is left out if no chain of entries other than 0 joins it to the input, or to the output.
+
+    Args:
+        system: The model.
+        output: The output's number, from 0.
+        number: The input's number, from 0.
+    """
     b, c = system.B[:, number : number + 1], system.C[output : output + 1]
     kept = reachable(system.A, b) & reachable(system.A.T, c.T)
     d = system.D[output : output + 1, number : number + 1]
@@ -49,17 +57,31 @@ def without_copies(system: lti.StateSpace) -> lti.StateSpace:
 
 
 def without_state(system: lti.StateSpace, state: int, equals: Floats) -> lti.StateSpace:
-    """The same map without a state that ``equals`` a combination of the others, (1, states) with a 0 of its own."""
+    """The same map without a state that is a combination of the others.
+
+    Args:
+        system: The map.
+        state: The state's number, from 0.
+        equals: The combination, shape (1, states), with a 0 for the state itself.
+    """
     kept = np.arange(system.order) != state
     A, C = (M + M[:, state : state + 1] * equals for M in (system.A, system.C))
     return lti.StateSpace(A[np.ix_(kept, kept)], system.B[kept], C[:, kept], system.D)
 
 
 def refuse_hidden(system: lti.StateSpace, period_s: float, name: str) -> None:
-    """Raises ExportError if no input drives a mode, if no output shows one, or if a number is too large.
+    """Refuse a model in which no input drives a mode or no output shows one, or that has too large a number.
 
     The test of Popov, Belevitch and Hautus on the balanced system: [A - s, B] and [A - s; C] keep their rank at every
     pole. What loses it has vanished from the transfer function.
+
+    Args:
+        system: The model.
+        period_s: Its sample time in seconds; 0 where it is continuous.
+        name: What messages call it.
+
+    Raises:
+        ExportError: With the mode that is hidden, or the number's limit.
     """
     if not all(np.all(np.abs(getattr(system, key)) <= LARGEST) for key in "ABCD"):
         raise ExportError(
@@ -89,7 +111,16 @@ def _balanced(system: lti.StateSpace) -> tuple[Floats, Floats, Floats]:
 
 
 def refuse_unstable(system: lti.StateSpace, period_s: float, name: str) -> None:
-    """Raises ExportError with the worst pole if one lies outside the region of stability; integrators do not."""
+    """Refuse a model with a pole outside the region of stability; integrators pass.
+
+    Args:
+        system: The model.
+        period_s: Its sample time in seconds; 0 where it is continuous.
+        name: What messages call it.
+
+    Raises:
+        ExportError: With the worst pole.
+    """
     poles = np.linalg.eigvals(system.A)
     beyond = np.abs(poles) - 1.0 if period_s else poles.real / np.maximum(np.abs(poles), 1e-300)
     if not poles.size or np.max(beyond) <= _OUTSIDE:
@@ -101,7 +132,12 @@ def refuse_unstable(system: lti.StateSpace, period_s: float, name: str) -> None:
 
 
 def pole_text(pole: complex, period_s: float) -> str:
-    """A root in words: its frequency in Hz, and |z| or the damping ratio."""
+    """A root in words: its frequency in Hz, and |z| or the damping ratio.
+
+    Args:
+        pole: The root, in rad/s where continuous.
+        period_s: Sample time in seconds; 0 where continuous.
+    """
     if period_s:
         return f"|z| = {abs(pole):.9g} at {abs(np.angle(pole)) / (2.0 * math.pi * period_s):.4g} Hz"
     damping = -pole.real / abs(pole) if pole else 1.0
