@@ -208,8 +208,9 @@ def test_under_a_jitter_the_page_has_the_margin_of_the_outage(tmp_path):
     assert f"{error * 1e6:.2f}" in link_view.map_words(found) and "10 \u00b5rad" in link_view.map_words(still)
     assert link.margin_map(found.data, found.data.table.data_rate_bit_s, error)[0, 0] == pytest.approx(margin, abs=1e-6)
     assert found.frame.pointing_error_rad[-1] > error
-    shown = {row[0] for row in link_view.tables(link_study.run_link_study(file))["Under jitter"]}
-    assert {"Mean pointing loss", "Outage", "Below required margin"} <= {name.removesuffix(" !") for name in shown}
+    jittered, calm = (link_view.blocks(link_study.run_link_study(each)) for each in (file, link_file(tmp_path)))
+    assert "What pointing costs the link" in [each.title for each in jittered if isinstance(each, View)]
+    assert "What pointing costs the link" not in [each.title for each in calm if isinstance(each, View)]
 
 
 def test_the_frame_stands_still_until_the_working_point_leaves_it(draft, view):
@@ -226,13 +227,6 @@ def test_margins_say_whether_they_are_met(draft):
     short = link_view.view(draft.set("terminals.leo_aperture", "4 cm").link()).margins[0]
     assert not short.met
     assert "needs 3 dB: MISSED" in short.needs
-
-
-def test_rows_of_a_budget_are_its_lines_and_its_sums(view):
-    budget = view.budgets[0]
-    rows = link_view.budget_rows((*budget.lines, *budget.totals))
-    assert len(rows) == len(budget.lines) + len(budget.totals)
-    assert rows[-1][:2] == ("Margin", f"{budget.margin_db:.2f} dB")
 
 
 def test_the_last_rows_of_a_table_stand_out_and_nothing_is_sent_twice():
@@ -289,17 +283,19 @@ def test_sliders_are_those_of_the_links_and_the_seldom_moved_stand_behind(draft)
 
 def test_the_study_of_the_links_gives_tables_sentences_and_what_moves_the_margin(draft):
     study = link_study.run_link_study(draft.link())
-    drawn = link_view.tornado_plot(study)
-    first = study.tornados[0].swings[0]
+    blocks = link_view.blocks(study)
+    drawn, first = plots.drawn(blocks)["tornado"], study.tornados[0].swings[0]
     assert drawn["layout"]["yaxis"]["ticktext"][0].startswith(first.key.removeprefix("communication."))
     bars = [bar for each in drawn["data"] for bar in zip(each["y"], each["base"], each["x"], strict=True)]
     ends = [base + length for row, base, length in bars if row == 0]
     assert sorted(ends) == pytest.approx(sorted((first.margin_low_db, first.margin_high_db)), rel=1e-4)
-    assert "Tracking sensor" in link_view.tables(study)
-    assert any(sentence.startswith("The links close") for sentence in link_view.consequences(study))
-    assert not any(sentence.startswith("Warning: ") for sentence in link_view.consequences(study))
-    far = link_study.run_link_study(draft.set("communication.pointing_error", "60 urad").link())
-    assert any(sentence.startswith("Warning: ") for sentence in link_view.consequences(far))
+    assert "The answer's light on the tracking sensor" in [each.title for each in blocks if isinstance(each, Table)]
+    assert blocks[0].startswith("The links close")
+    titles = [each.title for each in blocks if isinstance(each, View)]
+    assert "Acquisition" in titles and "Open-loop pointing" not in titles
+    marked = "Marked \u201c!\u201d in the tables:"
+    far = link_view.blocks(link_study.run_link_study(draft.set("communication.pointing_error", "60 urad").link()))
+    assert (marked in blocks, marked in far) == (False, True)
 
 
 # ------------------------------------------------------------------------------------------------------------ pointing

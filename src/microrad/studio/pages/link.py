@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
 
 from nicegui import ui
@@ -12,17 +12,19 @@ from microrad.core.progress import Progress
 from microrad.link import study as link_study
 from microrad.link.study import LinkStudy
 from microrad.mission.file import LinkFile
+from microrad.report.links.views import budget_table
+from microrad.report.view import Block
 from microrad.studio import commands
 from microrad.studio.draft.draft import Draft
 from microrad.studio.pages import layout
-from microrad.studio.pages.elements import Figure, MarginCards, fill, table
+from microrad.studio.pages.elements import Blocks, Figure, MarginCards, put, table
 from microrad.studio.pages.in_thread import in_thread
 from microrad.studio.pages.sliders import SliderPage
 from microrad.studio.session import Session
 from microrad.studio.views import link as link_view
 from microrad.studio.views.latest import Latest, shared
 from microrad.studio.views.link import LinkView
-from microrad.studio.views.plots import Plot
+from microrad.studio.views.plots import Plot, drawn
 from microrad.studio.views.sliders import Slider
 
 TITLE = "Links"
@@ -43,7 +45,6 @@ class LinkPage(SliderPage[LinkView]):
         """Build the body, and have it follow the session."""
         self.study: Latest[LinkStudy] = shared(session, "links")
         self.shown, self.rested = "", ("", 0.0)
-        self.slow: dict[str, list[link_view.Row]] = {}
         layout.copy_buttons(lambda: commands.budget(layout.file_of(session)))
         super().__init__(session, link_view.second)
         ui.timer(_LOOK_S, self._look)
@@ -58,14 +59,10 @@ class LinkPage(SliderPage[LinkView]):
         self.words = ui.label().props('role="status"')
         layout.heading("Budgets")
         self.which = ui.toggle([], on_change=self._show_table).props('no-caps dense aria-label="Budget shown"')
-        self.table = table(("Line", "Value", "Basis", "Source"), numbers=(1,))
-        ui.label("! marks a line with a warning: see the end of the next section.").classes("soft small")
+        self.table = table()
         layout.heading("What follows")
         self.state = ui.label().classes("soft").props('role="status"')
-        self.sentences = ui.column()
-        layout.heading("What moves the margin of the communication link")
-        ui.label("Each input alone, 10 % lower and higher (0.5 dB; an outage by a factor of ten).").classes("soft")
-        self.tornado = Figure("What moves the margin; in words above")
+        self.told = Blocks()
         self.dimmed = (self.cards, self.map, self.key, self.words, self.table)
 
     def sliders(self, draft: Draft) -> Mapping[str, tuple[Slider, ...]]:
@@ -88,19 +85,16 @@ class LinkPage(SliderPage[LinkView]):
         self._tabs()
 
     def _tabs(self) -> None:
-        names = [*(b.name for b in self.view_now.budgets), *self.slow] if self.view_now else []
+        names = [b.name for b in self.view_now.budgets] if self.view_now else []
         if names != self.which.options:
             chosen = self.which.value if self.which.value in names else names[0] if names else None
             self.which.set_options(names, value=chosen)
         self._show_table()
 
     def _show_table(self) -> None:
-        name = self.which.value
-        budget = next((b for b in (self.view_now.budgets if self.view_now else ()) if b.name == name), None)
-        if budget is None:
-            fill(self.table, self.slow.get(str(name), []))
-        else:
-            fill(self.table, link_view.budget_rows((*budget.lines, *budget.totals)), len(budget.totals))
+        for budget in self.view_now.budgets if self.view_now else ():
+            if budget.name == self.which.value:
+                put(self.table, budget_table(budget))
 
     async def _look(self) -> None:
         """Have the study of the links made once a draft rests, and show it once it is there."""
@@ -111,18 +105,11 @@ class LinkPage(SliderPage[LinkView]):
         computing = "Computing acquisition and what moves the margins ..." if state.running else ""
         self.state.text = computing or state.error or before
         self.state.visible = bool(self.state.text)
-        for part in (self.sentences, self.tornado):
-            layout.grey(part, not now)
+        layout.grey(self.told, not now)
         if state.result is None or state.key == self.shown:
             return
         self.shown = state.key
-        words, self.slow, tornado = await in_thread(self.sentences, _told, state.result)
-        self.sentences.clear()
-        with self.sentences:
-            for sentence in words:
-                ui.label(sentence)
-        self.tornado.show(tornado)
-        self._tabs()
+        self.told.show_blocks(*await in_thread(self.told, _told, state.result))
 
     def _ask_study(self) -> None:
         """It takes a second of a core: not for every step of a slider."""
@@ -135,9 +122,10 @@ class LinkPage(SliderPage[LinkView]):
                 self.study.ask(draft.sha256, partial(_study, file))
 
 
-def _told(study: LinkStudy) -> tuple[list[str], dict[str, list[link_view.Row]], Plot]:
-    """Words, tables and plot of a study."""
-    return link_view.consequences(study), link_view.tables(study), link_view.tornado_plot(study)
+def _told(study: LinkStudy) -> tuple[Sequence[Block], Mapping[str, Plot | str]]:
+    """What follows from a study, and the figures of it."""
+    blocks = link_view.blocks(study)
+    return blocks, drawn(blocks)
 
 
 def _study(file: LinkFile, progress: Progress) -> LinkStudy:

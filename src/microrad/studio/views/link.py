@@ -3,30 +3,27 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from microrad import link
 from microrad.core.arrays import Floats
-from microrad.core.budget import Line as BudgetLine
 from microrad.core.units import format_quantity
 from microrad.link import study as link_study
 from microrad.link.pointing.outage import error_rad, required_error_rad
 from microrad.link.study import LinkStudy
 from microrad.mission.file import LinkFile
 from microrad.report.links import words
-from microrad.report.links.budgets import jitter_lines
-from microrad.report.links.figures import tornado
+from microrad.report.links.figures import link_figures
+from microrad.report.links.views import budgets_view, links_views
 from microrad.report.plotting.palette import VERMILION, WHITE
 from microrad.report.plotting.sheet import Axis, Field, Line
 from microrad.report.quantities import quantity, signed
+from microrad.report.view import Block
 from microrad.studio.draft.draft import Draft
-from microrad.studio.views.plots import Plot, empty, figure, plot
+from microrad.studio.views.plots import Plot, plot
 from microrad.studio.views.sliders import Slider, slider
-
-Row = tuple[str, ...]
 
 TABLES = {
     "terminals": "Telescopes",
@@ -209,14 +206,6 @@ def map_key(required: float) -> str:
     return f"Solid line: the required {required:g} dB.{none} Dot: the working point."
 
 
-def budget_rows(lines: Sequence[BudgetLine]) -> list[Row]:
-    """Lines of a budget as rows of text."""
-    return [
-        (line.name + (" !" if line.warning else ""), quantity(line.value, line.unit), line.basis, line.source)
-        for line in lines
-    ]
-
-
 def map_words(v: LinkView) -> str:
     """What the map says, in words, for a reader who does not see it."""
     q, c = v.data.requirement, v.data.table
@@ -241,26 +230,8 @@ def _largest(data: link.DataLink) -> str:
 
 
 # --------------------------------------------------------------------------------------------------- the slower things
-def tables(study: LinkStudy) -> dict[str, list[Row]]:
-    """Budgets that take the whole study of the links: under jitter, the receiver's noise, the tracking sensor."""
-    found = {
-        "Under jitter": jitter_lines(study),
-        "Receiver noise": list(study.receiver_noise),
-        "Tracking sensor": [],
-    }
-    t = study.tracking
-    if t is not None:
-        angle = () if t.noise_equivalent_angle is None else (t.noise_equivalent_angle,)
-        found["Tracking sensor"] = [*t.noise_lines, *angle]
-    return {name: budget_rows(lines) for name, lines in found.items() if lines}
-
-
-def consequences(study: LinkStudy) -> list[str]:
-    """What follows from the budgets, a sentence each, and the warnings."""
-    return [words.verdict(study), *words.consequences(study), *(f"Warning: {warning}" for warning in study.warnings)]
-
-
-def tornado_plot(study: LinkStudy) -> Plot:
-    """What moves the margin of the communication link: one input at a time, the weightiest on top."""
-    of = study.tornados[0]
-    return figure(tornado(study, of).sheet) if of.swings else empty("no input moves the margin")
+def blocks(study: LinkStudy) -> tuple[Block, ...]:
+    """The report's views of the links but for the pointing, which has a page, and the lines of the budgets."""
+    figures, own = link_figures(study), replace(study, open_loop=None)
+    budgets, *others = links_views(own, figures, budgets=budgets_view(study, (), figures))
+    return (words.verdict(study), *budgets.blocks, *others)
