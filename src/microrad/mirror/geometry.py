@@ -270,9 +270,9 @@ def stroke_budget(
 ) -> tuple[StrokeBudget, ...]:
     """Compare the stroke that each output of the mirror needs with the travel that it has.
 
-    An output is an axis, or an actuator of a tripod. The demand may lie anywhere within its half ranges on both axes:
-    an output called for by the line of sight along the unit vector d needs |d_x| x + |d_y| y, times the magnification,
-    halved where the angle is mechanical.
+    There is one budget for each output: for x and y, or for the actuators 1 to 3 of a tripod. The demand may lie
+    anywhere within its half ranges on both axes: an output called for by the line of sight along the unit vector d
+    needs |d_x| x + |d_y| y, times the magnification, halved where the angle is mechanical.
 
     Args:
         geometry: What stands between the mirror's outputs and the line of sight.
@@ -283,9 +283,6 @@ def stroke_budget(
             ("optical").
         usable_travel_rad: What the drive range leaves of the travel, counted alike; all of it where none is given.
         sources: Where a half range comes from, by the name of its field of `StrokeDemand`.
-
-    Returns:
-        One budget for each output: x and y, or actuators 1 to 3.
 
     Raises:
         ValueError: For a travel that is not above zero, a usable travel beyond it, and a singular geometry.

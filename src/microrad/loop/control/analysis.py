@@ -33,8 +33,14 @@ NEAR_LEAST = 1.3
 def refuse_misfit(plant: DesignPlant, controller: AxisController, period_s: float | None = None) -> None:
     """Raise ValueError where a controller cannot close this plant's loop.
 
-    Wrong numbers of inputs, outputs or states, a number that is not finite, a plant that answers the command of its own
-    sample, or a controller made for another control period (``period_s``, where it is known).
+    Args:
+        plant: The plant of one axis.
+        controller: The controller of one axis that is to close its loop.
+        period_s: Control period that the controller is made for, where it is known.
+
+    Raises:
+        ValueError: Wrong numbers of inputs, outputs or states, a number that is not finite, a plant that answers the
+            command of its own sample, or a controller made for another control period.
     """
     s, name = controller.system, controller.name
     n = s.order
@@ -60,10 +66,16 @@ def refuse_misfit(plant: DesignPlant, controller: AxisController, period_s: floa
 
 
 def close(plant: DesignPlant, controller: AxisController) -> lti.StateSpace:
-    """Discrete closed loop from the plant's white sequences to residual, optical, gauge (rad) and command (V).
+    """Close the loop: from the plant's white sequences to residual, optical, gauge (rad) and command (V), discrete.
 
-    States: plant, controller. The command is not clipped. Raises ValueError as `refuse_misfit` does; an unstable loop
-    is returned as it is.
+    States: plant, controller. The command is not clipped. An unstable loop is returned as it is.
+
+    Args:
+        plant: The plant of one axis.
+        controller: Its controller.
+
+    Raises:
+        ValueError: The controller does not fit, see `refuse_misfit`.
     """
     refuse_misfit(plant, controller)
     p, c = plant.system, controller.system
@@ -76,9 +88,13 @@ def close(plant: DesignPlant, controller: AxisController) -> lti.StateSpace:
 
 
 def reachable(A: Floats, B: Floats) -> Flags:
-    """States that an input reaches through the entries other than 0 of A and B.
+    """Which states an input reaches through the entries other than 0 of A and B: flags, shape (states,).
 
     For a plant built from blocks these are the states that a command moves; the rest is the disturbance's own.
+
+    Args:
+        A: Map of the states, shape (states, states).
+        B: What the inputs add to the states, shape (states, inputs).
     """
     reached = np.any(B != 0.0, axis=1)
     for _ in range(A.shape[0]):
@@ -95,13 +111,30 @@ def moved(plant: DesignPlant) -> DesignPlant:
 
 
 def loop_poles(plant: DesignPlant, controller: AxisController) -> Complexes:
-    """Poles z of the closed loop, largest first, without those that belong to the disturbance alone."""
+    """Poles z of the closed loop, largest first, without those that belong to the disturbance alone.
+
+    Args:
+        plant: The plant of one axis.
+        controller: Its controller.
+
+    Raises:
+        ValueError: The controller does not fit, see `refuse_misfit`.
+    """
     found = np.linalg.eigvals(close(moved(plant), controller).A)
     return np.asarray(found[np.argsort(-np.abs(found), kind="stable")], dtype=complex)
 
 
 def refuse_unstable(plant: DesignPlant, controller: AxisController) -> None:
-    """Raise ValueError where the closed loop is unstable, with its worst pole and by how far it misses a margin."""
+    """Raise ValueError where the closed loop is unstable.
+
+    Args:
+        plant: The plant of one axis.
+        controller: Its controller.
+
+    Raises:
+        ValueError: The loop is unstable, with its worst pole and by how far it misses a margin; or the controller does
+            not fit.
+    """
     worst = loop_poles(plant, controller)[0]
     if abs(worst) < 1.0:
         return
@@ -121,8 +154,10 @@ def refuse_unstable(plant: DesignPlant, controller: AxisController) -> None:
 def h2(closed: lti.StateSpace) -> Floats:
     """Stationary variance of each output (row) that each white sequence of unit variance (column) causes.
 
-    The sequences are independent: an output's variance is the sum of its row. Raises ValueError where a pole lies on or
-    outside the unit circle, for which there is no stationary variance.
+    The sequences are independent: an output's variance is the sum of its row.
+
+    Raises:
+        ValueError: A pole lies on or outside the unit circle, so that there is no stationary variance.
     """
     worst = float(np.max(np.abs(np.linalg.eigvals(closed.A)), initial=0.0))
     if worst >= 1.0:
@@ -135,7 +170,16 @@ def h2(closed: lti.StateSpace) -> Floats:
 
 
 def by_source(plant: DesignPlant, controller: AxisController, output: int = 0) -> dict[str, float]:
-    """Variance of one output of the closed loop (the residual, rad^2) from disturbance, optical and gauge noise."""
+    """Variance of one output of the closed loop, by what causes it: disturbance, optical noise and gauge noise.
+
+    Args:
+        plant: The plant of one axis.
+        controller: Its controller.
+        output: Which output: the residual by default, `OPTICAL` or `GAUGE` (rad^2), or `COMMAND` (V^2).
+
+    Raises:
+        ValueError: The controller does not fit, or there is no stationary variance, see `h2`.
+    """
     row = h2(close(plant, controller))[output]
     n = plant.disturbances
     parts = (row[:n], row[n : n + 1], row[n + 1 :])
@@ -190,9 +234,16 @@ class LoopMargins(DiskMargin):
 def loop_response(
     plant: DesignPlant, controller: AxisController, freq_hz: Floats, broken_at: str = "command"
 ) -> Complexes:
-    """Loop gain L, shape (frequencies,), of the loop cut at one of `BREAKS`; 1 + L = 0 is the limit of stability.
+    """Loop gain L of the loop cut at one place, shape (frequencies,); 1 + L = 0 is the limit of stability.
 
-    Frequencies up to half the control rate. Raises ValueError above it, and as `refuse_misfit` does.
+    Args:
+        plant: The plant of one axis.
+        controller: Its controller.
+        freq_hz: Frequencies up to half the control rate, one or an array of them.
+        broken_at: Where the loop is cut, one of `BREAKS`.
+
+    Raises:
+        ValueError: For a frequency above half the control rate, and where the controller does not fit.
     """
     refuse_misfit(plant, controller)
     freq_hz = np.atleast_1d(np.asarray(freq_hz, dtype=float))
@@ -205,9 +256,14 @@ def loop_response(
 
 
 def cut(K: Complexes, G: Complexes, broken_at: str) -> Complexes:
-    """Loop gain from the responses of controller (sensor to command) and plant (command to sensor), shape (..., 2).
+    """Loop gain, shape (...,), from the responses of controller and plant.
 
     At the command -(K_o G_o + K_g G_g); at the optical sensor, with the gauge's loop closed, -K_o G_o / (1 - K_g G_g).
+
+    Args:
+        K: From the optical sensor and the gauge (rad) to the command (V), shape (..., 2).
+        G: From the command (V) to optical sensor and gauge (rad), shape (..., 2).
+        broken_at: Where the loop is cut, one of `BREAKS`.
     """
     parts = K * G
     if broken_at == "command":
@@ -234,12 +290,23 @@ def _parts(
 
 
 def real_at_half_the_rate(L: Complexes, cycles: Floats) -> Complexes:
-    """The loop gain at frequencies in cycles a sample, without what rounding leaves of an imaginary part at 0.5."""
+    """The loop gain without the imaginary part that rounding leaves at half the rate, where it is real.
+
+    Args:
+        L: Loop gain, shape (frequencies,).
+        cycles: Its frequencies in cycles a sample, up to 0.5, shape (frequencies,).
+    """
     return np.where(cycles > 0.5 - 1e-9, L.real, L)
 
 
 def around_poles(poles: Complexes, period_s: float, ratio: float) -> Floats:
-    """Frequencies (Hz) around discrete poles: from a fifth of the half width away, then each ``ratio`` farther."""
+    """Frequencies (Hz) around discrete poles: from a fifth of the half width away, then each a constant factor farther.
+
+    Args:
+        poles: Poles z of a discrete system; those on the positive real axis have no resonance and are passed over.
+        period_s: Control period.
+        ratio: Factor, above 1, between the distances of neighbouring frequencies from their pole.
+    """
     s = np.log(poles[np.abs(poles) > 1e-3].astype(complex)) / (2 * math.pi * period_s)
     found = []
     for pole in s[s.imag > 0.0]:
@@ -252,7 +319,12 @@ def around_poles(poles: Complexes, period_s: float, ratio: float) -> Floats:
 
 
 def resolving(poles: Complexes, period_s: float) -> Floats:
-    """Frequencies (Hz) to half the rate on which a loop with these poles, open and closed, shows every resonance."""
+    """Frequencies (Hz), rising to half the rate, on which a loop shows every resonance.
+
+    Args:
+        poles: Poles z of the loop, open and closed.
+        period_s: Control period.
+    """
     near = around_poles(np.unique(poles), period_s, 1.3) * (1.0 + 1e-9)  # an undamped filter has no response at its own
     return np.unique(np.concatenate([np.geomspace(1e-7, 0.5, _POINTS) / period_s, near]).clip(max=0.5 / period_s))
 
@@ -263,7 +335,16 @@ def _resolving(plant: DesignPlant, controller: AxisController) -> Floats:
 
 
 def margins_at(plant: DesignPlant, controller: AxisController, broken_at: str = "command") -> LoopMargins:
-    """Margins of the loop cut at one of `BREAKS`. Raises ValueError as `refuse_misfit` and `refuse_unstable` do."""
+    """Margins of the loop cut at one place.
+
+    Args:
+        plant: The plant of one axis.
+        controller: Its controller.
+        broken_at: Where the loop is cut, one of `BREAKS`.
+
+    Raises:
+        ValueError: The controller does not fit, or the loop is unstable.
+    """
     refuse_misfit(plant, controller)
     refuse_unstable(plant, controller)
     return margins_of(_respond(plant, controller, broken_at), _resolving(plant, controller))
@@ -329,10 +410,17 @@ def _roots(of: Callable[[Floats], Floats], freq_hz: Floats, values: Floats) -> F
 
 
 def loop_margins(plant: DesignPlant, controller: AxisController) -> LoopMargins:
-    """Worst margins over the places where the loop can be cut; reach and peak are of the disturbance's rejection.
+    """Worst margins over the places where the loop can be cut.
 
-    A disturbance is rejected by 1 / (1 + L) of the loop cut at the optical sensor, or at the command where there is
-    but one sensor. Raises ValueError as `margins_at` does.
+    Crossover, bandwidth and peak are those of the disturbance's rejection, 1 / (1 + L) of the loop cut at the optical
+    sensor, or at the command where there is but one sensor.
+
+    Args:
+        plant: The plant of one axis.
+        controller: Its controller.
+
+    Raises:
+        ValueError: The controller does not fit, or the loop is unstable.
     """
     if not uses_both(controller):
         return margins_at(plant, controller)
@@ -346,7 +434,15 @@ def loop_margins(plant: DesignPlant, controller: AxisController) -> LoopMargins:
 
 
 def margins_of_cuts(plant: DesignPlant, controller: AxisController) -> tuple[LoopMargins, LoopMargins]:
-    """`margins_at` each of `BREAKS`, in their order: both cuts share the responses of controller and plant."""
+    """Margins of the loop cut at each of `BREAKS`, in their order; faster than `margins_at` one after the other.
+
+    Args:
+        plant: The plant of one axis.
+        controller: Its controller.
+
+    Raises:
+        ValueError: The controller does not fit, or the loop is unstable.
+    """
     refuse_misfit(plant, controller)
     refuse_unstable(plant, controller)
     freq, period = _resolving(plant, controller), plant.period_s
@@ -368,7 +464,14 @@ def uses_both(controller: AxisController) -> bool:
 
 
 def bandwidth_hz(freq_hz: Floats, distance: Floats) -> float:
-    """Lowest frequency at which |S| = 1 / ``distance`` reaches 1 from below; 0 where it never lies below."""
+    """Lowest frequency at which the sensitivity |S| reaches 1 from below, between the points of a grid.
+
+    It is 0 where |S| never lies below 1, and the last frequency of the grid where it always does.
+
+    Args:
+        freq_hz: Grid of frequencies, rising, shape (frequencies,).
+        distance: Distance |1 + L| = 1 / |S| at each of them, shape (frequencies,).
+    """
     if distance[0] <= 1.0:
         return 0.0
     at = int(np.argmax(distance <= 1.0))
@@ -413,14 +516,21 @@ class MultiloopMargin(DiskMargin):
 
 
 def multiloop_disk_margin(freq_hz: Floats, L: Complexes) -> MultiloopMargin:
-    """Disk margin of a two-axis loop gain L, shape (frequencies, 2, 2), against simultaneous independent changes.
+    """Disk margin of a two-axis loop against changes of both loops at once, each on its own.
 
-    2 / min over real diagonal D of the largest singular value of D (S - T) D^-1, which for two loops is the structured
-    singular value itself. Source: Seiler, Packard and Gahinet, IEEE Control Systems Magazine 40 (2020) 78. Raises
-    ValueError for another shape.
+    2 / max over the frequencies of min over real diagonal D of the largest singular value of D (S - T) D^-1, which for
+    two loops is the structured singular value itself. Source: Seiler, Packard and Gahinet, IEEE Control Systems
+    Magazine 40 (2020) 78.
 
     Scaling keeps the determinant, the product of both singular values, so the larger one is smallest where the sum of
     squares is: where both entries off the diagonal have the same size.
+
+    Args:
+        freq_hz: Frequencies, shape (frequencies,).
+        L: Loop gain at each of them, shape (frequencies, 2, 2).
+
+    Raises:
+        ValueError: For a loop gain of another shape.
     """
     if L.shape != (freq_hz.size, 2, 2):
         raise ValueError(

@@ -95,7 +95,12 @@ def corner_hz(plant: DesignPlant) -> float:
 
 
 def drift(model: lti.StateSpace, below: float) -> list[tuple[float, float]]:
-    """Real stable (pole, zero) of a discrete model below a frequency (in cycles a sample), slowest first."""
+    """Real stable poles and zeros of a discrete model below a frequency, in pairs (pole, zero), slowest first.
+
+    Args:
+        model: Discrete model with one input and one output.
+        below: Frequency in cycles a sample.
+    """
     found = []
     for roots in (np.linalg.eigvals(model.A).astype(complex), lti.zeros(model)):
         real = roots[(np.abs(roots.imag) < 1e-9) & (roots.real > math.exp(-2.0 * math.pi * below)) & (roots.real < 1.0)]
@@ -350,8 +355,18 @@ def _observer_design(
 def observer_filter(plant: DesignPlant, bandwidth_hz: float, lead_hz: float, damping: float) -> lti.StateSpace:
     """Q over P's approximate inverse: from the disturbance's estimate (rad) to the command (V) that cancels it.
 
-    Low-pass of second order with a lead, over the slow gain, without the plant's drift (real poles and zeros far below
-    its corner, as creep leaves them) and without its most prominent resonance.
+    Q is a low-pass of second order with a lead. The inverse divides by the slow gain, and undoes the plant's drift
+    (real poles and zeros far below its corner, as creep leaves them) and its most prominent resonance, where it has
+    one.
+
+    Args:
+        plant: The plant of one axis.
+        bandwidth_hz: Natural frequency of Q, below half the control rate.
+        lead_hz: Frequency of Q's zero, the lead.
+        damping: Damping ratio of Q.
+
+    Raises:
+        ValueError: For a plant without optical sensor, and for a bandwidth that is not between 0 and half the rate.
     """
     model = optical_model(plant)
     low_pass = filters.low_pass(bandwidth_hz, damping, plant.period_s, lead_hz)

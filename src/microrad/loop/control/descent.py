@@ -87,7 +87,12 @@ def _numbers(trial: Trial) -> Floats:
 
 
 def descend(search: Search, start: Trial) -> Trial:
-    """Where a sequence of quadratic programs leads from ``start``: near an optimum, which `settle` ends at."""
+    """Follow a sequence of quadratic programs from a trial to near an optimum, from where `settle` goes on.
+
+    Args:
+        search: Judges the candidates.
+        start: Trial to set out from.
+    """
     if not start.place.size:
         return start
     local = _Local(search)
@@ -143,11 +148,15 @@ class _Quadratic:
 
 
 def settle(search: Search, start: Trial) -> Trial:
-    """The optimum beside ``start``, by the optima of quadratic models until one stands still.
+    """Find the optimum beside a trial, by the optima of quadratic models until one stands still.
 
     A search that builds up its curvature as it goes stops where the cost hardly falls, which in a flat valley is
     anywhere; the model's curvature is that of the valley. Where a model has misled, the next one reaches less far and
     lays its points closer: a constraint that changes from one dip of |1 + L| to another has a kink.
+
+    Args:
+        search: Judges the candidates.
+        start: Trial near the optimum, as `descend` finds it.
     """
     here, reach, node = start, REACH, NODE
     for _ in range(MODELS if start.place.size else 0):

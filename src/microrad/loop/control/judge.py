@@ -284,12 +284,22 @@ class _Stack:
 
 
 def response(system: lti.StateSpace, points: Complexes) -> Complexes:
-    """Response of a controller (one output) at points z, shape (points, inputs)."""
+    """Response of a controller (one output) at points z, shape (points, inputs).
+
+    Args:
+        system: The controller, discrete.
+        points: Complex points z, shape (points,); exp(2 pi i f T) for a frequency f.
+    """
     return np.asarray(responses(_Stack.of([system]), points)[0])
 
 
 def responses(stack: _Stack, points: Complexes) -> Complexes:
-    """Responses of controllers (one output) at points z, shape (controllers, points, inputs)."""
+    """Responses of controllers (one output) at points z, shape (controllers, points, inputs).
+
+    Args:
+        stack: Matrices of the controllers, all of one order.
+        points: Complex points z, shape (points,); exp(2 pi i f T) for a frequency f.
+    """
     several, order = stack.A.shape[:2]
     if not order:
         return np.broadcast_to(stack.D.astype(complex), (several, points.size, stack.D.shape[2]))

@@ -57,9 +57,17 @@ def lqg_controller(plant: DesignPlant, weights: Weights, *, coarse: bool = False
     """Optimal controller of the plant for these weights; it uses the measurement of its own sample.
 
     With x the prediction, K the predictor's gain and G the regulator's, v[k] - v[k-1] = -G (A x + K (m - C x), v[k-1]).
-    The observer and v[k-1] are driven by the clipped command: anti-windup is their input column. ``coarse`` rounds the
-    observer's gain and the matrices to what processors agree in (`OBSERVER_BITS`, `lti.EXACT_BITS`). Raises ValueError
-    without an optical sensor, and where a Riccati equation has no solution.
+    The observer and v[k-1] are driven by the clipped command: anti-windup is their input column.
+
+    Args:
+        plant: The plant of one axis.
+        weights: What the design trades.
+        coarse: Whether the observer's gain and the matrices are rounded to what processors agree in (`OBSERVER_BITS`,
+            `lti.EXACT_BITS`).
+
+    Raises:
+        ValueError: For a plant without optical sensor, weights that are not above 0, and where a Riccati equation has
+            no solution.
     """
     known, seen_by = _solved(plant), (weights.sensor_noise, weights.command_noise_v, weights.walk)
     if seen_by not in known:
@@ -127,7 +135,15 @@ def in_own_units(plant: DesignPlant) -> DesignPlant:
 
 
 def observed(plant: DesignPlant, weights: Weights) -> Model:
-    """The plant with walk and noise on the command, its unused sensors left out and the noise of the others scaled."""
+    """What the design knows of the plant: with walk and noise on the command, and the sensors that it uses.
+
+    Args:
+        plant: The plant of one axis.
+        weights: Give the size of the walk, of the command's noise and of the sensors' noise.
+
+    Raises:
+        ValueError: For a plant without optical sensor, and for weights that are not above 0.
+    """
     _refuse(plant, weights)
     s, n = plant.system, plant.system.order
     sensors = [OPTICAL, GAUGE] if plant.has_gauge else [OPTICAL]
@@ -188,12 +204,21 @@ def _has_integrator(plant: DesignPlant) -> bool:
 
 
 def filter_gain(A: Floats, noise: Floats, seen: Floats, seen_noise: Floats) -> Floats:
-    """Gain K of the steady one-step predictor x+ = A x + K (m - C x) under one white sequence in states and sensors.
+    """Gain K, shape (states, sensors), of the steady one-step predictor x+ = A x + K (m - C x).
 
     K = (A P C' + N) (C P C' + R)^-1 with P from the Riccati equation, N and R the noise's cross-covariance and the
-    sensors' covariance (Anderson and Moore, Optimal Filtering, 1979, section 5.4), then refined: the covariance that
-    K leaves is a sum of squares, and hardly depends on the errors of a K near the best (Kleinman, IEEE Transactions on
-    Automatic Control 13 (1968) 114). Raises ValueError without one.
+    sensors' covariance (Anderson and Moore, Optimal Filtering, 1979, section 5.4), then refined: the covariance that K
+    leaves is a sum of squares, and hardly depends on the errors of a K near the best (Kleinman, IEEE Transactions on
+    Automatic Control 13 (1968) 114).
+
+    Args:
+        A: Map of the states, shape (states, states).
+        noise: What white sequences of unit variance add to the states, shape (states, sequences).
+        seen: C, what the sensors see of the states, shape (sensors, states).
+        seen_noise: What the same sequences add to the sensors, shape (sensors, sequences).
+
+    Raises:
+        ValueError: The sensors do not see every state that drifts.
     """
     R, N = seen_noise @ seen_noise.T, noise @ seen_noise.T
     whitened = np.linalg.solve(R, N.T)
@@ -212,10 +237,17 @@ def filter_gain(A: Floats, noise: Floats, seen: Floats, seen_noise: Floats) -> F
 
 
 def regulator_gain(model: Model, weight: float) -> Floats:
-    """Gain G of v[k] - v[k-1] = -G (A x, v[k-1]) that minimises residual^2 + weight (v[k] - v[k-1])^2.
+    """Gain G of v[k] - v[k-1] = -G (A x, v[k-1]), shape (1, states + 1), that costs least.
 
-    A Riccati equation where the command reaches, and a Stein equation for what it does not: states of the disturbance
-    may be undamped, no pole of theirs has to be moved. Raises ValueError without a solution.
+    The cost is residual^2 + weight (v[k] - v[k-1])^2. A Riccati equation is solved where the command reaches, and a
+    Stein equation for what it does not: states of the disturbance may be undamped, no pole of theirs has to be moved.
+
+    Args:
+        model: What the design knows of the plant.
+        weight: Cost of the command's increment (rad^2/V^2), above 0.
+
+    Raises:
+        ValueError: One of the equations has no solution.
     """
     m, own = np.append(model.moved, True), np.append(~model.moved, False)
     n = model.A.shape[0]
@@ -232,10 +264,19 @@ def regulator_gain(model: Model, weight: float) -> Floats:
 
 
 def riccati(A: Floats, B: Floats, Q: Floats, R: Floats, otherwise: str) -> Floats:
-    """Stabilising solution X = A' X (I + B R^-1 B' X)^-1 A + Q of the discrete Riccati equation, R positive definite.
+    """Stabilising solution X = A' X (I + B R^-1 B' X)^-1 A + Q of the discrete Riccati equation, shape (n, n).
 
-    Structure-preserving doubling: Chu, Fan, Lin and Wang, International Journal of Control 77 (2004) 767. Raises
-    ValueError, saying ``otherwise``, where it does not settle.
+    Structure-preserving doubling: Chu, Fan, Lin and Wang, International Journal of Control 77 (2004) 767.
+
+    Args:
+        A: Map of the states, shape (n, n).
+        B: What the inputs add to the states, shape (n, m).
+        Q: Cost of the states, shape (n, n), symmetric.
+        R: Cost of the inputs, shape (m, m), positive definite.
+        otherwise: Reason to give where there is no solution.
+
+    Raises:
+        ValueError: The doubling does not settle.
     """
     n = A.shape[0]
     X = np.array(Q, dtype=float)
@@ -253,7 +294,16 @@ def _gramian(A: Floats, Q: Floats) -> Floats:
 
 
 def stein(left: Floats, right: Floats, Q: Floats) -> Floats:
-    """Solution Z = left' Z right + Q by doubling; poles of ``right`` may lie on the unit circle, not of ``left``."""
+    """Solution Z = left' Z right + Q of a Stein equation by doubling, shape (n, m).
+
+    Args:
+        left: Shape (n, n), with all its poles inside the unit circle.
+        right: Shape (m, m); its poles may lie on the unit circle.
+        Q: Shape (n, m).
+
+    Raises:
+        ValueError: The largest poles of both have a product of 1 or more.
+    """
     slowest = math.prod(float(np.max(np.abs(np.linalg.eigvals(M)), initial=0.0)) for M in (left, right))
     if slowest >= 1.0:
         raise ValueError("LQG: the disturbance grows faster than the loop settles; give its model some damping")

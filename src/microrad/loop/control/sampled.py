@@ -77,7 +77,12 @@ class Gains:
 
 
 def gains_from_mission(control: Control, mirror_gain_rad_v: float) -> Gains:
-    """The mission's gains, scaled to keep the loop gain for a mirror of another gain than they are given for."""
+    """The mission's gains, scaled to keep the loop gain for a mirror of another gain than they are given for.
+
+    Args:
+        control: The mission's table of the control.
+        mirror_gain_rad_v: Gain of the mirror that the loop is closed around.
+    """
     scale = control.for_mirror_gain_rad_v / mirror_gain_rad_v
     return Gains(
         control.proportional_v_rad * scale,
@@ -91,6 +96,10 @@ def pid(gains: Gains, period_s: float) -> lti.StateSpace:
     """Digital PID of one axis: v = Kp e + Ki T sum(e) + Kd filtered difference, all by backward differences.
 
     States, where their gains are not 0: the integral part in volts, and e behind the derivative's first-order filter.
+
+    Args:
+        gains: Its gains, from the error (rad) to the command (V).
+        period_s: Control period T.
     """
     step = gains.integral * period_s
     keep = gains.derivative_filter_s / (gains.derivative_filter_s + period_s)
@@ -166,7 +175,12 @@ def inverse(m: Mirror) -> Inverse:
 
 
 def inverse_arrays(of: Inverse, period_s: float) -> dict[str, Any]:
-    """The inverse as the kernels' arrays, by field of `kernels.Loop` and `kernels.Ensemble`, for a control period."""
+    """The inverse as the kernels' arrays, by field of `kernels.Loop` and `kernels.Ensemble`.
+
+    Args:
+        of: The inverse.
+        period_s: Control period, at which its creep is advanced.
+    """
     lags = [
         (weight, tau, a)
         for a, creep in enumerate(of.creep)
@@ -208,8 +222,16 @@ def play_inverse(model: Play) -> tuple[float, tuple[float, ...], tuple[float, ..
 def sampled_plant(m: Mirror, drive: Drive, timing: Timing) -> lti.StateSpace:
     """Delay, amplifier and linear mirror of one axis as the controller sees them: discrete, at the control period.
 
-    The same recursion as the simulation's, at the plant's step, with the hysteresis replaced by its slow gain.
-    States: mirror, amplifier output, commands on their way. Raises ValueError for more than one axis.
+    From the command (V) to the angle (rad). The same recursion as the simulation's, at the plant's step, with the
+    hysteresis replaced by its slow gain. States: mirror, amplifier output, commands on their way.
+
+    Args:
+        m: Mirror of one axis.
+        drive: Its amplifier, of which the bandwidth alone counts here.
+        timing: Clock of the loop.
+
+    Raises:
+        ValueError: For more than one axis or actuator.
     """
     if (m.actuators, m.axes) != (1, 1):
         raise ValueError(f"mirror {m.name!r} has {m.actuators} actuators and {m.axes} axes: give one axis at a time")
@@ -234,7 +256,12 @@ def sampled_plant(m: Mirror, drive: Drive, timing: Timing) -> lti.StateSpace:
 
 
 def amplifier_factor(drive: Drive, step_s: float) -> float:
-    """Share of the way to its target that a first-order amplifier covers in one step; 1 when ideal."""
+    """Share of the way to its target that a first-order amplifier covers in one step; 1 when ideal.
+
+    Args:
+        drive: The amplifier.
+        step_s: Length of a step.
+    """
     return 1.0 if math.isinf(drive.bandwidth_hz) else -math.expm1(-2.0 * math.pi * drive.bandwidth_hz * step_s)
 
 
@@ -282,5 +309,11 @@ def slowest_pole(loop: lti.StateSpace) -> float:
 
 
 def sensitivity(loop: lti.StateSpace, freq_hz: float, period_s: float) -> complex:
-    """Error over reference, 1 / (1 + L), of the closed discrete ``loop`` (one axis) at one frequency."""
+    """Error over reference, 1 / (1 + L), of a closed loop at one frequency.
+
+    Args:
+        loop: Loop gain L, discrete, from the error to the output of one axis.
+        freq_hz: The frequency, up to half the control rate.
+        period_s: Control period.
+    """
     return complex(1.0 / (1.0 + lti.frequency_response(loop, np.array([freq_hz]), period_s)[0, 0, 0]))

@@ -83,12 +83,23 @@ class Search:
         return self.of_all(values, within)
 
     def of(self, values: Floats, place: Floats | None = None) -> Trial:
-        """Judge the candidate of these values; one that cannot be built counts as unstable."""
+        """Judge the candidate of these values; one that cannot be built counts as unstable.
+
+        Args:
+            values: Values of the parameters in SI units, shape (parameters,).
+            place: Their place within the bounds, shape (parameters,), each from 0 to 1; found from the values if not
+                given.
+        """
         (found,) = self.of_all([values], None if place is None else [place])
         return found
 
     def of_all(self, values: Sequence[Floats], places: Sequence[Floats] | None = None) -> list[Trial]:
-        """Judge the candidates of many values at once, as `of` does."""
+        """Judge the candidates of many values at once, as `of` does.
+
+        Args:
+            values: Values of the parameters of each candidate in SI units, each of shape (parameters,).
+            places: Their places within the bounds, in the same order; found from the values if not given.
+        """
         if places is None:
             own = [zip(self.parameters, each, strict=True) for each in values]
             places = [np.array([place_of(p, v) for p, v in pairs]) for pairs in own]
@@ -134,14 +145,24 @@ class Search:
 
 
 def value(parameter: Parameter, place: float) -> float:
-    """Value of a parameter at a place from 0 (its least) to 1 (its most), on its own scale."""
+    """Value of a parameter at a place within its bounds, on its own scale (linear or logarithmic).
+
+    Args:
+        parameter: The parameter.
+        place: From 0 (its least value) to 1 (its most).
+    """
     if parameter.log:
         return float(parameter.least * (parameter.most / parameter.least) ** place)
     return float(parameter.least + place * (parameter.most - parameter.least))
 
 
 def place_of(parameter: Parameter, number: float) -> float:
-    """The reverse of `value`; 0 below the least."""
+    """Place of a value within the bounds of its parameter, the reverse of `value`; 0 below the least.
+
+    Args:
+        parameter: The parameter.
+        number: Its value, in the parameter's unit.
+    """
     if number <= parameter.least:
         return 0.0
     if parameter.log:
@@ -155,7 +176,13 @@ def rounded(number: float) -> float:
 
 
 def apart(trials: Sequence[Trial], most: int, distance: float) -> list[Trial]:
-    """The first trials that lie at least this part of the bounds apart from each other."""
+    """The first trials that lie apart from each other.
+
+    Args:
+        trials: Trials in the order in which they are preferred.
+        most: How many are taken at most.
+        distance: Share of the bounds that any two of them differ by, or more, in one parameter at least.
+    """
     found: list[Trial] = []
     for t in trials:
         if len(found) < most and all(np.max(np.abs(t.place - other.place), initial=0.0) > distance for other in found):

@@ -75,17 +75,26 @@ def tune(
     survey: int = SURVEY,
     base: Tuned | None = None,
 ) -> Tuned:
-    """The controller of a family, built for the first plant, that leaves the least mean variance over all plants.
+    """Find the controller of a family that leaves the least mean variance over all plants.
 
-    Every plant has to be stable with it, have the modulus margin, cut at the command and at the optical sensor, and the
-    bandwidth that ``specification`` asks for. The first plant is the nominal one, the others are what it could also be.
-    A Latin hypercube of ``survey`` places drawn from ``seed``, then local searches from its best places and, where the
-    family contains another, from that one's optimum, ``base`` where it is known: the result is never worse than that.
-    The best optima are followed until they stand still; the values are used to four significant digits.
-    ``on_progress(done, total, what)`` counts the survey's places and the local searches.
+    It is built for the first plant. Every plant has to be stable with it, have the modulus margin, cut at the command
+    and at the optical sensor, and the bandwidth that is asked for. A Latin hypercube of places is looked at first, then
+    local searches set out from its best places and, where the family contains another, from that one's optimum: the
+    result is never worse than that. The best optima are followed until they stand still; the values are used to four
+    significant digits.
 
-    Raises ValueError where the family has no controller for the nominal plant, none was stable on every plant, or the
-    specification is not met, with the best that was reached.
+    Args:
+        family: Kind of controller.
+        plants: The nominal plant first, then others that it could also be.
+        specification: Modulus margin and bandwidth that every plant has to have.
+        seed: Seed of the places that are looked at first.
+        on_progress: Called with the places and local searches that are done, their number and what is done.
+        survey: Number of the places that are looked at first.
+        base: Optimum of the family that this one contains, where it is known.
+
+    Raises:
+        ValueError: The family has no controller for the nominal plant, none was stable on every plant, or the
+            specification is not met; says what the best one reaches.
     """
     total, what = survey + STARTS + FINALISTS, f"tune {family.name}"
     search = Search(family, plants, specification)
@@ -157,7 +166,18 @@ def _settled(search: Search, optima: Sequence[Trial]) -> Trial:
 def grid_best(
     family: Family, plants: Sequence[DesignPlant], specification: Specification, grid: Sequence[Sequence[float]]
 ) -> Tuned:
-    """The best controller of an explicit grid, one row of values for each parameter; as `tune` for everything else."""
+    """The best controller of an explicit grid; as `tune` for everything else.
+
+    Args:
+        family: Kind of controller.
+        plants: The nominal plant first, then others that it could also be.
+        specification: Modulus margin and bandwidth that every plant has to have.
+        grid: Values of each parameter in SI units, in the order of the family's parameters.
+
+    Raises:
+        ValueError: The grid has not one row of values for each parameter, or no controller of the grid meets the
+            specification.
+    """
     search = Search(family, plants, specification, pull=0.0)
     if len(grid) != len(search.parameters):
         names = ", ".join(p.name for p in search.parameters)
