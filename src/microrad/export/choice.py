@@ -130,8 +130,9 @@ def outlook(choice: Choice) -> controller_study.Outlook | None:
 
 
 def promised(choice: Choice, accept: bool = False) -> controller_study.Outlook | None:
-    """What a controller of the fine-pointing loop leaves, if its linear figure is a promise; None for a loop of
-    [control].
+    """What a controller of the fine-pointing loop leaves, refused where its linear figure is no promise.
+
+    The loop of [control] has no such figure: None.
 
     Args:
         choice: The controller.

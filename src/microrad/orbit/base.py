@@ -22,7 +22,16 @@ _Table = TypeVar("_Table")
 
 
 def required(table: _Table | None, name: str, error: type[ValueError]) -> _Table:
-    """The mission's table of that name; raises this error where the mission has none."""
+    """A table of the mission that has to be there.
+
+    Args:
+        table: The table; None where the mission has none.
+        name: What the table is called in the mission file.
+        error: The error to raise without it.
+
+    Raises:
+        ValueError: The error that was given, where there is no table.
+    """
     if table is None:
         raise error(f"the mission has no table [{name}]: microrad init writes one")
     return table

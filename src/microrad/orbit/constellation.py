@@ -65,11 +65,22 @@ def opportunities(
     furthest_m: float = math.inf,
     on_progress: Callable[[int], None] = lambda done: None,
 ) -> operations.Opportunities:
-    """Every contact of every satellite with every relay up to a range of ``furthest_m``, in order of their start.
+    """Every contact of every satellite with every relay up to a range, in order of their start.
 
-    One satellite after the other, as the work is many small arrays, for which threads only wait on one another: it
-    grows with the number of satellites, and what is kept with the number of contacts. Raises `orbit.OrbitError` as
-    `orbit.contacts`.
+    The satellites are searched one after the other, as the work is many small arrays, for which threads only wait on
+    one another. The time grows with the number of satellites, and what is kept with the number of contacts.
+
+    Args:
+        satellites: The satellites on their orbits, counted from 0 in this order.
+        relays: The relays on theirs, likewise.
+        earth: What hides one from the other.
+        epoch: Instant from which all times count.
+        span_s: Start and end of the search, s.
+        furthest_m: Largest range of a contact, m; infinite without a limit.
+        on_progress: Called with the number of satellites that are searched.
+
+    Raises:
+        OrbitError: As `orbit.contacts`.
     """
     rows: list[tuple[int, int, float, float]] = []
     sampled: dict[float, list[Sampled]] = {}
@@ -95,12 +106,13 @@ def run_constellation(
     at its largest range. Volumes leave out the share of time in outage.
 
     Args:
-        file: the mission, with the files that it names.
-        loss: what pointing costs the laser link.
-        on_progress: told how many of how many satellites are searched.
+        file: The mission, with the files that it names.
+        loss: What pointing costs the laser link.
+        on_progress: Told how many of how many satellites are searched.
 
-    Raises `operations.OperationsError` without the tables `constellation` and `operations`, and `orbit.OrbitError` for
-    orbits that do not hold.
+    Raises:
+        OperationsError: Without the tables `constellation` and `operations`.
+        OrbitError: Without the table `orbit`, and for orbits that do not hold.
     """
     m, folder, contents = file.mission, file.path.parent, file.contents
     c = required(m.constellation, "constellation", operations.OperationsError)

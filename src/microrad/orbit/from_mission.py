@@ -59,12 +59,13 @@ def pair(orbits: Orbits | None, ends: Terminals, folder: Path, contents: Content
     """The terminals of a mission on their orbits; files are looked for in ``contents``, and then in ``folder``.
 
     Args:
-        orbits: the mission's table `orbit`.
-        ends: its table `terminals`, with their names.
-        folder: the folder of its file.
-        contents: the files that it names, where they were read with it.
+        orbits: The mission's table `orbit`.
+        ends: Its table `terminals`, with their names.
+        folder: The folder of its file.
+        contents: The files that it names, where they were read with it.
 
-    Raises OrbitError if an orbit is impossible, or does not hold over the mission's span.
+    Raises:
+        OrbitError: If an orbit is impossible, or does not hold over the mission's span.
     """
     orbits = required(orbits, "orbit", OrbitError)
     try:
@@ -154,7 +155,16 @@ def stations(downlink: Downlink) -> tuple[Station, ...]:
 
 
 def relays(c: Constellation, orbits: Orbits, epoch: Epoch) -> tuple[Terminal, ...]:
-    """The relays of a constellation, each limited as the mission's own partner is."""
+    """The relays of a constellation in their geostationary slots, each limited as the mission's own partner is.
+
+    Args:
+        c: The mission's table of its constellation.
+        orbits: The mission's table of orbits, for the partner's limits.
+        epoch: Instant from which times count.
+
+    Raises:
+        OrbitError: For a longitude beyond a full turn, and for limits that are out of range.
+    """
     shared = _limits(orbits.geo.limits)
     return tuple(
         Terminal(GeostationarySlot(name, epoch, relay.longitude_rad), shared, name) for name, relay in c.relays.items()
@@ -172,7 +182,12 @@ def _names(sets: Sequence[ElementSet], path: Path) -> list[str]:
 
 
 def repeats(c: Constellation, orbits: Orbits) -> bool:
-    """Whether the constellation has satellites: from a file, or from elements that its pattern can repeat."""
+    """Whether the constellation has satellites: from a file, or from elements that its pattern can repeat.
+
+    Args:
+        c: The mission's table of its constellation.
+        orbits: The mission's table of orbits, whose own satellite the pattern repeats.
+    """
     return c.pattern == "file" or orbits.leo.kind in REPEATED
 
 
@@ -185,13 +200,14 @@ def satellites(
     its phase 2 pi (j p / t + f k / t) further (J. G. Walker, J. Br. Interplanet. Soc. 37, 1984).
 
     Args:
-        c: the mission's table of its constellation.
-        orbits: the mission's table of orbits, whose own satellite the pattern repeats.
-        epoch: from which times count.
-        folder: where files are looked for that are not among the contents.
-        contents: the files that the mission names.
+        c: The mission's table of its constellation.
+        orbits: The mission's table of orbits, whose own satellite the pattern repeats.
+        epoch: Instant from which times count.
+        folder: Where files are looked for that are not among the contents.
+        contents: The files that the mission names.
 
-    Raises OrbitError for a file that is refused, and an orbit that no pattern can repeat.
+    Raises:
+        OrbitError: For a file that is refused, and an orbit that no pattern can repeat.
     """
     shared = _limits(orbits.leo.limits)
     if c.file is not None:

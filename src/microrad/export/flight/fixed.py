@@ -49,7 +49,7 @@ def quantised(
         of: The controller.
         form: Its linear part.
         v: The recorded run; each number gets a range of `HEAD_ROOM` times its largest size there.
-        bits: Of coefficients and signals, 8 to 32; sums have 64.
+        bits: Bits of coefficients and signals, 8 to 32; sums have 64.
         beyond_a_count: Accept commands that stray from double precision by more than a count of the converter.
 
     Raises:

@@ -63,7 +63,7 @@ def operations(of: FlightController, form: Sections, precision: Precision) -> Op
     Args:
         of: The controller.
         form: Its linear part.
-        precision: Of the code.
+        precision: Precision of the code.
     """
     found = _mended(of, form, precision)  # whether the state is sound, then whether the readings are accepted
     found += Operations(comparisons=2) * sum(each.size for each in of.inputs)

@@ -83,7 +83,7 @@ def export_flight(
         choice: The controller, see `choice.choose`.
         folder: Where to write; it appears whole or not at all.
         name: What the code is called, an identifier of C; None makes one of the controller's name.
-        precision: Of the code: "double", "single" or "fixed" point.
+        precision: Precision of the code: "double", "single" or "fixed" point.
         samples: Length of the recorded run, in control periods.
         overwrite: Replace an earlier export in the folder.
         accept: Write also what `choice.promised` refuses.

@@ -82,7 +82,7 @@ def write_unit(unit: PlantUnit | LoopUnit, path: Path, version: Version, name: s
     Args:
         unit: The mirror with its amplifier, or a closed loop.
         path: The file to write.
-        version: Of the interface, "2.0" or "3.0".
+        version: Version of the interface, "2.0" or "3.0".
         name: What the unit calls itself, an identifier of C.
 
     Raises:

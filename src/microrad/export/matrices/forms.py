@@ -117,8 +117,9 @@ def _of_entries(model: LinearModel, make: Callable[..., Any]) -> tuple[tuple[Any
 
 
 def factors(numerator: list[Fraction], denominator: list[Fraction]) -> tuple[Complexes, Complexes, float]:
-    """Zeros, poles and gain of an entry from its `polynomials`; no zeros, no poles and a gain of 0 for a numerator of
-    0.
+    """Zeros, poles and gain of an entry from its `polynomials`.
+
+    Where the numerator is 0 there are no zeros and no poles, and the gain is 0.
 
     Args:
         numerator: Its coefficients, highest power first, the first one not 0; empty for 0.

@@ -75,9 +75,9 @@ def loss_at(data: link.DataLink, margin_db: float, source: str) -> PointingLoss:
     """The pointing loss, an uncorrected point-ahead in it, that leaves a margin at the budgeted rate and distance.
 
     Args:
-        data: the communication link.
-        margin_db: its margin, dB.
-        source: where the margin comes from, in words.
+        data: The communication link.
+        margin_db: Its margin, dB.
+        source: Where the margin comes from, in words.
     """
     needed = float(link.required_dbm(data, data.table.data_rate_bit_s))
     return PointingLoss(link.received_on_axis_dbm(data) - needed - margin_db, 0.0, source)
@@ -96,8 +96,8 @@ def relay(links: LinkStudy, loss: PointingLoss) -> Way:
     """The way by the relay alone: what `run_day_study` finds of it, without the rest of the day.
 
     Args:
-        links: the links of the mission, with their acquisition.
-        loss: what pointing costs the laser link.
+        links: The links of the mission, with their acquisition.
+        loss: What pointing costs the laser link.
     """
     o, _, seen, found = _begin(links)
     return flow.relay(o, seen, flow.rate_table(flow.closings(o, links.data, loss)), loss.outage, found, 1.0)
@@ -109,12 +109,13 @@ def run_day_study(
     """The day of a mission that has the tables `orbit` and `operations`.
 
     Args:
-        links: the links of the mission, with their acquisition.
-        loss: what pointing costs the laser link; by default what the mission states.
-        on_progress: told how many of how many assumptions are changed.
+        links: The links of the mission, with their acquisition.
+        loss: What pointing costs the laser link; by default what the mission states.
+        on_progress: Told how many of how many assumptions are changed.
 
-    Raises `orbit.OrbitError` and `operations.OperationsError` for tables that are missing, orbits that do not hold and
-    a contact that is asked for beyond those of the span.
+    Raises:
+        OrbitError: Without the table `orbit`, and for orbits that do not hold.
+        OperationsError: Without the table `operations`, and for a contact that is asked for beyond those of the span.
     """
     m = links.file.mission
     loss = given_loss(links) if loss is None else loss

@@ -80,7 +80,17 @@ class Known:
 
 
 def numbers(case: Case, known: Known) -> Numbers:
-    """Volumes and latencies of one case."""
+    """Volumes and latencies of one case.
+
+    Contacts and passes are found anew only where the case has other orbits or stations.
+
+    Args:
+        case: What the day rests on.
+        known: What holds for every case with the orbits and stations of its own one.
+
+    Raises:
+        OrbitError: For orbits that do not hold.
+    """
     o, own, seen, heard = case.operations, known.own.operations, known.seen, known.heard
     moved = case.orbits is not known.own.orbits
     if moved:
@@ -99,9 +109,13 @@ def swings(known: Known, on_progress: Callable[[int, int, str], None]) -> tuple[
     """Assumptions of the day, the one that moves the ratio most first; those that move nothing stay in.
 
     Data rates and the time of acquisition are halved and doubled, the margin, the grazing height and the masks go to 0
-    and to twice, the pointing loss to 0 and 3 dB up, the altitude by a fifth; attitude, eclipse, local time, stations
-    and what the relay grants are replaced. An orbit from a file stays as it is, and so does what would leave no orbit:
-    one that has decayed, or lies below the surface that lines of sight must clear.
+    and to twice, the pointing loss to 0 and 3 dB up, the altitude a fifth down and up; attitude, eclipse, local time,
+    stations and what the relay grants are replaced. An orbit from a file stays as it is. A change that would leave no
+    orbit is not made: one that decays, or lies below the surface that lines of sight must clear.
+
+    Args:
+        known: The mission's own case with its contacts, passes and acquisition.
+        on_progress: Called with the assumptions done, their number and what is done.
     """
     o = known.own.operations
     own = replace(known.own, operations=o.with_value("runs", min(o.runs, _RUNS)))

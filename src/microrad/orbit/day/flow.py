@@ -80,9 +80,15 @@ class Way:
 
 
 def closings(o: Operations, data: link.DataLink, loss: PointingLoss) -> tuple[Closing, ...]:
-    """The rates of the link, highest first, each with how far it reaches; what the receiver refuses is left out.
+    """The data rates of the link, highest first, each with how far it reaches; what the receiver refuses is left out.
 
-    It closes with a margin of `operations.margin`; the margin falls by 20 log10 of the range.
+    The link closes where it has the margin that the mission demands (`operations.margin`); the margin falls by 20 log10
+    of the range.
+
+    Args:
+        o: The mission's table of operations, with the margin and, where given, the rates.
+        data: The communication link at its budgeted distance.
+        loss: What pointing costs it, the same at every range and rate.
     """
     rates = (data.table.data_rate_bit_s,) if o.rates_bit_s is None else o.rates_bit_s
     built, found = data.receiver, []
@@ -106,7 +112,12 @@ def rate_table(found: tuple[Closing, ...]) -> operations.RateTable | None:
 
 
 def ratio(relay_bit: float, direct_bit: float) -> float:
-    """A volume by relay over one direct: 0 where the relay carries nothing, infinite where the other alone does."""
+    """A volume by relay over one direct: 0 where the relay carries nothing, infinite where it alone carries something.
+
+    Args:
+        relay_bit: Volume by relay, bit.
+        direct_bit: Volume by the direct downlink, bit.
+    """
     if direct_bit == 0.0:
         return math.inf if relay_bit > 0.0 else 0.0
     return relay_bit / direct_bit
@@ -119,12 +130,12 @@ def relay(
     """The way by the relay: each run draws an acquisition for each contact.
 
     Args:
-        o: the mission's table of operations.
-        seen: the contacts of the two terminals.
-        rates: the rates of the laser link by range; None where the receiver takes none.
-        outage: share of the time in which the link is out, from 0 to 1.
-        found: the acquisition whose simulated times are drawn from; None where lock is there at once.
-        slower: factor on the times of acquisition.
+        o: The mission's table of operations.
+        seen: The contacts of the two terminals.
+        rates: The rates of the laser link by range; None where the receiver takes none.
+        outage: Share of the time in which the link is out, from 0 to 1.
+        found: The acquisition whose simulated times are drawn from; None where lock is there at once.
+        slower: Factor on the times of acquisition.
     """
     granted = _granted(seen, o.relay_share)
     whole = tuple(contact for contact, _ in granted)
@@ -179,7 +190,15 @@ StationPass = tuple[orbit.Pass, str]
 
 
 def station_passes(down: Downlink | None, pair: orbit.Pair) -> tuple[StationPass, ...]:
-    """Every pass over every station of the direct downlink; none without one."""
+    """Every pass of the lower satellite over every station of the direct downlink, station by station.
+
+    Args:
+        down: The mission's table of its downlink; None where it has none, which gives no passes.
+        pair: The two terminals; the lower one's orbit is searched over the span with its tail.
+
+    Raises:
+        OrbitError: For an orbit that does not hold.
+    """
     return tuple(
         (each, station.name)
         for station in (() if down is None else orbit.stations(down))
@@ -188,7 +207,15 @@ def station_passes(down: Downlink | None, pair: orbit.Pair) -> tuple[StationPass
 
 
 def direct(o: Operations, seen: View, passes: tuple[StationPass, ...]) -> Way | None:
-    """The radio downlink, or None without one. The station that rises first is kept until the satellite sets there."""
+    """The way by the direct radio downlink, or None without one.
+
+    The station that rises first is kept until the satellite sets there.
+
+    Args:
+        o: The mission's table of operations.
+        seen: The contacts of the two terminals, for the span.
+        passes: The passes over all stations, in any order.
+    """
     down = o.downlink
     if down is None:
         return None

@@ -105,9 +105,13 @@ class View:
 
 
 def longest_gap_s(contacts: Sequence[orbit.Contact], pair: orbit.Pair) -> float:
-    """Longest time (s) without a contact that begins within the span, to its end behind it as far as that is known.
+    """The longest time in s without a contact, of the gaps that begin within the span; it may end behind the span.
 
-    ``contacts`` are those of the whole, in order. Without any it is the span.
+    The last gap ends with the tail of the span. Without any contact it is the span.
+
+    Args:
+        contacts: The contacts of the span and of its tail, in order.
+        pair: The two terminals, for the span and its tail.
     """
     begin_s, end_s = pair.span_s
     if not contacts:
@@ -117,12 +121,26 @@ def longest_gap_s(contacts: Sequence[orbit.Contact], pair: orbit.Pair) -> float:
 
 
 def cut_at(contact: _C, end_s: float) -> _C:
-    """The contact up to the end of the span."""
+    """The contact up to the end of the span; itself where it ends before.
+
+    Args:
+        contact: A contact that begins within the span.
+        end_s: End of the span, s.
+    """
     return contact if contact.end_s <= end_s else replace(contact, end_s=end_s, ends=END)
 
 
 def view(pair: orbit.Pair, wavelength_m: float) -> View:
-    """The contacts of a pair of terminals, with the Doppler shift at a wavelength; raises `orbit.OrbitError`."""
+    """The contacts of the mission's two terminals, with what their line of sight does meanwhile.
+
+    Args:
+        pair: The terminals on their orbits.
+        wavelength_m: Wavelength of the laser, m, for the Doppler shift.
+
+    Raises:
+        OrbitError: For orbits that do not hold or meet, and a terminal below the surface that the line of sight must
+            clear.
+    """
     from scipy.interpolate import CubicHermiteSpline
 
     found = orbit.contacts(pair.leo, pair.geo, pair.earth, pair.epoch, pair.whole_s)
@@ -152,7 +170,16 @@ def _sight(pair: orbit.Pair, contact: orbit.Contact) -> orbit.LineOfSight:
 
 
 def encounter(pair: orbit.Pair, contact: orbit.Contact, wavelength_m: float) -> Encounter:
-    """A contact with what its line of sight reaches."""
+    """A contact with its line of sight, sampled as `times` says, and the largest values that it reaches.
+
+    Args:
+        pair: The terminals on their orbits.
+        contact: The contact.
+        wavelength_m: Wavelength of the laser, m, for the Doppler shift.
+
+    Raises:
+        OrbitError: For orbits that do not hold.
+    """
     seen = _sight(pair, contact)
     return Encounter(
         contact,
@@ -189,7 +216,12 @@ def short_tail(pair: orbit.Pair) -> tuple[str, ...]:
 
 
 def beyond_the_mission(m: LinkMission, seen: View) -> tuple[str, ...]:
-    """Constants of the mission that its own orbits exceed, a sentence each."""
+    """Constants of the mission that its own orbits exceed by more than 1 %, a sentence each.
+
+    Args:
+        m: The mission.
+        seen: The contacts of its terminals.
+    """
     if not seen.encounters:
         return ()
     ahead, rate, furthest = (seen.largest(n) for n in ("point_ahead_most_rad", "rate_most_rad_s", "range_most_m"))

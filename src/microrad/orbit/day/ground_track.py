@@ -57,9 +57,9 @@ def ground_track(seen: View, ways: tuple[Way, ...], downlink: Downlink | None) -
     """The track of the mission's satellite over its span, of a day at most.
 
     Args:
-        seen: the terminals, and when they see each other.
-        ways: the ways down, each shown where it is open.
-        downlink: the mission's ground stations; None without any.
+        seen: The terminals, and when they see each other.
+        ways: The ways down, each shown where it is open.
+        downlink: The mission's ground stations; None without any.
     """
     pair = seen.pair
     time_s = np.arange(0.0, min(seen.duration_s, LONGEST_S), STEP_S)

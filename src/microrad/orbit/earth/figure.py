@@ -36,9 +36,14 @@ class Subpoint(NamedTuple):
 
 
 def semi_axes_m(shape: Shape, height_m: float = 0.0) -> tuple[float, float]:
-    """Equatorial and polar semi-axis of the figure `shape`, both made longer by `height_m`.
+    """Equatorial and polar semi-axis of a figure of the Earth, m, both made longer by a height.
 
-    Raises OrbitError for another shape.
+    Args:
+        shape: The figure.
+        height_m: What is added to both semi-axes, m.
+
+    Raises:
+        OrbitError: For another shape.
     """
     if shape not in get_args(Shape):
         raise OrbitError(f"the shape of the Earth {shape!r} is not known; write oblate or sphere")
@@ -76,14 +81,19 @@ class Earth:
         return np.sqrt(_square(np.asarray(position_m, dtype=np.float64))) - EARTH_RADIUS_M
 
     def clearance_rad(self, first_m: Floats, second_m: Floats) -> Floats:
-        """Angle by which the line of sight between two terminals clears the surface: above 0 it is free.
+        """Angle by which the line of sight between two terminals clears the surface, shape (n,): above 0 it is free.
 
         In coordinates in which the surface is the unit sphere it is acos(1/|r1|) + acos(1/|r2|) less the angle between
         r1 and r2: by how much further the two could stand apart, seen from the centre. Straight lines and tangents stay
-        such in those coordinates. Positions have shape (3, n); the result (n,) is smooth in them and is the same to the
-        last bit when the two are swapped.
+        such in those coordinates. The result is smooth in the positions and is the same to the last bit when the two
+        are swapped.
 
-        Raises OrbitError for a terminal below the surface, or a position that is not a number.
+        Args:
+            first_m: Positions of one terminal, m, shape (3, n).
+            second_m: Those of the other one at the same times, likewise.
+
+        Raises:
+            OrbitError: For a terminal below the surface, or a position that is not a number.
         """
         first, second = self._scaled(first_m, "first"), self._scaled(second_m, "second")
         cross_x = first[1] * second[2] - first[2] * second[1]
@@ -111,7 +121,13 @@ class Earth:
 
 
 def to_unit_sphere(position_m: Floats, equatorial_m: float, polar_m: float) -> Floats:
-    """Positions of shape (3, n) in coordinates in which the ellipsoid with these semi-axes is the unit sphere."""
+    """Positions in coordinates in which an ellipsoid of revolution is the unit sphere, shape (3, n).
+
+    Args:
+        position_m: Positions or other vectors in TEME, m, shape (3, n).
+        equatorial_m: Equatorial semi-axis of the ellipsoid, m.
+        polar_m: Its polar semi-axis, m.
+    """
     position = np.asarray(position_m, dtype=np.float64)
     return np.stack((position[0] / equatorial_m, position[1] / equatorial_m, position[2] / polar_m))
 
@@ -127,9 +143,13 @@ def _horizon_rad(scaled: Floats) -> Floats:
 
 
 def gravity(position_m: Floats, j2: bool) -> Floats:
-    """Acceleration of gravity in m/s2 at positions of shape (3, n) in TEME: a point mass, with the flattening if `j2`.
+    """Acceleration of gravity in TEME, m/s^2, shape (3, n): that of a point mass, with or without the flattening.
 
     Source: Vallado, Fundamentals of Astrodynamics, chapter 8 (J2 alone).
+
+    Args:
+        position_m: Positions in TEME, m, shape (3, n).
+        j2: Whether the flattening is in it.
     """
     position = np.asarray(position_m, dtype=np.float64)
     square = _square(position)
@@ -144,10 +164,14 @@ def gravity(position_m: Floats, j2: bool) -> Floats:
 
 
 def subpoint(position_m: Floats, rotation_rad: Floats) -> Subpoint:
-    """Geodetic (WGS84) latitude, longitude in [-pi, pi) and height of positions of shape (3, n) in TEME.
+    """Geodetic (WGS84) latitude, longitude in [-pi, pi) and height of positions in TEME.
 
-    `rotation_rad` is the angle of the Earth at the same times, `Epoch.earth_rotation_rad`. Two rounds of Bowring's
-    iteration (Survey Review 23, 1976) leave less than 1e-12 rad and a micrometre from the surface outwards.
+    Two rounds of Bowring's iteration (Survey Review 23, 1976) leave less than 1e-12 rad and a micrometre from the
+    surface outwards.
+
+    Args:
+        position_m: Positions in TEME, m, shape (3, n).
+        rotation_rad: Angle of the Earth at the same times, `Epoch.earth_rotation_rad`, shape (n,).
     """
     x, y, z = np.asarray(position_m, dtype=np.float64)
     cosine, sine = np.cos(rotation_rad), np.sin(rotation_rad)
@@ -201,7 +225,15 @@ class Station:
             )
 
     def position(self, epoch: Epoch, time_s: Floats) -> States:
-        """Position and velocity of the station in TEME, `time_s` after `epoch`; it turns with the Earth."""
+        """Position and velocity of the station in TEME; it turns with the Earth.
+
+        Args:
+            epoch: Instant from which the times count.
+            time_s: Times after the epoch, s, shape (n,).
+
+        Raises:
+            OrbitError: For a time outside the tables of `Epoch`.
+        """
         square = FLATTENING * (2.0 - FLATTENING)
         sine = math.sin(self.latitude_rad)
         normal = EARTH_RADIUS_M / math.sqrt(1.0 - square * sine * sine)
@@ -213,17 +245,34 @@ class Station:
         return States(np.stack((x, y, np.full_like(x, z))), velocity)
 
     def vertical(self, epoch: Epoch, time_s: Floats) -> Floats:
-        """Unit vectors in TEME upwards from the station, along the normal of the ellipsoid, of shape (3, n)."""
+        """Unit vectors in TEME upwards from the station, along the normal of the ellipsoid, shape (3, n).
+
+        Args:
+            epoch: Instant from which the times count.
+            time_s: Times after the epoch, s, shape (n,).
+
+        Raises:
+            OrbitError: For a time outside the tables of `Epoch`.
+        """
         angle = epoch.earth_rotation_rad(time_s) + self.longitude_rad
         level, rise = math.cos(self.latitude_rad), math.sin(self.latitude_rad)
         return np.stack((level * np.cos(angle), level * np.sin(angle), np.full_like(angle, rise)))
 
 
 def elevation_rad(station: Station, epoch: Epoch, time_s: Floats, position_m: Floats) -> Floats:
-    """Elevation in rad over the station's horizon of positions (3, n) in TEME at `time_s` after `epoch`.
+    """Elevation of positions over a station's horizon, rad, shape (n,); negative below it.
 
-    Geometric: the angle over the plane normal to the ellipsoid's normal, without refraction (which lifts a satellite by
-    0.5 deg at the horizon, 0.1 deg at an elevation of 9 deg).
+    It is geometric: the angle over the plane across the ellipsoid's normal, without refraction (which lifts a satellite
+    by 0.5 deg at the horizon, 0.1 deg at an elevation of 9 deg).
+
+    Args:
+        station: The station.
+        epoch: Instant from which the times count.
+        time_s: Times after the epoch, s, shape (n,).
+        position_m: Positions in TEME at these times, m, shape (3, n).
+
+    Raises:
+        OrbitError: For a time outside the tables of `Epoch`.
     """
     line = np.asarray(position_m, dtype=np.float64) - station.position(epoch, time_s).position_m
     up = station.vertical(epoch, time_s)

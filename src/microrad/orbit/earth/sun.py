@@ -16,10 +16,14 @@ SUN_RADIUS_M = 6.957e8
 
 
 def sun_direction(epoch: Epoch, time_s: Floats) -> Floats:
-    """Unit vectors in TEME from the centre of the Earth to the apparent Sun, of shape (3, n).
+    """Unit vectors in TEME from the centre of the Earth to the apparent Sun, shape (3, n).
 
     Within 0.02 deg from 1973 to 2050. Source: the low-precision formulas of the Astronomical Almanac, section C; their
-    longitude counts from the mean equinox of date, and aberration is in it. `time_s` counts from `epoch`.
+    longitude counts from the mean equinox of date, and aberration is in it.
+
+    Args:
+        epoch: Instant from which the times count.
+        time_s: Times after the epoch, s, shape (n,).
     """
     day = 36525.0 * epoch.terrestrial_centuries(time_s)
     mean_longitude = np.radians(280.460 + 0.9856474 * day)
@@ -31,16 +35,22 @@ def sun_direction(epoch: Epoch, time_s: Floats) -> Floats:
 
 
 def shadow_rad(position_m: Floats, sun_direction: Floats, shape: Shape) -> Floats:
-    """Depth in the umbra, in rad, of positions (3, n) with the Sun in the directions (3, n): above 0 it is night.
+    """Depth of positions in the umbra of the Earth, rad, shape (n,): above 0 it is night.
 
     In coordinates in which the Earth (no air) is the unit sphere it is the angular radius of the Earth less that of the
     Sun less the angle between their centres, all seen from the satellite: above 0 the whole disc of the Sun is hidden.
     It is smooth but on the axis of the shadow, where it is largest. The Sun is taken at its mean distance: its radius
-    is then off by up to 1.7 % (80 urad) in January and July, for the oblate Earth by up to 16 urad more; near
-    0.1 s of the limits of an eclipse in a low orbit and 1.3 s in the geostationary one. Light bent by the air is left
-    out.
+    is then off by up to 1.7 % (80 urad) in January and July, for the oblate Earth by up to 16 urad more. That moves the
+    limits of an eclipse by about 0.1 s in a low orbit and by 1.3 s in the geostationary one. Light bent by the air is
+    left out.
 
-    Raises OrbitError for a position inside the Earth.
+    Args:
+        position_m: Positions in TEME, m, shape (3, n).
+        sun_direction: Unit vectors to the Sun at the same times, shape (3, n).
+        shape: Figure of the Earth.
+
+    Raises:
+        OrbitError: For a position inside the Earth, and for another shape.
     """
     position = np.asarray(position_m, dtype=np.float64)
     to_sun = ASTRONOMICAL_UNIT_M * sun_direction - position

@@ -21,12 +21,16 @@ from microrad.orbit.propagation.mean_elements import REVOLUTION_RAD, ElementSet,
 
 
 def read_elements(path: Path, name: str | None = None, data: bytes | None = None) -> tuple[ElementSet, ...]:
-    """All element sets of a file, in its order; with `name`, those of the satellite with that name or number.
+    """All element sets of a file in its order, or those of one satellite.
 
-    With `data`, these are the bytes of the file, which is not read again.
+    Args:
+        path: The file, in one of the formats of TLE and OMM.
+        name: Name or catalogue number of the satellite; None for all.
+        data: The bytes of the file, where it was read already; it is then not read again.
 
-    Raises OrbitError for a file that is not one of the formats, for the first fault in it with its line, and for a
-    name that is not in it.
+    Raises:
+        OrbitError: For a file that is not one of the formats, for the first fault in it with its line, and for a name
+            that is not in it.
     """
     text = read_text(path, data)
     found = list(_parsed(path, text))

@@ -28,9 +28,16 @@ def frame_name(text: str) -> str:
 
 
 def to_teme(frame: str, epoch: Epoch, time: Floats, values: Floats) -> States:
-    """States in TEME of `values`, of shape (6, n): position in m and velocity in m/s, given in one of `FRAMES`.
+    """States turned into TEME; the velocity is the rate of the coordinates there.
 
-    The velocity is the rate of the coordinates in TEME.
+    Args:
+        frame: The frame in which they are given, one of `FRAMES`.
+        epoch: Instant from which the times count.
+        time: Times after the epoch, s, rising, shape (n,).
+        values: Position in m, then velocity in m/s, shape (6, n).
+
+    Raises:
+        OrbitError: For a time outside the tables of `Epoch`, in a frame that turns with the Earth.
     """
     position, velocity = values[:3], values[3:]
     if frame == "TEME":

@@ -43,14 +43,25 @@ class Field(NamedTuple):
         return repr(self.value if len(self.value) <= 60 else self.value[:57] + "...")
 
     def refused(self, path: Path, why: str) -> OrbitError:
-        """The refusal of the value: where it is, what it is, and `why` behind it."""
+        """The error that refuses the value: it says where it stands, what it is, and why it will not do.
+
+        Args:
+            path: The file.
+            why: The reason, put behind the value as it is: it begins with a comma, a semicolon or a blank.
+        """
         return OrbitError(f"{path}, {self.place}: {self.key} is {self.shown}{why}")
 
 
 def read_text(path: Path, data: bytes | None = None) -> str:
-    """Text of a file in UTF-8, lines ending in a newline; raises OrbitError if it is no text, or too large.
+    """Text of a file in UTF-8, its lines ending in a newline.
 
-    With ``data``, these are the bytes of the file, which is not read again.
+    Args:
+        path: The file.
+        data: The bytes of the file, where it was read already; it is then not read again.
+
+    Raises:
+        OrbitError: For a file that is not there or cannot be read, is no text, is empty, or is larger than
+            `MOST_BYTES`.
     """
     try:
         if data is None:
@@ -106,7 +117,16 @@ def _binary(path: Path, byte: int) -> OrbitError:
 
 
 def kvn_field(path: Path, number: int, line: str) -> Field:
-    """The key, value and unit of a line `KEY = value [unit]`; raises OrbitError for any other line."""
+    """The key, value and unit of a line `KEY = value [unit]`.
+
+    Args:
+        path: The file, for messages.
+        number: Number of the line, from 1.
+        line: The line.
+
+    Raises:
+        OrbitError: For any other line.
+    """
     match = _KVN.fullmatch(line) if len(line) <= _MOST_LINE else None
     if match is None:
         raise OrbitError(
@@ -117,7 +137,16 @@ def kvn_field(path: Path, number: int, line: str) -> Field:
 
 
 def add_field(fields: dict[str, Field], new: Field, path: Path) -> None:
-    """Put a field among the others; raises OrbitError when its key is there with another value."""
+    """Put a field among the others; comments and keys of the user's own are passed over.
+
+    Args:
+        fields: The fields so far by key; the new one is added here.
+        new: The field.
+        path: The file, for messages.
+
+    Raises:
+        OrbitError: When its key is there with another value.
+    """
     if new.key == "COMMENT" or new.key.startswith("USER_DEFINED"):
         return
     old = fields.setdefault(new.key, new)
@@ -169,7 +198,12 @@ class _XmlReader:
 def xml_fields(path: Path, text: str) -> Iterator[Field]:
     """The elements of an XML text in their order: those without children as fields, others as `<tag` and `</tag`.
 
-    Raises OrbitError for text that is not well formed, and for any document type.
+    Args:
+        path: The file, for messages.
+        text: The text.
+
+    Raises:
+        OrbitError: For text that is not well formed, and for any document type.
     """
     reader = _XmlReader(path)
     for start in range(0, len(text) + 1, _BLOCK):
@@ -185,7 +219,15 @@ def xml_fields(path: Path, text: str) -> Iterator[Field]:
 
 
 def finite(path: Path, given: Field) -> float:
-    """The number of a field; raises OrbitError for anything else, nan and inf included."""
+    """The number of a field.
+
+    Args:
+        path: The file, for messages.
+        given: The field.
+
+    Raises:
+        OrbitError: For anything but a finite number: nan and inf are refused, too.
+    """
     try:
         number = float(given.value) if "_" not in given.value else math.nan
     except ValueError:
@@ -219,7 +261,17 @@ def _ordinal(text: str) -> int:
 
 
 def instant(path: Path, given: Field, system: str) -> tuple[int, float]:
-    """Ordinal of the day and seconds in it of a time code of CCSDS 301.0-B, A or B; raises OrbitError."""
+    """Ordinal of the day and seconds in it of a time code of CCSDS 301.0-B, A or B.
+
+    Args:
+        path: The file, for messages.
+        given: The field with the time code.
+        system: Its time system, one of `TIME_SYSTEMS`.
+
+    Raises:
+        OrbitError: For what is no date and time, a leap second that was not inserted, and a Z in another system than
+            UTC.
+    """
     day, _, clock = given.value.partition("T")
     match = _CLOCK.fullmatch(clock)
     try:
@@ -263,7 +315,15 @@ def _minutes(text: str) -> int:
 
 
 def utc_epoch(path: Path, given: Field) -> Epoch:
-    """The instant of a field in UTC; raises OrbitError with its place."""
+    """The instant of a field in UTC.
+
+    Args:
+        path: The file, for messages.
+        given: The field with the time code.
+
+    Raises:
+        OrbitError: For what is no instant, with its place in the file.
+    """
     day, _ = instant(path, given, "UTC")
     clock = given.value.partition("T")[2].rstrip("Z").rstrip(".")
     try:
@@ -273,9 +333,16 @@ def utc_epoch(path: Path, given: Field) -> Epoch:
 
 
 def elapsed_s(system: str, epoch: Epoch, instants: list[tuple[int, float]], where: str) -> Floats:
-    """Seconds since `epoch` of instants, each the ordinal of a day and seconds in it, in one of `TIME_SYSTEMS`.
+    """Seconds since an epoch of instants in one time system, leap seconds included; shape (n,), negative before it.
 
-    Raises OrbitError, beginning with `where`, for a day of UTC outside the years of `Epoch`.
+    Args:
+        system: The time system, one of `TIME_SYSTEMS`.
+        epoch: The epoch.
+        instants: The ordinal of the day and the seconds in it, for each instant.
+        where: What a message begins with: the place in the file.
+
+    Raises:
+        OrbitError: For a day of UTC outside the years of `Epoch`.
     """
     days = np.array([day for day, _ in instants], dtype=np.int64)
     seconds = np.array([second for _, second in instants])

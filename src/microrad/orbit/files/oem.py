@@ -54,7 +54,17 @@ class _Draft:
     values: list[list[float]] = field(default_factory=list)
 
     def add(self, path: Path, place: str, time: str, words: list[str]) -> None:
-        """Take a state vector; raises OrbitError for too many or too few words, and what is not a number."""
+        """Take a state vector.
+
+        Args:
+            path: The file, for messages.
+            place: Where in the file it stands, such as "line 12".
+            time: Its time code.
+            words: Position in km, velocity in km/s and, where there is one, acceleration, three numbers each.
+
+        Raises:
+            OrbitError: For too many or too few words, and what is not a number.
+        """
         if len(words) not in (6, 9):
             raise OrbitError(
                 f"{path}, {place}: {len(words) + 1} columns; a state vector has a time, three of position in km and "
@@ -71,15 +81,21 @@ class _Draft:
 
 
 def read_oem(path: Path, epoch: Epoch, name: str | None = None, data: bytes | None = None) -> EphemerisOrbit:
-    """The orbit of an object from a CCSDS OEM, KVN or XML; `name` (or its identifier) chooses among several.
-
-    With `data`, these are the bytes of the file, which is not read again.
+    """The orbit of an object from a CCSDS OEM, KVN or XML.
 
     Time systems: UTC, TAI, TT, GPS. Frames: TEME, TOD, EME2000 (J2000), GCRF, ICRF, and ITRF without polar motion;
-    velocities of ITRF gain the Earth's rotation. Interpolation: LAGRANGE (degree + 1 state vectors) or HERMITE
-    ((degree + 1) / 2, rounded up); Hermite of degree 7 when the file names none. Covariances and accelerations are
-    passed over. Raises OrbitError with file, line and value for all else, for a hole within the usable times of a
-    segment (a step of more than `MOST_STEPS` median ones), and for velocities that are not those of the positions.
+    velocities of ITRF gain the Earth's rotation. Interpolation: LAGRANGE (degree + 1 state vectors) or HERMITE ((degree
+    + 1) / 2, rounded up); Hermite of degree 7 when the file names none. Covariances and accelerations are passed over.
+
+    Args:
+        path: The file.
+        epoch: The epoch of the mission, from which the orbit's times count.
+        name: Name or identifier of the object; None where the file has only one.
+        data: The bytes of the file, where it was read already; it is then not read again.
+
+    Raises:
+        OrbitError: For all else, with file, line and value; for a hole within the usable times of a segment (a step of
+            more than `MOST_STEPS` median ones); and for velocities that are not those of the positions.
     """
     text = read_text(path, data)
     drafts = list(_xml_drafts(path, text) if text.lstrip().startswith("<") else _kvn_drafts(path, text))

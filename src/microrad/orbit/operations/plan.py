@@ -59,6 +59,10 @@ def csv_text(sessions: Sequence[PlannedSession], utc: Utc) -> str:
     Names are quoted where a comma, quote or new line asks for it. One that begins with =, +, -, @, a tab or a new line
     would be a formula to a spreadsheet: it gets an apostrophe in front, as does a name that begins with one, so that a
     reader who takes off one leading apostrophe has every name as it was.
+
+    Args:
+        sessions: The sessions, in the order of their rows.
+        utc: Gives the UTC text of a time in s since the mission's epoch.
     """
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
@@ -98,7 +102,14 @@ def contact_plan(sessions: Sequence[PlannedSession], utc: Utc, satellites: Seque
     light time rounded up to whole seconds: 1 s up to a range of 299 792 km. A session of which nothing is left, or that
     has no rate, is named in a comment.
 
-    Raises OperationsError for a session of more than 2^32 - 1 byte/s.
+    Args:
+        sessions: The sessions, in any order.
+        utc: Gives the UTC text of a time in s since the mission's epoch.
+        satellites: Names of all satellites, numbered from 1 in this order.
+        relays: Names of all relays, numbered behind the satellites.
+
+    Raises:
+        OperationsError: For a session of more than 2^32 - 1 byte/s.
     """
     day, clock = utc(0.0).removesuffix("Z").split("T")
     nodes = {name: number for number, name in enumerate((*satellites, *relays), start=1)}

@@ -104,10 +104,19 @@ class Service:
 
 
 def service(table: RateTable, contact: tuple[float, float], range_m: Range, availability: float) -> Service:
-    """What a contact from start to end (s) carries: the table's rate at the range of each moment.
+    """What a contact carries: the table's rate at the range of each moment.
 
     The moments where the range crosses a step's limit are found to 1 ms: the range is sampled at most 60 s apart and at
     its turning points, which may not lie closer together than two samples.
+
+    Args:
+        table: Data rates and the ranges they reach.
+        contact: Start and end of the contact, s.
+        range_m: Gives the range in m at times in s, both of shape (n,).
+        availability: 1 less the share of time in outage, from 0 to 1.
+
+    Raises:
+        OperationsError: For an availability out of range.
     """
     edges = np.concatenate((contact[:1], _crossings(table, contact, range_m), contact[1:]))
     edges = edges[np.concatenate(([True], np.diff(edges) > 0.0))]

@@ -86,12 +86,24 @@ class _Plan:
         return relay
 
     def wait(self, satellite: int, opportunity: int) -> None:
-        """A satellite has a place in the queue of its opportunity's relay."""
+        """A satellite takes a place in the queue of its opportunity's relay.
+
+        Args:
+            satellite: Its number.
+            opportunity: Number of the opportunity under way.
+        """
         place = (self.last_data[satellite], self.data_s[satellite], satellite, opportunity)
         heapq.heappush(self.queue[self.relay[opportunity]], place)
 
     def next_waiting(self, relay: int, now: float) -> _Waiting | None:
-        """The place of the satellite that has waited longest and has time enough left, or None."""
+        """The place of the satellite that has waited longest and has time enough left, or None.
+
+        Places that are no longer good are taken out of the queue.
+
+        Args:
+            relay: Number of the relay.
+            now: The moment, s.
+        """
         queue = self.queue[relay]
         while queue:
             last, _, satellite, opportunity = queue[0]
@@ -102,7 +114,13 @@ class _Plan:
         return None
 
     def begin(self, relay: int, terminal: int, now: float) -> None:
-        """The satellite at the head of the queue takes a terminal."""
+        """The satellite at the head of the queue takes a terminal.
+
+        Args:
+            relay: Number of the relay.
+            terminal: Number of its terminal.
+            now: The moment, s.
+        """
         _, _, satellite, opportunity = heapq.heappop(self.queue[relay])
         self.served[satellite] = True
         self.rows.append([satellite, relay, terminal, now, now])
@@ -110,14 +128,24 @@ class _Plan:
         self.watch(len(self.rows) - 1, now)
 
     def watch(self, session: int, now: float) -> None:
-        """Note when a session is to be looked at next: at its longest, or where the geometry ends it."""
+        """Note when a session is to be looked at next: at its longest, or where the geometry ends it.
+
+        Args:
+            session: Number of the session.
+            now: The moment from which its longest counts, s.
+        """
         _, relay, terminal, _, _ = self.rows[session]
         heapq.heappush(
             self.events, (min(now + self.rules.longest_s, self.until[session]), int(relay), int(terminal), session)
         )
 
     def finish(self, session: int, now: float) -> set[int]:
-        """End a session; its satellite waits wherever it is visible. The relays concerned."""
+        """End a session; its satellite waits wherever it is visible. The relays where it does are returned.
+
+        Args:
+            session: Number of the session.
+            now: The moment, s.
+        """
         satellite = int(self.rows[session][0])
         self.rows[session][4] = now
         self.data_s[satellite] += now - self.rows[session][3] - self.rules.overhead_s
@@ -134,13 +162,23 @@ class _Plan:
         return int(relay)
 
     def fill(self, relays: set[int], now: float) -> None:
-        """Free terminals take who has waited longest, the lowest relay and terminal first."""
+        """Free terminals take who has waited longest, the lowest relay and terminal first.
+
+        Args:
+            relays: Numbers of the relays to look at.
+            now: The moment, s.
+        """
         for relay in sorted(relays):
             while self.free[relay] and self.next_waiting(relay, now) is not None:
                 self.begin(relay, heapq.heappop(self.free[relay]), now)
 
     def reconsider(self, session: int, now: float) -> set[int]:
-        """A session has had its longest: another takes its terminal, or it goes on. The relays concerned."""
+        """A session has had its longest: another takes its terminal, or it goes on. The relays concerned are returned.
+
+        Args:
+            session: Number of the session.
+            now: The moment, s.
+        """
         _, relay, terminal, _, _ = self.rows[session]
         if self.next_waiting(int(relay), now) is None:
             self.watch(session, now)
@@ -149,7 +187,12 @@ class _Plan:
         return self.finish(session, now)
 
     def at(self, now: float, begins: list[int]) -> None:
-        """Everything that happens at one moment: ends, begins, free terminals, then sessions at their longest."""
+        """Everything that happens at one moment: ends, begins, free terminals, then sessions at their longest.
+
+        Args:
+            now: The moment, s.
+            begins: Numbers of the opportunities that begin then.
+        """
         due = []
         while self.events and self.events[0][0] == now:
             due.append(heapq.heappop(self.events)[3])
@@ -167,17 +210,25 @@ class _Plan:
 def schedule(
     opportunities: Opportunities, satellites: int, relays: int, terminals: int, rules: Rules, start_s: float
 ) -> Sessions:
-    """Share `terminals` terminals on each of `relays` relays among `satellites` satellites of one terminal each.
+    """Share the terminals of the relays among satellites of one terminal each, by a fixed rule.
 
     A free terminal takes, of the satellites in view that are unserved and have `rules.shortest_s` left there, the one
-    whose last data ended longest ago; one never served has waited since `start_s`. Ties go to the one that has had the
+    whose last data ended longest ago; one never served has waited since the start. Ties go to the one that has had the
     least data so far, then to the lowest index of the satellite, the relay and the terminal: by index alone, those cut
     at the same moment would come round unevenly. A terminal never idles while such a satellite is in view. A session
     that has had its longest ends if another satellite waits for its relay at that moment, else it goes on for as long
-    again; the satellite that leaves may take a terminal that is free elsewhere. The same input gives the same
-    schedule; the effort grows as the number of opportunities and sessions.
+    again; the satellite that leaves may take a terminal that is free elsewhere. The same input gives the same schedule;
+    the effort grows as the number of opportunities and sessions.
 
     This is a rule that is fair and simple to announce, not the schedule of the most data.
+
+    Args:
+        opportunities: When each satellite could use each relay, in order of their start.
+        satellites: Number of satellites.
+        relays: Number of relays.
+        terminals: Number of terminals on each relay.
+        rules: How a terminal is shared.
+        start_s: Start of the span, s.
     """
     plan = _Plan(opportunities, (satellites, relays, terminals), rules, start_s)
     starts, place = opportunities.start_s.tolist(), 0
@@ -210,14 +261,28 @@ class Totals:
 def totals_by_satellite(
     sessions: Sessions, satellites: int, volume_bit: Sequence[float] | Floats, span: tuple[float, float]
 ) -> Totals:
-    """What each satellite got over the span (start_s, end_s); `volume_bit` (n,) is the data of each session."""
+    """What each satellite got over the span.
+
+    Args:
+        sessions: The sessions.
+        satellites: Number of satellites.
+        volume_bit: Data of each session, bit, shape (sessions,).
+        span: Start and end of the span, s.
+    """
     return _totals(sessions, sessions.satellite, satellites, volume_bit, span)
 
 
 def totals_by_relay(
     sessions: Sessions, relays: int, volume_bit: Sequence[float] | Floats, span: tuple[float, float]
 ) -> Totals:
-    """What each relay carried over all its terminals; arguments as `totals_by_satellite`."""
+    """What each relay carried over all its terminals.
+
+    Args:
+        sessions: The sessions.
+        relays: Number of relays.
+        volume_bit: Data of each session, bit, shape (sessions,).
+        span: Start and end of the span, s.
+    """
     return _totals(sessions, sessions.relay, relays, volume_bit, span)
 
 

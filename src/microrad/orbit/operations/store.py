@@ -119,12 +119,12 @@ def deliver(
     capacity, so the result is exact and there is no time step. Mean rates count, outages spread evenly.
 
     Args:
-        rate_bit_s: data produced over the observed time, at least 0.
-        observed_s: start and end of the production, within the span.
-        capacity_bit: room of the store, above 0; inf allowed.
-        services: the contacts, in order, which do not overlap and lie within the span.
-        span_s: start and end. What is on board at its end counts as not delivered.
-        delay_s: added to every latency: from the satellite to where the data is wanted.
+        rate_bit_s: Data produced over the observed time, at least 0.
+        observed_s: Start and end of the production, within the span.
+        capacity_bit: Room of the store, above 0; inf allowed.
+        services: The contacts, in order, which do not overlap and lie within the span.
+        span_s: Start and end. What is on board at its end counts as not delivered.
+        delay_s: Added to every latency: from the satellite to where the data is wanted.
     """
     grid = np.unique(np.concatenate([span_s, observed_s, *(s.edges_s for s in services)]))
     middle = 0.5 * (grid[1:] + grid[:-1])

@@ -119,6 +119,10 @@ def eccentric_anomaly_rad(mean_anomaly_rad: Floats, eccentricity: float) -> Floa
 
     Newton's method until no step is above 1e-14 rad. For M in [0, pi], where E - e sin E is convex, it starts from
     M + e, M / (1 - e) or pi, whichever is least: all are above the root, so every step goes down to it.
+
+    Args:
+        mean_anomaly_rad: Mean anomaly M, rad, of any shape and any size; it need not be within one turn.
+        eccentricity: Eccentricity e, from 0 to below 1.
     """
     if eccentricity == 0.0:
         return np.array(mean_anomaly_rad, dtype=np.float64)
@@ -137,9 +141,19 @@ def eccentric_anomaly_rad(mean_anomaly_rad: Floats, eccentricity: float) -> Floa
 def circular(
     name: str, epoch: Epoch, altitude_m: float, inclination_rad: float, node_rad: float, phase_rad: float, j2: bool
 ) -> KeplerOrbit:
-    """A circular orbit `altitude_m` over the equatorial radius, `phase_rad` past its ascending node at `epoch`.
+    """A circular orbit from its altitude, plane and phase.
 
-    Raises OrbitError as `KeplerOrbit` does.
+    Args:
+        name: What it is called.
+        epoch: Instant at which the elements hold and from which times count.
+        altitude_m: Height over the equatorial radius, m.
+        inclination_rad: Inclination, rad, from 0 to pi.
+        node_rad: Right ascension of the ascending node in TEME, rad.
+        phase_rad: Angle past the ascending node at the epoch, rad.
+        j2: Whether the flattening turns node, perigee and mean anomaly.
+
+    Raises:
+        OrbitError: As `KeplerOrbit`.
     """
     return KeplerOrbit(name, epoch, EARTH_RADIUS_M + altitude_m, 0.0, inclination_rad, node_rad, 0.0, phase_rad, j2)
 
@@ -147,8 +161,12 @@ def circular(
 def sun_synchronous_inclination_rad(altitude_m: float, eccentricity: float = 0.0) -> float:
     """Inclination at which the flattening turns the node with the mean Sun, once in a tropical year.
 
-    `altitude_m` is the semi-major axis less the equatorial radius. Raises OrbitError where no inclination does it
-    (above 5974 km for a circular orbit) and for an eccentricity outside [0, 1).
+    Args:
+        altitude_m: Semi-major axis less the equatorial radius, m.
+        eccentricity: Eccentricity, from 0 to below 1.
+
+    Raises:
+        OrbitError: Where no inclination does it (above 5974 km for a circular orbit), and for another eccentricity.
     """
     if not 0.0 <= eccentricity < 1.0:
         raise OrbitError(f"the eccentricity {eccentricity:.6g} is not from 0 to below 1; check the elements")
@@ -166,10 +184,16 @@ def sun_synchronous_inclination_rad(altitude_m: float, eccentricity: float = 0.0
 
 
 def node_of_local_time(epoch: Epoch, local_time_h: float) -> float:
-    """Right ascension in [0, 2 pi) of the ascending node that has this mean local time at `epoch`.
+    """Right ascension in [0, 2 pi) of the ascending node that has a given mean local time at an epoch.
 
-    The mean local time of a place is UTC plus one hour for every 15 deg of its east longitude. Raises OrbitError for
-    hours outside [0, 24).
+    The mean local time of a place is UTC plus one hour for every 15 deg of its east longitude.
+
+    Args:
+        epoch: The instant.
+        local_time_h: Mean local time of the node, h, from 0 to below 24.
+
+    Raises:
+        OrbitError: For hours outside [0, 24).
     """
     if not 0.0 <= local_time_h < 24.0:
         raise OrbitError(f"a local time of {local_time_h:.6g} h is not from 0 to below 24; give hours, such as 10.5")

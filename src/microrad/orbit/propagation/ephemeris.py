@@ -122,7 +122,15 @@ class EphemerisOrbit:
         return States(position, velocity)
 
     def require(self, start_s: float, end_s: float) -> None:
-        """Raises OrbitError when a part of the mission from `start_s` to `end_s` has no usable state vectors."""
+        """Check that the state vectors cover a part of the mission.
+
+        Args:
+            start_s: Its start, s since the epoch.
+            end_s: Its end, likewise.
+
+        Raises:
+            OrbitError: When some of it has no usable state vectors.
+        """
         self._check_finite(np.array([start_s, end_s]))
         first, last = self.span_s
         if start_s < first - SLACK_S or end_s > last + SLACK_S:

@@ -58,7 +58,15 @@ class ElementSet:
 
 
 def check_theory(where: str, kind: str) -> None:
-    """Raises OrbitError for a type of elements that is not of SGP4 (0, 2 or blank; 3 for its deep-space part)."""
+    """Refuse elements of another theory than SGP4; those of its deep-space part pass.
+
+    Args:
+        where: What a message begins with: the place of the elements.
+        kind: Type of the ephemeris as written: 0, 2 or blank is SGP4, 3 its deep-space part.
+
+    Raises:
+        OrbitError: For another type.
+    """
     if kind not in ("", "0", "2", "3"):
         raise OrbitError(
             f"{where}: the type of the ephemeris is {kind}, elements of another theory than SGP4 (4 is SGP4-XP), which "
@@ -85,7 +93,15 @@ def checked(elements: ElementSet) -> ElementSet:
 
 
 def closest_elements(sets: tuple[ElementSet, ...], epoch: Epoch) -> ElementSet:
-    """The set whose epoch is nearest to `epoch` among sets of one satellite; raises OrbitError for several."""
+    """The element set whose own epoch is nearest to that of the mission.
+
+    Args:
+        sets: Sets of one satellite, at least one.
+        epoch: The epoch of the mission.
+
+    Raises:
+        OrbitError: For sets of several satellites.
+    """
     if len({e.catalogue_number for e in sets}) > 1:
         listed = ", ".join(f"{e.name} ({e.catalogue_number})" for e in sets[:8])
         raise OrbitError(
@@ -144,9 +160,16 @@ class Sgp4Orbit:
         return States(position, velocity)
 
     def require(self, start_s: float, end_s: float) -> None:
-        """Raises OrbitError unless the elements hold from `start_s` to `end_s`: their age, and the height of perigee.
+        """Check that the elements hold over a part of the mission: their age, and the height of perigee.
 
         The mean perigee is looked at each day and at both ends.
+
+        Args:
+            start_s: Its start, s since the epoch of the mission.
+            end_s: Its end, likewise.
+
+        Raises:
+            OrbitError: Where they are too old or too new, the perigee is too low, or SGP4 stops.
         """
         self._check_times(np.array([start_s, end_s]))
         for time_s in np.linspace(start_s, end_s, 2 + math.ceil(abs(end_s - start_s) / DAY_S)):

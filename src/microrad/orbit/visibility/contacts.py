@@ -61,12 +61,17 @@ class Pass(Contact):
 
 # ---------------------------------------------------------------------------------------------------------- the samples
 def coarse_step_s(orbit: Orbit, time_s: float) -> float:
-    """Step in which an orbit is sampled: 60 s times a power of two, at most an 85th of a turn at its perigee's rate.
+    """Step in s in which an orbit is sampled: 60 s times a power of two, at most an 85th of a turn at perigee's rate.
 
-    The perigee is that of the ellipse through the state at `time_s`: with the angular momentum h its radius is
+    The perigee is that of the ellipse through the state at one time: with the angular momentum h its radius is
     h^2 / (mu (1 + e)), and its rate h over that squared. Every low orbit has 60 s, so that samples can be shared.
 
-    Raises OrbitError for a state that falls straight to the Earth's centre.
+    Args:
+        orbit: The orbit.
+        time_s: The time, s since the epoch.
+
+    Raises:
+        OrbitError: For a state that falls straight to the Earth's centre.
     """
     position, velocity = (vector[:, 0] for vector in orbit.states(np.array([time_s])))
     with np.errstate(over="ignore", invalid="ignore"):  # of a state that is no number
@@ -84,9 +89,14 @@ def coarse_step_s(orbit: Orbit, time_s: float) -> float:
 
 
 def coarse_times(span_s: Span, step_s: float) -> Floats:
-    """Samples over the span, both ends among them, evenly, at most `step_s` apart and at least five.
+    """Even samples over the span in s, both ends among them, at least five.
 
-    Raises OrbitError for a span that does not end after its start, and for one of more than 5 million steps.
+    Args:
+        span_s: Start and end of the span, s.
+        step_s: Largest distance of two samples, s.
+
+    Raises:
+        OrbitError: For a span that does not end after its start, and for one of more than 5 million steps.
     """
     start, end = span_s
     if not (math.isfinite(start) and math.isfinite(end) and start < end):
@@ -110,7 +120,16 @@ class Sampled:
 
     @classmethod
     def over(cls, orbit: Orbit, span_s: Span, step_s: float = math.inf) -> "Sampled":
-        """Sampled in its own coarse step, or in `step_s` where that is finer (that of a faster partner)."""
+        """Sample an orbit in its own coarse step, or in a finer one.
+
+        Args:
+            orbit: The orbit.
+            span_s: Start and end of the span, s.
+            step_s: Another step, s (that of a faster partner), which counts where it is finer.
+
+        Raises:
+            OrbitError: As `coarse_step_s` and `coarse_times`, and where the orbit does not hold.
+        """
         own = coarse_step_s(orbit, span_s[0])
         time_s = coarse_times(span_s, min(own, step_s))
         return cls(orbit, own, time_s, orbit.states(time_s))
@@ -128,14 +147,15 @@ def contacts(first: Terminal, second: Terminal, earth: Earth, epoch: Epoch, span
     by as much.
 
     Args:
-        first: a terminal on its orbit.
-        second: the other one, of another name.
-        earth: what hides one from the other.
-        epoch: from which all times count.
-        span_s: start and end of the search, s.
+        first: A terminal on its orbit.
+        second: The other one, of another name.
+        earth: What hides one from the other.
+        epoch: Instant from which all times count.
+        span_s: Start and end of the search, s.
 
-    Raises OrbitError for two terminals of one name, a span that holds no time, two orbits that meet, a terminal below
-    the surface that the line of sight must clear, or a time at which an orbit does not hold.
+    Raises:
+        OrbitError: For two terminals of one name, a span that holds no time, two orbits that meet, a terminal below the
+            surface that the line of sight must clear, or a time at which an orbit does not hold.
     """
     return contacts_with_each(first, (second,), earth, epoch, span_s)[0]
 
@@ -154,17 +174,18 @@ def contacts_with_each(
     Limits that are not set cost nothing.
 
     Args:
-        satellite: one terminal on its orbit.
-        relays: the others, none of them of the satellite's name.
-        earth: what hides one from the other.
-        epoch: from which all times count.
-        span_s: start and end of the search, s.
-        sampled: states of each relay, which several satellites may share:
+        satellite: One terminal on its orbit.
+        relays: The others, none of them of the satellite's name.
+        earth: What hides one from the other.
+        epoch: Instant from which all times count.
+        span_s: Start and end of the search, s.
+        sampled: States of each relay, which several satellites may share:
             ``Sampled.over(relay.orbit, span_s, coarse_step_s(satellite.orbit, span_s[0]))``. Those in another step are
             left aside.
-        furthest_m: largest range of a contact, m; infinite without a limit.
+        furthest_m: Largest range of a contact, m; infinite without a limit.
 
-    Raises OrbitError as `contacts`.
+    Raises:
+        OrbitError: As `contacts`.
     """
     for relay in relays:
         if relay.name == satellite.name:
@@ -250,12 +271,13 @@ def passes(orbit: Orbit, station: Station, epoch: Epoch, span_s: Span) -> tuple[
     """The passes of a satellite over a ground station in the span: its elevation, geometric, is above the mask.
 
     Args:
-        orbit: of the satellite.
-        station: place and elevation mask.
-        epoch: from which all times count.
-        span_s: start and end of the search, s.
+        orbit: Orbit of the satellite.
+        station: Place and elevation mask.
+        epoch: Instant from which all times count.
+        span_s: Start and end of the search, s.
 
-    Raises OrbitError if the span holds no time, or the orbit does not hold over it.
+    Raises:
+        OrbitError: If the span holds no time, or the orbit does not hold over it.
     """
     step = coarse_step_s(orbit, span_s[0])
     time_s = coarse_times(span_s, step)
@@ -288,10 +310,10 @@ class CoplanarContact(NamedTuple):
 
 
 def coplanar_contact(radius_m: float, grazing_height_m: float) -> CoplanarContact:
-    """A satellite on a circular orbit over the equator, eastward, and one fixed in the rotating Earth.
+    """The contact of a satellite on a circular orbit over the equator, eastward, with one in a geostationary slot.
 
-    `radius_m` is the radius of the lower orbit a, R = `EARTH_RADIUS_M` + `grazing_height_m` what the line of sight must
-    clear, b = `GEOSTATIONARY_RADIUS_M`. The angle between the two as seen from the Earth's centre is at most
+    In closed form, with a the radius of the lower orbit, R = `EARTH_RADIUS_M` + grazing height what the line of sight
+    must clear, and b = `GEOSTATIONARY_RADIUS_M`. The angle between the two as seen from the Earth's centre is at most
     acos(R/a) + acos(R/b) either way and grows by the difference of the two rates, n - w: the contact takes
 
         T (acos(R/a) + acos(R/b)) / pi,   T = 2 pi / (n - w),   n = sqrt(mu / a^3),
@@ -299,7 +321,12 @@ def coplanar_contact(radius_m: float, grazing_height_m: float) -> CoplanarContac
     the range goes from b - a to sqrt(a^2 - R^2) + sqrt(b^2 - R^2), where the line grazes the surface. Two bodies, no
     flattening: on the equator the oblate Earth hides what the sphere hides.
 
-    Raises OrbitError unless R < a < b.
+    Args:
+        radius_m: Radius of the lower orbit from the Earth's centre, m.
+        grazing_height_m: Height over the equatorial radius that the line of sight must clear, m.
+
+    Raises:
+        OrbitError: Unless R < a < b.
     """
     high, least = GEOSTATIONARY_RADIUS_M, EARTH_RADIUS_M + grazing_height_m
     if not (math.isfinite(radius_m) and 0.0 < least < radius_m < high):

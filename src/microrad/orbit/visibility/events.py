@@ -30,25 +30,36 @@ _MOST_STEPS = 200  # bisection alone takes 50; a guard against a function that i
 
 # ----------------------------------------------------------------------------------------------------------- intervals
 def positive(function: Function, time_s: Floats) -> Intervals:
-    """The intervals between the first and the last of the samples `time_s` (n,), rising, in which the function is > 0.
+    """The intervals in which a function of time is above 0, between the first and the last of its samples.
 
-    Their ends are within `TOLERANCE_S`. A boundary at the first or last sample is that sample exactly. The samples
-    have to be so dense that the function has at most one extremum between two; see `positive_rows`.
+    Their ends are within `TOLERANCE_S`. A boundary at the first or last sample is that sample exactly.
 
-    Raises OrbitError for fewer than three samples, samples that do not rise and values that are not finite.
+    Args:
+        function: The function.
+        time_s: Times of the samples, s, rising, shape (n,), so dense that the function has at most one extremum between
+            two; see `positive_rows`.
+
+    Raises:
+        OrbitError: For fewer than three samples, samples that do not rise and values that are not finite.
     """
     time_s = np.asarray(time_s, dtype=np.float64)
     return positive_rows(lambda time, _: function(time), time_s, np.asarray(function(time_s))[None, :])[0]
 
 
 def positive_rows(function: RowFunction, time_s: Floats, values: Floats) -> tuple[Intervals, ...]:
-    """As `positive`, for several functions with their samples `values` (rows, n): a set of intervals for each.
+    """As `positive`, for several functions at once: a set of intervals for each.
 
     A local extremum of the samples on the same side of 0 as its neighbours may hide an event shorter than the step:
     where a parabola through the three comes close to 0 (eight times its own height above the samples), the extremum is
     searched for and, on the other side of 0, split at. Events of `SHORTEST_S` and longer are found so.
 
-    Raises OrbitError as `positive`.
+    Args:
+        function: The functions, told apart by their row.
+        time_s: Times of the samples, s, rising, shape (n,), the same for all.
+        values: The samples, shape (rows, n).
+
+    Raises:
+        OrbitError: As `positive`.
     """
     if time_s.size < 3 or values.shape[1:] != time_s.shape:
         raise OrbitError(f"{values.shape} values at {time_s.size} times; give as many values as times, at least 3")
@@ -172,10 +183,17 @@ class _Brackets(NamedTuple):
 
 
 def crossings(function: RowFunction, brackets: _Brackets) -> Floats:
-    """The time in each bracket at which the function changes its sign, all brackets at once.
+    """The time in each bracket at which the function changes its sign, s, shape (brackets,); all are found at once.
 
     T. R. Chandrupatla, "A new hybrid quadratic/bisection algorithm for finding the zero of a nonlinear function without
     using derivatives", Adv. Eng. Softw. 28 (1997) 145-149; the first step is a secant.
+
+    Args:
+        function: The functions, told apart by their row.
+        brackets: Row, both times in s, and both values, on different sides of 0.
+
+    Raises:
+        OrbitError: Where the change of sign is not found within `TOLERANCE_S`.
     """
     rows, b, a, fb, fa = brackets
     c, fc = b, fb
@@ -219,10 +237,15 @@ def _next_share(a: Floats, b: Floats, c: Floats, fa: Floats, fb: Floats, fc: Flo
 
 # -------------------------------------------------------------------------------------------------- largest in a window
 def largest(function: Function, windows: Intervals, step_s: float) -> tuple[Floats, Floats]:
-    """Time and value of the largest value in each of the windows (k, 2), ends included.
+    """Time in s and value of the largest value in each of the windows, ends included; shape (k,) each.
 
-    The function must have at most one maximum in twice `step_s`. The time is within `SHORTEST_S`. All windows are
-    searched at once: `step_s` or finer first, then `_CUT` pieces of the two steps about the largest value.
+    The time is within `SHORTEST_S`. All windows are searched at once: in the given step or finer first, then in `_CUT`
+    pieces of the two steps about the largest value.
+
+    Args:
+        function: The function, which must have at most one maximum in twice the step.
+        windows: Start and end of each window, s, shape (k, 2).
+        step_s: The step of the first search, s.
     """
     if not windows.size:
         return np.empty(0), np.empty(0)
@@ -249,9 +272,14 @@ def _neighbours(at: int | Rows, count: int) -> Rows:
 
 # ------------------------------------------------------------------------------------------------------ finer sampling
 def refined(directions: Callable[[Floats], Floats], time_s: Floats, most_rad: float) -> Floats:
-    """The times `time_s` with more between them until no direction turns by more than `most_rad` from one to the next.
+    """Times with more of them put between, until no direction turns too far from one to the next.
 
-    `directions(time_s)` has the shape (k, 3, n), unit vectors. Steps of `SHORTEST_S` are not cut further.
+    Steps of `SHORTEST_S` are not cut further.
+
+    Args:
+        directions: Gives unit vectors at times (n,), shape (k, 3, n).
+        time_s: The times, s, rising, shape (n,).
+        most_rad: The largest turn of a direction between two times, rad.
     """
     least_chord = 2.0 * np.sin(0.5 * most_rad)
     while True:
@@ -274,7 +302,12 @@ def union(*sets: Intervals) -> Intervals:
 
 
 def complement(intervals: Intervals, span_s: tuple[float, float]) -> Intervals:
-    """What of the span (start, end) is not in the set."""
+    """What of a span is not in the set.
+
+    Args:
+        intervals: The set, s, shape (k, 2).
+        span_s: Start and end of the span, s.
+    """
     edges = np.concatenate(([span_s[0]], np.clip(intervals, *span_s).ravel(), [span_s[1]])).reshape(-1, 2)
     return np.asarray(edges[edges[:, 0] < edges[:, 1]])
 

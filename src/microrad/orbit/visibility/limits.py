@@ -154,7 +154,16 @@ class Side:
 
 
 def conditions(side: Side, time_s: Floats) -> Iterator[Condition]:
-    """The limits that the terminal of this side has, each with the intervals in which it is kept."""
+    """The limits that the terminal of this side has, each with the intervals in which it is kept.
+
+    Args:
+        side: The terminal and its partner.
+        time_s: Coarse samples of the span, s, rising, shape (n,); they are made finer where the line of sight turns
+            fast.
+
+    Raises:
+        OrbitError: Where the two are at the same place, or an orbit does not hold.
+    """
     limits, name = side.terminal.limits, side.terminal.name
     aims: list[tuple[str, Function]] = []
     if limits.field_of_regard_rad < math.pi:
@@ -178,7 +187,10 @@ def conditions(side: Side, time_s: Floats) -> Iterator[Condition]:
 def body_axes(attitude: Literal["nadir", "sun"], states: States, sun: Floats) -> Floats:
     """The axes x, y and z of the body as unit vectors in TEME: shape (3 axes, 3 components, n).
 
-    `sun` holds the unit vectors towards the Sun, (3, n).
+    Args:
+        attitude: How the body is held.
+        states: Position and velocity of the satellite.
+        sun: Unit vectors towards the Sun, shape (3, n).
     """
     if attitude == "nadir":
         y, z = -_unit(_momentum(states)), -_unit(states.position_m)
@@ -188,10 +200,16 @@ def body_axes(attitude: Literal["nadir", "sun"], states: States, sun: Floats) ->
 
 
 def body_rate_rad_s(attitude: Attitude, states: States, sun: Floats) -> Floats:
-    """Angular velocity of the body against the stars, (3, n) in TEME; 0 for "free", whose turning is the pointing.
+    """Angular velocity of the body against the stars, rad/s, shape (3, n) in TEME.
 
     nadir: h / r^2 about the orbit normal, and r a_n / h about the radius, a_n the part of gravity (with J2) along the
-    normal. sun: about the Sun's direction, which is taken to stand still (it moves by 0.2 urad/s).
+    normal. sun: about the Sun's direction, which is taken to stand still (it moves by 0.2 urad/s). free: 0, as the
+    body's turning is the pointing.
+
+    Args:
+        attitude: How the body is held.
+        states: Position and velocity of the satellite.
+        sun: Unit vectors towards the Sun, shape (3, n).
     """
     position, velocity = states
     if attitude == "free":

@@ -51,11 +51,12 @@ def sight(first: Orbit, second: Orbit, time_s: ArrayLike) -> LineOfSight:
     periodic terms of J2 (two bodies, or mean elements) has an acceleration of its own, up to 0.3 % off.
 
     Args:
-        first: the orbit from which the line is seen.
-        second: the orbit that it leads to.
-        time_s: times since the epoch of both, s, shape (n,).
+        first: The orbit from which the line is seen.
+        second: The orbit that it leads to.
+        time_s: Times since the epoch of both, s, shape (n,).
 
-    Raises OrbitError if both are at the same place, or an orbit does not hold at one of the times.
+    Raises:
+        OrbitError: If both are at the same place, or an orbit does not hold at one of the times.
     """
     time = np.atleast_1d(np.asarray(time_s, dtype=np.float64))
     one, other = first.states(time), second.states(time)
@@ -83,10 +84,20 @@ def sight(first: Orbit, second: Orbit, time_s: ArrayLike) -> LineOfSight:
 
 
 def dot(a: Floats, b: Floats) -> Floats:
-    """Scalar product of vectors of shape (3, n), in the same order of sums whichever comes first."""
+    """Scalar product of vectors, shape (n,), in the same order of sums whichever comes first.
+
+    Args:
+        a: Vectors, shape (3, n).
+        b: Vectors, shape (3, n).
+    """
     return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
 
 
 def cross(a: Floats, b: Floats) -> Floats:
-    """Vector product of vectors of shape (3, n); a third of the time of `numpy.cross`."""
+    """Vector product of vectors, shape (3, n); a third of the time of `numpy.cross`.
+
+    Args:
+        a: Left factors, shape (3, n).
+        b: Right factors, shape (3, n).
+    """
     return np.stack((a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]))
