@@ -30,7 +30,12 @@ class PaperCases:
 
 
 def of(m: Mission, mirrors: MirrorParts) -> PaperCases:
-    """Assemble the loop of `[control]` around the mission's mirror, which is `mirror.of` the mission."""
+    """Assemble the loop of `[control]` around the mission's mirror.
+
+    Args:
+        m: The mission.
+        mirrors: Its mirror, as `mirror.of` assembles it.
+    """
     gain = secant_gain(mirrors.line_of_sight[Variant.GIVEN].model, m.scenario.amplitude_rad)
     timing = control.timing_from_mission(m.control)
     pid = control.pid(control.gains_from_mission(m.control, gain), timing.period_s)
@@ -85,9 +90,14 @@ def loop_margins(cases: PaperCases) -> control.LoopMargins:
 
 
 def sine_runs(cases: PaperCases, variants: Collection[Variant] = tuple(Variant)) -> tuple[Run, ...]:
-    """Fig. 6 and 8: the sines of the scenario under PID and PID + inverse, on variants of the mirror that it has.
+    """Fig. 6 and 8: the sines of the scenario under PID and PID + inverse.
 
-    Raises ValueError when the mirror has no inverse.
+    Args:
+        cases: The paper's loop.
+        variants: Variants of the mirror that they are run on; those that it does not have are passed over.
+
+    Raises:
+        ValueError: The mirror has no inverse.
     """
     s, runs = cases.scenario, []
     both = sorted({*s.pid_frequencies_hz, *s.inverse_frequencies_hz})
@@ -105,12 +115,24 @@ def sine_runs(cases: PaperCases, variants: Collection[Variant] = tuple(Variant))
 
 
 def worst(runs: tuple[Run, ...], statistic: str, variant: Variant = Variant.GIVEN) -> Run:
-    """The run of PID + inverse on one variant of the mirror that leaves the largest error, by "peak" or "rms"."""
+    """The run of PID + inverse on one variant of the mirror that leaves the largest error.
+
+    Args:
+        runs: Runs as `sine_runs` gives them.
+        statistic: What the error is measured by, "peak" or "rms".
+        variant: The variant, the mission's own by default.
+    """
     candidates = [r for r in runs if (r.mirror, r.controller) == (variant, PID_WITH_INVERSE)]
     return max(candidates, key=lambda r: r.trace.left_rad(statistic))
 
 
 def residual_rad(required: Requirement, conventions: Conventions, trace: Trace) -> float:
-    """The residual that the link sees, in the mission's statistic and convention (per axis, or radial)."""
+    """The residual that the link sees, in the mission's statistic and convention (per axis, or radial).
+
+    Args:
+        required: Says which statistic has to meet the requirement, "peak" or "rms".
+        conventions: Says whether the residual is that of an axis or radial, which is sqrt(2) times as large.
+        trace: Run of one axis.
+    """
     one_axis = trace.left_rad(required.residual_statistic)
     return one_axis * math.sqrt(2.0) if conventions.residual == "radial" else one_axis

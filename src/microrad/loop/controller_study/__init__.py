@@ -95,7 +95,12 @@ class FinePointingStudy:
 def design_and_simulate(scene: Scene, on_progress: Progress = lambda done, total, what: None) -> FinePointingStudy:
     """Design, tune and simulate controllers for a fine-pointing loop; seeded by its table.
 
-    Raises ValueError with the reason for a controller that cannot meet its margin.
+    Args:
+        scene: The mission's fine-pointing loop.
+        on_progress: Called with what is done of the step at hand, of how much, and the step in words.
+
+    Raises:
+        ValueError: A controller cannot meet its margin; says why.
     """
     verified = verify(scene, design(scene, on_progress), on_progress)
     chosen, designs = best(verified), [v.design for v in verified]

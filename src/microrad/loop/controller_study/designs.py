@@ -50,7 +50,12 @@ def families(f: FinePointing) -> tuple[Family, ...]:
 
 
 def plants(scene: Scene, seed: int) -> tuple[DesignPlant, ...]:
-    """The nominal plant of an axis, then one for each mirror drawn from the identification's covariance."""
+    """The nominal plant of an axis, then one for each mirror drawn from the identification's covariance.
+
+    Args:
+        scene: The mission's fine-pointing loop; without an uncertainty of its mirror there is the nominal plant alone.
+        seed: Seed of the mirrors that are drawn.
+    """
     of = scene.mirrors.table
     drawn = spread.draws(of, DRAWS, seed) if of.uncertainty is not None else ()
     loops = [scene.axis, *(replace(scene.axis, mirror=from_table(t)) for t in drawn)]
@@ -70,9 +75,15 @@ def design(
     on_progress: Progress = lambda done, total, what: None,
     only: Sequence[str] = (),
 ) -> tuple[Design, ...]:
-    """Every controller of the study, the baseline first, or ``only`` some of them by name; tuned on the linear cost.
+    """Design every controller of the study, or some of them; tuned on the linear cost.
 
-    Raises ValueError for a name that `names` does not list, and with the reason when a modulus margin cannot be met.
+    Args:
+        scene: The mission's fine-pointing loop.
+        on_progress: Called with the controllers that are tuned, their number and what is done.
+        only: Names out of `names`, in the order that is wanted; by default all, the baseline first.
+
+    Raises:
+        ValueError: For a name that `names` does not list, and where a modulus margin cannot be met; says why.
     """
     import scipy.optimize  # noqa: F401  slow to import: once, ahead of the other process
 
@@ -113,9 +124,15 @@ def _tuned_in_turn(group: Mapping[str, Callable[..., Tuned]]) -> dict[str, Tuned
 
 
 def tune(name: str, f: FinePointing, of: Sequence[DesignPlant]) -> Tuned:
-    """One of the controllers that `names` lists, tuned for these plants of an axis (see `plants`).
+    """Tune one of the controllers that `names` lists.
 
-    Raises ValueError for another name, and with the reason when it cannot meet the modulus margin.
+    Args:
+        name: Its name.
+        f: The mission's fine-pointing table: modulus margin, seed and reference filter.
+        of: Plants of an axis, the nominal one first (see `plants`).
+
+    Raises:
+        ValueError: For another name, and where the controller cannot meet the modulus margin; says why.
     """
     return _tuning(name, f, of)()
 
@@ -137,7 +154,16 @@ def _tuning(name: str, f: FinePointing, of: Sequence[DesignPlant]) -> Callable[.
 
 
 def build(name: str, scene: Scene, axis: control.AxisController) -> LoopController:
-    """A tuned axis controller on all axes of the scene, with its inverse where its name says so."""
+    """Put a tuned axis controller on all axes of the scene, with its inverse where its name says so.
+
+    Args:
+        name: One of `names`.
+        scene: The mission's fine-pointing loop.
+        axis: The controller of one axis.
+
+    Raises:
+        ValueError: The controller reads a gauge that the loop lacks, or its mirror has no inverse.
+    """
     if name not in _INVERSE_USED:
         return assemble(name, scene.loop, axis)
     path, inverse = ReferenceFilter(scene.table.reference_filter_hz), control.inverse(scene.loop.mirror)
@@ -145,7 +171,15 @@ def build(name: str, scene: Scene, axis: control.AxisController) -> LoopControll
 
 
 def grid_baseline(of: Sequence[DesignPlant], wanted: Specification) -> Tuned:
-    """The best PI on a grid of both its parameters over their whole range: what the tuned ones are held against."""
+    """The best PI on a grid of both its parameters over their whole range: what the tuned ones are held against.
+
+    Args:
+        of: Plants of an axis, the nominal one first.
+        wanted: What the controller has to respect on every one of them.
+
+    Raises:
+        ValueError: No PI of the grid respects it.
+    """
     parameters = control.PI.parameters(of[0])
     axes = [np.geomspace(p.least, p.most, GRID) if p.log else np.linspace(p.least, p.most, GRID) for p in parameters]
     return control.grid_best(control.PI, of, wanted, [[control.rounded(v) for v in axis] for axis in axes])

@@ -54,7 +54,10 @@ class Outlook:
         return self.times <= PROMISE
 
     def mark(self, accept: bool) -> str:
-        """Refused where the linear figure is no promise, or accepted where the user says so; else nothing."""
+        """The word that a report sets beside the figure: "refused" where the linear one is no promise, else none.
+
+        With `accept`, the user's word that it is to be taken all the same, "accepted" stands in place of "refused".
+        """
         return "" if self.holds else "accepted" if accept else "refused"
 
 
@@ -93,7 +96,12 @@ class Verified:
     predicted_rad2_hz: Floats
 
     def meets(self, required_rad: float, variant: Variant = Variant.GIVEN) -> bool:
-        """Whether the quantile stays within the requirement."""
+        """Whether the error's quantile stays within the requirement.
+
+        Args:
+            required_rad: Largest radial error that is allowed.
+            variant: Variant of the mirror that it is judged on, the mission's own by default.
+        """
         return self.simulated[variant].quantile_rad <= required_rad
 
 
@@ -172,7 +180,16 @@ def span(f: FinePointing) -> ensemble.Span:
 def verify(
     scene: Scene, designs: Sequence[Design], on_progress: Progress = lambda done, total, what: None
 ) -> tuple[Verified, ...]:
-    """Simulate each design on each variant of the mirror, beside its linear theory."""
+    """Simulate each design on each variant of the mirror, beside its linear theory.
+
+    Args:
+        scene: The mission's fine-pointing loop.
+        designs: The designs, in the order that is wanted.
+        on_progress: Called with the parts of the work that are done, their number and what is done.
+
+    Raises:
+        ValueError: The linear loop under a design is unstable.
+    """
     loops = {variant: on_variant(scene, variant) for variant in scene.mirrors.own}
     cases = [
         _case(loop, d.controller, spectrum=variant == Variant.GIVEN) for d in designs for variant, loop in loops.items()
@@ -185,7 +202,13 @@ def verify(
 def outlook(
     scene: Scene, designs: Sequence[Design], on_progress: Progress = lambda done, total, what: None
 ) -> tuple[Outlook, ...]:
-    """Each design beside its linear figure, simulated in one batch of the mission's runs with its hysteresis."""
+    """Each design's linear figure beside one simulated with hysteresis, in one batch of shortened runs.
+
+    Args:
+        scene: The mission's fine-pointing loop.
+        designs: The designs, in the order that is wanted.
+        on_progress: Called with the parts of the work that are done, their number and what is done.
+    """
     whole, runs = span(scene.table), min(scene.table.runs, kernel_arrays.LANES)
     few = replace(whole, duration_s=min(whole.duration_s, whole.settle_s + FEW_SAMPLES * scene.loop.timing.period_s))
     cases = [_case(scene.loop, d.controller) for d in designs]
@@ -197,7 +220,12 @@ def outlook(
 
 
 def on_variant(scene: Scene, variant: Variant) -> PointingLoop:
-    """The loop on one variant of its mirror: without hysteresis each element is its slow gain, as in theory."""
+    """The loop on one variant of its mirror: without hysteresis each element is its slow gain, as in theory.
+
+    Args:
+        scene: The mission's fine-pointing loop.
+        variant: The variant.
+    """
     straight = variant == Variant.STRAIGHT
     return parts.without(scene.loop, parts.HYSTERESIS) if straight else with_mirror(scene.loop, scene.mirrors, variant)
 
@@ -207,7 +235,12 @@ def _case(loop: PointingLoop, controller: LoopController, *, spectrum: bool = Fa
 
 
 def for_mirror(controller: LoopController, loop: PointingLoop) -> LoopController:
-    """The controller with its inverse, where it has one, that of this loop's mirror."""
+    """The controller with its inverse, where it has one, made that of this loop's mirror.
+
+    Args:
+        controller: The controller of all axes.
+        loop: The loop that it is to work in.
+    """
     return controller if controller.inverse is None else replace(controller, inverse=inverse(loop.mirror))
 
 
@@ -232,7 +265,12 @@ def _verified(scene: Scene, design: Design, runs: dict[Variant, ensemble.Ensembl
 
 
 def residual(run: ensemble.Ensemble, quantile: float) -> Residual:
-    """An ensemble's statistics as a record."""
+    """An ensemble's statistics as a record.
+
+    Args:
+        run: The ensemble.
+        quantile: Share of the time, 0 to 1, that the error of the record stays below.
+    """
     shares = {name: run.share(counter) for name, counter in COUNTERS.items()}
     return Residual(
         run.radial_rms_rad,
@@ -253,9 +291,15 @@ def best(verified: Sequence[Verified]) -> Verified:
 
 
 def error_budget(scene: Scene, of: Verified, on_progress: Progress = lambda done, total, what: None) -> ErrorBudget:
-    """Each source of error alone, together, and what is not a source left out of the whole; all with the same seeds.
+    """Split up the residual of a design: each source alone, all together, and what the rest of the loop adds.
 
+    What is not a source of error (limits, quantisation, delay) is left out of the whole. All runs have the same seeds.
     The whole, with hysteresis and without, is what `verify` has simulated.
+
+    Args:
+        scene: The mission's fine-pointing loop.
+        of: The design, simulated.
+        on_progress: Called with the parts of the work that are done, their number and what is done.
     """
     fine = parts.without(scene.loop, parts.HYSTERESIS, parts.QUANTISATION)
     names = parts.sources(fine)
@@ -292,6 +336,11 @@ def sines(
     """The paper's sines (Fig. 6 and 8) on axis x, with vibration and sensor noise, for all controllers.
 
     Body pointing and point-ahead are left out: with them the sine would not fit into the stroke.
+
+    Args:
+        scene: The mission's fine-pointing loop, with amplitude and frequencies of the sines.
+        designs: The designs, in the order that is wanted.
+        on_progress: Called with the parts of the work that are done, their number and what is done.
     """
     f = scene.table
     cases, what = [], []

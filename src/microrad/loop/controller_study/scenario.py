@@ -91,7 +91,16 @@ def scene(file: MissionFile, mirrors: MirrorParts, received_power_w: float | Non
 
 
 def optics(f: FinePointing, mirror_angle: str) -> geometry.Geometry:
-    """The chain from the mirror's own angle, counted as conventions.mirror_angle says, to the line of sight."""
+    """The chain from the mirror's own angle to the line of sight.
+
+    Args:
+        f: The mission's fine-pointing table.
+        mirror_angle: What the mirror's output counts, as conventions.mirror_angle says: "mechanical", "optical" or
+            "line-of-sight".
+
+    Raises:
+        ValueError: The output is the line of sight already, and the table has a telescope in between.
+    """
     g = f.geometry
     if mirror_angle == "line-of-sight" and g.magnification != 1.0:
         raise ValueError(
@@ -110,14 +119,26 @@ def optics(f: FinePointing, mirror_angle: str) -> geometry.Geometry:
 
 
 def with_mirror(loop: fine.PointingLoop, mirrors: MirrorParts, variant: Variant) -> fine.PointingLoop:
-    """The loop with another variant of its mirror on each actuator."""
+    """The loop with another variant of its mirror on each actuator.
+
+    Args:
+        loop: The loop.
+        mirrors: The mission's mirror in each of its variants.
+        variant: The variant, one that the mirror has.
+    """
     return replace(loop, mirror=mirror.combine(*[mirrors.own[variant].plant] * loop.mirror.actuators))
 
 
 def disturbances(f: FinePointing, folder: Path, contents: tuple[NamedFile, ...]) -> tuple[disturbance.Disturbance, ...]:
-    """Vibration, wheels and body pointing of one axis; a file of the vibration is named as seen from the folder.
+    """Vibration, wheels and body pointing of one axis.
 
-    What is held already of that file in ``contents`` is not read again.
+    Args:
+        f: The mission's fine-pointing table.
+        folder: Folder that a file of the vibration is named from.
+        contents: Files that are held already; they are not read again.
+
+    Raises:
+        ValueError: The file cannot be read, or no filter has its spectrum.
     """
     body = f.body
     found = [vibration(f.vibration, folder, contents)]
@@ -130,7 +151,16 @@ def disturbances(f: FinePointing, folder: Path, contents: tuple[NamedFile, ...])
 
 
 def vibration(v: VibrationTable, folder: Path, contents: tuple[NamedFile, ...]) -> disturbance.Disturbance:
-    """The platform's vibration of one axis."""
+    """The platform's vibration of one axis.
+
+    Args:
+        v: The mission's table of the vibration.
+        folder: Folder that its file is named from.
+        contents: Files that are held already; they are not read again.
+
+    Raises:
+        ValueError: The file cannot be read, or no filter has its spectrum.
+    """
     if v.spectrum == "olympus":
         return disturbance.olympus(convention=v.convention)
     if v.spectrum == "first-order":
@@ -149,7 +179,14 @@ def optical_sensor(
 ) -> sensor.OpticalSensor:
     """The tracking sensor, its noise as given or from the light that it receives through the aperture.
 
-    Raises ValueError where the noise follows from light and none is given.
+    Args:
+        f: The mission's fine-pointing table.
+        received_power_w: Light on the sensor; None where the table gives the noise.
+        wavelength_m: Wavelength of the light.
+        aperture_m: Diameter of the aperture that focuses it.
+
+    Raises:
+        ValueError: The noise follows from light and none is given, or rate and delay do not fit the control's.
     """
     o = f.optical_sensor
     noise = o.noise_rad
@@ -197,7 +234,19 @@ def stroke(
     sources: Mapping[str, Source],
     on_mirror: bool,
 ) -> tuple[geometry.StrokeBudget, ...]:
-    """What the mirror has to cover, by axis, with the point-ahead on it or not."""
+    """What the mirror has to cover, one budget for each of its outputs.
+
+    Args:
+        f: The mission's fine-pointing table.
+        mirrors: The mission's mirror, with its gain, drive range and travel.
+        chain: What stands between the mirror's outputs and the line of sight.
+        pointing: The mission's open-loop pointing errors, of which the bias counts.
+        sources: Where the mission's numbers come from, by key.
+        on_mirror: Whether the mirror carries the point-ahead.
+
+    Raises:
+        ValueError: For a singular geometry.
+    """
     r, of = f.reference, mirrors.table
     lag = r.line_of_sight_rate_rad_s * (1.0 - r.rate_feedforward) / (2.0 * math.pi * f.body.bandwidth_hz)
     body = f.body.error_rad / (math.sqrt(2.0) if f.body.convention == "radial" else 1.0)

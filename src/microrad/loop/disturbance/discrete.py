@@ -29,13 +29,18 @@ class Discrete:
 
 
 def discretise(disturbance: Disturbance, step_s: float) -> Discrete:
-    """The disturbance at multiples of ``step_s``.
+    """The disturbance at multiples of a step.
 
     The noise of each white input over a step is integrated exactly (Van Loan 1978). Of its directions, those that give
     less than 1e-6 of that input's output variance are left out, and the rest scaled so that the variance of the output
     stays exact: a slow filter of any order takes one random number a step. What is lost lies near half the sample rate.
 
-    Raises ValueError for a step that is not above zero and for a line at or above half the sample rate.
+    Args:
+        disturbance: The disturbance, continuous in time.
+        step_s: Length of a step.
+
+    Raises:
+        ValueError: For a step that is not above zero and for a line at or above half the sample rate.
     """
     above_zero(step_s, "step of a sampled disturbance", "s")
     for line in disturbance.lines:
@@ -102,10 +107,16 @@ def _noise_covariance(A: Floats, b: Floats, step_s: float) -> Floats:
 
 
 def initial_state(discrete: Discrete, gaussians: Floats, phases: Floats) -> Floats:
-    """A stationary start, shape as ``gaussians``: (states,) or (states, runs).
+    """A stationary start of the states, shape as ``gaussians``.
 
-    ``gaussians`` are standard normal; ``phases`` (lines,) or (lines, runs) uniform over 0 to 2 pi, and more rows are
-    not used. Raises ValueError for too few rows of either.
+    Args:
+        discrete: The disturbance.
+        gaussians: Independent standard normal numbers, shape (states,) or (states, runs).
+        phases: Phases of the lines (rad), uniform over 0 to 2 pi, shape (lines,) or (lines, runs); more rows are not
+            used.
+
+    Raises:
+        ValueError: For another number of rows than states, and for too few phases.
     """
     states, lines = discrete.Ad.shape[0], discrete.line_amplitude_rad.size
     if gaussians.shape[0] != states or phases.shape[0] < lines:

@@ -39,11 +39,21 @@ class Fit:
 def fit_bands(
     edges_hz: ArrayLike, rms_rad: ArrayLike, *, convention: Convention, name: str = "bands", source: str = "given"
 ) -> Fit:
-    """Filter whose rms in each band between the edges is the given one within 5 %.
+    """Fit a filter whose rms in each band between the edges is the given one within 5 %.
 
     Bands leave open the shape within them and what lies outside. The broadest terms that fit are taken, with little
-    power outside: about a tenth of the last band's above it. The first edge may be 0 Hz. Raises ValueError for edges
-    that do not rise, an rms that is not above zero, and where no sum of a few terms comes within 5 %.
+    power outside: about a tenth of the last band's above it.
+
+    Args:
+        edges_hz: Edges of the bands, rising, shape (bands + 1,); the first may be 0 Hz.
+        rms_rad: Rms in each band, above 0, shape (bands,).
+        convention: What the rms values are: "radial", of both axes together, or "per-axis".
+        name: What the disturbance is called.
+        source: Who gave the numbers.
+
+    Raises:
+        ValueError: For edges that do not rise, an rms that is not above zero, and where no sum of a few terms comes
+            within 5 %.
     """
     edges, wanted = rising(np.asarray(edges_hz), f'"{name}": edges of the bands'), np.asarray(rms_rad, dtype=float)
     if wanted.shape != (edges.size - 1,) or not np.all(np.isfinite(edges)):
@@ -78,10 +88,18 @@ def _refuse_poor_bands(fit: Fit, name: str) -> None:
 def fit_table(
     freq_hz: ArrayLike, psd_rad2_hz: ArrayLike, *, convention: Convention, name: str = "table", source: str = "given"
 ) -> Fit:
-    """Filter fitted to a measured one-sided density; the bands of the fit are the decades of the table.
+    """Fit a filter to a measured one-sided density; the bands of the fit are the decades of the table.
 
-    A row at 0 Hz is left out: no average has settled there. Raises ValueError for columns that are no spectrum (as
-    `read_table`), for a density of zero, and for a poor fit: 3 dB off somewhere, or 10 % in the rms over the table.
+    Args:
+        freq_hz: Frequencies, rising, shape (rows,); a row at 0 Hz is left out, as no average has settled there.
+        psd_rad2_hz: One-sided density at each of them, above 0, shape (rows,).
+        convention: What the densities are: "radial", of both axes together, or "per-axis".
+        name: What the disturbance is called.
+        source: Who gave the numbers.
+
+    Raises:
+        ValueError: For columns that are no spectrum (see `read_table`), for a density of zero, and for a poor fit: 3 dB
+            off somewhere, or 10 % in the rms over the table.
     """
     freq, density = checked(np.asarray(freq_hz, dtype=float), np.asarray(psd_rad2_hz, dtype=float), f'"{name}"')
     freq, density = freq[freq > 0.0], density[freq > 0.0] * share(convention)

@@ -84,19 +84,45 @@ def share(convention: Convention) -> float:
 
 
 def above_zero(value: float, what: str, unit: str) -> None:
-    """Raise ValueError unless the number is finite and above zero."""
+    """Raise ValueError unless the number is finite and above zero.
+
+    Args:
+        value: The number.
+        what: What it is, as the message begins.
+        unit: Its unit, for the message.
+
+    Raises:
+        ValueError: The number is not.
+    """
     if not 0.0 < value < math.inf:
         raise ValueError(f"{what} is {value:g} {unit}; give a finite number above zero")
 
 
 def at_least_zero(value: float, what: str, unit: str) -> None:
-    """Raise ValueError unless the number is finite and not negative."""
+    """Raise ValueError unless the number is finite and not negative.
+
+    Args:
+        value: The number.
+        what: What it is, as the message begins.
+        unit: Its unit, for the message.
+
+    Raises:
+        ValueError: The number is not.
+    """
     if not 0.0 <= value < math.inf:
         raise ValueError(f"{what} is {value:g} {unit}; give a finite number, zero or above")
 
 
 def rising(values: Floats, what: str) -> Floats:
-    """The values as an array; raises ValueError unless there are two or more that rise strictly from zero or above."""
+    """The values as an array, once they are seen to rise strictly from zero or above.
+
+    Args:
+        values: Frequencies (Hz), two or more.
+        what: What they are, as the message begins.
+
+    Raises:
+        ValueError: They do not rise, or are fewer than two.
+    """
     array = np.asarray(values, dtype=float)
     if array.ndim != 1 or array.size < 2 or not array[0] >= 0.0 or not np.all(np.diff(array) > 0.0):
         raise ValueError(f"{what} are {array.tolist()} Hz; give two or more that rise from 0 Hz or above")
@@ -104,14 +130,24 @@ def rising(values: Floats, what: str) -> Floats:
 
 
 def covariance(A: Floats, B: Floats) -> Floats:
-    """Stationary covariance P of x' = A x + B w: A P + P A' + B B' = 0."""
+    """Stationary covariance P of x' = A x + B w, shape (n, n): A P + P A' + B B' = 0.
+
+    Args:
+        A: Map of the states of a stable filter (1/s), shape (n, n); n may be 0.
+        B: What white noise of unit two-sided density adds to them, shape (n, inputs).
+    """
     from scipy.linalg import solve_continuous_lyapunov
 
     return np.zeros((0, 0)) if A.size == 0 else np.asarray(solve_continuous_lyapunov(A, -B @ B.T))
 
 
 def psd(disturbance: Disturbance, freq_hz: Floats) -> Floats:
-    """One-sided density (rad^2/Hz) of the continuous part at each frequency; lines are not in it."""
+    """One-sided density (rad^2/Hz) of the continuous part, shape (frequencies,); lines are not in it.
+
+    Args:
+        disturbance: The disturbance of one axis.
+        freq_hz: Frequencies, shape (frequencies,).
+    """
     feedthrough = np.zeros((1, disturbance.B.shape[1]))
     system = lti.StateSpace(disturbance.A, disturbance.B, disturbance.C, feedthrough)
     response = lti.frequency_response(system, np.asarray(freq_hz, dtype=float))[:, 0, :]
@@ -119,11 +155,17 @@ def psd(disturbance: Disturbance, freq_hz: Floats) -> Floats:
 
 
 def band_rms(disturbance: Disturbance, edges_hz: Floats) -> Floats:
-    """Rms (rad) in each band between neighbouring edges, lines included; the last edge may be infinity.
+    """Rms (rad) in each band between neighbouring edges, shape (edges - 1,), lines included.
 
     Exact: the density is 4 Re[C (i w - A)^-1 P C'], P the stationary covariance, and its integral is a logarithm by
-    mode. A line on an edge counts in the band above it. Raises ValueError for edges that do not rise from 0 Hz or
-    above, and for a filter without a modal form.
+    mode. A line on an edge counts in the band above it.
+
+    Args:
+        disturbance: The disturbance of one axis.
+        edges_hz: Edges of the bands, rising, shape (edges,); the last one may be infinite.
+
+    Raises:
+        ValueError: For edges that do not rise from 0 Hz or above, and for a filter without a modal form.
     """
     edges = rising(edges_hz, "edges of the bands")
     poles, modes = np.linalg.eig(disturbance.A)
@@ -169,8 +211,8 @@ def _pairs_first(A: Floats, B: Floats, C: Floats) -> tuple[Floats, Floats, Float
 def one_input(disturbance: Disturbance) -> Disturbance:
     """The same spectrum from a single white input (spectral factorisation), for one random number a step.
 
-    The poles stay; the zeros are those of the density's in the left half-plane. Returned as it is where it has no more
-    than one input, and where the factor misses the density by more than 1e-6 (zeros or poles that coincide).
+    The poles stay; the zeros are those of the density that lie in the left half-plane. Returned as it is where it has
+    no more than one input, and where the factor misses the density by more than 1e-6 (zeros or poles that coincide).
     """
     A, B, C = disturbance.A, disturbance.B, disturbance.C
     n = A.shape[0]

@@ -23,7 +23,14 @@ MICIUS_RMS_RAD = (8.6e-6, 2.8e-6, 1.9e-6, 0.6e-6)
 
 
 def from_terms(terms: list[Term], name: str, basis: str, source: str) -> Disturbance:
-    """Disturbance with one white input for each term."""
+    """Disturbance with one white input for each term.
+
+    Args:
+        terms: Spectra of first and second order that add up to its spectrum; none for no filter.
+        name: What the disturbance is called.
+        basis: How the filter came about.
+        source: Who gave the numbers.
+    """
     empty = Disturbance(name, np.zeros((0, 0)), np.zeros((0, 0)), np.zeros((1, 0)), (), basis, source)
     parts = [term_filter(term) for term in terms]
     filters = [replace(empty, A=A, B=B, C=C) for A, B, C in parts]
@@ -33,9 +40,19 @@ def from_terms(terms: list[Term], name: str, basis: str, source: str) -> Disturb
 def first_order(
     level_rad2_hz: float, corner_hz: float, *, convention: Convention, name: str = "first order", source: str = "given"
 ) -> Disturbance:
-    """S(f) = level / (1 + (f / corner)^2), one-sided; its variance is pi / 2 x level x corner.
+    """Disturbance with the one-sided density S(f) = level / (1 + (f / corner)^2).
 
-    Raises ValueError for a negative level and for a corner that is not above zero.
+    Its variance is pi / 2 x level x corner.
+
+    Args:
+        level_rad2_hz: Density at low frequencies, 0 or above.
+        corner_hz: Frequency at which the density is half of that, above 0.
+        convention: What the level is: "radial", of both axes together, or "per-axis".
+        name: What the disturbance is called.
+        source: Who gave the numbers.
+
+    Raises:
+        ValueError: For a negative level and for a corner that is not above zero.
     """
     at_least_zero(level_rad2_hz, f'level of "{name}"', "rad^2/Hz")
     above_zero(corner_hz, f'corner frequency of "{name}"', "Hz")
@@ -47,7 +64,7 @@ def first_order(
 def olympus(*, convention: Convention = "radial") -> Disturbance:
     """Base motion of the OLYMPUS satellite, 160 / (1 + f^2) urad^2/Hz with f in Hz: 15.85 urad rms, taken as radial.
 
-    ``convention`` says otherwise where a study reads the same spectrum as that of each axis.
+    Where a study reads the same spectrum as that of each axis, ``convention`` says so.
     """
     return first_order(160e-12, 1.0, convention=convention, name="OLYMPUS", source="ESA OLYMPUS base motion spectrum")
 
@@ -57,8 +74,14 @@ def body_pointing(
 ) -> Disturbance:
     """Slow error of the coarse stage: a maximally flat low pass of second order with its half power at the bandwidth.
 
-    ``error_rad`` is ``sigmas`` standard deviations: 300 urad at 3 sigma is 100 urad rms. Raises ValueError for a
-    negative error and for sigmas or a bandwidth that are not above zero.
+    Args:
+        error_rad: Error at a number of standard deviations: 300 urad at 3 sigma is 100 urad rms.
+        sigmas: That number of standard deviations.
+        bandwidth_hz: Bandwidth of the attitude control, at which the density has fallen to half.
+        convention: What the error is: "radial", of both axes together, or "per-axis".
+
+    Raises:
+        ValueError: For a negative error and for sigmas or a bandwidth that are not above zero.
     """
     at_least_zero(error_rad, "body pointing error", "rad")
     above_zero(sigmas, "number of sigmas of the body pointing error", "standard deviations")
@@ -78,12 +101,22 @@ def wheels(
     convention: Convention,
     source: str = "given",
 ) -> Disturbance:
-    """Lines of a reaction wheel that turns ``speed_hz`` times a second: amplitude C_i speed^2 at h_i x speed.
+    """Lines of a reaction wheel: of amplitude C_i speed^2 at the frequency h_i x speed.
 
-    The force of harmonic h_i grows with the square of the speed; C_i (rad of line of sight per Hz^2) holds the wheel's
-    imbalance and the structure's compliance, which is taken as constant over the speeds of interest. Radial numbers are
-    divided by sqrt(2), equal power in both axes. Raises ValueError for lists that are empty or of unequal length, a
-    speed or harmonic not above zero and a negative coefficient.
+    The force of harmonic h_i grows with the square of the speed; C_i holds the wheel's imbalance and the structure's
+    compliance, which is taken as constant over the speeds of interest. Radial numbers are divided by sqrt(2), equal
+    power in both axes.
+
+    Args:
+        speed_hz: Turns of the wheel a second.
+        harmonics: Frequency h_i of each line over the wheel's speed.
+        coefficients_rad_hz2: Coefficient C_i of each line, in rad of line of sight per Hz^2.
+        convention: What the coefficients are: "radial", of both axes together, or "per-axis".
+        source: Who gave the numbers.
+
+    Raises:
+        ValueError: For lists that are empty or of unequal length, a speed or harmonic not above zero and a negative
+            coefficient.
     """
     above_zero(speed_hz, "speed of the wheel", "Hz")
     if len(harmonics) != len(coefficients_rad_hz2) or not harmonics:

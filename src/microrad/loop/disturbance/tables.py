@@ -20,13 +20,19 @@ _MAX_BYTES = 100_000_000
 
 
 def read_table(path: str | Path, unit: Unit | None = None, data: bytes | None = None) -> tuple[Floats, Floats]:
-    """Frequencies (Hz) and one-sided densities (rad^2/Hz) from a text of two columns.
+    """Read frequencies (Hz) and one-sided densities (rad^2/Hz) from a text of two columns.
 
     Columns are separated by comma, semicolon, tab or white space; lines that begin with # and blank lines are skipped.
-    The unit of the density stands in a heading line ("Hz, urad^2/Hz"), commented or not, or in ``unit``. With
-    ``data``, these are the bytes of the file, which is not read again. Raises ValueError for a file that cannot be
-    read, no unit or two that differ, a line without exactly two numbers, and rows that `checked` refuses, each with its
-    line.
+    The unit of the density stands in a heading line ("Hz, urad^2/Hz"), commented or not, or is given.
+
+    Args:
+        path: The file.
+        unit: Unit of the density in the file, where its heading names none.
+        data: Bytes of the file where they are at hand; it is not read then.
+
+    Raises:
+        ValueError: For a file that cannot be read, no unit or two that differ, a line without exactly two numbers, and
+            rows that `checked` refuses, each with its line.
     """
     lines = _lines(Path(path), data)
     heading = [text for _, text in lines[: _first_numbers(lines)]]
@@ -90,11 +96,17 @@ def _two_numbers(path: str | Path, number: int, text: str) -> tuple[float, float
 def checked(
     freq_hz: Floats, psd_rad2_hz: Floats, name: str, lines: Sequence[int] | None = None
 ) -> tuple[Floats, Floats]:
-    """The two columns, when they are a spectrum.
+    """The two columns as they are, once they are seen to be a spectrum.
 
-    Raises ValueError, with the row (the line of the file, where ``lines`` has them), for columns of unequal length or
-    fewer than three rows, a number that is not finite, a negative frequency or density and a frequency that does not
-    rise.
+    Args:
+        freq_hz: Frequencies, rising from 0 or above, shape (rows,) with three rows or more.
+        psd_rad2_hz: One-sided densities, 0 or above, shape (rows,).
+        name: What they are called in the message.
+        lines: Line of each row in its file, for the message; the rows are counted where none are given.
+
+    Raises:
+        ValueError: For columns of unequal length or fewer than three rows, a number that is not finite, a negative
+            frequency or density and a frequency that does not rise; names the row.
     """
     if freq_hz.ndim != 1 or freq_hz.shape != psd_rad2_hz.shape or freq_hz.size < 3:
         raise ValueError(

@@ -36,7 +36,12 @@ class Term:
 
 
 def term_density(term: Term, at_hz: Floats) -> Floats:
-    """One-sided density (rad^2/Hz) of the term; its integral from 0 to infinity is the term's variance."""
+    """One-sided density (rad^2/Hz) of the term; its integral from 0 to infinity is the term's variance.
+
+    Args:
+        term: The term.
+        at_hz: Frequencies, an array of any shape, which the density has as well.
+    """
     ratio = at_hz / term.freq_hz
     scale = 4.0 * term.variance_rad2 / (2.0 * math.pi * term.freq_hz)
     if term.kind == "first-order":
@@ -108,7 +113,11 @@ def band_samples(edges_hz: Floats, variance_rad2: Floats) -> Samples:
     """Rows that are the variances in bands, and ceilings on what lies outside them.
 
     Above: a tenth of the last band's variance. Below a first edge that is not 0 Hz: a tenth of the first band's, or
-    what its mean density would have there.
+    what its mean density would have there, whichever is more.
+
+    Args:
+        edges_hz: Edges of the bands, rising, shape (bands + 1,).
+        variance_rad2: Variance in each band, shape (bands,).
     """
     first, last = float(edges_hz[0]), float(edges_hz[-1])
     lowest = 1e-4 * float(edges_hz[1])
@@ -128,11 +137,15 @@ def _and_below(part: tuple[Floats, Floats], lowest_hz: float) -> tuple[Floats, F
 
 
 def table_samples(freq_hz: Floats, psd_rad2_hz: Floats) -> Samples:
-    """Rows that are the densities of a table (all above 0 Hz), rows within 3 % of each other in frequency averaged.
+    """Rows that are the densities of a table, rows within 3 % of each other in frequency averaged.
 
     A measured density scatters from row to row; the average of neighbours is what a smooth filter can be held to.
     Between rows farther apart the density is taken as a power of frequency, all of a gap with the weight of one row, so
     that no resonance hides there.
+
+    Args:
+        freq_hz: Frequencies of the table, rising, above 0, shape (rows,).
+        psd_rad2_hz: One-sided density at each of them, above 0, shape (rows,).
     """
     group = np.floor(np.log(freq_hz / freq_hz[0]) / _FINENESS)
     starts = np.flatnonzero(np.diff(group, prepend=-1.0))
@@ -157,11 +170,17 @@ def _evenly(rows_hz: Floats) -> tuple[Floats, Floats]:
 
 
 def fit_terms(samples: Samples, range_hz: tuple[float, float], least_damping: float, tolerance: float) -> list[Term]:
-    """Few terms whose rows follow the samples, to within ``tolerance`` (natural logarithm, any row) where they can.
+    """Find few terms whose rows follow the samples.
 
-    Corners stay in ``range_hz`` and damping at or above ``least_damping``. Broad terms on a grid by non-negative least
-    squares (Lawson and Hanson 1974) first; then a term where the density lacks most, as long as that helps; then terms
-    are left out again while the fit stays good. The caller judges what is left of the misfit.
+    Broad terms on a grid by non-negative least squares (Lawson and Hanson 1974) first; then a term where the density
+    lacks most, as long as that helps; then terms are left out again while the fit stays good. The caller judges what is
+    left of the misfit.
+
+    Args:
+        samples: What the sum of the terms is compared with.
+        range_hz: Lowest and highest corner of a term.
+        least_damping: Least damping ratio of a term of second order.
+        tolerance: Largest misfit of a row (natural logarithm) that is good enough.
     """
     limits = (*range_hz, least_damping)
     fractions = np.linspace(0.0, 1.0, 1 + max(4, round(4 * math.log10(range_hz[1] / range_hz[0]))))

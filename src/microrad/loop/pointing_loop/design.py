@@ -16,6 +16,9 @@ def design_plant(loop: PointingLoop) -> DesignPlant:
 
     A sensor slower than the control is taken as one that delivers every sample, later by half of what its hold adds and
     with the noise that it spreads to low frequencies; disturbance lines are taken as narrow bands of noise.
+
+    Raises:
+        ValueError: For a loop of more axes or actuators.
     """
     if loop.axes != 1 or loop.mirror.actuators != 1:
         raise ValueError(f"a design needs a loop of one axis, not of {loop.axes}: design each axis by itself")
@@ -51,7 +54,15 @@ def design_plant(loop: PointingLoop) -> DesignPlant:
 
 
 def close_axis(loop: PointingLoop, controller: AxisController) -> ClosedLoop:
-    """The linear loop of one axis under an axis controller."""
+    """The linear loop of one axis under an axis controller.
+
+    Args:
+        loop: Loop of one axis.
+        controller: Its controller.
+
+    Raises:
+        ValueError: The controller reads a gauge that the loop lacks.
+    """
     return close(loop, assemble(controller.name, loop, controller))
 
 
@@ -75,7 +86,13 @@ def narrow_band(each: Disturbance) -> Disturbance:
 
 
 def behind_filter(plant: DesignPlant, low_pass: lti.StateSpace) -> DesignPlant:
-    """The plant with a filter in its command path, of which the first output counts: for an inverse in series."""
+    """The plant with a filter in its command path: for an inverse in series.
+
+    Args:
+        plant: The plant of one axis.
+        low_pass: Filter from the command to the command that the plant gets, discrete at the plant's control period;
+            its first output counts.
+    """
     s, f = plant.system, low_pass
     first = lti.StateSpace(f.A, f.B, f.C[:1], f.D[:1])
     n, k = s.order, f.order
