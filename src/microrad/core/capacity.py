@@ -17,7 +17,12 @@ _BISECTIONS = 100
 
 
 def excess_noise_factor(gain: float, ionisation_ratio: float) -> float:
-    """Excess noise factor k M + (1 - k) (2 - 1/M) of an avalanche photodiode (McIntyre 1966, IEEE T-ED 13, 164)."""
+    """Excess noise factor k M + (1 - k) (2 - 1/M) of an avalanche photodiode (McIntyre 1966, IEEE T-ED 13, 164).
+
+    Args:
+        gain: Avalanche gain M, at least 1.
+        ionisation_ratio: Ratio k of the two carriers' ionisation rates, from 0 to 1.
+    """
     return ionisation_ratio * gain + (1.0 - ionisation_ratio) * (2.0 - 1.0 / gain)
 
 
@@ -41,13 +46,17 @@ class Code:
         return self._rate * self._natural / least
 
     def ook_counting(self, mark: float, space: float, background: float | None = None) -> float:
-        """On-off keying with a photon counter, marks and spaces equally likely; their powers are over the average.
+        """Largest gain of on-off keying with a photon counter, marks and spaces equally likely.
 
-        `background` is counts without signal for each bit of information; None is for any background. Without a code
-        Chernoff's bound, exact for dark spaces without background, asks for BER = exp(-C) / 2 at most: C is
-        c ln(c / dim) - c + dim at c = (bright - dim) / ln(bright / dim), of the mean counts in a mark and a space. The
-        least counts are those of the two bounds below. In any background C is at least half of how far the laws lie
+        Without a code Chernoff's bound, exact for dark spaces without background, asks for BER = exp(-C) / 2 at most: C
+        is c ln(c / dim) - c + dim at c = (bright - dim) / ln(bright / dim), of the mean counts in a mark and a space.
+        The least counts are those of the two bounds below. In any background C is at least half of how far the laws lie
         apart, which grows at least as fast as the signal: the gain is at most the ratio of the two.
+
+        Args:
+            mark: Power of a mark over the average power.
+            space: Power of a space over the average power.
+            background: Counts without signal for each bit of information; None is for any background.
         """
         if background is None:
             return 2.0 * self._natural / self._apart
@@ -57,11 +66,16 @@ class Code:
         return uncoded / max(self._least_dark_counts, line.counts(self._apart, background))
 
     def ook_current(self, mark: float, space: float, excess_noise: float = 1.0) -> float:
-        """On-off keying with a PIN or avalanche photodiode, in the Gaussian noise of its model.
+        """Largest gain of on-off keying with a PIN or avalanche photodiode, in the Gaussian noise of its model.
 
         Without a code the power is at most the sum of what shot noise asks for alone, F Q^2 / (sqrt mark - sqrt
-        space)^2 electrons, and of what noise of one size asks for alone. The first is held against the least counts;
-        in the second the power goes as Q, and the noise as the root of the line's rate: the root of the gain in Q^2.
+        space)^2 electrons, and of what noise of one size asks for alone. The first is held against the least counts; in
+        the second the power goes as Q, and the noise as the root of the line's rate: the root of the gain in Q^2.
+
+        Args:
+            mark: Power of a mark over the average power.
+            space: Power of a space over the average power.
+            excess_noise: Excess noise factor F of the photodiode; 1 for PIN.
         """
         shot = _OnOff(mark, space).counts(excess_noise * self._q**2, 0.0)
         least = max(self._least_dark_counts, _OnOff(mark, space).counts(self._apart, 0.0))
@@ -140,12 +154,22 @@ class _OnOff:
     space: float
 
     def counts(self, apart: float, background: float) -> float:
-        """Signal counts at which -2 ln of the overlap, (sqrt bright - sqrt dim)^2 of the mean counts, is `apart`."""
+        """Signal counts at which -2 ln of the overlap, (sqrt bright - sqrt dim)^2 of the mean counts, takes a value.
+
+        Args:
+            apart: The value.
+            background: Counts without signal, in the unit of the signal's.
+        """
         swing = (self.mark - self.space) ** 2
         return 2.0 * apart / swing * (1.0 + math.sqrt(self.mark * self.space + swing * background / apart))
 
     def exponent(self, counts: float, background: float) -> float:
-        """Chernoff's exponent of the error between the two."""
+        """Chernoff's exponent of the error between a mark and a space.
+
+        Args:
+            counts: Signal counts on average.
+            background: Counts without signal.
+        """
         bright, dim = self.mark * counts + background, self.space * counts + background
         if dim <= 0.0:
             return bright

@@ -32,10 +32,16 @@ class StateSpace:
 def modal_from_polynomials(numerator: tuple[float, ...], denominator: tuple[float, ...]) -> StateSpace:
     """Real modal (block-diagonal) realisation of a strictly proper transfer function with distinct poles.
 
-    Coefficients are in powers of s (rad/s), highest first. Coefficient form is ill-conditioned when poles span
-    decades, so only the roots are taken from it and each mode is built from its residue.
+    Coefficient form is ill-conditioned when poles span decades, so only the roots are taken from it and each mode is
+    built from its residue.
 
-    Raises ValueError when the function is not strictly proper or two poles coincide (no modal form exists).
+    Args:
+        numerator: Coefficients in powers of s (rad/s), highest first.
+        denominator: Those of the denominator, likewise.
+
+    Raises:
+        ValueError: When the function is not strictly proper, or two poles coincide or nearly so (no accurate modal form
+            exists).
     """
     num = np.trim_zeros(np.asarray(numerator, dtype=float), "f")
     den = np.trim_zeros(np.asarray(denominator, dtype=float), "f")
@@ -58,10 +64,17 @@ def modal_from_polynomials(numerator: tuple[float, ...], denominator: tuple[floa
 
 
 def modal_from_roots(zeros: Complexes, poles: Complexes, unit_at_hz: float) -> StateSpace:
-    """Real modal form of a strictly proper function with these zeros and distinct poles (rad/s).
+    """Real modal form of a strictly proper function with given zeros and distinct poles.
 
-    Its magnitude is 1 at ``unit_at_hz``, and its real part there is positive. Raises ValueError where it is not
-    strictly proper, two poles coincide, or it vanishes at that frequency.
+    It is scaled to a magnitude of 1 at one frequency, with a positive real part there.
+
+    Args:
+        zeros: Zeros, rad/s, shape (zeros,); complex ones in conjugate pairs.
+        poles: Poles, likewise.
+        unit_at_hz: The frequency at which the magnitude is 1, Hz.
+
+    Raises:
+        ValueError: Where it is not strictly proper, two poles coincide, or it vanishes at that frequency.
     """
     if zeros.size >= poles.size:
         raise ValueError(f"{zeros.size} zeros over {poles.size} poles: not strictly proper")
@@ -101,7 +114,12 @@ def _modal(poles: Complexes, residues: Complexes) -> StateSpace:
 def frequency_response(system: StateSpace, freq_hz: Floats, step_s: float | None = None) -> Complexes:
     """Response C (s - A)^-1 B + D, shape (frequencies, outputs, inputs).
 
-    s = 2 pi i f for a continuous system; exp(2 pi i f step) for a discrete one, when ``step_s`` is given.
+    s is 2 pi i f for a continuous system, and exp(2 pi i f step) for a discrete one.
+
+    Args:
+        system: The system.
+        freq_hz: Frequencies, Hz, shape (frequencies,).
+        step_s: Sample time of a discrete system, s; None for a continuous one.
     """
     s = 2j * np.pi * np.atleast_1d(freq_hz)
     points = s if step_s is None else np.exp(s * step_s)
@@ -117,6 +135,11 @@ def resolvent_rows(A: Floats, C: Floats, points: Complexes) -> Complexes:
     By forward substitution in their Schur forms A = U T U', all points at once: the rows r (z - T) = C U, then r U'.
     States in volts beside states in radians cost Schur's rotations the digits of the small ones: they are scaled first,
     by powers of 2 that make rows and columns of A alike, and the rows are corrected once by what they leave of C.
+
+    Args:
+        A: Matrices of the systems, shape (systems, states, states).
+        C: What their outputs show of the states, shape (systems, rows, states).
+        points: The points z, shape (points,).
     """
     from scipy.linalg.lapack import dgebal, zgees
 
@@ -159,7 +182,13 @@ def zeros(system: StateSpace) -> Complexes:
 
 
 def first_order_hold(A: Floats, B: Floats, step_s: float) -> tuple[Floats, Floats, Floats]:
-    """Exact step for an input linear over it: x[k+1] = Ad x[k] + B0 u[k] + B1 u[k+1]; returns Ad, B0, B1."""
+    """Exact step for an input linear over it: x[k+1] = Ad x[k] + B0 u[k] + B1 u[k+1]; returns Ad, B0, B1.
+
+    Args:
+        A: Matrix of the continuous system, shape (states, states).
+        B: Its input matrix, shape (states, inputs).
+        step_s: The step, s.
+    """
     from scipy.linalg import expm
 
     n, m = A.shape[0], B.shape[1]
@@ -172,13 +201,25 @@ def first_order_hold(A: Floats, B: Floats, step_s: float) -> tuple[Floats, Float
 
 
 def zero_order_hold(A: Floats, B: Floats, step_s: float) -> tuple[Floats, Floats]:
-    """Exact step for an input held over it: x[k+1] = Ad x[k] + Bd u[k]."""
+    """Exact step for an input held over it: x[k+1] = Ad x[k] + Bd u[k]; returns Ad, Bd.
+
+    Args:
+        A: Matrix of the continuous system, shape (states, states).
+        B: Its input matrix, shape (states, inputs).
+        step_s: The step, s.
+    """
     Ad, B0, B1 = first_order_hold(A, B, step_s)
     return Ad, B0 + B1
 
 
 def series(first: StateSpace, second: StateSpace) -> StateSpace:
-    """The two systems one behind the other, the first one nearest the input."""
+    """The two systems one behind the other.
+
+    Args:
+        first: The one nearest the input.
+        second: The one behind it, with as many inputs as the first has outputs; both continuous or both of one sample
+            time.
+    """
     n1, n2 = first.order, second.order
     A, B = np.zeros((n1 + n2, n1 + n2)), np.empty((n1 + n2, first.B.shape[1]))
     C = np.empty((second.C.shape[0], n1 + n2))
@@ -195,13 +236,17 @@ def feedback_poles(loop: StateSpace) -> Complexes:
 
 
 def gramian(A: Floats, Q: Floats) -> Floats:
-    """Solution X = A' X A + Q of the discrete Lyapunov equation for one Q or a stack of them, A stable.
+    """Solution X = A' X A + Q of the discrete Lyapunov equation, of the shape of Q.
 
-    With A' in place of A it is the stationary covariance of x[k+1] = A x[k] + noise of covariance Q. States that turn
-    without damping may stand beside the stable ones where Q has nothing of them.
+    With A' in place of A it is the stationary covariance of x[k+1] = A x[k] + noise of covariance Q.
 
     Doubling: X is the sum of A'^k Q A^k, and each iteration doubles the number of its terms, so a time constant of 1e5
     samples takes some 22 of them. Source: Smith, SIAM Journal on Applied Mathematics 16 (1968) 198.
+
+    Args:
+        A: The matrix, shape (states, states), stable; states that turn without damping may stand beside the stable ones
+            where Q has nothing of them.
+        Q: One symmetric matrix, shape (states, states), or a stack of them.
     """
     X, power = Q, A
     for _ in range(64):
@@ -218,21 +263,35 @@ def _diagonal(X: Floats) -> Floats:
 
 
 def to_bits(values: Floats, bits: int) -> Floats:
-    """The values rounded to a number of significant bits: what processors round otherwise in the last ones is equal."""
+    """The values rounded to a number of significant bits, above the last ones, in which processors may differ.
+
+    Args:
+        values: The values, of any shape.
+        bits: Significant bits that are kept.
+    """
     share, exponent = np.frexp(values)
     return np.asarray(np.ldexp(np.round(share * 2.0**bits) / 2.0**bits, exponent))
 
 
 def decay_to_bits(factors: Floats, bits: int) -> Floats:
-    """What is left of a state after a step, rounded by what is lost of it: a slow one keeps its time constant.
+    """Decay factors of a step, rounded by what is lost in it, so that a slow state keeps its time constant.
 
     Down to 2^-44 of the state, which is as much above the rounding of the factor itself.
+
+    Args:
+        factors: What is left of each state after a step, as a share, of any shape.
+        bits: Significant bits that are kept of what is lost.
     """
     return np.asarray(1.0 - np.round(to_bits(1.0 - factors, bits) * 2.0**44) / 2.0**44)
 
 
 def system_to_bits(system: StateSpace, bits: int) -> StateSpace:
-    """The system with matrices of a number of significant bits."""
+    """The system with its four matrices rounded to a number of significant bits.
+
+    Args:
+        system: The system.
+        bits: Significant bits that are kept of each entry.
+    """
     return StateSpace(*(to_bits(matrix, bits) for matrix in (system.A, system.B, system.C, system.D)))
 
 

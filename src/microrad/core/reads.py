@@ -134,7 +134,12 @@ class Reads:
         self._process = os.getpid()
 
     def watched(self, value: Any, path: Path = ()) -> Any:
-        """The value where it is no record, noted as read; else one that notes what is read through it."""
+        """The value, noted as read; a record or a container of records in place of it notes what is read through it.
+
+        Args:
+            value: The value.
+            path: Steps from the arguments to it.
+        """
         if isinstance(value, dict | MappingProxyType) and any(_holds_records(item) for item in value.values()):
             return _Entries(value, self, path)
         seen = _seen_at_once(value)
@@ -146,15 +151,30 @@ class Reads:
         return type(value)(self.watched(item, (*path, number)) for number, item in enumerate(value))
 
     def whole(self, value: Any, path: Path) -> None:
-        """Note a record as read in all its parts."""
+        """Note a record as read in all its parts.
+
+        Args:
+            value: The record.
+            path: Steps from the arguments to it.
+        """
         self._note((*path, WHOLE), value)
 
     def absent(self, path: Path, key: Any) -> None:
-        """Note that a mapping was asked for a key that it does not have."""
+        """Note that a mapping was asked for a key that it does not have.
+
+        Args:
+            path: Steps from the arguments to the mapping.
+            key: The key.
+        """
         self._note((*path, (KEY, key)), None)
 
     def keys(self, path: Path, keys: Sequence[Any]) -> None:
-        """Note the keys of a mapping as read."""
+        """Note the keys of a mapping as read.
+
+        Args:
+            path: Steps from the arguments to the mapping.
+            keys: All its keys, in their order.
+        """
         self._note((*path, KEY), tuple(keys))
 
     def _note(self, path: Path, value: Any) -> None:

@@ -166,15 +166,19 @@ class _RefusedError(ValueError):
 
 
 def parse_quantity(text: object, unit: str, typical: str = "") -> float:
-    """Value of `text` in the SI unit `unit`.
+    """Read a quantity with its unit from a text, as a number in an SI unit.
 
     The text is one plain number, at most one space and a unit: "5 cm", "300 Mbit/s", "16000 V/(mrad s)", "-3 dBm".
-    Units are multiplied by a space; more than one unit below the stroke needs brackets; powers are "m^2" or "m2",
-    a square root is "pA/sqrt(Hz)" or "pA/√Hz".
-    A key in W also takes dBm and dBW, a key in dB takes dB alone. `typical` is the unit in which an error message
-    writes its example.
+    Units are multiplied by a space; more than one unit below the stroke needs brackets; powers are "m^2" or "m2", a
+    square root is "pA/sqrt(Hz)" or "pA/√Hz". A key in W also takes dBm and dBW, a key in dB takes dB alone.
 
-    Raises `UnitError` for anything else: a bare number, another dimension, a comma, nan, an expression.
+    Args:
+        text: The text, or whatever stands in its place.
+        unit: The SI unit of the result.
+        typical: Unit in which an error message writes its example; by default a usual one of this kind.
+
+    Raises:
+        UnitError: For anything else: a bare number, another dimension, a comma, nan, an expression.
     """
     try:
         return _read(text, unit)
@@ -240,7 +244,12 @@ def _scale_of_text(symbol: str, number: str, unit: str) -> _Scale:
 
 
 def printable(text: str, kept: str = "") -> str:
-    """The text with every character spelled out that would steer a terminal or cannot be seen, but for those kept."""
+    """The text with every character spelled out that would steer a terminal or cannot be seen.
+
+    Args:
+        text: The text.
+        kept: Characters that stay as they are all the same.
+    """
     return "".join(c if c.isprintable() or c in kept else f"\\u{ord(c):04x}" for c in text)
 
 
@@ -287,10 +296,15 @@ def _factor(symbol: str) -> tuple[_Scale, int]:
 
 
 def format_quantity(value: float, unit: str, digits: int = 4) -> str:
-    """`value`, given in the SI unit `unit`, with `digits` significant digits and a readable prefix: "9.99 µrad".
+    """A quantity in words with a readable prefix: "9.99 µrad".
 
     The prefix goes to the first unit above the stroke, where that unit takes one; decibels take none. What is returned
     can be read back with `parse_quantity`, unless the value is not finite.
+
+    Args:
+        value: The value in the SI unit.
+        unit: The SI unit.
+        digits: Significant digits.
     """
     rounded = float(f"{value:.{digits}g}")
     prefix = _prefix(abs(rounded), re.split("[ /]", unit, maxsplit=1)[0])
@@ -299,7 +313,12 @@ def format_quantity(value: float, unit: str, digits: int = 4) -> str:
 
 
 def format_input(value: float, unit: str) -> str:
-    """`value` with every digit that it was given with; one that was computed, which has no end of them, with four."""
+    """A quantity in words with every digit that it was given with; one that was computed gets four digits.
+
+    Args:
+        value: The value in the SI unit.
+        unit: The SI unit.
+    """
     given = next(
         (n for n in range(4, _MOST_GIVEN + 1) if math.isclose(float(f"{value:.{n}g}"), value, rel_tol=1e-14)), 4
     )

@@ -20,7 +20,15 @@ class Stream:
         self._file, self.start, self.end, self.position = file, start, size, 0
 
     def take(self, count: int, end: int) -> bytes:
-        """Bytes that must stand before `end`; raises `MatlabFileError`."""
+        """The next bytes, which must not go beyond an end.
+
+        Args:
+            count: How many bytes.
+            end: Position in the stream behind the last byte that may be taken.
+
+        Raises:
+            MatlabFileError: Where they go beyond it, or there are fewer.
+        """
         if self.position + count > end:
             raise self.beyond(self.position + count - end, end)
         return self.read(count)
@@ -42,7 +50,12 @@ class Stream:
         """Go to the end, where what was packed has its checksum; raises `MatlabFileError` or `zlib.error`."""
 
     def beyond(self, missing: int, end: int) -> MatlabFileError:
-        """Words for data that are said to go beyond `end`."""
+        """The error for data that are said to go beyond an end.
+
+        Args:
+            missing: Bytes that are beyond it.
+            end: The position of that end.
+        """
         return too_much(end) if self.packed and end == self.end else cut_off(missing)
 
 
