@@ -74,11 +74,19 @@ def optical_sensor(
 ) -> OpticalSensor:
     """Optical sensor from its sample rate and its delay, as whole control samples and plant steps.
 
-    The delay runs from the middle of the exposure to the delivery: a detector that integrates over its whole sample
-    period adds half of that period to its read-out time.
+    Args:
+        noise_rad: Noise-equivalent angle, per axis and sample.
+        field_of_view_rad: Radial half angle beyond which the spot is lost; infinite for never.
+        rate_hz: Sample rate, a whole fraction of the control rate.
+        delay_s: From the middle of the exposure to the delivery, a whole number of plant steps: a detector that
+            integrates over its whole sample period adds half of that period to its read-out time.
+        control_rate_hz: Rate of the controller.
+        plant_step_s: Step at which the plant is simulated.
+        resolution_rad: One count; 0 is an ideal converter.
 
-    Raises ValueError when the rate is above the control rate or no whole fraction of it, or the delay is no whole
-    number of plant steps, with the nearest value that would do; and for what `OpticalSensor` refuses.
+    Raises:
+        ValueError: When the rate is above the control rate or no whole fraction of it, or the delay is no whole number
+            of plant steps, with the nearest value that would do; and for what `OpticalSensor` refuses.
     """
     _above_zero("control rate", control_rate_hz, "Hz")
     _above_zero("plant step", plant_step_s, "s")
@@ -146,8 +154,15 @@ class QuadCell:
     def noise_lines(self, power_w: float, bandwidth_hz: float, source: str = _NOT_STATED) -> tuple[Line, ...]:
         """Noise currents of the four cells together, in A rms: independent, so that their squares add.
 
-        ``bandwidth_hz`` is the noise-equivalent bandwidth, see `noise_bandwidth_hz`. Shot noise 2 q I B (Schottky).
-        Raises ValueError for a negative power and a bandwidth that is not above zero.
+        Shot noise is sqrt(2 q I B) (Schottky).
+
+        Args:
+            power_w: Signal that all four cells receive together, 0 or above.
+            bandwidth_hz: Noise-equivalent bandwidth, above 0, see `noise_bandwidth_hz`.
+            source: Where the numbers come from.
+
+        Raises:
+            ValueError: For a negative power and a bandwidth that is not above zero.
         """
         _zero_or_more("quad cell: received power", power_w, "W", "0 W is no light at all")
         _above_zero("quad cell: noise bandwidth", bandwidth_hz, "Hz")
@@ -169,7 +184,14 @@ class QuadCell:
     def signal_to_noise(self, power_w: float, bandwidth_hz: float) -> float:
         """Signal-to-noise ratio of the four cells summed: mean over rms current, a voltage ratio and not one of powers.
 
-        That is SNRv of Tyler and Fried (1982). Raises ValueError as `noise_lines` does.
+        That is SNRv of Tyler and Fried (1982).
+
+        Args:
+            power_w: Signal that all four cells receive together, 0 or above.
+            bandwidth_hz: Noise-equivalent bandwidth, above 0, see `noise_bandwidth_hz`.
+
+        Raises:
+            ValueError: For a negative power and a bandwidth that is not above zero.
         """
         noise = root_sum_square(self.noise_lines(power_w, bandwidth_hz))
         return self.responsivity_a_w * power_w / noise if power_w > 0.0 else 0.0
@@ -253,10 +275,15 @@ class GaussianSpot:
 def noise_equivalent_angle_rad(spot: AirySpot | GaussianSpot, signal_to_noise: float) -> float:
     """Standard deviation of the measured angle, per axis, for a spot near the centre of a quad cell.
 
-    ``signal_to_noise`` is the voltage ratio of the four cells summed (`QuadCell.signal_to_noise`), and the noise that
-    of the bandwidth it was taken in. Gaps between the cells are not counted, and off centre the answer is less steep.
+    Gaps between the cells are not counted, and off centre the answer is less steep.
 
-    Raises ValueError unless the ratio is above zero: without light there is no angle.
+    Args:
+        spot: Spot of light on the cell.
+        signal_to_noise: Voltage ratio of the four cells summed (`QuadCell.signal_to_noise`), in the bandwidth that the
+            angle's noise is wanted for.
+
+    Raises:
+        ValueError: Unless the ratio is above zero: without light there is no angle.
     """
     if not signal_to_noise > 0.0:
         raise ValueError(
@@ -271,7 +298,15 @@ def noise_equivalent_angle_line(
 ) -> Line:
     """Noise-equivalent angle per axis and sample of a cell that integrates over its sample period, as a line in rad.
 
-    Raises ValueError without light, or for a rate that is not above zero.
+    Args:
+        cell: The quad cell.
+        spot: Spot of light on it.
+        power_w: Signal that all four cells receive together.
+        rate_hz: Sample rate of the cell.
+        source: Where the numbers come from.
+
+    Raises:
+        ValueError: Without light, or for a rate that is not above zero.
     """
     bandwidth = noise_bandwidth_hz(rate_hz)
     ratio = cell.signal_to_noise(power_w, bandwidth)

@@ -79,18 +79,42 @@ class Setup:
 
 
 def sampled_loop(m: Mirror, setup: Setup) -> lti.StateSpace:
-    """Controller and sampled mirror in series, with each hysteresis element replaced by its slow gain."""
+    """Controller and sampled mirror in series: from the error to the angle (rad), discrete at the control period.
+
+    Each hysteresis element is replaced by its slow gain.
+
+    Args:
+        m: Mirror of one axis.
+        setup: What stands around it.
+
+    Raises:
+        ValueError: For a mirror of more than one axis.
+    """
     return lti.series(setup.controller, control.sampled_plant(m, setup.drive, setup.timing))
 
 
 def margins(m: Mirror, setup: Setup) -> control.LoopMargins:
-    """Margins of the loop as it is sampled; raises ValueError when it is unstable."""
+    """Margins of the loop as it is sampled.
+
+    Args:
+        m: Mirror of one axis.
+        setup: What stands around it.
+
+    Raises:
+        ValueError: The loop is unstable, or the mirror has more than one axis.
+    """
     plant = control.sampled_plant(m, setup.drive, setup.timing)
     return control.margins(setup.controller, plant, setup.timing.period_s)
 
 
 def assemble(m: Mirror, setup: Setup, inverse: Inverse) -> kernels.Loop:
-    """The loop around a mirror as the kernel's arrays. Axis i commands actuator i."""
+    """The loop around a mirror as the kernel's arrays. Axis i commands actuator i.
+
+    Args:
+        m: The mirror.
+        setup: What stands around it.
+        inverse: The feedforward.
+    """
     drive, timing, controller = setup.drive, setup.timing, setup.controller
     actuators = m.actuators
 
@@ -137,7 +161,19 @@ def at_rest(loop: kernels.Loop) -> kernels.LoopState:
 
 
 def track(name: str, m: Mirror, setup: Setup, inverse: Inverse, reference_rad: Floats, steady: slice) -> Trace:
-    """Run the sampled loop from rest over ``reference_rad`` (samples, axes) at the control period."""
+    """Run the sampled loop from rest over a reference.
+
+    Args:
+        name: What the run is called.
+        m: The mirror.
+        setup: What stands around it.
+        inverse: The feedforward.
+        reference_rad: Wanted angles at the control samples, shape (samples, axes).
+        steady: The samples that statistics are taken of.
+
+    Raises:
+        ValueError: The mirror cannot be simulated at the plant's step, see `mirror.discretise`.
+    """
     drive, timing = setup.drive, setup.timing
     plant = mirror.discretise(m, timing.step_s)
     loop = assemble(m, setup, inverse)
@@ -166,10 +202,14 @@ CHATTER_SAMPLES = 10  # reversals nearer to each other than this are chatter, no
 
 
 def alternations(command: Floats, threshold: float) -> int:
-    """Reversals of the command that follow the last one within 10 samples; moves up to ``threshold`` are not looked at.
+    """Count the reversals of the command that follow the last one within 10 samples.
 
     A zigzag from sample to sample counts at every sample, a limit cycle of a few samples twice a cycle, and a reversal
-    of a smooth reference not at all. ``command`` is (samples, actuators).
+    of a smooth reference not at all.
+
+    Args:
+        command: The command (V), shape (samples, actuators).
+        threshold: Moves of the command (V) up to this size are not looked at.
     """
     count = 0
     for column in command.T:
@@ -181,15 +221,32 @@ def alternations(command: Floats, threshold: float) -> int:
 
 
 def track_sine(name: str, m: Mirror, setup: Setup, inverse: Inverse, amplitude_rad: float, freq_hz: float) -> Trace:
-    """Track a sine on one axis, with statistics over the last period."""
+    """Track a sine on one axis, with statistics over its steady part, see `sine`.
+
+    Args:
+        name: What the run is called.
+        m: Mirror of one axis.
+        setup: What stands around it.
+        inverse: The feedforward.
+        amplitude_rad: Amplitude of the sine.
+        freq_hz: Its frequency.
+
+    Raises:
+        ValueError: The mirror cannot be simulated at the plant's step, see `mirror.discretise`.
+    """
     return track(name, m, setup, inverse, *sine(amplitude_rad, freq_hz, setup.timing.period_s))
 
 
 def sine(amplitude_rad: float, freq_hz: float, period_s: float, settle_s: float = 0.2) -> tuple[Floats, slice]:
     """A sine reference of one axis, shape (samples, 1), and its steady part.
 
-    The steady part is whole periods, as many as make 200 samples; before it come whole periods, one at least and
-    ``settle_s`` at least.
+    The steady part is whole periods, as many as make 200 samples or more; before it come whole periods, one at least.
+
+    Args:
+        amplitude_rad: Amplitude of the sine.
+        freq_hz: Its frequency.
+        period_s: Control period.
+        settle_s: Least time before the steady part.
     """
     shown = math.ceil(200 * freq_hz * period_s)
     periods = shown + max(1, math.ceil(settle_s * freq_hz))
@@ -221,10 +278,15 @@ class HysteresisLoop:
 def hysteresis_loop(
     model: hysteresis.BoucWen | hysteresis.Play, freq_hz: float, amplitude_v: float, step_s: float
 ) -> HysteresisLoop:
-    """The static hysteresis model (no linear part) under a sine of ``amplitude_v`` about its bias, once it repeats
-    itself.
+    """The static hysteresis model (no linear part) under a sine about its bias, once it repeats itself.
 
-    Repeating: the loop of h moves by at most 1e-6 of its size from one period to the next, or 1000 periods have passed.
+    Repeating: the output moves by at most 1e-6 of its size from one period to the next, or 1000 periods have passed.
+
+    Args:
+        model: The hysteresis model.
+        freq_hz: Frequency of the sine.
+        amplitude_v: Its amplitude.
+        step_s: Time between samples, about: a period has a whole number of them.
     """
     static = mirror.assemble("static", "static", None, model)
     samples = round(1 / freq_hz / step_s)

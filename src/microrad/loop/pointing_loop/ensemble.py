@@ -53,7 +53,10 @@ class Ensemble:
         return float(np.sqrt(np.mean(np.sum(self.rms_rad**2, axis=1))))
 
     def radial_rms_interval_rad(self, sigmas: float = 2.576) -> float:
-        """Half width of the interval of the radial rms from run to run (99 % by default); infinite for one run."""
+        """Half width of the radial rms's interval of confidence, from its spread between runs; infinite for one run.
+
+        It is ``sigmas`` standard errors, 99 % by default.
+        """
         squares = np.sum(self.rms_rad**2, axis=1)
         if squares.size < 2:
             return math.inf
@@ -61,7 +64,7 @@ class Ensemble:
         return sigmas * spread / (2.0 * self.radial_rms_rad)
 
     def quantile_rad(self, share: float) -> float:
-        """Radial error that a share of the time stays below, over all runs, from the histogram."""
+        """Radial error that is not exceeded for a share of the time (0 to 1), over all runs, from the histogram."""
         return histogram_quantile(self.histogram.sum(axis=0), share)
 
     def beyond(self, radius_rad: float) -> float:
@@ -69,7 +72,12 @@ class Ensemble:
         return histogram_beyond(self.histogram.sum(axis=0), radius_rad)
 
     def part(self, first: int, runs: int) -> "Ensemble":
-        """The same of some of the runs, from the ``first`` of this ensemble on; the spectrum is left as it is."""
+        """The statistics of some of the runs; the spectrum is left as it is.
+
+        Args:
+            first: Place of the first of them among this ensemble's runs, from 0.
+            runs: How many there are.
+        """
         of = slice(first, first + runs)
         by_run = {
             name: getattr(self, name)[of] for name in ("rms_rad", "mean_rad", "largest_rad", "histogram", "counts")
@@ -97,7 +105,14 @@ def bin_edges_rad() -> Floats:
 
 
 def histogram_quantile(counts: NDArray[np.integer], share: float) -> float:
-    """Quantile of binned radial errors, linear in the square inside a bin (3 % wide)."""
+    """Quantile (rad) of binned radial errors; nan where nothing was counted.
+
+    It is linear in the square inside a bin, which is 3 % wide.
+
+    Args:
+        counts: Samples in each bin of `bin_edges_rad`, shape (bins,).
+        share: Share of the samples below the quantile, 0 to 1.
+    """
     total = np.cumsum(counts)
     if not total[-1]:
         return math.nan
@@ -111,7 +126,14 @@ def histogram_quantile(counts: NDArray[np.integer], share: float) -> float:
 
 
 def histogram_beyond(counts: NDArray[np.integer], radius_rad: float) -> float:
-    """Share of binned radial errors beyond a radius, linear in the square inside a bin."""
+    """Share of binned radial errors beyond a radius; nan where nothing was counted.
+
+    It is linear in the square inside a bin.
+
+    Args:
+        counts: Samples in each bin of `bin_edges_rad`, shape (bins,).
+        radius_rad: The radius; below 0 it counts as 0.
+    """
     total = float(np.sum(counts))
     if not total:
         return math.nan
@@ -123,7 +145,8 @@ def histogram_beyond(counts: NDArray[np.integer], radius_rad: float) -> float:
 def compile_in_background(of: Callable[[], PointingLoop]) -> Callable[[], None]:
     """Begin to compile the kernels of an ensemble in a process beside this one, if the cache lacks them.
 
-    They do not depend on the loop, ``of``: it is an example to compile them by. The callable waits for the end.
+    They are compiled by an example, the loop that ``of`` gives, on which they do not depend. The callable that is
+    returned waits for the end.
     """
     if kernels.is_compiled(kernels.ensemble_loop):
         return lambda: None
@@ -160,14 +183,24 @@ def simulate(
     on_progress: Progress = lambda done, total, what: None,
     beat: Callable[[], None] = lambda: None,
 ) -> Ensemble:
-    """Statistics of ``runs`` runs, those of the numbers from ``first_run`` on.
+    """Simulate many runs of a loop under a controller and take their statistics.
 
-    They depend on the seed and the run's number alone, not on ``threads``. ``beat`` is called between slices of
-    compiled code, on the thread that runs them, and ends the runs by raising. The spectrum is that of run 0 and its
-    batch, nan where they are not among the runs.
+    They depend on the seed and the run's number alone, not on the threads. The spectrum is that of run 0 and its batch,
+    nan where they are not among the runs. Memory does not grow with the length of the runs, and by 5 kB a run.
 
-    Memory does not grow with the length of the runs, and by 5 kB a run. Raises ValueError for what does not fit and for
-    less than one run.
+    Args:
+        loop: The loop.
+        controller: The controller of all its axes.
+        span: How long a run is, what is left out at its begin, and the seed.
+        runs: How many runs there are, 1 or more.
+        first_run: Number of the first of them.
+        threads: Threads to share them, by default one for each core.
+        on_progress: Called with the runs that are done, their number and the controller's name.
+        beat: Called between slices of compiled code, on the thread that runs them; ends the runs by raising.
+
+    Raises:
+        ValueError: For a controller that does not fit the loop, a run that ends before it has settled, and for less
+            than one run.
     """
     case = Case(loop, controller)
     _refuse_none(runs)
@@ -195,9 +228,18 @@ DRAWN_SAMPLES = 256
 def simulate_cases(
     cases: Sequence[Case], span: Span, runs: int, on_done: Callable[[int, int], None] = lambda done, total: None
 ) -> list[Ensemble]:
-    """`simulate` for each of the cases, to the last bit, on all cores: cases with the same disturbances draw them once.
+    """Simulate each of the cases as `simulate` does, to the last bit, on all cores.
 
-    ``on_done`` hears how many parts of the work are done, and of how many.
+    Cases with the same disturbances draw them once.
+
+    Args:
+        cases: Loops, each under its controller.
+        span: How long a run is, what is left out at its begin, and the seed.
+        runs: How many runs each case has, 1 or more, from run 0 on.
+        on_done: Called with the parts of the work that are done, and their number.
+
+    Raises:
+        ValueError: As `simulate` does.
     """
     _refuse_none(runs)
     alike: dict[Any, list[int]] = {}
@@ -236,7 +278,15 @@ class _Batch:
 
 
 def control_samples(loop: PointingLoop, span: Span) -> tuple[int, int]:
-    """Control samples in all, and those that settle."""
+    """Number of control samples of a run in all, and of those that settle.
+
+    Args:
+        loop: The loop, for its clock.
+        span: How long a run is, and what is left out at its begin.
+
+    Raises:
+        ValueError: Nothing is left behind the settling time.
+    """
     period = loop.timing.period_s
     total, settle = round(span.duration_s / period), round(span.settle_s / period)
     if not 0 <= settle < total:

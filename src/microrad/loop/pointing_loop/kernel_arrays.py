@@ -39,7 +39,12 @@ PURPOSES_OF_ONE = 256  # streams set aside for each disturbance of an axis
 
 
 def purpose_of(name: str, axis: int) -> int:
-    """First stream of a disturbance of an axis: it goes by its name, so leaving another out does not change it."""
+    """First stream of random numbers of a disturbance: it goes by its name, so leaving another out does not change it.
+
+    Args:
+        name: Name of the disturbance.
+        axis: Number of its axis, from 0.
+    """
     return (zlib.crc32(name.encode()) % (1 << 16) * 4 + axis) * PURPOSES_OF_ONE
 
 
@@ -60,9 +65,10 @@ def _refuse_shared(loop: PointingLoop) -> None:
 
 
 def combined_shaping(loop: PointingLoop) -> Shaping:
-    """Disturbances side by side, each at an even state so that pairs stay pairs.
+    """Disturbances of all axes side by side, each at an even state so that pairs stay pairs.
 
-    Raises ValueError for two that would share their random numbers, see `_refuse_shared`.
+    Raises:
+        ValueError: Two would share their random numbers, or the states of one do not come in pairs.
     """
     _refuse_shared(loop)
     parts, states, sources = [], 0, 0
@@ -96,9 +102,16 @@ def combined_shaping(loop: PointingLoop) -> Shaping:
 def arrays(
     loop: PointingLoop, controller: LoopController, seed: int, shaping: Shaping | None = None
 ) -> kernels.Ensemble:
-    """The loop and its controller as the kernel's arrays. Raises ValueError for a controller that does not fit.
+    """The loop and its controller as the kernel's arrays.
 
-    ``shaping`` is the loop's `combined_shaping` where it is at hand.
+    Args:
+        loop: The loop.
+        controller: The controller of all its axes.
+        seed: Seed of the random numbers, of which 64 bits count.
+        shaping: The loop's `combined_shaping`, where it is at hand.
+
+    Raises:
+        ValueError: For a controller that does not fit.
     """
     check_controller(loop, controller)
     drive, timing = loop.drive, loop.timing
@@ -161,7 +174,15 @@ def arrays(
 
 
 def check_controller(loop: PointingLoop, controller: LoopController) -> None:
-    """Raise ValueError if the controller has numbers that are not finite, or another size than the loop's."""
+    """Raise ValueError if the controller does not fit the loop.
+
+    Args:
+        loop: The loop.
+        controller: The controller of all its axes.
+
+    Raises:
+        ValueError: It has numbers that are not finite, or another size than the loop's.
+    """
     s, m = controller.system, loop.mirror
     inputs = loop.axes + m.axes + loop.axes
     outputs = m.actuators * (3 if controller.inverse else 1)
@@ -187,10 +208,16 @@ def start(
     references: Sequence[References] = (),
     shaping: Shaping | None = None,
 ) -> kernels.EnsembleState:
-    """Mirror and controller at rest, the disturbance drawn from its stationary distribution in the runs' streams.
+    """State at the begin of a batch of runs.
 
-    ``references`` are those of each run where they are not the loop's, ``shaping`` its `combined_shaping` where it is
-    at hand.
+    Mirror and controller are at rest, the disturbance is drawn from its stationary distribution in the runs' streams.
+
+    Args:
+        loop: The loop.
+        p: Its arrays.
+        first_run: Number of the first run of the batch.
+        references: References of each run, by axis, where they are not the loop's.
+        shaping: The loop's `combined_shaping`, where it is at hand.
     """
     n, m, outputs, axes = p.diagonal.size, p.actuator.shape[0], p.Cy.shape[0], loop.axes
     runs = np.array([first_run], dtype=np.uint64)
@@ -240,7 +267,13 @@ def start(
 
 
 def start_disturbance(shaping: Shaping, p: kernels.Ensemble, runs: NDArray[np.uint64]) -> Floats:
-    """States of all disturbances at the begin, (states, LANES) in a row: stationary, and lines with random phases."""
+    """States of all disturbances at the begin, (states, LANES) in a row: stationary, and lines with random phases.
+
+    Args:
+        shaping: The disturbances of all axes.
+        p: The loop's arrays, for the seed.
+        runs: Number of the first run of the batch, shape (1,).
+    """
     states = np.zeros((max(p.shaping_diagonal.size, 1), LANES))
     for at, model, purpose in shaping.parts:
         n = model.Ad.shape[0]
@@ -260,9 +293,14 @@ def uniform(gaussians: Floats) -> Floats:
 
 
 def reference(loop: PointingLoop, begin: int, end: int, references: Sequence[References] = ()) -> Floats:
-    """Reference at the control samples ``begin`` to ``end``, both included: (samples, axes, 1), one for all runs.
+    """Reference (rad) at some control samples: (samples, axes, 1), one for all runs, or (samples, axes, LANES).
 
-    Or (samples, axes, LANES), the ``references`` of each run; runs behind them have those of the last one.
+    Args:
+        loop: The loop, for its clock and its own references.
+        begin: First control sample.
+        end: Last control sample, included.
+        references: References of each run, by axis, where they are not the loop's; runs behind them have those of the
+            last one.
     """
     time: Floats = np.arange(begin, end + 1, dtype=float) * loop.timing.period_s
     each = [np.stack([r.at(time) for r in of], axis=1) for of in references or (loop.references,)]

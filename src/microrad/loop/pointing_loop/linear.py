@@ -222,7 +222,12 @@ def _without_disturbances(closed: ClosedLoop) -> NDArray[np.bool_]:
 
 
 def straightened(controller: LoopController, loop: PointingLoop) -> LoopController:
-    """The controller with its inverse replaced by the gain that it has on a mirror without hysteresis."""
+    """The controller with its inverse replaced by the gain that it has on a mirror without hysteresis.
+
+    Args:
+        controller: The controller of all axes; one without inverse is returned as it is.
+        loop: The loop, for the gain of its mirror.
+    """
     if controller.inverse is None:
         return controller
     s, m = controller.system, loop.mirror.actuators
@@ -232,7 +237,12 @@ def straightened(controller: LoopController, loop: PointingLoop) -> LoopControll
 
 
 def close(loop: PointingLoop, controller: LoopController) -> ClosedLoop:
-    """The linear loop under the controller, whose inverse counts as the reciprocal of the slow gain."""
+    """The linear loop under a controller, whose inverse counts as the reciprocal of the slow gain.
+
+    Args:
+        loop: The loop.
+        controller: The controller of all its axes.
+    """
     o, c = open_loop(loop), straightened(controller, loop)
     s, n, axes, outputs = c.system, o.at.order, loop.axes, loop.mirror.axes
     whole, readings = n + s.order, axes + outputs
@@ -369,17 +379,29 @@ def _line_variances(closed: ClosedLoop, monodromy: Floats, line: Line) -> tuple[
 
 
 def sensitivity(closed: ClosedLoop, freq_hz: Floats) -> Complexes:
-    """Error over disturbance at the control samples, (frequencies, axes, axes): I - (mirror's answer to the error).
+    """Error over disturbance at the control samples, shape (frequencies, axes, axes): the inverse of 1 + the loop gain.
 
-    For an optical sensor that delivers at every control sample; a slower one folds frequencies and raises ValueError.
+    Args:
+        closed: The loop under its controller.
+        freq_hz: Frequencies up to half the control rate, shape (frequencies,).
+
+    Raises:
+        ValueError: The optical sensor is slower than the control, which folds frequencies.
     """
     return np.asarray(np.linalg.inv(np.eye(closed.open.loop.axes) + loop_response(closed, freq_hz)))
 
 
 def loop_response(closed: ClosedLoop, freq_hz: Floats) -> Complexes:
-    """Loop gain at the line of sight, (frequencies, axes, axes): error in, the mirror's angle out, gauge loops closed.
+    """Loop gain at the line of sight, shape (frequencies, axes, axes): error in, the mirror's angle out.
 
-    The optical sensor's delay is in it. Raises ValueError for a sensor slower than the control.
+    Loops through the gauge are closed, and the optical sensor's delay is in it.
+
+    Args:
+        closed: The loop under its controller.
+        freq_hz: Frequencies up to half the control rate, shape (frequencies,).
+
+    Raises:
+        ValueError: The optical sensor is slower than the control.
     """
     o, loop = closed.open, closed.open.loop
     if loop.optical.every != 1:
@@ -407,7 +429,15 @@ def loop_response(closed: ClosedLoop, freq_hz: Floats) -> Complexes:
 
 
 def residual_spectrum(closed: ClosedLoop, freq_hz: Floats) -> Floats:
-    """One-sided spectrum of the residual at the control samples, (frequencies, axes), lines left out."""
+    """One-sided spectrum (rad^2/Hz) of the residual at the control samples, shape (frequencies, axes), lines left out.
+
+    Args:
+        closed: The loop under its controller.
+        freq_hz: Frequencies up to half the control rate, shape (frequencies,).
+
+    Raises:
+        ValueError: The optical sensor is slower than the control.
+    """
     o, loop = closed.open, closed.open.loop
     whole = closed.step_noise.shape[0]
     if loop.optical.every != 1:

@@ -93,7 +93,16 @@ class ReferenceFilter:
 
 
 def assemble(name: str, loop: PointingLoop, axis: AxisController) -> LoopController:
-    """The same controller on each axis, with commands and gauge readings decoupled by the loop's optics."""
+    """The same controller on each axis, with commands and gauge readings decoupled by the loop's optics.
+
+    Args:
+        name: What the controller is called.
+        loop: The loop.
+        axis: The controller of one axis.
+
+    Raises:
+        ValueError: It reads a gauge that the loop lacks.
+    """
     axes = loop.axes
     eye, s, to_drives = np.eye(axes), axis.system, decoupling(loop)
     by_gauge = np.kron(loop.optics, s.B[:, 1:2]), s.D[0, 1] * loop.optics
@@ -111,10 +120,18 @@ def with_inverse(
 ) -> LoopController:
     """The controller with an inverse of the mirror's hysteresis, driven through the reference filter.
 
-    Raises ValueError for an inverse that inverts nothing (a mirror whose hysteresis lies in a stiffness has none).
+    Args:
+        name: What the controller is called.
+        loop: The loop.
+        axis: The controller of one axis.
+        inverse: Inverse of the mirror's hysteresis.
+        path: The reference filter.
+        in_series: Whether the controller's own command goes through the inverse too, as an angle, so that it
+            straightens the mirror inside the loop; else the reference alone drives it (feedforward, as in the paper).
 
-    Without ``in_series`` the reference alone drives it (feedforward, as in the paper). With it, the controller's own
-    command goes through it too, as an angle: the inverse then straightens the mirror inside the loop.
+    Raises:
+        ValueError: The inverse inverts nothing (a mirror whose hysteresis lies in a stiffness has none), or the
+            controller reads a gauge that the loop lacks.
     """
     if not any(inverse.direct) and not inverse.bouc_wen:
         raise ValueError(

@@ -30,7 +30,17 @@ class PointingTrace:
 
 
 def trace(loop: PointingLoop, controller: LoopController, span: Span, run_number: int = 0) -> PointingTrace:
-    """One run in full: the run of that number of an ensemble, to the last bit. The settling time is part of it."""
+    """One run in full: the run of that number of an ensemble, to the last bit. The settling time is part of it.
+
+    Args:
+        loop: The loop.
+        controller: The controller of all its axes.
+        span: How long the run is, and the seed.
+        run_number: Number of the run, from 0.
+
+    Raises:
+        ValueError: For a controller that does not fit, and a run that ends before it has settled.
+    """
     p = arrays(loop, controller, span.seed)
     total, _ = control_samples(loop, span)
     axes, m, outputs = loop.axes, loop.mirror.actuators, loop.mirror.axes
@@ -52,9 +62,20 @@ def trace(loop: PointingLoop, controller: LoopController, span: Span, run_number
 def side_by_side(
     loop: PointingLoop, controller: LoopController, span: Span, references: Sequence[References], first_run: int = 0
 ) -> tuple[Floats, Floats]:
-    """Error and mirror's outputs of one run for each of the references, (runs, samples, axes) and (.., outputs).
+    """Error and mirror's outputs (rad) of one run for each of several references.
 
-    The runs of the numbers from ``first_run`` on, at the control samples; the settling time is part of them.
+    Their shapes are (runs, samples, axes) and (runs, samples, outputs), at the control samples; the settling time is
+    part of them.
+
+    Args:
+        loop: The loop; its own references are not used.
+        controller: The controller of all its axes.
+        span: How long a run is, and the seed.
+        references: References of each run, by axis.
+        first_run: Number of the first run; the others follow it.
+
+    Raises:
+        ValueError: For a controller that does not fit, and a run that ends before it has settled.
     """
     p = arrays(loop, controller, span.seed)
     total, _ = control_samples(loop, span)
@@ -105,9 +126,20 @@ class Replay:
 
 
 def replay(loop: PointingLoop, controller: LoopController, samples: int, seed: int, run_number: int = 0) -> Replay:
-    """The run of that number of an ensemble with this seed, to the last bit.
+    """Run a loop and keep what its controller read and what it made of it, sample by sample.
 
-    It enters the kernel once a sample, some 0.1 ms each: for a trace of the loop alone take `trace`.
+    It is the run of that number of an ensemble with this seed, to the last bit. It enters the kernel once a sample,
+    some 0.1 ms each: for a trace of the loop alone take `trace`.
+
+    Args:
+        loop: The loop.
+        controller: The controller of all its axes.
+        samples: Number of control samples.
+        seed: Seed of the ensemble.
+        run_number: Number of the run, from 0.
+
+    Raises:
+        ValueError: For a controller that does not fit.
     """
     p = arrays(loop, controller, seed)
     state = start(loop, p, run_number)
