@@ -28,7 +28,8 @@ class Line:
 def total_db(lines: Iterable[Line]) -> float:
     """Sum of the lines: in dB, or in dBm (dBW) when one of them is a level in dBm (dBW).
 
-    Raises `ValueError` for a line in another unit and for a second level: two powers do not add in decibels.
+    Raises:
+        ValueError: For a line in another unit and for a second level: two powers do not add in decibels.
     """
     lines = tuple(lines)
     for line in lines:
@@ -44,7 +45,9 @@ def root_sum_square(lines: Iterable[Line]) -> float:
     """Root of the sum of the squared lines, in their common unit.
 
     Right for standard deviations of uncorrelated terms: ECSS-E-ST-60-10C, 4.2.3, does not add means or bounds so.
-    Raises `ValueError` when there is no line, when units differ and for decibels.
+
+    Raises:
+        ValueError: When there is no line, when units differ and for decibels.
     """
     lines = tuple(lines)
     units = sorted({line.unit for line in lines})

@@ -38,7 +38,8 @@ class UnknownValueError(TypeError):
 def digest(value: Any) -> bytes:
     """A digest of a value that another process finds, too: of its kind and of everything in it, to the last bit.
 
-    Raises UnknownValueError for what is not made of numbers, texts, arrays, containers, records and functions.
+    Raises:
+        UnknownValueError: For what is not made of numbers, texts, arrays, containers, records and functions.
     """
     known = sha256()
     for part in _parts(value):

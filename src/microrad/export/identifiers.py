@@ -48,7 +48,10 @@ _TAKEN = frozenset(_LIBRARY.split()) | {name + ending for name in _MATHEMATICS.s
 def identifier(name: str) -> str:
     """The name, if exported code can bear it: C99 and C++ keep it for users, and the headers in use have not taken it.
 
-    Letters, digits and underscores behind a letter, at most `LONGEST`. Raises ExportError with the reason otherwise.
+    It has letters, digits and underscores behind a letter, at most `LONGEST` of them.
+
+    Raises:
+        ExportError: For any other name, with the reason.
     """
     if trouble := _trouble(name):
         raise ExportError(f"{name!r} is no name for exported code: {trouble}; take for example {suggested(name)!r}")

@@ -128,8 +128,10 @@ class LoopUnit:
 
 @dataclass(frozen=True, slots=True)
 class Vectors:
-    """A run of the loop in the kernel as a controller sees it: ``inputs`` (samples, numbers), ``commands`` (samples,
-    actuators; V). ``saturated`` and ``rate_clamped`` are counted over all samples and actuators (elements).
+    """A run of the loop in the kernel as a controller sees it.
+
+    ``inputs`` have the shape (samples, numbers), ``commands`` (samples, actuators), V. ``saturated`` is counted over
+    all samples and actuators, ``rate_clamped`` over all samples and elements.
     """
 
     inputs: Floats

@@ -55,6 +55,7 @@ class Orbit(Protocol):
     def states(self, time_s: Floats) -> States:
         """States at `time_s`, elapsed seconds since the epoch of the mission, in any order.
 
-        Raises OrbitError for a time at which the rule does not hold.
+        Raises:
+            OrbitError: For a time at which the rule does not hold.
         """
         ...

@@ -62,7 +62,12 @@ class MatlabFile:
         self.variables = dict(zip(_distinct([name for name, _ in found]), (value for _, value in found), strict=True))
 
     def numbers(self, left: Left) -> NDArray[Any]:
-        """Read the numbers that were left. Raises `MatlabFileError` where they are damaged, and OSError."""
+        """Read the numbers that were left.
+
+        Raises:
+            MatlabFileError: Where they are damaged.
+            OSError: Where the file cannot be read.
+        """
         with self._path.open("rb") as file, _placed(left.variable):
             stream, _ = self._stream(file, left.variable, self._most)
             stream.skip(left.offset)

@@ -34,7 +34,11 @@ class Stream:
         return self.read(count)
 
     def read(self, count: int) -> bytes:
-        """The next bytes; raises `MatlabFileError` where there are fewer."""
+        """The next bytes.
+
+        Raises:
+            MatlabFileError: Where there are fewer.
+        """
         data = self._file.read(count)
         if len(data) < count:
             raise cut_off(count - len(data))
@@ -47,7 +51,12 @@ class Stream:
         self.position += count
 
     def finish(self) -> None:
-        """Go to the end, where what was packed has its checksum; raises `MatlabFileError` or `zlib.error`."""
+        """Go to the end, where what was packed has its checksum.
+
+        Raises:
+            MatlabFileError: Where the packed data are cut off, or unpack to too much.
+            zlib.error: Where they are damaged.
+        """
 
     def beyond(self, missing: int, end: int) -> MatlabFileError:
         """The error for data that are said to go beyond an end.
@@ -70,7 +79,11 @@ class Packed(Stream):
         self._left, self._zlib, self._ready = size, zlib.decompressobj(), bytearray()
 
     def read(self, count: int) -> bytes:
-        """The next bytes; raises `MatlabFileError` where there are fewer, or more than `most` before them."""
+        """The next bytes.
+
+        Raises:
+            MatlabFileError: Where there are fewer, or more than `most` before them.
+        """
         while len(self._ready) < count:
             self._unpack(count - len(self._ready))
         data = bytes(memoryview(self._ready)[:count])

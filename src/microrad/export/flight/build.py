@@ -55,7 +55,10 @@ class BenchResult:
 def compiler() -> str | None:
     """The C compiler: what the environment variable CC says (which may hold arguments too), else cc, gcc or clang.
 
-    None where there is none. Raises ExportError when CC names a program that is not there. `compiler_words` splits it.
+    None where there is none. `compiler_words` splits it.
+
+    Raises:
+        ExportError: When CC names a program that is not there.
     """
     asked = os.environ.get("CC", "").strip()
     if not asked:
@@ -69,7 +72,11 @@ def compiler() -> str | None:
 
 
 def compiler_words() -> tuple[str, ...]:
-    """The compiler and its arguments as the first words of a command. Raises ExportError where there is no compiler."""
+    """The compiler and its arguments as the first words of a command.
+
+    Raises:
+        ExportError: Where there is no compiler.
+    """
     found = compiler()
     if found is None:
         raise ExportError(

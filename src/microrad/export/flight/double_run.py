@@ -13,8 +13,12 @@ from microrad.export.records import FlightController, InverseLaw
 
 @dataclass(frozen=True, slots=True)
 class InverseRun:
-    """The inverse over a run: ``target`` behind creep (output units) and its ``rate`` by actuator, ``h`` by element and
-    ``travel`` (V) of its drive, ``lag`` at the begin of each sample, and what is ``added`` to the commands (V)."""
+    """The inverse over a run, by sample.
+
+    ``target`` behind creep (rad), its ``rate`` (rad/s) and what is ``added`` to the commands (V) have the shape
+    (samples, actuators), ``travel`` of the drive (V) and ``h`` (samples, elements), ``lag`` at the begin of each sample
+    (samples, lags).
+    """
 
     target: Floats
     rate: Floats
@@ -26,8 +30,12 @@ class InverseRun:
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """A controller over a run in double: by sample, ``states`` before it, ``outputs`` of the linear part, the commands
-    ``free`` of the clip, and the ``excess`` clip(free) - free that goes to the anti-windup."""
+    """A controller over a run in double precision, by sample.
+
+    ``states`` (samples, states) are those before the sample, ``outputs`` (samples, outputs) those of the linear part.
+    ``free`` are the commands ahead of the clip, and ``excess`` is clip(free) - free, which goes to the anti-windup;
+    both (samples, actuators), V.
+    """
 
     states: Floats
     outputs: Floats

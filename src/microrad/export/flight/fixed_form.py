@@ -54,9 +54,12 @@ class Converter:
 
 @dataclass(frozen=True, slots=True)
 class OutputQuality:
-    """One output in its ``unit``: largest relative error of its frequency response (norm over the inputs) and where,
-    the noise of rounding as predicted and as measured over the run (rms), and the largest swing (peak to peak) that
-    rounding can sustain without input, and did."""
+    """What fixed point does to one output, in its ``unit``.
+
+    ``response_error`` is the largest relative error of its frequency response (norm over the inputs), at ``at_hz``. The
+    noise of rounding is an rms, as predicted and as measured over the run. ``cycle_bound`` is the largest swing (peak
+    to peak) that rounding can sustain without input, ``cycle_found`` the one that was found.
+    """
 
     name: str
     unit: str
@@ -72,10 +75,9 @@ class OutputQuality:
 class QuantisationReport:
     """What fixed point costs over a recorded run of ``samples``.
 
-    ``head_room_bits`` go by state, from the largest size in the run.
-    ``error_v`` is the largest difference of a command from double precision, ahead of the converter, that fixed point
-    makes, and ``inverse_v`` a bound of what single precision in the inverse adds to it; ``bound_v`` is that of the
-    difference of two commands behind the converter.
+    ``head_room_bits`` go by state, from the largest size in the run. ``error_v`` is the largest difference from double
+    precision that fixed point makes in a command ahead of the converter; ``inverse_v`` bounds what single precision in
+    the inverse adds to it. ``bound_v`` bounds both together behind the converter.
     """
 
     samples: int

@@ -21,7 +21,8 @@ _SAVE = "s = struct('A', sys.A, 'B', sys.B, 'C', sys.C, 'D', sys.D, 'Ts', sys.Ts
 def load(path: Path) -> dict[str, Any]:
     """Variables by name: arrays of numbers, arrays of objects for cells, str, `Structure` and `Unread`.
 
-    Raises ExportError for a file that cannot be read: missing, too large, damaged, nested too deep, version 7.3.
+    Raises:
+        ExportError: For a file that cannot be read: missing, too large, damaged, nested too deep, version 7.3.
     """
     try:
         size = path.stat().st_size

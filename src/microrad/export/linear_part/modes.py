@@ -44,7 +44,8 @@ class Modes:
 def modes(of: FlightController) -> Modes:
     """The finest blocks of a controller that do not cancel each other.
 
-    Raises ExportError where the controller has a number that is not finite.
+    Raises:
+        ExportError: Where the controller has a number that is not finite.
     """
     s = of.system
     matrices = {**{key: getattr(s, key) for key in "ABCD"}, "anti-windup gain L": of.anti_windup}
@@ -143,9 +144,12 @@ def hidden(of: Modes) -> tuple[str, complex] | None:
 def minimal(of: FlightController) -> FlightController:
     """The controller without modes that nothing drives or no output shows; itself where it has none.
 
-    Designs that hold a model of their plant have such modes, where a pole of the model stands on a zero. From rest,
-    the outputs stay the same, but for a share of LEAST_SHARE of such a mode. Modes that hide in several blocks at once
-    (equal poles side by side) are left in. Raises ExportError where the controller has a number that is not finite.
+    Designs that hold a model of their plant have such modes, where a pole of the model stands on a zero. From rest, the
+    outputs stay the same, but for a share of LEAST_SHARE of such a mode. Modes that hide in several blocks at once
+    (equal poles side by side) are left in.
+
+    Raises:
+        ExportError: Where the controller has a number that is not finite.
     """
     found = modes(of)
     kept = [_kept(found, np.arange(at.start, at.stop)) for at in found.found.slices]

@@ -59,8 +59,11 @@ class Sections:
 def sections(of: FlightController) -> Sections:
     """The controller's linear part in sections: the finest form whose blocks do not cancel each other.
 
-    Raises ExportError for numbers that are not finite, for poles outside the unit circle or repeated ones on it that
-    grow, and for modes that no input and no anti-windup drives or that no output shows. Integrators are welcome.
+    Integrators are welcome.
+
+    Raises:
+        ExportError: For numbers that are not finite, for poles outside the unit circle or repeated ones on it that
+            grow, and for modes that no input and no anti-windup drives or that no output shows.
     """
     found = modes(of)
     _refuse_growing(of, found.found)

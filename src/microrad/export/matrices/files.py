@@ -128,7 +128,8 @@ def _cells(rows: _Entries, of: Callable[[Any], Any]) -> Any:
 def json_text(models: Sequence[LinearModel]) -> str:
     """The models as JSON: matrices by row, complex numbers as [re, im], each float so that it reads back the same.
 
-    Raises ExportError for a model with a number that is not finite.
+    Raises:
+        ExportError: For a model with a number that is not finite.
     """
     whole = {"format": FORMAT, "version": 1, "microrad": version("microrad"), "models": [_data(m) for m in models]}
     try:
@@ -173,7 +174,11 @@ def _plain(value: Any) -> Any:
 
 # ------------------------------------------------------------------------------------------------------ python-control
 def python_control() -> Any:
-    """The library python-control. Raises ExportError where it is not installed."""
+    """The library python-control.
+
+    Raises:
+        ExportError: Where it is not installed.
+    """
     try:
         return import_module("control")
     except ImportError as error:
@@ -186,7 +191,8 @@ def python_control() -> Any:
 def to_control(model: LinearModel) -> Any:
     """The model as a `control.StateSpace` with its names and its sample time (0: continuous).
 
-    Raises ExportError where python-control is not installed.
+    Raises:
+        ExportError: Where python-control is not installed.
     """
     s = model.system
     return python_control().ss(

@@ -236,7 +236,11 @@ def polynomials(entry: lti.StateSpace) -> tuple[list[Fraction], list[Fraction]]:
 
 
 def floats(coefficients: Sequence[Fraction]) -> Floats:
-    """Coefficients, each rounded once. Raises ExportError for one that no float holds."""
+    """Coefficients, each rounded once.
+
+    Raises:
+        ExportError: For one that no float holds.
+    """
     try:
         return np.array([float(each) for each in coefficients], dtype=float)
     except OverflowError as error:

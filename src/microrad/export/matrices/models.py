@@ -26,7 +26,10 @@ def models(of: Source | Choice) -> tuple[LinearModel, ...]:
     """The linear models of a mission's mirror (see `choice.source`), or of a controller (`choice.choose`) and its loop.
 
     Angles are line-of-sight angles in the sampled plant, the controller and the loop, and the mirror file's own in the
-    first two. Raises ExportError if the mission's loop cannot be built.
+    first two.
+
+    Raises:
+        ExportError: If the mission's loop cannot be built.
     """
     start = of if isinstance(of, Source) else of.source
     controller = None if isinstance(of, Source) else _controller(start, flight_controller(of))

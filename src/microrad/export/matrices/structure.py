@@ -1,4 +1,4 @@
-"""What of a linear model is behind one input and output: its states, modes that are hidden, copies of states."""
+"""The part of a linear model between one input and one output: its states, hidden modes, copies of states."""
 
 import math
 

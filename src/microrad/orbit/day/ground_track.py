@@ -41,8 +41,9 @@ class Outline:
 class GroundTrack:
     """Where the satellite stands over the Earth, and which ways are open to it there; arrays of shape (n,).
 
-    Around a relay that stands still: from within, a satellite at the mean height of the track sees it. Around a
-    station: its mask. Neither has a line where the satellite's height varies by `SAME_HEIGHT`.
+    A relay that stands still has a line around it, within which a satellite at the mean height of the track sees it.
+    The line around a station is its elevation mask. Neither has a line where the satellite's height varies by
+    `SAME_HEIGHT`.
     """
 
     time_s: Floats

@@ -80,7 +80,8 @@ class Epoch:
     def utc(self, time_s: float) -> str:
         """UTC at `time_s` after this instant, in ISO 8601 to the millisecond with Z; a leap second reads :60.
 
-        Raises OrbitError for a time outside the tables.
+        Raises:
+            OrbitError: For a time outside the tables.
         """
         self._check(np.asarray(time_s, dtype=np.float64))
         day, second = _instant(self.text)
@@ -91,8 +92,10 @@ class Epoch:
         """Greenwich mean sidereal time (IAU 1982) at UT1, `time_s` after this instant, in rad.
 
         In [0, 2 pi) at 0h of the first day and continuous from there: it is not wrapped. UT1 - TAI is taken as linear
-        over each day. Raises OrbitError for a time outside the tables.
-        Source: Aoki et al. 1982 (AIAA 2006-6753, appendix C).
+        over each day. Source: Aoki et al. 1982 (AIAA 2006-6753, appendix C).
+
+        Raises:
+            OrbitError: For a time outside the tables.
         """
         time = np.asarray(time_s, dtype=np.float64)
         self._check(time)

@@ -88,7 +88,8 @@ class KeplerOrbit:
     def states(self, time_s: Floats) -> States:
         """States at `time_s` after the epoch; the velocity is the derivative of the position, drifts included.
 
-        Raises OrbitError for a time that is not a number.
+        Raises:
+            OrbitError: For a time that is not a number.
         """
         time = np.asarray(time_s, dtype=np.float64)
         if not np.all(np.isfinite(time)):
@@ -221,7 +222,11 @@ class GeostationarySlot:
             )
 
     def states(self, time_s: Floats) -> States:
-        """States at `time_s` after the epoch; raises OrbitError for a time outside the tables of `Epoch`."""
+        """States at `time_s` after the epoch.
+
+        Raises:
+            OrbitError: For a time outside the tables of `Epoch`.
+        """
         angle = self.epoch.earth_rotation_rad(time_s) + self.longitude_rad
         x, y = GEOSTATIONARY_RADIUS_M * np.cos(angle), GEOSTATIONARY_RADIUS_M * np.sin(angle)
         zero = np.zeros_like(x)

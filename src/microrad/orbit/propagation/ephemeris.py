@@ -102,7 +102,11 @@ class EphemerisOrbit:
         return self.segments[0].start_s, self.segments[-1].stop_s
 
     def states(self, time_s: Floats) -> States:
-        """States in TEME at `time_s`, of shape (3, n); raises OrbitError outside the usable times."""
+        """States in TEME at `time_s`, of shape (3, n).
+
+        Raises:
+            OrbitError: Outside the usable times.
+        """
         time = np.atleast_1d(np.asarray(time_s, dtype=np.float64))
         self._check_finite(time)
         starts = np.array([segment.start_s for segment in self.segments])

@@ -75,7 +75,11 @@ def check_theory(where: str, kind: str) -> None:
 
 
 def checked(elements: ElementSet) -> ElementSet:
-    """The elements when they are those of a closed orbit; raises OrbitError for others."""
+    """The elements, unchanged, where they are those of a closed orbit.
+
+    Raises:
+        OrbitError: For an element out of range.
+    """
     revolutions_per_day = elements.mean_motion_rad_s * DAY_S / REVOLUTION_RAD
     ranges = (
         ("eccentricity", elements.eccentricity, 0.0, 1.0, "at least 0 and below 1"),
@@ -142,7 +146,8 @@ class Sgp4Orbit:
     def states(self, time_s: Floats) -> States:
         """States in TEME at `time_s`, of shape (3, n).
 
-        Raises OrbitError where SGP4 reports an error, and further than `MOST_ELEMENTS_AGE_S` from the elements.
+        Raises:
+            OrbitError: Where SGP4 reports an error, and further than `MOST_ELEMENTS_AGE_S` from the elements.
         """
         time = np.atleast_1d(np.asarray(time_s, dtype=np.float64))
         self._check_times(time)

@@ -34,8 +34,10 @@ class LineOfSight:
     def doppler_hz(self, wavelength_m: float) -> Floats:
         """Frequency received less frequency sent, first order: -range rate / wavelength; positive on approach.
 
-        The second order, (v/c)^2 / 2 of the carrier, is below 0.1 MHz at 1.55 µm for satellites of the Earth. Raises
-        `OrbitError` for a wavelength not above 0.
+        The second order, (v/c)^2 / 2 of the carrier, is below 0.1 MHz at 1.55 µm for satellites of the Earth.
+
+        Raises:
+            OrbitError: For a wavelength not above 0.
         """
         if not wavelength_m > 0.0:
             raise OrbitError(f"a wavelength of {format_quantity(wavelength_m, 'm')} is none; give one above 0 m")
