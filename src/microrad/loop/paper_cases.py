@@ -72,7 +72,11 @@ class Run:
 
 
 def simulate(cases: PaperCases) -> tuple[tuple[HysteresisLoop, ...], control.LoopMargins, tuple[Run, ...]]:
-    """The settled loops, the margins and the tracked sines. Raises ValueError as `loop_margins` and `sine_runs`."""
+    """The settled loops, the margins and the tracked sines.
+
+    Raises:
+        ValueError: The loop is unstable, or the mirror has no inverse.
+    """
     return hysteresis_loops(cases), loop_margins(cases), sine_runs(cases)
 
 
@@ -85,7 +89,11 @@ def hysteresis_loops(cases: PaperCases) -> tuple[HysteresisLoop, ...]:
 
 
 def loop_margins(cases: PaperCases) -> control.LoopMargins:
-    """Margins of the loop as it is sampled; raises ValueError when it is unstable."""
+    """Margins of the loop as it is sampled.
+
+    Raises:
+        ValueError: The loop is unstable.
+    """
     return margins(cases.mirrors.line_of_sight[Variant.GIVEN].plant, cases.setup)
 
 

@@ -106,7 +106,8 @@ def _tilts(geometry: Geometry) -> Floats:
 def outputs_matrix(geometry: Geometry) -> Floats:
     """The mirror's outputs for line-of-sight angles (x, y), shape (outputs, 2): without piston for a tripod.
 
-    Raises ValueError for a singular geometry.
+    Raises:
+        ValueError: For a singular geometry.
     """
     seen = line_of_sight_matrix(geometry)
     _refuse_singular(geometry, seen)

@@ -247,8 +247,11 @@ def steepest_slope(model: BoucWen | Play) -> float:
     """Bound on |dz/dq| of a model, anywhere in its loops.
 
     A Bouc-Wen element whose |h| grows along a branch (a decay below 0: a hardening spring) has no bound; it is taken
-    within the travel over which that branch steepens by a factor e. Raises ValueError where there is none: for a
-    Bouc-Wen model that depends on the rate without a limit, and for plays that depend on it.
+    within the travel over which that branch steepens by a factor e.
+
+    Raises:
+        ValueError: For a Bouc-Wen model that depends on the rate without a limit, and for plays that depend on it:
+            there is no bound.
     """
     if isinstance(model, Play):
         if model.widening_s:

@@ -67,7 +67,8 @@ def parameters(table: Mirror, normals: Floats, again: Callable[[int], Iterator[F
 def parameter_units(table: Mirror) -> dict[str, str]:
     """SI units of what `parameters` draws, by key; "" for plain numbers and for the factor of a whole list.
 
-    Raises ValueError without an `uncertainty`.
+    Raises:
+        ValueError: Without an `uncertainty`.
     """
     return {key: _unit(table, place(table, key)) for key in _uncertainty(table).parameters}
 
@@ -82,8 +83,10 @@ def _unit(table: Mirror, at: Place) -> str:
 def relative_covariance(table: Mirror) -> Floats:
     """Covariance (n, n) of the factors, 1 on average, that a draw multiplies the n parameters with.
 
-    A correlation matrix that rounding left indefinite is repaired: eigenvalues below 0 become 0. Raises ValueError
-    without an `uncertainty`.
+    A correlation matrix that rounding left indefinite is repaired: eigenvalues below 0 become 0.
+
+    Raises:
+        ValueError: Without an `uncertainty`.
     """
     uncertainty = _uncertainty(table)
     values, vectors = np.linalg.eigh(np.array(uncertainty.correlation_rows))
@@ -97,7 +100,8 @@ def relative_covariance(table: Mirror) -> Floats:
 def relative_spread(table: Mirror) -> float:
     """Relative standard error of the slow gain (see `hysteresis.slow_gain`), to first order.
 
-    Raises ValueError without an `uncertainty`.
+    Raises:
+        ValueError: Without an `uncertainty`.
     """
     shares = np.array([_share_of_gain(table, place(table, key)) for key in _uncertainty(table).parameters])
     return float(np.sqrt(shares @ relative_covariance(table) @ shares))

@@ -216,8 +216,8 @@ class LoopMargins(DiskMargin):
 
     ``gain_up`` and ``gain_down`` are the factors nearest 1 that make it unstable (infinite and 0 without one),
     ``phase_rad`` the smallest phase margin in either direction, ``delay_s`` the smallest additional delay, ``modulus``
-    is min |1 + L|. ``crossover_hz`` is the highest frequency with
-    |L| = 1 (nan without one), ``bandwidth_hz`` the lowest with |S| = 1, ``peak`` the largest |S|.
+    is min |1 + L|. ``crossover_hz`` is the highest frequency with |L| = 1 (nan without one), ``bandwidth_hz`` the
+    lowest with |S| = 1, ``peak`` the largest |S|, at ``peak_hz``.
     """
 
     gain_up: float

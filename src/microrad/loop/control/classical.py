@@ -51,7 +51,10 @@ class Resonance:
 def optical_model(plant: DesignPlant) -> lti.StateSpace:
     """P: command (V) to the reading that its answer takes off the optical error (rad), delays included.
 
-    Of the plant's states it keeps those that lie between the two. Raises ValueError without an optical sensor.
+    Of the plant's states it keeps those that lie between the two.
+
+    Raises:
+        ValueError: The plant has no optical sensor.
     """
     if not plant.has_optical:
         raise ValueError(

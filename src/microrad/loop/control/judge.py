@@ -50,7 +50,14 @@ class Judge:
     """
 
     def __init__(self, plants: Sequence[DesignPlant]) -> None:
-        """Raise ValueError for no plant, different periods, no disturbance, or one without stationary variance."""
+        """Compute the responses of the plants, once for all controllers.
+
+        Args:
+            plants: Plants of one axis, all of one control period.
+
+        Raises:
+            ValueError: For no plant, different periods, no disturbance, or one without stationary variance.
+        """
         self._period = _one_period(plants)
         self._A, self._B, self._C, self._D = _stacked([moved(p).from_command for p in plants])
         grids = [_grid(p) for p in plants]

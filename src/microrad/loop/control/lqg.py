@@ -122,10 +122,10 @@ class Model:
 
 @once_per_plant
 def in_own_units(plant: DesignPlant) -> DesignPlant:
-    """The plant with each state in a unit (a power of 2) of its own size under the white sequences and one of 1 V.
+    """The plant with scaled states, each in a unit of about its own size (a power of 2).
 
-    States in volts beside states in radians cost the Riccati equations eight digits. The sizes are those that some
-    thousand samples build up: a state may drift for ever.
+    States in volts beside states in radians cost the Riccati equations eight digits. The size is the rms that some
+    thousand samples of the white sequences and of a white command of 1 V build up: a state may drift for ever.
     """
     s = plant.system
     size = np.sqrt(np.diag(lti.gramian(0.999 * s.A.T, s.B @ s.B.T)))

@@ -40,7 +40,7 @@ class DesignPlant:
 
 
 def once_per_plant(of: Callable[[DesignPlant], _Answer]) -> Callable[[DesignPlant], _Answer]:
-    """The function, its last answer kept: a search asks the same of one plant for each of its candidates."""
+    """Let a function keep its last answer: a search asks the same of one plant for each of its candidates."""
     last: tuple[DesignPlant, _Answer] | None = None
 
     @functools.wraps(of)

@@ -148,8 +148,10 @@ def no_feedforward(m: Mirror) -> Inverse:
 def inverse(m: Mirror) -> Inverse:
     """Inverse of the mirror's hysteresis and creep: Eq. 4 for Bouc-Wen, the closed form for Prandtl-Ishlinskii.
 
-    The rate that widens a rate-dependent operator is that of the reference over the slow gain. Raises ValueError for a
-    Prandtl-Ishlinskii model without weight at threshold 0: it stands still after a reversal.
+    The rate that widens a rate-dependent operator is that of the reference over the slow gain.
+
+    Raises:
+        ValueError: For a Prandtl-Ishlinskii model without weight at threshold 0: it stands still after a reversal.
     """
     direct = [0.0] * m.actuators
     bouc_wen, plays = [], []
@@ -201,11 +203,14 @@ def inverse_arrays(of: Inverse, period_s: float) -> dict[str, Any]:
 
 
 def play_inverse(model: Play) -> tuple[float, tuple[float, ...], tuple[float, ...]]:
-    """Inverse of a Prandtl-Ishlinskii model as (direct gain, thresholds in rad, weights in V/rad).
+    """Inverse of a Prandtl-Ishlinskii model as (direct gain in V/rad, thresholds in rad, weights in V/rad).
 
     Source: Kuhnen, European Journal of Control 9 (2003) 407: r'_j = sum_{i<j} w_i (r_j - r_i), and w' from the
     differences of the reciprocals of the cumulated weights. Thresholds above 0 that widen by s widen the inverse's by
-    w_0 s (Al Janaideh and Krejci 2013), which `inverse` looks after. Raises ValueError without weight at threshold 0.
+    w_0 s (Al Janaideh and Krejci 2013), which `inverse` looks after.
+
+    Raises:
+        ValueError: For a model without weight at threshold 0: it stands still after a reversal.
     """
     r, w = np.array(model.thresholds_v), np.array(model.weights_rad_v)
     slope = np.cumsum(w)

@@ -59,7 +59,17 @@ class Search:
         specification: Specification,
         pull: float = PULL,
     ) -> None:
-        """Raise ValueError where the plants do not fit together or the family has no controller for the nominal one."""
+        """Begin a tuning, with no candidate judged yet.
+
+        Args:
+            family: Kind of controller.
+            plants: The nominal plant first, then others that it could also be.
+            specification: Modulus margin and bandwidth that every plant has to have.
+            pull: Share of the rms that the most vigorous value of a parameter counts for, see `PULL`; 0 for none.
+
+        Raises:
+            ValueError: The plants do not fit together, or the family has no controller for the nominal one.
+        """
         self.family, self.plants, self.specification = family, plants, specification
         self.parameters = family.parameters(plants[0]) if plants else ()
         self.judge = Judge(plants)

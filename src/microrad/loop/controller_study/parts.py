@@ -55,7 +55,15 @@ SWITCHES: dict[str, Callable[[PointingLoop], PointingLoop]] = {
 
 
 def without(loop: PointingLoop, *names: str) -> PointingLoop:
-    """The loop without the named parts or disturbances. Raises ValueError for a name that it does not have."""
+    """The loop without the named parts or disturbances.
+
+    Args:
+        loop: The loop.
+        names: Keys of `SWITCHES`, or names of the loop's disturbances.
+
+    Raises:
+        ValueError: For a name that the loop does not have.
+    """
     known = {each.name for several in loop.disturbances for each in several}
     for name in names:
         if name in SWITCHES:

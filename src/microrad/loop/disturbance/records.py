@@ -77,7 +77,11 @@ class Disturbance:
 
 
 def share(convention: Convention) -> float:
-    """Part of a given power that one axis has; raises ValueError for an unknown convention."""
+    """Part of a given power that one axis has: a half of a radial one, all of one that is given per axis.
+
+    Raises:
+        ValueError: For an unknown convention.
+    """
     if convention not in get_args(Convention):
         raise ValueError(f'convention "{convention}" of a spectrum is not known; say "radial" or "per-axis"')
     return 0.5 if convention == "radial" else 1.0
@@ -182,9 +186,12 @@ def band_rms(disturbance: Disturbance, edges_hz: Floats) -> Floats:
 
 
 def combine(*disturbances: Disturbance) -> Disturbance:
-    """Several independent disturbances of one axis as one, block-diagonal; raises ValueError for none.
+    """Several independent disturbances of one axis as one, block-diagonal.
 
     States that come in pairs stand before single ones, so that every pair begins at an even row.
+
+    Raises:
+        ValueError: For none.
     """
     from scipy.linalg import block_diag
 

@@ -85,9 +85,10 @@ class Ensemble:
         return replace(self, **by_run)
 
     def share(self, counter: int) -> float:
-        """How often a counter counted, of all actuators or elements together, so that it may exceed 1.
+        """How often a counter (`kernels.COUNT_*`) counted, over how often it could have.
 
-        Lost spots per optical reading, saturation and the inverse's rate per control sample, the others per plant step.
+        All actuators or elements count together, so that it may exceed 1. Lost spots are per optical reading,
+        saturation and the inverse's rate per control sample, the others per plant step.
         """
         sampled = counter in (kernels.COUNT_SATURATED, kernels.COUNT_INVERSE_CLAMPED)
         times = self.readings if counter == kernels.COUNT_LOST else self.samples if sampled else self.steps
@@ -211,7 +212,7 @@ def simulate(
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """A loop under a controller; without ``spectrum`` that of its residual is left out, as nan."""
+    """A loop under a controller, and whether the ``spectrum`` of its residual is taken; else that is nan."""
 
     loop: PointingLoop
     controller: LoopController

@@ -183,7 +183,8 @@ class ClosedLoop:
     """The loop under a controller, linear: a map for each control sample of a sensor period and its plant steps.
 
     States: those of `OpenLoop`, then the controller's. ``samples[i]`` is the control sample's own map and
-    ``sample_noise[i]`` what its unit white readings' noise adds; ``steps`` and ``step_noise`` as in `OpenLoop`.
+    ``sample_noise[i]`` takes the readings' noise, unit white sequences, to the states; ``steps`` and ``step_noise`` are
+    as in `OpenLoop`.
     """
 
     open: OpenLoop
@@ -288,7 +289,11 @@ def gauge_noise_rad(loop: PointingLoop) -> float:
 
 
 def refuse_unstable(closed: ClosedLoop) -> None:
-    """Raise ValueError with the pole when the loop is unstable."""
+    """Raise ValueError when the loop is unstable.
+
+    Raises:
+        ValueError: The loop is unstable; gives its worst pole.
+    """
     size, freq = closed.worst_pole()
     if size >= 1.0:
         raise ValueError(
@@ -318,8 +323,10 @@ class Stationary:
 def stationary(closed: ClosedLoop) -> Stationary:
     """Stationary variances by the discrete Lyapunov equation (H2), one solution a source.
 
-    Lines have no white source: what the loop makes of each is added, at a random phase. Raises ValueError for an
-    unstable loop.
+    Lines have no white source: what the loop makes of each is added, at a random phase.
+
+    Raises:
+        ValueError: The loop is unstable.
     """
     refuse_unstable(closed)
     o, axes = closed.open, closed.open.loop.axes

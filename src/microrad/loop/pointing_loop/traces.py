@@ -114,8 +114,8 @@ class Replay:
     """A run at its control samples, from rest.
 
     ``inputs`` (samples, numbers) are the readings in the order of `LoopController`, ``commands`` (samples, actuators)
-    what it made of them, in V from the bias. ``disturbance_rad`` and ``error_rad`` (samples, axes) are at the line of
-    sight; ``counts`` (kernels.COUNT_*) are of the whole run.
+    what the controller made of them, in V from the bias. ``disturbance_rad`` and ``error_rad`` (samples, axes) are at
+    the line of sight; ``counts`` (kernels.COUNT_*) are of the whole run.
     """
 
     inputs: Floats
