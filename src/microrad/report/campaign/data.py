@@ -48,7 +48,6 @@ def _output_data(output: OutputSummary) -> dict[str, Any]:
         **{key: getattr(output, key) for key in ("name", "unit", "meaning", "rows", "deviation", "least", "most")},
         "mean": asdict(output.mean),
         "quantiles": [{"probability": p, **asdict(each)} for p, each in output.quantiles.items()],
-        "sketch_error": 0.0,  # quantiles are exact; those who read the key find it
         "edges": output.edges.tolist(),
         "counts": output.counts.tolist(),
     }
