@@ -13,8 +13,8 @@ import psutil
 import pytest
 
 from microrad.campaign.engines import cluster
-from microrad.campaign.engines.cluster import DaskEngine
-from microrad.campaign.engines.flights import Flight, JobQueue, late_flights
+from microrad.campaign.engines.cluster import DaskEngine, Flight, late_flights
+from microrad.campaign.engines.jobs import JobQueue
 from microrad.campaign.records import CampaignError, Job
 from small_campaign import import_path, killing
 from small_campaign import kill as kill_process

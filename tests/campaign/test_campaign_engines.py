@@ -14,10 +14,12 @@ from types import SimpleNamespace
 import psutil
 import pytest
 
-from microrad.campaign.engines import flights
-from microrad.campaign.engines.flights import Clock, Flight, late_flights
+from microrad.campaign.engines import jobs as engine_jobs
+from microrad.campaign.engines import local
+from microrad.campaign.engines.cluster import Flight, late_flights
+from microrad.campaign.engines.jobs import Clock
 from microrad.campaign.engines.local import LocalEngine
-from microrad.campaign.engines.worker import Beat
+from microrad.campaign.engines.worker import Beat, Kind
 from microrad.campaign.records import CampaignError, Job
 from small_campaign import hears_ctrl_c, import_path, killing
 from waiting import HANG_S, alive, beside, gone, no_hang, until
@@ -194,6 +196,21 @@ def test_a_job_that_lasts_but_beats_is_not_late(engine):
     assert one._clock.now_s > 2.0
 
 
+def test_a_job_that_ended_while_the_caller_did_something_else_is_not_late(engine):
+    """The caller writes each outcome to a disk, which may take longer than a job may be silent."""
+    one = engine(threads=2, late_s=20.0)
+    one._clock.close()
+    one._clock = SimpleNamespace(now=lambda: now_s[-1], close=lambda: None)
+    now_s = [0.0]
+    assert kinds(run(one, chunks(2))) == {} and len(children()) == 2
+    outcomes = one.outcomes(iter(chunks(2, first=2)))
+    first = next(outcomes)
+    until(lambda: one._inbox.qsize() == 1, "the other job")
+    now_s.append(1000.0)
+    (second,) = outcomes
+    assert (first.kind, second.kind) == ("done", "done") and first.job != second.job
+
+
 def test_a_job_that_failed_once_may_be_done_again(engine, tmp_path):
     one = engine(f'{{"1": "hang_once {tmp_path}/a", "2": "killed_once {tmp_path}/b"}}', threads=1, late_s=LATE_S)
     assert kinds(run(one, chunks(4))) == {1: "late", 2: "died"}
@@ -232,6 +249,29 @@ def test_deaths_without_anything_done_between_are_given_up(engine):
     with pytest.raises(CampaignError, match=r"ended 20 times without a job done between.*SIGKILL"):
         run(engine('{"else": "killed"}', threads=1), chunks(40))
     assert children() == []
+
+
+@pytest.mark.parametrize("table", ["die", '{"else": "killed"}'])
+def test_as_many_ends_as_there_are_processes_are_not_many(engine, table, monkeypatch):
+    """All may end for one reason: short of memory, or stopped by somebody."""
+    monkeypatch.setattr(local, "_FALSE_STARTS", 1)
+    monkeypatch.setattr(local, "_DEATHS", 1)
+    with pytest.raises(CampaignError, match=f"ended {3 if table == 'die' else 4} times without a job done between"):
+        run(engine(table, threads=2), chunks(40))
+    assert children() == []
+
+
+def test_a_process_that_something_is_written_to_is_known_by_then(engine, monkeypatch):
+    """To write may take until the process reads; whoever closes the engine meanwhile has to find it."""
+    one, sent, real = engine(threads=2), [], local.write_message
+
+    def write(stream, message):
+        sent.append((message.kind, stream in [worker.process.stdin for worker in one._workers]))
+        real(stream, message)
+
+    monkeypatch.setattr(local, "write_message", write)
+    assert kinds(run(one, chunks(4))) == {}
+    assert sorted(sent) == [(Kind.OPEN, True)] * 2 + [(Kind.JOB, True)] * 4
 
 
 def test_other_code_after_a_restart_is_refused(engine, tmp_path, monkeypatch):
@@ -359,16 +399,16 @@ def test_a_campaign_stopped_for_a_while_calls_only_that_late_which_is(
 
     def halt():
         until(begun.exists, "job 2")
-        workers = children()
+        workers = children() if deed == "quiet" else ()  # what hangs is not resumed, nor would be one that begins
         for worker in workers:
             worker.suspend()
         count = len(looks)
         until(lambda: len(looks) > count + 10, "some seconds awake behind the halt")
-        for worker in workers if deed == "quiet" else ():
+        for worker in workers:
             worker.resume()
         end.touch()
 
-    monkeypatch.setattr(flights, "time", SimpleNamespace(monotonic=monotonic))
+    monkeypatch.setattr(engine_jobs, "time", SimpleNamespace(monotonic=monotonic))
     own = f" {end}" if deed == "quiet" else ""
     one = engine(f'{{"2": "{deed} {begun}{own}"}}', late_s=late_s)
     halted = beside(halt)
@@ -434,7 +474,7 @@ def test_beats_are_told_at_once_and_then_not_too_often():
 
 def test_a_clock_counts_seconds_awake(monkeypatch):
     times = iter([5.0, 5.1, 5.25, 1005.25, 1005.3])  # a halt of 1000 s is in it
-    monkeypatch.setattr(flights, "time", SimpleNamespace(monotonic=lambda: next(times, 1005.3)))
+    monkeypatch.setattr(engine_jobs, "time", SimpleNamespace(monotonic=lambda: next(times, 1005.3)))
     clock = Clock()
     until(lambda: clock.now() > 0.49, "the last of these times")
     clock.close()

@@ -92,9 +92,9 @@ def scratch_folder(what: str) -> Path:
 
 
 @contextmanager
-def scratch(what: str, beside: Path | None = None) -> Iterator[Path]:
-    """A folder among the temporary files, or ``beside`` a file and hidden there, which vanishes at the end."""
-    folder = scratch_folder(what) if beside is None else _new_folder(beside.parent, f".{beside.name}-{what}", ".part")
+def scratch(what: str) -> Iterator[Path]:
+    """A folder among the temporary files, which vanishes at the end."""
+    folder = scratch_folder(what)
     try:
         yield folder
     finally:

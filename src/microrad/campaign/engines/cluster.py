@@ -19,7 +19,7 @@ from hashlib import sha256
 from queue import Empty, SimpleQueue
 from typing import Any
 
-from microrad.campaign.engines.flights import SLICE_S, Clock, Flight, JobQueue, late_flights, late_reason
+from microrad.campaign.engines.jobs import SLICE_S, Clock, JobQueue, late_reason
 from microrad.campaign.engines.worker import (
     Beat,
     Kind,
@@ -125,6 +125,31 @@ def _tell_now(worker: Any, topic: str, message: list[Any]) -> None:
 
 
 # --------------------------------------------------------------------------------------------------------- this side
+@dataclass(slots=True)
+class Flight:
+    """A job handed to a worker: when it was last heard of (s, of a `Clock`), nan before it has begun; where it runs."""
+
+    job: Job
+    heard_s: float = float("nan")
+    where: str = ""
+
+    @property
+    def begun(self) -> bool:
+        """Whether a worker has begun it."""
+        return self.heard_s == self.heard_s
+
+
+def late_flights(flights: dict[int, Flight], now_s: float, late_s: float) -> list[int]:
+    """The serial numbers of the flights that were not heard of for longer than ``late_s``.
+
+    Where there is one, those silent for more than half as long are late too: a job that keeps the interpreter to
+    itself silences its neighbours, and which of them was the last to be heard says nothing.
+    """
+    silent = {serial: now_s - f.heard_s for serial, f in flights.items() if f.begun}
+    limit = late_s / 2.0 if max(silent.values(), default=0.0) > late_s else late_s
+    return [serial for serial, silence in silent.items() if silence > limit]
+
+
 def _distributed() -> Any:
     """The package, or CampaignError where it is not installed."""
     try:

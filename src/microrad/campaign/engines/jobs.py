@@ -1,10 +1,9 @@
-"""Jobs under way on any engine: which are to come, when each was last heard of, and which are late."""
+"""What both engines know of jobs: which are to come, the time by which one is late, and what is said of it then."""
 
 import threading
 import time
 from collections import deque
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from microrad.campaign.records import Job
 
@@ -36,31 +35,6 @@ class Clock:
         """Stop."""
         self._end.set()
         self._thread.join()
-
-
-@dataclass(slots=True)
-class Flight:
-    """A job handed to a worker: when it was last heard of (s, of a `Clock`), nan before it has begun; where it runs."""
-
-    job: Job
-    heard_s: float = float("nan")
-    where: str = ""
-
-    @property
-    def begun(self) -> bool:
-        """Whether a worker has begun it."""
-        return self.heard_s == self.heard_s
-
-
-def late_flights(flights: dict[int, Flight], now_s: float, late_s: float) -> list[int]:
-    """The serial numbers of the flights that were not heard of for longer than ``late_s``.
-
-    Where there is one, those silent for more than half as long are late too: a job that keeps the interpreter to
-    itself silences its neighbours, and which of them was the last to be heard says nothing.
-    """
-    silent = {serial: now_s - f.heard_s for serial, f in flights.items() if f.begun}
-    limit = late_s / 2.0 if max(silent.values(), default=0.0) > late_s else late_s
-    return [serial for serial, silence in silent.items() if silence > limit]
 
 
 def late_reason(late_s: float) -> str:

@@ -70,16 +70,6 @@ def write_message(stream: IO[bytes], message: Message) -> None:
     stream.flush()
 
 
-def pack_job(job: Job) -> bytes:
-    """The job as it travels."""
-    return json.dumps(list(job)).encode()
-
-
-def unpack_job(body: bytes) -> Job:
-    """The job that has travelled."""
-    return Job(*json.loads(body))
-
-
 def open_target(target: str, spec: bytes) -> Work:
     """The work that the function ``target`` ("module:function") makes of ``spec``."""
     module, function = target.split(":")
@@ -128,17 +118,12 @@ def end_when_stuck(stuck_s: float) -> None:
     threading.Thread(target=wind, daemon=True, name="alarm").start()
 
 
-class _ToParent:
-    """The way to the parent; without a parent the process ends."""
-
-    def __init__(self, stream: IO[bytes]) -> None:
-        self._stream = stream
-
-    def send(self, message: Message) -> None:
-        try:
-            write_message(self._stream, message)
-        except OSError:
-            os._exit(1)
+def _tell(parent: IO[bytes], message: Message) -> None:
+    """Tell the parent; without a parent the process ends."""
+    try:
+        write_message(parent, message)
+    except OSError:
+        os._exit(1)
 
 
 class Beat:
@@ -163,7 +148,7 @@ def beat_every_s(late_s: float) -> float:
     return min(1.0, late_s / 10.0)
 
 
-def _serve(target: str, late_s: float, messages: "SimpleQueue[Message]", port: _ToParent) -> None:
+def _serve(target: str, late_s: float, messages: "SimpleQueue[Message]", parent: IO[bytes]) -> None:
     """Open the work with the first message, then do job after job.
 
     The parent is told of which code the work is, or why it cannot be opened.
@@ -172,18 +157,18 @@ def _serve(target: str, late_s: float, messages: "SimpleQueue[Message]", port: _
         work = open_target(target, messages.get().body)
         code = code_sha256(target)
     except BaseException as error:
-        port.send(Message(Kind.REFUSED, words(error).encode()))
+        _tell(parent, Message(Kind.REFUSED, words(error).encode()))
         return
-    port.send(Message(Kind.READY, code.encode()))
+    _tell(parent, Message(Kind.READY, code.encode()))
     while True:
         asked = messages.get()
-        beat = Beat(lambda: port.send(Message(Kind.BEAT)), beat_every_s(late_s))
+        beat = Beat(lambda: _tell(parent, Message(Kind.BEAT)), beat_every_s(late_s))
         beat()  # says that it has begun
         try:
-            answer = Message(Kind.DONE, work.do(unpack_job(asked.body), beat))
+            answer = Message(Kind.DONE, work.do(Job(*json.loads(asked.body)), beat))
         except BaseException as error:  # whatever it was, it is this job's
             answer = Message(Kind.RAISED, words(error).encode())
-        port.send(answer)
+        _tell(parent, answer)
 
 
 def _take_pipes() -> tuple[IO[bytes], IO[bytes]]:
@@ -205,7 +190,7 @@ def main() -> None:
         end_when_stuck(late_s + _STUCK_S)  # a living parent is quicker
     incoming, outgoing = _take_pipes()
     messages: SimpleQueue[Message] = SimpleQueue()
-    arguments = (target, late_s, messages, _ToParent(outgoing))
+    arguments = (target, late_s, messages, outgoing)
     threading.Thread(target=_serve, args=arguments, daemon=True, name="jobs").start()
     while (message := read_message(incoming)) is not None:
         messages.put(message)
