@@ -80,7 +80,7 @@ def efficiency(runs: int) -> None:
         started: dict[str, float] = {}
         for _ in range(ROUNDS):
             rounds.append({})
-            for name, means in MEANS.items():  # one at a time: an idle cluster takes some of both cores
+            for name, means in MEANS.items():  # one at a time: each has the cores to itself
                 began = time.perf_counter()
                 with closing(means.engine(spec, 600.0)) as engine:
                     timed(engine, jobs[:4])  # every worker has opened the campaign
@@ -98,8 +98,8 @@ def efficiency(runs: int) -> None:
 
 
 def memory(runs: int) -> None:
-    """Peak memory of the command and of its workers for campaigns of growing length."""
-    print("\npeak memory of the command and of its worker, links alone")
+    """Peak memory of the command and of its largest worker for campaigns of growing length."""
+    print("\npeak memory of the command and of its largest worker, links alone")
     for rows in (runs, 8 * runs):
         with tempfile.TemporaryDirectory() as folder:
             path = written(folder, rows, loop="")

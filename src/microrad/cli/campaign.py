@@ -50,6 +50,7 @@ _LINE_S = 30.0  # between two lines of progress in a log
 _File = Annotated[Path, typer.Argument(help="Campaign file; microrad campaign init writes one.", metavar="FILE")]
 _Ledger = Annotated[Path, typer.Argument(help="Ledger that microrad campaign run wrote.", metavar="LEDGER")]
 _Threads = Annotated[int | None, option("--threads", "N", "Processes of this machine [default: one a core].", min=1)]
+_OwnThreads = Annotated[int | None, option("--threads", "N", "Threads of this process [default: one a core].", min=1)]
 _Workers = Annotated[int | None, option("--workers", "N", "The same as --threads.", min=1)]
 _Scheduler = Annotated[
     str | None, option("--scheduler", "ADDRESS", "A running Dask scheduler, such as tcp://head:8786.")
@@ -263,7 +264,7 @@ def report(
 
 @campaigns.command(epilog=examples("microrad campaign optimise campaign.toml"))
 @command
-def optimise(file: _File, threads: _Threads = None, as_json: Json = False) -> Outcome:
+def optimise(file: _File, threads: _OwnThreads = None, as_json: Json = False) -> Outcome:
     """Find the design of least cost whose rows keep the limits often enough.
 
     The table optimise of the campaign file says what may change. The optimum is checked with rows that the search has

@@ -252,7 +252,7 @@ class DaskEngine:
         self._undo_quiet()
 
     def _take_back(self) -> None:
-        """Workers of others forget the campaign."""
+        """The workers forget the campaign."""
         if self._client.status == "running":
             with suppress(Exception):
                 self._call(self._client._run, forget, self._name, on_error="ignore", answer_s=1.0)
@@ -341,7 +341,7 @@ class DaskEngine:
     def _feed(self, queue: JobQueue) -> None:
         """Hand out jobs: one a thread of the workers, and one that it finds when it has done its own.
 
-        A worker of others gets none before it was looked at: one without microrad would end of it, and never be told.
+        A worker gets none before it was looked at: one without microrad would end of it, and never be told.
         """
         while len(self._flights) < _AHEAD * sum(self._threads.values()):
             job = queue.next()
