@@ -12,7 +12,12 @@ DB_PER_NEPER = 10.0 / math.log(10.0)
 
 
 def aperture_gain_db(diameter_m: float, wavelength_m: float) -> float:
-    """On-axis gain of a uniformly lit circular aperture, (pi D / lambda)^2."""
+    """On-axis gain of a uniformly lit circular aperturein dB, (pi D / lambda)^2.
+
+    Args:
+        diameter_m: Diameter D of the aperture, in m.
+        wavelength_m: Wavelength lambda, in m.
+    """
     return 20.0 * math.log10(math.pi * diameter_m / wavelength_m)
 
 
@@ -22,15 +27,27 @@ def gaussian_beam_gain_db(half_angle_rad: float) -> float:
 
 
 def peak_radiant_intensity_w_sr(power_w: float, half_angle_rad: float) -> float:
-    """Radiant intensity on the axis of a lossless Gaussian beam, 2 P / (pi theta^2): its gain times P / (4 pi)."""
+    """Radiant intensity on the axis of a lossless Gaussian beam, 2 P / (pi theta^2): its gain times P / (4 pi).
+
+    Args:
+        power_w: Power P of the beam, in W.
+        half_angle_rad: Half angle theta at 1/e2 of intensity, in rad.
+    """
     return 2.0 * power_w / (math.pi * half_angle_rad**2)
 
 
 def implied_transmission_db(measured_w_sr: float, power_w: float, half_angle_rad: float) -> float:
     """What lies between a measured peak radiant intensity and that of a lossless beam, in dB: negative for a loss.
 
-    Transmission of the optics, wavefront error and truncation together. Raises ValueError for an intensity that is
-    not above zero, or above the lossless beam's.
+    Transmission of the optics, wavefront error and truncation together.
+
+    Args:
+        measured_w_sr: Measured peak radiant intensity, in W/sr.
+        power_w: Power of the beam before any loss, in W.
+        half_angle_rad: Half angle at 1/e2 of intensity, in rad.
+
+    Raises:
+        ValueError: For an intensity that is not above zero, or above the lossless beam's.
     """
     ideal = peak_radiant_intensity_w_sr(power_w, half_angle_rad)
     if not 0.0 < measured_w_sr <= ideal * (1.0 + 1e-9):
@@ -43,32 +60,65 @@ def implied_transmission_db(measured_w_sr: float, power_w: float, half_angle_rad
 
 
 def free_space_loss_db(distance_m: float, wavelength_m: float) -> float:
-    """Loss between isotropic antennas, (4 pi R / lambda)^2 (Friis 1946)."""
+    """Loss between isotropic antennas in dB, positive, (4 pi R / lambda)^2 (Friis 1946).
+
+    Args:
+        distance_m: Distance R, in m.
+        wavelength_m: Wavelength lambda, in m.
+    """
     return 20.0 * math.log10(4.0 * math.pi * distance_m / wavelength_m)
 
 
 def far_field_m(aperture_m: float, wavelength_m: float) -> float:
-    """Distance from which on an aperture's far field holds, 2 D^2 / lambda (Fraunhofer)."""
+    """Distance in m beyond which an aperture's far field holds, 2 D^2 / lambda (Fraunhofer).
+
+    Args:
+        aperture_m: Diameter D of the aperture, in m.
+        wavelength_m: Wavelength lambda, in m.
+    """
     return 2.0 * aperture_m**2 / wavelength_m
 
 
 def gaussian_pointing_loss_db(error_rad: ArrayLike, half_angle_rad: float) -> Floats:
-    """Loss of a Gaussian beam off its axis, exp(-2 (error / theta)^2): 8.686 (error / theta)^2 dB."""
+    """Loss of a Gaussian beam off its axis, exp(-2 (error / theta)^2): 8.686 (error / theta)^2 dB.
+
+    Args:
+        error_rad: Angles from the axis, in rad, any shape.
+        half_angle_rad: Half angle theta at 1/e2 of intensity, in rad.
+    """
     return 2.0 * DB_PER_NEPER * (np.asarray(error_rad, dtype=np.float64) / half_angle_rad) ** 2
 
 
 def pointing_loss_db(error_rad: ArrayLike, aperture_m: float, wavelength_m: float, convention: str) -> Floats:
-    """Loss of a diffraction-limited beam off its axis.
+    """Loss of a diffraction-limited beam off its axis, in dB and positive.
 
     "gaussian": a Gaussian beam of 1/e2 radius D/2 at the aperture, theta = 2 lambda / (pi D). "gain": exp(-G error^2)
     with G = (pi D / lambda)^2, twice as many decibels.
+
+    Args:
+        error_rad: Angles from the axis, in rad, any shape.
+        aperture_m: Diameter D of the aperture that the beam leaves, in m.
+        wavelength_m: Wavelength lambda, in m.
+        convention: "gaussian" or "gain".
+
+    Raises:
+        ValueError: For another convention.
     """
     error = np.asarray(error_rad, dtype=np.float64)
     return pointing_db_per_rad2(aperture_m, wavelength_m, convention) * error**2
 
 
 def pointing_db_per_rad2(aperture_m: float, wavelength_m: float, convention: str) -> float:
-    """Both conventions are a number of decibels times the square of the error."""
+    """Pointing loss in dB over the square of the error in rad; both conventions have such a constant.
+
+    Args:
+        aperture_m: Diameter of the aperture that the beam leaves, in m.
+        wavelength_m: Wavelength, in m.
+        convention: "gaussian" or "gain", as `pointing_loss_db` tells them.
+
+    Raises:
+        ValueError: For another convention.
+    """
     gain = (math.pi * aperture_m / wavelength_m) ** 2
     if convention == "gain":
         return DB_PER_NEPER * gain
@@ -78,9 +128,14 @@ def pointing_db_per_rad2(aperture_m: float, wavelength_m: float, convention: str
 
 
 def strehl_loss_db(strehl: float, convention: str) -> float:
-    """Loss by wavefront error: "decibel" takes `strehl` as it is, "ratio" as -10 lg of it.
+    """Loss by wavefront error in dB, positive, from a stated Strehl.
 
-    Raises ValueError for a ratio that is not above 0 and at most 1, and for a negative loss.
+    Args:
+        strehl: The Strehl as it is stated, a loss in dB or a ratio.
+        convention: "decibel" takes the Strehl as it is, "ratio" takes -10 lg of it.
+
+    Raises:
+        ValueError: For a ratio that is not above 0 and at most 1, a negative loss, and another convention.
     """
     if convention == "decibel":
         if not strehl >= 0.0:
@@ -94,7 +149,12 @@ def strehl_loss_db(strehl: float, convention: str) -> float:
 
 
 def strehl_ratio(wavefront_error_m: float, wavelength_m: float) -> float:
-    """Strehl ratio of an rms wavefront error, exp(-(2 pi sigma / lambda)^2) (Marechal, as extended by Mahajan)."""
+    """Strehl ratio of an rms wavefront error, exp(-(2 pi sigma / lambda)^2) (Marechal, as extended by Mahajan).
+
+    Args:
+        wavefront_error_m: Rms wavefront error sigma, in m.
+        wavelength_m: Wavelength lambda, in m.
+    """
     return math.exp(-((2.0 * math.pi * wavefront_error_m / wavelength_m) ** 2))
 
 
@@ -120,9 +180,15 @@ def air_mass(elevation_rad: float) -> float:
 
 
 def clear_sky_loss_db(zenith_transmission: float, elevation_rad: float) -> float:
-    """Absorption and scattering of a clear atmosphere: the zenith's loss times the air mass (Beer and Lambert).
+    """Loss of a clear atmosphere by absorption and scattering in dB: the zenith's loss times the air mass (Beer and
+    Lambert).
 
-    Raises ValueError for a transmission that is not above 0 and at most 1, and as `air_mass`.
+    Args:
+        zenith_transmission: Share of the light that comes through towards the zenith, above 0 and at most 1.
+        elevation_rad: Elevation of the path above the horizon, in rad.
+
+    Raises:
+        ValueError: For a transmission that is not above 0 and at most 1, and as `air_mass`.
     """
     if not 0.0 < zenith_transmission <= 1.0:
         raise ValueError(f"a transmission of {zenith_transmission:g} is not above 0 and at most 1; 1 is vacuum")

@@ -29,8 +29,15 @@ _NODE, _NODE_WEIGHT = np.polynomial.legendre.leggauss(4)
 def gap_probability(scan: Scan, jitter_rms_rad: float = 0.0) -> float:
     """Probability that one scan misses a target inside the searched disc, away from its edge.
 
-    `jitter_rms_rad` is the vibration's rms in each axis. A target at offset u from its nearest track is missed with the
-    product over the tracks of 1 - q(u + k pitch); the mean is over u in one pitch (over one cell of a grid of dwells).
+    A target at offset u from its nearest track is missed with the product over the tracks of 1 - q(u + k pitch); the
+    mean is over u in one pitch (over one cell of a grid of dwells).
+
+    Args:
+        scan: The pattern of the beam, with its search and detector.
+        jitter_rms_rad: Rms of the vibration about each axis, in rad.
+
+    Raises:
+        ValueError: If the rms is negative or not finite.
     """
     require_not_negative("the vibration's rms", jitter_rms_rad, "rad")
     if isinstance(scan, StepStare):
@@ -41,10 +48,18 @@ def gap_probability(scan: Scan, jitter_rms_rad: float = 0.0) -> float:
 
 
 def detection_times(scan: Scan, jitter_rms_rad: float = 0.0) -> TimeDistribution:
-    """Time until one scan detects the target, which lies as the uncertainty says; the sum is the scan's probability.
+    """Time until one scan detects the target, which lies as the uncertainty says.
 
-    Each crossing counts, the first that detects gives the time: that of the middle of the crossing, in a dwell that of
-    the mean look. The ends of a raster's rows count as sharp: 1 % too few at a disc of 5 beam radii, less at wider.
+    The probabilities of the times sum up to that of the scan. Each crossing counts, and the first that detects gives
+    the time: that of the middle of the crossing, in a dwell that of the mean look. The ends of a raster's rows count as
+    sharp: 1 % too few at a disc of 5 beam radii, less at wider.
+
+    Args:
+        scan: The pattern of the beam, with its search and detector.
+        jitter_rms_rad: Rms of the vibration about each axis, in rad.
+
+    Raises:
+        ValueError: If the rms is negative or not finite.
     """
     require_not_negative("the vibration's rms", jitter_rms_rad, "rad")
     if isinstance(scan, Spiral):
@@ -240,9 +255,18 @@ class ScanRuns:
 def simulate_scan(scan: Scan, runs: int, seed: int, vibration: Vibration | None = None, samples: int = 128) -> ScanRuns:
     """Draw targets from the uncertainty and let the beam pass over each; (runs,) arrays.
 
-    The beam follows its real path, `samples` points of it near the target in each pass, shifted by one continuous
-    vibration of the whole scan. Every whole detection time that the beam stays on the target is one look.
-    Raises ValueError for no run and for less than 2 samples.
+    The beam follows its real path, sampled near the target in each pass and shifted by one continuous vibration of the
+    whole scan. Every whole detection time that the beam stays on the target is one look.
+
+    Args:
+        scan: The pattern of the beam, with its search and detector.
+        runs: Number of targets drawn.
+        seed: Seed of the random numbers; the same one gives the same runs.
+        vibration: Vibration of the beam; none by default.
+        samples: Points of the path in each pass over the target, at least 2.
+
+    Raises:
+        ValueError: For no run and for less than 2 samples.
     """
     require_count("the number of runs", runs)
     if samples < 2:
@@ -274,7 +298,12 @@ class _Pass:
         self.found_s = np.zeros(x_rad.size)
 
     def move(self, time_s: Floats, within_s: Floats) -> None:
-        """Go on to `time_s`; a gap in the path, or a new pass, ends what was lit."""
+        """Go on to a time; a gap in the path, or a new pass, ends what was lit.
+
+        Args:
+            time_s: The new time of each run, in s, shape (runs,).
+            within_s: A time within the pass that is under way in each run, in s, shape (runs,).
+        """
         step = np.maximum(time_s - self.time_s, 0.0)
         if self.shake.rms_rad:
             kept = np.exp(-step / self.shake.correlation_time_s)

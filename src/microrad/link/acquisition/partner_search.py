@@ -143,7 +143,14 @@ class Finding:
 def answer_on_sensor(
     a: Acquisition | None, aperture_m: float, answer: Sent | None, sources: Mapping[str, Source]
 ) -> Tracking | None:
-    """The answer on the quad cell of `[acquisition.sensor]` behind an aperture, or None without either."""
+    """The answer on the quad cell of `[acquisition.sensor]` behind an aperture; None without an answer or a sensor.
+
+    Args:
+        a: The mission's table on acquisition, None where it has none.
+        aperture_m: Diameter of the aperture in front of the quad cell, in m.
+        answer: The answer with its budget, None where the mission has none.
+        sources: Where each value of the mission comes from, by its dotted key.
+    """
     if answer is None or a is None or a.sensor is None:
         return None
     s = a.sensor
@@ -159,9 +166,18 @@ def answer_on_sensor(
 def find_partner(
     a: Acquisition, data: link.DataLink, error: pointing.Jitter, beacon: Sent, answer: Sent, light: Tracking | None
 ) -> Finding:
-    """Acquisition as the mission's table times it; ``error`` is that of the predicted direction.
+    """Acquisition as the mission's table times it, by the wide beacon and, where the table has one, by a scan.
 
-    Raises ValueError for a scan of a direction that is known without error.
+    Args:
+        a: The mission's table on acquisition.
+        data: The communication link, whose narrow beam is sent back.
+        error: Error of the predicted direction: bias and rms of each axis, in rad.
+        beacon: The beacon with its budget.
+        answer: The answer with its budget.
+        light: The answer on the tracking sensor, None without a sensor.
+
+    Raises:
+        ValueError: For a scan of a direction that is known without error.
     """
     shared = data.shared
     radii = (_reach(beacon, shared), _reach(answer, shared), _return_reach(data))

@@ -103,13 +103,24 @@ class Spiral:
         return math.pi * np.maximum(track_radius_rad, 0.0) ** 2 / (self.search.pitch_rad * self.speed_rad_s)
 
     def beam_at(self, time_s: Floats, within_s: Floats) -> tuple[Floats, Floats]:
-        """Beam's centre at each time; `within_s` is not needed here."""
+        """Beam's centre (x, y) at each time, in rad.
+
+        Args:
+            time_s: Times from the begin of the scan, in s, any shape.
+            within_s: A time within the pass that is under way, in s; a spiral does not need it.
+        """
         radius = self.track_radius(time_s)
         angle = 2.0 * math.pi * radius / self.search.pitch_rad
         return radius * np.cos(angle), radius * np.sin(angle)
 
     def windows(self, x_rad: Floats, y_rad: Floats, reach_rad: float) -> tuple[Floats, Floats]:
-        """Start and end of the times when the beam may be within `reach_rad` of each target, (targets, windows)."""
+        """Start and end of the times when the beam may be near each target, in s, each of shape (targets, windows).
+
+        Args:
+            x_rad: Place of each target along x, in rad from the middle of the search, shape (targets,).
+            y_rad: The same along y.
+            reach_rad: Distance from the beam's centre that counts as near, in rad.
+        """
         pitch = self.search.pitch_rad
         radius, azimuth = np.hypot(x_rad, y_rad), np.arctan2(y_rad, x_rad) % (2.0 * math.pi)
         count = math.ceil(2.0 * reach_rad / pitch) + 2
@@ -165,14 +176,25 @@ class Raster:
         return np.asarray((np.arange(self.rows) - (self.rows - 1) / 2.0) * self.search.pitch_rad, dtype=np.float64)
 
     def beam_at(self, time_s: Floats, within_s: Floats) -> tuple[Floats, Floats]:
-        """Beam's centre at each time, on the row that is scanned at `within_s`."""
+        """Beam's centre (x, y) at each time, in rad.
+
+        Args:
+            time_s: Times from the begin of the scan, in s, any shape.
+            within_s: A time at which the row meant is being scanned, in s, of the shape of the times.
+        """
         period = self.row_time_s + self.turn_around_s
         row = np.clip(np.floor(within_s / period), 0, self.rows - 1)
         along = np.clip(time_s - row * period, 0.0, self.row_time_s) * self.speed_rad_s - self.search.radius_rad
         return np.where(row % 2 == 0, along, -along), (row - (self.rows - 1) / 2.0) * self.search.pitch_rad
 
     def windows(self, x_rad: Floats, y_rad: Floats, reach_rad: float) -> tuple[Floats, Floats]:
-        """Start and end of the times when the beam may be within `reach_rad` of each target, (targets, windows)."""
+        """Start and end of the times when the beam may be near each target, in s, each of shape (targets, windows).
+
+        Args:
+            x_rad: Place of each target along x, in rad from the middle of the search, shape (targets,).
+            y_rad: The same along y.
+            reach_rad: Distance from the beam's centre that counts as near, in rad.
+        """
         count = min(math.ceil(2.0 * reach_rad / self.search.pitch_rad) + 1, self.rows)
         nearest = y_rad / self.search.pitch_rad + (self.rows - 1) / 2.0
         first = np.clip(np.round(nearest - (count - 1) / 2.0), 0, self.rows - count)
@@ -243,13 +265,24 @@ class StepStare:
         return np.asarray(steps[length <= reach_rad + self.search.pitch_rad], dtype=np.int64)
 
     def beam_at(self, time_s: Floats, within_s: Floats) -> tuple[Floats, Floats]:
-        """Beam's centre in the dwell that is under way at `within_s`."""
+        """Beam's centre (x, y) in the dwell that is under way, in rad.
+
+        Args:
+            time_s: Times from the begin of the scan, in s; the beam rests, so that they are not needed.
+            within_s: A time within the dwell meant, in s, any shape.
+        """
         dwell = np.clip(np.floor(within_s / (self.dwell_s + self.settle_s)), 0, self.dwells - 1).astype(np.int64)
         place = _dwell_indices(self)[dwell] @ self.basis_rad
         return place[..., 0], place[..., 1]
 
     def windows(self, x_rad: Floats, y_rad: Floats, reach_rad: float) -> tuple[Floats, Floats]:
-        """Start and end of the dwells within reach of each target, (targets, windows); empty ones at the end."""
+        """Start and end of the dwells near each target, in s, each of shape (targets, windows); empty ones at the end.
+
+        Args:
+            x_rad: Place of each target along x, in rad from the middle of the search, shape (targets,).
+            y_rad: The same along y.
+            reach_rad: Distance from the beam's centre that counts as near, in rad.
+        """
         place = np.stack([x_rad, y_rad], axis=-1) @ np.linalg.inv(self.basis_rad)
         nearest = np.round(place).astype(np.int64)
         number = np.sort(self.order(nearest[:, None, :] + self.near(reach_rad)), axis=1)
@@ -266,6 +299,13 @@ def highest_speed(search: Search, detection_time_s: float) -> float:
 
     The chord there is 2 a sqrt(1 - (1 - overlap)^2). With no overlap it is zero: such a search always leaves targets
     that no track sees long enough. Faster, down to the whole diameter, the swath is narrower than the pitch.
+
+    Args:
+        search: The searched disc with beam radius and overlap.
+        detection_time_s: Time for which the beam has to stay on the target, in s.
+
+    Raises:
+        ValueError: If the time is not finite and above zero.
     """
     require_positive("the detection time", detection_time_s, "s")
     chord = 2.0 * search.beam_radius_rad * math.sqrt(1.0 - (1.0 - search.overlap) ** 2)

@@ -137,9 +137,16 @@ class Chances:
 
 
 def frame_detection_probability(signal_to_noise: float, threshold_to_noise: float) -> float:
-    """Probability that a frame's signal with unit Gaussian noise exceeds the threshold, both in rms of the noise.
+    """Probability that a frame's signal with unit Gaussian noise exceeds the threshold.
 
-    The probability of a false alarm in a frame without signal is the same with a signal of zero.
+    With a signal of zero this is the probability of a false alarm in a frame.
+
+    Args:
+        signal_to_noise: Signal over the rms of the noise, at least 0.
+        threshold_to_noise: Threshold over the rms of the noise, of any sign.
+
+    Raises:
+        ValueError: If the signal is negative, or either is not finite.
     """
     require_not_negative("the signal-to-noise ratio", signal_to_noise, "")
     if not math.isfinite(threshold_to_noise):
@@ -148,7 +155,15 @@ def frame_detection_probability(signal_to_noise: float, threshold_to_noise: floa
 
 
 def frames_detection_probability(frame_probability: float, frames: int) -> float:
-    """Probability of detection in at least one of independent frames, 1 - (1 - p)^n."""
+    """Probability of detection in at least one of independent frames, 1 - (1 - p)^n.
+
+    Args:
+        frame_probability: Probability p of detection in one frame, above 0 and at most 1.
+        frames: Number n of frames, at least 1.
+
+    Raises:
+        ValueError: If either is outside its limits.
+    """
     require_probability("the probability of detection in a frame", frame_probability)
     require_count("the number of frames", frames)
     return 1.0 - (1.0 - frame_probability) ** frames
@@ -159,6 +174,10 @@ def beacon_stages(timing: Timing, chances: Chances) -> tuple[Stage, ...]:
 
     Where the beacon does not land, no frame helps: coverage times the probability of the frames. A failure costs LEO
     the wait for an answer, and its body points anew.
+
+    Args:
+        timing: Durations of the steps, and the names of the two terminals.
+        chances: Probability that each step succeeds.
     """
     detect_s = timing.frames * timing.frame_time_s
     detected = chances.beacon_coverage * frames_detection_probability(chances.frame_detection, timing.frames)
@@ -172,9 +191,14 @@ def beacon_stages(timing: Timing, chances: Chances) -> tuple[Stage, ...]:
 
 
 def scan_stages(timing: Timing, scan: TimeDistribution, duration_s: float) -> tuple[Stage, ...]:
-    """First stages with a scan by a narrow beam: `scan` is the time to detection in one scan of `duration_s`.
+    """First stages with a scan by a narrow beam: LEO's body settles, light time, GEO detects.
 
     A scan without detection is repeated after the wait for an answer, and LEO's body points anew.
+
+    Args:
+        timing: Durations of the steps, and the names of the two terminals.
+        scan: Time to detection in one scan, with its probability.
+        duration_s: Duration of one whole scan, in s.
     """
     wait_s = duration_s + timing.geo_response_s + timing.light_time_s + timing.leo_detection_s
     probability = min(scan.probability, 1.0)
@@ -191,6 +215,10 @@ def answer_stages(timing: Timing, chances: Chances) -> tuple[Stage, ...]:
 
     When the answer does not land, GEO answers again; when LEO's narrow beam does not, or a lock fails, LEO measures
     the answer again. LEO learns that GEO has not locked only after the light time back.
+
+    Args:
+        timing: Durations of the steps, and the names of the two terminals.
+        chances: Probability that each step succeeds.
     """
     light_s, lock_s = timing.light_time_s, timing.lock_time_s
     answered = chances.answer_coverage * chances.answer_detection
@@ -212,6 +240,10 @@ def paper_sequence(timing: Timing, chances: Chances) -> tuple[Stage, ...]:
     """The sequence of the paper's section 2.1: wide beacon, narrow answer, narrow beam back, both lock.
 
     The paper gives the order alone; what follows a failure is the choice of `beacon_stages` and `answer_stages`.
+
+    Args:
+        timing: Durations of the steps, and the names of the two terminals.
+        chances: Probability that each step succeeds.
     """
     return (*beacon_stages(timing, chances), *answer_stages(timing, chances))
 
@@ -250,7 +282,15 @@ def solve_sequence(stages: Sequence[Stage], attempts: int) -> Outcome:
 
 
 def check_sequence(stages: Sequence[Stage], attempts: int) -> tuple[int, ...]:
-    """Index of the stage to which each stage goes back; raises ValueError as `solve_sequence` does."""
+    """Index of the stage to which each stage goes back on failure.
+
+    Args:
+        stages: The stages in their order.
+        attempts: Number of attempts that a stage has, at least 1.
+
+    Raises:
+        ValueError: For no stage, two of one name, a stage that goes back to a later or unknown one, and no attempt.
+    """
     require_count("the number of attempts", attempts)
     names = [stage.name for stage in stages]
     if not names:
@@ -286,9 +326,16 @@ class SequenceRuns:
 
 
 def simulate(stages: Sequence[Stage], attempts: int, runs: int, seed: int) -> SequenceRuns:
-    """Draw the sequence event by event; `attempts` as in `solve_sequence`.
+    """Draw the sequence event by event, many times over.
 
-    Raises ValueError as it does, and for no run.
+    Args:
+        stages: The stages in their order.
+        attempts: Number of attempts, as in `solve_sequence`.
+        runs: Number of sequences drawn, at least 1.
+        seed: Seed of the random numbers; the same one gives the same runs.
+
+    Raises:
+        ValueError: As `solve_sequence`, and for no run.
     """
     require_count("the number of runs", runs)
     back = check_sequence(stages, attempts)
@@ -298,7 +345,16 @@ def simulate(stages: Sequence[Stage], attempts: int, runs: int, seed: int) -> Se
 
 
 def simulate_log(stages: Sequence[Stage], attempts: int, seed: int) -> tuple[Transition, ...]:
-    """Log of one run: that of the first run of `simulate` with the same seed."""
+    """Log of one run: that of the first run of `simulate` with the same seed.
+
+    Args:
+        stages: The stages in their order.
+        attempts: Number of attempts, as in `solve_sequence`.
+        seed: Seed of the random numbers.
+
+    Raises:
+        ValueError: As `solve_sequence`.
+    """
     back = check_sequence(stages, attempts)
     return tuple(_run(stages, back, attempts, np.random.Generator(np.random.Philox(key=seed))))
 

@@ -84,16 +84,30 @@ class TimeDistribution:
 
 
 def fixed_time(time_s: float, probability: float = 1.0) -> TimeDistribution:
-    """One time with its probability."""
+    """Distribution of one time that is certain, or has a probability.
+
+    Args:
+        time_s: The time, in s, at least 0.
+        probability: Probability of it; what is missing to 1 is failure.
+
+    Raises:
+        ValueError: If the time is negative or not finite.
+    """
     if not (math.isfinite(time_s) and time_s >= 0.0):
         raise ValueError(f"a time is {format_quantity(time_s, 's')}: it must be 0 s or more and finite")
     return TimeDistribution(np.array([time_s]), np.array([probability]))
 
 
 def merged(time_s: NDArray[np.float64], weight: NDArray[np.float64], most: int = _MOST) -> TimeDistribution:
-    """Times in any order as a distribution: equal times joined, and above `most` of them equal bins at their means.
+    """Times in any order as a distribution, equal ones joined.
 
-    The probability and the mean stay exact; a quantile is off by at most one bin, the span over `most`.
+    More times than `most` are put into equal bins, each at its mean. The probability and the mean stay exact; a
+    quantile is off by at most one bin, the span over `most`.
+
+    Args:
+        time_s: The times, in s, shape (times,).
+        weight: Probability of each time, shape (times,); those of 0 are left out.
+        most: Largest number of times kept.
     """
     used = weight > 0.0
     time, weights = time_s[used], weight[used]

@@ -70,7 +70,12 @@ class Beams:
         return float(self.irradiance_w_m2(self.narrow_half_angle_rad, self.beam_radius_rad))
 
     def irradiance_w_m2(self, half_angle_rad: ArrayLike, off_axis_rad: ArrayLike) -> Floats:
-        """Irradiance of a Gaussian beam at the partner: 2 P / (pi w^2 L^2) exp(-2 (angle / w)^2), w at 1/e2."""
+        """Irradiance of a Gaussian beam at the partner in W/m^2: 2 P / (pi w^2 L^2) exp(-2 (angle / w)^2), w at 1/e2.
+
+        Args:
+            half_angle_rad: Half angle w of the beam at 1/e2, in rad; broadcast against the other angle.
+            off_axis_rad: Angle of the partner from the beam's axis, in rad.
+        """
         half = np.asarray(half_angle_rad, dtype=np.float64)
         off = np.asarray(off_axis_rad, dtype=np.float64)
         on_axis = 2.0 * self.power_w / (math.pi * (half * self.range_m) ** 2)
@@ -103,12 +108,22 @@ def wide_against_scan(
     receiver: Receiver,
     jitter_rms_rad: float = 0.0,
 ) -> Trade:
-    """Time and probability of the wide beacon and of a spiral scan for each uncertainty per axis (paper, section 2.1).
+    """Compare a wide beacon with a spiral scan, for each uncertainty (paper, section 2.1).
 
-    Both are dimensioned at the edge: the wide beacon integrates until a target on the radius of `coverage` is
-    detected, the scan is as slow as a target half way between two tracks and `beam_radius_rad` off the axis needs. The
-    wide beam's half angle at 1/e2 is sqrt(2) times the radius: no other is brighter there. It sees no `jitter_rms_rad`,
-    which is small against it. Raises ValueError for tracks that do not overlap.
+    Both are dimensioned at the edge: the wide beacon integrates until a target on the radius of `coverage` is detected,
+    the scan is as slow as a target half way between two tracks and `beam_radius_rad` off the axis needs. The wide
+    beam's half angle at 1/e2 is sqrt(2) times the radius: no other is brighter there. The vibration is small against
+    the wide beam and left out there.
+
+    Args:
+        sigma_rad: Rms uncertainty of the direction about each axis, in rad, a number or shape (cases,).
+        coverage: Probability that the target is inside the searched disc.
+        beams: The transmitter with its two beams.
+        receiver: The partner's receiver, which says how long it has to be lit.
+        jitter_rms_rad: Rms of the vibration about each axis, in rad.
+
+    Raises:
+        ValueError: For tracks that do not overlap.
     """
     sigma = np.atleast_1d(np.asarray(sigma_rad, dtype=np.float64))
     if beams.overlap == 0.0:

@@ -91,15 +91,28 @@ def of(m: LinkMission) -> DataLink:
 def assembled(
     shared: Shared, table: Communication, requirement: LinkRequirement, jitter: JitterTable | None
 ) -> DataLink:
-    """The communication link of these tables; errors as of `of`."""
+    """The communication link of these tables; raises what `of` raises.
+
+    Args:
+        shared: What all links of the mission have in common.
+        table: The table on the communication link.
+        requirement: What is required of it.
+        jitter: The table on its jitter, None where the mission has none.
+    """
     beam = communication_beam(shared.terminals, table, shared.conventions.pointing_loss)
     return DataLink(shared, table, requirement, jitter, beam, _receiver(shared.terminals, table))
 
 
 def communication_beam(terminals: Terminals, beam: Communication, convention: str) -> TransmittedBeam:
-    """The beam of the communication link, by a convention for its pointing loss.
+    """The beam of the communication link, with its pointing loss by a convention.
 
-    Raises ValueError as `of` does.
+    Args:
+        terminals: The terminals, of which LEO's aperture sends.
+        beam: The table on the communication link.
+        convention: "pattern" for the far field of the lit aperture, "gaussian" or "gain" for a Gaussian fall.
+
+    Raises:
+        ValueError: As `of`.
     """
     if convention == "pattern":
         lit = _lit_aperture(terminals, beam)
@@ -119,7 +132,15 @@ def _lit_aperture(terminals: Terminals, beam: Communication) -> LitAperture:
 
 
 def strehl_db(beam: Beam, convention: str) -> float:
-    """Loss by wavefront error of a link, from its Strehl or from the rms wavefront error."""
+    """Loss of a link by wavefront error in dB, from its Strehl or from the rms wavefront error.
+
+    Args:
+        beam: The table of the link.
+        convention: "decibel" where the table's Strehl is a loss in dB, "ratio" where it is a ratio.
+
+    Raises:
+        ValueError: As `strehl_loss_db`.
+    """
     if beam.strehl is not None:
         return gains.strehl_loss_db(beam.strehl, convention)
     ratio = gains.strehl_ratio(beam.wavefront_error_m or 0.0, beam.wavelength_m)
@@ -200,7 +221,12 @@ def _background_w(terminals: Terminals, link: Communication, table: ReceiverTabl
 def required_dbm(data: DataLink, data_rate_bit_s: ArrayLike) -> Floats:
     """Power at the receiver that each data rate needs, in dBm.
 
-    Raises ValueError for a rate that the receiver does not take, with the highest that it does.
+    Args:
+        data: The communication link.
+        data_rate_bit_s: Data rates, in bit/s, any shape.
+
+    Raises:
+        ValueError: For a rate that the receiver does not take, with the highest that it does.
     """
     rate = np.asarray(data_rate_bit_s, dtype=np.float64)
     if data.receiver is not None:
@@ -213,7 +239,15 @@ def required_dbm(data: DataLink, data_rate_bit_s: ArrayLike) -> Floats:
 
 
 def check_grid(data_rate_bit_s: Floats, pointing_error_rad: Floats) -> None:
-    """Raises ValueError if a data rate is not above 0, a pointing error below 0, or either not finite."""
+    """Check that data rates and pointing errors can be judged.
+
+    Args:
+        data_rate_bit_s: Data rates, in bit/s, any shape.
+        pointing_error_rad: Radial pointing errors, in rad, any shape.
+
+    Raises:
+        ValueError: If a data rate is not above 0, a pointing error below 0, or either not finite.
+    """
     if not np.all((data_rate_bit_s > 0.0) & (data_rate_bit_s < np.inf)):
         raise ValueError('data rates must be finite and above 0 bit/s; "largest" has to be solved for first')
     if not np.all((pointing_error_rad >= 0.0) & (pointing_error_rad < np.inf)):

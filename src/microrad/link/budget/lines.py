@@ -215,7 +215,14 @@ def _deep(loss_db: float) -> str:
 
 
 def given_or_own(own: float, given: float | None, source: str, given_source: str) -> tuple[float, str]:
-    """The value in force and its source: the one given, else the mission's own."""
+    """The value in force and its source: the one given, else the mission's own.
+
+    Args:
+        own: The mission's own value.
+        given: A value in place of it, None to keep the mission's own.
+        source: Where the mission's own value comes from.
+        given_source: Where the given value comes from.
+    """
     return (own, source) if given is None else (float(given), given_source)
 
 
@@ -238,12 +245,22 @@ class Writer:
         return float(getattr(self.shared.terminals, f"{end}_aperture_m"))
 
     def loss(self, name: str, key: str) -> Line:
-        """A loss that the mission gives in dB; 0 dB is a line like any other."""
+        """A loss that the mission gives in dB; 0 dB is a line like any other.
+
+        Args:
+            name: Name of the line.
+            key: Field of the table without its `_db`; the loss is positive there and negative in the line.
+        """
         value = getattr(self.beam, f"{key}_db")
         return Line(name, 0.0 - value, "dB", "as given", self.source(key), _GIVEN, "" if value else LEFT_AT_ZERO)
 
     def gain(self, end: str, regime: str) -> Line:
-        """Gain of a whole, evenly lit aperture."""
+        """Gain of a whole, evenly lit aperture.
+
+        Args:
+            end: Terminal whose aperture it is, "leo" or "geo".
+            regime: Where the formula holds, in words for the line.
+        """
         diameter, wavelength = self.aperture_m(end), self.beam.wavelength_m
         shown = f"D = {format_input(diameter, 'm')}, lambda = {format_input(wavelength, 'm')}"
         source = source_text(self.sources, f"terminals.{end}_aperture", f"{self.table}.wavelength")
@@ -264,9 +281,12 @@ class Writer:
         return (*lines, self.loss("Receive optics loss", "receive_optics_loss"))
 
     def transmit(self, gain: tuple[Line, ...], pointing: Line, with_ahead_db: float) -> tuple[Line, ...]:
-        """Everything up to the receiving aperture.
+        """Lines of everything up to the receiving aperture.
 
-        ``with_ahead_db`` is the pointing loss once an uncorrected point-ahead is added to the error.
+        Args:
+            gain: Lines of the transmitting aperture's gain.
+            pointing: Line of the pointing loss, negative in dB.
+            with_ahead_db: Value in dB of the pointing line once an uncorrected point-ahead is added to the error.
         """
         beam = self.beam
         power = f"P = {format_input(beam.transmit_power_w, 'W')}"

@@ -26,7 +26,12 @@ _SLOWEST_BIT_S = 1.0
 
 
 def received_on_axis_dbm(data: DataLink, strehl_loss_db: float | None = None) -> float:
-    """Received power (dBm) of the communication link pointed without error: its budget without the pointing lines."""
+    """Received power (dBm) of the communication link pointed without error, all other losses included.
+
+    Args:
+        data: The communication link.
+        strehl_loss_db: Loss by wavefront error in dB, positive; by default that of the mission.
+    """
     beam, terminals = data.table, data.shared.terminals
     losses = (
         beam.transmit_optics_loss_db
@@ -43,7 +48,12 @@ def received_on_axis_dbm(data: DataLink, strehl_loss_db: float | None = None) ->
 
 
 def pointing_loss_db(data: DataLink, pointing_error_rad: ArrayLike) -> Floats:
-    """Loss of the communication link at each pointing error, an uncorrected point-ahead on top of it included."""
+    """Loss (positive, dB) of the communication link at each pointing error, with an uncorrected point-ahead added.
+
+    Args:
+        data: The communication link.
+        pointing_error_rad: Radial pointing errors, in rad, any shape.
+    """
     error = np.asarray(pointing_error_rad, dtype=np.float64)
     return data.beam.fall.loss_db(error + data.shared.point_ahead_rad)
 
@@ -67,7 +77,15 @@ def margin_map(data: DataLink, data_rate_bit_s: ArrayLike, pointing_error_rad: A
 
 
 def margin_of_error(data: DataLink, pointing_error_rad: ArrayLike) -> Floats:
-    """Margin of the communication link in dB at the mission's data rate, for each of the pointing errors."""
+    """Margin of the communication link in dB at the mission's data rate, at each pointing error.
+
+    Args:
+        data: The communication link.
+        pointing_error_rad: Radial pointing errors, in rad, any shape, which the margins have too.
+
+    Raises:
+        ValueError: As `margin_map`.
+    """
     error = np.asarray(pointing_error_rad, dtype=np.float64)
     row: Floats = margin_map(data, data.table.data_rate_bit_s, error.ravel())[0]
     return row.reshape(error.shape)
@@ -207,6 +225,14 @@ def convention_maps(
     """Margin maps under each reading of pointing loss and Strehl, as `margin_map` gives them.
 
     The paper leaves both open: what the readings differ by is the width of the band that its Fig. 2 stands for.
+
+    Args:
+        data: The communication link.
+        data_rate_bit_s: Data rates, in bit/s, as `margin_map` takes them.
+        pointing_error_rad: Radial pointing errors, in rad, as `margin_map` takes them.
+
+    Raises:
+        ValueError: As `margin_map`.
     """
     maps = {}
     update = {} if data.shared.conventions.pointing_loss != "pattern" else {"beam": None}
@@ -233,10 +259,15 @@ class IdealReceiver:
 def ideal_receivers(
     data: DataLink, sources: Mapping[str, Source], pointing_error_rad: float | None = None
 ) -> tuple[IdealReceiver, ...]:
-    """The link's margin with three ideal receivers, at the mission's data rate; losses stay as in the mission.
+    """The link's margin with three ideal receivers, at the mission's data rate and with its losses.
 
     The formulas are the textbook ones (Agrawal, Fiber-Optic Communication Systems): n photons per bit, for on-off
     keying averaged over marks and spaces.
+
+    Args:
+        data: The communication link.
+        sources: Where each value of the mission comes from, by its dotted key.
+        pointing_error_rad: Radial pointing error, in rad; by default that of the mission.
     """
     beam = data.table
     own_source = source_text(sources, "communication.pointing_error")
