@@ -1,7 +1,7 @@
 """The report in Chromium: nothing is loaded, no error, each figure comes alive and prints, and anyone can read it."""
 
 import re
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 import pytest
@@ -15,7 +15,7 @@ from microrad.report.links.page import links_page
 from report import test_identification_report as identified
 from report import test_report_campaign as campaigns
 from report import test_report_fine_pointing as fine_loops
-from shipped import plain_study
+from shipped import plain_study, whole_drawn, whole_study
 from waiting import HANG_MS
 
 A4_PX = 680  # between the margins
@@ -28,6 +28,8 @@ SEEN += [
 ]
 """Pages and widths: each page once; what else is done with the report is done at its full width."""
 MOST_BYTES = 6_000_000
+SHIPPED_BYTES, SHIPPED_PX = 4_000_000, 15_000
+"""Of the shipped mission's page, and its height at its full width as it opens."""
 
 
 @pytest.fixture(scope="module")
@@ -51,6 +53,10 @@ def files(found, tmp_path_factory):
     def written(name):
         if name == "report":
             return report.write(fine_loops.with_fine(found, fine), folder / "study")
+        if name == "whole":
+            with pytest.MonkeyPatch.context() as patch:
+                patch.setattr(report, "study_figures", lambda *_: whole_drawn())
+                return report.write(whole_study()[0], folder / "whole")
         if name == "identification":
             mirror = identify(recordings, 0.5, models=("prandtl_ishlinskii", "linear"))
             return identified.write(mirror, folder / "identification.html", recordings=recordings)
@@ -63,14 +69,14 @@ def files(found, tmp_path_factory):
 class Opened:
     """A page with what it said and asked for, unfolded unless told otherwise."""
 
-    def __init__(self, browser, file, width=1280, unfolded=True, **options):
+    def __init__(self, browser, file, width=1280, unfolded=True, anchor="", **options):
         self.page = browser.new_page(viewport={"width": width, "height": 900}, **options)
         self.page.set_default_timeout(HANG_MS)
         self.said, self.asked = [], []
         self.page.on("console", lambda message: self.said.append(message.text))
         self.page.on("pageerror", lambda error: self.said.append(str(error)))
         self.page.on("request", lambda request: self.asked.append(request.url))
-        self.page.goto(file.as_uri())
+        self.page.goto(file.as_uri() + anchor)
         if unfolded:
             self.page.evaluate("document.querySelectorAll('details.view').forEach(each => { each.open = true })")
 
@@ -254,3 +260,99 @@ def test_points_are_saved_as_a_table_where_there_is_no_folder(opened):
     assert rows[0] == "curve,x,y,z"
     assert len(rows) > 100
     assert here.figure("Contacts").query_selector("a") is None
+
+
+# ------------------------------------------------------------------------------------------- contents, links and rows
+HERE = """id => {
+  const place = document.getElementById(id).getBoundingClientRect();
+  return place.height > 100 && place.top > -5 && place.top < innerHeight;
+}"""
+"""Whether something that was folded is open and in view."""
+
+
+def test_a_link_opens_what_is_folded_about_its_place(opened):
+    inner, figure = "by-other-readings", "figure-fig5-hysteresis-loops"
+    here = opened(unfolded=False, anchor=f"#{inner}")
+    here.page.wait_for_function(HERE, arg=inner)
+    assert not here.page.evaluate(HERE, figure)
+    here.page.evaluate("hash => { location.hash = hash }", figure)  # as one does who edits the address
+    here.page.wait_for_function(HERE, arg=figure)
+    assert here.page.evaluate("id => document.getElementById(id).closest('details').open", figure)
+    fold = "id => { document.getElementById(id).open = false; scrollTo(0, 0) }"
+    here.page.evaluate(fold, inner)
+    assert not here.page.evaluate(HERE, inner)
+    here.page.click(f"nav.contents a[href='#{inner}']")
+    here.page.wait_for_function(HERE, arg=inner)
+    here.page.evaluate(fold, inner)
+    here.page.click(f"nav.contents a[href='#{inner}']")  # a second time, with the same address
+    here.page.wait_for_function(HERE, arg=inner)
+    here.page.evaluate(fold, inner)
+    summary = here.page.query_selector(f"#{inner} > summary")
+    summary.scroll_into_view_if_needed()
+    summary.query_selector("a.anchor").click()
+    here.page.wait_for_function(HERE, arg=inner)
+    summary.click(position={"x": 4, "y": 4})
+    assert not here.page.evaluate("id => document.getElementById(id).open", inner)
+    assert here.said == []
+
+
+def test_each_heading_links_to_itself(report_page):
+    anchor = "[h.id || h.closest('details').id, h.lastChild.hash]"
+    links = f"[...document.querySelectorAll('main :is(h2, h3, h4)')].map(h => {anchor})"
+    found = report_page.page.evaluate(links)
+    assert len(found) > 25
+    assert [(anchor, link) for anchor, link in found if link != f"#{anchor}"] == []
+
+
+def test_contents_stand_open_where_there_is_room_for_them(opened):
+    here = opened(unfolded=False)
+    first = "nav.contents li a"
+    assert here.page.is_visible(first)
+    assert here.page.evaluate("document.querySelector('nav.contents').getBoundingClientRect().right") < 400
+    here.page.set_viewport_size({"width": 400, "height": 900})
+    here.page.wait_for_selector(first, state="hidden")
+    assert here.page.is_visible("nav.contents summary")
+    here.page.set_viewport_size({"width": 1280, "height": 900})
+    here.page.wait_for_selector(first)
+    narrow = opened(width=400, unfolded=False)
+    assert not narrow.page.is_visible(first)
+    narrow.page.click("nav.contents summary")
+    assert narrow.page.is_visible(first)
+
+
+def test_buttons_and_search_leave_the_rows_that_they_name(opened):
+    here = opened(anchor="#assumptions")
+    here.page.evaluate("document.querySelectorAll('details').forEach(each => { each.open = true })")
+    box = here.page.query_selector(".filters")
+    table = box.evaluate_handle("box => box.nextElementSibling").as_element()
+    shown = "table => [...table.querySelectorAll('tbody tr')].filter(r => r.checkVisibility()).map(r => r.innerText)"
+    rows = partial(table.evaluate, shown)
+    every = rows()
+    whole, assumed, *_ = buttons = box.query_selector_all("button")
+    assert whole.inner_text() == f"all {len(every)}"
+    assumed.click()
+    chosen = rows()
+    assert assumed.inner_text() == f"assumptions ({len(chosen)})"
+    assert chosen == [row for row in every if "assumption" in row.split("\t")[-1]]
+    assert 0 < len(chosen) < len(every)
+    assert [each.get_attribute("aria-pressed") for each in buttons] == [
+        "false",
+        "true",
+        *["false"] * (len(buttons) - 2),
+    ]
+    box.query_selector("input").fill("BEACON.")
+    assert rows() == [row for row in chosen if "beacon." in row.lower()]
+    assert 0 < len(rows()) < len(chosen)
+    whole.click()
+    assert rows() == [row for row in every if "beacon." in row.lower()]
+    box.query_selector("input").fill("")
+    assert rows() == every
+
+
+def test_the_shipped_page_is_neither_long_nor_heavy(browser, files):
+    assert files("whole").stat().st_size <= SHIPPED_BYTES
+    here = Opened(browser, files("whole"), unfolded=False)
+    assert len(here.figures()) >= ALIVE["report"]
+    height = here.page.evaluate("document.documentElement.scrollHeight")
+    here.page.close()
+    assert 5_000 < height <= SHIPPED_PX

@@ -14,7 +14,17 @@ from microrad.mirror import Variant
 from microrad.mission.model import Mission
 from microrad.report.fine_pointing.words import NAMES, source_name
 from microrad.report.plotting.figure import Figure
-from microrad.report.plotting.palette import BLACK, BLUE, GREEN, GREY, ORANGE, SKY, VERMILION, WHITE
+from microrad.report.plotting.palette import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    SKY,
+    VERMILION,
+    WHITE,
+    thinned_by_logarithm,
+)
 from microrad.report.plotting.sheet import Bars, Dash, Legend, Line, Panel, Rule, Sheet, Words, grid
 from microrad.report.quantities import micro, share_of_time
 from microrad.study.study import Study
@@ -42,6 +52,7 @@ class Shown:
 
     def line(self, freq_hz: Floats, values: Floats, place: int) -> Line:
         """Its line, with markers at even distances on a logarithmic axis, elsewhere for each place."""
+        freq_hz, values = _seen(freq_hz, values)
         at = np.geomspace(freq_hz[0], freq_hz[-1], 3 * _MARKS + 1)[1 + place :: 3]
         marks = [int(i) for i in np.unique(np.searchsorted(freq_hz, at[at <= freq_hz[-1]]))]
         return Line(freq_hz, values, self.colour, label=self.name, marker=self.marker, size=5.0, every=marks)
@@ -70,6 +81,12 @@ def shown(fine: FinePointingStudy) -> tuple[Shown, ...]:
     return tuple(Shown(*each) for each in zip(chosen, _COLOURS, _SHAPES, strict=False))
 
 
+def _seen(freq_hz: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """The points of a curve that a logarithmic axis of frequency tells apart."""
+    kept = thinned_by_logarithm(freq_hz, values)
+    return freq_hz[kept], values[kept]
+
+
 def cumulative_rms(freq_hz: Floats, density: Floats) -> Floats:
     """Rms from the first frequency up to each, of a one-sided density on a uniform grid."""
     return np.asarray(np.sqrt(np.cumsum(density) * (freq_hz[1] - freq_hz[0])))
@@ -86,7 +103,7 @@ def spectra(fine: FinePointingStudy, controllers: tuple[Shown, ...]) -> Figure:
     left, right = sheet.panel(0, 0), sheet.panel(0, 1)
     before = fine.disturbed_rad2_hz[inner]
     columns = {"frequency (Hz)": freq, "before the loop (rad^2/Hz)": before}
-    left.add(Line(freq, before * 1e12, label="before the loop"))
+    left.add(Line(*_seen(freq, before * 1e12), label="before the loop"))
     noise = _noise_density(fine)
     if noise > 0.0:
         left.add(Rule(noise * 1e12, False, GREY, ":", 1.2, "sensor noise"))
@@ -97,7 +114,7 @@ def spectra(fine: FinePointingStudy, controllers: tuple[Shown, ...]) -> Figure:
             (right, cumulative_rms(freq, after) * 1e6, cumulative_rms(freq, predicted) * 1e6),
         ):
             panel.add(each.line(freq, found, place))
-            panel.add(Line(freq, linear, each.colour, *_PREDICTED, name=f"{each.name}, predicted, linear"))
+            panel.add(Line(*_seen(freq, linear), each.colour, *_PREDICTED, name=f"{each.name}, predicted, linear"))
         columns[f"{each.name}, simulated (rad^2/Hz)"] = after
         columns[f"{each.name}, predicted (rad^2/Hz)"] = predicted
     left.add(Line(freq[:0], freq[:0], GREY, *_PREDICTED, label="dashed: predicted, linear"))

@@ -10,6 +10,7 @@ BLACK, ORANGE, SKY, GREEN, BLUE, VERMILION = "#000000", "#E69F00", "#56B4E9", "#
 WHITE, GREY = "#ffffff", "#777777"
 
 MOST_POINTS = 1200  # of a curve; extremes are kept
+LOG_STRETCHES = 480  # of a logarithmic axis, each as wide as a dot of a screen or less
 _PICKS = 5  # of a stretch: lowest and highest of both coordinates, and a gap
 # cividis, at even steps: rising in lightness, and the same to the colour-blind.
 CIVIDIS = (
@@ -68,6 +69,22 @@ def _of_stretches(x: Floats, y: Floats, count: int) -> NDArray[np.int64]:
         for extreme in (np.fmin, np.fmax):
             found = _firsts(values == extreme.reduceat(values, first)[stretch], stretch)
             picked.append(found[~broken[stretch[found]]])
+    return np.unique(np.concatenate([[0, x.size - 1], *picked]))
+
+
+def thinned_by_logarithm(x: Floats, y: Floats, count: int = LOG_STRETCHES) -> NDArray[np.int64]:
+    """Places of the points to keep on a logarithmic axis: both ends, and the lowest and highest of each stretch of it.
+
+    ``count`` stretches are equal on that axis, so that a rising x at even steps keeps each point where there are few.
+    Both are finite, and x is above 0.
+    """
+    if x.size <= 2:
+        return np.arange(x.size)
+    share = np.log(x / x[0]) / np.log(x[-1] / x[0])
+    stretch = np.minimum((count * share).astype(np.int64), count - 1)
+    first = np.flatnonzero(np.diff(stretch, prepend=-1))
+    own = np.repeat(np.arange(first.size), np.diff(first, append=x.size))
+    picked = [_firsts(y == extreme.reduceat(y, first)[own], own) for extreme in (np.fmin, np.fmax)]
     return np.unique(np.concatenate([[0, x.size - 1], *picked]))
 
 
