@@ -639,3 +639,11 @@ def test_what_cannot_be_searched_is_refused(changes, message):
 def test_the_least_that_is_not_refused():
     assert optimise(problem(evaluations=16), rising(), rising(), quiet).feasible
     assert optimise(problem(confidence=0.999), rising(rows=1000), rising(rows=1000), quiet).evaluations > 0
+
+
+def test_help_says_what_the_number_of_threads_is_of(call):
+    said = {name: " ".join(call("campaign", name, "--help").out.split()) for name in ("run", "resume", "optimise")}
+    assert "--threads N Threads of this process [default: one a core]" in said["optimise"]
+    assert all(
+        "--threads N Processes of this machine [default: one a core]" in said[name] for name in ("run", "resume")
+    )

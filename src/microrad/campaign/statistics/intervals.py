@@ -268,4 +268,5 @@ def histogram(values: Floats, weights: Floats, count: int = PICTURE_BINS) -> tup
         half = max(abs(least), 1e-30) * 1e-3
         return np.array([least - half, least + half]), np.array([float(np.sum(weights))])
     edges = np.linspace(least, most, count + 1)  # np.histogram refuses values a few steps of rounding apart
-    return edges, np.bincount(np.searchsorted(edges[1:-1], values, side="right"), weights, count)
+    bins = np.searchsorted(edges[1:-1], values, side="right")
+    return edges, np.bincount(bins, weights, count).astype(float)
