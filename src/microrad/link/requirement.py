@@ -92,9 +92,13 @@ def time_kept(required: LinkRequirement) -> str:
 
 
 def derived_from(sources: Mapping[str, Source], *keys: str) -> tuple[str, ...]:
-    """The inputs under these keys whose source calls them derived, each with its value and what from.
+    """The inputs whose source calls them derived, each in words with its value and what it is derived from.
 
     A value that was changed since is none of them.
+
+    Args:
+        sources: Where each value of the mission comes from, by its dotted key.
+        *keys: Beginnings of the dotted keys looked at.
     """
     found = [(key, s) for key, s in sources.items() if s.kind == "derived" and not s.was and key.startswith(keys)]
     unquoted = ((key, s.value.strip('"'), s.comment.partition(": ")[2]) for key, s in found)

@@ -136,10 +136,17 @@ class Solution:
 
 
 def solve_key(file: LinkFile, key: str) -> Solution:
-    """The values of a key of the links' tables that leave the required margin: of communication, but for the outage.
+    """The values of one key of the links' tables that leave exactly the required margin.
 
-    A key of the beacon's table is looked for at 0 dB of the beacon, one of the answer's at 0 dB of the answer. Raises
-    ValueError for a key that these tables do not have, and for one that is 0.
+    The margin is that of communication, but for the share of time of the outage. A key of the beacon's table is looked
+    for at 0 dB of the beacon, one of the answer's at 0 dB of the answer.
+
+    Args:
+        file: The mission's file on its links.
+        key: The dotted key, of an item in a list with its place from 1 behind it.
+
+    Raises:
+        ValueError: For a key that these tables do not have, and for one that is 0.
     """
     file = solve_rate(file)
     m, sources = file.mission, file.sources
@@ -178,7 +185,12 @@ def _no_such_key(key: str, keys: Iterable[str]) -> str:
 def run_link_study(file: LinkFile, parts: kept.Kept = kept.NOTHING) -> LinkStudy:
     """Budgets of every link of a mission and what follows from them.
 
-    Raises ValueError with the reason when a receiver does not take the data rate, or a scan has no time to detect.
+    Args:
+        file: The mission's file on its links.
+        parts: Keeps the acquisition from an earlier run of the same inputs; keeps nothing by default.
+
+    Raises:
+        ValueError: When a receiver does not take the data rate, or a scan has no time to detect; the message says why.
     """
     file = solve_rate(file)
     m, sources, shared = file.mission, file.sources, link.Shared.of(file.mission)
@@ -217,7 +229,12 @@ def run_link_study(file: LinkFile, parts: kept.Kept = kept.NOTHING) -> LinkStudy
 def communication_budget(data: link.DataLink, sources: Mapping[str, Source]) -> link.LinkBudget:
     """The budget of the communication link at `outage.error_rad`, with the static margin under a jitter.
 
-    Raises ValueError for a data rate that the receiver does not take.
+    Args:
+        data: The communication link.
+        sources: Where each value of the mission comes from, by its dotted key.
+
+    Raises:
+        ValueError: For a data rate that the receiver does not take.
     """
     static = link.communication_budget(data, sources)
     if data.jitter is None:
@@ -233,7 +250,13 @@ def communication_budget(data: link.DataLink, sources: Mapping[str, Source]) -> 
 def tornados(
     m: LinkMission, sources: Mapping[str, Source], budgets: tuple[link.LinkBudget, ...]
 ) -> tuple[link.Tornado, ...]:
-    """What moves the margin of each budget, communication first."""
+    """What moves the margin of each budget, communication first.
+
+    Args:
+        m: The mission's tables on its links.
+        sources: Where each value of the mission comes from, by its dotted key.
+        budgets: The budgets, that of communication first.
+    """
     tables = ("jitter", "requirement", *link.LINK_TABLES)
     swings = [link.swings(m, sources, tables, m.conventions.strehl, _margin_db, link.beam_passes)]
     swings += [variation.beam_tornado(m, sources, each.name.lower()) for each in budgets[1:]]

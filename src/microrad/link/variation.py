@@ -47,7 +47,12 @@ class Input:
         return self.key if self.item is None else f"{self.key}.{self.item + 1}"
 
     def moved(self, tables: Varied, value: float) -> Varied:
-        """The tables with this number replaced."""
+        """The tables with this number replaced.
+
+        Args:
+            tables: The tables that hold the number.
+            value: The new number, in the SI unit of the field.
+        """
         if self.item is None:
             return tables.with_value(f"{self.table}.{self.field}", value)
         items = list(getattr(_table(tables, self.table), self.field))
@@ -56,7 +61,12 @@ class Input:
 
 
 def inputs(tables: Table, name: str) -> Iterator[Input]:
-    """Every quantity of one of the tables that has a value."""
+    """Every quantity of one of the tables that has a value, each item of a list by itself.
+
+    Args:
+        tables: The tables of the mission.
+        name: Dotted name of the table meant; one that the mission does not have gives nothing.
+    """
     table = _table(tables, name)
     if table is None:
         return
@@ -71,7 +81,15 @@ def inputs(tables: Table, name: str) -> Iterator[Input]:
 
 
 def moved(tables: Varied, found: tuple[Input, ...], value: float) -> Varied | None:
-    """The tables with the input at a value, its axes in proportion, or None where their rule does not allow it."""
+    """The tables with an input at another value, or None where its rule does not allow it.
+
+    Where the input has several items, the largest takes the value and the others stay in proportion to it.
+
+    Args:
+        tables: The tables that hold the input.
+        found: The input, or its items.
+        value: The new value, in the SI unit of the input.
+    """
     largest = max(each.value for each in found)
     for each in found:
         own = value if each.value == largest else value * each.value / largest
@@ -89,7 +107,12 @@ def _rules(info: FieldInfo) -> list[Quantity]:
 
 
 def unit_of(each: Input, strehl: str) -> str:
-    """Unit of an input; a Strehl has one of its own where the convention reads it as a loss."""
+    """Unit of an input; a Strehl has one of its own where the convention reads it as a loss.
+
+    Args:
+        each: The input.
+        strehl: The mission's convention for a Strehl, "decibel" or "ratio".
+    """
     return "dB" if (each.field, strehl) == ("strehl", "decibel") else each.rule.unit
 
 
@@ -110,7 +133,12 @@ def beam_passes(m: LinkMission) -> bool:
 
 
 def margin_or_none(of: _Link, margin_db: Callable[[_Link], float]) -> float:
-    """The margin of a link; a receiver too slow for the rate has none."""
+    """The margin of a link in dB; minus infinity where the receiver is too slow for the rate.
+
+    Args:
+        of: The link, or the mission that it is part of.
+        margin_db: The margin in dB of such a link.
+    """
     try:
         return margin_db(of)
     except RateError:
@@ -165,14 +193,25 @@ class Tornado:
 
 
 def beam_margin(name: str, sources: Mapping[str, Source]) -> Callable[[LinkMission], float]:
-    """The margin of the "beacon" or of the "answer", asked of a mission, which has that beam."""
+    """A function that gives the margin in dB of the beacon or the answer of a mission, which must have it.
+
+    Args:
+        name: "beacon" or "answer".
+        sources: Where each value of the mission comes from, by its dotted key.
+    """
     return lambda m: beam_budget(name, Shared.of(m), getattr(m, name), sources).margin_db
 
 
 def beam_tornado(m: LinkMission, sources: Mapping[str, Source], name: str) -> tuple[Swing, ...]:
-    """The margin of the "beacon" or of the "answer" over each of its inputs, as `swings` moves them.
+    """The margin of the beacon or the answer over each of its inputs, as `swings` moves them.
 
-    Raises ValueError if the mission has no such beam.
+    Args:
+        m: The mission's tables on its links.
+        sources: Where each value of the mission comes from, by its dotted key.
+        name: "beacon" or "answer".
+
+    Raises:
+        ValueError: If the mission has no such beam.
     """
     tables = ("terminals", name, "channel", "point_ahead")
     return swings(m, sources, tables, m.conventions.strehl, beam_margin(name, sources), divergence_possible(name))

@@ -99,7 +99,15 @@ class BenchMirror:
 
 # --------------------------------------------------------------------------------------------------- Eq. 2 and Eq. 3
 def linear_output(drive: Floats, rest_v: float, rate_hz: float) -> Floats:
-    """Eq. 2 as printed (mrad), settled at `rest_v` before; the drive is held between samples, as a converter does."""
+    """Output (mrad) of the linear Eq. 2 as printed, settled at the rest drive before the record.
+
+    The drive is held between samples, as a converter does.
+
+    Args:
+        drive: Drive of one axis, in V, shape (samples,).
+        rest_v: Drive before the record, in V, at which the mirror has settled.
+        rate_hz: Sample rate, in Hz.
+    """
     poles, residues = _modes(EQ2_NUMERATOR, EQ2_DENOMINATOR)
     moved, previous = np.append(drive[:-1] - rest_v, 0.0), np.zeros(poles.size, dtype=complex)
     response = _modal(poles, residues, moved, 1.0 / rate_hz, previous, held=True)[0]
@@ -108,9 +116,15 @@ def linear_output(drive: Floats, rest_v: float, rate_hz: float) -> Floats:
 
 
 def bouc_wen_output(drive: Floats, rest_v: float, rate_hz: float) -> Floats:
-    """Eq. 3 as printed (mrad) for the drive in volts, h = 0 before; the drive is a straight line between samples.
+    """Output (mrad) of Eq. 3 as printed, with h = 0 before the record.
 
-    Eq. 3 has no answer to the steps of a converter, whose rate has no bound.
+    The drive is a straight line between samples: Eq. 3 has no answer to the steps of a converter, whose rate has no
+    bound.
+
+    Args:
+        drive: Drive of one axis, in V, shape (samples,).
+        rest_v: Drive before the record, in V.
+        rate_hz: Sample rate, in Hz.
     """
     row = np.array([*EQ3, math.inf, 0.0])
     return np.asarray(bouc_wen_response(np.append(rest_v, drive), 1.0 / rate_hz, row, 0.0)[0][1:])
@@ -191,7 +205,15 @@ class _MirrorState:
         return volts
 
     def advance(self, drive: Floats, volts: Floats, steps: int) -> tuple[Floats, Floats]:
-        """Fast output about the settled one, and S, at the samples of a part of the record; then steps over them."""
+        """Go over a part of the record in steps finer than its samples.
+
+        Returned are the fast output about the settled one, and S, both at the samples (shape (samples,)).
+
+        Args:
+            drive: The command at each sample, in V, shape (samples,).
+            volts: The amplifier's output at each sample, in V at its input, shape (samples,).
+            steps: Steps in each sample.
+        """
         from scipy.signal import lfilter
 
         mirror, step_s = self.mirror, self.sample_s / steps

@@ -149,7 +149,15 @@ class ExcitationTable(Table):
     noise_share: Share | None = Field(None, description="instead of the noise of bench.sensor")
 
     def design(self, name: str, limits: Limits) -> tuple[Excitation, ...]:
-        """The records of this excitation; raises `DesignError`."""
+        """The records of this excitation.
+
+        Args:
+            name: Name of the excitation, which its records carry.
+            limits: What the drive must keep to, and its sample rate.
+
+        Raises:
+            DesignError: For an excitation that the limits do not allow.
+        """
         raise NotImplementedError
 
     def parameters(self) -> dict[str, Any]:
@@ -173,7 +181,15 @@ class ChirpTable(ExcitationTable):
     axis: Count = 1
 
     def design(self, name: str, limits: Limits) -> tuple[Excitation, ...]:
-        """One record."""
+        """The one record of this excitation.
+
+        Args:
+            name: Name of the record.
+            limits: What the drive must keep to, and its sample rate.
+
+        Raises:
+            DesignError: For an excitation that the limits do not allow.
+        """
         return (logarithmic_chirp(limits, **self.parameters(), name=name),)
 
 
@@ -192,7 +208,15 @@ class MultisineTable(ExcitationTable):
     seed: Annotated[int, Whole("", least=0, most=2**63 - 1)]
 
     def design(self, name: str, limits: Limits) -> tuple[Excitation, ...]:
-        """One record for each realisation."""
+        """The records of this excitation, one for each realisation.
+
+        Args:
+            name: Name of the excitation, which its records carry.
+            limits: What the drive must keep to, and its sample rate.
+
+        Raises:
+            DesignError: For an excitation that the limits do not allow.
+        """
         parameters = self.parameters()
         lines = Lines(*(parameters.pop(key) for key in ("period_s", "start_hz", "stop_hz", "lines")))
         return multisine(limits, lines, **parameters, name=name)
@@ -209,7 +233,15 @@ class SinesTable(ExcitationTable):
     axis: Count = 1
 
     def design(self, name: str, limits: Limits) -> tuple[Excitation, ...]:
-        """One record for each frequency, named with it where there are several."""
+        """The records of this excitation, one for each frequency and named with it where there are several.
+
+        Args:
+            name: Name of the excitation, with which those of its records begin.
+            limits: What the drive must keep to, and its sample rate.
+
+        Raises:
+            DesignError: For an excitation that the limits do not allow.
+        """
         parameters = self.parameters()
         frequencies_hz = parameters.pop("frequencies_hz")
         names = [f"{name}-{f:g}hz" for f in frequencies_hz] if len(frequencies_hz) > 1 else [name]
@@ -229,7 +261,15 @@ class StaircaseTable(ExcitationTable):
     axis: Count = 1
 
     def design(self, name: str, limits: Limits) -> tuple[Excitation, ...]:
-        """One record."""
+        """The one record of this excitation.
+
+        Args:
+            name: Name of the record.
+            limits: What the drive must keep to, and its sample rate.
+
+        Raises:
+            DesignError: For an excitation that the limits do not allow.
+        """
         return (staircase(limits, **self.parameters(), name=name),)
 
 

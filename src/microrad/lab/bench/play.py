@@ -61,7 +61,16 @@ def play(plan: Plan, seed: int, on_progress: Progress | None = None) -> tuple[Re
 
 
 def play_records(plan: Plan, seed: int, on_progress: Progress | None = None) -> Iterator[tuple[Record, Recording]]:
-    """Each record with its recording, one after the other, see `play`."""
+    """Play the records of a plan and give each with its recording, one after the other, as `play` does all at once.
+
+    Args:
+        plan: The plan.
+        seed: Seed of the noise, at least 0.
+        on_progress: Called with the records done, their number and the name of what is played.
+
+    Raises:
+        BenchError: For a negative seed.
+    """
     if seed < 0:
         raise BenchError(f"the seed is {seed}; give a whole number of at least 0")
     report = on_progress or (lambda *_: None)
@@ -72,7 +81,12 @@ def play_records(plan: Plan, seed: int, on_progress: Progress | None = None) -> 
 
 
 def true_output(plan: Plan, record: Record) -> tuple[Floats, Floats]:
-    """Drive given out by the converter (V) and angle (mrad) without sensor, both of shape (samples, axes)."""
+    """Drive given out by the converter (V) and true angle (mrad), before any sensor, both of shape (samples, axes).
+
+    Args:
+        plan: The plan, which describes the bench.
+        record: The record of it that is played.
+    """
     excitation, bench = record.excitation, plan.bench
     drive = converters(bench.converters)[0].convert(excitation.drive)
     rest_v = float(converters(bench.converters)[0].convert(np.array(excitation.rest_v)))

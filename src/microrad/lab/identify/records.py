@@ -11,7 +11,13 @@ from microrad.lab.recording import Recording
 
 
 def no_progress(done: int, total: int, what: str) -> None:
-    """What is called with the progress where nobody asked for it."""
+    """Say nothing: what is called with the progress where nobody asked for it.
+
+    Args:
+        done: Steps done.
+        total: Their number.
+        what: What is being done.
+    """
 
 
 _VOLTS = {"V": 1.0, "mV": 1e-3}
@@ -143,7 +149,14 @@ def transient(drive: Floats) -> int:
 
 
 def smoothed_rate(drive: Floats, step_s: float) -> Floats:
-    """Rate of the drive over a hundredth of the period of its highest strong line, so that noise does not count."""
+    """Rate of the drive (V/s), smoothed so that noise does not count.
+
+    It is taken over a hundredth of the period of the drive's highest strong line.
+
+    Args:
+        drive: Drive, in V, shape (samples,).
+        step_s: Time between samples, in s.
+    """
     spectrum = np.abs(np.fft.rfft(drive - drive.mean()))
     highest = int(np.flatnonzero(spectrum >= 0.05 * spectrum.max())[-1])
     span = max(1, drive.size // (100 * max(highest, 1)))
@@ -200,10 +213,20 @@ def span(records: Sequence[SiRecord]) -> float:
 
 
 def centred(columns: Floats, records: Sequence[SiRecord]) -> Floats:
-    """Stacked columns less their mean in each record: solving without them is solving with one offset per record."""
+    """Stacked columns less their mean in each record; to fit them is to fit one free offset per record too.
+
+    Args:
+        columns: Values of the used samples of all records one behind the other, shape (samples,) or (samples, columns).
+        records: The records, in the same order.
+    """
     return np.concatenate([part - part.mean(axis=0) for part in split_by_record(columns, records)])
 
 
 def split_by_record(values: Floats, records: Sequence[SiRecord]) -> list[Floats]:
-    """Stacked values of the used samples, one array per record."""
+    """Stacked values of the used samples, one array per record.
+
+    Args:
+        values: Values of the used samples of all records one behind the other.
+        records: The records, in the same order.
+    """
     return np.split(values, np.cumsum([r.used for r in records])[:-1])

@@ -77,7 +77,12 @@ def propagated(quantity: Callable[[Floats], Floats], values: Floats, covariance:
 
 
 def percent(residual: Floats, span_rad: float) -> tuple[float, float]:
-    """Rms and peak of a residual in per cent of a peak-to-peak span."""
+    """Rms and peak of a residual in per cent of a peak-to-peak span.
+
+    Args:
+        residual: The residual, in rad, any shape.
+        span_rad: The peak-to-peak span, in rad.
+    """
     return 100 * float(np.sqrt(np.mean(residual**2))) / span_rad, 100 * float(np.max(np.abs(residual))) / span_rad
 
 
@@ -85,6 +90,10 @@ def rounded_to_error(value: float, standard_error: float) -> str:
     """A fitted value as it is printed: no digits beyond the two of its standard error, and five at most.
 
     Further digits would tell nothing and differ between processors. A value without error (nan or 0) has five digits.
+
+    Args:
+        value: The value, in any unit.
+        standard_error: Its standard error, in the same unit.
     """
     if 0.0 < standard_error < math.inf:
         decimals = 1 - math.floor(math.log10(float(f"{standard_error:.2g}")))

@@ -286,7 +286,7 @@ def check_sequence(stages: Sequence[Stage], attempts: int) -> tuple[int, ...]:
 
     Args:
         stages: The stages in their order.
-        attempts: Number of attempts that a stage has, at least 1.
+        attempts: Failures until the sequence is given up, at least 1.
 
     Raises:
         ValueError: For no stage, two of one name, a stage that goes back to a later or unknown one, and no attempt.
@@ -330,7 +330,7 @@ def simulate(stages: Sequence[Stage], attempts: int, runs: int, seed: int) -> Se
 
     Args:
         stages: The stages in their order.
-        attempts: Number of attempts, as in `solve_sequence`.
+        attempts: Failures until the sequence is given up, at least 1.
         runs: Number of sequences drawn, at least 1.
         seed: Seed of the random numbers; the same one gives the same runs.
 
@@ -349,7 +349,7 @@ def simulate_log(stages: Sequence[Stage], attempts: int, seed: int) -> tuple[Tra
 
     Args:
         stages: The stages in their order.
-        attempts: Number of attempts, as in `solve_sequence`.
+        attempts: Failures until the sequence is given up, at least 1.
         seed: Seed of the random numbers.
 
     Raises:

@@ -78,11 +78,12 @@ class ErrorTerm:
 
 
 def error_term(stated: StatedError, interpretation: Interpretation = "temporal") -> ErrorTerm:
-    """Mean and standard deviation of a stated error E of k sigma, or bound E, under a statistical interpretation.
+    """Mean and standard deviation that a stated error stands for, about each of two axes.
 
-    "temporal" (ECSS-E-ST-60-10C A.1.2, modified): the confidence is a share of the time of the worst-case satellite,
-    whose constant errors are W = 3 E / k, or the bound. "mixed": a share of the times of all satellites, over which
-    constant errors spread about zero by s = E / k, a bound uniformly (s = E / sqrt(3); radial: over a disc, E / 2).
+    The error is stated as E of k sigma, or as a bound E. "temporal" (ECSS-E-ST-60-10C A.1.2, modified): the confidence
+    is a share of the time of the worst-case satellite, whose constant errors are W = 3 E / k, or the bound. "mixed": a
+    share of the times of all satellites, over which constant errors spread about zero by s = E / k, a bound uniformly
+    (s = E / sqrt(3); radial: over a disc, E / 2).
 
     | class     | temporal                     | mixed            | from                                           |
     |-----------|------------------------------|------------------|------------------------------------------------|
@@ -95,6 +96,13 @@ def error_term(stated: StatedError, interpretation: Interpretation = "temporal")
     not stated: counted as always there it leaves the coverage at its least, whatever its course between 0 and W, as
     long as the other errors are symmetric about their means with a single peak (Anderson's theorem). A radial mean
     lies on the diagonal, W / sqrt(2) about each axis, where the means of the other lines add up to the most.
+
+    Args:
+        stated: The error as it is stated, with class, statistic and axes.
+        interpretation: "temporal" or "mixed": over what the confidence is a share.
+
+    Raises:
+        ValueError: For another interpretation.
     """
     if interpretation not in get_args(Interpretation):
         raise ValueError(f'no interpretation "{interpretation}"; give one of {", ".join(get_args(Interpretation))}')
@@ -118,7 +126,12 @@ def error_term(stated: StatedError, interpretation: Interpretation = "temporal")
 
 
 def basis(stated: StatedError, interpretation: Interpretation = "temporal") -> str:
-    """Class, statistic and axes of a stated error, and in words the mean and the standard deviation taken for it."""
+    """Class, statistic and axes of a stated error, and in words the mean and the standard deviation taken for it.
+
+    Args:
+        stated: The error as it is stated.
+        interpretation: "temporal" or "mixed", as of `error_term`.
+    """
     where = {"per-axis": "about each axis", "radial": "radial", "x": "about one axis"}[stated.axes]
     head = f"{stated.kind}, {stated.statistic}, {where}"
     spread, worst = _spread_text(stated), _worst_text(stated)

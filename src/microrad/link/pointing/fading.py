@@ -65,11 +65,15 @@ class SpectralMotion:
 def motion_of_spectrum(freq_hz: ArrayLike, psd_rad2_hz: ArrayLike) -> SpectralMotion:
     """Angle and velocity of the axes from their one-sided power spectral densities, by the trapezoidal rule.
 
-    `freq_hz` has the shape (freqs,) and rises; `psd_rad2_hz` has the shape (2, freqs), axis x first. The velocity
-    variance is the integral of (2 pi f)^2 S. The grid must resolve the peaks of the spectrum.
+    The velocity variance is the integral of (2 pi f)^2 S. The grid must resolve the peaks of the spectrum.
 
-    Raises ValueError for a grid that does not rise or is negative, a density that is negative or of another shape,
-    and values that are not finite.
+    Args:
+        freq_hz: Rising frequencies f, in Hz, shape (freqs,).
+        psd_rad2_hz: One-sided density S of the angle about each axis, in rad^2/Hz, shape (2, freqs), axis x first.
+
+    Raises:
+        ValueError: For a grid that does not rise or is negative, a density that is negative or of another shape, and
+            values that are not finite.
     """
     freq, psd = _checked_spectrum(freq_hz, psd_rad2_hz)
     speed = (2.0 * math.pi * freq) ** 2 * psd
@@ -124,8 +128,14 @@ def level_crossing_rate_hz(jitter: Jitter, velocity_rms_rad_s: tuple[float, floa
     sv_n^2 = cos^2 sv_x^2 + sin^2 sv_y^2 (Rice 1944, for two axes): velocity and angle at the same instant are
     independent. Equal axes without bias give sv / sqrt(2 pi) R / s^2 exp(-R^2 / (2 s^2)).
 
-    `velocity_rms_rad_s` is per axis. Raises ValueError for a velocity that is negative or not finite, an axis that
-    moves without jitter or jitters without moving, and a negative radius.
+    Args:
+        jitter: Bias and rms of the pointing error about each axis, in rad.
+        velocity_rms_rad_s: Rms velocity sv of each axis, in rad/s.
+        radius_rad: Radii R, in rad, any shape, at least 0.
+
+    Raises:
+        ValueError: For a velocity that is negative or not finite, an axis that moves without jitter or jitters without
+            moving, and a negative radius.
     """
     _check_velocity(jitter, velocity_rms_rad_s)
     radius = np.asarray(radius_rad, dtype=np.float64)
@@ -166,10 +176,19 @@ def _one_axis_rate(jitter: Jitter, velocity: tuple[float, float], radius: Floats
 def fades(
     jitter: Jitter, velocity_rms_rad_s: tuple[float, float], half_angle_rad: ArrayLike, margin_db: ArrayLike
 ) -> Fades:
-    """Fades by more than `margin_db` below the power on axis; half angle and margin are broadcast.
+    """Rate, length and share of the fades by more than a margin below the power on axis.
 
-    Raises ValueError as `level_crossing_rate_hz` and `outage_probability`. A velocity rms from a spectrum that ends
-    too early makes the fades too few and too long: see `SpectralMotion.warning`.
+    A velocity rms from a spectrum that ends too early makes the fades too few and too long: see
+    `SpectralMotion.warning`.
+
+    Args:
+        jitter: Bias and rms of the pointing error about each axis, in rad.
+        velocity_rms_rad_s: Rms velocity of each axis, in rad/s.
+        half_angle_rad: Half angle of the beam at 1/e2, in rad; broadcast against the margin.
+        margin_db: Fade margin, in dB, at least 0.
+
+    Raises:
+        ValueError: As `level_crossing_rate_hz` and `outage_probability`.
     """
     rate = level_crossing_rate_hz(jitter, velocity_rms_rad_s, radius_of_loss_rad(half_angle_rad, margin_db))
     share = outage_probability(jitter, half_angle_rad, margin_db)
@@ -179,10 +198,17 @@ def fades(
 
 # ------------------------------------------------------------------------------------- power that the fluctuation costs
 def mean_error_ratio(jitter: Jitter, half_angle_rad: float, extra_power_db: float, error_ratio: ErrorRatio) -> float:
-    """Mean over the pointing error of `error_ratio` at the received power 10^(extra_power_db / 10) h.
+    """Mean bit error ratio over the pointing error, at the received power 10^(extra / 10) h.
 
-    Raises ValueError when `error_ratio` does not give one ratio from 0 to 1 for each power, or one that grows with
-    the power, and for a half angle not above 0.
+    Args:
+        jitter: Bias and rms of the pointing error about each axis, in rad.
+        half_angle_rad: Half angle of the beam at 1/e2, in rad.
+        extra_power_db: Power added to the link, in dB.
+        error_ratio: Bit error ratio for each received power, that on axis without extra power counted as 1.
+
+    Raises:
+        ValueError: When `error_ratio` does not give one ratio from 0 to 1 for each power, or one that grows with the
+            power, and for a half angle not above 0.
     """
     power, share = _power_shares(jitter, half_angle_rad)
     return _mean_over(power, share, extra_power_db, error_ratio)
@@ -210,13 +236,18 @@ def _mean_over(power: Floats, share: Floats, extra_db: float, error_ratio: Error
 def uncoded_penalty_db(jitter: Jitter, half_angle_rad: float, error_ratio: ErrorRatio) -> float:
     """Extra power in dB, above the power on axis, that brings the mean bit error ratio back to the target.
 
-    For a link without code, or with code words so short that the power stands still over each, where the figure to
-    keep is the bit error ratio over a long time. `error_ratio` is then the curve at constant power, behind the decoder
-    if there is one, over the power relative to what the target needs without pointing error: its value at 1 is the
-    target.
+    For a link without code, or with code words so short that the power stands still over each, where the figure to keep
+    is the bit error ratio over a long time.
 
-    Raises NoPowerError when `MOST_POWER_DB` do not reach the target, `ValueError` when that is not between 0 and 1,
-    and as `mean_error_ratio`.
+    Args:
+        jitter: Bias and rms of the pointing error about each axis, in rad.
+        half_angle_rad: Half angle of the beam at 1/e2, in rad.
+        error_ratio: Bit error ratio at constant power, behind the decoder if there is one, over the power relative to
+            what the target needs without pointing error; its value at 1 is the target.
+
+    Raises:
+        NoPowerError: When `MOST_POWER_DB` do not reach the target.
+        ValueError: When the target is not between 0 and 1, and as `mean_error_ratio`.
     """
     power, share = _power_shares(jitter, half_angle_rad)
     target = _mean_over(np.ones(1), np.ones(1), 0.0, error_ratio)

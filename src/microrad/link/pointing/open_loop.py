@@ -127,7 +127,15 @@ class OpenLoopPointing:
         return radial_cdf(self.error, radius_rad)
 
     def allocation(self, total_rad: float, rule: Rule = "ecss-radial") -> tuple[Allocation, ...]:
-        """What a total leaves for each line, the others unchanged; raises ValueError as `allocate`."""
+        """What a total leaves for each line, the others unchanged.
+
+        Args:
+            total_rad: The total to meet, in rad.
+            rule: The rule by which the lines are summed, out of `TOTALS`.
+
+        Raises:
+            ValueError: As `allocate`.
+        """
         return allocate(
             self.stated, total_rad, rule=rule, confidence=self.confidence, interpretation=self.interpretation
         )

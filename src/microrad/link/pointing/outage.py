@@ -35,9 +35,15 @@ class Exposure:
 
     @classmethod
     def of(cls, data: link.DataLink, quantile_rad: float, beyond: Callable[[float], float]) -> "Exposure":
-        """The link under errors of which these two are known.
+        """The link under errors of which a quantile and the share beyond any size are known.
 
-        Raises ValueError for a data rate that the receiver does not take.
+        Args:
+            data: The communication link.
+            quantile_rad: Radial error that is exceeded for the mission's outage, in rad.
+            beyond: Share of the time with a larger radial error than the one given, in rad.
+
+        Raises:
+            ValueError: For a data rate that the receiver does not take.
         """
         received_dbm = link.received_on_axis_dbm(data)
         on_axis_db = received_dbm - float(link.required_dbm(data, data.table.data_rate_bit_s))
@@ -272,6 +278,10 @@ def with_point_ahead(jitter: pointing.Jitter, ahead_rad: float) -> pointing.Jitt
     How the point-ahead lies to the axes is not stated. It is taken along the bias, which it makes longer, and without
     a bias along the axis with the larger rms, where it makes errors well beyond itself the most frequent; along x where
     the two are equal.
+
+    Args:
+        jitter: Bias and rms of the pointing error about each axis, in rad.
+        ahead_rad: Point-ahead that is not corrected, in rad.
     """
     (x, y), static = jitter.bias_rad, jitter.static_rad
     wider = (1.0, 0.0) if jitter.rms_rad[0] >= jitter.rms_rad[1] else (0.0, 1.0)

@@ -49,7 +49,16 @@ class Jitter:
 
 # --------------------------------------------------------------------------------------------------------------- checks
 def at_least_zero(values: ArrayLike, name: str, unit: str) -> Floats:
-    """`values` as an array; raises ValueError, which names them, for one that is negative or not finite."""
+    """Values as an array, none of them negative.
+
+    Args:
+        values: The values, in `unit`, any shape.
+        name: What they are, in the words of the message.
+        unit: Their unit for the message.
+
+    Raises:
+        ValueError: For a value that is negative or not finite.
+    """
     array = np.asarray(values, dtype=np.float64)
     wrong = array[~(np.isfinite(array) & (array >= 0.0))]
     if wrong.size:
@@ -143,24 +152,45 @@ def _probability_of(jitter: Jitter, radius: Floats, beyond: bool) -> Floats:
 
 
 def radial_survival(jitter: Jitter, radius_rad: ArrayLike) -> Floats:
-    """P(r > R) of the radial pointing error, for each radius R (rad, any shape).
+    """Probability P(r > R) that the radial pointing error r exceeds each radius R.
 
     Exact for unequal and biased axes, by 96-point Gauss-Legendre quadrature over one axis. Equal axes s without bias
-    have the Rayleigh distribution, exp(-R^2 / (2 s^2)). Raises ValueError for a negative radius.
+    have the Rayleigh distribution, exp(-R^2 / (2 s^2)).
+
+    Args:
+        jitter: Bias and rms of the pointing error about each axis, in rad.
+        radius_rad: Radii R, in rad, any shape.
+
+    Raises:
+        ValueError: For a negative radius.
     """
     return _probability_of(jitter, at_least_zero(radius_rad, "radial error", "rad"), beyond=True)
 
 
 def radial_cdf(jitter: Jitter, radius_rad: ArrayLike) -> Floats:
-    """P(r < R) of the radial pointing error, as `radial_survival`; a small probability keeps its digits here."""
+    """Probability P(r < R) that the radial pointing error r stays below each radius R.
+
+    It is 1 less `radial_survival`; a small probability keeps its digits here.
+
+    Args:
+        jitter: Bias and rms of the pointing error about each axis, in rad.
+        radius_rad: Radii R, in rad, any shape.
+
+    Raises:
+        ValueError: For a negative radius.
+    """
     return _probability_of(jitter, at_least_zero(radius_rad, "radial error", "rad"), beyond=False)
 
 
 def density_on_circle(jitter: Jitter, radius: Floats) -> tuple[Floats, Floats, Floats]:
-    """Joint density of the errors on the circle of `radius`, ready to be summed round it over the last axis.
+    """Joint density of the errors on a circle, ready to be summed round it over the last axis.
 
-    Returns squared direction cosines of the nodes towards x and y, and density times arc length (1/rad); the sum of
-    the latter is the density of the radial error. Both rms must be above 0.
+    Returns squared direction cosines of the nodes towards x and y, and density times arc length (1/rad); the sum of the
+    latter is the density of the radial error.
+
+    Args:
+        jitter: Bias and rms of the pointing error about each axis, in rad; both rms above 0.
+        radius: Radii of the circles, in rad, any shape.
     """
     bias_u, rms_u, bias_v, rms_v = _axes(jitter)
     towards_v, parts = [], []
@@ -176,9 +206,14 @@ def density_on_circle(jitter: Jitter, radius: Floats) -> tuple[Floats, Floats, F
 
 
 def radial_quantile(jitter: Jitter, probability: ArrayLike) -> Floats:
-    """Radial error (rad) that is exceeded with `probability`: the root R of P(r > R) = p.
+    """Radial error (rad) that is exceeded with each probability p: the root R of P(r > R) = p.
 
-    Raises ValueError unless p is from `SMALLEST_PROBABILITY` to below 1.
+    Args:
+        jitter: Bias and rms of the pointing error about each axis, in rad.
+        probability: Probabilities p, any shape.
+
+    Raises:
+        ValueError: Unless p is from `SMALLEST_PROBABILITY` to below 1.
     """
     p = _probability(probability)
     widest = max(jitter.rms_rad)

@@ -28,7 +28,15 @@ def _half_angle(values: ArrayLike) -> Floats:
 
 # ---------------------------------------------------------------------------------------------------------------- mean
 def transmission(radius_rad: ArrayLike, half_angle_rad: ArrayLike) -> Floats:
-    """h = exp(-2 r^2 / theta^2), the power on axis taken as 1; radial error and half angle are broadcast."""
+    """Received power h = exp(-2 r^2 / theta^2) at a radial error, the power on axis taken as 1.
+
+    Args:
+        radius_rad: Radial errors r, in rad, at least 0; broadcast against the half angle.
+        half_angle_rad: Half angle theta of the beam at 1/e2, in rad.
+
+    Raises:
+        ValueError: For a negative error or a half angle not above 0.
+    """
     radius = at_least_zero(radius_rad, "radial error", "rad")
     return np.asarray(np.exp(-2.0 * (radius / _half_angle(half_angle_rad)) ** 2))
 
@@ -40,39 +48,78 @@ def _squares(jitter: Jitter, half_angle_rad: ArrayLike) -> tuple[Floats, Floats]
 
 
 def mean_loss_db(jitter: Jitter, half_angle_rad: ArrayLike) -> Floats:
-    """Loss of mean power in dB against a beam pointed without error, -10 lg E[h]; see `mean_transmission`."""
+    """Loss of mean power in dB (positive) against a beam pointed without error, -10 lg E[h]; see `mean_transmission`.
+
+    Args:
+        jitter: Bias and rms of the pointing error about each axis, in rad.
+        half_angle_rad: Half angles of the beam at 1/e2, in rad, any shape.
+
+    Raises:
+        ValueError: For a half angle that is not above 0.
+    """
     spread, offset = _squares(jitter, half_angle_rad)
     nepers = np.sum(0.5 * np.log1p(spread) + offset / (1.0 + spread), axis=-1)
     return np.asarray(10.0 / math.log(10.0) * nepers)
 
 
 def mean_transmission(jitter: Jitter, half_angle_rad: ArrayLike) -> Floats:
-    """Mean E[h]: the product over the axes of exp(-2 b^2 / (theta^2 + 4 s^2)) / sqrt(1 + 4 s^2 / theta^2).
+    """Mean received power E[h], that on axis taken as 1: the product over the axes of exp(-2 b^2 / (theta^2 + 4 s^2)) /
+    sqrt(1 + 4 s^2 / theta^2).
 
-    b is the bias and s the rms of the axis (the Gaussian integral, done). Equal axes without bias give
-    1 / (1 + 4 s^2 / theta^2), as the density beta h^(beta - 1), beta = theta^2 / (4 s^2), of Toyoshima et al. (2002).
-    Raises ValueError for a half angle that is not above 0.
+    b is the bias and s the rms of the axis (the Gaussian integral, done). Equal axes without bias give 1 / (1 + 4 s^2 /
+    theta^2), as the density beta h^(beta - 1), beta = theta^2 / (4 s^2), of Toyoshima et al. (2002).
+
+    Args:
+        jitter: Bias b and rms s of the pointing error about each axis, in rad.
+        half_angle_rad: Half angles theta of the beam at 1/e2, in rad, any shape.
+
+    Raises:
+        ValueError: For a half angle that is not above 0.
     """
     return np.asarray(10.0 ** (-0.1 * mean_loss_db(jitter, half_angle_rad)))
 
 
 # -------------------------------------------------------------------------------------------------------- distribution
 def outage_probability(jitter: Jitter, half_angle_rad: ArrayLike, margin_db: ArrayLike) -> Floats:
-    """P(pointing loss > margin): the share of time that a fade margin above the power on axis does not cover.
+    """Share of the time in which the pointing loss exceeds a fade margin below the power on axis.
 
-    Half angle and margin are broadcast. Equal axes without bias give P(h < x) = x^beta, beta as in
-    `mean_transmission`. Raises ValueError for a negative margin or a half angle not above 0.
+    Equal axes without bias give P(h < x) = x^beta, beta as in `mean_transmission`.
+
+    Args:
+        jitter: Bias and rms of the pointing error about each axis, in rad.
+        half_angle_rad: Half angles of the beam at 1/e2, in rad; broadcast against the margins.
+        margin_db: Fade margins, in dB, positive.
+
+    Raises:
+        ValueError: For a negative margin or a half angle not above 0.
     """
     return radial_survival(jitter, radius_of_loss_rad(half_angle_rad, margin_db))
 
 
 def outage_loss_db(jitter: Jitter, half_angle_rad: ArrayLike, probability: ArrayLike) -> Floats:
-    """Pointing loss in dB not exceeded but for `probability`: the fade margin that this outage needs."""
+    """Pointing loss in dB that is exceeded with each probability: the fade margin that this outage needs.
+
+    Args:
+        jitter: Bias and rms of the pointing error about each axis, in rad.
+        half_angle_rad: Half angles of the beam at 1/e2, in rad; broadcast against the probabilities.
+        probability: Probabilities of the outage.
+
+    Raises:
+        ValueError: As `radial_quantile`, and for a half angle not above 0.
+    """
     return np.asarray(_DB_PER_SQUARE * (radial_quantile(jitter, probability) / _half_angle(half_angle_rad)) ** 2)
 
 
 def radius_of_loss_rad(half_angle_rad: ArrayLike, loss_db: ArrayLike) -> Floats:
-    """Radial error (rad) at which the pointing loss is `loss_db`, from loss = 8.686 dB (r / theta)^2."""
+    """Radial error (rad) at which the pointing loss has each value, from loss = 8.686 dB (r / theta)^2.
+
+    Args:
+        half_angle_rad: Half angles theta of the beam at 1/e2, in rad; broadcast against the losses.
+        loss_db: Pointing losses, in dB, positive.
+
+    Raises:
+        ValueError: For a negative loss or a half angle not above 0.
+    """
     loss = at_least_zero(loss_db, "loss", "dB")
     return np.asarray(_half_angle(half_angle_rad) * np.sqrt(loss / _DB_PER_SQUARE))
 
@@ -103,10 +150,19 @@ def best_divergence_for_outage(
     smallest_half_angle_rad: float = 0.0,
     current_half_angle_rad: float | None = None,
 ) -> BestDivergence:
-    """Half angle with the most power at the loss exceeded with `probability`: sqrt(2) times that radial error.
+    """Half angle with the most power at the loss exceeded with a probability: sqrt(2) times that radial error.
 
-    The loss there is 4.343 dB whatever the bias and the axes, unless the limit binds. Equal axes s without bias give
-    2 s sqrt(ln(1/p)). Raises ValueError as `best_divergence_for_static_error` and `radial_quantile`.
+    The loss there is 4.343 dB whatever the bias and the axes, unless the limit binds. Equal axes s without bias give 2
+    s sqrt(ln(1/p)).
+
+    Args:
+        jitter: Bias and rms of the pointing error about each axis, in rad.
+        probability: Probability p of the outage.
+        smallest_half_angle_rad: Smallest half angle at 1/e2 that the aperture allows, in rad; 0 for no limit.
+        current_half_angle_rad: Half angle to compare with, in rad, None for no comparison.
+
+    Raises:
+        ValueError: As `best_divergence_for_static_error` and `radial_quantile`.
     """
     radius = float(radial_quantile(jitter, probability))
     return best_divergence_for_static_error(
@@ -119,7 +175,13 @@ def best_divergence_for_static_error(
 ) -> BestDivergence:
     """Half angle with the most power at a static radial error: sqrt(2) times it, where 8/theta^2 h is largest.
 
-    Raises ValueError for a negative error, a current half angle below the smallest, or no error and no limit.
+    Args:
+        error_rad: Radial error, in rad.
+        smallest_half_angle_rad: Smallest half angle at 1/e2 that the aperture allows, in rad; 0 for no limit.
+        current_half_angle_rad: Half angle to compare with, in rad, None for no comparison.
+
+    Raises:
+        ValueError: For a negative error, a current half angle below the smallest, or no error and no limit.
     """
     error = float(at_least_zero(error_rad, "radial error", "rad"))
     limit = float(at_least_zero(smallest_half_angle_rad, "smallest half angle", "rad"))

@@ -86,31 +86,64 @@ def esa_1993_rad(terms: Terms) -> float:
 
 
 def axis_totals_rad(terms: Terms, confidence: float) -> tuple[float, float]:
-    """abs(mean) + n_p sigma about x and about y: ECSS-E-ST-60-10C 4.2.4.1."""
+    """Total error about x and about y in rad, abs(mean) + n_p sigma: ECSS-E-ST-60-10C 4.2.4.1.
+
+    Args:
+        terms: Mean and standard deviation of each error.
+        confidence: Share P that the total covers.
+
+    Raises:
+        ValueError: For what is no confidence.
+    """
     total, multiple = mean_and_sigma(terms), sigma_multiple(confidence)
     x, y = (abs(mean) + multiple * sigma for mean, sigma in zip(total.bias_rad, total.rms_rad, strict=True))
     return x, y
 
 
 def radial_total_rad(terms: Terms, confidence: float) -> float:
-    """sqrt(mean_x^2 + mean_y^2) + n_p sqrt(sigma_x^2 + sigma_y^2): ECSS-E-ST-60-10C 4.2.4.2.1, any two axes."""
+    """Total radial error in rad, for any two axes: ECSS-E-ST-60-10C 4.2.4.2.1.
+
+    It is sqrt(mean_x^2 + mean_y^2) + n_p sqrt(sigma_x^2 + sigma_y^2).
+
+    Args:
+        terms: Mean and standard deviation of each error.
+        confidence: Share P that the total covers.
+
+    Raises:
+        ValueError: For what is no confidence.
+    """
     total = mean_and_sigma(terms)
     return total.static_rad + sigma_multiple(confidence) * math.hypot(*total.rms_rad)
 
 
 def rayleigh_total_rad(terms: Terms, confidence: float) -> float:
-    """max(sigma_x, sigma_y) sqrt(-2 ln(1 - P)): ECSS-E-ST-60-10C 4.2.4.2.2, for means far below the deviations.
+    """Total radial error in rad, for means far below the deviations: ECSS-E-ST-60-10C 4.2.4.2.2.
 
-    Whether it may be used is for `rayleigh_caveat` to say.
+    It is max(sigma_x, sigma_y) sqrt(-2 ln(1 - P)). Whether it may be used is for `rayleigh_caveat` to say.
+
+    Args:
+        terms: Mean and standard deviation of each error.
+        confidence: Share P that the total covers.
+
+    Raises:
+        ValueError: For what is no confidence.
     """
     sigma_multiple(confidence)  # refuses what is no confidence
     return max(mean_and_sigma(terms).rms_rad) * math.sqrt(-2.0 * math.log1p(-confidence))
 
 
 def exact_total_rad(terms: Terms, confidence: float) -> float:
-    """Radial error that the Gaussian about the mean, unequal axes and all, keeps within with the confidence.
+    """Radial error in rad that the sum of all errors stays within, for the share of the confidence.
 
-    Exact but for what the sum has of other shapes. The reference that shows how conservative each rule is.
+    Exact for a Gaussian sum with any means and unequal axes; terms of other shapes are taken as Gaussian. It is the
+    reference that shows how conservative each rule is.
+
+    Args:
+        terms: Mean and standard deviation of each error.
+        confidence: Share that the total covers.
+
+    Raises:
+        ValueError: For what is no confidence.
     """
     sigma_multiple(confidence)  # refuses what is no confidence
     return float(radial_quantile(mean_and_sigma(terms), 1.0 - confidence))
@@ -128,7 +161,15 @@ TOTALS: dict[Rule, Callable[[Terms, float], float]] = {
 
 # ------------------------------------------------------------------------------------------------------- side by side
 def summations(terms: Terms, confidence: float) -> tuple[Summation, ...]:
-    """The total by each rule, each said to hold or not. Raises ValueError for no term, and for no confidence."""
+    """The total by each rule, and whether that rule holds here.
+
+    Args:
+        terms: Mean and standard deviation of each error.
+        confidence: Share that the totals cover.
+
+    Raises:
+        ValueError: For no term, and for no confidence.
+    """
     if not terms:
         raise ValueError("the pointing budget has 0 terms; give at least 1")
     totals = {rule: total(terms, confidence) for rule, total in TOTALS.items()}
@@ -250,10 +291,19 @@ def allocate(
     confidence: float,
     interpretation: Interpretation = "temporal",
 ) -> tuple[Allocation, ...]:
-    """For each line, the largest half width with which the total by `rule` just meets `total_rad`.
+    """For each line, the largest half width with which the total by a rule just meets a given one.
 
-    Totals grow with each line, so that there is one. `confidence` does not matter to the rules of stated half widths.
-    Raises ValueError for a total not above 0, an unknown rule, and as `error_term` and the rule do.
+    Totals grow with each line, so that there is one such width.
+
+    Args:
+        stated: The errors as they are stated.
+        total_rad: The total to meet, in rad.
+        rule: The rule by which the errors are summed, out of `TOTALS`.
+        confidence: Share that the total covers; it does not matter to the rules of stated half widths.
+        interpretation: "temporal" or "mixed", as of `error_term`.
+
+    Raises:
+        ValueError: For a total not above 0, an unknown rule, and as `error_term` and the rule do.
     """
     if not (math.isfinite(total_rad) and total_rad > 0.0):
         shown = format_quantity(total_rad, "rad")

@@ -10,11 +10,18 @@ from microrad.link.receivers.base import require, require_zero_or_more
 def background_power_w(
     spectral_radiance_w_m2_sr_m: float, aperture_area_m2: float, field_of_view_rad: float, filter_bandwidth_m: float
 ) -> float:
-    """Power that a uniform sky sends through aperture, field stop and filter, both polarisations, before any loss.
+    """Power in W that a uniform sky sends through aperture, field stop and filter, both polarisations, before any loss.
 
-    L A pi sin^2(field/2) d: `field_of_view_rad` is the full angle of a round field, filled by the sky;
-    `filter_bandwidth_m` is the full width of the filter. The radiance is per metre of wavelength:
-    1 W/(m^2 sr um) is 1e6 W/(m^2 sr m). Raises ValueError for a negative value and a field of more than pi rad.
+    It is L A pi sin^2(field/2) d. 1 W/(m^2 sr um) is 1e6 W/(m^2 sr m).
+
+    Args:
+        spectral_radiance_w_m2_sr_m: Radiance L of the sky per metre of wavelength, in W/(m^2 sr m).
+        aperture_area_m2: Area A of the aperture, in m^2.
+        field_of_view_rad: Full angle of the round field of view, in rad, filled by the sky.
+        filter_bandwidth_m: Full width d of the filter in wavelength, in m.
+
+    Raises:
+        ValueError: For a negative value and a field of more than pi rad.
     """
     require_zero_or_more("the spectral radiance", spectral_radiance_w_m2_sr_m, "W/(m^2 sr m)")
     require_zero_or_more("the aperture's area", aperture_area_m2, "m^2")
@@ -33,8 +40,15 @@ def background_power_w(
 def background_photons_per_mode(spectral_radiance_w_m2_sr_m: float, wavelength_m: float) -> float:
     """Mean photons in one spatial mode and one polarisation, L lambda^5 / (2 h c^2), of an unpolarised sky.
 
-    What a single-mode receiver takes from a source that fills its mode, before any loss: about 1e-6 from a bright
-    sky at 1.55 um, 0.25 from the sun. Raises ValueError for a negative radiance or a wavelength not above 0 m.
+    What a single-mode receiver takes from a source that fills its mode, before any loss: about 1e-6 from a bright sky
+    at 1.55 um, 0.25 from the sun.
+
+    Args:
+        spectral_radiance_w_m2_sr_m: Radiance L of the sky per metre of wavelength, in W/(m^2 sr m).
+        wavelength_m: Wavelength lambda, in m.
+
+    Raises:
+        ValueError: For a negative radiance or a wavelength not above 0 m.
     """
     require_zero_or_more("the spectral radiance", spectral_radiance_w_m2_sr_m, "W/(m^2 sr m)")
     require(wavelength_m > 0.0, "the wavelength", wavelength_m, "m", "it must be above 0 m")
@@ -44,8 +58,15 @@ def background_photons_per_mode(spectral_radiance_w_m2_sr_m: float, wavelength_m
 def apd_excess_noise_factor(gain: float, ionisation_ratio: float) -> float:
     """Excess noise factor k M + (1 - k) (2 - 1/M) of an avalanche photodiode (McIntyre 1966, IEEE T-ED 13, 164).
 
-    `gain` M is the mean; `ionisation_ratio` k is that of holes to electrons where electrons start the avalanche (its
-    inverse where holes do), from 0 to 1. Thick multiplication layers; thin ones have less noise. Raises ValueError.
+    It holds for thick multiplication layers; thin ones have less noise.
+
+    Args:
+        gain: Mean gain M, at least 1.
+        ionisation_ratio: Ratio k of holes to electrons where electrons start the avalanche (its inverse where holes
+            do), from 0 to 1.
+
+    Raises:
+        ValueError: For a gain below 1, and a ratio outside 0 to 1.
     """
     require(1.0 <= gain < math.inf, "the gain of the avalanche photodiode", gain, "", "it must be at least 1")
     require(

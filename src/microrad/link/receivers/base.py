@@ -46,29 +46,72 @@ def checked_powers(power_w: ArrayLike) -> Floats:
 
 
 def shown(value: float, unit: str) -> str:
-    """A value with its unit for a message."""
+    """A value with its unit for a message.
+
+    Args:
+        value: The value, in `unit`.
+        unit: Its SI unit, empty for a plain number.
+    """
     return format_quantity(value, unit).rstrip()
 
 
 def require(holds: bool, what: str, value: float, unit: str, limit: str) -> None:
-    """Raises ValueError, which names the value and its limit, unless it holds."""
+    """Check a condition on a value; the message names the value and its limit.
+
+    Args:
+        holds: Whether the condition holds.
+        what: What the value is, in the words of the message.
+        value: The value, in `unit`.
+        unit: Its SI unit, empty for a plain number.
+        limit: The condition in words.
+
+    Raises:
+        ValueError: Unless the condition holds.
+    """
     if not holds:
         raise ValueError(f"{what} is {shown(value, unit)}: {limit}")
 
 
 def require_zero_or_more(what: str, value: float, unit: str, advice: str = "") -> None:
-    """Raises ValueError if the value is below zero or not finite."""
+    """Check that a value is finite and zero or more.
+
+    Args:
+        what: What the value is, in the words of the message.
+        value: The value, in `unit`.
+        unit: Its SI unit, empty for a plain number.
+        advice: Words put behind the limit in the message.
+
+    Raises:
+        ValueError: If the value is below zero or not finite.
+    """
     zero = f"0 {unit}".rstrip()
     require(0.0 <= value < math.inf, what, value, unit, f"it must be finite and not below {zero}{advice}")
 
 
 def require_above_zero(what: str, value: float, unit: str) -> None:
-    """Raises ValueError if the value is not above zero, or not finite."""
+    """Check that a value is finite and above zero.
+
+    Args:
+        what: What the value is, in the words of the message.
+        value: The value, in `unit`.
+        unit: Its SI unit, empty for a plain number.
+
+    Raises:
+        ValueError: If the value is not above zero, or not finite.
+    """
     require(0.0 < value < math.inf, what, value, unit, f"it must be finite and above 0 {unit}")
 
 
 def require_efficiency(what: str, value: float) -> None:
-    """Raises ValueError if the efficiency is not above 0 and at most 1."""
+    """Check that an efficiency is above 0 and at most 1.
+
+    Args:
+        what: What the efficiency is, in the words of the message.
+        value: The efficiency, in counts or electrons per photon.
+
+    Raises:
+        ValueError: If the efficiency is not above 0 and at most 1.
+    """
     require(0.0 < value <= 1.0, what, value, "", "it must lie above 0, up to 1 (one count or electron for each photon)")
 
 
@@ -127,10 +170,15 @@ class Receiver(ABC):
         require(0.0 < self.code_rate <= 1.0, "the code rate", self.code_rate, "", "it must lie above 0, up to 1")
 
     def bit_error_ratio_at(self, power_w: ArrayLike, data_rate_bit_s: ArrayLike) -> Floats:
-        """Bit error ratio (after the decoder) at the average power `power_w` and the data rate; the two broadcast.
+        """Bit error ratio, after the decoder, at a received power and a data rate.
 
-        Raises ValueError for a negative power and a rate that is not positive, `RateError` for a rate above the
-        bandwidth.
+        Args:
+            power_w: Average received power, in W; broadcast against the data rate.
+            data_rate_bit_s: Data rate, in bit/s, without the check bits of a code.
+
+        Raises:
+            ValueError: For a negative power and a rate that is not positive.
+            RateError: For a rate above the bandwidth.
         """
         powers = checked_powers(power_w)
         power, rate = np.broadcast_arrays(powers * self._code_gain, self._rates(data_rate_bit_s))
@@ -162,7 +210,15 @@ class Receiver(ABC):
     def noise_lines(self, power_w: float, data_rate_bit_s: float) -> tuple[Line, ...]:
         """The independent terms of the noise at this power, each a standard deviation in one symbol of the line.
 
-        The symbols are those on the line, code included. Errors as of `bit_error_ratio_at`.
+        The symbols are those on the line, code included.
+
+        Args:
+            power_w: Average received power, in W.
+            data_rate_bit_s: Data rate, in bit/s, without the check bits of a code.
+
+        Raises:
+            ValueError: As `bit_error_ratio_at`.
+            RateError: As `bit_error_ratio_at`.
         """
         power, rate = float(checked_powers(power_w)), float(self._rates(data_rate_bit_s))
         return self._noise(power, float(self.symbol_rate_hz(rate)))

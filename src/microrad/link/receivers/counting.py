@@ -174,6 +174,12 @@ class _MostCounts(NamedTuple):
 
     @classmethod
     def of(cls, floor: Floats, order: int) -> "_MostCounts":
+        """The tables for slots without a pulse.
+
+        Args:
+            floor: Mean counts of a slot without a pulse, shape (rows,).
+            order: Number of slots in a symbol.
+        """
         b = floor[:, None]
         # Bernstein: beyond `last` an empty slot comes with exp(-45); the sum may step by half a standard deviation
         first, last = np.floor(np.maximum(b - 10.0 * np.sqrt(b), 0.0)), b + 15.0 + np.sqrt(225.0 + 90.0 * b)
@@ -190,7 +196,12 @@ class _MostCounts(NamedTuple):
         return cls(b, k, log_p + np.log(step), np.where(few < 1e-7, few, 1.0 - win))
 
     def error_ratio(self, pulse: Floats, row: slice | NDArray[np.int64]) -> Floats:
-        """Word error ratio with `pulse` mean signal counts, one for each of the rows."""
+        """Word error ratio for pulses of given strength, one for each of some rows.
+
+        Args:
+            pulse: Mean signal counts of the pulse, shape (chosen rows,).
+            row: The rows of the tables.
+        """
         signal, b = pulse[:, None], self.floor[row]
         probability = np.exp(self.log_weight[row] - signal + self.counts[row] * np.log1p(signal / b))
         return np.asarray((probability * self.loss[row]).sum(axis=1), dtype=np.float64)

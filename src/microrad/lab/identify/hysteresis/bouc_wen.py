@@ -82,7 +82,13 @@ class BoucWenProblem:
         return centred(np.concatenate(parts), self.records)
 
     def linear(self, columns: Floats, theta: Floats) -> Floats:
-        """The best d1 and epsilon; where epsilon takes back more of d1 than allowed, the best on that bound."""
+        """The best d1 and epsilon, shape (2,); where epsilon takes back more of d1 than allowed, the best on that
+        bound.
+
+        Args:
+            columns: Responses to unit d1 and to unit epsilon, as `columns` gives them, shape (samples, 2).
+            theta: The four searched numbers, scaled.
+        """
         size = np.sqrt(np.einsum("ij,ij->j", columns, columns)) + 1e-300
         gram = (columns.T @ columns) / np.outer(size, size) + 1e-13 * np.eye(2)
         best = np.linalg.solve(gram, (columns.T @ self.target) / size) / size
@@ -121,7 +127,14 @@ def _thin_problem(problem: BoucWenProblem) -> BoucWenProblem:
 
 # ----------------------------------------------------------------------------------------------------------- search
 def search_from_starts(problem: BoucWenProblem, starts: int, seed: int, on_progress: Progress) -> tuple[Floats, Floats]:
-    """Cost reached from each start, and the best point polished on all samples."""
+    """Cost reached from each start, shape (starts,), and the best point polished on all samples, shape (4,).
+
+    Args:
+        problem: The problem, with all samples.
+        starts: Number of scattered starts.
+        seed: Seed of the starts.
+        on_progress: Called with the starts done, their number and what is done.
+    """
     screen = _thin_problem(problem)
     points, costs = [], []
     for done, start in enumerate(_starts(screen, starts, seed), start=1):
@@ -173,9 +186,14 @@ def _search(problem: BoucWenProblem, start: Floats) -> Any:
 
 
 def with_tightened_bound(problem: BoucWenProblem, best: Floats) -> tuple[BoucWenProblem, Floats]:
-    """Lower the share of d1 that epsilon may take back until no slope along the recordings is negative.
+    """The problem and its best point once no slope along the recordings is negative any more.
 
-    The bound holds for slow reversals; at a fast one h is larger than its slow settled value by exp(delta |u'|).
+    For that the share of d1 that epsilon may take back is lowered. The bound holds for slow reversals; at a fast one h
+    is larger than its slow settled value by exp(delta |u'|).
+
+    Args:
+        problem: The problem, whose share is changed in place.
+        best: The best point so far, the four searched numbers.
     """
     for _ in range(12):
         values = problem.solve(best)
@@ -189,7 +207,12 @@ def with_tightened_bound(problem: BoucWenProblem, best: Floats) -> tuple[BoucWen
 
 # ---------------------------------------------------------------------------------------------------------- values
 def stacked_output(problem: BoucWenProblem, values: Floats) -> Floats:
-    """Model output of the used samples of all records, without offset."""
+    """Model output (rad) of the used samples of all records one behind the other, without offset.
+
+    Args:
+        problem: The problem with its records.
+        values: The six parameters in the order of `PARAMETERS`.
+    """
     row = np.array([*values, problem.rate_limit, 0.0])
     return np.concatenate([bouc_wen_response(r.drive_v, r.step_s, row, 0.0)[0][r.start :] for r in problem.records])
 
@@ -216,7 +239,12 @@ def made_rising(model: BoucWen) -> BoucWen:
 
 
 def lowest_slope(problem: BoucWenProblem, values: Floats) -> float:
-    """Lowest dy/du along the used samples, at the begin of each step, positive in the direction of d1."""
+    """Lowest slope dy/du (rad/V) along the used samples, at the begin of each step, positive in the direction of d1.
+
+    Args:
+        problem: The problem with its records.
+        values: The six parameters in the order of `PARAMETERS`.
+    """
     d1, d2, epsilon, delta, alpha, beta = values
     row = np.array([*values, problem.rate_limit, 0.0])
     lowest = math.inf
@@ -305,7 +333,12 @@ class BoucWenFit(Estimate):
         return value, float(math.sqrt(max(0.0, gradient @ self.covariance @ gradient)))
 
     def response(self, drive_v: Floats, step_s: float) -> tuple[Floats, int]:
-        """Output (rad) without offset for a drive (V) from h = 0, and the number of rate-clamped samples."""
+        """Output (rad) without offset for a drive (V) from h = 0, and the number of rate-clamped samples.
+
+        Args:
+            drive_v: Drive, in V, shape (samples,).
+            step_s: Time between samples, in s.
+        """
         output, _, clamped = bouc_wen_response(drive_v, step_s, np.array(self.model.row[:8]), 0.0)
         return output, int(clamped)
 

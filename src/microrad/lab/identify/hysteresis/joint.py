@@ -102,7 +102,12 @@ class JointFit:
         return tuple((name, f"{fact}; {_WHY.get(name.partition(' ')[0], reversals)}") for name, fact in found)
 
     def response(self, drive_v: Floats, step_s: float) -> tuple[Floats, int]:
-        """Output (rad) without offset for a drive (V), at rest at the first drive value, and the clamped samples."""
+        """Output (rad) without offset from rest at the first drive value, and the number of rate-clamped samples.
+
+        Args:
+            drive_v: Drive, in V, shape (samples,).
+            step_s: Time between samples, in s.
+        """
         plant = mirror.discretise(self.mirror, step_s)
         state = mirror.at_rest(plant)
         output = np.empty((drive_v.size, 1))
@@ -111,7 +116,12 @@ class JointFit:
         return output[:, 0], int(state.clamped.sum())
 
     def nuisance(self, samples: int, step_s: float) -> Floats:
-        """What a record may add by itself (samples, columns): an offset, and the tail of a creep begun before it."""
+        """What a record may add by itself (samples, columns): an offset, and the tail of a creep begun before it.
+
+        Args:
+            samples: Length of the record in samples.
+            step_s: Time between samples, in s.
+        """
         return _nuisance(samples, step_s, self.creep.time_constants_s)
 
 
@@ -216,7 +226,13 @@ def fit_joint(  # noqa: PLR0913  all but the first three are named options
 
 # ---------------------------------------------------------------------------------------------------------- starts
 def fit_static_start(recordings: Sequence[Recording], units: Units, seed: int) -> BoucWenFit:
-    """The fit of Eq. 3 at which all Bouc-Wen forms begin."""
+    """The fit of Eq. 3 at which all Bouc-Wen forms begin.
+
+    Args:
+        recordings: Recordings of one axis.
+        units: Units of their drives and outputs.
+        seed: Seed of the scattered starts.
+    """
     return fit_bouc_wen(recordings, starts=6, seed=seed, units=units)
 
 
@@ -310,7 +326,13 @@ def _play_start(
 
 
 def behind_linear_part(columns: Floats, linear: LinearPoles | None, step_s: float) -> Floats:
-    """Columns (samples, any) behind the linear part, each from rest and straight between its samples."""
+    """Columns filtered by the linear part, each from rest and straight between its samples.
+
+    Args:
+        columns: The columns, shape (samples, any).
+        linear: The linear part, None to leave the columns as they are.
+        step_s: Time between samples, in s.
+    """
     if linear is None:
         return columns
     system = linear.system

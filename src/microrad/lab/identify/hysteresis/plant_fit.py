@@ -87,7 +87,12 @@ class FitRecord:
 
 
 def without_nuisance(nuisance: Floats, signal: Floats) -> Floats:
-    """A signal (samples, outputs) less its projection onto orthonormal columns (samples, columns)."""
+    """A signal less its projection onto orthonormal columns.
+
+    Args:
+        nuisance: The orthonormal columns, shape (samples, columns).
+        signal: The signal, shape (samples, outputs).
+    """
     return np.asarray(signal - nuisance @ (nuisance.T @ signal)) if nuisance.size else signal
 
 
@@ -176,7 +181,12 @@ def _one_period(recording: Recording, factor: int, hold: Interpolation) -> tuple
 
 
 def simulate_record(plant: kernels.Plant, run: FitRecord) -> Floats:
-    """Output (samples, outputs) of the plant over a run, from rest."""
+    """Output (samples, outputs) of the plant over a run, from rest.
+
+    Args:
+        plant: The discrete plant, with the time step of the run's drive.
+        run: The run, whose drive has `stride` steps in each sample of the output.
+    """
     state = mirror.at_rest(plant)
     output = np.empty((run.drive.shape[0], len(plant.outputs)))
     bank = np.empty((run.drive.shape[0], 0))

@@ -66,7 +66,12 @@ class PrandtlIshlinskiiFit:
         return int(np.sum(self.weights_rad_per_v > 0))
 
     def response(self, drive_v: Floats, step_s: float) -> tuple[Floats, int]:
-        """Output (rad) without offset for a drive (V), every operator starting at the first drive value; 0 clamped."""
+        """Output (rad) without offset, every operator starting at the first drive value; no sample is clamped (0).
+
+        Args:
+            drive_v: Drive, in V, shape (samples,).
+            step_s: Time between samples, in s, on which this model does not depend.
+        """
         active = self.weights_rad_per_v > 0
         states = _states(drive_v, self.thresholds_v[active])
         return np.asarray(self.sign * (states @ self.weights_rad_per_v[active])), 0
@@ -127,7 +132,12 @@ def _states(drive_v: Floats, thresholds_v: Floats) -> Floats:
 
 
 def threshold_grid(drive_span: float, operators: int) -> Floats:
-    """Thresholds spread evenly from 0 to 0.47 of the peak-to-peak drive."""
+    """Thresholds spread evenly from 0 to 0.47 of the peak-to-peak drive.
+
+    Args:
+        drive_span: Peak-to-peak drive, in V.
+        operators: Number of thresholds.
+    """
     return np.linspace(0.0, 0.47 * drive_span, operators)
 
 
@@ -148,7 +158,14 @@ def _thresholds(records: Sequence[SiRecord], given: ArrayLike | None, operators:
 
 
 def non_negative_weights(states: Floats, output: Floats) -> Floats:
-    """Weights >= 0 by least squares; the triangle of a QR decomposition holds the same problem in a few rows."""
+    """Weights of 0 or more with the least squared error.
+
+    The triangle of a QR decomposition holds the same problem in a few rows.
+
+    Args:
+        states: Outputs of the operators, shape (samples, operators).
+        output: Output to be met, shape (samples,).
+    """
     from scipy.optimize import nnls
 
     triangle = np.asarray(np.linalg.qr(np.column_stack((states, output)), mode="r"))

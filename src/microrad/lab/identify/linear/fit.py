@@ -92,13 +92,21 @@ def parameter_covariance(polished: Polished) -> Floats:
 
 
 def transfer_matrix(model: ModalModel, points: Complexes) -> Complexes:
-    """Transfer matrix at any complex frequencies (rad/s), shape (points, outputs, inputs)."""
+    """Transfer matrix at any complex frequencies (rad/s), shape (points, outputs, inputs).
+
+    Args:
+        model: The modal model.
+        points: Complex frequencies, in rad/s, shape (points,).
+    """
     return model.combined(1.0 / (np.asarray(points)[:, None] - model.all_poles_rad_s))
 
 
 def transmission_zeros(model: ModalModel, below_rad_s: float) -> Complexes:
-    """Complex frequencies at which the square transfer matrix loses rank, up to `below_rad_s`; none where not
-    square.
+    """Complex frequencies (rad/s) at which the square transfer matrix loses rank; none where it is not square.
+
+    Args:
+        model: The modal model.
+        below_rad_s: Largest modulus of the zeros returned, in rad/s.
     """
     from scipy.linalg import eig
 

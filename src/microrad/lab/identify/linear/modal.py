@@ -66,8 +66,15 @@ class ModalModel:
         return np.concatenate([self.poles_rad_s, self.poles_rad_s[self.real_poles :].conj()])
 
     def response(self, freq_hz: Floats, hold: Hold = "band-limited", rate_hz: float | None = None) -> Complexes:
-        """Sampled response behind the hold, shape (frequencies, outputs, inputs); band-limited is the continuous
-        one.
+        """Sampled response behind the hold, shape (frequencies, outputs, inputs); band-limited is the continuous one.
+
+        Args:
+            freq_hz: Frequencies, in Hz, shape (frequencies,).
+            hold: What the drive does between samples.
+            rate_hz: Sample rate, in Hz; a band-limited drive needs none.
+
+        Raises:
+            IdentificationError: For a hold without a rate.
         """
         return self.combined(hold_basis(self.all_poles_rad_s, freq_hz, hold, rate_hz)[0])
 
@@ -102,7 +109,14 @@ class ModalModel:
 
 
 def order_modes(poles: Complexes, inputs: Complexes, outputs: Complexes, direct: Floats) -> ModalModel:
-    """A model of the given modes, real ones first, then by frequency, with vectors of equal length in each mode."""
+    """A model of the given modes, real ones first, then by frequency, with vectors of equal length in each mode.
+
+    Args:
+        poles: One pole of each mode, in rad/s, shape (modes,), of a pair the one with positive frequency.
+        inputs: Input vectors, shape (modes, inputs).
+        outputs: Output vectors, shape (outputs, modes).
+        direct: Direct term, shape (outputs, inputs).
+    """
     size_in = np.linalg.norm(inputs, axis=1)
     balance = np.sqrt(np.linalg.norm(outputs, axis=0) / np.where(size_in > 0, size_in, 1.0))
     balance = np.where(balance > 0, balance, 1.0)
@@ -114,9 +128,13 @@ def order_modes(poles: Complexes, inputs: Complexes, outputs: Complexes, direct:
 def rank_one_modes(
     poles: Complexes, residues: Iterable[Complexes], direct: Floats, most: int | None = None
 ) -> ModalModel:
-    """Modes with the singular vectors of each residue, as many as its rank and at most `most`.
+    """Modes with the singular vectors of each residue, as many as its rank.
 
-    Conjugate poles are left out of `poles`, and `residues` are matrices (outputs, inputs), one for each pole.
+    Args:
+        poles: Poles, in rad/s, without their conjugates.
+        residues: One matrix (outputs, inputs) for each pole.
+        direct: Direct term, shape (outputs, inputs).
+        most: Largest number of modes for one pole, None for no limit.
     """
     kept, inputs, outputs = [], [], []
     for pole, residue in zip(poles, residues, strict=True):
@@ -132,7 +150,10 @@ def rank_one_modes(
 def real_columns(basis: Complexes, real: int) -> Complexes:
     """Columns with real coefficients: those of the real poles, then sums and turned differences of each pair.
 
-    The columns of `basis` belong to `real` real poles, then the upper halves of the pairs, then the lower ones.
+    Args:
+        basis: Columns of the real poles, then of the upper halves of the pairs, then of the lower ones, shape (rows,
+            poles).
+        real: Number of real poles.
     """
     pairs = (basis.shape[1] - real) // 2
     upper, lower = basis[:, real : real + pairs], basis[:, real + pairs :]
@@ -141,7 +162,16 @@ def real_columns(basis: Complexes, real: int) -> Complexes:
 
 # ---------------------------------------------------------------------------------------------------------- the hold
 def hold_step(poles_rad_s: Complexes, hold: Hold, rate_hz: float) -> Step:
-    """One exact step of each mode for a drive held as `hold` says; band-limited has none (`IdentificationError`)."""
+    """One exact step of each mode, from sample to sample, for a drive held in a given way.
+
+    Args:
+        poles_rad_s: Poles, in rad/s, shape (modes,).
+        hold: What the drive does between samples.
+        rate_hz: Sample rate, in Hz.
+
+    Raises:
+        IdentificationError: For a band-limited drive, which has no such step.
+    """
     if hold == "band-limited":
         raise IdentificationError(
             "a band-limited drive cannot be stepped from sample to sample; choose the zero-order hold (a converter "
@@ -189,7 +219,17 @@ def _phi(a: Complexes) -> tuple[Complexes, Complexes, Complexes, Complexes, Comp
 def hold_basis(
     poles_rad_s: Complexes, freq_hz: Floats, hold: Hold, rate_hz: float | None
 ) -> tuple[Complexes, Complexes]:
-    """Sampled response of 1/(s - p) behind the hold, and its derivative by p; shapes (frequencies, poles)."""
+    """Sampled response of 1/(s - p) behind the hold, and its derivative by p, both of shape (frequencies, poles).
+
+    Args:
+        poles_rad_s: Poles p, in rad/s, shape (poles,).
+        freq_hz: Frequencies, in Hz, shape (frequencies,).
+        hold: What the drive does between samples.
+        rate_hz: Sample rate, in Hz; None is enough for a band-limited drive.
+
+    Raises:
+        IdentificationError: For another hold without a rate.
+    """
     s = 2j * np.pi * np.asarray(freq_hz, dtype=float)[:, None]
     p = np.asarray(poles_rad_s, dtype=complex)[None, :]
     if hold == "band-limited":
@@ -208,7 +248,18 @@ def hold_basis(
 def filtered(
     poles_rad_s: Complexes, drive: Floats, hold: Hold, rate_hz: float, *, rates: bool = False
 ) -> tuple[Complexes, Complexes | None]:
-    """Each drive behind each mode from rest, and the derivative by the pole; shapes (modes, inputs, samples)."""
+    """Each drive behind each mode from rest, and its derivative by the pole, both of shape (modes, inputs, samples).
+
+    Args:
+        poles_rad_s: Poles, in rad/s, shape (modes,).
+        drive: Drives, shape (samples, inputs).
+        hold: What the drive does between samples, not band-limited.
+        rate_hz: Sample rate, in Hz.
+        rates: Whether the derivatives are wanted; else they are None.
+
+    Raises:
+        IdentificationError: For a band-limited drive.
+    """
     from scipy.signal import lfilter
 
     step = hold_step(poles_rad_s, hold, rate_hz)
@@ -229,7 +280,17 @@ def filtered(
 
 # --------------------------------------------------------------------------------------------------------- simulation
 def simulate(model: ModalModel, drive: Floats, rate_hz: float, hold: Hold = "zero-order") -> Floats:
-    """Output (samples, outputs) from rest for a drive (samples, inputs), exact at the samples for the hold."""
+    """Output (samples, outputs) from rest, exact at the samples for the hold.
+
+    Args:
+        model: The modal model.
+        drive: Drives, shape (samples, inputs).
+        rate_hz: Sample rate, in Hz.
+        hold: What the drive does between samples, not band-limited.
+
+    Raises:
+        IdentificationError: For a band-limited drive.
+    """
     states, _ = filtered(model.poles_rad_s, drive, hold, rate_hz)
     modes = np.einsum("ki,kit->kt", model.input_vectors, states)
     modes[model.real_poles :] *= 2.0
@@ -237,7 +298,14 @@ def simulate(model: ModalModel, drive: Floats, rate_hz: float, hold: Hold = "zer
 
 
 def simulate_periodic(model: ModalModel, period: Floats, rate_hz: float, hold: Hold = "zero-order") -> Floats:
-    """Steady-state output (samples, outputs) for one period of a periodic drive (samples, inputs)."""
+    """Steady-state output (samples, outputs) for a periodic drive.
+
+    Args:
+        model: The modal model.
+        period: One period of the drives, shape (samples, inputs).
+        rate_hz: Sample rate, in Hz.
+        hold: What the drive does between samples.
+    """
     samples = period.shape[0]
     response = model.response(np.arange(samples // 2 + 1) * (rate_hz / samples), hold, rate_hz)
     if samples % 2 == 0:

@@ -45,13 +45,23 @@ def fit_order(
     fine: bool = True,
     smaller: ModalModel | None = None,
 ) -> Polished:
-    """Modal model with `order` states of least output error in a response: vector fit, reduction, exchanges, polish.
+    """Modal model of a given order with the least output error in a response.
 
-    The error is weighed by the power of the drives, so that the sum is the mean-square output error. `exchanges` is
-    the largest number of modes exchanged from each of two starts (vector fits of `order` and of 1.4 `order` poles), 0
-    for one start and no exchange; without `fine` the last polish on all lines is left out. `smaller` is a model of one
-    input with one state less: with a real pole more it is another start of the last polish, so that the fit is never
-    worse than it.
+    It is found by vector fit, reduction, exchanges of modes and polish. The error is weighed by the power of the
+    drives, so that the sum is the mean-square output error.
+
+    Args:
+        response: The measured frequency response with the power of its drives.
+        order: Number of states.
+        direct: Whether the model has a direct term.
+        exchanges: Largest number of modes exchanged from each of two starts (vector fits of `order` and of 1.4 `order`
+            poles); 0 for one start and no exchange.
+        fine: Whether the result is polished once more on all lines.
+        smaller: Model of one input with one state less; with a real pole more it is another start of the last polish,
+            so that the fit is never worse than it.
+
+    Raises:
+        IdentificationError: For an order below 1, or beyond what the frequencies can fix.
     """
     check_order(response.freq_hz, order)
     freq, values, power = _merged(response)
@@ -109,7 +119,12 @@ def _merged(response: FrequencyResponse) -> tuple[Floats, Complexes, Complexes]:
 
 # ------------------------------------------------------------------------------------------------------------ reduction
 def reduced(model: ModalModel, order: int) -> ModalModel:
-    """Balanced truncation to `order` states, as rank-one modes; the model itself where it has no more."""
+    """A model cut down to fewer states by balanced truncation, as rank-one modes; itself where it has no more.
+
+    Args:
+        model: The modal model.
+        order: Largest number of states.
+    """
     if model.order <= order:
         return model
     p, (b, c) = model.all_poles_rad_s, model.all_vectors

@@ -43,7 +43,12 @@ class Equations(Protocol):
     power: float
 
     def blocks(self, poles_rad_s: Complexes, rates: bool) -> Iterator[Block]:
-        """The rows for these poles, with derivatives by the poles where asked."""
+        """The rows of the equations for some poles.
+
+        Args:
+            poles_rad_s: Poles of the modes, in rad/s, shape (modes,), real ones first, of each pair one.
+            rates: Whether the derivatives by the poles are wanted.
+        """
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +93,12 @@ class FrequencyEquations:
         self.decay_rad_s = 2 * np.pi * float(freq_hz.min()) * _LOWEST_DECAY
 
     def blocks(self, poles_rad_s: Complexes, rates: bool) -> Iterator[Block]:
-        """One block: real and imaginary parts of all lines."""
+        """One block: real and imaginary parts of all lines.
+
+        Args:
+            poles_rad_s: Poles of the modes, in rad/s, shape (modes,), real ones first, of each pair one.
+            rates: Whether the derivatives by the poles are wanted.
+        """
         real = int(np.count_nonzero(poles_rad_s.imag == 0))
         every = np.concatenate([poles_rad_s, poles_rad_s[real:].conj()])
         basis, slope = hold_basis(every, self.freq_hz, self.hold, self.rate_hz)
@@ -123,7 +133,12 @@ class TimeEquations:
         self.decay_rad_s = _LOWEST_DECAY * 2 * np.pi * min(rate / len(y) for _, y, rate in self.records)
 
     def blocks(self, poles_rad_s: Complexes, rates: bool) -> Iterator[Block]:
-        """One block for each record."""
+        """One block for each record.
+
+        Args:
+            poles_rad_s: Poles of the modes, in rad/s, shape (modes,), real ones first, of each pair one.
+            rates: Whether the derivatives by the poles are wanted.
+        """
         real = int(np.count_nonzero(poles_rad_s.imag == 0))
         for drive, output, rate_hz in self.records:
             behind, slopes = filtered(poles_rad_s, drive, self.hold, rate_hz, rates=rates)
@@ -146,8 +161,14 @@ def _centred(values: Floats) -> Floats:
 
 # ---------------------------------------------------------------------------------------------------- normal equations
 def pack(model: ModalModel, direct: bool) -> Floats:
-    """Parameters: poles (real part, frequency of pairs), input vectors (real, imaginary of pairs), then per output the
-    output vector (real parts, imaginary parts of pairs) and the direct term, where that is free.
+    """The parameters of a model as one vector.
+
+    They are poles (real part, frequency of pairs), input vectors (real, imaginary of pairs), then per output the output
+    vector (real parts, imaginary parts of pairs) and the direct term, where that is free.
+
+    Args:
+        model: The modal model.
+        direct: Whether the direct term is free.
     """
     m = model.real_poles
     b, c = model.input_vectors, model.output_vectors
@@ -157,7 +178,12 @@ def pack(model: ModalModel, direct: bool) -> Floats:
 
 
 def unpack(theta: Floats, like: ModalModel) -> ModalModel:
-    """The model of a parameter vector of `pack`, with as many real poles and pairs as `like`."""
+    """The model that a parameter vector stands for.
+
+    Args:
+        theta: Parameters, as `pack` orders them.
+        like: A model with as many real poles, pairs, inputs and outputs.
+    """
     n, m = like.poles_rad_s.size, like.real_poles
     outputs, inputs = like.direct.shape
     sizes = [n, n - m, n * inputs, (n - m) * inputs]
@@ -179,7 +205,13 @@ def _with_outputs(poles: Complexes, b: Complexes, own: Floats, real: int) -> Mod
 
 
 def behind_modes(behind: Floats, b: Complexes, real: int) -> Floats:
-    """Rows of each mode's state: one for a real pole; for a pair those of Re c and of Im c, stacked behind."""
+    """Rows of each mode's state: one for a real pole; for a pair those of Re c and of Im c, one block behind the other.
+
+    Args:
+        behind: The drives behind the filters, shape (filters, inputs, columns).
+        b: Input vectors of the modes, shape (modes, inputs), those of real poles first.
+        real: Number of real poles.
+    """
     pairs = len(b) - real
     first, second = behind[real : real + pairs], behind[real + pairs :]
     gamma, delta = b[real:].real, b[real:].imag
@@ -197,7 +229,13 @@ def _mixed(weights: Floats, rows: Floats) -> Floats:
 
 
 def fit_outputs(equations: Equations, poles: Complexes, inputs: Complexes) -> tuple[ModalModel, float]:
-    """Best output vectors and direct term for given poles and input vectors, and the sum of squares left."""
+    """Best output vectors and direct term for given poles and input vectors, and the sum of squares left.
+
+    Args:
+        equations: The equations to be met.
+        poles: Poles of the modes, in rad/s, shape (modes,), real ones first, of each pair one.
+        inputs: Input vectors, shape (modes, inputs).
+    """
     real = int(np.count_nonzero(poles.imag == 0))
     gram: Floats | float = 0.0
     cross: Floats | float = 0.0
@@ -214,7 +252,12 @@ def fit_outputs(equations: Equations, poles: Complexes, inputs: Complexes) -> tu
 
 
 def normal_equations(equations: Equations, model: ModalModel) -> tuple[Floats, Floats, float]:
-    """Normal matrix, gradient (of half the cost) and cost in the parameters of `pack`."""
+    """Normal matrix, gradient of half the cost, and cost, in the parameters of `pack`.
+
+    Args:
+        equations: The equations to be met.
+        model: The model about which they are made linear.
+    """
     n, m = model.poles_rad_s.size, model.real_poles
     outputs, inputs = model.direct.shape
     shared, width = (2 * n - m) * (1 + inputs), 2 * n - m + inputs * equations.direct
@@ -264,9 +307,15 @@ def _shared_rows(behind: Floats, moved: Floats, c: Complexes, real: int) -> Floa
 
 # -------------------------------------------------------------------------------------------------------- trust region
 def polish(equations: Equations, model: ModalModel, *, iterations: int = 50, tolerance: float = 1e-6) -> Polished:
-    """Least squares by Levenberg-Marquardt with the output vectors projected out; ends when two steps in a row gain
-    less than `tolerance` of the cost. Poles stay stable: a step beyond the slowest decay that the data can show stops
-    there.
+    """Improve a model by least squares: Levenberg-Marquardt with the output vectors projected out.
+
+    Poles stay stable: a step beyond the slowest decay that the data can show stops there.
+
+    Args:
+        equations: The equations to be met.
+        model: The model to begin with.
+        iterations: Largest number of steps.
+        tolerance: The search ends when two steps in a row gain less than this share of the cost.
     """
     model, _ = fit_outputs(equations, model.poles_rad_s, model.input_vectors)
     model = _balanced(model)

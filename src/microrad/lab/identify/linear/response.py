@@ -116,7 +116,15 @@ def _check(records: Sequence[Recording]) -> None:
 
 
 def check_alike(records: Sequence[Recording], done: str) -> None:
-    """Raises IdentificationError if records differ in rate or channels; `done` says what is done to them."""
+    """Check that records have the same rate and the same number of channels.
+
+    Args:
+        records: The records, at least one.
+        done: What is done to them, in words for the message.
+
+    Raises:
+        IdentificationError: If records differ in rate or channels.
+    """
     first = records[0]
     for other in records[1:]:
         if other.rate_hz != first.rate_hz:

@@ -108,7 +108,15 @@ def vector_fit(
 
 
 def check_order(freq: Floats, order: int) -> None:
-    """Raises IdentificationError if the number of poles is below 1 or beyond what so many frequencies can fix."""
+    """Check that a number of poles can be fitted to so many frequencies.
+
+    Args:
+        freq: The frequencies, shape (frequencies,).
+        order: Number of poles.
+
+    Raises:
+        IdentificationError: If the number of poles is below 1 or beyond what so many frequencies can fix.
+    """
     if order < 1:
         raise IdentificationError(f"the order is {order}; give at least one pole.")
     if freq.size < order + 1:
@@ -134,7 +142,12 @@ def _check(freq: Floats, order: int, data: Complexes, hold: Hold, rate_hz: float
 
 
 def starting_poles(freq_hz: Floats, order: int) -> Complexes:
-    """Lightly damped pairs spread over the given frequencies as these lie, and for an odd order one real pole."""
+    """Lightly damped pairs (rad/s) as dense as the given frequencies, and for an odd order one real pole.
+
+    Args:
+        freq_hz: Frequencies, in Hz, shape (frequencies,).
+        order: Number of poles.
+    """
     at = np.quantile(np.sort(freq_hz), (np.arange(order // 2) + 0.5) / max(order // 2, 1))
     pairs = 2 * np.pi * at * (-0.01 + 1j)
     real = [-2 * np.pi * float(np.median(freq_hz))] if order % 2 else []

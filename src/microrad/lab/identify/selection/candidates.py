@@ -239,11 +239,21 @@ class Candidates:
         return tuple(predict(fit, recording, split) for recording, split in pairs)
 
     def scored(self, fit: Fit, predictions: tuple[Prediction, ...]) -> ScoredModel:
-        """A fit with its score, for whoever looks on."""
+        """A fit with its score, as those who look on are given it.
+
+        Args:
+            fit: The fit.
+            predictions: Its prediction of each recording: loops, then validation.
+        """
         return ScoredModel(fit.name, self.score(fit.name, predictions), predictions, self.recordings)
 
     def score(self, model: str, predictions: Sequence[Prediction]) -> Score:
-        """Residuals of a model on the fitted and on the held-out samples, in per cent of the span."""
+        """Residuals of a model on the fitted and on the held-out samples, in per cent of the span.
+
+        Args:
+            model: Name of the model.
+            predictions: Its prediction of each recording: loops, then validation.
+        """
         fitted = [p.residual_rad[p.start : p.split] for p in predictions[: len(self.loops)]]
         unseen = [p.residual_rad[p.split :] for p in predictions]
         return Score(
@@ -254,7 +264,16 @@ class Candidates:
 def refit_winner(
     candidates: Candidates, winner: Fit, predictions: tuple[Prediction, ...], on_progress: Progress
 ) -> tuple[Fit, tuple[Prediction, ...]]:
-    """The winner with all its numbers free, its linear part among them, where that is no worse on the held-out part."""
+    """Fit the winner once more with all its numbers free, its linear part among them.
+
+    The new fit is taken where it is no worse on the held-out part; one without a linear part stays as it is.
+
+    Args:
+        candidates: The recordings that the models are fitted to and judged by.
+        winner: The fit chosen.
+        predictions: Its prediction of each recording.
+        on_progress: Called with the starts done, their number and what is done.
+    """
     if not isinstance(winner, JointFit) or winner.linear is None:
         return winner, predictions
     free = candidates.fit_joint(winner.name, winner.linear, on_progress, free_linear=True)

@@ -92,7 +92,14 @@ def predict(fit: Fit, recording: Recording, split: int | None = None) -> Predict
 def straight_line(
     prepared: Sequence[SiRecord], recordings: Sequence[Recording], splits: Sequence[int], units: Units
 ) -> list[Prediction]:
-    """One slope for all recordings and one offset for each, from the fitted samples; a split of 0 is all unseen."""
+    """One slope for all recordings and one offset for each, from the fitted samples.
+
+    Args:
+        prepared: The fitted parts in SI units.
+        recordings: The recordings to predict: loops, then validation.
+        splits: Samples at the begin of each recording that were fitted; 0 where all are unseen.
+        units: Units of the recordings.
+    """
     above = [(p.drive_v[p.start :], p.output_rad[p.start :]) for p in prepared]
     slope = sum(float((u - u.mean()) @ (y - y.mean())) for u, y in above) / sum(
         float((u - u.mean()) @ (u - u.mean())) for u, _ in above

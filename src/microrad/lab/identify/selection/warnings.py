@@ -24,7 +24,12 @@ _FLIPPED = (
 
 
 def range_warnings(drive_range: tuple[float, float], rate: float) -> list[str]:
-    """The drives and rates that the fit has seen."""
+    """The drives and rates that the fit has seen.
+
+    Args:
+        drive_range: Lowest and highest drive fitted, in V.
+        rate: Fastest rate of the drives fitted, in V/s.
+    """
     low, high = drive_range
     freq_hz = rate / (math.pi * (high - low))
     digits = max(0, 3 - math.floor(math.log10(high - low)))  # to a thousandth of the range
@@ -37,7 +42,12 @@ def range_warnings(drive_range: tuple[float, float], rate: float) -> list[str]:
 
 
 def set_aside_warnings(recordings: Sequence[Recording], predictions: Sequence[Prediction]) -> list[str]:
-    """Records of which more than a fifth is not fitted, because the drive takes that long to sweep its range once."""
+    """Records of which more than a fifth is not fitted, because the drive takes that long to sweep its range once.
+
+    Args:
+        recordings: The recordings fitted.
+        predictions: The model's prediction of each of them.
+    """
     return [
         f"{recording.path}: the first {p.start} of {p.split} samples are set aside, until the drive has swept its "
         "range once, because what the mirror remembers from before is not known; begin a record with its largest sweep."
@@ -52,7 +62,12 @@ def depends_on_rate(fit: JointFit) -> bool:
 
 
 def rate_warnings(records: Sequence[SiRecord], fit: Fit) -> list[str]:
-    """What the rates of the loops do not show, and a drive too noisy to have a rate."""
+    """What the rates of the loops do not show, and a drive too noisy to have a rate.
+
+    Args:
+        records: The fitted parts in SI units.
+        fit: The model chosen.
+    """
     warnings = []
     slowest, fastest = loop_rates(records)
     if one_rate_only(records):
@@ -77,7 +92,14 @@ def rate_warnings(records: Sequence[SiRecord], fit: Fit) -> list[str]:
 def held_out_warnings(
     recordings: Sequence[Recording], units: Units, drive_range: tuple[float, float], predictions: Sequence[Prediction]
 ) -> list[str]:
-    """Held-out samples beyond the drives that were fitted."""
+    """Held-out samples beyond the drives that were fitted.
+
+    Args:
+        recordings: The recordings.
+        units: Units of their drives and outputs.
+        drive_range: Lowest and highest drive fitted, in V.
+        predictions: The model's prediction of each recording.
+    """
     low, high = drive_range
     margin = 0.02 * (high - low)
     outside = 0
@@ -90,7 +112,12 @@ def held_out_warnings(
 
 
 def score_warnings(score: Score, line: Score) -> list[str]:
-    """A model no better than a line, or much worse on what it has not seen."""
+    """A model no better than a line, or much worse on what it has not seen.
+
+    Args:
+        score: Score of the model.
+        line: Score of the straight line.
+    """
     warnings = []
     if score.held_out_rms_percent >= line.held_out_rms_percent:
         warnings.append("No model is better than a straight line on the held-out samples: do not use the hysteresis.")
@@ -135,6 +162,11 @@ def drift(
     """Largest linear trend of a record's residual over its length (rad), and a warning where it stands out.
 
     It stands out above three standard errors (noise colour counted) and above 0.2 % of the peak-to-peak output.
+
+    Args:
+        predictions: The model's prediction of each recording.
+        recordings: The recordings, in the same order.
+        span_rad: Peak-to-peak output, in rad.
     """
     largest, warnings = 0.0, []
     for prediction, recording in zip(predictions, recordings, strict=True):
@@ -193,6 +225,10 @@ def residual_test(residual: Floats, drive: Floats) -> ResidualTest:
 
     For the cross-correlation both are whitened by an autoregression (order 20) of the residual, so that the bound
     1.96 / sqrt(samples) holds although neither is white.
+
+    Args:
+        residual: Measured less predicted output, shape (samples,), in any unit.
+        drive: Drive, shape (samples,), in any unit.
     """
     n, order = residual.size, min(20, residual.size // 20)
     centred = residual - residual.mean()
