@@ -19,6 +19,8 @@ from microrad.campaign.statistics.interim import Interim
 from microrad.campaign.statistics.summary import summarise_campaign
 from microrad.loop.pointing_loop.ensemble import bin_edges_rad
 from microrad.report.campaign import words as campaign_words
+from microrad.report.tables import Table
+from microrad.report.view import View
 from microrad.studio.jobs import ledgers as campaign_live
 from microrad.studio.jobs.ledgers import Live, LiveCampaigns
 from microrad.studio.views import campaign as campaign_view
@@ -26,7 +28,6 @@ from small_campaign import campaign_file
 from waiting import HANG_S
 
 LIMIT = '\n[limits]\nresidual_rms = { most = "5 urad" }\n'
-TAIL = "Radial errors that are exceeded"
 GRID = '\n[grid]\n"communication.data_rate" = ["1 Gbit/s", "2 Gbit/s"]\n'
 
 
@@ -285,58 +286,50 @@ def test_the_figures_say_of_how_many_rows_they_are(growing, at_once):
     growing.put(0)
     found = campaign_view.figures(tabs.look(growing.path))
     assert found.rows == f"Of {growing.rows} rows so far ({ROWS} are wanted)"
-    assert found.headline.startswith(f"1 of {growing.rows} rows failed; ")
-    assert found.notes[0] == "1 of them failed."
-    titles = [table.title for table in found.tables]
-    assert titles == ["Limits", TAIL, "Outputs and their quantiles over the rows", "Failed rows"]
+    assert found.headline.startswith(f"So far: 1 of {growing.rows} rows failed; ")
+    views = {view.title: view for view in found.blocks if isinstance(view, View)}
+    assert {"Limits", "Outputs", "Tail", "Rows without results"} <= views.keys()
+    assert "Over the grid" not in views
+    assert (views["How the rows were made"].folded, views["Limits"].folded) == (True, False)
     cell = summarise_campaign(growing.path).cells[0]
-    (limit,) = found.tables[0].rows
-    kept = 100.0 * (1.0 - cell.missed_by["residual_rms"].value)
-    assert limit[0] == "residual_rms ≤ 5 µrad"
-    assert limit[1] == f"{kept:.3g} %"
-    low, high = (100.0 * (1.0 - end) for end in (cell.missed.high, cell.missed.low))
+    (limit,) = views["Limits"].blocks[0].rows
+    assert limit[:2] == ("residual_rms ≤ 5 µrad", f"{100.0 * cell.missed_by['residual_rms'].value:.3g} %")
+    low, high = (100.0 * end for end in (cell.missed.low, cell.missed.high))
     said = [float(end.removesuffix(" %")) for end in limit[2].split(" to ")]
     assert said == [pytest.approx(low, abs=0.05), pytest.approx(high, abs=0.05)]
-    outputs = {row[0]: row for row in found.tables[2].rows}
-    headings = found.tables[2].headings
+    table = next(each for each in views["Outputs"].blocks if isinstance(each, Table))
+    outputs, headings = {row[0]: row for row in table.rows}, table.headings
     assert headings[:3] == ("output", "mean", "deviation")
     median = cell.outputs["residual_rms"].quantiles[0.5]
     shown = outputs["residual_rms"][headings.index("50 %")]
-    assert shown == f"{1e6 * median.value:.2f} µrad\n{1e6 * median.low:.2f} to {1e6 * median.high:.2f} µrad"
-    assert found.tables[3].rows == (("3", "7", "2", "the reason"),)
+    assert shown.startswith(f"{1e6 * median.value:.2f} µrad\n{1e6 * median.low:.2f}")
+    assert views["Rows without results"].blocks[0].rows == [("3", "7", "2", "the reason")]
     growing.put(*range(1, growing.every))
     growing.end()
-    assert campaign_view.figures(tabs.look(growing.path)).rows == f"Of all {ROWS} rows"
+    whole = campaign_view.figures(tabs.look(growing.path))
+    assert whole.rows == f"Of all {ROWS} rows"
+    assert whole.headline == campaign_words.headline(summarise_campaign(growing.path))
 
 
-def test_the_plot_shows_the_share_below_its_quantiles_and_the_limit(growing, at_once):
+def test_of_a_grid_that_has_begun_the_combinations_are_told(tmp_path, at_once):
+    growing = Growing(tmp_path, GRID, runs=64)
+    growing.put(0)
+    found = campaign_view.figures(LiveCampaigns().look(growing.path))
+    growing.put(0, cell=1)
+    both = campaign_view.figures(LiveCampaigns().look(growing.path))
+    for each in (found, both):
+        assert "Over the grid" in [view.title for view in each.blocks if isinstance(view, View)]
+        assert next(iter(each.plots)) == "Distribution of residual_rms"
+
+
+def test_the_plot_shows_the_report_s_distribution_and_what_has_a_limit_first(growing, at_once):
     growing.put(0, 1, 2)
     found = campaign_view.figures(LiveCampaigns().look(growing.path))
-    assert next(iter(found.plots)) == "residual_rms"  # the one with a limit comes first
-    plot = found.plots["residual_rms"]
-    (rows, quantiles), (limit,) = plot["data"], plot["layout"]["shapes"]
-    output = summarise_campaign(growing.path).cells[0].outputs["residual_rms"]
-    assert (rows["y"][0], rows["y"][-1]) == (0.0, pytest.approx(100.0))
-    assert all(a <= b for a, b in zip(rows["y"][:-1], rows["y"][1:], strict=True))
-    at = dict(zip(quantiles["y"], quantiles["x"], strict=True))
-    assert at[50.0] == pytest.approx(1e6 * output.quantiles[0.5].value, rel=1e-5)
-    assert np.interp(at[50.0], rows["x"], rows["y"]) == pytest.approx(50.0, abs=1.0)
-    assert min(quantiles["error_x"]["array"] + quantiles["error_x"]["arrayminus"]) >= 0.0
-    assert limit["x0"] == limit["x1"] == pytest.approx(5.0)
-    assert limit["name"] == "limit ≤ 5 µrad"
+    assert next(iter(found.plots)) == "Distribution of residual_rms"
+    plot = found.plots["Distribution of residual_rms"]
     assert plot["layout"]["xaxis"]["title"]["text"] == "residual_rms (µrad)"
-    assert plot["layout"]["yaxis"]["title"]["text"] == "rows at or below (%)"
-    unlimited = found.plots[next(name for name in found.plots if name != "residual_rms")]
-    assert not any("limit" in each["name"] for each in (*unlimited["data"], *unlimited["layout"]["shapes"]))
-
-
-def test_a_limit_far_from_all_rows_is_named_and_not_drawn(growing):
-    growing.put(0)
-    output = summarise_campaign(growing.path).cells[0].outputs["residual_rms"]
-    (limit,) = growing.campaign.limits
-    far = campaign_view.distribution_plot(output, replace(limit, most=1e-3))["data"][-1]
-    assert (far["name"], far["x"]) == ("limit ≤ 1 mrad, right of here", [None])
-    both = campaign_view.distribution_plot(output, replace(limit, least=-1e-3, most=4e-6))
-    assert both["data"][-1]["name"] == "limit ≥ −1 mrad, left of here"
-    assert [each["name"] for each in both["layout"]["shapes"]] == ["limit ≤ 4 µrad"]
-    assert both["layout"]["shapes"][0]["x0"] == pytest.approx(4.0)
+    assert plot["layout"]["yaxis"]["title"]["text"] == "rows (%)"
+    assert "limit ≤ 5 µrad" in [each["name"] for each in (*plot["data"], *plot["layout"]["shapes"]) if each.get("name")]
+    unlimited = found.plots[[*found.plots][1]]
+    names = [each.get("name") or "" for each in (*unlimited["data"], *unlimited["layout"]["shapes"])]
+    assert not any(name.startswith("limit") for name in names)

@@ -339,7 +339,17 @@ def test_blocks_of_the_report_are_shown_as_text_and_what_was_unfolded_stays_so(m
             folds = {fold.text: fold for fold in box.descendants() if isinstance(fold, ui.expansion)}
             assert [(name, fold.value) for name, fold in folds.items()] == [("Folded rows", False), ("Inner", False)]
             folds["Inner"].value = True
-            box.show_blocks(blocks, plots.drawn(blocks))
+            kept = [*box.descendants()]
+            box.show_blocks(("said first", *blocks[1:]), plots.drawn(blocks))
+            assert [each for each in box.descendants() if each.tag != "li"] == [
+                each for each in kept if each.tag != "li"
+            ]
+            assert kept[0].text == "said first"
+            box.show_blocks((*blocks, "more"), plots.drawn(blocks))
+            assert kept[0].is_deleted
+            folds = {fold.text: fold for fold in box.descendants() if isinstance(fold, ui.expansion)}
+            folds["Inner"].value = True
+            box.show_blocks((*blocks, "other"), plots.drawn(blocks))
             found = [*box.descendants()]
         visit.end()
         return found, visit.told

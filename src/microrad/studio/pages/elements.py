@@ -7,14 +7,15 @@ text NiceGUI builds the whole page anew, which takes longer than drawing.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from typing import Any
 
 from nicegui import ui
 from nicegui.element import Element
 
+from microrad.report.plotting.figure import Figure as Drawn
 from microrad.report.tables import Cell, Table
-from microrad.report.view import Block, Points, Soft, Verbatim, Verdict, View
+from microrad.report.view import Block, Drawing, Points, Soft, Verbatim, Verdict, View
 from microrad.studio.pages import layout
 from microrad.studio.pages.in_thread import stay
 from microrad.studio.views.link import Margin
@@ -55,7 +56,7 @@ class MarginCards(Element, component="margin_cards.js"):
 def table(headings: Sequence[str] = (), numbers: Collection[int] = ()) -> ui.table:
     """A table of text that is still empty; the columns in `numbers` hold numbers, counted from 0."""
     made = ui.table(rows=[], columns=_columns(headings, numbers), row_key="id").props(
-        "flat dense wrap-cells hide-bottom"
+        "flat dense wrap-cells hide-bottom tabindex=0"
     )
     made.props(""":pagination='{rowsPerPage: 0}' :table-row-class-fn="row => row.total ? 'total' : ''" """)
     return made.classes("wide-table")
@@ -73,68 +74,122 @@ def fill(made: ui.table, rows: Sequence[Sequence[str | Cell]], totals: int = 0) 
 
 def put(made: ui.table, of: Table) -> None:
     """Show a table of the report."""
-    made.columns = _columns(of.headings, [k for k in range(len(of.headings)) if k not in of.words])
+    columns = _columns(of.headings, [k for k in range(len(of.headings)) if k not in of.words])
+    if columns != made.columns:
+        made.columns = columns
     fill(made, of.rows, of.totals)
 
 
 class Blocks(ui.column):
-    """What a view of the report holds; what is folded stays open, or shut, as its reader has left it."""
+    """What a view of the report holds; others of the same form change in place: what one reads or unfolds stays."""
 
     def __init__(self) -> None:
         """Nothing is shown yet."""
         super().__init__()
         self.classes("w-full")
-        self._opened: set[str] = set()
+        self._form: tuple[Any, ...] = ()
+        self._parts: list[Any] = []
 
     def show_blocks(self, blocks: Sequence[Block], figures: Mapping[str, Plot | str] | None = None) -> None:
         """Show these in place of what was there, with their figures as `views.plots.drawn` has them."""
-        self.clear()
-        with self:
-            self._add(blocks, figures or {}, 2)
-
-    def _add(self, blocks: Sequence[Block], figures: Mapping[str, Plot | str], level: int) -> None:
-        for block in blocks:
-            match block:
-                case str():
-                    ui.label(block)
-                case Soft():
-                    ui.label(block.text).classes("soft")
-                case Points():
-                    with ui.element("ul").classes("points"):
-                        for line in block.lines:
-                            layout.words("li", line)
-                case Verbatim():
-                    layout.words("pre", block.text).classes("kept mono")
-                case Verdict():
-                    ui.label(block.headline).classes({True: "PASS", False: "FAIL", None: ""}[block.good])
-                    self._add(block.blocks, figures, level)
-                case Table():
-                    with self._under(block.title, block.folded, level):
-                        put(table(), block)
-                case View():
-                    with self._under(block.title, block.title if block.folded else "", level):
-                        self._add(block.blocks, figures, level + 1)
-                case _:
-                    self._figure(block.title, block.caption, figures[block.name])
-
-    @contextmanager
-    def _under(self, title: str, folded: str, level: int) -> Iterator[None]:
-        """Under a heading, or behind the sentence of what is folded."""
-        if not folded:
-            if title:
-                layout.heading(title, level)
-            yield
-            return
-        with ui.expansion(folded, value=folded in self._opened).props("dense").classes("w-full") as fold:
-            yield
-        fold.on_value_change(lambda event: (self._opened.add if event.value else self._opened.discard)(folded))
-
-    def _figure(self, title: str, caption: str, figure: Plot | str) -> None:
-        if isinstance(figure, str):
-            ui.element("img").classes("picture").props["src"] = figure
+        drawn, form = figures or {}, _form(blocks)
+        if form != self._form:
+            self._form, self._parts = form, []
+            self.clear()
+            with self:
+                self._build(blocks, drawn, 2)
         else:
-            Figure(title, figure)
-        ui.label(f"{title}. {caption}").classes("soft small")
+            for part, block in zip(self._parts, _each(blocks), strict=True):
+                if isinstance(block, Drawn | Drawing):
+                    _draw(part[0], drawn[block.name])
+                _say(part, block)
+
+    def _build(self, blocks: Sequence[Block], drawn: Mapping[str, Plot | str], level: int) -> None:
+        for block in blocks:
+            part, inside = _part(block, drawn, level)
+            self._parts.append(part)
+            _say(part, block)
+            with inside:
+                self._build(getattr(block, "blocks", ()), drawn, level + isinstance(block, View))
+
+
+def _part(block: Block, drawn: Mapping[str, Plot | str], level: int) -> tuple[Any, AbstractContextManager[Any]]:
+    """What is built once for a block, and where the blocks within it go."""
+    match block:
+        case View() | Table():
+            fold = ui.expansion().props("dense").classes("w-full") if block.folded else None
+            if fold is None and block.title:
+                layout.heading(block.title, level)
+            inside = fold or nullcontext()
+            with inside:
+                return (fold, table() if isinstance(block, Table) else None), inside
+        case Points():
+            return ui.element("ul").classes("points"), nullcontext()
+        case Drawn() | Drawing():
+            return (_figure(block.title, drawn[block.name]), ui.label().classes("soft small")), nullcontext()
+    look = _LOOKS.get(block.good if isinstance(block, Verdict) else type(block), "")
+    return ui.label().classes(look), nullcontext()
+
+
+def _figure(title: str, drawn: Plot | str) -> Element:
+    if not isinstance(drawn, str):
+        return Figure(title, drawn)
+    made = ui.element("img").classes("picture")
+    made.props["alt"], made.props["src"] = title, drawn
+    return made
+
+
+def _draw(made: Element, drawn: Plot | str) -> None:
+    if isinstance(made, Figure) and not isinstance(drawn, str):
+        made.show(drawn)
+    else:
+        made.props["src"] = drawn
+
+
+def _say(part: Any, block: Block) -> None:
+    """Show the texts of a block in what was built for one of its form."""
+    match block:
+        case View() | Table():
+            fold, made = part
+            if isinstance(block, Table):
+                put(made, block)
+            if fold is not None:
+                fold.text = block.folded if isinstance(block, Table) else block.title
+        case Points():
+            part.clear()
+            with part:
+                for line in block.lines:
+                    layout.words("li", line)
+        case Drawn() | Drawing():
+            part[1].text = f"{block.title}. {block.caption}"
+        case Verdict():
+            part.text = block.headline
+        case _:
+            part.text = getattr(block, "text", block)
+
+
+_LOOKS: dict[object, str] = {Soft: "soft", Verbatim: "kept mono", True: "PASS", False: "FAIL"}
+
+
+def _form(blocks: Sequence[Block]) -> tuple[Any, ...]:
+    """What of blocks is built once."""
+    return tuple(
+        (
+            type(block),
+            "" if isinstance(block, str) else getattr(block, "title", ""),
+            bool(getattr(block, "folded", "")),
+            getattr(block, "good", None),
+            _form(getattr(block, "blocks", ())),
+        )
+        for block in blocks
+    )
+
+
+def _each(blocks: Sequence[Block]) -> Iterator[Block]:
+    """Every block, those within others behind them."""
+    for block in blocks:
+        yield block
+        yield from _each(getattr(block, "blocks", ()))
 
 
 def _columns(headings: Sequence[str], numbers: Collection[int] = ()) -> list[dict[str, Any]]:

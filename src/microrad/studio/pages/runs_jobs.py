@@ -8,16 +8,15 @@ from functools import partial
 from pathlib import Path
 
 from nicegui import ui
-from nicegui.elements.mixins.text_element import TextElement
 
 from microrad.studio import commands
 from microrad.studio.jobs.ledgers import Live
 from microrad.studio.jobs.queue import Job, JobError, Order
 from microrad.studio.pages import layout
-from microrad.studio.pages.elements import Figure, text_table
+from microrad.studio.pages.elements import Blocks, Figure
 from microrad.studio.pages.in_thread import in_thread
 from microrad.studio.session import Session
-from microrad.studio.views.campaign import Figures, Table, figures
+from microrad.studio.views.campaign import Figures, figures
 from microrad.studio.views.runs import (
     Others,
     ledger_of,
@@ -32,7 +31,6 @@ from microrad.studio.views.runs import (
 )
 
 _LOOK_S = 1.0
-_LONG = 60  # characters that may not stand on one line
 
 
 RESULTS = "/results"
@@ -228,19 +226,15 @@ class CampaignPanel:
         self.session, self.ledger = session, ledger
         self._last: Live | None = None
         self._found: Figures | None = None
-        self._tables: list[_Table] = []
         self.place = ui.element("section").classes("runs-figures").props('aria-label="Figures of the campaign"')
         self.place.visible = False
         with self.place:
             self._rows = ui.label("Reading the ledger ...").classes("runs-rows")
             self._headline = ui.label().classes("kept")
-            with ui.element("div").classes("runs-side"):
-                self._left = ui.element("div").classes("runs-tables")
-                with ui.element("div").classes("runs-plot") as self._right:
-                    self._chosen = ui.select({}, label="Shown", on_change=self._draw).props("dense outlined")
-                    self._plot = Figure("Distribution over the rows")
-            self._below = ui.element("div").classes("runs-tables")
-            self._notes = ui.label().classes("small kept soft")
+            with ui.element("div").classes("runs-plot") as self._drawn:
+                self._chosen = ui.select({}, label="Shown", on_change=self._draw).props("dense outlined")
+                self._plot = Figure("Distribution over the rows")
+            self._told = Blocks()
             self._fault = ui.label().classes("no kept")
         self._timer = ui.timer(_LOOK_S, self._look, active=False)
         self._clear()
@@ -272,16 +266,15 @@ class CampaignPanel:
         """Say that there are no rows yet."""
         self._found = None
         self._rows.text = "No row is in the ledger yet."
-        for each in (self._headline, self._left, self._right, self._below, self._notes, self._fault):
+        for each in (self._headline, self._drawn, self._told, self._fault):
             each.visible = False
 
     def _show(self, found: Figures) -> None:
         self._found = found
-        self._rows.text, self._headline.text, self._notes.text = found.rows, found.headline, "\n".join(found.notes)
-        self._headline.visible = self._left.visible = self._below.visible = True
-        self._notes.visible = bool(found.notes)
-        self._show_tables(found.tables)
-        self._right.visible = bool(found.plots)
+        self._rows.text, self._headline.text = found.rows, found.headline
+        self._headline.visible = self._told.visible = True
+        self._told.show_blocks(found.blocks)
+        self._drawn.visible = bool(found.plots)
         names = {name: name for name in found.plots}
         if names != self._chosen.options:
             keep = self._chosen.value if self._chosen.value in names else next(iter(names), None)
@@ -289,41 +282,8 @@ class CampaignPanel:
         self._chosen.visible = len(names) > 1
         self._draw()
 
-    def _show_tables(self, tables: tuple[Table, ...]) -> None:
-        """Texts change in place: what one reads or has marked stays."""
-        if [each.form for each in self._tables] != [_form(table) for table in tables]:
-            for place in (self._left, self._below):
-                place.clear()
-            self._tables = [_Table(table, self._below if table.wide else self._left) for table in tables]
-        for shown, table in zip(self._tables, tables, strict=True):
-            shown.set(table)
-
     def _draw(self) -> None:
         plot = None if self._found is None else self._found.plots.get(self._chosen.value or "")
         if plot is not None:
             self._plot.props["aria-label"] = f"Distribution over the rows: {self._chosen.value}"
             self._plot.show(plot)
-
-
-def _form(table: Table) -> tuple[str, tuple[str, ...], int]:
-    """What of a table is built once."""
-    return table.title, table.headings, len(table.rows)
-
-
-class _Table:
-    """A table whose cells change."""
-
-    def __init__(self, table: Table, place: ui.element) -> None:
-        self.form = _form(table)
-        self._cells: list[TextElement] = []
-        with place, text_table(*table.headings, caption=table.title):
-            for row in table.rows:
-                with ui.element("tr"):
-                    for column, text in enumerate(row):
-                        tag, kind = ("th", "") if column == 0 else ("td", "text" if len(text) > _LONG else "number")
-                        self._cells.append(layout.words(tag, text).classes(kind))
-
-    def set(self, table: Table) -> None:
-        """Show the texts of another table of the same form."""
-        for cell, text in zip(self._cells, (text for row in table.rows for text in row), strict=True):
-            cell.text = text
