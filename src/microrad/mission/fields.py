@@ -300,7 +300,12 @@ class Table(BaseModel):
         raise KeyError(key)
 
     def with_value(self, key: str, value: object) -> Self:
-        """The table with another value for a dotted attribute, such as "communication.data_rate_bit_s", unchecked."""
+        """The table with another value for one attribute; the value is not checked.
+
+        Args:
+            key: Dotted name of the attribute, such as "communication.data_rate_bit_s".
+            value: The new value, in the SI unit of the attribute.
+        """
         name, _, rest = key.partition(".")
         return self.model_copy(update={name: getattr(self, name).with_value(rest, value) if rest else value})
 

@@ -98,19 +98,30 @@ class MissionFile(LinkFile):
 
 
 def load_mission(path: str | Path, mirror_path: str | Path | None = None, *, text: str | None = None) -> MissionFile:
-    """Read a mission file; `mirror_path` names a mirror file that replaces what the mission says about its mirror.
+    """Read a mission file, and check it.
 
-    Without it, `[mirror]` may hold the single key `file`, the path of a mirror file as seen from the mission file.
-    With `text`, the mission is that text, as if it stood at `path`, which need not exist.
-    Raises `MissionError` with every fault of both files.
+    Args:
+        path: The mission file.
+        mirror_path: A mirror file that replaces what the mission says about its mirror; without it, `[mirror]` may hold
+            the single key `file`, the path of a mirror file as seen from the mission file.
+        text: The mission as text in place of the file's content, as if it stood at `path`, which then need not exist.
+
+    Raises:
+        MissionError: With every fault of both files.
     """
     return mission_file(open_mission(path, mirror_path, text=text))
 
 
 def open_mission(path: str | Path, mirror_path: str | Path | None = None, *, text: str | None = None) -> Document:
-    """A mission file as it stands, its mirror file taken in, for `mission_file`; nothing but its TOML is checked.
+    """Read a mission file as it stands, its mirror file taken in, for `mission_file`; nothing but its TOML is checked.
 
-    With `text`, the mission is that text. Raises `MissionError` when it is no TOML.
+    Args:
+        path: The mission file.
+        mirror_path: A mirror file that replaces what the mission says about its mirror.
+        text: The mission as text in place of the file's content, as if it stood at `path`.
+
+    Raises:
+        MissionError: When it is no TOML.
     """
     document = _open(Path(path), "mission file", "", text)
     _take_in_mirror(document, None if mirror_path is None else Path(mirror_path))
@@ -118,7 +129,13 @@ def open_mission(path: str | Path, mirror_path: str | Path | None = None, *, tex
 
 
 def with_values(document: Document, data: Mapping[str, Any], mirror_path: Path | None = None) -> Document:
-    """The document with other data in place of its own, and with the mirror of another file; its faults are kept."""
+    """The document with other data in place of its own, and with the mirror of another file; its faults are kept.
+
+    Args:
+        document: The document, which stays as it is.
+        data: The data in place of its own.
+        mirror_path: A mirror file that replaces what the data says about the mirror, None for none.
+    """
     inner = {name: replace(each, faults=list(each.faults)) for name, each in document.inner.items()}
     other = replace(document, data=dict(data), faults=list(document.faults), inner=inner)
     if mirror_path is not None:
@@ -182,14 +199,24 @@ def _content(path: Path) -> bytes | None:
 
 
 def content_of(name: str, contents: tuple[NamedFile, ...]) -> bytes | None:
-    """What a file held that a mission names; None where it is to be read now."""
+    """What a file that a mission names held when it was read; None where it is to be read now.
+
+    Args:
+        name: Name of the file, as the mission gives it.
+        contents: The files whose content is known.
+    """
     return next((each.content for each in contents if each.name == name), None)
 
 
 def load_link(path: str | Path, *, text: str | None = None) -> LinkFile:
     """Read a file for its links alone: a whole mission, or one without the tables on mirror, loop and scenario.
 
-    With `text`, the mission is that text, as if it stood at `path`. Raises `MissionError` with every fault of it.
+    Args:
+        path: The mission file.
+        text: The mission as text in place of the file's content, as if it stood at `path`.
+
+    Raises:
+        MissionError: With every fault of the file.
     """
     return either_file(open_mission(path, text=text))
 
@@ -284,9 +311,13 @@ def _leaves(data: Mapping[str, Any], table: str) -> Iterator[str]:
 
 # --------------------------------------------------------------------------------------------------------- validating
 def check_value(document: Document, table: type[Table], key: str, value: object) -> bool:
-    """Whether a value fits a key of a table by itself; what is wrong with it is noted.
+    """Whether a value fits a key of a table by itself; what is wrong with it is noted in the document.
 
-    The document's prefix is the dotted key of the table.
+    Args:
+        document: The document, whose prefix is the dotted key of the table.
+        table: The table that has the key.
+        key: The key, as a file calls it.
+        value: The value, as a file holds it.
     """
     try:
         table.model_validate({key: value})
@@ -298,7 +329,13 @@ def check_value(document: Document, table: type[Table], key: str, value: object)
 
 
 def check_table(document: Document, model: type[_T], data: Mapping[str, Any]) -> _T | None:
-    """The data as a record, or None with every fault in it noted."""
+    """The data as a record, or None with every fault in it noted in the document.
+
+    Args:
+        document: The document that the data stands in.
+        model: The record that the data is to become.
+        data: The data, as a file holds it.
+    """
     try:
         return model.model_validate(data)
     except ValidationError as error:
@@ -353,9 +390,14 @@ class _Report:
             self._note_value(detail)
 
     def sound(self, table: type[Table], data: Mapping[str, Any], at: _Location = ()) -> Table:
-        """What of a table is in order; the rest is no attribute of it. What does not fit together there is noted.
+        """The part of a table that is in order, other keys left out; what does not fit together there is noted.
 
         Pydantic asks a table whether it fits together when all of its keys are in order, and no sooner.
+
+        Args:
+            table: The table that the data stands for.
+            data: The data, as a file holds it.
+            at: Keys that lead from the document's root to the table.
         """
         try:
             return table.model_validate(data)

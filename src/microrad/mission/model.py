@@ -76,7 +76,12 @@ class Source:
 
 
 def source_text(sources: Mapping[str, Source], *keys: str) -> str:
-    """The sources of some keys as one text, each said once; "not stated" for a key without one."""
+    """The sources of some keys as one text, each said once; "not stated" for a key without one.
+
+    Args:
+        sources: Where each value of the mission comes from, by its dotted key.
+        *keys: The dotted keys asked for.
+    """
     texts = [sources[key].text if key in sources else "not stated" for key in keys]
     return "; ".join(dict.fromkeys(texts))
 

@@ -14,9 +14,14 @@ from microrad.mission.toml import scan, value_of
 def written_for(key: str, comment: str, value: str) -> str:
     """The value that a comment was written for, where it stands behind another one now; "" where it does not.
 
-    `value` is raw TOML, as is what is returned. It is known only for a comment that the shipped missions and presets
-    hold, word for word, behind the same dotted key and one value. Quantities that are equal in other units ("5 cm",
-    "50 mm") are one value.
+    The value returned is raw TOML. It is known only for a comment that the shipped missions and presets hold, word for
+    word, behind the same dotted key and one value. Quantities that are equal in other units ("5 cm", "50 mm") are one
+    value.
+
+    Args:
+        key: The dotted key.
+        comment: The comment behind it.
+        value: The value in front of the comment now, raw TOML.
     """
     there = _shipped().get((key, comment), ())
     if not there or any(_same(value, each) for each in there) or not all(_same(each, there[0]) for each in there):
@@ -25,7 +30,12 @@ def written_for(key: str, comment: str, value: str) -> str:
 
 
 def of_paper(key: str, value: str) -> str:
-    """The raw value that the paper's mission has for a dotted key, where it is another one; "" where it is not."""
+    """The raw value that the paper's mission has for a dotted key, where it is another one; "" where it is not.
+
+    Args:
+        key: The dotted key.
+        value: The value that it has now, raw TOML.
+    """
     there = _paper().get(key, value)
     return "" if _same(value, there) else " ".join(there.split())
 

@@ -247,15 +247,32 @@ class Document:
     def read(cls, path: Path, label: str, prefix: str = "", names: Collection[str] | None = None) -> Self:
         """Read, scan and parse a file.
 
-        Raises `UnreadableError` when it is no text, and `MissionError` when nothing in it can be parsed.
+        Args:
+            path: The file.
+            label: What a reader calls it, such as "mission file".
+            prefix: Table that the root of the file stands for, empty for the whole mission.
+            names: Keys that such a file has, None for any.
+
+        Raises:
+            UnreadableError: When it is no text.
+            MissionError: When nothing in it can be parsed.
         """
         return cls.of(_content(path), path, label, prefix, names)
 
     @classmethod
     def of(cls, content: bytes, path: Path, label: str, prefix: str = "", names: Collection[str] | None = None) -> Self:
-        """Scan and parse what a file holds, or would hold if it were written to `path`.
+        """Scan and parse the content of a file.
 
-        Raises what `read` raises.
+        Args:
+            content: What the file holds, or would hold if it were written.
+            path: Where it stands, or would stand.
+            label: What a reader calls it, such as "mission file".
+            prefix: Table that the root of the file stands for, empty for the whole mission.
+            names: Keys that such a file has, None for any.
+
+        Raises:
+            UnreadableError: When it is no text.
+            MissionError: When nothing in it can be parsed.
         """
         document = cls(path, label, prefix, names, _decoded(content), hashlib.sha256(content).hexdigest())
         _Parser(document).run()
@@ -264,7 +281,14 @@ class Document:
     def fault(self, key: str, value: str, reason: str, expected: str, *, line: int = 0, nearest: str = "") -> None:
         """Note a fault on the line of its key, or of the nearest table above it.
 
-        `nearest` is in quotes where it stands for the value.
+        Args:
+            key: Full dotted key at fault.
+            value: Its value as raw TOML, empty where there is none to show.
+            reason: What is wrong, in words that follow the key.
+            expected: What would be right.
+            line: Line of the fault; 0 for that of the key.
+            nearest: The right word that the wrong one resembles, in quotes where it stands for the value; empty for
+                none.
         """
         holder = self.holder(key)
         if nearest:
@@ -451,7 +475,12 @@ def _has_long_key(raw: str) -> bool:
 
 
 def value_of(raw: str, parse_float: Callable[[str], Any] = float) -> object:
-    """A raw value of TOML as data; None where it is none, or holds a key of more than 50 parts."""
+    """A raw value of TOML as data; None where it is none, or holds a key of more than 50 parts.
+
+    Args:
+        raw: The value, as it stands in a file.
+        parse_float: Called with the text of each number that is not whole.
+    """
     if _has_long_key(raw):
         return None
     try:

@@ -120,6 +120,10 @@ def scan(cases: PaperCases, on_progress: Progress | None = None) -> Scan:
     """Errors over both compositions and the grid of gains, for the claims of Fig. 6 and 8.
 
     The plant takes one step a control period here: the errors compared are tens of µrad.
+
+    Args:
+        cases: The paper's cases: mirrors, loop and claims.
+        on_progress: Called with the points done, their number and what is done.
     """
     timing = cases.setup.timing
     delay = math.ceil(timing.delay_steps / timing.steps_per_sample)

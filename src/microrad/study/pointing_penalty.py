@@ -57,7 +57,13 @@ class LinkPerformance:
     costs: tuple[Cost, ...]
 
     def case(self, source: str, controller: str, mirror: str) -> Performance | None:
-        """One of the cases, or None."""
+        """The case of one simulated residual, or None.
+
+        Args:
+            source: Which loop the residual comes from.
+            controller: Name of the controller.
+            mirror: Variant of the mirror.
+        """
         return next((c for c in self.cases if (c.source, c.controller, c.mirror) == (source, controller, mirror)), None)
 
 

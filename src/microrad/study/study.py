@@ -247,9 +247,13 @@ def judged(
     fine: controller_study.FinePointingStudy | None,
     case: Performance | None,
 ) -> tuple[Requirements, Requirements]:
-    """What the verdict judges, and what the paper's loop is held against beside it where it is not that.
+    """The requirements that the verdict judges, and those on the paper's loop where they only stand beside it.
 
-    ``case`` is the link under the best controller of the fine-pointing loop.
+    Args:
+        links: The study of the mission's links.
+        by_paper: The requirements as the paper's loop meets them.
+        fine: The study of the fine-pointing loop, None where the mission has none.
+        case: The link under the best controller of that loop, None without it.
     """
     beams = requirement.of_beams(links)
     if fine is None or case is None:
@@ -260,12 +264,22 @@ def judged(
 def best_case(
     found: pointing_penalty.LinkPerformance, fine: controller_study.FinePointingStudy | None
 ) -> Performance | None:
-    """The link under the fine-pointing loop's best controller on the mission's mirror, or None without that loop."""
+    """The link under the fine-pointing loop's best controller on the mission's mirror, or None without that loop.
+
+    Args:
+        found: The link under every residual that was simulated.
+        fine: The study of the fine-pointing loop, None where the mission has none.
+    """
     return None if fine is None else found.case(pointing_penalty.FINE, fine.best.design.name, Variant.GIVEN)
 
 
 def tornado(links: link_study.LinkStudy, error_rad: float) -> link.Tornado:
-    """What moves the margin of the communication link at a pointing error that stays as it is."""
+    """What moves the margin of the communication link at a pointing error that stays as it is.
+
+    Args:
+        links: The study of the mission's links.
+        error_rad: Radial pointing error, in rad.
+    """
     m, sources = links.file.mission, links.file.sources
 
     def margin_db(data: link.DataLink) -> float:
@@ -313,6 +327,10 @@ def margin_map(data: link.DataLink, sources: Mapping[str, Source]) -> MarginMap:
     """Margin over data rate and pointing error around the requirement, with the receivers that it implies.
 
     The largest pointing error is nan where the link has not even on axis the required margin.
+
+    Args:
+        data: The communication link.
+        sources: Where each value of the mission comes from, by its dotted key.
     """
     q, rate = data.requirement, data.table.data_rate_bit_s
     highest = math.inf if data.receiver is None else data.receiver.highest_data_rate_bit_s

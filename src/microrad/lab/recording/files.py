@@ -71,7 +71,15 @@ def _nearest_file(path: Path) -> str:
 
 
 def read_head(path: Path, size: int) -> bytes:
-    """The first bytes of the file."""
+    """The first bytes of the file.
+
+    Args:
+        path: The file.
+        size: Number of bytes read, fewer where the file is shorter.
+
+    Raises:
+        RecordingError: If the file cannot be read.
+    """
     try:
         return read_bytes(path, size)
     except OSError as error:

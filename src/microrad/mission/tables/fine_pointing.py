@@ -344,7 +344,14 @@ class FinePointing(Table):
 
 # -------------------------------------------------------------------------------------------------------------- clocks
 def clock_problems(table: str, rate_hz: float, delay_s: float, plant_step_s: float) -> Iterator[Problem]:
-    """What keeps the keys rate, delay and plant_step of a table from a control period and a delay in whole steps."""
+    """Why the control period and the delay of a table are not both whole numbers of its plant steps.
+
+    Args:
+        table: Name of the table, for the message.
+        rate_hz: Control rate, in Hz.
+        delay_s: Delay of the loop, in s.
+        plant_step_s: Step of the simulated plant, in s.
+    """
     step, period = plant_step_s, 1.0 / rate_hz
     if not max(period, delay_s) <= MOST_STEPS * step:
         reason = f"goes more than {MOST_STEPS} times into the control period or the delay"

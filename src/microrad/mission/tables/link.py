@@ -243,7 +243,11 @@ class Receiver(Table):
     def most_code_gain(self, data_rate_bit_s: float, wavelength_m: float) -> float:
         """Largest net gain that a code can have on this receiver, as a ratio of power (see `capacity`).
 
-        The background of a counter is taken as it is where its power is given, and the rate; else as any.
+        A counter's background counts as it is where its power and the data rate are given, else it may be any.
+
+        Args:
+            data_rate_bit_s: Data rate, in bit/s; what is not above 0 counts as not given.
+            wavelength_m: Wavelength of the light, in m.
         """
         code = Code(self.code_rate, self.bit_error_ratio)
         if self.modulation == "ppm":
@@ -313,12 +317,17 @@ class LinkRequirement(Table):
 
 
 def half_angle_rad(divergence_rad: float, convention: str) -> float:
-    """Half angle at 1/e2 of intensity of a beam whose divergence is given as "full-1/e2" or "half-1/e2"."""
+    """Half angle (rad) at 1/e2 of intensity of a beam whose divergence is given by some convention.
+
+    Args:
+        divergence_rad: The divergence as it is given, in rad.
+        convention: "full-1/e2" where that is the full angle, "half-1/e2" where it is the half angle.
+    """
     return divergence_rad / 2 if convention == "full-1/e2" else divergence_rad
 
 
 def narrowest_half_angle_rad(aperture_m: float, wavelength_m: float) -> float:
-    """Half angle at 1/e2 of the Gaussian beam with the gain of the whole aperture, sqrt(8) lambda / (pi D).
+    """Half angle (rad) at 1/e2 of the Gaussian beam with the gain of the whole aperture, sqrt(8) lambda / (pi D).
 
     A Gaussian beam of half angle theta has the gain 8 / theta^2. Light that fills the aperture evenly has
     (pi D / lambda)^2, and by the Schwarz inequality no light that leaves it has more. So no Gaussian beam is narrower
@@ -328,6 +337,10 @@ def narrowest_half_angle_rad(aperture_m: float, wavelength_m: float) -> float:
     0.822 lambda / D, and 1.03 lambda / D wide at half maximum. Taken for Gaussian beams such widths would put more
     light on the axis than there is (by 0.8 dB for 0.822), as would lambda / (pi w) = 0.637 lambda / D for w = D / 2,
     the Gaussian beam that no aperture cuts (by 3 dB).
+
+    Args:
+        aperture_m: Diameter D of the aperture, in m.
+        wavelength_m: Wavelength lambda, in m.
     """
     return math.sqrt(8.0) * wavelength_m / (math.pi * aperture_m)
 
@@ -352,7 +365,12 @@ def strehl_fits(name: str) -> Callable[..., Iterator[Problem]]:
 
 
 def divergence_fits(name: str, end: str) -> Callable[..., Iterator[Problem]]:
-    """Check that a beam is not narrower than diffraction at the aperture that it leaves."""
+    """A check that a beam is not narrower than diffraction at the aperture that it leaves.
+
+    Args:
+        name: Name of the beam's table.
+        end: Terminal that the beam leaves, "leo" or "geo".
+    """
 
     def check(conventions: LinkConventions, terminals: Terminals, beam: Beacon | None) -> Iterator[Problem]:
         if beam is None:
@@ -378,7 +396,12 @@ def divergence_fits(name: str, end: str) -> Callable[..., Iterator[Problem]]:
 
 
 def pattern_fits(conventions: LinkConventions, communication: Communication) -> Iterator[Problem]:
-    """A far-field pattern needs to know how the aperture is lit, and the other readings do not take it into account."""
+    """Check that a far-field pattern knows how the aperture is lit, and that no other convention is told so.
+
+    Args:
+        conventions: The mission's conventions.
+        communication: The table on the communication link.
+    """
     if conventions.pointing_loss == "pattern" and communication.beam is None:
         advice = 'pointing_loss = "gaussian", or a table [communication.beam]'
         yield Problem("conventions.pointing_loss", "needs the table communication.beam, which is missing", advice)
@@ -388,7 +411,12 @@ def pattern_fits(conventions: LinkConventions, communication: Communication) -> 
 
 
 def obscuration_fits(terminals: Terminals, communication: Communication) -> Iterator[Problem]:
-    """A beam that its own terminal's obscuration does not stop."""
+    """Check that the obscuration of its own terminal does not stop the beam.
+
+    Args:
+        terminals: The terminals.
+        communication: The table on the communication link.
+    """
     beam, hole = communication.beam, terminals.leo_obscuration or 0.0
     if beam is None or beam.radius_m is None:
         return

@@ -114,9 +114,11 @@ class LinearPart(Table):
 
 
 def roots_from_damping(frequencies_hz: tuple[float, ...], dampings: tuple[float, ...]) -> tuple[complex, ...]:
-    """Roots (rad/s) from natural frequencies and damping ratios: a pair below 1, one real root at 1 or -1.
+    """Roots (rad/s) from natural frequencies and damping ratios: a pair, or one real root for a damping of 1 or -1.
 
-    A positive damping is a root in the left half plane.
+    Args:
+        frequencies_hz: Natural frequencies, in Hz.
+        dampings: Damping ratio of each, positive in the left half plane.
     """
     roots: list[complex] = []
     for frequency, damping in zip(frequencies_hz, dampings, strict=True):
@@ -323,8 +325,13 @@ _UNCERTAIN = {
 def place(mirror: "Mirror", key: str) -> Place:
     """Where the parameter of a dotted key stands in a mirror.
 
-    Raises `ProblemsError` for a key that is no parameter of this mirror, and for a value that has no relative error: 0,
-    and the damping 1 of a real root.
+    Args:
+        mirror: The mirror's table.
+        key: Dotted key of the parameter, of an item in a list with its place from 1 behind it.
+
+    Raises:
+        ProblemsError: For a key that is no parameter of this mirror, and for a value that has no relative error: 0, and
+            the damping 1 of a real root.
     """
     name, _, rest = key.partition(".")
     alias, _, number = rest.partition(".")

@@ -23,7 +23,7 @@ _STATE_OF_STAGE = (*[State.BEACON] * 2, State.DETECT, *[State.ANSWER] * 3, *[Sta
 def run_contact(
     data: link.DataLink, finding: Finding, scene: Scene, design: Design, contact: Contact, settings: Settings
 ) -> ContactRun:
-    """One contact from the slew to its end, under one controller of the mission's fine-pointing loop; seeded.
+    """Run one contact from the slew to its end, under one controller of the mission's fine-pointing loop.
 
     The slew ends when the contact begins, or later where the body is not free early enough. Lock is lost where the
     margin stays below 0 dB for longer than the settings hold it, which the terminal learns after the light time there
@@ -31,8 +31,17 @@ def run_contact(
     beacon on, in the state "re-acquire". The contact is over when an acquisition is given up after as many failures as
     the mission has attempts, or the data after as many losses in windows that follow each other.
 
-    Raises ValueError for a scan that the mission does not have, a data rate that is still to be solved for, and a
-    geometry that gives no numbers.
+    Args:
+        data: The communication link.
+        finding: The acquisition as the mission times it.
+        scene: The fine-pointing loop of the mission.
+        design: The controller with its gains.
+        contact: Begin, end and geometry of the contact.
+        settings: Slew, windows, attempts, way of acquisition and seed.
+
+    Raises:
+        ValueError: For a scan that the mission does not have, a data rate that is still to be solved for, and a
+            geometry that gives no numbers.
     """
     found = finding.way(settings.way)
     if found is None:
@@ -64,7 +73,13 @@ class Log:
         return self.entries[-1].time_s
 
     def go(self, time_s: float, to: State, cause: str) -> bool:
-        """Change the state, unless the contact ends before; whether it goes on."""
+        """Change the state, unless the contact ends before; whether the contact goes on.
+
+        Args:
+            time_s: Time of the change, in s.
+            to: The new state.
+            cause: Why it changes, in words.
+        """
         if self.state == State.END:
             return False
         if time_s >= self.contact.end_s:
@@ -178,7 +193,21 @@ def of_mission(
     finding: Finding | None,
     fine: FinePointingStudy | None,
 ) -> ContactRun | None:
-    """The run of `operations.contact` under the best controller; None without that table or what it needs."""
+    """The run of `operations.contact` under the best controller.
+
+    It is None where the mission lacks that table or what it needs.
+
+    Args:
+        o: The table on operations.
+        a: The table on acquisition, None where the mission has none.
+        data: The communication link.
+        day: The day's geometry with its contacts.
+        finding: The acquisition as the mission times it, None without one.
+        fine: The study of the fine-pointing loop, None without one.
+
+    Raises:
+        ValueError: As `run_contact`.
+    """
     asked = o.contact
     if asked is None or a is None or finding is None or fine is None or not day.relay.contacts:
         return None

@@ -44,9 +44,14 @@ class MovingReference(Reference):
 
 
 def plan(start_s: float, end_s: float, settings: Settings) -> tuple[tuple[float, float], ...]:
-    """Begin and length of each window from the begin of data to the end of the contact.
+    """Begin and length (s) of each window, from the begin of data to the end of the contact.
 
-    As many as do not overlap; one, as long as there is data, where that is shorter than a window.
+    There are as many as do not overlap; where there is data for less than a window, one as long as that.
+
+    Args:
+        start_s: Begin of the data, in s.
+        end_s: End of the contact, in s.
+        settings: Number and length of the windows wanted.
     """
     length = min(settings.window_s, end_s - start_s)
     count = min(settings.windows, max(int((end_s - start_s) / settings.window_s), 1))
@@ -84,9 +89,13 @@ class Sampler:
             )
 
     def windows(self, planned: Sequence[tuple[float, float]], first: int = 0) -> list[Window | None]:
-        """The planned windows, all of one length and numbered from ``first`` on; None for one without a control sample.
+        """Run the planned windows; None for one without a control sample.
 
         Their random streams are those of the ensemble's runs of their numbers with the settings' seed.
+
+        Args:
+            planned: Begin and length of each window, in s, all of one length.
+            first: Number of the first window, on which its random stream depends.
         """
         period, length_s = self.loop.timing.period_s, planned[0][1]
         samples, settling = round(length_s / period), round(self.settings.settle_s / period)
@@ -102,7 +111,13 @@ class Sampler:
         return [self._of(begin, at, length_s, error, angle, settling) for (begin, _), at, error, angle in each]
 
     def window(self, number: int, start_s: float, length_s: float) -> Window | None:
-        """One window by itself."""
+        """Run one window by itself; None without a control sample in it.
+
+        Args:
+            number: Number of the window, on which its random stream depends.
+            start_s: Begin of the window, in s.
+            length_s: Its length, in s.
+        """
         return self.windows([(start_s, length_s)], number)[0]
 
     def _of(
@@ -158,6 +173,10 @@ class Sampler:
 
         Free-space loss goes with the square of the range. A point-ahead that the mission does not correct adds to the
         length of every error, as it does in the mission's budget, and is that of the geometry here.
+
+        Args:
+            radial_rad: Radial pointing errors, in rad, of a shape that broadcasts against the sight.
+            sight: Range and point-ahead at the time of each error.
         """
         fall, ahead = self.data.beam.fall, self.data.shared.point_ahead
         on_axis = float(link.margin_of_error(self.data, 0.0)) + float(fall.loss_db(self.data.shared.point_ahead_rad))
@@ -194,7 +213,12 @@ class Sampler:
 
 
 def first_run(holds: NDArray[np.bool_], length: int) -> int | None:
-    """Where the first run of that many true values in a row begins, or None."""
+    """Index at which the first long enough run of true values begins, or None.
+
+    Args:
+        holds: The values, shape (samples,).
+        length: How many true values in a row are long enough.
+    """
     edges = np.flatnonzero(np.diff(holds, prepend=False, append=False))
     begins, ends = edges[::2], edges[1::2]
     long = np.flatnonzero(ends - begins >= length)

@@ -311,7 +311,15 @@ class _Search:
     def minimise(
         self, start: Numbers, pool: ThreadPoolExecutor, iterations: int, tolerance: float, on_progress: Progress
     ) -> None:
-        """From a start to the end; the result is in `numbers` and `parts`."""
+        """Search from a start to the end; the result is in `numbers` and `parts`.
+
+        Args:
+            start: The numbers to begin with.
+            pool: Threads in which the records are simulated side by side.
+            iterations: Largest number of steps.
+            tolerance: The search ends after several steps in a row that lower the logarithm of the error by less.
+            on_progress: Called with the steps done, their largest number and the error.
+        """
         self.numbers, damping, small = start, _DAMPING, 0
         self._linearise(pool)
         self.start_error = self.error

@@ -112,9 +112,14 @@ class Numbers:
 
 
 def scaled(numbers: Numbers, drive: float, output: float) -> Numbers:
-    """The same model for a drive counted in units ``drive`` times as small, and an output ``output`` times as small.
+    """The same model with drive and output counted in other units.
 
     A model of u / U and y / Y becomes one of u and y with drive = U and output = Y; q and z are then counted as u is.
+
+    Args:
+        numbers: The model's numbers.
+        drive: How many of the new units of the drive make one of the old.
+        output: How many of the new units of the output make one of the old.
     """
     return replace(
         numbers,
@@ -144,7 +149,14 @@ def balanced(numbers: Numbers) -> Numbers:
 
 
 def delayed(drive: Floats, rate_hz: float, delay_s: float, factor: int) -> Floats:
-    """Whole periods of a drive (samples, inputs), ``delay_s`` later and at ``factor`` times the rate, band-limited."""
+    """Whole periods of a drive, later by a delay and at a higher rate, band-limited.
+
+    Args:
+        drive: Whole periods of the drive, shape (samples, inputs).
+        rate_hz: Sample rate of the drive, in Hz.
+        delay_s: Delay, in s, positive for later.
+        factor: Samples of the result for each sample of the drive.
+    """
     spectrum = np.fft.rfft(drive, axis=0)
     turn = np.exp(-2j * np.pi * np.fft.rfftfreq(drive.shape[0], 1 / rate_hz) * delay_s)
     late = np.fft.irfft(spectrum * turn[:, None], drive.shape[0], axis=0)
@@ -155,9 +167,16 @@ def delayed(drive: Floats, rate_hz: float, delay_s: float, factor: int) -> Float
 def linear_start(
     response: FrequencyResponse, order: int, sub_steps: int, delay_s: float | None, exchanges: int
 ) -> tuple[ModalModel, float]:
-    """Linear model behind a pure delay, for a drive that is straight over each of ``sub_steps`` steps a sample.
+    """Linear model behind a pure delay, and the delay in s.
 
-    Without a delay given, it is the best on a grid of a quarter of a sample up to two samples.
+    The drive is taken as straight over each of the steps of a sample.
+
+    Args:
+        response: The measured frequency response.
+        order: Number of states of the model.
+        sub_steps: Steps of the simulation in each sample.
+        delay_s: The delay, in s; None for the best on a grid of a quarter of a sample up to two samples.
+        exchanges: Largest number of modes exchanged in the fit of the model.
     """
 
     def behind(late_s: float) -> FrequencyResponse:
@@ -175,10 +194,17 @@ def linear_start(
 def starting_numbers(
     model: ModalModel, delay_s: float, sources: Sequence[HysteresisSource], lowest_hz: float, plays: int
 ) -> Numbers:
-    """A linear model with an operator of next to no weight per actuator and source, which acts as its drive does.
+    """Numbers to begin with: a linear model, and for each actuator and source an operator of next to no weight.
 
-    The strain of the actuators is what, at low frequency, the drive makes of them: q = M y with M the (pseudo-)inverse
-    of the quasi-static gain. Thresholds are left at zero.
+    Each operator acts as the drive of its actuator does. The strain of the actuators is what, at low frequency, the
+    drive makes of them: q = M y with M the (pseudo-)inverse of the quasi-static gain. Thresholds are left at zero.
+
+    Args:
+        model: The linear model.
+        delay_s: The delay in front of it, in s.
+        sources: What drives the operators: the strain of the actuators or their drive.
+        lowest_hz: Lowest frequency of the recordings, in Hz, at which the quasi-static gain begins to be averaged.
+        plays: Number of plays in each operator.
     """
     pairs = np.flatnonzero(model.poles_rad_s.imag != 0)
     real = np.flatnonzero(model.poles_rad_s.imag == 0)

@@ -46,14 +46,27 @@ class Normal(NamedTuple):
 
 
 def play_plant(numbers: Numbers, step_s: float) -> kernels.PlayPlant:
-    """The discrete plant of a model; raises ValueError where its loop through the plays is no contraction."""
+    """The discrete plant of a model.
+
+    Args:
+        numbers: The model's numbers.
+        step_s: Step of the simulation, in s.
+
+    Raises:
+        ValueError: Where the model's loop through the plays is no contraction.
+    """
     plant = mirror.discretise(numbers.mirror("trial"), step_s)
     values = {name: getattr(plant, name) for name in kernels.PlayPlant._fields}
     return kernels.PlayPlant(**values | {"play_start": plant.play_start.astype(np.int64)})
 
 
 def simulate_path(plant: kernels.PlayPlant, drive: Floats) -> kernels.Path:
-    """The path of a plant from rest."""
+    """The path of a plant from rest: its output and all that is inside it, at every step.
+
+    Args:
+        plant: The discrete plant.
+        drive: Drive at each step, shape (steps, inputs).
+    """
     steps, operators = drive.shape[0], plant.K.shape[1]
     path = kernels.Path(
         np.empty((steps, plant.C.shape[0])),
@@ -68,13 +81,24 @@ def simulate_path(plant: kernels.PlayPlant, drive: Floats) -> kernels.Path:
 
 
 def two_periods(record: Steady, delay_s: float) -> Floats:
-    """The drive of the plant for a record in its steady state: two periods, of which the second counts."""
+    """The drive of the plant for a record in its steady state: two periods, of which the second counts.
+
+    Args:
+        record: The record, one period of its steady state.
+        delay_s: Delay of the drive, in s.
+    """
     one = delayed(record.drive, record.rate_hz, delay_s, record.sub_steps)
     return np.concatenate([one, one])
 
 
 def steady_error(plant: kernels.PlayPlant, record: Steady, delay_s: float) -> tuple[Floats, kernels.Path, Floats]:
-    """Modelled less measured output (samples, outputs), without its mean; the path, and the drive."""
+    """Modelled less measured output (samples, outputs), without its mean; the path and the drive of both periods.
+
+    Args:
+        plant: The discrete plant.
+        record: The record, one period of its steady state.
+        delay_s: Delay of the drive, in s.
+    """
     drive = two_periods(record, delay_s)
     path = simulate_path(plant, drive)
     error = path.output[drive.shape[0] // 2 :: record.sub_steps] - record.output
@@ -82,14 +106,26 @@ def steady_error(plant: kernels.PlayPlant, record: Steady, delay_s: float) -> tu
 
 
 def squared_error(plant: kernels.PlayPlant, record: Steady, delay_s: float) -> float:
-    """Sum of the squared error; infinite where the model runs away."""
+    """Sum of the squared error; infinite where the model runs away.
+
+    Args:
+        plant: The discrete plant.
+        record: The record, one period of its steady state.
+        delay_s: Delay of the drive, in s.
+    """
     with np.errstate(all="ignore"):
         cost = float(np.sum(steady_error(plant, record, delay_s)[0] ** 2))
     return cost if math.isfinite(cost) else math.inf
 
 
 def normal_equations(plant: kernels.PlayPlant, numbers: Numbers, record: Steady) -> Normal:
-    """Normal equations of a record in the order of `Numbers.vector`, in single precision, summed in double."""
+    """Normal equations of a record in the order of `Numbers.vector`, in single precision, summed in double.
+
+    Args:
+        plant: The discrete plant of the model.
+        numbers: The model's numbers, about which the equations are made linear.
+        record: The record, one period of its steady state.
+    """
     error, path, drive = steady_error(plant, record, numbers.delay_s)
     J = jacobian(plant, numbers, record, (path, drive), np.float32)
     J -= J.mean(axis=0)
@@ -106,10 +142,16 @@ def jacobian(
     kind: type,
     lead: int = -1,
 ) -> Floats:
-    """Derivative of the second period's output (samples, outputs, numbers), in the precision ``kind``.
+    """Derivative of the second period's output by each number, shape (samples, outputs, numbers).
 
-    Tangents begin ``lead`` samples before the period: by default seven time constants of the slowest mode, at most one
-    period.
+    Args:
+        plant: The discrete plant of the model.
+        numbers: The model's numbers.
+        record: The record, one period of its steady state.
+        way: Path and drive over two periods, as `steady_error` gives them.
+        kind: Type of floating-point number of the result.
+        lead: Samples before the second period at which the tangents begin, at most one period; by default seven time
+            constants of the slowest mode.
     """
     path, drive = way
     period = drive.shape[0] // 2

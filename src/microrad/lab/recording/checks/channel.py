@@ -53,10 +53,15 @@ def quantum(values: Floats) -> float:
 
 
 def quantisation(label: str, values: Floats, drives: Sequence[Floats] | None) -> list[Finding]:
-    """Levels that an output resolves, where the drive itself has more of them than the output.
+    """Findings on the levels that a channel resolves, of an output where its drive has more of them.
 
     Noise of half a step or more between neighbours dithers: averaging then recovers what lies between two levels, and
     the finding is only noted. The levels of an input are noted.
+
+    Args:
+        label: The channel in the words of a message.
+        values: Its samples, shape (samples,), finite.
+        drives: The inputs, each (samples,), where the channel is an output; None where it is an input itself.
     """
     step = quantum(values)
     span = float(np.ptp(values))
@@ -90,12 +95,17 @@ def _flicker(values: Floats, step: float) -> float:
 
 
 def drift(label: str, values: Floats, drives: Sequence[Floats]) -> list[Finding]:
-    """The linear trend that the drives do not explain, as a share of peak-to-peak.
+    """Findings on the linear trend of an output that the drives do not explain, as a share of its peak-to-peak.
 
     Regression of the output on drives, time and a constant; the standard error of the trend follows from the scatter of
     eight block means, so that slow noise is not taken for drift. Noted from 0.5 % on. Above half of peak-to-peak the
     drift is the larger part of what was recorded, unless drives seen through slow low-passes explain it: then the
     mirror is still answering a step.
+
+    Args:
+        label: The output in the words of a message.
+        values: Its samples, shape (samples,), finite.
+        drives: The inputs, each of shape (samples,).
     """
     # Block means instead of every n-th sample: they do not alias.
     y, *u = (block_means(column, max(1, values.size // 50_000)) for column in (values, *drives))
@@ -146,7 +156,12 @@ def _slow(drives: Sequence[Floats]) -> list[Floats]:
 
 
 def block_means(values: Floats, length: int) -> Floats:
-    """Means of blocks of `length` samples; what is left at the end is left out."""
+    """Means of blocks of samples; a last block that is not full is left out.
+
+    Args:
+        values: The samples, shape (samples,).
+        length: Samples in each block.
+    """
     if length == 1:
         return values
     return np.asarray(values[: values.size // length * length].reshape(-1, length).mean(axis=1))
@@ -165,11 +180,17 @@ _SLOWING = 0.97
 
 
 def clipping(label: str, values: Floats, place: Callable[[int], str], drives: Sequence[Floats] | None) -> list[Finding]:
-    """Judge one channel; `drives` are the inputs where it is an output, None where it is an input itself.
+    """Findings on one channel that is cut off at its highest or lowest value.
 
     A flat top counts when its flanks are smooth and steep enough to hide more than rounding, on at least two peaks.
     At the top of an output the drive must go on moving (a resting mirror is no fault); a drive must have curved
     flanks (a ramp that rests at its limit is meant).
+
+    Args:
+        label: The channel in the words of a message.
+        values: Its samples, shape (samples,), finite.
+        place: Says where in the file a sample of that number stands, for a message.
+        drives: The inputs, each (samples,), where the channel is an output; None where it is an input itself.
     """
     found = []
     low, high = float(values.min()), float(values.max())

@@ -27,7 +27,13 @@ _NARROW_RAD = math.radians(25)
 def excitation(
     inputs: Sequence[Floats], labels: Sequence[str], rate_hz: float
 ) -> tuple[tuple[float, float], list[Finding]]:
-    """The band in Hz that holds 99.9 % of the power of all inputs, and a finding with the band of each."""
+    """The band in Hz that holds 99.9 % of the power of all inputs, and a finding with the band of each.
+
+    Args:
+        inputs: Samples of each input, each of shape (samples,).
+        labels: The inputs in the words of a message, in the same order.
+        rate_hz: Sample rate, in Hz.
+    """
     bands, powers = zip(*(_band(values, rate_hz) for values in inputs), strict=True)
     findings = []
     for label, values, (low, high), power in zip(labels, inputs, bands, powers, strict=True):
@@ -84,7 +90,16 @@ def follows(
     rate_hz: float,
     band: tuple[float, float],
 ) -> list[Finding]:
-    """Findings: an output that does not follow the inputs, or that comes before them."""
+    """Findings on an output that does not follow the inputs, or that comes before them.
+
+    Args:
+        label: The output in the words of a message.
+        output: Its samples, shape (samples,).
+        inputs: Samples of each input, each of shape (samples,).
+        labels: The inputs in the words of a message, in the same order.
+        rate_hz: Sample rate, in Hz.
+        band: Lowest and highest excited frequency, in Hz, as `excitation` finds them.
+    """
     factor = max(1, int(rate_hz / (16 * band[1])))
     factor = min(factor, max(1, output.size // 4096))
     slow = [block_means(column, factor) for column in (*inputs, output)]

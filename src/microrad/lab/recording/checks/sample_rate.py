@@ -19,7 +19,15 @@ _JITTER_NOTE, _JITTER_REFUSED = 0.01, 0.10
 
 
 def check_rate(where: str, rate_hz: object) -> float:
-    """The rate as a positive finite float; raises `RecordingError`."""
+    """The rate as a positive finite float.
+
+    Args:
+        where: The file in the words of a message.
+        rate_hz: What is given as the samples per second.
+
+    Raises:
+        RecordingError: For what is no positive finite number.
+    """
     if isinstance(rate_hz, bool) or not isinstance(rate_hz, (int, float, np.number)) or not 0 < rate_hz < math.inf:
         raise RecordingError(
             f"{where}: the sample rate is {rate_hz!r}; give the samples per second as a positive number in Hz."
@@ -28,7 +36,16 @@ def check_rate(where: str, rate_hz: object) -> float:
 
 
 def agreed_rate(where: str, rate_hz: float | None, stated: Sequence[StatedRate]) -> float:
-    """The rate given, else the one stated; raises `RecordingError` where two differ or none is known."""
+    """The rate given, else the one that the file states, in Hz.
+
+    Args:
+        where: The file in the words of a message.
+        rate_hz: The rate given, in Hz, None where none is.
+        stated: The rates that the file states.
+
+    Raises:
+        RecordingError: Where two rates differ, or none is known.
+    """
     known = [StatedRate(rate_hz, "given")] if rate_hz is not None else []
     known += stated
     if not known:
@@ -50,7 +67,17 @@ def agreed_rate(where: str, rate_hz: float | None, stated: Sequence[StatedRate])
 def rate_of_time(
     where: str, label: str, time_s: Floats, place: Callable[[int], str]
 ) -> tuple[StatedRate, list[Finding]]:
-    """Rate and findings of a time column in seconds; raises `RecordingError` where time stops, jumps or runs back."""
+    """Sample rate that a time column tells, and findings on its steps.
+
+    Args:
+        where: The file in the words of a message.
+        label: The time column in the words of a message.
+        time_s: The times, in s, shape (samples,).
+        place: Says where in the file a sample of that number stands, for a message.
+
+    Raises:
+        RecordingError: Where a time is no number, or time stops, jumps or runs back.
+    """
     bad = ~np.isfinite(time_s)
     if bad.any():
         row = int(np.argmax(bad))

@@ -38,7 +38,12 @@ class Variable:
 
 
 def stated_rate(name: str, value: Any) -> StatedRate | None:
-    """The rate stated by a scalar with a name such as fs or dt; None for any other."""
+    """The sample rate that a scalar with a name such as fs or dt states; None for any other variable.
+
+    Args:
+        name: Name of the variable, after that of its group.
+        value: Its value, in Hz or, where the name is that of a step, in s.
+    """
     key = name.rsplit("/", 1)[-1].casefold()
     if key not in RATE_NAMES | STEP_NAMES:
         return None
@@ -65,9 +70,13 @@ def rates_of(variables: list[Variable]) -> dict[str, tuple[StatedRate, ...]]:
 
 
 def channels_of(variables: list[Variable], unusable: dict[str, str]) -> tuple[Channel, ...]:
-    """Each vector is a channel, each column of a matrix another, named `variable[column]`.
+    """The channels in some variables: each vector is one, and each column of a matrix, named `variable[column]`.
 
     Samples run along the longer axis. Arrays of more axes are not listed: `ArraySource.resolve` takes them by index.
+
+    Args:
+        variables: The variables of the file.
+        unusable: Why other variables are no channels, by their names; those found here are added.
     """
     found: list[Channel] = []
     for variable in variables:
@@ -127,7 +136,13 @@ def _channel(variable: Variable, index: tuple[int, ...]) -> Channel:
 
 
 def indexed(source: Container, variables: list[Variable], wanted: int | str) -> Channel | None:
-    """The channel that `variable[i, j, ...]` names in an array of three axes or more, if it exists."""
+    """The channel that `variable[i, j, ...]` names in an array of three axes or more, if it exists.
+
+    Args:
+        source: The container, whose variables they are.
+        variables: Its variables.
+        wanted: Name of the channel; a number names none.
+    """
     match = _INDEXED.fullmatch(wanted) if isinstance(wanted, str) else None
     if match is None:
         return None
@@ -168,7 +183,15 @@ class ArraySource(Container):
         return any(sum(n != 1 for n in v.shape) > 2 and v.dtype.kind in "iuf" for v in self.variables)
 
     def resolve(self, wanted: int | str, role: str) -> int:
-        """A name, a number, or `variable[i, j, ...]`; the latter joins the list of channels."""
+        """Number of a channel; one that an index picks out of an array joins the list of channels.
+
+        Args:
+            wanted: A name, a number, or `variable[i, j, ...]`.
+            role: What the channel is wanted for, in the words of a message.
+
+        Raises:
+            RecordingError: For no such channel, or a name that may be several.
+        """
         if isinstance(wanted, str) and wanted not in self.names:
             wanted = re.sub(r"\s*,\s*", ", ", wanted)
             extra = None if wanted in self.names else indexed(self, self.variables, wanted)

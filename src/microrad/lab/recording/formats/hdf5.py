@@ -34,7 +34,12 @@ _MATLAB_NUMBERS = frozenset(
 
 
 def unusable_dataset(path: Path, item: Any) -> str:
-    """Why a dataset is no channel and what to do, in words that follow its name; empty for one that may be."""
+    """Why a dataset is no channel and what to do, in words that follow its name; empty for one that may be.
+
+    Args:
+        path: The file.
+        item: The dataset as h5py gives it.
+    """
     # The order matters: the shape of a virtual dataset may ask for its files.
     if item.external or item.is_virtual:
         return f"takes its values from other files, {ELSEWHERE}"
@@ -42,7 +47,12 @@ def unusable_dataset(path: Path, item: Any) -> str:
 
 
 def attribute(attributes: Mapping[str, Any], name: str) -> Any:
-    """An attribute's value; None where there is none or it is of a type that NumPy does not know."""
+    """An attribute's value; None where there is none or it is of a type that NumPy does not know.
+
+    Args:
+        attributes: The attributes as h5py gives them.
+        name: Name of the one wanted.
+    """
     try:
         return attributes.get(name)
     except TypeError:
@@ -116,9 +126,18 @@ def _too_large(path: Path, item: Any) -> str:
 
 
 def check_pieces(path: Path, name: str, item: Any) -> None:
-    """Raises RecordingError if a piece does not unpack to the number of bytes that it states.
+    """Check that each piece of a dataset unpacks to the number of bytes that it states.
 
-    Of one that holds more the library would make room for all; behind one that holds less it reads on in the memory.
+    For a piece that holds more the library would make room for all of it; behind one that holds less it would read on
+    in the memory.
+
+    Args:
+        path: The file, for the message.
+        name: Name of the dataset, for the message.
+        item: The dataset as h5py gives it.
+
+    Raises:
+        RecordingError: If a piece unpacks to another number of bytes.
     """
     if item.chunks is None:
         return

@@ -38,7 +38,12 @@ def is_time_name(name: str) -> bool:
 
 
 def time_unit(name: str, unit: str) -> str:
-    """Unit of a time channel: stated, in brackets or behind an underscore of the name, else seconds."""
+    """Unit of a time channel: the one stated, else the one in its name, in brackets or behind an underscore, else s.
+
+    Args:
+        name: Name of the channel.
+        unit: Unit that the file states, empty for none.
+    """
     tail = name.rsplit("_", 1)[-1].casefold() if "_" in name else ""
     stated = unit or bracketed_unit(name) or (tail if tail in SECONDS else "")
     return stated or "s"
@@ -58,7 +63,15 @@ class Source(ABC):
 
     @abstractmethod
     def resolve(self, wanted: int | str, role: str) -> int:
-        """Number of the channel with that name or number; raises `RecordingError`."""
+        """Number of the channel with a name or a number.
+
+        Args:
+            wanted: Name of the channel, or its number from 0.
+            role: What the channel is wanted for, in the words of a message.
+
+        Raises:
+            RecordingError: For no such channel, or a name that may be several.
+        """
 
     @abstractmethod
     def load(self, indices: Sequence[int]) -> list[Floats]:
@@ -134,7 +147,15 @@ class Container(Source):
         return f"channel {index} ('{self.names[index]}')"
 
     def resolve(self, wanted: int | str, role: str) -> int:
-        """Full name, unique last part of a name, or number."""
+        """Number of the channel with a full name, the unique last part of one, or a number.
+
+        Args:
+            wanted: Name of the channel, or its number from 0.
+            role: What the channel is wanted for, in the words of a message.
+
+        Raises:
+            RecordingError: For no such channel, or a name that may be several.
+        """
         if isinstance(wanted, str):
             hits = [i for i, name in enumerate(self.names) if name == wanted]
             hits = hits or [i for i, name in enumerate(self.names) if name.rsplit("/", 1)[-1] == wanted]
@@ -218,7 +239,13 @@ def _first_line(error: BaseException) -> str:
 
 
 def damaged(path: Path, kind: str, error: BaseException) -> RecordingError:
-    """The refusal of a file that its library cannot open."""
+    """The refusal of a file that its library cannot open.
+
+    Args:
+        path: The file.
+        kind: Its format in the words of a message.
+        error: What the library raised.
+    """
     return RecordingError(
         f"{path}: this cannot be read as {kind} ({_first_line(error)}); the file is damaged or truncated: copy it "
         "again from its source."

@@ -98,7 +98,15 @@ def _encoding(path: Path, head: bytes) -> str:
 
 
 def refuse_binary(path: Path, chunk: bytes) -> None:
-    """Raises RecordingError, whose message names what the file is instead of text."""
+    """Refuse a file that is no text; the message names what it is instead.
+
+    Args:
+        path: The file.
+        chunk: Its first bytes.
+
+    Raises:
+        RecordingError: Always.
+    """
     what = "UTF-16 text" if chunk[:2] in (b"\xff\xfe", b"\xfe\xff") else "a binary file, not text"
     raise RecordingError(f"{path}: this is {what}; export the recording as plain text (CSV, UTF-8).")
 
@@ -116,7 +124,12 @@ def _guess_delimiter(line: str) -> str | None:
 
 
 def split(line: str, delimiter: str | None) -> list[str]:
-    """Cells of a line."""
+    """Cells of a line, without the white space about them.
+
+    Args:
+        line: The line.
+        delimiter: What stands between two cells, None for white space.
+    """
     if delimiter is None:
         return line.split()
     if '"' in line:
@@ -172,13 +185,28 @@ def _check_comma_pairs(
 
 
 def short(text: str, limit: int = 40) -> str:
-    """The beginning of a text, fit for a message."""
+    """The beginning of a text, fit for a message.
+
+    Args:
+        text: The text.
+        limit: Largest number of characters.
+    """
     text = text.strip()
     return text if len(text) <= limit else text[: limit - 1] + "…"
 
 
 def column_of(path: Path, layout: Layout, wanted: int | str, role: str) -> int:
-    """Number of the wanted column; a text of digits is a number unless it is a name in the header."""
+    """Number of the wanted column; a text of digits is a number unless it is a name in the header.
+
+    Args:
+        path: The file, for the message.
+        layout: Its columns and headers.
+        wanted: Name in a header, or number from 0.
+        role: What the column is wanted for, in the words of a message.
+
+    Raises:
+        RecordingError: For no such column, or a name that several have.
+    """
     matches = [[i for i, name in enumerate(row) if name == wanted] for row in layout.headers]
     hits = next((hit for hit in matches if hit), [])
     if len(hits) > 1:
@@ -230,7 +258,15 @@ class TextSource(Source):
         return self.layout.label(index)
 
     def resolve(self, wanted: int | str, role: str) -> int:
-        """Header name or number."""
+        """Number of the column with a name in the header, or a number.
+
+        Args:
+            wanted: Name in a header, or number from 0.
+            role: What the column is wanted for, in the words of a message.
+
+        Raises:
+            RecordingError: For no such column, or a name that several have.
+        """
         return column_of(self.path, self.layout, wanted, role)
 
     def load(self, indices: Sequence[int]) -> list[Floats]:
