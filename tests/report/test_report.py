@@ -518,6 +518,30 @@ def test_a_drive_beyond_the_identified_rate_is_the_first_thing_said(paper, tmp_p
     assert "Not to be relied on" not in report.verdict_text(paper)
 
 
+def test_warnings_of_a_requirement_that_is_missed_stand_first(paper, monkeypatch):
+    """Those of the others follow by what is to spare, and what puts the verdict in doubt is before both."""
+    by = {r.subject: r for r in paper.requirements}
+    beacon, answer = (replace(by[name], derived=()) for name in ("beacon", "answer"))
+    met = [replace(each, actual=spare, margin=spare) for each, spare in ((beacon, 3.0), (answer, 1.0))]
+
+    def order(*requirements):
+        found = words.ranked_warnings(replace(paper, requirements=requirements))
+        return next(iter(found)), [w.split(" budget:")[0] for w in found["The verdict"] if " budget:" in w]
+
+    alike = order(*met)
+    assert alike == ("The verdict", ["Answer", "Beacon", "Communication"])
+    missed = replace(beacon, actual=-1.0, margin=-1.0)
+    assert order(missed, met[1])[1] == ["Beacon", "Answer", "Communication"]
+    monkeypatch.setattr(words, "_of_verdict", lambda study: ["the verdict's pointing loss is large"])
+    assert words.warnings(replace(paper, requirements=(missed, met[1])))[0] == "the verdict's pointing loss is large"
+    stroke = replace(missed, subject="stroke")
+    own, others = ["fine pointing: tuned", "fine pointing: the stroke does not cover"], []
+    monkeypatch.setattr(words.fine_pointing_words, "warnings", lambda *_: (own, others))
+    found = words.ranked_warnings(replace(paper, requirements=(*met, stroke), fine_pointing=object()))
+    assert [*found][:2] == ["The loop that is judged", "The verdict"]
+    assert found["The loop that is judged"] == own[::-1]
+
+
 @pytest.fixture
 def no_scan(monkeypatch):
     """The scan has tests of its own and takes the longest."""

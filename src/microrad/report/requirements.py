@@ -46,17 +46,19 @@ def nearest(found: Sequence[Requirement]) -> Requirement:
     Missed ones come first, and behind all others those that are met by the choice of an input.
     """
 
-    def order(r: Requirement) -> tuple[bool, bool, float]:
-        if r.unit == "dB":
-            spare = 10.0 ** (r.margin / 10.0)
-        elif r.unit == "%":
-            spare = (100.0 - r.required) / max(100.0 - r.actual, 1e-12)
-        else:
-            small, large = (abs(each) or 1e-12 for each in (r.required, r.actual))
-            spare = large / small if (r.margin >= 0.0) == (large > small) else small / large
-        return r.met, r.mark == DERIVED, spare
+    return min(found, key=nearness)
 
-    return min(found, key=order)
+
+def nearness(r: Requirement) -> tuple[bool, bool, float]:
+    """By what requirements are put in order: those that are missed first, by the most, and the derived ones last."""
+    if r.unit == "dB":
+        spare = 10.0 ** (r.margin / 10.0)
+    elif r.unit == "%":
+        spare = (100.0 - r.required) / max(100.0 - r.actual, 1e-12)
+    else:
+        small, large = (abs(each) or 1e-12 for each in (r.required, r.actual))
+        spare = large / small if (r.margin >= 0.0) == (large > small) else small / large
+    return r.met, r.mark == DERIVED, spare
 
 
 def margin_text(r: Requirement) -> str:

@@ -1,10 +1,13 @@
 """What a study found, in words and as plain data."""
 
 import math
+import re
+from collections.abc import Sequence
+from functools import partial
 
 from microrad.core.units import format_quantity
 from microrad.link.budget.lines import DEEPEST_DB, POINT_AHEAD_LOSS, POINTING_LOSS
-from microrad.link.requirement import IMPOSSIBLE, time_kept
+from microrad.link.requirement import IMPOSSIBLE, Requirement, Subject, time_kept
 from microrad.loop.paper_cases import Run
 from microrad.mirror import Variant
 from microrad.mission.file import changed_from_shipped
@@ -17,12 +20,24 @@ from microrad.report.requirements import (
     margin_text,
     met_words,
     nearest,
+    nearness,
     requirement_table,
 )
 from microrad.report.study import contributors
 from microrad.report.tables import table_text, tables_text
 from microrad.study.pointing_penalty import FINE, Cost
 from microrad.study.study import Study
+
+_OF_VERDICT = ("[jitter] is not", "the verdict's ")  # warnings that put the judged margin itself in doubt
+_LAST = (True, True, math.inf)
+_BEGINS: dict[Subject, str] = {
+    "communication": "[Cc]ommunication[ .]",
+    "beacon": "[Bb]eacon[ .]",
+    "answer": "[Aa]nswer[ .]",
+    "stroke": "fine pointing: the stroke",
+    "fine pointing": "fine pointing: ",
+}
+"""How the warnings begin that speak of a requirement."""
 
 
 def headline(study: Study) -> str:
@@ -233,7 +248,10 @@ def warnings(study: Study) -> list[str]:
 
 
 def ranked_warnings(study: Study) -> dict[str, list[str]]:
-    """The warnings by what they put in doubt: first the verdict itself, last what it does not rest on."""
+    """The warnings by what they put in doubt: first the verdict itself, last what it does not rest on.
+
+    Those of a requirement that is missed stand before all others, those of requirements in the order of `nearest`.
+    """
     own: list[str] = []
     others: list[str] = []
     if study.fine_pointing is not None:
@@ -249,7 +267,28 @@ def ranked_warnings(study: Study) -> dict[str, list[str]]:
         "Other controllers": others,
         "The paper's loop and figures": [] if judged else paper,
     }
-    return {what: said for what, said in found.items() if said}
+    ranked = {what: sorted(said, key=partial(_weight, study)) for what, said in found.items() if said}
+    return dict(sorted(ranked.items(), key=lambda each: not _missed(study, each[1])))
+
+
+def _weight(study: Study, warning: str) -> tuple[bool, bool, float]:
+    """What a warning is put in order by: the requirement that it speaks of; what speaks of none stays before others."""
+    r = _spoken_of(study, warning)
+    return (False, False, 0.0) if r is None and warning.startswith(_OF_VERDICT) else _LAST if r is None else nearness(r)
+
+
+def _missed(study: Study, warnings: Sequence[str]) -> bool:
+    """Whether one of the warnings speaks of a requirement that is not met."""
+    found = [_spoken_of(study, each) for each in warnings]
+    return any(r is not None and not r.met for r in found)
+
+
+def _spoken_of(study: Study, warning: str) -> Requirement | None:
+    """The requirement that a warning is about, by how it begins."""
+    for subject, begins in _BEGINS.items():
+        if re.match(begins, warning):
+            return next((r for r in study.requirements if r.subject == subject), None)
+    return None
 
 
 def _of_sources(study: Study) -> list[str]:
