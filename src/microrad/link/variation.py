@@ -231,12 +231,12 @@ def swings(
     ten; none beyond the bounds of its key. Inputs that do not move the margin are left out.
 
     Args:
-        mission: the tables as they are.
-        sources: where each value comes from, by key.
-        tables: names of the tables whose inputs are moved.
-        strehl: the convention by which a Strehl is read, "ratio" or "decibel".
-        margin_db: the margin (dB) of the tables.
-        possible: whether such tables can be, so that no obscuration stops the whole beam, for instance.
+        mission: The tables as they are.
+        sources: Where each value comes from, by key.
+        tables: Names of the tables whose inputs are moved.
+        strehl: The convention by which a Strehl is read, "ratio" or "decibel".
+        margin_db: The margin (dB) of the tables.
+        possible: Whether such tables can be, so that no obscuration stops the whole beam, for instance.
     """
 
     def swing(each: Input) -> Swing:
@@ -327,14 +327,15 @@ def solve(
     """Where an input leaves a margin, looked for in steps and then found to the last digits.
 
     Args:
-        mission: the tables as they are.
-        found: the input, or its axes, which keep their proportion.
-        unit: its unit; decibels are moved by steps, all else by factors.
-        margin_db: the margin (dB) of the tables; none where their rule or ``possible`` does not allow the value.
-        required_db: the margin that has to be left, dB.
-        possible: whether such tables can be.
+        mission: The tables as they are.
+        found: The input, or its axes, which keep their proportion.
+        unit: Its unit; decibels are moved by steps, all else by factors.
+        margin_db: The margin (dB) of the tables; none where their rule or ``possible`` does not allow the value.
+        required_db: The margin that has to be left, dB.
+        possible: Whether such tables can be.
 
-    Raises ValueError if the input is 0 and no decibels, which no factor moves, or does not move the margin.
+    Raises:
+        ValueError: If the input is 0 and no decibels, which no factor moves, or does not move the margin.
     """
     value, count = max(each.value for each in found), DECADES * STEPS
     linear = unit.startswith("dB")

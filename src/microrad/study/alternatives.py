@@ -54,9 +54,9 @@ def other_readings(m: Mission, residual: paper_cases.Run, parts: kept.Kept = kep
     Readings of the loop are simulated (PID + inverse at the mission's frequencies); the others read one run anew.
 
     Args:
-        m: the mission as it is.
-        residual: the run that the verdict rests on.
-        parts: the runs of earlier studies that are kept.
+        m: The mission as it is.
+        residual: The run that the verdict rests on.
+        parts: The runs of earlier studies that are kept.
     """
     found = []
     for key, table in _OPEN:

@@ -79,10 +79,10 @@ def performance_of_loops(
     """The communication link under the residuals of the clean sines and of the fine-pointing loop.
 
     Args:
-        data: the communication link.
-        residual: how the residual of a sine is read: "radial" for two equal axes, "per-axis" for one.
-        runs: the tracked sines, by controller and mirror.
-        fine: the fine-pointing loop; None in a mission without one.
+        data: The communication link.
+        residual: How the residual of a sine is read: "radial" for two equal axes, "per-axis" for one.
+        runs: The tracked sines, by controller and mirror.
+        fine: The fine-pointing loop; None in a mission without one.
     """
     cases = [_sine(data, residual == "radial", run) for run in runs]
     if fine is not None:

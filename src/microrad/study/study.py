@@ -153,12 +153,13 @@ def run_study(
     """The whole study of a mission: budgets, mirror, loops, and the link at the residual that the loop leaves.
 
     Args:
-        file: the mission.
-        on_progress: told how many of the three steps are done, and which one begins.
-        parts: the results of earlier runs that are kept; none by default.
+        file: The mission.
+        on_progress: Told how many of the three steps are done, and which one begins.
+        parts: The results of earlier runs that are kept; none by default.
 
-    Raises ValueError with the reason when the loop is unstable, the mirror has no inverse or the receiver does not take
-    the data rate.
+    Raises:
+        ValueError: When the loop is unstable, the mirror has no inverse or the receiver does not take the data rate;
+            the message says why.
     """
     file = with_contents(link_study.solve_rate(file))
     if any(each.content is None for each in file.contents):  # it may be there when it is read
@@ -300,12 +301,13 @@ def delivered(
     """The day at a pointing loss, its contact in time under the best controller, and the plan of a constellation.
 
     Args:
-        links: the links of the mission, with their acquisition.
-        loss: what pointing costs the laser link.
-        fine: the fine-pointing loop; None in a mission without one, which then has no contact in time.
-        parts: the results of earlier runs that are kept.
+        links: The links of the mission, with their acquisition.
+        loss: What pointing costs the laser link.
+        fine: The fine-pointing loop; None in a mission without one, which then has no contact in time.
+        parts: The results of earlier runs that are kept.
 
-    Raises ValueError if an orbit does not hold over the mission's span.
+    Raises:
+        ValueError: If an orbit does not hold over the mission's span.
     """
     m, operations = links.file.mission, links.file.mission.operations
     if m.orbit is None or operations is None:

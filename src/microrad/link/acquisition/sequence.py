@@ -254,11 +254,12 @@ def solve_sequence(stages: Sequence[Stage], attempts: int) -> Outcome:
     Exact: all orders of failures are summed; times that are distributions are convolved.
 
     Args:
-        stages: in order, each of another name.
-        attempts: failures until the sequence is given up, at least 1.
+        stages: In order, each of another name.
+        attempts: Failures until the sequence is given up, at least 1.
 
-    Raises ValueError if there is no attempt or no stage, if two stages have one name, or a failure goes back to a stage
-    that is not there or comes later.
+    Raises:
+        ValueError: If there is no attempt or no stage, if two stages have one name, or a failure goes back to a stage
+            that is not there or comes later.
     """
     back = check_sequence(stages, attempts)
     locked: list[TimeDistribution] = []

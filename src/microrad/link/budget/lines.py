@@ -107,13 +107,14 @@ def communication_budget(
     """Budget of the data link from LEO to GEO, at its own pointing error and data rate or at those given.
 
     Args:
-        data: the communication link.
-        sources: where each value of the mission comes from, by key.
-        pointing_error_rad: static radial error, rad; by default the mission's.
-        data_rate_bit_s: information rate, bit/s; by default the mission's.
-        given_source: where a given value comes from: the source of its line.
+        data: The communication link.
+        sources: Where each value of the mission comes from, by key.
+        pointing_error_rad: Static radial error, rad; by default the mission's.
+        data_rate_bit_s: Information rate, bit/s; by default the mission's.
+        given_source: Where a given value comes from: the source of its line.
 
-    Raises ValueError if the pointing error is negative, the data rate not above zero, or the receiver does not take it.
+    Raises:
+        ValueError: If the pointing error is negative, the data rate not above zero, or the receiver does not take it.
     """
     beam = data.table
     write = Writer("communication", beam, data.shared, sources, "leo")
@@ -139,11 +140,12 @@ def beam_budget(name: str, shared: Shared, beam: Beacon | None, sources: Mapping
 
     Args:
         name: "beacon" or "answer", the name of its table.
-        shared: terminals, conventions, air and point-ahead of the mission.
-        beam: the table itself; None where the mission has none.
-        sources: where each value of the mission comes from, by key.
+        shared: Terminals, conventions, air and point-ahead of the mission.
+        beam: The table itself; None where the mission has none.
+        sources: Where each value of the mission comes from, by key.
 
-    Raises ValueError if the mission has no such beam.
+    Raises:
+        ValueError: If the mission has no such beam.
     """
     if beam is None:
         raise ValueError(f"the mission has no table [{name}]")

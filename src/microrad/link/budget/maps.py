@@ -62,11 +62,12 @@ def margin_map(data: DataLink, data_rate_bit_s: ArrayLike, pointing_error_rad: A
     """Margin of the communication link in dB, shape (rates, errors); paper, Fig. 2.
 
     Args:
-        data: the communication link.
-        data_rate_bit_s: information rates, bit/s, shape (rates,).
-        pointing_error_rad: static radial errors, rad, shape (errors,).
+        data: The communication link.
+        data_rate_bit_s: Information rates, bit/s, shape (rates,).
+        pointing_error_rad: Static radial errors, rad, shape (errors,).
 
-    Raises ValueError if an error is negative, a rate not above zero, or the receiver does not take it.
+    Raises:
+        ValueError: If an error is negative, a rate not above zero, or the receiver does not take it.
     """
     rate = np.atleast_1d(np.asarray(data_rate_bit_s, dtype=np.float64))
     error = np.atleast_1d(np.asarray(pointing_error_rad, dtype=np.float64))
@@ -95,11 +96,12 @@ def largest_data_rate(data: DataLink, margin_db: float, pointing_error_rad: floa
     """Largest data rate (bit/s) with a margin at a pointing error, or the highest that the receiver takes.
 
     Args:
-        data: the communication link.
-        margin_db: the margin that is left, dB.
-        pointing_error_rad: static radial error, rad, at least 0.
+        data: The communication link.
+        margin_db: The margin that is left, dB.
+        pointing_error_rad: Static radial error, rad, at least 0.
 
-    Raises LinkError if not even the slowest rate leaves the margin.
+    Raises:
+        LinkError: If not even the slowest rate leaves the margin.
     """
     check_grid(np.ones(1), np.asarray(pointing_error_rad))
     lost = float(pointing_loss_db(data, pointing_error_rad))
@@ -110,11 +112,12 @@ def rate_at_loss(data: DataLink, margin_db: float, loss_db: float) -> float:
     """Largest data rate (bit/s) with a margin at a pointing loss, or the highest that the receiver takes.
 
     Args:
-        data: the communication link.
-        margin_db: the margin that is left, dB.
-        loss_db: the pointing loss, dB, positive.
+        data: The communication link.
+        margin_db: The margin that is left, dB.
+        loss_db: The pointing loss, dB, positive.
 
-    Raises LinkError if not even the slowest rate leaves the margin.
+    Raises:
+        LinkError: If not even the slowest rate leaves the margin.
     """
     available = received_on_axis_dbm(data) - loss_db - margin_db
     built = data.receiver
@@ -148,12 +151,13 @@ def largest_pointing_error(data: DataLink, margin_db: float, data_rate_bit_s: fl
     """Largest radial pointing error (rad) with a margin at a data rate: the loss grows with the error.
 
     Args:
-        data: the communication link.
-        margin_db: the margin that is left, dB.
-        data_rate_bit_s: information rate, bit/s.
+        data: The communication link.
+        margin_db: The margin that is left, dB.
+        data_rate_bit_s: Information rate, bit/s.
 
-    Raises LinkError if the margin is not there even on axis, or an uncorrected point-ahead lies beyond the main lobe
-    of the beam, where the loss does not grow with the error.
+    Raises:
+        LinkError: If the margin is not there even on axis, or an uncorrected point-ahead lies beyond the main lobe of
+            the beam, where the loss does not grow with the error.
     """
     excess_db = float(margin_map(data, data_rate_bit_s, 0.0)[0, 0]) - margin_db
     if excess_db < 0.0:

@@ -169,14 +169,15 @@ def open_loop_budget(
     Point-ahead is a line where the mission has it.
 
     Args:
-        pointing: the mission's table of errors and confidence.
-        shared: terminals, conventions and point-ahead of the mission.
-        beacon: the beam that has to cover the errors; None where the mission has none.
-        sources: where each value of the mission comes from, by key.
-        interpretation: of all lines. "temporal": the confidence is a share of the time of the worst-case satellite,
+        pointing: The mission's table of errors and confidence.
+        shared: Terminals, conventions and point-ahead of the mission.
+        beacon: The beam that has to cover the errors; None where the mission has none.
+        sources: Where each value of the mission comes from, by key.
+        interpretation: Of all lines. "temporal": the confidence is a share of the time of the worst-case satellite,
             "mixed": of the times of all satellites; see `error_term`.
 
-    Raises ValueError if the mission states no pointing errors, or a line stands for point-ahead as well.
+    Raises:
+        ValueError: If the mission states no pointing errors, or a line stands for point-ahead as well.
     """
     if pointing is None:
         raise ValueError("the mission states no pointing errors; give it the table [pointing]")

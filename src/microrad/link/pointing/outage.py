@@ -236,13 +236,13 @@ def performance(
     """The communication link under a distribution of pointing errors.
 
     Args:
-        data: the communication link.
-        source: where the errors come from, in words.
-        controller: the controller that leaves them; "" without one.
-        mirror: the variant of the mirror under it; "" without one.
-        errors: the radial errors and their shares of the time.
-        jitter: bias and rms of each axis, for the fades and the penalty of an uncoded link.
-        motion: what the spectrum says of each axis; None where it is not known, and the fades are then nan.
+        data: The communication link.
+        source: Where the errors come from, in words.
+        controller: The controller that leaves them; "" without one.
+        mirror: The variant of the mirror under it; "" without one.
+        errors: The radial errors and their shares of the time.
+        jitter: Bias and rms of each axis, for the fades and the penalty of an uncoded link.
+        motion: What the spectrum says of each axis; None where it is not known, and the fades are then nan.
     """
     q, kept = data.requirement, 1.0 - stated_outage(data.requirement)
     under = Exposure.of(data, errors.quantile_rad(kept), errors.beyond)

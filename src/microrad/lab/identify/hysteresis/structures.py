@@ -92,9 +92,9 @@ def hysteretic_oscillator(
     The arguments are where the search begins.
 
     Args:
-        mass: m (kg).
-        damping: c (N s/m).
-        stiffness: k (N/m).
+        mass: M (kg).
+        damping: C (N s/m).
+        stiffness: K (N/m).
         slope: N/m.
         decay: 1/m.
         asymmetry: 1/m.

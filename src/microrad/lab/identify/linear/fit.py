@@ -344,8 +344,8 @@ def fit_percent(measured: Floats, error: Floats) -> Floats:
     """100 (1 - |y - yhat| / |y - mean y|) of each output, shape (outputs,).
 
     Args:
-        measured: y, shape (samples, outputs).
-        error: y - yhat, of the same shape.
+        measured: Y, shape (samples, outputs).
+        error: Y - yhat, of the same shape.
     """
     spread = np.linalg.norm(measured - measured.mean(axis=0), axis=0)
     return np.asarray(100.0 * (1.0 - np.linalg.norm(error, axis=0) / spread))
