@@ -48,7 +48,7 @@ class GaussianFall:
     half_angle_rad: float
 
     def loss_db(self, error_rad: ArrayLike) -> Floats:
-        """8.686 (error / theta)^2 dB."""
+        """Loss at each radial error, 8.686 (error / theta)^2 dB."""
         error: Floats = np.asarray(error_rad, dtype=np.float64) / self.half_angle_rad
         return 2.0 * DB_PER_NEPER * error**2
 

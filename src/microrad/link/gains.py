@@ -159,7 +159,7 @@ def strehl_ratio(wavefront_error_m: float, wavelength_m: float) -> float:
 
 
 def obscuration_loss_db(obscuration: float) -> float:
-    """Area that a central obscuration takes from an aperture: -10 lg(1 - e^2), e the ratio of the diameters.
+    """Loss (dB) by a central obscuration of an aperture: -10 lg(1 - e^2), e the ratio of the diameters.
 
     Raises ValueError for a ratio that is not at least 0 and below 1.
     """
@@ -180,8 +180,9 @@ def air_mass(elevation_rad: float) -> float:
 
 
 def clear_sky_loss_db(zenith_transmission: float, elevation_rad: float) -> float:
-    """Loss of a clear atmosphere by absorption and scattering in dB: the zenith's loss times the air mass (Beer and
-    Lambert).
+    """Loss (dB) by absorption and scattering in a clear atmosphere.
+
+    It is the loss towards the zenith times the air mass (Beer and Lambert).
 
     Args:
         zenith_transmission: Share of the light that comes through towards the zenith, above 0 and at most 1.
@@ -196,15 +197,15 @@ def clear_sky_loss_db(zenith_transmission: float, elevation_rad: float) -> float
 
 
 def photon_energy_j(wavelength_m: float) -> float:
-    """Energy of one photon, h c / lambda."""
+    """Energy (J) of one photon, h c / lambda."""
     return PLANCK_J_S * SPEED_OF_LIGHT_M_S / wavelength_m
 
 
 def dbm(power_w: float) -> float:
-    """A power as a level in dBm."""
+    """The level in dBm of a power in W."""
     return 10.0 * math.log10(power_w) + 30.0
 
 
 def watt(level_dbm: float) -> float:
-    """A level in dBm as a power."""
+    """The power in W of a level in dBm."""
     return float(10.0 ** ((level_dbm - 30.0) / 10.0))

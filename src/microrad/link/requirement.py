@@ -61,7 +61,7 @@ class Requirement:
 
 
 def of_links(study: LinkStudy) -> tuple[Requirement, ...]:
-    """What the budgets alone are held against: what is required of the beacon, the answer and communication."""
+    """The requirements that the budgets alone can answer: those of the beacon, the answer and communication."""
     m = study.file.mission
     name = "communication margin" + ("" if m.jitter is None else f" for {time_kept(m.requirement)}")
     return (
@@ -76,7 +76,7 @@ def met(study: LinkStudy) -> bool:
 
 
 def of_beams(study: LinkStudy) -> tuple[Requirement, ...]:
-    """What is required of beacon and answer, where the mission has them: the beacon's cone, and 0 dB of each."""
+    """The requirements of beacon and answer, where the mission has them: the beacon's cone, and 0 dB of each."""
     sources, found = study.file.sources, []
     if study.beacon is not None:
         assert study.open_loop is not None  # it has a beacon

@@ -299,7 +299,7 @@ def largest_rate(data: link.DataLink) -> float:
 
 
 def point_ahead(data: link.DataLink) -> PointAheadEffect | None:
-    """What the mission's point-ahead is to its beam and its mirror, or None where it is not given."""
+    """The mission's point-ahead compared with its beam and its mirror, or None where it is not given."""
     ahead = data.shared.point_ahead
     if ahead is None:
         return None

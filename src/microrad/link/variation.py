@@ -146,7 +146,7 @@ def margin_or_none(of: _Link, margin_db: Callable[[_Link], float]) -> float:
 
 
 def divergence_possible(name: str) -> Callable[[Any], bool]:
-    """Whether the aperture of the beacon, or of the answer, can make its divergence; asked of a mission."""
+    """A check of a mission: whether the aperture of its beacon, or of its answer, can make the divergence."""
     too_narrow = divergence_fits(name, "geo" if name == "answer" else "leo")
     return lambda m: not any(too_narrow(m.conventions, m.terminals, getattr(m, name)))
 

@@ -56,7 +56,7 @@ class Quantity:
     most: float | None = None
 
     def read(self, value: object) -> float:
-        """SI value of the text; raises `UnitError`."""
+        """SI value of what a file holds, a text of number and unit or a plain number; raises `UnitError`."""
         if value == UNKNOWN:
             raise UnitError(value, NOT_PUBLISHED, self.wanted, self.example)
         number = parse_quantity(value, self.unit, self.typical) if self.unit else _plain_number(value)

@@ -98,7 +98,7 @@ class MissionFile(LinkFile):
 
 
 def load_mission(path: str | Path, mirror_path: str | Path | None = None, *, text: str | None = None) -> MissionFile:
-    """Read a mission file, and check it.
+    """Read a mission file and check it.
 
     Args:
         path: The mission file.
@@ -182,7 +182,7 @@ def named_files(m: LinkMission) -> tuple[str, ...]:
 
 
 def with_contents(file: _File) -> _File:
-    """The file with what the files hold that its mission names: each is read once, whatever becomes of it later.
+    """The mission file with the content of the files that it names: each is read once, whatever becomes of it later.
 
     One that cannot be read, or is too large, is left to whoever needs it, who says what is wrong.
     """

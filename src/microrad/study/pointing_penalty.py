@@ -92,7 +92,7 @@ def performance_of_loops(
 
 
 def costs(cases: tuple[Performance, ...]) -> tuple[Cost, ...]:
-    """Each case with hysteresis against the same one without."""
+    """What hysteresis costs: each case with it against the same one without."""
     straight = {(c.source, c.controller): c for c in cases if c.mirror == Variant.STRAIGHT}
     found = []
     for c in cases:

@@ -256,11 +256,14 @@ def _manifest(plan: Plan, seed: int, entries: list[dict[str, Any]], draft: Path)
 
 
 def check_folder(folder: Path, overwrite: bool) -> None:
-    """Raises FolderError if `folder` holds something that must not be replaced.
+    """Check that a folder may be written.
 
     Args:
         folder: The folder to write.
         overwrite: Whether a folder that a bench wrote may be replaced.
+
+    Raises:
+        FolderError: If the folder holds something that must not be replaced.
     """
     check(folder, overwrite, "plan", "recordings")
 

@@ -88,7 +88,7 @@ class BenchMirror:
         return np.asarray(self.creep_first_s * 10.0 ** ((np.arange(count) + 0.5) / self.lags_per_decade))
 
     def saturated(self, extension_mrad: Floats) -> Floats:
-        """S of the sum of direct part and plays."""
+        """S (mrad) of the mirror for the sum (mrad) of direct part and plays."""
         return extension_mrad * (1.0 + self.curvature_1_mrad * extension_mrad)
 
     def at_rest(self, rest_v: float) -> float:

@@ -39,7 +39,7 @@ _BY_NAME = {each.name: each for each in _FORMATS}
 
 
 def check_file(path: Path) -> None:
-    """Raises RecordingError if the path is no readable file, or the file is empty or has more than `MAX_BYTES`."""
+    """Check a file; raises RecordingError if it cannot be read, is empty or has more than `MAX_BYTES`."""
     try:
         if path.is_dir():
             raise RecordingError(f"{path}: this is a directory; name one file in it.")
@@ -87,7 +87,7 @@ def read_head(path: Path, size: int) -> bytes:
 
 
 def most_unpacked(path: Path) -> int:
-    """Bytes that an array of a file may unpack to: a few kB that claim more could fill the memory."""
+    """Largest number of bytes that an array of a file may unpack to, as a small file could claim to fill the memory."""
     return min(max(_UNPACKED_BYTES, _UNPACKED_TIMES * path.stat().st_size), MAX_BYTES)
 
 

@@ -55,7 +55,7 @@ def require_angle(name: str, value: float) -> None:
 
 
 def require_overlap(value: float) -> None:
-    """Raises ValueError unless the overlap of neighbouring tracks is 0 or more and below 1."""
+    """Check the overlap of neighbouring tracks; raises ValueError unless it is 0 or more and below 1."""
     if not 0.0 <= value < 1.0:
         raise ValueError(f"the overlap is {value:g}: it must be 0 or more and below 1, a share of a diameter")
 

@@ -235,7 +235,7 @@ class StepStare:
         return np.array([(pitch, 0.0), (pitch / 2.0, pitch * math.sqrt(3.0) / 2.0)])
 
     def order(self, index: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Which dwell, from 0, stands at each grid index (..., 2); the number of dwells where there is none."""
+        """Number, from 0, of the dwell at each grid index (..., 2); the number of dwells where there is none."""
         table, size = _dwell_order(self)
         half = table.shape[0] // 2
         inside = np.all(np.abs(index) <= half, axis=-1)

@@ -59,15 +59,15 @@ class TimeDistribution:
         return TimeDistribution(self.time_s, self.weight / self._certain())
 
     def scaled(self, factor: float) -> "TimeDistribution":
-        """The same times, each probability times `factor`."""
+        """The same times, each with its probability multiplied by a factor."""
         return TimeDistribution(self.time_s, self.weight * factor)
 
     def shifted(self, delay_s: float) -> "TimeDistribution":
-        """Every time later by `delay_s`."""
+        """The distribution with every time later by `delay_s`."""
         return TimeDistribution(self.time_s + delay_s, self.weight)
 
     def followed_by(self, other: "TimeDistribution") -> "TimeDistribution":
-        """Time of both, one after the other and independent: the convolution."""
+        """Distribution of the sum of two independent times, this one and then the other: their convolution."""
         if other.time_s.size == 1:
             return self.shifted(float(other.time_s[0])).scaled(float(other.weight[0]))
         first, second = self, other
@@ -128,5 +128,5 @@ def merged(time_s: NDArray[np.float64], weight: NDArray[np.float64], most: int =
 
 
 def joined(parts: list[TimeDistribution]) -> TimeDistribution:
-    """Sum of parts that exclude each other."""
+    """Distribution of a time that comes from one of several parts, which exclude each other."""
     return merged(np.concatenate([p.time_s for p in parts]), np.concatenate([p.weight for p in parts]))

@@ -91,13 +91,16 @@ def of(m: LinkMission) -> DataLink:
 def assembled(
     shared: Shared, table: Communication, requirement: LinkRequirement, jitter: JitterTable | None
 ) -> DataLink:
-    """The communication link of these tables; raises what `of` raises.
+    """Assemble the communication link from its tables.
 
     Args:
         shared: What all links of the mission have in common.
         table: The table on the communication link.
         requirement: What is required of it.
         jitter: The table on its jitter, None where the mission has none.
+
+    Raises:
+        ValueError: As `of`.
     """
     beam = communication_beam(shared.terminals, table, shared.conventions.pointing_loss)
     return DataLink(shared, table, requirement, jitter, beam, _receiver(shared.terminals, table))

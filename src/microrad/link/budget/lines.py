@@ -272,7 +272,7 @@ class Writer:
         )
 
     def receive(self, end: str) -> tuple[Line, ...]:
-        """From the receiving aperture on: its gain, its obscuration where the mission gives one, and its optics."""
+        """Lines from the receiving aperture on: its gain, its obscuration if the mission gives one, its optics."""
         hole = getattr(self.shared.terminals, f"{end}_obscuration")
         lines = [self.gain(end, _RECEIVING)]
         if hole is not None:

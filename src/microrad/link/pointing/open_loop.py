@@ -52,7 +52,7 @@ class PointAheadAngle:
 
 
 def point_ahead(table: PointAhead) -> PointAheadAngle:
-    """The angle of a mission and what is left of it."""
+    """The point-ahead angle of a mission, and the error that it leaves."""
     angle = point_ahead_rad(table.transverse_velocity_m_s)
     return PointAheadAngle(angle, table.corrected, table.error_rad if table.corrected else angle)
 

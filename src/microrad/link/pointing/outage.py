@@ -52,7 +52,7 @@ class Exposure:
 
     @classmethod
     def stated(cls, data: link.DataLink) -> "Exposure":
-        """That of a link whose loop is not simulated: under its jitter, or at its static error all the time."""
+        """The exposure of a link whose loop is not simulated: under its jitter, or at its static error all the time."""
         error = error_rad(data)
         if data.jitter is None:
             return cls.of(data, error, lambda reach_rad: float(error > reach_rad))
@@ -108,7 +108,7 @@ class GaussianErrors(ErrorDistribution):
 
     @classmethod
     def of(cls, jitter: pointing.Jitter) -> "GaussianErrors":
-        """The errors of this jitter."""
+        """The distribution of the radial errors that this jitter makes."""
         reach = jitter.static_rad + 12.0 * max(jitter.rms_rad)
         if reach == jitter.static_rad:
             return cls(np.array([reach]), np.ones(1), jitter)

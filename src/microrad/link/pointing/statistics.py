@@ -63,11 +63,11 @@ def mean_loss_db(jitter: Jitter, half_angle_rad: ArrayLike) -> Floats:
 
 
 def mean_transmission(jitter: Jitter, half_angle_rad: ArrayLike) -> Floats:
-    """Mean received power E[h], that on axis taken as 1: the product over the axes of exp(-2 b^2 / (theta^2 + 4 s^2)) /
-    sqrt(1 + 4 s^2 / theta^2).
+    """Mean received power E[h], the power on axis taken as 1.
 
-    b is the bias and s the rms of the axis (the Gaussian integral, done). Equal axes without bias give 1 / (1 + 4 s^2 /
-    theta^2), as the density beta h^(beta - 1), beta = theta^2 / (4 s^2), of Toyoshima et al. (2002).
+    It is the product over the axes of exp(-2 b^2 / (theta^2 + 4 s^2)) / sqrt(1 + 4 s^2 / theta^2). Equal axes without
+    bias give 1 / (1 + 4 s^2 / theta^2), as the density beta h^(beta - 1), beta = theta^2 / (4 s^2), of Toyoshima et al.
+    (2002).
 
     Args:
         jitter: Bias b and rms s of the pointing error about each axis, in rad.

@@ -75,12 +75,12 @@ def mean_and_sigma(terms: Terms) -> Jitter:
 
 
 def rss_rad(terms: Terms) -> float:
-    """Root of the sum of the squared half widths as stated, whatever their class, statistic and axes."""
+    """Root sum square of the half widths as stated, whatever their class, statistic and axes."""
     return math.hypot(*(term.stated_rad for term in terms))
 
 
 def esa_1993_rad(terms: Terms) -> float:
-    """Half widths as stated: in squares within a class, the classes then one upon the other."""
+    """Total of the half widths as stated: the root sum square within each class, and then the sum over the classes."""
     kinds = dict.fromkeys(term.kind for term in terms)
     return math.fsum(rss_rad([term for term in terms if term.kind == kind]) for kind in kinds)
 

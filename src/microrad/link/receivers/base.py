@@ -22,7 +22,7 @@ LEAST_COUNT = 1e-30  # stands for none, so that logarithms exist
 
 
 def normal_deviate(ratio: float) -> float:
-    """Q for which the normal tail is `ratio`."""
+    """The number Q of standard deviations beyond which the tail of a normal distribution is `ratio`."""
     return -NormalDist().inv_cdf(ratio)
 
 
@@ -33,7 +33,7 @@ def mark_and_space(extinction_ratio: float) -> tuple[float, float]:
 
 
 def spontaneous_photons(noise_figure_db: float) -> float:
-    """n_sp = F / 2 at high gain; "3 dB" is taken as 10 log10 2."""
+    """Spontaneous-emission factor n_sp = F / 2 of an amplifier at high gain; "3 dB" is taken as 10 log10 2."""
     return max(float(10.0 ** (noise_figure_db / 10.0)) / 2.0, 1.0)
 
 
@@ -116,13 +116,13 @@ def require_efficiency(what: str, value: float) -> None:
 
 
 def require_extinction(ratio: float) -> None:
-    """Raises ValueError if a mark is no brighter than a space."""
+    """Check that a mark is brighter than a space; raises ValueError."""
     limit = "it is the power of a mark over that of a space, as a ratio and above 1 (inf: dark spaces)"
     require(ratio > 1.0, "the extinction ratio", ratio, "", limit)
 
 
 def require_noise_figure(noise_figure_db: float) -> None:
-    """Raises ValueError if the noise figure is below the quantum limit."""
+    """Check that a noise figure is not below the quantum limit; raises ValueError."""
     limit = "it must be at least 3 dB, the quantum limit of an amplifier of both quadratures at high gain"
     require(3.0 <= noise_figure_db < math.inf, "the noise figure", noise_figure_db, "dB", limit)
 

@@ -89,7 +89,7 @@ class Log:
         return to != State.END
 
     def finish(self) -> None:
-        """The end of the contact, where nothing else has ended it."""
+        """Note the end of the contact where nothing else has ended it."""
         self.go(self.contact.end_s, State.END, "")
 
 

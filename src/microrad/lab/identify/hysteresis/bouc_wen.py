@@ -62,7 +62,7 @@ class BoucWenProblem:
         self.scale = 1.0 / (self.output_span_rad * math.sqrt(self.target.size))
 
     def physical(self, theta: Floats) -> tuple[float, float, float, float]:
-        """d2, delta (s/V), k_settled and k_reversal (1/V)."""
+        """The searched numbers in their units: d2, delta (s/V), k_settled and k_reversal (1/V)."""
         return (
             float(theta[0]) / self.rate_limit,
             float(theta[1]) / self.rate_limit,
@@ -82,8 +82,9 @@ class BoucWenProblem:
         return centred(np.concatenate(parts), self.records)
 
     def linear(self, columns: Floats, theta: Floats) -> Floats:
-        """The best d1 and epsilon, shape (2,); where epsilon takes back more of d1 than allowed, the best on that
-        bound.
+        """The best d1 and epsilon, shape (2,).
+
+        Where epsilon would take back more of d1 than allowed, they are the best on that bound.
 
         Args:
             columns: Responses to unit d1 and to unit epsilon, as `columns` gives them, shape (samples, 2).

@@ -269,7 +269,7 @@ class PlantProblem:
         return np.asarray(self.modelled(point) - self.measured)
 
     def slopes(self, point: Floats) -> Floats:
-        """Derivative of the residual by differences to one side, for the way to an optimum: half the simulations."""
+        """Derivative of the residual by one-sided differences, good enough on the way; half as many simulations."""
         here = self.modelled(point)
 
         def column(i: int) -> Floats:

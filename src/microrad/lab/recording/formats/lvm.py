@@ -73,12 +73,12 @@ class LvmSource(Container):
         return [parts[k][0] if len(parts[k]) == 1 else np.concatenate(parts[k]) for k in range(len(indices))]
 
     def samples(self) -> tuple[int | None, ...]:
-        """The rows of the segments."""
+        """How many samples each channel has: the rows of its segments."""
         rows = [segment.rows for segment in self._segments]
         return tuple(sum(rows) if self._joined else rows[number] for number, _ in self._columns)
 
     def rates(self, indices: Sequence[int]) -> list[StatedRate]:
-        """1 / Delta_X of the channels, where the header states it."""
+        """Sample rates of the channels, 1 / Delta_X, where the header states it."""
         found = []
         for index in indices:
             number, column = self._columns[index]

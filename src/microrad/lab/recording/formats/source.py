@@ -27,7 +27,7 @@ class StatedRate:
 
 
 def bracketed_unit(name: str) -> str:
-    """`V` of `Voltage (V)` or `Voltage [V]`, else nothing."""
+    """The unit in the brackets of a name, `V` of `Voltage (V)` or `Voltage [V]`, else nothing."""
     match = _BRACKETED.search(name)
     return match.group(1) if match else ""
 
@@ -135,7 +135,7 @@ class Container(Source):
             )
 
     def samples(self) -> tuple[int | None, ...]:
-        """Those that the channels state."""
+        """How many samples each channel states to have."""
         return tuple(channel.samples for channel in self.channels)
 
     def _has_more(self) -> bool:
@@ -143,7 +143,7 @@ class Container(Source):
         return False
 
     def label(self, index: int) -> str:
-        """`channel 1 ('bench/y')`."""
+        """The channel in the words of a message, such as `channel 1 ('bench/y')`."""
         return f"channel {index} ('{self.names[index]}')"
 
     def resolve(self, wanted: int | str, role: str) -> int:

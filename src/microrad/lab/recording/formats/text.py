@@ -42,7 +42,7 @@ class Layout:
     encoding: str
 
     def label(self, column: int) -> str:
-        """`column 1 ('output')`, or the number alone where the file has no names."""
+        """The column in the words of a message: `column 1 ('output')`, or its number alone where it has no name."""
         name = self.headers[0][column] if self.headers and column < len(self.headers[0]) else ""
         return f"column {column} ('{name}')" if name else f"column {column}"
 
@@ -254,7 +254,7 @@ class TextSource(Source):
         self.sha256, self._regular = _scan(path, self.layout)
 
     def label(self, index: int) -> str:
-        """`column 1 ('output')`."""
+        """The column in the words of a message, such as `column 1 ('output')`."""
         return self.layout.label(index)
 
     def resolve(self, wanted: int | str, role: str) -> int:
@@ -279,7 +279,7 @@ class TextSource(Source):
         return []
 
     def place(self, row: int) -> str:
-        """`line 12`, counted from 1."""
+        """The place of a sample in the words of a message, such as `line 12`, counted from 1."""
         with self.path.open(encoding=self.layout.encoding, errors="replace") as file:
             for number, line in enumerate(file, start=1):
                 if number >= self.layout.first_line and line.strip() and not line.lstrip().startswith(COMMENT):
