@@ -136,7 +136,7 @@ class Solution:
 
 
 def solve_key(file: LinkFile, key: str) -> Solution:
-    """The values of one key of the links' tables that leave exactly the required margin.
+    """The values of one key of the links' tables that leave the required margin.
 
     The margin is that of communication, but for the share of time of the outage. A key of the beacon's table is looked
     for at 0 dB of the beacon, one of the answer's at 0 dB of the answer.

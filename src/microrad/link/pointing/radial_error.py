@@ -170,7 +170,7 @@ def radial_survival(jitter: Jitter, radius_rad: ArrayLike) -> Floats:
 def radial_cdf(jitter: Jitter, radius_rad: ArrayLike) -> Floats:
     """Probability P(r < R) that the radial pointing error r stays below each radius R.
 
-    It is 1 less `radial_survival`; a small probability keeps its digits here.
+    It is 1 - `radial_survival`, but a small probability keeps its digits here.
 
     Args:
         jitter: Bias and rms of the pointing error about each axis, in rad.
