@@ -451,7 +451,7 @@ def test_a_damaged_note_breaks_no_list(studio, tmp_path, name, text):
 def test_a_link_for_the_folder_is_refused(tmp_path):
     (tmp_path / "elsewhere").mkdir()
     (tmp_path / "studio").symlink_to(tmp_path / "elsewhere")
-    with pytest.raises(JobError, match="is a link; remove it, or choose another working folder"):
+    with pytest.raises(JobError, match="made private: it is a link or belongs to somebody else; remove it"):
         Jobs(tmp_path / "studio")
     assert list((tmp_path / "elsewhere").iterdir()) == []
 

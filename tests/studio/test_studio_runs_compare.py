@@ -154,21 +154,6 @@ def test_the_report_of_a_ledger_as_a_command():
     assert action.results == ("x.html",)
 
 
-@pytest.mark.parametrize(
-    ("time_s", "words"),
-    [
-        (0.0, "0 s"),
-        (59.4, "59 s"),
-        (59.6, "1 min 0 s"),
-        (200.0, "3 min 20 s"),
-        (3599.6, "1 h 0 min"),
-        (7500, "2 h 5 min"),
-    ],
-)
-def test_a_duration_in_words(time_s, words):
-    assert runs_view.duration_words(time_s) == words
-
-
 def test_progress_in_words():
     assert runs_view.progress_words(None) == "starting"
     assert runs_view.progress_words(Progress(3, 12, "rows")) == "25 %, 3 of 12 rows"
@@ -187,6 +172,7 @@ def test_the_state_of_a_job_in_words(tmp_path):
     assert runs_view.state_words(replace(job, state="running", code=None)) == "running"
     assert runs_view.state_words(replace(job, state="running", cancelling=True, code=None)) == "stopping ..."
     assert runs_view.state_words(replace(job, state="lost", code=None)) == "lost"
+    assert runs_view.state_words(replace(job, state="queued", code=None)) == "waiting for the job before it"
 
 
 def test_the_times_of_a_job_in_words(tmp_path):
@@ -194,7 +180,7 @@ def test_the_times_of_a_job_in_words(tmp_path):
     assert runs_view.time_words(job) == "put in the queue 2026-03-20 12:00:00 UTC"
     assert runs_view.time_words(replace(job, state="unreadable", queued="")) == ""
     job = replace(job, started="2026-03-20T12:01:00Z", ended="2026-03-20T12:03:05Z")
-    assert runs_view.time_words(job) == "started 2026-03-20 12:01:00 UTC, 2 min 5 s"
+    assert runs_view.time_words(job) == "started 2026-03-20 12:01:00 UTC, 2.08 min"
     now = datetime(2026, 3, 20, 12, 1, 30, tzinfo=UTC)
     assert runs_view.time_words(replace(job, ended=""), lambda: now).endswith(", 30 s")
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 import re
 import secrets
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 from urllib.parse import parse_qsl, quote, urlencode
 
 from microrad.studio.guard import policy
@@ -19,17 +20,15 @@ from microrad.studio.guard.address import MESSAGE_BYTES, cookie_name
 from microrad.studio.guard.answers import (
     CLOSE,
     Answer,
-    Application,
-    Message,
-    Receive,
-    Scope,
-    Send,
     locked,
     refusal,
     send_answer,
     short,
     too_large,
 )
+
+if TYPE_CHECKING:
+    from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 UPLOAD_BYTES = 200_000_000
 """Largest recording that is taken."""
@@ -67,7 +66,7 @@ class Guard:
 
     def __init__(
         self,
-        app: Application,
+        app: ASGIApp,
         hosts: tuple[str, ...],
         origins: tuple[str, ...],
         token: str,

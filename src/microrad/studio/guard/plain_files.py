@@ -42,6 +42,17 @@ def content(path: Path, most: int = MOST_BYTES) -> bytes:
     return data
 
 
+def private(folder: Path) -> Path:
+    """A folder that only its owner may look into, made where there is none. Raises OSError for a link, or another's."""
+    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    found = folder.lstat()
+    owner = getattr(os, "getuid", lambda: found.st_uid)()
+    if not stat.S_ISDIR(found.st_mode) or found.st_uid != owner:
+        raise OSError(errno.EPERM, "it is a link or belongs to somebody else; remove it", str(folder))
+    folder.chmod(0o700)
+    return folder.absolute()
+
+
 def is_folder(folder: Path) -> bool:
     """Whether this is a folder, and no link to one."""
     return folder.is_dir() and not folder.is_symlink()

@@ -174,9 +174,6 @@ class Jobs:
 def _make_private(folder: Path) -> None:
     """Make a folder that only its owner may read; JobError where it is something else."""
     try:
-        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        if folder.is_symlink():
-            raise JobError(f"{folder} is a link; remove it, or choose another working folder")
-        folder.chmod(0o700)
+        plain_files.private(folder)
     except OSError as error:
         raise JobError(f"{folder} cannot be made or made private: {error.strerror}; choose another folder") from error

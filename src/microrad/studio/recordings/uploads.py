@@ -11,7 +11,6 @@ import os
 import re
 import secrets
 import shutil
-import stat
 import tempfile
 import time
 from collections.abc import AsyncIterator
@@ -108,7 +107,7 @@ class Uploads:
             raise UploadError(
                 f"the file {shown(name)} is not taken: {len(places)} recordings are here already; remove one first"
             )
-        place = _private(self.folder) / secrets.token_hex(8)  # the folder may have been removed meanwhile
+        place = plain_files.private(self.folder) / secrets.token_hex(8)  # the folder may have been removed meanwhile
         place.mkdir(mode=0o700)
         return place
 
@@ -210,12 +209,7 @@ def _forgotten(path: Path) -> bool:
 
 def _private(folder: Path) -> Path:
     """The folder, made or made private; a link or another one's folder could be looked into."""
-    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-    found = folder.lstat()
-    owner = getattr(os, "getuid", lambda: found.st_uid)()
-    if not stat.S_ISDIR(found.st_mode) or found.st_uid != owner:
-        raise UploadError(
-            f"{folder} is a link or belongs to somebody else; remove it, or choose another working folder"
-        )
-    folder.chmod(0o700)
-    return folder.absolute()
+    try:
+        return plain_files.private(folder)
+    except OSError as error:
+        raise UploadError(f"{folder}: {error.strerror}, or choose another working folder") from error

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from microrad.core.folder import read_bytes, write_whole
 from microrad.mission.toml import MAX_BYTES, scan
+from microrad.report.quantities import duration
 from microrad.studio.commands import Action, campaign_report, path_argument
 from microrad.studio.jobs.queue import Job, JobError, Kind, Order, Progress
 from microrad.studio.session import Session
@@ -22,14 +23,6 @@ _VERDICTS = {
     ("study", 1): "not every requirement is met",
     ("campaign", 0): "the rows keep the limits",
     ("campaign", 1): "the rows do not keep the limits",
-}
-_STATES = {
-    "queued": "waiting for the job before it",
-    "done": "done",
-    "failed": "failed",
-    "cancelled": "cancelled",
-    "lost": "lost",
-    "unreadable": "unreadable",
 }
 
 
@@ -98,7 +91,9 @@ def state_words(job: Job) -> str:
     if job.state == "running":
         return "stopping ..." if job.cancelling else "running"
     verdict = _VERDICTS.get((job.kind, job.code if job.code is not None else -1), "")
-    return f"{_STATES[job.state]}: {verdict}" if job.state == "done" and verdict else _STATES[job.state]
+    if job.state == "queued":
+        return "waiting for the job before it"
+    return f"done: {verdict}" if job.state == "done" and verdict else job.state
 
 
 def progress_words(progress: Progress | None) -> str:
@@ -108,7 +103,7 @@ def progress_words(progress: Progress | None) -> str:
     words = f"{_percent(progress.share)}, {progress.done} of {progress.total}{_what(progress)}"
     if progress.rate_1_s:
         left_s = (progress.total - progress.done) / progress.rate_1_s
-        words += f"; {progress.rate_1_s:.3g} a second, {duration_words(left_s)} left"
+        words += f"; {progress.rate_1_s:.3g} a second, {duration(left_s)} left"
     return words
 
 
@@ -121,22 +116,12 @@ def _what(progress: Progress) -> str:
     return " rows" if progress.what == "rows" or " rows/s" in progress.what else f": {progress.what}"
 
 
-def duration_words(time_s: float) -> str:
-    """A time as one says it: "48 s", "3 min 20 s", "2 h 5 min"."""
-    whole = round(time_s)
-    if whole < 60:
-        return f"{whole} s"
-    if whole < 3600:
-        return f"{whole // 60} min {whole % 60} s"
-    return f"{whole // 3600} h {whole % 3600 // 60} min"
-
-
 def time_words(job: Job, now: Callable[[], datetime] = lambda: datetime.now(UTC)) -> str:
     """When a job began, and how long it took or takes."""
     if not job.started:
         return f"put in the queue {_at(job.queued)}" if job.queued else ""
     begun, ended = _read(job.started), _read(job.ended) or now()
-    took = "" if begun is None else f", {duration_words(max((ended - begun).total_seconds(), 0.0))}"
+    took = "" if begun is None else f", {duration(round(max((ended - begun).total_seconds(), 0.0)))}"
     return f"started {_at(job.started)}{took}"
 
 
