@@ -288,7 +288,7 @@ class Writer:
         Args:
             gain: Lines of the transmitting aperture's gain.
             pointing: Line of the pointing loss, negative in dB.
-            with_ahead_db: Value in dB of the pointing line once an uncorrected point-ahead is added to the error.
+            with_ahead_db: Pointing loss in dB, positive, once an uncorrected point-ahead is added to the error.
         """
         beam = self.beam
         power = f"P = {format_input(beam.transmit_power_w, 'W')}"

@@ -46,7 +46,8 @@ class MovingReference(Reference):
 def plan(start_s: float, end_s: float, settings: Settings) -> tuple[tuple[float, float], ...]:
     """Begin and length (s) of each window, from the begin of data to the end of the contact.
 
-    There are as many as do not overlap; where there is data for less than a window, one as long as that.
+    There are as many as the settings want, or fewer so that none overlap; where the data is shorter than a window, one
+    as long as the data.
 
     Args:
         start_s: Begin of the data, in s.
