@@ -229,6 +229,8 @@ def test_poles_order_and_gains_are_those_of_the_linear_fit(page, full):
         f"{rounded_to_error(1e3 * linear.edge_gain[0, 0], 1e3 * linear.edge_gain_error[0, 0])} mrad/V",
         f"{1e3 * linear.edge_gain_error[0, 0]:.2g} mrad/V",
     ]
+    assert row_of(text, "gain at zero frequency")[5:] == ["no", "extrapolated"]
+    assert edge[5:] == ["yes", ""]
     for score in linear.scan:
         row = next(r for r in rows_of(text) if len(r) == 6 and r[:2] == [str(score.order), str(score.parameters)])
         assert row[5] == ("chosen" if score.order == linear.order else "")

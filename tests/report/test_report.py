@@ -18,6 +18,7 @@ from microrad import report
 from microrad.core import folder
 from microrad.mission import file as missionfile
 from microrad.report.links import figures as link_module
+from microrad.report.page.templates import inputs_view
 from microrad.report.paper import bench, figures
 from microrad.report.paper import diagrams as drawings
 from microrad.report.paper import page as paper_views
@@ -329,7 +330,14 @@ def test_the_drawings_hold_the_numbers_of_mission_and_bench(paper):
 
 def test_the_page_holds_what_the_paper_is_judged_by(written):
     text = (written / "report.html").read_text(encoding="utf-8")
-    for needed in ("76", "291 photons per bit", "hence circular", "Homodyne BPSK", "18.1", "non-physical reversals"):
+    for needed in (
+        "76",
+        "291 photons per bit",
+        "hence circular",
+        "Homodyne BPSK",
+        "18.1",
+        "whose model first turns the wrong way",
+    ):
         assert needed in text
     for claim in ("Fig. 5", "Fig. 6", "Fig. 8", "Table 2", "section 2.1", "section 3.2"):
         assert claim in text
@@ -572,6 +580,10 @@ def test_a_changed_value_does_not_keep_the_papers_name(paper, tmp_path):
     assert any("names the paper as its source" in w for w in report.summary(changed)["warnings"])
     text = report.write(changed, tmp_path / "out").read_text(encoding="utf-8")
     assert "This mission is not the paper" in text
+    for study_of, keys in ((paper, []), (changed, ["terminals.leo_aperture"])):
+        (table,) = inputs_view(study_of.file.sources).blocks
+        assert [table.rows[k][0].text for k in table.filters["other than their source says"]] == keys
+        assert f"{len(keys)} other than their source says" in table.folded
 
 
 def test_a_radial_residual_is_two_axes(no_scan, paper, tmp_path):

@@ -7,6 +7,7 @@ import re
 import xml.etree.ElementTree as ET
 from dataclasses import replace
 from html import escape
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -34,6 +35,7 @@ from microrad.report.links.views import (
     residuals_sentence,
 )
 from microrad.report.quantities import apart, quantity
+from microrad.report.study.page import cost_view
 from microrad.report.tables import Table
 from microrad.report.view import Soft
 from microrad.study.pointing_penalty import FINE, Cost, LinkPerformance
@@ -143,6 +145,23 @@ def test_costs_stand_in_the_row_of_their_case_and_the_best_controller_is_marked(
     plainly = performance_table(cases, (), 0.003)
     assert {len(row) for row in (*plainly.rows, plainly.headings)} == {13}
     assert not performance_table([case(plain)], (), 0.003).best
+
+
+def test_the_reference_without_hysteresis_has_no_row_and_the_missions_own_jitter_stands_first(plain):
+    shown = case(plain, source="sine of 1 Hz", controller="PID", mirror="given")
+    cases = (shown, replace(shown, mirror="no hysteresis"))
+    found = LinkPerformance(0.003, 20e-6, cases, (Cost("sine of 1 Hz", "PID", "given", -1.0, -2e6),))
+
+    def rows(links):
+        ahead = SimpleNamespace(mission=SimpleNamespace(point_ahead=None))
+        study = SimpleNamespace(links=links, performance=found, fine_pointing=None, file=ahead)
+        table, *more = [block for block in cost_view(study).blocks if isinstance(block, Table)]
+        assert more == []
+        return [(row[0], row[2], *row[-2:]) for row in table.rows]
+
+    simulated = ("sine of 1 Hz", "given", "1.00", "2")
+    assert rows(replace(plain, under_jitter=None)) == [simulated]
+    assert rows(plain) == [("jitter as given", "", "", ""), simulated]
 
 
 def test_the_note_says_how_the_columns_are_read(plain):

@@ -95,7 +95,7 @@ def test_the_lines_of_the_verdict(shipped):
     rows = (*beams, *result.papers_loop, stroke, fine, margin)
     assert (len(beams), len(result.papers_loop)) == (3, 2)
     found = [(r.unit, r.met, r.limited_by) for r in rows]
-    cause = "hysteresis at the non-physical reversals at 25 Hz"
+    cause = "hysteresis at 25 Hz, whose model first turns the wrong way"
     assert found == [
         ("rad", True, "Body pointing"),
         ("dB", True, "Pointing loss"),

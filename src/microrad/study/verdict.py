@@ -93,7 +93,7 @@ def residual_cause(mirrors: MirrorParts, statistic: str, worst: Run, runs: tuple
         return f"lag of the loop at {worst.freq_hz:g} Hz"
     model = mirrors.own[Variant.GIVEN].model
     wrong_way = isinstance(model, hysteresis.BoucWen) and model.reversal_slope_rad_v() < 0.0
-    return f"hysteresis {'at the non-physical reversals ' if wrong_way else ''}at {worst.freq_hz:g} Hz"
+    return f"hysteresis at {worst.freq_hz:g} Hz{', whose model first turns the wrong way' if wrong_way else ''}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -200,8 +200,8 @@ def _beacon_claim(p: pointing.OpenLoopPointing) -> Claim:
     ours = f"{p.required_divergence_rad * 1e6:.0f} µrad needed for {p.rss_rad * 1e6:.0f} µrad (half width)"
     if p.reading is not None:
         why += (
-            f"; a root sum square is one axis: with both axes, and biases at their bounds, the partner is inside the "
-            f"cone with a probability of {p.reading.coverage:.2f}"
+            f"; a root sum square is that of one axis; counting both axes, with biases at their bounds, the beacon's "
+            f"cone covers its partner with a probability of {p.reading.coverage:.2f}"
         )
     return Claim("section 2.1", claim, ours, "inferred" if p.covers else "no", why)
 

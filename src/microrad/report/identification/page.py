@@ -195,7 +195,7 @@ def _scan(linear: LinearFit) -> Table | None:
 
 
 def _roots(linear: LinearFit) -> Table:
-    outside, inside = Cell("", "no", "extrapolated"), Cell("", "yes")
+    outside, inside = (Cell("", "no"), "extrapolated"), (Cell("", "yes"), "")
     rows: list[tuple[str | Cell, ...]] = [
         (
             f"{r.kind}{', real' if abs(r.damping) == 1.0 else ' pair'}",
@@ -203,14 +203,14 @@ def _roots(linear: LinearFit) -> Table:
             f"{parameters.two_digits(r.freq_error_hz)} Hz",
             rounded_to_error(r.damping, r.damping_error),
             parameters.two_digits(r.damping_error) if r.damping_error else "",
-            inside if r.excited else outside,
+            *(inside if r.excited else outside),
         )
         for r in words.roots(linear)
     ]
     for place, (name, gain, error) in enumerate(words.gains(linear)):
         known = rounded_to_error(gain * 1e3, error * 1e3), parameters.two_digits(error * 1e3)
-        rows.append((f"gain at {name}", *(f"{text} mrad/V" for text in known), "", "", inside if place else outside))
-    return Table("", ("", "natural frequency", "±", "damping ratio", "±", "excited"), rows, (0, 5))
+        rows.append((f"gain at {name}", *(f"{text} mrad/V" for text in known), "", "", *(inside if place else outside)))
+    return Table("", ("", "natural frequency", "±", "damping ratio", "±", "excited", ""), rows, (0, 5, 6))
 
 
 def _errors(found: Identification) -> Table:

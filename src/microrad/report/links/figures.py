@@ -56,8 +56,8 @@ def tornado(study: LinkStudy, of: Tornado) -> Figure:
     panel.legend = swing_legend("input", "lower right")
     assumed = [s.key for s in shown if s.kind == "assumption"]
     caption = (
-        "Margin with one input at a time 10 % lower and higher (0.5 dB for those in decibels, a factor of ten for a "
-        "bit error ratio and an outage), never beyond its bounds; all others as they are."
+        "Margin with one input at a time 10 % lower and higher, all others as they are. An input in decibels is moved "
+        "by 0.5 dB; a bit error ratio or an outage becomes ten times smaller and larger. No input leaves its bounds."
     )
     if assumed:
         caption += f" Assumptions among them: {', '.join(assumed)}."

@@ -75,9 +75,11 @@ def page_of(  # noqa: PLR0913  all but the first five are named options
 
 
 def inputs_view(sources: "Mapping[str, Source]") -> View:
-    """Every input with its source; buttons leave the assumptions, what was inferred, and what is not as it was shipped.
+    """Every input with its source; buttons leave the assumptions, what was inferred, and what differs from its source.
 
-    The hundreds of numbers of a correlation are left to the mirror file.
+    The last are values with the comment that a shipped mission has behind another value, and those that name the paper
+    and are not its own. A changed value with a comment of its own is none of them. The hundreds of numbers of a
+    correlation are left to the mirror file.
     """
     from microrad.mission.file import changed_from_shipped
 
@@ -86,7 +88,7 @@ def inputs_view(sources: "Mapping[str, Source]") -> View:
     filters = {
         "assumptions": [k for k, (_, s) in enumerate(given) if s.kind == "assumption"],
         "inferred from others": [k for k, (_, s) in enumerate(given) if s.kind == "derived"],
-        "changed by me": [k for k, (key, s) in enumerate(given) if s.was or key in changed],
+        "other than their source says": [k for k, (key, s) in enumerate(given) if s.was or key in changed],
     }
     counts = ", ".join(f"{len(rows)} {name}" for name, rows in filters.items())
     rows = [(Cell(key, code=True), s.value, s.text) for key, s in given]

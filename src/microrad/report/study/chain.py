@@ -138,7 +138,8 @@ def _mirror(study: Study) -> Stage:
     if study.fine_pointing is None:
         return Stage("Mirror", tuple(lines))
     axis = min(study.fine_pointing.scene.own_stroke, key=lambda a: a.margin_rad)
-    lines.append(f"stroke {micro(axis.needed_rad)} of {micro(axis.available_rad)} µrad ({axis.name})")
+    lines.append(f"stroke ({axis.name}): {micro(axis.needed_rad)} µrad needed,")
+    lines.append(f"{micro(axis.available_rad)} µrad available")
     return Stage("Mirror", tuple(lines), next(r.mark for r in study.requirements if r.subject == "stroke"))
 
 

@@ -198,12 +198,16 @@ def _links(study: Study, figures: Sequence[Figure]) -> tuple[View, ...]:
         *map(budget_table, (study.beacon, study.answer)),
     ]
     budgets = budgets_view(study.links, tables, figures, _loop_noise(study), _implied(study))
+    return links_views(study.links, figures, budgets=budgets, performance=cost_view(study))
+
+
+def cost_view(study: Study) -> View:
+    """The link under its own jitter, where it has one, and under each simulated error on a mirror with hysteresis."""
     best = "" if study.fine_pointing is None else study.fine_pointing.best.design.name
     found, under = study.performance, study.links.under_jitter
     cases = [*([] if under is None else [under]), *(c for c in found.cases if c.mirror != Variant.STRAIGHT)]
     said = [residuals_sentence(found), *_left_out(study)]
-    cost = performance_view(cases, found.costs, found.outage, said, best)
-    return links_views(study.links, figures, budgets=budgets, performance=cost)
+    return performance_view(cases, found.costs, found.outage, said, best)
 
 
 def _implied(study: Study) -> View:
