@@ -122,7 +122,7 @@ def test_the_best_is_the_one_that_leaves_least_of_what_no_fit_has_seen():
 # ------------------------------------------------------------------------------------------------------------ the form
 def listed(*channels, time=None, rates=()):
     infos = tuple(ChannelInfo(name, unit, 1000) for name, unit in channels)
-    return Listing("csv", "ab" * 32, infos, 0, (), time, rates)
+    return Listing(infos, time, rates)
 
 
 @pytest.mark.parametrize(
@@ -327,7 +327,7 @@ def test_a_form_that_somebody_else_has_written_holds_what_can_be_chosen(tmp_path
 # ----------------------------------------------------------------------------------------------------------- the plots
 def viewed():
     values = ((0.0, 1.0, 2.0),), ((5.0, 6.0, 7.0),)
-    return View("ab", 300, 100.0, ("u",), ("y",), ("V",), ("um",), ("the output drifts",), (0, 150, 299), *values)
+    return View(300, 100.0, ("the output drifts",), (0, 150, 299), *values)
 
 
 def titles(figure):

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from microrad.lab.recording.formats.source import Source
 
 _TEXT = 200
-_UNUSABLE = 50
+_MOST = 50  # rates or findings that are told
 
 
 class RefusedError(ValueError):
@@ -103,22 +103,16 @@ def opened(path: Path, request: dict[str, Any]) -> Source:
 
 def channels(path: Path, request: dict[str, Any]) -> dict[str, Any]:
     """Names, units and lengths; see `reading.Listing`."""
-    from microrad.lab.recording.files import file_format
     from microrad.lab.recording.formats.source import is_time_name
 
     source = opened(path, request)
     most = request["limits"]["channels"]
     listed = list(zip(source.names, source.units, source.samples(), strict=True))[:most]
-    unusable = list(getattr(source, "unusable", {}).items())[:_UNUSABLE]
     rates = dict.fromkeys(r.rate_hz for r in source.rates(range(len(listed))) if math.isfinite(r.rate_hz))
     return {
-        "format": file_format(path),
-        "sha256": source.sha256,
         "channels": [{"name": name[:_TEXT], "unit": unit[:_TEXT], "samples": n} for name, unit, n in listed],
-        "more": len(source.names) - len(listed),
-        "unusable": [[name[:_TEXT], reason[:_TEXT]] for name, reason in unusable],
         "time": next((k for k, (name, _, _) in enumerate(listed) if is_time_name(name)), None),
-        "rates_hz": list(rates)[:_UNUSABLE],
+        "rates_hz": list(rates)[:_MOST],
     }
 
 
@@ -138,12 +132,9 @@ def view(path: Path, request: dict[str, Any]) -> dict[str, Any]:
     )
     rows = extremes([*r.drive.T, *r.output.T], request["limits"]["points"])
     return {
-        "sha256": r.sha256,
         "samples": r.samples,
         "rate_hz": r.rate_hz,
-        **{key: [t[:_TEXT] for t in getattr(r, key)] for key in ("input_names", "output_names")},
-        **{key: [t[:_TEXT] for t in getattr(r, key)] for key in ("input_units", "output_units")},
-        "findings": [f.message for f in r.findings[:_UNUSABLE]],
+        "findings": [f.message for f in r.findings[:_MOST]],
         "rows": rows.tolist(),
         "drive": [_digits(column[rows]) for column in r.drive.T],
         "output": [_digits(column[rows]) for column in r.output.T],

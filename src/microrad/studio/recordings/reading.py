@@ -71,17 +71,13 @@ class ChannelInfo:
 
 @dataclass(frozen=True, slots=True)
 class Listing:
-    """What is in a file: its format, its channels, how many more there are, and why other contents are no channel.
+    """The channels of a file, the first of them where there are many.
 
     `time` is the number of the channel that is plainly time, `rates_hz` the sample rates that the file states. Texts
     are as the file has them, cut at 200 characters: data, to be shown as text.
     """
 
-    format: str
-    sha256: str
     channels: tuple[ChannelInfo, ...]
-    more: int
-    unusable: tuple[tuple[str, str], ...]
     time: int | None
     rates_hz: tuple[float, ...]
 
@@ -95,13 +91,8 @@ class View:
     digits, in the units of the file.
     """
 
-    sha256: str
     samples: int
     rate_hz: float
-    input_names: tuple[str, ...]
-    output_names: tuple[str, ...]
-    input_units: tuple[str, ...]
-    output_units: tuple[str, ...]
     findings: tuple[str, ...]
     rows: tuple[int, ...]
     drive: tuple[tuple[float, ...], ...]
