@@ -23,7 +23,8 @@ from small_campaign import campaign_file, children, halted
 api = pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
 
 APERTURE = "terminals.leo_aperture"
-WIDTHS = (400, 1280)
+WIDTHS = (400, 1000, 1400) if os.environ.get("MICRORAD_ENDURANCE") else (400, 1280)
+"""On both sides of the widths at which pages change their columns: 700, 1000, 1150 and 1250."""
 LATE = {
     "mission": "[aria-label='Text of the mission']",
     "link": "text=every requirement is met",
