@@ -7,7 +7,6 @@ second tab; nothing is read from them here (see `microrad.studio.recordings.read
 from __future__ import annotations
 
 import asyncio
-import os
 import re
 import secrets
 import shutil
@@ -25,7 +24,7 @@ from microrad.studio.guard.names import safe_name, shown
 _KEY = re.compile(r"[0-9a-f]{16}")
 _BLOCK_BYTES = 1 << 20
 _PART = ".part"
-_FORGOTTEN_NS = 3600 * 10**9
+_FORGOTTEN_NS = 3600 * 10**9  # nothing was written there for so long
 
 
 class UploadError(ValueError):
@@ -69,8 +68,9 @@ class Uploads:
             if _stored(place) is None:
                 shutil.rmtree(place, ignore_errors=True)
         spool = _private(self.folder / "spool")
-        for path in filter(_forgotten, _files(spool)):
-            _remove(path)
+        for path in _files(spool):
+            if _status(path)[1] < time.time_ns() - _FORGOTTEN_NS:
+                _remove(path)
         tempfile.tempdir = str(spool)
 
     async def save(self, name: str, blocks: AsyncIterator[bytes]) -> Upload:
@@ -91,7 +91,7 @@ class Uploads:
                 raise
         except OSError as error:
             raise UploadError(f"the file {shown(name)} could not be stored: {error.strerror or error}") from error
-        return Upload(place.name, name, place / name, _size(place / name))
+        return Upload(place.name, name, place / name, _status(place / name)[0])
 
     def too_large(self, name: str) -> str:
         """The refusal of a file that is over the limit."""
@@ -135,7 +135,7 @@ class Uploads:
 
     def listed(self) -> tuple[Upload, ...]:
         """The stored files, the oldest first."""
-        places = sorted(self._places(), key=lambda place: (_time_ns(place), place.name))
+        places = sorted(self._places(), key=lambda place: (_status(place)[1], place.name))
         found = (_stored(place) for place in places)
         return tuple(each for each in found if each is not None)
 
@@ -154,7 +154,7 @@ class Uploads:
         return [p for p in _files(self.folder) if _KEY.fullmatch(p.name) and p.is_dir() and not p.is_symlink()]
 
     def _total(self) -> int:
-        return sum(_size(path) for place in self._places() for path in _files(place))
+        return sum(_status(path)[0] for place in self._places() for path in _files(place))
 
 
 def _stored(place: Path) -> Upload | None:
@@ -165,7 +165,7 @@ def _stored(place: Path) -> Upload | None:
     found = next(
         (path for path in _files(place) if path.name != _PART and path.is_file() and not path.is_symlink()), None
     )
-    return None if found is None else Upload(place.name, found.name, found, _size(found))
+    return None if found is None else Upload(place.name, found.name, found, _status(found)[0])
 
 
 def _files(place: Path) -> list[Path]:
@@ -175,12 +175,13 @@ def _files(place: Path) -> list[Path]:
         return []
 
 
-def _status(path: Path) -> os.stat_result | None:
-    """What the system says of a file, and of a link itself; None where there is none any more."""
+def _status(path: Path) -> tuple[int, int]:
+    """Size in bytes and last change in ns of a file, and of a link itself; 0 and 0 where there is none any more."""
     try:
-        return path.lstat()
+        found = path.lstat()
     except FileNotFoundError:
-        return None
+        return 0, 0
+    return found.st_size, found.st_mtime_ns
 
 
 def _remove(path: Path) -> None:
@@ -190,21 +191,6 @@ def _remove(path: Path) -> None:
         return
     with suppress(OSError):
         path.unlink()
-
-
-def _size(path: Path) -> int:
-    found = _status(path)
-    return 0 if found is None else found.st_size
-
-
-def _time_ns(path: Path) -> int:
-    found = _status(path)
-    return 0 if found is None else found.st_mtime_ns
-
-
-def _forgotten(path: Path) -> bool:
-    """Whether nothing was written there for an hour."""
-    return _time_ns(path) < time.time_ns() - _FORGOTTEN_NS
 
 
 def _private(folder: Path) -> Path:
