@@ -136,6 +136,17 @@ def test_the_page_opens_with_the_verdict_and_keeps_its_order(written, paper):
     assert text.count("<figure ") == len(re.findall('<figure [^>]*id="figure-', text))
 
 
+def test_terms_are_explained_below_the_verdict_and_stand_on_the_page(written):
+    text = (written / "report.html").read_text(encoding="utf-8")
+    begin = text.index('<details class="view" id="terms">')
+    end = text.index("</details>", begin)
+    assert text.index('<h2 id="verdict">') < begin < end < text.index('<h2 id="warnings">')
+    for term, said in words.TERMS.items():
+        assert html.escape(f"{term}: {said}").replace("&#x27;", "&#39;") in text[begin:end]
+        assert term.lower().removesuffix(" at 1/e2") in (text[:begin] + text[end:]).lower()
+    assert len(re.findall("<li>", text[begin:end])) == len(words.TERMS)
+
+
 def test_each_requirement_stands_with_its_margin_and_its_contributor(written, paper):
     rows = requirement_views.judged_table(paper, paper.requirements).rows
     assert [row[4].mark for row in rows] == ["derived", "PASS", "PASS", "FAIL", "FAIL"]

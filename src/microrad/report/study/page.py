@@ -89,7 +89,8 @@ def verdict_view(study: Study) -> View:
     good = study.met and (study.fine_case is not None or not words.beyond_identified(study, study.residual))
     judged = contributors.judged_table(study, study.requirements)
     box = Verdict(words.headline(study), told(judged, derived_words(study.requirements)), good)
-    return View("Verdict", [box, "What the verdict rests on:", Points(words.explanation(study))], "verdict")
+    terms = View("Terms", [Points([f"{term}: {said}" for term, said in words.TERMS.items()])], folded=True)
+    return View("Verdict", [box, "What the verdict rests on:", Points(words.explanation(study)), terms], "verdict")
 
 
 def warnings_view(study: Study) -> View:

@@ -28,6 +28,23 @@ from microrad.report.tables import table_text, tables_text
 from microrad.study.pointing_penalty import FINE, Cost
 from microrad.study.study import Study
 
+TERMS = {
+    "Margin": "received over required power, in dB. At 3 dB twice the required light arrives.",
+    "Outage": "share of the time with a margin below 0 dB.",
+    "Rms": "root of the mean square of an error, its constant part counted.",
+    "Residual": "the pointing error that a loop leaves.",
+    "Half angle at 1/e2": "angle off the axis at which a beam has 13.5 % of the intensity on its axis.",
+    "Point-ahead": (
+        "angle by which a beam leads the direction in which the partner is seen. Both move while light is under way."
+    ),
+    "Noise-equivalent angle": "rms error of one reading of the tracking sensor, by noise alone.",
+    "Modulus margin": (
+        "smallest distance of the open loop's frequency response from the point -1, where the loop becomes unstable. "
+        "It is the inverse of the largest amplification of a disturbance."
+    ),
+}
+"""What the page says without a word of explanation elsewhere."""
+
 _OF_VERDICT = ("[jitter] is not", "the verdict's ")  # warnings that put the judged margin itself in doubt
 _LAST = (True, True, math.inf)
 _BEGINS: dict[Subject, str] = {
