@@ -149,7 +149,7 @@ from microrad.mission.file import load_mission
 from scenes import scene_of
 from shipped import SHIPPED
 
-def helped(jobs, turns, mouth):
+def helped(jobs, turns, mouth, ears):
     try:
         done = threads._done(jobs, turns)
         mouth.send(done)

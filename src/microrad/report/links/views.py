@@ -74,6 +74,7 @@ def pointing_view(p: OpenLoopPointing | None) -> View | None:
         ("error source", "half width", "share of squares", *largest, "how it counts", "source"),
         rows,
         (0, words_from, words_from + 1),
+        brief=(0, 1, 2, 3, 5, 6) if largest else (),  # without what ECSS leaves
     )
     sums = "; ".join(f"{each.name} {quantity(each.total_rad, 'rad')}" for each in p.summations)
     beside = [] if half is None else ["beacon's half angle"]
