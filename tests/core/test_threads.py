@@ -97,10 +97,10 @@ began, begins = os.pipe()
 
 def own():
     name = multiprocessing.current_process().name
-    if name == "Process-1":
+    if name == "ForkProcess-1":
         os.write(begins, b".")
         os._exit(1)
-    if name == "Process-2":
+    if name == "ForkProcess-2":
         os.write(begins, os.read(began, 1))  # it has a job, and the other has begun with one
     return sent
 
