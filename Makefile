@@ -33,8 +33,11 @@ lint: $(VENV)/.test
 types: $(VENV)/.test
 	$(BIN)/mypy
 
-compiled: $(VENV)/.test
+compiled: $(VENV)/.compiled
+
+$(VENV)/.compiled: $(VENV)/.test scripts/compile_kernels.py $(wildcard src/microrad/core/kernels/*.py)
 	$(BIN)/python scripts/compile_kernels.py
+	@touch $@
 
 # Each quantity of the quick cases against reference/; `scripts/numbers check --all` compares all cases.
 numbers: $(VENV)/.test
