@@ -23,6 +23,7 @@ from microrad.report.paper import bench, figures
 from microrad.report.paper import diagrams as drawings
 from microrad.report.paper import page as paper_views
 from microrad.report.plotting.figure import Figure
+from microrad.report.quantities import with_minus
 from microrad.report.study import chain, page, words
 from microrad.report.study import contributors as requirement_views
 from microrad.study import study
@@ -548,10 +549,11 @@ def test_warnings_of_a_requirement_that_is_missed_stand_first(paper, monkeypatch
         return next(iter(found)), [w.split(" budget:")[0] for w in found["The verdict"] if " budget:" in w]
 
     alike = order(*met)
-    assert alike == ("The verdict", ["Answer", "Beacon", "Communication"])
+    assert alike == ("The day", ["Answer", "Beacon", "Communication"])
     missed = replace(beacon, actual=-1.0, margin=-1.0)
     assert order(missed, met[1])[1] == ["Beacon", "Answer", "Communication"]
-    monkeypatch.setattr(words, "_of_verdict", lambda study: ["the verdict's pointing loss is large"])
+    doubt = words.Warned("the verdict's pointing loss is large", "verdict")
+    monkeypatch.setattr(words, "_of_verdict", lambda study: [doubt])
     assert words.warnings(replace(paper, requirements=(missed, met[1])))[0] == "the verdict's pointing loss is large"
     stroke = replace(missed, subject="stroke")
     own, others = ["fine pointing: tuned", "fine pointing: the stroke does not cover"], []
@@ -559,6 +561,25 @@ def test_warnings_of_a_requirement_that_is_missed_stand_first(paper, monkeypatch
     found = words.ranked_warnings(replace(paper, requirements=(*met, stroke), fine_pointing=object()))
     assert [*found][:2] == ["The loop that is judged", "The verdict"]
     assert found["The loop that is judged"] == own[::-1]
+
+
+def test_warnings_stand_by_what_they_cost_in_decibels(paper):
+    """The mission's range is exceeded by 4.8 %, 0.41 dB by its square; what the others cost is not known."""
+    (costly,) = (w for w in words._of_day(paper) if w.text.startswith("communication.distance is 42000 km"))
+    furthest = max(e.range_most_m for e in paper.day.encounters)
+    assert costly.cost_db == pytest.approx(20.0 * math.log10(furthest / 42e6)) == pytest.approx(0.41, abs=0.005)
+    assert costly.text.endswith("costs 0.41 dB more")
+    met = replace(paper, requirements=[replace(r, actual=1.0, required=0.0, margin=1.0) for r in paper.requirements])
+    assert words.warnings(met)[0] == costly.text
+    assert [*words.ranked_warnings(met)][:2] == ["The day", "The verdict"]
+    near = replace(paper.day, encounters=tuple(replace(e, range_most_m=42e6) for e in paper.day.encounters))
+    assert words.warnings(replace(met, day=near))[0] != costly.text
+
+
+def test_a_negative_number_has_a_minus_sign_whoever_worded_it(paper):
+    (said,) = (w for w in words.warnings(paper) if w.startswith("not physical at reversals"))
+    assert "falls to \u22120.885 mrad/V against d1 = 0.089" in said
+    assert with_minus("-3 dB, x-1, 1e-9, a-b, (-2)") == "\u22123 dB, x-1, 1e-9, a-b, (\u22122)"
 
 
 @pytest.fixture
@@ -593,8 +614,14 @@ def test_a_changed_value_does_not_keep_the_papers_name(paper, tmp_path):
     assert "This mission is not the paper" in text
     for study_of, keys in ((paper, []), (changed, ["terminals.leo_aperture"])):
         (table,) = inputs_view(study_of.file.sources).blocks
-        assert [table.rows[k][0].text for k in table.filters["other than their source says"]] == keys
-        assert f"{len(keys)} other than their source says" in table.folded
+        assert [table.rows[k][0].text for k in table.filters["changed from what is shipped"]] == keys
+        assert f"{len(keys)} changed from what is shipped" in table.folded
+    for comment in (" # my own", ""):  # a comment of one's own, or none, hides no change
+        text = re.sub('leo_aperture = "5 cm".*', f'leo_aperture = "6 cm"{comment}', SHIPPED.read_text(encoding="utf-8"))
+        (tmp_path / "own.toml").write_text(text, encoding="utf-8")
+        (table,) = inputs_view(missionfile.load_mission(tmp_path / "own.toml").sources).blocks
+        rows = table.filters["changed from what is shipped"]
+        assert [table.rows[k][0].text for k in rows] == ["terminals.leo_aperture"]
 
 
 def test_a_radial_residual_is_two_axes(no_scan, paper, tmp_path):

@@ -23,7 +23,7 @@ def written_for(key: str, comment: str, value: str) -> str:
         comment: The comment behind it.
         value: The value in front of the comment now, raw TOML.
     """
-    there = _shipped().get((key, comment), ())
+    there = _shipped().get((key, comment), ()) if comment else ()
     if not there or any(_same(value, each) for each in there) or not all(_same(each, there[0]) for each in there):
         return ""
     return " ".join(there[0].split())
@@ -40,13 +40,23 @@ def of_paper(key: str, value: str) -> str:
     return "" if _same(value, there) else " ".join(there.split())
 
 
+def is_shipped(key: str, value: str) -> bool:
+    """Whether the paper's mission or a preset has this value for a dotted key, whatever stands behind it.
+
+    Args:
+        key: The dotted key.
+        value: The value that it has now, raw TOML.
+    """
+    return any(_same(value, each) for (name, _), values in _shipped().items() if name == key for each in values)
+
+
 @cache
 def _shipped() -> Mapping[tuple[str, str], tuple[str, ...]]:
     """Values by key and comment, of the paper's mission and every preset."""
     found: dict[tuple[str, str], tuple[str, ...]] = {}
     for text in (_shipped_mission(), *(preset.text for preset in presets())):
         for each in scan(text):
-            if each.kind == "key" and each.comment:
+            if each.kind == "key":
                 where = each.key, each.comment
                 found[where] = (*found.get(where, ()), each.value)
     return found

@@ -1,6 +1,7 @@
 """Numbers as text: values with their units, angles, shares, lengths of time and powers of ten."""
 
 import math
+import re
 
 from microrad.core.units import format_quantity
 from microrad.link.pointing.radial_error import SMALLEST_PROBABILITY
@@ -54,6 +55,11 @@ def signed(value: float, unit: str, digits: int = 3) -> str:
 def minus(text: str) -> str:
     """A text with minus signs in place of its hyphens."""
     return text.replace("-", MINUS)
+
+
+def with_minus(text: str) -> str:
+    """A sentence that was worded elsewhere, with a minus sign in front of each negative number."""
+    return re.sub(r"(?<![\w.])-(?=\d)", MINUS, text)
 
 
 def power_text(number: float, digits: int = 3) -> str:

@@ -75,20 +75,22 @@ def page_of(  # noqa: PLR0913  all but the first five are named options
 
 
 def inputs_view(sources: "Mapping[str, Source]") -> View:
-    """Every input with its source; buttons leave the assumptions, what was inferred, and what differs from its source.
+    """Every input with its source; buttons leave the assumptions, what was inferred, and what is changed.
 
-    The last are values with the comment that a shipped mission has behind another value, and those that name the paper
-    and are not its own. A changed value with a comment of its own is none of them. The hundreds of numbers of a
-    correlation are left to the mirror file.
+    Changed is a value that no shipped mission or preset has for its key, one with the comment that a shipped mission
+    has behind another value, and one that names the paper and is not its own. The hundreds of numbers of a correlation
+    are left to the mirror file.
     """
     from microrad.mission.file import changed_from_shipped
+    from microrad.mission.origins import is_shipped
 
     given = [item for item in sources.items() if item[0] != "mirror.uncertainty.correlation"]
     changed = {key for key, *_ in changed_from_shipped(sources)}
+    changed |= {key for key, s in given if s.was or not is_shipped(key, s.value)}
     filters = {
         "assumptions": [k for k, (_, s) in enumerate(given) if s.kind == "assumption"],
         "inferred from others": [k for k, (_, s) in enumerate(given) if s.kind == "derived"],
-        "other than their source says": [k for k, (key, s) in enumerate(given) if s.was or key in changed],
+        "changed from what is shipped": [k for k, (key, _) in enumerate(given) if key in changed],
     }
     counts = ", ".join(f"{len(rows)} {name}" for name, rows in filters.items())
     rows = [(Cell(key, code=True), s.value, s.text) for key, s in given]

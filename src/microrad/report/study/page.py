@@ -29,11 +29,10 @@ from microrad.report.page.templates import drawing, inputs_view, mission_page
 from microrad.report.paper.page import paper_view
 from microrad.report.plotting.figure import Figure
 from microrad.report.quantities import given_angle
-from microrad.report.requirements import derived_words
 from microrad.report.results.manifest import embedded, hash_of_page, with_manifest
 from microrad.report.study import chain, contributors, words
 from microrad.report.tables import Table
-from microrad.report.view import Block, Drawing, Points, Soft, Verbatim, Verdict, View, told
+from microrad.report.view import Block, Drawing, Points, Soft, Verbatim, View, told
 from microrad.study.pointing_penalty import FINE
 from microrad.study.study import Study
 
@@ -70,14 +69,14 @@ def study_views(study: Study, drawn: StudyFigures) -> tuple[View, ...]:
     required, fine = study.file.mission.requirement.pointing_error_rad, study.fine_pointing
     found = told(
         verdict_view(study),
-        warnings_view(study),
+        words.warnings_view(study),
         _chain(study),
         View("Pointing and link budgets", _links(study, drawn.links), "budgets"),
         _mirror_and_loop(study),
         None if fine is None else fine_pointing_view(fine, required, drawn.fine),
         None if fine is None else tail_view(fine, required, drawn.tails),
         _day(study, drawn.day),
-        paper_view(study, (*drawn.study, *drawn.bench), _papers_loop(study), _readings(study)),
+        paper_view(study, (*drawn.study, *drawn.bench), words.papers_loop_view(study), _readings(study)),
         inputs_view(study.file.sources),
         _not_in_study(study),
     )
@@ -86,19 +85,9 @@ def study_views(study: Study, drawn: StudyFigures) -> tuple[View, ...]:
 
 def verdict_view(study: Study) -> View:
     """The verdict with its requirements, and what it rests on."""
-    good = study.met and (study.fine_case is not None or not words.beyond_identified(study, study.residual))
-    judged = contributors.judged_table(study, study.requirements)
-    box = Verdict(words.headline(study), told(judged, derived_words(study.requirements)), good)
     terms = View("Terms", [Points([f"{term}: {said}" for term, said in words.TERMS.items()])], folded=True)
-    return View("Verdict", [box, "What the verdict rests on:", Points(words.explanation(study)), terms], "verdict")
-
-
-def warnings_view(study: Study) -> View:
-    """What a reader must not overlook, by what it puts in doubt."""
-    found = words.ranked_warnings(study)
-    said = [block for what, several in found.items() for block in (f"{what}:", Points(several))]
-    count = sum(map(len, found.values()))
-    return View(f"Warnings ({count}), the weightiest first" if count else "Warnings", said or ["None."], "warnings")
+    rests = Points(words.explanation(study))
+    return View("Verdict", [words.verdict_box(study), "What the verdict rests on:", rests, terms], "verdict")
 
 
 def _chain(study: Study) -> View:
@@ -135,16 +124,6 @@ def _run(run: Run) -> list[str]:
     errors = (f"{value * 1e6:.2f} µrad" for value in (trace.peak_rad, trace.rms_rad))
     numbers = counts.clamped + counts.inverse_clamped, counts.saturated, counts.slew_limited, counts.alternating
     return [run.mirror, run.controller, f"{run.freq_hz:g} Hz", *errors, *map(str, numbers)]
-
-
-def _papers_loop(study: Study) -> View:
-    found, said = study.papers_loop, words.papers_loop(study)
-    own = (
-        "The verdict judges the mission's own fine-pointing loop. This is the loop of the paper with its sines, judged "
-        "by itself."
-    )
-    judged: list[Block] = [own, contributors.judged_table(study, found)] if found else []
-    return View("The paper's loop", [*judged, Points(said)])
 
 
 def _readings(study: Study) -> View:

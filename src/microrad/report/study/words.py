@@ -1,19 +1,20 @@
 """What a study found, in words and as plain data."""
 
 import math
-import re
-from collections.abc import Sequence
+from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import partial
+from typing import Literal
 
 from microrad.core.units import format_quantity
 from microrad.link.budget.lines import DEEPEST_DB, POINT_AHEAD_LOSS, POINTING_LOSS
-from microrad.link.requirement import IMPOSSIBLE, Requirement, Subject, time_kept
+from microrad.link.requirement import IMPOSSIBLE, Subject, time_kept
 from microrad.loop.paper_cases import Run
 from microrad.mirror import Variant
 from microrad.mission.file import changed_from_shipped
 from microrad.report.day import words as day_words
 from microrad.report.fine_pointing import words as fine_pointing_words
-from microrad.report.quantities import quantity, signed
+from microrad.report.quantities import quantity, signed, with_minus
 from microrad.report.requirements import (
     derived_words,
     first_warning,
@@ -21,10 +22,9 @@ from microrad.report.requirements import (
     met_words,
     nearest,
     nearness,
-    requirement_table,
 )
 from microrad.report.study import contributors
-from microrad.report.tables import table_text, tables_text
+from microrad.report.view import Points, Verdict, View, told, views_text
 from microrad.study.pointing_penalty import FINE, Cost
 from microrad.study.study import Study
 
@@ -45,16 +45,17 @@ TERMS = {
 }
 """What the page says without a word of explanation elsewhere."""
 
-_OF_VERDICT = ("[jitter] is not", "the verdict's ")  # warnings that put the judged margin itself in doubt
-_LAST = (True, True, math.inf)
-_BEGINS: dict[Subject, str] = {
-    "communication": "[Cc]ommunication[ .]",
-    "beacon": "[Bb]eacon[ .]",
-    "answer": "[Aa]nswer[ .]",
-    "stroke": "fine pointing: the stroke",
-    "fine pointing": "fine pointing: ",
-}
-"""How the warnings begin that speak of a requirement."""
+
+@dataclass(frozen=True, slots=True)
+class Warned:
+    """A warning: what it says, the requirement that it speaks of ("" for none), and what it costs in dB (0: unknown).
+
+    One about the "verdict" puts the judged margin itself in doubt.
+    """
+
+    text: str
+    about: Subject | Literal["", "verdict"] = ""
+    cost_db: float = 0.0
 
 
 def headline(study: Study) -> str:
@@ -92,18 +93,21 @@ def _judged_beyond(study: Study) -> str:
 
 
 def short(study: Study) -> list[str]:
-    """What limits the terminal and what to do about it, in six sentences at most."""
-    case = study.fine_case
-    under = "" if case is None else f", with what {case.controller} leaves of {case.source}"
+    """What limits the terminal and what to do about it, in five sentences at most."""
     found = [
-        f"The margin is received over required power of the communication link at {_judged_at(study)}{under}.",
-        _limit(study),
-        derived_words(study.requirements),
+        *_limits(study),
         _largest_warning(study),
         "" if study.day is None else day_words.headline(study.day)[0],
         _papers_loop(study),
     ]
     return list(filter(None, found))
+
+
+def _limits(study: Study) -> list[str]:
+    case = study.fine_case
+    under = "" if case is None else f", with what {case.controller} leaves of {case.source}"
+    margin = f"The margin is received over required power of the communication link at {_judged_at(study)}{under}."
+    return [margin, _limit(study)]
 
 
 def _limit(study: Study) -> str:
@@ -228,21 +232,44 @@ def found(study: Study) -> str:
     )
 
 
+def verdict_box(study: Study) -> Verdict:
+    """The verdict with its requirements."""
+    good = study.met and (study.fine_case is not None or not beyond_identified(study, study.residual))
+    judged = contributors.judged_table(study, study.requirements)
+    return Verdict(headline(study), told(judged, derived_words(study.requirements)), good)
+
+
+def warnings_view(study: Study) -> View:
+    """What a reader must not overlook, by what it puts in doubt."""
+    ranked = ranked_warnings(study)
+    said = [block for what, several in ranked.items() for block in (f"{what}:", Points(several))]
+    count = sum(map(len, ranked.values()))
+    return View(f"Warnings ({count}), the weightiest first" if count else "Warnings", said or ["None."], "warnings")
+
+
+def papers_loop_view(study: Study) -> View:
+    """The loop of the paper, judged by itself where the verdict is on another one."""
+    own = (
+        "The verdict judges the mission's own fine-pointing loop. This is the loop of the paper with its sines, judged "
+        "by itself."
+    )
+    judged = study.papers_loop
+    first = (own, contributors.judged_table(study, judged)) if judged else ()
+    return View("The paper's loop", [*first, Points(papers_loop(study))])
+
+
 def verdict_text(study: Study, width: int = 80, verbose: bool = False) -> str:
     """The verdict as plain text: headline, a line for each requirement, and what limits them.
 
-    ``verbose`` adds everything else that the first part of the report says, and its warnings.
+    Args:
+        study: a run of a whole mission.
+        width: columns of the terminal.
+        verbose: adds everything else that the first part of the report says, and its warnings.
     """
-    judged = [tables_text([], [headline(study)], width), table_text(requirement_table(study.requirements), width)]
     if not verbose:
-        return "\n\n".join((*judged, tables_text([], short(study), width)))
-    blocks = [*judged, tables_text([], [*short(study), *explanation(study)], width)]
-    by_paper = tables_text([], ["The paper's loop", *papers_loop(study)], width)
-    own = study.papers_loop
-    blocks += [by_paper, table_text(requirement_table(own), width)] if own else [by_paper]
-    if said := warnings(study):
-        blocks.append(tables_text([], ["Warnings", *(f"- {each}" for each in said)], width))
-    return "\n\n".join(blocks)
+        return views_text([verdict_box(study), *short(study)], width)
+    said = [*_limits(study), *explanation(study)]
+    return views_text([verdict_box(study), *said, papers_loop_view(study), warnings_view(study)], width)
 
 
 def beyond_identified(study: Study, run: Run) -> str:
@@ -265,9 +292,10 @@ def warnings(study: Study) -> list[str]:
 
 
 def ranked_warnings(study: Study) -> dict[str, list[str]]:
-    """The warnings by what they put in doubt: first the verdict itself, last what it does not rest on.
+    """The warnings by what they put in doubt.
 
-    Those of a requirement that is missed stand before all others, those of requirements in the order of `nearest`.
+    Those of a requirement that is missed stand first. The others follow by what they cost in dB, the largest first;
+    where that is not known, by the order of what they put in doubt and of the requirements in `nearest`.
     """
     own: list[str] = []
     others: list[str] = []
@@ -277,35 +305,51 @@ def ranked_warnings(study: Study) -> dict[str, list[str]]:
     paper = [*_of_loops(study), *_of_runs(study)]
     judged = paper if study.fine_pointing is None else []
     found = {
-        "The verdict": [*_of_verdict(study), *_of_sources(study), *study.links.warnings],
-        "The model of the mirror": [*study.summary.warnings],
-        "The loop that is judged": own + judged,
-        "The day": [] if study.day is None else [*study.day.warnings, *_not_run(study)],
-        "Other controllers": others,
-        "The paper's loop and figures": [] if judged else paper,
+        "The verdict": [*_of_verdict(study), *map(Warned, _of_sources(study)), *_of_links(study)],
+        "The model of the mirror": [*map(Warned, study.summary.warnings)],
+        "The loop that is judged": [*map(_of_fine_loop, own), *map(Warned, judged)],
+        "The day": [*_of_day(study), *map(Warned, _not_run(study))],
+        "Other controllers": [*map(Warned, others)],
+        "The paper's loop and figures": [] if judged else [*map(Warned, paper)],
     }
-    ranked = {what: sorted(said, key=partial(_weight, study)) for what, said in found.items() if said}
-    return dict(sorted(ranked.items(), key=lambda each: not _missed(study, each[1])))
+    weight = partial(_weight, study)
+    ranked = {what: sorted(said, key=weight) for what, said in found.items() if said}
+
+    def of_group(each: tuple[str, list[Warned]]) -> tuple[bool, bool, float]:
+        return min((met, sure, cost) for sure, met, cost, _ in map(weight, each[1]))
+
+    groups = sorted(ranked.items(), key=of_group)
+    return {what: [with_minus(warned.text) for warned in said] for what, said in groups}
 
 
-def _weight(study: Study, warning: str) -> tuple[bool, bool, float]:
-    """What a warning is put in order by: the requirement that it speaks of; what speaks of none stays before others."""
-    r = _spoken_of(study, warning)
-    return (False, False, 0.0) if r is None and warning.startswith(_OF_VERDICT) else _LAST if r is None else nearness(r)
+def _weight(study: Study, warned: Warned) -> tuple[bool, bool, float, tuple[bool, bool, float]]:
+    """What a warning is put in order by: doubt of the verdict, a missed requirement, decibels, the requirement."""
+    r = next((r for r in study.requirements if r.subject == warned.about), None)
+    order = (True, True, math.inf) if r is None else nearness(r)
+    return warned.about != "verdict", r is None or r.met, -warned.cost_db, order
 
 
-def _missed(study: Study, warnings: Sequence[str]) -> bool:
-    """Whether one of the warnings speaks of a requirement that is not met."""
-    found = [_spoken_of(study, each) for each in warnings]
-    return any(r is not None and not r.met for r in found)
+def _of_links(study: Study) -> list[Warned]:
+    about: Mapping[str, Subject] = {"Communication": "communication", "Beacon": "beacon", "Answer": "answer"}
+    return [Warned(text, about[budget.name]) for budget in study.links.budgets for text in budget.warnings]
 
 
-def _spoken_of(study: Study, warning: str) -> Requirement | None:
-    """The requirement that a warning is about, by how it begins."""
-    for subject, begins in _BEGINS.items():
-        if re.match(begins, warning):
-            return next((r for r in study.requirements if r.subject == subject), None)
-    return None
+def _of_fine_loop(text: str) -> Warned:
+    return Warned(text, "stroke" if "the stroke does not cover" in text else "fine pointing")
+
+
+def _of_day(study: Study) -> list[Warned]:
+    """The warnings of the day; a range beyond the mission's costs by its square."""
+    m, day = study.file.mission, study.day
+    if day is None:
+        return []
+    furthest = max((e.range_most_m for e in day.encounters), default=math.nan)
+    beams = {"communication": m.communication, "beacon": m.beacon, "answer": m.answer}
+    costs = {name: 20.0 * math.log10(furthest / b.distance_m) for name, b in beams.items() if b is not None}
+    return [
+        Warned(text, cost_db=next((db for name, db in costs.items() if text.startswith(f"{name}.distance")), 0.0))
+        for text in day.warnings
+    ]
 
 
 def _of_sources(study: Study) -> list[str]:
@@ -346,21 +390,24 @@ def _of_runs(study: Study) -> list[str]:
     return found
 
 
-def _of_verdict(study: Study) -> list[str]:
+def _of_verdict(study: Study) -> list[Warned]:
     """What the judged margin leaves out, or may not be relied on for."""
     m, case, found = study.file.mission, study.fine_case, []
     if m.jitter is not None:
-        found.append(
+        under_db = study.communication.margin_db
+        text = (
             "[jitter] is not in this verdict, which judges the pointing error that the simulated loop leaves: the two "
-            f"are not summed. Under [jitter] alone the margin is {signed(study.communication.margin_db, 'dB')} for "
+            f"are not summed. Under [jitter] alone the margin is {signed(under_db, 'dB')} for "
             f"{time_kept(m.requirement)}, as microrad budget judges it"
         )
+        found.append(Warned(text, "verdict", max(study.margin_db - under_db, 0.0)))
     lost = study.achieved.loss_db(POINTING_LOSS, POINT_AHEAD_LOSS) if case is None else case.outage_loss_db
     if lost > DEEPEST_DB:
-        found.append(
+        text = (
             f"the verdict's pointing loss of {quantity(lost, 'dB')} is beyond {DEEPEST_DB:g} dB, where the wings and "
             "the scatter of a real beam decide, not the formula of its main lobe"
         )
+        found.append(Warned(text, "verdict", lost))
     return found
 
 
