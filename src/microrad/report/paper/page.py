@@ -1,5 +1,6 @@
 """The paper's figures 1 to 8 and tables 1 and 2 beside this run: which figure of ours stands for each, what differs."""
 
+from collections import Counter
 from collections.abc import Sequence
 
 from microrad.core.units import format_quantity
@@ -93,7 +94,9 @@ def _sketch(number: str, name: str, values: object, said: dict[str, str]) -> tup
 def claims_view(study: Study) -> View:
     """Each printed claim of the paper, what this run has instead, and whether they agree."""
     rows = [(c.where, c.claim, c.ours, Cell("", c.agrees), c.why) for c in study.claims]
-    table = Table("", ("where", "claim", "this run", "agrees", "why"), rows, (0, 1, 2, 3, 4))
+    counts = ", ".join(f"{count} {agrees}" for agrees, count in Counter(c.agrees for c in study.claims).most_common())
+    folded = f"{len(rows)} claims; whether they agree: {counts}"
+    table = Table("", ("where", "claim", "this run", "agrees", "why"), rows, (0, 1, 2, 3, 4), folded=folded)
     changed = "; ".join(
         f"{key} is {value}, there {was}" for key, value, was in changed_from_shipped(study.file.sources)
     )
