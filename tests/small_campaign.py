@@ -8,6 +8,7 @@ import sys
 import threading
 import time
 from contextlib import contextmanager
+from functools import cached_property
 from pathlib import Path
 
 import psutil
@@ -60,7 +61,11 @@ class Here:
     """An engine without a worker: it does one job after the other in the process of the test."""
 
     def __init__(self, spec):
-        self.work = worker.open_target(run.TARGET, spec)
+        self.spec = spec
+
+    @cached_property
+    def work(self):
+        return worker.open_target(run.TARGET, self.spec)
 
     def outcomes(self, jobs):
         for job in jobs:

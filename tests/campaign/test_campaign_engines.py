@@ -24,6 +24,7 @@ from microrad.campaign.records import CampaignError, Job
 from small_campaign import hears_ctrl_c, import_path, killing
 from waiting import HANG_S, alive, beside, gone, no_hang, until
 
+OFTEN = bool(os.environ.get("MICRORAD_ENDURANCE"))
 LATE_S = 3.0  # a job that does nothing but end may be silent for half of that on a busy machine
 
 
@@ -138,7 +139,9 @@ def test_what_jobs_print_does_not_disturb_the_messages(engine):
     assert kinds(run(engine('{"else": "chat"}'), chunks(20))) == {}
 
 
-@pytest.mark.parametrize(("deed", "words"), [("segfault", "SIGSEGV"), ("killed", "SIGKILL")])
+@pytest.mark.parametrize(
+    ("deed", "words"), [("segfault", "SIGSEGV"), pytest.param("killed", "SIGKILL", marks=pytest.mark.endurance)]
+)
 def test_a_job_that_kills_its_process_has_died_and_the_others_come_out(engine, deed, words):
     outcomes = run(engine(f'{{"3": "{deed}"}}', threads=1), chunks(8))
     assert kinds(outcomes) == {3: "died"}, "the one that waited behind it starts again"
@@ -155,7 +158,7 @@ def test_a_row_that_kills_takes_no_other_row_with_it(engine):
     assert kinds(run(engine('{"1": "killed"}', threads=2), jobs)) == {1: "died"}
 
 
-@pytest.mark.parametrize("deed", ["hang", "hog"])
+@pytest.mark.parametrize("deed", [pytest.param("hang", marks=pytest.mark.endurance), "hog"])
 def test_a_job_without_a_sign_of_life_is_late(engine, deed):
     outcomes = run(engine(f'{{"2": "{deed}"}}', threads=1, late_s=LATE_S), chunks(5))
     assert kinds(outcomes) == {2: "late"}
@@ -218,7 +221,8 @@ def test_a_job_that_failed_once_may_be_done_again(engine, tmp_path):
 
 
 def test_a_process_killed_at_random_loses_and_doubles_nothing(engine):
-    one, todo, done, died = engine('{"else": "slow 2"}'), chunks(200), {}, 0
+    jobs = 200 if OFTEN else 40
+    one, todo, done, died = engine('{"else": "slow 2"}'), chunks(jobs), {}, 0
 
     def kill():
         for process in children():
@@ -231,7 +235,7 @@ def test_a_process_killed_at_random_loses_and_doubles_nothing(engine):
             done |= {o.job.number: o.payload for o in outcomes if o.kind == "done"}
             todo = sorted(o.job for o in outcomes if o.kind != "done")
             died += len(todo)
-    assert done == {n: f"0/{n}/-1".encode() for n in range(200)}
+    assert done == {n: f"0/{n}/-1".encode() for n in range(jobs)}
     assert died > 0, "no kill hit a job"
 
 
@@ -245,8 +249,10 @@ def test_a_process_that_cannot_start_is_given_up(engine):
         run(engine("die"), chunks(1))
 
 
-def test_deaths_without_anything_done_between_are_given_up(engine):
-    with pytest.raises(CampaignError, match=r"ended 20 times without a job done between.*SIGKILL"):
+def test_deaths_without_anything_done_between_are_given_up(engine, monkeypatch):
+    assert local._DEATHS == 20
+    monkeypatch.setattr(local, "_DEATHS", 5)
+    with pytest.raises(CampaignError, match=r"ended 5 times without a job done between.*SIGKILL"):
         run(engine('{"else": "killed"}', threads=1), chunks(40))
     assert children() == []
 
@@ -283,7 +289,9 @@ def test_other_code_after_a_restart_is_refused(engine, tmp_path, monkeypatch):
         list(outcomes)
 
 
-@pytest.mark.parametrize("deed", ["endless", "hang", "hog"])
+@pytest.mark.parametrize(
+    "deed", [*(pytest.param(deed, marks=pytest.mark.endurance) for deed in ("endless", "hang")), "hog"]
+)
 def test_close_stops_at_once_whatever_runs(engine, deed, tmp_path, monkeypatch):
     """At once: its worker is killed before anything is waited for; what it does has no end of its own."""
     one, calls = engine(f'{{"else": "{deed} {tmp_path}/begun", "0": "work"}}'), []
@@ -369,7 +377,7 @@ def parent():
 FINE = '{"0": "work", "1": "work"'
 
 
-@pytest.mark.parametrize("deed", ["endless", "hang", "hog"])
+@pytest.mark.parametrize("deed", ["endless", pytest.param("hang", marks=pytest.mark.endurance), "hog"])
 def test_a_killed_parent_leaves_no_orphan(parent, deed, tmp_path):
     process, workers = parent(f'{FINE}, "else": "{deed} {tmp_path}/begun"}}')
     until((tmp_path / "begun").exists, "the deed")

@@ -2,6 +2,7 @@
 
 import csv
 import hashlib
+import os
 import random
 import subprocess
 import sys
@@ -26,6 +27,7 @@ COLUMNS = (
     Column("margin", "dB", "margin of the link"),
 )
 ROWS, FORMATS = 50, ("nc", "parquet", "csv")
+FLIPS = 5 if os.environ.get("MICRORAD_ENDURANCE") else 2  # of each column
 REASON = "=1+1 raised\nValueError: µ"
 
 
@@ -232,7 +234,7 @@ def test_no_flip_among_the_values_of_any_column_is_silent(tmp_path, kind):
         starts = [c.dictionary_page_offset if c.has_dictionary_page else c.data_page_offset for c in each]
         places = [(at, at + c.total_compressed_size) for at, c in zip(starts, each, strict=True)]
     draw = random.Random(6)
-    spots = [(draw.randrange(*place), draw.randrange(8)) for place in places for _ in range(5)]
+    spots = [(draw.randrange(*place), draw.randrange(8)) for place in places for _ in range(FLIPS)]
     told, silent = flips(target, spots, READ[kind])
     assert silent == 0
     assert told > len(spots) / 2
@@ -280,29 +282,31 @@ FULL = """
     from microrad.campaign.ledger import Ledger
     from microrad.campaign.records import CampaignError
     with Ledger.open(Path(sys.argv[1]), write=False) as ledger:
-        try:
-            export_rows(ledger, Path(sys.argv[2]))
-        except CampaignError as error:
-            print(error)
+        for target in sys.argv[2:]:
+            try:
+                export_rows(ledger, Path(target))
+            except CampaignError as error:
+                print(error)
 """
 
 
-@pytest.mark.parametrize("kind", FORMATS)
-def test_a_full_disk_leaves_the_old_file_and_no_part_of_a_new_one(tmp_path, kind):
+def test_a_full_disk_leaves_the_old_file_and_no_part_of_a_new_one(tmp_path):
     path, folder = write(tmp_path, numbers=(range(40), range(40))), tmp_path / "small"
     folder.mkdir()
     made = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", folder], capture_output=True, check=False)
     if made.returncode:
         pytest.skip("this machine does not allow to mount a small disk")
     try:
-        target = folder / f"rows.{kind}"
-        target.write_text("last week's")
-        code = [sys.executable, "-W", "error", "-c", textwrap.dedent(FULL), str(path), str(target)]
+        targets = [folder / f"rows.{kind}" for kind in FORMATS]
+        for target in targets:
+            target.write_text("last week's")
+        code = [sys.executable, "-W", "error", "-c", textwrap.dedent(FULL), str(path), *map(str, targets)]
         ended = subprocess.run(code, capture_output=True, text=True, check=False)
         assert (ended.returncode, ended.stderr) == (0, "")
-        assert "could not be written" in ended.stdout and "No space left" in ended.stdout
-        assert [each.name for each in folder.iterdir()] == [target.name]
-        assert target.read_text() == "last week's"
+        for target, said in zip(targets, ended.stdout.splitlines(), strict=True):
+            assert said.startswith(f"{target} could not be written") and "No space left" in said
+        assert sorted(folder.iterdir()) == sorted(targets)
+        assert {target.read_text() for target in targets} == {"last week's"}
     finally:
         subprocess.run(["umount", "-l", folder], check=True)
 
@@ -321,9 +325,9 @@ PEAK = """
 
 @pytest.fixture(scope="module")
 def two_sizes(tmp_path_factory):
-    """A ledger of 100 000 rows and one of 400 000."""
+    """A ledger of 50 000 rows and one of 200 000."""
     folder = tmp_path_factory.mktemp("sizes")
-    return [write(folder, (range(count),), ({},), rows=5000) for count in (20, 80)]
+    return [write(folder, (range(count),), ({},), rows=5000) for count in (10, 40)]
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="the peak of memory is in kB on Linux alone")
@@ -333,5 +337,5 @@ def test_memory_does_not_grow_with_the_number_of_rows(tmp_path, kind, two_sizes)
     target = str(tmp_path / f"rows.{kind}")
     code = [sys.executable, "-c", textwrap.dedent(PEAK), target, *map(str, two_sizes)]
     less, more = map(int, subprocess.run(code, capture_output=True, check=True).stdout.split())
-    assert Path(target).stat().st_size > 8_000_000
-    assert more - less < 300_000 * 3 * 8 / 1024 / 2  # half of what the further rows' numbers take
+    assert Path(target).stat().st_size > 4_000_000
+    assert more - less < 150_000 * 3 * 8 / 1024 / 2  # half of what the further rows' numbers take

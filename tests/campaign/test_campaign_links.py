@@ -29,7 +29,6 @@ from microrad.mission.toml import MissionError
 from preset_files import NAMES as PRESETS
 from preset_files import completed
 from shipped import SHIPPED
-from small_campaign import without_worker
 
 CROSSLINK = SHIPPED.parent.parent / "docs" / "gallery" / "crosslink.toml"
 HEAD = 'mission = "{name}.toml"\nseed = 1\nruns = 4\nsampling = "random"\n'
@@ -226,11 +225,11 @@ DRAWN = '[inputs."jitter.rms.1"]\ndistribution = "uniform"\nlow = "20 urad"\nhig
 EVEN = HEAD.replace("random", "latin-hypercube").replace("runs = 4", "runs = 64")
 
 
-def begun(folder, book, monkeypatch, row_s, progress=lambda *_: None, **means):
+def begun(folder, book, monkeypatch, row_s, progress=lambda *_: None):
     """A campaign of 64 rows that are taken to last ``row_s`` each, run to its end."""
     loaded(folder, "gallery", DRAWN, EVEN)
     monkeypatch.setattr(run, "row_s", lambda _: row_s)
-    run.run_campaign(folder / "campaign-gallery.toml", folder / book, run.Means(**(means or {"threads": 1})), progress)
+    run.run_campaign(folder / "campaign-gallery.toml", folder / book, run.Means(threads=1), progress)
     return folder / book
 
 
@@ -266,12 +265,11 @@ def test_a_row_costs_the_mean_of_some_without_the_first(tmp_path):
     assert run.row_s(replace(campaign, rows=1), lambda: 7.0) == 0.0  # no more rows than there are
 
 
+@pytest.mark.usefixtures("rows_here")
 def test_results_are_the_same_bits_whatever_a_row_costs(tmp_path, monkeypatch):
     mission(tmp_path, "gallery")
-    with monkeypatch.context() as patch:
-        without_worker(patch)
-        whole = content(begun(tmp_path, "whole.ledger", monkeypatch, 1e-6))
-    parts = content(begun(tmp_path, "parts.ledger", monkeypatch, 0.2, threads=2))
+    whole = content(begun(tmp_path, "whole.ledger", monkeypatch, 1e-6))
+    parts = content(begun(tmp_path, "parts.ledger", monkeypatch, 0.2))
     assert whole[0] == [64] and parts[0] == [8] * 8
     assert parts[1:] == whole[1:]
 

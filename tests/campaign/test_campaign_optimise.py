@@ -1,6 +1,7 @@
 """Optimisation under a probability constraint: against closed forms, known optima, and what it must not claim."""
 
 import math
+import os
 import re
 
 import numpy as np
@@ -394,12 +395,15 @@ def test_the_check_is_no_toss_of_a_coin():
 
     The rest are those whose own rows were so mild that it shows.
     """
-    founds = [optimise(problem(evaluations=20), rising(seed=s), rising(seed=1000 + s), quiet) for s in range(30)]
+    times = 30 if os.environ.get("MICRORAD_ENDURANCE") else 15
+    founds = [optimise(problem(evaluations=16), rising(seed=s), rising(seed=1000 + s), quiet) for s in range(times)]
     short = sum(not found.fresh.feasible for found in founds)
     confirmed = sum(found.confirmed for found in founds)
-    assert 8 <= short <= 22
-    assert 23 <= confirmed <= 30 and confirmed > 30 - short + 4
-    worse = [optimise(problem(evaluations=20), rising(seed=s), rising(4000, s, spread=1.5), quiet) for s in range(30)]
+    assert 0.26 * times <= short <= 0.74 * times
+    assert 0.76 * times <= confirmed and confirmed > times - short + 0.13 * times
+    worse = [
+        optimise(problem(evaluations=16), rising(seed=s), rising(4000, s, spread=1.5), quiet) for s in range(times)
+    ]
     assert not any(found.confirmed for found in worse)
 
 
@@ -583,12 +587,13 @@ def test_data_has_the_check():
 # ---------------------------------------------------------------------------------------------------------- the rest
 def test_the_same_seed_gives_the_same_candidates_and_another_does_not():
     def trace(seed):
-        asked = problem(variables=unit_cube(2), seed=seed)
+        asked = problem(variables=unit_cube(2), seed=seed, evaluations=50)
         return [tuple(c.values.values()) for c in optimise(asked, rising(), rising(), quiet).trace]
 
-    assert trace(1) == trace(1)
-    assert trace(1) != trace(2)
-    assert len(set(trace(1))) == len(trace(1))
+    one = trace(1)
+    assert one == trace(1)
+    assert one != trace(2)
+    assert len(set(one)) == len(one)
 
 
 def test_progress_counts_up_to_the_candidates_looked_at():

@@ -63,8 +63,15 @@ def test_indices_of_known_functions(name: str, kind: str) -> None:
         assert found.total["x2"].low > 0.2 > found.first["x2"].high
 
 
-@pytest.mark.parametrize("kind", ["random", "sobol"])
-@pytest.mark.parametrize("name", FUNCTIONS)
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [
+        ("ishigami", "random"),
+        ("g", "sobol"),
+        pytest.param("ishigami", "sobol", marks=pytest.mark.endurance),
+        pytest.param("g", "random", marks=pytest.mark.endurance),
+    ],
+)
 def test_intervals_hold_the_known_indices(name: str, kind: str) -> None:
     function, inputs, exact = FUNCTIONS[name]
     held, times = np.zeros((2, inputs)), np.zeros(2)

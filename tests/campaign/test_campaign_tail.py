@@ -209,7 +209,7 @@ def test_beyond_all_draws_little_is_known_and_below_them_all() -> None:
 
 
 # -------------------------------------------------------------------------------------------------------- the real loop
-SEEDS = 100 if os.environ.get("MICRORAD_ENDURANCE") else 40
+SEEDS = 100 if os.environ.get("MICRORAD_ENDURANCE") else 20
 CAMPAIGN = """
 mission = "mission.toml"
 seed = 1
