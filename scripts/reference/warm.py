@@ -1,0 +1,78 @@
+"""Commands of microrad in forks of a process that has run one: loading the libraries takes a second of each."""
+
+import gc
+import importlib
+import os
+import runpy
+import sys
+import tempfile
+import traceback
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import IO, NoReturn
+
+LIBRARIES = ("numba", "scipy.linalg", "scipy.optimize", "scipy.signal", "xarray", "h5netcdf")
+"""What most commands load beside what the first one does."""
+
+is_loaded = False
+"""Whether this process has them, and those that it forks."""
+
+
+def load(words: Sequence[str], folder: Path) -> None:
+    """Run a command once in a process without threads, which the forks then have loaded."""
+    global is_loaded  # noqa: PLW0603
+    for name in LIBRARIES:
+        importlib.import_module(name)
+    os.chdir(folder)
+    ends = os.dup(1)
+    with tempfile.TemporaryFile() as out:
+        os.dup2(out.fileno(), 1)
+        code = _microrad(words)
+        sys.stdout.flush()
+        os.dup2(ends, 1)
+    os.close(ends)
+    gc.freeze()  # a collection would copy all of it into the fork
+    is_loaded = code == 0
+
+
+def run(words: Sequence[str], folder: Path, environment: Mapping[str, str]) -> tuple[int, str, str]:
+    """Exit code, output and errors of a command in a fork of this process."""
+    with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
+        if (child := os.fork()) == 0:
+            _become(words, folder, environment, out, err)
+        code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+        return code, _text(out), _text(err)
+
+
+def _become(
+    words: Sequence[str], folder: Path, environment: Mapping[str, str], out: IO[bytes], err: IO[bytes]
+) -> NoReturn:
+    code = 70
+    try:
+        os.dup2(out.fileno(), 1)
+        os.dup2(err.fileno(), 2)
+        os.chdir(folder)
+        os.environ.clear()
+        os.environ.update(environment)
+        code = _microrad(words)
+    except BaseException:
+        traceback.print_exc()
+    finally:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)
+
+
+def _microrad(words: Sequence[str]) -> int:
+    """`python -m microrad` with these words, in this process."""
+    sys.argv = ["microrad", *words]
+    try:
+        runpy.run_module("microrad", run_name="__main__", alter_sys=True)
+    except SystemExit as end:
+        return end.code if isinstance(end.code, int) else int(end.code is not None)
+    return 0
+
+
+def _text(file: IO[bytes]) -> str:
+    file.seek(0)
+    return file.read().decode("utf-8")
