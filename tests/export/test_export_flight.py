@@ -6,6 +6,7 @@ import re
 import shutil
 import subprocess
 from dataclasses import dataclass, replace
+from functools import cached_property
 from math import inf, nan, pi
 
 import numpy as np
@@ -60,6 +61,10 @@ void replay({name}_state *state, size_t samples, const {name}_real *m, {name}_re
 """
 
 
+BUILT = {}
+"""Shared libraries by their compiler and their code."""
+
+
 @dataclass(frozen=True)
 class Counters:
     saturated: int
@@ -79,13 +84,26 @@ class Code:
             (folder / file).write_text(text, encoding="utf-8")
         places = np.cumsum([0, *(each.size for each in of.inputs)])
         arguments = ", ".join(f"m + {at}" for at in places[:-1])
-        driver = DRIVER.format(name=name, readings=places[-1], actuators=of.actuators, arguments=arguments)
-        (folder / "driver.c").write_text(driver)
-        library = folder / "flown.so"
-        built = [compiler, *FLAGS, "-shared", "-fPIC", "-o", library, folder / f"{name}.c", folder / "driver.c", "-lm"]
-        subprocess.run(built, check=True, timeout=HANG_S)
-        self.library = ctypes.CDLL(str(library))
-        self.library.state_size.restype = ctypes.c_size_t
+        self.driver = DRIVER.format(name=name, readings=places[-1], actuators=of.actuators, arguments=arguments)
+        self.compiler = compiler
+
+    @cached_property
+    def path(self):
+        """The shared library, compiled once for all that have the same code."""
+        same = (self.compiler, self.driver, *self.files.values())
+        if same not in BUILT:
+            (self.folder / "driver.c").write_text(self.driver)
+            sources = [self.folder / f"{self.name}.c", self.folder / "driver.c"]
+            BUILT[same] = self.folder / "flown.so"
+            command = [self.compiler, *FLAGS, "-shared", "-fPIC", "-o", BUILT[same], *sources, "-lm"]
+            subprocess.run(command, check=True, timeout=HANG_S)
+        return BUILT[same]
+
+    @cached_property
+    def library(self):
+        found = ctypes.CDLL(str(self.path))
+        found.state_size.restype = ctypes.c_size_t
+        return found
 
     def begin(self):
         state = (ctypes.c_char * self.library.state_size())()
@@ -640,7 +658,7 @@ def test_it_is_called_from_c_plus_plus(shipped, tmp_path):
         '#include "flown.h"\nint main() { flown_state s; flown_init(&s); return s.faults + (s.command_v[0] != 0.0); }\n'
     )
     (tmp_path / "use.cpp").write_text(text)
-    subprocess.run(["g++", *WARNINGS, "-o", "use", "use.cpp", code.folder / "flown.so"], cwd=tmp_path, check=True)
+    subprocess.run(["g++", *WARNINGS, "-o", "use", "use.cpp", code.path], cwd=tmp_path, check=True)
     assert subprocess.run([tmp_path / "use"], check=False).returncode == 0
 
 
@@ -660,7 +678,9 @@ def test_words_of_a_mission_cannot_become_code(shipped, tmp_path):
     """A comment's end, a trigraph, an end of line, a text that turns around: compiled, and nothing defined."""
     hostile = Origin("a */ int evil; /* b ??/\n#error c \\", "0" * 64, "d\u202e */*/ e")
     of = replace(choice.flight_controller(shipped), origin=hostile, name="*/ #error /*")
-    files = Code(tmp_path, of, name="x" * 31).files
+    code = Code(tmp_path, of, name="x" * 31)
+    assert code.path.is_file()
+    files = code.files
     plain = re.sub(r"/\*.*?\*/", "", "".join(files.values()), flags=re.S)
     assert "evil" not in plain
     assert "#error c" not in plain
