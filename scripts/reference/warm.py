@@ -23,6 +23,7 @@ def load(words: Sequence[str], folder: Path) -> None:
     global is_loaded  # noqa: PLW0603
     for name in LIBRARIES:
         importlib.import_module(name)
+    os.environ["MICRORAD_KEEP"] = "no"
     os.chdir(folder)
     ends = os.dup(1)
     with tempfile.TemporaryFile() as out:
