@@ -10,14 +10,13 @@ from numpy.typing import ArrayLike
 
 from microrad.core.arrays import Floats
 from microrad.orbit.base import OperationsError
+from microrad.orbit.visibility.events import TOLERANCE_S, positive_rows
 
 Range = Callable[[Floats], Floats]
 """Range in m over time in s, both of shape (n,); smooth."""
 
 _SPACING_S = 60.0  # of the samples of the range, at most
 _FEWEST = 16  # intervals of a contact, however short
-_FINE_S = 1e-4  # to which a crossing is found: a tenth of what is promised
-_GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 
 
 class Step(NamedTuple):
@@ -106,8 +105,8 @@ class Service:
 def service(table: RateTable, contact: tuple[float, float], range_m: Range, availability: float) -> Service:
     """What a contact carries: the table's rate at the range of each moment.
 
-    The moments where the range crosses a step's limit are found to 1 ms: the range is sampled at most 60 s apart and at
-    its turning points, which may not lie closer together than two samples.
+    The moments where the range crosses a step's limit are found as those of contacts are (`events.positive_rows`); the
+    range is sampled at most 60 s apart, and its turning points may not lie closer together than two samples.
 
     Args:
         table: Data rates and the ranges they reach.
@@ -118,8 +117,7 @@ def service(table: RateTable, contact: tuple[float, float], range_m: Range, avai
     Raises:
         OperationsError: For an availability out of range.
     """
-    edges = np.concatenate((contact[:1], _crossings(table, contact, range_m), contact[1:]))
-    edges = edges[np.concatenate(([True], np.diff(edges) > 0.0))]
+    edges = np.unique(np.concatenate((contact, _crossings(table, contact, range_m))))
     rates = table.rate_bit_s(range_m(0.5 * (edges[1:] + edges[:-1])))
     inner = np.flatnonzero(np.diff(rates)) + 1  # pieces of the same rate are one
     return Service(
@@ -128,48 +126,11 @@ def service(table: RateTable, contact: tuple[float, float], range_m: Range, avai
 
 
 def _crossings(table: RateTable, contact: tuple[float, float], range_m: Range) -> Floats:
-    """Moments, rising, at which the range crosses the limit of a step, by bisection of "closes or not"."""
-    limits = np.unique([s.largest_range_m for s in table.steps if 0.0 < s.largest_range_m < math.inf])
-    if not limits.size:
-        return np.zeros(0)
-    time = _samples(contact, range_m, limits)
-    closes = range_m(time) <= limits[:, None]
-    step, place = np.nonzero(closes[:, 1:] != closes[:, :-1])
-    low, high, before = time[place], time[place + 1], closes[step, place]
-    while low.size and np.any(high - low > _FINE_S):
-        middle = 0.5 * (low + high)
-        same = (range_m(middle) <= limits[step]) == before
-        low, high = np.where(same, middle, low), np.where(same, high, middle)
-    return np.sort(0.5 * (low + high))
-
-
-def _samples(contact: tuple[float, float], range_m: Range, limits: Floats) -> Floats:
-    """Even samples, and the turning points of the range between them: it is monotonic from each to the next.
-
-    Turning points are looked for only where a limit is as near to the samples as they are to one another.
-    """
+    """Moments at which the range crosses the limit of a step, in any order and with ends of the contact among them."""
+    limits = np.array([s.largest_range_m for s in table.steps if 0.0 < s.largest_range_m < math.inf])
     start, end = contact
+    if not limits.size or end - start <= TOLERANCE_S:
+        return np.zeros(0)
     time = np.linspace(start, end, max(math.ceil((end - start) / _SPACING_S), _FEWEST) + 1)
-    ranges = range_m(time)
-    reach = float(np.max(np.abs(np.diff(ranges))))
-    if not np.any((np.min(ranges) - reach <= limits) & (limits <= np.max(ranges) + reach)):
-        return time
-    turns = [_turning_points(time, sign * ranges, range_m, sign) for sign in (1.0, -1.0)]
-    return np.unique(np.concatenate((time, *turns)))
-
-
-def _turning_points(time: Floats, value: Floats, range_m: Range, sign: float) -> Floats:
-    """Minima of `sign` times the range, of which `value` are samples, by golden-section search of all at once.
-
-    A minimum may lie about each sample that is one, and in the first and the last interval.
-    """
-    lowest = np.flatnonzero((value[1:-1] <= value[:-2]) & (value[1:-1] <= value[2:])) + 1
-    low = np.concatenate((time[lowest - 1], time[[0, -2]]))
-    high = np.concatenate((time[lowest + 1], time[[1, -1]]))
-    while np.any(high - low > _FINE_S):
-        width = _GOLDEN * (high - low)
-        left, right = high - width, low + width
-        values = sign * range_m(np.concatenate((left, right)))
-        keep_left = values[: low.size] <= values[low.size :]
-        low, high = np.where(keep_left, low, left), np.where(keep_left, right, high)
-    return 0.5 * (low + high)
+    closes = positive_rows(lambda time, row: limits[row] - range_m(time), time, limits[:, None] - range_m(time))
+    return np.concatenate(closes).ravel()
