@@ -437,22 +437,46 @@ def test_an_interrupted_write_leaves_nothing_and_keeps_the_old(static, no_figure
 # --------------------------------------------------------------------------------------------------- text and data
 def test_the_text_holds_scores_parameters_roles_and_what_to_do_next(full):
     text = report.identification_text(full, "linear", mirror_file=Path("a b.toml"), report_file=Path("r.html"))
+    said = " ".join(text.split())
     assert full.chosen == "bouc_wen"
-    assert "linear (written)" in text
-    assert "bouc_wen (written)" not in text
-    for needed in ("straight line", "held-out samples", "±", "refused: prandtl_ishlinskii_creep", "warning: Valid"):
+    assert said.startswith(" ".join(words.verdict(full, "linear")))
+    assert re.search(r"(?m)^ bouc_wen \(chosen\) .*$", text)
+    parts = ["Warnings and refusals", "Recordings", "Linear part", "Loops", "Residuals", "Parameters", "All models"]
+    assert [line for line in text.splitlines() if line in parts] == parts
+    for title in ("bouc_wen, the choice", "linear, in the mirror file"):
+        assert text.splitlines().count(title) == 1
+    for needed in (
+        "straight line",
+        "held out",
+        "± standard error",
+        "- prandtl_ishlinskii_creep: ",
+        "- Valid for drives",
+    ):
         assert needed in text
     for role in ("loops", "broadband", "validation"):
-        assert re.search(rf"^  {role} +\d+ fitted +\d+ held out  \S+\.csv$", text, re.MULTILINE)
+        assert re.search(rf"(?m)^ \S+\.csv +{role} +\d+ +\d+$", text)
     score = full.score("linear")
-    assert f"{score.held_out_rms_percent:10.3f}{score.held_out_peak_percent:10.2f}" in text
-    assert f"linear part, excited from {full.linear.excited_hz[0]:.4g} Hz" in text
-    assert "The mirror file holds linear as asked" in text
+    assert re.search(rf"(?m)^ linear .* {score.held_out_rms_percent:.3f} +{score.held_out_peak_percent:.2f}$", text)
+    assert f"The linear part was excited from {full.linear.excited_hz[0]:.3g} Hz" in said
+    assert "The mirror file holds linear as asked" in said
     assert text.endswith(
         "r.html written: what was found, with pictures.\n"
         "a b.toml written (linear). Next: microrad run leo-geo.toml --mirror 'a b.toml' --output 'a b-study'"
     )
     assert "as asked" not in report.identification_text(full, full.chosen)
+    assert max(map(len, text.partition("\n\nr.html")[0].splitlines())) <= 80
+
+
+def test_a_terminal_has_the_reasons_of_few_parameters_and_the_names_of_many(full, monkeypatch):
+    def said(count):
+        monkeypatch.setattr(
+            identification_page.parameters, "not_identified", lambda fit: [(f"p{k}", f"why {k}") for k in range(count)]
+        )
+        return report.identification_text(full, full.chosen)
+
+    assert "- not identified: p5, why 5" in said(6)
+    assert "why" not in said(7).partition("bouc_wen, the choice")[2].partition("All models")[0]
+    assert f"Not identified: 7 of {len(parameter_rows(full.fit()))}, p0, p1, p2, p3, p4, p5, p6." in said(7)
 
 
 def test_the_verdict_compares_with_the_papers_model_and_the_line(full, static):

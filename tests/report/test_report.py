@@ -17,9 +17,8 @@ import xarray as xr
 from microrad import report
 from microrad.core import folder
 from microrad.mission import file as missionfile
-from microrad.report.links import figures as link_module
 from microrad.report.page.templates import inputs_view
-from microrad.report.paper import bench, figures
+from microrad.report.paper import bench
 from microrad.report.paper import diagrams as drawings
 from microrad.report.paper import page as paper_views
 from microrad.report.plotting.figure import Figure
@@ -43,12 +42,6 @@ def no_fine_pointing():
 @pytest.fixture(scope="module")
 def paper():
     return plain_study()
-
-
-@pytest.fixture(scope="module")
-def small(tmp_path_factory):
-    """A study of a second."""
-    return study.run_study(edited_file(tmp_path_factory.mktemp("small"), day=False))
 
 
 @pytest.fixture(scope="module")
@@ -439,17 +432,16 @@ def test_two_runs_write_the_same_page_and_figures(paper, written, tmp_path):
         assert (tmp_path / "again" / path.relative_to(written)).read_bytes() == path.read_bytes()
 
 
-def test_results_are_never_replaced_silently(small, tmp_path, monkeypatch):
-    for module, name in ((figures, "paper_figures"), (link_module, "link_figures"), (bench, "bench_figures")):
-        monkeypatch.setattr(module, name, lambda *args: ())
+def test_results_are_never_replaced_silently(paper, tmp_path, monkeypatch):
+    monkeypatch.setattr(report, "study_figures", lambda *args: page.StudyFigures())
     target = tmp_path / "out"
-    report.write(small, target)
+    report.write(paper, target)
     before = {p: p.read_bytes() for p in target.rglob("*") if p.is_file()}
     with pytest.raises(report.FolderError, match="already holds results: choose another --output, or replace"):
-        report.write(small, target)
+        report.write(paper, target)
     assert {p: p.read_bytes() for p in target.rglob("*") if p.is_file()} == before
     (target / "left over.txt").write_text("x")
-    report.write(small, target, overwrite=True)
+    report.write(paper, target, overwrite=True)
     assert not (target / "left over.txt").exists()
     assert sorted(p.name for p in tmp_path.iterdir()) == ["out"]
 
@@ -490,12 +482,13 @@ def no_bench(monkeypatch):
     monkeypatch.setattr(bench, "bench_figures", lambda *args: ())
 
 
-@pytest.mark.usefixtures("no_scan", "no_bench")
-def test_text_of_the_mission_is_escaped(tmp_path):
+def test_text_of_the_mission_is_escaped(paper, tmp_path, monkeypatch):
+    drawn = plain_drawn()
+    monkeypatch.setattr(report, "study_figures", lambda *args: drawn)
     file = edited_file(
-        tmp_path, ('name = "LEO-to-GEO relay of a 100 kg satellite"', 'name = "<script>alert(1)</script>"'), day=False
+        tmp_path, ('name = "LEO-to-GEO relay of a 100 kg satellite"', 'name = "<script>alert(1)</script>"')
     )
-    text = report.write(study.run_study(file), tmp_path / "out").read_text(encoding="utf-8")
+    text = report.write(replace(paper, file=file), tmp_path / "out").read_text(encoding="utf-8")
     assert "<script>alert" not in text
     assert "&lt;script&gt;alert(1)&lt;/script&gt;" in text
     manifest = text.partition('<script type="application/json" id="manifest">')[2].partition("</script>")[0]
@@ -529,7 +522,7 @@ def test_verdict_and_summary_say_the_same(paper):
     json.dumps(data)
 
 
-def test_a_drive_beyond_the_identified_rate_is_the_first_thing_said(paper, tmp_path):
+def test_a_drive_beyond_the_identified_rate_is_the_first_thing_said(no_scan, paper, tmp_path):
     slow = study.run_study(edited_file(tmp_path, ('rate_limit = "3770 V/s"', 'rate_limit = "100 V/s"'), day=False))
     text = report.verdict_text(slow)
     assert "The mirror model is extrapolated." in " ".join(text.partition("\n\n")[0].split())
@@ -603,15 +596,16 @@ def test_an_amplifier_at_its_limits_is_named_as_the_cause_and_claims_are_not_jud
     assert any("beyond the amplifier's range" in w for w in report.summary(weak)["warnings"])
 
 
-@pytest.mark.usefixtures("no_scan", "no_bench")
+@pytest.mark.usefixtures("no_scan")
 def test_a_changed_value_does_not_keep_the_papers_name(paper, tmp_path):
     assert missionfile.changed_from_shipped(paper.file.sources) == ()
     file = edited_file(tmp_path, ('leo_aperture = "5 cm"', 'leo_aperture = "6 cm"'), day=False)
     assert missionfile.changed_from_shipped(file.sources) == (("terminals.leo_aperture", '"6 cm"', '"5 cm"'),)
     changed = study.run_study(file)
     assert any("names the paper as its source" in w for w in report.summary(changed)["warnings"])
-    text = report.write(changed, tmp_path / "out").read_text(encoding="utf-8")
-    assert "This mission is not the paper" in text
+    said = 'This mission is not the paper\'s: terminals.leo_aperture is "6 cm", there "5 cm".'
+    assert said in paper_views.claims_view(changed).blocks
+    assert not any("This mission is not" in str(block) for block in paper_views.claims_view(paper).blocks)
     for study_of, keys in ((paper, []), (changed, ["terminals.leo_aperture"])):
         (table,) = inputs_view(study_of.file.sources).blocks
         assert [table.rows[k][0].text for k in table.filters["changed from what is shipped"]] == keys

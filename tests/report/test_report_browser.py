@@ -11,7 +11,7 @@ from microrad import report
 from microrad.lab.identify import identify
 from microrad.report.campaign.page import campaign_page
 from microrad.report.day.page import day_page
-from microrad.report.links.page import links_page
+from microrad.report.links.views import links_page
 from report import test_identification_report as identified
 from report import test_report_campaign as campaigns
 from report import test_report_fine_pointing as fine_loops

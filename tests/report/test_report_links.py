@@ -23,11 +23,11 @@ from microrad.report.links import words as links_words
 from microrad.report.links.budgets import links_csv, links_text
 from microrad.report.links.data import performance_data
 from microrad.report.links.figures import link_figures
-from microrad.report.links.page import links_page
 from microrad.report.links.views import (
     acquisition_paragraphs,
     acquisition_view,
     fade_sentences,
+    links_page,
     paired_tables,
     performance_note,
     performance_table,

@@ -62,8 +62,8 @@ def contacts(
     if sum((as_csv, as_html, as_json)) > 1:
         raise Refusal("--csv, --html and --json exclude each other; give one of them.")
     from microrad.orbit import day as day_study
-    from microrad.report.day.data import day_data
-    from microrad.report.day.text import day_csv, day_text
+    from microrad.report.day.data import day_csv, day_data
+    from microrad.report.day.page import day_page, day_text
 
     links = _links(file)
     with refusal_of(file), progress_bar() as progress:
@@ -74,8 +74,6 @@ def contacts(
     if as_csv:
         return Outcome(day_csv(day), code)
     if as_html:
-        from microrad.report.day.page import day_page
-
         return Outcome(day_page(day, links), code)
     return Outcome(day_text(day, width()), code)
 

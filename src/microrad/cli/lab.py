@@ -24,6 +24,7 @@ from microrad.cli.frame import (
     json_text,
     option,
     progress_bar,
+    width,
 )
 from microrad.core.folder import write_whole
 
@@ -175,7 +176,7 @@ def identify(  # noqa: PLR0913  every argument is a named option
         json_text(report.identification_data(found, written, **data))
         if as_json
         else f"drive in {input_unit} ({drive_by}), output in {output_unit} ({output_by})\n\n"
-        + report.identification_text(found, written, **data)
+        + report.identification_text(found, written, width(), **data)
     )
     check()  # the file may have appeared meanwhile
     report.write_identification(

@@ -79,7 +79,7 @@ def budget(  # noqa: PLR0913, PLR0917  each is an option
     if as_csv:
         return Outcome(links_csv(study, solution), code)
     if as_html:
-        from microrad.report.links.page import links_page
+        from microrad.report.links.views import links_page
 
         return Outcome(links_page(study, solution), code)
     return Outcome(links_text(study, width(), verbose=verbose, solution=solution), code)

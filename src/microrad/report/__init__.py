@@ -21,8 +21,12 @@ from microrad.report.tables import Column, numbers_text, rows_of
 if TYPE_CHECKING:
     from microrad.orbit.constellation import ConstellationPlan
     from microrad.report.identification.data import identification_data
-    from microrad.report.identification.page import ReportError, check_identification, write_identification
-    from microrad.report.identification.text import identification_text
+    from microrad.report.identification.page import (
+        ReportError,
+        check_identification,
+        identification_text,
+        write_identification,
+    )
     from microrad.report.plotting.figure import Figure
     from microrad.report.study.data import summary
     from microrad.report.study.page import StudyFigures
@@ -34,7 +38,7 @@ _LAZY = {
     "check_identification": "identification.page",
     "write_identification": "identification.page",
     "identification_data": "identification.data",
-    "identification_text": "identification.text",
+    "identification_text": "identification.page",
     "summary": "study.data",
     "verdict_text": "study.words",
 }

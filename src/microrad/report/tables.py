@@ -4,7 +4,7 @@ import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import zip_longest
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,7 +68,6 @@ class Table:
     that has no room for all columns shows those in ``brief``.
     """
 
-    kind: ClassVar[str] = "table"
     title: str
     headings: Sequence[str]
     rows: Sequence[Sequence[str | Cell]]

@@ -8,7 +8,6 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
-from typing import ClassVar
 
 from markupsafe import Markup
 
@@ -20,7 +19,6 @@ from microrad.report.tables import Table, table_text, tables_text
 class Soft:
     """A paragraph that explains how to read what is above it."""
 
-    kind: ClassVar[str] = "soft"
     text: str
 
 
@@ -28,7 +26,6 @@ class Soft:
 class Points:
     """A list, a sentence each."""
 
-    kind: ClassVar[str] = "points"
     lines: Sequence[str]
 
 
@@ -36,7 +33,6 @@ class Points:
 class Verbatim:
     """Text whose lines stay as they are."""
 
-    kind: ClassVar[str] = "verbatim"
     text: str
 
 
@@ -44,7 +40,6 @@ class Verbatim:
 class Verdict:
     """A judgement: its sentence, what belongs to it, and whether it is good news; None where it is open."""
 
-    kind: ClassVar[str] = "verdict"
     headline: str
     blocks: Sequence["Block"] = ()
     good: bool | None = None
@@ -54,7 +49,6 @@ class Verdict:
 class Drawing:
     """A picture without data of its own, as SVG that is safe to show, with its title and caption."""
 
-    kind: ClassVar[str] = "drawing"
     name: str
     title: str
     caption: str
@@ -69,7 +63,6 @@ class View:
     a page name it.
     """
 
-    kind: ClassVar[str] = "view"
     title: str
     blocks: Sequence["Block"] = ()
     anchor: str = ""
@@ -83,6 +76,11 @@ class View:
 
 
 Block = str | Soft | Points | Verbatim | Verdict | Drawing | Table | Figure | View
+
+
+def opened(figures: Sequence[Figure], names: Sequence[str]) -> list[Block]:
+    """Figures of which a page shows those of these names at once, the others when it is asked."""
+    return [f if f.name in names else View(f.title, [f], folded=True, listed=False) for f in figures]
 
 
 def slug(text: str) -> str:

@@ -45,7 +45,7 @@ def contacts(file: Path) -> Action:
     """Contacts with the relay and the ground, and what they deliver."""
     python = _joined(
         "from microrad import load_link, run_day_study, run_link_study",
-        "from microrad.report.day.text import day_text",
+        "from microrad.report.day.page import day_text",
         "",
         f"day = run_day_study(run_link_study(load_link({str(file)!r})))",
         f"print(day_text(day, {_WIDTH}))",

@@ -1,4 +1,4 @@
-"""The plan of a constellation in words, as a table in a terminal and as plain data."""
+"""The plan of a constellation in words, as a view and as plain data."""
 
 from typing import Any
 
@@ -6,7 +6,8 @@ import numpy as np
 
 from microrad.orbit.constellation import ConstellationPlan
 from microrad.report.quantities import duration, volume
-from microrad.report.tables import Table, tables_text
+from microrad.report.tables import Table
+from microrad.report.view import View, views_text
 
 MOST_ROWS = 40
 """Satellites of a table; there may be thousands."""
@@ -45,6 +46,11 @@ def satellites_table(plan: ConstellationPlan) -> Table:
     return Table("What each satellite gets", headings, rows, (0,), folded="What each satellite gets")
 
 
+def constellation_view(plan: ConstellationPlan) -> View:
+    """Who is served when."""
+    return View("A constellation", [*plan_sentences(plan), satellites_table(plan)], folded=True)
+
+
 def plan_text(plan: ConstellationPlan, width: int) -> str:
     """The plan in sentences and a table for a terminal.
 
@@ -52,10 +58,9 @@ def plan_text(plan: ConstellationPlan, width: int) -> str:
         plan: who is served when.
         width: columns of the terminal.
     """
-    shown, count = plan_sentences(plan), len(plan.satellites)
-    if count > MOST_ROWS:
-        shown.append(f"The first {MOST_ROWS} of {count} satellites; --csv has every session.")
-    return tables_text([satellites_table(plan)], shown, width)
+    count = len(plan.satellites)
+    more = f"The first {MOST_ROWS} of {count} satellites; --csv has every session." if count > MOST_ROWS else ""
+    return views_text([constellation_view(plan), more], width)
 
 
 def plan_data(plan: ConstellationPlan) -> dict[str, Any]:

@@ -1,11 +1,34 @@
-"""A day of the link as plain data, in SI units with the unit in each key."""
+"""A day of the link as plain data, in SI units with the unit in each key, and as CSV."""
 
+import csv
+import io
 from typing import Any
 
 from microrad.orbit import Contact, Pass
 from microrad.orbit.day import DayStudy, Encounter, Numbers, Way
+from microrad.orbit.operations import spreadsheet_text
 from microrad.report.data import fields
 from microrad.report.day import words
+
+_COLUMNS = {
+    "rise (UTC)": "start_utc",
+    "set (UTC)": "end_utc",
+    "rise (s)": "start_s",
+    "set (s)": "end_s",
+    "duration (s)": "duration_s",
+    "begins by": "begins",
+    "ends by": "ends",
+    "smallest range (m)": "range_least_m",
+    "largest range (m)": "range_most_m",
+    "largest point-ahead (rad)": "point_ahead_most_rad",
+    "largest rate of the line of sight (rad/s)": "line_of_sight_rate_most_rad_s",
+    "largest acceleration of the line of sight (rad/s^2)": "line_of_sight_acceleration_most_rad_s2",
+    "largest range rate (m/s)": "range_rate_most_m_s",
+    "largest Doppler shift (Hz)": "doppler_most_hz",
+    "largest elevation (rad)": "highest_elevation_rad",
+    "could carry (bit)": "could_carry_bit",
+}
+"""Columns of the CSV behind the names of way and partner, and where their numbers stand in the plain data."""
 
 
 def day_data(day: DayStudy) -> dict[str, Any]:
@@ -93,3 +116,17 @@ def _numbers_data(n: Numbers) -> dict[str, float]:
         "relay_latency_99_percent_s": n.relay_slow_s,
         "direct_latency_99_percent_s": n.direct_slow_s,
     }
+
+
+def day_csv(day: DayStudy) -> str:
+    """One line a contact by either way, each number with every digit."""
+    buffer = io.StringIO()
+    writer = csv.writer(buffer, lineterminator="\n")
+    writer.writerow(("by", "with", *_COLUMNS))
+    whole = day_data(day)
+    rows = [(day.relay.name, day.view.pair.geo.name, each) for each in whole["contacts"]]
+    if day.direct is not None:
+        rows += [(day.direct.name, each["station"], each) for each in whole["direct"]["passes"]]
+    for way, partner, each in sorted(rows, key=lambda row: row[2]["start_s"]):
+        writer.writerow([way, spreadsheet_text(partner), *(each.get(key, "") for key in _COLUMNS.values())])
+    return buffer.getvalue().rstrip("\n")

@@ -3,15 +3,11 @@
 from collections.abc import Sequence
 
 from microrad.link.study import LinkStudy
-from microrad.orbit.constellation import ConstellationPlan
 from microrad.orbit.day import DayStudy
 from microrad.report.day import words
-from microrad.report.day.constellation import plan_sentences, satellites_table
-from microrad.report.day.figures import day_figures
 from microrad.report.day.tables import assumptions_table, contacts_table, ways_table
-from microrad.report.page.templates import inputs_view, mission_page
 from microrad.report.plotting.figure import Figure
-from microrad.report.view import Points, Verdict, View, told
+from microrad.report.view import Points, Verdict, View, opened, told, views_text
 
 OPEN = ("day-timeline", "data-volume")
 """Figures that a page shows at once; the others when it is asked."""
@@ -24,10 +20,23 @@ def day_page(day: DayStudy, links: LinkStudy) -> str:
         day: what the links deliver.
         links: the study of the links that the day is of; its file has the sources of the inputs.
     """
+    from microrad.report.day.figures import day_figures
+    from microrad.report.page.templates import inputs_view, mission_page
+
     headline, *sentences = words.sentences(day)
     lead = Verdict(headline, good=day.relay.capacity_bit > 0.0)
     views = (day_view(day, sentences, day_figures(day)), inputs_view(links.file.sources))
     return mission_page(links.file, "contacts", [lead], views)
+
+
+def day_text(day: DayStudy, width: int) -> str:
+    """The day for a terminal: its answers, its warnings and its tables.
+
+    Args:
+        day: what the links deliver.
+        width: columns of the terminal.
+    """
+    return views_text([day_view(day, words.sentences(day), ())], width)
 
 
 def day_view(day: DayStudy, sentences: Sequence[str], figures: Sequence[Figure], *more: View | None) -> View:
@@ -40,16 +49,15 @@ def day_view(day: DayStudy, sentences: Sequence[str], figures: Sequence[Figure],
         more: views at the end.
     """
     tables = (ways_table(day), contacts_table(day), assumptions_table(day))
-    drawn = [f if f.name in OPEN else View(f.title, [f], folded=True, listed=False) for f in figures]
     return View(
         "What the link delivers",
-        told(*sentences, "Warnings:" if day.warnings else None, Points(day.warnings), *tables, *drawn, *more),
+        told(
+            *sentences,
+            "Warnings:" if day.warnings else None,
+            Points(day.warnings),
+            *tables,
+            *opened(figures, OPEN),
+            *more,
+        ),
         "delivers",
-    )
-
-
-def constellation_view(plan: ConstellationPlan | None) -> View | None:
-    """Who is served when."""
-    return (
-        None if plan is None else View("A constellation", [*plan_sentences(plan), satellites_table(plan)], folded=True)
     )

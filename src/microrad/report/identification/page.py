@@ -3,8 +3,10 @@
 import hashlib
 import math
 import os
+import shlex
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 
 from markupsafe import Markup
 
@@ -21,7 +23,10 @@ from microrad.report.identification.figures import identification_figures
 from microrad.report.page.templates import page_of
 from microrad.report.plotting.figure import Figure
 from microrad.report.tables import Cell, Table
-from microrad.report.view import Points, Soft, Verbatim, Verdict, View, told
+from microrad.report.view import Block, Points, Soft, Verbatim, Verdict, View, told, views_text
+
+MOST_REASONS = 6
+"""Parameters that are not identified of which a terminal has the reasons; of more it has the names."""
 
 BEGINS = '<!DOCTYPE html>\n<html lang="en" data-made-by="microrad identify">'
 
@@ -105,35 +110,78 @@ def identification_page(
     virtual: bool = False,
 ) -> str:
     """The page's HTML; every text that is not ours is escaped, and nothing is loaded from anywhere."""
-    everything = [*found.recordings, *words.shown_recordings(found, recordings)]
     figures = identification_figures(found, recordings, virtual=virtual)
-    no_time = "No broadband recording was used: there is no linear model to compare."
-    tests = figures.get("tests")
-    headline, *sentences = words.verdict(found, written)
     own = "The recordings are those of the virtual bench: nothing here was measured on a mirror." if virtual else ""
-    lead = Verdict(headline, told(" ".join(sentences), own), words.sound(found))
-    views = (
-        _warnings(found, written),
-        _recordings(found, everything, figures),
-        _linear(found, figures),
-        View("Loops", told(figures.get("loops"), f"Error of {found.chosen} on each recording:", _errors(found))),
-        View("Time response", [figures.get("time", no_time)]),
-        View("Residuals", told(figures.get("residuals"), " ".join(words.residual_sentences(found)), tests)),
-        _parameters(found, written),
-        _ranking(found),
-        _origin(found, mirror_file, mirror_text, written),
-    )
+    views = (*_views(found, written, recordings, figures), _origin(found, mirror_file, mirror_text, written))
     count = len(found.sources)
     of = Markup("{} recording{}, mirror file <code>{}</code>").format(count, "s" * (count > 1), mirror_file)
     return page_of(
         title,
         "identification",
         of,
-        [lead],
+        [_lead(found, written, own)],
         views,
         sha256=hashlib.sha256(mirror_text.encode()).hexdigest(),
         made_by="microrad identify",
         badge="virtual bench" if virtual else "",
+    )
+
+
+def identification_text(
+    found: Identification,
+    written: str,
+    width: int = 80,
+    *,
+    mirror_file: Path | None = None,
+    report_file: Path | None = None,
+) -> str:
+    """The identification as text to read; the files that were written, and what to do next, stand at its end.
+
+    Args:
+        found: what was identified.
+        written: the model in the mirror file. Parameters are its own, those of the choice and those of the paper's
+            model; the report and the plain data have all.
+        width: columns of the terminal.
+        mirror_file: the mirror file, if one was written.
+        report_file: the report, if one was written.
+    """
+    files = [] if report_file is None else [f"{report_file} written: what was found, with pictures."]
+    if mirror_file is not None:
+        run_it = ["microrad", "run", "leo-geo.toml", "--mirror", str(mirror_file)]
+        run_it += ["--output", f"{mirror_file.stem}-study"]
+        files.append(f"{mirror_file} written ({written}). Next: {shlex.join(run_it)}")
+    shown = views_text([_lead(found, written), *_views(found, written, short=True)], width)
+    return "\n\n".join([shown, "\n".join(files)]) if files else shown
+
+
+def _lead(found: Identification, written: str, own: str = "") -> Verdict:
+    headline, *sentences = words.verdict(found, written)
+    return Verdict(headline, told(" ".join(sentences), own), words.sound(found))
+
+
+def _views(
+    found: Identification,
+    written: str,
+    recordings: Sequence[Recording] = (),
+    figures: Mapping[str, Figure] = MappingProxyType({}),
+    *,
+    short: bool = False,
+) -> tuple[View, ...]:
+    """What a page and a terminal show, a ``short`` one without the parameters that a page folds."""
+    everything = [*found.recordings, *words.shown_recordings(found, recordings)]
+    no_time = "No broadband recording was used: there is no linear model to compare." if figures else None
+    return (
+        _warnings(found, written),
+        _recordings(found, everything, figures),
+        _linear(found, figures),
+        View("Loops", told(figures.get("loops"), f"Error of {found.chosen} on each recording:", _errors(found))),
+        View("Time response", told(figures.get("time", no_time))),
+        View(
+            "Residuals",
+            told(figures.get("residuals"), " ".join(words.residual_sentences(found)), figures.get("tests")),
+        ),
+        _parameters(found, written, short),
+        _ranking(found),
     )
 
 
@@ -164,7 +212,7 @@ def _recordings(found: Identification, everything: Sequence[Recording], figures:
     checks = (
         "What the checks of the recordings noticed:" if noticed else "The checks of the recordings noticed nothing."
     )
-    table = Table("", headings, rows, (0, 1, 2))
+    table = Table("", headings, rows, (0, 1, 2), brief=(0, 1, 4, 5))
     return View("Recordings", told(table, checks, Points(noticed), figures.get("excitation")))
 
 
@@ -191,7 +239,7 @@ def _scan(linear: LinearFit) -> Table | None:
         for s in linear.scan
     ]
     headings = ("order", "parameters", "chi-square per degree of freedom", "criterion", "output error (rms)", "")
-    return Table("", headings, rows, (5,)) if rows else None
+    return Table("", headings, rows, (5,), brief=(0, 1, 3, 5)) if rows else None
 
 
 def _roots(linear: LinearFit) -> Table:
@@ -210,7 +258,9 @@ def _roots(linear: LinearFit) -> Table:
     for place, (name, gain, error) in enumerate(words.gains(linear)):
         known = rounded_to_error(gain * 1e3, error * 1e3), parameters.two_digits(error * 1e3)
         rows.append((f"gain at {name}", *(f"{text} mrad/V" for text in known), "", "", *(inside if place else outside)))
-    return Table("", ("", "natural frequency", "±", "damping ratio", "±", "excited", ""), rows, (0, 5, 6))
+    return Table(
+        "", ("", "natural frequency", "±", "damping ratio", "±", "excited", ""), rows, (0, 5, 6), brief=(0, 1, 2, 3, 5)
+    )
 
 
 def _errors(found: Identification) -> Table:
@@ -222,21 +272,32 @@ def _errors(found: Identification) -> Table:
         name, drive = Cell(Path(recording.path).name, code=True), words.drive_text(recording, found.units.volts)
         rows.append((name, drive, _angle(fitted), _angle(unseen), share, str(prediction.clamped)))
     headings = ("file", "drive", "fitted, rms", "unseen, rms", "unseen, rms", "rate-clamped")
-    return Table("", headings, rows, (0, 1))
+    return Table("", headings, rows, (0, 1), brief=(0, 2, 3, 4))
 
 
 def _angle(value_rad: float) -> str:
     return "" if math.isnan(value_rad) else f"{1e6 * value_rad:.3g} µrad"
 
 
-def _parameters(found: Identification, written: str) -> View:
+def _parameters(found: Identification, written: str, short: bool) -> View:
     """The parameters of each model; those of the choice and of the mirror file stand open."""
     views = []
     for score, fit in zip(found.scores, found.fits, strict=True):
+        if short and score.model not in (found.chosen, written, words.PAPER_MODEL):
+            continue
         choice, held = ", the choice" * (score.model == found.chosen), ", in the mirror file" * (score.model == written)
-        blocks = (_model(fit), Soft(" ".join(parameters.notes(fit))))
+        table, notes = _model(fit), parameters.notes(fit)
+        blocks = (table.columns(range(4)), _not_identified(fit), notes[0]) if short else (table, Soft(" ".join(notes)))
         views.append(View(f"{score.model}{choice}{held}", blocks, folded=not (choice or held)))
     return View("Parameters", views)
+
+
+def _not_identified(fit: Fit) -> Block:
+    """Parameters that the recordings do not fix, with the reasons where they are few."""
+    found, count = parameters.not_identified(fit), len(parameters.parameter_rows(fit))
+    if len(found) > MOST_REASONS:
+        return f"Not identified: {len(found)} of {count}, {', '.join(name for name, _ in found)}."
+    return Points([f"not identified: {name}, {why}" for name, why in found])
 
 
 def _model(fit: Fit) -> Table:
@@ -246,7 +307,7 @@ def _model(fit: Fit) -> Table:
         value, error, unit = row.shown
         note = row.note or (f"not identified: {unknown[row.name]}" if row.name in unknown else "")
         rows.append((row.name, rounded_to_error(value, error), parameters.two_digits(error), unit, note))
-    return Table("", ("parameter", "value", "± standard error", "unit", ""), rows, (0, 3, 4))
+    return Table("", ("parameter", "value", "± standard error", "unit", "note"), rows, (0, 3, 4))
 
 
 def _ranking(found: Identification) -> View:
@@ -268,7 +329,8 @@ def _ranking(found: Identification) -> View:
     first = f"residual in % of the peak-to-peak output, {format_quantity(found.span_rad, 'rad', 4)}"
     headings = ("fitted, rms", "fitted, peak", "unseen, rms", "unseen, peak", "unseen, rms", "admissible")
     best = [k for k, s in enumerate(scores) if s.model == found.chosen]
-    return View("All models", (found.reason, Table("", (first, *headings), rows, (0, 6), best=best)))
+    table = Table("", (first, *headings), rows, (0, 6), best=best, brief=range(5))
+    return View("All models", (found.reason, table))
 
 
 def _origin(found: Identification, mirror_file: Path, mirror_text: str, written: str) -> View:

@@ -12,12 +12,14 @@ from microrad.link import LinkBudget
 from microrad.link.acquisition.partner_search import LONGEST_LOOK_S, Finding, Found, Scanned
 from microrad.link.pointing import OpenLoopPointing
 from microrad.link.pointing.outage import Performance, stated_outage
-from microrad.link.study import LinkStudy
+from microrad.link.requirement import met, of_links
+from microrad.link.study import LinkStudy, Solution
 from microrad.report.links import words
 from microrad.report.plotting.figure import Figure
 from microrad.report.quantities import given_angle, minus, quantity
+from microrad.report.requirements import derived_words, requirement_table
 from microrad.report.tables import Cell, Table
-from microrad.report.view import Block, Points, Soft, View, told
+from microrad.report.view import Block, Points, Soft, Verdict, View, opened, told
 
 if TYPE_CHECKING:
     from microrad.study.pointing_penalty import Cost, LinkPerformance
@@ -30,6 +32,23 @@ RAREST_FADE_HZ = 1.0 / (365.25 * 86400.0)
 
 _LINES = ("line", "value", "basis", "source", "holds for")
 _NO_VALUE = "\u2013"
+
+
+def links_page(study: LinkStudy, solution: Solution | None = None) -> str:
+    """The budgets as one page that loads nothing, with their figures and no drawing library: their numbers stand below.
+
+    Args:
+        study: the links, at their budgeted errors or under their jitter.
+        solution: the values of a key that leave the required margin, if one was solved for.
+    """
+    from microrad.report.links.figures import link_figures
+    from microrad.report.page.templates import inputs_view, mission_page
+
+    judged = of_links(study)
+    said = [] if solution is None else [words.solution_text(solution)]
+    views = (*links_views(study, [figure.static for figure in link_figures(study)]), inputs_view(study.file.sources))
+    lead = Verdict(words.verdict(study), told(requirement_table(judged), derived_words(judged), *said), met(study))
+    return mission_page(study.file, "budget", [lead], views, data="below")
 
 
 def links_views(
@@ -204,9 +223,8 @@ def budgets_view(
         tables.append(lines_table(name, light.noise_lines, [light.noise_equivalent_angle]))
     warned: list[Block] = ["Marked \u201c!\u201d in the tables:", Points(study.warnings)] if study.warnings else []
     moving = [f for f in figures if f.name.startswith("tornado")]
-    folded = [View(f.title, [f], folded=True, listed=False) for f in moving[1:]]
     said = Points([*words.consequences(study), *sentences])
-    return View("Link budgets", told(*tables, *warned, said, *moving[:1], *folded, *more))
+    return View("Link budgets", told(*tables, *warned, said, *opened(moving, [f.name for f in moving[:1]]), *more))
 
 
 # --------------------------------------------------------------------------------------------------------- performance
@@ -326,11 +344,11 @@ def residuals_sentence(found: LinkPerformance) -> str:
 
 def cost_cells(c: Cost) -> list[str]:
     """What hysteresis takes from one controller, as text: dB of margin, Mbit/s."""
-    rate = "" if math.isnan(c.data_rate_bit_s) else signed(-c.data_rate_bit_s * 1e-6, 0)
-    return [signed(-c.margin_db, 2), rate]
+    rate = "" if math.isnan(c.data_rate_bit_s) else _fixed(-c.data_rate_bit_s * 1e-6, 0)
+    return [_fixed(-c.margin_db, 2), rate]
 
 
-def signed(value: float, decimals: int) -> str:
+def _fixed(value: float, decimals: int) -> str:
     """A number that has no sign when it is shown as zero, and a minus sign, not a hyphen, when it is negative."""
     return minus(f"{round(value, decimals) + 0.0:.{decimals}f}")
 
@@ -363,7 +381,7 @@ def acquisition_view(found: Finding | None, figures: Sequence[Figure]) -> View |
     at = f"{100 * EARLY:g} % within"
     headings = ("way", "lock", "simulated", "mean time", "simulated", at)
     ways = Table("", headings, [_way(w) for w in found.ways], (0,))
-    trade = [View(f.title, [f], folded=True, listed=False) for f in figures if not f.name.startswith("tornado")]
+    trade = opened([f for f in figures if not f.name.startswith("tornado")], ())
     stages = [view for w in found.ways for view in (_stages(w),)]
     return View("Acquisition", told(*acquisition_paragraphs(found), ways, *stages, *trade))
 

@@ -25,6 +25,7 @@ def templates() -> Environment:
     made = Environment(
         loader=PackageLoader("microrad.report", "."), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )
+    made.filters["kind"] = lambda block: type(block).__name__
     return made
 
 

@@ -13,8 +13,9 @@ from microrad.loop.paper_cases import Run
 from microrad.mirror import Variant
 from microrad.orbit.day import DayStudy
 from microrad.report.day import words as day_words
+from microrad.report.day.constellation import constellation_view
 from microrad.report.day.contact_run import contact_sentences, transitions_table, windows_table
-from microrad.report.day.page import constellation_view, day_view
+from microrad.report.day.page import day_view
 from microrad.report.fine_pointing.page import fine_pointing_view
 from microrad.report.fine_pointing.tails import tail_view
 from microrad.report.links.views import (
@@ -215,7 +216,8 @@ def _day(study: Study, figures: Sequence[Figure]) -> View | None:
     day = study.day
     if day is None:
         return None
-    return day_view(day, day_words.sentences(day), figures, _contact(study, day), constellation_view(study.plan))
+    plan = None if study.plan is None else constellation_view(study.plan)
+    return day_view(day, day_words.sentences(day), figures, _contact(study, day), plan)
 
 
 def _contact(study: Study, day: DayStudy) -> View | None:
