@@ -204,13 +204,11 @@ def _routes(composition: str, elements: int) -> tuple[Floats, Floats]:
 
 def combine(*mirrors: Mirror) -> Mirror:
     """Independent mirrors side by side: the axes, actuators and elements of the first, then of the next."""
-    from scipy.linalg import block_diag
-
     bw = [len(m.bouc_wen) for m in mirrors]
     total = np.cumsum([0] + [len(m.bouc_wen) + len(m.plays) for m in mirrors])
     order = [int(t) + i for t, n in zip(total, bw, strict=False) for i in range(n)]
     order += [i for i in range(int(total[-1])) if i not in order]  # Bouc-Wen elements first
-    blocks = {key: block_diag(*(getattr(m, key) for m in mirrors)) for key in "ABEFGCDK"}
+    blocks = {key: lti.block_diagonal(*(getattr(m, key) for m in mirrors)) for key in "ABEFGCDK"}
     return Mirror(
         name=" + ".join(m.name for m in mirrors),
         A=blocks["A"],

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from microrad.core.arrays import Floats
+from microrad.core.roots import root
 from microrad.core.units import format_quantity
 from microrad.link.pointing.radial_error import Jitter, density_on_circle, radial_survival
 from microrad.link.pointing.statistics import outage_probability, radius_of_loss_rad, transmission
@@ -264,6 +265,4 @@ def uncoded_penalty_db(jitter: Jitter, half_angle_rad: float, error_ratio: Error
             f"the mean bit error ratio stays above {target:g} even with {MOST_POWER_DB:g} dB more power; "
             "widen the beam or reduce the jitter"
         )
-    from scipy.optimize import brentq
-
-    return float(brentq(missed, 0.0, MOST_POWER_DB, xtol=1e-9))
+    return root(missed, 0.0, MOST_POWER_DB, xtol=1e-9)
