@@ -249,34 +249,49 @@ def test_a_simulation_repeats_with_its_seed_alone():
 
 
 REFUSALS = [
-    (lambda: Search(300e-6, 0.0, 0.25, 0.9), r"the beam's radius is 0 rad: it must lie above 0 rad"),
-    (lambda: Search(300e-6, 1.6, 0.25, 0.9), r"the beam's radius is 1\.6 rad: .*below pi/2"),
-    (lambda: Search(0.0, 20e-6, 0.25, 0.9), r"standard deviation of the pointing error is 0 rad"),
-    (lambda: Search(300e-6, 20e-6, -0.01, 0.9), r"the overlap is -0\.01: it must be 0 or more and below 1"),
-    (lambda: Search(300e-6, 20e-6, 1.0, 0.9), r"the overlap is 1: it must be 0 or more and below 1"),
-    (lambda: Search(300e-6, 20e-6, 0.25, 1.0), r"coverage probability is 1: it must lie above 0 and below 1"),
-    (lambda: Search(300e-6, 20e-6, 0.25, 0.0), r"coverage probability is 0: it must lie above 0 and below 1"),
+    (
+        lambda: Search(300e-6, 0.0, 0.25, 0.9),
+        r"Search\.beam_radius_rad is 0 rad: it must be finite, above 0 and below 1\.571 rad",
+    ),
+    (
+        lambda: Search(300e-6, 1.6, 0.25, 0.9),
+        r"Search\.beam_radius_rad is 1\.6 rad: it must be finite, above 0 and below 1\.571 rad",
+    ),
+    (lambda: Search(0.0, 20e-6, 0.25, 0.9), r"Search\.sigma_rad is 0 rad: it must be finite, above 0 rad"),
+    (
+        lambda: Search(300e-6, 20e-6, -0.01, 0.9),
+        r"Search\.overlap is -0\.01: it must be finite, at least 0 and below 1",
+    ),
+    (lambda: Search(300e-6, 20e-6, 1.0, 0.9), r"Search\.overlap is 1: it must be finite, at least 0 and below 1"),
+    (lambda: Search(300e-6, 20e-6, 0.25, 1.0), r"Search\.coverage is 1: it must be finite, above 0 and below 1"),
+    (lambda: Search(300e-6, 20e-6, 0.25, 0.0), r"Search\.coverage is 0: it must be finite, above 0 and below 1"),
     (lambda: Search(0.6, 20e-6, 0.25, 0.995), r"radius that covers the pointing error is 1\.953 rad"),
-    (lambda: Detector(0.0), r"the detection time is 0 s: it must be above 0 s"),
-    (lambda: Detector(1e-3, 0.0), r"detection in one look is 0: it must lie above 0 and be 1 or less"),
-    (lambda: Detector(1e-3, 1.01), r"detection in one look is 1\.01: it must lie above 0 and be 1 or less"),
-    (lambda: Spiral(SEARCH, SURE, 0.0), r"the speed of the scan is 0 rad/s"),
+    (lambda: Detector(0.0), r"Detector\.detection_time_s is 0 s: it must be finite, above 0 s"),
+    (lambda: Detector(1e-3, 0.0), r"Detector\.probability is 0: it must be finite, above 0, at most 1"),
+    (lambda: Detector(1e-3, 1.01), r"Detector\.probability is 1\.01: it must be finite, above 0, at most 1"),
+    (lambda: Spiral(SEARCH, SURE, 0.0), r"Spiral\.speed_rad_s is 0 rad/s: it must be finite, above 0 rad/s"),
     (
         lambda: Spiral(SEARCH, SURE, 0.0401),
         r"at 40\.1 mrad/s the beam crosses the target faster than the detection time of 1 ms: scan at 40 mrad/s",
     ),
     (lambda: Raster(SEARCH, SURE, 0.0401), r"scan at 40 mrad/s or slower"),
-    (lambda: Raster(SEARCH, SURE, 0.01, -0.1), r"the turn-around time is -100 ms: it must be 0 s or more"),
-    (lambda: StepStare(SEARCH, SURE, 1e-3, -1e-3), r"the settling time is -1 ms: it must be 0 s or more"),
-    (lambda: StepStare(SEARCH, SURE, 0.0), r"the dwell time is 0 s: it must be above 0 s"),
+    (lambda: Raster(SEARCH, SURE, 0.01, -0.1), r"Raster\.turn_around_s is -100 ms: it must be finite, at least 0 s"),
+    (lambda: StepStare(SEARCH, SURE, 1e-3, -1e-3), r"StepStare\.settle_s is -1 ms: it must be finite, at least 0 s"),
+    (lambda: StepStare(SEARCH, SURE, 0.0), r"StepStare\.dwell_s is 0 s: it must be finite, above 0 s"),
     (lambda: StepStare(SEARCH, SURE, 0.9e-3), r"the dwell of 900 µs is shorter than the detection time of 1 ms"),
     (lambda: highest_speed(SEARCH, 0.0), r"the detection time is 0 s"),
-    (lambda: gap_probability(Spiral(SEARCH, SURE, SLOW), -1e-6), r"the vibration's rms is -1 µrad"),
+    (lambda: gap_probability(Spiral(SEARCH, SURE, SLOW), -1e-6), r"the vibration's rms is -1 µrad: .* at least 0 rad"),
     (lambda: detection_times(Spiral(SEARCH, SURE, SLOW), -1e-6), r"the vibration's rms is -1 µrad"),
-    (lambda: Vibration(-1e-6, 1.0), r"the vibration's rms is -1 µrad"),
-    (lambda: Vibration(1e-6, 0.0), r"correlation time is 0 s: it must be above 0 s"),
-    (lambda: simulate_scan(Spiral(SEARCH, SURE, SLOW), 0, 1), r"the number of runs is 0: it must be 1 or more"),
-    (lambda: simulate_scan(Spiral(SEARCH, SURE, SLOW), 1, 1, None, 1), r"samples in a pass is 1: it must be 2"),
+    (lambda: Vibration(-1e-6, 1.0), r"Vibration\.rms_rad is -1 µrad: it must be finite, at least 0 rad"),
+    (lambda: Vibration(1e-6, 0.0), r"Vibration\.correlation_time_s is 0 s: it must be finite, above 0 s"),
+    (
+        lambda: simulate_scan(Spiral(SEARCH, SURE, SLOW), 0, 1),
+        r"the number of runs is 0: it must be finite, at least 1",
+    ),
+    (
+        lambda: simulate_scan(Spiral(SEARCH, SURE, SLOW), 1, 1, None, 1),
+        r"the number of samples in a pass is 1: it must be finite, at least 2",
+    ),
 ]
 
 

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Protocol
+from typing import Annotated, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from microrad.core.arrays import Floats
 from microrad.core.roots import root
 from microrad.link.gains import DB_PER_NEPER, aperture_gain_db
+from microrad.mission.fields import Bounded, Quantity, Share
 from microrad.mission.tables.link import narrowest_radius
 
 BEST_TRUNCATION = 1.1209
@@ -59,7 +60,7 @@ class GaussianFall:
 
 
 @dataclass(frozen=True, slots=True)
-class LitAperture:
+class LitAperture(Bounded):
     """A circular aperture with a central obscuration, lit by a Gaussian beam or evenly; its exact far field.
 
     ``truncation`` is the aperture's radius over the beam's radius at 1/e2 of intensity; 0 is an even light.
@@ -69,23 +70,19 @@ class LitAperture:
     Raises ValueError for a value without meaning, and for a beam that the obscuration stops but for 1 %.
     """
 
-    diameter_m: float
-    wavelength_m: float
-    truncation: float
-    obscuration: float
-    m_squared: float = 1.0
+    diameter_m: Annotated[float, Quantity("m", above=0.0)]
+    wavelength_m: Annotated[float, Quantity("m", above=0.0)]
+    truncation: Annotated[float, Quantity("", least=0.0), "0 is an even light"]
+    obscuration: Annotated[float, Share("", least=0.0)]
+    m_squared: Annotated[float, Quantity("", least=1.0), "1 is an ideal beam"] = 1.0
 
     def __post_init__(self) -> None:
         """Raises ValueError if a value is out of range, or the obscuration stops the beam."""
-        _require(self.diameter_m > 0.0, "the aperture", self.diameter_m, "above 0 m")
-        _require(self.wavelength_m > 0.0, "the wavelength", self.wavelength_m, "above 0 m")
-        _require(self.truncation >= 0.0, "the truncation", self.truncation, "at least 0, which is an even light")
-        _require(0.0 <= self.obscuration < 1.0, "the obscuration", self.obscuration, "at least 0 and below 1")
-        _require(self.m_squared >= 1.0, "M squared", self.m_squared, "at least 1, an ideal beam")
+        Bounded.__post_init__(self)
         if self.obscuration > 0.0:
-            most = 1.0 / narrowest_radius(self.obscuration)
-            limit = f"at most {most:.4g} at an obscuration of {self.obscuration:g}, which stops the rest of the beam"
-            _require(self.truncation <= most, "the truncation", self.truncation, limit)
+            most = Quantity("", most=1.0 / narrowest_radius(self.obscuration))
+            why = f"an obscuration of {self.obscuration:g} stops the rest of the beam"
+            most.check("truncation", self.truncation, why)
 
     @property
     def efficiency(self) -> float:
@@ -201,8 +198,3 @@ class LitAperture:
 def _gauss_legendre() -> tuple[Floats, Floats]:
     node, weight = np.polynomial.legendre.leggauss(_NODES)
     return node, weight
-
-
-def _require(holds: bool, what: str, value: float, limit: str) -> None:
-    if not (holds and math.isfinite(value)):
-        raise ValueError(f"{what} is {value:.4g}: it must be finite and {limit}")

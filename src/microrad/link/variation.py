@@ -93,7 +93,7 @@ def moved(tables: Varied, found: tuple[Input, ...], value: float) -> Varied | No
     largest = max(each.value for each in found)
     for each in found:
         own = value if each.value == largest else value * each.value / largest
-        if each.rule.out_of_bounds(own) or (isinstance(each.rule, Share) and not 0.0 < own < each.rule.below):
+        if each.rule.out_of_bounds(own):
             return None
         tables = each.moved(tables, own)
     return tables

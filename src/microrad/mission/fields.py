@@ -4,10 +4,12 @@ Both plug into pydantic as annotations, `Annotated[float, Quantity("W", above=0.
 """
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass
+import re
+from collections.abc import Hashable, Iterator
+from dataclasses import dataclass, fields
+from functools import cache
 from itertools import pairwise
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple, Self, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, GetJsonSchemaHandler, model_validator
 from pydantic_core import CoreSchema, core_schema
@@ -79,8 +81,28 @@ class Quantity:
     def wanted(self) -> str:
         """What the key expects, in words."""
         noun = f"{kind_of(self.unit)[0]} with its unit" if self.unit else "a number without quotes"
+        return f"{noun}, {self.limits}" if self.limits else noun
+
+    @property
+    def limits(self) -> str:
+        """The bounds in words."""
         bounds = [("above", self.above), ("at least", self.least), ("at most", self.most)]
-        return ", ".join([noun, *(f"{word} {self._show(bound)}" for word, bound in bounds if bound is not None)])
+        return ", ".join(f"{word} {self._show(bound)}" for word, bound in bounds if bound is not None)
+
+    def check(self, name: str, value: float, why: str = "") -> None:
+        """Check a value that comes from no file.
+
+        Args:
+            name: What the value is, in the words of the message.
+            value: The value, in the unit of the quantity.
+            why: Why the bounds hold, for the message.
+
+        Raises:
+            ValueError: For a value that is not finite or out of bounds.
+        """
+        if not math.isfinite(value) or self.out_of_bounds(value):
+            reason = f"; {why}" if why else ""
+            raise ValueError(f"{name} is {self._show(value).strip()}: it must be finite, {self.limits}{reason}")
 
     def out_of_bounds(self, number: float) -> str:
         """Why a number is not allowed, or nothing."""
@@ -115,13 +137,16 @@ class Whole(Quantity):
 
     def read(self, value: object) -> int:
         """The number; raises `UnitError`."""
-        if value == UNKNOWN:
-            raise UnitError(value, NOT_PUBLISHED, self.wanted, self.example)
         if isinstance(value, bool) or not isinstance(value, int):
-            raise UnitError(value, "is not a whole number", self.wanted, self.example)
+            reason = NOT_PUBLISHED if value == UNKNOWN else "is not a whole number"
+            raise UnitError(value, reason, self.wanted, self.example)
         if fault := self.out_of_bounds(value):
             raise UnitError(value, fault, self.wanted, self.example)
         return value
+
+    def out_of_bounds(self, number: float) -> str:
+        """Why a number is not allowed, or nothing."""
+        return "is not whole" if number != int(number) else Quantity.out_of_bounds(self, number)
 
     @property
     def example(self) -> str:
@@ -143,16 +168,15 @@ class Whole(Quantity):
 
 @dataclass(frozen=True, slots=True)
 class Share(Quantity):
-    """A number above 0 (or at least `least`) and below `below`."""
+    """A number above 0 (or at least `least`) and below `below`; it has a unit only where it is read from no file."""
 
     below: float = 1.0
 
-    def read(self, value: object) -> float:
-        """The number; raises `UnitError`."""
-        number = Quantity.read(self, value)
-        if not 0.0 < number < self.below:
-            raise UnitError(value, f"is not above 0 and below {self.below:g}", self.wanted, self.example)
-        return number
+    def out_of_bounds(self, number: float) -> str:
+        """Why a number is not allowed, or nothing."""
+        inside = (self.least is not None or number > 0.0) and number < self.below
+        fault = "" if inside else f"is not above 0 and below {self._show(self.below)}"
+        return Quantity.out_of_bounds(self, number) or fault
 
     @property
     def example(self) -> str:
@@ -162,10 +186,10 @@ class Share(Quantity):
         )
 
     @property
-    def wanted(self) -> str:
-        """What the key expects, in words."""
-        lowest = "above 0" if self.least is None else f"at least {self.least:g}"
-        return f"a number without quotes, {lowest} and below {self.below:g}"
+    def limits(self) -> str:
+        """The bounds in words."""
+        lowest = "above 0" if self.least is None else f"at least {self._show(self.least)}"
+        return f"{lowest} and below {self._show(self.below)}"
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         """A number with its bounds."""
@@ -179,10 +203,9 @@ class Switch(Quantity):
 
     def read(self, value: object) -> bool:
         """The value; raises `UnitError`."""
-        if value == UNKNOWN:
-            raise UnitError(value, NOT_PUBLISHED, self.wanted, self.example)
         if not isinstance(value, bool):
-            raise UnitError(value, "is neither true nor false", self.wanted, self.example)
+            reason = NOT_PUBLISHED if value == UNKNOWN else "is neither true nor false"
+            raise UnitError(value, reason, self.wanted, self.example)
         return value
 
     @property
@@ -285,10 +308,50 @@ def _plain_number(value: object) -> float:
     return number
 
 
-class Table(BaseModel):
-    """A table of a mission or plan file: frozen, strict, no key beyond the named ones."""
+class Bounded:
+    """A record that refuses what its annotations do not allow, as `Annotated[float, Quantity("W", least=0.0)]`.
 
-    model_config = ConfigDict(strict=True, frozen=True, extra="forbid", allow_inf_nan=False)
+    A text behind the bounds says why they hold. The default of a field is allowed whatever they are.
+    """
+
+    __slots__ = ()
+
+    def __post_init__(self) -> None:
+        """Raises ValueError if a value is not finite or out of its bounds."""
+        record: Hashable = type(self)
+        for name, default, rule, why in _bounds(record):
+            value = getattr(self, name)
+            if value != default:
+                rule.check(f"{type(self).__name__}.{name}", value, why)
+
+
+@cache
+def _bounds(record: Any) -> tuple[tuple[str, object, Quantity, str], ...]:
+    """Name, default, rule and reason of each field of a record that has bounds."""
+    hints, found = get_type_hints(record, include_extras=True), []
+    for each in fields(record):
+        bounds = getattr(hints[each.name], "__metadata__", ())
+        if bounds and isinstance(bounds[0], Quantity):
+            found.append((each.name, each.default, bounds[0], "".join(bounds[1:])))
+    return tuple(found)
+
+
+_UNIT = re.compile(r"(_(rad|m|s|hz|v|w|a|db|bit|photon|sr|m2|m3|rad2|hz2|1|sqrt))+$")
+
+
+class Table(BaseModel):
+    """A table of a mission or plan file: frozen, strict, no key beyond the named ones.
+
+    A file calls a field by its name without the unit at its end, unless the field has an alias of its own.
+    """
+
+    model_config = ConfigDict(
+        strict=True,
+        frozen=True,
+        extra="forbid",
+        allow_inf_nan=False,
+        alias_generator=lambda name: _UNIT.sub("", name),
+    )
 
     @classmethod
     def rule_of(cls, key: str) -> tuple[str, "Quantity"]:

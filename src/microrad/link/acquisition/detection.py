@@ -8,15 +8,17 @@ breaks up the crossings, or gives a long dwell more chances than one: simulate i
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from microrad.core.arrays import Floats
-from microrad.link.acquisition.checks import require_count, require_not_negative, require_positive
-from microrad.link.acquisition.scan import Raster, Scan, Spiral, StepStare
+from microrad.link.acquisition.scan import Duration, Raster, Scan, Spiral, StepStare
 from microrad.link.acquisition.times import TimeDistribution, merged
+from microrad.mission.fields import Bounded, Quantity, Whole
 
+_RMS = Quantity("rad", least=0.0)
 _REACH = 8.0  # standard deviations of the vibration
 _TIMES = 2048
 _RADII = 2048
@@ -39,7 +41,7 @@ def gap_probability(scan: Scan, jitter_rms_rad: float = 0.0) -> float:
     Raises:
         ValueError: If the rms is negative or not finite.
     """
-    require_not_negative("the vibration's rms", jitter_rms_rad, "rad")
+    _RMS.check("the vibration's rms", jitter_rms_rad)
     if isinstance(scan, StepStare):
         _, _, probability = _cell(scan, jitter_rms_rad)
         return float(np.mean(np.prod(1.0 - probability, axis=-1)))
@@ -61,7 +63,7 @@ def detection_times(scan: Scan, jitter_rms_rad: float = 0.0) -> TimeDistribution
     Raises:
         ValueError: If the rms is negative or not finite.
     """
-    require_not_negative("the vibration's rms", jitter_rms_rad, "rad")
+    _RMS.check("the vibration's rms", jitter_rms_rad)
     if isinstance(scan, Spiral):
         return _spiral_times(scan, jitter_rms_rad)
     if isinstance(scan, Raster):
@@ -230,16 +232,11 @@ def _mean_look(scan: StepStare) -> float:
 
 # ------------------------------------------------------------------------------------------------------------ simulated
 @dataclass(frozen=True, slots=True)
-class Vibration:
+class Vibration(Bounded):
     """Ornstein-Uhlenbeck jitter of the beam: rms in each axis and correlation time (spectrum 1/(2 pi time) wide)."""
 
-    rms_rad: float
-    correlation_time_s: float
-
-    def __post_init__(self) -> None:
-        """Raises ValueError if the rms is negative or the correlation time not above 0."""
-        require_not_negative("the vibration's rms", self.rms_rad, "rad")
-        require_positive("the vibration's correlation time", self.correlation_time_s, "s")
+    rms_rad: Annotated[float, _RMS]
+    correlation_time_s: Duration
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -268,9 +265,8 @@ def simulate_scan(scan: Scan, runs: int, seed: int, vibration: Vibration | None 
     Raises:
         ValueError: For no run and for less than 2 samples.
     """
-    require_count("the number of runs", runs)
-    if samples < 2:
-        raise ValueError(f"the number of samples in a pass is {samples}: it must be 2 or more")
+    Whole("", least=1).check("the number of runs", runs)
+    Whole("", least=2).check("the number of samples in a pass", samples)
     draw = np.random.Generator(np.random.Philox(key=seed))
     x, y = (draw.normal(0.0, scan.search.sigma_rad, runs) for _ in range(2))
     shake = vibration or Vibration(0.0, 1.0)

@@ -3,24 +3,25 @@
 import math
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from microrad.core.arrays import Floats
 from microrad.core.units import format_quantity
-from microrad.link.acquisition.checks import (
-    require_angle,
-    require_inside,
-    require_not_negative,
-    require_overlap,
-    require_positive,
-    require_probability,
-)
+from microrad.mission.fields import Bounded, Quantity, Share
+
+OffAxis = Annotated[float, Share("rad", below=math.pi / 2), "an angle from the line of sight is meant"]
+Overlap = Annotated[float, Share("", least=0.0), "a share of a diameter"]
+Duration = Annotated[float, Quantity("s", above=0.0)]
+DurationOrZero = Annotated[float, Quantity("s", least=0.0)]
+Probability = Annotated[float, Quantity("", above=0.0, most=1.0)]
+Speed = Annotated[float, Quantity("rad/s", above=0.0)]
 
 
 @dataclass(frozen=True, slots=True)
-class Search:
+class Search(Bounded):
     """What is searched and with which beam.
 
     The target lies at a Gaussian offset from the middle, `sigma_rad` in each axis. `beam_radius_rad` is the half angle
@@ -29,18 +30,15 @@ class Search:
     searched disc.
     """
 
-    sigma_rad: float
-    beam_radius_rad: float
-    overlap: float
-    coverage: float
+    sigma_rad: Annotated[float, Quantity("rad", above=0.0)]
+    beam_radius_rad: OffAxis
+    overlap: Overlap
+    coverage: Annotated[float, Share(""), "Gaussian errors have no edge"]
 
     def __post_init__(self) -> None:
         """Raises ValueError if an angle, the overlap or the coverage is out of its range."""
-        require_angle("the beam's radius", self.beam_radius_rad)
-        require_overlap(self.overlap)
-        require_positive("the standard deviation of the pointing error", self.sigma_rad, "rad")
-        require_inside("the coverage probability", self.coverage)
-        require_angle("the radius that covers the pointing error", self.radius_rad)
+        Bounded.__post_init__(self)
+        Share("rad", below=math.pi / 2).check("the radius that covers the pointing error", self.radius_rad)
 
     @property
     def radius_rad(self) -> float:
@@ -54,19 +52,14 @@ class Search:
 
 
 @dataclass(frozen=True, slots=True)
-class Detector:
+class Detector(Bounded):
     """The partner's detector: one look needs the beam for `detection_time_s` and detects with `probability`.
 
     A crossing that lasts n whole detection times is n looks, each independent: 1 - (1 - p)^n. A shorter one is none.
     """
 
-    detection_time_s: float
-    probability: float = 1.0
-
-    def __post_init__(self) -> None:
-        """Raises ValueError if the time is not above 0 or the probability not in (0, 1]."""
-        require_positive("the detection time", self.detection_time_s, "s")
-        require_probability("the probability of detection in one look", self.probability)
+    detection_time_s: Duration
+    probability: Probability = 1.0
 
     def looks(self, duration_s: Floats) -> Floats:
         """Whole looks in a crossing of each duration."""
@@ -78,16 +71,17 @@ class Detector:
 
 
 @dataclass(frozen=True, slots=True)
-class Spiral:
+class Spiral(Bounded):
     """Archimedean spiral from the middle outward at constant tangential speed: r = sqrt(pitch speed t / pi)."""
 
     search: Search
     detector: Detector
-    speed_rad_s: float
+    speed_rad_s: Speed
 
     def __post_init__(self) -> None:
         """Raises ValueError if the beam leaves the target before it is detected."""
-        _require_speed(self.search, self.detector, self.speed_rad_s)
+        Bounded.__post_init__(self)
+        _check_speed(self.search, self.detector, self.speed_rad_s)
 
     @property
     def duration_s(self) -> float:
@@ -139,7 +133,7 @@ class Spiral:
 
 
 @dataclass(frozen=True, slots=True)
-class Raster:
+class Raster(Bounded):
     """Rows of length 2R a pitch apart, to and fro, over the square around the disc.
 
     Between two rows passes `turn_around_s`, in which nothing is detected.
@@ -147,13 +141,13 @@ class Raster:
 
     search: Search
     detector: Detector
-    speed_rad_s: float
-    turn_around_s: float = 0.0
+    speed_rad_s: Speed
+    turn_around_s: DurationOrZero = 0.0
 
     def __post_init__(self) -> None:
         """Raises ValueError if a time is negative, or the beam leaves the target before it is detected."""
-        require_not_negative("the turn-around time", self.turn_around_s, "s")
-        _require_speed(self.search, self.detector, self.speed_rad_s)
+        Bounded.__post_init__(self)
+        _check_speed(self.search, self.detector, self.speed_rad_s)
 
     @property
     def rows(self) -> int:
@@ -207,7 +201,7 @@ class Raster:
 
 
 @dataclass(frozen=True, slots=True)
-class StepStare:
+class StepStare(Bounded):
     """Dwells on a hexagonal grid over the disc, ring after ring outward, each with `dwell_s`, `settle_s` between them.
 
     Neighbours are one pitch apart. The grid leaves no gap when the overlap is at least 1 - sqrt(3)/2 = 0.134.
@@ -215,13 +209,12 @@ class StepStare:
 
     search: Search
     detector: Detector
-    dwell_s: float
-    settle_s: float = 0.0
+    dwell_s: Duration
+    settle_s: DurationOrZero = 0.0
 
     def __post_init__(self) -> None:
         """Raises ValueError if a time is negative or the dwell shorter than the detection time."""
-        require_not_negative("the settling time", self.settle_s, "s")
-        require_positive("the dwell time", self.dwell_s, "s")
+        Bounded.__post_init__(self)
         if self.dwell_s < self.detector.detection_time_s * (1.0 - 1e-9):
             raise ValueError(
                 f"the dwell of {format_quantity(self.dwell_s, 's')} is shorter than the detection time of"
@@ -307,13 +300,12 @@ def highest_speed(search: Search, detection_time_s: float) -> float:
     Raises:
         ValueError: If the time is not finite and above zero.
     """
-    require_positive("the detection time", detection_time_s, "s")
+    Quantity("s", above=0.0).check("the detection time", detection_time_s)
     chord = 2.0 * search.beam_radius_rad * math.sqrt(1.0 - (1.0 - search.overlap) ** 2)
     return chord / detection_time_s
 
 
-def _require_speed(search: Search, detector: Detector, speed_rad_s: float) -> None:
-    require_positive("the speed of the scan", speed_rad_s, "rad/s")
+def _check_speed(search: Search, detector: Detector, speed_rad_s: float) -> None:
     most = 2.0 * search.beam_radius_rad / detector.detection_time_s
     if speed_rad_s > most * (1.0 + 1e-9):
         raise ValueError(

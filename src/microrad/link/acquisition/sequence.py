@@ -1,20 +1,22 @@
 """Acquisition as a chain of timed stages with retries: probability and time until both terminals lock."""
 
 import math
-from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from microrad.core.arrays import Floats
 from microrad.core.units import SPEED_OF_LIGHT_M_S, format_quantity
-from microrad.link.acquisition.checks import require_count, require_not_negative, require_positive, require_probability
+from microrad.link.acquisition.scan import Duration, DurationOrZero, Probability
 from microrad.link.acquisition.times import TimeDistribution, fixed_time, joined
+from microrad.mission.fields import Bounded, Quantity, Whole
 
 LOCKED = "locked"
 LOST = "lost"
+_CHANCE, _TIME, _COUNT = Quantity("", above=0.0, most=1.0), Quantity("s", least=0.0), Whole("", least=1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,9 +35,9 @@ class Stage:
 
     def __post_init__(self) -> None:
         """Raises ValueError if the probability is not in (0, 1], a time negative, or the time-out too short."""
-        require_probability(f'the probability of success of the stage "{self.name}"', self.success_probability)
-        require_not_negative(f'the duration of the stage "{self.name}"', self.longest_s, "s")
-        require_not_negative(f'the time-out of the stage "{self.name}"', self.failure_s, "s")
+        _CHANCE.check(f'the probability of success of the stage "{self.name}"', self.success_probability)
+        _TIME.check(f'the duration of the stage "{self.name}"', self.longest_s)
+        _TIME.check(f'the time-out of the stage "{self.name}"', self.failure_s)
         if self.failure_s < self.longest_s:
             raise ValueError(
                 f'the stage "{self.name}" lasts {format_quantity(self.longest_s, "s")} and its time-out is'
@@ -81,7 +83,7 @@ class Outcome:
 
 
 @dataclass(frozen=True, slots=True)
-class Timing:
+class Timing(Bounded):
     """Times of the paper's sequence; the range gives the light time.
 
     GEO looks for the beacon in `frames` frames of `frame_time_s`. `geo_response_s` is the time GEO needs to turn and
@@ -89,24 +91,16 @@ class Timing:
     `own_name` and `partner_name` are what the stages call LEO and GEO.
     """
 
-    range_m: float
-    body_settling_s: float
-    frame_time_s: float
-    frames: int
-    geo_response_s: float
-    leo_detection_s: float
-    mirror_settling_s: float
-    lock_time_s: float
+    range_m: Annotated[float, Quantity("m", above=0.0)]
+    body_settling_s: DurationOrZero
+    frame_time_s: Duration
+    frames: Annotated[int, _COUNT]
+    geo_response_s: DurationOrZero
+    leo_detection_s: DurationOrZero
+    mirror_settling_s: DurationOrZero
+    lock_time_s: DurationOrZero
     own_name: str = "LEO"
     partner_name: str = "GEO"
-
-    def __post_init__(self) -> None:
-        """Raises ValueError if a time is negative, the range not above 0, or there is less than one frame."""
-        require_positive("the range", self.range_m, "m")
-        require_positive("the time of a frame", self.frame_time_s, "s")
-        require_count("the number of frames", self.frames)
-        for name in ("body_settling_s", "geo_response_s", "leo_detection_s", "mirror_settling_s", "lock_time_s"):
-            require_not_negative(name, getattr(self, name), "s")
 
     @property
     def light_time_s(self) -> float:
@@ -115,7 +109,7 @@ class Timing:
 
 
 @dataclass(frozen=True, slots=True)
-class Chances:
+class Chances(Bounded):
     """Probabilities of the paper's sequence, each in (0, 1].
 
     Coverage is the probability that a beam lands: `beacon_coverage` that of LEO's body pointing within the beacon,
@@ -124,17 +118,12 @@ class Chances:
     `answer_detection` that of LEO's sensor, `lock` that of each terminal on a beam that lands.
     """
 
-    beacon_coverage: float
-    frame_detection: float
-    answer_coverage: float
-    answer_detection: float
-    return_coverage: float
-    lock: float = 1.0
-
-    def __post_init__(self) -> None:
-        """Raises ValueError if a probability is not in (0, 1]."""
-        for name in self.__slots__:
-            require_probability(name, getattr(self, name))
+    beacon_coverage: Probability
+    frame_detection: Probability
+    answer_coverage: Probability
+    answer_detection: Probability
+    return_coverage: Probability
+    lock: Probability = 1.0
 
 
 def frame_detection_probability(signal_to_noise: float, threshold_to_noise: float) -> float:
@@ -149,7 +138,7 @@ def frame_detection_probability(signal_to_noise: float, threshold_to_noise: floa
     Raises:
         ValueError: If the signal is negative, or either is not finite.
     """
-    require_not_negative("the signal-to-noise ratio", signal_to_noise, "")
+    Quantity("", least=0.0).check("the signal-to-noise ratio", signal_to_noise)
     if not math.isfinite(threshold_to_noise):
         raise ValueError(f"the threshold is {threshold_to_noise:g} times the noise: it must be finite")
     return 0.5 * math.erfc((threshold_to_noise - signal_to_noise) / math.sqrt(2.0))
@@ -165,8 +154,8 @@ def frames_detection_probability(frame_probability: float, frames: int) -> float
     Raises:
         ValueError: If either is outside its limits.
     """
-    require_probability("the probability of detection in a frame", frame_probability)
-    require_count("the number of frames", frames)
+    _CHANCE.check("the probability of detection in a frame", frame_probability)
+    _COUNT.check("the number of frames", frames)
     return 1.0 - (1.0 - frame_probability) ** frames
 
 
@@ -293,7 +282,7 @@ def check_sequence(stages: Sequence[Stage], attempts: int) -> tuple[int, ...]:
     Raises:
         ValueError: For no stage, two of one name, a stage that goes back to a later or unknown one, and no attempt.
     """
-    require_count("the number of attempts", attempts)
+    _COUNT.check("the number of attempts", attempts)
     names = [stage.name for stage in stages]
     if not names:
         raise ValueError("the sequence has no stage: give at least one")
@@ -339,12 +328,11 @@ def simulate(stages: Sequence[Stage], attempts: int, runs: int, seed: int) -> Se
     Raises:
         ValueError: As `solve_sequence`, and for no run.
     """
-    require_count("the number of runs", runs)
+    _COUNT.check("the number of runs", runs)
     back = check_sequence(stages, attempts)
     draw = np.random.Generator(np.random.Philox(key=seed))
-    ends = [_moments(stage) for stage in stages]
-    found = [_run(stages, back, attempts, draw, ends) for _ in range(runs)]
-    return SequenceRuns(np.array([locked for locked, _ in found]), np.array([time_s for _, time_s in found]))
+    logs = [_run(stages, back, attempts, draw) for _ in range(runs)]
+    return SequenceRuns(np.array([log[-1].to == LOCKED for log in logs]), np.array([log[-1].time_s for log in logs]))
 
 
 def simulate_log(stages: Sequence[Stage], attempts: int, seed: int) -> tuple[Transition, ...]:
@@ -359,46 +347,33 @@ def simulate_log(stages: Sequence[Stage], attempts: int, seed: int) -> tuple[Tra
         ValueError: As `solve_sequence`.
     """
     back = check_sequence(stages, attempts)
-    log: list[Transition] = []
-    draw = np.random.Generator(np.random.Philox(key=seed))
-    _run(stages, back, attempts, draw, [_moments(stage) for stage in stages], log)
-    return tuple(log)
+    return tuple(_run(stages, back, attempts, np.random.Generator(np.random.Philox(key=seed))))
 
 
 _DONE = "done"
 
-_Moments = tuple[list[float], list[float]]
 
-
-def _moments(stage: Stage) -> _Moments:
-    """Weights up to each moment at which a stage may end, and the moments in s; no weight where there is one alone."""
-    if not isinstance(stage.duration_s, TimeDistribution):
-        return [], [stage.duration_s]
-    return np.cumsum(stage.duration_s.weight).tolist(), stage.duration_s.time_s.tolist()
-
-
-def _run(
-    stages: Sequence[Stage],
-    back: Sequence[int],
-    attempts: int,
-    draw: np.random.Generator,
-    moments: Sequence[_Moments],
-    log: list[Transition] | None = None,
-) -> tuple[bool, float]:
-    """Whether one run locks, and when it does or is given up, in s; its transitions are added to the log."""
+def _run(stages: Sequence[Stage], back: Sequence[int], attempts: int, draw: np.random.Generator) -> list[Transition]:
     time_s, index, failures = 0.0, 0, 0
+    log: list[Transition] = []
     while index < len(stages) and failures < attempts:
         stage = stages[index]
         if draw.random() < stage.success_probability:
-            up_to, ends = moments[index]
-            time_s += ends[min(bisect_right(up_to, draw.random() * up_to[-1]), len(ends) - 1)] if up_to else ends[0]
+            time_s += _duration(stage, draw)
             following, cause = index + 1, _DONE
         else:
             time_s += stage.failure_s
             failures += 1
             following, cause = back[index], f"time-out, failure {failures} of {attempts}"
-        if log is not None:
-            name = stages[following].name if following < len(stages) else LOCKED
-            log.append(Transition(time_s, stage.name, LOST if failures == attempts else name, cause))
+        name = stages[following].name if following < len(stages) else LOCKED
+        log.append(Transition(time_s, stage.name, LOST if failures == attempts else name, cause))
         index = following
-    return failures < attempts, time_s
+    return log
+
+
+def _duration(stage: Stage, draw: np.random.Generator) -> float:
+    if not isinstance(stage.duration_s, TimeDistribution):
+        return stage.duration_s
+    cumulative = np.cumsum(stage.duration_s.weight)
+    index = int(np.searchsorted(cumulative, draw.random() * cumulative[-1], side="right"))
+    return float(stage.duration_s.time_s[min(index, cumulative.size - 1)])

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad.core.units import format_quantity
+from microrad.mission.fields import Quantity
 
 _MOST = 4096  # times kept; more are merged into equal bins, each at its mean
 _FEW = 1024  # each of two distributions when they are convolved
@@ -93,8 +93,7 @@ def fixed_time(time_s: float, probability: float = 1.0) -> TimeDistribution:
     Raises:
         ValueError: If the time is negative or not finite.
     """
-    if not (math.isfinite(time_s) and time_s >= 0.0):
-        raise ValueError(f"a time is {format_quantity(time_s, 's')}: it must be 0 s or more and finite")
+    Quantity("s", least=0.0).check("a time", time_s)
     return TimeDistribution(np.array([time_s]), np.array([probability]))
 
 

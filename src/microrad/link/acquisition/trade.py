@@ -2,38 +2,43 @@
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from microrad.core.arrays import Floats
-from microrad.link.acquisition.checks import require_angle, require_not_negative, require_overlap, require_positive
 from microrad.link.acquisition.detection import detection_times
-from microrad.link.acquisition.scan import Detector, Search, Spiral, highest_speed
+from microrad.link.acquisition.scan import (
+    Detector,
+    Duration,
+    DurationOrZero,
+    OffAxis,
+    Overlap,
+    Search,
+    Spiral,
+    highest_speed,
+)
+from microrad.mission.fields import Bounded, Quantity
+
+Power = Annotated[float, Quantity("W", above=0.0)]
 
 _WIDE_PER_RADIUS = math.sqrt(2.0)
 """Half angle at 1/e2 of the beam with the most irradiance at a radius that it has to cover, over that radius."""
 
 
 @dataclass(frozen=True, slots=True)
-class Receiver:
+class Receiver(Bounded):
     """The partner's acquisition receiver: it detects `power_w` behind its aperture within `time_s`.
 
     Its noise is white and does not depend on the light: the time falls with the square of the power. A one-sided
     noise-equivalent power N in W/sqrt(Hz) and a needed ratio r of signal to rms noise are r N / sqrt(2) in 1 s.
     """
 
-    aperture_area_m2: float
-    power_w: float
-    time_s: float
-    shortest_s: float = 0.0
-
-    def __post_init__(self) -> None:
-        """Raises ValueError if a value is not above 0, or the shortest time below 0."""
-        require_positive("the receiver's aperture area", self.aperture_area_m2, "m^2")
-        require_positive("the power that the receiver needs", self.power_w, "W")
-        require_positive("the time in which it does", self.time_s, "s")
-        require_not_negative("the shortest detection time", self.shortest_s, "s")
+    aperture_area_m2: Annotated[float, Quantity("m^2", above=0.0)]
+    power_w: Power
+    time_s: Duration
+    shortest_s: DurationOrZero = 0.0
 
     def detection_time_s(self, power_w: ArrayLike) -> Floats:
         """Time to detection at each received power, at least `shortest_s`."""
@@ -42,7 +47,7 @@ class Receiver:
 
 
 @dataclass(frozen=True, slots=True)
-class Beams:
+class Beams(Bounded):
     """The transmitter and its two beams at one range.
 
     `power_w` is the power that leaves the terminal, losses taken off. The narrow beam has the half angle
@@ -50,19 +55,11 @@ class Beams:
     of its diameter.
     """
 
-    power_w: float
-    range_m: float
-    narrow_half_angle_rad: float
-    beam_radius_rad: float
-    overlap: float
-
-    def __post_init__(self) -> None:
-        """Raises ValueError if a value is not above 0, or the overlap not from 0 to below 1."""
-        require_positive("the transmitted power", self.power_w, "W")
-        require_positive("the range", self.range_m, "m")
-        require_angle("the narrow beam's half angle", self.narrow_half_angle_rad)
-        require_angle("the beam's radius", self.beam_radius_rad)
-        require_overlap(self.overlap)
+    power_w: Power
+    range_m: Annotated[float, Quantity("m", above=0.0)]
+    narrow_half_angle_rad: OffAxis
+    beam_radius_rad: OffAxis
+    overlap: Overlap
 
     @property
     def edge_irradiance_w_m2(self) -> float:

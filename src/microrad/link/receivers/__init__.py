@@ -1,11 +1,12 @@
 """Receivers of a laser link, each one modulation with one detector."""
 
-from microrad.link.receivers.background import (
+from microrad.link.receivers.base import (
+    RateError,
+    Receiver,
     apd_excess_noise_factor,
     background_photons_per_mode,
     background_power_w,
 )
-from microrad.link.receivers.base import RateError, Receiver
 from microrad.link.receivers.coherent import BpskHomodyne, DpskPreamplified
 from microrad.link.receivers.counting import OokCounting, PpmCounting
 from microrad.link.receivers.photocurrent import OokApd, OokPin, OokPreamplified

@@ -1,5 +1,7 @@
 """What every receiver of a laser link has: bit error ratio from optical power, and the power that a data rate needs.
 
+Light beside the signal, which a filter and a field of view let through of a sky, stands here, too.
+
 Powers are averages over marks and spaces (or slots) at the detector; rates are information bits per second.
 """
 
@@ -7,18 +9,37 @@ import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from statistics import NormalDist
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from microrad.core import capacity
 from microrad.core.arrays import Floats
 from microrad.core.budget import Line
-from microrad.core.units import format_quantity
+from microrad.core.units import PLANCK_J_S, SPEED_OF_LIGHT_M_S, format_quantity
 from microrad.link.gains import photon_energy_j
+from microrad.mission.fields import Bounded, Quantity, Share
 
 SOURCE = "receiver and power as given"
 LEAST_RATIO = 1e-18  # sums over Poisson counts are cut at about 1e-22
 LEAST_COUNT = 1e-30  # stands for none, so that logarithms exist
+
+
+Efficiency = Annotated[float, Quantity("", above=0.0, most=1.0), "one count or electron for each photon at the most"]
+Power = Annotated[float, Quantity("W", least=0.0)]
+PerMode = Annotated[float, Quantity("photon", least=0.0)]
+Extinction = Annotated[float, Quantity("", above=1.0), "the power of a mark over that of a space (inf: dark spaces)"]
+NoiseFigure = Annotated[
+    float,
+    Quantity("dB", least=3.0),
+    "3 dB is the quantum limit of an amplifier of both quadratures at high gain",
+]
+_GAIN, _RATIO = Quantity("", least=1.0), Quantity("", least=0.0, most=1.0)
+_INVERSE = "take the inverse when the other carrier starts the avalanche"
+AvalancheGain = Annotated[float, _GAIN]
+IonisationRatio = Annotated[float, _RATIO, _INVERSE]
+_RADIANCE = Quantity("W/(m^2 sr m)", least=0.0)
 
 
 def normal_deviate(ratio: float) -> float:
@@ -41,90 +62,69 @@ def checked_powers(power_w: ArrayLike) -> Floats:
     """The powers as an array; raises ValueError if one is negative or not finite."""
     powers = np.asarray(power_w, dtype=np.float64)
     for power in powers[~((powers >= 0.0) & (powers < math.inf))].flat[:1]:
-        require_zero_or_more("the received power", float(power), "W")
+        Quantity("W", least=0.0).check("the received power", float(power))
     return powers
 
 
-def shown(value: float, unit: str) -> str:
-    """A value with its unit for a message.
+def background_power_w(
+    spectral_radiance_w_m2_sr_m: float, aperture_area_m2: float, field_of_view_rad: float, filter_bandwidth_m: float
+) -> float:
+    """Power in W that a uniform sky sends through aperture, field stop and filter, both polarisations, before any loss.
+
+    It is L A pi sin^2(field/2) d. 1 W/(m^2 sr um) is 1e6 W/(m^2 sr m).
 
     Args:
-        value: The value, in `unit`.
-        unit: Its SI unit, empty for a plain number.
-    """
-    return format_quantity(value, unit).rstrip()
-
-
-def require(holds: bool, what: str, value: float, unit: str, limit: str) -> None:
-    """Check a condition on a value; the message names the value and its limit.
-
-    Args:
-        holds: Whether the condition holds.
-        what: What the value is, in the words of the message.
-        value: The value, in `unit`.
-        unit: Its SI unit, empty for a plain number.
-        limit: The condition in words.
+        spectral_radiance_w_m2_sr_m: Radiance L of the sky per metre of wavelength, in W/(m^2 sr m).
+        aperture_area_m2: Area A of the aperture, in m^2.
+        field_of_view_rad: Full angle of the round field of view, in rad, filled by the sky.
+        filter_bandwidth_m: Full width d of the filter in wavelength, in m.
 
     Raises:
-        ValueError: Unless the condition holds.
+        ValueError: For a negative value and a field of more than pi rad.
     """
-    if not holds:
-        raise ValueError(f"{what} is {shown(value, unit)}: {limit}")
+    _RADIANCE.check("the spectral radiance", spectral_radiance_w_m2_sr_m)
+    Quantity("m^2", least=0.0).check("the aperture's area", aperture_area_m2)
+    Quantity("m", least=0.0).check("the filter's bandwidth", filter_bandwidth_m)
+    full = Quantity("rad", least=0.0, most=math.pi)
+    full.check("the field of view", field_of_view_rad, "it is the full angle, up to pi rad (a half space)")
+    projected_solid_angle_sr = math.pi * math.sin(field_of_view_rad / 2.0) ** 2
+    return spectral_radiance_w_m2_sr_m * aperture_area_m2 * projected_solid_angle_sr * filter_bandwidth_m
 
 
-def require_zero_or_more(what: str, value: float, unit: str, advice: str = "") -> None:
-    """Check that a value is finite and zero or more.
+def background_photons_per_mode(spectral_radiance_w_m2_sr_m: float, wavelength_m: float) -> float:
+    """Mean photons in one spatial mode and one polarisation, L lambda^5 / (2 h c^2), of an unpolarised sky.
+
+    What a single-mode receiver takes from a source that fills its mode, before any loss: about 1e-6 from a bright sky
+    at 1.55 um, 0.25 from the sun.
 
     Args:
-        what: What the value is, in the words of the message.
-        value: The value, in `unit`.
-        unit: Its SI unit, empty for a plain number.
-        advice: Words put behind the limit in the message.
+        spectral_radiance_w_m2_sr_m: Radiance L of the sky per metre of wavelength, in W/(m^2 sr m).
+        wavelength_m: Wavelength lambda, in m.
 
     Raises:
-        ValueError: If the value is below zero or not finite.
+        ValueError: For a negative radiance or a wavelength not above 0 m.
     """
-    zero = f"0 {unit}".rstrip()
-    require(0.0 <= value < math.inf, what, value, unit, f"it must be finite and not below {zero}{advice}")
+    _RADIANCE.check("the spectral radiance", spectral_radiance_w_m2_sr_m)
+    Quantity("m", above=0.0).check("the wavelength", wavelength_m)
+    return spectral_radiance_w_m2_sr_m * wavelength_m**5 / (2.0 * PLANCK_J_S * SPEED_OF_LIGHT_M_S**2)
 
 
-def require_above_zero(what: str, value: float, unit: str) -> None:
-    """Check that a value is finite and above zero.
+def apd_excess_noise_factor(gain: float, ionisation_ratio: float) -> float:
+    """Excess noise factor k M + (1 - k) (2 - 1/M) of an avalanche photodiode (McIntyre 1966, IEEE T-ED 13, 164).
+
+    It holds for thick multiplication layers; thin ones have less noise.
 
     Args:
-        what: What the value is, in the words of the message.
-        value: The value, in `unit`.
-        unit: Its SI unit, empty for a plain number.
+        gain: Mean gain M, at least 1.
+        ionisation_ratio: Ratio k of holes to electrons where electrons start the avalanche (its inverse where holes
+            do), from 0 to 1.
 
     Raises:
-        ValueError: If the value is not above zero, or not finite.
+        ValueError: For a gain below 1, and a ratio outside 0 to 1.
     """
-    require(0.0 < value < math.inf, what, value, unit, f"it must be finite and above 0 {unit}")
-
-
-def require_efficiency(what: str, value: float) -> None:
-    """Check that an efficiency is above 0 and at most 1.
-
-    Args:
-        what: What the efficiency is, in the words of the message.
-        value: The efficiency, in counts or electrons per photon.
-
-    Raises:
-        ValueError: If the efficiency is not above 0 and at most 1.
-    """
-    require(0.0 < value <= 1.0, what, value, "", "it must lie above 0, up to 1 (one count or electron for each photon)")
-
-
-def require_extinction(ratio: float) -> None:
-    """Check that a mark is brighter than a space; raises ValueError."""
-    limit = "it is the power of a mark over that of a space, as a ratio and above 1 (inf: dark spaces)"
-    require(ratio > 1.0, "the extinction ratio", ratio, "", limit)
-
-
-def require_noise_figure(noise_figure_db: float) -> None:
-    """Check that a noise figure is not below the quantum limit; raises ValueError."""
-    limit = "it must be at least 3 dB, the quantum limit of an amplifier of both quadratures at high gain"
-    require(3.0 <= noise_figure_db < math.inf, "the noise figure", noise_figure_db, "dB", limit)
+    _GAIN.check("the gain of the avalanche photodiode", gain)
+    _RATIO.check("the ionisation ratio", ionisation_ratio, _INVERSE)
+    return capacity.excess_noise_factor(gain, ionisation_ratio)
 
 
 class RateError(ValueError):
@@ -132,7 +132,7 @@ class RateError(ValueError):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Receiver(ABC):
+class Receiver(Bounded, ABC):
     """What every receiver has.
 
     `bit_error_ratio` is the target, at the decoder's output if there is a code. `bandwidth_hz` is the highest rate of
@@ -147,27 +147,11 @@ class Receiver(ABC):
     Raises ValueError for a value without meaning.
     """
 
-    wavelength_m: float
-    bit_error_ratio: float
-    bandwidth_hz: float
-    code_gain_db: float = 0.0
-    code_rate: float = 1.0
-
-    def __post_init__(self) -> None:
-        """Raises ValueError if a value is outside the limits that the class names."""
-        require_above_zero("the wavelength", self.wavelength_m, "m")
-        require(
-            LEAST_RATIO <= self.bit_error_ratio < 0.5,
-            "the target bit error ratio",
-            self.bit_error_ratio,
-            "",
-            f"it must be at least {LEAST_RATIO:g} and below 0.5, which is a guess",
-        )
-        require_above_zero("the receiver's bandwidth", self.bandwidth_hz, "Hz")
-        require_zero_or_more(
-            "the net code gain", self.code_gain_db, "dB", "; a code that costs power is better left out"
-        )
-        require(0.0 < self.code_rate <= 1.0, "the code rate", self.code_rate, "", "it must lie above 0, up to 1")
+    wavelength_m: Annotated[float, Quantity("m", above=0.0)]
+    bit_error_ratio: Annotated[float, Share("", least=LEAST_RATIO, below=0.5), "0.5 is a guess"]
+    bandwidth_hz: Annotated[float, Quantity("Hz", above=0.0)]
+    code_gain_db: Annotated[float, Quantity("dB", least=0.0), "a code that costs power is better left out"] = 0.0
+    code_rate: Annotated[float, Quantity("", above=0.0, most=1.0)] = 1.0
 
     def bit_error_ratio_at(self, power_w: ArrayLike, data_rate_bit_s: ArrayLike) -> Floats:
         """Bit error ratio, after the decoder, at a received power and a data rate.
@@ -242,14 +226,15 @@ class Receiver(ABC):
     def _rates(self, data_rate_bit_s: ArrayLike) -> Floats:
         rates = np.asarray(data_rate_bit_s, dtype=np.float64)
         for rate in rates[~((rates > 0.0) & (rates < math.inf))].flat[:1]:
-            require_above_zero("the data rate", rate, "bit/s")
+            Quantity("bit/s", above=0.0).check("the data rate", float(rate))
         symbols, limit = self.symbol_rate_hz(rates), self._symbol_rate_limit_hz
         if np.any(symbols > limit * (1.0 + 1e-12)):
             highest = float(rates.max())
             raise RateError(
-                f"the data rate is {shown(highest, 'bit/s')}, which is {shown(float(symbols.max()), 'Hz')} of "
-                f"symbols or slots on the line: the receiver takes {shown(limit, 'Hz')}, "
-                f"so at most {shown(highest * limit / float(symbols.max()), 'bit/s')} of data"
+                f"the data rate is {format_quantity(highest, 'bit/s')}, which is "
+                f"{format_quantity(float(symbols.max()), 'Hz')} of symbols or slots on the line: the receiver takes "
+                f"{format_quantity(limit, 'Hz')}, so at most "
+                f"{format_quantity(highest * limit / float(symbols.max()), 'bit/s')} of data"
             )
         return rates
 

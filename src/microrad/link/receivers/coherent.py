@@ -9,11 +9,11 @@ from microrad.core.arrays import Floats
 from microrad.core.budget import Line
 from microrad.link.receivers.base import (
     SOURCE,
+    Efficiency,
+    NoiseFigure,
+    PerMode,
     Receiver,
     normal_deviate,
-    require_efficiency,
-    require_noise_figure,
-    require_zero_or_more,
     spontaneous_photons,
 )
 
@@ -28,14 +28,8 @@ class DpskPreamplified(Receiver):
     (a polariser), no shot or thermal noise behind the amplifier, no phase error in laser or interferometer.
     """
 
-    noise_figure_db: float
-    background_photons_per_mode: float = 0.0
-
-    def __post_init__(self) -> None:
-        """Raises ValueError if the noise figure is below 3 dB or the background negative."""
-        Receiver.__post_init__(self)
-        require_noise_figure(self.noise_figure_db)
-        require_zero_or_more("the background in one mode", self.background_photons_per_mode, "photon")
+    noise_figure_db: NoiseFigure
+    background_photons_per_mode: PerMode = 0.0
 
     @property
     def _noise_photons(self) -> float:
@@ -66,14 +60,8 @@ class BpskHomodyne(Receiver):
     a matched filter, shot noise of the oscillator far above thermal noise, no phase error.
     """
 
-    quantum_efficiency: float
-    background_photons_per_mode: float = 0.0
-
-    def __post_init__(self) -> None:
-        """Raises ValueError if the efficiency is not in (0, 1] or the background negative."""
-        Receiver.__post_init__(self)
-        require_efficiency("the quantum efficiency", self.quantum_efficiency)
-        require_zero_or_more("the background in one mode", self.background_photons_per_mode, "photon")
+    quantum_efficiency: Efficiency
+    background_photons_per_mode: PerMode = 0.0
 
     @property
     def _signal_per_photon(self) -> float:

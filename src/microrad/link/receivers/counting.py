@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,13 +14,13 @@ from microrad.core.roots import root
 from microrad.link.receivers.base import (
     LEAST_COUNT,
     SOURCE,
+    Efficiency,
+    Extinction,
+    Power,
     Receiver,
     mark_and_space,
-    require,
-    require_efficiency,
-    require_extinction,
-    require_zero_or_more,
 )
+from microrad.mission.fields import Quantity
 
 _MANY = 1e5  # counts from which asymptotic series are exact to 1e-11
 _ROUNDING = 4.0 * float(np.finfo(np.float64).eps)
@@ -30,15 +30,9 @@ _CHUNK = 4096  # rows of a table of counts held at once
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Counter(Receiver):
-    detection_efficiency: float
-    dark_count_rate_hz: float = 0.0
-    background_power_w: float = 0.0
-
-    def __post_init__(self) -> None:
-        Receiver.__post_init__(self)
-        require_efficiency("the detection efficiency", self.detection_efficiency)
-        require_zero_or_more("the dark count rate", self.dark_count_rate_hz, "Hz")
-        require_zero_or_more("the background power", self.background_power_w, "W")
+    detection_efficiency: Efficiency
+    dark_count_rate_hz: Annotated[float, Quantity("Hz", least=0.0)] = 0.0
+    background_power_w: Power = 0.0
 
     @property
     def _counts_per_joule(self) -> float:
@@ -68,12 +62,7 @@ class OokCounting(_Counter):
     and spaces. No dead time, afterpulsing or saturation: valid up to count rates far below the detector's own limit.
     """
 
-    extinction_ratio: float = math.inf
-
-    def __post_init__(self) -> None:
-        """Raises ValueError if a mark is no brighter than a space."""
-        _Counter.__post_init__(self)
-        require_extinction(self.extinction_ratio)
+    extinction_ratio: Extinction = math.inf
 
     def _ratio(self, power: Floats, rate: Floats) -> Floats:
         return self._ratio_of_counts(power * self._counts_per_joule / rate, self._floor(rate))
@@ -123,8 +112,10 @@ class PpmCounting(_Counter):
     def __post_init__(self) -> None:
         """Raises ValueError if the order is no power of two."""
         _Counter.__post_init__(self)
-        whole = self.order >= 2 and math.log2(self.order).is_integer()
-        require(whole, "the order of the pulse-position modulation", self.order, "", "it is a power of two, at least 2")
+        if self.order < 2 or not math.log2(self.order).is_integer():
+            raise ValueError(
+                f"the order of the pulse-position modulation is {self.order:g}: it is a power of two above 1"
+            )
 
     @property
     def _symbols_per_bit(self) -> float:

@@ -3,27 +3,29 @@
 import math
 from abc import abstractmethod
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from microrad.core.arrays import Floats
 from microrad.core.budget import Line
 from microrad.core.units import ELEMENTARY_CHARGE_C
-from microrad.link.receivers.background import apd_excess_noise_factor
 from microrad.link.receivers.base import (
     SOURCE,
+    AvalancheGain,
+    Efficiency,
+    Extinction,
+    IonisationRatio,
+    NoiseFigure,
+    PerMode,
+    Power,
     Receiver,
+    apd_excess_noise_factor,
     mark_and_space,
     normal_deviate,
-    require,
-    require_above_zero,
-    require_efficiency,
-    require_extinction,
-    require_noise_figure,
-    require_zero_or_more,
     spontaneous_photons,
 )
+from microrad.mission.fields import Quantity, Whole
 
 _BANDWIDTH_PER_SYMBOL = 0.5  # one-sided noise bandwidth over the symbol rate of a filter matched to rectangular symbols
 
@@ -39,11 +41,7 @@ class _Term(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _OnOffCurrent(Receiver):
-    extinction_ratio: float = math.inf
-
-    def __post_init__(self) -> None:
-        Receiver.__post_init__(self)
-        require_extinction(self.extinction_ratio)
+    extinction_ratio: Extinction = math.inf
 
     @abstractmethod
     def _signal_a_w(self) -> float:
@@ -104,18 +102,10 @@ class OokPin(_OnOffCurrent):
     the best one, and it follows the power.
     """
 
-    quantum_efficiency: float
-    thermal_noise_a_sqrt_hz: float
-    dark_current_a: float = 0.0
-    background_power_w: float = 0.0
-
-    def __post_init__(self) -> None:
-        """Raises ValueError if the efficiency is not in (0, 1], or noise, dark current or background are negative."""
-        _OnOffCurrent.__post_init__(self)
-        require_efficiency("the quantum efficiency", self.quantum_efficiency)
-        require_zero_or_more("the thermal noise", self.thermal_noise_a_sqrt_hz, "A/sqrt(Hz)")
-        require_zero_or_more("the dark current", self.dark_current_a, "A")
-        require_zero_or_more("the background power", self.background_power_w, "W")
+    quantum_efficiency: Efficiency
+    thermal_noise_a_sqrt_hz: Annotated[float, Quantity("A/sqrt(Hz)", least=0.0)]
+    dark_current_a: Annotated[float, Quantity("A", least=0.0)] = 0.0
+    background_power_w: Power = 0.0
 
     def _responsivity_a_w(self) -> float:
         return self.quantum_efficiency * ELEMENTARY_CHARGE_C / self._photon_j
@@ -149,13 +139,8 @@ class OokApd(OokPin):
     avalanche's gain (McIntyre 1972, IEEE T-ED 19, 703): the fewer electrons start it in a symbol, the less it holds.
     """
 
-    gain: float
-    ionisation_ratio: float
-
-    def __post_init__(self) -> None:
-        """Raises ValueError if the gain is below 1 or the ionisation ratio not from 0 to 1."""
-        OokPin.__post_init__(self)
-        apd_excess_noise_factor(self.gain, self.ionisation_ratio)
+    gain: AvalancheGain
+    ionisation_ratio: IonisationRatio
 
     def _gain_and_excess(self) -> tuple[float, float]:
         return self.gain, apd_excess_noise_factor(self.gain, self.ionisation_ratio)
@@ -177,20 +162,11 @@ class OokPreamplified(_OnOffCurrent):
     the chi-square laws give 38.3. With a filter of 1 to 20 symbol rates it needs 0.18 to 0.33 dB too much.
     """
 
-    noise_figure_db: float
-    gain_db: float
-    optical_bandwidth_hz: float
-    background_photons_per_mode: float = 0.0
-    polarisations: int = 2
-
-    def __post_init__(self) -> None:
-        """Raises ValueError if noise figure, gain, bandwidth, background or polarisations are out of range."""
-        _OnOffCurrent.__post_init__(self)
-        require_noise_figure(self.noise_figure_db)
-        require(10.0 <= self.gain_db < math.inf, "the gain", self.gain_db, "dB", "high gain is meant, at least 10 dB")
-        require_above_zero("the optical bandwidth", self.optical_bandwidth_hz, "Hz")
-        require_zero_or_more("the background in one mode", self.background_photons_per_mode, "photon")
-        require(self.polarisations in (1, 2), "the number of polarisations", self.polarisations, "", "it is 1 or 2")
+    noise_figure_db: NoiseFigure
+    gain_db: Annotated[float, Quantity("dB", least=10.0), "high gain is meant"]
+    optical_bandwidth_hz: Annotated[float, Quantity("Hz", above=0.0)]
+    background_photons_per_mode: PerMode = 0.0
+    polarisations: Annotated[int, Whole("", least=1, most=2)] = 2
 
     @property
     def _symbol_rate_limit_hz(self) -> float:
