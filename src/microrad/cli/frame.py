@@ -52,7 +52,12 @@ class Judged(StrEnum):
     CLOSES = "closes"
 
     def code(self, *, met: bool, closes: bool) -> int:
-        """0 where that holds, else 1."""
+        """0 where that holds, else 1.
+
+        Args:
+            met: Whether all requirements are met.
+            closes: Whether the links close.
+        """
         return MET if (met if self is Judged.REQUIREMENTS else closes) else UNMET
 
 
@@ -310,7 +315,17 @@ def width() -> int:
 
 
 def check_target(path: Path, advice: str, replace_if_begins: str = "") -> None:
-    """Refuse a file that must not be written: one that exists, unless it begins with a text that may be replaced."""
+    """Refuse a file that must not be written.
+
+    Args:
+        path: The file.
+        advice: What to do where it exists, the end of the message.
+        replace_if_begins: How a file begins that may be replaced; empty where none may.
+
+    Raises:
+        Refusal: There is no folder for it, or a file that must stay.
+        OSError: The file that is there cannot be read.
+    """
     if not path.parent.is_dir():
         raise Refusal(f"{path}: there is no folder {path.parent}; create it first.")
     if not os.path.lexists(path):
@@ -322,7 +337,14 @@ def check_target(path: Path, advice: str, replace_if_begins: str = "") -> None:
 
 
 def option(flag: str, metavar: str, text: str, **settings: Any) -> Any:
-    """An option with the name of its value and its help."""
+    """An option of a command.
+
+    Args:
+        flag: Its name, as ``--output``.
+        metavar: The name of its value.
+        text: Its help.
+        settings: What else typer takes.
+    """
     return typer.Option(flag, metavar=metavar, help=text, **settings)
 
 

@@ -54,7 +54,12 @@ def run() -> tuple[Check, ...]:
 
 
 def text(checks: Iterable[Check], width: int) -> str:
-    """A line for each check, in at most ``width`` columns but for a single word; what goes on is set in."""
+    """A line for each check; what goes on is set in.
+
+    Args:
+        checks: What was looked at.
+        width: Most columns, but for a single word that is longer.
+    """
     lines = (
         f"{'ok' if c.ok else 'problem':8} {c.name:17} {'; '.join(filter(None, (c.found, c.advice)))}" for c in checks
     )

@@ -28,9 +28,16 @@ class FolderError(ValueError):
 
 
 def read_bytes(path: Path, most: int) -> bytes:
-    """At most so many bytes of a file. Raises OSError, also where they are not there yet, as of a log of the kernel.
+    """The first bytes of a file.
 
     Whatever a user names is read by this: /proc/kmsg is a regular file to all who ask, and waits for ever.
+
+    Args:
+        path: The file.
+        most: Most bytes to read.
+
+    Raises:
+        OSError: The file cannot be read, or its bytes are not there yet, as of a log of the kernel.
     """
 
     def at_once(name: str, flags: int) -> int:
@@ -47,9 +54,16 @@ def read_bytes(path: Path, most: int) -> bytes:
 
 
 def check_folder(folder: Path, overwrite: bool, kind: str = "mission", what: str = "results") -> None:
-    """Raise FolderError when ``folder`` holds something that must not be replaced.
+    """Refuse a folder of results that holds something which must not be replaced.
 
-    What may be has a manifest of microrad with the key ``kind``; ``what`` it holds is said in the message.
+    Args:
+        folder: The folder, which need not exist.
+        overwrite: Whether results of microrad may be replaced.
+        kind: Key of the manifest that tells a folder of such results.
+        what: What such a folder holds, for the message.
+
+    Raises:
+        FolderError: It is a file, or holds other files, or results that are not to be replaced.
     """
     if not folder.exists():
         return
@@ -74,7 +88,17 @@ def _ours(manifest: Path, kind: str) -> bool:
 
 @contextmanager
 def whole_folder(folder: Path, overwrite: bool, kind: str = "mission", what: str = "results") -> Iterator[Path]:
-    """A folder beside ``folder`` to write into; it becomes ``folder`` at the end, or vanishes on any error."""
+    """A folder beside ``folder`` to write into; it becomes ``folder`` at the end, or vanishes on any error.
+
+    Args:
+        folder: Where the results go; folders above it are made.
+        overwrite: As for `check_folder`, like the next two.
+        kind: Key of the manifest.
+        what: What the folder holds.
+
+    Raises:
+        FolderError: The folder must not be replaced.
+    """
     check_folder(folder, overwrite, kind, what)
     folder.parent.mkdir(parents=True, exist_ok=True)
     draft = _new_folder(folder.parent, f".{folder.name}", ".part")
@@ -157,10 +181,15 @@ def _replace(draft: Path, folder: Path) -> None:
 
 
 def write_whole(path: Path, content: str | bytes, *, durable: bool = True) -> None:
-    """Write a file whole or not at all: beside its place first. Text is written in UTF-8, its line ends as they are.
+    """Write a file whole or not at all: beside its place first.
 
     The draft beside it has a name that no other process ever takes, as a killed one may have left its own there.
-    What is not ``durable`` may be cut by a failure of the machine: a file that its readers check.
+
+    Args:
+        path: The file, which is replaced.
+        content: Bytes, or text that is written in UTF-8 with its line ends as they are.
+        durable: Whether it is on the disk on return. If not, a failure of the machine may cut the file: for one that
+            its readers check.
     """
     draft = path.with_name(f".microrad-{secrets.token_hex(8)}{DRAFT}")
     try:

@@ -2,6 +2,11 @@
 
 
 def advice(extra: str = "", *options: str) -> str:
-    """The command that installs microrad with one of its extras, and where to run it."""
+    """The command that installs microrad, and where to run it.
+
+    Args:
+        extra: An extra of it that is installed, too.
+        options: Options of pip.
+    """
     what = f"'.[{extra}]'" if extra else "."
     return f"in the project's folder: {' '.join(['pip install', *options, '--constraint constraints.txt', what])}"

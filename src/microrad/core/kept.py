@@ -62,9 +62,12 @@ class Kept:
             self._try(lambda: _prepare(folder))
 
     def part(self, function: Callable[..., _Result], *args: Any, **beside: Any) -> _Result:
-        """What ``function(*args, **beside)`` returns; what stands ``beside`` does not change the result.
+        """What ``function(*args, **beside)`` returns, from the folder where it has been kept.
 
-        The function reads its arguments alone, and returns what can be pickled.
+        Args:
+            function: It reads its arguments alone, and returns what can be pickled.
+            args: What the result depends on.
+            beside: What does not change the result, as who hears of the progress.
         """
         folder = self._folder
         if folder is None:

@@ -308,6 +308,12 @@ class _Entries(Mapping[Any, Any]):
 
 
 def watched_call(function: Callable[..., Any], *args: Any, **beside: Any) -> tuple[Any, Reads]:
-    """What a function returns, and what it has read of its positional arguments."""
+    """What a function returns, and what it has read of its positional arguments.
+
+    Args:
+        function: What to call.
+        args: Its positional arguments, which are watched.
+        beside: Its other arguments, which are not.
+    """
     reads = Reads()
     return function(*reads.watched(args), **beside), reads

@@ -19,9 +19,14 @@ def in_threads(
     on_done: Callable[[int, int], None] = lambda done, total: None,
     workers: int | None = None,
 ) -> list[_Result]:
-    """What each job returns, in their order; ``on_done`` hears how many are done, and of how many.
+    """What each job returns, in their order.
 
     After an error, or Ctrl-C, those that have not begun are dropped.
+
+    Args:
+        jobs: What to call.
+        on_done: Hears how many are done, and of how many.
+        workers: Number of threads; None for one on each core.
     """
     results = []
     with ThreadPoolExecutor(max_workers=workers or os.cpu_count()) as pool:
@@ -45,12 +50,14 @@ def shared_out(
 ) -> Iterator[Callable[[], list[_Result]]]:
     """Jobs in Python that forked processes begin with, at most 256; the callable takes part and returns their results.
 
-    ``on_turn`` hears the number of each job that the callable itself begins. ``meanwhile`` says that the caller has
-    other work to do first: all jobs may then be done by others.
-
     A result is pickled. A process that fails leaves its jobs to the caller, so an error is the one that the job raises
     there. Where no process can be forked the callable does all of them: that is safe on Linux alone, while no other
     thread runs.
+
+    Args:
+        jobs: What to call.
+        on_turn: Hears the number of each job that the callable itself begins.
+        meanwhile: Whether the caller has other work to do first: all jobs may then be done by others.
     """
     helpers = min((os.cpu_count() or 1) - 1, len(jobs) - (not meanwhile)) if _may_fork() else 0
     turns, given = os.pipe()
@@ -86,7 +93,12 @@ def shared_out(
 
 
 def both(first: Callable[[], _First], second: Callable[[], _Second]) -> tuple[_First, _Second]:
-    """What two jobs in Python return, done side by side where that is possible (see `shared_out`)."""
+    """What two jobs in Python return, done side by side where that is possible (see `shared_out`).
+
+    Args:
+        first: The job that this process begins with.
+        second: The other one.
+    """
     jobs: tuple[Callable[[], Any], ...] = (first, second)
     with shared_out(jobs) as results:
         of_first, of_second = results()

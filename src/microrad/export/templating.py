@@ -109,7 +109,15 @@ def comment(text: str, prefix: str = "") -> str:
 
 
 def render(template: str, **values: Any) -> str:
-    """A file of the folder `templates` with the values filled in; a name without a value is an error of jinja2."""
+    """A file of the folder `templates` with the values filled in.
+
+    Args:
+        template: Name of the file.
+        values: What stands for each name in it.
+
+    Raises:
+        jinja2.UndefinedError: A name of the template has no value.
+    """
     return _environment().get_template(template).render(**values)
 
 
