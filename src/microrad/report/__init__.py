@@ -73,9 +73,14 @@ def write(
     on_progress: Progress = lambda done, total, what: None,
     parts: Kept = NOTHING,
 ) -> Path:
-    """Write report.html, results.nc, manifest.json and figures/ into ``folder``, all of them or none.
+    """Write report.html, results.nc, manifest.json and figures/ into a folder, all of them or none.
 
-    ``parts`` are those of earlier runs that are kept: none by default.
+    Args:
+        study: a run of a whole mission.
+        folder: where to; it is made.
+        overwrite: whether results of microrad that are there may be replaced.
+        on_progress: is told how far it is.
+        parts: those of earlier runs that are kept: none by default.
 
     Raises FolderError if the folder holds something that must not be replaced. Returns the page's path.
     """
@@ -109,7 +114,9 @@ def write(
 def study_figures(study: "Study", parts: Kept = NOTHING) -> "StudyFigures":
     """The figures of a study's page, by its parts.
 
-    ``parts`` are those of earlier runs that are kept: none by default.
+    Args:
+        study: a run of a whole mission.
+        parts: those of earlier runs that are kept: none by default.
     """
     from microrad.report.day.figures import day_figures
     from microrad.report.fine_pointing.figures import fine_pointing_figures
@@ -130,7 +137,12 @@ def study_figures(study: "Study", parts: Kept = NOTHING) -> "StudyFigures":
 
 
 def write_plan(plan: "ConstellationPlan", folder: Path) -> None:
-    """The sessions of a constellation for a spreadsheet, and as a contact plan."""
+    """The sessions of a constellation for a spreadsheet, and as a contact plan.
+
+    Args:
+        plan: who is served when.
+        folder: where to; files of the same names are replaced.
+    """
     from microrad.orbit.operations import csv_text
 
     (folder / "sessions.csv").write_text(csv_text(plan.planned, plan.epoch.utc) + "\n", encoding="utf-8")

@@ -19,5 +19,10 @@ def finite(data: Any) -> Any:
 
 
 def fields(record: object, *names: str) -> dict[str, Any]:
-    """Some fields of a record by their names."""
+    """Some fields of a record by their names.
+
+    Args:
+        record: any record.
+        names: those of its fields.
+    """
     return {name: getattr(record, name) for name in names}

@@ -13,7 +13,13 @@ _NOTHING_DB = 1e-9  # what rounding leaves of a margin that is none
 
 
 def apart(one: float, other: float, unit: str) -> tuple[str, str]:
-    """Two values of one SI ``unit`` with as many more digits as it takes to tell them apart, seven at most."""
+    """Two values with as many more digits as it takes to tell them apart, seven at most.
+
+    Args:
+        one: in SI units.
+        other: in SI units.
+        unit: the SI unit of both.
+    """
     texts = (quantity(one, unit), quantity(other, unit))
     for digits in range(4, 8):
         if one == other or texts[0] != texts[1]:
@@ -47,7 +53,13 @@ def quantity(value: float, unit: str, digits: int = 3) -> str:
 
 
 def signed(value: float, unit: str, digits: int = 3) -> str:
-    """A margin, as `quantity` has it, with its sign."""
+    """A margin, as `quantity` has it, with its sign.
+
+    Args:
+        value: in SI units.
+        unit: its SI unit.
+        digits: significant ones; decibels have one decimal less.
+    """
     text = quantity(value, unit, digits)
     return text if text.startswith(MINUS) else f"+{text}"
 
@@ -63,7 +75,12 @@ def with_minus(text: str) -> str:
 
 
 def power_text(number: float, digits: int = 3) -> str:
-    """A number with its power of ten, as it is printed in books: 3×10⁻⁴."""
+    """A number with its power of ten, as it is printed in books: 3×10⁻⁴.
+
+    Args:
+        number: any.
+        digits: significant ones.
+    """
     if not number:
         return "0"
     mantissa, _, exponent = f"{number:.{digits - 1}e}".partition("e")

@@ -16,7 +16,12 @@ from microrad.report.tables import Cell, Table
 
 
 def requirement_table(found: Sequence[Requirement], causes: Sequence[str] = ()) -> Table:
-    """Requirements with what is achieved; ``causes`` say what contributes most to each, where there is room for it."""
+    """Requirements with what is achieved.
+
+    Args:
+        found: the requirements.
+        causes: what contributes most to each, shown where there is room for it; none leaves the column out.
+    """
     rows: list[list[str | Cell]] = [
         [r.name, *reversed(apart(r.actual, r.required, r.unit)), margin_text(r), Cell("", r.mark), *causes[k : k + 1]]
         for k, r in enumerate(found)
@@ -85,7 +90,12 @@ _MOST = 10.0  # times the power that there is: more of it is no advice
 
 
 def advice_for_links(study: LinkStudy, r: Requirement) -> str:
-    """What to change for a requirement of the links, as the end of a sentence, or nothing."""
+    """What to change for a requirement of the links, as the end of a sentence, or nothing.
+
+    Args:
+        study: the links.
+        r: the requirement.
+    """
     m = study.file.mission
     if r.unknown:
         return ""
@@ -97,7 +107,12 @@ def advice_for_links(study: LinkStudy, r: Requirement) -> str:
 
 
 def advice_for_cone(study: LinkStudy, r: Requirement) -> str:
-    """What to change for the beacon to cover its partner, or to hold the root sum square of the errors."""
+    """What to change for the beacon to cover its partner, or to hold the root sum square of the errors.
+
+    Args:
+        study: the links, with an open-loop pointing budget.
+        r: the requirement.
+    """
     p = study.open_loop
     assert p is not None  # such a requirement has one
     needed = p.confident_divergence_rad if r.unit == "%" else p.required_divergence_rad
@@ -105,7 +120,13 @@ def advice_for_cone(study: LinkStudy, r: Requirement) -> str:
 
 
 def advice_for_power(beam: Beam, r: Requirement, tornado: link.Tornado) -> str:
-    """What to change for a margin: the transmit power, or what moves it most where that would be far too much."""
+    """What to change for a margin: the transmit power, or what moves it most where that would be far too much.
+
+    Args:
+        beam: the link's table.
+        r: the requirement.
+        tornado: what moves the link's margin.
+    """
     factor = _factor(r)
     if factor <= _MOST:
         return advise_at_least(r, f"{r.subject}.transmit_power", factor * beam.transmit_power_w, "W")
@@ -127,18 +148,38 @@ def _factor(r: Requirement) -> float:
 
 # -------------------------------------------------------------------------------------------------------------- clauses
 def advise_change(r: Requirement, key: str, verb: str = "change") -> str:
-    """That a key moves a requirement."""
+    """That a key moves a requirement.
+
+    Args:
+        r: the requirement.
+        key: dotted key of the mission.
+        verb: what is done to it.
+    """
     return f"; to {'move' if r.met else 'meet'} it, {verb} {key}"
 
 
 def advise_at_least(r: Requirement, key: str, value: float, unit: str) -> str:
-    """That a key meets a requirement from a value on, which is rounded so that it does."""
+    """That a key meets a requirement from a value on, which is rounded so that it does.
+
+    Args:
+        r: the requirement.
+        key: dotted key of the mission.
+        value: from which on it is met, in SI units.
+        unit: its SI unit.
+    """
     shown = format_quantity(_rounded(value, 1.0), unit)
     return f"{advise_change(r, key)}, which may be {shown} at least" if r.met else _take(key, shown, "more")
 
 
 def advise_at_most(r: Requirement, key: str, value: float, unit: str) -> str:
-    """That a key meets a requirement up to a value, which is rounded so that it does."""
+    """That a key meets a requirement up to a value, which is rounded so that it does.
+
+    Args:
+        r: the requirement.
+        key: dotted key of the mission.
+        value: up to which it is met, in SI units.
+        unit: its SI unit.
+    """
     shown = format_quantity(_rounded(value, -1.0), unit)
     return f"{advise_change(r, key)}, which may be {shown} at most" if r.met else _take(key, shown, "less")
 

@@ -17,7 +17,12 @@ _LEGIBLE = 16  # columns in which even the longest words may be folded
 
 
 def rows_of(columns: Mapping[str, Column], digits: int) -> list[tuple[str, ...]]:
-    """Columns as rows of text: numbers to so many digits, nothing for a nan and behind the end of a short column."""
+    """Columns as rows of text: nothing for a nan and behind the end of a short column.
+
+    Args:
+        columns: by heading.
+        digits: significant ones.
+    """
     return [*zip_longest(*(_texts(column, digits) for column in columns.values()), fillvalue="")]
 
 
@@ -29,7 +34,14 @@ def _texts(column: Column, digits: int) -> Sequence[str]:
 
 
 def numbers_text(columns: Sequence[NDArray[np.float64]], digits: int, between: str, end: str) -> str:
-    """Columns of numbers as `rows_of` has them, as one text: the quickest way for many of them."""
+    """Columns of numbers as `rows_of` has them, as one text: the quickest way for many of them.
+
+    Args:
+        columns: of any lengths.
+        digits: significant ones.
+        between: two numbers of a row.
+        end: of a row.
+    """
     rows = np.full((max(column.size for column in columns), len(columns)), np.nan)
     for place, column in enumerate(columns):
         rows[: column.size, place] = column
@@ -150,5 +162,10 @@ def tables_text(tables: Sequence[Table], sentences: Sequence[str], width: int) -
 
 
 def table_text(table: Table, width: int) -> str:
-    """One table for a terminal of ``width`` columns, without blank lines around it."""
+    """One table for a terminal, without blank lines around it.
+
+    Args:
+        table: with its title.
+        width: columns of the terminal.
+    """
     return tables_text([table], [], width).strip("\n")

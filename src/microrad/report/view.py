@@ -79,7 +79,12 @@ Block = str | Soft | Points | Verbatim | Verdict | Drawing | Table | Figure | Vi
 
 
 def opened(figures: Sequence[Figure], names: Sequence[str]) -> list[Block]:
-    """Figures of which a page shows those of these names at once, the others when it is asked."""
+    """Figures of which a page shows those of these names at once, the others when it is asked.
+
+    Args:
+        figures: in their order.
+        names: of those that are shown at once.
+    """
     return [f if f.name in names else View(f.title, [f], folded=True, listed=False) for f in figures]
 
 
@@ -89,7 +94,12 @@ def slug(text: str) -> str:
 
 
 def anchored(views: Sequence[View], taken: set[str] | None = None) -> tuple[View, ...]:
-    """The same views, each with an anchor that no other has."""
+    """The same views, each with an anchor that no other has.
+
+    Args:
+        views: in the order of the page.
+        taken: anchors that others have; those given here are added.
+    """
     taken = set() if taken is None else taken
     found = []
     for view in views:
@@ -107,7 +117,12 @@ def told(*blocks: Block | None) -> tuple[Block, ...]:
 
 
 def views_text(blocks: Sequence[Block], width: int) -> str:
-    """All that is not drawn, for a terminal of ``width`` columns; no line is free between sentences in a row."""
+    """All that is not drawn, for a terminal; no line is free between sentences in a row.
+
+    Args:
+        blocks: in their order.
+        width: columns of the terminal.
+    """
     parts: list[str] = []
     for alike, several in groupby(blocks, lambda block: isinstance(block, str)):
         found = list(several)

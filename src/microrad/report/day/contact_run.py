@@ -9,7 +9,14 @@ from microrad.study.contact_run import ContactRun, State
 
 
 def contact_sentences(run: ContactRun, number: int, controller: str, rate_bit_s: float | None) -> list[str]:
-    """How the contact went; without a rate, where it is stepped with range, the volume is left to the day."""
+    """How the contact went.
+
+    Args:
+        run: the contact as it was simulated.
+        number: its place among those of the day, from 1.
+        controller: name of the controller of its fine loop.
+        rate_bit_s: its data rate, bit/s; None where that is stepped with range, which leaves the volume to the day.
+    """
     c, spent = run.contact, run.seconds
     length = c.end_s - c.start_s
     if run.data_s == 0.0:
@@ -36,7 +43,12 @@ def _times(count: int) -> str:
 
 
 def windows_table(run: ContactRun, quantile: float) -> Table:
-    """The windows that were simulated in full; the ``quantile`` of the error is the mission's."""
+    """The windows that were simulated in full.
+
+    Args:
+        run: the contact as it was simulated.
+        quantile: share of the time that the mission's error is judged at, of 1.
+    """
     headings = (
         "since rise (min)",
         "range (km)",

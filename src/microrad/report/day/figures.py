@@ -61,9 +61,13 @@ class Windows(NamedTuple):
 
 
 def timeline(rows: Sequence[tuple[str, Floats]], span_s: tuple[float, float], epoch_label: str) -> Figure:
-    """Intervals, one row for each name: an array (n, 2) of begins and ends in seconds since the epoch.
+    """Intervals, one row for each name. Beside each row: how many, and their sum.
 
-    Rows whose names agree up to a colon ("direct: Kiruna") have one colour. Beside each row: how many, and their sum.
+    Args:
+        rows: name and array (n, 2) of begins and ends, in seconds since the epoch; names that agree up to a colon
+            ("direct: Kiruna") have one colour.
+        span_s: begin and end of the axis, in seconds since the epoch.
+        epoch_label: how the epoch is written.
     """
     sheet = _timeline(rows, span_s, epoch_label) if rows else empty("no contacts and no eclipses to show")
     caption = (
@@ -107,7 +111,13 @@ def _hours(start_s: float, end_s: float) -> Floats:
 def contact_run(
     states: Sequence[tuple[str, float, float]], windows: Windows, required_rad: float | None = None
 ) -> Figure:
-    """States of a simulated contact as (name, begin, end) in seconds, above the pointing error in sampled windows."""
+    """States of a simulated contact above the pointing error in its sampled windows.
+
+    Args:
+        states: name, begin and end of each, in seconds.
+        windows: the errors in the windows.
+        required_rad: radial error that is allowed, rad; None draws no line for it.
+    """
     names = [*dict.fromkeys(name for name, _, _ in states)]
     rows = [(name, np.array([[a, b] for which, a, b in states if which == name])) for name in names]
     sheet = _contact_run(rows, windows, required_rad) if rows else empty("no contact was run")
@@ -172,7 +182,17 @@ def along_contact(
     number: int,
     rise_utc: str,
 ) -> Figure:
-    """What one contact asks of the terminals, each (n,), over the time since its rise; ``number`` counts from 1."""
+    """What one contact asks of the terminals, over the time since its rise.
+
+    Args:
+        time_s: since the rise, (n,), s.
+        range_m: between the satellites, (n,), m.
+        point_ahead_rad: point-ahead angle, (n,), rad.
+        rate_rad_s: angular rate of the line of sight, (n,), rad/s.
+        doppler_hz: frequency received less sent, (n,), Hz.
+        number: of the contact, from 1.
+        rise_utc: when it begins, as text.
+    """
     panels = {
         "range (m)": ("range (km)", range_m, 1e-3),
         "point-ahead (rad)": ("point-ahead angle (µrad)", point_ahead_rad, 1e6),
@@ -205,9 +225,12 @@ def _along_contact(minutes: Floats, panels: Sequence[tuple[str, Floats, float]])
 
 
 def data_volume(cumulative: Curves, stored: Curves) -> Figure:
-    """Data over time: generated and delivered since the start above, stored on board below; a name has one colour.
+    """Data over time; a name has one colour in both panels.
 
-    Each curve is a pair of arrays (n,): seconds since the epoch, and bits.
+    Args:
+        cumulative: by name the curves generated and delivered since the start: seconds since the epoch and bits, each
+            (n,).
+        stored: the same of what is on board.
     """
     both = {"since the start": cumulative, "stored": stored}
     some = any(time_s.size for curves in both.values() for time_s, _ in curves.values())
@@ -253,7 +276,13 @@ def _bytes(several: Iterable[Floats]) -> tuple[float, str]:
 
 
 def reached_s(latency_s: Floats, share: Floats, wanted: float) -> float:
-    """Latency (s) within which the wanted share has arrived; infinite where it never does."""
+    """Latency (s) within which a share has arrived; infinite where it never does.
+
+    Args:
+        latency_s: latencies, rising, (n,), s.
+        share: share that has arrived by each, of 1, (n,).
+        wanted: share that is asked for, of 1.
+    """
     if not share.size or share[-1] < wanted:
         return math.inf
     return float(np.interp(wanted, share, latency_s))
@@ -323,7 +352,13 @@ class Assumed(NamedTuple):
 
 
 def assumptions(swings: Sequence[Assumed], value: float, quantity: str) -> Figure:
-    """A number over each assumption, one at a time, the first on top. ``quantity`` is its name with unit."""
+    """A number over each assumption, one at a time, the first on top.
+
+    Args:
+        swings: each assumption with what the number becomes on both sides.
+        value: the number as it is.
+        quantity: its name with its unit.
+    """
     shown = swings[:MOST_BARS]
     if shown and math.isfinite(value):
         sheet = _tornado(shown, value, f"{quantity}; as assumed: {value:.4g}")
@@ -351,7 +386,12 @@ def _tornado(shown: Sequence[Assumed], value: float, label: str) -> Sheet:
 
 
 def day_figures(day: DayStudy, run: ContactRun | None = None) -> tuple[Figure, ...]:
-    """Every figure of a day; ``run`` is one of its contacts, simulated."""
+    """Every figure of a day.
+
+    Args:
+        day: what the links deliver.
+        run: one of its contacts, simulated, or None.
+    """
     found = [_contacts_figure(day), *_along_figure(day), _volume_figure(day), _latency_figure(day), ground_map(day)]
     found.append(_assumptions_figure(day))
     return tuple(found if run is None else [*found, _contact_run_figure(day, run)])

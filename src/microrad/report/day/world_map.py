@@ -66,9 +66,14 @@ def world_map(
     stations: Mapping[str, Marked],
     first_s: float | None = None,
 ) -> Figure:
-    """Ground track, its parts in contact (a name and (n,) flags of the track's points), relays and stations.
+    """Ground track, its parts in contact, relays and stations.
 
-    ``first_s`` is the time that the track takes, where it is the beginning of a longer span only.
+    Args:
+        track: sub-satellite points, (n,), in their order.
+        contact: by name the flags (n,) of the points in contact.
+        relays: by name, with what they see.
+        stations: by name, with their horizons.
+        first_s: the time that the track takes, s, where it is the beginning of a longer span only.
     """
     sheet, (panel,) = grid(WIDTH, 4.6)
     _earth(panel)
@@ -160,7 +165,9 @@ def _track(panel: Panel, track: Places, contact: Mapping[str, NDArray[np.bool_]]
 def broken(longitude: Floats, latitude: Floats) -> tuple[Floats, Floats]:
     """The line in degrees with its breaks (nan): at ±180°, drawn up to the edge, and over a pole, drawn up to it.
 
-    Longitudes in [-180, 180]; a nan among them is a gap already.
+    Args:
+        longitude: in [-180, 180], (n,), degrees; a nan is a gap already.
+        latitude: (n,), degrees.
     """
     x, y = [longitude[:1]], [latitude[:1]]
     for (a, b), (low, high) in zip(_pairs(longitude), _pairs(latitude), strict=True):
@@ -225,7 +232,12 @@ def _shifted(ring: Floats) -> tuple[Floats, ...]:
 
 
 def odd(rings: Sequence[Floats], point: tuple[float, float]) -> bool:
-    """Whether an odd number of closed rings is around a point."""
+    """Whether an odd number of closed rings is around a point.
+
+    Args:
+        rings: each (m, 2), closed.
+        point: its two coordinates.
+    """
     crossings = 0
     for ring in rings:
         (x, y), (ahead_x, ahead_y) = ring[:-1].T, ring[1:].T

@@ -24,7 +24,14 @@ from microrad.report.identification.parameters import (
 def identification_data(
     found: Identification, written: str, *, mirror_file: Path | None = None, report_file: Path | None = None
 ) -> dict[str, Any]:
-    """The identification as plain data, in SI units with the unit in each key; what is not finite is None."""
+    """The identification as plain data, in SI units with the unit in each key; what is not finite is None.
+
+    Args:
+        found: what was identified.
+        written: the model in the mirror file.
+        mirror_file: the mirror file, if one was written.
+        report_file: the report, if one was written.
+    """
     names = [score.model for score in found.scores]
     data = {
         "model": written,

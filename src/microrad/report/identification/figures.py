@@ -61,7 +61,13 @@ class Shown:
 def identification_figures(
     found: Identification, recordings: Sequence[Recording], *, virtual: bool = False
 ) -> dict[str, Figure]:
-    """All figures by name. `recordings` are those given to `identify`, of which `found` keeps no broadband ones."""
+    """All figures by name.
+
+    Args:
+        found: what was identified.
+        recordings: those that `identify` was given to fit: it keeps no broadband ones.
+        virtual: whether they come from the virtual bench: each figure says so.
+    """
     everything = shown(found, recordings)
     figures = [excitation(everything, found)]
     if found.linear is not None:
@@ -78,7 +84,12 @@ def _virtual(figure: Figure) -> Figure:
 
 
 def shown(found: Identification, recordings: Sequence[Recording]) -> list[Shown]:
-    """Loops, validation and broadband recordings, in this order, in volts and radians."""
+    """Loops, validation and broadband recordings, in this order, in volts and radians.
+
+    Args:
+        found: what was identified.
+        recordings: those that `identify` was given to fit: it keeps no broadband ones.
+    """
     best = words.chosen_predictions(found)
     kept = {(s.path, s.sha256): s.role for s in found.sources}
     pairs: list[tuple[Recording, Prediction | None]] = list(zip(found.recordings, best, strict=True))
@@ -111,7 +122,12 @@ def _not_drawn(everything: Sequence[Shown]) -> str:
 
 # ------------------------------------------------------------------------------------------------------- excitation
 def excitation(everything: Sequence[Shown], found: Identification) -> Figure:
-    """Drive against time, and its spectrum, a row for each recording."""
+    """Drive against time, and its spectrum, a row for each recording.
+
+    Args:
+        everything: the recordings as they are drawn.
+        found: what was identified.
+    """
     drawn = everything[:MOST_RECORDINGS]
     sheet, panels = grid(_WIDTH, 0.5 + 1.7 * len(drawn), len(drawn), 2)
     for left, right, one in zip(panels[::2], panels[1::2], drawn, strict=True):
@@ -135,7 +151,12 @@ def excitation(everything: Sequence[Shown], found: Identification) -> Figure:
 
 
 def amplitude_spectrum(signal: Floats, rate_hz: float) -> tuple[Floats, Floats]:
-    """Amplitude of the lines of a signal about its mean, the largest of each of at most 400 logarithmic bins."""
+    """Amplitude of the lines of a signal about its mean, the largest of each of at most 400 logarithmic bins.
+
+    Args:
+        signal: even samples, (n,).
+        rate_hz: of the samples, Hz.
+    """
     size = 2 * np.abs(np.fft.rfft(signal - signal.mean()))[1:] / signal.size
     freq = np.arange(1, size.size + 1) * (rate_hz / signal.size)
     edges = np.unique(np.geomspace(1, size.size, _SPECTRUM_POINTS).astype(int)) - 1
@@ -207,7 +228,12 @@ def _levels(linear: LinearFit) -> list[Line]:
 
 
 def banded_rms(freq_hz: Floats, level: Floats) -> tuple[Floats, Floats]:
-    """Mean frequency and rms of a level in each of at most 60 logarithmic bands: single lines of it scatter widely."""
+    """Mean frequency and rms of a level in each of at most 60 logarithmic bands: single lines of it scatter widely.
+
+    Args:
+        freq_hz: rising, above 0, (n,), Hz.
+        level: its value at each, (n,).
+    """
     edges = np.geomspace(freq_hz[0], freq_hz[-1], _LEVEL_BANDS + 1)
     band = np.clip(np.searchsorted(edges, freq_hz, side="right") - 1, 0, _LEVEL_BANDS - 1)
     counts = np.bincount(band, minlength=_LEVEL_BANDS)
@@ -246,7 +272,12 @@ def poles(linear: LinearFit) -> Figure:
 
 # ------------------------------------------------------------------------------------------------------------ loops
 def loops(everything: Sequence[Shown], found: Identification) -> Figure:
-    """Output over drive, measured and modelled, and what a straight line leaves of both, a row for each recording."""
+    """Output over drive, measured and modelled, and what a straight line leaves of both, a row for each recording.
+
+    Args:
+        everything: the recordings as they are drawn.
+        found: what was identified.
+    """
     judged = [one for one in everything if one.prediction is not None]
     drawn = judged[:MOST_RECORDINGS]
     sheet, panels = grid(_WIDTH, 0.5 + 2.5 * len(drawn), len(drawn), 2)
@@ -306,7 +337,12 @@ def _stretch(one: Shown, part: slice) -> slice:
 
 # ---------------------------------------------------------------------------------------------------- time response
 def time_response(found: Identification, recordings: Sequence[Recording]) -> Figure | None:
-    """Output of the broadband recordings against time, measured and by the linear model; None without any."""
+    """Output of the broadband recordings against time, measured and by the linear model; None without any.
+
+    Args:
+        found: what was identified.
+        recordings: those that `identify` was given to fit: it keeps no broadband ones.
+    """
     linear = found.linear
     judged = {(s.path, s.sha256) for s in found.sources if s.role == "validation"}
     given = [r for r in recordings or found.recordings if (r.path, r.sha256) not in judged]

@@ -36,7 +36,12 @@ class ReportError(ValueError):
 
 
 def check_identification(target: Path, overwrite: bool) -> None:
-    """Raises ReportError if ``target`` must not be written: no folder for it, or a file that must not be replaced."""
+    """Raises ReportError if ``target`` must not be written: no folder for it, or a file that must not be replaced.
+
+    Args:
+        target: the file of the report.
+        overwrite: whether a report that is there may be replaced.
+    """
     if not target.parent.is_dir():
         raise ReportError(f"{target}: there is no folder {target.parent}; create it first.")
     if not os.path.lexists(target):
@@ -109,7 +114,17 @@ def identification_page(
     recordings: Sequence[Recording] = (),
     virtual: bool = False,
 ) -> str:
-    """The page's HTML; every text that is not ours is escaped, and nothing is loaded from anywhere."""
+    """The page's HTML; every text that is not ours is escaped, and nothing is loaded from anywhere.
+
+    Args:
+        found: what was identified.
+        mirror_file: the mirror file that goes with it.
+        mirror_text: its text.
+        title: the heading of the page.
+        written: the model in the mirror file.
+        recordings: those that `identify` was given to fit: it keeps no broadband ones.
+        virtual: whether they come from the virtual bench: the page and each figure say so.
+    """
     figures = identification_figures(found, recordings, virtual=virtual)
     own = "The recordings are those of the virtual bench: nothing here was measured on a mirror." if virtual else ""
     views = (*_views(found, written, recordings, figures), _origin(found, mirror_file, mirror_text, written))

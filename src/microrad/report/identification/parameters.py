@@ -108,7 +108,12 @@ def colour(fit: Fit) -> float:
 
 
 def correlations(fit: Fit, least: float = HIGH_CORRELATION) -> list[tuple[str, str, float]]:
-    """Pairs of parameters whose estimates are correlated by at least `least`, the strongest first."""
+    """Pairs of parameters whose estimates are correlated, the strongest first.
+
+    Args:
+        fit: one fit of an identification.
+        least: magnitude from which a pair is told.
+    """
     if isinstance(fit, PrandtlIshlinskiiFit):
         return []
     matrix = fit.correlation if isinstance(fit, BoucWenFit) else fit.fit.correlation

@@ -33,7 +33,12 @@ class Sine:
 
 
 def sine_of(drive_v: Floats, rate_hz: float) -> Sine | None:
-    """The sine that a drive is, its amplitude growing or not, of two periods or more; None where it is none."""
+    """The sine that a drive is, its amplitude growing or not, of two periods or more; None where it is none.
+
+    Args:
+        drive_v: even samples, (n,), V.
+        rate_hz: of the samples, Hz.
+    """
     centred = drive_v - drive_v.mean()
     spectrum = np.abs(np.fft.rfft(centred * np.hanning(drive_v.size))) ** 2
     peak = int(np.argmax(spectrum[1:])) + 1
@@ -50,7 +55,12 @@ def sine_of(drive_v: Floats, rate_hz: float) -> Sine | None:
 
 
 def drive_text(recording: Recording, volts: float) -> str:
-    """How a recording was driven: "60 Hz, ± 6 V about 6 V"."""
+    """How a recording was driven: "60 Hz, ± 6 V about 6 V".
+
+    Args:
+        recording: with its drive in its own unit.
+        volts: volts in one of that unit.
+    """
     drive = recording.drive[:, 0] * volts
     sine = sine_of(drive, recording.rate_hz)
     half = float(np.ptp(drive)) / 2
@@ -66,7 +76,12 @@ def _rounded(value: float, span: float) -> float:
 
 # ---------------------------------------------------------------------------------------------------------- verdict
 def error_text(score: Score, span_rad: float) -> str:
-    """The rms error on unseen samples in µrad and per cent of the peak-to-peak output."""
+    """The rms error on unseen samples in µrad and per cent of the peak-to-peak output.
+
+    Args:
+        score: one model's.
+        span_rad: largest peak-to-peak output, rad.
+    """
     rms = score.held_out_rms_percent
     return f"{rms * span_rad * 1e4:.3g} µrad rms ({rms:.3g} %)"
 
@@ -83,7 +98,12 @@ def drive_range(found: Identification) -> tuple[str, str]:
 
 
 def verdict(found: Identification, written: str | None = None) -> list[str]:
-    """What was found and where it holds, a sentence each; the first one is the headline."""
+    """What was found and where it holds, a sentence each; the first one is the headline.
+
+    Args:
+        found: what was identified.
+        written: the model in the mirror file; None says nothing of one.
+    """
     own, fit = found.score(), found.fit()
     headline = (
         f"{found.chosen} predicts samples that no fit has seen with an error of "
@@ -154,7 +174,12 @@ def _has_linear(fit: Fit) -> bool:
 
 
 def warnings(found: Identification, written: str | None = None) -> list[str]:
-    """Warnings of the identification and of the model that is written, each once."""
+    """Warnings of the identification and of the model that is written, each once.
+
+    Args:
+        found: what was identified.
+        written: the model in the mirror file; the chosen one unless it is given.
+    """
     return list(dict.fromkeys([*found.warnings, *fit_warnings(found.fit(written))]))
 
 
@@ -234,6 +259,11 @@ def gains(linear: LinearFit | None) -> list[tuple[str, float, float]]:
 
 
 def shown_recordings(found: Identification, recordings: Sequence[Recording]) -> list[Recording]:
-    """The recordings of `recordings` that the identification itself does not keep: the broadband ones."""
+    """The recordings that the identification itself does not keep: the broadband ones.
+
+    Args:
+        found: what was identified.
+        recordings: those that `identify` was given.
+    """
     kept = {(r.path, r.sha256) for r in found.recordings}
     return [r for r in recordings if (r.path, r.sha256) not in kept]

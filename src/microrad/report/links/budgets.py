@@ -56,7 +56,12 @@ def jitter_lines(study: LinkStudy) -> list[Line]:
 
 
 def links_csv(study: LinkStudy, solution: Solution | None = None) -> str:
-    """Every line with its value in full, for a spreadsheet, behind the values of a key that were solved for."""
+    """Every line with its value in full, for a spreadsheet, behind the values of a key that were solved for.
+
+    Args:
+        study: the links, at their budgeted errors or under their jitter.
+        solution: the values of a key that leave the required margin, if one was solved for.
+    """
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
     writer.writerow(COLUMNS)

@@ -15,7 +15,12 @@ from microrad.report.requirements import requirement_data
 
 
 def links_data(study: LinkStudy, solution: Solution | None = None) -> dict[str, Any]:
-    """The verdict on the links, their budgets and what follows from them, after the values that were solved for."""
+    """The verdict on the links, their budgets and what follows from them, after the values that were solved for.
+
+    Args:
+        study: the links, at their budgeted errors or under their jitter.
+        solution: the values of a key that leave the required margin, if one was solved for.
+    """
     judged = [requirement_data(r) for r in of_links(study)]
     solved = {} if solution is None else {"solved": _solution_data(solution)}
     return {"closes": study.closes, "met": met(study), "requirements": judged, **solved, **budgets_data(study)}

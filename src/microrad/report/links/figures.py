@@ -35,7 +35,12 @@ def link_figures(study: LinkStudy) -> tuple[Figure, ...]:
 
 
 def tornado(study: LinkStudy, of: Tornado) -> Figure:
-    """One margin over each of its inputs, one at a time."""
+    """One margin over each of its inputs, one at a time.
+
+    Args:
+        study: the links, at their budgeted errors or under their jitter.
+        of: the margin with its inputs, the widest first.
+    """
     shown, margin = of.swings[:MOST_BARS], of.margin_db
     sheet, (panel,) = grid(6.4, 0.9 + 0.27 * len(shown))
     lost_db = _lost(shown, margin)
@@ -87,7 +92,13 @@ def _label(swing: Swing) -> str:
 
 
 def trade(study: LinkStudy, found: Finding, t: Trade) -> Figure:
-    """Section 2.1 of the paper as a picture: a wide beacon, or a scan with a narrow beam."""
+    """Section 2.1 of the paper as a picture: a wide beacon, or a scan with a narrow beam.
+
+    Args:
+        study: the links, at their budgeted errors or under their jitter.
+        found: the search for the partner, which has a scan.
+        t: the times of both ways over the uncertainty.
+    """
     sheet, (panel,) = grid(6.4, 3.6)
     sigma = t.sigma_rad * 1e6
     panel.add(Line(sigma, t.wide_time_s, BLUE, label="wide beacon: detection at the edge of its cone"))

@@ -147,7 +147,13 @@ def coverage(p: OpenLoopPointing) -> list[str]:
 
 # ------------------------------------------------------------------------------------------------------------- budgets
 def lines_table(title: str, lines: Sequence[Line], totals: Sequence[Line] = ()) -> Table:
-    """Lines of a budget with its sums; a page shows the sums, and the lines when it is asked."""
+    """Lines of a budget with its sums; a page shows the sums, and the lines when it is asked.
+
+    Args:
+        title: what a page shows in place of the folded lines, before the sums.
+        lines: the lines.
+        totals: their sums.
+    """
     sums = "; ".join(f"{line.name.lower()} {quantity(line.value, line.unit)}" for line in totals)
     rows = [_row(line) for line in (*lines, *totals)]
     folded = f"{title}: {sums}" if sums else title
@@ -169,6 +175,11 @@ def paired_tables(budget: LinkBudget, other: LinkBudget, headings: tuple[str, st
 
     Where basis, source or regime of a line differ, that of the other stands below. A total that one of them does not
     have is an empty cell.
+
+    Args:
+        budget: the first of both.
+        other: another one of the same link.
+        headings: of the two columns of values.
     """
     if [line.name for line in budget.lines] != [line.name for line in other.lines]:
         named = zip((budget, other), headings, strict=True)
@@ -231,7 +242,15 @@ def budgets_view(
 def performance_view(
     cases: Sequence[Performance], costs: Sequence[Cost], outage: float, sentences: Sequence[str], best: str = ""
 ) -> View:
-    """The link under each distribution of pointing errors; ``best`` names the controller to mark."""
+    """The link under each distribution of pointing errors.
+
+    Args:
+        cases: the distributions.
+        costs: what hysteresis takes from each controller.
+        outage: share of the time that the loss is judged at, of 1.
+        sentences: what stands above the tables.
+        best: controller to mark, or "".
+    """
     return View(
         "What pointing costs the link",
         told(
@@ -375,7 +394,12 @@ def fade_sentences(cases: Sequence[Performance]) -> list[str]:
 
 # --------------------------------------------------------------------------------------------------------- acquisition
 def acquisition_view(found: Finding | None, figures: Sequence[Figure]) -> View | None:
-    """Each way to find the partner, exact beside simulated, with its stages and one run."""
+    """Each way to find the partner, exact beside simulated, with its stages and one run.
+
+    Args:
+        found: the search for the partner; None gives no view.
+        figures: those of the links.
+    """
     if found is None:
         return None
     at = f"{100 * EARLY:g} % within"
@@ -425,7 +449,12 @@ def acquisition_paragraphs(f: Finding) -> list[str]:
 
 
 def scan_words(s: Scanned, sigma_rad: float) -> str:
-    """How the scan is laid out, and what its light does to it."""
+    """How the scan is laid out, and what its light does to it.
+
+    Args:
+        s: the scan.
+        sigma_rad: uncertainty that it covers, rms per axis, rad.
+    """
     covers = (
         f"The scan covers {format_quantity(s.radius_rad, 'rad', 3)} about the predicted direction, for an uncertainty "
         f"of {format_quantity(sigma_rad, 'rad', 3)} rms per axis with biases"

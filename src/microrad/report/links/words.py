@@ -122,7 +122,12 @@ def point_ahead(p: PointAheadEffect) -> str:
 
 
 def under_jitter_sentence(p: Performance, study: LinkStudy) -> str:
-    """The link under its jitter, in two sentences."""
+    """The link under its jitter, in two sentences.
+
+    Args:
+        p: the link under its jitter.
+        study: the links that it is of.
+    """
     narrowest = ", the narrowest of the aperture" if p.best.at_limit else ""
     return (
         f"Under the jitter: mean pointing loss {p.mean_loss_db:.2f} dB; {p.outage_loss_db:.2f} dB at most for "

@@ -30,7 +30,13 @@ def templates() -> Environment:
 
 
 def drawing(template: str, name: str, *arguments: object) -> Markup:
-    """A picture made by a macro of a template, named by its path in this room."""
+    """A picture made by a macro of a template.
+
+    Args:
+        template: by its path in this room.
+        name: of the macro.
+        arguments: of the macro, in their order.
+    """
     made: Markup = getattr(templates().get_template(template).module, name)(*arguments)
     return made
 
@@ -67,8 +73,17 @@ def page_of(  # noqa: PLR0913  all but the first five are named options
 ) -> str:
     """A page that loads nothing, with its scripts at its end: the drawing library only where a figure needs it.
 
-    Arguments that `mission_page` does not have: ``sha256`` stands at the foot of each printed sheet, ``made_by`` marks
-    the page as ours, and ``badge`` warns beside its title.
+    Args:
+        title: its heading.
+        kind: what was made, behind "microrad".
+        of: of what.
+        lead: what stands above all views.
+        views: the parts of the page.
+        sha256: stands at the foot of each printed sheet.
+        data: where the data of its figures are: "beside" the page, "below" each, or nowhere.
+        manifest: whether it has an element for its manifest at its end.
+        made_by: the command that marks the page as ours, or "".
+        badge: a warning beside the title, or "".
     """
     context = {"title": title, "kind": kind, "of": of, "lead": lead, "views": anchored(views), "sha256": sha256}
     more = {"data": data, "manifest": manifest, "made_by": made_by, "badge": badge}

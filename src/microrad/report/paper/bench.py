@@ -112,7 +112,12 @@ def _loop(fit: identify.BoucWenFit, record: Recording, freq_hz: float, fitted_hz
 
 
 def bench_figures(study: Study, parts: Kept = NOTHING) -> tuple[Figure, ...]:
-    """Both figures for a mission with a mirror of the paper's kind; none for others."""
+    """Both figures for a mission with a mirror of the paper's kind; none for others.
+
+    Args:
+        study: a run of a whole mission.
+        parts: those of earlier runs that are kept: none by default.
+    """
     if study.scan is None:
         return ()
     return chirp_figure(parts.part(chirp)), loops_figure(parts.part(loops))

@@ -115,7 +115,12 @@ def claims_view(study: Study) -> View:
 
 
 def differs(study: Study, *, played: bool) -> dict[str, str]:
-    """What is not as in the paper, by figure or table."""
+    """What is not as in the paper, by figure or table.
+
+    Args:
+        study: a run of a whole mission.
+        played: whether the virtual bench has played the records of Fig. 4 and 5.
+    """
     m = study.file.mission
     c = m.conventions
     return {

@@ -43,7 +43,12 @@ class Figure:
         return interactive.text_of(interactive.plot_of(self.sheet, self.placed)) if alive else ""
 
     def take(self, svg: str, plot: str) -> None:
-        """Have both forms as they were drawn earlier, from the same sheet."""
+        """Have both forms as they were drawn earlier, from the same sheet.
+
+        Args:
+            svg: the static picture.
+            plot: what the page's script draws.
+        """
         vars(self).update(svg=svg, plot=plot)
 
     @property

@@ -32,11 +32,15 @@ _QUIET: dict[str, Any] = {"hoverinfo": "skip", "hovertemplate": None}
 
 
 def plot_of(sheet: Sheet, found: Layout | None = None) -> dict[str, Any]:
-    """A sheet as plain data, from its ``found`` layout where there is one already.
+    """A sheet as plain data.
 
     ``data`` and ``layout`` are plotly's but for the places of the panels: those stand in ``panels`` and ``scales``
     (colour bars) as boxes in CSS pixels for the width ``size[0]``, from which the page's script makes them for the
     width that it has. ``keys`` are the legends.
+
+    Args:
+        sheet: what is drawn.
+        found: its layout where there is one already.
     """
     found = found or layout(sheet)
     drawn = Drawn(found)
@@ -82,7 +86,12 @@ def words(text: str) -> str:
 
 
 def spoken(title: str, placeholder: str) -> str:
-    """Part of a hover label: an axis's title with a value in it, the unit behind the value."""
+    """Part of a hover label: an axis's title with a value in it, the unit behind the value.
+
+    Args:
+        title: the axis's, with its unit in brackets at the end.
+        placeholder: name of the value in plotly.
+    """
     name, unit = _parts(title)
     unit = f" {words(unit)}".rstrip().replace(" °", "°")
     return f"{words(name) or placeholder}: %{{{placeholder}:.5~g}}{unit}"
@@ -231,17 +240,34 @@ class Pen:
         self.x, self.y = _name("x", number), _name("y", number)
 
     def trace(self, made: dict[str, Any], label: str, look: Look) -> None:
-        """Add a trace, named by its label."""
+        """Add a trace, named by its label.
+
+        Args:
+            made: plotly's trace without axes and name.
+            label: its name.
+            look: what a reader tells it by.
+        """
         self.to.data.append({"xaxis": self.x, "yaxis": self.y, "name": words(label), **made})
         self.to.turned.append(Turned("data", len(self.to.data) - 1, self.number, label, look))
 
     def shape(self, made: dict[str, Any], label: str, look: Look) -> None:
-        """Add a shape."""
+        """Add a shape.
+
+        Args:
+            made: plotly's shape.
+            label: what a legend calls it, or "".
+            look: what a reader tells it by.
+        """
         self.to.shapes.append(made)
         self.to.turned.append(Turned("shapes", len(self.to.shapes) - 1, self.number, label, look))
 
     def said(self, x: float, y: float) -> str:
-        """The words at the ticks next to a point, where an axis has words."""
+        """The words at the ticks next to a point, where an axis has words.
+
+        Args:
+            x: on the horizontal axis.
+            y: on the upright axis.
+        """
         return _joined([_word(self.of.panel.y, self.of.y_title, y), _word(self.of.panel.x, self.of.x_title, x)])
 
     @property
@@ -257,14 +283,26 @@ class Pen:
         return {"hovertemplate": f"{said}<extra>%{{fullData.name}}</extra>"}
 
     def scatter(self, x: Floats, y: Floats, mode: str) -> dict[str, Any]:
-        """Points or a curve."""
+        """Points or a curve.
+
+        Args:
+            x: on the horizontal axis, (n,).
+            y: on the upright axis, (n,).
+            mode: plotly's: lines, markers or both.
+        """
         made = {"type": "scatter", "mode": mode, "x": numbers(x), "y": numbers(y), **self.hover()}
         if self.named:
             made["text"] = [self.said(a, b) for a, b in zip(np.ravel(x), np.ravel(y), strict=True)]
         return made
 
     def across(self, kind: str, ends: Sequence[float], upright: bool) -> dict[str, Any]:
-        """A shape over the whole panel, between two values of x if upright, else of y."""
+        """A shape over the whole panel, between two values of one axis.
+
+        Args:
+            kind: line or rect.
+            ends: the two values.
+            upright: whether they are of x.
+        """
         first, last = numbers(ends)
         values = {"x0": first, "x1": last, "xref": self.x, "y0": 0, "y1": 1, "yref": f"{self.y} domain"}
         if not upright:

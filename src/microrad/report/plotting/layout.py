@@ -203,7 +203,13 @@ def _covered(of: Placed, key: Key, x: float, y: float) -> int:
 
 
 def at(of: Placed, x: object, y: object) -> tuple[np.ndarray, np.ndarray]:
-    """Points from the top left corner of the sheet for values of both axes."""
+    """Points from the top left corner of the sheet for values of both axes.
+
+    Args:
+        of: the panel in its place.
+        x: on the horizontal axis, (n,).
+        y: on the upright axis, (n,).
+    """
     left, top, right, bottom = of.inner
     across = scales.place(of.panel.x, np.asarray(x, dtype=np.float64), of.x_ends)
     up = scales.place(of.panel.y, np.asarray(y, dtype=np.float64), of.y_ends)

@@ -30,7 +30,12 @@ def colour_at(share: float) -> str:
 
 
 def clear(colour: str, opacity: float) -> str:
-    """A colour with its opacity; "" for none."""
+    """A colour with its opacity; "" for none.
+
+    Args:
+        colour: "#rrggbb", or "".
+        opacity: 0 to 1.
+    """
     if not colour or opacity == 1.0:
         return colour
     red, green, blue = _parts(colour)
@@ -45,6 +50,11 @@ def thinned(x: Floats, y: Floats, most: int = MOST_POINTS) -> NDArray[np.int64]:
     """Places of the points to keep: both ends, and the lowest and highest of each stretch.
 
     Gaps (nan) stay gaps.
+
+    Args:
+        x: (n,).
+        y: (n,).
+        most: so many places at most, but for those at gaps.
     """
     if x.size <= most:
         return np.arange(x.size)
@@ -75,8 +85,12 @@ def _of_stretches(x: Floats, y: Floats, count: int) -> NDArray[np.int64]:
 def thinned_by_logarithm(x: Floats, y: Floats, count: int = LOG_STRETCHES) -> NDArray[np.int64]:
     """Places of the points to keep on a logarithmic axis: both ends, and the lowest and highest of each stretch of it.
 
-    ``count`` stretches are equal on that axis, so that a rising x at even steps keeps each point where there are few.
-    Both are finite, and x is above 0.
+    A rising x at even steps keeps each point where there are few.
+
+    Args:
+        x: (n,), finite and above 0.
+        y: (n,), finite.
+        count: of the stretches, equal on that axis.
     """
     if x.size <= 2:
         return np.arange(x.size)

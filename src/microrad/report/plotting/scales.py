@@ -27,12 +27,22 @@ _WIDTHS = (
 
 
 def width_of(text: str, size: float) -> float:
-    """Width of the longest line of a text."""
+    """Width of the longest line of a text, points.
+
+    Args:
+        text: with its line breaks.
+        size: of its letters, points.
+    """
     return max((sum(map(_hundredths, line)) for line in text.split("\n")), default=0.0) * size / 100.0
 
 
 def height_of(text: str, size: float) -> float:
-    """Height of all lines of a text."""
+    """Height of all lines of a text, points.
+
+    Args:
+        text: with its line breaks.
+        size: of its letters, points.
+    """
     return LINE * size * (text.count("\n") + 1) if text else 0.0
 
 
@@ -47,7 +57,12 @@ def _hundredths(character: str) -> int:
 def limits(axis: Axis, which: str, panels: Sequence[Panel]) -> tuple[float, float]:
     """Those that the axis sets, and else those of the data of the panels that share it, with a margin.
 
-    ``which`` is "x" or "y". A logarithmic axis has no place for an end that is not positive: it follows from the data.
+    A logarithmic axis has no place for an end that is not positive: it follows from the data.
+
+    Args:
+        axis: of which the ends are asked for.
+        which: "x" or "y".
+        panels: those that share it.
     """
     given_low, given_high = (None if end is None or (axis.log and end <= 0.0) else end for end in (axis.low, axis.high))
     if given_low is not None and given_high is not None:
@@ -95,7 +110,12 @@ def _extent(mark: Mark, which: str) -> Iterator[Floats]:
 
 
 def edges_of(of: Field, which: str) -> Floats:
-    """Where the cells of a field end along an axis; the points themselves of one with levels."""
+    """Where the cells of a field end along an axis; the points themselves of one with levels.
+
+    Args:
+        of: the field.
+        which: "x" or "y".
+    """
     middle = of.x if which == "x" else of.y
     if of.levels is not None or middle.size < 2:
         return middle if middle.size > 1 else np.array([middle[0] - 0.5, middle[0] + 0.5])
@@ -117,7 +137,13 @@ def _margins(marks: Sequence[Mark], which: str, low: float, high: float) -> tupl
 
 # ------------------------------------------------------------------------------------------------ ticks
 def place(axis: Axis, value: Floats | float, ends: tuple[float, float]) -> Floats:
-    """Where values stand between the ends of an axis: 0 to 1."""
+    """Where values stand between the ends of an axis: 0 to 1.
+
+    Args:
+        axis: linear or logarithmic.
+        value: on it, of any shape.
+        ends: of the axis, the first at 0.
+    """
     low, high = ends
     with np.errstate(divide="ignore", invalid="ignore"):
         if axis.log:
@@ -128,7 +154,14 @@ def place(axis: Axis, value: Floats | float, ends: tuple[float, float]) -> Float
 
 
 def ticks(axis: Axis, which: str, ends: tuple[float, float], length: float) -> dict[float, str]:
-    """Places of ticks and their texts, for an axis so long."""
+    """Places of ticks and their texts.
+
+    Args:
+        axis: with its own ticks, if it sets some.
+        which: "x" or "y".
+        ends: of the axis.
+        length: of the axis, points.
+    """
     low, high = min(ends), max(ends)
     if axis.ticks is not None:
         at = [float(each) for each in axis.ticks if low - 1e-9 * abs(low) <= each <= high + 1e-9 * abs(high)]
@@ -149,7 +182,13 @@ def _apart(axis: Axis, found: dict[float, str], ends: tuple[float, float], lengt
 
 
 def rounds(low: float, high: float, most: int) -> list[float]:
-    """At most so many round numbers from low to high."""
+    """At most so many round numbers from low to high.
+
+    Args:
+        low: the least.
+        high: the largest.
+        most: how many there may be.
+    """
     if not high > low:
         return [low]
     power = 10.0 ** math.floor(math.log10((high - low) / most))
@@ -161,7 +200,13 @@ def rounds(low: float, high: float, most: int) -> list[float]:
 
 
 def decades(low: float, high: float, most: int) -> list[float]:
-    """At most so many ticks of a logarithmic axis: powers of ten, with numbers between where those are few."""
+    """At most so many ticks of a logarithmic axis: powers of ten, with numbers between where those are few.
+
+    Args:
+        low: the least, above 0.
+        high: the largest.
+        most: how many there may be.
+    """
     first, last = math.floor(math.log10(low) + 1e-9), math.ceil(math.log10(high) - 1e-9)
     whole = [power for power in range(first, last + 1) if low * (1 - 1e-9) <= 10.0**power <= high * (1 + 1e-9)]
     if len(whole) >= 3:
@@ -176,7 +221,12 @@ def decades(low: float, high: float, most: int) -> list[float]:
 
 
 def minor(axis: Axis, ends: tuple[float, float]) -> list[float]:
-    """Ticks without a text between those of a logarithmic axis."""
+    """Ticks without a text between those of a logarithmic axis.
+
+    Args:
+        axis: linear ones have none.
+        ends: of the axis.
+    """
     low, high = min(ends), max(ends)
     if not axis.log or axis.ticks is not None or math.log10(high / low) > _DECADES_WITH_MINOR_TICKS:
         return []

@@ -250,24 +250,52 @@ class Sheet:
     panels: list[Panel] = field(default_factory=list)
 
     def panel(self, row: int = 0, column: int = 0, columns: int = 1) -> Panel:
-        """A new panel at a place of the grid, which may go over several columns."""
+        """A new panel at a place of the grid.
+
+        Args:
+            row: from 0 on top.
+            column: from 0 at the left.
+            columns: over how many it goes.
+        """
         self.panels.append(Panel(row, column, columns))
         return self.panels[-1]
 
 
 def grid(width: float, height: float, rows: int = 1, columns: int = 1, **more: bool) -> tuple[Sheet, list[Panel]]:
-    """A sheet with a panel in each field of its grid, row by row."""
+    """A sheet with a panel in each field of its grid, row by row.
+
+    Args:
+        width: of the sheet, inches.
+        height: of the sheet, inches.
+        rows: of the grid.
+        columns: of the grid.
+        more: further fields of the sheet.
+    """
     sheet = Sheet(width, height, (1.0,) * rows, (1.0,) * columns, **more)  # type: ignore[arg-type]
     return sheet, [sheet.panel(row, column) for row in range(rows) for column in range(columns)]
 
 
 def rows(texts: Sequence[str], size: float = 8.0) -> Axis:
-    """An upright axis with a text at each row from 0 on, the first on top."""
+    """An upright axis with a text at each row from 0 on, the first on top.
+
+    Args:
+        texts: from the top.
+        size: of its letters, points.
+    """
     return Axis(low=len(texts) - 0.4, high=-0.6, ticks=dict(enumerate(texts)), size=size, grid=False)
 
 
 def between(x: Floats, low: Floats, high: Floats, colour: str, opacity: float, label: str = "") -> Area:
-    """The area between two curves, parted where one of them is nan."""
+    """The area between two curves, parted where one of them is nan.
+
+    Args:
+        x: (n,).
+        low: (n,).
+        high: (n,).
+        colour: "#rrggbb".
+        opacity: 0 to 1.
+        label: for the legend.
+    """
     known = np.isfinite(low) & np.isfinite(high)
     parts = np.split(np.arange(x.size), np.flatnonzero(np.diff(known.astype(np.int8))) + 1)
     rings = tuple(
@@ -279,14 +307,29 @@ def between(x: Floats, low: Floats, high: Floats, colour: str, opacity: float, l
 
 
 def segments(x: Floats, low: Floats | float, high: Floats, colour: str, width: float) -> Line:
-    """Upright strokes from low to high at each x, as one curve with gaps."""
+    """Upright strokes from low to high at each x, as one curve with gaps.
+
+    Args:
+        x: (n,).
+        low: (n,), or one for all.
+        high: (n,).
+        colour: "#rrggbb".
+        width: points.
+    """
     low = np.broadcast_to(low, x.shape)
     gaps = np.full(x.shape, np.nan)
     return Line(np.repeat(x, 3), np.stack([low, high, gaps], axis=1).ravel(), colour, width=width, whole=True)
 
 
 def stairs(edges: Floats, values: Floats, colour: str, edge: str) -> tuple[Bars, Line]:
-    """A histogram between its edges (n + 1,): bars, and their outline."""
+    """A histogram: bars, and their outline.
+
+    Args:
+        edges: (n + 1,).
+        values: (n,).
+        colour: of the bars.
+        edge: colour of the outline.
+    """
     zeros = np.zeros(values.size)
     bars = Bars((edges[:-1] + edges[1:]) / 2.0, zeros, values, np.diff(edges), colour, upright=True)
     x, y = np.repeat(edges, 2), np.r_[0.0, np.repeat(values, 2), 0.0]
@@ -294,7 +337,14 @@ def stairs(edges: Floats, values: Floats, colour: str, edge: str) -> tuple[Bars,
 
 
 def contour(x: Floats, y: Floats, z: Floats, level: float) -> tuple[Floats, Floats]:
-    """Where the values (m, n) over x (n,) and y (m,) have a level, as one curve with gaps."""
+    """Where values have a level, as one curve with gaps.
+
+    Args:
+        x: (n,).
+        y: (m,).
+        z: (m, n).
+        level: of z.
+    """
     import contourpy
 
     lines = [line for line in contourpy.contour_generator(x, y, z).lines(level) if len(line)]
@@ -304,7 +354,15 @@ def contour(x: Floats, y: Floats, z: Floats, level: float) -> tuple[Floats, Floa
 
 
 def region(x: Floats, y: Floats, z: Floats, least: float, most: float) -> tuple[Floats, ...]:
-    """Rings around where the values lie between two levels."""
+    """Rings around where the values lie between two levels.
+
+    Args:
+        x: (n,).
+        y: (m,).
+        z: (m, n).
+        least: lower level.
+        most: upper level.
+    """
     import contourpy
 
     filled: Any = contourpy.contour_generator(x, y, z, fill_type="OuterOffset").filled(least, most)
@@ -326,7 +384,12 @@ def labelled(marks: Sequence[Mark]) -> Iterator[Line | Rule | Span | Area | Bars
 
 
 def shortened(name: str, most: int = 34) -> str:
-    """The name as it stands in a figure: on one line, and cut at ``most`` characters, where data would have no room."""
+    """The name as it stands in a figure: on one line, and cut where data would have no room.
+
+    Args:
+        name: of any length.
+        most: characters.
+    """
     plain = " ".join("".join(c if c.isprintable() else " " for c in name).split())
     return plain if len(plain) <= most else plain[: most - 1] + "…"
 

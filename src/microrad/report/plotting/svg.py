@@ -42,7 +42,9 @@ _FONT = "system-ui, 'DejaVu Sans', sans-serif"
 def svg_of(sheet: Sheet, found: Layout | None = None) -> str:
     """The sheet as the text of an <svg> element, its coordinates to a hundredth of a point.
 
-    ``found`` is its layout where there is one already.
+    Args:
+        sheet: what is drawn.
+        found: its layout where there is one already.
     """
     found = found or layout(sheet)
     size = f'width="{found.width / INCH * 96:.0f}" height="{found.height / INCH * 96:.0f}"'

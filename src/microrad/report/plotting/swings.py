@@ -27,6 +27,12 @@ def swing_bars(panel: Panel, labels: Sequence[str], ends: Sequence[tuple[float, 
     """Bars from a value to what it becomes with each input lower and higher, the first row on top.
 
     A bar to infinity stops beyond all others and says so; where there is no value (nan) words stand for the bar.
+
+    Args:
+        panel: gets the bars.
+        labels: of the rows.
+        ends: of each row, with the input lower and higher; nan for none.
+        value: as it is.
     """
     reach = max((abs(end - value) for both in ends for end in both if math.isfinite(end)), default=0.0)
     reach = reach or abs(value) or 1.0
@@ -43,7 +49,13 @@ def swing_bars(panel: Panel, labels: Sequence[str], ends: Sequence[tuple[float, 
 
 
 def swing_legend(what: str, place: Place, columns: int = 1) -> Legend:
-    """What the colours of the bars say of an input or assumption."""
+    """What the colours of the bars say of an input or assumption.
+
+    Args:
+        what: an input, or an assumption.
+        place: of the legend.
+        columns: of its entries.
+    """
     return Legend(
         place, columns, only=(Area((), ORANGE, label=f"{what} lower"), Area((), BLUE, label=f"{what} higher"))
     )

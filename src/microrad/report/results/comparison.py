@@ -66,15 +66,27 @@ class Comparison:
 
 
 def compare(was: Any, now: Any, allowed: Allowed | None) -> Comparison:
-    """Compare two trees of plain data: to the last bit and letter without ``allowed``, else each number to its own.
+    """Compare two trees of plain data, number by number.
 
-    Then texts are the same where their words are, and their numbers to `WORDS_SHARE` or one in the last digit.
+    Texts are the same where their words are, and their numbers to `WORDS_SHARE` or one in the last digit.
+
+    Args:
+        was: one tree.
+        now: the other one.
+        allowed: the distance up to which two numbers are the same; None asks for the last bit and letter.
     """
     return _compared(leaves(was, now, ""), allowed)
 
 
 def compare_tables(name: str, was: str, now: str, allowed: Allowed | None) -> Comparison:
-    """Compare two figures' data, texts of CSV with a heading, in the same way: column by column."""
+    """Compare two figures' data, texts of CSV with a heading, in the same way: column by column.
+
+    Args:
+        name: the figure's.
+        was: the text of its CSV with a heading.
+        now: the other one.
+        allowed: the distance up to which two numbers are the same; None asks for the last bit and letter.
+    """
     return _compared(_cells(name, _columns(was), _columns(now)), allowed)
 
 
@@ -103,6 +115,12 @@ def leaves(was: Any, now: Any, place: str, unit: str = "") -> Iterator[tuple[str
     """Each pair of values at the same place, with the unit that stands beside them, or "".
 
     A value that only one side has stands beside `MISSING`.
+
+    Args:
+        was: one tree.
+        now: the other one.
+        place: of both within the whole, "" for all of it.
+        unit: that stands beside them.
     """
     if isinstance(was, dict) and isinstance(now, dict):
         beside = now.get("unit")
@@ -153,7 +171,12 @@ def _cell(text: str) -> float | str:
 
 
 def relative(was: float, now: float) -> float:
-    """Distance of two numbers over the larger of them; 0 for two that are both below `SMALLEST`."""
+    """Distance of two numbers over the larger of them; 0 for two that are both below `SMALLEST`.
+
+    Args:
+        was: one number.
+        now: the other one.
+    """
     if not (math.isfinite(was) and math.isfinite(now)):
         return 0.0 if was == now else math.inf
     larger = max(abs(was), abs(now))

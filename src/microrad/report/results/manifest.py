@@ -18,11 +18,16 @@ OPENING, ENDING = '<script type="application/json" id="manifest">', "</script>"
 
 
 def manifest_of(study: Study, summary: Mapping[str, Any], folder: Path) -> dict[str, Any]:
-    """What made the results: with the ``summary`` of the study, and a hash of each file in ``folder``.
+    """What made the results.
 
     The mission's text and hash and those of the files that it names, as they were read, and versions. Random numbers
     are drawn for the fine-pointing loop, for acquisition and for the day, from the mission's seeds, and for Fig. 4 and
     5.
+
+    Args:
+        study: a run of a whole mission.
+        summary: the study as plain data.
+        folder: of each file in it the hash is taken.
     """
     mirror, m = study.file.mirror_file, study.file.mission
     seeded = {"fine_pointing": m.fine_pointing, "acquisition": m.acquisition, "operations": m.operations}
@@ -69,7 +74,13 @@ def _hashes(folder: Path) -> dict[str, str]:
 
 
 def write_manifest(made: Mapping[str, Any], folder: Path, name: str) -> None:
-    """A manifest with the hashes of all files, written last, so that its presence says that the folder is whole."""
+    """A manifest with the hashes of all files, written last, so that its presence says that the folder is whole.
+
+    Args:
+        made: the manifest.
+        folder: with the other files.
+        name: of the file.
+    """
     text = json.dumps({**made, "files_sha256": _hashes(folder)}, indent=2, ensure_ascii=False)
     (folder / name).write_text(text + "\n", encoding="utf-8")
 
@@ -98,7 +109,12 @@ def shown_part(page: str) -> str:
 
 
 def with_manifest(page: str, text: str) -> str:
-    """A page with this text in the place of its manifest."""
+    """A page with this text in the place of its manifest.
+
+    Args:
+        page: with a place for a manifest.
+        text: the manifest as JSON.
+    """
     before, _, behind = page.partition(OPENING)
     return before + OPENING + text + ENDING + behind.partition(ENDING)[2]
 

@@ -179,7 +179,12 @@ def _beside(manifest: ReadManifest) -> Iterator[tuple[str, tuple[str, str]]]:
 
 
 def content_beside(manifest: ReadManifest, name: str) -> bytes | None:
-    """What stands in a file beside the report, as the manifest names it; None without such a file."""
+    """What stands in a file beside the report, as the manifest names it; None without such a file.
+
+    Args:
+        manifest: that of a report.
+        name: as the manifest has it.
+    """
     path = manifest.path.parent / name
     fits = plain(name) and path.is_file() and path.stat().st_size <= MOST_BYTES
     return read_bytes(path, MOST_BYTES) if fits else None
@@ -187,10 +192,16 @@ def content_beside(manifest: ReadManifest, name: str) -> bytes | None:
 
 # ----------------------------------------------------------------------------------------------------------- unpacking
 def unpack_mission(manifest: ReadManifest, folder: Path) -> tuple[missionfile.MissionFile, dict[str, str]]:
-    """Write mission, mirror and the files that the mission names into ``folder``, and read the mission there.
+    """Write mission, mirror and the files that the mission names into a folder, and read the mission there.
 
     A name that could lead out of the folder, or is not plain on every system, is replaced, in the mission's data too;
-    which ones comes second. Raises ReproduceError if a file that the mission names is not in it.
+    which ones comes second.
+
+    Args:
+        manifest: that of a report.
+        folder: where to; it is made.
+
+    Raises ReproduceError if a file that the mission names is not in the manifest.
     """
     stated, mirror = manifest.data["mission"], manifest.data.get("mirror")
     place = _written(folder, plain(stated["file"]) or "mission.toml", stated["text"])
@@ -268,7 +279,12 @@ def _written(folder: Path, name: str, text: str) -> Path:
 
 
 def renamed(record: Any, names: Mapping[str, str]) -> Any:
-    """A record of the mission with its keys `file` renamed, wherever they stand."""
+    """A record of the mission with its keys `file` renamed, wherever they stand.
+
+    Args:
+        record: with its inner ones.
+        names: new ones by the old.
+    """
     changed: dict[str, Any] = {}
     for key in type(record).model_fields:
         value = getattr(record, key)

@@ -96,7 +96,13 @@ def reproduce(path: Path, on_progress: Progress = lambda done, total, what: None
 
 
 def restored(text: str, moved: Mapping[str, str], written: Callable[[str], str]) -> str:
-    """The text with the names that the mission gives to its files in place of those that they were written under."""
+    """The text with the names that the mission gives to its files in place of those that they were written under.
+
+    Args:
+        text: of a page or a manifest.
+        moved: names that they were written under, by those that the mission gives.
+        written: how a name stands in the text.
+    """
     for name, own in moved.items():
         text = text.replace(written(own), written(name))
     return text

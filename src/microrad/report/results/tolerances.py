@@ -96,7 +96,13 @@ class Tolerance:
     distance: Mapping[str, float] = field(default_factory=dict)
 
     def allowed(self, was: float, now: float, unit: str) -> float:
-        """The distance up to which two values are the same."""
+        """The distance up to which two values are the same.
+
+        Args:
+            was: one value.
+            now: the other one.
+            unit: their unit, "" for none.
+        """
         return self.relative * max(abs(was), abs(now)) + self.distance.get(unit, 0.0)
 
 

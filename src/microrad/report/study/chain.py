@@ -195,7 +195,14 @@ def _verdict(study: Study) -> Stage:
 
 # ------------------------------------------------------------------------------------------------------------ drawing
 def layout(found: Sequence[Stage], columns: int, width: float, gap: float) -> Drawing:
-    """Boxes in rows of ``columns``, arrows from each to the next; ``width`` is that of the whole drawing."""
+    """Boxes in rows, arrows from each to the next.
+
+    Args:
+        found: the boxes in their order.
+        columns: of a row.
+        width: of the whole drawing, in its units.
+        gap: between boxes.
+    """
     own = (width - (columns - 1) * gap) / columns
     found = [_wrapped(s, int((own - 16.0) / _CHARACTER_WIDTH)) for s in found]
     rows = [found[at : at + columns] for at in range(0, len(found), columns)]

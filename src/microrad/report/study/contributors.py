@@ -28,7 +28,12 @@ _BY_TEN = ("bit_error_ratio", "outage")  # inputs that a tornado moves by their 
 
 
 def judged_table(study: Study, found: Sequence[Requirement]) -> Table:
-    """Requirements with what contributes most to each."""
+    """Requirements with what contributes most to each.
+
+    Args:
+        study: a run of a whole mission.
+        found: requirements of it.
+    """
     return requirement_table(found, [contributor(study, r) for r in found])
 
 
@@ -51,7 +56,12 @@ def _reading(r: Reading, met: bool) -> list[str | Cell]:
 
 
 def contributor(study: Study, r: Requirement) -> str:
-    """What contributes most to a requirement, with its numbers."""
+    """What contributes most to a requirement, with its numbers.
+
+    Args:
+        study: a run of a whole mission.
+        r: a requirement of it.
+    """
     fine = study.fine_case is not None and r in study.requirements
     return _capital(r.unknown or (_OF_FINE if fine else _CONTRIBUTORS)[r.subject](study, r.limited_by))
 
@@ -70,7 +80,12 @@ def _cone(study: Study) -> str:
 
 
 def advice(study: Study, r: Requirement) -> str:
-    """What to change for a requirement that the verdict judges, as the end of a sentence, or nothing."""
+    """What to change for a requirement that the verdict judges, as the end of a sentence, or nothing.
+
+    Args:
+        study: a run of a whole mission.
+        r: a requirement of it.
+    """
     m = study.file.mission
     if r.unknown:
         return ""

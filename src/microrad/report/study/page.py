@@ -58,7 +58,10 @@ class StudyFigures:
 def study_page(study: Study, drawn: StudyFigures, manifest: Mapping[str, Any]) -> str:
     """The page's HTML; every text of the mission is escaped, and nothing is loaded from anywhere.
 
-    ``manifest`` is put into the page as JSON: what `reproduce` runs again.
+    Args:
+        study: a run of a whole mission.
+        drawn: its figures.
+        manifest: is put into the page as JSON: what `reproduce` runs again.
     """
     views = study_views(study, drawn)
     text = mission_page(study.file, "study", [], [*views, _origin(manifest)], data="beside", manifest=True)
@@ -66,7 +69,12 @@ def study_page(study: Study, drawn: StudyFigures, manifest: Mapping[str, Any]) -
 
 
 def study_views(study: Study, drawn: StudyFigures) -> tuple[View, ...]:
-    """A whole study in the order of its page: the verdict, what to doubt, the chain part by part, the paper, inputs."""
+    """A whole study in the order of its page: the verdict, what to doubt, the chain part by part, the paper, inputs.
+
+    Args:
+        study: a run of a whole mission.
+        drawn: its figures.
+    """
     required, fine = study.file.mission.requirement.pointing_error_rad, study.fine_pointing
     found = told(
         verdict_view(study),

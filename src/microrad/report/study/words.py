@@ -273,7 +273,12 @@ def verdict_text(study: Study, width: int = 80, verbose: bool = False) -> str:
 
 
 def beyond_identified(study: Study, run: Run) -> str:
-    """The warning that a run drives the mirror faster or further than its model was identified for, or nothing."""
+    """The warning that a run drives the mirror faster or further than its model was identified for, or nothing.
+
+    Args:
+        study: a run of a whole mission.
+        run: one of its runs of the paper's loop.
+    """
     table, (low, high) = study.file.mission.mirror, run.drive_span_v
     beyond = []
     if run.fastest_drive_v_s > table.rate_limit_v_s:
