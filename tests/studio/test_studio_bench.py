@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -15,6 +16,7 @@ from microrad.loop import controller_study
 from microrad.loop import paper_cases as tracking
 from microrad.loop.pointing_loop import linear
 from microrad.mission.file import load_mission
+from microrad.report.tables import Table
 from microrad.studio.draft.draft import Draft
 from microrad.studio.draft.tables import with_mirror_file
 from microrad.studio.jobs.files import Job, Progress
@@ -472,8 +474,7 @@ def test_a_tuned_controller_has_the_numbers_of_the_study(mission, pi):
     assert pi.residual_rad == tuned.residual_rms_rad
     assert (pi.margins.modulus, pi.margins.gain_up) == (tuned.margins.modulus, tuned.margins.gain_up)
     assert pi.margins.modulus >= pi.asked_modulus == scene.table.modulus_margin
-    assert {name: value for name, (value, _) in pi.values.items()} == tuned.values
-    assert {unit for _, unit in pi.values.values()} == {"Hz"}
+    assert pi.tuned == ", ".join(f"{name} {value:.3g} Hz" for name, value in tuned.values.items())
     closed = linear.close(scene.loop, controller_study.build("PI", scene, tuned.controller))
     at = np.array([10.0, 100.0, 1000.0])
     expected = np.abs(linear.sensitivity(closed, at)[:, 0, 0])
@@ -561,23 +562,25 @@ def test_the_warnings_of_the_mirror_s_file_stand_beside_the_margins(mission, pi,
 
 
 def test_margins_in_words_against_what_is_asked_for(mission, pi):
-    rows = dict(control_view.margin_rows(pi))
-    assert rows["Modulus margin, least |1 + L|"] == f"{pi.margins.modulus:.3f} (asked for: 0.5)"
-    assert rows["Phase margin"].endswith("°")
-    assert rows["Residual of an axis, rms, linear"].endswith(" µrad")
-    assert control_view.value_rows(pi)[0][1].endswith(" Hz")
-    assert "Integral frequency" in dict(control_view.value_rows(pi))
-    assert control_view.table_row(pi)[0] == "PI"
-    assert control_view.waiting_row("PI")[2] == ""
-    assert control_view.notes(pi) == ()
     pid = control_model.controller(mission, PID)
-    assert control_view.table_row(pi)[1].endswith(" µrad")
-    assert control_view.table_row(pid)[1] == "not computed"
-    assert "asked for" not in dict(control_view.margin_rows(pid))["Modulus margin, least |1 + L|"]
-    assert "nothing shakes it" in control_view.notes(pid)[0]
     bound = replace(pi, bound_by=("modulus margin",), sensitivity=None, loop_gain=None)
-    assert control_view.notes(bound)[0] == "What keeps its residual from being smaller: modulus margin."
-    assert "slower than the control" in control_view.notes(bound)[1]
+    found = {"PI": pi, PID: pid, "PID": "being tuned ...", "bound": bound}
+    table = next(block for block in control_model.blocks(found) if isinstance(block, Table))
+    rows = [dict(zip(table.headings, row, strict=True)) for row in table.rows]
+    first, second, waiting, last = rows
+    assert [row["controller"] for row in rows] == [*found]
+    residual = "residual of an axis,\nrms in theory (µrad)"
+    assert float(first[residual]) == pytest.approx(1e6 * pi.residual_rad, rel=5e-3)
+    assert (second[residual], waiting[residual]) == ("", "")
+    assert re.fullmatch(r"integral frequency \d+ Hz, zero \d+ Hz", first["tuned to"])
+    assert (second["tuned to"], waiting["tuned to"]) == ("the gains of [control]", "being tuned ...")
+    assert (first["modulus"], second["modulus"]) == (f"{pi.margins.modulus:.2f}", f"{pid.margins.modulus:.2f}")
+    assert float(first["phase (°)"]) == pytest.approx(math.degrees(pi.margins.phase_rad), abs=0.5)
+    assert {waiting[heading] for heading in table.headings[3:]} == {""}
+    assert (first["bound by"], last["bound by"]) == ("nothing", "modulus margin")
+    assert control_view.notes(pi) == ()
+    assert "nothing shakes it" in control_view.notes(pid)[0]
+    assert "slower than the control" in control_view.notes(bound)[0]
     assert control_view.sensitivity_plot(bound)["data"] == control_view.gain_plot(bound)["data"] == []
 
 

@@ -19,7 +19,7 @@ from microrad.studio.jobs.queue import Job, JobError, Progress
 from microrad.studio.session import Session
 from microrad.studio.views import compare as compare_view
 from microrad.studio.views import runs as runs_view
-from microrad.studio.views.compare import Beside, Number
+from microrad.studio.views.compare import Number
 from shipped import DEFAULT, SHIPPED, links_alone
 
 
@@ -265,12 +265,10 @@ def test_only_results_that_are_there_and_inside_are_offered(session, tmp_path_fa
 def test_keys_that_differ_with_their_sources(draft):
     there = draft.set("terminals.leo_aperture", "6 cm").set("conventions.strehl", "ratio")
     found = compare_view.differences(draft, there)
-    assert [(each.key, each.here, each.there) for each in found] == [
-        ("terminals.leo_aperture", "5 cm", "6 cm"),
-        ("conventions.strehl", "decibel", "ratio"),
-    ]
-    assert found[0].here_source == "paper: Table 2"
-    assert compare_view.differences(draft, draft) == ()
+    assert [row[0] for row in found] == ["terminals.leo_aperture", "conventions.strehl"]
+    assert found[0][1:] == ("5 cm\npaper: Table 2", f"6 cm\n{there.values['terminals.leo_aperture'].source}")
+    assert [cell.partition("\n")[0] for cell in found[1][1:]] == ["decibel", "ratio"]
+    assert compare_view.differences(draft, draft) == []
 
 
 @pytest.mark.parametrize(
@@ -285,16 +283,16 @@ def test_keys_that_differ_with_their_sources(draft):
     ],
 )
 def test_an_equal_quantity_in_another_unit_is_no_difference(draft, key, same, other):
-    assert compare_view.differences(draft, draft.set(key, same)) == ()
-    assert [each.key for each in compare_view.differences(draft, draft.set(key, other))] == [key]
+    assert compare_view.differences(draft, draft.set(key, same)) == []
+    assert [row[0] for row in compare_view.differences(draft, draft.set(key, other))] == [key]
 
 
 def test_a_table_of_one_mission_alone_is_one_difference(draft):
     there = with_table(draft, "channel")
     (found,) = compare_view.differences(draft, there)
-    assert (found.key, found.here, found.there) == ("[channel]", "", "2 keys")
+    assert found == ("[channel]", "not given", "2 keys")
     (found,) = compare_view.differences(there, draft)
-    assert (found.here, found.there) == ("2 keys", "")
+    assert found[1:] == ("2 keys", "not given")
 
 
 def test_the_numbers_are_those_of_the_link_study(session, draft):
@@ -313,14 +311,35 @@ def test_the_numbers_are_those_of_the_link_study(session, draft):
 
 def test_numbers_beside_each_other_with_their_change():
     here, there = (
-        (Number("margin", 3.0, "dB"), Number("a", 1.0, "W")),
-        (Number("margin", 1.5, "dB"), Number("b", 1.0, "")),
+        (Number("margin", 3.0, "dB", "2.00 dB", True), Number("a", 1.0, "W")),
+        (Number("margin", 1.5, "dB", "2.00 dB", False), Number("b", 1.0, "")),
     )
-    found = compare_view.beside(here, there)
-    assert [(each.name, each.change) for each in found] == [("margin", "−1.50 dB"), ("a", ""), ("b", "")]
-    assert found[1].there is None
-    assert found[2].here is None
-    assert Beside("x", here[0], here[0]).change == "same"
+    assert compare_view.beside(here, there) == [
+        ("margin", "3.00 dB PASS\nrequired 2.00 dB", "1.50 dB FAIL\nrequired 2.00 dB", "−1.50 dB"),
+        ("a", "1 W", "none", ""),
+        ("b", "none", "1", ""),
+    ]
+    assert compare_view.beside(there, here)[0][3] == "+1.50 dB"
+    assert compare_view.beside(here, here)[0][3] == "same"
+
+
+def test_two_missions_are_compared_in_the_report_s_views(session, draft):
+    there, names = draft.set("terminals.leo_aperture", "6 cm"), ("a.toml", "b.toml")
+    links, verdicts, differ = compare_view.blocks(session, draft, there, names)
+    (table,) = links.blocks
+    assert table.headings == ("number", "in a.toml", "in b.toml", "change")
+    assert [row[0] for row in table.rows][:2] == ["Communication: margin", "Communication: received power"]
+    assert [block.text for block in verdicts.blocks] == [
+        f"{name}: no study of this text is in the folder; the page Runs makes one." for name in names
+    ]
+    count, table = differ.blocks
+    assert (count.partition(";")[0], [row[0] for row in table.rows]) == ("1 key differs", ["terminals.leo_aperture"])
+    links, _, differ = compare_view.blocks(session, draft, draft.set("terminals.leo_aperture", "5 parsec"), names)
+    said, table = links.blocks
+    assert said.headline.startswith("b.toml has no link budget:\n") and "parsec" in said.headline
+    assert not said.good and {row[2] for row in table.rows} == {"none"}
+    (same,) = compare_view.blocks(session, draft, draft, names)[2].blocks
+    assert same.text == "Every key has the same value in both."
 
 
 def test_the_study_of_exactly_this_text_is_found(session, draft):

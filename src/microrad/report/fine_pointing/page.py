@@ -1,7 +1,7 @@
 """The fine-pointing loop as a view: what each controller leaves, its design, the error budget, stroke and sines."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from microrad.core.units import format_quantity
 from microrad.loop.control import LoopMargins
@@ -138,35 +138,60 @@ def designs_view(fine: FinePointingStudy) -> View:
     rows = []
     for v in fine.verified:
         tuned = v.design.tuned
-        values = ", ".join(_value(name, value, units) for name, value in tuned.values.items())
         inverse = f"; inverse {v.design.inverse}" if v.design.inverse else ""
-        rows.append((v.design.name, values + inverse, *_margins(tuned.margins), ", ".join(tuned.bound_by) or "nothing"))
+        said = tuned_to(tuned.values, units) + inverse
+        rows.append((v.design.name, *design_cells(said, tuned.margins, tuned.bound_by)))
+    best = _best(fine, [v.design.name for v in fine.verified])
+    return View("What each controller was tuned to, and its margins", designs(rows, best=best), folded=True)
+
+
+def designs(
+    rows: Sequence[Sequence[str]], between: Sequence[str] = (), best: Sequence[int] = ()
+) -> tuple[str, Table, Soft]:
+    """The table of designs between the sentences that explain it.
+
+    Args:
+        rows: for each design its name, what stands in the columns ``between``, and its `design_cells`.
+        between: headings of further columns of numbers, behind the name.
+        best: rows that stand out, counted from 0.
+    """
     margins = "modulus", "gain (dB)", "phase (°)", "delay (µs)", "disk", "bandwidth (Hz)", "crossover (Hz)"
-    best = _best(fine, [row[0] for row in rows])
-    table = Table("", ("controller", "tuned to", *margins, "bound by"), rows, (0, 1, 9), best=best)
-    return View(
-        "What each controller was tuned to, and its margins",
-        (
-            "One axis, linear, on the sampled loop with its delay: the worst of the places where the loop can be cut.",
-            table,
-            Soft(
-                "Bandwidth: lowest frequency at which the sensitivity reaches 0 dB. Crossover: highest frequency at "
-                "which the loop gain does."
-            ),
+    headings = ("controller", *between, "tuned to", *margins, "bound by")
+    return (
+        "One axis, linear, on the sampled loop with its delay: the worst of the places where the loop can be cut.",
+        Table("", headings, rows, (0, 1 + len(between), len(headings) - 1), best=best),
+        Soft(
+            "Bandwidth: lowest frequency at which the sensitivity reaches 0 dB. Crossover: highest frequency at which "
+            "the loop gain does."
         ),
-        folded=True,
     )
 
 
-def _value(name: str, value: float, units: dict[str, str]) -> str:
-    unit = units.get(name, "")
-    return minus(f"{name} {format_quantity(value, unit, 3) if unit else f'{value:.3g}'}")
+def tuned_to(values: Mapping[str, float], units: Mapping[str, str]) -> str:
+    """What a controller was tuned to, in words.
+
+    Args:
+        values: its parameters in SI units, by name.
+        units: their SI units by name; a parameter without one is a plain number.
+    """
+    told = {
+        name: format_quantity(value, units[name], 3) if units.get(name) else f"{value:.3g}"
+        for name, value in values.items()
+    }
+    return minus(", ".join(f"{name} {value}" for name, value in told.items()))
 
 
-def _margins(margins: LoopMargins) -> list[str]:
-    """Modulus, gain (dB), phase (degrees), delay (µs), disk, bandwidth and crossover (Hz), in the table's order."""
+def design_cells(tuned: str, margins: LoopMargins, bound_by: Sequence[str]) -> tuple[str, ...]:
+    """A design in the table of `designs`, behind its name.
+
+    Args:
+        tuned: what it was tuned to, in words.
+        margins: those of its nominal loop.
+        bound_by: what keeps its residual from being smaller.
+    """
     gain = 20.0 * math.log10(margins.gain_up)
-    return [
+    return (
+        tuned,
         f"{margins.modulus:.2f}",
         _or(f"{gain:.1f}", gain, "any"),
         _or(f"{math.degrees(margins.phase_rad):.0f}", margins.phase_rad, "any"),
@@ -174,7 +199,8 @@ def _margins(margins: LoopMargins) -> list[str]:
         f"{margins.disk:.2f}",
         f"{margins.bandwidth_hz:.3g}",
         _or(f"{margins.crossover_hz:.3g}", margins.crossover_hz, "none"),
-    ]
+        ", ".join(bound_by) or "nothing",
+    )
 
 
 def _or(text: str, value: float, instead: str) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -10,15 +9,15 @@ from typing import Any
 from nicegui import ui
 
 from microrad.mission import presets
+from microrad.report.view import Soft
 from microrad.studio import commands
 from microrad.studio.commands import Action
 from microrad.studio.draft.draft import Draft
 from microrad.studio.pages import layout
-from microrad.studio.pages.elements import text_table
+from microrad.studio.pages.elements import Blocks
 from microrad.studio.pages.in_thread import in_thread
 from microrad.studio.session import Session
 from microrad.studio.views import compare as compare_view
-from microrad.studio.views.compare import Beside, Found, Number
 from microrad.studio.views.runs import campaign_files
 
 TITLE = "Compare"
@@ -32,15 +31,6 @@ _PRESET = "the preset "
 def page(session: Session) -> None:
     """The choice of the other mission, and the tables of both."""
     _Page(session)
-
-
-@dataclass(frozen=True, slots=True)
-class _Both:
-    """What is shown: the numbers of both, or why there are none."""
-
-    numbers: tuple[Beside, ...]
-    faults: tuple[str, str]
-    studies: tuple[Found | None, Found | None]
 
 
 class _Page:
@@ -57,7 +47,7 @@ class _Page:
             ui.label("for the other:").classes("soft")
             layout.copy_buttons(partial(self._action, other=True))
         self.fault = ui.label().classes("no kept").props('role="alert"')
-        self.place = ui.column().classes("compare-tables")
+        self.told = Blocks()
         layout.follow(session, self._look)
 
     def _options(self) -> dict[str, str]:
@@ -122,99 +112,13 @@ class _Page:
         """Compute in a thread, and show it if nothing has changed meanwhile."""
         here, there = self.session.draft, self.session.other
         if there is None:
-            self.place.clear()
-            with self.place:
-                ui.label("Choose the mission that this one is to be compared with.").classes("soft")
-            return
-        both = await in_thread(self.place, _both, self.session, here, there)
-        if asked != self.asked:
+            self.told.show_blocks([Soft("Choose the mission that this one is to be compared with.")])
             return
         names = (self.session.name_of(here.path), self._name(there))
-        self.place.clear()
-        with self.place:
-            _numbers(both, names)
-            _studies(both, names)
-            _differences(here, there, names)
+        blocks = await in_thread(self.told, compare_view.blocks, self.session, here, there, names)
+        if asked == self.asked:
+            self.told.show_blocks(blocks)
 
     def _name(self, draft: Draft) -> str:
         name = self.session.name_of(draft.path)
         return f"{name} (saved)" if draft.path == self.session.draft.path else name
-
-
-def _both(session: Session, here: Draft, there: Draft) -> _Both:
-    (ours, why), (theirs, why_not) = _of_links(here), _of_links(there)
-    studies = (compare_view.finished_study(session, here), compare_view.finished_study(session, there))
-    return _Both(compare_view.beside(ours, theirs), (why, why_not), studies)
-
-
-def _of_links(draft: Draft) -> tuple[tuple[Number, ...], str]:
-    try:
-        return compare_view.link_numbers(draft), ""
-    except ValueError as error:
-        return (), str(error)
-
-
-def _differences(here: Draft, there: Draft, names: tuple[str, str]) -> None:
-    found = compare_view.differences(here, there)
-    layout.heading(f"Differences: {len(found)}")
-    if not found:
-        ui.label("Every key has the same value in both.").classes("soft")
-        return
-    with text_table("Key", *names):
-        for each in found:
-            with ui.element("tr"):
-                layout.words("th", each.key).props("scope=row")
-                _cell(each.here, each.here_source)
-                _cell(each.there, each.there_source)
-
-
-def _numbers(both: _Both, names: tuple[str, str]) -> None:
-    layout.heading("Links")
-    for name, fault in zip(names, both.faults, strict=True):
-        if fault:
-            ui.label(f"{name} has no link budget.").classes("no")
-            ui.label(fault).classes("small kept")
-    if both.numbers:
-        _table(both.numbers, names)
-
-
-def _studies(both: _Both, names: tuple[str, str]) -> None:
-    layout.heading("Verdicts")
-    for name, found in zip(names, both.studies, strict=True):
-        words = (
-            f"{name}: {found.verdict} ({found.folder})"
-            if found
-            else f"{name}: no study of this text is in the folder; the page Runs makes one."
-        )
-        ui.label(words).classes("soft" if found is None else "yes" if found.met else "no")
-    if any(both.studies):
-        ours, theirs = (() if found is None else found.numbers for found in both.studies)
-        _table(compare_view.beside(ours, theirs), names)
-
-
-def _table(rows: tuple[Beside, ...], names: tuple[str, str]) -> None:
-    with text_table("Number", *names, "Change"):
-        for row in rows:
-            with ui.element("tr"):
-                layout.words("th", row.name).props("scope=row")
-                _number(row.here)
-                _number(row.there)
-                layout.words("td", row.change).classes("number")
-
-
-def _cell(typed: str, source: str) -> None:
-    with ui.element("td"):
-        layout.words("div", typed or "not given").classes("" if typed else "soft")
-        layout.words("div", source).classes("small soft")
-
-
-def _number(number: Number | None) -> None:
-    with ui.element("td").classes("number"):
-        if number is None:
-            layout.words("span", "none").classes("soft")
-            return
-        layout.words("span", number.text)
-        if number.met is not None:
-            mark = "PASS" if number.met else "FAIL"
-            layout.words("span", f"  {mark}").classes(f"{mark} compare-mark")
-            layout.words("div", f"required {number.required}").classes("small soft")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +10,10 @@ from nicegui import background_tasks, ui
 
 from microrad.mission.file import MissionFile
 from microrad.mission.tables.fine_pointing import FinePointing
+from microrad.report.view import Block
 from microrad.studio import commands
 from microrad.studio.pages import layout
-from microrad.studio.pages.elements import Figure, fill, numbers, table
+from microrad.studio.pages.elements import Blocks, Figure
 from microrad.studio.pages.in_thread import in_thread, stay
 from microrad.studio.session import Session
 from microrad.studio.views import control as control_view
@@ -22,14 +23,6 @@ from microrad.studio.views.plots import empty
 TITLE = "Control"
 PATH = "/control"
 
-_TABLE = (
-    "Controller",
-    "Residual of an axis (rms, linear)",
-    "Modulus margin",
-    "Gain margin",
-    "Phase margin",
-    "Bandwidth",
-)
 _PLOTS = {
     "sensitivity": "Sensitivity by frequency",
     "gain": "Loop gain by frequency",
@@ -57,7 +50,7 @@ class ControlPage:
         self.session = session
         self.file: MissionFile | None = None
         self.question, self.round, self.filling = 0, 0, False
-        self.rows: dict[str, tuple[str, ...]] = {}
+        self.found: dict[str, Controller | str] = {}
         self.plots: dict[str, Any] = {}
         layout.copy_buttons(lambda: commands.design(Path(session.name_of(session.draft.path))))
         self.words = ui.label().classes("no kept").props('role="alert"')
@@ -72,7 +65,7 @@ class ControlPage:
             self.tune = ui.button("Tune all", on_click=self.tune_all).props("no-caps dense outline")
             self.stop = ui.button("Stop", on_click=self.stop_all).props("no-caps dense flat")
             self.stop.visible = False
-        self.table = table(_TABLE, numbers=range(1, 6))
+        self.table = Blocks()
 
     def _one(self) -> None:
         layout.heading("One controller")
@@ -87,7 +80,6 @@ class ControlPage:
         self.state = ui.label().classes("soft").props('role="status"')
         self.fault = ui.label().classes("no kept").props('role="alert"')
         self.notes = ui.column().classes("gap-0")
-        self.numbers = ui.element("dl").classes("numbers")
         layout.heading("By frequency", 3)
         self._plots("sensitivity", "gain")
         layout.heading("A step of the reference on axis x", 3)
@@ -122,7 +114,7 @@ class ControlPage:
             return
         names = await in_thread(self.table, _names, file.mission.fine_pointing)
         self.file, self.round = file, self.round + 1
-        self.rows = {name: control_view.waiting_row(name) for name in names}
+        self.found = dict.fromkeys(names, "not looked at yet")
         self._table()
         self.filling = True
         if not self.name.value:
@@ -141,7 +133,7 @@ class ControlPage:
         self.round += 1
         mine, file = self.round, self.file
         self.tune.visible, self.stop.visible = False, True
-        for name in list(self.rows):
+        for name in list(self.found):
             if mine != self.round:
                 break
             await self._tuned(file, name)
@@ -156,23 +148,23 @@ class ControlPage:
     async def _tuned(self, file: MissionFile, name: str) -> Controller | None:
         """A controller, and its row; None where it cannot be built, which its row says."""
 
-        def told(row: tuple[str, ...]) -> None:
+        def told(now: Controller | str) -> None:
             if file is self.file:
-                self.rows[name] = row
+                self.found[name] = now
                 self._table()
 
-        if not self.rows[name][2]:
-            told(control_view.waiting_row(name, "being tuned ..."))
+        if isinstance(self.found[name], str):
+            told("being tuned ...")
         try:
             found = await in_thread(self.table, _controller, file, name)
         except ValueError as error:
-            told(control_view.waiting_row(name, str(error)))
+            told(str(error))
             return None
-        told(control_view.table_row(found))
+        told(found)
         return found
 
     def _table(self) -> None:
-        fill(self.table, list(self.rows.values()))
+        self.table.show_blocks(_blocks(self.found))
 
     # -------------------------------------------------------------------------------------------------------------- one
     async def show(self) -> None:
@@ -206,11 +198,11 @@ class ControlPage:
             self._dim([])
 
     def _dim(self, plots: Collection[str]) -> None:
-        """Turn grey the plots that answer another question than the one that is typed, and the words and numbers."""
+        """Turn grey the plots that answer another question than the one that is typed, and the words."""
         told = self.told_step, self.told_sine, self.told_jitter
         grey = [self.plots[name] for name in plots] + [*(told if plots else ())]
-        grey += [self.numbers, self.notes] if any(name in plots for name in _OWN) else []
-        for each in (*self.plots.values(), *told, self.numbers, self.notes):
+        grey += [self.notes] if any(name in plots for name in _OWN) else []
+        for each in (*self.plots.values(), *told, self.notes):
             layout.grey(each, each in grey)
 
     def _controller(self, found: Controller) -> None:
@@ -218,9 +210,6 @@ class ControlPage:
         with self.notes:
             for note in control_view.notes(found):
                 ui.label(note).classes("soft")
-        self.numbers.clear()
-        with self.numbers:
-            numbers((*control_view.margin_rows(found), *control_view.value_rows(found)))
         self.plots["sensitivity"].show(control_view.sensitivity_plot(found))
         self.plots["gain"].show(control_view.gain_plot(found))
 
@@ -246,6 +235,12 @@ def _names(table: FinePointing | None) -> tuple[str, ...]:
     from microrad.studio.views import controllers
 
     return controllers.names(table)
+
+
+def _blocks(found: Mapping[str, Controller | str]) -> Sequence[Block]:
+    from microrad.studio.views import controllers
+
+    return controllers.blocks(found)
 
 
 def _controller(file: MissionFile, name: str) -> Controller:

@@ -7,7 +7,7 @@ text NiceGUI builds the whole page anew, which takes longer than drawing.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
+from contextlib import AbstractContextManager, nullcontext, suppress
 from typing import Any
 
 from nicegui import ui
@@ -168,7 +168,7 @@ def _say(part: Any, block: Block) -> None:
             part.text = getattr(block, "text", block)
 
 
-_LOOKS: dict[object, str] = {Soft: "soft", Verbatim: "kept mono", True: "PASS", False: "FAIL"}
+_LOOKS: dict[object, str] = {Soft: "soft", Verbatim: "kept mono", True: "PASS kept", False: "FAIL kept"}
 
 
 def _form(blocks: Sequence[Block]) -> tuple[Any, ...]:
@@ -204,19 +204,6 @@ def _columns(headings: Sequence[str], numbers: Collection[int] = ()) -> list[dic
         }
         for place, heading in enumerate(headings)
     ]
-
-
-@contextmanager
-def text_table(*headings: str, caption: str = "") -> Iterator[None]:
-    """A table of elements, as wide as it must be, with its headings; the rows are filled in."""
-    with ui.element("div").classes("compare-scroll"), layout.words("table").classes("compare-table"):
-        if caption:
-            layout.words("caption", caption)
-        with ui.element("thead"), ui.element("tr"):
-            for heading in headings:
-                layout.words("th", heading).props("scope=col")
-        with ui.element("tbody"):
-            yield
 
 
 def numbers(pairs: Sequence[tuple[str, str]]) -> None:

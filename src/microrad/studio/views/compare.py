@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from decimal import Decimal
@@ -14,23 +15,15 @@ from microrad.core.units import UnitError, parse_quantity
 from microrad.link import study as link_study
 from microrad.mission.toml import value_of
 from microrad.report.quantities import quantity
+from microrad.report.tables import Table
+from microrad.report.view import Soft, Verdict, View, told
 from microrad.studio.draft.draft import Draft, Value
 from microrad.studio.session import Session
 from microrad.studio.views.link import ROUNDING_DB
 
 _MOST_FOLDERS = 500
 _MOST_BYTES = 5_000_000
-
-
-@dataclass(frozen=True, slots=True)
-class Difference:
-    """A key that two missions do not agree on: its value in each, "" where it has none, and where each comes from."""
-
-    key: str
-    here: str
-    there: str
-    here_source: str
-    there_source: str
+_ABSENT = "not given"
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,45 +42,104 @@ class Number:
         return quantity(self.value, self.unit) if self.unit else f"{self.value:.4g}"
 
 
-@dataclass(frozen=True, slots=True)
-class Beside:
-    """A number in both missions, None where one of them has it not."""
+def blocks(session: Session, here: Draft, there: Draft, names: tuple[str, str]) -> tuple[View, ...]:
+    """The tables of two missions: what follows from their links, their studies, and what differs.
 
-    name: str
-    here: Number | None
-    there: Number | None
+    Args:
+        session: whose working folder has the studies.
+        here: the first mission.
+        there: the second.
+        names: what both are called.
+    """
+    (links, why), (others, why_not) = _links(here), _links(there)
+    studies = [finished_study(session, each) for each in (here, there)]
+    faults = [
+        Verdict(f"{name} has no link budget:\n{fault}", (), False)
+        for name, fault in zip(names, (why, why_not), strict=True)
+        if fault
+    ]
+    verdicts = [
+        Verdict(f"{name}: {each.verdict} ({each.folder})", (), each.met)
+        if each
+        else Soft(f"{name}: no study of this text is in the folder; the page Runs makes one.")
+        for name, each in zip(names, studies, strict=True)
+    ]
+    ours, theirs = (() if each is None else each.numbers for each in studies)
+    differ = differences(here, there)
+    count = f"{len(differ)} key{'s differ' if len(differ) > 1 else ' differs'}; a table that one of them lacks is one."
+    columns = ("key", *(f"in {name}" for name in names))
+    return (
+        View("Links", told(*faults, _numbers(links, others, names))),
+        View("Verdicts", told(*verdicts, _numbers(ours, theirs, names))),
+        View("Differences", (count, Table("", columns, differ, words=range(3))))
+        if differ
+        else View("Differences", (Soft("Every key has the same value in both."),)),
+    )
 
-    @property
-    def change(self) -> str:
-        """The second less the first, with its sign; "same" where both are shown alike."""
-        if self.here is None or self.there is None:
-            return ""
-        change = self.there.value - self.here.value
-        if self.here.text == self.there.text:
-            return "same"
-        sign = "" if change < 0.0 else "+"
-        return f"{sign}{Number(self.name, change, self.here.unit).text}"
+
+def _links(draft: Draft) -> tuple[tuple[Number, ...], str]:
+    """What follows from the links, and why nothing does."""
+    try:
+        return link_numbers(draft), ""
+    except ValueError as error:
+        return (), str(error)
 
 
-def differences(here: Draft, there: Draft) -> tuple[Difference, ...]:
-    """The keys whose values differ, in the order of the first mission, then of the second.
+def _numbers(ours: Sequence[Number], theirs: Sequence[Number], names: tuple[str, str]) -> Table | None:
+    rows = beside(ours, theirs)
+    return Table("", ("number", *(f"in {name}" for name in names), "change"), rows) if rows else None
+
+
+def beside(ours: Sequence[Number], theirs: Sequence[Number]) -> list[tuple[str, str, str, str]]:
+    """The numbers of both by name, in the order of the first, then of the second, and the second less the first.
+
+    Args:
+        ours: numbers of the first mission.
+        theirs: numbers of the second.
+    """
+    first, second = {n.name: n for n in ours}, {n.name: n for n in theirs}
+    pairs = {name: (first.get(name), second.get(name)) for name in (*first, *second)}
+    return [(name, _cell(a), _cell(b), _change(a, b)) for name, (a, b) in pairs.items()]
+
+
+def _cell(number: Number | None) -> str:
+    if number is None or number.met is None:
+        return "none" if number is None else number.text
+    return f"{number.text} {'PASS' if number.met else 'FAIL'}\nrequired {number.required}"
+
+
+def _change(here: Number | None, there: Number | None) -> str:
+    if here is None or there is None:
+        return ""
+    change = Number("", there.value - here.value, here.unit)
+    return "same" if here.text == there.text else f"{'' if change.value < 0.0 else '+'}{change.text}"
+
+
+def differences(here: Draft, there: Draft) -> list[tuple[str, str, str]]:
+    """The keys whose values differ, in the order of the first mission, then of the second: key, values with sources.
 
     Quantities that are equal in other units ("5 cm", "50 mm") do not differ, nor do other words for the same number. A
     table that only one of them has is one difference, "[orbit]", with the number of its keys.
+
+    Args:
+        here: the first mission.
+        there: the second.
     """
     ours, theirs = here.values, there.values
-    found: dict[str, Difference] = {}
+    found: dict[str, tuple[str, str, str]] = {}
     for key in dict.fromkeys((*ours, *theirs)):
         a, b = ours.get(key), theirs.get(key)
         table = key.partition(".")[0]
         alone = "." in key and not (_keys_of(table, ours) and _keys_of(table, theirs))
         if alone:
-            here_keys, there_keys = (_count(_keys_of(table, values)) for values in (ours, theirs))
-            found[table] = Difference(f"[{table}]", here_keys, there_keys, "", "")
+            found[table] = (f"[{table}]", _count(_keys_of(table, ours)), _count(_keys_of(table, theirs)))
         elif a is None or b is None or _meant(a) != _meant(b):
-            typed = ("" if each is None else each.typed for each in (a, b))
-            found[key] = Difference(key, *typed, *("" if each is None else each.source for each in (a, b)))
-    return tuple(found.values())
+            found[key] = (key, _typed(a), _typed(b))
+    return list(found.values())
+
+
+def _typed(value: Value | None) -> str:
+    return _ABSENT if value is None else "\n".join(filter(None, (value.typed, value.source)))
 
 
 def _keys_of(table: str, values: dict[str, Value]) -> int:
@@ -95,7 +147,7 @@ def _keys_of(table: str, values: dict[str, Value]) -> int:
 
 
 def _count(keys: int) -> str:
-    return f"{keys} key{'' if keys == 1 else 's'}" if keys else ""
+    return f"{keys} key{'' if keys == 1 else 's'}" if keys else _ABSENT
 
 
 def _meant(value: Value) -> object:
@@ -132,12 +184,6 @@ def link_numbers(draft: Draft) -> tuple[Number, ...]:
         if study.finding.wide.possible:
             found.append(Number("Acquisition by the wide beacon: mean time", outcome.mean_time_s, "s"))
     return tuple(found)
-
-
-def beside(here: tuple[Number, ...], there: tuple[Number, ...]) -> tuple[Beside, ...]:
-    """The numbers of both, by name, in the order of the first, then of the second."""
-    ours, theirs = {n.name: n for n in here}, {n.name: n for n in there}
-    return tuple(Beside(name, ours.get(name), theirs.get(name)) for name in dict.fromkeys((*ours, *theirs)))
 
 
 # ------------------------------------------------------------------------------------------------------------- studies

@@ -1,4 +1,4 @@
-"""What the control page shows of a controller: margins as rows, responses by frequency and in time as plots.
+"""What the control page shows of a controller: responses by frequency and in time as plots, and answers in words.
 
 `controllers` computes it, and loads the kernels for it. Times are in s, angles in rad, drives in V from the bias.
 """
@@ -16,6 +16,7 @@ from microrad.core.arrays import Floats
 from microrad.core.units import UnitError, format_quantity, parse_quantity
 from microrad.report.plotting.palette import BLACK, BLUE, GREEN, GREY, VERMILION
 from microrad.report.plotting.sheet import Axis, Line, Mark, Rule
+from microrad.report.quantities import angle, given_angle, quantity
 from microrad.studio.views.plots import Plot, empty, plot
 
 if TYPE_CHECKING:
@@ -81,16 +82,17 @@ class Answers:
 class Controller:
     """A controller, ready to be asked.
 
-    ``values`` are what it was tuned to by name, each with its unit. ``loop_gain`` and ``sensitivity`` are magnitudes at
-    ``freq_hz``, None where a slower sensor folds frequencies. ``limits_v`` are the amplifier's about the bias,
+    ``tuned`` says what it was tuned to. ``residual_rad`` is the rms of an axis in theory, nan where nothing shakes it.
+    ``asked_modulus`` is the margin that was asked for, nan for none. ``loop_gain`` and ``sensitivity`` are magnitudes
+    at ``freq_hz``, None where a slower sensor folds frequencies. ``limits_v`` are the amplifier's about the bias,
     ``identified_v`` the range that the mirror was identified in. ``rate_hz`` is that of the control,
-    ``field_of_view_rad`` the radial error beyond which the sensor holds its last reading. ``warnings`` say what
-    the mirror leaves out.
+    ``field_of_view_rad`` the radial error beyond which the sensor holds its last reading. ``warnings`` say what the
+    mirror leaves out.
     """
 
     name: str
     margins: LoopMargins
-    values: dict[str, tuple[float, str]]
+    tuned: str
     residual_rad: float
     bound_by: tuple[str, ...]
     asked_modulus: float
@@ -142,39 +144,6 @@ def _quantity(name: str, typed: str, unit: str, least: float, most: float) -> fl
 
 
 # --------------------------------------------------------------------------------------------------------------- words
-def margin_rows(of: Controller) -> list[tuple[str, str]]:
-    """The margins in words, the modulus against what is asked for."""
-    m = of.margins
-    asked = "" if math.isnan(of.asked_modulus) else f" (asked for: {of.asked_modulus:g})"
-    rows = [
-        ("Modulus margin, least |1 + L|", f"{m.modulus:.3f}{asked}"),
-        ("Gain margin", _gain(m.gain_up)),
-        ("Phase margin", "none" if math.isinf(m.phase_rad) else f"{math.degrees(m.phase_rad):.1f}°"),
-        ("Delay margin", _told(m.delay_s, "s")),
-        ("Crossover, |L| = 1", _told(m.crossover_hz, "Hz")),
-        ("Bandwidth, |S| = 1", _told(m.bandwidth_hz, "Hz")),
-        ("Largest |S|", f"{m.peak:.3f} ({20 * math.log10(m.peak):.2f} dB)"),
-    ]
-    if math.isfinite(of.residual_rad):
-        rows.append(("Residual of an axis, rms, linear", _told(of.residual_rad, "rad")))
-    return rows
-
-
-def _gain(factor: float) -> str:
-    return "none" if math.isinf(factor) else f"{factor:.3g} ({20 * math.log10(factor):.1f} dB)"
-
-
-def _told(value: float, unit: str) -> str:
-    return "none" if not math.isfinite(value) else format_quantity(float(f"{value:.4g}"), unit)
-
-
-def value_rows(of: Controller) -> list[tuple[str, str]]:
-    """What the controller was tuned to."""
-    return [
-        (f"{name[:1].upper()}{name[1:]}", f"{value:.5g} {unit}".rstrip()) for name, (value, unit) in of.values.items()
-    ]
-
-
 def notes(of: Controller) -> tuple[str, ...]:
     """What has to be known to read the numbers."""
     told = []
@@ -182,37 +151,18 @@ def notes(of: Controller) -> tuple[str, ...]:
         told.append(
             "The gains of [control] as they stand in the mission: this loop is not tuned, and nothing shakes it."
         )
-    if of.bound_by:
-        told.append(f"What keeps its residual from being smaller: {', '.join(of.bound_by)}.")
     if of.sensitivity is None:
         told.append("The optical sensor is slower than the control: the loop has no response by frequency of its own.")
     return (*told, *of.warnings)
 
 
-def table_row(of: Controller) -> tuple[str, ...]:
-    """The controller as a row of the table of all."""
-    m = of.margins
-    residual = _told(of.residual_rad, "rad") if math.isfinite(of.residual_rad) else "not computed"
-    phase = f"{math.degrees(m.phase_rad):.1f}°" if math.isfinite(m.phase_rad) else "none"
-    return (of.name, residual, f"{m.modulus:.3f}", _gain(m.gain_up), phase, _told(m.bandwidth_hz, "Hz"))
-
-
-def waiting_row(name: str, words: str = "not looked at yet") -> tuple[str, ...]:
-    """A row of the table for a controller of which nothing is known."""
-    return (name, words, "", "", "", "")
-
-
 def answer_words(curves: dict[str, Curve], what: str, field_of_view_rad: float = math.inf) -> str:
     """Rms and peak of the error of each variant in a sentence, and one on a sensor that has lost sight of it."""
-    told = [
-        f"{variant} {format_quantity(float(f'{c.rms_rad:.3g}'), 'rad')} rms, at most "
-        f"{format_quantity(float(f'{c.peak_rad:.3g}'), 'rad')}"
-        for variant, c in curves.items()
-    ]
+    told = [f"{variant} {angle(c.rms_rad)} rms, at most {angle(c.peak_rad)}" for variant, c in curves.items()]
     words = f"{what}: {'; '.join(told)}." if told else ""
     if not any(c.peak_rad > field_of_view_rad for c in curves.values()):
         return words
-    view = format_quantity(field_of_view_rad, "rad")
+    view = given_angle(field_of_view_rad)
     return f"{words} The sensor sees errors up to {view}: beyond, it holds its last reading, and the loop does not act."
 
 
@@ -241,7 +191,7 @@ def _by_frequency(of: Controller, values: Floats, title: str, mark: str, at: flo
     low, high = max(float(np.min(values)), _LEAST), float(np.max(values))
     shown: list[Mark] = [*marks, Rule(1.0, False, GREY, ":")]
     if math.isfinite(at) and at > 0.0:
-        shown.append(Rule(at, True, GREEN, "-.", 1.3, f"{mark} {_told(at, 'Hz')}"))
+        shown.append(Rule(at, True, GREEN, "-.", 1.3, f"{mark} {quantity(at, 'Hz')}"))
     x = Axis("frequency (Hz)", log=True, low=of.freq_hz[0], high=of.freq_hz[-1])
     return plot(x, Axis(title, log=True, low=low, high=1.3 * high), *shown)
 

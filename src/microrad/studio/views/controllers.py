@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import threading
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 
@@ -29,6 +30,9 @@ from microrad.loop.pointing_loop.loop import LoopController, PointingLoop
 from microrad.mirror import Variant
 from microrad.mission.file import MissionFile
 from microrad.mission.tables.fine_pointing import FinePointing
+from microrad.report.fine_pointing.page import design_cells, designs, tuned_to
+from microrad.report.quantities import micro
+from microrad.report.view import Block
 from microrad.studio.views.control import PID, PID_INVERSE, WITH, WITHOUT, Answers, Ask, Controller, Curve
 
 _POINTS = 500
@@ -45,6 +49,18 @@ def names(table: FinePointing | None) -> tuple[str, ...]:
     return (*(() if table is None else controller_study.names(table)), PID, PID_INVERSE)
 
 
+def blocks(found: Mapping[str, Controller | str]) -> tuple[Block, ...]:
+    """The report's table of designs, by their names; a text in place of one says why there is none yet."""
+    rows = [
+        (name, "", each, *_UNKNOWN)
+        if isinstance(each, str)
+        else (name, micro(each.residual_rad), *design_cells(each.tuned, each.margins, each.bound_by))
+        for name, each in found.items()
+    ]
+    return designs(rows, between=("residual of an axis,\nrms in theory (µrad)",))
+
+
+_UNKNOWN = ("",) * 8  # margins, and what a design is bound by
 _MOST_KEPT = 32
 _kept: dict[tuple[str, str, str], Controller] = {}
 _tuning = threading.Lock()  # two pages that want the same controller tune it once
@@ -86,7 +102,7 @@ def _fine(scene: controller_study.Scene, name: str) -> Controller:
     return Controller(
         name,
         tuned.margins,
-        {key: (value, units.get(key, "")) for key, value in tuned.values.items()},
+        tuned_to(tuned.values, units),
         tuned.residual_rms_rad,
         tuned.bound_by,
         table.modulus_margin,
@@ -176,7 +192,7 @@ def _pid(cases: paper_cases.PaperCases, name: str) -> Controller:
     return Controller(
         name,
         found,
-        {},
+        "the gains of [control]",
         math.nan,
         (),
         math.nan,
