@@ -5,7 +5,7 @@ Both plug into pydantic as annotations, `Annotated[float, Quantity("W", above=0.
 
 import math
 import re
-from collections.abc import Hashable, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, fields
 from functools import cache
 from itertools import pairwise
@@ -318,7 +318,7 @@ class Bounded:
 
     def __post_init__(self) -> None:
         """Raises ValueError if a value is not finite or out of its bounds."""
-        record: Hashable = type(self)
+        record: Any = type(self)
         for name, default, rule, why in _bounds(record):
             value = getattr(self, name)
             if value != default:
@@ -371,6 +371,31 @@ class Table(BaseModel):
         """
         name, _, rest = key.partition(".")
         return self.model_copy(update={name: getattr(self, name).with_value(rest, value) if rest else value})
+
+    def choice_problems(
+        self,
+        choice: str,
+        needed: Mapping[str, str],
+        allowed: Collection[str] = (),
+        instead: Callable[[str], str] = lambda key: "",
+    ) -> Iterator[Problem]:
+        """Of the keys that may be left out: those that a choice needs and that are missing, and those of no use to it.
+
+        Args:
+            choice: The choice in words, such as 'kind = "circular"'.
+            needed: The keys that it needs, each with a value that could stand there.
+            allowed: Other keys that may be there.
+            instead: Gives the choice that a key belongs to, in words, or nothing.
+        """
+        for name, info in type(self).model_fields.items():
+            if info.is_required():
+                continue
+            key, present = info.alias or name, getattr(self, name) is not None
+            if key in needed and not present:
+                yield Problem(key, f"is missing, and {choice} needs it", f"{key} = {needed[key]} would do")
+            if present and key not in (*needed, *allowed):
+                other = f", or {instead(key)}" if instead(key) else ""
+                yield Problem(key, f"does not belong to {choice}", f"this line removed{other}")
 
     def problems(self) -> Iterator[Problem]:
         """What does not fit together in a table whose keys are each in order."""

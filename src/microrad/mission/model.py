@@ -114,10 +114,10 @@ class Amplifier(Table):
     """From the controller's output to the piezo: gain, then limits at the amplifier's output."""
 
     gain: Annotated[float, Quantity("", above=0.0)]
-    output_min_v: Voltage = Field(alias="output_min")
-    output_max_v: Voltage = Field(alias="output_max")
-    bandwidth_hz: Frequency = Field(alias="bandwidth", description="first-order corner")
-    slew_v_s: Rate = Field(alias="slew", description="at the amplifier's output")
+    output_min_v: Voltage
+    output_max_v: Voltage
+    bandwidth_hz: Frequency = Field(description="first-order corner")
+    slew_v_s: Rate = Field(description="at the amplifier's output")
 
     def problems(self) -> Iterator[Problem]:
         """An output range that goes up."""
@@ -129,18 +129,17 @@ class Amplifier(Table):
 class Control(Table):
     """The sampled loop. A resolution of "0 V" or "0 urad" is an ideal converter or sensor."""
 
-    rate_hz: Frequency = Field(alias="rate", description="sample rate of the controller")
-    delay_s: DurationOrZero = Field(alias="delay", description="from sampling to the changed output")
-    plant_step_s: Duration = Field(alias="plant_step", description="step of the simulated plant")
-    drive_resolution_v: Step = Field(alias="drive_resolution", description='one count; "0 V" is ideal')
-    sensor_resolution_rad: AngleOrZero = Field(alias="sensor_resolution", description='one count; "0 urad" is ideal')
-    proportional_v_rad: Annotated[float, Quantity("V/rad", "V/mrad", least=0.0)] = Field(alias="proportional")
-    integral_v_rad_s: Annotated[float, Quantity("V/(rad s)", "V/(mrad s)", least=0.0)] = Field(alias="integral")
-    derivative_v_s_rad: Annotated[float, Quantity("V s/rad", "V s/mrad", least=0.0)] = Field(alias="derivative")
-    derivative_filter_s: Duration = Field(alias="derivative_filter", description="time constant")
+    rate_hz: Frequency = Field(description="sample rate of the controller")
+    delay_s: DurationOrZero = Field(description="from sampling to the changed output")
+    plant_step_s: Duration = Field(description="step of the simulated plant")
+    drive_resolution_v: Step = Field(description='one count; "0 V" is ideal')
+    sensor_resolution_rad: AngleOrZero = Field(description='one count; "0 urad" is ideal')
+    proportional_v_rad: Annotated[float, Quantity("V/rad", "V/mrad", least=0.0)]
+    integral_v_rad_s: Annotated[float, Quantity("V/(rad s)", "V/(mrad s)", least=0.0)]
+    derivative_v_s_rad: Annotated[float, Quantity("V s/rad", "V s/mrad", least=0.0)]
+    derivative_filter_s: Duration = Field(description="time constant")
     for_mirror_gain_rad_v: MirrorGain = Field(
-        alias="for_mirror_gain",
-        description="for a mirror of another gain the gains are scaled to keep the loop gain",
+        description="for a mirror of another gain the gains are scaled to keep the loop gain"
     )
 
     def problems(self) -> Iterator[Problem]:
@@ -151,11 +150,11 @@ class Control(Table):
 class Scenario(Table):
     """The sines that the study runs."""
 
-    amplitude_rad: Angle = Field(alias="amplitude", description="of the pointing reference")
-    pid_frequencies_hz: Frequencies = Field(alias="pid_frequencies")
-    inverse_frequencies_hz: Frequencies = Field(alias="inverse_frequencies")
-    loop_frequencies_hz: Frequencies = Field(alias="loop_frequencies", description="of the hysteresis loops")
-    loop_amplitude_v: Annotated[float, Quantity("V", above=0.0)] = Field(alias="loop_amplitude")
+    amplitude_rad: Angle = Field(description="of the pointing reference")
+    pid_frequencies_hz: Frequencies
+    inverse_frequencies_hz: Frequencies
+    loop_frequencies_hz: Frequencies = Field(description="of the hysteresis loops")
+    loop_amplitude_v: Annotated[float, Quantity("V", above=0.0)]
 
 
 def _bias_fits(mirror: Mirror, amplifier: Amplifier) -> Iterator[Problem]:

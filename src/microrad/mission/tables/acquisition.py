@@ -19,17 +19,15 @@ LEAST_OVERLAP = 0.001
 class TrackingSensor(Table):
     """Quad cell of the satellite's own terminal, which measures the answer; its spot is that of the whole aperture."""
 
-    responsivity_a_w: Annotated[float, Quantity("A/W", above=0.0, most=1e3)] = Field(alias="responsivity")
+    responsivity_a_w: Annotated[float, Quantity("A/W", above=0.0, most=1e3)]
     background_power_w: Annotated[float, Quantity("W", "pW", least=0.0, most=1e6)] = Field(
-        alias="background_power", description="on all four cells together"
+        description="on all four cells together"
     )
-    dark_current_a: Annotated[float, Quantity("A", "nA", least=0.0, most=1.0)] = Field(
-        alias="dark_current", description="of one of them"
-    )
+    dark_current_a: Annotated[float, Quantity("A", "nA", least=0.0, most=1.0)] = Field(description="of one of them")
     thermal_noise_a_sqrt_hz: Annotated[float, Quantity("A/sqrt(Hz)", "pA/sqrt(Hz)", least=0.0, most=1e-3)] = Field(
-        alias="thermal_noise", description="of one amplifier, one-sided, referred to its input"
+        description="of one amplifier, one-sided, referred to its input"
     )
-    rate_hz: Frequency = Field(alias="rate", description="readings in a second")
+    rate_hz: Frequency = Field(description="readings in a second")
 
 
 class Scan(Table):
@@ -37,15 +35,14 @@ class Scan(Table):
 
     pattern: Literal["spiral", "raster", "step-stare"]
     beam_radius_rad: Angle = Field(
-        alias="beam_radius",
-        description="off axis, where the partner still sees it; the beam itself is no narrower than diffraction",
+        description="off axis, where the partner still sees it; the beam itself is no narrower than diffraction"
     )
     overlap: Annotated[float, Quantity("", least=0.0, most=0.95)] = Field(
         description="of neighbouring tracks, share of the beam's diameter"
     )
     coverage: Annotated[float, Share("")] = Field(description="probability that the partner is within what is scanned")
-    detection_s: Frame = Field(alias="detection", description="time on the partner that its sensor needs")
-    turn_s: Seconds = Field(alias="turn", description="raster: at the end of a row; step-stare: from spot to spot")
+    detection_s: Frame = Field(description="time on the partner that its sensor needs")
+    turn_s: Seconds = Field(description="raster: at the end of a row; step-stare: from spot to spot")
     jitter_rms_rad: AngleOrZero = Field(alias="jitter", description="of the scanning beam, rms per axis")
 
     def problems(self) -> Iterator[Problem]:
@@ -61,18 +58,18 @@ class Scan(Table):
 class Acquisition(Table):
     """The paper's sequence: wide beacon, detection, narrow answer, measurement, narrow beam back, lock."""
 
-    settle_s: Seconds = Field(alias="settle", description="body turned to the predicted direction")
-    detection_s: Frame = Field(alias="detection", description="of the beacon by the partner, one frame")
+    settle_s: Seconds = Field(description="body turned to the predicted direction")
+    detection_s: Frame = Field(description="of the beacon by the partner, one frame")
     detection_probability: Annotated[float, Share("")] = Field(
         description="in a frame, at the power that the sensor needs"
     )
     detection_frames: Annotated[int, Whole("", least=1, most=100_000)] = Field(
         description="frames that the partner waits for the beacon"
     )
-    response_s: Seconds = Field(alias="response", description="partner turned, its narrow answer on")
-    measurement_s: Frame = Field(alias="measurement", description="of the answer's direction")
-    steering_s: Seconds = Field(alias="steering", description="own mirror turned to the measured direction")
-    lock_s: Seconds = Field(alias="lock", description="both loops settled on each other's beam")
+    response_s: Seconds = Field(description="partner turned, its narrow answer on")
+    measurement_s: Frame = Field(description="of the answer's direction")
+    steering_s: Seconds = Field(description="own mirror turned to the measured direction")
+    lock_s: Seconds = Field(description="both loops settled on each other's beam")
     lock_probability: Annotated[float, Share("")] = Field(description="of each loop, once its beam arrives")
     pointing_sigmas: Annotated[float, Quantity("", above=0.0, most=100.0)] = Field(
         description="standard deviations per axis in answer.pointing_error"

@@ -51,16 +51,16 @@ class GeometryTable(Table):
 
     layout: Literal["two-axis", "tripod"] = Field(description="tripod: three actuators 120 degrees apart")
     actuator_radius_m: Annotated[float, Quantity("m", "mm", above=0.0, most=10.0)] | None = Field(
-        alias="actuator_radius", default=None, description="of the circle that a tripod's actuators stand on"
+        default=None, description="of the circle that a tripod's actuators stand on"
     )
     incidence_rad: Annotated[float, Quantity("rad", "deg", least=0.0, most=ANGLE_MOST)] = Field(
-        alias="incidence", description="angle between the beam and the mirror's normal"
+        description="angle between the beam and the mirror's normal"
     )
     magnification: Annotated[float, Quantity("", above=0.0, most=1e4)] = Field(
         description="of the telescope: the line of sight turns by the beam's angle divided by it"
     )
     rotation_rad: Annotated[float, Quantity("rad", "deg")] = Field(
-        alias="rotation", description="of the mirror's axes about the line of sight, from x towards y"
+        description="of the mirror's axes about the line of sight, from x towards y"
     )
     coupling: Coupling = Field(description="row by row: what drives x and y do on axis x, then on axis y")
     travel_angle: Literal["optical", "mechanical"] = Field(
@@ -69,12 +69,8 @@ class GeometryTable(Table):
 
     def problems(self) -> Iterator[Problem]:
         """A radius exactly for a tripod, and every direction of the line of sight within reach."""
-        if self.layout == "tripod" and self.actuator_radius_m is None:
-            advice = 'actuator_radius = "10 mm" would do'
-            yield Problem("actuator_radius", 'is missing, and layout = "tripod" needs it', advice)
-        if self.layout != "tripod" and self.actuator_radius_m is not None:
-            advice = 'this line removed, or layout = "tripod"'
-            yield Problem("actuator_radius", f'does not belong to layout = "{self.layout}"', advice)
+        needed = {"actuator_radius": '"10 mm"'} if self.layout == "tripod" else {}
+        yield from self.choice_problems(f'layout = "{self.layout}"', needed, instead=lambda key: 'layout = "tripod"')
         if len(self.coupling) == 4:
             yield from self._reach_problems()
         else:
@@ -123,29 +119,18 @@ class VibrationTable(Table):
         description="olympus: 160 / (1 + f^2) urad^2/Hz; first-order: level / (1 + (f/corner)^2); bands: rms by band"
     )
     convention: Convention
-    level_rad2_hz: Level | None = Field(alias="level", default=None, description="first-order: at low frequency")
-    corner_hz: Frequency | None = Field(alias="corner", default=None, description="first-order: half of the level")
-    edges_hz: Edges | None = Field(alias="edges", default=None, description="bands: rising, the first may be 0 Hz")
-    rms_rad: BandRms | None = Field(alias="rms", default=None, description="bands: in each band between the edges")
+    level_rad2_hz: Level | None = Field(default=None, description="first-order: at low frequency")
+    corner_hz: Frequency | None = Field(default=None, description="first-order: half of the level")
+    edges_hz: Edges | None = Field(default=None, description="bands: rising, the first may be 0 Hz")
+    rms_rad: BandRms | None = Field(default=None, description="bands: in each band between the edges")
     file: Name | None = Field(default=None, description="table: two columns, the path seen from the mission file")
 
     def problems(self) -> Iterator[Problem]:
         """The keys of its spectrum and no others; an rms for each band."""
-        given = {
-            "level": self.level_rad2_hz,
-            "corner": self.corner_hz,
-            "edges": self.edges_hz,
-            "rms": self.rms_rad,
-            "file": self.file,
-        }
-        for spectrum, keys in _SPECTRUM_KEYS.items():
-            for key, example in keys.items():
-                if spectrum == self.spectrum and given[key] is None:
-                    reason = f'is missing, and spectrum = "{spectrum}" needs it'
-                    yield Problem(key, reason, f"{key} = {example} would do")
-                if spectrum != self.spectrum and given[key] is not None:
-                    reason = f'does not belong to spectrum = "{self.spectrum}"'
-                    yield Problem(key, reason, f'this line removed, or spectrum = "{spectrum}"')
+        of = {key: f'spectrum = "{spectrum}"' for spectrum, keys in _SPECTRUM_KEYS.items() for key in keys}
+        yield from self.choice_problems(
+            f'spectrum = "{self.spectrum}"', _SPECTRUM_KEYS[self.spectrum], instead=of.__getitem__
+        )
         if self.edges_hz is not None and self.rms_rad is not None:
             yield from _band_problems(len(self.edges_hz), len(self.rms_rad))
 
@@ -163,11 +148,9 @@ def _band_problems(edges: int, values: int) -> Iterator[Problem]:
 class WheelsTable(Table):
     """Lines of a reaction wheel: the amplitude of each harmonic is its coefficient times the speed squared."""
 
-    speed_hz: Frequency = Field(alias="speed", description="revolutions in a second")
+    speed_hz: Frequency = Field(description="revolutions in a second")
     harmonics: Harmonics = Field(description="frequency of each line over the speed; 1 is the imbalance")
-    coefficients_rad_hz2: WheelCoefficients = Field(
-        alias="coefficients", description="amplitude over speed squared, one for each harmonic"
-    )
+    coefficients_rad_hz2: WheelCoefficients = Field(description="amplitude over speed squared, one for each harmonic")
     convention: Convention
 
     def problems(self) -> Iterator[Problem]:
@@ -181,9 +164,9 @@ class WheelsTable(Table):
 class BodyTable(Table):
     """What the attitude control leaves: slow, a second-order low pass of white noise."""
 
-    error_rad: AngleOrZero = Field(alias="error", description="as many standard deviations as sigmas says")
+    error_rad: AngleOrZero = Field(description="as many standard deviations as sigmas says")
     sigmas: Annotated[float, Quantity("", above=0.0, most=100.0)] = Field(description="standard deviations in error")
-    bandwidth_hz: Frequency = Field(alias="bandwidth", description="of the attitude control")
+    bandwidth_hz: Frequency = Field(description="of the attitude control")
     convention: Convention
 
 
@@ -193,16 +176,14 @@ class QuadCellTable(Table):
     The light is that of the answer, with its wavelength, and with the power of its budget where none is given.
     """
 
-    responsivity_a_w: Annotated[float, Quantity("A/W", above=0.0, most=1e3)] = Field(alias="responsivity")
-    background_power_w: PowerOrZero = Field(alias="background_power", description="on all four together")
-    dark_current_a: Annotated[float, Quantity("A", "nA", least=0.0, most=1.0)] = Field(
-        alias="dark_current", description="of one of them"
-    )
+    responsivity_a_w: Annotated[float, Quantity("A/W", above=0.0, most=1e3)]
+    background_power_w: PowerOrZero = Field(description="on all four together")
+    dark_current_a: Annotated[float, Quantity("A", "nA", least=0.0, most=1.0)] = Field(description="of one of them")
     thermal_noise_a_sqrt_hz: Annotated[float, Quantity("A/sqrt(Hz)", "pA/sqrt(Hz)", least=0.0, most=1e-3)] = Field(
-        alias="thermal_noise", description="of one amplifier, one-sided, referred to its input"
+        description="of one amplifier, one-sided, referred to its input"
     )
     received_power_w: ReceivedPower | None = Field(
-        alias="received_power", default=None, description="signal on all four together; absent: as the answer's budget"
+        default=None, description="signal on all four together; absent: as the answer's budget"
     )
     spot: Literal["airy"] = Field(description="airy: focused by the whole aperture terminals.leo_aperture")
 
@@ -210,11 +191,11 @@ class QuadCellTable(Table):
 class OpticalSensorTable(Table):
     """Tracking sensor of the line of sight; its noise is given, or follows from a quad cell and its light."""
 
-    noise_rad: AngleOrZero | None = Field(alias="noise", default=None, description="rms, per axis and reading")
-    field_of_view_rad: Angle = Field(alias="field_of_view", description="radial half angle; beyond it the spot is lost")
-    resolution_rad: AngleOrZero = Field(alias="resolution", description='one count; "0 urad" is ideal')
-    rate_hz: Frequency = Field(alias="rate", description="readings in a second; divides fine_pointing.rate")
-    delay_s: DurationOrZero = Field(alias="delay", description="middle of the exposure to delivery")
+    noise_rad: AngleOrZero | None = Field(default=None, description="rms, per axis and reading")
+    field_of_view_rad: Angle = Field(description="radial half angle; beyond it the spot is lost")
+    resolution_rad: AngleOrZero = Field(description='one count; "0 urad" is ideal')
+    rate_hz: Frequency = Field(description="readings in a second; divides fine_pointing.rate")
+    delay_s: DurationOrZero = Field(description="middle of the exposure to delivery")
     quad_cell: QuadCellTable | None = Field(default=None, description="in place of noise")
 
     def problems(self) -> Iterator[Problem]:
@@ -229,17 +210,17 @@ class OpticalSensorTable(Table):
 class StrainGaugeTable(Table):
     """Sensor of the mirror, in the mirror's own angle, read at each control sample."""
 
-    noise_rad: AngleOrZero = Field(alias="noise", description="rms, per reading")
-    resolution_rad: AngleOrZero = Field(alias="resolution", description='one count; "0 urad" is ideal')
+    noise_rad: AngleOrZero = Field(description="rms, per reading")
+    resolution_rad: AngleOrZero = Field(description='one count; "0 urad" is ideal')
 
 
 class ReferenceTable(Table):
     """The known part of the pointing error: point-ahead, and the orbital motion that the body leaves."""
 
-    point_ahead_rad: AngleOrZero = Field(alias="point_ahead", description="largest, on axis x")
+    point_ahead_rad: AngleOrZero = Field(description="largest, on axis x")
     point_ahead_on_mirror: Annotated[bool, Switch("")] = Field(description="false: another mirror makes it")
     line_of_sight_rate_rad_s: Annotated[float, Quantity("rad/s", "urad/s", least=0.0, most=ANGLE_MOST)] = Field(
-        alias="line_of_sight_rate", description="largest, on axis x"
+        description="largest, on axis x"
     )
     rate_feedforward: Annotated[float, Quantity("", least=0.0, most=1.0)] = Field(
         description="share of that rate that the body turns by command"
@@ -249,23 +230,19 @@ class ReferenceTable(Table):
 class FinePointing(Table):
     """The fine-pointing loop and how it is judged: radial error below which it stays for a share of the time."""
 
-    rate_hz: Frequency = Field(alias="rate", description="sample rate of the controller")
-    delay_s: DurationOrZero = Field(alias="delay", description="computation: from sampling to the changed output")
-    plant_step_s: Step = Field(alias="plant_step", description="step of the simulated plant")
-    amplifier_bandwidth_hz: Frequency = Field(
-        alias="amplifier_bandwidth", description="first-order corner, in place of amplifier.bandwidth"
-    )
-    drive_resolution_v: Resolution = Field(alias="drive_resolution", description='one count; "0 V" is ideal')
+    rate_hz: Frequency = Field(description="sample rate of the controller")
+    delay_s: DurationOrZero = Field(description="computation: from sampling to the changed output")
+    plant_step_s: Step = Field(description="step of the simulated plant")
+    amplifier_bandwidth_hz: Frequency = Field(description="first-order corner, in place of amplifier.bandwidth")
+    drive_resolution_v: Resolution = Field(description='one count; "0 V" is ideal')
     reference_filter_hz: Frequency = Field(
-        alias="reference_filter", description="bandwidth of the filter that the inverse's target and rate come from"
+        description="bandwidth of the filter that the inverse's target and rate come from"
     )
     modulus_margin: Annotated[float, Share("")] = Field(description="least distance of the loop from -1")
     quantile: Annotated[float, Share("")] = Field(description="share of the time that the radial error is judged at")
     runs: Annotated[int, Whole("", least=1, most=100_000)]
-    duration_s: Seconds = Field(alias="duration", description="of a run, settling included")
-    settle_s: Annotated[float, Quantity("s", least=0.0, most=1e9)] = Field(
-        alias="settle", description="left out at the begin of a run"
-    )
+    duration_s: Seconds = Field(description="of a run, settling included")
+    settle_s: Annotated[float, Quantity("s", least=0.0, most=1e9)] = Field(description="left out at the begin of a run")
     seed: Annotated[int, Whole("", least=0, most=2**63 - 1)]
     geometry: GeometryTable
     vibration: VibrationTable

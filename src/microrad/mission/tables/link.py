@@ -37,8 +37,8 @@ LARGEST = "largest"
 class Terminals(Table):
     """The two optical terminals: the satellite's own in low orbit ("leo") and its partner ("geo")."""
 
-    leo_aperture_m: Aperture = Field(alias="leo_aperture")
-    geo_aperture_m: Aperture = Field(alias="geo_aperture")
+    leo_aperture_m: Aperture
+    geo_aperture_m: Aperture
     leo_obscuration: Obscuration | None = Field(
         default=None, description="diameter of the central obscuration over that of the aperture"
     )
@@ -77,7 +77,7 @@ class Channel(Table):
 
     zenith_transmission: Efficiency = Field(description="of the clear atmosphere straight up, at the links' wavelength")
     elevation_rad: Annotated[float, Quantity("rad", "deg", least=LOWEST_ELEVATION_RAD, most=ANGLE_MOST)] = Field(
-        alias="elevation", description="of the satellite above the horizon"
+        description="of the satellite above the horizon"
     )
 
 
@@ -85,36 +85,32 @@ class BeamShape(Table):
     """How a beam lights the aperture that it leaves."""
 
     profile: Literal["uniform", "gaussian"] = Field(description="gaussian: cut by the aperture and its obscuration")
-    radius_m: Aperture | None = Field(
-        alias="radius", default=None, description="gaussian: at 1/e2 of intensity, in the aperture"
-    )
+    radius_m: Aperture | None = Field(default=None, description="gaussian: at 1/e2 of intensity, in the aperture")
     m_squared: Annotated[float, Quantity("", least=1.0, most=1e3)] | None = Field(
         default=None, description="beam quality, divergence over that of an ideal beam"
     )
 
     def problems(self) -> Iterator[Problem]:
         """A radius and a beam quality exactly for a Gaussian."""
-        for key, value, example in (("radius", self.radius_m, '"2 cm"'), ("m_squared", self.m_squared, "1.1")):
-            if self.profile == "gaussian" and value is None:
-                reason = 'is missing, and profile = "gaussian" needs it'
-                yield Problem(key, reason, f"{key} = {example} would do")
-            if self.profile == "uniform" and value is not None:
-                yield Problem(key, 'does not belong to profile = "uniform"', 'this line removed, or "gaussian"')
+        needed = {"radius": '"2 cm"', "m_squared": "1.1"} if self.profile == "gaussian" else {}
+        yield from self.choice_problems(
+            f'profile = "{self.profile}"', needed, instead=lambda key: 'profile = "gaussian"'
+        )
 
 
 class Beam(Table):
     """What a link has whatever its beam: power, wavelength, quality, distance and losses (all losses positive)."""
 
-    transmit_power_w: Power = Field(alias="transmit_power", description="optical power before the optics")
-    wavelength_m: Wavelength = Field(alias="wavelength")
+    transmit_power_w: Power = Field(description="optical power before the optics")
+    wavelength_m: Wavelength
     strehl: Strehl | None = Field(default=None, description="decibel or ratio as conventions.strehl says")
     wavefront_error_m: Annotated[float, Quantity("m", "nm", least=0.0, most=1e-3)] | None = Field(
-        alias="wavefront_error", default=None, description="rms, in place of strehl"
+        default=None, description="rms, in place of strehl"
     )
-    pointing_error_rad: AngleOrZero = Field(alias="pointing_error", description="off the line of sight, radial")
-    distance_m: Distance = Field(alias="distance")
-    transmit_optics_loss_db: Loss = Field(alias="transmit_optics_loss")
-    receive_optics_loss_db: Loss = Field(alias="receive_optics_loss")
+    pointing_error_rad: AngleOrZero = Field(description="off the line of sight, radial")
+    distance_m: Distance
+    transmit_optics_loss_db: Loss
+    receive_optics_loss_db: Loss
 
     def problems(self) -> Iterator[Problem]:
         """Quality said once, and within the wavefront errors for which it means something."""
@@ -131,8 +127,8 @@ class Beam(Table):
 class Beacon(Beam):
     """A wide Gaussian beam to be found by: the beacon, and the answer to it."""
 
-    divergence_rad: Angle = Field(alias="divergence", description="full or half angle as conventions.divergence says")
-    required_power_w: Threshold = Field(alias="required_power", description="power that the sensor needs")
+    divergence_rad: Angle = Field(description="full or half angle as conventions.divergence says")
+    required_power_w: Threshold = Field(description="power that the sensor needs")
 
 
 _DETECTORS: dict[str, tuple[str, ...]] = {
@@ -163,11 +159,11 @@ class Background(Table):
     """Light of a sky or a bright body that fills the receiver's field of view."""
 
     spectral_radiance_w_m3_sr: Annotated[float, Quantity("W/(m^3 sr)", "W/(m^2 sr um)", least=0.0)] = Field(
-        alias="spectral_radiance", description="both polarisations"
+        description="both polarisations"
     )
-    field_of_view_rad: Angle = Field(alias="field_of_view", description="full angle of the field stop, on the sky")
+    field_of_view_rad: Angle = Field(description="full angle of the field stop, on the sky")
     filter_bandwidth_m: Annotated[float, Quantity("m", "nm", above=0.0, most=1e-5)] = Field(
-        alias="filter_bandwidth", description="full width of the optical filter"
+        description="full width of the optical filter"
     )
 
 
@@ -179,38 +175,32 @@ class Receiver(Table):
     bit_error_ratio: Annotated[float, Share("", least=1e-18, below=0.5)] = Field(
         description="at which the link is judged"
     )
-    code_gain_db: Loss = Field(alias="code_gain", description="net, in power per information bit")
+    code_gain_db: Loss = Field(description="net, in power per information bit")
     code_rate: Efficiency = Field(description="information bits per bit sent")
-    bandwidth_hz: Bandwidth = Field(alias="bandwidth", description="highest symbol rate, slot rate for ppm")
-    background_power_w: PowerOrZero | None = Field(
-        alias="background_power", default=None, description="behind the filter, on the detector"
-    )
+    bandwidth_hz: Bandwidth = Field(description="highest symbol rate, slot rate for ppm")
+    background_power_w: PowerOrZero | None = Field(default=None, description="behind the filter, on the detector")
     background: Background | None = Field(default=None, description="in place of background_power")
     order: Annotated[int, Whole("", least=2, most=2**20)] | None = Field(
         default=None, description="ppm: slots in a symbol, a power of two"
     )
     extinction_ratio_db: Annotated[float, Quantity("dB", above=0.0)] | None = Field(
-        alias="extinction_ratio", default=None, description="ook: power of a mark over that of a space"
+        default=None, description="ook: power of a mark over that of a space"
     )
     efficiency: Efficiency | None = Field(default=None, description="electrons per photon, all detectors but amplified")
-    dark_count_rate_1_s: Annotated[float, Quantity("1/s", least=0.0, most=1e12)] | None = Field(
-        alias="dark_count_rate", default=None
-    )
-    dark_current_a: Current | None = Field(alias="dark_current", default=None, description="before avalanche gain")
+    dark_count_rate_1_s: Annotated[float, Quantity("1/s", least=0.0, most=1e12)] | None = Field(default=None)
+    dark_current_a: Current | None = Field(default=None, description="before avalanche gain")
     thermal_noise_a_sqrt_hz: NoiseDensity | None = Field(
-        alias="thermal_noise", default=None, description="one-sided, referred to the amplifier's input"
+        default=None, description="one-sided, referred to the amplifier's input"
     )
-    avalanche_gain: Annotated[float, Quantity("", least=1.0, most=1e6)] | None = Field(default=None)
-    ionisation_ratio: Annotated[float, Quantity("", least=0.0, most=1.0)] | None = Field(default=None)
+    avalanche_gain: Annotated[float, Quantity("", least=1.0, most=1e6)] | None = None
+    ionisation_ratio: Annotated[float, Quantity("", least=0.0, most=1.0)] | None = None
     noise_figure_db: Annotated[float, Quantity("dB", least=3.0)] | None = Field(
-        alias="noise_figure", default=None, description="of the optical amplifier; 3 dB is the quantum limit"
+        default=None, description="of the optical amplifier; 3 dB is the quantum limit"
     )
     amplifier_gain_db: Annotated[float, Quantity("dB", least=10.0)] | None = Field(
-        alias="amplifier_gain", default=None, description="of the optical amplifier"
+        default=None, description="of the optical amplifier"
     )
-    optical_bandwidth_hz: Bandwidth | None = Field(
-        alias="optical_bandwidth", default=None, description="of the filter behind the amplifier"
-    )
+    optical_bandwidth_hz: Bandwidth | None = Field(default=None, description="of the filter behind the amplifier")
 
     def problems(self) -> Iterator[Problem]:
         """A detector that receives the modulation, and the keys of both and no others."""
@@ -228,15 +218,10 @@ class Receiver(Table):
                 wanted |= {"optical_bandwidth": '"20 GHz"', "amplifier_gain": '"35 dB"'}
         if self.background is None and self.detector not in ("homodyne", "preamplified"):
             wanted["background_power"] = '"0 pW"'
-        optional = {name: info for name, info in type(self).model_fields.items() if not info.is_required()}
-        for name, info in optional.items():
-            key, present = info.alias or name, getattr(self, name) is not None
-            if key in wanted and not present:
-                yield Problem(key, f"is missing, and {what} needs it", f"{key} = {wanted[key]} would do")
-            if key == "background_power" and present and self.background is not None:
-                yield Problem(key, "stands beside the table background", "one of the two removed")
-            elif present and key not in (*wanted, "background"):
-                yield Problem(key, f"does not belong to {what}", "this line removed")
+        instead = () if self.background is None else ("background_power",)
+        yield from self.choice_problems(what, wanted, ("background", *instead))
+        if self.background is not None and self.background_power_w is not None:
+            yield Problem("background_power", "stands beside the table background", "one of the two removed")
         if self.order is not None and self.order & (self.order - 1):
             yield Problem("order", "is no power of two", "order = 16 would do")
 
@@ -272,11 +257,11 @@ class Communication(Beam):
 
     data_rate_bit_s: Annotated[
         float, OrWord("bit/s", above=0.0, word=LARGEST, meaning=" for what the required margin leaves")
-    ] = Field(alias="data_rate", description=f'"{LARGEST}" solves for it')
-    tracking_split_loss_db: Loss = Field(alias="tracking_split_loss", description="light for the tracking sensor")
-    implementation_loss_db: Loss = Field(alias="implementation_loss", description="receiver against its sensitivity")
+    ] = Field(description=f'"{LARGEST}" solves for it')
+    tracking_split_loss_db: Loss = Field(description="light for the tracking sensor")
+    implementation_loss_db: Loss = Field(description="receiver against its sensitivity")
     receiver_sensitivity_photon_bit: Annotated[float, Quantity("photon/bit", above=0.0)] | None = Field(
-        alias="receiver_sensitivity", default=None, description="as measured, at its bit error ratio"
+        default=None, description="as measured, at its bit error ratio"
     )
     receiver: Receiver | None = Field(default=None, description="in place of receiver_sensitivity")
     beam: BeamShape | None = Field(default=None, description="absent: uniform, unobscured")
@@ -309,8 +294,8 @@ class Communication(Beam):
 class LinkRequirement(Table):
     """What a link has to meet."""
 
-    margin_db: Loss = Field(alias="margin", description="margin of the communication link")
-    pointing_error_rad: Angle = Field(alias="pointing_error", description="residual that the fine pointing may leave")
+    margin_db: Loss = Field(description="margin of the communication link")
+    pointing_error_rad: Angle = Field(description="residual that the fine pointing may leave")
     outage: Annotated[float, Share("")] | None = Field(
         default=None, description="share of the time that the required margin may be missed; asked for under a jitter"
     )

@@ -36,13 +36,13 @@ class LinearPart(Table):
 
     numerator: Coefficients | None = None
     denominator: Coefficients | None = None
-    poles_hz: Roots | None = Field(alias="poles", default=None, description="natural frequencies, rising")
+    poles_hz: Roots | None = Field(default=None, description="natural frequencies, rising")
     pole_dampings: Dampings | None = Field(default=None, description="1 for a real pole")
-    zeros_hz: Roots | None = Field(alias="zeros", default=None, description="natural frequencies, rising; or none")
+    zeros_hz: Roots | None = Field(default=None, description="natural frequencies, rising; or none")
     zero_dampings: Dampings | None = Field(default=None, description="1 for a real zero, -1 in the right half plane")
-    normalise_at_hz: Frequency = Field(alias="normalise_at", description="where its magnitude is divided out")
-    excited_from_hz: Frequency = Field(alias="excited_from")
-    excited_to_hz: Frequency = Field(alias="excited_to")
+    normalise_at_hz: Frequency = Field(description="where its magnitude is divided out")
+    excited_from_hz: Frequency
+    excited_to_hz: Frequency
 
     def problems(self) -> Iterator[Problem]:
         """A proper fraction, normalised inside its band."""
@@ -137,17 +137,17 @@ class BoucWenTable(Table):
     gamma, eta and exponent generalise Eq. 3, which is what stands when they are left out (see `hysteresis.BoucWen`).
     """
 
-    d1_rad_v: MirrorGain = Field(alias="d1")
-    d2_s_v: Annotated[float, Quantity("s/V")] = Field(alias="d2")
-    epsilon_rad_v: Annotated[float, Quantity("rad/V", "mrad/V")] = Field(alias="epsilon")
-    delta_s_v: Annotated[float, Quantity("s/V")] = Field(alias="delta")
-    alpha_1_v: Annotated[float, Quantity("1/V")] = Field(alias="alpha")
-    beta_1_v: Annotated[float, Quantity("1/V")] = Field(alias="beta")
+    d1_rad_v: MirrorGain
+    d2_s_v: Annotated[float, Quantity("s/V")]
+    epsilon_rad_v: Annotated[float, Quantity("rad/V", "mrad/V")]
+    delta_s_v: Annotated[float, Quantity("s/V")]
+    alpha_1_v: Annotated[float, Quantity("1/V")]
+    beta_1_v: Annotated[float, Quantity("1/V")]
     gamma_1_v: Annotated[float, Quantity("1/V")] = Field(
-        alias="gamma", default=0.0, description="tells the signs of h apart; left out, they are alike"
+        default=0.0, description="tells the signs of h apart; left out, they are alike"
     )
     eta_1_v: Annotated[float, Quantity("1/V")] = Field(
-        alias="eta", default=0.0, description="tells rising from falling drive; left out, they are alike"
+        default=0.0, description="tells rising from falling drive; left out, they are alike"
     )
     exponent: Annotated[float, Quantity("", least=1.0, most=100.0)] = Field(
         default=1.0, description="of h in the decay; left out, 1 as in Eq. 3"
@@ -169,14 +169,10 @@ class BoucWenTable(Table):
 class PrandtlIshlinskiiTable(Table):
     """Play operators: half widths in V, rising from 0 V, and a weight in rad/V for each."""
 
-    thresholds_v: Annotated[tuple[float, ...], Several(Quantity("V", least=0.0), rising=True)] = Field(
-        alias="thresholds"
-    )
-    weights_rad_v: Annotated[tuple[float, ...], Several(Quantity("rad/V", "urad/V", least=0.0))] = Field(
-        alias="weights"
-    )
+    thresholds_v: Annotated[tuple[float, ...], Several(Quantity("V", least=0.0), rising=True)]
+    weights_rad_v: Annotated[tuple[float, ...], Several(Quantity("rad/V", "urad/V", least=0.0))]
     widening_s: DurationOrZero = Field(
-        alias="widening", default=0.0, description="growth of the thresholds above 0 with the drive's rate; or none"
+        default=0.0, description="growth of the thresholds above 0 with the drive's rate; or none"
     )
 
     def problems(self) -> Iterator[Problem]:
@@ -193,10 +189,8 @@ class PrandtlIshlinskiiTable(Table):
 class CreepTable(Table):
     """Creep beside the hysteresis: drive behind first-order lags, with a weight in rad/V for each time constant."""
 
-    time_constants_s: Annotated[tuple[float, ...], Several(Quantity("s", above=0.0), rising=True)] = Field(
-        alias="time_constants"
-    )
-    weights_rad_v: Annotated[tuple[float, ...], Several(Quantity("rad/V", "urad/V"))] = Field(alias="weights")
+    time_constants_s: Annotated[tuple[float, ...], Several(Quantity("s", above=0.0), rising=True)]
+    weights_rad_v: Annotated[tuple[float, ...], Several(Quantity("rad/V", "urad/V"))]
 
     def problems(self) -> Iterator[Problem]:
         """A weight for each lag."""
@@ -387,14 +381,14 @@ class Mirror(Table):
     """The fast steering mirror: one hysteresis model, and the linear part that its composition asks for."""
 
     name: Name
-    travel_rad: Angle = Field(alias="travel", description="from stop to stop")
+    travel_rad: Angle = Field(description="from stop to stop")
     composition: Literal["cascade", "additive", "static"] = Field(
         description="cascade: hysteresis drives the linear part; additive: it is added behind; static: no linear part"
     )
-    rate_limit_v_s: Rate = Field(alias="rate_limit", description="fastest drive that the hysteresis was identified for")
-    bias_v: Voltage = Field(alias="bias", description="drive about which the mirror works")
-    drive_min_v: Voltage = Field(alias="drive_min", description="lowest drive that the hysteresis was identified for")
-    drive_max_v: Voltage = Field(alias="drive_max", description="highest drive that the hysteresis was identified for")
+    rate_limit_v_s: Rate = Field(description="fastest drive that the hysteresis was identified for")
+    bias_v: Voltage = Field(description="drive about which the mirror works")
+    drive_min_v: Voltage = Field(description="lowest drive that the hysteresis was identified for")
+    drive_max_v: Voltage = Field(description="highest drive that the hysteresis was identified for")
     linear: LinearPart | None = None
     bouc_wen: BoucWenTable | None = None
     prandtl_ishlinskii: PrandtlIshlinskiiTable | None = None

@@ -19,21 +19,21 @@ class StationTable(Table):
     """A ground station of the direct downlink."""
 
     latitude_rad: Annotated[float, Quantity("rad", "deg", least=-math.pi / 2, most=math.pi / 2)] = Field(
-        alias="latitude", description="geodetic, north positive"
+        description="geodetic, north positive"
     )
-    longitude_rad: Longitude = Field(alias="longitude", description="east positive")
-    height_m: Annotated[float, Quantity("m", "m", least=-500.0, most=9000.0)] = Field(alias="height")
+    longitude_rad: Longitude = Field(description="east positive")
+    height_m: Annotated[float, Quantity("m", "m", least=-500.0, most=9000.0)]
     mask_rad: Annotated[float, Quantity("rad", "deg", least=0.0, most=HIGHEST_MASK_RAD)] = Field(
-        alias="mask", description="lowest elevation at which data flow"
+        description="lowest elevation at which data flow"
     )
 
 
 class Downlink(Table):
     """The radio downlink that the relay is set against: one station at a time."""
 
-    data_rate_bit_s: DataRate = Field(alias="data_rate")
-    setup_s: Seconds = Field(alias="setup", description="from the rise above the mask until data flow")
-    delay_s: Seconds = Field(alias="delay", description="from the station to the user")
+    data_rate_bit_s: DataRate
+    setup_s: Seconds = Field(description="from the rise above the mask until data flow")
+    delay_s: Seconds = Field(description="from the station to the user")
     stations: dict[str, StationTable] = Field(description="one table for each, [operations.downlink.stations.NAME]")
 
     def __hash__(self) -> int:
@@ -51,16 +51,14 @@ class ContactTable(Table):
 
     number: Annotated[int, Whole("", least=1, most=100_000)] = Field(description="which contact of the span, from 1")
     slew_rate_rad_s: Annotated[float, Quantity("rad/s", "deg/s", above=0.0)] = Field(
-        alias="slew_rate", description="of the body, towards the partner before the contact"
+        description="of the body, towards the partner before the contact"
     )
     slew_angle_rad: Annotated[float, Quantity("rad", "deg", least=0.0, most=math.pi)] = Field(
-        alias="slew_angle", description="how far it turns"
+        description="how far it turns"
     )
     windows: Annotated[int, Whole("", least=1, most=1000)]
-    window_s: Annotated[float, Quantity("s", "s", above=0.0, most=1000.0)] = Field(alias="window")
-    hold_s: Seconds = Field(
-        alias="hold", description="how long the margin may stay below 0 dB before lock is taken for lost"
-    )
+    window_s: Annotated[float, Quantity("s", "s", above=0.0, most=1000.0)]
+    hold_s: Seconds = Field(description="how long the margin may stay below 0 dB before lock is taken for lost")
 
     def problems(self) -> Iterator[Problem]:
         """A loss that a window can show."""
@@ -72,19 +70,19 @@ class ContactTable(Table):
 class Operations(Table):
     """From contacts to delivered data."""
 
-    instrument_rate_bit_s: DataRate = Field(alias="instrument_rate", description="what fills the store, on average")
-    store_bit: Annotated[float, Quantity("bit", "GB", above=0.0)] = Field(alias="store", description="capacity")
+    instrument_rate_bit_s: DataRate = Field(description="what fills the store, on average")
+    store_bit: Annotated[float, Quantity("bit", "GB", above=0.0)] = Field(description="capacity")
     rates_bit_s: Annotated[tuple[float, ...], Several(Quantity("bit/s", "Mbit/s", above=0.0), rising=True)] | None = (
-        Field(alias="rates", default=None, description="stepped with range; absent: communication.data_rate alone")
+        Field(default=None, description="stepped with range; absent: communication.data_rate alone")
     )
     margin_db: Annotated[float, Quantity("dB", least=0.0)] = Field(
-        alias="margin", description="of the laser link, at which a data rate counts as one that it closes at"
+        description="of the laser link, at which a data rate counts as one that it closes at"
     )
     acquisition: Literal["wide beacon", "scan"] = Field(description="by which the partner is found")
     relay_share: Annotated[float, Quantity("", least=0.01, most=1.0)] = Field(
         description="share of each contact that the relay grants, from its beginning"
     )
-    relay_delay_s: Seconds = Field(alias="relay_delay", description="from the satellite's laser to the user")
+    relay_delay_s: Seconds = Field(description="from the satellite's laser to the user")
     runs: Annotated[int, Whole("", least=1, most=10_000)] = Field(
         description="of the span, each with acquisitions drawn"
     )
@@ -96,10 +94,7 @@ class Operations(Table):
 class RelayTable(Table):
     """A relay of the constellation."""
 
-    longitude_rad: Longitude = Field(alias="longitude", description="of its slot, east positive")
-
-
-_PATTERN_KEYS = ("satellites", "planes", "phasing")
+    longitude_rad: Longitude = Field(description="of its slot, east positive")
 
 
 class Constellation(Table):
@@ -118,11 +113,11 @@ class Constellation(Table):
     terminals: Annotated[int, Whole("", least=1, most=100)] = Field(
         description="of each relay, each serves one satellite at a time"
     )
-    overhead_s: Seconds = Field(alias="overhead", description="of each session before data flow")
+    overhead_s: Seconds = Field(description="of each session before data flow")
     session_s: Annotated[float, Quantity("s", "s", above=0.0, most=1e6)] = Field(
-        alias="session", description="longest, while others wait"
+        description="longest, while others wait"
     )
-    shortest_s: Seconds = Field(alias="shortest", description="session that is worth its overhead")
+    shortest_s: Seconds = Field(description="session that is worth its overhead")
     relays: dict[str, RelayTable] = Field(description="one table for each, [constellation.relays.NAME]")
 
     def __hash__(self) -> int:
@@ -132,15 +127,9 @@ class Constellation(Table):
 
     def problems(self) -> Iterator[Problem]:
         """The keys of the pattern, and no others; planes that divide the satellites."""
-        for key in (*_PATTERN_KEYS, "file"):
-            present, wanted = getattr(self, key) is not None, (key == "file") == (self.pattern == "file")
-            if wanted and not present:
-                example = '"satellites.tle"' if key == "file" else "1"
-                yield Problem(
-                    key, f'is missing, and pattern = "{self.pattern}" needs it', f"{key} = {example} would do"
-                )
-            if present and not wanted:
-                yield Problem(key, f'does not belong to pattern = "{self.pattern}"', "this line removed")
+        from_file = self.pattern == "file"
+        needed = {"file": '"satellites.tle"'} if from_file else {"satellites": "1", "planes": "1", "phasing": "1"}
+        yield from self.choice_problems(f'pattern = "{self.pattern}"', needed)
         if self.satellites and self.planes and self.satellites % self.planes:
             yield Problem("planes", f"does not divide satellites = {self.satellites}", "a divisor of it")
         if self.planes and self.phasing is not None and self.phasing >= self.planes:

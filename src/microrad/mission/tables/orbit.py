@@ -74,27 +74,23 @@ class VisibilityLimits(Table):
         default=None, description="of the terminal in the body's axes x, y, z; nadir and sun need it"
     )
     field_of_regard_rad: HalfAngle | None = Field(
-        alias="field_of_regard", default=None, description="half angle about the boresight; nadir and sun need it"
+        default=None, description="half angle about the boresight; nadir and sun need it"
     )
     slew_limit_rad_s: Annotated[float, Quantity("rad/s", "deg/s", above=0.0)] = Field(
-        alias="slew_limit", description="largest rate of the line of sight, in the frame of the attitude"
+        description="largest rate of the line of sight, in the frame of the attitude"
     )
     sun_exclusion_rad: Annotated[float, Quantity("rad", "deg", least=0.0, most=math.pi / 2)] = Field(
-        alias="sun_exclusion", description='least angle between line of sight and a Sun that is not set; "0 deg": none'
+        description='least angle between line of sight and a Sun that is not set; "0 deg": none'
     )
     in_eclipse: Annotated[bool, Switch("")] = Field(description="false: the terminal is off in the Earth's shadow")
 
     def problems(self) -> Iterator[Problem]:
         """A boresight and a field of regard exactly where the body does not turn."""
-        for key, value, example in (
-            ("boresight", self.boresight, "[0.0, 0.0, -1.0]"),
-            ("field_of_regard", self.field_of_regard_rad, '"70 deg"'),
-        ):
-            if self.attitude == "free" and value is not None:
-                yield Problem(key, 'does not belong to attitude = "free": the body turns', "this line removed")
-            if self.attitude != "free" and value is None:
-                reason = f'is missing, and attitude = "{self.attitude}" needs it'
-                yield Problem(key, reason, f"{key} = {example} would do")
+        if self.attitude == "free":
+            yield from self.choice_problems('attitude = "free": the body turns', {})
+        else:
+            needed = {"boresight": "[0.0, 0.0, -1.0]", "field_of_regard": '"70 deg"'}
+            yield from self.choice_problems(f'attitude = "{self.attitude}"', needed)
         if self.boresight is not None and len(self.boresight) != 3:
             yield Problem("boresight", f"has {len(self.boresight)} items", "three: boresight = [0.0, 0.0, -1.0]")
         elif self.boresight is not None and math.hypot(*self.boresight) < 0.1:
@@ -132,31 +128,25 @@ class OrbitTable(Table):
         description="elements: a TLE or an OMM, by SGP4; ephemeris: a CCSDS OEM"
     )
     altitude_m: Annotated[float, Quantity("m", "km", least=1e5, most=1e9)] | None = Field(
-        alias="altitude", default=None, description="above the equatorial radius of 6378.137 km"
+        default=None, description="above the equatorial radius of 6378.137 km"
     )
-    semi_major_axis_m: Annotated[float, Quantity("m", "km", least=6.4e6, most=1e9)] | None = Field(
-        alias="semi_major_axis", default=None
-    )
+    semi_major_axis_m: Annotated[float, Quantity("m", "km", least=6.4e6, most=1e9)] | None = Field(default=None)
     eccentricity: Annotated[float, Quantity("", least=0.0, most=0.999)] | None = None
     inclination_rad: Annotated[float | str, _INCLINATION] | None = Field(
-        alias="inclination", default=None, description=f'"{SUN_SYNCHRONOUS}": the node follows the Sun'
+        default=None, description=f'"{SUN_SYNCHRONOUS}": the node follows the Sun'
     )
-    node_rad: Anomaly | None = Field(
-        alias="node", default=None, description="right ascension of the ascending node at the epoch"
-    )
+    node_rad: Anomaly | None = Field(default=None, description="right ascension of the ascending node at the epoch")
     local_time_s: Annotated[float, Quantity("s", "h", least=0.0, most=86400.0)] | None = Field(
-        alias="local_time", default=None, description="mean local time of the ascending node, in place of node"
+        default=None, description="mean local time of the ascending node, in place of node"
     )
-    argument_of_perigee_rad: Anomaly | None = Field(alias="argument_of_perigee", default=None)
-    mean_anomaly_rad: Anomaly | None = Field(alias="mean_anomaly", default=None, description="at the epoch")
-    phase_rad: Anomaly | None = Field(
-        alias="phase", default=None, description="angle from the ascending node at the epoch"
-    )
+    argument_of_perigee_rad: Anomaly | None = None
+    mean_anomaly_rad: Anomaly | None = Field(default=None, description="at the epoch")
+    phase_rad: Anomaly | None = Field(default=None, description="angle from the ascending node at the epoch")
     gravity: Literal["two-body", "j2"] | None = Field(
         default=None, description="j2: node, perigee and anomaly drift as the Earth's flattening has it"
     )
     longitude_rad: Annotated[float, Quantity("rad", "deg", least=-math.pi, most=2.0 * math.pi)] | None = Field(
-        alias="longitude", default=None, description="of the slot, east of Greenwich"
+        default=None, description="of the slot, east of Greenwich"
     )
     file: Name | None = Field(default=None, description="seen from the mission file")
     object: Name | None = Field(default=None, description="which satellite of the file; not needed where it has one")
@@ -164,15 +154,8 @@ class OrbitTable(Table):
 
     def problems(self) -> Iterator[Problem]:
         """The keys of the kind of orbit, and no others."""
-        wanted = dict(_NEEDS[self.kind])
-        allowed = (*wanted, *_MAY_HAVE[self.kind], "kind", "limits")
-        for name, info in type(self).model_fields.items():
-            key, present = info.alias or name, getattr(self, name) is not None
-            if key in wanted and not present:
-                yield Problem(key, f'is missing, and kind = "{self.kind}" needs it', f"{key} = {wanted[key]} would do")
-            if present and key not in allowed:
-                yield Problem(key, f'does not belong to kind = "{self.kind}"', "this line removed")
-        if "node" not in allowed:
+        yield from self.choice_problems(f'kind = "{self.kind}"', _NEEDS[self.kind], (*_MAY_HAVE[self.kind], "limits"))
+        if "node" not in _MAY_HAVE[self.kind]:
             return
         if self.inclination_rad == SUN_SYNCHRONOUS and self.gravity == "two-body":
             reason = f'is "two-body", in which no node follows the Sun, and inclination is "{SUN_SYNCHRONOUS}"'
@@ -189,12 +172,12 @@ class Orbits(Table):
     """Where both terminals fly, and the span of time that is looked at."""
 
     epoch: Annotated[str, UtcEpoch("")] = Field(description="beginning of the span, UTC")
-    duration_s: Annotated[float, Quantity("s", "h", least=60.0, most=LONGEST_S)] = Field(alias="duration")
+    duration_s: Annotated[float, Quantity("s", "h", least=60.0, most=LONGEST_S)]
     earth: Literal["oblate", "sphere"] = Field(
         description="what hides the partner: the ellipsoid of WGS 84, or a sphere of its equatorial radius"
     )
     grazing_height_m: Annotated[float, Quantity("m", "km", least=0.0, most=1e6)] = Field(
-        alias="grazing_height", description="least height of the line of sight above the Earth"
+        description="least height of the line of sight above the Earth"
     )
     leo: OrbitTable
     geo: OrbitTable

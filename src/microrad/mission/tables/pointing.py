@@ -24,7 +24,7 @@ Statistic = Literal["1-sigma", "2-sigma", "3-sigma", "bound"]
 class PointingLine(Table):
     """One error of the open-loop pointing budget."""
 
-    error_rad: AngleOrZero = Field(alias="error", description="half width about the line of sight")
+    error_rad: AngleOrZero = Field(description="half width about the line of sight")
     kind: ErrorClass = Field(
         alias="class",
         description="bias: constant in time; random: about zero; drift: from zero, steadily; transient: now and then",
@@ -66,11 +66,9 @@ class Pointing(Table):
 class JitterTable(Table):
     """What fine pointing leaves, for a link that is budgeted without a simulated loop."""
 
-    bias_rad: TwoOffsets = Field(alias="bias", description="static, about x and y")
-    rms_rad: TwoAngles = Field(alias="rms", description="about the bias, about x and y")
-    bandwidth_hz: Frequency = Field(
-        alias="bandwidth", description="root mean square frequency of the jitter: rms rate over 2 pi rms"
-    )
+    bias_rad: TwoOffsets = Field(description="static, about x and y")
+    rms_rad: TwoAngles = Field(description="about the bias, about x and y")
+    bandwidth_hz: Frequency = Field(description="root mean square frequency of the jitter: rms rate over 2 pi rms")
 
     def problems(self) -> Iterator[Problem]:
         """Two axes."""
@@ -83,10 +81,10 @@ class PointAhead(Table):
     """The angle between where the partner is seen and where it will be when the light arrives."""
 
     transverse_velocity_m_s: Annotated[float, Quantity("m/s", "km/s", least=0.0, most=1e5)] = Field(
-        alias="transverse_velocity", description="largest, across the line of sight, of one terminal against the other"
+        description="largest, across the line of sight, of one terminal against the other"
     )
     corrected: Annotated[bool, Switch("")] = Field(description="false: both beams leave along the line of sight")
-    error_rad: AngleOrZero = Field(alias="error", description="what a correction leaves, radial")
+    error_rad: AngleOrZero = Field(description="what a correction leaves, radial")
 
 
 def point_ahead_rad(transverse_velocity_m_s: float) -> float:
