@@ -6,8 +6,6 @@ from pathlib import Path
 import pytest
 
 from microrad.campaign import bundle
-from microrad.cli import campaign as cli_campaign
-from microrad.cli import export as cli_export
 from microrad.cli import frame
 from microrad.core.folder import FolderError, check_folder
 from microrad.export.linear_import import matlab
@@ -72,9 +70,7 @@ def of_campaign(path):
         ("m.toml", lambda path: Draft.shipped(path).save(), DraftError, "cannot be written: it is no file on disk"),
         ("old/manifest.json", lambda p: check_folder(p.parent, True), FolderError, "are not results of microrad"),
         ("old/manifest.json", lambda p: folder.read_folder(p.parent), BenchError, "no manifest.json of microrad"),
-        ("page.html", lambda p: frame.check_target(p, "choose another", "<!"), BlockingIOError, MISSING),
-        ("page.html", lambda p: cli_campaign._check_output(p, True), BlockingIOError, MISSING),
-        ("model.mat", lambda p: cli_export._check_file(p, True, b"MATLAB"), BlockingIOError, MISSING),
+        ("m.mat", lambda p: frame.check_target(p, "", overwrite=True, begins=b"MAT"), BlockingIOError, MISSING),
         (
             "a.csv",
             lambda p: manifest_reader.content_beside(manifest_reader.ReadManifest(p, {}, ""), p.name),

@@ -20,28 +20,26 @@ from microrad.cli.frame import (
     check_target,
     command,
     examples,
+    group,
     interrupted,
     json_text,
     option,
     progress_bar,
     width,
 )
-from microrad.core.folder import read_bytes, write_whole
+from microrad.core.folder import write_whole
 
 if TYPE_CHECKING:
     from microrad.campaign.run import Means
 
-campaigns = typer.Typer(
-    name="campaign",
-    help="Many runs of a mission with drawn inputs: tails, sweeps, sensitivity, optimisation.",
-    epilog=examples(
+campaigns = group(
+    "campaign",
+    "Many runs of a mission with drawn inputs: tails, sweeps, sensitivity, optimisation.",
+    examples(
         "microrad campaign init            write a campaign file to start from",
         "microrad campaign run campaign.toml",
         "microrad campaign status campaign.ledger",
     ),
-    no_args_is_help=True,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
 )
 app.add_typer(campaigns)
 
@@ -57,7 +55,6 @@ _Scheduler = Annotated[
 ]
 
 
-_PAGE = b"<!DOCTYPE html>"
 _BEGINS = {".csv": b"cell,", ".parquet": b"PAR1", ".nc": b"\x89HDF"}  # as what microrad exports does
 _ADDRESS = re.compile(r"((tcp|tls|ucx|ws|wss)://)?[^/\s]+:\d{1,5}")  # those that Dask knows
 
@@ -70,16 +67,6 @@ def _means(threads: int | None, workers: int | None, scheduler: str | None) -> "
     from microrad.campaign.run import Means
 
     return Means(threads, workers, scheduler)
-
-
-def _check_output(file: Path, overwrite: bool) -> None:
-    """Refuse to replace anything but, if asked to, a file that begins as those of its kind that microrad writes."""
-    if not overwrite:
-        check_target(file, "choose another name, or replace it with --overwrite")
-    elif file.is_file():
-        first = read_bytes(file, 16)
-        if first and not first.startswith(_BEGINS.get(file.suffix.lower(), _PAGE)):
-            raise Refusal(f"{file} was not written by microrad and is left as it is; choose another name.")
 
 
 @contextmanager
@@ -237,7 +224,8 @@ def export(
     from microrad.campaign.export import export_rows
     from microrad.campaign.ledger import Ledger
 
-    _check_output(file, overwrite)
+    begins = _BEGINS.get(file.suffix.lower(), b"")
+    check_target(file, "choose another name", overwrite=overwrite, begins=begins)
     with Ledger.open(ledger, write=False) as book:
         export_rows(book, file)
     return Outcome(str(file))
@@ -257,7 +245,7 @@ def report(
     from microrad.report.campaign.page import campaign_page
 
     file = file or ledger.parent / f"{ledger.stem}.html"
-    _check_output(file, overwrite)
+    check_target(file, "choose another name", overwrite=overwrite, begins=b"<!DOCTYPE html>")
     write_whole(file, campaign_page(summarise_campaign(ledger)))
     return Outcome(str(file))
 

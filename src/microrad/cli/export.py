@@ -18,32 +18,31 @@ from microrad.cli.frame import (
     check_target,
     command,
     examples,
+    group,
     json_text,
     option,
     progress_bar,
 )
-from microrad.core.folder import read_bytes, write_whole
+from microrad.core.folder import write_whole
 
 if TYPE_CHECKING:
     from microrad.export.choice import Choice
     from microrad.mission.file import MissionFile
 
-exports = typer.Typer(
-    name="export",
-    help="Take a design to the flight computer and to other simulators: C, FMU, matrices.",
-    epilog=examples(
+exports = group(
+    "export",
+    "Take a design to the flight computer and to other simulators: C, FMU, matrices.",
+    examples(
         "microrad export c leo-geo.toml                C99 of a controller with its inverse, compiled and run",
         "microrad export fmu leo-geo.toml              the mirror as a co-simulation unit",
         "microrad export matrices leo-geo.toml         state-space, zeros and poles for MATLAB and Python",
     ),
-    no_args_is_help=True,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
 )
 app.add_typer(exports)
 
 _File = Annotated[Path, typer.Argument(help="Mission file; microrad init writes one.", metavar="FILE")]
 _Mirror = Annotated[Path | None, option("--mirror", "FILE", "Mirror file in place of the mission's mirror.")]
+_OTHER = "choose another --output"
 _CONTROLLER = "A controller of the mission, as microrad design names them, or PID, PID + inverse"
 
 
@@ -173,7 +172,7 @@ def fmu(  # noqa: PLR0913, PLR0917  each is an option
     mission = load_mission(file, mirror)
     name = identifier(name) if name is not None else suggested(f"{controller} loop" if controller else "mirror")
     path = output or Path(f"{file.stem}-{name}.fmu")
-    _check_file(path, overwrite, b"PK")
+    check_target(path, _OTHER, overwrite=overwrite, begins=b"PK")
     with progress_bar() as progress:
         if controller is not None:
             unit: Any = choice.loop_unit(_promised(mission, controller, accept, progress))
@@ -216,7 +215,7 @@ def matrices(
     mission = load_mission(file, mirror)
     path = output or Path(f"{file.stem}.mat")
     if not as_json:
-        _check_file(path, overwrite, b"MATLAB 5.0")
+        check_target(path, _OTHER, overwrite=overwrite, begins=b"MATLAB 5.0")
     with progress_bar() as progress:
         of = choice.source(mission) if controller is None else _promised(mission, controller, accept, progress)
         found = linear.models(of)
@@ -281,7 +280,7 @@ def import_(  # noqa: PLR0913, PLR0917  what a linear model does not say has to 
         output_unit=output_unit.value,
     )
     path = output or Path(f"{file.stem}-mirror.toml")
-    _check_file(path, overwrite, b"# Mirror imported")
+    check_target(path, _OTHER, overwrite=overwrite, begins=b"# Mirror imported")
     write_whole(path, import_mat(file, given, variable))
     return Outcome(f"{path} written. Next: microrad run leo-geo.toml --mirror {shlex.quote(str(path))}")
 
@@ -293,12 +292,3 @@ def _quantity(flag: str, text: str, unit: str) -> float:
         return parse_quantity(text, unit)
     except UnitError as error:
         raise Refusal(f"{flag}: {error}") from error
-
-
-def _check_file(path: Path, overwrite: bool, begins: bytes) -> None:
-    """Refuse to replace anything but, if asked to, a file that begins as those that microrad writes here."""
-    if not overwrite or not path.exists():
-        check_target(path, "choose another --output, or replace it with --overwrite")
-        return
-    if path.is_dir() or read_bytes(path, len(begins)) != begins:
-        raise Refusal(f"{path} was not written by microrad and is left as it is; choose another --output.")

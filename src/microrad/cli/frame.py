@@ -84,19 +84,36 @@ def examples(*lines: str) -> str:
     return "\n".join(["\b", "Examples:", *(f"  {line}" for line in lines)])
 
 
-app = typer.Typer(
-    name="microrad",
-    help="Design, identify and simulate the pointing chain of a small-satellite laser terminal.",
-    epilog=examples(
+def group(name: str, text: str, epilog: str, **settings: Any) -> typer.Typer:
+    """A group of commands.
+
+    Args:
+        name: Its name.
+        text: Its help.
+        epilog: The end of its help.
+        settings: What else typer takes.
+    """
+    return typer.Typer(
+        name=name,
+        help=text,
+        epilog=epilog,
+        no_args_is_help=True,
+        pretty_exceptions_enable=False,
+        rich_markup_mode=None,  # plain help: quick, and lines that can be searched and copied
+        **settings,
+    )
+
+
+app = group(
+    "microrad",
+    "Design, identify and simulate the pointing chain of a small-satellite laser terminal.",
+    examples(
         "microrad init                    write a mission, ready to run",
         "microrad run leo-geo.toml        the whole study: a verdict and a report",
         "microrad identify --help         a mirror model from your own recordings",
     )
     + "\n\nExit code: 0 done, 1 a requirement is not met, 2 bad usage or a bad file.",
     context_settings={"help_option_names": ["-h", "--help"]},
-    no_args_is_help=True,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,  # plain help: quick, and lines that can be searched and copied
 )
 
 
@@ -314,25 +331,27 @@ def width() -> int:
     return max(shutil.get_terminal_size((80, 24)).columns, 80)
 
 
-def check_target(path: Path, advice: str, replace_if_begins: str = "") -> None:
+def check_target(path: Path, advice: str, *, overwrite: bool = False, begins: bytes = b"") -> None:
     """Refuse a file that must not be written.
 
     Args:
         path: The file.
         advice: What to do where it exists, the end of the message.
-        replace_if_begins: How a file begins that may be replaced; empty where none may.
+        overwrite: Whether a file of its kind that microrad wrote may be replaced, or one that is empty.
+        begins: How files of its kind begin; empty for those that are never replaced.
 
     Raises:
-        Refusal: There is no folder for it, or a file that must stay.
+        Refusal: There is no folder for it, or something that must stay.
         OSError: The file that is there cannot be read.
     """
     if not path.parent.is_dir():
         raise Refusal(f"{path}: there is no folder {path.parent}; create it first.")
     if not os.path.lexists(path):
         return
-    if not replace_if_begins:
-        raise Refusal(f"{path} exists and is left as it is; {advice}.")
-    if read_bytes(path, len(replace_if_begins)) != replace_if_begins.encode():
+    if not (overwrite and begins):
+        replace = ", or replace it with --overwrite" if begins else ""
+        raise Refusal(f"{path} exists and is left as it is; {advice}{replace}.")
+    if path.is_dir() or read_bytes(path, len(begins)) not in (b"", begins):
         raise Refusal(f"{path} was not written by microrad and is left as it is; {advice}.")
 
 

@@ -136,10 +136,10 @@ def identify(  # noqa: PLR0913  every argument is a named option
 
     target = mirror_file or Path(f"{files[0].stem}-mirror.toml")
     page = report_file or target.with_suffix(".html")
-    advice = "name another one with --mirror-file" + ("" if overwrite else " or replace it with --overwrite")
     if page.resolve() == target.resolve():
         raise Refusal(f"{page} cannot be both the mirror file and the report; name another one with --report.")
-    check = functools.partial(check_target, target, advice, MIRROR_FILE_BEGINS if overwrite else "")
+    advice, begins = "name another one with --mirror-file", MIRROR_FILE_BEGINS.encode()
+    check = functools.partial(check_target, target, advice, overwrite=overwrite, begins=begins)
     check()
     report.check_identification(page, overwrite)
     columns = _Columns(input_column, output_column, rate, time, period, tuple(accept or ()))
