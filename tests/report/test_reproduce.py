@@ -119,7 +119,9 @@ def test_the_page_and_the_manifest_beside_it_carry_the_same(written, ran):
 
 
 # -------------------------------------------------------------------------------------------------------------- changed
-def test_a_changed_aperture_is_told_with_what_follows(changed, capsys):
+def test_a_changed_aperture_is_told_with_what_follows(changed, capsys, monkeypatch):
+    monkeypatch.setattr(report, "study_figures", lambda *args: page.StudyFigures())
+
     def wider(data):
         text = data["mission"]["text"]
         assert text.count('leo_aperture = "5 cm"') == 1

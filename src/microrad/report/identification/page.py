@@ -16,7 +16,6 @@ from microrad.core.units import format_quantity
 from microrad.lab.identify import Identification
 from microrad.lab.identify.linear.fit import LinearFit
 from microrad.lab.identify.selection.predictions import Fit
-from microrad.lab.identify.statistics import rounded_to_error
 from microrad.lab.recording import Recording
 from microrad.report.identification import parameters, words
 from microrad.report.identification.figures import identification_figures
@@ -262,16 +261,16 @@ def _roots(linear: LinearFit) -> Table:
     rows: list[tuple[str | Cell, ...]] = [
         (
             f"{r.kind}{', real' if abs(r.damping) == 1.0 else ' pair'}",
-            f"{rounded_to_error(r.freq_hz, r.freq_error_hz)} Hz",
+            f"{parameters.to_error(r.freq_hz, r.freq_error_hz)} Hz",
             f"{parameters.two_digits(r.freq_error_hz)} Hz",
-            rounded_to_error(r.damping, r.damping_error),
+            parameters.to_error(r.damping, r.damping_error),
             parameters.two_digits(r.damping_error) if r.damping_error else "",
             *(inside if r.excited else outside),
         )
         for r in words.roots(linear)
     ]
     for place, (name, gain, error) in enumerate(words.gains(linear)):
-        known = rounded_to_error(gain * 1e3, error * 1e3), parameters.two_digits(error * 1e3)
+        known = parameters.to_error(gain * 1e3, error * 1e3), parameters.two_digits(error * 1e3)
         rows.append((f"gain at {name}", *(f"{text} mrad/V" for text in known), "", "", *(inside if place else outside)))
     return Table(
         "", ("", "natural frequency", "±", "damping ratio", "±", "excited", ""), rows, (0, 5, 6), brief=(0, 1, 2, 3, 5)
@@ -321,7 +320,7 @@ def _model(fit: Fit) -> Table:
     for row in parameters.parameter_rows(fit):
         value, error, unit = row.shown
         note = row.note or (f"not identified: {unknown[row.name]}" if row.name in unknown else "")
-        rows.append((row.name, rounded_to_error(value, error), parameters.two_digits(error), unit, note))
+        rows.append((row.name, parameters.to_error(value, error), parameters.two_digits(error), unit, note))
     return Table("", ("parameter", "value", "± standard error", "unit", "note"), rows, (0, 3, 4))
 
 

@@ -8,6 +8,7 @@ from microrad.lab.identify.hysteresis.bouc_wen import PARAMETER_UNITS, PARAMETER
 from microrad.lab.identify.hysteresis.joint import JointFit
 from microrad.lab.identify.selection.predictions import Fit
 from microrad.lab.identify.statistics import rounded_to_error
+from microrad.report.quantities import with_minus
 
 HIGH_CORRELATION = 0.95
 
@@ -27,6 +28,16 @@ class ParameterRow:
         """Value, standard error and unit as they are printed: gains in mrad/V."""
         factor, unit = (1e3, "mrad/V") if self.unit == "rad/V" else (1.0, self.unit)
         return factor * self.value, factor * self.standard_error, unit
+
+
+def to_error(value: float, error: float) -> str:
+    """A value with the digits that its error leaves it, as it is printed.
+
+    Args:
+        value: as it was found.
+        error: its standard error in the same unit; nan where it was held.
+    """
+    return with_minus(rounded_to_error(value, error))
 
 
 def two_digits(error: float) -> str:
@@ -134,12 +145,12 @@ def notes(fit: Fit) -> list[str]:
     if pairs := correlations(fit):
         shown = ", ".join(f"{a} and {b} {r:+.3f}" for a, b, r in pairs[:6])
         more = f" and {len(pairs) - 6} pairs more" if len(pairs) > 6 else ""
-        found.append(f"Correlated above {HIGH_CORRELATION:g}: {shown}{more}.".replace("-", "\u2212"))
+        found.append(with_minus(f"Correlated above {HIGH_CORRELATION:g}: {shown}{more}."))
     if isinstance(fit, BoucWenFit):
         value, error = fit.settled_hysteresis_rad
         found.append(
             f"Better fixed than its parts: the hysteresis of a slow settled loop, |epsilon| / (alpha + sign(epsilon) "
-            f"beta) = {rounded_to_error(1e6 * value, 1e6 * error)} ± {1e6 * error:.2g} µrad."
+            f"beta) = {to_error(1e6 * value, 1e6 * error)} ± {1e6 * error:.2g} µrad."
         )
     found.append(
         f"Condition number {condition_number(fit):.3g}; the variances are inflated {colour(fit):.3g} times for the "
