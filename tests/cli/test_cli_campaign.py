@@ -15,7 +15,7 @@ from microrad.campaign import run
 from microrad.campaign.file import load_campaign
 from microrad.campaign.ledger import Ledger, mending
 from microrad.cli.campaign import campaigns
-from small_campaign import without_worker
+from small_campaign import Here, without_worker
 
 LIMIT = '[limits.margin]\nleast = "1 dB"\n'
 LINKS = HEAD.replace("256", "64") + POWER + LIMIT  # without a loop: a worker has its rows in milliseconds
@@ -248,7 +248,7 @@ def test_an_interrupt_says_how_to_go_on(there, call, monkeypatch):
     shortened(there)
     (there / "campaign.ledger").rename(there / "my rows.ledger")
     with monkeypatch.context() as patched:
-        patched.setattr(run.Means, "engine", interrupt)
+        patched.setattr(Here, "outcomes", interrupt)
         shown = call("campaign", "resume", "my rows.ledger")
     assert (shown.code, shown.out) == (130, "")
     assert re.search(r"stopped; \d+ rows are in my rows.ledger. Go on with: microrad campaign resume 'my", shown.err)

@@ -17,8 +17,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from microrad.campaign.definition.reader import read_definition
 from microrad.campaign.definition.records import CampaignFile
-from microrad.campaign.file import load_campaign
 from microrad.campaign.records import CampaignError
 from microrad.core import lti
 from microrad.core.folder import read_bytes, scratch_folder
@@ -63,7 +63,12 @@ def hashes(campaign: CampaignFile) -> dict[str, str]:
 
 
 def packed(campaign: CampaignFile, controllers: Sequence[AxisController]) -> bytes:
-    """The files of a campaign and its controllers, one for each cell (none without a loop), as bytes."""
+    """The files of a campaign and its controllers as bytes. Raises `CampaignError` for files named by absolute paths.
+
+    Args:
+        campaign: the campaign, whose files are read.
+        controllers: the tuned one of each cell; none without a loop.
+    """
     _refuse_absolute(campaign)
     named = _named(campaign.files)
     files = {name: base64.b64encode(read_bytes(path, _MOST_BYTES)).decode() for name, path in named.items()}
@@ -79,7 +84,12 @@ def packed(campaign: CampaignFile, controllers: Sequence[AxisController]) -> byt
 
 
 def opened(spec: bytes, any_code: bool = False) -> Opened:
-    """What `packed` put together. Raises `CampaignError` if it was packed by other code, if that is not allowed."""
+    """What `packed` put together. Raises `CampaignError` for a stranger's bundle, and for other code's.
+
+    Args:
+        spec: the bytes that it made.
+        any_code: whether a bundle of other code than this is opened, too.
+    """
     content = _unpacked(spec)
     if content.code != code_sha256() and not any_code:
         raise CampaignError(
@@ -92,7 +102,7 @@ def opened(spec: bytes, any_code: bool = False) -> Opened:
             path = _inside(folder, name)
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(data)
-        campaign = load_campaign(_inside(folder, content.campaign))
+        campaign, _ = read_definition(_inside(folder, content.campaign))  # whoever packed it has tried its rows
         found = Opened(replace(campaign, chunk_rows=content.chunk_rows), content.controllers)
     except BaseException:
         shutil.rmtree(folder, ignore_errors=True)

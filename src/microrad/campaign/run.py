@@ -60,7 +60,12 @@ class Means:
     scheduler: str | None = None
 
     def engine(self, spec: bytes, late_s: float) -> Engine:
-        """The engine, started."""
+        """The engine. Raises `CampaignError` where no scheduler answers.
+
+        Args:
+            spec: the campaign in one piece, see `bundle.packed`.
+            late_s: how long (s) a job may give no sign of life.
+        """
         if self.scheduler is not None:
             return DaskEngine(spec, TARGET, self.scheduler, late_s)
         return LocalEngine(spec, TARGET, self.threads or self.workers or os.cpu_count() or 1, late_s)
@@ -84,12 +89,12 @@ def run_campaign(file: Path, path: Path, means: Means, on_progress: Progress = l
     if plan.is_timed:
         campaign = replace(campaign, chunk_rows=plan.timed_chunk(row_s(campaign)))
     spec = bundle.packed(campaign, controllers(campaign, on_progress))
-    with closing(_Workers(campaign, spec, means)) as workers:
-        if means.scheduler is not None:
-            workers.engine()  # one that is not there leaves no ledger behind
-        with Ledger.create(path, _head(campaign, spec)) as book:
-            book.note("file", str(file.resolve()))
-            _Runner(campaign, workers, book, on_progress).run()
+    with (
+        closing(means.engine(spec, campaign.table.row_limit_s + LATE_S)) as engine,  # none there leaves no ledger
+        Ledger.create(path, _head(campaign, spec)) as book,
+    ):
+        book.note("file", str(file.resolve()))
+        _Runner(campaign, engine, book, on_progress).run()
 
 
 def resume_campaign(path: Path, means: Means, on_progress: Progress = lambda done, total, what: None) -> None:
@@ -111,14 +116,18 @@ def resume_campaign(path: Path, means: Means, on_progress: Progress = lambda don
         opened = bundle.opened(head.bundle, any_code=True)
         campaign = load_campaign(file) if file.is_file() else opened.campaign
         check_same(head.hashes, bundle.hashes(campaign), path)
-        with closing(_Workers(opened.campaign, head.bundle, means)) as workers:
-            _Runner(opened.campaign, workers, book, on_progress).run()
+        with closing(means.engine(head.bundle, opened.campaign.table.row_limit_s + LATE_S)) as engine:
+            _Runner(opened.campaign, engine, book, on_progress).run()
 
 
 def row_s(campaign: CampaignFile, clock: Callable[[], float] = time.perf_counter) -> float:
     """Time (s) that a row of links alone takes here: the mean of some, those of all cells in turn.
 
     The first one, which loads what it needs, does not count.
+
+    Args:
+        campaign: the campaign.
+        clock: seconds from any time on.
     """
     evaluator, cells = Evaluator(campaign, {}), len(campaign.cells)
     began = took = 0.0
@@ -184,30 +193,11 @@ def _minutes(seconds: float) -> str:
     return f"{seconds / 60.0:.0f} min" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h"
 
 
-class _Workers:
-    """The engine of a campaign, started when it is first needed."""
-
-    def __init__(self, campaign: CampaignFile, spec: bytes, means: Means) -> None:
-        self._late_s, self._spec, self._means = campaign.table.row_limit_s + LATE_S, spec, means
-        self._engine: Engine | None = None
-
-    def engine(self) -> Engine:
-        """The engine, started."""
-        if self._engine is None:
-            self._engine = self._means.engine(self._spec, self._late_s)
-        return self._engine
-
-    def close(self) -> None:
-        """Stop it at once, if it was started."""
-        if self._engine is not None:
-            self._engine.close()
-
-
 class _Runner:
     """Has the work of a campaign done and keeps it in the ledger."""
 
-    def __init__(self, campaign: CampaignFile, workers: _Workers, book: Ledger, on_progress: Progress) -> None:
-        self.campaign, self.workers, self.book, self.on_progress = campaign, workers, book, on_progress
+    def __init__(self, campaign: CampaignFile, engine: Engine, book: Ledger, on_progress: Progress) -> None:
+        self.campaign, self.engine, self.book, self.on_progress = campaign, engine, book, on_progress
         self.plan = planned(campaign)
         rows = sum(len(self.plan.rows_of(number)) for _, number in book.done())
         self.pace = _Pace(rows, float(book.notes().get("seconds", 0.0)))
@@ -228,10 +218,10 @@ class _Runner:
             self._traces()
             self._note("complete")
         except KeyboardInterrupt:
-            self.workers.close()  # that nobody writes any more says that it was stopped: no further sync of the disk
+            self.engine.close()  # that nobody writes any more says that it was stopped: no further sync of the disk
             raise KeyboardInterrupt(f"stopped; {self._stopped()}") from None
         except BaseException as error:
-            self.workers.close()
+            self.engine.close()
             with suppress(CampaignError):
                 self._note("stopped")
             if isinstance(error, CampaignError) and "campaign resume" not in str(error):
@@ -265,7 +255,7 @@ class _Runner:
     def _pass(self, jobs: Sequence[Job]) -> list[Outcome]:
         """Put what is done into the ledger; returns what is not."""
         missed = []
-        for outcome in self.workers.engine().outcomes(iter(jobs)) if jobs else ():
+        for outcome in self.engine.outcomes(iter(jobs)):
             if outcome.kind == "done":
                 self._keep(outcome.job, outcome.payload)
             else:
@@ -304,7 +294,7 @@ class _Runner:
         lost: dict[int, str] = {}
         for _ in range(ATTEMPTS):
             todo = [each for each in rows if each.row not in found or found[each.row].failed]
-            for outcome in self.workers.engine().outcomes(iter(todo)) if todo else ():
+            for outcome in self.engine.outcomes(iter(todo)):
                 if outcome.kind == "done":
                     found[outcome.job.row] = chunk_format.unpack_chunk(outcome.payload)
                 else:
@@ -333,9 +323,7 @@ class _Runner:
             if (trace.cell, trace.row) not in wanted:
                 self.book.drop_trace(trace)
         jobs = [Job(cell, 0, row, "trace") for cell, row in wanted if (cell, row) not in there]
-        if not jobs:
-            return
-        for outcome in self.workers.engine().outcomes(iter(jobs)):
+        for outcome in self.engine.outcomes(iter(jobs)):
             if outcome.kind == "done":
                 found = chunk_format.unpack_trace(outcome.payload)
                 value = wanted[found.cell, found.row]

@@ -31,7 +31,12 @@ class Work:
             traces.trace(loop, self.evaluator.controller(0), ensemble.Span(2.0 * loop.timing.period_s, 0.0, 0))
 
     def do(self, job: Job, beat: Callable[[], None]) -> bytes:
-        """A chunk, a chunk of one row, or a trace, as the job asks, in the format that the ledger keeps."""
+        """A chunk, a chunk of one row, or a trace, as the job asks, in the format that the ledger keeps.
+
+        Args:
+            job: what to do.
+            beat: called at each sign of life.
+        """
         if job.kind == "trace":
             return chunk_format.pack_trace(self.evaluator.trace(job.cell, job.row, beat))
         if job.kind == "row":

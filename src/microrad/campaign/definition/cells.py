@@ -62,7 +62,7 @@ class CellReader:
         found = None if key == MIRROR else self.reader.key("grid", key, values, data)
         if not isinstance(values, list) or not values:
             expected = "the values of the grid: [first, second]"
-            raise self.reader.noted(at, values, "is not a list with something in it", expected)
+            raise self.reader.fault(at, values, "is not a list with something in it", expected)
         fitting = [v for v in values if (self.reader.fits(at, found, v) if found else self._is_path(at, v))]
         texts = [text_of(v) for v in fitting]
         for text in dict.fromkeys(t for t in texts if texts.count(t) > 1):
@@ -70,7 +70,12 @@ class CellReader:
         return fitting
 
     def cells(self, data: Mapping[str, Any], axes: Mapping[str, list[Any]]) -> tuple[Cell, ...]:
-        """The cells of the grid, the last key running fastest; none where one of them is no mission."""
+        """The cells of the grid, the last key running fastest; none where one of them is no mission.
+
+        Args:
+            data: the mission's raw data under [set].
+            axes: the values of the grid by key.
+        """
         found = []
         for values in itertools.product(*axes.values()):
             cell = dict(zip(axes, values, strict=True))
@@ -82,7 +87,12 @@ class CellReader:
         return tuple(found)
 
     def cell(self, data: Mapping[str, Any], cell: Mapping[str, Any]) -> Cell:
-        """A cell with its mission. Raises `MissionError` with the faults as a mission file has them."""
+        """A cell with its mission. Raises `MissionError` with the faults as a mission file has them.
+
+        Args:
+            data: the mission's raw data under [set].
+            cell: the cell's values by key of the grid; none for the mission under [set] alone.
+        """
         given = {**self.fixed, **cell}
         path = self.reader.document.path.parent / given[MIRROR] if MIRROR in given else None
         document = with_values(self.mission, data, path)

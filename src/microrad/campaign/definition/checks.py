@@ -19,7 +19,13 @@ from microrad.mission.tables.link import LinkRequirement
 
 
 def check_loop(reader: ValueReader, table: LoopTable, missions: Sequence[LinkMission]) -> None:
-    """In every cell a mission with a loop, a controller of it, and time behind the settling."""
+    """In every cell a mission with a loop, a controller of it, and time behind the settling.
+
+    Args:
+        reader: where faults are noted.
+        table: the loop that is simulated.
+        missions: those of the cells.
+    """
     for m in missions:
         if not isinstance(m, Mission) or m.fine_pointing is None:
             expected = "a mission with [fine_pointing], which microrad init writes, or [loop] removed"
@@ -50,7 +56,13 @@ def _has_controller(reader: ValueReader, controller: str, of: FinePointing) -> b
 
 
 def kept(reader: ValueReader, raw: object, table: CampaignTable | None) -> tuple[str, ...]:
-    """The outputs to keep in the order of `OUTPUTS`; by default all that there are but for those of the day."""
+    """The outputs to keep in the order of `OUTPUTS`; by default all that there are but for those of the day.
+
+    Args:
+        reader: where faults are noted.
+        raw: what the file has at `keep`, None where it leaves that out.
+        table: the campaign's tables, None where they cannot be read.
+    """
     has_loop = table is None or table.loop is not None
     if raw is None:
         groups = {"residual", "link"} if has_loop else {"link"}
@@ -67,7 +79,11 @@ def kept(reader: ValueReader, raw: object, table: CampaignTable | None) -> tuple
 def with_tables(reader: ValueReader, raw: object, keep: tuple[str, ...], absent: Collection[str]) -> tuple[str, ...]:
     """The outputs to keep, by default without the margin of a beam that the mission has not; it is refused if asked.
 
-    ``absent`` are tables that the mission of a cell has not.
+    Args:
+        reader: where faults are noted.
+        raw: what the file has at `keep`.
+        keep: the outputs to keep as far as the file says them.
+        absent: tables that the mission of a cell has not.
     """
     for name in ("beacon", "answer"):
         output = f"{name}_margin"
@@ -80,7 +96,13 @@ def with_tables(reader: ValueReader, raw: object, keep: tuple[str, ...], absent:
 
 
 def check_day(reader: ValueReader, keep: Sequence[str], absent: Collection[str]) -> None:
-    """Outputs of the day only from missions that have a day."""
+    """Outputs of the day only from missions that have a day.
+
+    Args:
+        reader: where faults are noted.
+        keep: the outputs to keep.
+        absent: tables that the mission of a cell has not.
+    """
     day = [name for name in keep if OUTPUTS[name].group == "day"]
     if day and not {"orbit", "operations"}.isdisjoint(absent):
         expected = "a mission with [orbit] and [operations], which microrad init writes, or these outputs left out"
@@ -91,7 +113,14 @@ def check_day(reader: ValueReader, keep: Sequence[str], absent: Collection[str])
 def default_limits(
     reader: ValueReader, keep: Sequence[str], r: LinkRequirement, varied: Mapping[str, Mapping[str, Any]]
 ) -> tuple[Limit, ...]:
-    """The limits that the mission requires of the kept outputs; ``varied`` are keys that vary, by their table."""
+    """The limits that the mission requires of the kept outputs.
+
+    Args:
+        reader: where faults are noted.
+        keep: the outputs to keep.
+        r: what the mission requires.
+        varied: keys that vary from row to row or cell to cell, by the table that they stand in.
+    """
     limits = _required(keep, r)
     for limit in limits:
         for name in (name for name, keys in varied.items() if limit.source in keys):
@@ -112,7 +141,14 @@ def _required(keep: Sequence[str], r: LinkRequirement) -> tuple[Limit, ...]:
 def unchecked(
     given: Collection[str], keep: Sequence[str], r: LinkRequirement, varied: Collection[str]
 ) -> Iterator[str]:
-    """Of limits that the mission requires and [limits] leaves out: that nothing checks them; ``varied`` are keys."""
+    """Of limits that the mission requires and [limits] leaves out: that nothing checks them.
+
+    Args:
+        given: outputs that [limits] names.
+        keep: the outputs to keep.
+        r: what the mission requires.
+        varied: keys that vary from row to row or cell to cell.
+    """
     for limit in _required(keep, r):
         if limit.output in given or limit.source in varied:
             continue
@@ -126,25 +162,38 @@ def unchecked(
 
 
 def limit(reader: ValueReader, name: str, raw: object, keep: Sequence[str]) -> Limit:
-    """One limit. Raises `NotedError` with what is wrong noted."""
+    """One limit. Raises `NotedError` with what is wrong noted.
+
+    Args:
+        reader: where faults are noted.
+        name: the output.
+        raw: its table under [limits].
+        keep: the outputs to keep.
+    """
     at = f"limits.{name}"
     if not reader.is_output(at, name):
         raise NotedError
     if name not in keep:
         reason = "is a limit of an output that is not kept"
-        raise reader.noted(at, None, reason, f'"{name}" in keep, or this table removed')
+        raise reader.fault(at, None, reason, f'"{name}" in keep, or this table removed')
     if not isinstance(raw, dict) or not raw:
-        raise reader.noted(at, None, "has neither least nor most", f"[{at}] with least or most")
+        raise reader.fault(at, None, "has neither least nor most", f"[{at}] with least or most")
     table, rule = reader.table(at, LimitTable, raw), Quantity(OUTPUTS[name].unit, OUTPUTS[name].typical)
     given = {side: value for side, value in (("least", table.least), ("most", table.most)) if value is not None}
     bounds = dict(zip(given, reader.numbers(at, {side: (rule, value) for side, value in given.items()}), strict=True))
     if len(bounds) == 2 and bounds["least"] >= bounds["most"]:
-        raise reader.noted(f"{at}.most", table.most, "is not above least", "a range that goes up")
+        raise reader.fault(f"{at}.most", table.most, "is not above least", "a range that goes up")
     return Limit(name, bounds.get("least"), bounds.get("most"), FILE_WORD)
 
 
 def half_width(reader: ValueReader, table: CampaignTable, keep: Sequence[str]) -> float:
-    """The half width that a precision wants, in its output's SI unit; nan without one."""
+    """The half width that a precision wants, in its output's SI unit; nan without one.
+
+    Args:
+        reader: where faults are noted.
+        table: the campaign's tables.
+        keep: the outputs to keep.
+    """
     wanted, at = table.precision, "precision.output"
     if wanted is None or not reader.is_output(at, wanted.output, RADIUS):
         return math.nan
@@ -158,7 +207,12 @@ def half_width(reader: ValueReader, table: CampaignTable, keep: Sequence[str]) -
 
 
 def tell_half_width(reader: ValueReader, output: object) -> None:
-    """Say of a precision without half_width, if noted, what would do there, in the unit of its output."""
+    """Say of a precision without half_width, if noted, what would do there, in the unit of its output.
+
+    Args:
+        reader: where faults are noted.
+        output: what the file has at `precision.output`.
+    """
     if isinstance(output, str) and (output in OUTPUTS or output == RADIUS):
         rule, example = _width_of(output)
         reader.tell_missing("precision.half_width", f"{rule.wanted}; for example half_width = {example}")
@@ -172,7 +226,14 @@ def _width_of(output: str) -> tuple[Quantity, str]:
 
 # --------------------------------------------------------------------------------------------------------------- whole
 def check_tail(reader: ValueReader, table: CampaignTable, varying: Sequence[str], present: Mapping[str, Any]) -> None:
-    """Importance sampling of the noise: one loop for all rows of a cell, and no other outputs."""
+    """Importance sampling of the noise: one loop for all rows of a cell, and no other outputs.
+
+    Args:
+        reader: where faults are noted.
+        table: the campaign's tables.
+        varying: drawn keys that change the loop.
+        present: the file's raw data.
+    """
     if table.tail is None:
         return
     if table.loop is None:
@@ -185,7 +246,15 @@ def check_tail(reader: ValueReader, table: CampaignTable, varying: Sequence[str]
 
 
 def check_repeats(reader: ValueReader, table: CampaignTable, is_drawn: bool, rows: int, most_rows: int) -> None:
-    """More than one row only where something makes rows differ: a drawn input, or the noise of the loop."""
+    """More than one row only where something makes rows differ: a drawn input, or the noise of the loop.
+
+    Args:
+        reader: where faults are noted.
+        table: the campaign's tables.
+        is_drawn: whether any input is.
+        rows: rows of a cell in the first round.
+        most_rows: rows of a cell at most.
+    """
     if is_drawn or table.loop is not None or most_rows == 1:
         return
     key = "precision.at_most" if rows == 1 else "sampling" if table.runs == 1 else "runs"
@@ -195,7 +264,12 @@ def check_repeats(reader: ValueReader, table: CampaignTable, is_drawn: bool, row
 
 
 def check_minimise(reader: ValueReader, table: CampaignTable) -> None:
-    """An optimisation has variables, and minimises one of them or an output."""
+    """An optimisation has variables, and minimises one of them or an output.
+
+    Args:
+        reader: where faults are noted.
+        table: the campaign's tables.
+    """
     if table.optimise is None:
         return
     if not table.optimise.variables:
@@ -212,7 +286,14 @@ def check_minimise(reader: ValueReader, table: CampaignTable) -> None:
 
 
 def check_size(reader: ValueReader, rows: int, most_rows: int, realisations: int) -> None:
-    """Runs that the noise streams have numbers for; a first round within the most."""
+    """Runs that the noise streams have numbers for; a first round within the most.
+
+    Args:
+        reader: where faults are noted.
+        rows: rows of a cell in the first round.
+        most_rows: rows of a cell at most.
+        realisations: runs of each row.
+    """
     if most_rows < rows:
         reader.fault("precision.at_most", most_rows, f"is below the {rows} rows of the first round", f"at least {rows}")
     if most_rows * realisations > MOST_RUNS:

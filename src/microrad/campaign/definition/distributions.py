@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,19 +21,10 @@ class NormalTable(Table):
     drawn_as: Any = None
 
 
-class UniformTable(Table):
-    """Evenly between two values."""
+class RangeTable(Table):
+    """Evenly between two values, or on a logarithmic scale."""
 
-    distribution: Literal["uniform"]
-    low: Any
-    high: Any
-    drawn_as: Any = None
-
-
-class LogUniformTable(Table):
-    """Evenly between two values on a logarithmic scale."""
-
-    distribution: Literal["log-uniform"]
+    distribution: Literal["uniform", "log-uniform"]
     low: Any
     high: Any
     drawn_as: Any = None
@@ -56,35 +47,19 @@ class IdentifiedTable(Table):
 
 TABLES: dict[str, type[Table]] = {
     "normal": NormalTable,
-    "uniform": UniformTable,
-    "log-uniform": LogUniformTable,
+    "uniform": RangeTable,
+    "log-uniform": RangeTable,
     "table": ListTable,
     "identified": IdentifiedTable,
 }
 """The tables of a campaign file by the word that their key `distribution` has."""
 
-AnyTable = NormalTable | UniformTable | LogUniformTable | ListTable | IdentifiedTable
-
-
-class Distribution(Protocol):
-    """What an input is drawn from; values are in the SI unit of its key."""
-
-    def at(self, share: Floats) -> Floats:
-        """Values that a share of all draws, inside (0, 1), stays below."""
-        ...
-
-    def log_density(self, value: Floats) -> Floats:
-        """Natural logarithm of the density, or of the probability of a value of a list."""
-        ...
-
-    def words(self, unit: str) -> str:
-        """The distribution in words."""
-        ...
+AnyTable = NormalTable | RangeTable | ListTable | IdentifiedTable
 
 
 @dataclass(frozen=True, slots=True)
 class Normal:
-    """Normal, with mean and standard deviation."""
+    """Normal, with mean and standard deviation, in the SI unit of the key that is drawn."""
 
     mean: float
     deviation: float
@@ -183,6 +158,9 @@ class OneOf:
         return f"one of {', '.join(names)}{shares}"
 
 
+Distribution = Normal | Uniform | LogUniform | OneOf
+
+
 def standard_normal(share: Floats) -> Floats:
     """Value that a share of all standard normal draws stays below."""
     from scipy.special import ndtri
@@ -191,7 +169,12 @@ def standard_normal(share: Floats) -> Floats:
 
 
 def quantity(value: float, unit: str) -> str:
-    """A value to read."""
+    """A value to read.
+
+    Args:
+        value: the value in the SI unit.
+        unit: that unit, "" for a plain number.
+    """
     return format_quantity(value, unit) if unit else f"{value:.6g}"
 
 
@@ -203,7 +186,12 @@ def _has_all(drawn: OneOf, wanted: OneOf) -> bool:
 
 
 def uncovered(wanted: Distribution, drawn: Distribution) -> str:
-    """Why draws from one distribution cannot be weighted to stand for another; "" where they can."""
+    """Why draws from one distribution cannot be weighted to stand for another; "" where they can.
+
+    Args:
+        wanted: the input's own distribution.
+        drawn: the one that is drawn from.
+    """
     if isinstance(wanted, Normal):
         if not isinstance(drawn, Normal):
             return "never draws far out, where the normal distribution still has values"
@@ -213,7 +201,7 @@ def uncovered(wanted: Distribution, drawn: Distribution) -> str:
     if isinstance(wanted, OneOf) or isinstance(drawn, OneOf):
         alike = isinstance(wanted, OneOf) and isinstance(drawn, OneOf) and _has_all(drawn, wanted)
         return "" if alike else "does not draw every value of the table"
-    ends = np.array([wanted.low, wanted.high])  # type: ignore[attr-defined]
+    ends = np.array([wanted.low, wanted.high])
     if not np.all(np.isfinite(drawn.log_density(ends))):
         return "does not reach every value"
     return ""

@@ -31,7 +31,12 @@ class DrawReader:
     given: frozenset[str]
 
     def draw(self, key: str, raw: object) -> Draw:
-        """One input. Raises `NotedError` with what is wrong noted."""
+        """One input. Raises `NotedError` with what is wrong noted.
+
+        Args:
+            key: the input's key of the mission.
+            raw: its table under [inputs].
+        """
         at = f"inputs.{key}"
         table = self._distribution_table(at, raw)
         if key == MIRROR or isinstance(table, distributions.IdentifiedTable):
@@ -47,20 +52,20 @@ class DrawReader:
         kinds = list(distributions.TABLES)
         choices = " or ".join(f'distribution = "{kind}"' for kind in kinds)
         if not isinstance(raw, dict):
-            raise self.reader.noted(at, raw, "is no table", f"[{at}] with {choices}")
+            raise self.reader.fault(at, raw, "is no table", f"[{at}] with {choices}")
         kind = raw.get("distribution")
         if kind is None:
-            raise self.reader.noted(f"{at}.distribution", None, "is missing", choices)
+            raise self.reader.fault(f"{at}.distribution", None, "is missing", choices)
         if not isinstance(kind, str) or kind not in kinds:
             near = quoted_near(kind, kinds)
-            raise self.reader.noted(f"{at}.distribution", kind, "is none of the choices", choices, near)
+            raise self.reader.fault(f"{at}.distribution", kind, "is none of the choices", choices, near)
         return self.reader.table(at, distributions.TABLES[kind], raw)  # type: ignore[return-value]
 
     def _identified(self, at: str, key: str, table: AnyTable) -> Draw:
         """The mirrors that the identification leaves possible, in every cell."""
         if key != MIRROR or not isinstance(table, distributions.IdentifiedTable):
             expected = f'[inputs.{MIRROR}] with distribution = "identified", or the key of a single value'
-            raise self.reader.noted(at, None, "does not go together with its distribution", expected)
+            raise self.reader.fault(at, None, "does not go together with its distribution", expected)
         for m in self.mirrors:
             if m is None or m.uncertainty is None:
                 reason = "is to be identified, but the mission has no mirror, only its links"
@@ -70,21 +75,21 @@ class DrawReader:
                     f'[set] with {MIRROR} = "FILE", or [grid] with {MIRROR} = ["FILE"]: a mirror file as microrad '
                     "identify writes it, seen from the campaign file"
                 )
-                raise self.reader.noted(at, None, reason, expected)
+                raise self.reader.fault(at, None, reason, expected)
             for parameter in m.uncertainty.parameters:
                 if f"{MIRROR}.{parameter}" in self.given:
                     reason = f"draws {MIRROR}.{parameter}, which the campaign gives too"
-                    raise self.reader.noted(at, None, reason, "one of the two removed")
+                    raise self.reader.fault(at, None, reason, "one of the two removed")
         return Draw(MIRROR, "", None, None)
 
     def _drawn_as(self, at: str, key: Key, raw: object, wanted: Distribution) -> Distribution:
         table = self._distribution_table(at, raw)
         if isinstance(table, distributions.IdentifiedTable) or table.drawn_as is not None:
             reason = "is no distribution that an input can be drawn as"
-            raise self.reader.noted(at, None, reason, "a normal one, for example")
+            raise self.reader.fault(at, None, reason, "a normal one, for example")
         found = self._mostly_inside(at, key, table)
         if reason := distributions.uncovered(wanted, found):
-            raise self.reader.noted(at, None, reason, "a distribution that reaches as far as the input's own")
+            raise self.reader.fault(at, None, reason, "a distribution that reaches as far as the input's own")
         return found
 
     def _mostly_inside(self, at: str, key: Key, table: AnyTable) -> Distribution:
@@ -92,7 +97,7 @@ class DrawReader:
         found = self._distribution(at, key, table)
         share, where = outside_of(key, found)
         if share > 0.5:
-            raise self.reader.noted(at, None, f"has {_percent(share)} of its draws {where}", _INSIDE)
+            raise self.reader.fault(at, None, f"has {_percent(share)} of its draws {where}", _INSIDE)
         return found
 
     def _distribution(self, at: str, key: Key, table: AnyTable) -> Distribution:
@@ -104,32 +109,32 @@ class DrawReader:
             own = within(self.data, key.text)
             items = " and ".join(item_keys(key.text, len(own))) if isinstance(own, list) else ""
             expected = f"{items or 'a list that the mission has'}, each with its distribution"
-            raise self.reader.noted(at, None, "is a list, whose items are drawn each by its own key", expected)
+            raise self.reader.fault(at, None, "is a list, whose items are drawn each by its own key", expected)
         if rule is None:
             expected = 'distribution = "table" with its values, or a grid of them'
-            raise self.reader.noted(at, None, "is not a quantity that takes any value in a range", expected)
+            raise self.reader.fault(at, None, "is not a quantity that takes any value in a range", expected)
         if isinstance(table, distributions.NormalTable):
             positive = Quantity(rule.unit, rule.typical, above=0.0)
             values = {"mean": (rule, table.mean), "deviation": (positive, table.deviation)}
             return distributions.Normal(*self.reader.numbers(at, values))
         assert not isinstance(table, distributions.IdentifiedTable)
-        is_log = isinstance(table, distributions.LogUniformTable)
+        is_log = table.distribution == "log-uniform"
         kind = distributions.LogUniform if is_log else distributions.Uniform
         return kind(*bounds_of(self.reader, at, rule, table.low, table.high, is_log))
 
     def _one_of(self, at: str, key: Key, table: distributions.ListTable) -> Distribution:
         at, values, weights = f"{at}.values", table.values, f"{at}.weights"
         if not isinstance(values, list) or not 0 < len(values) <= MOST_ITEMS:
-            raise self.reader.noted(at, values, "is not a list with something in it", f"1 to {MOST_ITEMS} values")
+            raise self.reader.fault(at, values, "is not a list with something in it", f"1 to {MOST_ITEMS} values")
         fitting = [value for value in values if self.reader.fits(at, key, value)]
         if len(fitting) < len(values):
             raise NotedError
         read: list[Any] = [value if key.rule is None else key.rule.read(value) for value in values]
         if any(isinstance(value, float) and math.isnan(value) for value in read):
             expected = "values, or this word in the mission"
-            raise self.reader.noted(at, values, "has a word that is solved for", expected)
+            raise self.reader.fault(at, values, "has a word that is solved for", expected)
         if any(read.count(value) > 1 for value in read):
-            raise self.reader.noted(at, values, "has a value twice", "each value once, with its weight")
+            raise self.reader.fault(at, values, "has a value twice", "each value once, with its weight")
         is_words = not all(is_number(value) for value in read)
         numbers = tuple(float(i) for i in range(1, len(read) + 1)) if is_words else tuple(float(v) for v in read)
         shares = self._shares(weights, table.weights, len(read))
@@ -140,7 +145,7 @@ class DrawReader:
             return (1.0 / count,) * count
         if not isinstance(weights, list) or len(weights) != count or not all(is_number(v) and v > 0 for v in weights):
             expected = f"{count} plain numbers above 0, one for each value"
-            raise self.reader.noted(at, weights, "does not give each value its weight", expected)
+            raise self.reader.fault(at, weights, "does not give each value its weight", expected)
         total = math.fsum(weights)
         return tuple(float(v) / total for v in weights)
 
@@ -156,7 +161,12 @@ class Outside(NamedTuple):
 
 
 def outside_of(key: Key, drawn: Distribution) -> Outside:
-    """The draws beyond the bounds of a key by itself; only a normal distribution has any: others end within them."""
+    """The draws beyond the bounds of a key by itself; only a normal distribution has any: others end within them.
+
+    Args:
+        key: the key, with its bounds.
+        drawn: what its values are drawn from.
+    """
     from scipy.special import ndtr
 
     rule = key.numeric
@@ -179,7 +189,13 @@ def outside_of(key: Key, drawn: Distribution) -> Outside:
 
 
 def failing(draws: tuple[Draw, ...], data: Mapping[str, Any], rows: int) -> Iterator[str]:
-    """Of inputs that are drawn beyond the bounds of their key: how many rows fail for it, unless it is hardly one."""
+    """Of inputs that are drawn beyond the bounds of their key: how many rows fail for it, unless it is hardly one.
+
+    Args:
+        draws: the inputs.
+        data: the mission's raw data.
+        rows: rows of a cell at most.
+    """
     for draw in draws:
         drawn = draw.drawn_as or draw.distribution
         if drawn is None:
@@ -203,27 +219,48 @@ def _percent(share: float) -> str:
 def bounds_of(
     reader: ValueReader, at: str, rule: Quantity, raw_low: object, raw_high: object, is_log: bool = False
 ) -> tuple[float, float]:
-    """The keys low and high of a table in SI units. Raises `NotedError` with what is wrong noted."""
+    """The keys low and high of a table in SI units. Raises `NotedError` with what is wrong noted.
+
+    Args:
+        reader: where faults are noted.
+        at: the key of the table.
+        rule: what the values may be.
+        raw_low: the lower bound as written.
+        raw_high: the upper one.
+        is_log: whether the scale between them is logarithmic.
+    """
     low, high = reader.numbers(at, {"low": (rule, raw_low), "high": (rule, raw_high)})
     if low >= high:
-        raise reader.noted(f"{at}.high", raw_high, f"is not above low ({shown(raw_low)})", "a range that goes up")
+        raise reader.fault(f"{at}.high", raw_high, f"is not above low ({shown(raw_low)})", "a range that goes up")
     if is_log and low <= 0.0:
         expected = 'a value above 0, or distribution = "uniform"'
-        raise reader.noted(f"{at}.low", raw_low, "is not above 0, so that it has no logarithm", expected)
+        raise reader.fault(f"{at}.low", raw_low, "is not above 0, so that it has no logarithm", expected)
     return low, high
 
 
 def variable(reader: ValueReader, key: str, table: VariableTable, data: Mapping[str, Any]) -> Variable:
-    """One design variable. Raises `NotedError` with what is wrong noted."""
+    """One design variable. Raises `NotedError` with what is wrong noted.
+
+    Args:
+        reader: where faults are noted.
+        key: the variable's key of the mission.
+        table: its bounds as written.
+        data: the mission's raw data.
+    """
     at, found = f"optimise.variables.{key}", reader.key("optimise.variables", key, None, data)
     if found.numeric is None:
         reason = "is not a quantity that takes any value in a range"
-        raise reader.noted(at, None, reason, "the key of a quantity")
+        raise reader.fault(at, None, reason, "the key of a quantity")
     return Variable(key, found.unit, *bounds_of(reader, at, found.numeric, table.low, table.high))
 
 
 def input_texts(draws: tuple[Draw, ...], mirrors: Sequence[Mirror | None]) -> tuple[InputText, ...]:
-    """The drawn columns in words; an identified mirror has one for each parameter of any cell's mirror."""
+    """The drawn columns in words; an identified mirror has one for each parameter of any cell's mirror.
+
+    Args:
+        draws: the inputs.
+        mirrors: those of the cells, None where a mission has none.
+    """
     found: list[InputText] = []
     for draw in draws:
         if draw.distribution is None:

@@ -27,7 +27,13 @@ class UnknownKeyError(Exception):
     """A key that the mission does not have: why, what would do, and the key that it resembles."""
 
     def __init__(self, reason: str, expected: str, nearest: str = "") -> None:
-        """Keep the texts."""
+        """Keep the texts.
+
+        Args:
+            reason: what is wrong with the key.
+            expected: what would do.
+            nearest: the key that it resembles, "" without one.
+        """
         super().__init__(reason)
         self.reason, self.expected, self.nearest = reason, expected, nearest
 
@@ -75,9 +81,11 @@ class Key:
 
 
 def find(key: str, data: Mapping[str, Any]) -> Key:
-    """The key of a mission whose raw data are given: they say which names there are in [pointing.lines] and its like.
+    """The key of a mission. Raises `UnknownKeyError`.
 
-    Raises `UnknownKeyError`.
+    Args:
+        key: the dotted key.
+        data: raw data of the mission: they say which names there are in [pointing.lines] and its like.
     """
     parts = tuple(key.split("."))
     return _find(kind_of(data), parts, 0, data)
@@ -113,7 +121,11 @@ def _find(table: type[Table], parts: tuple[str, ...], at: int, data: object) -> 
 def as_one(key: Key, items: object) -> Key:
     """The key of a list as one number, its largest item, which the others follow in proportion, as in `--solve`.
 
-    ``items`` are those of the mission. Any other key, and a list with a negative item or nothing but 0, stays as it is.
+    Any other key, and a list with a negative item or nothing but 0, stays as it is.
+
+    Args:
+        key: the key.
+        items: what the mission has there.
     """
     if not isinstance(key.rule, Several) or type(key.rule.each) is not Quantity or not isinstance(items, list):
         return key
@@ -128,7 +140,12 @@ def as_one(key: Key, items: object) -> Key:
 
 
 def within(data: object, key: str) -> object:
-    """What raw data have at a key, or None."""
+    """What raw data have at a key, or None.
+
+    Args:
+        data: raw data of a mission.
+        key: the dotted key.
+    """
     for name in key.split("."):
         data = _at(data, name)
     return data
@@ -145,13 +162,23 @@ def _item(parts: tuple[str, ...], items: object) -> int:
 
 
 def item_keys(key: str, count: int) -> list[str]:
-    """The keys of the items of a list, of a long one the first and the last."""
+    """The keys of the items of a list, of a long one the first and the last.
+
+    Args:
+        key: the key of the list.
+        count: how many items it has.
+    """
     places = range(1, count + 1) if count <= 3 else (1, count)
     return [f"{key}.{place}" for place in places]
 
 
 def nearest(word: object, words: Iterable[str]) -> str:
-    """The one of some words that a word resembles, or ""."""
+    """The one of some words that a word resembles, or "".
+
+    Args:
+        word: what was written.
+        words: what could have been meant.
+    """
     return next(iter(difflib.get_close_matches(str(word)[:60], list(words), n=1)), "")
 
 
@@ -185,7 +212,13 @@ def rule_in(info: FieldInfo) -> Quantity | Several | None:
 
 # --------------------------------------------------------------------------------------------------------------- data
 def put(data: Mapping[str, Any], key: str, value: object) -> dict[str, Any]:
-    """The raw data with another value at a key; what is not on its way is shared."""
+    """The raw data with another value at a key; what is not on its way is shared.
+
+    Args:
+        data: raw data of a mission.
+        key: the dotted key.
+        value: what is to stand there, as a file has it.
+    """
     name, _, rest = key.partition(".")
     inner = data.get(name)
     if rest and isinstance(inner, list):
@@ -194,7 +227,12 @@ def put(data: Mapping[str, Any], key: str, value: object) -> dict[str, Any]:
 
 
 def flat(data: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Values by dotted key, whether a file has written them in one key or in tables inside each other."""
+    """Values by dotted key, whether a file has written them in one key or in tables inside each other.
+
+    Args:
+        data: tables inside each other.
+        prefix: what stands before each key, with its dot.
+    """
     found: dict[str, Any] = {}
     for name, value in data.items():
         if isinstance(value, dict):
@@ -205,7 +243,13 @@ def flat(data: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
 
 
 def flat_tables(data: Mapping[str, Any], inner: tuple[str, ...], prefix: str = "") -> dict[str, Any]:
-    """Tables by dotted key; those named ``inner`` belong to the table that they stand in."""
+    """Tables by dotted key.
+
+    Args:
+        data: tables inside each other.
+        inner: names of those that belong to the table that they stand in.
+        prefix: what stands before each key, with its dot.
+    """
     found: dict[str, Any] = {}
     for name, value in data.items():
         key = f"{prefix}{name}"
@@ -225,6 +269,10 @@ def touches_loop(key: str, m: LinkMission) -> bool:
     """Whether the fine-pointing loop depends on a key: on all but those of the tables that it never looks into.
 
     Aperture and wavelength matter to it where its optical sensor is a quad cell. Links alone have no loop.
+
+    Args:
+        key: a key of the mission.
+        m: the mission.
     """
     if not isinstance(m, Mission):
         return False

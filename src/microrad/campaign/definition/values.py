@@ -30,17 +30,26 @@ class ValueReader:
 
     document: Document
 
-    def fault(self, key: str, value: object, reason: str, expected: str, nearest: str = "") -> None:
-        """Note a fault on the line of a key."""
-        self.document.fault(key, "" if value is None else shown(value), reason, expected, nearest=nearest)
+    def fault(self, key: str, value: object, reason: str, expected: str, nearest: str = "") -> NotedError:
+        """Note a fault on the line of a key; returns what to raise where nothing can be read of it.
 
-    def noted(self, key: str, value: object, reason: str, expected: str, nearest: str = "") -> NotedError:
-        """Note a fault; returns what to raise."""
-        self.fault(key, value, reason, expected, nearest)
+        Args:
+            key: the key in the campaign file.
+            value: what stands there, None where nothing does.
+            reason: what is wrong with it.
+            expected: what would do.
+            nearest: the word that it resembles, "" without one.
+        """
+        self.document.fault(key, "" if value is None else shown(value), reason, expected, nearest=nearest)
         return NotedError()
 
     def each(self, read: Callable[..., T], items: Iterable[tuple[Any, ...]]) -> tuple[T, ...]:
-        """What is read of each of some items; those with a fault, which is noted, are left out."""
+        """What is read of each of some items; those with a fault, which is noted, are left out.
+
+        Args:
+            read: reads one item.
+            items: the arguments of each call.
+        """
         found = []
         for item in items:
             with suppress(NotedError):
@@ -48,21 +57,40 @@ class ValueReader:
         return tuple(found)
 
     def table(self, at: str, model: type[TableT], raw: Mapping[str, Any]) -> TableT:
-        """A table that stands at a key. Raises `NotedError`."""
+        """A table that stands at a key. Raises `NotedError`.
+
+        Args:
+            at: the key in the campaign file.
+            model: what the table has to be.
+            raw: the table as written.
+        """
         found = check_table(replace(self.document, prefix=at), model, raw)
         if found is None:
             raise NotedError
         return found
 
     def key(self, at: str, key: str, value: object, data: Mapping[str, Any]) -> Key:
-        """A key of the mission. Raises `NotedError`."""
+        """A key of the mission. Raises `NotedError`.
+
+        Args:
+            at: the table of the campaign file.
+            key: the key of the mission.
+            value: what stands there, None where nothing is told of it.
+            data: raw data of the mission.
+        """
         try:
             return find(key, data)
         except UnknownKeyError as error:
-            raise self.noted(f"{at}.{key}", value, error.reason, error.expected, error.nearest) from None
+            raise self.fault(f"{at}.{key}", value, error.reason, error.expected, error.nearest) from None
 
     def fits(self, at: str, key: Key, value: object) -> bool:
-        """Whether a value fits a key by itself; what is wrong with it is noted at a key of the campaign."""
+        """Whether a value fits a key of the mission by itself; what is wrong with it is noted.
+
+        Args:
+            at: the key in the campaign file.
+            key: the key of the mission.
+            value: the value as written.
+        """
         if key.item is not None:
             assert isinstance(key.rule, Quantity)
             return bool(self.each(self.number, [(at, key.rule, value)]))
@@ -74,29 +102,52 @@ class ValueReader:
         return False
 
     def numbers(self, at: str, raw: Mapping[str, tuple[Quantity, object]]) -> tuple[float, ...]:
-        """The SI values of keys of a table by their rules. Raises `NotedError` with all that is wrong noted."""
+        """The SI values of keys of a table by their rules. Raises `NotedError` with all that is wrong noted.
+
+        Args:
+            at: the key of the table.
+            raw: rule and value as written, by their names in it.
+        """
         found = self.each(self.number, [(f"{at}.{name}", rule, value) for name, (rule, value) in raw.items()])
         if len(found) < len(raw):
             raise NotedError
         return found
 
     def number(self, at: str, rule: Quantity, raw: object, example: str = "") -> float:
-        """The SI value of a quantity. Raises `NotedError` with what would do noted: ``example`` or the rule's own."""
+        """The SI value of a quantity. Raises `NotedError` with what would do noted.
+
+        Args:
+            at: the key in the campaign file.
+            rule: what it may be.
+            raw: the value as written.
+            example: what would do; "" for the rule's own example.
+        """
         try:
             return float(rule.read(raw))
         except UnitError as error:
             example = example or (f'"{error.example}"' if " " in error.example else error.example)
             name = at.rpartition(".")[2]
-            raise self.noted(at, raw, error.reason, f"{error.expected}; for example {name} = {example}") from None
+            raise self.fault(at, raw, error.reason, f"{error.expected}; for example {name} = {example}") from None
 
     def tell_missing(self, key: str, expected: str) -> None:
-        """Say of a key that was noted as missing what would do in its place."""
+        """Say of a key that was noted as missing what would do in its place.
+
+        Args:
+            key: the key in the campaign file.
+            expected: what would do.
+        """
         for i, fault in enumerate(self.document.faults):
             if fault.key == key and fault.reason == "is missing":
                 self.document.faults[i] = replace(fault, expected=expected)
 
     def is_output(self, at: str, name: object, *others: str) -> bool:
-        """Whether a name is that of an output, or one of ``others``; what is wrong with it is noted."""
+        """Whether a name is that of an output; what is wrong with it is noted.
+
+        Args:
+            at: the key in the campaign file.
+            name: what stands there.
+            others: names that will do as well.
+        """
         names = (*OUTPUTS, *others)
         if isinstance(name, str) and name in names:
             return True
@@ -117,6 +168,11 @@ def is_number(value: object) -> bool:
 
 
 def quoted_near(word: object, words: Iterable[str]) -> str:
-    """The choice that a word resembles, in quotes, or ""."""
+    """The choice that a word resembles, in quotes, or "".
+
+    Args:
+        word: what was written.
+        words: what could have been meant.
+    """
     near = nearest(word, words)
     return near and f'"{near}"'

@@ -72,7 +72,14 @@ _openings: dict[str, _Opening] = {}
 
 
 def install(name: str, target: str, spec: bytes, code: str) -> None:
-    """Give this worker a specification."""
+    """Give this worker a specification.
+
+    Args:
+        name: what the specification is called from now on.
+        target: "module:function" that opens it.
+        spec: the specification.
+        code: SHA-256 of the campaign's code.
+    """
     _openings.setdefault(name, _Opening(target, spec, code))
 
 
@@ -89,7 +96,15 @@ def kill(dask_worker: Any) -> None:
 
 
 def do(name: str, topic: str, serial: int, job: tuple[int, int, int, str], every_s: float) -> bytes:
-    """Do a job on a worker: a `Kind` in the first byte, then the result, or why there is none."""
+    """Do a job on a worker: a `Kind` in the first byte, then the result, or why there is none.
+
+    Args:
+        name: what the specification is called.
+        topic: where the scheduler logs signs of life.
+        serial: the number by which this side knows the job.
+        job: the fields of a `Job`.
+        every_s: least time (s) between two signs of life.
+    """
     from distributed import get_worker
 
     opening, worker = _openings.get(name), get_worker()
@@ -140,10 +155,15 @@ class Flight:
 
 
 def late_flights(flights: dict[int, Flight], now_s: float, late_s: float) -> list[int]:
-    """The serial numbers of the flights that were not heard of for longer than ``late_s``.
+    """The serial numbers of the flights that were not heard of for too long.
 
-    Where there is one, those silent for more than half as long are late too: a job that keeps the interpreter to
-    itself silences its neighbours, and which of them was the last to be heard says nothing.
+    Where there is one, those silent for more than half as long are late too: a job that keeps the interpreter to itself
+    silences its neighbours, and which of them was the last to be heard says nothing.
+
+    Args:
+        flights: those under way, by serial number.
+        now_s: the time (s) of the clock that they were heard by.
+        late_s: how long (s) is too long.
     """
     silent = {serial: now_s - f.heard_s for serial, f in flights.items() if f.begun}
     limit = late_s / 2.0 if max(silent.values(), default=0.0) > late_s else late_s
@@ -186,7 +206,14 @@ class DaskEngine:
     """
 
     def __init__(self, spec: bytes, target: str, address: str, late_s: float = 300.0) -> None:
-        """Connect."""
+        """Connect.
+
+        Args:
+            spec: the campaign, as the target's function opens it.
+            target: "module:function" on the workers.
+            address: that of the scheduler.
+            late_s: how long (s) a job may give no sign of life.
+        """
         distributed = _distributed()
         self._code = code_sha256(target)
         self._undo_quiet = _quiet()

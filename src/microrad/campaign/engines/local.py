@@ -129,7 +129,14 @@ class LocalEngine:
     """
 
     def __init__(self, spec: bytes, target: str, processes: int, late_s: float) -> None:
-        """The processes start with the first jobs."""
+        """The processes start with the first jobs.
+
+        Args:
+            spec: the campaign, as the target's function opens it.
+            target: "module:function" that each process calls once.
+            processes: how many, at most.
+            late_s: how long (s) a job may give no sign of life.
+        """
         self._spec, self._target, self._processes, self._late_s = spec, target, processes, late_s
         self._clock = Clock()
         self._inbox: SimpleQueue[tuple[object, Message | None]] = SimpleQueue()

@@ -30,7 +30,12 @@ class Work(Protocol):
     """What a target's function makes of the specification: it does jobs."""
 
     def do(self, job: Job, beat: Callable[[], None]) -> bytes:
-        """The job's result; calls ``beat`` at each sign of life, at least every 0.2 s or so."""
+        """The job's result.
+
+        Args:
+            job: what to do.
+            beat: called at each sign of life, at least every 0.2 s or so.
+        """
         ...
 
 
@@ -64,14 +69,24 @@ def read_message(stream: IO[bytes]) -> Message | None:
 
 
 def write_message(stream: IO[bytes], message: Message) -> None:
-    """Write a message whole; OSError where the other side has ended."""
+    """Write a message whole; OSError where the other side has ended.
+
+    Args:
+        stream: where to.
+        message: the message.
+    """
     stream.write(_HEAD.pack(message.kind, len(message.body)))
     stream.write(message.body)
     stream.flush()
 
 
 def open_target(target: str, spec: bytes) -> Work:
-    """The work that the function ``target`` ("module:function") makes of ``spec``."""
+    """The work that a function makes of a specification.
+
+    Args:
+        target: the function, "module:function".
+        spec: the specification.
+    """
     module, function = target.split(":")
     work: Work = getattr(importlib.import_module(module), function)(spec)
     return work
@@ -130,7 +145,12 @@ class Beat:
     """Tells of a job's signs of life, at most every ``every_s``; the first at once."""
 
     def __init__(self, tell: Callable[[], None], every_s: float) -> None:
-        """Nothing is told yet."""
+        """Nothing is told yet.
+
+        Args:
+            tell: tells of a sign of life.
+            every_s: least time (s) between two of them.
+        """
         self._tell = tell
         self._every_s = every_s
         self._next_s = 0.0

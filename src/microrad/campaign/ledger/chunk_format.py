@@ -134,7 +134,14 @@ def unpack_head(data: bytes) -> Head:
 
 
 def pack(kind: str, header: Mapping[str, Any], arrays: Mapping[str, Floats], rest: bytes = b"") -> bytes:
-    """Header, arrays and further bytes as one run of bytes of this kind."""
+    """Header, arrays and further bytes as one run of bytes of this kind.
+
+    Args:
+        kind: "chunk", "trace" or "head".
+        header: JSON values.
+        arrays: arrays of any shape by name, kept in their order.
+        rest: further bytes, which nobody looks into.
+    """
     values = {name: np.ascontiguousarray(array, dtype="<f8").reshape(np.shape(array)) for name, array in arrays.items()}
     ends = {name: _ends(array.ravel().view("<u8")) for name, array in values.items()}
     table = [[name, list(array.shape), *ends[name]] for name, array in values.items()]
@@ -147,7 +154,12 @@ def pack(kind: str, header: Mapping[str, Any], arrays: Mapping[str, Floats], res
 
 
 def unpack(kind: str, data: bytes) -> Unpacked:
-    """What `pack` made bytes of; the arrays are copies. Raises `CampaignError` for damaged or other bytes."""
+    """What `pack` made bytes of; the arrays are copies. Raises `CampaignError` for damaged or other bytes.
+
+    Args:
+        kind: "chunk", "trace" or "head".
+        data: the bytes.
+    """
     _check(kind, data)
     body = memoryview(data)[:-_DIGEST]
     length = _PREFIX.unpack_from(body)[3]

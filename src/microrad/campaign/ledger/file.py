@@ -50,7 +50,12 @@ def make_empty(path: Path) -> None:
 
 
 def put_head(path: Path, head: Head) -> None:
-    """Write both copies of the head: one would be all that stands between a flipped bit and the whole campaign."""
+    """Write both copies of the head: one would be all that stands between a flipped bit and the whole campaign.
+
+    Args:
+        path: an empty ledger.
+        head: what it is of.
+    """
     payload = chunk_format.pack_head(head)
     with closing(sqlite3.connect(path)) as connection, connection:
         for table in HEADS:
@@ -58,7 +63,12 @@ def put_head(path: Path, head: Head) -> None:
 
 
 def install(draft: Path, path: Path) -> None:
-    """Put a closed ledger in its place for good: the name, too, has to survive a power loss."""
+    """Put a closed ledger in its place for good: the name, too, has to survive a power loss.
+
+    Args:
+        draft: where it was made.
+        path: its place.
+    """
     for name in files(path)[1:]:
         name.unlink(missing_ok=True)  # a log that is left over would be taken for the new file's
     draft.replace(path)
@@ -133,7 +143,12 @@ def refuse_foreign(path: Path) -> None:
 
 
 def connected(path: Path, *, write: bool) -> sqlite3.Connection:
-    """A connection to a ledger, known to be one of this format."""
+    """A connection to a ledger, known to be one of this format.
+
+    Args:
+        path: the ledger.
+        write: whether to write to it.
+    """
     try:
         return _opened(path, "mode=rw", write)
     except sqlite3.OperationalError:
@@ -208,13 +223,23 @@ def digest(*parts: int | str | bytes) -> bytes:
 
 
 def head_in(connection: sqlite3.Connection, table: str) -> Head:
-    """The head in one of the tables `HEADS`. Raises `CampaignError` if it is damaged."""
+    """The head in one of the tables `HEADS`. Raises `CampaignError` if it is damaged.
+
+    Args:
+        connection: to a ledger.
+        table: which of the two copies.
+    """
     row = connection.execute(f"SELECT payload FROM {table}").fetchone()
     return chunk_format.unpack_head(b"" if row is None else row[0])
 
 
 def whole_head(path: Path, connection: sqlite3.Connection) -> Head:
-    """The head of a ledger. Raises `CampaignError` if neither of its two copies is whole."""
+    """The head of a ledger. Raises `CampaignError` if neither of its two copies is whole.
+
+    Args:
+        path: the ledger, as messages call it.
+        connection: to it.
+    """
     for table in HEADS:
         with suppress(CampaignError, sqlite3.Error):
             return head_in(connection, table)
@@ -284,7 +309,12 @@ def code_of(error: BaseException | None) -> int:
 
 @contextmanager
 def errors_in_words(path: Path, what: str) -> Iterator[None]:
-    """Turn the errors of SQLite and of the file system into words: what failed, what is in, what to do."""
+    """Turn the errors of SQLite and of the file system into words: what failed, what is in, what to do.
+
+    Args:
+        path: the ledger.
+        what: what is being done, behind "could not".
+    """
     try:
         yield
     except sqlite3.Error as error:

@@ -41,7 +41,13 @@ class Ledger:
     """An open ledger; see `create` and `open`. Use it as a context manager, in one thread."""
 
     def __init__(self, path: Path, connection: sqlite3.Connection, lock: sqlite3.Connection | None) -> None:
-        """For `create` and `open`, which see."""
+        """For `create` and `open`, which see.
+
+        Args:
+            path: the file.
+            connection: to it.
+            lock: the right to write, None to read only.
+        """
         self.path = path
         self._connection = connection
         self._lock = lock
@@ -49,7 +55,12 @@ class Ledger:
 
     @classmethod
     def create(cls, path: Path, head: Head) -> Self:
-        """A new ledger, open for writing. Raises `CampaignError` if there is already a file or none can be."""
+        """A new ledger, open for writing. Raises `CampaignError` if there is already a file or none can be.
+
+        Args:
+            path: the file.
+            head: what the ledger is of.
+        """
         with errors_in_words(path, "create the ledger"):
             refuse_existing(path)
             with closing(locked(path)):
@@ -110,6 +121,11 @@ class Ledger:
 
         Raises `CampaignError` for bytes that are not this chunk, a chunk that is in with other content, columns that
         are not the head's, and for any trouble of the file; then the ledger is as it was before.
+
+        Args:
+            cell: the cell of the grid.
+            number: the chunk's number in it.
+            payload: the bytes that `chunk_format.pack_chunk` made of it.
         """
         self._check_chunk(cell, number, payload)
         with self._writing(f"keep chunk {number} of cell {cell}"):
@@ -122,7 +138,12 @@ class Ledger:
                 )
 
     def get(self, cell: int, number: int) -> bytes | None:
-        """The bytes of a chunk, None where it is not done. Raises `CampaignError` if they are damaged."""
+        """The bytes of a chunk, None where it is not done. Raises `CampaignError` if they are damaged.
+
+        Args:
+            cell: the cell of the grid.
+            number: the chunk's number in it.
+        """
         with errors_in_words(self.path, f"read chunk {number} of cell {cell}"):
             wanted = "SELECT sha256, payload FROM chunks WHERE cell = ? AND number = ?"
             row = self._connection.execute(wanted, (cell, number)).fetchone()
@@ -189,7 +210,12 @@ class Ledger:
             self._connection.execute(wanted, (trace.cell, trace.row, trace.output))
 
     def note(self, key: str, value: Any) -> None:
-        """Keep a JSON value by name, in place of the last one."""
+        """Keep a JSON value by name, in place of the last one.
+
+        Args:
+            key: the name.
+            value: anything that JSON has.
+        """
         text = json.dumps(value, sort_keys=True)
         with self._writing(f"note {key!r}"):
             row = (key, text, digest(key, text))

@@ -104,7 +104,13 @@ class Candidate:
 
 # -------------------------------------------------------------------------------------------------------------- judging
 def judged(problem: Problem, values: dict[str, float], columns: dict[str, Floats]) -> Candidate:
-    """The candidate with these outputs of its rows."""
+    """The candidate with these outputs of its rows.
+
+    Args:
+        problem: what is asked of it.
+        values: its variables by key, in SI units.
+        columns: outputs (rows,) by name, nan in failed rows, and their ``weight`` where rows do not count alike.
+    """
     weight = columns.get("weight", np.ones(len(next(iter(columns.values())))))
     _check_rows(problem, weight.size)
     kept = tuple(_kept(limit, _column(columns, limit.output), weight, problem.confidence) for limit in problem.limits)
@@ -154,5 +160,10 @@ def percent(share: float) -> str:
 
 
 def quantity_text(value: float, unit: str) -> str:
-    """A value with its unit as it stands in messages."""
+    """A value with its unit as it stands in messages.
+
+    Args:
+        value: the value in its SI unit.
+        unit: that unit.
+    """
     return format_quantity(value, unit).strip()

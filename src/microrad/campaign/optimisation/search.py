@@ -101,11 +101,15 @@ class Optimum:
 def optimise(problem: Problem, evaluate: Evaluate, evaluate_fresh: Evaluate, on_progress: Progress) -> Optimum:
     """The candidate of least cost whose rows keep each limit often enough; the same for the same seed.
 
-    ``evaluate`` takes the variables' SI values (variables,) in their order and gives the columns of the outputs
-    (rows,), nan in failed rows, for the same draws at every call, with a column ``weight`` where rows do not count
-    alike; `CampaignError` from it refuses the candidate. ``evaluate_fresh`` does so for other draws. ``on_progress``
-    gets the candidates done, the most there may be, and the best cost so far in words. Raises `CampaignError` for a
-    problem that cannot be searched.
+    Raises `CampaignError` for a problem that cannot be searched.
+
+    Args:
+        problem: what to minimise, over which variables and under which limits.
+        evaluate: from the variables' SI values (variables,) in their order to the columns of the outputs (rows,),
+            nan in failed rows, for the same draws at every call, with a column ``weight`` where rows do not count
+            alike; `CampaignError` from it refuses the candidate.
+        evaluate_fresh: the same for other draws.
+        on_progress: gets the candidates done, the most there may be, and the best cost so far in words.
     """
     _check(problem)
     search = _Search(problem, evaluate, on_progress)

@@ -27,8 +27,13 @@ if TYPE_CHECKING:
 def outputs(file: LinkFile, runs: ensemble.Ensemble | None, keep: Collection[str]) -> dict[str, float]:
     """The kept outputs of a row, by name in the order of `OUTPUTS`; nothing is computed, or read, for any other.
 
-    ``runs`` is None in a campaign without a loop. A link that no rate closes has a data rate of 0. Raises `LinkError`
-    for a link by whose budget more light arrives than was sent.
+    A link that no rate closes has a data rate of 0. Raises `LinkError` for a link by whose budget more light arrives
+    than was sent.
+
+    Args:
+        file: the row's mission.
+        runs: its runs of the loop, None in a campaign without one.
+        keep: names of the outputs.
     """
     m = file.mission
     known: dict[str, Callable[[], float]] = {}

@@ -114,7 +114,15 @@ class Evaluator:
 
     # ----------------------------------------------------------------------------------------------------------- rows
     def rows(self, cell: int, rows: range, beat: Beat, attempts: int = ATTEMPTS, number: int = 0) -> Chunk:
-        """Rows of a cell as chunk ``number``; one that fails is tried again by itself, ``attempts`` times in all."""
+        """Rows of a cell as a chunk; one that fails is tried again by itself.
+
+        Args:
+            cell: the cell.
+            rows: the numbers of the rows.
+            beat: called at each sign of life.
+            attempts: how often a row is tried in all.
+            number: the number of the chunk.
+        """
         watch = _Watch(beat, self.campaign.table.row_limit_s)
         drawn = self._drawn(cell, rows)
         kept = {name: np.full(len(rows), math.nan) for name in self.names}
@@ -243,7 +251,13 @@ class Evaluator:
         return self._proposals[cell]
 
     def trace(self, cell: int, row: int, beat: Beat) -> WorstTrace:
-        """The first run of a row in time, once it has settled; the output and its value are the caller's to fill in."""
+        """The first run of a row in time, once it has settled; the output and its value are the caller's to fill in.
+
+        Args:
+            cell: the cell.
+            row: the row.
+            beat: called at each sign of life.
+        """
         file = self._drawn(cell, range(row, row + 1)).files[0]
         if isinstance(file, str):
             raise CampaignError(file)

@@ -75,12 +75,18 @@ class Proposal:
 
 
 def proposal(loop: PointingLoop, controller: LoopController, span: Span, error_rad: float) -> Proposal:
-    """The proposal that favours a radial error of ``error_rad`` at the end of runs of this span; 0 gives plain runs.
+    """The proposal that favours a radial error at the end of runs.
 
-    The error is that at the end of the last control sample, so a span needs no more than the settling time and the
-    loop's memory: in a stationary loop the probability there is the share of the time. A batch of plain runs tells how
-    far the loop follows its linear model, which decides on the levels. Raises ValueError for an unstable loop, and
-    where no random noise reaches the error.
+    That end is the end of the last control sample, so a span needs no more than the settling time and the loop's
+    memory: in a stationary loop the probability there is the share of the time. A batch of plain runs tells how far the
+    loop follows its linear model, which decides on the levels. Raises ValueError for an unstable loop, and where no
+    random noise reaches the error.
+
+    Args:
+        loop: the loop.
+        controller: its controller.
+        span: how long the runs are, and their seed.
+        error_rad: the error (rad); 0 gives plain runs.
     """
     closed = linear.close(loop, controller)
     linear.refuse_unstable(closed)
@@ -157,6 +163,10 @@ def level_of(radius_rad: Floats, sigma_rad: Floats) -> tuple[Floats, Floats]:
 
     P is the mean over the unit circle of exp(-(radius / s)^2 / 2) with s^2 = (sigma_1 cos)^2 + (sigma_2 sin)^2: along
     each direction of the circle the unit errors exceed radius / s. For one axis it is that of the normal distribution.
+
+    Args:
+        radius_rad: radii (n,) in rad.
+        sigma_rad: standard deviations (axes,) in rad.
     """
     from scipy.special import log_ndtr
 
@@ -174,7 +184,12 @@ def level_of(radius_rad: Floats, sigma_rad: Floats) -> tuple[Floats, Floats]:
 
 
 def radius_of(level: Floats, sigma_rad: Floats) -> Floats:
-    """Radius of each level, by Newton's method from above: the level is convex in the radius."""
+    """Radius of each level, by Newton's method from above: the level is convex in the radius.
+
+    Args:
+        level: levels (n,), at least 0.
+        sigma_rad: standard deviations (axes,) in rad, the largest first.
+    """
     radius: Floats = sigma_rad[0] * np.sqrt(2.0 * level)
     for _ in range(100):
         found, slope = level_of(radius, sigma_rad)
@@ -219,9 +234,13 @@ def _through_steps(closed: linear.ClosedLoop) -> tuple[Floats, Floats]:
 
 
 def end_covariance(closed: linear.ClosedLoop, total: int) -> Floats:
-    """Stationary covariance (axes, axes) in rad^2 of the error at the end of control sample number ``total``.
+    """Stationary covariance (axes, axes) in rad^2 of the error at the end of a run.
 
     That of the noise: lines are left out. Raises ValueError for an unstable loop.
+
+    Args:
+        closed: the linear loop.
+        total: control samples of the run.
     """
     linear.refuse_unstable(closed)
     o, whole = closed.open, closed.step_noise.shape[0]
@@ -247,10 +266,18 @@ def runs(
     first_run: int,
     beat: Callable[[], None] = lambda: None,
 ) -> tuple[Floats, Floats]:
-    """Radial error (rad) at the end of LANES runs from the number ``first_run`` on, and the logarithm of their weights.
+    """Radial error (rad) at the end of LANES runs, and the logarithm of their weights.
 
-    The mean over runs of weight times 1(error > x) is the probability of an error beyond x. ``beat`` is called between
-    slices of compiled code and ends the runs by raising. The numbers go by the seed and the run's number alone.
+    The mean over runs of weight times 1(error > x) is the probability of an error beyond x. The numbers go by the seed
+    and the run's number alone.
+
+    Args:
+        loop: the loop.
+        controller: its controller.
+        span: how long the runs are, and their seed.
+        by: what their noise is drawn from.
+        first_run: number of the first of them.
+        beat: called between slices of compiled code; ends the runs by raising.
     """
     p = kernel_arrays.arrays(loop, controller, span.seed)
     state = kernel_arrays.start(loop, p, first_run)
@@ -270,7 +297,13 @@ def runs(
 
 
 def drawn(by: Proposal, seed: int, first_run: int) -> tuple[Floats, Floats]:
-    """What each of LANES runs has along the directions, (directions, LANES), and the logarithm of its weight."""
+    """What each of LANES runs has along the directions, (directions, LANES), and the logarithm of its weight.
+
+    Args:
+        by: what the noise is drawn from.
+        seed: the campaign's.
+        first_run: number of the first run.
+    """
     if by.end == 0.0:
         return np.zeros((by.sigma_rad.size, LANES)), np.zeros(LANES)
     streams = [

@@ -27,7 +27,13 @@ def settings(file: LinkFile) -> FinePointing:
 
 
 def span(table: LoopTable, f: FinePointing, seed: int) -> Span:
-    """How long the runs of a row are: as the campaign's table `loop` says, else its mission; seeded by the campaign."""
+    """How long the runs of a row are: as the campaign's table `loop` says, else its mission; seeded by the campaign.
+
+    Args:
+        table: what the campaign says of its loop.
+        f: what its mission says.
+        seed: the campaign's.
+    """
     duration = f.duration_s if table.duration_s is None else table.duration_s
     settle = f.settle_s if table.settle_s is None else table.settle_s
     return Span(duration, settle, seed)
@@ -81,7 +87,12 @@ class ControllerTuner:
         self._tuned: dict[Hashable, AxisController] = {}
 
     def tuned(self, cell: int, values: Mapping[str, float]) -> AxisController:
-        """The controller for a cell's mission with values of its keys in SI units. Raises `CampaignError`."""
+        """The controller for a cell's mission. Raises `CampaignError` if none can be tuned.
+
+        Args:
+            cell: the cell.
+            values: values of its mission's keys, in SI units.
+        """
         table, key = self._campaign.loop, self._builder.loop_key(cell, values)
         assert table is not None
         if key not in self._tuned:
@@ -94,7 +105,12 @@ class ControllerTuner:
 
 
 def controllers(campaign: CampaignFile, on_progress: Progress) -> tuple[AxisController, ...]:
-    """The controller of each cell, tuned; none without a loop."""
+    """The controller of each cell, tuned; none without a loop.
+
+    Args:
+        campaign: the campaign.
+        on_progress: called with the cells done, all cells and what is being tuned.
+    """
     table, tuner, found = campaign.table.loop, ControllerTuner(campaign), []
     if table is not None:
         for cell in range(len(campaign.cells)):

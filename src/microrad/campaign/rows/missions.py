@@ -40,9 +40,13 @@ class MissionBuilder:
         self._identified = any(d.distribution is None for d in campaign.draws)
 
     def mission(self, cell: int, values: Mapping[str, float]) -> LinkFile:
-        """The mission of a row of a cell from its drawn values by key, in SI units; without any the cell's own.
+        """The mission of a row of a cell; without any values the cell's own.
 
         Raises `CampaignError` with key, value and reason where that is no mission.
+
+        Args:
+            cell: the cell.
+            values: drawn values by key, in SI units.
         """
         base = self._cells[cell]
         if not values:
@@ -56,7 +60,12 @@ class MissionBuilder:
         return replace(base.file, mission=_validated(base, data, texts), sources={**base.file.sources, **told})
 
     def loop_key(self, cell: int, values: Mapping[str, float]) -> Hashable:
-        """Equal for rows with the same fine-pointing loop: the values, of the grid and drawn, that the loop has."""
+        """Equal for rows with the same fine-pointing loop: the values, of the grid and drawn, that the loop has.
+
+        Args:
+            cell: the cell.
+            values: drawn values by key, in SI units.
+        """
         base = self._cells[cell]
         given = ((key, value) for each in (base.values, values) for key, value in each.items())
         return tuple((key, value) for key, value in given if touches_loop(key, base.file.mission))

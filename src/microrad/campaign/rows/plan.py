@@ -36,7 +36,12 @@ class Plan:
     is_timed: bool
 
     def chunks(self, cell: int, rows: int) -> list[Job]:
-        """The chunks that the first ``rows`` rows of a cell are in."""
+        """The chunks that the first rows of a cell are in.
+
+        Args:
+            cell: the cell.
+            rows: how many rows.
+        """
         return [Job(cell, number) for number in range(-(-rows // self.chunk_rows))]
 
     def rows_of(self, number: int) -> range:

@@ -21,6 +21,12 @@ def rows(campaign: CampaignFile, cell: int, first: int, count: int) -> tuple[dic
 
     Weights are 1 but for inputs that are drawn from another distribution than their own: there the ratio of both
     densities, so that their mean is 1. All cells have the same random numbers.
+
+    Args:
+        campaign: what is drawn.
+        cell: the cell, whose mirror's covariance is drawn from where that is an input.
+        first: number of the first row.
+        count: how many rows.
     """
     table, names = campaign.table, [each.key for each in campaign.inputs]
     points = uniform(table.sampling, table.seed, campaign.block, len(names), first, count)
@@ -62,6 +68,14 @@ def uniform(sampling: str, seed: int, block: int, dimensions: int, first: int, c
 
     "latin-hypercube" and "sobol" (scrambled, Owen 1995 in the form of Matousek 1998) fill the cube evenly by blocks of
     rows, a power of two; the blocks are independent replicates of each other.
+
+    Args:
+        sampling: "random", "latin-hypercube" or "sobol".
+        seed: the campaign's.
+        block: rows of one set, a power of two.
+        dimensions: numbers of a row.
+        first: number of the first row.
+        count: how many rows.
     """
     if not dimensions or not count:
         return np.zeros((count, dimensions))

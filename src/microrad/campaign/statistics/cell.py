@@ -29,7 +29,13 @@ class CellRows:
     """
 
     def __init__(self, campaign: CampaignFile, number: int, chunks: Iterable[Chunk] = ()) -> None:
-        """With these chunks of it."""
+        """With these chunks of it.
+
+        Args:
+            campaign: the campaign.
+            number: which cell.
+            chunks: its chunks.
+        """
         self.campaign, self.cell = campaign, campaign.cells[number]
         self.chunks: list[Chunk] = []
         """Those taken since the rows were last asked for, and all before them as one; without their curves."""

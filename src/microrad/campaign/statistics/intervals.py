@@ -52,7 +52,12 @@ class Moments:
 
 
 def moments(values: Floats, weights: Floats | None = None) -> Moments:
-    """Moments of values (n,), nan left out, with weights (n,) above 0 that are 1 by default."""
+    """Moments of values; nan is left out.
+
+    Args:
+        values: the values (n,).
+        weights: their weights (n,), above 0; 1 by default.
+    """
     given = np.ones(values.shape) if weights is None else weights
     known = ~np.isnan(values)
     values, given = values[known], given[known]
@@ -78,11 +83,14 @@ def moments(values: Floats, weights: Floats | None = None) -> Moments:
 
 # ------------------------------------------------------------------------------------------------------------ intervals
 def mean_interval(rows: Moments, confidence: float, blocks: Moments | None = None) -> Interval:
-    """Mean of the rows with its interval by Student's t.
+    """Mean of the rows with its interval by Student's t; that is not known with less than two rows or blocks.
 
-    ``blocks`` are the moments of the means of independent blocks (one Latin hypercube or Sobol set each): the spread
-    from block to block gives the interval then, since rows of one block are not independent. Without blocks the rows
-    are. With less than two of either the interval is not known.
+    Args:
+        rows: moments of the rows.
+        confidence: that of the interval, within (0, 1).
+        blocks: moments of the means of independent blocks, one Latin hypercube or Sobol set each: rows of one block
+            are not independent, so the spread from block to block gives the interval then. None: the rows are
+            independent.
     """
     parts = blocks or rows
     if parts.count < 2:
@@ -95,6 +103,11 @@ def proportion_interval(hits: float, trials: float, confidence: float) -> Interv
     """Share of trials that hit, with the interval of C. J. Clopper and E. S. Pearson, Biometrika 26 (1934) 404.
 
     Never too narrow. Without trials nothing is known.
+
+    Args:
+        hits: trials that hit; any number from 0 to all, not whole ones alone.
+        trials: all trials.
+        confidence: that of the interval, within (0, 1).
     """
     if trials <= 0.0:
         return Interval(math.nan, math.nan, math.nan, confidence)
@@ -111,6 +124,10 @@ def share_interval(rows: Moments, confidence: float) -> Interval:
     that would know the share as well: E. L. Korn and B. I. Graubard, Confidence intervals for proportions with small
     expected number of positive counts estimated from survey data, Survey Methodology 24 (1998) 193; of Kish's
     (sum w)^2 / sum w^2 where all or none hit. For rows of Latin hypercubes or Sobol sets it is wider than needed.
+
+    Args:
+        rows: moments of 1 (hit) and 0 over the rows.
+        confidence: that of the interval, within (0, 1).
     """
     if not rows.count:
         return proportion_interval(0.0, 0.0, confidence)
@@ -145,7 +162,12 @@ class Ordered:
 
 
 def ordered(values: Floats, weights: Floats | None = None) -> Ordered:
-    """Values (n,), nan left out, with weights (n,) above 0 that are 1 by default, in their order."""
+    """Values in their order; nan is left out.
+
+    Args:
+        values: the values (n,).
+        weights: their weights (n,), above 0; 1 by default.
+    """
     given = np.ones(values.shape) if weights is None else weights
     order = np.argsort(values, kind="stable")[: int(np.count_nonzero(~np.isnan(values)))]  # nan comes last
     given = given[order]
@@ -159,6 +181,11 @@ def quantile_interval(rows: Ordered, probability: float, confidence: float) -> I
     Its ends are the order statistics between which the quantile is by the binomial distribution (H. A. David and H. N.
     Nagaraja, Order Statistics, 2003, section 7.1). With weights the number of rows is that of independent ones which
     would know the share below as well. An end that so few rows cannot have is nan.
+
+    Args:
+        rows: the values in their order.
+        probability: share of the rows below the quantile.
+        confidence: that of the interval, within (0, 1).
     """
     value, count, beyond = rows.quantile(probability), rows.values.size, (1.0 - confidence) / 2.0
     if not count:
@@ -199,7 +226,13 @@ def _tails(rows: Ordered, rank: int, probability: float) -> tuple[float, float]:
 
 
 def binomial_band(hits: Floats, trials: Floats, confidence: float) -> tuple[Floats, Floats]:
-    """Ends of Clopper and Pearson's interval, for real numbers of hits and trials, too."""
+    """Ends of Clopper and Pearson's interval, for real numbers of hits and trials, too.
+
+    Args:
+        hits: numbers of hits (n,).
+        trials: numbers of trials (n,).
+        confidence: that of the interval, within (0, 1).
+    """
     from scipy.special import betaincinv
 
     beyond, missed = (1.0 - confidence) / 2.0, np.maximum(trials - hits, 0.0)
@@ -209,7 +242,12 @@ def binomial_band(hits: Floats, trials: Floats, confidence: float) -> tuple[Floa
 
 
 def student(confidence: float, freedom: float) -> float:
-    """Half width of the interval of Student's t with so many degrees of freedom, inf for the normal distribution."""
+    """Half width of the interval of Student's t.
+
+    Args:
+        confidence: that of the interval, within (0, 1).
+        freedom: degrees of freedom, inf for the normal distribution.
+    """
     from scipy.special import stdtrit
 
     return float(stdtrit(freedom, 0.5 + confidence / 2.0))
@@ -219,8 +257,13 @@ def student(confidence: float, freedom: float) -> float:
 def block_means(rows: Floats, values: Floats, weights: Floats, block: int) -> Moments:
     """Moments of the means of the whole blocks; each mean is a draw of the mean, unless all its rows have failed.
 
-    ``rows`` (n,), rising, are the numbers of the rows, ``values`` (n,) are nan where one has failed. A block of which
-    rows are missing says nothing about the mean's interval.
+    A block of which rows are missing says nothing about the mean's interval.
+
+    Args:
+        rows: numbers of the rows (n,), rising.
+        values: an output (n,), nan where a row has failed.
+        weights: their weights (n,).
+        block: rows of a block.
     """
     _, first, count = np.unique(rows // block, return_index=True, return_counts=True)
     whole = [slice(at, at + block) for at in first[count == block].tolist()]
@@ -231,9 +274,14 @@ def block_means(rows: Floats, values: Floats, weights: Floats, block: int) -> Mo
 def output_summary(
     output: Output, columns: Mapping[str, Floats], probabilities: Iterable[float], confidence: float, block: int = 0
 ) -> OutputSummary:
-    """What the columns of rows, with ``row`` and ``weight``, say of an output.
+    """What rows say of an output.
 
-    ``block`` is the number of rows in a block of the sampling, 0 where rows are independent.
+    Args:
+        output: the output.
+        columns: columns (rows,) by name, with ``row`` and ``weight``.
+        probabilities: those of the quantiles.
+        confidence: that of all intervals, within (0, 1).
+        block: rows in a block of the sampling, 0 where rows are independent.
     """
     values, weights = columns[output.name], columns["weight"]
     known, in_order = moments(values, weights), ordered(values, weights)
@@ -258,6 +306,11 @@ def histogram(values: Floats, weights: Floats, count: int = PICTURE_BINS) -> tup
     """Edges (count + 1,) and weights (count,) of even bins over the finite values, for a picture.
 
     Values that are all the same get one bin about them; without any finite value both are empty.
+
+    Args:
+        values: the values (n,).
+        weights: their weights (n,).
+        count: how many bins.
     """
     finite = np.isfinite(values)
     values, weights = values[finite], weights[finite]

@@ -38,6 +38,12 @@ def sensitivity(inputs: dict[str, Floats], output: Floats, name: str, confidence
     each other; ``note`` says so. What the surrogate leaves unexplained, the noise of the runs included, may belong to
     any input: it is in the upper end of their intervals. Intervals are from leaving out parts of the rows in turn.
     Rows with nan or without end in the output are left out, and those behind the first `MOST_ROWS`.
+
+    Args:
+        inputs: the drawn inputs (rows,) by key.
+        output: the output (rows,).
+        name: what it is called.
+        confidence: that of all intervals, within (0, 1).
     """
     good = np.isfinite(output)
     for column in inputs.values():

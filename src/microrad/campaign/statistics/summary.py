@@ -43,7 +43,15 @@ def summarise_campaign(path: Path) -> CampaignSummary:
 def assembled(
     head: Head, campaign: CampaignFile, cells: Sequence[CellRows], summaries: Sequence[CellSummary], pace: Progress
 ) -> CampaignSummary:
-    """A summary without what needs single rows: sensitivities, a sample and the worst traces."""
+    """A summary without what needs single rows: sensitivities, a sample and the worst traces.
+
+    Args:
+        head: that of the ledger.
+        campaign: the campaign.
+        cells: the rows of each cell.
+        summaries: what they say, of each cell.
+        pace: how far the campaign is.
+    """
     failed = [(number, each) for number, cell in enumerate(cells) for chunk in cell.chunks for each in chunk.failed]
     return CampaignSummary(
         name=head.campaign_name,

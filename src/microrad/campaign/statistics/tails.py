@@ -26,12 +26,19 @@ def tail_of_time(
 ) -> Tail:
     """Share of the time that the radial error exceeds a radius, from the sums over rows that a `Chunk` has.
 
-    ``survival`` (bins,) and ``survival_square`` (bins,) belong to the first ``bins`` of ``edges_rad``. Errors of one
-    row are correlated in time, rows are not: the spread of the rows' own shares gives the number of independent errors
-    that would know the share as well, and the interval is that of Korn and Graubard (see `share_interval`) with their
-    correction for few rows. Where few events are left, that number is held to what it was before them: it rises
-    further out, where excursions are shorter. The interval of a radius has those radii whose own interval holds the
-    probability; an end that the rows cannot tell is nan. Raises ValueError for less than one row.
+    Errors of one row are correlated in time, rows are not: the spread of the rows' own shares gives the number of
+    independent errors that would know the share as well, and the interval is that of Korn and Graubard (see
+    `share_interval`) with their correction for few rows. Where few events are left, that number is held to what it was
+    before them: it rises further out, where excursions are shorter. The interval of a radius has those radii whose own
+    interval holds the probability; an end that the rows cannot tell is nan. Raises ValueError for less than one row.
+
+    Args:
+        survival: sum over the rows of the share of their time beyond the lower edge of each bin (bins,).
+        survival_square: sum of the squares of these shares (bins,).
+        rows: how many rows were summed.
+        edges_rad: edges of the bins (at least bins,) in rad, rising.
+        probabilities: those of the radii that are wanted.
+        confidence: that of the interval, within (0, 1).
     """
     if rows < 1:
         raise ValueError("a tail of no rows: at least one row has to have succeeded")
@@ -63,18 +70,25 @@ def tail_weighted(
     confidence: float,
     errors_rad: Sequence[float] = (),
 ) -> Tail:
-    """Probability that one error exceeds a radius, from draws (n,) with the logarithm of their weights (n,).
+    """Probability that one error exceeds a radius, from draws of importance sampling.
 
-    The weights are those of importance sampling, of mean 1. The share beyond a radius is the mean of weight times
-    1(draw >= radius), or 1 less that of the other draws where these tell it better. Its interval is that of a weighted
-    sum of Poisson numbers: M. P. Fay and E. J. Feuer, Confidence intervals for directly standardized rates, Stat. Med.
-    16 (1997) 791, where the upper end has one more draw of the heaviest weight among those summed (among all, where
-    none is), with Student's correction for few draws. It holds as long as some draws are plain ones, as they are in
-    `importance_sampling`: weights without bound would be heavy where no draw has been.
+    The share beyond a radius is the mean of weight times 1(draw >= radius), or 1 less that of the other draws where
+    these tell it better. Its interval is that of a weighted sum of Poisson numbers: M. P. Fay and E. J. Feuer,
+    Confidence intervals for directly standardized rates, Stat. Med. 16 (1997) 791, where the upper end has one more
+    draw of the heaviest weight among those summed (among all, where none is), with Student's correction for few draws.
+    It holds as long as some draws are plain ones, as they are in `importance_sampling`: weights without bound would be
+    heavy where no draw has been.
 
-    ``beyond`` has the probability of an error larger than each of ``errors_rad``; its upper end counts the nearest
-    smaller draw as larger, so that it is known beyond all draws, too. The tail has at most `TAIL_POINTS` radii, while
-    all draws tell of ``wanted`` and ``beyond``. Raises ValueError without draws.
+    The tail has at most `TAIL_POINTS` radii, while all draws tell of ``wanted`` and ``beyond``. Raises ValueError
+    without draws.
+
+    Args:
+        radius_rad: the draws (n,) in rad.
+        log_weight: logarithms of their weights (n,), which have a mean of 1.
+        probabilities: those of the radii that are wanted.
+        confidence: that of the interval, within (0, 1).
+        errors_rad: radii (rad) whose probability of a larger error is wanted; its upper end counts the nearest
+            smaller draw as larger, so that it is known beyond all draws, too.
     """
     if not radius_rad.size:
         raise ValueError("a tail of no draws: at least one run has to have succeeded")
