@@ -197,7 +197,8 @@ def test_the_parameter_table_holds_value_and_error_of_every_model(page, full):
         assert len(rows) == len(expected) > 0
         for cells, row in zip(rows, expected, strict=True):
             value, error, unit = row.shown
-            assert cells[:4] == [row.name, rounded_to_error(value, error), two_digits(error), unit]
+            shown = re.sub("^-", "\u2212", rounded_to_error(value, error))
+            assert cells[:4] == [row.name, shown, two_digits(error), unit]
         for name, why in not_identified(fit):
             assert any(cells[0] == name and why in cells[4] for cells in rows)
         below = part[part.index("</table>") :][:2000]
