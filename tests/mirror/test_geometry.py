@@ -116,12 +116,12 @@ def test_a_singular_coupling_is_refused_with_the_direction_that_is_not_driven():
     [
         ({"angle": "line of sight"}, 'angle is \'line of sight\'; choose "optical" or "mechanical"'),
         ({"layout": "hexapod"}, 'layout is \'hexapod\'; choose "two-axis" or "tripod"'),
-        ({"incidence_rad": math.pi / 2}, r"incidence_rad is 1\.5708; .* below pi/2, where the beam would graze"),
-        ({"incidence_rad": -0.1}, "incidence_rad is -0.1"),
+        ({"incidence_rad": math.pi / 2}, r"incidence_rad is 1\.571 rad: .* below 1\.571 rad; .* the beam grazes"),
+        ({"incidence_rad": -0.1}, "incidence_rad is -100 mrad"),
         ({"incidence_rad": math.nan}, "incidence_rad is nan"),
-        ({"magnification": 0.0}, r"magnification is 0; give .* above 0 \(1 without a telescope; an inverted image is"),
+        ({"magnification": 0.0}, "magnification is 0: it must be finite, above 0; an inverted image is"),
         ({"magnification": math.nan}, "magnification is nan"),
-        ({"rotation_rad": math.inf}, "rotation_rad is inf; give a finite angle"),
+        ({"rotation_rad": math.inf}, "rotation_rad is inf rad: it must be finite"),
         ({"coupling": ((1.0, 0.0), (0.0, math.nan))}, "coupling is .*nan.*; give two rows of two finite numbers"),
         ({"coupling": ((1.0, 0.0),)}, "coupling is .* for none"),
         ({"layout": "tripod"}, "actuator_radius_m is None; give the radius of the circle on which the tripod's three"),
@@ -129,7 +129,7 @@ def test_a_singular_coupling_is_refused_with_the_direction_that_is_not_driven():
     ],
 )
 def test_what_is_no_geometry_is_refused(values, message):
-    with pytest.raises(ValueError, match=f"^geometry: {message}"):
+    with pytest.raises(ValueError, match=f"^(geometry: |Geometry.){message}"):
         Geometry(**({"angle": "optical"} | values))
 
 

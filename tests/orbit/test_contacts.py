@@ -544,12 +544,18 @@ def test_the_sun_behind_the_earth_does_not_blind():
         ({"attitude": "spin"}, "attitude 'spin' is not known; write nadir, sun or free"),
         ({"boresight": (0.0, 0.0, 0.0)}, "has no direction"),
         ({"boresight": (0.0, math.nan, 1.0)}, "has no direction"),
-        ({"field_of_regard_rad": 0.0}, "field of regard of 0 rad is out of range"),
-        ({"field_of_regard_rad": 3.2}, "field of regard of 3.2 rad is out of range"),
+        (
+            {"field_of_regard_rad": 0.0},
+            "Limits.field_of_regard_rad is 0 deg: it must be finite, above 0 deg, at most 180 deg",
+        ),
+        ({"field_of_regard_rad": 3.2}, "Limits.field_of_regard_rad is 183.3 deg: it must be finite"),
         ({"field_of_regard_rad": 1.0}, 'means nothing with the attitude "free"'),
-        ({"slew_limit_rad_s": 0.0}, "slew limit of 0 rad/s is out of range"),
-        ({"sun_exclusion_rad": -0.1}, "Sun exclusion of -100 mrad is out of range"),
-        ({"sun_exclusion_rad": math.nan}, "Sun exclusion of nan rad is out of range"),
+        ({"slew_limit_rad_s": 0.0}, "slew limit of 0 rad/s is not above 0"),
+        (
+            {"sun_exclusion_rad": -0.1},
+            "Limits.sun_exclusion_rad is -5.73 deg: it must be finite, at least 0 deg and below 180 deg",
+        ),
+        ({"sun_exclusion_rad": math.nan}, "Limits.sun_exclusion_rad is nan deg: it must be finite"),
     ],
 )
 def test_limits_that_mean_nothing_are_refused(changed, message):

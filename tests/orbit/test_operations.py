@@ -125,7 +125,9 @@ def test_a_rate_without_a_range_is_refused(largest):
 
 @pytest.mark.parametrize("availability", [-0.1, 1.1, math.nan])
 def test_an_availability_that_is_no_share_is_refused(availability):
-    with pytest.raises(OperationsError, match=f"the availability is {availability:g}; give a share of time from 0 to"):
+    with pytest.raises(
+        OperationsError, match=rf"availability is {availability:g}: .* at least 0, at most 1; it is a share"
+    ):
         Service(np.array([0.0, 1.0]), np.array([1.0]), availability)
 
 

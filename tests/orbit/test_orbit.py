@@ -334,7 +334,7 @@ def test_a_surface_that_is_none_is_refused():
     with pytest.raises(OrbitError, match="'flat' is not known; write oblate or sphere"):
         earth.Earth("flat", 0.0)
     for height in (-1.0, 2e6, math.nan):
-        with pytest.raises(OrbitError, match=r"grazing height .* is not between 0 and 1000 km"):
+        with pytest.raises(OrbitError, match=r"Earth\.grazing_height_m is .* finite, at least 0 m, at most 1000 km"):
             earth.Earth("sphere", height)
 
 
@@ -546,21 +546,30 @@ def test_any_order_and_any_shape_of_times_gives_the_same_states(orbit):
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"eccentricity": 1.0}, "eccentricity 1 is not from 0 to below 1"),
-        ({"eccentricity": -0.1}, "eccentricity -0.1 is not"),
+        ({"eccentricity": 1.0}, r"KeplerOrbit\.eccentricity of low is 1: it must be finite, at least 0 and below 1"),
+        (
+            {"eccentricity": -0.1},
+            r"KeplerOrbit\.eccentricity of low is -0\.1: it must be finite, at least 0 and below 1",
+        ),
         ({"eccentricity": 0.7}, r"perigee is -4158\.14 km over the equator, below 120 km: it has decayed"),
         ({"semi_major_axis_m": 700e3}, "it has decayed; raise the altitude or the semi-major axis"),
-        ({"inclination_rad": 3.2}, "inclination of 183.346 deg is not from 0 to 180 deg"),
-        ({"node_rad": math.nan}, "node_rad is nan, not a number"),
-        ({"semi_major_axis_m": math.inf}, "semi_major_axis_m is inf"),
-        ({"mean_anomaly_rad": math.inf}, "mean_anomaly_rad is inf"),
-        ({"argument_of_perigee_rad": math.nan}, "argument_of_perigee_rad is nan"),
+        (
+            {"inclination_rad": 3.2},
+            r"inclination_rad of low is 183\.3 deg: it must be finite, at least 0 deg, at most 180 deg",
+        ),
+        ({"node_rad": math.nan}, r"KeplerOrbit\.node_rad of low is nan rad: it must be finite"),
+        ({"semi_major_axis_m": math.inf}, r"KeplerOrbit\.semi_major_axis_m of low is inf m: it must be finite"),
+        ({"mean_anomaly_rad": math.inf}, r"KeplerOrbit\.mean_anomaly_rad of low is inf rad: it must be finite"),
+        (
+            {"argument_of_perigee_rad": math.nan},
+            r"KeplerOrbit\.argument_of_perigee_rad of low is nan rad: it must be finite",
+        ),
     ],
 )
 def test_elements_that_are_no_orbit_are_refused(changes, words):
     with pytest.raises(OrbitError, match=words) as refused:
         dataclasses.replace(LOW, **changes)
-    assert "orbit low" in str(refused.value)
+    assert any(where in str(refused.value) for where in ("orbit low", "of low"))
 
 
 def test_the_lowest_perigee_is_taken_and_a_metre_less_is_not():
@@ -618,7 +627,7 @@ def test_a_slot_stands_over_its_longitude():
     below = earth.subpoint(SLOT.states(time_s).position_m, START.earth_rotation_rad(time_s))
     np.testing.assert_allclose(below.longitude_rad, 0.4, rtol=0.0, atol=1e-12)
     np.testing.assert_allclose(below.latitude_rad, 0.0, rtol=0.0, atol=1e-15)
-    with pytest.raises(OrbitError, match="slot GEO: its longitude of 400 deg"):
+    with pytest.raises(OrbitError, match=r"longitude_rad of GEO is 400 deg: .* at least -360 deg, at most 360 deg"):
         analytic.GeostationarySlot("GEO", START, math.radians(400.0))
 
 
@@ -738,15 +747,15 @@ def test_overhead_is_ninety_degrees_and_the_horizon_nought():
 @pytest.mark.parametrize(
     ("site", "words"),
     [
-        ((90.1, 0.0, 0.0), "its latitude of 90.1 deg is not from -90 to 90 deg"),
-        ((math.nan, 0.0, 0.0), "its latitude of nan deg"),
-        ((0.0, 361.0, 0.0), "its longitude of 361 deg"),
-        ((0.0, 0.0, 0.0, 90.0), "its elevation mask of 90 deg is not from 0 to below 90 deg"),
-        ((0.0, 0.0, 0.0, -1.0), "its elevation mask of -1 deg"),
-        ((0.0, 0.0, 6378137.0), r"its height of 6\.37814e\+06 m is not from -1 to 50 km"),
+        ((90.1, 0.0, 0.0), r"latitude_rad of G is 90\.1 deg: it must be finite, at least -90 deg, at most 90 deg"),
+        ((math.nan, 0.0, 0.0), r"latitude_rad of G is nan deg: it must be finite, at least -90 deg, at most 90 deg"),
+        ((0.0, 361.0, 0.0), r"longitude_rad of G is 361 deg: it must be finite, at least -360 deg, at most 360 deg"),
+        ((0.0, 0.0, 0.0, 90.0), r"mask_rad of G is 90 deg: it must be finite, at least 0 deg and below 90 deg"),
+        ((0.0, 0.0, 0.0, -1.0), r"mask_rad of G is -1 deg: it must be finite, at least 0 deg and below 90 deg"),
+        ((0.0, 0.0, 6378137.0), r"height_m of G is 6378 km: it must be finite, at least -1 km, at most 50 km"),
     ],
 )
 def test_a_place_that_is_none_is_refused(site, words):
     with pytest.raises(OrbitError, match=words) as refused:
         station(*site)
-    assert "station G" in str(refused.value)
+    assert " of G is " in str(refused.value)

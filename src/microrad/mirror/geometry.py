@@ -8,13 +8,14 @@ plane of incidence and the mirror's surface. Reflection: k' = k - 2 (k n) n.
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 
 from microrad.core.arrays import Floats
 from microrad.core.budget import Line, root_sum_square
 from microrad.core.units import format_quantity
+from microrad.mission.fields import Bounded, Quantity, Share
 
 WORST_CONDITION = 1e4
 """Ratio of the largest to the smallest gain from drives to line of sight beyond which a geometry is singular."""
@@ -28,7 +29,7 @@ _PUSHES_AT_RAD = 2.0 * np.pi / 3.0 * np.arange(3)
 
 
 @dataclass(frozen=True, slots=True)
-class Geometry:
+class Geometry(Bounded):
     """What stands between the mirror's outputs and the line of sight outside the telescope.
 
     ``angle``: a "mechanical" output counts the tilt, an "optical" one twice the tilt (the beam at normal incidence).
@@ -47,9 +48,13 @@ class Geometry:
     """
 
     angle: Literal["optical", "mechanical"]
-    incidence_rad: float = 0.0
-    magnification: float = 1.0
-    rotation_rad: float = 0.0
+    incidence_rad: Annotated[
+        float,
+        Share("rad", least=0.0, below=math.pi / 2.0),
+        "between beam and normal; at pi/2 the beam grazes the mirror",
+    ] = 0.0
+    magnification: Annotated[float, Quantity("", above=0.0), "an inverted image is rotation_rad = pi"] = 1.0
+    rotation_rad: Annotated[float, Quantity("rad")] = 0.0
     coupling: tuple[tuple[float, float], tuple[float, float]] = NO_COUPLING
     layout: Literal["two-axis", "tripod"] = "two-axis"
     actuator_radius_m: float | None = None
@@ -58,18 +63,7 @@ class Geometry:
         """Check each value."""
         _one_of("angle", self.angle, _ANGLES)
         _one_of("layout", self.layout, _LAYOUTS)
-        if not 0.0 <= self.incidence_rad < math.pi / 2.0:
-            raise ValueError(
-                f"geometry: incidence_rad is {self.incidence_rad:g}; give the angle between beam and mirror normal, at "
-                "least 0 rad and below pi/2, where the beam would graze the mirror"
-            )
-        if not 0.0 < self.magnification < math.inf:
-            raise ValueError(
-                f"geometry: magnification is {self.magnification:g}; give the telescope's angular magnification, "
-                "above 0 (1 without a telescope; an inverted image is rotation_rad = pi)"
-            )
-        if not math.isfinite(self.rotation_rad):
-            raise ValueError(f"geometry: rotation_rad is {self.rotation_rad:g}; give a finite angle (0 rad: none)")
+        Bounded.__post_init__(self)
         coupling = np.asarray(self.coupling, dtype=np.float64)
         if coupling.shape != (2, 2) or not np.all(np.isfinite(coupling)):
             raise ValueError(

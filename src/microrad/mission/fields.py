@@ -9,7 +9,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, fields
 from functools import cache
 from itertools import pairwise
-from typing import Any, NamedTuple, Self, get_type_hints
+from typing import Any, ClassVar, NamedTuple, Self, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, GetJsonSchemaHandler, model_validator
 from pydantic_core import CoreSchema, core_schema
@@ -101,8 +101,8 @@ class Quantity:
             ValueError: For a value that is not finite or out of bounds.
         """
         if not math.isfinite(value) or self.out_of_bounds(value):
-            reason = f"; {why}" if why else ""
-            raise ValueError(f"{name} is {self._show(value).strip()}: it must be finite, {self.limits}{reason}")
+            limits, reason = ", ".join(filter(None, ("finite", self.limits))), f"; {why}" if why else ""
+            raise ValueError(f"{name} is {self._show(value).strip()}: it must be {limits}{reason}")
 
     def out_of_bounds(self, number: float) -> str:
         """Why a number is not allowed, or nothing."""
@@ -311,18 +311,25 @@ def _plain_number(value: object) -> float:
 class Bounded:
     """A record that refuses what its annotations do not allow, as `Annotated[float, Quantity("W", least=0.0)]`.
 
-    A text behind the bounds says why they hold. The default of a field is allowed whatever they are.
+    A text behind the bounds says why they hold. The default of a field is allowed whatever they are. `REFUSAL` is the
+    error that is raised.
     """
 
     __slots__ = ()
+    REFUSAL: ClassVar[type[ValueError]] = ValueError
 
     def __post_init__(self) -> None:
-        """Raises ValueError if a value is not finite or out of its bounds."""
+        """Raises the record's error if a value is not finite or out of its bounds."""
         record: Any = type(self)
+        own = getattr(self, "name", "")
         for name, default, rule, why in _bounds(record):
             value = getattr(self, name)
-            if value != default:
-                rule.check(f"{type(self).__name__}.{name}", value, why)
+            if value == default:
+                continue
+            try:
+                rule.check(f"{record.__name__}.{name}{f' of {own}' if own else ''}", value, why)
+            except ValueError as error:
+                raise self.REFUSAL(str(error)) from None
 
 
 @cache

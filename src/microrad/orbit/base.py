@@ -8,10 +8,18 @@ Times are elapsed seconds since the epoch of the mission. Vectors are axis first
 from typing import NamedTuple, Protocol, TypeVar
 
 from microrad.core.arrays import Floats
+from microrad.mission import fields
 
 
 class OrbitError(ValueError):
     """An orbit, an instant or a place is not possible; the message says why, and what to do."""
+
+
+class Bounded(fields.Bounded):
+    """A record of this room that refuses what its annotations do not allow; raises OrbitError."""
+
+    __slots__ = ()
+    REFUSAL = OrbitError
 
 
 class OperationsError(ValueError):

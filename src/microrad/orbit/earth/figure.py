@@ -2,12 +2,13 @@
 
 import math
 from dataclasses import dataclass
-from typing import Literal, NamedTuple, get_args
+from typing import Annotated, Literal, NamedTuple, get_args
 
 import numpy as np
 
 from microrad.core.arrays import Floats
-from microrad.orbit.base import OrbitError, States
+from microrad.mission.fields import Quantity, Share
+from microrad.orbit.base import Bounded, OrbitError, States
 from microrad.orbit.earth.epoch import Epoch
 
 EARTH_RADIUS_M = 6378137.0
@@ -52,7 +53,7 @@ def semi_axes_m(shape: Shape, height_m: float = 0.0) -> tuple[float, float]:
 
 
 @dataclass(frozen=True, slots=True)
-class Earth:
+class Earth(Bounded):
     """The surface that a line of sight must clear: the figure of the Earth, raised by the grazing height.
 
     Raised means that both semi-axes are longer by `grazing_height_m`. For the sphere that is the surface of this
@@ -63,16 +64,14 @@ class Earth:
     """
 
     shape: Shape
-    grazing_height_m: float
+    grazing_height_m: Annotated[
+        float, Quantity("m", "km", least=0.0, most=1e6), "it is the height below which the air is not to be crossed"
+    ]
 
     def __post_init__(self) -> None:
         """Raises OrbitError if the shape is unknown or the height out of range."""
         semi_axes_m(self.shape)
-        if not 0.0 <= self.grazing_height_m <= 1e6:
-            raise OrbitError(
-                f"the grazing height {self.grazing_height_m / 1e3:.6g} km is not between 0 and 1000 km; give the "
-                "height below which the air is not to be crossed, for example 100 km"
-            )
+        Bounded.__post_init__(self)
 
     def height_m(self, position_m: Floats) -> Floats:
         """Height of positions of shape (3, n) over the figure itself: geodetic over the oblate Earth."""
@@ -193,7 +192,7 @@ def subpoint(position_m: Floats, rotation_rad: Floats) -> Subpoint:
 
 # --------------------------------------------------------------------------------------------------------------- ground
 @dataclass(frozen=True, slots=True)
-class Station:
+class Station(Bounded):
     """A place fixed to the Earth: geodetic latitude (north positive), longitude (east positive), height (WGS84).
 
     `mask_rad` is the elevation below which nothing is received. Raises OrbitError for a latitude beyond the poles, a
@@ -201,28 +200,10 @@ class Station:
     """
 
     name: str
-    latitude_rad: float
-    longitude_rad: float
-    height_m: float
-    mask_rad: float
-
-    def __post_init__(self) -> None:
-        """Raises OrbitError if an angle or the height is out of range."""
-        for what, angle_rad, holds, wanted in (
-            ("latitude", self.latitude_rad, abs(self.latitude_rad) <= math.pi / 2, "from -90 to 90 deg"),
-            ("longitude", self.longitude_rad, abs(self.longitude_rad) <= 2 * math.pi, "from -360 to 360 deg"),
-            ("elevation mask", self.mask_rad, 0.0 <= self.mask_rad < math.pi / 2, "from 0 to below 90 deg"),
-        ):
-            if not holds:
-                raise OrbitError(
-                    f"station {self.name}: its {what} of {math.degrees(angle_rad):.6g} deg is not {wanted}; check its "
-                    "sign and its unit"
-                )
-        if not -1e3 <= self.height_m <= 5e4:
-            raise OrbitError(
-                f"station {self.name}: its height of {self.height_m:.6g} m is not from -1 to 50 km; give the height "
-                "over the ellipsoid in metres"
-            )
+    latitude_rad: Annotated[float, Quantity("rad", "deg", least=-math.pi / 2, most=math.pi / 2)]
+    longitude_rad: Annotated[float, Quantity("rad", "deg", least=-2.0 * math.pi, most=2.0 * math.pi)]
+    height_m: Annotated[float, Quantity("m", least=-1e3, most=5e4), "it is the height over the ellipsoid"]
+    mask_rad: Annotated[float, Share("rad", "deg", least=0.0, below=math.pi / 2)]
 
     def position(self, epoch: Epoch, time_s: Floats) -> States:
         """Position and velocity of the station in TEME; it turns with the Earth.

@@ -3,12 +3,13 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from microrad.core.arrays import Floats
+from microrad.mission.fields import Bounded, Quantity
 from microrad.orbit.base import OperationsError
 from microrad.orbit.visibility.events import TOLERANCE_S, positive_rows
 
@@ -52,7 +53,7 @@ class RateTable:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Service:
+class Service(Bounded):
     """What a contact carries: piecewise-constant data rate, `edges_s` of shape (k + 1,) and `rate_bit_s` (k,).
 
     `availability` is 1 less the share of time in outage. Outages are taken as short against the pieces and their data
@@ -61,14 +62,11 @@ class Service:
     The edges rise. Raises OperationsError for an availability that is not from 0 to 1.
     """
 
+    REFUSAL = OperationsError
+
     edges_s: Floats
     rate_bit_s: Floats
-    availability: float
-
-    def __post_init__(self) -> None:
-        """Raises OperationsError if the availability is not from 0 to 1."""
-        if not 0.0 <= self.availability <= 1.0:
-            raise OperationsError(f"the availability is {self.availability:g}; give a share of time from 0 to 1")
+    availability: Annotated[float, Quantity("", least=0.0, most=1.0), "it is a share of time"]
 
     @property
     def start_s(self) -> float:

@@ -2,11 +2,13 @@
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from microrad.core.arrays import Floats
-from microrad.orbit.base import OrbitError, States
+from microrad.mission.fields import Quantity, Share
+from microrad.orbit.base import Bounded, OrbitError, States
 from microrad.orbit.earth.epoch import DAY_S, Epoch
 from microrad.orbit.earth.figure import EARTH_RADIUS_M, GEOSTATIONARY_RADIUS_M, J2, MU_M3_S2, ROTATION_RAD_S
 
@@ -15,13 +17,9 @@ LOWEST_PERIGEE_M = 120e3
 TROPICAL_YEAR_S = 365.24219 * DAY_S
 """Time in which the mean Sun goes once round the equator from equinox to equinox."""
 
-_ELEMENTS = (
-    "semi_major_axis_m", "eccentricity", "inclination_rad", "node_rad", "argument_of_perigee_rad", "mean_anomaly_rad",
-)  # fmt: skip
-
 
 @dataclass(frozen=True, slots=True)
-class KeplerOrbit:
+class KeplerOrbit(Bounded):
     """An ellipse about the Earth; its elements hold at `epoch`, from which the times of `states` count.
 
     `node_rad` is the right ascension of the ascending node, in TEME as all else. With `j2` the elements are mean ones:
@@ -34,29 +32,21 @@ class KeplerOrbit:
 
     name: str
     epoch: Epoch
-    semi_major_axis_m: float
-    eccentricity: float
-    inclination_rad: float
-    node_rad: float
-    argument_of_perigee_rad: float
-    mean_anomaly_rad: float
+    semi_major_axis_m: Annotated[float, Quantity("m")]
+    eccentricity: Annotated[float, Share("", least=0.0), "else the orbit is not closed"]
+    inclination_rad: Annotated[
+        float,
+        Quantity("rad", "deg", least=0.0, most=math.pi),
+        "an orbit against the rotation of the Earth has more than 90 deg",
+    ]
+    node_rad: Annotated[float, Quantity("rad")]
+    argument_of_perigee_rad: Annotated[float, Quantity("rad")]
+    mean_anomaly_rad: Annotated[float, Quantity("rad")]
     j2: bool
 
     def __post_init__(self) -> None:
         """Raises OrbitError if an element is out of range."""
-        for what in _ELEMENTS:
-            if not math.isfinite(value := getattr(self, what)):
-                raise OrbitError(f"orbit {self.name}: {what} is {value}, not a number; give it a finite value")
-        if not 0.0 <= self.eccentricity < 1.0:
-            raise OrbitError(
-                f"orbit {self.name}: the eccentricity {self.eccentricity:.6g} is not from 0 to below 1, so the orbit "
-                "is not closed; check the elements"
-            )
-        if not 0.0 <= self.inclination_rad <= math.pi:
-            raise OrbitError(
-                f"orbit {self.name}: the inclination of {math.degrees(self.inclination_rad):.6g} deg is not from 0 to "
-                "180 deg; an orbit against the rotation of the Earth has more than 90 deg"
-            )
+        Bounded.__post_init__(self)
         height_m = self.semi_major_axis_m * (1.0 - self.eccentricity) - EARTH_RADIUS_M
         if height_m < LOWEST_PERIGEE_M:
             raise OrbitError(
@@ -203,7 +193,7 @@ def node_of_local_time(epoch: Epoch, local_time_h: float) -> float:
 
 
 @dataclass(frozen=True, slots=True)
-class GeostationarySlot:
+class GeostationarySlot(Bounded):
     """A satellite that stands over the equator at a longitude (east positive), fixed in the turning Earth.
 
     Times count from `epoch`. Raises OrbitError for a longitude beyond a full turn.
@@ -211,15 +201,7 @@ class GeostationarySlot:
 
     name: str
     epoch: Epoch
-    longitude_rad: float
-
-    def __post_init__(self) -> None:
-        """Raises OrbitError if the longitude is beyond a full turn."""
-        if not abs(self.longitude_rad) <= 2.0 * math.pi:
-            raise OrbitError(
-                f"slot {self.name}: its longitude of {math.degrees(self.longitude_rad):.6g} deg is not from -360 to "
-                "360 deg; check its unit"
-            )
+    longitude_rad: Annotated[float, Quantity("rad", "deg", least=-2.0 * math.pi, most=2.0 * math.pi)]
 
     def states(self, time_s: Floats) -> States:
         """States at `time_s` after the epoch.

@@ -3,13 +3,14 @@
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Literal, NamedTuple, get_args
+from typing import Annotated, Literal, NamedTuple, get_args
 
 import numpy as np
 
 from microrad.core.arrays import Floats
 from microrad.core.units import format_quantity
-from microrad.orbit.base import Orbit, OrbitError, States
+from microrad.mission.fields import Quantity, Share
+from microrad.orbit.base import Bounded, Orbit, OrbitError, States
 from microrad.orbit.earth.epoch import Epoch
 from microrad.orbit.earth.figure import Earth, gravity
 from microrad.orbit.earth.sun import shadow_rad, sun_direction
@@ -31,7 +32,7 @@ _TURN_RAD = 0.1  # by which the line of sight may turn in the body from one samp
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
+class Limits(Bounded):
     """What a terminal can point at, beside what the Earth hides.
 
     `boresight` is fixed in the body, along the axes of `Attitude`, of any length. The line of sight is at most
@@ -46,9 +47,9 @@ class Limits:
 
     attitude: Attitude
     boresight: tuple[float, ...]
-    field_of_regard_rad: float
+    field_of_regard_rad: Annotated[float, Quantity("rad", "deg", above=0.0, most=math.pi), "it is a half angle"]
     slew_limit_rad_s: float
-    sun_exclusion_rad: float
+    sun_exclusion_rad: Annotated[float, Share("rad", "deg", least=0.0, below=math.pi)]
     in_eclipse: bool
 
     def __post_init__(self) -> None:
@@ -58,17 +59,9 @@ class Limits:
         size = math.hypot(*self.boresight)
         if len(self.boresight) != 3 or not (math.isfinite(size) and size > 0.0):
             raise OrbitError(f"the boresight {self.boresight} has no direction; give three numbers, such as (0, 0, 1)")
-        field, slew, sun = self.field_of_regard_rad, self.slew_limit_rad_s, self.sun_exclusion_rad
-        for what, value, unit, holds in (
-            ("field of regard", field, "rad", 0.0 < field <= math.pi),
-            ("slew limit", slew, "rad/s", slew > 0.0),
-            ("Sun exclusion", sun, "rad", 0.0 <= sun < math.pi),
-        ):
-            if not holds:
-                raise OrbitError(
-                    f"a {what} of {format_quantity(value, unit)} is out of range; give the half angle of a field of "
-                    "regard above 0 to pi, a slew limit above 0, a Sun exclusion from 0 to below pi"
-                )
+        Bounded.__post_init__(self)
+        if not self.slew_limit_rad_s > 0.0:  # it may be infinite
+            raise OrbitError(f"a slew limit of {format_quantity(self.slew_limit_rad_s, 'rad/s')} is not above 0")
         if self.attitude == "free" and self.field_of_regard_rad < math.pi:
             raise OrbitError(
                 'a field of regard means nothing with the attitude "free": the body turns its boresight onto the '
