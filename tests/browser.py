@@ -57,6 +57,8 @@ class Studio:
 
     def enter(self, context, path=""):
         """A watched tab on one of the pages, which has shown the token."""
+        if not context.pages:  # a tab that stays, with a refusal: without one each new tab compiles all scripts anew
+            context.new_page().goto(f"{self.base}%07")
         page = watched(context.new_page())
         page.goto(self.url.replace(self.base, self.base + path))
         page.get_by_role("heading", level=1).wait_for()

@@ -812,6 +812,10 @@ def page():
     ui.button("script", on_click=lambda: ui.run_javascript("document.title = 'ran'"))
     ui.number("gain", value=3, validation={"too large": lambda v: v < 100}).tooltip("a tip")
 
+@ui.page("/plain")
+def plain():
+    ui.label(MISSION)
+
 @ui.page("/slipped")
 def slipped():
     ui.label("still here")
@@ -881,7 +885,7 @@ def test_a_browser_without_the_token_is_told_what_to_do(studio, tab):
 
 
 def test_whoever_is_in_already_gets_in_by_a_link_from_elsewhere(studio, tab):
-    here = f"http://127.0.0.1:{studio}/"
+    here = f"http://127.0.0.1:{studio}/plain"
     tab.goto(f"{here}?token={TOKEN}")
     with serving(FOREIGN) as (other, _):
         tab.goto(f"http://localhost:{other}/{here}")
@@ -928,7 +932,7 @@ ATTACK = """async ([here, host]) => {
 
 def test_a_page_on_another_port_reaches_nothing_even_with_the_cookie(studio, tab):
     host = f"127.0.0.1:{studio}"
-    tab.goto(f"http://{host}/?token={TOKEN}")
+    tab.goto(f"http://{host}/plain?token={TOKEN}")
     with serving(FOREIGN) as (other, _):
         tab.goto(f"http://127.0.0.1:{other}/x")
         assert tab.evaluate(ATTACK, [f"http://{host}/", host]) == ["refused"] * 5
@@ -939,7 +943,7 @@ def test_a_page_on_another_port_reaches_nothing_even_with_the_cookie(studio, tab
 @pytest.mark.parametrize("name", ["127.0.0.1", "localhost"])
 def test_a_link_on_another_page_opens_the_studio(studio, tab, name):
     with serving(FOREIGN) as (other, _):
-        tab.goto(f"http://{name}:{other}/http://127.0.0.1:{studio}/?token={TOKEN}")
+        tab.goto(f"http://{name}:{other}/http://127.0.0.1:{studio}/plain?token={TOKEN}")
         tab.locator("#in").click()
-        tab.get_by_text("slider at 3").wait_for()
-        assert tab.url == f"http://127.0.0.1:{studio}/"
+        tab.get_by_text("<img src=x").wait_for()
+        assert tab.url == f"http://127.0.0.1:{studio}/plain"

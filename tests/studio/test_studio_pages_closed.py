@@ -6,6 +6,7 @@ import base64
 import importlib
 import threading
 from dataclasses import replace
+from functools import cache
 from itertools import cycle
 from pathlib import Path
 from types import SimpleNamespace
@@ -18,6 +19,7 @@ from microrad.report.plotting.sheet import Line, grid
 from microrad.report.tables import Cell, Table
 from microrad.report.view import Drawing, Points, Soft, Verbatim, Verdict, View
 from microrad.studio.jobs.queue import JobError
+from microrad.studio.recordings import reading
 from microrad.studio.recordings.uploads import Uploads
 from microrad.studio.session import Session
 from microrad.studio.views import compare as compare_view
@@ -136,6 +138,13 @@ def session(tmp_path_factory):
     return found
 
 
+@pytest.fixture
+def read_once(monkeypatch):
+    """A recording is read by one process, not by one for each visit."""
+    for name in ("list_channels", "view"):
+        monkeypatch.setattr(reading, name, cache(getattr(reading, name)))
+
+
 def left(patch, session, build, leave):
     """A visit of what `build` puts on a page, closed as it waits for this time."""
 
@@ -170,7 +179,7 @@ WAITS = {"compare": 2, "control": 4, "day": 2, "link": 3, "mirror": 4, "mission"
 
 
 @pytest.mark.parametrize("name", WAITS)
-def test_a_page_may_be_closed_whenever_it_waits(session, name, monkeypatch):
+def test_a_page_may_be_closed_whenever_it_waits(session, name, monkeypatch, read_once):
     monkeypatch.setattr(link, "_REST_S", -1.0)  # asks for the study of the links at once
     monkeypatch.setattr(compare_view, "link_numbers", lambda draft: ())  # takes a second of each visit
     module = importlib.import_module(f"microrad.studio.pages.{name}")
@@ -219,7 +228,7 @@ def told_of(session, visit):
 
 
 @pytest.mark.parametrize("build", [dropped, started, told_of])
-def test_a_page_may_be_closed_while_what_was_clicked_is_done(session, build):
+def test_a_page_may_be_closed_while_what_was_clicked_is_done(session, build, read_once):
     times, told = every_time(session, build)
     assert (times >= 2, told) == (True, {})
 
