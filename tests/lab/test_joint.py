@@ -19,7 +19,7 @@ from microrad.lab.identify import (
 )
 from microrad.lab.identify.hysteresis import joint
 from microrad.lab.identify.hysteresis.joint import thin_record, time_constants
-from microrad.lab.identify.hysteresis.plant_fit import fit_plant, fit_records
+from microrad.lab.identify.hysteresis.plant_fit import PlantProblem, fit_plant, fit_records
 from microrad.lab.identify.hysteresis.prandtl_ishlinskii import threshold_grid
 from microrad.lab.identify.hysteresis.structures import LinearPoles, Roots, poles_of
 from microrad.lab.identify.records import si_records
@@ -333,11 +333,10 @@ def test_thinning_keeps_the_fit_and_never_bends_the_drive(monkeypatch):
     record = recorded(drive, plays(drive, THRESHOLDS, WEIGHTS), 10_000.0, noise=1e-4)
     (prepared,) = si_records([record], UNITS)
     whole = fit_joint([record], "prandtl_ishlinskii_joint", UNITS)
-    assert thin_record(prepared) is not None
-    assert thin_record(prepared).drive_v.size == 20_000
+    assert thin_record(prepared, 20_000, 2e-3).drive_v.size == 20_000
 
     monkeypatch.setattr(joint, "_MOST_SAMPLES", 2500)
-    fewer = thin_record(prepared)
+    fewer = thin_record(prepared, 2500, 2e-3)
     assert fewer.drive_v.size == 2500
     assert fewer.step_s == pytest.approx(8e-4)
     assert fewer.start == math.ceil(prepared.start / 8)
@@ -351,10 +350,35 @@ def test_thinning_keeps_the_fit_and_never_bends_the_drive(monkeypatch):
 
     rough = two_sines(20_000, 10_000.0, freq_hz=300.0)
     (kept,) = si_records([recorded(rough, rough * 1e-4, 10_000.0)], UNITS)
-    assert thin_record(kept).drive_v.size == 20_000
+    assert thin_record(kept, 2500, 2e-3).drive_v.size == 20_000
     corner = 5.0 + np.abs((np.arange(20_000) / 100) % 2 - 1)  # a triangle of 200 samples a period
     (kept,) = si_records([recorded(corner, corner * 1e-4, 10_000.0)], UNITS)
-    assert thin_record(kept).drive_v.size in (10_000, 5_000, 2_500)
+    assert thin_record(kept, 2500, 2e-3).drive_v.size in (10_000, 5_000, 2_500)
+
+
+def test_starts_on_fewer_samples_lead_to_the_same_fit(monkeypatch):
+    drive = two_sines(12_000, 4000.0)
+    record = recorded(drive, bouc_wen(drive, 4000.0, EQ3), 4000.0)
+    screened = fit_joint([record], "bouc_wen_joint", UNITS)
+    monkeypatch.setattr(joint, "_SCREENED_SAMPLES", 12_000)
+    whole = fit_joint([record], "bouc_wen_joint", UNITS)
+    assert min(screened.fit.start_costs) != min(whole.fit.start_costs)
+    assert 0.0 < np.max(np.abs(screened.fit.values - whole.fit.values) / whole.fit.standard_errors) < 1e-3
+    assert screened.fit.agreeing_starts == whole.fit.agreeing_starts == 2
+
+
+def test_parameters_in_which_the_output_is_linear():
+    """Their derivatives take one simulation, whatever the step; those by two are the same."""
+    fit = fit_joint([crept(None)], "prandtl_ishlinskii_rate_creep", UNITS)
+    marked = [p.name for p in fit.structure.parameters if p.linear]
+    assert marked == [p.name for p in fit.structure.parameters if p.name != "widening"]
+    unmarked = replace(
+        fit.structure, parameters=tuple(replace(parameter, linear=False) for parameter in fit.structure.parameters)
+    )
+    records = fit_records([crept(None)])
+    at = fit.fit.values / np.array([p.scale for p in fit.structure.parameters]) + 0.1
+    one, two = (PlantProblem(s, records).slopes(at, central=True) for s in (fit.structure, unmarked))
+    assert_allclose(one.T @ one, two.T @ two, rtol=1e-7)
 
 
 # --------------------------------------------------------------------------------------------------------- predictions

@@ -25,6 +25,8 @@ from microrad.mirror.model import Mirror
 
 _OPERATORS = 15
 _MOST_SAMPLES = 20_000
+_STRAIGHT = 2e-3  # a drive is, whose distance from straight lines is at most this part of its rms
+_SCREENED_SAMPLES, _NEARLY_STRAIGHT = 4_000, 2e-2
 _EVALUATIONS = 200
 _POLISHING = 60  # each is long: the broadband recordings belong to it
 
@@ -171,7 +173,7 @@ def fit_joint(  # noqa: PLR0913  all but the first three are named options
         IdentificationError: If a recording cannot be used, or if no start can be simulated.
     """
     form = FORMS[name]
-    records = tuple(thin_record(record) for record in si_records(recordings, units))
+    records = tuple(thin_record(record, _MOST_SAMPLES, _STRAIGHT) for record in si_records(recordings, units))
     creep_times = time_constants(records) if form.creep else ()
     fit_list = [_fit_record(record, creep_times) for record in records]
     model: BoucWen | Play
@@ -196,9 +198,11 @@ def fit_joint(  # noqa: PLR0913  all but the first three are named options
         # Of periods that only repeat, two say it all.
         short = [r.first(2 * r.period_samples) if r.period_samples else r for r in broadband]
         fit_list += [_fit_record(record, creep_times) for record in si_records(short, units)]
+    coarse = [thin_record(record, _SCREENED_SAMPLES, _NEARLY_STRAIGHT) for record in records]
     fit = fit_plant(
         structure,
         fit_list,
+        screen=() if free_linear else [_fit_record(record, creep_times) for record in coarse],
         starts=_scattered_starts(structure, starts, seed) if form.family == "bouc_wen" else (),
         tolerance=1e-12 if free_linear else 1e-9,  # a candidate is only compared
         most_evaluations=_POLISHING if free_linear else _EVALUATIONS,
@@ -245,19 +249,23 @@ def time_constants(records: Sequence[SiRecord]) -> tuple[float, ...]:
     return tuple(10.0**k for k in range(first, last + 1))
 
 
-def thin_record(record: SiRecord) -> SiRecord:
+def thin_record(record: SiRecord, most: int, bent: float) -> SiRecord:
     """Every n-th sample of a long record, as long as straight lines between them still make the drive.
 
     The kernel is exact for such a drive at any step, so only samples are lost, and neighbouring ones say the same.
-    Straight enough is an rms distance of 0.2 % of the drive's own rms.
+
+    Args:
+        record: The record.
+        most: Number of samples from which it is thinned.
+        bent: Largest rms distance of the drive from the straight lines, in parts of its own rms.
     """
     size = record.drive_v.size
-    stride = -(-size // _MOST_SAMPLES)
+    stride = -(-size // most)
     spread = float(np.std(record.drive_v))
     while stride > 1:
         kept = np.arange(0, size, stride)
-        bent = np.interp(np.arange(kept[-1] + 1), kept, record.drive_v[kept]) - record.drive_v[: kept[-1] + 1]
-        if float(np.sqrt(np.mean(bent**2))) <= 2e-3 * spread:
+        away = np.interp(np.arange(kept[-1] + 1), kept, record.drive_v[kept]) - record.drive_v[: kept[-1] + 1]
+        if float(np.sqrt(np.mean(away**2))) <= bent * spread:
             break
         stride //= 2
     return record.every(stride)

@@ -27,7 +27,9 @@ from microrad.mirror.model import Mirror
 Interpolation = Literal["linear", "band-limited"]
 
 _ROUGH = 1e-8  # relative change of cost or place from which a search goes on by central differences
+_SCREENED = 1e-5  # and that at which it ends on fewer samples
 _DIFFERENCE = 1e-5
+_LINEAR_DIFFERENCE = 1.0
 _SLICE = 2_000_000
 _FAR = 1e3  # times the largest output: a model further off is as good as none
 
@@ -36,7 +38,8 @@ _FAR = 1e3  # times the largest output: a model further off is as good as none
 class Parameter:
     """A number to be fitted: name, unit, where the search begins, its bounds, and a change of it that is of order one.
 
-    `size` is the size of the start where it is left at 0.
+    `size` is the size of the start where it is left at 0. `linear` says that the output is linear in it, the others
+    held: then a single simulation gives its derivative.
     """
 
     name: str
@@ -45,6 +48,7 @@ class Parameter:
     lower: float = -math.inf
     upper: float = math.inf
     size: float = 0.0
+    linear: bool = False
 
     @property
     def scale(self) -> float:
@@ -228,7 +232,11 @@ class PlantFit(Estimate):
 
 
 class PlantProblem:
-    """The weighted residual of a structure on its runs, and its Jacobian by differences, as functions of the values."""
+    """The weighted residual of a structure on its runs, and its derivatives by differences, as functions of the values.
+
+    A search sees both turned so that the residual lies along the first axis: costs, gradients and steps are the same,
+    and there are no more rows than parameters and one.
+    """
 
     def __init__(self, structure: Structure, records: Sequence[FitRecord]) -> None:
         """The parameters are searched in units of their scale."""
@@ -237,6 +245,7 @@ class PlantProblem:
         self.lower = np.array([p.lower for p in structure.parameters]) / self.scale
         self.upper = np.array([p.upper for p in structure.parameters]) / self.scale
         self.targets = [run.target for run in self.runs]
+        self.edges = np.cumsum([target.size for target in self.targets])[:-1]
         self.size = sum(target.size for target in self.targets)
         largest = [run.weight * float(np.max(np.abs(t))) for run, t in zip(self.runs, self.targets, strict=True)]
         self.far = _FAR * max(largest)
@@ -265,43 +274,59 @@ class PlantProblem:
         return np.where(np.abs(whole) < self.far, whole, self.far)  # nan and inf too
 
     def residual(self, point: Floats) -> Floats:
-        """Modelled less measured, weighted."""
-        return np.asarray(self.modelled(point) - self.measured)
+        """Modelled less measured, weighted, at a scaled point, turned onto the first axis."""
+        turned = np.zeros(1 + point.size)
+        turned[0] = np.linalg.norm(self.modelled(point) - self.measured)
+        return turned
 
-    def slopes(self, point: Floats) -> Floats:
-        """Derivative of the residual by one-sided differences, good enough on the way; half as many simulations."""
+    def slopes(self, point: Floats, *, central: bool) -> Floats:
+        """Derivative of the residual by the scaled parameters, turned as it is.
+
+        Args:
+            point: The scaled point.
+            central: Whether differences are taken to both sides; those to one side, good enough on the way, need half
+                as many simulations.
+        """
+        rows = np.vstack([*self.triangles(point, central), np.zeros((1 + point.size, 1 + point.size))])
+        turned = _triangle(rows)
+        turned[0] *= math.copysign(1.0, turned[0, 0])
+        return np.asarray(turned[:, 1:])
+
+    def triangles(self, point: Floats, central: bool) -> list[Floats]:
+        """Of each run the triangle of a QR decomposition of its residual (first column) and derivatives.
+
+        Args:
+            point: The scaled point.
+            central: Whether differences are taken to both sides.
+        """
         here = self.modelled(point)
 
         def column(i: int) -> Floats:
-            step = np.zeros(point.size)
-            step[i] = _DIFFERENCE if point[i] + _DIFFERENCE <= self.upper[i] else -_DIFFERENCE
-            return np.asarray((self.modelled(point + step) - here) / step[i])
-
-        return _columns(column, point.size)
-
-    def jacobian(self, point: Floats) -> Floats:
-        """Derivative of the residual by central differences."""
-
-        def column(i: int) -> Floats:
-            step = np.zeros(point.size)
-            up = min(point[i] + _DIFFERENCE, self.upper[i]) - point[i]
-            down = point[i] - max(point[i] - _DIFFERENCE, self.lower[i])
+            step, linear = np.zeros(point.size), self.structure.parameters[i].linear
+            size = _LINEAR_DIFFERENCE if linear else _DIFFERENCE
+            if linear or not central:
+                step[i] = size if point[i] + size <= self.upper[i] else -size
+                return np.asarray((self.modelled(point + step) - here) / step[i])
+            up = min(point[i] + size, self.upper[i]) - point[i]
+            down = point[i] - max(point[i] - size, self.lower[i])
             step[i] = up + down
             above, below = point + (up / step[i]) * step, point - (down / step[i]) * step
             return np.asarray((self.modelled(above) - self.modelled(below)) / step[i])
 
-        return _columns(column, point.size)
+        columns = in_threads([partial(column, i) for i in range(point.size)])
+        parts = [part.T for part in np.split(np.array([here - self.measured, *columns]), self.edges, axis=1)]
+        return in_threads([partial(_triangle, part) for part in parts])
 
 
-def _columns(column: Callable[[int], Floats], count: int) -> Floats:
-    """Columns side by side, made on all cores."""
-    return np.column_stack(in_threads([partial(column, i) for i in range(count)]))
+def _triangle(rows: Floats) -> Floats:
+    return np.asarray(np.linalg.qr(rows, mode="r"))
 
 
 def fit_plant(
     structure: Structure,
     records: Sequence[FitRecord],
     *,
+    screen: Sequence[FitRecord] = (),
     starts: Sequence[Floats] = (),
     tolerance: float = 1e-9,
     most_evaluations: int = 60,
@@ -309,9 +334,12 @@ def fit_plant(
 ) -> PlantFit:
     """Fit all parameters of a structure to all records at once, by trust-region least squares within their bounds.
 
+    Of several starts the search goes on, with derivatives to both sides, from the place of the least cost.
+
     Args:
         structure: The parameters, with the point where the search begins, and the mirror that they make.
         records: What is fitted to.
+        screen: The same records in fewer samples, where the searches from all starts are made on those first.
         starts: Further points where a search begins, values in the order of the parameters.
         tolerance: Relative change of cost or place at which a search ends.
         most_evaluations: Largest number of simulations of all records in a search, without those for derivatives.
@@ -321,60 +349,59 @@ def fit_plant(
         IdentificationError: If no start can be simulated.
     """
     problem = PlantProblem(structure, records)
-    own = np.array([p.start for p in structure.parameters])
-    solutions = []
+    screened = PlantProblem(structure, screen) if screen else problem
+    own, ending = np.array([p.start for p in structure.parameters]), _SCREENED if screen else _ROUGH
+    near = []
     for done, start in enumerate([own, *starts], 1):
-        solutions.append(_search(problem, start / problem.scale, tolerance, most_evaluations))
+        near.append(_search(screened, start / problem.scale, ending, most_evaluations, central=False))
         (on_progress or no_progress)(done, 1 + len(starts), structure.name)
-    best = min(solutions, key=lambda s: float(s.cost))
+    first = min(near, key=lambda s: float(s.cost))
+    if screen:
+        first = _search(problem, first.x, _ROUGH, most_evaluations, central=False)
+    best = _search(problem, first.x, tolerance, max(most_evaluations - first.nfev, 1), central=True)
+    best.nfev += first.nfev
     if best.cost >= 0.4 * problem.size * problem.far**2:
         raise IdentificationError(
             f"{structure.name}: the mirror cannot be simulated from any start at a step of "
             f"{max(run.step_s for run in records):g} s; begin nearer, or take more steps a sample."
         )
-    return _report(problem, best, [float(s.cost) for s in solutions])
+    return _report(problem, best, [float(s.cost) for s in near])
 
 
-def _search(problem: PlantProblem, start: Floats, tolerance: float, most_evaluations: int) -> Any:
+def _search(problem: PlantProblem, start: Floats, tolerance: float, most_evaluations: int, *, central: bool) -> Any:
     from scipy.optimize import least_squares
 
-    def search(begin: Floats, jacobian: Callable[[Floats], Floats], ending: float, most: int) -> Any:
-        return least_squares(
-            problem.residual,
-            begin,
-            jac=jacobian,
-            bounds=(problem.lower, problem.upper),
-            method="trf",
-            x_scale="jac",
-            ftol=ending,
-            xtol=ending,
-            gtol=1e-12,
-            max_nfev=most,
-        )
-
-    near = search(np.clip(start, problem.lower, problem.upper), problem.slopes, _ROUGH, most_evaluations)
-    found = search(near.x, problem.jacobian, tolerance, max(most_evaluations - near.nfev, 1))
-    found.nfev += near.nfev
-    return found
+    return least_squares(
+        problem.residual,
+        np.clip(start, problem.lower, problem.upper),
+        jac=partial(problem.slopes, central=central),
+        bounds=(problem.lower, problem.upper),
+        method="trf",
+        x_scale="jac",
+        ftol=tolerance,
+        xtol=tolerance,
+        gtol=1e-12,
+        max_nfev=most_evaluations,
+    )
 
 
 # ---------------------------------------------------------------------------------------------------------- report
 def _report(problem: PlantProblem, best: Any, costs: list[float]) -> PlantFit:
     values = best.x * problem.scale
-    edges = np.cumsum([target.size for target in problem.targets])[:-1]
     residuals = tuple(
         target - out.reshape(target.shape) / run.weight
         for run, target, out in zip(
-            problem.runs, problem.targets, np.split(problem.modelled(best.x), edges), strict=True
+            problem.runs, problem.targets, np.split(problem.modelled(best.x), problem.edges), strict=True
         )
     )
     colours = [colour_inflation(list(residual.T)) for residual in residuals]
-    lost = best.fun.size / max(1, best.fun.size - values.size - sum(r.nuisance.shape[1] for r in problem.runs))
+    lost = problem.size / max(1, problem.size - values.size - sum(r.nuisance.shape[1] for r in problem.runs))
     variances = [
-        np.full(r.size, lost * colour * run.weight**2 * float(np.mean(r**2)))
+        lost * colour * run.weight**2 * float(np.mean(r**2))
         for r, colour, run in zip(residuals, colours, problem.runs, strict=True)
     ]
-    covariance, condition = _covariance(best.jac, np.concatenate(variances), problem)
+    slopes = [triangle[:, 1:] for triangle in problem.triangles(best.x, central=True)]
+    covariance, condition = _covariance(slopes, variances, problem)
     problem.simulated.cache_clear()
     return PlantFit(
         structure=problem.structure,
@@ -392,8 +419,12 @@ def _report(problem: PlantProblem, best: Any, costs: list[float]) -> PlantFit:
     )
 
 
-def _covariance(jacobian: Floats, variance: Floats, problem: PlantProblem) -> tuple[Floats, float]:
-    """The sandwich in the parameters' units, and the condition number of J with columns of length 1."""
+def _covariance(slopes: Sequence[Floats], variances: Sequence[float], problem: PlantProblem) -> tuple[Floats, float]:
+    """The sandwich in the parameters' units, and the condition number of J with columns of length 1.
+
+    Of each run, there are the rows of J and the variance of its residuals.
+    """
+    jacobian = np.concatenate(slopes)
     length = np.sqrt(np.einsum("ij,ij->j", jacobian, jacobian)) + 1e-300
     if not np.isfinite(length).all():
         raise IdentificationError(
@@ -404,7 +435,8 @@ def _covariance(jacobian: Floats, variance: Floats, problem: PlantProblem) -> tu
     values, vectors = np.linalg.eigh(gram)
     values = np.maximum(values, 1e-15)
     bread = (vectors / values) @ vectors.T
-    half = bread @ (jacobian / length * np.sqrt(variance)[:, None]).T  # a square cannot come out negative
+    scattered = np.concatenate([math.sqrt(v) * rows for v, rows in zip(variances, slopes, strict=True)])
+    half = bread @ (scattered / length).T  # a square cannot come out negative
     size = problem.scale / length
     return np.asarray(size[:, None] * (half @ half.T) * size), float(math.sqrt(values[-1] / values[0]))
 

@@ -209,7 +209,7 @@ def _bouc_wen_part(
 ) -> tuple[tuple[Parameter, ...], Callable[[Floats], BoucWen]]:
     fastest = model.rate_limit_v_s if math.isfinite(model.rate_limit_v_s) else 1.0
     all_of_them = (
-        Parameter("d1", "rad/V", model.d1_rad_v),
+        Parameter("d1", "rad/V", model.d1_rad_v, linear=not admissible),
         Parameter(
             "epsilon", "rad/V", model.epsilon_rad_v, size=max(abs(model.epsilon_rad_v), 1e-3 * abs(model.d1_rad_v))
         ),
@@ -254,7 +254,7 @@ def _play_part(model: Play, free: Sequence[str]) -> tuple[tuple[Parameter, ...],
     rising = math.copysign(1.0, slow_gain(model))
     bounds = (0.0, math.inf) if rising > 0.0 else (-math.inf, 0.0)
     parameters = [
-        Parameter(f"weight at {r:.4g} V", "rad/V", w, *bounds, size=max(abs(w), 0.01 * total))
+        Parameter(f"weight at {r:.4g} V", "rad/V", w, *bounds, size=max(abs(w), 0.01 * total), linear=True)
         for r, w in zip(model.thresholds_v, model.weights_rad_v, strict=True)
     ]
     if "widening" in free:
@@ -272,9 +272,8 @@ def _play_part(model: Play, free: Sequence[str]) -> tuple[tuple[Parameter, ...],
 def _creep_part(creep: Creep, gain: float) -> tuple[tuple[Parameter, ...], Callable[[Floats], Creep]]:
     if not creep.weights_rad_v:
         return (), lambda _: creep
-    parameter = Parameter(
-        "creep", "rad/V", creep.weights_rad_v[0], size=max(abs(creep.weights_rad_v[0]), 1e-3 * abs(gain))
-    )
+    weight = creep.weights_rad_v[0]
+    parameter = Parameter("creep", "rad/V", weight, size=max(abs(weight), 1e-3 * abs(gain)), linear=True)
 
     def make(values: Floats) -> Creep:
         return replace(creep, weights_rad_v=(float(values[0]),) * len(creep.time_constants_s))
