@@ -48,7 +48,7 @@ def problem(**changes):
         "minimise": "x0",
         "limits": (MARGIN,),
         "confidence": 0.99,
-        "evaluations": 100,
+        "evaluations": 50,
         "seed": 1,
     }
     return Problem(**given | changes)
@@ -513,7 +513,7 @@ def test_only_refused_candidates():
     assert found.reason == (
         f"no candidate is a mission: all {found.refused} were refused, the last because a mirror of no mission"
     )
-    assert found.evaluations == found.refused == 25  # the first look alone
+    assert found.evaluations == found.refused == 12  # the first look alone
 
 
 def test_rows_that_all_fail_are_refused_where_their_mean_is_the_cost():
@@ -600,7 +600,7 @@ def test_progress_counts_up_to_the_candidates_looked_at():
     said = []
     found = optimise(problem(), rising(), rising(), lambda *what: said.append(what))
     assert [done for done, _, _ in said] == list(range(1, found.evaluations + 1))
-    assert {total for _, total, _ in said} == {100}
+    assert {total for _, total, _ in said} == {50}
     assert found.evaluations <= 100
     assert said[-1][2] == f"best x0 {found.best.cost:.4g}"
     told = []

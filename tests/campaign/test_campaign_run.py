@@ -64,11 +64,11 @@ def whole(book, campaign):
 
 @pytest.fixture(scope="module")
 def long(tmp_path_factory):
-    """A campaign of 32 chunks, and the table of an undisturbed run."""
+    """A campaign of two chunks in each of many cells, and the table of an undisturbed run."""
     folder = tmp_path_factory.mktemp("long")
-    rates = ", ".join(f'"{100 + 10 * i} Mbit/s"' for i in range(16))
+    rates = ", ".join(f'"{100 + 10 * i} Mbit/s"' for i in range(16 if OFTEN else 8))
     grid = f'[grid]\n"communication.data_rate" = [{rates}]\n'
-    path = campaign_file(folder, runs=96 if OFTEN else 65, duration="0.3 s", more=grid)  # two chunks of a cell
+    path = campaign_file(folder, runs=96 if OFTEN else 65, duration="0.3 s", more=grid)
     with pytest.MonkeyPatch.context() as patch:
         without_worker(patch)
         book = begun(folder)
