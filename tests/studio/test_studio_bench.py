@@ -387,10 +387,12 @@ def test_the_state_of_an_identification_in_words(tmp_path):
 def test_the_outcome_is_read_from_what_the_command_prints():
     said = {"model": "m", "verdict": ["a"], "warnings": ["b"], "refused": {"c": "why"}, "travel_rad": 1e-3}
     found = mirror_view.outcome(json.dumps(said))
-    assert (found.model, found.verdict, found.warnings, found.refused) == ("m", ("a",), ("b",), ("c: why",))
-    assert found.numbers == (("travel over the fitted drive", "1 mrad"),)
+    model, (table, verdict, warned, refused) = found
+    assert (model, verdict, warned.lines, refused.lines) == ("m", "a", ["Warning: b"], ["Not fitted: c: why"])
+    assert table.rows == [("travel over the fitted drive", "1 mrad")]
     for damaged in ("", "{", "[]", '{"model": "m"}', '{"model": "m", "verdict": 1}'):
         assert mirror_view.outcome(damaged) is None
+    assert mirror_view.outcome(json.dumps({**said, "travel_rad": None})) == ("m", ("a", warned, refused))
 
 
 # ---------------------------------------------------------------------------------------------- the mirror in a mission

@@ -57,7 +57,6 @@ class Session:
         self._other = self._kept(_OTHER)
         self._disk: tuple[Draft, object, OnDisk] | None = None
         self._mission: tuple[Draft, MissionFile | None, str] | None = None
-        self._link: tuple[Draft, LinkFile | None] | None = None
 
     # ------------------------------------------------------------------------------------------------------- missions
     @property
@@ -134,13 +133,8 @@ class Session:
 
     def link(self) -> LinkFile | None:
         """What a link budget needs, or None while the draft has faults."""
-        draft, kept = self._draft, self._link
-        if kept is None or kept[0] is not draft:
-            found = None
-            with suppress(MissionError):
-                found = draft.link()
-            kept = self._link = (draft, found)
-        return kept[1]
+        draft = self._draft
+        return None if draft.problems else draft.link()
 
     def _read(self) -> tuple[MissionFile | None, str]:
         draft, kept = self._draft, self._mission

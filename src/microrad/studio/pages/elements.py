@@ -204,11 +204,3 @@ def _columns(headings: Sequence[str], numbers: Collection[int] = ()) -> list[dic
         }
         for place, heading in enumerate(headings)
     ]
-
-
-def numbers(pairs: Sequence[tuple[str, str]]) -> None:
-    """Names and values side by side, in the present container, a "dl" of the class "numbers"."""
-    for name, value in pairs:
-        with ui.element("div"):
-            layout.words("dt", name)
-            layout.words("dd", value)

@@ -11,7 +11,7 @@ from microrad.lab.live_fit import LiveFit
 from microrad.studio.draft.tables import with_mirror_file
 from microrad.studio.jobs.queue import Job
 from microrad.studio.pages import layout
-from microrad.studio.pages.elements import Figure, fill, numbers, table
+from microrad.studio.pages.elements import Blocks, Figure, fill, table
 from microrad.studio.pages.in_thread import in_thread
 from microrad.studio.session import Session
 from microrad.studio.views import mirror as mirror_view
@@ -28,7 +28,6 @@ class JobView:
         self.session, self.number = session, 0
         self.fits: tuple[LiveFit, ...] = ()
         self.drive_unit, self.chosen = "V", ""
-        self.found: mirror_view.Outcome | None = None
         self.state: object = None
         self.drawn: object = None
         layout.heading("Identification")
@@ -39,6 +38,7 @@ class JobView:
         self.cancel = ui.button("Cancel", on_click=self.stop).props("dense no-caps outline").classes("self-start")
         self._live()
         self.end = ui.column().classes("w-full gap-1")
+        self.told = Blocks()
         for each in (self.bar, self.cancel, self.live):
             each.visible = False
         ui.timer(_LOOK_S, self.look)
@@ -95,8 +95,8 @@ class JobView:
     # --------------------------------------------------------------------------------------------------------- showing
     def _show(self, job: Job) -> None:
         self.drive_unit = mirror_view.argument(job, "--input-unit", "V")
-        self.found = mirror_view.outcome(self.session.jobs.output(job.number)) if job.state == "done" else None
-        self.chosen = "" if self.found is None else self.found.model
+        end = mirror_view.outcome(self.session.jobs.output(job.number)) if job.state == "done" else None
+        self.chosen, said = end or ("", ())
         self.words.text = mirror_view.state_words(job, mirror_view.leader(self.fits, self.chosen))
         self.bar.visible = self.cancel.visible = not job.finished
         self.bar.value = 0.0 if job.progress is None else job.progress.share
@@ -112,6 +112,7 @@ class JobView:
             self.recording.set_options(names, value=self.recording.value if self.recording.value in names else 0)
             self.recording.visible = len(names) > 1
         self.draw()
+        self.told.show_blocks(said)
         self._end(job)
 
     def draw(self) -> None:
@@ -130,25 +131,15 @@ class JobView:
         self.residual.show(mirror_view.residual_plot(fit, number))
 
     def _end(self, job: Job) -> None:
-        """What has come of it: verdict, warnings, the files, and the way into the mission."""
+        """The files of an identification that has found a model, and the way into the mission."""
         self.end.clear()
-        found = self.found
-        if found is None:
+        if not self.chosen:
             return
         mirror = self.session.folder / job.results[0]
-        with self.end:
-            with ui.row().classes("items-center"):
-                ui.button("Use this mirror in the mission", on_click=lambda: self.use(mirror)).props("no-caps")
-                ui.link("Open the report", f"/results/{job.number}/1", new_tab=True)
-                ui.link(f"Mirror file {mirror.name}", f"/results/{job.number}/0", new_tab=True)
-            with ui.element("dl").classes("numbers"):
-                numbers(found.numbers)
-            for sentence in found.verdict:
-                ui.label(sentence)
-            for warning in found.warnings:
-                ui.label(f"Warning: {warning}").classes("kept")
-            for refusal in found.refused:
-                ui.label(f"Not fitted: {refusal}").classes("soft kept")
+        with self.end, ui.row().classes("items-center"):
+            ui.button("Use this mirror in the mission", on_click=lambda: self.use(mirror)).props("no-caps")
+            ui.link("Open the report", f"/results/{job.number}/1", new_tab=True)
+            ui.link(f"Mirror file {mirror.name}", f"/results/{job.number}/0", new_tab=True)
 
     def use(self, mirror: Path) -> None:
         """Put the mirror into the mission that is being edited."""

@@ -23,7 +23,7 @@ from microrad.report.quantities import quantity, signed
 from microrad.report.view import Block
 from microrad.studio.draft.draft import Draft
 from microrad.studio.views.plots import Plot, plot
-from microrad.studio.views.sliders import Slider, slider
+from microrad.studio.views.sliders import Slider, grouped
 
 TABLES = {
     "terminals": "Telescopes",
@@ -152,14 +152,9 @@ def contour(data: link.DataLink, frame: Frame, level_db: float) -> Floats:
 
 def sliders(draft: Draft) -> dict[str, tuple[Slider, ...]]:
     """The numbers of the links' tables by what their table is called, in the order of the text."""
-    found: dict[str, list[Slider]] = {}
-    for key, value in draft.values.items():
-        table, _, name = key.partition(".")
-        made = slider(value) if table in TABLES and "." not in name else None
-        if made is not None:
-            found.setdefault(TABLES[table], []).append(made)
-    order = [name for name in TABLES.values() if name in found]
-    return {name: tuple(found[name]) for name in order}
+    return grouped(
+        draft, TABLES.values(), lambda key: TABLES.get(key.partition(".")[0], "") if key.count(".") < 2 else ""
+    )
 
 
 def second(key: str) -> bool:

@@ -5,10 +5,8 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from pydantic import TypeAdapter
@@ -17,6 +15,9 @@ from microrad.core.units import format_quantity
 from microrad.lab.live_fit import LIVE_FITS, LiveFit
 from microrad.report.plotting.palette import BLACK, BLUE, GREY, SKY, VERMILION
 from microrad.report.plotting.sheet import Axis, Line, Span, grid
+from microrad.report.quantities import quantity
+from microrad.report.tables import Table
+from microrad.report.view import Block, Points, told
 from microrad.studio.guard import plain_files
 from microrad.studio.jobs.queue import Job
 from microrad.studio.recordings.reading import View
@@ -112,41 +113,30 @@ def score_rows(fits: Sequence[LiveFit], chosen: str = "") -> list[tuple[str, ...
     ]
 
 
-@dataclass(frozen=True, slots=True)
-class Outcome:
-    """What an identification has come to: verdict in sentences, warnings, models that were refused and why."""
-
-    model: str
-    verdict: tuple[str, ...]
-    warnings: tuple[str, ...]
-    refused: tuple[str, ...]
-    numbers: tuple[tuple[str, str], ...]
-
-
-def outcome(said: str) -> Outcome | None:
-    """The end of an identification from what its job has printed; None where it has printed no result."""
+def outcome(said: str) -> tuple[str, tuple[Block, ...]] | None:
+    """The model that an identification has chosen and what it says of it, from what its job has printed; else None."""
     try:
         data = json.loads(said)
-        return Outcome(
-            str(data["model"]),
-            tuple(map(str, data["verdict"])),
-            tuple(map(str, data["warnings"])),
-            tuple(f"{model}: {why}" for model, why in data["refused"].items()),
-            tuple(_numbers(data)),
-        )
+        warnings = [f"Warning: {each}" for each in map(str, data["warnings"])]
+        refused = [f"Not fitted: {model}: {why}" for model, why in data["refused"].items()]
+        rows = [
+            (name, quantity(float(data[key]), unit))
+            for key, (name, unit) in _FOUND.items()
+            if data.get(key) is not None
+        ]
+        table = Table("", ("found", "value"), rows) if rows else None
+        return str(data["model"]), told(table, *map(str, data["verdict"]), Points(warnings), Points(refused))
     except (ValueError, KeyError, TypeError, AttributeError):
         return None
 
 
-def _numbers(data: dict[str, Any]) -> list[tuple[str, str]]:
-    rows = (
-        ("travel over the fitted drive", "travel_rad", "rad"),
-        ("drive, lowest", "drive_min_v", "V"),
-        ("drive, highest", "drive_max_v", "V"),
-        ("fastest drive", "rate_limit_v_s", "V/s"),
-        ("drift over the recording", "drift_rad", "rad"),
-    )
-    return [(name, format_quantity(float(data[key]), unit)) for name, key, unit in rows if data.get(key) is not None]
+_FOUND = {
+    "travel_rad": ("travel over the fitted drive", "rad"),
+    "drive_min_v": ("drive, lowest", "V"),
+    "drive_max_v": ("drive, highest", "V"),
+    "rate_limit_v_s": ("fastest drive", "V/s"),
+    "drift_rad": ("drift over the recording", "rad"),
+}
 
 
 def doing(what: str) -> str:

@@ -22,14 +22,19 @@ from microrad.report.quantities import quantity
 from microrad.report.view import Block, Soft, View, told
 from microrad.studio.draft.draft import Draft
 from microrad.studio.views.plots import Plot, plot, rows
-from microrad.studio.views.sliders import Slider, slider
+from microrad.studio.views.sliders import Slider, grouped
 
 POINTS = 241
 """Of the curve of coverage."""
 
 _CLASSES = {"bias": BLUE, "random": ORANGE, "drift": GREEN, "transient": SKY, "total": GREY}
-_LINES, _AHEAD = "pointing.lines.", ("point_ahead.transverse_velocity", "point_ahead.error")
-_BEACON = "beacon.divergence"
+_LINES = "pointing.lines."
+_OTHERS = {
+    "beacon.divergence": "Beacon",
+    "point_ahead.transverse_velocity": "Point-ahead",
+    "point_ahead.error": "Point-ahead",
+    "pointing.confidence": "Asked for",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,25 +59,17 @@ def view(file: LinkFile) -> PointingView:
 
 def sliders(draft: Draft) -> dict[str, tuple[Slider, ...]]:
     """The numbers that move the budget: its lines, the beacon's cone, the confidence, the point-ahead."""
-    found: dict[str, list[Slider]] = {"Errors": [], "Beacon": [], "Point-ahead": [], "Asked for": []}
-    for key, value in draft.values.items():
-        made = slider(value)
-        if made is None:
-            continue
-        if key.startswith(_LINES) and key.endswith(".error"):
-            found["Errors"].append(_named(made, key))
-        elif key == _BEACON:
-            found["Beacon"].append(made)
-        elif key in _AHEAD:
-            found["Point-ahead"].append(made)
-        elif key == "pointing.confidence":
-            found["Asked for"].append(made)
-    return {name: tuple(those) for name, those in found.items() if those}
+    found = grouped(draft, ("Errors", *dict.fromkeys(_OTHERS.values())), _group)
+    return {name: tuple(map(_named, those)) if name == "Errors" else those for name, those in found.items()}
 
 
-def _named(made: Slider, key: str) -> Slider:
+def _group(key: str) -> str:
+    return "Errors" if key.startswith(_LINES) and key.endswith(".error") else _OTHERS.get(key, "")
+
+
+def _named(made: Slider) -> Slider:
     """The slider of a line, called by the line."""
-    name = key.removeprefix(_LINES).removesuffix(".error").replace("_", " ").replace("-", " ")
+    name = made.key.removeprefix(_LINES).removesuffix(".error").replace("_", " ").replace("-", " ")
     return replace(made, label=name[:1].upper() + name[1:])
 
 

@@ -100,6 +100,20 @@ def slider(value: Value) -> Slider | None:
     return made if found is None else _ranged(replace(made, value=found[0], unit=found[1]))
 
 
+def grouped(draft: Draft, order: Iterable[str], group: Callable[[str], str]) -> dict[str, tuple[Slider, ...]]:
+    """The sliders of a draft by their groups, each in the order of the text.
+
+    Args:
+        draft: the mission that is edited.
+        order: names of the groups; one without sliders is left out.
+        group: the group of a key, "" for one that has no slider.
+    """
+    chosen = {key: (group(key), value) for key, value in draft.values.items() if group(key)}
+    made = [(name, found) for name, value in chosen.values() if (found := slider(value)) is not None]
+    groups = {name: tuple(each for of, each in made if of == name) for name in order}
+    return {name: those for name, those in groups.items() if those}
+
+
 def read(typed: str, si: str) -> tuple[float, str] | None:
     """Number and unit of what is typed, or None when it is no quantity in the SI unit `si` ("": no plain number)."""
     found = _NUMBER.fullmatch(typed.strip())
