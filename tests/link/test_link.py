@@ -319,7 +319,8 @@ def test_more_rate_more_error_or_more_distance_never_help(rate, error, factor):
 
 
 @pytest.mark.parametrize(
-    ("rate", "error", "what"), [(0.0, 1e-5, "data rates"), (1e8, -1e-6, "pointing errors"), (math.nan, 0.0, "data")]
+    ("rate", "error", "what"),
+    [(0.0, 1e-5, "data rate is 0"), (1e8, -1e-6, "pointing error is -1"), (math.nan, 0.0, "data")],
 )
 def test_impossible_points_are_refused(rate, error, what):
     with pytest.raises(ValueError, match=what):

@@ -502,8 +502,8 @@ def test_a_rate_of_largest_without_any_is_refused(read):
 @pytest.mark.parametrize(
     ("rate", "error", "what"),
     [
-        (math.inf, 0.0, "data rates must be finite and above 0 bit/s"),
-        (1e8, math.inf, "pointing errors must be finite and at least 0 rad: they are radial"),
+        (math.inf, 0.0, r"the data rate is inf bit/s: it must be finite, above 0 bit/s"),
+        (1e8, math.inf, r"the pointing error is inf rad: it must be finite, at least 0 rad"),
     ],
 )
 def test_points_without_end_are_refused(read, rate, error, what):

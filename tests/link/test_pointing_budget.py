@@ -363,7 +363,7 @@ def test_no_confidence_is_refused(confidence):
         summation.exact_total_rad,
     )
     for rule in (*rules, summation.summations):
-        with pytest.raises(ValueError, match="is not possible; give a share above 0 and below 1"):
+        with pytest.raises(ValueError, match=r"the confidence is .*: it must be finite, above 0 and below 1"):
             rule(terms, confidence)
 
 
@@ -374,7 +374,7 @@ def test_a_budget_without_terms_is_refused():
 
 @pytest.mark.parametrize("error", [-1e-6, math.nan, math.inf])
 def test_no_half_width_is_refused(error):
-    with pytest.raises(ValueError, match=r"line: an error of .* is no half width; give at least 0 rad"):
+    with pytest.raises(ValueError, match=r"line: the error is .*: .* at least 0 rad; it is a half width"):
         stated("bias", error=error)
 
 
@@ -390,11 +390,11 @@ def test_words_without_a_meaning_are_refused():
 
 
 def test_no_mean_and_no_deviation_are_refused():
-    with pytest.raises(ValueError, match=r"a mean of \(nan, 0.0\) rad; give two finite values"):
+    with pytest.raises(ValueError, match=r"term: the mean is nan rad: it must be finite"):
         term(mean=(math.nan, 0.0))
-    with pytest.raises(ValueError, match=r"a standard deviation of .* rad; give two finite values"):
+    with pytest.raises(ValueError, match=r"the standard deviation is .* rad; give two values, for axis x and axis y"):
         term(sigma=(1.0,))
-    with pytest.raises(ValueError, match="a standard deviation of -1 µrad is not possible; give at least 0 rad"):
+    with pytest.raises(ValueError, match="the standard deviation is -1 µrad: it must be finite, at least 0 rad"):
         term(sigma=(0.0, -1e-6))
 
 
@@ -406,7 +406,7 @@ def test_no_velocity_is_refused(velocity):
 
 def test_totals_that_leave_nothing_to_allocate_are_refused():
     for total in (0.0, -1e-6, math.nan, math.inf):
-        with pytest.raises(ValueError, match="leaves nothing to allocate; give an angle above 0 rad"):
+        with pytest.raises(ValueError, match=r"the total is .*: it must be finite, above 0 rad"):
             summation.allocate(LINES, total, rule="rss", confidence=0.997)
     with pytest.raises(ValueError, match='no rule "rayleigh" to allocate by; give one of rss, esa-1993'):
         summation.allocate(LINES, 1e-4, rule="rayleigh", confidence=0.997)

@@ -172,15 +172,15 @@ def test_nearly_equal_axes_join_the_equal_ones_and_a_thin_axis_leaves_a_line():
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: Jitter((0.0, math.nan), (1e-6, 1e-6)), "the bias is .* give two finite values"),
-        (lambda: Jitter((0.0, 0.0), (math.inf, 1e-6)), "the jitter rms is .* give two finite values"),
-        (lambda: Jitter((0.0, 0.0, 0.0), (1e-6, 1e-6)), "give two finite values"),
-        (lambda: Jitter((0.0, 0.0), (1e-6, -1e-6)), "a jitter rms of -1 µrad is below 0"),
-        (lambda: radial_survival(EQUAL, [0.0, -1e-6]), "a radial error of -1 µrad is not possible"),
-        (lambda: radial_cdf(EQUAL, math.inf), "a radial error of inf"),
-        (lambda: radial_quantile(EQUAL, 1.0), "a probability of 1 is out of range"),
-        (lambda: radial_quantile(EQUAL, 0.99e-20), "a probability of 9.9e-21 is out of range"),
-        (lambda: radial_quantile(EQUAL, math.nan), "a probability of nan is out of range"),
+        (lambda: Jitter((0.0, math.nan), (1e-6, 1e-6)), r"the bias is nan rad: it must be finite"),
+        (lambda: Jitter((0.0, 0.0), (math.inf, 1e-6)), r"the jitter rms is inf rad: it must be finite, at least 0 rad"),
+        (lambda: Jitter((0.0, 0.0, 0.0), (1e-6, 1e-6)), r"the bias is .* rad; give two values, for axis x and axis y"),
+        (lambda: Jitter((0.0, 0.0), (1e-6, -1e-6)), r"the jitter rms is -1 µrad: it must be finite, at least 0 rad"),
+        (lambda: radial_survival(EQUAL, [0.0, -1e-6]), r"the radial error is -1 µrad: .* at least 0 rad"),
+        (lambda: radial_cdf(EQUAL, math.inf), r"the radial error is inf rad: it must be finite, at least 0 rad"),
+        (lambda: radial_quantile(EQUAL, 1.0), r"the probability is 1: it must be finite, at least 1e-20 and below 1"),
+        (lambda: radial_quantile(EQUAL, 0.99e-20), r"the probability is 9\.9e-21: .* below 1"),
+        (lambda: radial_quantile(EQUAL, math.nan), r"the probability is nan: .* below 1"),
     ],
 )
 def test_what_is_no_error_no_radius_and_no_probability_is_refused(call, message):

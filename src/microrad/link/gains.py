@@ -7,8 +7,28 @@ from numpy.typing import ArrayLike
 
 from microrad.core.arrays import Floats
 from microrad.core.units import PLANCK_J_S, SPEED_OF_LIGHT_M_S, format_quantity
+from microrad.mission.fields import Quantity, Share
 
 DB_PER_NEPER = 10.0 / math.log(10.0)
+_SHARE = Quantity("", above=0.0, most=1.0)
+
+
+def checked(name: str, values: ArrayLike, rule: Quantity, why: str = "") -> Floats:
+    """Values as an array, all of them allowed.
+
+    Args:
+        name: What they are, in the words of the message.
+        values: The values, in the unit of the rule, any shape.
+        rule: The bounds.
+        why: Why the bounds hold, for the message.
+
+    Raises:
+        ValueError: For a value that is not finite or out of bounds.
+    """
+    array = np.asarray(values, dtype=np.float64)
+    for extreme in (np.min(array), np.max(array)) if array.size else ():  # nan is both
+        rule.check(name, float(extreme), why)
+    return array
 
 
 def aperture_gain_db(diameter_m: float, wavelength_m: float) -> float:
@@ -138,12 +158,10 @@ def strehl_loss_db(strehl: float, convention: str) -> float:
         ValueError: For a ratio that is not above 0 and at most 1, a negative loss, and another convention.
     """
     if convention == "decibel":
-        if not strehl >= 0.0:
-            raise ValueError(f"a Strehl loss of {strehl:g} dB is a gain; give at least 0 dB")
+        Quantity("dB", least=0.0).check("the Strehl loss", strehl)
         return strehl
     if convention == "ratio":
-        if not 0.0 < strehl <= 1.0:
-            raise ValueError(f"a Strehl ratio of {strehl:g} is not above 0 and at most 1; 1 is a perfect wavefront")
+        _SHARE.check("the Strehl ratio", strehl, "1 is a perfect wavefront")
         return -10.0 * math.log10(strehl)
     raise ValueError(f'Strehl convention "{convention}" is neither "decibel" nor "ratio"')
 
@@ -163,8 +181,7 @@ def obscuration_loss_db(obscuration: float) -> float:
 
     Raises ValueError for a ratio that is not at least 0 and below 1.
     """
-    if not 0.0 <= obscuration < 1.0:
-        raise ValueError(f"an obscuration of {obscuration:g} is not at least 0 and below 1, the whole aperture")
+    Share("", least=0.0).check("the obscuration", obscuration, "1 is the whole aperture")
     return 0.0 - 10.0 * math.log10(1.0 - obscuration**2)
 
 
@@ -191,8 +208,7 @@ def clear_sky_loss_db(zenith_transmission: float, elevation_rad: float) -> float
     Raises:
         ValueError: For a transmission that is not above 0 and at most 1, and as `air_mass`.
     """
-    if not 0.0 < zenith_transmission <= 1.0:
-        raise ValueError(f"a transmission of {zenith_transmission:g} is not above 0 and at most 1; 1 is vacuum")
+    _SHARE.check("the transmission", zenith_transmission, "1 is vacuum")
     return 0.0 - 10.0 * math.log10(zenith_transmission) * air_mass(elevation_rad)
 
 

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from microrad.core.arrays import Floats
 from microrad.link import gains, receivers
 from microrad.link.beams import GaussianFall, LitAperture, OffAxis
+from microrad.mission.fields import Quantity
 from microrad.mission.model import LinkMission
 from microrad.mission.tables import pointing as pointing_table
 from microrad.mission.tables.link import Beam, Channel, Communication, LinkConventions, LinkRequirement, Terminals
@@ -251,7 +252,6 @@ def check_grid(data_rate_bit_s: Floats, pointing_error_rad: Floats) -> None:
     Raises:
         ValueError: If a data rate is not above 0, a pointing error below 0, or either not finite.
     """
-    if not np.all((data_rate_bit_s > 0.0) & (data_rate_bit_s < np.inf)):
-        raise ValueError('data rates must be finite and above 0 bit/s; "largest" has to be solved for first')
-    if not np.all((pointing_error_rad >= 0.0) & (pointing_error_rad < np.inf)):
-        raise ValueError("pointing errors must be finite and at least 0 rad: they are radial")
+    largest = '"largest" has to be solved for first'
+    gains.checked("the data rate", data_rate_bit_s, Quantity("bit/s", above=0.0), largest)
+    gains.checked("the pointing error", pointing_error_rad, Quantity("rad", least=0.0), "it is radial")

@@ -4,7 +4,8 @@ import math
 from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
-from microrad.core.units import format_quantity
+from microrad.link.pointing.radial_error import RADIUS, two_axes
+from microrad.mission.fields import Quantity
 from microrad.mission.tables.pointing import ErrorClass, Statistic
 
 Axes = Literal["per-axis", "radial", "x"]
@@ -40,9 +41,7 @@ class StatedError:
 
     def __post_init__(self) -> None:
         """Raises ValueError if the error is negative or not finite, or a word is unknown."""
-        if not (math.isfinite(self.error_rad) and self.error_rad >= 0.0):
-            shown = format_quantity(self.error_rad, "rad")
-            raise ValueError(f"{self.name}: an error of {shown} is no half width; give at least 0 rad")
+        RADIUS.check(f"{self.name}: the error", self.error_rad, "it is a half width")
         for key, choices in _CHOICES:
             if getattr(self, key) not in choices:
                 raise ValueError(f'{self.name}: no {key} "{getattr(self, key)}"; give one of {", ".join(choices)}')
@@ -69,12 +68,8 @@ class ErrorTerm:
 
     def __post_init__(self) -> None:
         """Raises ValueError if a value is not finite or a standard deviation negative."""
-        for what, pair in (("mean", self.mean_rad), ("standard deviation", self.sigma_rad)):
-            if len(pair) != 2 or not all(math.isfinite(value) for value in pair):
-                raise ValueError(f"{self.name}: a {what} of {pair} rad; give two finite values, for axis x and axis y")
-        if min(self.sigma_rad) < 0.0:
-            shown = format_quantity(min(self.sigma_rad), "rad")
-            raise ValueError(f"{self.name}: a standard deviation of {shown} is not possible; give at least 0 rad")
+        two_axes(f"{self.name}: the mean", self.mean_rad, Quantity("rad"))
+        two_axes(f"{self.name}: the standard deviation", self.sigma_rad, RADIUS)
 
 
 def error_term(stated: StatedError, interpretation: Interpretation = "temporal") -> ErrorTerm:

@@ -13,8 +13,10 @@ from numpy.typing import ArrayLike
 from microrad.core.arrays import Floats
 from microrad.core.roots import root
 from microrad.core.units import format_quantity
-from microrad.link.pointing.radial_error import Jitter, density_on_circle, radial_survival
+from microrad.link.gains import checked
+from microrad.link.pointing.radial_error import RADIUS, Jitter, density_on_circle, radial_survival
 from microrad.link.pointing.statistics import outage_probability, radius_of_loss_rad, transmission
+from microrad.mission.fields import Quantity
 
 ErrorRatio = Callable[[Floats], Floats]
 """Bit error ratio over received power; the power 1 is what the target needs without pointing error."""
@@ -103,9 +105,7 @@ def _checked_spectrum(freq_hz: ArrayLike, psd_rad2_hz: ArrayLike) -> tuple[Float
         )
     if not np.all(np.isfinite(freq)) or freq[0] < 0.0 or np.any(np.diff(freq) <= 0.0):
         raise ValueError("the frequencies do not rise from 0 Hz or above; sort them, each once")
-    if not np.all(np.isfinite(psd) & (psd >= 0.0)):
-        raise ValueError("a spectral density is negative or not finite; give finite values of at least 0 rad^2/Hz")
-    return freq, psd
+    return freq, checked("the spectral density", psd, Quantity("rad^2/Hz", least=0.0))
 
 
 # --------------------------------------------------------------------------------------------------------------- fades
@@ -139,9 +139,7 @@ def level_crossing_rate_hz(jitter: Jitter, velocity_rms_rad_s: tuple[float, floa
             moving, and a negative radius.
     """
     _check_velocity(jitter, velocity_rms_rad_s)
-    radius = np.asarray(radius_rad, dtype=np.float64)
-    if not np.all(np.isfinite(radius) & (radius >= 0.0)):
-        raise ValueError("a radial error is negative or not finite; give finite values of at least 0 rad")
+    radius = checked("the radial error", radius_rad, RADIUS)
     if min(jitter.rms_rad) > 0.0:
         square_x, square_y, density = density_on_circle(jitter, radius)
         speed = np.sqrt(square_x * velocity_rms_rad_s[0] ** 2 + square_y * velocity_rms_rad_s[1] ** 2)
@@ -151,10 +149,7 @@ def level_crossing_rate_hz(jitter: Jitter, velocity_rms_rad_s: tuple[float, floa
 
 def _check_velocity(jitter: Jitter, velocity: tuple[float, float]) -> None:
     for axis, rms, speed in zip("xy", jitter.rms_rad, velocity, strict=True):
-        if not (math.isfinite(speed) and speed >= 0.0):
-            raise ValueError(
-                f"the velocity rms of axis {axis} is {format_quantity(speed, 'rad/s')}; give at least 0 rad/s"
-            )
+        Quantity("rad/s", least=0.0).check(f"the velocity rms of axis {axis}", speed)
         if (rms > 0.0) != (speed > 0.0):
             raise ValueError(
                 f"axis {axis} has a jitter rms of {format_quantity(rms, 'rad')} and a velocity rms of "

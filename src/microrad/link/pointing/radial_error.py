@@ -11,14 +11,32 @@ from numpy.typing import ArrayLike
 
 from microrad.core.arrays import Floats
 from microrad.core.roots import root
-from microrad.core.units import format_quantity
+from microrad.link.gains import checked
+from microrad.mission.fields import Quantity, Share
 
 SMALLEST_PROBABILITY = 1e-20
 """Below it the quadrature of the tails is no longer relied on."""
 
+RADIUS = Quantity("rad", least=0.0)
 _REACH = 12.0  # standard deviations about the bias that are integrated; 4e-33 lies beyond
 _ROUNDING = 4.0 * float(np.finfo(np.float64).eps)
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(96)
+
+
+def two_axes(name: str, values: tuple[float, float], rule: Quantity) -> None:
+    """Check the values of axis x and axis y.
+
+    Args:
+        name: What they are, in the words of the message.
+        values: The values, in the unit of the rule.
+        rule: The bounds of each.
+
+    Raises:
+        ValueError: For more or less than two values, and one that is not finite or out of bounds.
+    """
+    if len(values) != 2:
+        raise ValueError(f"{name} is {values} {rule.unit}; give two values, for axis x and axis y")
+    checked(name, values, rule)
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,44 +53,13 @@ class Jitter:
 
     def __post_init__(self) -> None:
         """Raises ValueError if a value is not finite or an rms negative."""
-        for name, values in (("bias", self.bias_rad), ("jitter rms", self.rms_rad)):
-            if len(values) != 2 or not all(math.isfinite(value) for value in values):
-                raise ValueError(f"the {name} is {values} rad; give two finite values, for axis x and axis y")
-        if min(self.rms_rad) < 0.0:
-            shown = format_quantity(min(self.rms_rad), "rad")
-            raise ValueError(f"a jitter rms of {shown} is below 0; give the standard deviation per axis")
+        two_axes("the bias", self.bias_rad, Quantity("rad"))
+        two_axes("the jitter rms", self.rms_rad, RADIUS)
 
     @property
     def static_rad(self) -> float:
         """Radial bias (rad)."""
         return math.hypot(*self.bias_rad)
-
-
-# --------------------------------------------------------------------------------------------------------------- checks
-def at_least_zero(values: ArrayLike, name: str, unit: str) -> Floats:
-    """Values as an array, none of them negative.
-
-    Args:
-        values: The values, in `unit`, any shape.
-        name: What they are, in the words of the message.
-        unit: Their unit for the message.
-
-    Raises:
-        ValueError: For a value that is negative or not finite.
-    """
-    array = np.asarray(values, dtype=np.float64)
-    wrong = array[~(np.isfinite(array) & (array >= 0.0))]
-    if wrong.size:
-        raise ValueError(f"a {name} of {format_quantity(wrong[0], unit)} is not possible; give at least 0 {unit}")
-    return array
-
-
-def _probability(values: ArrayLike) -> Floats:
-    array = np.asarray(values, dtype=np.float64)
-    wrong = array[~((array >= SMALLEST_PROBABILITY) & (array < 1.0))]
-    if wrong.size:
-        raise ValueError(f"a probability of {wrong[0]:g} is out of range; give {SMALLEST_PROBABILITY:g} to below 1")
-    return array
 
 
 # --------------------------------------------------------------------------------------------------------- distribution
@@ -165,7 +152,7 @@ def radial_survival(jitter: Jitter, radius_rad: ArrayLike) -> Floats:
     Raises:
         ValueError: For a negative radius.
     """
-    return _probability_of(jitter, at_least_zero(radius_rad, "radial error", "rad"), beyond=True)
+    return _probability_of(jitter, checked("the radial error", radius_rad, RADIUS), beyond=True)
 
 
 def radial_cdf(jitter: Jitter, radius_rad: ArrayLike) -> Floats:
@@ -180,7 +167,7 @@ def radial_cdf(jitter: Jitter, radius_rad: ArrayLike) -> Floats:
     Raises:
         ValueError: For a negative radius.
     """
-    return _probability_of(jitter, at_least_zero(radius_rad, "radial error", "rad"), beyond=False)
+    return _probability_of(jitter, checked("the radial error", radius_rad, RADIUS), beyond=False)
 
 
 def density_on_circle(jitter: Jitter, radius: Floats) -> tuple[Floats, Floats, Floats]:
@@ -216,7 +203,7 @@ def radial_quantile(jitter: Jitter, probability: ArrayLike) -> Floats:
     Raises:
         ValueError: Unless p is from `SMALLEST_PROBABILITY` to below 1.
     """
-    p = _probability(probability)
+    p = checked("the probability", probability, Share("", least=SMALLEST_PROBABILITY))
     widest = max(jitter.rms_rad)
     if widest == 0.0:
         return np.full(p.shape, jitter.static_rad)

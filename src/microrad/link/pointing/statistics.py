@@ -11,19 +11,16 @@ from numpy.typing import ArrayLike
 
 from microrad.core.arrays import Floats
 from microrad.core.units import format_quantity
-from microrad.link.pointing.radial_error import Jitter, at_least_zero, radial_quantile, radial_survival
+from microrad.link.gains import checked
+from microrad.link.pointing.radial_error import RADIUS, Jitter, radial_quantile, radial_survival
+from microrad.mission.fields import Quantity
 
 _DB_PER_SQUARE = 20.0 / math.log(10.0)  # loss in dB is 8.686 (r / theta)^2
 
 
 # ------------------------------------------------------------------------------------------------------------- checks
 def _half_angle(values: ArrayLike) -> Floats:
-    array = np.asarray(values, dtype=np.float64)
-    wrong = array[~(np.isfinite(array) & (array > 0.0))]
-    if wrong.size:
-        shown = format_quantity(wrong[0], "rad")
-        raise ValueError(f"a half angle of {shown} is no beam; give the half angle at 1/e^2, above 0 rad")
-    return array
+    return checked("the half angle", values, Quantity("rad", above=0.0), "it is that of a beam at 1/e^2")
 
 
 # ---------------------------------------------------------------------------------------------------------------- mean
@@ -37,7 +34,7 @@ def transmission(radius_rad: ArrayLike, half_angle_rad: ArrayLike) -> Floats:
     Raises:
         ValueError: For a negative error or a half angle not above 0.
     """
-    radius = at_least_zero(radius_rad, "radial error", "rad")
+    radius = checked("the radial error", radius_rad, RADIUS)
     return np.asarray(np.exp(-2.0 * (radius / _half_angle(half_angle_rad)) ** 2))
 
 
@@ -120,7 +117,7 @@ def radius_of_loss_rad(half_angle_rad: ArrayLike, loss_db: ArrayLike) -> Floats:
     Raises:
         ValueError: For a negative loss or a half angle not above 0.
     """
-    loss = at_least_zero(loss_db, "loss", "dB")
+    loss = checked("the loss", loss_db, Quantity("dB", least=0.0))
     return np.asarray(_half_angle(half_angle_rad) * np.sqrt(loss / _DB_PER_SQUARE))
 
 
@@ -183,8 +180,8 @@ def best_divergence_for_static_error(
     Raises:
         ValueError: For a negative error, a current half angle below the smallest, or no error and no limit.
     """
-    error = float(at_least_zero(error_rad, "radial error", "rad"))
-    limit = float(at_least_zero(smallest_half_angle_rad, "smallest half angle", "rad"))
+    error = float(checked("the radial error", error_rad, RADIUS))
+    limit = float(checked("the smallest half angle", smallest_half_angle_rad, RADIUS))
     wanted = math.sqrt(2.0) * error
     best, current = max(wanted, limit), current_half_angle_rad
     if best == 0.0:

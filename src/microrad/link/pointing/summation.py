@@ -10,6 +10,7 @@ from microrad.core.roots import root
 from microrad.core.units import format_quantity
 from microrad.link.pointing.error_classes import ErrorTerm, Interpretation, StatedError, error_term
 from microrad.link.pointing.radial_error import Jitter, radial_quantile
+from microrad.mission.fields import Quantity, Share
 
 Rule = Literal["rss", "esa-1993", "ecss-axis", "ecss-radial", "exact"]
 """The rules that count every term; the Rayleigh rule of ECSS leaves out the means."""
@@ -51,8 +52,7 @@ def sigma_multiple(confidence: float) -> float:
 
     ECSS-E-ST-60-10C 4.2.4.1: 1, 2 and 3 for 68.27, 95.45 and 99.73 %. Raises ValueError unless 0 < confidence < 1.
     """
-    if not 0.0 < confidence < 1.0:
-        raise ValueError(f"a confidence of {confidence:g} is not possible; give a share above 0 and below 1")
+    Share("").check("the confidence", confidence)
     return NormalDist().inv_cdf(0.5 * (1.0 + confidence))
 
 
@@ -306,9 +306,7 @@ def allocate(
     Raises:
         ValueError: For a total not above 0, an unknown rule, and as `error_term` and the rule do.
     """
-    if not (math.isfinite(total_rad) and total_rad > 0.0):
-        shown = format_quantity(total_rad, "rad")
-        raise ValueError(f"a total of {shown} leaves nothing to allocate; give an angle above 0 rad")
+    Quantity("rad", above=0.0).check("the total", total_rad, "else nothing is left to allocate")
     if rule not in TOTALS:
         raise ValueError(f'no rule "{rule}" to allocate by; give one of {", ".join(TOTALS)}')
 

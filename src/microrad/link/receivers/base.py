@@ -18,7 +18,7 @@ from microrad.core import capacity
 from microrad.core.arrays import Floats
 from microrad.core.budget import Line
 from microrad.core.units import PLANCK_J_S, SPEED_OF_LIGHT_M_S, format_quantity
-from microrad.link.gains import photon_energy_j
+from microrad.link.gains import checked, photon_energy_j
 from microrad.mission.fields import Bounded, Quantity, Share
 
 SOURCE = "receiver and power as given"
@@ -27,7 +27,8 @@ LEAST_COUNT = 1e-30  # stands for none, so that logarithms exist
 
 
 Efficiency = Annotated[float, Quantity("", above=0.0, most=1.0), "one count or electron for each photon at the most"]
-Power = Annotated[float, Quantity("W", least=0.0)]
+_POWER = Quantity("W", least=0.0)
+Power = Annotated[float, _POWER]
 PerMode = Annotated[float, Quantity("photon", least=0.0)]
 Extinction = Annotated[float, Quantity("", above=1.0), "the power of a mark over that of a space (inf: dark spaces)"]
 NoiseFigure = Annotated[
@@ -56,14 +57,6 @@ def mark_and_space(extinction_ratio: float) -> tuple[float, float]:
 def spontaneous_photons(noise_figure_db: float) -> float:
     """Spontaneous-emission factor n_sp = F / 2 of an amplifier at high gain; "3 dB" is taken as 10 log10 2."""
     return max(float(10.0 ** (noise_figure_db / 10.0)) / 2.0, 1.0)
-
-
-def checked_powers(power_w: ArrayLike) -> Floats:
-    """The powers as an array; raises ValueError if one is negative or not finite."""
-    powers = np.asarray(power_w, dtype=np.float64)
-    for power in powers[~((powers >= 0.0) & (powers < math.inf))].flat[:1]:
-        Quantity("W", least=0.0).check("the received power", float(power))
-    return powers
 
 
 def background_power_w(
@@ -164,7 +157,7 @@ class Receiver(Bounded, ABC):
             ValueError: For a negative power and a rate that is not positive.
             RateError: For a rate above the bandwidth.
         """
-        powers = checked_powers(power_w)
+        powers = checked("the received power", power_w, _POWER)
         power, rate = np.broadcast_arrays(powers * self._code_gain, self._rates(data_rate_bit_s))
         return np.asarray(self._ratio(power, rate), dtype=np.float64)
 
@@ -204,7 +197,8 @@ class Receiver(Bounded, ABC):
             ValueError: As `bit_error_ratio_at`.
             RateError: As `bit_error_ratio_at`.
         """
-        power, rate = float(checked_powers(power_w)), float(self._rates(data_rate_bit_s))
+        power = float(checked("the received power", power_w, _POWER))
+        rate = float(self._rates(data_rate_bit_s))
         return self._noise(power, float(self.symbol_rate_hz(rate)))
 
     @property
@@ -224,9 +218,7 @@ class Receiver(Bounded, ABC):
         return self.bandwidth_hz
 
     def _rates(self, data_rate_bit_s: ArrayLike) -> Floats:
-        rates = np.asarray(data_rate_bit_s, dtype=np.float64)
-        for rate in rates[~((rates > 0.0) & (rates < math.inf))].flat[:1]:
-            Quantity("bit/s", above=0.0).check("the data rate", float(rate))
+        rates = checked("the data rate", data_rate_bit_s, Quantity("bit/s", above=0.0))
         symbols, limit = self.symbol_rate_hz(rates), self._symbol_rate_limit_hz
         if np.any(symbols > limit * (1.0 + 1e-12)):
             highest = float(rates.max())
