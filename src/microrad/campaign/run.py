@@ -4,7 +4,7 @@ import heapq
 import math
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, suppress
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
@@ -252,10 +252,14 @@ class _Runner:
         for outcome in failed:
             self._by_rows(outcome.job)
 
+    def _outcomes(self, jobs: Sequence[Job]) -> Iterator[Outcome]:
+        """Those of the engine, which is not asked for nothing: a scheduler that is not needed any more may be gone."""
+        return self.engine.outcomes(iter(jobs)) if jobs else iter(())
+
     def _pass(self, jobs: Sequence[Job]) -> list[Outcome]:
         """Put what is done into the ledger; returns what is not."""
         missed = []
-        for outcome in self.engine.outcomes(iter(jobs)):
+        for outcome in self._outcomes(jobs):
             if outcome.kind == "done":
                 self._keep(outcome.job, outcome.payload)
             else:
@@ -294,7 +298,7 @@ class _Runner:
         lost: dict[int, str] = {}
         for _ in range(ATTEMPTS):
             todo = [each for each in rows if each.row not in found or found[each.row].failed]
-            for outcome in self.engine.outcomes(iter(todo)):
+            for outcome in self._outcomes(todo):
                 if outcome.kind == "done":
                     found[outcome.job.row] = chunk_format.unpack_chunk(outcome.payload)
                 else:
@@ -323,7 +327,7 @@ class _Runner:
             if (trace.cell, trace.row) not in wanted:
                 self.book.drop_trace(trace)
         jobs = [Job(cell, 0, row, "trace") for cell, row in wanted if (cell, row) not in there]
-        for outcome in self.engine.outcomes(iter(jobs)):
+        for outcome in self._outcomes(jobs):
             if outcome.kind == "done":
                 found = chunk_format.unpack_trace(outcome.payload)
                 value = wanted[found.cell, found.row]
