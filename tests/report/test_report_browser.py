@@ -305,8 +305,13 @@ def test_each_heading_links_to_itself(report_page):
     assert [(anchor, link) for anchor, link in found if link != f"#{anchor}"] == []
 
 
-def test_contents_stand_open_where_there_is_room_for_them(opened):
+BOXES = "[...document.querySelectorAll('.chain li')].map(each => Math.round(each.getBoundingClientRect().left))"
+
+
+def test_contents_stand_open_and_the_chain_in_rows_where_there_is_room_for_them(opened):
     here = opened(unfolded=False)
+    lefts = here.page.evaluate(BOXES)
+    assert lefts == [*sorted(set(lefts))] * 2 and len(lefts) == 8
     first = "nav.contents li a"
     assert here.page.is_visible(first)
     assert here.page.evaluate("document.querySelector('nav.contents').getBoundingClientRect().right") < 400
@@ -316,6 +321,7 @@ def test_contents_stand_open_where_there_is_room_for_them(opened):
     here.page.set_viewport_size({"width": 1280, "height": 900})
     here.page.wait_for_selector(first)
     narrow = opened(width=400, unfolded=False)
+    assert len(set(narrow.page.evaluate(BOXES))) == 1
     assert not narrow.page.is_visible(first)
     narrow.page.click("nav.contents summary")
     assert narrow.page.is_visible(first)

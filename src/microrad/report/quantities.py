@@ -65,13 +65,8 @@ def signed(value: float, unit: str, digits: int = 3) -> str:
 
 
 def minus(text: str) -> str:
-    """A text with minus signs in place of its hyphens."""
-    return text.replace("-", MINUS)
-
-
-def with_minus(text: str) -> str:
-    """A sentence that was worded elsewhere, with a minus sign in front of each negative number."""
-    return re.sub(r"(?<![\w.])-(?=\d)", MINUS, text)
+    """A text with a minus sign in front of each negative number, in place of a hyphen."""
+    return re.sub(r"(?<![\w.])-(?=\d|inf)", MINUS, text)
 
 
 def power_text(number: float, digits: int = 3) -> str:

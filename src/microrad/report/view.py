@@ -8,6 +8,8 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
+from textwrap import fill
+from typing import Any
 
 from markupsafe import Markup
 
@@ -47,7 +49,7 @@ class Verdict:
 
 @dataclass(frozen=True, slots=True)
 class Drawing:
-    """A picture without data of its own, as SVG that is safe to show, with its title and caption."""
+    """A picture without data of its own, as markup that is safe to show, with its title and caption."""
 
     name: str
     title: str
@@ -74,6 +76,8 @@ class View:
         """The views directly within."""
         return (block for block in self.blocks if isinstance(block, View))
 
+
+_POINT: dict[str, Any] = {"initial_indent": "- ", "subsequent_indent": "  ", "break_on_hyphens": False}
 
 Block = str | Soft | Points | Verbatim | Verdict | Drawing | Table | Figure | View
 
@@ -140,7 +144,7 @@ def _text(block: Block, width: int) -> str:
         case Table():
             text = table_text(block, width)
         case Points():
-            text = tables_text([], [f"- {line}" for line in block.lines], width)
+            text = "\n".join(fill(each, width, **_POINT) for each in block.lines)
         case Soft():
             text = tables_text([], [block.text], width)
         case Verbatim():

@@ -3,6 +3,7 @@
 from typing import Any
 
 from microrad.report.data import fields
+from microrad.report.day.words import times
 from microrad.report.quantities import duration, minus, quantity, volume
 from microrad.report.tables import Table
 from microrad.study.contact_run import ContactRun, State
@@ -25,7 +26,7 @@ def contact_sentences(run: ContactRun, number: int, controller: str, rate_bit_s:
     lost = "lock is never lost in them"
     if run.losses:
         every = duration(1.0 / run.losses_per_s)
-        lost = f"lock is lost {_times(run.losses)} in them, once in {every}, which the time between them does not show"
+        lost = f"lock is lost {times(run.losses)} in them, once in {every}, which the time between them does not show"
     carried = ""
     if rate_bit_s is not None:
         carried = f": {volume(run.bits(rate_bit_s))} at {quantity(rate_bit_s, 'bit/s')}"
@@ -36,10 +37,6 @@ def contact_sentences(run: ContactRun, number: int, controller: str, rate_bit_s:
         f"windows, {duration(run.sampled_s)} in all, with the point-ahead and the rate of the line of sight of each; "
         f"{lost}."
     ]
-
-
-def _times(count: int) -> str:
-    return "once" if count == 1 else f"{count} times"
 
 
 def windows_table(run: ContactRun, quantile: float) -> Table:

@@ -38,8 +38,9 @@ def _compared(ratio: float) -> str:
 
 
 def times(count: float) -> str:
-    """How often."""
-    return "once" if count == 1 else "never" if count == 0 else f"{count:.3g} times"
+    """How often, in three digits; a count of more has all of its own."""
+    shown = f"{count:.0f}" if count >= 100.0 else f"{count:.3g}"
+    return "once" if count == 1 else "never" if count == 0 else f"{shown} times"
 
 
 def _how_much(day: DayStudy, way: Way) -> str:

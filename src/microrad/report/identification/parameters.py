@@ -8,7 +8,7 @@ from microrad.lab.identify.hysteresis.bouc_wen import PARAMETER_UNITS, PARAMETER
 from microrad.lab.identify.hysteresis.joint import JointFit
 from microrad.lab.identify.selection.predictions import Fit
 from microrad.lab.identify.statistics import rounded_to_error
-from microrad.report.quantities import with_minus
+from microrad.report.quantities import minus
 
 HIGH_CORRELATION = 0.95
 
@@ -37,7 +37,7 @@ def to_error(value: float, error: float) -> str:
         value: as it was found.
         error: its standard error in the same unit; nan where it was held.
     """
-    return with_minus(rounded_to_error(value, error))
+    return minus(rounded_to_error(value, error))
 
 
 def two_digits(error: float) -> str:
@@ -145,7 +145,7 @@ def notes(fit: Fit) -> list[str]:
     if pairs := correlations(fit):
         shown = ", ".join(f"{a} and {b} {r:+.3f}" for a, b, r in pairs[:6])
         more = f" and {len(pairs) - 6} pairs more" if len(pairs) > 6 else ""
-        found.append(with_minus(f"Correlated above {HIGH_CORRELATION:g}: {shown}{more}."))
+        found.append(minus(f"Correlated above {HIGH_CORRELATION:g}: {shown}{more}."))
     if isinstance(fit, BoucWenFit):
         value, error = fit.settled_hysteresis_rad
         found.append(

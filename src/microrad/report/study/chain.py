@@ -1,13 +1,7 @@
-"""The chain as a picture with this run's numbers on it: orbit, link, pointing, mirror, loop, residual, volume, verdict.
-
-Drawn as SVG twice, in rows for a wide page and for print, in one column for a narrow one; the page shows one of them.
-"""
+"""The chain with this run's numbers on it: orbit, link, pointing, mirror, loop, residual, volume, verdict."""
 
 import math
-import textwrap
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from itertools import pairwise
+from dataclasses import dataclass
 
 from microrad.core.units import format_quantity
 from microrad.link import pointing
@@ -15,9 +9,6 @@ from microrad.mirror import Variant
 from microrad.mirror.hysteresis import output_amplitude
 from microrad.report.quantities import micro, quantity, share_of_time, signed
 from microrad.study.study import Study
-
-_TITLE_HEIGHT, _LINE_HEIGHT, _PAD = 30, 18, 12
-_CHARACTER_WIDTH = 6.5  # of the text, in the mean of a line
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,28 +20,6 @@ class Stage:
     mark: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class Box:
-    """A stage with its place in the drawing."""
-
-    stage: Stage
-    x: float
-    y: float
-    width: float
-    height: float
-
-
-@dataclass(frozen=True, slots=True)
-class Drawing:
-    """Boxes and the paths of the arrows between them, in the units of the drawing."""
-
-    width: float
-    height: float
-    boxes: tuple[Box, ...]
-    arrows: tuple[str, ...]
-
-
-# ----------------------------------------------------------------------------------------------------------- numbers
 def stages(study: Study) -> tuple[Stage, ...]:
     """The chain's boxes, in the order of the chain."""
     return (
@@ -62,13 +31,6 @@ def stages(study: Study) -> tuple[Stage, ...]:
         _residual(study),
         _volume(study),
         _verdict(study),
-    )
-
-
-def alternative(found: Sequence[Stage]) -> str:
-    """The picture as a sentence for those who do not see it."""
-    return " ".join(
-        f"{s.name}{f' ({s.mark})' if s.mark else ''}: {', '.join(line.rstrip(',') for line in s.lines)}." for s in found
     )
 
 
@@ -191,41 +153,3 @@ def _verdict(study: Study) -> Stage:
         f"{study.file.mission.requirement.margin_db:g} dB required",
     )
     return Stage("Verdict", lines, "PASS" if study.met else "FAIL")
-
-
-# ------------------------------------------------------------------------------------------------------------ drawing
-def layout(found: Sequence[Stage], columns: int, width: float, gap: float) -> Drawing:
-    """Boxes in rows, arrows from each to the next.
-
-    Args:
-        found: the boxes in their order.
-        columns: of a row.
-        width: of the whole drawing, in its units.
-        gap: between boxes.
-    """
-    own = (width - (columns - 1) * gap) / columns
-    found = [_wrapped(s, int((own - 16.0) / _CHARACTER_WIDTH)) for s in found]
-    rows = [found[at : at + columns] for at in range(0, len(found), columns)]
-    boxes: list[Box] = []
-    y = 1.0
-    for row in rows:
-        height = _TITLE_HEIGHT + _LINE_HEIGHT * max(len(s.lines) for s in row) + _PAD
-        boxes += [Box(s, i * (own + gap) + 1.0, y, own - 2.0, height) for i, s in enumerate(row)]
-        y += height + gap
-    arrows = [_arrow(a, b, gap) for a, b in pairwise(boxes)]
-    return Drawing(width, y - gap + 1.0, tuple(boxes), tuple(arrows))
-
-
-def _wrapped(stage: Stage, most: int) -> Stage:
-    """The stage with its lines broken at so many characters."""
-    return replace(stage, lines=tuple(part for line in stage.lines for part in textwrap.wrap(line, most)))
-
-
-def _arrow(a: Box, b: Box, gap: float) -> str:
-    """To the right within a row, else down and back to the left."""
-    tip = 7.0  # length of the arrow's head, which stands before the end of the path
-    if a.y == b.y:
-        y = a.y + a.height / 2.0
-        return f"M{a.x + a.width:.1f} {y:.1f}H{b.x - tip:.1f}"
-    from_x, to_x = a.x + a.width / 2.0, b.x + b.width / 2.0
-    return f"M{from_x:.1f} {a.y + a.height:.1f}v{gap / 2.0 - tip / 2.0:.1f}H{to_x:.1f}V{b.y - tip:.1f}"

@@ -5,8 +5,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from markupsafe import Markup
-
 from microrad.core.machine import versions
 from microrad.core.units import format_quantity
 from microrad.loop.paper_cases import Run
@@ -100,16 +98,13 @@ def verdict_view(study: Study) -> View:
 
 
 def _chain(study: Study) -> View:
-    boxes = chain.stages(study)
-    said = chain.alternative(boxes)
-    sizes = (("wide", chain.layout(boxes, 4, 960.0, 26.0)), ("narrow", chain.layout(boxes, 1, 340.0, 24.0)))
-    svg = Markup("\n").join(drawing("study/chain.html", "chain", each, name, said) for name, each in sizes)
     stroke = "" if study.fine_pointing is None else "; at the mirror, whether its stroke covers the worst case"
     caption = (
         "Each arrow hands a result on: from where the satellites are to what arrives. PASS and FAIL are those of the "
         f"requirements above{stroke}."
     )
-    return View("The chain", [Drawing("chain", "The chain with its numbers", caption, svg)], "chain")
+    drawn = drawing("study/chain.html", "chain", chain.stages(study))
+    return View("The chain", [Drawing("chain", "The chain with its numbers", caption, drawn)], "chain")
 
 
 def _mirror_and_loop(study: Study) -> View:

@@ -14,7 +14,7 @@ from microrad.mirror import Variant
 from microrad.mission.file import changed_from_shipped
 from microrad.report.day import words as day_words
 from microrad.report.fine_pointing import words as fine_pointing_words
-from microrad.report.quantities import quantity, signed, with_minus
+from microrad.report.quantities import minus, quantity, signed
 from microrad.report.requirements import (
     derived_words,
     first_warning,
@@ -324,7 +324,7 @@ def ranked_warnings(study: Study) -> dict[str, list[str]]:
         return min((met, sure, cost) for sure, met, cost, _ in map(weight, each[1]))
 
     groups = sorted(ranked.items(), key=of_group)
-    return {what: [with_minus(warned.text) for warned in said] for what, said in groups}
+    return {what: [minus(warned.text) for warned in said] for what, said in groups}
 
 
 def _weight(study: Study, warned: Warned) -> tuple[bool, bool, float, tuple[bool, bool, float]]:
