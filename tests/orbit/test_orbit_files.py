@@ -22,7 +22,7 @@ from skyfield.sgp4lib import TEME
 
 from microrad.orbit.base import OrbitError, States
 from microrad.orbit.earth.epoch import Epoch
-from microrad.orbit.files import frames, messages, oem, read_elements, read_oem
+from microrad.orbit.files import messages, oem, read_elements, read_oem
 from microrad.orbit.files.elements import _EXPECTED, checksum
 from microrad.orbit.propagation.mean_elements import Sgp4Orbit, closest_elements
 
@@ -732,8 +732,8 @@ def test_rotations_between_hours(tmp_path):
     time_s = np.linspace(0.0, 5 * 86400.0, 333)
     days = 2451545.0 + 36525.0 * EPOCH.terrestrial_centuries(time_s)
     for frame in ("GCRF", "EME2000", "TOD"):
-        fitted, rate = frames._rotations(frame, EPOCH, time_s)
-        exact = frames._matrices(frame, SCALE.tt_jd(days))
+        fitted, rate = oem._rotations(frame, EPOCH, time_s)
+        exact = oem._matrices(frame, SCALE.tt_jd(days))
         assert 4.2e7 * np.max(np.abs(fitted - exact)) < ONE_MM
         assert np.max(np.abs(rate)) < 2e-11
 

@@ -13,8 +13,7 @@ from microrad.orbit.operations import (
     Rules,
     Sessions,
     schedule,
-    totals_by_relay,
-    totals_by_satellite,
+    totals,
 )
 
 RULES = Rules(overhead_s=2.0, shortest_s=3.0, longest_s=10.0)
@@ -163,11 +162,11 @@ def test_no_terminal_idles_while_someone_could_use_it(case):
 def test_the_time_served_is_bounded_by_the_terminals_and_by_what_is_in_view(case):
     rows, satellites, relays, terminals, rules = case
     got = schedule(opportunities(*rows), satellites, relays, terminals, rules, 0.0)
-    each = totals_by_satellite(got, satellites, volumes(got), (0.0, 40.0))
+    each = totals(got, got.satellite, satellites, volumes(got), (0.0, 40.0))
     for satellite in range(satellites):
         seconds = {s for row in rows if row[0] == satellite for s in range(int(row[2]), int(row[3]))}
         assert each.busy_s[satellite] <= len(seconds)
-    both = totals_by_relay(got, relays, volumes(got), (0.0, 40.0))
+    both = totals(got, got.relay, relays, volumes(got), (0.0, 40.0))
     assert np.all(both.busy_s <= 40.0 * terminals)
     assert both.busy_s.sum() == pytest.approx(each.busy_s.sum(), abs=rounding)
     assert both.sessions.sum() == each.sessions.sum() == got.start_s.size
@@ -221,7 +220,7 @@ def test_satellites_that_see_the_same_get_the_same_within_one_session(count, ter
     rules = Rules(overhead_s=60.0, shortest_s=120.0, longest_s=600.0)
     rows = [(satellite, 0, 0.0, DAY) for satellite in range(count)]
     got = schedule(opportunities(*rows), count, 1, terminals, rules, 0.0)
-    each = totals_by_satellite(got, count, volumes(got), (0.0, DAY))
+    each = totals(got, got.satellite, count, volumes(got), (0.0, DAY))
     assert np.ptp(each.served_s) <= rules.longest_s - rules.overhead_s + rounding
     if terminals < count:  # every terminal is busy all day, in sessions of the longest
         assert each.busy_s.sum() == pytest.approx(terminals * DAY)
@@ -249,8 +248,8 @@ def test_a_thousand_satellites_on_four_relays_keep_every_terminal_busy_and_every
         assert np.all(got.start_s[order][1:][same] >= got.end_s[order][:-1][same])
     span = (0.0, float(got.end_s.max()))
     each, relays = (
-        totals_by_satellite(got, 1000, volumes(got), span),
-        totals_by_relay(got, 4, volumes(got), span),
+        totals(got, got.satellite, 1000, volumes(got), span),
+        totals(got, got.relay, 4, volumes(got), span),
     )
     assert np.all(each.sessions >= 1)
     # from 2 h to 22 h there is always someone in view: no terminal is without a session
@@ -270,13 +269,13 @@ def sessions(*rows):
 
 def test_totals_count_data_from_lock_to_end_and_gaps_from_data_to_data():
     got = sessions((0, 0, 0, 10, 12, 20), (1, 0, 1, 11, 15, 40), (2, 0, 2, 16, 17, 18), (0, 1, 0, 50, 55, 60))
-    each = totals_by_satellite(got, 4, volumes(got, 2.0), (0.0, 100.0))
+    each = totals(got, got.satellite, 4, volumes(got, 2.0), (0.0, 100.0))
     assert each.sessions.tolist() == [2, 1, 1, 0]
     assert each.busy_s.tolist() == [20.0, 29.0, 2.0, 0.0]
     assert each.served_s.tolist() == [13.0, 25.0, 1.0, 0.0]
     assert each.volume_bit.tolist() == [26.0, 50.0, 2.0, 0.0]
     assert each.longest_gap_s.tolist() == [40.0, 60.0, 82.0, 100.0]
-    relays = totals_by_relay(got, 2, volumes(got, 2.0), (0.0, 100.0))
+    relays = totals(got, got.relay, 2, volumes(got, 2.0), (0.0, 100.0))
     assert relays.longest_gap_s.tolist() == [60.0, 55.0]  # relay 0 has data from 12 to 40 on its three terminals
     assert relays.served_s.tolist() == [34.0, 5.0]
 
@@ -284,7 +283,7 @@ def test_totals_count_data_from_lock_to_end_and_gaps_from_data_to_data():
 def test_a_schedule_without_an_opportunity_is_empty():
     got = schedule(opportunities(), 2, 1, 1, RULES, 0.0)
     assert listed(got) == []
-    assert totals_by_satellite(got, 2, volumes(got, 1.0), (0.0, 9.0)).longest_gap_s.tolist() == [9.0, 9.0]
+    assert totals(got, got.satellite, 2, volumes(got, 1.0), (0.0, 9.0)).longest_gap_s.tolist() == [9.0, 9.0]
 
 
 def test_views_that_touch_or_are_of_different_relays_are_taken():

@@ -5,12 +5,10 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from pydantic.fields import FieldInfo
-
 from microrad.link.budget.assembly import Shared, communication_beam
 from microrad.link.budget.lines import beam_budget
 from microrad.link.receivers import RateError
-from microrad.mission.fields import Quantity, Several, Share, Table
+from microrad.mission.fields import Quantity, Several, Share, Table, rule_of_field
 from microrad.mission.model import LinkMission, Source, source_text
 from microrad.mission.tables.link import divergence_fits
 
@@ -72,11 +70,11 @@ def inputs(tables: Table, name: str) -> Iterator[Input]:
         return
     for field, info in type(table).model_fields.items():
         value, key = getattr(table, field), f"{name}.{info.alias or field}"
-        rules = _rules(info)
-        if rules and isinstance(value, float):
-            yield Input(key, name, field, None, value, rules[0])
-        for rule in (each for each in info.metadata if isinstance(each, Several)):
-            for item, number in enumerate(value):
+        rule = rule_of_field(info)
+        if isinstance(rule, Quantity) and isinstance(value, float):
+            yield Input(key, name, field, None, value, rule)
+        if isinstance(rule, Several):
+            for item, number in enumerate(value or ()):
                 yield Input(key, name, field, item, number, rule.each)
 
 
@@ -97,13 +95,6 @@ def moved(tables: Varied, found: tuple[Input, ...], value: float) -> Varied | No
             return None
         tables = each.moved(tables, own)
     return tables
-
-
-def _rules(info: FieldInfo) -> list[Quantity]:
-    """The rule of a quantity; that of one that may be left out stands inside the union."""
-    kinds = getattr(info.annotation, "__args__", ())
-    inner = [rule for kind in kinds for rule in getattr(kind, "__metadata__", ())]
-    return [rule for rule in (*info.metadata, *inner) if isinstance(rule, Quantity)]
 
 
 def unit_of(each: Input, strehl: str) -> str:

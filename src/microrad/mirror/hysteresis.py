@@ -37,22 +37,9 @@ class BoucWen:
 
     @property
     def row(self) -> tuple[float, ...]:
-        """The parameters in the order of the kernel's columns."""
+        """The parameters in the order of the kernel's columns, which is that of the fields."""
         per_size = self.alpha_1_v / abs(self.epsilon_rad_v) if self.exponent != 1.0 and self.epsilon_rad_v else 0.0
-        return (
-            self.d1_rad_v,
-            self.d2_s_v,
-            self.epsilon_rad_v,
-            self.delta_s_v,
-            self.alpha_1_v,
-            self.beta_1_v,
-            self.rate_limit_v_s,
-            self.bias_v,
-            self.gamma_1_v,
-            self.eta_1_v,
-            self.exponent - 1.0,
-            per_size,
-        )
+        return (*(getattr(self, name) for name in self.__slots__[:-1]), self.exponent - 1.0, per_size)
 
     def decay_1_v(self, rising: float, sign: float) -> float:
         """Decay of |h| per volt of travel, at exponent 1.

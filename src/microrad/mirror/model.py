@@ -7,6 +7,7 @@ Drive u in volts at the amplifier's input, output y in radians. All are deviatio
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -87,20 +88,7 @@ def hysteresis_model(
         bias_v: Resting drive, which a Bouc-Wen model needs.
     """
     if table.bouc_wen is not None:
-        b = table.bouc_wen
-        return BoucWen(
-            b.d1_rad_v,
-            b.d2_s_v,
-            b.epsilon_rad_v,
-            b.delta_s_v,
-            b.alpha_1_v,
-            b.beta_1_v,
-            rate_limit_v_s,
-            bias_v,
-            b.gamma_1_v,
-            b.eta_1_v,
-            b.exponent,
-        )
+        return BoucWen(**dict(table.bouc_wen), rate_limit_v_s=rate_limit_v_s, bias_v=bias_v)
     p = table.prandtl_ishlinskii
     assert p is not None  # the mission's own check
     return Play(p.thresholds_v, p.weights_rad_v, p.widening_s, rate_limit_v_s if p.widening_s else math.inf)
@@ -208,22 +196,11 @@ def combine(*mirrors: Mirror) -> Mirror:
     total = np.cumsum([0] + [len(m.bouc_wen) + len(m.plays) for m in mirrors])
     order = [int(t) + i for t, n in zip(total, bw, strict=False) for i in range(n)]
     order += [i for i in range(int(total[-1])) if i not in order]  # Bouc-Wen elements first
-    blocks = {key: lti.block_diagonal(*(getattr(m, key) for m in mirrors)) for key in "ABEFGCDK"}
-    return Mirror(
-        name=" + ".join(m.name for m in mirrors),
-        A=blocks["A"],
-        B=blocks["B"],
-        E=blocks["E"][:, order],
-        F=blocks["F"][order],
-        G=blocks["G"][order],
-        C=blocks["C"],
-        D=blocks["D"],
-        K=blocks["K"][:, order],
-        bouc_wen=sum((m.bouc_wen for m in mirrors), ()),
-        plays=sum((m.plays for m in mirrors), ()),
-        inverse=sum((m.inverse for m in mirrors), ()),
-        inverse_creep=sum((m.inverse_creep for m in mirrors), ()),
-    )
+    parts: dict[str, Any] = {key: lti.block_diagonal(*(getattr(m, key) for m in mirrors)) for key in "ABEFGCDK"}
+    parts |= {key: parts[key][:, order] for key in "EK"} | {key: parts[key][order] for key in "FG"}
+    banks = ("bouc_wen", "plays", "inverse", "inverse_creep")
+    parts |= {key: sum((getattr(m, key) for m in mirrors), ()) for key in banks}
+    return Mirror(name=" + ".join(m.name for m in mirrors), **parts)
 
 
 def discretise(mirror: Mirror, step_s: float, *, often: bool = False) -> kernels.Plant:

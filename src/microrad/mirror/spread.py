@@ -10,7 +10,7 @@ from pydantic.fields import FieldInfo
 from microrad.core import lti
 from microrad.core.arrays import Floats
 from microrad.core.units import UnitError
-from microrad.mission.fields import ProblemsError, Quantity, Several, Table
+from microrad.mission.fields import ProblemsError, Quantity, Table, rule_of_field
 from microrad.mission.tables.mirror import Mirror, Place, Uncertainty, place
 
 TRIES = 10_000
@@ -74,7 +74,7 @@ def parameter_units(table: Mirror) -> dict[str, str]:
 
 
 def _unit(table: Mirror, at: Place) -> str:
-    rule = _rule(type(getattr(table, at.table)).model_fields[at.field])
+    rule = rule_of_field(type(getattr(table, at.table)).model_fields[at.field])
     if rule is None or _scales_a_list(table, at):
         return ""
     return rule.unit if isinstance(rule, Quantity) else rule.each.unit
@@ -202,7 +202,7 @@ def _faults(moved: Mirror, places: list[Place]) -> Iterator[tuple[str, str]]:
 
 def _out_of_range(value: float | tuple[float, ...] | None, info: FieldInfo) -> Iterator[str]:
     """Why a value, written into a file, would be refused."""
-    rule = _rule(info)
+    rule = rule_of_field(info)
     if value is None or rule is None:
         return
     unit = rule.unit if isinstance(rule, Quantity) else rule.each.unit
@@ -213,9 +213,3 @@ def _out_of_range(value: float | tuple[float, ...] | None, info: FieldInfo) -> I
         yield error.reason
     except ProblemsError as error:
         yield from (problem.reason for problem in error.problems)
-
-
-def _rule(info: FieldInfo) -> Quantity | Several | None:
-    """What a key may hold; of a key that may be left out it stands inside the annotation."""
-    inner = [m for kind in getattr(info.annotation, "__args__", ()) for m in getattr(kind, "__metadata__", ())]
-    return next((rule for rule in (*info.metadata, *inner) if isinstance(rule, Quantity | Several)), None)

@@ -12,6 +12,7 @@ from itertools import pairwise
 from typing import Any, ClassVar, NamedTuple, Self, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, GetJsonSchemaHandler, model_validator
+from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema, core_schema
 
 from microrad.core.units import UnitError, format_quantity, kind_of, parse_quantity
@@ -343,6 +344,12 @@ def _bounds(record: Any) -> tuple[tuple[str, object, Quantity, str], ...]:
     return tuple(found)
 
 
+def rule_of_field(info: FieldInfo) -> Quantity | Several | None:
+    """What a key of a table may hold; of a key that may be left out it stands inside the annotation."""
+    inner = [rule for kind in getattr(info.annotation, "__args__", ()) for rule in getattr(kind, "__metadata__", ())]
+    return next((rule for rule in (*info.metadata, *inner) if isinstance(rule, Quantity | Several)), None)
+
+
 _UNIT = re.compile(r"(_(rad|m|s|hz|v|w|a|db|bit|photon|sr|m2|m3|rad2|hz2|1|sqrt))+$")
 
 
@@ -361,12 +368,12 @@ class Table(BaseModel):
     )
 
     @classmethod
-    def rule_of(cls, key: str) -> tuple[str, "Quantity"]:
+    def rule_of(cls, key: str) -> tuple[str, Quantity]:
         """Name and rule of the quantity that a file calls `key`; a missing one is a KeyError."""
         for name, info in cls.model_fields.items():
-            rules = [rule for rule in info.metadata if isinstance(rule, Quantity)]
-            if rules and (info.alias or name) == key:
-                return name, rules[0]
+            rule = rule_of_field(info)
+            if isinstance(rule, Quantity) and (info.alias or name) == key:
+                return name, rule
         raise KeyError(key)
 
     def with_value(self, key: str, value: object) -> Self:

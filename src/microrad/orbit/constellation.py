@@ -144,8 +144,8 @@ def run_constellation(
         sessions=sessions,
         planned=planned,
         loss=loss,
-        by_satellite=operations.totals_by_satellite(sessions, len(own), volumes, pair.span_s),
-        by_relay=operations.totals_by_relay(sessions, len(relays), volumes, pair.span_s),
+        by_satellite=operations.totals(sessions, sessions.satellite, len(own), volumes, pair.span_s),
+        by_relay=operations.totals(sessions, sessions.relay, len(relays), volumes, pair.span_s),
     )
 
 

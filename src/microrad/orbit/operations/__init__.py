@@ -9,8 +9,7 @@ from microrad.orbit.operations.schedule import (
     Sessions,
     Totals,
     schedule,
-    totals_by_relay,
-    totals_by_satellite,
+    totals,
 )
 from microrad.orbit.operations.store import Latency, StoreHistory, deliver, pool
 
@@ -34,6 +33,5 @@ __all__ = [
     "schedule",
     "service",
     "spreadsheet_text",
-    "totals_by_relay",
-    "totals_by_satellite",
+    "totals",
 ]

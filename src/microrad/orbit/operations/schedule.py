@@ -258,37 +258,19 @@ class Totals:
     longest_gap_s: Floats
 
 
-def totals_by_satellite(
-    sessions: Sessions, satellites: int, volume_bit: Sequence[float] | Floats, span: tuple[float, float]
-) -> Totals:
-    """What each satellite got over the span.
-
-    Args:
-        sessions: The sessions.
-        satellites: Number of satellites.
-        volume_bit: Data of each session, bit, shape (sessions,).
-        span: Start and end of the span, s.
-    """
-    return _totals(sessions, sessions.satellite, satellites, volume_bit, span)
-
-
-def totals_by_relay(
-    sessions: Sessions, relays: int, volume_bit: Sequence[float] | Floats, span: tuple[float, float]
-) -> Totals:
-    """What each relay carried over all its terminals.
-
-    Args:
-        sessions: The sessions.
-        relays: Number of relays.
-        volume_bit: Data of each session, bit, shape (sessions,).
-        span: Start and end of the span, s.
-    """
-    return _totals(sessions, sessions.relay, relays, volume_bit, span)
-
-
-def _totals(
+def totals(
     sessions: Sessions, index: Integers, count: int, volume_bit: Sequence[float] | Floats, span: tuple[float, float]
 ) -> Totals:
+    """What each satellite got over the span, or each relay carried over all its terminals.
+
+    Args:
+        sessions: The sessions.
+        index: `sessions.satellite` or `sessions.relay`.
+        count: Number of satellites, or of relays.
+        volume_bit: Data of each session, bit, shape (sessions,).
+        span: Start and end of the span, s.
+    """
+
     def add(each: Sequence[float] | Floats) -> Floats:
         return np.bincount(index, each, minlength=count).astype(np.float64)
 
