@@ -8,29 +8,26 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from microrad.link.acquisition import (
+from microrad.link.acquisition.detection import detection_times
+from microrad.link.acquisition.scan import Detector, Search, Spiral
+from microrad.link.acquisition.sequence import (
     LOCKED,
     LOST,
-    Beams,
     Chances,
-    Detector,
-    Receiver,
-    Search,
-    Spiral,
     Stage,
     Timing,
     answer_stages,
-    detection_times,
+    beacon_stages,
     frame_detection_probability,
+    frames_detection_probability,
     paper_sequence,
     scan_stages,
     simulate,
     simulate_log,
     solve_sequence,
-    wide_against_scan,
 )
-from microrad.link.acquisition.sequence import beacon_stages, frames_detection_probability
 from microrad.link.acquisition.times import TimeDistribution
+from microrad.link.acquisition.trade import Beams, Receiver, wide_against_scan
 
 URAD = 1e-6
 NORMAL_99 = 2.5758  # one seed in a hundred misses it; larger studies of each pair show no bias

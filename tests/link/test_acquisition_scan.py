@@ -5,18 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from microrad.link.acquisition import (
-    Detector,
-    Raster,
-    Search,
-    Spiral,
-    StepStare,
-    Vibration,
-    detection_times,
-    gap_probability,
-    highest_speed,
-    simulate_scan,
-)
+from microrad.link.acquisition.detection import Vibration, detection_times, gap_probability, simulate_scan
+from microrad.link.acquisition.scan import Detector, Raster, Search, Spiral, StepStare, highest_speed
 
 URAD = 1e-6
 SEARCH = Search(300 * URAD, 20 * URAD, 0.25, 0.995)

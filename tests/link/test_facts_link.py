@@ -17,8 +17,9 @@ from numpy.testing import assert_allclose
 
 import budgets
 from microrad import link
-from microrad.link import acquisition, beams, gains, pointing
+from microrad.link import beams, gains, pointing
 from microrad.link import study as link_study
+from microrad.link.acquisition import scan
 from microrad.link.pointing import statistics
 from microrad.link.receivers import PpmCounting
 from microrad.loop import disturbance, sensor
@@ -322,7 +323,7 @@ def test_the_papers_sum_stands_next_to_those_of_the_standard_and_is_not_authoris
 
 
 # --------------------------------------------------------------------------------------------------- acquisition
-SEARCH = acquisition.Search(sigma_rad=300 * URAD, beam_radius_rad=20 * URAD, overlap=0.25, coverage=0.995)
+SEARCH = scan.Search(sigma_rad=300 * URAD, beam_radius_rad=20 * URAD, overlap=0.25, coverage=0.995)
 HALF_RADIUS_STEPS = int(math.pi * SEARCH.radius_rad**2 / (SEARCH.pitch_rad * SEARCH.beam_radius_rad / 2))
 
 
@@ -338,7 +339,7 @@ def test_the_spiral_is_that_of_the_worked_example(value, text):
 
 def test_a_spiral_takes_its_area_over_pitch_and_speed():
     # checked: T = pi R^2 / (pitch speed)
-    spiral = acquisition.Spiral(SEARCH, acquisition.Detector(1e-3), 0.01)
+    spiral = scan.Spiral(SEARCH, scan.Detector(1e-3), 0.01)
     wanted = math.pi * SEARCH.radius_rad**2 / (30 * URAD * 0.01)
     assert spiral.duration_s == pytest.approx(wanted, rel=1e-12)
 

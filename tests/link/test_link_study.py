@@ -13,8 +13,9 @@ import budgets
 from link_files import PATTERN, RECEIVERS, link_file, received_with
 from microrad import link
 from microrad.core.units import parse_quantity
-from microrad.link import acquisition, requirement
+from microrad.link import requirement
 from microrad.link import study as link_study
+from microrad.link.acquisition import detection, scan, sequence
 from microrad.link.acquisition import partner_search as link_acquisition
 from microrad.link.budget.lines import LEFT_AT_ZERO
 from microrad.link.pointing.radial_error import Jitter
@@ -408,7 +409,7 @@ def test_a_beam_that_brings_too_little_power_even_on_its_axis_finds_nobody(tmp_p
     assert found.wide.outcome.success_probability < 1e-10
     assert found.wide.simulated_probability == 0.0
     assert math.isnan(found.wide.simulated_mean_s)
-    assert found.wide.log[-1].to == acquisition.LOST
+    assert found.wide.log[-1].to == sequence.LOST
 
 
 def test_a_partner_that_points_without_error_is_hit(tmp_path):
@@ -457,7 +458,7 @@ def test_the_closed_form_and_the_simulation_agree_and_the_log_is_the_first_run(t
         assert agrees(found)
         assert found.simulated.locked.size == 2000
         assert found.log[-1].time_s == found.simulated.time_s[0]
-        assert found.log[-1].to == (acquisition.LOCKED if found.simulated.locked[0] else acquisition.LOST)
+        assert found.log[-1].to == (sequence.LOCKED if found.simulated.locked[0] else sequence.LOST)
         assert found.outcome.success_probability + found.outcome.lost.probability == pytest.approx(1.0)
 
 
@@ -657,12 +658,12 @@ def test_the_trade_spreads_the_beacons_power_or_leads_it_over_the_uncertainty(pl
     assert trade.speed_rad_s == pytest.approx(SPEED_RAD_S, rel=1e-9)
     assert_allclose(trade.scan_time_s, np.pi * trade.radius_rad**2 / (PITCH_RAD * SPEED_RAD_S), rtol=1e-9)
     assert np.all(trade.scan_mean_time_s < trade.scan_time_s)
-    search = acquisition.Search(float(sigma[3]), 20 * URAD, 0.25, 0.995)
-    scan = acquisition.Spiral(search, acquisition.Detector(1e-3), trade.speed_rad_s)
-    shaken = acquisition.detection_times(scan, 5 * URAD)  # acquisition.scan.jitter
+    search = scan.Search(float(sigma[3]), 20 * URAD, 0.25, 0.995)
+    spiral = scan.Spiral(search, scan.Detector(1e-3), trade.speed_rad_s)
+    shaken = detection.detection_times(spiral, 5 * URAD)  # acquisition.scan.jitter
     assert trade.scan_probability[3] == pytest.approx(shaken.probability, rel=1e-9)
     assert trade.scan_mean_time_s[3] == pytest.approx(shaken.mean_s, rel=1e-9)
-    assert shaken.probability < acquisition.detection_times(scan).probability
+    assert shaken.probability < detection.detection_times(spiral).probability
 
 
 @pytest.mark.parametrize(

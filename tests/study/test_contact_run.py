@@ -12,8 +12,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 import budgets
 from microrad import link
 from microrad.core import kernels
-from microrad.link import acquisition
 from microrad.link import study as link_study
+from microrad.link.acquisition import sequence as acquisition
 from microrad.loop import control, controller_study
 from microrad.loop.controller_study import designs
 from microrad.loop.disturbance import Reference

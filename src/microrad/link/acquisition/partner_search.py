@@ -8,7 +8,9 @@ import numpy as np
 
 from microrad import link
 from microrad.core.budget import Line, total_db
-from microrad.link import acquisition, pointing
+from microrad.link import pointing
+from microrad.link.acquisition import detection, scan, sequence
+from microrad.link.acquisition.trade import Beams, Receiver, Trade, wide_against_scan
 from microrad.link.beams import GaussianFall
 from microrad.link.budget.lines import POINT_AHEAD_LOSS, POINTING_LOSS
 from microrad.loop import sensor
@@ -57,10 +59,10 @@ class Found:
     """One way to find the partner: its stages, the exact outcome, and the seeded simulation of the same process."""
 
     name: str
-    stages: tuple[acquisition.Stage, ...]
-    outcome: acquisition.Outcome
-    simulated: acquisition.SequenceRuns
-    log: tuple[acquisition.Transition, ...]
+    stages: tuple[sequence.Stage, ...]
+    outcome: sequence.Outcome
+    simulated: sequence.SequenceRuns
+    log: tuple[sequence.Transition, ...]
 
     @property
     def possible(self) -> bool:
@@ -96,7 +98,7 @@ class Scanned:
     speed_rad_s: float | None
     stated_detection_s: float
     needed_detection_s: float
-    trade: acquisition.Trade | None
+    trade: Trade | None
 
     @property
     def detects(self) -> bool:
@@ -112,7 +114,7 @@ class Finding:
     its axis each beam still suffices.
     """
 
-    chances: acquisition.Chances
+    chances: sequence.Chances
     sigma_rad: float
     beacon_radius_rad: float
     answer_radius_rad: float
@@ -126,7 +128,7 @@ class Finding:
         return None if self.scanned is None else self.scanned.found
 
     @property
-    def trade(self) -> acquisition.Trade | None:
+    def trade(self) -> Trade | None:
         """The wide beacon against a scan."""
         return None if self.scanned is None else self.scanned.trade
 
@@ -181,7 +183,7 @@ def find_partner(
     """
     shared = data.shared
     radii = (_reach(beacon, shared), _reach(answer, shared), _return_reach(data))
-    chances = acquisition.Chances(
+    chances = sequence.Chances(
         beacon_coverage=_coverage(error, radii[0]),
         frame_detection=a.detection_probability,
         answer_coverage=_coverage(
@@ -193,19 +195,19 @@ def find_partner(
     )
     timing = _timing(shared.terminals, a, beacon.table.distance_m)
     sigma = max(math.hypot(b, s) for b, s in zip(error.bias_rad, error.rms_rad, strict=True))
-    wide = _solved("wide beacon", acquisition.paper_sequence(timing, chances), a)
+    wide = _solved("wide beacon", sequence.paper_sequence(timing, chances), a)
     scanned = None
     if a.scan is not None:
-        answering = acquisition.answer_stages(timing, chances)
+        answering = sequence.answer_stages(timing, chances)
         scanned = _scanned(a, a.scan, _sender(shared, beacon, a, a.scan), sigma, timing, answering)
     return Finding(chances, sigma, *radii, wide, scanned)
 
 
-def _timing(terminals: Terminals, a: Acquisition, range_m: float) -> acquisition.Timing:
+def _timing(terminals: Terminals, a: Acquisition, range_m: float) -> sequence.Timing:
     own, partner = terminals.called("leo"), terminals.called("geo")
     if own == partner:  # two terminals of one make
         own, partner = f"{own} (own)", f"{partner} (partner)"
-    return acquisition.Timing(
+    return sequence.Timing(
         range_m=range_m,
         body_settling_s=a.settle_s,
         frame_time_s=a.detection_s,
@@ -270,42 +272,42 @@ def _answer_detection(a: Acquisition, light: Tracking | None) -> float:
         return a.detection_probability
     # the noise of a measurement falls with the root of the readings in it
     readings = max(a.measurement_s * a.sensor.rate_hz, 1.0)
-    return acquisition.frame_detection_probability(light.signal_to_noise * math.sqrt(readings), THRESHOLD)
+    return sequence.frame_detection_probability(light.signal_to_noise * math.sqrt(readings), THRESHOLD)
 
 
-def _pattern(s: ScanTable, sigma_rad: float, look_s: float) -> acquisition.Scan:
+def _pattern(s: ScanTable, sigma_rad: float, look_s: float) -> scan.Scan:
     """The mission's scan, as fast as a detector that looks that long allows."""
     if sigma_rad == 0.0:
         raise ValueError(
             "pointing.lines: every error is 0 rad, and a scan has nothing to cover; give an error above 0 rad, or take "
             "out acquisition.scan"
         )
-    search = acquisition.Search(sigma_rad, s.beam_radius_rad, s.overlap, s.coverage)
-    detector = acquisition.Detector(look_s)
+    search = scan.Search(sigma_rad, s.beam_radius_rad, s.overlap, s.coverage)
+    detector = scan.Detector(look_s)
     if s.pattern == "step-stare":
-        return acquisition.StepStare(search, detector, look_s, s.turn_s)
-    speed = acquisition.highest_speed(search, look_s)
+        return scan.StepStare(search, detector, look_s, s.turn_s)
+    speed = scan.highest_speed(search, look_s)
     if s.pattern == "raster":
-        return acquisition.Raster(search, detector, speed, s.turn_s)
-    return acquisition.Spiral(search, detector, speed)
+        return scan.Raster(search, detector, speed, s.turn_s)
+    return scan.Spiral(search, detector, speed)
 
 
 def _scanned(
     a: Acquisition,
     s: ScanTable,
-    sender: tuple[acquisition.Beams, acquisition.Receiver],
+    sender: tuple[Beams, Receiver],
     sigma_rad: float,
-    timing: acquisition.Timing,
-    answering: tuple[acquisition.Stage, ...],
+    timing: sequence.Timing,
+    answering: tuple[sequence.Stage, ...],
 ) -> Scanned:
     """The scan at the pace that its light allows, before the stages from the answer on."""
     beams, receiver = sender
     needed = float(receiver.detection_time_s(receiver.aperture_area_m2 * beams.edge_irradiance_w_m2))
     pattern = _pattern(s, sigma_rad, max(needed, s.detection_s))
-    times = acquisition.detection_times(pattern, s.jitter_rms_rad)
+    times = detection.detection_times(pattern, s.jitter_rms_rad)
     detects, overlapping = needed <= LONGEST_LOOK_S, s.overlap >= LEAST_OVERLAP
     times = times if detects else times.scaled(_NEVER)
-    stages = (*acquisition.scan_stages(timing, times, pattern.duration_s), *answering)
+    stages = (*sequence.scan_stages(timing, times, pattern.duration_s), *answering)
     # nor is a look of the trade shorter than any that the mission states
     least = replace(receiver, shortest_s=min(a.detection_s, s.detection_s))
     return Scanned(
@@ -313,28 +315,26 @@ def _scanned(
         duration_s=pattern.duration_s,
         radius_rad=pattern.search.radius_rad,
         half_angle_rad=beams.narrow_half_angle_rad,
-        speed_rad_s=None if isinstance(pattern, acquisition.StepStare) else pattern.speed_rad_s,
+        speed_rad_s=None if isinstance(pattern, scan.StepStare) else pattern.speed_rad_s,
         stated_detection_s=s.detection_s,
         needed_detection_s=needed,
-        trade=acquisition.wide_against_scan(TRADE_RAD, s.coverage, beams, least, s.jitter_rms_rad)
+        trade=wide_against_scan(TRADE_RAD, s.coverage, beams, least, s.jitter_rms_rad)
         if detects and overlapping
         else None,
     )
 
 
-def _solved(name: str, stages: tuple[acquisition.Stage, ...], a: Acquisition) -> Found:
+def _solved(name: str, stages: tuple[sequence.Stage, ...], a: Acquisition) -> Found:
     return Found(
         name,
         stages,
-        acquisition.solve_sequence(stages, a.attempts),
-        acquisition.simulate(stages, a.attempts, a.runs, a.seed),
-        acquisition.simulate_log(stages, a.attempts, a.seed),
+        sequence.solve_sequence(stages, a.attempts),
+        sequence.simulate(stages, a.attempts, a.runs, a.seed),
+        sequence.simulate_log(stages, a.attempts, a.seed),
     )
 
 
-def _sender(
-    shared: link.Shared, beacon: Sent, a: Acquisition, s: ScanTable
-) -> tuple[acquisition.Beams, acquisition.Receiver]:
+def _sender(shared: link.Shared, beacon: Sent, a: Acquisition, s: ScanTable) -> tuple[Beams, Receiver]:
     """The beacon's power in the scan's narrow beam, and the partner's sensor.
 
     The sensor is that of the beacon budget: it needs its required power for one frame, and four times as long at half
@@ -347,11 +347,11 @@ def _sender(
     area = math.pi / 4.0 * shared.terminals.geo_aperture_m**2
     margin_db = min(max(_on_axis_margin_db(beacon.budget), -_DEEPEST_MARGIN_DB), _DEEPEST_MARGIN_DB)
     on_axis = beam.required_power_w * 10.0 ** (margin_db / 10.0) / area
-    beams = acquisition.Beams(
+    beams = Beams(
         power_w=on_axis * math.pi * (half * beam.distance_m) ** 2 / 2.0,
         range_m=beam.distance_m,
         narrow_half_angle_rad=max(s.beam_radius_rad, least),
         beam_radius_rad=s.beam_radius_rad,
         overlap=s.overlap,
     )
-    return beams, acquisition.Receiver(area, beam.required_power_w, a.detection_s)
+    return beams, Receiver(area, beam.required_power_w, a.detection_s)

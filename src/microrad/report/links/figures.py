@@ -7,8 +7,8 @@ import numpy as np
 
 from microrad.core.units import format_quantity
 from microrad.link import Swing, Tornado
-from microrad.link.acquisition import Trade
 from microrad.link.acquisition.partner_search import Finding
+from microrad.link.acquisition.trade import Trade
 from microrad.link.requirement import time_kept
 from microrad.link.study import LinkStudy
 from microrad.report.plotting.figure import Figure

@@ -7,7 +7,7 @@ import numpy as np
 from microrad import link, orbit
 from microrad.core.arrays import Floats
 from microrad.core.units import format_quantity
-from microrad.link import acquisition
+from microrad.link.acquisition import sequence as acquisition
 from microrad.link.acquisition.partner_search import Finding, Found
 from microrad.loop.controller_study import Design, FinePointingStudy, Scene
 from microrad.mission.tables.acquisition import Acquisition
