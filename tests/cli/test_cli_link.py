@@ -62,7 +62,7 @@ def file_with(folder, *changes):
 
 def said(result, start):
     """The one printed sentence that starts so, without its line breaks."""
-    (block,) = re.findall(rf"(?m)^{re.escape(start)}(?:.|\n(?! |\n|- |[A-Z]))*", result.out)
+    (block,) = re.findall(rf"(?m)^{re.escape(start)}(?:.|\n(?! \S|\n|- |[A-Z]))*", result.out)
     return " ".join(block.split())
 
 
