@@ -101,10 +101,10 @@ class _DefinitionReader:
         variables = self.reader.each(drawing.variable, items)
         if self.table is None or not cells:
             return None
-        try:
-            nominal = cell_reader.cell(data, {})
-        except MissionError:  # no mission without the values of the grid
-            nominal = cells[0]
+        nominal = cells[0]
+        if axes:
+            with suppress(MissionError):  # no mission without the values of the grid
+                nominal = cell_reader.cell(data, {})
         return self._campaign(self.table, mission, nominal, cells, draws, keep, variables)
 
     def _check_doubles(self) -> None:
