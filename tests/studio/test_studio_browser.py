@@ -328,7 +328,7 @@ def test_a_campaign_shows_its_figures_while_it_runs_goes_on_after_a_cancel_and_h
         assert card.get_by_role("row").filter(has_text="margin ≥").get_by_text("%").count() == 2
         card.get_by_role("figure").locator(".main-svg").first.wait_for()
         picture(page, "runs-campaign.png", full_page=True)
-        page.reload()
+    tab.reload()
     there.get_by_role("button", name="Cancel").click()
     until(tab, (studio.folder / ".microrad-studio" / "jobs" / str(number) / "cancel").exists, "the cancel")
     os.killpg(command, signal.SIGCONT)

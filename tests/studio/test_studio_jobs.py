@@ -20,6 +20,9 @@ from small_campaign import campaign_file, children, kill
 from studio_jobs import written
 from waiting import HANG_S, gone, lines_of, until
 
+ONE_WORKER = ("--threads", "1")
+"""Of a campaign: a worker takes a second to start."""
+
 
 @pytest.fixture
 def studio(tmp_path):
@@ -150,7 +153,8 @@ def test_a_job_goes_on_when_whoever_started_it_is_gone(tmp_path):
 # ----------------------------------------------------------------------------------------------------------- progress
 def test_progress_is_handed_over_with_its_rate(studio, tmp_path):
     campaign_file(tmp_path, runs=96)
-    job = ended(studio.submit(order(tmp_path, "campaign", "run", "campaign.toml", kind="campaign")).folder)
+    job = studio.submit(order(tmp_path, "campaign", "run", "campaign.toml", *ONE_WORKER, kind="campaign"))
+    job = ended(job.folder)
     assert job.code == 0, job
     assert (job.progress.done, job.progress.total, job.progress.share) == (96, 96, 1.0)
     assert "rows" in job.progress.what
@@ -189,7 +193,7 @@ def test_a_line_of_progress_that_is_being_written_is_not_read(tmp_path):
 # ------------------------------------------------------------------------------------------------------------- cancel
 def test_a_cancelled_campaign_keeps_its_rows_and_resumes(studio, tmp_path):
     campaign_file(tmp_path, runs=4096, duration="1 s")
-    job = studio.submit(order(tmp_path, "campaign", "run", "campaign.toml", kind="campaign"))
+    job = studio.submit(order(tmp_path, "campaign", "run", "campaign.toml", *ONE_WORKER, kind="campaign"))
 
     def rows():
         found = jobs_files.read_job(job.folder)
@@ -201,7 +205,7 @@ def test_a_cancelled_campaign_keeps_its_rows_and_resumes(studio, tmp_path):
     job = ended(job.folder)
     assert (job.state, job.code) == ("cancelled", 130)
     assert "Go on with: microrad campaign resume campaign.ledger" in studio.output(job.number, "stderr")
-    again = studio.submit(order(tmp_path, "campaign", "resume", "campaign.ledger", kind="campaign"))
+    again = studio.submit(order(tmp_path, "campaign", "resume", "campaign.ledger", *ONE_WORKER, kind="campaign"))
     done = job.progress.done
 
     def further():
@@ -256,7 +260,7 @@ def test_what_a_command_has_started_is_stopped_with_it(tmp_path):
 
 def test_a_job_that_waits_and_is_cancelled_never_starts(studio, tmp_path):
     campaign_file(tmp_path, runs=4096, duration="1 s")
-    first = studio.submit(order(tmp_path, "campaign", "run", "campaign.toml", kind="campaign"))
+    first = studio.submit(order(tmp_path, "campaign", "run", "campaign.toml", *ONE_WORKER, kind="campaign"))
     second = studio.submit(order(tmp_path, "init", "never.toml"))
     assert (first.state, second.state) == ("running", "queued")
     assert studio.cancel(2).state == "cancelled"
@@ -296,7 +300,7 @@ def test_who_looks_at_the_list_starts_what_nobody_started(studio, tmp_path):
 def test_a_job_whose_process_is_killed_is_lost_ends_with_it_and_lets_the_next_one_go(studio, tmp_path):
     """The process that watches over it alone: nobody would hear that the command is to stop."""
     campaign_file(tmp_path, runs=4096, duration="1 s")
-    first = studio.submit(order(tmp_path, "campaign", "run", "campaign.toml", kind="campaign"))
+    first = studio.submit(order(tmp_path, "campaign", "run", "campaign.toml", *ONE_WORKER, kind="campaign"))
     second = studio.submit(order(tmp_path, "init", "next.toml"))
     pid = json.loads((first.folder / "started.json").read_text())["pid"]
     below = []
@@ -359,7 +363,7 @@ def test_a_finished_job_is_removed_with_its_output_and_its_number_is_not_used_ag
 
 def test_a_running_job_is_not_removed(studio, tmp_path):
     campaign_file(tmp_path, runs=4096, duration="1 s")
-    job = studio.submit(order(tmp_path, "campaign", "run", "campaign.toml", kind="campaign"))
+    job = studio.submit(order(tmp_path, "campaign", "run", "campaign.toml", *ONE_WORKER, kind="campaign"))
     with pytest.raises(JobError, match="job 1 is running; cancel it first"):
         studio.remove(job.number)
     assert job.folder.is_dir()
