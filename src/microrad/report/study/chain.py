@@ -8,6 +8,7 @@ from microrad.link import pointing
 from microrad.mirror import Variant
 from microrad.mirror.hysteresis import output_amplitude
 from microrad.report.quantities import micro, quantity, share_of_time, signed
+from microrad.report.study.contributors import worst_axis
 from microrad.study.study import Study
 
 
@@ -99,7 +100,7 @@ def _mirror(study: Study) -> Stage:
         lines.append(f"{100 * high.width:.1f} % at {high.freq_hz:g} Hz")
     if study.fine_pointing is None:
         return Stage("Mirror", tuple(lines))
-    axis = min(study.fine_pointing.scene.own_stroke, key=lambda a: a.margin_rad)
+    axis = worst_axis(study)
     lines.append(f"stroke ({axis.name}): {micro(axis.needed_rad)} µrad needed,")
     lines.append(f"{micro(axis.available_rad)} µrad available")
     return Stage("Mirror", tuple(lines), next(r.mark for r in study.requirements if r.subject == "stroke"))

@@ -63,11 +63,8 @@ def contributor(study: Study, r: Requirement) -> str:
         r: a requirement of it.
     """
     fine = study.fine_case is not None and r in study.requirements
-    return _capital(r.unknown or (_OF_FINE if fine else _CONTRIBUTORS)[r.subject](study, r.limited_by))
-
-
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]
+    said = r.unknown or (_OF_FINE if fine else _CONTRIBUTORS)[r.subject](study, r.limited_by)
+    return f"{said[:1].upper()}{said[1:]}"
 
 
 def _cone(study: Study) -> str:
@@ -103,7 +100,7 @@ def advice(study: Study, r: Requirement) -> str:
 
 
 def _of_stroke(study: Study, r: Requirement) -> str:
-    m, axis = study.file.mission, _worst_axis(study)
+    m, axis = study.file.mission, worst_axis(study)
     assert m.fine_pointing is not None  # such a requirement has it
     own = {
         "Body pointing": ("fine_pointing.body.error", m.fine_pointing.body.error_rad),
@@ -117,14 +114,10 @@ def _of_stroke(study: Study, r: Requirement) -> str:
     return advise_at_most(r, key, value * left / line.value, "rad")
 
 
-def _worst_axis(study: Study) -> StrokeBudget:
-    fine = study.fine_pointing
-    assert fine is not None  # such a requirement has one
-    return min(fine.scene.own_stroke, key=lambda each: each.margin_rad)
-
-
-def _tornado(study: Study, of: str) -> Sequence[link.Swing]:
-    return next((t.swings for t in study.links.tornados if t.of == of), ())
+def worst_axis(study: Study) -> StrokeBudget:
+    """The axis of the fine-pointing loop, which there is, whose stroke has the least to spare."""
+    assert study.fine_pointing is not None
+    return min(study.fine_pointing.scene.own_stroke, key=lambda each: each.margin_rad)
 
 
 def most_sensitive(swings: Sequence[link.Swing]) -> str:
@@ -147,11 +140,12 @@ def largest_loss(budget: link.LinkBudget) -> str:
 
 
 def _power(study: Study, budget: link.LinkBudget) -> str:
-    return f"{largest_loss(budget)}{most_sensitive(_tornado(study, budget.name))}"
+    swings = next((t.swings for t in study.links.tornados if t.of == budget.name), ())
+    return f"{largest_loss(budget)}{most_sensitive(swings)}"
 
 
 def _stroke(study: Study, cause: str) -> str:
-    axis = _worst_axis(study)
+    axis = worst_axis(study)
     line = max(axis.lines, key=lambda each: each.value)
     return f"{cause}: {quantity(line.value, 'rad')} of {quantity(axis.total_rad, 'rad')} at the line of sight"
 
