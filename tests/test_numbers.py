@@ -1,7 +1,10 @@
 """The reference: what becomes a quantity, what counts as moved, and the line that the changelog owes to it."""
 
 import json
+import os
 import runpy
+import subprocess
+import sys
 
 import pytest
 
@@ -219,6 +222,26 @@ def test_a_case_that_moves_or_fails_is_named_and_one_that_cannot_run_here_is_ski
     assert capsys.readouterr().out.startswith("budget: microrad budget ended with 2\n1 ")
     assert check(["contacts"]) == 1
     assert "contacts: ... and " in capsys.readouterr().out
+
+
+FORKS = """
+import json, os
+from pathlib import Path
+from reference import warm
+
+for words in (["presets", "--json"], ["budget", "no.toml"]):
+    print(json.dumps(warm.run(words, Path.cwd(), os.environ | {"COLUMNS": "80"})))
+"""
+
+
+def test_a_command_in_a_fork_ends_and_says_what_the_plain_one_does(call, folder):
+    """In a process of its own: one that has threads, as those of the tests have, must not be forked."""
+    scripts = os.environ | {"PYTHONPATH": str(ROOT / "scripts")}
+    ran = subprocess.run([sys.executable, "-c", FORKS], env=scripts, capture_output=True, text=True, check=True)
+    listed, refused = (tuple(json.loads(line)) for line in ran.stdout.splitlines())
+    assert listed == call("presets", "--json") and listed[0] == 0
+    assert refused == call("budget", "no.toml") and refused[0] == 2
+    assert "no.toml" in refused[2]
 
 
 # ------------------------------------------------------------------------------------------------------- what is there
