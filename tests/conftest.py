@@ -59,6 +59,7 @@ LONGEST = (
     "test_docs_report.py",
     "test_campaign_engines.py",
     "test_export_fixed.py",
+    "test_kept_run.py",
     "test_linear_model.py",
     "test_cli_day.py",
     "test_reproduce.py",
