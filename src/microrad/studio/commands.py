@@ -73,7 +73,12 @@ def design(file: Path) -> Action:
 
 
 def study(file: Path, folder: Path) -> Action:
-    """The whole study of a mission's file, with its report, its data and the manifest in a new folder."""
+    """The whole study of a mission's file, with its report, its data and the manifest in a new folder.
+
+    Args:
+        file: the mission's file, seen from the working folder.
+        folder: the new folder.
+    """
     python = _joined(
         "from pathlib import Path",
         "",
@@ -89,7 +94,12 @@ def study(file: Path, folder: Path) -> Action:
 
 # ----------------------------------------------------------------------------------------------------------- campaigns
 def campaign(file: Path, ledger: Path) -> Action:
-    """The campaign of a file into a new ledger."""
+    """The campaign of a file into a new ledger.
+
+    Args:
+        file: the campaign's file, seen from the working folder.
+        ledger: the new ledger.
+    """
     python = _campaign(ledger, "run_campaign", f"{_path(file)}, ledger")
     arguments = ("campaign", "run", path_argument(file), *_option("--ledger", ledger))
     return Action(arguments, python, f"Campaign {file}", (str(ledger),))
@@ -116,7 +126,12 @@ def _campaign(ledger: Path, function: str, arguments: str) -> str:
 
 
 def campaign_report(ledger: Path, page: Path) -> Action:
-    """The page with the pictures of a campaign's ledger."""
+    """The page with the pictures of a campaign's ledger.
+
+    Args:
+        ledger: the ledger, seen from the working folder.
+        page: the page to write; one that is there is replaced.
+    """
     python = _joined(
         "from pathlib import Path",
         "",
@@ -148,10 +163,19 @@ def identify(  # noqa: PLR0913  all but the first four are named options
 ) -> Action:
     """A mirror from recordings, into a mirror file and its report.
 
-    `files` are fitted and those of `validate` checked. `drive` and `output` are names or numbers of their columns,
-    counted from 0, and `units` those of both; `rate_hz` is None where the files say it. `accept` names findings that do
-    not stop it. `lever_arm_m` is that of a displacement. `static` fits the hysteresis alone, `admissible` takes no
-    model that moves the wrong way. `name` is that of the mirror.
+    Args:
+        files: recordings that are fitted.
+        drive: name or number of its column, counted from 0.
+        output: name or number of its column.
+        mirror_file: the mirror file to write.
+        name: that of the mirror.
+        units: those of drive and output.
+        rate_hz: None where the files say it.
+        accept: findings that do not stop it.
+        validate: recordings that are checked and not fitted.
+        lever_arm_m: that of a displacement, None for an angle.
+        static: whether the hysteresis alone is fitted.
+        admissible: whether no model is taken that moves the wrong way.
     """
     options: tuple[tuple[str, object], ...] = (
         ("--input", drive),

@@ -86,6 +86,10 @@ def listen(port: int = 0, exposed: str | None = None) -> Entrance:
     """Take the port (0: any free one) on 127.0.0.1, or on the address `exposed` of this machine in the network.
 
     Raises `StudioError` where the port is taken or the address is not this machine's, `ExposureError` for a bad name.
+
+    Args:
+        port: 0 for any free one.
+        exposed: address or name of this machine in the network; None for 127.0.0.1 alone.
     """
     host = "127.0.0.1" if exposed is None else _as_browsers_write(exposed)
     if host in _ANY:
@@ -162,9 +166,14 @@ def _process(path: Path) -> str:
 
 
 def serve(session: Session, entrance: Entrance, on_ready: Callable[[], None]) -> None:
-    """Serve the pages until Ctrl-C or a request to terminate; `on_ready` is called when a browser may come.
+    """Serve the pages until Ctrl-C or a request to terminate.
 
     Jobs go on. One process serves one studio: NiceGUI keeps its state in its modules.
+
+    Args:
+        session: the session of all tabs.
+        entrance: where the studio listens.
+        on_ready: called when a browser may come.
     """
     import uvicorn
 
@@ -215,6 +224,10 @@ def way_in(studio: Path, url: str) -> str:
 
     A browser has what it is to open on its command line, where every user of the machine can read it: the token must
     not stand there. The page is its owner's alone.
+
+    Args:
+        studio: the studio's own folder.
+        url: the address with the token.
     """
     path = studio / _WAY_IN
     path.unlink(missing_ok=True)
@@ -224,7 +237,12 @@ def way_in(studio: Path, url: str) -> str:
 
 
 def application(session: Session, entrance: Entrance) -> Guard:
-    """The pages of a session behind the guard."""
+    """The pages of a session behind the guard.
+
+    Args:
+        session: the session of all tabs.
+        entrance: where the studio listens.
+    """
     # Read when NiceGUI is loaded: nobody can have put a file there, and the studio keeps nothing in it.
     os.environ["NICEGUI_STORAGE_PATH"] = str(Path(tempfile.gettempdir()) / f"microrad-{secrets.token_hex(16)}")
     from fastapi import FastAPI
@@ -282,7 +300,13 @@ def _documents(session: Session) -> Callable[[int, int], Response]:
 
 
 def result(session: Session, number: int, place: int) -> Path | None:
-    """A file that a job has written, where it lies in the working folder; None where there is none."""
+    """A file that a job has written, where it lies in the working folder; None where there is none.
+
+    Args:
+        session: the session of all tabs.
+        number: that of the job.
+        place: among the job's results, counted from 0.
+    """
     try:
         job = session.jobs.get(number)
         path = within(session.folder, job.cwd / job.results[place])

@@ -45,6 +45,10 @@ class Session:
 
         Raises `MissionError` for a file that cannot be read, `JobError` and `NameRefusedError` for a folder or file
         that cannot be used.
+
+        Args:
+            folder: the working folder.
+            file: a mission in it.
         """
         self.folder = folder.resolve()
         self.studio = self.folder / STUDIO
@@ -97,7 +101,12 @@ class Session:
             self.change(how(self._draft))
 
     def set(self, key: str, typed: str) -> None:
-        """Set a key of the draft as it is now; raises `DraftError`."""
+        """Set a key of the draft as it is now; raises `DraftError`.
+
+        Args:
+            key: its dotted name.
+            typed: the value as one types it.
+        """
         self.edit(lambda draft: draft.set(key, typed))
 
     def replace(self, draft: Draft) -> None:

@@ -129,6 +129,10 @@ class Draft:
 
         A key that its table may have, and does not, gets a line behind the table's others. What is wrong with the value
         is among the problems. Raises `DraftError` for a key that has no place in the text.
+
+        Args:
+            key: its dotted name.
+            typed: the value as one types it.
         """
         _encoded(typed)
         typed = _plain(typed)

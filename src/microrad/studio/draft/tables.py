@@ -33,6 +33,10 @@ def with_table(draft: Draft, name: str) -> Draft:
     """The draft with a table more: its commented example comes to life where it stands, else it goes to the end.
 
     Raises `DraftError` for a table that is there already or is none.
+
+    Args:
+        draft: the mission.
+        name: the dotted name of the table, one of `offered`.
     """
     if name not in offered(draft):
         raise DraftError(f"[{name}] cannot be added: it is there already, or a mission has no such table")
@@ -136,6 +140,10 @@ def with_mirror_file(draft: Draft, mirror: Path) -> Draft:
 
     The comments between the tables stay where they are, and so does everything else. The path is written as seen from
     the mission's file. Raises `DraftError` for a path that no file of text can hold.
+
+    Args:
+        draft: the mission.
+        mirror: the path of the mirror's file.
     """
     lines = _LINE.findall(draft.text.removeprefix("\ufeff"))
     end = "\r\n" if any(line.endswith("\r\n") for line in lines) else "\n"

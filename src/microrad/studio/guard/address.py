@@ -27,6 +27,10 @@ def hosts(port: int, names: tuple[str, ...] = _LOOPBACK) -> tuple[str, ...]:
     """The names under which the studio answers, as a browser sends them: `name:port`, without the port where it is 80.
 
     Raises `ExposureError` for a text that is no name of a host.
+
+    Args:
+        port: the port that the studio listens on.
+        names: names or addresses of this machine, without port.
     """
     wrong = [name for name in names if not _NAME.fullmatch(name)]
     if wrong or not names:
@@ -42,7 +46,12 @@ def origins(names: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def entrance(host: str, token: str) -> str:
-    """The address that the command prints; `host` is one of `hosts`."""
+    """The address that the command prints.
+
+    Args:
+        host: name and port, one of `hosts`.
+        token: the secret of the session.
+    """
     return f"http://{host}/?token={token}"
 
 

@@ -43,7 +43,14 @@ class Answer:
 
 
 async def send_answer(answer: Answer, scope: Scope, send: Send, kind: str = "http.response") -> None:
-    """Send the page; `kind` is "websocket.http.response" in place of a WebSocket's handshake."""
+    """Send the page.
+
+    Args:
+        answer: the page.
+        scope: that of the request.
+        send: the way to the server.
+        kind: beginning of the messages' types; "websocket.http.response" in place of a WebSocket's handshake.
+    """
     title, words = html.escape(answer.title), html.escape(answer.words)
     body = _PAGE.format(title=title, words=words, again=_AGAIN if answer.again else "").encode("utf-8")
     headers = [
@@ -75,7 +82,12 @@ def locked(reason: str) -> Answer:
 
 
 def refusal(status: int, words: str) -> Answer:
-    """The refusal of a request that does not come from a page of the studio; the connection ends with it."""
+    """The refusal of a request that does not come from a page of the studio; the connection ends with it.
+
+    Args:
+        status: of HTTP.
+        words: why, and what to do instead.
+    """
     return Answer(status, f"Refused: {HTTPStatus(status).phrase.lower()}", words, (CLOSE,))
 
 

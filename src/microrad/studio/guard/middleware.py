@@ -73,7 +73,16 @@ class Guard:
         limits: Limits | None = None,
         documents: tuple[str, ...] = (),
     ) -> None:
-        """Stand in front of `app`; raises ValueError without hosts and their origins, or for a token that is short."""
+        """Stand in front of `app`; raises ValueError without hosts and their origins, or for a token that is short.
+
+        Args:
+            app: the ASGI application behind the guard.
+            hosts: exact values of the Host header.
+            origins: exact values of the Origin header, one for each host.
+            token: the secret that opens the door, of at least 32 characters.
+            limits: of the bodies of requests.
+            documents: beginnings of the paths that run in a sandbox.
+        """
         if len(token) < 32 or not hosts or len(hosts) != len(origins):
             raise ValueError(
                 "the guard needs hosts, their origins and a token of at least 32 characters; see new_token"

@@ -61,7 +61,12 @@ def _fault(name: str) -> str | None:
 
 
 def within(folder: Path, name: str | Path) -> Path:
-    """The path `name` in `folder`, resolved with its links; raises `NameRefusedError` where it leaves the folder."""
+    """A path in a folder, resolved with its links; raises `NameRefusedError` where it leaves the folder.
+
+    Args:
+        folder: what must not be left.
+        name: a path, seen from the folder unless it is absolute.
+    """
     try:
         root = folder.resolve()
         path = (root / name).resolve()

@@ -34,7 +34,12 @@ def new(path: Path) -> BinaryIO:
 
 
 def content(path: Path, most: int = MOST_BYTES) -> bytes:
-    """The bytes of a plain file. Raises OSError where there is none, a link included, and for more than `most`."""
+    """The bytes of a plain file. Raises OSError where there is none, a link included, and for more than `most`.
+
+    Args:
+        path: the file.
+        most: bytes.
+    """
     with opened(path) as file:
         data = file.read(most + 1)
     if len(data) > most:

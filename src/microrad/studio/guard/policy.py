@@ -35,10 +35,14 @@ def new_nonce() -> str:
 
 
 def page_policy(host: str, nonce: str) -> str:
-    """Content-security policy of the studio's own pages; `host` is the checked name and port of the request.
+    """Content-security policy of the studio's own pages.
 
     The address of the WebSocket is spelled out, since not every browser counts it to 'self'. Images may be data: and
     blob:, as heat maps and exported plots are.
+
+    Args:
+        host: name and port of the request, checked.
+        nonce: what scripts of the page's own template carry.
     """
     return "; ".join(
         (
@@ -74,7 +78,12 @@ def refusal_policy() -> str:
 
 
 def secured(headers: Headers, policy: str) -> Headers:
-    """The headers of an answer with those of the policy in place of its own of the same names."""
+    """The headers of an answer with those of the policy in place of its own of the same names.
+
+    Args:
+        headers: those of the answer.
+        policy: its content-security policy.
+    """
     ours = ((b"content-security-policy", policy.encode("latin-1")), *_ALWAYS)
     names = {name for name, _ in ours}
     return [*((name, value) for name, value in headers if name.lower() not in names), *ours]
@@ -86,7 +95,12 @@ def signed(template: str) -> str:
 
 
 def sign_template(environment: Environment, name: str = "index.html") -> None:
-    """Have a Jinja environment serve the template `name` signed; for NiceGUI: `nicegui.client.templates.env`."""
+    """Have a Jinja environment serve a template signed.
+
+    Args:
+        environment: of Jinja; NiceGUI's is `nicegui.client.templates.env`.
+        name: that of the template.
+    """
     from jinja2 import ChoiceLoader, DictLoader
 
     loader = environment.loader

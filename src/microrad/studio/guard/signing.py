@@ -36,7 +36,12 @@ def code(text: bytes) -> str:
 
 
 def is_ours(text: bytes, given: str) -> bool:
-    """Whether the code given with a text is that of this user's key. Raises `SigningError`."""
+    """Whether the code given with a text is that of this user's key. Raises `SigningError`.
+
+    Args:
+        text: what was signed.
+        given: the code beside it.
+    """
     key = _key()
     return key is not None and hmac.compare_digest(_code(key, text).encode(), given.encode())
 

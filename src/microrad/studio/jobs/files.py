@@ -228,7 +228,12 @@ def _progress(line: str) -> tuple[float, int, int, str] | None:
 
 
 def output(folder: Path, name: str) -> str:
-    """What a job has printed so far, the last 200 kB of it: `name` is "stdout" or "stderr"."""
+    """What a job has printed so far, the last 200 kB of it.
+
+    Args:
+        folder: that of the job.
+        name: "stdout" or "stderr".
+    """
     return _tail(folder / name, _OUTPUT_BYTES)
 
 
@@ -260,6 +265,10 @@ def held(path: Path, patience_s: float) -> Iterator[bool]:
 
     It is SQLite's, as that of a campaign's ledger: the same on each operating system, and gone with its process.
     Raises `JobError` where there is something else in its place, which SQLite would open, and where it cannot be made.
+
+    Args:
+        path: the file, made where there is none.
+        patience_s: how long to wait for another process (s).
     """
     _refuse_strange(path)
     with closing(_lock(path, patience_s)) as lock:
@@ -310,7 +319,13 @@ def is_held(path: Path) -> bool:
 
 
 def wait_for(happened: Any, patience_s: float, step_s: float = 0.01) -> bool:
-    """Wait until `happened()` is true; False when it is not after `patience_s`."""
+    """Wait until `happened()` is true; False when it is not after `patience_s`.
+
+    Args:
+        happened: a function without arguments.
+        patience_s: how long to wait (s).
+        step_s: between two looks (s).
+    """
     end = time.monotonic() + patience_s
     while not happened():
         if time.monotonic() > end:

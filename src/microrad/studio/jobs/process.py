@@ -108,6 +108,12 @@ def run_job(
     """Run a job to its end, whichever it is, and note how it ended; nothing where another process has it.
 
     Nothing either where this user did not queue it, in this place.
+
+    Args:
+        folder: that of the job.
+        program: what the job's arguments are given to; microrad unless told else.
+        waits_s: how long a command has behind SIGINT, then behind SIGTERM (s).
+        look_s: between two looks at whether it is to stop (s).
     """
     job = read_job(folder)
     if job.state not in ("queued", "cancelled"):

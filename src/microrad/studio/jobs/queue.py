@@ -166,7 +166,12 @@ class Jobs:
             raise JobError(f"{where}; check free space and permissions") from error
 
     def output(self, number: int, name: str = "stdout") -> str:
-        """What a job has printed so far, the last 200 kB: "stdout" or "stderr". Raises `JobError`."""
+        """What a job has printed so far, the last 200 kB. Raises `JobError`.
+
+        Args:
+            number: that of the job.
+            name: "stdout" or "stderr".
+        """
         job = self.get(number)
         return "" if job.state == "unreadable" else output(job.folder, "stderr" if name == "stderr" else "stdout")
 

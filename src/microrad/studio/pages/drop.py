@@ -57,7 +57,13 @@ class Drop:
     def __init__(
         self, uploads: Uploads, taken: Callable[[Upload], Awaitable[None]], refused: Callable[[str], None]
     ) -> None:
-        """Build the field, and take its files as they are sent."""
+        """Build the field, and take its files as they are sent.
+
+        Args:
+            uploads: where files are stored.
+            taken: gets each file that is stored.
+            refused: gets the words for each that is not.
+        """
         self._uploads, self._taken, self._refused = uploads, taken, refused
         field = ui.element("input").classes("drop-zone")
         field.props('type=file multiple aria-label="Recordings: drop files here, or choose them"')

@@ -29,7 +29,12 @@ class Figure(Element, component="figure.js"):
     """A plot; `label` says what it shows and where the same stands in words, `begin` is what is drawn at first."""
 
     def __init__(self, label: str, begin: Plot | None = None) -> None:
-        """Build it in the present container."""
+        """Build it in the present container.
+
+        Args:
+            label: what it shows, and where the same stands in words.
+            begin: what is drawn at first.
+        """
         super().__init__()
         self.classes("w-full js-plotly-plot").props["role"] = "figure"
         self.props["aria-label"], self.props["begin"] = label, begin or empty("")
@@ -54,7 +59,12 @@ class MarginCards(Element, component="margin_cards.js"):
 
 
 def table(headings: Sequence[str] = (), numbers: Collection[int] = ()) -> ui.table:
-    """A table of text that is still empty; the columns in `numbers` hold numbers, counted from 0."""
+    """A table of text that is still empty.
+
+    Args:
+        headings: of the columns.
+        numbers: columns that hold numbers, counted from 0.
+    """
     made = ui.table(rows=[], columns=_columns(headings, numbers), row_key="id").props(
         "flat dense wrap-cells hide-bottom tabindex=0"
     )
@@ -63,7 +73,13 @@ def table(headings: Sequence[str] = (), numbers: Collection[int] = ()) -> ui.tab
 
 
 def fill(made: ui.table, rows: Sequence[Sequence[str | Cell]], totals: int = 0) -> None:
-    """Show these rows, of which the last `totals` stand out; nothing is sent where nothing changes."""
+    """Show these rows, of which the last `totals` stand out; nothing is sent where nothing changes.
+
+    Args:
+        made: the table.
+        rows: what it is to show.
+        totals: how many of the last rows are sums.
+    """
     found = [
         {"id": place, "total": place >= len(rows) - totals, **{f"c{k}": str(text) for k, text in enumerate(row)}}
         for place, row in enumerate(rows)
@@ -73,7 +89,12 @@ def fill(made: ui.table, rows: Sequence[Sequence[str | Cell]], totals: int = 0) 
 
 
 def put(made: ui.table, of: Table) -> None:
-    """Show a table of the report."""
+    """Show a table of the report.
+
+    Args:
+        made: the table on the page.
+        of: what it is to show.
+    """
     columns = _columns(of.headings, [k for k in range(len(of.headings)) if k not in of.words])
     if columns != made.columns:
         made.columns = columns
@@ -91,7 +112,12 @@ class Blocks(ui.column):
         self._parts: list[Any] = []
 
     def show_blocks(self, blocks: Sequence[Block], figures: Mapping[str, Plot | str] | None = None) -> None:
-        """Show these in place of what was there, with their figures as `views.plots.drawn` has them."""
+        """Show these in place of what was there.
+
+        Args:
+            blocks: what is to be shown.
+            figures: their figures by name, as `views.plots.drawn` has them.
+        """
         drawn, form = figures or {}, _form(blocks)
         if form != self._form:
             self._form, self._parts = form, []

@@ -19,7 +19,13 @@ R = TypeVar("R")
 
 
 async def in_thread(page: Element, work: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
-    """What `work` returns or raises, done in a thread; the caller ends when the page of this element is closed."""
+    """What `work` returns or raises, done in a thread; the caller ends when the page of this element is closed.
+
+    Args:
+        page: an element of the page.
+        work: what is called in the thread.
+        args: passed on to it, as named ones are.
+    """
     try:
         return cast(R, await run.io_bound(work, *args, **kwargs))
     finally:
@@ -27,7 +33,12 @@ async def in_thread(page: Element, work: Callable[P, R], *args: P.args, **kwargs
 
 
 async def pause(page: Element, seconds: float) -> None:
-    """Wait; the caller ends when the page of this element is closed."""
+    """Wait; the caller ends when the page of this element is closed.
+
+    Args:
+        page: an element of the page.
+        seconds: how long.
+    """
     await asyncio.sleep(seconds)
     stay(page)
 

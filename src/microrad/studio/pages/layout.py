@@ -33,7 +33,13 @@ _ON_DISK: dict[OnDisk, str] = {"": "", "changed": "changed on disk; open it agai
 
 @contextmanager
 def frame(session: Session, title: str, entries: tuple[tuple[str, str], ...]) -> Iterator[None]:
-    """Header with state and navigation, a heading, and the body to be filled; `entries` are titles and paths."""
+    """Header with state and navigation, a heading, and the body to be filled.
+
+    Args:
+        session: the session of all tabs.
+        title: that of the page.
+        entries: titles and paths of all pages.
+    """
     style = resources.files(__package__).joinpath("style.css").read_text("utf-8")
     ui.add_head_html(f"<style>{style}</style>")  # ui.add_css would add a script, which the guard's policy stops
     ui.colors(primary="#0a4f96", negative="#a63c00", positive="#00664a")
@@ -90,7 +96,12 @@ def attempt(do: Callable[[], object]) -> bool:
 
 
 def grey(element: ui.element, old: bool) -> None:
-    """Show an element in grey while it belongs to a mission or a question before the one that stands."""
+    """Show an element in grey while it belongs to a mission or a question before the one that stands.
+
+    Args:
+        element: the element.
+        old: whether it belongs to what was before.
+    """
     element.classes(**{"add" if old else "remove": "behind"})
 
 
@@ -100,7 +111,12 @@ def refuse(words: str) -> None:
 
 
 def follow(session: Session, show: Callable[[], Any]) -> Callable[[], None]:
-    """Call `show` now and whenever the session has changed; what is returned says that this page has shown it."""
+    """Call `show` now and whenever the session has changed; what is returned says that this page has shown it.
+
+    Args:
+        session: the session of all tabs.
+        show: brings the page up to date.
+    """
     seen = -1
 
     def look() -> None:
@@ -120,12 +136,22 @@ def follow(session: Session, show: Callable[[], Any]) -> Callable[[], None]:
 
 
 def words(tag: str, text: str = "") -> TextElement:
-    """An element of this tag with a text, which is escaped; its text can be changed."""
+    """An element of this tag with a text, which is escaped; its text can be changed.
+
+    Args:
+        tag: that of HTML.
+        text: what it says.
+    """
     return TextElement(tag=tag, text=text)
 
 
 def heading(text: str, level: int = 2) -> TextElement:
-    """A heading of the page's outline: 1 is the page's own, and there already."""
+    """A heading of the page's outline: 1 is the page's own, and there already.
+
+    Args:
+        text: what it says.
+        level: from 2 on.
+    """
     return words(f"h{level}", text)
 
 

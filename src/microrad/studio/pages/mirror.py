@@ -219,7 +219,12 @@ class MirrorPage:
             await self.look()
 
     def use(self, key: str, use: str) -> None:
-        """Have a recording serve for something else."""
+        """Have a recording serve for something else.
+
+        Args:
+            key: that of the recording.
+            use: one of `mirror_form.USES`.
+        """
         self.keep(replace(self.form, uses={**self.form.uses, key: use}))
 
     # -------------------------------------------------------------------------------------------------------- the form

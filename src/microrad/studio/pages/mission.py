@@ -219,7 +219,12 @@ def _plain(draft: Draft) -> str:
 
 # --------------------------------------------------------------------------------------------------------------- files
 def file_buttons(session: Session, shown: Callable[[str], None]) -> None:
-    """Buttons for everything that is done with files; `shown` is called with the table to look at, "" for any."""
+    """Buttons for everything that is done with files.
+
+    Args:
+        session: the session of all tabs.
+        shown: called with the table to look at, "" for any.
+    """
     with ui.row().classes("mission-files"):
         ui.button("Open ...", on_click=lambda: _open(session, shown)).props("no-caps outline dense")
         ui.button("New ...", on_click=lambda: _new(session, shown)).props("no-caps outline dense")

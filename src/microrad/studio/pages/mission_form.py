@@ -60,7 +60,13 @@ class Form:
     """
 
     def __init__(self, session: Session, changed: Callable[[], None], entered: Callable[[str], None]) -> None:
-        """An empty form in the place where it is made; `show` fills it."""
+        """An empty form in the place where it is made; `show` fills it.
+
+        Args:
+            session: the session of all tabs.
+            changed: called when a row has changed the draft.
+            entered: called with the key whose field is entered.
+        """
         self.session, self.table, self.sought = session, "", ""
         self._changed, self._entered = changed, entered
         self._rows: dict[str, _Row] = {}
@@ -68,7 +74,12 @@ class Form:
         self._place = ui.column().classes("mission-form")
 
     def show(self, table: str, sought: str = "") -> None:
-        """Build the rows of a table, or of every key whose name, value or comment has the text `sought`."""
+        """Build the rows of a table, or of every key whose name, value or comment has the text `sought`.
+
+        Args:
+            table: name of an outermost table, or `ROOT`.
+            sought: the text, in any case; "" for the table.
+        """
         self.table, self.sought, self._rows = table, sought.strip().lower(), {}
         self._place.clear()
         with self._place:

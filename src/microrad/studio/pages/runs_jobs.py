@@ -40,7 +40,12 @@ class JobList:
     """Every job of the session, the newest first; `open_page` is called with the address of a page to show."""
 
     def __init__(self, session: Session, open_page: Callable[[str, str], None]) -> None:
-        """An empty list in the place where it is made; it fills and follows by itself."""
+        """An empty list in the place where it is made; it fills and follows by itself.
+
+        Args:
+            session: the session of all tabs.
+            open_page: called with address and title of a page to show.
+        """
         self.session, self.open_page = session, open_page
         self._empty = ui.label("Nothing was run in this folder yet.").classes("soft")
         self._place = ui.column().classes("runs-list")
@@ -208,7 +213,13 @@ def _class(job: Job) -> str:
 
 
 async def submit(page: ui.element, session: Session, make: Callable[[], Order]) -> bool:
-    """Queue what `make` returns; says on the page of this element why it cannot be, and returns whether it is."""
+    """Queue what `make` returns; says on the page of this element why it cannot be, and returns whether it is.
+
+    Args:
+        page: an element of the page.
+        session: the session of all tabs.
+        make: makes the order, in a thread.
+    """
     try:
         await in_thread(page, lambda: session.jobs.submit(make()))
     except (JobError, OSError) as error:
@@ -222,7 +233,12 @@ class CampaignPanel:
     """What the rows of a ledger say; it looks by itself while it is open."""
 
     def __init__(self, session: Session, ledger: Path) -> None:
-        """Closed, with nothing read."""
+        """Closed, with nothing read.
+
+        Args:
+            session: the session of all tabs.
+            ledger: path of the ledger; it may not be there yet.
+        """
         self.session, self.ledger = session, ledger
         self._last: Live | None = None
         self._found: Figures | None = None

@@ -26,7 +26,13 @@ class SliderRow(Element, component="slider.js"):
     """
 
     def __init__(self, slider: Slider, on_try: Told, on_set: Told) -> None:
-        """Build the row in the present container."""
+        """Build the row in the present container.
+
+        Args:
+            slider: what it shows at first.
+            on_try: told key and text while it moves or is typed.
+            on_set: told key and text when it is let go.
+        """
         super().__init__()
         self.slider, self._try, self._set = slider, on_try, on_set
         self.busy, self._changes = False, 0
@@ -98,7 +104,13 @@ class SliderBoard:
     """The sliders of a page in groups; the numbers that are seldom moved stand folded behind each group."""
 
     def __init__(self, on_try: Told, on_set: Told, seldom: Callable[[str], bool] = lambda key: False) -> None:
-        """Build an empty board in the present container."""
+        """Build an empty board in the present container.
+
+        Args:
+            on_try: told key and text while a slider moves.
+            on_set: told key and text when one is let go.
+            seldom: whether a key stands folded.
+        """
         self._try, self._set, self._seldom = on_try, on_set, seldom
         self.rows: dict[str, SliderRow] = {}
         self._box = ui.column().classes("sliders")
@@ -157,7 +169,12 @@ class SliderPage(Generic[T]):
     dimmed: tuple[Element, ...] = ()
 
     def __init__(self, session: Session, seldom: Callable[[str], bool] = lambda key: False) -> None:
-        """Build sliders at the left and results at the right, and have them follow the session."""
+        """Build sliders at the left and results at the right, and have them follow the session.
+
+        Args:
+            session: the session of all tabs.
+            seldom: whether a key stands folded.
+        """
         self.session = session
         self.view_now: T | None = None
         self.last: Attempt[T] | None = None

@@ -87,7 +87,12 @@ def _memory(request: dict[str, Any]) -> str:
 
 
 def opened(path: Path, request: dict[str, Any]) -> Source:
-    """The file as channels, none of which claims more samples than may be read."""
+    """The file as channels, none of which claims more samples than may be read.
+
+    Args:
+        path: the recording.
+        request: what `reading` asks for, with its limits.
+    """
     from microrad.lab.recording.reader import open_source
 
     source = open_source(path)
@@ -102,7 +107,12 @@ def opened(path: Path, request: dict[str, Any]) -> Source:
 
 
 def channels(path: Path, request: dict[str, Any]) -> dict[str, Any]:
-    """Names, units and lengths; see `reading.Listing`."""
+    """Names, units and lengths; see `reading.Listing`.
+
+    Args:
+        path: the recording.
+        request: what `reading` asks for, with its limits.
+    """
     from microrad.lab.recording.formats.source import is_time_name
 
     source = opened(path, request)
@@ -117,7 +127,12 @@ def channels(path: Path, request: dict[str, Any]) -> dict[str, Any]:
 
 
 def view(path: Path, request: dict[str, Any]) -> dict[str, Any]:
-    """The recording, checked and thinned; see `reading.View`."""
+    """The recording, checked and thinned; see `reading.View`.
+
+    Args:
+        path: the recording.
+        request: what `reading` asks for, with its columns and limits.
+    """
     from microrad.lab.live_fit import extremes
     from microrad.lab.recording import read_recording
 

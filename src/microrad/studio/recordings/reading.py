@@ -100,12 +100,23 @@ class View:
 
 
 def list_channels(path: Path, limits: ReadingLimits | None = None) -> Listing:
-    """The channels of a file; raises `ReadingError`."""
+    """The channels of a file; raises `ReadingError`.
+
+    Args:
+        path: the recording.
+        limits: what the reading may take.
+    """
     return _read(path, {"task": "channels"}, limits or ReadingLimits(), Listing)
 
 
 def view(path: Path, columns: Columns, limits: ReadingLimits | None = None) -> View:
-    """Read and check a recording as `recording.read_recording` does, and thin it; raises `ReadingError`."""
+    """Read and check a recording as `recording.read_recording` does, and thin it; raises `ReadingError`.
+
+    Args:
+        path: the recording.
+        columns: the channels that are read.
+        limits: what the reading may take.
+    """
     return _read(path, {"task": "view", "columns": asdict(columns)}, limits or ReadingLimits(), View)
 
 

@@ -54,7 +54,12 @@ class Uploads:
     """The uploads of a working folder, in `folder`, which nobody else may read."""
 
     def __init__(self, folder: Path, limits: UploadLimits | None = None) -> None:
-        """Make the folder private; raises `UploadError` where it is something else or somebody else's."""
+        """Make the folder private; raises `UploadError` where it is something else or somebody else's.
+
+        Args:
+            folder: where the files lie.
+            limits: of their sizes and number.
+        """
         self.limits = limits or UploadLimits()
         self.folder = _private(folder)
 
@@ -78,6 +83,10 @@ class Uploads:
 
         Raises `NameRefusedError` for its name, and `UploadError` for its size, for one file too many, and for a disk
         that is full.
+
+        Args:
+            name: as it was dropped.
+            blocks: the file's bytes as they arrive.
         """
         name = safe_name(name)
         try:

@@ -198,7 +198,12 @@ class Found:
 
 
 def finished_study(session: Session, draft: Draft) -> Found | None:
-    """The latest study of the draft's text among the folders of the working folder; None where there is none."""
+    """The latest study of the draft's text among the folders of the working folder; None where there is none.
+
+    Args:
+        session: the session of all tabs.
+        draft: the mission.
+    """
     found = []
     for path in sorted(session.folder.glob(f"*/{MANIFEST}"))[:_MOST_FOLDERS]:
         with suppress(OSError, ValueError, KeyError, TypeError):

@@ -112,7 +112,14 @@ class AskError(ValueError):
 
 
 def ask_of(step: str, amplitude: str, frequency: str, rate_hz: float) -> Ask:
-    """Step, amplitude and frequency as they are typed, for a loop of this rate. Raises `AskError`."""
+    """Step, amplitude and frequency as they are typed, for a loop of this rate. Raises `AskError`.
+
+    Args:
+        step: an angle with its unit.
+        amplitude: an angle with its unit, of the sine.
+        frequency: with its unit, of the sine.
+        rate_hz: that of the loop's control.
+    """
     return Ask(_angle("step", step), _angle("amplitude of the sine", amplitude), _frequency(frequency, rate_hz))
 
 
@@ -157,7 +164,13 @@ def notes(of: Controller) -> tuple[str, ...]:
 
 
 def answer_words(curves: dict[str, Curve], what: str, field_of_view_rad: float = math.inf) -> str:
-    """Rms and peak of the error of each variant in a sentence, and one on a sensor that has lost sight of it."""
+    """Rms and peak of the error of each variant in a sentence, and one on a sensor that has lost sight of it.
+
+    Args:
+        curves: a run for each variant of the mirror.
+        what: what the error is called.
+        field_of_view_rad: the radial error up to which the sensor sees.
+    """
     told = [f"{variant} {angle(c.rms_rad)} rms, at most {angle(c.peak_rad)}" for variant, c in curves.items()]
     words = f"{what}: {'; '.join(told)}." if told else ""
     if not any(c.peak_rad > field_of_view_rad for c in curves.values()):
@@ -221,7 +234,13 @@ def motion_plot(answers: Answers) -> Plot:
 
 
 def drive_plot(of: Controller, curves: dict[str, Curve], over: str = MILLISECONDS) -> Plot:
-    """The drive of the first actuator from the bias, with the amplifier's limits and the identified range."""
+    """The drive of the first actuator from the bias, with the amplifier's limits and the identified range.
+
+    Args:
+        of: the controller, for its limits.
+        curves: a run for each variant of the mirror.
+        over: title of the axis of time, `MILLISECONDS` or `SECONDS`.
+    """
     if not curves:
         return empty(_NOTHING)
     lines = _lines(curves, _ms if over == MILLISECONDS else _s, lambda c: c.drive_v[:, 0])

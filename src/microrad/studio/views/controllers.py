@@ -67,7 +67,12 @@ _tuning = threading.Lock()  # two pages that want the same controller tune it on
 
 
 def controller(file: MissionFile, name: str) -> Controller:
-    """A controller of the mission, tuned; takes seconds the first time. Raises ValueError with the reason."""
+    """A controller of the mission, tuned; takes seconds the first time. Raises ValueError with the reason.
+
+    Args:
+        file: the mission.
+        name: one of `names`.
+    """
     inner = file.mirror_file
     key = file.sha256, "" if inner is None else inner.sha256, name
     with _tuning:
@@ -119,7 +124,12 @@ def _fine(scene: controller_study.Scene, name: str) -> Controller:
 
 
 def mirror_warnings(has_linear_part: bool, text: str) -> tuple[str, ...]:
-    """What the mirror leaves out, in sentences: its linear part, and what the head of its own file's text warns of."""
+    """What the mirror leaves out, in sentences: its linear part, and what the head of its own file's text warns of.
+
+    Args:
+        has_linear_part: whether the mirror's dynamics are known.
+        text: that of the mirror's file, "" without one.
+    """
     own = [line.removeprefix(_WARNING) for line in text.splitlines() if line.startswith(_WARNING)]
     told = [] if has_linear_part else [_NO_LINEAR_PART]
     return (*told, *(f"Warning of the mirror's file: {warning}" for warning in own))

@@ -14,7 +14,12 @@ from microrad.report.view import Block
 
 
 def compute_day(file: LinkFile, on_progress: Progress) -> DayStudy:
-    """The links of a mission, then its day; raises ValueError with the reason where a day cannot be had."""
+    """The links of a mission, then its day; raises ValueError with the reason where a day cannot be had.
+
+    Args:
+        file: the mission.
+        on_progress: told how far it is.
+    """
     on_progress(0, 0, "links")
     links = link_study.run_link_study(file)
     on_progress(0, 0, "contacts")

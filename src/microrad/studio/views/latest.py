@@ -55,6 +55,10 @@ class Latest(Generic[T]):
 
         `work` may raise ValueError, whose words become the error; it calls its progress often, so that it can be
         dropped.
+
+        Args:
+            key: what tells the question from others.
+            work: answers it, told how to report progress.
         """
         with self._lock:
             if key == self._state.key and (self._state.running or self._state.result is not None or self._state.error):
@@ -107,6 +111,11 @@ _sharing = threading.Lock()
 
 
 def shared(owner: object, name: str) -> Latest[Any]:
-    """The one question of that name that all pages of `owner` share; it ends with its owner."""
+    """The one question of that name that all pages of `owner` share; it ends with its owner.
+
+    Args:
+        owner: what the pages have in common.
+        name: that of the question.
+    """
     with _sharing:
         return _shared.setdefault(owner, {}).setdefault(name, Latest())

@@ -115,6 +115,10 @@ def view(file: LinkFile, frame: Frame | None = None) -> LinkView:
 
     Raises ValueError with the reason when a receiver does not take the data rate, and when no rate has the required
     margin where one is to be solved for.
+
+    Args:
+        file: the mission.
+        frame: the axes to keep, if the working point lies within.
     """
     file = link_study.solve_rate(file)
     m, sources, data = file.mission, file.sources, link.of(file.mission)
@@ -141,6 +145,11 @@ def contour(data: link.DataLink, frame: Frame, level_db: float) -> Floats:
 
     Rate and error move the margin apart from each other, so that one row and one column of the map hold it; it falls
     with the rate.
+
+    Args:
+        data: the communication link.
+        frame: axes of the map.
+        level_db: the margin (dB).
     """
     rates = np.geomspace(frame.data_rate_bit_s[0], frame.data_rate_bit_s[-1], EDGES)
     on_axis = link.margin_map(data, rates, 0.0)[:, 0]

@@ -46,6 +46,10 @@ def leader(fits: tuple[LiveFit, ...], chosen: str = "") -> LiveFit | None:
     """The model that was chosen in the end, as it was fitted last; until then the best so far. None without one.
 
     Of models that differ by chance alone the end prefers what never moves the wrong way: it need not choose the best.
+
+    Args:
+        fits: the models so far.
+        chosen: name of the model that was chosen, "" before the end.
     """
     ended = [fit for fit in fits if fit.model == chosen]
     return ended[-1] if ended else best(fits)
@@ -58,13 +62,23 @@ def best(fits: tuple[LiveFit, ...]) -> LiveFit | None:
 
 # ----------------------------------------------------------------------------------------------------------- the plots
 def recording_plot(view: View, setting: Setting) -> Plot:
-    """The measured loop: output over drive, each sample that is shown a point."""
+    """The measured loop: output over drive, each sample that is shown a point.
+
+    Args:
+        view: the recording.
+        setting: the form, for the units.
+    """
     points = Line(np.array(view.drive[0]), np.array(view.output[0]), BLUE, "", marker=".", size=5.0, label="measured")
     return plot(Axis(_drive_title(setting)), Axis(_output_title(setting)), points)
 
 
 def time_plot(view: View, setting: Setting) -> Plot:
-    """Drive and output over time, one above the other."""
+    """Drive and output over time, one above the other.
+
+    Args:
+        view: the recording.
+        setting: the form, for the units.
+    """
     sheet, (above, below) = grid(WIDTH, 3.6, 2, share_x=True)
     time_s = np.array(view.rows) / view.rate_hz
     above.add(Line(time_s, np.array(view.drive[0]), BLACK, name="drive", whole=True))
@@ -82,7 +96,13 @@ def _output_title(setting: Setting) -> str:
 
 
 def loop_plot(fit: LiveFit, number: int, drive_unit: str) -> Plot:
-    """The last periods of a recording: what was measured, and what the model makes of the same drive."""
+    """The last periods of a recording: what was measured, and what the model makes of the same drive.
+
+    Args:
+        fit: the model.
+        number: which of its recordings, counted from 0.
+        drive_unit: that of the drive.
+    """
     loop = fit.loops[number]
     drive = np.array(loop.drive)
     measured = Line(drive, 1e6 * np.array(loop.measured_rad), GREY, "-", 3.0, "measured")
@@ -91,7 +111,12 @@ def loop_plot(fit: LiveFit, number: int, drive_unit: str) -> Plot:
 
 
 def residual_plot(fit: LiveFit, number: int) -> Plot:
-    """What the model leaves of a recording over time, with the part that no fit has seen shaded."""
+    """What the model leaves of a recording over time, with the part that no fit has seen shaded.
+
+    Args:
+        fit: the model.
+        number: which of its recordings, counted from 0.
+    """
     loop = fit.loops[number]
     residual = Line(np.array(loop.time_s), 1e6 * np.array(loop.residual_rad), BLUE, label="measured less model")
     unseen = Span(loop.split_s, loop.time_s[-1], True, SKY, 0.2, "seen by no fit")
@@ -105,7 +130,12 @@ def nothing() -> Plot:
 
 # ---------------------------------------------------------------------------------------------------------- the scores
 def score_rows(fits: Sequence[LiveFit], chosen: str = "") -> list[tuple[str, ...]]:
-    """Model, rms held out and fitted, and a note that marks the one that leads or was chosen; the best comes first."""
+    """Model, rms held out and fitted, and a note that marks the one that leads or was chosen; the best comes first.
+
+    Args:
+        fits: the models so far.
+        chosen: name of the model that was chosen, "" before the end.
+    """
     first, mark = leader(tuple(fits), chosen), "chosen" if chosen else "best so far"
     return [
         (fit.model, f"{fit.held_out_rms_percent:.3g} %", f"{fit.fit_rms_percent:.3g} %", mark if fit is first else "")
@@ -157,7 +187,12 @@ def findings(view: View) -> list[str]:
 
 
 def state_words(job: Job, first: LiveFit | None) -> str:
-    """An identification in a sentence: how far it is, which model leads, or how it ended."""
+    """An identification in a sentence: how far it is, which model leads, or how it ended.
+
+    Args:
+        job: the identification.
+        first: the model that leads, None without one.
+    """
     told = {
         "queued": "Waiting for another job to end.",
         "running": "Begins.",
@@ -175,6 +210,12 @@ def state_words(job: Job, first: LiveFit | None) -> str:
 
 
 def argument(job: Job, flag: str, otherwise: str) -> str:
-    """The value of an option of a job's command."""
+    """The value of an option of a job's command.
+
+    Args:
+        job: the job.
+        flag: name of the option.
+        otherwise: what is returned without it.
+    """
     said = dict(pairwise(job.arguments))
     return said.get(flag, otherwise)

@@ -111,12 +111,22 @@ def _possible(form: Form) -> Form:
 
 
 def keep_form(path: Path, form: Form) -> None:
-    """Keep the form for a reload and for other tabs. Raises OSError."""
+    """Keep the form for a reload and for other tabs. Raises OSError.
+
+    Args:
+        path: the file.
+        form: what it is to hold.
+    """
     write_whole(path, json.dumps(asdict(form)))
 
 
 def first_setting(listing: Listing, file: str) -> Setting:
-    """What a recording says of itself: channels by their names and units, its rate where it states one."""
+    """What a recording says of itself: channels by their names and units, its rate where it states one.
+
+    Args:
+        listing: channels of the recording.
+        file: its name.
+    """
     usable = [k for k, channel in enumerate(listing.channels) if k != listing.time and channel.samples != 0]
     drive = _guess(listing, usable, _DRIVES, DRIVE_UNITS)
     drive = next(iter(usable), None) if drive is None else drive
@@ -138,7 +148,12 @@ def first_setting(listing: Listing, file: str) -> Setting:
 def shown(form: Form, listing: Listing, key: str, name: str, *, alone: bool = False) -> Form:
     """The form for another recording: channels, units and rate are guessed, unless they were set for such channels.
 
-    With `alone` nothing is left of what the form said of recordings before.
+    Args:
+        form: as it is.
+        listing: channels of the recording that is to be shown.
+        key: that of the upload.
+        name: that of the file.
+        alone: whether nothing is left of what the form said of recordings before.
     """
     first = first_setting(listing, name)
     if alone:
@@ -161,6 +176,11 @@ def edited(form: Form, listing: Listing | None, setting: Setting) -> Form:
     """The form as somebody has changed its setting; a channel that was changed brings its unit along.
 
     Without the channels of the recording that is shown, those of the form stay.
+
+    Args:
+        form: as it was.
+        listing: channels of the recording that is shown, None while they are not known.
+        setting: what the form says now.
     """
     old = form.setting
     if listing is None:
@@ -295,6 +315,11 @@ def identification(folder: Path, recordings: Sequence[Dropped], setting: Setting
 
     Raises `SettingError` for what is missing in it, for units that a recording denies, and for a mirror file that is
     there already.
+
+    Args:
+        folder: the working folder.
+        recordings: what was dropped.
+        setting: what the form says.
     """
     chosen = columns(setting)
     for each in recordings:
@@ -348,5 +373,10 @@ def _new_file(folder: Path, name: str) -> Path:
 
 
 def order(folder: Path, action: Action) -> Order:
-    """The job of an identification."""
+    """The job of an identification.
+
+    Args:
+        folder: the working folder.
+        action: the identification.
+    """
     return Order("identification", action.title, (*action.arguments, "--json"), folder, action.results)

@@ -29,7 +29,14 @@ _WHITE = {"paper_bgcolor": "white", "plot_bgcolor": "white"}
 
 
 def plot(x: Axis, y: Axis, *marks: Mark, height: float = 3.6) -> Plot:
-    """Marks on one pair of axes as a figure; `height` is that of the sheet in inches."""
+    """Marks on one pair of axes as a figure.
+
+    Args:
+        x: the axis across.
+        y: the axis up.
+        marks: what is drawn, the first below.
+        height: that of the sheet (inches).
+    """
     sheet, (panel,) = grid(WIDTH, height)
     panel.x, panel.y, sheet.legend = x, y, Legend("above")
     panel.add(*marks)

@@ -27,18 +27,35 @@ _VERDICTS = {
 
 
 def order(session: Session, kind: Kind, action: Action) -> Order:
-    """An action as a job in the working folder."""
+    """An action as a job in the working folder.
+
+    Args:
+        session: the session of all tabs.
+        kind: that of the job.
+        action: what is to be run.
+    """
     return Order(kind, action.title, action.arguments, session.folder, action.results)
 
 
 def report_order(session: Session, ledger: Path) -> Order:
-    """The report of a ledger as a job, under a name that is free."""
+    """The report of a ledger as a job, under a name that is free.
+
+    Args:
+        session: the session of all tabs.
+        ledger: the ledger, seen from the working folder.
+    """
     return order(session, "export", campaign_report(ledger, Path(free_name(session, ledger.stem, ".html"))))
 
 
 # -------------------------------------------------------------------------------------------------- what can be started
 def free_name(session: Session, stem: str, ending: str = "") -> str:
-    """A name in the working folder that nothing has yet, and no job that is still to run will take."""
+    """A name in the working folder that nothing has yet, and no job that is still to run will take.
+
+    Args:
+        session: the session of all tabs.
+        stem: beginning of the name.
+        ending: its end, with the dot.
+    """
     taken = {Path(each).parts[0] for job in session.jobs.listed() if not job.finished for each in job.results if each}
     number, name = 1, f"{stem}{ending}"
     while (session.folder / name).exists() or name in taken:
@@ -117,7 +134,12 @@ def _what(progress: Progress) -> str:
 
 
 def time_words(job: Job, now: Callable[[], datetime] = lambda: datetime.now(UTC)) -> str:
-    """When a job began, and how long it took or takes."""
+    """When a job began, and how long it took or takes.
+
+    Args:
+        job: the job.
+        now: tells the time, in UTC.
+    """
     if not job.started:
         return f"put in the queue {_at(job.queued)}" if job.queued else ""
     begun, ended = _read(job.started), _read(job.ended) or now()
@@ -149,7 +171,12 @@ class Others:
 
 
 def others(jobs: Iterable[Job], job: Job) -> Others:
-    """A job among all of them."""
+    """A job among all of them.
+
+    Args:
+        jobs: all jobs.
+        job: one of them.
+    """
     ledger = ledger_of(job)
     later = [each for each in jobs if each.number > job.number]
     campaigns = [ledger_of(each) for each in later if each.kind == "campaign"]
@@ -171,7 +198,12 @@ def ledger_of(job: Job) -> str | None:
 
 
 def ledger_path(session: Session, job: Job) -> Path | None:
-    """The ledger of a campaign's job, where it lies in the working folder; it may not be there yet."""
+    """The ledger of a campaign's job, where it lies in the working folder; it may not be there yet.
+
+    Args:
+        session: the session of all tabs.
+        job: any job.
+    """
     ledger = ledger_of(job)
     path = None if ledger is None else job.cwd / ledger
     return path if path is not None and _is_inside(session, path) else None
@@ -181,6 +213,10 @@ def result_files(session: Session, job: Job) -> tuple[tuple[int, str], ...]:
     """The results of a job that are there: their places among them, and their names.
 
     Where a job has failed or was cancelled, files of these names are another run's; a campaign alone writes as it goes.
+
+    Args:
+        session: the session of all tabs.
+        job: any job.
     """
     if job.kind != "campaign" and job.state in ("failed", "cancelled"):
         return ()

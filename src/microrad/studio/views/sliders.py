@@ -115,7 +115,12 @@ def grouped(draft: Draft, order: Iterable[str], group: Callable[[str], str]) -> 
 
 
 def read(typed: str, si: str) -> tuple[float, str] | None:
-    """Number and unit of what is typed, or None when it is no quantity in the SI unit `si` ("": no plain number)."""
+    """Number and unit of what is typed, or None when it is no quantity in the SI unit `si` ("": no plain number).
+
+    Args:
+        typed: a number with its unit.
+        si: the SI unit of its kind, "" for a plain number.
+    """
     found = _NUMBER.fullmatch(typed.strip())
     if found is None or bool(found[2]) != bool(si) or not math.isfinite(float(found[1])):
         return None
@@ -134,7 +139,12 @@ def label(key: str) -> str:
 
 
 def faulty(draft: Draft, sliders: Iterable[str]) -> dict[str, str]:
-    """What is wrong with each of these keys, in the words of the command line; only those with faults."""
+    """What is wrong with each of these keys, in the words of the command line; only those with faults.
+
+    Args:
+        draft: the mission.
+        sliders: keys.
+    """
     told: dict[str, list[str]] = {}
     for fault in draft.problems:
         told.setdefault(fault.key, []).append(f"{fault.reason}; expected {fault.expected}")
@@ -201,12 +211,24 @@ class Attempt(Generic[T]):
 
 
 def attempt(draft: Draft, key: str, typed: str, view: Callable[[LinkFile], T]) -> Attempt[T]:
-    """What a value would do, read as the mission file is; raises `DraftError` for a key that has no place."""
+    """What a value would do, read as the mission file is; raises `DraftError` for a key that has no place.
+
+    Args:
+        draft: the mission as it is.
+        key: what is changed.
+        typed: its value as one types it.
+        view: what is shown of a mission.
+    """
     return seen(draft.set(key, typed), view)
 
 
 def seen(draft: Draft, view: Callable[[LinkFile], T]) -> Attempt[T]:
-    """A draft as it is; a ValueError of `view` becomes the refusal."""
+    """A draft as it is; a ValueError of `view` becomes the refusal.
+
+    Args:
+        draft: the mission.
+        view: what is shown of one.
+    """
     if draft.problems:
         return Attempt(draft, None)
     try:
