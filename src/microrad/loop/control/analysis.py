@@ -21,7 +21,7 @@ COMMAND = 3
 BREAKS = ("command", "optical")
 """Where a loop is cut: at the command all paths at once, at the optical sensor with the gauge's loop closed."""
 
-_POINTS = 3000
+_POINTS = 1000
 
 NEAR_LEAST = 1.3
 """Dips within this factor of the deepest point of a grid may be deeper than it between the points."""

@@ -76,7 +76,8 @@ class Judge:
         taken = whole[:, RESIDUAL, 0, None, None] * seen
         columns = np.stack([white, taken[:, 0], taken[:, 1]], axis=2)
         self._parts: Complexes = np.asarray(np.linalg.qr(columns, "r"))
-        self._points = np.exp(2j * math.pi * self._freq * self._period)
+        different, self._of_points = np.unique(self._freq, return_inverse=True)  # most plants share most of theirs
+        self._points = np.exp(2j * math.pi * different * self._period)
         self.open_rad2 = float(self._mean(white[None])[0])
         if self.open_rad2 <= 0.0:
             raise ValueError("the plant has no disturbance: without a loop its residual is 0; give it one to reject")
@@ -115,7 +116,7 @@ class Judge:
 
     def _reached(self, stack: "_Stack", cuts: Sequence[str]) -> Iterator[tuple[float, Floats, Floats]]:
         """Mean variance, moduli and bandwidths of stable loops."""
-        K = responses(stack, self._points)
+        K = responses(stack, self._points)[:, self._of_points]
         whole = 1.0 + cut(K, self._to_sensors, "command")
         distances = [np.abs(whole)] + [np.abs(1.0 + cut(K, self._to_sensors, each)) for each in cuts[1:]]
         means = self._mean(self._residual(K / whole[..., None]))

@@ -113,7 +113,10 @@ def tune(
             break
     finalists = apart(sorted(rough, key=_score), FINALISTS, 0.02)
     found = _tuned(search, _settled(search, [t for t in finalists if t.score < finalists[0].score + CLOSE]))
-    inner = [_tuned(search, t) for t in contained if _holds(search, t)]
+    better = [
+        t for t in contained if t.verdict.pole < 1.0 and _mean_rms_rad(_variances(search, t)[1]) < found.mean_rms_rad
+    ]
+    inner = [_tuned(search, t) for t in better if _holds(search, t)]
     on_progress(total, total, what)
     return min([found, *inner], key=lambda t: t.mean_rms_rad)
 
@@ -224,11 +227,20 @@ def _chosen(search: Search) -> Tuned:
     raise ValueError(_refusal(search))
 
 
+def _variances(search: Search, trial: Trial) -> tuple[AxisController, list[float]]:
+    """The controller of a trial as it is used, and the variance of its residual (rad^2) on each plant."""
+    controller = (search.family.final or search.family.build)(search.plants[0], trial.values)
+    return controller, [float(np.sum(h2(close(p, controller))[RESIDUAL])) for p in search.plants]
+
+
+def _mean_rms_rad(variances: Sequence[float]) -> float:
+    return math.sqrt(float(np.mean(variances)))
+
+
 def _tuned(search: Search, trial: Trial) -> Tuned:
-    final = search.family.final
-    controller = (final or search.family.build)(search.plants[0], trial.values)
+    controller, variances = _variances(search, trial)
+    final = search.family.final is not None
     margins = [loop_margins(p, controller) for p in search.plants] if final else search.margins(trial)
-    variances = [float(np.sum(h2(close(p, controller))[RESIDUAL])) for p in search.plants]
     evaluations = search.count
     modulus, bandwidth = min(m.modulus for m in margins), min(m.bandwidth_hz for m in margins)
     asked = search.specification
@@ -240,7 +252,7 @@ def _tuned(search: Search, trial: Trial) -> Tuned:
         controller=controller,
         values=_named(search, trial),
         residual_rms_rad=math.sqrt(variances[0]),
-        mean_rms_rad=math.sqrt(float(np.mean(variances))),
+        mean_rms_rad=_mean_rms_rad(variances),
         worst_rms_rad=math.sqrt(max(variances)),
         margins=margins[0],
         least_modulus=modulus,
