@@ -10,8 +10,10 @@ import sqlite3
 import struct
 import subprocess
 import sys
+import tempfile
 import textwrap
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -23,6 +25,7 @@ from microrad.campaign.records import CampaignError, Chunk, Failed, WorstTrace
 from places import TESTS
 from waiting import any_moment
 
+MEMORY = "/dev/shm"
 COLUMNS = (Column("row", "", "number"), Column("weight", "", "weight"), Column("margin", "dB", "margin"))
 HEAD = Head(
     campaign_name="campaign.toml",
@@ -71,6 +74,16 @@ TRACE = WorstTrace(
 @pytest.fixture
 def path(tmp_path):
     return tmp_path / "a ledger, 100 % #1?.ledger"  # characters that an address would take otherwise
+
+
+@pytest.fixture
+def path_in_memory(path):
+    """A path on no disk, where the machine has such: for hundreds of ledgers, each of which is mended and written."""
+    with contextlib.ExitStack() as stack:
+        if os.access(MEMORY, os.W_OK):
+            yield Path(stack.enter_context(tempfile.TemporaryDirectory(dir=MEMORY))) / path.name
+        else:
+            yield path
 
 
 def said(call, *args, **kwargs):
@@ -460,7 +473,8 @@ def opened(path):
     return False
 
 
-def test_wherever_a_bit_flips_it_is_found_or_harmless_and_what_can_be_read_is_kept(path):
+def test_wherever_a_bit_flips_it_is_found_or_harmless_and_what_can_be_read_is_kept(path_in_memory):
+    path = path_in_memory
     payloads = filled(path)
     whole = path.read_bytes()
     draw = random.Random(2)
@@ -484,7 +498,8 @@ def test_wherever_a_bit_flips_it_is_found_or_harmless_and_what_can_be_read_is_ke
     assert sum(each <= 1 for each in lost) > 0.8 * len(lost)
 
 
-def test_a_page_overwritten_by_another_program_costs_little_but_for_those_that_lead_to_others(path):
+def test_a_page_overwritten_by_another_program_costs_little_but_for_those_that_lead_to_others(path_in_memory):
+    path = path_in_memory
     payloads = filled(path)
     whole = path.read_bytes()
     pages, cheap = len(whole) // 4096, 0
