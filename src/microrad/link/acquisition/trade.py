@@ -8,17 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from microrad.core.arrays import Floats
+from microrad.link.acquisition import scan
 from microrad.link.acquisition.detection import detection_times
-from microrad.link.acquisition.scan import (
-    Detector,
-    Duration,
-    DurationOrZero,
-    OffAxis,
-    Overlap,
-    Search,
-    Spiral,
-    highest_speed,
-)
 from microrad.mission.fields import Bounded, Quantity
 
 Power = Annotated[float, Quantity("W", above=0.0)]
@@ -37,8 +28,8 @@ class Receiver(Bounded):
 
     aperture_area_m2: Annotated[float, Quantity("m^2", above=0.0)]
     power_w: Power
-    time_s: Duration
-    shortest_s: DurationOrZero = 0.0
+    time_s: scan.Duration
+    shortest_s: scan.DurationOrZero = 0.0
 
     def detection_time_s(self, power_w: ArrayLike) -> Floats:
         """Time to detection at each received power, at least `shortest_s`."""
@@ -57,9 +48,9 @@ class Beams(Bounded):
 
     power_w: Power
     range_m: Annotated[float, Quantity("m", above=0.0)]
-    narrow_half_angle_rad: OffAxis
-    beam_radius_rad: OffAxis
-    overlap: Overlap
+    narrow_half_angle_rad: scan.OffAxis
+    beam_radius_rad: scan.OffAxis
+    overlap: scan.Overlap
 
     @property
     def edge_irradiance_w_m2(self) -> float:
@@ -125,22 +116,22 @@ def wide_against_scan(
     sigma = np.atleast_1d(np.asarray(sigma_rad, dtype=np.float64))
     if beams.overlap == 0.0:
         raise ValueError("the overlap is 0: it must be above 0, or a target between two tracks is seen for no time")
-    searches = [Search(float(s), beams.beam_radius_rad, beams.overlap, coverage) for s in sigma]
+    searches = [scan.Search(float(s), beams.beam_radius_rad, beams.overlap, coverage) for s in sigma]
     radius = np.array([search.radius_rad for search in searches])
     wide = _WIDE_PER_RADIUS * radius
     area = receiver.aperture_area_m2
     wide_time = receiver.detection_time_s(area * beams.irradiance_w_m2(wide, radius))
-    detector = Detector(float(receiver.detection_time_s(area * beams.edge_irradiance_w_m2)))
-    speed = highest_speed(searches[0], detector.detection_time_s)
-    scans = [Spiral(search, detector, speed) for search in searches]
-    found = [detection_times(scan, jitter_rms_rad) for scan in scans]
+    detector = scan.Detector(float(receiver.detection_time_s(area * beams.edge_irradiance_w_m2)))
+    speed = scan.highest_speed(searches[0], detector.detection_time_s)
+    scans = [scan.Spiral(search, detector, speed) for search in searches]
+    found = [detection_times(each, jitter_rms_rad) for each in scans]
     return Trade(
         sigma_rad=sigma,
         radius_rad=radius,
         wide_full_angle_rad=2.0 * wide,
         wide_time_s=wide_time,
         wide_probability=np.full(sigma.size, coverage),
-        scan_time_s=np.array([scan.duration_s for scan in scans]),
+        scan_time_s=np.array([each.duration_s for each in scans]),
         scan_mean_time_s=np.array([times.mean_s for times in found]),
         scan_probability=np.array([times.probability for times in found]),
         speed_rad_s=speed,

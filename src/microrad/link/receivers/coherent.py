@@ -7,19 +7,11 @@ import numpy as np
 
 from microrad.core.arrays import Floats
 from microrad.core.budget import Line
-from microrad.link.receivers.base import (
-    SOURCE,
-    Efficiency,
-    NoiseFigure,
-    PerMode,
-    Receiver,
-    normal_deviate,
-    spontaneous_photons,
-)
+from microrad.link.receivers import base
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class DpskPreamplified(Receiver):
+class DpskPreamplified(base.Receiver):
     """Differential phase-shift keying: preamplifier, matched optical filter, delay interferometer, balanced detection.
 
     BER = exp(-n / (n_sp + N)) / 2, n photons per symbol at the amplifier's input, N `background_photons_per_mode`:
@@ -28,12 +20,12 @@ class DpskPreamplified(Receiver):
     (a polariser), no shot or thermal noise behind the amplifier, no phase error in laser or interferometer.
     """
 
-    noise_figure_db: NoiseFigure
-    background_photons_per_mode: PerMode = 0.0
+    noise_figure_db: base.NoiseFigure
+    background_photons_per_mode: base.PerMode = 0.0
 
     @property
     def _noise_photons(self) -> float:
-        return spontaneous_photons(self.noise_figure_db) + self.background_photons_per_mode
+        return base.spontaneous_photons(self.noise_figure_db) + self.background_photons_per_mode
 
     def _ratio(self, power: Floats, rate: Floats) -> Floats:
         return np.asarray(0.5 * np.exp(-power / (rate * self._photon_j * self._noise_photons)), dtype=np.float64)
@@ -46,13 +38,13 @@ class DpskPreamplified(Receiver):
         noise, regime = self._noise_photons, "matched filter; product of the fields of two symbols, so not Gaussian"
         signal = power / (symbol_rate * self._photon_j)
         return (
-            Line("Signal-ASE beat noise", math.sqrt(signal * noise), "photon", "sqrt(n N)", SOURCE, regime),
-            Line("ASE-ASE beat noise", noise / math.sqrt(2.0), "photon", "N / sqrt 2", SOURCE, regime),
+            Line("Signal-ASE beat noise", math.sqrt(signal * noise), "photon", "sqrt(n N)", base.SOURCE, regime),
+            Line("ASE-ASE beat noise", noise / math.sqrt(2.0), "photon", "N / sqrt 2", base.SOURCE, regime),
         )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class BpskHomodyne(Receiver):
+class BpskHomodyne(base.Receiver):
     """Binary phase-shift keying with homodyne detection: a strong local oscillator, locked in phase.
 
     BER = erfc(sqrt(2 q n / (1 + 2 q N))) / 2, q `quantum_efficiency` (with mixing efficiency), n photons per symbol, N
@@ -60,8 +52,8 @@ class BpskHomodyne(Receiver):
     a matched filter, shot noise of the oscillator far above thermal noise, no phase error.
     """
 
-    quantum_efficiency: Efficiency
-    background_photons_per_mode: PerMode = 0.0
+    quantum_efficiency: base.Efficiency
+    background_photons_per_mode: base.PerMode = 0.0
 
     @property
     def _signal_per_photon(self) -> float:
@@ -75,13 +67,13 @@ class BpskHomodyne(Receiver):
         return np.asarray(ndtr(-np.sqrt(self._signal_per_photon * photons)), dtype=np.float64)
 
     def _power_w(self, rate: Floats) -> Floats:
-        photons = normal_deviate(self.bit_error_ratio) ** 2 / self._signal_per_photon
+        photons = base.normal_deviate(self.bit_error_ratio) ** 2 / self._signal_per_photon
         return photons * self._photon_j * rate
 
     def _noise(self, power: float, symbol_rate: float) -> tuple[Line, ...]:
         beat = math.sqrt(self.quantum_efficiency * self.background_photons_per_mode / 2.0)
         regime = "quadrature of the field, in which the signal is sqrt(q n); matched filter"
         return (
-            Line("Shot noise of the local oscillator", 0.5, "sqrt(photon)", "1/2", SOURCE, regime),
-            Line("Background beat noise", beat, "sqrt(photon)", "sqrt(q N / 2)", SOURCE, regime),
+            Line("Shot noise of the local oscillator", 0.5, "sqrt(photon)", "1/2", base.SOURCE, regime),
+            Line("Background beat noise", beat, "sqrt(photon)", "sqrt(q N / 2)", base.SOURCE, regime),
         )

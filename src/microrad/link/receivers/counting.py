@@ -11,15 +11,7 @@ from numpy.typing import NDArray
 from microrad.core.arrays import Floats
 from microrad.core.budget import Line
 from microrad.core.roots import root
-from microrad.link.receivers.base import (
-    LEAST_COUNT,
-    SOURCE,
-    Efficiency,
-    Extinction,
-    Power,
-    Receiver,
-    mark_and_space,
-)
+from microrad.link.receivers import base
 from microrad.mission.fields import Quantity
 
 _MANY = 1e5  # counts from which asymptotic series are exact to 1e-11
@@ -29,10 +21,10 @@ _CHUNK = 4096  # rows of a table of counts held at once
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Counter(Receiver):
-    detection_efficiency: Efficiency
+class _Counter(base.Receiver):
+    detection_efficiency: base.Efficiency
     dark_count_rate_hz: Annotated[float, Quantity("Hz", least=0.0)] = 0.0
-    background_power_w: Power = 0.0
+    background_power_w: base.Power = 0.0
 
     @property
     def _counts_per_joule(self) -> float:
@@ -41,13 +33,20 @@ class _Counter(Receiver):
     def _floor(self, slot_rate: Floats) -> Floats:
         """Mean counts in a slot without signal."""
         counts = self._counts_per_joule * self.background_power_w + self.dark_count_rate_hz
-        return np.asarray(np.maximum(counts / slot_rate, LEAST_COUNT), dtype=np.float64)
+        return np.asarray(np.maximum(counts / slot_rate, base.LEAST_COUNT), dtype=np.float64)
 
     def _count_lines(self, pulses: dict[str, float], slot_rate: float) -> tuple[Line, ...]:
         background = self._counts_per_joule * self.background_power_w / slot_rate
         terms = {**pulses, "Background shot noise": background, "Dark counts": self.dark_count_rate_hz / slot_rate}
         return tuple(
-            Line(name, math.sqrt(mean), "count", "sqrt(mean counts in a slot)", SOURCE, "Poisson counts, no dead time")
+            Line(
+                name,
+                math.sqrt(mean),
+                "count",
+                "sqrt(mean counts in a slot)",
+                base.SOURCE,
+                "Poisson counts, no dead time",
+            )
             for name, mean in terms.items()
         )
 
@@ -62,14 +61,14 @@ class OokCounting(_Counter):
     and spaces. No dead time, afterpulsing or saturation: valid up to count rates far below the detector's own limit.
     """
 
-    extinction_ratio: Extinction = math.inf
+    extinction_ratio: base.Extinction = math.inf
 
     def _ratio(self, power: Floats, rate: Floats) -> Floats:
         return self._ratio_of_counts(power * self._counts_per_joule / rate, self._floor(rate))
 
     def _ratio_of_counts(self, counts: Floats, floor: Floats) -> Floats:
         """Bit error ratio from the mean signal counts in a symbol and the counts without signal."""
-        bright, dim = mark_and_space(self.extinction_ratio)
+        bright, dim = base.mark_and_space(self.extinction_ratio)
         space, swing = dim * counts + floor, (bright - dim) * counts
         mark = space + swing
         # more than (l1 - l0) / log(l1 / l0) counts are likelier from a mark; few beside the floor keep their digits
@@ -80,7 +79,7 @@ class OokCounting(_Counter):
 
     def _power_w(self, rate: Floats) -> Floats:
         floor, target = self._floor(rate), self.bit_error_ratio
-        mark, space = mark_and_space(self.extinction_ratio)
+        mark, space = base.mark_and_space(self.extinction_ratio)
         natural = math.log(0.5 / target)
         # Bhattacharyya: BER <= exp(-(sqrt l1 - sqrt l0)^2 / 2) / 2, and sqrt l1 + sqrt l0 <= 2 sqrt l1
         swing = (mark - space) ** 2 / natural
@@ -90,7 +89,7 @@ class OokCounting(_Counter):
 
     def _noise(self, power: float, symbol_rate: float) -> tuple[Line, ...]:
         counts = power * self._counts_per_joule / symbol_rate
-        mark, space = mark_and_space(self.extinction_ratio)
+        mark, space = base.mark_and_space(self.extinction_ratio)
         pulses = {"Signal shot noise, marks": mark * counts, "Signal shot noise, spaces": space * counts}
         return self._count_lines(pulses, symbol_rate)
 

@@ -10,21 +10,7 @@ import numpy as np
 from microrad.core.arrays import Floats
 from microrad.core.budget import Line
 from microrad.core.units import ELEMENTARY_CHARGE_C
-from microrad.link.receivers.base import (
-    SOURCE,
-    AvalancheGain,
-    Efficiency,
-    Extinction,
-    IonisationRatio,
-    NoiseFigure,
-    PerMode,
-    Power,
-    Receiver,
-    apd_excess_noise_factor,
-    mark_and_space,
-    normal_deviate,
-    spontaneous_photons,
-)
+from microrad.link.receivers import base
 from microrad.mission.fields import Quantity, Whole
 
 _BANDWIDTH_PER_SYMBOL = 0.5  # one-sided noise bandwidth over the symbol rate of a filter matched to rectangular symbols
@@ -40,8 +26,8 @@ class _Term(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _OnOffCurrent(Receiver):
-    extinction_ratio: Extinction = math.inf
+class _OnOffCurrent(base.Receiver):
+    extinction_ratio: base.Extinction = math.inf
 
     @abstractmethod
     def _signal_a_w(self) -> float:
@@ -58,7 +44,7 @@ class _OnOffCurrent(Receiver):
     def _ratio(self, power: Floats, rate: Floats) -> Floats:
         from scipy.special import ndtr
 
-        (mark, space), (per_signal, fixed) = mark_and_space(self.extinction_ratio), self._variance(rate)
+        (mark, space), (per_signal, fixed) = base.mark_and_space(self.extinction_ratio), self._variance(rate)
         swing = self._signal_a_w() * (mark - space) * power
         sigmas = np.sqrt(fixed + per_signal * mark * power) + np.sqrt(fixed + per_signal * space * power)
         # without any noise nothing is wrong, unless there is no signal either
@@ -67,8 +53,8 @@ class _OnOffCurrent(Receiver):
 
     def _power_w(self, rate: Floats) -> Floats:
         # Q (s1 + s0) = R (P1 - P0) with s^2 = fixed + per_signal P is quadratic in P1 - P0
-        (mark, space), (per_signal, fixed) = mark_and_space(self.extinction_ratio), self._variance(rate)
-        slope = self._signal_a_w() / normal_deviate(self.bit_error_ratio)
+        (mark, space), (per_signal, fixed) = base.mark_and_space(self.extinction_ratio), self._variance(rate)
+        slope = self._signal_a_w() / base.normal_deviate(self.bit_error_ratio)
         share = mark / (mark - space)
         root = np.sqrt(per_signal**2 * share * (share - 1.0) + slope**2 * fixed)
         swing = 2.0 * (per_signal * (share - 0.5) + root) / slope**2
@@ -80,10 +66,10 @@ class _OnOffCurrent(Receiver):
         for term in self._terms(np.asarray(_BANDWIDTH_PER_SYMBOL * symbol_rate)):
             cases = [("", 0.0)]
             if np.any(term.per_signal):
-                cases = list(zip((", marks", ", spaces"), mark_and_space(self.extinction_ratio), strict=True))
+                cases = list(zip((", marks", ", spaces"), base.mark_and_space(self.extinction_ratio), strict=True))
             for case, share in cases:
                 rms = math.sqrt(float(term.fixed + term.per_signal * share * power))
-                lines.append(Line(term.name + case, rms, "A", term.basis, SOURCE, regime))
+                lines.append(Line(term.name + case, rms, "A", term.basis, base.SOURCE, regime))
         return tuple(lines)
 
 
@@ -102,10 +88,10 @@ class OokPin(_OnOffCurrent):
     the best one, and it follows the power.
     """
 
-    quantum_efficiency: Efficiency
+    quantum_efficiency: base.Efficiency
     thermal_noise_a_sqrt_hz: Annotated[float, Quantity("A/sqrt(Hz)", least=0.0)]
     dark_current_a: Annotated[float, Quantity("A", least=0.0)] = 0.0
-    background_power_w: Power = 0.0
+    background_power_w: base.Power = 0.0
 
     def _responsivity_a_w(self) -> float:
         return self.quantum_efficiency * ELEMENTARY_CHARGE_C / self._photon_j
@@ -139,11 +125,11 @@ class OokApd(OokPin):
     avalanche's gain (McIntyre 1972, IEEE T-ED 19, 703): the fewer electrons start it in a symbol, the less it holds.
     """
 
-    gain: AvalancheGain
-    ionisation_ratio: IonisationRatio
+    gain: base.AvalancheGain
+    ionisation_ratio: base.IonisationRatio
 
     def _gain_and_excess(self) -> tuple[float, float]:
-        return self.gain, apd_excess_noise_factor(self.gain, self.ionisation_ratio)
+        return self.gain, base.apd_excess_noise_factor(self.gain, self.ionisation_ratio)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -162,10 +148,10 @@ class OokPreamplified(_OnOffCurrent):
     the chi-square laws give 38.3. With a filter of 1 to 20 symbol rates it needs 0.18 to 0.33 dB too much.
     """
 
-    noise_figure_db: NoiseFigure
+    noise_figure_db: base.NoiseFigure
     gain_db: Annotated[float, Quantity("dB", least=10.0), "high gain is meant"]
     optical_bandwidth_hz: Annotated[float, Quantity("Hz", above=0.0)]
-    background_photons_per_mode: PerMode = 0.0
+    background_photons_per_mode: base.PerMode = 0.0
     polarisations: Annotated[int, Whole("", least=1, most=2)] = 2
 
     @property
@@ -177,7 +163,7 @@ class OokPreamplified(_OnOffCurrent):
 
     def _terms(self, bandwidth: Floats) -> tuple[_Term, ...]:
         signal, none = self._signal_a_w(), np.zeros(())
-        noise_photons = spontaneous_photons(self.noise_figure_db) + self.background_photons_per_mode
+        noise_photons = base.spontaneous_photons(self.noise_figure_db) + self.background_photons_per_mode
         emission = signal * noise_photons * self._photon_j  # A/Hz in each polarisation
         optical, shot = self.optical_bandwidth_hz, 2.0 * ELEMENTARY_CHARGE_C * bandwidth
         beat = 2.0 * self.polarisations * emission**2 * bandwidth * (optical - bandwidth / 2.0)

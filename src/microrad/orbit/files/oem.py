@@ -18,18 +18,7 @@ from microrad.core.arrays import Floats
 from microrad.orbit.base import OrbitError, States
 from microrad.orbit.earth.epoch import Epoch
 from microrad.orbit.earth.figure import MU_M3_S2, ROTATION_RAD_S
-from microrad.orbit.files.messages import (
-    TIME_SYSTEMS,
-    Field,
-    add_field,
-    elapsed_s,
-    finite,
-    instant,
-    kvn_field,
-    plain_instant,
-    read_text,
-    xml_fields,
-)
+from microrad.orbit.files import messages
 from microrad.orbit.propagation.ephemeris import SLACK_S, EphemerisOrbit, Segment
 
 DEFAULT_DEGREE = 7
@@ -56,7 +45,7 @@ class _Draft:
     """A segment as it is read: its metadata, and a place, a time and six numbers for each state vector."""
 
     place: str
-    metadata: dict[str, Field] = field(default_factory=dict)
+    metadata: dict[str, messages.Field] = field(default_factory=dict)
     places: list[str] = field(default_factory=list)
     times: list[str] = field(default_factory=list)
     values: list[list[float]] = field(default_factory=list)
@@ -82,7 +71,10 @@ class _Draft:
         try:
             numbers = list(map(float, words))
         except ValueError:
-            numbers = [finite(path, Field(key, w, "", place)) for key, w in zip(_COLUMNS, words, strict=False)]
+            numbers = [
+                messages.finite(path, messages.Field(key, w, "", place))
+                for key, w in zip(_COLUMNS, words, strict=False)
+            ]
         self.places.append(place)
         self.times.append(time)
         self.values.append(numbers)
@@ -105,7 +97,7 @@ def read_oem(path: Path, epoch: Epoch, name: str | None = None, data: bytes | No
         OrbitError: For all else, with file, line and value; for a hole within the usable times of a segment (a step of
             more than `MOST_STEPS` median ones); and for velocities that are not those of the positions.
     """
-    text = read_text(path, data)
+    text = messages.read_text(path, data)
     drafts = list(_xml_drafts(path, text) if text.lstrip().startswith("<") else _kvn_drafts(path, text))
     if not drafts:
         raise OrbitError(
@@ -132,7 +124,7 @@ def _kvn_drafts(path: Path, text: str) -> Iterator[_Draft]:
         ("head", "META_START"): "meta", ("data", "META_START"): "meta", ("meta", "META_STOP"): "data",
         ("data", "COVARIANCE_START"): "covariance", ("covariance", "COVARIANCE_STOP"): "data",
     }  # fmt: skip
-    block, draft, header = "head", _Draft(""), dict[str, Field]()
+    block, draft, header = "head", _Draft(""), dict[str, messages.Field]()
     for number, line in enumerate(text.split("\n"), 1):
         words = line.split()
         if not words or words[0] == "COMMENT":
@@ -146,7 +138,7 @@ def _kvn_drafts(path: Path, text: str) -> Iterator[_Draft]:
                     yield draft
                 draft = _Draft(f"line {number}")
         elif block == "head":
-            add_field(header, kvn_field(path, number, line), path)
+            messages.add_field(header, messages.kvn_field(path, number, line), path)
             first = next(iter(header.values()))
             if first.key != "CCSDS_OEM_VERS" or first.value.partition(".")[0] not in ("1", "2", "3"):
                 raise OrbitError(
@@ -154,7 +146,7 @@ def _kvn_drafts(path: Path, text: str) -> Iterator[_Draft]:
                     "= 1, 2 or 3; give a CCSDS Orbit Ephemeris Message"
                 )
         elif block == "meta":
-            add_field(draft.metadata, kvn_field(path, number, line), path)
+            messages.add_field(draft.metadata, messages.kvn_field(path, number, line), path)
         elif block == "data":
             draft.add(path, f"line {number}", words[0], words[1:])
     if block in ("meta", "covariance"):
@@ -168,9 +160,9 @@ def _kvn_drafts(path: Path, text: str) -> Iterator[_Draft]:
 def _xml_drafts(path: Path, text: str) -> Iterator[_Draft]:
     """The segments of a text in XML."""
     draft: _Draft | None = None
-    row: dict[str, Field] | None = None
+    row: dict[str, messages.Field] | None = None
     container: list[str] = []
-    for given in xml_fields(path, text):
+    for given in messages.xml_fields(path, text):
         if given.key.startswith("</"):
             container.pop()
             if given.key == "</stateVector" and draft is not None and row is not None:
@@ -186,12 +178,12 @@ def _xml_drafts(path: Path, text: str) -> Iterator[_Draft]:
             elif given.key == "<stateVector":
                 row = {}
         elif row is not None:
-            add_field(row, given, path)
+            messages.add_field(row, given, path)
         elif draft is not None and container[-1] == "metadata":
-            add_field(draft.metadata, given, path)
+            messages.add_field(draft.metadata, given, path)
 
 
-def _xml_row(path: Path, draft: _Draft, row: dict[str, Field], place: str) -> None:
+def _xml_row(path: Path, draft: _Draft, row: dict[str, messages.Field], place: str) -> None:
     for key in ("EPOCH", *_COLUMNS):
         unit = "" if key == "EPOCH" else "km/s" if key.endswith("DOT") else "km"
         if key not in row:
@@ -207,11 +199,11 @@ def _check_metadata(path: Path, draft: _Draft) -> None:
     """Raises OrbitError for a segment whose keys are missing, or whose centre, time system or frame is not read."""
     given = draft.metadata
     for key in _REQUIRED:
-        if not given.get(key, Field(key, "", "", "")).value:
+        if not given.get(key, messages.Field(key, "", "", "")).value:
             raise OrbitError(f"{path}, {draft.place}: {key} is missing in this segment's metadata; add it")
     for key, read, allowed in (
         ("CENTER_NAME", given["CENTER_NAME"].value.upper() == "EARTH", "EARTH"),
-        ("TIME_SYSTEM", _system(given) in TIME_SYSTEMS, "UTC, TAI, TT, GPS"),
+        ("TIME_SYSTEM", _system(given) in messages.TIME_SYSTEMS, "UTC, TAI, TT, GPS"),
         ("REF_FRAME", FRAMES.fullmatch(_frame(given)), "TEME, TOD, EME2000, GCRF, ICRF, ITRF"),
     ):
         if not read:
@@ -223,11 +215,11 @@ def _check_metadata(path: Path, draft: _Draft) -> None:
         )
 
 
-def _system(metadata: dict[str, Field]) -> str:
+def _system(metadata: dict[str, messages.Field]) -> str:
     return metadata["TIME_SYSTEM"].value.upper()
 
 
-def _frame(metadata: dict[str, Field]) -> str:
+def _frame(metadata: dict[str, messages.Field]) -> str:
     return frame_name(metadata["REF_FRAME"].value)
 
 
@@ -246,11 +238,11 @@ def _segment(path: Path, draft: _Draft, epoch: Epoch) -> Segment:
     """A segment in seconds of the mission and in TEME."""
     system = _system(draft.metadata)
     instants = [
-        plain_instant(t) or instant(path, Field("the epoch", t, "", p), system)
+        messages.plain_instant(t) or messages.instant(path, messages.Field("the epoch", t, "", p), system)
         for t, p in zip(draft.times, draft.places, strict=True)
     ]
     method, points = _method(path, draft)
-    time = elapsed_s(system, epoch, instants, f"{path}, {draft.place}")
+    time = messages.elapsed_s(system, epoch, instants, f"{path}, {draft.place}")
     _check_rows(path, draft, time)
     values = 1000.0 * np.array(draft.values).T
     states = to_teme(_frame(draft.metadata), epoch, time, values)
@@ -341,7 +333,7 @@ def _check_holes(path: Path, draft: _Draft, time: Floats, usable: tuple[float, f
 def _method(path: Path, draft: _Draft) -> tuple[str, int]:
     """The method of interpolation and how many state vectors it takes."""
     given = draft.metadata
-    method = given.get("INTERPOLATION", Field("INTERPOLATION", "HERMITE", "", draft.place))
+    method = given.get("INTERPOLATION", messages.Field("INTERPOLATION", "HERMITE", "", draft.place))
     degree = given.get("INTERPOLATION_DEGREE")
     if "INTERPOLATION" in given and degree is None:
         raise OrbitError(f"{path}, {method.place}: INTERPOLATION stands without INTERPOLATION_DEGREE; add the degree")
@@ -349,7 +341,7 @@ def _method(path: Path, draft: _Draft) -> tuple[str, int]:
     if kind not in ("HERMITE", "LAGRANGE"):
         why = "other curves miss it by kilometres or jump in velocity: export with one of these"
         raise method.refused(path, f"; an orbit is read with HERMITE or LAGRANGE, because {why}")
-    number = DEFAULT_DEGREE if degree is None else finite(path, degree)
+    number = DEFAULT_DEGREE if degree is None else messages.finite(path, degree)
     if degree is not None and not (number == int(number) and DEGREES[0] <= number <= DEGREES[1]):
         raise degree.refused(path, f"; take a whole number from {DEGREES[0]} to {DEGREES[1]}")
     points = int(number) + 1 if kind == "LAGRANGE" else (int(number) + 2) // 2
@@ -366,8 +358,8 @@ def _usable(path: Path, draft: _Draft, epoch: Epoch, time: Floats) -> tuple[floa
     """The usable times, those of the metadata as far as state vectors reach."""
     given, system = draft.metadata, _system(draft.metadata)
     ends = [given.get(f"USEABLE_{key}", given[key]) for key in ("START_TIME", "STOP_TIME")]
-    instants = [instant(path, end, system) for end in ends]
-    start, stop = (float(t) for t in elapsed_s(system, epoch, instants, f"{path}, {ends[0].place}"))
+    instants = [messages.instant(path, end, system) for end in ends]
+    start, stop = (float(t) for t in messages.elapsed_s(system, epoch, instants, f"{path}, {ends[0].place}"))
     usable = max(start, float(time[0])), min(stop, float(time[-1]))
     if usable[1] <= usable[0]:
         raise OrbitError(
