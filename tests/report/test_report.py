@@ -130,6 +130,13 @@ def test_the_page_opens_with_the_verdict_and_keeps_its_order(written, paper):
     assert text.count("<figure ") == len(re.findall('<figure [^>]*id="figure-', text))
 
 
+def test_a_warning_of_a_budget_stands_once_on_the_page(written, paper):
+    text = html.unescape((written / "report.html").read_text(encoding="utf-8"))
+    assert len(paper.links.warnings) == 3
+    assert [text.count(f"<li>{each}</li>") for each in paper.links.warnings] == [1, 1, 1]
+    assert text.count("What \u201c!\u201d marks in the tables stands under Warnings.") == 1
+
+
 def test_terms_are_explained_below_the_verdict_and_stand_on_the_page(written):
     text = (written / "report.html").read_text(encoding="utf-8")
     begin = text.index('<details class="view" id="terms">')

@@ -214,7 +214,12 @@ def _both(texts: Sequence[tuple[str, str]]) -> str:
 
 
 def budgets_view(
-    study: LinkStudy, tables: Sequence[Table], figures: Sequence[Figure], sentences: Sequence[str] = (), *more: View
+    study: LinkStudy,
+    tables: Sequence[Table],
+    figures: Sequence[Figure],
+    sentences: Sequence[str] = (),
+    *more: View,
+    warned: str = "",
 ) -> View:
     """The budgets, what follows from them, and what moves their margins.
 
@@ -224,6 +229,7 @@ def budgets_view(
         figures: those of the links, where they are shown; the first is open.
         sentences: more that follows.
         more: views at the end.
+        warned: where else the warnings stand that the tables mark, a sentence; without one they stand below the tables.
     """
     noise, light = study.receiver_noise, study.tracking
     tables = [*tables]
@@ -232,10 +238,13 @@ def budgets_view(
     if light is not None and light.noise_equivalent_angle is not None:
         name = "The answer's light on the tracking sensor"
         tables.append(lines_table(name, light.noise_lines, [light.noise_equivalent_angle]))
-    warned: list[Block] = ["Marked \u201c!\u201d in the tables:", Points(study.warnings)] if study.warnings else []
+    below: tuple[Block, ...] = (warned,) if warned else ("Marked \u201c!\u201d in the tables:", Points(study.warnings))
     moving = [f for f in figures if f.name.startswith("tornado")]
     said = Points([*words.consequences(study), *sentences])
-    return View("Link budgets", told(*tables, *warned, said, *opened(moving, [f.name for f in moving[:1]]), *more))
+    return View(
+        "Link budgets",
+        told(*tables, *(below if study.warnings else ()), said, *opened(moving, [f.name for f in moving[:1]]), *more),
+    )
 
 
 # --------------------------------------------------------------------------------------------------------- performance

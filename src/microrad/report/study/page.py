@@ -181,7 +181,8 @@ def _links(study: Study, figures: Sequence[Figure]) -> tuple[View, ...]:
         *paired_tables(study.communication, study.achieved, names),
         *map(budget_table, (study.beacon, study.answer)),
     ]
-    budgets = budgets_view(study.links, tables, figures, _loop_noise(study), _implied(study))
+    warned = "What “!” marks in the tables stands under Warnings."
+    budgets = budgets_view(study.links, tables, figures, _loop_noise(study), _implied(study), warned=warned)
     return links_views(study.links, figures, budgets=budgets, performance=cost_view(study))
 
 
