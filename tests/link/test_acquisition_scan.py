@@ -74,7 +74,8 @@ def test_a_raster_covers_the_box_in_rows_a_pitch_apart():
 
 def test_dwells_stand_on_their_grid_go_outward_and_fill_the_disc():
     scan, cell = StepStare(SEARCH, SURE, 2 * LOOK_S, LOOK_S), math.sqrt(3) / 2
-    centres = scan.centres_rad
+    middle_s = np.arange(scan.dwells) * 3 * LOOK_S + LOOK_S
+    centres = np.stack(scan.beam_at(middle_s, middle_s), axis=-1)
     assert scan.dwells == pytest.approx(math.pi * SEARCH.radius_rad**2 / (cell * SEARCH.pitch_rad**2), rel=0.01)
     assert scan.duration_s == pytest.approx(scan.dwells * 3 * LOOK_S - LOOK_S, rel=1e-12)
     assert np.max(np.hypot(*centres.T)) <= SEARCH.radius_rad

@@ -82,7 +82,7 @@ def test_the_shipped_table_is_read_in_si(load):
     assert (table.runs, table.duration_s, table.settle_s, table.seed) == (64, 2.0, 0.5, 1)
     assert (table.geometry.layout, table.geometry.travel_angle) == ("two-axis", "optical")
     assert (table.geometry.incidence_rad, table.geometry.magnification, table.geometry.rotation_rad) == (0.0, 1.0, 0.0)
-    assert (table.geometry.coupling_rows, table.geometry.actuator_radius_m) == (((1.0, 0.0), (0.0, 1.0)), None)
+    assert (table.geometry.coupling, table.geometry.actuator_radius_m) == ((1.0, 0.0, 0.0, 1.0), None)
     assert (table.vibration.spectrum, table.vibration.convention) == ("olympus", "radial")
     assert (table.body.error_rad, table.body.sigmas, table.body.bandwidth_hz) == (300e-6, 3.0, 0.1)
     assert table.body.convention == "per-axis"
@@ -198,7 +198,7 @@ def _seen(table, angle="optical"):
         table.incidence_rad,
         table.magnification,
         table.rotation_rad,
-        table.coupling_rows,
+        (table.coupling[:2], table.coupling[2:]),
         table.layout,
         table.actuator_radius_m,
     )

@@ -236,11 +236,6 @@ class StepStare(Bounded):
         return np.where(inside, table[clipped[..., 0], clipped[..., 1]], size)
 
     @property
-    def centres_rad(self) -> Floats:
-        """Centre of each dwell in the order they come, (dwells, 2)."""
-        return _dwell_indices(self) @ self.basis_rad
-
-    @property
     def dwells(self) -> int:
         """Number of dwells."""
         return int(_dwell_indices(self).shape[0])

@@ -86,12 +86,6 @@ class GeometryTable(Table):
         if singular and (not grazing or _singular(self.coupling, 1.0)):
             yield Problem("coupling", f"is singular: it {less}", "coupling = [1.0, 0.0, 0.0, 1.0] would do")
 
-    @property
-    def coupling_rows(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """The coupling as two rows."""
-        a, b, c, d = self.coupling
-        return (a, b), (c, d)
-
 
 def _singular(coupling: tuple[float, ...], cos_incidence: float) -> bool:
     """Whether diag(1, cos) times the coupling has a condition above the worst one; numpy would be slow to load.
