@@ -178,7 +178,7 @@ def fit_joint(  # noqa: PLR0913  all but the first three are named options
     fit_list = [_fit_record(record, creep_times) for record in records]
     model: BoucWen | Play
     if form.family == "bouc_wen":
-        static = static or fit_static_start(recordings, units, seed)
+        static = static or fit_bouc_wen(recordings, starts=6, seed=seed, units=units)
         model = replace(static.model, bias_v=float(np.mean([r.drive_v[0] for r in records])))
         if "delta" not in form.free:
             model = replace(model, d2_s_v=0.0, delta_s_v=0.0)
@@ -229,17 +229,6 @@ def fit_joint(  # noqa: PLR0913  all but the first three are named options
 
 
 # ---------------------------------------------------------------------------------------------------------- starts
-def fit_static_start(recordings: Sequence[Recording], units: Units, seed: int) -> BoucWenFit:
-    """The fit of Eq. 3 at which all Bouc-Wen forms begin.
-
-    Args:
-        recordings: Recordings of one axis.
-        units: Units of their drives and outputs.
-        seed: Seed of the scattered starts.
-    """
-    return fit_bouc_wen(recordings, starts=6, seed=seed, units=units)
-
-
 def time_constants(records: Sequence[SiRecord]) -> tuple[float, ...]:
     """Decades of creep that the records can show: from ten samples or 10 ms to three times the longest record."""
     longest = max(r.drive_v.size * r.step_s for r in records)

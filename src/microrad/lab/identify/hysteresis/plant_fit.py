@@ -207,9 +207,10 @@ class PlantFit(Estimate):
     `covariance`, over the parameters in their order, comes from the residuals of each run by themselves (the sandwich
     (J'J)^-1 J'VJ (J'J)^-1), inflated by their colour (`statistics.colour_inflation`, the largest one is kept).
     `residual_rms` has the shape (runs, outputs), in the units of the recordings, without the weights. `start_costs` are
-    the costs reached from each start, `agreeing_starts` how many came to within 0.1 % of the best. `not_identified`
-    names each parameter that the records do not fix, with the reason. Where the search was not `converged` it stopped
-    at its last evaluation on the way down, and the standard errors are those of a point that is no minimum.
+    the costs reached from each start, before the search went on from the best, `agreeing_starts` how many came to
+    within 0.1 % of it. `not_identified` names each parameter that the records do not fix, with the reason. Where the
+    search was not `converged` it stopped at its last evaluation on the way down, and the standard errors are those of a
+    point that is no minimum.
     """
 
     structure: Structure

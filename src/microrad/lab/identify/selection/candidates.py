@@ -13,7 +13,7 @@ import numpy as np
 from microrad.core.progress import Progress
 from microrad.core.threads import shared_out
 from microrad.lab.identify.hysteresis.bouc_wen import BoucWenFit, fit_bouc_wen
-from microrad.lab.identify.hysteresis.joint import FORMS, JointFit, fit_joint, fit_static_start, time_constants
+from microrad.lab.identify.hysteresis.joint import FORMS, JointFit, fit_joint, time_constants
 from microrad.lab.identify.hysteresis.prandtl_ishlinskii import fit_prandtl_ishlinskii
 from microrad.lab.identify.hysteresis.structures import LinearPoles, poles_of
 from microrad.lab.identify.linear.fit import LinearFit, fit_linear
@@ -152,12 +152,15 @@ class Candidates:
     ) -> dict[str, Callable[[], Fit]]:
         """What gives the fit of each model, or raises its error: all of them made, on all cores where that is possible.
 
-        What takes longest goes first.
+        Bouc-Wen forms come in a second round, behind the static fit at which they begin; what takes longest goes first
+        in each.
         """
-        turns = sorted(models, key=lambda model: (model in STATIC, model != "bouc_wen_classical"))
-        if any(FORMS[model].family == "bouc_wen" for model in set(models) - {*STATIC}):
-            with suppress(IdentificationError):  # each form says so
-                _ = self._static_start
+        later = [model for model in models if model in FORMS and FORMS[model].family == "bouc_wen"]
+        later.sort(key=lambda model: model != "bouc_wen_classical")
+        first = [model for model in models if model not in later]
+        first.sort(key=lambda model: not model.startswith("bouc_wen"))
+        ahead: dict[str, Callable[[], Fit]] = {}
+        order = [*first, *later]
 
         def fitted(model: str) -> tuple[Fit | None, str]:
             try:
@@ -170,29 +173,43 @@ class Candidates:
                 raise IdentificationError(error)
             return fit
 
-        def told(turn: int) -> None:
-            begun = sum(effort for model, effort in zip(models, efforts, strict=True) if model in turns[:turn])
-            on_progress(begun, sum(efforts), f"fitting {turns[turn]}")
+        for before, turns in ((0, first), (len(first), later)):
+            if turns is later and later:
+                with suppress(IdentificationError):  # each form says so
+                    _ = self._static_start
 
-        with shared_out([partial(fitted, model) for model in turns], told) as results:
-            return {model: partial(given, *found) for model, found in zip(turns, results(), strict=True)}
+            def told(turn: int, before: int = before) -> None:
+                begun = sum(efforts[models.index(model)] for model in order[: before + turn])
+                on_progress(begun, sum(efforts), f"fitting {order[before + turn]}")
+
+            with shared_out([partial(fitted, model) for model in turns], told) as results:
+                found = dict(zip(turns, results(), strict=True))
+            ahead |= {model: partial(given, *one) for model, one in found.items()}
+            if "bouc_wen" in found and found["bouc_wen"][0] is not None:  # another process may have made it
+                vars(self)["_static_start"] = found["bouc_wen"][0]
+        return ahead
 
     def _fit(self, model: str, poles: LinearPoles | None, progress: Progress) -> Fit:
-        return self._fit_static(model, progress) if model in STATIC else self.fit_joint(model, poles, progress)
-
-    def _fit_static(self, model: str, progress: Progress) -> Fit:
         if model == "prandtl_ishlinskii":
             plays = fit_prandtl_ishlinskii(self.heads, units=self.units)
             progress(1, 1, "play operators")
             return plays
-        return fit_bouc_wen(
+        if model in STATIC:
+            return self._fit_eq_3(progress, admissible=model == "bouc_wen_admissible")
+        return self.fit_joint(model, poles, progress)
+
+    def _fit_eq_3(self, progress: Progress, *, admissible: bool = False) -> BoucWenFit:
+        fit = fit_bouc_wen(
             self.heads,
             starts=_STARTS,
             seed=self.seed,
-            admissible=model == "bouc_wen_admissible",
+            admissible=admissible,
             on_progress=progress,
             units=self.units,
         )
+        if not admissible:
+            vars(self)["_static_start"] = fit
+        return fit
 
     def fit_joint(
         self, model: str, poles: LinearPoles | None, progress: Progress, *, free_linear: bool = False
@@ -220,8 +237,8 @@ class Candidates:
 
     @cached_property
     def _static_start(self) -> BoucWenFit:
-        """Where all Bouc-Wen forms begin; fitted once."""
-        return fit_static_start(self.heads, self.units, self.seed)
+        """Where all Bouc-Wen forms begin: the fit of Eq. 3, made once."""
+        return self._fit_eq_3(no_progress)
 
     @property
     def recordings(self) -> tuple[Recording, ...]:
