@@ -417,8 +417,8 @@ def test_a_bit_flipped_in_a_payload_or_its_checksum_costs_one_chunk(path):
 
 
 def test_mending_reads_each_chunk_once_where_sqlite_gets_to_the_end(path, monkeypatch):
-    payloads, hashed, real = filled(path), [], mending.digest
-    monkeypatch.setattr(mending, "digest", lambda *parts: hashed.append(parts[:-1]) or real(*parts))
+    payloads, hashed, real = filled(path), [], mending.file.digest
+    monkeypatch.setattr(mending.file, "digest", lambda *parts: hashed.append(parts[:-1]) or real(*parts))
     flip(path, path.read_bytes().index(payloads[0, 7][-600:-500]), 5)
     mend(path)
     assert sorted(each for each in hashed if len(each) == 2) == sorted(payloads)

@@ -16,24 +16,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from microrad.campaign.ledger import chunk_format
+from microrad.campaign.ledger import chunk_format, file
 from microrad.campaign.ledger.chunk_format import Head
-from microrad.campaign.ledger.file import (
-    argument,
-    connected,
-    digest,
-    draft_of,
-    errors_in_words,
-    install,
-    locked,
-    make_empty,
-    notes_in,
-    put_head,
-    refuse_existing,
-    refuse_foreign,
-    this_process,
-    whole_head,
-)
 from microrad.campaign.records import CampaignError, Chunk, WorstTrace
 
 
@@ -61,14 +45,14 @@ class Ledger:
             path: the file.
             head: what the ledger is of.
         """
-        with errors_in_words(path, "create the ledger"):
-            refuse_existing(path)
-            with closing(locked(path)):
-                draft = draft_of(path)
-                make_empty(draft)
-                put_head(draft, head)
-                refuse_existing(path)
-                install(draft, path)
+        with file.errors_in_words(path, "create the ledger"):
+            file.refuse_existing(path)
+            with closing(file.locked(path)):
+                draft = file.draft_of(path)
+                file.make_empty(draft)
+                file.put_head(draft, head)
+                file.refuse_existing(path)
+                file.install(draft, path)
         return cls.open(path, write=True)
 
     @classmethod
@@ -81,18 +65,18 @@ class Ledger:
 
         Raises `CampaignError` if it is no ledger, or if another process already writes to it.
         """
-        with errors_in_words(path, "open the ledger"):
-            refuse_foreign(path)
-            lock = locked(path) if write else None
+        with file.errors_in_words(path, "open the ledger"):
+            file.refuse_foreign(path)
+            lock = file.locked(path) if write else None
             try:
-                ledger = cls(path, connected(path, write=write), lock)
+                ledger = cls(path, file.connected(path, write=write), lock)
             except BaseException:
                 if lock is not None:
                     lock.close()
                 raise
             try:
                 if write:
-                    ledger.note("writer", this_process())
+                    ledger.note("writer", file.this_process())
             except BaseException:
                 ledger.close()
                 raise
@@ -129,7 +113,7 @@ class Ledger:
         """
         self._check_chunk(cell, number, payload)
         with self._writing(f"keep chunk {number} of cell {cell}"):
-            row = (cell, number, digest(cell, number, payload), payload)
+            row = (cell, number, file.digest(cell, number, payload), payload)
             added = self._connection.execute("INSERT OR IGNORE INTO chunks VALUES (?, ?, ?, ?)", row).rowcount
             if not added and self.get(cell, number) != payload:
                 raise CampaignError(
@@ -144,19 +128,19 @@ class Ledger:
             cell: the cell of the grid.
             number: the chunk's number in it.
         """
-        with errors_in_words(self.path, f"read chunk {number} of cell {cell}"):
+        with file.errors_in_words(self.path, f"read chunk {number} of cell {cell}"):
             wanted = "SELECT sha256, payload FROM chunks WHERE cell = ? AND number = ?"
             row = self._connection.execute(wanted, (cell, number)).fetchone()
         return None if row is None else self._sound(cell, number, *row)
 
     def done(self) -> set[tuple[int, int]]:
         """Cell and number of every chunk that is in."""
-        with errors_in_words(self.path, "read what is done"):
+        with file.errors_in_words(self.path, "read what is done"):
             return set(self._connection.execute("SELECT cell, number FROM chunks"))
 
     def chunks(self, cell: int) -> Iterator[Chunk]:
         """The chunks of a cell in the order of their numbers, one at a time. Raises `CampaignError` if damaged."""
-        with errors_in_words(self.path, f"read the chunks of cell {cell}"):
+        with file.errors_in_words(self.path, f"read the chunks of cell {cell}"):
             wanted = "SELECT number, sha256, payload FROM chunks WHERE cell = ? ORDER BY number"
             for number, sha256, payload in self._connection.execute(wanted, (cell,)):
                 yield chunk_format.unpack_chunk(self._sound(cell, number, sha256, payload))
@@ -166,14 +150,14 @@ class Ledger:
 
         Raises `CampaignError` if damaged.
         """
-        with errors_in_words(self.path, "read what was added"):
+        with file.errors_in_words(self.path, "read what was added"):
             wanted = "SELECT rowid, cell, number, sha256, payload FROM chunks WHERE rowid > ? ORDER BY rowid"
             for at, cell, number, sha256, payload in self._connection.execute(wanted, (mark,)):
                 yield at, chunk_format.unpack_chunk(self._sound(cell, number, sha256, payload))
 
     def count(self) -> int:
         """How many chunks are in."""
-        with errors_in_words(self.path, "count what is done"):
+        with file.errors_in_words(self.path, "count what is done"):
             return int(self._connection.execute("SELECT count(*) FROM chunks").fetchone()[0])
 
     @contextmanager
@@ -189,7 +173,7 @@ class Ledger:
     @property
     def head(self) -> Head:
         """What the ledger is of. Raises `CampaignError` if neither of its two copies is whole."""
-        return whole_head(self.path, self._connection)
+        return file.whole_head(self.path, self._connection)
 
     def put_trace(self, trace: WorstTrace) -> None:
         """Keep a trace, in place of one of the same row and output."""
@@ -199,7 +183,7 @@ class Ledger:
 
     def traces(self) -> tuple[WorstTrace, ...]:
         """All traces by cell, output and row."""
-        with errors_in_words(self.path, "read the traces"):
+        with file.errors_in_words(self.path, "read the traces"):
             wanted = "SELECT payload FROM traces ORDER BY cell, output, row"
             return tuple(chunk_format.unpack_trace(row[0]) for row in self._connection.execute(wanted))
 
@@ -218,22 +202,22 @@ class Ledger:
         """
         text = json.dumps(value, sort_keys=True)
         with self._writing(f"note {key!r}"):
-            row = (key, text, digest(key, text))
+            row = (key, text, file.digest(key, text))
             kept = "ON CONFLICT(key) DO UPDATE SET value = excluded.value, sha256 = excluded.sha256"
             self._connection.execute(f"INSERT INTO notes VALUES (?, ?, ?) {kept}", row)
 
     def notes(self) -> dict[str, Any]:
         """All noted values by name; a damaged one is left out, as if it had not been noted."""
-        with errors_in_words(self.path, "read the notes"):
-            return notes_in(self._connection)
+        with file.errors_in_words(self.path, "read the notes"):
+            return file.notes_in(self._connection)
 
     def _sound(self, cell: int, number: int, sha256: bytes, payload: bytes) -> bytes:
         """The payload of a chunk if its checksum is right."""
-        if sha256 == digest(cell, number, payload):
+        if sha256 == file.digest(cell, number, payload):
             return payload
         raise CampaignError(
             f"{self.path}: chunk {number} of cell {cell} is damaged, its checksum differs; "
-            f"`microrad campaign resume {argument(self.path)}` does it again"
+            f"`microrad campaign resume {file.argument(self.path)}` does it again"
         )
 
     def _check_chunk(self, cell: int, number: int, payload: bytes) -> None:
@@ -252,7 +236,7 @@ class Ledger:
         """One transaction: all of it is kept, or nothing."""
         if self._lock is None:
             raise CampaignError(f"{self.path} is open for reading, so microrad cannot {what}")
-        with errors_in_words(self.path, what):
+        with file.errors_in_words(self.path, what):
             self._connection.execute("BEGIN IMMEDIATE")
             try:
                 yield

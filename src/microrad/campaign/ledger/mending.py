@@ -7,21 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from microrad.campaign.ledger import chunk_format
-from microrad.campaign.ledger.file import (
-    HEADS,
-    connected,
-    digest,
-    draft_of,
-    errors_in_words,
-    head_in,
-    install,
-    locked,
-    make_empty,
-    put_head,
-    refuse_foreign,
-    whole_head,
-)
+from microrad.campaign.ledger import chunk_format, file
 from microrad.campaign.records import CampaignError
 
 
@@ -53,10 +39,10 @@ def verify(path: Path, expected: Iterable[tuple[int, int]] = ()) -> Verified:
 
     Raises `CampaignError` if there is no ledger, or one that cannot be opened or has no whole head.
     """
-    with errors_in_words(path, "open the ledger"):
-        refuse_foreign(path)
-        with closing(connected(path, write=False)) as connection:
-            whole_head(path, connection)
+    with file.errors_in_words(path, "open the ledger"):
+        file.refuse_foreign(path)
+        with closing(file.connected(path, write=False)) as connection:
+            file.whole_head(path, connection)
             faults = [*_structure(connection), *_small_faults(connection)]
             right, there = dict[tuple[int, int], bool](), set[tuple[int, int]]()
             try:
@@ -81,9 +67,9 @@ def _structure(connection: sqlite3.Connection) -> list[str]:
 def _small_faults(connection: sqlite3.Connection) -> list[str]:
     """What is wrong with the head, the traces and the notes."""
     faults = []
-    for copy, table in enumerate(HEADS, 1):
+    for copy, table in enumerate(file.HEADS, 1):
         try:
-            head_in(connection, table)
+            file.head_in(connection, table)
         except (CampaignError, sqlite3.Error) as error:
             faults.append(f"copy {copy} of the head: {error}")
     for table, keys in (("traces", 3), ("notes", 1)):
@@ -98,7 +84,7 @@ def _small_faults(connection: sqlite3.Connection) -> list[str]:
 
 def _sound_chunk(row: tuple[Any, ...]) -> bool:
     cell, number, sha256, payload = row
-    return bool(sha256 == digest(cell, number, payload))
+    return bool(sha256 == file.digest(cell, number, payload))
 
 
 def _sound_trace(row: tuple[Any, ...]) -> bool:
@@ -111,7 +97,7 @@ def _sound_trace(row: tuple[Any, ...]) -> bool:
 
 def _sound_note(row: tuple[Any, ...]) -> bool:
     key, text, sha256 = row
-    return bool(sha256 == digest(key, text))
+    return bool(sha256 == file.digest(key, text))
 
 
 _KEPT: dict[str, tuple[str, Callable[[tuple[Any, ...]], bool]]] = {
@@ -127,18 +113,18 @@ def mend(path: Path) -> None:
 
     Raises `CampaignError` where SQLite cannot open it or no copy of the head is whole; then nothing is changed.
     """
-    with errors_in_words(path, "mend the ledger"), closing(locked(path)):
-        refuse_foreign(path)
-        draft = draft_of(path)
-        with closing(connected(path, write=False)) as damaged:
-            make_empty(draft)
-            put_head(draft, whole_head(path, damaged))
+    with file.errors_in_words(path, "mend the ledger"), closing(file.locked(path)):
+        file.refuse_foreign(path)
+        draft = file.draft_of(path)
+        with closing(file.connected(path, write=False)) as damaged:
+            file.make_empty(draft)
+            file.put_head(draft, file.whole_head(path, damaged))
             with closing(sqlite3.connect(draft)) as mended, mended:
                 for table, (columns, _) in _KEPT.items():
                     marks = ", ".join("?" * len(columns.split(",")))
                     whole = _whole_rows(damaged, table)
                     mended.executemany(f"INSERT OR IGNORE INTO {table} (rowid, {columns}) VALUES (?, {marks})", whole)
-        install(draft, path)
+        file.install(draft, path)
 
 
 def _whole_rows(damaged: sqlite3.Connection, table: str) -> Iterator[tuple[Any, ...]]:
