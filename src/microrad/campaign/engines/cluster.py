@@ -20,15 +20,7 @@ from queue import Empty, SimpleQueue
 from typing import Any
 
 from microrad.campaign.engines.jobs import SLICE_S, Clock, JobQueue, late_reason
-from microrad.campaign.engines.worker import (
-    Beat,
-    Kind,
-    Work,
-    beat_every_s,
-    code_sha256,
-    open_target,
-    words,
-)
+from microrad.campaign.engines.worker import Beat, Kind, Work, beat_every_s, code_sha256, open_target, words
 from microrad.campaign.records import CampaignError, Job, Outcome
 from microrad.core.installing import advice
 
