@@ -385,14 +385,13 @@ def test_the_state_of_an_identification_in_words(tmp_path):
 
 
 def test_the_outcome_is_read_from_what_the_command_prints():
-    said = {"model": "m", "verdict": ["a"], "warnings": ["b"], "refused": {"c": "why"}, "travel_rad": 1e-3}
+    said = {"model": "m", "verdict": ["a"], "warnings": ["b"], "refused": {"c": "why"}}
     found = mirror_view.outcome(json.dumps(said))
-    model, (table, verdict, warned, refused) = found
+    model, (verdict, warned, refused) = found
     assert (model, verdict, warned.lines, refused.lines) == ("m", "a", ["Warning: b"], ["Not fitted: c: why"])
-    assert table.rows == [("travel over the fitted drive", "1 mrad")]
     for damaged in ("", "{", "[]", '{"model": "m"}', '{"model": "m", "verdict": 1}'):
         assert mirror_view.outcome(damaged) is None
-    assert mirror_view.outcome(json.dumps({**said, "travel_rad": None})) == ("m", ("a", warned, refused))
+    assert mirror_view.outcome(json.dumps({**said, "refused": {}})) == ("m", ("a", warned))
 
 
 # ---------------------------------------------------------------------------------------------- the mirror in a mission

@@ -18,6 +18,7 @@ from microrad.report.plotting.figure import Figure as Reported
 from microrad.report.plotting.sheet import Line, grid
 from microrad.report.tables import Cell, Table
 from microrad.report.view import Drawing, Points, Soft, Verbatim, Verdict, View
+from microrad.studio.jobs.files import EXIT, STARTED, STDOUT, note
 from microrad.studio.jobs.queue import JobError
 from microrad.studio.recordings import reading
 from microrad.studio.recordings.uploads import Uploads
@@ -124,8 +125,9 @@ def session(tmp_path_factory):
     runs.write_campaign(found)
     for number, kind in enumerate(("identification", "campaign", "study"), 1):
         job = written(found.studio / "jobs", number, kind=kind)
-        (job / "started").touch()
-        (job / "stdout").write_text("said\n", "utf-8")
+        note(job / STARTED, pid=1)
+        (job / STDOUT).write_text("said\n", "utf-8")
+        note(job / EXIT, code=0)
     time = np.arange(400) / 200
     drive = 50 - 50 * np.cos(2 * np.pi * time)
     rows = np.column_stack([time, drive, 10 * drive])

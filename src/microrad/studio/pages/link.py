@@ -15,7 +15,6 @@ from microrad.mission.file import LinkFile
 from microrad.report.links.views import budget_table
 from microrad.report.view import Block
 from microrad.studio import commands
-from microrad.studio.draft.draft import Draft
 from microrad.studio.pages import layout
 from microrad.studio.pages.elements import Blocks, Figure, MarginCards, put, table
 from microrad.studio.pages.in_thread import in_thread
@@ -25,7 +24,6 @@ from microrad.studio.views import link as link_view
 from microrad.studio.views.latest import Latest, shared
 from microrad.studio.views.link import LinkView
 from microrad.studio.views.plots import Plot, drawn
-from microrad.studio.views.sliders import Slider
 
 TITLE = "Links"
 PATH = "/link"
@@ -46,7 +44,7 @@ class LinkPage(SliderPage[LinkView]):
         self.study: Latest[LinkStudy] = shared(session, "links")
         self.shown, self.rested = "", ("", 0.0)
         layout.copy_buttons(lambda: commands.budget(layout.file_of(session)))
-        super().__init__(session, link_view.second)
+        super().__init__(session, link_view.sliders, self._view, link_view.second)
         ui.timer(_LOOK_S, self._look)
 
     def build(self) -> None:
@@ -65,14 +63,6 @@ class LinkPage(SliderPage[LinkView]):
         self.told = Blocks()
         self.dimmed = (self.cards, self.map, self.key, self.words, self.table)
 
-    def sliders(self, draft: Draft) -> Mapping[str, tuple[Slider, ...]]:
-        """The numbers of the links' tables."""
-        return link_view.sliders(draft)
-
-    def view(self, file: LinkFile) -> LinkView:
-        """Budgets and map, on the axes that the map has."""
-        return link_view.view(file, None if self.view_now is None else self.view_now.frame)
-
     async def show(self, view: LinkView) -> None:
         """Margins and map."""
         self.cards.show(view.margins)
@@ -83,6 +73,10 @@ class LinkPage(SliderPage[LinkView]):
         self.key.text = link_view.map_key(view.data.requirement.margin_db)
         self.words.text = link_view.map_words(view)
         self._tabs()
+
+    def _view(self, file: LinkFile) -> LinkView:
+        """Budgets and map, on the axes that the map has."""
+        return link_view.view(file, None if self.view_now is None else self.view_now.frame)
 
     def _tabs(self) -> None:
         names = [b.name for b in self.view_now.budgets] if self.view_now else []

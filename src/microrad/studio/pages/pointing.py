@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
-from microrad.mission.file import LinkFile
 from microrad.studio import commands
-from microrad.studio.draft.draft import Draft
 from microrad.studio.pages import layout
 from microrad.studio.pages.elements import Blocks, Figure
 from microrad.studio.pages.sliders import SliderPage
 from microrad.studio.session import Session
 from microrad.studio.views import pointing as pointing_view
 from microrad.studio.views.pointing import PointingView
-from microrad.studio.views.sliders import Slider
 
 TITLE = "Pointing"
 PATH = "/pointing"
@@ -30,7 +25,7 @@ class PointingPage(SliderPage[PointingView]):
     def __init__(self, session: Session) -> None:
         """Build the body, and have it follow the session."""
         layout.copy_buttons(lambda: commands.budget(layout.file_of(session)))
-        super().__init__(session)
+        super().__init__(session, pointing_view.sliders, pointing_view.view)
 
     def build(self) -> None:
         """Coverage, lines and totals, point-ahead."""
@@ -40,14 +35,6 @@ class PointingPage(SliderPage[PointingView]):
         self.bars = Figure("Half widths of the lines and totals of the rules; in numbers in the tables below")
         self.told = Blocks()
         self.dimmed = (self.coverage, self.bars, self.told)
-
-    def sliders(self, draft: Draft) -> Mapping[str, tuple[Slider, ...]]:
-        """The numbers that move the budget."""
-        return pointing_view.sliders(draft)
-
-    def view(self, file: LinkFile) -> PointingView:
-        """The budget."""
-        return pointing_view.view(file)
 
     async def show(self, view: PointingView) -> None:
         """Both plots."""

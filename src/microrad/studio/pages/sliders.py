@@ -168,14 +168,22 @@ class SliderPage(Generic[T]):
 
     dimmed: tuple[Element, ...] = ()
 
-    def __init__(self, session: Session, seldom: Callable[[str], bool] = lambda key: False) -> None:
+    def __init__(
+        self,
+        session: Session,
+        sliders: Callable[[Draft], Mapping[str, tuple[Slider, ...]]],
+        view: Callable[[LinkFile], T],
+        seldom: Callable[[str], bool] = lambda key: False,
+    ) -> None:
         """Build sliders at the left and results at the right, and have them follow the session.
 
         Args:
             session: the session of all tabs.
+            sliders: the sliders of a draft in groups.
+            view: what is to be shown of a mission; runs in a thread. Its ValueError says why nothing can be.
             seldom: whether a key stands folded.
         """
-        self.session = session
+        self.session, self.sliders, self.view = session, sliders, view
         self.view_now: T | None = None
         self.last: Attempt[T] | None = None
         self._wanted: Callable[[], Attempt[T]] | None = None
@@ -192,14 +200,6 @@ class SliderPage(Generic[T]):
     # ------------------------------------------------------------------------------------------ what a page is made of
     def build(self) -> None:
         """Build what stands at the right."""
-        raise NotImplementedError
-
-    def sliders(self, draft: Draft) -> Mapping[str, tuple[Slider, ...]]:
-        """The sliders of a draft in groups."""
-        raise NotImplementedError
-
-    def view(self, file: LinkFile) -> T:
-        """What is to be shown of a mission; runs in a thread."""
         raise NotImplementedError
 
     async def show(self, view: T) -> None:

@@ -15,8 +15,6 @@ from microrad.core.units import format_quantity
 from microrad.lab.live_fit import LIVE_FITS, LiveFit
 from microrad.report.plotting.palette import BLACK, BLUE, GREY, SKY, VERMILION
 from microrad.report.plotting.sheet import Axis, Line, Span, grid
-from microrad.report.quantities import quantity
-from microrad.report.tables import Table
 from microrad.report.view import Block, Points, told
 from microrad.studio.guard import plain_files
 from microrad.studio.jobs.queue import Job
@@ -149,24 +147,9 @@ def outcome(said: str) -> tuple[str, tuple[Block, ...]] | None:
         data = json.loads(said)
         warnings = [f"Warning: {each}" for each in map(str, data["warnings"])]
         refused = [f"Not fitted: {model}: {why}" for model, why in data["refused"].items()]
-        rows = [
-            (name, quantity(float(data[key]), unit))
-            for key, (name, unit) in _FOUND.items()
-            if data.get(key) is not None
-        ]
-        table = Table("", ("found", "value"), rows) if rows else None
-        return str(data["model"]), told(table, *map(str, data["verdict"]), Points(warnings), Points(refused))
+        return str(data["model"]), told(*map(str, data["verdict"]), Points(warnings), Points(refused))
     except (ValueError, KeyError, TypeError, AttributeError):
         return None
-
-
-_FOUND = {
-    "travel_rad": ("travel over the fitted drive", "rad"),
-    "drive_min_v": ("drive, lowest", "V"),
-    "drive_max_v": ("drive, highest", "V"),
-    "rate_limit_v_s": ("fastest drive", "V/s"),
-    "drift_rad": ("drift over the recording", "rad"),
-}
 
 
 def doing(what: str) -> str:
