@@ -254,24 +254,18 @@ class PlantProblem:
         # A point is asked for up to three times: by the search, by the derivatives there and by the report.
         self.simulated = lru_cache(maxsize=2 * self.scale.size + 2)(self._simulate)
 
-    def outputs(self, values: Floats) -> list[Floats]:
-        """Used outputs of each run without their nuisance, weighted."""
-        model = self.structure.build(values)
-        plants = {step: mirror.discretise(model, step, often=True) for step in {run.step_s for run in self.runs}}
-        return [
-            r.weight * without_nuisance(r.nuisance, simulate_record(plants[r.step_s], r)[r.first :]) for r in self.runs
-        ]
-
     def modelled(self, point: Floats) -> Floats:
         """All used outputs as one vector, at a scaled point; far off where the plant cannot be stepped or runs away."""
         return self.simulated(point.tobytes())
 
     def _simulate(self, point: bytes) -> Floats:
         try:
-            parts = self.outputs(np.frombuffer(point) * self.scale)
+            model = self.structure.build(np.frombuffer(point) * self.scale)
+            plants = {step: mirror.discretise(model, step, often=True) for step in {run.step_s for run in self.runs}}
         except ValueError:
             return np.full(self.size, self.far)
-        whole = np.concatenate([part.ravel() for part in parts])
+        used = [(run, simulate_record(plants[run.step_s], run)[run.first :]) for run in self.runs]
+        whole = np.concatenate([run.weight * without_nuisance(run.nuisance, output).ravel() for run, output in used])
         return np.where(np.abs(whole) < self.far, whole, self.far)  # nan and inf too
 
     def residual(self, point: Floats) -> Floats:
