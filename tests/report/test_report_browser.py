@@ -1,5 +1,6 @@
 """The report in Chromium: nothing is loaded, no error, each figure comes alive and prints, and anyone can read it."""
 
+import os
 import re
 from functools import cache, partial
 from pathlib import Path
@@ -142,9 +143,17 @@ def test_each_figure_comes_alive_and_nothing_is_loaded_or_complained_of(opened, 
         assert_no_barrier(here.page)
 
 
+ROWS = """document.querySelectorAll('tbody').forEach(body => {
+  [...body.rows].slice(8).forEach(row => row.querySelector('.mark') || row.remove());
+})"""
+"""Leaves eight rows of each table, and those with a mark: the others look like these, and axe takes long for each."""
+
+
 def assert_no_barrier(page):
-    """That axe finds nothing, what is folded opened."""
+    """That axe finds nothing, what is folded opened; the page is left with fewer rows."""
     page.evaluate("document.querySelectorAll('details').forEach(each => { each.open = true })")
+    if not os.environ.get("MICRORAD_ENDURANCE"):
+        page.evaluate(ROWS)
     found = violations(page)
     assert [(each["id"], each["impact"], each["nodes"][0]["html"][:150]) for each in found] == []
 
