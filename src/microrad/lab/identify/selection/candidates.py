@@ -132,13 +132,16 @@ class Candidates:
                 on_progress(before + done, sum(efforts), what)
 
             try:
-                fits.append(ahead[model]() if ahead else self._fit(model, poles, progress))
+                fit = ahead[model] if ahead else self._fit(model, poles, progress)
+                if isinstance(fit, IdentificationError):
+                    raise fit
             except IdentificationError as error:
                 if model in STATIC:
                     raise
                 failed.append(Refused(model, str(error)))
             else:
-                on_fit(fits[-1])
+                fits.append(fit)
+                on_fit(fit)
             if not ahead and model not in STATIC:
                 progress(1, 1, model)
         if ahead:
@@ -149,8 +152,8 @@ class Candidates:
 
     def _side_by_side(
         self, models: Sequence[str], efforts: Sequence[int], poles: LinearPoles | None, on_progress: Progress
-    ) -> dict[str, Callable[[], Fit]]:
-        """What gives the fit of each model, or raises its error: all of them made, on all cores where that is possible.
+    ) -> dict[str, Fit | IdentificationError]:
+        """The fit of each model, or its error, made on all cores where that is possible.
 
         Bouc-Wen forms come in a second round, behind the static fit at which they begin; what takes longest goes first
         in each.
@@ -159,19 +162,14 @@ class Candidates:
         later.sort(key=lambda model: model != "bouc_wen_classical")
         first = [model for model in models if model not in later]
         first.sort(key=lambda model: not model.startswith("bouc_wen"))
-        ahead: dict[str, Callable[[], Fit]] = {}
+        ahead: dict[str, Fit | IdentificationError] = {}
         order = [*first, *later]
 
-        def fitted(model: str) -> tuple[Fit | None, str]:
+        def fitted(model: str) -> Fit | IdentificationError:
             try:
-                return self._fit(model, poles, no_progress), ""
+                return self._fit(model, poles, no_progress)
             except IdentificationError as error:
-                return None, str(error)
-
-        def given(fit: Fit | None, error: str) -> Fit:
-            if fit is None:
-                raise IdentificationError(error)
-            return fit
+                return error
 
         for before, turns in ((0, first), (len(first), later)):
             if turns is later and later:
@@ -183,10 +181,9 @@ class Candidates:
                 on_progress(begun, sum(efforts), f"fitting {order[before + turn]}")
 
             with shared_out([partial(fitted, model) for model in turns], told) as results:
-                found = dict(zip(turns, results(), strict=True))
-            ahead |= {model: partial(given, *one) for model, one in found.items()}
-            if "bouc_wen" in found and found["bouc_wen"][0] is not None:  # another process may have made it
-                vars(self)["_static_start"] = found["bouc_wen"][0]
+                ahead |= zip(turns, results(), strict=True)
+            if isinstance(fit := ahead.get("bouc_wen"), BoucWenFit):  # another process may have made it
+                vars(self)["_static_start"] = fit
         return ahead
 
     def _fit(self, model: str, poles: LinearPoles | None, progress: Progress) -> Fit:
