@@ -1,6 +1,7 @@
 """Acquisition as a chain of timed stages with retries: probability and time until both terminals lock."""
 
 import math
+from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated
@@ -331,8 +332,9 @@ def simulate(stages: Sequence[Stage], attempts: int, runs: int, seed: int) -> Se
     _COUNT.check("the number of runs", runs)
     back = check_sequence(stages, attempts)
     draw = np.random.Generator(np.random.Philox(key=seed))
-    logs = [_run(stages, back, attempts, draw) for _ in range(runs)]
-    return SequenceRuns(np.array([log[-1].to == LOCKED for log in logs]), np.array([log[-1].time_s for log in logs]))
+    ends = [_moments(stage) for stage in stages]
+    found = [_run(stages, back, attempts, draw, ends) for _ in range(runs)]
+    return SequenceRuns(np.array([locked for locked, _ in found]), np.array([time_s for _, time_s in found]))
 
 
 def simulate_log(stages: Sequence[Stage], attempts: int, seed: int) -> tuple[Transition, ...]:
@@ -347,33 +349,46 @@ def simulate_log(stages: Sequence[Stage], attempts: int, seed: int) -> tuple[Tra
         ValueError: As `solve_sequence`.
     """
     back = check_sequence(stages, attempts)
-    return tuple(_run(stages, back, attempts, np.random.Generator(np.random.Philox(key=seed))))
+    log: list[Transition] = []
+    draw = np.random.Generator(np.random.Philox(key=seed))
+    _run(stages, back, attempts, draw, [_moments(stage) for stage in stages], log)
+    return tuple(log)
 
 
 _DONE = "done"
 
+_Moments = tuple[list[float], list[float]]
 
-def _run(stages: Sequence[Stage], back: Sequence[int], attempts: int, draw: np.random.Generator) -> list[Transition]:
+
+def _moments(stage: Stage) -> _Moments:
+    """Weights up to each moment at which a stage may end, and the moments in s; no weight where there is one alone."""
+    if not isinstance(stage.duration_s, TimeDistribution):
+        return [], [stage.duration_s]
+    return np.cumsum(stage.duration_s.weight).tolist(), stage.duration_s.time_s.tolist()
+
+
+def _run(
+    stages: Sequence[Stage],
+    back: Sequence[int],
+    attempts: int,
+    draw: np.random.Generator,
+    moments: Sequence[_Moments],
+    log: list[Transition] | None = None,
+) -> tuple[bool, float]:
+    """Whether one run locks, and when it does or is given up, in s; its transitions are added to the log."""
     time_s, index, failures = 0.0, 0, 0
-    log: list[Transition] = []
     while index < len(stages) and failures < attempts:
         stage = stages[index]
         if draw.random() < stage.success_probability:
-            time_s += _duration(stage, draw)
+            up_to, ends = moments[index]
+            time_s += ends[min(bisect_right(up_to, draw.random() * up_to[-1]), len(ends) - 1)] if up_to else ends[0]
             following, cause = index + 1, _DONE
         else:
             time_s += stage.failure_s
             failures += 1
             following, cause = back[index], f"time-out, failure {failures} of {attempts}"
-        name = stages[following].name if following < len(stages) else LOCKED
-        log.append(Transition(time_s, stage.name, LOST if failures == attempts else name, cause))
+        if log is not None:
+            name = stages[following].name if following < len(stages) else LOCKED
+            log.append(Transition(time_s, stage.name, LOST if failures == attempts else name, cause))
         index = following
-    return log
-
-
-def _duration(stage: Stage, draw: np.random.Generator) -> float:
-    if not isinstance(stage.duration_s, TimeDistribution):
-        return stage.duration_s
-    cumulative = np.cumsum(stage.duration_s.weight)
-    index = int(np.searchsorted(cumulative, draw.random() * cumulative[-1], side="right"))
-    return float(stage.duration_s.time_s[min(index, cumulative.size - 1)])
+    return failures < attempts, time_s
