@@ -12,7 +12,7 @@ import os
 import shutil
 import tempfile
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from microrad.core.folder import write_whole
@@ -72,19 +72,11 @@ class Jobs:
             raise JobError(f"'{order.kind}' is no kind of job; it is one of {', '.join(KINDS)}")
         if not order.cwd.is_dir():
             raise JobError(f"{order.cwd} is no folder to run a job in; choose another working folder")
-        described = {
-            "kind": order.kind,
-            "title": order.title,
-            "arguments": list(order.arguments),
-            "cwd": str(order.cwd.absolute()),
-            "results": list(order.results),
-            "queued": now(),
-            "folder": str(self.folder),
-        }
+        place = {"cwd": str(order.cwd.absolute()), "queued": now(), "folder": str(self.folder)}
         try:
             for each in (self.folder.parent, self.folder):  # both may have been removed meanwhile
                 _make_private(each)
-            folder = self._put(json.dumps(described, indent=2))
+            folder = self._put(json.dumps(asdict(order) | place, indent=2))
         except OSError as error:
             raise JobError(f"{self.folder}: {error.strerror}; check free space and permissions") from error
         except SigningError as error:
