@@ -19,6 +19,7 @@ from microrad.studio.guard.names import NameRefusedError, safe_name, typed_words
 from microrad.studio.pages import layout
 from microrad.studio.pages.mission_form import Form, fault_words, table_of, tables
 from microrad.studio.session import Session
+from microrad.studio.views.runs import free_name
 
 TITLE = "Mission"
 PATH = "/"
@@ -256,20 +257,11 @@ def _new(session: Session, shown: Callable[[str], None]) -> None:
     texts[_SHIPPED] = "the shipped mission, with mirror, loop and orbit"
 
     def do(name: str) -> None:
-        file = "leo-geo.toml" if name == _SHIPPED else f"{name}.toml"
-        draft = Draft.shipped(_free(session, file))
+        file = free_name(session, "leo-geo" if name == _SHIPPED else name, ".toml")
+        draft = Draft.shipped(session.inside(file))
         session.replace(draft if name == _SHIPPED else draft.with_text(presets.preset_text(name)))
 
     _ask("Begin a new mission", "From", "Begin", texts, do, shown, _lost(session))
-
-
-def _free(session: Session, name: str) -> str:
-    """The path of a name that no file has yet."""
-    stem, number, path = name.removesuffix(".toml"), 1, session.inside(name)
-    while path.exists():
-        number += 1
-        path = session.inside(f"{stem}-{number}.toml")
-    return str(path)
 
 
 def _lost(session: Session) -> str:
