@@ -140,6 +140,20 @@ def test_row_relaxation_is_libms():
     assert side_by_side.row_relaxation(0.0) == side_by_side.row_relaxation(-0.0) == 1.0
 
 
+def test_near_row_functions_are_libms_up_to_where_they_are_good_for():
+    x = np.concatenate([np.linspace(-1, 1, 4001), np.geomspace(1e-18, 1, 400), [0.0, -0.0]])
+    error = np.max(np.abs(over(side_by_side.near_row_exp, side_by_side.NEAR_EXP * x) / np.exp(2 * x) - 1))
+    k = side_by_side.NEAR_DECAY * x
+    found = np.prod(over(side_by_side.near_row_relaxation, k), axis=1)
+    expected = np.divide(-np.expm1(-k), k, out=np.ones_like(k), where=k != 0)
+    away = np.max(np.abs(found / expected - 1))
+    print(f"exp within {error:.1e}, (1 - exp(-k)) / k within {away:.1e}")
+    assert error < 2e-15
+    assert away < 2e-15
+    assert (found[-2:] == 1.0).all()
+    assert side_by_side.near_row_exp(0.0) == 1.0
+
+
 def test_row_logarithm_is_libms():
     x = np.concatenate(
         [np.geomspace(2.3e-308, 1.7e308, 8001), np.linspace(0.5, 2, 4001), (np.arange(1, 2001) - 0.5) / 2**32]

@@ -34,7 +34,17 @@ from microrad.core.kernels.records import (
     WIDENING,
     WIDENING_LIMIT,
 )
-from microrad.core.kernels.side_by_side import ROW_LENGTH, at_row, row_exp, row_relaxation
+from microrad.core.kernels.side_by_side import (
+    NEAR_DECAY,
+    NEAR_EXP,
+    ROW_LENGTH,
+    at_row,
+    bits_of,
+    near_row_exp,
+    near_row_relaxation,
+    row_exp,
+    row_relaxation,
+)
 
 
 @merged
@@ -162,18 +172,40 @@ def _small_exp(x):  # type: ignore[no-untyped-def]
 
 @compiled_loop
 def _mend(rows, e, bank, at, rate_gain, power):  # type: ignore[no-untyped-def]
-    """h and z of those runs whose h changes sign inside the step, which few do; of all for another exponent than 1."""
+    """h and z of those runs whose h changes sign inside the step or decays far; of all for another exponent than 1."""
+    d1, bias = rows[e, D1], rows[e, BIAS]
     for r in range(ROW_LENGTH):
-        h, end, travel = (
+        h, end, travel, forcing = (
             bank[at + at_row(BANK_H_BEFORE) + r],
             bank[at + at_row(BANK_H) + r],
             bank[at + at_row(BANK_TRAVEL) + r],
+            bank[at + at_row(BANK_FORCING) + r],
         )
-        if power or (h * end <= 0.0 and h * rows[e, EPSILON] * travel < 0.0):
+        far = abs(travel) > _near_travel(rows, e)
+        if far:
+            decay = _decay(rows, e, h, forcing, travel)
+            end = h + (forcing - decay * h) * row_relaxation(decay)
+        crosses = (bits_of(h) ^ bits_of(end)) < 0 and h * forcing < 0.0
+        if far or crosses or power:
             rate = clamp(travel * rate_gain, rows[e, RATE_LIMIT])
-            mended = bouc_wen_advance(h, travel, rate, rows, e)
-            bank[at + at_row(BANK_H) + r] = mended
-            bank[at + at_row(BANK_Z) + r] += mended - end
+            if crosses or power:
+                end = bouc_wen_advance(h, travel, rate, rows, e)
+            linear = d1 * row_exp(-rows[e, D2] * rate) * (bank[at + at_row(BANK_Q) + r] + bias) - d1 * bias
+            bank[at + at_row(BANK_H) + r] = end
+            bank[at + at_row(BANK_Z) + r] = linear + end
+
+
+@inlined
+def _near_travel(rows, e):  # type: ignore[no-untyped-def]
+    """Up to which travel the decay is within NEAR_DECAY. No test of the decay: the compiler rounds it as it likes."""
+    return NEAR_DECAY / (abs(rows[e, ALPHA]) + abs(rows[e, BETA]) + abs(rows[e, GAMMA]) + abs(rows[e, ETA]))
+
+
+@inlined
+def _decay(rows, e, h, forcing, travel):  # type: ignore[no-untyped-def]
+    alpha, beta, gamma, eta = rows[e, ALPHA], rows[e, BETA], rows[e, GAMMA], rows[e, ETA]
+    common, split = alpha * abs(travel) + eta * travel, gamma * abs(travel) + beta * travel
+    return common + split if (h if h != 0.0 else forcing) > 0.0 else common - split
 
 
 @merged
@@ -184,45 +216,56 @@ def _advance_bouc_wen(rows, e, bank, at, rate_gain, counts):  # type: ignore[no-
     """
     limit, delta, d2 = rows[e, RATE_LIMIT], rows[e, DELTA], -rows[e, D2]
     d1, bias, epsilon = rows[e, D1], rows[e, BIAS], rows[e, EPSILON]
-    alpha, beta, gamma, eta = rows[e, ALPHA], rows[e, BETA], rows[e, GAMMA], rows[e, ETA]
-    if (epsilon == 0.0) & (d2 == 0.0):  # a slow gain alone, as without hysteresis: h stays 0
-        for r in range(ROW_LENGTH):
-            q = bank[at + at_row(BANK_Q_NEXT) + r]
-            free = (q - bank[at + at_row(BANK_Q) + r]) * rate_gain
-            counts[at_row(COUNT_CLAMPED) + r] += 0.0 if free == min(max(free, -limit), limit) else 1.0
-            bank[at + at_row(BANK_Z_BEFORE) + r] = bank[at + at_row(BANK_Z) + r]
-            bank[at + at_row(BANK_Z) + r] = d1 * (q + bias) - d1 * bias
-            bank[at + at_row(BANK_Q) + r] = q
-        return
-    crossing, small = 0, abs(d2) * limit <= 0.02
-    # Two loops: their chains of arithmetic are long, and shorter ones overlap better from run to run.
+    # Several short loops: their constants stay in registers, and their chains of arithmetic overlap from run to run.
+    clamped, small = np.int64(0), abs(d2) * limit <= 0.02
     for r in range(ROW_LENGTH):
         q = bank[at + at_row(BANK_Q_NEXT) + r]
         travel = q - bank[at + at_row(BANK_Q) + r]
         free = travel * rate_gain
         rate = min(max(free, -limit), limit)
-        counts[at_row(COUNT_CLAMPED) + r] += 0.0 if free == rate else 1.0
-        bank[at + at_row(BANK_FORCING) + r] = epsilon * row_exp(delta * abs(rate)) * travel
+        clamped |= bits_of(free - rate)
+        grown = _small_exp(d2 * rate)
         bank[at + at_row(BANK_TRAVEL) + r] = travel
-        bank[at + at_row(BANK_Z_BEFORE) + r] = bank[at + at_row(BANK_Z) + r]
-        grown = _small_exp(d2 * rate) if small else row_exp(d2 * rate)
-        bank[at + at_row(BANK_Z) + r] = d1 * grown * (q + bias) - d1 * bias
         bank[at + at_row(BANK_Q) + r] = q
+        bank[at + at_row(BANK_Z_BEFORE) + r] = bank[at + at_row(BANK_Z) + r]
+        bank[at + at_row(BANK_Z) + r] = d1 * grown * (q + bias) - d1 * bias
+    if not small:
+        for r in range(ROW_LENGTH):
+            rate = min(max(bank[at + at_row(BANK_TRAVEL) + r] * rate_gain, -limit), limit)
+            grown = row_exp(d2 * rate)
+            bank[at + at_row(BANK_Z) + r] = d1 * grown * (bank[at + at_row(BANK_Q) + r] + bias) - d1 * bias
+    if clamped != 0:
+        for r in range(ROW_LENGTH):
+            free = bank[at + at_row(BANK_TRAVEL) + r] * rate_gain
+            counts[at_row(COUNT_CLAMPED) + r] += 0.0 if free == min(max(free, -limit), limit) else 1.0
+    if epsilon == 0.0:  # h stays 0
+        return
+    if abs(delta) * limit <= NEAR_EXP:
+        for r in range(ROW_LENGTH):
+            travel = bank[at + at_row(BANK_TRAVEL) + r]
+            rate = min(abs(travel * rate_gain), limit)
+            bank[at + at_row(BANK_FORCING) + r] = epsilon * near_row_exp(delta * rate) * travel
+    else:
+        for r in range(ROW_LENGTH):
+            travel = bank[at + at_row(BANK_TRAVEL) + r]
+            rate = min(abs(travel * rate_gain), limit)
+            bank[at + at_row(BANK_FORCING) + r] = epsilon * row_exp(delta * rate) * travel
+    unusual, near = np.int64(0), _near_travel(rows, e)  # the sign of the first: somewhere h changes sign or decays far
     for r in range(ROW_LENGTH):
         h, forcing, travel = (
             bank[at + at_row(BANK_H) + r],
             bank[at + at_row(BANK_FORCING) + r],
             bank[at + at_row(BANK_TRAVEL) + r],
         )
-        common, split = alpha * abs(travel) + eta * travel, gamma * abs(travel) + beta * travel
-        decay = common + split if (h if h != 0.0 else forcing) > 0.0 else common - split
-        end = h + (forcing - decay * h) * row_relaxation(decay)
-        crossing += 1 if (h * forcing < 0.0) & (h * end <= 0.0) else 0
+        decay = _decay(rows, e, h, forcing, travel)
+        half, other = near_row_relaxation(decay)
+        end = h + ((forcing - decay * h) * half) * other
+        unusual |= (bits_of(h) ^ bits_of(end)) | bits_of(near - abs(travel))
         bank[at + at_row(BANK_H_BEFORE) + r] = h
         bank[at + at_row(BANK_H) + r] = end
         bank[at + at_row(BANK_Z) + r] += end
     power = rows[e, POWER] != 0.0
-    if crossing > 0 or power:
+    if unusual < 0 or power:
         _mend(rows, e, bank, at, rate_gain, power)
 
 

@@ -18,6 +18,8 @@ _ROOT_HALF_BITS = np.int64(0x3FE6A09E667F3BCD)
 _ROUND_BITS = np.int64(0x4338000000000000)
 _MANTISSA = np.int64(52)
 
+NEAR_EXP, NEAR_DECAY = 2.0, 4.0  # how far the series of `near_row_exp` and `near_row_relaxation` are good for
+
 ROW_LENGTH = np.uint64(LANES)  # unsigned, as every place in a row of runs: no test for a negative index in the loops
 
 if numba_config.DISABLE_JIT:  # set when numba is loaded
@@ -95,6 +97,45 @@ def row_relaxation(k):  # type: ignore[no-untyped-def]
     scale = number_of(_ONE_BITS + (bits_of(shifted) << _MANTISSA))
     grown = scale * _grown(r) + (scale - 1.0)
     return 1.0 if x == 0.0 else grown / x
+
+
+@inlined
+def near_row_exp(x):  # type: ignore[no-untyped-def]
+    """exp(x) for |x| <= NEAR_EXP: exp(y)^4 with y = x / 4, by its series economised for |y| <= 1/2 (error 5e-18)."""
+    y = 0.25 * x
+    y2 = y * y
+    even = 0.041666666666668815 + y2 * (
+        0.001388888888837246 + y2 * (2.480158789165942e-05 + y2 * (2.755697317701901e-07 + y2 * 2.097735036131617e-09))
+    )
+    odd = 0.16666666666668065 + y2 * (
+        0.00833333333288564
+        + y2 * (0.00019841270455102898 + y2 * (2.7556910165747336e-06 + y2 * 2.5182902237048238e-08))
+    )
+    root = (1.0 + y2 * (0.49999999999999994 + y2 * even)) + y * (0.9999999999999999 + y2 * odd)
+    square = root * root
+    return square * square
+
+
+@inlined
+def near_row_relaxation(k):  # type: ignore[no-untyped-def]
+    """(1 - exp(-k)) / k =: f(k) for |k| <= NEAR_DECAY, without a division, as two factors: a f(k) = (a first) second.
+
+    f(2 k) = f(k) (1 - f(k) k / 2), twice, from the series of f(r), r = k / 4, economised for |r| <= 1 (error 1e-16).
+    """
+    r = 0.25 * k
+    r2 = r * r
+    even = 0.008333333333481638 + r2 * (
+        0.00019841269752333027
+        + r2 * (2.7557344614538454e-06 + r2 * (2.5048389313364278e-08 + r2 * 1.6328813678829017e-10))
+    )
+    odd = 0.001388888888906751 + r2 * (
+        2.4801587216571472e-05
+        + r2 * (2.7557339990277737e-07 + r2 * (2.0874041838692515e-09 + r2 * 1.1651309874417153e-11))
+    )
+    odd = 0.5 + r2 * (0.04166666666666501 + r2 * odd)
+    quarter = (1.0 + r2 * (0.1666666666666574 + r2 * even)) - r * odd
+    half = quarter * (1.0 - 0.5 * r * quarter)
+    return half, 1.0 - r * half
 
 
 @inlined
