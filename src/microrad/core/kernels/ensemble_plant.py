@@ -198,7 +198,8 @@ def _mend(rows, e, bank, at, rate_gain, power):  # type: ignore[no-untyped-def]
 @inlined
 def _near_travel(rows, e):  # type: ignore[no-untyped-def]
     """Up to which travel the decay is within NEAR_DECAY. No test of the decay: the compiler rounds it as it likes."""
-    return NEAR_DECAY / (abs(rows[e, ALPHA]) + abs(rows[e, BETA]) + abs(rows[e, GAMMA]) + abs(rows[e, ETA]))
+    most = abs(rows[e, ALPHA]) + abs(rows[e, BETA]) + abs(rows[e, GAMMA]) + abs(rows[e, ETA])
+    return NEAR_DECAY / max(most, 1e-300)
 
 
 @inlined

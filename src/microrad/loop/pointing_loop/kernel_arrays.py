@@ -224,38 +224,35 @@ def start(
     words = 4 * (-(-(axes + outputs) // 4))
     samples_late = -(-p.delay_steps // p.steps_per_sample)
 
-    def rows(count: int) -> Floats:
-        return np.zeros(max(count, 1) * LANES)
-
     state = kernels.EnsembleState(
         first_run=runs,
         place=np.zeros(3, dtype=np.int64),
-        x=rows(n),
-        x_next=rows(n),
-        drive=rows(kernels.DRIVE_FIELDS * m),
-        bank=rows(kernels.BANK_FIELDS * p.G.shape[0]),
-        play=rows(p.play_threshold.size),
-        y=rows(outputs),
+        x=_rows(n),
+        x_next=_rows(n),
+        drive=_rows(kernels.DRIVE_FIELDS * m),
+        bank=_rows(kernels.BANK_FIELDS * p.G.shape[0]),
+        play=_rows(p.play_threshold.size),
+        y=_rows(outputs),
         shaping=start_disturbance(shaping or combined_shaping(loop), p, runs),
-        disturbance=rows(axes),
-        gauss=rows(4 * p.purpose.size),
-        sensor_gauss=rows(words),
-        error=rows(axes),
-        error_ring=rows((p.sensor_delay_steps + 1) * axes),
-        measured=rows(p.B.shape[1]),
-        xc=rows(p.A.shape[0]),
-        xc_next=rows(p.A.shape[0]),
-        output=rows(p.C.shape[0]),
-        command=rows((samples_late + 1) * m),
-        target=rows(2 * m),
-        inverse=rows(p.inverse_bouc_wen.shape[0]),
-        inverse_play=rows(p.inverse_play_threshold.size),
-        inverse_lag=rows(p.inverse_lag_keep.size),
-        work=rows(m),
-        sum=rows(axes),
-        sum_square=rows(axes),
-        largest=rows(1),
-        counts=rows(kernels.COUNT_FIELDS),
+        disturbance=_rows(axes),
+        gauss=_rows(4 * p.purpose.size),
+        sensor_gauss=_rows(words),
+        error=_rows(axes),
+        error_ring=_rows((p.sensor_delay_steps + 1) * axes),
+        measured=_rows(p.B.shape[1]),
+        xc=_rows(p.A.shape[0]),
+        xc_next=_rows(p.A.shape[0]),
+        output=_rows(p.C.shape[0]),
+        command=_rows((samples_late + 1) * m),
+        target=_rows(2 * m),
+        inverse=_rows(p.inverse_bouc_wen.shape[0]),
+        inverse_play=_rows(p.inverse_play_threshold.size),
+        inverse_lag=_rows(p.inverse_lag_keep.size),
+        work=_rows(m),
+        sum=_rows(axes),
+        sum_square=_rows(axes),
+        largest=_rows(1),
+        counts=_rows(kernels.COUNT_FIELDS),
         histogram=np.zeros((LANES, kernels.BINS), dtype=np.int32),
         drawn=np.zeros(0),
     )
@@ -274,7 +271,7 @@ def start_disturbance(shaping: Shaping, p: kernels.Ensemble, runs: NDArray[np.ui
         p: The loop's arrays, for the seed.
         runs: Number of the first run of the batch, shape (1,).
     """
-    states = np.zeros((max(p.shaping_diagonal.size, 1), LANES))
+    states = _rows(p.shaping_diagonal.size).reshape(-1, LANES)
     for at, model, purpose in shaping.parts:
         n = model.Ad.shape[0]
         numbers = np.zeros(4 * (-(-2 * n // 4)) * LANES)
@@ -282,7 +279,15 @@ def start_disturbance(shaping: Shaping, p: kernels.Ensemble, runs: NDArray[np.ui
         drawn = numbers.reshape(-1, LANES)
         begin = disturbance.initial_state(model, drawn[:n], uniform(drawn[n : 2 * n]))
         states[at : at + n] = lti.to_bits(begin, lti.EXACT_BITS)
-    return np.ascontiguousarray(states).ravel()
+    return states.ravel()
+
+
+def _rows(count: int) -> Floats:
+    """Zeros, at least one row of runs: rows begin where a cache line does, so that no wide load needs two lines."""
+    size, line = max(count, 1) * LANES, 8
+    room = np.zeros(size + line)
+    begin = -room.ctypes.data // room.itemsize % line
+    return room[begin : begin + size]
 
 
 def uniform(gaussians: Floats) -> Floats:
