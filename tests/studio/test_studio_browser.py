@@ -82,8 +82,10 @@ def test_an_aperture_is_changed_checked_saved_and_budgeted_by_the_command_line(s
     tab.get_by_role("option", name="the shipped mission").click()
     tab.get_by_role("heading", name="Verdicts").wait_for()
     for name, margin in margins.items():
-        shown = tab.get_by_role("row").filter(has_text=f"{name}: margin").get_by_role("cell").nth(1).inner_text()
-        assert shown.startswith(f"{margin:.2f} dB")
+        shown = tab.get_by_role("row").filter(has_text=f"{name}: margin").get_by_role("cell").nth(1)
+        text = shown.inner_text()
+        assert text.startswith(f"{margin:.2f} dB")
+        assert (text.rpartition(" ")[2] in shown.get_attribute("class").split()) == ("required" in text)  # its colour
     assert "6 cm" in tab.get_by_role("row").filter(has_text=APERTURE).inner_text()
     assert "5 cm" in tab.get_by_role("row").filter(has_text=APERTURE).inner_text()
     assert tab.get_by_role("columnheader", name="the shipped mission").count() == 2  # though both are leo-geo.toml

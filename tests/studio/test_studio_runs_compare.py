@@ -12,6 +12,7 @@ import pytest
 from microrad.link import study as link_study
 from microrad.mission.file import load_link
 from microrad.mission.presets import preset_text
+from microrad.report.tables import Cell
 from microrad.studio import commands
 from microrad.studio.draft.draft import Draft, DraftError
 from microrad.studio.draft.tables import offered, with_table
@@ -315,7 +316,7 @@ def test_numbers_beside_each_other_with_their_change():
         (Number("margin", 1.5, "dB", "2.00 dB", False), Number("b", 1.0, "")),
     )
     assert compare_view.beside(here, there) == [
-        ("margin", "3.00 dB PASS\nrequired 2.00 dB", "1.50 dB FAIL\nrequired 2.00 dB", "−1.50 dB"),
+        ("margin", Cell("3.00 dB, required 2.00 dB", "PASS"), Cell("1.50 dB, required 2.00 dB", "FAIL"), "−1.50 dB"),
         ("a", "1 W", "none", ""),
         ("b", "none", "1", ""),
     ]

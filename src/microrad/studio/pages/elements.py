@@ -73,7 +73,9 @@ def table(headings: Sequence[str] = (), numbers: Collection[int] = ()) -> ui.tab
 
 
 def fill(made: ui.table, rows: Sequence[Sequence[str | Cell]], totals: int = 0) -> None:
-    """Show these rows, of which the last `totals` stand out; nothing is sent where nothing changes.
+    """Show these rows, of which the last `totals` stand out, each cell in the colour of its mark.
+
+    Nothing is sent where nothing changes.
 
     Args:
         made: the table.
@@ -81,7 +83,9 @@ def fill(made: ui.table, rows: Sequence[Sequence[str | Cell]], totals: int = 0) 
         totals: how many of the last rows are sums.
     """
     found = [
-        {"id": place, "total": place >= len(rows) - totals, **{f"c{k}": str(text) for k, text in enumerate(row)}}
+        {"id": place, "total": place >= len(rows) - totals}
+        | {f"c{k}": str(cell) for k, cell in enumerate(row)}
+        | {f"mark{k}": cell.mark for k, cell in enumerate(row) if isinstance(cell, Cell)}
         for place, row in enumerate(rows)
     ]
     if found != made.rows:
@@ -226,7 +230,7 @@ def _columns(headings: Sequence[str], numbers: Collection[int] = ()) -> list[dic
             "label": heading[:1].upper() + heading[1:].replace("\n", " "),
             "field": f"c{place}",
             "align": "right" if place in numbers else "left",
-            "classes": "text-no-wrap" if place in numbers else "",
+            ":classes": f"row => `{'text-no-wrap' if place in numbers else ''} ${{row.mark{place} ?? ''}}`",
         }
         for place, heading in enumerate(headings)
     ]

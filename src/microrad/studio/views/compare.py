@@ -15,7 +15,7 @@ from microrad.core.units import UnitError, parse_quantity
 from microrad.link import study as link_study
 from microrad.mission.toml import value_of
 from microrad.report.quantities import quantity
-from microrad.report.tables import Table
+from microrad.report.tables import Cell, Table
 from microrad.report.view import Soft, Verdict, View, told
 from microrad.studio.draft.draft import Draft, Value
 from microrad.studio.session import Session
@@ -90,7 +90,7 @@ def _numbers(ours: Sequence[Number], theirs: Sequence[Number], names: tuple[str,
     return Table("", ("number", *(f"in {name}" for name in names), "change"), rows) if rows else None
 
 
-def beside(ours: Sequence[Number], theirs: Sequence[Number]) -> list[tuple[str, str, str, str]]:
+def beside(ours: Sequence[Number], theirs: Sequence[Number]) -> list[tuple[str | Cell, ...]]:
     """The numbers of both by name, in the order of the first, then of the second, and the second less the first.
 
     Args:
@@ -102,10 +102,10 @@ def beside(ours: Sequence[Number], theirs: Sequence[Number]) -> list[tuple[str, 
     return [(name, _cell(a), _cell(b), _change(a, b)) for name, (a, b) in pairs.items()]
 
 
-def _cell(number: Number | None) -> str:
+def _cell(number: Number | None) -> str | Cell:
     if number is None or number.met is None:
         return "none" if number is None else number.text
-    return f"{number.text} {'PASS' if number.met else 'FAIL'}\nrequired {number.required}"
+    return Cell(f"{number.text}, required {number.required}", "PASS" if number.met else "FAIL")
 
 
 def _change(here: Number | None, there: Number | None) -> str:
