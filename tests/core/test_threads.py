@@ -94,18 +94,21 @@ from microrad.core.threads import shared_out
 sent = bytes(1 << 20)  # more than a pipe holds
 os.cpu_count = lambda: 3
 began, begins = os.pipe()
+readied, ready = os.pipe()
+told = []
 
 def own():
     name = multiprocessing.current_process().name
     if name == "ForkProcess-1":
         os.write(begins, b".")
         os._exit(1)
-    if name == "ForkProcess-2":
-        os.write(begins, os.read(began, 1))  # it has a job, and the other has begun with one
+    if name == "ForkProcess-2" and not told:  # it has a job, and waits until the other has begun with one
+        told.append(os.read(began, 1))
+        os.write(ready, b".")
     return sent
 
 with shared_out([own] * 3) as results:
-    os.waitid(os.P_ALL, 0, os.WEXITED | os.WNOWAIT)
+    os.read(readied, 1)
     assert results() == [sent] * 3
 """
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=HANG_S)
