@@ -2,6 +2,7 @@
 
 import csv
 import io
+import json
 import math
 import re
 import xml.etree.ElementTree as ET
@@ -21,7 +22,7 @@ from microrad.report.links import figures as link_module
 from microrad.report.links import views as links
 from microrad.report.links import words as links_words
 from microrad.report.links.budgets import links_csv, links_text
-from microrad.report.links.data import performance_data
+from microrad.report.links.data import links_data, performance_data
 from microrad.report.links.figures import link_figures
 from microrad.report.links.views import (
     acquisition_paragraphs,
@@ -37,7 +38,8 @@ from microrad.report.links.views import (
 from microrad.report.quantities import apart, quantity
 from microrad.report.study.page import cost_view
 from microrad.report.tables import Table
-from microrad.report.view import Soft
+from microrad.report.view import Soft, views_text
+from microrad.studio.views import pointing as pointing_pages
 from microrad.study.pointing_penalty import FINE, Cost, LinkPerformance
 from report_pages import without_scripts
 
@@ -114,6 +116,26 @@ def test_the_cells_of_a_case_are_its_record(plain):
         "beyond any power",
         "unknown",
     ]
+
+
+@pytest.mark.parametrize("added", [True, False])
+def test_a_line_of_the_pointing_budget_stands_in_every_face_once_the_mission_has_it(tmp_path, added):
+    """As CONTRIBUTING says: a table of the mission, and no code."""
+    name, source = "Thermal bending of the bench", "assumption: from a thermal analysis"
+    table = '[pointing.lines.thermal_bending_of_the_bench]\nerror = "21 urad"  # assumption: from a thermal analysis\n'
+    table += 'class = "drift"\nstatistic = "bound"\naxes = "per-axis"\n'
+    path = written(tmp_path, data_with(NO_SCAN))
+    path.write_text(path.read_text("utf-8") + table * added, "utf-8")
+    found = link_study.run_link_study(load_link(path))
+    terminal = " ".join(links_text(found, 400, verbose=True).split())
+    studio = " ".join(views_text(pointing_pages.blocks(pointing_pages.view(found.file)), 400).split())
+    cells = re.search(rf"<td[^>]*>{name}</td>.*?</tr>", without_scripts(links_page(found)), re.DOTALL)
+    page = re.sub("<[^>]*>", " ", cells[0]) if cells else ""
+    lines = {each["name"]: each for each in json.loads(json.dumps(links_data(found)))["pointing"]["lines"]}
+    for face in (terminal, page, studio):
+        assert (f"{name} 21 µrad" in " ".join(face.split()), source in face) == (added, added)
+    assert (name in lines) is added
+    assert not added or (lines[name]["value"], lines[name]["source"]) == (21e-6, source)
 
 
 @pytest.mark.parametrize(
