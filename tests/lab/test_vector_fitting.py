@@ -159,8 +159,11 @@ def test_modal_response_is_that_of_the_state_space(hold):
 def test_derivative_by_the_pole(hold, pole):
     step = 1e-6 * abs(pole)
     ends = [hold_basis(np.array([pole + s]), BAND_HZ, hold, RATE_HZ)[0] for s in (step, -step)]
-    slope = hold_basis(np.array([pole]), BAND_HZ, hold, RATE_HZ)[1]
+    basis, slope = hold_basis(np.array([pole]), BAND_HZ, hold, RATE_HZ)
     np.testing.assert_allclose((ends[0] - ends[1]) / (2 * step), slope, rtol=1e-5)
+    alone, none = hold_basis(np.array([pole]), BAND_HZ, hold, RATE_HZ, rates=False)
+    np.testing.assert_array_equal(alone, basis)
+    assert none is None
 
 
 @pytest.mark.parametrize("hold", HOLDS[:2])

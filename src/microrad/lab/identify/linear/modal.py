@@ -217,8 +217,8 @@ def _phi(a: Complexes) -> tuple[Complexes, Complexes, Complexes, Complexes, Comp
 
 
 def hold_basis(
-    poles_rad_s: Complexes, freq_hz: Floats, hold: Hold, rate_hz: float | None
-) -> tuple[Complexes, Complexes]:
+    poles_rad_s: Complexes, freq_hz: Floats, hold: Hold, rate_hz: float | None, *, rates: bool = True
+) -> tuple[Complexes, Complexes | None]:
     """Sampled response of 1/(s - p) behind the hold, and its derivative by p, both of shape (frequencies, poles).
 
     Args:
@@ -226,6 +226,7 @@ def hold_basis(
         freq_hz: Frequencies, in Hz, shape (frequencies,).
         hold: What the drive does between samples.
         rate_hz: Sample rate, in Hz; None is enough for a band-limited drive.
+        rates: Whether the derivative is wanted; else it is None.
 
     Raises:
         IdentificationError: For another hold without a rate.
@@ -234,15 +235,18 @@ def hold_basis(
     p = np.asarray(poles_rad_s, dtype=complex)[None, :]
     if hold == "band-limited":
         basis = 1.0 / (s - p)
-        return basis, basis * basis
+        return basis, basis * basis if rates else None
     if rate_hz is None:
         raise IdentificationError(f"a {hold} hold needs the sample rate; give rate_hz.")
     step = hold_step(p[0], hold, rate_hz)
     # z - e^a as a difference of expm1, which keeps slow poles apart from 1.
     gap = 1.0 / (np.expm1(s / rate_hz) - np.expm1(p / rate_hz))
+    if hold == "zero-order":  # nothing of the sample ahead
+        basis = step.begin * gap
+        return basis, step.begin_rate * gap + basis * gap * step.keep_rate if rates else None
     ahead = np.exp(s / rate_hz)
-    top = step.begin + step.end * ahead
-    return top * gap, (step.begin_rate + step.end_rate * ahead) * gap + top * gap * gap * step.keep_rate
+    basis = (step.begin + step.end * ahead) * gap
+    return basis, (step.begin_rate + step.end_rate * ahead) * gap + basis * gap * step.keep_rate if rates else None
 
 
 def filtered(

@@ -101,8 +101,10 @@ class FrequencyEquations:
         """
         real = int(np.count_nonzero(poles_rad_s.imag == 0))
         every = np.concatenate([poles_rad_s, poles_rad_s[real:].conj()])
-        basis, slope = hold_basis(every, self.freq_hz, self.hold, self.rate_hz)
-        yield Block(self._rows(basis, real), self._rows(slope, real) if rates else None, self._drive, self._target)
+        basis, slope = hold_basis(every, self.freq_hz, self.hold, self.rate_hz, rates=rates)
+        yield Block(
+            self._rows(basis, real), None if slope is None else self._rows(slope, real), self._drive, self._target
+        )
 
     def _rows(self, basis: Complexes, real: int) -> Floats:
         return _real_rows(
