@@ -7,16 +7,18 @@ import signal
 import stat
 import subprocess
 import sys
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
+from microrad.campaign.statistics.interim import Interim
 from microrad.core import kept
 from microrad.studio.jobs import files as jobs_files
 from microrad.studio.jobs import process as jobs_process
 from microrad.studio.jobs import queue as jobs_module
 from microrad.studio.jobs.queue import JobError, Jobs, Order
-from small_campaign import campaign_file, children, kill
+from small_campaign import campaign_file, children, halted, halting, kill
 from studio_jobs import written
 from waiting import HANG_S, gone, lines_of, until
 
@@ -45,6 +47,15 @@ def ended(folder):
 
 def order(tmp_path, *arguments, kind="study", title="a title", results=()):
     return Order(kind, title, arguments, tmp_path, results)
+
+
+@contextmanager
+def running(studio, tmp_path):
+    """A job that runs for as long as it is held here: its folder."""
+    folder = written(studio.folder, cwd=str(tmp_path), kind="campaign")
+    with jobs_files.held(folder / "alive", 0.0):
+        jobs_files.note(folder / "started.json")
+        yield folder
 
 
 def python(code):
@@ -151,16 +162,6 @@ def test_a_job_goes_on_when_whoever_started_it_is_gone(tmp_path):
 
 
 # ----------------------------------------------------------------------------------------------------------- progress
-def test_progress_is_handed_over_with_its_rate(studio, tmp_path):
-    campaign_file(tmp_path, runs=96)
-    job = studio.submit(order(tmp_path, "campaign", "run", "campaign.toml", *ONE_WORKER, kind="campaign"))
-    job = ended(job.folder)
-    assert job.code == 0, job
-    assert (job.progress.done, job.progress.total, job.progress.share) == (96, 96, 1.0)
-    assert "rows" in job.progress.what
-    assert "of 96" not in studio.output(job.number, "stderr")
-
-
 def progress_of(tmp_path, *notes, more=""):
     lines = [json.dumps(dict(zip(("at", "done", "total", "what"), note, strict=True))) for note in notes]
     (tmp_path / "progress").write_text("\n".join(lines) + more)
@@ -191,29 +192,35 @@ def test_a_line_of_progress_that_is_being_written_is_not_read(tmp_path):
 
 
 # ------------------------------------------------------------------------------------------------------------- cancel
-def test_a_cancelled_campaign_keeps_its_rows_and_resumes(studio, tmp_path):
-    campaign_file(tmp_path, runs=4096, duration="1 s")
-    job = studio.submit(order(tmp_path, "campaign", "run", "campaign.toml", *ONE_WORKER, kind="campaign"))
+def rows_in(ledger):
+    return sum(cell.rows for cell in Interim(ledger).look().cells)
 
-    def rows():
-        found = jobs_files.read_job(job.folder)
-        assert not found.finished, found
-        return found.progress is not None and found.progress.total == 4096 and found.progress.done > 0
 
-    until(rows, "rows of the campaign")
+def test_a_cancelled_campaign_keeps_its_rows_and_resumes_with_progress_handed_over(studio, tmp_path, monkeypatch):
+    campaign_file(tmp_path, runs=384)  # in two chunks
+    (tmp_path / "halt").touch()
+    for name, value in halting(tmp_path / "halt").items():
+        monkeypatch.setenv(name, value)
+    job = studio.submit(order(tmp_path, "campaign", "run", "campaign.toml", kind="campaign"))
+    began = job.folder / "started.json"
+    until(began.is_file, "the job's start")
+    (command,) = until(lambda: children(json.loads(began.read_text("utf-8"))["pid"]), "the job's command")
+    halted(command)
+    progress = jobs_files.read_job(job.folder).progress
+    assert (progress.total, "rows" in progress.what) == (384, True)
+    done = rows_in(tmp_path / "campaign.ledger")
+    assert 0 < done < 384
     assert studio.cancel(job.number).cancelling
+    os.killpg(command, signal.SIGCONT)
     job = ended(job.folder)
     assert (job.state, job.code) == ("cancelled", 130)
     assert "Go on with: microrad campaign resume campaign.ledger" in studio.output(job.number, "stderr")
-    again = studio.submit(order(tmp_path, "campaign", "resume", "campaign.ledger", *ONE_WORKER, kind="campaign"))
-    done = job.progress.done
-
-    def further():
-        found = jobs_files.read_job(again.folder)
-        assert not found.finished, found
-        return found.progress is not None and found.progress.done > done
-
-    until(further, "further rows of the campaign")
+    kept = rows_in(tmp_path / "campaign.ledger")
+    assert done <= kept < 384
+    again = ended(studio.submit(order(tmp_path, "campaign", "resume", "campaign.ledger", kind="campaign")).folder)
+    assert again.code == 0, again
+    assert (again.progress.done, again.progress.total, again.progress.share) == (384, 384, 1.0)
+    assert "of 384" not in studio.output(again.number, "stderr")
 
 
 def test_a_command_that_does_not_listen_is_asked_harder_each_time(tmp_path, monkeypatch):
@@ -259,13 +266,12 @@ def test_what_a_command_has_started_is_stopped_with_it(tmp_path):
 
 
 def test_a_job_that_waits_and_is_cancelled_never_starts(studio, tmp_path):
-    campaign_file(tmp_path, runs=4096, duration="1 s")
-    first = studio.submit(order(tmp_path, "campaign", "run", "campaign.toml", *ONE_WORKER, kind="campaign"))
-    second = studio.submit(order(tmp_path, "init", "never.toml"))
-    assert (first.state, second.state) == ("running", "queued")
-    assert studio.cancel(2).state == "cancelled"
-    studio.cancel(1)
-    ended(first.folder)
+    with running(studio, tmp_path) as first:
+        second = studio.submit(order(tmp_path, "init", "never.toml"))
+        assert (jobs_files.read_job(first).state, second.state) == ("running", "queued")
+        assert studio.cancel(2).state == "cancelled"
+        studio.cancel(1)
+        jobs_files.note(first / "exit.json", code=130)
     assert [job.state for job in studio.listed()] == ["cancelled", "cancelled"]
     assert not (tmp_path / "never.toml").exists()
     with pytest.raises(JobError, match=r"job 2 is not running any more \(cancelled\); there is nothing to cancel"):
@@ -362,11 +368,9 @@ def test_a_finished_job_is_removed_with_its_output_and_its_number_is_not_used_ag
 
 
 def test_a_running_job_is_not_removed(studio, tmp_path):
-    campaign_file(tmp_path, runs=4096, duration="1 s")
-    job = studio.submit(order(tmp_path, "campaign", "run", "campaign.toml", *ONE_WORKER, kind="campaign"))
-    with pytest.raises(JobError, match="job 1 is running; cancel it first"):
-        studio.remove(job.number)
-    assert job.folder.is_dir()
+    with running(studio, tmp_path) as folder, pytest.raises(JobError, match="job 1 is running; cancel it first"):
+        studio.remove(1)
+    assert folder.is_dir()
 
 
 @pytest.mark.parametrize(

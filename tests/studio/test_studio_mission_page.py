@@ -3,14 +3,18 @@
 import asyncio
 import os
 import threading
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
+from microrad.studio import commands
 from microrad.studio.draft import draft as drafts
 from microrad.studio.draft.draft import Draft, DraftError
 from microrad.studio.guard.names import NameRefusedError
+from microrad.studio.jobs.queue import Job
 from microrad.studio.session import Session
+from microrad.studio.views import runs as runs_view
 from shipped import SHIPPED
 
 pytest.importorskip("nicegui", reason="the studio is not installed (nicegui)")
@@ -18,7 +22,7 @@ pytest.importorskip("nicegui", reason="the studio is not installed (nicegui)")
 from nicegui.client import Client
 from nicegui.page import page as at
 
-from microrad.studio.pages import layout, mission, runs
+from microrad.studio.pages import layout, mission, runs, runs_jobs
 from microrad.studio.pages.sliders import SliderPage
 from waiting import until
 
@@ -250,6 +254,37 @@ def test_a_study_of_a_file_that_another_program_has_changed_is_not_run(session, 
         study._look()
     assert study.button.enabled and study.fault.text == ""
     client.delete()
+
+
+def test_a_campaign_that_was_cancelled_goes_on_and_one_that_is_done_gets_its_report(session, monkeypatch):
+    asked = []
+
+    async def here(page, work, *args):
+        return work(*args)
+
+    async def clicked():
+        with client:
+            for job, click in ((stopped, "_go_on"), (done, "_write_page")):
+                card = runs_jobs._Card(jobs, job)
+                await card.show(job, runs_view.others((job,), job))
+                assert (card.again.visible, card.page.visible) == (job is not done, job is done)
+                await getattr(card, click)()
+
+    monkeypatch.setattr(runs_jobs, "in_thread", here)
+    monkeypatch.setattr(session.jobs, "submit", asked.append)
+    monkeypatch.setattr(session.jobs, "output", lambda number: "said")
+    (session.folder / "x.ledger").touch()
+    more = {"arguments": ("campaign",), "cwd": session.folder, "results": ("x.ledger",)}
+    stopped, done = (Job(1, session.folder, state, "campaign", **more) for state in ("cancelled", "done"))
+    client = Client(at("/"), request=None)
+    with client:
+        jobs = runs_jobs.JobList(session, lambda address, title: None)
+    asyncio.run(clicked())
+    client.delete()
+    assert [order.arguments for order in asked] == [
+        commands.resume(Path("x.ledger")).arguments,
+        commands.campaign_report(Path("x.ledger"), Path("x.html")).arguments,
+    ]
 
 
 @pytest.mark.parametrize("content", [TEXT, None])
