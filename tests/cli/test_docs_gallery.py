@@ -1,4 +1,7 @@
-"""docs/gallery.md: each example is walked through as it stands, prints what stands there, and has no other figure."""
+"""docs/gallery.md: each example is walked through as it stands, prints what stands there, and has no other figure.
+
+Three of the five are walked through by `make endurance`: the commands and functions in them have tests of their own.
+"""
 
 import math
 import re
@@ -138,6 +141,7 @@ def test_the_papers_mission(walk, monkeypatch):
         controller_study.design_and_simulate_one(scene_of(ran.file), "PID")
 
 
+@pytest.mark.endurance
 def test_a_lab_identifies_its_mirror(walk, monkeypatch):
     monkeypatch.setattr(
         identification, "identification_figures", lambda *args, **kwargs: {}
@@ -151,6 +155,7 @@ def test_a_lab_identifies_its_mirror(walk, monkeypatch):
     assert (GALLERY / "loops.png").stat().st_size < 1e5
 
 
+@pytest.mark.endurance
 def test_choosing_a_mirror(walk):
     walk.through(EXAMPLES[CHOICE])
 
@@ -159,6 +164,7 @@ def test_a_crosslink(walk):
     walk.through(EXAMPLES[CROSSLINK])
 
 
+@pytest.mark.endurance
 def test_a_constellations_day(walk):
     walk.through(EXAMPLES[CONSTELLATION])
     for rate in GIVEN[CONSTELLATION]:
@@ -186,6 +192,21 @@ def test_the_table_of_mirrors_is_that_of_their_files():
         assert m.linear.poles_hz[0] == pytest.approx(parse_quantity(resonance, "Hz"))
         weights = m.prandtl_ishlinskii.weights_rad_v
         assert 100 * (1.0 - weights[0] / sum(weights)) == pytest.approx(float(hysteresis), abs=0.5)
+
+
+@pytest.mark.parametrize(("damping", "count"), [(-1.0, 1), (-0.5, 2)])
+def test_a_mirror_may_have_a_zero_in_the_right_half_plane(tmp_path, damping, count):
+    """As the identified one has it: a real zero counts once against the two poles, one that oscillates twice."""
+    text = (GALLERY / "medium-stroke.toml").read_text(encoding="utf-8")
+    zero = f'[linear]\nzeros = ["20 kHz"]\nzero_dampings = [{damping}]\n'
+    path = tmp_path / "mirror.toml"
+    path.write_text(text.replace("[linear]\n", zero), encoding="utf-8")
+    if count == 1:
+        zeros, _ = load_mirror(path).mirror.linear.roots
+        assert zeros == pytest.approx((2 * math.pi * 20e3,))
+    else:
+        with pytest.raises(ValueError, match="makes 2 zeros over 2 poles"):
+            load_mirror(path)
 
 
 def test_the_crosslink_keeps_all_that_its_preset_knows():
