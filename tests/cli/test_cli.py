@@ -193,9 +193,9 @@ def test_a_full_disk_leaves_no_part_of_a_file(refused, monkeypatch):
 
 # ---------------------------------------------------------------------------------------------------------------- run
 def test_init_then_run(call, folder):
-    """Without the fine-pointing loop, which takes most of the time: the whole is run by tests/test_docs_gallery.py."""
+    """Without the fine-pointing loop and the day: the whole is run by test_docs_gallery.py."""
     call("init")
-    Path("leo-geo.toml").write_text(without_fine_pointing(PAPER.read_text(encoding="utf-8")), encoding="utf-8")
+    mission(Path("leo-geo.toml"))
     result = call("run", "leo-geo.toml", "--exit-on", "closes")
     assert (result.code, result.err) == (0, "")
     assert result.out.startswith("Not every requirement is met: residual pointing error (")

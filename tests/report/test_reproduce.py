@@ -31,7 +31,13 @@ def no_scan():
 
 @pytest.fixture(scope="module")
 def ran(tmp_path_factory):
-    return study.run_study(edited_file(tmp_path_factory.mktemp("mission"), ("runs = 4000 ", "runs = 100 ")))
+    return study.run_study(
+        edited_file(
+            tmp_path_factory.mktemp("mission"),
+            ("runs = 4000 ", "runs = 100 "),
+            ('duration = "24 h"', 'duration = "6 h"'),
+        )
+    )
 
 
 @pytest.fixture(scope="module")
