@@ -25,6 +25,7 @@ from microrad.report.plotting.figure import Figure
 from microrad.report.quantities import minus
 from microrad.report.study import chain, page, words
 from microrad.report.study import contributors as requirement_views
+from microrad.report.tables import Table
 from microrad.study import study
 from microrad.study.pointing_penalty import Cost
 from report_pages import assert_sound
@@ -137,6 +138,14 @@ def test_a_warning_of_a_budget_stands_once_on_the_page(written, paper):
     assert text.count("What \u201c!\u201d marks in the tables stands under Warnings.") == 1
 
 
+def test_what_limits_the_link_stands_below_the_verdict_and_a_warning_of_the_day_once(written, paper):
+    text = html.unescape((written / "report.html").read_text(encoding="utf-8"))
+    rests = text[text.index("What the verdict rests on:") : text.index('id="terms"')]
+    assert [rests.count(f"<li>{each}</li>") for each in words.limits(paper)] == [1, 1]
+    assert words.limits(paper)[1].startswith("What limits it is the ")
+    assert paper.day.warnings and [text.count(f"<li>{each}</li>") for each in paper.day.warnings] == [1]
+
+
 def test_terms_are_explained_below_the_verdict_and_stand_on_the_page(written):
     text = (written / "report.html").read_text(encoding="utf-8")
     begin = text.index('<details class="view" id="terms">')
@@ -156,8 +165,8 @@ def test_each_requirement_stands_with_its_margin_and_its_contributor(written, pa
         assert row[3][0] == ("+" if r.met else "\u2212")
     cone, beacon, answer, residual, link = (row[5] for row in rows)
     shares = paper.open_loop.variance_shares
-    widest = f"Body pointing: {100 * max(shares):.2g} % of the squares, 300 µrad half width"
-    assert cone == f"{widest}; the cone of 390 µrad half angle covers its partner with 0.53"
+    widest = f"Body pointing: {100 * max(shares):.2g} % of the sum of squares, 300 µrad half width"
+    assert cone == f"{widest}; the cone of 390 µrad half angle covers its partner with a probability of 0.53"
     for text, tornado in ((beacon, paper.links.tornados[-2]), (answer, paper.links.tornados[-1])):
         top = tornado.swings[0]
         assert text.endswith(f"the margin moves most with {top.key}: {top.swing_db:.2f} dB for ±10 %")
@@ -296,6 +305,13 @@ def test_each_figure_of_the_paper_is_the_one_of_ours_that_stands_for_it(paper):
         "Fig. 5": ["fig5-bench-loops", "fig5-hysteresis-loops"],
         "Fig. 6": ["fig6-pid"],
         "Fig. 8": ["fig8-inverse"],
+    }
+    judged = {title[:6]: [b.rows for b in found[title].blocks if isinstance(b, Table)] for title in numbered}
+    assert {n: [row[0] for row in rows[0]] for n, rows in judged.items() if rows} == {
+        "Fig. 2": ["section 2.2, Fig. 2"],
+        "Fig. 5": ["Fig. 5"],
+        "Fig. 6": ["Fig. 6", "section 3.1, Fig. 6 and 8"],
+        "Fig. 8": ["Fig. 8", "Fig. 8", "section 3.1, Fig. 6 and 8"],
     }
     assert [*found][-2:] == ["Hysteresis models compared", "Where the paper's closed-loop claims hold"]
     assert all(figure.title.startswith(number) for number, several in ours.items() for figure in several)
@@ -554,7 +570,7 @@ def test_warnings_stand_by_what_they_cost_in_decibels(paper):
     (costly,) = (w for w in words._of_day(paper) if w.text.startswith("communication.distance is 42000 km"))
     furthest = max(e.range_most_m for e in paper.day.encounters)
     assert costly.cost_db == pytest.approx(20.0 * math.log10(furthest / 42e6)) == pytest.approx(0.41, abs=0.005)
-    assert costly.text.endswith("costs 0.41 dB more")
+    assert costly.text.endswith("costs 0.41 dB more than budgeted")
     met = replace(paper, requirements=[replace(r, actual=1.0, required=0.0, margin=1.0) for r in paper.requirements])
     assert words.warnings(met)[0] == costly.text
     assert [*words.ranked_warnings(met)][:2] == ["The day", "The verdict"]

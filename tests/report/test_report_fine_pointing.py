@@ -419,9 +419,19 @@ def test_fine_requirements_stand_with_their_dominant_part(plain, fine):
 
     whole = with_fine(plain, fine)
     rows = causes(whole, whole.requirements)
-    assert rows[4] == "Vibration (OLYMPUS): 3 µrad of 3.05 µrad rms with hysteresis, 97 % of the squares"
+    assert rows[4] == "Vibration (OLYMPUS): 3 µrad of 3.05 µrad rms with hysteresis, 97 % of the sum of squares"
     lost = whole.performance.case(performance.FINE, SECOND, "given").outage_loss_db
     top = whole.tornado.swings[0]
+def test_the_margin_of_the_verdict_follows_from_the_budget_by_its_pointing_loss(plain, fine):
+    whole = with_fine(plain, fine)
+    (said,) = report_page._judged(whole)
+    margin_db, judged_db, budgeted_db = (float(each.replace("\u2212", "-")) for each in re.findall(r"(\S+) dB", said))
+    assert margin_db == pytest.approx(whole.static.margin_db + budgeted_db - judged_db, abs=0.02)
+    assert f"which {SECOND} does not exceed for 99.7 % of the time" in said and margin_db == round(whole.margin_db, 2)
+    assert report_page._judged(plain) == []
+    assert {*study_words.terms(whole)} - {*study_words.terms(plain)} == {"Stroke", "OLYMPUS", "PI", "LQG"}
+
+
     assert rows[5] == (
         f"Vibration (OLYMPUS), pointing loss {lost:.2f} dB at the outage; the margin moves most with {top.key}: "
         f"{top.swing_db:.2f} dB for ±10 %"
@@ -474,7 +484,7 @@ def test_the_missions_own_stroke_counts(fine, mission):
 def test_two_sets_of_hardware_are_told_apart(fine, mission):
     (said,) = [w for w in warned(fine, mission) if "one does not stand for the other" in w]
     assert said.startswith("fine pointing: judged at 5 kHz, 200 µs of delay, an amplifier of 1 kHz; ")
-    assert "at 50 kHz, 20 µs of delay, an amplifier of 5 kHz" in said
+    assert "; the paper's loop runs at 50 kHz, 20 µs of delay, an amplifier of 5 kHz: one" in said
     f = mission.fine_pointing
     same = {"rate_hz": f.rate_hz, "delay_s": f.delay_s}
     amplifier = mission.amplifier.model_copy(update={"bandwidth_hz": f.amplifier_bandwidth_hz})

@@ -263,7 +263,7 @@ def beyond_the_mission(m: LinkMission, seen: View) -> tuple[str, ...]:
         checks.append(("fine_pointing.reference.line_of_sight_rate", given, rate, "rad/s", "rate of the line of sight"))
     return tuple(
         f"{key} is {format_quantity(given, unit)}, and the contacts reach a {what} of {format_quantity(most, unit, 5)}"
-        + (f", which costs {20.0 * math.log10(most / given):.2f} dB more" if what == "range" else "")
+        + (f", which costs {20.0 * math.log10(most / given):.2f} dB more than budgeted" if what == "range" else "")
         for key, given, most, unit, what in checks
         if most > given * (1.0 + _TOLERANCE)
     )

@@ -39,7 +39,9 @@ def day_text(day: DayStudy, width: int) -> str:
     return views_text([day_view(day, words.sentences(day), ())], width)
 
 
-def day_view(day: DayStudy, sentences: Sequence[str], figures: Sequence[Figure], *more: View | None) -> View:
+def day_view(
+    day: DayStudy, sentences: Sequence[str], figures: Sequence[Figure], *more: View | None, warned: bool = False
+) -> View:
     """What a day delivers.
 
     Args:
@@ -47,14 +49,14 @@ def day_view(day: DayStudy, sentences: Sequence[str], figures: Sequence[Figure],
         sentences: its answers.
         figures: those of the day.
         more: views at the end.
+        warned: whether the day's warnings stand elsewhere on the page.
     """
     tables = (ways_table(day), contacts_table(day), assumptions_table(day))
     return View(
         "What the link delivers",
         told(
             *sentences,
-            "Warnings:" if day.warnings else None,
-            Points(day.warnings),
+            *(() if warned or not day.warnings else ("Warnings:", Points(day.warnings))),
             *tables,
             *opened(figures, OPEN),
             *more,

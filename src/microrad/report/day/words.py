@@ -19,7 +19,7 @@ def headline(day: DayStudy) -> list[str]:
     relay, span = day.relay, duration(day.view.duration_s)
     whole = day.operations is None or day.operations.relay_share == 1.0
     said = (
-        f"In {span} the relay {'is in view' if whole else 'grants the link'} {_how_much(day, relay)}, and could take "
+        f"In {span} the relay {_how_much(day, relay, whole)}, and could carry "
         f"{volume(relay.capacity_bit)}{_a_day(day, volume(relay.capacity_bit / day.view.days))}"
     )
     if day.direct is None:
@@ -27,7 +27,8 @@ def headline(day: DayStudy) -> list[str]:
     d, down = day.direct, day.operations.downlink if day.operations else None
     stations = ", ".join(down.stations) if down else ""
     carried = f"{volume(d.capacity_bit)}{_a_day(day, volume(d.capacity_bit / day.view.days))}"
-    return [f"{said}; the ground ({stations}) {_how_much(day, d)}, and could take {carried}{_compared(day.ratio)}."]
+    ground = f"The ground ({stations}) {_how_much(day, d)}, and could carry {carried}"
+    return [f"{said}. {ground}{_compared(day.ratio)}."]
 
 
 def _compared(ratio: float) -> str:
@@ -43,13 +44,14 @@ def times(count: float) -> str:
     return "once" if count == 1 else "never" if count == 0 else f"{shown} times"
 
 
-def _how_much(day: DayStudy, way: Way) -> str:
-    """Number and time of the contacts of a way."""
+def _how_much(day: DayStudy, way: Way, whole: bool = True) -> str:
+    """Number and time of the contacts of a way, all of them or those that are granted."""
     if not way.contacts:
-        return "never"
+        return "is never in view" if whole else "never grants the link"
     days = day.view.days
     a_day = _a_day(day, f"{times(len(way.contacts) / days)}, {contact_time(way.contact_s / days)}")
-    return f"{times(len(way.contacts))}, {contact_time(way.contact_s)} in all{a_day}"
+    seen = "is in view" if whole else "grants the link"
+    return f"{seen} {times(len(way.contacts))}, {contact_time(way.contact_s)} in all{a_day}"
 
 
 def contact_time(time_s: float) -> str:

@@ -306,7 +306,7 @@ def _hardware_warnings(f: FinePointing, c: Control, amplifier: Amplifier) -> lis
     if loops[0] == loops[1]:
         return []
     own, paper = (f"{rate}, {delay} of delay, an amplifier of {bandwidth}" for rate, delay, bandwidth in loops)
-    return [f"judged at {own}; the residual and the communication margin at {paper}: one does not stand for the other"]
+    return [f"judged at {own}; the paper's loop runs at {paper}: one does not stand for the other"]
 
 
 def _bound_warnings(fine: FinePointingStudy) -> list[tuple[list[str], str]]:

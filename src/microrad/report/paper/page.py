@@ -1,5 +1,6 @@
 """The paper's figures 1 to 8 and tables 1 and 2 beside this run: which figure of ours stands for each, what differs."""
 
+import re
 from collections import Counter
 from collections.abc import Sequence
 
@@ -12,6 +13,7 @@ from microrad.report.quantities import quantity
 from microrad.report.tables import Cell, Table
 from microrad.report.view import Block, Drawing, Soft, View, slug, told
 from microrad.study.study import Study
+from microrad.study.verdict import Claim
 
 # Table 1 of the paper: year, LEO satellite, its mass, rate in Mbit/s, GEO satellite
 PROJECTS = (
@@ -80,7 +82,10 @@ def paper_view(study: Study, figures: Sequence[Figure], *first: View) -> View:
                 "table-2",
                 folded=True,
             ),
-            *(View(_TITLES[number], found, f"paper-{slug(number)}", folded=True) for number, found in blocks),
+            *(
+                View(_TITLES[number], told(*found, _claims_of(study, number)), f"paper-{slug(number)}", folded=True)
+                for number, found in blocks
+            ),
             *(View(figure.title, [figure], folded=True) for figure in others),
         ),
         "paper",
@@ -93,10 +98,8 @@ def _sketch(number: str, name: str, values: object, said: dict[str, str]) -> tup
 
 def claims_view(study: Study) -> View:
     """Each printed claim of the paper, what this run has instead, and whether they agree."""
-    rows = [(c.where, c.claim, c.ours, Cell("", c.agrees), c.why) for c in study.claims]
     counts = ", ".join(f"{count} {agrees}" for agrees, count in Counter(c.agrees for c in study.claims).most_common())
-    folded = f"{len(rows)} claims; whether they agree: {counts}"
-    table = Table("", ("where", "claim", "this run", "agrees", "why"), rows, (0, 1, 2, 3, 4), folded=folded)
+    table = _claims_table(study.claims, folded=f"{len(study.claims)} claims; whether they agree: {counts}")
     changed = "; ".join(
         f"{key} is {value}, there {was}" for key, value, was in changed_from_shipped(study.file.sources)
     )
@@ -112,6 +115,18 @@ def claims_view(study: Study) -> View:
         ),
         "claims",
     )
+
+
+def _claims_of(study: Study, figure: str) -> Table | None:
+    """The claims that the paper makes of one of its figures, such as "Fig. 8"; None where it makes none."""
+    number = figure.removeprefix("Fig. ")
+    found = [c for c in study.claims if number in re.findall(r"\d+", c.where.partition("Fig.")[2])]
+    return _claims_table(found) if found else None
+
+
+def _claims_table(claims: Sequence[Claim], folded: str = "") -> Table:
+    rows = [(c.where, c.claim, c.ours, Cell("", c.agrees), c.why) for c in claims]
+    return Table("", ("where", "claim", "this run", "agrees", "why"), rows, (0, 1, 2, 3, 4), cards=True, folded=folded)
 
 
 def differs(study: Study, *, played: bool) -> dict[str, str]:

@@ -71,9 +71,9 @@ def _cone(study: Study) -> str:
     p = study.open_loop
     share, line = max(zip(p.variance_shares, p.lines, strict=True), key=lambda pair: pair[0])
     assert p.reading is not None  # a whole mission has a beacon
-    said = f"{line.name}: {percent(share)} of the squares, {quantity(line.value, 'rad')} half width"
+    said = f"{line.name}: {percent(share)} of the sum of squares, {quantity(line.value, 'rad')} half width"
     half = quantity(p.reading.half_angle_rad, "rad")
-    return f"{said}; the cone of {half} half angle covers its partner with {p.reading.coverage:.2f}"
+    return f"{said}; the cone of {half} half angle covers its partner with a probability of {p.reading.coverage:.2f}"
 
 
 def advice(study: Study, r: Requirement) -> str:
@@ -147,7 +147,9 @@ def _power(study: Study, budget: link.LinkBudget) -> str:
 def _stroke(study: Study, cause: str) -> str:
     axis = worst_axis(study)
     line = max(axis.lines, key=lambda each: each.value)
-    return f"{cause}: {quantity(line.value, 'rad')} of {quantity(axis.total_rad, 'rad')} at the line of sight"
+    return (
+        f"{cause}: {quantity(line.value, 'rad')} of the {quantity(axis.total_rad, 'rad')} needed at the line of sight"
+    )
 
 
 def _residual(study: Study, cause: str) -> str:
@@ -173,7 +175,7 @@ def _fine(study: Study, cause: str) -> str:
     own, whole = sizes[cause], fine.budget.full_rad
     share = percent((own / whole) ** 2)
     sizes_of = f"{quantity(own, 'rad')} of {quantity(whole, 'rad')} rms with hysteresis"
-    return f"{source_name(cause)}: {sizes_of}, {share} of the squares"
+    return f"{source_name(cause)}: {sizes_of}, {share} of the sum of squares"
 
 
 def _outage(study: Study, cause: str) -> str:

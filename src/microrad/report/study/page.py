@@ -7,6 +7,8 @@ from typing import Any
 
 from microrad.core.machine import versions
 from microrad.core.units import format_quantity
+from microrad.link.budget.lines import POINT_AHEAD_LOSS, POINTING_LOSS
+from microrad.link.requirement import time_kept
 from microrad.loop.paper_cases import Run
 from microrad.mirror import Variant
 from microrad.orbit.day import DayStudy
@@ -27,7 +29,7 @@ from microrad.report.links.views import (
 from microrad.report.page.templates import drawing, inputs_view, mission_page
 from microrad.report.paper.page import paper_view
 from microrad.report.plotting.figure import Figure
-from microrad.report.quantities import given_angle
+from microrad.report.quantities import given_angle, quantity, signed
 from microrad.report.results.manifest import embedded, hash_of_page, with_manifest
 from microrad.report.study import chain, contributors, words
 from microrad.report.tables import Table
@@ -92,8 +94,8 @@ def study_views(study: Study, drawn: StudyFigures) -> tuple[View, ...]:
 
 def verdict_view(study: Study) -> View:
     """The verdict with its requirements, and what it rests on."""
-    terms = View("Terms", [Points([f"{term}: {said}" for term, said in words.TERMS.items()])], folded=True)
-    rests = Points(words.explanation(study))
+    terms = View("Terms", [Points([f"{term}: {said}" for term, said in words.terms(study).items()])], folded=True)
+    rests = Points([*words.limits(study), *words.explanation(study)])
     return View("Verdict", [words.verdict_box(study), "What the verdict rests on:", rests, terms], "verdict")
 
 
@@ -176,13 +178,16 @@ def _origin(manifest: Mapping[str, Any]) -> View:
 
 
 def _links(study: Study, figures: Sequence[Figure]) -> tuple[View, ...]:
-    names = ("as budgeted", "at the simulated residual")
+    judged = study.fine_case is not None
+    names = ("as budgeted", "at the residual of the paper's loop" if judged else "at the simulated residual")
     tables = [
         *paired_tables(study.communication, study.achieved, names),
         *map(budget_table, (study.beacon, study.answer)),
     ]
     warned = "What “!” marks in the tables stands under Warnings."
-    budgets = budgets_view(study.links, tables, figures, _loop_noise(study), _implied(study), warned=warned)
+    budgets = budgets_view(
+        study.links, tables, figures, [*_judged(study), *_loop_noise(study)], _implied(study), warned=warned
+    )
     return links_views(study.links, figures, budgets=budgets, performance=cost_view(study))
 
 
@@ -221,7 +226,7 @@ def _day(study: Study, figures: Sequence[Figure]) -> View | None:
     if day is None:
         return None
     plan = None if study.plan is None else constellation_view(study.plan)
-    return day_view(day, day_words.sentences(day), figures, _contact(study, day), plan)
+    return day_view(day, day_words.sentences(day), figures, _contact(study, day), plan, warned=True)
 
 
 def _contact(study: Study, day: DayStudy) -> View | None:
@@ -246,6 +251,20 @@ def _left_out(study: Study) -> list[str]:
         more = float(lost.loss_db(error + ahead.error_rad)) - at.outage_loss_db
         cost = f": at most {more:.2f} dB more for the best loop"
     return [f"What the correction of point-ahead leaves ({given_angle(ahead.error_rad)}) is not in these errors{cost}."]
+
+
+def _judged(study: Study) -> list[str]:
+    """How the margin of the verdict follows from the budget, where another loop than the paper's is judged."""
+    case = study.fine_case
+    if case is None:
+        return []
+    budgeted, kept = study.static, time_kept(study.file.mission.requirement)
+    lost = quantity(budgeted.loss_db(POINTING_LOSS, POINT_AHEAD_LOSS), "dB")
+    return [
+        f"The verdict's margin of {signed(study.margin_db, 'dB')} is that of the budget with another pointing loss: "
+        f"{quantity(case.outage_loss_db, 'dB')}, which {case.controller} does not exceed for {kept}, in place of "
+        f"{lost}."
+    ]
 
 
 def _loop_noise(study: Study) -> list[str]:

@@ -29,10 +29,16 @@ from microrad.study.pointing_penalty import FINE, Cost
 from microrad.study.study import Study
 
 TERMS = {
+    "Beacon": "wide beam by which the terminal is found.",
+    "Answer": "narrow beam that the partner sends back to the beacon.",
     "Margin": "received over required power, in dB. At 3 dB twice the required light arrives.",
     "Outage": "share of the time with a margin below 0 dB.",
     "Rms": "root of the mean square of an error, its constant part counted.",
+    "Root sum square": "root of the sum of the squares, as errors add that have nothing to do with each other.",
+    "Share of squares": "the part that one error has in the sum of the squares of all.",
+    "Half width": "size of an error to either side of the line of sight: its bound, or the stated standard deviations.",
     "Residual": "the pointing error that a loop leaves.",
+    "Inverse": "a model of the mirror's hysteresis, run backwards ahead of the mirror to take its hysteresis out.",
     "Half angle at 1/e2": "angle off the axis at which a beam has 13.5 % of the intensity on its axis.",
     "Point-ahead": (
         "angle by which a beam leads the direction in which the partner is seen. Both move while light is under way."
@@ -44,6 +50,12 @@ TERMS = {
     ),
 }
 """What the page says without a word of explanation elsewhere."""
+_FINE_TERMS = {
+    "Stroke": "angle to either side by which the mirror can move the line of sight.",
+    "OLYMPUS": "a spectrum of vibration, after what was measured on the satellite of that name.",
+    "PI": "controller with a proportional and an integral part; PID has a derivative part as well.",
+    "LQG": "linear-quadratic-Gaussian controller: a Kalman filter with the best state feedback for it.",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,10 +104,15 @@ def _judged_beyond(study: Study) -> str:
     return beyond_identified(study, study.residual) if study.fine_case is None else ""
 
 
+def terms(study: Study) -> dict[str, str]:
+    """What the page of a study explains: each term, and what it means."""
+    return TERMS if study.fine_pointing is None else TERMS | _FINE_TERMS
+
+
 def short(study: Study) -> list[str]:
     """What limits the terminal and what to do about it, in five sentences at most."""
     found = [
-        *_limits(study),
+        *limits(study),
         _largest_warning(study),
         "" if study.day is None else day_words.headline(study.day)[0],
         _papers_loop(study),
@@ -103,7 +120,8 @@ def short(study: Study) -> list[str]:
     return list(filter(None, found))
 
 
-def _limits(study: Study) -> list[str]:
+def limits(study: Study) -> list[str]:
+    """What the margin of the verdict is, and which requirement is nearest to its limit."""
     case = study.fine_case
     under = "" if case is None else f", with what {case.controller} leaves of {case.source}"
     margin = f"The margin is received over required power of the communication link at {_judged_at(study)}{under}."
@@ -114,7 +132,7 @@ def _limit(study: Study) -> str:
     r = nearest(study.requirements)
     said = contributors.contributor(study, r)
     which, todo = "Nearest to its limit is" if r.met else "What limits it is", contributors.advice(study, r)
-    return f"{which} the {r.name}: {said[:1].lower()}{said[1:]}{todo}."
+    return f"{which} the {r.name}. {said[:1].upper()}{said[1:]}{todo}."
 
 
 def _largest_warning(study: Study) -> str:
@@ -134,9 +152,9 @@ def _papers_loop(study: Study) -> str:
     left, most = (format_quantity(rad, "rad", 3) for rad in (found_rad, q.pointing_error_rad))
     judged = f"would miss {' and '.join(failed)}" if failed else "would meet what is required"
     return (
-        f"For comparison alone: the paper's loop ({run.controller}, sine of {run.freq_hz:g} Hz) {judged}; it leaves "
-        f"{left} ({q.residual_statistic}) of {most}, and {signed(study.achieved.margin_db, 'dB')} where "
-        f"{q.margin_db:.2f} dB are required."
+        f"For comparison alone: the paper's loop ({run.controller}, sine of {run.freq_hz:g} Hz) {judged}. It leaves "
+        f"{left} ({q.residual_statistic}) where {most} is allowed, and a margin of "
+        f"{signed(study.achieved.margin_db, 'dB')} where {q.margin_db:.2f} dB is required."
     )
 
 
@@ -221,13 +239,14 @@ def found(study: Study) -> str:
     if f is None or p is None:
         return ""
     said = "; ".join(
-        f"{w.name} {w.outcome.success_probability:.4f} in {quantity(w.outcome.mean_time_s, 's')}"
+        f"the {w.name} locks with a probability of {w.outcome.success_probability:.4f}, in "
+        f"{quantity(w.outcome.mean_time_s, 's')} on average"
         if w.possible
-        else f"{w.name} never"
+        else f"the {w.name} never locks"
         for w in f.ways
     )
     return (
-        f"Acquisition, with its retries: {said} (mean). The beacon's cone at 1/e2 covers its partner with a "
+        f"Acquisition, with its retries: {said}. The beacon's cone at 1/e2 covers its partner with a "
         f"probability of {p.coverage:.2f}, biases at their bounds about both axes."
     )
 
@@ -268,7 +287,7 @@ def verdict_text(study: Study, width: int = 80, verbose: bool = False) -> str:
     """
     if not verbose:
         return views_text([verdict_box(study), *short(study)], width)
-    said = [*_limits(study), *explanation(study)]
+    said = [*limits(study), *explanation(study)]
     return views_text([verdict_box(study), *said, papers_loop_view(study), warnings_view(study)], width)
 
 
