@@ -21,6 +21,8 @@ from small_campaign import halting
 from waiting import HANG_MS, HANG_S
 
 MISSION = "leo-geo.toml"
+WIDTHS = (400, 1000, 1400) if os.environ.get("MICRORAD_ENDURANCE") else (400, 1400)
+"""On both sides of the widths at which pages of the studio change their columns: 700, 1000, 1150 and 1250."""
 _SETTLED = """
 () => new Promise(done => {
   let last = setTimeout(done, 250);
@@ -100,6 +102,23 @@ def violations(page):
     """What axe finds wrong in a page."""
     axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe is not installed")
     return axe.Axe().run(page, options=_AXE).response["violations"]
+
+
+def fits(page, name, picture):
+    """The page scrolls to no side at any of `WIDTHS`, and axe finds nothing serious; it has its width again behind it.
+
+    What those who do not see are told is the same at all widths, and looked at in the widest.
+    """
+    before = page.viewport_size
+    for width in WIDTHS:
+        page.set_viewport_size({"width": width, "height": 900})
+        settled(page)
+        picture(page, f"{name}-{width}.png", full_page=True)
+        page.wait_for_function("document.documentElement.scrollWidth <= document.documentElement.clientWidth")
+        if width == max(WIDTHS) or os.environ.get("MICRORAD_ENDURANCE"):
+            serious = [each for each in violations(page) if each["impact"] in ("serious", "critical")]
+            assert [f"{each['id']}: {[node['html'][:150] for node in each['nodes']][:3]}" for each in serious] == []
+    page.set_viewport_size(before)
 
 
 def until(page, there, what):

@@ -11,7 +11,7 @@ from urllib.parse import urlsplit
 import numpy as np
 import pytest
 
-from browser import until
+from browser import check_quiet, fits, until
 from cli.test_cli import write_recording
 from microrad.lab import bench
 from microrad.studio.views.mirror import read_fits
@@ -42,6 +42,15 @@ def recording(tmp_path_factory):
     )
     loop = next(path for path in files if path.stem == "loop-100hz")
     return loop, {"output": None, "unit": None, "rate": "", "arm": "", "said": ""}
+
+
+@pytest.fixture(scope="module")
+def mirror(studio, context):
+    """The page of the mirror, whose list of files each test leaves empty."""
+    found = studio.enter(context, "mirror")
+    yield found
+    found.close()
+    check_quiet(found, studio.base)
 
 
 def drop(tab, file):
@@ -77,9 +86,8 @@ def choose(tab, label, option):
     tab.get_by_role("option", name=option, exact=True).click()
 
 
-def test_what_is_no_recording_is_refused_in_words(studio, opened, tmp_path):
-    tab = opened("mirror")
-    words = tab.get_by_role("alert").first
+def test_what_is_no_recording_is_refused_in_words(studio, mirror, tmp_path):
+    tab, words = mirror, mirror.get_by_role("alert").first
     drop(tab, {"name": "../evil.csv", "mimeType": "text/csv", "buffer": b"1,2\n3,4\n"})
     refusal = "the file '../evil.csv' is not taken: its name holds a path; rename it and drop it again"
     api.expect(words).to_have_text(refusal)
@@ -108,8 +116,8 @@ def looped(path, unit, scale=1.0):
     return path
 
 
-def test_each_recording_has_its_own_units_and_one_that_cannot_be_read_says_so(opened, tmp_path, picture):
-    tab = opened("mirror")
+def test_each_recording_has_its_own_units_and_one_that_cannot_be_read_says_so(mirror, tmp_path, picture):
+    tab = mirror
     for name, unit, scale in (("a_mrad", "mrad", 1.0), ("b_urad", "urad", 1e3)):
         drop(tab, looped(tmp_path / f"{name}.csv", unit, scale))
         api.expect(tab.locator(".mirror-file .seen")).to_have_text(f"{name}.csv")
@@ -169,13 +177,13 @@ def test_a_recording_is_dropped_identified_while_one_looks_on_and_its_mirror_use
     tab.get_by_role("link", name="Open the report").wait_for()
     assert tab.get_by_label("Name of the mirror").input_value() == "stage"
     assert tomllib.loads((studio.folder / "stage.toml").read_text("utf-8"))["name"] == "stage"
-    (fits,) = filter(None, map(read_fits, (studio.folder / ".microrad-studio" / "jobs").glob("[0-9]*")))
-    assert {fit.model for fit in fits} == {"prandtl_ishlinskii", "bouc_wen"}
+    (fitted,) = filter(None, map(read_fits, (studio.folder / ".microrad-studio" / "jobs").glob("[0-9]*")))
+    assert {fit.model for fit in fitted} == {"prandtl_ishlinskii", "bouc_wen"}
     tab.get_by_role("cell", name="bouc_wen", exact=True).wait_for()
     chosen = tab.get_by_role("row").filter(has=tab.get_by_text("chosen", exact=True))
     api.expect(chosen).to_have_count(1)
     wait_for_traces(tab, "Measured loop and that of the model", 2)
-    picture(tab, "mirror-identified.png", full_page=True)
+    fits(tab, "mirror", picture)
     (_, measured), (_, model) = traces(tab, "Measured loop and that of the model").values()
     assert 0 < np.std(measured - model) < 0.05 * np.ptp(measured)
     before = studio.file.read_text("utf-8")
@@ -207,7 +215,7 @@ def test_a_controller_is_chosen_and_its_loop_answers(opened, picture):
     tab.get_by_label("Step", exact=True).fill("5 V")
     tab.get_by_text('step: "5 V" is in "V", another kind of quantity').wait_for()
     api.expect(tab.get_by_label("Step response")).to_have_class(re.compile(r"\bbehind\b"))
-    picture(tab, "control.png", full_page=True)
     tab.get_by_label("Step", exact=True).fill("50 urad")
     api.expect(tab.get_by_label("Step response")).not_to_have_class(re.compile(r"\bbehind\b"))
     assert tab.get_by_text("another kind of quantity").count() == 0
+    fits(tab, "control", picture)

@@ -5,7 +5,7 @@ import json
 import pytest
 
 import budgets
-from browser import check_quiet, until
+from browser import check_quiet, fits, until
 from microrad import link
 from microrad.link.study import largest_rate
 from microrad.report.quantities import signed
@@ -92,7 +92,7 @@ def test_the_margin_and_the_map_follow_a_typed_aperture(studio, links):
     shown_margin(links, "+3.00 dB")
 
 
-def test_a_slider_that_is_moved_shows_its_value_in_the_map_and_writes_it_when_let_go(studio, links, opened):
+def test_a_slider_that_is_moved_shows_its_value_in_the_map_and_writes_it_when_let_go(studio, links):
     before, text = links.evaluate(CORNER), written(studio)
     typed(links, APERTURE).fill("7 cm")
     box = links.get_by_role("slider", name=f"{APERTURE}, slider").bounding_box()
@@ -107,14 +107,39 @@ def test_a_slider_that_is_moved_shows_its_value_in_the_map_and_writes_it_when_le
     assert 5.0 < float(value.removesuffix(" cm")) < 20.0
     there = margin_at(studio.file, terminals__leo_aperture=value)
     shown_margin(links, there)
+    typed(links, APERTURE).fill("5 cm")
+    typed(links, APERTURE).press("Enter")
+    shown_margin(links, "+3.00 dB")
+
+
+@pytest.mark.endurance  # as the mission's tabs do, in test_studio_browser.py
+def test_tabs_of_the_links_follow_each_other(studio, links, opened):
+    typed(links, APERTURE).fill("7 cm")
+    typed(links, APERTURE).press("Enter")
+    there = margin_at(studio.file, terminals__leo_aperture="7 cm")
+    shown_margin(links, there)
+    links.get_by_text("not saved", exact=True).wait_for()
     second = opened("link")
     second.wait_for_function("() => document.querySelector('.margin-card .value')?.textContent")
-    assert typed(second, APERTURE).input_value() == value
+    assert typed(second, APERTURE).input_value() == "7 cm"
     assert margins(second)[0] == there
     typed(second, APERTURE).fill("5 cm")
     typed(second, APERTURE).press("Enter")
     shown_margin(links, "+3.00 dB")  # the first tab follows the second
     assert typed(links, APERTURE).input_value() == "5 cm"
+
+
+def test_a_slider_that_is_typed_is_in_the_file_that_a_click_on_save_writes_at_once(studio, links):
+    before, size = studio.file.read_text("utf-8"), typed(links, APERTURE)
+    for last in ("8 cm", "5 cm"):
+        size.fill("7 cm")
+        size.press("Enter")
+        links.get_by_role("status").get_by_text("not saved", exact=True).wait_for()
+        size.fill(last)
+        links.get_by_role("button", name="Save", exact=True).click()
+        links.get_by_role("status").get_by_text("saved", exact=True).wait_for()
+        assert studio.file.read_text("utf-8") == before.replace('leo_aperture = "5 cm"', f'leo_aperture = "{last}"')
+    shown_margin(links, "+3.00 dB")
 
 
 def test_quick_steps_of_a_slider_never_go_back_and_end_at_the_last_in_map_field_and_mission(studio, links):
@@ -172,7 +197,7 @@ def test_a_page_that_is_opened_on_a_faulty_mission_promises_nothing_in_grey(stud
     shown_margin(links, "+3.00 dB")
 
 
-def test_the_budget_of_another_link_is_chosen_and_the_page_copied_as_a_command(studio, links):
+def test_the_budget_of_another_link_is_chosen_and_the_page_copied_as_a_command(studio, links, picture):
     links.get_by_text("The links close, and ").wait_for()
     links.get_by_role("button", name="Beacon", exact=True).click()
     beacon = budgets.beacon(*mission_at(studio.file))
@@ -181,10 +206,17 @@ def test_the_budget_of_another_link_is_chosen_and_the_page_copied_as_a_command(s
     links.get_by_role("button", name="Copy as command").click()
     links.get_by_text("Copied: microrad budget leo-geo.toml").wait_for()
     assert links.evaluate("navigator.clipboard.readText()") == "microrad budget leo-geo.toml"
+    links.get_by_text("every requirement is met").wait_for()  # of the study, which comes last
+    fits(links, "link", picture)
 
 
 # ------------------------------------------------------------------------------------------------------------ pointing
-def test_the_coverage_follows_the_beacon_s_divergence(studio, opened):
+LEGENDS = """() => [...document.querySelectorAll('.js-plotly-plot')]
+    .every(plot => plot.clientWidth > 300 && plot._fullLayout?._size.h > 190)"""
+"""That no legend takes the room of the data."""
+
+
+def test_the_coverage_follows_the_beacon_s_divergence_and_a_narrow_page_has_one_column(studio, opened, picture):
     page = opened("pointing")
     page.get_by_text("with a probability of 0.53").wait_for()
     typed(page, "Divergence").fill("1310 urad")
@@ -194,39 +226,31 @@ def test_the_coverage_follows_the_beacon_s_divergence(studio, opened):
     page.get_by_role("row").filter(has_text="radial distribution").get_by_text("covers it").wait_for()
     typed(page, "Divergence").fill("780 urad")
     page.get_by_text("with a probability of 0.53").wait_for()
-
-
-def test_a_narrow_page_has_one_column_and_a_long_legend_does_not_take_the_room_of_the_data(opened):
-    page = opened("pointing")
+    fits(page, "pointing", picture)
     page.set_viewport_size({"width": 400, "height": 900})
-    page.get_by_text("with a probability of").wait_for()
-    page.wait_for_function(
-        """() => [...document.querySelectorAll('.js-plotly-plot')]
-            .every(plot => plot.clientWidth > 300 && plot._fullLayout?._size.h > 190)"""
-    )
+    page.wait_for_function(LEGENDS)
 
 
 # ----------------------------------------------------------------------------------------------------------------- day
-def test_the_day_is_computed_with_progress_and_a_second_tab_finds_it(opened):
+def test_the_day_is_computed_with_progress_and_a_second_tab_finds_it_and_says_whose_it_is(opened, links, picture):
     page = opened("day")
     page.get_by_text("Computing, ").wait_for()
     page.get_by_text("In 24 h the relay is in view 15 times").wait_for()
     page.get_by_role("button", name="What the ways could carry").click()
     page.get_by_role("row").filter(has_text="time in contact").get_by_text("913 min").wait_for()
     page.wait_for_function("() => document.querySelectorAll('.js-plotly-plot .barlayer .point').length > 30")
+    fits(page, "day", picture)
+    page.close()
+
     again = opened("day")
     again.get_by_text("In 24 h the relay is in view 15 times").wait_for()
     assert again.get_by_text("Computing, ").count() == 0
-
-
-def test_a_day_that_is_shown_beside_a_fault_says_that_it_is_the_one_before(opened, links):
-    page = opened("day")
-    page.get_by_text("The day of the mission as it stands.").wait_for()
+    again.get_by_text("The day of the mission as it stands.").wait_for()
     typed(links, APERTURE).fill("5 W")
     typed(links, APERTURE).press("Enter")
-    page.get_by_text("The day of the mission before this.").wait_for()
-    assert page.locator(".behind").get_by_text("In 24 h the relay is in view 15 times").is_visible()
+    again.get_by_text("The day of the mission before this.").wait_for()
+    assert again.locator(".behind").get_by_text("In 24 h the relay is in view 15 times").is_visible()
     typed(links, APERTURE).fill("5 cm")
     typed(links, APERTURE).press("Enter")
-    page.get_by_text("The day of the mission as it stands.").wait_for()
-    page.locator(".behind").wait_for(state="detached")
+    again.get_by_text("The day of the mission as it stands.").wait_for()
+    again.locator(".behind").wait_for(state="detached")
