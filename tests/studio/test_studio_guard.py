@@ -691,9 +691,9 @@ def test_a_gigabyte_is_cut_off_and_takes_no_memory(server, path, chunked):
     head = f"POST {path} HTTP/1.1\r\n" + own_headers(port, **length)
     status, passed = raw(port, head, zeros(1_000_000_000, chunked))
     # 413 for all but the path that answers without reading, whose connection ends; what lies in the system's buffers
-    # between both ends was sent without being taken.
+    # between both ends (on Linux up to 32 MiB to receive and 4 MiB to send) was sent without being taken.
     assert status in ((413, None) if path != "/unread" or not chunked else (200, None))
-    assert passed <= taken * 1.01 + 16_000_000
+    assert passed <= taken * 1.01 + 40_000_000
     assert passed >= taken * 0.99 or path == "/unread"
     if sys.platform == "linux":
         assert largest_memory_kb(process) - before < 20_000
@@ -852,11 +852,11 @@ def test_a_page_of_the_studio_works_in_a_browser_under_the_policy(studio, tab):
     tab.goto(f"{here}?token={TOKEN}")
     assert tab.url == here
     tab.get_by_text("slider at 3").wait_for()
-    tab.locator(".q-slider").first.click(position={"x": 2, "y": 10})
-    tab.get_by_text("slider at 0").wait_for()
     tab.locator(".js-plotly-plot .heatmaplayer image").wait_for(state="attached")
     tab.locator("canvas").first.wait_for()
     tab.locator(".cm-content").wait_for()
+    tab.locator(".q-slider").first.click(position={"x": 2, "y": 10})  # which nothing moves any more
+    tab.get_by_text("slider at 0").wait_for()
     tab.locator("input[type=file]").set_input_files([{"name": "<b>x.csv", "mimeType": "text/csv", "buffer": b"1,2"}])
     tab.get_by_text("took <b>x.csv").wait_for()
     tab.get_by_role("button", name="script").click()
