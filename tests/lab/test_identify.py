@@ -24,6 +24,7 @@ from microrad.lab.identify import (
 )
 from microrad.lab.identify.hysteresis.bouc_wen import _bound_gradient
 from microrad.lab.identify.records import fastest_rate, si_records, transient
+from microrad.lab.identify.selection import candidates
 from microrad.lab.identify.selection.choice import choose_best
 from microrad.lab.identify.statistics import colour_inflation
 from microrad.lab.recording import read_recording, recording_from_arrays
@@ -89,7 +90,9 @@ def fit_trio():
 
 @pytest.fixture(scope="module")
 def identification():
-    return identify([record(100, 5), record(60, 6)], models=STATIC)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(candidates, "_STARTS", 4)
+        return identify([record(100, 5), record(60, 6)], models=STATIC)
 
 
 # -------------------------------------------------------------------------------------------------- recovery, Bouc-Wen
@@ -412,7 +415,8 @@ def test_other_refusals(fit_100hz):
             predict(fit_100hz, record(100), split)
 
 
-def test_a_drive_of_steps_has_a_rate():
+def test_a_drive_of_steps_has_a_rate(monkeypatch):
+    monkeypatch.setattr(candidates, "_STARTS", 2)
     drive = np.where(np.sin(2 * np.pi * 7 * np.arange(2000) / 1000) > 0, 1.0, 0.0)
     assert fastest_rate(si_records([recording_from_arrays(drive, drive, 1000.0)], Units())) > 100
     assert identify([recording_from_arrays(drive, drive + 0.01 * philox(1).standard_normal(2000), 1000.0)]).warnings
