@@ -6,7 +6,7 @@ import re
 import shutil
 import subprocess
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from math import inf, nan, pi
 
 import numpy as np
@@ -133,6 +133,7 @@ def bench(code, vectors, target="check", passes=1):
     """Status and numbers of the bench that the Makefile builds, over these vectors."""
     (code.folder / "vectors.csv").write_text(c_code.vectors_text(code.of, vectors), encoding="utf-8")
     words = ["make", "-s", "-C", code.folder, target, "CC=gcc", f"PASSES={passes}"]
+    words += ["CFLAGS=-std=c99 -O1"] if target == "sanitized" else []  # quicker to compile
     done = subprocess.run(words, check=False, capture_output=True, text=True, timeout=HANG_S)
     lines = [line.split() for line in done.stdout.splitlines()]
     return done.returncode, {line[0]: float(line[1]) for line in lines if len(line) == 2}, done.stderr
@@ -154,7 +155,7 @@ def mission(folder, *changes, whole=True):
 
 NO_CONVERTER = ('drive_resolution = "0.305 mV"', 'drive_resolution = "0 V"')
 OFTEN = bool(os.environ.get("MICRORAD_ENDURANCE"))
-POINTING = {"PI + inverse": 20_000 if OFTEN else 10_000, "PI + inverse in series": 100_000 if OFTEN else 20_000}
+POINTING = {"PI + inverse": 20_000 if OFTEN else 5000, "PI + inverse in series": 100_000 if OFTEN else 10_000}
 """Samples by controller: in series the jitter goes through the inverse, else the known part of the error alone."""
 
 
@@ -223,8 +224,10 @@ def pi_axis(loop):
     return AxisController("PI", system, s.B / s.D)
 
 
-def pair(of, models, resolution_v=0.0, in_series=True):
+@cache
+def pair(models, resolution_v=0.0, in_series=True):
     """Controller and recorded run of a pair's loop, around a mirror of plays: those are quick, whatever is inverted."""
+    of = designs.chosen("PI + inverse in series")
     loop = pair_loop(models, resolution_v)
     inverse = control.inverse(loop.mirror)
     made = with_inverse("pair", loop, pi_axis(loop), inverse, ReferenceFilter(1000.0), in_series)
@@ -275,9 +278,9 @@ def test_single_precision_stays_within_the_bound_that_it_states(flown, tmp_path)
 
 
 @pytest.mark.parametrize("name", PAIRS)
-def test_every_model_of_hysteresis_and_creep_on_several_actuators(name, shipped, tmp_path):
+def test_every_model_of_hysteresis_and_creep_on_several_actuators(name, tmp_path):
     """With rates beyond the limit and commands beyond the stroke, which are counted as the kernel does."""
-    of, vectors = pair(shipped, PAIRS[name])
+    of, vectors = pair(PAIRS[name])
     assert vectors.saturated > 50
     assert (vectors.rate_clamped > 50) == (("exponent" not in name and "generalised" not in name) or "gen" in name)
     off, counters = difference(Code(tmp_path / "double", of), vectors)
@@ -345,9 +348,9 @@ def without_a_play(of):
     return replace(of, inverse=replace(of.inverse, **parts))
 
 
-def test_each_part_of_an_inverse_counts(shipped, tmp_path):
+def test_each_part_of_an_inverse_counts(tmp_path):
     """The agreement above is not for want of hysteresis: without one play, creep or gamma it is lost."""
-    of, vectors = pair(shipped, PAIRS["printed, widening plays that creep"])
+    of, vectors = pair(PAIRS["printed, widening plays that creep"])
     law = of.inverse
     changes = (
         without_a_play(of),
@@ -362,7 +365,7 @@ def test_each_part_of_an_inverse_counts(shipped, tmp_path):
 
 
 def test_the_converter_rounds_as_the_kernels(shipped, tmp_path):
-    of, vectors = choice.flight_controller(shipped), choice.vectors(shipped, 5000)
+    of, vectors = choice.flight_controller(shipped), choice.vectors(shipped, 2000)
     off, counters = difference(Code(tmp_path, of), vectors)
     assert off == 0.0
     assert counters == Counters(0, 0, 0, 0)
@@ -394,11 +397,18 @@ def mirror_of(tables):
 EXPONENT = 'beta = "34.635 1/V" ', 'exponent = 2\nbeta = "34.635 1/V" '
 
 
-@pytest.mark.parametrize("changes", [(), (EXPONENT,), mirror_of(WIDENING_PLAYS)], ids=["Eq. 3", "exponent 2", "plays"])
+@pytest.mark.parametrize(
+    "changes",
+    [
+        pytest.param((), id="Eq. 3"),
+        pytest.param((EXPONENT,), id="exponent 2", marks=pytest.mark.endurance),
+        pytest.param(mirror_of(WIDENING_PLAYS), id="plays"),
+    ],
+)
 def test_the_controller_of_fig_8_takes_its_rate_from_two_samples(changes, tmp_path):
     """The loop of [control]: one axis at 50 kHz, and an inverse that the reference alone drives."""
     chosen = choice.choose(mission(tmp_path, NO_CONVERTER, *changes, whole=False), choice.PID_WITH_INVERSE)
-    of, vectors = choice.flight_controller(chosen), choice.vectors(chosen, 10_000)
+    of, vectors = choice.flight_controller(chosen), choice.vectors(chosen, 5000)
     assert of.inverse.by_difference
     code = Code(tmp_path, of)
     off, counters = difference(code, vectors)
@@ -408,7 +418,7 @@ def test_the_controller_of_fig_8_takes_its_rate_from_two_samples(changes, tmp_pa
     assert 1e-9 < off < 1e-4
 
 
-@pytest.mark.parametrize("name", ["PI", "LQG"])
+@pytest.mark.parametrize("name", [pytest.param("PI", marks=pytest.mark.endurance), "LQG"])
 def test_controllers_without_an_inverse_have_no_header_for_it(name, tmp_path):
     chosen = designs.without_converter(name)
     of, vectors = minimal(choice.flight_controller(chosen)), choice.vectors(chosen, 3000)
@@ -424,8 +434,8 @@ def test_controllers_without_an_inverse_have_no_header_for_it(name, tmp_path):
 
 @pytest.mark.skipif(shutil.which("clang") is None, reason="no clang")
 @pytest.mark.parametrize("precision", PRECISIONS)
-def test_another_compiler_makes_the_same_of_it(precision, shipped, tmp_path):
-    of, vectors = pair(shipped, PAIRS["printed, widening plays that creep"])
+def test_another_compiler_makes_the_same_of_it(precision, tmp_path):
+    of, vectors = pair(PAIRS["printed, widening plays that creep"])
     off, _ = difference(Code(tmp_path, of, precision, compiler="clang"), vectors)
     assert off < (EXACT if precision == "double" else 2e-5)
 
@@ -473,8 +483,8 @@ FUZZED = {
         ("printed, widening plays that creep", "single"),
     ],
 )
-def test_garbage_is_held_off_and_never_leaves_the_limits(name, precision, shipped, tmp_path):
-    of, vectors = pair(shipped, FUZZED[name], resolution_v=0.35e-3)  # 2.5 V would be rounded to 2.50005 V
+def test_garbage_is_held_off_and_never_leaves_the_limits(name, precision, tmp_path):
+    of, vectors = pair(FUZZED[name], resolution_v=0.35e-3)  # 2.5 V would be rounded to 2.50005 V
     code = Code(tmp_path, of, precision)
     bad = spoiled(vectors.inputs, code.number)
     good, rejected = held(bad)
@@ -543,8 +553,8 @@ def test_the_loop_recovers_once_its_inputs_are_sound_again(precision, shipped, t
 # ------------------------------------------------------------------------------------------------ state and source
 
 
-def test_all_memory_is_the_callers(shipped, tmp_path):
-    of, vectors = pair(shipped, PAIRS["printed, widening plays that creep"])
+def test_all_memory_is_the_callers(tmp_path):
+    of, vectors = pair(PAIRS["printed, widening plays that creep"])
     code = Code(tmp_path, of)
     alone, other = code.run(vectors.inputs)[0], code.run(-vectors.inputs)[0]
     one, two = code.begin(), code.begin()
@@ -560,10 +570,10 @@ def test_all_memory_is_the_callers(shipped, tmp_path):
 
 
 @pytest.mark.parametrize("precision", PRECISIONS)
-def test_a_drive_that_is_no_number_is_not_given_out(precision, shipped, tmp_path):
+def test_a_drive_that_is_no_number_is_not_given_out(precision, tmp_path):
     """A gain of exp(-2500) and an h of exp(1200): the last command stays, and once the inputs are sound it recovers."""
     endless = replace(PRINTED, rate_limit_v_s=inf, d2_s_v=1e-3)
-    of, vectors = pair(shipped, ((endless, CREEP), (PLAYS, NO_CREEP)), in_series=False)
+    of, vectors = pair(((endless, CREEP), (PLAYS, NO_CREEP)), in_series=False)
     settling = np.concatenate([np.zeros((60_000, 4)), 0.1 * vectors.inputs[:2000]])
     jump = np.array([[0.0, 0.0, 0.09, 0.0]])
     code = Code(tmp_path / "around", of, precision)
@@ -603,9 +613,9 @@ ALLOWED = {"exp", "expm1", "log1p", "floor", "pow", "fabs", "fmin", "fmax"}
 
 
 @pytest.mark.parametrize("precision", PRECISIONS)
-def test_no_heap_no_recursion_no_memory_of_its_own_and_bounded_loops(precision, shipped, tmp_path):
+def test_no_heap_no_recursion_no_memory_of_its_own_and_bounded_loops(precision, tmp_path):
     """Each function calls only those that stand above it, so none comes back to itself."""
-    of, _ = pair(shipped, PAIRS["printed, widening plays that creep"])
+    of, _ = pair(PAIRS["printed, widening plays that creep"])
     code = Code(tmp_path, of, precision)
     text = code.files["flown_hysteresis.h"] + code.files["flown.c"]
     names = [name for name, _ in functions(text)]

@@ -100,7 +100,7 @@ FLOWN += [
 
 def flown(name):
     """A controller by its name, or with the inverse of a pair of models, and a recorded run."""
-    return pair(designs.chosen("PI + inverse in series"), PAIRS[name]) if name in PAIRS else designs.flown(name, 300)
+    return pair(PAIRS[name]) if name in PAIRS else designs.flown(name, 300)
 
 
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc")
