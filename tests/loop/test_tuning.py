@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -177,8 +177,8 @@ def test_the_free_optimum_of_one_gain_is_that_of_a_scalar_minimiser():
 
 def test_a_tuned_pi_is_the_best_of_a_fine_grid_with_exact_variances_and_margins():
     best = (math.inf, None)
-    for integral in np.geomspace(100.0, 2e3, 35):
-        for proportional in [1e-4, *np.geomspace(0.01, 1.0, 25)]:
+    for integral in np.geomspace(100.0, 2e3, 24):
+        for proportional in [1e-4, *np.geomspace(0.01, 1.0, 16)]:
             controller = pi(PLAIN, [integral, proportional])
             if stable(PLAIN, controller):
                 left = rms(PLAIN, controller)
@@ -246,8 +246,29 @@ def test_a_bound_that_costs_nothing_is_not_named():
     assert found.bound_by == ()
 
 
+FLAT = {
+    "PI": (PI, PLAIN),
+    "PI + notch": (classical.PI_NOTCH, RESONANT),
+    "resonant damping": (classical.RESONANT_DAMPING, RESONANT),
+    "disturbance observer": (classical.DISTURBANCE_OBSERVER, PLAIN),
+    "LQG": (LQG, RESONANT),
+}
+REPEATED = {"PI + notch", "resonant damping"}
+"""Their optima have tests of their own below."""
+
+
+@cache
+def tuned(name):
+    """What a family is tuned to, and each place where a search for it has ended."""
+    of, plant = FLAT[name]
+    kept, settle = [], tuning.settle
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(tuning, "settle", lambda *args: kept.append((args[0], settle(*args))) or kept[-1][1])
+        return tuning.tune(of, [plant], HALF, seed=1), kept
+
+
 def test_lqg_beats_the_tuned_pi_under_the_same_margin():
-    ours, theirs = (tuning.tune(f, [RESONANT], HALF, seed=1) for f in (LQG, PI))
+    ours, theirs = tuned("LQG")[0], tuning.tune(PI, [RESONANT], HALF, seed=1)
     print(f"LQG {1e6 * ours.residual_rms_rad:.3f} urad, PI {1e6 * theirs.residual_rms_rad:.3f} urad")
     assert ours.residual_rms_rad < 0.8 * theirs.residual_rms_rad
     assert ours.least_modulus >= 0.5
@@ -264,22 +285,11 @@ def test_each_seed_ends_at_the_same_four_digits(plant):
     assert all(v == float(f"{v:.3e}") for v in found[0].values.values())
 
 
-FLAT = {
-    "PI": (PI, PLAIN),
-    "PI + notch": (classical.PI_NOTCH, RESONANT),
-    "resonant damping": (classical.RESONANT_DAMPING, RESONANT),
-    "disturbance observer": (classical.DISTURBANCE_OBSERVER, PLAIN),
-    "LQG": (LQG, RESONANT),
-}
-
-
-@pytest.mark.parametrize("name", FLAT)
-def test_nothing_beside_a_tuned_controller_is_better(name, monkeypatch):
-    kept = []
-    settle = tuning.settle
-    monkeypatch.setattr(tuning, "settle", lambda *args: kept.append((args[0], settle(*args))) or kept[-1][1])
-    tuning.tune(*FLAT[name][:1], [FLAT[name][1]], HALF, seed=1)
-    of, best = min(kept, key=lambda each: each[1].score)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.endurance] if name in REPEATED else []) for name in FLAT]
+)
+def test_nothing_beside_a_tuned_controller_is_better(name):
+    of, best = min(tuned(name)[1], key=lambda each: each[1].score)
     rng = np.random.default_rng(1)
     for size in (1e-5, 1e-4, 1e-3):
         for _ in range(20):
@@ -306,8 +316,8 @@ def test_where_the_residual_does_not_tell_the_gentler_value_is_taken():
 
 
 def test_a_family_that_contains_another_is_never_worse(monkeypatch):
-    spread = [axis_plant(gain=0.089e-3 * g, resonance=(900.0, 0.3)) for g in (1.0, 0.8, 1.2)]
-    for plants in ([PLAIN], spread, [NOISY]):
+    spread = [axis_plant(gain=0.089e-3 * g, resonance=(900.0, 0.3)) for g in (1.0, 0.8)]
+    for plants in (spread, [NOISY]):
         known = tuning.tune(classical.PI, plants, HALF, seed=1)
         assert tuning.tune(classical.PI_NOTCH, plants, HALF, seed=1, base=known).mean_rms_rad <= known.mean_rms_rad
     monkeypatch.setattr(tuning, "settle", lambda of, t: of.at(np.full(5, 0.4)))  # a search that ends somewhere
