@@ -422,15 +422,6 @@ def test_the_tail_stands_by_itself_with_its_intervals(page, fine, written):
         assert next(csv.reader(file))[0] == "radial error, mission's mirror (rad)"
 
 
-def test_fine_requirements_stand_with_their_dominant_part(plain, fine):
-    def causes(study, found):
-        return [row[5] for row in requirement_views.judged_table(study, found).rows]
-
-    whole = with_fine(plain, fine)
-    rows = causes(whole, whole.requirements)
-    assert rows[4] == "Vibration (OLYMPUS): 3 µrad of 3.05 µrad rms with hysteresis, 97 % of the sum of squares"
-    lost = whole.performance.case(performance.FINE, SECOND, "given").outage_loss_db
-    top = whole.tornado.swings[0]
 def test_the_margin_of_the_verdict_follows_from_the_budget_by_its_pointing_loss(plain, fine):
     whole = with_fine(plain, fine)
     (said,) = report_page._judged(whole)
@@ -441,6 +432,15 @@ def test_the_margin_of_the_verdict_follows_from_the_budget_by_its_pointing_loss(
     assert {*study_words.terms(whole)} - {*study_words.terms(plain)} == {"Stroke", "OLYMPUS", "PI", "LQG"}
 
 
+def test_fine_requirements_stand_with_their_dominant_part(plain, fine):
+    def causes(study, found):
+        return [row[5] for row in requirement_views.judged_table(study, found).rows]
+
+    whole = with_fine(plain, fine)
+    rows = causes(whole, whole.requirements)
+    assert rows[4] == "Vibration (OLYMPUS): 3 µrad of 3.05 µrad rms with hysteresis, 97 % of the sum of squares"
+    lost = whole.performance.case(performance.FINE, SECOND, "given").outage_loss_db
+    top = whole.tornado.swings[0]
     assert rows[5] == (
         f"Vibration (OLYMPUS), pointing loss {lost:.2f} dB at the outage; the margin moves most with {top.key}: "
         f"{top.swing_db:.2f} dB for ±10 %"
