@@ -30,7 +30,7 @@ TABLE = {
     "102": "shout",
     "103": "refuse",
     "104": "leave",
-    "105": "slow 700",  # times 10 ms at least
+    "105": "slow 550",  # times 10 ms at least
     "106": "hog",
 }
 
