@@ -23,6 +23,8 @@ from microrad.export.linear_part.sections import sections
 from microrad.export.records import ExportError, FlightController, Origin, Signal
 
 SHIPPED = ("LQG", "PI + inverse", "PI + inverse in series", "PID + inverse")
+ONE_OF_EACH = ("LQG", pytest.param("PI + inverse", marks=pytest.mark.endurance), *SHIPPED[2:])
+"""One without an inverse, one of the fine-pointing loop with it, and one of the loop of [control]."""
 LARGEST, SMALLEST = 2**31 - 1, -(2**31)
 FLAGS = [
     "-std=c99",
@@ -203,7 +205,7 @@ needs_compiler = pytest.mark.skipif(not COMPILERS, reason="no gcc or clang here"
 
 
 @needs_compiler
-@pytest.mark.parametrize("name", SHIPPED)
+@pytest.mark.parametrize("name", ONE_OF_EACH)
 def test_the_compiled_code_equals_the_twin_to_the_last_bit(name, tmp_path):
     of, form, v = shipped(name)
     fixed, rng = form_of(name), np.random.default_rng(5)
@@ -261,7 +263,7 @@ def test_a_step_with_an_inverse_stays_within_the_limits_for_any_readings(name, t
 
 
 @needs_compiler
-@pytest.mark.parametrize("name", SHIPPED)
+@pytest.mark.parametrize("name", ONE_OF_EACH)
 def test_the_bench_holds_the_recorded_run(name, tmp_path):
     of, form, v = shipped(name)
     fixed = form_of(name)

@@ -249,8 +249,8 @@ def wild(of: FlightController) -> Floats:
     ("name", "precision"),
     [
         ("PI + inverse in series", "double"),
-        ("PI + inverse in series", "single"),
-        ("PID + inverse", "double"),
+        pytest.param("PI + inverse in series", "single", marks=pytest.mark.endurance),
+        pytest.param("PID + inverse", "double", marks=pytest.mark.endurance),
         ("resonant damping", "single"),
     ],
 )
@@ -277,7 +277,11 @@ PLAIN = {
 @needs_gxx
 @pytest.mark.parametrize(
     ("name", "precision"),
-    [*((name, "single") for name in PLAIN), ("no inverse", "double"), ("all", "double")],
+    [
+        *((name, "single") for name in PLAIN),
+        pytest.param("no inverse", "double", marks=pytest.mark.endurance),
+        ("all", "double"),
+    ],
 )
 def test_each_kind_of_inverse_costs_what_is_stated(tmp_path: Path, name: str, precision: str) -> None:
     of = PLAIN[name]
@@ -346,10 +350,14 @@ FIXED = {
     "all": 32,
     "rate given": 24,
 }
+FIXED_AGAIN = {"no inverse", "rate given"}
+"""What differs from another one by its numbers, or by a rate that is read and not computed."""
 
 
 @needs_gxx
-@pytest.mark.parametrize("name", FIXED)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.endurance] if name in FIXED_AGAIN else []) for name in FIXED]
+)
 def test_fixed_point_costs_what_is_stated(tmp_path: Path, name: str) -> None:
     of, run = (PLAIN[name], run_of(PLAIN[name])) if name in PLAIN else designed(name)
     made = fixed.quantised(of, sections(of), run, FIXED[name], beyond_a_count=True)
