@@ -247,8 +247,7 @@ SHOWN = "each => each.getBoundingClientRect().height > 2 * each.querySelector('s
     [
         "report",
         "campaign",
-        "identification",
-        *(pytest.param(each, marks=pytest.mark.endurance) for each in ("day", "budget")),
+        *(pytest.param(e, marks=pytest.mark.endurance) for e in ("identification", "day", "budget")),
     ],
 )
 def test_paper_is_wide_enough_and_shows_what_is_folded(opened, name):
