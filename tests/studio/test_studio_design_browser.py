@@ -203,11 +203,11 @@ def test_the_budget_of_another_link_is_chosen_and_the_page_copied_as_a_command(s
     beacon = budgets.beacon(*mission_at(studio.file))
     row = links.locator("tr.total").filter(has_text="Margin")
     row.get_by_text(f"{beacon.margin_db:.2f} dB").wait_for()
+    links.get_by_text("every requirement is met").wait_for()  # of the study, which comes last
+    fits(links, "link", picture)
     links.get_by_role("button", name="Copy as command").click()
     links.get_by_text("Copied: microrad budget leo-geo.toml").wait_for()
     assert links.evaluate("navigator.clipboard.readText()") == "microrad budget leo-geo.toml"
-    links.get_by_text("every requirement is met").wait_for()  # of the study, which comes last
-    fits(links, "link", picture)
 
 
 # ------------------------------------------------------------------------------------------------------------ pointing
