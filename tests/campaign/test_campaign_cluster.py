@@ -279,22 +279,31 @@ def test_a_worker_with_other_code_is_refused_with_both_hashes(there, monkeypatch
     one.close()
 
 
-def test_a_worker_without_microrad_is_refused(elsewhere):
-    """Also where it joins a campaign that waits for workers: a job would end it before it was looked at."""
-    one = connect(elsewhere)
-    bare = {"prelude": "import sys; sys.modules['microrad'] = None"}
-    joins = beside(lambda: (until(lambda: one._looked_s > 0.0, "a look"), elsewhere.worker("--no-nanny", **bare)))
-    with pytest.raises(CampaignError, match=r"the worker at tcp://\S* has no microrad that fits .* code is c0de"):
+@pytest.fixture(scope="module")
+def lonely(tmp_path_factory):
+    """A scheduler without workers; the last test that uses it starts one that is no good."""
+    one = Elsewhere(tmp_path_factory.mktemp("lonely"))
+    yield one
+    one.close()
+    print(one.log)
+
+
+def test_a_scheduler_without_workers_is_told(lonely, monkeypatch):
+    monkeypatch.setattr(cluster, "_NO_WORKERS_S", 1.0)
+    one = connect(lonely)
+    with pytest.raises(CampaignError, match="had no worker for 1 s: start some with `dask worker tcp://"):
         run(one, chunks(0))
-    joins.join(HANG_S)
     one.close()
 
 
-def test_a_scheduler_without_workers_is_told(elsewhere, monkeypatch):
-    monkeypatch.setattr(cluster, "_NO_WORKERS_S", 1.0)
-    one = connect(elsewhere)
-    with pytest.raises(CampaignError, match="had no worker for 1 s: start some with `dask worker tcp://"):
+def test_a_worker_without_microrad_is_refused(lonely):
+    """Also where it joins a campaign that waits for workers: a job would end it before it was looked at."""
+    one = connect(lonely)
+    bare = {"prelude": "import sys; sys.modules['microrad'] = None"}
+    joins = beside(lambda: (until(lambda: one._looked_s > 0.0, "a look"), lonely.worker("--no-nanny", **bare)))
+    with pytest.raises(CampaignError, match=r"the worker at tcp://\S* has no microrad that fits .* code is c0de"):
         run(one, chunks(0))
+    joins.join(HANG_S)
     one.close()
 
 
