@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 import signal
 import stat
@@ -196,6 +197,12 @@ def rows_in(ledger):
     return sum(cell.rows for cell in Interim(ledger).look().cells)
 
 
+def interrupt_waits(process):
+    """Whether a process that has halted will be interrupted when it goes on."""
+    (pending,) = re.findall(r"ShdPnd:\s*(\w+)", Path(f"/proc/{process}/status").read_text("utf-8"))
+    return bool(int(pending, 16) >> (signal.SIGINT - 1) & 1)
+
+
 def test_a_cancelled_campaign_keeps_its_rows_and_resumes_with_progress_handed_over(studio, tmp_path, monkeypatch):
     campaign_file(tmp_path, runs=384)  # in two chunks
     (tmp_path / "halt").touch()
@@ -211,6 +218,7 @@ def test_a_cancelled_campaign_keeps_its_rows_and_resumes_with_progress_handed_ov
     done = rows_in(tmp_path / "campaign.ledger")
     assert 0 < done < 384
     assert studio.cancel(job.number).cancelling
+    until(lambda: interrupt_waits(command), "the interrupt")
     os.killpg(command, signal.SIGCONT)
     job = ended(job.folder)
     assert (job.state, job.code) == ("cancelled", 130)
