@@ -363,25 +363,6 @@ def test_a_sine_is_tracked_better_with_the_inverse(scene, file, tuned):
         assert rms["PI + inverse", variant, 25.0] < 0.4 * rms["PI", variant, 25.0]
 
 
-def test_sines_share_runs_and_each_has_its_own(scene, file, tuned, monkeypatch):
-    """The sine of 25 Hz has the last third of the runs side by side, or all where it is alone in a batch."""
-    design, of = by_name(tuned[0])["PI"], file.mission.fine_pointing
-    span = ensemble.Span(0.15, 0.05, of.seed)
-    monkeypatch.setattr(results, "SINE_S", span.duration_s)
-    monkeypatch.setattr(results, "SINE_SETTLE_S", span.settle_s)
-    still = parts.without(scene.loop, parts.REFERENCE, "body pointing")
-    moving = replace(still.references[0], sine_amplitude_rad=scene.sine_amplitude_rad, sine_freq_hz=25.0)
-    loop = replace(still, references=(moving, still.references[1]))
-    for together, first_run, runs in ((3, 42, 21), (2, 0, 64)):
-        monkeypatch.setattr(results, "SINES_TOGETHER", together)
-        found = controller_study.sines(scene, [design])
-        assert [each.freq_hz for each in found] == [1.0, 15.0, 25.0] * 2
-        alone = ensemble.simulate(loop, design.controller, span, runs, first_run=first_run)
-        assert found[2].rms_rad == pytest.approx(alone.radial_rms_rad, rel=1e-12)
-        assert found[2].quantile_rad == alone.quantile_rad(of.quantile)
-        assert found[2].rms_interval_rad == pytest.approx(alone.radial_rms_interval_rad(), rel=1e-9)
-
-
 def test_an_uncertain_mirror_is_tuned_for_its_draws(tmp_path):
     """A gain known to 10 %: the margin holds for each drawn mirror, at a price."""
     changed = edited_file(tmp_path, ("\n[mirror.comparison.bouc_wen]", UNCERTAIN))

@@ -950,20 +950,6 @@ def test_cases_that_share_what_they_draw_are_the_runs_that_each_would_be_alone()
                 assert_array_equal(getattr(found, field), getattr(alone, field))
 
 
-def test_runs_with_references_of_their_own_are_those_of_loops_with_them():
-    """The last of the references is that of all runs behind, of the next batch, too."""
-    loop, controller = noisy()
-    first, second = ((Reference(20 * URAD, 0.0, 0.1, 60 * URAD, freq_hz),) * 2 for freq_hz in (10.0, 90.0))
-    case, span = ensemble.Case(loop, controller, references=(first,) * 20 + (second,) * 30), Span(0.2, 0.05, 7)
-    (found,) = ensemble.simulate_cases([case], span, 70)
-    for references, own in ((first, slice(20)), (second, slice(20, 70))):
-        alone = ensemble.simulate(replace(loop, references=references), controller, span, 70)
-        for field in FIELDS:
-            if field != "psd_rad2_hz":
-                assert_array_equal(getattr(found, field)[own], getattr(alone, field)[own])
-    assert np.min(found.rms_rad[20:]) > np.max(found.rms_rad[:20])
-
-
 def test_another_seed_gives_other_numbers_and_the_same_seed_the_same():
     loop, controller = noisy()
     first, again, other, high = (

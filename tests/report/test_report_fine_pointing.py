@@ -322,15 +322,6 @@ def test_sines_are_held_against_the_requirement(page, fine):
     assert f"is met at 1 Hz by all controllers; at 25 Hz by {first}." in page[1]
 
 
-def test_sines_say_how_well_the_worst_of_their_rms_is_known(page, fine):
-    heading = "The paper's sines under vibration and noise"
-    assert heading in page[0] and "At worst an rms is known" not in page[1]  # these have no interval
-    shares = [0.01] * (len(fine.sines) - 1) + [0.025]
-    known = (replace(s, rms_interval_rad=x * s.rms_rad) for s, x in zip(fine.sines, shares, strict=True))
-    view = section.sines_view(replace(fine, sines=tuple(known)), 10e-6)
-    assert "At worst an rms is known to 2.5 % (99 % interval). While a sine" in view.blocks[0]
-
-
 def test_the_section_opens_with_the_verdict_and_its_distance_from_theory(page, fine):
     text, best, baseline = page[1], fine.best, fine.verified[0]
     r, reference = best.simulated["given"], baseline.simulated["given"]

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -164,17 +163,13 @@ class ErrorBudget:
 
 @dataclass(frozen=True, slots=True)
 class Sine:
-    """Fig. 6 and 8 under vibration and noise: radial error while tracking a sine on x, on one variant of the mirror.
-
-    ``rms_interval_rad`` is the half width of the rms's 99 % interval over the runs, infinite where it is not known.
-    """
+    """Fig. 6 and 8 under vibration and noise: axis error while tracking a sine on x, on one variant of the mirror."""
 
     controller: str
     variant: Variant
     freq_hz: float
     rms_rad: float
     quantile_rad: float
-    rms_interval_rad: float = math.inf
 
 
 def span(f: FinePointing) -> ensemble.Span:
@@ -325,11 +320,14 @@ def error_budget(scene: Scene, of: Verified, on_progress: Progress = lambda done
     return ErrorBudget(of.design.name, lines, together, full, differences)
 
 
+def _following_sine(loop: PointingLoop, amplitude_rad: float, freq_hz: float) -> PointingLoop:
+    alone = parts.without(loop, parts.REFERENCE, BODY_POINTING)
+    first = replace(alone.references[0], sine_amplitude_rad=amplitude_rad, sine_freq_hz=freq_hz)
+    return replace(alone, references=(first, *alone.references[1:]))
+
+
 SINE_S, SINE_SETTLE_S = 1.4, 0.4
 """Length of a run that tracks a sine, and what is left out at its begin."""
-
-SINES_TOGETHER = 3
-"""Sines, at most, that share the runs that are simulated side by side: 21 runs each, or more where there are fewer."""
 
 
 def sines(
@@ -337,34 +335,27 @@ def sines(
 ) -> tuple[Sine, ...]:
     """The paper's sines (Fig. 6 and 8) on axis x, with vibration and sensor noise, for all controllers.
 
-    Body pointing and point-ahead are left out: with them the sine would not fit into the stroke. A sine has the same
-    runs, and so the same noise, under all controllers.
+    Body pointing and point-ahead are left out: with them the sine would not fit into the stroke.
 
     Args:
         scene: The mission's fine-pointing loop, with amplitude and frequencies of the sines.
         designs: The designs, in the order that is wanted.
         on_progress: Called with the parts of the work that are done, their number and what is done.
     """
-    freqs, lanes = scene.sine_frequencies_hz, kernel_arrays.LANES
-    groups = [freqs[first : first + SINES_TOGETHER] for first in range(0, len(freqs), SINES_TOGETHER)]
+    f = scene.table
     cases, what = [], []
     for variant in (each for each in scene.mirrors.own if each != Variant.STRAIGHT):
-        loop = parts.without(with_mirror(scene.loop, scene.mirrors, variant), parts.REFERENCE, BODY_POINTING)
-        still, *others = loop.references
-        for design, group in product(designs, groups):
-            moving = [replace(still, sine_amplitude_rad=scene.sine_amplitude_rad, sine_freq_hz=freq) for freq in group]
-            of_runs = tuple((each, *others) for each in moving for _ in range(lanes // len(group)))
-            cases.append(replace(_case(loop, design.controller), references=of_runs))
-            what.append((design.name, variant, group))
-    short = ensemble.Span(SINE_S, SINE_SETTLE_S, scene.table.seed)
-    runs = ensemble.simulate_cases(cases, short, lanes, _telling(on_progress, "sines under vibration and noise"))
-    return tuple(
-        _sine(name, variant, freq, run.part(number * (lanes // len(group)), lanes // len(group)), scene.table.quantile)
-        for (name, variant, group), run in zip(what, runs, strict=True)
-        for number, freq in enumerate(group)
+        loop = with_mirror(scene.loop, scene.mirrors, variant)
+        for design in designs:
+            for freq in scene.sine_frequencies_hz:
+                following = _following_sine(loop, scene.sine_amplitude_rad, freq)
+                cases.append(_case(following, design.controller))
+                what.append((design.name, variant, freq))
+    short = ensemble.Span(SINE_S, SINE_SETTLE_S, f.seed)
+    runs = ensemble.simulate_cases(
+        cases, short, kernel_arrays.LANES, _telling(on_progress, "sines under vibration and noise")
     )
-
-
-def _sine(name: str, variant: Variant, freq_hz: float, run: ensemble.Ensemble, quantile: float) -> Sine:
-    rms_rad, interval_rad = run.radial_rms_rad, run.radial_rms_interval_rad()
-    return Sine(name, variant, freq_hz, rms_rad, run.quantile_rad(quantile), interval_rad)
+    return tuple(
+        Sine(name, variant, freq, run.radial_rms_rad, run.quantile_rad(f.quantile))
+        for (name, variant, freq), run in zip(what, runs, strict=True)
+    )

@@ -14,15 +14,7 @@ from microrad.core import compiling, kernels, lti
 from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
 from microrad.core.threads import in_background, in_threads
-from microrad.loop.pointing_loop.kernel_arrays import (
-    LANES,
-    References,
-    Shaping,
-    arrays,
-    combined_shaping,
-    reference,
-    start,
-)
+from microrad.loop.pointing_loop.kernel_arrays import LANES, Shaping, arrays, combined_shaping, reference, start
 from microrad.loop.pointing_loop.loop import LoopController, PointingLoop
 
 SLICE_SAMPLES = 2048  # control samples between two returns from the kernel, and at most in a segment of the spectrum
@@ -220,15 +212,11 @@ def simulate(
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """A loop under a controller, and whether the ``spectrum`` of its residual is taken; else that is nan.
-
-    ``references`` are those of each run, by axis, where they are not the loop's; runs behind them have the last one's.
-    """
+    """A loop under a controller, and whether the ``spectrum`` of its residual is taken; else that is nan."""
 
     loop: PointingLoop
     controller: LoopController
     spectrum: bool = True
-    references: tuple[References, ...] = ()
 
 
 TOGETHER = 12
@@ -365,8 +353,7 @@ class _Advancing:
 
     def __init__(self, case: Case, span: Span, first_run: int, shaping: Shaping) -> None:
         self.loop, self.p = case.loop, arrays(case.loop, case.controller, span.seed, shaping)
-        self._references = case.references[first_run : first_run + LANES] or case.references[-1:]
-        self.state = start(case.loop, self.p, first_run, self._references, shaping)
+        self.state = start(case.loop, self.p, first_run, shaping=shaping)
         segment = _segment(case.loop, span)
         self._spectrum, self._segments = np.zeros((segment // 2 + 1, case.loop.axes)), 0
         wanted = case.spectrum and first_run == 0
@@ -378,7 +365,7 @@ class _Advancing:
         if counting and not self.state.place[kernels.COUNTING]:
             self.state.place[kernels.COUNTING] = 1
             self.state.counts[:] = 0.0
-        self._reference = reference(self.loop, at, end, self._references)
+        self._reference = reference(self.loop, at, end)
         self._whole = counting and self._residual.size > 0 and end - at == len(self._residual)
 
     def advance(self, first: int, last: int, drawn: Floats | None) -> None:

@@ -308,8 +308,6 @@ def reference(loop: PointingLoop, begin: int, end: int, references: Sequence[Ref
             last one.
     """
     time: Floats = np.arange(begin, end + 1, dtype=float) * loop.timing.period_s
-    wanted = references or (loop.references,)
-    different = {of: np.stack([r.at(time) for r in of], axis=1) for of in dict.fromkeys(wanted)}
-    each = [different[of] for of in wanted]
+    each = [np.stack([r.at(time) for r in of], axis=1) for of in references or (loop.references,)]
     each += each[-1:] * (LANES - len(each) if references else 0)
     return np.ascontiguousarray(np.stack(each, axis=2))

@@ -356,16 +356,11 @@ def sines_view(fine: FinePointingStudy, required_rad: float) -> View | None:
         (
             f"Fig. 6 and 8 again: a {amplitude} sine on axis x with vibration and sensor noise on both axes. Body "
             "pointing and point-ahead are left out: the stroke would not hold them beside it. Radial error in µrad: "
-            f"rms / {time}.{_known_to(fine.sines)} {words.tracked(fine, required_rad)}",
+            f"rms / {time}. {words.tracked(fine, required_rad)}",
             Table("", headings, rows, groups=(("", 1), *groups), best=_best(fine, names)),
         ),
         folded=True,
     )
-
-
-def _known_to(sines: Sequence[Sine]) -> str:
-    worst = max(s.rms_interval_rad / s.rms_rad for s in sines)
-    return f" At worst an rms is known to {100.0 * worst:.2g} % (99 % interval)." if math.isfinite(worst) else ""
 
 
 def _sine(sine: Sine | None, required_rad: float) -> str | Cell:

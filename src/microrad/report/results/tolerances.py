@@ -10,8 +10,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
 
-from microrad.loop.controller_study.results import SINES_TOGETHER
-from microrad.loop.pointing_loop.kernel_arrays import LANES
 from microrad.mirror.hysteresis import slow_gain
 from microrad.orbit.visibility.events import TOLERANCE_S
 from microrad.study.study import Study
@@ -128,8 +126,6 @@ def tolerances(s: ConverterSteps) -> dict[str, Tolerance]:
         "run": Tolerance(SMOOTH, {"rad": s.run_rad}),
         # All runs together: their roundings are independent of each other.
         "runs": Tolerance(SMOOTH, {"rad": s.runs_rad}),
-        # The same of a sine that shares its batch with others, or has one to itself.
-        "runs of a sine": Tolerance(SMOOTH, {"rad": s.run_rad / math.sqrt(LANES // SINES_TOGETHER)}),
         # The worst of all samples: 7 standard deviations of what two roundings differ by, where a statistic has 3.5.
         "largest": Tolerance(SMOOTH, {"rad": 2.0 * s.run_rad}),
         # The spread of n runs is itself known to 1 / sqrt(2 n): a tenth of that.
@@ -202,10 +198,9 @@ SUMMARY: Mapping[str, tuple[str, ...]] = {
         "other_readings[].residual_rad",
     ),
     "runs": (
-        "fine_pointing.controllers[].simulated.*.{rms_rad,quantile_rad,axis_rms_rad[]}",
+        "fine_pointing.{controllers[].simulated.*,sines[]}.{rms_rad,quantile_rad,axis_rms_rad[]}",
         "fine_pointing.error_budget.{*_rms_rad,parts[].rms_rad}",
     ),
-    "runs of a sine": ("fine_pointing.sines[].{rms_rad,quantile_rad}",),
     "link": (
         "margin_db.{judged,communication_at_residual}",
         "{requirements,papers_loop}[].{required,actual,margin}",
