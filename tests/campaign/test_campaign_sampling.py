@@ -47,15 +47,6 @@ def test_marginals_are_those_of_scipy(name, method):
     np.testing.assert_allclose(ours.at(np.array([0.01, 0.3, 0.99])), value, rtol=1e-12)
 
 
-@pytest.mark.parametrize(("count", "dimensions"), [(1, 1), (64, 3), (250, 7)])
-def test_a_latin_hypercube_is_that_of_scipy_bit_for_bit(count, dimensions):
-    ours, peer = (np.random.Generator(np.random.Philox(5)) for _ in range(2))
-    found = sampling.latin_hypercube(ours, count, dimensions)
-    np.testing.assert_array_equal(found, stats.qmc.LatinHypercube(dimensions, rng=peer).random(count))
-    assert np.array_equal(np.sort(np.floor(count * found), axis=0)[:, 0], np.arange(count))
-    assert ours.random() == peer.random()
-
-
 def test_a_range_has_no_density_outside():
     assert Uniform(1.0, 2.0).log_density(np.array([0.99, 2.01])).tolist() == [-math.inf] * 2
     assert LogUniform(1.0, 2.0).log_density(np.array([-1.0, 0.99, 2.01])).tolist() == [-math.inf] * 3

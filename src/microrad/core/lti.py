@@ -212,15 +212,6 @@ def zero_order_hold(A: Floats, B: Floats, step_s: float) -> tuple[Floats, Floats
     return Ad, B0 + B1
 
 
-def block_diagonal(*blocks: Floats) -> Floats:
-    """Matrices as blocks along the diagonal of one, which is 0 elsewhere; they may have no rows or no columns."""
-    ends = np.cumsum([(0, 0), *(block.shape for block in blocks)], axis=0)
-    whole = np.zeros(ends[-1])
-    for block, (row, column), (last_row, last_column) in zip(blocks, ends[:-1], ends[1:], strict=True):
-        whole[row:last_row, column:last_column] = block
-    return whole
-
-
 def series(first: StateSpace, second: StateSpace) -> StateSpace:
     """The two systems one behind the other.
 

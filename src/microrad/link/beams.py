@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from microrad.core.arrays import Floats
-from microrad.core.roots import root
 from microrad.link.gains import DB_PER_NEPER, aperture_gain_db
 from microrad.mission.fields import Bounded, Quantity, Share
 from microrad.mission.tables.link import narrowest_radius
@@ -182,6 +181,8 @@ class LitAperture(Bounded):
     @lru_cache(maxsize=256)  # noqa: B019  not of beams, which are values: of what most rows of a campaign share
     def error_rad(self, loss_db: float) -> float:
         """Smallest error with this loss, within the main lobe; infinite beyond the 300 dB of a null."""
+        from scipy.optimize import brentq
+
         half = self.half_angle_rad
         if loss_db <= _ROUND_DB:
             return GaussianFall(half).error_rad(loss_db)
@@ -190,8 +191,8 @@ class LitAperture(Bounded):
         first = None if wanted < _FLOOR else self._first_below(wanted, outwards)
         if first is None:
             return math.inf
-        lower, upper = outwards[first - 1 : first + 1].tolist()
-        return root(lambda e: float(self._field(np.array([e]))[0]) - wanted, lower, upper, xtol=1e-13 * half)
+        lower, upper = outwards[first - 1], outwards[first]
+        return float(brentq(lambda e: float(self._field(np.array([e]))[0]) - wanted, lower, upper, xtol=1e-13 * half))
 
 
 @lru_cache(maxsize=1)

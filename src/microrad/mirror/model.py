@@ -192,11 +192,13 @@ def _routes(composition: str, elements: int) -> tuple[Floats, Floats]:
 
 def combine(*mirrors: Mirror) -> Mirror:
     """Independent mirrors side by side: the axes, actuators and elements of the first, then of the next."""
+    from scipy.linalg import block_diag
+
     bw = [len(m.bouc_wen) for m in mirrors]
     total = np.cumsum([0] + [len(m.bouc_wen) + len(m.plays) for m in mirrors])
     order = [int(t) + i for t, n in zip(total, bw, strict=False) for i in range(n)]
     order += [i for i in range(int(total[-1])) if i not in order]  # Bouc-Wen elements first
-    parts: dict[str, Any] = {key: lti.block_diagonal(*(getattr(m, key) for m in mirrors)) for key in "ABEFGCDK"}
+    parts: dict[str, Any] = {key: block_diag(*(getattr(m, key) for m in mirrors)) for key in "ABEFGCDK"}
     parts |= {key: parts[key][:, order] for key in "EK"} | {key: parts[key][order] for key in "FG"}
     banks = ("bouc_wen", "plays", "inverse", "inverse_creep")
     parts |= {key: sum((getattr(m, key) for m in mirrors), ()) for key in banks}

@@ -26,7 +26,6 @@ import numpy as np
 
 from microrad.campaign.optimisation.candidates import Candidate, Problem, judged, percent, quantity_text
 from microrad.campaign.records import CampaignError
-from microrad.campaign.rows.sampling import latin_hypercube
 from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
 from microrad.loop import control
@@ -204,9 +203,11 @@ class _Search:
     # ----------------------------------------------------------------------------------------------------- moving
     def look_around(self) -> None:
         """Candidates all over the range, and from them what is a large step in the cost and in each constraint."""
+        from scipy.stats import qmc
+
         size = len(self.problem.variables)
         count = max(size + 2, round(FIRST_LOOK * self.problem.evaluations))
-        for place in latin_hypercube(np.random.default_rng(self.problem.seed), count, size):
+        for place in qmc.LatinHypercube(size, rng=np.random.default_rng(self.problem.seed)).random(count):
             self.at(place)
         seen = [candidate for _, candidate in self.accepted]
         self.cost_scale = _spread([c.cost for c in seen])

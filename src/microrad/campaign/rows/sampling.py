@@ -105,35 +105,18 @@ def _open_unit(raw: NDArray[np.uint64]) -> Floats:
     return np.asarray(((raw >> np.uint64(12)).astype(float) + 0.5) * 2.0**-52)
 
 
-def latin_hypercube(rng: np.random.Generator, count: int, dimensions: int) -> Floats:
-    """Points (count, dimensions) of the unit cube, along each dimension one in each of ``count`` equal slices.
-
-    The same bits as `scipy.stats.qmc.LatinHypercube` gives, which takes half a second of each process to import.
-
-    Args:
-        rng: whose child they are drawn from.
-        count: how many points.
-        dimensions: numbers of a point.
-    """
-    (own,) = rng.spawn(1)
-    inside = own.uniform(size=(count, dimensions))
-    slices = np.tile(np.arange(1, count + 1), (dimensions, 1))
-    for each in slices:
-        own.shuffle(each)
-    return np.asarray((slices.T - inside) / count)
-
-
 @lru_cache(maxsize=8)
 def _block(sampling: str, seed: int, block: int, dimensions: int, number: int) -> Floats:
     """A replicate, from a stream of its own."""
+    from scipy.stats import qmc
+
     stream = np.random.SeedSequence(seed, spawn_key=(INPUTS, number))
     rng = np.random.Generator(np.random.Philox(stream))
     if sampling == "sobol":
-        from scipy.stats import qmc
-
         sobol = qmc.Sobol(dimensions, scramble=True, bits=_SOBOL_BITS, rng=rng)
         points = sobol.random_base2(block.bit_length() - 1) + 0.5**_SOBOL_BITS / 2.0  # the middle of each cell: never 0
     else:
-        points = np.clip(latin_hypercube(rng, block, dimensions), 2.0**-54, 1.0 - 2.0**-53)
+        points = qmc.LatinHypercube(dimensions, rng=rng).random(block)
+        points = np.clip(points, 2.0**-54, 1.0 - 2.0**-53)
     points.flags.writeable = False
     return np.asarray(points)

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from microrad.core.arrays import Floats
-from microrad.core.roots import root
 from microrad.core.units import format_quantity
 from microrad.link import gains
 from microrad.link.budget.assembly import DataLink, LinkError, assembled, check_grid, required_dbm, strehl_db
@@ -140,11 +139,12 @@ def rate_at_loss(data: DataLink, margin_db: float, loss_db: float) -> float:
             f"not even {format_quantity(slowest, 'bit/s')} leaves a margin of {margin_db:g} dB: "
             f"{missing:.2f} dB are missing, mostly against noise that does not fall with the rate"
         )
+    from scipy.optimize import brentq
 
     def excess(lg_rate: float) -> float:
         return float(required_dbm(data, 10.0**lg_rate)) - available
 
-    return float(10.0 ** root(excess, math.log10(slowest), math.log10(highest), xtol=1e-10))
+    return float(10.0 ** brentq(excess, math.log10(slowest), math.log10(highest), xtol=1e-10))
 
 
 def largest_pointing_error(data: DataLink, margin_db: float, data_rate_bit_s: float) -> float:

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from microrad.core.arrays import Floats
-from microrad.core.roots import root
 from microrad.core.units import format_quantity
 from microrad.link.gains import checked
 from microrad.link.pointing.radial_error import RADIUS, Jitter, density_on_circle, radial_survival
@@ -260,4 +259,6 @@ def uncoded_penalty_db(jitter: Jitter, half_angle_rad: float, error_ratio: Error
             f"the mean bit error ratio stays above {target:g} even with {MOST_POWER_DB:g} dB more power; "
             "widen the beam or reduce the jitter"
         )
-    return root(missed, 0.0, MOST_POWER_DB, xtol=1e-9)
+    from scipy.optimize import brentq
+
+    return float(brentq(missed, 0.0, MOST_POWER_DB, xtol=1e-9))

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from microrad.core.arrays import Floats
-from microrad.core.roots import root
 from microrad.link.gains import checked
 from microrad.mission.fields import Quantity, Share
 
@@ -209,13 +208,14 @@ def radial_quantile(jitter: Jitter, probability: ArrayLike) -> Floats:
         return np.full(p.shape, jitter.static_rad)
     if _is_rayleigh(jitter):
         return np.asarray(widest * np.sqrt(-2.0 * np.log(p)))
+    from scipy.optimize import brentq
 
     def missed(radius: float, p: float) -> float:
         return math.log(max(float(_probability_of(jitter, np.asarray(radius), beyond=True)), 1e-300) / p)
 
-    def quantile(p: float) -> float:
+    def root(p: float) -> float:
         # r is at most the bias plus a Rayleigh variable of the wider axis
         highest = (jitter.static_rad + widest * math.sqrt(-2.0 * math.log(p))) * (1.0 + 1e-6)
-        return root(lambda radius: missed(radius, p), 0.0, highest, xtol=1e-300, rtol=_ROUNDING)
+        return float(brentq(missed, 0.0, highest, args=(p,), xtol=1e-300, rtol=_ROUNDING))
 
-    return np.array([quantile(each) for each in p.ravel().tolist()]).reshape(p.shape)
+    return np.array([root(each) for each in p.ravel().tolist()]).reshape(p.shape)

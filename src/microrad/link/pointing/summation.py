@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from statistics import NormalDist
 from typing import Literal
 
-from microrad.core.roots import root
 from microrad.core.units import format_quantity
 from microrad.link.pointing.error_classes import ErrorTerm, Interpretation, StatedError, error_term
 from microrad.link.pointing.radial_error import Jitter, radial_quantile
@@ -323,8 +322,10 @@ def allocate(
             return Allocation(line.name, line.error_rad, 0.0, missing, note)
         # alone it would reach the total here; totals are in proportion to a line that is alone
         highest = total_rad / total_with(index, 1.0, alone=True)
+        from scipy.optimize import brentq
+
         low, high = 0.0, highest * (1.0 + 1e-6)
-        largest = root(lambda error: total_with(index, error) - total_rad, low, high, xtol=1e-9 * highest)
-        return Allocation(line.name, line.error_rad, largest, 0.0, "")
+        largest = brentq(lambda error: total_with(index, error) - total_rad, low, high, xtol=1e-9 * highest)
+        return Allocation(line.name, line.error_rad, float(largest), 0.0, "")
 
     return tuple(one(index) for index in range(len(stated)))

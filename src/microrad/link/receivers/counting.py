@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from microrad.core.arrays import Floats
 from microrad.core.budget import Line
-from microrad.core.roots import root
 from microrad.link.receivers import base
 from microrad.mission.fields import Quantity
 
@@ -244,6 +243,7 @@ def _counts_at(
     ratio: Callable[[Floats, Floats], Floats], target: float, lowest: Floats, highest: Floats, row: Floats
 ) -> Floats:
     """Counts at which `ratio`, falling in them, is `target`."""
+    from scipy.optimize import brentq, elementwise
 
     def excess(log_counts: Floats, row: Floats) -> Floats:
         return np.asarray(np.log(np.maximum(ratio(np.exp(log_counts), row), 1e-300) / target), dtype=np.float64)
@@ -253,12 +253,10 @@ def _counts_at(
     if row.size == 1:  # many at once cost little more than one, and one by itself costs a quarter this way
         low, high = (np.broadcast_to(end, row.shape).item() for end in ends)
         try:
-            x = root(lambda x: excess(np.full(row.shape, x), row).item(), low, high, xtol=1e-300, rtol=_ROUNDING)
+            x = brentq(lambda x: excess(np.full(row.shape, x), row).item(), low, high, xtol=1e-300, rtol=_ROUNDING)
         except ValueError:  # no root between them
             raise ArithmeticError(_NO_POWER) from None
         return np.full(row.shape, math.exp(x))
-    from scipy.optimize import elementwise
-
     found = elementwise.find_root(excess, ends, args=(row,))
     if not np.all(found.success):
         raise ArithmeticError(_NO_POWER)

@@ -114,8 +114,10 @@ def refuse_beyond_rate(freq_hz: float, period_s: float, what: str) -> None:
 
 def parallel(*systems: lti.StateSpace) -> lti.StateSpace:
     """Sum of the outputs of systems that share their input."""
+    from scipy.linalg import block_diag
+
     return lti.StateSpace(
-        A=lti.block_diagonal(*(s.A for s in systems)),
+        A=block_diag(*(s.A for s in systems)),
         B=np.vstack([s.B for s in systems]),
         C=np.hstack([s.C for s in systems]),
         D=np.sum([s.D for s in systems], axis=0),

@@ -193,9 +193,11 @@ def combine(*disturbances: Disturbance) -> Disturbance:
     Raises:
         ValueError: For none.
     """
+    from scipy.linalg import block_diag
+
     if not disturbances:
         raise ValueError("no disturbance to combine; give one or more")
-    A, B = (lti.block_diagonal(*matrices) for matrices in zip(*((d.A, d.B) for d in disturbances), strict=True))
+    A, B = (block_diag(*matrices) for matrices in zip(*((d.A, d.B) for d in disturbances), strict=True))
     C = np.hstack([d.C for d in disturbances])
     return Disturbance(
         " + ".join(d.name for d in disturbances),

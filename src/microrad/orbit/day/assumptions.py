@@ -70,18 +70,13 @@ class Case:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Known:
-    """What holds for every case with the same orbits and stations as the ``own`` one: contacts, passes, acquisition.
-
-    ``here`` are the numbers of the own case, where they are known: a case that changes one of the ways alone takes
-    those of the other from it.
-    """
+    """What holds for every case with the same orbits and stations as the ``own`` one: contacts, passes, acquisition."""
 
     own: Case
     pair_of: Callable[[Orbits], orbit.Pair]
     seen: geometry.View
     heard: tuple[flow.StationPass, ...]
     found: Found | None
-    here: Numbers | None = None
 
 
 def numbers(case: Case, known: Known) -> Numbers:
@@ -96,35 +91,18 @@ def numbers(case: Case, known: Known) -> Numbers:
     Raises:
         OrbitError: For orbits that do not hold.
     """
-    o, own, seen, heard, here = case.operations, known.own.operations, known.seen, known.heard, known.here
+    o, own, seen, heard = case.operations, known.own.operations, known.seen, known.heard
     moved = case.orbits is not known.own.orbits
     if moved:
         seen = geometry.view(known.pair_of(case.orbits), case.data.table.wavelength_m)
     if moved or (o.downlink and own.downlink and o.downlink.stations is not own.downlink.stations):
         heard = flow.station_passes(o.downlink, seen.pair)
-    if here and not moved and _same_laser(case, known.own):
-        relay = here.relay_bit, here.relay_slow_s
-    else:
-        rates = flow.rate_table(flow.closings(o, case.data, case.loss))
-        way = flow.relay(o, seen, rates, case.loss.outage, known.found, case.slower)
-        relay = way.capacity_bit, way.slow_s
-    if here and not moved and _of_radio(o) == _of_radio(own):
-        direct = here.direct_bit, here.direct_slow_s
-    else:
-        radio = flow.direct(o, seen, heard)
-        direct = (math.nan, math.nan) if radio is None else (radio.capacity_bit, radio.slow_s)
-    return Numbers(relay[0], direct[0], relay[1], direct[1])
-
-
-def _same_laser(case: Case, own: Case) -> bool:
-    """Whether a case on the same orbits changes nothing but the direct downlink."""
-    laser = case.data is own.data and case.loss is own.loss and case.slower == own.slower
-    return laser and case.operations.with_value("downlink", own.operations.downlink) == own.operations
-
-
-def _of_radio(o: Operations) -> tuple[object, ...]:
-    """What of the operations the direct downlink depends on."""
-    return o.downlink, o.instrument_rate_bit_s, o.store_bit
+    rates = flow.rate_table(flow.closings(o, case.data, case.loss))
+    relay = flow.relay(o, seen, rates, case.loss.outage, known.found, case.slower)
+    direct = flow.direct(o, seen, heard)
+    if direct is None:
+        return Numbers(relay.capacity_bit, math.nan, relay.slow_s, math.nan)
+    return Numbers(relay.capacity_bit, direct.capacity_bit, relay.slow_s, direct.slow_s)
 
 
 def swings(known: Known, on_progress: Callable[[int, int, str], None]) -> tuple[Swing, ...]:
@@ -143,7 +121,6 @@ def swings(known: Known, on_progress: Callable[[int, int, str], None]) -> tuple[
     own = replace(known.own, operations=o.with_value("runs", min(o.runs, _RUNS)))
     known = replace(known, own=own)
     here = numbers(own, known)
-    known = replace(known, here=here)
 
     def end(side: _Side) -> tuple[str, Numbers]:
         try:

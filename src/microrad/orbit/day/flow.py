@@ -1,6 +1,7 @@
 """From contacts to data: rates that the link closes at, acquisitions drawn, the store, volumes and latencies."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,7 +11,7 @@ from microrad.core.arrays import Floats
 from microrad.link.acquisition.partner_search import Found
 from microrad.mission.tables.operations import Downlink, Operations
 from microrad.orbit import operations
-from microrad.orbit.day.geometry import Range, View, cut_at, longest_gap_s
+from microrad.orbit.day.geometry import View, cut_at, longest_gap_s
 
 RELAY, DIRECT = "relay", "direct downlink"
 
@@ -154,7 +155,7 @@ def _of_span(contacts: tuple[orbit.Contact, ...], seen: View) -> int:
     return sum(c.start_s < seen.duration_s for c in contacts)
 
 
-def _granted(seen: View, share: float) -> list[tuple[orbit.Contact, Range]]:
+def _granted(seen: View, share: float) -> list[tuple[orbit.Contact, Callable[[Floats], Floats]]]:
     """The part of each contact that the relay grants, with its range over time.
 
     A contact that goes on behind the span is granted in two parts: what it has in the span counts by itself.

@@ -1,7 +1,7 @@
 """When both terminals of the link see one another, and what the line of sight does meanwhile."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
@@ -43,45 +43,19 @@ class Encounter:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Range:
-    """Range in m over time, exact to a millimetre: between two samples the cubic that has their ranges and their rates.
-
-    ``coefficients`` (4, pieces) are those of 1, t, t^2 and t^3, t from the begin of a piece.
-    """
-
-    time_s: Floats
-    coefficients: Floats
-
-    @classmethod
-    def of(cls, sight: orbit.LineOfSight) -> "Range":
-        """The range of a line of sight over its own moments."""
-        time, range_m, rate = sight.time_s, sight.range_m, sight.range_rate_m_s
-        step = np.diff(time)
-        slope = np.diff(range_m) / step
-        bend = (rate[:-1] + rate[1:] - 2.0 * slope) / step
-        return cls(time, np.stack([range_m[:-1], rate[:-1], (slope - rate[:-1]) / step - bend, bend / step]))
-
-    def __call__(self, time_s: Floats) -> Floats:
-        """Range in m at moments in s, both of shape (n,)."""
-        piece = np.clip(np.searchsorted(self.time_s, time_s, side="right") - 1, 0, self.time_s.size - 2)
-        c, t = self.coefficients[:, piece], time_s - self.time_s[piece]
-        return np.asarray(c[0] + c[1] * t + c[2] * (t * t) + c[3] * (t * t * t))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class View:
     """The contacts of the mission's two terminals.
 
     ``encounters`` are those of the span of ``pair``, cut at its end. ``contacts`` are all of them whole, those behind
-    the span too, in which its data may still be sent; ``range_m`` has the range over time for each. ``umbra_s`` (n, 2)
-    are the eclipses of the lower satellite in the span. ``closed_form`` is the contact of an orbit of the same radius
-    over the equator, where that orbit and no field of regard decide.
+    the span too, in which its data may still be sent. ``range_m`` has the range over time for each, a spline that is
+    exact to a millimetre. ``umbra_s`` (n, 2) are the eclipses of the lower satellite in the span. ``closed_form`` is
+    the contact of an orbit of the same radius over the equator, where that orbit and no field of regard decide.
     """
 
     pair: orbit.Pair
     encounters: tuple[Encounter, ...]
     contacts: tuple[orbit.Contact, ...]
-    range_m: tuple[Range, ...]
+    range_m: tuple[Callable[[Floats], Floats], ...]
     umbra_s: Floats
     closed_form: orbit.CoplanarContact | None
 
@@ -167,6 +141,8 @@ def view(pair: orbit.Pair, wavelength_m: float) -> View:
         OrbitError: For orbits that do not hold or meet, and a terminal below the surface that the line of sight must
             clear.
     """
+    from scipy.interpolate import CubicHermiteSpline
+
     found = orbit.contacts(pair.leo, pair.geo, pair.earth, pair.epoch, pair.whole_s)
     sights, own, end = [_sight(pair, c) for c in found], pair.leo.orbit, pair.span_s[1]
 
@@ -178,7 +154,7 @@ def view(pair: orbit.Pair, wavelength_m: float) -> View:
         pair=pair,
         encounters=tuple(encounter(pair, cut_at(c, end), wavelength_m) for c in found if c.start_s < end),
         contacts=found,
-        range_m=tuple(Range.of(s) for s in sights),
+        range_m=tuple(CubicHermiteSpline(s.time_s, s.range_m, s.range_rate_m_s) for s in sights),
         umbra_s=positive(depth_rad, coarse_times(pair.span_s, coarse_step_s(own, pair.span_s[0]))),
         closed_form=_closed_form(pair),
     )
