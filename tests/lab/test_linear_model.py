@@ -53,7 +53,7 @@ def recording(drive, output, rate_hz, period=None, name="record"):
 # ------------------------------------------------------------------------------------------------- the paper's chirp
 @pytest.fixture(scope="module")
 def chirp_and_answer():
-    return chirp_of(4)  # the paper's lasts 10 s, see `test_the_papers_chirp_on_the_virtual_bench`
+    return chirp_of(10)
 
 
 def chirp_of(seconds):
@@ -108,7 +108,7 @@ def test_other_noise_and_a_direct_term(chirp_and_answer, seed):
 def test_the_order_is_chosen_for_a_reason(paper_fit):
     assert [score.order for score in paper_fit.scan] == list(range(1, 9))
     by_order = {score.order: score for score in paper_fit.scan}
-    assert by_order[4].chi_square > 3 * by_order[4].freedom
+    assert by_order[4].chi_square > 5 * by_order[4].freedom
     assert 0.5 < by_order[5].chi_square / by_order[5].freedom < 1.5
     assert by_order[5].parameters == 10
     assert paper_fit.reason.startswith("order 5 has the least criterion")
@@ -404,19 +404,22 @@ def realisations(amplitude_mv):
     return multisine_recordings(drive, output, 6400.0, f"{amplitude_mv} mV")
 
 
+@pytest.fixture(scope="module")
+def cubespec():
+    """One realisation of each amplitude held out; without exchanges, which the benchmark has."""
+    found = {}
+    for amplitude_mv in (100, 200, 300):
+        *fitted, held_out = realisations(amplitude_mv)
+        found[amplitude_mv] = (fit_linear(fitted, 28, exchanges=0), held_out)
+    return found
+
+
 @needs_cubespec
 @pytest.mark.parametrize(
-    ("amplitude_mv", "low_um", "bar_um"),
-    [
-        (100, 0.06, 0.1),
-        pytest.param(200, 0.09, 0.17, marks=pytest.mark.endurance),
-        pytest.param(300, 0.13, 0.225, marks=pytest.mark.endurance),
-    ],
+    ("amplitude_mv", "low_um", "bar_um"), [(100, 0.06, 0.1), (200, 0.09, 0.17), (300, 0.13, 0.225)]
 )
-def test_cubespec_held_out(amplitude_mv, low_um, bar_um):
-    """One realisation of each amplitude held out; without exchanges, which the benchmark has."""
-    *fitted, held_out = realisations(amplitude_mv)
-    fit = fit_linear(fitted, 28, exchanges=0)
+def test_cubespec_held_out(cubespec, amplitude_mv, low_um, bar_um):
+    fit, held_out = cubespec[amplitude_mv]
     assert fit.order == 28
     assert (np.linalg.eigvals(fit.system.A).real < 0).all()
     for error in (output_error(fit.modes, held_out, drop=1000), output_error(fit.modes, held_out, steady=True)):
@@ -424,12 +427,11 @@ def test_cubespec_held_out(amplitude_mv, low_um, bar_um):
 
 
 @needs_cubespec
-def test_cubespec_softens_with_amplitude():
-    """A dozen states have its first resonance, though not all of the output."""
-    change = amplitude_dependence([fit_linear(realisations(a)[:-1], 12, exchanges=0) for a in (300, 100, 200)])
+def test_cubespec_softens_with_amplitude(cubespec):
+    change = amplitude_dependence([cubespec[a][0] for a in (300, 100, 200)])
     assert (np.diff(change.drive_rms) > 0.09).all()
     assert 6.5 < change.gain_rise_percent < 9
-    assert change.resonance_hz[0] == pytest.approx(923.9, abs=0.3)
+    assert change.resonance_hz[0] == pytest.approx(924.1, abs=0.3)
     assert -3.3 < change.resonance_shift_hz < -2.3
     assert (change.damping_ratio > 0.005).all()
     assert (change.damping_ratio < 0.02).all()
