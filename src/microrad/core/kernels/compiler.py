@@ -60,7 +60,12 @@ class CacheFile(IndexDataCacheFile):
     """
 
     def save(self, key: Any, data: Any) -> None:
-        """Write the machine code of one signature, and then the index."""
+        """Write the machine code of one signature, and then the index.
+
+        Args:
+            key: What the index finds it by: signature, processor and code.
+            data: The compiled function, as numba has it written.
+        """
         name = f"{self._index_name.removesuffix('.nbi')}.{sha256(repr(key).encode()).hexdigest()[:16]}.nbc"
         self._save_data(name, data)  # type: ignore[no-untyped-call]
         self._save_index({**self._load_index(), key: name})  # type: ignore[no-untyped-call]
@@ -76,7 +81,12 @@ SOURCES = source_stamp(Path(__file__).parent)
 
 
 def compiled_loop(function: Callable[..., Any], **options: Any) -> Any:
-    """The function compiled, with its machine code kept in a cache that several processes may share."""
+    """The function compiled, with its machine code kept in a cache that several processes may share.
+
+    Args:
+        function: A loop that checks nothing and allocates nothing.
+        options: More options of `numba.njit`, by name.
+    """
     compiled = numba.njit(**_OPTIONS, **options)(function)
     if cache := getattr(compiled, "_cache", None):  # none under NUMBA_DISABLE_JIT
         cache._cache_file.__class__ = CacheFile
@@ -112,7 +122,12 @@ UNROLLED_CONTROLLER = 2  # states of a PID
 
 
 def counts(unrolled: bool, **sizes: int) -> dict[str, Any]:
-    """The counts of a `Plant` or a `Loop`, by field."""
+    """The counts of a `Plant` or a `Loop`, by field.
+
+    Args:
+        unrolled: Whether the loops over them are unrolled: then they are tuples, else arrays (see `Count`).
+        sizes: How many there are, by field.
+    """
     return {name: (0,) * size if unrolled else np.zeros(size) for name, size in sizes.items()}
 
 

@@ -58,8 +58,14 @@ def _eliminate(matrix, right):  # type: ignore[no-untyped-def]
 def riccati_kernel(power, G, X, work, wide):  # type: ignore[no-untyped-def]
     """Doubles A, B R^-1 B' and Q into the solution X = A' X (I + G X)^-1 A + Q; whether it has settled.
 
-    Structure-preserving doubling: Chu, Fan, Lin and Wang, International Journal of Control 77 (2004) 767. The first
-    three (n, n) are written over; ``work`` (4, n, n) and ``wide`` (n, 2 n) are room.
+    Structure-preserving doubling: Chu, Fan, Lin and Wang, International Journal of Control 77 (2004) 767.
+
+    Args:
+        power: A, shape (n, n); written over.
+        G: B R^-1 B', symmetric, shape (n, n); written over.
+        X: Q, symmetric, shape (n, n); the solution is left in it.
+        work: Room, shape (4, n, n).
+        wide: Room, shape (n, 2 n).
     """
     n = X.shape[0]
     first, second, other, more = work[0], work[1], work[2], work[3]
@@ -99,9 +105,12 @@ def riccati_kernel(power, G, X, work, wide):  # type: ignore[no-untyped-def]
 
 @compiled_loop
 def gramian_kernel(power, X, work):  # type: ignore[no-untyped-def]
-    """Doubles A and Q into the solution X = A' X A + Q, as `lti.gramian`; both (n, n) are written over.
+    """Doubles A and Q into the solution X = A' X A + Q, as `lti.gramian`.
 
-    ``work`` (3, n, n) is room.
+    Args:
+        power: A, stable, shape (n, n); written over.
+        X: Q, symmetric, shape (n, n); the solution is left in it.
+        work: Room, shape (3, n, n).
     """
     n = X.shape[0]
     turned, half, more = work[0], work[1], work[2]

@@ -311,11 +311,18 @@ def _record(k, rows, width, trace, channel):  # type: ignore[no-untyped-def]
 
 @compiled_loop
 def draw_loop(p, s, samples, drawn):  # type: ignore[no-untyped-def]
-    """What LANES runs draw over some control samples, into the rows of ``drawn``, flat, sample by sample.
+    """What LANES runs draw over some control samples, sample by sample.
 
     For each: a random number for every reading (optical by axis, then gauge by output), then at every plant step's end
     the disturbance by axis. Loops alike in their disturbances, clock, axes and outputs draw the same. Of the state the
-    disturbance goes on, and nothing else.
+    disturbance and the place go on, and nothing else.
+
+    Args:
+        p: The `Ensemble`.
+        s: Its `EnsembleState`.
+        samples: How many control samples.
+        drawn: Rows of runs, flat; the first samples x (axes + outputs + steps per sample x axes) are written. Random
+            numbers have an rms of 1, disturbances are in rad.
     """
     axes, steps, words = p.optics.shape[0], p.steps_per_sample, p.optics.shape[0] + p.optics.shape[1]
     row = 0
@@ -337,13 +344,20 @@ def draw_loop(p, s, samples, drawn):  # type: ignore[no-untyped-def]
 def ensemble_loop(p, s, reference, residual, trace, shift):  # type: ignore[no-untyped-def]
     """Advance LANES runs over the control samples of ``reference``, linear between them.
 
-    Its shape is (samples + 1, axes, 1), or with LANES in place of the 1 where each run has its own.
-    Fills ``residual`` (samples, axes, LANES) with the line-of-sight error at the begin of each sample, if it has rows,
-    and ``trace`` (samples, channels, LANES) likewise, once the sample has measured: disturbance by axis, drive before
-    and now actuator by actuator, the plant's outputs, readings. Statistics are taken where ``place`` says so: squares
-    and the largest error at the end of every plant step, sums and the histogram at the end of each control sample; the
-    counters go on all the time. The states are left at the end, so that a following call continues. ``shift`` is added
-    to the random numbers (UNSHIFTED: none); those that the runs began with are drawn already.
+    Statistics are taken where ``place`` says so: squares and the largest error at the end of every plant step, sums and
+    the histogram at the end of each control sample; the counters go on all the time. The states are left at the end, so
+    that a following call continues.
+
+    Args:
+        p: The `Ensemble`.
+        s: Its `EnsembleState`; the random numbers that the runs begin with are drawn already.
+        reference: Reference of each axis, rad, shape (samples + 1, axes, 1), or with LANES in place of the 1 where each
+            run has its own.
+        residual: Line-of-sight error at the begin of each sample, rad, shape (samples, axes, LANES); written if it has
+            rows.
+        trace: What there is once a sample has measured, shape (samples, channels, LANES): disturbance by axis, drive
+            before and now actuator by actuator, the plant's outputs, readings; written if it has rows.
+        shift: The `Shift` that is added to the random numbers; `UNSHIFTED` for none.
     """
     axes, steps, actuators = p.optics.shape[0], p.steps_per_sample, p.actuator.shape[0]
     length = s.command.size // (actuators * LANES)

@@ -49,7 +49,12 @@ from microrad.core.kernels.side_by_side import (
 
 @merged
 def clear_row(rows, at):  # type: ignore[no-untyped-def]
-    """Set a row of runs to zero."""
+    """Set a row of runs to zero.
+
+    Args:
+        rows: Rows of runs, one behind the other, flat.
+        at: Place where the row begins, see `at_row`.
+    """
     for r in range(ROW_LENGTH):
         rows[at + r] = 0.0
 
@@ -61,6 +66,15 @@ def weigh(weights, rows, first, stride, total, at, fresh):  # type: ignore[no-un
     A weight of 0 costs nothing. Places are unsigned, as `at_row` gives them, so that all callers share one function.
 
     Returns whether the total is still to be written. The total must lie in another array than the rows.
+
+    Args:
+        weights: Weights, shape (weights,).
+        rows: Rows of runs, one behind the other, flat.
+        first: Place of the row that goes with the first weight.
+        stride: Numbers from the row of one weight to that of the next.
+        total: Rows of runs, flat, of which one is written.
+        at: Place of that row.
+        fresh: Whether that row has nothing yet and is written over; else the sum is added to it.
     """
     j = 0
     while j < weights.size:
@@ -101,7 +115,17 @@ def weigh(weights, rows, first, stride, total, at, fresh):  # type: ignore[no-un
 
 @merged
 def weigh_some(weights, rows, first, stride, total, at, fresh):  # type: ignore[no-untyped-def]
-    """As `weigh`, without the call where all weights are 0, as most are."""
+    """As `weigh`, without the call where all weights are 0, as most are.
+
+    Args:
+        weights: Weights, shape (weights,).
+        rows: Rows of runs, one behind the other, flat.
+        first: Place of the row that goes with the first weight.
+        stride: Numbers from the row of one weight to that of the next.
+        total: Rows of runs, flat, of which one is written.
+        at: Place of that row.
+        fresh: Whether that row has nothing yet and is written over; else the sum is added to it.
+    """
     some = False
     for j in range(weights.size):
         some = some or weights[j] != 0.0
@@ -110,21 +134,44 @@ def weigh_some(weights, rows, first, stride, total, at, fresh):  # type: ignore[
 
 @merged
 def sum_rows(weights, rows, first, stride, total, row):  # type: ignore[no-untyped-def]
-    """total row = sum of weights[j] x row first + stride j, as `weigh` takes it."""
+    """A row of the total = sum of weights[j] x rows[first + stride j:]; zeros where no weight counts.
+
+    Args:
+        weights: Weights, shape (weights,).
+        rows: Rows of runs, one behind the other, flat.
+        first: Place of the row that goes with the first weight.
+        stride: Numbers from the row of one weight to that of the next.
+        total: Rows of runs, flat, of which one is written.
+        row: Number of that row, from 0.
+    """
     if weigh(weights, rows, first, stride, total, at_row(row), True):
         clear_row(total, at_row(row))
 
 
 @compiled_loop
 def shift_rows(weights, size, rows, first, stride):  # type: ignore[no-untyped-def]
-    """row first + stride i += weights[i] @ size, in a function by itself as few calls of the loop need it."""
+    """rows[first + stride i:] += weights[i] @ size, in a function by itself as few calls of the loop need it.
+
+    Args:
+        weights: Weights, shape (rows that are shifted, directions).
+        size: A row of runs for each direction, flat (directions x LANES).
+        rows: Rows of runs, one behind the other, flat; some are added to.
+        first: Place of the first row that is shifted.
+        stride: Numbers from one row that is shifted to the next.
+    """
     for i in range(weights.shape[0]):
         weigh_some(weights[i], size, at_row(0), at_row(1), rows, first + stride * np.uint64(i), False)
 
 
 @compiled_loop
 def modal_step(diagonal, coupling, x):  # type: ignore[no-untyped-def]
-    """x = Ad x in place, for Ad of neighbouring pairs."""
+    """x = Ad x in place, for Ad of neighbouring pairs.
+
+    Args:
+        diagonal: Diagonal of Ad, shape (states,), of an even number.
+        coupling: What Ad takes of each state's neighbour (0 of 1, 1 of 0, 2 of 3, ...), shape (states,).
+        x: States, a row of runs each, flat (states x LANES); written over.
+    """
     for i in range(0, diagonal.size, 2):
         keep0, cross0, keep1, cross1 = diagonal[i], coupling[i], diagonal[i + 1], coupling[i + 1]
         at = at_row(i)
@@ -311,7 +358,13 @@ def _advance_bank(p, s):  # type: ignore[no-untyped-def]
 
 @inlined
 def ensemble_plant_step(p, s):  # type: ignore[no-untyped-def]
-    """One plant step behind the amplifier's: as `predict` and `plant_step`, for a row of runs."""
+    """One plant step behind the amplifier's: as `predict` and `plant_step`, for a row of runs.
+
+    Args:
+        p: An `Ensemble`, for its plant.
+        s: An `EnsembleState`: its drive has what it was and what it is at the end of the step; x, y, the bank and its
+            counters are taken there.
+    """
     states, elements, several = p.diagonal.size, p.G.shape[0], p.rest.value.size > 0
     if several:  # before x moves
         for i in range(states):

@@ -60,6 +60,15 @@ def bouc_wen_step(h, travel, epsilon_rate, alpha, beta, gamma, eta):  # type: ig
     h' = epsilon_rate q' - alpha |q'| h - beta q' |h| - gamma |q'| |h| - eta q' h  is linear in h on each side of zero,
     with forcing F and decay k: h <- h exp(-k) + F (1 - exp(-k)) / k. It crosses zero at most once, at the fraction
     ln(1 - k h / F) / k of the step. gamma = eta = 0 is Eq. 3.
+
+    Args:
+        h: Hysteresis at the begin of the step, in the unit of the output.
+        travel: Change of the drive over the step, with its sign.
+        epsilon_rate: Output per drive; the rate is that of the drive over the step.
+        alpha: Decay per travel, whichever way (Eq. 3), in 1 / V where the drive is in V, as are the next three.
+        beta: Decay that turns its sign with the travel and with the side of h (Eq. 3).
+        gamma: Decay that turns its sign with the side of h.
+        eta: Decay that turns its sign with the travel.
     """
     forcing = epsilon_rate * travel
     side = 1.0 if h > 0.0 or (h == 0.0 and forcing > 0.0) else -1.0
@@ -87,6 +96,13 @@ def bouc_wen_power_step(h, travel, epsilon_rate, rows, e):  # type: ignore[no-un
     and PER_SIZE of row ``e``. Runge-Kutta of order 5 with the embedded order 4 (Dormand and Prince, J. Comp. Appl.
     Math. 6 (1980) 19) to an error of 1e-11 of the size a step of its own, in at most a million steps. What is no finite
     number, or grows beyond all bounds on the way, comes out as nan.
+
+    Args:
+        h: Hysteresis at the begin of the step, in the unit of the output.
+        travel: Change of the drive over the step, with its sign.
+        epsilon_rate: epsilon exp(delta |rate|), output per drive.
+        rows: Bouc-Wen parameters, shape (elements, columns), see `bouc_wen_rows`.
+        e: Row of the element.
     """
     power, per_size = rows[e, POWER], rows[e, PER_SIZE]
     forcing = epsilon_rate * travel
@@ -122,7 +138,15 @@ def bouc_wen_power_step(h, travel, epsilon_rate, rows, e):  # type: ignore[no-un
 
 @merged
 def bouc_wen_advance(h, travel, rate, rows, e):  # type: ignore[no-untyped-def]
-    """h of Bouc-Wen element e after its drive has moved by ``travel``; the rate is the clamped one."""
+    """h of Bouc-Wen element e after its drive has moved by ``travel``.
+
+    Args:
+        h: Hysteresis at the begin of the step, in the unit of the output.
+        travel: Change of the drive over the step, with its sign.
+        rate: Rate of the drive, per second, already held within RATE_LIMIT.
+        rows: Bouc-Wen parameters, shape (elements, columns), see `bouc_wen_rows`.
+        e: Row of the element.
+    """
     grown = rows[e, EPSILON] * near_exp(rows[e, DELTA] * abs(rate))
     if rows[e, POWER] != 0.0:
         return bouc_wen_power_step(h, travel, grown, rows, e)
@@ -131,25 +155,47 @@ def bouc_wen_advance(h, travel, rate, rows, e):  # type: ignore[no-untyped-def]
 
 @inlined
 def clamp(value, limit):  # type: ignore[no-untyped-def]
-    """The value within -limit and limit."""
+    """The value within -limit and limit.
+
+    Args:
+        value: A number.
+        limit: The largest magnitude, not negative, in the same unit.
+    """
     return limit if value > limit else (-limit if value < -limit else value)
 
 
 @inlined
 def widened(threshold, widening):  # type: ignore[no-untyped-def]
-    """The threshold of a play at a rate; one without a threshold has none at any."""
+    """The threshold of a play at a rate; one without a threshold has none at any.
+
+    Args:
+        threshold: Threshold r at rest, half the width of the play, not negative, in the unit of the drive.
+        widening: What the rate adds to it, in the same unit.
+    """
     return threshold + widening if threshold > 0.0 else 0.0
 
 
 @inlined
 def play_step(p, q, threshold):  # type: ignore[no-untyped-def]
-    """A play operator's state behind the drive q."""
+    """A play operator's state behind the drive q.
+
+    Args:
+        p: State before, in the unit of the drive.
+        q: Drive at the end of the step.
+        threshold: Half the width of the play, not negative, in the unit of the drive.
+    """
     return max(q - threshold, min(q + threshold, p))
 
 
 @inlined
 def row_product(matrix, i, w):  # type: ignore[no-untyped-def]
-    """Row i of the matrix times the vector w."""
+    """Row i of the matrix times the vector w.
+
+    Args:
+        matrix: `Rows` of a matrix.
+        i: Number of the row, from 0.
+        w: Vector, at least as long as the matrix is wide.
+    """
     total = 0.0
     for j in range(matrix.start[i], matrix.start[i + 1]):
         total += matrix.value[j] * w[matrix.column[j]]
@@ -158,9 +204,17 @@ def row_product(matrix, i, w):  # type: ignore[no-untyped-def]
 
 @compiled_loop
 def bouc_wen_kernel(drive, step_s, rows, hysteresis0, output, hysteresis):  # type: ignore[no-untyped-def]
-    """Static Eq. 3 (one row) for a sampled drive, linear between samples; fills ``output`` and ``hysteresis``.
+    """Static Eq. 3 for a sampled drive, linear between samples; fills ``output`` and ``hysteresis``.
 
     Returns the number of rate-clamped samples. The rate is the backward difference, zero at the first sample.
+
+    Args:
+        drive: Drive about its bias, V, shape (samples,), at least one.
+        step_s: Time between samples, s.
+        rows: Parameters, shape (1, columns), see `bouc_wen_rows`.
+        hysteresis0: h before the first sample, in the unit of the output.
+        output: Output about that at rest, shape (samples,); written.
+        hysteresis: h, its share of the output, shape (samples,); written.
     """
     h = hysteresis0
     clamped, row = 0, np.int64(0)  # no literal: it would compile what it calls once more
@@ -182,9 +236,13 @@ def bouc_wen_kernel(drive, step_s, rows, hysteresis0, output, hysteresis):  # ty
 def bouc_wen_response(
     drive: Floats, step_s: float, parameters: Floats, hysteresis0: float
 ) -> tuple[Floats, Floats, int]:
-    """Static Eq. 3 for a sampled drive: (output, hysteresis, number of rate-clamped samples).
+    """Static Eq. 3 for a sampled drive: (output, hysteresis, number of rate-clamped samples), see bouc_wen_kernel.
 
-    See bouc_wen_kernel; ``parameters`` is a row of `bouc_wen_rows`.
+    Args:
+        drive: Drive about its bias, V, shape (samples,), at least one.
+        step_s: Time between samples, s.
+        parameters: A row of `bouc_wen_rows`, which may end early, as there.
+        hysteresis0: h before the first sample, in the unit of the output.
     """
     output, hysteresis = np.empty(drive.size), np.empty(drive.size)
     clamped = bouc_wen_kernel(drive, step_s, bouc_wen_rows([parameters.tolist()]), hysteresis0, output, hysteresis)
@@ -193,9 +251,17 @@ def bouc_wen_response(
 
 @compiled_loop
 def play_kernel(drive, step_s, thresholds, operator, state0, states):  # type: ignore[no-untyped-def]
-    """States of play operators, p <- max(u - r, min(u + r, p)); fills ``states`` (samples, operators).
+    """States of play operators, p <- max(u - r, min(u + r, p)); fills ``states``.
 
-    A threshold above 0 grows with the rate, r + WIDENING |u'|; ``operator`` is one row. Returns the clamped samples.
+    A threshold above 0 grows with the rate, r + WIDENING |u'|. Returns the number of rate-clamped samples.
+
+    Args:
+        drive: Drive u, V, shape (samples,), at least one.
+        step_s: Time between samples, s.
+        thresholds: Thresholds r at rest, V, not negative, shape (operators,).
+        operator: WIDENING (s) and WIDENING_LIMIT (V/s), the rate beyond which it grows no further, shape (2,).
+        state0: States before the first sample, V, shape (operators,).
+        states: States at each sample, V, shape (samples, operators); written.
     """
     clamped = 0
     for j in range(thresholds.size):
@@ -214,14 +280,28 @@ def play_kernel(drive, step_s, thresholds, operator, state0, states):  # type: i
 
 
 def play_response(drive: Floats, thresholds: Floats, state0: Floats) -> Floats:
-    """States of play operators that do not depend on the rate, shape (samples, operators), see play_kernel."""
+    """States of play operators that do not depend on the rate, shape (samples, operators), see play_kernel.
+
+    Args:
+        drive: Drive, V, shape (samples,), at least one.
+        thresholds: Thresholds, V, not negative, shape (operators,).
+        state0: States before the first sample, V, shape (operators,).
+    """
     return widening_play_response(drive, 1.0, thresholds, np.array([0.0, np.inf]), state0)[0]
 
 
 def widening_play_response(
     drive: Floats, step_s: float, thresholds: Floats, operator: Floats, state0: Floats
 ) -> tuple[Floats, int]:
-    """States of play operators, shape (samples, operators), and the number of rate-clamped samples, see play_kernel."""
+    """States of play operators, shape (samples, operators), and the number of rate-clamped samples, see play_kernel.
+
+    Args:
+        drive: Drive, V, shape (samples,), at least one.
+        step_s: Time between samples, s.
+        thresholds: Thresholds at rest, V, not negative, shape (operators,).
+        operator: WIDENING (s) and WIDENING_LIMIT (V/s), shape (2,).
+        state0: States before the first sample, V, shape (operators,).
+    """
     states = np.empty((drive.size, thresholds.size))
     clamped = play_kernel(drive, step_s, thresholds, operator, state0, states)
     return states, int(clamped)
@@ -229,7 +309,15 @@ def widening_play_response(
 
 @compiled_loop
 def lag_kernel(drive, step_s, time_constants, state0, states):  # type: ignore[no-untyped-def]
-    """First-order lags x' = (u - x) / tau of a drive linear between samples; fills ``states`` (samples, lags)."""
+    """First-order lags x' = (u - x) / tau of a drive linear between samples; fills ``states``.
+
+    Args:
+        drive: Drive u, V, shape (samples,), at least one.
+        step_s: Time between samples, s.
+        time_constants: tau of each lag, s, above 0, shape (lags,).
+        state0: States at the first sample, V, shape (lags,).
+        states: States at each sample, V, shape (samples, lags); written.
+    """
     for j in range(time_constants.size):
         part = step_s / time_constants[j]
         gain = -expm1(-part)
@@ -245,7 +333,14 @@ def lag_kernel(drive, step_s, time_constants, state0, states):  # type: ignore[n
 
 
 def lag_response(drive: Floats, step_s: float, time_constants: Floats, state0: Floats) -> Floats:
-    """States of first-order lags, shape (samples, lags), from ``state0`` at the first sample, see lag_kernel."""
+    """States of first-order lags, shape (samples, lags), from ``state0`` at the first sample, see lag_kernel.
+
+    Args:
+        drive: Drive, V, shape (samples,), at least one.
+        step_s: Time between samples, s.
+        time_constants: Time constant of each lag, s, above 0, shape (lags,).
+        state0: States at the first sample, V, shape (lags,).
+    """
     states = np.empty((drive.size, time_constants.size))
     lag_kernel(drive, step_s, time_constants, state0, states)
     return states

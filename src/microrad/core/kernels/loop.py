@@ -31,7 +31,14 @@ def inverse_drive(loop, state, reference, sample_s, feedforward):  # type: ignor
     u = (r - h + d1 bias) / (d1 exp(-d2 q')) - bias, with h and q' driven by the reference, q = r / d1: taking the rate
     from the feedforward's own last sample makes it chatter at the sample rate. What creep will add is taken off the
     reference first: it lags, so it is known from the samples before. The inverse needs nothing from the loop, so it
-    runs ahead of it, over all of ``reference``, into ``feedforward`` (samples, actuators).
+    runs ahead of it, over all of ``reference``.
+
+    Args:
+        loop: The `Loop`, for its allocation and its inverse.
+        state: Its `LoopState`; what the inverse remembers is left at the last sample.
+        reference: Reference of each axis, rad, shape (samples, axes).
+        sample_s: Time between samples, s.
+        feedforward: Drive of each actuator about its bias, V, shape (samples, actuators); written.
     """
     for k in range(reference.shape[0]):
         for a in range(len(loop.actuators)):
@@ -77,7 +84,12 @@ def inverse_drive(loop, state, reference, sample_s, feedforward):  # type: ignor
 
 @inlined
 def quantised(value, resolution):  # type: ignore[no-untyped-def]
-    """The value at the nearest step of a converter; a resolution of 0 has none."""
+    """The value at the nearest step of a converter; a resolution of 0 has none.
+
+    Args:
+        value: A number.
+        resolution: Step of the converter in the same unit, not negative.
+    """
     return np.floor(value / resolution + 0.5) * resolution if resolution > 0.0 else value
 
 
@@ -127,12 +139,22 @@ def _amplifier_step(loop, state, due, u, u_next):  # type: ignore[no-untyped-def
 
 @compiled_loop
 def closed_loop(plant, plant_state, loop, loop_state, reference, output, command, drive):  # type: ignore[no-untyped-def]
-    """The sampled loop over ``reference`` (samples, axes), one row per control sample.
+    """The sampled loop over ``reference``, one row per control sample.
 
-    At each sample the output is measured, the controller computes a command, and the plant takes
-    ``steps_per_sample`` steps under the command that left the controller ``delay_steps`` plant steps ago. Fills, at
-    the sample instants, ``output`` (samples, axes), ``command`` and ``drive`` (samples, actuators; before and behind
-    the amplifier). The states are left at the end, so that a following call continues.
+    At each sample the output is measured, the controller computes a command, and the plant takes ``steps_per_sample``
+    steps under the command that left the controller ``delay_steps`` plant steps ago. The states are left at the end, so
+    that a following call continues.
+
+    Args:
+        plant: The `Plant`, with one output an axis.
+        plant_state: Its `PlantState`.
+        loop: The `Loop`.
+        loop_state: Its `LoopState`.
+        reference: Reference of each axis, rad, shape (samples, axes).
+        output: Output at the sample instants, rad, shape (samples, axes); written.
+        command: Command before the amplifier, about the bias, V, shape (samples, actuators); written.
+        drive: Drive behind the amplifier at the sample instants, about the bias, V, shape (samples, actuators);
+            written.
     """
     command[:, :] = 0.0
     if loop.feedforward:  # command holds it until the sample's own command takes its place

@@ -11,7 +11,12 @@ from microrad.core.kernels.records import BIAS, CHANGE, D1, D2, RATE_LIMIT, WIDE
 
 @inlined
 def predict(plant, state):  # type: ignore[no-untyped-def]
-    """The part of the predicted x that needs nothing from the end of the step."""
+    """The part of the predicted x that needs nothing from the end of the step; leaves it in ``x_next``.
+
+    Args:
+        plant: The `Plant`.
+        state: Its `PlantState` at the begin of the step.
+    """
     x, x_next, first_operator = state.x, state.x_next, len(plant.elements)
     for i in range(len(plant.states)):
         total = plant.diagonal[i] * x[i] + plant.coupling[i] * x[i ^ 1]
@@ -42,7 +47,12 @@ def _element_drive(plant, state, e):  # type: ignore[no-untyped-def]
 
 @merged
 def plant_step(plant, state):  # type: ignore[no-untyped-def]
-    """One step to ``u_next``, behind predict: second order, and nothing is iterated."""
+    """One step to ``u_next``, behind predict: second order, and nothing is iterated.
+
+    Args:
+        plant: The `Plant`.
+        state: Its `PlantState`, with the drive at the end of the step in ``u_next``; left at the end of the step.
+    """
     x, x_next, y, bank, first_operator = state.x, state.x_next, state.y, state.bank, len(plant.elements)
     if plant.direct:
         for i in range(len(plant.states)):
@@ -120,10 +130,17 @@ def _play_operator(plant, state, e, o, q):  # type: ignore[no-untyped-def]
 
 @compiled_loop
 def open_loop(plant, state, drive, output, bank):  # type: ignore[no-untyped-def]
-    """Response of the mirror to ``drive`` (samples, actuators), linear between samples spaced by the plant's step.
+    """Response of the mirror to a drive that is linear between samples spaced by the plant's step.
 
-    Fills ``output`` (samples, outputs) and ``bank`` (samples, elements; z) and leaves ``state`` at the last sample,
-    so that a following call continues. The first sample is reached from the stored state in one step.
+    Leaves ``state`` at the last sample, so that a following call continues. The first sample is reached from the stored
+    state in one step.
+
+    Args:
+        plant: The `Plant`.
+        state: Its `PlantState`.
+        drive: Drive about the bias, V, shape (samples, actuators).
+        output: Outputs about those at rest, shape (samples, outputs); written.
+        bank: Outputs z of the hysteresis elements, shape (samples, elements), or of the first few; written.
     """
     for k in range(drive.shape[0]):
         for a in range(len(plant.actuators)):
@@ -178,7 +195,13 @@ class Path(NamedTuple):
 
 @compiled_loop
 def play_path(plant, drive, path):  # type: ignore[no-untyped-def]
-    """`open_loop` from rest with the whole path kept; the same arithmetic, see `Plant`, in loops of any length."""
+    """`open_loop` from rest with the whole path kept; the same arithmetic, see `Plant`, in loops of any length.
+
+    Args:
+        plant: A `PlayPlant`.
+        drive: Drive about the bias, V, shape (steps, inputs).
+        path: A `Path` with arrays of as many steps; written.
+    """
     states, inputs, operators = plant.diagonal.size, drive.shape[1], path.z.shape[1]
     for k in range(drive.shape[0]):
         for i in range(states):

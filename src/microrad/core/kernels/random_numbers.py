@@ -17,7 +17,16 @@ _TWO_52 = 4503599627370496.0
 
 @inlined
 def philox(c0, c1, c2, c3, k0, k1):  # type: ignore[no-untyped-def]
-    """Four random words of 32 bits from four words of counter and two of key, each in 64 bits."""
+    """Four random words of 32 bits from four words of counter and two of key, each in 64 bits.
+
+    Args:
+        c0: Lowest word of the counter.
+        c1: Second one.
+        c2: Third one.
+        c3: Highest one.
+        k0: Lower word of the key.
+        k1: Higher one.
+    """
     for _ in range(10):
         first, second = _MULTIPLY0 * (c0 & _LOW32), _MULTIPLY1 * (c2 & _LOW32)
         c0, c2 = (second >> _HALF_WORD) ^ c1 ^ k0, (first >> _HALF_WORD) ^ c3 ^ k1
@@ -72,9 +81,17 @@ def cosine_sine(turns):  # type: ignore[no-untyped-def]
 
 @compiled_loop
 def gaussians(seed, first_run, purpose, block, rows, at):  # type: ignore[no-untyped-def]
-    """Four standard normal numbers a run, by Box and Muller, into the four rows that begin at ``at``.
+    """Four standard normal numbers a run, by Box and Muller, into four rows of runs.
 
     Counter: block (64 bits), run (its low 32 bits), purpose; key: seed. The largest magnitude is 6.8.
+
+    Args:
+        seed: Low and high 32 bits of the seed, shape (2,), unsigned.
+        first_run: Number of the first run, unsigned; the others follow it.
+        purpose: Which stream of a run, unsigned, of 32 bits.
+        block: Which four numbers of the stream, from 0.
+        rows: Rows of runs, one behind the other, flat; four are written.
+        at: Place where the first of them begins, see `at_row`.
     """
     low, high = np.uint64(block) & _LOW32, np.uint64(block) >> _HALF_WORD
     for r in range(ROW_LENGTH):
@@ -91,6 +108,14 @@ def gaussians(seed, first_run, purpose, block, rows, at):  # type: ignore[no-unt
 
 @compiled_loop
 def gaussian_kernel(seed, first_run, purpose, first_block, numbers):  # type: ignore[no-untyped-def]
-    """Standard normal numbers of LANES runs from one stream: fills ``numbers``, flat (4 x blocks, LANES)."""
+    """Standard normal numbers of LANES runs from one stream; fills ``numbers``.
+
+    Args:
+        seed: Low and high 32 bits of the seed, shape (2,), unsigned.
+        first_run: Number of the first run, shape (1,), unsigned; the others follow it.
+        purpose: Which stream of a run, unsigned, of 32 bits.
+        first_block: Number of the first block, four numbers of the stream each, from 0.
+        numbers: Numbers in the order of the stream, a row of runs each, flat (4 x blocks x LANES); written.
+    """
     for block in range(numbers.size // (4 * LANES)):
         gaussians(seed, first_run[0], purpose, first_block + block, numbers, at_row(4 * block))

@@ -156,7 +156,14 @@ def row_log(x):  # type: ignore[no-untyped-def]
 
 @compiled_loop
 def copy_rows(source, target, first, count):  # type: ignore[no-untyped-def]
-    """The first rows of one array to the rows from ``first`` on of another."""
+    """The first rows of one array to the rows from ``first`` on of another.
+
+    Args:
+        source: Rows of runs, one behind the other, flat.
+        target: Rows of runs, flat; written.
+        first: Number of its first row that is written.
+        count: How many rows are copied.
+    """
     at = at_row(first)
     for r in range(at_row(count)):
         target[at + r] = source[r]
@@ -164,7 +171,14 @@ def copy_rows(source, target, first, count):  # type: ignore[no-untyped-def]
 
 @compiled_loop
 def take_rows(source, first, target, count):  # type: ignore[no-untyped-def]
-    """The rows from ``first`` on of one array to the first rows of another."""
+    """The rows from ``first`` on of one array to the first rows of another.
+
+    Args:
+        source: Rows of runs, one behind the other, flat.
+        first: Number of its first row that is copied.
+        target: Rows of runs, flat; its first ones are written.
+        count: How many rows are copied.
+    """
     at = at_row(first)
     for r in range(at_row(count)):
         target[r] = source[at + r]

@@ -138,9 +138,16 @@ def _tangent_bank(t, moved, k):  # type: ignore[no-untyped-def]
 def tangent_kernel(t, moved, begin, first, stride, output):  # type: ignore[no-untyped-def]
     """Derivative of a plant's output by parameters, along its path (forward sensitivities of the plays' exact steps).
 
-    Starts with no tangent at step ``begin``, runs to the end of the path, whose ``moved`` is given, and fills
-    ``output`` (rows, outputs, parameters) from step ``first`` on, every ``stride`` steps. What enters the output itself
-    (C, D, K) is not a parameter here.
+    Starts with no tangent at step ``begin`` and runs to the end of the path. What enters the output itself (C, D, K) is
+    not a parameter here.
+
+    Args:
+        t: `Tangents`, whose working memory is zero.
+        moved: Plays of each operator that its drive carries along, shape (steps, operators), as a `Path` has it.
+        begin: Step at which the tangents begin.
+        first: First step whose derivative is wanted, no earlier than ``begin``.
+        stride: Steps from one that is wanted to the next.
+        output: Derivatives, shape (rows, outputs, parameters), with a row for each step that is wanted; written.
     """
     row = 0
     for k in range(begin, moved.shape[0]):
