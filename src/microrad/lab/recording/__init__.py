@@ -8,6 +8,7 @@ from microrad.lab.recording.reader import multisine_recordings, read_recording, 
 from microrad.lab.recording.records import (
     ACCEPTABLE,
     MIN_SAMPLES,
+    ROLES,
     Finding,
     Recording,
     RecordingError,
@@ -18,6 +19,7 @@ from microrad.lab.recording.records import (
 __all__ = [
     "ACCEPTABLE",
     "MIN_SAMPLES",
+    "ROLES",
     "Finding",
     "Recording",
     "RecordingError",

@@ -13,6 +13,9 @@ MIN_SAMPLES = 200
 
 ACCEPTABLE = ("jitter", "clipping", "dead", "quantisation", "drift", "unexcited", "lead")
 
+ROLES = ("loops", "broadband", "validation")
+"""What a recording may be said to serve for: hysteresis, linear part, or the scores alone."""
+
 
 @dataclass(frozen=True)
 class Finding:
@@ -47,9 +50,11 @@ class Recording:
     """Drives and outputs sampled together at a constant rate; the arrays are read-only.
 
     `drive` has the shape (samples, inputs) and `output` (samples, outputs), in the units of their source. `sha256` is
-    the digest of the file's bytes, or of the arrays where there was no file. `period_samples` is the length of one
-    period where the excitation is periodic. `input_units` and `output_units` are the texts that the file states, ''
-    where it states none, and empty tuples where nothing is known. `findings` is what the checks noticed and let pass.
+    the digest of the file's bytes, or of the arrays where they are a part of the file or there was none.
+    `period_samples` is the length of one period where the excitation is periodic. `input_units` and `output_units` are
+    the texts that the file states, '' where it states none, and empty tuples where nothing is known. `findings` is
+    what the checks noticed and let pass. `role` is what it is to serve for, one of `ROLES`, or '' where its drive is
+    to tell.
     """
 
     path: str
@@ -63,6 +68,7 @@ class Recording:
     input_units: tuple[str, ...] = ()
     output_units: tuple[str, ...] = ()
     findings: tuple[Finding, ...] = ()
+    role: str = ""
 
     @property
     def step_s(self) -> float:
