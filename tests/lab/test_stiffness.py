@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 
 from microrad.core import kernels
+from microrad.core.periodic import delayed
 from microrad.lab.identify import fit_hysteretic_stiffness, fit_linear, output_error, predicted_error
 from microrad.lab.identify.records import IdentificationError
 from microrad.lab.identify.stiffness import fit as stiffness_fit
 from microrad.lab.identify.stiffness import tangents
 from microrad.lab.identify.stiffness.fit import StiffnessOptions, simulate_hysteretic_stiffness
-from microrad.lab.identify.stiffness.model import FIELDS, Numbers, balanced, delayed, scaled
+from microrad.lab.identify.stiffness.model import FIELDS, Numbers, balanced, scaled
 from microrad.lab.recording import Recording, multisine_recordings
 from microrad.mirror import model as mirror
 from microrad.mirror.hysteresis import Play

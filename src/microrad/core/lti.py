@@ -1,6 +1,7 @@
 """State-space algebra of linear time-invariant systems: polynomials to modal form, discretisation, responses."""
 
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -12,6 +13,8 @@ in the last bit of a matrix grows to one in a hundred thousand; so far before th
 
 DESIGN_BITS = 44
 """Significant bits (6e-14) of the plant of a design: what a controller cancels in it has to stay cancelled."""
+
+_MOST_COMBINED = 6
 
 
 @dataclass(frozen=True, slots=True)
@@ -233,6 +236,24 @@ def feedback_poles(loop: StateSpace) -> Complexes:
     """Poles of the loop closed with unit negative feedback around ``loop`` (square)."""
     closing = np.linalg.inv(np.eye(loop.D.shape[0]) + loop.D)
     return np.asarray(np.linalg.eigvals(loop.A - loop.B @ closing @ loop.C))
+
+
+def growth_1_s(A: Floats, E: Floats, F: Floats, gains: Floats) -> float:
+    """Largest real part of a pole of x' = (A + E K F) x, each gain in the diagonal K either 0 or as given.
+
+    The gain of plays that slide is the sum of their weights, that of stuck ones 0: above 0 a large drive starts what no
+    drive stops. All combinations are tried for up to `_MOST_COMBINED` gains, and all and none beyond.
+
+    Args:
+        A: Shape (states, states).
+        E: What each element does to the states, shape (states, elements).
+        F: What drives each element, shape (elements, states).
+        gains: Gain of each element where it slides, shape (elements,).
+    """
+    each = product((0.0, 1.0), repeat=gains.size)
+    cases = list(each) if gains.size <= _MOST_COMBINED else [(0.0,) * gains.size, (1.0,) * gains.size]
+    sliding = A + (E * (np.array(cases) * gains)[:, None, :]) @ F
+    return float(np.linalg.eigvals(sliding).real.max())
 
 
 def gramian(A: Floats, Q: Floats) -> Floats:

@@ -14,7 +14,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from microrad.core import kernels
+from microrad.core import kernels, periodic
 from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
 from microrad.core.threads import in_threads
@@ -108,14 +108,11 @@ def upsampled(drive: Floats, factor: int, hold: Interpolation) -> Floats:
         factor: The multiple.
         hold: "linear": straight between samples; "band-limited": trigonometric, for a drive of whole periods.
     """
+    if factor == 1 or hold == "band-limited":
+        return periodic.upsampled(drive, factor)
     samples = drive.shape[0]
-    if factor == 1:
-        return drive
-    if hold == "linear":
-        fine = np.arange(factor * (samples - 1) + 1) / factor
-        return np.column_stack([np.interp(fine, np.arange(samples), column) for column in drive.T])
-    spectrum = np.fft.rfft(drive, axis=0)
-    return np.asarray(np.fft.irfft(spectrum, factor * samples, axis=0) * factor)
+    fine = np.arange(factor * (samples - 1) + 1) / factor
+    return np.column_stack([np.interp(fine, np.arange(samples), column) for column in drive.T])
 
 
 def fit_records(

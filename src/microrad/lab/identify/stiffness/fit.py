@@ -26,14 +26,13 @@ from microrad.lab.identify.stiffness.model import (
     HysteresisSource,
     Numbers,
     balanced,
-    delayed,
     linear_start,
     scaled,
     starting_numbers,
 )
 from microrad.lab.identify.stiffness.tangents import Normal, Steady
 from microrad.lab.recording import Recording
-from microrad.mirror import model as mirror
+from microrad.mirror import coupled
 from microrad.mirror.model import Mirror
 
 SOURCES: tuple[HysteresisSource, ...] = ("strain", "drive")
@@ -116,11 +115,7 @@ def simulate_hysteretic_stiffness(fit: HystereticStiffnessFit, drive: Floats) ->
         fit: The fit.
         drive: The drive, shape (samples, inputs), at the rate of the fit.
     """
-    fine = delayed(drive, fit.rate_hz, fit.delay_s, fit.sub_steps)
-    plant = mirror.discretise(fit.mirror, 1.0 / (fit.rate_hz * fit.sub_steps))
-    output = np.empty((fine.shape[0], fit.mirror.axes))
-    kernels.open_loop(plant, mirror.at_rest(plant), fine, output, np.empty((fine.shape[0], 0)))
-    return np.ascontiguousarray(output[:: fit.sub_steps])
+    return coupled.response(fit.mirror, drive, fit.rate_hz, fit.sub_steps, fit.delay_s)
 
 
 def predicted_error(fit: HystereticStiffnessFit, record: Recording, drop: int = 0) -> Floats:

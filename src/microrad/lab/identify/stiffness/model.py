@@ -10,13 +10,12 @@ Two scales are not: that of each mode (its state) and that of each operator (z).
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import product
 from typing import Literal
 
 import numpy as np
 
+from microrad.core import lti
 from microrad.core.arrays import Complexes, Floats
-from microrad.lab.identify.hysteresis.plant_fit import upsampled
 from microrad.lab.identify.linear.modal import ModalModel
 from microrad.lab.identify.linear.order import fit_order
 from microrad.lab.identify.linear.response import FrequencyResponse
@@ -26,7 +25,6 @@ from microrad.mirror.model import Mirror
 HysteresisSource = Literal["strain", "drive"]
 
 FIELDS = ("decay", "frequency", "B", "E", "F", "G", "weights", "C", "D", "K")
-_MOST_COMBINED = 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,14 +84,9 @@ class Numbers:
         """Largest real part of a pole, the plays of each operator all stuck or all sliding.
 
         Plays that slide follow q, so that z = W q with W the sum of their weights and x' = (A + E W F) x. Above 0 a
-        large drive starts what no drive stops. All combinations are tried for up to `_MOST_COMBINED` operators, and
-        all stuck and all sliding beyond.
+        large drive starts what no drive stops; see `lti.growth_1_s`.
         """
-        sums, A = self.weights.sum(axis=1), self.mirror("").A
-        each = product((0.0, 1.0), repeat=sums.size)
-        cases = list(each) if sums.size <= _MOST_COMBINED else [(0.0,) * sums.size, (1.0,) * sums.size]
-        sliding = A + (self.E * (np.array(cases) * sums)[:, None, :]) @ self.F
-        return float(np.linalg.eigvals(sliding).real.max())
+        return lti.growth_1_s(self.mirror("").A, self.E, self.F, self.weights.sum(axis=1))
 
     def mirror(self, name: str) -> Mirror:
         """The mirror in the plant form, without its delay."""
@@ -146,21 +139,6 @@ def balanced(numbers: Numbers) -> Numbers:
     z = np.sqrt(np.linalg.norm(E, axis=0) / np.where(weight > 0, weight, 1.0))
     z = np.where(z > 0, z, 1.0)
     return replace(numbers, B=B, C=C, F=F, E=E / z, K=numbers.K / z, weights=numbers.weights * z[:, None])
-
-
-def delayed(drive: Floats, rate_hz: float, delay_s: float, factor: int) -> Floats:
-    """Whole periods of a drive, later by a delay and at a higher rate, band-limited.
-
-    Args:
-        drive: Whole periods of the drive, shape (samples, inputs).
-        rate_hz: Sample rate of the drive, in Hz.
-        delay_s: Delay, in s, positive for later.
-        factor: Samples of the result for each sample of the drive.
-    """
-    spectrum = np.fft.rfft(drive, axis=0)
-    turn = np.exp(-2j * np.pi * np.fft.rfftfreq(drive.shape[0], 1 / rate_hz) * delay_s)
-    late = np.fft.irfft(spectrum * turn[:, None], drive.shape[0], axis=0)
-    return np.ascontiguousarray(upsampled(late, factor, "band-limited"))
 
 
 # ---------------------------------------------------------------------------------------------------------- the start

@@ -10,10 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from microrad.core import kernels
+from microrad.core import kernels, periodic
 from microrad.core.arrays import Floats
 from microrad.lab.identify.linear.modal import hold_step
-from microrad.lab.identify.stiffness.model import Numbers, delayed
+from microrad.lab.identify.stiffness.model import Numbers
 from microrad.mirror import model as mirror
 
 _CHUNK = 128
@@ -87,7 +87,7 @@ def two_periods(record: Steady, delay_s: float) -> Floats:
         record: The record, one period of its steady state.
         delay_s: Delay of the drive, in s.
     """
-    one = delayed(record.drive, record.rate_hz, delay_s, record.sub_steps)
+    one = periodic.delayed(record.drive, record.rate_hz, delay_s, record.sub_steps)
     return np.concatenate([one, one])
 
 
