@@ -54,7 +54,12 @@ _MARKED = tuple(zip((BLACK, GREEN, ORANGE, BLACK, GREY), _DASHES, strict=True))
 
 
 def label_of(key: str, keys: Sequence[str]) -> str:
-    """The end of a dotted key that tells it from the others, two parts at least, on lines that leave room for data."""
+    """The end of a dotted key that tells it from the others, two parts at least, on lines that leave room for data.
+
+    Args:
+        key: the dotted key.
+        keys: all keys that it is told from, itself among them.
+    """
     parts = key.split(".")
     for count in range(2, len(parts)):
         tail_ = ".".join(parts[-count:])
@@ -67,7 +72,12 @@ def label_of(key: str, keys: Sequence[str]) -> str:
 
 
 def limit_of(summary: CampaignSummary, output: str) -> Limit | None:
-    """The limit of an output."""
+    """The limit of an output; None where it has none.
+
+    Args:
+        summary: the campaign.
+        output: name of the output.
+    """
     return next((limit for limit in summary.limits if limit.output == output), None)
 
 
@@ -80,7 +90,12 @@ def _bounds(limit: Limit | None) -> list[tuple[str, float]]:
 
 # ------------------------------------------------------------------------------------------------------- distributions
 def distribution(output: OutputSummary, limit: Limit | None) -> Figure:
-    """How an output is spread over the rows, with its limit and some quantiles."""
+    """How an output is spread over the rows, with its limit and some quantiles.
+
+    Args:
+        output: the output over the rows of a cell.
+        limit: its limit, if it has one.
+    """
     scale = scale_of(np.array([output.least, output.most]), output.unit, output.name)
     sheet, (panel,) = sheets.grid(WIDTH, 2.3)
     sheet.legend = Legend("upper right")
@@ -128,7 +143,14 @@ def _far(label: str) -> Line:
 
 # ---------------------------------------------------------------------------------------------------------------- tail
 def tail(summary: CampaignSummary, cell: CellSummary) -> tuple[Figure, ...]:
-    """How likely a radial error is exceeded: with its band in the cell shown, beside it the other cells."""
+    """How likely a radial error is exceeded: with its band in the cell shown, beside it the other cells.
+
+    Nothing for a cell without a tail.
+
+    Args:
+        summary: the campaign.
+        cell: the cell whose band is shown, one of the campaign's.
+    """
     if cell.tail is None or not np.any(cell.tail.survival > 0.0):
         return ()
     sheet, (panel,) = sheets.grid(WIDTH, 3.8)
@@ -256,7 +278,12 @@ def _known(interval: Interval) -> bool:
 def region(summary: CampaignSummary, limit: Limit, number: int, inputs: Sequence[str], note: str = "") -> Figure:
     """Rows of a cell that keep and that miss a limit, over two inputs, or over one with the output beside it.
 
-    ``note`` ends the caption.
+    Args:
+        summary: the campaign; its sample has the inputs and the output.
+        limit: the limit.
+        number: number of the cell, from 0.
+        inputs: keys of one or two inputs.
+        note: a sentence that ends the caption, with a space before it.
     """
     cell, units = summary.cells[number], {each.key: each.unit for each in summary.inputs}
     rows = np.flatnonzero(summary.sample["cell"] == number)
@@ -437,7 +464,13 @@ def _numbered(values: Floats) -> Iterator[Field | Words]:
 
 # --------------------------------------------------------------------------------------------------------------- worst
 def worst(summary: CampaignSummary, trace: WorstTrace, number: int) -> Figure:
-    """The ``number``-th worst row, from 1: radial error and drive over time."""
+    """One of the worst rows: radial error and drive over time.
+
+    Args:
+        summary: the campaign that it is of.
+        trace: the row's trace.
+        number: how bad it is among the rows of its cell, from 1.
+    """
     sheet, (above, below) = sheets.grid(WIDTH, 3.4, 2, share_x=True)
     sheet.heights = (1.3, 1.0)
     error = np.reshape(trace.error_rad, (trace.time_s.size, -1))

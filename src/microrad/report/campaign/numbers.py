@@ -35,12 +35,23 @@ def share(probability: float) -> str:
 
 
 def is_share(name: str, unit: str) -> bool:
-    """Whether an output is a share of something, shown as a probability."""
+    """Whether an output is a share of something, shown as a probability.
+
+    Args:
+        name: name of the output.
+        unit: its SI unit; "" or "1" where it has none.
+    """
     return unit in ("", "1") and (name in ("outage", "short") or name.endswith("_share"))
 
 
 def value(number: float, unit: str, name: str = "") -> str:
-    """An estimate of the output ``name`` with its unit, in three digits also where the last are 0: "4.10 µrad"."""
+    """An estimate of an output with its unit, in three digits also where the last are 0: "4.10 µrad".
+
+    Args:
+        number: the estimate, in SI units; nan is not known.
+        unit: its SI unit; "" or "1" where it has none.
+        name: name of the output, which tells whether it is a share (`is_share`).
+    """
     text = bound(number, unit, name)
     if not math.isfinite(number) or unit in ("", "1") or unit.startswith("dB"):
         return text
@@ -57,7 +68,13 @@ def _three(digits: str) -> str:
 
 
 def bound(number: float, unit: str, name: str = "") -> str:
-    """A value that was given, such as a limit, with its unit: "10 µrad"."""
+    """A value that was given, such as a limit, with its unit: "10 µrad".
+
+    Args:
+        number: what was given, in SI units; nan is not known.
+        unit: its SI unit; "" or "1" where it has none.
+        name: name of the output, which tells whether it is a share (`is_share`).
+    """
     if math.isnan(number):
         return _UNKNOWN
     if is_share(name, unit):
@@ -69,7 +86,13 @@ def bound(number: float, unit: str, name: str = "") -> str:
 
 
 def ends(interval: Interval, unit: str, name: str = "") -> str:
-    """The interval alone: "3.1 dB to 3.3 dB", "at least 3.1 dB" where one end is not known, "" where neither is."""
+    """The interval alone: "3.1 dB to 3.3 dB", "at least 3.1 dB" where one end is not known, "" where neither is.
+
+    Args:
+        interval: the interval, in SI units; an end that is nan is not known.
+        unit: its SI unit; "" or "1" where it has none.
+        name: name of the output, which tells whether it is a share (`is_share`).
+    """
     low, high = (value(end, unit, name) for end in (interval.low, interval.high))
     if is_share(name, unit) and 0.0 <= interval.low < _LEAST_LOW:
         low = "0 %" if high.endswith("%") else "0"
@@ -79,7 +102,13 @@ def ends(interval: Interval, unit: str, name: str = "") -> str:
 
 
 def with_ends(interval: Interval, unit: str, name: str = "") -> str:
-    """The estimate with its interval."""
+    """The estimate with its interval.
+
+    Args:
+        interval: the estimate and its interval, in SI units.
+        unit: their SI unit; "" or "1" where they have none.
+        name: name of the output, which tells whether it is a share (`is_share`).
+    """
     found = ends(interval, unit, name)
     return value(interval.value, unit, name) + (f" ({found})" if found else "")
 
@@ -90,7 +119,12 @@ def share_ends(interval: Interval) -> str:
 
 
 def limit_text(limit: Limit, unit: str) -> str:
-    """What an output has to keep, as an inequality."""
+    """What an output has to keep, as an inequality.
+
+    Args:
+        limit: the limit, one side or both.
+        unit: SI unit of its output.
+    """
     both = [
         f"{SYMBOL[side]} {bound(at, unit, limit.output)}"
         for side in ("least", "most")
@@ -117,7 +151,13 @@ class Scale(NamedTuple):
 
 
 def scale_of(values: NDArray[np.float64], unit: str, name: str = "") -> Scale:
-    """The prefix of the unit, or per cent, that suits the largest of the values."""
+    """The prefix of the unit, or per cent, that suits the largest of the values.
+
+    Args:
+        values: what is shown, in SI units, of any shape; what is not finite does not count.
+        unit: their SI unit; "" or "1" where they have none.
+        name: name of the output, which tells whether it is a share (`is_share`).
+    """
     finite = np.abs(values[np.isfinite(values)])
     largest = float(finite.max()) if finite.size else 0.0
     if is_share(name, unit):

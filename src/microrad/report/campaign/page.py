@@ -32,7 +32,12 @@ def campaign_page(summary: CampaignSummary) -> str:
 
 
 def campaign_views(summary: CampaignSummary, drawn: Mapping[str, Sequence[Figure]]) -> tuple[View, ...]:
-    """The parts of the page that have something to show; ``drawn`` are its figures by part."""
+    """The parts of the page that have something to show.
+
+    Args:
+        summary: the campaign.
+        drawn: its figures by section of the page, as `campaign_figures` gives them.
+    """
     cell = words.best(summary)
     indices, every = tables.index_table(summary.sensitivities), "Every index and rank correlation"
     parts: dict[str, Sequence[Block]] = {

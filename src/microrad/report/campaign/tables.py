@@ -23,7 +23,12 @@ def good(cell: CellSummary) -> int:
 
 
 def unit_of(summary: CampaignSummary, output: str) -> str:
-    """The unit of an output; nothing where no cell has it."""
+    """The unit of an output; nothing where no cell has it.
+
+    Args:
+        summary: the campaign.
+        output: name of the output.
+    """
     return next((cell.outputs[output].unit for cell in summary.cells if output in cell.outputs), "")
 
 
@@ -35,7 +40,12 @@ def ranked(found: Sensitivity) -> list[tuple[str, Interval]]:
 
 # -------------------------------------------------------------------------------------------------------------- tables
 def limit_table(summary: CampaignSummary, cell: CellSummary) -> Rows:
-    """Each limit, how many rows miss it, and where it comes from."""
+    """Each limit, how many rows miss it, and where it comes from.
+
+    Args:
+        summary: the campaign, for its limits.
+        cell: the cell whose rows are counted.
+    """
     rows: list[Row] = []
     for limit in summary.limits:
         if missed := cell.missed_by.get(limit.output):
@@ -50,7 +60,12 @@ def is_known(quantile: Interval) -> bool:
 
 
 def chosen_quantiles(outputs: Sequence[OutputSummary], most: int) -> list[float]:
-    """Probabilities of at most ``most`` quantiles, rising: those that are known and the usual ones before others."""
+    """Probabilities of some quantiles, rising: those that are known and the usual ones before others.
+
+    Args:
+        outputs: the outputs that are to have them.
+        most: how many at most.
+    """
     there = {p for output in outputs for p in output.quantiles}
     known = {p for output in outputs for p, quantile in output.quantiles.items() if is_known(quantile)}
     usual = [group for group in _USUAL if there.issuperset(group)]
@@ -62,9 +77,12 @@ def chosen_quantiles(outputs: Sequence[OutputSummary], most: int) -> list[float]
 
 
 def output_table(cell: CellSummary, most: int, *, intervals: bool = False) -> Rows:
-    """Each output that differs, with mean, deviation and at most ``most`` quantiles.
+    """Each output that differs from row to row, with mean, deviation and some quantiles.
 
-    With ``intervals`` a second line of each quantile has its ends.
+    Args:
+        cell: the cell whose rows are summed up.
+        most: how many quantiles at most.
+        intervals: whether each quantile has a second line with the ends of its interval.
     """
     outputs = [output for output in cell.outputs.values() if output.rows and output.most > output.least]
     chosen = chosen_quantiles(outputs, most)
@@ -97,7 +115,12 @@ def meanings_table(cell: CellSummary | None) -> Rows:
 
 
 def cell_table(summary: CampaignSummary, cells: Sequence[CellSummary]) -> Rows:
-    """Each combination of the grid, and how many rows keep all limits there."""
+    """Each combination of the grid, and how many rows keep all limits there.
+
+    Args:
+        summary: the campaign, for its limits and the keys of its grid.
+        cells: the combinations to list, in their order.
+    """
     keys = _keys(summary)
     headings = (*keys, *(("keep all",) if summary.limits else ()), "rows", "failed")
     kept = [[share_ends(complement(cell.missed)) if good(cell) else ""] if summary.limits else [] for cell in cells]
@@ -109,7 +132,12 @@ def cell_table(summary: CampaignSummary, cells: Sequence[CellSummary]) -> Rows:
 
 
 def limited_table(summary: CampaignSummary, cells: Sequence[CellSummary]) -> Rows:
-    """Each combination of the grid, the mean of each limited output, and the rows that miss it."""
+    """Each combination of the grid, the mean of each limited output, and the share of the rows that miss its limit.
+
+    Args:
+        summary: the campaign, for its limits and the keys of its grid.
+        cells: the combinations to list, in their order.
+    """
     keys, names = _keys(summary), [limit.output for limit in summary.limits]
     headings = [heading for name in names for heading in (f"mean {label(name)}", f"miss {label(name)}")]
     return Rows((*keys, *headings), [_limited_row(cell, keys, names) for cell in cells])
@@ -155,7 +183,12 @@ def index_text(index: Interval | None) -> str:
 
 
 def failed_table(summary: CampaignSummary, most: int) -> Rows:
-    """Rows without results, with the combination of the grid where there is one."""
+    """Rows without results, with the combination of the grid where there is one.
+
+    Args:
+        summary: the campaign.
+        most: how many rows are listed at most, the first ones.
+    """
     rows = []
     for number, each in summary.failed[:most]:
         cell = summary.cells[number]
@@ -165,6 +198,11 @@ def failed_table(summary: CampaignSummary, most: int) -> Rows:
 
 
 def more_failed(summary: CampaignSummary, shown: int) -> str:
-    """How many failed rows are not shown; nothing where all are."""
+    """How many failed rows are not shown; nothing where all are.
+
+    Args:
+        summary: the campaign.
+        shown: how many failed rows are shown.
+    """
     more = sum(cell.failed for cell in summary.cells) - shown
     return f"{more} more failed rows are in the export." if more > 0 else ""

@@ -29,6 +29,10 @@ def beyond(tail: Tail, radius_rad: float) -> Interval | None:
     """Probability of a larger radial error, read off the tail in its logarithm; None below its radii.
 
     Beyond the largest error seen it is 0, its interval that of the last radius.
+
+    Args:
+        tail: the tail of the radial error.
+        radius_rad: the radius, in rad.
     """
     radius, seen = tail.radius_rad, tail.survival > 0.0
     if not seen.any() or radius_rad < radius[0]:
@@ -152,7 +156,12 @@ def matters(summary: CampaignSummary) -> list[str]:
 
 
 def leading(summary: CampaignSummary, output: str) -> list[str]:
-    """The inputs that matter to an output, the one that matters most first; none where it is not known."""
+    """The inputs that matter to an output, the one that matters most first; none where it is not known.
+
+    Args:
+        summary: the campaign, with its sensitivities.
+        output: name of the output.
+    """
     found = [s for s in summary.sensitivities if s.output == output]
     return [key for s in found for key, index in ranked(s) if index.value >= MATTERS]
 
@@ -167,7 +176,12 @@ def _matters(found: Sensitivity) -> str:
 
 
 def tail_sentences(summary: CampaignSummary, cell: CellSummary | None) -> list[str]:
-    """The radius exceeded with the least probability that is known, and how likely the error is beyond its bounds."""
+    """The radius exceeded with the least probability that is known, and how likely the error is beyond its bounds.
+
+    Args:
+        summary: the campaign; the upper bounds of its residual are radii that are asked for, too.
+        cell: the cell whose tail is told; nothing is said without one.
+    """
     if cell is None or cell.tail is None:
         return []
     tail, found = cell.tail, []
@@ -195,7 +209,12 @@ def _worth(tail: Tail, radius_rad: float, past: Interval) -> str:
 
 
 def answers(summary: CampaignSummary, cell: CellSummary | None) -> list[str]:
-    """What follows the verdict: what matters most, and the tail."""
+    """What follows the verdict: what matters most, and the tail.
+
+    Args:
+        summary: the campaign.
+        cell: the cell whose tail is told, if there is one.
+    """
     said = headline(summary)
     return [each for each in (*matters(summary), *tail_sentences(summary, cell)) if each != said]
 
