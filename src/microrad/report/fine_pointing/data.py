@@ -15,7 +15,12 @@ from microrad.report.fine_pointing.words import room
 
 
 def fine_pointing_data(fine: FinePointingStudy, required: float) -> dict[str, Any]:
-    """Everything that the page shows of the study, but its spectra, which results.nc holds."""
+    """Everything that the page shows of the study, but its spectra, which results.nc holds.
+
+    Args:
+        fine: the study.
+        required: largest radial error (rad) that is allowed for the mission's share of the time.
+    """
     r, units = room(fine), parameter_units(fine)
     stroke = {"point_ahead_on_mirror": fine.scene.stroke, "without_point_ahead": fine.scene.stroke_without_point_ahead}
     found: dict[str, Any] = {

@@ -51,7 +51,13 @@ class Shown:
         return self.of.design.name
 
     def line(self, freq_hz: Floats, values: Floats, place: int) -> Line:
-        """Its line, with markers at even distances on a logarithmic axis, elsewhere for each place."""
+        """Its line, with markers at even distances on a logarithmic axis of frequency.
+
+        Args:
+            freq_hz: frequencies (points,) in Hz, above 0, rising.
+            values: the curve there (points,), in the unit of the axis.
+            place: place of the controller among those shown, 0 to 2, which shifts its markers away from theirs.
+        """
         freq_hz, values = _seen(freq_hz, values)
         at = np.geomspace(freq_hz[0], freq_hz[-1], 3 * _MARKS + 1)[1 + place :: 3]
         marks = [int(i) for i in np.unique(np.searchsorted(freq_hz, at[at <= freq_hz[-1]]))]
@@ -59,7 +65,12 @@ class Shown:
 
 
 def fine_pointing_figures(study: Study, parts: Kept = NOTHING) -> tuple[Figure, ...]:
-    """The figures of the study's fine-pointing loop; none without one. ``parts`` are those of earlier runs."""
+    """The figures of the study's fine-pointing loop; none without one.
+
+    Args:
+        study: the study.
+        parts: the parts that earlier runs have kept.
+    """
     fine, m = study.fine_pointing, study.file.mission
     if fine is None:
         return ()
@@ -88,7 +99,12 @@ def _seen(freq_hz: Floats, values: Floats) -> tuple[Floats, Floats]:
 
 
 def cumulative_rms(freq_hz: Floats, density: Floats) -> Floats:
-    """Rms from the first frequency up to each, of a one-sided density on a uniform grid."""
+    """Rms from the first frequency up to each, of a one-sided density on a uniform grid.
+
+    Args:
+        freq_hz: frequencies (points,) in Hz, evenly spaced, rising, at least two.
+        density: the density there (points,), a square per Hz, such as rad^2/Hz.
+    """
     return np.asarray(np.sqrt(np.cumsum(density) * (freq_hz[1] - freq_hz[0])))
 
 
@@ -96,7 +112,12 @@ def cumulative_rms(freq_hz: Floats, density: Floats) -> Floats:
 
 
 def spectra(fine: FinePointingStudy, controllers: tuple[Shown, ...]) -> Figure:
-    """Spectrum of axis x before and after the loop, and the rms that gathers below each frequency."""
+    """Spectrum of axis x before and after the loop, and the rms that gathers below each frequency.
+
+    Args:
+        fine: the study, with the frequencies.
+        controllers: those shown.
+    """
     inner = slice(1, -1)  # neither the mean nor half the control rate
     freq = fine.freq_hz[inner]
     sheet = Sheet(7.6, 4.3, widths=(1.45, 1.0), legend=Legend("above", 3))
@@ -152,7 +173,12 @@ def _lines(fine: FinePointingStudy) -> bool:
 
 
 def errors(fine: FinePointingStudy, m: Mission) -> Figure:
-    """Radial error at the mission's share of the time, by controller and variant of the mirror."""
+    """Radial error at the mission's share of the time, by controller and variant of the mirror.
+
+    Args:
+        fine: the study.
+        m: the mission, for the error that it allows.
+    """
     names = [v.design.name for v in fine.verified]
     rows = np.arange(len(names))[::-1]
     sheet, (panel,) = grid(7.6, 1.3 + 0.36 * len(names))
@@ -242,7 +268,14 @@ def error_budget(b: ErrorBudget) -> Figure:
 
 
 def sensitivities(fine: FinePointingStudy, m: Mission, controllers: tuple[Shown, ...], parts: Kept = NOTHING) -> Figure:
-    """|S| of the same controllers, with the ceiling that the modulus margin asked for puts on it."""
+    """|S| of the same controllers, with the ceiling that the modulus margin asked for puts on it.
+
+    Args:
+        fine: the study.
+        m: the mission, for the modulus margin that it asks for.
+        controllers: those shown.
+        parts: the parts that earlier runs have kept.
+    """
     half = 0.5 / fine.scene.loop.timing.period_s
     freq = np.geomspace(half * 1e-4, half * 0.999, _SENSITIVITY_POINTS)
     sheet, (whole, peak) = grid(7.6, 3.7, 1, 2)
@@ -267,7 +300,13 @@ def sensitivities(fine: FinePointingStudy, m: Mission, controllers: tuple[Shown,
 
 
 def sensitivity_size(loop: PointingLoop, controller: LoopController, freq_hz: Floats) -> Floats:
-    """|S| of axis x at each frequency."""
+    """|S| of axis x at each frequency, shape (frequencies,): what is left of a disturbance, of 1.
+
+    Args:
+        loop: the pointing loop.
+        controller: its controller.
+        freq_hz: frequencies in Hz, shape (frequencies,).
+    """
     return np.asarray(np.abs(sensitivity(close(loop, controller), freq_hz)[:, 0, 0]))
 
 

@@ -21,7 +21,13 @@ OPEN = ("fine-pointing-budget",)
 
 
 def fine_pointing_view(fine: FinePointingStudy, required: float, figures: Sequence[Figure]) -> View:
-    """The study at a required pointing error (rad) with its figures; its tables have microradians, as they say."""
+    """The study with its figures; its tables have microradians, as they say.
+
+    Args:
+        fine: the study.
+        required: largest radial error (rad) that is allowed for the mission's share of the time.
+        figures: its figures, of which those in `OPEN` are shown at once.
+    """
     met = fine.best.meets(required) and not unknown_dynamics(fine.scene.mirrors.table)
     verdict = Verdict(" ".join(words.result(fine, required)), [" ".join(words.theory(fine))], met)
     drawn = [f if f.name in OPEN else View(f.title, [f], folded=True, listed=False) for f in figures]
@@ -73,7 +79,12 @@ def with_interval(residual: Residual) -> str:
 
 # ------------------------------------------------------------------------------------------------ controllers
 def residuals_view(fine: FinePointingStudy, required_rad: float) -> View:
-    """What each controller leaves, in theory and by variant of the mirror."""
+    """What each controller leaves, in theory and by variant of the mirror.
+
+    Args:
+        fine: the study.
+        required_rad: largest radial error (rad) that is allowed for the mission's share of the time.
+    """
     variants = [v for v in words.NAMES if any(v in each.simulated for each in fine.verified)]
     time = share_of_time(fine.quantile)
     rows = [
@@ -340,7 +351,12 @@ def _magnification(axis: StrokeBudget) -> str:
 
 # ------------------------------------------------------------------------------------------------ sines
 def sines_view(fine: FinePointingStudy, required_rad: float) -> View | None:
-    """Controllers by sine: rms and quantile, a group of columns for each variant of the mirror."""
+    """Controllers by sine: rms and quantile, a group of columns for each variant of the mirror; None without sines.
+
+    Args:
+        fine: the study.
+        required_rad: largest radial error (rad) that is allowed for the mission's share of the time.
+    """
     if not fine.sines:
         return None
     found: dict[tuple[str, str, float], Sine] = {(s.controller, s.variant, s.freq_hz): s for s in fine.sines}

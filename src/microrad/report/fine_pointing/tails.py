@@ -63,7 +63,12 @@ def _middles() -> Floats:
 
 
 def quantile(left: Residual, share: float) -> Quantile:
-    """A quantile with the interval of its order statistics, by the normal approximation of the binomial."""
+    """A quantile with the interval of its order statistics, by the normal approximation of the binomial.
+
+    Args:
+        left: what a controller leaves, with the histogram of its radial error.
+        share: share of the time that the error stays below the quantile, 0 to 1.
+    """
     value, independent = histogram_quantile(left.radial_counts, share), independent_samples(left)
     if not independent * (1.0 - share) >= LEAST_BEYOND:  # nan too
         return Quantile(share, value, math.nan, math.nan)
@@ -73,7 +78,12 @@ def quantile(left: Residual, share: float) -> Quantile:
 
 
 def beyond(left: Residual, radius_rad: float) -> tuple[float, float, float]:
-    """Share of the time beyond a radius, with its 99 % interval by Wilson's score; nan where it has none."""
+    """Share of the time beyond a radius, with the ends of its 99 % interval by Wilson's score; nan where it has none.
+
+    Args:
+        left: what a controller leaves, with the histogram of its radial error.
+        radius_rad: the radius, in rad.
+    """
     share, n = histogram_beyond(left.radial_counts, radius_rad), independent_samples(left)
     if math.isnan(n):
         return share, math.nan, math.nan
@@ -85,7 +95,13 @@ def beyond(left: Residual, radius_rad: float) -> tuple[float, float, float]:
 
 # --------------------------------------------------------------------------------------------------------------- page
 def tail_view(fine: FinePointingStudy, required_rad: float, figures: Sequence[Figure]) -> View:
-    """The best controller's tail on each variant of the mirror, beside the baseline's."""
+    """The best controller's tail on each variant of the mirror, beside the baseline's.
+
+    Args:
+        fine: the study.
+        required_rad: largest radial error (rad) that is allowed for the mission's share of the time.
+        figures: figures of the tail, which stand at the end.
+    """
     shares = sorted({*SHARES, fine.quantile})
     shown = shown_of(fine)
     rows = [
@@ -140,7 +156,12 @@ def _count(value: float) -> str:
 
 
 def tail_sentences(fine: FinePointingStudy, samples: int) -> list[str]:
-    """What was drawn, and how the intervals come about."""
+    """What was drawn, and how the intervals come about.
+
+    Args:
+        fine: the study.
+        samples: control samples over all runs.
+    """
     table = fine.scene.table
     return [
         "Radial error of the line of sight at the control samples of the ensemble: "
@@ -160,7 +181,12 @@ def tail_figures(study: Study) -> tuple[Figure, ...]:
 
 
 def tail(fine: FinePointingStudy, required_rad: float) -> Figure:
-    """Share of the time beyond each radius, on a logarithmic axis, beside a Rayleigh distribution of the same rms."""
+    """Share of the time beyond each radius, on a logarithmic axis, beside a Rayleigh distribution of the same rms.
+
+    Args:
+        fine: the study.
+        required_rad: largest radial error (rad) that is allowed for the mission's share of the time.
+    """
     sheet, (panel,) = grid(7.4, 3.8)
     sheet.legend = Legend("above", 3)
     columns: dict[str, Floats] = {}

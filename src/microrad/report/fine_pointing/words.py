@@ -96,7 +96,12 @@ def _sentence(text: str) -> str:
 
 
 def result(fine: FinePointingStudy, required: float) -> list[str]:
-    """What the best controller leaves, what makes it up, and how it stands against the baseline."""
+    """What the best controller leaves, what makes it up, and how it stands against the baseline.
+
+    Args:
+        fine: the study.
+        required: largest radial error (rad) that is allowed for the mission's share of the time.
+    """
     best, baseline = fine.best, fine.verified[0]
     left = best.simulated[Variant.GIVEN]
     time = share_of_time(fine.quantile)
@@ -173,7 +178,12 @@ def not_reliable(mirror: Mirror) -> list[str]:
 
 
 def short(fine: FinePointingStudy, required: float) -> list[str]:
-    """The verdict in a line each: what is left, on a sine too, what theory leaves to gain, whether the stroke does."""
+    """The verdict in a line each: what is left, on a sine too, what theory leaves to gain, whether the stroke does.
+
+    Args:
+        fine: the study.
+        required: largest radial error (rad) that is allowed for the mission's share of the time.
+    """
     left, r = fine.best.simulated[Variant.GIVEN], room(fine)
     lines = [
         f"Fine pointing under vibration and noise: {fine.best.design.name} leaves {angle(left.quantile_rad)} radial at "
@@ -197,7 +207,12 @@ def short(fine: FinePointingStudy, required: float) -> list[str]:
 
 
 def tracked(fine: FinePointingStudy, required_rad: float) -> str:
-    """At which of the paper's sines the requirement is met on the mission's mirror, and by whom."""
+    """At which of the paper's sines the requirement is met on the mission's mirror, and by whom; "" without sines.
+
+    Args:
+        fine: the study.
+        required_rad: largest radial error (rad) that is allowed for the mission's share of the time.
+    """
     parts = []
     for freq in dict.fromkeys(s.freq_hz for s in fine.sines):
         here = [s for s in fine.sines if s.variant == Variant.GIVEN and s.freq_hz == freq]
@@ -265,7 +280,10 @@ def _fit(where: str, several: tuple[StrokeBudget, ...]) -> str:
 def warnings(fine: FinePointingStudy, paper: Control, amplifier: Amplifier) -> tuple[list[str], list[str]]:
     """What a reader must not overlook: of the loop that is judged, and of the other controllers.
 
-    ``paper`` is the table of the loop that tracks the paper's sines, with its ``amplifier``.
+    Args:
+        fine: the study.
+        paper: table of the loop that tracks the paper's sines.
+        amplifier: its amplifier.
     """
     name = fine.best.design.name
     own = _stroke_warnings(fine) + _hardware_warnings(fine.scene.table, paper, amplifier)
