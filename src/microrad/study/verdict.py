@@ -34,7 +34,16 @@ def of_residual(
     left_rad: float,
     cause: str,
 ) -> tuple[Requirement, Requirement]:
-    """The error of the paper's loop in the worst of its sines, with its cause, and the margin that it leaves."""
+    """The error of the paper's loop in the worst of its sines, with its cause, and the margin that it leaves.
+
+    Args:
+        q: What the mission requires of the link, and the largest residual that it allows.
+        mirrors: The mission's mirror, which tells whether its dynamics are known.
+        sources: Where each value of the mission comes from, by its dotted key.
+        achieved: The communication link at the residual.
+        left_rad: The residual (rad), in the mission's statistic and convention.
+        cause: What it is made of, `residual_cause`.
+    """
     spare, derived = achieved.margin_db - q.margin_db, derived_from(sources, "communication.")
     because, name, lacking = "the residual: " + cause, "communication margin", unknown(mirrors.table)
     doubt = lacking if achieved.possible else IMPOSSIBLE
@@ -49,7 +58,11 @@ def of_fine_pointing(
 ) -> tuple[Requirement, ...]:
     """The mirror's stroke; the best controller's error for its share of the time, and the margin but for the outage.
 
-    ``case`` is the link under that controller.
+    Args:
+        q: What the mission requires of the link, and the largest residual that it allows.
+        sources: Where each value of the mission comes from, by its dotted key.
+        fine: The study of the fine-pointing loop.
+        case: The link under the best controller on the mission's mirror.
     """
     controller, cause, lacking = fine.best.design.name, fine.budget.dominant, unknown(fine.scene.mirrors.table)
     left, title = fine.best.simulated[Variant.GIVEN].quantile_rad, f"fine pointing at {100 * fine.quantile:g} %"
@@ -82,7 +95,14 @@ def _error(subject: Subject, name: str, q: LinkRequirement, left_rad: float, cau
 
 
 def residual_cause(mirrors: MirrorParts, statistic: str, worst: Run, runs: tuple[Run, ...]) -> str:
-    """What the residual is made of: an amplifier at its limits, else the lag of the loop, else hysteresis."""
+    """What the residual is made of: an amplifier at its limits, else the lag of the loop, else hysteresis.
+
+    Args:
+        mirrors: The mission's mirror.
+        statistic: What the error is measured by, "peak" or "rms".
+        worst: The run that leaves the residual, on the mission's mirror.
+        runs: All runs, among them the same sine under the same controller on the mirror without hysteresis.
+    """
     if worst.at_limits:
         return f"{worst.at_limits} at {worst.freq_hz:g} Hz"
     linear = next(
