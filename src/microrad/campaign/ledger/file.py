@@ -259,7 +259,11 @@ def lock_of(path: Path) -> Path:
 
 
 def locked(path: Path) -> sqlite3.Connection:
-    """The right to write, for as long as the connection is open and the process lives."""
+    """The right to write, for as long as the connection is open and the process lives.
+
+    Raises:
+        CampaignError: another process has it.
+    """
     lock = sqlite3.connect(lock_of(path), timeout=_GLANCE_S, isolation_level=None)
     try:
         lock.execute("PRAGMA journal_mode = MEMORY")  # no further file beside it
@@ -314,6 +318,9 @@ def errors_in_words(path: Path, what: str) -> Iterator[None]:
     Args:
         path: the ledger.
         what: what is being done, behind "could not".
+
+    Raises:
+        CampaignError: in place of an error of SQLite or of the file system.
     """
     try:
         yield

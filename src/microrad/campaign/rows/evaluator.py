@@ -257,6 +257,9 @@ class Evaluator:
             cell: the cell.
             row: the row.
             beat: called at each sign of life.
+
+        Raises:
+            CampaignError: the row's draws make no mission.
         """
         file = self._drawn(cell, range(row, row + 1)).files[0]
         if isinstance(file, str):

@@ -214,6 +214,9 @@ def polynomials(entry: lti.StateSpace) -> tuple[list[Fraction], list[Fraction]]:
 
     With M_0 = 1: c_k = -trace(A M_(k-1)) / k, M_k = A M_(k-1) + c_k; the numerator's coefficients are C M_k B + D c.
     Leading ones that are zero but for rounding are left out. Source: Gantmacher, The Theory of Matrices 1 (1959) 87.
+
+    Raises:
+        ExportError: There are more states than `MOST_STATES`.
     """
     n = entry.order
     if n > MOST_STATES:

@@ -104,7 +104,14 @@ class Side:
     epoch: Epoch
 
     def look(self, time_s: Floats) -> _Look:
-        """Directions and rates, in TEME."""
+        """Directions and rates, in TEME.
+
+        Args:
+            time_s: Times since the epoch, s, shape (times,).
+
+        Raises:
+            OrbitError: Both terminals are at the same place at one of them.
+        """
         own, other = self.terminal.orbit.states(time_s), self.partner.orbit.states(time_s)
         apart, speed = other.position_m - own.position_m, other.velocity_m_s - own.velocity_m_s
         square = dot(apart, apart)

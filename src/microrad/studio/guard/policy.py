@@ -100,6 +100,9 @@ def sign_template(environment: Environment, name: str = "index.html") -> None:
     Args:
         environment: of Jinja; NiceGUI's is `nicegui.client.templates.env`.
         name: that of the template.
+
+    Raises:
+        ValueError: the environment has no loader.
     """
     from jinja2 import ChoiceLoader, DictLoader
 

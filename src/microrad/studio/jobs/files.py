@@ -249,7 +249,12 @@ def _tail(path: Path, most: int) -> str:
 
 # ------------------------------------------------------------------------------------------------------------- writing
 def note(path: Path, **data: Any) -> None:
-    """Write a note whole, with the time in "at"."""
+    """Write a note whole, with the time in "at".
+
+    Args:
+        path: file of the note.
+        data: what it says, by name: what JSON can hold.
+    """
     write_whole(path, json.dumps({**data, "at": now()}))
 
 

@@ -92,6 +92,9 @@ def opened(path: Path, request: dict[str, Any]) -> Source:
     Args:
         path: the recording.
         request: what `reading` asks for, with its limits.
+
+    Raises:
+        RefusedError: a channel claims more samples than may be read.
     """
     from microrad.lab.recording.reader import open_source
 
