@@ -157,7 +157,7 @@ class _OnOff:
         """Signal counts at which -2 ln of the overlap, (sqrt bright - sqrt dim)^2 of the mean counts, takes a value.
 
         Args:
-            apart: The value.
+            apart: What -2 ln of the overlap is to be, above 0.
             background: Counts without signal, in the unit of the signal's.
         """
         swing = (self.mark - self.space) ** 2

@@ -138,7 +138,7 @@ class Reads:
         """The value, noted as read; a record or a container of records in place of it notes what is read through it.
 
         Args:
-            value: The value.
+            value: The arguments, or what was read of them.
             path: Steps from the arguments to it.
         """
         if isinstance(value, dict | MappingProxyType) and any(_holds_records(item) for item in value.values()):
@@ -155,7 +155,7 @@ class Reads:
         """Note a record as read in all its parts.
 
         Args:
-            value: The record.
+            value: A record, or a mapping of records.
             path: Steps from the arguments to it.
         """
         self._note((*path, WHOLE), value)

@@ -247,7 +247,7 @@ def printable(text: str, kept: str = "") -> str:
     """The text with every character spelled out that would steer a terminal or cannot be seen.
 
     Args:
-        text: The text.
+        text: What is to be printed, from a file or a user.
         kept: Characters that stay as they are all the same.
     """
     return "".join(c if c.isprintable() or c in kept else f"\\u{ord(c):04x}" for c in text)

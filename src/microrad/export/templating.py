@@ -26,7 +26,7 @@ def real(x: float, precision: Precision = "double") -> str:
     What is too small for the precision becomes 0 (a compiler warns of such a literal).
 
     Args:
-        x: The number.
+        x: A constant of the code, in any unit.
         precision: "double", at most 17 significant digits, or "single", at most 9 and the suffix f.
 
     Raises:

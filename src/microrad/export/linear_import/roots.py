@@ -39,7 +39,7 @@ def response(of: Roots, freq_hz: Floats) -> Complexes:
 
     Args:
         of: The system.
-        freq_hz: Frequencies in Hz.
+        freq_hz: Frequencies in Hz, any shape.
     """
     return factored(of.zeros, of.poles, of.gain, np.asarray(2j * np.pi * freq_hz, dtype=complex))
 
@@ -125,7 +125,7 @@ def roots_of_coefficients(numerator: Floats, denominator: Floats, source: str) -
     """Zeros, poles and gain of a quotient of polynomials in s (rad/s).
 
     Args:
-        numerator: Its coefficients, highest power first.
+        numerator: Its coefficients, highest power of s (rad/s) first, shape (coefficients,).
         denominator: Those of the denominator, likewise.
         source: What messages call the system.
 

@@ -101,7 +101,8 @@ class Spiral(Bounded):
 
         Args:
             time_s: Times from the begin of the scan, in s, any shape.
-            within_s: A time within the pass that is under way, in s; a spiral does not need it.
+            within_s: A time within the pass that is under way, in s, of the shape of the times; a spiral does not need
+                it.
         """
         radius = self.track_radius(time_s)
         angle = 2.0 * math.pi * radius / self.search.pitch_rad
@@ -112,7 +113,7 @@ class Spiral(Bounded):
 
         Args:
             x_rad: Place of each target along x, in rad from the middle of the search, shape (targets,).
-            y_rad: The same along y.
+            y_rad: The same along y, shape (targets,).
             reach_rad: Distance from the beam's centre that counts as near, in rad.
         """
         pitch = self.search.pitch_rad
@@ -186,7 +187,7 @@ class Raster(Bounded):
 
         Args:
             x_rad: Place of each target along x, in rad from the middle of the search, shape (targets,).
-            y_rad: The same along y.
+            y_rad: The same along y, shape (targets,).
             reach_rad: Distance from the beam's centre that counts as near, in rad.
         """
         count = min(math.ceil(2.0 * reach_rad / self.search.pitch_rad) + 1, self.rows)
@@ -268,7 +269,7 @@ class StepStare(Bounded):
 
         Args:
             x_rad: Place of each target along x, in rad from the middle of the search, shape (targets,).
-            y_rad: The same along y.
+            y_rad: The same along y, shape (targets,).
             reach_rad: Distance from the beam's centre that counts as near, in rad.
         """
         place = np.stack([x_rad, y_rad], axis=-1) @ np.linalg.inv(self.basis_rad)

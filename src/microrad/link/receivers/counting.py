@@ -190,7 +190,7 @@ class _MostCounts(NamedTuple):
 
         Args:
             pulse: Mean signal counts of the pulse, shape (chosen rows,).
-            row: The rows of the tables.
+            row: The rows of the tables, a slice or their numbers.
         """
         signal, b = pulse[:, None], self.floor[row]
         probability = np.exp(self.log_weight[row] - signal + self.counts[row] * np.log1p(signal / b))

@@ -239,7 +239,7 @@ def loop_response(
     Args:
         plant: The plant of one axis.
         controller: Its controller.
-        freq_hz: Frequencies up to half the control rate, one or an array of them.
+        freq_hz: Frequencies in Hz up to half the control rate, one or an array of shape (frequencies,).
         broken_at: Where the loop is cut, one of `BREAKS`.
 
     Raises:
@@ -304,7 +304,7 @@ def around_poles(poles: Complexes, period_s: float, ratio: float) -> Floats:
 
     Args:
         poles: Poles z of a discrete system; those on the positive real axis have no resonance and are passed over.
-        period_s: Control period.
+        period_s: Control period, s.
         ratio: Factor, above 1, between the distances of neighbouring frequencies from their pole.
     """
     s = np.log(poles[np.abs(poles) > 1e-3].astype(complex)) / (2 * math.pi * period_s)
@@ -322,8 +322,8 @@ def resolving(poles: Complexes, period_s: float) -> Floats:
     """Frequencies (Hz), rising to half the rate, on which a loop shows every resonance.
 
     Args:
-        poles: Poles z of the loop, open and closed.
-        period_s: Control period.
+        poles: Poles z of the loop, open and closed, shape (poles,).
+        period_s: Control period, s.
     """
     near = around_poles(np.unique(poles), period_s, 1.3) * (1.0 + 1e-9)  # an undamped filter has no response at its own
     return np.unique(np.concatenate([np.geomspace(1e-7, 0.5, _POINTS) / period_s, near]).clip(max=0.5 / period_s))
@@ -357,9 +357,9 @@ def margins_of(response: Response, freq_hz: Floats, known: Complexes | None = No
     which frequencies these are, as long as they resolve the loop.
 
     Args:
-        response: Loop gain L at frequencies in Hz; 1 + L = 0 is the limit of stability.
-        freq_hz: Where the crossings and dips are looked for, rising; see `resolving`.
-        known: The response at these frequencies, where it is at hand.
+        response: Gives the loop gain L at frequencies in Hz; 1 + L = 0 is the limit of stability.
+        freq_hz: Where the crossings and dips are looked for, Hz, rising, shape (frequencies,); see `resolving`.
+        known: The response at these frequencies, of the same shape, where it is at hand.
     """
     L = response(freq_hz) if known is None else known
     size = np.abs(L)
