@@ -91,7 +91,7 @@ class LinkStudy:
 
     @property
     def closes(self) -> bool:
-        """Whether each budget has a margin of at least 0 dB."""
+        """Whether each budget closes: with a margin of at least 0 dB, and no more light than was sent."""
         return all(budget.closes for budget in self.budgets)
 
     @property

@@ -116,7 +116,10 @@ class Study:
 
     @property
     def closes(self) -> bool:
-        """Whether each of the three links has a margin of at least 0 dB, communication under the judged loop."""
+        """Whether each of the three links closes, communication under the judged loop.
+
+        A link closes with a margin of at least 0 dB, where its budget has no more light arrive than was sent.
+        """
         possible = self.achieved.possible if self.fine_case is None else self.fine_case.possible
         return self.beacon.closes and self.answer.closes and possible and self.margin_db >= -requirement.ROUNDING
 
