@@ -3,8 +3,10 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from microrad.core.arrays import Floats
 from microrad.lab.recording import Recording
@@ -23,6 +25,7 @@ def no_progress(done: int, total: int, what: str) -> None:
 _VOLTS = {"V": 1.0, "mV": 1e-3}
 _RADIANS = {"rad": 1.0, "mrad": 1e-3, "urad": 1e-6}
 _METRES = {"m": 1.0, "mm": 1e-3, "um": 1e-6}
+_MEDIAN_OF_NORMAL = 0.6745  # median size of a normal variable, in standard deviations
 
 
 class IdentificationError(ValueError):
@@ -127,7 +130,7 @@ def _si_record(recording: Recording, units: Units) -> SiRecord:
     drive = recording.drive[:, 0] * units.volts
     if np.ptp(drive) == 0 or np.ptp(recording.output) == 0:
         raise IdentificationError(f"{recording.path}: drive or output is constant in the part that is fitted.")
-    if len(_sweeps(drive, recording.step_s)) < 2:
+    if not turning_points(drive).size:
         raise IdentificationError(
             f"{recording.path}: the drive never reverses in the part that is fitted, and hysteresis shows only "
             "behind a reversal; record at least one full period of the drive."
@@ -148,56 +151,108 @@ def transient(drive: Floats) -> int:
     return min(swept + 1, drive.size // 2)
 
 
+def turning_points(drive: Floats) -> NDArray[np.intp]:
+    """Samples at which the drive reverses: it goes on by more than a twentieth of its range both before and behind.
+
+    What is smaller (noise, ripple) is no reversal, and neither is a spike of one sample.
+
+    Args:
+        drive: Drive, in V, shape (samples,).
+    """
+    from scipy.signal import find_peaks
+
+    smooth = _without_spikes(drive)
+    band = 0.05 * float(np.ptp(smooth)) or math.inf
+    return np.sort(np.concatenate([find_peaks(side, prominence=band)[0] for side in (smooth, -smooth)]))
+
+
+def _without_spikes(drive: Floats) -> Floats:
+    """The median of each sample and its neighbours: steps stay, and single samples that stand out go."""
+    from scipy.ndimage import median_filter
+
+    return np.asarray(median_filter(drive, size=3, mode="nearest"))
+
+
+def _fastest_tenth(sweep: Floats) -> tuple[float, int]:
+    """The fastest tenth of a sweep's travel: how far the drive goes in it (V), and in how many samples."""
+    rising = np.maximum.accumulate(sweep if sweep[-1] > sweep[0] else -sweep)
+    ends = np.searchsorted(rising, rising + 0.1 * (rising[-1] - rising[0]))
+    begins = np.flatnonzero(ends < rising.size)
+    ends = ends[begins]
+    best = int(np.argmax((rising[ends] - rising[begins]) / (ends - begins)))
+    return float(rising[ends[best]] - rising[begins[best]]), int(ends[best] - begins[best])
+
+
+def _sweeps(drive: Floats) -> list[tuple[float, int]]:
+    """The fastest tenth of each sweep from reversal to reversal; those below a fifth of the longest are left out.
+
+    What lies before the first reversal or behind the last one belongs to no loop, and counts where there is nothing
+    else.
+    """
+    smooth, turns = _without_spikes(drive), turning_points(drive)
+    edges = turns if turns.size > 1 else np.array([0, *turns, drive.size - 1])
+    travel = np.abs(np.diff(smooth[edges]))
+    pairs = [pair for pair, long in zip(pairwise(edges), travel >= 0.2 * travel.max(), strict=True) if long]
+    return [_fastest_tenth(smooth[begin : end + 1]) for begin, end in pairs]
+
+
+def _sweep_rates(drive: Floats, step_s: float) -> Floats:
+    """Rates (V/s) of the fastest tenths of the sweeps, in ascending order, without the highest of three or more."""
+    rates = np.sort([volts / (samples * step_s) for volts, samples in _sweeps(drive)])
+    return rates[:-1] if rates.size > 2 else rates
+
+
 def smoothed_rate(drive: Floats, step_s: float) -> Floats:
     """Rate of the drive (V/s), smoothed so that noise does not count.
 
-    It is taken over a hundredth of the period of the drive's highest strong line.
+    It is taken over a hundredth of the period of the drive's highest strong line, or over half of the time that the
+    steepest sweeps but one take for a tenth of their travel, where that is shorter.
 
     Args:
         drive: Drive, in V, shape (samples,).
         step_s: Time between samples, in s.
     """
-    spectrum = np.abs(np.fft.rfft(drive - drive.mean()))
+    smooth = _without_spikes(drive)
+    spectrum = np.abs(np.fft.rfft(smooth - smooth.mean()))
     highest = int(np.flatnonzero(spectrum >= 0.05 * spectrum.max())[-1])
-    span = max(1, drive.size // (100 * max(highest, 1)))
-    return (drive[span:] - drive[:-span]) / (span * step_s)
+    shortest = sorted(samples for _, samples in _sweeps(drive))
+    edge = shortest[1 if len(shortest) > 2 else 0] // 2
+    span = max(1, min(drive.size // (100 * max(highest, 1)), edge))
+    return (smooth[span:] - smooth[:-span]) / (span * step_s)
 
 
 def fastest_rate(records: Sequence[SiRecord]) -> float:
     """Fastest rate of the drive (V/s) over all records: 99.5 % of the smoothed rate, so that a spike does not count.
 
-    Samples at rest do not count either: a drive of steps moves in few of them.
+    Samples at rest do not count either: a drive of steps moves in few of them. Where that is a quarter above the rates
+    of all sweeps but one it comes from a single step, such as that to the first sample of a sine, and theirs counts.
     """
-    rates = [np.abs(smoothed_rate(r.drive_v, r.step_s)) for r in records]
-    return max(float(np.quantile(rate[rate > 0], 0.995)) for rate in rates)
+    return max(_fastest_rate(r.drive_v, r.step_s) for r in records)
+
+
+def _fastest_rate(drive: Floats, step_s: float) -> float:
+    rate = np.abs(smoothed_rate(drive, step_s))
+    highest, sweeps = float(np.quantile(rate[rate > 0], 0.995)), float(_sweep_rates(drive, step_s)[-1])
+    return sweeps if highest > 1.25 * sweeps else highest
 
 
 def noisiness(records: Sequence[SiRecord]) -> float:
-    """Rms scatter of the sample-to-sample rate about the smoothed rate, over the fastest rate."""
+    """Scatter of the sample-to-sample rate about the smoothed rate (from its median size), over the fastest rate."""
     scatter = 0.0
     for record in records:
         smooth = smoothed_rate(record.drive_v, record.step_s)
         sample = np.diff(record.drive_v) / record.step_s
         lag = (sample.size - smooth.size) // 2
-        scatter = max(scatter, float(np.std(sample[lag : lag + smooth.size] - smooth)))
+        away = np.abs(sample[lag : lag + smooth.size] - smooth)
+        scatter = max(scatter, float(np.median(away)) / _MEDIAN_OF_NORMAL)
     return scatter / fastest_rate(records)
 
 
-def _sweeps(drive: Floats, step_s: float) -> Floats:
-    """Peak rate (V/s) of each sweep between two reversals; sweeps of less than a fifth of the longest are left out."""
-    rate = smoothed_rate(drive, step_s)
-    moving = rate[np.abs(rate) > 0.05 * np.abs(rate).max()]
-    starts = np.concatenate(([0], np.flatnonzero(np.diff(np.sign(moving)) != 0) + 1))
-    travel = np.add.reduceat(np.abs(moving), starts)
-    peaks = np.maximum.reduceat(np.abs(moving), starts)
-    return np.asarray(peaks[travel >= 0.2 * travel.max()])
-
-
 def loop_rates(records: Sequence[SiRecord]) -> tuple[float, float]:
-    """Slowest and fastest peak rate (V/s) among the loops of all records, without the outermost twentieths."""
-    peaks = np.concatenate([_sweeps(r.drive_v, r.step_s) for r in records])
-    medians = [float(np.median(_sweeps(r.drive_v, r.step_s))) for r in records]
-    low, high = np.quantile(peaks, [0.05, 0.95])
+    """Slowest and fastest rate (V/s) of the sweeps of all records, without the outermost twentieths."""
+    rates = [_sweep_rates(r.drive_v, r.step_s) for r in records]
+    medians = [float(np.median(each)) for each in rates]
+    low, high = np.quantile(np.concatenate(rates), [0.05, 0.95])
     return min(float(low), *medians), max(float(high), *medians)
 
 
