@@ -45,6 +45,23 @@ def _inflation(residual: Floats) -> float:
     return max(1.0, float(2 * pairs[:last].sum() - 1))
 
 
+def may_be_chance(losses: Sequence[Floats], best: Sequence[Floats]) -> bool:
+    """Whether the mean difference of squared residuals is below two of its standard errors, noise colour counted.
+
+    F. X. Diebold and R. S. Mariano, Comparing predictive accuracy, J. Business & Economic Statistics 13 (1995) 253.
+
+    Args:
+        losses: Squared residuals of a model, for each recording.
+        best: Those of the model with the lowest mean, on the same samples.
+    """
+    differences = [a - b for a, b in zip(losses, best, strict=True)]
+    difference = np.concatenate(differences)
+    if not difference.any():
+        return True
+    colour = colour_inflation(differences)
+    return float(difference.mean()) <= 2 * math.sqrt(colour * float(difference.var()) / difference.size)
+
+
 def correlation(covariance: Floats) -> Floats:
     """Correlation matrix of a covariance."""
     deviation = np.sqrt(np.diag(covariance)) + 1e-300

@@ -33,7 +33,7 @@ from microrad.lab.identify.selection.warnings import (
     score_warnings,
     set_aside_warnings,
 )
-from microrad.lab.identify.statistics import colour_inflation
+from microrad.lab.identify.statistics import may_be_chance
 from microrad.lab.recording import Recording
 
 _MIN_PART = 100
@@ -335,20 +335,8 @@ def choose_best(fits: Sequence[Fit], residuals: Sequence[Sequence[Floats]]) -> i
     losses = [[residual**2 for residual in each] for each in residuals]
     sums = [float(sum(np.sum(loss) for loss in each)) for each in losses]
     lowest = int(np.argmin(sums))
-    ties = [i for i, each in enumerate(losses) if _may_be_chance(each, losses[lowest])]
+    ties = [i for i, each in enumerate(losses) if may_be_chance(each, losses[lowest])]
     return min(ties, key=lambda i: (not fits[i].admissible, fits[i].parameter_count, sums[i]))
-
-
-def _may_be_chance(losses: Sequence[Floats], best: Sequence[Floats]) -> bool:
-    """Whether the mean difference of squared residuals is below two of its standard errors, noise colour counted.
-
-    F. X. Diebold and R. S. Mariano, Comparing predictive accuracy, J. Business & Economic Statistics 13 (1995) 253.
-    """
-    difference = np.concatenate([a - b for a, b in zip(losses, best, strict=True)])
-    if not difference.any():
-        return True
-    colour = colour_inflation([a - b for a, b in zip(losses, best, strict=True)])
-    return float(difference.mean()) <= 2 * math.sqrt(colour * float(difference.var()) / difference.size)
 
 
 def _reason(scores: Sequence[Score], line: Score, best: int) -> str:

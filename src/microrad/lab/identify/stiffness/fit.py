@@ -231,8 +231,12 @@ def _check(records: Sequence[Recording], skip_periods: int, options: StiffnessOp
         raise IdentificationError('no source of hysteresis was named; give "strain", "drive" or both.')
 
 
-def _classes(records: Sequence[Recording]) -> tuple[tuple[float, ...], tuple[int, ...]]:
-    """Rms drive of each class of records whose drives are within a tenth of the next, and the class of each record."""
+def amplitude_classes(records: Sequence[Recording]) -> tuple[tuple[float, ...], tuple[int, ...]]:
+    """Rms drive of each class of records whose drives are within a tenth of the next, and the class of each record.
+
+    Raises:
+        IdentificationError: If the drive of a record does not change.
+    """
     size = np.array([float(np.sqrt(np.mean(np.var(r.drive, axis=0)))) for r in records])
     if not (size > 0).all():
         raise IdentificationError(
@@ -242,13 +246,18 @@ def _classes(records: Sequence[Recording]) -> tuple[tuple[float, ...], tuple[int
     jumps = np.concatenate([[False], size[rank][1:] > 1.1 * size[rank][:-1]])
     classes = np.empty(size.size, dtype=int)
     classes[rank] = np.cumsum(jumps)
-    amplitudes = tuple(float(np.mean(size[classes == c])) for c in range(int(classes.max()) + 1))
+    return tuple(float(np.mean(size[classes == c])) for c in range(int(classes.max()) + 1)), tuple(classes.tolist())
+
+
+def _classes(records: Sequence[Recording]) -> tuple[tuple[float, ...], tuple[int, ...]]:
+    """As `amplitude_classes`, but refused where there is only one."""
+    amplitudes, classes = amplitude_classes(records)
     if len(amplitudes) < 2:
         raise IdentificationError(
             f"all {len(records)} records have one amplitude, {amplitudes[0]:.3g} rms of the drive: hysteresis cannot "
             "be told from linear stiffness; add records of another amplitude, twice as large for example."
         )
-    return amplitudes, tuple(int(c) for c in classes)
+    return amplitudes, classes
 
 
 def _unit(records: Sequence[Recording], channel: str) -> float:

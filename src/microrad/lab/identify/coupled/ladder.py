@@ -1,0 +1,204 @@
+"""The ladder of models for several channels: fitted from small to large, judged on held-out records, one chosen."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+
+import numpy as np
+
+from microrad.core.arrays import Complexes, Floats
+from microrad.core.progress import Progress
+from microrad.lab.identify.coupled.channels import Channels, channels
+from microrad.lab.identify.coupled.held_out import (
+    BANDS,
+    Judged,
+    judge,
+    modelled_output,
+    noise_rms,
+    output_rms,
+    smallest_within_noise,
+)
+from microrad.lab.identify.coupled.linear import STEPS, Fitted, best_delay, coupled_linear, per_axis
+from microrad.lab.identify.coupled.records import Candidate, CoupledIdentification
+from microrad.lab.identify.linear.response import FrequencyResponse, response_from_periods, response_from_records
+from microrad.lab.identify.records import IdentificationError, no_progress
+from microrad.lab.identify.selection.candidates import Refused
+from microrad.lab.recording import Recording
+from microrad.mirror.coupled import CoupledMirror
+
+AXIS_ORDERS = (2, 4)
+LINEAR_ORDERS = (4, 8, 12, 16, 20, 24, 28)
+_DELAY_ORDER = 12
+_EXCHANGES = 12
+
+
+@dataclass(frozen=True, slots=True)
+class LadderOptions:
+    """The orders of the models that are fitted: states of each output, of all outputs."""
+
+    axis_orders: tuple[int, ...] = AXIS_ORDERS
+    linear_orders: tuple[int, ...] = LINEAR_ORDERS
+
+
+def identify_coupled(
+    recordings: Sequence[Recording],
+    *,
+    validation: Sequence[Recording] = (),
+    drive_unit: str = "V",
+    output_unit: str = "m",
+    positions_m: Sequence[tuple[float, float]] | None = None,
+    options: LadderOptions = LadderOptions(),
+    on_progress: Progress | None = None,
+    on_model: Callable[[Candidate], None] = lambda candidate: None,
+) -> CoupledIdentification:
+    """Fit a ladder of models to recordings of several channels, and choose the smallest one within noise of the best.
+
+    Args:
+        recordings: Multisines (periodic, realisations) or chirps and loops (not periodic), of one rate and length, with
+            the same channels. One realisation of each amplitude is held out where nothing is given for validation.
+        validation: Recordings that no fit sees; they judge the models.
+        drive_unit: Unit of all drives: V or mV.
+        output_unit: Unit of all outputs: rad, mrad, urad, m, mm or um.
+        positions_m: Where each output is measured on the mirror, (x, y) in m; None where that is not known.
+        options: The orders of the models.
+        on_progress: Called with the models done, their number, and the best one so far in words.
+        on_model: Given each candidate as soon as it is judged.
+
+    Raises:
+        IdentificationError: For recordings that do not belong together, that excite not all channels independently, or
+            of which nothing can be held out.
+    """
+    records = channels(recordings, validation, drive_unit, output_unit, positions_m)
+    response = _response(records.fitted, records.periodic)
+    low, high = response.excited_hz
+    ladder = _Ladder(records, response, np.geomspace(low, high, BANDS + 1), on_model)
+    stopped = False
+    try:
+        ladder.climb(options, on_progress or no_progress)
+    except KeyboardInterrupt:
+        if not ladder.candidates:
+            raise
+        stopped = True
+    return ladder.result(stopped)
+
+
+def _response(records: Sequence[Recording], periodic: bool) -> FrequencyResponse:
+    return response_from_periods(records) if periodic else response_from_records(records)
+
+
+@dataclass(eq=False)
+class _Ladder:
+    """The candidates so far, and what they are fitted to and judged by."""
+
+    records: Channels
+    response: FrequencyResponse
+    bands_hz: Floats
+    on_model: Callable[[Candidate], None]
+    candidates: list[Candidate] = field(default_factory=list)
+    judged: list[Judged] = field(default_factory=list)
+    refused: list[Refused] = field(default_factory=list)
+
+    def climb(self, options: LadderOptions, on_progress: Progress) -> None:
+        """Fit and judge all models, from small to large."""
+        most = self.response.freq_hz.size - 1
+        linear = [n for n in options.linear_orders if n <= most] or [most]
+        total = 1 + len(options.axis_orders) + len(linear)
+        on_progress(0, total, "delay")
+        delay_s = best_delay(self.response, min(_DELAY_ORDER, max(linear)))
+        models = [partial(per_axis, self.response, n, delay_s) for n in options.axis_orders]
+        models += [partial(coupled_linear, self.response, n, delay_s, _EXCHANGES) for n in linear]
+        names = [f"per axis, order {n}" for n in options.axis_orders] + [f"coupled linear, order {n}" for n in linear]
+        for done, (name, fit) in enumerate(zip(names, models, strict=True), start=1):
+            on_progress(done, total, name + self._so_far())
+            self._judge(fit())
+        on_progress(total, total, "done" + self._so_far())
+
+    def _so_far(self) -> str:
+        if not self.candidates:
+            return ""
+        best = min(self.candidates, key=lambda candidate: candidate.error_share)
+        return f"; best so far {best.name}: {100 * best.error_share:.3g} % of the output on held-out records"
+
+    def _judge(self, fitted: Fitted) -> None:
+        records = self.records
+        model = CoupledMirror(
+            mirror=fitted.mirror,
+            actuators=records.actuators,
+            outputs=records.outputs,
+            delay_s=fitted.delay_s,
+            rate_hz=records.rate_hz,
+            steps_per_sample=STEPS,
+            excited_hz=self.response.excited_hz,
+            known=fitted.known,
+        )
+        judged = judge(model, records, self.bands_hz)
+        candidate = Candidate(
+            name=fitted.name,
+            kind=fitted.kind,
+            order=fitted.order,
+            parameters=fitted.parameters,
+            model=model,
+            poles_rad_s=fitted.poles_rad_s,
+            poles_error_rad_s=fitted.poles_error_rad_s,
+            delay_error_s=fitted.delay_error_s,
+            error_rms=judged.error_rms,
+            band_error_rms=judged.band_error_rms,
+            error_share=judged.share,
+            record_share=judged.record_share,
+            note=fitted.note,
+        )
+        self.judged.append(judged)
+        self.candidates.append(candidate)
+        self.on_model(candidate)
+
+    def result(self, stopped: bool) -> CoupledIdentification:
+        """The choice among the candidates so far."""
+        records = self.records
+        chosen, best, ties = smallest_within_noise(self.judged, [c.parameters for c in self.candidates])
+        responses = tuple(self._response_of(k) for k in range(records.amplitudes_v.size))
+        return CoupledIdentification(
+            candidates=tuple(self.candidates),
+            chosen=self.candidates[chosen].name,
+            reason=self._reason(chosen, best),
+            within_noise=tuple(self.candidates[k].name for k in ties),
+            warnings=(),
+            refused=tuple(self.refused),
+            amplitudes_v=records.amplitudes_v,
+            bands_hz=self.bands_hz,
+            output_rms=output_rms(records),
+            noise_rms=noise_rms(records),
+            responses=responses,
+            modelled=tuple(
+                None if own is None else self._modelled(self.candidates[chosen].model, k)
+                for k, own in enumerate(responses)
+            ),
+            dependence=None,
+            fitted=tuple(r.path for r in records.fitted),
+            held_out=tuple(r.path for r in records.held_out),
+            stopped=stopped,
+        )
+
+    def _response_of(self, amplitude: int) -> FrequencyResponse | None:
+        """The response of one amplitude; None where its records are too few, or drive not all channels."""
+        try:
+            return _response(self.records.of_amplitude(amplitude), self.records.periodic)
+        except IdentificationError:
+            return None
+
+    def _modelled(self, model: CoupledMirror, amplitude: int) -> Complexes:
+        """The response of a model to the drives of one amplitude, estimated as that of the recordings is."""
+        records = [replace(r, output=modelled_output(model, r)) for r in self.records.of_amplitude(amplitude)]
+        return _response(records, self.records.periodic).response
+
+    def _reason(self, chosen: int, best: int) -> str:
+        own, least = self.candidates[chosen], self.candidates[best]
+        text = (
+            f"{own.name} ({own.parameters} parameters) leaves {100 * own.error_share:.3g} % of the output on the "
+            "held-out records"
+        )
+        if chosen == best:
+            return f"{text}, less than any other by more than its noise."
+        return (
+            f"{text}; the least, {100 * least.error_share:.3g} % by {least.name} with {least.parameters} parameters, "
+            "is less by no more than two standard errors of the difference, so the smaller model is taken."
+        )
