@@ -9,6 +9,7 @@ from microrad.core.kernels import play_response
 from microrad.lab.recording import (
     ACCEPTABLE,
     RecordingError,
+    check_together,
     multisine_recordings,
     read_recording,
     recording_from_arrays,
@@ -230,6 +231,61 @@ def test_faint_input():
     assert "the drive 1 has" in message
     assert "of the power of the strongest input" in message
     assert notes(np.column_stack((strong, 1e-2 * faint)), strong + 0.01 * noise())
+
+
+# ------------------------------------------------------------------------------------------------- several recordings
+def one_of_several(drives, outputs, name):
+    return recording_from_arrays(np.column_stack(drives), np.column_stack(outputs), RATE_HZ, name, alone=False)
+
+
+def test_an_input_may_rest_in_one_recording_and_not_in_all():
+    strong, faint, still = multisine(1), multisine(2), np.full(N, 5.0)
+    for other in (1e-4 * faint, still):
+        first = one_of_several((strong, other), (strong + 0.01 * noise(),), "first")
+        message = next(f.message for f in first.findings if f.channel == "the drive 1")
+        assert "that is no excitation; it rests, and other recordings have to tell what it does" in message
+        assert not any(f.refused for f in first.findings)
+        with pytest.raises(RecordingError, match=r"first: the input 'drive 1' moves in none of the recordings"):
+            check_together([first])
+        check_together([first, one_of_several((other, strong), (strong + 0.01 * noise(),), "second")])
+    with pytest.raises(RecordingError, match="the input, the drive 0, is constant at 5"):
+        one_of_several((still, still), (strong,), "still")
+
+
+def test_a_sensor_may_be_dead_while_the_other_axis_is_driven_and_not_always():
+    wave, still = multisine(1), np.zeros(N)
+    first = one_of_several((wave, still), (wave + 0.1 * noise(3), noise(4)), "first")
+    second = one_of_several((still, wave), (noise(5), wave + 0.1 * noise(6)), "second")
+    assert [(f.channel, f.refused) for f in first.findings if f.kind == "dead"] == [("the output 1", False)]
+    check_together([first, second])
+    with pytest.raises(RecordingError, match="first and 1 more: the output 'output 1' follows the drives in none"):
+        check_together([first, one_of_several((still, wave), (wave + 0.1 * noise(5), noise(6)), "second")])
+    with pytest.raises(RecordingError, match="the output 1 does not follow the drive"):
+        one_of_several((wave, multisine(2)), (wave + 0.1 * noise(3), noise(4)), "both driven")
+
+
+def test_drives_may_copy_each_other_in_one_recording_and_not_in_all():
+    """Orthogonal multisines: the second drive is turned round from one realisation to the next."""
+    a, b = multisine(1), multisine(2)
+
+    def recorded(*drives):
+        return one_of_several(drives, (sum(drives) + 0.3 * drives[0] + 0.01 * noise(),), "some")
+
+    check_together([recorded(a, a), recorded(a, -a)])
+    with pytest.raises(RecordingError, match="some and 1 more: the input 'drive 1' is a copy of the input 'drive 0'"):
+        check_together([recorded(a, a), recorded(b, b)])
+    check_together([recorded(a, b, a + b), recorded(b, a, a - b)])
+    with pytest.raises(RecordingError, match="the input 'drive 2' is a copy of the input 'drive 0' and others: only"):
+        check_together([recorded(a, b, a + b), recorded(b, a, a + b)])
+    with pytest.raises(RecordingError, match="the drive 1 is a copy of the drive 0"):
+        recording_from_arrays(np.column_stack((a, a)), a + 0.01 * noise(), RATE_HZ)
+
+
+def test_recordings_of_other_channels_are_not_put_together():
+    one = recording_from_arrays(SINE, GOOD, RATE_HZ, "one")
+    two = recording_from_arrays(SINE, np.column_stack((GOOD, GOOD + SINE)), RATE_HZ, "two")
+    with pytest.raises(RecordingError, match="two: 1 inputs and 2 outputs, where one has 1 and 1; name the same chan"):
+        check_together([one, two])
 
 
 # ----------------------------------------------------------------------------------------------------------------- time

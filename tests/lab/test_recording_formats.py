@@ -430,7 +430,7 @@ def test_many_axes(tmp_path):
     check(read_recording(path, "data[0, 2, 1]", "data[1,2,1]", RATE_HZ), ("data[0, 2, 1]", "data[1, 2, 1]"))
     message = refusal(path, 0, 1, RATE_HZ)
     assert "shape (1000, 2, 3, 2)" in message
-    assert "multisine_recordings" in message
+    assert "read it whole by saying what each axis is: --axes (axes), such as samples,channels" in message
     assert "'data[2, 0, 0]' is no channel" in refusal(path, "data[2, 0, 0]", "data[0, 0, 0]", RATE_HZ)
 
 

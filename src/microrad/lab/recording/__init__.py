@@ -4,7 +4,9 @@ Columns are named or numbered from 0. Lines of a text are counted from 1, as a t
 The values keep the units of the file; `identify` is told what they are.
 """
 
-from microrad.lab.recording.reader import multisine_recordings, read_recording, recording_from_arrays
+from microrad.lab.recording.checks.together import check_together
+from microrad.lab.recording.reader import read_recording, recording_from_arrays
+from microrad.lab.recording.realisations import AXES, multisine_recordings, read_arrays
 from microrad.lab.recording.records import (
     ACCEPTABLE,
     MIN_SAMPLES,
@@ -18,12 +20,15 @@ from microrad.lab.recording.records import (
 
 __all__ = [
     "ACCEPTABLE",
+    "AXES",
     "MIN_SAMPLES",
     "ROLES",
     "Finding",
     "Recording",
     "RecordingError",
+    "check_together",
     "multisine_recordings",
+    "read_arrays",
     "read_in",
     "read_recording",
     "recording_from_arrays",

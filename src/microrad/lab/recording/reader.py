@@ -28,9 +28,13 @@ from microrad.lab.recording.records import (
 )
 
 Column = int | str
+Part = tuple[float, float | None]
+"""First and last time, in s from the first sample; None for the end."""
+
+WHOLE: Part = (0.0, None)
 
 
-def read_recording(
+def read_recording(  # noqa: PLR0913  all but the first four are named options
     path: str | Path,
     inputs: Column | Sequence[Column],
     outputs: Column | Sequence[Column],
@@ -38,7 +42,9 @@ def read_recording(
     *,
     time: Column | None = None,
     period_samples: int | None = None,
+    part_s: Part = WHOLE,
     accept: Sequence[str] = (),
+    alone: bool = True,
 ) -> Recording:
     """Read drives and outputs from a laboratory file and check them.
 
@@ -53,8 +59,11 @@ def read_recording(
         rate_hz: Sample rate where the file states none; where both are known they must agree to 0.1 %.
         time: The time column (s); by default one that is plainly called so.
         period_samples: Length of one period of a periodic excitation.
+        part_s: First and last time, in s from the first sample, of the part that is read; None for the end.
         accept: Findings of degree (`jitter`, `clipping`, `dead`, `quantisation`, `drift`, `unexcited`, `lead`) that are
             to be carried in `Recording.findings` instead of refused.
+        alone: Whether the recording has to do by itself. False where it is one of several that are judged by
+            `check_together`: then an input may rest while another one is driven.
 
     Raises:
         RecordingError: For anything that cannot be relied upon, naming file, channel, row and remedy.
@@ -62,7 +71,7 @@ def read_recording(
     path = Path(path)
     if rate_hz is not None:
         rate_hz = check_rate(str(path), rate_hz)
-    _check_accept(str(path), accept)
+    check_accept(str(path), accept)
     check_file(path)
     source = open_source(path)
     ins, outs = _columns(source, inputs, "input"), _columns(source, outputs, "output")
@@ -72,22 +81,25 @@ def read_recording(
     columns, rates, findings = _load_columns(source, [*ins, *outs], clock, optional)
     rate = agreed_rate(str(path), rate_hz, [*source.rates([*ins, *outs]), *rates])
     _check_lengths(source, [*ins, *outs], columns)
+    kept = samples_of(str(path), part_s, rate, columns[0].size)
+    columns = [column[kept] for column in columns]
     drives = {f"the input, {source.label(i)}": column for i, column in zip(ins, columns, strict=False)}
     sensors = {f"the output, {source.label(i)}": column for i, column in zip(outs, columns[len(ins) :], strict=True)}
-    findings = [*findings, *check_signals(str(path), drives, sensors, rate, source.place)]
+    where = named_part(str(path), part_s)
+    found = check_signals(where, drives, sensors, rate, lambda row: source.place(row + kept.start), alone)
     drive, output = _table(columns[: len(ins)]), _table(columns[len(ins) :])
     return Recording(
-        str(path),
-        source.sha256,
+        where,
+        source.sha256 if part_s == WHOLE else digest_of(drive, output),
         drive,
         output,
         rate,
         tuple(source.names[i] for i in ins),
         tuple(source.names[i] for i in outs),
-        _checked_period(str(path), period_samples, drive.shape[0]),
+        checked_period(where, period_samples, drive.shape[0]),
         tuple(source.units[i] for i in ins),
         tuple(source.units[i] for i in outs),
-        _carried(str(path), findings, accept),
+        carried(where, [*findings, *found], accept),
     )
 
 
@@ -99,6 +111,7 @@ def recording_from_arrays(
     period_samples: int | None = None,
     *,
     accept: Sequence[str] = (),
+    alone: bool = True,
 ) -> Recording:
     """Make a recording from arrays of shape (samples,) or (samples, channels), under the same checks as a file.
 
@@ -109,12 +122,13 @@ def recording_from_arrays(
         name: Stands where the path of a file would.
         period_samples: Length of one period of a periodic excitation.
         accept: Findings of degree to take on, see `read_recording`.
+        alone: Whether the recording has to do by itself; the same.
 
     Raises:
         RecordingError: For anything that cannot be relied upon.
     """
     rate_hz = check_rate(name, rate_hz)
-    _check_accept(name, accept)
+    check_accept(name, accept)
     u, y = (np.array(a, dtype=np.float64) for a in (drive, output))
     if u.ndim not in (1, 2) or y.ndim not in (1, 2) or len(u) != len(y) or 0 in (u.size, y.size):
         raise RecordingError(
@@ -130,7 +144,7 @@ def recording_from_arrays(
         {f"the {channel}": np.ascontiguousarray(column) for channel, column in zip(names, a.T, strict=True)}
         for names, a in ((input_names, u), (output_names, y))
     )
-    findings = check_signals(name, inputs, outputs, rate_hz, lambda row: f"sample {row}")
+    findings = check_signals(name, inputs, outputs, rate_hz, lambda row: f"sample {row}", alone)
     return Recording(
         name,
         digest_of(u, y),
@@ -139,37 +153,8 @@ def recording_from_arrays(
         rate_hz,
         input_names,
         output_names,
-        _checked_period(name, period_samples, len(u)),
-        findings=_carried(name, findings, accept),
-    )
-
-
-def multisine_recordings(
-    drive: ArrayLike, output: ArrayLike, rate_hz: float, name: str = "multisine", *, accept: Sequence[str] = ()
-) -> tuple[Recording, ...]:
-    """One recording per realisation of a periodic multisine experiment, its periods joined in time.
-
-    Args:
-        drive: Shape (samples of one period, inputs, realisations, periods).
-        output: Shape (samples of one period, outputs, realisations, periods).
-        rate_hz: Samples per second.
-        name: Stands where the path of a file would, before the number of the realisation.
-        accept: Findings of degree to take on, see `read_recording`.
-
-    Raises:
-        RecordingError: If the shapes do not agree, or for anything that cannot be relied upon.
-    """
-    u, y = (np.asarray(a) for a in (drive, output))
-    if u.ndim != 4 or y.ndim != 4 or (u.shape[0], *u.shape[2:]) != (y.shape[0], *y.shape[2:]):
-        raise RecordingError(
-            f"{name}: drive has shape {u.shape} and output {y.shape}; give (samples, channels, realisations, periods) "
-            "with the same samples, realisations and periods."
-        )
-    # (periods, samples, channels) of each realisation, one period behind the other
-    joined = [np.moveaxis(a, (2, 3), (0, 1)).reshape(a.shape[2], -1, a.shape[1]) for a in (u, y)]
-    return tuple(
-        recording_from_arrays(drives, outputs, rate_hz, f"{name} realisation {r}", u.shape[0], accept=accept)
-        for r, (drives, outputs) in enumerate(zip(*joined, strict=True))
+        checked_period(name, period_samples, len(u)),
+        findings=carried(name, findings, accept),
     )
 
 
@@ -265,7 +250,16 @@ def _check_lengths(source: Source, indices: Sequence[int], columns: Sequence[Flo
 
 
 # ---------------------------------------------------------------------------------------------------------- judging
-def _check_accept(where: str, accept: Sequence[str]) -> None:
+def check_accept(where: str, accept: Sequence[str]) -> None:
+    """Check that the findings to take on are such as can be.
+
+    Args:
+        where: The file in the words of a message.
+        accept: Names of findings.
+
+    Raises:
+        RecordingError: For a name that is none of them.
+    """
     names = [accept] if isinstance(accept, str) else list(accept)
     unknown = [name for name in names if name not in ACCEPTABLE]
     if unknown or isinstance(accept, str):
@@ -275,7 +269,17 @@ def _check_accept(where: str, accept: Sequence[str]) -> None:
         )
 
 
-def _carried(where: str, findings: Sequence[Finding], accept: Sequence[str]) -> tuple[Finding, ...]:
+def carried(where: str, findings: Sequence[Finding], accept: Sequence[str]) -> tuple[Finding, ...]:
+    """The findings that a recording carries.
+
+    Args:
+        where: The file in the words of a message.
+        findings: All findings.
+        accept: Names of those that are not to refuse it.
+
+    Raises:
+        RecordingError: For a finding that refuses it.
+    """
     refused = [f for f in findings if f.refused and f.kind not in accept]
     if refused:
         kinds = list(dict.fromkeys(f.kind for f in refused))
@@ -287,7 +291,17 @@ def _carried(where: str, findings: Sequence[Finding], accept: Sequence[str]) -> 
     return tuple(findings)
 
 
-def _checked_period(where: str, period_samples: int | None, samples: int) -> int | None:
+def checked_period(where: str, period_samples: int | None, samples: int) -> int | None:
+    """Length of a period that fits into the recording, None for none.
+
+    Args:
+        where: The file in the words of a message.
+        period_samples: Samples of a period, None for none.
+        samples: Samples of the recording.
+
+    Raises:
+        RecordingError: For a length that is none, or does not fit.
+    """
     if period_samples is None:
         return None
     if isinstance(period_samples, bool) or not isinstance(period_samples, (int, np.integer)):
@@ -298,6 +312,41 @@ def _checked_period(where: str, period_samples: int | None, samples: int) -> int
             "one period in samples."
         )
     return int(period_samples)
+
+
+def samples_of(where: str, part_s: Part, rate_hz: float, samples: int) -> slice:
+    """The samples from the first to the last time of a part.
+
+    Args:
+        where: The file in the words of a message.
+        part_s: First and last time, in s from the first sample; None for the end.
+        rate_hz: Samples per second.
+        samples: Number of samples that there are.
+
+    Raises:
+        RecordingError: If the part is empty or reaches beyond the recording.
+    """
+    first_s, last_s = part_s
+    first, last = round(first_s * rate_hz), samples if last_s is None else round(last_s * rate_hz)
+    if not 0 <= first < last <= samples:
+        raise RecordingError(
+            f"{where}: from {first_s:g} s to {'the end' if last_s is None else f'{last_s:g} s'} is no part of a "
+            f"recording of {samples / rate_hz:g} s; give two times within it, the earlier one first."
+        )
+    return slice(first, last)
+
+
+def named_part(name: str, part_s: Part) -> str:
+    """Name of a recording that tells a part of it from other parts.
+
+    Args:
+        name: Name of the whole.
+        part_s: First and last time, in s; None for the end.
+    """
+    if part_s == WHOLE:
+        return name
+    first_s, last_s = part_s
+    return f"{name} from {first_s:g} s" + ("" if last_s is None else f" to {last_s:g} s")
 
 
 def _table(columns: Sequence[Floats]) -> Floats:

@@ -16,7 +16,7 @@ _MAX_SEGMENT, _SHORT_SEGMENT = 1 << 16, 1 << 12
 _OUTSIDE = 5e-4
 # A drive whose motion is 1e-5 of its offset is the flicker of a constant; one with 1e-6 of the strongest input's power
 # (60 dB less) moves the mirror less than that input's noise does.
-_STILL, _FAINT = 1e-5, 1e-6
+_STILL, FAINT = 1e-5, 1e-6
 _SHORT_RECORD, _ORDER = 20_000, 8
 # A multiplexed converter reads its channels up to one step apart in time, typically half of one.
 _LEAD_SAMPLES = 0.75
@@ -25,32 +25,41 @@ _NARROW_RAD = math.radians(25)
 
 
 def excitation(
-    inputs: Sequence[Floats], labels: Sequence[str], rate_hz: float
-) -> tuple[tuple[float, float], list[Finding]]:
-    """The band in Hz that holds 99.9 % of the power of all inputs, and a finding with the band of each.
+    inputs: Sequence[Floats], labels: Sequence[str], rate_hz: float, alone: bool
+) -> tuple[tuple[float, float], list[int], list[Finding]]:
+    """The band in Hz with 99.9 % of the power of the inputs that move, their numbers, and a finding for each input.
 
     Args:
         inputs: Samples of each input, each of shape (samples,).
         labels: The inputs in the words of a message, in the same order.
         rate_hz: Sample rate, in Hz.
+        alone: Whether all of them have to move; else one that rests beside one that moves is no fault.
     """
     bands, powers = zip(*(_band(values, rate_hz) for values in inputs), strict=True)
+    still = [_stillness(values, power, max(powers)) for values, power in zip(inputs, powers, strict=True)]
+    may_rest = not alone and not all(still)
+    moving = [k for k, text in enumerate(still) if not (text and may_rest)]
     findings = []
-    for label, values, (low, high), power in zip(labels, inputs, bands, powers, strict=True):
-        offset = abs(float(values.mean()))
-        if math.sqrt(power) < _STILL * offset:
-            text = f"{label} moves by {math.sqrt(power):.2g} rms about {offset:.6g}: that is no excitation"
-            findings.append(Finding("unexcited", label, None, f"{text}; drive the mirror up and down", True))
-        elif power < _FAINT * max(powers):
-            text = f"{label} has {power / max(powers):.1g} of the power of the strongest input: that is no excitation"
-            findings.append(Finding("unexcited", label, None, f"{text}; drive it, or leave it out", True))
-        else:
-            text = (
-                f"{label} is excited from {low:.4g} to {high:.4g} Hz (99.9 % of its power); nothing outside that "
-                "band can be learnt from this record"
-            )
-            findings.append(Finding("unexcited", label, None, text, False))
-    return (min(low for low, _ in bands), max(high for _, high in bands)), findings
+    for label, text, (low, high) in zip(labels, still, bands, strict=True):
+        said = (
+            f"{label} is excited from {low:.4g} to {high:.4g} Hz (99.9 % of its power); nothing outside that "
+            "band can be learnt from this record"
+        )
+        if text:
+            remedy = "it rests, and other recordings have to tell what it does" if may_rest else text[1]
+            said = f"{label} {text[0]}: that is no excitation; {remedy}"
+        findings.append(Finding("unexcited", label, None, said, bool(text) and not may_rest))
+    return (min(bands[k][0] for k in moving), max(bands[k][1] for k in moving)), moving, findings
+
+
+def _stillness(values: Floats, power: float, strongest: float) -> tuple[str, str] | None:
+    """Why an input does not move the mirror, in words that follow its name, and what to do; None where it does."""
+    offset = float(values.mean())
+    if power == 0.0 or math.sqrt(power) < _STILL * abs(offset):
+        return f"moves by {math.sqrt(power):.2g} rms about {offset:.6g}", "drive the mirror up and down"
+    if power < FAINT * strongest:
+        return f"has {power / strongest:.1g} of the power of the strongest input", "drive it, or leave it out"
+    return None
 
 
 def _band(values: Floats, rate_hz: float) -> tuple[tuple[float, float], float]:

@@ -1,6 +1,7 @@
 """All checks of the values of a recording, in order: what cannot be used at all, then what is a matter of degree."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -20,6 +21,7 @@ def check_signals(
     outputs: Mapping[str, Floats],
     rate_hz: float,
     place: Callable[[int], str],
+    alone: bool,
 ) -> list[Finding]:
     """Findings of degree, refused or not.
 
@@ -29,6 +31,8 @@ def check_signals(
         outputs: The sensors, in the same way.
         rate_hz: Samples per second.
         place: The words for where a sample stands in the file.
+        alone: Whether the recording has to do by itself. Where it is one of several that `check_together` judges, an
+            input may rest or copy another one, and a sensor of an axis that is not driven be dead.
 
     Raises:
         RecordingError: For what no one can accept.
@@ -42,19 +46,33 @@ def check_signals(
             f"{where}: {samples} samples; at least {MIN_SAMPLES} are needed to tell a hysteresis loop from "
             "noise and to hold some back for the check; record longer or faster."
         )
+    vary = list(inputs) if alone else [label for label, values in inputs.items() if not _is_constant(values)]
     for role, label, values in everything:
-        _check_varies(where, role, label, values)
-    _check_separable(where, drives, list(inputs))
-    findings = []
-    for role, label, values in everything:
-        findings += clipping(label, values, place, drives if role == "output" else None)
-        findings += quantisation(label, values, drives if role == "output" else None)
-    band, found = excitation(drives, list(inputs), rate_hz)
-    findings += found
+        if role == "output" or label in vary or not vary:
+            _check_varies(where, role, label, values)
+    labels = list(inputs)
+    band, moving, findings = excitation(drives, labels, rate_hz, alone)
+    if alone:
+        check_separable(where, covariance(drives), labels)
+    drives, labels = [drives[k] for k in moving], [labels[k] for k in moving]
+    for label, values in zip(labels, drives, strict=True):
+        findings += clipping(label, values, place, None)
+        findings += quantisation(label, values, None)
     for label, values in outputs.items():
-        findings += drift(label, values, drives)
-        findings += follows(label, values, drives, list(inputs), rate_hz, band)
+        found = [
+            *clipping(label, values, place, drives),
+            *quantisation(label, values, drives),
+            *drift(label, values, drives),
+            *follows(label, values, drives, labels, rate_hz, band),
+        ]
+        rests = len(drives) < len(inputs)
+        findings += [replace(f, refused=False) if rests and f.kind in ("dead", "quantisation") else f for f in found]
     return findings
+
+
+def _is_constant(values: Floats) -> bool:
+    low, high = float(values.min()), float(values.max())
+    return high - low <= 1e-12 * max(abs(low), abs(high))
 
 
 def _check_finite(where: str, label: str, values: Floats, place: Callable[[int], str]) -> None:
@@ -71,8 +89,7 @@ def _check_finite(where: str, label: str, values: Floats, place: Callable[[int],
 
 
 def _check_varies(where: str, role: str, label: str, values: Floats) -> None:
-    low, high = float(values.min()), float(values.max())
-    if high - low <= 1e-12 * max(abs(low), abs(high)):
+    if _is_constant(values):
         remedy = "drive the mirror up and down" if role == "input" else "check the sensor's wiring and range"
         named = label if label.startswith(f"the {role}") else f"the {role}, {label}"
         raise RecordingError(
@@ -81,12 +98,29 @@ def _check_varies(where: str, role: str, label: str, values: Floats) -> None:
         )
 
 
-def _check_separable(where: str, inputs: Sequence[Floats], labels: Sequence[str]) -> None:
-    """Raises RecordingError if an input is a linear combination of those before it."""
-    if len(inputs) < 2:
-        return
+def covariance(inputs: Sequence[Floats]) -> Floats:
+    """Covariance of inputs, times the number of samples; shape (inputs, inputs).
+
+    Args:
+        inputs: Samples of each input, each of shape (samples,).
+    """
     centred = [column - column.mean() for column in inputs]
-    covariance = np.array([[float(a @ b) for b in centred] for a in centred])
+    return np.array([[float(a @ b) for b in centred] for a in centred])
+
+
+def check_separable(where: str, covariance: Floats, labels: Sequence[str]) -> None:
+    """Check that no input is a linear combination of those before it.
+
+    Args:
+        where: The file or files, as messages name them.
+        covariance: Covariance of the inputs, each of which moves, shape (inputs, inputs).
+        labels: The inputs in the words of a message, in the same order.
+
+    Raises:
+        RecordingError: For an input that is, naming both.
+    """
+    if len(labels) < 2:
+        return
     scale = np.sqrt(np.diag(covariance))
     correlation = covariance / np.outer(scale, scale)
     for k, label in enumerate(labels[1:], 1):

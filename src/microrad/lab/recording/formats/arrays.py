@@ -3,13 +3,15 @@
 import math
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from microrad.core.arrays import Floats
+from microrad.lab.recording.files import too_large
 from microrad.lab.recording.formats.source import Channel, Container, StatedRate
+from microrad.lab.recording.records import RecordingError
 
 # fmt: off
 RATE_NAMES = frozenset({
@@ -108,8 +110,8 @@ def many_axes(variable: Variable) -> str:
     example = ", ".join("0" for _ in others)
     return (
         f"is an array of shape {variable.shape}: name one channel of it with an index for each axis but the samples', "
-        f"'{variable.name}[{example}]'; arrays of (samples, channels, realisations, periods) become recordings by "
-        "microrad.lab.recording.multisine_recordings"
+        f"'{variable.name}[{example}]', or read it whole by saying what each axis is: --axes (axes), such as "
+        "samples,channels,realisations,periods"
     )
 
 
@@ -199,3 +201,53 @@ class ArraySource(Container):
                 self.channels = (*self.channels, extra)
                 self.names, self.units = (*self.names, extra.name), (*self.units, extra.unit)
         return super().resolve(wanted, role)
+
+    def whole(self, wanted: str | None, axes: int, role: str) -> Variable:
+        """An array that is read with all its axes, in the shape that has as many of them.
+
+        Args:
+            wanted: Its name, or the last part of it; None for the only array with so many axes.
+            axes: How many axes it is to have; others must be of length one.
+            role: What it is wanted for, in the words of a message.
+
+        Raises:
+            RecordingError: For no such array, one of other axes, and one that is too large.
+        """
+        numbers = [v for v in self.variables if v.dtype.kind in "iuf" and math.prod(v.shape) > 1]
+        alone = wanted is None and len(numbers) == 1
+        named = numbers if alone else [v for v in numbers if wanted in (v.name, v.name.rsplit("/", 1)[-1])]
+        fitting = [v for v in (numbers if wanted is None else named) if _with_axes(v.shape, axes) is not None]
+        listed = ", ".join(f"'{v.name}' of shape {v.shape}" for v in numbers[:20]) or self._list()
+        if len(fitting) == 1:
+            shape = _with_axes(fitting[0].shape, axes) or ()
+            if reason := too_large(self.path, shape, 8):
+                raise RecordingError(f"{self.path}: '{fitting[0].name}' {reason}.")
+            return replace(fitting[0], shape=shape)
+        if named and not fitting:
+            raise RecordingError(
+                f"{self.path}: the {role} '{named[0].name}' has the shape {named[0].shape} and --axes (axes) names "
+                f"{axes}; name each axis of the array once, in its order."
+            )
+        if wanted is None:
+            some = f"{len(fitting)} arrays have" if fitting else "no array has"
+            raise RecordingError(
+                f"{self.path}: {some} {axes} axes, as --axes (axes) says, so which one holds the {role}s is not plain: "
+                f"name it (--{role}). The file holds {listed}."
+            )
+        raise RecordingError(f"{self.path}: no one array of {role}s is named '{wanted}'; the file holds {listed}.")
+
+    def load_whole(self, variable: Variable) -> Floats:
+        """All numbers of an array that `whole` gave; raises `RecordingError` where they cannot be read."""
+
+        def load() -> Floats:
+            with np.errstate(invalid="ignore"):  # a signalling NaN becomes a quiet one, and is found as such
+                every = (slice(None),) * next(len(v.shape) for v in self.variables if v.name == variable.name)
+                return np.asarray(variable.load(every), dtype=np.float64).reshape(variable.shape)
+
+        return self.loaded(f"'{variable.name}'", load)
+
+
+def _with_axes(shape: tuple[int, ...], axes: int) -> tuple[int, ...] | None:
+    """The shape with so many axes, as it is or without those of length one; None where neither has so many."""
+    long = tuple(n for n in shape if n != 1)
+    return next((each for each in (shape, long) if len(each) == axes), None)

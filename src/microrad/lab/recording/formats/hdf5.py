@@ -284,7 +284,7 @@ def _variable(path: Path, name: str, item: Any, matlab: bool) -> Variable:
     def load(key: tuple[int | slice, ...]) -> Any:
         with h5py.File(path, "r") as file:
             check_pieces(path, name, file[name])
-            return file[name][key[::-1] if matlab else key]
+            return file[name][key[::-1]].T if matlab else file[name][key]
 
     logical = matlab_class(item) == "logical" or (not matlab_class(item) and "MATLAB_int_decode" in item.attrs)
     dtype = np.dtype(bool) if logical and item.dtype.itemsize == 1 else item.dtype

@@ -197,23 +197,32 @@ class Container(Source):
 
     def load(self, indices: Sequence[int]) -> list[Floats]:
         """Load channels; raises `RecordingError` for a fault of the file that shows only now."""
-        values = []
-        for index in indices:
-            try:
-                values.append(self.channels[index].load())
-            except RecordingError:
-                raise
-            except MemoryError:
-                raise RecordingError(
-                    f"{self.path}: {self.label(index)} takes more memory than there is to read; cut out the part that "
-                    "you need, or keep every n-th sample."
-                ) from None
-            except Exception as error:  # a damaged file may raise anything in its library
-                raise RecordingError(
-                    f"{self.path}: {self.label(index)} cannot be read ({_first_line(error)}); the file is damaged or "
-                    "truncated: copy it again from its source."
-                ) from None
-        return values
+        return [self.loaded(self.label(index), self.channels[index].load) for index in indices]
+
+    def loaded(self, label: str, load: Callable[[], Floats]) -> Floats:
+        """What a function loads from the file.
+
+        Args:
+            label: What it loads, in the words of a message.
+            load: The function.
+
+        Raises:
+            RecordingError: For a fault of the file that shows only now.
+        """
+        try:
+            return load()
+        except RecordingError:
+            raise
+        except MemoryError:
+            raise RecordingError(
+                f"{self.path}: {label} takes more memory than there is to read; cut out the part that you need, or "
+                "keep every n-th sample."
+            ) from None
+        except Exception as error:  # a damaged file may raise anything in its library
+            raise RecordingError(
+                f"{self.path}: {label} cannot be read ({_first_line(error)}); the file is damaged or truncated: copy "
+                "it again from its source."
+            ) from None
 
     def find_time(self, used: Sequence[int]) -> int | None:
         """The first channel that is plainly time and as long as the first one in use."""
@@ -226,11 +235,15 @@ class Container(Source):
         """Rates of the channels, else of the nearest of the variable and the groups around it that states one."""
         found: list[StatedRate] = []
         for channel in (self.channels[index] for index in indices):
-            group = channel.name if channel.name in self.stated else _COLUMN.sub("", channel.name)
-            while group and group not in self.stated:
-                group = group.rpartition("/")[0]
-            found.extend([channel.rate] if channel.rate else self.stated.get(group, ()))
+            found.extend([channel.rate] if channel.rate else self.rates_of(channel.name))
         return list(dict.fromkeys(found))
+
+    def rates_of(self, name: str) -> tuple[StatedRate, ...]:
+        """Rates of the nearest of a variable and the groups around it that states one; of one column or of it all."""
+        group = name if name in self.stated else _COLUMN.sub("", name)
+        while group and group not in self.stated:
+            group = group.rpartition("/")[0]
+        return self.stated.get(group, ())
 
 
 def _first_line(error: BaseException) -> str:

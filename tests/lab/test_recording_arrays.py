@@ -1,0 +1,193 @@
+"""Arrays with axes for channels, realisations and periods: what is read of them, and each refusal with its message."""
+
+import h5py
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+from microrad.lab.recording import AXES, RecordingError, multisine_recordings, read_arrays
+from places import DATA
+
+RATE_HZ = 1000.0
+SHAPE = (400, 2, 3, 2)  # samples, channels, realisations, periods
+
+
+def experiment():
+    rng = np.random.Generator(np.random.Philox(11))
+    drive = np.repeat(rng.standard_normal((*SHAPE[:3], 1)), SHAPE[3], axis=3)
+    mixed = np.stack([drive[:, 0] + 0.2 * drive[:, 1], drive[:, 1] - 0.1 * drive[:, 0], drive[:, 1]], axis=1)
+    return drive, mixed + 0.01 * rng.standard_normal(mixed.shape)
+
+
+U, Y = experiment()
+WHOLE = multisine_recordings(U, Y, RATE_HZ)
+
+
+def write_npz(path, **arrays):
+    np.savez(path, **arrays)
+
+
+def write_mat(path, **arrays):
+    savemat(path, arrays)
+
+
+def write_mat73(path, **arrays):
+    with h5py.File(path, "w", userblock_size=512) as file:
+        for name, values in arrays.items():
+            file.create_dataset(name, data=np.atleast_2d(values).T).attrs["MATLAB_class"] = np.bytes_("double")
+    with path.open("r+b") as file:
+        file.write(b"MATLAB 7.3 MAT-file, Platform: test".ljust(116) + bytes(8) + b"\x00\x02IM")
+
+
+def write_hdf5(path, **arrays):
+    with h5py.File(path, "w") as file:
+        for name, values in arrays.items():
+            file[f"run/{name}"] = values
+        file["run/u"].attrs["units"] = "V"
+
+
+WRITERS = {"a.npz": write_npz, "a.mat": write_mat, "b.mat": write_mat73, "a.h5": write_hdf5}
+
+
+def refusal(*args, axes=AXES, **options):
+    with pytest.raises(RecordingError) as caught:
+        read_arrays(*args, axes=axes, **options)
+    message = str(caught.value)
+    assert message.startswith(f"{args[0]}")
+    assert "\n" not in message
+    return message
+
+
+def check(read, expected=WHOLE):
+    assert len(read) == len(expected)
+    for one, other in zip(read, expected, strict=True):
+        np.testing.assert_array_equal(one.drive, other.drive)
+        np.testing.assert_array_equal(one.output, other.output)
+        assert (one.rate_hz, one.period_samples) == (RATE_HZ, other.period_samples)
+        assert not one.drive.flags.writeable
+
+
+@pytest.mark.parametrize("order", [(0, 1, 2, 3), (3, 2, 1, 0), (2, 0, 3, 1)])
+@pytest.mark.parametrize("name", WRITERS)
+def test_each_format_and_order_gives_the_same_recordings(tmp_path, name, order):
+    path, axes = tmp_path / name, [AXES[k] for k in order]
+    WRITERS[name](path, u=np.transpose(U, order), y=np.transpose(Y, order), fs=RATE_HZ)
+    read = read_arrays(path, "u", "y", axes=axes)
+    check(read)
+    assert [r.path for r in read] == [f"{path} realisation {k}" for k in range(3)]
+    assert len({r.sha256 for r in read}) == 3
+    group = "run/" if name == "a.h5" else ""
+    assert (read[0].input_names, read[0].output_names[2]) == ((f"{group}u[0]", f"{group}u[1]"), f"{group}y[2]")
+    assert read[0].input_units == (("V", "V") if group else ("", ""))
+
+
+def test_outputs_in_a_file_of_their_own(tmp_path):
+    np.save(tmp_path / "u.npy", U)
+    np.save(tmp_path / "y.npy", Y)
+    read = read_arrays(tmp_path / "u.npy", rate_hz=RATE_HZ, axes=AXES, output_path=tmp_path / "y.npy")
+    check(read)
+    assert (read[0].input_names, read[0].output_names) == (
+        ("drive[0]", "drive[1]"),
+        ("output[0]", "output[1]", "output[2]"),
+    )
+
+
+def test_axes_that_an_array_does_not_have(tmp_path):
+    path = tmp_path / "a.npz"
+    np.savez(path, u=U[:, 0, 0, 0], y=Y[:, :1, 0, 0], wide=Y[:, :, 0, 0], fs=RATE_HZ)
+    one = read_arrays(path, "u", "y", axes=["samples"])  # a column of length one is what MATLAB makes of it
+    assert [(r.drive.shape, r.output.shape, r.period_samples) for r in one] == [((400, 1), (400, 1), None)]
+    assert (one[0].path, one[0].input_names) == (str(path), ("u",))
+    np.savez(path, u=U[:, :, :, 0], y=Y[:, :, :, 0], fs=RATE_HZ)
+    three = read_arrays(path, "u", "y", axes=AXES[:3], period_samples=200)
+    assert [(r.drive.shape, r.period_samples) for r in three] == [((400, 2), 200)] * 3
+
+
+def test_a_part_of_each_realisation(tmp_path):
+    path = tmp_path / "a.npz"
+    np.savez(path, u=U, y=Y, fs=RATE_HZ)
+    read = read_arrays(path, "u", "y", axes=AXES, part_s=(0.4, None))
+    np.testing.assert_array_equal(read[2].drive, U[:, :, 2, 1])
+    assert read[2].path == f"{path} realisation 2 from 0.4 s"
+    assert "0.4 s to 9 s is no part of a recording of 0.8 s" in refusal(path, "u", "y", part_s=(0.4, 9.0))
+
+
+@pytest.mark.parametrize(
+    ("axes", "words"),
+    [
+        (("samples", "channels", "periods", "realisations"), "in each period: correct the order in --axes (axes)"),
+        (
+            ("channels", "samples", "realisations", "periods"),
+            "that --axes (axes) calls samples has 2, and at least 200",
+        ),
+        (("samples", "channels", "periods"), "'u' has the shape (400, 2, 3, 2) and --axes (axes) names 3; name each"),
+        (("sample", "channels"), "'sample' is no axis, samples is; name each axis of the array in its order, out of"),
+        (("samples", "axis"), "'axis' is no axis; name each axis"),
+        (("samples", "samples"), "samples stands twice"),
+        (("channels", "periods"), "without samples"),
+        ("samples", "give a sequence of words"),
+    ],
+)
+def test_wrong_axes(tmp_path, axes, words):
+    path = tmp_path / "a.npz"
+    np.savez(path, u=U, y=Y, fs=RATE_HZ)
+    assert words in refusal(path, "u", "y", axes=axes)
+
+
+def test_periods_called_channels_are_copies_of_each_other(tmp_path):
+    path = tmp_path / "a.npz"
+    np.savez(path, u=U, y=Y[:, :2], fs=RATE_HZ)
+    message = refusal(path, "u", "y", axes=("samples", "realisations", "periods", "channels"))
+    assert "differs from period 0 to 1 by" in message
+    np.savez(path, u=U[:, :, 0], y=Y[:, :2, 0], fs=RATE_HZ)
+    message = refusal(path, "u", "y", axes=("samples", "realisations", "channels"))
+    assert "realisation 0 and 1 more: the input 'u[1]' is a copy of the input 'u[0]'" in message
+
+
+def test_what_no_recordings_can_be_made_of(tmp_path):
+    path = tmp_path / "a.npz"
+    np.savez(path, u=U, y=Y, short=Y[:300], fewer=Y[:, :, :2], text=np.array(["a"]), slow=np.array(3.0), fs=RATE_HZ)
+    assert "'short' has 300 samples, where the drives, 'u' in" in refusal(path, "u", "short")
+    assert "'fewer' has 2 realisations, where" in refusal(path, "u", "fewer")
+    assert "input and output are both 'u'; name two arrays (--input, --output), or the file" in refusal(path, "u", "u")
+    message = refusal(path, "u")
+    assert "4 arrays have 4 axes" in message
+    assert "name it (--output). The file holds 'u' of shape (400, 2, 3, 2), 'y' of shape" in message
+    assert "no one array of inputs is named 'v'; the file holds 'u'" in refusal(path, "v", "y")
+    assert "leave out --period" in refusal(path, "u", "y", period_samples=200)
+    assert "two sample rates" in refusal(path, "u", "y", rate_hz=500.0)
+    np.savez(
+        path, u=U, y=np.where(np.arange(2) == 1, np.where(np.arange(400) == 7, np.nan, 1.0)[:, None, None, None], 1) * Y
+    )
+    message = refusal(path, "u", "y", rate_hz=RATE_HZ)
+    assert "realisation 0: sample 7 of period 1 of the output, y[0] is nan, 1 such samples" in message
+    text = tmp_path / "a.csv"
+    text.write_text("u,y\n" + "1,2\n" * 300)
+    assert "--axes (axes) is for arrays (NPY, NPZ, MAT, HDF5) and this file holds columns" in refusal(text, "u", "y")
+
+
+def test_two_files_of_other_rates_and_of_one_missing(tmp_path):
+    np.savez(tmp_path / "u.npz", u=U, fs=RATE_HZ)
+    np.savez(tmp_path / "y.npz", y=Y, fs=2 * RATE_HZ)
+    assert "two sample rates: 1000 Hz (fs = 1000 Hz) and 2000 Hz" in refusal(
+        tmp_path / "u.npz", axes=AXES, output_path=tmp_path / "y.npz"
+    )
+    with pytest.raises(RecordingError, match=r"z\.npz: there is no such file"):
+        read_arrays(tmp_path / "u.npz", axes=AXES, output_path=tmp_path / "z.npz")
+
+
+def test_arrays_that_would_fill_the_memory(tmp_path, monkeypatch):
+    path = tmp_path / "a.npz"
+    np.savez_compressed(path, u=np.zeros((40_000, 1, 1, 2), np.int8), y=Y, fs=RATE_HZ)
+    monkeypatch.setattr("microrad.lab.recording.files._UNPACKED_BYTES", 300_000)
+    monkeypatch.setattr("microrad.lab.recording.files._UNPACKED_TIMES", 1)
+    assert "'u' states 4e+04 samples, 0.64 MB in a file of" in refusal(path, "u", "y")
+
+
+@pytest.mark.skipif(not DATA.is_dir(), reason=f"real recordings are not at {DATA}")
+def test_real_arrays():
+    u, y = (DATA / "cubespec" / f"{name}_200mV_train.npy" for name in "uy")
+    read = read_arrays(u, rate_hz=6400.0, axes=AXES, output_path=y)
+    assert [(r.drive.shape, r.output.shape, r.period_samples) for r in read] == [((16384, 3), (16384, 3), 8192)] * 6
+    np.testing.assert_array_equal(read[4].output[8192:], np.load(y)[:, :, 4, 1])
+    assert {f.kind for r in read for f in r.findings} == {"unexcited"}
