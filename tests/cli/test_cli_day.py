@@ -324,4 +324,4 @@ def test_where_nothing_goes_direct_the_relays_volume_is_what_matters(call, folde
         "What matters most to the relay's volume, each assumption changed alone: laser data rate (150 Mbit/s:" in said
     )
     assert "nothing direct" not in said
-    assert "nothing arrives by the direct downlink" in said
+    assert "by the direct downlink nothing arrives" in said

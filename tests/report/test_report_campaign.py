@@ -862,7 +862,7 @@ def test_the_tails_worth_stands_in_plain_english():
     tail = replace(rayleigh_tail(2e-6), effective_runs=2.44e7)
     said = campaign_words.tail_method(tail)
     assert said.startswith("It comes from the share of the time of 64 rows")
-    assert said.endswith("24 million independent samples of the error would tell as much of 10⁻⁶.")
+    assert said.endswith("It knows 10⁻⁶ as well as 24 million independent samples of the error would.")
     assert "samples" not in campaign_words.tail_method(replace(tail, effective_runs=math.nan))
     for count, words in ((1.3e5, "130000 "), (3.21e9, "3.2 billion ")):
         assert f" {words}independent" in campaign_words.tail_method(replace(tail, effective_runs=count))

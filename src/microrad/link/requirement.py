@@ -21,7 +21,7 @@ ROUNDING = 1e-9
 DERIVED = "derived"
 """Mark of a requirement that is met by the choice of an input."""
 
-IMPOSSIBLE = "how strong the link is in its near field: this budget has more light arrive than was sent"
+IMPOSSIBLE = "its budget has more light arrive than was sent: the terminals are too near for it"
 
 
 @dataclass(frozen=True, slots=True)

@@ -86,7 +86,7 @@ def _exposure(data: link.DataLink, runs: ensemble.Ensemble | None) -> Exposure:
     else:
         under = Exposure.of(data, runs.quantile_rad(1.0 - stated_outage(data.requirement)), runs.beyond)
     if not under.possible:
-        raise link.LinkError(f"not known is {IMPOSSIBLE}")
+        raise link.LinkError(IMPOSSIBLE)
     return under
 
 
@@ -111,7 +111,7 @@ class _Beam:
 def _beam_margin(of: _Beam) -> float:
     found = link.beam_budget(of.name, of.shared, of.beam, of.sources)
     if not found.possible:
-        raise link.LinkError(f"{of.name}: not known is {IMPOSSIBLE}")
+        raise link.LinkError(f"{of.name}: {IMPOSSIBLE}")
     return found.margin_db
 
 

@@ -205,7 +205,7 @@ def _worth(tail: Tail, radius_rad: float, past: Interval) -> str:
     if not variance:
         return ""
     plain = past.value * (1.0 - past.value) / variance
-    return f" The variance of that estimate is {variance:.2g}, as of {plain:.2g} draws without importance sampling."
+    return f" The variance of that estimate is {variance:.2g}, that of {plain:.2g} draws without importance sampling."
 
 
 def answers(summary: CampaignSummary, cell: CellSummary | None) -> list[str]:
@@ -226,7 +226,7 @@ def tail_method(tail: Tail) -> str:
     if not known or not math.isfinite(tail.effective_runs):
         return said
     count, of = _many(tail.effective_runs), share(min(known))
-    return f"{said} {count} independent samples of the error would tell as much of {of}."
+    return f"{said} It knows {of} as well as {count} independent samples of the error would."
 
 
 def _many(count: float) -> str:

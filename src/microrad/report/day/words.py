@@ -35,7 +35,7 @@ def _compared(ratio: float) -> str:
     """The direct downlink against the relay, in words; nothing where one of them carries nothing."""
     if not 0.0 < ratio < math.inf:
         return ""
-    return f", {ratio:.3g} times less" if ratio >= 1.0 else f", {1.0 / ratio:.3g} times more"
+    return f"; the relay could carry {ratio:.3g} times as much"
 
 
 def times(count: float) -> str:
@@ -80,7 +80,7 @@ def contact_words(day: DayStudy) -> str:
     ahead, rate = v.largest("point_ahead_most_rad"), v.largest("rate_most_rad_s")
     parts = ""
     if v.rises < len(v.encounters):
-        parts = f" It rises {times(v.rises)}: some contacts are cut in two by more than the Earth."
+        parts = f" It rises {times(v.rises)} only: a limit other than the Earth cuts some contacts in two."
     at_a_time = "" if math.isnan(v.median_s) else f" {duration(v.median_s)} at a time (median),"
     return (
         f"The relay is in view for {100 * v.visible_share:.1f} % of the time,{at_a_time} and out of it for "
@@ -132,9 +132,9 @@ def kilometres(range_m: float) -> str:
 def latency_words(day: DayStudy) -> list[str]:
     """How long the instrument's data take to the user."""
     made = volume(day.relay.generated_bit)
-    said = [f"Of the {made} that the instrument makes, {_arrived(day.relay)} by the relay"]
+    said = [f"What becomes of the {made} that the instrument makes: by the relay {_arrived(day.relay)}"]
     if day.direct is not None:
-        said.append(f"{_arrived(day.direct)} by the direct downlink")
+        said.append(f"by the direct downlink {_arrived(day.direct)}")
     return ["; ".join(said) + "."]
 
 
@@ -142,13 +142,13 @@ def _arrived(way: Way) -> str:
     """What becomes of the instrument's data by one way; the latency is that of what the store has kept."""
     if way.arrived_bit <= 0.0:
         return "nothing arrives"
-    slow = "99 % do not arrive" if math.isinf(way.slow_s) else f"99 % within {duration(way.slow_s)}"
+    slow = "less than 99 % by the end" if math.isinf(way.slow_s) else f"99 % within {duration(way.slow_s)}"
     half = "less than half arrives" if math.isinf(way.median_s) else f"half arrives within {duration(way.median_s)}"
     late = f", {volume(way.on_board_bit)} are still on board at the end" if way.on_board_bit > 1.0 else ""
     if way.lost_bit <= 0.0:
-        return f"{half} and {slow}{late}"
+        return f"{half}, and {slow}{late}"
     lost = f"{volume(way.lost_bit)} find the store full"
-    return f"{volume(way.arrived_bit)} arrive (of what is kept {half} and {slow}), {lost}{late}"
+    return f"{volume(way.arrived_bit)} arrive (of what is kept {half}, and {slow}), {lost}{late}"
 
 
 def assumption_words(day: DayStudy) -> list[str]:
@@ -163,10 +163,12 @@ def assumption_words(day: DayStudy) -> list[str]:
     waits = sorted(day.swings, key=lambda s: -_wait_factor(s))
     if waits and _wait_factor(waits[0]) > MATTERS:
         s = waits[0]
-        by = [f"relay {_both(s, 'relay_slow_s')}"]
+        by = [f"within {_both(s, 'relay_slow_s')} by the relay"]
         if day.direct is not None:
-            by.append(f"direct {_both(s, 'direct_slow_s')}")
-        found.append(f"What matters most to the latency: {s.name}, {s.low} or {s.high}; 99 % by {', '.join(by)}.")
+            by.append(f"within {_both(s, 'direct_slow_s')} directly")
+        found.append(
+            f"How late data arrive depends most on {s.name}: with {s.low} or {s.high}, 99 % arrive {', '.join(by)}."
+        )
     return found
 
 

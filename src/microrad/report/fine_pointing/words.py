@@ -160,13 +160,13 @@ def theory(fine: FinePointingStudy) -> list[str]:
     ]
     settled = f"The question of a better linear controller is settled: at most {percent(r.at_nearest)} are left."
     if r.at_baseline < WORTHWHILE:
-        sentences.append(f"Theory does not allow {percent(WORTHWHILE)} there.")
+        sentences.append(f"So no linear controller can be {percent(WORTHWHILE)} better than the baseline.")
     sentences += [settled] if r.at_nearest < SETTLED else []
     if r.with_hysteresis > r.at_baseline + 0.01:
         simulated, gained = angle(r.baseline.simulated[Variant.GIVEN].rms_rad), percent(max(r.gained, 0.0))
         sentences.append(
-            f"On the mission's mirror hysteresis brings the baseline to {simulated}: undone entirely, it would "
-            f"leave at most {percent(r.with_hysteresis)} to gain, of which {fine.best.design.name} takes {gained}."
+            f"On the mission's mirror hysteresis brings the baseline to {simulated}. Without it the rms could be "
+            f"at most {percent(r.with_hysteresis)} lower; {fine.best.design.name} is {gained} lower."
         )
     return sentences
 
@@ -305,8 +305,8 @@ def _limit_warnings(fine: FinePointingStudy) -> list[tuple[list[str], str]]:
 def _stroke_warnings(fine: FinePointingStudy) -> list[str]:
     return [
         f"the stroke does not cover the worst case on {axis.label}: {angle(axis.needed_rad)} needed to either side, "
-        f"{angle(axis.available_rad)} available (root sum square {angle(axis.needed_rss_rad)}); no simulated run has "
-        "the static misalignment, so that they may stay within limits which the worst case exceeds"
+        f"{angle(axis.available_rad)} available (root sum square {angle(axis.needed_rss_rad)}); the simulated "
+        "runs leave out the static misalignment, so they may stay within limits that the worst case exceeds"
         for axis in fine.scene.own_stroke
         if not axis.fits
     ]

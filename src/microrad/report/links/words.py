@@ -34,7 +34,10 @@ def short(study: LinkStudy) -> list[str]:
     if m.jitter is not None:
         error = quantity(error_rad(study.data), "rad")
         at = f"for {time_kept(m.requirement)} under the jitter, an error of {error}"
-    said = [f"The margin is received over required power, for communication {at}.", *consequences(study)[:2]]
+    said = [
+        f"The margin is the power received over the power needed, for communication {at}.",
+        *consequences(study)[:2],
+    ]
     r = nearest(found)
     which = "Nearest to its limit is" if r.met else "What limits it is"
     said.append(f"{which} the {r.name}, by {r.because}{advice_for_links(study, r)}.")

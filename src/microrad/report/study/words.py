@@ -76,7 +76,9 @@ def headline(study: Study) -> str:
     if not study.closes:
         links = {"beacon": study.beacon.margin_db, "answer": study.answer.margin_db, "communication": study.margin_db}
         failing = [f"{name} {signed(margin, 'dB')}" for name, margin in links.items() if margin < 0.0]
-        return f"The link does not close: {', '.join(failing) or IMPOSSIBLE}, at {at}."
+        if not failing:
+            return f"Whether the link closes at {at} is not known: {IMPOSSIBLE}."
+        return f"The link does not close: {', '.join(failing)}, at {at}."
     margin, failed = signed(study.margin_db, "dB"), [r for r in study.requirements if not r.met]
     if failed:
         names = " and ".join(f"{r.name} ({r.unknown or margin_text(r)})" for r in failed)
@@ -124,13 +126,18 @@ def limits(study: Study) -> list[str]:
     """What the margin of the verdict is, and which requirement is nearest to its limit."""
     case = study.fine_case
     under = "" if case is None else f", with what {case.controller} leaves of {case.source}"
-    margin = f"The margin is received over required power of the communication link at {_judged_at(study)}{under}."
+    margin = (
+        f"The margin is the power that the communication link receives over the power that it needs, at "
+        f"{_judged_at(study)}{under}."
+    )
     return [margin, _limit(study)]
 
 
 def _limit(study: Study) -> str:
     r = nearest(study.requirements)
     said = contributors.contributor(study, r)
+    if r.unknown:
+        return f"Nothing can be said of the {r.name}: {r.unknown}."
     which, todo = "Nearest to its limit is" if r.met else "What limits it is", contributors.advice(study, r)
     return f"{which} the {r.name}. {said[:1].upper()}{said[1:]}{todo}."
 
@@ -206,9 +213,9 @@ def read_otherwise(study: Study) -> list[str]:
     if not run:
         return []
     if not turned:
-        return [f"None of {len(run)} other readings, each changed alone, changes whether that link closes."]
+        return [f"None of {len(run)} other readings of the paper, one at a time, changes whether that link closes."]
     would = "would not close" if closes else "would close"
-    return [f"By another reading, one changed alone, that link {would}: {', '.join(turned)}."]
+    return [f"With one point of the paper read otherwise that link {would}: {', '.join(turned)}."]
 
 
 def hysteresis_cost(study: Study) -> str:
@@ -224,7 +231,9 @@ def hysteresis_cost(study: Study) -> str:
     ]
     outage = f"{100 * study.performance.outage:g} %"
     return (
-        f"Hysteresis costs the link, at the loss exceeded {outage} of the time, {' and '.join(said)}." if said else ""
+        f"Hysteresis costs the link {' and '.join(said)}, at the pointing loss that is exceeded {outage} of the time."
+        if said
+        else ""
     )
 
 
