@@ -1,5 +1,6 @@
 """State-space algebra of linear time-invariant systems: polynomials to modal form, discretisation, responses."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -112,6 +113,22 @@ def _modal(poles: Complexes, residues: Complexes) -> StateSpace:
             C[0, row : row + 2] = 2 * r.real, 2 * r.imag
             row += 2
     return StateSpace(A, B, C, np.zeros((1, 1)))
+
+
+def modal_matrix(modes: Sequence[tuple[float, float]]) -> Floats:
+    """Block-diagonal A with a block [[s, -w], [w, s]] for each mode, or s alone where w is 0.
+
+    Args:
+        modes: Real part s and imaginary part w of each mode, in 1/s and rad/s.
+    """
+    states = sum(2 if w else 1 for _, w in modes)
+    A, row = np.zeros((states, states)), 0
+    for s, w in modes:
+        A[row, row] = s
+        if w:
+            A[row + 1, row + 1], A[row, row + 1], A[row + 1, row] = s, -w, w
+        row += 2 if w else 1
+    return A
 
 
 def frequency_response(system: StateSpace, freq_hz: Floats, step_s: float | None = None) -> Complexes:

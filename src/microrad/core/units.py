@@ -102,7 +102,7 @@ _KINDS = {
     "W/m^2": ("an irradiance", "W/m^2"),
     "W/sr": ("a radiant intensity", "MW/sr"),
     "W/(m^3 sr)": ("a spectral radiance", "W/(m^2 sr um)"),
-    "1/s": ("a rate of counts", "1/s"),
+    "1/s": ("a rate per second", "1/s"),
     "m/s": ("a velocity", "km/s"),
     "V/s": ("a voltage rate", "V/s"),
     "rad/V": ("an angle per voltage", "mrad/V"),

@@ -253,10 +253,11 @@ class OrWord(Quantity):
 
 @dataclass(frozen=True, slots=True)
 class Several:
-    """A list of at least one quantity; rising lists are strictly increasing."""
+    """A list of at least one quantity and of at most `most`; rising lists are strictly increasing."""
 
     each: Quantity
     rising: bool = False
+    most: int = MOST_ITEMS
 
     def read(self, value: object) -> tuple[float, ...]:
         """SI values of the list; raises `ProblemsError` with every item that does not fit."""
@@ -264,8 +265,8 @@ class Several:
             raise ProblemsError(Problem("", NOT_PUBLISHED, self.wanted))
         if not isinstance(value, list | tuple) or not value:
             raise ProblemsError(Problem("", "is not a list with something in it", self.wanted))
-        if len(value) > MOST_ITEMS:
-            raise ProblemsError(Problem("", f"is a list of {len(value)} items", f"at most {MOST_ITEMS} items"))
+        if len(value) > self.most:
+            raise ProblemsError(Problem("", f"is a list of {len(value)} items", f"at most {self.most} items"))
         numbers, problems = [], []
         for place, item in enumerate(value, 1):
             try:

@@ -14,9 +14,11 @@ from pydantic.fields import FieldInfo
 
 from microrad.core.folder import read_bytes
 from microrad.core.units import UnitError
+from microrad.mission import versions
 from microrad.mission.fields import NOT_PUBLISHED, UNKNOWN, Problem, ProblemsError, Quantity, Several, Table
 from microrad.mission.model import LinkMission, Mission, Source
 from microrad.mission.origins import of_paper, written_for
+from microrad.mission.tables.coupled_mirror import CoupledMirror
 from microrad.mission.tables.mirror import Mirror
 from microrad.mission.toml import Document, Fault, MissionError, UnreadableError, clipped, shown
 
@@ -32,6 +34,7 @@ __all__ = [
     "content_of",
     "either_file",
     "kind_of",
+    "load_coupled_mirror",
     "load_link",
     "load_mirror",
     "load_mission",
@@ -227,10 +230,31 @@ def load_mirror(path: str | Path) -> MirrorFile:
     Raises `MissionError` with every fault of it.
     """
     document = _open(Path(path), "mirror file", "mirror")
+    if not versions.is_of_one_axis(document, document.data):
+        raise MissionError(document.path, document.faults)
     mirror = check_table(document, Mirror, document.data)
     if mirror is None or document.faults:
         raise MissionError(document.path, document.faults)
     return _mirror_file(document, mirror)
+
+
+def load_coupled_mirror(path: str | Path, *, text: str | None = None) -> CoupledMirror:
+    """Read a mirror file of version 2, of several axes; `microrad.mirror.coupled.of` makes a mirror of the table.
+
+    Args:
+        path: The mirror file.
+        text: Its text in place of the file's content, as if it stood at `path`, which then need not exist.
+
+    Raises:
+        MissionError: With every fault of it.
+    """
+    document = _open(Path(path), "mirror file", "mirror", text)
+    if not versions.is_of_several_axes(document):
+        raise MissionError(document.path, document.faults)
+    mirror = check_table(document, CoupledMirror, document.data)
+    if mirror is None or document.faults:
+        raise MissionError(document.path, document.faults)
+    return mirror
 
 
 def assumptions(sources: Mapping[str, Source]) -> tuple[tuple[str, str, str], ...]:
@@ -242,10 +266,10 @@ def assumptions(sources: Mapping[str, Source]) -> tuple[tuple[str, str, str], ..
 # --------------------------------------------------------------------------------------------------------------- files
 def _open(path: Path, label: str, prefix: str, text: str | None = None) -> Document:
     try:
-        names = _names_within(Mirror if prefix else Mission) | {"file"}
+        names = _names_within(Mirror) | _names_within(CoupledMirror) if prefix else _names_within(Mission)
         if text is not None:
-            return Document.of(text.encode("utf-8", "surrogatepass"), path, label, prefix, names)
-        return Document.read(path, label, prefix, names)
+            return Document.of(text.encode("utf-8", "surrogatepass"), path, label, prefix, names | {"file"})
+        return Document.read(path, label, prefix, names | {"file"})
     except UnreadableError as error:
         fault = Fault("", "", 0, f"the {label} {error.reason}", error.expected, file=clipped(str(path)))
         raise MissionError(path, [fault]) from None
@@ -256,16 +280,26 @@ def _take_in_mirror(document: Document, given: Path | None) -> None:
     table = document.data.get("mirror")
     path = given or _named_file(document, table)
     if path is None:
+        if isinstance(table, dict) and "file" not in table and not versions.is_of_one_axis(document, table):
+            _leave_out_mirror(document)
         return
     try:
         inner = _open(path, "mirror file", "mirror")
     except MissionError as error:
         document.faults.extend(error.faults)
-        document.damaged.add("mirror")
-        document.data.pop("mirror", None)
+        _leave_out_mirror(document)
+        return
+    if not versions.is_of_one_axis(inner, inner.data):
+        document.faults.extend(inner.faults)
+        _leave_out_mirror(document)
         return
     document.inner["mirror"] = inner
     document.data["mirror"] = inner.data
+
+
+def _leave_out_mirror(document: Document) -> None:
+    document.damaged.add("mirror")
+    document.data.pop("mirror", None)
 
 
 def _named_file(document: Document, table: object) -> Path | None:
@@ -279,8 +313,7 @@ def _named_file(document: Document, table: object) -> Path | None:
     document.fault(
         "mirror.file", shown(file), reason, 'file = "mirror.toml" alone in [mirror], or all of its other keys'
     )
-    document.damaged.add("mirror")
-    document.data.pop("mirror")
+    _leave_out_mirror(document)
     return None
 
 
@@ -364,7 +397,7 @@ def _as_far(check: Callable[..., Iterator[Problem]], sound: Table, names: Iterab
 
 def _note_problem(document: Document, key: str, problem: Problem, value: str) -> None:
     found = document.holder(key).statements.get(key)
-    raw = clipped(found.value) if found and found.kind == "key" else value
+    raw = clipped(" ".join(found.value.split())) if found and found.kind == "key" else value
     document.fault(key, raw, problem.reason, problem.expected)
 
 

@@ -9,7 +9,7 @@ from pydantic import Field, GetJsonSchemaHandler
 from pydantic_core import CoreSchema
 
 from microrad.core.units import format_quantity
-from microrad.mission.fields import MOST_ITEMS, Problem, ProblemsError, Quantity, Several, Table
+from microrad.mission.fields import Problem, ProblemsError, Quantity, Several, Table
 
 ANGLE_MOST = math.pi / 2  # beyond a quarter turn no pointing error, beam or mirror angle has a meaning here
 Name = Annotated[str, Field(min_length=1, max_length=200)]
@@ -131,6 +131,17 @@ def roots_from_damping(frequencies_hz: tuple[float, ...], dampings: tuple[float,
     return tuple(roots)
 
 
+def least_alpha_1_v(beta_1_v: float, gamma_1_v: float, eta_1_v: float) -> float:
+    """What alpha of a Bouc-Wen model has to be above, in 1/V, so that h decays on each side of 0 in both directions.
+
+    Args:
+        beta_1_v: Share of the decay that turns with the direction, 1/V.
+        gamma_1_v: What tells the signs of h apart, 1/V.
+        eta_1_v: What tells rising from falling drive, 1/V.
+    """
+    return max(abs(beta_1_v + eta_1_v * s) - s * gamma_1_v for s in (1.0, -1.0))
+
+
 class BoucWenTable(Table):
     """Parameters of the rate-dependent Bouc-Wen model, with angle in rad and drive in V (paper, Eq. 3).
 
@@ -155,9 +166,7 @@ class BoucWenTable(Table):
 
     def problems(self) -> Iterator[Problem]:
         """Hysteresis that stays bounded."""
-        least = max(
-            abs(self.beta_1_v + self.eta_1_v * s) - s * self.gamma_1_v for s in (1.0, -1.0)
-        )  # of alpha, with the decay of each sign of h above 0 in both directions
+        least = least_alpha_1_v(self.beta_1_v, self.gamma_1_v, self.eta_1_v)
         if not self.alpha_1_v > least:
             size = format_quantity(least, "1/V")
             names = "beta" if self.gamma_1_v == self.eta_1_v == 0.0 else "what beta, gamma and eta take off it"
@@ -219,25 +228,31 @@ class Comparison(Table):
 
 # --------------------------------------------------------------------------------------------------------- uncertainty
 @dataclass(frozen=True, slots=True)
-class _Keys(Several):
-    """A list of keys as text."""
+class KeyList(Several):
+    """A list of keys as text; `shown` is an example."""
+
+    shown: str = '["bouc_wen.d1", "linear.poles.1"]'
 
     def read(self, value: object) -> Any:
+        """The keys; raises `ProblemsError`."""
         if not isinstance(value, list | tuple) or not value or not all(isinstance(v, str) for v in value):
             raise ProblemsError(Problem("", "is not a list of keys in quotes", f"{self.wanted}: {self.example}"))
-        if len(value) > MOST_ITEMS:
-            raise ProblemsError(Problem("", f"is a list of {len(value)} items", f"at most {MOST_ITEMS} items"))
+        if len(value) > self.most:
+            raise ProblemsError(Problem("", f"is a list of {len(value)} items", f"at most {self.most} items"))
         return tuple(value)
 
     @property
     def wanted(self) -> str:
+        """What the key expects, in words."""
         return "a list of keys inside the mirror, items of lists counted from 1"
 
     @property
     def example(self) -> str:
-        return '["bouc_wen.d1", "linear.poles.1"]'
+        """A list of keys."""
+        return self.shown
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        """An array of texts."""
         return {"type": "array", "minItems": 1, "items": {"type": "string"}}
 
 
@@ -260,7 +275,7 @@ class Uncertainty(Table):
     the diagonal row by row; of a list that scales together its first item other than 0 counts.
     """
 
-    parameters: Annotated[tuple[str, ...], _Keys(Quantity(""))] = Field(
+    parameters: Annotated[tuple[str, ...], KeyList(Quantity(""))] = Field(
         description="keys inside the mirror, items counted from 1"
     )
     standard_errors: Annotated[tuple[float, ...], Several(Quantity("", least=0.0, most=1.0))] = Field(

@@ -5,13 +5,12 @@
 A is in real modal form. Drive and output count from rest at the bias; q and z are counted in volts.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
-from microrad.core import kernels, periodic
+from microrad.core import kernels, lti, periodic
 from microrad.core.arrays import Floats
 from microrad.mirror import model
 from microrad.mirror.model import Mirror
@@ -146,21 +145,9 @@ def modes(A: Floats) -> tuple[tuple[float, float], ...]:
         w = float(A[row + 1, row]) if row + 1 < states else 0.0
         found.append((float(A[row, row]), w))
         row += 2 if w else 1
-    if not np.array_equal(A, modal_matrix(found)):
+    if not np.array_equal(A, lti.modal_matrix(found)):
         raise ValueError(
             "A is not block-diagonal with a block [[s, -w], [w, s]] for each pair of poles and s for each real one; "
             "bring the mirror into real modal form first"
         )
     return tuple(found)
-
-
-def modal_matrix(of: Sequence[tuple[float, float]]) -> Floats:
-    """The matrix in real modal form with modes of the given real and imaginary parts (rad/s); see `modes`."""
-    states = sum(2 if w else 1 for _, w in of)
-    A, row = np.zeros((states, states)), 0
-    for s, w in of:
-        A[row, row] = s
-        if w:
-            A[row + 1, row + 1], A[row, row + 1], A[row + 1, row] = s, -w, w
-        row += 2 if w else 1
-    return A

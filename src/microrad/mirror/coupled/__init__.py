@@ -1,0 +1,8 @@
+"""Mirrors of several axes: the record and its response, tilts from displacements, mirror files of version 2."""
+
+from microrad.mirror.coupled.geometry import tilts_and_piston
+from microrad.mirror.coupled.reading import of
+from microrad.mirror.coupled.records import Actuator, CoupledMirror, Known, Output, modes, response
+from microrad.mirror.coupled.writing import text
+
+__all__ = ["Actuator", "CoupledMirror", "Known", "Output", "modes", "of", "response", "text", "tilts_and_piston"]
