@@ -38,6 +38,8 @@ _PUBLIC = {
     "OrbitError": "orbit.OrbitError",
     "OperationsError": "orbit.operations.OperationsError",
     "read_recording": "lab.recording.read_recording",
+    "read_arrays": "lab.recording.read_arrays",
+    "read_recordings_list": "lab.recording.list_file.read_list",
     "recording_from_arrays": "lab.recording.recording_from_arrays",
     "Recording": "lab.recording.Recording",
     "RecordingError": "lab.recording.RecordingError",

@@ -1,7 +1,7 @@
 """Laboratory recordings: read from the formats of a laboratory, checked, and refused with the place that is wrong.
 
 Columns are named or numbered from 0. Lines of a text are counted from 1, as a text editor counts them, samples from 0.
-The values keep the units of the file; `identify` is told what they are.
+The values keep the units of the file; `identify` is told what they are. `list_file` reads a list of recordings.
 """
 
 from microrad.lab.recording.checks.together import check_together

@@ -4,6 +4,7 @@ import hashlib
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
@@ -119,6 +120,28 @@ def stated_units(units: Sequence[str], names: Sequence[str]) -> set[str]:
     return {_SPELLINGS.get(unit, unit) for unit in said}
 
 
+def check_stated(recording: Recording, which: Literal["input", "output"], unit: str) -> None:
+    """Check that the file of a recording states no other unit for its channels.
+
+    Args:
+        recording: The recording.
+        which: Its drives or its outputs.
+        unit: The unit in which they are to be read, spelled as in "V" or "urad".
+
+    Raises:
+        RecordingError: If the file states another one: the mirror would be larger or smaller than it is.
+    """
+    r = recording
+    units, names = (r.input_units, r.input_names) if which == "input" else (r.output_units, r.output_names)
+    said = stated_units(units, names)
+    if said and said != {unit}:
+        called = "drive" if which == "input" else "output"
+        raise RecordingError(
+            f"{r.path}: the {called} is to be read in {unit} and the file says {', '.join(sorted(said))}; give "
+            "the unit that the file says, or convert its values."
+        )
+
+
 def read_in(recording: Recording, input_unit: str, output_unit: str) -> Recording:
     """The recording, where its file states no other units than those in which it is to be read.
 
@@ -130,15 +153,6 @@ def read_in(recording: Recording, input_unit: str, output_unit: str) -> Recordin
     Raises:
         RecordingError: If its file states other units: the mirror would be larger or smaller than it is.
     """
-    r = recording
-    for which, given, units, names in (
-        ("drive", input_unit, r.input_units, r.input_names),
-        ("output", output_unit, r.output_units, r.output_names),
-    ):
-        said = stated_units(units, names)
-        if said and said != {given}:
-            raise RecordingError(
-                f"{r.path}: the {which} is to be read in {given} and the file says {', '.join(sorted(said))}; give "
-                "the unit that the file says, or convert its values."
-            )
-    return r
+    check_stated(recording, "input", input_unit)
+    check_stated(recording, "output", output_unit)
+    return recording

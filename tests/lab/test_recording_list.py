@@ -1,0 +1,223 @@
+"""A list of recordings: what is read by it, and every fault of it at once, with its line."""
+
+import numpy as np
+import pytest
+
+from microrad.lab.recording import RecordingError
+from microrad.lab.recording.list_file import RecordingsError, read_list
+
+N, RATE_HZ = 800, 1000.0
+TIME_S = np.arange(N) / RATE_HZ
+RNG = np.random.Generator(np.random.Philox(5))
+DRIVE = np.column_stack((np.sin(2 * np.pi * 11 * TIME_S), np.cos(2 * np.pi * 17 * TIME_S)))
+OUTPUT = DRIVE @ np.array([[1.0, -0.3], [0.2, 0.8]]) + 0.01 * RNG.standard_normal((N, 2))
+
+
+def write_csv(path, names="t,u, x,u y,x,y"):
+    table = np.column_stack((TIME_S, DRIVE, OUTPUT))
+    path.write_text(names + "\n" + "".join(",".join(map(repr, row)) + "\n" for row in table.tolist()))
+
+
+def write_list(folder, text):
+    path = folder / "list.toml"
+    path.write_text(text)
+    return path
+
+
+def faults(folder, text):
+    with pytest.raises(RecordingsError) as caught:
+        read_list(write_list(folder, text))
+    return {(fault.key, fault.line): f"{fault.reason}; {fault.expected}" for fault in caught.value.faults}
+
+
+def refusal(folder, text):
+    with pytest.raises(RecordingError) as caught:
+        read_list(write_list(folder, text))
+    message = str(caught.value)
+    assert message.startswith(str(folder / "list.toml"))
+    return message
+
+
+def test_columns_period_units_and_roles_by_file(tmp_path):
+    write_csv(tmp_path / "both.csv", "t;ux, slow;uy;x;y".replace(";", ","))
+    (tmp_path / "both.csv").write_text((tmp_path / "both.csv").read_text().replace("ux, slow", "ux"))
+    np.savez(tmp_path / "again.npz", u=DRIVE[::-1], y=OUTPUT[::-1], fs=RATE_HZ)
+    found = read_list(
+        write_list(
+            tmp_path,
+            """
+name = "fsm 3"
+output = ["x", "y"]
+output_unit = "um"
+lever_arm = "50 mm"
+positions = [["0 mm", "12 mm"], ["10 mm", "-6 mm"]]
+signs = [[1, 0], [-1, 1]]
+
+[recording.slow]
+file = "both.csv"
+input = ["ux", 2]
+from = "0.1 s"
+to = "0.5 s"
+role = "loops"
+
+[recording.rest]
+file = "both.csv"
+input = ["ux", "uy"]
+from = "0.5 s"
+role = "validation"
+
+[recording.turned]
+file = "again.npz"
+input = "u"
+output = "y"
+axes = ["samples", "channels"]
+period = 400
+input_unit = "mV"
+""",
+        )
+    )
+    slow, turned = found.recordings
+    (rest,) = found.validation
+    assert [r.role for r in (slow, turned, rest)] == ["loops", "", "validation"]
+    assert (slow.path, rest.path) == (f"{tmp_path}/both.csv from 0.1 s to 0.5 s", f"{tmp_path}/both.csv from 0.5 s")
+    np.testing.assert_allclose(slow.drive, DRIVE[100:500])
+    np.testing.assert_allclose(rest.output, OUTPUT[500:])
+    np.testing.assert_array_equal(turned.output, OUTPUT[::-1])
+    assert (slow.output_names, turned.output_names) == (("x", "y"), ("y[0]", "y[1]"))
+    assert (slow.period_samples, turned.period_samples, slow.rate_hz) == (None, 400, RATE_HZ)
+    assert (slow.output_units, turned.output_units) == (("um", "um"), ("um", "um"))
+    assert (slow.input_units, turned.input_units) == (("", ""), ("mV", "mV"))
+    assert len({r.sha256 for r in (slow, turned, rest)}) == 3
+    assert (found.name, found.lever_arm_m, found.signs) == ("fsm 3", 0.05, ((1, 0), (-1, 1)))
+    assert found.positions_m == ((0.0, 0.012), (0.01, -0.006))
+
+
+def test_a_name_with_a_comma_is_one_column(tmp_path):
+    np.savez(tmp_path / "a.npz", **{"u, x": DRIVE[:, 0], "y": OUTPUT[:, 0], "fs": RATE_HZ})
+    found = read_list(write_list(tmp_path, '[recording.a]\nfile = "a.npz"\ninput = "u, x"\noutput = "y"\n'))
+    assert found.recordings[0].input_names == ("u, x",)
+
+
+def test_every_fault_is_told_at_once(tmp_path):
+    found = faults(
+        tmp_path,
+        """input = ["u1", "u2"]
+rate = "1 km"
+positons = 3
+signs = [[1, 2]]
+[recording.a]
+fil = "a.csv"
+period = 3.5
+axes = ["samples", "samples"]
+[recording.b]
+file = "a.csv"
+output = [1, true]
+role = "loop"
+from = "3 s"
+to = "2 s"
+accept = ["noise"]
+output_unit = "km"
+[recording]
+c = 3
+""",
+    )
+    words = {
+        ("rate", 2): "another kind of quantity",
+        ("positons", 3): "is no key of the list of recordings",
+        ("signs", 4): "has an item that is none of 1, -1 and 0; a list for each output, with 1, -1 or 0 for each",
+        ("recording.a.fil", 6): "is no key of [recording.a]",
+        ("recording.a.period", 7): "is not a whole number",
+        ("recording.a.axes", 8): 'holds "samples", which stands twice',
+        ("recording.b.output", 11): "holds true, which is no channel; the name of a channel, its number from 0",
+        ("recording.b.role", 12): 'role = "loops" or role = "broadband" or role = "validation"',
+        ("recording.b.to", 14): "is not above from",
+        ("recording.b.accept", 15): 'holds "noise", which is none of them',
+        ("recording.b.output_unit", 16): "is none of the choices",
+        ("recording.c", 18): "is no table; [recording.c] with its file below it",
+    }
+    for place, text in words.items():
+        assert text in found.get(place, ""), (place, found)
+    assert len(found) == len(words)
+
+
+def test_what_does_not_fit_together(tmp_path):
+    found = faults(
+        tmp_path,
+        """[recording.a]
+file = "a.csv"
+input = "u"
+[recording.b]
+file = "b.npz"
+input = ["u", "v"]
+axes = ["samples", "channels"]
+time = "t"
+[recording.c]
+file = "c.npz"
+input = "u"
+output = "y"
+output_file = "d.npz"
+[recording.d]
+file = "c.npz"
+input = "u"
+output = "y"
+output_file = "d.npz"
+axes = ["samples"]
+from = "1 s"
+to = "2 s"
+role = "validation"
+[recording.e]
+file = "c.npz"
+input = "u"
+output_file = "d.npz"
+axes = ["samples"]
+from = "1.5 s"
+""",
+    )
+    words = {
+        ("recording.a.output", 1): "is missing; output = ",
+        ("recording.b.input", 6): "names several arrays, beside axes",
+        ("recording.b.time", 8): "is no column of this recording",
+        ("recording.c.output_file", 13): "stands without axes",
+        ("recording.d", 14): "takes samples for validation that [recording.e] fits",
+    }
+    for place, text in words.items():
+        assert text in found.get(place, ""), (place, found)
+    assert len(found) == len(words)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "is empty"),
+        ("name = 'x'\n", "a table [recording.NAME] for each recording, with its file"),
+        ("recording = 3\n", "is no group of named tables"),
+        ("[recording.a\n", "is no table header"),
+    ],
+)
+def test_what_is_no_list(tmp_path, text, words):
+    assert any(words in told for told in faults(tmp_path, text).values())
+
+
+def test_a_list_that_does_not_exist(tmp_path):
+    with pytest.raises(RecordingsError, match="the list of recordings does not exist"):
+        read_list(tmp_path / "none.toml")
+
+
+def test_what_the_recordings_contradict(tmp_path):
+    write_csv(tmp_path / "a.csv", "t,ux (mV),uy (mV),x (um),y (um)")
+    start = "input = [1, 2]\noutput = [3, 4]\n"
+    entry = '[recording.a]\nfile = "a.csv"\n'
+    assert "there are 2 outputs, x (um), y (um); give one place" in refusal(
+        tmp_path, f'{start}positions = [["0 mm", "1 mm"]]\n{entry}'
+    )
+    assert "signs has rows of 2 items and there are 2 outputs and 2 inputs" in refusal(
+        tmp_path, f"{start}signs = [[1, 1]]\n{entry}"
+    )
+    message = refusal(tmp_path, f'{start}input_unit = "V"\n{entry}')
+    assert "[recording.a]: " in message
+    assert "the drive is to be read in V and the file says mV" in message
+    assert "every recording is for validation" in refusal(tmp_path, f'{start}{entry}role = "validation"\n')
+    assert "[recording.a]: " in refusal(tmp_path, f'{start}{entry}to = "0.9 s"\n')
+    assert "no input column is named 'ux'" in refusal(tmp_path, f'{start}{entry}input = "ux"\n')
+    message = refusal(tmp_path, f'input = [1, 2]\noutput = [3, 4]\n{entry}[recording.b]\nfile = "a.csv"\noutput = 3\n')
+    assert "2 inputs and 1 outputs, where" in message
