@@ -4,6 +4,7 @@ What stands above the tables holds for all recordings that do not say otherwise.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -242,13 +243,19 @@ def _begins_before_end(one: RecordingTable, other: RecordingTable) -> bool:
 
 def _read(path: Path, name: str, entry: RecordingTable) -> tuple[Recording, ...]:
     """The recordings of an entry, in the units and with the role that it says."""
-    try:
-        found = (
-            _read_columns(path.parent, entry) if entry.axes is None else _read_arrays(path.parent, entry, entry.axes)
-        )
+    folder, axes = path.parent, entry.axes
+    with _named(f"{path}, [recording.{name}]"):
+        found = _read_columns(folder, entry) if axes is None else _read_arrays(folder, entry, axes)
         return tuple(replace(_in_units(each, entry), role=entry.role or "") for each in found)
+
+
+@contextmanager
+def _named(place: str) -> Iterator[None]:
+    """Name the place in the list in front of what is wrong with a recording."""
+    try:
+        yield
     except RecordingError as error:
-        raise RecordingError(f"{path}, [recording.{name}]: {error}", error.findings) from None
+        raise RecordingError(f"{place}: {error}", error.findings) from None
 
 
 def _read_columns(folder: Path, entry: RecordingTable) -> tuple[Recording, ...]:
