@@ -20,6 +20,8 @@ from microrad.report.tables import Column, numbers_text, rows_of
 
 if TYPE_CHECKING:
     from microrad.orbit.constellation import ConstellationPlan
+    from microrad.report.identification.coupled import coupled_identification_text, write_coupled_identification
+    from microrad.report.identification.coupled_data import coupled_identification_data
     from microrad.report.identification.data import identification_data
     from microrad.report.identification.page import (
         ReportError,
@@ -36,6 +38,9 @@ if TYPE_CHECKING:
 _LAZY = {
     "ReportError": "identification.page",
     "check_identification": "identification.page",
+    "coupled_identification_data": "identification.coupled_data",
+    "coupled_identification_text": "identification.coupled",
+    "write_coupled_identification": "identification.coupled",
     "write_identification": "identification.page",
     "identification_data": "identification.data",
     "identification_text": "identification.page",
@@ -48,12 +53,15 @@ __all__ = [
     "ReportError",
     "check_folder",
     "check_identification",
+    "coupled_identification_data",
+    "coupled_identification_text",
     "identification_data",
     "identification_text",
     "study_figures",
     "summary",
     "verdict_text",
     "write",
+    "write_coupled_identification",
     "write_identification",
 ]
 

@@ -108,12 +108,17 @@ def given_angle(value_rad: float) -> str:
 
 
 # ----------------------------------------------------------------------------------------------------- shares and time
-def percent(share: float) -> str:
-    """A share in two digits: "2.3 %"."""
+def percent(share: float, digits: int = 2) -> str:
+    """A share in per cent: "2.3 %".
+
+    Args:
+        share: 1 for all of it.
+        digits: significant ones.
+    """
     value = 100.0 * share
     if 0.0 < abs(value) < 1e-3:
         return "< 0.001 %"
-    return minus(f"{float(f'{value:.2g}'):.15g} %")
+    return minus(f"{float(f'{value:.{digits}g}'):.15g} %")
 
 
 def share_of_time(quantile: float) -> str:

@@ -1,0 +1,336 @@
+"""The report of an identification of several channels: one view for the page and for a terminal."""
+
+import hashlib
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from textwrap import wrap
+from types import MappingProxyType
+
+import numpy as np
+from markupsafe import Markup
+
+from microrad.core.folder import write_whole
+from microrad.core.machine import versions
+from microrad.lab.identify.coupled import Candidate, CoupledIdentification
+from microrad.mirror.coupled import Actuator
+from microrad.report.identification import coupled_words as words
+from microrad.report.identification.coupled_figures import coupled_figures
+from microrad.report.identification.page import check_identification
+from microrad.report.page.templates import page_of
+from microrad.report.plotting.figure import Figure
+from microrad.report.quantities import minus, quantity
+from microrad.report.tables import Cell, Table
+from microrad.report.view import Block, Points, Soft, Verbatim, Verdict, View, told, views_text
+
+MOST_LINES = 25
+"""Of a terminal."""
+_MOST_ROWS = 4  # of a table of a terminal
+_MOST_UNFOLDED = 12  # rows of a table of records
+_MOST_FILE_LINES = 60  # of the mirror file that a page shows
+_MOST_COLUMNS = 5  # of errors by amplitude or by output
+
+
+def write_coupled_identification(
+    found: CoupledIdentification,
+    page: Path,
+    *,
+    mirror_file: Path,
+    mirror_text: str,
+    title: str,
+    overwrite: bool = False,
+) -> Path:
+    """Write the report of an identification of several channels as one HTML file that loads nothing; return its path.
+
+    Args:
+        found: what was identified.
+        page: the file of the report; it appears whole or not at all.
+        mirror_file: the mirror file that goes with it.
+        mirror_text: its text.
+        title: the heading of the page.
+        overwrite: whether a report that is there may be replaced.
+
+    Raises:
+        ReportError: if ``page`` holds something that must not be replaced.
+    """
+    check_identification(page, overwrite)
+    text = coupled_identification_page(found, mirror_file=mirror_file, mirror_text=mirror_text, title=title)
+    check_identification(page, overwrite)  # it may have appeared meanwhile
+    write_whole(page, text)
+    return page
+
+
+def coupled_identification_page(
+    found: CoupledIdentification, *, mirror_file: Path, mirror_text: str, title: str
+) -> str:
+    """The page's HTML; every text that is not ours is escaped, and nothing is loaded from anywhere.
+
+    Args:
+        found: what was identified.
+        mirror_file: the mirror file that goes with it.
+        mirror_text: its text.
+        title: the heading of the page.
+    """
+    views = (*_views(found, coupled_figures(found)), _origin(found, mirror_file, mirror_text))
+    model = found.candidate().model
+    of = Markup("{} and {}, mirror file <code>{}</code>").format(
+        words.counted(len(model.actuators), "actuator"), words.counted(len(model.outputs), "output"), mirror_file
+    )
+    return page_of(
+        title,
+        "identification",
+        of,
+        [_lead(found)],
+        views,
+        sha256=hashlib.sha256(mirror_text.encode()).hexdigest(),
+        made_by="microrad identify",
+    )
+
+
+def coupled_identification_text(
+    found: CoupledIdentification,
+    width: int = 80,
+    *,
+    mirror_file: Path | None = None,
+    report_file: Path | None = None,
+) -> str:
+    """The identification in at most 25 lines for a terminal of 80 columns; the files stand at its end.
+
+    Args:
+        found: what was identified.
+        width: columns of the terminal.
+        mirror_file: the mirror file, if one was written.
+        report_file: the report, if one was written.
+    """
+    files = [] if report_file is None else [f"{report_file} written: what was found, with pictures."]
+    files += [] if mirror_file is None else [f"{mirror_file} written ({found.chosen})."]
+    first = views_text([words.headline(found), words.worst_text(found)], width)
+    tables = views_text([_amplitudes(found, short=True), _candidates(found, short=True)], width)
+    last = "\n".join(line for each in files for line in wrap(each, width))
+    room = MOST_LINES - sum(part.count("\n") + 2 for part in (first, tables, last) if part) - 1
+    parts = [first, tables, _warnings_text(found, width, room), last]
+    return "\n\n".join(filter(None, parts))
+
+
+def _warnings_text(found: CoupledIdentification, width: int, room: int) -> str:
+    """As many warnings as there is room for, in their order, and how many there are else."""
+    shown: list[str] = []
+    for number, warning in enumerate(found.warnings, start=1):
+        lines = wrap(warning, width, initial_indent="- ", subsequent_indent="  ", break_on_hyphens=False)
+        if len(shown) + len(lines) + (number < len(found.warnings) or bool(found.refused)) > room:
+            left = len(found.warnings) - number + 1
+            break
+        shown += lines
+    else:
+        left = 0
+    more = [words.counted(left, "more warning" if shown else "warning")] if left else []
+    more += [words.counted(len(found.refused), "refused model")] if found.refused else []
+    return "\n".join([*shown, *([f"- {' and '.join(more)}: see the report, or --json."] if more else [])])
+
+
+# ----------------------------------------------------------------------------------------------------------- the view
+def _lead(found: CoupledIdentification) -> Verdict:
+    headline, *sentences = words.verdict(found)
+    return Verdict(headline, told(" ".join(sentences)), words.sound(found))
+
+
+def _views(found: CoupledIdentification, figures: Mapping[str, Figure] = MappingProxyType({})) -> tuple[View, ...]:
+    """What a page shows, in the order of its parts."""
+    own = found.candidate()
+    return (
+        View("Warnings", [Points(found.warnings or ["No warnings."])]),
+        _choice(found, figures),
+        View("Error on held-out records", told(_amplitudes(found), Soft(_READING), _records(found))),
+        View("Response", told(figures.get("response", _NO_RESPONSE))),
+        _dependence(found, figures),
+        View("Poles", told(_poles(own), Soft(words.pole_error_text(own.poles_error_rad_s)))),
+        View("Error by output and band", told(figures.get("bands"), _bands(found))),
+        View("Where it holds", told(_range(own), words.delay_text(own))),
+        View("What the mirror file does not hold", [Points(words.not_held(found))]),
+    )
+
+
+_READING = (
+    "Per cent are of the rms output, the mean over outputs in power. The best linear model is the measured response of "
+    "that amplitude: what it leaves of the fitted records is distortion and noise, and no linear model leaves less. "
+    "Noise is what changes from period to period."
+)
+_NO_RESPONSE = (
+    "No amplitude has enough records for a response of its own: as many realisations with different drives as there "
+    "are actuators, or broadband drives of one actuator at a time."
+)
+_NO_DEPENDENCE = (
+    "Gain and resonance were not compared over the amplitude: that takes two amplitudes with a response each, and a "
+    "resonance in the excited band."
+)
+
+
+def _choice(found: CoupledIdentification, figures: Mapping[str, Figure]) -> View:
+    """Error over parameters, and all candidates with those that were refused."""
+    refused = [f"{each.model}: {each.reason}" for each in found.refused]
+    stopped = (
+        "The ladder was stopped before its last model: what is chosen is the smallest within noise so far."
+        if found.stopped
+        else None
+    )
+    none = "" if refused else "No model was refused."
+    which = "Models that were refused, with the reason:" if refused else none
+    picture = figures.get("error-over-parameters")
+    return View("Which model", told(picture, stopped, _candidates(found), which, Points(refused)))
+
+
+def _candidates(found: CoupledIdentification, *, short: bool = False) -> Table:
+    """The candidates by their error, the lowest first; a short table has the first ones and the chosen."""
+    ranked = sorted(found.candidates, key=lambda candidate: candidate.error_share)
+    if short and len(ranked) > _MOST_ROWS:
+        own = found.candidate()
+        best = ranked[:_MOST_ROWS]
+        ranked = best if own in best else [*best[:-1], own]
+    known = [k for k in range(found.amplitudes_v.size) if np.isfinite(found.output_rms[k]).all()]
+    shown = [] if short or len(known) > _MOST_COLUMNS else known
+    rows = []
+    for candidate in ranked:
+        shares = words.shares(candidate, found)
+        cells = (words.part(float(shares[k])) for k in shown)
+        said = _standing(candidate, found) if short else [*_standing(candidate, found), candidate.note]
+        name, count, error = candidate.name, str(candidate.parameters), words.part(candidate.error_share)
+        rows.append((name, count, error, *cells, "; ".join(filter(None, said))))
+    at = [f"at {quantity(float(found.amplitudes_v[k]), 'V')} rms" for k in shown]
+    headings = ("model", "parameters", "held-out error", *at, "")
+    standing_out = [k for k, candidate in enumerate(ranked) if candidate.name == found.chosen]
+    return Table("", headings, rows, (0, len(headings) - 1), best=standing_out, cards=True)
+
+
+def _standing(candidate: Candidate, found: CoupledIdentification) -> list[str]:
+    if candidate.name == found.chosen:
+        return ["chosen"]
+    return ["within noise"] if candidate.name in found.within_noise else []
+
+
+def _amplitudes(found: CoupledIdentification, *, short: bool = False) -> Table:
+    """The error of the chosen model at each amplitude, beside what no linear model can leave less of, and noise."""
+    own, unit = found.candidate(), words.unit_of(found)
+    error, output, noise = (words.over_outputs(v) for v in (own.error_rms, found.output_rms, found.noise_rms))
+    floor = words.linear_floor(found)
+    linear, shares = words.over_outputs(floor), words.shares(own, found)
+    scale = words.scale(error, unit)
+    rows = []
+    for k in _few(found.amplitudes_v.size) if short else range(found.amplitudes_v.size):
+        numbers = [scale.text(float(values[k])) for values in (output, error, linear, noise)]
+        worst = "" if np.isnan(error[k]) else _worst_output(own, found, k)
+        first = quantity(float(found.amplitudes_v[k]), "V")
+        rows.append((first, numbers[0], numbers[1], words.part(float(shares[k])), *numbers[2:], worst))
+    rms = [f"{name} ({scale.unit})" for name in ("output", "error", "best linear", "noise")]
+    headings = ("drive, rms", *rms[:2], "of output", *rms[2:], "worst output")
+    return Table("", headings, rows, (6,), cards=True, brief=(0, 2, 3, 4, 6))
+
+
+def _few(count: int) -> Sequence[int]:
+    """Numbers of the rows that a terminal has room for: the first ones and the last."""
+    return range(count) if count <= _MOST_ROWS else [*range(_MOST_ROWS - 1), count - 1]
+
+
+def _worst_output(own: Candidate, found: CoupledIdentification, number: int) -> str:
+    shares = own.error_rms[number] / found.output_rms[number]
+    place = int(np.argmax(shares))
+    return f"{own.model.outputs[place].name}, {words.part(float(shares[place]))}"
+
+
+def _records(found: CoupledIdentification) -> Table:
+    """The error of the chosen model on each held-out record, by output."""
+    own = found.candidate()
+    outputs = own.model.outputs[:_MOST_COLUMNS]
+    rows: list[tuple[str | Cell, ...]] = []
+    for name, share in zip(found.held_out, own.record_share, strict=True):
+        total = words.part(float(words.over_outputs(share)))
+        rows.append((Cell(name, code=True), total, *(words.part(float(s)) for s in share[: len(outputs)])))
+    headings = ("held-out record", "error", *(output.name for output in outputs))
+    folded = "" if len(rows) <= _MOST_UNFOLDED else f"All {len(rows)} held-out records"
+    return Table("", headings, rows, (0,), folded=folded, cards=True)
+
+
+def _dependence(found: CoupledIdentification, figures: Mapping[str, Figure]) -> View:
+    of, title = found.dependence, "Dependence on the amplitude"
+    if of is None:
+        return View(title, [_NO_DEPENDENCE])
+    unit = words.unit_of(found)
+    gain = words.scale(of.gain, unit)
+    rows = []
+    for k in range(of.gain.size):
+        freq, error = words.with_error(float(of.resonance_hz[k]), float(of.resonance_error_hz[k]))
+        drive = quantity(float(of.drive_rms[k]), "V")
+        rows.append((drive, gain.text(float(of.gain[k])), freq, error, f"{of.damping_ratio[k]:.3g}"))
+    headings = ("drive, rms", f"gain ({gain.unit}/V)", "main resonance (Hz)", "± (Hz)", "damping ratio")
+    change = (
+        f"From the smallest to the largest amplitude the gain changes by {of.gain_rise_percent:+.2g} % and the main "
+        f"resonance by {of.resonance_shift_hz:+.3g} Hz."
+    )
+    return View(title, told(minus(change), figures.get("amplitude"), Table("", headings, rows)))
+
+
+def _poles(own: Candidate) -> Table:
+    inside, outside = (Cell("", "yes"), ""), (Cell("", "no"), "extrapolated")
+    rows: list[tuple[str | Cell, ...]] = [
+        (
+            "real pole" if pole.real else "pair",
+            *pole.texts,
+            *(inside if pole.excited else outside),
+        )
+        for pole in words.poles(own)
+    ]
+    headings = ("pole at rest", "frequency (Hz)", "± (Hz)", "damping ratio (1)", "± (1)", "excited", "")
+    return Table("", headings, rows, (0, 5, 6))
+
+
+def _bands(found: CoupledIdentification) -> Table | None:
+    """The error of the chosen model in each band, a row for each amplitude and output."""
+    own, edges = found.candidate(), found.bands_hz
+    scale = words.scale(own.band_error_rms, words.unit_of(found))
+    rows = []
+    for k in range(found.amplitudes_v.size):
+        if not np.isfinite(own.error_rms[k]).all():
+            continue
+        for o, output in enumerate(own.model.outputs):
+            cells = (scale.text(float(value)) for value in own.band_error_rms[k, :, o])
+            rows.append((f"{quantity(float(found.amplitudes_v[k]), 'V')}, {output.name}", *cells))
+    headings = [f"{low:.3g} to {high:.3g} Hz" for low, high in itertools.pairwise(edges)]
+    folded = f"The same as numbers: rms error in each band ({scale.unit})"
+    return Table("", ("drive, output", *headings), rows, (0,), folded=folded) if rows else None
+
+
+def _range(own: Candidate) -> Table:
+    rows: list[tuple[str | Cell, ...]] = [
+        (
+            Cell(a.name, code=True),
+            *(quantity(v, "V", 4) for v in (_bias(a), a.drive_min_v, a.drive_max_v)),
+            quantity(a.rate_limit_v_s, "V/s", 4),
+        )
+        for a in own.model.actuators
+    ]
+    return Table("", ("actuator", "bias", "lowest drive", "highest drive", "fastest rate"), rows)
+
+
+def _bias(actuator: Actuator) -> float:
+    """The bias (V) to a thousandth of the range: what a mean leaves of none is none."""
+    span = actuator.drive_max_v - actuator.drive_min_v
+    return round(actuator.bias_v, 3 - math.floor(math.log10(span))) + 0.0 if span > 0.0 else actuator.bias_v
+
+
+def _origin(found: CoupledIdentification, mirror_file: Path, mirror_text: str) -> View:
+    """What was fitted, the beginning of the mirror file, and what made them."""
+    sha256 = hashlib.sha256(mirror_text.encode()).hexdigest()
+    lines = mirror_text.splitlines()
+    more = len(lines) - _MOST_FILE_LINES
+    begins = "\n".join(line if len(line) <= 160 else f"{line[:150]} …" for line in lines[:_MOST_FILE_LINES])
+    left = f"{words.counted(more, 'more line')} are in the file; long ones are cut here." if more > 0 else None
+    made = ", ".join(f"{name} {version}" for name, version in versions().items())
+    fitted = [(Cell(name, code=True),) for name in found.fitted]
+    file = View(f"Mirror file {mirror_file.name}", told(Verbatim(begins), left), folded=True, listed=False)
+    blocks: list[Block] = [
+        Table("", ("fitted record",), fitted, (0,), folded=f"All {len(fitted)} fitted records"),
+        file,
+        Soft(f"Mirror file SHA-256 {sha256}. Every number above is computed from these recordings."),
+        Soft(f"Made with {made}."),
+    ]
+    return View("Mirror file and origin", blocks)

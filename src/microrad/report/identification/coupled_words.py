@@ -1,0 +1,286 @@
+"""What an identification of several channels found, in sentences, and the numbers that several of them need."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from microrad.core.arrays import Complexes, Floats
+from microrad.core.units import format_quantity, parse_quantity
+from microrad.lab.identify.coupled import Candidate, CoupledIdentification
+from microrad.lab.identify.linear.response import FrequencyResponse
+from microrad.report.identification.parameters import to_error, two_digits
+from microrad.report.quantities import minus, percent, quantity
+
+USABLE = 0.5
+"""Of the rms output: a model that leaves more on records that no fit has seen is none."""
+_MOST_NAMES = 4
+_MOST_AMPLITUDES = 4
+
+
+# --------------------------------------------------------------------------------------------------------------- units
+def unit_of(found: CoupledIdentification) -> str:
+    """The SI unit of the outputs: m or rad."""
+    return "rad" if found.candidate().model.outputs[0].quantity == "angle" else "m"
+
+
+@dataclass(frozen=True, slots=True)
+class Scale:
+    """A unit with a prefix in which a column or an axis is read well, and its SI value."""
+
+    unit: str
+    size: float
+
+    def text(self, value: float) -> str:
+        """A value without its unit, in three digits; "" for nan."""
+        return "" if math.isnan(value) else minus(f"{float(f'{value / self.size:.3g}'):.10g}")
+
+
+def scale(values: object, unit: str) -> Scale:
+    """The unit that leaves the largest of some values one to three digits before the point.
+
+    Args:
+        values: in SI units, of any shape; nan does not count.
+        unit: their SI unit.
+    """
+    size = np.abs(np.asarray(values, dtype=np.float64))
+    largest = float(size[np.isfinite(size)].max(initial=0.0))
+    name = format_quantity(largest, unit).partition(" ")[2] if largest else unit
+    return Scale(name, parse_quantity(f"1 {name}", unit))
+
+
+# ------------------------------------------------------------------------------------------------------------- numbers
+def over_outputs(rms: Floats) -> Floats:
+    """Rms over the outputs of what has the shape (..., outputs)."""
+    return np.asarray(np.sqrt(np.mean(np.square(rms), axis=-1)))
+
+
+def shares(candidate: Candidate, found: CoupledIdentification) -> Floats:
+    """Error of a candidate over the output at each amplitude, rms over the outputs, shape (amplitudes,).
+
+    Args:
+        candidate: one model.
+        found: what was identified.
+    """
+    return over_outputs(candidate.error_rms / found.output_rms)
+
+
+def linear_floor(found: CoupledIdentification) -> Floats:
+    """Rms that the best linear model of each amplitude leaves, (amplitudes, outputs), SI; nan where that is not known.
+
+    It is found without a model: what the measured response leaves of the outputs of the fitted records.
+    """
+    rows = [
+        np.full(found.output_rms.shape[1], np.nan) if r is None else np.sqrt(np.sum(r.residual_power, axis=0))
+        for r in found.responses
+    ]
+    return np.array(rows)
+
+
+def in_bands(response: FrequencyResponse, power: Floats, bands_hz: Floats) -> Floats:
+    """Root of the power at the frequencies of a response in each band, shape (bands, outputs).
+
+    Args:
+        response: with the frequencies.
+        power: at each of them, (frequencies, outputs).
+        bands_hz: edges of the bands, (bands + 1,), Hz.
+    """
+    band = np.searchsorted(bands_hz, response.freq_hz, side="right") - 1
+    band[response.freq_hz == bands_hz[-1]] = bands_hz.size - 2
+    sums = np.stack([power[band == k].sum(axis=0) for k in range(bands_hz.size - 1)])
+    return np.where(sums > 0.0, np.sqrt(sums), np.nan)
+
+
+def noise_power(response: FrequencyResponse) -> Floats | None:
+    """What of the residual power of a response changes from period to period, (frequencies, outputs); None if unknown.
+
+    It is that of the mean of the periods.
+    """
+    if response.noise_standard_error is None:
+        return None
+    error = np.maximum(response.standard_error[:, :, 0], 1e-300)
+    return np.asarray(response.residual_power * (response.noise_standard_error[:, :, 0] / error) ** 2)
+
+
+@dataclass(frozen=True, slots=True)
+class Pole:
+    """A pole, one of a conjugate pair: natural frequency and damping ratio (1 where it is real), one standard error."""
+
+    freq_hz: float
+    freq_error_hz: float
+    damping: float
+    damping_error: float
+    excited: bool
+
+    @property
+    def real(self) -> bool:
+        """Whether it is real."""
+        return self.damping_error == 0.0
+
+    @property
+    def texts(self) -> tuple[str, str, str, str]:
+        """Frequency (Hz) and damping, each with its standard error and with the digits that this leaves."""
+        damping = (f"{self.damping:.0f}", "") if self.real else with_error(self.damping, self.damping_error)
+        return *with_error(self.freq_hz, self.freq_error_hz), *damping
+
+
+def with_error(value: float, error: float) -> tuple[str, str]:
+    """A value with the digits that its standard error leaves it, and that error.
+
+    Args:
+        value: as it was found.
+        error: its standard error in the same unit; nan where it is not known.
+    """
+    if math.isnan(error):
+        return minus(f"{value:.4g}"), "not known"
+    return to_error(value, error), two_digits(error)
+
+
+def poles(candidate: Candidate) -> list[Pole]:
+    """The poles at rest by their frequency."""
+    low, high = candidate.model.excited_hz
+    every = zip(candidate.poles_rad_s, candidate.poles_error_rad_s, strict=True)
+    return sorted((_pole(complex(p), complex(e), low, high) for p, e in every), key=lambda pole: pole.freq_hz)
+
+
+def _pole(pole: complex, error: complex, low_hz: float, high_hz: float) -> Pole:
+    """Errors of modulus and damping from those of real and imaginary part, taken as independent."""
+    size = abs(pole) or 1e-300
+    s, w, ds, dw = pole.real, pole.imag, error.real, error.imag
+    freq = size / (2 * math.pi)
+    if w == 0.0:
+        return Pole(freq, abs(ds) / (2 * math.pi), 1.0, 0.0, low_hz <= freq <= high_hz)
+    freq_error = math.hypot(s * ds, w * dw) / size / (2 * math.pi)
+    damping_error = abs(w) * math.hypot(w * ds, s * dw) / size**3
+    return Pole(freq, freq_error, -s / size, damping_error, low_hz <= freq <= high_hz)
+
+
+def drawn_amplitude(found: CoupledIdentification) -> int | None:
+    """Number of the amplitude whose response is drawn: the middle one of those that have one."""
+    known = [k for k, response in enumerate(found.responses) if response is not None]
+    return known[len(known) // 2] if known else None
+
+
+# ----------------------------------------------------------------------------------------------------------- sentences
+def part(share: float) -> str:
+    """An error over the output, in per cent and as many digits as tell candidates apart; "" for nan."""
+    return "" if math.isnan(share) else percent(share, 3)
+
+
+def counted(number: int, noun: str) -> str:
+    """A number with its noun: "1 parameter", "2 parameters".
+
+    Args:
+        number: how many.
+        noun: in the singular.
+    """
+    return f"{number} {noun}{'s' * (number != 1)}"
+
+
+def headline(found: CoupledIdentification) -> str:
+    """Which model was chosen, and how well it predicts."""
+    own = found.candidate()
+    name = f"Stopped before the last model, so the choice so far: {own.name}" if found.stopped else _begun(own.name)
+    return (
+        f"{name} ({counted(own.parameters, 'parameter')}) predicts "
+        f"{counted(len(found.held_out), 'record')} that no fit has seen with an error of {part(own.error_share)} of "
+        "the rms output."
+    )
+
+
+def _begun(sentence: str) -> str:
+    """A sentence with a capital letter."""
+    return f"{sentence[:1].upper()}{sentence[1:]}"
+
+
+def sound(found: CoupledIdentification) -> bool | None:
+    """Whether the choice can be used: it leaves less than half of the output; None where the ladder was stopped."""
+    return None if found.stopped else found.candidate().error_share < USABLE
+
+
+def worst(found: CoupledIdentification) -> tuple[str, str, float]:
+    """Held-out record and output with the largest error of the chosen model over the rms output, and that share."""
+    share = found.candidate().record_share
+    record, output = np.unravel_index(int(np.argmax(share)), share.shape)
+    return found.held_out[record], found.candidate().model.outputs[output].name, float(share[record, output])
+
+
+def worst_text(found: CoupledIdentification) -> str:
+    """The same in a sentence."""
+    record, output, share = worst(found)
+    return f"The worst is {output} of {record}: {part(share)}."
+
+
+def by_amplitude(found: CoupledIdentification) -> str:
+    """The error of the chosen model at each amplitude of the drive, in the outputs' unit and in per cent."""
+    own = found.candidate()
+    errors, parts = over_outputs(own.error_rms), shares(own, found)
+    known = [k for k in range(errors.size) if np.isfinite(errors[k])]
+    told = [
+        f"{quantity(errors[k], unit_of(found))} rms ({part(parts[k])} of the output) at "
+        f"{quantity(found.amplitudes_v[k], 'V')} rms drive"
+        for k in known
+    ]
+    if len(told) > _MOST_AMPLITUDES:
+        told = [told[0], told[len(told) // 2], told[-1]]
+    return f"It leaves {_listed(told)}." if told else ""
+
+
+def rests_on(found: CoupledIdentification) -> str:
+    """On which records the verdict rests."""
+    names = list(found.held_out[:_MOST_NAMES])
+    more = len(found.held_out) - len(names)
+    names += [f"{more} more"] if more else []
+    return f"This rests on {_listed(names)}; {counted(len(found.fitted), 'other record')} were fitted."
+
+
+def _listed(texts: Sequence[str]) -> str:
+    return " and ".join(filter(None, [", ".join(texts[:-1]), *texts[-1:]]))
+
+
+def verdict(found: CoupledIdentification) -> list[str]:
+    """What was found and on what it rests, a sentence each; the first is the headline."""
+    return [
+        *filter(None, (headline(found), by_amplitude(found), worst_text(found), rests_on(found), _begun(found.reason)))
+    ]
+
+
+def delay_text(candidate: Candidate) -> str:
+    """The delay of the recording chain in a sentence."""
+    delay, error = candidate.model.delay_s, candidate.delay_error_s
+    known = f" ± {quantity(error, 's', 2)}" if math.isfinite(error) and error > 0.0 else ""
+    return (
+        f"The drive acts {quantity(delay, 's')}{known} late. That delay belongs to the recording chain (converters, "
+        "filters, amplifier), not to the mirror: the mirror file holds it apart."
+    )
+
+
+def not_held(found: CoupledIdentification) -> list[str]:
+    """What the mirror file does not hold because the recordings do not show it, a sentence each."""
+    own = found.candidate()
+    low, high = own.model.excited_hz
+    said = [
+        f"Creep: nothing below {quantity(low, 'Hz')} was excited, so what the mirror does within minutes of a step was "
+        "not seen.",
+        f"Modes above {quantity(high, 'Hz')}: nothing was excited there.",
+    ]
+    if own.kind != "hysteretic stiffness":
+        said.append("Hysteresis: the chosen model is linear, and its gain is the same at every amplitude.")
+    if any(output.quantity == "displacement" and output.position_m is None for output in own.model.outputs):
+        said.append(
+            "A geometry: where the displacements are measured was not stated. Tilts and piston cannot be had from "
+            "them, and sensors that are swapped or reversed would not be noticed."
+        )
+    if any(output.quantity == "angle" for output in own.model.outputs):
+        said.append("The signs of the axes: a reversed sensor of an angle would not be noticed.")
+    if own.model.known is None:
+        said.append("Uncertainty: standard errors of the parameters are not known.")
+    return said
+
+
+def pole_error_text(errors: Complexes) -> str:
+    """What the standard errors of poles are, or that there are none."""
+    if not np.isfinite(errors).all():
+        return "Standard errors that are not known would need more records of each amplitude."
+    return "± is one standard error; it says nothing of what the model leaves out."

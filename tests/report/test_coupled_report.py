@@ -1,0 +1,465 @@
+"""The report of an identification of several channels: the same numbers in terminal, page and JSON, and all are said.
+
+Its record is made by hand: two actuators, two outputs, two amplitudes; responses are those of simulated multisines.
+"""
+
+import html
+import json
+import re
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from microrad import report
+from microrad.lab.identify.coupled import Candidate, CoupledIdentification
+from microrad.lab.identify.linear.amplitude import AmplitudeDependence
+from microrad.lab.identify.linear.response import response_from_periods
+from microrad.lab.identify.selection.candidates import Refused
+from microrad.lab.recording import Recording
+from microrad.mirror.coupled import Actuator, CoupledMirror, Known, Output
+from microrad.mirror.model import Mirror
+from microrad.report.identification import coupled_words as words
+from microrad.report.identification.coupled import MOST_LINES
+from microrad.report.identification.coupled_figures import MOST, bands, coupled_figures, error_over_parameters
+from microrad.report.plotting.sheet import Line, Rule, Span
+from report_pages import assert_sound, without_scripts
+
+RATE_HZ, PERIOD = 1000.0, 256
+BANDS_HZ = np.array([3.9, 40.0, 400.0])
+OUTPUT_RMS = np.array([[1.0e-6, 2.0e-6], [2.0e-6, 4.0e-6]])
+NOISE_RMS = np.array([[1.0e-8, 2.0e-8], [1.0e-8, 2.0e-8]])
+HELD_OUT = ("small <3>.npy", "large <3>.npy")
+HOSTILE = "<b>sensor</b>"
+
+
+def philox(seed):
+    return np.random.Generator(np.random.Philox(seed))
+
+
+def plant():
+    """A pair at 79.6 Hz and a real pole, micrometres from volts."""
+    A = np.array([[-20.0, -500.0, 0.0], [500.0, -20.0, 0.0], [0.0, 0.0, -900.0]])
+    B = np.array([[0.0, 0.0], [400.0, 300.0], [500.0, -600.0]])
+    C = 1e-6 * np.array([[1.0, 0.2, 1.0], [0.7, 0.1, -1.0]])
+    none = np.zeros((3, 0)), np.zeros((0, 3)), np.zeros((0, 2)), np.zeros((2, 0))
+    return Mirror("mirror", A, B, none[0], none[1], none[2], C, np.zeros((2, 2)), none[3], (), (), ())
+
+
+@cache
+def coupled(quantity="displacement", known=None):
+    """The plant with its channels."""
+    return CoupledMirror(
+        plant(),
+        (Actuator("piezo 1", 5.0, 4.25, 5.75, 1.5e4), Actuator("piezo 2", 4.0, 3.5, 4.5, 1e4)),
+        (Output(HOSTILE, quantity), Output("y1", quantity)),
+        2e-4,
+        RATE_HZ,
+        2,
+        (3.9, 400.0),
+        known,
+    )
+
+
+@cache
+def responses(scale):
+    """Measured and modelled response at an amplitude, and the records behind it: three realisations of two periods."""
+    measured, modelled = [], []
+    for seed in range(3):
+        phases = philox(seed).uniform(0, 2 * np.pi, (102, 2))
+        spectrum = np.zeros((PERIOD // 2 + 1, 2), dtype=complex)
+        spectrum[1:103] = np.exp(1j * phases)
+        drive = np.fft.irfft(spectrum, PERIOD, axis=0)
+        drive = np.tile(scale * drive / drive.std(axis=0), (2, 1))
+        model = coupled().response(np.concatenate([drive[:PERIOD], drive]))[PERIOD:]
+        noise = 1e-8 * philox(100 + seed).standard_normal(model.shape)
+        names = ("piezo 1", "piezo 2"), (HOSTILE, "y1")
+        record = Recording(f"{scale:g} V, {seed}", "", drive, 1.02 * model + noise, RATE_HZ, *names, PERIOD)
+        measured.append(record)
+        modelled.append(replace(record, output=model))
+    return response_from_periods(measured), response_from_periods(modelled).response
+
+
+def candidate(name, kind, parameters, share, error=None, **more):
+    """A candidate with this error over the output everywhere, unless told otherwise."""
+    errors = share * OUTPUT_RMS if error is None else error
+    return Candidate(
+        name=name,
+        kind=kind,
+        order=3,
+        parameters=parameters,
+        model=coupled(),
+        poles_rad_s=np.array([-20.0 + 500.0j, -900.0 + 0.0j]),
+        poles_error_rad_s=np.array([1.0 + 2.0j, 30.0 + 0.0j]),
+        delay_error_s=5e-6,
+        error_rms=errors,
+        band_error_rms=np.stack([0.6 * errors, 0.8 * errors], axis=1),
+        error_share=share,
+        record_share=np.array([[0.9 * share, 1.1 * share], [share, share]]),
+        **more,
+    )
+
+
+def found_of(**changes):
+    """The identification, with some of its fields changed."""
+    small, large = responses(0.1), responses(0.2)
+    given = {
+        "candidates": (
+            candidate("per axis, order 2", "per axis", 11, 0.523),
+            candidate("coupled linear, order 3", "coupled linear", 17, 0.2171, note="its search had not settled"),
+            candidate("hysteretic stiffness, order 3", "hysteretic stiffness", 47, 0.0523),
+            candidate("hysteretic stiffness, order 5", "hysteretic stiffness", 81, 0.0517),
+        ),
+        "chosen": "hysteretic stiffness, order 3",
+        "reason": "the smaller of two whose difference may be chance.",
+        "within_noise": ("hysteretic stiffness, order 3", "hysteretic stiffness, order 5"),
+        "warnings": ("Output y1 drifts.", "Few realisations."),
+        "refused": (Refused("hysteretic stiffness, order 9", "the fitted mirror <runs> away"),),
+        "amplitudes_v": np.array([0.1, 0.2]),
+        "bands_hz": BANDS_HZ,
+        "output_rms": OUTPUT_RMS,
+        "noise_rms": NOISE_RMS,
+        "responses": (small[0], large[0]),
+        "modelled": (small[1], large[1]),
+        "dependence": AmplitudeDependence(
+            np.array([0.1, 0.2]),
+            np.array([2.0e-6, 2.1e-6]),
+            np.array([79.58, 78.2]),
+            np.array([0.2, 0.1]),
+            np.full(2, 0.04),
+        ),
+        "fitted": ("small 0", "small 1", "small 2", "large 0", "large 1", "large 2"),
+        "held_out": HELD_OUT,
+        "stopped": False,
+    }
+    return CoupledIdentification(**given | changes)
+
+
+def page_of(found, folder, name="found.html", **options):
+    given = {"mirror_file": Path("lab.toml"), "mirror_text": "version = 2\n", "title": "A mirror"}
+    return report.write_coupled_identification(found, folder / name, **given | options)
+
+
+def one_line(text):
+    return re.sub(r"\s+", " ", text)
+
+
+def plain(page):
+    """What a page says, without its tags."""
+    return one_line(html.unescape(re.sub(r"<[^>]*>", " ", without_scripts(page))))
+
+
+@pytest.fixture(scope="module")
+def found():
+    return found_of()
+
+
+@pytest.fixture(scope="module")
+def page(found, tmp_path_factory):
+    return page_of(found, tmp_path_factory.mktemp("coupled")).read_text("utf-8")
+
+
+@pytest.fixture(scope="module")
+def text(found):
+    return report.coupled_identification_text(found, 80, mirror_file=Path("lab.toml"), report_file=Path("lab.html"))
+
+
+@pytest.fixture(scope="module")
+def data(found):
+    made = report.coupled_identification_data(found, mirror_file=Path("lab.toml"), report_file=Path("lab.html"))
+    assert json.loads(json.dumps(made, allow_nan=False)) == made
+    return made
+
+
+def rows_of(page):
+    """The cells of each table row of a page, as plain text."""
+    rows = re.findall(r"<tr[^>]*>(.*?)</tr>", page, re.DOTALL)
+    cells = (re.findall(r"<t[dh][^>]*>(.*?)</t[dh]>", row, re.DOTALL) for row in rows)
+    return [[html.unescape(re.sub(r"<[^>]*>", "", cell)).strip() for cell in row] for row in cells]
+
+
+def row_of(page, first):
+    (row,) = [row for row in rows_of(page) if row and row[0] == first]
+    return row
+
+
+# ----------------------------------------------------------------------------------------------------- the same numbers
+def test_the_verdict_is_the_same_in_all_faces(found, page, text, data):
+    headline, amplitudes, worst, rests, reason = words.verdict(found)
+    assert headline == (
+        "Hysteretic stiffness, order 3 (47 parameters) predicts 2 records that no fit has seen with an error of 5.23 % "
+        "of the rms output."
+    )
+    assert amplitudes == (
+        "It leaves 82.7 nm rms (5.23 % of the output) at 100 mV rms drive and 165 nm rms (5.23 % of the output) at "
+        "200 mV rms drive."
+    )
+    assert worst == "The worst is y1 of small <3>.npy: 5.75 %."
+    assert rests == "This rests on small <3>.npy and large <3>.npy; 6 other records were fitted."
+    assert reason == "The smaller of two whose difference may be chance."
+    assert data["verdict"] == [headline, amplitudes, worst, rests, reason]
+    assert all(sentence in plain(page) for sentence in data["verdict"])
+    assert headline in one_line(text) and worst in one_line(text)
+    assert data["worst"] == {"record": "small <3>.npy", "output": "y1", "error_share": pytest.approx(0.05753)}
+
+
+@pytest.mark.parametrize("number", range(4))
+def test_each_candidate_is_in_all_faces(found, page, text, data, number):
+    own = found.candidates[number]
+    error = ("52.3 %", "21.7 %", "5.23 %", "5.17 %")[number]
+    said = ("", "its search had not settled", "chosen", "within noise")[number]
+    assert row_of(page, own.name) == [own.name, str(own.parameters), error, error, error, said]
+    (line,) = [line for line in text.splitlines() if line.strip().startswith(own.name)]
+    assert line.split()[4:6] == [str(own.parameters), error.split()[0]]
+    of = data["candidates"][number]
+    assert (of["name"], of["kind"], of["parameters"]) == (own.name, own.kind, own.parameters)
+    assert of["error_share"] == own.error_share
+    assert of["error_rms_m"] == own.error_rms.tolist()
+    assert of["error_share_by_amplitude"] == pytest.approx([own.error_share] * 2)
+    assert of["record_error_share"] == dict(zip(HELD_OUT, own.record_share.tolist(), strict=True))
+
+
+def test_errors_by_amplitude_and_record_stand_beside_floor_and_noise(found, page, text, data):
+    floor = words.linear_floor(found)
+    linear = f"{1e9 * float(np.sqrt(np.mean(floor[0] ** 2))):.3g}"
+    assert ["100 mV", "1580", "82.7", "5.23 %", linear, "15.8", f"{HOSTILE}, 5.23 %"] in rows_of(page)
+    assert data["linear_floor_rms_m"] == floor.tolist()
+    assert 1e-9 < floor.min() < floor.max() < 2e-8  # the noise of the records, in the mean of two periods
+    assert row_of(page, HELD_OUT[0]) == [HELD_OUT[0], "5.26 %", "4.71 %", "5.75 %"]
+    assert re.search(rf"100 mV +82.7 +5.23 % +{linear} +", text)
+
+
+def test_poles_by_hand(found, page, data):
+    pair, real = words.poles(found.candidate())
+    size = np.hypot(20.0, 500.0)
+    assert pair.freq_hz == pytest.approx(size / (2 * np.pi))
+    assert pair.freq_error_hz == pytest.approx(np.hypot(20.0 * 1.0, 500.0 * 2.0) / size / (2 * np.pi))
+    assert pair.damping == pytest.approx(20.0 / size)
+    moved = [-p.real / abs(p) for p in (-21.0 + 500.0j, -20.0 + 502.0j)]
+    assert pair.damping_error == pytest.approx(np.hypot(*(np.array(moved) - pair.damping)), rel=0.01)
+    assert (real.freq_hz, real.damping, real.excited) == (pytest.approx(900.0 / (2 * np.pi)), 1.0, True)
+    assert row_of(page, "pair") == ["pair", "79.64", "0.32", "0.04", "0.002", "yes", ""]
+    assert row_of(page, "real pole")[1:5] == ["143.2", "4.8", "1", ""]
+    assert data["candidates"][2]["poles"][0]["frequency_hz"] == pair.freq_hz
+
+
+def test_a_pole_whose_error_is_not_known_has_its_digits():
+    own = replace(found_of().candidate(), poles_error_rad_s=np.full(2, complex(np.nan, np.nan)))
+    assert [pole.texts for pole in words.poles(own)] == [
+        ("79.64", "not known", "0.03997", "not known"),
+        ("143.2", "not known", "1", ""),
+    ]
+    assert words.pole_error_text(own.poles_error_rad_s).startswith("Standard errors that are not known")
+
+
+def test_range_delay_and_amplitude_dependence_are_said(page, data):
+    assert row_of(page, "piezo 1") == ["piezo 1", "5 V", "4.25 V", "5.75 V", "15 kV/s"]
+    assert "The drive acts 200 µs ± 5 µs late." in plain(page)
+    assert data["actuators"][1]["rate_limit_v_s"] == 1e4 and data["delay_s"] == 2e-4
+    assert "the gain changes by +5 % and the main resonance by \u22121.38 Hz" in plain(page)
+    assert data["amplitude_dependence"]["gain_m_v"] == [2.0e-6, 2.1e-6]
+    assert ["200 mV", "2.1", "78.2", "0.1", "0.04"] in rows_of(page)
+
+
+def test_what_the_mirror_file_does_not_hold_is_said(found, page, data):
+    said = words.not_held(found)
+    assert data["not_in_the_mirror_file"] == said and all(sentence in plain(page) for sentence in said)
+    assert [sentence.split(":")[0] for sentence in said] == ["Creep", "Modes above 400 Hz", "A geometry", "Uncertainty"]
+    known = Known(("recording.delay",), np.array([5e-6]), np.ones((1, 1)))
+    linear = replace(found.candidate("coupled linear, order 3"), model=coupled("angle", known))
+    other = words.not_held(replace(found, candidates=(linear,), chosen=linear.name))
+    assert [sentence.split(":")[0] for sentence in other] == [
+        "Creep",
+        "Modes above 400 Hz",
+        "Hysteresis",
+        "The signs of the axes",
+    ]
+
+
+# --------------------------------------------------------------------------------------------------------- the terminal
+def test_the_terminal_is_short(text):
+    lines = text.splitlines()
+    assert len(lines) <= MOST_LINES == 25 and max(map(len, lines)) <= 80
+    assert lines[-1] == "lab.toml written (hysteretic stiffness, order 3)."
+    assert "- Output y1 drifts." in lines and "- Few realisations." in lines
+    assert "- 1 refused model: see the report, or --json." in lines
+
+
+def test_the_terminal_is_short_however_much_there_is_to_say():
+    many = tuple(
+        candidate(f"coupled linear, order {n}", "coupled linear", 10 * n, 0.5 - 0.01 * n) for n in range(1, 30)
+    )
+    long = tuple(f"Warning {n}: {'it goes on and on, ' * 9}and ends." for n in range(1, 20))
+    found = found_of(candidates=many, chosen=many[3].name, within_noise=(many[3].name,), warnings=long)
+    files = {"mirror_file": Path("a" * 60 + ".toml"), "report_file": Path("b" * 60 + ".html")}
+    lines = report.coupled_identification_text(found, 80, **files).splitlines()
+    assert len(lines) <= MOST_LINES and max(map(len, lines)) <= 80
+    (own,) = [line for line in lines if line.startswith(" coupled linear, order 4 ")]
+    assert own.endswith("chosen")
+    assert re.search(
+        r"^- \d+ (more )?warnings and 1 refused model: see the report, or --json\.$", "\n".join(lines), re.M
+    )
+    assert sum(line.startswith(" coupled linear") for line in lines) == 4
+
+
+# ------------------------------------------------------------------------------------------------------------- the page
+def test_the_page_is_sound_and_escapes_what_is_not_ours(page, found):
+    assert_sound(page)
+    assert HOSTILE not in without_scripts(page) and html.escape(HOSTILE) in page
+    assert "http" not in re.sub(r"http://www\.w3\.org/\S+", "", without_scripts(page))
+    assert len(page) < 2_500_000
+    assert page.startswith('<!DOCTYPE html>\n<html lang="en" data-made-by="microrad identify">')
+
+
+def test_refused_models_have_their_reasons(page, data):
+    assert "hysteretic stiffness, order 9: the fitted mirror <runs> away" in plain(page)
+    assert data["refused"] == {"hysteretic stiffness, order 9": "the fitted mirror <runs> away"}
+
+
+def test_a_ladder_that_was_stopped_says_so(tmp_path):
+    found = found_of(stopped=True)
+    begins = (
+        "Stopped before the last model, so the choice so far: hysteretic stiffness, order 3 (47 parameters) predicts"
+    )
+    assert words.headline(found).startswith(begins)
+    assert begins in one_line(report.coupled_identification_text(found))
+    assert report.coupled_identification_data(found)["stopped"] is True
+    written = page_of(found, tmp_path).read_text("utf-8")
+    assert begins in plain(written) and "The ladder was stopped before its last model" in plain(written)
+    assert words.sound(found) is None and words.sound(found_of()) is True
+    assert 'class="verdict pass"' not in written
+
+
+def test_a_model_that_leaves_most_of_the_output_is_no_good_news():
+    assert words.sound(found_of(chosen="per axis, order 2")) is False
+
+
+def test_a_report_is_replaced_only_where_it_is_asked_for(found, tmp_path):
+    target = page_of(found, tmp_path)
+    with pytest.raises(report.ReportError, match=r"found\.html exists and is left as it is.*--overwrite"):
+        page_of(found, tmp_path)
+    assert page_of(found, tmp_path, overwrite=True, title="Another").read_text("utf-8").count("<h1>Another</h1>") == 1
+    target.write_text("mine")
+    with pytest.raises(report.ReportError, match="not a report that microrad identify wrote"):
+        page_of(found, tmp_path, overwrite=True)
+    assert target.read_text() == "mine"
+
+
+# ---------------------------------------------------------------------------------------------------------- the figures
+def test_every_axis_has_its_unit_and_no_panel_is_empty(found):
+    figures = coupled_figures(found)
+    assert list(figures) == ["error-over-parameters", "response", "amplitude", "bands"]
+    for figure in figures.values():
+        for placed in figure.placed.placed:
+            assert re.search(r"\(.+\)$", placed.x_title) and re.search(r"\(.+\)$", placed.y_title)
+            lines = [line for line in placed.panel.all_of(Line) if line.x.size]
+            assert lines and all(np.isfinite(line.y).any() for line in lines)
+
+
+def test_the_winner_is_marked_among_points_of_each_candidate(found):
+    (panel,) = error_over_parameters(found).sheet.panels
+    lines = {line.label: line for line in panel.all_of(Line)}
+    assert lines["hysteretic stiffness"].x.tolist() == [47, 81]
+    assert lines["hysteretic stiffness"].y == pytest.approx([5.23, 5.17])
+    assert (lines["chosen"].x.tolist(), lines["chosen"].y) == ([47], pytest.approx([5.23]))
+    (band,) = panel.all_of(Span)
+    assert (band.low, band.high) == (pytest.approx(5.17), pytest.approx(5.23))
+    rules = {rule.label: rule.at for rule in panel.all_of(Rule)}
+    assert rules["noise"] == pytest.approx(100 * np.sqrt((0.01**2 + 0.005**2) / 2))
+    assert 0.0 < rules["left by the best linear model of each amplitude"] < rules["noise"]
+
+
+def test_the_response_has_a_panel_for_each_pair_with_measured_and_modelled(found):
+    panels = coupled_figures(found)["response"].sheet.panels
+    assert [p.title for p in panels] == [
+        f"piezo 1 → {HOSTILE}",
+        f"piezo 2 → {HOSTILE}",
+        "piezo 1 → y1",
+        "piezo 2 → y1",
+    ]
+    measured = found.responses[1]
+    for k, panel in enumerate(panels):
+        by = {line.label: line for line in panel.all_of(Line)}
+        assert by["measured"].y.max() == pytest.approx(1e9 * np.abs(measured.response[:, k // 2, k % 2]).max())
+        assert by["modelled"].y.max() == pytest.approx(by["measured"].y.max() / 1.02, rel=0.01)
+        assert 0.0 < by["measured less modelled, rms"].y.max() < 0.05 * by["measured"].y.max()
+        assert panel.y.log and panel.x.log
+
+
+def test_bands_hold_all_of_the_error_and_of_the_floor(found):
+    response = found.responses[0]
+    parts = words.in_bands(response, response.residual_power, BANDS_HZ)
+    assert np.nansum(parts**2, axis=0) == pytest.approx(response.residual_power.sum(axis=0))
+    panels = bands(found).sheet.panels
+    assert [panel.title for panel in panels] == [f"{HOSTILE}, 100 mV", "y1, 100 mV", f"{HOSTILE}, 200 mV", "y1, 200 mV"]
+    error, floor, noise = panels[1].all_of(Line)
+    assert error.y.tolist() == pytest.approx([62.76, 62.76, 83.68, 83.68])
+    assert (noise.y <= 1.5 * floor.y).all()
+
+
+def test_without_responses_what_is_missing_is_said(tmp_path):
+    alone = found_of(responses=(None, None), modelled=(None, None), dependence=None, noise_rms=np.full((2, 2), np.nan))
+    assert list(coupled_figures(alone)) == ["error-over-parameters", "bands"]
+    text = plain(page_of(alone, tmp_path).read_text("utf-8"))
+    assert "No amplitude has enough records for a response of its own" in text
+    assert "Gain and resonance were not compared over the amplitude" in text
+    assert report.coupled_identification_data(alone)["linear_floor_rms_m"] == [[None, None], [None, None]]
+    assert not re.search(r"\bnan\b", text + report.coupled_identification_text(alone))
+
+
+def test_an_amplitude_of_which_nothing_is_held_out_is_left_out(tmp_path):
+    rms = np.array([[np.nan, np.nan], [2.0e-6, 4.0e-6]])
+    own = candidate("coupled linear, order 3", "coupled linear", 17, 0.2, 0.2 * rms)
+    own = replace(own, record_share=np.array([[0.2, 0.2]]))
+    found = found_of(candidates=(own,), chosen=own.name, within_noise=(own.name,), output_rms=rms, held_out=("large",))
+    assert words.by_amplitude(found) == "It leaves 632 nm rms (20 % of the output) at 200 mV rms drive."
+    assert len(bands(found).sheet.panels) == 2
+    assert not re.search(r"\bnan\b", plain(page_of(found, tmp_path).read_text("utf-8")))
+
+
+def test_of_many_channels_the_first_are_drawn(found):
+    outputs, drives = 6, 5
+    wide = np.tile(found.responses[0].response, (1, 3, 3))[:, :outputs, :drives]
+    none = np.zeros((3, 0)), np.zeros((0, 3)), np.zeros((0, drives)), np.zeros((outputs, 0))
+    mirror = replace(
+        plant(), B=np.zeros((3, drives)), C=np.zeros((outputs, 3)), D=np.zeros((outputs, drives)), G=none[2], K=none[3]
+    )
+    model = replace(
+        coupled(),
+        mirror=mirror,
+        actuators=tuple(Actuator(f"u{k}", 0.0, -1.0, 1.0, 1.0) for k in range(drives)),
+        outputs=tuple(Output(f"y{k}", "angle") for k in range(outputs)),
+    )
+    own = replace(
+        found.candidate(),
+        model=model,
+        error_rms=np.full((2, outputs), 1e-7),
+        band_error_rms=np.full((2, 2, outputs), 1e-7),
+        record_share=np.full((2, outputs), 0.1),
+    )
+    response = replace(
+        found.responses[0],
+        response=wide,
+        standard_error=np.abs(wide) / 50,
+        noise_standard_error=None,
+        residual_power=np.full((wide.shape[0], outputs), 1e-18),
+    )
+    rms = np.full((2, outputs), 1e-6)
+    many = replace(
+        found,
+        candidates=(own,),
+        within_noise=(own.name,),
+        output_rms=rms,
+        noise_rms=rms / 100,
+        responses=(response, None),
+        modelled=(0.9 * wide, None),
+    )
+    figures = coupled_figures(many)
+    assert len(figures["response"].sheet.panels) == MOST * MOST == 16
+    assert len(figures["bands"].sheet.panels) == 2 * MOST
+    assert all("Of 6 outputs and 5 drives the first 4 are drawn." in figures[n].caption for n in ("response", "bands"))
+    assert {panel.y.title for panel in figures["response"].sheet.panels} == {"gain (nrad/V)", ""}
+    text = report.coupled_identification_text(many)
+    assert len(text.splitlines()) <= MOST_LINES and max(map(len, text.splitlines())) <= 80
