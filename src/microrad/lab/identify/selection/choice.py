@@ -34,6 +34,7 @@ from microrad.lab.identify.selection.warnings import (
     set_aside_warnings,
 )
 from microrad.lab.identify.statistics import may_be_chance
+from microrad.lab.identify.travel import check_travel
 from microrad.lab.recording import Recording
 
 _MIN_PART = 100
@@ -166,6 +167,7 @@ def identify(  # noqa: PLR0913  all but the first are named options in practice
     if not recordings:
         raise IdentificationError("no recording was given; name at least one.")
     _check_distinct(recordings, validation)
+    check_travel([*recordings, *validation], units.output, units.lever_arm_m)
     response, broadband, loops = roles(recordings)
     splits = _splits(loops, hold_out, bool(validation))
     heads = [r.first(k) for r, k in zip(loops, splits, strict=True)]

@@ -1,0 +1,50 @@
+"""An output that moves farther than a mirror can is refused before anything is fitted, with its file and its unit."""
+
+import math
+
+import numpy as np
+import pytest
+
+from microrad.lab.identify import IdentificationError, identify
+from microrad.lab.identify.travel import check_travel
+from microrad.lab.recording import recording_from_arrays
+
+WAVE = 5 + 5 * np.sin(np.arange(4000) * 0.02)
+
+
+def recorded(size, name="loop.csv"):
+    return recording_from_arrays(WAVE, np.column_stack((0.1 * WAVE, size / 10.0 * WAVE)), 1000.0, name)
+
+
+@pytest.mark.parametrize(
+    ("per_rad", "unit", "options", "words"),
+    [
+        (1.0, "rad", {}, "moves by 2 rad, a tilt of 2 rad, and no mirror turns by more than 1.571 rad (a quarter"),
+        (1000.0, "mrad", {}, "moves by 2000 mrad, a tilt of 2 rad"),
+        (100.0, "mm", {"lever_arm_m": 0.1}, "moves by 200 mm over 100 mm, a tilt of 2 rad"),
+        (10.0, "mm", {"positions_m": [(0.0, 0.0), (0.006, 0.008)]}, "moves by 20 mm over 10 mm, a tilt of 2 rad"),
+    ],
+)
+def test_an_absurd_unit_is_told(per_rad, unit, options, words):
+    most = math.pi / 2 * per_rad
+    check_travel([recorded(0.999 * most)], unit, **options)
+    with pytest.raises(IdentificationError):
+        check_travel([recorded(1.001 * most)], unit, **options)
+    with pytest.raises(IdentificationError) as caught:
+        check_travel([recorded(0.01), recorded(2.0 * per_rad, "far.csv")], unit, **options)
+    message = str(caught.value)
+    assert message.startswith("far.csv: the output 'output 1' moves by ")
+    assert words in message
+    assert "--output-unit" in message
+    assert ("--lever-arm" in message) == bool(options)
+
+
+def test_a_length_without_an_arm_and_an_unknown_unit_are_not_judged():
+    check_travel([recorded(1e6)], "m")
+    check_travel([recorded(1e6)], "km", 0.1)
+
+
+def test_identify_refuses_an_absurd_unit_at_once():
+    one = recording_from_arrays(WAVE, 0.3 * WAVE, 1000.0, "loop.csv")
+    with pytest.raises(IdentificationError, match=r"loop\.csv: the output 'output' moves by 3 rad, a tilt of 3 rad"):
+        identify([one], output_unit="rad")
