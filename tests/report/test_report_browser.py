@@ -13,18 +13,26 @@ from microrad.lab.identify import identify
 from microrad.report.campaign.page import campaign_page
 from microrad.report.day.page import day_page
 from microrad.report.links.views import links_page
+from report import test_coupled_report as several
 from report import test_identification_report as identified
 from report import test_report_campaign as campaigns
 from shipped import whole_drawn, whole_study
 from waiting import HANG_MS
 
 A4_PX = 680  # between the margins
-ALIVE = {"report": 20, "day": 6, "campaign": 6, "identification": 5}
+ALIVE = {"report": 20, "day": 6, "campaign": 6, "identification": 5, "channels": 4}
 """Pages with interactive figures, and how many they have at least."""
-SEEN = [("campaign", 1280), ("identification", 400), ("report", 400)]
+SEEN = [("campaign", 1280), ("identification", 400), ("report", 400), ("channels", 400)]
 SEEN += [
     pytest.param(*each, marks=pytest.mark.endurance)
-    for each in (("report", 1280), ("day", 400), ("day", 1280), ("campaign", 400), ("identification", 1280))
+    for each in (
+        ("report", 1280),
+        ("day", 400),
+        ("day", 1280),
+        ("campaign", 400),
+        ("identification", 1280),
+        ("channels", 1280),
+    )
 ]
 """Pages and widths: each page once, that of a day within the report, which has its figures; what else is done with the
 report is done at its full width."""
@@ -50,6 +58,8 @@ def files(tmp_path_factory):
             with pytest.MonkeyPatch.context() as patch:
                 patch.setattr(report, "study_figures", lambda *_: drawn)
                 return report.write(whole_study()[0], folder / "study")
+        if name == "channels":
+            return several.page_of(several.found_of(), folder, "channels.html")
         if name == "identification":
             mirror = identify(recordings, 0.5, models=("prandtl_ishlinskii", "linear"))
             return identified.write(mirror, folder / "identification.html", recordings=recordings)
@@ -247,7 +257,7 @@ SHOWN = "each => each.getBoundingClientRect().height > 2 * each.querySelector('s
     [
         "report",
         "campaign",
-        *(pytest.param(e, marks=pytest.mark.endurance) for e in ("identification", "day", "budget")),
+        *(pytest.param(e, marks=pytest.mark.endurance) for e in ("identification", "channels", "day", "budget")),
     ],
 )
 def test_paper_is_wide_enough_and_shows_what_is_folded(opened, name):

@@ -223,7 +223,7 @@ def _amplitudes(found: CoupledIdentification, *, short: bool = False) -> Table:
         rows.append((first, numbers[0], numbers[1], words.part(float(shares[k])), *numbers[2:], worst))
     rms = [f"{name} ({scale.unit})" for name in ("output", "error", "best linear", "noise")]
     headings = ("drive, rms", *rms[:2], "of output", *rms[2:], "worst output")
-    return Table("", headings, rows, (6,), cards=True, brief=(0, 2, 3, 4, 6))
+    return Table("", headings, rows, (6,) if short else (0, 6), cards=True, brief=(0, 2, 3, 4, 6))
 
 
 def _few(count: int) -> Sequence[int]:

@@ -51,7 +51,7 @@ def error_over_parameters(found: CoupledIdentification) -> Figure:
             panel.add(_candidates(own, label=kind, size=7.0, width=0.7, dash=":", **style))
     panel.add(
         _candidates(
-            [found.candidate()], label="chosen", colour=BLACK, dash="", marker="o", size=14.0, face="", edge=BLACK
+            [found.candidate()], label="chosen", colour=BLACK, dash="", marker="o", size=11.0, face="", edge=BLACK
         )
     )
     if np.isfinite(floor := _share(words.linear_floor(found), found)):
@@ -59,7 +59,7 @@ def error_over_parameters(found: CoupledIdentification) -> Figure:
     if np.isfinite(noise := _share(found.noise_rms, found)):
         panel.add(Rule(100 * noise, False, BLACK, ":", 1.0, "noise"))
     panel.x = Axis("parameters (1)", log=True)
-    panel.y, panel.legend = Axis("error on held-out records (% of rms output)", log=True), Legend("right")
+    panel.y, panel.legend = Axis("error on held-out records (% of rms output)", log=True), Legend("best")
     caption = (
         "Each point is a model, fitted to the other records and run over those that no fit has seen. Of those in the "
         "shaded band, whose differences to the best may be chance, the one with the fewest parameters is chosen."
