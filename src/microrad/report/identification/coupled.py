@@ -24,8 +24,8 @@ from microrad.report.quantities import minus, quantity
 from microrad.report.tables import Cell, Table
 from microrad.report.view import Block, Points, Soft, Verbatim, Verdict, View, told, views_text
 
-MOST_LINES = 25
-"""Of a terminal."""
+MOST_LINES = 23
+"""Of a terminal of 25: the command has one of its own above them."""
 _MOST_ROWS = 4  # of a table of a terminal
 _MOST_UNFOLDED = 12  # rows of a table of records
 _MOST_FILE_LINES = 60  # of the mirror file that a page shows
@@ -95,7 +95,7 @@ def coupled_identification_text(
     mirror_file: Path | None = None,
     report_file: Path | None = None,
 ) -> str:
-    """The identification in at most 25 lines for a terminal of 80 columns; the files stand at its end.
+    """The identification in at most 23 lines for a terminal of 80 columns; the files stand at its end.
 
     Args:
         found: what was identified.
@@ -108,7 +108,7 @@ def coupled_identification_text(
     first = views_text([words.headline(found), words.worst_text(found)], width)
     tables = views_text([_amplitudes(found, short=True), _candidates(found, short=True)], width)
     last = "\n".join(line for each in files for line in wrap(each, width))
-    room = MOST_LINES - sum(part.count("\n") + 2 for part in (first, tables, last) if part) - 1
+    room = MOST_LINES - sum(part.count("\n") + 2 for part in (first, tables, last) if part)
     parts = [first, tables, _warnings_text(found, width, room), last]
     return "\n\n".join(filter(None, parts))
 
@@ -181,12 +181,11 @@ def _choice(found: CoupledIdentification, figures: Mapping[str, Figure]) -> View
 
 
 def _candidates(found: CoupledIdentification, *, short: bool = False) -> Table:
-    """The candidates by their error, the lowest first; a short table has the first ones and the chosen."""
+    """The candidates by their error, the lowest first; a short table has the chosen one and the best of each kind."""
     ranked = sorted(found.candidates, key=lambda candidate: candidate.error_share)
-    if short and len(ranked) > _MOST_ROWS:
-        own = found.candidate()
-        best = ranked[:_MOST_ROWS]
-        ranked = best if own in best else [*best[:-1], own]
+    if short:
+        best = {candidate.kind: candidate.name for candidate in reversed(ranked)}
+        ranked = [candidate for candidate in ranked if candidate.name in (found.chosen, *best.values())]
     known = [k for k in range(found.amplitudes_v.size) if np.isfinite(found.output_rms[k]).all()]
     shown = [] if short or len(known) > _MOST_COLUMNS else known
     rows = []

@@ -15,6 +15,7 @@ from microrad.report.quantities import minus, percent, quantity
 
 USABLE = 0.5
 """Of the rms output: a model that leaves more on records that no fit has seen is none."""
+_SENSORS = 4  # from which their places contradict a sensor that is reversed
 _MOST_NAMES = 4
 _MOST_AMPLITUDES = 4
 
@@ -267,13 +268,17 @@ def not_held(found: CoupledIdentification) -> list[str]:
     ]
     if own.kind != "hysteretic stiffness":
         said.append("Hysteresis: the chosen model is linear, and its gain is the same at every amplitude.")
-    if any(output.quantity == "displacement" and output.position_m is None for output in own.model.outputs):
+    outputs = own.model.outputs
+    if placeless := any(output.quantity == "displacement" and output.position_m is None for output in outputs):
         said.append(
-            "A geometry: where the displacements are measured was not stated. Tilts and piston cannot be had from "
-            "them, and sensors that are swapped or reversed would not be noticed."
+            "A geometry: where the displacements are measured was not stated, so tilts and piston cannot be had from "
+            "them."
         )
-    if any(output.quantity == "angle" for output in own.model.outputs):
-        said.append("The signs of the axes: a reversed sensor of an angle would not be noticed.")
+    if placeless or len(outputs) < _SENSORS or any(output.quantity == "angle" for output in outputs):
+        said.append(
+            "Which way round the channels are: a reversed sensor and two swapped channels are another mirror, and show "
+            "only against signs that are stated, or against the places of four sensors or more."
+        )
     if own.model.known is None:
         said.append("Uncertainty: standard errors of the parameters are not known.")
     return said
