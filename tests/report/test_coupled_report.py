@@ -390,10 +390,15 @@ def test_the_response_has_a_panel_for_each_pair_with_measured_and_modelled(found
         assert panel.y.log and panel.x.log
 
 
-def test_bands_hold_all_of_the_error_and_of_the_floor(found):
+def test_bands_hold_all_of_the_error_and_of_the_floor(found, page, data):
     response = found.responses[0]
     parts = words.in_bands(response, response.residual_power, BANDS_HZ)
     assert np.nansum(parts**2, axis=0) == pytest.approx(response.residual_power.sum(axis=0))
+    assert data["linear_floor_band_rms_m"][0] == parts.tolist()
+    noise = words.band_floors(found)[1][0]
+    assert data["noise_band_rms_m"][0] == noise.tolist()
+    for what, values in (("error", [31.4, 41.8]), ("best linear", 1e9 * parts[:, 0]), ("noise", 1e9 * noise[:, 0])):
+        assert [f"100 mV, {HOSTILE}", what, *(f"{value:.3g}" for value in values)] in rows_of(page)
     panels = bands(found).sheet.panels
     assert [panel.title for panel in panels] == [f"{HOSTILE}, 100 mV", "y1, 100 mV", f"{HOSTILE}, 200 mV", "y1, 200 mV"]
     error, floor, noise = panels[1].all_of(Line)

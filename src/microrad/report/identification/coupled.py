@@ -283,19 +283,22 @@ def _poles(own: Candidate) -> Table:
 
 
 def _bands(found: CoupledIdentification) -> Table | None:
-    """The error of the chosen model in each band, a row for each amplitude and output."""
+    """The error of the chosen model in each band with its limits, rows for each amplitude and output."""
     own, edges = found.candidate(), found.bands_hz
+    levels = (own.band_error_rms, *words.band_floors(found))
     scale = words.scale(own.band_error_rms, words.unit_of(found))
     rows = []
     for k in range(found.amplitudes_v.size):
         if not np.isfinite(own.error_rms[k]).all():
             continue
         for o, output in enumerate(own.model.outputs):
-            cells = (scale.text(float(value)) for value in own.band_error_rms[k, :, o])
-            rows.append((f"{quantity(float(found.amplitudes_v[k]), 'V')}, {output.name}", *cells))
+            name = f"{quantity(float(found.amplitudes_v[k]), 'V')}, {output.name}"
+            for what, values in zip(("error", "best linear", "noise"), levels, strict=True):
+                if np.isfinite(values[k, :, o]).any():
+                    rows.append((name, what, *(scale.text(float(value)) for value in values[k, :, o])))
     headings = [f"{low:.3g} to {high:.3g} Hz" for low, high in itertools.pairwise(edges)]
-    folded = f"The same as numbers: rms error in each band ({scale.unit})"
-    return Table("", ("drive, output", *headings), rows, (0,), folded=folded) if rows else None
+    folded = f"The same as numbers: rms in each band ({scale.unit})"
+    return Table("", ("drive, output", "rms of", *headings), rows, (0, 1), folded=folded) if rows else None
 
 
 def _range(own: Candidate) -> Table:

@@ -24,7 +24,7 @@ def coupled_identification_data(
     """
     own, unit = found.candidate(), words.unit_of(found)
     record, output, share = words.worst(found)
-    dependence = found.dependence
+    dependence, (floor, noise) = found.dependence, words.band_floors(found)
     data = {
         "model": found.chosen,
         **fields(found, "stopped", "reason", "warnings"),
@@ -38,6 +38,8 @@ def coupled_identification_data(
         f"output_rms_{unit}": found.output_rms.tolist(),
         f"noise_rms_{unit}": found.noise_rms.tolist(),
         f"linear_floor_rms_{unit}": words.linear_floor(found).tolist(),
+        f"linear_floor_band_rms_{unit}": floor.tolist(),
+        f"noise_band_rms_{unit}": noise.tolist(),
         "amplitude_dependence": None
         if dependence is None
         else {

@@ -196,14 +196,13 @@ def bands(found: CoupledIdentification) -> Figure:
 
 def _levels(found: CoupledIdentification, number: int) -> list[tuple[Floats, dict[str, Any]]]:
     """Curves of one amplitude: rms in each band, (bands, outputs), with how each is drawn."""
-    error = found.candidate().band_error_rms[number]
-    curves = [(error, {"colour": VERMILION, "width": 1.6, "label": "measured less modelled"})]
-    measured = found.responses[number]
-    if measured is None:
-        return curves
-    floor = words.in_bands(measured, measured.residual_power, found.bands_hz)
-    curves.append((floor, {"colour": BLUE, "dash": "--", "width": 1.4, "label": "left by the measured response"}))
-    if (noise := words.noise_power(measured)) is not None:
-        of_noise = words.in_bands(measured, noise, found.bands_hz)
-        curves.append((of_noise, {"colour": GREEN, "dash": "-.", "width": 1.2, "label": "noise"}))
-    return curves
+    floor, noise = (levels[number] for levels in words.band_floors(found))
+    curves: list[tuple[Floats, dict[str, Any]]] = [
+        (
+            found.candidate().band_error_rms[number],
+            {"colour": VERMILION, "width": 1.6, "label": "measured less modelled"},
+        ),
+        (floor, {"colour": BLUE, "dash": "--", "width": 1.4, "label": "left by the measured response"}),
+        (noise, {"colour": GREEN, "dash": "-.", "width": 1.2, "label": "noise"}),
+    ]
+    return [(values, style) for values, style in curves if np.isfinite(values).any()]

@@ -93,15 +93,23 @@ def in_bands(response: FrequencyResponse, power: Floats, bands_hz: Floats) -> Fl
     return np.where(sums > 0.0, np.sqrt(sums), np.nan)
 
 
-def noise_power(response: FrequencyResponse) -> Floats | None:
-    """What of the residual power of a response changes from period to period, (frequencies, outputs); None if unknown.
+def band_floors(found: CoupledIdentification) -> tuple[Floats, Floats]:
+    """What the measured response of each amplitude leaves in each band, and the noise in that.
 
-    It is that of the mean of the periods.
+    Both are rms in SI units, in the mean of the periods, (amplitudes, bands, outputs); nan where they are not known.
     """
-    if response.noise_standard_error is None:
-        return None
-    error = np.maximum(response.standard_error[:, :, 0], 1e-300)
-    return np.asarray(response.residual_power * (response.noise_standard_error[:, :, 0] / error) ** 2)
+    shape = found.candidate().band_error_rms.shape
+    floor, noise = np.full(shape, np.nan), np.full(shape, np.nan)
+    for k, response in enumerate(found.responses):
+        if response is None:
+            continue
+        power = response.residual_power
+        floor[k] = in_bands(response, power, found.bands_hz)
+        if response.noise_standard_error is not None:
+            error = np.maximum(response.standard_error[:, :, 0], 1e-300)
+            noisy = power * (response.noise_standard_error[:, :, 0] / error) ** 2
+            noise[k] = in_bands(response, noisy, found.bands_hz)
+    return floor, noise
 
 
 @dataclass(frozen=True, slots=True)
