@@ -23,7 +23,7 @@ from microrad.lab.identify import (
     predict,
 )
 from microrad.lab.identify.hysteresis.bouc_wen import _bound_gradient
-from microrad.lab.identify.records import fastest_rate, si_records, transient
+from microrad.lab.identify.records import fastest_rate, lead, si_records, transient
 from microrad.lab.identify.selection import candidates
 from microrad.lab.identify.selection.choice import choose_best
 from microrad.lab.identify.statistics import colour_inflation
@@ -439,7 +439,7 @@ def test_straight_line_is_the_least_squares_line():
     r = play_record([0.05, 0.03], [0.0, 1.0])
     result = identify([r], models=("prandtl_ishlinskii",))
     drive, output = r.drive[:, 0], r.output[:, 0]
-    start = transient(drive[:2000])
+    start = lead(drive[:2000])
     line = np.polyfit(drive[start:2000], output[start:2000], 1)
     residual = output - np.polyval(line, drive)
     span = np.ptp(output[:2000])

@@ -22,7 +22,7 @@ from microrad.lab.identify.hysteresis.joint import thin_record, time_constants
 from microrad.lab.identify.hysteresis.plant_fit import PlantProblem, fit_plant, fit_records
 from microrad.lab.identify.hysteresis.prandtl_ishlinskii import threshold_grid
 from microrad.lab.identify.hysteresis.structures import LinearPoles, Roots, poles_of
-from microrad.lab.identify.records import si_records
+from microrad.lab.identify.records import centred, si_records
 from microrad.lab.identify.statistics import propagated
 from microrad.lab.recording import read_recording
 from microrad.mirror import model as mirror
@@ -320,11 +320,17 @@ def test_an_admissible_fit_never_moves_the_wrong_way(paper_loops, monkeypatch):
 
 # ------------------------------------------------------------------------------------------------- weights and thinning
 def test_a_long_record_does_not_drown_a_short_one():
-    """Two gains cannot both be right: each relative residual counts alike, so g minimises (1 - g)^2 + (1 - g/1.2)^2."""
+    """Two gains cannot both be right, and each relative residual counts alike.
+
+    So g minimises a (1 - g)^2 + b (1 - g/1.2)^2 with the shares a and b of each output that are not the record's own.
+    """
     long, short = two_sines(6000), two_sines(600, freq_hz=8.0)
     records = [recorded(long, 1e-4 * long, noise=1e-4), recorded(short, 1.2e-4 * short, noise=1e-4)]
     fit = fit_joint(records, "linear", UNITS)
-    assert sum(fit.model.weights_rad_v) == pytest.approx(1e-4 * (1 + 1.2 / 1.44) / (1 + 1 / 1.44), rel=2e-3)
+    known = [(r, r.output_rad[r.start :]) for r in si_records(records, UNITS)]
+    a, b = (np.mean(centred(output, [r]) ** 2) / np.var(output) for r, output in known)
+    assert 0.8 < b < 0.9 < a < 1.0
+    assert sum(fit.model.weights_rad_v) == pytest.approx(1e-4 * (a + 1.2 * b / 1.44) / (a + b / 1.44), rel=1e-3)
     assert sum(fit_prandtl_ishlinskii(records).weights_rad_per_v) < 1.03e-4  # every sample counts there
 
 
@@ -402,7 +408,9 @@ def test_a_split_of_zero_says_that_all_is_unseen():
     unseen, default = predict(fit, record, 0), predict(fit, record)
     assert unseen.split == unseen.start > 0
     assert default.split == record.samples
-    assert np.array_equal(unseen.model_rad, default.model_rad)  # its offset and tail are its own
+    assert unseen.start > 10 * default.start
+    apart = (unseen.model_rad - default.model_rad)[unseen.start :]  # its offset and tail are its own
+    assert 0.0 < np.sqrt(np.mean(apart**2)) < 1e-4 * np.ptp(unseen.measured_rad)
     for split in (-5, 1, record.samples + 1):
         with pytest.raises(IdentificationError, match=rf"split {split} does not lie within the 3000 samples"):
             predict(fit, record, split)

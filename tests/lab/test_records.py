@@ -4,12 +4,15 @@ import numpy as np
 import pytest
 
 import truths
-from microrad.lab.identify import identify
+from microrad.lab.identify import fit_prandtl_ishlinskii, identify, predict, records
 from microrad.lab.identify.records import (
     IdentificationError,
     Units,
+    centred,
     fastest_rate,
+    lead,
     loop_rates,
+    memory,
     noisiness,
     si_records,
     smoothed_rate,
@@ -39,10 +42,10 @@ def test_a_step_to_the_first_sample_of_a_sine_is_no_reason_to_refuse_it():
 
 @pytest.mark.parametrize("samples", [6400, 7000, 14_000])
 def test_one_step_is_neither_the_rate_of_the_loops_nor_their_limit(samples):
-    records = prepared(FROM_REST[:samples])
-    assert np.abs(smoothed_rate(records[0].drive_v, 1 / RATE)).max() > 10 * PEAK
-    assert fastest_rate(records) == pytest.approx(PEAK, rel=0.01)
-    assert loop_rates(records) == pytest.approx((PEAK, PEAK), rel=0.01)
+    record = prepared(FROM_REST[:samples])
+    assert np.abs(smoothed_rate(record[0].drive_v, 1 / RATE)).max() > 10 * PEAK
+    assert fastest_rate(record) == pytest.approx(PEAK, rel=0.01)
+    assert loop_rates(record) == pytest.approx((PEAK, PEAK), rel=0.01)
 
 
 def test_one_spike_changes_nothing():
@@ -80,3 +83,74 @@ def test_noise_of_the_drive_is_told_by_its_median_size():
     assert noisiness(prepared(FROM_REST)) < 0.01
     noisy = drive + 0.01 * truths.philox(1).standard_normal(drive.size)
     assert noisiness(prepared(noisy)) == pytest.approx(np.sqrt(2) * 0.01 * RATE / PEAK, rel=0.15)
+
+
+# ----------------------------------------------------------------------------------------------- what happened before
+THRESHOLDS, WEIGHTS = (0.0, 0.6, 1.9, 3.2), (6e-5, 1.5e-5, 1e-5, 0.8e-5)
+GROWING = np.repeat([1.0, 2.0, 3.0, 4.0], 2000) * np.sin(2 * np.pi * 2.0 * np.arange(8000) / 2000.0)
+
+
+def remembered(drive, before, rate_hz=2000.0, noise=2e-4):
+    """A record of plays that something went before: ``before`` is a drive that leads to the first one."""
+    output = truths.plays(np.concatenate([before, drive]), THRESHOLDS, WEIGHTS)[len(before) :]
+    return truths.recorded(drive, output, rate_hz, noise=noise)
+
+
+@pytest.mark.parametrize("before", [[], np.linspace(-6.0, 0.0, 50), np.linspace(4.5, 0.0, 50)])
+def test_a_growing_loop_is_used_whole_whatever_the_mirror_remembers(before, monkeypatch):
+    record = remembered(5.0 + GROWING, np.array(before) + 5.0)
+    fit = fit_prandtl_ishlinskii([record], THRESHOLDS)
+    assert fit.samples_used == record.samples - 250  # up to the first reversal
+    assert 0.02 < fit.residual_rms_percent < 0.06  # the noise is 0.02 %
+    assert np.max(fit.standard_errors_rad_per_v) < 2e-7
+    np.testing.assert_array_less(abs(fit.weights_rad_per_v - WEIGHTS) / fit.standard_errors_rad_per_v, 4.0)
+    prediction = predict(fit, record, 4000)
+    assert prediction.start == 200  # a twentieth of what was fitted
+    assert np.std(prediction.residual_rad[200:4000]) < 0.0006 * np.ptp(prediction.measured_rad)
+
+    monkeypatch.setattr(records, "memory", lambda drive, known: np.zeros((drive.size, 1)))
+    at_rest = fit_prandtl_ishlinskii([record], THRESHOLDS)
+    assert (at_rest.residual_rms_percent > 5 * fit.residual_rms_percent) == (len(before) > 0)
+    assert (np.max(abs(at_rest.weights_rad_per_v - WEIGHTS)) > 6e-7) == (len(before) > 0)
+
+
+def test_memory_is_a_function_of_the_range_swept_so_far():
+    """Of plays that came from elsewhere, less those from rest: it stands still in each loop that is repeated."""
+    ramps = memory(GROWING, GROWING.size)
+    assert ramps.shape == (8000, 8)
+    assert np.all(np.diff(ramps, axis=0) >= 0.0)
+    assert ramps[0].tolist() == [0.0] * 8
+    assert ramps[-1].tolist() == [1.0] * 8
+    settled = slice(1500, 2000)  # the last of two periods of 1 V
+    assert np.ptp(ramps[settled], axis=0).max() == 0.0
+    assert ramps[1999].sum() == pytest.approx(2.0, abs=1e-3)  # 2 V of 8 V, in eighths
+    away = remembered(GROWING, np.linspace(-6.0, 0.0, 50), noise=0.0).output - remembered(GROWING, [], noise=0.0).output
+    own = np.column_stack([np.ones(8000), ramps])
+    left = away[:, 0] - own @ np.linalg.lstsq(own, away[:, 0], rcond=None)[0]
+    assert np.std(left) < 0.05 * np.std(away)
+    assert memory(GROWING, 2000)[2000:].tolist() == memory(GROWING, 2000)[1999:2000].tolist() * 6000  # unknown beyond
+
+
+def test_a_staircase_keeps_its_dwells_and_creep():
+    """A level that nothing but the range swept tells from the one before is free; what creeps on it counts."""
+    levels, time = [6, 9, 12, 6, 0, 6], np.arange(12_000) / 200.0
+    drive = np.interp(time, [t for k in range(6) for t in (10 * k + 0.1 * (k > 0), 10 * k + 10)], np.repeat(levels, 2))
+    (record,) = prepared(drive, 200.0)
+    assert record.used == 11_400
+    assert record.own.shape[1] <= 9
+    np.testing.assert_allclose(record.own.T @ record.own, np.eye(record.own.shape[1]), atol=1e-12)
+    dwells = [round(200 * (10 * k + 5)) - record.start for k in range(6)]
+    for level, known in ((9.0, False), (12.0, True)):  # back at 6 V the drive has swept no more than at 12 V
+        there = centred(np.where(abs(record.drive_v - level) < 0.1, 1.0, 0.0)[record.start :], [record])
+        assert (np.abs(there[dwells]).max() > 0.1) == known
+    slope = centred(np.where(abs(record.drive_v - 9.0) < 0.1, time, 0.0)[record.start :], [record])
+    assert np.std(slope[dwells[1] - 900 : dwells[1] + 900]) > 2.0  # how it moves meanwhile does
+
+
+def test_an_unseen_record_of_which_half_is_not_judged_is_told():
+    known, unseen = remembered(5.0 + GROWING[::-1], []), remembered(5.0 + GROWING, [], noise=3e-4)
+    found = identify([known], models=("prandtl_ishlinskii",), validation=[unseen])
+    assert [p.start for p in found.predictions[0]] == [lead(known.drive[:, 0]), 4000]
+    (told,) = [w for w in found.warnings if "are not judged" in w]
+    assert "the first 4000 of 8000 samples" in told
+    assert not any("set aside" in w for w in found.warnings)

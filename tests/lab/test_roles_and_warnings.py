@@ -14,7 +14,7 @@ from microrad.lab.identify.selection import warnings
 from microrad.lab.identify.selection.predictions import Prediction, Score
 from microrad.lab.identify.selection.roles import is_broadband, roles, whole_periods
 from microrad.lab.identify.selection.warnings import ResidualTest, residual_test, residual_warnings
-from microrad.lab.recording import Recording, recording_from_arrays
+from microrad.lab.recording import Recording
 from truths import philox
 
 TIME = np.arange(8000) / 2000.0
@@ -206,14 +206,3 @@ def test_a_search_that_did_not_settle_is_told():
     cut = replace(fit, fit=replace(fit.fit, converged=False, evaluations=60))
     assert "stopped after 60 evaluations" in warnings.fit_warnings(cut)[0]
     assert_array_equal(warnings.fit_warnings(fit), [])
-
-
-def test_a_record_that_begins_with_small_loops_is_told_how_much_is_set_aside():
-    time_s = np.arange(6000) / 1000.0
-    for growing in (True, False):
-        drive = 5.0 + (np.ceil((time_s + 1e-9) / 2.0) if growing else 3.0) * np.sin(2 * np.pi * 5.0 * time_s)
-        output = 0.06 * drive + 1e-3 * np.random.Generator(np.random.Philox(1)).standard_normal(drive.size)
-        found = identify([recording_from_arrays(drive, output, 1000.0, "loops")], models=("prandtl_ishlinskii",))
-        told = [w for w in found.warnings if "are set aside" in w]
-        assert len(told) == growing
-        assert not growing or "the first 1500 of 3000 samples" in told[0]

@@ -18,6 +18,7 @@ from microrad.lab.identify.hysteresis.joint import JointFit
 from microrad.lab.identify.hysteresis.plant_fit import PlantFit
 from microrad.lab.identify.hysteresis.prandtl_ishlinskii import threshold_grid
 from microrad.lab.identify.hysteresis.structures import LinearPoles, Roots, one_axis
+from microrad.lab.identify.records import lead, memory
 from microrad.mirror import spread as mirror_spread
 from microrad.mirror.hysteresis import NO_CREEP, BoucWen, Creep, Play, slow_gain
 from microrad.mirror.model import hysteresis_model, linear_part
@@ -317,8 +318,9 @@ def test_neighbouring_weights_are_drawn_apart_and_their_sum_is_not(read, neighbo
     mirror = written(read, neighbours)
     assert len(mirror.uncertainty.parameters) == 15
     states = np.array([truths.plays(DRIVE[:2000], [r], [1.0]) for r in GRID]).T
-    states = states[int(np.argmax(DRIVE.min() + 0.1 > DRIVE)) :]
-    states -= states.mean(axis=0)
+    own = np.column_stack([np.ones(2000), memory(DRIVE[:2000], 2000)])[lead(DRIVE[:2000]) :]
+    states = states[lead(DRIVE[:2000]) :]
+    states -= own @ np.linalg.lstsq(own, states)[0]
     inverse = np.linalg.inv(states.T @ states)
     total = fit.weights_rad_per_v.sum()
     of_sum = math.sqrt(inverse.sum() / np.diag(inverse)[4]) * fit.standard_errors_rad_per_v[4] / total

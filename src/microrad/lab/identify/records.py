@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -25,6 +26,8 @@ def no_progress(done: int, total: int, what: str) -> None:
 _VOLTS = {"V": 1.0, "mV": 1e-3}
 _RADIANS = {"rad": 1.0, "mrad": 1e-3, "urad": 1e-6}
 _METRES = {"m": 1.0, "mm": 1e-3, "um": 1e-6}
+_RAMPS = 8  # twice as many predict the virtual bench no better
+_SAME = 1e-6  # a column whose own part is smaller than this says the same as others
 _MEDIAN_OF_NORMAL = 0.6745  # median size of a normal variable, in standard deviations
 
 
@@ -80,7 +83,7 @@ DEFAULT_UNITS = Units()
 
 @dataclass(frozen=True, eq=False)
 class SiRecord:
-    """A recording in volts and radians, with the samples before `start` set aside as the initial transient."""
+    """A recording in volts and radians; the samples before `start` are left out."""
 
     name: str
     sha256: str
@@ -88,6 +91,16 @@ class SiRecord:
     output_rad: Floats
     step_s: float
     start: int
+
+    @cached_property
+    def own(self) -> Floats:
+        """What a fit leaves to the record itself, an offset and its `memory`, as orthonormal columns.
+
+        The shape is (used samples, columns).
+        """
+        return orthonormal(
+            np.column_stack([np.ones(self.drive_v.size), memory(self.drive_v, self.drive_v.size)])[self.start :]
+        )
 
     def every(self, stride: int) -> "SiRecord":
         """Every `stride`-th sample of it; what is exact for a drive linear between samples loses only samples."""
@@ -101,7 +114,7 @@ class SiRecord:
 
     @property
     def used(self) -> int:
-        """Samples behind the initial transient."""
+        """Samples behind `start`."""
         return self.drive_v.size - self.start
 
 
@@ -136,14 +149,57 @@ def _si_record(recording: Recording, units: Units) -> SiRecord:
             "behind a reversal; record at least one full period of the drive."
         )
     output = recording.output[:, 0] * units.radians
-    return SiRecord(recording.path, recording.sha256, drive, output, recording.step_s, transient(drive))
+    return SiRecord(recording.path, recording.sha256, drive, output, recording.step_s, lead(drive))
+
+
+def lead(drive: Floats) -> int:
+    """Number of first samples that no fit uses: until the first reversal, at most a twentieth of them.
+
+    Dynamics that were under way before the first sample are over then; for what the hysteresis remembers see `memory`.
+
+    Args:
+        drive: Drive, in V, shape (samples,).
+    """
+    return int(min([*turning_points(drive)[:1], drive.size // 20]))
+
+
+def memory(drive: Floats, known: int) -> Floats:
+    """What a mirror remembers from before a record adds to its output there, as columns (samples, 8) of free weight.
+
+    A play operator follows its drive u by p = min(max(p, u - r), u + r). Until the drive has swept 2 r since the first
+    sample, that is the value it came with, pushed up by the highest drive so far and down by the lowest; then it is the
+    same whatever it came with. So all that is unknown is a function of the range swept so far, which stands still while
+    a loop is repeated. The columns are ramps, whose sum is any such function, straight between eighths of the range
+    and constant beyond it. A Bouc-Wen term forgets sooner.
+
+    Args:
+        drive: Drive, in V, shape (samples,).
+        known: Samples from which the weights are fitted: the range is what they sweep.
+    """
+    swept = np.maximum.accumulate(drive) - np.minimum.accumulate(drive)
+    step = float(swept[known - 1]) / _RAMPS or 1.0
+    return np.clip(swept[:, None] / step - np.arange(_RAMPS), 0.0, 1.0)
+
+
+def orthonormal(columns: Floats) -> Floats:
+    """Orthonormal columns that span the same as some columns, of which several may say the same.
+
+    Args:
+        columns: The columns, shape (samples, columns).
+    """
+    from scipy.linalg import orth
+
+    return np.asarray(orth(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300), _SAME))
 
 
 def transient(drive: Floats) -> int:
-    """Number of first samples to set aside: until the drive has swept 99 % of its range once, at most half of them.
+    """Number of first samples by which nothing is judged where no fit has seen the record, at most half of them.
 
-    The state before the first sample is unknown. A play operator forgets it when the drive has swept its full range;
-    a Bouc-Wen term when the drive has travelled a few times 1 / (alpha - |beta|), which is less in practice.
+    That is until the drive has swept 99 % of its range once: the state before the first sample is unknown, and a play
+    operator forgets it when the drive has swept its full range.
+
+    Args:
+        drive: Drive, in V, shape (samples,).
     """
     low, high = float(drive.min()), float(drive.max())
     margin = 0.01 * (high - low)
@@ -268,13 +324,14 @@ def span(records: Sequence[SiRecord]) -> float:
 
 
 def centred(columns: Floats, records: Sequence[SiRecord]) -> Floats:
-    """Stacked columns less their mean in each record; to fit them is to fit one free offset per record too.
+    """Stacked columns less what each record may add by itself; to fit them is to fit that too.
 
     Args:
         columns: Values of the used samples of all records one behind the other, shape (samples,) or (samples, columns).
         records: The records, in the same order.
     """
-    return np.concatenate([part - part.mean(axis=0) for part in split_by_record(columns, records)])
+    pairs = zip(split_by_record(columns, records), records, strict=True)
+    return np.concatenate([part - record.own @ (record.own.T @ part) for part, record in pairs])
 
 
 def split_by_record(values: Floats, records: Sequence[SiRecord]) -> list[Floats]:

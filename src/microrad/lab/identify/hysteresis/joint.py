@@ -17,7 +17,7 @@ from microrad.lab.identify.hysteresis.bouc_wen import BoucWenFit, fit_bouc_wen, 
 from microrad.lab.identify.hysteresis.plant_fit import FitRecord, PlantFit, fit_plant, without_nuisance
 from microrad.lab.identify.hysteresis.prandtl_ishlinskii import non_negative_weights, threshold_grid
 from microrad.lab.identify.hysteresis.structures import AxisStructure, LinearPoles, one_axis
-from microrad.lab.identify.records import SiRecord, Units, fastest_rate, si_records, span
+from microrad.lab.identify.records import SiRecord, Units, fastest_rate, memory, orthonormal, si_records, span
 from microrad.lab.recording import Recording
 from microrad.mirror import model as mirror
 from microrad.mirror.hysteresis import NO_CREEP, BoucWen, Creep, Play, slow_gain
@@ -117,14 +117,15 @@ class JointFit:
         kernels.open_loop(plant, state, drive, output, np.empty((drive_v.size, 0)))
         return output[:, 0], int(state.clamped.sum())
 
-    def nuisance(self, samples: int, step_s: float) -> Floats:
-        """What a record may add by itself (samples, columns): an offset, and the tail of a creep begun before it.
+    def nuisance(self, drive_v: Floats, step_s: float, known: int) -> Floats:
+        """What a record may add by itself: an offset, its `memory`, and the tail of a creep begun before it.
 
         Args:
-            samples: Length of the record in samples.
+            drive_v: Drive, in V, shape (samples,).
             step_s: Time between samples, in s.
+            known: Samples from which it is fitted.
         """
-        return _nuisance(samples, step_s, self.creep.time_constants_s)
+        return _nuisance(drive_v, step_s, self.creep.time_constants_s, known)
 
 
 _WHY = {
@@ -260,19 +261,19 @@ def thin_record(record: SiRecord, most: int, bent: float) -> SiRecord:
     return record.every(stride)
 
 
-def _nuisance(samples: int, step_s: float, creep_times: Sequence[float]) -> Floats:
-    """Orthonormal columns: an offset and, with creep, the tail that a level before the record leaves in all lags."""
-    columns = [np.ones(samples)]
+def _nuisance(drive_v: Floats, step_s: float, creep_times: Sequence[float], known: int) -> Floats:
+    """Columns: an offset, the memory and, with creep, the tail that a level before the record leaves in all lags."""
+    columns = [np.ones(drive_v.size), memory(drive_v, known)]
     if creep_times:
-        time = np.arange(samples) * step_s
+        time = np.arange(drive_v.size) * step_s
         columns.append(np.sum([np.exp(-time / tau) for tau in creep_times], axis=0))
-    return np.asarray(np.linalg.qr(np.column_stack(columns))[0])
+    return np.column_stack(columns)
 
 
 def _fit_record(record: SiRecord, creep_times: Sequence[float]) -> FitRecord:
     """A record about its first drive value; its weight makes it count as every other does."""
     used = record.output_rad[record.start :]
-    nuisance = _nuisance(record.drive_v.size, record.step_s, creep_times)[record.start :]
+    nuisance = _nuisance(record.drive_v, record.step_s, creep_times, record.drive_v.size)[record.start :]
     weight = 1.0 / (float(np.std(used)) * math.sqrt(used.size))
     return FitRecord(
         record.name,
@@ -281,7 +282,7 @@ def _fit_record(record: SiRecord, creep_times: Sequence[float]) -> FitRecord:
         record.step_s,
         1,
         record.start,
-        np.asarray(np.linalg.qr(nuisance)[0]),
+        orthonormal(nuisance),
         weight,
     )
 

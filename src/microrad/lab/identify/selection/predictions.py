@@ -9,7 +9,7 @@ from microrad.core.arrays import Floats
 from microrad.lab.identify.hysteresis.bouc_wen import BoucWenFit
 from microrad.lab.identify.hysteresis.joint import JointFit
 from microrad.lab.identify.hysteresis.prandtl_ishlinskii import PrandtlIshlinskiiFit
-from microrad.lab.identify.records import IdentificationError, SiRecord, Units, transient
+from microrad.lab.identify.records import IdentificationError, SiRecord, Units, lead, memory, transient
 from microrad.lab.recording import Recording
 
 Fit = BoucWenFit | PrandtlIshlinskiiFit | JointFit
@@ -17,10 +17,11 @@ Fit = BoucWenFit | PrandtlIshlinskiiFit | JointFit
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """Model against measurement over one record, offset included (rad); samples before `start` are the transient.
+    """Model against measurement over one record, offset included (rad); samples before `start` count nowhere.
 
-    Behind `split` the record is unseen. What a record may add by itself (an offset; with creep the tail of what went
-    before it) is fitted over the samples from `start` to `split`, or over all where the whole record is unseen.
+    Behind `split` the record is unseen. What a record may add by itself (an offset; what the mirror remembers from
+    before, see `records.memory`; with creep the tail of what went before it) is fitted over the samples from `start` to
+    `split`, or over all where the whole record is unseen.
     """
 
     model_rad: Floats
@@ -78,14 +79,14 @@ def predict(fit: Fit, recording: Recording, split: int | None = None) -> Predict
             f"split {split} does not lie within the {recording.samples} samples of {recording.path}; give a number "
             "from 2 to that."
         )
-    start = transient(drive[:end])
+    start = transient(drive) if split == 0 else lead(drive[:end])
     model, clamped = fit.response(drive, recording.step_s)
-    difference = measured - model
     if isinstance(fit, JointFit):
-        columns = fit.nuisance(difference.size, recording.step_s)
-        model = model + columns @ np.linalg.lstsq(columns[start:end], difference[start:end], rcond=None)[0]
+        columns = fit.nuisance(drive, recording.step_s, end)
     else:
-        model = model + float(np.mean(difference[start:end]))
+        columns = np.column_stack([np.ones(drive.size), memory(drive, end)])
+    own = np.linalg.lstsq(columns[start:end], (measured - model)[start:end], rcond=None)[0]
+    model = model + columns @ own
     return Prediction(model, measured, start, start if split == 0 else end, clamped)
 
 
@@ -108,7 +109,7 @@ def straight_line(
     for recording, split in zip(recordings, splits, strict=True):
         drive = recording.drive[:, 0] * units.volts
         model, measured = slope * drive, recording.output[:, 0] * units.radians
-        start = transient(drive[: split or None])
+        start = lead(drive[:split]) if split else transient(drive)
         offset = float(np.mean((measured - model)[start : split or None]))
         lines.append(Prediction(model + offset, measured, start, split or start, 0))
     return lines

@@ -42,17 +42,18 @@ def range_warnings(drive_range: tuple[float, float], rate: float) -> list[str]:
 
 
 def set_aside_warnings(recordings: Sequence[Recording], predictions: Sequence[Prediction]) -> list[str]:
-    """Records of which more than a fifth is not fitted, because the drive takes that long to sweep its range once.
+    """Unseen records of which more than a fifth is not judged, because their drives sweep their range so late.
 
     Args:
-        recordings: The recordings fitted.
+        recordings: The recordings.
         predictions: The model's prediction of each of them.
     """
     return [
-        f"{recording.path}: the first {p.start} of {p.split} samples are set aside, until the drive has swept its "
-        "range once, because what the mirror remembers from before is not known; begin a record with its largest sweep."
+        f"{recording.path}: the first {p.start} of {recording.samples} samples are not judged, because what the mirror "
+        "remembers from before is not known until the drive has swept its range once; begin a record for validation "
+        "with its largest sweep."
         for recording, p in zip(recordings, predictions, strict=True)
-        if p.start > 0.2 * p.split
+        if p.start > 0.2 * recording.samples
     ]
 
 
