@@ -189,7 +189,7 @@ def bands(found: CoupledIdentification) -> Figure:
     caption = (
         f"What {own_name(found)}, leaves of each output on the held-out records, as rms in each band, at each rms "
         "drive. Beside it what the measured response of that amplitude leaves, which is what a linear model of its own "
-        "would leave at least: distortion and noise. Of that, the noise by itself, in the mean of the periods."
+        "would leave at least: distortion and noise. Of that, the noise by itself."
     )
     return Figure("bands", "Error by output and band", caption + _left_out(found), sheet, {})
 

@@ -70,46 +70,48 @@ def shares(candidate: Candidate, found: CoupledIdentification) -> Floats:
 def linear_floor(found: CoupledIdentification) -> Floats:
     """Rms that the best linear model of each amplitude leaves, (amplitudes, outputs), SI; nan where that is not known.
 
-    It is found without a model: what the measured response leaves of the outputs of the fitted records.
+    It is found without a model: what the measured response leaves of the outputs of the fitted records, with the noise
+    of a single period.
     """
-    rows = [
-        np.full(found.output_rms.shape[1], np.nan) if r is None else np.sqrt(np.sum(r.residual_power, axis=0))
-        for r in found.responses
-    ]
-    return np.array(rows)
-
-
-def in_bands(response: FrequencyResponse, power: Floats, bands_hz: Floats) -> Floats:
-    """Root of the power at the frequencies of a response in each band, shape (bands, outputs).
-
-    Args:
-        response: with the frequencies.
-        power: at each of them, (frequencies, outputs).
-        bands_hz: edges of the bands, (bands + 1,), Hz.
-    """
-    band = np.searchsorted(bands_hz, response.freq_hz, side="right") - 1
-    band[response.freq_hz == bands_hz[-1]] = bands_hz.size - 2
-    sums = np.stack([power[band == k].sum(axis=0) for k in range(bands_hz.size - 1)])
-    return np.where(sums > 0.0, np.sqrt(sums), np.nan)
+    floor, _ = _floor_powers(found, np.array([0.0, np.inf]))
+    return np.asarray(np.sqrt(floor[:, 0]))
 
 
 def band_floors(found: CoupledIdentification) -> tuple[Floats, Floats]:
-    """What the measured response of each amplitude leaves in each band, and the noise in that.
+    """The same in each band, and the noise in it, both rms in SI units, (amplitudes, bands, outputs)."""
+    floor, noise = _floor_powers(found, found.bands_hz)
+    return np.sqrt(floor), np.sqrt(noise)
 
-    Both are rms in SI units, in the mean of the periods, (amplitudes, bands, outputs); nan where they are not known.
+
+def _floor_powers(found: CoupledIdentification, edges_hz: Floats) -> tuple[Floats, Floats]:
+    """Mean squares of both in each band; nan where they are not known.
+
+    A response is one of the mean of the periods, whose noise is smaller than that of the samples a model is judged by:
+    it is raised to what the held-out records have.
     """
-    shape = found.candidate().band_error_rms.shape
+    shape = (found.amplitudes_v.size, edges_hz.size - 1, found.output_rms.shape[1])
     floor, noise = np.full(shape, np.nan), np.full(shape, np.nan)
     for k, response in enumerate(found.responses):
         if response is None:
             continue
-        power = response.residual_power
-        floor[k] = in_bands(response, power, found.bands_hz)
-        if response.noise_standard_error is not None:
-            error = np.maximum(response.standard_error[:, :, 0], 1e-300)
-            noisy = power * (response.noise_standard_error[:, :, 0] / error) ** 2
-            noise[k] = in_bands(response, noisy, found.bands_hz)
+        floor[k] = _band_sums(response, response.residual_power, edges_hz)
+        if response.noise_standard_error is None:
+            continue
+        error = np.maximum(response.standard_error[:, :, 0], 1e-300)
+        of_mean = response.residual_power * (response.noise_standard_error[:, :, 0] / error) ** 2
+        raised = np.fmax(found.noise_rms[k] ** 2 / np.maximum(of_mean.sum(axis=0), 1e-300), 1.0)
+        in_mean = _band_sums(response, of_mean, edges_hz)
+        noise[k] = raised * in_mean
+        floor[k] += (raised - 1.0) * in_mean
     return floor, noise
+
+
+def _band_sums(response: FrequencyResponse, power: Floats, edges_hz: Floats) -> Floats:
+    """Sum of a power (frequencies, outputs) over the frequencies in each band, (bands, outputs); nan without any."""
+    band = np.searchsorted(edges_hz, response.freq_hz, side="right") - 1
+    band[response.freq_hz == edges_hz[-1]] = edges_hz.size - 2
+    sums = np.stack([power[band == k].sum(axis=0) for k in range(edges_hz.size - 1)])
+    return np.where(sums > 0.0, sums, np.nan)
 
 
 @dataclass(frozen=True, slots=True)
