@@ -883,7 +883,7 @@ def test_bench_refusals(refused, folder):
     (folder / "plan-bench" / "mine.txt").write_text("mine")
     assert "holds files that are not recordings of microrad" in refused("bench", "plan.toml", "--overwrite")
     assert "no manifest.json of microrad bench in it" in refused("identify", "plan-bench")
-    assert "--input is missing" in refused("identify", "plan.toml")
+    assert "expected: a table [recording.NAME] for each recording, with its file" in refused("identify", "plan.toml")
 
 
 def test_the_models_of_the_command_are_those_of_the_ladder():

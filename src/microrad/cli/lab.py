@@ -4,13 +4,13 @@ import functools
 import os
 import shlex
 from collections.abc import Callable
-from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from microrad.cli.coupled import Target, identify_channels, refuse_options
 from microrad.cli.frame import (
     PROGRESS_FILE,
     Json,
@@ -26,11 +26,11 @@ from microrad.cli.frame import (
     progress_bar,
     width,
 )
+from microrad.cli.recordings import Options, common_name, given_recordings, unit_of
 from microrad.core.folder import write_whole
 
 if TYPE_CHECKING:
     from microrad.lab.identify import Identification
-    from microrad.lab.recording import Recording
 
 MIRROR_FILE_BEGINS = "# Mirror identified from"
 
@@ -76,11 +76,38 @@ def _rate(text: str) -> float:
     return _quantity("Hz")(f"{text} Hz")
 
 
-_FILES = "Recordings (CSV, text, LVM, TDMS, MAT, NPY, NPZ, HDF5), or one folder that microrad bench wrote."
-_OUTPUT_UNITS = "rad, mrad or urad; with --lever-arm also m, mm or um [default: what the file says, else mrad]."
+def _place(text: str) -> tuple[float, float]:
+    """A place on the mirror, two lengths with a comma between them."""
+    parts = text.split(",")
+    if len(parts) != 2:
+        raise typer.BadParameter(f"'{text}' is no place; give x and y as '12 mm,-6 mm'.")
+    x, y = (_quantity("m")(part.strip()) for part in parts)
+    return x, y
+
+
+_FILES = (
+    "Recordings (CSV, text, LVM, TDMS, MAT, NPY, NPZ, HDF5); or one list of recordings (.toml), which says columns, "
+    "units, part and role of each; or one folder that microrad bench wrote."
+)
+_INPUT = "Drive: name, or number from 0; repeat it for several. With --axes the array that holds all drives."
+_OUTPUT = "Angle or displacement: the same."
+_AXES = (
+    "Read whole arrays (NPY, NPZ, MAT, HDF5), whose axes are these, in the array's order: some of samples,channels,"
+    "realisations,periods. Each realisation is a recording."
+)
+_OUTPUT_FILE = (
+    "File of the outputs where FILE has the drives alone; repeat it in the order of FILE..., then --validate."
+)
+_POSITION = "Where an output is measured on the mirror: '12 mm,-6 mm'; repeat it in the order of the outputs."
+_OUTPUT_UNITS = (
+    "rad, mrad or urad; m, mm or um with --lever-arm, or of several outputs [default: what the file says, else mrad]."
+)
 _INPUT_UNITS = "V or mV [default: what the file says, else V]."
 _LEVER_ARM = "From the axis of rotation to the point measured: '50 mm'."
-_MIRROR_FILE = "File to write [default: <name of the recording>-mirror.toml in the current folder]."
+_NAME = (
+    "Name of the mirror [default: the recording's; of several what all their names begin with, else their folder's]."
+)
+_MIRROR_FILE = "File to write [default: that name, and -mirror.toml, in the current folder]."
 _REPORT_FILE = "Report to write [default: <name of the mirror file>.html beside it]."
 _RATE = "Sample rate: 200, '200 Hz' or '50 kHz' [default: what the file says]."
 _HOLD_OUT = "Kept for the check, at each recording's end [default: 0.5; 0 with --validate]."
@@ -95,6 +122,10 @@ _STATIC = "Fit the hysteresis alone, two models, in seconds."
         "microrad identify 60Hz.csv 80Hz.csv chirp.csv --input 1 --output 2 --rate '50 kHz' --validate 100Hz.csv",
         "microrad identify piezo.dat --input 0 --output 4 --rate '200 Hz' --output-unit um --lever-arm '50 mm'",
         "microrad identify mirror-characterisation-bench",
+        "microrad identify axes.csv --input ux --input uy --output x --output y --output-unit urad",
+        "microrad identify u.npy --output-file y.npy --axes samples,channels,realisations,periods --rate '6400 Hz' "
+        "--output-unit m",
+        "microrad identify recordings.toml",
         "microrad run leo-geo.toml --mirror loop-mirror.toml --output loop-mirror-study",
     )
 )
@@ -102,8 +133,10 @@ _STATIC = "Fit the hysteresis alone, two models, in seconds."
 def identify(  # noqa: PLR0913  every argument is a named option
     files: Annotated[list[Path], typer.Argument(help=_FILES, metavar="FILE...")],
     *,
-    input_column: Annotated[str | None, option("--input", "COLUMN", "Drive: name, or number from 0.")] = None,
-    output_column: Annotated[str | None, option("--output", "COLUMN", "Angle or displacement: the same.")] = None,
+    input_column: Annotated[list[str] | None, option("--input", "COLUMN", _INPUT)] = None,
+    output_column: Annotated[list[str] | None, option("--output", "COLUMN", _OUTPUT)] = None,
+    output_file: Annotated[list[Path] | None, option("--output-file", "FILE", _OUTPUT_FILE)] = None,
+    axes: Annotated[str | None, option("--axes", "WORDS", _AXES)] = None,
     rate: Annotated[float | None, option("--rate", "HZ", _RATE, parser=_rate)] = None,
     time: Annotated[str | None, option("--time", "COLUMN", "Time (s), to read the rate off.")] = None,
     period: Annotated[int | None, option("--period", "SAMPLES", "Length of a period of a periodic drive.")] = None,
@@ -112,12 +145,13 @@ def identify(  # noqa: PLR0913  every argument is a named option
     output_unit: Annotated[str | None, option("--output-unit", "UNIT", _OUTPUT_UNITS)] = None,
     input_unit: Annotated[str | None, option("--input-unit", "UNIT", _INPUT_UNITS)] = None,
     lever_arm: Annotated[float | None, option("--lever-arm", "LENGTH", _LEVER_ARM, parser=_quantity("m"))] = None,
+    position: Annotated[list[Any] | None, option("--position", "X,Y", _POSITION, parser=_place)] = None,
     hold_out: Annotated[float | None, option("--hold-out", "SHARE", _HOLD_OUT)] = None,
     static: Annotated[bool, typer.Option("--static", help=_STATIC)] = False,
     model: Annotated[Model, typer.Option(help="Model that the mirror file holds.")] = Model.BEST,
     admissible: Annotated[bool, typer.Option("--admissible", help="No Bouc-Wen model moving the wrong way.")] = False,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the scattered starts of the Bouc-Wen fits.")] = 0,
-    name: Annotated[str | None, option("--name", "TEXT", "Name of the mirror [default: the recording's].")] = None,
+    name: Annotated[str | None, option("--name", "TEXT", _NAME)] = None,
     mirror_file: Annotated[Path | None, option("--mirror-file", "FILE", _MIRROR_FILE)] = None,
     report_file: Annotated[Path | None, option("--report", "FILE", _REPORT_FILE)] = None,
     overwrite: Overwrite = False,
@@ -128,13 +162,16 @@ def identify(  # noqa: PLR0913  every argument is a named option
     Checks the recordings, takes the linear part from broadband ones and the hysteresis from loops, fits a dozen models
     to part of the samples and judges them on the rest. The best one is written as a mirror file, and everything as a
     report. A column is given by its name or by its number, counted from 0.
+
+    Of several drives or outputs, models of all channels are ranked on held-out recordings, and the smallest one within
+    noise of the best is written; Ctrl-C ends that with the best one so far.
     """
     from microrad import report
     from microrad.lab import identify as identification
     from microrad.lab.live_fit import live_fit_writer
-    from microrad.lab.recording import stated_units
 
-    target = mirror_file or Path(f"{files[0].stem}-mirror.toml")
+    called = common_name(files)
+    target = mirror_file or Path(f"{called}-mirror.toml")
     page = report_file or target.with_suffix(".html")
     if page.resolve() == target.resolve():
         raise Refusal(f"{page} cannot be both the mirror file and the report; name another one with --report.")
@@ -142,26 +179,58 @@ def identify(  # noqa: PLR0913  every argument is a named option
     check = functools.partial(check_target, target, advice, overwrite=overwrite, begins=begins)
     check()
     report.check_identification(page, overwrite)
-    columns = _Columns(input_column, output_column, rate, time, period, tuple(accept or ()))
-    records, validation, virtual = _recordings(files, validate or [], columns)
-    everything = [*records, *validation]
-    drive_said = set().union(*(stated_units(r.input_units, r.input_names) for r in everything))
-    output_said = set().union(*(stated_units(r.output_units, r.output_names) for r in everything))
-    input_unit, drive_by = _unit(input_unit, drive_said, "--input-unit", "V")
-    output_unit, output_by = _unit(output_unit, output_said, "--output-unit", "mrad")
+    given = given_recordings(
+        Options(
+            files=tuple(files),
+            input=tuple(input_column or ()),
+            output=tuple(output_column or ()),
+            output_file=tuple(output_file or ()),
+            axes=axes,
+            rate=rate,
+            time=time,
+            period=period,
+            accept=tuple(accept or ()),
+            validate=tuple(validate or ()),
+            position=tuple(position or ()),
+            lever_arm=lever_arm,
+            input_unit=input_unit,
+            output_unit=output_unit,
+        )
+    )
+    title = name if name is not None else given.name or called[:200]
+    input_unit, drive_by = unit_of(given, "input", input_unit, "V")
+    output_unit, output_by = unit_of(given, "output", output_unit, "mrad")
+    said = f"drive in {input_unit} ({drive_by}), output in {output_unit} ({output_by})"
+    if given.several_channels:
+        one_axis = {
+            "--static": static,
+            "--model": model is not Model.BEST,
+            "--admissible": admissible,
+            "--seed": seed != 0,
+            "--hold-out": hold_out is not None,
+            "--lever-arm": given.lever_arm_m is not None,
+        }
+        refuse_options(given, one_axis)
+        return identify_channels(
+            given, (input_unit, output_unit), said, Target(target, page, title, overwrite, check), as_json
+        )
+    if given.positions_m is not None or given.signs is not None:
+        raise Refusal("positions and signs are for several outputs or drives: leave out --position, or name them all.")
+    if not given.recordings:
+        raise Refusal("every recording is for validation: leave one to be fitted.")
     models = identification.STATIC[:2] if static else identification.MODELS
     live = os.environ.get(PROGRESS_FILE)
     with progress_bar() as bar:
         found = identification.identify(
-            records,
+            given.recordings,
             hold_out,
             seed,
             _wanted(models, model),
             bar,
-            validation=validation,
+            validation=given.validation,
             admissible=admissible,
             output_unit=output_unit,
-            lever_arm_m=lever_arm,
+            lever_arm_m=given.lever_arm_m,
             input_unit=input_unit,
             on_fit=live_fit_writer(live),
             side_by_side=not live,
@@ -169,14 +238,12 @@ def identify(  # noqa: PLR0913  every argument is a named option
     if found.unsupported:
         raise Refusal(found.unsupported)
     written = _written(found, model, admissible)
-    title = files[0].stem[:200] if name is None else name
     text = identification.mirror_file_text(found, title, model=written)
     data = {"mirror_file": target, "report_file": page}
     outcome = Outcome(
         json_text(report.identification_data(found, written, **data))
         if as_json
-        else f"drive in {input_unit} ({drive_by}), output in {output_unit} ({output_by})\n\n"
-        + report.identification_text(found, written, width(), **data)
+        else f"{said}\n\n" + report.identification_text(found, written, width(), **data)
     )
     check()  # the file may have appeared meanwhile
     report.write_identification(
@@ -186,66 +253,12 @@ def identify(  # noqa: PLR0913  every argument is a named option
         mirror_text=text,
         title=title,
         written=written,
-        recordings=records,
+        recordings=given.recordings,
         overwrite=overwrite,
-        virtual=virtual,
+        virtual=given.virtual,
     )
     write_whole(target, text)
     return outcome
-
-
-@dataclass(frozen=True, slots=True)
-class _Columns:
-    """Where in a file the recording is, and what is known of it."""
-
-    input: str | None
-    output: str | None
-    rate_hz: float | None
-    time: str | None
-    period: int | None
-    accept: tuple[str, ...]
-
-
-def _recordings(
-    files: list[Path], validate: list[Path], columns: _Columns
-) -> tuple[list["Recording"], list["Recording"], bool]:
-    """Recordings to fit, recordings for validation, and whether they come from the virtual bench."""
-    from microrad.lab.recording import read_recording
-
-    if len(files) == 1 and files[0].is_dir():
-        from microrad.lab import bench
-
-        found = bench.read_folder(files[0], columns.accept)
-        uses = {use: [r for r, of in found if of == use] for use in ("identification", "validation")}
-        return uses["identification"], uses["validation"], True
-    if columns.input is None or columns.output is None:
-        missing = "--input" if columns.input is None else "--output"
-        raise Refusal(f"{missing} is missing: name the column of the {'drive' if missing == '--input' else 'sensor'}.")
-
-    def read(path: Path) -> "Recording":
-        return read_recording(
-            path,
-            columns.input or "",
-            columns.output or "",
-            columns.rate_hz,
-            time=columns.time,
-            period_samples=columns.period,
-            accept=columns.accept,
-        )
-
-    return [read(path) for path in files], [read(path) for path in validate], False
-
-
-def _unit(given: str | None, said: set[str], flag: str, assumed: str) -> tuple[str, str]:
-    """The unit of a channel, and where it comes from: the option or the files, which must agree, else an assumption."""
-    listed = ", ".join(sorted(said))
-    if given is not None:
-        if said and said != {given}:
-            raise Refusal(f"{flag} is {given} and the files say {listed}: give what the files say, or neither.")
-        return given, "given"
-    if len(said) > 1:
-        raise Refusal(f"the files say different units, {listed}: identify them apart, or convert them.")
-    return (said.pop(), "stated in the files") if said else (assumed, f"assumed, {flag} says otherwise")
 
 
 def _wanted(models: tuple[str, ...], model: Model) -> tuple[str, ...]:

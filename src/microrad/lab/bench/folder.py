@@ -271,7 +271,8 @@ def check_folder(folder: Path, overwrite: bool) -> None:
 def read_folder(folder: Path, accept: tuple[str, ...] = ()) -> tuple[tuple[Recording, str], ...]:
     """Recordings of a folder that `write_folder` made, each with its use ("identification" or "validation").
 
-    Of several formats the first is read.
+    Of several formats the first is read. Where there are several drives, each may rest while another one is played:
+    `check_together` judges all recordings.
 
     Args:
         folder: The folder.
@@ -290,6 +291,6 @@ def read_folder(folder: Path, accept: tuple[str, ...] = ()) -> tuple[tuple[Recor
             f"{folder}: no {MANIFEST} of microrad bench in it; name the recordings themselves (--input, --output)"
         ) from None
     return tuple(
-        (read_recording(path, inputs, outputs, period_samples=period, accept=accept), use)
+        (read_recording(path, inputs, outputs, period_samples=period, accept=accept, alone=False), use)
         for path, inputs, outputs, period, use in wanted
     )
