@@ -28,7 +28,7 @@ from microrad.report.plotting.sheet import Line, Rule, Span
 from report_pages import assert_sound, without_scripts
 
 RATE_HZ, PERIOD = 1000.0, 256
-BANDS_HZ = np.array([3.9, 40.0, 400.0])
+BANDS_HZ = np.array([3.9, 40.0, 1234.0])
 OUTPUT_RMS = np.array([[1.0e-6, 2.0e-6], [2.0e-6, 4.0e-6]])
 NOISE_RMS = np.array([[1.0e-8, 2.0e-8], [1.0e-8, 2.0e-8]])
 HELD_OUT = ("small <3>.npy", "large <3>.npy")
@@ -400,6 +400,7 @@ def test_bands_hold_all_of_the_error_and_of_the_floor(found, page, data):
     )
     assert data["linear_floor_band_rms_m"][0] == parts.tolist()
     assert data["noise_band_rms_m"][0] == noise.tolist()
+    assert ["Drive, output", "rms of", "3.9 to 40 Hz", "40 to 1230 Hz"] in rows_of(page)
     for what, values in (("error", [31.4, 41.8]), ("best linear", 1e9 * parts[:, 0]), ("noise", 1e9 * noise[:, 0])):
         assert [f"100 mV, {HOSTILE}", what, *(f"{value:.3g}" for value in values)] in rows_of(page)
     panels = bands(found).sheet.panels

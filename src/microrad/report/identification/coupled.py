@@ -296,7 +296,8 @@ def _bands(found: CoupledIdentification) -> Table | None:
             for what, values in zip(("error", "best linear", "noise"), levels, strict=True):
                 if np.isfinite(values[k, :, o]).any():
                     rows.append((name, what, *(scale.text(float(value)) for value in values[k, :, o])))
-    headings = [f"{low:.3g} to {high:.3g} Hz" for low, high in itertools.pairwise(edges)]
+    ends = [words.Scale("Hz", 1.0).text(float(edge)) for edge in edges]
+    headings = [f"{low} to {high} Hz" for low, high in itertools.pairwise(ends)]
     folded = f"The same as numbers: rms in each band ({scale.unit})"
     return Table("", ("drive, output", "rms of", *headings), rows, (0, 1), folded=folded) if rows else None
 
