@@ -16,8 +16,10 @@ from microrad.lab.identify import identify as identify_mirror
 from microrad.lab.identify import mirror_file_text
 from microrad.lab.recording import Recording
 from microrad.lab.recording import RecordingError
+from microrad.lab.recording import read_arrays
 from microrad.lab.recording import read_recording
 from microrad.lab.recording import recording_from_arrays
+from microrad.lab.recording.list_file import read_list as read_recordings_list
 from microrad.link import LinkError
 from microrad.link.study import LinkStudy
 from microrad.link.study import run_link_study
@@ -72,6 +74,8 @@ __all__ = [
     "OrbitError",
     "OperationsError",
     "read_recording",
+    "read_arrays",
+    "read_recordings_list",
     "recording_from_arrays",
     "Recording",
     "RecordingError",
