@@ -373,6 +373,14 @@ def test_the_winner_is_marked_among_points_of_each_candidate(found):
     assert rules["left by the best linear model of each amplitude"] == pytest.approx(0.8, rel=0.1)
 
 
+def test_noise_far_below_all_models_is_said_and_leaves_them_their_room():
+    for noise_rms, drawn in ((NOISE_RMS / 2, True), (NOISE_RMS / 5, False)):
+        figure = error_over_parameters(found_of(noise_rms=noise_rms))
+        (panel,) = figure.sheet.panels
+        assert ("noise" in {rule.label for rule in panel.all_of(Rule)}) is drawn
+        assert ("Noise, 0.158 %, lies far below." in figure.caption) is not drawn
+
+
 def test_the_response_has_a_panel_for_each_pair_with_measured_and_modelled(found):
     panels = coupled_figures(found)["response"].sheet.panels
     assert [p.title for p in panels] == [

@@ -22,6 +22,7 @@ MOST = 4
 """Outputs, and drives, that a figure has panels for."""
 _WIDTH = 8.2
 _STRETCHES = 110  # of the frequencies of a panel, each with its lowest and highest value
+_FAR = 20.0  # times below the best model, noise would leave no room for the models
 _NAME = 16  # characters of a channel's name above a panel
 _KINDS: dict[str, dict[str, Any]] = {
     "per axis": {"colour": SKY, "marker": "s"},
@@ -56,7 +57,8 @@ def error_over_parameters(found: CoupledIdentification) -> Figure:
     )
     if np.isfinite(floor := _share(words.linear_floor(found), found)):
         panel.add(Rule(100 * floor, False, BLACK, "--", 1.0, "left by the best linear model of each amplitude"))
-    if np.isfinite(noise := _share(found.noise_rms, found)):
+    noise, least = _share(found.noise_rms, found), min(candidate.error_share for candidate in found.candidates)
+    if noise > least / _FAR:
         panel.add(Rule(100 * noise, False, BLACK, ":", 1.0, "noise"))
     panel.x = Axis("parameters (1)", log=True)
     panel.y, panel.legend = Axis("error on held-out records (% of rms output)", log=True), Legend("best")
