@@ -378,7 +378,7 @@ def test_noise_far_below_all_models_is_said_and_leaves_them_their_room():
         figure = error_over_parameters(found_of(noise_rms=noise_rms))
         (panel,) = figure.sheet.panels
         assert ("noise" in {rule.label for rule in panel.all_of(Rule)}) is drawn
-        assert ("Noise, 0.158 %, lies far below." in figure.caption) is not drawn
+        assert ("Noise, 0.158 %, lies far below." in figure.caption) is (not drawn)
 
 
 def test_the_response_has_a_panel_for_each_pair_with_measured_and_modelled(found):

@@ -71,6 +71,8 @@ def error_over_parameters(found: CoupledIdentification) -> Figure:
             " Dashed: what a linear model of its own for each amplitude would leave at least, the mean over amplitudes;"
             " only a model with hysteresis can be below."
         )
+    if noise <= least / _FAR:
+        caption += f" Noise, {words.part(noise)}, lies far below."
     return Figure(
         "error-over-parameters", "Error on held-out records over the number of parameters", caption, sheet, {}
     )
