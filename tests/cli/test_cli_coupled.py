@@ -185,7 +185,7 @@ def test_stopped_before_the_first_model_nothing_is_written(call, folder, monkeyp
             ["--position", "1 mm,2 mm", "--position", "3 mm,4 mm", "--output-unit", "m"],
             "the positions do not give the tilts: 2 of 2 displacements",
         ),
-        (["--position", "1 mm,2 mm", "--position", "3 mm,4 mm"], "the outputs are angles (mrad), which are alike"),
+        (["--position", "1 mm,2 mm", "--position", "3 mm,4 mm"], "the outputs are angles, which are alike"),
         (["--output-unit", "rad"], "moves by"),
         (["--period", "512"], "--axes (axes) says where the periods are; leave out --period"),
         (["--name", " "], "the mirror has no name"),
@@ -221,6 +221,44 @@ def test_drives_that_cannot_be_told_apart_are_refused_by_all_recordings(refused,
     still[:, 1] = 0.0
     message = refused("identify", *arrays(folder, still, 1e-6 * U + 0.1 * Y), *AXES, "--output-unit", "m")
     assert "the input 'drive[1]' moves in none of the recordings" in message
+
+
+def test_an_actuator_that_moves_nothing(refused, folder):
+    noise = np.random.Generator(np.random.Philox(2)).standard_normal(Y.shape)
+    output = 1e-6 * U[:, :1] * np.array([1.0, 0.5])[:, None, None] + 1e-7 * noise
+    message = refused("identify", *arrays(folder, output=output), *AXES, "--output-unit", "m")
+    assert (
+        "u_100mV.npy realisation 0: the drive 'drive[1]' moves nothing: the response of every output to it" in message
+    )
+
+
+def test_amplitudes_of_other_lengths_rates_or_channels(refused, folder):
+    whole, short = arrays(folder), arrays(folder, U[:300], Y[:300], "200mV")
+    files = (whole[0], short[0], *whole[1:], *short[1:])
+    message = refused("identify", *files, *AXES, "--output-unit", "m")
+    assert (
+        "u_200mV.npy realisation 0: 600 samples in periods of 300, where u_100mV.npy realisation 0 has 1024 s"
+        in message
+    )
+    short = arrays(folder, U, Y[:, :1], "200mV")
+    message = refused("identify", *files, *AXES, "--output-unit", "m")
+    assert "u_200mV.npy realisation 0: 2 inputs and 1 outputs, where u_100mV.npy realisation 0 has 2 and 2" in message
+    np.savez(folder / "slow.npz", u=U, y=Y, fs=500.0)
+    (folder / "list.toml").write_text(
+        """axes = ["samples", "channels", "realisations", "periods"]
+output_unit = "m"
+[recording.fast]
+file = "u_100mV.npy"
+output_file = "y_100mV.npy"
+rate = "2 kHz"
+[recording.slow]
+file = "slow.npz"
+input = "u"
+output = "y"
+"""
+    )
+    message = refused("identify", "list.toml")
+    assert "slow.npz realisation 0: the sample rate is 500 Hz and that of u_100mV.npy realisation 0 2000 Hz" in message
 
 
 @pytest.mark.parametrize(

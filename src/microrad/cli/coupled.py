@@ -52,13 +52,9 @@ def identify_channels(given: Given, units: tuple[str, str], said: str, target: T
     from microrad import report
     from microrad.lab.identify import coupled
     from microrad.lab.identify.coupled.mirror_file import coupled_file_text
-    from microrad.lab.identify.coupled.orientation import check_orientation
-    from microrad.lab.identify.travel import check_travel
 
     if not target.title.strip():
         raise Refusal("the mirror has no name; give one with --name, it stands in the mirror file and in the report.")
-    check_travel(given.every, units[1], positions_m=given.positions_m)
-    check_orientation(given.recordings, units[1], given.positions_m, given.signs)
     with progress_bar() as bar:
         found = coupled.identify_coupled(
             given.recordings,
@@ -66,6 +62,7 @@ def identify_channels(given: Given, units: tuple[str, str], said: str, target: T
             drive_unit=units[0],
             output_unit=units[1],
             positions_m=given.positions_m,
+            signs=given.signs,
             on_progress=bar,
         )
     text = coupled_file_text(found, given.every, target.title)

@@ -20,10 +20,12 @@ from microrad.lab.identify.coupled.held_out import (
 )
 from microrad.lab.identify.coupled.linear import STEPS, Fitted, best_delay, coupled_linear, per_axis
 from microrad.lab.identify.coupled.records import Candidate, CoupledIdentification
+from microrad.lab.identify.coupled.wiring import check_wiring
 from microrad.lab.identify.linear.response import FrequencyResponse, response_from_periods, response_from_records
 from microrad.lab.identify.records import IdentificationError, no_progress
 from microrad.lab.identify.selection.candidates import Refused
-from microrad.lab.recording import Recording
+from microrad.lab.identify.travel import check_travel
+from microrad.lab.recording import Recording, check_together
 from microrad.mirror.coupled import CoupledMirror
 
 AXIS_ORDERS = (2, 4)
@@ -40,13 +42,14 @@ class LadderOptions:
     linear_orders: tuple[int, ...] = LINEAR_ORDERS
 
 
-def identify_coupled(
+def identify_coupled(  # noqa: PLR0913  all but the first are named options
     recordings: Sequence[Recording],
     *,
     validation: Sequence[Recording] = (),
     drive_unit: str = "V",
     output_unit: str = "m",
     positions_m: Sequence[tuple[float, float]] | None = None,
+    signs: Sequence[Sequence[int]] | None = None,
     options: LadderOptions = LadderOptions(),
     on_progress: Progress | None = None,
     on_model: Callable[[Candidate], None] = lambda candidate: None,
@@ -60,16 +63,23 @@ def identify_coupled(
         drive_unit: Unit of all drives: V or mV.
         output_unit: Unit of all outputs: rad, mrad, urad, m, mm or um.
         positions_m: Where each output is measured on the mirror, (x, y) in m; None where that is not known.
+        signs: The way that each output moves with each drive at low frequency, shape (outputs, inputs): 1, -1, or 0
+            where nothing is said. With them, and with four positions, swapped channels and reversed sensors are seen.
         options: The orders of the models.
         on_progress: Called with the models done, their number, and the best one so far in words.
         on_model: Given each candidate as soon as it is judged.
 
     Raises:
+        RecordingError: For a drive that moves in no recording, or only as others do, and an output that follows none.
         IdentificationError: For recordings that do not belong together, that excite not all channels independently, or
-            of which nothing can be held out.
+            of which nothing can be held out; for a drive that moves nothing, an output that moves farther than a mirror
+            can, and channels that are not wired as signs or positions say.
     """
+    check_travel([*recordings, *validation], output_unit, positions_m=positions_m)
     records = channels(recordings, validation, drive_unit, output_unit, positions_m)
+    check_together(recordings)
     response = _response(records.fitted, records.periodic)
+    check_wiring(records.fitted[0].path, response, records.outputs, signs)
     low, high = response.excited_hz
     ladder = _Ladder(records, response, np.geomspace(low, high, BANDS + 1), on_model)
     stopped = False
