@@ -46,6 +46,7 @@ __all__ = [
 ]
 
 _BEYOND_LINK = Mission.model_fields.keys() - LinkMission.model_fields.keys()
+_MOST_QUOTED = 1000  # characters of a value, before it is clipped
 _MOST_UNKNOWN = 100  # unknown keys of one file for which a near one is looked up
 _Location = tuple[int | str, ...]
 _T = TypeVar("_T", bound=Table)
@@ -397,7 +398,7 @@ def _as_far(check: Callable[..., Iterator[Problem]], sound: Table, names: Iterab
 
 def _note_problem(document: Document, key: str, problem: Problem, value: str) -> None:
     found = document.holder(key).statements.get(key)
-    raw = clipped(" ".join(found.value.split())) if found and found.kind == "key" else value
+    raw = clipped(" ".join(found.value[:_MOST_QUOTED].split())) if found and found.kind == "key" else value
     document.fault(key, raw, problem.reason, problem.expected)
 
 

@@ -7,6 +7,7 @@ to hysteresis element e. A is made of the modes. Matrices are plain numbers in S
 """
 
 import difflib
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any
 
@@ -70,12 +71,12 @@ class CoupledMirror(Table):
             return
         faults = list(self._matrix_problems())
         yield from faults
-        if not faults:
-            faults = list(self._element_problems())
-            yield from faults
-            yield from self._growth_problems() if not faults else ()
+        if faults:
+            return
         if self.uncertainty is not None:
             yield from _name_problems(self, self.uncertainty)
+        faults = list(self._element_problems())
+        yield from faults or self._growth_problems()
 
     def _count_problems(self) -> Iterator[Problem]:
         for key, least in (("actuators", 1), ("outputs", 1), ("hysteresis", 0)):
@@ -170,6 +171,8 @@ def _place_problems(outputs: Mapping[str, OutputTable]) -> Iterator[Problem]:
         if table.position_m is None:
             advice = "a position of each displacement, or of none"
             yield Problem(f"outputs.{name}.position", "is missing, while other displacements have one", advice)
+    if len(places) < len(displacements):
+        return
     advice = "three displacements with a position, not on one line, or no position"
     if len(places) < 3:
         reason = f"has {len(places)} displacements with a position, too few for two tilts and a piston"
@@ -188,6 +191,7 @@ def on_a_line(places: Sequence[tuple[float, ...]]) -> bool:
 
 
 # ---------------------------------------------------------------------------------------------------------- parameters
+_MOST_TOLD = 20  # names of parameters that do not fit
 _KNOWN_OF_ELEMENTS = (
     *("thresholds", "weights", "widening"),
     *("d1", "d2", "epsilon", "delta", "alpha", "beta", "gamma", "eta", "exponent"),
@@ -217,11 +221,10 @@ def parameters(mirror: CoupledMirror) -> dict[str, float]:
 def _name_problems(mirror: CoupledMirror, uncertainty: UncertaintyTable) -> Iterator[Problem]:
     """Parameters that this mirror does not have, and those named twice."""
     there, key = parameters(mirror), "uncertainty.parameters"
-    seen: set[str] = set()
-    for name in uncertainty.parameters:
-        if name not in there:
-            near = next(iter(difflib.get_close_matches(name[:60], there, n=1)), "modes.decay.1")
-            yield Problem(key, f'has "{name[:60]}", which is no parameter of this mirror', f'such as "{near}"')
-        elif name in seen:
-            yield Problem(key, f'has "{name}" twice', "each parameter once")
-        seen.add(name)
+    unknown = [name for name in uncertainty.parameters if name not in there]
+    for name in unknown[:_MOST_TOLD]:
+        near = (*difflib.get_close_matches(name[:60], there, n=1), "modes.decay.1")[0]
+        yield Problem(key, f'has "{name[:60]}", which is no parameter of this mirror', f'such as "{near}"')
+    twice = [name for name, count in Counter(uncertainty.parameters).items() if count > 1]
+    for name in twice[:_MOST_TOLD]:
+        yield Problem(key, f'has "{name[:60]}" more than once', "each parameter once")

@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 Rows = tuple[tuple[float, ...], ...]
 
 Count = tuple[int, str]  # how many there are of what the rows or columns of a matrix belong to, and what that is
-_MANY = 1_000_000  # items of a list: the size of the file is the limit
+_MANY = 20_000  # items of a list for each parameter, or pair of them
+_MOST_MODES = 100
 _LENGTH = 1e-6  # a row of a factor may differ from length 1 by so much: six digits leave it
 
 
@@ -131,8 +132,10 @@ class ModesTable(Table):
     has one.
     """
 
-    decay_1_s: Annotated[tuple[float, ...], Several(Quantity("1/s"))] = Field(description="of each mode, above 0")
-    frequency_rad_s: Annotated[tuple[float, ...], Several(Quantity("rad/s"))] = Field(
+    decay_1_s: Annotated[tuple[float, ...], Several(Quantity("1/s"), most=_MOST_MODES)] = Field(
+        description="of each mode, above 0"
+    )
+    frequency_rad_s: Annotated[tuple[float, ...], Several(Quantity("rad/s"), most=_MOST_MODES)] = Field(
         description="of each mode; 0 for a real one"
     )
 

@@ -1,0 +1,330 @@
+"""Mirrors of several axes: response against a twin, the file that reads back to the bit, tilts from displacements."""
+
+import tomllib
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import oracles
+from microrad.core import lti
+from microrad.mirror import coupled
+from microrad.mirror.coupled import Actuator, CoupledMirror, Known, Output
+from microrad.mirror.hysteresis import BoucWen, Play
+from microrad.mirror.model import Mirror
+from microrad.mission.file import MissionError, load_coupled_mirror
+from microrad.mission.tables.coupled_mirror import CoupledMirror as Table
+
+SAMPLES, RATE_HZ, STEPS = 64, 1000.0, 2
+
+
+def philox(seed):
+    return np.random.Generator(np.random.Philox(seed))
+
+
+def channels(actuators, outputs):
+    """Names and ranges, each another, and outputs of both quantities."""
+    return (
+        tuple(Actuator(f"u {i}", 0.1 * i, -1.0 - i, 3.0 + i / 3, 1e3 / (i + 1)) for i in range(actuators)),
+        tuple(Output(f"y {i}", ("displacement", "angle")[i % 2]) for i in range(outputs)),
+    )
+
+
+def made(seed, modes=3, actuators=2, outputs=2, bouc_wen=1, plays=2, fed=True):
+    """A mirror of any numbers, slow enough that it does not run away."""
+    draw, elements = philox(seed).standard_normal, bouc_wen + plays
+    roots = [(-20.0 * (1 + abs(float(draw()))), (i % 3 != 1) * 300.0 * float(draw())) for i in range(modes)]
+    A = lti.modal_matrix(roots)
+    states = A.shape[0]
+    mirror = Mirror(
+        name="made of draws",
+        A=A,
+        B=100 * draw((states, actuators)),
+        E=draw((states, elements)),
+        F=fed * 0.1 * draw((elements, states)),
+        G=draw((elements, actuators)),
+        C=draw((outputs, states)),
+        D=0.1 * draw((outputs, actuators)),
+        K=draw((outputs, elements)),
+        bouc_wen=tuple(
+            BoucWen(0.1 * float(draw()), 0.0, 0.3 * float(draw()), 0.0, 2.0, 0.5, gamma_1_v=0.1, eta_1_v=0.2)
+            for _ in range(bouc_wen)
+        ),
+        plays=tuple(Play((0.0, 0.1 + i, 0.7 + i), tuple((0.1 * draw(3)).tolist())) for i in range(plays)),
+        inverse=(),
+    )
+    return CoupledMirror(mirror, *channels(actuators, outputs), 3.3e-4, RATE_HZ, STEPS, (1.0, 400.0))
+
+
+def read_back(mirror):
+    return coupled.of(load_coupled_mirror("mirror.toml", text=coupled.text(mirror)))
+
+
+def drive_of(seed, actuators):
+    """A multisine of five lines: amplitude and phase of each, and its samples."""
+    rng = philox(seed)
+    lines = rng.standard_normal((5, actuators)) + 1j * rng.standard_normal((5, actuators))
+    return lines, sampled(lines, np.arange(SAMPLES) / RATE_HZ)
+
+
+def sampled(lines, time_s):
+    """Sum of the lines 1 to 5 of a period of SAMPLES at the times."""
+    turn = np.exp(2j * np.pi * np.outer(time_s, np.arange(1, 6)) * RATE_HZ / SAMPLES)
+    return (turn @ lines).real
+
+
+def twin_of(mirror):
+    """The plant as the twins of the kernels take it."""
+    rows = tuple(oracles.BoucWen(*(getattr(b, f.name) for f in fields(b))) for b in mirror.bouc_wen)
+    operators = tuple(oracles.Operator(p.thresholds_v, p.weights_rad_v) for p in mirror.plays)
+    return oracles.Mirror(*(getattr(mirror, name) for name in "ABEFGCDK"), rows, operators)
+
+
+# ------------------------------------------------------------------------------------------------------------ response
+@pytest.mark.parametrize("fed", [True, False])
+def test_the_response_is_that_of_the_twin_to_a_drive_of_the_delay_ago(fed):
+    """The drive between samples from its lines, the plant by dense matrix exponentials."""
+    mirror = made(1, fed=fed)
+    lines, drive = drive_of(2, 2)
+    at = np.arange(SAMPLES * STEPS) / (RATE_HZ * STEPS)
+    expected = oracles.open_loop(twin_of(mirror.mirror), mirror.step_s, sampled(lines, at - mirror.delay_s))[0][::STEPS]
+    assert np.abs(expected).max() > 1.0
+    np.testing.assert_allclose(mirror.response(drive), expected, rtol=0, atol=1e-11 * np.abs(expected).max())
+    in_time = oracles.open_loop(twin_of(mirror.mirror), mirror.step_s, sampled(lines, at))[0][::STEPS]
+    assert np.abs(in_time - expected).max() > 1e-3 * np.abs(expected).max()
+
+
+def test_modes_are_found_in_the_order_of_their_states():
+    roots = [(-1.0, 0.0), (-2.0, 30.0), (-3.0, -40.0), (-2.0, 0.0), (-2.0, 0.0)]
+    assert coupled.modes(lti.modal_matrix(roots)) == tuple(roots)
+    assert coupled.modes(np.zeros((0, 0))) == ()
+
+
+def test_a_plant_in_another_form_or_of_other_channels_is_refused():
+    mirror = made(0)
+    for A in ([[-1.0, 2.0], [2.0, -1.0]], [[-1.0, 2.0], [-2.0, -3.0]], [[-1.0, 1.0], [0.0, -3.0]]):
+        with pytest.raises(ValueError, match="bring the mirror into real modal form first"):
+            coupled.modes(np.array(A))
+    coupling = mirror.mirror.A.copy()
+    coupling[0, -1] = 1.0
+    with pytest.raises(ValueError, match="not block-diagonal"):
+        replace(mirror, mirror=replace(mirror.mirror, A=coupling))
+    with pytest.raises(ValueError, match="1 actuators are named, and the mirror has 2"):
+        replace(mirror, actuators=mirror.actuators[:1])
+    with pytest.raises(ValueError, match="3 outputs are named, and the mirror has 2"):
+        replace(mirror, outputs=(*mirror.outputs, Output("more", "angle")))
+
+
+# ---------------------------------------------------------------------------------------------------------- round trip
+@settings(deadline=None, max_examples=60)  # the machine may be busy
+@given(
+    seed=st.integers(0, 10**6),
+    modes=st.integers(0, 4),
+    actuators=st.integers(1, 3),
+    outputs=st.integers(1, 3),
+    bouc_wen=st.integers(0, 2),
+    plays=st.integers(0, 2),
+    fed=st.booleans(),
+)
+def test_a_file_reads_back_to_the_bit_and_so_does_its_response(seed, **sizes):
+    mirror = made(seed, **sizes)
+    if not sizes["bouc_wen"] + sizes["plays"] + sizes["modes"] and not mirror.mirror.D.any():
+        return
+    found = read_back(mirror)
+    same(found, mirror)
+    drive = drive_of(seed + 1, sizes["actuators"])[1]
+    np.testing.assert_array_equal(found.response(drive), mirror.response(drive))
+
+
+def same(found, mirror):
+    """All numbers alike, to the last bit."""
+    for each in fields(Mirror):
+        one, other = (getattr(m.mirror, each.name) for m in (found, mirror))
+        assert np.array_equal(one, other) if isinstance(one, np.ndarray) else one == other, each.name
+    for each in fields(CoupledMirror):
+        if each.name not in ("mirror", "known"):
+            assert getattr(found, each.name) == getattr(mirror, each.name), each.name
+    assert (found.known is None) == (mirror.known is None)
+    if found.known is not None:
+        assert found.known.parameters == mirror.known.parameters
+        np.testing.assert_array_equal(found.known.standard_errors, mirror.known.standard_errors)
+        np.testing.assert_array_equal(found.known.factor, mirror.known.factor)
+
+
+NUMBER = st.floats(allow_nan=False, allow_infinity=False, width=64)
+
+
+@settings(deadline=None, max_examples=60)  # the machine may be busy
+@given(gains=st.lists(NUMBER, min_size=4, max_size=4), decay=st.floats(1e-300, 1e300), w=NUMBER, delay=NUMBER)
+def test_any_number_reads_back(gains, decay, w, delay):
+    """Without hysteresis nothing can run away: the largest numbers and the smallest."""
+    plain = made(0, modes=1, bouc_wen=0, plays=0)
+    A = lti.modal_matrix([(-decay, w)])
+    C = np.array([gains[:2], gains[2:]])[:, : A.shape[0]]
+    plain = replace(
+        plain,
+        mirror=replace(
+            plain.mirror,
+            A=A,
+            B=np.ones((A.shape[0], 2)),
+            E=np.zeros((A.shape[0], 0)),
+            F=np.zeros((0, A.shape[0])),
+            C=C + (C == 0),
+        ),
+        delay_s=delay,
+    )
+    same(read_back(plain), plain)
+
+
+def whole():
+    """A mirror that uses all that a file may hold."""
+    mirror = made(5, fed=False)
+    rated = BoucWen(0.1, -3e-7, -0.02, 5e-4, 2.4, 0.6, 1e4, 5.0, 0.1, 0.2, 1.5)
+    plays = (Play((0.2, 0.4), (0.3, -0.1), 2e-5, 2e4), mirror.mirror.plays[1])
+    factor = philox(8).standard_normal((5, 3))
+    factor /= np.linalg.norm(factor, axis=1, keepdims=True)
+    names = (
+        "recording.delay",
+        "modes.frequency.1",
+        "matrices.B.2.1",
+        "hysteresis.2.weights.2",
+        "hysteresis.1.exponent",
+    )
+    at = ((0.03, 0.0), (-0.015, 0.026), (-0.015, -0.026))
+    outputs = tuple(Output(f'sensor "{i}" \\ µ', "displacement", place) for i, place in enumerate(at))
+    D = philox(6).standard_normal((3, 2))
+    plant = replace(
+        mirror.mirror,
+        bouc_wen=(rated,),
+        plays=plays,
+        D=D,
+        C=np.vstack([mirror.mirror.C, mirror.mirror.C[:1]]),
+        K=np.vstack([mirror.mirror.K, 2 * mirror.mirror.K[:1]]),
+    )
+    return replace(
+        mirror, mirror=plant, outputs=outputs, known=Known(names, np.array([1e-6, 0.1, 0.0, 3e-3, 0.25]), factor)
+    )
+
+
+def test_all_that_a_file_holds_reads_back():
+    mirror = whole()
+    found = read_back(mirror)
+    same(found, mirror)
+    drive = drive_of(3, 2)[1]
+    np.testing.assert_array_equal(found.response(drive), mirror.response(drive))
+    assert np.abs(found.response(drive)).max() > 0.1
+    np.testing.assert_allclose(np.diag(found.known.correlation), 1.0, atol=1e-15)
+
+
+def test_the_text_is_to_be_read_by_people():
+    """A row of a matrix a line, Hz and damping behind each mode, comments at the head that cannot end the comment."""
+    mirror = whole()
+    text = coupled.text(mirror, ["Mirror identified from records\nversion = 3", "second"])
+    lines = text.split("\n")
+    assert lines[:2] == ["# Mirror identified from records version = 3", "# second"]
+    assert lines.index("version = 2") == 3
+    begin = lines.index("B = [")
+    states = mirror.mirror.A.shape[0]
+    assert lines[begin + states + 1] == "]"
+    assert [float(v) for v in lines[begin + 2].strip(" [],").split(",")] == mirror.mirror.B[1].tolist()
+    s, w = coupled.modes(mirror.mirror.A)[0]
+    size = abs(complex(s, w))
+    first = next(line for line in lines if "# mode 1:" in line)
+    assert first.split("# mode 1: ")[1] == f"{size / (2 * np.pi):.6g} Hz, damping {-s / size:.4g}"
+    assert next(line for line in lines if "# mode 2:" in line).endswith("Hz, real")
+    assert max(len(line) for line in lines) < 130
+
+
+def test_elements_of_both_models_may_stand_in_any_order():
+    """A file may count plays first; the plant has Bouc-Wen elements first."""
+    mirror = made(5)
+    data = tomllib.loads(coupled.text(mirror))
+    data["hysteresis"] = {"1": data["hysteresis"]["3"], "2": data["hysteresis"]["1"], "3": data["hysteresis"]["2"]}
+    turned = [2, 0, 1]
+    for name in "EK":
+        data["matrices"][name] = [[row[i] for i in turned] for row in data["matrices"][name]]
+    for name in "FG":
+        data["matrices"][name] = [data["matrices"][name][i] for i in turned]
+    found = coupled.of(Table.model_validate(data))
+    order = [0, 2, 1]  # the plays have changed places
+    np.testing.assert_array_equal(found.mirror.E, mirror.mirror.E[:, order])
+    np.testing.assert_array_equal(found.mirror.G, mirror.mirror.G[order])
+    assert found.mirror.bouc_wen == mirror.mirror.bouc_wen
+    assert found.mirror.plays == mirror.mirror.plays[::-1]
+    drive = drive_of(3, 2)[1]
+    np.testing.assert_allclose(found.response(drive), mirror.response(drive), rtol=0, atol=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("change", "key", "reason"),
+    [
+        ({"delay_s": float("nan")}, "mirror.recording.delay", ""),
+        (
+            {"known": Known(("modes.decay.9",), np.ones(1), np.ones((1, 1)))},
+            "mirror.uncertainty.parameters",
+            "is no parameter of this mirror",
+        ),
+        (
+            {"known": Known(("modes.decay.1",), np.ones(1), 2 * np.ones((1, 1)))},
+            "mirror.uncertainty.factor",
+            "the length 2",
+        ),
+    ],
+)
+def test_nothing_is_written_that_would_not_be_read(change, key, reason):
+    with pytest.raises(MissionError) as refused:
+        coupled.text(replace(made(0), **change))
+    assert [fault.key for fault in refused.value.faults] == [key]
+    assert reason in refused.value.faults[0].reason
+
+
+# ------------------------------------------------------------------------------------------------------------ geometry
+def placed(*places):
+    return tuple(Output(f"y {i}", "displacement", place) for i, place in enumerate(places))
+
+
+def test_tilts_and_piston_of_a_plane_that_is_turned():
+    """A plane through three or four places: turned about x it rises at positive y, about y at negative x."""
+    tilt_x, tilt_y, piston = 3e-4, -2e-4, 5e-6
+    turned_about_x = np.array([[1, 0, 0], [0, np.cos(tilt_x), -np.sin(tilt_x)], [0, np.sin(tilt_x), np.cos(tilt_x)]])
+    turned_about_y = np.array([[np.cos(tilt_y), 0, np.sin(tilt_y)], [0, 1, 0], [-np.sin(tilt_y), 0, np.cos(tilt_y)]])
+    for places in (((0.03, 0.01), (-0.015, 0.026), (-0.02, -0.03)), ((0.03, 0), (0, 0.03), (-0.03, 0), (0, -0.03))):
+        moved = [(turned_about_y @ turned_about_x @ [x, y, 0.0])[2] + piston for x, y in places]
+        found = coupled.tilts_and_piston(placed(*places)) @ moved
+        np.testing.assert_allclose(found, [tilt_x, tilt_y, piston], rtol=1e-3, atol=1e-9)
+
+
+def test_more_places_than_three_average_their_noise():
+    """Four sensors on a circle of radius r: a tilt has the variance of one over 2 r^2, the piston a quarter of it."""
+    matrix = coupled.tilts_and_piston(placed((0.03, 0), (0, 0.03), (-0.03, 0), (0, -0.03)))
+    covariance = matrix @ matrix.T
+    np.testing.assert_allclose(covariance, np.diag([1 / (2 * 0.03**2), 1 / (2 * 0.03**2), 0.25]), rtol=1e-12, atol=1e-9)
+
+
+def test_angles_have_no_part_in_the_geometry():
+    outputs = placed((0.03, 0.01), (-0.015, 0.026), (-0.02, -0.03))
+    matrix = coupled.tilts_and_piston((outputs[0], Output("angle", "angle"), *outputs[1:]))
+    assert matrix.shape == (3, 4)
+    assert not matrix[:, 1].any()
+    np.testing.assert_array_equal(matrix[:, [0, 2, 3]], coupled.tilts_and_piston(outputs))
+
+
+@pytest.mark.parametrize(
+    ("places", "reason"),
+    [
+        (((0.0, 0.0), (0.01, 0.01), (0.03, 0.03)), "on one line"),
+        (((0.0, 0.0), (0.0, 0.0), (0.0, 0.0)), "on one line"),
+        (((0.0, 0.0), (0.01, 0.0)), "2 of 2 displacements have a position; two tilts and a piston take at least three"),
+        (((0.0, 0.0), (0.01, 0.0), (0.0, 0.01), None), "3 of 4 displacements have a position"),
+        ((), "0 of 0 displacements"),
+    ],
+)
+def test_places_that_do_not_span_the_tilts_are_refused(places, reason):
+    with pytest.raises(ValueError, match=reason):
+        coupled.tilts_and_piston(placed(*places))
+
+
+def test_places_almost_on_a_line_still_span():
+    assert np.isfinite(coupled.tilts_and_piston(placed((0.0, 0.0), (0.01, 1e-5), (0.02, 0.0)))).all()

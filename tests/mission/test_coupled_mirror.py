@@ -1,0 +1,560 @@
+"""Mirror files of version 2: what a bad one is told, and what the commands say that take one axis."""
+
+import re
+
+import pytest
+
+from microrad.mission.file import MissionError, load_coupled_mirror, load_mirror, load_mission
+from microrad.mission.tables.coupled_mirror import CoupledMirror, parameters
+from microrad.mission.toml import scan
+from places import ROOT
+from waiting import no_hang
+
+PAGE = (ROOT / "docs" / "mirror-file.md").read_text(encoding="utf-8")
+EXAMPLES = re.findall(r"```toml\n(.*?)```", PAGE, flags=re.DOTALL)
+TEXT = next(text for text in EXAMPLES if text.startswith("version = 2"))
+ONE_AXIS = EXAMPLES[0]
+MISSION = ROOT / "missions" / "leo-geo.toml"
+
+
+def edited(*changes):
+    """The example with texts replaced, each once."""
+    text = TEXT
+    for old, new in changes:
+        assert old in text, old
+        text = text.replace(old, new, 1)
+    return text
+
+
+def loaded(text):
+    return load_coupled_mirror("mirror.toml", text=text)
+
+
+def refusal(text, load=load_coupled_mirror):
+    with no_hang(), pytest.raises(MissionError) as refused:
+        load("mirror.toml", text=text)
+    report = str(refused.value)
+    assert "mirror.toml" in report
+    assert report.replace("\n", "").isprintable()
+    for fault in refused.value.faults:
+        assert fault.reason and fault.expected
+    return refused.value.faults
+
+
+UNCERTAIN = TEXT[TEXT.index("[uncertainty]") :]
+PARAMETERS = '["modes.decay.1", "modes.frequency.1", "hysteresis.1.weights.3", "recording.delay"]'
+CORRELATION = TEXT[TEXT.index("correlation = [") :]
+IDENTITY = "[[1.0, 0.0], [0.0, 1.0], [0.6, 0.8], [1.0, 0.0]]"
+B = re.search(r"B = \[.*?\n\]", TEXT, re.DOTALL)[0]
+C = re.search(r"C = \[.*?\n\]", TEXT, re.DOTALL)[0]
+E = re.search(r"E = \[.*?\n\]", TEXT, re.DOTALL)[0]
+F = re.search(r"F = \[.*?\n\]", TEXT, re.DOTALL)[0]
+PLAYS = TEXT[TEXT.index("[hysteresis.2]") : TEXT.index("[uncertainty]")]
+BOUC_WEN = '[hysteresis.2]\nmodel = "bouc-wen"\nd1 = 0.02\nepsilon = -0.01\nalpha = "2 1/V"\nbeta = "0.5 1/V"\n'
+
+FAULTS = {
+    # ---- versions
+    "an unknown version": (("version = 2", "version = 3"), "version", "is no version", "version = 2 for"),
+    "a version in quotes": (("version = 2", 'version = "2"'), "version", "is no version", "version = 2 for"),
+    "a version with a point": (("version = 2", "version = 2.0"), "version", "is no version", "version = 2 for"),
+    "no version": (("version = 2\n", ""), "version", "is missing", "version = 2 in the first line"),
+    "a key of version 1": (
+        ("version = 2\n", 'version = 2\ntravel = "2 mrad"\n'),
+        "travel",
+        "is a key of version 1, in a file of version 2",
+        "this line removed",
+    ),
+    "a range of version 1": (
+        ("version = 2\n", 'version = 2\nbias = "5 V"\n'),
+        "bias",
+        "is a key of version 1",
+        "in the table of each actuator",
+    ),
+    "a table of version 1": (
+        ("[modes]", '[linear]\npoles = ["1 Hz"]\n[modes]'),
+        "linear",
+        "is a key of version 1",
+        "[modes] and [matrices] in its place",
+    ),
+    "hysteresis of version 1": (
+        ("[modes]", '[prandtl_ishlinskii]\nthresholds = ["0 V"]\n[modes]'),
+        "prandtl_ishlinskii",
+        "is a key of version 1",
+        'model = "plays"',
+    ),
+    "a key that is none": (("steps_per_sample", "steps_a_sample"), "recording.steps_a_sample", "is no key", "one of"),
+    # ---- channels
+    "a bias out of range": (
+        ('bias = "50 V" ', 'bias = "150 V" '),
+        "actuators.1.bias",
+        "is outside drive_min to drive_max (0 V to 100 V)",
+        "0 V to 100 V",
+    ),
+    "a range that falls": (
+        ('drive_max = "100 V"', 'drive_max = "-1 V"'),
+        "actuators.1.drive_max",
+        "is not above drive_min",
+        "above 0 V",
+    ),
+    "a number without its unit": (
+        ('rate_limit = "20 kV/s"', "rate_limit = 20.0"),
+        "actuators.1.rate_limit",
+        "is a number without a unit",
+        'rate_limit = "20 V/us"',
+    ),
+    "an actuator left out": (
+        ("[actuators.2]", "[actuators.3]"),
+        "actuators",
+        'has "3" where its 2 tables are counted from 1',
+        "[actuators.1], [actuators.2]",
+    ),
+    "a name that stands twice": (
+        ('name = "tilt about y"', 'name = "tilt about x"'),
+        "actuators",
+        'two tables of the name "tilt about x"',
+        "a name of its own",
+    ),
+    "another quantity": (
+        ('quantity = "displacement"', 'quantity = "displacment"'),
+        "outputs.1.quantity",
+        "is none of the choices",
+        'quantity = "displacement"',
+    ),
+    "a band beyond half the rate": (
+        ('excited_to = "500 Hz"', 'excited_to = "2 kHz"'),
+        "recording.excited_to",
+        "is above half the rate (1 kHz)",
+        "at most 1 kHz",
+    ),
+    "a band that falls": (
+        ('excited_from = "1 Hz"', 'excited_from = "700 Hz"'),
+        "recording.excited_to",
+        "is not above excited_from",
+        "a band that goes up",
+    ),
+    "part of a step": (
+        ("steps_per_sample = 4", "steps_per_sample = 4.5"),
+        "recording.steps_per_sample",
+        "is not a whole number",
+        "from 1 to 1000",
+    ),
+    # ---- geometry
+    "sensors on one line": (
+        ('["-15 mm", "-26 mm"]', '["-60 mm", "52 mm"]'),
+        "outputs",
+        "has all displacements on one line, so a tilt about that line moves none",
+        "three displacements with a position, not on one line",
+    ),
+    "a sensor without a place": (
+        ('position = ["-15 mm", "-26 mm"]\n', ""),
+        "outputs.3.position",
+        "is missing, while other displacements have one",
+        "of each displacement, or of none",
+    ),
+    "a place in space": (
+        ('["-15 mm", "-26 mm"]', '["-15 mm", "-26 mm", "2 mm"]'),
+        "outputs.3.position",
+        "has 3 coordinates",
+        "x and y in the plane",
+    ),
+    # ---- modes
+    "an unstable pole": (
+        ('["18 1/s", "21 1/s"]', '["18 1/s", "-21 1/s"]'),
+        "modes.decay",
+        "item 2 is -21 1/s: an unstable mode",
+        "above 0 1/s",
+    ),
+    "a pole at 0": (
+        ('["18 1/s"', '["0 1/s"'),
+        "modes.decay",
+        "item 1 is 0 1/s: an unstable mode",
+        "above 0 1/s",
+    ),
+    "a decay in Hz": (('["18 1/s"', '["18 Hz"'), "modes.decay", 'item 1: "18 Hz" is in "Hz"', "1/s"),
+    "a decay too many": (
+        ('["18 1/s", ', '["18 1/s", "5 1/s", '),
+        "modes.frequency",
+        "has 2 items where decay has 3",
+        '"0 rad/s" for a real one',
+    ),
+    # ---- matrices
+    "a row too many": (
+        ("B = [", "B = [[1.0, 1.0],"),
+        "matrices.B",
+        "has 5 rows where there are 4 states",
+        "one row for each, in order",
+    ),
+    "a number too few": (
+        ("[25.0, -950.0]", "[25.0]"),
+        "matrices.B",
+        "row 4 has 1 numbers where there are 2 actuators",
+        "2 numbers in each row",
+    ),
+    "rows that are all too long": (
+        (F, "F = [[1.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0, 0.0]]"),
+        "matrices.F",
+        "row 1 has 5 numbers where there are 4 states; 1 other rows do not fit, either",
+        "4 numbers in each row",
+    ),
+    "an output too few": (
+        (C, "C = [[1.0, 0.0, 0.0, 0.0]]"),
+        "matrices.C",
+        "has 1 rows where there are 3 outputs",
+        "row",
+    ),
+    "a text in a matrix": (
+        ("[25.0, -950.0]", '[25.0, "x"]'),
+        "matrices.B",
+        "row 4: item 2",
+        "a list of rows, each a list of numbers",
+    ),
+    "a number that is none": (("[25.0, -950.0]", "[25.0, nan]"), "matrices.B", "row 4: item 2", "numbers"),
+    "a matrix in one row": ((B, "B = [1.0, 2.0]"), "matrices.B", "is no list of rows", "[[1.0, 0.0], [0.0, 1.0]]"),
+    "no C": ((C, ""), "matrices", "has no C, so none of the 4 states is seen", "a row for each output"),
+    # ---- hysteresis
+    "an operator that acts on nothing": (
+        (E, "E = [[0.0, 0.0], [-900.0, 0.0], [0.0, 0.0], [0.0, 0.0]]"),
+        "hysteresis.2",
+        "acts on nothing: column 2 of E and of K is zero",
+        "a number other than 0 there",
+    ),
+    "an operator that nothing drives": (
+        (F, "F = [[0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]]"),
+        "hysteresis.1",
+        "is driven by nothing: row 1 of F and of G is zero",
+        "a number other than 0 there",
+    ),
+    "weights of nothing": (
+        ("weights = [0.03, 0.03, 0.04]", "weights = [0.0, 0.0, 0.0]"),
+        "hysteresis.1.weights",
+        "is zero throughout, so the element acts on nothing",
+        "a weight other than 0",
+    ),
+    "thresholds that fall": (
+        ('["0.5 V", "2 V", "8 V"]', '["0.5 V", "8 V", "2 V"]'),
+        "hysteresis.1.thresholds",
+        "does not rise",
+        "rising",
+    ),
+    "thresholds below 0": (
+        ('["0.5 V", "2 V"', '["-0.5 V", "2 V"'),
+        "hysteresis.1.thresholds",
+        "is below 0 V",
+        "at least 0 V",
+    ),
+    "a weight too few": (
+        ("weights = [0.03, 0.03, 0.04]", "weights = [0.03, 0.03]"),
+        "hysteresis.1.weights",
+        "has 2 items where thresholds has 3",
+        "one weight for each threshold",
+    ),
+    "a key of the other model": (
+        ("weights = [0.03, 0.03, 0.04]", "weights = [0.03, 0.03, 0.04]\nd1 = 0.1"),
+        "hysteresis.1.d1",
+        'does not belong to model = "plays"',
+        'or model = "bouc-wen"',
+    ),
+    "plays without weights": (
+        ("weights = [0.03, 0.03, 0.04]", ""),
+        "hysteresis.1.weights",
+        'is missing, and model = "plays" needs it',
+        "weights = [0.8, 0.1]",
+    ),
+    "a Bouc-Wen model that grows": (
+        (PLAYS, BOUC_WEN.replace("0.5 1/V", "2.5 1/V")),
+        "hysteresis.2.alpha",
+        "h would grow without bound",
+        "above 2.5 1/V",
+    ),
+    "a Bouc-Wen model of nothing": (
+        (PLAYS, BOUC_WEN.replace("0.02", "0.0").replace("-0.01", "0.0")),
+        "hysteresis.2.d1",
+        "acts on nothing",
+        "one of them other than 0",
+    ),
+    "a rate without a limit": (
+        (PLAYS, f'{BOUC_WEN}delta = "1e-4 s/V"\n'),
+        "hysteresis.2.rate_limit",
+        "the element depends on the rate",
+        'rate_limit = "1 kV/s"',
+    ),
+    "a rate that is fed back": (
+        (PLAYS, f'{BOUC_WEN}delta = "1e-4 s/V"\nrate_limit = "1 kV/s"\n'),
+        "hysteresis.2.delta",
+        "row 2 of F feeds back",
+        "this line removed, or a row of zeros in F",
+    ),
+    "a stiffness that runs away": (
+        ("weights = [0.03, 0.03, 0.04]", "weights = [0.5, 0.5, 0.4]"),
+        "hysteresis",
+        "makes the mirror run away: where its elements slide it grows by",
+        "smaller weights",
+    ),
+    "a Bouc-Wen stiffness that runs away": (
+        (PLAYS, BOUC_WEN.replace("0.02", "1.3")),
+        "hysteresis",
+        "makes the mirror run away",
+        "smaller weights",
+    ),
+    # ---- uncertainty
+    "a name that is not in the mirror": (
+        ("hysteresis.1.weights.3", "hysteresis.1.weights.4"),
+        "uncertainty.parameters",
+        'has "hysteresis.1.weights.4", which is no parameter of this mirror',
+        'such as "hysteresis.1.weights.',
+    ),
+    "a name that stands twice among the parameters": (
+        ('"hysteresis.1.weights.3"', '"modes.decay.1"'),
+        "uncertainty.parameters",
+        'has "modes.decay.1" more than once',
+        "each parameter once",
+    ),
+    "a negative error": (
+        ("standard_errors = [0.4", "standard_errors = [-0.4"),
+        "uncertainty.standard_errors",
+        "item 1: -0.4 is below 0",
+        "at least 0",
+    ),
+    "an error too few": (
+        ("standard_errors = [0.4, ", "standard_errors = ["),
+        "uncertainty.standard_errors",
+        "has 3 items where parameters has 4",
+        "one standard error for each parameter",
+    ),
+    "a correlation that is none": (
+        ("-0.2, 0.6,", "-0.99, 0.99,"),
+        "uncertainty.correlation",
+        "is not positive semidefinite: its smallest eigenvalue is -",
+        "as the fit gave them",
+    ),
+    "a correlation beyond 1": (("-0.2, 0.6,", "-1.2, 0.6,"), "uncertainty.correlation", "is below -1", "at least -1"),
+    "a correlation too short": (
+        ("-0.2, 0.6,", "-0.2,"),
+        "uncertainty.correlation",
+        "has 5 items where 4 parameters have 6 pairs",
+        "6 numbers, the lower triangle",
+    ),
+    "both forms of a correlation": (
+        (CORRELATION, f"factor = {IDENTITY}\n{CORRELATION}"),
+        "uncertainty.correlation",
+        "stands beside factor",
+        "one of the two removed",
+    ),
+    "a factor of other lengths": (
+        (CORRELATION, f"factor = {IDENTITY.replace('0.6', '0.7')}\n"),
+        "uncertainty.factor",
+        "row 3 has the length 1.063015, so the correlation with itself is not 1",
+        "rows of length 1",
+    ),
+    "a factor too short": (
+        (CORRELATION, "factor = [[1.0, 0.0], [0.0, 1.0], [0.6, 0.8]]\n"),
+        "uncertainty.factor",
+        "has 3 rows where there are 4 parameters",
+        "one row for each",
+    ),
+    "a factor that is ragged": (
+        (CORRELATION, "factor = [[1.0, 0.0], [0.0, 1.0], [0.6, 0.8], [1.0]]\n"),
+        "uncertainty.factor",
+        "row 4 has 1 numbers where there are 2 numbers in row 1",
+        "2 numbers in each row",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_what_is_wrong_is_told_once_with_its_key_and_a_remedy(name):
+    change, key, reason, expected = FAULTS[name]
+    text = edited(change)
+    faults = refusal(text)
+    assert [fault.key for fault in faults] == [f"mirror.{key}"]
+    fault = faults[0]
+    assert reason in fault.reason
+    assert expected in fault.expected or expected in fault.reason
+    lines = {statement.key: statement.line for statement in scan(text)}
+    parts = key.split(".")
+    there = [".".join(parts[:n]) for n in range(len(parts), 0, -1) if ".".join(parts[:n]) in lines]
+    assert fault.line == (lines[there[0]] if there else 0)
+
+
+def test_faults_of_all_tables_are_told_together():
+    text = edited(
+        ("version = 2", "version = 2\ncreep = 1"),
+        ('["18 1/s"', '["-18 1/s"'),
+        ('bias = "50 V" ', 'bais = "50 V" '),
+        ("[25.0, -950.0]", '[25.0, "x"]'),
+        ('model = "plays"', 'model = "play"'),
+    )
+    told = {(fault.key, fault.nearest) for fault in refusal(text)}
+    assert told == {
+        ("mirror.creep", ""),
+        ("mirror.modes.decay", ""),
+        ("mirror.actuators.1.bais", "bias"),
+        ("mirror.matrices.B", ""),
+        ("mirror.hysteresis.1.model", '"plays"'),
+    }
+
+
+def test_what_stands_without_its_table_is_told_for_each_matrix():
+    modes = TEXT[TEXT.index("[modes]") : TEXT.index("[matrices]")]
+    keys = {fault.key: fault.reason for fault in refusal(edited((modes, "")))}
+    assert set(keys) == {f"mirror.matrices.{name}" for name in "BCEF"}
+    assert set(keys.values()) == {"stands without a table [modes]"}
+    elements = TEXT[TEXT.index("[hysteresis.1]") : TEXT.index("[uncertainty]")]
+    keys = {
+        fault.key: fault.reason
+        for fault in refusal(edited((elements, ""), ("hysteresis.1.weights.3", "modes.decay.2")))
+    }
+    assert set(keys) == {"mirror.matrices.E", "mirror.matrices.F"}
+    assert set(keys.values()) == {"stands without a table [hysteresis.1]"}
+
+
+def test_two_displacements_with_places_are_too_few():
+    third = TEXT[TEXT.index("[outputs.3]") : TEXT.index("[recording]")]
+    faults = refusal(edited((third, ""), (C, "C = [[0.0, 0.0, -3.0e-6, 0.0], [2.6e-6, 0.0, 1.5e-6, 0.0]]")))
+    assert [fault.key for fault in faults] == ["mirror.outputs"]
+    assert "has 2 displacements with a position, too few for two tilts and a piston" in faults[0].reason
+    unplaced = edited((third, ""), (C, "C = [[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]]"))
+    assert len(loaded(re.sub(r"position = .*\n", "", unplaced)).outputs) == 2
+
+
+def test_an_angle_has_no_place():
+    faults = refusal(edited(('quantity = "displacement"', 'quantity = "angle"')))
+    assert [fault.key for fault in faults] == ["mirror.outputs.1.position"]
+    assert "an angle, which is alike everywhere" in faults[0].reason
+
+
+def test_a_rate_that_nothing_feeds_back_is_taken():
+    """The same element that is refused in the stiffness, driven by the drive alone."""
+    element = f'{BOUC_WEN}delta = "1e-4 s/V"\nrate_limit = "1 kV/s"\n'
+    rows = "F = [[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0]]\nG = [[0.0, 0.0], [0.0, 1.0]]"
+    assert loaded(edited((PLAYS, element), (F, rows))).hysteresis["2"].delta_s_v == 1e-4
+
+
+def test_a_stiffness_at_the_edge_of_running_away():
+    """The pair -18 +- 900i with E W F: stable while the weights sum to less than 1, as x2' = (1 - W) 900 x1 - 18 x2."""
+    for last, stable in (("0.9395", True), ("0.941", False)):
+        text = edited(("weights = [0.03, 0.03, 0.04]", f"weights = [0.03, 0.03, {last}]"))
+        if stable:
+            assert loaded(text).states == 4
+        else:
+            assert "run away" in refusal(text)[0].reason
+
+
+def test_parameters_are_named_with_their_values():
+    found = parameters(loaded(TEXT))
+    assert found["modes.decay.2"] == 21.0
+    assert found["modes.frequency.1"] == 900.0
+    assert found["matrices.B.4.1"] == 25.0
+    assert found["hysteresis.2.thresholds.3"] == 8.0
+    assert found["hysteresis.1.weights.3"] == 0.04
+    assert found["recording.delay"] == 70e-6
+    assert len(found) == 1 + 4 + 8 + 12 + 8 + 8 + 12
+    matrices = TEXT[TEXT.index("[matrices]") : TEXT.index("[hysteresis.1]")]
+    static = "[matrices]\nC = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]\nG = [[1.0, 0.0], [0.0, 1.0]]\n"
+    added = f"{static}K = [[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]]\n"
+    real = loaded(edited(('"950 rad/s"', '"0 rad/s"'), (matrices, added)))
+    assert real.states == 3
+    assert "modes.frequency.2" not in parameters(real)
+
+
+@pytest.mark.parametrize("name", ["standard_errors = [0.4, 0.9, 0.004, 2.0e-6]", PARAMETERS, B])
+def test_lists_without_end_are_refused_in_little_time(name):
+    many = ", ".join(["0.1"] * 100_000) if name != PARAMETERS else ", ".join(f'"a{i}"' for i in range(19_999))
+    new = {PARAMETERS: f"[{many}]", B: f"B = [[{many}]]"}.get(name, f"standard_errors = [{many}]")
+    assert len(str(MissionError(ROOT, refusal(edited((name, new)))))) < 40_000
+
+
+def test_the_schema_has_every_key():
+    schema = CoupledMirror.model_json_schema(by_alias=True)
+    assert set(schema["properties"]) == {key.partition(".")[0].strip() for key in CoupledMirror.model_fields}
+    assert schema["properties"]["version"] == {
+        "description": "2: a mirror of several axes",
+        "type": "integer",
+        "minimum": 2,
+        "maximum": 2,
+        "title": "Version",
+    }
+
+
+# ------------------------------------------------------------------------------------------- where one axis is wanted
+HELD = "holds a mirror of several axes (2 actuators, 3 outputs, 4 states); studies, designs and exports take one axis"
+
+
+@pytest.fixture
+def several(tmp_path):
+    path = tmp_path / "two-axes.toml"
+    path.write_text(TEXT, encoding="utf-8")
+    return path
+
+
+def only_fault(load):
+    with pytest.raises(MissionError) as refused:
+        load()
+    assert len(refused.value.faults) == 1
+    return refused.value.faults[0]
+
+
+def is_the_refusal(fault, path):
+    assert fault.key == "mirror.version"
+    assert fault.file.endswith(path.name)
+    assert fault.line == 1
+    assert HELD in fault.reason
+    assert "microrad.mission.file.load_coupled_mirror" in fault.expected
+    assert "microrad.mirror.coupled.of" in fault.expected
+
+
+def test_a_file_of_several_axes_is_no_mirror_of_a_study(several, tmp_path):
+    is_the_refusal(only_fault(lambda: load_mirror(several)), several)
+    is_the_refusal(only_fault(lambda: load_mission(MISSION, several)), several)
+    text = MISSION.read_text(encoding="utf-8")
+    named = re.sub(r"\[mirror\]\n.*?(?=\n\[(?!mirror))", '[mirror]\nfile = "two-axes.toml"\n', text, flags=re.DOTALL)
+    assert named != text
+    is_the_refusal(only_fault(lambda: load_mission(tmp_path / "mission.toml", text=named)), several)
+
+
+@pytest.mark.parametrize("command", [("run",), ("design",), ("export", "c"), ("export", "fmu"), ("export", "matrices")])
+def test_commands_of_one_axis_say_what_they_cannot_do(folder, several, refused, command):
+    """Exit code 2, the file with what it holds and what reads it; nothing is written."""
+    told = refused(*command, MISSION, "--mirror", several.name)
+    assert "1 fault to correct" in told
+    assert f"{several.name}, line 1: mirror.version = 2" in told
+    assert HELD in told
+    assert "microrad.mission.file.load_coupled_mirror" in told
+    assert [path.name for path in folder.iterdir()] == [several.name]
+
+
+def test_a_mirror_of_several_axes_inside_a_mission_is_refused():
+    text = MISSION.read_text(encoding="utf-8").replace("[mirror]\n", "[mirror]\nversion = 2\n")
+    fault = only_fault(lambda: load_mission(MISSION, text=text))
+    assert fault.key == "mirror.version"
+    assert fault.reason.startswith("holds a mirror of several axes; ")
+    assert fault.line == next(s.line for s in scan(text) if s.key == "mirror.version")
+
+
+def test_keys_of_version_2_in_a_mirror_of_one_axis(tmp_path):
+    def told(text):
+        (tmp_path / "mirror.toml").write_text(text, encoding="utf-8")
+        with pytest.raises(MissionError) as refused:
+            load_mirror(tmp_path / "mirror.toml")
+        return [(fault.key, fault.reason) for fault in refused.value.faults]
+
+    foreign = "is a key of version 2, in a mirror of one axis"
+    assert told(f'{ONE_AXIS}\n[modes]\ndecay = ["1 1/s"]\n[matrices]\n') == [
+        ("mirror.modes", foreign),
+        ("mirror.matrices", foreign),
+    ]
+    unknown = "is no version of a mirror of one axis"
+    assert told(f"version = 1\n{ONE_AXIS}") == [("mirror.version", unknown)]
+    assert told(f"version = true\n{ONE_AXIS}") == [("mirror.version", unknown)]
+    assert told(edited(("version = 2\n", ""))) == [
+        ("mirror.version", "is missing, and actuators is a key of version 2")
+    ]
+    for other in ("5", "2.0", '"2"'):
+        assert told(edited(("version = 2", f"version = {other}"))) == [("mirror.version", unknown)]
+
+
+def test_a_mirror_of_one_axis_is_none_of_several():
+    faults = refusal(ONE_AXIS)
+    assert [fault.key for fault in faults] == ["mirror.version"]
+    assert "travel is a key of version 1: the file holds a mirror of one axis" in faults[0].reason
+    assert "load_mirror reads this one" in faults[0].expected
