@@ -1,0 +1,81 @@
+"""Known truths: their simulation and the bound of their errors against closed forms, and a few of them identified."""
+
+import importlib.util
+import math
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import truths
+from places import ROOT
+
+SPEC = importlib.util.spec_from_file_location("error_coverage", ROOT / "benchmarks" / "error_coverage.py")
+coverage = importlib.util.module_from_spec(SPEC)
+sys.modules[SPEC.name] = coverage
+SPEC.loader.exec_module(coverage)
+
+ROUNDING = 1e-9
+LAGS = [f"lag {i}" for i in range(len(coverage.LAGS_S))]
+RECORD = coverage.RECORDS[3]  # fast loops: a delay, a rate and a resonance all show in it
+
+
+# ---- the bound
+def test_bound_of_a_line_is_that_of_the_textbook():
+    """Slope of a line with a free offset: sigma^2 over the sum of squares about the mean; over two records, both."""
+    time = np.arange(50.0)
+    one = coverage.cramer_rao([time[:, None]], 0.3)
+    assert one[0, 0] == pytest.approx(0.3**2 / np.sum((time - time.mean()) ** 2), rel=ROUNDING)
+    assert one[0, 0] == pytest.approx(0.3**2 * 12 / (50 * (50**2 - 1)), rel=ROUNDING)
+    assert coverage.cramer_rao([time[:, None]] * 2, 0.3)[0, 0] == pytest.approx(one[0, 0] / 2, rel=ROUNDING)
+
+
+def test_bound_of_a_sine_is_that_of_the_textbook():
+    """Amplitude A and phase of a sine over whole periods, in units that differ by 1e6: 2 sigma^2/N, over A^2."""
+    turns, amplitude = 2 * np.pi * np.arange(1000) / 100, 3e-6
+    covariance = coverage.cramer_rao([np.column_stack([np.sin(turns), amplitude * np.cos(turns)])], 1e-7)
+    assert covariance[0, 0] == pytest.approx(2 * 1e-14 / 1000, rel=ROUNDING)
+    assert covariance[1, 1] == pytest.approx(2 * 1e-14 / 1000 / amplitude**2, rel=ROUNDING)
+    assert abs(covariance[0, 1]) < ROUNDING * math.sqrt(covariance[0, 0] * covariance[1, 1])
+
+
+def test_errors_of_functions_of_correlated_values():
+    """Of a difference and of a quotient, to first order."""
+    covariance = np.array([[4.0, 1.9], [1.9, 1.0]])
+    values = {"a": 20.0, "b": 5.0}
+    apart = coverage.error_of(lambda v: v["a"] - v["b"], values, ("a", "b"), covariance)
+    assert apart == pytest.approx(math.sqrt(4.0 + 1.0 - 2 * 1.9), rel=1e-6)
+    quotient = coverage.error_of(lambda v: v["a"] / v["b"], values, ("a", "b"), covariance)
+    assert quotient == pytest.approx(4.0 * math.sqrt(0.1**2 + 0.2**2 - 2 * 1.9 / 100), rel=1e-6)
+
+
+# ---- the truths
+@pytest.mark.parametrize("seed", [0, 1])
+def test_truth_is_what_slower_twins_say(seed):
+    """Hysteresis, resonance, creep and delay of a truth, by the oracles of the tests from the delayed drive."""
+    truth = coverage.draw_truth(seed)
+    truth = replace(truth, values={**truth.values, **dict.fromkeys(LAGS, 1e-6), "delay": 33e-6})
+    v, rate_hz = truth.values, RECORD.rate_hz
+    drive = RECORD.samples(33e-6)
+    assert np.abs(drive - RECORD.samples()).max() > 0.04  # 64 Hz, 4 V
+    if truth.family == "plays":
+        strain = truths.plays(drive, coverage.THRESHOLDS_V, [v[f"weight {i}"] for i in range(15)])
+    else:
+        strain = truths.bouc_wen(drive, rate_hz, [v[k] for k in ("d1", "d2", "epsilon", "delta", "alpha", "beta")])
+    expected = truths.behind_resonance(strain, rate_hz, (v["resonance"], v["damping"]))
+    expected += truths.creep(drive, rate_hz, coverage.LAGS_S, 1e-6)
+    assert coverage.simulated(truth, RECORD, 1) == pytest.approx(expected, abs=1e-5 * np.ptp(expected))
+    assert coverage.simulated(truth, RECORD) == pytest.approx(expected, abs=1e-3 * np.ptp(expected))
+
+
+@pytest.mark.parametrize("beta", [2.0, -2.0])
+def test_bouc_wen_of_the_truth_for_either_sign(beta):
+    """Loops within loops, h through zero in both directions, epsilon of either sign."""
+    drive = truths.two_sines(300, 200.0)
+    for epsilon in (-0.03, 0.02):
+        values = {"d1": 0.08, "d2": 1e-4, "epsilon": epsilon, "delta": 1e-3, "alpha": 5.0, "beta": beta}
+        twin = truths.bouc_wen(drive, 200.0, list(values.values()), pieces=100)
+        found = coverage.bouc_wen(drive - coverage.REST_V, 1 / 200.0, values)
+        assert np.ptp(twin - 0.08 * (drive - drive[0])) > 1e-3  # there is hysteresis
+        assert found == pytest.approx(twin, abs=1e-8)
