@@ -1,10 +1,14 @@
 """A list of recordings: what is read by it, and every fault of it at once, with its line."""
 
+import re
+
 import numpy as np
 import pytest
+from nptdms import ChannelObject, TdmsWriter
 
 from microrad.lab.recording import RecordingError
-from microrad.lab.recording.list_file import RecordingsError, read_list
+from microrad.lab.recording.list_file import ListTable, RecordingsError, RecordingTable, read_list
+from places import ROOT
 
 N, RATE_HZ = 800, 1000.0
 TIME_S = np.arange(N) / RATE_HZ
@@ -221,3 +225,24 @@ def test_what_the_recordings_contradict(tmp_path):
     assert "no input column is named 'ux'" in refusal(tmp_path, f'{start}{entry}input = "ux"\n')
     message = refusal(tmp_path, f'input = [1, 2]\noutput = [3, 4]\n{entry}[recording.b]\nfile = "a.csv"\noutput = 3\n')
     assert "2 inputs and 1 outputs, where" in message
+
+
+def test_the_list_of_the_documentation_is_read(tmp_path):
+    page = (ROOT / "docs" / "recordings.md").read_text(encoding="utf-8")
+    text = page.partition("```toml\n")[2].partition("```")[0]
+    time_s = np.arange(6000) / 100.0
+    drive = 5 + 5 * np.sin(time_s * (1.0 + 0.2 * time_s))
+    rows = np.column_stack((time_s, drive, drive + 0.01 * RNG.standard_normal(time_s.size)))
+    np.savetxt(tmp_path / "loops.csv", rows, delimiter=",", header="time,drive (V),sensor", comments="", fmt="%.9g")
+    channels = [
+        ChannelObject("bench", name, rows[:, k], {"wf_increment": 0.01}) for k, name in ((1, "drive"), (2, "sensor"))
+    ]
+    with TdmsWriter(tmp_path / "chirp.tdms") as file:
+        file.write_segment(channels)
+    found = read_list(write_list(tmp_path, text))
+    assert [(r.role, r.samples) for r in found.recordings] == [("loops", 4000), ("broadband", 6000)]
+    assert [(r.role, r.samples) for r in found.validation] == [("validation", 2000)]
+    assert (found.name, found.lever_arm_m) == ("fsm 3", 0.05)
+    keys = {info.alias or name for name, info in (ListTable.model_fields | RecordingTable.model_fields).items()}
+    table = page.partition("| key | |")[2].partition("\n\n")[0]
+    assert keys - {"recording"} <= set(re.findall(r"`(\w+)`", table))
