@@ -101,6 +101,16 @@ def test_columns_of_tables_and_json(call, folder):
 
 
 @pytest.mark.usefixtures("quick")
+def test_arrays_for_validation(call, folder):
+    fitted, other = arrays(folder), arrays(folder, *experiment(5, 1), "other")
+    result = call("identify", *fitted, "--validate", *other, *AXES, "--output-unit", "m", "--json")
+    assert (result.code, result.err) == (0, "")
+    data = json.loads(result.out)
+    assert data["held_out"] == ["u_other.npy realisation 0"]
+    assert data["fitted"] == [f"u_100mV.npy realisation {r}" for r in range(4)]
+
+
+@pytest.mark.usefixtures("quick")
 def test_a_list_with_validation(call, folder):
     drive, output = experiment(5, 1)
     arrays(folder)
@@ -202,6 +212,8 @@ def test_options_beside_a_list_are_refused(refused, folder):
     for option in (["--input", "u"], ["--output-file", "y.npy"], ["--rate", "2 kHz"], ["--lever-arm", "1 mm"]):
         message = refused("identify", "list.toml", *option)
         assert f"list.toml is a list of recordings and {option[0]} is for files: write it into the list" in message
+    message = refused("identify", table(folder), "list.toml", "--input", 1, "--output", 3)
+    assert "list.toml is a list of recordings: give it alone, and name the other files in it" in message
 
 
 def test_positions_and_outputs_apart_of_one_channel_are_refused(refused, folder):

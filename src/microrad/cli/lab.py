@@ -216,8 +216,6 @@ def identify(  # noqa: PLR0913  every argument is a named option
         )
     if given.positions_m is not None or given.signs is not None:
         raise Refusal("positions and signs are for several outputs or drives: leave out --position, or name them all.")
-    if not given.recordings:
-        raise Refusal("every recording is for validation: leave one to be fitted.")
     models = identification.STATIC[:2] if static else identification.MODELS
     live = os.environ.get(PROGRESS_FILE)
     with progress_bar() as bar:

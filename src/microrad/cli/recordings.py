@@ -82,7 +82,10 @@ def given_recordings(options: Options) -> Given:
         return _of_bench(options)
     if len(options.files) == 1 and options.files[0].suffix == ".toml":
         return _of_list(options)
-    read, files = _reader(options), (*options.files, *options.validate)
+    files = (*options.files, *options.validate)
+    if lists := [path for path in files if path.suffix == ".toml"]:
+        raise Refusal(f"{lists[0]} is a list of recordings: give it alone, and name the other files in it.")
+    read = _reader(options)
     if options.output_file and len(options.output_file) != len(files):
         raise Refusal(
             f"--output-file is given {len(options.output_file)} times and there are {len(files)} files of drives; give "
@@ -99,6 +102,8 @@ def _together(given: Given) -> Given:
     """What was read, where the recordings of several channels can be identified from together."""
     from microrad.lab.recording import check_together
 
+    if not given.recordings:
+        raise Refusal("every recording is for validation: leave one to be fitted.")
     if given.several_channels:
         check_together(given.recordings)
     outputs = given.channels[1]
