@@ -61,6 +61,7 @@ THRESHOLDS_V = np.linspace(0.0, 0.47 * SPAN_V, 15)
 """Of the play operators: those that the documentation of `identify` says it takes, so that the model can be true."""
 
 LAGS_S = (0.01, 0.1, 1.0, 10.0)
+RESIDUAL = "residual of the loop"
 DRAWS = 100
 PERIOD_S = 2e-4
 FAMILIES = {
@@ -546,7 +547,7 @@ def judged_residual(truth: Truth, table: Mirror, least: Floats) -> Judged:
         table: The identified one.
         least: Least covariance of what is fitted of the truth.
     """
-    name, gain = "residual of the loop", slow_gain(truth.values)
+    name, gain = RESIDUAL, slow_gain(truth.values)
     found = from_table(table).linear_loop
     controller = tune(PI, [loop_plant(found, gain)], Specification(0.5), seed=0, survey=64).controller
     true, predicted = residual_rad(true_mirror(truth.values), controller), residual_rad(found, controller)
@@ -565,29 +566,63 @@ def slow_gain(v: Values) -> float:
 
 # ----------------------------------------------------------------------------------------------------------- the table
 def table_of(results: Sequence[Result]) -> list[str]:
-    """The lines of the table, weights of plays taken together."""
+    """The lines of the table, with what misses a bar at their ends."""
+    return [f"{'':24}{'truths':>7}{'known':>7}{'held':>7}  {'95 %':13}{'width':>7}", *map(str, lines_of(results))]
+
+
+def lines_of(results: Sequence[Result]) -> list["Line"]:
+    """What came of each quantity, weights of plays above 0 V taken together, and of all parameters."""
     rows = [j for r in results for j in r.judged]
     names = dict.fromkeys(label(j.name) for j in rows)
-    lines = [f"{'':24}{'truths':>7}{'known':>7}{'held':>7}  {'95 %':13}{'width':>7}"]
-    lines += [_line(name, [j for j in rows if label(j.name) == name]) for name in names]
-    parameters = [j for j in rows if j.name != "residual of the loop"]
-    return [*lines, _line("all parameters", parameters)]
+    lines = [Line(name, tuple(j for j in rows if label(j.name) == name)) for name in names]
+    return [*lines, Line("all parameters", tuple(j for j in rows if j.name != RESIDUAL))]
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A line of the table: a quantity of all truths that have it."""
+
+    name: str
+    rows: tuple[Judged, ...]
+
+    @property
+    def known(self) -> tuple[Judged, ...]:
+        """Those that the file has an error for."""
+        return tuple(j for j in self.rows if j.known)
+
+    @property
+    def held(self) -> tuple[float, float, float]:
+        """Share of the known whose interval holds the truth, and the limits (95 %) within which chance leaves it."""
+        inside = binomtest(sum(abs(j.off) <= Z for j in self.known), len(self.known))
+        low, high = inside.proportion_ci()
+        return float(inside.statistic), float(low), float(high)
+
+    @property
+    def width(self) -> float:
+        """Median of the error over the bound."""
+        return float(np.median([j.error / j.bound for j in self.known]))
+
+    @property
+    def missed(self) -> tuple[str, ...]:
+        """The bars that are missed; that of the held intervals where chance does not explain it."""
+        if len(self.known) < KNOWN * len(self.rows):
+            return ("too few known",)
+        found = ("errors too small",) if self.held[2] < HELD[0] else ("errors too large",) * (self.held[1] > HELD[1])
+        return (*found, "too wide") if self.width > WIDTH else found
+
+    def __str__(self) -> str:
+        """The line as it is printed."""
+        share = 100 * len(self.known) / len(self.rows)
+        text = f"{self.name:24}{len(self.rows):7d}{share:6.0f}%"
+        if self.known:
+            held, low, high = (100 * x for x in self.held)
+            text += f"{held:6.0f}%  {low:3.0f} to {high:3.0f} %{self.width:8.2f}"
+        return f"{text}  {', '.join(self.missed)}".rstrip()
 
 
 def label(name: str) -> str:
     """The line of the table that a quantity belongs to."""
     return "weights above 0 V" if name.startswith("weight") and name != "weight 0" else name
-
-
-def _line(name: str, rows: Sequence[Judged]) -> str:
-    known = [j for j in rows if j.known]
-    start = f"{name:24}{len(rows):7d}{100 * len(known) / len(rows):6.0f}%"
-    if not known:
-        return start
-    inside = sum(abs(j.off) <= Z for j in known)
-    low, high = binomtest(inside, len(known)).proportion_ci()
-    width = float(np.median([j.error / j.bound for j in known]))
-    return f"{start}{100 * inside / len(known):6.0f}%  {100 * low:3.0f} to {100 * high:3.0f} %{width:8.2f}"
 
 
 def told(result: Result) -> str:

@@ -79,3 +79,44 @@ def test_bouc_wen_of_the_truth_for_either_sign(beta):
         found = coverage.bouc_wen(drive - coverage.REST_V, 1 / 200.0, values)
         assert np.ptp(twin - 0.08 * (drive - drive[0])) > 1e-3  # there is hysteresis
         assert found == pytest.approx(twin, abs=1e-8)
+
+
+# ---- what is said of them
+def judged(off, error=1.0, name="damping"):
+    return coverage.Judged(0, name, 10.0, 10.0 + off * error, error, 0.5)
+
+
+def test_line_of_the_table_counts_what_is_known_and_what_is_held():
+    rows = (judged(0.5), judged(-1.9), judged(2.0), judged(0.0, 11.0), judged(0.0, math.nan))
+    line = coverage.Line("damping", rows)
+    assert len(line.known) == 3  # neither without an error, nor with one above its size
+    assert line.held[0] == pytest.approx(2 / 3)
+    assert line.held[1:] == pytest.approx((0.0943, 0.9916), abs=1e-4)  # Clopper and Pearson
+    assert line.width == 2.0
+    assert line.missed == ("too few known",)
+    assert str(line) == "damping                       5    60%    67%    9 to  99 %    2.00  too few known"
+
+
+@pytest.mark.parametrize(
+    ("offs", "error", "missed"),
+    [
+        ([0.0] * 94 + [3.0] * 6, 1.0, ()),
+        ([0.0] * 80 + [3.0] * 20, 1.0, ("errors too small",)),
+        ([0.0] * 1000, 1.0, ("errors too large",)),
+        ([0.0] * 94 + [3.0] * 6, 1.1, ("too wide",)),
+    ],
+)
+def test_line_names_the_bar_that_it_misses(offs, error, missed):
+    assert coverage.Line("damping", tuple(judged(off, error) for off in offs)).missed == missed
+
+
+def test_table_takes_weights_together_and_the_residual_apart():
+    rows = tuple(judged(0.0, name=n) for n in ("weight 0", "weight 3", "weight 4", coverage.RESIDUAL))
+    result = coverage.Result(coverage.draw_truth(0), rows, "prandtl_ishlinskii_joint", (), (), 1.0)
+    lines = coverage.lines_of([result, result])
+    assert [(line.name, len(line.rows)) for line in lines] == [
+        ("weight 0", 2),
+        ("weights above 0 V", 4),
+        (coverage.RESIDUAL, 2),
+        ("all parameters", 6),
+    ]
