@@ -2,6 +2,7 @@
 
 import tomllib
 from dataclasses import fields, replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -216,6 +217,19 @@ def test_all_that_a_file_holds_reads_back():
     np.testing.assert_array_equal(found.response(drive), mirror.response(drive))
     assert np.abs(found.response(drive)).max() > 0.1
     np.testing.assert_allclose(np.diag(found.known.correlation), 1.0, atol=1e-15)
+
+
+def test_a_covariance_may_be_larger_than_a_mission_file():
+    """Of 240 parameters: more than the megabyte that other files have."""
+    mirror = made(5, modes=20, actuators=3, outputs=3, bouc_wen=0, plays=0)
+    states = mirror.mirror.A.shape[0]
+    pairs = list(product(range(1, states + 1), range(1, 4)))
+    names = (*(f"matrices.B.{i}.{j}" for i, j in pairs), *(f"matrices.C.{j}.{i}" for i, j in pairs))[:240]
+    factor = philox(3).standard_normal((len(names), 230))
+    factor /= np.linalg.norm(factor, axis=1, keepdims=True)
+    large = replace(mirror, known=Known(names, np.arange(float(len(names))), factor))
+    assert len(coupled.text(large)) > 1_000_000
+    same(read_back(large), large)
 
 
 def test_the_text_is_to_be_read_by_people():

@@ -20,7 +20,7 @@ from microrad.mission.model import LinkMission, Mission, Source
 from microrad.mission.origins import of_paper, written_for
 from microrad.mission.tables.coupled_mirror import CoupledMirror
 from microrad.mission.tables.mirror import Mirror
-from microrad.mission.toml import Document, Fault, MissionError, UnreadableError, clipped, shown
+from microrad.mission.toml import MAX_BYTES, Document, Fault, MissionError, UnreadableError, clipped, shown, too_large
 
 __all__ = [
     "Fault",
@@ -46,6 +46,7 @@ __all__ = [
 ]
 
 _BEYOND_LINK = Mission.model_fields.keys() - LinkMission.model_fields.keys()
+_MOST_MIRROR_BYTES = 4_000_000  # the covariance of hundreds of parameters
 _MOST_QUOTED = 1000  # characters of a value, before it is clipped
 _MOST_UNKNOWN = 100  # unknown keys of one file for which a near one is looked up
 _Location = tuple[int | str, ...]
@@ -230,9 +231,7 @@ def load_mirror(path: str | Path) -> MirrorFile:
 
     Raises `MissionError` with every fault of it.
     """
-    document = _open(Path(path), "mirror file", "mirror")
-    if not versions.is_of_one_axis(document, document.data):
-        raise MissionError(document.path, document.faults)
+    document = _open_mirror(Path(path))
     mirror = check_table(document, Mirror, document.data)
     if mirror is None or document.faults:
         raise MissionError(document.path, document.faults)
@@ -268,12 +267,27 @@ def assumptions(sources: Mapping[str, Source]) -> tuple[tuple[str, str, str], ..
 def _open(path: Path, label: str, prefix: str, text: str | None = None) -> Document:
     try:
         names = _names_within(Mirror) | _names_within(CoupledMirror) if prefix else _names_within(Mission)
+        named = (path, label, prefix, names | {"file"}, _MOST_MIRROR_BYTES if prefix else MAX_BYTES)
         if text is not None:
-            return Document.of(text.encode("utf-8", "surrogatepass"), path, label, prefix, names | {"file"})
-        return Document.read(path, label, prefix, names | {"file"})
+            return Document.of(text.encode("utf-8", "surrogatepass"), *named)
+        return Document.read(*named)
     except UnreadableError as error:
-        fault = Fault("", "", 0, f"the {label} {error.reason}", error.expected, file=clipped(str(path)))
-        raise MissionError(path, [fault]) from None
+        raise _unreadable(path, label, error) from None
+
+
+def _unreadable(path: Path, label: str, error: UnreadableError) -> MissionError:
+    fault = Fault("", "", 0, f"the {label} {error.reason}", error.expected, file=clipped(str(path)))
+    return MissionError(path, [fault])
+
+
+def _open_mirror(path: Path) -> Document:
+    """The mirror file of one axis; raises `MissionError` where it holds several, or is no mirror file."""
+    document = _open(path, "mirror file", "mirror")
+    if not versions.is_of_one_axis(document, document.data):
+        raise MissionError(document.path, document.faults)
+    if len(document.text) > MAX_BYTES:
+        raise _unreadable(path, "mirror file", too_large(MAX_BYTES))
+    return document
 
 
 def _take_in_mirror(document: Document, given: Path | None) -> None:
@@ -285,13 +299,9 @@ def _take_in_mirror(document: Document, given: Path | None) -> None:
             _leave_out_mirror(document)
         return
     try:
-        inner = _open(path, "mirror file", "mirror")
+        inner = _open_mirror(path)
     except MissionError as error:
         document.faults.extend(error.faults)
-        _leave_out_mirror(document)
-        return
-    if not versions.is_of_one_axis(inner, inner.data):
-        document.faults.extend(inner.faults)
         _leave_out_mirror(document)
         return
     document.inner["mirror"] = inner

@@ -244,7 +244,14 @@ class Document:
     inner: "dict[str, Document]" = field(default_factory=dict)
 
     @classmethod
-    def read(cls, path: Path, label: str, prefix: str = "", names: Collection[str] | None = None) -> Self:
+    def read(
+        cls,
+        path: Path,
+        label: str,
+        prefix: str = "",
+        names: Collection[str] | None = None,
+        most_bytes: int = MAX_BYTES,
+    ) -> Self:
         """Read, scan and parse a file.
 
         Args:
@@ -252,15 +259,24 @@ class Document:
             label: What a reader calls it, such as "mission file".
             prefix: Table that the root of the file stands for, empty for the whole mission.
             names: Keys that such a file has, None for any.
+            most_bytes: Size beyond which it is no such file.
 
         Raises:
             UnreadableError: When it is no text.
             MissionError: When nothing in it can be parsed.
         """
-        return cls.of(_content(path), path, label, prefix, names)
+        return cls.of(_content(path, most_bytes), path, label, prefix, names, most_bytes)
 
     @classmethod
-    def of(cls, content: bytes, path: Path, label: str, prefix: str = "", names: Collection[str] | None = None) -> Self:
+    def of(
+        cls,
+        content: bytes,
+        path: Path,
+        label: str,
+        prefix: str = "",
+        names: Collection[str] | None = None,
+        most_bytes: int = MAX_BYTES,
+    ) -> Self:
         """Scan and parse the content of a file.
 
         Args:
@@ -269,12 +285,13 @@ class Document:
             label: What a reader calls it, such as "mission file".
             prefix: Table that the root of the file stands for, empty for the whole mission.
             names: Keys that such a file has, None for any.
+            most_bytes: Size beyond which it is no such file.
 
         Raises:
             UnreadableError: When it is no text.
             MissionError: When nothing in it can be parsed.
         """
-        document = cls(path, label, prefix, names, _decoded(content), hashlib.sha256(content).hexdigest())
+        document = cls(path, label, prefix, names, _decoded(content, most_bytes), hashlib.sha256(content).hexdigest())
         _Parser(document).run()
         return document
 
@@ -320,13 +337,13 @@ class Document:
         return self.faults + [fault for document in self.inner.values() for fault in document.faults]
 
 
-def _content(path: Path) -> bytes:
+def _content(path: Path, most_bytes: int) -> bytes:
     try:
         if path.is_dir():
             raise UnreadableError("is a directory", "the path of a file")
         if path.exists() and not path.is_file():  # a pipe or a device may never end
             raise UnreadableError("is not a regular file", "the path of a file on disk")
-        content = read_bytes(path, MAX_BYTES + 1)
+        content = read_bytes(path, most_bytes + 1)
     except FileNotFoundError:
         raise UnreadableError("does not exist", "an existing file; `microrad init` writes one to start from") from None
     except (OSError, ValueError) as error:
@@ -335,9 +352,14 @@ def _content(path: Path) -> bytes:
     return content
 
 
-def _decoded(content: bytes) -> str:
-    if len(content) > MAX_BYTES:
-        raise UnreadableError(f"is larger than {MAX_BYTES // 1000} kB", "a TOML file of a few kB")
+def too_large(most_bytes: int) -> UnreadableError:
+    """Why a file of more bytes cannot be taken."""
+    return UnreadableError(f"is larger than {most_bytes // 1000} kB", "a TOML file of a few kB")
+
+
+def _decoded(content: bytes, most_bytes: int) -> str:
+    if len(content) > most_bytes:
+        raise too_large(most_bytes)
     if b"\0" in content:
         raise UnreadableError("holds binary data", "a TOML file, plain text in UTF-8")
     try:

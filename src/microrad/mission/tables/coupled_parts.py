@@ -18,6 +18,7 @@ Rows = tuple[tuple[float, ...], ...]
 
 Count = tuple[int, str]  # how many there are of what the rows or columns of a matrix belong to, and what that is
 _MANY = 20_000  # items of a list for each parameter, or pair of them
+_MOST_TOLD = 20  # faults of one matrix
 _MOST_MODES = 100
 _LENGTH = 1e-6  # a row of a factor may differ from length 1 by so much: six digits leave it
 
@@ -30,12 +31,17 @@ class _Matrix(Several):
         """The rows; raises `ProblemsError` with every item that does not fit."""
         if not isinstance(value, list | tuple) or not value or not all(isinstance(r, list | tuple) for r in value):
             raise ProblemsError(Problem("", "is no list of rows", f"{self.wanted}: {self.example}"))
-        rows, problems = [], []
+        if len(value) > _MANY:
+            raise ProblemsError(Problem("", f"has {len(value)} rows", f"at most {_MANY} rows"))
+        rows: list[tuple[float, ...]] = []
+        problems: list[Problem] = []
         for place, row in enumerate(value, 1):
             try:
                 rows.append(Several.read(self, row))
             except ProblemsError as error:
                 problems += [Problem("", f"row {place}: {p.reason}", p.expected) for p in error.problems]
+            if len(problems) >= _MOST_TOLD:
+                break
         if problems:
             raise ProblemsError(*problems)
         return tuple(rows)
