@@ -97,6 +97,19 @@ def test_the_response_is_that_of_the_twin_to_a_drive_of_the_delay_ago(fed):
     assert np.abs(in_time - expected).max() > 1e-3 * np.abs(expected).max()
 
 
+@pytest.mark.parametrize("shape", [(SAMPLES,), (SAMPLES, 1), (SAMPLES, 3), (0, 2), (2, SAMPLES, 2)])
+def test_a_drive_of_another_shape_is_refused(shape):
+    with pytest.raises(ValueError, match=r"give samples x 2, a column for each actuator of 'made of draws'"):
+        made(0).response(np.zeros(shape))
+
+
+def test_a_step_too_long_for_the_stiffness_names_one_that_would_do():
+    slow = replace(made(0), rate_hz=10.0, steps_per_sample=1, excited_hz=(0.1, 5.0))
+    stiff = replace(slow, mirror=replace(slow.mirror, E=300 * slow.mirror.E))
+    with pytest.raises(ValueError, match=r"is no contraction at a step of 0.1 s; use a step of at most"):
+        stiff.response(np.zeros((SAMPLES, 2)))
+
+
 def test_modes_are_found_in_the_order_of_their_states():
     roots = [(-1.0, 0.0), (-2.0, 30.0), (-3.0, -40.0), (-2.0, 0.0), (-2.0, 0.0)]
     assert coupled.modes(lti.modal_matrix(roots)) == tuple(roots)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from types import UnionType
-from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 
 from pydantic import TypeAdapter, ValidationError
 from pydantic.fields import FieldInfo
@@ -18,9 +18,11 @@ from microrad.mission import versions
 from microrad.mission.fields import NOT_PUBLISHED, UNKNOWN, Problem, ProblemsError, Quantity, Several, Table
 from microrad.mission.model import LinkMission, Mission, Source
 from microrad.mission.origins import of_paper, written_for
-from microrad.mission.tables.coupled_mirror import CoupledMirror
 from microrad.mission.tables.mirror import Mirror
 from microrad.mission.toml import MAX_BYTES, Document, Fault, MissionError, UnreadableError, clipped, shown, too_large
+
+if TYPE_CHECKING:
+    from microrad.mission.tables.coupled_mirror import CoupledMirror
 
 __all__ = [
     "Fault",
@@ -238,7 +240,7 @@ def load_mirror(path: str | Path) -> MirrorFile:
     return _mirror_file(document, mirror)
 
 
-def load_coupled_mirror(path: str | Path, *, text: str | None = None) -> CoupledMirror:
+def load_coupled_mirror(path: str | Path, *, text: str | None = None) -> "CoupledMirror":
     """Read a mirror file of version 2, of several axes; `microrad.mirror.coupled.of` makes a mirror of the table.
 
     Args:
@@ -248,6 +250,8 @@ def load_coupled_mirror(path: str | Path, *, text: str | None = None) -> Coupled
     Raises:
         MissionError: With every fault of it.
     """
+    from microrad.mission.tables.coupled_mirror import CoupledMirror
+
     document = _open(Path(path), "mirror file", "mirror", text)
     if not versions.is_of_several_axes(document):
         raise MissionError(document.path, document.faults)
@@ -266,13 +270,19 @@ def assumptions(sources: Mapping[str, Source]) -> tuple[tuple[str, str, str], ..
 # --------------------------------------------------------------------------------------------------------------- files
 def _open(path: Path, label: str, prefix: str, text: str | None = None) -> Document:
     try:
-        names = _names_within(Mirror) | _names_within(CoupledMirror) if prefix else _names_within(Mission)
+        names = _names_in_mirror_files() if prefix else _names_within(Mission)
         named = (path, label, prefix, names | {"file"}, _MOST_MIRROR_BYTES if prefix else MAX_BYTES)
         if text is not None:
             return Document.of(text.encode("utf-8", "surrogatepass"), *named)
         return Document.read(*named)
     except UnreadableError as error:
         raise _unreadable(path, label, error) from None
+
+
+def _names_in_mirror_files() -> frozenset[str]:
+    from microrad.mission.tables.coupled_mirror import CoupledMirror
+
+    return _names_within(Mirror) | _names_within(CoupledMirror)
 
 
 def _unreadable(path: Path, label: str, error: UnreadableError) -> MissionError:

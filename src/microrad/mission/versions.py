@@ -5,7 +5,6 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from microrad.mission.tables.coupled_mirror import CoupledMirror
 from microrad.mission.toml import Document, shown
 
 _VERSION = "version = 2 for a mirror of several axes, and no version for one axis"
@@ -80,6 +79,8 @@ def is_of_several_axes(document: Document) -> bool:
 
 def _sizes(data: Mapping[str, Any]) -> str:
     """How many channels and states a mirror of several axes has; nothing where its data is not in order."""
+    from microrad.mission.tables.coupled_mirror import CoupledMirror
+
     try:
         mirror = CoupledMirror.model_validate(data)
     except ValidationError:

@@ -119,8 +119,13 @@ def response(mirror: Mirror, drive_v: Floats, rate_hz: float, steps_per_sample: 
         delay_s: Delay of the drive, in s, positive for later.
 
     Raises:
-        ValueError: Where the loop through the hysteresis is no contraction at this step.
+        ValueError: For a drive of another shape, and where the loop through the hysteresis is no contraction.
     """
+    if drive_v.ndim != 2 or drive_v.shape[1] != mirror.actuators or not drive_v.size:
+        raise ValueError(
+            f"the drive has the shape {drive_v.shape}; give samples x {mirror.actuators}, a column for each actuator "
+            f"of {mirror.name!r}"
+        )
     fine = periodic.delayed(drive_v, rate_hz, delay_s, steps_per_sample)
     plant = model.discretise(mirror, 1.0 / (rate_hz * steps_per_sample))
     output = np.empty((fine.shape[0], mirror.axes))
