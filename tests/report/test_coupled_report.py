@@ -330,6 +330,8 @@ def test_a_ladder_that_was_stopped_says_so(tmp_path):
     assert report.coupled_identification_data(found)["stopped"] is True
     written = page_of(found, tmp_path).read_text("utf-8")
     assert begins in plain(written) and "The ladder was stopped before its last model" in plain(written)
+    none = page_of(found_of(stopped=True, dependence=None), tmp_path, "none.html").read_text("utf-8")
+    assert "The ladder was stopped before gain and resonance were compared" in plain(none)
     assert words.sound(found) is None and words.sound(found_of()) is True
     assert 'class="verdict pass"' not in written
 

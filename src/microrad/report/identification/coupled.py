@@ -17,6 +17,7 @@ from microrad.lab.identify.coupled import Candidate, CoupledIdentification
 from microrad.mirror.coupled import Actuator
 from microrad.report.identification import coupled_words as words
 from microrad.report.identification.coupled_figures import coupled_figures
+from microrad.report.identification.figures import VIRTUAL
 from microrad.report.identification.page import check_identification
 from microrad.report.page.templates import page_of
 from microrad.report.plotting.figure import Figure
@@ -26,6 +27,7 @@ from microrad.report.view import Block, Points, Soft, Verbatim, Verdict, View, t
 
 MOST_LINES = 23
 """Of a terminal of 25: the command has one of its own above them."""
+_OF_THE_BENCH = "The recordings are those of the virtual bench: nothing here was measured on a mirror."
 _MOST_ROWS = 4  # of a table of a terminal
 _MOST_UNFOLDED = 12  # rows of a table of records
 _MOST_FILE_LINES = 60  # of the mirror file that a page shows
@@ -40,6 +42,7 @@ def write_coupled_identification(
     mirror_text: str,
     title: str,
     overwrite: bool = False,
+    virtual: bool = False,
 ) -> Path:
     """Write the report of an identification of several channels as one HTML file that loads nothing; return its path.
 
@@ -50,19 +53,22 @@ def write_coupled_identification(
         mirror_text: its text.
         title: the heading of the page.
         overwrite: whether a report that is there may be replaced.
+        virtual: whether the recordings come from the virtual bench: the page says so.
 
     Raises:
         ReportError: if ``page`` holds something that must not be replaced.
     """
     check_identification(page, overwrite)
-    text = coupled_identification_page(found, mirror_file=mirror_file, mirror_text=mirror_text, title=title)
+    text = coupled_identification_page(
+        found, mirror_file=mirror_file, mirror_text=mirror_text, title=title, virtual=virtual
+    )
     check_identification(page, overwrite)  # it may have appeared meanwhile
     write_whole(page, text)
     return page
 
 
 def coupled_identification_page(
-    found: CoupledIdentification, *, mirror_file: Path, mirror_text: str, title: str
+    found: CoupledIdentification, *, mirror_file: Path, mirror_text: str, title: str, virtual: bool = False
 ) -> str:
     """The page's HTML; every text that is not ours is escaped, and nothing is loaded from anywhere.
 
@@ -71,6 +77,7 @@ def coupled_identification_page(
         mirror_file: the mirror file that goes with it.
         mirror_text: its text.
         title: the heading of the page.
+        virtual: whether the recordings come from the virtual bench: the page says so.
     """
     views = (*_views(found, coupled_figures(found)), _origin(found, mirror_file, mirror_text))
     model = found.candidate().model
@@ -81,10 +88,11 @@ def coupled_identification_page(
         title,
         "identification",
         of,
-        [_lead(found)],
+        [_lead(found, _OF_THE_BENCH if virtual else "")],
         views,
         sha256=hashlib.sha256(mirror_text.encode()).hexdigest(),
         made_by="microrad identify",
+        badge=VIRTUAL if virtual else "",
     )
 
 
@@ -130,9 +138,9 @@ def _warnings_text(found: CoupledIdentification, width: int, room: int) -> str:
 
 
 # ----------------------------------------------------------------------------------------------------------- the view
-def _lead(found: CoupledIdentification) -> Verdict:
+def _lead(found: CoupledIdentification, own: str = "") -> Verdict:
     headline, *sentences = words.verdict(found)
-    return Verdict(headline, told(" ".join(sentences)), words.sound(found))
+    return Verdict(headline, told(" ".join(sentences), own), words.sound(found))
 
 
 def _views(found: CoupledIdentification, figures: Mapping[str, Figure] = MappingProxyType({})) -> tuple[View, ...]:
@@ -160,6 +168,7 @@ _NO_RESPONSE = (
     "No amplitude has enough records for a response of its own: as many realisations with different drives as there "
     "are actuators, or broadband drives of one actuator at a time."
 )
+_STOPPED_BEFORE = "The ladder was stopped before gain and resonance were compared over the amplitude."
 _NO_DEPENDENCE = (
     "Gain and resonance were not compared over the amplitude: that takes two amplitudes with a response each, and a "
     "resonance in the excited band."
@@ -252,7 +261,7 @@ def _records(found: CoupledIdentification) -> Table:
 def _dependence(found: CoupledIdentification, figures: Mapping[str, Figure]) -> View:
     of, title = found.dependence, "Dependence on the amplitude"
     if of is None:
-        return View(title, [_NO_DEPENDENCE])
+        return View(title, [_STOPPED_BEFORE if found.stopped else _NO_DEPENDENCE])
     unit = words.unit_of(found)
     gain = words.scale(of.gain, unit)
     rows = []
