@@ -59,6 +59,44 @@ def table(folder, name="axes.csv", realisation=0):
     return name
 
 
+PLAN = """name = "two axes"
+formats = ["csv"]
+
+[limits]
+rate = "2 kHz"
+drive_min = "0 V"
+drive_max = "12 V"
+slew = "20 V/ms"
+samples_per_period = 4
+
+[bench]
+truth = "bench"
+axes = 2
+crosstalk = 0.1
+
+[bench.amplifier]
+gain = 15
+output_min = "0 V"
+output_max = "180 V"
+bandwidth = "5 kHz"
+slew = "1 V/us"
+
+[bench.converters]
+bits = 16
+drive_min = "-4 V"
+drive_max = "16 V"
+output_min = "-1 mrad"
+output_max = "2 mrad"
+
+[bench.sensor]
+noise = "0.2 urad"
+mains = "0 urad"
+mains_frequency = "50 Hz"
+drift = "0 nrad/s"
+
+"""
+
+
 # -------------------------------------------------------------------------------------------------------- what is done
 @pytest.mark.usefixtures("quick")
 def test_arrays_become_a_mirror_file_of_version_2(call, folder):
@@ -173,6 +211,23 @@ def test_stopped_before_the_first_model_nothing_is_written(call, folder, monkeyp
     result = call("identify", *names, *AXES, "--output-unit", "m")
     assert (result.code, result.out, result.err) == (130, "", "microrad: interrupted, nothing was written\n")
     assert sorted(path.name for path in folder.iterdir()) == ["u_100mV.npy", "y_100mV.npy"]
+
+
+@pytest.mark.usefixtures("quick")
+def test_a_folder_of_the_virtual_bench_whose_drives_are_played_one_after_the_other(call, folder):
+    plan = PLAN
+    chirp = 'kind = "chirp"\nstart = "40 Hz"\nduration = "0.15 s"\namplitude = "1 V"\noffset = "6 V"\n'
+    for axis, stop in ((1, 400), (2, 400), (1, 450), (2, 450)):
+        plan += f'[excitation.axis-{axis}-{stop}]\n{chirp}stop = "{stop} Hz"\naxis = {axis}\n'
+    (folder / "plan.toml").write_text(plan)
+    assert call("bench", "plan.toml").code == 0
+    result = call("identify", "plan-bench", "--json")
+    assert (result.code, result.err) == (0, "")
+    data = json.loads(result.out)
+    assert (data["mirror_file"], len(data["actuators"]), len(data["outputs"])) == ("plan-bench-mirror.toml", 2, 2)
+    assert data["held_out"] == ["plan-bench/axis-1-450.csv", "plan-bench/axis-2-450.csv"]
+    page = (folder / "plan-bench-mirror.html").read_text(encoding="utf-8")
+    assert "nothing here was measured on a mirror" in page
 
 
 # ------------------------------------------------------------------------------------------------------------ refusals

@@ -80,6 +80,7 @@ def identify_channels(given: Given, units: tuple[str, str], said: str, target: T
         mirror_text=text,
         title=target.title,
         overwrite=target.overwrite,
+        virtual=given.virtual,
     )
     write_whole(target.mirror_file, text)
     if found.stopped:

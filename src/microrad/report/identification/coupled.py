@@ -268,7 +268,7 @@ def _dependence(found: CoupledIdentification, figures: Mapping[str, Figure]) -> 
     for k in range(of.gain.size):
         freq, error = words.with_error(float(of.resonance_hz[k]), float(of.resonance_error_hz[k]))
         drive = quantity(float(of.drive_rms[k]), "V")
-        rows.append((drive, gain.text(float(of.gain[k])), freq, error, f"{of.damping_ratio[k]:.3g}"))
+        rows.append((drive, gain.text(float(of.gain[k]), 4), freq, error, f"{of.damping_ratio[k]:.3g}"))
     headings = ("drive, rms", f"gain ({gain.unit}/V)", "main resonance (Hz)", "± (Hz)", "damping ratio")
     change = (
         f"From the smallest to the largest amplitude the gain changes by {of.gain_rise_percent:+.2g} % and the main "
