@@ -33,9 +33,14 @@ class Scale:
     unit: str
     size: float
 
-    def text(self, value: float) -> str:
-        """A value without its unit, in three digits; "" for nan."""
-        return "" if math.isnan(value) else minus(f"{float(f'{value / self.size:.3g}'):.10g}")
+    def text(self, value: float, digits: int = 3) -> str:
+        """A value without its unit; "" for nan.
+
+        Args:
+            value: in the SI unit.
+            digits: significant ones.
+        """
+        return "" if math.isnan(value) else minus(f"{float(f'{value / self.size:.{digits}g}'):.10g}")
 
 
 def scale(values: object, unit: str) -> Scale:
