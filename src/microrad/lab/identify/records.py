@@ -176,7 +176,7 @@ def memory(drive: Floats, known: int) -> Floats:
         drive: Drive, in V, shape (samples,).
         known: Samples from which the weights are fitted: the range is what they sweep.
     """
-    swept = np.maximum.accumulate(drive) - np.minimum.accumulate(drive)
+    swept = _swept(drive)
     step = float(swept[known - 1]) / _RAMPS or 1.0
     return np.clip(swept[:, None] / step - np.arange(_RAMPS), 0.0, 1.0)
 
@@ -195,16 +195,19 @@ def orthonormal(columns: Floats) -> Floats:
 def transient(drive: Floats) -> int:
     """Number of first samples by which nothing is judged where no fit has seen the record, at most half of them.
 
-    That is until the drive has swept 99 % of its range once: the state before the first sample is unknown, and a play
-    operator forgets it when the drive has swept its full range.
+    That is until the drive has swept 95 % of its range: only then are nearly all play operators where they would be
+    whatever they came with. What is left is in the `memory`.
 
     Args:
         drive: Drive, in V, shape (samples,).
     """
-    low, high = float(drive.min()), float(drive.max())
-    margin = 0.01 * (high - low)
-    swept = max(int(np.argmax(drive >= high - margin)), int(np.argmax(drive <= low + margin)))
-    return min(swept + 1, drive.size // 2)
+    swept = _swept(drive)
+    return min(int(np.argmax(swept >= 0.95 * swept[-1])) + 1, drive.size // 2)
+
+
+def _swept(drive: Floats) -> Floats:
+    """Range that the drive has swept so far, in V."""
+    return np.asarray(np.maximum.accumulate(drive) - np.minimum.accumulate(drive))
 
 
 def turning_points(drive: Floats) -> NDArray[np.intp]:

@@ -19,8 +19,17 @@ from microrad.lab.identify.selection.candidates import (
     refit_winner,
     supported_models,
 )
-from microrad.lab.identify.selection.predictions import Fit, Prediction, Score, ScoredModel, straight_line
-from microrad.lab.identify.selection.roles import roles, whole_periods
+from microrad.lab.identify.selection.predictions import (
+    Evidence,
+    Fit,
+    Prediction,
+    Score,
+    ScoredModel,
+    evidence,
+    straight_line,
+)
+from microrad.lab.identify.selection.roles import for_validation, roles, single_period, whole_periods
+from microrad.lab.identify.selection.splits import split_points, split_warnings
 from microrad.lab.identify.selection.warnings import (
     ResidualTest,
     drift,
@@ -32,12 +41,12 @@ from microrad.lab.identify.selection.warnings import (
     residual_warnings,
     score_warnings,
     set_aside_warnings,
+    use_warnings,
 )
 from microrad.lab.identify.statistics import may_be_chance
 from microrad.lab.identify.travel import check_travel
 from microrad.lab.recording import Recording
 
-_MIN_PART = 100
 _EXPLAINED = 0.5
 _HARDLY = (
     "The output hardly follows the drive: check that the channels belong together, and record a larger drive, or with "
@@ -142,8 +151,8 @@ def identify(  # noqa: PLR0913  all but the first are named options in practice
 
     Args:
         recordings: One drive and one output each.
-        hold_out: Share at the end of each loop that no fit sees; states are carried through into it. By default 0.5,
-            and 0 where there are recordings for validation.
+        hold_out: Share at the end of each loop that no fit sees; states are carried through into it. By default 0.5, or
+            less where the drive has not swept its range before, and 0 where there are recordings for validation.
         seed: Seed of the scattered starts of the Bouc-Wen fits.
         models: The models to fit, out of `MODELS`.
         on_progress: Called with the fits done, their number and what is done.
@@ -166,14 +175,17 @@ def identify(  # noqa: PLR0913  all but the first are named options in practice
         models = tuple(dict.fromkeys("bouc_wen_admissible" if m == "bouc_wen" else m for m in models))
     if not recordings:
         raise IdentificationError("no recording was given; name at least one.")
+    recordings, validation = for_validation(recordings, validation)
     _check_distinct(recordings, validation)
     check_travel([*recordings, *validation], units.output, units.lever_arm_m)
-    response, broadband, loops = roles(recordings)
-    splits = _splits(loops, hold_out, bool(validation))
+    served = roles(recordings)
+    response, broadband, loops = served
+    splits = split_points(loops, hold_out, validated=bool(validation))
     heads = [r.first(k) for r, k in zip(loops, splits, strict=True)]
     prepared = si_records(heads, units)
     seen = {id(r): head for r, head in zip(loops, heads, strict=True)}
-    response = [whole_periods(seen[id(r)]) if id(r) in seen else r for r in response]
+    alone = single_period(response)
+    response = [whole_periods(seen.get(id(r), r)) if alone or id(r) in seen else r for r in response]
     linear = fit_linear_part(response, units, models, on_progress)
     names, refused = supported_models(models, prepared, linear is not None)
     candidates = Candidates(
@@ -200,25 +212,9 @@ def identify(  # noqa: PLR0913  all but the first are named options in practice
     fits[best], predictions[best] = refit_winner(candidates, winner, predictions[best], on_progress)
     if fits[best] is not winner:
         on_fit(candidates.scored(fits[best], predictions[best]))
-    sources = _sources(candidates, broadband, response if linear is not None else ())
-    return _identification(candidates, prepared, fits, predictions, best, [*refused, *failed], sources)
-
-
-def _splits(recordings: Sequence[Recording], hold_out: float | None, validated: bool) -> list[int]:
-    share = (0.0 if validated else 0.5) if hold_out is None else hold_out
-    if not (0 < share < 1 or (share == 0 and validated)):
-        raise IdentificationError(
-            f"--hold-out (hold_out) is {share}; give the share of each recording kept for the check, between 0 "
-            "and 1, e.g. 0.5, or 0 with recordings for validation."
-        )
-    splits = [round(r.samples * (1 - share)) for r in recordings]
-    for recording, split in zip(recordings, splits, strict=True):
-        if split < _MIN_PART or (share > 0 and recording.samples - split < _MIN_PART):
-            raise IdentificationError(
-                f"{recording.path}: {split} samples to fit and {recording.samples - split} to check; each part needs "
-                f"at least {_MIN_PART}; record longer or choose hold_out nearer to 0.5."
-            )
-    return splits
+    sources = _sources(candidates, broadband, served.response if linear is not None else ())
+    notes = use_warnings(served, linear=linear is not None)
+    return _identification(candidates, prepared, fits, predictions, best, [*refused, *failed], sources, notes)
 
 
 def _check_distinct(recordings: Sequence[Recording], validation: Sequence[Recording]) -> None:
@@ -242,6 +238,7 @@ def _identification(
     best: int,
     refused: Sequence[Refused],
     sources: tuple[RecordingUse, ...],
+    notes: Sequence[str],
 ) -> Identification:
     scores = tuple(candidates.score(f.name, p) for f, p in zip(fits, predictions, strict=True))
     straight = straight_line(prepared, candidates.recordings, candidates.all_splits, candidates.units)
@@ -259,12 +256,14 @@ def _identification(
     test = residual_test(longest.residual_rad[longest.split :], recording.drive[longest.split :, 0])
     warnings = [
         *range_warnings((low, high), fit.rate_limit_v_per_s),
-        *rate_warnings(prepared, fit),
-        *set_aside_warnings(candidates.recordings, chosen),
-        *held_out_warnings(candidates.recordings, candidates.units, (low, high), chosen),
         *score_warnings(scores[best], line),
         *fit_warnings(fit),
         *drift_warnings,
+        *rate_warnings(prepared, fit),
+        *notes,
+        *split_warnings(candidates.loops, candidates.splits, candidates.units.volts),
+        *set_aside_warnings(candidates.recordings, chosen),
+        *held_out_warnings(candidates.recordings, candidates.units, (low, high), chosen),
         *residual_warnings(test),
         *(f"Linear part (in rad/V): {text}" for text in (linear.warnings if linear is not None else ())),
     ]
@@ -273,7 +272,7 @@ def _identification(
         scores=scores,
         straight_line=line,
         chosen=fit.name,
-        reason=_reason(scores, line, best),
+        reason=f"{_reason(scores, line, best)} {_rests_on(evidence(candidates.recordings, chosen))}",
         warnings=tuple(warnings),
         refused=tuple(refused),
         unsupported=_unsupported(scores[best], line, chosen),
@@ -289,6 +288,13 @@ def _identification(
         drive_max_v=high,
         rate_limit_v_per_s=fit.rate_limit_v_per_s,
         drift_rad=drift_rad,
+    )
+
+
+def _rests_on(found: Evidence) -> str:
+    return (
+        f"It rests on {found.text}; the worst of all recordings is {found.worst}, with "
+        f"{1e6 * found.worst_rms_rad:.3g} µrad rms and {1e6 * found.worst_peak_rad:.3g} µrad at most."
     )
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -55,6 +56,44 @@ class ScoredModel:
     score: Score
     predictions: tuple[Prediction, ...]
     recordings: tuple[Recording, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Evidence:
+    """On what the error on unseen samples rests: names of recordings with their seconds, and the worst of all."""
+
+    judged: tuple[tuple[str, float], ...]
+    worst: str
+    worst_rms_rad: float
+    worst_peak_rad: float
+
+    @property
+    def seconds(self) -> float:
+        """Length of what is judged, in s."""
+        return sum(seconds for _, seconds in self.judged)
+
+    @property
+    def text(self) -> str:
+        """How much is judged, of which recordings."""
+        count = len(self.judged)
+        named = " and ".join(f"{name} ({seconds:.3g} s)" for name, seconds in self.judged) if count < 4 else ""
+        return f"{self.seconds:.3g} s of {count} recording{'s' * (count > 1)}{f', {named}' if named else ''}"
+
+
+def evidence(recordings: Sequence[Recording], predictions: Sequence[Prediction]) -> Evidence:
+    """On what the error of a model rests, and the recording on which its residual has the largest rms.
+
+    Args:
+        recordings: The recordings, fitted or not.
+        predictions: The model's prediction of each of them.
+    """
+    pairs = list(zip(recordings, predictions, strict=True))
+    unseen = [(Path(r.path).name, (r.samples - p.split) * r.step_s) for r, p in pairs if r.samples > p.split]
+    residuals = [p.residual_rad[p.start :] for p in predictions]
+    rms = [float(np.sqrt(np.mean(residual**2))) for residual in residuals]
+    worst = int(np.argmax(rms))
+    name, peak = Path(recordings[worst].path).name, float(np.max(np.abs(residuals[worst])))
+    return Evidence(tuple(unseen), name, rms[worst], peak)
 
 
 def predict(fit: Fit, recording: Recording, split: int | None = None) -> Prediction:

@@ -12,6 +12,7 @@ from microrad.lab.identify.hysteresis.joint import JointFit
 from microrad.lab.identify.hysteresis.prandtl_ishlinskii import PrandtlIshlinskiiFit
 from microrad.lab.identify.records import SiRecord, Units, loop_rates, noisiness, one_rate_only
 from microrad.lab.identify.selection.predictions import Fit, Prediction, Score
+from microrad.lab.identify.selection.roles import Roles, is_broadband, single_period
 from microrad.lab.identify.statistics import colour_inflation
 from microrad.lab.recording import Recording
 from microrad.mirror.hysteresis import BoucWen
@@ -55,6 +56,35 @@ def set_aside_warnings(recordings: Sequence[Recording], predictions: Sequence[Pr
         for recording, p in zip(recordings, predictions, strict=True)
         if p.start > 0.2 * recording.samples
     ]
+
+
+def use_warnings(found: Roles, *, linear: bool) -> list[str]:
+    """Broadband recordings that serve for less than they could, and why.
+
+    Args:
+        found: The recordings by what they serve for.
+        linear: Whether there is a linear part.
+    """
+    told, loops, response = [], {id(r) for r in found.loops}, {id(r) for r in found.response}
+    for r in (r for r in found.broadband if id(r) not in loops):
+        if not linear:
+            told.append(f"{r.path}: broadband, and fitted by nothing: no model with a linear part was asked for.")
+        elif id(r) not in response:
+            told.append(
+                f"{r.path}: broadband, and fitted by nothing: only recordings at the highest sample rate and of one "
+                "period are averaged, periodic ones before chirps."
+            )
+        elif not is_broadband(r):
+            told.append(
+                f"{r.path}: broadband as its role says, though its drive does not fill a decade of frequencies: poles "
+                "and zeros outside what it fills are not known."
+            )
+    if linear and single_period(found.response):
+        told.append(
+            f"{found.response[0].path}: one period only, so it is fitted as a drive that does not repeat; record two "
+            "periods, or the same lines with other phases, to tell noise from distortion."
+        )
+    return told
 
 
 def depends_on_rate(fit: JointFit) -> bool:

@@ -1,0 +1,158 @@
+"""What recordings serve for, where they are split, and what is said of what no fit has seen."""
+
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import truths
+from microrad.lab.identify import IdentificationError, identify
+from microrad.lab.identify.selection.predictions import Prediction, evidence
+from microrad.lab.identify.selection.roles import roles
+from microrad.lab.identify.selection.splits import split_points
+from microrad.lab.identify.selection.warnings import use_warnings
+from microrad.lab.recording import recording_from_arrays
+
+RATE = 2000.0
+PLAYS = ("prandtl_ishlinskii",)
+
+
+def loop(periods, freq_hz=2.0, name="loop", noise=2e-4):
+    """One to nine volts and back, `periods` times, from the middle upwards."""
+    time = np.arange(round(periods * RATE / freq_hz)) / RATE
+    drive = 5.0 + 4.0 * np.sin(2 * np.pi * freq_hz * time)
+    return truths.recorded(drive, truths.plays(drive, [0.0, 0.8, 2.1], [6e-5, 2e-5, 1e-5]), RATE, noise, name=name)
+
+
+def growing(amplitudes, name="growing"):
+    sines = np.sin(2 * np.pi * 2.0 * np.arange(2000) / RATE)  # two periods
+    drive = 5.0 + np.concatenate([amplitude * sines for amplitude in amplitudes])
+    return truths.recorded(drive, truths.plays(drive, [0.0, 0.8, 2.1], [6e-5, 2e-5, 1e-5]), RATE, 2e-4, name=name)
+
+
+def wide(periods=3, name="wide", rate_hz=RATE, seed=5):
+    drive = truths.small_multisine(rate_hz, 2000, periods, rms=0.05, highest=0.3, seed=seed)
+    output = 8e-5 * truths.behind_resonance(drive, rate_hz, held=True)
+    return truths.recorded(drive, output, rate_hz, 2e-3, name=name, period=2000)
+
+
+# -------------------------------------------------------------------------------------------------------------- splits
+def test_one_period_is_split_where_the_drive_has_swept_its_range():
+    """Its first half goes from 5 V to 9 V and back, and says nothing of 1 V."""
+    one = loop(1)
+    found = identify([one], models=PLAYS)
+    assert (round(found.drive_min_v, 1), round(found.drive_max_v, 1)) == (1.1, 9.0)
+    (source,) = found.sources
+    assert 0.7 * one.samples < source.fitted < 0.75 * one.samples
+    (told,) = [w for w in found.warnings if "are held out instead of half" in w]
+    assert told.startswith("loop: the last 28 %")
+    half = identify([one], models=PLAYS, hold_out=0.5)
+    assert half.drive_min_v == pytest.approx(5.0, abs=0.1)
+    (told,) = [w for w in half.warnings if "the fitted part sweeps" in w]
+    assert "sweeps 5 V to 9 V of the 1 V to 9 V that were recorded; hold less out" in told
+
+
+def test_a_growing_loop_is_split_behind_its_largest_sweep_and_others_in_the_middle():
+    assert split_points([growing([1, 2, 3, 4])], None, validated=False) == [pytest.approx(6000 + 720, abs=30)]
+    assert split_points([growing([4, 3, 2, 1]), loop(7)], None, validated=False) == [4000, 3500]
+    assert split_points([growing([1, 2, 3, 4])], 0.5, validated=False) == [4000]
+    assert split_points([growing([1, 2, 3, 4])], None, validated=True) == [8000]
+    late = np.concatenate([np.ones(9900), np.full(100, 4.0)])
+    too_late = recording_from_arrays(late, late, RATE)
+    assert split_points([too_late], None, validated=False) == [5000]
+    found = identify([growing([1, 2, 3, 4])], models=PLAYS)
+    assert not any("lie outside the fitted drive range" in w for w in found.warnings)
+
+
+# --------------------------------------------------------------------------------------------------------------- roles
+def test_a_role_goes_before_what_the_drive_looks_like():
+    sine, small, large = loop(4), wide(), replace(wide(), path="large", drive=wide().drive * 30)
+    assert roles([sine, small]).broadband == [small]
+    as_loop = replace(small, role="loops")
+    assert roles([sine, as_loop]) == ([], [], [sine, as_loop])
+    as_wide = replace(large, role="broadband")
+    assert roles([sine, large]).broadband == []
+    assert roles([sine, as_wide]).response == [as_wide]
+    assert roles([as_wide, small]) == ([as_wide, small], [as_wide, small], [small])
+
+
+def test_a_role_that_a_drive_contradicts_is_refused():
+    with pytest.raises(IdentificationError, match=r"loop: its role is broadband and its drive is a sine.* role loops"):
+        roles([replace(loop(4), role="broadband"), growing([1, 4])])
+    with pytest.raises(IdentificationError, match=r"wide: every recording has the role broadband.*leave the role of"):
+        roles([replace(wide(), role="broadband")])
+    with pytest.raises(IdentificationError, match=r"loop: every recording has the role validation"):
+        identify([replace(loop(4), role="validation")])
+    with pytest.raises(IdentificationError, match=r"loop: it is given for validation and its role is loops"):
+        identify([growing([1, 4])], validation=[replace(loop(4), role="loops")])
+
+
+def test_a_recording_for_validation_is_seen_by_no_fit():
+    found = identify([growing([1, 4]), replace(loop(4), role="validation")], models=PLAYS)
+    assert [(s.path, s.role, s.fitted, s.held_out) for s in found.sources] == [
+        ("growing", "loops", 4000, 0),
+        ("loop", "validation", 0, 4000),
+    ]
+
+
+def test_a_narrow_drive_may_be_broadband_by_its_role_and_is_told():
+    """A multisine of half a decade about a resonance."""
+    time = np.arange(8000) / RATE
+    lines = range(100, 320, 20)
+    drive = 5.0 + 0.02 * sum(np.cos(2 * np.pi * f * time + 0.3 * f**1.5) for f in lines)
+    narrow = truths.recorded(drive, 8e-5 * truths.behind_resonance(drive, RATE, held=True), RATE, name="narrow")
+    assert roles([loop(4), narrow]).broadband == []
+    served = roles([loop(4), replace(narrow, role="broadband")])
+    assert [r.path for r in served.response] == ["narrow"]
+    (told,) = use_warnings(served, linear=True)
+    assert told.startswith("narrow: broadband as its role says, though its drive does not fill a decade")
+
+
+# ------------------------------------------------------------------------------------------------- what no fit has seen
+def test_what_is_fitted_by_nothing_is_told():
+    slow = wide(name="slow", rate_hz=1000.0)
+    served = roles([loop(4), wide(), slow])
+    (told,) = use_warnings(served, linear=True)
+    assert told.startswith("slow: broadband, and fitted by nothing: only recordings at the highest sample rate")
+    unasked = use_warnings(served, linear=False)
+    assert [t.partition(":")[0] for t in unasked] == ["wide", "slow"]
+    assert all("no model with a linear part was asked for" in t for t in unasked)
+    assert use_warnings(roles([loop(4), wide(), wide(name="twin", seed=6)]), linear=True) == []
+    found = identify([loop(4), wide()], models=PLAYS)
+    assert any(w.startswith("wide: broadband, and fitted by nothing") for w in found.warnings)
+
+
+def test_one_period_of_a_multisine_is_fitted_as_a_drive_that_does_not_repeat():
+    found = identify([loop(6), wide(1)], models=("linear",))
+    assert found.linear.fit_percent[0] > 90
+    assert found.linear.response.freq_hz.size > 30
+    (told,) = [w for w in found.warnings if "one period only" in w]
+    assert told.startswith("wide: one period only, so it is fitted as a drive that does not repeat; record two periods")
+    assert {s.path: s.fitted for s in found.sources}["wide"] == 2000
+    pair = roles([loop(6), wide(1), wide(1, name="twin", seed=6)])
+    assert use_warnings(pair, linear=True) == []
+
+
+def test_the_choice_says_what_it_rests_on_and_names_the_worst_recording():
+    quiet, noisy = loop(4, name="a/quiet.csv"), loop(8, freq_hz=4.0, name="b/noisy.csv", noise=3e-3)
+    found = identify([quiet, noisy], models=PLAYS)
+    assert "It rests on 2 s of 2 recordings, quiet.csv (1 s) and noisy.csv (1 s); the worst of all" in found.reason
+    error = 1e6 * np.std(found.predictions[0][1].residual_rad[found.predictions[0][1].start :])
+    assert f"the worst of all recordings is noisy.csv, with {error:.3g} µrad rms and " in found.reason
+    four = [replace(quiet, path=f"{k}") for k in range(4)]
+    ends = Prediction(np.zeros(4000), np.full(4000, 1e-6), 0, 3000, 0)
+    assert evidence(four, [ends] * 4).text == "2 s of 4 recordings"
+    assert evidence(four[:2], [replace(ends, split=4000), ends]).text == "0.5 s of 1 recording, 1 (0.5 s)"
+
+
+def test_an_identification_goes_to_another_process_whole():
+    found = identify([loop(6), wide()], models=("prandtl_ishlinskii", "linear"))
+    again = pickle.loads(pickle.dumps(found))
+    assert again.reason == found.reason
+    assert again.scores == found.scores
+    assert again.warnings == found.warnings
+    for a, b in zip(again.fits, found.fits, strict=True):
+        drive = found.recordings[0].drive[:, 0]
+        np.testing.assert_array_equal(a.response(drive, 1 / RATE)[0], b.response(drive, 1 / RATE)[0])
+    np.testing.assert_array_equal(again.predictions[1][0].model_rad, found.predictions[1][0].model_rad)
