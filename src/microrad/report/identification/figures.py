@@ -16,7 +16,7 @@ from microrad.core.arrays import Floats
 from microrad.lab.identify import Identification
 from microrad.lab.identify.linear.fit import LinearFit, fit_percent, output_error
 from microrad.lab.identify.selection.predictions import Prediction
-from microrad.lab.identify.selection.roles import roles
+from microrad.lab.identify.selection.roles import roles, single_period, whole_periods
 from microrad.lab.recording import Recording
 from microrad.report.identification import words
 from microrad.report.plotting.figure import Figure
@@ -28,7 +28,6 @@ VIRTUAL = "virtual bench"
 _WIDTH = 8.2
 _SPECTRUM_POINTS = 400  # strokes of three points, all of which are drawn
 _SPECTRUM_FLOOR = 1e-5  # of the strongest line
-_PAPER_LOOPS_HZ = {60, 80, 100}
 _ZOOM_SAMPLES = 300
 _MOST_RESPONSES = 3
 _MOST_CROSSINGS = 40
@@ -291,11 +290,7 @@ def loops(everything: Sequence[Shown], found: Identification) -> Figure:
         "sine of constant amplitude the last period of either part is drawn, of others at most some twenty swings; the "
         "initial transient is left out." + _not_drawn(judged)
     )
-    title = "Loops, measured against modelled"
-    rounded = {round(one.sine.freq_hz) for one in judged if one.sine is not None}
-    if rounded >= _PAPER_LOOPS_HZ:
-        title = "Fig. 5  Rate-dependent hysteresis, measured against modelled"
-    return Figure("loops", title, caption, sheet, {})
+    return Figure("loops", "Loops, measured against modelled", caption, sheet, {})
 
 
 def _loop(left: Panel, right: Panel, one: Shown, prediction: Prediction) -> None:
@@ -356,9 +351,10 @@ def time_response(found: Identification, recordings: Sequence[Recording]) -> Fig
     for row, recording in zip(range(0, rows, 2), drawn, strict=True):
         panels = sheet.panel(row, columns=2), sheet.panel(row + 1), sheet.panel(row + 1, 1)
         seen = "fitted" if any(recording is one for one in fitted) else "unseen by the linear model"
-        percents.append(_response_panels(panels, recording, found, linear, seen))
+        alone = single_period(fitted) and seen == "fitted"
+        percents.append(_response_panels(panels, whole_periods(recording) if alone else recording, found, linear, seen))
     chirps = [i for i, recording in enumerate(drawn) if is_chirp(recording)]
-    title = "Fig. 4  Time response to the chirp" if chirps else "Time response of the linear part"
+    title = "Time response to the chirp" if chirps else "Time response of the linear part"
     caption = (
         f"Output of the broadband recordings and of the linear model of order {linear.order}. Fit: "
         "100 (1 − |y − ŷ| / |y − mean y|), the MATLAB-style percentage, offsets removed. Above the whole record, below "

@@ -5,6 +5,7 @@ import math
 import os
 import shlex
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 
@@ -19,13 +20,13 @@ from microrad.lab.identify.selection.predictions import Fit
 from microrad.lab.recording import Recording
 from microrad.report.identification import parameters, words
 from microrad.report.identification.figures import identification_figures
+from microrad.report.identification.terminal import MOST_LINES, warnings_text
 from microrad.report.page.templates import page_of
 from microrad.report.plotting.figure import Figure
 from microrad.report.tables import Cell, Table
-from microrad.report.view import Block, Points, Soft, Verbatim, Verdict, View, told, views_text
+from microrad.report.view import Points, Soft, Verbatim, Verdict, View, told, views_text
 
-MOST_REASONS = 6
-"""Parameters that are not identified of which a terminal has the reasons; of more it has the names."""
+_MOST_POLES = 7  # of a terminal, with their dampings
 
 BEGINS = '<!DOCTYPE html>\n<html lang="en" data-made-by="microrad identify">'
 
@@ -149,12 +150,11 @@ def identification_text(
     mirror_file: Path | None = None,
     report_file: Path | None = None,
 ) -> str:
-    """The identification as text to read; the files that were written, and what to do next, stand at its end.
+    """The identification in at most 23 lines of a terminal; what was written, and what to do next, stand at its end.
 
     Args:
         found: what was identified.
-        written: the model in the mirror file. Parameters are its own, those of the choice and those of the paper's
-            model; the report and the plain data have all.
+        written: the model in the mirror file, of which it has the poles; the report and the plain data have all.
         width: columns of the terminal.
         mirror_file: the mirror file, if one was written.
         report_file: the report, if one was written.
@@ -163,9 +163,19 @@ def identification_text(
     if mirror_file is not None:
         run_it = ["microrad", "run", "leo-geo.toml", "--mirror", str(mirror_file)]
         run_it += ["--output", f"{mirror_file.stem}-study"]
-        files.append(f"{mirror_file} written ({written}). Next: {shlex.join(run_it)}")
-    shown = views_text([_lead(found, written), *_views(found, written, short=True)], width)
-    return "\n\n".join([shown, "\n".join(files)]) if files else shown
+        files += [f"{mirror_file} written ({written}).", f"Next: {shlex.join(run_it)}"]
+    last = "\n".join(files)
+    first = views_text([" ".join(words.brief_verdict(found, written)), *_poles(found, written)], width)
+    room = MOST_LINES - sum(1 + part.count("\n") + 1 for part in (first, last) if part)
+    told_of = warnings_text(words.pressing(found, written), len(found.refused), width, room)
+    return "\n\n".join(filter(None, [first, told_of, last]))
+
+
+def _poles(found: Identification, written: str) -> list[Table]:
+    """The poles of the model that is written, with the delay, as the report has them among its parameters."""
+    whole = _model(found.fit(written))
+    rows = [row for row in whole.rows if str(row[0]).startswith(("pole", "delay"))][:_MOST_POLES]
+    return [replace(whole, rows=rows).columns(range(4))] if rows else []
 
 
 def _lead(found: Identification, written: str, own: str = "") -> Verdict:
@@ -178,10 +188,8 @@ def _views(
     written: str,
     recordings: Sequence[Recording] = (),
     figures: Mapping[str, Figure] = MappingProxyType({}),
-    *,
-    short: bool = False,
 ) -> tuple[View, ...]:
-    """What a page and a terminal show, a ``short`` one without the parameters that a page folds."""
+    """What a page shows."""
     everything = [*found.recordings, *words.shown_recordings(found, recordings)]
     no_time = "No broadband recording was used: there is no linear model to compare." if figures else None
     return (
@@ -194,7 +202,7 @@ def _views(
             "Residuals",
             told(figures.get("residuals"), " ".join(words.residual_sentences(found)), figures.get("tests")),
         ),
-        _parameters(found, written, short),
+        _parameters(found, written),
         _ranking(found),
     )
 
@@ -293,25 +301,14 @@ def _angle(value_rad: float) -> str:
     return "" if math.isnan(value_rad) else f"{1e6 * value_rad:.3g} µrad"
 
 
-def _parameters(found: Identification, written: str, short: bool) -> View:
+def _parameters(found: Identification, written: str) -> View:
     """The parameters of each model; those of the choice and of the mirror file stand open."""
     views = []
     for score, fit in zip(found.scores, found.fits, strict=True):
-        if short and score.model not in (found.chosen, written, words.PAPER_MODEL):
-            continue
         choice, held = ", the choice" * (score.model == found.chosen), ", in the mirror file" * (score.model == written)
-        table, notes = _model(fit), parameters.notes(fit)
-        blocks = (table.columns(range(4)), _not_identified(fit), notes[0]) if short else (table, Soft(" ".join(notes)))
-        views.append(View(f"{score.model}{choice}{held}", blocks, folded=not (choice or held)))
+        notes = Soft(" ".join(parameters.notes(fit)))
+        views.append(View(f"{score.model}{choice}{held}", (_model(fit), notes), folded=not (choice or held)))
     return View("Parameters", views)
-
-
-def _not_identified(fit: Fit) -> Block:
-    """Parameters that the recordings do not fix, with the reasons where they are few."""
-    found, count = parameters.not_identified(fit), len(parameters.parameter_rows(fit))
-    if len(found) > MOST_REASONS:
-        return f"Not identified: {len(found)} of {count}, {', '.join(name for name, _ in found)}."
-    return Points([f"not identified: {name}, {why}" for name, why in found])
 
 
 def _model(fit: Fit) -> Table:

@@ -11,8 +11,8 @@ from microrad.core.units import format_quantity
 from microrad.lab.identify import Identification, Score
 from microrad.lab.identify.hysteresis.joint import JointFit
 from microrad.lab.identify.linear.fit import LinearFit
-from microrad.lab.identify.selection.predictions import Fit, Prediction
-from microrad.lab.identify.selection.warnings import fit_warnings
+from microrad.lab.identify.selection.predictions import Evidence, Fit, Prediction, evidence
+from microrad.lab.identify.selection.warnings import fit_warnings, range_warnings
 from microrad.lab.recording import Recording
 from microrad.report.identification.parameters import (
     admissible,
@@ -104,27 +104,73 @@ def verdict(found: Identification, written: str | None = None) -> list[str]:
         found: what was identified.
         written: the model in the mirror file; None says nothing of one.
     """
-    own, fit = found.score(), found.fit()
+    own, fit, rests = found.score(), found.fit(), evidence(found.recordings, chosen_predictions(found))
     headline = (
         f"{found.chosen} predicts samples that no fit has seen with an error of "
-        f"{error_text(own, found.span_rad)}, {own.held_out_peak_percent * found.span_rad * 1e4:.3g} µrad at most."
+        f"{error_text(own, found.span_rad)}, {own.held_out_peak_percent * found.span_rad * 1e4:.3g} µrad at most, over "
+        f"{rests.text}."
     )
-    low, high, rate = *drive_range(found), found.rate_limit_v_per_s
     sentences = [
         headline,
+        worst_text(rests, found.span_rad),
         _against(found),
         f"Per cent are of the largest peak-to-peak output, {format_quantity(found.span_rad, 'rad', 4)}.",
-        f"It holds for drives from {low} to {high} and rates up to {format_quantity(rate, 'V/s', 4)}, "
-        f"which a sine over that range reaches at {full_range_hz(found):.4g} Hz. {_band(found)}",
+        f"{range_text(found)} {_band(found)}",
         "Admissible: the modelled mirror never moves against its drive after a reversal."
         if admissible(fit)
         else "Not admissible: after a reversal the modelled mirror first moves the wrong way.",
         f"{starts_text(fit)[0].upper()}{starts_text(fit)[1:]}.",
     ]
     if written is not None and written != found.chosen:
-        error = error_text(found.score(written), found.span_rad)
-        sentences.append(f"The mirror file holds {written} as asked, which leaves {error}.")
+        sentences.append(written_text(found, written))
     return sentences
+
+
+def brief_verdict(found: Identification, written: str) -> list[str]:
+    """What a terminal has of the verdict: the error, what it rests on and where it holds.
+
+    Args:
+        found: what was identified.
+        written: the model in the mirror file.
+    """
+    headline, worst, *_ = verdict(found)
+    line = f"A straight line leaves {_times(found.straight_line, found)}."
+    as_asked = [] if written == found.chosen else [written_text(found, written)]
+    return [headline, worst, line, range_text(found), *as_asked]
+
+
+def worst_text(rests: Evidence, span_rad: float) -> str:
+    """The recording on which the choice leaves most, seen by a fit or not.
+
+    Args:
+        rests: what the error rests on.
+        span_rad: largest peak-to-peak output, rad.
+    """
+    rms, share = 1e6 * rests.worst_rms_rad, 100 * rests.worst_rms_rad / span_rad
+    return (
+        f"The worst of all recordings, fitted or not, is {rests.worst}, with {rms:.3g} µrad rms ({share:.3g} %) and "
+        f"{1e6 * rests.worst_peak_rad:.3g} µrad at most."
+    )
+
+
+def range_text(found: Identification) -> str:
+    """The drives and rates that were fitted."""
+    low, high = drive_range(found)
+    return (
+        f"It holds for drives from {low} to {high} and rates up to "
+        f"{format_quantity(found.rate_limit_v_per_s, 'V/s', 4)}, which a sine over that range reaches at "
+        f"{full_range_hz(found):.4g} Hz."
+    )
+
+
+def written_text(found: Identification, written: str) -> str:
+    """The error of another model than the choice in the mirror file.
+
+    Args:
+        found: what was identified.
+        written: the model in the mirror file.
+    """
+    return f"The mirror file holds {written} as asked, which leaves {error_text(found.score(written), found.span_rad)}."
 
 
 def _against(found: Identification) -> str:
@@ -181,6 +227,17 @@ def warnings(found: Identification, written: str | None = None) -> list[str]:
         written: the model in the mirror file; the chosen one unless it is given.
     """
     return list(dict.fromkeys([*found.warnings, *fit_warnings(found.fit(written))]))
+
+
+def pressing(found: Identification, written: str) -> list[str]:
+    """The warnings but for those of drives and rates, which the verdict has.
+
+    Args:
+        found: what was identified.
+        written: the model in the mirror file.
+    """
+    known = range_warnings((found.drive_min_v, found.drive_max_v), found.rate_limit_v_per_s)
+    return [text for text in warnings(found, written) if text not in known]
 
 
 def chosen_predictions(found: Identification) -> tuple[Prediction, ...]:
