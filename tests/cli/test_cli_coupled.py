@@ -39,10 +39,29 @@ U, Y = experiment()
 
 @pytest.fixture
 def quick(monkeypatch):
-    """A ladder of two rungs, and a page without figures."""
-    short = LadderOptions(axis_orders=(2,), linear_orders=(4,))
-    monkeypatch.setattr(coupled, "identify_coupled", functools.partial(identify_coupled, options=short))
+    """A ladder of two rungs, and a page without figures; what was identified, once it is."""
+    found = []
+
+    def short(*args, **options):
+        found.append(identify_coupled(*args, options=LadderOptions(axis_orders=(2,), linear_orders=(4,)), **options))
+        return found[-1]
+
+    monkeypatch.setattr(coupled, "identify_coupled", short)
     monkeypatch.setattr("microrad.report.identification.coupled.coupled_figures", lambda found: {})
+    return found
+
+
+@pytest.fixture
+def given(monkeypatch):
+    """What would be identified from, in place of it."""
+    taken = {}
+
+    def take(recordings, **options):
+        taken.update(options, recordings=recordings)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(coupled, "identify_coupled", take)
+    return taken
 
 
 def arrays(folder, drive=U, output=Y, name="100mV"):
@@ -98,8 +117,7 @@ drift = "0 nrad/s"
 
 
 # -------------------------------------------------------------------------------------------------------- what is done
-@pytest.mark.usefixtures("quick")
-def test_arrays_become_a_mirror_file_of_version_2(call, folder):
+def test_arrays_become_a_mirror_file_of_version_2(call, folder, quick):
     third = Y[:, :1] - 0.5 * Y[:, 1:]
     result = call("identify", *arrays(folder, output=np.concatenate((Y, third), axis=1)), *AXES, "--output-unit", "m",
                   "--position", "1 cm, 0 mm", "--position=-5 mm,8 mm", "--position=-5 mm, -8 mm",
@@ -118,7 +136,9 @@ def test_arrays_become_a_mirror_file_of_version_2(call, folder):
     assert [output.position_m for output in mirror.outputs] == [(0.01, 0.0), (-0.005, 0.008), (-0.005, -0.008)]
     assert [actuator.name for actuator in mirror.actuators] == ["drive[0]", "drive[1]"]
     assert "fsm 3" in (folder / "u_100mV-mirror.html").read_text(encoding="utf-8")
-    left = mirror.response(np.tile(U[:, :, 3, 0], (3, 1)))[-PERIOD:, :2] - Y[:, :, 3].mean(axis=2)
+    drive = np.tile(U[:, :, 3, 0], (3, 1))
+    np.testing.assert_array_equal(mirror.response(drive), quick[0].candidate().model.response(drive))  # to the bit
+    left = mirror.response(drive)[-PERIOD:, :2] - Y[:, :, 3].mean(axis=2)
     assert left.std() < 0.1 * Y.std()  # the drive of the truth is a sum of sines between its samples, too
 
 
@@ -138,14 +158,14 @@ def test_columns_of_tables_and_json(call, folder):
     assert (folder / "axes-mirror.html").is_file()
 
 
-@pytest.mark.usefixtures("quick")
-def test_arrays_for_validation(call, folder):
+def test_arrays_for_validation(call, folder, given):
     fitted, other = arrays(folder), arrays(folder, *experiment(5, 1), "other")
-    result = call("identify", *fitted, "--validate", *other, *AXES, "--output-unit", "m", "--json")
-    assert (result.code, result.err) == (0, "")
-    data = json.loads(result.out)
-    assert data["held_out"] == ["u_other.npy realisation 0"]
-    assert data["fitted"] == [f"u_100mV.npy realisation {r}" for r in range(4)]
+    result = call("identify", *fitted, "--validate", *other, *AXES, "--output-unit", "um", "--input-unit", "mV")
+    assert (result.code, result.err) == (130, "microrad: interrupted, nothing was written\n")
+    assert [r.path for r in given["recordings"]] == [f"u_100mV.npy realisation {r}" for r in range(4)]
+    assert [r.path for r in given["validation"]] == ["u_other.npy realisation 0"]
+    np.testing.assert_array_equal(given["validation"][0].output[PERIOD:], np.load("y_other.npy")[:, :, 0, 1])
+    assert (given["drive_unit"], given["output_unit"], given["signs"]) == ("mV", "um", None)
 
 
 @pytest.mark.usefixtures("quick")
@@ -201,14 +221,9 @@ def test_stopped_with_what_was_found_so_far(call, folder, monkeypatch):
     assert of(load_coupled_mirror(folder / "u_100mV-mirror.toml")).mirror.name == "u_100mV"
 
 
-@pytest.mark.usefixtures("quick")
-def test_stopped_before_the_first_model_nothing_is_written(call, folder, monkeypatch):
-    def stopped(*args, **options):
-        raise KeyboardInterrupt
-
-    names = arrays(folder)
-    monkeypatch.setattr(coupled, "identify_coupled", stopped)
-    result = call("identify", *names, *AXES, "--output-unit", "m")
+@pytest.mark.usefixtures("given")
+def test_stopped_before_the_first_model_nothing_is_written(call, folder):
+    result = call("identify", *arrays(folder), *AXES, "--output-unit", "m")
     assert (result.code, result.out, result.err) == (130, "", "microrad: interrupted, nothing was written\n")
     assert sorted(path.name for path in folder.iterdir()) == ["u_100mV.npy", "y_100mV.npy"]
 
