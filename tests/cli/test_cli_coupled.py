@@ -89,7 +89,7 @@ slew = "20 V/ms"
 samples_per_period = 4
 
 [bench]
-truth = "bench"
+truth = "linear"
 axes = 2
 crosstalk = 0.1
 
