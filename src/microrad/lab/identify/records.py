@@ -137,8 +137,8 @@ def si_records(recordings: Sequence[Recording], units: Units) -> tuple[SiRecord,
 def _si_record(recording: Recording, units: Units) -> SiRecord:
     if recording.drive.shape[1] != 1 or recording.output.shape[1] != 1:
         raise IdentificationError(
-            f"{recording.path}: {recording.drive.shape[1]} drives and {recording.output.shape[1]} outputs; a mirror "
-            "file holds one of each: choose one column, or fit several with fit_linear or fit_hysteretic_stiffness."
+            f"{recording.path}: {recording.drive.shape[1]} drives and {recording.output.shape[1]} outputs; one of each "
+            "is identified here: choose one column, or identify all of them with coupled.identify_coupled."
         )
     drive = recording.drive[:, 0] * units.volts
     if np.ptp(drive) == 0 or np.ptp(recording.output) == 0:
