@@ -314,6 +314,12 @@ def test_an_actuator_that_moves_nothing(refused, folder):
     )
 
 
+def test_one_recording_for_fit_and_validation_is_refused(refused, folder):
+    names = arrays(folder)
+    message = refused("identify", *names, "--validate", *names, *AXES, "--output-unit", "m")
+    assert "u_100mV.npy realisation 0: the same data as u_100mV.npy realisation 0; give each recording once" in message
+
+
 def test_amplitudes_of_other_lengths_rates_or_channels(refused, folder):
     whole, short = arrays(folder), arrays(folder, U[:300], Y[:300], "200mV")
     files = (whole[0], short[0], *whole[1:], *short[1:])
@@ -325,7 +331,7 @@ def test_amplitudes_of_other_lengths_rates_or_channels(refused, folder):
     short = arrays(folder, U, Y[:, :1], "200mV")
     message = refused("identify", *files, *AXES, "--output-unit", "m")
     assert "u_200mV.npy realisation 0: 2 inputs and 1 outputs, where u_100mV.npy realisation 0 has 2 and 2" in message
-    np.savez(folder / "slow.npz", u=U, y=Y, fs=500.0)
+    np.savez(folder / "slow.npz", u=2.0 * U, y=2.0 * Y, fs=500.0)
     (folder / "list.toml").write_text(
         """axes = ["samples", "channels", "realisations", "periods"]
 output_unit = "m"

@@ -281,11 +281,22 @@ def test_drives_may_copy_each_other_in_one_recording_and_not_in_all():
         recording_from_arrays(np.column_stack((a, a)), a + 0.01 * noise(), RATE_HZ)
 
 
+def test_no_data_are_given_twice_nor_fitted_and_for_validation():
+    one, two = (recording_from_arrays(SINE, GOOD + k, RATE_HZ, name) for k, name in enumerate(("one", "two")))
+    again = recording_from_arrays(SINE, GOOD, RATE_HZ, "again")
+    check_together([one, two])
+    for recordings, validation in (([one, two, again], []), ([one], [two, again])):
+        with pytest.raises(RecordingError, match="again: the same data as one; give each recording once"):
+            check_together(recordings, validation)
+
+
 def test_recordings_of_other_channels_are_not_put_together():
     one = recording_from_arrays(SINE, GOOD, RATE_HZ, "one")
     two = recording_from_arrays(SINE, np.column_stack((GOOD, GOOD + SINE)), RATE_HZ, "two")
     with pytest.raises(RecordingError, match="two: 1 inputs and 2 outputs, where one has 1 and 1; name the same chan"):
         check_together([one, two])
+    with pytest.raises(RecordingError, match="two: 1 inputs and 2 outputs"):
+        check_together([one], [two])
 
 
 # ----------------------------------------------------------------------------------------------------------------- time

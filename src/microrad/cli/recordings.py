@@ -105,7 +105,7 @@ def _together(given: Given) -> Given:
     if not given.recordings:
         raise Refusal("every recording is for validation: leave one to be fitted.")
     if given.several_channels:
-        check_together(given.recordings)
+        check_together(given.recordings, given.validation)
     outputs = given.channels[1]
     if given.positions_m is not None and len(given.positions_m) != outputs:
         raise Refusal(

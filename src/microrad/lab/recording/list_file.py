@@ -184,7 +184,7 @@ def read_list(path: str | Path) -> RecordingsList:
         (validation if entry.role == "validation" else recordings).extend(found)
     if not recordings:
         raise RecordingError(f"{path}: every recording is for validation; leave one without a role, to be fitted.")
-    _check_channels(path, root, recordings)
+    _check_channels(path, root, recordings, validation)
     return RecordingsList(tuple(recordings), tuple(validation), root.name, root.lever_arm_m, root.positions, root.signs)
 
 
@@ -299,12 +299,14 @@ def _in_units(recording: Recording, entry: RecordingTable) -> Recording:
     return recording
 
 
-def _check_channels(path: Path, root: ListTable, recordings: Sequence[Recording]) -> None:
+def _check_channels(
+    path: Path, root: ListTable, recordings: Sequence[Recording], validation: Sequence[Recording]
+) -> None:
     """Raises RecordingError if positions or signs are not those of the channels."""
     inputs, outputs = recordings[0].drive.shape[1], recordings[0].output.shape[1]
     if inputs > 1 or outputs > 1:
         with _named(str(path)):
-            check_together(recordings)
+            check_together(recordings, validation)
     if root.positions is not None and len(root.positions) != outputs:
         raise RecordingError(
             f"{path}: positions has {len(root.positions)} places and there are {outputs} outputs, "

@@ -77,7 +77,7 @@ def identify_coupled(  # noqa: PLR0913  all but the first are named options
     """
     check_travel([*recordings, *validation], output_unit, positions_m=positions_m)
     records = channels(recordings, validation, drive_unit, output_unit, positions_m)
-    check_together(recordings)
+    check_together(recordings, validation)
     response = _response(records.fitted, records.periodic)
     check_wiring(records.fitted[0].path, response, records.outputs, signs)
     low, high = response.excited_hz

@@ -9,19 +9,27 @@ from microrad.lab.recording.checks.signals import check_separable, covariance
 from microrad.lab.recording.records import Recording, RecordingError
 
 
-def check_together(recordings: Sequence[Recording]) -> None:
+def check_together(recordings: Sequence[Recording], validation: Sequence[Recording] = ()) -> None:
     """Check what one recording cannot tell, as its drives may be played one after the other.
 
     Args:
         recordings: The recordings of a mirror, at least one, with the same inputs and outputs in the same order.
+        validation: Recordings of the same channels that are not fitted.
 
     Raises:
-        RecordingError: If they have other numbers of channels, if an input moves in none of them or is a combination
-            of others in all of them, or if an output follows in none.
+        RecordingError: If they have other numbers of channels, if two hold the same data, if an input moves in none of
+            `recordings` or is a combination of others in all of them, or if an output follows in none.
     """
     first = recordings[0]
-    for other in recordings[1:]:
-        _check_alike(first, other)
+    seen: dict[str, str] = {}
+    for each in (*recordings, *validation):
+        _check_alike(first, each)
+        if each.sha256 in seen:
+            raise RecordingError(
+                f"{each.path}: the same data as {seen[each.sha256]}; give each recording once, and for validation one "
+                "that is not fitted."
+            )
+        seen[each.sha256] = each.path
     where = first.path if len(recordings) == 1 else f"{first.path} and {len(recordings) - 1} more"
     total = np.sum([covariance(list(r.drive.T)) for r in recordings], axis=0)
     power = np.diag(total)
