@@ -22,8 +22,8 @@ from microrad.lab.recording import Recording
 from microrad.mirror.coupled import Actuator, CoupledMirror, Known, Output
 from microrad.mirror.model import Mirror
 from microrad.report.identification import coupled_words as words
-from microrad.report.identification.coupled import MOST_LINES
 from microrad.report.identification.coupled_figures import MOST, bands, coupled_figures, error_over_parameters
+from microrad.report.identification.terminal import MOST_LINES
 from microrad.report.plotting.sheet import Line, Rule, Span
 from report_pages import assert_sound, without_scripts
 

@@ -476,6 +476,10 @@ def test_a_terminal_has_as_many_warnings_as_there_is_room_for_and_says_how_many_
     assert lines[-1] == f"- {left} more warnings and 1 refused model: see the report, or --json."
     none = replace(full, warnings=full.warnings[:2], refused=(), chosen="linear")
     assert "see the report" not in report.identification_text(none, "linear")
+    long = replace(none, warnings=(*full.warnings[:2], "word " * 400))
+    *_, last, more = report.identification_text(long, "linear").splitlines()
+    assert last.endswith("word …")
+    assert more == "- the whole of it: see the report, or --json."
 
 
 def test_the_verdict_says_on_what_it_rests_and_names_the_worst_recording(full):

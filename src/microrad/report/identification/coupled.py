@@ -19,14 +19,13 @@ from microrad.report.identification import coupled_words as words
 from microrad.report.identification.coupled_figures import coupled_figures
 from microrad.report.identification.figures import VIRTUAL
 from microrad.report.identification.page import check_identification
+from microrad.report.identification.terminal import MOST_LINES, counted, warnings_text
 from microrad.report.page.templates import page_of
 from microrad.report.plotting.figure import Figure
 from microrad.report.quantities import minus, quantity
 from microrad.report.tables import Cell, Table
 from microrad.report.view import Block, Points, Soft, Verbatim, Verdict, View, told, views_text
 
-MOST_LINES = 23
-"""Of a terminal of 25: the command has one of its own above them."""
 _OF_THE_BENCH = "The recordings are those of the virtual bench: nothing here was measured on a mirror."
 _MOST_ROWS = 4  # of a table of a terminal
 _MOST_UNFOLDED = 12  # rows of a table of records
@@ -82,7 +81,7 @@ def coupled_identification_page(
     views = (*_views(found, coupled_figures(found)), _origin(found, mirror_file, mirror_text))
     model = found.candidate().model
     of = Markup("{} and {}, mirror file <code>{}</code>").format(
-        words.counted(len(model.actuators), "actuator"), words.counted(len(model.outputs), "output"), mirror_file
+        counted(len(model.actuators), "actuator"), counted(len(model.outputs), "output"), mirror_file
     )
     return page_of(
         title,
@@ -117,24 +116,8 @@ def coupled_identification_text(
     tables = views_text([_amplitudes(found, short=True), _candidates(found, short=True)], width)
     last = "\n".join(line for each in files for line in wrap(each, width))
     room = MOST_LINES - sum(part.count("\n") + 2 for part in (first, tables, last) if part)
-    parts = [first, tables, _warnings_text(found, width, room), last]
+    parts = [first, tables, warnings_text(found.warnings, len(found.refused), width, room), last]
     return "\n\n".join(filter(None, parts))
-
-
-def _warnings_text(found: CoupledIdentification, width: int, room: int) -> str:
-    """As many warnings as there is room for, in their order, and how many there are else."""
-    shown: list[str] = []
-    for number, warning in enumerate(found.warnings, start=1):
-        lines = wrap(warning, width, initial_indent="- ", subsequent_indent="  ", break_on_hyphens=False)
-        if len(shown) + len(lines) + (number < len(found.warnings) or bool(found.refused)) > room:
-            left = len(found.warnings) - number + 1
-            break
-        shown += lines
-    else:
-        left = 0
-    more = [words.counted(left, "more warning" if shown else "warning")] if left else []
-    more += [words.counted(len(found.refused), "refused model")] if found.refused else []
-    return "\n".join([*shown, *([f"- {' and '.join(more)}: see the report, or --json."] if more else [])])
 
 
 # ----------------------------------------------------------------------------------------------------------- the view
@@ -335,7 +318,7 @@ def _origin(found: CoupledIdentification, mirror_file: Path, mirror_text: str) -
     lines = mirror_text.splitlines()
     more = len(lines) - _MOST_FILE_LINES
     begins = "\n".join(line if len(line) <= 160 else f"{line[:150]} …" for line in lines[:_MOST_FILE_LINES])
-    left = f"{words.counted(more, 'more line')} are in the file; long ones are cut here." if more > 0 else None
+    left = f"{counted(more, 'more line')} are in the file; long ones are cut here." if more > 0 else None
     made = ", ".join(f"{name} {version}" for name, version in versions().items())
     fitted = [(Cell(name, code=True),) for name in found.fitted]
     file = View(f"Mirror file {mirror_file.name}", told(Verbatim(begins), left), folded=True, listed=False)

@@ -11,6 +11,7 @@ from microrad.core.units import format_quantity, parse_quantity
 from microrad.lab.identify.coupled import Candidate, CoupledIdentification
 from microrad.lab.identify.linear.response import FrequencyResponse
 from microrad.report.identification.parameters import to_error, two_digits
+from microrad.report.identification.terminal import counted
 from microrad.report.quantities import minus, percent, quantity
 
 USABLE = 0.5
@@ -182,16 +183,6 @@ def drawn_amplitude(found: CoupledIdentification) -> int | None:
 def part(share: float) -> str:
     """An error over the output, in per cent and as many digits as tell candidates apart; "" for nan."""
     return "" if math.isnan(share) else percent(share, 3)
-
-
-def counted(number: int, noun: str) -> str:
-    """A number with its noun: "1 parameter", "2 parameters".
-
-    Args:
-        number: how many.
-        noun: in the singular.
-    """
-    return f"{number} {noun}{'s' * (number != 1)}"
 
 
 def headline(found: CoupledIdentification) -> str:

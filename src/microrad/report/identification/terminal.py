@@ -10,6 +10,8 @@ MOST_LINES = 23
 def warnings_text(warnings: Sequence[str], refused: int, width: int, room: int) -> str:
     """As many warnings as there is room for, in their order, and how many there are else.
 
+    Where there is no room for the first one it is cut.
+
     Args:
         warnings: each a sentence or several.
         refused: number of models that were refused, which the report names.
@@ -17,23 +19,27 @@ def warnings_text(warnings: Sequence[str], refused: int, width: int, room: int) 
         room: lines.
     """
     shown: list[str] = []
-    left = 0
+    left, cut = 0, False
     for number, warning in enumerate(warnings, start=1):
         lines = wrap(warning, width, initial_indent="- ", subsequent_indent="  ", break_on_hyphens=False)
         if len(shown) + len(lines) + (number < len(warnings) or refused > 0) > room:
-            left = len(warnings) - number + 1
+            cut = not shown
+            if cut:
+                *whole, last = lines[: max(room - 1, 1)]
+                shown = [*whole, f"{last[: width - 2]} …"]
+            left = len(warnings) - number + (not cut)
             break
         shown += lines
-    more = [counted(left, "more warning" if shown else "warning")] if left else []
+    more = [counted(left, "more warning")] if left else ["the whole of it"] if cut else []
     more += [counted(refused, "refused model")] if refused else []
     return "\n".join([*shown, *([f"- {' and '.join(more)}: see the report, or --json."] if more else [])])
 
 
-def counted(count: int, what: str) -> str:
-    """A number of things: "1 output", "3 outputs".
+def counted(number: int, noun: str) -> str:
+    """A number with its noun: "1 parameter", "2 parameters".
 
     Args:
-        count: how many.
-        what: one of them.
+        number: how many.
+        noun: in the singular.
     """
-    return f"{count} {what}{'s' * (count != 1)}"
+    return f"{number} {noun}{'s' * (number != 1)}"
