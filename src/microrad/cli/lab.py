@@ -4,6 +4,7 @@ import functools
 import os
 import shlex
 from collections.abc import Callable
+from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -26,7 +27,7 @@ from microrad.cli.frame import (
     progress_bar,
     width,
 )
-from microrad.cli.recordings import Options, common_name, given_recordings, unit_of
+from microrad.cli.recordings import Given, Options, common_name, given_recordings, unit_of
 from microrad.core.folder import write_whole
 
 if TYPE_CHECKING:
@@ -167,8 +168,6 @@ def identify(  # noqa: PLR0913  every argument is a named option
     noise of the best is written; Ctrl-C ends that with the best one so far.
     """
     from microrad import report
-    from microrad.lab import identify as identification
-    from microrad.lab.live_fit import live_fit_writer
 
     called = common_name(files)
     target = mirror_file or Path(f"{called}-mirror.toml")
@@ -198,9 +197,10 @@ def identify(  # noqa: PLR0913  every argument is a named option
         )
     )
     title = name if name is not None else given.name or called[:200]
-    input_unit, drive_by = unit_of(given, "input", input_unit, "V")
-    output_unit, output_by = unit_of(given, "output", output_unit, "mrad")
-    said = f"drive in {input_unit} ({drive_by}), output in {output_unit} ({output_by})"
+    drive, drive_by = unit_of(given, "input", input_unit, "V")
+    output, output_by = unit_of(given, "output", output_unit, "mrad")
+    said = f"drive in {drive} ({drive_by}), output in {output} ({output_by})"
+    written = Target(target, page, title, overwrite, check)
     if given.several_channels:
         one_axis = {
             "--static": static,
@@ -211,51 +211,72 @@ def identify(  # noqa: PLR0913  every argument is a named option
             "--lever-arm": given.lever_arm_m is not None,
         }
         refuse_options(given, one_axis)
-        return identify_channels(
-            given, (input_unit, output_unit), said, Target(target, page, title, overwrite, check), as_json
-        )
+        return identify_channels(given, (drive, output), said, written, as_json)
     if given.positions_m is not None or given.signs is not None:
         raise Refusal("positions and signs are for several outputs or drives: leave out --position, or name them all.")
-    models = identification.STATIC[:2] if static else identification.MODELS
+    how = _Fits(model, static, admissible, hold_out, seed)
+    return _identify_axis(given, (drive, output), said, written, how, as_json)
+
+
+@dataclass(frozen=True, slots=True)
+class _Fits:
+    """Which models of one axis are fitted, and which of them is written."""
+
+    model: Model
+    static: bool
+    admissible: bool
+    hold_out: float | None
+    seed: int
+
+
+def _identify_axis(
+    given: Given, units: tuple[str, str], said: str, target: Target, how: _Fits, as_json: bool
+) -> Outcome:
+    """Identify a mirror of one drive and one output, and write its file and report; `said` begins the text."""
+    from microrad import report
+    from microrad.lab import identify as identification
+    from microrad.lab.live_fit import live_fit_writer
+
+    models = identification.STATIC[:2] if how.static else identification.MODELS
     live = os.environ.get(PROGRESS_FILE)
     with progress_bar() as bar:
         found = identification.identify(
             given.recordings,
-            hold_out,
-            seed,
-            _wanted(models, model),
+            how.hold_out,
+            how.seed,
+            _wanted(models, how.model),
             bar,
             validation=given.validation,
-            admissible=admissible,
-            output_unit=output_unit,
+            admissible=how.admissible,
+            output_unit=units[1],
             lever_arm_m=given.lever_arm_m,
-            input_unit=input_unit,
+            input_unit=units[0],
             on_fit=live_fit_writer(live),
             side_by_side=not live,
         )
     if found.unsupported:
         raise Refusal(found.unsupported)
-    written = _written(found, model, admissible)
-    text = identification.mirror_file_text(found, title, model=written)
-    data = {"mirror_file": target, "report_file": page}
+    written = _written(found, how.model, how.admissible)
+    text = identification.mirror_file_text(found, target.title, model=written)
+    data = {"mirror_file": target.mirror_file, "report_file": target.page}
     outcome = Outcome(
         json_text(report.identification_data(found, written, **data))
         if as_json
         else f"{said}\n\n" + report.identification_text(found, written, width(), **data)
     )
-    check()  # the file may have appeared meanwhile
+    target.check()  # the file may have appeared meanwhile
     report.write_identification(
         found,
-        page,
-        mirror_file=target,
+        target.page,
+        mirror_file=target.mirror_file,
         mirror_text=text,
-        title=title,
+        title=target.title,
         written=written,
         recordings=given.recordings,
-        overwrite=overwrite,
+        overwrite=target.overwrite,
         virtual=given.virtual,
     )
-    write_whole(target, text)
+    write_whole(target.mirror_file, text)
     return outcome
 
 
