@@ -30,7 +30,7 @@ BLOCK = re.compile(r"(?ms)^```(\w+)\n(.*?)^```|((?:^    \S[^\n]*\n)+)")
 FIGURE = re.compile(r"\d+(?:\.\d+)?(?: (?:%|dB|deg|min|h|cm|[µmMkGT]?(?:rad|bit|m|W|V|Hz|s|B))(?:/s)?(?!\w))?")
 DERIVED = {
     PAPER: {"0.60 dB": 3.60 - 3.00},
-    LAB: {"2 %": 100 * 0.0013 / 0.0654, "12 %": 100 * 0.0022 / 0.0182},
+    LAB: {},
     CHOICE: {"29 %": 100 * (5.66 / 4.40 - 1.0), "5 %": 100 * 0.05},
     CROSSLINK: {"1081 km": 580 * 10 ** (5.41 / 20), "80 mm": 5 * 16, "0.96 deg/s": math.degrees(16.8e-3)},
     CONSTELLATION: {},

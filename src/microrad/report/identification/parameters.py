@@ -73,7 +73,8 @@ def _held(fit: JointFit) -> list[ParameterRow]:
         for number, (f, damping) in enumerate(zip(roots.frequencies_hz, roots.dampings, strict=True), 1):
             if f"{kind} {number}" not in fitted:
                 rows.append(ParameterRow(f"{kind} {number}", f, math.nan, "Hz", note))
-                rows.append(ParameterRow(f"{kind} {number} damping", damping, math.nan, "", note))
+                if abs(damping) != 1.0:  # or it is real
+                    rows.append(ParameterRow(f"{kind} {number} damping", damping, math.nan, "", note))
     for number, lag in enumerate(fit.creep.time_constants_s, 1):
         rows.append(ParameterRow(f"creep lag {number}", lag, math.nan, "s", "chosen, one weight for all lags"))
     return rows
