@@ -276,6 +276,53 @@ def test_stuck_and_sliding_plays_in_all_their_combinations(numbers):
     assert many.growth_1_s == pytest.approx(-30.0)
 
 
+def test_growth_and_its_slopes_against_differences(numbers):
+    """What keeps a step from a mirror that runs away: the fastest pole of each combination, by each number."""
+    vector = numbers.vector()
+    found = numbers.growths()
+    assert len(found) == 16
+    assert max(growth.rate_1_s for growth in found) == pytest.approx(numbers.growth_1_s)
+    slopes = np.array([growth.slope for growth in found])
+    for i, value in enumerate(vector):
+        step = np.zeros(vector.size)
+        step[i] = 1e-6 * max(abs(value), 1e-3)
+        above, below = ([g.rate_1_s for g in numbers.at(vector + sign * step).growths()] for sign in (1, -1))
+        expected = np.subtract(above, below) / (2 * step[i])
+        np.testing.assert_allclose(slopes[:, i], expected, rtol=1e-4, atol=1e-4 * max(1.0, np.abs(expected).max()))
+    assert np.abs(slopes).max() > 1.0
+
+
+def test_a_bounded_step_takes_each_pole_half_of_its_way_at_most():
+    draw = philox(8).standard_normal
+    root = draw((6, 6))
+    system = root @ root.T + np.eye(6), 10 * draw(6), np.exp(draw(6))
+    slopes = draw((3, 6))
+    free, held = stiffness_fit._bounded_move(system, 1e-3, (np.full(3, 1e9), slopes))
+    assert not held
+    slopes *= np.sign(slopes @ free)[:, None]
+    room = slopes @ free * np.array([0.2, 0.3, 2.0])
+    move, held = stiffness_fit._bounded_move(system, 1e-3, (room, slopes))
+    assert held and (slopes @ free > room * 1.01).any()
+    assert (slopes @ move <= room * (1 + 1e-5)).all()
+    assert np.linalg.norm(move) > 0.05 * np.linalg.norm(free)
+
+
+def test_few_records_first_lead_nearly_as_far(training):
+    """An iteration on one record of each amplitude costs a third, and most of the error is gone after four."""
+    options = StiffnessOptions(delay_s=7e-4, exchanges=0, few_first=4)
+    steps = []
+    fit = fit_hysteretic_stiffness(
+        training, order=4, options=options, iterations=1, on_progress=lambda done, total, _: steps.append((done, total))
+    )
+    assert steps[-1] == (5, 5) and len(steps) == 5
+    assert fit.iterations == 1 and fit.moved.shape == (9, len(fit.names))
+    straight = fit_linear(training, 4, exchanges=0)
+    linear = [rms(output_error(straight.modes, record, steady=True)) for record in training]
+    assert (fit.start_error_rms < 0.5 * np.array(linear)).all()
+    assert (fit.error_rms < fit.start_error_rms).any()
+    assert fit.names[-1] == "recording.delay" and (fit.moved[:, -1] == 0.0).all()
+
+
 def test_a_delay_that_is_given_is_kept(training):
     fit = fit_hysteretic_stiffness(training, order=4, options=StiffnessOptions(delay_s=5e-4), iterations=1)
     assert fit.delay_s == 5e-4 and fit.delay_error_s == 0

@@ -267,10 +267,15 @@ def growth_1_s(A: Floats, E: Floats, F: Floats, gains: Floats) -> float:
         F: What drives each element, shape (elements, states).
         gains: Gain of each element where it slides, shape (elements,).
     """
-    each = product((0.0, 1.0), repeat=gains.size)
-    cases = list(each) if gains.size <= _MOST_COMBINED else [(0.0,) * gains.size, (1.0,) * gains.size]
-    sliding = A + (E * (np.array(cases) * gains)[:, None, :]) @ F
+    sliding = A + (E * (sliding_cases(gains.size) * gains)[:, None, :]) @ F
     return float(np.linalg.eigvals(sliding).real.max())
+
+
+def sliding_cases(elements: int) -> Floats:
+    """Which elements slide (1) or are stuck (0), shape (cases, elements); see `growth_1_s` for which cases."""
+    if elements > _MOST_COMBINED:
+        return np.array([[0.0] * elements, [1.0] * elements])
+    return np.array(list(product((0.0, 1.0), repeat=elements))).reshape(2**elements, elements)
 
 
 def gramian(A: Floats, Q: Floats) -> Floats:

@@ -1,6 +1,6 @@
 """The ladder of models for several channels: fitted from small to large, judged on held-out records, one chosen."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -18,9 +18,13 @@ from microrad.lab.identify.coupled.held_out import (
     output_rms,
     smallest_within_noise,
 )
+from microrad.lab.identify.coupled.hysteretic import hysteretic_stiffness
 from microrad.lab.identify.coupled.linear import STEPS, Fitted, best_delay, coupled_linear, per_axis
+from microrad.lab.identify.coupled.linear_errors import line_spectra
 from microrad.lab.identify.coupled.records import Candidate, CoupledIdentification
 from microrad.lab.identify.coupled.wiring import check_wiring
+from microrad.lab.identify.linear.amplitude import AmplitudeDependence, amplitude_dependence
+from microrad.lab.identify.linear.fit import fit_linear
 from microrad.lab.identify.linear.response import FrequencyResponse, response_from_periods, response_from_records
 from microrad.lab.identify.records import IdentificationError, no_progress
 from microrad.lab.identify.selection.candidates import Refused
@@ -32,14 +36,20 @@ AXIS_ORDERS = (2, 4)
 LINEAR_ORDERS = (4, 8, 12, 16, 20, 24, 28)
 _DELAY_ORDER = 12
 _EXCHANGES = 12
+_NEIGHBOURS = 3
 
 
 @dataclass(frozen=True, slots=True)
 class LadderOptions:
-    """The orders of the models that are fitted: states of each output, of all outputs."""
+    """The orders of the models that are fitted: states of each output, and states of all outputs together.
+
+    Hysteretic stiffness begins with the linear model of its order, which is fitted, too; without orders of its own it
+    takes the order that serves best without hysteresis, and the next ones in ``linear_orders``.
+    """
 
     axis_orders: tuple[int, ...] = AXIS_ORDERS
     linear_orders: tuple[int, ...] = LINEAR_ORDERS
+    stiffness_orders: tuple[int, ...] | None = None
 
 
 def identify_coupled(  # noqa: PLR0913  all but the first are named options
@@ -104,24 +114,75 @@ class _Ladder:
     response: FrequencyResponse
     bands_hz: Floats
     on_model: Callable[[Candidate], None]
-    candidates: list[Candidate] = field(default_factory=list)
-    judged: list[Judged] = field(default_factory=list)
+    found: list[tuple[Candidate, Judged]] = field(default_factory=list)
     refused: list[Refused] = field(default_factory=list)
+    fits: dict[str, Fitted] = field(default_factory=dict)
+    left: list[str] = field(default_factory=list)
+    done: int = 0
+    total: int = 0
+    on_progress: Progress = no_progress
+
+    @property
+    def candidates(self) -> list[Candidate]:
+        """Those that could be judged."""
+        return [candidate for candidate, _ in self.found]
 
     def climb(self, options: LadderOptions, on_progress: Progress) -> None:
         """Fit and judge all models, from small to large."""
-        most = self.response.freq_hz.size - 1
-        linear = [n for n in options.linear_orders if n <= most] or [most]
-        total = 1 + len(options.axis_orders) + len(linear)
-        on_progress(0, total, "delay")
+        most, reason = self.response.freq_hz.size - 1, self._no_hysteresis()
+        given = () if reason else options.stiffness_orders or ()
+        linear = [n for n in sorted({*options.linear_orders, *given}) if n <= most] or [most]
+        self.left = [
+            *(f"per axis, order {n} each" for n in options.axis_orders),
+            *(f"coupled linear, order {n}" for n in linear),
+        ]
+        few = 0 if reason else min(_NEIGHBOURS, len(linear))
+        self.total, self.on_progress = len(self.left) + (len(given) or few), on_progress
+        self._report("delay")
         delay_s = best_delay(self.response, min(_DELAY_ORDER, max(linear)))
-        models = [partial(per_axis, self.response, n, delay_s) for n in options.axis_orders]
-        models += [partial(coupled_linear, self.response, n, delay_s, _EXCHANGES) for n in linear]
-        names = [f"per axis, order {n}" for n in options.axis_orders] + [f"coupled linear, order {n}" for n in linear]
-        for done, (name, fit) in enumerate(zip(names, models, strict=True), start=1):
-            on_progress(done, total, name + self._so_far())
-            self._judge(fit())
-        on_progress(total, total, "done" + self._so_far())
+        spectra = line_spectra(self.records.fitted, self.response)
+        for n in options.axis_orders:
+            self._judge(partial(per_axis, self.response, n, delay_s, spectra))
+        for n in linear:
+            self._judge(partial(coupled_linear, self.response, n, delay_s, _EXCHANGES, spectra))
+        if reason:
+            self.refused.append(Refused("hysteretic stiffness", reason))
+            stiff: list[int] = []
+        else:
+            stiff = [n for n in given if n <= most] or self._neighbours(linear)
+        self.left, self.total = [f"hysteretic stiffness, order {n}" for n in stiff], self.done + len(stiff)
+        lowest_hz = self.response.excited_hz[0]
+        for n in stiff:
+            start = self.fits.get(f"coupled linear, order {n}")
+            self._judge(partial(hysteretic_stiffness, self.records.fitted, start, lowest_hz, self._iteration))
+        self._report("done")
+
+    def _no_hysteresis(self) -> str:
+        """Why the records cannot tell hysteresis from linear stiffness; nothing where they can."""
+        if not self.records.periodic:
+            return "it takes multisines of at least two amplitudes in their steady state, and no record is periodic"
+        if len(set(self.records.fitted_class.tolist())) < 2:
+            size = self.records.amplitudes_v[self.records.fitted_class[0]]
+            return (
+                f"all fitted records have one amplitude, {size:.3g} V rms: hysteresis cannot be told from linear "
+                "stiffness; add records of another amplitude, twice as large for example"
+            )
+        return ""
+
+    def _neighbours(self, orders: list[int]) -> list[int]:
+        """The order of the linear model that would be chosen, and its neighbours, in rising order."""
+        linear = [(c, own) for c, own in self.found if c.kind == "coupled linear"]
+        if not linear:
+            return orders[:1]
+        best = smallest_within_noise([own for _, own in linear], [c.parameters for c, _ in linear])[0]
+        k = orders.index(linear[best][0].order)
+        return orders[max(k - 1, 0) : k + 2]
+
+    def _report(self, what: str) -> None:
+        self.on_progress(self.done, self.total, what + self._so_far())
+
+    def _iteration(self, done: int, total: int, text: str) -> None:
+        self._report(f"{self.left[0]}, iteration {done} of {total}")
 
     def _so_far(self) -> str:
         if not self.candidates:
@@ -129,7 +190,17 @@ class _Ladder:
         best = min(self.candidates, key=lambda candidate: candidate.error_share)
         return f"; best so far {best.name}: {100 * best.error_share:.3g} % of the output on held-out records"
 
-    def _judge(self, fitted: Fitted) -> None:
+    def _judge(self, fit: Callable[[], Fitted]) -> None:
+        """Fit the next model and judge it, or keep the reason why it cannot be."""
+        self._report(self.left[0])
+        name = self.left[0]
+        try:
+            self.fits[name] = fitted = fit()
+        except IdentificationError as error:
+            self.refused.append(Refused(name, str(error)))
+            return
+        finally:
+            self.left, self.done = self.left[1:], self.done + 1
         records = self.records
         model = CoupledMirror(
             mirror=fitted.mirror,
@@ -142,6 +213,9 @@ class _Ladder:
             known=fitted.known,
         )
         judged = judge(model, records, self.bands_hz)
+        if not np.isfinite(judged.share):
+            self.refused.append(Refused(fitted.name, "it runs away on a held-out record"))
+            return
         candidate = Candidate(
             name=fitted.name,
             kind=fitted.kind,
@@ -157,21 +231,22 @@ class _Ladder:
             record_share=judged.record_share,
             note=fitted.note,
         )
-        self.judged.append(judged)
-        self.candidates.append(candidate)
+        self.found.append((candidate, judged))
         self.on_model(candidate)
 
     def result(self, stopped: bool) -> CoupledIdentification:
         """The choice among the candidates so far."""
-        records = self.records
-        chosen, best, ties = smallest_within_noise(self.judged, [c.parameters for c in self.candidates])
+        records, candidates = self.records, self.candidates
+        if not candidates:
+            raise IdentificationError(f"no model could be fitted: {self.refused[0].model}: {self.refused[0].reason}")
+        chosen, best, ties = smallest_within_noise([own for _, own in self.found], [c.parameters for c in candidates])
         responses = tuple(self._response_of(k) for k in range(records.amplitudes_v.size))
         return CoupledIdentification(
-            candidates=tuple(self.candidates),
-            chosen=self.candidates[chosen].name,
+            candidates=tuple(candidates),
+            chosen=candidates[chosen].name,
             reason=self._reason(chosen, best),
-            within_noise=tuple(self.candidates[k].name for k in ties),
-            warnings=(),
+            within_noise=tuple(candidates[k].name for k in ties),
+            warnings=tuple(self._warnings(candidates[chosen], candidates[best])),
             refused=tuple(self.refused),
             amplitudes_v=records.amplitudes_v,
             bands_hz=self.bands_hz,
@@ -179,10 +254,9 @@ class _Ladder:
             noise_rms=noise_rms(records),
             responses=responses,
             modelled=tuple(
-                None if own is None else self._modelled(self.candidates[chosen].model, k)
-                for k, own in enumerate(responses)
+                None if own is None else self._modelled(candidates[chosen].model, k) for k, own in enumerate(responses)
             ),
-            dependence=None,
+            dependence=None if stopped else self._dependence(),
             fitted=tuple(r.path for r in records.fitted),
             held_out=tuple(r.path for r in records.held_out),
             stopped=stopped,
@@ -200,8 +274,29 @@ class _Ladder:
         records = [replace(r, output=modelled_output(model, r)) for r in self.records.of_amplitude(amplitude)]
         return _response(records, self.records.periodic).response
 
+    def _dependence(self) -> AmplitudeDependence | None:
+        """How gain and main resonance change with the amplitude, by linear models of each; None where not seen."""
+        linear = [c for c in self.candidates if c.kind == "coupled linear"]
+        groups = [self.records.of_amplitude(k) for k in range(self.records.amplitudes_v.size) if self._response_of(k)]
+        if len(groups) < 2 or not linear:
+            return None
+        order = min(linear, key=lambda candidate: candidate.error_share).order
+        try:
+            return amplitude_dependence([fit_linear(group, order, exchanges=0) for group in groups])
+        except IdentificationError:  # no resonance in the excited band
+            return None
+
+    def _warnings(self, chosen: Candidate, best: Candidate) -> Iterator[str]:
+        if chosen.note:
+            yield f"{chosen.name}: {chosen.note}."
+        if best.order == max(c.order for c in self.candidates if c.kind == best.kind):
+            yield (
+                f"The least error is that of the largest model of its kind that was tried, {best.name}: a larger one "
+                "may have less."
+            )
+
     def _reason(self, chosen: int, best: int) -> str:
-        own, least = self.candidates[chosen], self.candidates[best]
+        own, least = self.found[chosen][0], self.found[best][0]
         text = (
             f"{own.name} ({own.parameters} parameters) leaves {100 * own.error_share:.3g} % of the output on the "
             "held-out records"

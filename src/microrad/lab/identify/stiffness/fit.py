@@ -12,6 +12,7 @@ import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -24,6 +25,7 @@ from microrad.lab.identify.stiffness import tangents
 from microrad.lab.identify.stiffness.model import (
     FIELDS,
     HysteresisSource,
+    LinearStart,
     Numbers,
     balanced,
     linear_start,
@@ -41,6 +43,7 @@ THRESHOLDS = tuple(np.geomspace(0.006, 0.6, 6).tolist())
 _DAMPING = 1e-2
 _TRIALS = 8
 _PATIENCE = 3
+_BOUNDS = 8  # poles that a step is kept from taking across zero
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +54,8 @@ class StiffnessOptions:
     with its drive; in the fit each may take up any mixture of both. ``thresholds`` are parts of the largest drive that
     any operator of the start meets. The mirror takes ``sub_steps`` steps a sample. ``delay_s`` is fitted along, from
     the best on a grid up to two samples, unless it is given. ``exchanges`` is for the linear start, see `fit_linear`.
-    The search ends when three iterations in a row gain less than ``tolerance`` of the error.
+    The search ends when three iterations in a row gain less than ``tolerance`` of the error. It begins with up to
+    ``few_first`` iterations on one record of each amplitude alone, which cost less and lead nearly as far.
     """
 
     sources: tuple[HysteresisSource, ...] = SOURCES
@@ -60,6 +64,7 @@ class StiffnessOptions:
     delay_s: float | None = None
     exchanges: int = 12
     tolerance: float = 1e-3
+    few_first: int = 0
 
 
 DEFAULTS = StiffnessOptions()
@@ -76,13 +81,16 @@ class HystereticStiffnessFit:
     through the plays.
 
     ``error_rms`` (records,) is the rms over samples and outputs of the steady state of each record less its mean,
-    ``start_error_rms`` that of the linear start. ``amplitudes`` is the rms drive of each class of records of one
-    amplitude and ``classes`` the class of each record. ``costs`` is the root of the weighed mean-square error, see
+    ``start_error_rms`` that where the search on all records began: at the linear start, or where iterations on a few
+    of them have led. ``amplitudes`` is the rms drive of each class of records of one amplitude and ``classes`` the
+    class of each record. ``costs`` is the root of the weighed mean-square error, see
     `fit_hysteretic_stiffness`, at the start and after each iteration. ``poles_rad_s`` are those at rest, and
     ``poles_error_rad_s`` their standard errors (real and imaginary part as a complex number), with ``delay_error_s``.
     These count each record as one independent draw of drive, noise and distortion (cluster-robust sandwich): they say
     how far another set of such records would move the estimate, and nothing about what the model leaves out. With few
-    records they are rough, and nan for a single one per amplitude.
+    records they are rough, and nan for a single one per amplitude. ``names`` are those of all numbers as in a mirror
+    file, the delay last, and ``moved`` (records, numbers) a root of their covariance in SI units, moved.T @ moved, None
+    for a single record per amplitude. ``held`` says that the search ended where a step would have run away.
     """
 
     mirror: Mirror
@@ -102,6 +110,9 @@ class HystereticStiffnessFit:
     costs: tuple[float, ...]
     iterations: int
     converged: bool
+    held: bool
+    names: tuple[str, ...]
+    moved: Floats | None
 
 
 def simulate_hysteretic_stiffness(fit: HystereticStiffnessFit, drive: Floats) -> Floats:
@@ -145,6 +156,7 @@ def fit_hysteretic_stiffness(
     options: StiffnessOptions = DEFAULTS,
     skip_periods: int = 0,
     iterations: int = 40,
+    start: LinearStart | None = None,
     on_progress: Progress | None = None,
 ) -> HystereticStiffnessFit:
     """Fit one mirror to periodic multisines of several amplitudes, any number of inputs and outputs.
@@ -165,6 +177,7 @@ def fit_hysteretic_stiffness(
         options: What is fitted and how.
         skip_periods: First periods of each record that are dropped as transient.
         iterations: Largest number of iterations.
+        start: Linear model to begin with, which then gives the order; by default that of the middle amplitude.
         on_progress: Called with the iterations done, their largest number, and the error.
 
     Raises:
@@ -177,14 +190,21 @@ def fit_hysteretic_stiffness(
     units = _unit(records, "drive"), _unit(records, "output")
     steady = [_steady(r, units, options.sub_steps, skip_periods) for r in records]
     groups = [[r for r, c in zip(records, classes, strict=True) if c == own] for own in range(len(amplitudes))]
-    start = _start(groups, amplitudes, classes, order, options, skip_periods)
-    start = _with_thresholds(scaled(start, 1 / units[0], 1 / units[1]), steady, options.thresholds)
+    numbers = _start(groups, (amplitudes, classes), order, options, skip_periods, start)
+    numbers = _with_thresholds(scaled(numbers, 1 / units[0], 1 / units[1]), steady, options.thresholds)
     squares, group = np.array([np.mean(r.output**2) for r in steady]), np.asarray(classes)
     outputs = np.sqrt([np.mean(squares[group == c]) for c in range(len(amplitudes))])
     levels = _levels(groups, outputs, units[1], skip_periods)
-    search = _Search(steady, classes, levels, fixed_delay=options.delay_s is not None)
+    few = [classes.index(c) for c in range(len(amplitudes))]
+    every = range(len(steady))
+    stages = [(few, options.few_first), (every, iterations)] if options.few_first else [(every, iterations)]
+    report, done = on_progress or no_progress, 0
     with ThreadPoolExecutor(min(len(steady), os.cpu_count() or 1)) as pool:
-        search.minimise(balanced(start), pool, iterations, options.tolerance, on_progress or no_progress)
+        for used, most in stages:
+            search = _Search([steady[k] for k in used], [classes[k] for k in used], levels, options.delay_s is not None)
+            told = partial(_report, report, done, iterations + options.few_first)
+            search.minimise(balanced(numbers), pool, most, options.tolerance, told)
+            numbers, done = search.numbers, done + most
     if (growth := search.numbers.growth_1_s) >= 0.0:
         raise IdentificationError(
             f"the fitted mirror runs away: where its plays slide it grows by {growth:.3g} 1/s, whatever the drive; fit "
@@ -193,20 +213,26 @@ def fit_hysteretic_stiffness(
     return _result(search, units, amplitudes, records[0].rate_hz)
 
 
+def _report(on_progress: Progress, before: int, total: int, done: int, _: int, text: str) -> None:
+    """Steps done of one stage as those of all."""
+    on_progress(before + done, total, text)
+
+
 def _start(
     groups: Sequence[Sequence[Recording]],
-    amplitudes: Sequence[float],
-    classes: Sequence[int],
+    classes: tuple[Sequence[float], Sequence[int]],
     order: int,
     options: StiffnessOptions,
     skip_periods: int,
+    given: LinearStart | None,
 ) -> Numbers:
-    """Linear model of the middle amplitude with operators of next to no weight."""
-    size = np.log(amplitudes)
-    middle = int(np.argmin(np.abs(size - np.mean(size[np.asarray(classes)]))))
-    response = response_from_periods(groups[middle], skip_periods=skip_periods)
-    model, late_s = linear_start(response, order, options.sub_steps, options.delay_s, options.exchanges)
-    return starting_numbers(model, late_s, options.sources, response.excited_hz[0], len(options.thresholds))
+    """A linear model, given or of the middle amplitude, with operators of next to no weight."""
+    size = np.log(classes[0])
+    middle = int(np.argmin(np.abs(size - np.mean(size[np.asarray(classes[1])]))))
+    if given is None:
+        response = response_from_periods(groups[middle], skip_periods=skip_periods)
+        given = linear_start(response, order, options.sub_steps, options.delay_s, options.exchanges)
+    return starting_numbers(given, options.sources, len(options.thresholds))
 
 
 # --------------------------------------------------------------------------------------------------------- the records
@@ -310,7 +336,7 @@ class _Search:
         self.start_error = np.zeros(len(steady))
         self.converged = False
         self.held = False
-        """Whether a trial of the last step was refused because it would run away."""
+        """Whether the last step was shortened, or a trial of it refused, because it would run away."""
 
     def minimise(
         self, start: Numbers, pool: ThreadPoolExecutor, iterations: int, tolerance: float, on_progress: Progress
@@ -365,10 +391,12 @@ class _Search:
         free[-1] = not self.fixed_delay
         size = np.sqrt(np.diag(matrix) + self._floors(np.diag(matrix)))[free]
         scaled_matrix = matrix[np.ix_(free, free)] / np.outer(size, size)
-        cost = self.costs[-1] ** 2
+        cost, growths = self.costs[-1] ** 2, self.numbers.growths()
+        bounds = np.array([-0.5 * growth.rate_1_s for growth in growths]), np.array([g.slope[free] for g in growths])
         for _ in range(_TRIALS):
             move = np.zeros(gradient.size)
-            move[free] = -np.linalg.solve(scaled_matrix + damping * np.eye(size.size), gradient[free] / size) / size
+            move[free], bounded = _bounded_move((scaled_matrix, gradient[free], size), damping, bounds)
+            self.held = self.held or bounded
             trial = self.numbers.at(self.numbers.vector() + move)
             if self._cost(trial, pool) < cost:
                 self.numbers = balanced(trial)
@@ -399,17 +427,55 @@ class _Search:
         return floors
 
 
+def _bounded_move(
+    system: tuple[Floats, Floats, Floats], damping: float, bounds: tuple[Floats, Floats]
+) -> tuple[Floats, bool]:
+    """A damped step that, to first order, takes no pole further than half of its way to zero; whether one held it.
+
+    Args:
+        system: Normal matrix, scaled by the size of each number, gradient and sizes.
+        damping: What is added to the diagonal.
+        bounds: Of each pole, how far it may rise in 1/s, and its derivative by each number.
+    """
+    matrix, gradient, size = system
+    inverse = np.asarray(np.linalg.inv(matrix + damping * np.eye(size.size)), dtype=np.float64)
+    room: Floats = np.maximum(bounds[0], 1e-9)
+    slopes = np.asarray(bounds[1] / size, dtype=np.float64)
+    free: Floats = np.asarray(-(inverse @ (gradient / size)), dtype=np.float64)
+    move: np.ndarray = free
+    active: list[int] = []
+    for _ in range(_BOUNDS):
+        beyond = (slopes @ move - room) / room
+        worst = int(np.argmax(beyond))
+        if beyond[worst] <= 1e-6:
+            break
+        active, pull = _pulls([*active, worst], slopes, inverse, np.asarray(slopes @ free - room))
+        move = free - inverse @ (slopes[active].T @ pull)
+    return np.asarray(move / size), bool(active)
+
+
+def _pulls(active: list[int], slopes: Floats, inverse: Floats, beyond: np.ndarray) -> tuple[list[int], Floats]:
+    """How hard each bound pulls on a step so that all are met, without those that would push."""
+    while True:
+        own = slopes[active]
+        pull = np.asarray(np.linalg.lstsq(own @ inverse @ own.T, beyond[active], rcond=1e-9)[0], dtype=np.float64)
+        if (pull >= 0.0).all():
+            return active, pull
+        active = [k for k, p in zip(active, pull, strict=True) if p >= 0.0]
+
+
 def _result(
     search: _Search, units: tuple[float, float], amplitudes: tuple[float, ...], rate_hz: float
 ) -> HystereticStiffnessFit:
-    numbers = search.numbers
-    decay, frequency, delay = _standard_errors(search)
-    poles_error = decay.astype(complex)
-    poles_error[: frequency.size] += 1j * frequency
+    numbers, moved = search.numbers, _moved(search)
+    modes, pairs = numbers.decay.size, numbers.frequency.size
+    error = np.full(numbers.vector().size, np.nan) if moved is None else np.sqrt(np.sum(moved**2, axis=0))
+    poles_error = error[:modes].astype(complex)
+    poles_error[:pairs] += 1j * error[modes : modes + pairs]
     return HystereticStiffnessFit(
         mirror=scaled(numbers, *units).mirror("identified"),
         delay_s=numbers.delay_s,
-        delay_error_s=delay,
+        delay_error_s=float(error[-1]),
         rate_hz=rate_hz,
         sub_steps=search.steady[0].sub_steps,
         order=int(numbers.B.shape[0]),
@@ -424,14 +490,16 @@ def _result(
         costs=tuple(search.costs),
         iterations=len(search.costs) - 1,
         converged=search.converged,
+        held=search.held,
+        names=numbers.names,
+        moved=None if moved is None else _in_si(numbers, moved, units),
     )
 
 
-def _standard_errors(search: _Search) -> tuple[Floats, Floats, float]:
-    """Cluster-robust standard errors of decays, frequencies and delay; nan with a single record in an amplitude."""
-    modes, pairs = search.numbers.decay.size, search.numbers.frequency.size
+def _moved(search: _Search) -> Floats | None:
+    """Root of the cluster-robust covariance, shape (records, numbers); None with a single record in an amplitude."""
     if int(np.bincount(np.asarray(search.classes)).min()) < 2:
-        return np.full(modes, np.nan), np.full(pairs, np.nan), math.nan
+        return None
     matrix, total = search.normal_equations()
     size = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
     inverse = np.linalg.pinv(matrix / np.outer(size, size), rcond=1e-6, hermitian=True) / np.outer(size, size)
@@ -440,6 +508,12 @@ def _standard_errors(search: _Search) -> tuple[Floats, Floats, float]:
     )
     count = len(search.parts)
     moved = pulls @ inverse * math.sqrt(count / (count - 1))
-    error = np.sqrt(np.sum(moved**2, axis=0))
-    last = 0.0 if search.fixed_delay else float(error[-1])
-    return error[:modes], error[modes : modes + pairs], last
+    moved[:, -1] *= not search.fixed_delay
+    return np.asarray(moved)
+
+
+def _in_si(numbers: Numbers, moved: Floats, units: tuple[float, float]) -> Floats:
+    """Changes of all numbers, in the search's units, as changes of the numbers of a mirror file in SI units."""
+    rows = np.array([scaled(numbers.at(row), *units).vector() for row in moved])
+    rows[:, : numbers.decay.size] *= -1.0  # a file's decay is above 0
+    return rows

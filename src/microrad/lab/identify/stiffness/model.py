@@ -10,7 +10,7 @@ Two scales are not: that of each mode (its state) and that of each operator (z).
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -25,6 +25,21 @@ from microrad.mirror.model import Mirror
 HysteresisSource = Literal["strain", "drive"]
 
 FIELDS = ("decay", "frequency", "B", "E", "F", "G", "weights", "C", "D", "K")
+
+
+class LinearStart(NamedTuple):
+    """A linear model behind a delay, for a drive that is straight over each step; and the lowest excited frequency."""
+
+    model: ModalModel
+    delay_s: float
+    lowest_hz: float
+
+
+class Growth(NamedTuple):
+    """Real part of a pole (1/s), and its derivative by each of the numbers."""
+
+    rate_1_s: float
+    slope: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +95,18 @@ class Numbers:
         return replace(self, **parts, delay_s=float(vector[start]))
 
     @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the numbers of `vector` as in a mirror file, see `mirror.coupled.Known`."""
+        modes = range(1, self.decay.size + 1)
+        found = [f"modes.decay.{k}" for k in modes] + [f"modes.frequency.{k}" for k in modes[: self.frequency.size]]
+        for name in ("B", "E", "F", "G"):
+            found += [f"matrices.{name}.{i + 1}.{j + 1}" for i, j in np.ndindex(getattr(self, name).shape)]
+        found += [f"hysteresis.{i + 1}.weights.{j + 1}" for i, j in np.ndindex(self.weights.shape)]
+        for name in ("C", "D", "K"):
+            found += [f"matrices.{name}.{i + 1}.{j + 1}" for i, j in np.ndindex(getattr(self, name).shape)]
+        return (*found, "recording.delay")
+
+    @property
     def growth_1_s(self) -> float:
         """Largest real part of a pole, the plays of each operator all stuck or all sliding.
 
@@ -87,6 +114,36 @@ class Numbers:
         large drive starts what no drive stops; see `lti.growth_1_s`.
         """
         return lti.growth_1_s(self.mirror("").A, self.E, self.F, self.weights.sum(axis=1))
+
+    def growths(self) -> list["Growth"]:
+        """The fastest-growing pole of each combination of operators that slide, and how each number moves it.
+
+        With left and right vectors l and r of a pole p of M = A + E W F, dp = l* dM r / l* r.
+        """
+        from scipy.linalg import eig
+
+        sums, A, first = self.weights.sum(axis=1), self.mirror("").A, self.rows
+        found, pairs = [], self.frequency.size
+        for case in lti.sliding_cases(sums.size):
+            slope = case * sums
+            poles, left, right = eig(A + (self.E * slope) @ self.F, left=True)
+            k = int(np.argmax(poles.real))
+            size = left[:, k].conj() @ right[:, k]
+            P = (left[:, k].conj()[:, None] * right[:, k] / (size if size else 1e-300)).real
+            second = [row + 1 for row in first[:pairs]]
+            decay = P[first, first]
+            decay[:pairs] += P[second, second]
+            through = np.einsum("ie,ij,ej->e", self.E, P, self.F) * case
+            parts = {
+                "decay": decay,
+                "frequency": P[second, first[:pairs]] - P[first[:pairs], second],
+                "E": (P @ self.F.T) * slope,
+                "F": (self.E.T @ P) * slope[:, None],
+                "weights": np.repeat(through[:, None], self.weights.shape[1], axis=1),
+            }
+            each = [parts.get(name, np.zeros_like(getattr(self, name))).ravel() for name in FIELDS]
+            found.append(Growth(float(poles[k].real), np.concatenate([*each, [0.0]])))
+        return found
 
     def mirror(self, name: str) -> Mirror:
         """The mirror in the plant form, without its delay."""
@@ -144,8 +201,8 @@ def balanced(numbers: Numbers) -> Numbers:
 # ---------------------------------------------------------------------------------------------------------- the start
 def linear_start(
     response: FrequencyResponse, order: int, sub_steps: int, delay_s: float | None, exchanges: int
-) -> tuple[ModalModel, float]:
-    """Linear model behind a pure delay, and the delay in s.
+) -> LinearStart:
+    """Linear model behind a pure delay.
 
     The drive is taken as straight over each of the steps of a sample.
 
@@ -157,33 +214,40 @@ def linear_start(
         exchanges: Largest number of modes exchanged in the fit of the model.
     """
 
-    def behind(late_s: float) -> FrequencyResponse:
-        ahead = np.exp(2j * np.pi * response.freq_hz * late_s)[:, None, None]
-        values = np.asarray(response.response * ahead)
-        return replace(response, response=values, hold="first-order", rate_hz=sub_steps * response.rate_hz)
-
     if delay_s is None:
         tried = [late / response.rate_hz for late in np.arange(0.0, 2.01, 0.25)]
-        costs = [fit_order(behind(late), order, exchanges=0, fine=False).cost for late in tried]
+        behind = [without_delay(response, late, sub_steps) for late in tried]
+        costs = [fit_order(each, order, exchanges=0, fine=False).cost for each in behind]
         delay_s = tried[int(np.argmin(costs))]
-    return fit_order(behind(delay_s), order, exchanges=exchanges).model, delay_s
+    model = fit_order(without_delay(response, delay_s, sub_steps), order, exchanges=exchanges).model
+    return LinearStart(model, delay_s, response.excited_hz[0])
 
 
-def starting_numbers(
-    model: ModalModel, delay_s: float, sources: Sequence[HysteresisSource], lowest_hz: float, plays: int
-) -> Numbers:
+def without_delay(response: FrequencyResponse, delay_s: float, sub_steps: int) -> FrequencyResponse:
+    """The response of what is behind a delay, to a drive that is straight over each step of the plant.
+
+    Args:
+        response: The measured response.
+        delay_s: The delay, in s.
+        sub_steps: Steps of the plant in each sample.
+    """
+    ahead = np.exp(2j * np.pi * response.freq_hz * delay_s)[:, None, None]
+    values = np.asarray(response.response * ahead)
+    return replace(response, response=values, hold="first-order", rate_hz=sub_steps * response.rate_hz)
+
+
+def starting_numbers(start: LinearStart, sources: Sequence[HysteresisSource], plays: int) -> Numbers:
     """Numbers to begin with: a linear model, and for each actuator and source an operator of next to no weight.
 
     Each operator acts as the drive of its actuator does. The strain of the actuators is what, at low frequency, the
     drive makes of them: q = M y with M the (pseudo-)inverse of the quasi-static gain. Thresholds are left at zero.
 
     Args:
-        model: The linear model.
-        delay_s: The delay in front of it, in s.
+        start: The linear model and its delay. The quasi-static gain is its mean from the lowest excited frequency on.
         sources: What drives the operators: the strain of the actuators or their drive.
-        lowest_hz: Lowest frequency of the recordings, in Hz, at which the quasi-static gain begins to be averaged.
         plays: Number of plays in each operator.
     """
+    model, delay_s, lowest_hz = start
     pairs = np.flatnonzero(model.poles_rad_s.imag != 0)
     real = np.flatnonzero(model.poles_rad_s.imag == 0)
     b, c, poles = model.input_vectors, model.output_vectors, model.poles_rad_s

@@ -1,0 +1,342 @@
+"""The ladder for several channels: what it chooses, what it hands on bit for bit, how it stops, what it refuses."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.linalg import block_diag
+
+from microrad.core import kernels
+from microrad.core.periodic import delayed
+from microrad.lab.identify.coupled import hysteretic, identify_coupled, linear, linear_errors
+from microrad.lab.identify.coupled.held_out import held_out_error, smallest_within_noise
+from microrad.lab.identify.coupled.ladder import LadderOptions
+from microrad.lab.identify.linear.modal import ModalModel
+from microrad.lab.identify.linear.response import response_from_periods
+from microrad.lab.identify.records import IdentificationError
+from microrad.lab.identify.stiffness.fit import amplitude_classes
+from microrad.lab.recording import Recording, multisine_recordings
+from microrad.mirror import coupled
+from microrad.mirror import model as mirror
+from microrad.mirror.hysteresis import Play
+from microrad.mirror.model import Mirror
+from microrad.mission.file import load_coupled_mirror
+from places import DATA
+
+CUBESPEC = DATA / "cubespec"
+needs_cubespec = pytest.mark.skipif(not CUBESPEC.exists(), reason=f"real recording cubespec absent: {CUBESPEC}")
+RATE_HZ, PERIOD = 1000.0, 512
+ORDERS = LadderOptions(axis_orders=(2,), linear_orders=(2, 4), stiffness_orders=(4,))
+
+
+def philox(seed):
+    return np.random.Generator(np.random.Philox(seed))
+
+
+def multisine(seed):
+    """Random-phase multisine of unit rms on 200 lines, two drives."""
+    spectrum = np.zeros((PERIOD // 2 + 1, 2), dtype=complex)
+    spectrum[1:201] = np.exp(1j * philox(seed).uniform(0, 2 * np.pi, (200, 2)))
+    drive = np.fft.irfft(spectrum, PERIOD, axis=0)
+    return drive / drive.std(axis=0)
+
+
+def truth(hysteresis):
+    """Two modes, two drives, two angles; each actuator is a spring that softens by plays of its own strain."""
+    A = block_diag(*([[s, -w], [w, s]] for s, w in ((-18.0, 900.0), (-34.0, 1700.0))))
+    B = np.array([[0.0, 0.0], [-700.0, -600.0], [0.0, 0.0], [-800.0, 900.0]])
+    C = 1e-5 * np.array([[1.0, 0.0, 0.7, 0.0], [0.8, 0.0, -0.8, 0.0]])
+    strain = np.linalg.inv(-C @ np.linalg.solve(A, B)) @ C
+    play = Play((0.1, 0.3, 0.8, 2.0), (0.01 * hysteresis,) * 4)
+    idle = Play((1.0,), (0.0,))  # as many operators as the fit has: then the kernel compiles once
+    E, F, G = np.hstack([B, B]), np.vstack([strain, strain]), np.zeros((4, 2))
+    D = 1e-6 * np.array([[2.0, 1.0], [1.0, -2.0]])  # without one, a direct term stands in for a part of the delay
+    return Mirror("truth", A, B, E, F, G, C, D, np.zeros((2, 4)), (), (play, play, idle, idle), ())
+
+
+def record_of(plant, amplitude, seed, noise, steps):
+    """Two periods in the steady state, behind 0.7 ms, with steps of its own."""
+    drive = amplitude * multisine(seed)
+    fine = delayed(np.tile(drive, (4, 1)), RATE_HZ, 7e-4, steps)
+    discrete = mirror.discretise(plant, 1 / (steps * RATE_HZ))
+    output = np.empty_like(fine)
+    kernels.open_loop(discrete, mirror.at_rest(discrete), fine, output, np.empty((fine.shape[0], 0)))
+    output = output[2 * steps * PERIOD :: steps]
+    output = output + noise * output.std() * philox(1000 + seed).standard_normal(output.shape)
+    names = ("u0", "u1"), ("x", "y")
+    return Recording(f"{amplitude:g} V, {seed}", f"{seed}", np.tile(drive, (2, 1)), output, RATE_HZ, *names, PERIOD)
+
+
+def records(hysteresis, noise, steps=8):
+    plant = truth(hysteresis)
+    return [
+        record_of(plant, amplitude, 10 * i + k, noise, steps)
+        for i, amplitude in enumerate((0.4, 1.2))
+        for k in range(4)
+    ]
+
+
+@pytest.fixture(scope="module")
+def hysteretic_records():
+    return records(1.0, 1e-3)
+
+
+@pytest.fixture(scope="module")
+def found(hysteretic_records):
+    told, heard = [], []
+    result = identify_coupled(
+        hysteretic_records,
+        output_unit="rad",
+        options=ORDERS,
+        on_progress=lambda done, total, what: told.append((done, total, what)),
+        on_model=heard.append,
+    )
+    return result, told, heard
+
+
+# ----------------------------------------------------------------------------------------------------------- the choice
+def test_hysteretic_stiffness_is_found_where_it_is(found):
+    result, _, _ = found
+    names = [candidate.name for candidate in result.candidates]
+    assert names == [
+        "per axis, order 2 each",
+        "coupled linear, order 2",
+        "coupled linear, order 4",
+        "hysteretic stiffness, order 4",
+    ]
+    assert result.chosen == names[-1] == result.best.name
+    axis, _, straight, own = result.candidates
+    assert 1e-3 < own.error_share < 0.3 * straight.error_share < 0.3 * axis.error_share
+    assert axis.parameters < straight.parameters < own.parameters
+    assert result.held_out == ("0.4 V, 3", "1.2 V, 13")
+    assert len(result.fitted) == 6 and not set(result.fitted) & set(result.held_out)
+    assert f"{100 * own.error_share:.3g} % of the output" in result.reason and "less than any other" in result.reason
+    assert not result.stopped and result.refused == ()
+
+
+def test_errors_are_rms_by_amplitude_output_and_band(found, hysteretic_records):
+    result, _, _ = found
+    own = result.candidate()
+    np.testing.assert_allclose(result.amplitudes_v, (0.4, 1.2), rtol=1e-3)
+    held = [record for record in hysteretic_records if record.path in result.held_out]
+    errors = np.array([held_out_error(own.model, record).std(axis=0) for record in held])
+    np.testing.assert_allclose(own.error_rms, errors, rtol=1e-9)
+    np.testing.assert_allclose(own.record_share, errors / [r.output.std(axis=0) for r in held], rtol=1e-9)
+    np.testing.assert_allclose(own.error_share, np.sqrt(np.mean(own.record_share**2)), rtol=1e-9)
+    inside = np.sum(own.band_error_rms**2, axis=1)
+    assert (0.3 * own.error_rms**2 < inside).all() and (inside < 1.0001 * own.error_rms**2).all()
+    np.testing.assert_allclose(result.noise_rms / result.output_rms, 1e-3, rtol=0.3)
+    assert result.bands_hz.size == own.band_error_rms.shape[1] + 1
+
+
+def test_the_linear_model_is_enough_where_the_truth_is_linear():
+    result = identify_coupled(records(0.0, 1e-2, linear.STEPS), output_unit="rad", options=ORDERS)
+    assert result.chosen == "coupled linear, order 4"
+    own, other = result.candidate(), result.candidates[-1]
+    assert other.kind == "hysteretic stiffness"
+    assert own.error_share == pytest.approx(1e-2, rel=0.2)
+    assert own.name in result.within_noise
+    known = own.model.known
+    index = known.parameters.index("recording.delay")
+    assert abs(own.model.delay_s - 7e-4) < 5 * own.delay_error_s < 1e-4
+    assert known.standard_errors[index] == pytest.approx(own.delay_error_s)
+    poles = own.poles_rad_s[np.argsort(own.poles_rad_s.imag)]
+    away = poles - np.array([-18 + 900j, -34 + 1700j])
+    size = own.poles_error_rad_s[np.argsort(own.poles_rad_s.imag)]
+    assert (np.abs(away.real) < 5 * size.real).all() and (np.abs(away.imag) < 5 * size.imag).all()
+    assert (size.real < 1.0).all() and (size.imag < 1.0).all()
+
+
+def test_the_smaller_model_wins_unless_the_difference_is_certain():
+    class Own:
+        def __init__(self, losses):
+            self.losses, self.share = (losses,), float(np.sqrt(losses.mean()))
+
+    noise = philox(0).standard_normal(400)
+    small, large = Own((1.001 * noise) ** 2 + 1e-3 * philox(1).standard_normal(400) ** 2), Own(noise**2)
+    assert smallest_within_noise([small, large], [10, 20])[:2] == (1, 1)
+    near = Own((noise + 0.01 * philox(2).standard_normal(400)) ** 2)
+    assert smallest_within_noise([near, large], [10, 20])[0] == 0
+
+
+# ---------------------------------------------------------------------------------------------------- what is handed on
+def test_the_model_is_the_fit_and_the_file_is_the_model(found, tmp_path):
+    result, _, _ = found
+    for candidate in result.candidates:
+        text = coupled.text(candidate.model, ["of a test"])
+        read = coupled.of(load_coupled_mirror(tmp_path / "mirror.toml", text=text))
+        drive = np.tile(multisine(77), (2, 1))
+        np.testing.assert_array_equal(read.response(drive), candidate.model.response(drive))
+        assert read.known.parameters == candidate.model.known.parameters
+        assert np.abs(read.response(drive)).max() > 0
+
+
+def test_errors_of_the_hysteretic_fit_come_from_its_records(found):
+    own = found[0].candidate()
+    known = own.model.known
+    assert known.factor.shape == (len(known.parameters), 6)  # one column a record
+    np.testing.assert_allclose(np.linalg.norm(known.factor, axis=1), 1.0)
+    place = known.parameters.index("modes.frequency.1")
+    assert known.standard_errors[place] == pytest.approx(own.poles_error_rad_s[0].imag)
+    assert 0 < known.standard_errors[place] < 5.0
+    assert "hysteresis.1.weights.2" in known.parameters
+
+
+def test_each_amplitude_has_its_response_and_the_models(found):
+    result, _, _ = found
+    for response, modelled in zip(result.responses, result.modelled, strict=True):
+        assert response.response.shape == modelled.shape == (200, 2, 2)
+        away = np.linalg.norm(modelled - response.response) / np.linalg.norm(response.response)
+        assert away < 0.05
+    assert result.dependence.resonance_shift_hz < -0.1 and result.dependence.gain_rise_percent > 0.0
+
+
+def test_derivatives_of_a_linear_model_against_differences(hysteretic_records):
+    response = linear.without_delay(response_from_periods(hysteretic_records), 7e-4, linear.STEPS)
+    poles = np.array([-40.0, -20.0 + 900.0j, -30.0 + 1500.0j])
+    b = np.array([[1.0, 2.0], [0.5 + 1.0j, -1.0 + 0.3j], [0.2 - 0.1j, 0.8 + 0.4j]])
+    c = np.array([[0.5, 1.0 - 0.2j, 0.3 + 0.1j], [-1.0, 0.4 + 0.6j, 0.7 - 0.5j]])
+    direct = np.array([[0.1, 0.2], [-0.3, 0.05]])
+    exact = linear_errors.jacobian(ModalModel(poles, b, c, direct), response, slice(0, 200, 20))
+    plant = linear.side_by_side([ModalModel(poles, b, c, direct)])
+    theta = np.concatenate([-poles.real, poles[1:].imag, plant.B.ravel(), plant.C.ravel(), direct.ravel(), [0.0]])
+    names = linear_errors.names(ModalModel(poles, b, c, direct), range(2), range(2))
+    assert len(names) == theta.size == exact.shape[3]
+    freq = response.freq_hz[slice(0, 200, 20)]
+
+    def modelled(values):
+        decay, wide, B, C, D, late = np.split(values, np.cumsum([3, 2, 10, 10, 4]))
+        B, C = B.reshape(5, 2), C.reshape(2, 5)
+        p = -decay + 1j * np.array([0.0, *wide])
+        own = ModalModel(
+            p,
+            np.array([B[0], B[1] + 1j * B[2], B[3] + 1j * B[4]]),
+            np.stack([C[:, 0], (C[:, 1] - 1j * C[:, 2]) / 2, (C[:, 3] - 1j * C[:, 4]) / 2], axis=1),
+            D.reshape(2, 2),
+        )
+        turned = np.exp(-2j * np.pi * freq * late)[:, None, None]
+        return own.response(freq, response.hold, response.rate_hz) * turned
+
+    for k, name in enumerate(names):
+        step = np.zeros(theta.size)
+        step[k] = 1e-8 if name == "recording.delay" else 1e-6 * max(abs(theta[k]), 1e-3)
+        expected = (modelled(theta + step) - modelled(theta - step)) / (2 * step[k])
+        assert np.abs(expected).max() > 0
+        np.testing.assert_allclose(exact[..., k], expected, rtol=0, atol=1e-5 * np.abs(expected).max(), err_msg=name)
+
+
+# ------------------------------------------------------------------------------------------- progress, and how it stops
+def test_progress_names_the_best_model_so_far(found):
+    result, told, heard = found
+    assert [candidate.name for candidate in heard] == [candidate.name for candidate in result.candidates]
+    assert told[0] == (0, 4, "delay") and told[-1][:2] == (4, 4)
+    assert all(done <= total for done, total, _ in told)
+    iterations = [what for _, _, what in told if "iteration" in what]
+    assert "hysteretic stiffness, order 4, iteration 1 of 19; best so far coupled linear, order 4: " in iterations[0]
+
+
+def test_stopped_it_returns_what_was_found(hysteretic_records):
+    def stop(candidate):
+        if candidate.kind == "coupled linear":
+            raise KeyboardInterrupt
+
+    result = identify_coupled(hysteretic_records, output_unit="rad", options=ORDERS, on_model=stop)
+    assert result.stopped and len(result.candidates) == 2
+    assert result.chosen in {candidate.name for candidate in result.candidates}
+
+    def at_once(*_):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        identify_coupled(hysteretic_records, output_unit="rad", options=ORDERS, on_progress=at_once)
+
+
+# ------------------------------------------------------------------------------------------------------------- refusals
+SHORT = LadderOptions(axis_orders=(), linear_orders=(4,), stiffness_orders=(4,))
+
+
+def test_one_amplitude_leaves_linear_models(hysteretic_records):
+    result = identify_coupled(hysteretic_records[:4], output_unit="rad", options=SHORT)
+    assert result.chosen == "coupled linear, order 4"
+    (refused,) = result.refused
+    assert refused.model == "hysteretic stiffness" and "one amplitude, 0.4 V rms" in refused.reason
+    assert result.dependence is None
+
+
+def test_chirps_of_each_drive_give_linear_models(hysteretic_records):
+    time = np.arange(4096) / RATE_HZ
+    chirp = np.sin(2 * np.pi * (5.0 * time + 40.0 * time**2)) * np.minimum(1.0, 20 * np.minimum(time, time[-1] - time))
+    made = []
+    plant = coupled.CoupledMirror(truth(0.0), *(identify_actuators(hysteretic_records)), 7e-4, RATE_HZ, 2, (1.0, 400.0))
+    for k in range(4):
+        drive = np.zeros((4096, 2))
+        drive[:, k % 2] = (0.5 + 0.1 * (k // 2)) * chirp
+        output = plant.response(drive)
+        output = output + 1e-3 * output.std() * philox(k).standard_normal(output.shape)
+        made.append(Recording(f"chirp {k}", f"chirp {k}", drive, output, RATE_HZ, ("u0", "u1"), ("x", "y")))
+    result = identify_coupled(made[:2], validation=made[2:], output_unit="rad", options=SHORT)
+    assert result.held_out == ("chirp 2", "chirp 3")
+    assert result.candidate().error_share < 0.1
+    assert "no record is periodic" in result.refused[0].reason
+    with pytest.raises(IdentificationError, match="none can be held out to judge the models by"):
+        identify_coupled(made[:2], output_unit="rad", options=SHORT)
+    with pytest.raises(IdentificationError, match=r"chirp 0: of this record and .* one is periodic"):
+        identify_coupled([hysteretic_records[0], made[0]], output_unit="rad")
+
+
+def identify_actuators(given):
+    actuators = tuple(coupled.Actuator(name, 0.0, -1.0, 1.0, 1e3) for name in given[0].input_names)
+    return actuators, tuple(coupled.Output(name, "angle") for name in given[0].output_names)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"rate_hz": 2000.0}, r"0\.4 V, 1: the sample rate is 2000 Hz and that of 0\.4 V, 0 1000 Hz"),
+        ({"output": np.zeros((1024, 3)), "output_names": ("x", "y", "z")}, r"0\.4 V, 1: 2 inputs and 3 outputs"),
+        ({"period_samples": 256}, r"0\.4 V, 1: 1024 samples in periods of 256, where 0\.4 V, 0 has 1024 samples in"),
+        (
+            {"drive": np.zeros((512, 2)), "output": np.zeros((512, 2))},
+            r"0\.4 V, 1: 512 samples in periods of 512, where 0\.4 V, 0 has 1024 samples .* cut all records",
+        ),
+        ({"drive": np.zeros((1024, 2))}, r"0\.4 V, 1: the drive does not change"),
+    ],
+)
+def test_records_that_do_not_belong_together_are_named(hysteretic_records, change, message):
+    first, second, *rest = hysteretic_records
+    with pytest.raises(IdentificationError, match=message):
+        identify_coupled([first, replace(second, **change), *rest], output_unit="rad")
+
+
+def test_other_things_that_cannot_be(hysteretic_records):
+    with pytest.raises(IdentificationError, match="no recording was given"):
+        identify_coupled([])
+    with pytest.raises(IdentificationError, match="output unit 'inch' is not known"):
+        identify_coupled(hysteretic_records, output_unit="inch")
+    with pytest.raises(IdentificationError, match="input unit 'kV' is not known"):
+        identify_coupled(hysteretic_records, drive_unit="kV", output_unit="rad")
+    with pytest.raises(IdentificationError, match=r"1 positions for 2 outputs \(x, y\)"):
+        identify_coupled(hysteretic_records, output_unit="m", positions_m=[(0.0, 1.0)])
+    with pytest.raises(IdentificationError, match=r"2 records for 2 actuators: 1 held out .* leave 1, and at least 2"):
+        identify_coupled(hysteretic_records[:2], output_unit="rad")
+
+
+# ------------------------------------------------------------------------------------------------------------- CubeSpec
+@needs_cubespec
+def test_the_ladder_on_cubespec(monkeypatch):
+    """Four realisations, four states and few iterations: the choice needs hysteresis already."""
+    monkeypatch.setattr(hysteretic, "FEW", 3)
+    monkeypatch.setattr(hysteretic, "ALL", 1)
+
+    def of(amplitude_mv):
+        drive, output = (np.load(CUBESPEC / f"{name}_{amplitude_mv}mV_train.npy")[:, :, :4] for name in "uy")
+        return multisine_recordings(drive, output, 6400.0, f"{amplitude_mv} mV")
+
+    every = [*of(100), *of(300)]
+    options = LadderOptions(axis_orders=(), linear_orders=(), stiffness_orders=(4,))
+    result = identify_coupled(every, options=options)
+    assert result.held_out == ("100 mV realisation 3", "300 mV realisation 3")
+    straight, own = result.candidates
+    assert result.chosen == own.name == "hysteretic stiffness, order 4"
+    assert 0.2 < own.error_share < 0.98 * straight.error_share < 0.6
+    assert amplitude_classes(every)[1] == (0, 0, 0, 0, 1, 1, 1, 1)
