@@ -93,14 +93,26 @@ class SiRecord:
     start: int
 
     @cached_property
-    def own(self) -> Floats:
-        """What a fit leaves to the record itself, an offset and its `memory`, as orthonormal columns.
+    def _own(self) -> tuple[NDArray[np.intp], NDArray[np.intp], Floats]:
+        """Stretches in which the drive sweeps nothing new, and orthonormal columns of an offset and the memory.
 
-        The shape is (used samples, columns).
+        They are the first used sample of each, its length, and the row that all its samples have in the columns.
         """
-        return orthonormal(
-            np.column_stack([np.ones(self.drive_v.size), memory(self.drive_v, self.drive_v.size)])[self.start :]
-        )
+        swept = _swept(self.drive_v)[self.start :]
+        starts = np.flatnonzero(np.diff(swept, prepend=-1.0))
+        lengths = np.diff(starts, append=swept.size)
+        ramps = memory(self.drive_v, self.drive_v.size)[self.start :][starts]
+        root = np.sqrt(lengths)[:, None]
+        return starts, lengths, orthonormal(root * np.column_stack([np.ones(starts.size), ramps])) / root
+
+    def less_own(self, values: Floats) -> Floats:
+        """Values over the used samples less what a fit leaves to the record itself: an offset, and its `memory`.
+
+        Args:
+            values: Shape (used samples,) or (used samples, columns).
+        """
+        starts, lengths, rows = self._own
+        return values - np.repeat(rows @ (rows.T @ np.add.reduceat(values, starts)), lengths, axis=0)
 
     def every(self, stride: int) -> "SiRecord":
         """Every `stride`-th sample of it; what is exact for a drive linear between samples loses only samples."""
@@ -334,7 +346,7 @@ def centred(columns: Floats, records: Sequence[SiRecord]) -> Floats:
         records: The records, in the same order.
     """
     pairs = zip(split_by_record(columns, records), records, strict=True)
-    return np.concatenate([part - record.own @ (record.own.T @ part) for part, record in pairs])
+    return np.concatenate([record.less_own(part) for part, record in pairs])
 
 
 def split_by_record(values: Floats, records: Sequence[SiRecord]) -> list[Floats]:
