@@ -139,6 +139,7 @@ def test_a_staircase_keeps_its_dwells_and_creep():
     assert record.used == 11_400
     own = np.column_stack([np.ones(12_000), memory(drive, 12_000)])[record.start :]
     np.testing.assert_allclose(record.less_own(own), 0.0, atol=1e-9)
+    assert record.own_count == np.linalg.matrix_rank(own)
     rest = time[record.start :] ** 2
     np.testing.assert_allclose(record.less_own(rest), rest - own @ np.linalg.lstsq(own, rest)[0], atol=1e-8)
     dwells = [round(200 * (10 * k + 5)) - record.start for k in range(6)]

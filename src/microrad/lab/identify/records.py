@@ -105,6 +105,11 @@ class SiRecord:
         root = np.sqrt(lengths)[:, None]
         return starts, lengths, orthonormal(root * np.column_stack([np.ones(starts.size), ramps])) / root
 
+    @property
+    def own_count(self) -> int:
+        """How many numbers a fit leaves to it."""
+        return int(self._own[2].shape[1])
+
     def less_own(self, values: Floats) -> Floats:
         """Values over the used samples less what a fit leaves to the record itself: an offset, and its `memory`.
 

@@ -353,11 +353,11 @@ def fit_bouc_wen(
     on_progress: Progress | None = None,
     units: Units = DEFAULT_UNITS,
 ) -> BoucWenFit:
-    """Fit Eq. 3 with one offset per record to all recordings at once, every sample with equal weight.
+    """Fit Eq. 3 to all recordings at once, every sample with equal weight; each has an offset and a memory of its own.
 
     Trust-region-reflective least squares from several starts: the best points of a coarse grid, scattered log-normally.
-    h starts at zero, and the residuals before the drive has swept its range once are left out. The rate in the
-    exponents is clamped at the fastest rate of the recordings, as it is in simulation.
+    h starts at zero, and the residuals before the first reversal are left out (`records.lead`, `records.memory`). The
+    rate in the exponents is clamped at the fastest rate of the recordings, as it is in simulation.
 
     Args:
         recordings: Loops of one drive and one output each.
@@ -385,7 +385,8 @@ def _report(problem: BoucWenProblem, values: Floats, units: Units, costs: Floats
     offsets = tuple(float(part.mean()) for part in split_by_record(residual, problem.records))
     residual = centred(residual, problem.records)
     colour = colour_inflation(split_by_record(residual, problem.records))
-    variance = colour * float(residual @ residual) / max(1, residual.size - values.size - len(problem.records))
+    own = sum(record.own_count for record in problem.records)
+    variance = colour * float(residual @ residual) / max(1, residual.size - values.size - own)
     share = -float(values[2] * 2 * values[4] / values[0]) / k_settled(values)
     at_bound = constrained and share > 0.999 * problem.share
     sizes = _sizes(problem, values)

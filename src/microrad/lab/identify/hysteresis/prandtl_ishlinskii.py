@@ -2,7 +2,7 @@
 
     y = sign * sum_i w_i P_i[u] + offset,   w_i >= 0,   P_i: p <- max(u - r_i, min(u + r_i, p))
 
-Linear in the weights: non-negative least squares, with one unconstrained offset per record.
+Linear in the weights: non-negative least squares, with an unconstrained offset and memory of each record.
 """
 
 from collections.abc import Sequence
@@ -86,7 +86,8 @@ def fit_prandtl_ishlinskii(
 ) -> PrandtlIshlinskiiFit:
     """Fit the weights of play operators to all recordings at once, every sample with equal weight.
 
-    States are carried through each record; samples before the drive has swept its range once are left out.
+    States are carried through each record; samples before the first reversal are left out (`records.lead`), and what
+    the mirror remembers from before a record is fitted with the rest (`records.memory`).
 
     Args:
         recordings: Loops of one drive and one output each.
@@ -109,7 +110,8 @@ def fit_prandtl_ishlinskii(
     offsets = tuple(float(part.mean()) for part in split_by_record(residual, records))
     residual = centred(residual, records)
     colour = colour_inflation(split_by_record(residual, records))
-    variance = colour * float(residual @ residual) / max(1, residual.size - int(np.sum(weights > 0)) - len(offsets))
+    own = sum(record.own_count for record in records)
+    variance = colour * float(residual @ residual) / max(1, residual.size - int(np.sum(weights > 0)) - own)
     errors, condition = _errors(states, weights, variance)
     rms, _ = percent(residual, span(records))
     return PrandtlIshlinskiiFit(
