@@ -145,6 +145,7 @@ class _Ladder:
             self._judge(partial(per_axis, self.response, n, delay_s, spectra))
         for n in linear:
             self._judge(partial(coupled_linear, self.response, n, delay_s, _EXCHANGES, spectra))
+            delay_s = self.fits[name].delay_s if (name := f"coupled linear, order {n}") in self.fits else delay_s
         if reason:
             self.refused.append(Refused("hysteretic stiffness", reason))
             stiff: list[int] = []

@@ -77,7 +77,7 @@ def coupled_linear(
             break
         delay_s = max(delay_s + min(max(step, -most), most), 0.0)
         behind = without_delay(response, delay_s, STEPS)
-        model = polish(_equations(behind), model, iterations=30).model
+        model = polish(_equations(behind), model, iterations=10).model
         found = spread(model, behind, delay_s, spectra)
     outputs, inputs = model.direct.shape
     return Fitted(
