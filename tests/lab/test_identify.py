@@ -439,7 +439,7 @@ def test_straight_line_is_the_least_squares_line():
     r = play_record([0.05, 0.03], [0.0, 1.0])
     result = identify([r], 0.5, models=("prandtl_ishlinskii",))
     drive, output = r.drive[:, 0], r.output[:, 0]
-    start = lead(drive[:2000])
+    start = lead(2000)
     line = np.polyfit(drive[start:2000], output[start:2000], 1)
     residual = output - np.polyval(line, drive)
     span = np.ptp(output[:2000])

@@ -318,8 +318,8 @@ def test_neighbouring_weights_are_drawn_apart_and_their_sum_is_not(read, neighbo
     mirror = written(read, neighbours)
     assert len(mirror.uncertainty.parameters) == 15
     states = np.array([truths.plays(DRIVE[:2000], [r], [1.0]) for r in GRID]).T
-    own = np.column_stack([np.ones(2000), memory(DRIVE[:2000], 2000)])[lead(DRIVE[:2000]) :]
-    states = states[lead(DRIVE[:2000]) :]
+    own = np.column_stack([np.ones(2000), memory(DRIVE[:2000], 2000)])[lead(2000) :]
+    states = states[lead(2000) :]
     states -= own @ np.linalg.lstsq(own, states)[0]
     inverse = np.linalg.inv(states.T @ states)
     total = fit.weights_rad_per_v.sum()

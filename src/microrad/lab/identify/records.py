@@ -166,18 +166,18 @@ def _si_record(recording: Recording, units: Units) -> SiRecord:
             "behind a reversal; record at least one full period of the drive."
         )
     output = recording.output[:, 0] * units.radians
-    return SiRecord(recording.path, recording.sha256, drive, output, recording.step_s, lead(drive))
+    return SiRecord(recording.path, recording.sha256, drive, output, recording.step_s, lead(drive.size))
 
 
-def lead(drive: Floats) -> int:
-    """Number of first samples that no fit uses: until the first reversal, at most a twentieth of them.
+def lead(samples: int) -> int:
+    """Number of first samples that no fit uses, a twentieth: dynamics that were under way before them are over then.
 
-    Dynamics that were under way before the first sample are over then; for what the hysteresis remembers see `memory`.
+    For what the hysteresis remembers see `memory`.
 
     Args:
-        drive: Drive, in V, shape (samples,).
+        samples: Length of a record in samples.
     """
-    return int(min([*turning_points(drive)[:1], drive.size // 20]))
+    return samples // 20
 
 
 def memory(drive: Floats, known: int) -> Floats:

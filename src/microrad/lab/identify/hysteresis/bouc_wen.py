@@ -356,8 +356,8 @@ def fit_bouc_wen(
     """Fit Eq. 3 to all recordings at once, every sample with equal weight; each has an offset and a memory of its own.
 
     Trust-region-reflective least squares from several starts: the best points of a coarse grid, scattered log-normally.
-    h starts at zero, and the residuals before the first reversal are left out (`records.lead`, `records.memory`). The
-    rate in the exponents is clamped at the fastest rate of the recordings, as it is in simulation.
+    h starts at zero, and the residuals of the first twentieth are left out (`records.lead`, `records.memory`). The rate
+    in the exponents is clamped at the fastest rate of the recordings, as it is in simulation.
 
     Args:
         recordings: Loops of one drive and one output each.

@@ -86,8 +86,8 @@ def fit_prandtl_ishlinskii(
 ) -> PrandtlIshlinskiiFit:
     """Fit the weights of play operators to all recordings at once, every sample with equal weight.
 
-    States are carried through each record; samples before the first reversal are left out (`records.lead`), and what
-    the mirror remembers from before a record is fitted with the rest (`records.memory`).
+    States are carried through each record, of which the first twentieth is left out (`records.lead`); what the mirror
+    remembers from before it is fitted with the rest (`records.memory`).
 
     Args:
         recordings: Loops of one drive and one output each.

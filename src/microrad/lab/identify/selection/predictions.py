@@ -118,7 +118,7 @@ def predict(fit: Fit, recording: Recording, split: int | None = None) -> Predict
             f"split {split} does not lie within the {recording.samples} samples of {recording.path}; give a number "
             "from 2 to that."
         )
-    start = transient(drive) if split == 0 else lead(drive[:end])
+    start = transient(drive) if split == 0 else lead(end)
     model, clamped = fit.response(drive, recording.step_s)
     if isinstance(fit, JointFit):
         columns = fit.nuisance(drive, recording.step_s, end)
@@ -148,7 +148,7 @@ def straight_line(
     for recording, split in zip(recordings, splits, strict=True):
         drive = recording.drive[:, 0] * units.volts
         model, measured = slope * drive, recording.output[:, 0] * units.radians
-        start = lead(drive[:split]) if split else transient(drive)
+        start = lead(split) if split else transient(drive)
         offset = float(np.mean((measured - model)[start : split or None]))
         lines.append(Prediction(model + offset, measured, start, split or start, 0))
     return lines
