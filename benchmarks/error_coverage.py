@@ -1,6 +1,8 @@
 """How far the errors of an identified mirror can be trusted: random mirrors that are known, each identified.
 
-    python benchmarks/error_coverage.py [truths] [first]      200 truths from seed 0
+    OPENBLAS_NUM_THREADS=1 python benchmarks/error_coverage.py [truths] [first]      200 truths from seed 0
+
+(One thread of BLAS, as the command line has it: several get in the way of the fit's own and take ten times as long.)
 
 A truth is a resonance behind play operators or Bouc-Wen hysteresis, with creep beside them or without, a pure delay of
 the recording chain or none, and white noise. It is simulated here by NumPy and SciPy, with nothing of what is fitted.
@@ -565,11 +567,6 @@ def slow_gain(v: Values) -> float:
 
 
 # ----------------------------------------------------------------------------------------------------------- the table
-def table_of(results: Sequence[Result]) -> list[str]:
-    """The lines of the table, with what misses a bar at their ends."""
-    return [f"{'':24}{'truths':>7}{'known':>7}{'held':>7}  {'95 %':13}{'width':>7}", *map(str, lines_of(results))]
-
-
 def lines_of(results: Sequence[Result]) -> list["Line"]:
     """What came of each quantity, weights of plays above 0 V taken together, and of all parameters."""
     rows = [j for r in results for j in r.judged]
@@ -638,13 +635,15 @@ def told(result: Result) -> str:
 
 
 def main() -> None:
-    """Identify the truths and print the table."""
+    """Identify the truths and print the table; exit code 1 where a line misses a bar."""
     count, first = (int(sys.argv[i]) if len(sys.argv) > i else default for i, default in ((1, TRUTHS), (2, 0)))
     results = []
     for seed in range(first, first + count):
         results.append(judged(draw_truth(seed)))
         print(told(results[-1]), flush=True)
-    print("\n".join(table_of(results)))
+    lines = lines_of(results)
+    print(f"{'':24}{'truths':>7}{'known':>7}{'held':>7}  {'95 %':13}{'width':>7}", *lines, sep="\n")
+    raise SystemExit(any(line.missed for line in lines))
 
 
 if __name__ == "__main__":
