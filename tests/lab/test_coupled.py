@@ -232,7 +232,7 @@ def test_progress_names_the_best_model_so_far(found):
     assert told[0] == (0, 4, "delay") and told[-1][:2] == (4, 4)
     assert all(done <= total for done, total, _ in told)
     iterations = [what for _, _, what in told if "iteration" in what]
-    assert "hysteretic stiffness, order 4, iteration 1 of 19; best so far coupled linear, order 4: " in iterations[0]
+    assert "hysteretic stiffness, order 4, iteration 1 of 24; best so far coupled linear, order 4: " in iterations[0]
 
 
 def test_stopped_it_returns_what_was_found(hysteretic_records):

@@ -12,7 +12,7 @@ from microrad.lab.identify.stiffness.fit import StiffnessOptions, fit_hysteretic
 from microrad.lab.identify.stiffness.model import LinearStart
 from microrad.lab.recording import Recording
 
-FEW, ALL = 16, 3
+FEW, ALL = 20, 4
 """Iterations on one record of each amplitude, then on all; benchmarks/cubespec_ladder.py says what more would gain."""
 
 

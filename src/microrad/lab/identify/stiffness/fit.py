@@ -392,23 +392,24 @@ class _Search:
         size = np.sqrt(np.diag(matrix) + self._floors(np.diag(matrix)))[free]
         scaled_matrix = matrix[np.ix_(free, free)] / np.outer(size, size)
         cost, growths = self.costs[-1] ** 2, self.numbers.growths()
-        bounds = np.array([-0.5 * growth.rate_1_s for growth in growths]), np.array([g.slope[free] for g in growths])
+        room, slopes = np.array([-0.5 * g.rate_1_s for g in growths]), np.array([g.slope[free] for g in growths])
         for _ in range(_TRIALS):
             move = np.zeros(gradient.size)
-            move[free], bounded = _bounded_move((scaled_matrix, gradient[free], size), damping, bounds)
-            self.held = self.held or bounded
+            move[free], bounded = _bounded_move((scaled_matrix, gradient[free], size), damping, (room, slopes))
             trial = self.numbers.at(self.numbers.vector() + move)
-            if self._cost(trial, pool) < cost:
+            runs_away = trial.growth_1_s >= 0.0
+            self.held = self.held or bounded or runs_away
+            if not runs_away and self._cost(trial, pool) < cost:
                 self.numbers = balanced(trial)
                 return max(damping / 4, 1e-6), True
-            damping *= 4
+            if runs_away and bounded:  # what is beyond first order took a pole across: stay further away
+                room, damping = room / 4, damping * 2
+            else:
+                damping *= 4
         return damping, False
 
     def _cost(self, numbers: Numbers, pool: ThreadPoolExecutor) -> float:
         if (numbers.frequency <= 0).any():
-            return math.inf
-        if numbers.growth_1_s >= 0.0:
-            self.held = True
             return math.inf
         try:
             plant = self._plant(numbers)

@@ -24,6 +24,7 @@ from microrad.mirror.model import Mirror
 
 HysteresisSource = Literal["strain", "drive"]
 
+_FASTEST = 3
 FIELDS = ("decay", "frequency", "B", "E", "F", "G", "weights", "C", "D", "K")
 
 
@@ -116,34 +117,39 @@ class Numbers:
         return lti.growth_1_s(self.mirror("").A, self.E, self.F, self.weights.sum(axis=1))
 
     def growths(self) -> list["Growth"]:
-        """The fastest-growing pole of each combination of operators that slide, and how each number moves it.
+        """The fastest-growing poles of each combination of operators that slide, and how each number moves them.
 
         With left and right vectors l and r of a pole p of M = A + E W F, dp = l* dM r / l* r.
         """
         from scipy.linalg import eig
 
-        sums, A, first = self.weights.sum(axis=1), self.mirror("").A, self.rows
-        found, pairs = [], self.frequency.size
+        sums, A = self.weights.sum(axis=1), self.mirror("").A
+        found = []
         for case in lti.sliding_cases(sums.size):
-            slope = case * sums
-            poles, left, right = eig(A + (self.E * slope) @ self.F, left=True)
-            k = int(np.argmax(poles.real))
-            size = left[:, k].conj() @ right[:, k]
-            P = (left[:, k].conj()[:, None] * right[:, k] / (size if size else 1e-300)).real
-            second = [row + 1 for row in first[:pairs]]
-            decay = P[first, first]
-            decay[:pairs] += P[second, second]
-            through = np.einsum("ie,ij,ej->e", self.E, P, self.F) * case
-            parts = {
-                "decay": decay,
-                "frequency": P[second, first[:pairs]] - P[first[:pairs], second],
-                "E": (P @ self.F.T) * slope,
-                "F": (self.E.T @ P) * slope[:, None],
-                "weights": np.repeat(through[:, None], self.weights.shape[1], axis=1),
-            }
-            each = [parts.get(name, np.zeros_like(getattr(self, name))).ravel() for name in FIELDS]
-            found.append(Growth(float(poles[k].real), np.concatenate([*each, [0.0]])))
+            poles, left, right = eig(A + (self.E * (case * sums)) @ self.F, left=True)
+            rank = np.argsort(np.where(poles.imag >= 0.0, -poles.real, np.inf), kind="stable")
+            for k in rank[:_FASTEST]:
+                size = left[:, k].conj() @ right[:, k]
+                P = (left[:, k].conj()[:, None] * right[:, k] / (size if size else 1e-300)).real
+                found.append(Growth(float(poles[k].real), self._slope(P, case, sums)))
         return found
+
+    def _slope(self, P: Floats, case: Floats, sums: Floats) -> Floats:
+        """Derivative by each number of the real part of a pole whose derivative by the matrix is P."""
+        first, pairs = self.rows, self.frequency.size
+        second = [row + 1 for row in first[:pairs]]
+        decay = P[first, first]
+        decay[:pairs] += P[second, second]
+        through = np.einsum("ie,ij,ej->e", self.E, P, self.F) * case
+        parts = {
+            "decay": decay,
+            "frequency": P[second, first[:pairs]] - P[first[:pairs], second],
+            "E": (P @ self.F.T) * (case * sums),
+            "F": (self.E.T @ P) * (case * sums)[:, None],
+            "weights": np.repeat(through[:, None], self.weights.shape[1], axis=1),
+        }
+        each = [parts.get(name, np.zeros_like(getattr(self, name))).ravel() for name in FIELDS]
+        return np.concatenate([*each, [0.0]])
 
     def mirror(self, name: str) -> Mirror:
         """The mirror in the plant form, without its delay."""
