@@ -8,7 +8,7 @@ from scipy.linalg import block_diag
 
 from microrad.core import kernels
 from microrad.core.periodic import delayed
-from microrad.lab.identify.coupled import hysteretic, identify_coupled, linear, linear_errors
+from microrad.lab.identify.coupled import hysteretic, identify_coupled, ladder, linear, linear_errors
 from microrad.lab.identify.coupled.held_out import held_out_error, smallest_within_noise
 from microrad.lab.identify.coupled.ladder import LadderOptions
 from microrad.lab.identify.linear.modal import ModalModel
@@ -261,6 +261,36 @@ def test_one_amplitude_leaves_linear_models(hysteretic_records):
     (refused,) = result.refused
     assert refused.model == "hysteretic stiffness" and "one amplitude, 0.4 V rms" in refused.reason
     assert result.dependence is None
+
+
+def test_a_model_that_runs_away_is_listed_with_its_reason(hysteretic_records, monkeypatch):
+    def runs_away(*_):
+        raise IdentificationError("the fitted mirror runs away.")
+
+    def grows(response, order, *_):
+        own = linear.per_axis(response, 2, 0.0, None)
+        return replace(own, name=f"coupled linear, order {order}", mirror=replace(own.mirror, A=-500 * own.mirror.A))
+
+    monkeypatch.setattr(ladder, "hysteretic_stiffness", runs_away)
+    options = replace(SHORT, axis_orders=(2,))
+    result = identify_coupled(hysteretic_records, output_unit="rad", options=options)
+    assert [(refused.model, refused.reason) for refused in result.refused] == [
+        ("hysteretic stiffness, order 4", "the fitted mirror runs away.")
+    ]
+    assert result.chosen == "coupled linear, order 4"
+    monkeypatch.setattr(ladder, "coupled_linear", grows)
+    result = identify_coupled(hysteretic_records, output_unit="rad", options=options)
+    assert result.chosen == "per axis, order 2 each"
+    assert result.refused[0].model == "coupled linear, order 4"
+    assert result.refused[0].reason == "it runs away on a held-out record"
+    with pytest.raises(IdentificationError, match=r"no model could be fitted: coupled linear, order 4: it runs away"):
+        identify_coupled(hysteretic_records, output_unit="rad", options=SHORT)
+
+
+def test_drives_that_copy_each_other_are_named(hysteretic_records):
+    copied = [replace(r, drive=np.repeat(r.drive[:, :1], 2, axis=1)) for r in hysteretic_records]
+    with pytest.raises(ValueError, match=r"u1.*u0|u0.*u1"):
+        identify_coupled(copied, output_unit="rad", options=SHORT)
 
 
 def test_chirps_of_each_drive_give_linear_models(hysteretic_records):

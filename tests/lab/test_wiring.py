@@ -62,6 +62,14 @@ def test_an_actuator_that_moves_nothing(response):
     assert "u.npy: the drive 'drive[1]' moves nothing" in refusal(replace(response, response=still), None)
 
 
+def test_a_few_lines_of_great_noise_hide_no_motion(response):
+    noisy = response.standard_error.copy()
+    noisy[5] = 1e6 * np.abs(response.response).max()
+    check_wiring("u.npy", replace(response, standard_error=noisy), OUTPUTS, None)
+    still = np.where(np.arange(len(noisy))[:, None, None] == 5, noisy, 0.5 * noisy)
+    assert "moves nothing" in refusal(replace(response, response=still, standard_error=noisy), None)
+
+
 def test_places_of_three_sensors_agree_with_anything_and_two_or_a_line_do_not_do(response):
     def placed(*places):
         return [replace(output, position_m=place) for output, place in zip(OUTPUTS, places, strict=True)]

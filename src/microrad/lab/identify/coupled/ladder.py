@@ -213,7 +213,8 @@ class _Ladder:
             excited_hz=self.response.excited_hz,
             known=fitted.known,
         )
-        judged = judge(model, records, self.bands_hz)
+        with np.errstate(all="ignore"):
+            judged = judge(model, records, self.bands_hz)
         if not np.isfinite(judged.share):
             self.refused.append(Refused(fitted.name, "it runs away on a held-out record"))
             return
