@@ -87,7 +87,7 @@ def sine(freq_hz, samples=3000, rate_hz=1000.0):
 # ---------------------------------------------------------------------------------------- plays, linear part, widening
 def test_plays_behind_a_resonance_are_recovered():
     record = recorded(DRIVE, behind_resonance(plays(DRIVE, THRESHOLDS, WEIGHTS), 1000.0))
-    fit = fit_joint([record], "prandtl_ishlinskii_joint", UNITS, linear=RESONANCE)
+    fit = fit_joint([record], "prandtl_ishlinskii_joint", UNITS, linear=RESONANCE, hold="first-order")
     assert_plays_recovered(fit)
     assert 0.09 < fit.residual_rms_percent < 0.11  # the noise is 0.1 %
     assert fit.linear == RESONANCE
@@ -104,8 +104,9 @@ def test_the_linear_part_moves_with_the_rest_where_it_is_free():
     small = small_multisine()
     wide = recorded(small, behind_resonance(plays(small, THRESHOLDS, WEIGHTS), 1000.0), noise=3e-3, name="wide")
     off = LinearPoles(Roots((152.0,), (0.34,)), Roots((), ()), 3.0)
-    held = fit_joint(loops, "prandtl_ishlinskii_joint", UNITS, linear=off)
-    free = fit_joint(loops, "prandtl_ishlinskii_joint", UNITS, linear=off, free_linear=True, broadband=[wide])
+    held = fit_joint(loops, "prandtl_ishlinskii_joint", UNITS, linear=off, hold="first-order")
+    words = {"linear": off, "free_linear": True, "hold": "first-order"}
+    free = fit_joint(loops, "prandtl_ishlinskii_joint", UNITS, broadband=[wide], **words)
     assert held.linear == off
     assert_recovered(free, pole_1=150.0, pole_1_damping=0.35)
     assert fitted(free)["pole 1"][1] < 0.5
@@ -123,7 +124,7 @@ def test_phase_lag_is_not_counted_twice():
     for freq_hz in (2.0, 20.0):
         drive = sine(freq_hz)
         record = recorded(drive, behind_resonance(plays(drive, THRESHOLDS, WEIGHTS), 1000.0))
-        both = fit_joint([record], "prandtl_ishlinskii_joint", UNITS, linear=RESONANCE)
+        both = fit_joint([record], "prandtl_ishlinskii_joint", UNITS, linear=RESONANCE, hold="first-order")
         joint_widths.append(loop_width(both.model, sine(0.5)))
         alone = fit_prandtl_ishlinskii([record])
         static_widths.append(loop_width(fit_like(alone.thresholds_v, alone.weights_rad_per_v), sine(0.5)))
@@ -160,12 +161,11 @@ def test_two_sample_rates_make_one_model():
         recorded(d, behind_resonance(plays(d, THRESHOLDS, WEIGHTS), rate), rate, seed=k)
         for k, (d, rate) in enumerate(((fast, 1000.0), (slow, 500.0)))
     ]
-    fit = fit_joint(records, "prandtl_ishlinskii_joint", UNITS, linear=RESONANCE)
+    fit = fit_joint(records, "prandtl_ishlinskii_joint", UNITS, linear=RESONANCE, hold="first-order")
     assert_plays_recovered(fit)
     wrong = [records[0], replace(records[1], rate_hz=1000.0)]
-    assert fit_joint(wrong, "prandtl_ishlinskii_joint", UNITS, linear=RESONANCE).residual_rms_rad > (
-        2 * fit.residual_rms_rad
-    )
+    other = fit_joint(wrong, "prandtl_ishlinskii_joint", UNITS, linear=RESONANCE, hold="first-order")
+    assert other.residual_rms_rad > 2 * fit.residual_rms_rad
 
 
 # --------------------------------------------------------------------------------------------------------------- creep
@@ -174,11 +174,30 @@ def crept(before, noise=1e-3, seed=0):
     return recorded(DRIVE, output, noise=noise, seed=seed)
 
 
+def assert_creep_recovered(fit, weights=(CREEP,) * 3):
+    """Each lag within its standard errors, which are small beside it."""
+    found = [fitted(fit)[f"creep at {tau:g} s"] for tau in CREEP_TIMES]
+    assert fit.creep.weights_rad_v == tuple(value for value, _ in found)
+    for (value, error), weight in zip(found, weights, strict=True):
+        assert abs(value - weight) < 4 * error
+        assert error < 0.3 * CREEP
+
+
+def test_each_lag_of_the_creep_has_a_weight_of_its_own():
+    weights = (6e-6, 0.0, 3e-6)
+    output = plays(DRIVE, THRESHOLDS, WEIGHTS)
+    output += sum(creep(DRIVE, 1000.0, (tau,), weight) for tau, weight in zip(CREEP_TIMES, weights, strict=True))
+    fit = fit_joint([recorded(DRIVE, output, noise=3e-4)], "prandtl_ishlinskii_creep", UNITS)
+    assert_creep_recovered(fit, weights)
+    assert any(name == "creep at 0.1 s" for name, _ in fit.not_identified)  # it is none
+    assert not any(name == "creep at 0.01 s" for name, _ in fit.not_identified)
+
+
 def test_creep_is_recovered_whatever_went_before_the_record():
     for before in (None, 9.0):
         fit = fit_joint([crept(before)], "prandtl_ishlinskii_creep", UNITS)
         assert fit.creep.time_constants_s == CREEP_TIMES
-        assert_recovered(fit, creep=CREEP)
+        assert_creep_recovered(fit)
         assert_plays_recovered(fit)
 
 
@@ -196,8 +215,8 @@ def test_without_its_tail_an_older_creep_would_bias_the_weights():
 
 def test_creep_beside_a_resonance():
     output = behind_resonance(plays(DRIVE, THRESHOLDS, WEIGHTS), 1000.0) + creep(DRIVE, 1000.0, CREEP_TIMES, CREEP, 7.0)
-    fit = fit_joint([recorded(DRIVE, output)], "prandtl_ishlinskii_creep", UNITS, linear=RESONANCE)
-    assert_recovered(fit, creep=CREEP)
+    fit = fit_joint([recorded(DRIVE, output)], "prandtl_ishlinskii_creep", UNITS, linear=RESONANCE, hold="first-order")
+    assert_creep_recovered(fit)
     assert_plays_recovered(fit)
 
 
@@ -263,7 +282,7 @@ def test_a_falling_sensor_turns_the_signs(generalised, asymmetric):
 
 def test_falling_plays_have_falling_weights():
     record = recorded(DRIVE, -behind_resonance(plays(DRIVE, THRESHOLDS, WEIGHTS), 1000.0))
-    fit = fit_joint([record], "prandtl_ishlinskii_joint", UNITS, linear=RESONANCE)
+    fit = fit_joint([record], "prandtl_ishlinskii_joint", UNITS, linear=RESONANCE, hold="first-order")
     assert max(fit.model.weights_rad_v) <= 0.0
     assert sum(fit.model.weights_rad_v) == pytest.approx(-sum(WEIGHTS), rel=0.01)
     assert fit.admissible
@@ -423,7 +442,7 @@ def test_states_are_carried_through():
     fresh = fit.response(drive[1700:], 1e-3)[0]
     assert np.ptp(fresh - whole[1700:]) > 1e-6
     oracle = plays(drive, fit.model.thresholds_v, fit.model.weights_rad_v)
-    oracle += creep(drive, 1e3, CREEP_TIMES, fit.creep.weights_rad_v[0])
+    oracle += sum(creep(drive, 1e3, (tau,), w) for tau, w in zip(CREEP_TIMES, fit.creep.weights_rad_v, strict=True))
     assert_allclose(whole, oracle, atol=1e-9)
 
 
@@ -442,7 +461,7 @@ def test_creep_is_what_a_real_record_needs():
 
     assert 0.5 < (plain := unseen_percent("prandtl_ishlinskii_creep"))[0] < 0.70
     assert plain[1]
-    assert 0.4 < (bound := unseen_percent("bouc_wen_creep", True))[0] < 0.60
+    assert 0.3 < (bound := unseen_percent("bouc_wen_creep", True))[0] < 0.60
     assert bound[1]
     assert unseen_percent("prandtl_ishlinskii_joint")[0] > 0.80
     assert unseen_percent("prandtl_ishlinskii_rate")[0] > 0.80
@@ -481,7 +500,7 @@ def test_errors_are_propagated():
 def test_standard_errors_match_the_scatter():
     fits = [fit_joint([crept(9.0, seed=s)], "prandtl_ishlinskii_creep", UNITS) for s in range(12)]
     scatter = np.std([f.creep.weights_rad_v[0] for f in fits], ddof=1)
-    reported = np.median([fitted(f)["creep"][1] for f in fits])
+    reported = np.median([fitted(f)["creep at 0.01 s"][1] for f in fits])
     assert 0.5 < scatter / reported < 2.0
     totals = np.std([sum(f.model.weights_rad_v) for f in fits], ddof=1)
     assert 0 < totals < 5e-7

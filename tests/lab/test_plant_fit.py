@@ -217,10 +217,10 @@ def test_what_a_search_sees_has_the_gradient_and_the_curvature_of_the_residual()
 def test_a_slope_that_is_no_number_is_refused_and_no_fault_of_the_program():
     problem = PlantProblem(hysteretic_oscillator(2.0, 300.0, 5e4, 2e4, 300.0, 100.0), fit_records([low_pass(3)]))
     slopes = np.ones((20, 6))
-    assert np.isfinite(_covariance([slopes[:5], slopes[5:]], [1.0, 1.0], problem)[0]).all()
+    assert np.isfinite(_covariance([slopes[:5], slopes[5:]], np.eye(6), problem)[0]).all()
     slopes[3, 2] = 1e200
     with pytest.raises(IdentificationError, match="nothing can be said of their errors; record loops over the whole"):
-        _covariance([slopes[:5], slopes[5:]], [1.0, 1.0], problem)
+        _covariance([slopes[:5], slopes[5:]], np.eye(6), problem)
 
 
 def test_nothing_left_to_fit_is_refused():

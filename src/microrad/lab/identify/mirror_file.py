@@ -128,14 +128,15 @@ def _joint(fit: JointFit, identification: Identification, source: str) -> list[s
     else:
         lines = _joint_plays(fit, source)
     if fit.creep.weights_rad_v:
-        error = fit.fit.standard_errors[[p.name for p in fit.structure.parameters].index("creep")]
+        of = zip(fit.structure.parameters, fit.fit.standard_errors, strict=True)
+        given = ", ".join(f"{1e3 * error:.2g}" for p, error in of if p.name.startswith("creep "))
         times = _list(fit.creep.time_constants_s, "s")
         weights = _list([turned * 1e3 * w for w in fit.creep.weights_rad_v], "mrad/V")
         lines += [
             "",
             "[creep]",
             f"time_constants = {times} # identified: decades that the recordings cover; from {source}",
-            f"weights = {weights} # identified: one weight, ± standard error {1e3 * error:.2g} mrad/V, from {source}",
+            f"weights = {weights} # identified: ± standard error {given} mrad/V, from {source}",
         ]
     if fit.linear is not None:
         lines += ["", *_linear(fit, fit.linear, identification)]
@@ -211,8 +212,12 @@ def _linear(fit: JointFit, linear: LinearPoles, identification: Identification) 
         dampings = ", ".join(repr(float(d)) for d in roots.dampings)
         lines.append(f"{kind}_dampings = [{dampings}] # identified: 1 is a real {kind}; from {wide}")
     low, high = identification.linear.excited_hz if identification.linear is not None else (0.0, 0.0)
+    between = {"zero-order": "held", "first-order": "straight"}.get(fit.hold, fit.hold)
+    error_s = f" ± {of['delay']:.2g} s" if "delay" in of else " s"
     return [
         *lines,
+        f"# recording: drive {between} between samples, output {linear.delay_s:.3g}{error_s} late, a delay that "
+        "belongs to the recording chain and is no part of the mirror",
         _line("normalise_at", _text(linear.normalise_at_hz, "Hz"), "where the linear part has the magnitude 1"),
         _line("excited_from", _text(low, "Hz"), f"lowest frequency with a drive in it, from {wide}"),
         _line("excited_to", _text(high, "Hz"), f"highest frequency with a drive in it, from {wide}"),
@@ -275,8 +280,8 @@ def _numbers(fit: JointFit, at: Floats) -> dict[str, float]:
     else:
         found |= {f"prandtl_ishlinskii.weights.{i}": w for i, w in enumerate(model.weights_rad_v, 1)}
         found["prandtl_ishlinskii.widening"] = model.widening_s
-    if axis.creep.weights_rad_v:
-        found["creep.weights"] = (-1.0 if fit.falling else 1.0) * axis.creep.weights_rad_v[0]
+    turned = -1.0 if fit.falling else 1.0
+    found |= {f"creep.weights.{i}": turned * w for i, w in enumerate(axis.creep.weights_rad_v, 1)}
     if axis.linear is not None:
         for kind, roots in (("pole", axis.linear.poles), ("zero", axis.linear.zeros)):
             found |= {f"linear.{kind}s.{i}": f for i, f in enumerate(roots.frequencies_hz, 1)}

@@ -76,7 +76,7 @@ def _held(fit: JointFit) -> list[ParameterRow]:
                 if abs(damping) != 1.0:  # or it is real
                     rows.append(ParameterRow(f"{kind} {number} damping", damping, math.nan, "", note))
     for number, lag in enumerate(fit.creep.time_constants_s, 1):
-        rows.append(ParameterRow(f"creep lag {number}", lag, math.nan, "s", "chosen, one weight for all lags"))
+        rows.append(ParameterRow(f"creep lag {number}", lag, math.nan, "s", "chosen"))
     return rows
 
 

@@ -14,9 +14,10 @@ from microrad.core import kernels
 from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
 from microrad.lab.identify.hysteresis.bouc_wen import BoucWenFit, fit_bouc_wen, made_rising
-from microrad.lab.identify.hysteresis.plant_fit import FitRecord, PlantFit, fit_plant, without_nuisance
+from microrad.lab.identify.hysteresis.plant_fit import FitRecord, PlantFit, fit_plant, held, without_nuisance
 from microrad.lab.identify.hysteresis.prandtl_ishlinskii import non_negative_weights, threshold_grid
 from microrad.lab.identify.hysteresis.structures import AxisStructure, LinearPoles, one_axis
+from microrad.lab.identify.linear.modal import HOLD, Hold, beyond, late
 from microrad.lab.identify.records import SiRecord, Units, fastest_rate, memory, orthonormal, si_records, span
 from microrad.lab.recording import Recording
 from microrad.mirror import model as mirror
@@ -27,6 +28,7 @@ _OPERATORS = 15
 _MOST_SAMPLES = 20_000
 _STRAIGHT = 2e-3  # a drive is, whose distance from straight lines is at most this part of its rms
 _SCREENED_SAMPLES, _NEARLY_STRAIGHT = 4_000, 2e-2
+_IDLE = 1e-6  # of the sum of all weights
 _EVALUATIONS = 200
 _POLISHING = 60  # each is long: the broadband recordings belong to it
 
@@ -61,7 +63,8 @@ class JointFit:
 
     `model`, `creep` and `linear` are what the mirror consists of; `fit` holds the parameters of `structure` with their
     covariance.
-    `time_constants_s` of the creep are chosen (decades that the recordings cover), not fitted.
+    `time_constants_s` of the creep are chosen (decades that the recordings cover), not fitted. `hold` is what the
+    drive does between samples, and `delay_s` the delay of the recording chain: `response` has it, `mirror` has not.
     """
 
     name: str
@@ -77,6 +80,12 @@ class JointFit:
     residual_rms_rad: float
     residual_rms_percent: float
     samples_used: int
+    hold: Hold = HOLD
+
+    @property
+    def delay_s(self) -> float:
+        """Pure delay of the recording chain; 0 without a linear part."""
+        return 0.0 if self.linear is None else self.linear.delay_s
 
     @property
     def falling(self) -> bool:
@@ -111,11 +120,13 @@ class JointFit:
             step_s: Time between samples, in s.
         """
         plant = mirror.discretise(self.mirror, step_s)
+        if self.hold == "zero-order":
+            plant = held(plant)
         state = mirror.at_rest(plant)
-        output = np.empty((drive_v.size, 1))
-        drive = (drive_v - drive_v[0])[:, None].copy()
-        kernels.open_loop(plant, state, drive, output, np.empty((drive_v.size, 0)))
-        return output[:, 0], int(state.clamped.sum())
+        drive = beyond((drive_v - drive_v[0])[:, None], self.delay_s).copy()
+        output = np.empty((len(drive), 1))
+        kernels.open_loop(plant, state, drive, output, np.empty((len(drive), 0)))
+        return late(output, self.delay_s / step_s)[: drive_v.size, 0], int(state.clamped.sum())
 
     def nuisance(self, drive_v: Floats, step_s: float, known: int) -> Floats:
         """What a record may add by itself: an offset, its `memory`, and the tail of a creep begun before it.
@@ -136,6 +147,7 @@ _WHY = {
     "d2": "its effect on the output is below what is left; faster loops would show it",
     "delta": "the loops widen too little with the rate to tell; record faster loops",
     "exponent": "only the shape of the branches fixes it; record loops of several amplitudes",
+    "delay": "poles and zeros beyond the band turn the phase as a delay does",
     "pole": "a pole and a zero side by side nearly cancel, and one beyond the band is a flank only",
     "zero": "a pole and a zero side by side nearly cancel, and one beyond the band is a flank only",
 }
@@ -151,6 +163,9 @@ def fit_joint(  # noqa: PLR0913  all but the first three are named options
     admissible: bool = False,
     broadband: Sequence[Recording] = (),
     static: BoucWenFit | None = None,
+    hold: Hold = HOLD,
+    begin: JointFit | None = None,
+    search: bool = True,
     starts: int = 2,
     seed: int = 0,
     on_progress: Progress | None = None,
@@ -162,10 +177,14 @@ def fit_joint(  # noqa: PLR0913  all but the first three are named options
         name: Name of the form.
         units: Units of the recordings.
         linear: The linear part.
-        free_linear: Whether its poles and zeros are fitted with the rest.
+        free_linear: Whether its poles, zeros and delay are fitted with the rest.
         admissible: Whether epsilon is bounded so that the slope behind a slow reversal never turns.
         broadband: Recordings that belong to the fit where `free_linear` is set, so that they keep hold of the poles.
         static: The fit of Eq. 3 at which a Bouc-Wen form begins; by default it is made here.
+        hold: What the drive does between samples: "zero-order" where the record is what a converter was told,
+            "first-order" where the drive itself was measured.
+        begin: A fit of the same form where the search begins; by default that is found here.
+        search: Whether anything is searched; if not, the errors are those of everything free where the search begins.
         starts: Number of starts of a Bouc-Wen form; those behind the first are scattered about it.
         seed: Seed of the Philox stream that scatters them.
         on_progress: Called with the starts done, their number and the name.
@@ -174,23 +193,33 @@ def fit_joint(  # noqa: PLR0913  all but the first three are named options
         IdentificationError: If a recording cannot be used, or if no start can be simulated.
     """
     form = FORMS[name]
-    records = tuple(thin_record(record, _MOST_SAMPLES, _STRAIGHT) for record in si_records(recordings, units))
+    if linear is None:
+        hold = "first-order"  # where nothing lags, what is between the samples changes nothing
+    whole = si_records(recordings, units)
+    records = tuple(thin_record(record, _MOST_SAMPLES, _STRAIGHT) for record in whole)
     creep_times = time_constants(records) if form.creep else ()
-    fit_list = [_fit_record(record, creep_times) for record in records]
+
+    def prepared(chosen: Sequence[SiRecord]) -> list[FitRecord]:
+        pairs = zip(chosen, whole, strict=True)
+        return [_between(_fit_record(record, creep_times), hold, of.step_s) for record, of in pairs]
+
+    fit_list = prepared(records)
     model: BoucWen | Play
-    if form.family == "bouc_wen":
+    if begin is not None:
+        model, creep_rad_v = _without_idle(begin.model), begin.creep.weights_rad_v
+    elif form.family == "bouc_wen":
         static = static or fit_bouc_wen(recordings, starts=6, seed=seed, units=units)
         model = replace(static.model, bias_v=float(np.mean([r.drive_v[0] for r in records])))
         if "delta" not in form.free:
             model = replace(model, d2_s_v=0.0, delta_s_v=0.0)
-        creep_rad_v = 1e-3 * model.d1_rad_v
+        creep_rad_v = (1e-3 * model.d1_rad_v,) * len(creep_times)
     else:
         model, creep_rad_v = _play_start(form, records, fit_list, linear, creep_times)
     structure = one_axis(
         name,
         model,
         linear=linear,
-        creep=Creep((creep_rad_v,) * len(creep_times), creep_times) if creep_times else NO_CREEP,
+        creep=Creep(creep_rad_v, creep_times) if creep_times else NO_CREEP,
         free=form.free,
         free_linear=free_linear,
         admissible=admissible,
@@ -198,15 +227,18 @@ def fit_joint(  # noqa: PLR0913  all but the first three are named options
     if broadband:
         # Of periods that only repeat, two say it all.
         short = [r.first(2 * r.period_samples) if r.period_samples else r for r in broadband]
-        fit_list += [_fit_record(record, creep_times) for record in si_records(short, units)]
+        fit_list += [
+            _between(_fit_record(record, creep_times), hold, record.step_s) for record in si_records(short, units)
+        ]
     coarse = [thin_record(record, _SCREENED_SAMPLES, _NEARLY_STRAIGHT) for record in records]
     fit = fit_plant(
         structure,
         fit_list,
-        screen=() if free_linear else [_fit_record(record, creep_times) for record in coarse],
-        starts=_scattered_starts(structure, starts, seed) if form.family == "bouc_wen" else (),
-        tolerance=1e-12 if free_linear else 1e-9,  # a candidate is only compared
-        most_evaluations=_POLISHING if free_linear else _EVALUATIONS,
+        screen=() if free_linear else prepared(coarse),
+        starts=_scattered_starts(structure, starts, seed) if form.family == "bouc_wen" and begin is None else (),
+        # Candidates are only compared. Of N samples a gain of e moves a value by sqrt(N e) of its error at most.
+        tolerance=1e-10 if free_linear else 1e-9,
+        most_evaluations=(_POLISHING if free_linear else _EVALUATIONS) if search else 1,
         on_progress=on_progress,
     )
     axis = structure.parts(fit.values)
@@ -226,6 +258,7 @@ def fit_joint(  # noqa: PLR0913  all but the first three are named options
         residual_rms_rad=rms,
         residual_rms_percent=100 * rms / span(records),
         samples_used=residual.size,
+        hold=hold,
     )
 
 
@@ -287,6 +320,21 @@ def _fit_record(record: SiRecord, creep_times: Sequence[float]) -> FitRecord:
     )
 
 
+def _between(record: FitRecord, hold: Hold, step_s: float) -> FitRecord:
+    """The record with what its drive does between the samples.
+
+    A held drive of which only some samples are kept is a straight one that comes half a sample later.
+
+    Args:
+        record: The record.
+        hold: What the drive does between the samples that were recorded.
+        step_s: Time between those, in s.
+    """
+    if hold != "zero-order" or record.step_s == step_s:
+        return replace(record, hold=hold)
+    return replace(record, hold="first-order", late_s=0.5 * step_s)
+
+
 def _scattered_starts(structure: AxisStructure, starts: int, seed: int) -> list[Floats]:
     """Values of `starts` - 1 more starts, epsilon and alpha scattered about those of the structure."""
     own = np.array([p.start for p in structure.parameters])
@@ -301,16 +349,16 @@ def _play_start(
     fit_list: Sequence[FitRecord],
     linear: LinearPoles | None,
     creep_times: Sequence[float],
-) -> tuple[Play, float]:
+) -> tuple[Play, tuple[float, ...]]:
     """Weights >= 0 of plays and creep by non-negative least squares, the linear part held; idle plays are dropped."""
     operators = 1 if form.family == "linear" else _OPERATORS
     thresholds = threshold_grid(max(float(np.ptp(r.drive_v)) for r in records), operators)
     columns, targets = [], []
     for record, run in zip(records, fit_list, strict=True):
         drive = run.drive[:, 0]
-        plays = behind_linear_part(kernels.play_response(drive, thresholds, np.zeros(operators)), linear, record.step_s)
+        plays = behind_linear_part(kernels.play_response(drive, thresholds, np.zeros(operators)), linear, run)
         lags = kernels.lag_response(drive, record.step_s, np.array(creep_times), np.zeros(len(creep_times)))
-        both = np.column_stack([plays, lags.sum(axis=1)] if creep_times else [plays])
+        both = np.column_stack([plays, lags])
         columns.append(run.weight * without_nuisance(run.nuisance, both[run.first :]))
         targets.append(run.weight * run.target[:, 0])
     matrix, target = np.concatenate(columns), np.concatenate(targets)
@@ -320,16 +368,30 @@ def _play_start(
     kept[0] = True
     limit = fastest_rate(records)
     model = Play(tuple(thresholds[kept].tolist()), tuple(weights[:operators][kept].tolist()), 0.0, limit)
-    return model, float(weights[-1]) if creep_times else 0.0
+    return model, tuple(weights[operators:].tolist())
 
 
-def behind_linear_part(columns: Floats, linear: LinearPoles | None, step_s: float) -> Floats:
-    """Columns filtered by the linear part, each from rest and straight between its samples.
+def _without_idle(model: BoucWen | Play) -> BoucWen | Play:
+    """The model without the plays that a search has left at the bound 0, which would only slow the next one down."""
+    if isinstance(model, BoucWen):
+        return model
+    weights = np.array(model.weights_rad_v)
+    kept = np.abs(weights) > _IDLE * np.abs(weights).sum()
+    kept[0] = True
+    return replace(
+        model,
+        thresholds_v=tuple(np.array(model.thresholds_v)[kept].tolist()),
+        weights_rad_v=tuple(weights[kept].tolist()),
+    )
+
+
+def behind_linear_part(columns: Floats, linear: LinearPoles | None, run: FitRecord) -> Floats:
+    """Columns filtered by the linear part and its delay, each from rest.
 
     Args:
         columns: The columns, shape (samples, any).
         linear: The linear part, None to leave the columns as they are.
-        step_s: Time between samples, in s.
+        run: The record that they belong to, with its step and what is between the samples.
     """
     if linear is None:
         return columns
@@ -348,10 +410,12 @@ def behind_linear_part(columns: Floats, linear: LinearPoles | None, step_s: floa
         plays=(),
         inverse=(),
     )
-    plant = mirror.discretise(no_bank, step_s)
+    plant = mirror.discretise(no_bank, run.step_s)
+    if run.hold == "zero-order":
+        plant = held(plant)
     behind = np.empty_like(columns)
     output, bank = np.empty((columns.shape[0], 1)), np.empty((columns.shape[0], 0))
     for j, column in enumerate(columns.T):
         kernels.open_loop(plant, mirror.at_rest(plant), column[:, None].copy(), output, bank)
         behind[:, j] = output[:, 0]
-    return behind
+    return late(behind, (linear.delay_s + run.late_s) / run.step_s)

@@ -15,9 +15,10 @@ from typing import Any, Literal
 import numpy as np
 
 from microrad.core import kernels, periodic
-from microrad.core.arrays import Floats
+from microrad.core.arrays import Floats, Integers
 from microrad.core.progress import Progress
 from microrad.core.threads import in_threads
+from microrad.lab.identify.linear.modal import Hold, beyond, late
 from microrad.lab.identify.records import IdentificationError, no_progress
 from microrad.lab.identify.statistics import Estimate, colour_inflation, correlation
 from microrad.lab.recording import Recording
@@ -31,6 +32,7 @@ _SCREENED = 1e-5  # and that at which it ends on fewer samples
 _DIFFERENCE = 1e-5
 _LINEAR_DIFFERENCE = 1.0
 _SLICE = 2_000_000
+_LINES = 30  # of the spectrum of a residual to either side, at least, that tell its power
 _FAR = 1e3  # times the largest output: a model further off is as good as none
 
 
@@ -56,13 +58,21 @@ class Parameter:
         return self.size or abs(self.start) or 1.0
 
 
+def _no_delay(_values: Floats) -> float:
+    return 0.0
+
+
 @dataclass(frozen=True, eq=False)
 class Structure:
-    """Parameters, and how they make a mirror: `build` takes their values, in their order, and raises nothing."""
+    """Parameters, and how they make a mirror: `build` takes their values, in their order, and raises nothing.
+
+    `late` gives, of the same values, the delay of the recording chain behind that mirror (s).
+    """
 
     name: str
     parameters: tuple[Parameter, ...]
     build: Callable[[Floats], Mirror]
+    late: Callable[[Floats], float] = _no_delay
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +82,7 @@ class FitRecord:
     `drive` (steps of `step_s`, actuators) goes to the plant, about its rest; every `stride`-th output, from the first,
     belongs to a row of `output` (samples, outputs). Rows before `first` are the transient. `nuisance` (used samples,
     columns) is what every output may add to itself freely: an offset, the tail of an older creep. `weight` is what one
-    unit of residual counts.
+    unit of residual counts. `hold` is what the drive does between two steps; `late_s` is a known delay of this record.
     """
 
     name: str
@@ -83,6 +93,8 @@ class FitRecord:
     first: int
     nuisance: Floats
     weight: float = 1.0
+    hold: Hold = "first-order"
+    late_s: float = 0.0
 
     @property
     def target(self) -> Floats:
@@ -181,20 +193,28 @@ def _one_period(recording: Recording, factor: int, hold: Interpolation) -> tuple
     return np.concatenate([one, one]), np.concatenate([np.zeros((period, mean.shape[1])), mean]), period
 
 
-def simulate_record(plant: kernels.Plant, run: FitRecord) -> Floats:
+def held(plant: kernels.Plant) -> kernels.Plant:
+    """The plant for a drive that is held over each step: drive and bank act with their values at its start."""
+    nothing = np.zeros_like(plant.E1)
+    return plant._replace(B0=plant.B0 + plant.B1, B1=np.zeros_like(plant.B1), E1=nothing, CE1=np.zeros_like(plant.CE1))
+
+
+def simulate_record(plant: kernels.Plant, run: FitRecord, delay_s: float = 0.0) -> Floats:
     """Output (samples, outputs) of the plant over a run, from rest.
 
     Args:
-        plant: The discrete plant, with the time step of the run's drive.
+        plant: The discrete plant, with the time step and the hold of the run's drive.
         run: The run, whose drive has `stride` steps in each sample of the output.
+        delay_s: Delay of the recording chain behind it, in s.
     """
     state = mirror.at_rest(plant)
-    output = np.empty((run.drive.shape[0], len(plant.outputs)))
-    bank = np.empty((run.drive.shape[0], 0))
-    for begin in range(0, run.drive.shape[0], _SLICE):  # the interpreter answers Ctrl-C between two of them
+    drive = beyond(run.drive, delay_s + run.late_s)
+    output = np.empty((drive.shape[0], len(plant.outputs)))
+    bank = np.empty((drive.shape[0], 0))
+    for begin in range(0, drive.shape[0], _SLICE):  # the interpreter answers Ctrl-C between two of them
         part = slice(begin, begin + _SLICE)
-        kernels.open_loop(plant, state, run.drive[part], output[part], bank[part])
-    return output[:: run.stride]
+        kernels.open_loop(plant, state, drive[part], output[part], bank[part])
+    return late(output, (delay_s + run.late_s) / run.step_s)[: run.drive.shape[0] : run.stride]
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,7 +222,8 @@ class PlantFit(Estimate):
     """What came out: the mirror, its parameters with their covariance, and how well it follows the records.
 
     `covariance`, over the parameters in their order, comes from the residuals of each run by themselves (the sandwich
-    (J'J)^-1 J'VJ (J'J)^-1), inflated by their colour (`statistics.colour_inflation`, the largest one is kept).
+    (J'J)^-1 J'VJ (J'J)^-1), with their colour counted for each direction (`coloured_scatter`). `colour_inflation`
+    (see `statistics`) is that of the most coloured residual.
     `residual_rms` has the shape (runs, outputs), in the units of the recordings, without the weights. `start_costs` are
     the costs reached from each start, before the search went on from the best, `agreeing_starts` how many came to
     within 0.1 % of it. `not_identified` names each parameter that the records do not fix, with the reason. Where the
@@ -239,6 +260,7 @@ class PlantProblem:
     def __init__(self, structure: Structure, records: Sequence[FitRecord]) -> None:
         """The parameters are searched in units of their scale."""
         self.structure, self.runs = structure, tuple(records)
+        self.steps = {(run.step_s, run.hold) for run in self.runs}
         self.scale = np.array([p.scale for p in structure.parameters])
         self.lower = np.array([p.lower for p in structure.parameters]) / self.scale
         self.upper = np.array([p.upper for p in structure.parameters]) / self.scale
@@ -256,12 +278,15 @@ class PlantProblem:
         return self.simulated(point.tobytes())
 
     def _simulate(self, point: bytes) -> Floats:
+        values = np.frombuffer(point) * self.scale
         try:
-            model = self.structure.build(np.frombuffer(point) * self.scale)
+            model = self.structure.build(values)
             plants = {step: mirror.discretise(model, step, often=True) for step in {run.step_s for run in self.runs}}
         except ValueError:
             return np.full(self.size, self.far)
-        used = [(run, simulate_record(plants[run.step_s], run)[run.first :]) for run in self.runs]
+        behind = self.structure.late(values)
+        of = {(step, hold): plants[step] if hold == "first-order" else held(plants[step]) for step, hold in self.steps}
+        used = [(run, simulate_record(of[run.step_s, run.hold], run, behind)[run.first :]) for run in self.runs]
         whole = np.concatenate([run.weight * without_nuisance(run.nuisance, output).ravel() for run, output in used])
         return np.where(np.abs(whole) < self.far, whole, self.far)  # nan and inf too
 
@@ -291,6 +316,15 @@ class PlantProblem:
             point: The scaled point.
             central: Whether differences are taken to both sides.
         """
+        return in_threads([partial(_triangle, part) for part in self.rows(point, central)])
+
+    def rows(self, point: Floats, central: bool) -> list[Floats]:
+        """Of each run its residual (first column) and derivatives, shape (used values, 1 + parameters).
+
+        Args:
+            point: The scaled point.
+            central: Whether differences are taken to both sides.
+        """
         here = self.modelled(point)
 
         def column(i: int) -> Floats:
@@ -306,8 +340,7 @@ class PlantProblem:
             return np.asarray((self.modelled(above) - self.modelled(below)) / step[i])
 
         columns = in_threads([partial(column, i) for i in range(point.size)])
-        parts = [part.T for part in np.split(np.array([here - self.measured, *columns]), self.edges, axis=1)]
-        return in_threads([partial(_triangle, part) for part in parts])
+        return [part.T for part in np.split(np.array([here - self.measured, *columns]), self.edges, axis=1)]
 
 
 def _triangle(rows: Floats) -> Floats:
@@ -388,12 +421,10 @@ def _report(problem: PlantProblem, best: Any, costs: list[float]) -> PlantFit:
     )
     colours = [colour_inflation(list(residual.T)) for residual in residuals]
     lost = problem.size / max(1, problem.size - values.size - sum(r.nuisance.shape[1] for r in problem.runs))
-    variances = [
-        lost * colour * run.weight**2 * float(np.mean(r**2))
-        for r, colour, run in zip(residuals, colours, problem.runs, strict=True)
-    ]
-    slopes = [triangle[:, 1:] for triangle in problem.triangles(best.x, central=True)]
-    covariance, condition = _covariance(slopes, variances, problem)
+    rows = problem.rows(best.x, central=True)
+    shapes = [(target.shape, part) for target, part in zip(problem.targets, rows, strict=True)]
+    scatter = lost * np.sum(in_threads([partial(coloured_scatter, part, *shape) for shape, part in shapes]), axis=0)
+    covariance, condition = _covariance([part[:, 1:] for part in rows], scatter, problem)
     problem.simulated.cache_clear()
     return PlantFit(
         structure=problem.structure,
@@ -411,24 +442,61 @@ def _report(problem: PlantProblem, best: Any, costs: list[float]) -> PlantFit:
     )
 
 
-def _covariance(slopes: Sequence[Floats], variances: Sequence[float], problem: PlantProblem) -> tuple[Floats, float]:
+def coloured_scatter(rows: Floats, samples: int, outputs: int) -> Floats:
+    """Covariance of the gradient J'r of a run, the colour of its residual counted line by line.
+
+    The residual is taken for stationary noise: then the covariance is the sum over frequencies of the power of the
+    residual times the transforms of the columns of J. That power is the mean over neighbouring lines, or the mean
+    weighed by what J has there where it is larger: what a model leaves of loops that repeat has its power at the same
+    lines as J, and noise has it anywhere but there, because it was fitted.
+
+    Args:
+        rows: Residual and J of the run, shape (samples x outputs, 1 + parameters).
+        samples: Number of samples.
+        outputs: Number of outputs.
+    """
+    total = np.zeros((rows.shape[1] - 1,) * 2)
+    for part in rows.reshape(samples, outputs, -1).transpose(1, 0, 2):
+        lines = np.fft.rfft(part, axis=0)
+        twice = np.full(len(lines), 2.0)
+        twice[0] = 1.0
+        if samples % 2 == 0:
+            twice[-1] = 1.0
+        size = np.linalg.norm(part[:, 1:], axis=0) + 1e-300
+        worth = np.sum(np.abs(lines[:, 1:] / size) ** 2, axis=1)
+        number = np.arange(len(lines))
+        half = np.maximum(_LINES, number // 10)
+        low, high = np.maximum(number - half, 0), np.minimum(number + half + 1, len(lines))
+
+        def over(values: Floats, low: Integers = low, high: Integers = high) -> Floats:
+            added = np.append(0.0, np.cumsum(values))
+            return np.asarray(added[high] - added[low])
+
+        squares = np.abs(lines[:, 0]) ** 2 / samples
+        power = np.maximum(over(squares) / (high - low), over(worth * squares) / np.maximum(over(worth), 1e-300))
+        weighed = lines[:, 1:] * np.sqrt(np.maximum(power, 0.0) * twice / samples)[:, None]
+        total += (weighed.conj().T @ weighed).real
+    return total
+
+
+def _covariance(slopes: Sequence[Floats], scatter: Floats, problem: PlantProblem) -> tuple[Floats, float]:
     """The sandwich in the parameters' units, and the condition number of J with columns of length 1.
 
-    Of each run, there are the rows of J and the variance of its residuals.
+    Of each run there are the rows of J; `scatter` is the covariance of the whole gradient.
     """
-    jacobian = np.concatenate(slopes)
-    length = np.sqrt(np.einsum("ij,ij->j", jacobian, jacobian)) + 1e-300
+    lengths = [np.einsum("ij,ij->j", part, part) for part in slopes]
+    length = np.sqrt(np.sum(lengths, axis=0)) + 1e-300
     if not np.isfinite(length).all():
         raise IdentificationError(
             f"{problem.structure.name}: a small change of the best parameters leads to a mirror that cannot be "
             "simulated, so nothing can be said of their errors; record loops over the whole range of the drive as well."
         )
-    gram = (jacobian.T @ jacobian) / np.outer(length, length)
+    gram = np.sum([part.T @ part for part in slopes], axis=0) / np.outer(length, length)
     values, vectors = np.linalg.eigh(gram)
     values = np.maximum(values, 1e-15)
     bread = (vectors / values) @ vectors.T
-    scattered = np.concatenate([math.sqrt(v) * rows for v, rows in zip(variances, slopes, strict=True)])
-    half = bread @ (scattered / length).T  # a square cannot come out negative
+    inner, turned = np.linalg.eigh(scatter / np.outer(length, length))
+    half = bread @ (turned * np.sqrt(np.maximum(inner, 0.0)))  # a square cannot come out negative
     size = problem.scale / length
     return np.asarray(size[:, None] * (half @ half.T) * size), float(math.sqrt(values[-1] / values[0]))
 

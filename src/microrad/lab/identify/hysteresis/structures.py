@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import NamedTuple
 
@@ -18,6 +18,8 @@ from microrad.mission.tables.mirror import roots_from_damping
 
 _RATIO = 0.999  # of alpha, at most: beyond it h would grow without bound
 _DAMPING = (1e-4, 0.9999)
+_ALLOWED = 4.0  # standard errors
+_LONGEST = 10.0  # times its start, or the decay of the fastest pole: the longest delay that is searched
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,11 +48,17 @@ class Roots:
 
 @dataclass(frozen=True, slots=True)
 class LinearPoles:
-    """A linear part of unit gain: poles, zeros, and the frequency (Hz) at which its magnitude is 1."""
+    """A linear part of unit gain: poles, zeros, and the frequency (Hz) at which its magnitude is 1.
+
+    `delay_s` is the pure delay of the recording chain, which is no part of `system`, and `delay_error_s` its standard
+    error where a response has shown it.
+    """
 
     poles: Roots
     zeros: Roots
     normalise_at_hz: float
+    delay_s: float = 0.0
+    delay_error_s: float = math.inf
 
     @property
     def system(self) -> lti.StateSpace:
@@ -141,8 +149,8 @@ class Axis(NamedTuple):
 class AxisStructure(Structure):
     """A `Structure` of one axis, whose parts can be had by themselves; another process makes it again from `recipe`."""
 
-    parts: Callable[[Floats], Axis]
-    recipe: Callable[[], "AxisStructure"]
+    parts: Callable[[Floats], Axis] = field(kw_only=True)
+    recipe: Callable[[], "AxisStructure"] = field(kw_only=True)
 
     def __reduce__(self) -> tuple[Callable[[], "AxisStructure"], tuple[()]]:
         """What pickles it: its closures cannot be."""
@@ -162,8 +170,8 @@ def one_axis(
     """One axis: hysteresis, behind it a linear part of unit gain where there is one (cascade), creep beside both.
 
     Of a Bouc-Wen model d1, epsilon, alpha and beta are fitted; beta, gamma and eta as shares of alpha, so that h stays
-    bounded. Of a Prandtl-Ishlinskii model the weights are fitted, the thresholds are not. Creep is one weight for all
-    its lags.
+    bounded. Of a Prandtl-Ishlinskii model the weights are fitted, the thresholds are not. Each lag of the creep has a
+    weight of its own. With the poles and zeros the delay of the recording chain is fitted.
 
     Args:
         name: Name of the mirror.
@@ -172,7 +180,7 @@ def one_axis(
         creep: The creep at which it begins.
         free: What is fitted as well: d2, delta, gamma, eta, exponent of a Bouc-Wen model, widening of a
             Prandtl-Ishlinskii model.
-        free_linear: Whether poles and zeros are fitted.
+        free_linear: Whether poles, zeros and the delay are fitted.
         admissible: Whether the slope of a Bouc-Wen model behind a slow reversal is kept from turning against d1.
     """
     hysteresis, make_model = (
@@ -201,7 +209,12 @@ def one_axis(
         free_linear=free_linear,
         admissible=admissible,
     )
-    return AxisStructure(name, (*hysteresis, *lags, *roots), build, parts, again)
+
+    def late(values: Floats) -> float:
+        found = make_linear(values[second:])
+        return 0.0 if found is None else found.delay_s
+
+    return AxisStructure(name, (*hysteresis, *lags, *roots), build, late, parts=parts, recipe=again)
 
 
 def _bouc_wen_part(
@@ -272,13 +285,16 @@ def _play_part(model: Play, free: Sequence[str]) -> tuple[tuple[Parameter, ...],
 def _creep_part(creep: Creep, gain: float) -> tuple[tuple[Parameter, ...], Callable[[Floats], Creep]]:
     if not creep.weights_rad_v:
         return (), lambda _: creep
-    weight = creep.weights_rad_v[0]
-    parameter = Parameter("creep", "rad/V", weight, size=max(abs(weight), 1e-3 * abs(gain)), linear=True)
+    least = 1e-3 * abs(gain)
+    parameters = tuple(
+        Parameter(f"creep at {tau:.4g} s", "rad/V", weight, size=max(abs(weight), least), linear=True)
+        for tau, weight in zip(creep.time_constants_s, creep.weights_rad_v, strict=True)
+    )
 
     def make(values: Floats) -> Creep:
-        return replace(creep, weights_rad_v=(float(values[0]),) * len(creep.time_constants_s))
+        return replace(creep, weights_rad_v=tuple(float(v) for v in values))
 
-    return (parameter,), make
+    return parameters, make
 
 
 def _linear_part(
@@ -293,6 +309,11 @@ def _linear_part(
             if abs(damping) < 1.0:
                 low, high = _DAMPING if kind == "pole" else (-_DAMPING[1], _DAMPING[1])
                 parameters.append(Parameter(f"{kind} {number} damping", "", damping, low, high, 0.1 * abs(damping)))
+    # A delay changes a response by as much as a pole does where it turns its phase by as much: by one radian there.
+    fastest = 1.0 / (2.0 * math.pi * max(linear.poles.frequencies_hz))
+    # A hysteresis that a model lacks looks like a delay in loops, so these move it no farther than a response allows.
+    reach = min(_LONGEST * max(fastest, abs(linear.delay_s)), _ALLOWED * linear.delay_error_s)
+    parameters.append(Parameter("delay", "s", linear.delay_s, linear.delay_s - reach, linear.delay_s + reach, fastest))
 
     def make(values: Floats) -> LinearPoles:
         at = iter(values)
@@ -301,6 +322,7 @@ def _linear_part(
             pairs = [(float(next(at)), float(next(at)) if abs(d) < 1.0 else d) for d in roots.dampings]
             return Roots(tuple(f for f, _ in pairs), tuple(d for _, d in pairs))
 
-        return replace(linear, poles=moved(linear.poles), zeros=moved(linear.zeros))
+        poles, zeros = moved(linear.poles), moved(linear.zeros)
+        return replace(linear, poles=poles, zeros=zeros, delay_s=float(next(at)))
 
     return tuple(parameters), make

@@ -185,7 +185,9 @@ class LinearFit(Uncertainty):
     `system` is continuous, real and block-diagonal; `modes` the same as poles and vectors. `fit_percent` (outputs,) is
     100 (1 - |y - yhat| / |y - mean y|) over the recordings, offsets removed: from rest, or in steady state where the
     recordings are periodic. `residual` (frequencies, outputs, inputs) is measured less
-    modelled response. `scan` is empty where the order was given; `reason` says in words why this order.
+    modelled response. `scan` is empty where the order was given; `reason` says in words why this order. `delay_s` with
+    its standard error is the pure delay of the recording chain, 0 where it was not fitted; `modes` have it, `system`
+    has not.
     """
 
     system: StateSpace
@@ -201,6 +203,8 @@ class LinearFit(Uncertainty):
     warnings: tuple[str, ...]
     response: FrequencyResponse
     residual: Complexes
+    delay_s: float = 0.0
+    delay_error_s: float = 0.0
 
 
 def fit_linear(
@@ -381,10 +385,29 @@ def _linear_fit(
         scan=tuple(scan),
         reason=reason,
         **vars(known),
-        warnings=(*_tones(model, records, rms, response.hold), *_warnings(known, response)),
+        warnings=linear_warnings(model, records, rms, response, known),
         response=response,
         residual=residual,
     )
+
+
+def linear_warnings(
+    model: ModalModel,
+    records: Sequence[Recording],
+    residual_rms: Floats,
+    response: FrequencyResponse,
+    known: Uncertainty,
+) -> tuple[str, ...]:
+    """What speaks against poles, zeros and gains.
+
+    Args:
+        model: The model.
+        records: The recordings that it was fitted to.
+        residual_rms: Rms of what it leaves of each output.
+        response: The response that it was fitted to.
+        known: Its poles, zeros and gains with their errors.
+    """
+    return (*_tones(model, records, residual_rms, response.hold), *_warnings(known, response))
 
 
 def _tones(model: ModalModel, records: Sequence[Recording], residual_rms: Floats, hold: Hold) -> list[str]:

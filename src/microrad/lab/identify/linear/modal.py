@@ -25,6 +25,9 @@ from microrad.lab.identify.records import IdentificationError
 
 Hold = Literal["zero-order", "first-order", "band-limited"]
 
+HOLD: Hold = "zero-order"
+"""What a recorded drive does between samples, unless it is said: what is recorded is what a converter was told."""
+
 
 class Step(NamedTuple):
     """Of modes x' = p x + u over one sample: x[k+1] = keep x[k] + begin u[k] + end u[k+1], and derivatives by p."""
@@ -42,13 +45,15 @@ class ModalModel:
     """Rank-one modes of a stable continuous system; real poles first, of each pair the pole with positive frequency.
 
     `poles_rad_s` has the shape (modes,), `input_vectors` (modes, inputs), `output_vectors` (outputs, modes) and
-    `direct` (outputs, inputs). The vectors of real poles are real.
+    `direct` (outputs, inputs). The vectors of real poles are real. `delay_s` is a pure delay of the recording chain:
+    responses and simulations have it, the state space has not.
     """
 
     poles_rad_s: Complexes
     input_vectors: Complexes
     output_vectors: Complexes
     direct: Floats
+    delay_s: float = 0.0
 
     @property
     def real_poles(self) -> int:
@@ -76,7 +81,10 @@ class ModalModel:
         Raises:
             IdentificationError: For a hold without a rate.
         """
-        return self.combined(hold_basis(self.all_poles_rad_s, freq_hz, hold, rate_hz)[0])
+        undelayed = self.combined(hold_basis(self.all_poles_rad_s, freq_hz, hold, rate_hz)[0])
+        if self.delay_s == 0.0:
+            return undelayed
+        return np.asarray(undelayed * np.exp(-2j * np.pi * np.asarray(freq_hz) * self.delay_s)[:, None, None])
 
     def combined(self, basis: Complexes) -> Complexes:
         """The direct term and the sum of all modes, each times its column of a basis (points, all poles)."""
@@ -295,10 +303,48 @@ def simulate(model: ModalModel, drive: Floats, rate_hz: float, hold: Hold = "zer
     Raises:
         IdentificationError: For a band-limited drive.
     """
+    samples = len(drive)
+    drive = beyond(drive, model.delay_s)
     states, _ = filtered(model.poles_rad_s, drive, hold, rate_hz)
     modes = np.einsum("ki,kit->kt", model.input_vectors, states)
     modes[model.real_poles :] *= 2.0
-    return np.asarray((model.output_vectors @ modes).real.T + drive @ model.direct.T)
+    output = (model.output_vectors @ modes).real.T + drive @ model.direct.T
+    return late(output, model.delay_s * rate_hz)[:samples]
+
+
+_TAPS = 20
+
+
+def beyond(drive: Floats, delay_s: float) -> Floats:
+    """A drive that stays at its end for as long as `late` looks ahead, where there is a delay.
+
+    Args:
+        drive: The drive, shape (samples, inputs).
+        delay_s: The delay, in s; at 0 nothing is looked at.
+    """
+    return drive if delay_s == 0.0 else np.concatenate([drive, np.repeat(drive[-1:], _TAPS, axis=0)])
+
+
+def late(signal: Floats, samples: float) -> Floats:
+    """A signal some samples later, between samples by the polynomial through the twenty nearest.
+
+    That is the Lagrange filter of T. Laakso et al., Splitting the unit delay, IEEE Signal Processing Magazine 13 (1996)
+    30: at a fifth of the sample rate it errs by 2e-5, at a quarter by 2e-4. Before its first and behind its last sample
+    the signal rests.
+
+    Args:
+        signal: The signal, shape (samples, channels).
+        samples: The delay in samples; below 0 the signal comes earlier.
+    """
+    if samples == 0.0:
+        return np.asarray(signal)
+    whole = math.floor(samples)
+    at = np.arange(_TAPS) - _TAPS // 2 + 1  # samples later than `whole` that take part
+    others = [at[at != k] for k in at]
+    taps = np.array([np.prod((samples - whole - o) / (k - o)) for k, o in zip(at, others, strict=True)])
+    last = len(signal) - 1
+    padded = signal[np.clip(np.arange(-int(at[-1]), last + 1 - int(at[0])) - whole, 0, last)]
+    return np.stack([np.convolve(column, taps, mode="valid") for column in padded.T], axis=1)
 
 
 def simulate_periodic(model: ModalModel, period: Floats, rate_hz: float, hold: Hold = "zero-order") -> Floats:

@@ -10,16 +10,19 @@ from functools import cached_property, partial
 
 import numpy as np
 
+from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
 from microrad.core.threads import shared_out
 from microrad.lab.identify.hysteresis.bouc_wen import BoucWenFit, fit_bouc_wen
 from microrad.lab.identify.hysteresis.joint import FORMS, JointFit, fit_joint, time_constants
 from microrad.lab.identify.hysteresis.prandtl_ishlinskii import fit_prandtl_ishlinskii
 from microrad.lab.identify.hysteresis.structures import LinearPoles, poles_of
-from microrad.lab.identify.linear.fit import LinearFit, fit_linear
+from microrad.lab.identify.linear.axis import fit_axis
+from microrad.lab.identify.linear.fit import LinearFit
+from microrad.lab.identify.linear.modal import Hold
 from microrad.lab.identify.records import IdentificationError, SiRecord, Units, no_progress
 from microrad.lab.identify.selection.predictions import Fit, Prediction, Score, ScoredModel, predict
-from microrad.lab.identify.statistics import percent
+from microrad.lab.identify.statistics import may_be_chance, percent
 from microrad.lab.recording import Recording
 
 STATIC = ("prandtl_ishlinskii", "bouc_wen", "bouc_wen_admissible")
@@ -27,6 +30,7 @@ STATIC = ("prandtl_ishlinskii", "bouc_wen", "bouc_wen_admissible")
 
 MODELS = (*STATIC, *FORMS)
 _STARTS = 12
+_REACH, _POLISHED = 2.0, 2  # by how much a fit may be worse and still be polished, and how many are
 
 
 @dataclass(frozen=True)
@@ -38,7 +42,7 @@ class Refused:
 
 
 def fit_linear_part(
-    response: Sequence[Recording], units: Units, models: Sequence[str], on_progress: Progress
+    response: Sequence[Recording], units: Units, models: Sequence[str], hold: Hold, on_progress: Progress
 ) -> LinearFit | None:
     """The linear part of the broadband recordings, in volts and radians; None where no model asks for it.
 
@@ -46,6 +50,7 @@ def fit_linear_part(
         response: Broadband recordings that can be averaged together.
         units: Their units.
         models: The models that are to be fitted.
+        hold: What the drives do between samples.
         on_progress: Called with the steps done, their number and what is done.
     """
     if not response or not set(models) & set(FORMS):
@@ -53,7 +58,7 @@ def fit_linear_part(
     scaled = [  # about the first drive value, where the mirror rests
         replace(r, drive=(r.drive - r.drive[:1]) * units.volts, output=r.output * units.radians) for r in response
     ]
-    return fit_linear(scaled, strictly_proper=True, on_progress=on_progress)
+    return fit_axis(scaled, hold=hold, on_progress=on_progress)
 
 
 def supported_models(
@@ -91,7 +96,7 @@ class Candidates:
     """The recordings that the models are fitted to and judged by, and how.
 
     `heads` are the fitted parts of `loops`, up to `splits`; `span_rad` is the peak-to-peak output that percentages
-    refer to, `seed` that of scattered starts.
+    refer to, `seed` that of scattered starts, `hold` what a drive does between samples.
     """
 
     loops: Sequence[Recording]
@@ -104,6 +109,7 @@ class Candidates:
     span_rad: float
     seed: int
     admissible: bool
+    hold: Hold
 
     def fit_all(
         self, models: Sequence[str], on_progress: Progress, on_fit: Callable[[Fit], None], *, side_by_side: bool = False
@@ -122,6 +128,7 @@ class Candidates:
         poles = None
         if self.linear is not None:
             poles = poles_of(self.linear.system, self.linear.excited_hz, self.linear.rate_hz)
+            poles = replace(poles, delay_s=self.linear.delay_s, delay_error_s=self.linear.delay_error_s)
         efforts = [_STARTS if model in ("bouc_wen", "bouc_wen_admissible") else 1 for model in models]
         ahead = self._side_by_side(models, efforts, poles, on_progress) if side_by_side else {}
         fits: list[Fit] = []
@@ -208,28 +215,46 @@ class Candidates:
             vars(self)["_static_start"] = fit
         return fit
 
-    def fit_joint(
-        self, model: str, poles: LinearPoles | None, progress: Progress, *, free_linear: bool = False
-    ) -> JointFit:
-        """The fit of one of `FORMS`.
+    def fit_joint(self, model: str, poles: LinearPoles | None, progress: Progress) -> JointFit:
+        """The fit of one of `FORMS`, its linear part held.
 
         Args:
             model: Its name.
             poles: The linear part in cascade.
             progress: Called once, before the fit.
-            free_linear: Whether poles and zeros are fitted with the rest, and the broadband recording with the loops.
         """
-        progress(0, 1, "linear part, hysteresis and creep together" if free_linear else f"fitting {model}")
+        progress(0, 1, f"fitting {model}")
         return fit_joint(
             self.heads,
             model,
             self.units,
             linear=poles,
-            free_linear=free_linear,
             admissible=self.admissible,
-            broadband=self.broadband if free_linear else (),
             static=self._static_start if FORMS[model].family == "bouc_wen" else None,
+            hold=self.hold,
             seed=self.seed,
+        )
+
+    def freed(self, begin: JointFit, progress: Progress, *, search: bool = True) -> JointFit:
+        """A joint fit with poles, zeros and delay free as well, to the broadband recording and the loops.
+
+        Args:
+            begin: Where the search begins.
+            progress: Called once, before the fit.
+            search: Whether anything moves; if not, only the errors of all numbers there are found.
+        """
+        progress(0, 1, "linear part, hysteresis and creep together")
+        return fit_joint(
+            self.heads,
+            begin.name,
+            self.units,
+            linear=begin.linear,
+            free_linear=True,
+            admissible=self.admissible,
+            broadband=self.broadband,
+            hold=self.hold,
+            begin=begin,
+            search=search,
         )
 
     @cached_property
@@ -275,25 +300,55 @@ class Candidates:
         )
 
 
-def refit_winner(
-    candidates: Candidates, winner: Fit, predictions: tuple[Prediction, ...], on_progress: Progress
-) -> tuple[Fit, tuple[Prediction, ...]]:
-    """Fit the winner once more with all its numbers free, its linear part among them.
+def within_reach(fits: Sequence[Fit], predictions: Sequence[Sequence[Prediction]]) -> list[int]:
+    """Numbers of the fits that may be the best once everything is free, the best first.
 
-    The new fit is taken where it is no worse on the held-out part; one without a linear part stays as it is.
+    Those are joint fits with a linear part that leave at most twice of what the best fit leaves on the samples that no
+    fit has seen, and no more than two.
+
+    Args:
+        fits: The fits.
+        predictions: Of each fit, its prediction of each recording.
+    """
+    squares = [_held_out_squares(each) for each in predictions]
+    near = [i for i, fit in enumerate(fits) if has_linear(fit) and squares[i] <= _REACH**2 * min(squares)]
+    return sorted(near, key=lambda i: squares[i])[:_POLISHED]
+
+
+def has_linear(fit: Fit) -> bool:
+    """Whether poles and zeros belong to a fit."""
+    return isinstance(fit, JointFit) and fit.linear is not None
+
+
+def refit(
+    candidates: Candidates, fit: Fit, predictions: tuple[Prediction, ...], on_progress: Progress
+) -> tuple[Fit, tuple[Prediction, ...]]:
+    """Fit a model once more with all its numbers free, its linear part among them.
+
+    The new fit is taken where it is no worse on the held-out part, but for chance. Where it is worse the model stays
+    where it was, with the errors that all its numbers have there. One without a linear part stays as it is.
 
     Args:
         candidates: The recordings that the models are fitted to and judged by.
-        winner: The fit chosen.
+        fit: The fit.
         predictions: Its prediction of each recording.
         on_progress: Called with the starts done, their number and what is done.
     """
-    if not isinstance(winner, JointFit) or winner.linear is None:
-        return winner, predictions
-    free = candidates.fit_joint(winner.name, winner.linear, on_progress, free_linear=True)
+    if not isinstance(fit, JointFit) or fit.linear is None:
+        return fit, predictions
+    free = candidates.freed(fit, on_progress)
     seen = candidates.predict(free)
-    return (free, seen) if _held_out_squares(seen) <= _held_out_squares(predictions) else (winner, predictions)
+    if may_be_chance(_losses(seen), _losses(predictions)):
+        return free, seen
+    there = candidates.freed(fit, on_progress, search=False)
+    settled = replace(there.fit, converged=fit.fit.converged, evaluations=fit.fit.evaluations)
+    return replace(there, fit=settled), predictions
+
+
+def _losses(predictions: Sequence[Prediction]) -> list[Floats]:
+    """Squared residuals on the samples that no fit has seen, of each recording that has some."""
+    return [r**2 for p in predictions if (r := p.residual_rad[p.split :]).size]
 
 
 def _held_out_squares(predictions: Sequence[Prediction]) -> float:
-    return float(sum(np.sum(p.residual_rad[p.split :] ** 2) for p in predictions))
+    return float(sum(np.sum(loss) for loss in _losses(predictions)))

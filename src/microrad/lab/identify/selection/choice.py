@@ -9,6 +9,7 @@ import numpy as np
 from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
 from microrad.lab.identify.linear.fit import LinearFit
+from microrad.lab.identify.linear.modal import HOLD, Hold
 from microrad.lab.identify.records import IdentificationError, SiRecord, Units, no_progress, si_records, span
 from microrad.lab.identify.selection.candidates import (
     MODELS,
@@ -16,8 +17,10 @@ from microrad.lab.identify.selection.candidates import (
     Candidates,
     Refused,
     fit_linear_part,
-    refit_winner,
+    has_linear,
+    refit,
     supported_models,
+    within_reach,
 )
 from microrad.lab.identify.selection.predictions import (
     Evidence,
@@ -140,14 +143,15 @@ def identify(  # noqa: PLR0913  all but the first are named options in practice
     lever_arm_m: float | None = None,
     input_unit: str = "V",
     on_fit: Callable[[ScoredModel], None] = lambda judged: None,
+    hold: Hold = HOLD,
     side_by_side: bool = False,
 ) -> Identification:
     """Fit the models on the first part of each recording and choose the one that is better on the rest.
 
     Broadband recordings (chirps, multisines; see `roles`) give the linear part, which the joint models have in cascade;
     they are not split. The lowest residual rms over all held-out samples wins; where the difference may be chance an
-    admissible model goes before one that is not, and fewer parameters before more. A winner with a linear part is
-    fitted once more with everything free.
+    admissible model goes before one that is not, and fewer parameters before more. Before that the best few with a
+    linear part are fitted once more with everything free.
 
     Args:
         recordings: One drive and one output each.
@@ -162,6 +166,8 @@ def identify(  # noqa: PLR0913  all but the first are named options in practice
         lever_arm_m: Distance from the axis of rotation to the point measured, where that is a length.
         input_unit: Unit of the drives: V or mV.
         on_fit: Given each model as soon as it is fitted, and the winner again when everything was free.
+        hold: What a drive does between samples: "zero-order" where the record is what a converter was told,
+            "first-order" where the drive itself was measured.
         side_by_side: Whether several models are fitted at once, in another process too; then `on_fit` is given them
             when all are fitted.
 
@@ -186,7 +192,7 @@ def identify(  # noqa: PLR0913  all but the first are named options in practice
     seen = {id(r): head for r, head in zip(loops, heads, strict=True)}
     alone = single_period(response)
     response = [whole_periods(seen.get(id(r), r)) if alone or id(r) in seen else r for r in response]
-    linear = fit_linear_part(response, units, models, on_progress)
+    linear = fit_linear_part(response, units, models, hold, on_progress)
     names, refused = supported_models(models, prepared, linear is not None)
     candidates = Candidates(
         loops=loops,
@@ -199,6 +205,7 @@ def identify(  # noqa: PLR0913  all but the first are named options in practice
         span_rad=span(prepared),
         seed=seed,
         admissible=admissible,
+        hold=hold,
     )
     predictions: list[tuple[Prediction, ...]] = []
 
@@ -207,14 +214,36 @@ def identify(  # noqa: PLR0913  all but the first are named options in practice
         on_fit(candidates.scored(fit, predictions[-1]))
 
     fits, failed = candidates.fit_all(names, on_progress, judge, side_by_side=side_by_side and len(names) > 1)
-    best = choose_best(fits, [[r for p in each if (r := p.residual_rad[p.split :]).size] for each in predictions])
-    winner = fits[best]
-    fits[best], predictions[best] = refit_winner(candidates, winner, predictions[best], on_progress)
-    if fits[best] is not winner:
-        on_fit(candidates.scored(fits[best], predictions[best]))
+    best = _polished(candidates, fits, predictions, on_progress, on_fit)
     sources = _sources(candidates, broadband, served.response if linear is not None else ())
     notes = use_warnings(served, linear=linear is not None)
     return _identification(candidates, prepared, fits, predictions, best, [*refused, *failed], sources, notes)
+
+
+def _polished(
+    candidates: Candidates,
+    fits: list[Fit],
+    predictions: list[tuple[Prediction, ...]],
+    on_progress: Progress,
+    on_fit: Callable[[ScoredModel], None],
+) -> int:
+    """Number of the best fit, the best few and it fitted once more with everything free, in place."""
+    done: set[int] = set()
+    turns = within_reach(fits, predictions)
+    while turns:
+        for i in turns:
+            before = fits[i]
+            fits[i], predictions[i] = refit(candidates, before, predictions[i], on_progress)
+            if fits[i] is not before:
+                on_fit(candidates.scored(fits[i], predictions[i]))
+        done |= set(turns)
+        best = _best(fits, predictions)
+        turns = [best] if has_linear(fits[best]) and best not in done else []
+    return _best(fits, predictions)
+
+
+def _best(fits: Sequence[Fit], predictions: Sequence[Sequence[Prediction]]) -> int:
+    return choose_best(fits, [[r for p in each if (r := p.residual_rad[p.split :]).size] for each in predictions])
 
 
 def _check_distinct(recordings: Sequence[Recording], validation: Sequence[Recording]) -> None:

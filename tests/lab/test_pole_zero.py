@@ -1,0 +1,188 @@
+"""The linear part of one axis: no pole more than the mirror has; delay, hold, creep and hysteresis are none of it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.signal import chirp, lsim
+
+from microrad.lab.identify.hysteresis.joint import fit_joint
+from microrad.lab.identify.hysteresis.plant_fit import coloured_scatter, held
+from microrad.lab.identify.hysteresis.structures import LinearPoles, Roots
+from microrad.lab.identify.linear.axis import fit_axis
+from microrad.lab.identify.linear.modal import late
+from microrad.lab.identify.records import Units
+from microrad.lab.recording import recording_from_arrays
+from microrad.mirror import model as mirror
+from truths import behind_resonance, creep, philox, plays, recorded, two_sines
+
+RATE, FINE = 20_000.0, 4
+GAIN = 8e-5
+
+
+def swept(seconds=0.6, lowest=2.0, highest=2000.0, size=0.25):
+    time = np.arange(round(seconds * RATE)) / RATE
+    return 5.0 + size * chirp(time, lowest, seconds, highest, method="logarithmic", phi=-90)
+
+
+def answer(drive, poles, *, between="first-order", delay_s=0.0, zeros=(), creeps=False, turned=None):
+    """Output (rad) of poles and zeros (rad/s) with unit gain at rest, on a grid so fine that a delay is whole steps."""
+    fine = np.arange((drive.size - 1) * FINE + 1) / FINE
+    moved = drive - drive[0] if turned is None else turned(drive)
+    moved = np.interp(fine, np.arange(drive.size), moved) if between == "first-order" else moved[fine.astype(int)]
+    numerator, denominator = np.atleast_1d(np.real(np.poly(zeros))), np.real(np.poly(poles))
+    system = (numerator * denominator[-1] / numerator[-1], denominator)
+    output = GAIN * lsim(system, moved, fine / RATE, interp=between == "first-order")[1]
+    if creeps:
+        output += creep(moved, FINE * RATE, 10.0 ** np.arange(-1.75, 2.0, 0.5), 0.006 * GAIN)
+    steps = round(delay_s * RATE * FINE)
+    assert steps == pytest.approx(delay_s * RATE * FINE)
+    return np.concatenate([np.zeros(steps), output[: output.size - steps]])[::FINE]
+
+
+def measured(drive, output, noise=4e-4, name="chirp"):
+    """Noise of 0.04 % of what the mirror moves for 10 V."""
+    noisy = output + noise * 10 * GAIN * philox(3).standard_normal(output.size)
+    return recording_from_arrays(drive, noisy, RATE, name)
+
+
+def pair(natural_hz, damping):
+    w = 2 * np.pi * natural_hz
+    return [w * complex(-damping, s * np.sqrt(1 - damping**2)) for s in (1, -1)]
+
+
+def found(fit):
+    """Poles in Hz, of pairs the upper one, with their errors."""
+    upper = fit.poles_rad_s.imag >= 0
+    return fit.poles_rad_s[upper] / (2 * np.pi), fit.poles_error_rad_s[upper] / (2 * np.pi)
+
+
+def assert_poles(fit, *poles):
+    upper = [p / (2 * np.pi) for p in poles if p.imag >= 0]
+    values, errors = found(fit)
+    assert len(values) == len(upper), values
+    for value, error in zip(values, errors, strict=True):
+        nearest = min(upper, key=lambda p: abs(p - value))
+        assert abs(value - nearest) < 4 * error
+        assert error < 0.1 * abs(nearest)
+
+
+# ------------------------------------------------------------------------------------------------------------- poles
+def test_a_resonance_with_creep_is_one_pair_of_poles():
+    poles = pair(420.0, 0.025)
+    drive = swept()
+    record = measured(drive, answer(drive, poles, creeps=True))
+    fit = fit_axis([record], hold="first-order")
+    assert_poles(fit, *poles)
+    assert fit.zeros_rad_s.size == 0
+    assert abs(fit.delay_s) < 4 * fit.delay_error_s < 4e-6
+
+
+@pytest.mark.parametrize("between", ["zero-order", "first-order"])
+def test_a_delay_is_no_pole_and_the_hold_is_the_one_that_was_named(between):
+    poles = pair(1200.0, 0.4)
+    drive = swept(highest=2500.0)
+    record = measured(drive, answer(drive, poles, between=between, delay_s=0.625e-4))
+    fit = fit_axis([record], hold=between)
+    assert_poles(fit, *poles)
+    assert abs(fit.delay_s - 0.625e-4) < 4 * fit.delay_error_s < 4e-6
+    other = fit_axis([record], hold="first-order" if between == "zero-order" else "zero-order")
+    assert min(s.criterion for s in other.scan) > min(s.criterion for s in fit.scan) + 4.0
+
+
+def test_a_pole_and_a_zero_that_the_response_needs_stay():
+    poles = [-2 * np.pi * 60.0 + 0j, *pair(1200.0, 0.3)]
+    drive = swept()
+    fit = fit_axis([measured(drive, answer(drive, poles, zeros=[-2 * np.pi * 66.0]))], hold="first-order")
+    assert_poles(fit, *poles)
+    assert abs(abs(fit.zeros_rad_s[0]) / (2 * np.pi) - 66.0) < 4 * fit.zeros_error_rad_s[0] / (2 * np.pi)
+
+
+def test_the_loss_of_small_loops_is_no_pole():
+    poles = pair(420.0, 0.05)
+    drive = swept(size=1.0)
+    output = answer(drive, poles, turned=lambda u: plays(u, (0.0, 0.2, 0.5), (0.9, 0.06, 0.04)))
+    fit = fit_axis([measured(drive, output)], hold="first-order")
+    assert_poles(fit, *poles)
+
+
+def test_a_shift_between_samples():
+    time = np.arange(300.0)[:, None]
+    for samples in (0.0, 3.0, -2.0, 0.4, -1.3):
+        shifted = late(np.sin(2 * np.pi * 0.1 * time), samples)
+        away = np.abs(shifted - np.sin(2 * np.pi * 0.1 * (time - samples)))[10:-10].max()
+        assert away < (1e-12 if samples == round(samples) else 1e-5)
+    assert_allclose(late(np.sin(time), 400.0)[:5], 0.0, atol=1e-12)  # it rests before its first sample
+
+
+# ------------------------------------------------------------------------------------------------------ the joint fit
+def test_a_held_drive_is_that_of_a_converter():
+    drive = two_sines(400)
+    linear = LinearPoles(Roots((150.0,), (0.35,)), Roots((), ()), 3.0)
+    model = mirror.assemble("m", "cascade", linear.system, mirror_of_gain(), mirror_creep())
+    plant = held(mirror.discretise(model, 1e-3))
+    output = simulated(plant, drive)
+    gain = behind_resonance(GAIN * (drive - drive[0]), 1e3, held=True)
+    slow = lsim(([1.0], [0.1, 1.0]), drive - drive[0], np.arange(400) / 1e3, interp=False)[1]
+    scale = linear.system  # of unit gain at 3 Hz, not at rest
+    at_rest = float((scale.C @ np.linalg.solve(-scale.A, scale.B))[0, 0])
+    assert_allclose(output, at_rest * gain + 1e-6 * slow, atol=1e-4 * np.ptp(output))
+
+
+def mirror_of_gain():
+    from microrad.mirror.hysteresis import Play
+
+    return Play((0.0,), (GAIN,))
+
+
+def mirror_creep():
+    from microrad.mirror.hysteresis import Creep
+
+    return Creep((1e-6,), (0.1,))
+
+
+def simulated(plant, drive):
+    from microrad.core import kernels
+
+    output = np.empty((drive.size, 1))
+    moved = (drive - drive[0])[:, None].copy()
+    kernels.open_loop(plant, mirror.at_rest(plant), moved, output, np.empty((drive.size, 0)))
+    return output[:, 0]
+
+
+def test_the_delay_is_fitted_with_the_poles_and_belongs_to_the_recording():
+    drive = swept(seconds=0.6, lowest=5.0, size=3.0)
+    poles = pair(700.0, 0.3)
+    record = recording_from_arrays(drive, 1e3 * answer(drive, poles, delay_s=1e-4), RATE, "large chirp")
+    start = LinearPoles(Roots((650.0,), (0.35,)), Roots((), ()), 10.0)
+    fit = fit_joint([record], "linear", Units(), linear=start, free_linear=True, hold="first-order")
+    assert fit.delay_s == pytest.approx(1e-4, abs=1e-6)
+    assert fit.linear.poles.frequencies_hz[0] == pytest.approx(700.0, rel=2e-3)
+    assert fit.fit.converged
+    simulated_late = fit.response(drive, 1 / RATE)[0]
+    at_once = replace(fit, linear=replace(fit.linear, delay_s=0.0)).response(drive, 1 / RATE)[0]
+    assert_allclose(simulated_late[2:], at_once[:-2], atol=2e-3 * np.ptp(at_once))  # two samples later
+
+
+def test_the_error_of_a_sum_counts_the_colour_of_what_is_left():
+    """Of a mean of correlated noise the variance is that of white noise times (1 + a) / (1 - a)."""
+    a, n = 0.9, 4000
+    white = philox(2).standard_normal((n, 40))
+    coloured = np.zeros_like(white)
+    for k in range(1, n):
+        coloured[k] = a * coloured[k - 1] + white[k]
+    fast = np.cos(np.pi * np.arange(n))  # where that noise is weakest
+    columns = np.column_stack([np.ones(n), fast])
+    scatter = [coloured_scatter(np.column_stack([r, columns]), n, 1) for r in coloured.T]
+    slow_factor, fast_factor = (np.median([s[i, i] for s in scatter]) / n for i in (0, 1))
+    assert slow_factor == pytest.approx(1 / (1 - a) ** 2, rel=0.35)
+    assert fast_factor == pytest.approx(1 / (1 + a) ** 2, rel=0.35)
+    plain = coloured_scatter(np.column_stack([white[:, 0], columns]), n, 1)
+    assert_allclose(np.diag(plain) / n, 1.0, rtol=0.3)
+
+
+def test_what_lies_between_samples_changes_nothing_without_a_linear_part():
+    record = recorded(two_sines(), plays(two_sines(), (0.0, 1.0), (6e-5, 1e-5)))
+    fits = [fit_joint([record], "prandtl_ishlinskii_rate", Units(), hold=h) for h in ("zero-order", "first-order")]
+    assert_allclose(fits[0].fit.values, fits[1].fit.values, rtol=0, atol=0)
