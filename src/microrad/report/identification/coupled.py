@@ -169,7 +169,8 @@ def _choice(found: CoupledIdentification, figures: Mapping[str, Figure]) -> View
     none = "" if refused else "No model was refused."
     which = "Models that were refused, with the reason:" if refused else none
     picture = figures.get("error-over-parameters")
-    return View("Which model", told(picture, stopped, _candidates(found), which, Points(refused)))
+    notes = Points([f"{c.name}: {c.note}" for c in found.candidates if c.note])
+    return View("Which model", told(picture, stopped, _candidates(found), notes, which, Points(refused)))
 
 
 def _candidates(found: CoupledIdentification, *, short: bool = False) -> Table:
@@ -184,19 +185,18 @@ def _candidates(found: CoupledIdentification, *, short: bool = False) -> Table:
     for candidate in ranked:
         shares = words.shares(candidate, found)
         cells = (words.part(float(shares[k])) for k in shown)
-        said = _standing(candidate, found) if short else [*_standing(candidate, found), candidate.note]
         name, count, error = candidate.name, str(candidate.parameters), words.part(candidate.error_share)
-        rows.append((name, count, error, *cells, "; ".join(filter(None, said))))
+        rows.append((name, count, error, *cells, _standing(candidate, found)))
     at = [f"at {quantity(float(found.amplitudes_v[k]), 'V')} rms" for k in shown]
     headings = ("model", "parameters", "held-out error", *at, "")
     standing_out = [k for k, candidate in enumerate(ranked) if candidate.name == found.chosen]
     return Table("", headings, rows, (0, len(headings) - 1), best=standing_out, cards=True)
 
 
-def _standing(candidate: Candidate, found: CoupledIdentification) -> list[str]:
+def _standing(candidate: Candidate, found: CoupledIdentification) -> str:
     if candidate.name == found.chosen:
-        return ["chosen"]
-    return ["within noise"] if candidate.name in found.within_noise else []
+        return "chosen"
+    return "within noise" if candidate.name in found.within_noise else ""
 
 
 def _amplitudes(found: CoupledIdentification, *, short: bool = False) -> Table:
