@@ -67,6 +67,7 @@ benchmark: $(VENV)/.test
 	$(BIN)/python benchmarks/hysteresis_fit.py
 	$(BIN)/python benchmarks/cubespec_linear.py
 	$(BIN)/python benchmarks/cubespec_one_model.py
+	$(BIN)/python benchmarks/cubespec_ladder.py
 	$(BIN)/python benchmarks/studio_map.py
 
 clean:

@@ -42,13 +42,15 @@ class Spread:
 
 
 def line_spectra(records: Sequence[Recording], response: FrequencyResponse) -> LineSpectra | None:
-    """Spectra of the mean period of each record at the lines of their response; None where they do not repeat.
+    """Spectra of the mean period of each record at the lines of their response.
+
+    None where the records do not repeat, or are no more than the drives: then none is left to tell how they scatter.
 
     Args:
         records: The records.
         response: Their response.
     """
-    if any(r.period_samples is None for r in records):
+    if any(r.period_samples is None for r in records) or len(records) <= records[0].drive.shape[1]:
         return None
     period = records[0].period_samples or 1
     lines = np.rint(response.freq_hz * period / records[0].rate_hz).astype(int)
