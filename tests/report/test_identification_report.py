@@ -15,8 +15,8 @@ from scipy.signal import cont2discrete, lfilter
 
 from microrad import report
 from microrad.core.kernels import play_response
+from microrad.core.units import format_quantity
 from microrad.lab.identify import Refused, identify, mirror_file_text
-from microrad.lab.identify.selection import candidates
 from microrad.lab.identify.statistics import rounded_to_error
 from microrad.lab.recording import Finding, recording_from_arrays
 from microrad.report.identification import figures, words
@@ -87,16 +87,14 @@ def static():
 
 @pytest.fixture(scope="module")
 def recordings():
-    return [loop(60.0, 1, "60.csv"), loop(80.0, 2, "80.csv"), loop(100.0, 3, "100.csv"), chirp()]
+    return [loop(15.0, 1, "15.csv"), loop(20.0, 2, "20.csv"), loop(25.0, 3, "25.csv"), chirp()]
 
 
 @pytest.fixture(scope="module")
 def full(recordings):
     """Loops and a chirp: a linear part, a joint model, refusals, and a recording for validation."""
     models = ("prandtl_ishlinskii", "bouc_wen", "linear")
-    with pytest.MonkeyPatch.context() as patch:  # the paper's model stays the best: no other is polished
-        patch.setattr(candidates, "_REACH", 0.0)
-        found = identify(recordings, 0.5, models=models, validation=[loop(70.0, 4, "70.csv")])
+    found = identify(recordings, 0.5, models=models, validation=[loop(17.5, 4, "17.csv")])
     return replace(found, refused=(Refused("prandtl_ishlinskii_creep", "the longest recording lasts <1 s"),))
 
 
@@ -251,13 +249,13 @@ def test_recordings_have_their_roles_hashes_and_findings(full, recordings, no_fi
     text = text_of(write(found, tmp_path / "r.html", recordings=recordings))
     files = {row[0]: row[1:] for row in rows_of(text) if len(row) == 7 and row[0].endswith(".csv")}
     assert {name: cells[0] for name, cells in files.items()} == {
-        "60.csv": "loops",
-        "80.csv": "loops",
-        "100.csv": "loops",
+        "15.csv": "loops",
+        "20.csv": "loops",
+        "25.csv": "loops",
         "chirp.csv": "broadband",
-        "70.csv": "validation",
+        "17.csv": "validation",
     }
-    assert files["60.csv"][1:] == ["60 Hz, ± 6 V about 6 V", "2 kHz", "300", "300", "300 ms"]
+    assert files["15.csv"][1:] == ["15 Hz, ± 6 V about 6 V", "2 kHz", "300", "300", "300 ms"]
     assert files["chirp.csv"][1:] == ["many frequencies, ± 0.2 V about 0 V", "2 kHz", "8000", "0", "4 s"]
     for source in full.sources:
         assert source.sha256 in text
@@ -305,13 +303,13 @@ def test_loops_show_measured_and_modelled_output_and_the_hysteresis(full, record
         "measured, unseen by the fit",
         "modelled",
     ]
-    period = math.ceil(RATE_HZ / 60.0) + 1
+    period = math.ceil(RATE_HZ / 15.0) + 1
     assert unseen.x.size == pytest.approx(period, abs=1)
     np.testing.assert_array_equal(unseen.x, full.recordings[0].drive[-unseen.x.size :, 0])
     moved = 1e3 * (p.measured_rad - p.model_rad)[-period:]
     np.testing.assert_allclose(unseen.y - model.y, moved, atol=1e-12)
     assert np.ptp(right.all_of(Line)[1].y) / 1e3 < 0.5 * np.ptp(unseen.y)
-    assert "60 Hz, ± 6 V" in right.title
+    assert "15 Hz, ± 6 V" in right.title
     assert "unseen" in right.title
 
 
@@ -511,7 +509,7 @@ def test_the_verdict_compares_with_the_papers_model_and_the_line(full, static):
     beside = f"The paper's model (bouc_wen) leaves {paper.held_out_rms_percent * full.span_rad * 1e4:.3g} µrad rms"
     assert beside in " ".join(words.verdict(other))
     assert f", {ratio:.3g} times as much, a straight" in " ".join(words.verdict(other))
-    assert f"rates up to {full.rate_limit_v_per_s / 1e3:.4g} kV/s" in said
+    assert f"rates up to {format_quantity(full.rate_limit_v_per_s, 'V/s', 4)}" in said
     freq = full.rate_limit_v_per_s / (math.pi * (full.drive_max_v - full.drive_min_v))
     assert f"reaches at {freq:.4g} Hz" in said
     assert "from 0 V to 12 V" in said
