@@ -2,6 +2,8 @@
 
 import importlib.util
 import math
+import os
+import subprocess
 import sys
 from dataclasses import replace
 
@@ -120,3 +122,28 @@ def test_table_takes_weights_together_and_the_residual_apart():
         (coverage.RESIDUAL, 2),
         ("all parameters", 6),
     ]
+
+
+# ---- a few of them identified
+@pytest.mark.parametrize("seed", [32, pytest.param(12, marks=pytest.mark.endurance)])
+def test_known_truth_is_found_within_its_errors(seed):
+    """Plays with creep and a delay, and with a delay: each number within four of its errors."""
+    found = coverage.judged(coverage.draw_truth(seed))
+    by = {each.name: each for each in found.judged}
+    assert {"resonance", "damping", "delay", "gain of large drives", coverage.RESIDUAL} <= set(by)
+    assert ("creep a decade" in by) == found.chosen.endswith("creep") == (seed == 32)
+    assert len(found.poles_hz) == 1  # the one that there is
+    for each in found.judged:
+        assert 0.0 < each.bound < math.inf
+        assert each.known, each
+        assert abs(each.off) < 4.0, each
+    assert 0.5 < by["resonance"].error / by["resonance"].bound < 2.0
+
+
+@pytest.mark.endurance
+def test_all_truths_meet_the_bars():
+    """As the benchmark prints it, with BLAS in one thread as the command line has it: no line misses a bar."""
+    command, environment = [sys.executable, SPEC.origin], {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+    ran = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert ran.returncode == 0, ran.stdout + ran.stderr
+    assert len(ran.stdout.splitlines()) > coverage.TRUTHS
