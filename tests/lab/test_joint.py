@@ -190,6 +190,11 @@ def test_each_lag_of_the_creep_has_a_weight_of_its_own():
     fit = fit_joint([recorded(DRIVE, output, noise=3e-4)], "prandtl_ishlinskii_creep", UNITS)
     assert_creep_recovered(fit, weights)
     assert any(name == "creep at 0.1 s" for name, _ in fit.not_identified)  # it is none
+    slower = [why for name, why in fit.not_identified if name == "creep that is slower"]
+    assert len(slower) == 1
+    assert slower[0].startswith(
+        "no record lasts long enough for a lag beyond 1 s; over a short record creep looks like"
+    )
     assert not any(name == "creep at 0.01 s" for name, _ in fit.not_identified)
 
 
@@ -226,7 +231,8 @@ def test_time_constants_are_decades_that_the_records_show():
         return time_constants(si_records([recorded(drive, drive * 1e-4, rate_hz)], UNITS))
 
     assert times(3000, 1000.0) == (0.01, 0.1, 1.0)
-    assert times(4000, 1000.0) == (0.01, 0.1, 1.0, 10.0)
+    assert times(9000, 1000.0) == (0.01, 0.1, 1.0)  # a slower lag has hardly begun
+    assert times(11_000, 1000.0) == (0.01, 0.1, 1.0, 10.0)
     assert times(4014, 200.0) == (0.1, 1.0, 10.0)  # not below ten samples
     assert times(1000, 50_000.0) == (0.01,)
 

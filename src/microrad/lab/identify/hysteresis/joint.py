@@ -110,6 +110,9 @@ class JointFit:
         """Parameters that the recordings do not fix: name, and the number that says so with what would help."""
         reversals = "loops fix the settled hysteresis, only the samples behind a reversal its parts; record small loops"
         found = self.fit.not_identified
+        if self.creep.time_constants_s:
+            slow = f"no record lasts long enough for a lag beyond {max(self.creep.time_constants_s):g} s"
+            found = (*found, ("creep that is slower", slow))
         return tuple((name, f"{fact}; {_WHY.get(name.partition(' ')[0], reversals)}") for name, fact in found)
 
     def response(self, drive_v: Floats, step_s: float) -> tuple[Floats, int]:
@@ -264,10 +267,13 @@ def fit_joint(  # noqa: PLR0913  all but the first three are named options
 
 # ---------------------------------------------------------------------------------------------------------- starts
 def time_constants(records: Sequence[SiRecord]) -> tuple[float, ...]:
-    """Decades of creep that the records can show: from ten samples or 10 ms to three times the longest record."""
+    """Decades of creep that the records show: from ten samples or 10 ms up to the longest record.
+
+    A slower lag has hardly begun there: what it would come to is not known, and it would change the gain at rest.
+    """
     longest = max(r.drive_v.size * r.step_s for r in records)
     shortest = max(10 * min(r.step_s for r in records), 1e-2)
-    last = math.floor(math.log10(3 * longest))
+    last = math.floor(math.log10(longest))
     first = min(math.ceil(math.log10(shortest)), last)
     return tuple(10.0**k for k in range(first, last + 1))
 
