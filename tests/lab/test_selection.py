@@ -178,7 +178,10 @@ def test_the_polish_is_kept_only_where_it_is_no_worse(loops, wide, monkeypatch):
     assert_allclose(fit.linear.poles.frequencies_hz, held.poles.frequencies_hz, rtol=1e-12)
     assert fit.delay_s == held.delay_s
     of = {p.name: e for p, e in zip(fit.structure.parameters, fit.fit.standard_errors, strict=True)}
-    assert 0 < of["pole 1"] < 0.01 * held.poles.frequencies_hz[0]
+    of_response = result.linear.poles_error_rad_s[0] / (2 * np.pi)
+    assert of["pole 1"] >= 0.99 * of_response / np.sqrt(2)  # as the response knows it, and no better
+    assert of["pole 1"] < 0.01 * held.poles.frequencies_hz[0]
+    assert of["pole 1 damping"] >= 0.99 * of_response / np.sqrt(2) / held.poles.frequencies_hz[0]
     assert '"linear.poles.1"' in mirror_file_text(result, "m").partition("[uncertainty]")[2]
     static = fit_bouc_wen(loops, starts=1)
     assert refit(None, static, (), None) == (static, ())  # nothing to be freed

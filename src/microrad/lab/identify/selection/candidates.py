@@ -3,6 +3,7 @@
 A static model has hysteresis alone; a joint one has the linear part, hysteresis and creep together.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -30,6 +31,7 @@ STATIC = ("prandtl_ishlinskii", "bouc_wen", "bouc_wen_admissible")
 
 MODELS = (*STATIC, *FORMS)
 _STARTS = 12
+_VAGUE, _BESIDE = 0.03, 0.1  # relative error of a pole, and logarithm of a zero over it, from which it may be spare
 _REACH, _POLISHED = 2.0, 2  # by how much a fit may be worse and still be polished, and how many are
 
 
@@ -337,12 +339,87 @@ def refit(
     if not isinstance(fit, JointFit) or fit.linear is None:
         return fit, predictions
     free = candidates.freed(fit, on_progress)
-    seen = candidates.predict(free)
+    free, seen = _without_spare_poles(candidates, free, candidates.predict(free), on_progress)
     if may_be_chance(_losses(seen), _losses(predictions)):
         return free, seen
     there = candidates.freed(fit, on_progress, search=False)
-    settled = replace(there.fit, converged=fit.fit.converged, evaluations=fit.fit.evaluations)
-    return replace(there, fit=settled), predictions
+    known = replace(
+        there.fit,
+        covariance=_held_covariance(there, candidates.linear),
+        converged=fit.fit.converged,
+        evaluations=fit.fit.evaluations,
+    )
+    return replace(there, fit=known), predictions
+
+
+def _held_covariance(fit: JointFit, response: LinearFit | None) -> Floats:
+    """Covariance where poles, zeros and delay are those of the response: they are known as it knows them, no better.
+
+    Args:
+        fit: The fit, with the errors of everything free.
+        response: The linear part that they come from.
+    """
+    if response is None or fit.linear is None:
+        return fit.fit.covariance
+    known = {"delay": response.delay_error_s}
+    roots = ("pole", fit.linear.poles, response.poles_rad_s, response.poles_error_rad_s)
+    others = ("zero", fit.linear.zeros, response.zeros_rad_s, response.zeros_error_rad_s)
+    for kind, of, values, errors in (roots, others):
+        for number, (f, damping) in enumerate(zip(of.frequencies_hz, of.dampings, strict=True), 1):
+            if not values.size:
+                continue
+            error = float(errors[int(np.argmin(np.abs(np.abs(values) - 2 * np.pi * f)))])
+            if abs(damping) < 1.0:  # of a pair half of the squared error lies along the root, half across it
+                error /= np.sqrt(2.0)
+            known[f"{kind} {number}"] = error / (2 * np.pi)
+            known[f"{kind} {number} damping"] = error / (2 * np.pi * f)
+    own = fit.fit.standard_errors
+    least = np.array([known.get(p.name, 0.0) for p in fit.structure.parameters])
+    wider = np.maximum(least / np.maximum(own, 1e-300), 1.0)
+    return np.asarray(wider[:, None] * fit.fit.covariance * wider)
+
+
+def _without_spare_poles(
+    candidates: Candidates, fit: JointFit, predictions: tuple[Prediction, ...], on_progress: Progress
+) -> tuple[JointFit, tuple[Prediction, ...]]:
+    """The fit without the poles that the held-out recordings do not need.
+
+    The response of a small hysteresis loop asks for poles that are not needed behind the hysteresis.
+
+    Args:
+        candidates: The recordings that the models are fitted to and judged by.
+        fit: A fit with everything free.
+        predictions: Its prediction of each recording.
+        on_progress: Called with the starts done, their number and what is done.
+    """
+    for fewer in _fewer_poles(fit):
+        other = candidates.freed(replace(fit, linear=fewer), on_progress)
+        seen = candidates.predict(other)
+        if may_be_chance(_losses(seen), _losses(predictions)):
+            return _without_spare_poles(candidates, other, seen, on_progress)
+    return fit, predictions
+
+
+def _fewer_poles(fit: JointFit) -> list[LinearPoles]:
+    """The linear part without one of the poles that may be spare, the least known first.
+
+    Those are poles that are hardly known, and poles with a zero beside them, which goes with it. A pole alone leaves
+    its turn of phase to the delay.
+    """
+    assert fit.linear is not None
+    poles, zeros = fit.linear.poles, fit.linear.zeros
+    errors = {p.name: e for p, e in zip(fit.structure.parameters, fit.fit.standard_errors, strict=True)}
+    found: list[tuple[float, LinearPoles]] = []
+    for k, (freq_hz, damping) in enumerate(zip(poles.frequencies_hz, poles.dampings, strict=True)):
+        error = errors[f"pole {k + 1}"] / freq_hz
+        alike = [j for j, other in enumerate(zeros.dampings) if (abs(other) < 1.0) == (damping < 1.0)]
+        beside = [j for j in alike if abs(math.log(zeros.frequencies_hz[j] / freq_hz)) < _BESIDE][:1]
+        turn_s = 0.0 if beside else (damping if damping < 1.0 else 0.5) / (math.pi * freq_hz)
+        delay_s = fit.linear.delay_s + turn_s
+        fewer = replace(fit.linear, poles=poles.without(k), zeros=zeros.without(*beside), delay_s=delay_s)
+        if (beside or error > _VAGUE) and fewer.poles.values.size > fewer.zeros.values.size:
+            found.append((error, fewer))
+    return [fewer for _, fewer in sorted(found, key=lambda pair: -pair[0])]
 
 
 def _losses(predictions: Sequence[Prediction]) -> list[Floats]:
