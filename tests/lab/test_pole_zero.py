@@ -1,21 +1,26 @@
 """The linear part of one axis: no pole more than the mirror has; delay, hold, creep and hysteresis are none of it."""
 
-from dataclasses import replace
+import math
+from dataclasses import fields, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.signal import chirp, lsim
 
-from microrad.lab.identify.hysteresis.joint import fit_joint
+from microrad.lab.identify.hysteresis.joint import JointFit, fit_joint
 from microrad.lab.identify.hysteresis.plant_fit import coloured_scatter, held
 from microrad.lab.identify.hysteresis.structures import LinearPoles, Roots
 from microrad.lab.identify.linear.axis import fit_axis
 from microrad.lab.identify.linear.modal import late
 from microrad.lab.identify.records import Units
+from microrad.lab.identify.selection.candidates import _fewer_poles, _without_spare_poles
 from microrad.lab.recording import recording_from_arrays
 from microrad.mirror import model as mirror
 from truths import behind_resonance, creep, philox, plays, recorded, two_sines
+
+NONE = np.zeros((0, 0))  # nothing of a record's own
 
 RATE, FINE = 20_000.0, 4
 GAIN = 8e-5
@@ -174,15 +179,78 @@ def test_the_error_of_a_sum_counts_the_colour_of_what_is_left():
         coloured[k] = a * coloured[k - 1] + white[k]
     fast = np.cos(np.pi * np.arange(n))  # where that noise is weakest
     columns = np.column_stack([np.ones(n), fast])
-    scatter = [coloured_scatter(np.column_stack([r, columns]), n, 1) for r in coloured.T]
+    scatter = [coloured_scatter(np.column_stack([r, columns]), 1, NONE, np.zeros((2, 2))) for r in coloured.T]
     slow_factor, fast_factor = (np.median([s[i, i] for s in scatter]) / n for i in (0, 1))
     assert slow_factor == pytest.approx(1 / (1 - a) ** 2, rel=0.35)
     assert fast_factor == pytest.approx(1 / (1 + a) ** 2, rel=0.35)
-    plain = coloured_scatter(np.column_stack([white[:, 0], columns]), n, 1)
+    plain = coloured_scatter(np.column_stack([white[:, 0], columns]), 1, NONE, np.zeros((2, 2)))
     assert_allclose(np.diag(plain) / n, 1.0, rtol=0.3)
+
+
+def test_what_a_fit_takes_out_of_a_residual_is_given_back():
+    """Sines at the lowest ten lines and an offset, fitted to white noise: its variance there comes out as it is."""
+    n = 400
+    turns = 2 * np.pi * np.outer(np.arange(n), np.arange(1, 11)) / n
+    columns = math.sqrt(2.0 / n) * np.hstack([np.cos(turns), np.sin(turns)])
+    offset = np.full((n, 1), 1.0 / math.sqrt(n))
+    basis = np.hstack([columns, offset])
+    found = []
+    for noise in philox(3).standard_normal((40, n)):
+        rows = np.column_stack([noise - basis @ (basis.T @ noise), columns])
+        given = coloured_scatter(rows, 1, offset, np.eye(20)), coloured_scatter(rows, 1, NONE, np.zeros((20, 20)))
+        found.append([np.trace(each) / 20 for each in given])
+    back, lost = np.mean(found, axis=0)
+    assert 0.95 < back < 1.25  # the larger of two means
+    assert lost < 0.8
 
 
 def test_what_lies_between_samples_changes_nothing_without_a_linear_part():
     record = recorded(two_sines(), plays(two_sines(), (0.0, 1.0), (6e-5, 1e-5)))
     fits = [fit_joint([record], "prandtl_ishlinskii_rate", Units(), hold=h) for h in ("zero-order", "first-order")]
     assert_allclose(fits[0].fit.values, fits[1].fit.values, rtol=0, atol=0)
+
+
+# -------------------------------------------------------------------------------------------- behind a hysteresis model
+def fitted_to(linear, errors):
+    """What of a joint fit is looked at: its linear part, and the standard error of each pole (Hz)."""
+    named = [SimpleNamespace(name=f"pole {k}") for k in range(1, len(errors) + 1)]
+    parts = {"structure": SimpleNamespace(parameters=named), "fit": SimpleNamespace(standard_errors=np.array(errors))}
+    return JointFit(**(dict.fromkeys(f.name for f in fields(JointFit)) | parts | {"linear": linear}))
+
+
+def test_a_pole_with_its_zero_and_one_that_is_hardly_known_are_what_may_be_spare():
+    """A slow real pair of pole and zero, a resonance that is known, and a pole far beyond the band."""
+    linear = LinearPoles(Roots((11.0, 400.0, 20e3), (1.0, 0.03, 1.0)), Roots((11.5, 900.0), (1.0, 1.0)), 30.0, 1e-4)
+    beyond, pair = _fewer_poles(fitted_to(linear, (0.1, 0.02, 9e3)))
+    assert beyond.poles.frequencies_hz == (11.0, 400.0)
+    assert beyond.zeros == linear.zeros
+    assert beyond.delay_s == pytest.approx(1e-4 + 1 / (2 * np.pi * 20e3))  # the turn of phase it made stays
+    assert pair.poles.frequencies_hz == (400.0, 20e3)
+    assert pair.zeros.frequencies_hz == (900.0,)
+    assert pair.delay_s == 1e-4
+    assert _fewer_poles(fitted_to(LinearPoles(Roots((400.0,), (0.03,)), Roots((), ()), 30.0), (100.0,))) == []
+
+
+def test_poles_go_as_long_as_the_held_out_recordings_do_not_need_them():
+    """Of three poles the recordings need one: without it what is left is ten times as large."""
+    noise = philox(4).standard_normal(2000)
+
+    def predicted(fit, _=None):
+        return (
+            SimpleNamespace(residual_rad=noise * (1.0 if 400.0 in fit.linear.poles.frequencies_hz else 10.0), split=0),
+        )
+
+    linear = LinearPoles(Roots((11.0, 400.0, 20e3), (1.0, 0.03, 1.0)), Roots((11.5,), (1.0,)), 30.0)
+    asked = []
+
+    def freed(begin, progress):
+        asked.append(begin.linear.poles.frequencies_hz)
+        return fitted_to(begin.linear, [0.5 * f for f in begin.linear.poles.frequencies_hz])
+
+    candidates = SimpleNamespace(freed=freed, predict=predicted)
+    begin = fitted_to(linear, (0.1, 200.0, 9e3))
+    fit, seen = _without_spare_poles(candidates, begin, predicted(begin), None)
+    assert fit.linear.poles.frequencies_hz == (400.0,)
+    assert fit.linear.zeros.frequencies_hz == ()
+    assert_allclose(seen[0].residual_rad, noise)
+    assert () not in asked

@@ -26,6 +26,7 @@ from microrad.mirror.hysteresis import BoucWen, Play, scaled, slow_gain
 _LOST = 100.0  # relative standard error of a value that is as good as held
 _LOOSEST = 1.0  # relative standard error that the file gives to a combination of parameters at most
 _STIFFEST = 1e-6  # the same, at least: what is known better keeps no more digits
+_IDLE = 1e-3  # share of the sum of weights, below which a play operator counts as without weight
 _BOUND = 1e-6  # distance from its bound, over its size, at which the search leaves a parameter
 
 
@@ -267,8 +268,28 @@ def _joint_covariance(fit: JointFit) -> tuple[dict[str, float], Floats]:
         return np.array(list(_numbers(fit, where).values()))
 
     jacobian = central_differences(values, at, 1e-6 * scale)
-    covariance = _holding(fit.fit.covariance, distance <= _BOUND * scale)
-    return _numbers(fit, at), np.asarray(jacobian @ covariance @ jacobian.T)
+    weight = np.array([p.name.startswith("weight") for p in parameters])
+    covariance = _holding(fit.fit.covariance, ~weight & (distance <= _BOUND * scale))
+    numbers = _numbers(fit, at)
+    jacobian = _with_neighbours(numbers) @ jacobian
+    return numbers, np.asarray(jacobian @ covariance @ jacobian.T)
+
+
+def _with_neighbours(numbers: dict[str, float]) -> Floats:
+    """What adds the error of a play operator without weight to that of its nearest neighbour with weight.
+
+    A weight of 0 has no relative error, and held at 0 it would leave the others, and their sum, too certain.
+    """
+    together = np.eye(len(numbers))
+    places = [i for i, key in enumerate(numbers) if key.startswith("prandtl_ishlinskii.weights")]
+    sizes = list(numbers.values())
+    least = _IDLE * sum(sizes[i] for i in places)
+    used = [i for i in places if sizes[i] > least]
+    for i in places:
+        if i not in used:
+            nearest = min(used, key=lambda j: abs(j - i), default=i)
+            together[nearest, i], together[i, i] = 1.0, 0.0
+    return together
 
 
 def _numbers(fit: JointFit, at: Floats) -> dict[str, float]:

@@ -14,7 +14,14 @@ from microrad.core import kernels
 from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
 from microrad.lab.identify.hysteresis.bouc_wen import BoucWenFit, fit_bouc_wen, made_rising
-from microrad.lab.identify.hysteresis.plant_fit import FitRecord, PlantFit, fit_plant, held, without_nuisance
+from microrad.lab.identify.hysteresis.plant_fit import (
+    FitRecord,
+    PlantFit,
+    PlantProblem,
+    fit_plant,
+    held,
+    without_nuisance,
+)
 from microrad.lab.identify.hysteresis.prandtl_ishlinskii import non_negative_weights, threshold_grid
 from microrad.lab.identify.hysteresis.structures import AxisStructure, LinearPoles, one_axis
 from microrad.lab.identify.linear.modal import HOLD, Hold, beyond, late
@@ -28,7 +35,6 @@ _OPERATORS = 15
 _MOST_SAMPLES = 20_000
 _STRAIGHT = 2e-3  # a drive is, whose distance from straight lines is at most this part of its rms
 _SCREENED_SAMPLES, _NEARLY_STRAIGHT = 4_000, 2e-2
-_IDLE = 1e-6  # of the sum of all weights
 _EVALUATIONS = 200
 _POLISHING = 60  # each is long: the broadband recordings belong to it
 
@@ -209,7 +215,7 @@ def fit_joint(  # noqa: PLR0913  all but the first three are named options
     fit_list = prepared(records)
     model: BoucWen | Play
     if begin is not None:
-        model, creep_rad_v = _without_idle(begin.model), begin.creep.weights_rad_v
+        model, creep_rad_v = begin.model, begin.creep.weights_rad_v
     elif form.family == "bouc_wen":
         static = static or fit_bouc_wen(recordings, starts=6, seed=seed, units=units)
         model = replace(static.model, bias_v=float(np.mean([r.drive_v[0] for r in records])))
@@ -233,6 +239,8 @@ def fit_joint(  # noqa: PLR0913  all but the first three are named options
         fit_list += [
             _between(_fit_record(record, creep_times), hold, record.step_s) for record in si_records(short, units)
         ]
+    if begin is not None:
+        fit_list = _weighed(structure, fit_list)
     coarse = [thin_record(record, _SCREENED_SAMPLES, _NEARLY_STRAIGHT) for record in records]
     fit = fit_plant(
         structure,
@@ -326,6 +334,16 @@ def _fit_record(record: SiRecord, creep_times: Sequence[float]) -> FitRecord:
     )
 
 
+def _weighed(structure: AxisStructure, records: Sequence[FitRecord]) -> list[FitRecord]:
+    """The records, each weighed by what the structure leaves of it where the search begins: a sum of squares of 1."""
+    problem = PlantProblem(structure, records)
+    start = np.array([p.start for p in structure.parameters]) / problem.scale
+    left = np.split(problem.modelled(start) - problem.measured, problem.edges)
+    rms = [float(np.sqrt(np.mean(part**2))) / record.weight for part, record in zip(left, records, strict=True)]
+    whole = math.sqrt(problem.size)
+    return [replace(record, weight=1.0 / (each * whole)) for each, record in zip(rms, records, strict=True)]
+
+
 def _between(record: FitRecord, hold: Hold, step_s: float) -> FitRecord:
     """The record with what its drive does between the samples.
 
@@ -356,7 +374,7 @@ def _play_start(
     linear: LinearPoles | None,
     creep_times: Sequence[float],
 ) -> tuple[Play, tuple[float, ...]]:
-    """Weights >= 0 of plays and creep by non-negative least squares, the linear part held; idle plays are dropped."""
+    """Weights >= 0 of plays and creep by non-negative least squares, the linear part held."""
     operators = 1 if form.family == "linear" else _OPERATORS
     thresholds = threshold_grid(max(float(np.ptp(r.drive_v)) for r in records), operators)
     columns, targets = [], []
@@ -370,25 +388,9 @@ def _play_start(
     matrix, target = np.concatenate(columns), np.concatenate(targets)
     sign = 1.0 if float(matrix[:, 0] @ target) >= 0.0 else -1.0
     weights = sign * non_negative_weights(matrix, sign * target)
-    kept = np.abs(weights[:operators]) > 0.0
-    kept[0] = True
     limit = fastest_rate(records)
-    model = Play(tuple(thresholds[kept].tolist()), tuple(weights[:operators][kept].tolist()), 0.0, limit)
+    model = Play(tuple(thresholds.tolist()), tuple(weights[:operators].tolist()), 0.0, limit)
     return model, tuple(weights[operators:].tolist())
-
-
-def _without_idle(model: BoucWen | Play) -> BoucWen | Play:
-    """The model without the plays that a search has left at the bound 0, which would only slow the next one down."""
-    if isinstance(model, BoucWen):
-        return model
-    weights = np.array(model.weights_rad_v)
-    kept = np.abs(weights) > _IDLE * np.abs(weights).sum()
-    kept[0] = True
-    return replace(
-        model,
-        thresholds_v=tuple(np.array(model.thresholds_v)[kept].tolist()),
-        weights_rad_v=tuple(weights[kept].tolist()),
-    )
 
 
 def behind_linear_part(columns: Floats, linear: LinearPoles | None, run: FitRecord) -> Floats:

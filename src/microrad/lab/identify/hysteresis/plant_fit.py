@@ -15,7 +15,7 @@ from typing import Any, Literal
 import numpy as np
 
 from microrad.core import kernels, periodic
-from microrad.core.arrays import Floats, Integers
+from microrad.core.arrays import Complexes, Floats
 from microrad.core.progress import Progress
 from microrad.core.threads import in_threads
 from microrad.lab.identify.linear.modal import Hold, beyond, late
@@ -33,6 +33,8 @@ _DIFFERENCE = 1e-5
 _LINEAR_DIFFERENCE = 1.0
 _SLICE = 2_000_000
 _LINES = 30  # of the spectrum of a residual to either side, at least, that tell its power
+_AS_GOOD_AS_NONE = 1e-6  # of the mean power of J over all lines
+_LEFT = 1e-3  # share of a line's power, at least, that a fit is taken to leave
 _FAR = 1e3  # times the largest output: a model further off is as good as none
 
 
@@ -420,11 +422,8 @@ def _report(problem: PlantProblem, best: Any, costs: list[float]) -> PlantFit:
         )
     )
     colours = [colour_inflation(list(residual.T)) for residual in residuals]
-    lost = problem.size / max(1, problem.size - values.size - sum(r.nuisance.shape[1] for r in problem.runs))
     rows = problem.rows(best.x, central=True)
-    shapes = [(target.shape, part) for target, part in zip(problem.targets, rows, strict=True)]
-    scatter = lost * np.sum(in_threads([partial(coloured_scatter, part, *shape) for shape, part in shapes]), axis=0)
-    covariance, condition = _covariance([part[:, 1:] for part in rows], scatter, problem)
+    covariance, condition = _covariance([part[:, 1:] for part in rows], _scatter(problem, rows), problem)
     problem.simulated.cache_clear()
     return PlantFit(
         structure=problem.structure,
@@ -442,20 +441,46 @@ def _report(problem: PlantProblem, best: Any, costs: list[float]) -> PlantFit:
     )
 
 
-def coloured_scatter(rows: Floats, samples: int, outputs: int) -> Floats:
+def _scatter(problem: PlantProblem, rows: Sequence[Floats]) -> Floats:
+    """Covariance of the gradient J'r over all runs, each with the colour of its residual.
+
+    Args:
+        problem: The problem.
+        rows: Of each run its residual and J.
+    """
+    squares = [part[:, 1:].T @ part[:, 1:] for part in rows]
+    gram = np.sum(squares, axis=0)
+    length = np.sqrt(np.diag(gram)) + 1e-300
+    inverse = np.linalg.pinv(gram / np.outer(length, length), rcond=1e-13, hermitian=True) / np.outer(length, length)
+    variances = [float(np.mean(part[:, 0] ** 2)) for part in rows]
+    moved = inverse @ np.sum([v * each for v, each in zip(variances, squares, strict=True)], axis=0) @ inverse
+    jobs = [
+        partial(coloured_scatter, part, target.shape[1], run.nuisance, 2 * inverse - moved / (v + 1e-300))
+        for part, target, run, v in zip(rows, problem.targets, problem.runs, variances, strict=True)
+    ]
+    return np.asarray(np.sum(in_threads(jobs), axis=0))
+
+
+def coloured_scatter(rows: Floats, outputs: int, nuisance: Floats, taken: Floats) -> Floats:
     """Covariance of the gradient J'r of a run, the colour of its residual counted line by line.
 
-    The residual is taken for stationary noise: then the covariance is the sum over frequencies of the power of the
-    residual times the transforms of the columns of J. That power is the mean over neighbouring lines, or the mean
-    weighed by what J has there where it is larger: what a model leaves of loops that repeat has its power at the same
-    lines as J, and noise has it anywhere but there, because it was fitted.
+    The residual is taken for stationary noise: then the covariance is the sum over frequencies of its power times the
+    transforms of the columns of J. That power is a mean over a quarter octave and at least some lines: the larger one
+    of the plain mean and of that which weighs each line by what J has there, as the residual of loops that repeat has
+    its power at the same lines as J. What the fit has taken out of a line is given back: of white noise of variance v,
+    1 - j T j' - n is left there, with j the transform of J, n the share of the nuisance and T = 2 G - G J'VJ G / v,
+    where G = (J'J)^-1 and V holds the variances of all runs. (With one run T is G: the leverage, as in the estimator
+    HC2 of J. MacKinnon and H. White, J. Econometrics 29 (1985) 305.)
 
     Args:
         rows: Residual and J of the run, shape (samples x outputs, 1 + parameters).
-        samples: Number of samples.
         outputs: Number of outputs.
+        nuisance: Its orthonormal columns, shape (samples, columns).
+        taken: T, shape (parameters, parameters).
     """
+    samples = len(rows) // outputs
     total = np.zeros((rows.shape[1] - 1,) * 2)
+    of_nuisance = np.sum(np.abs(np.fft.rfft(nuisance, axis=0)) ** 2, axis=1) if nuisance.size else 0.0
     for part in rows.reshape(samples, outputs, -1).transpose(1, 0, 2):
         lines = np.fft.rfft(part, axis=0)
         twice = np.full(len(lines), 2.0)
@@ -464,19 +489,26 @@ def coloured_scatter(rows: Floats, samples: int, outputs: int) -> Floats:
             twice[-1] = 1.0
         size = np.linalg.norm(part[:, 1:], axis=0) + 1e-300
         worth = np.sum(np.abs(lines[:, 1:] / size) ** 2, axis=1)
-        number = np.arange(len(lines))
-        half = np.maximum(_LINES, number // 10)
-        low, high = np.maximum(number - half, 0), np.minimum(number + half + 1, len(lines))
-
-        def over(values: Floats, low: Integers = low, high: Integers = high) -> Floats:
-            added = np.append(0.0, np.cumsum(values))
-            return np.asarray(added[high] - added[low])
-
-        squares = np.abs(lines[:, 0]) ** 2 / samples
-        power = np.maximum(over(squares) / (high - low), over(worth * squares) / np.maximum(over(worth), 1e-300))
-        weighed = lines[:, 1:] * np.sqrt(np.maximum(power, 0.0) * twice / samples)[:, None]
+        worth += _AS_GOOD_AS_NONE * worth.mean() + 1e-300  # lines at which J has nothing: rounding tells nothing there
+        of_fit = np.einsum("ki,ij,kj->k", lines[:, 1:].conj(), taken, lines[:, 1:]).real
+        left = np.clip(1.0 - (of_fit + of_nuisance) / samples, _LEFT, 1.0)
+        power = np.maximum(_mean_power(lines[:, 0], left, worth), _mean_power(lines[:, 0], left, np.ones(worth.size)))
+        weighed = lines[:, 1:] * np.sqrt(power * twice)[:, None] / samples
         total += (weighed.conj().T @ weighed).real
     return total
+
+
+def _mean_power(residual: Complexes, left: Floats, worth: Floats) -> Floats:
+    """Power of a residual about each line, of which a fit has left a share, as a mean that weighs by `worth`."""
+    number = np.arange(residual.size)
+    half = np.maximum(_LINES, number // 10)
+    low, high = np.maximum(number - half, 0), np.minimum(number + half + 1, residual.size)
+
+    def over(values: Floats) -> Floats:
+        added = np.append(0.0, np.cumsum(values))
+        return np.asarray(np.maximum(added[high] - added[low], 0.0))
+
+    return over(worth * np.abs(residual) ** 2) / over(worth * left)
 
 
 def _covariance(slopes: Sequence[Floats], scatter: Floats, problem: PlantProblem) -> tuple[Floats, float]:

@@ -34,6 +34,11 @@ class Roots:
         """The roots in rad/s, conjugates included."""
         return np.array(roots_from_damping(self.frequencies_hz, self.dampings), dtype=complex)
 
+    def without(self, *places: int) -> "Roots":
+        """The others, counted from 0."""
+        kept = [i for i in range(len(self.dampings)) if i not in places]
+        return Roots(tuple(self.frequencies_hz[i] for i in kept), tuple(self.dampings[i] for i in kept))
+
     @classmethod
     def of(cls, roots: Iterable[complex]) -> "Roots":
         """Natural frequencies and dampings of roots in rad/s; of a conjugate pair one is looked at."""
