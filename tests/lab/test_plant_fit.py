@@ -1,5 +1,6 @@
 """The joint fit on the Bouc-Wen benchmark, against an oracle that knows nothing of the kernels, and its uncertainty."""
 
+from dataclasses import replace
 from math import pi
 
 import numpy as np
@@ -18,10 +19,12 @@ from microrad.lab.identify.hysteresis.plant_fit import (
     simulate_record,
     upsampled,
 )
-from microrad.lab.identify.hysteresis.structures import hysteretic_oscillator
+from microrad.lab.identify.hysteresis.structures import hysteretic_oscillator, one_axis
 from microrad.lab.recording import read_recording, recording_from_arrays
 from microrad.mirror import model as mirror
+from microrad.mirror.hysteresis import Play
 from places import DATA
+from truths import plays, recorded, two_sines
 
 BENCHMARK = DATA / "boucwen" / "train.h5"
 needs_benchmark = pytest.mark.skipif(not BENCHMARK.exists(), reason=f"recording boucwen absent: {BENCHMARK}")
@@ -238,3 +241,23 @@ def test_a_drive_between_its_samples(hold):
         "band-limited": np.sin(pi / 16),
     }
     assert_allclose(fine[2], expected[hold], atol=1e-12)
+
+
+def test_what_is_at_its_bound_is_held_until_it_would_gain_by_leaving():
+    """Two of three weights begin at 0: the one that the record needs comes up, the other stays there exactly."""
+    drive = two_sines(1200)
+    record = recorded(drive, plays(drive, (0.0, 1.0), (6e-5, 2e-5)), noise=1e-4)
+    structure = one_axis("m", Play((0.0, 1.0, 2.0), (8e-5, 0.0, 0.0), 0.0, 100.0))
+    (run,) = fit_records([replace(record, output=1e-3 * record.output)])
+    fit = fit_plant(structure, [run])
+    assert fit.converged
+    assert fit.values[:2] == pytest.approx([6e-5, 2e-5], rel=0.01)
+    assert 0.0 <= fit.values[2] < 3 * fit.standard_errors[2]
+    below = fit_plant(one_axis("m", Play((0.0, 1.0, 2.0), (6e-5, 2e-5, 0.0), 0.0, 100.0)), [_less(run)])
+    assert below.values[2] == 0.0  # it would be negative
+
+
+def _less(run):
+    """The record less a play of 2 V, so that its weight would be below 0."""
+    less = plays(run.drive[:, 0] + 5.0, (2.0,), (1e-5,))[:, None]
+    return replace(run, output=run.output - less)

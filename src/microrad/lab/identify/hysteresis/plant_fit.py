@@ -13,9 +13,10 @@ from functools import lru_cache, partial
 from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from microrad.core import kernels, periodic
-from microrad.core.arrays import Complexes, Floats
+from microrad.core.arrays import Complexes, Floats, Integers
 from microrad.core.progress import Progress
 from microrad.core.threads import in_threads
 from microrad.lab.identify.linear.modal import Hold, beyond, late
@@ -35,6 +36,7 @@ _SLICE = 2_000_000
 _LINES = 30  # of the spectrum of a residual to either side, at least, that tell its power
 _AS_GOOD_AS_NONE = 1e-6  # of the mean power of J over all lines
 _LEFT = 1e-3  # share of a line's power, at least, that a fit is taken to leave
+_AT = 1e-7  # of its size: a parameter nearer to its bound is there
 _FAR = 1e3  # times the largest output: a model further off is as good as none
 
 
@@ -298,34 +300,37 @@ class PlantProblem:
         turned[0] = np.linalg.norm(self.modelled(point) - self.measured)
         return turned
 
-    def slopes(self, point: Floats, *, central: bool) -> Floats:
+    def slopes(self, point: Floats, *, central: bool, free: Sequence[int] | None = None) -> Floats:
         """Derivative of the residual by the scaled parameters, turned as it is.
 
         Args:
             point: The scaled point.
             central: Whether differences are taken to both sides; those to one side, good enough on the way, need half
                 as many simulations.
+            free: Numbers of the parameters, None for all.
         """
-        rows = np.vstack([*self.triangles(point, central), np.zeros((1 + point.size, 1 + point.size))])
+        count = point.size if free is None else len(free)
+        rows = np.vstack([*self.triangles(point, central, free), np.zeros((1 + point.size, 1 + count))])
         turned = _triangle(rows)
         turned[0] *= math.copysign(1.0, turned[0, 0])
-        return np.asarray(turned[:, 1:])
+        return np.vstack([turned[:, 1:], np.zeros((point.size - count, count))])
 
-    def triangles(self, point: Floats, central: bool) -> list[Floats]:
+    def triangles(self, point: Floats, central: bool, free: Sequence[int] | None = None) -> list[Floats]:
         """Of each run the triangle of a QR decomposition of its residual (first column) and derivatives.
 
         Args:
             point: The scaled point.
             central: Whether differences are taken to both sides.
         """
-        return in_threads([partial(_triangle, part) for part in self.rows(point, central)])
+        return in_threads([partial(_triangle, part) for part in self.rows(point, central, free)])
 
-    def rows(self, point: Floats, central: bool) -> list[Floats]:
+    def rows(self, point: Floats, central: bool, free: Sequence[int] | None = None) -> list[Floats]:
         """Of each run its residual (first column) and derivatives, shape (used values, 1 + parameters).
 
         Args:
             point: The scaled point.
             central: Whether differences are taken to both sides.
+            free: Numbers of the parameters, None for all.
         """
         here = self.modelled(point)
 
@@ -341,7 +346,7 @@ class PlantProblem:
             above, below = point + (up / step[i]) * step, point - (down / step[i]) * step
             return np.asarray((self.modelled(above) - self.modelled(below)) / step[i])
 
-        columns = in_threads([partial(column, i) for i in range(point.size)])
+        columns = in_threads([partial(column, i) for i in (range(point.size) if free is None else free)])
         return [part.T for part in np.split(np.array([here - self.measured, *columns]), self.edges, axis=1)]
 
 
@@ -396,20 +401,67 @@ def fit_plant(
 
 
 def _search(problem: PlantProblem, start: Floats, tolerance: float, most_evaluations: int, *, central: bool) -> Any:
+    """Least squares within the bounds. What is at its bound is held, until it would gain by leaving.
+
+    A search that keeps such parameters within their bounds is slow, and a grid of play operators has many.
+    """
+    point = np.clip(start, problem.lower, problem.upper)
+    held = _at_bound(problem, point)
+    evaluations = 0
+    while True:
+        free = np.flatnonzero(~held | held.all())
+        found = _search_free(problem, point, free, tolerance, most_evaluations - evaluations, central=central)
+        point, evaluations = _placed(point, free, found.x), evaluations + found.nfev
+        at = _at_bound(problem, point)
+        point = np.where(at, np.where(point - problem.lower < _AT, problem.lower, problem.upper), point)
+        leaving = at & _would_leave(problem, point, tolerance * found.cost)
+        if evaluations >= most_evaluations or (np.array_equal(at, held) and not leaving.any()):
+            break
+        held = at & ~leaving
+    found.x, found.nfev = point, evaluations
+    return found
+
+
+def _search_free(
+    problem: PlantProblem, point: Floats, free: Integers, tolerance: float, most: int, *, central: bool
+) -> Any:
     from scipy.optimize import least_squares
 
     return least_squares(
-        problem.residual,
-        np.clip(start, problem.lower, problem.upper),
-        jac=partial(problem.slopes, central=central),
-        bounds=(problem.lower, problem.upper),
+        lambda values: problem.residual(_placed(point, free, values)),
+        point[free],
+        jac=lambda values: problem.slopes(_placed(point, free, values), central=central, free=free.tolist()),
+        bounds=(problem.lower[free], problem.upper[free]),
         method="trf",
         x_scale="jac",
         ftol=tolerance,
         xtol=tolerance,
         gtol=1e-12,
-        max_nfev=most_evaluations,
+        max_nfev=max(most, 1),
     )
+
+
+def _placed(point: Floats, where: Integers, values: Floats) -> Floats:
+    moved = point.copy()
+    moved[where] = values
+    return moved
+
+
+def _at_bound(problem: PlantProblem, point: Floats) -> NDArray[np.bool_]:
+    return np.asarray(np.minimum(point - problem.lower, problem.upper - point) < _AT)
+
+
+def _would_leave(problem: PlantProblem, point: Floats, gain: float) -> NDArray[np.bool_]:
+    """Which parameters at a bound would gain more than that by leaving it, to first order."""
+    at = np.flatnonzero(_at_bound(problem, point))
+    leaving = np.zeros(point.size, dtype=bool)
+    if at.size:
+        slopes = problem.slopes(point, central=False, free=at.tolist())
+        pull = -(slopes.T @ problem.residual(point))
+        inward = np.where(point[at] - problem.lower[at] < _AT, 1.0, -1.0)
+        worth = pull**2 / np.maximum(np.einsum("ij,ij->j", slopes, slopes), 1e-300) / 2
+        leaving[at] = (pull * inward > 0.0) & (worth > gain)
+    return leaving
 
 
 # ---------------------------------------------------------------------------------------------------------- report
