@@ -14,6 +14,7 @@ from microrad.lab.identify.hysteresis.plant_fit import (
     PlantProblem,
     Structure,
     _covariance,
+    _scatter,
     fit_plant,
     fit_records,
     simulate_record,
@@ -222,6 +223,8 @@ def test_a_slope_that_is_no_number_is_refused_and_no_fault_of_the_program():
     slopes = np.ones((20, 6))
     assert np.isfinite(_covariance([slopes[:5], slopes[5:]], np.eye(6), problem)[0]).all()
     slopes[3, 2] = 1e200
+    with np.errstate(over="ignore", invalid="ignore"):
+        assert not _scatter(problem, [np.column_stack([np.ones(20), slopes])]).any()
     with pytest.raises(IdentificationError, match="nothing can be said of their errors; record loops over the whole"):
         _covariance([slopes[:5], slopes[5:]], np.eye(6), problem)
 

@@ -502,6 +502,8 @@ def _scatter(problem: PlantProblem, rows: Sequence[Floats]) -> Floats:
     """
     squares = [part[:, 1:].T @ part[:, 1:] for part in rows]
     gram = np.sum(squares, axis=0)
+    if not np.isfinite(gram).all():  # `_covariance` says so
+        return np.zeros_like(gram)
     length = np.sqrt(np.diag(gram)) + 1e-300
     inverse = np.linalg.pinv(gram / np.outer(length, length), rcond=1e-13, hermitian=True) / np.outer(length, length)
     variances = [float(np.mean(part[:, 0] ** 2)) for part in rows]
