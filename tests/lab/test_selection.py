@@ -164,9 +164,9 @@ def test_the_polish_is_kept_only_where_it_is_no_worse(loops, wide, monkeypatch):
     """Where it is worse the model stays where it was, with the errors that poles have there."""
     real = candidates.fit_joint
 
-    def spoiled(*args, free_linear=False, search=True, **words):
-        fit = real(*args, free_linear=free_linear, search=search, **words)
-        if not free_linear or not search:
+    def spoiled(*args, free_linear=False, evaluations=None, **words):
+        fit = real(*args, free_linear=free_linear, evaluations=evaluations, **words)
+        if not free_linear or evaluations == 1:
             return fit
         return replace(fit, mirror=replace(fit.mirror, E=1.5 * fit.mirror.E), samples_used=-1)
 

@@ -174,7 +174,7 @@ def fit_joint(  # noqa: PLR0913  all but the first three are named options
     static: BoucWenFit | None = None,
     hold: Hold = HOLD,
     begin: JointFit | None = None,
-    search: bool = True,
+    evaluations: int | None = None,
     starts: int = 2,
     seed: int = 0,
     on_progress: Progress | None = None,
@@ -193,7 +193,8 @@ def fit_joint(  # noqa: PLR0913  all but the first three are named options
         hold: What the drive does between samples: "zero-order" where the record is what a converter was told,
             "first-order" where the drive itself was measured.
         begin: A fit of the same form where the search begins; by default that is found here.
-        search: Whether anything is searched; if not, the errors are those of everything free where the search begins.
+        evaluations: Largest number of simulations in a search, without those for derivatives; 1 searches nothing, and
+            the errors are those where it begins.
         starts: Number of starts of a Bouc-Wen form; those behind the first are scattered about it.
         seed: Seed of the Philox stream that scatters them.
         on_progress: Called with the starts done, their number and the name.
@@ -249,7 +250,7 @@ def fit_joint(  # noqa: PLR0913  all but the first three are named options
         starts=_scattered_starts(structure, starts, seed) if form.family == "bouc_wen" and begin is None else (),
         # Candidates are only compared. Of N samples a gain of e moves a value by sqrt(N e) of its error at most.
         tolerance=1e-10 if free_linear else 1e-9,
-        most_evaluations=(_POLISHING if free_linear else _EVALUATIONS) if search else 1,
+        most_evaluations=evaluations or (_POLISHING if free_linear else _EVALUATIONS),
         on_progress=on_progress,
     )
     axis = structure.parts(fit.values)

@@ -32,6 +32,7 @@ STATIC = ("prandtl_ishlinskii", "bouc_wen", "bouc_wen_admissible")
 MODELS = (*STATIC, *FORMS)
 _STARTS = 12
 _VAGUE, _BESIDE = 0.03, 0.1  # relative error of a pole, and logarithm of a zero over it, from which it may be spare
+_ROUGH = 5  # simulations in which a fit comes near enough to tell whether a pole is needed
 _REACH, _POLISHED = 2.0, 2  # by how much a fit may be worse and still be polished, and how many are
 
 
@@ -237,13 +238,13 @@ class Candidates:
             seed=self.seed,
         )
 
-    def freed(self, begin: JointFit, progress: Progress, *, search: bool = True) -> JointFit:
+    def freed(self, begin: JointFit, progress: Progress, *, evaluations: int | None = None) -> JointFit:
         """A joint fit with poles, zeros and delay free as well, to the broadband recording and the loops.
 
         Args:
             begin: Where the search begins.
             progress: Called once, before the fit.
-            search: Whether anything moves; if not, only the errors of all numbers there are found.
+            evaluations: Largest number of simulations in the search; 1 moves nothing, and finds the errors there.
         """
         progress(0, 1, "linear part, hysteresis and creep together")
         return fit_joint(
@@ -256,7 +257,7 @@ class Candidates:
             broadband=self.broadband,
             hold=self.hold,
             begin=begin,
-            search=search,
+            evaluations=evaluations,
         )
 
     @cached_property
@@ -338,11 +339,14 @@ def refit(
     """
     if not isinstance(fit, JointFit) or fit.linear is None:
         return fit, predictions
-    free = candidates.freed(fit, on_progress)
-    free, seen = _without_spare_poles(candidates, free, candidates.predict(free), on_progress)
+    begin = fit
+    if fit.form.family == "bouc_wen":  # a small loop of it asks for poles that are not needed behind it
+        begin = _without_spare_poles(candidates, candidates.freed(fit, on_progress, evaluations=_ROUGH), on_progress)
+    free = candidates.freed(begin, on_progress)
+    seen = candidates.predict(free)
     if may_be_chance(_losses(seen), _losses(predictions)):
         return free, seen
-    there = candidates.freed(fit, on_progress, search=False)
+    there = candidates.freed(fit, on_progress, evaluations=1)
     known = replace(
         there.fit,
         covariance=_held_covariance(there, candidates.linear),
@@ -379,25 +383,20 @@ def _held_covariance(fit: JointFit, response: LinearFit | None) -> Floats:
     return np.asarray(wider[:, None] * fit.fit.covariance * wider)
 
 
-def _without_spare_poles(
-    candidates: Candidates, fit: JointFit, predictions: tuple[Prediction, ...], on_progress: Progress
-) -> tuple[JointFit, tuple[Prediction, ...]]:
-    """The fit without the poles that the held-out recordings do not need.
-
-    The response of a small hysteresis loop asks for poles that are not needed behind the hysteresis.
+def _without_spare_poles(candidates: Candidates, fit: JointFit, on_progress: Progress) -> JointFit:
+    """The fit without the poles that the held-out recordings do not need, the least known first.
 
     Args:
         candidates: The recordings that the models are fitted to and judged by.
         fit: A fit with everything free.
-        predictions: Its prediction of each recording.
         on_progress: Called with the starts done, their number and what is done.
     """
-    for fewer in _fewer_poles(fit):
-        other = candidates.freed(replace(fit, linear=fewer), on_progress)
-        seen = candidates.predict(other)
-        if may_be_chance(_losses(seen), _losses(predictions)):
-            return _without_spare_poles(candidates, other, seen, on_progress)
-    return fit, predictions
+    while fewer := _fewer_poles(fit):
+        other = candidates.freed(replace(fit, linear=fewer[0]), on_progress, evaluations=_ROUGH)
+        if not may_be_chance(_losses(candidates.predict(other)), _losses(candidates.predict(fit))):
+            break
+        fit = other
+    return fit
 
 
 def _fewer_poles(fit: JointFit) -> list[LinearPoles]:
