@@ -222,6 +222,9 @@ def test_a_slope_that_is_no_number_is_refused_and_no_fault_of_the_program():
     problem = PlantProblem(hysteretic_oscillator(2.0, 300.0, 5e4, 2e4, 300.0, 100.0), fit_records([low_pass(3)]))
     slopes = np.ones((20, 6))
     assert np.isfinite(_covariance([slopes[:5], slopes[5:]], np.eye(6), problem)[0]).all()
+    slopes[:, 2] = 0.0
+    errors = np.sqrt(np.diag(_covariance([slopes], np.diag(np.sum(slopes**2, axis=0)), problem)[0]))
+    assert errors[2] == 1e3 * problem.scale[2]  # nothing is known of what nothing depends on
     slopes[3, 2] = 1e200
     with np.errstate(over="ignore", invalid="ignore"):
         assert not _scatter(problem, [np.column_stack([np.ones(20), slopes])]).any()

@@ -36,6 +36,7 @@ _SLICE = 2_000_000
 _LINES = 30  # of the spectrum of a residual to either side, at least, that tell its power
 _AS_GOOD_AS_NONE = 1e-6  # of the mean power of J over all lines
 _LEFT = 1e-3  # share of a line's power, at least, that a fit is taken to leave
+_NO_SLOPE, _UNKNOWN = 1e-150, 1e3  # length of a column of zeros, and the error of such a parameter over its size
 _AT = 1e-7  # of its size: a parameter nearer to its bound is there
 _FAR = 1e3  # times the largest output: a model further off is as good as none
 
@@ -504,7 +505,7 @@ def _scatter(problem: PlantProblem, rows: Sequence[Floats]) -> Floats:
     gram = np.sum(squares, axis=0)
     if not np.isfinite(gram).all():  # `_covariance` says so
         return np.zeros_like(gram)
-    length = np.sqrt(np.diag(gram)) + 1e-300
+    length = np.maximum(np.sqrt(np.diag(gram)), _NO_SLOPE)
     inverse = np.linalg.pinv(gram / np.outer(length, length), rcond=1e-13, hermitian=True) / np.outer(length, length)
     variances = [float(np.mean(part[:, 0] ** 2)) for part in rows]
     moved = inverse @ np.sum([v * each for v, each in zip(variances, squares, strict=True)], axis=0) @ inverse
@@ -571,7 +572,7 @@ def _covariance(slopes: Sequence[Floats], scatter: Floats, problem: PlantProblem
     Of each run there are the rows of J; `scatter` is the covariance of the whole gradient.
     """
     lengths = [np.einsum("ij,ij->j", part, part) for part in slopes]
-    length = np.sqrt(np.sum(lengths, axis=0)) + 1e-300
+    length = np.maximum(np.sqrt(np.sum(lengths, axis=0)), _NO_SLOPE)
     if not np.isfinite(length).all():
         raise IdentificationError(
             f"{problem.structure.name}: a small change of the best parameters leads to a mirror that cannot be "
@@ -584,7 +585,10 @@ def _covariance(slopes: Sequence[Floats], scatter: Floats, problem: PlantProblem
     inner, turned = np.linalg.eigh(scatter / np.outer(length, length))
     half = bread @ (turned * np.sqrt(np.maximum(inner, 0.0)))  # a square cannot come out negative
     size = problem.scale / length
-    return np.asarray(size[:, None] * (half @ half.T) * size), float(math.sqrt(values[-1] / values[0]))
+    covariance = size[:, None] * (half @ half.T) * size
+    unknown = np.flatnonzero(length <= _NO_SLOPE)  # nothing depends on it here
+    covariance[unknown, unknown] = (_UNKNOWN * problem.scale[unknown]) ** 2
+    return np.asarray(covariance), float(math.sqrt(values[-1] / values[0]))
 
 
 def _not_identified(structure: Structure, values: Floats, covariance: Floats) -> list[tuple[str, str]]:
