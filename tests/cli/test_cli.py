@@ -525,6 +525,15 @@ def test_identify_prints_both_models_and_writes_the_mirror(call, folder):
 
 
 @pytest.mark.usefixtures("undrawn")
+@pytest.mark.parametrize(("options", "hold"), [([], "zero-order"), (["--measured-drive"], "first-order")])
+def test_identify_is_told_what_the_drive_does_between_samples(refused, folder, monkeypatch, options, hold):
+    def fit(*_, **options):
+        raise identify.IdentificationError(f"asked with {options['hold']}")
+
+    monkeypatch.setattr("microrad.lab.identify.identify", fit)
+    assert f"asked with {hold}" in refused("identify", write_recording(folder / "loop.csv"), *COLUMNS, *options)
+
+
 def test_identify_json_names_and_models(call, folder):
     path = write_recording(folder / "loop.csv", reverse=True)
     options = (

@@ -250,6 +250,7 @@ def test_a_folder_of_the_virtual_bench_whose_drives_are_played_one_after_the_oth
     ("options", "words"),
     [
         (["--static"], "--static is for one drive and one output, and these recordings have 2 and 2: leave it out"),
+        (["--measured-drive"], "--measured-drive is for one drive and one output"),
         (["--model", "bouc-wen"], "--model is for one drive and one output"),
         (["--admissible"], "--admissible is for one drive and one output"),
         (["--seed", "4"], "--seed is for one drive and one output"),

@@ -114,6 +114,7 @@ _RATE = "Sample rate: 200, '200 Hz' or '50 kHz' [default: what the file says]."
 _HOLD_OUT = "Kept for the check, at each recording's end [default: 0.5; 0 with --validate]."
 _VALIDATE = "Recording that no fit sees; may be repeated."
 _ACCEPT = "Go on in spite of a finding of the checks; may be repeated. The refusal names it."
+_MEASURED = "The drive was measured, so it is straight between samples; by default it is what a converter was told."
 _STATIC = "Fit the hysteresis alone, two models, in seconds."
 
 
@@ -147,6 +148,7 @@ def identify(  # noqa: PLR0913  every argument is a named option
     input_unit: Annotated[str | None, option("--input-unit", "UNIT", _INPUT_UNITS)] = None,
     lever_arm: Annotated[float | None, option("--lever-arm", "LENGTH", _LEVER_ARM, parser=_quantity("m"))] = None,
     position: Annotated[list[Any] | None, option("--position", "X,Y", _POSITION, parser=_place)] = None,
+    measured_drive: Annotated[bool, typer.Option("--measured-drive", help=_MEASURED)] = False,
     hold_out: Annotated[float | None, option("--hold-out", "SHARE", _HOLD_OUT)] = None,
     static: Annotated[bool, typer.Option("--static", help=_STATIC)] = False,
     model: Annotated[Model, typer.Option(help="Model that the mirror file holds.")] = Model.BEST,
@@ -203,6 +205,7 @@ def identify(  # noqa: PLR0913  every argument is a named option
     written = Target(target, page, title, overwrite, check)
     if given.several_channels:
         one_axis = {
+            "--measured-drive": measured_drive,
             "--static": static,
             "--model": model is not Model.BEST,
             "--admissible": admissible,
@@ -214,7 +217,7 @@ def identify(  # noqa: PLR0913  every argument is a named option
         return identify_channels(given, (drive, output), said, written, as_json)
     if given.positions_m is not None or given.signs is not None:
         raise Refusal("positions and signs are for several outputs or drives: leave out --position, or name them all.")
-    how = _Fits(model, static, admissible, hold_out, seed)
+    how = _Fits(model, static, admissible, measured_drive, hold_out, seed)
     return _identify_axis(given, (drive, output), said, written, how, as_json)
 
 
@@ -225,6 +228,7 @@ class _Fits:
     model: Model
     static: bool
     admissible: bool
+    measured_drive: bool
     hold_out: float | None
     seed: int
 
@@ -248,6 +252,7 @@ def _identify_axis(
             bar,
             validation=given.validation,
             admissible=how.admissible,
+            hold="first-order" if how.measured_drive else "zero-order",
             output_unit=units[1],
             lever_arm_m=given.lever_arm_m,
             input_unit=units[0],
