@@ -100,7 +100,11 @@ def root_values(roots: Sequence[Root]) -> Complexes:
 
 
 class PoleZeroProblem:
-    """Distance of poles, zeros, delay and creep to a response of one drive and one output, in standard errors."""
+    """Distance of poles, zeros, delay and creep to a response of one drive and one output, in standard errors.
+
+    The weight of a lag of creep counts as well, in parts of the median response: lags that the band hardly tells apart
+    would else cancel one another at thousands of times the gain.
+    """
 
     def __init__(self, response: FrequencyResponse, lags_s: Sequence[float], length_s: float) -> None:
         """`lags_s` are the time constants of the creep fitted along, `length_s` is that of a record or period."""
@@ -116,7 +120,8 @@ class PoleZeroProblem:
         self.lags_s = tuple(lags_s)
         poles = np.array([complex(-1.0 / tau) for tau in self.lags_s])
         self._lags = -poles * hold_basis(poles, self.freq_hz, self.hold, self.rate_hz, rates=False)[0]
-        self._target = self._rows(self.measured[:, None])[:, 0]
+        self._weak = np.eye(len(self.lags_s), 2 + len(self.lags_s), 2) / float(np.median(np.abs(self.measured)))
+        self._target = self._measured()
 
     def worth_less(self, best: PoleZero) -> "PoleZeroProblem":
         """The same, each frequency worth less by what no model explains thereabouts: distortion counts as noise.
@@ -124,11 +129,11 @@ class PoleZeroProblem:
         Args:
             best: The model with the least distance.
         """
-        squares = np.square(self.residual(best)).reshape(2, -1).sum(axis=0) / 2
+        squares = np.square(self.residual(best)[: self.values]).reshape(2, -1).sum(axis=0) / 2
         scatter = _near(self.freq_hz, squares, _ABOUT)
         other = copy(self)
         other.root_weight = self.root_weight / np.sqrt(np.maximum(scatter, 1.0))
-        other._target = other._rows(self.measured[:, None])[:, 0]
+        other._target = other._measured()
         return other
 
     def shows(self, pole: Root) -> bool:
@@ -150,16 +155,23 @@ class PoleZeroProblem:
     @property
     def values(self) -> int:
         """Number of real values in the response."""
-        return int(self._target.size)
+        return 2 * self.freq_hz.size
+
+    def _measured(self) -> Floats:
+        """What the columns are to make: the weighted response, and no creep."""
+        return np.append(self._rows(self.measured[:, None]), np.zeros(len(self.lags_s)))
 
     def _rows(self, columns: Complexes) -> Floats:
         weighted = columns * self.root_weight[:, None]
         return np.concatenate([weighted.real, weighted.imag])
 
     def columns(self, at: PoleZero) -> Floats:
-        """The weighted response of unit gain, the same turned by 90 degrees, and of each lag: (values, 2 + lags)."""
+        """The weighted response of unit gain, the same turned by 90 degrees, and of each lag, then the lags' weights.
+
+        The shape is (values + lags, 2 + lags).
+        """
         shape = sampled(at, self.freq_hz, self.hold, self.rate_hz)
-        return self._rows(np.column_stack([shape, 1j * shape, self._lags]))
+        return np.vstack([self._rows(np.column_stack([shape, 1j * shape, self._lags])), self._weak])
 
     def residual(self, at: PoleZero) -> Floats:
         """What is left of the response where gain, loss and lags are the best; all of it where two poles coincide."""
@@ -181,7 +193,7 @@ class PoleZeroProblem:
         Args:
             at: Poles, zeros and delay.
         """
-        left = self.residual(at)
+        left = self.residual(at)[: self.values]
         half = left.size // 2
         squared = (left[:half] ** 2 + left[half:] ** 2) / self.root_weight**2
         return math.sqrt(float(np.sum(squared * self.power)))
