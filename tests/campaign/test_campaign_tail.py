@@ -337,7 +337,7 @@ def test_a_campaign_says_how_likely_its_error_is(slow: Slow) -> None:
     assert "at 99 % confidence" in likely and likely in campaign_text(found, 10_000)
     (told,) = campaign_data(found)["cells"][0]["tail"]["beyond"]
     assert told == {"error_rad": error, **asdict(past), "variance": cell.tail.variance[error]}
-    assert f"The variance of that estimate is {told['variance']:.2g}, as of " in likely
+    assert f"The variance of that estimate is {told['variance']:.2g}, that of " in likely
     with Ledger.open(book, write=False) as opened:
         rows = [chunk.columns for chunk in opened.chunks(0)]
     drawn = {name: np.concatenate([each[name] for each in rows]) for name in ("tail_radius", "tail_log_weight")}

@@ -14,7 +14,8 @@ import numpy as np
 
 from microrad.core.arrays import Floats
 from microrad.lab.identify import Identification
-from microrad.lab.identify.linear.fit import LinearFit, fit_percent, output_error
+from microrad.lab.identify.linear.axis import axis_error
+from microrad.lab.identify.linear.fit import LinearFit, fit_percent
 from microrad.lab.identify.selection.predictions import Prediction
 from microrad.lab.identify.selection.roles import roles, single_period, whole_periods
 from microrad.lab.recording import Recording
@@ -357,8 +358,9 @@ def time_response(found: Identification, recordings: Sequence[Recording]) -> Fig
     title = "Time response to the chirp" if chirps else "Time response of the linear part"
     caption = (
         f"Output of the broadband recordings and of the linear model of order {linear.order}. Fit: "
-        "100 (1 − |y − ŷ| / |y − mean y|), the MATLAB-style percentage, offsets removed. Above the whole record, below "
-        "two stretches of it; the mirror rests at the first value of its drive, or a periodic drive has settled."
+        "100 (1 − |y − ŷ| / |y − mean y|), the MATLAB-style percentage, without offsets, drift and creep. Above the "
+        "whole record, below two stretches of it; the mirror rests at the first value of its drive, or a periodic drive has "
+        "settled."
     )
     return Figure("time", f"{title}, fit {percents[chirps[0] if chirps else 0]:.2f} %", caption, sheet, {})
 
@@ -370,7 +372,7 @@ def _response_panels(
     # The mirror rests at the first drive value, not at 0 V.
     drive = (recording.drive - recording.drive[:1]) * found.units.volts
     scaled = replace(recording, drive=drive, output=recording.output * found.units.radians)
-    error = output_error(linear.modes, scaled, linear.hold, steady=recording.period_samples is not None)
+    error = axis_error(linear.modes, scaled, linear.hold)
     measured = scaled.output[: len(error)] - scaled.output[: len(error)].mean(axis=0)
     percent = float(fit_percent(measured, error)[0])
     time = np.arange(len(error)) / recording.rate_hz

@@ -18,7 +18,7 @@ from microrad.lab.identify.linear.fit import (
     output_error,
     transmission_zeros,
 )
-from microrad.lab.identify.linear.modal import HOLD, Hold, ModalModel, simulate
+from microrad.lab.identify.linear.modal import HOLD, Hold, ModalModel, simulate, simulate_periodic
 from microrad.lab.identify.linear.order import fit_order
 from microrad.lab.identify.linear.pole_zero import Fitted, PoleZeroProblem, merged, modes_of, pruned, root_values
 from microrad.lab.identify.linear.response import (
@@ -155,8 +155,7 @@ def _linear_fit(
 ) -> LinearFit:
     own, known, delay_error_s = _known(fit, response.excited_hz[0], response.rate_hz)
     whole = fit.modes(creep=True)
-    steady = all(r.period_samples is not None for r in records)
-    errors = [_without_creep(output_error(whole, r, response.hold, steady=steady), r, steady) for r in records]
+    errors = [axis_error(own, record, response.hold) for record in records]
     error = np.concatenate(errors)
     measured = [r.output[-len(e) :] - r.output[-len(e) :].mean(axis=0) for r, e in zip(records, errors, strict=True)]
     rms = np.sqrt(np.mean(error**2, axis=0))
@@ -186,16 +185,28 @@ def _linear_fit(
     )
 
 
-def _without_creep(error: Floats, record: Recording, steady: bool) -> Floats:
-    """The output error without what is slower than the lags that were fitted: more creep, and a drift."""
-    if steady:
-        return error
-    length = record.samples * record.step_s
-    last = math.floor(math.log10(3 * length / _FIRST_LAG_S))
+def axis_error(modes: ModalModel, record: Recording, hold: Hold) -> Floats:
+    """Measured less modelled output (samples, 1) of a record, without creep and a drift: they belong to no pole.
+
+    Args:
+        modes: The linear part.
+        record: The record; one with a period is taken for settled, another begins at rest at its first drive value.
+        hold: What the drive does between samples.
+    """
+    period = record.period_samples
+    error = output_error(modes, record, hold, steady=period is not None)
+    last = math.floor(math.log10(3 * record.samples * record.step_s / _FIRST_LAG_S))
     times = np.array([_FIRST_LAG_S * 10.0**k for k in range(max(last, 0) + 1)])
     drive = np.ascontiguousarray(record.drive[:, 0] - record.drive[0, 0])
-    lags = kernels.lag_response(drive, record.step_s, times, np.zeros(times.size))
-    columns = np.column_stack([np.ones(record.samples), np.arange(record.samples) / record.samples, lags])
+    if period is None:
+        lags = kernels.lag_response(drive, record.step_s, times, np.zeros(times.size))
+        lags = np.column_stack([lags, np.arange(len(error)) / len(error)])
+    else:
+        poles, ones = np.array([complex(-1.0 / tau) for tau in times]), np.ones((times.size, 1), dtype=complex)
+        bank = ModalModel(poles, ones, np.diag(-poles), np.zeros(ones.shape))
+        begins = range(0, len(error), period)
+        lags = np.vstack([simulate_periodic(bank, drive[k : k + period, None], record.rate_hz, hold) for k in begins])
+    columns = np.column_stack([np.ones(len(error)), lags])
     return np.asarray(error - columns @ np.linalg.lstsq(columns, error)[0])
 
 
