@@ -359,8 +359,8 @@ def time_response(found: Identification, recordings: Sequence[Recording]) -> Fig
     caption = (
         f"Output of the broadband recordings and of the linear model of order {linear.order}. Fit: "
         "100 (1 − |y − ŷ| / |y − mean y|), the MATLAB-style percentage, without offsets, drift and creep. Above the "
-        "whole record, below two stretches of it; the mirror rests at the first value of its drive, or a periodic drive "
-        "has settled."
+        "whole record, below two stretches of it; the mirror rests at the first value of its drive, or a periodic "
+        "drive has settled."
     )
     return Figure("time", f"{title}, fit {percents[chirps[0] if chirps else 0]:.2f} %", caption, sheet, {})
 
