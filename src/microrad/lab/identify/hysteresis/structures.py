@@ -237,7 +237,8 @@ def _bouc_wen_part(
         Parameter("delta", "s/V", model.delta_s_v, -3.0 / fastest, 10.0 / fastest, 0.1 / fastest),
         Parameter("gamma over alpha", "", model.gamma_1_v / model.alpha_1_v, -_RATIO, _RATIO, 0.1),
         Parameter("eta over alpha", "", model.eta_1_v / model.alpha_1_v, -_RATIO, _RATIO, 0.1),
-        Parameter("exponent", "", model.exponent, 1.0, 10.0, 0.1),
+        # Derivatives need a change that stands above the error of the integration, which only another exponent needs.
+        Parameter("exponent", "", model.exponent, 1.0, 10.0, 10.0),
     )
     used = [p for p in all_of_them if p.name.split()[0] in ("d1", "epsilon", "alpha", "beta", *free)]
     if admissible:  # 1 is where the slope behind a slow reversal is 0

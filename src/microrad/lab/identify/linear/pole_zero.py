@@ -38,6 +38,7 @@ _FAR = (
 _APART = 1e-3  # of its size: two poles nearer than this at the start are moved apart
 _TURN = 0.5  # longest delay, in periods of the highest excited frequency
 _SCREENED, _EVALUATIONS = 4, 40
+_SETTLED = 4  # changes that are fitted to their end: with two, where a search ends chose the next change
 _NEIGHBOURS, _ABOUT = 1.1, 2.0  # factors in frequency over which noise and scatter are averaged
 _FEWEST = 10  # lines to either side over which they are averaged at least
 
@@ -452,7 +453,7 @@ def pruned(fit: Fitted) -> Fitted:
     while True:
         tried = [fit.problem.fitted(other, _SCREENED) for other in _others(fit)]
         tried.sort(key=lambda found: found.criterion)
-        settled = [fit.problem.fitted(found.at) for found in tried[:2]]
+        settled = [fit.problem.fitted(found.at) for found in tried[:_SETTLED]]
         best = min(settled, key=lambda found: found.criterion, default=None)
         if best is None or best.criterion > fit.criterion - _GAIN:
             return fit
