@@ -408,6 +408,14 @@ def test_what_stands_without_its_table_is_told_for_each_matrix():
     assert set(keys.values()) == {"stands without a table [hysteresis.1]"}
 
 
+def test_rows_of_another_length_are_told_once():
+    rows = ", ".join(["[0.5, 0.5]"] * 2 + ["[0.6, 0.8]"] + ["[1.0, 1.0]"])
+    fault = only_fault(lambda: loaded(edited((CORRELATION, f"factor = [{rows}]\n"))))
+    assert fault.key == "mirror.uncertainty.factor"
+    assert fault.reason.startswith("row 1 has the length 0.7071068, so the correlation with itself is not 1")
+    assert fault.reason.endswith("; 3 of 4 rows have another length than 1")
+
+
 def test_two_displacements_with_places_are_too_few():
     third = TEXT[TEXT.index("[outputs.3]") : TEXT.index("[recording]")]
     faults = refusal(edited((third, ""), (C, "C = [[0.0, 0.0, -3.0e-6, 0.0], [2.6e-6, 0.0, 1.5e-6, 0.0]]")))

@@ -308,11 +308,12 @@ class UncertaintyTable(Table):
 
     def _factor_problems(self, factor: Rows, count: int) -> Iterator[Problem]:
         yield from shape_problems("factor", factor, (count, "parameters"), (len(factor[0]), "numbers in row 1"))
-        for place, row in enumerate(factor, 1):
-            square = sum(value * value for value in row)
-            if not abs(square - 1.0) <= 2.0 * _LENGTH:
-                reason = f"row {place} has the length {square**0.5:.7g}, so the correlation with itself is not 1"
-                yield Problem("factor", reason, "rows of length 1")
+        squares = [sum(value * value for value in row) for row in factor]
+        wrong = [place for place, square in enumerate(squares) if not abs(square - 1.0) <= 2.0 * _LENGTH]
+        if wrong:
+            first = f"row {wrong[0] + 1} has the length {squares[wrong[0]] ** 0.5:.7g}"
+            more = f"; {len(wrong)} of {len(factor)} rows have another length than 1" if wrong[1:] else ""
+            yield Problem("factor", f"{first}, so the correlation with itself is not 1{more}", "rows of length 1")
 
     def _correlation_problems(self, correlation: tuple[float, ...], count: int) -> Iterator[Problem]:
         import numpy as np
