@@ -92,6 +92,19 @@ def test_outputs_in_a_file_of_their_own(tmp_path):
     )
 
 
+def test_an_output_in_a_file_of_its_own_that_follows_no_drive(tmp_path):
+    rng = np.random.Generator(np.random.Philox(12))
+    drive = np.zeros((800, 2, 2))
+    drive[:, 0, 0], drive[:, 1, 1] = rng.standard_normal((2, 800))  # one after the other
+    output = drive.sum(axis=1, keepdims=True) + 0.01 * rng.standard_normal((800, 1, 2))
+    np.save(tmp_path / "u.npy", drive)
+    words = {"rate_hz": RATE_HZ, "axes": AXES[:3], "output_path": tmp_path / "y.npy"}
+    np.save(tmp_path / "y.npy", output)
+    assert len(read_arrays(tmp_path / "u.npy", **words)) == 2
+    np.save(tmp_path / "y.npy", np.concatenate((output, rng.standard_normal(output.shape)), axis=1))
+    assert "the output 'output[1]' follows the drives in none of the recordings" in refusal(tmp_path / "u.npy", **words)
+
+
 def test_axes_that_an_array_does_not_have(tmp_path):
     path = tmp_path / "a.npz"
     np.savez(path, u=U[:, 0, 0, 0], y=Y[:, :1, 0, 0], wide=Y[:, :, 0, 0], fs=RATE_HZ)

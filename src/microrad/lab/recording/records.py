@@ -24,7 +24,8 @@ class Finding:
 
     `kind` is the check (`drift`, `clipping`, ...), `channel` the name of the channel, `row` the first sample concerned
     counted from 0 (None where the whole record is meant), `message` the numbers and the remedy. `refused` is true
-    where the finding is grounds for refusal; a recording that carries such a finding was taken on by `accept`.
+    where the finding is grounds for refusal; a recording that carries such a finding was taken on by `accept`. `output`
+    is the number of the output, from 0, that was checked, None where it was an input or the time.
     """
 
     kind: str
@@ -32,6 +33,7 @@ class Finding:
     row: int | None
     message: str
     refused: bool
+    output: int | None = None
 
 
 class RecordingError(ValueError):

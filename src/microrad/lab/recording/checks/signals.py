@@ -58,15 +58,17 @@ def check_signals(
     for label, values in zip(labels, drives, strict=True):
         findings += clipping(label, values, place, None)
         findings += quantisation(label, values, None)
-    for label, values in outputs.items():
+    rests = len(drives) < len(inputs)
+    for number, (label, values) in enumerate(outputs.items()):
         found = [
             *clipping(label, values, place, drives),
             *quantisation(label, values, drives),
             *drift(label, values, drives),
             *follows(label, values, drives, labels, rate_hz, band),
         ]
-        rests = len(drives) < len(inputs)
-        findings += [replace(f, refused=False) if rests and f.kind in ("dead", "quantisation") else f for f in found]
+        for each in found:
+            excused = rests and each.kind in ("dead", "quantisation")
+            findings.append(replace(each, refused=each.refused and not excused, output=number))
     return findings
 
 

@@ -42,7 +42,7 @@ def check_together(recordings: Sequence[Recording], validation: Sequence[Recordi
             )
     check_separable(where, total, labels)
     for k, name in enumerate(first.output_names):
-        if all(_is_dead(r, r.output_names[k]) for r in recordings):
+        if all(any(f.kind == "dead" and f.output == k for f in r.findings) for r in recordings):
             raise RecordingError(
                 f"{where}: the output '{name}' follows the drives in none of the recordings; check the sensor's "
                 "wiring, or leave it out."
@@ -56,8 +56,3 @@ def _check_alike(first: Recording, other: Recording) -> None:
             f"{other.path}: {counts[1][0]} inputs and {counts[1][1]} outputs, where {first.path} has {counts[0][0]} "
             f"and {counts[0][1]}; name the same channels in each recording, in the same order."
         )
-
-
-def _is_dead(recording: Recording, output: str) -> bool:
-    """Whether a check found that an output does not follow; the channel of a finding ends with the output's name."""
-    return any(f.kind == "dead" and f.channel.endswith((f"('{output}')", f" {output}")) for f in recording.findings)
