@@ -173,6 +173,7 @@ def test_the_polish_is_kept_only_where_it_is_no_worse(loops, wide, monkeypatch):
     monkeypatch.setattr(candidates, "fit_joint", spoiled)
     result = identify([wide, *loops], models=("prandtl_ishlinskii_joint",))
     fit = result.fit()
+    assert fit.begun
     assert fit.samples_used > 0
     held = replace(poles_of(result.linear.system, result.linear.excited_hz, RATE), delay_s=result.linear.delay_s)
     assert_allclose(fit.linear.poles.frequencies_hz, held.poles.frequencies_hz, rtol=1e-12)

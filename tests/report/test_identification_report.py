@@ -210,6 +210,15 @@ def test_the_parameter_table_holds_value_and_error_of_every_model(page, full):
         assert starts_text(fit)[1:] in below
 
 
+def test_where_a_search_began_is_told(full):
+    held = full.fit("linear")
+    assert starts_text(held) == "one start was made, from the least-squares weights of the operators"
+    assert starts_text(replace(held, begun=True)) == "one start was made, from an earlier fit of the same model"
+    searched = full.fit("bouc_wen")
+    assert starts_text(searched) == f"{searched.agreeing_starts} of 12 starts reached the best fit"
+    assert "no starts are needed" in starts_text(full.fit("prandtl_ishlinskii"))
+
+
 def test_parameters_are_shown_in_their_units(page, full):
     fit, part = full.fit("bouc_wen"), text_of(page)
     rows = rows_of(part[part.index("bouc_wen", part.index(">Parameters<a")) :])

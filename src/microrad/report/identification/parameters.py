@@ -99,6 +99,8 @@ def starts_text(fit: Fit) -> str:
     found = starts(fit)
     if found is None:
         return "the weights are a non-negative least-squares problem, which has one minimum: no starts are needed"
+    if isinstance(fit, JointFit) and fit.begun:
+        return "one start was made, from an earlier fit of the same model"
     if found[1] == 1:
         return "one start was made, from the least-squares weights of the operators"
     return f"{found[0]} of {found[1]} starts reached the best fit"

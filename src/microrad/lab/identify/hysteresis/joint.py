@@ -71,6 +71,7 @@ class JointFit:
     covariance.
     `time_constants_s` of the creep are chosen (decades that the recordings cover), not fitted. `hold` is what the
     drive does between samples, and `delay_s` the delay of the recording chain: `response` has it, `mirror` has not.
+    `begun` says that the search began at an earlier fit of the same form, and nowhere else.
     """
 
     name: str
@@ -87,6 +88,7 @@ class JointFit:
     residual_rms_percent: float
     samples_used: int
     hold: Hold = HOLD
+    begun: bool = False
 
     @property
     def delay_s(self) -> float:
@@ -271,6 +273,7 @@ def fit_joint(  # noqa: PLR0913  all but the first three are named options
         residual_rms_percent=100 * rms / span(records),
         samples_used=residual.size,
         hold=hold,
+        begun=begin is not None,
     )
 
 
