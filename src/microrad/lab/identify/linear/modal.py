@@ -20,7 +20,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from microrad.core.arrays import Complexes, Floats
-from microrad.core.lti import StateSpace
+from microrad.core.lti import StateSpace, modal_matrix
 from microrad.lab.identify.records import IdentificationError
 
 Hold = Literal["zero-order", "first-order", "band-limited"]
@@ -100,19 +100,17 @@ class ModalModel:
     def state_space(self) -> StateSpace:
         """Real modal (block-diagonal) continuous state space."""
         n, count = self.order, self.real_poles
-        A = np.zeros((n, n))
         B, C = np.zeros((n, self.direct.shape[1])), np.zeros((self.direct.shape[0], n))
         row = 0
-        for k, pole in enumerate(self.poles_rad_s):
-            b, c = self.input_vectors[k], self.output_vectors[:, k]
+        for k, (b, c) in enumerate(zip(self.input_vectors, self.output_vectors.T, strict=True)):
             if k < count:
-                A[row, row], B[row], C[:, row] = pole.real, b.real, c.real
+                B[row], C[:, row] = b.real, c.real
                 row += 1
                 continue
-            A[row : row + 2, row : row + 2] = [[pole.real, -pole.imag], [pole.imag, pole.real]]
             B[row : row + 2] = b.real, b.imag
             C[:, row], C[:, row + 1] = 2 * c.real, -2 * c.imag
             row += 2
+        A = modal_matrix([(pole.real, pole.imag) for pole in self.poles_rad_s.tolist()])
         return StateSpace(A, B, C, self.direct.copy())
 
 
