@@ -13,10 +13,9 @@ from microrad.lab.identify.linear.fit import (
     LinearFit,
     OrderScore,
     Uncertainty,
-    fit_percent,
-    linear_warnings,
     output_error,
     transmission_zeros,
+    with_evidence,
 )
 from microrad.lab.identify.linear.modal import HOLD, Hold, ModalModel, simulate, simulate_periodic
 from microrad.lab.identify.linear.order import fit_order
@@ -153,36 +152,17 @@ def _freed(fit: Fitted, response: FrequencyResponse) -> np.ndarray:
 def _linear_fit(
     records: Sequence[Recording], response: FrequencyResponse, fit: Fitted, fits: Sequence[Fitted]
 ) -> LinearFit:
-    own, known, delay_error_s = _known(fit, response.excited_hz[0], response.rate_hz)
+    own, known = _known(fit, response.excited_hz[0], response.rate_hz)
     whole = fit.modes(creep=True)
     errors = [axis_error(own, record, response.hold) for record in records]
-    error = np.concatenate(errors)
-    measured = [r.output[-len(e) :] - r.output[-len(e) :].mean(axis=0) for r, e in zip(records, errors, strict=True)]
-    rms = np.sqrt(np.mean(error**2, axis=0))
     loss = own.response(response.freq_hz, response.hold, response.rate_hz) * (1j * fit.gains[1] / fit.gains[0])
+    residual = response.response - whole.response(response.freq_hz, response.hold, response.rate_hz) - loss
     scores = {one.order: one for one in map(_score, fits)}
     score = _score(fit)
     before = scores.get(score.order, score)
     scores[score.order] = min(score, before, key=lambda one: one.criterion)
     scan = tuple(scores[order] for order in sorted(scores))
-    return LinearFit(
-        system=own.state_space(),
-        modes=own,
-        order=own.order,
-        hold=response.hold,
-        rate_hz=response.rate_hz,
-        excited_hz=response.excited_hz,
-        fit_percent=fit_percent(np.concatenate(measured), error),
-        residual_rms=rms,
-        scan=scan,
-        reason=_reason(score, scan),
-        **vars(known),
-        warnings=linear_warnings(own, records, rms, response, known),
-        response=response,
-        residual=response.response - whole.response(response.freq_hz, response.hold, response.rate_hz) - loss,
-        delay_s=fit.at.delay_s,
-        delay_error_s=delay_error_s,
-    )
+    return with_evidence(own, records, errors, response, residual, known, scan, _reason(score, scan))
 
 
 def axis_error(modes: ModalModel, record: Recording, hold: Hold) -> Floats:
@@ -211,8 +191,8 @@ def axis_error(modes: ModalModel, record: Recording, hold: Hold) -> Floats:
 
 
 def _score(fit: Fitted) -> OrderScore:
-    order, parameters = fit.modes().order, fit.parameters
-    return OrderScore(order, parameters, fit.chi_square, fit.freedom, fit.criterion, fit.output_error_rms)
+    order = sum(pole.states for pole in fit.at.poles)
+    return OrderScore(order, fit.parameters, fit.chi_square, fit.freedom, fit.criterion, fit.output_error_rms)
 
 
 def _reason(chosen: OrderScore, scan: Sequence[OrderScore]) -> str:
@@ -230,8 +210,8 @@ def _reason(chosen: OrderScore, scan: Sequence[OrderScore]) -> str:
 
 
 # -------------------------------------------------------------------------------------------------------------- errors
-def _known(fit: Fitted, edge_hz: float, rate_hz: float) -> tuple[ModalModel, Uncertainty, float]:
-    """The modes, poles, zeros and gains with their standard errors, and that of the delay (s)."""
+def _known(fit: Fitted, edge_hz: float, rate_hz: float) -> tuple[ModalModel, Uncertainty]:
+    """The modes, and poles, zeros, gains and the delay with their standard errors."""
     problem, gain = fit.problem, float(fit.gains[0])
     numbers = problem.pack(fit.at)
     count = numbers.size
@@ -265,5 +245,6 @@ def _known(fit: Fitted, edge_hz: float, rate_hz: float) -> tuple[ModalModel, Unc
         errors[n + m : n + m + 1, None],
         values[n + m + 1 : n + m + 2].real[:, None],
         errors[n + m + 1 : n + m + 2, None],
+        float(errors[-1]),
     )
-    return modes, known, float(errors[-1])
+    return modes, known

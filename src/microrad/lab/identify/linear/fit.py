@@ -31,7 +31,7 @@ class Uncertainty:
 
     `poles_rad_s` and `zeros_rad_s` (transmission zeros below half the sample rate, square systems only) are arrays
     (poles,) and (zeros,); `dc_gain` and `edge_gain` (outputs, inputs) are the gains at zero frequency and at the lowest
-    excited one.
+    excited one. `delay_error_s` is the standard error of the delay of the recording chain, 0 where it was not fitted.
     """
 
     poles_rad_s: Complexes
@@ -42,6 +42,7 @@ class Uncertainty:
     dc_gain_error: Floats
     edge_gain: Floats
     edge_gain_error: Floats
+    delay_error_s: float
 
 
 def uncertainty(polished: Polished, response: FrequencyResponse, direct: bool, inflation: float) -> Uncertainty:
@@ -78,6 +79,7 @@ def uncertainty(polished: Polished, response: FrequencyResponse, direct: bool, i
         errors[0],
         np.abs(values[1]),
         errors[1],
+        0.0,
     )
 
 
@@ -184,10 +186,9 @@ class LinearFit(Uncertainty):
 
     `system` is continuous, real and block-diagonal; `modes` the same as poles and vectors. `fit_percent` (outputs,) is
     100 (1 - |y - yhat| / |y - mean y|) over the recordings, offsets removed: from rest, or in steady state where the
-    recordings are periodic. `residual` (frequencies, outputs, inputs) is measured less
-    modelled response. `scan` is empty where the order was given; `reason` says in words why this order. `delay_s` with
-    its standard error is the pure delay of the recording chain, 0 where it was not fitted; `modes` have it, `system`
-    has not.
+    recordings are periodic. `residual` (frequencies, outputs, inputs) is measured less modelled response. `scan` is
+    empty where the order was given; `reason` says in words why this order. The delay of the recording chain belongs to
+    `modes` and not to `system`.
     """
 
     system: StateSpace
@@ -203,8 +204,11 @@ class LinearFit(Uncertainty):
     warnings: tuple[str, ...]
     response: FrequencyResponse
     residual: Complexes
-    delay_s: float = 0.0
-    delay_error_s: float = 0.0
+
+    @property
+    def delay_s(self) -> float:
+        """Pure delay of the recording chain; 0 where it was not fitted."""
+        return self.modes.delay_s
 
 
 def fit_linear(
@@ -370,6 +374,31 @@ def _linear_fit(
     inflation = colour_inflation([column for error in errors for column in error.T])
     known = uncertainty(polished, response, direct, inflation)
     residual = response.response - model.response(response.freq_hz, response.hold, response.rate_hz)
+    return with_evidence(model, records, errors, response, residual, known, scan, reason)
+
+
+def with_evidence(
+    model: ModalModel,
+    records: Sequence[Recording],
+    errors: Sequence[Floats],
+    response: FrequencyResponse,
+    residual: Complexes,
+    known: Uncertainty,
+    scan: Sequence[OrderScore],
+    reason: str,
+) -> LinearFit:
+    """A linear model with how well it follows its records, and with what speaks against its poles, zeros and gains.
+
+    Args:
+        model: The model.
+        records: The recordings that it was fitted to.
+        errors: Of each of them measured less modelled output, without its mean, shape (samples, outputs).
+        response: The response that it was fitted to.
+        residual: What it leaves of that, of the same shape.
+        known: Its poles, zeros and gains with their errors.
+        scan: The orders that were compared.
+        reason: Why it is this order.
+    """
     error = np.concatenate(errors)
     measured = [r.output[-len(e) :] - r.output[-len(e) :].mean(axis=0) for r, e in zip(records, errors, strict=True)]
     rms = np.sqrt(np.mean(error**2, axis=0))
@@ -385,29 +414,10 @@ def _linear_fit(
         scan=tuple(scan),
         reason=reason,
         **vars(known),
-        warnings=linear_warnings(model, records, rms, response, known),
+        warnings=(*_tones(model, records, rms, response.hold), *_warnings(known, response)),
         response=response,
         residual=residual,
     )
-
-
-def linear_warnings(
-    model: ModalModel,
-    records: Sequence[Recording],
-    residual_rms: Floats,
-    response: FrequencyResponse,
-    known: Uncertainty,
-) -> tuple[str, ...]:
-    """What speaks against poles, zeros and gains.
-
-    Args:
-        model: The model.
-        records: The recordings that it was fitted to.
-        residual_rms: Rms of what it leaves of each output.
-        response: The response that it was fitted to.
-        known: Its poles, zeros and gains with their errors.
-    """
-    return (*_tones(model, records, residual_rms, response.hold), *_warnings(known, response))
 
 
 def _tones(model: ModalModel, records: Sequence[Recording], residual_rms: Floats, hold: Hold) -> list[str]:
