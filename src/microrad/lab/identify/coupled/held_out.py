@@ -43,12 +43,8 @@ def judge(model: CoupledMirror, records: Channels, bands_hz: Floats) -> Judged:
         bands_hz: Edges of the bands, in Hz, shape (bands + 1,).
     """
     errors = [held_out_error(model, record) for record in records.held_out]
-    shape = records.amplitudes_v.size, len(records.outputs)
-    rms, in_bands = np.full(shape, np.nan), np.full((shape[0], bands_hz.size - 1, shape[1]), np.nan)
-    for number in np.unique(records.held_class):
-        own = [e for e, c in zip(errors, records.held_class, strict=True) if c == number]
-        rms[number] = np.sqrt(np.mean([np.mean(e**2, axis=0) for e in own], axis=0))
-        in_bands[number] = np.sqrt(np.mean([_band_power(e, records.rate_hz, bands_hz) for e in own], axis=0))
+    rms = _rms_by_amplitude(records, [np.mean(e**2, axis=0) for e in errors])
+    in_bands = _rms_by_amplitude(records, [_band_power(e, records.rate_hz, bands_hz) for e in errors])
     losses = tuple(_loss(e, r) for e, r in zip(errors, records.held_out, strict=True))
     shares = np.array([e.std(axis=0) / r.output.std(axis=0) for e, r in zip(errors, records.held_out, strict=True)])
     return Judged(rms, in_bands, shares, losses)
@@ -88,11 +84,7 @@ def modelled_output(model: CoupledMirror, record: Recording) -> Floats:
 
 def output_rms(records: Channels) -> Floats:
     """Rms output of the held-out records without its mean, shape (amplitudes, outputs); nan where there are none."""
-    found = np.full((records.amplitudes_v.size, len(records.outputs)), np.nan)
-    for number in np.unique(records.held_class):
-        own = [r for r, c in zip(records.held_out, records.held_class, strict=True) if c == number]
-        found[number] = np.sqrt(np.mean([r.output.var(axis=0) for r in own], axis=0))
-    return found
+    return _rms_by_amplitude(records, [r.output.var(axis=0) for r in records.held_out])
 
 
 def noise_rms(records: Channels) -> Floats:
@@ -100,16 +92,26 @@ def noise_rms(records: Channels) -> Floats:
 
     It is that of a single period; nan where a record has one alone.
     """
-    found = np.full((records.amplitudes_v.size, len(records.outputs)), np.nan)
+    return _rms_by_amplitude(records, [_period_scatter(r) for r in records.held_out])
+
+
+def _rms_by_amplitude(records: Channels, squares: Sequence[Floats]) -> Floats:
+    """Root of the mean of squares, one array a held-out record, over those of each amplitude; nan where there are none.
+
+    A nan of one record is that of its amplitude.
+    """
+    each = np.array(squares)
+    found = np.full((records.amplitudes_v.size, *each.shape[1:]), np.nan)
     for number in np.unique(records.held_class):
-        own = [r for r, c in zip(records.held_out, records.held_class, strict=True) if c == number]
-        if all(r.period_samples and r.samples >= 2 * r.period_samples for r in own):
-            found[number] = np.sqrt(np.mean([_period_scatter(r) for r in own], axis=0))
+        found[number] = np.sqrt(np.mean(each[records.held_class == number], axis=0))
     return found
 
 
 def _period_scatter(record: Recording) -> Floats:
-    periods = _by_period(record.output, record.period_samples or 1)
+    """Mean square of what changes from period to period, by output; nan with fewer than two periods."""
+    if not record.period_samples or record.samples < 2 * record.period_samples:
+        return np.full(record.output.shape[1], np.nan)
+    periods = _by_period(record.output, record.period_samples)
     periods = periods - periods.mean(axis=1, keepdims=True)
     return np.asarray(periods.var(axis=0, ddof=1).mean(axis=0))
 

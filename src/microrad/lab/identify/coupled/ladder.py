@@ -19,7 +19,7 @@ from microrad.lab.identify.coupled.held_out import (
     smallest_within_noise,
 )
 from microrad.lab.identify.coupled.hysteretic import hysteretic_stiffness
-from microrad.lab.identify.coupled.linear import STEPS, Fitted, best_delay, coupled_linear, per_axis
+from microrad.lab.identify.coupled.linear import STEPS, Fitted, coupled_linear, per_axis
 from microrad.lab.identify.coupled.linear_errors import line_spectra
 from microrad.lab.identify.coupled.records import Candidate, CoupledIdentification
 from microrad.lab.identify.coupled.wiring import check_wiring
@@ -28,6 +28,7 @@ from microrad.lab.identify.linear.fit import fit_linear
 from microrad.lab.identify.linear.response import FrequencyResponse, response_from_periods, response_from_records
 from microrad.lab.identify.records import IdentificationError, no_progress
 from microrad.lab.identify.selection.candidates import Refused
+from microrad.lab.identify.stiffness.model import best_delay
 from microrad.lab.identify.travel import check_travel
 from microrad.lab.recording import Recording, check_together
 from microrad.mirror.coupled import CoupledMirror
@@ -139,7 +140,7 @@ class _Ladder:
         few = 0 if reason else min(_NEIGHBOURS, len(linear))
         self.total, self.on_progress = len(self.left) + (len(given) or few), on_progress
         self._report("delay")
-        delay_s = best_delay(self.response, min(_DELAY_ORDER, max(linear)))
+        delay_s = best_delay(self.response, min(_DELAY_ORDER, max(linear)), STEPS)
         spectra = line_spectra(self.records.fitted, self.response)
         for n in options.axis_orders:
             self._judge(partial(per_axis, self.response, n, delay_s, spectra))
@@ -258,7 +259,7 @@ class _Ladder:
             modelled=tuple(
                 None if own is None else self._modelled(candidates[chosen].model, k) for k, own in enumerate(responses)
             ),
-            dependence=None if stopped else self._dependence(),
+            dependence=None if stopped else self._dependence(responses),
             fitted=tuple(r.path for r in records.fitted),
             held_out=tuple(r.path for r in records.held_out),
             stopped=stopped,
@@ -276,10 +277,10 @@ class _Ladder:
         records = [replace(r, output=modelled_output(model, r)) for r in self.records.of_amplitude(amplitude)]
         return _response(records, self.records.periodic).response
 
-    def _dependence(self) -> AmplitudeDependence | None:
+    def _dependence(self, responses: Sequence[FrequencyResponse | None]) -> AmplitudeDependence | None:
         """How gain and main resonance change with the amplitude, by linear models of each; None where not seen."""
         linear = [c for c in self.candidates if c.kind == "coupled linear"]
-        groups = [self.records.of_amplitude(k) for k in range(self.records.amplitudes_v.size) if self._response_of(k)]
+        groups = [self.records.of_amplitude(k) for k, own in enumerate(responses) if own is not None]
         if len(groups) < 2 or not linear:
             return None
         order = min(linear, key=lambda candidate: candidate.error_share).order

@@ -19,8 +19,7 @@ from microrad.mirror.model import Mirror
 STEPS = 2
 """Steps of the plant in each sample."""
 
-_GRID = np.arange(0.0, 2.01, 0.25)  # delays tried, in samples
-_ROUNDS, _STEP = 8, 0.25  # of the search for the delay from there; its longest step, in samples
+_ROUNDS, _STEP = 8, 0.25  # of the search for the delay; its longest step, in samples
 _SETTLED = 0.3  # of the delay's standard error: a step that ends the search
 
 
@@ -45,18 +44,6 @@ class Fitted:
     note: str = ""
 
 
-def best_delay(response: FrequencyResponse, order: int) -> float:
-    """The delay (s) on a grid of a quarter of a sample up to two samples behind which a model fits best.
-
-    Args:
-        response: The measured response.
-        order: Number of states of the models.
-    """
-    tried = _GRID / response.rate_hz
-    costs = [fit_order(without_delay(response, d, STEPS), order, exchanges=0, fine=False).cost for d in tried]
-    return float(tried[int(np.argmin(costs))])
-
-
 def coupled_linear(
     response: FrequencyResponse, order: int, delay_s: float, exchanges: int, spectra: LineSpectra | None
 ) -> Fitted:
@@ -69,8 +56,9 @@ def coupled_linear(
         exchanges: Largest number of modes exchanged for better ones, see `fit_order`.
         spectra: Spectra of the records of the response, see `linear_errors`.
     """
-    model = fit_order(without_delay(response, delay_s, STEPS), order, exchanges=exchanges).model
-    found = spread(model, without_delay(response, delay_s, STEPS), delay_s, spectra)
+    behind = without_delay(response, delay_s, STEPS)
+    model = fit_order(behind, order, exchanges=exchanges).model
+    found = spread(model, behind, delay_s, spectra)
     for _ in range(_ROUNDS):
         step, most = float(found.step[-1]), _STEP / response.rate_hz
         if abs(step) < _SETTLED * float(np.linalg.norm(found.moved[:, -1])):

@@ -190,7 +190,10 @@ def fit_hysteretic_stiffness(
     units = _unit(records, "drive"), _unit(records, "output")
     steady = [_steady(r, units, options.sub_steps, skip_periods) for r in records]
     groups = [[r for r, c in zip(records, classes, strict=True) if c == own] for own in range(len(amplitudes))]
-    numbers = _start(groups, (amplitudes, classes), order, options, skip_periods, start)
+    if start is None:
+        response = response_from_periods(groups[_middle(amplitudes, classes)], skip_periods=skip_periods)
+        start = linear_start(response, order, options.sub_steps, options.delay_s, options.exchanges)
+    numbers = starting_numbers(start, options.sources, len(options.thresholds))
     numbers = _with_thresholds(scaled(numbers, 1 / units[0], 1 / units[1]), steady, options.thresholds)
     squares, group = np.array([np.mean(r.output**2) for r in steady]), np.asarray(classes)
     outputs = np.sqrt([np.mean(squares[group == c]) for c in range(len(amplitudes))])
@@ -216,23 +219,6 @@ def fit_hysteretic_stiffness(
 def _report(on_progress: Progress, before: int, total: int, done: int, _: int, text: str) -> None:
     """Steps done of one stage as those of all."""
     on_progress(before + done, total, text)
-
-
-def _start(
-    groups: Sequence[Sequence[Recording]],
-    classes: tuple[Sequence[float], Sequence[int]],
-    order: int,
-    options: StiffnessOptions,
-    skip_periods: int,
-    given: LinearStart | None,
-) -> Numbers:
-    """A linear model, given or of the middle amplitude, with operators of next to no weight."""
-    size = np.log(classes[0])
-    middle = int(np.argmin(np.abs(size - np.mean(size[np.asarray(classes[1])]))))
-    if given is None:
-        response = response_from_periods(groups[middle], skip_periods=skip_periods)
-        given = linear_start(response, order, options.sub_steps, options.delay_s, options.exchanges)
-    return starting_numbers(given, options.sources, len(options.thresholds))
 
 
 # --------------------------------------------------------------------------------------------------------- the records
@@ -284,6 +270,12 @@ def _classes(records: Sequence[Recording]) -> tuple[tuple[float, ...], tuple[int
             "be told from linear stiffness; add records of another amplitude, twice as large for example."
         )
     return amplitudes, classes
+
+
+def _middle(amplitudes: Sequence[float], classes: Sequence[int]) -> int:
+    """Number of the amplitude that is next to the geometric mean over all records."""
+    size = np.log(amplitudes)
+    return int(np.argmin(np.abs(size - np.mean(size[np.asarray(classes)]))))
 
 
 def _unit(records: Sequence[Recording], channel: str) -> float:

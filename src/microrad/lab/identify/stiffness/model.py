@@ -219,14 +219,23 @@ def linear_start(
         delay_s: The delay, in s; None for the best on a grid of a quarter of a sample up to two samples.
         exchanges: Largest number of modes exchanged in the fit of the model.
     """
-
     if delay_s is None:
-        tried = [late / response.rate_hz for late in np.arange(0.0, 2.01, 0.25)]
-        behind = [without_delay(response, late, sub_steps) for late in tried]
-        costs = [fit_order(each, order, exchanges=0, fine=False).cost for each in behind]
-        delay_s = tried[int(np.argmin(costs))]
+        delay_s = best_delay(response, order, sub_steps)
     model = fit_order(without_delay(response, delay_s, sub_steps), order, exchanges=exchanges).model
     return LinearStart(model, delay_s, response.excited_hz[0])
+
+
+def best_delay(response: FrequencyResponse, order: int, sub_steps: int) -> float:
+    """The delay (s) on a grid of a quarter of a sample up to two samples behind which a linear model fits best.
+
+    Args:
+        response: The measured response.
+        order: Number of states of the models.
+        sub_steps: Steps of the plant in each sample.
+    """
+    tried = np.arange(0.0, 2.01, 0.25) / response.rate_hz
+    costs = [fit_order(without_delay(response, d, sub_steps), order, exchanges=0, fine=False).cost for d in tried]
+    return float(tried[int(np.argmin(costs))])
 
 
 def without_delay(response: FrequencyResponse, delay_s: float, sub_steps: int) -> FrequencyResponse:
