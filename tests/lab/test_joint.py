@@ -403,9 +403,8 @@ def test_parameters_in_which_the_output_is_linear():
     fit = fit_joint([crept(None)], "prandtl_ishlinskii_rate_creep", UNITS)
     marked = [p.name for p in fit.structure.parameters if p.linear]
     assert marked == [p.name for p in fit.structure.parameters if p.name != "widening"]
-    unmarked = replace(
-        fit.structure, parameters=tuple(replace(parameter, linear=False) for parameter in fit.structure.parameters)
-    )
+    parameters = tuple(replace(parameter, linear=False) for parameter in fit.structure.parameters)
+    unmarked = replace(fit.structure, parameters=parameters, beside=())
     records = fit_records([crept(None)])
     at = fit.fit.values / np.array([p.scale for p in fit.structure.parameters]) + 0.1
     one, two = (PlantProblem(s, records).slopes(at, central=True) for s in (fit.structure, unmarked))

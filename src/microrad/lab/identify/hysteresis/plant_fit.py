@@ -31,7 +31,7 @@ Interpolation = Literal["linear", "band-limited"]
 _ROUGH = 1e-8  # relative change of cost or place from which a search goes on by central differences
 _SCREENED = 1e-5  # and that at which it ends on fewer samples
 _DIFFERENCE = 1e-5
-_LINEAR_DIFFERENCE = 1.0
+_BANK = ("bouc_wen", "operator", "play_start", "play_threshold", "play_weight")  # fields of a plant
 _SLICE = 2_000_000
 _LINES = 30  # of the spectrum of a residual to either side, at least, that tell its power
 _AS_GOOD_AS_NONE = 1e-6  # of the mean power of J over all lines
@@ -45,8 +45,8 @@ _FAR = 1e3  # times the largest output: a model further off is as good as none
 class Parameter:
     """A number to be fitted: name, unit, where the search begins, its bounds, and a change of it that is of order one.
 
-    `size` is the size of the start where it is left at 0. `linear` says that the output is linear in it, the others
-    held: then a single simulation gives its derivative.
+    `size` is the size of the start where it is left at 0. `linear` says that the output is linear in all such
+    parameters together, the others held: then a single simulation with no other of them gives its derivative.
     """
 
     name: str
@@ -71,13 +71,16 @@ def _no_delay(_values: Floats) -> float:
 class Structure:
     """Parameters, and how they make a mirror: `build` takes their values, in their order, and raises nothing.
 
-    `late` gives, of the same values, the delay of the recording chain behind that mirror (s).
+    `late` gives, of the same values, the delay of the recording chain behind that mirror (s). `beside` holds what the
+    mirror contains beside the rest and what never changes: number of a linear parameter, and the mirror for 1 of it
+    alone. It is simulated once.
     """
 
     name: str
     parameters: tuple[Parameter, ...]
     build: Callable[[Floats], Mirror]
     late: Callable[[Floats], float] = _no_delay
+    beside: tuple[tuple[int, Mirror], ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,14 +215,22 @@ def simulate_record(plant: kernels.Plant, run: FitRecord, delay_s: float = 0.0) 
         run: The run, whose drive has `stride` steps in each sample of the output.
         delay_s: Delay of the recording chain behind it, in s.
     """
+    return _delayed(_undelayed(plant, run), run, delay_s)
+
+
+def _delayed(output: Floats, run: FitRecord, delay_s: float) -> Floats:
+    return late(output, (delay_s + run.late_s) / run.step_s)[: run.drive.shape[0] : run.stride]
+
+
+def _undelayed(plant: kernels.Plant, run: FitRecord) -> Floats:
     state = mirror.at_rest(plant)
-    drive = beyond(run.drive, delay_s + run.late_s)
+    drive = beyond(run.drive, math.inf)  # as far as any delay looks
     output = np.empty((drive.shape[0], len(plant.outputs)))
     bank = np.empty((drive.shape[0], 0))
     for begin in range(0, drive.shape[0], _SLICE):  # the interpreter answers Ctrl-C between two of them
         part = slice(begin, begin + _SLICE)
         kernels.open_loop(plant, state, drive[part], output[part], bank[part])
-    return late(output, (delay_s + run.late_s) / run.step_s)[: run.drive.shape[0] : run.stride]
+    return output
 
 
 @dataclass(frozen=True, eq=False)
@@ -277,22 +288,46 @@ class PlantProblem:
         self.measured = np.concatenate([r.weight * t.ravel() for r, t in zip(self.runs, self.targets, strict=True)])
         # A point is asked for up to three times: by the search, by the derivatives there and by the report.
         self.simulated = lru_cache(maxsize=2 * self.scale.size + 2)(self._simulate)
+        self.discrete: dict[tuple[int | bytes, ...], dict[float, kernels.Plant]] = {}  # by what is not the bank
+        self.beside = {i: [self.scale[i] * each for each in self._outputs(model)] for i, model in structure.beside}
+        self.used_beside = lru_cache(maxsize=len(self.beside))(lambda i, delay_s: self._used(self.beside[i], delay_s))
+        self.linear = np.array([p.linear for p in structure.parameters], dtype=bool)
 
     def modelled(self, point: Floats) -> Floats:
         """All used outputs as one vector, at a scaled point; far off where the plant cannot be stepped or runs away."""
         return self.simulated(point.tobytes())
 
     def _simulate(self, point: bytes) -> Floats:
-        values = np.frombuffer(point) * self.scale
+        place = np.frombuffer(point)
+        values = place * self.scale
+        rest = values.copy()
+        rest[list(self.beside)] = 0.0
         try:
-            model = self.structure.build(values)
-            plants = {step: mirror.discretise(model, step, often=True) for step in {run.step_s for run in self.runs}}
+            outputs = self._outputs(self.structure.build(rest))
         except ValueError:
             return np.full(self.size, self.far)
-        behind = self.structure.late(values)
+        for number, each in self.beside.items():
+            for output, one in zip(outputs, each, strict=True):
+                np.add(output, place[number] * one, out=output)
+        return self._used(outputs, self.structure.late(values))
+
+    def _outputs(self, model: Mirror) -> list[Floats]:
+        """Of each run the output of a mirror at every step, without the delay behind it."""
+        longest = max(run.step_s for run in self.runs)  # where one of them has no plant, it is this
+        own = mirror.discretise(model, longest, often=True)
+        bank = {field: getattr(own, field) for field in _BANK}
+        linear = (len(model.bouc_wen), *(getattr(model, field).tobytes() for field in "ABEFGCDK"))
+        if linear not in self.discrete:
+            plants = {step: mirror.discretise(model, step, often=True) for step, _ in self.steps if step != longest}
+            self.discrete[linear] = {longest: own, **plants}
+        plants = {step: plant._replace(**bank) for step, plant in self.discrete[linear].items()}
         of = {(step, hold): plants[step] if hold == "first-order" else held(plants[step]) for step, hold in self.steps}
-        used = [(run, simulate_record(of[run.step_s, run.hold], run, behind)[run.first :]) for run in self.runs]
-        whole = np.concatenate([run.weight * without_nuisance(run.nuisance, output).ravel() for run, output in used])
+        return [_undelayed(of[run.step_s, run.hold], run) for run in self.runs]
+
+    def _used(self, outputs: Sequence[Floats], delay_s: float) -> Floats:
+        """The used part of such outputs, weighted, as one vector."""
+        pairs = [(r, _delayed(output, r, delay_s)[r.first :]) for r, output in zip(self.runs, outputs, strict=True)]
+        whole = np.concatenate([run.weight * without_nuisance(run.nuisance, used).ravel() for run, used in pairs])
         return np.where(np.abs(whole) < self.far, whole, self.far)  # nan and inf too
 
     def residual(self, point: Floats) -> Floats:
@@ -334,11 +369,19 @@ class PlantProblem:
             free: Numbers of the parameters, None for all.
         """
         here = self.modelled(point)
+        few = self.linear.sum() <= len(self.beside) + 1
+        base = point if few else np.where(self.linear, 0.0, point)  # of several, each is simulated without the others
+        from_base = self.modelled(base)
+        delay_s = self.structure.late(point * self.scale)
 
         def column(i: int) -> Floats:
-            step, linear = np.zeros(point.size), self.structure.parameters[i].linear
-            size = _LINEAR_DIFFERENCE if linear else _DIFFERENCE
-            if linear or not central:
+            step, size = np.zeros(point.size), _DIFFERENCE
+            if i in self.beside:
+                return self.used_beside(i, delay_s)
+            if self.linear[i]:
+                step[i] = 1.0
+                return np.asarray(self.modelled(base + step) - from_base)
+            if not central:
                 step[i] = size if point[i] + size <= self.upper[i] else -size
                 return np.asarray((self.modelled(point + step) - here) / step[i])
             up = min(point[i] + size, self.upper[i]) - point[i]
@@ -545,7 +588,7 @@ def coloured_scatter(rows: Floats, outputs: int, nuisance: Floats, taken: Floats
         size = np.linalg.norm(part[:, 1:], axis=0) + 1e-300
         worth = np.sum(np.abs(lines[:, 1:] / size) ** 2, axis=1)
         worth += _AS_GOOD_AS_NONE * worth.mean() + 1e-300  # lines at which J has nothing: rounding tells nothing there
-        of_fit = np.einsum("ki,ij,kj->k", lines[:, 1:].conj(), taken, lines[:, 1:]).real
+        of_fit = np.einsum("kj,kj->k", lines[:, 1:].conj() @ taken, lines[:, 1:]).real
         left = np.clip(1.0 - (of_fit + of_nuisance) / samples, _LEFT, 1.0)
         power = np.maximum(_mean_power(lines[:, 0], left, worth), _mean_power(lines[:, 0], left, np.ones(worth.size)))
         weighed = lines[:, 1:] * np.sqrt(power * twice)[:, None] / samples

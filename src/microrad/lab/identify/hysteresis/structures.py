@@ -202,7 +202,10 @@ def one_axis(
     def build(values: Floats) -> Mirror:
         axis = parts(values)
         system = None if axis.linear is None else axis.linear.system
-        return mirror.assemble(name, composition, system, axis.model, axis.creep)
+        return mirror.assemble(name, composition, system, *_without_zeros(axis.model, axis.creep))
+
+    def lag(time_constant_s: float) -> Mirror:
+        return mirror.assemble(name, "static", None, Play((), ()), Creep((1.0,), (time_constant_s,)))
 
     again = partial(
         one_axis,
@@ -219,7 +222,17 @@ def one_axis(
         found = make_linear(values[second:])
         return 0.0 if found is None else found.delay_s
 
-    return AxisStructure(name, (*hysteresis, *lags, *roots), build, late, parts=parts, recipe=again)
+    beside = tuple((first + i, lag(tau)) for i, tau in enumerate(creep.time_constants_s))
+    return AxisStructure(name, (*hysteresis, *lags, *roots), build, late, beside, parts=parts, recipe=again)
+
+
+def _without_zeros(model: BoucWen | Play, creep: Creep) -> tuple[BoucWen | Play, Creep]:
+    """The same without plays and lags that have no weight, which take time and add nothing."""
+    if isinstance(model, Play):
+        kept = [(r, w) for r, w in zip(model.thresholds_v, model.weights_rad_v, strict=True) if w]
+        model = replace(model, thresholds_v=tuple(r for r, _ in kept), weights_rad_v=tuple(w for _, w in kept))
+    lags = [(w, tau) for w, tau in zip(creep.weights_rad_v, creep.time_constants_s, strict=True) if w]
+    return model, Creep(tuple(w for w, _ in lags), tuple(tau for _, tau in lags))
 
 
 def _bouc_wen_part(
