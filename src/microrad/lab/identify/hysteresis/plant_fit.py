@@ -627,10 +627,9 @@ def _covariance(slopes: Sequence[Floats], scatter: Floats, problem: PlantProblem
     bread = (vectors / values) @ vectors.T
     inner, turned = np.linalg.eigh(scatter / np.outer(length, length))
     half = bread @ (turned * np.sqrt(np.maximum(inner, 0.0)))  # a square cannot come out negative
-    size = problem.scale / length
-    covariance = size[:, None] * (half @ half.T) * size
-    unknown = np.flatnonzero(length <= _NO_SLOPE)  # nothing depends on it here
-    covariance[unknown, unknown] = (_UNKNOWN * problem.scale[unknown]) ** 2
+    unknown = length <= _NO_SLOPE  # nothing depends on it here
+    size = np.where(unknown, 0.0, problem.scale / length)
+    covariance = size[:, None] * (half @ half.T) * size + np.diag(np.where(unknown, _UNKNOWN * problem.scale, 0.0) ** 2)
     return np.asarray(covariance), float(math.sqrt(values[-1] / values[0]))
 
 
