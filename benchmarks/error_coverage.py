@@ -25,6 +25,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from operator import itemgetter
@@ -551,7 +552,10 @@ def judged_residual(truth: Truth, table: Mirror, least: Floats) -> Judged:
     """
     name, gain = RESIDUAL, slow_gain(truth.values)
     found = from_table(table).linear_loop
-    controller = tune(PI, [loop_plant(found, gain)], Specification(0.5), seed=0, survey=64).controller
+    try:
+        controller = tune(PI, [loop_plant(found, gain)], Specification(0.5), seed=0, survey=64).controller
+    except ValueError:  # no loop can be closed on what was identified
+        return Judged(truth.seed, name, math.nan, math.nan, math.nan, math.nan)
     true, predicted = residual_rad(true_mirror(truth.values), controller), residual_rad(found, controller)
     smallest = error_of(lambda v: residual_rad(true_mirror(v), controller), truth.values, truth.fitted, least)
     if table.uncertainty is None:
@@ -638,9 +642,10 @@ def main() -> None:
     """Identify the truths and print the table; exit code 1 where a line misses a bar."""
     count, first = (int(sys.argv[i]) if len(sys.argv) > i else default for i, default in ((1, TRUTHS), (2, 0)))
     results = []
-    for seed in range(first, first + count):
-        results.append(judged(draw_truth(seed)))
-        print(told(results[-1]), flush=True)
+    with ProcessPoolExecutor() as pool:
+        for result in pool.map(judged, map(draw_truth, range(first, first + count))):
+            results.append(result)
+            print(told(result), flush=True)
     lines = lines_of(results)
     print(f"{'':24}{'truths':>7}{'known':>7}{'held':>7}  {'95 %':13}{'width':>7}", *lines, sep="\n")
     raise SystemExit(any(line.missed for line in lines))
