@@ -15,6 +15,7 @@ a = p T, phi1 = (e^a - 1)/a, phi2 = (phi1 - 1)/a. The first two are exact at the
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -311,6 +312,7 @@ def simulate(model: ModalModel, drive: Floats, rate_hz: float, hold: Hold = "zer
 
 
 _TAPS = 20
+_AT = np.arange(_TAPS) - _TAPS // 2 + 1  # samples later than the whole ones that take part
 
 
 def beyond(drive: Floats, delay_s: float) -> Floats:
@@ -337,12 +339,16 @@ def late(signal: Floats, samples: float) -> Floats:
     if samples == 0.0:
         return np.asarray(signal)
     whole = math.floor(samples)
-    at = np.arange(_TAPS) - _TAPS // 2 + 1  # samples later than `whole` that take part
-    others = [at[at != k] for k in at]
-    taps = np.array([np.prod((samples - whole - o) / (k - o)) for k, o in zip(at, others, strict=True)])
-    last = len(signal) - 1
-    padded = signal[np.clip(np.arange(-int(at[-1]), last + 1 - int(at[0])) - whole, 0, last)]
+    taps, last = _taps(samples - whole), len(signal) - 1
+    padded = signal[np.clip(np.arange(-int(_AT[-1]), last + 1 - int(_AT[0])) - whole, 0, last)]
     return np.stack([np.convolve(column, taps, mode="valid") for column in padded.T], axis=1)
+
+
+@lru_cache(maxsize=64)
+def _taps(part: float) -> Floats:
+    """Weights of the samples of `_AT` for a delay of part of a sample."""
+    others = [_AT[k != _AT] for k in _AT]
+    return np.array([np.prod((part - o) / (k - o)) for k, o in zip(_AT, others, strict=True)])
 
 
 def simulate_periodic(model: ModalModel, period: Floats, rate_hz: float, hold: Hold = "zero-order") -> Floats:
