@@ -68,6 +68,7 @@ benchmark: $(VENV)/.test
 	$(BIN)/python benchmarks/cubespec_linear.py
 	$(BIN)/python benchmarks/cubespec_one_model.py
 	$(BIN)/python benchmarks/cubespec_ladder.py
+	$(BIN)/python benchmarks/cubespec_residual.py
 	$(BIN)/python benchmarks/studio_map.py
 
 clean:
