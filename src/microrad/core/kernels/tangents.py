@@ -52,6 +52,19 @@ def _add(total, gain, row):  # type: ignore[no-untyped-def]
 
 
 @inlined
+def _add_all(total, gains, rows):  # type: ignore[no-untyped-def]
+    """total += gains rows, three rows at a time: each then costs one load, where alone it costs two and a store."""
+    whole = gains.size - gains.size % 3
+    for e in range(0, whole, 3):
+        a, b, c = gains[e], gains[e + 1], gains[e + 2]
+        first, second, third = rows[e], rows[e + 1], rows[e + 2]
+        for p in range(total.size):
+            total[p] += a * first[p] + b * second[p] + c * third[p]
+    for e in range(whole, gains.size):
+        _add(total, gains[e], rows[e])
+
+
+@inlined
 def _inject(t, signals, k):  # type: ignore[no-untyped-def]
     """Add what the parameters of the state contribute by themselves at step k."""
     for p in range(t.places[DRIVE_FROM]):
@@ -79,9 +92,8 @@ def _tangent_predict(t):  # type: ignore[no-untyped-def]
             a, b = x0[p], x1[p]
             x0[p] = keep0 * a + cross0 * b
             x1[p] = keep1 * b + cross1 * a
-    for i in range(t.x.shape[0]):
-        for e in range(t.z.shape[0]):
-            _add(t.x[i], t.plant.E_held[i, e], t.z[e])
+        _add_all(x0, t.plant.E_held[i], t.z)
+        _add_all(x1, t.plant.E_held[i + 1], t.z)
 
 
 @inlined
@@ -91,8 +103,7 @@ def _tangent_drive(t, k):  # type: ignore[no-untyped-def]
         for p in range(q.size):
             q_before[p] = q[p]
             q[p] = 0.0
-        for i in range(t.x.shape[0]):
-            _add(q, t.plant.F[e, i], t.x[i])
+        _add_all(q, t.plant.F[e], t.x)
     for p in range(t.places[DRIVE_FROM], t.places[BANK_FROM]):
         t.q[t.row[p], p] += t.signal[k, t.source[p]]
 
@@ -156,16 +167,13 @@ def tangent_kernel(t, moved, begin, first, stride, output):  # type: ignore[no-u
         _tangent_drive(t, k)
         _tangent_bank(t, moved, k)
         for i in range(t.x.shape[0]):
-            for e in range(t.z.shape[0]):
-                _add(t.x[i], t.plant.E1[i, e], t.change[e])
+            _add_all(t.x[i], t.plant.E1[i], t.change)
         _inject(t, t.after, k)
         if k >= first and (k - first) % stride == 0:
             for o in range(output.shape[1]):
                 total = output[row, o]
                 for p in range(total.size):
                     total[p] = 0.0
-                for i in range(t.x.shape[0]):
-                    _add(total, t.plant.C[o, i], t.x[i])
-                for e in range(t.z.shape[0]):
-                    _add(total, t.plant.K[o, e], t.z[e])
+                _add_all(total, t.plant.C[o], t.x)
+                _add_all(total, t.plant.K[o], t.z)
             row += 1

@@ -16,7 +16,7 @@ from microrad.lab.identify.linear.modal import hold_step
 from microrad.lab.identify.stiffness.model import Numbers
 from microrad.mirror import model as mirror
 
-_CHUNK = 128
+_CHUNK = 256
 _STATE, _DRIVE, _BANK = range(3)  # where a parameter enters: the order of a chunk's columns
 _LATER = 1e-5
 
