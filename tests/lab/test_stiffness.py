@@ -250,6 +250,23 @@ def test_no_fit_runs_away_where_its_plays_slide(training):
     assert len(growths(fit)) == 16
     assert max(growths(fit)) < 0.0
     assert fit.costs[-1] < 0.03 * fit.costs[0]
+    drive = training[-1].drive[:PERIOD]
+    first, second, last = over_periods(fit, drive, 1, 2, 1000)
+    assert np.abs(last - second).max() < 1e-3 * np.abs(second).max() < 1e-3 * 2 * np.abs(first).max()
+    far, farther, at_rest = over_periods(fit, 10 * drive, 1, 1000, 1100)
+    assert np.abs(farther).max() < 1.5 * np.abs(far).max() < 30 * np.abs(first).max()
+    assert np.ptp(at_rest, axis=0).max() < 1e-6 * np.abs(first).max()
+
+
+def over_periods(fit, drive, *numbers):
+    """Outputs over some of many periods of a drive from rest; behind the thousandth there is none."""
+    plant, found = mirror.discretise(fit.mirror, 1 / (fit.sub_steps * RATE_HZ)), []
+    state, fine = mirror.at_rest(plant), delayed(drive, RATE_HZ, fit.delay_s, fit.sub_steps)
+    for number in range(1, numbers[-1] + 1):
+        output = np.empty((len(fine), len(plant.outputs)))
+        kernels.open_loop(plant, state, fine * (number <= 1000), output, np.empty((len(fine), 0)))
+        found += [output] * (number in numbers)
+    return found
 
 
 def test_a_mirror_that_runs_away_is_refused(training, monkeypatch):

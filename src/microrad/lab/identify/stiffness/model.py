@@ -112,7 +112,8 @@ class Numbers:
         """Largest real part of a pole, the plays of each operator all stuck or all sliding.
 
         Plays that slide follow q, so that z = W q with W the sum of their weights and x' = (A + E W F) x. Above 0 a
-        large drive starts what no drive stops; see `lti.growth_1_s`.
+        large drive starts what no drive stops; see `lti.growth_1_s`. Below 0 no drive runs away: a play differs from q
+        by no more than its threshold, which is a bounded drive of a mirror whose modes decay.
         """
         return lti.growth_1_s(self.mirror("").A, self.E, self.F, self.weights.sum(axis=1))
 
