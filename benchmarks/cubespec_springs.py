@@ -104,8 +104,8 @@ def backward(plant, path, error, state, predicted, drive, bank):
             of_state[i] = plant.diagonal[i] * predicted[k, i] + plant.coupling[i ^ 1] * predicted[k, i ^ 1]
 
 
-def gradient(numbers: Numbers, record: Steady) -> tuple[float, np.ndarray]:
-    """Squared error of a record in its steady state, and its derivative by each of the numbers."""
+def gradient(numbers: Numbers, record: Steady) -> np.ndarray:
+    """Derivative of the squared error of a record in its steady state by each of the numbers."""
     plant = tangents.play_plant(numbers, record.step_s)
     drive = tangents.two_periods(record, numbers.delay_s)
     path = tangents.simulate_path(plant, drive)
@@ -150,7 +150,7 @@ def gradient(numbers: Numbers, record: Steady) -> tuple[float, np.ndarray]:
         "K": error.T @ path.z,
     }
     delay = float(np.sum((by_drive[:half] + by_drive[half:]) * later))
-    return float(np.sum(error**2)), 2.0 * np.concatenate([*(found[f].ravel() for f in FIELDS), [delay]])
+    return 2.0 * np.concatenate([*(found[f].ravel() for f in FIELDS), [delay]])
 
 
 # -------------------------------------------------------------------------------------------------------- the springs
@@ -266,7 +266,7 @@ class Search:
 
     def gradient(self, free: np.ndarray) -> np.ndarray:
         numbers = self.springs.numbers(free)
-        found = list(self.pool.map(lambda r: gradient(numbers, r)[1], self.records))
+        found = list(self.pool.map(lambda r: gradient(numbers, r), self.records))
         return np.asarray(self.springs.slopes(free).T @ (self.weights @ np.array(found)))
 
     def curvature(self, free: np.ndarray) -> np.ndarray:
@@ -297,8 +297,8 @@ class Search:
                 size, since = self.size(matrix), 0
                 matrix /= np.outer(size, size)
             move = -_newton(cho_factor(matrix + damping * np.eye(size.size)), pairs, slope, size)
-            step, trial, refusals = _along(self, free, move, cost, float(slope @ move))
-            if step == 0.0:
+            trial, found, refusals = _along(self, free, move, cost, float(slope @ move))
+            if found == cost:
                 damping, since, refused = 8 * damping, REFRESH, refused + 1
                 pairs.clear()
                 if refused > TRIALS:
@@ -308,7 +308,7 @@ class Search:
             before, slope = slope, self.gradient(trial)
             if (trial - free) @ (slope - before) > 0.0:
                 pairs = [*pairs, (trial - free, slope - before)][-MEMORY:]
-            free, cost = trial, self.cost(trial)
+            free, cost = trial, found
             on_step(done, free, cost)
         return free
 
@@ -328,19 +328,19 @@ def _newton(factor: tuple, pairs: list, slope: np.ndarray, size: np.ndarray) -> 
 
 def _along(
     search: Search, free: np.ndarray, move: np.ndarray, cost: float, slope: float
-) -> tuple[float, np.ndarray, int]:
-    """The step that lowers the cost, 0 for none, where it leads, and how many were simulated in vain."""
+) -> tuple[np.ndarray, float, int]:
+    """Where a step leads that lowers the cost, its cost (as before if none does), and how many were tried in vain."""
     step, refusals = 1.0, 0
     for _ in range(12):
         trial = free + step * move
         found = search.cost(trial)
         if found < cost + 1e-4 * step * slope:
-            return step, trial, refusals
+            return trial, found, refusals
         refusals += math.isfinite(found)
         if refusals >= 2:
             break
         step *= 0.3 if math.isfinite(found) else 0.5
-    return 0.0, free, refusals
+    return free, cost, refusals
 
 
 def main() -> None:

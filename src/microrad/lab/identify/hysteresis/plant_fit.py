@@ -32,6 +32,7 @@ _ROUGH = 1e-8  # relative change of cost or place from which a search goes on by
 _SCREENED = 1e-5  # and that at which it ends on fewer samples
 _DIFFERENCE = 1e-5
 _BANK = ("bouc_wen", "operator", "play_start", "play_threshold", "play_weight")  # fields of a plant
+_KEPT = 100  # discretised mirrors
 _SLICE = 2_000_000
 _LINES = 30  # of the spectrum of a residual to either side, at least, that tell its power
 _AS_GOOD_AS_NONE = 1e-6  # of the mean power of J over all lines
@@ -317,10 +318,14 @@ class PlantProblem:
         own = mirror.discretise(model, longest, often=True)
         bank = {field: getattr(own, field) for field in _BANK}
         linear = (len(model.bouc_wen), *(getattr(model, field).tobytes() for field in "ABEFGCDK"))
-        if linear not in self.discrete:
-            plants = {step: mirror.discretise(model, step, often=True) for step, _ in self.steps if step != longest}
-            self.discrete[linear] = {longest: own, **plants}
-        plants = {step: plant._replace(**bank) for step, plant in self.discrete[linear].items()}
+        shared = self.discrete.get(linear)
+        if shared is None:
+            shared = {step: mirror.discretise(model, step, often=True) for step, _ in self.steps if step != longest}
+            shared[longest] = own
+            if len(self.discrete) > _KEPT:  # those of places that the search has left
+                self.discrete.clear()
+            self.discrete[linear] = shared
+        plants = {step: plant._replace(**bank) for step, plant in shared.items()}
         of = {(step, hold): plants[step] if hold == "first-order" else held(plants[step]) for step, hold in self.steps}
         return [_undelayed(of[run.step_s, run.hold], run) for run in self.runs]
 
