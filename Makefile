@@ -69,6 +69,7 @@ benchmark: $(VENV)/.test
 	$(BIN)/python benchmarks/cubespec_one_model.py
 	$(BIN)/python benchmarks/cubespec_ladder.py
 	$(BIN)/python benchmarks/cubespec_residual.py
+	$(BIN)/python benchmarks/springs_elsewhere.py
 	$(BIN)/python benchmarks/studio_map.py
 
 clean:

@@ -1,6 +1,6 @@
 """What one model of the CubeSpec mirror leaves of a realisation that it has not seen, beside noise and distortion.
 
-    python benchmarks/cubespec_residual.py [held=5] [order=28] [few=20] [iterations=4]
+    python benchmarks/cubespec_residual.py [held=5] [order=36] [springs=12] [iterations=60]
 
 Rms in um over the channels, of the mean of both periods in the steady state, by amplitude and band of frequencies:
 
@@ -48,13 +48,13 @@ def left(fit, group: tuple[Recording, ...], held: int) -> tuple[np.ndarray, ...]
 
 
 def main() -> None:
-    options = {"held": 5, "order": 28, "few": 20, "iterations": 4}
+    options = {"held": 5, "order": 36, "springs": 12, "iterations": 60}
     options |= {key: int(value) for key, value in (word.split("=") for word in sys.argv[1:])}
     records = realisations()
     fit = fit_hysteretic_stiffness(
         all_but(records, options["held"]),
         order=options["order"],
-        options=StiffnessOptions(few_first=options["few"]),
+        options=StiffnessOptions(springs=options["springs"]),
         iterations=options["iterations"],
         on_progress=lambda done, total, text: print(f"  {done} of {total}: {text}", file=sys.stderr, flush=True),
     )

@@ -38,12 +38,17 @@ class BoucWen(NamedTuple):
 
 
 class Operator(NamedTuple):
-    """z = sum of weight x play; the thresholds above 0 grow by widening |q'|, up to the rate limit."""
+    """z = sum of weight x play; the thresholds above 0 grow by widening |q'|, up to the rate limit.
+
+    The polynomial adds c1 s^2 + c2 |s| s + c3 s^3 with s = q / reach between -1 and 1.
+    """
 
     thresholds: tuple[float, ...]
     weights: tuple[float, ...]
     widening: float = 0.0
     rate_limit: float = np.inf
+    polynomial: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    reach: float = np.inf
 
 
 class Mirror(NamedTuple):
@@ -260,7 +265,11 @@ class MirrorTwin:
                 play(p, q_next[i], widened(r, operator.widening, c))
                 for p, r in zip(self.p[o], operator.thresholds, strict=True)
             ]
-            z.append(sum(w * p for w, p in zip(operator.weights, self.p[o], strict=True)))
+            s = min(max(q_next[i] / operator.reach, -1.0), 1.0)
+            powers = zip(operator.polynomial, (s**2, abs(s) * s, s**3), strict=True)
+            z.append(
+                sum(w * p for w, p in zip(operator.weights, self.p[o], strict=True)) + sum(c * p for c, p in powers)
+            )
         self.q = q_next
         return np.array(z)
 
@@ -550,7 +559,9 @@ def build_plant(mirror, step_s):
         CE1=mirror.C @ E1,
         K=mirror.K,
         bouc_wen=kernel_rows(mirror.bouc_wen),
-        operator=np.array([(o.widening, o.rate_limit) for o in mirror.operators], dtype=float).reshape(-1, 2),
+        operator=np.array(
+            [(o.widening, o.rate_limit, *o.polynomial, o.reach) for o in mirror.operators], dtype=float
+        ).reshape(-1, 6),
         play_start=np.cumsum([0, *(len(o.thresholds) for o in mirror.operators)]).astype(np.uint64),
         play_threshold=np.array([r for o in mirror.operators for r in o.thresholds], dtype=float),
         play_weight=np.array([w for o in mirror.operators for w in o.weights], dtype=float),

@@ -26,6 +26,7 @@ ASYMMETRIC = ADMISSIBLE._replace(gamma=0.5, eta=-0.7, d2=-1e-5)
 POWERED = ASYMMETRIC._replace(exponent=2.0)
 WIDENING = Operator((0.0, 0.2, 0.5), (0.03, 0.02, 0.04), widening=1e-4, rate_limit=1500.0)
 RIGID = Operator((0.0, 0.1, 0.6), (0.05, -0.02, 0.03))
+BENT = Operator((0.0, 0.3), (0.04, 0.02), polynomial=(0.02, -0.03, 0.04), reach=0.5)
 rounding = 1e-12  # of the largest value: two routes through the same arithmetic
 integrated = 1e-9  # another exponent than 1 is integrated with error control
 
@@ -418,7 +419,7 @@ def test_axes_actuators_and_outputs_of_any_number(axes, actuators, outputs):
 
 def test_all_runs_of_a_batch_are_their_twins():
     rng = np.random.default_rng(8)
-    mirror = random_mirror(rng, 2, 2, bouc_wen=(PAPER, ASYMMETRIC), operators=(WIDENING,))
+    mirror = random_mirror(rng, 2, 2, bouc_wen=(PAPER, ASYMMETRIC), operators=(WIDENING, BENT))
     assert_is_its_twin(random_loop(rng, mirror, 2), range(LANES), samples=15)
 
 
@@ -625,7 +626,7 @@ def random_pointing(seed):
     axes, actuators, outputs = (int(n) for n in (rng.integers(1, 3), rng.integers(1, 4), rng.integers(1, 4)))
     rows = [PAPER, ADMISSIBLE, ASYMMETRIC, PAPER._replace(gamma=-3.0, eta=2.0, epsilon=0.03, bias=0.0)]
     bouc_wen = tuple(rows[i] for i in rng.choice(4, rng.integers(0, 4)))
-    operators = tuple((RIGID, WIDENING, Operator((0.4,), (0.03,)))[i] for i in rng.choice(3, rng.integers(0, 3)))
+    operators = tuple((RIGID, WIDENING, BENT)[i] for i in rng.choice(3, rng.integers(0, 3)))
     shape = {"pairs": int(rng.integers(1, 4)), "lags": int(rng.integers(0, 3))}
     shape |= {"fed_back": bool(rng.integers(2)), "full": bool(rng.integers(2))}
     mirror = random_mirror(rng, actuators, outputs, bouc_wen, operators, **shape)
@@ -709,7 +710,7 @@ STATISTICS = ("sum", "sum_square", "largest", "histogram")
 def statistics_case():
     """Two axes with some of everything that counts."""
     rng = np.random.default_rng(31)
-    mirror = random_mirror(rng, 2, 2, bouc_wen=(PAPER, ADMISSIBLE), operators=(WIDENING,), fed_back=True)
+    mirror = random_mirror(rng, 2, 2, bouc_wen=(PAPER, ADMISSIBLE), operators=(WIDENING, BENT), fed_back=True)
     case = random_loop(rng, mirror, 2, feedforward=True)
     case = with_loop(
         case,

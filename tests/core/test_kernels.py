@@ -547,7 +547,8 @@ def make_mirrors():
             G=full(5, 3, scale=0.7), C=full(2, 7), D=full(2, 3, scale=0.01), K=full(2, 5, scale=0.1),
             bouc_wen=(*rows(d2=-1e-6), ASYMMETRIC._replace(d2=-2e-6, rate_limit=2500.0)),
             operators=(
-                Operator((0.0, 0.3, 1.2), (0.05, -0.02, 0.03)), Operator((0.4,), (-0.02,)),
+                Operator((0.0, 0.3, 1.2), (0.05, -0.02, 0.03)),
+                Operator((0.4,), (-0.02,), polynomial=(0.02, -0.03, 0.04), reach=2.0),
                 Operator((0.0, 0.2), (0.01, 0.02), widening=1e-4, rate_limit=1500.0),
             ),
         ),
@@ -559,7 +560,7 @@ def make_mirrors():
             states=2, A=one, B=0.05 * unit, E=np.hstack([unit, unit]), G=[[1.0], [-0.8]], C=[[1.0, 0.0]],
             K=[[0.0, 0.01]], operators=(
                 Operator((0.0, 0.5, 2.0), (0.02, 0.01, -0.004), widening=2e-4, rate_limit=2500.0),
-                Operator((1.0,), (0.01,)),
+                Operator((1.0,), (0.01,), polynomial=(0.01, 0.02, -0.005), reach=3.0),
             ),
         ),
         "static": compose(

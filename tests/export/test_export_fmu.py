@@ -105,6 +105,18 @@ def play_unit():
     return PlantUnit(Origin("m", "0" * 64, "static"), plant, np.eye(1), np.inf, 1.0, np.inf, 0.0)
 
 
+def test_a_polynomial_beside_plays_is_refused(tmp_path):
+    """The plant in C would have left it out without a word."""
+    bent = hysteresis.Play((0.0, 0.4), (5e-5, 2e-5), polynomial_rad=(0.0, 1e-5, 0.0), reach_v=2.0)
+    plant = mirror.discretise(mirror.assemble("static", "static", None, bent), 1e-5)
+    unit = PlantUnit(Origin("m", "0" * 64, "static"), plant, np.eye(1), np.inf, 1.0, np.inf, 0.0)
+    with pytest.raises(
+        ExportError, match=r"a polynomial beside its plays .* knows plays alone; write a mirror without"
+    ):
+        fmu.write_unit(unit, tmp_path / "unit.fmu", "3.0", "unit")
+    assert not any(tmp_path.iterdir())
+
+
 UNITS = {
     "mirror": lambda: choice.plant_unit(designs.mission(), "control"),
     "rich": rich_unit,

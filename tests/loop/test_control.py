@@ -142,6 +142,9 @@ def test_the_inverse_of_plays_is_exact(seed):
 def test_plays_that_stand_still_after_a_reversal_have_no_inverse():
     with pytest.raises(ValueError, match=r"no weight at threshold 0.*identify it again"):
         control.play_inverse(Play((0.0, 0.5), (0.0, 1e-4)))
+    bent = Play((0.0, 0.5), (1e-4, 1e-4), polynomial_rad=(0.0, 1e-5, 0.0), reach_v=2.0)
+    with pytest.raises(ValueError, match="has a polynomial beside its plays, and the inverse knows plays alone"):
+        control.play_inverse(bent)
     with pytest.raises(ValueError, match="has no inverse"):
         control.inverse(mirror.assemble("axis", "static", None, Play((0.0, 0.5), (0.0, 1e-4))))
 

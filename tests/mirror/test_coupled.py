@@ -53,10 +53,17 @@ def made(seed, modes=3, actuators=2, outputs=2, bouc_wen=1, plays=2, fed=True):
             BoucWen(0.1 * float(draw()), 0.0, 0.3 * float(draw()), 0.0, 2.0, 0.5, gamma_1_v=0.1, eta_1_v=0.2)
             for _ in range(bouc_wen)
         ),
-        plays=tuple(Play((0.0, 0.1 + i, 0.7 + i), tuple((0.1 * draw(3)).tolist())) for i in range(plays)),
+        plays=tuple(bent(draw, i) for i in range(plays)),
         inverse=(),
     )
     return CoupledMirror(mirror, *channels(actuators, outputs), 3.3e-4, RATE_HZ, STEPS, (1.0, 400.0))
+
+
+def bent(draw, i):
+    """Plays of any weights, every second operator with a polynomial."""
+    weights, (c1, c2, c3) = tuple((0.1 * draw(3)).tolist()), (0.1 * draw(3)).tolist()
+    plain = Play((0.0, 0.1 + i, 0.7 + i), weights)
+    return replace(plain, polynomial_rad=(c1, c2, c3), reach_v=0.5 + i) if i % 2 else plain
 
 
 def read_back(mirror):
@@ -79,7 +86,10 @@ def sampled(lines, time_s):
 def twin_of(mirror):
     """The plant as the twins of the kernels take it."""
     rows = tuple(oracles.BoucWen(*(getattr(b, f.name) for f in fields(b))) for b in mirror.bouc_wen)
-    operators = tuple(oracles.Operator(p.thresholds_v, p.weights_rad_v) for p in mirror.plays)
+    operators = tuple(
+        oracles.Operator(p.thresholds_v, p.weights_rad_v, polynomial=p.polynomial_rad, reach=p.reach_v)
+        for p in mirror.plays
+    )
     return oracles.Mirror(*(getattr(mirror, name) for name in "ABEFGCDK"), rows, operators)
 
 
@@ -196,14 +206,17 @@ def whole():
     """A mirror that uses all that a file may hold."""
     mirror = made(5, fed=False)
     rated = BoucWen(0.1, -3e-7, -0.02, 5e-4, 2.4, 0.6, 1e4, 5.0, 0.1, 0.2, 1.5)
-    plays = (Play((0.2, 0.4), (0.3, -0.1), 2e-5, 2e4), mirror.mirror.plays[1])
+    plays = (
+        Play((0.2, 0.4), (0.3, -0.1), 2e-5, 2e4),
+        replace(mirror.mirror.plays[1], polynomial_rad=(0.1, -0.2, 1 / 3), reach_v=0.7),
+    )
     factor = philox(8).standard_normal((5, 3))
     factor /= np.linalg.norm(factor, axis=1, keepdims=True)
     names = (
         "recording.delay",
         "modes.frequency.1",
         "matrices.B.2.1",
-        "hysteresis.2.weights.2",
+        "hysteresis.3.polynomial.2",
         "hysteresis.1.exponent",
     )
     at = ((0.03, 0.0), (-0.015, 0.026), (-0.015, -0.026))

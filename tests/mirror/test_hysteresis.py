@@ -186,6 +186,18 @@ def test_the_steepest_slope_of_plays_is_met_when_all_move():
     assert hysteresis.steepest_slope(mixed) == pytest.approx(0.089e-3)
 
 
+def test_a_polynomial_adds_to_the_steepest_slope_what_it_has_at_its_reach():
+    bent = replace(PLAYS, polynomial_rad=(2e-5, -1e-5, 3e-5), reach_v=2.0)
+    added = hysteresis.steepest_slope(bent) - hysteresis.steepest_slope(PLAYS)
+    q = np.linspace(-3.0, 3.0, 60001)
+    s = np.clip(q / 2.0, -1.0, 1.0)
+    slopes = np.gradient(2e-5 * s**2 - 1e-5 * np.abs(s) * s + 3e-5 * s**3, q)
+    assert added == pytest.approx((2 * 2e-5 + 2 * 1e-5 + 3 * 3e-5) / 2.0)
+    assert 0.4 * added < np.abs(slopes).max() <= added
+    twice = hysteresis.scaled(bent, 2.0)
+    assert twice.polynomial_rad == (4e-5, -2e-5, 6e-5) and twice.reach_v == 2.0
+
+
 def test_without_rate_limit_a_rate_dependent_model_has_no_steepest_slope():
     with pytest.raises(ValueError, match="depends on rate needs a finite rate limit"):
         hysteresis.steepest_slope(replace(PRINTED, rate_limit_v_s=inf))

@@ -248,6 +248,30 @@ FAULTS = {
         "has 2 items where thresholds has 3",
         "one weight for each threshold",
     ),
+    "a polynomial without a reach": (
+        ("weights = [0.03, 0.03, 0.04]", "weights = [0.03, 0.03, 0.04]\npolynomial = [0.0, 0.01, 0.0]"),
+        "hysteresis.1.reach",
+        "is missing beside polynomial",
+        'reach = "2 V"',
+    ),
+    "a reach without a polynomial": (
+        ("weights = [0.03, 0.03, 0.04]", 'weights = [0.03, 0.03, 0.04]\nreach = "1 V"'),
+        "hysteresis.1.polynomial",
+        "is missing beside reach",
+        "polynomial = [0.0, 0.01, -0.02]",
+    ),
+    "a polynomial of two": (
+        ("weights = [0.03, 0.03, 0.04]", 'weights = [0.03, 0.03, 0.04]\npolynomial = [0.0, 0.01]\nreach = "1 V"'),
+        "hysteresis.1.polynomial",
+        "has 2 items",
+        "three: of s^2, of |s| s and of s^3",
+    ),
+    "a reach of nothing": (
+        ("weights = [0.03, 0.03, 0.04]", 'weights = [0.03, 0.03, 0.04]\npolynomial = [0, 0.1, 0]\nreach = "0 V"'),
+        "hysteresis.1.reach",
+        "is not above 0 V",
+        "above 0 V",
+    ),
     "a key of the other model": (
         ("weights = [0.03, 0.03, 0.04]", "weights = [0.03, 0.03, 0.04]\nd1 = 0.1"),
         "hysteresis.1.d1",

@@ -306,7 +306,7 @@ def hysteresis_loop(
 
 
 def _linear_output(model: hysteresis.BoucWen | hysteresis.Play, u: Floats, step_s: float) -> Floats:
-    """The part of the output that is not hysteresis: d1 exp(-d2 u') u for Bouc-Wen, slow gain x u otherwise."""
+    """The part that is not hysteresis: d1 exp(-d2 u') u for Bouc-Wen, else the slow gain of the plays x u."""
     if isinstance(model, hysteresis.Play):
         return math.fsum(model.weights_rad_v) * u
     rate = np.diff(u, prepend=u[-1]) / step_s

@@ -144,12 +144,17 @@ class Play:
 
     With ``widening_s`` each threshold above 0 grows with the drive's rate, r + widening |q'|, up to ``rate_limit_v_s``
     (rate-dependent operator of Al Janaideh and Krejci, IEEE/ASME Trans. Mechatronics 18 (2013) 1498).
+
+    With a finite ``reach_v`` a polynomial stands beside the plays, a spring that hardens or softens: z has in addition
+    c1 s^2 + c2 |s| s + c3 s^3, with (c1, c2, c3) = ``polynomial_rad`` and s = q / reach, held at -1 and 1 beyond them.
     """
 
     thresholds_v: tuple[float, ...]
     weights_rad_v: tuple[float, ...]
     widening_s: float = 0.0
     rate_limit_v_s: float = math.inf
+    polynomial_rad: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    reach_v: float = math.inf
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,17 +183,19 @@ def scaled(model: BoucWen | Play, times: float) -> BoucWen | Play:
         times: Factor on its output; 2 turns a mechanical angle into that of the line of sight.
     """
     if isinstance(model, Play):
-        return replace(model, weights_rad_v=tuple(times * w for w in model.weights_rad_v))
+        c1, c2, c3 = model.polynomial_rad
+        weights = tuple(times * w for w in model.weights_rad_v)
+        return replace(model, weights_rad_v=weights, polynomial_rad=(times * c1, times * c2, times * c3))
     return replace(model, d1_rad_v=times * model.d1_rad_v, epsilon_rad_v=times * model.epsilon_rad_v)
 
 
 def slow_gain(model: BoucWen | Play) -> float:
-    """Gain for slow, large drives (rad/V): d1, or the sum of the weights."""
+    """Gain for slow, large drives (rad/V): d1, or the sum of the weights; a polynomial ends at its reach."""
     return model.d1_rad_v if isinstance(model, BoucWen) else math.fsum(model.weights_rad_v)
 
 
 def output_amplitude(model: BoucWen | Play, drive_v: float) -> float:
-    """Amplitude of the settled output (rad) under a slow sine of the drive, Bouc-Wen's h left out.
+    """Amplitude of the settled output (rad) under a slow sine of the drive, Bouc-Wen's h and a polynomial left out.
 
     Args:
         model: Hysteresis model.
@@ -203,7 +210,8 @@ def output_amplitude(model: BoucWen | Play, drive_v: float) -> float:
 def secant_gain(model: BoucWen | Play, output_rad: float) -> float:
     """Amplitude of the output over that of the drive (rad/V), for slow sines.
 
-    A Prandtl-Ishlinskii model is softer for small drives; a Bouc-Wen model has its slow gain at any amplitude.
+    A Prandtl-Ishlinskii model is softer for small drives; a Bouc-Wen model has its slow gain at any amplitude. A
+    polynomial is left out.
 
     Args:
         model: Hysteresis model.
@@ -245,7 +253,9 @@ def steepest_slope(model: BoucWen | Play) -> float:
             raise ValueError(
                 "a play operator that is fed back cannot depend on the rate: within a step it has no slope"
             )
-        return math.fsum(abs(w) for w in model.weights_rad_v)
+        quadratic, signed, cubic = (abs(c) for c in model.polynomial_rad)
+        bend = (2.0 * (quadratic + signed) + 3.0 * cubic) / model.reach_v
+        return math.fsum(abs(w) for w in model.weights_rad_v) + bend
     depends = bool(model.delta_s_v or model.d2_s_v)
     if math.isinf(model.rate_limit_v_s) and depends:
         raise ValueError("a Bouc-Wen element that is fed back and depends on rate needs a finite rate limit")

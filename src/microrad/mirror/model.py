@@ -289,7 +289,9 @@ def plant_arrays(step_s: float, discrete: tuple[Floats, ...], mirror: Mirror, *,
         CE1=mirror.C @ E1,
         K=mirror.K.astype(float),
         bouc_wen=kernels.bouc_wen_rows([b.row for b in mirror.bouc_wen]),
-        operator=np.array([(p.widening_s, p.rate_limit_v_s) for p in mirror.plays], dtype=float).reshape(-1, 2),
+        operator=np.array(
+            [(p.widening_s, p.rate_limit_v_s, *p.polynomial_rad, p.reach_v) for p in mirror.plays], dtype=float
+        ).reshape(-1, 6),
         play_start=np.cumsum([0] + [len(p.thresholds_v) for p in mirror.plays]).astype(np.uint64),
         play_threshold=np.array([r for p in mirror.plays for r in p.thresholds_v], dtype=float),
         play_weight=np.array([w for p in mirror.plays for w in p.weights_rad_v], dtype=float),

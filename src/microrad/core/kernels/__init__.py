@@ -7,6 +7,7 @@ Every kernel has a slow, obvious twin in ``tests/oracles.py`` and runs unchanged
 All quantities are deviations from the operating point (drive bias, output at rest), so zero states are at rest.
 """
 
+from microrad.core.kernels.adjoint import Adjoint, adjoint_kernel
 from microrad.core.kernels.compiler import UNROLLED, UNROLLED_CONTROLLER, Count, Floats, by_rows, counts, is_compiled
 from microrad.core.kernels.doubling import gramian_kernel, riccati_kernel
 from microrad.core.kernels.ensemble import draw_loop, ensemble_loop

@@ -1,5 +1,7 @@
 """The mirrors of an ensemble, one plant step."""
 
+from math import inf
+
 import numpy as np
 
 from microrad.core.kernels.compiler import compiled_loop, inlined, merged
@@ -18,7 +20,7 @@ from microrad.core.kernels.ensemble_records import (
     DRIVE_FIELDS,
     DRIVE_NOW,
 )
-from microrad.core.kernels.hysteresis import bouc_wen_advance, clamp
+from microrad.core.kernels.hysteresis import bouc_wen_advance, clamp, polynomial
 from microrad.core.kernels.records import (
     ALPHA,
     BETA,
@@ -31,6 +33,7 @@ from microrad.core.kernels.records import (
     GAMMA,
     POWER,
     RATE_LIMIT,
+    REACH,
     WIDENING,
     WIDENING_LIMIT,
 )
@@ -339,6 +342,9 @@ def _advance_operator(p, s, o, at):  # type: ignore[no-untyped-def]
             value = max(q - half, min(q + half, play[row + r]))
             play[row + r] = value
             bank[at + at_row(BANK_Z) + r] += weight * value
+    if p.operator[o, REACH] < inf:
+        for r in range(ROW_LENGTH):
+            bank[at + at_row(BANK_Z) + r] += polynomial(p.operator, o, bank[at + at_row(BANK_Q) + r])
 
 
 @inlined

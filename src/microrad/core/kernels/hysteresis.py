@@ -9,6 +9,7 @@ from microrad.core.kernels.records import (
     ALPHA,
     BETA,
     BIAS,
+    CUBIC,
     D1,
     D2,
     DELTA,
@@ -17,7 +18,10 @@ from microrad.core.kernels.records import (
     GAMMA,
     PER_SIZE,
     POWER,
+    QUADRATIC,
     RATE_LIMIT,
+    REACH,
+    SIGNED,
     WIDENING,
     WIDENING_LIMIT,
     bouc_wen_rows,
@@ -185,6 +189,19 @@ def play_step(p, q, threshold):  # type: ignore[no-untyped-def]
         threshold: Half the width of the play, not negative, in the unit of the drive.
     """
     return max(q - threshold, min(q + threshold, p))
+
+
+@inlined
+def polynomial(operator, o, q):  # type: ignore[no-untyped-def]
+    """What an operator adds to its plays: quadratic s^2 + signed |s| s + cubic s^3, s = q / reach within -1 and 1.
+
+    Args:
+        operator: Row of each Prandtl-Ishlinskii operator; its reach is infinite where it has no polynomial.
+        o: Number of the operator, from 0.
+        q: Drive at the end of the step.
+    """
+    s = clamp(q, operator[o, REACH]) / operator[o, REACH]
+    return s * (operator[o, QUADRATIC] * s + operator[o, SIGNED] * abs(s) + operator[o, CUBIC] * (s * s))
 
 
 @inlined

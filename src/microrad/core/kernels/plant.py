@@ -1,12 +1,21 @@
 """The mirror: a linear system in feedback with a bank of hysteresis elements, driven by a sampled drive."""
 
+from math import inf
 from typing import Any, NamedTuple
 
 from numpy.typing import NDArray
 
 from microrad.core.kernels.compiler import Floats, Integers, compiled_loop, inlined, merged
-from microrad.core.kernels.hysteresis import bouc_wen_advance, clamp, near_exp, play_step, row_product, widened
-from microrad.core.kernels.records import BIAS, CHANGE, D1, D2, RATE_LIMIT, WIDENING, WIDENING_LIMIT, H, Q, Z
+from microrad.core.kernels.hysteresis import (
+    bouc_wen_advance,
+    clamp,
+    near_exp,
+    play_step,
+    polynomial,
+    row_product,
+    widened,
+)
+from microrad.core.kernels.records import BIAS, CHANGE, D1, D2, RATE_LIMIT, REACH, WIDENING, WIDENING_LIMIT, H, Q, Z
 
 
 @inlined
@@ -124,6 +133,8 @@ def _play_operator(plant, state, e, o, q):  # type: ignore[no-untyped-def]
         p = play_step(state.play[j], q, widened(plant.play_threshold[j], widening))
         state.play[j] = p
         total += plant.play_weight[j] * p
+    if plant.operator[o, REACH] < inf:
+        total += polynomial(plant.operator, o, q)
     state.bank[e, Q] = q
     return total
 
@@ -172,6 +183,7 @@ class PlayPlant(NamedTuple):
     C: NDArray[Any]
     D: NDArray[Any]
     K: NDArray[Any]
+    operator: NDArray[Any]
     play_start: Integers
     play_threshold: NDArray[Any]
     play_weight: NDArray[Any]
@@ -180,68 +192,81 @@ class PlayPlant(NamedTuple):
 class Path(NamedTuple):
     """What a `PlayPlant` went through, one row a step: `play_path` fills it, `tangent_kernel` runs along it.
 
-    ``x`` is the predicted state (see `Plant`), ``state`` the one with the change of z in it, ``z`` and ``play`` the
-    outputs and the plays of the operators. ``moved`` counts for each operator the plays that its drive carries along:
-    always the first ones, for the memories of an operator that began at rest are nested.
+    ``x`` is the predicted state (see `Plant`), ``state`` the one with the change of z in it; ``q``, ``z`` and ``play``
+    are the drives, the outputs and the plays of the operators. ``moved`` counts for each operator the plays that its
+    drive carries along: always the first ones, for the memories of an operator that began at rest are nested.
     """
 
     output: Floats
     x: Floats
     state: Floats
+    q: Floats
     z: Floats
     play: Floats
     moved: Integers
 
 
+@inlined
+def _weigh(total, gains, columns):  # type: ignore[no-untyped-def]
+    """total += sum of gains[j] x columns[j]: a column at a time, which is vectorised where a sum over a row is not."""
+    for j in range(gains.size):
+        gain, column = gains[j], columns[j]
+        for i in range(total.size):
+            total[i] += gain * column[i]
+
+
+@inlined
+def _path_operator(plant, path, e, k):  # type: ignore[no-untyped-def]
+    """z of operator e at step k, and how many of its plays its drive carries along."""
+    q, total, count = path.q[k, e], 0.0, 0
+    for j in range(plant.play_start[e], plant.play_start[e + 1]):
+        threshold = plant.play_threshold[j]
+        p = play_step(path.play[k - 1, j] if k > 0 else 0.0, q, threshold)
+        path.play[k, j] = p
+        total += plant.play_weight[j] * p
+        if p == q - threshold or p == q + threshold:
+            count += 1
+    if plant.operator[e, REACH] < inf:
+        total += polynomial(plant.operator, e, q)
+    path.z[k, e] = total
+    path.moved[k, e] = count
+
+
 @compiled_loop
-def play_path(plant, drive, path):  # type: ignore[no-untyped-def]
+def play_path(plant, columns, drive, change, path):  # type: ignore[no-untyped-def]
     """`open_loop` from rest with the whole path kept; the same arithmetic, see `Plant`, in loops of any length.
 
     Args:
         plant: A `PlayPlant`.
+        columns: The same with each matrix turned: a row for each of its columns.
         drive: Drive about the bias, V, shape (steps, inputs).
+        change: Memory for the change of z, shape (operators,).
         path: A `Path` with arrays of as many steps; written.
     """
-    states, inputs, operators = plant.diagonal.size, drive.shape[1], path.z.shape[1]
     for k in range(drive.shape[0]):
-        for i in range(states):
-            total = 0.0
-            for a in range(inputs):
-                total += plant.B1[i, a] * drive[k, a]
-            if k > 0:
-                total += plant.diagonal[i] * path.state[k - 1, i] + plant.coupling[i] * path.state[k - 1, i ^ 1]
-                for a in range(inputs):
-                    total += plant.B0[i, a] * drive[k - 1, a]
-                for e in range(operators):
-                    total += plant.E_held[i, e] * path.z[k - 1, e]
-            path.x[k, i] = total
-        for e in range(operators):
-            q = 0.0
-            for a in range(inputs):
-                q += plant.G[e, a] * drive[k, a]
-            for i in range(states):
-                q += plant.F[e, i] * path.x[k, i]
-            total, count = 0.0, 0
-            for j in range(plant.play_start[e], plant.play_start[e + 1]):
-                threshold = plant.play_threshold[j]
-                p = play_step(path.play[k - 1, j] if k > 0 else 0.0, q, threshold)
-                path.play[k, j] = p
-                total += plant.play_weight[j] * p
-                if p == q - threshold or p == q + threshold:
-                    count += 1
-            path.z[k, e] = total
-            path.moved[k, e] = count
-        for i in range(states):
-            total = path.x[k, i]
-            for e in range(operators):
-                total += plant.E1[i, e] * (path.z[k, e] - (path.z[k - 1, e] if k > 0 else 0.0))
-            path.state[k, i] = total
-        for o in range(path.output.shape[1]):
-            total = 0.0
-            for i in range(states):
-                total += plant.C[o, i] * path.state[k, i]
-            for a in range(inputs):
-                total += plant.D[o, a] * drive[k, a]
-            for e in range(operators):
-                total += plant.K[o, e] * path.z[k, e]
-            path.output[k, o] = total
+        u, x, state, q, z, output = drive[k], path.x[k], path.state[k], path.q[k], path.z[k], path.output[k]
+        for i in range(x.size):
+            x[i] = 0.0
+        _weigh(x, u, columns.B1)
+        if k > 0:
+            before = path.state[k - 1]
+            for i in range(0, x.size, 2):
+                x[i] += plant.diagonal[i] * before[i] + plant.coupling[i] * before[i + 1]
+                x[i + 1] += plant.diagonal[i + 1] * before[i + 1] + plant.coupling[i + 1] * before[i]
+            _weigh(x, drive[k - 1], columns.B0)
+            _weigh(x, path.z[k - 1], columns.E_held)
+        for e in range(q.size):
+            q[e] = 0.0
+        _weigh(q, u, columns.G)
+        _weigh(q, x, columns.F)
+        for e in range(q.size):
+            _path_operator(plant, path, e, k)
+            change[e] = z[e] - (path.z[k - 1, e] if k > 0 else 0.0)
+        for i in range(x.size):
+            state[i] = x[i]
+        _weigh(state, change, columns.E1)
+        for o in range(output.size):
+            output[o] = 0.0
+        _weigh(output, state, columns.C)
+        _weigh(output, u, columns.D)
+        _weigh(output, z, columns.K)

@@ -11,8 +11,9 @@ from microrad.core.kernels.compiler import Count, Floats, Indices, Integers
 # between rising and falling drive, the exponent less 1, and 1 / size of h at which the exponent has no effect.
 D1, D2, EPSILON, DELTA, ALPHA, BETA, RATE_LIMIT, BIAS, GAMMA, ETA, POWER, PER_SIZE = range(12)
 
-# Columns of a Prandtl-Ishlinskii operator's row: growth of its thresholds with the rate, and the rate where that ends.
-WIDENING, WIDENING_LIMIT = range(2)
+# Columns of a Prandtl-Ishlinskii operator's row: growth of its thresholds with the rate, and the rate where that ends;
+# then the polynomial beside the plays and how far it reaches, see `hysteresis.polynomial`.
+WIDENING, WIDENING_LIMIT, QUADRATIC, SIGNED, CUBIC, REACH = range(6)
 
 # Columns of a row of the bank's state, of an actuator's parameters, and of its counters.
 Q, H, Z, CHANGE = range(4)

@@ -17,7 +17,8 @@ class Tangents(NamedTuple):
     state, and of ``after`` to the state once the operators have moved. Both have the shape (steps, sources, 2), for the
     state ``row`` and its neighbour; with ``turned`` the pair (a, b) is (-b, a). Those up to ``places[BANK_FROM]`` enter
     the drive of operator ``row``, by column ``source`` of ``signal`` (steps, columns), and the others its output, by
-    column ``source`` of ``plays``.
+    column ``source`` of ``plays``: its plays and the powers of its polynomial. ``bend`` is the slope of the
+    polynomials, shape (steps, operators).
 
     The plant, the signals and the working memory share one precision; single precision is twice as fast, and enough for
     a search. The working memory has the tangents of all parameters in a row, and rows by state, operator or play; it is
@@ -33,6 +34,7 @@ class Tangents(NamedTuple):
     after: NDArray[Any]
     signal: NDArray[Any]
     plays: NDArray[Any]
+    bend: NDArray[Any]
     x: NDArray[Any]
     q: NDArray[Any]
     q_before: NDArray[Any]
@@ -129,16 +131,16 @@ def _regroup(t, e, now):  # type: ignore[no-untyped-def]
 
 @inlined
 def _tangent_bank(t, moved, k):  # type: ignore[no-untyped-def]
-    """Plays that move follow the tangent of the drive; the others keep theirs, and their sum is kept too."""
+    """Plays that move and the polynomial follow the tangent of the drive; the other plays keep theirs, as a sum."""
     for e in range(t.q.shape[0]):
         if moved[k, e] != t.moved[e]:
             _regroup(t, e, moved[k, e])
-        slope, z, change, still, q = t.slope[e], t.z[e], t.change[e], t.still[e], t.q[e]
+        slope, z, change, still, q = t.slope[e] + t.bend[k, e], t.z[e], t.change[e], t.still[e], t.q[e]
         for p in range(z.size):
             now = still[p] + slope * q[p]
             change[p] = now - z[p]
             z[p] = now
-    # What a weight adds by itself is in z and its change now, and is taken off both before the next step's sum.
+    # What a weight or power adds by itself is in z and its change now, and is taken off both before the next sum.
     for p in range(t.places[BANK_FROM], t.row.size):
         value = t.plays[k, t.source[p]]
         t.z[t.row[p], p] += value

@@ -158,7 +158,7 @@ def _parameters(of: PlantUnit) -> list[Variable]:
 
 
 def _operator_parameters(p: kernels.Plant, o: int) -> list[Variable]:
-    within, (growth, limit) = f"prandtl_ishlinskii[{o + 1}].", p.operator[o]
+    within, (growth, limit) = f"prandtl_ishlinskii[{o + 1}].", p.operator[o, :2]
     text, fastest = "growth of the thresholds above 0 with the rate of the drive", "fastest rate that was identified"
     found = [
         _parameter(f"{within}widening_s", f"plant.widening_s[{o}]", text, "s", growth, "not negative"),

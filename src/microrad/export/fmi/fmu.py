@@ -162,7 +162,12 @@ def unit_code(unit: PlantUnit | LoopUnit, name: str) -> dict[str, str]:
 
 
 def _plant_values(unit: PlantUnit) -> dict[str, Any]:
-    """What the templates of a plant are filled with, but for its name."""
+    """What the templates of a plant are filled with, but for its name. Raises ExportError for a polynomial."""
+    if np.isfinite(unit.plant.operator[:, -1]).any():
+        raise ExportError(
+            "the mirror has a polynomial beside its plays (a hysteretic spring), and the plant in C knows plays alone; "
+            "write a mirror without one"
+        )
     p, count = unit.plant, np.diff(unit.plant.rest.start.astype(int))
     row = np.repeat(np.arange(count.size), count)
     return {

@@ -210,8 +210,13 @@ def play_inverse(model: Play) -> tuple[float, tuple[float, ...], tuple[float, ..
     w_0 s (Al Janaideh and Krejci 2013), which `inverse` looks after.
 
     Raises:
-        ValueError: For a model without weight at threshold 0: it stands still after a reversal.
+        ValueError: For a model without weight at threshold 0: it stands still after a reversal; and with a polynomial.
     """
+    if math.isfinite(model.reach_v):
+        raise ValueError(
+            "the Prandtl-Ishlinskii model has a polynomial beside its plays, and the inverse knows plays alone; "
+            "identify the axis without one"
+        )
     r, w = np.array(model.thresholds_v), np.array(model.weights_rad_v)
     slope = np.cumsum(w)
     if r[0] != 0.0 or np.min(slope) <= 0.0:

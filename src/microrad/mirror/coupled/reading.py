@@ -65,7 +65,10 @@ def _bouc_wen(table: HysteresisTable) -> BoucWen:
 
 def _play(table: HysteresisTable) -> Play:
     limit = math.inf if table.rate_limit_v_s is None else table.rate_limit_v_s
-    return Play(table.thresholds_v or (), table.weights or (), table.widening_s or 0.0, limit)
+    quadratic, signed, cubic = table.polynomial or (0.0, 0.0, 0.0)
+    reach = math.inf if table.reach_v is None else table.reach_v
+    plays = table.thresholds_v or (), table.weights or ()
+    return Play(*plays, table.widening_s or 0.0, limit, (quadratic, signed, cubic), reach)
 
 
 def _known(table: UncertaintyTable) -> Known:

@@ -118,6 +118,9 @@ def _play_lines(play: Play) -> Iterator[str]:
         yield f"widening = {_quantity(play.widening_s, 's')}"
     if math.isfinite(play.rate_limit_v_s):
         yield f"rate_limit = {_quantity(play.rate_limit_v_s, 'V/s')}"
+    if math.isfinite(play.reach_v):
+        yield f"polynomial = [{', '.join(_number(c) for c in play.polynomial_rad)}]"
+        yield f"reach = {_quantity(play.reach_v, 'V')}"
 
 
 def _bouc_wen_lines(model: BoucWen) -> Iterator[str]:

@@ -132,9 +132,10 @@ class CoupledMirror(Table):
         if self.modes is None or self.matrices.E is None or self.matrices.F is None:
             return
         A, E, F = lti.modal_matrix(self.modes.roots), np.array(self.matrices.E), np.array(self.matrices.F)
-        gains = np.array([table.d1 or 0.0 for table in in_order(self.hysteresis)])
-        plays = [place for place, table in enumerate(in_order(self.hysteresis)) if table.model == "plays"]
-        sums = np.array([np.sum(table.weights or 0.0) for table in in_order(self.hysteresis)])[plays]
+        tables = in_order(self.hysteresis)
+        gains = np.array([(table.d1 or 0.0) + table.linear_gain for table in tables])
+        plays = [place for place, table in enumerate(tables) if table.model == "plays"]
+        sums = np.array([np.sum(table.weights or 0.0) - table.linear_gain for table in tables])[plays]
         growth = lti.growth_1_s(A + (E * gains) @ F, E[:, plays], F[plays], sums)
         if growth >= 0.0:
             reason = (
@@ -193,7 +194,7 @@ def on_a_line(places: Sequence[tuple[float, ...]]) -> bool:
 # ---------------------------------------------------------------------------------------------------------- parameters
 _MOST_TOLD = 20  # names of parameters that do not fit
 _KNOWN_OF_ELEMENTS = (
-    *("thresholds", "weights", "widening"),
+    *("thresholds", "weights", "widening", "polynomial"),
     *("d1", "d2", "epsilon", "delta", "alpha", "beta", "gamma", "eta", "exponent"),
 )
 

@@ -206,6 +206,12 @@ class HysteresisTable(Table):
     widening_s: Annotated[float, Quantity("s", "us", least=0.0)] | None = Field(
         default=None, description="growth of the thresholds above 0 with the rate of q; or none"
     )
+    polynomial: Annotated[tuple[float, ...], Several(Quantity(""), most=3)] | None = Field(
+        default=None, description="c1, c2 and c3 of c1 s^2 + c2 |s| s + c3 s^3 beside the plays, with s = q / reach"
+    )
+    reach_v: Annotated[float, Quantity("V", above=0.0)] | None = Field(
+        default=None, description="q where s is 1; beyond it the polynomial is held"
+    )
     d1: Number | None = Field(default=None, description="gain without hysteresis")
     d2_s_v: Annotated[float, Quantity("s/V")] | None = Field(default=None, description="change of d1 with the rate")
     epsilon: Number | None = Field(default=None, description="slope of h behind a reversal")
@@ -229,7 +235,7 @@ class HysteresisTable(Table):
         of_bouc_wen = {"d1": "0.8", "epsilon": "-0.2", "alpha": '"2 1/V"', "beta": '"0.5 1/V"'}
         more = ("d2", "delta", "gamma", "eta", "exponent", "bias", "rate_limit")
         own, other = (_PLAYS, _BOUC_WEN) if plays else (_BOUC_WEN, _PLAYS)
-        allowed = ("widening", "rate_limit") if plays else more
+        allowed = ("widening", "rate_limit", "polynomial", "reach") if plays else more
         yield from self.choice_problems(own, needed if plays else of_bouc_wen, allowed, lambda key: other)
         if self.depends_on_rate and self.rate_limit_v_s is None:
             yield Problem("rate_limit", "is missing, and the element depends on the rate", 'rate_limit = "1 kV/s"')
@@ -240,14 +246,28 @@ class HysteresisTable(Table):
         """Whether the output depends on how fast the drive passes."""
         return bool(self.widening_s or self.d2_s_v or self.delta_s_v)
 
+    @property
+    def linear_gain(self) -> float:
+        """Weight of the play whose threshold is 0, which never sticks."""
+        pairs = zip(self.thresholds_v or (), self.weights or (), strict=False)
+        return sum(weight for threshold, weight in pairs if threshold == 0.0)
+
     def _play_problems(self) -> Iterator[Problem]:
         if self.thresholds_v is None or self.weights is None:
             return
         if len(self.weights) != len(self.thresholds_v):
             counts = f"has {len(self.weights)} items where thresholds has {len(self.thresholds_v)}"
             yield Problem("weights", counts, "one weight for each threshold")
-        if not any(self.weights):
-            yield Problem("weights", "is zero throughout, so the element acts on nothing", "a weight other than 0")
+        if not any((*self.weights, *(self.polynomial or ()))):
+            advice = "a weight other than 0, or a polynomial beside them"
+            yield Problem("weights", "is zero throughout, so the element acts on nothing", advice)
+        if self.polynomial is not None and len(self.polynomial) != 3:
+            counts = f"has {len(self.polynomial)} items"
+            yield Problem("polynomial", counts, "three: of s^2, of |s| s and of s^3, such as [0.0, 0.01, -0.02]")
+        if (self.polynomial is None) != (self.reach_v is None):
+            there, missing = ("polynomial", "reach") if self.reach_v is None else ("reach", "polynomial")
+            example = {"reach": 'reach = "2 V"', "polynomial": "polynomial = [0.0, 0.01, -0.02]"}[missing]
+            yield Problem(missing, f"is missing beside {there}", example)
 
     def _bouc_wen_problems(self) -> Iterator[Problem]:
         if self.alpha_1_v is None or self.beta_1_v is None:

@@ -12,28 +12,25 @@ from microrad.lab.identify.stiffness.fit import StiffnessOptions, fit_hysteretic
 from microrad.lab.identify.stiffness.model import LinearStart
 from microrad.lab.recording import Recording
 
-FEW, ALL = 20, 4
-"""Iterations on one record of each amplitude, then on all; benchmarks/cubespec_ladder.py says what more would gain."""
+FEW, ALL = 15, 10
+"""Steps on one record of each amplitude, then on all; benchmarks/cubespec_one_model.py says what more would gain."""
 
 
-def hysteretic_stiffness(
-    records: Sequence[Recording], start: Fitted | None, lowest_hz: float, on_progress: Progress
-) -> Fitted:
+def hysteretic_stiffness(records: Sequence[Recording], start: Fitted | None, on_progress: Progress) -> Fitted:
     """A mirror with hysteretic stiffness, see `fit_hysteretic_stiffness`.
 
     Args:
         records: Multisines of at least two amplitudes, in SI units.
         start: The coupled linear model to begin with; None where there is none.
-        lowest_hz: Lowest excited frequency, in Hz.
-        on_progress: Called with the iterations done, their largest number, and the error.
+        on_progress: Called with the steps done, their largest number, and the error.
 
     Raises:
-        IdentificationError: Where the records cannot tell hysteresis, or the mirror runs away all the same.
+        IdentificationError: Where the records cannot tell hysteresis.
     """
     if start is None or start.modes is None:
         raise IdentificationError("there is no coupled linear model of this order to begin with.")
     options = StiffnessOptions(sub_steps=STEPS, few_first=FEW)
-    began = LinearStart(start.modes, start.delay_s, lowest_hz)
+    began = LinearStart(start.modes, start.delay_s)
     fit = fit_hysteretic_stiffness(records, options=options, iterations=ALL, start=began, on_progress=on_progress)
     return Fitted(
         name=f"hysteretic stiffness, order {fit.order}",
@@ -46,11 +43,9 @@ def hysteretic_stiffness(
         poles_error_rad_s=np.asarray(fit.poles_error_rad_s, dtype=np.complex128),
         delay_error_s=fit.delay_error_s,
         known=None if fit.moved is None else known(fit.names, fit.moved),
-        note=_note(fit.converged, fit.held, fit.iterations),
+        note=_note(fit.converged, fit.iterations),
     )
 
 
-def _note(converged: bool, held: bool, iterations: int) -> str:
-    if held:
-        return "the search ended at a mirror that would run away with one step more; take another order if it matters"
-    return "" if converged else f"the search was ended before its optimum, after {iterations} iterations on all records"
+def _note(converged: bool, steps: int) -> str:
+    return "" if converged else f"the search was ended before its optimum, after {steps} steps on all records"

@@ -34,10 +34,10 @@ from microrad.lab.recording import Recording, check_together
 from microrad.mirror.coupled import CoupledMirror
 
 AXIS_ORDERS = (2, 4)
-LINEAR_ORDERS = (4, 8, 12, 16, 20, 24, 28)
+LINEAR_ORDERS = (4, 8, 12, 16, 20, 24, 28, 36)
 _DELAY_ORDER = 12
 _EXCHANGES = 12
-_NEIGHBOURS = 3
+_STIFFNESS_ORDERS = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +45,7 @@ class LadderOptions:
     """The orders of the models that are fitted: states of each output, and states of all outputs together.
 
     Hysteretic stiffness begins with the linear model of its order, which is fitted, too; without orders of its own it
-    takes the order that serves best without hysteresis, and the next ones in ``linear_orders``.
+    takes the order that serves best without hysteresis, and the next one in ``linear_orders``.
     """
 
     axis_orders: tuple[int, ...] = AXIS_ORDERS
@@ -137,7 +137,7 @@ class _Ladder:
             *(f"per axis, order {n} each" for n in options.axis_orders),
             *(f"coupled linear, order {n}" for n in linear),
         ]
-        few = 0 if reason else min(_NEIGHBOURS, len(linear))
+        few = 0 if reason else min(_STIFFNESS_ORDERS, len(linear))
         self.total, self.on_progress = len(self.left) + (len(given) or few), on_progress
         self._report("delay")
         delay_s = best_delay(self.response, min(_DELAY_ORDER, max(linear)), STEPS)
@@ -151,12 +151,11 @@ class _Ladder:
             self.refused.append(Refused("hysteretic stiffness", reason))
             stiff: list[int] = []
         else:
-            stiff = [n for n in given if n <= most] or self._neighbours(linear)
+            stiff = [n for n in given if n <= most] or self._best_and_next(linear)
         self.left, self.total = [f"hysteretic stiffness, order {n}" for n in stiff], self.done + len(stiff)
-        lowest_hz = self.response.excited_hz[0]
         for n in stiff:
             start = self.fits.get(f"coupled linear, order {n}")
-            self._judge(partial(hysteretic_stiffness, self.records.fitted, start, lowest_hz, self._iteration))
+            self._judge(partial(hysteretic_stiffness, self.records.fitted, start, self._iteration))
         self._report("done")
 
     def _no_hysteresis(self) -> str:
@@ -171,14 +170,14 @@ class _Ladder:
             )
         return ""
 
-    def _neighbours(self, orders: list[int]) -> list[int]:
-        """The order of the linear model that would be chosen, and its neighbours, in rising order."""
+    def _best_and_next(self, orders: list[int]) -> list[int]:
+        """The order of the linear model that would be chosen, and the next one."""
         linear = [(c, own) for c, own in self.found if c.kind == "coupled linear"]
         if not linear:
             return orders[:1]
         best = smallest_within_noise([own for _, own in linear], [c.parameters for c, _ in linear])[0]
         k = orders.index(linear[best][0].order)
-        return orders[max(k - 1, 0) : k + 2]
+        return orders[k : k + _STIFFNESS_ORDERS]
 
     def _report(self, what: str) -> None:
         self.on_progress(self.done, self.total, what + self._so_far())

@@ -1,10 +1,10 @@
 """One mirror for all amplitudes: linear modes in feedback with hysteresis, fitted to multisines of several amplitudes.
 
 The gain of a piezo mirror rises and its resonances fall with the amplitude, because its actuators are hysteretic
-springs: plays driven by the strain of the actuators act back on every mode. A linear model that is right at one
-amplitude is wrong at the next. `fit_hysteretic_stiffness` fits modes and plays together (Levenberg-Marquardt with exact
-derivatives along the simulated path), and `predicted_error` says how well the result predicts a record that it has not
-seen.
+springs that soften: plays and a polynomial of the strain act back on every mode. A linear model that is right at one
+amplitude is wrong at the next. `fit_hysteretic_stiffness` fits modes and springs together, with exact derivatives along
+the simulated path and so that no drive makes the mirror run away (`springs`), and `predicted_error` says how well the
+result predicts a record that it has not seen.
 """
 
 import math
@@ -13,58 +13,52 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
-from microrad.core import kernels
 from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
 from microrad.lab.identify.linear.response import check_alike, response_from_periods
 from microrad.lab.identify.records import IdentificationError, no_progress
+from microrad.lab.identify.stiffness import springs as springs_of
 from microrad.lab.identify.stiffness import tangents
-from microrad.lab.identify.stiffness.model import (
-    FIELDS,
-    HysteresisSource,
-    LinearStart,
-    Numbers,
-    balanced,
-    linear_start,
-    scaled,
-    starting_numbers,
-)
-from microrad.lab.identify.stiffness.tangents import Normal, Steady
+from microrad.lab.identify.stiffness.model import LinearStart, Numbers, linear_start, scaled
+from microrad.lab.identify.stiffness.search import Search
+from microrad.lab.identify.stiffness.tangents import Steady
 from microrad.lab.recording import Recording
 from microrad.mirror import coupled
-from microrad.mirror.model import Mirror
+from microrad.mirror.hysteresis import Play
+from microrad.mirror.model import Mirror, contraction
 
-SOURCES: tuple[HysteresisSource, ...] = ("strain", "drive")
-THRESHOLDS = tuple(np.geomspace(0.006, 0.6, 6).tolist())
+THRESHOLDS = (0.03, 0.1, 0.3, 0.6)
 
-_DAMPING = 1e-2
-_TRIALS = 8
-_PATIENCE = 3
-_BOUNDS = 8  # poles that a step is kept from taking across zero
+_REFRESH = 10  # steps on all records until the curvature is taken anew
+_SMALL = 1e-3  # of a standard error: the poles follow in proportion
+_AT_LIMIT = 0.99  # of the largest softening: a search that ends there has not converged
+_WINDOW = 8  # steps over which a search is judged
 
 
 @dataclass(frozen=True, slots=True)
 class StiffnessOptions:
     """What is fitted and how, for `fit_hysteretic_stiffness`.
 
-    Each of ``sources`` gives one Prandtl-Ishlinskii operator per actuator, begun with the strain of the actuator or
-    with its drive; in the fit each may take up any mixture of both. ``thresholds`` are parts of the largest drive that
-    any operator of the start meets. The mirror takes ``sub_steps`` steps a sample. ``delay_s`` is fitted along, from
-    the best on a grid up to two samples, unless it is given. ``exchanges`` is for the linear start, see `fit_linear`.
-    The search ends when three iterations in a row gain less than ``tolerance`` of the error. It begins with up to
-    ``few_first`` iterations on one record of each amplitude alone, which cost less and lead nearly as far.
+    ``springs`` is the number of hysteretic springs, by default twice that of actuators and outputs, but no more than
+    twice that of pairs of poles. Beside them each actuator has an operator that its drive alone moves. ``thresholds``
+    of their plays are parts of the largest drive. The mirror takes ``sub_steps`` steps a sample. ``delay_s`` is fitted
+    along, from the best on a grid up to two samples, unless it is given. ``exchanges`` is for the linear start, see
+    `fit_linear`. The search ends when its last eight steps have gained less than ``tolerance`` of the error. It begins
+    with up to ``few_first`` steps on one record of each amplitude and set of driven actuators alone, which cost less
+    and lead nearly as far.
     """
 
-    sources: tuple[HysteresisSource, ...] = SOURCES
+    springs: int | None = None
     thresholds: tuple[float, ...] = THRESHOLDS
     sub_steps: int = 2
     delay_s: float | None = None
     exchanges: int = 12
-    tolerance: float = 1e-3
-    few_first: int = 0
+    tolerance: float = 0.01
+    few_first: int = 15
 
 
 DEFAULTS = StiffnessOptions()
@@ -76,21 +70,24 @@ class HystereticStiffnessFit:
 
     `mirror` takes the drive of ``delay_s`` ago: the pure delay belongs to the recording chain (converters, anti-alias
     filter, amplifier), not to the mirror, and is counted beside the mirror's ``order`` states. ``parameters`` is the
-    number of free numbers, of which ``redundant`` change nothing (the scale of each state and operator). ``sub_steps``
-    is the number of plant steps a sample that was fitted; a plant of another step is another approximation of the loop
-    through the plays.
+    number of free numbers, of which ``redundant`` change nothing (the scale of each operator that the drive moves, and
+    of the state of a mode that carries no spring).
+    ``softening`` is the share of the stiffness that the springs take away where all plays slide; below 1 no drive makes
+    the mirror run away (see `springs`). ``sub_steps`` is the number of plant steps a sample that was fitted; a plant of
+    another step is another approximation of the loop through the plays.
 
     ``error_rms`` (records,) is the rms over samples and outputs of the steady state of each record less its mean,
-    ``start_error_rms`` that where the search on all records began: at the linear start, or where iterations on a few
-    of them have led. ``amplitudes`` is the rms drive of each class of records of one amplitude and ``classes`` the
-    class of each record. ``costs`` is the root of the weighed mean-square error, see
-    `fit_hysteretic_stiffness`, at the start and after each iteration. ``poles_rad_s`` are those at rest, and
-    ``poles_error_rad_s`` their standard errors (real and imaginary part as a complex number), with ``delay_error_s``.
-    These count each record as one independent draw of drive, noise and distortion (cluster-robust sandwich): they say
-    how far another set of such records would move the estimate, and nothing about what the model leaves out. With few
-    records they are rough, and nan for a single one per amplitude. ``names`` are those of all numbers as in a mirror
-    file, the delay last, and ``moved`` (records, numbers) a root of their covariance in SI units, moved.T @ moved, None
-    for a single record per amplitude. ``held`` says that the search ended where a step would have run away.
+    ``start_error_rms`` that of the linear model where the search began. ``amplitudes`` is the rms drive of each class
+    of records of one amplitude and ``classes`` the class of each record; ``motion`` is the largest drive of each
+    operator in them. ``costs`` is the root of the weighed mean-square error, see `fit_hysteretic_stiffness`, where the
+    search on all records began and after each of its steps.
+
+    ``poles_rad_s`` are those at rest, and ``poles_error_rad_s`` their standard errors (real and imaginary part as a
+    complex number), with ``delay_error_s``. These count each record as one independent draw of drive, noise and
+    distortion (cluster-robust sandwich): they say how far another set of such records would move the estimate, and
+    nothing about what the model leaves out. With few records they are rough, and nan for a single one per amplitude.
+    ``names`` are those of all numbers as in a mirror file, the delay last, and ``moved`` (records, numbers) a root of
+    their covariance in SI units, moved.T @ moved, None for a single record per amplitude.
     """
 
     mirror: Mirror
@@ -101,16 +98,17 @@ class HystereticStiffnessFit:
     order: int
     parameters: int
     redundant: int
+    softening: float
     poles_rad_s: np.ndarray
     poles_error_rad_s: np.ndarray
     error_rms: Floats
     start_error_rms: Floats
     amplitudes: tuple[float, ...]
     classes: tuple[int, ...]
+    motion: Floats
     costs: tuple[float, ...]
     iterations: int
     converged: bool
-    held: bool
     names: tuple[str, ...]
     moved: Floats | None
 
@@ -127,6 +125,51 @@ def simulate_hysteretic_stiffness(fit: HystereticStiffnessFit, drive: Floats) ->
         drive: The drive, shape (samples, inputs), at the rate of the fit.
     """
     return coupled.response(fit.mirror, drive, fit.rate_hz, fit.sub_steps, fit.delay_s)
+
+
+class Trust(NamedTuple):
+    """How far a drive takes a mirror beyond the records of its fit, and the rms error to expect there.
+
+    ``motion`` is the largest drive q of any operator, in the largest that it had in the records: above 1 it is beyond
+    them. ``error_rms`` is made of ``left``, what the fit leaves, continued over the amplitude by the power that its
+    amplitudes show, and of ``open``, by how much the output changes where the polynomials go on beyond their reach.
+    """
+
+    motion: float
+    error_rms: float
+    left: float
+    open: float
+
+
+def trust(fit: HystereticStiffnessFit, drive: Floats) -> Trust:
+    """How far a fit is to be trusted under a drive; where it is beyond the records, the error is an estimate.
+
+    Args:
+        fit: The fit.
+        drive: The drive, shape (samples, inputs), at the rate of the fit; whole periods, or at rest at both ends.
+    """
+    own, classes = fit.mirror, np.asarray(fit.classes)
+    inside = replace(own, C=own.F, D=own.G, K=np.zeros((len(own.F), len(own.plays))))
+    largest = np.abs(coupled.response(inside, drive, fit.rate_hz, fit.sub_steps, fit.delay_s)).max(axis=0)
+    further = replace(own, plays=tuple(_further(p, float(q)) for p, q in zip(own.plays, largest, strict=True)))
+    step_s, fine = 1.0 / (fit.rate_hz * fit.sub_steps), 1
+    while contraction(further, step_s / fine) >= 1.0:
+        fine *= 2
+    ends = (coupled.response(m, drive, fit.rate_hz, fine * fit.sub_steps, fit.delay_s) for m in (own, further))
+    opened = float(np.sqrt(np.mean(np.subtract(*ends) ** 2)))
+    errors = [float(np.sqrt(np.mean(fit.error_rms[classes == c] ** 2))) for c in range(len(fit.amplitudes))]
+    power, level = np.polyfit(np.log(fit.amplitudes), np.log(errors), 1)
+    amplitude = float(np.sqrt(np.mean(np.var(drive, axis=0))))
+    left = math.exp(level + max(float(power), 0.0) * math.log(amplitude))
+    return Trust(float((largest / fit.motion).max()), math.hypot(left, opened), left, opened)
+
+
+def _further(play: Play, largest: float) -> Play:
+    """The same operator with a polynomial that goes on to its largest drive, where that is beyond its reach."""
+    if not math.isfinite(play.reach_v) or largest <= play.reach_v:
+        return play
+    times, (c1, c2, c3) = largest / play.reach_v, play.polynomial_rad
+    return replace(play, reach_v=largest, polynomial_rad=(times**2 * c1, times**2 * c2, times**3 * c3))
 
 
 def predicted_error(fit: HystereticStiffnessFit, record: Recording, drop: int = 0) -> Floats:
@@ -155,7 +198,7 @@ def fit_hysteretic_stiffness(
     order: int = 28,
     options: StiffnessOptions = DEFAULTS,
     skip_periods: int = 0,
-    iterations: int = 40,
+    iterations: int = 60,
     start: LinearStart | None = None,
     on_progress: Progress | None = None,
 ) -> HystereticStiffnessFit:
@@ -164,26 +207,25 @@ def fit_hysteretic_stiffness(
     The search begins at a linear model of the middle amplitude (at least as many records of it as inputs), behind a
     pure delay. Each record counts by its mean-square error (steady state, mean of the periods, without its mean) over
     what no linear model of its amplitude could follow, where there are more records of each amplitude than inputs, and
-    else over its mean-square output. No step leads to a mirror that runs away where plays slide; a search that ends at
-    that bound has not converged.
+    else over its mean-square output. No drive makes a mirror run away that is returned, see `springs`.
 
-    Records are worked on in parallel, one a processor, each with a Jacobian in single precision: 4 bytes x samples of a
-    period x outputs x parameters, and about as much for what it is made from. With two processors, 15 records of 8192
-    samples, 3 outputs and 613 parameters the whole process has been seen to take 640 MB.
+    Records are worked on in parallel, one a processor. Each takes the path that is simulated and its derivative, 16
+    bytes x steps of two periods x (2 states + 3 operators + plays), and now and then a Jacobian in single precision: 4
+    bytes x samples of a period x outputs x parameters, and about as much for what it is made from.
 
     Args:
         records: The multisines, of one rate, with the same channels and `period_samples`.
         order: States of the linear model.
         options: What is fitted and how.
         skip_periods: First periods of each record that are dropped as transient.
-        iterations: Largest number of iterations.
+        iterations: Largest number of steps on all records.
         start: Linear model to begin with, which then gives the order; by default that of the middle amplitude.
-        on_progress: Called with the iterations done, their largest number, and the error.
+        on_progress: Called with the steps done, their largest number, and the error.
 
     Raises:
         IdentificationError: If all records have one amplitude (they cannot tell hysteresis from linear stiffness), if
-            they differ in rate or channels or have no period, if the thresholds do not ascend from 0, or if the mirror
-            runs away all the same.
+            they differ in rate or channels or have no period, or if the thresholds do not ascend from above 0,
+            or if the linear model has no pair of poles in the recorded band.
     """
     _check(records, skip_periods, options)
     amplitudes, classes = _classes(records)
@@ -193,32 +235,155 @@ def fit_hysteretic_stiffness(
     if start is None:
         response = response_from_periods(groups[_middle(amplitudes, classes)], skip_periods=skip_periods)
         start = linear_start(response, order, options.sub_steps, options.delay_s, options.exchanges)
-    numbers = starting_numbers(start, options.sources, len(options.thresholds))
-    numbers = _with_thresholds(scaled(numbers, 1 / units[0], 1 / units[1]), steady, options.thresholds)
+    linear = _in_units(start, units)
+    largest, middle = (
+        [r for r, c in zip(steady, classes, strict=True) if c == own]
+        for own in (len(amplitudes) - 1, _middle(amplitudes, classes))
+    )
+    fixed = options.delay_s is not None
+    springs, free = springs_of.begin(linear, largest, middle, options.springs, options.thresholds, fixed_delay=fixed)
     squares, group = np.array([np.mean(r.output**2) for r in steady]), np.asarray(classes)
     outputs = np.sqrt([np.mean(squares[group == c]) for c in range(len(amplitudes))])
-    levels = _levels(groups, outputs, units[1], skip_periods)
-    few = [classes.index(c) for c in range(len(amplitudes))]
-    every = range(len(steady))
-    stages = [(few, options.few_first), (every, iterations)] if options.few_first else [(every, iterations)]
-    report, done = on_progress or no_progress, 0
+    levels = _levels(groups, outputs, units[1], skip_periods)[group]
+    weights = 1.0 / (levels**2 * np.array([r.output.size for r in steady]) * len(steady))
+    few = _few(steady, classes)
+    told = _Told(on_progress or no_progress, options.few_first + iterations, options.tolerance)
     with ThreadPoolExecutor(min(len(steady), os.cpu_count() or 1)) as pool:
-        for used, most in stages:
-            search = _Search([steady[k] for k in used], [classes[k] for k in used], levels, options.delay_s is not None)
-            told = partial(_report, report, done, iterations + options.few_first)
-            search.minimise(balanced(numbers), pool, most, options.tolerance, told)
-            numbers, done = search.numbers, done + most
-    if (growth := search.numbers.growth_1_s) >= 0.0:
-        raise IdentificationError(
-            f"the fitted mirror runs away: where its plays slide it grows by {growth:.3g} 1/s, whatever the drive; fit "
-            "another order or fewer sources, or add records of other amplitudes."
-        )
-    return _result(search, units, amplitudes, records[0].rate_hz)
+        search = Search(springs, steady, weights, few, pool)
+        before = _errors(search, free)
+        if options.few_first:
+            share = weights.sum() / weights[few].sum()
+            first = Search(springs, [steady[k] for k in few], share * weights[few], range(len(few)), pool)
+            free = first.minimise(free, options.few_first, 1, told)
+        told.begin(options.few_first, search.cost(free))
+        free = search.minimise(free, iterations, _REFRESH, told)
+        limited = springs.softening(springs.numbers(free)) > _AT_LIMIT * springs_of.MOST_SOFTENING
+        moved = _moved(search, free, classes)
+        after = _errors(search, free)
+        motion = np.max(list(pool.map(partial(_motion, search, free), steady)), axis=0)
+    numbers = springs.numbers(free)
+    delay_error_s = math.nan if moved is None else float(np.linalg.norm(moved[:, -1]))
+    return HystereticStiffnessFit(
+        mirror=scaled(numbers, *units).mirror("identified"),
+        delay_s=numbers.delay_s,
+        delay_error_s=delay_error_s,
+        rate_hz=records[0].rate_hz,
+        sub_steps=options.sub_steps,
+        order=int(numbers.B.shape[0]),
+        parameters=free.size,
+        redundant=springs.redundant,
+        softening=springs.softening(numbers),
+        poles_rad_s=numbers.poles_at_rest,
+        poles_error_rad_s=_pole_errors(numbers, moved),
+        error_rms=units[1] * after,
+        start_error_rms=units[1] * before,
+        amplitudes=amplitudes,
+        classes=classes,
+        motion=units[0] * motion,
+        costs=tuple(told.costs),
+        iterations=len(told.costs) - 1,
+        converged=len(told.costs) <= iterations and not limited,
+        names=numbers.names,
+        moved=None if moved is None else _in_si(numbers, moved, units),
+    )
 
 
-def _report(on_progress: Progress, before: int, total: int, done: int, _: int, text: str) -> None:
-    """Steps done of one stage as those of all."""
-    on_progress(before + done, total, text)
+def _in_units(start: LinearStart, units: tuple[float, float]) -> LinearStart:
+    """The linear model with drive and output counted in units of the search, each vector at a scale that suits both."""
+    model = start.model
+    b, c = model.input_vectors * units[0], model.output_vectors / units[1]
+    even = np.sqrt(np.linalg.norm(c, axis=0) / np.maximum(np.linalg.norm(b, axis=1), 1e-300))
+    modes = replace(
+        model, input_vectors=b * even[:, None], output_vectors=c / even, direct=model.direct * units[0] / units[1]
+    )
+    return start._replace(model=modes)
+
+
+def _few(records: Sequence[Steady], classes: Sequence[int]) -> list[int]:
+    """Numbers of one record for each amplitude and set of actuators that are driven."""
+    first: dict[tuple[int, tuple[bool, ...]], int] = {}
+    for k, (record, own) in enumerate(zip(records, classes, strict=True)):
+        driven = np.ptp(record.drive, axis=0) > 0.0
+        first.setdefault((own, tuple(driven.tolist())), k)
+    return sorted(first.values())
+
+
+class _Told:
+    """Passes on how far a search is, keeps its costs and says when it may end."""
+
+    def __init__(self, on_progress: Progress, total: int, tolerance: float) -> None:
+        self.on_progress, self.total, self.tolerance = on_progress, total, tolerance
+        self.before = 0
+        self.costs: list[float] = []
+
+    def begin(self, before: int, cost: float) -> None:
+        """Begin anew at a cost, behind the steps of the search before."""
+        self.before, self.costs = before, [math.sqrt(cost)]
+
+    def __call__(self, done: int, free: Floats, cost: float) -> bool:
+        """Whether the search may end: its last steps gained next to nothing."""
+        self.costs.append(math.sqrt(cost))
+        self.on_progress(self.before + done, self.total, f"error {self.costs[-1]:.4f}")
+        return len(self.costs) > _WINDOW and self.costs[-1] > (1.0 - self.tolerance) * self.costs[-1 - _WINDOW]
+
+
+def _errors(search: Search, free: Floats) -> Floats:
+    """Rms error of each record, in the search's units."""
+    numbers = search.springs.numbers(free)
+    plant = tangents.play_plant(numbers, search.records[0].step_s)
+    cost = search.pool.map(lambda r: tangents.squared_error(plant, r, numbers.delay_s), search.records)
+    return np.asarray(np.sqrt(np.array(list(cost)) / np.array([r.output.size for r in search.records])))
+
+
+def _motion(search: Search, free: Floats, record: Steady) -> Floats:
+    """Largest drive of each operator in a record, in the search's units."""
+    numbers = search.springs.numbers(free)
+    plant = tangents.play_plant(numbers, record.step_s)
+    return np.asarray(np.abs(tangents.steady_error(plant, record, numbers.delay_s)[1].q).max(axis=0))
+
+
+def _moved(search: Search, free: Floats, classes: Sequence[int]) -> Floats | None:
+    """Root of the cluster-robust covariance, shape (records, numbers); None with a single record in an amplitude.
+
+    Numbers at their limits are counted as known (weights at 0), and the softening as free.
+    """
+    if int(np.bincount(np.asarray(classes)).min()) < 2:
+        return None
+    springs, numbers = search.springs, search.springs.numbers(free)
+    plant, T = tangents.play_plant(numbers, search.records[0].step_s), search.springs.matrix[:, springs.inside(free)]
+
+    def equations(record: Steady) -> tuple[Floats, Floats]:
+        normal = tangents.normal_equations(plant, numbers, record, search.wanted)
+        return T.T @ normal.matrix @ T, T.T @ normal.gradient
+
+    parts = list(search.pool.map(equations, search.records))
+    matrix = sum((w * part[0] for w, part in zip(search.weights, parts, strict=True)), np.zeros(()))
+    pulls = np.array([w * part[1] for w, part in zip(search.weights, parts, strict=True)])
+    size = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    inverse = np.linalg.pinv(matrix / np.outer(size, size), rcond=1e-6, hermitian=True) / np.outer(size, size)
+    count = len(parts)
+    return np.asarray((pulls - pulls.mean(axis=0)) @ inverse @ T.T * math.sqrt(count / (count - 1)))
+
+
+def _pole_errors(numbers: Numbers, moved: Floats | None) -> np.ndarray:
+    """Standard errors of real and imaginary part of each pole at rest: how far each row of ``moved`` moves it."""
+    poles = numbers.poles_at_rest
+    if moved is None:
+        return np.full(poles.size, complex(math.nan, math.nan))
+    square = np.zeros((2, poles.size))
+    for row in moved:
+        other = numbers.at(numbers.vector() + _SMALL * row).poles_at_rest
+        nearest = other[np.argmin(np.abs(other[None, :] - poles[:, None]), axis=1)]
+        change = (nearest - poles) / _SMALL
+        square += change.real**2, change.imag**2
+    return np.asarray(np.sqrt(square[0]) + 1j * np.sqrt(square[1]))
+
+
+def _in_si(numbers: Numbers, moved: Floats, units: tuple[float, float]) -> Floats:
+    """Changes of all numbers, in the search's units, as changes of the numbers of a mirror file in SI units."""
+    rows = np.array([scaled(numbers.at(row), *units).vector() for row in moved])
+    rows[:, : numbers.decay.size] *= -1.0  # a file's decay is above 0
+    return rows
 
 
 # --------------------------------------------------------------------------------------------------------- the records
@@ -235,12 +400,14 @@ def _check(records: Sequence[Recording], skip_periods: int, options: StiffnessOp
             )
     check_alike(records, "fitted")
     thresholds = options.thresholds
-    if not thresholds or thresholds[0] < 0 or np.any(np.diff(thresholds) <= 0):
-        raise IdentificationError(f"the thresholds {list(thresholds)} do not ascend from 0; sort them, each once.")
+    if not thresholds or thresholds[0] <= 0 or np.any(np.diff(thresholds) <= 0):
+        raise IdentificationError(
+            f"the thresholds {list(thresholds)} do not ascend from above 0; sort them, each once, and leave out 0."
+        )
     if options.sub_steps < 1:
         raise IdentificationError(f"{options.sub_steps} steps a sample were asked for; give at least 1.")
-    if not options.sources:
-        raise IdentificationError('no source of hysteresis was named; give "strain", "drive" or both.')
+    if options.springs is not None and options.springs < 1:
+        raise IdentificationError(f"{options.springs} springs were asked for; give at least 1.")
 
 
 def amplitude_classes(records: Sequence[Recording]) -> tuple[tuple[float, ...], tuple[int, ...]]:
@@ -302,211 +469,3 @@ def _levels(groups: Sequence[Sequence[Recording]], outputs: Floats, output_unit:
         return outputs
     left = [response_from_periods(group, skip_periods=skip_periods).residual_power for group in groups]
     return np.array([math.sqrt(float(power.sum(axis=0).mean())) / output_unit for power in left])
-
-
-def _with_thresholds(numbers: Numbers, steady: Sequence[Steady], thresholds: Sequence[float]) -> Numbers:
-    """Thresholds as parts of the largest drive of any operator in the record with the largest drive."""
-    largest = max(steady, key=lambda record: float(np.mean(record.drive**2)))
-    far = replace(numbers, thresholds=np.full_like(numbers.thresholds, 1e300))  # plays that never move: the linear part
-    plant = tangents.play_plant(far, largest.step_s)
-    drive = tangents.two_periods(largest, numbers.delay_s)
-    path = tangents.simulate_path(plant, drive)
-    half = drive.shape[0] // 2
-    q = path.x[half:, : numbers.B.shape[0]] @ numbers.F.T + drive[half:] @ numbers.G.T
-    return replace(numbers, thresholds=np.zeros_like(numbers.thresholds) + np.abs(q).max() * np.asarray(thresholds))
-
-
-# ---------------------------------------------------------------------------------------------------------- the search
-class _Search:
-    """Levenberg-Marquardt over all records, the error of each counted in units of its amplitude's ``levels``."""
-
-    def __init__(self, steady: Sequence[Steady], classes: Sequence[int], levels: Floats, fixed_delay: bool) -> None:
-        self.steady, self.classes, self.fixed_delay = steady, classes, fixed_delay
-        self.sizes = np.array([record.output.size for record in steady])
-        self.weights = 1.0 / (levels[np.asarray(classes)] ** 2 * self.sizes * len(steady))
-        self.costs: list[float] = []
-        self.start_error = np.zeros(len(steady))
-        self.converged = False
-        self.held = False
-        """Whether the last step was shortened, or a trial of it refused, because it would run away."""
-
-    def minimise(
-        self, start: Numbers, pool: ThreadPoolExecutor, iterations: int, tolerance: float, on_progress: Progress
-    ) -> None:
-        """Search from a start to the end; the result is in `numbers` and `parts`.
-
-        Args:
-            start: The numbers to begin with.
-            pool: Threads in which the records are simulated side by side.
-            iterations: Largest number of steps.
-            tolerance: The search ends after several steps in a row that lower the logarithm of the error by less.
-            on_progress: Called with the steps done, their largest number and the error.
-        """
-        self.numbers, damping, small = start, _DAMPING, 0
-        self._linearise(pool)
-        self.start_error = self.error
-        for done in range(1, iterations + 1):
-            damping, gained = self._step(pool, damping)
-            if gained:
-                self._linearise(pool)
-            small = small + 1 if not gained or math.log(self.costs[-2] / self.costs[-1]) < tolerance else 0
-            on_progress(done, iterations, f"error {self.costs[-1]:.4f} from {self.costs[0]:.4f}")
-            if not gained or small >= _PATIENCE:
-                self.converged = not self.held
-                break
-
-    @property
-    def error(self) -> Floats:
-        """Rms error of each record."""
-        return np.asarray(np.sqrt(np.array([part.cost for part in self.parts]) / self.sizes))
-
-    def _plant(self, numbers: Numbers) -> kernels.PlayPlant:
-        return tangents.play_plant(numbers, self.steady[0].step_s)
-
-    def _linearise(self, pool: ThreadPoolExecutor) -> None:
-        plant = self._plant(self.numbers)
-        parts = pool.map(lambda r: tangents.normal_equations(plant, self.numbers, r), self.steady)
-        self.parts: list[Normal] = list(parts)
-        self.costs.append(math.sqrt(float(self.weights @ np.array([part.cost for part in self.parts]))))
-
-    def normal_equations(self) -> tuple[Floats, Floats]:
-        """Weighed normal matrix and gradient over all numbers."""
-        matrix = sum((w * p.matrix for w, p in zip(self.weights, self.parts, strict=True)), np.zeros(()))
-        gradient = sum((w * p.gradient for w, p in zip(self.weights, self.parts, strict=True)), np.zeros(()))
-        return np.asarray(matrix), np.asarray(gradient)
-
-    def _step(self, pool: ThreadPoolExecutor, damping: float) -> tuple[float, bool]:
-        """Try damped steps until one lowers the cost; the damping for the next one."""
-        self.held = False
-        matrix, gradient = self.normal_equations()
-        free = np.ones(gradient.size, dtype=bool)
-        free[-1] = not self.fixed_delay
-        size = np.sqrt(np.diag(matrix) + self._floors(np.diag(matrix)))[free]
-        scaled_matrix = matrix[np.ix_(free, free)] / np.outer(size, size)
-        cost, growths = self.costs[-1] ** 2, self.numbers.growths()
-        room, slopes = np.array([-0.5 * g.rate_1_s for g in growths]), np.array([g.slope[free] for g in growths])
-        for _ in range(_TRIALS):
-            move = np.zeros(gradient.size)
-            move[free], bounded = _bounded_move((scaled_matrix, gradient[free], size), damping, (room, slopes))
-            trial = self.numbers.at(self.numbers.vector() + move)
-            runs_away = trial.growth_1_s >= 0.0
-            self.held = self.held or bounded or runs_away
-            if not runs_away and self._cost(trial, pool) < cost:
-                self.numbers = balanced(trial)
-                return max(damping / 4, 1e-6), True
-            if runs_away and bounded:  # what is beyond first order took a pole across: stay further away
-                room, damping = room / 4, damping * 2
-            else:
-                damping *= 4
-        return damping, False
-
-    def _cost(self, numbers: Numbers, pool: ThreadPoolExecutor) -> float:
-        if (numbers.frequency <= 0).any():
-            return math.inf
-        try:
-            plant = self._plant(numbers)
-        except ValueError:  # the loop through the plays is no contraction at this step
-            return math.inf
-        found = pool.map(lambda r: tangents.squared_error(plant, r, numbers.delay_s), self.steady)
-        return float(self.weights @ np.array(list(found)))
-
-    def _floors(self, diagonal: Floats) -> Floats:
-        """Least curvature of each number, from the mean of its kind: one that hardly acts yet is not to run away."""
-        floors, start = np.full(diagonal.size, 1e-12 * float(diagonal.max())), 0
-        for name in FIELDS:
-            part = slice(start, start + getattr(self.numbers, name).size)
-            floors[part] += 0.03 * float(diagonal[part].mean()) if part.stop > part.start else 0.0
-            start = part.stop
-        return floors
-
-
-def _bounded_move(
-    system: tuple[Floats, Floats, Floats], damping: float, bounds: tuple[Floats, Floats]
-) -> tuple[Floats, bool]:
-    """A damped step that, to first order, takes no pole further than half of its way to zero; whether one held it.
-
-    Args:
-        system: Normal matrix, scaled by the size of each number, gradient and sizes.
-        damping: What is added to the diagonal.
-        bounds: Of each pole, how far it may rise in 1/s, and its derivative by each number.
-    """
-    matrix, gradient, size = system
-    inverse = np.asarray(np.linalg.inv(matrix + damping * np.eye(size.size)), dtype=np.float64)
-    room: Floats = np.maximum(bounds[0], 1e-9)
-    slopes = np.asarray(bounds[1] / size, dtype=np.float64)
-    free: Floats = np.asarray(-(inverse @ (gradient / size)), dtype=np.float64)
-    move: np.ndarray = free
-    active: list[int] = []
-    for _ in range(_BOUNDS):
-        beyond = (slopes @ move - room) / room
-        worst = int(np.argmax(beyond))
-        if beyond[worst] <= 1e-6:
-            break
-        active, pull = _pulls([*active, worst], slopes, inverse, np.asarray(slopes @ free - room))
-        move = free - inverse @ (slopes[active].T @ pull)
-    return np.asarray(move / size), bool(active)
-
-
-def _pulls(active: list[int], slopes: Floats, inverse: Floats, beyond: np.ndarray) -> tuple[list[int], Floats]:
-    """How hard each bound pulls on a step so that all are met, without those that would push."""
-    while True:
-        own = slopes[active]
-        pull = np.asarray(np.linalg.lstsq(own @ inverse @ own.T, beyond[active], rcond=1e-9)[0], dtype=np.float64)
-        if (pull >= 0.0).all():
-            return active, pull
-        active = [k for k, p in zip(active, pull, strict=True) if p >= 0.0]
-
-
-def _result(
-    search: _Search, units: tuple[float, float], amplitudes: tuple[float, ...], rate_hz: float
-) -> HystereticStiffnessFit:
-    numbers, moved = search.numbers, _moved(search)
-    modes, pairs = numbers.decay.size, numbers.frequency.size
-    error = np.full(numbers.vector().size, np.nan) if moved is None else np.sqrt(np.sum(moved**2, axis=0))
-    poles_error = error[:modes].astype(complex)
-    poles_error[:pairs] += 1j * error[modes : modes + pairs]
-    return HystereticStiffnessFit(
-        mirror=scaled(numbers, *units).mirror("identified"),
-        delay_s=numbers.delay_s,
-        delay_error_s=float(error[-1]),
-        rate_hz=rate_hz,
-        sub_steps=search.steady[0].sub_steps,
-        order=int(numbers.B.shape[0]),
-        parameters=numbers.vector().size - (1 if search.fixed_delay else 0),
-        redundant=numbers.redundant,
-        poles_rad_s=numbers.poles,
-        poles_error_rad_s=poles_error,
-        error_rms=units[1] * search.error,
-        start_error_rms=units[1] * search.start_error,
-        amplitudes=amplitudes,
-        classes=tuple(search.classes),
-        costs=tuple(search.costs),
-        iterations=len(search.costs) - 1,
-        converged=search.converged,
-        held=search.held,
-        names=numbers.names,
-        moved=None if moved is None else _in_si(numbers, moved, units),
-    )
-
-
-def _moved(search: _Search) -> Floats | None:
-    """Root of the cluster-robust covariance, shape (records, numbers); None with a single record in an amplitude."""
-    if int(np.bincount(np.asarray(search.classes)).min()) < 2:
-        return None
-    matrix, total = search.normal_equations()
-    size = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-    inverse = np.linalg.pinv(matrix / np.outer(size, size), rcond=1e-6, hermitian=True) / np.outer(size, size)
-    pulls = np.array(
-        [w * p.gradient - total / len(search.parts) for w, p in zip(search.weights, search.parts, strict=True)]
-    )
-    count = len(search.parts)
-    moved = pulls @ inverse * math.sqrt(count / (count - 1))
-    moved[:, -1] *= not search.fixed_delay
-    return np.asarray(moved)
-
-
-def _in_si(numbers: Numbers, moved: Floats, units: tuple[float, float]) -> Floats:
-    """Changes of all numbers, in the search's units, as changes of the numbers of a mirror file in SI units."""
-    rows = np.array([scaled(numbers.at(row), *units).vector() for row in moved])
-    rows[:, : numbers.decay.size] *= -1.0  # a file's decay is above 0
-    return rows

@@ -19,6 +19,8 @@ from microrad.mirror import model as mirror
 _CHUNK = 256
 _STATE, _DRIVE, _BANK = range(3)  # where a parameter enters: the order of a chunk's columns
 _LATER = 1e-5
+_SETTLED = 7.0  # time constants of the slowest mode before tangents count
+_MATRICES = ("B0", "B1", "E_held", "E1", "F", "G", "C", "D", "K")
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,15 +71,41 @@ def simulate_path(plant: kernels.PlayPlant, drive: Floats) -> kernels.Path:
     """
     steps, operators = drive.shape[0], plant.K.shape[1]
     path = kernels.Path(
-        np.empty((steps, plant.C.shape[0])),
-        np.empty((steps, plant.diagonal.size)),
-        np.empty((steps, plant.diagonal.size)),
-        np.empty((steps, operators)),
-        np.empty((steps, plant.play_threshold.size)),
-        np.empty((steps, operators), dtype=np.int64),
+        output=np.empty((steps, plant.C.shape[0])),
+        x=np.empty((steps, plant.diagonal.size)),
+        state=np.empty((steps, plant.diagonal.size)),
+        q=np.empty((steps, operators)),
+        z=np.empty((steps, operators)),
+        play=np.empty((steps, plant.play_threshold.size)),
+        moved=np.empty((steps, operators), dtype=np.int64),
     )
-    kernels.play_path(plant, drive, path)
+    columns = {name: np.ascontiguousarray(getattr(plant, name).T) for name in _MATRICES}
+    kernels.play_path(plant, plant._replace(**columns), np.ascontiguousarray(drive), np.empty(operators), path)
     return path
+
+
+def powers(q: Floats, reach: Floats) -> Floats:
+    """What the coefficients of each polynomial are multiplied by along a path, shape (steps, operators, 3).
+
+    Args:
+        q: Drive of each operator, shape (steps, operators).
+        reach: Reach of each polynomial, infinite where an operator has none.
+    """
+    s = np.clip(q / reach, -1.0, 1.0)
+    return np.stack([s * s, s * np.abs(s), s * s * s], axis=2)
+
+
+def bend(plant: kernels.PlayPlant, path: kernels.Path) -> Floats:
+    """Slope of each polynomial along a path, shape (steps, operators).
+
+    Args:
+        plant: The discrete plant.
+        path: Its path.
+    """
+    quadratic, signed, cubic, reach = plant.operator[:, 2:].T
+    s = path.q / reach
+    slope = (2.0 * quadratic * s + 2.0 * signed * np.abs(s) + 3.0 * cubic * (s * s)) / reach
+    return np.where(np.abs(s) < 1.0, slope, 0.0)
 
 
 def two_periods(record: Steady, delay_s: float) -> Floats:
@@ -118,20 +146,42 @@ def squared_error(plant: kernels.PlayPlant, record: Steady, delay_s: float) -> f
     return cost if math.isfinite(cost) else math.inf
 
 
-def normal_equations(plant: kernels.PlayPlant, numbers: Numbers, record: Steady) -> Normal:
+def normal_equations(
+    plant: kernels.PlayPlant, numbers: Numbers, record: Steady, wanted: np.ndarray | None = None
+) -> Normal:
     """Normal equations of a record in the order of `Numbers.vector`, in single precision, summed in double.
 
     Args:
         plant: The discrete plant of the model.
         numbers: The model's numbers, about which the equations are made linear.
         record: The record, one period of its steady state.
+        wanted: Which numbers are, by default all; the others' rows and columns are zero.
     """
     error, path, drive = steady_error(plant, record, numbers.delay_s)
-    J = jacobian(plant, numbers, record, (path, drive), np.float32)
+    J = jacobian(plant, numbers, record, (path, drive), np.float32, wanted=wanted)
     J -= J.mean(axis=0)
     J = J.reshape(-1, J.shape[2])
     flat = error.reshape(-1).astype(np.float32)
     return Normal(float(np.sum(error**2)), (J.T @ J).astype(float), (J.T @ flat).astype(float))
+
+
+def curvature(plant: kernels.PlayPlant, numbers: Numbers, record: Steady, part: float, wanted: np.ndarray) -> Floats:
+    """J'J as in `normal_equations`, near enough for a search and sooner: from the end of the period, scaled to all.
+
+    Args:
+        plant: The discrete plant of the model.
+        numbers: The model's numbers.
+        record: The record, one period of its steady state.
+        part: Part of the period that counts; the tangents begin as long before it.
+        wanted: Which numbers are; the others' rows and columns are zero.
+    """
+    drive = two_periods(record, numbers.delay_s)
+    rows = max(round(part * len(record.output)), 1)
+    path = simulate_path(plant, drive)
+    J = jacobian(plant, numbers, record, (path, drive), np.float32, lead=rows, rows=rows, wanted=wanted)
+    J -= J.mean(axis=0)
+    J = J.reshape(-1, J.shape[2])
+    return np.asarray((J.T @ J).astype(float) * (len(record.output) / rows))
 
 
 def jacobian(
@@ -140,7 +190,10 @@ def jacobian(
     record: Steady,
     way: tuple[kernels.Path, Floats],
     kind: type,
-    lead: int = -1,
+    *,
+    lead: int | None = None,
+    rows: int | None = None,
+    wanted: np.ndarray | None = None,
 ) -> Floats:
     """Derivative of the second period's output by each number, shape (samples, outputs, numbers).
 
@@ -150,22 +203,25 @@ def jacobian(
         record: The record, one period of its steady state.
         way: Path and drive over two periods, as `steady_error` gives them.
         kind: Type of floating-point number of the result.
-        lead: Samples before the second period at which the tangents begin, at most one period; by default seven time
+        lead: Samples before the first row at which the tangents begin, as far as there are any; by default seven time
             constants of the slowest mode.
+        rows: Last samples of the period that are given; by default all.
+        wanted: Which numbers are, by their place in `Numbers.vector`; by default all. The others' columns are zero.
     """
     path, drive = way
-    period = drive.shape[0] // 2
-    if lead < 0:
-        lead = math.ceil(7.0 / -float(numbers.decay.max()) * record.rate_hz)
-    lead = min(lead * record.sub_steps, period - 1)
-    cut = slice(period - lead - 1, None)  # one step more: what enters needs the step before
-    part = kernels.Path(path.output[cut], path.x[cut], path.state[cut], path.z[cut], path.play[cut], path.moved[cut])
-    rows, outputs = record.output.shape[0], record.output.shape[1]
-    J: Floats = np.empty((rows, outputs, numbers.vector().size), dtype=kind)
-    _state_columns(J, (plant, numbers, record.step_s), (part, drive[cut]), (lead + 1, record.sub_steps))
-    _output_columns(J, numbers, (path, drive), (period, record.sub_steps))
+    wanted = np.ones(numbers.vector().size, dtype=bool) if wanted is None else wanted
+    rows = len(record.output) if rows is None else rows
+    first = len(drive) - rows * record.sub_steps
+    lead = math.ceil(_SETTLED / -float(numbers.decay.max()) * record.rate_hz) if lead is None else lead
+    lead = min(lead * record.sub_steps, first - 1)
+    cut = slice(first - lead - 1, None)  # one step more: what enters needs the step before
+    part = kernels.Path(**{name: values[cut] for name, values in path._asdict().items()})
+    J: Floats = np.zeros((rows, record.output.shape[1], wanted.size), dtype=kind)
+    _state_columns(J, (plant, numbers, record.step_s), (part, drive[cut]), (lead + 1, record.sub_steps), wanted)
+    _output_columns(J, numbers, (path, drive), (first, record.sub_steps))
     later = simulate_path(plant, two_periods(record, numbers.delay_s + _LATER * record.step_s)).output
-    J[:, :, -1] = (later - path.output)[period :: record.sub_steps] / (_LATER * record.step_s)
+    J[:, :, -1] = (later - path.output)[first :: record.sub_steps] / (_LATER * record.step_s)
+    J[:, :, ~wanted] = 0.0
     return J
 
 
@@ -174,16 +230,20 @@ def _state_columns(
     model: tuple[kernels.PlayPlant, Numbers, float],
     way: tuple[kernels.Path, Floats],
     rows: tuple[int, int],
+    wanted: np.ndarray,
 ) -> None:
     """Columns of what acts through the state, the drives of the operators or their weights."""
     (path, drive), (plant, numbers, step_s) = way, model
-    places, columns = _places(numbers)
+    places = _places(numbers)
+    columns = np.flatnonzero(wanted[: places.shape[1]])
+    places = places[:, columns]
     before, after = _sources(numbers, path, drive, step_s, J.dtype)
     signal = np.hstack([path.x[:, : numbers.B.shape[0]], drive]).astype(J.dtype)
-    plays = path.play.astype(J.dtype)
+    plays = np.hstack([path.play, powers(path.q, numbers.reach).reshape(len(drive), -1)]).astype(J.dtype)
+    slopes = bend(plant, path).astype(J.dtype)
     for begin in range(0, columns.size, _CHUNK):
         chunk = slice(begin, begin + _CHUNK)
-        tangents = _tangents(plant, places[:, chunk], (before, after, signal, plays), J.dtype)
+        tangents = _tangents(plant, places[:, chunk], (before, after, signal, plays, slopes), J.dtype)
         part = np.empty((*J.shape[:2], tangents.row.size), dtype=J.dtype)
         kernels.tangent_kernel(tangents, path.moved, 1, rows[0], rows[1], part)
         J[:, :, columns[chunk]] = part
@@ -199,7 +259,7 @@ def _tangents(
     def zeros(rows: int) -> Floats:
         return np.zeros((rows, count), dtype=kind)
 
-    before, after, signal, plays = signals
+    before, after, signal, plays, slopes = signals
 
     return kernels.Tangents(
         plant=kernels.PlayPlant(*(v.astype(kind) if v.dtype == np.float64 else v for v in plant)),
@@ -211,6 +271,7 @@ def _tangents(
         after=after,
         signal=signal,
         plays=plays,
+        bend=slopes,
         x=zeros(states),
         q=zeros(operators),
         q_before=zeros(operators),
@@ -223,8 +284,8 @@ def _tangents(
     )
 
 
-def _places(numbers: Numbers) -> tuple[np.ndarray, np.ndarray]:
-    """Place, row, source and turn of each parameter that is not of the output, and its column in the Jacobian."""
+def _places(numbers: Numbers) -> np.ndarray:
+    """Place, row, source and turn of each parameter that is not of the output, in the order of the Jacobian."""
     modes, pairs, first = numbers.decay.size, numbers.frequency.size, numbers.rows
     inputs, operators, order = numbers.B.shape[1], numbers.E.shape[1], numbers.B.shape[0]
     found = [(_STATE, first[i], i, 0) for i in range(modes)]
@@ -234,9 +295,10 @@ def _places(numbers: Numbers) -> tuple[np.ndarray, np.ndarray]:
         found += [(_STATE, first[i], offset + i * width + j, turn) for i, turn in states for j in range(width)]
     found += [(_DRIVE, e, i, 0) for e in range(operators) for i in range(order)]
     found += [(_DRIVE, e, order + j, 0) for e in range(operators) for j in range(inputs)]
-    plays = numbers.weights.shape[1]
+    plays, offset = numbers.weights.shape[1], numbers.weights.size
     found += [(_BANK, e, e * plays + j, 0) for e in range(operators) for j in range(plays)]
-    return np.array(found, dtype=np.int64).T.copy(), np.arange(len(found))
+    found += [(_BANK, e, offset + e * 3 + j, 0) for e in range(operators) for j in range(3)]
+    return np.array(found, dtype=np.int64).T.copy()
 
 
 def _sources(
