@@ -128,7 +128,7 @@ def simulate_hysteretic_stiffness(fit: HystereticStiffnessFit, drive: Floats) ->
 
 
 class Trust(NamedTuple):
-    """How far a drive takes a mirror beyond the records of its fit, and the rms error to expect there.
+    """How far a drive takes a mirror beyond the records of its fit, and the rms error to expect at least.
 
     ``motion`` is the largest drive q of any operator, in the largest that it had in the records: above 1 it is beyond
     them. ``error_rms`` is made of ``left``, what the fit leaves, continued over the amplitude by the power that its
@@ -142,7 +142,9 @@ class Trust(NamedTuple):
 
 
 def trust(fit: HystereticStiffnessFit, drive: Floats) -> Trust:
-    """How far a fit is to be trusted under a drive; where it is beyond the records, the error is an estimate.
+    """How far a fit is to be trusted under a drive: beyond the records its error is this or more.
+
+    On the CubeSpec mirror at 1.6 times the motion that was recorded, 4.4 times as much was left.
 
     Args:
         fit: The fit.
