@@ -12,7 +12,6 @@ import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -252,7 +251,7 @@ def fit_hysteretic_stiffness(
     told = _Told(on_progress or no_progress, options.few_first + iterations, options.tolerance)
     with ThreadPoolExecutor(min(len(steady), os.cpu_count() or 1)) as pool:
         search = Search(springs, steady, weights, few, pool)
-        before = _errors(search, free)
+        before, _ = _judged(search, free)
         if options.few_first:
             share = weights.sum() / weights[few].sum()
             first = Search(springs, [steady[k] for k in few], share * weights[few], range(len(few)), pool)
@@ -261,8 +260,7 @@ def fit_hysteretic_stiffness(
         free = search.minimise(free, iterations, _REFRESH, told)
         limited = springs.softening(springs.numbers(free)) > _AT_LIMIT * springs_of.MOST_SOFTENING
         moved = _moved(search, free, classes)
-        after = _errors(search, free)
-        motion = np.max(list(pool.map(partial(_motion, search, free), steady)), axis=0)
+        after, motion = _judged(search, free)
     numbers = springs.numbers(free)
     delay_error_s = math.nan if moved is None else float(np.linalg.norm(moved[:, -1]))
     return HystereticStiffnessFit(
@@ -329,19 +327,17 @@ class _Told:
         return len(self.costs) > _WINDOW and self.costs[-1] > (1.0 - self.tolerance) * self.costs[-1 - _WINDOW]
 
 
-def _errors(search: Search, free: Floats) -> Floats:
-    """Rms error of each record, in the search's units."""
+def _judged(search: Search, free: Floats) -> tuple[Floats, Floats]:
+    """Rms error of each record, and the largest drive of each operator in all of them, in the search's units."""
     numbers = search.springs.numbers(free)
     plant = tangents.play_plant(numbers, search.records[0].step_s)
-    cost = search.pool.map(lambda r: tangents.squared_error(plant, r, numbers.delay_s), search.records)
-    return np.asarray(np.sqrt(np.array(list(cost)) / np.array([r.output.size for r in search.records])))
 
+    def judged(record: Steady) -> tuple[float, Floats]:
+        error, path, _ = tangents.steady_error(plant, record, numbers.delay_s)
+        return float(np.sqrt(np.mean(error**2))), np.abs(path.q).max(axis=0)
 
-def _motion(search: Search, free: Floats, record: Steady) -> Floats:
-    """Largest drive of each operator in a record, in the search's units."""
-    numbers = search.springs.numbers(free)
-    plant = tangents.play_plant(numbers, record.step_s)
-    return np.asarray(np.abs(tangents.steady_error(plant, record, numbers.delay_s)[1].q).max(axis=0))
+    errors, motions = zip(*search.pool.map(judged, search.records), strict=True)
+    return np.array(errors), np.max(motions, axis=0)
 
 
 def _moved(search: Search, free: Floats, classes: Sequence[int]) -> Floats | None:
