@@ -505,6 +505,16 @@ def test_a_start_of_small_modes_is_soft_enough():
         assert 0.0 < found.softening(found.numbers(free)) < 0.0201
 
 
+def test_an_actuator_that_rests_at_the_middle_amplitude_has_no_gain_there(springs):
+    """Its plays and powers count in full; nothing is divided by how far it moved."""
+    model, drive = springs[1], STEADY.drive * np.array([1.0, 0.0])
+    large, middle = replace(STEADY, drive=2.0 * STEADY.drive), replace(STEADY, drive=drive)
+    found, free = springs_of.begin(LinearStart(model, 3e-4), [large], [middle], 2, (0.2,), fixed_delay=False)
+    assert np.isfinite(found.matrix).all()
+    numbers = found.numbers(free)
+    assert -numbers.weights[2, 1] < numbers.weights[2, 0] < 0.0 and numbers.weights[3, 0] == 0.0
+
+
 def test_actuators_that_are_driven_one_at_a_time(training):
     """Each has records of its own; the search begins with one of each amplitude and actuator."""
     truth, alone = hysteretic_truth(), []
