@@ -1,12 +1,13 @@
 """One model of the CubeSpec mirror for all three amplitudes, realisations held out in turn.
 
-    python benchmarks/cubespec_one_model.py [fold ... | all] [order=36] [springs=6,12] [seen=100,200,300]
-        [iterations=60]
+    python benchmarks/cubespec_one_model.py [fold ... | all] [order=36] [springs=12] [thresholds=0.02:0.06:0.15:0.4]
+        [seen=100,200,300] [iterations=60]
 
-A fold holds out one realisation at each amplitude (default: 5), and nothing of it is used: not for the start, not for
-the choice of the number of springs. Where several are given, each is fitted with few steps to all but one of the fold's
-own realisations and judged by that one ("inner"); the best is fitted to all of them. With "seen" only those amplitudes
-are fitted, and the others are blind.
+A fold holds out one realisation at each amplitude (default: 5), and nothing of it is used: not for the start, and not
+for a choice. Where several numbers of springs or sets of thresholds are given, separated by commas, each is fitted to
+the fold's own records, and the one counts that is expected to leave least of an unseen one (`unseen_error_rms` of the
+fit, from the same records; geometric mean over the amplitudes). With "seen" only those amplitudes are fitted, and the
+others are blind.
 
 Errors in um as the authors of the recordings score them (`cubespec.score_um`), and below them pooled: rms over samples
 and channels, both periods from rest, without the first 1000 samples. Bars: at most 40 states and at most 28. The
@@ -20,11 +21,13 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command line does, 
 import sys
 import time
 from functools import partial
+from itertools import product
 
 import numpy as np
 from cubespec import AMPLITUDES_MV, NEURAL_UM, realisations, rms_um, score_um
 
 from microrad.lab.identify.stiffness.fit import (
+    THRESHOLDS,
     HystereticStiffnessFit,
     StiffnessOptions,
     fit_hysteretic_stiffness,
@@ -34,7 +37,6 @@ from microrad.lab.identify.stiffness.fit import (
 from microrad.lab.recording import Recording
 
 SETTLED = 1000
-INNER = 10  # steps of a fit that only chooses
 BARS_UM = {40: (0.065, 0.105, 0.160), 28: (0.068, 0.110, 0.170)}
 STRETCH_UM = (0.055, 0.095, 0.145)
 Groups = list[tuple[Recording, ...]]
@@ -52,47 +54,52 @@ def scores(fit: HystereticStiffnessFit, groups: Groups, held: int) -> np.ndarray
     return np.array([score_um(partial(simulate_hysteretic_stiffness, fit), group[held]) for group in groups])
 
 
-def fitted(groups: Groups, order: int, springs: int, iterations: int) -> HystereticStiffnessFit:
+def fitted(groups: Groups, order: int, options: StiffnessOptions, iterations: int) -> HystereticStiffnessFit:
     def report(done: int, total: int, text: str) -> None:
         print(f"  {done} of {total}: {text}", file=sys.stderr, flush=True)
 
     records = [r for group in groups for r in group]
-    options = StiffnessOptions(springs=springs)
     return fit_hysteretic_stiffness(records, order=order, options=options, iterations=iterations, on_progress=report)
 
 
-def chosen(groups: Groups, order: int, candidates: list[int]) -> int:
-    """The number of springs that serves best on a realisation of the fold's own."""
-    if len(candidates) == 1:
-        return candidates[0]
-    errors = []
-    for springs in candidates:
-        fit = fitted(without(groups, 0), order, springs, INNER)
-        errors.append(scores(fit, groups, 0))
-        row(f"  inner, {springs} springs", errors[-1], f"{fit.parameters - fit.redundant} numbers")
-    return candidates[int(np.argmin(np.log(errors).sum(axis=1)))]
+def expected_um(fit: HystereticStiffnessFit) -> np.ndarray:
+    """What the fit is expected to leave of an unseen record of each amplitude, by its own records."""
+    classes = np.asarray(fit.classes)
+    return np.array([rms_um(fit.unseen_error_rms[classes == c]) for c in range(len(fit.amplitudes))])
 
 
 def fold(groups: Groups, held: int, options: dict[str, str]) -> np.ndarray:
     seen = [AMPLITUDES_MV.index(int(a)) for a in options["seen"].split(",")]
-    train, order = [without(groups, held)[k] for k in seen], int(options["order"])
-    began, spent = time.perf_counter(), time.process_time()
-    springs = chosen(train, order, [int(n) for n in options["springs"].split(",")])
-    choosing = time.process_time() - spent
-    fit = fitted(train, order, springs, int(options["iterations"]))
-    seconds, of_processor = time.perf_counter() - began, time.process_time() - spent - choosing
-    numbers = f"{fit.parameters - fit.redundant} numbers, {fit.order} states, {springs} springs"
-    steps = f"{fit.iterations} steps{'' if fit.converged else ', the most'}, softening {fit.softening:.2f}"
-    spent_on = f"{seconds:.0f} s in all; of processor time {of_processor:.0f} s and {choosing:.0f} s to choose"
-    scored = scores(fit, groups, held)
-    row(f"fold {held}, held out", scored, f"{numbers}, {steps}; {spent_on}")
-    pooled = [rms_um(predicted_error(fit, group[held], SETTLED)) for group in groups]
+    train = [without(groups, held)[k] for k in seen]
+    best, least = None, np.inf
+    for springs, thresholds in product(options["springs"].split(","), options["thresholds"].split(",")):
+        chosen = StiffnessOptions(springs=int(springs), thresholds=tuple(float(r) for r in thresholds.split(":")))
+        began, spent = time.perf_counter(), time.process_time()
+        fit = fitted(train, int(options["order"]), chosen, int(options["iterations"]))
+        seconds, of_processor = time.perf_counter() - began, time.process_time() - spent
+        steps = f"{fit.iterations} steps{'' if fit.converged else ', the most'}, softening {fit.softening:.2f}"
+        expected = np.full(3, np.nan)
+        expected[seen] = expected_um(fit)
+        told = f"{fit.parameters - fit.redundant} numbers, {steps}; {seconds:.0f} s, of processors {of_processor:.0f} s"
+        row(f"  expected, {springs}, {thresholds}", expected, told)
+        if (mean := float(np.log(expected[seen]).mean())) < least:
+            best, least = fit, mean
+    assert best is not None
+    scored = scores(best, groups, held)
+    row(f"fold {held}, held out", scored, f"{best.parameters - best.redundant} numbers, {best.order} states")
+    pooled = [rms_um(predicted_error(best, group[held], SETTLED)) for group in groups]
     row(f"fold {held}, pooled", np.array(pooled))
     return scored
 
 
 def main() -> None:
-    options = {"order": "36", "springs": "6,12", "seen": "100,200,300", "iterations": "60"}
+    options = {
+        "order": "36",
+        "springs": "12",
+        "thresholds": ":".join(f"{r:g}" for r in THRESHOLDS),
+        "seen": "100,200,300",
+        "iterations": "60",
+    }
     options |= dict(word.split("=") for word in sys.argv[1:] if "=" in word)
     words = [word for word in sys.argv[1:] if "=" not in word]
     folds = list(range(6)) if words == ["all"] else [int(word) for word in words] or [5]

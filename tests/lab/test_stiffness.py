@@ -15,6 +15,7 @@ from microrad.lab.identify.stiffness import springs as springs_of
 from microrad.lab.identify.stiffness import tangents
 from microrad.lab.identify.stiffness.fit import (
     StiffnessOptions,
+    _expected_squares,
     _pole_errors,
     simulate_hysteretic_stiffness,
     trust,
@@ -30,6 +31,7 @@ from places import DATA
 CUBESPEC = DATA / "cubespec"
 needs_cubespec = pytest.mark.skipif(not CUBESPEC.exists(), reason=f"real recording cubespec absent: {CUBESPEC}")
 RATE_HZ, PERIOD = 1000.0, 512
+AMPLITUDES = 0.3, 0.6, 1.2
 
 
 def philox(seed):
@@ -134,14 +136,17 @@ def test_the_gradient_is_that_of_the_derivatives_and_of_differences(numbers):
 
 
 def test_the_curvature_of_a_search_is_near_that_of_all_samples(numbers):
-    """From the second half of the period, scaled; numbers that are not wanted have none."""
+    """From half of the period, scaled; both halves are not the same. Numbers that are not wanted have none."""
     plant = tangents.play_plant(numbers, STEADY.step_s)
     wanted = np.arange(numbers.vector().size) % 3 > 0
     whole = tangents.normal_equations(plant, numbers, STEADY).matrix
-    rough = tangents.curvature(plant, numbers, STEADY, 0.5, wanted)
-    assert not rough[~wanted].any() and not rough[:, ~wanted].any()
-    ratio = np.diag(rough)[wanted] / np.diag(whole)[wanted]
-    assert 0.3 < ratio.min() < 1.0 < ratio.max() < 3.0
+    halves = [tangents.curvature(plant, numbers, STEADY, end, 0.5, wanted) for end in (0.5, 1.0)]
+    for rough in halves:
+        assert not rough[~wanted].any() and not rough[:, ~wanted].any()
+        ratio = np.diag(rough)[wanted] / np.diag(whole)[wanted]
+        assert 0.3 < ratio.min() < 1.0 < ratio.max() < 3.0
+    both = np.diag(sum(halves) / 2)[wanted] / np.diag(whole)[wanted]
+    assert not np.allclose(*halves) and 0.7 < both.min() < both.max() < 1.5
 
 
 def test_tangents_begin_early_enough_for_the_slowest_mode(numbers):
@@ -215,7 +220,7 @@ def record_of(truth, amplitude, seed, delay_s=7e-4):
 @pytest.fixture(scope="module")
 def training():
     truth = hysteretic_truth()
-    return [record_of(truth, amplitude, 10 * i + k) for i, amplitude in enumerate((0.3, 0.6, 1.2)) for k in range(3)]
+    return [record_of(truth, amplitude, 10 * i + k) for i, amplitude in enumerate(AMPLITUDES) for k in range(3)]
 
 
 @pytest.fixture(scope="module")
@@ -269,6 +274,29 @@ def test_an_amplitude_between_is_predicted_far_better_than_by_a_linear_model(kno
     error = rms(predicted_error(known[0], held_out, drop=512))
     assert 0 < error < 0.3 * min(linear, own)
     assert linear < rms(held_out.output)
+
+
+def test_the_error_expected_of_unseen_records_is_that_of_new_ones(known):
+    """On three new records of each amplitude; more than is left of those fitted, which tells too little."""
+    fit, _ = known
+    assert (fit.unseen_error_rms > fit.error_rms).all()
+    records = [record_of(hysteretic_truth(), a, 90 + k) for a in AMPLITUDES for k in range(3)]
+    found = np.array([rms(predicted_error(fit, record, PERIOD)) for record in records])
+    by_amplitude = [np.sqrt(np.mean(e.reshape(3, 3) ** 2, axis=1)) for e in (fit.unseen_error_rms, found)]
+    assert 0.6 < min(by_amplitude[0] / by_amplitude[1]) < max(by_amplitude[0] / by_amplitude[1]) < 1.3
+    assert rms(fit.error_rms) < rms(fit.unseen_error_rms) < rms(found)
+
+
+def test_a_record_that_is_noisier_counts_less():
+    """Alone as far as its own noise goes: what no linear model follows counts in all records of its amplitude."""
+    quiet = [record_of(hysteretic_truth(), 0.6, k) for k in range(4)]
+    noise = 1e-2 * philox(5).standard_normal(quiet[0].output.shape)
+    noisy = [replace(quiet[0], output=quiet[0].output + noise), *quiet[1:]]
+    before, after = (_expected_squares(records, (0,) * 4, 0) for records in (quiet, noisy))
+    assert before == pytest.approx(before[0], rel=1e-3)
+    own = float(np.mean((noise[:PERIOD] - noise[PERIOD:]) ** 2)) / 4
+    assert after[1:] == pytest.approx(after[1]) and after[0] - after[1] == pytest.approx(own, rel=0.05)
+    assert 0.5 * before[1] < after[1] < 2.0 * before[1]
 
 
 def test_a_fit_says_how_far_it_is_to_be_trusted(known):

@@ -35,7 +35,6 @@ from microrad.mirror.coupled import CoupledMirror
 
 AXIS_ORDERS = (2, 4)
 LINEAR_ORDERS = (4, 8, 12, 16, 20, 24, 28, 36)
-_DELAY_ORDER = 12
 _EXCHANGES = 12
 _STIFFNESS_ORDERS = 2
 
@@ -140,7 +139,7 @@ class _Ladder:
         few = 0 if reason else min(_STIFFNESS_ORDERS, len(linear))
         self.total, self.on_progress = len(self.left) + (len(given) or few), on_progress
         self._report("delay")
-        delay_s = best_delay(self.response, min(_DELAY_ORDER, max(linear)), STEPS)
+        delay_s = best_delay(self.response, max(linear), STEPS)
         spectra = line_spectra(self.records.fitted, self.response)
         for n in options.axis_orders:
             self._judge(partial(per_axis, self.response, n, delay_s, spectra))

@@ -30,7 +30,7 @@ from microrad.mirror import coupled
 from microrad.mirror.hysteresis import Play
 from microrad.mirror.model import Mirror, contraction
 
-THRESHOLDS = (0.03, 0.1, 0.3, 0.6)
+THRESHOLDS = (0.02, 0.06, 0.15, 0.4)
 
 _REFRESH = 10  # steps on all records until the curvature is taken anew
 _SMALL = 1e-3  # of a standard error: the poles follow in proportion
@@ -76,6 +76,7 @@ class HystereticStiffnessFit:
     another step is another approximation of the loop through the plays.
 
     ``error_rms`` (records,) is the rms over samples and outputs of the steady state of each record less its mean,
+    ``unseen_error_rms`` what is expected of a fit without it, whose numbers are a Newton step away, and
     ``start_error_rms`` that of the linear model where the search began. ``amplitudes`` is the rms drive of each class
     of records of one amplitude and ``classes`` the class of each record; ``motion`` is the largest drive of each
     operator in them. ``costs`` is the root of the weighed mean-square error, see `fit_hysteretic_stiffness`, where the
@@ -84,7 +85,8 @@ class HystereticStiffnessFit:
     ``poles_rad_s`` are those at rest, and ``poles_error_rad_s`` their standard errors (real and imaginary part as a
     complex number), with ``delay_error_s``. These count each record as one independent draw of drive, noise and
     distortion (cluster-robust sandwich): they say how far another set of such records would move the estimate, and
-    nothing about what the model leaves out. With few records they are rough, and nan for a single one per amplitude.
+    nothing about what the model leaves out. With few records they are rough, as is ``unseen_error_rms``, and nan for a
+    single one per amplitude.
     ``names`` are those of all numbers as in a mirror file, the delay last, and ``moved`` (records, numbers) a root of
     their covariance in SI units, moved.T @ moved, None for a single record per amplitude.
     """
@@ -101,6 +103,7 @@ class HystereticStiffnessFit:
     poles_rad_s: np.ndarray
     poles_error_rad_s: np.ndarray
     error_rms: Floats
+    unseen_error_rms: Floats
     start_error_rms: Floats
     amplitudes: tuple[float, ...]
     classes: tuple[int, ...]
@@ -243,10 +246,8 @@ def fit_hysteretic_stiffness(
     )
     fixed = options.delay_s is not None
     springs, free = springs_of.begin(linear, largest, middle, options.springs, options.thresholds, fixed_delay=fixed)
-    squares, group = np.array([np.mean(r.output**2) for r in steady]), np.asarray(classes)
-    outputs = np.sqrt([np.mean(squares[group == c]) for c in range(len(amplitudes))])
-    levels = _levels(groups, outputs, units[1], skip_periods)[group]
-    weights = 1.0 / (levels**2 * np.array([r.output.size for r in steady]) * len(steady))
+    expected = _expected_squares(records, classes, skip_periods) / units[1] ** 2
+    weights = 1.0 / (expected * np.array([r.output.size for r in steady]) * len(steady))
     few = _few(steady, classes)
     told = _Told(on_progress or no_progress, options.few_first + iterations, options.tolerance)
     with ThreadPoolExecutor(min(len(steady), os.cpu_count() or 1)) as pool:
@@ -259,7 +260,7 @@ def fit_hysteretic_stiffness(
         told.begin(options.few_first, search.cost(free))
         free = search.minimise(free, iterations, _REFRESH, told)
         limited = springs.softening(springs.numbers(free)) > _AT_LIMIT * springs_of.MOST_SOFTENING
-        moved = _moved(search, free, classes)
+        unseen, moved = _other_records(search, free, classes)
         after, motion = _judged(search, free)
     numbers = springs.numbers(free)
     delay_error_s = math.nan if moved is None else float(np.linalg.norm(moved[:, -1]))
@@ -276,6 +277,7 @@ def fit_hysteretic_stiffness(
         poles_rad_s=numbers.poles_at_rest,
         poles_error_rad_s=_pole_errors(numbers, moved),
         error_rms=units[1] * after,
+        unseen_error_rms=units[1] * unseen,
         start_error_rms=units[1] * before,
         amplitudes=amplitudes,
         classes=classes,
@@ -340,27 +342,42 @@ def _judged(search: Search, free: Floats) -> tuple[Floats, Floats]:
     return np.array(errors), np.max(motions, axis=0)
 
 
-def _moved(search: Search, free: Floats, classes: Sequence[int]) -> Floats | None:
-    """Root of the cluster-robust covariance, shape (records, numbers); None with a single record in an amplitude.
+def _other_records(search: Search, free: Floats, classes: Sequence[int]) -> tuple[Floats, Floats | None]:
+    """What other records would have given: expected rms error of each record unseen, and a root of the covariance.
 
+    Without a record the numbers would be a Newton step away (infinitesimal jackknife; R. Giordano et al., Proceedings
+    of AISTATS 2019), where its error is continued to second order. The root of the cluster-robust covariance, shape
+    (records, numbers), is made of the same pulls. With a single record in an amplitude there is neither: nan and None.
     Numbers at their limits are counted as known (weights at 0), and the softening as free.
     """
+    count = len(search.records)
     if int(np.bincount(np.asarray(classes)).min()) < 2:
-        return None
-    springs, numbers = search.springs, search.springs.numbers(free)
-    plant, T = tangents.play_plant(numbers, search.records[0].step_s), search.springs.matrix[:, springs.inside(free)]
+        return np.full(count, math.nan), None
+    springs, numbers, weights = search.springs, search.springs.numbers(free), search.weights
+    plant, T = tangents.play_plant(numbers, search.records[0].step_s), springs.matrix[:, springs.inside(free)]
 
-    def equations(record: Steady) -> tuple[Floats, Floats]:
+    def equations(record: Steady) -> tuple[float, Floats, Floats]:
         normal = tangents.normal_equations(plant, numbers, record, search.wanted)
-        return T.T @ normal.matrix @ T, T.T @ normal.gradient
+        return normal.cost, T.T @ normal.matrix @ T, T.T @ normal.gradient
 
-    parts = list(search.pool.map(equations, search.records))
-    matrix = sum((w * part[0] for w, part in zip(search.weights, parts, strict=True)), np.zeros(()))
-    pulls = np.array([w * part[1] for w, part in zip(search.weights, parts, strict=True)])
+    costs, matrices, slopes = zip(*search.pool.map(equations, search.records), strict=True)
+    matrix = sum((w * part for w, part in zip(weights, matrices, strict=True)), np.zeros(()))
     size = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-    inverse = np.linalg.pinv(matrix / np.outer(size, size), rcond=1e-6, hermitian=True) / np.outer(size, size)
-    count = len(parts)
-    return np.asarray((pulls - pulls.mean(axis=0)) @ inverse @ T.T * math.sqrt(count / (count - 1)))
+    pulls = np.array([w * slope for w, slope in zip(weights, slopes, strict=True)])
+
+    def inverse(part: Floats) -> Floats:
+        """Over what its records tell apart; zero over the rest."""
+        return np.asarray(
+            np.linalg.pinv(part / np.outer(size, size), rcond=1e-6, hermitian=True) / np.outer(size, size)
+        )
+
+    def unseen(k: int) -> float:
+        step = inverse(matrix - weights[k] * matrices[k]) @ pulls[k]
+        cost = costs[k] + 2.0 * slopes[k] @ step + step @ matrices[k] @ step
+        return math.sqrt(cost / search.records[k].output.size)
+
+    expected = np.array(list(search.pool.map(unseen, range(count))))
+    return expected, np.asarray((pulls - pulls.mean(axis=0)) @ inverse(matrix) @ T.T * math.sqrt(count / (count - 1)))
 
 
 def _pole_errors(numbers: Numbers, moved: Floats | None) -> np.ndarray:
@@ -448,22 +465,38 @@ def _unit(records: Sequence[Recording], channel: str) -> float:
     return float(np.sqrt(np.mean([np.mean(np.var(getattr(r, channel), axis=0)) for r in records])))
 
 
+def _periods(record: Recording, values: Floats, skip_periods: int) -> Floats:
+    """Whole periods of a channel group behind those skipped, shape (periods, samples, channels)."""
+    period = record.period_samples or record.samples
+    used = values[skip_periods * period : record.samples // period * period]
+    return np.asarray(used.reshape(-1, period, values.shape[1]))
+
+
 def _steady(record: Recording, units: tuple[float, float], sub_steps: int, skip_periods: int) -> Steady:
     """Mean of the record's whole periods behind those skipped, in the search's units."""
-    period = record.period_samples or record.samples
-    used = slice(skip_periods * period, record.samples // period * period)
-
-    def mean(values: Floats) -> Floats:
-        return np.asarray(values[used].reshape(-1, period, values.shape[1]).mean(axis=0))
-
-    output = mean(record.output)
+    drive, output = (_periods(record, v, skip_periods).mean(axis=0) for v in (record.drive, record.output))
     output = (output - output.mean(axis=0)) / units[1]
-    return Steady(record.path, mean(record.drive) / units[0], output, record.rate_hz, sub_steps)
+    return Steady(record.path, drive / units[0], output, record.rate_hz, sub_steps)
 
 
-def _levels(groups: Sequence[Sequence[Recording]], outputs: Floats, output_unit: float, skip_periods: int) -> Floats:
-    """Rms of each class in the search's units: what its best linear approximation leaves, or else its output."""
-    if any(len(group) <= group[0].drive.shape[1] for group in groups):
-        return outputs
-    left = [response_from_periods(group, skip_periods=skip_periods).residual_power for group in groups]
-    return np.array([math.sqrt(float(power.sum(axis=0).mean())) / output_unit for power in left])
+def _expected_squares(records: Sequence[Recording], classes: Sequence[int], skip_periods: int) -> Floats:
+    """Mean-square error to be expected in each record: what no linear model of its amplitude follows, and its noise.
+
+    The former is what the best linear approximation of its class leaves, less its noise. Where a class has too few
+    records for one, the mean square of each class's output stands for both.
+    """
+    group, kinds = np.asarray(classes), range(max(classes) + 1)
+    own = [[r for r, c in zip(records, classes, strict=True) if c == kind] for kind in kinds]
+    if any(len(each) <= each[0].drive.shape[1] for each in own):
+        squares = np.array([np.mean(np.var(r.output, axis=0)) for r in records])
+        return np.asarray(np.array([np.mean(squares[group == kind]) for kind in kinds])[group])
+    left = [response_from_periods(each, skip_periods=skip_periods).residual_power.sum(axis=0).mean() for each in own]
+    noise = np.array([_noise_square(r, skip_periods) for r in records])
+    distortion = [float(left[kind]) - noise[group == kind].mean() for kind in kinds]
+    return np.asarray(np.maximum(distortion, 0.0)[group] + noise)
+
+
+def _noise_square(record: Recording, skip_periods: int) -> float:
+    """Mean square over outputs of the noise that the mean of a record's periods has; 0 for a single period."""
+    periods = _periods(record, record.output, skip_periods)
+    return float(np.var(periods, axis=0, ddof=1).mean()) / len(periods) if len(periods) > 1 else 0.0

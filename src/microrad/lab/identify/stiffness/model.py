@@ -18,6 +18,8 @@ from microrad.lab.identify.linear.response import FrequencyResponse
 from microrad.mirror.hysteresis import Play
 from microrad.mirror.model import Mirror
 
+_DELAY_ORDER = 20  # most states of the models that a delay is found with
+
 FIELDS = ("decay", "frequency", "B", "E", "F", "G", "weights", "polynomial", "C", "D", "K")
 
 
@@ -172,10 +174,11 @@ def best_delay(response: FrequencyResponse, order: int, sub_steps: int) -> float
 
     Args:
         response: The measured response.
-        order: Number of states of the models.
+        order: Number of states of the model behind the delay, which is found with 20 at most.
         sub_steps: Steps of the plant in each sample.
     """
     tried = np.arange(0.0, 2.01, 0.25) / response.rate_hz
+    order = min(order, _DELAY_ORDER)
     costs = [fit_order(without_delay(response, d, sub_steps), order, exchanges=0, fine=False).cost for d in tried]
     return float(tried[int(np.argmin(costs))])
 

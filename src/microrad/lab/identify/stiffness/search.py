@@ -25,6 +25,7 @@ from microrad.lab.identify.stiffness.tangents import Steady
 _DAMPING, _LEAST_DAMPING = 1e-2, 1e-5  # the matrix is summed in single precision
 _MEMORY = 30
 _PER_NUMBER = 40  # samples for each number, of which the curvature is taken
+_ENDS = (0.5, 1.0)  # where in the period they end, in equal parts: small enough to keep all processors busy
 _TRIALS, _HALVINGS = 2, 12  # trials of a step that are simulated, and in all
 _REFUSED = 4  # steps in a row that lead nowhere: the end
 _FLOOR = 0.03  # least curvature of a number, in the mean of its kind: one that hardly acts yet is not to run away
@@ -88,11 +89,14 @@ class Search:
         numbers = self.springs.numbers(free)
         plant = tangents.play_plant(numbers, self.records[0].step_s)
         own, samples = self.weights[self.few], sum(self.records[k].output.size for k in self.few)
-        part = min(_PER_NUMBER * free.size / samples, 1.0)
+        part = min(_PER_NUMBER * free.size / samples, 1.0) / len(_ENDS)
         parts = self.pool.map(
-            lambda k: tangents.curvature(plant, numbers, self.records[k], part, self.wanted), self.few
+            lambda at: tangents.curvature(plant, numbers, self.records[at[0]], at[1], part, self.wanted),
+            [(k, end) for k in self.few for end in _ENDS],
         )
-        matrix = sum((w * part for w, part in zip(own, parts, strict=True)), np.zeros(()))
+        matrix = sum(
+            (w * part for w, part in zip(np.repeat(own / len(_ENDS), len(_ENDS)), parts, strict=True)), np.zeros(())
+        )
         T = self.springs.matrix
         return np.asarray(2.0 * self.weights.sum() / own.sum() * (T.T @ matrix @ T))
 

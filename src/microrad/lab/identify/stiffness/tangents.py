@@ -165,23 +165,27 @@ def normal_equations(
     return Normal(float(np.sum(error**2)), (J.T @ J).astype(float), (J.T @ flat).astype(float))
 
 
-def curvature(plant: kernels.PlayPlant, numbers: Numbers, record: Steady, part: float, wanted: np.ndarray) -> Floats:
-    """J'J as in `normal_equations`, near enough for a search and sooner: from the end of the period, scaled to all.
+def curvature(
+    plant: kernels.PlayPlant, numbers: Numbers, record: Steady, end: float, part: float, wanted: np.ndarray
+) -> Floats:
+    """J'J as in `normal_equations`, near enough for a search and sooner: from a part of the period, scaled to all.
 
     Args:
         plant: The discrete plant of the model.
         numbers: The model's numbers.
         record: The record, one period of its steady state.
+        end: Where the part ends, as a part of the period.
         part: Part of the period that counts; the tangents begin as long before it.
         wanted: Which numbers are; the others' rows and columns are zero.
     """
-    drive = two_periods(record, numbers.delay_s)
-    rows = max(round(part * len(record.output)), 1)
+    samples = len(record.output)
+    rows = max(round(part * samples), 1)
+    drive = two_periods(record, numbers.delay_s)[: (samples + max(round(end * samples), rows)) * record.sub_steps]
     path = simulate_path(plant, drive)
     J = jacobian(plant, numbers, record, (path, drive), np.float32, lead=rows, rows=rows, wanted=wanted)
     J -= J.mean(axis=0)
     J = J.reshape(-1, J.shape[2])
-    return np.asarray((J.T @ J).astype(float) * (len(record.output) / rows))
+    return np.asarray((J.T @ J).astype(float) * (samples / rows))
 
 
 def jacobian(
@@ -201,11 +205,11 @@ def jacobian(
         plant: The discrete plant of the model.
         numbers: The model's numbers.
         record: The record, one period of its steady state.
-        way: Path and drive over two periods, as `steady_error` gives them.
+        way: Path and drive over two periods, as `steady_error` gives them, or over what comes before an end.
         kind: Type of floating-point number of the result.
         lead: Samples before the first row at which the tangents begin, as far as there are any; by default seven time
             constants of the slowest mode.
-        rows: Last samples of the period that are given; by default all.
+        rows: Last samples before the end that are given; by default as many as the period has.
         wanted: Which numbers are, by their place in `Numbers.vector`; by default all. The others' columns are zero.
     """
     path, drive = way
@@ -219,7 +223,8 @@ def jacobian(
     J: Floats = np.zeros((rows, record.output.shape[1], wanted.size), dtype=kind)
     _state_columns(J, (plant, numbers, record.step_s), (part, drive[cut]), (lead + 1, record.sub_steps), wanted)
     _output_columns(J, numbers, (path, drive), (first, record.sub_steps))
-    later = simulate_path(plant, two_periods(record, numbers.delay_s + _LATER * record.step_s)).output
+    later = two_periods(record, numbers.delay_s + _LATER * record.step_s)[: len(drive)]
+    later = simulate_path(plant, later).output
     J[:, :, -1] = (later - path.output)[first :: record.sub_steps] / (_LATER * record.step_s)
     J[:, :, ~wanted] = 0.0
     return J
