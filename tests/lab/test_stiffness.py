@@ -142,10 +142,9 @@ def test_the_curvature_of_a_search_is_near_that_of_all_samples(numbers):
     whole = tangents.normal_equations(plant, numbers, STEADY).matrix
     halves = [tangents.curvature(plant, numbers, STEADY, end, 0.5, wanted) for end in (0.5, 1.0)]
     for rough in halves:
-        assert not rough[~wanted].any() and not rough[:, ~wanted].any()
-        ratio = np.diag(rough)[wanted] / np.diag(whole)[wanted]
+        ratio = np.diag(rough) / np.diag(whole)[wanted]
         assert 0.3 < ratio.min() < 1.0 < ratio.max() < 3.0
-    both = np.diag(sum(halves) / 2)[wanted] / np.diag(whole)[wanted]
+    both = np.diag(sum(halves) / 2) / np.diag(whole)[wanted]
     assert not np.allclose(*halves) and 0.7 < both.min() < both.max() < 1.5
 
 

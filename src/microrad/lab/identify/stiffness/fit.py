@@ -32,7 +32,7 @@ from microrad.mirror.model import Mirror, contraction
 
 THRESHOLDS = (0.02, 0.06, 0.15, 0.4)
 
-_REFRESH = 10  # steps on all records until the curvature is taken anew
+_REFRESH = 5  # steps on all records until the curvature is taken anew
 _SMALL = 1e-3  # of a standard error: the poles follow in proportion
 _AT_LIMIT = 0.99  # of the largest softening: a search that ends there has not converged
 _WINDOW = 8  # steps over which a search is judged
@@ -355,10 +355,11 @@ def _other_records(search: Search, free: Floats, classes: Sequence[int]) -> tupl
         return np.full(count, math.nan), None
     springs, numbers, weights = search.springs, search.springs.numbers(free), search.weights
     plant, T = tangents.play_plant(numbers, search.records[0].step_s), springs.matrix[:, springs.inside(free)]
+    wanted = T[search.wanted]
 
     def equations(record: Steady) -> tuple[float, Floats, Floats]:
         normal = tangents.normal_equations(plant, numbers, record, search.wanted)
-        return normal.cost, T.T @ normal.matrix @ T, T.T @ normal.gradient
+        return normal.cost, wanted.T @ normal.matrix @ wanted, wanted.T @ normal.gradient
 
     costs, matrices, slopes = zip(*search.pool.map(equations, search.records), strict=True)
     matrix = sum((w * part for w, part in zip(weights, matrices, strict=True)), np.zeros(()))

@@ -3,7 +3,8 @@
 The gradient of all records comes from one pass back along each path (`gradient`). The curvature is that of a few of
 them (Gauss-Newton, `tangents.curvature`), taken anew every few steps and corrected in between by the gradients
 (limited-memory BFGS; J. Nocedal and S. Wright, Numerical Optimization, 2nd ed., 2006, algorithm 7.4). Numbers
-are kept within their limits by projection.
+are kept within their limits: those that a step would take beyond stop there, and the step of the others is worked out
+anew for that.
 """
 
 import math
@@ -27,7 +28,9 @@ _MEMORY = 30
 _PER_NUMBER = 40  # samples for each number, of which the curvature is taken
 _ENDS = (0.5, 1.0)  # where in the period they end, in equal parts: small enough to keep all processors busy
 _TRIALS, _HALVINGS = 2, 12  # trials of a step that are simulated, and in all
-_REFUSED = 4  # steps in a row that lead nowhere: the end
+_REFUSED = 8  # steps in a row that lead nowhere: the end
+_REFUSAL, _SUCCESS = 3.0, 2.0  # what a step that leads nowhere raises the damping by, and what others change it by
+_BOUNDED = 6  # most times that a step is worked out anew for the numbers that it takes to their limits
 _FLOOR = 0.03  # least curvature of a number, in the mean of its kind: one that hardly acts yet is not to run away
 
 
@@ -97,7 +100,7 @@ class Search:
         matrix = sum(
             (w * part for w, part in zip(np.repeat(own / len(_ENDS), len(_ENDS)), parts, strict=True)), np.zeros(())
         )
-        T = self.springs.matrix
+        T = self.springs.matrix[self.wanted]
         return np.asarray(2.0 * self.weights.sum() / own.sum() * (T.T @ matrix @ T))
 
     def size(self, curvature: Floats) -> Floats:
@@ -129,23 +132,45 @@ class Search:
                 size = self.size(matrix)
                 matrix = matrix / np.outer(size, size)
                 pairs.clear()
-            loose = self.springs.loose(free, slope)
-            move = np.zeros_like(free)
-            factor, damping = _factor(matrix[np.ix_(loose, loose)], damping)
-            move[loose] = -_newton(factor, pairs, slope, size, loose)
+            move, damping = self._bounded_step(free, slope, (matrix, size, pairs), damping)
             step = self._along(free, move, cost, slope)
             if step is None:
-                damping, since, refused = 8.0 * damping, refresh, refused + 1
+                damping, since, refused = _REFUSAL * damping, refresh if since else 0, refused + 1
                 if refused > _REFUSED:
                     break
                 continue
-            damping = 3.0 * damping if step.refusals else max(damping / 2.5, _LEAST_DAMPING)
+            damping = _SUCCESS * damping if step.refusals else max(damping / _SUCCESS, _LEAST_DAMPING)
             refused, since, done = 0, since + 1, done + 1
             pairs = [*pairs, (step.free - free, step.slope - slope)][-_MEMORY:]
             free, cost, slope = step.free, step.cost, step.slope
             if on_step(done, free, cost):
                 break
         return free
+
+    def _bounded_step(
+        self, free: Floats, slope: Floats, curvature: tuple[Floats, Floats, list[tuple[Floats, Floats]]], damping: float
+    ) -> tuple[Floats, float]:
+        """The step to the least cost within the limits, as far as the curvature knows, and the damping it took.
+
+        Args:
+            free: The numbers to begin with.
+            slope: Derivative of the cost by each of them.
+            curvature: The matrix in units of each number's size, the sizes, and what the last steps add to it.
+            damping: The least damping.
+        """
+        matrix, size, pairs = curvature
+        loose, move = self.springs.loose(free, slope), np.zeros_like(free)
+        for _ in range(_BOUNDED):
+            pull = slope + size * (matrix @ (size * np.where(loose, 0.0, move)))
+            factor, damping = _factor(matrix[np.ix_(loose, loose)], damping)
+            move[loose] = -_newton(factor, pairs, pull, size, loose)
+            allowed = self.springs.within(free + move)
+            beyond = loose & (allowed != free + move)
+            if not beyond.any():
+                break
+            move[beyond] = allowed[beyond] - free[beyond]
+            loose &= ~beyond
+        return move, damping
 
     def _along(self, free: Floats, move: Floats, cost: float, slope: Floats) -> "_Step | None":
         """Where a step leads that lowers the cost; None where none does. The whole step is tried with its slope."""

@@ -16,7 +16,7 @@ from microrad.lab.identify.linear.modal import hold_step
 from microrad.lab.identify.stiffness.model import Numbers
 from microrad.mirror import model as mirror
 
-_CHUNK = 256
+_CHUNK = 192
 _STATE, _DRIVE, _BANK = range(3)  # where a parameter enters: the order of a chunk's columns
 _LATER = 1e-5
 _SETTLED = 7.0  # time constants of the slowest mode before tangents count
@@ -155,7 +155,7 @@ def normal_equations(
         plant: The discrete plant of the model.
         numbers: The model's numbers, about which the equations are made linear.
         record: The record, one period of its steady state.
-        wanted: Which numbers are, by default all; the others' rows and columns are zero.
+        wanted: Which numbers are, by default all; the others have neither row nor column.
     """
     error, path, drive = steady_error(plant, record, numbers.delay_s)
     J = jacobian(plant, numbers, record, (path, drive), np.float32, wanted=wanted)
@@ -176,7 +176,7 @@ def curvature(
         record: The record, one period of its steady state.
         end: Where the part ends, as a part of the period.
         part: Part of the period that counts; the tangents begin as long before it.
-        wanted: Which numbers are; the others' rows and columns are zero.
+        wanted: Which numbers are; the others have neither row nor column.
     """
     samples = len(record.output)
     rows = max(round(part * samples), 1)
@@ -210,7 +210,7 @@ def jacobian(
         lead: Samples before the first row at which the tangents begin, as far as there are any; by default seven time
             constants of the slowest mode.
         rows: Last samples before the end that are given; by default as many as the period has.
-        wanted: Which numbers are, by their place in `Numbers.vector`; by default all. The others' columns are zero.
+        wanted: Which numbers are, by their place in `Numbers.vector`, by default all; the others have no column.
     """
     path, drive = way
     wanted = np.ones(numbers.vector().size, dtype=bool) if wanted is None else wanted
@@ -220,13 +220,13 @@ def jacobian(
     lead = min(lead * record.sub_steps, first - 1)
     cut = slice(first - lead - 1, None)  # one step more: what enters needs the step before
     part = kernels.Path(**{name: values[cut] for name, values in path._asdict().items()})
-    J: Floats = np.zeros((rows, record.output.shape[1], wanted.size), dtype=kind)
+    J: Floats = np.zeros((rows, record.output.shape[1], np.count_nonzero(wanted)), dtype=kind)
     _state_columns(J, (plant, numbers, record.step_s), (part, drive[cut]), (lead + 1, record.sub_steps), wanted)
-    _output_columns(J, numbers, (path, drive), (first, record.sub_steps))
-    later = two_periods(record, numbers.delay_s + _LATER * record.step_s)[: len(drive)]
-    later = simulate_path(plant, later).output
-    J[:, :, -1] = (later - path.output)[first :: record.sub_steps] / (_LATER * record.step_s)
-    J[:, :, ~wanted] = 0.0
+    _output_columns(J, numbers, (path, drive), (first, record.sub_steps), wanted)
+    if wanted[-1]:
+        later = two_periods(record, numbers.delay_s + _LATER * record.step_s)[: len(drive)]
+        later = simulate_path(plant, later).output
+        J[:, :, -1] = (later - path.output)[first :: record.sub_steps] / (_LATER * record.step_s)
     return J
 
 
@@ -240,18 +240,17 @@ def _state_columns(
     """Columns of what acts through the state, the drives of the operators or their weights."""
     (path, drive), (plant, numbers, step_s) = way, model
     places = _places(numbers)
-    columns = np.flatnonzero(wanted[: places.shape[1]])
-    places = places[:, columns]
+    places = places[:, wanted[: places.shape[1]]]
     before, after = _sources(numbers, path, drive, step_s, J.dtype)
     signal = np.hstack([path.x[:, : numbers.B.shape[0]], drive]).astype(J.dtype)
     plays = np.hstack([path.play, powers(path.q, numbers.reach).reshape(len(drive), -1)]).astype(J.dtype)
     slopes = bend(plant, path).astype(J.dtype)
-    for begin in range(0, columns.size, _CHUNK):
-        chunk = slice(begin, begin + _CHUNK)
+    for begin in range(0, places.shape[1], _CHUNK):
+        chunk = slice(begin, min(begin + _CHUNK, places.shape[1]))
         tangents = _tangents(plant, places[:, chunk], (before, after, signal, plays, slopes), J.dtype)
         part = np.empty((*J.shape[:2], tangents.row.size), dtype=J.dtype)
         kernels.tangent_kernel(tangents, path.moved, 1, rows[0], rows[1], part)
-        J[:, :, columns[chunk]] = part
+        J[:, :, chunk] = part
 
 
 def _tangents(
@@ -265,9 +264,17 @@ def _tangents(
         return np.zeros((rows, count), dtype=kind)
 
     before, after, signal, plays, slopes = signals
-
+    pairs = plant.E1.reshape(-1, 2, operators)[:, ::-1].reshape(states, operators)
+    kept = plant.diagonal[:, None] * plant.E1 + plant.coupling[:, None] * pairs
+    live = np.asarray(plant.F.any(axis=1))
+    live[row[ends[0] :]] = True
     return kernels.Tangents(
         plant=kernels.PlayPlant(*(v.astype(kind) if v.dtype == np.float64 else v for v in plant)),
+        held=(kept + plant.E_held - plant.E1).astype(kind),
+        strain=(plant.F @ plant.E1).astype(kind),
+        through=(plant.C @ plant.E1 + plant.K).astype(kind),
+        live=np.flatnonzero(live),
+        seen=np.flatnonzero(plant.F.any(axis=0)),
         places=ends,
         row=row,
         source=source,
@@ -281,7 +288,6 @@ def _tangents(
         q=zeros(operators),
         q_before=zeros(operators),
         z=zeros(operators),
-        change=zeros(operators),
         play=zeros(plant.play_threshold.size),
         still=zeros(operators),
         slope=np.zeros(operators, dtype=kind),
@@ -337,14 +343,18 @@ def _sources(
     return before.view(kind).reshape(steps, width, 2), after.view(kind).reshape(steps, width, 2)
 
 
-def _output_columns(J: Floats, numbers: Numbers, way: tuple[kernels.Path, Floats], rows: tuple[int, int]) -> None:
+def _output_columns(
+    J: Floats, numbers: Numbers, way: tuple[kernels.Path, Floats], rows: tuple[int, int], wanted: np.ndarray
+) -> None:
     """Columns of C, D and K: what they multiply, for each output alone."""
     path, drive = way
     used = slice(rows[0], None, rows[1])
     state = path.state[used, : numbers.B.shape[0]]
-    column = J.shape[2] - 1 - numbers.C.size - numbers.D.size - numbers.K.size
-    J[:, :, column:-1] = 0.0
+    first = wanted.size - 1 - numbers.C.size - numbers.D.size - numbers.K.size
+    column = np.count_nonzero(wanted[:first])
     for factor in (state, drive[used], path.z[used]):
         for o in range(J.shape[1]):
-            J[:, o, column : column + factor.shape[1]] = factor
-            column += factor.shape[1]
+            own = wanted[first : first + factor.shape[1]]
+            count = np.count_nonzero(own)
+            J[:, o, column : column + count] = factor[:, own]
+            first, column = first + factor.shape[1], column + count
