@@ -22,6 +22,7 @@ from microrad.lab.identify.stiffness.fit import (
 )
 from microrad.lab.identify.stiffness.gradient import squared_error_slope
 from microrad.lab.identify.stiffness.model import LinearStart, Numbers, scaled
+from microrad.lab.identify.stiffness.search import Search
 from microrad.lab.recording import Recording, multisine_recordings
 from microrad.mirror import model as mirror
 from microrad.mirror.hysteresis import Play
@@ -481,6 +482,24 @@ def free_energies(numbers, count, state):
         rate = (m.A @ x)[1 : 2 * pairs : 2]
         found.append(np.sum(rate**2 / w + k * x[1 : 2 * pairs : 2] ** 2) / 2 - stored)
     return np.array(found)
+
+
+def test_a_step_that_meets_a_limit_is_the_best_within_it():
+    """Of two numbers that nearly do the same the first cannot fall far: the second is not to make up for its whole way.
+
+    Least of g d + d H d / 2 with d at least (-0.1, -inf), damped by 1e-9: d = (-0.1, 1 + 0.9 * 0.1).
+    """
+    least, most = np.array([0.0, -np.inf]), np.full(2, np.inf)
+    two = springs_of.Springs(None, 0, np.eye(2), np.zeros(2), np.array(["weights", "phi"]), least, most)
+    search = Search(two, [], np.ones(0), [], None)
+    free, slope, size = np.array([0.1, 5.0]), np.array([1.0, -1.0]), np.ones(2)
+    curvature = np.array([[1.0, 0.9], [0.9, 1.0]])
+    move, damping = search._bounded_step(free, slope, (curvature, size, []), 1e-9)
+    assert move == pytest.approx([-0.1, 1.09], rel=1e-6) and damping == 1e-9
+    scaled_by = np.array([10.0, 0.5])
+    curvature = curvature / np.outer(scaled_by, scaled_by)
+    other, _ = search._bounded_step(free, slope, (curvature, scaled_by, []), 1e-9)
+    assert other == pytest.approx([-0.1, 1.09], rel=1e-6)
 
 
 def test_few_records_first_lead_nearly_as_far(training):
