@@ -146,7 +146,7 @@ class Trust(NamedTuple):
 def trust(fit: HystereticStiffnessFit, drive: Floats) -> Trust:
     """How far a fit is to be trusted under a drive: beyond the records its error is this or more.
 
-    On the CubeSpec mirror at 1.6 times the motion that was recorded, 4.4 times as much was left.
+    On the CubeSpec mirror at 1.8 times the motion that was recorded, 4.2 times as much was left.
 
     Args:
         fit: The fit.
