@@ -71,7 +71,7 @@ def expected_um(fit: HystereticStiffnessFit) -> np.ndarray:
 def fold(groups: Groups, held: int, options: dict[str, str]) -> np.ndarray:
     seen = [AMPLITUDES_MV.index(int(a)) for a in options["seen"].split(",")]
     train = [without(groups, held)[k] for k in seen]
-    best, least = None, np.inf
+    best, scored, least = None, np.full(len(groups), np.nan), np.inf
     candidates = product(*(options[key].split(",") for key in ("order", "springs", "thresholds")))
     for order, springs, thresholds in candidates:
         chosen = StiffnessOptions(springs=int(springs), thresholds=tuple(float(r) for r in thresholds.split(":")))
@@ -83,11 +83,10 @@ def fold(groups: Groups, held: int, options: dict[str, str]) -> np.ndarray:
         expected[seen] = expected_um(fit)
         told = f"{fit.parameters - fit.redundant} numbers, {steps}; {seconds:.0f} s, of processors {of_processor:.0f} s"
         row(f"  {order}, {springs}, {thresholds}: expected", expected, told)
-        row("    held out", scores(fit, groups, held))
+        row("    held out", held_out := scores(fit, groups, held))
         if (mean := float(np.log(expected[seen]).mean())) < least:
-            best, least = fit, mean
+            best, scored, least = fit, held_out, mean
     assert best is not None
-    scored = scores(best, groups, held)
     row(f"fold {held}, held out", scored, f"{best.parameters - best.redundant} numbers, {best.order} states")
     pooled = [rms_um(predicted_error(best, group[held], SETTLED)) for group in groups]
     row(f"fold {held}, pooled", np.array(pooled))

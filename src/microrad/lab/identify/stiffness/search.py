@@ -10,6 +10,7 @@ anew for that.
 import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -93,13 +94,13 @@ class Search:
         plant = tangents.play_plant(numbers, self.records[0].step_s)
         own, samples = self.weights[self.few], sum(self.records[k].output.size for k in self.few)
         part = min(_PER_NUMBER * free.size / samples, 1.0) / len(_ENDS)
-        parts = self.pool.map(
-            lambda at: tangents.curvature(plant, numbers, self.records[at[0]], at[1], part, self.wanted),
-            [(k, end) for k in self.few for end in _ENDS],
-        )
-        matrix = sum(
-            (w * part for w, part in zip(np.repeat(own / len(_ENDS), len(_ENDS)), parts, strict=True)), np.zeros(())
-        )
+
+        def weighed(at: tuple[int, float]) -> Floats:
+            k, end = at
+            found = tangents.curvature(plant, numbers, self.records[k], end, part, self.wanted)
+            return np.asarray(self.weights[k] / len(_ENDS) * found)
+
+        matrix = sum(self.pool.map(weighed, product(self.few, _ENDS)), np.zeros(()))
         T = self.springs.matrix[self.wanted]
         return np.asarray(2.0 * self.weights.sum() / own.sum() * (T.T @ matrix @ T))
 
