@@ -194,6 +194,17 @@ def slow_gain(model: BoucWen | Play) -> float:
     return model.d1_rad_v if isinstance(model, BoucWen) else math.fsum(model.weights_rad_v)
 
 
+def rest_gain(model: BoucWen | Play) -> float:
+    """Gain for motions about rest that are too small to move a play with a threshold (rad/V): d1 + epsilon for Eq. 3.
+
+    Behind larger motions the gain lies between this one and the slow one, `slow_gain`.
+    """
+    if isinstance(model, BoucWen):
+        return model.d1_rad_v + model.epsilon_rad_v
+    pairs = zip(model.thresholds_v, model.weights_rad_v, strict=True)
+    return math.fsum(weight for threshold, weight in pairs if threshold == 0.0)
+
+
 def output_amplitude(model: BoucWen | Play, drive_v: float) -> float:
     """Amplitude of the settled output (rad) under a slow sine of the drive, Bouc-Wen's h and a polynomial left out.
 

@@ -6,6 +6,7 @@ Drive u in volts at the amplifier's input, output y in radians. All are deviatio
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -52,9 +53,20 @@ class Mirror:
     @property
     def linear_loop(self) -> lti.StateSpace:
         """The mirror with each element replaced by its slow gain, for margins (Bouc-Wen: d1, plays: sum of weights)."""
-        bank: tuple[BoucWen | Play, ...] = (*self.bouc_wen, *self.plays)
-        slopes = np.array([slow_gain(model) for model in bank])
-        through = slopes[:, None]
+        return self.linear([slow_gain(model) for model in self.bank])
+
+    @property
+    def bank(self) -> tuple[BoucWen | Play, ...]:
+        """The hysteresis elements in the order of the rows of F."""
+        return (*self.bouc_wen, *self.plays)
+
+    def linear(self, gains: Sequence[float]) -> lti.StateSpace:
+        """The mirror with a gain in place of each element.
+
+        Args:
+            gains: One for each element of the bank.
+        """
+        through = np.array(gains, dtype=float)[:, None]
         return lti.StateSpace(
             self.A + self.E @ (through * self.F),
             self.B + self.E @ (through * self.G),
@@ -205,6 +217,19 @@ def combine(*mirrors: Mirror) -> Mirror:
     return Mirror(name=" + ".join(m.name for m in mirrors), **parts)
 
 
+def linearised(mirror: Mirror, gains: Sequence[float]) -> Mirror:
+    """The mirror with a gain in place of each element, which its linear part takes in: no bank is left.
+
+    Args:
+        mirror: The mirror.
+        gains: One for each element of its bank.
+    """
+    s, (outputs, inputs) = mirror.linear(gains), mirror.D.shape
+    none = {"E": (s.order, 0), "F": (0, s.order), "G": (0, inputs), "K": (outputs, 0)}
+    parts: dict[str, Any] = {key: np.zeros(shape) for key, shape in none.items()}
+    return replace(mirror, A=s.A, B=s.B, C=s.C, D=s.D, bouc_wen=(), plays=(), **parts)
+
+
 def discretise(mirror: Mirror, step_s: float, *, often: bool = False) -> kernels.Plant:
     """The mirror for a fixed step, with u and z linear over it.
 
@@ -315,8 +340,7 @@ def contraction(mirror: Mirror, step_s: float) -> float:
     if not np.any(fed):
         return 0.0
     end = lti.first_order_hold(mirror.A, mirror.E, step_s)[2]
-    bank: tuple[BoucWen | Play, ...] = (*mirror.bouc_wen, *mirror.plays)
-    steepest = [steepest_slope(model) for model, is_fed in zip(bank, fed, strict=True) if is_fed]
+    steepest = [steepest_slope(model) for model, is_fed in zip(mirror.bank, fed, strict=True) if is_fed]
     returning = (mirror.F @ end)[np.ix_(fed, fed)]  # what is not fed cannot return
     return float(np.linalg.norm(returning * np.array(steepest)[None, :], np.inf))
 

@@ -209,14 +209,31 @@ def outlook(
         designs: The designs, in the order that is wanted.
         on_progress: Called with the parts of the work that are done, their number and what is done.
     """
-    whole, runs = span(scene.table), min(scene.table.runs, kernel_arrays.LANES)
-    few = replace(whole, duration_s=min(whole.duration_s, whole.settle_s + FEW_SAMPLES * scene.loop.timing.period_s))
-    cases = [_case(scene.loop, d.controller) for d in designs]
-    found = ensemble.simulate_cases(cases, few, runs, _telling(on_progress, "simulating controllers"))
+    found = shortened(scene.table, scene.loop, [d.controller for d in designs], on_progress)
     return tuple(
         Outlook(d.tuned.residual_rms_rad, each.radial_rms_rad / math.sqrt(scene.loop.axes))
         for d, each in zip(designs, found, strict=True)
     )
+
+
+def shortened(
+    f: FinePointing,
+    loop: PointingLoop,
+    controllers: Sequence[LoopController],
+    on_progress: Progress = lambda done, total, what: None,
+) -> list[ensemble.Ensemble]:
+    """Few and short runs of a loop under each controller, in one batch.
+
+    Args:
+        f: The mission's fine-pointing table, for the length of its runs and the seed.
+        loop: The loop.
+        controllers: Controllers of all its axes, in the order that is wanted.
+        on_progress: Called with the parts of the work that are done, their number and what is done.
+    """
+    whole, runs = span(f), min(f.runs, kernel_arrays.LANES)
+    few = replace(whole, duration_s=min(whole.duration_s, whole.settle_s + FEW_SAMPLES * loop.timing.period_s))
+    cases = [_case(loop, controller) for controller in controllers]
+    return list(ensemble.simulate_cases(cases, few, runs, _telling(on_progress, "simulating controllers")))
 
 
 def on_variant(scene: Scene, variant: Variant) -> PointingLoop:

@@ -23,10 +23,9 @@ def design_plant(loop: PointingLoop) -> DesignPlant:
     if loop.axes != 1 or loop.mirror.actuators != 1:
         raise ValueError(f"a design needs a loop of one axis, not of {loop.axes}: design each axis by itself")
     held = loop.optical.every
-    extra = round(0.5 * (held - 1) * loop.timing.steps_per_sample)
-    optical = replace(loop.optical, every=1, delay_steps=loop.optical.delay_steps + extra)
+    loop = read_each_sample(loop)
     random = tuple(tuple(narrow_band(each) for each in several) for several in loop.disturbances)
-    loop = replace(loop, optical=optical, disturbances=random)
+    loop = replace(loop, disturbances=random)
     o = open_loop(loop)
     keep = np.ones(o.at.order, dtype=bool)
     keep[o.at.held] = False
@@ -51,6 +50,12 @@ def design_plant(loop: PointingLoop) -> DesignPlant:
     B[:, 1:] = lti.to_bits(B[:, 1:], lti.EXACT_BITS)
     system = lti.system_to_bits(lti.StateSpace(A, B, rows, D), lti.DESIGN_BITS)
     return DesignPlant(loop.timing.period_s, system, noises.shape[1], nominal_axis_gain(loop), True, has_gauge)
+
+
+def read_each_sample(loop: PointingLoop) -> PointingLoop:
+    """The loop with an optical sensor that delivers every control sample, later by half of what its hold adds."""
+    extra = round(0.5 * (loop.optical.every - 1) * loop.timing.steps_per_sample)
+    return replace(loop, optical=replace(loop.optical, every=1, delay_steps=loop.optical.delay_steps + extra))
 
 
 def close_axis(loop: PointingLoop, controller: AxisController) -> ClosedLoop:

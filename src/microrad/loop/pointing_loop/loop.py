@@ -1,6 +1,7 @@
 """A fine-pointing loop as data: mirror, optics, amplifier, clock, disturbances, sensors, reference; its controller."""
 
 import math
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,7 +11,7 @@ from microrad.core.arrays import Floats
 from microrad.loop.control import AxisController, Drive, Inverse, Timing
 from microrad.loop.disturbance import Disturbance, Reference
 from microrad.loop.sensor import OpticalSensor, StrainGauge
-from microrad.mirror.hysteresis import BoucWen, Play, gain_only, slow_gain
+from microrad.mirror.hysteresis import gain_only, slow_gain
 from microrad.mirror.model import Mirror
 
 
@@ -20,7 +21,8 @@ class PointingLoop:
 
     ``optics`` (axes, outputs) turns the mirror's outputs into line-of-sight angles. ``disturbances`` has, by axis, what
     adds to the error; ``references`` the known part of it. ``drive_range_v`` is the range about the bias in which the
-    mirror was identified. The error is reference + disturbance - mirror.
+    mirror was identified. ``held`` (rows, outputs) are sums of the mirror's outputs that its drives are to leave where
+    they are, such as a piston. The error is reference + disturbance - mirror.
     """
 
     mirror: Mirror
@@ -32,6 +34,7 @@ class PointingLoop:
     gauge: StrainGauge | None
     references: tuple[Reference, ...]
     drive_range_v: tuple[float, float] = (-math.inf, math.inf)
+    held: Floats | None = None
 
     @property
     def axes(self) -> int:
@@ -53,8 +56,7 @@ def in_band_gain(m: Mirror) -> Floats:
 def without_hysteresis(loop: PointingLoop) -> PointingLoop:
     """The loop with each hysteresis element replaced by its slow gain."""
     m = loop.mirror
-    bank: tuple[BoucWen | Play, ...] = (*m.bouc_wen, *m.plays)
-    straight = tuple(gain_only(model) for model in bank)
+    straight = tuple(gain_only(model) for model in m.bank)
     inverse = tuple(gain_only(model) for model in m.inverse)
     return replace(loop, mirror=replace(m, bouc_wen=straight, plays=(), inverse=inverse))
 
@@ -92,27 +94,34 @@ class ReferenceFilter:
         return lti.StateSpace(Ad, Bd, Ad, Bd)
 
 
-def assemble(name: str, loop: PointingLoop, axis: AxisController) -> LoopController:
-    """The same controller on each axis, with commands and gauge readings decoupled by the loop's optics.
+def assemble(name: str, loop: PointingLoop, axis: AxisController | Sequence[AxisController]) -> LoopController:
+    """Controllers of one axis side by side, with commands and gauge readings decoupled by the loop's optics.
 
     Args:
         name: What the controller is called.
         loop: The loop.
-        axis: The controller of one axis.
+        axis: The controller of every axis, or one for each.
 
     Raises:
         ValueError: It reads a gauge that the loop lacks.
     """
-    axes = loop.axes
-    eye, s, to_drives = np.eye(axes), axis.system, decoupling(loop)
-    by_gauge = np.kron(loop.optics, s.B[:, 1:2]), s.D[0, 1] * loop.optics
-    if loop.gauge is None and (np.any(s.B[:, 1]) or np.any(s.D[:, 1])):
+    from scipy.linalg import block_diag
+
+    each = [axis] * loop.axes if isinstance(axis, AxisController) else list(axis)
+    to_drives = decoupling(loop)
+    if loop.gauge is None and any(np.any(c.system.B[:, 1]) or np.any(c.system.D[:, 1]) for c in each):
         raise ValueError(f"controller {name!r} reads a strain gauge, and this loop has none: give it one, or another")
-    B = np.hstack([np.kron(eye, s.B[:, :1]), by_gauge[0], np.zeros((axes * s.order, axes))])
-    D = np.hstack([s.D[0, 0] * eye, by_gauge[1], np.zeros((axes, axes))])
-    A, C = np.asarray(np.kron(eye, s.A), dtype=float), to_drives @ np.kron(eye, s.C)
-    system = lti.StateSpace(A, B, C, to_drives @ D)
-    return LoopController(name, system, np.kron(eye, axis.anti_windup) @ np.linalg.pinv(to_drives))
+
+    def beside(blocks: Iterable[Floats]) -> Floats:
+        return np.asarray(block_diag(*blocks), dtype=float)
+
+    by_gauge = np.vstack([np.kron(row, c.system.B[:, 1:2]) for row, c in zip(loop.optics, each, strict=True)])
+    A, C, windup = (beside(part) for part in zip(*((c.system.A, c.system.C, c.anti_windup) for c in each), strict=True))
+    B = np.hstack([beside(c.system.B[:, :1] for c in each), by_gauge, np.zeros((A.shape[0], loop.axes))])
+    gauge = np.array([c.system.D[0, 1] for c in each])[:, None] * loop.optics
+    D = np.hstack([beside(c.system.D[:, :1] for c in each), gauge, np.zeros((loop.axes, loop.axes))])
+    system = lti.StateSpace(A, B, to_drives @ C, to_drives @ D)
+    return LoopController(name, system, windup @ np.linalg.pinv(to_drives))
 
 
 def with_inverse(
@@ -167,9 +176,7 @@ def with_inverse(
 
 def decoupling(loop: PointingLoop) -> Floats:
     """Axis commands (V) to drives, (actuators, axes): each moves its axis by `nominal_axis_gain`, and no piston."""
-    return np.asarray(
-        nominal_axis_gain(loop) * np.linalg.pinv(loop.optics) / np.diag(in_band_gain(loop.mirror))[:, None]
-    )
+    return np.asarray(nominal_axis_gain(loop) * _drives_for_angles(loop))
 
 
 def nominal_axis_gain(loop: PointingLoop) -> float:
@@ -177,5 +184,40 @@ def nominal_axis_gain(loop: PointingLoop) -> float:
 
     The largest with which no drive gets more than the axis command.
     """
-    to_drives = np.linalg.pinv(loop.optics) / np.diag(in_band_gain(loop.mirror))[:, None]
-    return float(1.0 / np.max(np.abs(to_drives)))
+    return float(1.0 / np.max(np.abs(_drives_for_angles(loop))))
+
+
+def _drives_for_angles(loop: PointingLoop) -> Floats:
+    """Slow drives (V) for line-of-sight angles (rad), shape (actuators, axes): those that move least of what is held.
+
+    Of what is free beyond that, the drives are the least.
+    """
+    gain = in_band_gain(loop.mirror)
+    if loop.mirror.inverse:  # each actuator has its own output, and the least strokes are wanted
+        return np.asarray(np.linalg.pinv(loop.optics) / np.diag(gain)[:, None])
+    seen = loop.optics @ gain
+    drives = np.linalg.pinv(seen)
+    if loop.held is None:
+        return np.asarray(drives)
+    free = np.linalg.svd(seen)[2][loop.axes :].T  # drives that move no axis
+    return np.asarray(drives - free @ np.linalg.pinv(loop.held @ gain @ free) @ (loop.held @ gain @ drives))
+
+
+def axis_of(loop: PointingLoop, axis: int, to_drives: Floats) -> PointingLoop:
+    """One axis of the loop as its controller sees it, with the other axes at rest: its command in, its angle out.
+
+    Args:
+        loop: The loop.
+        axis: Number of the axis, from 0.
+        to_drives: Axis commands to drives, shape (actuators, axes): `decoupling` of this loop or of one like it.
+    """
+    m, into, seen = loop.mirror, to_drives[:, [axis]], loop.optics[[axis]]
+    one = replace(m, B=m.B @ into, G=m.G @ into, C=seen @ m.C, D=seen @ m.D @ into, K=seen @ m.K, inverse=())
+    return replace(
+        loop,
+        mirror=replace(one, inverse_creep=()),
+        optics=np.eye(1),
+        disturbances=loop.disturbances[axis : axis + 1],
+        references=loop.references[axis : axis + 1],
+        held=None,
+    )

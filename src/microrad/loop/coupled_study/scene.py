@@ -1,0 +1,143 @@
+"""The fine-pointing loop of a mission with a mirror of several axes: as it is simulated, and what designs are for."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from microrad.core.arrays import Floats
+from microrad.loop import control
+from microrad.loop.controller_study import scenario
+from microrad.loop.pointing_loop.design import read_each_sample
+from microrad.loop.pointing_loop.loop import PointingLoop
+from microrad.mirror import coupled, geometry, hysteresis
+from microrad.mirror.coupled import CoupledMirror, Output
+from microrad.mirror.model import linearised
+from microrad.mission.file import MissionFile
+from microrad.mission.tables.fine_pointing import FinePointing
+
+AXES = "xy"
+"""Names of the axes of the line of sight."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CoupledScene:
+    """The fine-pointing loop of a mission with a mirror of several axes in place of its own.
+
+    ``loop`` has the mirror with its hysteresis. ``linear`` have it with a gain in place of each element, and a sensor
+    that delivers each sample: the first one with the gains of small motions about rest, for which controllers are
+    built, the second with those of large slow ones, where all plays slide. A controller has to hold in each of them.
+    """
+
+    table: FinePointing
+    mirror: CoupledMirror
+    loop: PointingLoop
+    linear: tuple[PointingLoop, ...]
+
+    @property
+    def rest(self) -> PointingLoop:
+        """The loop for small motions about rest."""
+        return self.linear[0]
+
+
+def scene(file: MissionFile, mirror: CoupledMirror, received_power_w: float | None) -> CoupledScene:
+    """The fine-pointing loop of a mission with a mirror of several axes, assembled once.
+
+    The delay of the mirror's recordings stays out: the mission's own delay and amplifier take its place. The drives
+    reach as far as the amplifier and the recordings allow for all actuators alike.
+
+    Args:
+        file: The mission; its amplifier, clock, telescope, sensor and disturbances count, its own mirror does not.
+        mirror: The mirror.
+        received_power_w: Light on the tracking sensor (W), `link.tracking_light_w`; None where the table gives the
+            sensor's noise.
+
+    Raises:
+        ValueError: The mission has no such loop, or the mirror cannot be its mirror; says why.
+    """
+    m, f = file.mission, scenario.table(file.mission.fine_pointing)
+    f = f.model_copy(update={"strain_gauge": None})  # the mirror's own sensors belong to the laboratory
+    optics, piston = line_of_sight(f, m.conventions.mirror_angle, mirror.outputs)
+    base = control.drive_from_mission(m)
+    shift = np.array([m.mirror.bias_v - actuator.bias_v for actuator in mirror.actuators])
+    drive = replace(
+        base,
+        minimum_v=float(np.max(base.minimum_v + shift)),
+        maximum_v=float(np.min(base.maximum_v + shift)),
+        bandwidth_hz=f.amplifier_bandwidth_hz,
+        slew_v_s=min(base.slew_v_s, *(a.rate_limit_v_s for a in mirror.actuators)),
+        drive_resolution_v=f.drive_resolution_v,
+    )
+    if not drive.minimum_v < 0.0 < drive.maximum_v:
+        raise ValueError(
+            f"the amplifier takes the actuators of {mirror.mirror.name!r} from {drive.minimum_v:g} V to "
+            f"{drive.maximum_v:g} V about their bias, and rest has to lie inside: set amplifier.output_min, "
+            "amplifier.output_max and amplifier.gain for this mirror"
+        )
+    each_axis = scenario.disturbances(f, file.path.parent, file.contents)
+    period = 1.0 / f.rate_hz
+    loop = PointingLoop(
+        mirror=mirror.mirror,
+        optics=optics,
+        drive=drive,
+        timing=control.Timing(period, round(period / f.plant_step_s), round(f.delay_s / f.plant_step_s)),
+        disturbances=(each_axis, each_axis),
+        optical=scenario.optical_sensor(f, received_power_w, m.answer.wavelength_m, m.terminals.leo_aperture_m),
+        gauge=None,
+        references=scenario.references(f),
+        drive_range_v=(
+            max(a.drive_min_v - a.bias_v for a in mirror.actuators),
+            min(a.drive_max_v - a.bias_v for a in mirror.actuators),
+        ),
+        held=piston,
+    )
+    _refuse_unreachable(loop, mirror)
+    gains = ([of(model) for model in mirror.mirror.bank] for of in (hysteresis.rest_gain, hysteresis.slow_gain))
+    linear = [replace(read_each_sample(loop), mirror=linearised(mirror.mirror, each)) for each in gains]
+    return CoupledScene(f, mirror, loop, tuple(linear if mirror.mirror.bank else linear[:1]))
+
+
+def line_of_sight(f: FinePointing, mirror_angle: str, outputs: Sequence[Output]) -> tuple[Floats, Floats | None]:
+    """Line-of-sight angles from the mirror's outputs, shape (2, outputs), and its piston, shape (1, outputs).
+
+    Displacements give tilts and piston by their positions. Two angles are those of the axes x and y, counted as
+    conventions.mirror_angle says, and know of no piston.
+
+    Args:
+        f: The mission's fine-pointing table.
+        mirror_angle: What angles count: "mechanical", "optical" or "line-of-sight".
+        outputs: The mirror's outputs.
+
+    Raises:
+        ValueError: The outputs do not tell two tilts, or the table gives a coupling or a layout that a mirror file of
+            several axes has in itself.
+    """
+    if f.geometry.layout != "two-axis" or f.geometry.coupling != (1.0, 0.0, 0.0, 1.0):
+        raise ValueError(
+            "fine_pointing.geometry has a tripod or a coupling, and the mirror file of several axes already holds how "
+            'its actuators act: set layout = "two-axis" and coupling = [1.0, 0.0, 0.0, 1.0]'
+        )
+    if all(output.quantity == "angle" for output in outputs):
+        if len(outputs) != len(AXES):
+            raise ValueError(
+                f"the mirror file has {len(outputs)} angles as outputs: two are needed, that of axis x and that of "
+                "axis y, or displacements with positions"
+            )
+        return geometry.line_of_sight_matrix(scenario.optics(f, mirror_angle)), None
+    tilts = coupled.tilts_and_piston(outputs)
+    leans = np.vstack([tilts[1], -tilts[0]])  # towards x by the tilt about y, towards y by that about x backwards
+    return geometry.line_of_sight_matrix(scenario.optics(f, "mechanical")) @ leans, tilts[2:]
+
+
+def _refuse_unreachable(loop: PointingLoop, mirror: CoupledMirror) -> None:
+    """Raise ValueError where the actuators do not move the line of sight both ways."""
+    for gains in (hysteresis.rest_gain, hysteresis.slow_gain):
+        linear = mirror.mirror.linear([gains(model) for model in mirror.mirror.bank])
+        slow = loop.optics @ (linear.D - linear.C @ np.linalg.solve(linear.A, linear.B))
+        sizes = np.linalg.svd(slow, compute_uv=False)
+        if sizes.size < loop.axes or sizes[-1] * geometry.WORST_CONDITION < sizes[0] or not sizes[0] > 0.0:
+            raise ValueError(
+                f"the {mirror.mirror.actuators} actuator(s) of {mirror.mirror.name!r} do not move the line of sight in "
+                "both axes: one direction moves more than a factor of 10000 less than the other; check matrices.B and "
+                "the positions of the outputs"
+            )
