@@ -18,7 +18,7 @@ from microrad.loop.control.classical import (
     RESONANT_DAMPING,
     peak_family,
 )
-from microrad.loop.control.lqg import LQG, Weights, lqg_controller
+from microrad.loop.control.lqg import LQG, Weights, lqg_controller, lqg_of_axes
 from microrad.loop.control.problem import (
     GAUGE,
     OPTICAL,
@@ -27,6 +27,7 @@ from microrad.loop.control.problem import (
     DesignPlant,
     Family,
     Specification,
+    WholePlant,
 )
 from microrad.loop.control.sampled import (
     Drive,
@@ -72,6 +73,7 @@ __all__ = [
     "Timing",
     "Tuned",
     "Weights",
+    "WholePlant",
     "amplifier_factor",
     "anti_windup",
     "by_source",
@@ -82,6 +84,7 @@ __all__ = [
     "inverse_arrays",
     "loop_margins",
     "lqg_controller",
+    "lqg_of_axes",
     "margins",
     "multiloop_disk_margin",
     "no_feedforward",

@@ -60,12 +60,12 @@ class Judge:
         """
         self._period = _one_period(plants)
         self._A, self._B, self._C, self._D = _stacked([moved(p).from_command for p in plants])
-        grids = [_grid(p) for p in plants]
+        grids = [grid(p.system, p.period_s) for p in plants]
         self._edges = np.cumsum([0, *(f.size for f in grids)])
         self._freq = np.concatenate(grids)
         self._steps = np.diff(self._freq)  # below 0 from one plant to the next
         self._bands = _bands(grids, self._period)
-        self._weights = np.concatenate([_quadrature(f) for f in grids]) * 2.0 * self._period
+        self._weights = np.concatenate([quadrature(f) for f in grids]) * 2.0 * self._period
         whole = np.concatenate(
             [lti.frequency_response(p.system, f, self._period) for p, f in zip(plants, grids, strict=True)]
         )
@@ -231,13 +231,18 @@ def _one_period(plants: Sequence[DesignPlant]) -> float:
     return periods.pop()
 
 
-def _grid(plant: DesignPlant) -> Floats:
-    """Some 500 frequencies to half the control rate: logarithmic from below the slowest pole, linear, and by pole."""
-    poles = np.linalg.eigvals(plant.system.A).astype(complex)
+def grid(system: lti.StateSpace, period_s: float) -> Floats:
+    """Some 500 frequencies to half the control rate: logarithmic from below the slowest pole, linear, and by pole.
+
+    Args:
+        system: A plant, discrete.
+        period_s: Control period, s.
+    """
+    poles = np.linalg.eigvals(system.A).astype(complex)
     slow = np.abs(np.log(poles[np.abs(poles) > 0.5])) / (2 * math.pi)
     lowest = max(min(1e-4, float(np.min(slow, initial=1.0))) / 20.0, 1e-9)
-    grid = [np.geomspace(lowest, 0.5, 240), np.linspace(0.0, 0.5, 121)[1:]]
-    return np.unique(np.concatenate([*(f / plant.period_s for f in grid), around_poles(poles, plant.period_s, 1.2)]))
+    parts = [np.geomspace(lowest, 0.5, 240), np.linspace(0.0, 0.5, 121)[1:]]
+    return np.unique(np.concatenate([*(f / period_s for f in parts), around_poles(poles, period_s, 1.2)]))
 
 
 def _bands(grids: Sequence[Floats], period_s: float) -> NDArray[np.intp]:
@@ -247,7 +252,7 @@ def _bands(grids: Sequence[Floats], period_s: float) -> NDArray[np.intp]:
     return np.flatnonzero(np.diff(np.concatenate(number), prepend=-1))
 
 
-def _quadrature(f: Floats) -> Floats:
+def quadrature(f: Floats) -> Floats:
     """Weights of the trapezoidal rule, with the value at the lowest frequency held down to 0."""
     steps = np.diff(f)
     weights = np.zeros(f.size)

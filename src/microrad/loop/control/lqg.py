@@ -8,6 +8,7 @@ the loop at the command (Doyle and Stein, IEEE Transactions on Automatic Control
 
 import math
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,7 @@ from microrad.loop.control.problem import (
     DesignPlant,
     Family,
     Parameter,
+    WholePlant,
     once_per_plant,
 )
 
@@ -78,18 +80,70 @@ def lqg_controller(plant: DesignPlant, weights: Weights, *, coarse: bool = False
     if moved_by not in known:
         known[moved_by] = model, regulator_gain(model, weights.command * plant.gain_rad_v**2)
     _, G = known[moved_by]
+    system, driven = _controller(model, K, G, inputs=2, coarse=coarse)
+    return AxisController("LQG", system, driven)
+
+
+def _controller(model: "Model", K: Floats, G: Floats, inputs: int, coarse: bool) -> tuple[lti.StateSpace, Floats]:
+    """Observer and regulator as one system, and what the given command adds to its states."""
     K = lti.to_bits(K, OBSERVER_BITS) if coarse else K
-    n, sensors = model.A.shape[0], model.sensors
-    driven = np.vstack([model.command, [[1.0]]])  # observer and last command follow the command that is given
-    free = np.zeros((n + 1, n + 1))
+    (n, commands), sensors = model.command.shape, model.sensors
+    driven = np.vstack([model.command, np.eye(commands)])  # observer and last command follow the command that is given
+    free = np.zeros((n + commands, n + commands))
     free[:n, :n] = model.A - K @ model.seen
-    correction = np.zeros((n + 1, 2))
+    correction = np.zeros((n + commands, inputs))
     correction[:n, sensors] = K
-    last = np.eye(1, n + 1, n)
+    last = np.eye(commands, n + commands, n)
     C = last - G @ (free + driven @ last)
     D = -G @ correction
     system = lti.StateSpace(free + driven @ C, correction + driven @ D, C, D)
-    return AxisController("LQG", lti.system_to_bits(system, lti.EXACT_BITS) if coarse else system, driven)
+    return lti.system_to_bits(system, lti.EXACT_BITS) if coarse else system, driven
+
+
+def lqg_of_axes(plant: WholePlant, weights: Weights, *, coarse: bool = False) -> tuple[lti.StateSpace, Floats]:
+    """Optimal controller of several axes at once, from all optical errors to all commands, and its anti-windup input.
+
+    As `lqg_controller`, with a random walk on each axis and the same weights for all of them.
+
+    Args:
+        plant: The plant of all axes.
+        weights: What the design trades.
+        coarse: Whether gain and matrices are rounded to what processors agree in.
+
+    Raises:
+        ValueError: For weights that are not above 0, and where a Riccati equation has no solution.
+    """
+    _refuse_weights(weights)
+    model = _observed_axes(in_own_units(plant), weights)
+    K = filter_gain(model.A, model.noise, model.seen, model.seen_noise)
+    G = regulator_gain(model, weights.command * plant.gain_rad_v**2)
+    return _controller(model, K, G, plant.axes, coarse)
+
+
+def _observed_axes(plant: WholePlant, weights: Weights) -> "Model":
+    """What a design of several axes knows: the plant with a walk on each axis, and noise on its commands."""
+    s, n, axes, several = plant.system, plant.system.order, plant.axes, np.eye(plant.axes)
+    corner = np.array([WALK_CORNER / plant.period_s])
+    there = lti.frequency_response(s, corner, plant.period_s)[0, :, axes:]
+    level = np.linalg.norm(there[axes:], axis=1)
+    scale = np.where(np.arange(there.shape[1]) < plant.disturbances, 1.0, weights.sensor_noise)
+    A, command = np.eye(n + axes), np.zeros((n + axes, axes))
+    A[:n, :n], command[:n] = s.A, s.B[:, :axes]
+    noise = np.zeros((n + axes, scale.size + 3 * axes))  # white sequences, on commands, of the walks, of the floors
+    noise[:n, : scale.size] = s.B[:, axes:] * scale
+    noise[:n, scale.size : scale.size + axes] = s.B[:, :axes] * weights.command_noise_v
+    noise[n:, scale.size + axes : scale.size + 2 * axes] = np.diag(2 * math.pi * WALK_CORNER * level * weights.walk)
+    seen_noise = np.hstack([s.D[axes:, axes:] * scale, np.zeros((axes, 2 * axes)), np.diag(1e-6 * level)])
+    return Model(
+        A,
+        command,
+        np.hstack([s.C[:axes], several]),
+        np.hstack([s.C[axes:], several]),
+        noise,
+        seen_noise,
+        list(range(axes)),
+        reachable(A, command),
+    )
 
 
 @once_per_plant
@@ -120,8 +174,11 @@ class Model:
     moved: NDArray[np.bool_]
 
 
+_Plant = TypeVar("_Plant", DesignPlant, WholePlant)
+
+
 @once_per_plant
-def in_own_units(plant: DesignPlant) -> DesignPlant:
+def in_own_units(plant: _Plant) -> _Plant:
     """The plant with scaled states, each in a unit of about its own size (a power of 2).
 
     States in volts beside states in radians cost the Riccati equations eight digits. The size is the rms that some
@@ -173,6 +230,10 @@ def _refuse(plant: DesignPlant, weights: Weights) -> None:
             "LQG needs the optical sensor: without it nothing shows the disturbance that the mirror has to follow; "
             "add one, or close the loop on the gauge with another controller"
         )
+    _refuse_weights(weights)
+
+
+def _refuse_weights(weights: Weights) -> None:
     if not (weights.command > 0.0 and weights.sensor_noise > 0.0):
         raise ValueError(
             f"LQG: a command weight of {weights.command:g} and a sensor noise factor of {weights.sensor_noise:g} have "
@@ -237,10 +298,11 @@ def filter_gain(A: Floats, noise: Floats, seen: Floats, seen_noise: Floats) -> F
 
 
 def regulator_gain(model: Model, weight: float) -> Floats:
-    """Gain G of v[k] - v[k-1] = -G (A x, v[k-1]), shape (1, states + 1), that costs least.
+    """Gain G of v[k] - v[k-1] = -G (A x, v[k-1]), shape (commands, states + commands), that costs least.
 
-    The cost is residual^2 + weight (v[k] - v[k-1])^2. A Riccati equation is solved where the command reaches, and a
-    Stein equation for what it does not: states of the disturbance may be undamped, no pole of theirs has to be moved.
+    The cost is residual^2 + weight (v[k] - v[k-1])^2, summed over the axes. A Riccati equation is solved where the
+    commands reach, and a Stein equation for what they do not: states of the disturbance may be undamped, no pole of
+    theirs has to be moved.
 
     Args:
         model: What the design knows of the plant.
@@ -249,17 +311,18 @@ def regulator_gain(model: Model, weight: float) -> Floats:
     Raises:
         ValueError: One of the equations has no solution.
     """
-    m, own = np.append(model.moved, True), np.append(~model.moved, False)
-    n = model.A.shape[0]
-    A = np.block([[model.A, model.command], [np.zeros((1, n)), np.ones((1, 1))]])
-    b, c = np.vstack([model.command, [[1.0]]])[m], np.append(model.residual, [[0.0]], axis=1)
-    inside, across = A[np.ix_(m, m)], A[np.ix_(m, own)]
-    X = riccati(inside, b, c[:, m].T @ c[:, m], np.array([[weight]]), "the command does not reach the residual")
-    gain = np.linalg.solve(b.T @ X @ b + weight, b.T @ X)
+    n, commands = model.command.shape
+    m, own = np.append(model.moved, [True] * commands), np.append(~model.moved, [False] * commands)
+    A = np.block([[model.A, model.command], [np.zeros((commands, n)), np.eye(commands)]])
+    b = np.vstack([model.command, np.eye(commands)])[m]
+    c = np.append(model.residual, np.zeros((len(model.residual), commands)), axis=1)
+    inside, across, cost = A[np.ix_(m, m)], A[np.ix_(m, own)], weight * np.eye(commands)
+    X = riccati(inside, b, c[:, m].T @ c[:, m], cost, "the command does not reach the residual")
+    gain = np.linalg.solve(b.T @ X @ b + cost, b.T @ X)
     closed = inside - b @ (gain @ inside)
     Z = stein(closed, A[np.ix_(own, own)], closed.T @ X @ across + c[:, m].T @ c[:, own])
-    G = np.zeros((1, n + 1))
-    G[:, m], G[:, own] = gain, np.linalg.solve(b.T @ X @ b + weight, b.T @ Z)
+    G = np.zeros((commands, n + commands))
+    G[:, m], G[:, own] = gain, np.linalg.solve(b.T @ X @ b + cost, b.T @ Z)
     return G
 
 

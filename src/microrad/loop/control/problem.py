@@ -9,6 +9,7 @@ from microrad.core import lti
 from microrad.core.arrays import Floats
 
 _Answer = TypeVar("_Answer")
+_Plant = TypeVar("_Plant")
 
 RESIDUAL, OPTICAL, GAUGE = range(3)
 """Outputs of a design plant; a controller's inputs are the last two, in this order."""
@@ -39,12 +40,29 @@ class DesignPlant:
         return lti.StateSpace(s.A, s.B[:, :1], s.C[OPTICAL:], s.D[OPTICAL:, :1])
 
 
-def once_per_plant(of: Callable[[DesignPlant], _Answer]) -> Callable[[DesignPlant], _Answer]:
+@dataclass(frozen=True, slots=True)
+class WholePlant:
+    """Several axes that act on each other, as their controllers see them: discrete, with every delay inside.
+
+    ``system`` has the inputs command of each axis (V), then independent white sequences of unit variance: first
+    ``disturbances`` of them, then the optical sensor's noise by axis. Its outputs are the residuals of all axes (rad),
+    then the same as the optical sensor delivers them. ``gain_rad_v`` is the slow gain of each axis from its own
+    command, decoupled from the others.
+    """
+
+    period_s: float
+    system: lti.StateSpace
+    axes: int
+    disturbances: int
+    gain_rad_v: float
+
+
+def once_per_plant(of: Callable[[_Plant], _Answer]) -> Callable[[_Plant], _Answer]:
     """Let a function keep its last answer: a search asks the same of one plant for each of its candidates."""
-    last: tuple[DesignPlant, _Answer] | None = None
+    last: tuple[_Plant, _Answer] | None = None
 
     @functools.wraps(of)
-    def asked(plant: DesignPlant) -> _Answer:
+    def asked(plant: _Plant) -> _Answer:
         nonlocal last
         kept = last
         if kept is None or kept[0] is not plant:

@@ -85,35 +85,11 @@ def design(
     Raises:
         ValueError: For a name that `names` does not list, and where a modulus margin cannot be met; says why.
     """
-    wanted = tuple(only) or names(scene.table)
-    tuned = tune_all(wanted, scene.table, plants(scene, scene.table.seed), on_progress)
-    return tuple(
-        Design(name, tuned[name], build(name, scene, tuned[name].controller), _INVERSE_USED.get(name, ""))
-        for name in wanted
-    )
-
-
-def tune_all(
-    wanted: Sequence[str],
-    f: FinePointing,
-    of: Sequence[DesignPlant],
-    on_progress: Progress = lambda done, total, what: None,
-) -> Mapping[str, Tuned]:
-    """Tune several controllers of one axis, shared out to the processors.
-
-    Args:
-        wanted: Names out of `names`.
-        f: The mission's fine-pointing table: modulus margin, seed and reference filter.
-        of: Plants of an axis, the nominal one first.
-        on_progress: Called with the controllers that are tuned, their number and what is done.
-
-    Raises:
-        ValueError: For a name that `names` does not list, and where a modulus margin cannot be met; says why.
-    """
     import scipy.optimize  # noqa: F401  slow to import: once, ahead of the other process
 
-    groups = _groups(wanted, f)
-    jobs = [partial(_tuned_in_turn, {name: _tuning(name, f, of) for name in group}) for group in groups]
+    of, wanted = plants(scene, scene.table.seed), tuple(only) or names(scene.table)
+    groups = _groups(wanted, scene.table)
+    jobs = [partial(_tuned_in_turn, {name: _tuning(name, scene.table, of) for name in group}) for group in groups]
 
     def told(turn: int) -> None:
         on_progress(sum(map(len, groups[:turn])), len(wanted), f"tuning {groups[turn][0]}")
@@ -121,7 +97,10 @@ def tune_all(
     with shared_out(jobs, told) as results:
         tuned = dict(ChainMap(*results()))
     on_progress(len(wanted), len(wanted), "controllers tuned")
-    return tuned
+    return tuple(
+        Design(name, tuned[name], build(name, scene, tuned[name].controller), _INVERSE_USED.get(name, ""))
+        for name in wanted
+    )
 
 
 def _groups(wanted: Sequence[str], f: FinePointing) -> list[list[str]]:

@@ -1,11 +1,12 @@
 """Controllers of a mission's fine-pointing loop for a mirror of several axes, with the margins of the whole."""
 
-from microrad.loop.coupled_study.designs import CoupledDesign, design, names, outlook, plants
+from microrad.loop.coupled_study.designs import CoupledDesign, CoupledDesigns, design, names, outlook, plants
 from microrad.loop.coupled_study.scene import AXES, CoupledScene, scene
 
 __all__ = [
     "AXES",
     "CoupledDesign",
+    "CoupledDesigns",
     "CoupledScene",
     "design",
     "names",

@@ -1,47 +1,72 @@
 """Controllers for a mirror of several axes: decoupled, one loop an axis, judged all together on the whole mirror."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
+from microrad.core import lti
 from microrad.core.arrays import Complexes, Floats
 from microrad.core.progress import Progress
-from microrad.loop.control import DesignPlant, MultiloopMargin, Tuned, multiloop_disk_margin
+from microrad.core.threads import shared_out
+from microrad.loop.control import (
+    LQG,
+    Family,
+    MultiloopMargin,
+    Specification,
+    Tuned,
+    WholePlant,
+    multiloop_disk_margin,
+    tune,
+)
 from microrad.loop.control.analysis import resolving
 from microrad.loop.controller_study import designs as one_axis
 from microrad.loop.controller_study.results import Outlook, shortened
-from microrad.loop.coupled_study.scene import AXES, CoupledScene
-from microrad.loop.pointing_loop.design import design_plant
+from microrad.loop.coupled_study.scene import CoupledScene
+from microrad.loop.coupled_study.whole import lqg_for, with_others_closed
+from microrad.loop.pointing_loop.design import whole_plant
 from microrad.loop.pointing_loop.linear import ClosedLoop, close, loop_response, stationary
-from microrad.loop.pointing_loop.loop import LoopController, assemble, axis_of, decoupling
+from microrad.loop.pointing_loop.loop import LoopController, assemble, assemble_whole, decoupling
 from microrad.mission.tables.fine_pointing import FinePointing
 
-TRIES = 4
-"""Times that the axes are tuned, each time for a larger margin of their own, until the whole keeps the mission's."""
+ROUNDS = 6
+"""Times that all axes are tuned in turn, until the whole keeps the mission's margin."""
 
-HEADROOM = 1.05
-"""What a margin of an axis is raised by beyond what was missed of the whole."""
+HEADROOM, MOST = 1.05, 0.9
+"""What a margin of an axis is raised by beyond what was missed of the whole, and its largest."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CoupledDesign:
-    """One controller of all axes: how each axis was tuned, and what the whole loop has of it.
+    """One controller of all axes, and what the whole loop has of it.
 
-    ``modulus`` is the least singular value of 1 + L, the loop gain at the line of sight with both axes closed, over all
+    ``tuned`` are the values that it was tuned to: by axis, or those of all axes at once. ``modulus`` is the least singular value of 1 + L, the loop gain at the line of sight with both axes closed, over all
     frequencies and linear loops of the scene, and ``margin`` the smallest disk margin against changes of both loops at
     once. ``residual_rad`` is the rms of each axis for small motions about rest, linear, and ``worst_rad`` the largest
     of each axis over all linear loops.
     """
 
     name: str
-    tuned: tuple[Tuned, ...]
+    tuned: tuple[Mapping[str, float], ...]
     controller: LoopController
     modulus: float
     margin: MultiloopMargin
     residual_rad: Floats
     worst_rad: Floats
+
+    @property
+    def total_rad(self) -> float:
+        """Radial rms for small motions about rest, linear."""
+        return float(np.linalg.norm(self.residual_rad))
+
+
+class CoupledDesigns(NamedTuple):
+    """The controllers that were designed, and why others could not be, by name."""
+
+    made: tuple[CoupledDesign, ...]
+    refused: Mapping[str, str]
 
 
 def names(f: FinePointing) -> tuple[str, ...]:
@@ -49,18 +74,20 @@ def names(f: FinePointing) -> tuple[str, ...]:
     return tuple(family.name for family in one_axis.families(f))
 
 
-def plants(scene: CoupledScene) -> tuple[tuple[DesignPlant, ...], ...]:
-    """By axis, what its controller is designed for: the axis in each linear loop of the scene, decoupled as at rest."""
+def plants(scene: CoupledScene) -> tuple[WholePlant, ...]:
+    """What controllers are designed for: all axes in each linear loop of the scene, decoupled as at rest."""
     to_drives = decoupling(scene.rest)
-    return tuple(
-        tuple(design_plant(axis_of(loop, axis, to_drives)) for loop in scene.linear) for axis in range(scene.loop.axes)
-    )
+    return tuple(whole_plant(loop, to_drives) for loop in scene.linear)
 
 
 def design(
     scene: CoupledScene, on_progress: Progress = lambda done, total, what: None, only: Sequence[str] = ()
-) -> tuple[CoupledDesign, ...]:
-    """Design controllers: one of each family an axis, tuned until all of them together keep the modulus margin.
+) -> CoupledDesigns:
+    """Design controllers that keep the modulus margin with all axes closed.
+
+    LQG is one controller of all axes. Of the other families each axis has one: they are tuned in turn, each with those
+    of the other axes at work, and for a larger margin of its own where the whole lacks some. No family is worse than
+    the one that it contains.
 
     Args:
         scene: The mission's loop.
@@ -68,67 +95,96 @@ def design(
         only: Names out of `names`, in the order that is wanted; by default all.
 
     Raises:
-        ValueError: For a name that `names` does not list, and where a controller cannot meet its margin; says why.
+        ValueError: For a name that `names` does not list, and where no controller meets its margin; says why.
     """
-    wanted, of = tuple(only) or names(scene.table), plants(scene)
-    asked = dict.fromkeys(wanted, scene.table.modulus_margin)
-    found: dict[str, CoupledDesign] = {}
-    for _ in range(TRIES):
-        tuned = _tuned(scene.table, asked, of, on_progress)
-        for name in [*asked]:
-            found[name] = _judged(scene, name, [each[name] for each in tuned])
-            if found[name].modulus >= scene.table.modulus_margin:
-                del asked[name]
-            else:
-                asked[name] *= HEADROOM * scene.table.modulus_margin / max(found[name].modulus, 0.5 * asked[name])
-        if not asked:
-            return tuple(found[name] for name in wanted)
-    missed = next(iter(asked))
-    raise ValueError(
-        f"{missed}, tuned for each axis by itself, keeps a modulus margin of {found[missed].modulus:.3g} with all axes "
-        f"closed, where {scene.table.modulus_margin:g} is asked for: the axes pull on each other too much; lower "
-        "fine_pointing.modulus_margin, or leave this controller out"
+    import scipy.optimize  # noqa: F401  slow to import: once, ahead of the other process
+
+    has = names(scene.table)
+    wanted = tuple(only) or has
+    for name in wanted:
+        if name not in has:
+            raise ValueError(f"{name!r} is no controller of a mirror of several axes; there are {', '.join(has)}")
+    of, families = plants(scene), {family.name: family for family in one_axis.families(scene.table)}
+    order = sorted(wanted, key=lambda name: name != LQG.name)
+    jobs = [partial(_designed_or_why, scene, families[name], of) for name in order]
+    with shared_out(jobs, lambda turn: on_progress(turn, len(order), f"tuning {order[turn]}")) as results:
+        found = dict(zip(order, results(), strict=True))
+    on_progress(len(order), len(order), "controllers tuned")
+    made = {name: each for name, each in found.items() if isinstance(each, CoupledDesign)}
+    if not made:
+        raise ValueError("; ".join(str(found[name]) for name in wanted))
+    for name, own in made.items():
+        inner = families[name].base
+        base = made.get(inner.name) if inner else None
+        if base is not None and base.total_rad < own.total_rad:
+            made[name] = replace(base, name=name, controller=replace(base.controller, name=name))
+    return CoupledDesigns(
+        tuple(made[name] for name in wanted if name in made),
+        {name: str(found[name]) for name in wanted if name not in made},
     )
 
 
-def _tuned(
-    f: FinePointing,
-    asked: Mapping[str, float],
-    of: Sequence[Sequence[DesignPlant]],
-    on_progress: Progress,
-) -> list[Mapping[str, Tuned]]:
-    """By axis, the controllers tuned for the modulus margin that is asked of each."""
-    found: list[Mapping[str, Tuned]] = []
-    for number, axis in enumerate(of):
-        tuned: dict[str, Tuned] = {}
-        for margin in dict.fromkeys(asked.values()):
-            some = [name for name in asked if asked[name] == margin]
+def _designed_or_why(scene: CoupledScene, family: Family, of: Sequence[WholePlant]) -> CoupledDesign | str:
+    try:
+        return (_all_at_once if family is LQG else _in_turn)(scene, family, of)
+    except ValueError as error:
+        return str(error)
 
-            before = number * len(asked) + len(tuned)
-            told = partial(_told, on_progress, before, len(of) * len(asked), f"axis {AXES[number]}")
-            tuned |= one_axis.tune_all(some, f.model_copy(update={"modulus_margin": margin}), axis, told)
-        found.append(tuned)
+
+def _all_at_once(scene: CoupledScene, family: Family, of: Sequence[WholePlant]) -> CoupledDesign:
+    system, windup, values = lqg_for(of, scene.table.modulus_margin)
+    found = _judged(scene, assemble_whole(family.name, scene.rest, system, windup), (values,))
+    _refuse_missed(scene, found)
     return found
 
 
-def _told(on_progress: Progress, before: int, of: int, where: str, done: int, total: int, what: str) -> None:
-    del total
-    on_progress(before + done, of, f"{where}, {what}")
+def _in_turn(scene: CoupledScene, family: Family, of: Sequence[WholePlant]) -> CoupledDesign:
+    """One controller an axis, tuned in turn with the others at work."""
+    axes = range(scene.loop.axes)
+    margin = scene.table.modulus_margin
+    controllers: list[lti.StateSpace | None] = [None for _ in axes]
+    tuned: dict[int, Tuned] = {}
+    best: CoupledDesign | None = None
+    for _ in range(ROUNDS):
+        for axis in axes:
+            others = [with_others_closed(plant, axis, controllers) for plant in of]
+            tuned[axis] = tune(family, others, Specification(margin), seed=scene.table.seed)
+            s = tuned[axis].controller.system
+            controllers[axis] = lti.StateSpace(s.A, s.B[:, :1], s.C, s.D[:, :1])
+        made = assemble(family.name, scene.rest, [tuned[axis].controller for axis in axes])
+        found = _judged(scene, made, tuple(tuned[axis].values for axis in axes))
+        best = found if best is None or found.modulus > best.modulus else best
+        if found.modulus >= scene.table.modulus_margin:
+            return found
+        short = scene.table.modulus_margin / max(found.modulus, 0.5 * scene.table.modulus_margin)
+        margin = min(HEADROOM * margin * short, MOST)
+    assert best is not None
+    _refuse_missed(scene, best)
+    return best
 
 
-def _judged(scene: CoupledScene, name: str, tuned: Sequence[Tuned]) -> CoupledDesign:
-    """The controllers of all axes as one, with the worst of its linear loops; no margin where one is unstable."""
-    controller = assemble(name, scene.rest, [each.controller for each in tuned])
+def _refuse_missed(scene: CoupledScene, found: CoupledDesign) -> None:
+    asked = scene.table.modulus_margin
+    if found.modulus < asked:
+        raise ValueError(
+            f"{found.name} keeps a modulus margin of {found.modulus:.3g} with all axes closed, where {asked:g} is "
+            "asked for: the axes pull on each other too much; lower fine_pointing.modulus_margin, or take another "
+            "controller"
+        )
+
+
+def _judged(scene: CoupledScene, controller: LoopController, values: tuple[Mapping[str, float], ...]) -> CoupledDesign:
+    """A controller with the worst of the linear loops under it; no margin where one is unstable."""
     closed = [close(loop, controller) for loop in scene.linear]
     if max(each.worst_pole()[0] for each in closed) >= 1.0:
         nothing = np.full(scene.loop.axes, np.inf)
-        return CoupledDesign(name, tuple(tuned), controller, 0.0, MultiloopMargin(0.0, 0.0), nothing, nothing)
+        return CoupledDesign(controller.name, values, controller, 0.0, MultiloopMargin(0.0, 0.0), nothing, nothing)
     gains = [_loop_gain(each) for each in closed]
     moduli = (np.linalg.svd(np.eye(scene.loop.axes) + L, compute_uv=False)[:, -1] for _, L in gains)
     left = np.array([np.sqrt(stationary(each).error) for each in closed])
     return CoupledDesign(
-        name,
-        tuple(tuned),
+        controller.name,
+        values,
         controller,
         min(float(np.min(each)) for each in moduli),
         min((multiloop_disk_margin(*each) for each in gains), key=lambda margin: margin.disk),

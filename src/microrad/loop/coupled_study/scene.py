@@ -9,7 +9,7 @@ from microrad.core.arrays import Floats
 from microrad.loop import control
 from microrad.loop.controller_study import scenario
 from microrad.loop.pointing_loop.design import read_each_sample
-from microrad.loop.pointing_loop.loop import PointingLoop
+from microrad.loop.pointing_loop.loop import PointingLoop, in_band_gain
 from microrad.mirror import coupled, geometry, hysteresis
 from microrad.mirror.coupled import CoupledMirror, Output
 from microrad.mirror.model import linearised
@@ -26,7 +26,7 @@ class CoupledScene:
 
     ``loop`` has the mirror with its hysteresis. ``linear`` have it with a gain in place of each element, and a sensor
     that delivers each sample: the first one with the gains of small motions about rest, for which controllers are
-    built, the second with those of large slow ones, where all plays slide. A controller has to hold in each of them.
+    built, the second with those of slow motions over the whole drive range. A controller has to hold in each of them.
     """
 
     table: FinePointing
@@ -91,10 +91,27 @@ def scene(file: MissionFile, mirror: CoupledMirror, received_power_w: float | No
         ),
         held=piston,
     )
-    _refuse_unreachable(loop, mirror)
-    gains = ([of(model) for model in mirror.mirror.bank] for of in (hysteresis.rest_gain, hysteresis.slow_gain))
-    linear = [replace(read_each_sample(loop), mirror=linearised(mirror.mirror, each)) for each in gains]
-    return CoupledScene(f, mirror, loop, tuple(linear if mirror.mirror.bank else linear[:1]))
+    seen = read_each_sample(loop)
+    linear = tuple(
+        replace(seen, mirror=linearised(mirror.mirror, gains)) for gains in _gains(mirror, loop.drive_range_v)
+    )
+    _refuse_unreachable(linear)
+    return CoupledScene(f, mirror, loop, linear)
+
+
+def _gains(mirror: CoupledMirror, drive_range_v: tuple[float, float]) -> tuple[list[float], ...]:
+    """Gains of all elements for small motions about rest, then for slow motions over the drive range."""
+    own = mirror.mirror
+    if not own.bank:
+        return ([],)
+    rest = [hysteresis.rest_gain(model) for model in own.bank]
+    still = linearised(own, rest)
+    moved = own.G + own.F @ np.linalg.solve(-still.A, still.B)  # q for slow drives
+    farthest = max(map(abs, drive_range_v)) * np.sum(np.abs(moved), axis=1)
+    return rest, [
+        hysteresis.output_amplitude(model, q) / q if q > 0.0 else small
+        for model, q, small in zip(own.bank, farthest.tolist(), rest, strict=True)
+    ]
 
 
 def line_of_sight(f: FinePointing, mirror_angle: str, outputs: Sequence[Output]) -> tuple[Floats, Floats | None]:
@@ -129,15 +146,13 @@ def line_of_sight(f: FinePointing, mirror_angle: str, outputs: Sequence[Output])
     return geometry.line_of_sight_matrix(scenario.optics(f, "mechanical")) @ leans, tilts[2:]
 
 
-def _refuse_unreachable(loop: PointingLoop, mirror: CoupledMirror) -> None:
+def _refuse_unreachable(linear: Sequence[PointingLoop]) -> None:
     """Raise ValueError where the actuators do not move the line of sight both ways."""
-    for gains in (hysteresis.rest_gain, hysteresis.slow_gain):
-        linear = mirror.mirror.linear([gains(model) for model in mirror.mirror.bank])
-        slow = loop.optics @ (linear.D - linear.C @ np.linalg.solve(linear.A, linear.B))
-        sizes = np.linalg.svd(slow, compute_uv=False)
-        if sizes.size < loop.axes or sizes[-1] * geometry.WORST_CONDITION < sizes[0] or not sizes[0] > 0.0:
+    for loop in linear:
+        sizes = np.linalg.svd(loop.optics @ in_band_gain(loop.mirror), compute_uv=False)
+        if sizes.size < loop.axes or not sizes[-1] * geometry.WORST_CONDITION >= sizes[0] > 0.0:
             raise ValueError(
-                f"the {mirror.mirror.actuators} actuator(s) of {mirror.mirror.name!r} do not move the line of sight in "
-                "both axes: one direction moves more than a factor of 10000 less than the other; check matrices.B and "
-                "the positions of the outputs"
+                f"the {loop.mirror.actuators} actuator(s) of {loop.mirror.name!r} do not move the line of sight in "
+                f"both axes: one direction moves more than {geometry.WORST_CONDITION:g} times less than the other; "
+                "check matrices.B and the positions of the outputs"
             )

@@ -1,11 +1,12 @@
-"""The plant that a controller of one axis is designed for."""
+"""The plant that a controller of one axis, or of all of them, is designed for."""
 
 from dataclasses import replace
 
 import numpy as np
 
 from microrad.core import lti
-from microrad.loop.control import AxisController, DesignPlant
+from microrad.core.arrays import Floats
+from microrad.loop.control import AxisController, DesignPlant, WholePlant
 from microrad.loop.disturbance import Disturbance
 from microrad.loop.pointing_loop.linear import ClosedLoop, close, gauge_noise_rad, open_loop
 from microrad.loop.pointing_loop.loop import PointingLoop, assemble, decoupling, nominal_axis_gain
@@ -22,34 +23,59 @@ def design_plant(loop: PointingLoop) -> DesignPlant:
     """
     if loop.axes != 1 or loop.mirror.actuators != 1:
         raise ValueError(f"a design needs a loop of one axis, not of {loop.axes}: design each axis by itself")
-    held = loop.optical.every
-    loop = read_each_sample(loop)
+    sampled, disturbances = _sampled(loop, decoupling(loop))
+    s, rows = sampled, np.zeros((1, sampled.order))
+    gauge = np.zeros((1, s.B.shape[1]))
+    has_gauge = loop.gauge is not None
+    if has_gauge:
+        rows, gauge[0, -1] = s.C[2:], gauge_noise_rad(loop) * abs(float(loop.optics[0, 0]))
+    found = lti.StateSpace(s.A, s.B, np.vstack([s.C[:2], rows]), np.vstack([s.D[:2], gauge]))
+    exact = lti.system_to_bits(found, lti.DESIGN_BITS)
+    return DesignPlant(loop.timing.period_s, exact, disturbances, nominal_axis_gain(loop), True, has_gauge)
+
+
+def whole_plant(loop: PointingLoop, to_drives: Floats) -> WholePlant:
+    """What controllers of all axes of this loop are designed for; sensor and lines as in `design_plant`.
+
+    Args:
+        loop: The loop; a gauge is not looked at.
+        to_drives: Commands of the axes to drives, shape (actuators, axes): `decoupling` of this loop or of one like it.
+    """
+    s, disturbances = _sampled(loop, to_drives)
+    white, axes = s.B.shape[1] - 1, loop.axes  # without the gauge's noise
+    seen = lti.StateSpace(s.A, s.B[:, :white], s.C[: 2 * axes], s.D[: 2 * axes, :white])
+    exact = lti.system_to_bits(seen, lti.DESIGN_BITS)
+    return WholePlant(loop.timing.period_s, exact, axes, disturbances, nominal_axis_gain(loop))
+
+
+def _sampled(loop: PointingLoop, to_drives: Floats) -> tuple[lti.StateSpace, int]:
+    """The loop over a control period, and the number of white sequences behind its disturbances.
+
+    Inputs: commands of the axes, white sequences, optical noise by axis, one for a gauge. Outputs: residuals, optical
+    readings, and the mirror at the line of sight without a gauge's noise.
+    """
+    spread = np.sqrt(loop.optical.every)  # of a hold's noise to low frequencies
     random = tuple(tuple(narrow_band(each) for each in several) for several in loop.disturbances)
-    loop = replace(loop, disturbances=random)
-    o = open_loop(loop)
+    loop = replace(read_each_sample(loop), disturbances=random)
+    o, axes = open_loop(loop), loop.axes
     keep = np.ones(o.at.order, dtype=bool)
     keep[o.at.held] = False
     shift = o.shift.copy()
     shift[o.newest] = 0.0
-    period, command, factor = np.eye(o.at.order), np.zeros((o.at.order, 1)), np.zeros((o.at.order, o.at.order))
+    period, command, factor = np.eye(o.at.order), np.zeros((o.at.order, axes)), np.zeros((o.at.order, o.at.order))
     for step in o.steps:
         period = step @ period
         factor = step @ factor @ step.T + o.noise @ o.noise.T
-    command[o.newest] = decoupling(loop)
+    command[o.newest] = to_drives
     root = lti.covariance_root(factor)
     noises = root[:, np.any(root != 0.0, axis=0)]
-    B = np.hstack([(period @ command), noises, np.zeros((o.at.order, 2))])[keep]
+    B = np.hstack([(period @ command), noises, np.zeros((o.at.order, axes + 1))])[keep]
     A = (period @ shift)[np.ix_(keep, keep)]
     rows = np.vstack([o.error, o.reading, loop.optics @ o.mirror])[:, keep]
-    gauge = gauge_noise_rad(loop) * abs(float(loop.optics[0, 0]))
-    D = np.zeros((3, B.shape[1]))
-    D[1, -2], D[2, -1] = loop.optical.noise_rad * np.sqrt(held), gauge
-    has_gauge = loop.gauge is not None
-    if not has_gauge:
-        rows[2] = 0.0
-    B[:, 1:] = lti.to_bits(B[:, 1:], lti.EXACT_BITS)
-    system = lti.system_to_bits(lti.StateSpace(A, B, rows, D), lti.DESIGN_BITS)
-    return DesignPlant(loop.timing.period_s, system, noises.shape[1], nominal_axis_gain(loop), True, has_gauge)
+    D = np.zeros((3 * axes, B.shape[1]))
+    D[axes : 2 * axes, -1 - axes : -1] = loop.optical.noise_rad * spread * np.eye(axes)
+    B[:, axes:] = lti.to_bits(B[:, axes:], lti.EXACT_BITS)
+    return lti.StateSpace(A, B, rows, D), noises.shape[1]
 
 
 def read_each_sample(loop: PointingLoop) -> PointingLoop:

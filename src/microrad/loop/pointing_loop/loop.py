@@ -120,8 +120,27 @@ def assemble(name: str, loop: PointingLoop, axis: AxisController | Sequence[Axis
     B = np.hstack([beside(c.system.B[:, :1] for c in each), by_gauge, np.zeros((A.shape[0], loop.axes))])
     gauge = np.array([c.system.D[0, 1] for c in each])[:, None] * loop.optics
     D = np.hstack([beside(c.system.D[:, :1] for c in each), gauge, np.zeros((loop.axes, loop.axes))])
-    system = lti.StateSpace(A, B, to_drives @ C, to_drives @ D)
-    return LoopController(name, system, windup @ np.linalg.pinv(to_drives))
+    return _on_drives(name, to_drives, lti.StateSpace(A, B, C, D), windup)
+
+
+def assemble_whole(name: str, loop: PointingLoop, system: lti.StateSpace, anti_windup: Floats) -> LoopController:
+    """One controller of all axes, with its commands decoupled; it looks at the optical errors alone.
+
+    Args:
+        name: What the controller is called.
+        loop: The loop.
+        system: From the optical error of each axis (rad) to the command of each (V).
+        anti_windup: What a cut-off command of each axis adds to the states, shape (states, axes).
+    """
+    others = loop.mirror.axes + loop.axes  # gauge readings, references
+    B, D = (np.pad(each, ((0, 0), (0, others))) for each in (system.B, system.D))
+    return _on_drives(name, decoupling(loop), lti.StateSpace(system.A, B, system.C, D), anti_windup)
+
+
+def _on_drives(name: str, to_drives: Floats, axes: lti.StateSpace, anti_windup: Floats) -> LoopController:
+    """A controller of axis commands as one of drives."""
+    system = lti.StateSpace(axes.A, axes.B, to_drives @ axes.C, to_drives @ axes.D)
+    return LoopController(name, system, anti_windup @ np.linalg.pinv(to_drives))
 
 
 def with_inverse(
@@ -201,23 +220,3 @@ def _drives_for_angles(loop: PointingLoop) -> Floats:
         return np.asarray(drives)
     free = np.linalg.svd(seen)[2][loop.axes :].T  # drives that move no axis
     return np.asarray(drives - free @ np.linalg.pinv(loop.held @ gain @ free) @ (loop.held @ gain @ drives))
-
-
-def axis_of(loop: PointingLoop, axis: int, to_drives: Floats) -> PointingLoop:
-    """One axis of the loop as its controller sees it, with the other axes at rest: its command in, its angle out.
-
-    Args:
-        loop: The loop.
-        axis: Number of the axis, from 0.
-        to_drives: Axis commands to drives, shape (actuators, axes): `decoupling` of this loop or of one like it.
-    """
-    m, into, seen = loop.mirror, to_drives[:, [axis]], loop.optics[[axis]]
-    one = replace(m, B=m.B @ into, G=m.G @ into, C=seen @ m.C, D=seen @ m.D @ into, K=seen @ m.K, inverse=())
-    return replace(
-        loop,
-        mirror=replace(one, inverse_creep=()),
-        optics=np.eye(1),
-        disturbances=loop.disturbances[axis : axis + 1],
-        references=loop.references[axis : axis + 1],
-        held=None,
-    )
