@@ -320,7 +320,7 @@ def test_a_family_that_contains_another_is_never_worse(monkeypatch):
     for plants in (spread, [NOISY]):
         known = tuning.tune(classical.PI, plants, HALF, seed=1)
         assert tuning.tune(classical.PI_NOTCH, plants, HALF, seed=1, base=known).mean_rms_rad <= known.mean_rms_rad
-    monkeypatch.setattr(tuning, "settle", lambda of, t: of.at(np.full(5, 0.4)))  # a search that ends somewhere
+    monkeypatch.setattr(tuning, "settle", lambda of, t, models: of.at(np.full(5, 0.4)))  # a search that ends somewhere
     found = tuning.tune(classical.PI_NOTCH, [NOISY], HALF, seed=1, base=known)
     assert found.values["notch depth"] == 1.0
 

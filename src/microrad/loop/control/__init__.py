@@ -18,7 +18,7 @@ from microrad.loop.control.classical import (
     RESONANT_DAMPING,
     peak_family,
 )
-from microrad.loop.control.lqg import LQG, Weights, lqg_controller, lqg_of_axes
+from microrad.loop.control.lqg import LQG, LQG_OF_AXES, Weights, lqg_controller, lqg_of_axes
 from microrad.loop.control.problem import (
     GAUGE,
     OPTICAL,
@@ -27,6 +27,7 @@ from microrad.loop.control.problem import (
     DesignPlant,
     Family,
     Specification,
+    WholeController,
     WholePlant,
 )
 from microrad.loop.control.sampled import (
@@ -56,6 +57,7 @@ __all__ = [
     "DISTURBANCE_OBSERVER",
     "GAUGE",
     "LQG",
+    "LQG_OF_AXES",
     "OPTICAL",
     "PI",
     "PI_NOTCH",
@@ -73,6 +75,7 @@ __all__ = [
     "Timing",
     "Tuned",
     "Weights",
+    "WholeController",
     "WholePlant",
     "amplifier_factor",
     "anti_windup",

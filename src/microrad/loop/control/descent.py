@@ -147,7 +147,7 @@ class _Quadratic:
         return self.slope + self.bend @ step
 
 
-def settle(search: Search, start: Trial) -> Trial:
+def settle(search: Search, start: Trial, models: int = MODELS) -> Trial:
     """Find the optimum beside a trial, by the optima of quadratic models until one stands still.
 
     A search that builds up its curvature as it goes stops where the cost hardly falls, which in a flat valley is
@@ -157,9 +157,10 @@ def settle(search: Search, start: Trial) -> Trial:
     Args:
         search: Judges the candidates.
         start: Trial near the optimum, as `descend` finds it.
+        models: Most quadratic models; each takes some twice the square of the parameters' number in candidates.
     """
     here, reach, node = start, REACH, NODE
-    for _ in range(MODELS if start.place.size else 0):
+    for _ in range(models if start.place.size else 0):
         model = _model(search, here, node)
         if model is None:
             break

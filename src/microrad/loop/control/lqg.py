@@ -24,6 +24,7 @@ from microrad.loop.control.problem import (
     DesignPlant,
     Family,
     Parameter,
+    WholeController,
     WholePlant,
     once_per_plant,
 )
@@ -100,8 +101,8 @@ def _controller(model: "Model", K: Floats, G: Floats, inputs: int, coarse: bool)
     return lti.system_to_bits(system, lti.EXACT_BITS) if coarse else system, driven
 
 
-def lqg_of_axes(plant: WholePlant, weights: Weights, *, coarse: bool = False) -> tuple[lti.StateSpace, Floats]:
-    """Optimal controller of several axes at once, from all optical errors to all commands, and its anti-windup input.
+def lqg_of_axes(plant: WholePlant, weights: Weights, *, coarse: bool = False) -> WholeController:
+    """Optimal controller of several axes at once, from all optical errors to all commands.
 
     As `lqg_controller`, with a random walk on each axis and the same weights for all of them.
 
@@ -117,7 +118,7 @@ def lqg_of_axes(plant: WholePlant, weights: Weights, *, coarse: bool = False) ->
     model = _observed_axes(in_own_units(plant), weights)
     K = filter_gain(model.A, model.noise, model.seen, model.seen_noise)
     G = regulator_gain(model, weights.command * plant.gain_rad_v**2)
-    return _controller(model, K, G, plant.axes, coarse)
+    return WholeController(LQG.name, *_controller(model, K, G, plant.axes, coarse))
 
 
 def _observed_axes(plant: WholePlant, weights: Weights) -> "Model":
@@ -380,7 +381,11 @@ def _parameters(plant: DesignPlant) -> tuple[Parameter, ...]:
     """Command weight, sensor noise and command noise, the last one around what the optical noise is worth in volts."""
     _refuse(plant, Weights(1.0, 1.0, 0.0))
     sensor = float(np.linalg.norm(_slow_response(plant)[OPTICAL, plant.disturbances :]))
-    unit = max(sensor, _walk(plant)[1]) / abs(plant.gain_rad_v)
+    return _weight_parameters(max(sensor, _walk(plant)[1]) / abs(plant.gain_rad_v))
+
+
+def _weight_parameters(unit: float) -> tuple[Parameter, ...]:
+    """The weights, with the command's noise around a unit in volts."""
     return (
         Parameter("command weight", "", 1e-4, 1e2, gentle=1e2),
         Parameter("sensor noise factor", "", 0.1, 30.0, gentle=30.0),
@@ -398,3 +403,21 @@ def _coarse(plant: DesignPlant, values: Floats) -> AxisController:
 
 LQG = Family("LQG", _parameters, _build, final=_coarse)
 """Linear-quadratic-Gaussian control, tuned by the weights of `Weights`."""
+
+
+def _parameters_of_axes(plant: WholePlant) -> tuple[Parameter, ...]:
+    """As for one axis: the command's noise around what the optical noise of an axis is worth in volts."""
+    corner = np.array([WALK_CORNER / plant.period_s])
+    there = np.abs(lti.frequency_response(plant.system, corner, plant.period_s)[0, plant.axes :, plant.axes :])
+    noise, level = np.linalg.norm(there[:, plant.disturbances :]), np.linalg.norm(there)
+    unit = max(float(noise), 1e-6 * float(level)) / (math.sqrt(plant.axes) * abs(plant.gain_rad_v))
+    return _weight_parameters(unit)
+
+
+LQG_OF_AXES = Family(
+    LQG.name,
+    _parameters_of_axes,
+    lambda plant, values: lqg_of_axes(plant, Weights(*(float(v) for v in values))),
+    final=lambda plant, values: lqg_of_axes(plant, Weights(*(float(v) for v in values)), coarse=True),
+)
+"""LQG of all axes at once."""

@@ -3,13 +3,16 @@
 import functools
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from microrad.core import lti
 from microrad.core.arrays import Floats
 
 _Answer = TypeVar("_Answer")
 _Plant = TypeVar("_Plant")
+
+_KEPT = 4
+"""Plants whose answers are kept: one for each axis of a loop, and what a design makes of one in between."""
 
 RESIDUAL, OPTICAL, GAUGE = range(3)
 """Outputs of a design plant; a controller's inputs are the last two, in this order."""
@@ -58,15 +61,16 @@ class WholePlant:
 
 
 def once_per_plant(of: Callable[[_Plant], _Answer]) -> Callable[[_Plant], _Answer]:
-    """Let a function keep its last answer: a search asks the same of one plant for each of its candidates."""
-    last: tuple[_Plant, _Answer] | None = None
+    """Let a function keep its last answers: a search asks the same of a few plants for each of its candidates."""
+    last: dict[int, tuple[_Plant, _Answer]] = {}  # a plant that is kept keeps its identity
 
     @functools.wraps(of)
     def asked(plant: _Plant) -> _Answer:
-        nonlocal last
-        kept = last
+        kept = last.get(id(plant))
         if kept is None or kept[0] is not plant:
-            last = kept = (plant, of(plant))
+            last[id(plant)] = kept = (plant, of(plant))
+            while len(last) > _KEPT:
+                last.pop(next(iter(last)), None)
         return kept[1]
 
     return asked
@@ -80,6 +84,15 @@ class AxisController:
     gauge's reading of the mirror (rad), a zero column where a design does not use it. Output: command (V).
     ``anti_windup`` is L, shape (states, 1).
     """
+
+    name: str
+    system: lti.StateSpace
+    anti_windup: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class WholeController:
+    """A controller of all axes, as `AxisController`: from the optical error of each axis (rad) to its command (V)."""
 
     name: str
     system: lti.StateSpace
@@ -120,12 +133,13 @@ class Family:
     ``parameters`` and ``build`` may raise ValueError with the reason when the plant has no such controller (no gauge to
     damp with, no wheel line to filter). A family that contains another names it as ``base``; ``extended`` turns the
     values of that one into its own, for the same controller or the nearest that it has. ``final`` builds what is used
-    in the end, where that has coarser numbers than what a search wants smooth.
+    in the end, where that has coarser numbers than what a search wants smooth. Plants and controllers are of one axis
+    (`DesignPlant`, `AxisController`) or of all axes (`WholePlant`, `WholeController`).
     """
 
     name: str
-    parameters: Callable[[DesignPlant], tuple[Parameter, ...]]
-    build: Callable[[DesignPlant, Floats], AxisController]
+    parameters: Callable[[Any], tuple[Parameter, ...]]
+    build: Callable[[Any, Floats], Any]
     base: "Family | None" = None
-    extended: Callable[[DesignPlant, Floats], Floats] | None = None
-    final: Callable[[DesignPlant, Floats], AxisController] | None = None
+    extended: Callable[[Any, Floats], Floats] | None = None
+    final: Callable[[Any, Floats], Any] | None = None

@@ -1,15 +1,16 @@
 """The search that a tuning does: candidates built, judged and counted, and their places within the bounds."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any, Protocol
 
 import numpy as np
 
 from microrad.core.arrays import Floats
-from microrad.loop.control.analysis import LoopMargins, loop_margins, refuse_misfit
+from microrad.loop.control.analysis import loop_margins, refuse_misfit
 from microrad.loop.control.judge import Judge, Verdict
-from microrad.loop.control.problem import AxisController, DesignPlant, Family, Parameter, Specification
+from microrad.loop.control.problem import Family, Parameter, Specification
 
 HEADROOM = 1e-3
 """Relative excess over what is asked for that a search aims at: rounding what it finds takes a little of it."""
@@ -17,6 +18,46 @@ HEADROOM = 1e-3
 PULL = 1e-3
 """Share of the rms that the most vigorous value of a parameter counts for: where less than that tells two candidates
 apart, the gentler one is chosen (see `Parameter`), and the optimum is one point however flat the residual is."""
+
+
+class Judging(Protocol):
+    """Judges many controllers on the same plants; ``open_rad2`` is the mean variance without one."""
+
+    open_rad2: float
+
+    def several(self, controllers: Sequence[Any]) -> list[Verdict]:
+        """Verdicts on controllers, in their order."""
+
+    def unstable(self, pole: float) -> Verdict:
+        """What is said of a candidate that is unstable, or that could not be built."""
+
+
+class Margins(Protocol):
+    """What a specification asks of a loop that is looked at closely."""
+
+    @property
+    def modulus(self) -> float:
+        """Least distance from -1."""
+
+    @property
+    def bandwidth_hz(self) -> float:
+        """Lowest frequency that is not rejected any more."""
+
+
+@dataclass(frozen=True, slots=True)
+class Scope:
+    """What a search is about, one axis or all of them: how plants and controllers of its kind are looked at.
+
+    ``judge`` makes a judge for plants; ``misfit`` and ``margins`` take a plant and a controller, and raise ValueError
+    where the controller does not fit it.
+    """
+
+    judge: Callable[[Sequence[Any]], Judging]
+    misfit: Callable[[Any, Any], None]
+    margins: Callable[[Any, Any], Margins]
+
+
+ONE_AXIS = Scope(Judge, refuse_misfit, loop_margins)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,9 +96,10 @@ class Search:
     def __init__(
         self,
         family: Family,
-        plants: Sequence[DesignPlant],
+        plants: Sequence[Any],
         specification: Specification,
         pull: float = PULL,
+        scope: Scope = ONE_AXIS,
     ) -> None:
         """Begin a tuning, with no candidate judged yet.
 
@@ -66,18 +108,19 @@ class Search:
             plants: The nominal plant first, then others that it could also be.
             specification: Modulus margin and bandwidth that every plant has to have.
             pull: Share of the rms that the most vigorous value of a parameter counts for, see `PULL`; 0 for none.
+            scope: What the plants and the family's controllers are.
 
         Raises:
             ValueError: The plants do not fit together, or the family has no controller for the nominal one.
         """
         self.family, self.plants, self.specification = family, plants, specification
         self.parameters = family.parameters(plants[0]) if plants else ()
-        self.judge = Judge(plants)
+        self.judge, self._scope = scope.judge(plants), scope
         self.trials: list[Trial] = []
         self.count = 0
         self.optimism = 1.0  # by how much the grid has been seen to overstate the modulus margin
         self.reason: ValueError | None = None
-        self._looked: dict[bytes, list[LoopMargins]] = {}
+        self._looked: dict[bytes, list[Margins]] = {}
         self._gentle = np.array([0.0 if p.gentle is None else place_of(p, p.gentle) for p in self.parameters])
         self._pull = pull
 
@@ -123,22 +166,22 @@ class Search:
         self.count += len(trials)
         return trials
 
-    def _built(self, values: Floats) -> AxisController | None:
+    def _built(self, values: Floats) -> Any:
         """The controller of these values; None, and the first reason kept, where it cannot be built."""
         try:
             controller = self.family.build(self.plants[0], values)
-            refuse_misfit(self.plants[0], controller)
+            self._scope.misfit(self.plants[0], controller)
         except ValueError as error:
             self.reason = self.reason or error
             return None
         return controller
 
-    def margins(self, trial: Trial) -> list[LoopMargins]:
+    def margins(self, trial: Trial) -> list[Margins]:
         """Margins of a stable trial on all plants, looked at closely; once for each."""
         key = trial.values.tobytes()
         if key not in self._looked:
             controller = self.family.build(self.plants[0], trial.values)
-            self._looked[key] = [loop_margins(p, controller) for p in self.plants]
+            self._looked[key] = [self._scope.margins(p, controller) for p in self.plants]
         return self._looked[key]
 
     def _trial(self, place: Floats, values: Floats, verdict: Verdict) -> Trial:

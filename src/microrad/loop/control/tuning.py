@@ -10,7 +10,7 @@ import numpy as np
 from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
 from microrad.loop.control.analysis import LoopMargins, close, h2, loop_margins
-from microrad.loop.control.descent import descend, settle
+from microrad.loop.control.descent import MODELS, descend, settle
 from microrad.loop.control.problem import RESIDUAL, AxisController, DesignPlant, Family, Specification
 from microrad.loop.control.search import HEADROOM, Search, Trial, apart, rounded
 
@@ -112,7 +112,7 @@ def tune(
         if sum(t.score < min(map(_score, rough)) + 0.1 * CLOSE for t in rough) >= AGREE:
             break
     finalists = apart(sorted(rough, key=_score), FINALISTS, 0.02)
-    found = _tuned(search, _settled(search, [t for t in finalists if t.score < finalists[0].score + CLOSE]))
+    found = _tuned(search, settled(search, [t for t in finalists if t.score < finalists[0].score + CLOSE]))
     better = [
         t for t in contained if t.verdict.pole < 1.0 and _mean_rms_rad(_variances(search, t)[1]) < found.mean_rms_rad
     ]
@@ -154,10 +154,19 @@ def _score(trial: Trial) -> float:
     return trial.score
 
 
-def _settled(search: Search, optima: Sequence[Trial]) -> Trial:
-    """The best of some optima, its values rounded. Raises ValueError where it does not keep the specification."""
+def settled(search: Search, optima: Sequence[Trial], models: int = MODELS) -> Trial:
+    """The best of some optima, followed to its last digit and its values rounded.
+
+    Args:
+        search: Judges the candidates.
+        optima: Trials near optima.
+        models: Most quadratic models on the way to the last digit, see `settle`.
+
+    Raises:
+        ValueError: It does not keep the specification.
+    """
     for _ in range(OVERSTATED):
-        optima = [settle(search, t) for t in optima]
+        optima = [settle(search, t, models) for t in optima]
         best = min(optima, key=lambda t: (round(t.score, SAME_COST), *t.values))
         found = search.of(np.array([rounded(v) for v in best.values]), best.place)
         if _holds(search, found):
@@ -239,8 +248,7 @@ def _mean_rms_rad(variances: Sequence[float]) -> float:
 
 def _tuned(search: Search, trial: Trial) -> Tuned:
     controller, variances = _variances(search, trial)
-    final = search.family.final is not None
-    margins = [loop_margins(p, controller) for p in search.plants] if final else search.margins(trial)
+    margins = [loop_margins(p, controller) for p in search.plants]
     evaluations = search.count
     modulus, bandwidth = min(m.modulus for m in margins), min(m.bandwidth_hz for m in margins)
     asked = search.specification

@@ -1,65 +1,55 @@
 """Controllers for a mirror of several axes: decoupled, one loop an axis, judged all together on the whole mirror."""
 
+from collections import ChainMap
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 
-from microrad.core import lti
-from microrad.core.arrays import Complexes, Floats
+from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
 from microrad.core.threads import shared_out
-from microrad.loop.control import (
-    LQG,
-    Family,
-    MultiloopMargin,
-    Specification,
-    Tuned,
-    WholePlant,
-    multiloop_disk_margin,
-    tune,
-)
-from microrad.loop.control.analysis import resolving
+from microrad.loop.control import LQG, LQG_OF_AXES, PI, Family, Specification, WholeController, WholePlant, tune
+from microrad.loop.control.descent import descend
+from microrad.loop.control.search import Search, Trial, apart
+from microrad.loop.control.tuning import settled
 from microrad.loop.controller_study import designs as one_axis
 from microrad.loop.controller_study.results import Outlook, shortened
-from microrad.loop.coupled_study.scene import CoupledScene
-from microrad.loop.coupled_study.whole import lqg_for, with_others_closed
+from microrad.loop.coupled_study.scene import AXES, CoupledScene
+from microrad.loop.coupled_study.whole import ALL_AXES, WholeMargins, alone, of_all_axes, whole_margins
 from microrad.loop.pointing_loop.design import whole_plant
-from microrad.loop.pointing_loop.linear import ClosedLoop, close, loop_response, stationary
-from microrad.loop.pointing_loop.loop import LoopController, assemble, assemble_whole, decoupling
+from microrad.loop.pointing_loop.linear import close, stationary
+from microrad.loop.pointing_loop.loop import LoopController, assemble_whole, decoupling
 from microrad.mission.tables.fine_pointing import FinePointing
 
-ROUNDS = 6
-"""Times that all axes are tuned in turn, until the whole keeps the mission's margin."""
+STARTS = 3
+"""Places from which the weights of LQG are followed."""
 
-HEADROOM, MOST = 1.05, 0.9
-"""What a margin of an axis is raised by beyond what was missed of the whole, and its largest."""
+MODELS = 8
+"""Quadratic models of the whole that an optimum is followed by: with ten parameters each takes 220 candidates."""
+
+SURVEY = 40
+"""Places that the search of an axis by itself begins with, whose result is but where that of the whole begins."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CoupledDesign:
     """One controller of all axes, and what the whole loop has of it.
 
-    ``tuned`` are the values that it was tuned to: by axis, or those of all axes at once. ``modulus`` is the least singular value of 1 + L, the loop gain at the line of sight with both axes closed, over all
-    frequencies and linear loops of the scene, and ``margin`` the smallest disk margin against changes of both loops at
-    once. ``residual_rad`` is the rms of each axis for small motions about rest, linear, and ``worst_rad`` the largest
-    of each axis over all linear loops.
+    ``tuned`` are the values that it was tuned to, by name. ``margins`` are the smallest over all linear loops of the
+    scene, each with all axes closed. ``residual_rad`` is the rms of each axis for small motions about rest, linear, and
+    ``worst_rad`` the largest of each axis over all linear loops.
     """
 
     name: str
-    tuned: tuple[Mapping[str, float], ...]
+    tuned: Mapping[str, float]
     controller: LoopController
-    modulus: float
-    margin: MultiloopMargin
+    margins: WholeMargins
     residual_rad: Floats
     worst_rad: Floats
-
-    @property
-    def total_rad(self) -> float:
-        """Radial rms for small motions about rest, linear."""
-        return float(np.linalg.norm(self.residual_rad))
 
 
 class CoupledDesigns(NamedTuple):
@@ -85,9 +75,9 @@ def design(
 ) -> CoupledDesigns:
     """Design controllers that keep the modulus margin with all axes closed.
 
-    LQG is one controller of all axes. Of the other families each axis has one: they are tuned in turn, each with those
-    of the other axes at work, and for a larger margin of its own where the whole lacks some. No family is worse than
-    the one that it contains.
+    LQG is one controller of all axes. Of the other families each axis has one, and those of all axes are tuned
+    together: their search begins where each axis is best by itself, and where the family that they contain is best, so
+    that they are never worse than that.
 
     Args:
         scene: The mission's loop.
@@ -105,102 +95,90 @@ def design(
         if name not in has:
             raise ValueError(f"{name!r} is no controller of a mirror of several axes; there are {', '.join(has)}")
     of, families = plants(scene), {family.name: family for family in one_axis.families(scene.table)}
-    order = sorted(wanted, key=lambda name: name != LQG.name)
-    jobs = [partial(_designed_or_why, scene, families[name], of) for name in order]
-    with shared_out(jobs, lambda turn: on_progress(turn, len(order), f"tuning {order[turn]}")) as results:
-        found = dict(zip(order, results(), strict=True))
-    on_progress(len(order), len(order), "controllers tuned")
+    turns = [[name for name in wanted if families[name].base or families[name] is PI], *([n] for n in wanted)]
+    turns = [turn for i, turn in enumerate(turns) if turn and (i == 0 or not {*turn} & {*turns[0]})]
+    jobs = [partial(_designed_in_turn, scene, [families[name] for name in turn], of) for turn in turns]
+    with shared_out(jobs, lambda i: on_progress(i, len(turns), f"tuning {turns[i][0]}")) as results:
+        found: ChainMap[str, CoupledDesign | str] = ChainMap(*results())
+    on_progress(len(turns), len(turns), "controllers tuned")
     made = {name: each for name, each in found.items() if isinstance(each, CoupledDesign)}
     if not made:
         raise ValueError("; ".join(str(found[name]) for name in wanted))
-    for name, own in made.items():
-        inner = families[name].base
-        base = made.get(inner.name) if inner else None
-        if base is not None and base.total_rad < own.total_rad:
-            made[name] = replace(base, name=name, controller=replace(base.controller, name=name))
     return CoupledDesigns(
         tuple(made[name] for name in wanted if name in made),
         {name: str(found[name]) for name in wanted if name not in made},
     )
 
 
-def _designed_or_why(scene: CoupledScene, family: Family, of: Sequence[WholePlant]) -> CoupledDesign | str:
-    try:
-        return (_all_at_once if family is LQG else _in_turn)(scene, family, of)
-    except ValueError as error:
-        return str(error)
-
-
-def _all_at_once(scene: CoupledScene, family: Family, of: Sequence[WholePlant]) -> CoupledDesign:
-    system, windup, values = lqg_for(of, scene.table.modulus_margin)
-    found = _judged(scene, assemble_whole(family.name, scene.rest, system, windup), (values,))
-    _refuse_missed(scene, found)
+def _designed_in_turn(
+    scene: CoupledScene, families: Sequence[Family], of: Sequence[WholePlant]
+) -> dict[str, CoupledDesign | str]:
+    """The controller of each family, or why there is none; a base comes before what contains it, and is done once."""
+    found: dict[str, CoupledDesign | str] = {}
+    for family in sorted(families, key=lambda each: each.base is not None):
+        base = family.base and found.get(family.base.name)
+        try:
+            found[family.name] = _designed(scene, family, of, base if isinstance(base, CoupledDesign) else None)
+        except ValueError as error:
+            found[family.name] = str(error)
     return found
 
 
-def _in_turn(scene: CoupledScene, family: Family, of: Sequence[WholePlant]) -> CoupledDesign:
-    """One controller an axis, tuned in turn with the others at work."""
-    axes = range(scene.loop.axes)
-    margin = scene.table.modulus_margin
-    controllers: list[lti.StateSpace | None] = [None for _ in axes]
-    tuned: dict[int, Tuned] = {}
-    best: CoupledDesign | None = None
-    for _ in range(ROUNDS):
-        for axis in axes:
-            others = [with_others_closed(plant, axis, controllers) for plant in of]
-            tuned[axis] = tune(family, others, Specification(margin), seed=scene.table.seed)
-            s = tuned[axis].controller.system
-            controllers[axis] = lti.StateSpace(s.A, s.B[:, :1], s.C, s.D[:, :1])
-        made = assemble(family.name, scene.rest, [tuned[axis].controller for axis in axes])
-        found = _judged(scene, made, tuple(tuned[axis].values for axis in axes))
-        best = found if best is None or found.modulus > best.modulus else best
-        if found.modulus >= scene.table.modulus_margin:
-            return found
-        short = scene.table.modulus_margin / max(found.modulus, 0.5 * scene.table.modulus_margin)
-        margin = min(HEADROOM * margin * short, MOST)
-    assert best is not None
-    _refuse_missed(scene, best)
-    return best
+def _designed(
+    scene: CoupledScene, family: Family, of: Sequence[WholePlant], base: CoupledDesign | None
+) -> CoupledDesign:
+    """The best controller of a family, beginning where each axis is best by itself and where its base is best."""
+    asked = Specification(scene.table.modulus_margin)
+    whole = LQG_OF_AXES if family is LQG else of_all_axes(family, of[0], AXES)
+    search = Search(whole, of, asked, scope=ALL_AXES)
+    begun = _weights(search) if family is LQG else [_by_axis(scene, family, of, search)]
+    if base is not None and family.extended is not None:
+        parts = np.split(np.array(list(base.tuned.values())), scene.loop.axes)
+        extended = [family.extended(alone(of[0], axis), part) for axis, part in enumerate(parts)]
+        begun.append(search.of(np.concatenate(extended)))
+    near = min((descend(search, each) for each in begun), key=lambda t: t.score)
+    best = settled(search, [near], MODELS)
+    made = (whole.final or whole.build)(of[0], best.values)
+    values = dict(zip((p.name for p in search.parameters), best.values.tolist(), strict=True))
+    return _judged(scene, of, made, values)
 
 
-def _refuse_missed(scene: CoupledScene, found: CoupledDesign) -> None:
-    asked = scene.table.modulus_margin
-    if found.modulus < asked:
-        raise ValueError(
-            f"{found.name} keeps a modulus margin of {found.modulus:.3g} with all axes closed, where {asked:g} is "
-            "asked for: the axes pull on each other too much; lower fine_pointing.modulus_margin, or take another "
-            "controller"
-        )
+def _weights(search: Search) -> list[Trial]:
+    """Places all over the weights of LQG, of which the best ones are followed."""
+    fifths = [(np.arange(5) + 0.5) / 5.0] * len(search.parameters)
+    surveyed = search.at_all([np.array(place) for place in product(*fifths)])
+    return apart(sorted(surveyed, key=lambda t: t.score), STARTS, 0.1)
 
 
-def _judged(scene: CoupledScene, controller: LoopController, values: tuple[Mapping[str, float], ...]) -> CoupledDesign:
-    """A controller with the worst of the linear loops under it; no margin where one is unstable."""
-    closed = [close(loop, controller) for loop in scene.linear]
-    if max(each.worst_pole()[0] for each in closed) >= 1.0:
-        nothing = np.full(scene.loop.axes, np.inf)
-        return CoupledDesign(controller.name, values, controller, 0.0, MultiloopMargin(0.0, 0.0), nothing, nothing)
-    gains = [_loop_gain(each) for each in closed]
-    moduli = (np.linalg.svd(np.eye(scene.loop.axes) + L, compute_uv=False)[:, -1] for _, L in gains)
-    left = np.array([np.sqrt(stationary(each).error) for each in closed])
+def _by_axis(scene: CoupledScene, family: Family, of: Sequence[WholePlant], search: Search) -> Trial:
+    """Each axis as it is best by itself."""
+    seed = scene.table.seed
+    alike = [
+        tune(family, [alone(plant, axis) for plant in of], search.specification, seed=seed, survey=SURVEY)
+        for axis in range(scene.loop.axes)
+    ]
+    return search.of(np.array([value for each in alike for value in each.values.values()]))
+
+
+def _judged(
+    scene: CoupledScene, of: Sequence[WholePlant], controller: WholeController, values: Mapping[str, float]
+) -> CoupledDesign:
+    """A controller with what all linear loops have under it."""
+    made = assemble_whole(controller.name, scene.rest, controller.system, controller.anti_windup)
+    margins = [whole_margins(plant, controller) for plant in of]
+    left = np.array([np.sqrt(stationary(close(loop, made)).error) for loop in scene.linear])
     return CoupledDesign(
         controller.name,
         values,
-        controller,
-        min(float(np.min(each)) for each in moduli),
-        min((multiloop_disk_margin(*each) for each in gains), key=lambda margin: margin.disk),
+        made,
+        WholeMargins(
+            min(each.modulus for each in margins),
+            min((each.disk for each in margins), key=lambda margin: margin.disk),
+            min(each.bandwidth_hz for each in margins),
+        ),
         left[0],
         np.max(left, axis=0),
     )
-
-
-def _loop_gain(closed: ClosedLoop) -> tuple[Floats, Complexes]:
-    """Frequencies that show every resonance, open and closed, and the loop gain at the line of sight there."""
-    period, whole = closed.open.loop.timing.period_s, np.asarray(closed.open.shift)
-    for step in closed.open.steps:
-        whole = step @ whole
-    maps = whole, closed.controller.system.A, closed.monodromy
-    freq = resolving(np.concatenate([np.linalg.eigvals(each) for each in maps]), period)
-    return freq, loop_response(closed, freq)
 
 
 def outlook(

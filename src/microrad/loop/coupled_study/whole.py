@@ -1,163 +1,256 @@
-"""All axes at once: what controllers of several axes leave and how far they are from -1, and LQG tuned for both."""
+"""All axes at once: what a controller of all of them leaves, how far its loop is from -1, and families of such."""
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from itertools import product
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from microrad.core import lti
-from microrad.core.arrays import Floats
-from microrad.loop.control import DesignPlant, Weights, WholePlant, lqg_of_axes, rounded
-from microrad.loop.control.judge import grid, quadrature
+from microrad.core.arrays import Complexes, Floats
+from microrad.loop.control import (
+    AxisController,
+    DesignPlant,
+    Family,
+    MultiloopMargin,
+    WholeController,
+    WholePlant,
+    multiloop_disk_margin,
+)
+from microrad.loop.control.analysis import bandwidth_hz, reachable, resolving
+from microrad.loop.control.judge import CLOSER, NEAR_LEAST, Verdict, grid, quadrature
+from microrad.loop.control.problem import Parameter
+from microrad.loop.control.search import Scope
 
-SPANS = {"command weight": (1e-8, 1e2), "sensor noise factor": (0.1, 30.0), "command noise": (1e-3, 10.0)}
-"""Bounds of what LQG is tuned by; the command's noise over what the optical noise is worth in volts."""
-
-COARSE, FINE = 1.0, 1.0 / 32.0
-"""First and last step of the search, in decades of each weight."""
-
-MOVES = np.array([move for move in product((-1.0, 0.0, 1.0), repeat=3) if any(move)])
-"""Directions that the search looks in."""
-
-PRICE = 20.0
-"""What a missing modulus margin costs a candidate, over its residual: more than any weight gains by it."""
+BANDS = 10
+"""Bands of frequencies, in each of which the least modulus is a smooth number of its own."""
 
 
 @dataclass(frozen=True, slots=True)
-class Closed:
-    """What a controller of all axes has on several plants: worst pole, mean variance (rad^2), least modulus."""
+class WholeMargins:
+    """Margins of a stable loop of all axes.
 
-    pole: float
-    mean_rad2: float
+    ``modulus`` is the least singular value of 1 + L, L the loop gain at the optical sensor, ``disk`` the disk margin
+    against changes of all loops at once, and ``bandwidth_hz`` the lowest frequency at which the error of some direction
+    is not rejected any more: the largest singular value of the sensitivity reaches 1.
+    """
+
     modulus: float
+    disk: MultiloopMargin
+    bandwidth_hz: float
 
 
 class WholeJudge:
     """Residual and margin of any controller of all axes on some plants, from responses that are computed once."""
 
     def __init__(self, plants: Sequence[WholePlant]) -> None:
-        """Compute the responses of the plants.
+        """Compute the responses of the plants, once for all controllers.
 
         Args:
             plants: Plants of the same axes and control period.
         """
-        self.plants, self.axes, self._period = plants, plants[0].axes, plants[0].period_s
+        self._plants, self._moved = plants, [_moved(p) for p in plants]
         self._freq = [grid(p.system, p.period_s) for p in plants]
-        self._responses = [
-            lti.frequency_response(p.system, f, p.period_s) for p, f in zip(plants, self._freq, strict=True)
-        ]
+        self._different, places = np.unique(
+            np.concatenate(self._freq), return_inverse=True
+        )  # plants share most of them
+        self._places = np.split(places, np.cumsum([f.size for f in self._freq])[:-1])
+        self._whole = [lti.frequency_response(p.system, f, p.period_s) for p, f in zip(plants, self._freq, strict=True)]
+        edges = [np.geomspace(1e-3, 0.5, BANDS)[:-1] / p.period_s for p in plants]
+        bands = [np.searchsorted(e, f, side="right") for e, f in zip(edges, self._freq, strict=True)]
+        self._bands = [np.flatnonzero(np.diff(each, prepend=-1)) for each in bands]
+        # Residuals and readings of the white sequences by a triangular factor of the same size: as few columns as rows.
+        turned = [whole[:, :, p.axes :].conj().swapaxes(1, 2) for p, whole in zip(plants, self._whole, strict=True)]
+        self._white = [np.asarray(np.linalg.qr(each, "r")).conj().swapaxes(1, 2) for each in turned]
+        without = (self._variance(i, white[:, : plants[0].axes]) for i, white in enumerate(self._white))
+        self.open_rad2 = float(np.mean(list(without)))
 
-    def __call__(self, system: lti.StateSpace) -> Closed:
-        """Judge one controller, from optical errors to commands of the axes."""
-        pole = max(spectral_radius(p, system) for p in self.plants)
+    def several(self, controllers: Sequence[WholeController]) -> list[Verdict]:
+        """Judge controllers one by one."""
+        return [self._judged(each.system) for each in controllers]
+
+    def unstable(self, pole: float) -> Verdict:
+        """What is said of a candidate that is unstable, or that could not be built."""
+        return Verdict(pole, math.inf, np.zeros(sum(map(len, self._bands))), np.zeros(len(self._plants)))
+
+    def _judged(self, system: lti.StateSpace) -> Verdict:
+        pole = max(float(np.max(np.abs(np.linalg.eigvals(closed_map(p, system))))) for p in self._moved)
         if not pole < 1.0 - 1e-9:
-            return Closed(pole, math.inf, 0.0)
-        variances, moduli = zip(*map(self._on, range(len(self.plants)), [system] * len(self.plants)), strict=True)
-        return Closed(pole, float(np.mean(variances)), min(moduli))
+            return self.unstable(pole)
+        variances, moduli = [], []
+        response = _response(system, self._different, self._plants[0].period_s)
+        for i, (p, freq, whole) in enumerate(zip(self._moved, self._freq, self._whole, strict=True)):
+            axes, K = p.axes, response[self._places[i]]
+            returned = np.eye(axes) - whole[:, axes:, :axes] @ K
+            taken = whole[:, :axes, :axes] @ (K @ _inverse(returned))
+            variances.append(self._variance(i, self._white[i][:, :axes] + taken @ self._white[i][:, axes:]))
+            moduli.append(np.minimum.reduceat(least_moduli(p, system, freq, returned), self._bands[i]))
+        return Verdict(pole, float(np.mean(variances)), np.concatenate(moduli), np.zeros(len(self._plants)))
 
-    def _on(self, number: int, system: lti.StateSpace) -> tuple[float, float]:
-        freq, whole, axes = self._freq[number], self._responses[number], self.axes
-        rows = lti.resolvent_rows(system.A[None], system.C[None], np.exp(2j * math.pi * freq * self._period))[0]
-        K = np.moveaxis(rows, 2, 0) @ system.B + system.D
-        returned = np.eye(axes) - whole[:, axes:, :axes] @ K
-        seen = np.linalg.solve(returned, whole[:, axes:, axes:])
-        left = whole[:, :axes, axes:] + whole[:, :axes, :axes] @ (K @ seen)
+    def _variance(self, number: int, left: Complexes) -> float:
         spectrum = np.sum(left.real**2 + left.imag**2, axis=(1, 2))
-        modulus = float(np.min(np.linalg.svd(returned, compute_uv=False)[:, -1]))
-        return 2.0 * self._period * float(quadrature(freq) @ spectrum), modulus
+        return 2.0 * self._plants[number].period_s * float(quadrature(self._freq[number]) @ spectrum)
 
 
-def spectral_radius(plant: WholePlant, system: lti.StateSpace) -> float:
-    """Largest |z| of the loop of all axes; infinite where a number is not finite."""
+def least_moduli(plant: WholePlant, system: lti.StateSpace, freq: Floats, returned: Complexes) -> Floats:
+    """Least singular values of 1 + L on a grid, each local minimum by what is least between its points.
+
+    A parabola through a minimum and its neighbours tells where it is; what is near the least of all is looked at again
+    there, more closely each time, so that the least moves smoothly with the controller.
+
+    Args:
+        plant: The plant of all axes, without what its commands do not reach.
+        system: A controller from the optical errors to the commands.
+        freq: The grid, rising, in Hz.
+        returned: 1 + L there, shape (frequencies, axes, axes).
+    """
+    squared = _least_squares(returned)
+    before, after = freq[1:-1] - freq[:-2], freq[2:] - freq[1:-1]
+    left, right = (squared[1:-1] - squared[:-2]) / before, (squared[2:] - squared[1:-1]) / after
+    slope, bend = (left * after + right * before) / (before + after), (right - left) / (before + after)
+    dips = np.flatnonzero((left < 0.0) & (right > 0.0))
+    where, lowest = freq[1 + dips] - slope[dips] / (2.0 * bend[dips]), squared.copy()
+    lowest[1 + dips] -= slope[dips] ** 2 / (4.0 * bend[dips])
+    near = dips[lowest[1 + dips] < NEAR_LEAST**2 * np.min(lowest)]
+    where, width = where[np.isin(dips, near)], np.minimum(before[near], after[near])
+    for share in CLOSER if near.size else ():
+        points = where[:, None] + share * width[:, None] * np.array([-1.0, 0.0, 1.0])
+        low, middle, high = _least_squares(_returned(plant, system, points.ravel())).reshape(-1, 3).T
+        slope, bend = 0.5 * (high - low), high - 2.0 * middle + low
+        moved = np.clip(np.where(bend > 0.0, -slope / np.where(bend > 0.0, bend, 1.0), 0.0), -0.5 / share, 0.5 / share)
+        where = where + moved * share * width
+        lowest[1 + near] = middle + moved * (slope + 0.5 * moved * bend)
+    return np.sqrt(np.maximum(lowest, 0.0))
+
+
+def _returned(plant: WholePlant, system: lti.StateSpace, freq: Floats) -> Complexes:
+    """1 + L, the loop cut at the optical sensor, shape (frequencies, axes, axes)."""
+    s, axes = plant.system, plant.axes
+    to_sensor = lti.StateSpace(s.A, s.B[:, :axes], s.C[axes:], np.zeros((axes, axes)))
+    to_command = lti.frequency_response(system, freq, plant.period_s)
+    return np.asarray(np.eye(axes) - lti.frequency_response(to_sensor, freq, plant.period_s) @ to_command)
+
+
+def _least_squares(matrices: Complexes) -> Floats:
+    """Squares of the least singular values of matrices of two rows and columns."""
+    squares = np.sum(matrices.real**2 + matrices.imag**2, axis=(1, 2))
+    area = np.abs(_determinant(matrices)) ** 2
+    return np.asarray(2.0 * area / (squares + np.sqrt(np.maximum(squares**2 - 4.0 * area, 0.0))))
+
+
+def _determinant(matrices: Complexes) -> Complexes:
+    return np.asarray(matrices[:, 0, 0] * matrices[:, 1, 1] - matrices[:, 0, 1] * matrices[:, 1, 0])
+
+
+def _inverse(matrices: Complexes) -> Complexes:
+    """Inverses of matrices of two rows and columns."""
+    found = np.empty_like(matrices)
+    found[:, 0, 0], found[:, 1, 1] = matrices[:, 1, 1], matrices[:, 0, 0]
+    found[:, 0, 1], found[:, 1, 0] = -matrices[:, 0, 1], -matrices[:, 1, 0]
+    return np.asarray(found / _determinant(matrices)[:, None, None])
+
+
+def _moved(plant: WholePlant) -> WholePlant:
+    """The plant without the states that its commands do not reach, and without disturbance and noise."""
+    s, axes = plant.system, plant.axes
+    r = reachable(s.A, s.B[:, :axes])
+    part = lti.StateSpace(s.A[np.ix_(r, r)], s.B[r, :axes], s.C[:, r], s.D[:, :axes])
+    return replace(plant, system=part, disturbances=0)
+
+
+def _response(system: lti.StateSpace, freq: Floats, period_s: float) -> Complexes:
+    points = np.exp(2j * math.pi * freq * period_s)
+    rows = lti.resolvent_rows(system.A[None], system.C[None], points)[0]
+    return np.asarray(np.moveaxis(rows, 2, 0) @ system.B + system.D)
+
+
+def closed_map(plant: WholePlant, system: lti.StateSpace) -> Floats:
+    """Map of the states of plant and controller, their loop closed.
+
+    Args:
+        plant: The plant of all axes.
+        system: A controller from the optical errors to the commands.
+    """
     s, axes = plant.system, plant.axes
     command, seen = s.B[:, :axes], s.C[axes:]
-    whole = np.block([[s.A + command @ system.D @ seen, command @ system.C], [system.B @ seen, system.A]])
-    return float(np.max(np.abs(np.linalg.eigvals(whole)))) if np.isfinite(whole).all() else math.inf
+    return np.block([[s.A + command @ system.D @ seen, command @ system.C], [system.B @ seen, system.A]])
 
 
-def with_others_closed(plant: WholePlant, axis: int, others: Sequence[lti.StateSpace | None]) -> DesignPlant:
-    """One axis as its controller sees it while those of the other axes work.
+def whole_margins(plant: WholePlant, controller: WholeController) -> WholeMargins:
+    """Margins of the loop of all axes, on frequencies that show every resonance of plant, controller and loop.
+
+    Args:
+        plant: The plant of all axes.
+        controller: Its controller.
+
+    Raises:
+        ValueError: The loop is unstable.
+    """
+    moved, system = _moved(plant), controller.system
+    poles = [np.linalg.eigvals(each) for each in (moved.system.A, system.A, closed_map(moved, system))]
+    if np.max(np.abs(poles[-1])) >= 1.0:
+        raise ValueError(f"the loop under {controller.name!r} is unstable with all axes closed; lower its gains")
+    freq = resolving(np.concatenate(poles), plant.period_s)
+    returned = _returned(moved, system, freq)
+    least = least_moduli(moved, system, freq, returned)
+    margin = multiloop_disk_margin(freq, returned - np.eye(plant.axes))
+    return WholeMargins(float(np.min(least)), margin, bandwidth_hz(freq, np.sqrt(_least_squares(returned))))
+
+
+def _misfit(plant: WholePlant, controller: WholeController) -> None:
+    s = controller.system
+    if not all(np.isfinite(matrix).all() for matrix in (s.A, s.B, s.C, s.D)):
+        raise ValueError(f"controller {controller.name!r} holds a number that is not finite")
+
+
+ALL_AXES = Scope(WholeJudge, _misfit, whole_margins)
+
+
+def of_all_axes(family: Family, of: WholePlant, names: Sequence[str]) -> Family:
+    """A family of controllers of one axis, side by side on all of them: its parameters once for each axis.
+
+    Args:
+        family: The family of one axis.
+        of: The plant that controllers are built for.
+        names: Names of the axes.
+    """
+    from scipy.linalg import block_diag
+
+    axes = [alone(of, axis) for axis in range(of.axes)]
+    known: dict[tuple[int, bytes], AxisController] = {}
+
+    def own(axis: int, values: Floats) -> AxisController:
+        key = axis, values.tobytes()
+        if key not in known:
+            known[key] = family.build(axes[axis], values)
+        return known[key]
+
+    def parameters(plant: WholePlant) -> tuple[Parameter, ...]:
+        del plant
+        named = zip(names, axes, strict=True)
+        return tuple(replace(p, name=f"{p.name} {name}") for name, axis in named for p in family.parameters(axis))
+
+    def build(plant: WholePlant, values: Floats) -> WholeController:
+        del plant
+        each = [own(axis, part) for axis, part in enumerate(np.split(values, of.axes))]
+        parts = ((c.system.A, c.system.B[:, :1], c.system.C, c.system.D[:, :1], c.anti_windup) for c in each)
+        A, B, C, D, windup = (np.asarray(block_diag(*blocks), dtype=float) for blocks in zip(*parts, strict=True))
+        return WholeController(family.name, lti.StateSpace(A, B, C, D), windup)
+
+    return Family(family.name, parameters, build)
+
+
+def alone(plant: WholePlant, axis: int) -> DesignPlant:
+    """One axis as its controller sees it while the other commands rest.
 
     Args:
         plant: The plant of all axes.
         axis: Number of the axis, from 0.
-        others: By axis, the controller from its optical error to its command; None for one that does not work. That of
-            the axis itself is not looked at.
     """
     s, axes = plant.system, plant.axes
-    A, B, C, D = s.A, s.B, s.C, s.D
-    for number, controller in enumerate(others):
-        if controller is None or number == axis:
-            continue
-        k, seen = controller, axes + number
-        command, extra = B[:, number : number + 1], np.zeros((C.shape[0], k.order))
-        A, B = (
-            np.block([[A + command @ k.D @ C[seen : seen + 1], command @ k.C], [k.B @ C[seen : seen + 1], k.A]]),
-            np.vstack([B + command @ k.D @ D[seen : seen + 1], k.B @ D[seen : seen + 1]]),
-        )
-        C = np.hstack([C, extra])
-    rows, white = [axis, axes + axis], list(range(axes, B.shape[1]))
-    own = axes + plant.disturbances + axis  # this axis's optical noise stands last, before that of no gauge
-    order = [axis, *(i for i in white if i != own), own]
-    B, D = np.pad(B[:, order], ((0, 0), (0, 1))), np.pad(D[np.ix_(rows, order)], ((0, 1), (0, 1)))
-    system = lti.StateSpace(A, B, np.vstack([C[rows], np.zeros((1, A.shape[0]))]), D)
-    return DesignPlant(plant.period_s, system, len(order) - 2, plant.gain_rad_v, True, False)
-
-
-def lqg_for(
-    plants: Sequence[WholePlant], modulus: float, on_progress: Callable[[int], None] = lambda done: None
-) -> tuple[lti.StateSpace, Floats, dict[str, float]]:
-    """LQG of all axes with the least mean residual over the plants that keeps a modulus margin on all of them.
-
-    It is built for the first plant. A compass search goes over a grid of its weights, ever finer, and ends on it: which
-    of two neighbours is better does not hang on rounding. Returned are controller, anti-windup input and weights.
-
-    Args:
-        plants: The plant at rest, then others that it could also be.
-        modulus: Least singular value of 1 + L that is asked for.
-        on_progress: Called with the candidates that are judged.
-
-    Raises:
-        ValueError: No candidate keeps the margin; says what the best one reaches.
-    """
-    judge, own = WholeJudge(plants), plants[0]
-    noise = float(np.sqrt(np.mean(np.sum(own.system.D[own.axes :, own.axes :] ** 2, axis=1))))
-    unit = max(noise, 1e-12) / abs(own.gain_rad_v)
-    units = np.array([1.0, 1.0, unit])
-    low, high = np.log10(np.array(list(SPANS.values()))).T
-    known: dict[tuple[float, ...], tuple[float, Closed]] = {}
-
-    def weights(place: tuple[float, ...]) -> list[float]:
-        return [rounded(float(v)) for v in 10.0 ** np.array(place) * units]
-
-    def cost(place: tuple[float, ...]) -> float:
-        if place not in known:
-            try:
-                found = judge(lqg_of_axes(own, Weights(*weights(place)))[0])
-            except ValueError:
-                found = Closed(math.inf, math.inf, 0.0)
-            missing = max(0.0, modulus * 1.001 - found.modulus) / modulus
-            value = math.log(found.mean_rad2) + PRICE * missing if found.pole < 1.0 else 1e3 + min(found.pole, 1e3)
-            known[place] = value, found
-            on_progress(len(known))
-        return known[place][0]
-
-    starts = [(a, b, c) for a in (-4.0, -2.0, 0.0) for b in (0.0, 1.0) for c in (-2.0, 0.0)]
-    place, step = min(starts, key=cost), COARSE
-    while step >= FINE:
-        near = [tuple(np.clip(np.array(place) + step * move, low, high).tolist()) for move in MOVES]
-        best = min(near, key=cost)
-        if cost(best) < cost(place):
-            place = best
-        else:
-            step /= 2.0
-    reached = known[place][1]
-    if reached.modulus < modulus:
-        raise ValueError(
-            f"no LQG of {len(known)} tried meets the specification: a modulus margin of {modulus:g} with all axes "
-            f"closed is asked for, the nearest reaches {reached.modulus:.3g}; ask for less, or shorten the delay"
-        )
-    system, windup = lqg_of_axes(own, Weights(*weights(place)), coarse=True)
-    return system, windup, dict(zip(SPANS, weights(place), strict=True))
+    rows, own = [axis, axes + axis], axes + plant.disturbances + axis
+    others = [i for i in range(axes, s.B.shape[1]) if i != own]
+    columns = [axis, *others, own]  # this axis's optical noise stands last, before that of no gauge
+    B, D = np.pad(s.B[:, columns], ((0, 0), (0, 1))), np.pad(s.D[np.ix_(rows, columns)], ((0, 1), (0, 1)))
+    system = lti.StateSpace(s.A, B, np.vstack([s.C[rows], np.zeros((1, s.order))]), D)
+    return DesignPlant(plant.period_s, system, len(others), plant.gain_rad_v, True, False)
