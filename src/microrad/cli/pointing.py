@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from microrad.cli.coupled_design import broken_promises, design_of_several_axes
 from microrad.cli.frame import (
     MET,
     UNMET,
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     epilog=examples(
         "microrad design leo-geo.toml",
         "microrad design leo-geo.toml --mirror lab-mirror.toml",
+        "microrad design leo-geo.toml --mirror two-axes.toml",
         "microrad design leo-geo.toml --json > controllers.json",
     )
 )
@@ -43,15 +45,18 @@ def design(
 
     Each is tuned for the mission's mirror, disturbances, noise and delay under its modulus margin, for one axis, in
     theory (linear), and shown with what it leaves there and, in a few runs, on the mirror with its hysteresis; microrad
-    run simulates all of it. --json also prints their matrices. The exit code is 1 when one of them is refused: its
-    simulated figure is more than 1.5 times its linear one.
+    run simulates all of it. For a mirror file of several axes there is one controller of all axes, decoupled, and the
+    margins are those of the whole. --json also prints their matrices. The exit code is 1 when one of them is refused:
+    its simulated figure is more than 1.5 times its linear one.
     """
     from microrad import mirror as mirror_room
     from microrad.link import tracking_light_w
     from microrad.loop import controller_study
     from microrad.mirror.summary import unknown_dynamics
-    from microrad.mission.file import load_mission
+    from microrad.mission.file import holds_several_axes, load_mission
 
+    if mirror is not None and holds_several_axes(mirror):
+        return design_of_several_axes(file, mirror, accept, as_json)
     mission = load_mission(file, mirror)
     with progress_bar() as progress, refusal_of(mission.path):
         scene = controller_study.scene(mission, mirror_room.of(mission.mission), tracking_light_w(mission))
@@ -69,19 +74,8 @@ def design(
 
 def _broken(designs: "tuple[Design, ...]", left: "tuple[Outlook, ...]", accept: bool) -> str:
     """The designs whose linear figure the mirror does not keep, in a sentence."""
-    from microrad.loop.controller_study import PROMISE
-
-    named = [f"{d.name} ({x.times:.2f} times)" for d, x in zip(designs, left, strict=True) if not x.holds]
-    if not named:
-        return ""
-    advice = (
-        "accepted as they are"
-        if accept
-        else "refused, here and by microrad export; choose by the simulated figure, or take these with --accept"
-    )
-    return (
-        f"more than {PROMISE:g} times as much as linear theory says is left, simulated on the mission's mirror, by "
-        f"{', '.join(named)}: {advice}"
+    return broken_promises(
+        [f"{d.name} ({x.times:.2f} times)" for d, x in zip(designs, left, strict=True) if not x.holds], accept
     )
 
 

@@ -35,6 +35,7 @@ __all__ = [
     "changed_from_shipped",
     "content_of",
     "either_file",
+    "holds_several_axes",
     "kind_of",
     "load_coupled_mirror",
     "load_link",
@@ -238,6 +239,19 @@ def load_mirror(path: str | Path) -> MirrorFile:
     if mirror is None or document.faults:
         raise MissionError(document.path, document.faults)
     return _mirror_file(document, mirror)
+
+
+def holds_several_axes(path: str | Path) -> bool:
+    """Whether a mirror file says that it is of version 2, for `load_coupled_mirror`; nothing else of it is checked.
+
+    Args:
+        path: The mirror file.
+
+    Raises:
+        MissionError: When it cannot be read, or is no TOML.
+    """
+    version = _open(Path(path), "mirror file", "mirror").data.get("version")
+    return type(version) is int and version == 2
 
 
 def load_coupled_mirror(path: str | Path, *, text: str | None = None) -> "CoupledMirror":

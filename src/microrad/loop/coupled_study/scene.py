@@ -9,7 +9,7 @@ from microrad.core.arrays import Floats
 from microrad.loop import control
 from microrad.loop.controller_study import scenario
 from microrad.loop.pointing_loop.design import read_each_sample
-from microrad.loop.pointing_loop.loop import PointingLoop, in_band_gain
+from microrad.loop.pointing_loop.loop import PointingLoop, decoupling, in_band_gain, nominal_axis_gain
 from microrad.mirror import coupled, geometry, hysteresis
 from microrad.mirror.coupled import CoupledMirror, Output
 from microrad.mirror.model import linearised
@@ -19,6 +19,12 @@ from microrad.mission.tables.fine_pointing import FinePointing
 AXES = "xy"
 """Names of the axes of the line of sight."""
 
+DRAWS = 8
+"""Mirrors drawn from the identification's covariance that a controller has to hold for."""
+
+SETTLED = 10.0
+"""Periods of the body's bandwidth after which what it follows stands still."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CoupledScene:
@@ -26,7 +32,8 @@ class CoupledScene:
 
     ``loop`` has the mirror with its hysteresis. ``linear`` have it with a gain in place of each element, and a sensor
     that delivers each sample: the first one with the gains of small motions about rest, for which controllers are
-    built, the second with those of slow motions over the whole drive range. A controller has to hold in each of them.
+    built, the second with those of slow motions over the whole drive range, and one for each mirror that is drawn from
+    the identification's covariance, about rest. A controller has to hold in each of them.
     """
 
     table: FinePointing
@@ -38,6 +45,21 @@ class CoupledScene:
     def rest(self) -> PointingLoop:
         """The loop for small motions about rest."""
         return self.linear[0]
+
+    @property
+    def reach_v(self) -> tuple[float, float]:
+        """How far every drive may go from its bias: within the amplifier's and the recordings' range (V)."""
+        low, high = self.loop.drive_range_v
+        return max(low, self.loop.drive.minimum_v), min(high, self.loop.drive.maximum_v)
+
+    @property
+    def static_v(self) -> tuple[float, ...]:
+        """Drives (V, from the bias, without sign) for the known part of the pointing error, once it has settled."""
+        settled = np.array(
+            [float(each.at(np.array(SETTLED / each.body_bandwidth_hz))) for each in self.loop.references]
+        )
+        drives = decoupling(self.rest) / nominal_axis_gain(self.rest) @ settled
+        return tuple(np.abs(drives).tolist())
 
 
 def scene(file: MissionFile, mirror: CoupledMirror, received_power_w: float | None) -> CoupledScene:
@@ -92,9 +114,10 @@ def scene(file: MissionFile, mirror: CoupledMirror, received_power_w: float | No
         held=piston,
     )
     seen = read_each_sample(loop)
-    linear = tuple(
-        replace(seen, mirror=linearised(mirror.mirror, gains)) for gains in _gains(mirror, loop.drive_range_v)
-    )
+    plain = [linearised(mirror.mirror, gains) for gains in _gains(mirror, loop.drive_range_v)]
+    drawn = [each.mirror for each in coupled.draws(mirror, DRAWS, f.seed)]
+    plain += [linearised(each, [hysteresis.rest_gain(model) for model in each.bank]) for each in drawn]
+    linear = tuple(replace(seen, mirror=each) for each in plain)
     _refuse_unreachable(linear)
     return CoupledScene(f, mirror, loop, linear)
 

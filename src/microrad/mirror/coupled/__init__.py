@@ -1,8 +1,20 @@
-"""Mirrors of several axes: the record and its response, tilts from displacements, mirror files of version 2."""
+"""Mirrors of several axes: the record, its response and its uncertainty, tilts, mirror files of version 2."""
 
 from microrad.mirror.coupled.geometry import tilts_and_piston
 from microrad.mirror.coupled.reading import of
 from microrad.mirror.coupled.records import Actuator, CoupledMirror, Known, Output, modes, response
+from microrad.mirror.coupled.spread import draws
 from microrad.mirror.coupled.writing import text
 
-__all__ = ["Actuator", "CoupledMirror", "Known", "Output", "modes", "of", "response", "text", "tilts_and_piston"]
+__all__ = [
+    "Actuator",
+    "CoupledMirror",
+    "Known",
+    "Output",
+    "draws",
+    "modes",
+    "of",
+    "response",
+    "text",
+    "tilts_and_piston",
+]

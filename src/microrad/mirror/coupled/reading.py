@@ -1,6 +1,7 @@
 """The mirror of a mirror file of version 2."""
 
 import math
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,9 @@ from microrad.mirror.model import Mirror
 from microrad.mission.tables.coupled_mirror import MATRICES, in_order
 from microrad.mission.tables.coupled_mirror import CoupledMirror as Table
 from microrad.mission.tables.coupled_parts import HysteresisTable, UncertaintyTable
+
+_BY_ELEMENT = {"E": 3, "K": 3, "F": 2, "G": 2}
+"""Where the keys of matrix entries count elements: columns of E and K, rows of F and G."""
 
 
 def of(table: Table) -> CoupledMirror:
@@ -38,7 +42,7 @@ def of(table: Table) -> CoupledMirror:
         rate_hz=recording.rate_hz,
         steps_per_sample=recording.steps_per_sample,
         excited_hz=(recording.excited_from_hz, recording.excited_to_hz),
-        known=None if table.uncertainty is None else _known(table.uncertainty),
+        known=None if table.uncertainty is None else _known(table.uncertainty, order),
     )
 
 
@@ -71,11 +75,24 @@ def _play(table: HysteresisTable) -> Play:
     return Play(*plays, table.widening_s or 0.0, limit, (quadratic, signed, cubic), reach)
 
 
-def _known(table: UncertaintyTable) -> Known:
+def _known(table: UncertaintyTable, order: Sequence[int]) -> Known:
+    """What is known, with elements counted as the mirror has them: ``order`` says which of the file's stands there."""
     if table.factor is not None:
         factor = np.array(table.factor)
     else:
         values, vectors = np.linalg.eigh(table.correlation_matrix)
         factor = vectors * np.sqrt(np.maximum(values, 0.0))
         factor /= np.linalg.norm(factor, axis=1, keepdims=True)
-    return Known(table.parameters, np.array(table.standard_errors), factor)
+    own = {str(of + 1): str(place + 1) for place, of in enumerate(order)}
+    return Known(tuple(_counted(name, own) for name in table.parameters), np.array(table.standard_errors), factor)
+
+
+def _counted(parameter: str, own: Mapping[str, str]) -> str:
+    """The parameter with its element, if it has one, by its number in the mirror in place of that in the file."""
+    parts = parameter.split(".")
+    if parts[0] == "hysteresis":
+        parts[1] = own[parts[1]]
+    elif parts[0] == "matrices" and parts[1] in _BY_ELEMENT:
+        at = _BY_ELEMENT[parts[1]]
+        parts[at] = own[parts[at]]
+    return ".".join(parts)

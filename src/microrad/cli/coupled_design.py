@@ -1,0 +1,154 @@
+"""What `microrad design` does with a mirror file of several axes: one controller of all axes, margins of the whole."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from microrad.cli.frame import MET, UNMET, Outcome, json_text, progress_bar, refusal_of, width
+
+if TYPE_CHECKING:
+    from microrad.loop.controller_study import Outlook
+    from microrad.loop.coupled_study import CoupledDesign, CoupledDesigns, CoupledScene
+
+Lefts = Sequence[tuple["Outlook", ...]]
+
+
+def design_of_several_axes(file: Path, mirror: Path, accept: bool, as_json: bool) -> Outcome:
+    """Design controllers for a mission's loop with a mirror of several axes in place of its own.
+
+    Args:
+        file: The mission file.
+        mirror: The mirror file, of version 2.
+        accept: Whether designs count whose linear figure the simulation does not bear out.
+        as_json: Whether the text is to be JSON.
+    """
+    from microrad.link import tracking_light_w
+    from microrad.loop import coupled_study
+    from microrad.mirror import coupled
+    from microrad.mission.file import load_coupled_mirror, load_mission
+
+    mission, plant = load_mission(file), coupled.of(load_coupled_mirror(mirror))
+    with progress_bar() as progress, refusal_of(mission.path):
+        scene = coupled_study.scene(mission, plant, tracking_light_w(mission))
+        found = coupled_study.design(scene, progress)
+        left = coupled_study.outlook(scene, found.made, progress)
+    marks = [max((axis.mark(accept) for axis in each), key=len) for each in left]
+    worst = [max(axis.times for axis in each) for each in left]
+    broken = [f"{d.name} ({times:.2f} times)" for d, times, mark in zip(found.made, worst, marks, strict=True) if mark]
+    warnings = [*filter(None, [broken_promises(broken, accept)]), *_left_out(scene), *found.refused.values()]
+    code = UNMET if "refused" in marks else MET
+    if as_json:
+        controllers = [_data(*each) for each in zip(found.made, left, marks, strict=True)]
+        said = {"mission_sha256": mission.sha256, "mirror": plant.mirror.name, "controllers": controllers}
+        return Outcome(json_text({**said, "warnings": warnings}), code)
+    return Outcome(_text(scene, found, left, marks, warnings), code)
+
+
+def broken_promises(named: Sequence[str], accept: bool) -> str:
+    """The designs whose linear figure the mirror does not keep, in a sentence; nothing where there are none.
+
+    Args:
+        named: Those designs, each with how many times as much is left.
+        accept: Whether they are taken all the same.
+    """
+    from microrad.loop.controller_study import PROMISE
+
+    if not named:
+        return ""
+    advice = (
+        "accepted as they are"
+        if accept
+        else "refused, here and by microrad export; choose by the simulated figure, or take these with --accept"
+    )
+    return (
+        f"more than {PROMISE:g} times as much as linear theory says is left, simulated on the mission's mirror, by "
+        f"{', '.join(named)}: {advice}"
+    )
+
+
+def _left_out(scene: "CoupledScene") -> list[str]:
+    """What of the mirror's file does not count here, in sentences."""
+    from microrad.core.units import format_quantity
+
+    mirror, f = scene.mirror, scene.table
+    said = []
+    if mirror.delay_s > 0.0:
+        said.append(
+            f"the recordings' delay of {format_quantity(mirror.delay_s, 's', 3)} is left out; fine_pointing.delay and "
+            "fine_pointing.amplifier_bandwidth stand for the flight's own"
+        )
+    if f.rate_hz / 2 > mirror.excited_hz[1]:
+        said.append(
+            f"the mirror was recorded up to {format_quantity(mirror.excited_hz[1], 'Hz')}, and half of the control "
+            f"rate is {format_quantity(f.rate_hz / 2, 'Hz')}: between them the model is a guess"
+        )
+    return said
+
+
+def _text(
+    scene: "CoupledScene", found: "CoupledDesigns", left: Lefts, marks: Sequence[str], warnings: Sequence[str]
+) -> str:
+    from microrad.core.units import format_quantity
+    from microrad.report.tables import Table, tables_text
+
+    mirror = scene.mirror.mirror
+    about = (
+        f"{mirror.name}: {mirror.actuators} actuators and {mirror.axes} outputs, line of sight of 2 axes at "
+        f"{format_quantity(scene.table.rate_hz, 'Hz')}. Rms of the residual by axis in µrad, linear for small motions "
+        "about rest, and simulated with hysteresis; margins with both axes closed, the smallest at rest and over the "
+        "whole drive range."
+    )
+    rows, tuned = [], []
+    for d, axes, mark in zip(found.made, left, marks, strict=True):
+        linear, simulated = (
+            " / ".join(f"{1e6 * value:.3f}" for value in values)
+            for values in ([a.linear_rad for a in axes], [a.simulated_rad for a in axes])
+        )
+        margins = d.margins
+        bandwidth = format_quantity(margins.bandwidth_hz, "Hz", 3)
+        figures = f"{margins.modulus:.3f}", f"{margins.disk.disk:.3f}", bandwidth
+        rows.append((d.name, linear, f"{simulated} {mark}".strip(), *figures))
+        tuned.append((d.name, ", ".join(f"{k} {v:.3g}" for k, v in d.tuned.items())))
+    headings = ("controller", "linear x / y", "simulated x / y", "modulus", "disk", "bandwidth")
+    best, (low, high) = min(zip(left, found.made, strict=True), key=lambda each: _radial(each[0]))[1], scene.reach_v
+    drives = [
+        (actuator.name, f"{known:.3g}", f"{rms:.3g}", f"{100.0 * (known + 3.0 * rms) / min(high, -low):.3g} %")
+        for actuator, known, rms in zip(scene.mirror.actuators, scene.static_v, best.drive_v.tolist(), strict=True)
+    ]
+    reach = f"{min(high, -low):.4g} V"
+    tables = [
+        Table("", headings, rows, (0,)),
+        Table("", ("controller", "tuned to"), tuned, (1,)),
+        Table("", (f"actuator under {best.name}", "reference, V", "rms, V", f"with 3 rms of {reach}"), drives, (0,)),
+    ]
+    said = tables_text([], [about], width()), tables_text(tables, [f"Warning: {each}." for each in warnings], width())
+    return "\n\n".join(text.strip("\n") for text in said)
+
+
+def _radial(axes: tuple["Outlook", ...]) -> float:
+    """Simulated radial rms."""
+    import math
+
+    return math.hypot(*(axis.simulated_rad for axis in axes))
+
+
+def _data(d: "CoupledDesign", left: tuple["Outlook", ...], mark: str) -> dict[str, Any]:
+    m, system = d.margins, d.controller.system
+    return {
+        "name": d.name,
+        "tuned": dict(d.tuned),
+        "residual_rms_rad": [axis.linear_rad for axis in left],
+        "simulated_rms_rad": [axis.simulated_rad for axis in left],
+        "drive_rms_v": d.drive_v.tolist(),
+        "mark": mark,
+        "margins": {
+            "modulus": m.modulus,
+            "disk": m.disk.disk,
+            "disk_hz": m.disk.freq_hz,
+            "bandwidth_hz": m.bandwidth_hz,
+        },
+        "matrices": {
+            **{key: getattr(system, key).tolist() for key in "ABCD"},
+            "anti_windup": d.controller.anti_windup.tolist(),
+        },
+    }

@@ -1,0 +1,119 @@
+"""Mirrors of several axes that an identification leaves possible: drawn from the covariance that its file gives."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from microrad.core import lti
+from microrad.mirror.coupled.records import CoupledMirror, Known, modes
+from microrad.mirror.hysteresis import BoucWen, Play, rest_gain, slow_gain
+
+TRIES = 1000
+"""Times that one mirror is drawn again before its uncertainty is taken for one that no mirror has."""
+
+LEAST_DECAY = 0.1
+"""Least decay of a drawn mode, in its own."""
+
+_FIELDS = {
+    **{"thresholds": "thresholds_v", "weights": "weights_rad_v", "widening": "widening_s"},
+    **{"polynomial": "polynomial_rad", "d1": "d1_rad_v", "d2": "d2_s_v", "epsilon": "epsilon_rad_v"},
+    **{"delta": "delta_s_v", "alpha": "alpha_1_v", "beta": "beta_1_v", "gamma": "gamma_1_v"},
+    **{"eta": "eta_1_v", "exponent": "exponent"},
+}
+"""Fields of the hysteresis models by their keys in a mirror file."""
+
+
+def draws(mirror: CoupledMirror, count: int, seed: int) -> tuple[CoupledMirror, ...]:
+    """Draw mirrors from the normal distribution that ``known`` describes; none without one.
+
+    A decay stays above a tenth of its own, and what is at least 0 in the mirror stays at least 0: the distribution is
+    cut off there. A mirror that runs away at rest or where all plays slide, or whose thresholds change places, is drawn
+    again. Each has a Philox stream of its own, so the first ones are the same for a larger count.
+
+    Args:
+        mirror: The identified mirror.
+        count: How many mirrors are drawn.
+        seed: Seed of the random numbers.
+
+    Raises:
+        ValueError: Where `TRIES` draws in a row are no mirror.
+    """
+    known = mirror.known
+    if known is None:
+        return ()
+    streams = (np.random.SeedSequence(seed, spawn_key=(index,)) for index in range(count))
+    return tuple(_drawn(mirror, known, np.random.Generator(np.random.Philox(stream))) for stream in streams)
+
+
+def _drawn(mirror: CoupledMirror, known: Known, rng: np.random.Generator) -> CoupledMirror:
+    for _ in range(TRIES):
+        changes = known.standard_errors * (known.factor @ rng.standard_normal(known.factor.shape[1]))
+        found = changed(mirror, dict(zip(known.parameters, changes.tolist(), strict=True)))
+        if _is_one(found):
+            return replace(found, known=None)
+    raise ValueError(
+        f"{TRIES} draws from the uncertainty of {mirror.mirror.name!r} in a row run away or have thresholds out of "
+        "order: its standard errors are too large for a mirror; identify it from more records, or leave the table "
+        "uncertainty out"
+    )
+
+
+def _is_one(mirror: CoupledMirror) -> bool:
+    """Whether thresholds ascend, and neither stuck nor sliding plays make the mirror grow."""
+    own = mirror.mirror
+    if any(np.any(np.diff(play.thresholds_v) <= 0.0) for play in own.plays):
+        return False
+    ends = ([gain(model) for model in own.bank] for gain in (rest_gain, slow_gain))
+    return all(lti.growth_1_s(own.A, own.E, own.F, np.array(gains)) < 0.0 for gains in ends) if own.A.size else True
+
+
+def changed(mirror: CoupledMirror, by: Mapping[str, float]) -> CoupledMirror:
+    """The mirror with some of its numbers changed.
+
+    Args:
+        mirror: The mirror.
+        by: Changes by key as `Known` names them, in SI units; a decay grows where its change is above 0.
+    """
+    own = mirror.mirror
+    roots = [list(root) for root in modes(own.A)]
+    matrices: dict[str, Any] = {}
+    elements: dict[int, BoucWen | Play] = {}
+    delay_s = mirror.delay_s
+    for key, change in by.items():
+        what, *rest = key.split(".")
+        if what == "recording":
+            delay_s = max(delay_s + change, 0.0)
+        elif what == "modes":
+            root = roots[int(rest[1]) - 1]
+            if rest[0] == "decay":
+                root[0] = min(root[0] - change, LEAST_DECAY * root[0])
+            else:
+                root[1] = float(np.copysign(max(abs(root[1]) + np.sign(root[1]) * change, 1e-9), root[1]))
+        elif what == "matrices":
+            matrix = matrices.setdefault(rest[0], getattr(own, rest[0]).copy())
+            matrix[int(rest[1]) - 1, int(rest[2]) - 1] += change
+        else:
+            number = int(rest[0]) - 1
+            elements[number] = _with(elements.get(number, own.bank[number]), _FIELDS[rest[1]], rest[2:], change)
+    bank = [elements.get(number, model) for number, model in enumerate(own.bank)]
+    made = replace(
+        own,
+        A=lti.modal_matrix([(s, w) for s, w in roots]),
+        bouc_wen=tuple(model for model in bank if isinstance(model, BoucWen)),
+        plays=tuple(model for model in bank if isinstance(model, Play)),
+        **matrices,
+    )
+    return replace(mirror, mirror=made, delay_s=delay_s)
+
+
+def _with(model: BoucWen | Play, field: str, item: list[str], change: float) -> BoucWen | Play:
+    """The model with one of its numbers changed; one that is at least 0 stays so, but for signed ones."""
+    value = getattr(model, field)
+    values = list(value) if isinstance(value, tuple) else [value]
+    place = int(item[0]) - 1 if item else 0
+    bounded = field in ("thresholds_v", "weights_rad_v", "widening_s") and values[place] >= 0.0
+    values[place] = max(values[place] + change, 0.0) if bounded else values[place] + change
+    parts: dict[str, Any] = {field: tuple(values) if isinstance(value, tuple) else values[0]}
+    return replace(model, **parts)
