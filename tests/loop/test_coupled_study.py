@@ -1,0 +1,392 @@
+"""Controllers for mirrors of several axes: decoupling, LQG of all axes, margins of the whole, theory, refusals."""
+
+import json
+import math
+import re
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.linalg import block_diag
+
+from design_plants import axis_plant
+from microrad.core import lti
+from microrad.link import tracking_light_w
+from microrad.loop import control, coupled_study
+from microrad.loop.coupled_study import designs, whole
+from microrad.loop.coupled_study.scene import line_of_sight
+from microrad.loop.pointing_loop import ensemble
+from microrad.loop.pointing_loop.design import whole_plant
+from microrad.loop.pointing_loop.linear import close, loop_response
+from microrad.loop.pointing_loop.loop import assemble_whole, decoupling, in_band_gain, nominal_axis_gain
+from microrad.mirror import coupled
+from microrad.mirror.coupled import Actuator, CoupledMirror, Output
+from microrad.mirror.hysteresis import BoucWen, Play
+from microrad.mirror.model import Mirror, linearised
+from microrad.mission.file import load_coupled_mirror, load_mission
+from places import ROOT
+from shipped import DEFAULT
+
+PAGE = (ROOT / "docs" / "mirror-file.md").read_text(encoding="utf-8")
+TEXT = next(t for t in re.findall(r"```toml\n(.*?)```", PAGE, flags=re.DOTALL) if t.startswith("version = 2"))
+DRIVES = (("gain = 15 ", "gain = 1 "), ('output_max = "180 V"', 'output_max = "100 V"'))
+"""Edits with which the mission's amplifier drives the mirror of the page."""
+
+
+def mission_text(*changes):
+    text = DEFAULT.read_text(encoding="utf-8")
+    for old, new in (*DRIVES, *changes):
+        assert old in text, old
+        text = text.replace(old, new, 1)
+    return text
+
+
+def mission(*changes):
+    return load_mission("mission.toml", text=mission_text(*changes))
+
+
+def two_axes():
+    return coupled.of(load_coupled_mirror("two-axes.toml", text=TEXT))
+
+
+def scene_of(mirror, *changes):
+    file = mission(*changes)
+    return coupled_study.scene(file, mirror, tracking_light_w(file))
+
+
+def three_actuators(hysteresis=0.05):
+    """A plate on three actuators, each with its own gain, seen at three other places; resonances that pull on all."""
+    angles, places = 2 * np.pi * np.arange(3) / 3, 0.03 * np.exp(2j * np.pi * (np.arange(3) / 3 + 0.1))
+    pushes = np.column_stack([np.ones(3), np.cos(angles), np.sin(angles)]) * np.array([[1.0], [1.2], [0.85]])
+    sees = np.column_stack([np.ones(3), places.real / 0.03, places.imag / 0.03])
+    roots = [(-30.0, 1500.0), (-25.0, 1900.0), (-20.0, 2100.0)]
+    A, B, C = lti.modal_matrix(roots), np.zeros((6, 3)), np.zeros((3, 6))
+    turned = np.array([[1.0, 0.1, 0.0], [0.0, 1.0, 0.2], [0.1, -0.2, 1.0]])
+    B[1::2] = -1e3 * turned @ pushes.T
+    C[:, 0::2] = 1e-6 * sees @ np.linalg.inv(turned)
+    E, F = np.zeros((6, 3)), np.zeros((3, 6))
+    E[1::2], F[:, 0::2] = -1e3 * np.eye(3), np.eye(3)
+    plays = tuple(Play((0.0, 0.3, 1.0), (0.0, hysteresis, hysteresis)) for _ in range(3))
+    mirror = Mirror("a plate", A, B, E, F, np.zeros((3, 3)), C, np.zeros((3, 3)), np.zeros((3, 3)), (), plays, ())
+    actuators = tuple(Actuator(f"actuator {i + 1}", 50.0, 0.0, 100.0, 1e5) for i in range(3))
+    outputs = tuple(Output(f"sensor {i + 1}", "displacement", (z.real, z.imag)) for i, z in enumerate(places.tolist()))
+    return CoupledMirror(mirror, actuators, outputs, 0.0, 10e3, 2, (0.1, 3e3))
+
+
+@cache
+def plate():
+    """Its loop, and two controllers of it."""
+    scene = scene_of(three_actuators())
+    return scene, coupled_study.design(scene, only=("PI", "LQG"))
+
+
+@cache
+def pair():
+    """The loop of the page's mirror, and a controller of it."""
+    scene = scene_of(two_axes())
+    return scene, coupled_study.design(scene, only=("LQG",))
+
+
+CASES = [(plate, "PI"), (plate, "LQG"), (pair, "LQG")]
+IDS = ["PI on three actuators", "LQG on three actuators", "LQG on two"]
+
+
+def chosen(case):
+    make, name = case
+    scene, found = make()
+    assert found.refused == {}
+    return scene, next(d for d in found.made if d.name == name)
+
+
+# --------------------------------------------------------------------------------------------------------- the scene
+def test_commands_move_their_axis_alone_and_no_piston():
+    scene = scene_of(three_actuators())
+    to_drives = decoupling(scene.rest)
+    gain = in_band_gain(scene.rest.mirror)
+    assert_allclose(scene.rest.optics @ gain @ to_drives, nominal_axis_gain(scene.rest) * np.eye(2), atol=1e-18)
+    assert_allclose(scene.rest.held @ gain @ to_drives, 0.0, atol=1e-18)
+    assert np.max(np.abs(to_drives)) == pytest.approx(1.0, rel=1e-12)
+    least = np.linalg.pinv(scene.rest.optics @ gain)  # without a thought of piston
+    assert np.abs(scene.rest.held @ gain @ least).max() > 0.05 * np.abs(gain @ least).max()
+
+
+def test_displacements_become_angles_of_the_beam():
+    """A tilt towards x by t turns the beam by 2 t about the telescope's magnification; what rises with x leans away."""
+    file = mission(("magnification = 1.0", "magnification = 8.0"))
+    f, outputs = file.mission.fine_pointing, two_axes().outputs
+    seen, piston = line_of_sight(f, "mechanical", outputs)
+    x, y = np.array([output.position_m for output in outputs]).T
+    assert_allclose(seen @ (-x * 1e-6), [2e-6 / 8.0, 0.0], atol=1e-15)
+    assert_allclose(seen @ (-y * 1e-6), [0.0, 2e-6 / 8.0], atol=1e-15)
+    assert_allclose(seen @ np.ones(3), 0.0, atol=1e-12)
+    assert_allclose(piston @ np.ones(3), 1.0, atol=1e-12)
+    angles = [Output("x", "angle"), Output("y", "angle")]
+    seen, piston = line_of_sight(f, "optical", angles)
+    assert_allclose(seen, np.eye(2) / 8.0, atol=1e-15)
+    assert piston is None
+
+
+def test_gains_at_rest_and_over_the_drive_range():
+    """By hand: slow drives of 50 V strain the page's first spring by 50 (1 + 20 / 900) V, which slides for less."""
+    scene = scene_of(two_axes())
+    rest, whole_range = (loop.mirror.A for loop in scene.linear[:2])
+    assert_allclose(rest[:2, :2], [[-18.0, -900.0], [900.0, -18.0]])
+    strain = 50.0 * (1.0 + 20.0 / 900.0)
+    weight = sum(w * (strain - r) / strain for w, r in ((0.03, 0.5), (0.03, 2.0), (0.04, 8.0)))
+    assert whole_range[1, 0] - 900.0 == pytest.approx(-900.0 * weight, rel=2e-3)  # damping strains it a little less
+    assert weight == pytest.approx(0.0923, rel=1e-2)
+
+
+def test_drawn_mirrors_follow_the_covariance_and_those_that_are_none_are_drawn_again():
+    mirror = two_axes()
+    drawn = coupled.draws(mirror, 400, 3)
+    assert [m.mirror.A[0, 0] for m in coupled.draws(mirror, 3, 3)] == [m.mirror.A[0, 0] for m in drawn[:3]]
+    values = np.array(
+        [[-m.mirror.A[0, 0], m.mirror.A[1, 0], m.mirror.plays[0].weights_rad_v[2], m.delay_s] for m in drawn]
+    )
+    errors, correlation = mirror.known.standard_errors, mirror.known.correlation
+    assert_allclose(values.mean(axis=0), [18.0, 900.0, 0.04, 70e-6], atol=4.0 * np.max(errors / math.sqrt(400.0)))
+    assert_allclose(np.std(values, axis=0) / errors, 1.0, atol=4.0 / math.sqrt(800.0))
+    assert_allclose(np.corrcoef(values.T), correlation, atol=4.0 / math.sqrt(400.0))
+    assert coupled.draws(replace(mirror, known=None), 3, 3) == ()
+    wild = replace(mirror.known, standard_errors=np.array([0.0, 0.0, 1e6, 0.0]))
+    some = coupled.draws(replace(mirror, known=wild), 20, 3)
+    assert {m.mirror.plays[0].weights_rad_v[2] for m in some} == {
+        0.0
+    }  # half of the draws run away, the others end at 0
+
+
+def test_elements_in_another_order_keep_what_is_known_of_them():
+    """A file may list plays before a Bouc-Wen element, and the mirror has them the other way round."""
+    swapped = TEXT[: TEXT.index("[hysteresis.2]")] + '[hysteresis.2]\nmodel = "bouc-wen"\nd1 = 0.02\nepsilon = 0.01\n'
+    swapped += 'alpha = "2 1/V"\nbeta = "0.5 1/V"\n\n' + TEXT[TEXT.index("[uncertainty]") :]
+    swapped = swapped.replace("modes.frequency.1", "matrices.E.1.1").replace("modes.decay.1", "hysteresis.2.epsilon")
+    mirror = coupled.of(load_coupled_mirror("mirror.toml", text=swapped))
+    assert isinstance(mirror.mirror.bank[0], BoucWen)
+    assert mirror.known.parameters[:3] == ("hysteresis.1.epsilon", "matrices.E.1.2", "hysteresis.2.weights.3")
+    again = coupled.of(load_coupled_mirror("mirror.toml", text=coupled.text(mirror)))
+    assert again.known.parameters == mirror.known.parameters
+
+
+# ------------------------------------------------------------------------------------------------------------- LQG
+def test_lqg_of_two_axes_that_leave_each_other_alone_is_that_of_each():
+    """The Riccati equations fall apart then: an oracle that knows nothing of several axes."""
+    one = axis_plant(resonance=(400.0, 0.05), gauge=False)
+    s, n = one.system, one.system.order
+    white = s.B.shape[1] - 3
+    B = np.hstack([block_diag(s.B[:, :1], s.B[:, :1]), block_diag(s.B[:, 1 : 1 + white], s.B[:, 1 : 1 + white])])
+    rows = [block_diag(s.C[[i]], s.C[[i]]) for i in (0, 1)]
+    D = np.zeros((4, B.shape[1] + 2))
+    D[2:, -2:] = s.D[1, 1 + white] * np.eye(2)
+    B = np.hstack([B, np.zeros((2 * n, 2))])
+    plant = control.WholePlant(
+        one.period_s, lti.StateSpace(block_diag(s.A, s.A), B, np.vstack(rows), D), 2, 2 * white, one.gain_rad_v
+    )
+    weights = control.Weights(command=0.01, sensor_noise=1.5, command_noise_v=0.02)
+    both, alone = control.lqg_of_axes(plant, weights), control.lqg_controller(one, weights)
+    freq = np.geomspace(0.01, 2400.0, 60)
+    found = lti.frequency_response(both.system, freq, one.period_s)
+    expected = lti.frequency_response(alone.system, freq, one.period_s)[:, 0, 0]
+    assert np.abs(found[:, 0, 1]).max() < 1e-9 * np.abs(expected).max()
+    assert_allclose(found[:, 0, 0] / expected, 1.0, atol=1e-6)
+    assert_allclose(found[:, 1, 1] / expected, 1.0, atol=1e-6)
+
+
+def test_lqg_beats_one_loop_an_axis_where_the_axes_pull_on_each_other():
+    _, found = plate()
+    left = {d.name: float(np.linalg.norm(d.residual_rad)) for d in found.made}
+    print(left)
+    assert left["LQG"] < 0.9 * left["PI"]
+
+
+# ------------------------------------------------------------------------------------------------ margins of the whole
+@pytest.mark.parametrize("case", CASES, ids=IDS)
+def test_margins_are_those_of_the_closed_loop_on_a_dense_grid(case):
+    """From the state-space of the whole sampled loop, by brute force; the search's own come from design plants."""
+    scene, d = chosen(case)
+    freq = np.unique(np.concatenate([np.geomspace(0.01, 2500.0, 1500), np.linspace(1.0, 2500.0, 2500)]))
+    least, disk = math.inf, math.inf
+    for loop in scene.linear:
+        L = loop_response(close(loop, d.controller), freq)
+        least = min(least, float(np.linalg.svd(np.eye(2) + L, compute_uv=False)[:, -1].min()))
+        disk = min(disk, control.multiloop_disk_margin(freq, L).disk)
+    assert d.margins.modulus == pytest.approx(least, rel=2e-3)
+    assert d.margins.disk.disk == pytest.approx(disk, rel=5e-3)
+    assert d.margins.modulus >= scene.table.modulus_margin
+
+
+@pytest.mark.parametrize("case", CASES[1:], ids=IDS[1:])
+def test_no_change_within_the_disk_makes_the_loop_unstable_and_one_just_beyond_does(case):
+    """Changes (1 + d/2) / (1 - d/2) of both loops at once, d complex and real gains, at the sensor."""
+    scene, d = chosen(case)
+    plants = coupled_study.plants(scene)
+    system = control.WholeController(d.name, *_axis_parts(scene, d))
+    worst = min(plants, key=lambda p: whole.whole_margins(p, system).disk.disk)
+
+    def poles(left, right):
+        s = worst.system
+        seen = np.diag([left, right]) @ s.C[2:]
+        changed = replace(worst, system=lti.StateSpace(s.A, s.B, np.vstack([s.C[:2], seen]), s.D))
+        return float(np.abs(np.linalg.eigvals(whole.closed_map(changed, system.system))).max())
+
+    low, high = whole.whole_margins(worst, system).disk.disk_gain
+    rng = np.random.Generator(np.random.Philox(5))
+    within = np.exp(rng.uniform(math.log(low), math.log(high), (60, 2)))
+    assert max(poles(*each) for each in within.tolist()) < 1.0
+    found = max(poles(g, h) for g in (low**4, high**4, 1.0) for h in (low**4, high**4))
+    assert found > 1.0
+
+
+def _axis_parts(scene, d):
+    """The controller of axis commands behind the decoupling."""
+    s, back = d.controller.system, np.linalg.pinv(decoupling(scene.rest))
+    return lti.StateSpace(s.A, s.B[:, :2], back @ s.C, (back @ s.D)[:, :2]), d.controller.anti_windup
+
+
+def test_a_controller_that_closes_a_loop_the_wrong_way_is_unstable():
+    scene = scene_of(three_actuators())
+    (plant, *_) = coupled_study.plants(scene)
+    gain = 2.0 / plant.gain_rad_v
+    system = lti.StateSpace(np.eye(2), np.eye(2), np.zeros((2, 2)), gain * np.diag([1.0, -1.0]))
+    with pytest.raises(ValueError, match="is unstable with all axes closed; lower its gains"):
+        whole.whole_margins(plant, control.WholeController("wrong", system, np.zeros((2, 2))))
+    (verdict,) = whole.WholeJudge([plant]).several([control.WholeController("wrong", system, np.zeros((2, 2)))])
+    assert verdict.pole >= 1.0
+    assert verdict.mean_rad2 == math.inf
+
+
+def test_the_judge_sees_what_the_closed_loop_leaves():
+    """A spectrum summed over a grid against the covariance of the sampled loop, at the control samples."""
+    scene, d = chosen(CASES[1])
+    plants = coupled_study.plants(scene)
+    s, windup = _axis_parts(scene, d)
+    (verdict,) = whole.WholeJudge(plants[:1]).several([control.WholeController(d.name, s, windup)])
+    p = plants[0].system
+    A = whole.closed_map(plants[0], s)
+    noise = np.vstack([p.B[:, 2:] + p.B[:, :2] @ s.D @ p.D[2:, 2:], s.B @ p.D[2:, 2:]])
+    covariance = lti.gramian(A.T, noise @ noise.T)
+    seen = np.hstack([p.C[:2], np.zeros((2, s.order))])
+    expected = float(np.trace(seen @ covariance @ seen.T))
+    assert verdict.mean_rad2 == pytest.approx(expected, rel=2e-3)
+
+
+# ------------------------------------------------------------------------------------------------------------- theory
+@pytest.mark.parametrize("case", CASES, ids=IDS)
+def test_without_hysteresis_the_simulated_residual_is_that_of_theory(case):
+    scene, d = chosen(case)
+    gains = [0.0 for _ in scene.loop.mirror.bank]
+    straight = replace(scene.loop, mirror=linearised(scene.loop.mirror, gains), references=scene.loop.references)
+    run = ensemble.simulate(straight, d.controller, ensemble.Span(1.0, 0.5, 1), 64)
+    assert_allclose(run.axis_rms_rad / d.residual_rad, 1.0, atol=0.1)
+
+
+def test_with_hysteresis_the_outlook_is_near():
+    scene, found = plate()
+    for d, left in zip(found.made, coupled_study.outlook(scene, found.made), strict=True):
+        assert [axis.linear_rad for axis in left] == d.residual_rad.tolist()
+        assert all(0.7 < axis.times < 1.5 for axis in left), d.name
+
+
+# ------------------------------------------------------------------------------------------------------------ refusals
+FAULTS = {
+    "no positions": (
+        lambda m: replace(m, outputs=tuple(replace(o, position_m=None) for o in m.outputs)),
+        "have a position",
+    ),
+    "three angles": (
+        lambda m: replace(m, outputs=tuple(Output(o.name, "angle") for o in m.outputs)),
+        "has 3 angles as outputs: two are needed",
+    ),
+    "an actuator that does nothing": (
+        lambda m: replace(m, mirror=replace(m.mirror, B=m.mirror.B * np.array([1.0, 0.0]), E=0 * m.mirror.E)),
+        "do not move the line of sight in both axes",
+    ),
+    "a bias beyond the amplifier": (
+        lambda m: replace(m, actuators=tuple(replace(a, bias_v=150.0) for a in m.actuators)),
+        "rest has to lie inside: set amplifier.output_min, amplifier.output_max and amplifier.gain",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_a_mirror_that_does_not_fit_is_refused(name):
+    change, told = FAULTS[name]
+    with pytest.raises(ValueError, match=told):
+        scene_of(change(two_axes()))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        ("coupling = [1.0, 0.0, 0.0, 1.0]", "coupling = [1.0, 0.1, 0.0, 1.0]"),
+        ('layout = "two-axis" ', 'layout = "tripod"\nactuator_radius = "10 mm" '),
+    ],
+)
+def test_a_geometry_that_the_mirror_file_has_already_is_refused(change):
+    with pytest.raises(ValueError, match="the mirror file of several axes already holds how its actuators act"):
+        scene_of(two_axes(), change)
+
+
+def test_a_controller_of_another_name_is_refused():
+    with pytest.raises(ValueError, match="is no controller of a mirror of several axes; there are PI, PI \\+ notch"):
+        coupled_study.design(scene_of(two_axes()), only=("PID",))
+
+
+def test_a_margin_out_of_reach_is_refused_with_what_was_reached():
+    scene = scene_of(three_actuators())
+    harsh = replace(scene, table=scene.table.model_copy(update={"modulus_margin": 0.9999}))
+    with pytest.raises(ValueError, match=r"modulus margin of 0\.9999"):
+        coupled_study.design(harsh, only=("PI",))
+
+
+# -------------------------------------------------------------------------------------------------- on the command line
+@pytest.fixture
+def quick(monkeypatch, folder):
+    """A folder with the mission and the mirror, and a command that designs one controller alone."""
+    monkeypatch.setattr(designs, "names", lambda f: ("PI",))
+    (folder / "mission.toml").write_text(mission_text(), encoding="utf-8")
+    (folder / "two-axes.toml").write_text(TEXT, encoding="utf-8")
+    return folder
+
+
+def test_design_prints_one_controller_of_all_axes(quick, call):
+    result = call("design", "mission.toml", "--mirror", "two-axes.toml")
+    assert result.code == 0
+    assert max(map(len, result.out.splitlines())) <= 80
+    text = " ".join(result.out.split())
+    assert "Two axes on a hysteretic spring: 2 actuators and 3 outputs" in text
+    assert re.search(r"PI +\d\.\d{3} / \d\.\d{3} +\d\.\d{3} / \d\.\d{3} +0\.50\d", result.out)
+    assert "the recordings' delay of 70 µs is left out" in text
+    assert "the mirror was recorded up to 500 Hz" in text
+    assert re.search(r"tilt about y +0\.\d+ +\d\.\d+ +\d+\.?\d* %", result.out)
+
+
+def test_design_prints_its_matrices(quick, call):
+    result = call("design", "mission.toml", "--mirror", "two-axes.toml", "--json")
+    (found,) = json.loads(result.out)["controllers"]
+    scene = scene_of(two_axes())
+    system = lti.StateSpace(*(np.array(found["matrices"][key]) for key in "ABCD"))
+    assert system.D.shape == (2, 2 + 3 + 2)
+    axes = control.WholeController(
+        "read", *_axis_parts(scene, _Read(system, np.array(found["matrices"]["anti_windup"])))
+    )
+    margins = [whole.whole_margins(whole_plant(loop, decoupling(scene.rest)), axes) for loop in scene.linear]
+    assert min(m.modulus for m in margins) == pytest.approx(found["margins"]["modulus"], rel=1e-6)
+    assert found["mark"] == ""
+    again = assemble_whole("again", scene.rest, axes.system, axes.anti_windup)
+    assert_allclose(again.system.C, system.C, atol=1e-12 * np.abs(system.C).max())
+
+
+class _Read:
+    name = "read"
+
+    def __init__(self, system, windup):
+        self.controller = type("Controller", (), {"system": system, "anti_windup": windup})
+
+
+def test_design_refuses_a_mirror_that_does_not_fit_the_mission(folder, refused):
+    (folder / "two-axes.toml").write_text(TEXT, encoding="utf-8")
+    told = refused("design", DEFAULT, "--mirror", "two-axes.toml")
+    assert "rest has to lie inside: set amplifier.output_min" in told
