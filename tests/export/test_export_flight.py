@@ -14,16 +14,19 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import designs
+import several_axes
 from microrad.core import kernels, lti
 from microrad.export import choice
 from microrad.export.flight import c_code
 from microrad.export.flight.rounding import RoundingBound, rounding_bound
+from microrad.export.flight.write import export_flight
 from microrad.export.linear_part.modes import minimal
 from microrad.export.linear_part.sections import sections
 from microrad.export.records import ExportError, Origin, Signal
 from microrad.export.templating import comment, real, render, table, terms
 from microrad.loop import control, disturbance
 from microrad.loop.control import AxisController, Drive, Timing
+from microrad.loop.controller_study import Outlook
 from microrad.loop.pointing_loop import loop as fine
 from microrad.loop.pointing_loop.loop import PointingLoop, ReferenceFilter, with_inverse
 from microrad.loop.sensor import OpticalSensor
@@ -275,6 +278,78 @@ def test_single_precision_stays_within_the_bound_that_it_states(flown, tmp_path)
     assert_allclose(numbers["bound_v"], bound.command_v, rtol=1e-5)
     stated = f"within {bound.command_v:.3g} V of double precision over {len(vectors.inputs)} recorded"
     assert stated in code.files["flown.h"]
+
+
+# ------------------------------------------------------------------------------------------------ several axes
+
+
+@cache
+def of_three_actuators():
+    """LQG of all axes of a plate on three actuators, without a converter that would hide what is off."""
+    file = several_axes.mission(NO_CONVERTER)
+    return choice.choose_coupled(file, several_axes.three_actuators(), "LQG")
+
+
+def test_a_controller_of_several_axes_is_the_kernel_over_1e5_samples(tmp_path):
+    chosen = of_three_actuators()
+    of, vectors = choice.flight_controller(chosen), choice.vectors(chosen, 100_000)
+    assert [each.name for each in of.inputs] == ["optical_error_rad"]
+    assert (of.actuators, of.bias_v, vectors.inputs.shape) == (3, 50.0, (100_000, 2))
+    off, counters = difference(Code(tmp_path, of), vectors)
+    print(f"off by {off:.2g} of the largest command")
+    assert 0.0 < off < EXACT
+    assert counters == Counters(vectors.saturated, 0, 0, 0)
+    assert ("modulus margin of all axes", "") in [(name, unit) for name, _, unit in of.margins]
+
+
+def test_a_controller_of_several_axes_stays_within_its_bound_in_single_precision(tmp_path):
+    chosen = of_three_actuators()
+    of, vectors = choice.flight_controller(chosen), choice.vectors(chosen, 5000)
+    bound = rounding_bound(of, sections(of), vectors)
+    off, _ = difference(Code(tmp_path, of, "single", bound=bound), vectors)
+    found = off * np.max(np.abs(vectors.commands))
+    assert 1e-8 < found <= bound.command_v < 5e-2
+
+
+@pytest.mark.parametrize("precision", PRECISIONS)
+def test_garbage_does_not_take_several_axes_beyond_their_limits(precision, tmp_path):
+    chosen = of_three_actuators()
+    of, vectors = choice.flight_controller(chosen), choice.vectors(chosen, 2000)
+    code = Code(tmp_path, of, precision)
+    bad = spoiled(vectors.inputs, code.number)
+    good, rejected = held(bad)
+    found, counters = code.run(bad)
+    assert np.all(np.isfinite(found))
+    assert np.max(np.abs(found)) <= of.maximum_v
+    assert len(bad) / 10 < rejected == counters.rejected
+    assert_array_equal(found, code.run(good)[0])
+    status, numbers, words = bench(
+        code, replace(vectors, inputs=bad.astype(float), commands=found.astype(float)), "sanitized"
+    )
+    assert (status, words) == (0, "")
+    assert numbers["rejected"] == rejected
+
+
+def test_actuators_that_rest_at_different_biases_are_refused():
+    mirror = several_axes.three_actuators()
+    first, *others = mirror.actuators
+    with pytest.raises(ExportError, match=r"rest at 40 V, 50 V, and exported code counts all commands from one bias"):
+        choice.choose_coupled(
+            several_axes.mission(), replace(mirror, actuators=(replace(first, bias_v=40.0), *others)), "PI"
+        )
+
+
+def test_a_controller_of_several_axes_that_leaves_too_much_is_refused(monkeypatch, tmp_path):
+    chosen = of_three_actuators()
+    monkeypatch.setattr(
+        choice.coupled_study, "outlook", lambda scene, designs: [(Outlook(1e-6, 1.1e-6), Outlook(1e-6, 2e-6))]
+    )
+    with pytest.raises(ExportError, match=r"LQG leaves 2 µrad rms an axis .* 2\.00 times the 1 µrad"):
+        export_flight(chosen, tmp_path / "flight")
+    assert list(tmp_path.iterdir()) == []
+
+
+# ------------------------------------------------------------------------------------------------ inverses
 
 
 @pytest.mark.parametrize("name", PAIRS)

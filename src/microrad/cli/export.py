@@ -26,7 +26,7 @@ from microrad.cli.frame import (
 from microrad.core.folder import write_whole
 
 if TYPE_CHECKING:
-    from microrad.export.choice import Choice
+    from microrad.export.choice import Choice, PaperLoopChoice, PointingChoice
     from microrad.mission.file import MissionFile
 
 exports = group(
@@ -68,7 +68,7 @@ class _Loop(StrEnum):
     CONTROL = "control"
 
 
-DEFAULT_CONTROLLER = "PI + inverse"
+DEFAULT_CONTROLLER, DEFAULT_OF_SEVERAL = "PI + inverse", "PI + notch"
 
 _FlightController = Annotated[
     str | None, option("--controller", "NAME", f"{_CONTROLLER} [default: {DEFAULT_CONTROLLER}].")
@@ -87,6 +87,7 @@ _Folder = Annotated[Path | None, option("--output", "FOLDER", "Folder to write [
         "microrad export c leo-geo.toml",
         'microrad export c leo-geo.toml --controller "PID + inverse" --precision single',
         "microrad export c leo-geo.toml --controller LQG --name mirror_loop --output flight",
+        "microrad export c leo-geo.toml --mirror two-axes.toml --controller LQG",
     )
 )
 @command
@@ -109,17 +110,24 @@ def c(  # noqa: PLR0913, PLR0917  each is an option
     from microrad.export import choice
     from microrad.export.flight import write
     from microrad.export.identifiers import identifier, suggested
-    from microrad.mission.file import load_mission
+    from microrad.mirror import coupled
+    from microrad.mission.file import holds_several_axes, load_coupled_mirror, load_mission
 
-    mission = load_mission(file, mirror)
+    several = coupled.of(load_coupled_mirror(mirror)) if mirror is not None and holds_several_axes(mirror) else None
+    mission = load_mission(file, None if several else mirror)
     # Feedback with the inverse of the hysteresis ahead of it: the paper's choice, in the loop that the mission has.
     default = DEFAULT_CONTROLLER if mission.mission.fine_pointing is not None else "PID + inverse"
+    default = DEFAULT_OF_SEVERAL if several else default
     wanted = controller if controller is not None else default
     name = identifier(name) if name is not None else suggested(wanted)
     folder = output or Path(f"{file.stem}-{name}")
     write.check_output(folder, overwrite)
     with progress_bar() as progress:
-        chosen = choice.choose(mission, wanted, progress)
+        chosen: Choice = (
+            choice.choose_coupled(mission, several, wanted, progress)
+            if several
+            else choice.choose(mission, wanted, progress)
+        )
         found = write.export_flight(
             chosen,
             folder,
@@ -225,7 +233,9 @@ def matrices(
     return Outcome(f"{path} written: {', '.join(each.name for each in found)}")
 
 
-def _promised(mission: "MissionFile", name: str, accept: bool, on_progress: OnProgress) -> "Choice":
+def _promised(
+    mission: "MissionFile", name: str, accept: bool, on_progress: OnProgress
+) -> "PointingChoice | PaperLoopChoice":
     """A controller of the mission, refused where its linear figure is no promise."""
     from microrad.export import choice
 

@@ -16,6 +16,7 @@ from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
 from microrad.core.units import format_quantity
 from microrad.export.linear_part.modes import minimal
+from microrad.export.linear_part.sections import sections
 from microrad.export.records import (
     GAUGE,
     OPTICAL_ERROR,
@@ -31,11 +32,11 @@ from microrad.export.records import (
     Vectors,
 )
 from microrad.link import tracking_light_w
-from microrad.loop import control, controller_study, paper_cases, sine_run
+from microrad.loop import control, controller_study, coupled_study, paper_cases, sine_run
 from microrad.loop.paper_cases import PID, PID_WITH_INVERSE
 from microrad.loop.pointing_loop.loop import LoopController
 from microrad.loop.pointing_loop.traces import replay
-from microrad.mirror import Variant, model
+from microrad.mirror import Variant, coupled, model
 from microrad.mission.file import MissionFile
 from microrad.mission.model import Scenario
 from microrad.mission.tables.fine_pointing import FinePointing
@@ -50,11 +51,12 @@ INPUT_LIMIT_RAD = 0.1
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """The mission file that something was made from, and the table of its mirror."""
+    """The mission file that something was made from, the table of its mirror, and the bias that drives count from."""
 
     path: Path
     origin: Origin
     mirror: MirrorTable
+    bias_v: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +66,20 @@ class PointingChoice:
     source: Source
     scene: controller_study.Scene
     tuned: control.Tuned
+    controller: LoopController
+
+
+@dataclass(frozen=True, slots=True)
+class CoupledChoice:
+    """A controller of the fine-pointing loop with a mirror of several axes in place of the mission's.
+
+    ``controller`` is that of the design in the sections that fly: its slow poles are such that the last bit of a number
+    in another form is 1e-12 of the command.
+    """
+
+    source: Source
+    scene: coupled_study.CoupledScene
+    design: coupled_study.CoupledDesign
     controller: LoopController
 
 
@@ -79,7 +95,7 @@ class PaperLoopChoice:
     inverse: control.Inverse
 
 
-Choice = PointingChoice | PaperLoopChoice
+Choice = PointingChoice | CoupledChoice | PaperLoopChoice
 
 
 def names(table: FinePointing | None) -> tuple[str, ...]:
@@ -90,10 +106,12 @@ def names(table: FinePointing | None) -> tuple[str, ...]:
 def source(file: MissionFile) -> Source:
     """What an export says of the mission that it was made from."""
     table = file.mission.mirror
-    return Source(file.path, Origin(file.mission.name, file.sha256, table.name), table)
+    return Source(file.path, Origin(file.mission.name, file.sha256, table.name), table, table.bias_v)
 
 
-def choose(file: MissionFile, name: str, on_progress: Progress = lambda done, total, what: None) -> Choice:
+def choose(
+    file: MissionFile, name: str, on_progress: Progress = lambda done, total, what: None
+) -> PointingChoice | PaperLoopChoice:
     """A controller of a mission, tuned where it belongs to the fine-pointing loop.
 
     Args:
@@ -120,10 +138,52 @@ def choose(file: MissionFile, name: str, on_progress: Progress = lambda done, to
         raise ExportError(f"{file.path}: {error}") from error
 
 
+def choose_coupled(
+    file: MissionFile, given: coupled.CoupledMirror, name: str, on_progress: Progress = lambda done, total, what: None
+) -> CoupledChoice:
+    """A controller of a mission's fine-pointing loop for a mirror of several axes.
+
+    Args:
+        file: The mission.
+        given: The mirror, which takes the place of the mission's.
+        name: One of `coupled_study.names`.
+        on_progress: Is told what is being tuned.
+
+    Raises:
+        ExportError: The mission has no such controller, it cannot be built on the mirror, or the actuators rest at
+            different biases.
+    """
+    biases = sorted({actuator.bias_v for actuator in given.actuators})
+    if len(biases) > 1:
+        raise ExportError(
+            f"the actuators of {given.mirror.name!r} rest at {', '.join(f'{bias:g} V' for bias in biases)}, and "
+            "exported code counts all commands from one bias: give all actuators the same, in the mirror file and in "
+            "the amplifier"
+        )
+    try:
+        scene = coupled_study.scene(file, given, tracking_light_w(file))
+        (design,) = coupled_study.design(scene, on_progress, only=(name,)).made
+    except ValueError as error:
+        raise ExportError(f"{file.path}: {error}") from error
+    origin = replace(source(file).origin, mirror=given.mirror.name)
+    found = CoupledChoice(replace(source(file), origin=origin, bias_v=biases[0]), scene, design, design.controller)
+    form, at = sections(flight_controller(found)), _looked_at(_whole_controller(found))
+    places = np.concatenate([np.arange(each.start, each.stop) for each in at.values()])
+    B, D = (np.zeros((len(m), design.controller.system.B.shape[1])) for m in (form.B, form.D))
+    B[:, places], D[:, places] = form.B, form.D
+    return replace(found, controller=LoopController(name, lti.StateSpace(form.A, B, form.C, D), form.L))
+
+
 def outlook(choice: Choice) -> controller_study.Outlook | None:
-    """What a controller of the fine-pointing loop leaves, linear and simulated; the loop of [control] has no theory."""
+    """What a controller of the fine-pointing loop leaves, linear and simulated; the loop of [control] has no theory.
+
+    Of several axes it is the one on which the simulation strays farthest.
+    """
     if isinstance(choice, PaperLoopChoice):
         return None
+    if isinstance(choice, CoupledChoice):
+        (axes,) = coupled_study.outlook(choice.scene, [choice.design])
+        return max(axes, key=lambda axis: axis.times)
     design = controller_study.Design(choice.controller.name, choice.tuned, choice.controller)
     (found,) = controller_study.outlook(choice.scene, [design])
     return found
@@ -143,12 +203,12 @@ def promised(choice: Choice, accept: bool = False) -> controller_study.Outlook |
             accepted.
     """
     left = outlook(choice)
-    if isinstance(choice, PointingChoice) and left is not None and not (left.holds or accept):
+    if not isinstance(choice, PaperLoopChoice) and left is not None and not (left.holds or accept):
         raise ExportError(_broken(choice, left))
     return left
 
 
-def _broken(choice: PointingChoice, left: controller_study.Outlook) -> str:
+def _broken(choice: PointingChoice | CoupledChoice, left: controller_study.Outlook) -> str:
     found, said = rms_text(left.simulated_rad), rms_text(left.linear_rad)
     return (
         f"{choice.source.path}: {choice.controller.name} leaves {found} on the mission's mirror, simulated with its "
@@ -182,7 +242,7 @@ def flight_controller(choice: Choice) -> FlightController:
 
 
 def _whole_controller(choice: Choice) -> FlightController:
-    return _pointing_controller(choice) if isinstance(choice, PointingChoice) else _paper_controller(choice)
+    return _paper_controller(choice) if isinstance(choice, PaperLoopChoice) else _pointing_controller(choice)
 
 
 def columns(inputs: tuple[Signal, ...]) -> dict[str, slice]:
@@ -229,8 +289,20 @@ def _margins(of: control.LoopMargins) -> tuple[tuple[str, float, str], ...]:
     )
 
 
-def _pointing_controller(choice: PointingChoice) -> FlightController:
-    loop, made, margins = choice.scene.loop, choice.controller, choice.tuned.margins
+def _margins_of_all(of: coupled_study.WholeMargins) -> tuple[tuple[str, float, str], ...]:
+    return (
+        ("modulus margin of all axes", of.modulus, ""),
+        ("disk margin of all axes", of.disk.disk, ""),
+        ("bandwidth", of.bandwidth_hz, "Hz"),
+    )
+
+
+def _pointing_controller(choice: PointingChoice | CoupledChoice) -> FlightController:
+    loop, made = choice.scene.loop, choice.controller
+    if isinstance(choice, CoupledChoice):
+        margins = _margins_of_all(choice.design.margins)
+    else:
+        margins = (*_margins(choice.tuned.margins), ("bandwidth", choice.tuned.margins.bandwidth_hz, "Hz"))
     period = loop.timing.period_s
     error = "line-of-sight error (wanted less actual)"
     inputs = (
@@ -250,8 +322,8 @@ def _pointing_controller(choice: PointingChoice) -> FlightController:
         minimum_v=loop.drive.minimum_v,
         maximum_v=loop.drive.maximum_v,
         resolution_v=loop.drive.drive_resolution_v,
-        bias_v=choice.source.mirror.bias_v,
-        margins=(*_margins(margins), ("bandwidth", margins.bandwidth_hz, "Hz")),
+        bias_v=choice.source.bias_v,
+        margins=margins,
     )
 
 
@@ -279,7 +351,7 @@ def _paper_controller(choice: PaperLoopChoice) -> FlightController:
         minimum_v=setup.drive.minimum_v,
         maximum_v=setup.drive.maximum_v,
         resolution_v=setup.drive.drive_resolution_v,
-        bias_v=choice.source.mirror.bias_v,
+        bias_v=choice.source.bias_v,
         margins=_margins(sine_run.margins(choice.mirror, setup)),
     )
 
@@ -318,14 +390,14 @@ def _plant_unit(
         drive.bandwidth_hz,
         control.amplifier_factor(drive, timing.step_s),
         drive.slew_v_s * timing.step_s,
-        of.mirror.bias_v,
+        of.bias_v,
     )
 
 
 def loop_unit(choice: Choice) -> LoopUnit:
     """The chosen controller with the loop around it; sensors without their noise."""
     made = flight_controller(choice)
-    if isinstance(choice, PointingChoice):
+    if not isinstance(choice, PaperLoopChoice):
         loop, optical = choice.scene.loop, choice.scene.loop.optical
         plant = _plant_unit(choice.source, loop.mirror, loop.optics, loop.drive, loop.timing)
         gauge_rad = 0.0 if loop.gauge is None else loop.gauge.resolution_rad
@@ -349,7 +421,7 @@ def vectors(choice: Choice, samples: int) -> Vectors:
         choice: The controller.
         samples: Length of the run, in control periods.
     """
-    if isinstance(choice, PointingChoice):
+    if not isinstance(choice, PaperLoopChoice):
         run = replay(choice.scene.loop, choice.controller, samples, choice.scene.table.seed)
         saturated, clamped = (int(run.counts[c]) for c in (kernels.COUNT_SATURATED, kernels.COUNT_INVERSE_CLAMPED))
         found = Vectors(run.inputs, run.commands, saturated, clamped)

@@ -33,6 +33,7 @@ LEAST_BITS, MOST_BITS = 8, 32
 
 _REST_SAMPLES = 4096  # of a rest that limit cycles are looked for in
 _CIRCLE = 1e-12  # what rounding moves the size of a pole by
+_INTEGRATOR = 2.0**-lti.EXACT_BITS  # distance from 1 of an integrator: designs round their matrices to so many bits
 
 
 def quantised(
@@ -59,7 +60,7 @@ def quantised(
     if not LEAST_BITS <= bits <= MOST_BITS:
         raise ExportError(f"{bits} bits in fixed point: give {LEAST_BITS} to {MOST_BITS} (sums have 64)")
     ideal = run_in_double(of, form, v.inputs)
-    made = scaled(of, form, v.inputs, ideal, bits)
+    made = scaled(of, _with_integrators(form), v.inputs, ideal, bits)
     _refuse_what_does_not_fit(of, made)
     moved = _poles(form, made)
     _refuse_poles(of, made, moved)
@@ -72,6 +73,15 @@ def quantised(
             f"more bits (up to {MOST_BITS}), or say that more than a count will do"
         )
     return found
+
+
+def _with_integrators(form: Sections) -> Sections:
+    """The form with poles exactly at 1 where the rounding of a design has moved an integrator off it."""
+    A = form.A.copy()
+    for first, size in form.blocks:
+        if size == 1 and abs(A[first, first] - 1.0) < _INTEGRATOR:
+            A[first, first] = 1.0
+    return replace(form, A=A)
 
 
 def _refuse_what_does_not_fit(of: FlightController, made: FixedForm) -> None:

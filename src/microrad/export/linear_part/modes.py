@@ -1,5 +1,6 @@
 """A controller's modes: blocks of states of comparable size, which modes are superfluous, and it without those."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -144,19 +145,27 @@ def hidden(of: Modes) -> tuple[str, complex] | None:
 def minimal(of: FlightController) -> FlightController:
     """The controller without modes that nothing drives or no output shows; itself where it has none.
 
-    Designs that hold a model of their plant have such modes, where a pole of the model stands on a zero. From rest, the
-    outputs stay the same, but for a share of LEAST_SHARE of such a mode. Modes that hide in several blocks at once
-    (equal poles side by side) are left in.
+    Designs that hold a model of their plant have such modes, where a pole of the model stands on a zero; those for
+    several axes have some that hide behind equal poles of other blocks. From rest, the outputs stay the same, but for a
+    share of LEAST_SHARE of such a mode.
 
     Raises:
         ExportError: Where the controller has a number that is not finite.
     """
     found = modes(of)
-    kept = [_kept(found, np.arange(at.start, at.stop)) for at in found.found.slices]
+    made = _without_hidden(of, found, [np.arange(at.start, at.stop) for at in found.found.slices])
+    found = modes(made)
+    return made if hidden(found) is None else _without_hidden(made, found, _alike(found.found))
+
+
+def _without_hidden(of: FlightController, found: Modes, groups: Sequence[NDArray[np.intp]]) -> FlightController:
+    """The controller without what hides in each of some groups of states; itself where nothing does."""
+    kept = [_kept(found, at) for at in groups]
     if sum(len(block) for block, _, _ in kept) == of.system.order:
         return of
+    order = np.concatenate(groups)
     A, W, T = (block_diag(*matrices) for matrices in zip(*kept, strict=True))
-    made = _parted(A, W @ found.B, W @ found.L, found.C @ T)  # before any rounding
+    made = _parted(A, W @ found.B[order], W @ found.L[order], found.C[:, order] @ T)  # before any rounding
     A, B, C, L = (each.astype(float) for each in (made.found.blocks, made.B, made.C, made.L))
     return replace(of, system=lti.StateSpace(A, B, C, of.system.D), anti_windup=L)
 
@@ -169,7 +178,8 @@ def _kept(of: Modes, at: NDArray[np.intp]) -> tuple[Wide, Wide, Wide]:
     """
     one, inner = np.eye(at.size, dtype=np.longdouble), _stripped(of, at)
     block = of.found.blocks[np.ix_(inner, inner)]
-    into, back = one[inner - at[0]], one[:, inner - at[0]]
+    places = np.flatnonzero(np.isin(at, inner))
+    into, back = one[places], one[:, places]
     part = _local(of, inner)
     for reached in (True, False):
         Q, count = _staircase(part.A, part.B) if reached else _staircase(part.A.T, part.C.T)

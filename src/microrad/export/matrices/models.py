@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from microrad.core import lti
-from microrad.export.choice import Choice, PaperLoopChoice, PointingChoice, Source, flight_controller
+from microrad.export.choice import PaperLoopChoice, PointingChoice, Source, flight_controller
 from microrad.export.matrices.forms import LinearModel, Port
 from microrad.export.matrices.structure import without_copies, without_state
 from microrad.export.records import ExportError, FlightController
@@ -22,7 +22,7 @@ LINEAR_PART, MIRROR, SAMPLED_PLANT, CONTROLLER, LOOP = "linear_part", "mirror", 
 """Names of the models, valid as names of variables in MATLAB."""
 
 
-def models(of: Source | Choice) -> tuple[LinearModel, ...]:
+def models(of: Source | PointingChoice | PaperLoopChoice) -> tuple[LinearModel, ...]:
     """The linear models of a mission's mirror (see `choice.source`), or of a controller (`choice.choose`) and its loop.
 
     Angles are line-of-sight angles in the sampled plant, the controller and the loop, and the mirror file's own in the

@@ -2,12 +2,14 @@
 
 from microrad.loop.coupled_study.designs import CoupledDesign, CoupledDesigns, design, names, outlook, plants
 from microrad.loop.coupled_study.scene import AXES, CoupledScene, scene
+from microrad.loop.coupled_study.whole import WholeMargins
 
 __all__ = [
     "AXES",
     "CoupledDesign",
     "CoupledDesigns",
     "CoupledScene",
+    "WholeMargins",
     "design",
     "names",
     "outlook",

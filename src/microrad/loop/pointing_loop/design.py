@@ -41,7 +41,9 @@ def whole_plant(loop: PointingLoop, to_drives: Floats) -> WholePlant:
         loop: The loop; a gauge is not looked at.
         to_drives: Commands of the axes to drives, shape (actuators, axes): `decoupling` of this loop or of one like it.
     """
-    s, disturbances = _sampled(loop, to_drives)
+    m = loop.mirror
+    commanded = replace(m, B=m.B @ to_drives, G=m.G @ to_drives, D=m.D @ to_drives)  # an amplifier for each command
+    s, disturbances = _sampled(replace(loop, mirror=commanded), np.eye(loop.axes))
     white, axes = s.B.shape[1] - 1, loop.axes  # without the gauge's noise
     seen = lti.StateSpace(s.A, s.B[:, :white], s.C[: 2 * axes], s.D[: 2 * axes, :white])
     exact = lti.system_to_bits(seen, lti.DESIGN_BITS)
