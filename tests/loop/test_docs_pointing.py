@@ -2,17 +2,22 @@
 
 import re
 
+import several_axes
 from places import ROOT
 
 
-def test_every_controllers_worked_example_runs(monkeypatch, capsys):
-    monkeypatch.chdir(ROOT)
+def test_every_controllers_worked_example_runs(tmp_path, monkeypatch, capsys):
+    (tmp_path / "missions").symlink_to(ROOT / "missions")
+    (tmp_path / "two-axes.toml").write_text(several_axes.TEXT, encoding="utf-8")
+    (tmp_path / "two-axes-mission.toml").write_text(several_axes.mission_text(), encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
     text = (ROOT / "docs" / "pointing.md").read_text(encoding="utf-8")
     blocks = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
-    assert len(blocks) == 8
+    assert len(blocks) == 9
     session: dict[str, object] = {}
     for block in blocks:
         exec(block, session)
     printed = capsys.readouterr().out
-    assert printed.count("\n") == 8 and "nan" not in printed
+    assert printed.count("\n") == 10 and "nan" not in printed
     assert session["tuned"].margins.modulus >= 0.5 and session["lqg"].residual_rms_rad >= session["bound"]
+    assert session["both"].margins.modulus >= 0.5 and session["x"].times < 1.5
