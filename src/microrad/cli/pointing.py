@@ -60,8 +60,7 @@ def design(
     mission = load_mission(file, mirror)
     with progress_bar() as progress, refusal_of(mission.path):
         scene = controller_study.scene(mission, mirror_room.of(mission.mission), tracking_light_w(mission))
-        designs = controller_study.design(scene, progress)
-        left = controller_study.outlook(scene, designs, progress)
+        designs, left = zip(*controller_study.design_and_promise(scene, progress), strict=True)
     marks = [each.mark(accept) for each in left]
     warnings = list(filter(None, [unknown_dynamics(mission.mission.mirror), _broken(designs, left, accept)]))
     code = UNMET if "refused" in marks else MET
@@ -97,7 +96,9 @@ def _text(
         gain = "none" if margins["gain_up_db"] is None else f"{margins['gain_up_db']:.1f} dB"
         bandwidth = format_quantity(margins["bandwidth_hz"], "Hz", 3)
         rows.append((d.name, *rms, f"{margins['modulus']:.3f}", f"{margins['phase_deg']:.0f}°", gain, bandwidth))
-        tuned.append((d.name, ", ".join(f"{k} {v:.3g}" for k, v in d.tuned.values.items())))
+        values = [f"{k} {v:.3g}" for k, v in d.tuned.values.items()]
+        values += [] if d.margin is None else [f"for a modulus margin of {d.margin:.3g}, for the mirror's hysteresis"]
+        tuned.append((d.name, ", ".join(values)))
     headings = ("controller", "linear", "simulated", "modulus", "phase", "gain", "bandwidth")
     tables = [Table("", headings, rows, (0,)), Table("", ("controller", "tuned to"), tuned, (1,))]
     said = tables_text([], [about], width()), tables_text(tables, [f"Warning: {each}." for each in warnings], width())
@@ -112,6 +113,7 @@ def _data(d: "Design", left: "Outlook", mark: str) -> dict[str, Any]:
         "name": d.name,
         "inverse": d.inverse,
         "tuned": d.tuned.values,
+        "tuned_for_modulus_margin": d.margin,
         "bound_by": list(d.tuned.bound_by),
         "residual_rms_rad_per_axis": left.linear_rad,
         "simulated_rms_rad_per_axis": left.simulated_rad,

@@ -129,11 +129,9 @@ def choose(
         mirrors = mirror.of(m)
         if name in (PID, PID_WITH_INVERSE):
             return _paper_loop(source(file), paper_cases.of(m, mirrors), name)
-        on_progress(0, 2, f"tuning {name}")
         scene = controller_study.scene(file, mirrors, tracking_light_w(file))
-        tuned = controller_study.tune(name, scene.table, controller_study.plants(scene, scene.table.seed))
-        on_progress(1, 2, f"{name} tuned")
-        return PointingChoice(source(file), scene, tuned, controller_study.build(name, scene, tuned.controller))
+        (design,) = controller_study.design(scene, on_progress, only=(name,))
+        return PointingChoice(source(file), scene, design.tuned, design.controller)
     except ValueError as error:
         raise ExportError(f"{file.path}: {error}") from error
 

@@ -12,13 +12,13 @@ from microrad.loop.controller_study.designs import (
     BASELINE,
     Design,
     build,
-    design,
     families,
     names,
     optimum_rms_rad,
     plants,
     tune,
 )
+from microrad.loop.controller_study.promises import design, design_and_promise
 from microrad.loop.controller_study.results import (
     COUNTERS,
     PROMISE,
@@ -55,6 +55,7 @@ __all__ = [
     "best",
     "build",
     "design",
+    "design_and_promise",
     "design_and_simulate",
     "design_and_simulate_one",
     "error_budget",

@@ -31,12 +31,17 @@ GRID = 24
 
 @dataclass(frozen=True, slots=True)
 class Design:
-    """One controller of the study: what it was tuned to, on all axes; ``in_series`` names how an inverse is used."""
+    """One controller of the study: what it was tuned to, on all axes; ``inverse`` says how one is used.
+
+    ``margin`` is the modulus margin that it was tuned for where the mirror's hysteresis asks for more than the
+    mission's, else None.
+    """
 
     name: str
     tuned: Tuned
     controller: LoopController
     inverse: str = ""
+    margin: float | None = None
 
 
 def families(f: FinePointing) -> tuple[Family, ...]:
