@@ -14,6 +14,7 @@ from scipy.linalg import block_diag
 from design_plants import axis_plant
 from microrad.core import lti
 from microrad.loop import control, coupled_study
+from microrad.loop.controller_study import Outlook
 from microrad.loop.coupled_study import designs, whole
 from microrad.loop.coupled_study.scene import line_of_sight
 from microrad.loop.pointing_loop import ensemble
@@ -236,13 +237,15 @@ def _modulus(plant, controller):
     """By brute force, 0 where the loop is unstable."""
     if float(np.abs(np.linalg.eigvals(whole.closed_map(plant, controller.system))).max()) >= 1.0:
         return 0.0
-    freq = np.unique(np.concatenate([np.geomspace(0.01, 2500.0, 500), np.linspace(1.0, 2500.0, 2500)]))
     s = plant.system
     seen = lti.StateSpace(s.A, s.B[:, :2], s.C[2:], np.zeros((2, 2)))
-    L = lti.frequency_response(seen, freq, plant.period_s) @ lti.frequency_response(
-        controller.system, freq, plant.period_s
-    )
-    return float(_moduli(-L).min())
+
+    def moduli(freq):
+        to_command = lti.frequency_response(controller.system, freq, plant.period_s)
+        return _moduli(-lti.frequency_response(seen, freq, plant.period_s) @ to_command)
+
+    coarse = np.unique(np.concatenate([np.geomspace(0.01, 2500.0, 500), np.linspace(1.0, 2500.0, 2500)]))
+    return float(moduli(_around(coarse, moduli(coarse))).min())
 
 
 def test_a_controller_that_closes_a_loop_the_wrong_way_is_unstable():
@@ -285,8 +288,28 @@ def test_without_hysteresis_the_simulated_residual_is_that_of_theory(case):
 def test_with_hysteresis_the_outlook_is_near():
     scene, found = plate()
     for d, left in zip(found.made, coupled_study.outlook(scene, found.made), strict=True):
-        assert [axis.linear_rad for axis in left] == d.residual_rad.tolist()
-        assert all(0.7 < axis.times < 1.5 for axis in left), d.name
+        assert [axis.linear_rad for axis in left.axes] == d.residual_rad.tolist()
+        assert all(0.7 < axis.times < 1.5 for axis in left.axes), d.name
+        assert left.simulated_rad == pytest.approx(math.hypot(*(axis.simulated_rad for axis in left.axes)))
+
+
+def test_what_hysteresis_breaks_is_tuned_for_a_larger_margin(monkeypatch):
+    """As if all were left twice but for what is tuned for a margin of 0.7 or above."""
+    scene, _ = plate()
+
+    def judged(scene, found, on_progress=None):
+        times = [1.2 if d.margins.modulus > 0.69 else 2.0 for d in found]
+        return tuple(
+            coupled_study.CoupledOutlook(tuple(Outlook(r, t * r) for r in d.residual_rad.tolist()))
+            for d, t in zip(found, times, strict=True)
+        )
+
+    monkeypatch.setattr(designs, "outlook", judged)
+    found, (left,) = coupled_study.design_and_promise(scene, only=("PI",))
+    (kept,) = found.made
+    assert left.holds
+    assert kept.margin == pytest.approx(0.7)
+    assert 0.7 <= kept.margins.modulus < 0.71
 
 
 # ------------------------------------------------------------------------------------------------------------ refusals

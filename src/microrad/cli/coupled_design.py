@@ -1,16 +1,13 @@
 """What `microrad design` does with a mirror file of several axes: one controller of all axes, margins of the whole."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from microrad.cli.frame import MET, UNMET, Outcome, json_text, progress_bar, refusal_of, width
 
 if TYPE_CHECKING:
-    from microrad.loop.controller_study import Outlook
-    from microrad.loop.coupled_study import CoupledDesign, CoupledDesigns, CoupledScene
-
-Lefts = Sequence[tuple["Outlook", ...]]
+    from microrad.loop.coupled_study import CoupledDesign, CoupledDesigns, CoupledOutlook, CoupledScene
 
 
 def design_of_several_axes(file: Path, mirror: Path, accept: bool, as_json: bool) -> Outcome:
@@ -30,11 +27,10 @@ def design_of_several_axes(file: Path, mirror: Path, accept: bool, as_json: bool
     mission, plant = load_mission(file), coupled.of(load_coupled_mirror(mirror))
     with progress_bar() as progress, refusal_of(mission.path):
         scene = coupled_study.scene(mission, plant, tracking_light_w(mission))
-        found = coupled_study.design(scene, progress)
-        left = coupled_study.outlook(scene, found.made, progress)
-    marks = [max((axis.mark(accept) for axis in each), key=len) for each in left]
-    worst = [max(axis.times for axis in each) for each in left]
-    broken = [f"{d.name} ({times:.2f} times)" for d, times, mark in zip(found.made, worst, marks, strict=True) if mark]
+        found, left = coupled_study.design_and_promise(scene, progress)
+    marks = [each.worst.mark(accept) for each in left]
+    named = zip(found.made, left, strict=True)
+    broken = [f"{d.name} ({each.worst.times:.2f} times)" for d, each in named if not each.holds]
     warnings = [*filter(None, [broken_promises(broken, accept)]), *_left_out(scene), *found.refused.values()]
     code = UNMET if "refused" in marks else MET
     if as_json:
@@ -66,6 +62,18 @@ def broken_promises(named: Sequence[str], accept: bool) -> str:
     )
 
 
+def tuned_text(values: Mapping[str, float], margin: float | None) -> str:
+    """What a controller was tuned to, in words.
+
+    Args:
+        values: Its parameters by name.
+        margin: Modulus margin that hysteresis made it be tuned for; None for the mission's.
+    """
+    said = [f"{name} {value:.3g}" for name, value in values.items()]
+    said += [] if margin is None else [f"for a modulus margin of {margin:.3g}, for the mirror's hysteresis"]
+    return ", ".join(said)
+
+
 def _left_out(scene: "CoupledScene") -> list[str]:
     """What of the mirror's file does not count here, in sentences."""
     from microrad.core.units import format_quantity
@@ -86,7 +94,11 @@ def _left_out(scene: "CoupledScene") -> list[str]:
 
 
 def _text(
-    scene: "CoupledScene", found: "CoupledDesigns", left: Lefts, marks: Sequence[str], warnings: Sequence[str]
+    scene: "CoupledScene",
+    found: "CoupledDesigns",
+    left: "Sequence[CoupledOutlook]",
+    marks: Sequence[str],
+    warnings: Sequence[str],
 ) -> str:
     from microrad.core.units import format_quantity
     from microrad.report.tables import Table, tables_text
@@ -99,18 +111,21 @@ def _text(
         "whole drive range."
     )
     rows, tuned = [], []
-    for d, axes, mark in zip(found.made, left, marks, strict=True):
+    for d, each, mark in zip(found.made, left, marks, strict=True):
         linear, simulated = (
             " / ".join(f"{1e6 * value:.3f}" for value in values)
-            for values in ([a.linear_rad for a in axes], [a.simulated_rad for a in axes])
+            for values in ([a.linear_rad for a in each.axes], [a.simulated_rad for a in each.axes])
         )
         margins = d.margins
         bandwidth = format_quantity(margins.bandwidth_hz, "Hz", 3)
         figures = f"{margins.modulus:.3f}", f"{margins.disk.disk:.3f}", bandwidth
         rows.append((d.name, linear, f"{simulated} {mark}".strip(), *figures))
-        tuned.append((d.name, ", ".join(f"{k} {v:.3g}" for k, v in d.tuned.items())))
+        tuned.append((d.name, tuned_text(d.tuned, d.margin)))
     headings = ("controller", "linear x / y", "simulated x / y", "modulus", "disk", "bandwidth")
-    best, (low, high) = min(zip(left, found.made, strict=True), key=lambda each: _radial(each[0]))[1], scene.reach_v
+    best, (low, high) = (
+        min(zip(left, found.made, strict=True), key=lambda each: each[0].simulated_rad)[1],
+        scene.reach_v,
+    )
     drives = [
         (actuator.name, f"{known:.3g}", f"{rms:.3g}", f"{100.0 * (known + 3.0 * rms) / min(high, -low):.3g} %")
         for actuator, known, rms in zip(scene.mirror.actuators, scene.static_v, best.drive_v.tolist(), strict=True)
@@ -125,20 +140,14 @@ def _text(
     return "\n\n".join(text.strip("\n") for text in said)
 
 
-def _radial(axes: tuple["Outlook", ...]) -> float:
-    """Simulated radial rms."""
-    import math
-
-    return math.hypot(*(axis.simulated_rad for axis in axes))
-
-
-def _data(d: "CoupledDesign", left: tuple["Outlook", ...], mark: str) -> dict[str, Any]:
+def _data(d: "CoupledDesign", left: "CoupledOutlook", mark: str) -> dict[str, Any]:
     m, system = d.margins, d.controller.system
     return {
         "name": d.name,
         "tuned": dict(d.tuned),
-        "residual_rms_rad": [axis.linear_rad for axis in left],
-        "simulated_rms_rad": [axis.simulated_rad for axis in left],
+        "tuned_for_modulus_margin": d.margin,
+        "residual_rms_rad": [axis.linear_rad for axis in left.axes],
+        "simulated_rms_rad": [axis.simulated_rad for axis in left.axes],
         "drive_rms_v": d.drive_v.tolist(),
         "mark": mark,
         "margins": {

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from microrad.cli.coupled_design import broken_promises, design_of_several_axes
+from microrad.cli.coupled_design import broken_promises, design_of_several_axes, tuned_text
 from microrad.cli.frame import (
     MET,
     UNMET,
@@ -96,9 +96,7 @@ def _text(
         gain = "none" if margins["gain_up_db"] is None else f"{margins['gain_up_db']:.1f} dB"
         bandwidth = format_quantity(margins["bandwidth_hz"], "Hz", 3)
         rows.append((d.name, *rms, f"{margins['modulus']:.3f}", f"{margins['phase_deg']:.0f}°", gain, bandwidth))
-        values = [f"{k} {v:.3g}" for k, v in d.tuned.values.items()]
-        values += [] if d.margin is None else [f"for a modulus margin of {d.margin:.3g}, for the mirror's hysteresis"]
-        tuned.append((d.name, ", ".join(values)))
+        tuned.append((d.name, tuned_text(d.tuned.values, d.margin)))
     headings = ("controller", "linear", "simulated", "modulus", "phase", "gain", "bandwidth")
     tables = [Table("", headings, rows, (0,)), Table("", ("controller", "tuned to"), tuned, (1,))]
     said = tables_text([], [about], width()), tables_text(tables, [f"Warning: {each}." for each in warnings], width())

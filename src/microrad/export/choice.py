@@ -160,7 +160,7 @@ def choose_coupled(
         )
     try:
         scene = coupled_study.scene(file, given, tracking_light_w(file))
-        (design,) = coupled_study.design(scene, on_progress, only=(name,)).made
+        (design,) = coupled_study.design_and_promise(scene, on_progress, only=(name,))[0].made
     except ValueError as error:
         raise ExportError(f"{file.path}: {error}") from error
     origin = replace(source(file).origin, mirror=given.mirror.name)
@@ -181,7 +181,7 @@ def outlook(choice: Choice) -> controller_study.Outlook | None:
         return None
     if isinstance(choice, CoupledChoice):
         (axes,) = coupled_study.outlook(choice.scene, [choice.design])
-        return max(axes, key=lambda axis: axis.times)
+        return axes.worst
     design = controller_study.Design(choice.controller.name, choice.tuned, choice.controller)
     (found,) = controller_study.outlook(choice.scene, [design])
     return found

@@ -1,6 +1,15 @@
 """Controllers of a mission's fine-pointing loop for a mirror of several axes, with the margins of the whole."""
 
-from microrad.loop.coupled_study.designs import CoupledDesign, CoupledDesigns, design, names, outlook, plants
+from microrad.loop.coupled_study.designs import (
+    CoupledDesign,
+    CoupledDesigns,
+    CoupledOutlook,
+    design,
+    design_and_promise,
+    names,
+    outlook,
+    plants,
+)
 from microrad.loop.coupled_study.scene import AXES, CoupledScene, scene
 from microrad.loop.coupled_study.whole import WholeMargins
 
@@ -8,9 +17,11 @@ __all__ = [
     "AXES",
     "CoupledDesign",
     "CoupledDesigns",
+    "CoupledOutlook",
     "CoupledScene",
     "WholeMargins",
     "design",
+    "design_and_promise",
     "names",
     "outlook",
     "plants",

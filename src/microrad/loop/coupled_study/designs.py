@@ -1,8 +1,9 @@
 """Controllers for a mirror of several axes: decoupled, one loop an axis, judged all together on the whole mirror."""
 
+import math
 from collections import ChainMap
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import product
 from typing import NamedTuple
@@ -17,6 +18,7 @@ from microrad.loop.control.descent import descend
 from microrad.loop.control.search import Search, Trial, apart
 from microrad.loop.control.tuning import settled
 from microrad.loop.controller_study import designs as one_axis
+from microrad.loop.controller_study.promises import firmer
 from microrad.loop.controller_study.results import Outlook, shortened
 from microrad.loop.coupled_study.scene import AXES, CoupledScene
 from microrad.loop.coupled_study.whole import ALL_AXES, WholeMargins, alone, of_all_axes, whole_margins
@@ -44,7 +46,8 @@ class CoupledDesign:
 
     ``tuned`` are the values that it was tuned to, by name. ``margins`` are the smallest over all linear loops of the
     scene, each with all axes closed. ``residual_rad`` is the rms of each axis for small motions about rest, linear, and
-    ``drive_v`` that of each drive; ``worst_rad`` the largest rms of each axis over all linear loops.
+    ``drive_v`` that of each drive; ``worst_rad`` the largest rms of each axis over all linear loops. ``margin`` is the
+    modulus margin that it was tuned for where the mirror's hysteresis asks for more than the mission's, else None.
     """
 
     name: str
@@ -54,6 +57,29 @@ class CoupledDesign:
     residual_rad: Floats
     drive_v: Floats
     worst_rad: Floats
+    margin: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class CoupledOutlook:
+    """By axis, the linear figure about rest beside one simulated on the mirror with its hysteresis."""
+
+    axes: tuple[Outlook, ...]
+
+    @property
+    def simulated_rad(self) -> float:
+        """Simulated radial rms."""
+        return math.hypot(*(axis.simulated_rad for axis in self.axes))
+
+    @property
+    def worst(self) -> Outlook:
+        """That of the axis on which the simulation strays farthest."""
+        return max(self.axes, key=lambda axis: axis.times)
+
+    @property
+    def holds(self) -> bool:
+        """Whether the linear figure of each axis is a promise."""
+        return self.worst.holds
 
 
 class CoupledDesigns(NamedTuple):
@@ -112,6 +138,40 @@ def design(
         tuple(made[name] for name in wanted if name in made),
         {name: str(found[name]) for name in wanted if name not in made},
     )
+
+
+def design_and_promise(
+    scene: CoupledScene, on_progress: Progress = lambda done, total, what: None, only: Sequence[str] = ()
+) -> tuple[CoupledDesigns, tuple[CoupledOutlook, ...]]:
+    """As `design`, each with what it leaves; tuned for a larger margin where its linear figure is no promise.
+
+    Args:
+        scene: The mission's loop.
+        on_progress: Called with the controllers that are designed, their number and what is done.
+        only: Names out of `names`, in the order that is wanted; by default all.
+
+    Raises:
+        ValueError: For a name that `names` does not list, and where no controller meets its margin; says why.
+    """
+    found = design(scene, on_progress, only)
+    kept = [
+        (d, figure) if figure.holds else _firmer(scene, d, on_progress) or (d, figure)
+        for d, figure in zip(found.made, outlook(scene, found.made, on_progress), strict=True)
+    ]
+    return CoupledDesigns(tuple(d for d, _ in kept), found.refused), tuple(figure for _, figure in kept)
+
+
+def _firmer(
+    scene: CoupledScene, broken: CoupledDesign, on_progress: Progress
+) -> tuple[CoupledDesign, CoupledOutlook] | None:
+    (family,) = (each for each in one_axis.families(scene.table) if each.name == broken.name)
+
+    def tuned(margin: float) -> CoupledDesign:
+        on_progress(0, 1, f"tuning {broken.name} for a larger margin")
+        table = scene.table.model_copy(update={"modulus_margin": margin})
+        return replace(_designed(replace(scene, table=table), family, plants(scene), None), margin=margin)
+
+    return firmer(scene.table.modulus_margin, tuned, lambda designs: outlook(scene, designs))
 
 
 def _designed_in_turn(
@@ -219,8 +279,8 @@ def _judged(
 
 def outlook(
     scene: CoupledScene, designs: Sequence[CoupledDesign], on_progress: Progress = lambda done, total, what: None
-) -> tuple[tuple[Outlook, ...], ...]:
-    """By design and axis, the linear figure about rest beside one simulated on the mirror with its hysteresis.
+) -> tuple[CoupledOutlook, ...]:
+    """Each design's linear figures beside those simulated with hysteresis, in one batch of shortened runs.
 
     Args:
         scene: The mission's loop.
@@ -229,6 +289,6 @@ def outlook(
     """
     found = shortened(scene.table, scene.loop, [d.controller for d in designs], on_progress)
     return tuple(
-        tuple(map(Outlook, d.residual_rad.tolist(), each.axis_rms_rad.tolist()))
+        CoupledOutlook(tuple(map(Outlook, d.residual_rad.tolist(), each.axis_rms_rad.tolist())))
         for d, each in zip(designs, found, strict=True)
     )
