@@ -136,15 +136,21 @@ def _contained(search: Search, seed: int, survey: int, base: Tuned | None) -> li
 
 def _places(search: Search, contained: Sequence[Trial], survey: int, seed: int) -> Floats:
     """Where a search looks first; half of it beside what it contains, with that one's values and any of its own."""
-    found = _hypercube(len(search.parameters), survey, seed)
+    found = hypercube(len(search.parameters), survey, seed)
     if contained and search.family.base:
         shared = len(search.family.base.parameters(search.plants[0]))
         found[::2, :shared] = contained[0].place[:shared]
     return found
 
 
-def _hypercube(dimensions: int, count: int, seed: int) -> Floats:
-    """Places (count, dimensions) of a Latin hypercube."""
+def hypercube(dimensions: int, count: int, seed: int) -> Floats:
+    """Places (count, dimensions) of a Latin hypercube, each coordinate from 0 to 1.
+
+    Args:
+        dimensions: Number of coordinates.
+        count: Number of places.
+        seed: Seed of the places.
+    """
     rng = np.random.Generator(np.random.Philox(seed))
     strata = np.array([rng.permutation(count) for _ in range(dimensions)]).reshape(dimensions, count).T
     return np.asarray((strata + rng.random((count, dimensions))) / count)
@@ -172,6 +178,7 @@ def settled(search: Search, optima: Sequence[Trial], models: int = MODELS) -> Tr
         if _holds(search, found):
             return found
         search.optimism = max(search.optimism, _overstated(search, found)) * (1.0 + HEADROOM)
+        optima = [search.at(t.place) for t in optima]  # by what the margin is now taken to need
     raise ValueError(_refusal(search))
 
 

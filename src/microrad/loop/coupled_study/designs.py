@@ -13,10 +13,10 @@ import numpy as np
 from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
 from microrad.core.threads import shared_out
-from microrad.loop.control import LQG, LQG_OF_AXES, PI, Family, Specification, WholeController, WholePlant, tune
+from microrad.loop.control import LQG, LQG_OF_AXES, PI, Family, Specification, WholeController, WholePlant
 from microrad.loop.control.descent import descend
 from microrad.loop.control.search import Search, Trial, apart
-from microrad.loop.control.tuning import settled
+from microrad.loop.control.tuning import hypercube, settled
 from microrad.loop.controller_study import designs as one_axis
 from microrad.loop.controller_study.promises import firmer
 from microrad.loop.controller_study.results import Outlook, shortened
@@ -28,7 +28,7 @@ from microrad.loop.pointing_loop.loop import LoopController, assemble_whole, dec
 from microrad.mission.tables.fine_pointing import FinePointing
 
 STARTS = 3
-"""Places from which the weights of LQG are followed."""
+"""Places from which an axis by itself, and the weights of LQG, are followed."""
 
 MODELS = 8
 """Quadratic models of the whole that an optimum is followed by: with ten parameters each takes 220 candidates."""
@@ -196,13 +196,15 @@ def _designed(
     A plant on which the margin is missed is added to those that it is tuned for.
     """
     asked, tuned_for = scene.table.modulus_margin, [*range(min(NOMINAL, len(of)))]
+    begun: Floats | None = None
     for _ in range(ADDED + 1):
-        made, values = _tuned(scene, family, [of[i] for i in tuned_for], base)
+        made, values = _tuned(scene, family, [of[i] for i in tuned_for], base, begun)
         moduli = [_modulus(plant, made) for plant in of]
         worst = int(np.argmin(moduli))
         if moduli[worst] >= asked or worst in tuned_for:
             break
         tuned_for.append(worst)
+        begun = np.array(list(values.values()))
     if moduli[worst] < asked:
         raise ValueError(
             f"{family.name} keeps a modulus margin of {moduli[worst]:.3g} on one of {len(of)} mirrors that the "
@@ -221,18 +223,29 @@ def _modulus(plant: WholePlant, controller: WholeController) -> float:
 
 
 def _tuned(
-    scene: CoupledScene, family: Family, of: Sequence[WholePlant], base: CoupledDesign | None
+    scene: CoupledScene,
+    family: Family,
+    of: Sequence[WholePlant],
+    base: CoupledDesign | None,
+    begun: Floats | None,
 ) -> tuple[WholeController, dict[str, float]]:
-    """The best controller of a family, beginning where each axis is best by itself and where its base is best."""
+    """The best controller of a family for some plants, and its values.
+
+    The search begins where each axis is best by itself and where the base is best, or at the values that it has begun
+    with on fewer plants.
+    """
     asked = Specification(scene.table.modulus_margin)
     whole = LQG_OF_AXES if family is LQG else of_all_axes(family, of[0], AXES)
     search = Search(whole, of, asked, scope=ALL_AXES)
-    begun = _weights(search) if family is LQG else [_by_axis(scene, family, of, search)]
-    if base is not None and family.extended is not None:
-        parts = np.split(np.array(list(base.tuned.values())), scene.loop.axes)
-        extended = [family.extended(alone(of[0], axis), part) for axis, part in enumerate(parts)]
-        begun.append(search.of(np.concatenate(extended)))
-    near = min((descend(search, each) for each in begun), key=lambda t: t.score)
+    if begun is not None:
+        starts = [search.of(begun)]
+    else:
+        starts = _weights(search) if family is LQG else [_by_axis(scene, family, of, search)]
+        if base is not None and family.extended is not None:
+            parts = np.split(np.array(list(base.tuned.values())), scene.loop.axes)
+            extended = [family.extended(alone(of[0], axis), part) for axis, part in enumerate(parts)]
+            starts.append(search.of(np.concatenate(extended)))
+    near = min((descend(search, each) for each in starts), key=lambda t: t.score)
     best = settled(search, [near], MODELS)
     values = dict(zip((p.name for p in search.parameters), best.values.tolist(), strict=True))
     return (whole.final or whole.build)(of[0], best.values), values
@@ -246,13 +259,14 @@ def _weights(search: Search) -> list[Trial]:
 
 
 def _by_axis(scene: CoupledScene, family: Family, of: Sequence[WholePlant], search: Search) -> Trial:
-    """Each axis as it is best by itself."""
-    seed = scene.table.seed
-    alike = [
-        tune(family, [alone(plant, axis) for plant in of], search.specification, seed=seed, survey=SURVEY)
-        for axis in range(scene.loop.axes)
-    ]
-    return search.of(np.array([value for each in alike for value in each.values.values()]))
+    """Each axis as it is best by itself, to where a rough search ends: the whole goes on from there."""
+    best = []
+    for axis in range(scene.loop.axes):
+        own = Search(family, [alone(plant, axis) for plant in of], search.specification)
+        surveyed = own.at_all(list(hypercube(len(own.parameters), SURVEY, scene.table.seed)))
+        starts = apart(sorted(surveyed, key=lambda t: t.score), STARTS, 0.1)
+        best.append(min((descend(own, start) for start in starts), key=lambda t: t.score))
+    return search.of(np.concatenate([trial.values for trial in best]))
 
 
 def _judged(

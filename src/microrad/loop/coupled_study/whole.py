@@ -18,6 +18,7 @@ from microrad.loop.control import (
     multiloop_disk_margin,
 )
 from microrad.loop.control.analysis import bandwidth_hz, reachable, resolving
+from microrad.loop.control.classical import LIGHT_DAMPING
 from microrad.loop.control.judge import CLOSER, NEAR_LEAST, Verdict, grid, quadrature
 from microrad.loop.control.problem import Parameter
 from microrad.loop.control.search import Scope
@@ -74,7 +75,8 @@ class WholeJudge:
         return Verdict(pole, math.inf, np.zeros(sum(map(len, self._bands))), np.zeros(len(self._plants)))
 
     def _judged(self, system: lti.StateSpace) -> Verdict:
-        pole = max(float(np.max(np.abs(np.linalg.eigvals(closed_map(p, system))))) for p in self._moved)
+        poles = [np.linalg.eigvals(closed_map(p, system)).astype(complex) for p in self._moved]
+        pole = max(float(np.max(np.abs(each))) for each in poles)
         if not pole < 1.0 - 1e-9:
             return self.unstable(pole)
         variances, moduli = [], []
@@ -84,7 +86,7 @@ class WholeJudge:
             returned = np.eye(axes) - whole[:, axes:, :axes] @ K
             taken = whole[:, :axes, :axes] @ (K @ _inverse(returned))
             variances.append(self._variance(i, self._white[i][:, :axes] + taken @ self._white[i][:, axes:]))
-            moduli.append(np.minimum.reduceat(least_moduli(p, system, freq, returned), self._bands[i]))
+            moduli.append(np.minimum.reduceat(least_moduli(p, system, freq, returned, poles[i]), self._bands[i]))
         return Verdict(pole, float(np.mean(variances)), np.concatenate(moduli), np.zeros(len(self._plants)))
 
     def _variance(self, number: int, left: Complexes) -> float:
@@ -92,17 +94,21 @@ class WholeJudge:
         return 2.0 * self._plants[number].period_s * float(quadrature(self._freq[number]) @ spectrum)
 
 
-def least_moduli(plant: WholePlant, system: lti.StateSpace, freq: Floats, returned: Complexes) -> Floats:
+def least_moduli(
+    plant: WholePlant, system: lti.StateSpace, freq: Floats, returned: Complexes, poles: Complexes
+) -> Floats:
     """Least singular values of 1 + L on a grid, each local minimum by what is least between its points.
 
-    A parabola through a minimum and its neighbours tells where it is; what is near the least of all is looked at again
-    there, more closely each time, so that the least moves smoothly with the controller.
+    A parabola through a minimum and its neighbours tells where it is. What is near the least of all is looked at again
+    there, more closely each time, so that the least moves smoothly with the controller; and so is each light resonance
+    of the closed loop, whose dip may lie between two points.
 
     Args:
         plant: The plant of all axes, without what its commands do not reach.
         system: A controller from the optical errors to the commands.
         freq: The grid, rising, in Hz.
         returned: 1 + L there, shape (frequencies, axes, axes).
+        poles: Poles of the closed loop.
     """
     squared = _least_squares(returned)
     before, after = freq[1:-1] - freq[:-2], freq[2:] - freq[1:-1]
@@ -113,14 +119,29 @@ def least_moduli(plant: WholePlant, system: lti.StateSpace, freq: Floats, return
     lowest[1 + dips] -= slope[dips] ** 2 / (4.0 * bend[dips])
     near = dips[lowest[1 + dips] < NEAR_LEAST**2 * np.min(lowest)]
     where, width = where[np.isin(dips, near)], np.minimum(before[near], after[near])
+    at, half = _resonances(poles, plant.period_s)
+    places = np.clip(np.searchsorted(freq, at), 1, freq.size - 2)
+    finer = half < 0.5 * (freq[places + 1] - freq[places - 1])
+    where, width = np.concatenate([where, at[finer]]), np.concatenate([width, half[finer]])
+    near = np.concatenate([1 + near, places[finer]])
     for share in CLOSER if near.size else ():
         points = where[:, None] + share * width[:, None] * np.array([-1.0, 0.0, 1.0])
         low, middle, high = _least_squares(_returned(plant, system, points.ravel())).reshape(-1, 3).T
         slope, bend = 0.5 * (high - low), high - 2.0 * middle + low
         moved = np.clip(np.where(bend > 0.0, -slope / np.where(bend > 0.0, bend, 1.0), 0.0), -0.5 / share, 0.5 / share)
         where = where + moved * share * width
-        lowest[1 + near] = middle + moved * (slope + 0.5 * moved * bend)
+        found = np.minimum(middle, middle + moved * (slope + 0.5 * moved * bend))
+    if near.size:
+        lowest[near[: near.size - places[finer].size]] = math.inf  # what the parabola said
+        np.minimum.at(lowest, near, found)
     return np.sqrt(np.maximum(lowest, 0.0))
+
+
+def _resonances(poles: Complexes, period_s: float) -> tuple[Floats, Floats]:
+    """Frequencies and half widths (Hz) of light poles below half the rate."""
+    s = np.log(poles[np.abs(poles) > 0.1].astype(complex)) / (2.0 * math.pi * period_s)
+    light = s[(s.imag > 0.0) & (-s.real < LIGHT_DAMPING * np.abs(s)) & (s.imag < 0.499 / period_s)]
+    return np.asarray(light.imag), np.maximum(-light.real, 1e-9 / period_s)
 
 
 def _returned(plant: WholePlant, system: lti.StateSpace, freq: Floats) -> Complexes:
@@ -187,12 +208,12 @@ def whole_margins(plant: WholePlant, controller: WholeController) -> WholeMargin
         ValueError: The loop is unstable.
     """
     moved, system = _moved(plant), controller.system
-    poles = [np.linalg.eigvals(each) for each in (moved.system.A, system.A, closed_map(moved, system))]
+    poles = [np.linalg.eigvals(A).astype(complex) for A in (moved.system.A, system.A, closed_map(moved, system))]
     if np.max(np.abs(poles[-1])) >= 1.0:
         raise ValueError(f"the loop under {controller.name!r} is unstable with all axes closed; lower its gains")
     freq = resolving(np.concatenate(poles), plant.period_s)
     returned = _returned(moved, system, freq)
-    least = least_moduli(moved, system, freq, returned)
+    least = least_moduli(moved, system, freq, returned, poles[-1])
     margin = multiloop_disk_margin(freq, returned - np.eye(plant.axes))
     return WholeMargins(float(np.min(least)), margin, bandwidth_hz(freq, np.sqrt(_least_squares(returned))))
 
