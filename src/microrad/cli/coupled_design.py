@@ -145,7 +145,7 @@ def _data(d: "CoupledDesign", left: "CoupledOutlook", mark: str) -> dict[str, An
     return {
         "name": d.name,
         "tuned": dict(d.tuned),
-        "tuned_for_modulus_margin": d.margin,
+        **({} if d.margin is None else {"tuned_for_modulus_margin": d.margin}),
         "residual_rms_rad": [axis.linear_rad for axis in left.axes],
         "simulated_rms_rad": [axis.simulated_rad for axis in left.axes],
         "drive_rms_v": d.drive_v.tolist(),

@@ -111,7 +111,7 @@ def _data(d: "Design", left: "Outlook", mark: str) -> dict[str, Any]:
         "name": d.name,
         "inverse": d.inverse,
         "tuned": d.tuned.values,
-        "tuned_for_modulus_margin": d.margin,
+        **({} if d.margin is None else {"tuned_for_modulus_margin": d.margin}),
         "bound_by": list(d.tuned.bound_by),
         "residual_rms_rad_per_axis": left.linear_rad,
         "simulated_rms_rad_per_axis": left.simulated_rad,

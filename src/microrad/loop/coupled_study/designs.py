@@ -16,7 +16,7 @@ from microrad.core.threads import shared_out
 from microrad.loop.control import LQG, LQG_OF_AXES, PI, Family, Specification, WholeController, WholePlant
 from microrad.loop.control.descent import descend
 from microrad.loop.control.search import Search, Trial, apart
-from microrad.loop.control.tuning import hypercube, settled
+from microrad.loop.control.tuning import cheapest_that_holds, hypercube, settled
 from microrad.loop.controller_study import designs as one_axis
 from microrad.loop.controller_study.promises import firmer
 from microrad.loop.controller_study.results import Outlook, shortened
@@ -30,11 +30,15 @@ from microrad.mission.tables.fine_pointing import FinePointing
 STARTS = 3
 """Places from which an axis by itself, and the weights of LQG, are followed."""
 
-MODELS = 8
-"""Quadratic models of the whole that an optimum is followed by: with ten parameters each takes 220 candidates."""
+MODELS, CANDIDATES = 8, 800
+"""Quadratic models of the whole that an optimum is followed by, and about how many candidates they may take: with ten
+parameters each model takes 220."""
 
 NOMINAL, ADDED = 2, 3
 """Plants that controllers are tuned for at first, at rest and over the whole range, and how many are added at most."""
+
+SPARE = 0.002
+"""Share of its margin that a candidate is to have to spare where no optimum on the margin was found."""
 
 SURVEY = 40
 """Places that the search of an axis by itself begins with, whose result is but where that of the whole begins."""
@@ -246,7 +250,11 @@ def _tuned(
             extended = [family.extended(alone(of[0], axis), part) for axis, part in enumerate(parts)]
             starts.append(search.of(np.concatenate(extended)))
     near = min((descend(search, each) for each in starts), key=lambda t: t.score)
-    best = settled(search, [near], MODELS)
+    count = len(search.parameters)
+    try:
+        best = settled(search, [near], max(2, min(MODELS, CANDIDATES // (2 * count * (count + 1)))))
+    except ValueError:
+        best = cheapest_that_holds(search, SPARE)
     values = dict(zip((p.name for p in search.parameters), best.values.tolist(), strict=True))
     return (whole.final or whole.build)(of[0], best.values), values
 

@@ -117,7 +117,7 @@ def least_moduli(
     dips = np.flatnonzero((left < 0.0) & (right > 0.0))
     where, lowest = freq[1 + dips] - slope[dips] / (2.0 * bend[dips]), squared.copy()
     lowest[1 + dips] -= slope[dips] ** 2 / (4.0 * bend[dips])
-    near = dips[lowest[1 + dips] < NEAR_LEAST**2 * np.min(lowest)]
+    near = dips[lowest[1 + dips] < NEAR_LEAST**2 * np.min(squared)]
     where, width = where[np.isin(dips, near)], np.minimum(before[near], after[near])
     at, half = _resonances(poles, plant.period_s)
     places = np.clip(np.searchsorted(freq, at), 1, freq.size - 2)
