@@ -11,6 +11,7 @@ from microrad.export.records import ExportError
 from microrad.loop import controller_study
 from microrad.loop.controller_study import designs, promises
 from microrad.loop.pointing_loop import ensemble
+from microrad.report.fine_pointing import words
 from microrad.mission.file import load_mission
 from scenes import scene_of
 from shipped import SHIPPED
@@ -53,6 +54,18 @@ def test_what_breaks_its_promise_is_tuned_for_a_larger_margin(light):
     (before,) = controller_study.outlook(scene, [plain])
     assert plain.margin is None
     assert before.linear_rad < left.linear_rad < left.simulated_rad < 0.5 * before.simulated_rad
+
+
+def test_a_larger_margin_is_said_beside_the_values(light, call, monkeypatch):
+    monkeypatch.setattr(designs, "names", lambda m: (OBSERVER,))
+    done = call("design", "light.toml", "--json")
+    assert done.code == 0
+    (found,) = json.loads(done.out)["controllers"]
+    printed = " ".join(call("design", "light.toml").out.split())
+    assert f"for a modulus margin of {found['tuned_for_modulus_margin']:.3g}, for the mirror's hysteresis" in printed
+    assert "refused" not in printed
+    assert words.larger_margin(None) == ""
+    assert words.larger_margin(0.7) == "; for a modulus margin of 0.7, for the mirror's hysteresis"
 
 
 def test_of_larger_margins_the_one_that_leaves_least_is_taken():

@@ -69,9 +69,9 @@ def tuned_text(values: Mapping[str, float], margin: float | None) -> str:
         values: Its parameters by name.
         margin: Modulus margin that hysteresis made it be tuned for; None for the mission's.
     """
-    said = [f"{name} {value:.3g}" for name, value in values.items()]
-    said += [] if margin is None else [f"for a modulus margin of {margin:.3g}, for the mirror's hysteresis"]
-    return ", ".join(said)
+    from microrad.report.fine_pointing.words import larger_margin
+
+    return ", ".join(f"{name} {value:.3g}" for name, value in values.items()) + larger_margin(margin)
 
 
 def _left_out(scene: "CoupledScene") -> list[str]:

@@ -150,7 +150,7 @@ def designs_view(fine: FinePointingStudy) -> View:
     for v in fine.verified:
         tuned = v.design.tuned
         inverse = f"; inverse {v.design.inverse}" if v.design.inverse else ""
-        said = tuned_to(tuned.values, units) + inverse
+        said = tuned_to(tuned.values, units) + inverse + words.larger_margin(v.design.margin)
         rows.append((v.design.name, *design_cells(said, tuned.margins, tuned.bound_by)))
     best = _best(fine, [v.design.name for v in fine.verified])
     return View("What each controller was tuned to, and its margins", designs(rows, best=best), folded=True)

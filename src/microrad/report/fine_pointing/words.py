@@ -57,6 +57,15 @@ class Room:
     holds: bool
 
 
+def larger_margin(margin: float | None) -> str:
+    """What is said behind the values of a controller that hysteresis made be tuned for a larger margin; else nothing.
+
+    Args:
+        margin: That modulus margin, None for the mission's.
+    """
+    return "" if margin is None else f"; for a modulus margin of {margin:.3g}, for the mirror's hysteresis"
+
+
 def room(fine: FinePointingStudy) -> Room:
     """The distance of baseline and designs from the linear bound."""
     bound, baseline = fine.optimum_rad, fine.verified[0]
