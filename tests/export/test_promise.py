@@ -11,8 +11,8 @@ from microrad.export.records import ExportError
 from microrad.loop import controller_study
 from microrad.loop.controller_study import designs, promises
 from microrad.loop.pointing_loop import ensemble
-from microrad.report.fine_pointing import words
 from microrad.mission.file import load_mission
+from microrad.report.fine_pointing import words
 from scenes import scene_of
 from shipped import SHIPPED
 
