@@ -18,6 +18,7 @@ from microrad.loop.controller_study.designs import (
     plants,
     tune,
 )
+from microrad.loop.controller_study.designs import design as plain_designs
 from microrad.loop.controller_study.promises import design, design_and_promise
 from microrad.loop.controller_study.results import (
     COUNTERS,
@@ -96,6 +97,8 @@ class FinePointingStudy:
 def design_and_simulate(scene: Scene, on_progress: Progress = lambda done, total, what: None) -> FinePointingStudy:
     """Design, tune and simulate controllers for a fine-pointing loop; seeded by its table.
 
+    All are tuned for the mission's margin: what hysteresis makes of them is what is simulated here.
+
     Args:
         scene: The mission's fine-pointing loop.
         on_progress: Called with what is done of the step at hand, of how much, and the step in words.
@@ -103,7 +106,7 @@ def design_and_simulate(scene: Scene, on_progress: Progress = lambda done, total
     Raises:
         ValueError: A controller cannot meet its margin; says why.
     """
-    verified = verify(scene, design(scene, on_progress), on_progress)
+    verified = verify(scene, plain_designs(scene, on_progress), on_progress)
     chosen, designs = best(verified), [v.design for v in verified]
     segment = 2 * (verified[0].spectrum_rad2_hz.shape[0] - 1)
     freq = np.asarray(np.fft.rfftfreq(segment, scene.loop.timing.period_s), dtype=float)
@@ -131,5 +134,5 @@ def design_and_simulate_one(scene: Scene, name: str) -> Verified:
     Raises:
         ValueError: Another name, or the controller cannot meet its margin.
     """
-    (found,) = verify(scene, design(scene, only=(name,)))
+    (found,) = verify(scene, plain_designs(scene, only=(name,)))
     return found
