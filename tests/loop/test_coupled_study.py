@@ -3,6 +3,7 @@
 import json
 import math
 import re
+import sys
 from dataclasses import replace
 from functools import cache
 
@@ -222,7 +223,7 @@ def test_the_margin_holds_for_mirrors_that_the_identification_leaves_possible(mo
     """With errors twenty times those of the page; tuned for the mirror itself, the margin is missed on one of them."""
     known = replace(two_axes().known, standard_errors=np.array([8.0, 18.0, 0.0, 0.0]))
     assert len(scene_of(replace(two_axes(), known=known)).linear) == 2 + 8
-    monkeypatch.setattr("microrad.loop.coupled_study.scene.DRAWS", 3)
+    monkeypatch.setattr(sys.modules["microrad.loop.coupled_study.scene"], "DRAWS", 3)
     scene = scene_of(replace(two_axes(), known=known))
     (found,) = coupled_study.design(scene, only=("PI",)).made
     of = coupled_study.plants(scene)
