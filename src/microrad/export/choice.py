@@ -61,12 +61,13 @@ class Source:
 
 @dataclass(frozen=True, slots=True)
 class PointingChoice:
-    """A controller of the fine-pointing loop."""
+    """A controller of the fine-pointing loop, and what it leaves an axis."""
 
     source: Source
     scene: controller_study.Scene
     tuned: control.Tuned
     controller: LoopController
+    left: controller_study.Outlook
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +82,7 @@ class CoupledChoice:
     scene: coupled_study.CoupledScene
     design: coupled_study.CoupledDesign
     controller: LoopController
+    left: controller_study.Outlook
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,8 +132,8 @@ def choose(
         if name in (PID, PID_WITH_INVERSE):
             return _paper_loop(source(file), paper_cases.of(m, mirrors), name)
         scene = controller_study.scene(file, mirrors, tracking_light_w(file))
-        (design,) = controller_study.design(scene, on_progress, only=(name,))
-        return PointingChoice(source(file), scene, design.tuned, design.controller)
+        ((design, left),) = controller_study.design_and_promise(scene, on_progress, only=(name,))
+        return PointingChoice(source(file), scene, design.tuned, design.controller, left)
     except ValueError as error:
         raise ExportError(f"{file.path}: {error}") from error
 
@@ -160,31 +162,18 @@ def choose_coupled(
         )
     try:
         scene = coupled_study.scene(file, given, tracking_light_w(file))
-        (design,) = coupled_study.design_and_promise(scene, on_progress, only=(name,))[0].made
+        found, (left,) = coupled_study.design_and_promise(scene, on_progress, only=(name,))
+        (design,) = found.made
     except ValueError as error:
         raise ExportError(f"{file.path}: {error}") from error
     origin = replace(source(file).origin, mirror=given.mirror.name)
-    found = CoupledChoice(replace(source(file), origin=origin, bias_v=biases[0]), scene, design, design.controller)
-    form, at = sections(flight_controller(found)), _looked_at(_whole_controller(found))
+    of = replace(source(file), origin=origin, bias_v=biases[0])
+    chosen = CoupledChoice(of, scene, design, design.controller, left.worst)
+    form, at = sections(flight_controller(chosen)), _looked_at(_whole_controller(chosen))
     places = np.concatenate([np.arange(each.start, each.stop) for each in at.values()])
     B, D = (np.zeros((len(m), design.controller.system.B.shape[1])) for m in (form.B, form.D))
     B[:, places], D[:, places] = form.B, form.D
-    return replace(found, controller=LoopController(name, lti.StateSpace(form.A, B, form.C, D), form.L))
-
-
-def outlook(choice: Choice) -> controller_study.Outlook | None:
-    """What a controller of the fine-pointing loop leaves, linear and simulated; the loop of [control] has no theory.
-
-    Of several axes it is the one on which the simulation strays farthest.
-    """
-    if isinstance(choice, PaperLoopChoice):
-        return None
-    if isinstance(choice, CoupledChoice):
-        (axes,) = coupled_study.outlook(choice.scene, [choice.design])
-        return axes.worst
-    design = controller_study.Design(choice.controller.name, choice.tuned, choice.controller)
-    (found,) = controller_study.outlook(choice.scene, [design])
-    return found
+    return replace(chosen, controller=LoopController(name, lti.StateSpace(form.A, B, form.C, D), form.L))
 
 
 def promised(choice: Choice, accept: bool = False) -> controller_study.Outlook | None:
@@ -200,13 +189,15 @@ def promised(choice: Choice, accept: bool = False) -> controller_study.Outlook |
         ExportError: Where the simulated residual is more than `controller_study.PROMISE` times the linear one, unless
             accepted.
     """
-    left = outlook(choice)
-    if not isinstance(choice, PaperLoopChoice) and left is not None and not (left.holds or accept):
-        raise ExportError(_broken(choice, left))
-    return left
+    if isinstance(choice, PaperLoopChoice):
+        return None
+    if not (choice.left.holds or accept):
+        raise ExportError(_broken(choice))
+    return choice.left
 
 
-def _broken(choice: PointingChoice | CoupledChoice, left: controller_study.Outlook) -> str:
+def _broken(choice: PointingChoice | CoupledChoice) -> str:
+    left = choice.left
     found, said = rms_text(left.simulated_rad), rms_text(left.linear_rad)
     return (
         f"{choice.source.path}: {choice.controller.name} leaves {found} on the mission's mirror, simulated with its "

@@ -13,7 +13,16 @@ import numpy as np
 from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
 from microrad.core.threads import shared_out
-from microrad.loop.control import LQG, LQG_OF_AXES, PI, Family, Specification, WholeController, WholePlant
+from microrad.loop.control import (
+    LQG,
+    LQG_OF_AXES,
+    PI,
+    Family,
+    MultiloopMargin,
+    Specification,
+    WholeController,
+    WholePlant,
+)
 from microrad.loop.control.descent import descend
 from microrad.loop.control.search import Search, Trial, apart
 from microrad.loop.control.tuning import cheapest_that_holds, hypercube, settled
@@ -50,8 +59,8 @@ class CoupledDesign:
 
     ``tuned`` are the values that it was tuned to, by name. ``margins`` are the smallest over all linear loops of the
     scene, each with all axes closed. ``residual_rad`` is the rms of each axis for small motions about rest, linear, and
-    ``drive_v`` that of each drive; ``worst_rad`` the largest rms of each axis over all linear loops. ``margin`` is the
-    modulus margin that it was tuned for where the mirror's hysteresis asks for more than the mission's, else None.
+    ``drive_v`` that of each drive. ``margin`` is the modulus margin that it was tuned for where the mirror's hysteresis
+    asks for more than the mission's, else None.
     """
 
     name: str
@@ -60,7 +69,6 @@ class CoupledDesign:
     margins: WholeMargins
     residual_rad: Floats
     drive_v: Floats
-    worst_rad: Floats
     margin: float | None = None
 
 
@@ -203,7 +211,8 @@ def _designed(
     begun: Floats | None = None
     for _ in range(ADDED + 1):
         made, values = _tuned(scene, family, [of[i] for i in tuned_for], base, begun)
-        moduli = [_modulus(plant, made) for plant in of]
+        margins = [_margins(plant, made) for plant in of]
+        moduli = [each.modulus for each in margins]
         worst = int(np.argmin(moduli))
         if moduli[worst] >= asked or worst in tuned_for:
             break
@@ -215,15 +224,22 @@ def _designed(
             f"identification leaves possible, where {asked:g} is asked for; identify it from more records, lower "
             "fine_pointing.modulus_margin, or take another controller"
         )
-    return _judged(scene, of, made, values)
+    on_drives = assemble_whole(family.name, scene.rest, made.system, made.anti_windup)
+    left = stationary(close(scene.rest, on_drives))
+    smallest = WholeMargins(
+        min(moduli),
+        min((each.disk for each in margins), key=lambda margin: margin.disk),
+        min(each.bandwidth_hz for each in margins),
+    )
+    return CoupledDesign(family.name, values, on_drives, smallest, np.sqrt(left.error), np.sqrt(left.drive))
 
 
-def _modulus(plant: WholePlant, controller: WholeController) -> float:
-    """The modulus margin with all axes closed; 0 where the loop is unstable."""
+def _margins(plant: WholePlant, controller: WholeController) -> WholeMargins:
+    """The margins with all axes closed; none where the loop is unstable."""
     try:
-        return whole_margins(plant, controller).modulus
+        return whole_margins(plant, controller)
     except ValueError:
-        return 0.0
+        return WholeMargins(0.0, MultiloopMargin(0.0, 0.0), 0.0)
 
 
 def _tuned(
@@ -275,28 +291,6 @@ def _by_axis(scene: CoupledScene, family: Family, of: Sequence[WholePlant], sear
         starts = apart(sorted(surveyed, key=lambda t: t.score), STARTS, 0.1)
         best.append(min((descend(own, start) for start in starts), key=lambda t: t.score))
     return search.of(np.concatenate([trial.values for trial in best]))
-
-
-def _judged(
-    scene: CoupledScene, of: Sequence[WholePlant], controller: WholeController, values: Mapping[str, float]
-) -> CoupledDesign:
-    """A controller with what all linear loops have under it."""
-    made = assemble_whole(controller.name, scene.rest, controller.system, controller.anti_windup)
-    margins = [whole_margins(plant, controller) for plant in of]
-    left = [stationary(close(loop, made)) for loop in scene.linear]
-    return CoupledDesign(
-        controller.name,
-        values,
-        made,
-        WholeMargins(
-            min(each.modulus for each in margins),
-            min((each.disk for each in margins), key=lambda margin: margin.disk),
-            min(each.bandwidth_hz for each in margins),
-        ),
-        np.sqrt(left[0].error),
-        np.sqrt(left[0].drive),
-        np.sqrt(np.max([each.error for each in left], axis=0)),
-    )
 
 
 def outlook(

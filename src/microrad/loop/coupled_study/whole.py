@@ -52,9 +52,8 @@ class WholeJudge:
         """
         self._plants, self._moved = plants, [_moved(p) for p in plants]
         self._freq = [grid(p.system, p.period_s) for p in plants]
-        self._different, places = np.unique(
-            np.concatenate(self._freq), return_inverse=True
-        )  # plants share most of them
+        # Plants share most of their frequencies: a controller answers once at each.
+        self._different, places = np.unique(np.concatenate(self._freq), return_inverse=True)
         self._places = np.split(places, np.cumsum([f.size for f in self._freq])[:-1])
         self._whole = [lti.frequency_response(p.system, f, p.period_s) for p, f in zip(plants, self._freq, strict=True)]
         edges = [np.geomspace(1e-3, 0.5, BANDS)[:-1] / p.period_s for p in plants]

@@ -1,7 +1,6 @@
 """A fine-pointing loop as data: mirror, optics, amplifier, clock, disturbances, sensors, reference; its controller."""
 
 import math
-from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -94,32 +93,25 @@ class ReferenceFilter:
         return lti.StateSpace(Ad, Bd, Ad, Bd)
 
 
-def assemble(name: str, loop: PointingLoop, axis: AxisController | Sequence[AxisController]) -> LoopController:
-    """Controllers of one axis side by side, with commands and gauge readings decoupled by the loop's optics.
+def assemble(name: str, loop: PointingLoop, axis: AxisController) -> LoopController:
+    """The same controller on each axis, with commands and gauge readings decoupled by the loop's optics.
 
     Args:
         name: What the controller is called.
         loop: The loop.
-        axis: The controller of every axis, or one for each.
+        axis: The controller of one axis.
 
     Raises:
         ValueError: It reads a gauge that the loop lacks.
     """
-    from scipy.linalg import block_diag
-
-    each = [axis] * loop.axes if isinstance(axis, AxisController) else list(axis)
-    to_drives = decoupling(loop)
-    if loop.gauge is None and any(np.any(c.system.B[:, 1]) or np.any(c.system.D[:, 1]) for c in each):
+    axes = loop.axes
+    eye, s, to_drives = np.eye(axes), axis.system, decoupling(loop)
+    by_gauge = np.kron(loop.optics, s.B[:, 1:2]), s.D[0, 1] * loop.optics
+    if loop.gauge is None and (np.any(s.B[:, 1]) or np.any(s.D[:, 1])):
         raise ValueError(f"controller {name!r} reads a strain gauge, and this loop has none: give it one, or another")
-
-    def beside(blocks: Iterable[Floats]) -> Floats:
-        return np.asarray(block_diag(*blocks), dtype=float)
-
-    by_gauge = np.vstack([np.kron(row, c.system.B[:, 1:2]) for row, c in zip(loop.optics, each, strict=True)])
-    A, C, windup = (beside(part) for part in zip(*((c.system.A, c.system.C, c.anti_windup) for c in each), strict=True))
-    B = np.hstack([beside(c.system.B[:, :1] for c in each), by_gauge, np.zeros((A.shape[0], loop.axes))])
-    gauge = np.array([c.system.D[0, 1] for c in each])[:, None] * loop.optics
-    D = np.hstack([beside(c.system.D[:, :1] for c in each), gauge, np.zeros((loop.axes, loop.axes))])
+    B = np.hstack([np.kron(eye, s.B[:, :1]), by_gauge[0], np.zeros((axes * s.order, axes))])
+    D = np.hstack([s.D[0, 0] * eye, by_gauge[1], np.zeros((axes, axes))])
+    A, C, windup = (np.asarray(np.kron(eye, each), dtype=float) for each in (s.A, s.C, axis.anti_windup))
     return _on_drives(name, to_drives, lti.StateSpace(A, B, C, D), windup)
 
 
