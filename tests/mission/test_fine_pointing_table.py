@@ -128,7 +128,7 @@ def test_only_wheels_strain_gauge_and_quad_cell_may_be_left_out(refuse, load):
 
 def test_what_is_optional_has_no_other_default():
     optional = {name for name, field in FinePointing.model_fields.items() if not field.is_required()}
-    assert optional == {"wheels", "strain_gauge"}
+    assert optional == {"wheels", "strain_gauge", "mirror_file"}
     shipped = {key.removeprefix("fine_pointing.") for key in load_mission(SHIPPED).sources if "fine_pointing" in key}
     assert {key for key in shipped if "." not in key} == {
         field.alias or name

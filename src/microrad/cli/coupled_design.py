@@ -1,37 +1,38 @@
 """What `microrad design` does with a mirror file of several axes: one controller of all axes, margins of the whole."""
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from microrad.cli.frame import MET, UNMET, Outcome, json_text, progress_bar, refusal_of, width
 
 if TYPE_CHECKING:
     from microrad.loop.coupled_study import CoupledDesign, CoupledDesigns, CoupledOutlook, CoupledScene
+    from microrad.mission.file import MissionFile
+    from microrad.mission.tables.coupled_mirror import CoupledMirror
 
 
-def design_of_several_axes(file: Path, mirror: Path, accept: bool, as_json: bool) -> Outcome:
-    """Design controllers for a mission's loop with a mirror of several axes in place of its own.
+def design_of_several_axes(mission: "MissionFile", mirror: "CoupledMirror", accept: bool, as_json: bool) -> Outcome:
+    """Design controllers for a mission's loop with a mirror of several axes.
 
     Args:
-        file: The mission file.
-        mirror: The mirror file, of version 2.
+        mission: The mission.
+        mirror: The table of the mirror.
         accept: Whether designs count whose linear figure the simulation does not bear out.
         as_json: Whether the text is to be JSON.
     """
     from microrad.link import tracking_light_w
     from microrad.loop import coupled_study
     from microrad.mirror import coupled
-    from microrad.mission.file import load_coupled_mirror, load_mission
+    from microrad.report.fine_pointing.words import left_out
 
-    mission, plant = load_mission(file), coupled.of(load_coupled_mirror(mirror))
+    plant = coupled.of(mirror)
     with progress_bar() as progress, refusal_of(mission.path):
         scene = coupled_study.scene(mission, plant, tracking_light_w(mission))
         found, left = coupled_study.design_and_promise(scene, progress)
     marks = [each.worst.mark(accept) for each in left]
     named = zip(found.made, left, strict=True)
     broken = [f"{d.name} ({each.worst.times:.2f} times)" for d, each in named if not each.holds]
-    warnings = [*filter(None, [broken_promises(broken, accept)]), *_left_out(scene), *found.refused.values()]
+    warnings = [*filter(None, [broken_promises(broken, accept)]), *left_out(scene), *found.refused.values()]
     code = UNMET if "refused" in marks else MET
     if as_json:
         controllers = [_data(*each) for each in zip(found.made, left, marks, strict=True)]
@@ -72,25 +73,6 @@ def tuned_text(values: Mapping[str, float], margin: float | None) -> str:
     from microrad.report.fine_pointing.words import larger_margin
 
     return ", ".join(f"{name} {value:.3g}" for name, value in values.items()) + larger_margin(margin)
-
-
-def _left_out(scene: "CoupledScene") -> list[str]:
-    """What of the mirror's file does not count here, in sentences."""
-    from microrad.core.units import format_quantity
-
-    mirror, f = scene.mirror, scene.table
-    said = []
-    if mirror.delay_s > 0.0:
-        said.append(
-            f"the recordings' delay of {format_quantity(mirror.delay_s, 's', 3)} is left out; fine_pointing.delay and "
-            "fine_pointing.amplifier_bandwidth stand for the flight's own"
-        )
-    if f.rate_hz / 2 > mirror.excited_hz[1]:
-        said.append(
-            f"the mirror was recorded up to {format_quantity(mirror.excited_hz[1], 'Hz')}, and half of the control "
-            f"rate is {format_quantity(f.rate_hz / 2, 'Hz')}: between them the model is a guess"
-        )
-    return said
 
 
 def _text(

@@ -111,10 +111,9 @@ def c(  # noqa: PLR0913, PLR0917  each is an option
     from microrad.export.flight import write
     from microrad.export.identifiers import identifier, suggested
     from microrad.mirror import coupled
-    from microrad.mission.file import holds_several_axes, load_coupled_mirror, load_mission
+    from microrad.mission.file import load_loop
 
-    several = coupled.of(load_coupled_mirror(mirror)) if mirror is not None and holds_several_axes(mirror) else None
-    mission = load_mission(file, None if several else mirror)
+    mission, several = load_loop(file, mirror)
     # Feedback with the inverse of the hysteresis ahead of it: the paper's choice, in the loop that the mission has.
     default = DEFAULT_CONTROLLER if mission.mission.fine_pointing is not None else "PID + inverse"
     default = DEFAULT_OF_SEVERAL if several else default
@@ -124,7 +123,7 @@ def c(  # noqa: PLR0913, PLR0917  each is an option
     write.check_output(folder, overwrite)
     with progress_bar() as progress:
         chosen: Choice = (
-            choice.choose_coupled(mission, several, wanted, progress)
+            choice.choose_coupled(mission, coupled.of(several), wanted, progress)
             if several
             else choice.choose(mission, wanted, progress)
         )

@@ -53,11 +53,11 @@ def design(
     from microrad.link import tracking_light_w
     from microrad.loop import controller_study
     from microrad.mirror.summary import unknown_dynamics
-    from microrad.mission.file import holds_several_axes, load_mission
+    from microrad.mission.file import load_loop
 
-    if mirror is not None and holds_several_axes(mirror):
-        return design_of_several_axes(file, mirror, accept, as_json)
-    mission = load_mission(file, mirror)
+    mission, several = load_loop(file, mirror)
+    if several is not None:
+        return design_of_several_axes(mission, several, accept, as_json)
     with progress_bar() as progress, refusal_of(mission.path):
         scene = controller_study.scene(mission, mirror_room.of(mission.mission), tracking_light_w(mission))
         designs, left = zip(*controller_study.design_and_promise(scene, progress), strict=True)

@@ -286,18 +286,46 @@ def stroke_budget(
     _one_of("travel_angle", travel_angle, _ANGLES, "stroke budget")
     rows = outputs_matrix(replace(geometry, angle=travel_angle))
     names = ("x", "y") if geometry.layout == "two-axis" else ("actuator 1", "actuator 2", "actuator 3")
-    factors = [float(np.hypot(*row)) for row in rows]
+    travel = Travel(travel_angle, travel_rad, usable)
+    return budgets_of_rows(dict(zip(names, rows, strict=True)), geometry.magnification, demand, travel, sources or {})
+
+
+@dataclass(frozen=True, slots=True)
+class Travel:
+    """Travel of an output from stop to stop (rad), what of it is usable, and what both count."""
+
+    angle: str
+    whole_rad: float
+    usable_rad: float
+
+
+def budgets_of_rows(
+    rows: Mapping[str, Floats],
+    magnification: float,
+    demand: StrokeDemand,
+    travel: Travel,
+    sources: Mapping[str, str],
+) -> tuple[StrokeBudget, ...]:
+    """The stroke budget of each output or actuator, from what the line of sight calls for.
+
+    Args:
+        rows: By name, what takes an angle of 1 rad along each axis (x, y) of the line of sight, counted as the travel.
+        magnification: Of the telescope.
+        demand: Half ranges of the line of sight that the mirror has to follow.
+        travel: What each has.
+        sources: Where a half range comes from, by the name of its field of `StrokeDemand`.
+    """
     return tuple(
         StrokeBudget(
             name=name,
-            lines=_stroke_lines(demand, np.abs(row) / factor, sources or {}),
-            magnification=geometry.magnification,
-            mirror_per_line_of_sight=factor,
-            travel_angle=travel_angle,
-            travel_rad=travel_rad,
-            usable_travel_rad=usable,
+            lines=_stroke_lines(demand, np.abs(row) / float(np.hypot(*row)), sources),
+            magnification=magnification,
+            mirror_per_line_of_sight=float(np.hypot(*row)),
+            travel_angle=travel.angle,
+            travel_rad=travel.whole_rad,
+            usable_travel_rad=travel.usable_rad,
         )
-        for name, row, factor in zip(names, rows, factors, strict=True)
+        for name, row in rows.items()
     )
 
 

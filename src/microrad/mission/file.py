@@ -185,7 +185,7 @@ def named_files(m: LinkMission) -> tuple[str, ...]:
     tables = [] if m.orbit is None else [m.orbit.leo, m.orbit.geo]
     named = [t.file for t in tables] + [None if m.constellation is None else m.constellation.file]
     if isinstance(m, Mission) and m.fine_pointing is not None:
-        named.append(m.fine_pointing.vibration.file)
+        named += [m.fine_pointing.vibration.file, m.fine_pointing.mirror_file]
     return tuple(name for name in dict.fromkeys(named) if name is not None)
 
 
@@ -273,6 +273,40 @@ def load_coupled_mirror(path: str | Path, *, text: str | None = None) -> "Couple
     if mirror is None or document.faults:
         raise MissionError(document.path, document.faults)
     return mirror
+
+
+def load_loop(path: str | Path, mirror_path: str | Path | None = None) -> "tuple[MissionFile, CoupledMirror | None]":
+    """Read a mission for its fine-pointing loop, with the mirror of several axes that the loop has, if it is one.
+
+    Args:
+        path: The mission file.
+        mirror_path: A mirror file: of one axis it replaces what the mission says about its mirror, of several axes that
+            of the loop.
+
+    Raises:
+        MissionError: With every fault of both files.
+    """
+    if mirror_path is not None and holds_several_axes(mirror_path):
+        return load_mission(path), load_coupled_mirror(mirror_path)
+    mission = load_mission(path, mirror_path)
+    return mission, mirror_of_loop(mission)
+
+
+def mirror_of_loop(file: MissionFile) -> "CoupledMirror | None":
+    """The mirror of several axes that a mission's fine-pointing loop has, or None: its mirror on each axis.
+
+    Args:
+        file: The mission.
+
+    Raises:
+        MissionError: With every fault of the mirror file.
+    """
+    table = file.mission.fine_pointing
+    if table is None or table.mirror_file is None:
+        return None
+    held = content_of(table.mirror_file, file.contents)
+    text = None if held is None else held.decode("utf-8", "surrogateescape")
+    return load_coupled_mirror(file.path.parent / table.mirror_file, text=text)
 
 
 def assumptions(sources: Mapping[str, Source]) -> tuple[tuple[str, str, str], ...]:

@@ -14,7 +14,7 @@ from microrad.core.threads import beside, both
 from microrad.link import pointing, requirement
 from microrad.link import study as link_study
 from microrad.link.pointing.outage import Performance
-from microrad.loop import control, controller_study, paper_cases, sine_run
+from microrad.loop import control, controller_study, coupled_study, paper_cases, sine_run
 from microrad.loop.pointing_loop import ensemble
 from microrad.mirror import Variant
 from microrad.mirror import summary as mirror_summary
@@ -171,8 +171,8 @@ def run_study(
     mirrors = mirror.of(m)
     cases = paper_cases.of(m, mirrors)
 
-    def scene() -> controller_study.Scene:
-        return controller_study.scene(file, mirrors, link.tracking_light_w(file))
+    def scene() -> controller_study.AnyScene:
+        return coupled_study.of_mission(file, mirrors, link.tracking_light_w(file))
 
     def linked() -> tuple[link_study.LinkStudy, MarginMap]:
         found = link_study.run_link_study(file, parts)
@@ -191,7 +191,7 @@ def run_study(
         try:
             if m.fine_pointing is not None:
                 compiled()
-                fine = parts.part(controller_study.design_and_simulate, scene(), on_progress=on_progress)
+                fine = fine_pointing_loop(scene(), parts, on_progress)
         except ValueError:
             of_links()  # what is wrong with the links is said first
             raise
@@ -243,6 +243,21 @@ def run_study(
         papers_loop=papers_loop,
         claims=verdict.against_paper(evidence),
     )
+
+
+def fine_pointing_loop(
+    scene: controller_study.AnyScene, parts: kept.Kept, on_progress: Progress
+) -> controller_study.FinePointingStudy:
+    """The fine-pointing loop of a mission under the controllers that are designed for it.
+
+    Args:
+        scene: The loop.
+        parts: The results of earlier runs that are kept.
+        on_progress: Called with what is done of the step at hand, of how much, and the step in words.
+    """
+    if isinstance(scene, coupled_study.CoupledScene):
+        return parts.part(coupled_study.design_and_simulate, scene, on_progress=on_progress)
+    return parts.part(controller_study.design_and_simulate, scene, on_progress=on_progress)
 
 
 def judged(

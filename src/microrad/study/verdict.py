@@ -64,7 +64,7 @@ def of_fine_pointing(
         fine: The study of the fine-pointing loop.
         case: The link under the best controller on the mission's mirror.
     """
-    controller, cause, lacking = fine.best.design.name, fine.budget.dominant, unknown(fine.scene.mirrors.table)
+    controller, cause, lacking = fine.best.design.name, fine.budget.dominant, _lacking(fine.scene.unknown_dynamics)
     left, title = fine.best.simulated[Variant.GIVEN].quantile_rad, f"fine pointing at {100 * fine.quantile:g} %"
     name, derived = f"link margin for {time_kept(q)} ({controller})", derived_from(sources, "communication.")
     spare, doubt = case.margin_db - q.margin_db, lacking if case.possible else IMPOSSIBLE
@@ -77,8 +77,11 @@ def of_fine_pointing(
 
 def unknown(mirror: mirror_table.Mirror) -> str:
     """What would have to be known of the mission's mirror before a loop around it may be relied on, or nothing."""
-    lacking = mirror_summary.unknown_dynamics(mirror)
-    return "dynamics of the mirror, which its model does not have" if lacking else ""
+    return _lacking(mirror_summary.unknown_dynamics(mirror))
+
+
+def _lacking(unknown_dynamics: str) -> str:
+    return "dynamics of the mirror, which its model does not have" if unknown_dynamics else ""
 
 
 def _stroke(sources: Mapping[str, Source], fine: FinePointingStudy) -> Requirement:

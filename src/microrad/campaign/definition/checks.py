@@ -10,7 +10,7 @@ from microrad.campaign.definition.tables import MOST_RUNS, CampaignTable, LimitT
 from microrad.campaign.definition.values import FILE_WORD, NotedError, ValueReader, quoted_near
 from microrad.campaign.records import Limit
 from microrad.core.units import format_quantity
-from microrad.loop import controller_study
+from microrad.loop import controller_study, coupled_study
 from microrad.mirror import Variant
 from microrad.mission.fields import Quantity
 from microrad.mission.model import LinkMission, Mission
@@ -33,6 +33,11 @@ def check_loop(reader: ValueReader, table: LoopTable, missions: Sequence[LinkMis
             return
         if not _has_controller(reader, table.controller, m.fine_pointing):
             return
+        if m.fine_pointing.mirror_file is not None and (table.axes == "one" or table.mirror is Variant.COMPARISON):
+            key, expected = ("axes", "both") if table.axes == "one" else ("mirror", str(Variant.GIVEN))
+            reason = "is for a mirror on each axis, and fine_pointing.mirror_file names one of several axes"
+            reader.fault(f"loop.{key}", getattr(table, key), reason, f'{key} = "{expected}"')
+            return
         if table.mirror is Variant.COMPARISON and m.mirror.comparison is None:
             reason = f'needs a comparison model, which the mirror "{m.mirror.name}" has not'
             reader.fault("loop.mirror", table.mirror, reason, f'mirror = "{Variant.GIVEN}"')
@@ -46,7 +51,7 @@ def check_loop(reader: ValueReader, table: LoopTable, missions: Sequence[LinkMis
 
 
 def _has_controller(reader: ValueReader, controller: str, of: FinePointing) -> bool:
-    names = controller_study.names(of)
+    names = (controller_study if of.mirror_file is None else coupled_study).names(of)
     if controller in names:
         return True
     expected = " or ".join(f'"{name}"' for name in names)

@@ -10,7 +10,7 @@ from microrad.campaign.records import CampaignError
 from microrad.campaign.rows.missions import MissionBuilder
 from microrad.core.progress import Progress
 from microrad.link import tracking_light_w
-from microrad.loop import controller_study
+from microrad.loop import controller_study, coupled_study
 from microrad.loop.control import AxisController
 from microrad.loop.pointing_loop.ensemble import Span
 from microrad.loop.pointing_loop.loop import LoopController, PointingLoop
@@ -47,18 +47,27 @@ class MissionLoop:
     """
 
     table: LoopTable
-    scene: controller_study.Scene
+    scene: controller_study.AnyScene
     row: PointingLoop
     span: Span
 
     def tuned(self) -> AxisController:
-        """The controller that the campaign names, tuned for this loop. Raises `ValueError` if none can be."""
-        f = self.scene.table
-        return controller_study.tune(self.table.controller, f, controller_study.plants(self.scene, f.seed)).controller
+        """The controller that the campaign names, tuned for this loop. Raises `ValueError` if none can be.
 
-    def controller(self, axis: AxisController) -> LoopController:
+        It is that of one axis, or of all drives of a mirror of several axes.
+        """
+        name, f = self.table.controller, self.scene.table
+        if isinstance(self.scene, controller_study.Scene):
+            return controller_study.tune(name, f, controller_study.plants(self.scene, f.seed)).controller
+        assert isinstance(self.scene, coupled_study.CoupledScene)
+        whole = coupled_study.design(self.scene, only=(name,)).made[0].controller
+        return AxisController(name, whole.system, whole.anti_windup)
+
+    def controller(self, tuned: AxisController) -> LoopController:
         """A tuned controller on the axes of this loop."""
-        return controller_study.build(self.table.controller, replace(self.scene, loop=self.row), axis)
+        if isinstance(self.scene, controller_study.Scene):
+            return controller_study.build(self.table.controller, replace(self.scene, loop=self.row), tuned)
+        return LoopController(tuned.name, tuned.system, tuned.anti_windup)
 
 
 def mission_loop(file: LinkFile, table: LoopTable, seed: int) -> MissionLoop:
@@ -70,12 +79,10 @@ def mission_loop(file: LinkFile, table: LoopTable, seed: int) -> MissionLoop:
         seed: the campaign's.
     """
     assert isinstance(file, MissionFile)
-    scene = controller_study.scene(file, mirror.of(file.mission), tracking_light_w(file))
-    if table.axes == "one":
+    scene = coupled_study.of_mission(file, mirror.of(file.mission), tracking_light_w(file))
+    if isinstance(scene, controller_study.Scene) and table.axes == "one":
         scene = replace(scene, loop=scene.axis)
-    return MissionLoop(
-        table, scene, controller_study.on_variant(scene, table.mirror), span(table, settings(file), seed)
-    )
+    return MissionLoop(table, scene, scene.variants[table.mirror], span(table, settings(file), seed))
 
 
 class ControllerTuner:

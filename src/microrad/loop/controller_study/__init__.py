@@ -1,6 +1,7 @@
 """The fine-pointing study of a mission: its loop, controllers tuned for it, and what they leave under disturbances."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +11,7 @@ from microrad.core.progress import Progress
 from microrad.loop import disturbance
 from microrad.loop.controller_study.designs import (
     BASELINE,
+    AnyDesign,
     Design,
     build,
     families,
@@ -32,17 +34,18 @@ from microrad.loop.controller_study.results import (
     Verified,
     best,
     error_budget,
-    on_variant,
     outlook,
     sines,
     verify,
 )
-from microrad.loop.controller_study.scenario import Scene, scene, table
+from microrad.loop.controller_study.scenario import AnyScene, Scene, scene, table
 
 __all__ = [
     "BASELINE",
     "COUNTERS",
     "PROMISE",
+    "AnyDesign",
+    "AnyScene",
     "Design",
     "Difference",
     "ErrorBudget",
@@ -62,11 +65,11 @@ __all__ = [
     "error_budget",
     "families",
     "names",
-    "on_variant",
     "optimum_rms_rad",
     "outlook",
     "plants",
     "scene",
+    "simulated",
     "sines",
     "table",
     "tune",
@@ -83,7 +86,7 @@ class FinePointingStudy:
     ``optimum_rad`` the radial rms below which no linear controller comes on the nominal mirror, whatever its margins.
     """
 
-    scene: Scene
+    scene: AnyScene
     verified: tuple[Verified, ...]
     best: Verified
     budget: ErrorBudget
@@ -106,8 +109,26 @@ def design_and_simulate(scene: Scene, on_progress: Progress = lambda done, total
     Raises:
         ValueError: A controller cannot meet its margin; says why.
     """
-    verified = verify(scene, plain_designs(scene, on_progress), on_progress)
-    chosen, designs = best(verified), [v.design for v in verified]
+    designs, bound = plain_designs(scene, on_progress), math.sqrt(scene.loop.axes) * optimum_rms_rad(scene.axis)
+    return simulated(scene, designs, bound, on_progress)
+
+
+def simulated(
+    scene: AnyScene,
+    designs: Sequence[AnyDesign],
+    optimum_rad: float,
+    on_progress: Progress = lambda done, total, what: None,
+) -> FinePointingStudy:
+    """The study of a loop, from the controllers that were designed for it.
+
+    Args:
+        scene: The mission's fine-pointing loop.
+        designs: The controllers, the one that others are held against first.
+        optimum_rad: Radial rms below which no linear controller comes, whatever its margins.
+        on_progress: Called with what is done of the step at hand, of how much, and the step in words.
+    """
+    verified = verify(scene, designs, on_progress)
+    chosen = best(verified)
     segment = 2 * (verified[0].spectrum_rad2_hz.shape[0] - 1)
     freq = np.asarray(np.fft.rfftfreq(segment, scene.loop.timing.period_s), dtype=float)
     before = np.sum([disturbance.psd(each, freq) for each in scene.loop.disturbances[0]], axis=0)
@@ -120,7 +141,7 @@ def design_and_simulate(scene: Scene, on_progress: Progress = lambda done, total
         freq,
         before,
         scene.table.quantile,
-        math.sqrt(scene.loop.axes) * optimum_rms_rad(scene.axis),
+        optimum_rad,
     )
 
 

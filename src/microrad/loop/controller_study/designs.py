@@ -5,6 +5,7 @@ from collections import ChainMap
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Protocol
 
 import numpy as np
 
@@ -29,6 +30,45 @@ GRID = 24
 """Values of each gain on the grid of the baseline."""
 
 
+class AnyDesign(Protocol):
+    """A controller of all axes that was designed, on whatever mirror; `Design` says what its fields mean."""
+
+    @property
+    def name(self) -> str:
+        """What it is called."""
+        ...
+
+    @property
+    def controller(self) -> LoopController:
+        """The controller of all axes."""
+        ...
+
+    @property
+    def inverse(self) -> str:
+        """How an inverse is used."""
+        ...
+
+    @property
+    def margin(self) -> float | None:
+        """Modulus margin that it was tuned for in place of the mission's."""
+        ...
+
+    @property
+    def values(self) -> Mapping[str, float]:
+        """What it was tuned to, by name, in SI units."""
+        ...
+
+    @property
+    def bound_by(self) -> Sequence[str]:
+        """What keeps its residual from being smaller."""
+        ...
+
+    @property
+    def loop_margins(self) -> control.LoopMargins:
+        """Margins of its linear loop."""
+        ...
+
+
 @dataclass(frozen=True, slots=True)
 class Design:
     """One controller of the study: what it was tuned to, on all axes; ``inverse`` says how one is used.
@@ -42,6 +82,21 @@ class Design:
     controller: LoopController
     inverse: str = ""
     margin: float | None = None
+
+    @property
+    def values(self) -> Mapping[str, float]:
+        """What it was tuned to, by name, in SI units."""
+        return self.tuned.values
+
+    @property
+    def bound_by(self) -> Sequence[str]:
+        """What keeps its residual from being smaller."""
+        return self.tuned.bound_by
+
+    @property
+    def loop_margins(self) -> control.LoopMargins:
+        """Margins of the nominal loop of an axis."""
+        return self.tuned.margins
 
 
 def families(f: FinePointing) -> tuple[Family, ...]:

@@ -12,8 +12,8 @@ from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
 from microrad.loop.control import inverse
 from microrad.loop.controller_study import parts
-from microrad.loop.controller_study.designs import BASELINE, Design
-from microrad.loop.controller_study.scenario import BODY_POINTING, Scene, with_mirror
+from microrad.loop.controller_study.designs import BASELINE, AnyDesign, Design
+from microrad.loop.controller_study.scenario import BODY_POINTING, AnyScene, Scene
 from microrad.loop.pointing_loop import ensemble, kernel_arrays
 from microrad.loop.pointing_loop.linear import Stationary, close, residual_spectrum, stationary
 from microrad.loop.pointing_loop.loop import LoopController, PointingLoop
@@ -89,7 +89,7 @@ class Verified:
     of the linear one, at the same frequencies.
     """
 
-    design: Design
+    design: AnyDesign
     theory: Stationary
     simulated: dict[str, Residual]
     spectrum_rad2_hz: Floats
@@ -178,7 +178,7 @@ def span(f: FinePointing) -> ensemble.Span:
 
 
 def verify(
-    scene: Scene, designs: Sequence[Design], on_progress: Progress = lambda done, total, what: None
+    scene: AnyScene, designs: Sequence[AnyDesign], on_progress: Progress = lambda done, total, what: None
 ) -> tuple[Verified, ...]:
     """Simulate each design on each variant of the mirror, beside its linear theory.
 
@@ -190,7 +190,7 @@ def verify(
     Raises:
         ValueError: The linear loop under a design is unstable.
     """
-    loops = {variant: on_variant(scene, variant) for variant in scene.mirrors.own}
+    loops = scene.variants
     cases = [
         _case(loop, d.controller, spectrum=variant == Variant.GIVEN) for d in designs for variant, loop in loops.items()
     ]
@@ -236,17 +236,6 @@ def shortened(
     return list(ensemble.simulate_cases(cases, few, runs, _telling(on_progress, "simulating controllers")))
 
 
-def on_variant(scene: Scene, variant: Variant) -> PointingLoop:
-    """The loop on one variant of its mirror: without hysteresis each element is its slow gain, as in theory.
-
-    Args:
-        scene: The mission's fine-pointing loop.
-        variant: The variant.
-    """
-    straight = variant == Variant.STRAIGHT
-    return parts.without(scene.loop, parts.HYSTERESIS) if straight else with_mirror(scene.loop, scene.mirrors, variant)
-
-
 def _case(loop: PointingLoop, controller: LoopController, *, spectrum: bool = False) -> ensemble.Case:
     return ensemble.Case(loop, for_mirror(controller, loop), spectrum)
 
@@ -265,8 +254,8 @@ def _telling(on_progress: Progress, what: str) -> Callable[[int, int], None]:
     return lambda done, total: on_progress(done, total, what)
 
 
-def _verified(scene: Scene, design: Design, runs: dict[Variant, ensemble.Ensemble]) -> Verified:
-    closed = close(scene.loop, design.controller)
+def _verified(scene: AnyScene, design: AnyDesign, runs: dict[Variant, ensemble.Ensemble]) -> Verified:
+    closed = close(scene.theory, design.controller)
     given = runs[Variant.GIVEN]
     inner = given.freq_hz[1:-1]
     predicted = np.full((given.freq_hz.size, scene.loop.axes), np.nan)
@@ -307,7 +296,7 @@ def best(verified: Sequence[Verified]) -> Verified:
     return min(tuned, key=lambda v: v.simulated[Variant.GIVEN].quantile_rad)
 
 
-def error_budget(scene: Scene, of: Verified, on_progress: Progress = lambda done, total, what: None) -> ErrorBudget:
+def error_budget(scene: AnyScene, of: Verified, on_progress: Progress = lambda done, total, what: None) -> ErrorBudget:
     """Split up the residual of a design: each source alone, all together, and what the rest of the loop adds.
 
     What is not a source of error (limits, quantisation, delay) is left out of the whole. All runs have the same seeds.
@@ -318,7 +307,7 @@ def error_budget(scene: Scene, of: Verified, on_progress: Progress = lambda done
         of: The design, simulated.
         on_progress: Called with the parts of the work that are done, their number and what is done.
     """
-    fine = parts.without(scene.loop, parts.HYSTERESIS, parts.QUANTISATION)
+    fine = parts.without(scene.variants[Variant.STRAIGHT], parts.QUANTISATION)
     names = parts.sources(fine)
     left_out = (parts.LIMITS, parts.QUANTISATION, parts.DELAY)
     alone = [parts.without(fine, *(other for other in names if other != name)) for name in names]
@@ -348,7 +337,7 @@ SINE_S, SINE_SETTLE_S = 1.4, 0.4
 
 
 def sines(
-    scene: Scene, designs: Sequence[Design], on_progress: Progress = lambda done, total, what: None
+    scene: AnyScene, designs: Sequence[AnyDesign], on_progress: Progress = lambda done, total, what: None
 ) -> tuple[Sine, ...]:
     """The paper's sines (Fig. 6 and 8) on axis x, with vibration and sensor noise, for all controllers.
 
@@ -361,8 +350,9 @@ def sines(
     """
     f = scene.table
     cases, what = [], []
-    for variant in (each for each in scene.mirrors.own if each != Variant.STRAIGHT):
-        loop = with_mirror(scene.loop, scene.mirrors, variant)
+    for variant, loop in scene.variants.items():
+        if variant == Variant.STRAIGHT:
+            continue
         for design in designs:
             for freq in scene.sine_frequencies_hz:
                 following = _following_sine(loop, scene.sine_amplitude_rad, freq)

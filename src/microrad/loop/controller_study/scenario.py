@@ -9,8 +9,10 @@ import numpy as np
 
 from microrad import mirror
 from microrad.loop import control, disturbance, sensor
+from microrad.loop.controller_study import parts
 from microrad.loop.pointing_loop import loop as fine
-from microrad.mirror import MirrorParts, Variant, geometry, hysteresis
+from microrad.loop.pointing_loop.design import design_plant
+from microrad.mirror import MirrorParts, Variant, geometry, hysteresis, summary
 from microrad.mission.file import MissionFile, NamedFile, content_of
 from microrad.mission.model import Source, source_text
 from microrad.mission.tables.fine_pointing import FinePointing, OpticalSensorTable, VibrationTable
@@ -19,17 +21,15 @@ from microrad.mission.tables.pointing import Pointing
 BODY_POINTING = "body pointing"
 
 
-@dataclass(frozen=True, slots=True)
-class Scene:
-    """The fine-pointing loop of a mission: of all axes, of one axis for designs, and what they came from.
+@dataclass(frozen=True, slots=True, eq=False)
+class AnyScene:
+    """The fine-pointing loop of a mission with whatever mirror, and what it has to follow.
 
     ``sine_amplitude_rad`` and ``sine_frequencies_hz`` are those of the paper's sines, which it has to track as well.
     """
 
     table: FinePointing
-    mirrors: MirrorParts
     loop: fine.PointingLoop
-    axis: fine.PointingLoop
     stroke: tuple[geometry.StrokeBudget, ...]
     stroke_without_point_ahead: tuple[geometry.StrokeBudget, ...]
     sine_amplitude_rad: float
@@ -39,6 +39,58 @@ class Scene:
     def own_stroke(self) -> tuple[geometry.StrokeBudget, ...]:
         """The stroke budgets of the mission as it is: with the point-ahead on the mirror or not."""
         return self.stroke if self.table.reference.point_ahead_on_mirror else self.stroke_without_point_ahead
+
+    @property
+    def theory(self) -> fine.PointingLoop:
+        """The loop that linear theory is of."""
+        raise NotImplementedError
+
+    @property
+    def variants(self) -> dict[Variant, fine.PointingLoop]:
+        """The loop on each variant of its mirror, the mission's own first."""
+        raise NotImplementedError
+
+    @property
+    def unknown_dynamics(self) -> str:
+        """Why no loop around the mirror can be relied on, in a sentence; "" where its dynamics are known."""
+        raise NotImplementedError
+
+    @property
+    def one_axis(self) -> control.DesignPlant:
+        """The plant of one axis, which the parameters of controllers are bounded by."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scene(AnyScene):
+    """The fine-pointing loop of a mission with its mirror on each axis; ``axis`` is one of them, for designs."""
+
+    mirrors: MirrorParts
+    axis: fine.PointingLoop
+
+    @property
+    def theory(self) -> fine.PointingLoop:
+        """The loop itself: theory takes each hysteresis element at its slow gain."""
+        return self.loop
+
+    @property
+    def variants(self) -> dict[Variant, fine.PointingLoop]:
+        """The loop on each variant of the mirror: without hysteresis each element is its slow gain, as in theory."""
+        straight = parts.without(self.loop, parts.HYSTERESIS)
+        return {
+            variant: straight if variant == Variant.STRAIGHT else with_mirror(self.loop, self.mirrors, variant)
+            for variant in self.mirrors.own
+        }
+
+    @property
+    def unknown_dynamics(self) -> str:
+        """Why no loop around the mirror can be relied on, in a sentence; "" where its dynamics are known."""
+        return summary.unknown_dynamics(self.mirrors.table)
+
+    @property
+    def one_axis(self) -> control.DesignPlant:
+        """The plant of one axis, which the parameters of controllers are bounded by."""
+        return design_plant(self.axis)
 
 
 def table(given: FinePointing | None) -> FinePointing:
@@ -87,7 +139,7 @@ def scene(file: MissionFile, mirrors: MirrorParts, received_power_w: float | Non
     )
     with_it, without = (stroke(f, mirrors, chain, m.pointing, file.sources, on_mirror) for on_mirror in (True, False))
     freqs = sorted({*m.scenario.pid_frequencies_hz, *m.scenario.inverse_frequencies_hz})
-    return Scene(f, mirrors, loop, axis, with_it, without, m.scenario.amplitude_rad, tuple(freqs))
+    return Scene(f, loop, with_it, without, m.scenario.amplitude_rad, tuple(freqs), mirrors, axis)
 
 
 def optics(f: FinePointing, mirror_angle: str) -> geometry.Geometry:
@@ -247,20 +299,48 @@ def stroke(
     Raises:
         ValueError: For a singular geometry.
     """
-    r, of = f.reference, mirrors.table
+    of = mirrors.table
+    lowest_v, highest_v = mirrors.drive_range_v
+    gain = abs(hysteresis.slow_gain(mirrors.own[Variant.GIVEN].model))
+    own = {"optical": 1.0, "mechanical": 2.0}
+    usable = 2.0 * gain * min(highest_v, -lowest_v) * own[chain.angle] / own[f.geometry.travel_angle]
+    return geometry.stroke_budget(
+        chain,
+        demand(f, pointing, on_mirror),
+        travel_rad=of.travel_rad,
+        travel_angle=f.geometry.travel_angle,
+        usable_travel_rad=min(usable, of.travel_rad),
+        sources=demand_sources(pointing, sources),
+    )
+
+
+def demand(f: FinePointing, pointing: Pointing, on_mirror: bool) -> geometry.StrokeDemand:
+    """What the mirror has to follow, at the line of sight.
+
+    Args:
+        f: The mission's fine-pointing table.
+        pointing: The mission's open-loop pointing errors, of which the bias counts.
+        on_mirror: Whether the mirror carries the point-ahead.
+    """
+    r = f.reference
     lag = r.line_of_sight_rate_rad_s * (1.0 - r.rate_feedforward) / (2.0 * math.pi * f.body.bandwidth_hz)
     body = f.body.error_rad / (math.sqrt(2.0) if f.body.convention == "radial" else 1.0)
-    demand = geometry.StrokeDemand(
+    return geometry.StrokeDemand(
         body_pointing_rad=(body, body),
         point_ahead_rad=(r.point_ahead_rad, 0.0),
         bias_rad=(pointing.bias_rad, pointing.bias_rad),
         rate_lag_rad=(lag, 0.0),
         point_ahead_on_mirror=on_mirror,
     )
-    lowest_v, highest_v = mirrors.drive_range_v
-    gain = abs(hysteresis.slow_gain(mirrors.own[Variant.GIVEN].model))
-    own = {"optical": 1.0, "mechanical": 2.0}
-    usable = 2.0 * gain * min(highest_v, -lowest_v) * own[chain.angle] / own[f.geometry.travel_angle]
+
+
+def demand_sources(pointing: Pointing, sources: Mapping[str, Source]) -> dict[str, str]:
+    """Where each half range of `demand` comes from, by its name.
+
+    Args:
+        pointing: The mission's open-loop pointing errors.
+        sources: Where the mission's numbers come from, by key.
+    """
     named = {
         "body_pointing_rad": ("fine_pointing.body.error",),
         "point_ahead_rad": ("fine_pointing.reference.point_ahead",),
@@ -269,11 +349,4 @@ def stroke(
         ),
         "rate_lag_rad": ("fine_pointing.reference.line_of_sight_rate", "fine_pointing.reference.rate_feedforward"),
     }
-    return geometry.stroke_budget(
-        chain,
-        demand,
-        travel_rad=of.travel_rad,
-        travel_angle=f.geometry.travel_angle,
-        usable_travel_rad=min(usable, of.travel_rad),
-        sources={key: source_text(sources, *keys) for key, keys in named.items()},
-    )
+    return {key: source_text(sources, *keys) for key, keys in named.items()}

@@ -6,11 +6,12 @@ from microrad.loop.coupled_study.designs import (
     CoupledOutlook,
     design,
     design_and_promise,
+    design_and_simulate,
     names,
     outlook,
     plants,
 )
-from microrad.loop.coupled_study.scene import AXES, CoupledScene, scene
+from microrad.loop.coupled_study.scene import AXES, CoupledScene, of_mission, scene
 from microrad.loop.coupled_study.whole import WholeMargins
 
 __all__ = [
@@ -22,7 +23,9 @@ __all__ = [
     "WholeMargins",
     "design",
     "design_and_promise",
+    "design_and_simulate",
     "names",
+    "of_mission",
     "outlook",
     "plants",
     "scene",

@@ -18,14 +18,18 @@ from microrad.loop.control import (
     LQG_OF_AXES,
     PI,
     Family,
+    LoopMargins,
     MultiloopMargin,
     Specification,
+    Weights,
     WholeController,
     WholePlant,
+    lqg_of_axes,
 )
 from microrad.loop.control.descent import descend
 from microrad.loop.control.search import Search, Trial, apart
-from microrad.loop.control.tuning import cheapest_that_holds, hypercube, settled
+from microrad.loop.control.tuning import MARGIN, cheapest_that_holds, hypercube, settled
+from microrad.loop.controller_study import FinePointingStudy, simulated
 from microrad.loop.controller_study import designs as one_axis
 from microrad.loop.controller_study.promises import firmer
 from microrad.loop.controller_study.results import Outlook, shortened
@@ -49,6 +53,9 @@ NOMINAL, ADDED = 2, 3
 SPARE = 0.002
 """Share of its margin that a candidate is to have to spare where no optimum on the margin was found."""
 
+AT_BOUND = 0.02
+"""Share of the margin asked for above which a design is not bound by it."""
+
 SURVEY = 40
 """Places that the search of an axis by itself begins with, whose result is but where that of the whole begins."""
 
@@ -60,7 +67,7 @@ class CoupledDesign:
     ``tuned`` are the values that it was tuned to, by name. ``margins`` are the smallest over all linear loops of the
     scene, each with all axes closed. ``residual_rad`` is the rms of each axis for small motions about rest, linear, and
     ``drive_v`` that of each drive. ``margin`` is the modulus margin that it was tuned for where the mirror's hysteresis
-    asks for more than the mission's, else None.
+    asks for more than the mission's, else None. ``bound_by`` names that margin where the tuning ended at it.
     """
 
     name: str
@@ -70,6 +77,31 @@ class CoupledDesign:
     residual_rad: Floats
     drive_v: Floats
     margin: float | None = None
+    inverse: str = ""
+    bound_by: tuple[str, ...] = ()
+
+    @property
+    def values(self) -> Mapping[str, float]:
+        """What it was tuned to, by name, in SI units."""
+        return self.tuned
+
+    @property
+    def loop_margins(self) -> LoopMargins:
+        """Those of the whole; gain and phase are what the disk margin promises for both loops at once."""
+        disk, modulus = self.margins.disk, self.margins.modulus
+        lowest, highest = disk.disk_gain
+        return LoopMargins(
+            disk=disk.disk,
+            gain_up=highest,
+            gain_down=lowest,
+            phase_rad=disk.disk_phase_rad,
+            delay_s=math.nan,
+            modulus=modulus,
+            crossover_hz=math.nan,
+            bandwidth_hz=self.margins.bandwidth_hz,
+            peak=1.0 / modulus,
+            peak_hz=math.nan,
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,6 +184,34 @@ def design(
     )
 
 
+def design_and_simulate(
+    scene: CoupledScene, on_progress: Progress = lambda done, total, what: None
+) -> FinePointingStudy:
+    """Design and simulate controllers, as `controller_study.design_and_simulate`; PI is what others are held against.
+
+    Args:
+        scene: The mission's loop.
+        on_progress: Called with what is done of the step at hand, of how much, and the step in words.
+
+    Raises:
+        ValueError: No controller meets its margin; says why.
+    """
+    return simulated(scene, design(scene, on_progress).made, optimum_rms_rad(scene), on_progress)
+
+
+def optimum_rms_rad(scene: CoupledScene) -> float:
+    """Radial rms about rest under the controller that leaves least of all linear ones: LQG without any other price.
+
+    Args:
+        scene: The mission's loop.
+    """
+    free = Weights(command=1e-6, sensor_noise=1.0, command_noise_v=0.0)
+    best = lqg_of_axes(whole_plant(scene.rest, decoupling(scene.rest)), free)
+    return stationary(
+        close(scene.rest, assemble_whole(best.name, scene.rest, best.system, best.anti_windup))
+    ).radial_rms_rad
+
+
 def design_and_promise(
     scene: CoupledScene, on_progress: Progress = lambda done, total, what: None, only: Sequence[str] = ()
 ) -> tuple[CoupledDesigns, tuple[CoupledOutlook, ...]]:
@@ -231,7 +291,15 @@ def _designed(
         min((each.disk for each in margins), key=lambda margin: margin.disk),
         min(each.bandwidth_hz for each in margins),
     )
-    return CoupledDesign(family.name, values, on_drives, smallest, np.sqrt(left.error), np.sqrt(left.drive))
+    return CoupledDesign(
+        family.name,
+        values,
+        on_drives,
+        smallest,
+        np.sqrt(left.error),
+        np.sqrt(left.drive),
+        bound_by=(MARGIN,) if smallest.modulus < (1.0 + AT_BOUND) * asked else (),
+    )
 
 
 def _margins(plant: WholePlant, controller: WholeController) -> WholeMargins:

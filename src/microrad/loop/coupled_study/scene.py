@@ -8,12 +8,13 @@ import numpy as np
 from microrad.core.arrays import Floats
 from microrad.loop import control
 from microrad.loop.controller_study import scenario
-from microrad.loop.pointing_loop.design import read_each_sample
+from microrad.loop.coupled_study.whole import alone
+from microrad.loop.pointing_loop.design import read_each_sample, whole_plant
 from microrad.loop.pointing_loop.loop import PointingLoop, decoupling, in_band_gain, nominal_axis_gain
-from microrad.mirror import coupled, geometry, hysteresis
+from microrad.mirror import MirrorParts, Variant, coupled, geometry, hysteresis
 from microrad.mirror.coupled import CoupledMirror, Output
 from microrad.mirror.model import linearised
-from microrad.mission.file import MissionFile
+from microrad.mission.file import MissionFile, mirror_of_loop
 from microrad.mission.tables.fine_pointing import FinePointing
 
 AXES = "xy"
@@ -27,7 +28,7 @@ SETTLED = 10.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class CoupledScene:
+class CoupledScene(scenario.AnyScene):
     """The fine-pointing loop of a mission with a mirror of several axes in place of its own.
 
     ``loop`` has the mirror with its hysteresis. ``linear`` have it with a gain in place of each element, and a sensor
@@ -36,15 +37,33 @@ class CoupledScene:
     the identification's covariance, about rest. A controller has to hold in each of them.
     """
 
-    table: FinePointing
     mirror: CoupledMirror
-    loop: PointingLoop
     linear: tuple[PointingLoop, ...]
 
     @property
     def rest(self) -> PointingLoop:
         """The loop for small motions about rest."""
         return self.linear[0]
+
+    @property
+    def theory(self) -> PointingLoop:
+        """The loop that linear theory is of: that about rest."""
+        return self.rest
+
+    @property
+    def variants(self) -> dict[Variant, PointingLoop]:
+        """The loop with the mirror as it was identified, and without hysteresis: with its gains about rest."""
+        return {Variant.GIVEN: self.loop, Variant.STRAIGHT: replace(self.loop, mirror=self.rest.mirror)}
+
+    @property
+    def unknown_dynamics(self) -> str:
+        """Nothing: a mirror of several axes is identified with its dynamics."""
+        return ""
+
+    @property
+    def one_axis(self) -> control.DesignPlant:
+        """The plant of the first axis while the other rests."""
+        return alone(whole_plant(self.rest, decoupling(self.rest)), 0)
 
     @property
     def reach_v(self) -> tuple[float, float]:
@@ -119,7 +138,43 @@ def scene(file: MissionFile, mirror: CoupledMirror, received_power_w: float | No
     plain += [linearised(each, [hysteresis.rest_gain(model) for model in each.bank]) for each in drawn]
     linear = tuple(replace(seen, mirror=each) for each in plain)
     _refuse_unreachable(linear)
-    return CoupledScene(f, mirror, loop, linear)
+    with_it, without = (_stroke(file, f, linear[0], on_mirror) for on_mirror in (True, False))
+    freqs = sorted({*m.scenario.pid_frequencies_hz, *m.scenario.inverse_frequencies_hz})
+    return CoupledScene(f, loop, with_it, without, m.scenario.amplitude_rad, tuple(freqs), mirror, linear)
+
+
+def _stroke(
+    file: MissionFile, f: FinePointing, rest: PointingLoop, on_mirror: bool
+) -> tuple[geometry.StrokeBudget, ...]:
+    """What each actuator has to cover, its drive counted as the angle that an axis turns by at that drive."""
+    gain = nominal_axis_gain(rest)
+    low, high = max(rest.drive_range_v[0], rest.drive.minimum_v), min(rest.drive_range_v[1], rest.drive.maximum_v)
+    either_way = 2.0 * gain * min(-low, high)
+    return geometry.budgets_of_rows(
+        {f"actuator {number}": row for number, row in enumerate(decoupling(rest), 1)},
+        f.geometry.magnification,
+        scenario.demand(f, file.mission.pointing, on_mirror),
+        geometry.Travel("line-of-sight", either_way, either_way),
+        scenario.demand_sources(file.mission.pointing, file.sources),
+    )
+
+
+def of_mission(file: MissionFile, mirrors: MirrorParts, received_power_w: float | None) -> scenario.AnyScene:
+    """The fine-pointing loop of a mission: with the mirror of several axes that it names, else its mirror on each axis.
+
+    Args:
+        file: The mission.
+        mirrors: The mission's mirror, `mirror.of`.
+        received_power_w: Light on the tracking sensor (W), `link.tracking_light_w`; None where the table gives the
+            sensor's noise.
+
+    Raises:
+        ValueError: The mission has no such loop, or it cannot be built; says why.
+    """
+    several = mirror_of_loop(file)
+    if several is None:
+        return scenario.scene(file, mirrors, received_power_w)
+    return scene(file, coupled.of(several), received_power_w)
 
 
 def _gains(mirror: CoupledMirror, drive_range_v: tuple[float, float]) -> tuple[list[float], ...]:

@@ -245,6 +245,11 @@ class FinePointing(Table):
     optical_sensor: OpticalSensorTable
     strain_gauge: StrainGaugeTable | None = None
     reference: ReferenceTable
+    mirror_file: Name | None = Field(
+        default=None,
+        description="mirror file of version 2, seen from the mission file: one mirror of several axes in this loop, in "
+        "place of [mirror] on each axis",
+    )
 
     def problems(self) -> Iterator[Problem]:
         """Whole steps and samples, runs that outlast their settling, and nothing faster than what samples it."""

@@ -6,10 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from microrad.loop.controller_study import Design, ErrorBudget, FinePointingStudy, Residual, Sine, Verified, families
-from microrad.loop.pointing_loop.design import design_plant
+from microrad.loop.controller_study import AnyDesign, ErrorBudget, FinePointingStudy, Residual, Sine, Verified, families
 from microrad.mirror.geometry import StrokeBudget
-from microrad.mirror.summary import unknown_dynamics
 from microrad.report.data import fields, finite
 from microrad.report.fine_pointing.words import room
 
@@ -28,7 +26,7 @@ def fine_pointing_data(fine: FinePointingStudy, required: float) -> dict[str, An
         "required_rad": required,
         "best": fine.best.design.name,
         "baseline": r.baseline.design.name,
-        "met": fine.best.meets(required) and not unknown_dynamics(fine.scene.mirrors.table),
+        "met": fine.best.meets(required) and not fine.scene.unknown_dynamics,
         "linear_bound_rms_rad": fine.optimum_rad,
         "linear_bound_holds": r.holds,
         "rms_gained_over_baseline": r.gained,
@@ -48,12 +46,12 @@ def fine_pointing_data(fine: FinePointingStudy, required: float) -> dict[str, An
 
 
 def parameter_units(fine: FinePointingStudy) -> dict[str, str]:
-    """Units of the parameters that controllers are tuned by, by name; "" is a plain number."""
-    plant = design_plant(fine.scene.axis)
+    """Units of the parameters that controllers are tuned by, by name, alone or with an axis; "" is a plain number."""
+    plant = fine.scene.one_axis
     units: dict[str, str] = {}
     for family in families(fine.scene.table):
         try:
-            units |= {p.name: p.unit for p in family.parameters(plant)}
+            units |= {f"{p.name}{axis}": p.unit for p in family.parameters(plant) for axis in ("", " x", " y")}
         except ValueError:  # this plant has no such controller
             continue
     return units
@@ -70,14 +68,13 @@ def sources(verified: Sequence[Verified]) -> tuple[str, ...]:
 
 
 def _controller(v: Verified, required_rad: float, units: dict[str, str]) -> dict[str, Any]:
-    tuned = v.design.tuned
     return {
         "name": v.design.name,
         "inverse": v.design.inverse,
         "parameters": [
-            {"name": name, "unit": units.get(name, ""), "value": value} for name, value in tuned.values.items()
+            {"name": name, "unit": units.get(name, ""), "value": value} for name, value in v.design.values.items()
         ],
-        "bound_by": list(tuned.bound_by),
+        "bound_by": list(v.design.bound_by),
         "theory_rms_rad": v.theory.radial_rms_rad,
         "theory_rms_by_source_rad": rms_by_source(v),
         "simulated": {name: _residual(residual, required_rad) for name, residual in v.simulated.items()},
@@ -85,9 +82,9 @@ def _controller(v: Verified, required_rad: float, units: dict[str, str]) -> dict
     }
 
 
-def margins(design: Design) -> dict[str, float]:
+def margins(design: AnyDesign) -> dict[str, float]:
     """Margins and reach of a design's nominal loop, by key with its unit."""
-    of = design.tuned.margins
+    of = design.loop_margins
     return {
         "modulus": of.modulus,
         "gain_up_db": 20.0 * math.log10(of.gain_up),

@@ -5,10 +5,9 @@ from collections.abc import Callable, Mapping, Sequence
 
 from microrad.core.units import format_quantity
 from microrad.loop.control import LoopMargins
-from microrad.loop.controller_study import FinePointingStudy, Residual, Sine
+from microrad.loop.controller_study import FinePointingStudy, Residual, Scene, Sine
 from microrad.loop.controller_study.parts import DELAY
 from microrad.mirror.geometry import StrokeBudget
-from microrad.mirror.summary import unknown_dynamics
 from microrad.report.fine_pointing import words
 from microrad.report.fine_pointing.data import parameter_units, rms_by_source, sources
 from microrad.report.plotting.figure import Figure
@@ -28,7 +27,7 @@ def fine_pointing_view(fine: FinePointingStudy, required: float, figures: Sequen
         required: largest radial error (rad) that is allowed for the mission's share of the time.
         figures: its figures, of which those in `OPEN` are shown at once.
     """
-    met = fine.best.meets(required) and not unknown_dynamics(fine.scene.mirrors.table)
+    met = fine.best.meets(required) and not fine.scene.unknown_dynamics
     verdict = Verdict(" ".join(words.result(fine, required)), [" ".join(words.theory(fine))], met)
     drawn = [f if f.name in OPEN else View(f.title, [f], folded=True, listed=False) for f in figures]
     return View(
@@ -55,9 +54,10 @@ def setting(fine: FinePointingStudy) -> str:
     delay = format_quantity(loop.timing.delay_steps * loop.timing.step_s, "s")
     noise = given_angle(loop.optical.noise_rad)
     disturbances = words.listed([f"{each.name} {angle(each.rms_rad)}" for each in loop.disturbances[0]])
+    several = "" if isinstance(fine.scene, Scene) else f"Mirror of several axes: {words.several_axes(loop)}. "
     return (
-        f"Control at {rate} with {delay} of delay, sensor noise {noise} rms per axis and reading; disturbances, rms "
-        f"per axis before the loop: {disturbances}. Simulated: {table.runs} runs of "
+        f"{several}Control at {rate} with {delay} of delay, sensor noise {noise} rms per axis and reading; "
+        f"disturbances, rms per axis before the loop: {disturbances}. Simulated: {table.runs} runs of "
         f"{format_quantity(table.duration_s, 's')} each, the first {format_quantity(table.settle_s, 's')} left out, "
         f"seed {table.seed}. A design has to keep a modulus margin of {table.modulus_margin:g}."
     )
@@ -148,28 +148,37 @@ def designs_view(fine: FinePointingStudy) -> View:
     units = parameter_units(fine)
     rows = []
     for v in fine.verified:
-        tuned = v.design.tuned
         inverse = f"; inverse {v.design.inverse}" if v.design.inverse else ""
-        said = tuned_to(tuned.values, units) + inverse + words.larger_margin(v.design.margin)
-        rows.append((v.design.name, *design_cells(said, tuned.margins, tuned.bound_by)))
-    best = _best(fine, [v.design.name for v in fine.verified])
-    return View("What each controller was tuned to, and its margins", designs(rows, best=best), folded=True)
+        said = tuned_to(v.design.values, units) + inverse + words.larger_margin(v.design.margin)
+        rows.append((v.design.name, *design_cells(said, v.design.loop_margins, v.design.bound_by)))
+    best, about = _best(fine, [v.design.name for v in fine.verified]), ONE_AXIS
+    if not isinstance(fine.scene, Scene):
+        about = (
+            "Both axes closed, linear, the smallest over the mirrors that a design has to hold for. Gain and phase are "
+            "what the disk margin allows both axes to change by at once."
+        )
+    return View("What each controller was tuned to, and its margins", designs(rows, about, best=best), folded=True)
+
+
+ONE_AXIS = "One axis, linear, on the sampled loop with its delay: the worst of the places where the loop can be cut."
+"""What the margins of a mirror on each axis are of."""
 
 
 def designs(
-    rows: Sequence[Sequence[str]], between: Sequence[str] = (), best: Sequence[int] = ()
+    rows: Sequence[Sequence[str]], about: str, between: Sequence[str] = (), best: Sequence[int] = ()
 ) -> tuple[str, Table, Soft]:
     """The table of designs between the sentences that explain it.
 
     Args:
         rows: for each design its name, what stands in the columns ``between``, and its `design_cells`.
+        about: what the margins are of, in a sentence.
         between: headings of further columns of numbers, behind the name.
         best: rows that stand out, counted from 0.
     """
     margins = "modulus", "gain (dB)", "phase (°)", "delay (µs)", "disk", "bandwidth (Hz)", "crossover (Hz)"
     headings = ("controller", *between, "tuned to", *margins, "bound by")
     return (
-        "One axis, linear, on the sampled loop with its delay: the worst of the places where the loop can be cut.",
+        about,
         Table("", headings, rows, (0, 1 + len(between), len(headings) - 1), best=best),
         Soft(
             "Bandwidth: lowest frequency at which the sensitivity reaches 0 dB. Crossover: highest frequency at which "
@@ -197,19 +206,19 @@ def design_cells(tuned: str, margins: LoopMargins, bound_by: Sequence[str]) -> t
 
     Args:
         tuned: what it was tuned to, in words.
-        margins: those of its nominal loop.
+        margins: those of its nominal loop; of several axes, which have no delay margin, that is nan.
         bound_by: what keeps its residual from being smaller.
     """
-    gain = 20.0 * math.log10(margins.gain_up)
+    gain, several = 20.0 * math.log10(margins.gain_up), math.isnan(margins.delay_s)
     return (
         tuned,
         f"{margins.modulus:.2f}",
         _or(f"{gain:.1f}", gain, "any"),
         _or(f"{math.degrees(margins.phase_rad):.0f}", margins.phase_rad, "any"),
-        _or(f"{1e6 * margins.delay_s:.0f}", margins.delay_s, "any"),
+        "" if several else _or(f"{1e6 * margins.delay_s:.0f}", margins.delay_s, "any"),
         f"{margins.disk:.2f}",
         f"{margins.bandwidth_hz:.3g}",
-        _or(f"{margins.crossover_hz:.3g}", margins.crossover_hz, "none"),
+        "" if several else _or(f"{margins.crossover_hz:.3g}", margins.crossover_hz, "none"),
         ", ".join(bound_by) or "nothing",
     )
 

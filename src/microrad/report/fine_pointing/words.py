@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 from microrad.core.units import format_quantity
 from microrad.loop.control.tuning import MARGIN
-from microrad.loop.controller_study import FinePointingStudy, Verified
+from microrad.loop.controller_study import BASELINE, AnyScene, FinePointingStudy, Scene, Verified
+from microrad.loop.coupled_study import CoupledScene
+from microrad.loop.pointing_loop.loop import PointingLoop
 from microrad.mirror import Variant
 from microrad.mirror.geometry import StrokeBudget
-from microrad.mirror.summary import unknown_dynamics
 from microrad.mission.model import Amplifier, Control
 from microrad.mission.tables.fine_pointing import FinePointing
-from microrad.mission.tables.mirror import Mirror
 from microrad.report.quantities import angle, given_angle, percent, share_of_time
 
 NAMES: dict[str, str] = {
@@ -116,7 +116,7 @@ def result(fine: FinePointingStudy, required: float) -> list[str]:
     time = share_of_time(fine.quantile)
     met = "met" if best.meets(required) else "missed"
     sentences = [
-        *not_reliable(fine.scene.mirrors.table),
+        *not_reliable(fine.scene),
         f"{best.design.name} is the best of {len(fine.verified)} controllers: on the mission's mirror the radial error "
         f"stays within {angle(left.quantile_rad)} for {time} of the time ({angle(left.rms_rad)} rms, "
         f"{angle(left.largest_rad)} at most). The {given_angle(required)} required are {met}.",
@@ -128,10 +128,23 @@ def result(fine: FinePointingStudy, required: float) -> list[str]:
         sentences.append(f"The requirement is missed by {listed(failing)}.")
     reference = baseline.simulated[Variant.GIVEN]
     sentences.append(
-        f"Against the best PI of the gain grid ({angle(reference.rms_rad)} rms, {angle(reference.quantile_rad)} at "
+        f"Against {baseline_name(fine)} ({angle(reference.rms_rad)} rms, {angle(reference.quantile_rad)} at "
         f"{time}) the rms of {best.design.name} is {_lower(room(fine).gained)}."
     )
     return sentences
+
+
+def several_axes(loop: PointingLoop) -> str:
+    """A mirror of several axes in a few words."""
+    m = loop.mirror
+    channels = f"{m.actuators} actuators, {m.axes} outputs"
+    return f"{m.name}, {channels}, {m.A.shape[0]} states, {len(m.bank)} hysteresis elements"
+
+
+def baseline_name(fine: FinePointingStudy) -> str:
+    """The controller that others are held against, as a sentence calls it."""
+    name = fine.verified[0].design.name
+    return "the best PI of the gain grid" if name == BASELINE else name
 
 
 def _lower(share: float) -> str:
@@ -180,9 +193,9 @@ def theory(fine: FinePointingStudy) -> list[str]:
     return sentences
 
 
-def not_reliable(mirror: Mirror) -> list[str]:
+def not_reliable(scene: AnyScene) -> list[str]:
     """That no number of the loop may be relied on, and why, where that is so."""
-    unknown = unknown_dynamics(mirror)
+    unknown = scene.unknown_dynamics
     return [f"Not to be relied on: {unknown}."] if unknown else []
 
 
@@ -198,11 +211,11 @@ def short(fine: FinePointingStudy, required: float) -> list[str]:
         f"Fine pointing under vibration and noise: {fine.best.design.name} leaves {angle(left.quantile_rad)} radial at "
         f"{share_of_time(fine.quantile)} ({angle(left.rms_rad)} rms); {given_angle(required)} is allowed."
     ]
-    lines += [*not_reliable(fine.scene.mirrors.table), *filter(None, [tracked(fine, required)])]
+    lines += [*not_reliable(fine.scene), *filter(None, [tracked(fine, required)])]
     if r.holds:
         lines.append(
-            f"Without hysteresis no linear controller can be more than {percent(r.at_baseline)} better (rms) than the "
-            f"best PI of the gain grid; on the mission's mirror {fine.best.design.name} is {percent(abs(r.gained))} "
+            f"Without hysteresis no linear controller can be more than {percent(r.at_baseline)} better (rms) than "
+            f"{baseline_name(fine)}; on the mission's mirror {fine.best.design.name} is {percent(abs(r.gained))} "
             f"{'better' if r.gained >= 0.0 else 'worse'}."
         )
     short_of = [axis for axis in fine.scene.own_stroke if not axis.fits]
@@ -257,7 +270,7 @@ def stroke(fine: FinePointingStudy) -> list[str]:
         f"{said}The travel of {given_angle(one.travel_rad)} from stop to stop ({one.travel_angle} angle) is "
         f"{angle(half)} to either side; the worst case needs {needed}: the travel {covers}."
     ]
-    if one.usable_share < 1.0:
+    if one.usable_share < 1.0 and isinstance(fine.scene, Scene):
         mirror = fine.scene.mirrors.table
         sentences.append(
             f"The drive of {mirror.drive_min_v:g} to {mirror.drive_max_v:g} V about its bias of "
@@ -296,10 +309,32 @@ def warnings(fine: FinePointingStudy, paper: Control, amplifier: Amplifier) -> t
     """
     name = fine.best.design.name
     own = _stroke_warnings(fine) + _hardware_warnings(fine.scene.table, paper, amplifier)
+    own += left_out(fine.scene) if isinstance(fine.scene, CoupledScene) else []
     others: list[str] = []
     for names, text in (*_limit_warnings(fine), *_bound_warnings(fine), *_theory_warnings(fine)):
         (own if name in names else others).append(text)
     return [f"fine pointing: {text}" for text in own], [f"fine pointing: {text}" for text in others]
+
+
+def left_out(scene: CoupledScene) -> list[str]:
+    """What of the file of a mirror of several axes does not count in its loop, in sentences.
+
+    Args:
+        scene: the loop.
+    """
+    mirror, f = scene.mirror, scene.table
+    said = []
+    if mirror.delay_s > 0.0:
+        said.append(
+            f"the recordings' delay of {format_quantity(mirror.delay_s, 's', 3)} is left out; fine_pointing.delay and "
+            "fine_pointing.amplifier_bandwidth stand for the flight's own"
+        )
+    if f.rate_hz / 2 > mirror.excited_hz[1]:
+        said.append(
+            f"the mirror was recorded up to {format_quantity(mirror.excited_hz[1], 'Hz')}, and half of the control "
+            f"rate is {format_quantity(f.rate_hz / 2, 'Hz')}: between them the model is a guess"
+        )
+    return said
 
 
 def _limit_warnings(fine: FinePointingStudy) -> list[tuple[list[str], str]]:
@@ -339,7 +374,7 @@ def _hardware_warnings(f: FinePointing, c: Control, amplifier: Amplifier) -> lis
 def _bound_warnings(fine: FinePointingStudy) -> list[tuple[list[str], str]]:
     names: dict[str, list[str]] = {}
     for v in fine.verified:
-        for bound in v.design.tuned.bound_by:
+        for bound in v.design.bound_by:
             names.setdefault(bound, []).append(v.design.name)
     return [
         (

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from microrad.core.units import format_quantity
 from microrad.link import pointing
+from microrad.loop.controller_study import Scene
 from microrad.mirror import Variant
 from microrad.mirror.hysteresis import output_amplitude
 from microrad.report.quantities import micro, quantity, share_of_time, signed
@@ -90,7 +91,11 @@ def _covered(study: Study) -> float:
 
 
 def _mirror(study: Study) -> Stage:
-    m = study.file.mission
+    m, fine = study.file.mission, study.fine_pointing
+    if fine is not None and not isinstance(fine.scene, Scene):
+        of = fine.scene.loop.mirror
+        lines = [of.name, f"{of.actuators} actuators, {of.axes} outputs", f"{of.A.shape[0]} states"]
+        return _with_stroke(study, lines)
     widths = [100.0 * loop.width for loop in study.loops]
     half = (m.amplifier.output_max_v - m.amplifier.output_min_v) / m.amplifier.gain / 2.0
     lines = [f"reach {_angle(2.0 * output_amplitude(study.summary.model, half))} over {2 * half:g} V"]
@@ -98,8 +103,10 @@ def _mirror(study: Study) -> Stage:
         low, high = min(study.loops, key=lambda loop: loop.freq_hz), max(study.loops, key=lambda loop: loop.freq_hz)
         lines.append(f"hysteresis {100 * low.width:.1f} % at {low.freq_hz:g} Hz,")
         lines.append(f"{100 * high.width:.1f} % at {high.freq_hz:g} Hz")
-    if study.fine_pointing is None:
-        return Stage("Mirror", tuple(lines))
+    return Stage("Mirror", tuple(lines)) if fine is None else _with_stroke(study, lines)
+
+
+def _with_stroke(study: Study, lines: list[str]) -> Stage:
     axis = worst_axis(study)
     lines.append(f"stroke ({axis.name}): {micro(axis.needed_rad)} µrad needed,")
     lines.append(f"{micro(axis.available_rad)} µrad available")
@@ -115,7 +122,7 @@ def _loop(study: Study) -> Stage:
     if fine is not None:
         design = fine.best.design
         lines.append(f"{design.name} at {format_quantity(1.0 / fine.scene.loop.timing.period_s, 'Hz')}")
-        lines.append(f"modulus {design.tuned.margins.modulus:.2f}, {design.tuned.margins.bandwidth_hz:.3g} Hz wide")
+        lines.append(f"modulus {design.loop_margins.modulus:.2f}, {design.loop_margins.bandwidth_hz:.3g} Hz wide")
     return Stage("Loop", tuple(lines))
 
 

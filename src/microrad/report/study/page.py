@@ -122,7 +122,8 @@ def _mirror_and_loop(study: Study) -> View:
         folded=f"Each of {len(study.runs)} runs, with its counts",
     )
     margins = Table("", (heading, "value"), _margins(study))
-    return View("Mirror and loop", [Verbatim("\n".join(lines)), margins, runs], "mirror")
+    said = words.mirror_of_loop(study)
+    return View("Mirror and loop", told(said, Verbatim("\n".join(lines)), margins, runs), "mirror")
 
 
 def _run(run: Run) -> list[str]:

@@ -9,6 +9,7 @@ from typing import Literal
 from microrad.core.units import format_quantity
 from microrad.link.budget.lines import DEEPEST_DB, POINT_AHEAD_LOSS, POINTING_LOSS
 from microrad.link.requirement import IMPOSSIBLE, Subject, time_kept
+from microrad.loop.controller_study import Scene
 from microrad.loop.paper_cases import Run
 from microrad.mirror import Variant
 from microrad.mission.file import changed_from_shipped
@@ -104,6 +105,17 @@ def _extrapolated(study: Study) -> str:
 def _judged_beyond(study: Study) -> str:
     """How far the mirror of the judged loop is driven beyond where it was identified, or nothing."""
     return beyond_identified(study, study.residual) if study.fine_case is None else ""
+
+
+def mirror_of_loop(study: Study) -> str:
+    """That the fine-pointing loop has another mirror than the paper's, where it does; else nothing."""
+    fine = study.fine_pointing
+    if fine is None or isinstance(fine.scene, Scene):
+        return ""
+    return (
+        f"The mirror of the paper's loop. The fine-pointing loop has one of several axes: "
+        f"{fine_pointing_words.several_axes(fine.scene.loop)}."
+    )
 
 
 def terms(study: Study) -> dict[str, str]:

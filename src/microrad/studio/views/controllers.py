@@ -30,7 +30,7 @@ from microrad.loop.pointing_loop.loop import LoopController, PointingLoop
 from microrad.mirror import Variant
 from microrad.mission.file import MissionFile
 from microrad.mission.tables.fine_pointing import FinePointing
-from microrad.report.fine_pointing.page import design_cells, designs, tuned_to
+from microrad.report.fine_pointing.page import ONE_AXIS, design_cells, designs, tuned_to
 from microrad.report.quantities import micro
 from microrad.report.view import Block
 from microrad.studio.views.control import PID, PID_INVERSE, WITH, WITHOUT, Answers, Ask, Controller, Curve
@@ -57,7 +57,7 @@ def blocks(found: Mapping[str, Controller | str]) -> tuple[Block, ...]:
         else (name, micro(each.residual_rad), *design_cells(each.tuned, each.margins, each.bound_by))
         for name, each in found.items()
     ]
-    return designs(rows, between=("residual of an axis,\nrms in theory (µrad)",))
+    return designs(rows, ONE_AXIS, between=("residual of an axis,\nrms in theory (µrad)",))
 
 
 _UNKNOWN = ("",) * 8  # margins, and what a design is bound by
@@ -87,6 +87,11 @@ def _controller(file: MissionFile, name: str) -> Controller:
     mirrors = mirror.of(file.mission)
     if name in (PID, PID_INVERSE):
         made = _pid(paper_cases.of(file.mission, mirrors), name)
+    elif file.mission.fine_pointing is not None and file.mission.fine_pointing.mirror_file is not None:
+        raise ValueError(
+            "fine_pointing.mirror_file names a mirror of several axes, and this page designs for one: microrad design "
+            "has its controllers, and a run of the mission simulates them"
+        )
     else:
         made = _fine(controller_study.scene(file, mirrors, tracking_light_w(file)), name)
     text = "" if file.mirror_file is None else file.mirror_file.text

@@ -9,7 +9,7 @@ from microrad.core.arrays import Floats
 from microrad.core.units import format_quantity
 from microrad.link.acquisition import sequence as acquisition
 from microrad.link.acquisition.partner_search import Finding, Found
-from microrad.loop.controller_study import Design, FinePointingStudy, Scene
+from microrad.loop.controller_study import AnyDesign, AnyScene, FinePointingStudy
 from microrad.mission.tables.acquisition import Acquisition
 from microrad.mission.tables.operations import Operations
 from microrad.orbit.day import DayStudy
@@ -21,7 +21,7 @@ _STATE_OF_STAGE = (*[State.BEACON] * 2, State.DETECT, *[State.ANSWER] * 3, *[Sta
 
 
 def run_contact(
-    data: link.DataLink, finding: Finding, scene: Scene, design: Design, contact: Contact, settings: Settings
+    data: link.DataLink, finding: Finding, scene: AnyScene, design: AnyDesign, contact: Contact, settings: Settings
 ) -> ContactRun:
     """Run one contact from the slew to its end, under one controller of the mission's fine-pointing loop.
 
