@@ -182,27 +182,6 @@ def settled(search: Search, optima: Sequence[Trial], models: int = MODELS) -> Tr
     raise ValueError(_refusal(search))
 
 
-def cheapest_that_holds(search: Search, spare: float) -> Trial:
-    """The cheapest candidate that was judged, its values rounded, that keeps the specification looked at closely.
-
-    For searches of so many parameters that an optimum on a margin is not found to its last digit.
-
-    Args:
-        search: Has judged candidates.
-        spare: Share of the margin by which a candidate exceeds it, as judged.
-
-    Raises:
-        ValueError: None of the first ones keeps the specification.
-    """
-    enough = (1.0 + spare) * search.specification.modulus_margin
-    some = [t for t in _candidates(search) if t.modulus >= enough]
-    for trial in some[:CLOSE_LOOKS]:
-        found = search.of(np.array([rounded(v) for v in trial.values]), trial.place)
-        if _holds(search, found):
-            return found
-    raise ValueError(_refusal(search))
-
-
 def grid_best(
     family: Family, plants: Sequence[DesignPlant], specification: Specification, grid: Sequence[Sequence[float]]
 ) -> Tuned:

@@ -13,6 +13,7 @@ import numpy as np
 from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
 from microrad.core.threads import shared_out
+from microrad.loop import control
 from microrad.loop.control import (
     LQG,
     LQG_OF_AXES,
@@ -28,36 +29,38 @@ from microrad.loop.control import (
 )
 from microrad.loop.control.descent import descend
 from microrad.loop.control.search import Search, Trial, apart
-from microrad.loop.control.tuning import MARGIN, cheapest_that_holds, hypercube, settled
+from microrad.loop.control.tuning import MARGIN, settled
 from microrad.loop.controller_study import FinePointingStudy, simulated
 from microrad.loop.controller_study import designs as one_axis
 from microrad.loop.controller_study.promises import firmer
 from microrad.loop.controller_study.results import Outlook, shortened
 from microrad.loop.coupled_study.scene import AXES, CoupledScene
-from microrad.loop.coupled_study.whole import ALL_AXES, WholeMargins, alone, of_all_axes, whole_margins
+from microrad.loop.coupled_study.whole import ALL_AXES, WholeMargins, alone, side_by_side, whole_margins
 from microrad.loop.pointing_loop.design import whole_plant
 from microrad.loop.pointing_loop.linear import close, stationary
 from microrad.loop.pointing_loop.loop import LoopController, assemble_whole, decoupling
 from microrad.mission.tables.fine_pointing import FinePointing
 
 STARTS = 3
-"""Places from which an axis by itself, and the weights of LQG, are followed."""
+"""Places from which the weights of LQG are followed."""
 
-MODELS, CANDIDATES = 8, 800
-"""Quadratic models of the whole that an optimum is followed by, and about how many candidates they may take: with ten
-parameters each model takes 220."""
+MODELS = 8
+"""Quadratic models of the whole that the weights of LQG are followed by."""
 
-NOMINAL, ADDED = 2, 3
-"""Plants that controllers are tuned for at first, at rest and over the whole range, and how many are added at most."""
+NOMINAL = 2
+"""Plants that controllers are tuned for: at rest and over the whole range. The others have to keep the margin, too."""
 
-SPARE = 0.002
-"""Share of its margin that a candidate is to have to spare where no optimum on the margin was found."""
+LOOKS, ENOUGH = 8, 0.01
+"""Margins that controllers are tuned for until the whole keeps the one asked for, and what it may have to spare."""
+
+LEAST_RAISE, DECIMALS = 2e-3, 3
+"""By how much that margin is raised at least, and the decimals that it has."""
 
 AT_BOUND = 0.02
 """Share of the margin asked for above which a design is not bound by it."""
 
 SURVEY = 40
-"""Places that the search of an axis by itself begins with, whose result is but where that of the whole begins."""
+"""Places that the search of an axis by itself begins with."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -149,9 +152,8 @@ def design(
 ) -> CoupledDesigns:
     """Design controllers that keep the modulus margin with all axes closed.
 
-    LQG is one controller of all axes. Of the other families each axis has one, and those of all axes are tuned
-    together: their search begins where each axis is best by itself, and where the family that they contain is best, so
-    that they are never worse than that.
+    LQG is one controller of all axes. Of the other families each axis has one, tuned while the other rests, for the
+    least margin at which the whole keeps the one that is asked for; a family is never worse than one that it contains.
 
     Args:
         scene: The mission's loop.
@@ -263,42 +265,73 @@ def _designed_in_turn(
 def _designed(
     scene: CoupledScene, family: Family, of: Sequence[WholePlant], base: CoupledDesign | None
 ) -> CoupledDesign:
-    """The best controller of a family for the first plants that keeps its margin on all of them.
+    """The controller of a family that keeps its margin on all plants, with all axes closed.
 
-    A plant on which the margin is missed is added to those that it is tuned for.
+    It is tuned for the least margin at which the whole keeps the one that is asked for: what it is tuned for knows
+    nothing of the other axes, or of the mirrors that are drawn.
     """
-    asked, tuned_for = scene.table.modulus_margin, [*range(min(NOMINAL, len(of)))]
-    begun: Floats | None = None
-    for _ in range(ADDED + 1):
-        made, values = _tuned(scene, family, [of[i] for i in tuned_for], base, begun)
-        margins = [_margins(plant, made) for plant in of]
-        moduli = [each.modulus for each in margins]
-        worst = int(np.argmin(moduli))
-        if moduli[worst] >= asked or worst in tuned_for:
+    asked, low, high = scene.table.modulus_margin, (0.0, 0.0), (math.inf, math.inf)  # tuned for, and what the whole has
+    tuned_for, found, refused = asked, None, ""
+    for _ in range(LOOKS):
+        try:
+            made, values = _tuned(scene, family, of[:NOMINAL], tuned_for)
+            margins = [_margins(plant, made) for plant in of]
+            least = min(each.modulus for each in margins)
+        except ValueError as error:  # beyond what the family can have
+            refused, least = str(error), math.inf
+        if asked <= least < math.inf:
+            found = made, values, margins
+            if tuned_for == asked or least <= (1.0 + ENOUGH) * asked:
+                break
+        low, high = ((tuned_for, least), high) if least < asked else (low, (tuned_for, least))
+        following = round(_between(asked, low, high), DECIMALS)
+        if following in (low[0], high[0]):
             break
-        tuned_for.append(worst)
-        begun = np.array(list(values.values()))
-    if moduli[worst] < asked:
-        raise ValueError(
-            f"{family.name} keeps a modulus margin of {moduli[worst]:.3g} on one of {len(of)} mirrors that the "
-            f"identification leaves possible, where {asked:g} is asked for; identify it from more records, lower "
-            "fine_pointing.modulus_margin, or take another controller"
-        )
-    on_drives = assemble_whole(family.name, scene.rest, made.system, made.anti_windup)
+        tuned_for = following
+    if found is None:
+        raise ValueError(_out_of_reach(family.name, asked, low[1], len(of)) if low[0] else refused)
+    design = _of(scene, family.name, *found)
+    if base is not None and np.linalg.norm(base.residual_rad) < np.linalg.norm(design.residual_rad):
+        return replace(base, name=family.name, controller=replace(base.controller, name=family.name))
+    return design
+
+
+def _between(asked: float, low: tuple[float, float], high: tuple[float, float]) -> float:
+    """The margin to tune for next: the whole has less than is asked for at the low one, and enough at the high one."""
+    if math.isinf(high[0]):
+        return low[0] + max(asked - low[1], LEAST_RAISE)
+    if math.isinf(high[1]):
+        return 0.5 * (low[0] + high[0])
+    aim = (1.0 + 0.5 * ENOUGH) * asked
+    return low[0] + (high[0] - low[0]) * (aim - low[1]) / (high[1] - low[1])
+
+
+def _out_of_reach(name: str, asked: float, reached: float, mirrors: int) -> str:
+    return (
+        f"{name} keeps a modulus margin of {reached:.3g} with all axes closed, on the worst of {mirrors} linear mirrors "
+        f"(about rest, over the whole drive range, drawn from the identification), where {asked:g} is asked for; "
+        "identify it from more records, lower fine_pointing.modulus_margin, or take another controller"
+    )
+
+
+def _of(
+    scene: CoupledScene, name: str, made: WholeController, values: dict[str, float], margins: Sequence[WholeMargins]
+) -> CoupledDesign:
+    on_drives = assemble_whole(name, scene.rest, made.system, made.anti_windup)
     left = stationary(close(scene.rest, on_drives))
     smallest = WholeMargins(
-        min(moduli),
+        min(each.modulus for each in margins),
         min((each.disk for each in margins), key=lambda margin: margin.disk),
         min(each.bandwidth_hz for each in margins),
     )
     return CoupledDesign(
-        family.name,
+        name,
         values,
         on_drives,
         smallest,
         np.sqrt(left.error),
         np.sqrt(left.drive),
-        bound_by=(MARGIN,) if smallest.modulus < (1.0 + AT_BOUND) * asked else (),
+        bound_by=(MARGIN,) if smallest.modulus < (1.0 + AT_BOUND) * scene.table.modulus_margin else (),
     )
 
 
@@ -311,36 +344,20 @@ def _margins(plant: WholePlant, controller: WholeController) -> WholeMargins:
 
 
 def _tuned(
-    scene: CoupledScene,
-    family: Family,
-    of: Sequence[WholePlant],
-    base: CoupledDesign | None,
-    begun: Floats | None,
+    scene: CoupledScene, family: Family, of: Sequence[WholePlant], margin: float
 ) -> tuple[WholeController, dict[str, float]]:
-    """The best controller of a family for some plants, and its values.
-
-    The search begins where each axis is best by itself and where the base is best, or at the values that it has begun
-    with on fewer plants.
-    """
-    asked = Specification(scene.table.modulus_margin)
-    whole = LQG_OF_AXES if family is LQG else of_all_axes(family, of[0], AXES)
-    search = Search(whole, of, asked, scope=ALL_AXES)
-    if begun is not None:
-        starts = [search.of(begun)]
-    else:
-        starts = _weights(search) if family is LQG else [_by_axis(scene, family, of, search)]
-        if base is not None and family.extended is not None:
-            parts = np.split(np.array(list(base.tuned.values())), scene.loop.axes)
-            extended = [family.extended(alone(of[0], axis), part) for axis, part in enumerate(parts)]
-            starts.append(search.of(np.concatenate(extended)))
-    near = min((descend(search, each) for each in starts), key=lambda t: t.score)
-    count = len(search.parameters)
-    try:
-        best = settled(search, [near], max(2, min(MODELS, CANDIDATES // (2 * count * (count + 1)))))
-    except ValueError:
-        best = cheapest_that_holds(search, SPARE)
-    values = dict(zip((p.name for p in search.parameters), best.values.tolist(), strict=True))
-    return (whole.final or whole.build)(of[0], best.values), values
+    """The best controller of a family for some plants, and its values: LQG of the whole, else each axis by itself."""
+    asked, seed = Specification(margin), scene.table.seed
+    if family is not LQG:
+        alone_of = [[alone(plant, axis) for plant in of] for axis in range(scene.loop.axes)]
+        each = [control.tune(family, plants, asked, seed=seed, survey=SURVEY) for plants in alone_of]
+        values = {f"{name} {axis}": v for axis, t in zip(AXES, each, strict=True) for name, v in t.values.items()}
+        return side_by_side(family.name, [t.controller for t in each]), values
+    search = Search(LQG_OF_AXES, of, asked, scope=ALL_AXES)
+    near = min((descend(search, start) for start in _weights(search)), key=lambda t: t.score)
+    best = settled(search, [near], MODELS)
+    named = zip((p.name for p in search.parameters), best.values.tolist(), strict=True)
+    return lqg_of_axes(of[0], Weights(*best.values.tolist()), coarse=True), dict(named)
 
 
 def _weights(search: Search) -> list[Trial]:
@@ -348,17 +365,6 @@ def _weights(search: Search) -> list[Trial]:
     fifths = [(np.arange(5) + 0.5) / 5.0] * len(search.parameters)
     surveyed = search.at_all([np.array(place) for place in product(*fifths)])
     return apart(sorted(surveyed, key=lambda t: t.score), STARTS, 0.1)
-
-
-def _by_axis(scene: CoupledScene, family: Family, of: Sequence[WholePlant], search: Search) -> Trial:
-    """Each axis as it is best by itself, to where a rough search ends: the whole goes on from there."""
-    best = []
-    for axis in range(scene.loop.axes):
-        own = Search(family, [alone(plant, axis) for plant in of], search.specification)
-        surveyed = own.at_all(list(hypercube(len(own.parameters), SURVEY, scene.table.seed)))
-        starts = apart(sorted(surveyed, key=lambda t: t.score), STARTS, 0.1)
-        best.append(min((descend(own, start) for start in starts), key=lambda t: t.score))
-    return search.of(np.concatenate([trial.values for trial in best]))
 
 
 def outlook(

@@ -11,7 +11,6 @@ from microrad.core.arrays import Complexes, Floats
 from microrad.loop.control import (
     AxisController,
     DesignPlant,
-    Family,
     MultiloopMargin,
     WholeController,
     WholePlant,
@@ -20,7 +19,6 @@ from microrad.loop.control import (
 from microrad.loop.control.analysis import bandwidth_hz, reachable, resolving
 from microrad.loop.control.classical import LIGHT_DAMPING
 from microrad.loop.control.judge import CLOSER, NEAR_LEAST, Verdict, grid, quadrature
-from microrad.loop.control.problem import Parameter
 from microrad.loop.control.search import Scope
 
 BANDS = 10
@@ -226,38 +224,18 @@ def _misfit(plant: WholePlant, controller: WholeController) -> None:
 ALL_AXES = Scope(WholeJudge, _misfit, whole_margins)
 
 
-def of_all_axes(family: Family, of: WholePlant, names: Sequence[str]) -> Family:
-    """A family of controllers of one axis, side by side on all of them: its parameters once for each axis.
+def side_by_side(name: str, each: Sequence[AxisController]) -> WholeController:
+    """Controllers of one axis, one for each, as one of all axes.
 
     Args:
-        family: The family of one axis.
-        of: The plant that controllers are built for.
-        names: Names of the axes.
+        name: What it is called.
+        each: The controllers, in the order of the axes.
     """
     from scipy.linalg import block_diag
 
-    axes = [alone(of, axis) for axis in range(of.axes)]
-    known: dict[tuple[int, bytes], AxisController] = {}
-
-    def own(axis: int, values: Floats) -> AxisController:
-        key = axis, values.tobytes()
-        if key not in known:
-            known[key] = family.build(axes[axis], values)
-        return known[key]
-
-    def parameters(plant: WholePlant) -> tuple[Parameter, ...]:
-        del plant
-        named = zip(names, axes, strict=True)
-        return tuple(replace(p, name=f"{p.name} {name}") for name, axis in named for p in family.parameters(axis))
-
-    def build(plant: WholePlant, values: Floats) -> WholeController:
-        del plant
-        each = [own(axis, part) for axis, part in enumerate(np.split(values, of.axes))]
-        parts = ((c.system.A, c.system.B[:, :1], c.system.C, c.system.D[:, :1], c.anti_windup) for c in each)
-        A, B, C, D, windup = (np.asarray(block_diag(*blocks), dtype=float) for blocks in zip(*parts, strict=True))
-        return WholeController(family.name, lti.StateSpace(A, B, C, D), windup)
-
-    return Family(family.name, parameters, build)
+    parts = ((c.system.A, c.system.B[:, :1], c.system.C, c.system.D[:, :1], c.anti_windup) for c in each)
+    A, B, C, D, windup = (np.asarray(block_diag(*blocks), dtype=float) for blocks in zip(*parts, strict=True))
+    return WholeController(name, lti.StateSpace(A, B, C, D), windup)
 
 
 def alone(plant: WholePlant, axis: int) -> DesignPlant:
