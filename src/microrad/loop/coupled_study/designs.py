@@ -310,7 +310,8 @@ def _out_of_reach(name: str, asked: float, reached: float, mirrors: int) -> str:
     return (
         f"{name} keeps a modulus margin of {reached:.3g} with all axes closed, on the worst of {mirrors} linear "
         "mirrors (about rest, over the whole drive range, drawn from the identification), where "
-        f"{asked:g} is asked for; identify it from more records, lower fine_pointing.modulus_margin, or take another controller"
+        f"{asked:g} is asked for; identify it from more records, lower fine_pointing.modulus_margin, or take another "
+        "controller"
     )
 
 
