@@ -1,8 +1,11 @@
 """docs/gallery.md: each example is walked through as it stands, prints what stands there, and has no other figure.
 
-Three of the five are walked through by `make endurance`: the commands and functions in them have tests of their own.
+Four of the six are walked through by `make endurance`: the commands and functions in them have tests of their own. That
+of the recorded mirror takes its recordings from the folder that MICRORAD_DATA names; every run walks through it with
+recordings that are made here and a smaller search.
 """
 
+import json
 import math
 import re
 import shlex
@@ -10,27 +13,34 @@ import shutil
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from microrad import load_link, load_mirror, report
+from microrad.core import lti
 from microrad.core.units import parse_quantity
-from microrad.loop import controller_study
+from microrad.lab.identify import coupled
+from microrad.lab.identify.coupled.ladder import LadderOptions, identify_coupled
+from microrad.loop import controller_study, coupled_study
+from microrad.mirror.model import linearised
 from microrad.mission import presets
 from microrad.report.identification import page as identification
 from microrad.study import study
-from places import ROOT
+from places import DATA, ROOT
 from scenes import scene_of
+from several_axes import three_actuators
 from shipped import whole_drawn, whole_study
 
 GALLERY = ROOT / "docs" / "gallery"
 PAGE, REPORT = ((ROOT / "docs" / name).read_text(encoding="utf-8") for name in ("gallery.md", "report.md"))
 EXAMPLES = {text.partition("\n")[0]: text.partition("\n")[2] for text in PAGE.split("\n## ")[1:]}
-PAPER, LAB, CHOICE, CROSSLINK, CONSTELLATION = EXAMPLES
+PAPER, LAB, FLIGHT, CHOICE, CROSSLINK, CONSTELLATION = EXAMPLES
 BLOCK = re.compile(r"(?ms)^```(\w+)\n(.*?)^```|((?:^    \S[^\n]*\n)+)")
 FIGURE = re.compile(r"\d+(?:\.\d+)?(?: (?:%|dB|deg|min|h|cm|[µmMkGT]?(?:rad|bit|m|W|V|Hz|s|B))(?:/s)?(?!\w))?")
 DERIVED = {
     PAPER: {"0.60 dB": 3.60 - 3.00},
     LAB: {},
+    FLIGHT: {},
     CHOICE: {"29 %": 100 * (5.66 / 4.40 - 1.0), "5 %": 100 * 0.05},
     CROSSLINK: {"1081 km": 580 * 10 ** (5.41 / 20), "80 mm": 5 * 16, "0.96 deg/s": math.degrees(16.8e-3)},
     CONSTELLATION: {},
@@ -40,6 +50,7 @@ REQUIRED = {"10 µrad", "3 dB"}
 GIVEN = {
     PAPER: set(),
     LAB: {*REQUIRED, "40 Hz", "25 Hz"},
+    FLIGHT: set(),
     CHOICE: {*REQUIRED, "99.7 %"},
     CROSSLINK: {"45 deg", "1 deg/s"},
     CONSTELLATION: {"100 Mbit/s", "300 Mbit/s"},
@@ -153,6 +164,52 @@ def test_a_lab_identifies_its_mirror(walk, monkeypatch):
     assert {path.name for path in Path("lab").glob("*.tdms")} >= {"loops-40hz.tdms", "held-out.tdms"}
     assert 'frequencies = ["25 Hz"]' in Path("docs/gallery/lab-plan.toml").read_text(encoding="utf-8")
     assert (GALLERY / "loops.png").stat().st_size < 1e5
+
+
+@pytest.mark.endurance
+def test_a_recorded_mirror_goes_to_flight(walk):
+    given = sorted((DATA / "cubespec").glob("*_train.npy"))
+    if not given:
+        pytest.skip("the recordings of the CubeSpec mirror are not here")
+    for path in given:
+        shutil.copy(path, path.name)
+    walk.through(EXAMPLES[FLIGHT])
+
+
+def test_a_made_up_mirror_goes_to_flight(walk, monkeypatch, undrawn):
+    """The same commands with recordings of a plate on three actuators, a linear model and one controller."""
+
+    def short(*args, **options):
+        return identify_coupled(*args, options=LadderOptions(axis_orders=(2,), linear_orders=(6,)), **options)
+
+    monkeypatch.setattr(coupled, "identify_coupled", short)
+    monkeypatch.setattr("microrad.report.identification.coupled.coupled_figures", lambda found: {})
+    monkeypatch.setattr(coupled_study.designs, "names", lambda table: ("PI",))
+    for number, amplitude in enumerate((100, 200, 300)):
+        drive, output = played(amplitude, seed=number)
+        np.save(f"u_{amplitude}mV_train.npy", drive)
+        np.save(f"y_{amplitude}mV_train.npy", output)
+    commands = re.sub(r"(?ms)^```text\n.*?^```\n", "", EXAMPLES[FLIGHT]).replace("--controller LQG", "--controller PI")
+    walk.through(commands)
+    assert "compiled, run 5000 samples of the loop: at most" in walk.printed
+    manifest = json.loads(Path("leo-geo-study/manifest.json").read_text(encoding="utf-8"))
+    assert manifest["mission"]["file"] == "leo-geo.toml"
+    assert "fine pointing at 99.7 % (PI)" in Path("leo-geo-study/report.html").read_text(encoding="utf-8")
+
+
+def played(amplitude_mv, seed, samples=1024, realisations=5):
+    """Multisines on the actuators of the plate, and its sensors: (samples, channels, realisations, periods)."""
+    rng = np.random.Generator(np.random.Philox(seed))
+    lines, spectrum = np.arange(1, samples // 3), np.zeros((samples // 2 + 1, 3, realisations), dtype=complex)
+    spectrum[lines] = np.exp(2j * np.pi * rng.random((lines.size, 3, realisations)))
+    drive = np.fft.irfft(spectrum, samples, axis=0)
+    drive *= 1e-3 * amplitude_mv / drive.std()
+    m = linearised(three_actuators().mirror, [0.9, 0.9, 0.9])
+    freq_hz = np.arange(samples // 2 + 1) * 6400.0 / samples / 4.0  # four times as stiff
+    response = lti.frequency_response(lti.StateSpace(m.A, m.B, m.C, m.D), freq_hz)
+    moved = np.fft.irfft(np.einsum("foi,fir->for", response, np.fft.rfft(drive, axis=0)), samples, axis=0)
+    noise = 1e-3 * moved.std() * rng.standard_normal((*moved.shape, 2))
+    return np.repeat(drive[..., None], 2, axis=3), moved[..., None] + noise
 
 
 @pytest.mark.endurance

@@ -9,6 +9,7 @@ from scipy.linalg import block_diag
 from microrad.core import kernels
 from microrad.core.periodic import delayed
 from microrad.lab.identify.coupled import hysteretic, identify_coupled, ladder, linear, linear_errors
+from microrad.lab.identify.coupled.channels import channels
 from microrad.lab.identify.coupled.held_out import held_out_error, smallest_within_noise
 from microrad.lab.identify.coupled.ladder import LadderOptions
 from microrad.lab.identify.linear.modal import ModalModel
@@ -374,3 +375,17 @@ def test_the_ladder_on_cubespec(monkeypatch):
     assert result.chosen == own.name == "hysteretic stiffness, order 4"
     assert 0.2 < own.error_share < straight.error_share < 0.62
     assert amplitude_classes(every)[1] == (0, 0, 0, 0, 1, 1, 1, 1)
+
+
+@pytest.mark.parametrize("bias", [0.0, 6.0, -37.5])
+def test_rounding_in_the_records_is_no_bias(bias):
+    """Means of multisines differ in their last bits: flight code asks that all actuators rest at one bias."""
+    rng = np.random.Generator(np.random.Philox(4))
+    drive = rng.standard_normal((512, 3, 4))
+    drive += bias - drive.mean(axis=0)
+    assert len({float(v) for v in drive.mean(axis=0).ravel()}) > 1
+    output = 2.0 * drive[:, :2] + drive[:, 1:]
+    drive, output = (np.repeat(a[..., None], 2, axis=3) for a in (drive, output))
+    output = output + 0.01 * rng.standard_normal(output.shape)
+    found = channels(multisine_recordings(drive, output, 2000.0), (), "V", "um", None)
+    assert [actuator.bias_v for actuator in found.actuators] == [bias, bias, bias]

@@ -1,5 +1,6 @@
 """Recordings of several channels in SI units, their actuators and outputs, and what is held out of them."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -74,7 +75,7 @@ def channels(
     check_alike(every, "used")
     periodic = _periodic(recordings)
     volts, quantity, size = _units(drive_unit, output_unit)
-    bias = np.mean([r.drive.mean(axis=0) if r.period_samples else r.drive[0] for r in recordings], axis=0)
+    bias = _rounded_bias(recordings)
     si = [replace(r, drive=(r.drive - bias) * volts, output=r.output * size) for r in every]
     amplitudes, each = amplitude_classes(si)
     count, classes = len(recordings), np.asarray(each, dtype=np.int64)
@@ -148,6 +149,13 @@ def _held_out(records: Sequence[Recording], classes: Integers) -> Integers:
             "more, or give recordings for validation."
         )
     return np.array(held)
+
+
+def _rounded_bias(recordings: Sequence[Recording]) -> Floats:
+    """Rest of each drive, to a billionth of the largest: what rounding leaves of a mean is no bias."""
+    rest = np.mean([r.drive.mean(axis=0) if r.period_samples else r.drive[0] for r in recordings], axis=0)
+    largest = max(float(np.abs(r.drive).max()) for r in recordings)
+    return np.asarray(np.round(rest, 9 - math.ceil(math.log10(largest))) + 0.0 if largest else rest)
 
 
 def _actuators(records: Sequence[Recording], bias_v: Floats) -> tuple[Actuator, ...]:
