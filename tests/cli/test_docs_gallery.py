@@ -50,7 +50,7 @@ REQUIRED = {"10 µrad", "3 dB"}
 GIVEN = {
     PAPER: set(),
     LAB: {*REQUIRED, "40 Hz", "25 Hz"},
-    FLIGHT: set(),
+    FLIGHT: {"4.0"},  # of the licence
     CHOICE: {*REQUIRED, "99.7 %"},
     CROSSLINK: {"45 deg", "1 deg/s"},
     CONSTELLATION: {"100 Mbit/s", "300 Mbit/s"},
