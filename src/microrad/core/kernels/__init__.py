@@ -35,6 +35,7 @@ from microrad.core.kernels.ensemble_records import (
     UNSHIFTED,
     Ensemble,
     EnsembleState,
+    ForwardBank,
     Shift,
 )
 from microrad.core.kernels.hysteresis import (
