@@ -356,7 +356,9 @@ def test_a_geometry_that_the_mirror_file_has_already_is_refused(change):
 
 
 def test_a_controller_of_another_name_is_refused():
-    with pytest.raises(ValueError, match="is no controller of a mirror of several axes; there are PI, PI \\+ notch"):
+    with pytest.raises(
+        ValueError, match="is no controller of a mirror of several axes; there are PI, PI \\+ feedforward, PI"
+    ):
         coupled_study.design(scene_of(two_axes()), only=("PID",))
 
 

@@ -87,9 +87,10 @@ def _ahead(rest: PointingLoop, path: ReferenceFilter) -> lti.StateSpace:
     """
     period, eye, low_pass = rest.timing.period_s, np.eye(rest.axes), path.discrete(rest.timing.period_s)
     s = whole_plant(rest, decoupling(rest)).system
-    mirror = lti.StateSpace(s.A, s.B[:, : rest.axes], -s.C[: rest.axes], -s.D[: rest.axes, : rest.axes])
-    filtered = lti.StateSpace(low_pass.A, low_pass.B, low_pass.C[:1], low_pass.D[:1])
-    late = lti.to_bits(slow_delay_s(filtered, period) * eye + slow_delay_s(mirror, period), lti.DESIGN_BITS)
+    seen = lti.StateSpace(s.A, s.B[:, : rest.axes], -s.C[: rest.axes], -s.D[: rest.axes, : rest.axes])
+    late = -(slow_slope_s(low_pass, period)[0] * eye + slow_slope_s(seen, period) / nominal_axis_gain(rest))
+    late = late / slow_slope_s(low_pass, period)[1]  # the rate at the end of a hold is not quite that of the input
+    late = lti.to_bits(late, lti.DESIGN_BITS)
     A, B, target, rate, target_now, rate_now = (
         np.asarray(np.kron(eye, each), dtype=float)
         for each in (low_pass.A, low_pass.B, low_pass.C[:1], low_pass.C[1:], low_pass.D[:1], low_pass.D[1:])
@@ -97,14 +98,12 @@ def _ahead(rest: PointingLoop, path: ReferenceFilter) -> lti.StateSpace:
     return lti.StateSpace(A, B, target + late @ rate, target_now + late @ rate_now)
 
 
-def slow_delay_s(system: lti.StateSpace, period_s: float) -> Floats:
-    """How much later than slow inputs a discrete system answers, shape (outputs, inputs): -H(1)^-1 dH/ds.
+def slow_slope_s(system: lti.StateSpace, period_s: float) -> Floats:
+    """dH/ds of a discrete system at s = 0, shape (outputs, inputs): for a gain of 1 minus its delay for slow inputs.
 
     Args:
-        system: The system, with as many outputs as inputs.
+        system: The system, without a pole at 1.
         period_s: Its period.
     """
     still = np.eye(system.order) - system.A
-    settled = np.linalg.solve(still, system.B)
-    slope = period_s * system.C @ np.linalg.solve(still, settled)
-    return np.asarray(np.linalg.solve(system.C @ settled + system.D, slope))
+    return np.asarray(-period_s * system.C @ np.linalg.solve(still, np.linalg.solve(still, system.B)))
