@@ -1,7 +1,7 @@
 """Ways to make a mirror with hysteretic stiffness follow a known reference, and what errors of its model cost them.
 
     python benchmarks/feedforward.py                 # both families on two axes: Bouc-Wen, plays with a polynomial
-    python benchmarks/feedforward.py MIRROR.toml     # a mirror file of several axes
+    python benchmarks/feedforward.py MIRROR.toml 50  # a mirror file of several axes, sines of 50 µrad
 
 In the loop of missions/leo-geo.toml (5 kHz, a sample of delay, a 1 kHz amplifier, its jitter and sensor noise), a PI as
 tuned for the mirror follows the point-ahead, the slow rate, and sines of 300 µrad at 15 Hz on x and 25 Hz on y.
@@ -30,7 +30,7 @@ from scipy.ndimage import gaussian_filter1d
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 
-from hysteretic_springs import FAMILIES, driven, idle, on_springs, quiet, sines, with_errors
+from hysteretic_springs import AMPLITUDE_RAD, FAMILIES, driven, idle, on_springs, quiet, sines, with_errors
 from microrad.core.arrays import Floats
 from microrad.loop import coupled_study
 from microrad.loop.pointing_loop import ensemble, traces
@@ -99,10 +99,10 @@ def left(loop: PointingLoop, way: tuple[LoopController, tuple[Floats, Floats | N
     return 1e6 * ensemble.simulate(loop, controller, SPAN, runs).radial_rms_rad
 
 
-def compare(name: str, mirror: CoupledMirror) -> None:
-    scene = scene_of(mirror)
+def compare(name: str, mirror: CoupledMirror, amplitude_rad: float, *changes: tuple[str, str]) -> None:
+    scene = scene_of(mirror, *changes)
     (x, _) = scene.loop.references
-    given = sines(x.point_ahead_rad, x.line_of_sight_rate_rad_s)
+    given = sines(x.point_ahead_rad, x.line_of_sight_rate_rad_s, amplitude_rad)
     linear = tuple(replace(each, references=given) for each in scene.linear)
     scene = replace(scene, loop=replace(scene.loop, references=given), linear=linear)
     (pi,) = coupled_study.design(scene, only=("PI",)).made
@@ -119,10 +119,11 @@ def compare(name: str, mirror: CoupledMirror) -> None:
 def main() -> None:
     if sys.argv[1:]:
         mirror = coupled.of(load_coupled_mirror(sys.argv[1]))
-        return compare(mirror.mirror.name, replace(mirror, known=None))
-    for name, spring in FAMILIES.items():
-        compare(name, on_springs(spring))
-    return None
+        changes = ('output_min = "0 V"', 'output_min = "-5 V"'), ('output_max = "100 V"', 'output_max = "20 V"')
+        compare(mirror.mirror.name, replace(mirror, known=None), 1e-6 * float(sys.argv[2]), *changes)
+    else:
+        for name, spring in FAMILIES.items():
+            compare(name, on_springs(spring), AMPLITUDE_RAD)
 
 
 if __name__ == "__main__":
