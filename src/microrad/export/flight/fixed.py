@@ -54,11 +54,16 @@ def quantised(
         beyond_a_count: Accept commands that stray from double precision by more than a count of the converter.
 
     Raises:
-        ExportError: Other bits; a pole that quantisation puts on or beyond the unit circle; numbers that do not fit;
-            commands that stray by more than a count.
+        ExportError: Other bits; hysteresis that is run forward; a pole that quantisation puts on or beyond the unit
+            circle; numbers that do not fit; commands that stray by more than a count.
     """
     if not LEAST_BITS <= bits <= MOST_BITS:
         raise ExportError(f"{bits} bits in fixed point: give {LEAST_BITS} to {MOST_BITS} (sums have 64)")
+    if of.forward is not None:
+        raise ExportError(
+            f"controller {of.name!r} runs the mirror's hysteresis forward, and code in fixed point has no place for "
+            "that; export single precision"
+        )
     ideal = run_in_double(of, form, v.inputs)
     made = scaled(of, _with_integrators(form), v.inputs, ideal, bits)
     _refuse_what_does_not_fit(of, made)

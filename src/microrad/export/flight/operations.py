@@ -1,9 +1,9 @@
 """What a step of exported code costs: operations counted from the sizes of its tables, the worst branch taken.
 
-The counts follow templates/controller.c.j2, hysteresis.h.j2 and fixed.c.j2 line by line, as they are written: a
-processor without a floating-point unit calls a routine for each of these operations. Changes of sign and absolute
-values count nothing: they set a bit. Calls of exp, expm1, log1p, pow and floor count as one each, whatever they cost
-inside.
+The counts follow templates/controller.c.j2, forward.c.j2, hysteresis.h.j2 and fixed.c.j2 line by line, as they are
+written: a processor without a floating-point unit calls a routine for each of these operations. Changes of sign and
+absolute values count nothing: they set a bit. Calls of exp, expm1, log1p, pow and floor count as one each, whatever
+they cost inside.
 """
 
 from collections.abc import Iterable
@@ -70,6 +70,8 @@ def operations(of: FlightController, form: Sections, precision: Precision) -> Op
     found += _product(form.C) + _product(form.D)
     if of.inverse is not None:
         found += _inverse(of.inverse, of.actuators, precision)
+    if of.forward is not None:
+        found += _forward(of.forward)
     found += _command(of.resolution_v > 0.0) * of.actuators
     return found + _states(form, precision) if form.order else found
 
@@ -135,10 +137,12 @@ _COMPENSATED = _SOUND + Operations(additions=4)
 
 
 def _mended(of: FlightController, form: Sections, precision: Precision) -> Operations:
-    """Whether each number of the state is sound: states, what rounding left out, readings, commands, the inverse's."""
+    """Whether each number of the state is sound: states, what rounding left out, readings, commands, hysteresis."""
     numbers = form.order + sum(each.size for each in of.inputs) + of.actuators
     if precision == "single" and any(compensated_states(form)):
         numbers += form.order
+    if (forward := of.forward) is not None:
+        numbers += forward.drives.shape[1] + len(forward.bouc_wen) + forward.play_threshold.size
     return _SOUND * (numbers if of.inverse is None else numbers + _kept(of.inverse, of.actuators, precision))
 
 
@@ -167,6 +171,35 @@ def _command(converter: bool) -> Operations:
     return found + _CLAMP + Operations(1, 1, 1, roundings=1) if converter else found
 
 
+# -------------------------------------------------------------------------------------------------------- feedforward
+def _forward(of: kernels.ForwardBank) -> Operations:
+    """add_forward of templates/forward.c.j2."""
+    elements, operators, plays = int(of.drives.shape[1]), len(of.operator), int(of.play_threshold.size)
+    widens = bool(np.any(of.operator[:, kernels.WIDENING]))
+    bends = bool(np.any(np.isfinite(of.operator[:, kernels.REACH])))
+    found = _SOUND * elements + _product(of.drives)
+    if len(of.bouc_wen) and operators:
+        found += Operations(comparisons=1) * elements
+    found += Operations(additions=1) * (len(of.bouc_wen) + (operators if widens else 0))
+    for row in of.bouc_wen:
+        found += _run_element(power=float(row[kernels.POWER]) != 0.0)
+    if widens:
+        found += (_CLAMP + Operations(divisions=1, comparisons=2)) * operators
+        found += Operations(comparisons=1) * plays
+        found += Operations(multiplications=1, additions=1) * int(np.sum(of.play_threshold > 0.0))
+    found += (_CLAMP + Operations(multiplications=1, additions=3)) * plays
+    if bends:
+        found += (_CLAMP + Operations(multiplications=5, additions=3, divisions=1)) * operators
+    return found
+
+
+def _run_element(power: bool) -> Operations:
+    """A Bouc-Wen element that is run forward: rate, h, and d1 exp(-d2 rate) (q + bias) - d1 bias + h."""
+    rate = _CLAMP + Operations(divisions=1, comparisons=1)
+    output = Operations(multiplications=4, additions=3, exponentials=1)
+    return rate + _ADVANCE + (_power_step() if power else _linear_step()) + output
+
+
 # ------------------------------------------------------------------------------------------------------------ inverse
 def _inverse(of: InverseLaw, actuators: int, precision: Precision) -> Operations:
     elements, plays, lags = of.bouc_wen.shape[0], of.play_threshold.size, of.lag_keep.size
@@ -192,11 +225,12 @@ def _inverse(of: InverseLaw, actuators: int, precision: Precision) -> Operations
 def _element(power: bool) -> Operations:
     """A Bouc-Wen element of the inverse: travel and rate, h, and Eq. 4; its share of the drive."""
     travel = _CLAMP + Operations(additions=1, divisions=2, comparisons=1)
-    # {name}_bouc_wen_advance: the forcing, a decay for each sign of h, h at the end, and whether it is finite.
-    advance = Operations(multiplications=7, additions=6, exponentials=1, comparisons=3)
     equation = Operations(multiplications=3, additions=4, divisions=1, exponentials=1)
-    return travel + advance + (_power_step() if power else _linear_step()) + equation
+    return travel + _ADVANCE + (_power_step() if power else _linear_step()) + equation
 
+
+# {name}_bouc_wen_advance: the forcing, a decay for each sign of h, h at the end, and whether it is finite.
+_ADVANCE = Operations(multiplications=7, additions=6, exponentials=1, comparisons=3)
 
 _RELAXED = Operations(multiplications=2, additions=2, divisions=1, comparisons=1, exponentials=1)
 
