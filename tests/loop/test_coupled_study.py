@@ -391,6 +391,18 @@ def test_design_prints_one_controller_of_all_axes(quick, call):
     assert re.search(r"tilt about y +0\.\d+ +\d\.\d+ +\d+\.?\d* %", result.out)
 
 
+def test_design_prints_a_feedforward_beside_its_feedback(quick, call, monkeypatch):
+    monkeypatch.setattr(designs, "names", lambda f: ("PI", "PI + feedforward"))
+    result = call("design", "mission.toml", "--mirror", "two-axes.toml", "--json")
+    plain, ahead = json.loads(result.out)["controllers"]
+    assert (result.code, ahead["name"]) == (0, "PI + feedforward")
+    assert (ahead["tuned"], ahead["margins"]) == (plain["tuned"], plain["margins"])
+    assert np.shape(ahead["matrices"]["C"]) == (2 + 2, len(plain["matrices"]["A"]) + 4)
+    assert np.shape(ahead["matrices"]["drives_of_hysteresis"]) == (2, 2)
+    assert "drives_of_hysteresis" not in plain["matrices"]
+    assert all(v < 1.1 * p for v, p in zip(ahead["simulated_rms_rad"], plain["simulated_rms_rad"], strict=True))
+
+
 def test_design_prints_its_matrices(quick, call):
     result = call("design", "mission.toml", "--mirror", "two-axes.toml", "--json")
     (found,) = json.loads(result.out)["controllers"]

@@ -209,14 +209,16 @@ def test_what_its_lead_leaves_is_of_second_order_in_the_delay():
 # ------------------------------------------------------------------------------------------- the model run ahead of it
 @each_family
 def test_the_models_own_loop_run_ahead_leaves_what_feedback_alone_leaves(family):
-    """Its drive as feedforward and its output as reference: a model that is right repeats its own error."""
+    """Its drive as feedforward and its output as reference, C e_m + C (e - e_m) = C e: whether it is right or wrong."""
     found = scene(family)
     loop, feedback = quiet(found.loop), integral(found)
     model = traces.replay(loop, feedback, 2501, 1)
-    ran, given = driven(loop, feedback, model.commands, model.error_rad)
-    repeated = traces.replay(ran, given, 2500, 1).error_rad[:, :2]
-    alone = traces.replay(loop, feedback, 2500, 1).error_rad
-    assert_allclose(repeated, alone, rtol=0, atol=1e-9 * np.abs(alone).max())
+    for errors in ({}, {"gain": 0.8, "width": 1.3, "resonance": 1.05}):
+        real = replace(loop, mirror=with_errors(loop.mirror, **errors))
+        ran, given = driven(real, feedback, model.commands, model.error_rad)
+        repeated = traces.replay(ran, given, 2500, 1).error_rad[:, :2]
+        alone = traces.replay(real, feedback, 2500, 1).error_rad
+        assert_allclose(repeated, alone, rtol=0, atol=1e-9 * np.abs(alone).max())
     assert RAD_V * np.abs(model.commands).max() < 1e-6
 
 
