@@ -1,6 +1,7 @@
 """Flight code of a feedforward that runs the mirror's hysteresis: against the kernel, its bound, its cost, refusals."""
 
 import shutil
+import subprocess
 from dataclasses import replace
 from functools import cache
 
@@ -10,18 +11,17 @@ from numpy.testing import assert_allclose
 
 import several_axes
 from export.test_export_flight import EXACT, NO_CONVERTER, PRECISIONS, Code, Counters, bench, difference, held, spoiled
-from export.test_export_operations import counted, needs_gxx, swinging, wild
+from export.test_export_operations import counted, counted_fixed, needs_gxx, swinging, whole, wild
 from hysteretic_springs import BOUC_WEN, PLAYS, on_springs, sines
 from microrad.core import lti
 from microrad.export import choice
-from microrad.export.flight import c_code, double_run, operations
-from microrad.export.flight.fixed import quantised
+from microrad.export.flight import c_code, double_run, fixed, operations
 from microrad.export.flight.rounding import errors_before_converter, rounding_bound
 from microrad.export.flight.write import export_flight
 from microrad.export.linear_part.sections import sections
-from microrad.export.records import ExportError
 from microrad.loop.pointing_loop.loop import ForwardHysteresis
 from microrad.mirror.hysteresis import BoucWen, Play
+from waiting import HANG_S
 
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc")
 
@@ -140,7 +140,7 @@ def test_it_costs_what_is_stated(bank, tmp_path):
     assert 0.9 * stated.comparisons < most.comparisons <= stated.comparisons
 
 
-# -------------------------------------------------------------------------------------------- what is written, refusals
+# ---------------------------------------------------------------------------------------------------- what is written
 def test_it_is_written_with_its_report(tmp_path):
     found = export_flight(base(), tmp_path / "out", samples=500)
     assert found.bench.faults == 0
@@ -152,7 +152,35 @@ def test_it_is_written_with_its_report(tmp_path):
     assert (tmp_path / "out" / "pi_feedforward_hysteresis.h").exists()
 
 
-def test_fixed_point_refuses_it():
-    of, vectors = flown("Bouc-Wen")
-    with pytest.raises(ExportError, match="runs the mirror's hysteresis forward, and code in fixed point has no place"):
-        quantised(of, sections(of), vectors)
+# -------------------------------------------------------------------------------------------------------- fixed point
+@pytest.mark.parametrize("bank", ["Bouc-Wen", "all that there is"])
+def test_in_fixed_point_it_stays_within_its_report(bank, tmp_path):
+    """The linear part in whole numbers, hysteresis in single precision."""
+    of, vectors = flown(bank)
+    form = sections(of)
+    made = fixed.quantised(of, form, vectors)
+    r = made.report
+    assert 0.0 < r.inverse_v < 5e-4
+    assert [o.name for o in r.outputs[2:4]] == ["drive of hysteresis 0", "drive of hysteresis 1"]
+    for file, text in fixed.fixed_code(of, form, made, "flown").items():
+        (tmp_path / file).write_text(text, encoding="utf-8")
+    (tmp_path / "vectors.csv").write_text(c_code.vectors_text(of, vectors), encoding="utf-8")
+    words = ["make", "-s", "-C", tmp_path, "check", "CC=gcc", "PASSES=0"]
+    done = subprocess.run(words, check=True, capture_output=True, text=True, timeout=HANG_S)
+    numbers = {line.split()[0]: float(line.split()[1]) for line in done.stdout.splitlines()}
+    print(f"{bank}: {numbers['largest_difference_v']:.3g} V, bound {r.bound_v:.3g} V")
+    assert 0.0 < numbers["largest_difference_v"] <= r.bound_v < 1e-3
+    assert numbers["rate_clamped"] == vectors.rate_clamped
+    assert numbers["overflowed"] == numbers["faults"] == 0
+    assert "The feedforward, in single precision, adds up to" in fixed.quantisation_text(made)
+
+
+@needs_gxx
+def test_in_fixed_point_it_costs_what_is_stated(tmp_path):
+    of, vectors = flown("plays and a polynomial")
+    made = fixed.quantised(of, sections(of), vectors)
+    stated = operations.fixed_operations(of, made)
+    runs = [whole(made, each) for each in (vectors.inputs, swinging(of), wild(of))]
+    most = counted_fixed(tmp_path, of, made).most_fixed(*runs)
+    assert replace(most, single=replace(most.single, comparisons=stated.single.comparisons)) == stated
+    assert 0.9 * stated.single.comparisons < most.single.comparisons <= stated.single.comparisons

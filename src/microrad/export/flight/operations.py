@@ -80,7 +80,8 @@ def operations(of: FlightController, form: Sections, precision: Precision) -> Op
 class FixedOperations:
     """Operations of a step in fixed point: products of two numbers of 32 bits into 64, and the rest on 64 bits.
 
-    ``single`` are those of the inverse, in single precision, with ``conversions`` between whole and real numbers.
+    ``single`` are those of the inverse or the feedforward, in single precision, with ``conversions`` between whole and
+    real numbers.
     """
 
     multiplications: int
@@ -120,13 +121,13 @@ def fixed_operations(of: FlightController, fixed: FixedForm) -> FixedOperations:
     up = sum(shift > 0 for shift in shifts)
     held, clipped = m + outputs + states * (1 + reads), 5 + (2 if fixed.converter else 0)
     windup = 2 * actuators if np.any(fixed.state.value[:, states + m :]) else 0
-    added = 0 if of.inverse is None else actuators
+    added = 0 if of.inverse is None and of.forward is None else actuators
     return FixedOperations(
         multiplications=terms + len(fixed.converter),
         additions=terms + up + states + actuators + added,
         shifts=up + len(shifts) + states * (1 + reads),
         comparisons=len(shifts) + 3 * held + clipped * actuators + windup,
-        **({} if of.inverse is None else _single(of.inverse, actuators, outputs - actuators)),
+        **(_single(of, outputs - actuators) if added else {}),
     )
 
 
@@ -141,8 +142,8 @@ def _mended(of: FlightController, form: Sections, precision: Precision) -> Opera
     numbers = form.order + sum(each.size for each in of.inputs) + of.actuators
     if precision == "single" and any(compensated_states(form)):
         numbers += form.order
-    if (forward := of.forward) is not None:
-        numbers += forward.drives.shape[1] + len(forward.bouc_wen) + forward.play_threshold.size
+    if of.forward is not None:
+        numbers += _kept_forward(of.forward)
     return _SOUND * (numbers if of.inverse is None else numbers + _kept(of.inverse, of.actuators, precision))
 
 
@@ -150,6 +151,11 @@ def _kept(of: InverseLaw, actuators: int, precision: Precision) -> int:
     """Numbers that an inverse keeps: targets, hysteresis of the elements, plays, lags."""
     lags = of.lag_keep.size * (2 if precision == "single" else 1)
     return int(actuators + of.bouc_wen.shape[0] + of.play_threshold.size + lags)
+
+
+def _kept_forward(of: kernels.ForwardBank) -> int:
+    """Numbers that a feedforward keeps: drives of its elements, hysteresis, plays."""
+    return int(of.drives.shape[1] + len(of.bouc_wen) + of.play_threshold.size)
 
 
 def _product(matrix: NDArray[np.float64]) -> Operations:
@@ -258,11 +264,19 @@ def _power_step() -> Operations:
     return begin + (_TRIAL + taken + change) * MOST_TRIALS
 
 
-# -------------------------------------------------------------------------------------------- fixed point's own inverse
-def _single(of: InverseLaw, actuators: int, numbers: int) -> dict[str, Any]:
-    """{name}_inverse_step and the way there and back: ``numbers`` targets and rates, a drive by actuator."""
+# ------------------------------------------------------------------------- what fixed point has in single precision
+def _single(of: FlightController, numbers: int) -> dict[str, Any]:
+    """What works in single precision beside the linear part, and the way there and back.
+
+    ``numbers`` are its inputs, targets and rates or drives of hysteresis; it gives a drive by actuator.
+    """
+    actuators = of.actuators
     there = Operations(multiplications=1) * numbers
     back = (_CLAMP + Operations(multiplications=1, additions=1, roundings=1)) * actuators
-    step = (_SOUND + Operations(multiplications=1, additions=1)) * numbers + _inverse(of, actuators, "single")
-    step += _SOUND * (numbers + actuators + _kept(of, actuators, "single"))
+    step = (_SOUND + Operations(multiplications=1, additions=1)) * numbers
+    if of.inverse is not None:
+        step += _inverse(of.inverse, actuators, "single") + _SOUND * _kept(of.inverse, actuators, "single")
+    if of.forward is not None:
+        step += _forward(of.forward) + _SOUND * _kept_forward(of.forward)
+    step += _SOUND * (numbers + actuators)
     return {"conversions": numbers + actuators, "single": there + back + step + _command(converter=False) * actuators}
