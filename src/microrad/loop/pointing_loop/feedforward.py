@@ -21,7 +21,7 @@ import numpy as np
 
 from microrad.core import lti
 from microrad.core.arrays import Floats
-from microrad.loop.pointing_loop.design import read_each_sample, whole_plant
+from microrad.loop.pointing_loop.design import whole_plant
 from microrad.loop.pointing_loop.loop import (
     ForwardHysteresis,
     LoopController,
@@ -59,8 +59,8 @@ def with_feedforward(name: str, loop: PointingLoop, feedback: LoopController, pa
             "would drive the mirror twice as far; give the feedback alone"
         )
     gains = np.array([rest_gain(model) for model in m.bank])
-    rest = replace(read_each_sample(loop), mirror=linearised(m, gains.tolist()))
-    angles = decoupling(rest) / nominal_axis_gain(rest)
+    rest = replace(loop, mirror=linearised(m, gains.tolist()))
+    angles = decoupling(rest) / nominal_axis_gain(rest)  # P; motion is Q, and drives are -P Y
     moved, bent = np.linalg.solve(-rest.mirror.A, rest.mirror.B), np.linalg.solve(-rest.mirror.A, m.E)
     motion = (m.F @ moved + m.G) @ angles
     drives = -angles @ loop.optics @ (rest.mirror.C @ bent + m.K)
