@@ -178,7 +178,7 @@ def test_it_is_written_with_its_report(tmp_path):
     text = " ".join(header.replace("\n *", " ").split())
     assert "Feedforward: 2 hysteresis element(s) of the mirror with 8 play(s), run forward on the motion" in text
     assert "The feedforward keeps track of the mirror's hysteresis only as long as each command is applied." in text
-    assert "#define PI_FEEDFORWARD_FORWARD_PLAYS 8" in header
+    assert "#define PI_FEEDFORWARD_FORWARD_PLAYS 8U" in header
     assert (tmp_path / "out" / "pi_feedforward_hysteresis.h").exists()
 
 
