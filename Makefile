@@ -70,6 +70,7 @@ benchmark: $(VENV)/.test
 	$(BIN)/python benchmarks/cubespec_ladder.py
 	$(BIN)/python benchmarks/cubespec_residual.py
 	$(BIN)/python benchmarks/springs_elsewhere.py
+	$(BIN)/python benchmarks/feedforward.py
 	$(BIN)/python benchmarks/studio_map.py
 
 clean:

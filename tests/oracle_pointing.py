@@ -56,7 +56,8 @@ def gaussian(seed, run, purpose, number):
 class Pointing(NamedTuple):
     """A pointing loop. ``loop`` has the controller with the inputs (optical, gauge, reference), limits and inverse.
 
-    Shaping filter: s[k+1] = As s[k] + Bs g[k] every plant step, disturbance = Cs s.
+    ``forward`` is hysteresis alone, whose drives are the last outputs of the controller; its own outputs (V) are added
+    to the commands. Shaping filter: s[k+1] = As s[k] + Bs g[k] every plant step, disturbance = Cs s.
     """
 
     mirror: oracles.Mirror
@@ -78,6 +79,7 @@ class Pointing(NamedTuple):
     gauge_resolution: float
     drive_low: np.ndarray
     drive_high: np.ndarray
+    forward: oracles.Mirror
 
     @property
     def axes(self):
@@ -114,6 +116,7 @@ def quiet_pointing(mirror, step_s, optics, controllers=0, feedforward=False):
         gauge_resolution=0.0,
         drive_low=np.full(actuators, -np.inf),
         drive_high=np.full(actuators, np.inf),
+        forward=oracles.compose(actuators=0, outputs=actuators),
     )
 
 
@@ -197,6 +200,7 @@ class PointingTwin:
         self.case, self.run, self.shift = case, run, shift
         self.mirror = oracles.MirrorTwin(case.mirror, case.step_s)
         self.inverse = TargetInverse(case.loop, case.step_s * case.loop.steps_per_sample)
+        self.forward = oracles.MirrorTwin(case.forward, case.step_s * case.loop.steps_per_sample)
         self.s = np.array(shaping, dtype=float)
         self.xc = np.zeros(len(case.loop.Ac))
         self.optical = np.zeros(case.axes)
@@ -238,7 +242,9 @@ class PointingTwin:
         wanted = loop.Cc @ self.xc + loop.Dc @ m
         v = wanted[:n]
         if self.case.feedforward:
-            v = v + self.inverse.follow(wanted[n : 2 * n], wanted[2 * n :])
+            v = v + self.inverse.follow(wanted[n : 2 * n], wanted[2 * n : 3 * n])
+        self.forward.step(wanted[len(wanted) - len(self.forward.q) :])
+        v = v + self.forward.output()
         clipped = np.array([within(*limits) for limits in zip(v, loop.command_min, loop.command_max, strict=True)])
         self.saturated += int(np.sum(clipped != v))
         self.xc = loop.Ac @ self.xc + loop.Bc @ m + loop.L @ (clipped - v)
@@ -280,7 +286,7 @@ class PointingTwin:
             self.plant_step(j, reference + (reference_next - reference) * (j + 1) / steps)
 
     def counts(self):
-        clamped, inverse = sum(self.mirror.clamped), sum(self.inverse.clamped)
+        clamped, inverse = sum(self.mirror.clamped), sum(self.inverse.clamped) + sum(self.forward.clamped)
         return Counts(self.saturated, self.slew, clamped, inverse, self.outside, self.lost)
 
 
@@ -375,7 +381,15 @@ def build_ensemble(case):
         inverse_lag_keep=record.inverse_lag_keep,
         inverse_lag_weight=record.inverse_lag_weight,
         inverse_lag_actuator=record.inverse_lag_actuator,
+        forward=build_forward(case),
     )
+
+
+def build_forward(case):
+    """The kernel's record of the hysteresis that a controller runs."""
+    plant, _ = oracles.build_plant(case.forward, case.step_s * case.loop.steps_per_sample)
+    bank = {name: getattr(plant, name) for name in kernels.ForwardBank._fields if name != "drives"}
+    return kernels.ForwardBank(**bank, drives=np.ascontiguousarray(case.forward.K))
 
 
 def build_state(case, p, first_run, shaping, reference):
@@ -403,6 +417,8 @@ def build_state(case, p, first_run, shaping, reference):
         "inverse": len(p.inverse_bouc_wen),
         "inverse_play": p.inverse_play_threshold.size,
         "inverse_lag": p.inverse_lag_keep.size,
+        "forward_bank": kernels.BANK_FIELDS * p.forward.drives.shape[1],
+        "forward_play": p.forward.play_threshold.size,
         "work": m,
         "sum": axes,
         "sum_square": axes,

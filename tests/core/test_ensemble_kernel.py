@@ -335,6 +335,7 @@ def assert_same(ensemble, found, lanes, share=rounding):
         "inverse": [t.inverse.h for t in found],
         "inverse_play": [t.inverse.p for t in found],
         "inverse_lag": [t.inverse.lag for t in found],
+        "forward_play": [[p for operator in t.forward.p for p in operator] for t in found],
     }
     for name, twin in memory.items():
         same(ensemble.lines(name)[: len(twin[0]), lanes].T, twin)
@@ -348,7 +349,7 @@ def assert_same(ensemble, found, lanes, share=rounding):
 
 def share_of(case):
     """To what share of the largest value a loop agrees with its twin."""
-    elements = (*case.mirror.bouc_wen, *case.loop.inverse_bouc_wen)
+    elements = (*case.mirror.bouc_wen, *case.loop.inverse_bouc_wen, *case.forward.bouc_wen)
     return integrated if any(row.exponent != 1.0 for row in elements) else rounding
 
 
@@ -445,6 +446,19 @@ def plain_inverse(actuators=1):
     return with_loop(random_loop(rng, mirror, min(actuators, 2), feedforward=True), inverse_direct=2.0)
 
 
+def with_forward(case, *elements, seed=31):
+    """The loop with hysteresis that its controller runs on what it reads."""
+    rng = np.random.default_rng(seed)
+    bouc_wen = tuple(each for each in elements if isinstance(each, BoucWen))
+    operators = tuple(each for each in elements if isinstance(each, Operator))
+    n, m, s = len(elements), case.actuators, case.loop
+    drives = 3.0 * rng.uniform(-1, 1, (m, n))
+    forward = compose(actuators=n, outputs=m, bouc_wen=bouc_wen, operators=operators, G=np.eye(n), K=drives)
+    Cc = np.vstack([s.Cc, 0.1 * rng.uniform(-1, 1, (n, s.Cc.shape[1]))])
+    Dc = np.vstack([s.Dc, rng.uniform(-1, 1, (n, s.Dc.shape[1]))])
+    return with_loop(case, Cc=Cc, Dc=Dc)._replace(forward=forward)
+
+
 INVERSE_ROW = ADMISSIBLE._replace(rate_limit=600.0, d2=-1e-5)
 
 
@@ -537,6 +551,19 @@ def features():
             with_loop(inverse, **bouc_wen, command_min=-0.8, command_max=0.9),
             with_loop(inverse, **bouc_wen),
         ),
+        "feedforward of a Bouc-Wen element": (with_forward(one, ADMISSIBLE), one),
+        "feedforward of an element of exponent 2": (with_forward(one, POWERED), with_forward(one, ASYMMETRIC)),
+        "feedforward of plays": (with_forward(one, RIGID), one),
+        "feedforward of plays that widen": (with_forward(one, WIDENING), one),
+        "feedforward of a polynomial": (with_forward(one, BENT), with_forward(one, BENT._replace(reach=inf))),
+        "feedforward of five elements on three actuators": (
+            with_forward(three, PAPER, BENT, ADMISSIBLE, RIGID, BENT),
+            three,
+        ),
+        "feedforward ahead of the saturation": (
+            with_loop(with_forward(one, RIGID), command_min=-0.8, command_max=0.9),
+            with_forward(one, RIGID),
+        ),
     }
 
 
@@ -554,6 +581,9 @@ COUNTED = {  # what a feature makes the kernel count
     "inverse of creep and hysteresis": ("inverse_clamped",),
     "inverse of three actuators": ("inverse_clamped",),
     "inverse ahead of the saturation": ("saturated",),
+    "feedforward of plays that widen": ("inverse_clamped",),
+    "feedforward of five elements on three actuators": ("inverse_clamped",),
+    "feedforward ahead of the saturation": ("saturated",),
 }
 
 

@@ -356,7 +356,9 @@ def test_a_geometry_that_the_mirror_file_has_already_is_refused(change):
 
 
 def test_a_controller_of_another_name_is_refused():
-    with pytest.raises(ValueError, match="is no controller of a mirror of several axes; there are PI, PI \\+ notch"):
+    with pytest.raises(
+        ValueError, match="is no controller of a mirror of several axes; there are PI, PI \\+ feedforward, PI"
+    ):
         coupled_study.design(scene_of(two_axes()), only=("PID",))
 
 
@@ -387,6 +389,18 @@ def test_design_prints_one_controller_of_all_axes(quick, call):
     assert "the recordings' delay of 70 µs is left out" in text
     assert "the mirror was recorded up to 500 Hz" in text
     assert re.search(r"tilt about y +0\.\d+ +\d\.\d+ +\d+\.?\d* %", result.out)
+
+
+def test_design_prints_a_feedforward_beside_its_feedback(quick, call, monkeypatch):
+    monkeypatch.setattr(designs, "names", lambda f: ("PI", "PI + feedforward"))
+    result = call("design", "mission.toml", "--mirror", "two-axes.toml", "--json")
+    plain, ahead = json.loads(result.out)["controllers"]
+    assert (result.code, ahead["name"]) == (0, "PI + feedforward")
+    assert (ahead["tuned"], ahead["margins"]) == (plain["tuned"], plain["margins"])
+    assert np.shape(ahead["matrices"]["C"]) == (2 + 2, len(plain["matrices"]["A"]) + 4)
+    assert np.shape(ahead["matrices"]["drives_of_hysteresis"]) == (2, 2)
+    assert "drives_of_hysteresis" not in plain["matrices"]
+    assert all(v < 1.1 * p for v, p in zip(ahead["simulated_rms_rad"], plain["simulated_rms_rad"], strict=True))
 
 
 def test_design_prints_its_matrices(quick, call):

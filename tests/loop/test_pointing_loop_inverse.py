@@ -437,7 +437,7 @@ def test_a_mirror_that_names_no_hysteresis_to_invert_is_refused():
         ahead(stiff, control.inverse(stiff.mirror))
     words = "controller 'ahead': mirror 'Bouc-Wen' has no inverse: its hysteresis lies in a stiffness"
     assert words in str(refused.value)
-    assert "use feedback alone" in str(refused.value)
+    assert "use with_feedforward, which runs it forward" in str(refused.value)
 
 
 def test_plays_that_stand_still_behind_a_reversal_are_refused():

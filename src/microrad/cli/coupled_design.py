@@ -123,7 +123,7 @@ def _text(
 
 
 def _data(d: "CoupledDesign", left: "CoupledOutlook", mark: str) -> dict[str, Any]:
-    m, system = d.margins, d.controller.system
+    m, system, forward = d.margins, d.controller.system, d.controller.forward
     return {
         "name": d.name,
         "tuned": dict(d.tuned),
@@ -141,5 +141,6 @@ def _data(d: "CoupledDesign", left: "CoupledOutlook", mark: str) -> dict[str, An
         "matrices": {
             **{key: getattr(system, key).tolist() for key in "ABCD"},
             "anti_windup": d.controller.anti_windup.tolist(),
+            **({} if forward is None else {"drives_of_hysteresis": forward.drives.tolist()}),
         },
     }

@@ -34,6 +34,7 @@ from microrad.export.records import (
 from microrad.link import tracking_light_w
 from microrad.loop import control, controller_study, coupled_study, paper_cases, sine_run
 from microrad.loop.paper_cases import PID, PID_WITH_INVERSE
+from microrad.loop.pointing_loop.kernel_arrays import forward_arrays
 from microrad.loop.pointing_loop.loop import LoopController
 from microrad.loop.pointing_loop.traces import replay
 from microrad.mirror import Variant, coupled, model
@@ -173,7 +174,8 @@ def choose_coupled(
     places = np.concatenate([np.arange(each.start, each.stop) for each in at.values()])
     B, D = (np.zeros((len(m), design.controller.system.B.shape[1])) for m in (form.B, form.D))
     B[:, places], D[:, places] = form.B, form.D
-    return replace(chosen, controller=LoopController(name, lti.StateSpace(form.A, B, form.C, D), form.L))
+    sectioned = replace(design.controller, system=lti.StateSpace(form.A, B, form.C, D), anti_windup=form.L)
+    return replace(chosen, controller=sectioned)
 
 
 def promised(choice: Choice, accept: bool = False) -> controller_study.Outlook | None:
@@ -313,6 +315,7 @@ def _pointing_controller(choice: PointingChoice | CoupledChoice) -> FlightContro
         resolution_v=loop.drive.drive_resolution_v,
         bias_v=choice.source.bias_v,
         margins=margins,
+        forward=None if made.forward is None else forward_arrays(made.forward, loop.mirror.actuators, period),
     )
 
 

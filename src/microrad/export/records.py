@@ -67,8 +67,9 @@ class FlightController:
     """A controller as it flies: x[k+1] = A x + B m + L (clip(v) - v), with m the ``inputs`` one behind the other.
 
     ``system`` has the outputs C x + D m: v by actuator (V); then, with an ``inverse``, its target by actuator (rad);
-    then the target's rate by actuator (rad/s), unless the inverse takes it by difference. What the inverse makes of the
-    target is added to v; the sum is clipped to ``minimum_v`` and ``maximum_v`` and rounded to ``resolution_v`` (0: not
+    then the target's rate by actuator (rad/s), unless the inverse takes it by difference; then, with ``forward``, what
+    drives each of its elements. What the inverse makes of the target, and ``forward`` of its drives, is added to v; the
+    sum is clipped to ``minimum_v`` and ``maximum_v`` and rounded to ``resolution_v`` (0: not
     rounded). Commands count from ``bias_v``, at the amplifier's input. ``margins`` are (name, value, unit).
     """
 
@@ -85,6 +86,7 @@ class FlightController:
     resolution_v: float
     bias_v: float
     margins: tuple[tuple[str, float, str], ...]
+    forward: kernels.ForwardBank | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -313,15 +313,27 @@ def plant_arrays(step_s: float, discrete: tuple[Floats, ...], mirror: Mirror, *,
         D=mirror.D.astype(float),
         CE1=mirror.C @ E1,
         K=mirror.K.astype(float),
-        bouc_wen=kernels.bouc_wen_rows([b.row for b in mirror.bouc_wen]),
-        operator=np.array(
-            [(p.widening_s, p.rate_limit_v_s, *p.polynomial_rad, p.reach_v) for p in mirror.plays], dtype=float
-        ).reshape(-1, 6),
-        play_start=np.cumsum([0] + [len(p.thresholds_v) for p in mirror.plays]).astype(np.uint64),
-        play_threshold=np.array([r for p in mirror.plays for r in p.thresholds_v], dtype=float),
-        play_weight=np.array([w for p in mirror.plays for w in p.weights_rad_v], dtype=float),
+        **bank_arrays(mirror.bouc_wen, mirror.plays),
     )
     return kernels.by_rows(plant)
+
+
+def bank_arrays(bouc_wen: Sequence[BoucWen], plays: Sequence[Play]) -> dict[str, Any]:
+    """Hysteresis elements as the kernels' arrays, by field of `kernels.Plant` and `kernels.ForwardBank`.
+
+    Args:
+        bouc_wen: Bouc-Wen elements.
+        plays: Prandtl-Ishlinskii operators, which come after them.
+    """
+    return {
+        "bouc_wen": kernels.bouc_wen_rows([b.row for b in bouc_wen]),
+        "operator": np.array(
+            [(p.widening_s, p.rate_limit_v_s, *p.polynomial_rad, p.reach_v) for p in plays], dtype=float
+        ).reshape(-1, 6),
+        "play_start": np.cumsum([0] + [len(p.thresholds_v) for p in plays]).astype(np.uint64),
+        "play_threshold": np.array([r for p in plays for r in p.thresholds_v], dtype=float),
+        "play_weight": np.array([w for p in plays for w in p.weights_rad_v], dtype=float),
+    }
 
 
 def contraction(mirror: Mirror, step_s: float) -> float:

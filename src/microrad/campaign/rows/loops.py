@@ -54,20 +54,22 @@ class MissionLoop:
     def tuned(self) -> AxisController:
         """The controller that the campaign names, tuned for this loop. Raises `ValueError` if none can be.
 
-        It is that of one axis, or of all drives of a mirror of several axes.
+        It is that of one axis, or the feedback of all drives of a mirror of several axes.
         """
         name, f = self.table.controller, self.scene.table
         if isinstance(self.scene, controller_study.Scene):
             return controller_study.tune(name, f, controller_study.plants(self.scene, f.seed)).controller
         assert isinstance(self.scene, coupled_study.CoupledScene)
-        whole = coupled_study.design(self.scene, only=(name,)).made[0].controller
+        whole = coupled_study.design(self.scene, only=(coupled_study.feedback_of(name),)).made[0].controller
         return AxisController(name, whole.system, whole.anti_windup)
 
     def controller(self, tuned: AxisController) -> LoopController:
         """A tuned controller on the axes of this loop."""
         if isinstance(self.scene, controller_study.Scene):
             return controller_study.build(self.table.controller, replace(self.scene, loop=self.row), tuned)
-        return LoopController(tuned.name, tuned.system, tuned.anti_windup)
+        assert isinstance(self.scene, coupled_study.CoupledScene)
+        feedback = LoopController(tuned.name, tuned.system, tuned.anti_windup)
+        return coupled_study.as_named(self.scene, self.table.controller, feedback)
 
 
 def mission_loop(file: LinkFile, table: LoopTable, seed: int) -> MissionLoop:

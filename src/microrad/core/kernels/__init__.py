@@ -35,6 +35,7 @@ from microrad.core.kernels.ensemble_records import (
     UNSHIFTED,
     Ensemble,
     EnsembleState,
+    ForwardBank,
     Shift,
 )
 from microrad.core.kernels.hysteresis import (
@@ -62,8 +63,11 @@ from microrad.core.kernels.records import (
     PER_SIZE,
     POWER,
     RATE_LIMIT,
+    REACH,
     SATURATED,
     SLEW_LIMITED,
+    WIDENING,
+    WIDENING_LIMIT,
     H,
     Loop,
     LoopState,

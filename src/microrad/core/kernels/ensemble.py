@@ -6,6 +6,7 @@ from microrad.core.kernels.compiler import compiled_loop, inlined, merged
 from microrad.core.kernels.ensemble_plant import (
     clear_row,
     ensemble_plant_step,
+    forward_bank,
     modal_step,
     shift_rows,
     sum_rows,
@@ -16,6 +17,7 @@ from microrad.core.kernels.ensemble_records import (
     BIN_OFFSET,
     BIN_SHIFT,
     BINS,
+    COUNT_CLAMPED,
     COUNT_INVERSE_CLAMPED,
     COUNT_LOST,
     COUNT_OUTSIDE,
@@ -31,6 +33,7 @@ from microrad.core.kernels.ensemble_records import (
     SAMPLE,
     SENSOR_PURPOSE,
     STEP,
+    ForwardState,
 )
 from microrad.core.kernels.hysteresis import bouc_wen_advance
 from microrad.core.kernels.loop import quantised
@@ -277,6 +280,10 @@ def _control(p, s, length):  # type: ignore[no-untyped-def]
             clear_row(s.output, at_row(i))
     if p.feedforward:
         _ensemble_inverse(p, s)
+    if p.forward.drives.shape[1] > 0:
+        counts = s.counts[at_row(COUNT_INVERSE_CLAMPED - COUNT_CLAMPED) :]
+        own = ForwardState(s.forward_bank, s.forward_play, counts)
+        forward_bank(p.forward, own, s.output, p.C.shape[0] - p.forward.drives.shape[1])
     for i in range(states):
         fresh = weigh(p.A[i], s.xc, at_row(0), at_row(1), s.xc_next, at_row(i), True)
         if weigh(p.B[i], s.measured, at_row(0), at_row(1), s.xc_next, at_row(i), fresh):

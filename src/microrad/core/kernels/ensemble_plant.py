@@ -362,6 +362,29 @@ def _advance_bank(p, s):  # type: ignore[no-untyped-def]
             _advance_operator(p, s, e - first_operator, at)
 
 
+@compiled_loop
+def forward_bank(p, s, output, first):  # type: ignore[no-untyped-def]
+    """One sample of a feedforward's own hysteresis: what its elements make of their drives is added to the commands.
+
+    Args:
+        p: A `ForwardBank`.
+        s: Its `ForwardState`.
+        output: Rows of runs, flat: commands by actuator, which are added to, and the drives by element.
+        first: Row of the first element's drive.
+    """
+    actuators, elements, first_operator = p.drives.shape[0], p.drives.shape[1], p.bouc_wen.shape[0]
+    for e in range(elements):
+        at, source = at_row(e * BANK_FIELDS), at_row(first + e)
+        for r in range(ROW_LENGTH):
+            s.bank[at + at_row(BANK_Q_NEXT) + r] = output[source + r]
+        if e < first_operator:
+            _advance_bouc_wen(p.bouc_wen, e, s.bank, at, 1.0 / p.step_s, s.counts)
+        else:
+            _advance_operator(p, s, e - first_operator, at)
+    for a in range(actuators):
+        weigh(p.drives[a], s.bank, at_row(BANK_Z), at_row(BANK_FIELDS), output, at_row(a), False)
+
+
 @inlined
 def ensemble_plant_step(p, s):  # type: ignore[no-untyped-def]
     """One plant step behind the amplifier's: as `predict` and `plant_step`, for a row of runs.

@@ -39,6 +39,33 @@ SENSOR_PURPOSE = 1 << 28
 START_PURPOSE = 1 << 29
 
 
+class ForwardBank(NamedTuple):
+    """Hysteresis that a controller runs on the wanted motion, once a sample; fields as those of `Ensemble`.
+
+    ``step_s`` is the control period. ``drives`` (actuators, elements) are the volts that a unit of each element's
+    output adds to the commands; no feedforward has no elements.
+    """
+
+    step_s: float
+    bouc_wen: Floats
+    operator: Floats
+    play_start: Indices
+    play_threshold: Floats
+    play_weight: Floats
+    drives: Floats
+
+
+class ForwardState(NamedTuple):
+    """Memory of a `ForwardBank`, rows of runs. ``counts``: as in `EnsembleState`, but begun one row later.
+
+    So what counts as clamped in a plant counts there as COUNT_INVERSE_CLAMPED.
+    """
+
+    bank: Floats
+    play: Floats
+    counts: Floats
+
+
 class Ensemble(NamedTuple):
     """A sampled pointing loop for many runs side by side, as arrays.
 
@@ -53,9 +80,10 @@ class Ensemble(NamedTuple):
     delivers the plant's outputs with ``gauge_noise`` and ``gauge_resolution``.
 
     Controller: m = (optical by axis, gauge by output, reference by axis); x[k+1] = A x + B m + L (clip(v) - v), and
-    C x + D m = (v by actuator, then, with ``feedforward``, the inverse's target and its rate by actuator); what the
-    inverse makes of the target is added to v ahead of the clip. Rows of ``actuator`` as in `Loop`, then DRIVE_LOW and
-    DRIVE_HIGH, the drive range that the mirror was identified in. Inverse as in `Loop`.
+    C x + D m = (v by actuator, then, with ``feedforward``, the inverse's target and its rate by actuator, then what
+    drives each element of ``forward``); what the inverse makes of the target, and ``forward`` of its drives, is added
+    to v ahead of the clip. Rows of ``actuator`` as in `Loop`, then DRIVE_LOW and DRIVE_HIGH, the drive range that the
+    mirror was identified in. Inverse as in `Loop`.
     """
 
     step_s: float
@@ -112,6 +140,7 @@ class Ensemble(NamedTuple):
     inverse_lag_keep: Floats
     inverse_lag_weight: Floats
     inverse_lag_actuator: Indices
+    forward: ForwardBank
 
 
 class EnsembleState(NamedTuple):
@@ -148,6 +177,8 @@ class EnsembleState(NamedTuple):
     inverse: Floats
     inverse_play: Floats
     inverse_lag: Floats
+    forward_bank: Floats
+    forward_play: Floats
     work: Floats
     sum: Floats
     sum_square: Floats

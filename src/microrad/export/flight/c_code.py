@@ -27,8 +27,8 @@ def flight_code(
 ) -> dict[str, str]:
     """The controller with its linear part in ``form`` as C99: file names and texts.
 
-    Files: the code, {name}.h and {name}.c, with {name}_hysteresis.h where it has an inverse; a test bench that replays
-    a recorded run (`vectors_text`), and a Makefile.
+    Files: the code, {name}.h and {name}.c, with {name}_hysteresis.h where it has an inverse or a feedforward; a test
+    bench that replays a recorded run (`vectors_text`), and a Makefile.
 
     Args:
         of: The controller.
@@ -55,7 +55,7 @@ def flight_code(
         f"{name}_bench.c": "bench.c.j2",
         "Makefile": "Makefile.j2",
     }
-    if of.inverse is not None:
+    if of.inverse is not None or of.forward is not None:
         templates[f"{name}_hysteresis.h"] = "hysteresis.h.j2"
     headers, sources = ([file for file in templates if file.endswith(end)] for end in (".h", ".c"))
     return {file: render(template, headers=headers, sources=sources, **values) for file, template in templates.items()}
@@ -111,10 +111,13 @@ class Limits:
 
 def _values(of: FlightController, form: Sections, name: str, precision: Precision) -> dict[str, Any]:
     kept = np.array(compensated_states(form), dtype=bool) & (precision == "single")
-    kinds = ["v (V)", "target (rad)", "rate of the target (rad/s)"][: form.C.shape[0] // of.actuators]
+    elements = 0 if of.forward is None else of.forward.drives.shape[1]
+    kinds = ["v (V)", "target (rad)", "rate of the target (rad/s)"][: (form.C.shape[0] - elements) // of.actuators]
+    rows = ([*kinds, "drive of each element"], [of.actuators] * len(kinds) + [elements])
     sizes = [size for _, size in form.blocks]
     moves = form.A - np.diag(kept.astype(float))
-    matrices = {"A": moves, "B": form.B, "C": form.C, "D": form.D, "L": form.L}
+    drives = np.zeros((of.actuators, 0)) if of.forward is None else of.forward.drives
+    matrices = {"A": moves, "B": form.B, "C": form.C, "D": form.D, "L": form.L, "forward": drives}
     return {
         "name": name,
         "precision": precision,
@@ -128,19 +131,20 @@ def _values(of: FlightController, form: Sections, name: str, precision: Precisio
         "states": form.order,
         "compensated": kept.tolist() if np.any(kept) else [],
         "all_compensated": bool(np.any(kept) and np.all(kept)),
-        "rows": _places(kinds, [of.actuators] * len(kinds)),
+        "rows": _places(*rows) if elements else _places(kinds, [of.actuators] * len(kinds)),
         "columns": _places([each.name for each in of.inputs], [each.size for each in of.inputs]),
         "block_sizes": [(n, sizes.count(n)) for n in sorted(set(sizes))],
         "weights": {key: entries(matrix) for key, matrix in matrices.items()},
         "bound_share": bound_share(of),
         **_inverse_values(of.inverse),
+        **_forward_values(of.forward),
     }
 
 
 def bound_share(of: FlightController) -> float:
     """Largest difference of a command in double precision from the kernel's, over the largest command of the run."""
-    power = of.inverse is not None and bool(np.any(of.inverse.bouc_wen[:, kernels.POWER]))
-    return POWER_BOUND_SHARE if power else BOUND_SHARE
+    rows = [each.bouc_wen for each in (of.inverse, of.forward) if each is not None]
+    return POWER_BOUND_SHARE if any(np.any(row[:, kernels.POWER]) for row in rows) else BOUND_SHARE
 
 
 def _places(names: list[str], sizes: list[int]) -> str:
@@ -204,4 +208,20 @@ def _inverse_values(of: InverseLaw | None) -> dict[str, Any]:
         "widening": widening,
         "direct": bool(np.any(of.direct)),
         "uses_rate": elements > 0 or widening,
+    }
+
+
+def _forward_values(of: kernels.ForwardBank | None) -> dict[str, Any]:
+    if of is None:
+        return {"forward_count": 0, "forward_elements": 0, "forward_operators": 0, "forward_plays": 0}
+    reach = of.operator[:, kernels.REACH]
+    return {
+        "forward_count": of.drives.shape[1],
+        "forward_elements": len(of.bouc_wen),
+        "forward_operators": len(of.operator),
+        "forward_plays": of.play_threshold.size,
+        "forward_widens": bool(np.any(of.operator[:, kernels.WIDENING])),
+        "forward_bends": bool(np.any(np.isfinite(reach))),
+        "forward_polynomial": of.operator[:, kernels.REACH - 3 : kernels.REACH],
+        "forward_reach": np.where(np.isfinite(reach), reach, 1.0),
     }

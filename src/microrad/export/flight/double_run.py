@@ -29,6 +29,15 @@ class InverseRun:
 
 
 @dataclass(frozen=True, slots=True)
+class ForwardRun:
+    """A feedforward's hysteresis over a run: drives ``q`` and outputs ``z`` (samples, elements), Bouc-Wen's ``h``."""
+
+    q: Floats
+    h: Floats
+    z: Floats
+
+
+@dataclass(frozen=True, slots=True)
 class Run:
     """A controller over a run in double precision, by sample.
 
@@ -42,6 +51,7 @@ class Run:
     free: Floats
     excess: Floats
     inverse: InverseRun | None
+    forward: ForwardRun | None = None
 
 
 class Inverse:
@@ -107,6 +117,51 @@ def widened(law: InverseLaw, rate: Floats) -> Floats:
     return np.asarray(law.widening[:, 0] * np.minimum(np.abs(rate), law.widening[:, 1]))
 
 
+class Forward:
+    """A feedforward's hysteresis in double precision, sample by sample, as `kernels.ensemble_loop` has it."""
+
+    def __init__(self, of: kernels.ForwardBank, samples: int) -> None:
+        """At rest; ``samples`` is how many it can record."""
+        self.bank, self.k, elements = of, 0, of.drives.shape[1]
+        self.play = np.zeros(of.play_threshold.size)
+        self.record = ForwardRun(*(np.zeros((samples, w)) for w in (elements, len(of.bouc_wen), elements)))
+
+    def step(self, q: Floats) -> Floats:
+        """What it adds to each command, from what drives its elements in this sample."""
+        r, k, first = self.record, self.k, len(self.bank.bouc_wen)
+        r.q[k] = q
+        travel = q - r.q[k - 1] if k else q
+        for e in range(q.size):
+            found = self._bouc_wen if e < first else self._operator
+            r.z[k, e] = found(e, float(q[e]), float(travel[e]))
+        self.k = k + 1
+        return np.asarray(self.bank.drives @ r.z[k])
+
+    def _bouc_wen(self, e: int, q: float, travel: float) -> float:
+        row, k, h = self.bank.bouc_wen[e].tolist(), self.k, self.record.h
+        d1, limit, bias = row[kernels.D1], row[kernels.RATE_LIMIT], row[kernels.BIAS]
+        rate = min(max(travel / self.bank.step_s, -limit), limit)
+        grown, before = row[kernels.EPSILON] * math.exp(row[kernels.DELTA] * abs(rate)), h[k - 1, e] if k else 0.0
+        if row[kernels.POWER] != 0.0:
+            h[k, e] = kernels.bouc_wen_power_step(before, travel, grown, self.bank.bouc_wen, e)
+        else:
+            decay = (row[kernels.ALPHA], row[kernels.BETA], row[kernels.GAMMA], row[kernels.ETA])
+            h[k, e] = kernels.bouc_wen_step(before, travel, grown, *decay)
+        return float(d1 * math.exp(-row[kernels.D2] * rate) * (q + bias) - d1 * bias + h[k, e])
+
+    def _operator(self, e: int, q: float, travel: float) -> float:
+        bank, o = self.bank, e - len(self.bank.bouc_wen)
+        own = slice(int(bank.play_start[o]), int(bank.play_start[o + 1]))
+        widening, limit, quadratic, signed, cubic, reach = bank.operator[o].tolist()
+        wide = widening * min(abs(travel) / bank.step_s, limit) if widening else 0.0
+        threshold = bank.play_threshold[own]
+        half = threshold + np.where(threshold > 0.0, wide, 0.0)
+        self.play[own] = np.maximum(q - half, np.minimum(q + half, self.play[own]))
+        s = min(max(q, -reach), reach) / reach if math.isfinite(reach) else 0.0
+        bent = s * (quadratic * s + signed * abs(s) + cubic * s * s)
+        return float(bank.play_weight[own] @ self.play[own] + bent)
+
+
 def run_in_double(of: FlightController, form: Sections, inputs: Floats) -> Run:
     """Run the controller over a recorded run in double precision, from rest.
 
@@ -120,13 +175,17 @@ def run_in_double(of: FlightController, form: Sections, inputs: Floats) -> Run:
     states, outputs = np.empty((samples, x.size)), np.empty((samples, form.C.shape[0]))
     free, excess = np.empty((samples, of.actuators)), np.zeros((samples, of.actuators))
     inverse = None if of.inverse is None else Inverse(of, samples)
+    forward = None if of.forward is None else Forward(of.forward, samples)
     for k in range(samples):
         y = form.C @ x + direct[k]
         v = y[: of.actuators] if inverse is None else y[: of.actuators] + inverse.step(y)
+        if forward is not None:
+            v = v + forward.step(y[-forward.record.q.shape[1] :])
         states[k], outputs[k], free[k] = x, y, v
         x = A @ x + pushed[k]
         over = np.clip(v, of.minimum_v, of.maximum_v) - v
         if np.any(over):
             excess[k] = over
             x += form.L @ over
-    return Run(states, outputs, free, excess, None if inverse is None else inverse.record)
+    ran = None if inverse is None else inverse.record, None if forward is None else forward.record
+    return Run(states, outputs, free, excess, *ran)

@@ -21,6 +21,7 @@ from microrad.export.flight.fixed_form import (
     Whole,
     dequantised,
     fixed_run,
+    output_groups,
     scaled,
 )
 from microrad.export.flight.rounding import RoundingBound, behind_converter, errors_of_inverse, responses
@@ -126,7 +127,7 @@ def _report(
     near, (outputs, free, states) = dequantised(form, made), fixed_run(of, made, inputs)
     low, high = of.minimum_v, of.maximum_v
     error = np.max(np.abs(np.clip(free, low, high) - np.clip(ideal.free, low, high)), axis=0)
-    single = np.max(errors_of_inverse(of, form, ideal), axis=0) if of.inverse is not None else np.zeros(of.actuators)
+    single = np.max(errors_of_inverse(of, form, ideal), axis=0) if beside(of) else np.zeros(of.actuators)
     rest = np.maximum(np.max(np.abs(ideal.states), axis=0), 1e-300)
     ranges = np.ldexp(float(made.word), -np.array(made.state_scale, dtype=int))
     return QuantisationReport(
@@ -147,14 +148,11 @@ def _qualities(
 ) -> tuple[OutputQuality, ...]:
     """By output; ``wrong`` are its errors over the run, and ``states`` those at the end of it."""
     response, cycles = _response_errors(of, form, near), _cycles(near, made, states)
-    kinds, qualities = [("v", "V"), ("target", "rad"), ("target's rate", "rad/s")], []
-    for i in range(len(made.output_scale)):
-        kind, unit = kinds[i // of.actuators]
+    kinds, qualities = [(kind, unit, j) for kind, unit, size in output_groups(of) for j in range(size)], []
+    for i, (kind, unit, j) in enumerate(kinds):
         noise, bound = _noise(near, made, i, len(wrong))
         measured = float(np.sqrt(np.mean(wrong[:, i] ** 2)))
-        qualities.append(
-            OutputQuality(f"{kind} {i % of.actuators}", unit, *response[i], noise, measured, bound, float(cycles[i]))
-        )
+        qualities.append(OutputQuality(f"{kind} {j}", unit, *response[i], noise, measured, bound, float(cycles[i])))
     return tuple(qualities)
 
 
@@ -205,7 +203,8 @@ def quantisation_text(fixed: FixedForm) -> str:
         f"Commands stray from double precision by at most {r.error_v:.3g} V over them, ahead of the converter{count}.",
     ]
     if r.inverse_v > 0.0:
-        lines.append(f"The inverse, in single precision, adds up to {r.inverse_v:.3g} V to that.")
+        what = "feedforward" if any(o.name.startswith("drive") for o in r.outputs) else "inverse"
+        lines.append(f"The {what}, in single precision, adds up to {r.inverse_v:.3g} V to that.")
     heading = ("output", "response", "at", "noise rms, predicted", "measured", "swing at rest, most", "found")
     outputs: list[tuple[str, ...]] = [heading]
     for o in r.outputs:
@@ -240,7 +239,8 @@ def _constant(name: str, first: int, size: int, unit: str, words: str, scale: in
 def fixed_code(of: FlightController, form: Sections, fixed: FixedForm, name: str) -> dict[str, str]:
     """The fixed-point form as C99: {name}_fixed.h, {name}_fixed.c, their bench and Makefile; texts by file name.
 
-    With an inverse, {name}_inverse.h, .c and _hysteresis.h in single precision come with it.
+    With an inverse or a feedforward, {name}_inverse.h (_feedforward.h), .c and _hysteresis.h in single precision come
+    with it.
 
     Args:
         of: The controller.
@@ -271,6 +271,7 @@ def fixed_code(of: FlightController, form: Sections, fixed: FixedForm, name: str
         "name": name,
         "version": version("microrad"),
         "of": of,
+        "beside": beside(of),
         "fixed": fixed,
         "inputs": inputs,
         "outputs": _output_constants(of, fixed),
@@ -278,39 +279,52 @@ def fixed_code(of: FlightController, form: Sections, fixed: FixedForm, name: str
         "report": quantisation_text(fixed).splitlines(),
     }
     files = {f"{name}_{file}": render(f"{file}.j2", **values) for file in ("fixed.h", "fixed.c", "fixed_bench.c")}
-    inverse = {} if of.inverse is None else _inverse_code(of, fixed, identifier(f"{name}_inverse"))
+    inverse = _code_beside(of, fixed, identifier(f"{name}_{beside(of)}")) if beside(of) else {}
     headers, sources = ([file for file in (*files, *inverse) if file.endswith(end)] for end in (".h", ".c"))
     make = render("Makefile.j2", name=whole, version=version("microrad"), headers=headers, sources=sources)
     return {**files, **inverse, "Makefile": make}
 
 
+def beside(of: FlightController) -> str:
+    """What works in single precision beside the linear part: "inverse", "feedforward" or nothing."""
+    return "inverse" if of.inverse is not None else "feedforward" if of.forward is not None else ""
+
+
 def _output_constants(of: FlightController, fixed: FixedForm) -> list[dict[str, Any]]:
-    n, rows = of.actuators, len(fixed.output_scale) // of.actuators
-    kinds = [
-        ("V", "V", "v: the command" + ("" if of.inverse is None else " without what the inverse adds")),
-        ("TARGET_RAD", "rad", "target of the inverse"),
-        ("RATE_RAD_S", "rad/s", "rate of the inverse's target"),
-    ]
-    scales = fixed.output_scale[::n]
-    return [_constant(key, j * n, n, unit, words, scales[j]) for j, (key, unit, words) in enumerate(kinds[:rows])]
+    words = {
+        "v": ("V", "v: the command" + (f" without what the {beside(of)} adds" if beside(of) else "")),
+        "target": ("TARGET_RAD", "target of the inverse"),
+        "target's rate": ("RATE_RAD_S", "rate of the inverse's target"),
+        "drive of hysteresis": ("MOTION", "what drives each element of hysteresis"),
+    }
+    found, first = [], 0
+    for kind, unit, size in output_groups(of):
+        key, said = words[kind]
+        found.append(_constant(key, first, size, unit, said, fixed.output_scale[first]))
+        first += size
+    return found
 
 
-def _inverse_code(of: FlightController, fixed: FixedForm, name: str) -> dict[str, str]:
-    """The inverse alone, in single precision: target and rate in, what it adds to the commands out, not clipped."""
-    assert of.inverse is not None
+def _code_beside(of: FlightController, fixed: FixedForm, name: str) -> dict[str, str]:
+    """The inverse or the feedforward alone, in single precision: what drives it in, what it adds out, not clipped."""
     n, rows = of.actuators, len(fixed.output_scale)
-    ends = [math.ldexp(1.001 * fixed.word, -fixed.output_scale[j * n]) for j in range(1, rows // n)]
-    signals = (
-        Signal("wanted_rad", n, "rad", "target, by actuator", ends[0]),
-        *(Signal("wanted_rate_rad_s", n, "rad/s", "rate of the target, by actuator", end) for end in ends[1:]),
-    )
+    words = {
+        "target": ("wanted_rad", "target, by actuator"),
+        "target's rate": ("wanted_rate_rad_s", "rate of the target, by actuator"),
+        "drive of hysteresis": ("motion", "what drives each element of hysteresis"),
+    }
+    signals: tuple[Signal, ...] = ()
+    for kind, unit, size in output_groups(of)[1:]:
+        key, said = words[kind]
+        end = math.ldexp(1.001 * fixed.word, -fixed.output_scale[n + sum(each.size for each in signals)])
+        signals += (Signal(key, size, unit, said, end),)
     D = np.vstack([np.zeros((n, rows - n)), np.eye(rows - n)])
     nothing = np.zeros((0, 0))
     B, C, L = np.zeros((0, rows - n)), np.zeros((rows, 0)), np.zeros((0, n))
     form = Sections("modal", (), nothing, B, C, D, L)
     alone = replace(
         of,
-        name=f"inverse of {of.name}",
+        name=f"{beside(of)} of {of.name}",
         inputs=signals,
         system=form.system,
         anti_windup=L,

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad.core.arrays import Floats
-from microrad.export.flight.double_run import Inverse, Run
+from microrad.export.flight.double_run import Forward, Inverse, Run
 from microrad.export.flight.rounding import responses
 from microrad.export.linear_part.sections import Sections
 from microrad.export.records import FlightController
@@ -77,7 +77,7 @@ class QuantisationReport:
 
     ``head_room_bits`` go by state, from the largest size in the run. ``error_v`` is the largest difference from double
     precision that fixed point makes in a command ahead of the converter; ``inverse_v`` bounds what single precision in
-    the inverse adds to it. ``bound_v`` bounds both together behind the converter.
+    the inverse or the feedforward adds to it. ``bound_v`` bounds both together behind the converter.
     """
 
     samples: int
@@ -170,14 +170,23 @@ def _or_reachable(peaks: Floats, rows: Floats, form: Sections, inputs: Floats) -
     return found
 
 
+def output_groups(of: FlightController) -> tuple[tuple[str, str, int], ...]:
+    """Kinds of the outputs of the linear part, in their order: each with its unit and how many numbers it has."""
+    n, outputs = of.actuators, of.system.C.shape[0]
+    if of.forward is not None:
+        return ("v", "V", n), ("drive of hysteresis", "V", outputs - n)
+    return (("v", "V", n), ("target", "rad", n), ("target's rate", "rad/s", n))[: outputs // n]
+
+
 def _output_ranges(of: FlightController, form: Sections, ideal: Run, inputs: Floats) -> Floats:
-    """Ranges of the outputs, the same for all actuators: of v, that of the commands and of their limits."""
-    n = of.actuators
-    peaks = np.max(np.abs(ideal.outputs), axis=0).reshape(-1, n).max(axis=1)
+    """Ranges of the outputs, the same for all of a kind: of v, that of the commands and of their limits."""
+    sizes = [size for _, _, size in output_groups(of)]
+    first = np.cumsum([0, *sizes[:-1]])
+    peaks = np.maximum.reduceat(np.max(np.abs(ideal.outputs), axis=0), first)
     limits = [abs(x) for x in (of.minimum_v, of.maximum_v) if math.isfinite(x)]
     peaks[0] = max(*limits, peaks[0], float(np.max(np.abs(ideal.free)))) if limits else np.max(np.abs(ideal.free))
-    groups = _or_reachable(peaks * HEAD_ROOM, form.C[::n], form, inputs)
-    return np.repeat(groups, n)
+    groups = _or_reachable(peaks * HEAD_ROOM, form.C[first], form, inputs)
+    return np.repeat(groups, sizes)
 
 
 def _rows(matrix: Floats, columns: tuple[int, ...], word: int, most: list[int]) -> Rows:
@@ -272,16 +281,17 @@ def fixed_run(of: FlightController, made: FixedForm, inputs: Floats) -> tuple[Fl
     """Run the controller in fixed point: its outputs, its commands ahead of the clip, and its states at the end.
 
     Outputs (samples, outputs) and commands (samples, actuators; V) are in SI units, the states whole numbers in their
-    scales. What an inverse adds is taken in double precision.
+    scales. What an inverse or a feedforward adds is taken in double precision.
 
     Args:
-        of: The controller, for its inverse.
+        of: The controller, for its inverse or feedforward.
         made: Its linear part in fixed point.
         inputs: The recorded readings in SI units, shape (samples, numbers).
     """
     read, step, n = readings(made, inputs), Step(made), of.actuators
     outputs, free = np.empty((len(read), len(made.output_scale))), np.empty((len(read), n))
     inverse = None if of.inverse is None else Inverse(of, len(read))
+    forward = None if of.forward is None else Forward(of.forward, len(read))
     down, up = -np.array(made.output_scale, dtype=int), np.array(made.output_scale[:n], dtype=int)
     low, high = np.array(made.minimum), np.array(made.maximum)
     for k, reading in enumerate(read):
@@ -290,6 +300,8 @@ def fixed_run(of: FlightController, made: FixedForm, inputs: Floats) -> tuple[Fl
         command = y[:n]
         if inverse is not None:
             command = command + np.floor(np.ldexp(inverse.step(outputs[k]), up) + 0.5).astype(np.int64)
+        if forward is not None:
+            command = command + np.floor(np.ldexp(forward.step(outputs[k, n:]), up) + 0.5).astype(np.int64)
         free[k] = np.ldexp(command.astype(float), down[:n])
         step.update(np.clip(command, low, high) - command)
     return outputs, free, step.x

@@ -1,9 +1,9 @@
 """What a step of exported code costs: operations counted from the sizes of its tables, the worst branch taken.
 
-The counts follow templates/controller.c.j2, hysteresis.h.j2 and fixed.c.j2 line by line, as they are written: a
-processor without a floating-point unit calls a routine for each of these operations. Changes of sign and absolute
-values count nothing: they set a bit. Calls of exp, expm1, log1p, pow and floor count as one each, whatever they cost
-inside.
+The counts follow templates/controller.c.j2, forward.c.j2, hysteresis.h.j2 and fixed.c.j2 line by line, as they are
+written: a processor without a floating-point unit calls a routine for each of these operations. Changes of sign and
+absolute values count nothing: they set a bit. Calls of exp, expm1, log1p, pow and floor count as one each, whatever
+they cost inside.
 """
 
 from collections.abc import Iterable
@@ -70,6 +70,8 @@ def operations(of: FlightController, form: Sections, precision: Precision) -> Op
     found += _product(form.C) + _product(form.D)
     if of.inverse is not None:
         found += _inverse(of.inverse, of.actuators, precision)
+    if of.forward is not None:
+        found += _forward(of.forward)
     found += _command(of.resolution_v > 0.0) * of.actuators
     return found + _states(form, precision) if form.order else found
 
@@ -78,7 +80,8 @@ def operations(of: FlightController, form: Sections, precision: Precision) -> Op
 class FixedOperations:
     """Operations of a step in fixed point: products of two numbers of 32 bits into 64, and the rest on 64 bits.
 
-    ``single`` are those of the inverse, in single precision, with ``conversions`` between whole and real numbers.
+    ``single`` are those of the inverse or the feedforward, in single precision, with ``conversions`` between whole and
+    real numbers.
     """
 
     multiplications: int
@@ -118,13 +121,13 @@ def fixed_operations(of: FlightController, fixed: FixedForm) -> FixedOperations:
     up = sum(shift > 0 for shift in shifts)
     held, clipped = m + outputs + states * (1 + reads), 5 + (2 if fixed.converter else 0)
     windup = 2 * actuators if np.any(fixed.state.value[:, states + m :]) else 0
-    added = 0 if of.inverse is None else actuators
+    added = 0 if of.inverse is None and of.forward is None else actuators
     return FixedOperations(
         multiplications=terms + len(fixed.converter),
         additions=terms + up + states + actuators + added,
         shifts=up + len(shifts) + states * (1 + reads),
         comparisons=len(shifts) + 3 * held + clipped * actuators + windup,
-        **({} if of.inverse is None else _single(of.inverse, actuators, outputs - actuators)),
+        **(_single(of, outputs - actuators) if added else {}),
     )
 
 
@@ -135,10 +138,12 @@ _COMPENSATED = _SOUND + Operations(additions=4)
 
 
 def _mended(of: FlightController, form: Sections, precision: Precision) -> Operations:
-    """Whether each number of the state is sound: states, what rounding left out, readings, commands, the inverse's."""
+    """Whether each number of the state is sound: states, what rounding left out, readings, commands, hysteresis."""
     numbers = form.order + sum(each.size for each in of.inputs) + of.actuators
     if precision == "single" and any(compensated_states(form)):
         numbers += form.order
+    if of.forward is not None:
+        numbers += _kept_forward(of.forward)
     return _SOUND * (numbers if of.inverse is None else numbers + _kept(of.inverse, of.actuators, precision))
 
 
@@ -146,6 +151,11 @@ def _kept(of: InverseLaw, actuators: int, precision: Precision) -> int:
     """Numbers that an inverse keeps: targets, hysteresis of the elements, plays, lags."""
     lags = of.lag_keep.size * (2 if precision == "single" else 1)
     return int(actuators + of.bouc_wen.shape[0] + of.play_threshold.size + lags)
+
+
+def _kept_forward(of: kernels.ForwardBank) -> int:
+    """Numbers that a feedforward keeps: drives of its elements, hysteresis, plays."""
+    return int(of.drives.shape[1] + len(of.bouc_wen) + of.play_threshold.size)
 
 
 def _product(matrix: NDArray[np.float64]) -> Operations:
@@ -165,6 +175,35 @@ def _command(converter: bool) -> Operations:
     """Clip, whether v is finite and was clipped, what the limits took off; rounding to the converter's values."""
     found = _CLAMP + Operations(comparisons=3, additions=1)
     return found + _CLAMP + Operations(1, 1, 1, roundings=1) if converter else found
+
+
+# -------------------------------------------------------------------------------------------------------- feedforward
+def _forward(of: kernels.ForwardBank) -> Operations:
+    """add_forward of templates/forward.c.j2."""
+    elements, operators, plays = int(of.drives.shape[1]), len(of.operator), int(of.play_threshold.size)
+    widens = bool(np.any(of.operator[:, kernels.WIDENING]))
+    bends = bool(np.any(np.isfinite(of.operator[:, kernels.REACH])))
+    found = _SOUND * elements + _product(of.drives)
+    if len(of.bouc_wen) and operators:
+        found += Operations(comparisons=1) * elements
+    found += Operations(additions=1) * (len(of.bouc_wen) + (operators if widens else 0))
+    for row in of.bouc_wen:
+        found += _run_element(power=float(row[kernels.POWER]) != 0.0)
+    if widens:
+        found += (_CLAMP + Operations(divisions=1, comparisons=2)) * operators
+        found += Operations(comparisons=1) * plays
+        found += Operations(multiplications=1, additions=1) * int(np.sum(of.play_threshold > 0.0))
+    found += (_CLAMP + Operations(multiplications=1, additions=3)) * plays
+    if bends:
+        found += (_CLAMP + Operations(multiplications=5, additions=3, divisions=1)) * operators
+    return found
+
+
+def _run_element(power: bool) -> Operations:
+    """A Bouc-Wen element that is run forward: rate, h, and d1 exp(-d2 rate) (q + bias) - d1 bias + h."""
+    rate = _CLAMP + Operations(divisions=1, comparisons=1)
+    output = Operations(multiplications=4, additions=3, exponentials=1)
+    return rate + _ADVANCE + (_power_step() if power else _linear_step()) + output
 
 
 # ------------------------------------------------------------------------------------------------------------ inverse
@@ -192,11 +231,12 @@ def _inverse(of: InverseLaw, actuators: int, precision: Precision) -> Operations
 def _element(power: bool) -> Operations:
     """A Bouc-Wen element of the inverse: travel and rate, h, and Eq. 4; its share of the drive."""
     travel = _CLAMP + Operations(additions=1, divisions=2, comparisons=1)
-    # {name}_bouc_wen_advance: the forcing, a decay for each sign of h, h at the end, and whether it is finite.
-    advance = Operations(multiplications=7, additions=6, exponentials=1, comparisons=3)
     equation = Operations(multiplications=3, additions=4, divisions=1, exponentials=1)
-    return travel + advance + (_power_step() if power else _linear_step()) + equation
+    return travel + _ADVANCE + (_power_step() if power else _linear_step()) + equation
 
+
+# {name}_bouc_wen_advance: the forcing, a decay for each sign of h, h at the end, and whether it is finite.
+_ADVANCE = Operations(multiplications=7, additions=6, exponentials=1, comparisons=3)
 
 _RELAXED = Operations(multiplications=2, additions=2, divisions=1, comparisons=1, exponentials=1)
 
@@ -224,11 +264,19 @@ def _power_step() -> Operations:
     return begin + (_TRIAL + taken + change) * MOST_TRIALS
 
 
-# -------------------------------------------------------------------------------------------- fixed point's own inverse
-def _single(of: InverseLaw, actuators: int, numbers: int) -> dict[str, Any]:
-    """{name}_inverse_step and the way there and back: ``numbers`` targets and rates, a drive by actuator."""
+# ------------------------------------------------------------------------- what fixed point has in single precision
+def _single(of: FlightController, numbers: int) -> dict[str, Any]:
+    """What works in single precision beside the linear part, and the way there and back.
+
+    ``numbers`` are its inputs, targets and rates or drives of hysteresis; it gives a drive by actuator.
+    """
+    actuators = of.actuators
     there = Operations(multiplications=1) * numbers
     back = (_CLAMP + Operations(multiplications=1, additions=1, roundings=1)) * actuators
-    step = (_SOUND + Operations(multiplications=1, additions=1)) * numbers + _inverse(of, actuators, "single")
-    step += _SOUND * (numbers + actuators + _kept(of, actuators, "single"))
+    step = (_SOUND + Operations(multiplications=1, additions=1)) * numbers
+    if of.inverse is not None:
+        step += _inverse(of.inverse, actuators, "single") + _SOUND * _kept(of.inverse, actuators, "single")
+    if of.forward is not None:
+        step += _forward(of.forward) + _SOUND * _kept_forward(of.forward)
+    step += _SOUND * (numbers + actuators)
     return {"conversions": numbers + actuators, "single": there + back + step + _command(converter=False) * actuators}

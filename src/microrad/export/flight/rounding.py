@@ -15,7 +15,7 @@ import numpy as np
 
 from microrad.core import kernels
 from microrad.core.arrays import Floats
-from microrad.export.flight.double_run import InverseRun, Run, run_in_double, widened
+from microrad.export.flight.double_run import ForwardRun, InverseRun, Run, run_in_double, widened
 from microrad.export.linear_part.sections import Sections, compensated_states
 from microrad.export.records import FlightController, InverseLaw, Vectors
 
@@ -185,6 +185,8 @@ def _through_inverse(of: FlightController, r: Run, outputs: Floats, lag: Floats)
     """Errors of the commands, and of the lags of creep, from those of the linear part's ``outputs``, by sample."""
     n = of.actuators
     error = outputs[:, :n] + 2.0 * UNIT * np.abs(r.free)
+    if of.forward is not None and r.forward is not None:
+        error += _forward_errors(of.forward, r.forward, outputs[:, -r.forward.q.shape[1] :])
     if of.inverse is None or r.inverse is None:
         return error, lag
     law, i = of.inverse, r.inverse
@@ -196,6 +198,69 @@ def _through_inverse(of: FlightController, r: Run, outputs: Floats, lag: Floats)
     _add_play_errors(law, i, target, rate, added)
     added += 2.0 * UNIT * np.abs(i.added)
     return error + added, _lag_errors(law, i, added)
+
+
+def _forward_errors(bank: kernels.ForwardBank, f: ForwardRun, error: Floats) -> Floats:
+    """What a feedforward adds to the errors of the commands, from those of what drives its elements, by sample."""
+    elements = f.q.shape[1]
+    q_error = error + 2.0 * UNIT * np.abs(f.q)
+    before = np.vstack([np.zeros((1, elements)), q_error[:-1]])
+    travel = np.diff(f.q, axis=0, prepend=0.0)
+    rate = np.abs(travel) / bank.step_s
+    rate_error = (q_error + before) / bank.step_s + 4.0 * UNIT * rate
+    found = np.empty_like(f.q)
+    for e in range(elements):
+        at = (f.q[:, e], travel[:, e], rate_error[:, e], q_error[:, e])
+        first = len(bank.bouc_wen)
+        found[:, e] = (
+            _element_errors(bank.bouc_wen[e], bank.step_s, f.h[:, e], *at)
+            if e < first
+            else _operator_errors(bank, e - first, rate[:, e], *at)
+        )
+    drives = np.abs(bank.drives)
+    terms = np.count_nonzero(drives, axis=1) + 3
+    return np.asarray(found @ drives.T + terms * UNIT * (np.abs(f.z) @ drives.T))
+
+
+def _element_errors(
+    row: Floats, step_s: float, h: Floats, q: Floats, travel: Floats, rate_error: Floats, q_error: Floats
+) -> Floats:
+    """Errors of d1 exp(-d2 rate) (q + bias) - d1 bias + h."""
+    d1, d2, limit, bias = (row[c] for c in (kernels.D1, kernels.D2, kernels.RATE_LIMIT, kernels.BIAS))
+    rate = np.clip(travel / step_s, -limit, limit)
+    h_error = _memory_errors(row, h, travel, rate, rate_error, q_error)
+    gain, parts = np.abs(d1) * np.exp(-d2 * rate), np.abs(q) + np.abs(bias)
+    spread = 8.0 * UNIT + np.abs(d2) * (rate_error + 3.0 * UNIT * np.abs(rate))
+    linear = gain * (q_error + parts * spread) + 3.0 * UNIT * np.abs(d1 * bias)
+    return np.asarray(linear + h_error + 4.0 * UNIT * (gain * parts + np.abs(h)))
+
+
+def _operator_errors(
+    bank: kernels.ForwardBank,
+    o: int,
+    rate: Floats,
+    q: Floats,
+    travel: Floats,
+    rate_error: Floats,
+    q_error: Floats,
+) -> Floats:
+    """Errors of plays, each as wrong as its drive and threshold were at most so far, and of the polynomial."""
+    widening, limit, *polynomial, reach = bank.operator[o].tolist()
+    own = slice(int(bank.play_start[o]), int(bank.play_start[o + 1]))
+    wide = widening * np.minimum(rate, limit) if widening else np.zeros_like(rate)
+    found, size = np.zeros_like(q), np.zeros_like(q)
+    for threshold, weight in zip(bank.play_threshold[own].tolist(), bank.play_weight[own].tolist(), strict=True):
+        half = threshold + wide if threshold > 0.0 else 0.0 * wide
+        most = np.abs(q) + half
+        own_error = abs(widening) * rate_error if threshold > 0.0 else 0.0
+        found += abs(weight) * np.maximum.accumulate(q_error + own_error + 6.0 * UNIT * most)
+        size += abs(weight) * most
+    if math.isfinite(reach):
+        s, (quadratic, signed, cubic) = np.minimum(np.abs(q) / reach, 1.0), np.abs(polynomial)
+        slope = (2.0 * (quadratic + signed) * s + 3.0 * cubic * s * s) / reach
+        found += slope * (q_error + 3.0 * UNIT * np.abs(q)) + (quadratic + signed) * (q_error / reach) ** 2
+        size += (quadratic + signed + cubic) * s * s
+    return np.asarray(found + (own.stop - own.start + 6) * UNIT * size)
 
 
 def _target_errors(law: InverseLaw, i: InverseRun, error: Floats, lag: Floats) -> Floats:

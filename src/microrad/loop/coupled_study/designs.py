@@ -34,12 +34,17 @@ from microrad.loop.controller_study import FinePointingStudy, simulated
 from microrad.loop.controller_study import designs as one_axis
 from microrad.loop.controller_study.promises import firmer
 from microrad.loop.controller_study.results import Outlook, shortened
+from microrad.loop.controller_study.scenario import references
 from microrad.loop.coupled_study.scene import AXES, CoupledScene
 from microrad.loop.coupled_study.whole import ALL_AXES, WholeMargins, alone, side_by_side, whole_margins
 from microrad.loop.pointing_loop.design import whole_plant
+from microrad.loop.pointing_loop.feedforward import with_feedforward
 from microrad.loop.pointing_loop.linear import close, stationary
-from microrad.loop.pointing_loop.loop import LoopController, assemble_whole, decoupling
+from microrad.loop.pointing_loop.loop import LoopController, ReferenceFilter, assemble_whole, decoupling
 from microrad.mission.tables.fine_pointing import FinePointing
+
+WITH_FEEDFORWARD = f"{PI.name} + feedforward"
+"""The PI with the mirror's hysteresis run forward on the reference: the same feedback, and so the same margins."""
 
 STARTS = 3
 """Places from which the weights of LQG are followed."""
@@ -137,8 +142,12 @@ class CoupledDesigns(NamedTuple):
 
 
 def names(f: FinePointing) -> tuple[str, ...]:
-    """The controllers that are designed for a mirror of several axes."""
-    return tuple(family.name for family in one_axis.families(f))
+    """The controllers that are designed for a mirror of several axes; a feedforward where a reference is known."""
+    known = any(each.point_ahead_rad or each.line_of_sight_rate_rad_s for each in references(f))
+    found = [family.name for family in one_axis.families(f)]
+    return tuple(
+        each for name in found for each in ((name, WITH_FEEDFORWARD) if name == PI.name and known else (name,))
+    )
 
 
 def plants(scene: CoupledScene) -> tuple[WholePlant, ...]:
@@ -171,19 +180,40 @@ def design(
         if name not in has:
             raise ValueError(f"{name!r} is no controller of a mirror of several axes; there are {', '.join(has)}")
     of, families = plants(scene), {family.name: family for family in one_axis.families(scene.table)}
-    turns = [[name for name in wanted if families[name].base or families[name] is PI], *([n] for n in wanted)]
+    tuned = [*dict.fromkeys(feedback_of(name) for name in wanted)]
+    turns = [[name for name in tuned if families[name].base or families[name] is PI], *([n] for n in tuned)]
     turns = [turn for i, turn in enumerate(turns) if turn and (i == 0 or not {*turn} & {*turns[0]})]
     jobs = [partial(_designed_in_turn, scene, [families[name] for name in turn], of) for turn in turns]
     with shared_out(jobs, lambda i: on_progress(i, len(turns), f"tuning {turns[i][0]}")) as results:
         found: ChainMap[str, CoupledDesign | str] = ChainMap(*results())
     on_progress(len(turns), len(turns), "controllers tuned")
-    made = {name: each for name, each in found.items() if isinstance(each, CoupledDesign)}
+    done = {name: found[feedback_of(name)] for name in wanted}
+    made = {name: _as_named(scene, name, each) for name, each in done.items() if isinstance(each, CoupledDesign)}
     if not made:
-        raise ValueError("; ".join(str(found[name]) for name in wanted))
-    return CoupledDesigns(
-        tuple(made[name] for name in wanted if name in made),
-        {name: str(found[name]) for name in wanted if name not in made},
-    )
+        raise ValueError("; ".join(str(each) for each in done.values()))
+    return CoupledDesigns(tuple(made.values()), {name: str(each) for name, each in done.items() if name not in made})
+
+
+def feedback_of(name: str) -> str:
+    """The controller whose feedback one of `names` has."""
+    return PI.name if name == WITH_FEEDFORWARD else name
+
+
+def as_named(scene: CoupledScene, name: str, feedback: LoopController) -> LoopController:
+    """A feedback, with the feedforward where the name says so.
+
+    Args:
+        scene: The mission's loop.
+        name: One of `names`.
+        feedback: The controller that is called `feedback_of` that name.
+    """
+    if name != WITH_FEEDFORWARD:
+        return feedback
+    return with_feedforward(name, scene.loop, feedback, ReferenceFilter(scene.table.reference_filter_hz))
+
+
+def _as_named(scene: CoupledScene, name: str, design: CoupledDesign) -> CoupledDesign:
+    return replace(design, name=name, controller=as_named(scene, name, design.controller))
 
 
 def design_and_simulate(
@@ -238,12 +268,13 @@ def design_and_promise(
 def _firmer(
     scene: CoupledScene, broken: CoupledDesign, on_progress: Progress
 ) -> tuple[CoupledDesign, CoupledOutlook] | None:
-    (family,) = (each for each in one_axis.families(scene.table) if each.name == broken.name)
+    (family,) = (each for each in one_axis.families(scene.table) if each.name == feedback_of(broken.name))
 
     def tuned(margin: float) -> CoupledDesign:
         on_progress(0, 1, f"tuning {broken.name} for a larger margin")
         table = scene.table.model_copy(update={"modulus_margin": margin})
-        return replace(_designed(replace(scene, table=table), family, plants(scene), None), margin=margin)
+        made = _designed(replace(scene, table=table), family, plants(scene), None)
+        return replace(_as_named(scene, broken.name, made), margin=margin)
 
     return firmer(scene.table.modulus_margin, tuned, lambda designs: outlook(scene, designs))
 

@@ -14,8 +14,9 @@ from microrad.core import kernels, lti
 from microrad.core.arrays import Floats
 from microrad.loop import disturbance
 from microrad.loop.control import amplifier_factor, inverse_arrays, no_feedforward
-from microrad.loop.pointing_loop.loop import LoopController, PointingLoop
+from microrad.loop.pointing_loop.loop import ForwardHysteresis, LoopController, PointingLoop
 from microrad.loop.sensor import StrainGauge
+from microrad.mirror.model import bank_arrays
 
 References = tuple[disturbance.Reference, ...]
 
@@ -169,7 +170,21 @@ def arrays(
         L=np.asarray(controller.anti_windup, dtype=float),
         actuator=np.tile(np.array(row), (actuators, 1)),
         **inverse_arrays(inverse, timing.period_s),
+        forward=forward_arrays(controller.forward, actuators, timing.period_s),
     )
+    return kernels.by_rows(found)
+
+
+def forward_arrays(of: ForwardHysteresis | None, actuators: int, period_s: float) -> kernels.ForwardBank:
+    """The hysteresis that a controller runs on the wanted motion as the kernel's arrays; empty ones where it runs none.
+
+    Args:
+        of: The elements, or None.
+        actuators: Number of actuators.
+        period_s: Control period.
+    """
+    bank = of or ForwardHysteresis((), (), np.zeros((actuators, 0)))
+    found = kernels.ForwardBank(period_s, **bank_arrays(bank.bouc_wen, bank.plays), drives=bank.drives)
     return kernels.by_rows(found)
 
 
@@ -185,7 +200,8 @@ def check_controller(loop: PointingLoop, controller: LoopController) -> None:
     """
     s, m = controller.system, loop.mirror
     inputs = loop.axes + m.axes + loop.axes
-    outputs = m.actuators * (3 if controller.inverse else 1)
+    elements = 0 if controller.forward is None else len(controller.forward.bank)
+    outputs = m.actuators * (3 if controller.inverse else 1) + elements
     order = s.A.shape[0]
     wanted = {"A": (order, order), "B": (order, inputs), "C": (outputs, order), "D": (outputs, inputs)}
     matrices = {**{key: getattr(s, key) for key in "ABCD"}, "L": controller.anti_windup}
@@ -248,6 +264,8 @@ def start(
         inverse=_rows(p.inverse_bouc_wen.shape[0]),
         inverse_play=_rows(p.inverse_play_threshold.size),
         inverse_lag=_rows(p.inverse_lag_keep.size),
+        forward_bank=_rows(kernels.BANK_FIELDS * p.forward.drives.shape[1]),
+        forward_play=_rows(p.forward.play_threshold.size),
         work=_rows(m),
         sum=_rows(axes),
         sum_square=_rows(axes),

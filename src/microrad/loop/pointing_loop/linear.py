@@ -16,6 +16,7 @@ from microrad.core.arrays import Complexes, Floats
 from microrad.loop import disturbance
 from microrad.loop.control import amplifier_factor
 from microrad.loop.pointing_loop.loop import LoopController, PointingLoop, in_band_gain
+from microrad.mirror.hysteresis import slow_gain
 
 
 @dataclass(frozen=True, slots=True)
@@ -225,13 +226,19 @@ def _without_disturbances(closed: ClosedLoop) -> NDArray[np.bool_]:
 def straightened(controller: LoopController, loop: PointingLoop) -> LoopController:
     """The controller with its inverse replaced by the gain that it has on a mirror without hysteresis.
 
+    So are the elements of a feedforward: by their slow gains.
+
     Args:
-        controller: The controller of all axes; one without inverse is returned as it is.
+        controller: The controller of all axes; one without either is returned as it is.
         loop: The loop, for the gain of its mirror.
     """
+    s, m = controller.system, loop.mirror.actuators
+    if (forward := controller.forward) is not None:
+        slow = forward.drives * [slow_gain(model) for model in forward.bank]
+        system = lti.StateSpace(s.A, s.B, s.C[:m] + slow @ s.C[m:], s.D[:m] + slow @ s.D[m:])
+        return LoopController(controller.name, system, controller.anti_windup)
     if controller.inverse is None:
         return controller
-    s, m = controller.system, loop.mirror.actuators
     gain = np.linalg.inv(in_band_gain(loop.mirror))
     C, D = s.C[:m] + gain @ s.C[m : 2 * m], s.D[:m] + gain @ s.D[m : 2 * m]
     return LoopController(controller.name, lti.StateSpace(s.A, s.B, C, D), controller.anti_windup)

@@ -10,7 +10,7 @@ from microrad.core.arrays import Floats
 from microrad.loop.control import AxisController, Drive, Inverse, Timing
 from microrad.loop.disturbance import Disturbance, Reference
 from microrad.loop.sensor import OpticalSensor, StrainGauge
-from microrad.mirror.hysteresis import gain_only, slow_gain
+from microrad.mirror.hysteresis import BoucWen, Play, gain_only, slow_gain
 from microrad.mirror.model import Mirror
 
 
@@ -60,24 +60,43 @@ def without_hysteresis(loop: PointingLoop) -> PointingLoop:
     return replace(loop, mirror=replace(m, bouc_wen=straight, plays=(), inverse=inverse))
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class ForwardHysteresis:
+    """Hysteresis elements that a controller runs on the wanted motion: a bank as that of `Mirror`, Bouc-Wen first.
+
+    ``drives`` (actuators, elements) are the volts that a unit of each element's output adds to the commands.
+    """
+
+    bouc_wen: tuple[BoucWen, ...]
+    plays: tuple[Play, ...]
+    drives: Floats
+
+    @property
+    def bank(self) -> tuple[BoucWen | Play, ...]:
+        """The elements in the order of the columns of ``drives``."""
+        return (*self.bouc_wen, *self.plays)
+
+
 @dataclass(frozen=True, slots=True)
 class LoopController:
     """A controller of all axes: x[k+1] = A x + B m + L (clip(v) - v), as `kernels.Ensemble` takes it.
 
     ``system`` has the inputs optical error by axis, gauge reading by mirror output, reference by axis (all rad), and
     the outputs v by actuator (V) and, with an ``inverse``, the inverse's target (rad at the mirror's output) and its
-    rate (rad/s) by actuator. ``anti_windup`` is L, (states, actuators).
+    rate (rad/s) by actuator, and then, with ``forward``, what drives each of its elements. ``anti_windup`` is L,
+    (states, actuators).
     """
 
     name: str
     system: lti.StateSpace
     anti_windup: Floats
     inverse: Inverse | None = None
+    forward: ForwardHysteresis | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class ReferenceFilter:
-    """Second-order low-pass that the inverse's target and its rate are taken from, critically damped.
+    """Second-order low-pass that a feedforward's target and its rate are taken from, critically damped.
 
     Its state is the target and the rate, so the rate is never a difference of noisy samples.
     """
@@ -156,7 +175,7 @@ def with_inverse(
     if not any(inverse.direct) and not inverse.bouc_wen:
         raise ValueError(
             f"controller {name!r}: mirror {loop.mirror.name!r} has no inverse: its hysteresis lies in a stiffness, "
-            "inside the resonance, and not ahead of it; use feedback alone"
+            "inside the resonance, and not ahead of it; use with_feedforward, which runs it forward"
         )
     feedback = assemble(name, loop, axis)
     f, m, axes = feedback.system, loop.mirror.actuators, loop.axes
