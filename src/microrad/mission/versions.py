@@ -30,7 +30,7 @@ def is_of_one_axis(document: Document, data: dict[str, Any]) -> bool:
     """
     version, foreign = data.get("version"), [key for key in _SEVERAL_AXES_KEYS if key in data]
     if type(version) is int and version == 2:
-        reason = f"holds a mirror of several axes{_sizes(data)}; studies, FMUs and matrices take one axis so far"
+        reason = f"holds a mirror of several axes{_sizes(data)}; studies take one axis so far"
         advice = (
             "a mirror file of one axis; microrad design and microrad export c take this one by --mirror, and in Python "
             "microrad.mission.file.load_coupled_mirror reads it and "
