@@ -286,8 +286,8 @@ def import_(  # noqa: PLR0913, PLR0917  what a linear model does not say has to 
 ) -> Outcome:
     """Make a mirror file of a linear model from another tool.
 
-    Volts in, an angle out, continuous in time, one input and one output. Such a mirror has no hysteresis; what a linear
-    model does not say has to be given.
+    Volts in, an angle out, one input and one output. A sampled model counts as one whose drive is held over each
+    sample. Such a mirror has no hysteresis; what a linear model does not say has to be given.
     """
     from microrad.export.linear_import import Given, import_mat
 
