@@ -1,14 +1,16 @@
 """The stack of a step: the deepest chain of calls, and no more than a step takes on a stack that was painted before."""
 
+import platform
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 
 import pytest
 
 import designs
 from microrad.export import choice
-from microrad.export.flight import stack
+from microrad.export.flight import build, stack, write
 from microrad.export.flight.fixed import fixed_code, quantised
 from microrad.export.flight.write import export_flight
 from microrad.export.linear_part.sections import sections
@@ -103,6 +105,15 @@ def test_a_step_takes_as_much_of_a_painted_stack_as_is_stated(tmp_path, monkeypa
     assert found.most_bytes / 2 < step - nothing <= found.most_bytes + 16  # the caller's own frame, of an alignment
 
 
+def test_cycles_are_times_in_steps_of_the_counter_and_left_out_without_one():
+    found = build.BenchResult(10, 0.0, 1.0, 1e-12, 0, 0, 0, 0, 200.0, 100.0, 18.0, 2.5)
+    assert (
+        dict(write._measured(found))["cycles"]
+        == "500 at worst, 250 in the median, of this machine's counter at 2.5 GHz"
+    )
+    assert dict(write._measured(replace(found, cycles_per_ns=0.0)))["cycles"] == ""
+
+
 @needs_gcc
 def test_the_report_states_it(tmp_path, monkeypatch):
     monkeypatch.setenv("CC", "gcc")
@@ -110,4 +121,7 @@ def test_the_report_states_it(tmp_path, monkeypatch):
     assert 100 < done.stack.most_bytes < 10_000
     assert "exp" in done.stack.library
     assert f"  stack         {done.stack.words}\n" in (tmp_path / "flight" / "report.txt").read_text()
+    counts = platform.machine() == "x86_64"
+    assert (done.bench.cycles_per_ns > 0.1) == counts
+    assert ("  cycles        " in (tmp_path / "flight" / "report.txt").read_text()) == counts
     assert not list((tmp_path / "flight").glob("*.ci"))

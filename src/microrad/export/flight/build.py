@@ -36,7 +36,8 @@ class BenchResult:
     ``largest_difference_v`` is the largest difference of a command from the recorded one, ``bound_v`` what is allowed,
     ``peak_command_v`` the largest recorded command. ``saturated`` and the counters behind it are those of the code's
     state at the end. Times are of one step: each sample's least time over the passes, then the largest (worst) and the
-    median of the samples, less ``clock_ns``, what reading the clock takes.
+    median of the samples, less ``clock_ns``, what reading the clock takes. ``cycles_per_ns`` is the rate of the
+    processor's counter of cycles; 0 where a program cannot read one.
     """
 
     samples: int
@@ -50,6 +51,7 @@ class BenchResult:
     worst_step_ns: float
     median_step_ns: float
     clock_ns: float
+    cycles_per_ns: float
 
 
 def compiler() -> str | None:

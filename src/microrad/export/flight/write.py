@@ -185,7 +185,17 @@ def _measured(b: BenchResult | None) -> list[tuple[str, str]]:
         ("compiled, run", f"{b.samples} samples of the loop: at most {difference} off the kernel (allowed: {allowed})"),
         ("counters", counts),
         ("time a step", f"{b.worst_step_ns:.0f} ns at worst, {b.median_step_ns:.0f} ns in the median, on this machine"),
+        ("cycles", _cycles(b)),
     ]
+
+
+def _cycles(b: BenchResult) -> str:
+    """The times in cycles of the processor's counter; nothing where it has none."""
+    if not b.cycles_per_ns:
+        return ""
+    worst, median = (b.cycles_per_ns * each for each in (b.worst_step_ns, b.median_step_ns))
+    rate = format_quantity(1e9 * b.cycles_per_ns, "Hz", 3)
+    return f"{worst:.0f} at worst, {median:.0f} in the median, of this machine's counter at {rate}"
 
 
 def export_data(of: FlightExport) -> dict[str, Any]:
