@@ -3,6 +3,7 @@
 from dataclasses import replace
 from functools import cache
 
+import several_axes
 from microrad.export import choice
 from microrad.export.records import FlightController, Vectors
 from microrad.mission.file import MissionFile, load_mission
@@ -18,6 +19,13 @@ def mission() -> MissionFile:
 @cache
 def chosen(name: str) -> choice.Choice:
     return once(f"chosen {name}", lambda: choice.choose(mission(), name))
+
+
+@cache
+def of_three_actuators() -> choice.CoupledChoice:
+    """LQG of all axes of a plate on three actuators, without a converter that would hide what is off."""
+    file = several_axes.mission(('drive_resolution = "0.305 mV"', 'drive_resolution = "0 V"'))
+    return once("LQG on three actuators", lambda: choice.choose_coupled(file, several_axes.three_actuators(), "LQG"))
 
 
 @cache

@@ -40,6 +40,7 @@ LEFT_OUT = {
     r".*sha256.*|hashes|versions|microrad|files_sha256": "differs with every edit",
     r"folder|files?|path|report|mirror_file|ledger|written": "a path",
     r".*_ns|left_s|rows_per_s|seconds": "time of this machine",
+    r"stack": "that of this machine's compiler",
     r"edges|counts": "a histogram, whose bins a value at an edge leaves",
     r".*_utc": "the same moment stands beside it in seconds",
     r"unit|units|long_name|meaning|holds_for|source|authority|caveat|why|basis": "words about a number",

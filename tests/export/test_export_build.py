@@ -26,12 +26,12 @@ int main(int count, char **words) {
     if (file == NULL || fgets(line, 64, file) == NULL || fclose(file)) return 2;
     printf("samples %d\\nlargest_difference_v %g\\n", count, gain_step(DIFFERENCE));
     printf("peak_command_v 3.5\\nbound_v 1e-3\\nsaturated 4\\nrate_clamped 5\\nrejected 6\\nfaults 7\\n");
-    printf("worst_step_ns %s\\nmedian_step_ns 20.5\\nclock_ns 18\\nBEHIND", words[2]);
+    printf("worst_step_ns %s\\nmedian_step_ns 20.5\\nclock_ns 18\\ncycles_per_ns 2.5\\nBEHIND", words[2]);
     return gain_step(DIFFERENCE) > 1e-3;
 }
 """
 
-EXPECTED = build.BenchResult(3, 2e-4, 3.5, 1e-3, 4, 5, 6, 7, 11.0, 20.5, 18.0)
+EXPECTED = build.BenchResult(3, 2e-4, 3.5, 1e-3, 4, 5, 6, 7, 11.0, 20.5, 18.0, 2.5)
 
 
 def written(folder: Path, difference: str = "1e-4", behind: str = "", makefile: str | None = None) -> Path:

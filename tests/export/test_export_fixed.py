@@ -144,15 +144,15 @@ int main(int count, char **argument)
     const long samples = number();
     code_fixed_init(&state);
     for (long k = 0; k < samples; k++) {
-        for (int i = 0; i < CODE_FIXED_READINGS; i++) { in[i] = number(); }
-        for (int a = 0; a < CODE_FIXED_ACTUATORS; a++) { excess[a] = number(); }
+        for (size_t i = 0; i < CODE_FIXED_READINGS; i++) { in[i] = number(); }
+        for (size_t a = 0; a < CODE_FIXED_ACTUATORS; a++) { excess[a] = number(); }
         if (parts) {
             code_fixed_output(&state, in, out);
             code_fixed_update(&state, excess);
         } else {
             code_fixed_step(&state, in, out);
         }
-        for (int i = 0; i < (parts ? CODE_FIXED_OUTPUTS : CODE_FIXED_ACTUATORS); i++) {
+        for (size_t i = 0; i < (parts ? CODE_FIXED_OUTPUTS : CODE_FIXED_ACTUATORS); i++) {
             printf("%" PRId32 " ", out[i]);
         }
         printf("\\n");

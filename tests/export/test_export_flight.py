@@ -283,15 +283,8 @@ def test_single_precision_stays_within_the_bound_that_it_states(flown, tmp_path)
 # ------------------------------------------------------------------------------------------------ several axes
 
 
-@cache
-def of_three_actuators():
-    """LQG of all axes of a plate on three actuators, without a converter that would hide what is off."""
-    file = several_axes.mission(NO_CONVERTER)
-    return choice.choose_coupled(file, several_axes.three_actuators(), "LQG")
-
-
 def test_a_controller_of_several_axes_is_the_kernel_over_1e5_samples(tmp_path):
-    chosen = of_three_actuators()
+    chosen = designs.of_three_actuators()
     of, vectors = choice.flight_controller(chosen), choice.vectors(chosen, 100_000)
     assert [each.name for each in of.inputs] == ["optical_error_rad"]
     assert (of.actuators, of.bias_v, vectors.inputs.shape) == (3, 50.0, (100_000, 2))
@@ -303,7 +296,7 @@ def test_a_controller_of_several_axes_is_the_kernel_over_1e5_samples(tmp_path):
 
 
 def test_a_controller_of_several_axes_stays_within_its_bound_in_single_precision(tmp_path):
-    chosen = of_three_actuators()
+    chosen = designs.of_three_actuators()
     of, vectors = choice.flight_controller(chosen), choice.vectors(chosen, 5000)
     bound = rounding_bound(of, sections(of), vectors)
     off, _ = difference(Code(tmp_path, of, "single", bound=bound), vectors)
@@ -313,7 +306,7 @@ def test_a_controller_of_several_axes_stays_within_its_bound_in_single_precision
 
 @pytest.mark.parametrize("precision", PRECISIONS)
 def test_garbage_does_not_take_several_axes_beyond_their_limits(precision, tmp_path):
-    chosen = of_three_actuators()
+    chosen = designs.of_three_actuators()
     of, vectors = choice.flight_controller(chosen), choice.vectors(chosen, 2000)
     code = Code(tmp_path, of, precision)
     bad = spoiled(vectors.inputs, code.number)
@@ -340,7 +333,7 @@ def test_actuators_that_rest_at_different_biases_are_refused():
 
 
 def test_a_controller_of_several_axes_that_leaves_too_much_is_refused(tmp_path):
-    chosen = replace(of_three_actuators(), left=Outlook(1e-6, 2e-6))
+    chosen = replace(designs.of_three_actuators(), left=Outlook(1e-6, 2e-6))
     with pytest.raises(ExportError, match=r"LQG leaves 2 µrad rms an axis .* 2\.00 times the 1 µrad"):
         export_flight(chosen, tmp_path / "flight")
     assert list(tmp_path.iterdir()) == []

@@ -4,22 +4,25 @@ import importlib.metadata
 import json
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import zipfile
 from dataclasses import replace
 from functools import cache
+from itertools import chain
 from pathlib import Path
 
 import fmpy
 import numpy as np
 import pytest
-from fmpy import fmi2, fmi3
 from fmpy.fmi1 import FMICallException
 from fmpy.validation import validate_fmu
 from packaging.requirements import Requirement
 
 import designs
+import several_axes
+import slaves
 from loops import IDEAL_DRIVE
 from microrad.core import kernels, lti
 from microrad.export import choice
@@ -33,6 +36,7 @@ from microrad.loop.pointing_loop import kernel_arrays
 from microrad.loop.pointing_loop.loop import LoopController, PointingLoop
 from microrad.mirror import hysteresis
 from microrad.mirror import model as mirror
+from slaves import Slave
 
 VERSIONS = ("2.0", "3.0")
 AGAIN = {version: pytest.param(version, marks=pytest.mark.endurance) for version in VERSIONS}
@@ -51,6 +55,10 @@ def tracking():
 
 def pointing(name="PI + inverse"):
     return designs.chosen(name)
+
+
+def coupled():
+    return designs.of_three_actuators()
 
 
 OPTICS = np.array([[1.0, 0.2], [-0.1, 0.9], [0.5, 0.5]])
@@ -105,16 +113,14 @@ def play_unit():
     return PlantUnit(Origin("m", "0" * 64, "static"), plant, np.eye(1), np.inf, 1.0, np.inf, 0.0)
 
 
-def test_a_polynomial_beside_plays_is_refused(tmp_path):
-    """The plant in C would have left it out without a word."""
-    bent = hysteresis.Play((0.0, 0.4), (5e-5, 2e-5), polynomial_rad=(0.0, 1e-5, 0.0), reach_v=2.0)
-    plant = mirror.discretise(mirror.assemble("static", "static", None, bent), 1e-5)
-    unit = PlantUnit(Origin("m", "0" * 64, "static"), plant, np.eye(1), np.inf, 1.0, np.inf, 0.0)
-    with pytest.raises(
-        ExportError, match=r"a polynomial beside its plays .* knows plays alone; write a mirror without"
-    ):
-        fmu.write_unit(unit, tmp_path / "unit.fmu", "3.0", "unit")
-    assert not any(tmp_path.iterdir())
+BENT = hysteresis.Play((0.0, 0.4), (0.05, 0.02), polynomial_rad=(0.004, -0.01, 0.02), reach_v=1.5)
+"""Plays with a polynomial that ends within the walk of the tests."""
+
+
+def spring():
+    """A plate on three actuators with hysteresis in its stiffness, that of one with a polynomial beside its plays."""
+    made = several_axes.three_actuators()
+    return replace(made, mirror=replace(made.mirror, plays=(BENT, *made.mirror.plays[1:])))
 
 
 UNITS = {
@@ -123,6 +129,8 @@ UNITS = {
     "plays": play_unit,
     "loop": lambda: choice.loop_unit(tracking()),
     "pointing": lambda: choice.loop_unit(pointing()),
+    "spring": lambda: choice.plant_unit(several_axes.mission(), "fine_pointing", spring()),
+    "coupled": lambda: choice.loop_unit(coupled()),
 }
 
 
@@ -140,69 +148,6 @@ def archive(tmp_path_factory):
         return path
 
     return written
-
-
-class Slave:
-    """An instance of a unit, the same for both versions of FMI. ``said`` are its messages."""
-
-    def __init__(self, path, folder, *, guid=None, start=True, **parameters):
-        folder = folder / path.stem
-        if not folder.exists():
-            fmpy.extract(path, folder)
-        self.description = fmpy.read_model_description(folder)
-        self.places = {v.name: v.valueReference for v in self.description.modelVariables}
-        self.said = []
-        self.two = self.description.fmiVersion == "2.0"
-        known = {"guid": guid or self.description.guid, "unzipDirectory": str(folder)}
-        known |= {"modelIdentifier": self.description.coSimulation.modelIdentifier, "instanceName": "one"}
-        self.unit = (fmi2.FMU2Slave if self.two else fmi3.FMU3Slave)(**known)
-        self._instantiate()
-        self.time = 0.0
-        if start:
-            self.begin(parameters)
-
-    def _instantiate(self):
-        if self.two:
-            calls = fmi2.fmi2CallbackFunctions()
-            calls.logger = fmi2.fmi2CallbackLoggerTYPE(lambda *args: self.said.append(args[4].decode()))
-            self.unit.instantiate(callbacks=calls)
-        else:
-            self.unit.instantiate(logMessage=lambda *args: self.said.append(args[3].decode()))
-
-    def begin(self, parameters=()):
-        for name, value in dict(parameters).items():
-            self.set(name, [value])
-        if self.two:
-            self.unit.setupExperiment(startTime=0.0)
-            self.unit.enterInitializationMode()
-        else:
-            self.unit.enterInitializationMode(startTime=0.0)
-        self.unit.exitInitializationMode()
-
-    def references(self, name):
-        if name in self.places:
-            return [self.places[name]]
-        return [self.places[each] for each in self.places if each.startswith(f"{name}[")]
-
-    def set(self, name, values):
-        (self.unit.setReal if self.two else self.unit.setFloat64)(self.references(name), list(values))
-
-    def get(self, name):
-        return np.array((self.unit.getReal if self.two else self.unit.getFloat64)(self.references(name)))
-
-    def count(self, name):
-        return (self.unit.getInteger if self.two else self.unit.getInt32)(self.references(name))[0]
-
-    def step(self, duration):
-        self.unit.doStep(currentCommunicationPoint=self.time, communicationStepSize=duration)
-        self.time += duration
-
-    def state(self):
-        return self.unit.getFMUstate() if self.two else self.unit.getFMUState()
-
-    def restore(self, state, time):
-        (self.unit.setFMUstate if self.two else self.unit.setFMUState)(state)
-        self.time = time
 
 
 @pytest.fixture
@@ -226,7 +171,7 @@ def assert_follows(found, wanted, agreement=AGREEMENT):
 
 
 # ------------------------------------------------------------------------------------------------------------- contents
-CHECKED = [("mirror", "2.0"), ("rich", "3.0"), ("loop", "2.0"), ("pointing", "3.0")]
+CHECKED = [("mirror", "2.0"), ("rich", "3.0"), ("loop", "2.0"), ("pointing", "3.0"), ("spring", "3.0")]
 CHECKED += [
     pytest.param(name, "3.0" if version == "2.0" else "2.0", marks=pytest.mark.endurance) for name, version in CHECKED
 ]
@@ -239,13 +184,53 @@ def test_fmpy_finds_no_fault(archive, name, version):
     description = fmpy.read_model_description(path, validate=True)
     assert description.fmiVersion == version
     assert description.coSimulation.canGetAndSetFMUstate and description.coSimulation.canSerializeFMUstate
-    listed = variables(UNITS[name]())
+    listed = variables(UNITS[name](), version)
     assert [v.name for v in description.modelVariables] == [v.name for v in listed]
     if name == "rich":
         assert description.modelName == "all there */ is"
         assert 'Mission: a <mission> & "more", sha256 0' in description.description
-    units = {v.name: v.unit for v in description.modelVariables}
-    assert units["mirror_rad[1]"] == "rad" and units["amplifier_slew_v_s"] == "V/s" and units["drive_v[1]"] == "V"
+    units = {v.name.removesuffix("[1]"): v.unit for v in description.modelVariables}
+    output = "m" if name == "spring" else "rad"
+    assert units[f"mirror_{output}"] == output and units["amplifier_slew_v_s"] == "V/s" and units["drive_v"] == "V"
+
+
+def test_vectors_are_arrays_in_3_0_and_their_elements_variables_in_2_0(archive):
+    two, three = (fmpy.read_model_description(archive("rich", version)) for version in VERSIONS)
+    shapes = {v.name: v.shape for v in three.modelVariables}
+    assert shapes["command_v"] == (2,) and shapes["line_of_sight_rad"] == (3,) and shapes["mirror_rad"] == (2,)
+    assert shapes["prandtl_ishlinskii[1].threshold_v"] == (3,) and shapes["bouc_wen[1].d1_rad_v"] == ()
+    by_element = [
+        name if not shape else f"{name}[{i + 1}]" for name, shape in shapes.items() for i in range(*shape or (1,))
+    ]
+    assert [v.name for v in two.modelVariables] == by_element
+    starts = [
+        (float(start) for start in v.start.split()) if v.start is not None else (None,) * int(np.prod(v.shape))
+        for v in three.modelVariables
+    ]
+    assert [None if v.start is None else float(v.start) for v in two.modelVariables] == [*chain(*starts)]
+
+
+def test_numbers_of_several_arrays_come_in_their_order(slave):
+    one = slave("rich", "3.0")
+    one.unit.setFloat64(one.references("command_v"), [1.0, -2.0])
+    wanted = [*one.get("prandtl_ishlinskii[1].threshold_v"), *one.get("bias_v"), *one.get("command_v")]
+    of = [*one.references("prandtl_ishlinskii[1].threshold_v"), *one.references("bias_v"), *one.references("command_v")]
+    assert one.unit.getFloat64(of, 6) == wanted == [0.0, 0.3, 0.9, 6.0, 1.0, -2.0]
+
+
+def test_another_number_of_values_is_refused_and_changes_nothing(slave):
+    one = slave("rich", "3.0")
+    one.set("command_v", [1.0, -2.0])
+    for call, said in (
+        (lambda: one.set("command_v", [5.0]), "fmi3SetFloat64: 1 values for variables that hold 2"),
+        (lambda: one.unit.getFloat64(one.references("mirror_rad"), 3), "fmi3GetFloat64: 3 values for variables that"),
+        (lambda: one.unit.getInt32(one.references("faults"), 2), "fmi3GetInt32: 2 values for variables that hold 1"),
+        (lambda: one.unit.getFloat64(one.references("faults")), "there is no such variable"),
+    ):
+        with pytest.raises(FMICallException):
+            call()
+        assert said in one.said[-1]
+    np.testing.assert_array_equal(one.get("command_v"), [1.0, -2.0])
 
 
 def test_fmpy_notices_a_fault(archive, tmp_path):
@@ -259,7 +244,12 @@ def test_fmpy_notices_a_fault(archive, tmp_path):
 @pytest.mark.parametrize("version", VERSIONS)
 def test_the_start_values_are_those_of_the_design(archive, version):
     description = fmpy.read_model_description(archive("rich", version))
-    start = {v.name: float(v.start) for v in description.modelVariables if v.start is not None}
+    given = {v.name: [float(each) for each in v.start.split()] for v in description.modelVariables if v.start}
+    start = {
+        name if len(numbers) == 1 else f"{name}[{i + 1}]": x
+        for name, numbers in given.items()
+        for i, x in enumerate(numbers)
+    }
     model = everything().bouc_wen[1]
     assert start["bouc_wen[2].exponent"] == model.exponent
     assert start["bouc_wen[1].alpha_1_v"] == 38.4
@@ -386,28 +376,26 @@ def test_fmpys_own_simulation_runs_the_loop(archive, version):
     """The high-level call that users make, with a reference as an array over time."""
     trace, timing = sine(25.0), tracking().setup.timing
     samples = 400
-    signal = np.array(
-        list(zip(trace.time_s, trace.reference_rad[:, 0], strict=True)),
-        dtype=[("time", float), ("reference_rad[1]", float)],
-    )[: samples + 1]
+    name, shape = ("reference_rad[1]", ()) if version == "2.0" else ("reference_rad", (1,))
+    signal = np.zeros(trace.time_s.size, dtype=[("time", float), (name, float, shape)])
+    signal["time"], signal[name] = trace.time_s, trace.reference_rad[:, 0].reshape(-1, *shape)
     result = fmpy.simulate_fmu(
         archive("loop", version),
         stop_time=samples * timing.period_s,
         output_interval=timing.period_s,
-        input=signal,
-        output=["line_of_sight_rad[1]"],
+        input=signal[: samples + 1],
+        output=[name.replace("reference", "line_of_sight")],
     )
     assert result.size == samples + 1
-    assert_follows(result["line_of_sight_rad[1]"], trace.output_rad[: samples + 1, 0])
+    assert_follows(result[name.replace("reference", "line_of_sight")].ravel(), trace.output_rad[: samples + 1, 0])
 
 
 # ---------------------------------------------------------------------------------------------- the fine-pointing loop
 def quiet(of, **optical):
     """A choice with sensors that have no noise, and its optical sensor otherwise changed."""
     loop = of.scene.loop
-    changed = replace(
-        loop, optical=replace(loop.optical, noise_rad=0.0, **optical), gauge=replace(loop.gauge, noise_rad=0.0)
-    )
+    gauge = loop.gauge and replace(loop.gauge, noise_rad=0.0)
+    changed = replace(loop, optical=replace(loop.optical, noise_rad=0.0, **optical), gauge=gauge)
     return replace(of, scene=replace(of.scene, loop=changed))
 
 
@@ -437,14 +425,17 @@ def outside(loop, p, state, by_sample):
 
 POINTING = {
     "PI + inverse": {},
+    "LQG of all axes": {},
     "resonant damping": {"delay_steps": 7, "every": 2, "resolution_rad": 2e-8, "field_of_view_rad": 1.5e-4},
 }
 
 
-@pytest.mark.parametrize(("name", "version"), [("PI + inverse", "2.0"), ("resonant damping", "3.0")])
+@pytest.mark.parametrize(
+    ("name", "version"), [("PI + inverse", "2.0"), ("resonant damping", "3.0"), ("LQG of all axes", "3.0")]
+)
 def test_the_loop_follows_the_kernel_in_the_jitter(tmp_path, name, version):
     """Fine pointing, plant step by plant step; also with a late, coarse optical sensor that loses the spot."""
-    chosen = quiet(pointing(name), **POINTING[name])
+    chosen = quiet(coupled() if name == "LQG of all axes" else pointing(name), **POINTING[name])
     loop, samples = chosen.scene.loop, 800
     p = kernel_arrays.arrays(loop, chosen.controller, 11)
     state = kernel_arrays.start(loop, p, 0)
@@ -461,21 +452,28 @@ def test_the_loop_follows_the_kernel_in_the_jitter(tmp_path, name, version):
     path = tmp_path / "jitter.fmu"
     fmu.write_unit(choice.loop_unit(chosen), path, version, "jitter")
     one = Slave(path, tmp_path)
+    shown = ("error_rad", "drive_v", f"mirror_{choice.loop_unit(chosen).plant.output_unit}")
     errors, drives, mirrors = np.zeros((samples, axes)), np.zeros((samples, m)), np.zeros((samples, outputs))
     for k in range(samples):
         for j in range(p.steps_per_sample):
             one.set("reference_rad", reference[k * p.steps_per_sample + j])
             one.set("disturbance_rad", disturbance[k * p.steps_per_sample + j])
             if j == 0:
-                errors[k], drives[k], mirrors[k] = one.get("error_rad"), one.get("drive_v"), one.get("mirror_rad")
+                errors[k], drives[k], mirrors[k] = (one.get(each) for each in shown)
             one.step(p.step_s)
-    assert_follows(errors, residual[:, :, 0])
+    # The kernel's plant is rounded, which the plate's lightest resonance, of damping 20 in 2100, raises by its quality.
+    agreement = 2100.0 / (2.0 * 20.0) * as_rounded if name == "LQG of all axes" else AGREEMENT
+    assert_follows(errors, residual[:, :, 0], agreement)
     at = axes + kernels.DRIVE_FIELDS * m
-    assert_follows(drives, trace[:, axes + kernels.DRIVE_NOW : at : kernels.DRIVE_FIELDS, 0])
-    assert_follows(mirrors, trace[:, at : at + outputs, 0])
+    assert_follows(drives, trace[:, axes + kernels.DRIVE_NOW : at : kernels.DRIVE_FIELDS, 0], agreement)
+    assert_follows(mirrors, trace[:, at : at + outputs, 0], agreement)
     counts = state.counts.reshape(-1, kernels.LANES)[:, 0]
     assert one.count("lost") == counts[kernels.COUNT_LOST]
-    assert 0 < counts[kernels.COUNT_LOST] < 100 if POINTING[name] else counts[kernels.COUNT_LOST] == 0
+    assert (
+        0 < counts[kernels.COUNT_LOST] < 100
+        if "field_of_view_rad" in POINTING[name]
+        else counts[kernels.COUNT_LOST] == 0
+    )
     assert one.count("saturated") == counts[kernels.COUNT_SATURATED]
     assert one.count("rate_clamped") == counts[kernels.COUNT_CLAMPED]
     assert one.count("slew_limited") == counts[kernels.COUNT_SLEW]
@@ -536,12 +534,12 @@ def walk(actuators, samples=400):
     return 3.0 * np.sin(np.cumsum(np.random.default_rng(3).normal(size=(samples, actuators)) * 0.2, axis=0))
 
 
-def driven(one, commands, duration):
+def driven(one, commands, duration, outputs="mirror_rad"):
     found = []
     for command in commands:
         one.set("command_v", command)
         one.step(duration)
-        found.append(one.get("mirror_rad"))
+        found.append(one.get(outputs))
     return np.array(found)
 
 
@@ -567,6 +565,34 @@ def test_a_plant_without_states_follows_the_kernel(slave, version):
     one, commands = slave("plays", version), walk(1)
     output, _, _ = by_kernel(play_mirror(), np.eye(1), IDEAL_DRIVE, commands, 2, 1e-5)
     assert_follows(driven(one, commands, 2e-5), output)
+
+
+def spring_by_kernel(unit, of, commands, steps):
+    """Outputs of the kernel's mirror behind each command, held over so many plant steps, and the drives at the end."""
+    u, drives = np.zeros(commands.shape[1]), []
+    for command in np.repeat(commands, steps, axis=0):
+        u = u + np.clip((command - u) * unit.follow, -unit.slew_step_v, unit.slew_step_v)
+        drives.append(u)
+    plant, output = mirror.discretise(of, unit.plant.step_s), np.empty((len(drives), of.axes))
+    kernels.open_loop(plant, mirror.at_rest(plant), np.array(drives), output, np.empty((len(drives), 0)))
+    return output[steps - 1 :: steps], u
+
+
+def test_a_spring_of_several_axes_follows_the_kernel(slave):
+    """Hysteresis in the stiffness with a polynomial beside its plays, beyond whose reach the walk goes."""
+    unit, own = UNITS["spring"](), spring().mirror
+    one, commands = slave("spring", "3.0"), walk(3)
+    found = driven(one, commands, 4 * unit.plant.step_s, "mirror_m")
+    output, drive = spring_by_kernel(unit, own, commands, 4)
+    assert_follows(found, output)
+    assert_follows(one.get("drive_v"), drive)
+    assert_follows(one.get("line_of_sight_rad"), unit.optics @ output[-1])
+    straight = replace(own, plays=(replace(own.plays[0], polynomial_rad=(0.0, 0.0, 0.0)), *own.plays[1:]))
+    without, _ = spring_by_kernel(unit, straight, commands, 4)
+    assert np.max(np.abs(without - output)) > 1e-3 * np.max(np.abs(output))
+    assert np.max(np.abs(commands)) > BENT.reach_v
+    assert one.get("prandtl_ishlinskii[1].reach_v")[0] == BENT.reach_v
+    assert "prandtl_ishlinskii[2].reach_v" not in one.places
 
 
 @pytest.mark.parametrize("version", VERSIONS)
@@ -609,6 +635,21 @@ def test_a_state_comes_back(slave, version):
     again = driven(one, commands[:30], unit.plant.step_s)
     assert_follows(again, rich_by_kernel(commands[:30])[0])  # with the bandwidth of the design
     assert np.max(np.abs(again - begun)) > 0.0
+
+
+@pytest.mark.parametrize(("name", "version"), [("pointing", "2.0"), ("coupled", "3.0")])
+def test_a_killed_process_is_continued_by_another_to_the_last_bit(archive, tmp_path, name, version):
+    path, saved = archive(name, version), tmp_path / "state"
+    command = [sys.executable, Path(slaves.__file__), path, tmp_path / "running", saved, "60", "120"]
+    with subprocess.Popen([*command, "save"], stdout=subprocess.PIPE, text=True) as running:
+        assert running.stdout.readline() == "saved\n"
+        running.kill()  # in the middle of further steps
+    assert running.returncode == -signal.SIGKILL
+    done = subprocess.run([*command, "continue"], capture_output=True, text=True, check=True)
+    uninterrupted = slaves.shaken(Slave(path, tmp_path), range(120))
+    wanted = [number.hex() for number in uninterrupted[60:].ravel().tolist()]
+    assert json.loads(done.stdout) == wanted
+    assert len(set(wanted)) > 60  # it moves
 
 
 @pytest.mark.parametrize("version", VERSIONS)
@@ -681,21 +722,26 @@ def test_another_guid_is_refused(archive, tmp_path, version):
 )
 def test_an_impossible_parameter_is_refused(slave, version, name, value, wanted):
     one = slave("rich", version, start=False)
+    whole = name.removesuffix("[2]")
     with pytest.raises(FMICallException):
-        one.begin({name: value})
+        if name in one.places:
+            one.begin({name: value})
+        else:
+            one.set(whole, np.where(np.arange(3) == 1, value, one.get(whole)))
+            one.begin()
     assert one.said[-1] == f"parameter {name} is {value:g}: it has to be {wanted}"
 
 
 @pytest.mark.parametrize("version", VERSIONS)
 def test_what_cannot_be_set_is_refused(slave, version):
     one = slave("rich", version)
-    before = one.get("bouc_wen[1].d1_rad_v")
+    before, drives = one.get("bouc_wen[1].d1_rad_v"), "drive_v[1]" if one.two else "drive_v"
     for name, message in (
         ("bouc_wen[1].d1_rad_v", "bouc_wen[1].d1_rad_v cannot be set once the simulation has begun"),
-        ("drive_v[1]", "drive_v[1] cannot be set"),
+        (drives, f"{drives} cannot be set"),
     ):
         with pytest.raises(FMICallException):
-            one.set(name, [1.0])
+            one.set(name, [1.0] * (one.sizes[name] or 1))
         assert one.said[-1] == message
     with pytest.raises(FMICallException):
         (one.unit.getReal if one.two else one.unit.getFloat64)([10_000])
@@ -844,8 +890,8 @@ def test_an_input_that_no_sensor_delivers_is_refused():
     first, *rest = unit.controller.inputs
     other = replace(unit.controller, inputs=(Signal("star_rad", 1, "rad", first.meaning, first.limit), *rest))
     with pytest.raises(ExportError, match="reads star_rad, which a loop does not measure: it has optical_error_rad"):
-        fmu.unit_code(replace(unit, controller=other), "loop")
-    assert "loop_loop.c" in fmu.unit_code(unit, "loop")
+        fmu.unit_code(replace(unit, controller=other), "2.0", "loop")
+    assert "loop_loop.c" in fmu.unit_code(unit, "2.0", "loop")
 
 
 HARSH = """
@@ -857,12 +903,12 @@ rng = np.random.default_rng(1)
 for path in sys.argv[1:]:
     description = fmpy.read_model_description(path)
     step = {v.name: v for v in description.modelVariables}["plant_step_s"].start
-    names = [v.name for v in description.modelVariables if v.causality == "input"]
+    inputs = [(v.name, float, v.shape) for v in description.modelVariables if v.causality == "input"]
     for size in (1e-6, 1.0, 1e9, 1e300):
-        signal = np.zeros(300, dtype=[("time", float), *((name, float) for name in names)])
+        signal = np.zeros(300, dtype=[("time", float), *inputs])
         signal["time"] = np.arange(300) * float(step)
-        for name in names:
-            signal[name] = rng.normal(size=300) * size
+        for name, _, shape in inputs:
+            signal[name] = rng.normal(size=(300, *shape)) * size
         try:
             result = fmpy.simulate_fmu(path, stop_time=signal["time"][-1], output_interval=float(step), input=signal)
             print("done", size, len(result))

@@ -13,17 +13,27 @@ import pytest
 from scipy.io import loadmat, savemat
 
 import designs
+import several_axes
 from microrad.core import lti
 from microrad.export import choice, matrices
 from microrad.export.linear_import.matlab import load
 from microrad.export.matrices.forms import LinearModel, Port, forms, polynomials
-from microrad.export.matrices.models import CONTROLLER, LINEAR_PART, LOOP, MIRROR, SAMPLED_PLANT, axis_plant
+from microrad.export.matrices.models import (
+    CONTROLLER,
+    LINEAR_PART,
+    LOOP,
+    MIRROR,
+    MIRROR_AT_REST,
+    SAMPLED_PLANT,
+    axis_plant,
+)
 from microrad.export.matrices.structure import without_copies
 from microrad.export.records import ExportError, Origin
-from microrad.loop import control
+from microrad.loop import control, coupled_study
 from microrad.loop import sine_run as simulate
 from microrad.loop.control.analysis import loop_response
 from microrad.loop.pointing_loop.design import design_plant
+from microrad.loop.pointing_loop.loop import decoupling
 from microrad.mirror import model as mirror
 from microrad.mission.file import MissionFile, load_mission
 from shipped import SHIPPED
@@ -228,6 +238,71 @@ def test_a_chosen_controller_brings_its_plant_and_its_loop(file, tracking):
     assert [each.name for each in models(file)] == ["linear_part", "mirror"]
     names = ["linear_part", "mirror", "sampled_plant", "controller", "loop"]
     assert [each.name for each in models(tracking)] == names
+
+
+# --------------------------------------------------------------------------------------------------------- several axes
+@pytest.fixture(scope="module")
+def plate():
+    return designs.of_three_actuators()
+
+
+def answer_of_plate(own, gains, freq_hz):
+    """Outputs over drives of the plant form, its equations solved for x, q and y at each frequency."""
+    n, m, e = own.A.shape[0], own.actuators, len(gains)
+    found = []
+    for s in 2j * np.pi * freq_hz:
+        unknown = np.block([[s * np.eye(n) - own.A, -own.E * gains], [-own.F, np.eye(e)]])
+        x, q = np.split(np.linalg.solve(unknown, np.vstack([own.B, own.G]).astype(complex)), [n])
+        found.append(own.C @ x + own.D + (own.K * gains) @ q)
+    assert found[0].shape == (own.axes, m)
+    return np.array(found)
+
+
+def test_a_mirror_of_several_axes_goes_out_at_its_slow_gain_and_as_it_is_about_rest(plate):
+    own, freq = plate.scene.mirror.mirror, np.geomspace(1.0, 1e4, 60)
+    slow, rest = of(plate, MIRROR), of(plate, MIRROR_AT_REST)
+    for made, gains in ((slow, [0.1] * 3), (rest, [0.0] * 3)):  # all plays slide, and none but that without threshold
+        found, wanted = response(made, freq), answer_of_plate(own, np.array(gains), freq)
+        assert np.max(np.abs(found - wanted)) < NINE_DIGITS * np.max(np.abs(wanted))
+        assert made.period_s == 0.0 and "50 V" in made.meaning and made.origin.mirror == own.name
+    assert np.max(np.abs(response(slow, freq) - response(rest, freq))) > 0.1 * np.max(np.abs(response(rest, freq)))
+    assert slow.inputs == tuple(Port(f"drive_v_{i}", "V") for i in range(3))
+    assert slow.outputs == tuple(Port(f"mirror_m_{i}", "m") for i in range(3))
+    assert [each.name for each in matrices.models(choice.source(several_axes.mission(), plate.scene.mirror))] == [
+        *(MIRROR, MIRROR_AT_REST)
+    ]
+
+
+def test_sampled_plant_of_several_axes_is_what_their_controller_was_designed_for(plate):
+    m, designed = of(plate, SAMPLED_PLANT), coupled_study.plants(plate.scene)[0]
+    freq = grid(m.period_s)
+    wanted = lti.frequency_response(designed.system, freq, designed.period_s)[:, :, :2]
+    found = response(m, freq) @ decoupling(plate.scene.rest)
+    largest = np.max(np.abs(wanted), axis=(1, 2), keepdims=True)
+    known = 1e3 * 2.0**-lti.DESIGN_BITS  # to that both are rounded; a mode lasts 1e3 samples
+    assert np.max(np.abs(found[:, :2] + wanted[:, :2]) / largest) < known
+    assert np.max(np.abs(found[:, 2:] - wanted[:, 2:]) / largest) < known
+    assert [p.name for p in m.inputs] == [f"command_v_{i}" for i in range(3)]
+    assert [p.name for p in m.outputs] == [f"{n}_rad_{i}" for n in ("line_of_sight", "optical_error") for i in (0, 1)]
+    assert m.system.order < designed.system.order
+    assert "a mode that no output shows" in forms(m).zero_pole_gain  # the piston of the plate
+
+
+def test_loop_of_several_axes_is_controller_and_plant_and_keeps_its_margin(plate):
+    loop, plant, controller = (of(plate, name) for name in (LOOP, SAMPLED_PLANT, CONTROLLER))
+    freq = grid(loop.period_s)
+    z = np.exp(2j * np.pi * freq * loop.period_s)
+    theirs = [np.moveaxis(matrices.to_control(each)(z), 2, 0) for each in (loop, plant, controller)]
+    wanted = -theirs[1][:, 2:] @ theirs[2]
+    assert np.max(np.abs(theirs[0] - wanted)) < NINE_DIGITS * np.max(np.abs(wanted))
+    least = np.min(np.linalg.svd(np.eye(2) + response(loop, grid(loop.period_s, 4000)), compute_uv=False))
+    assert plate.design.margins.modulus * (1.0 - 1e-6) < least < 1.0
+    assert np.max(np.abs(lti.feedback_poles(loop.system))) < 1.0
+    assert (
+        [p.name for p in loop.inputs]
+        == [p.name for p in controller.inputs]
+        == ["optical_error_rad_0", "optical_error_rad_1"]
+    )
 
 
 # ------------------------------------------------------------------------------------------------------------ structure

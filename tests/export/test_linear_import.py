@@ -12,11 +12,13 @@ import control as python_control
 import numpy as np
 import pytest
 from scipy.io import loadmat, savemat
+from scipy.signal import cont2discrete
 from scipy.sparse import csc_array
 
 from microrad.core import lti
 from microrad.export import choice, matrices
 from microrad.export.linear_import import Given, import_control, import_mat, mirror_file
+from microrad.export.matrices.forms import floats, polynomials
 from microrad.export.records import ExportError
 from microrad.mirror import model as mirror
 from microrad.mission.file import load_mirror, load_mission
@@ -113,6 +115,80 @@ def test_transfer_function_of_python_control(tmp_path):
     assert difference(answer(tmp_path, import_control(system, GIVEN), BAND), by_roots(BAND)) < NINE_DIGITS
 
 
+# ------------------------------------------------------------------------------------------------------ sampled models
+PERIOD_S = 2e-5
+INSIDE = np.geomspace(1.0, 0.49 / PERIOD_S, 200)
+
+
+def held_by_scipy(system):
+    """The system behind a hold, as SciPy samples it."""
+    A, B, C, D, _ = cont2discrete((system.A, system.B, system.C, system.D), PERIOD_S, method="zoh")
+    return lti.StateSpace(A, B, C, D)
+
+
+def coefficients(system):
+    """Numerator and denominator, each coefficient rounded once, and what that does to the response, relative."""
+    num, den = map(floats, polynomials(system))
+    z = np.exp(2j * np.pi * INSIDE * PERIOD_S)
+    lost = sum(np.sum(np.abs(each)) / np.abs(np.polyval(each, z)) for each in (num, den))
+    return num[None], den[None], np.finfo(float).eps * np.max(lost)
+
+
+@pytest.mark.parametrize("shape", ["states", "roots", "coefficients", "python-control"])
+def test_a_sampled_model_becomes_the_continuous_one_behind_its_hold(shape, tmp_path):
+    """There and back: sampled by SciPy, imported, the response is that of the model it was."""
+    held = held_by_scipy(STATES)
+    num, den, lost = coefficients(held)
+    if shape == "python-control":
+        text = import_control(python_control.ss(held.A, held.B, held.C, held.D, PERIOD_S), GIVEN)
+    elif shape == "states":
+        text = import_mat(save(tmp_path, **{key: getattr(held, key) for key in "ABCD"}, Ts=PERIOD_S), GIVEN)
+    elif shape == "roots":
+        found = {"z": np.roots(num[0])[:, None], "p": np.linalg.eigvals(held.A)[:, None], "k": num[0, 0]}
+        text = import_mat(save(tmp_path, **found, Ts=PERIOD_S), GIVEN)
+    else:
+        text = import_mat(save(tmp_path, num=num, den=den, Ts=PERIOD_S), GIVEN)
+    wanted = lti.frequency_response(STATES, INSIDE)[:, 0, 0]
+    assert lost < NINE_DIGITS
+    assert difference(answer(tmp_path, text, INSIDE), wanted) < 10.0 * lost
+    assert f"sampled there, Ts = {PERIOD_S!r} s; its drive counts as held" in text
+
+
+def test_a_sampled_model_is_not_taken_for_one_without_its_hold(tmp_path):
+    """Bilinear or by matched poles the response is another: 0.1 at a fifth of the rate."""
+    held = held_by_scipy(STATES)
+    text = import_mat(save(tmp_path, **{key: getattr(held, key) for key in "ABCD"}, Ts=PERIOD_S), GIVEN)
+    freq = np.array([0.2 / PERIOD_S])
+    sampled = lti.frequency_response(held, freq, PERIOD_S)[:, 0, 0]
+    assert difference(answer(tmp_path, text, freq), sampled) > 0.1
+
+
+@pytest.mark.parametrize("zeros", [[], ZEROS])
+def test_a_sampled_model_has_no_zeros_that_rounding_made(zeros, tmp_path):
+    """Held and sampled any model has a zero less than poles; the continuous one has those that it had."""
+    gain = 3e9 if not zeros else GAIN
+    p = np.array(POLES)
+    up = [np.prod(each - np.array(zeros)) / np.prod(each - p[p != each]) for each in p]
+    num, den, lost = coefficients(held_by_scipy(lti.modal_from_residues(p, gain * np.array(up))))
+    assert (num.size, den.size) == (3, 4)
+    text = import_mat(save(tmp_path, num=num, den=den, Ts=PERIOD_S), GIVEN)
+    (tmp_path / "mirror.toml").write_text(text, encoding="utf-8")
+    found = load_mirror(tmp_path / "mirror.toml").mirror.linear
+    assert len(found.zeros_hz or ()) == len(zeros) // 2
+    assert difference(answer(tmp_path, text, INSIDE), by_roots(INSIDE, zeros, POLES, gain)) < 10.0 * lost
+
+
+def test_rounding_of_full_matrices_makes_no_zeros_either(tmp_path):
+    """At 500 kHz it leaves more of a leading coefficient than the exact arithmetic behind it takes for nothing."""
+    p = np.array(POLES)
+    made = lti.modal_from_residues(p, np.array([3e9 / np.prod(each - p[p != each]) for each in p]))
+    A, B, C, D, _ = cont2discrete((made.A, made.B, made.C, made.D), 2e-6, method="zoh")
+    Q = np.random.default_rng(1).normal(size=(3, 3))
+    back = np.linalg.inv(Q)
+    text = import_mat(save(tmp_path, A=Q @ A @ back, B=Q @ B, C=C @ back, D=D, Ts=2e-6), GIVEN)
+    assert "zeros" not in text and "poles" in text
+
+
 @pytest.mark.parametrize(("unit", "scale"), [("rad", 1.0), ("mrad", 1e-3), ("urad", 1e-6)])
 def test_output_counts_in_the_unit_that_is_given(unit, scale, tmp_path):
     text = import_mat(save(tmp_path, **SHAPES["roots"]), replace(GIVEN, output_unit=unit))
@@ -185,6 +261,10 @@ def states(**changed):
     return {**SHAPES["states"], **changed}
 
 
+def sampled_roots(poles, zeros=()):
+    return roots(poles, zeros, 1e-3, Ts=2e-5)
+
+
 TWO = {"A": -np.eye(2), "B": np.eye(2), "C": np.ones((1, 2)), "D": np.zeros((1, 2))}
 HIDING = {"A": np.diag([-1.0, -20.0]), "B": np.array([[1.0], [0.0]]), "C": np.ones((1, 2)), "D": np.zeros((1, 1))}
 
@@ -212,9 +292,22 @@ HIDING = {"A": np.diag([-1.0, -20.0]), "B": np.array([[1.0], [0.0]]), "C": np.on
         (states(D=np.ones((1, 1))), "3 zeros over 3 poles, not strictly proper"),
         (states(C=np.zeros((1, 3))), "not minimal, it has a mode that no output shows"),
         (HIDING, r"no input drives: 3\.183 Hz"),
-        (states(Ts=2e-5), r"sampled, Ts = 2e-05 s.*convert it first \(d2c"),
-        (states(Ts=-1.0), "sampled, Ts = -1 s"),
+        (states(Ts=-1.0), "sampled, Ts = -1 s, which is no time"),
         (states(Ts=np.zeros((2, 2))), "sampled, Ts = nan s"),
+        (states(Ts=math.inf), "Ts holds a number that is not finite"),
+        (states(Ts=2e-3), "the band ends at 5000 Hz, .* says nothing beyond 250 Hz"),
+        (sampled_roots([1.1, 0.5]), r"unstable, a pole at \|z\| = 1\.1 at 0 Hz"),
+        (sampled_roots([1.0, 0.5]), r"an integrator, a pole at \|z\| = 1 at 0 Hz"),
+        (sampled_roots([-0.4, 0.9]), r"negative real axis, \|z\| = 0\.4 at 2\.5e\+04 Hz, turns its sign"),
+        (sampled_roots([complex(-0.9, 1e-8), complex(-0.9, -1e-8)]), r"negative real axis, \|z\| = 0\.9 at 2\.5e"),
+        (sampled_roots([0.0, 0.9]), "a pole at 0, a delay of a whole sample"),
+        (sampled_roots([0.5, 0.5]), r"two poles coincide, \|z\| = 0\.5"),
+        (sampled_roots([0.5], [0.2]), "1 zeros over 1 poles, its output follows the drive within a sample"),
+        (
+            states(Ts=2e-5, A=np.diag([0.4, 0.5, 0.6]), B=np.ones((3, 1)), C=np.ones((1, 3)), D=np.ones((1, 1))),
+            "within a sample",
+        ),
+        (sampled_roots([0.5, 0.5 + 2e-8, 0.5 + 5e-8]), "no continuous model gives it within 1e-09"),
         (roots(k=np.ones((2, 1))), "k has 2 gains"),
         (roots(k=math.inf), "k holds a number that is not finite"),
         (roots(k=0.0), "a gain of 0.0; the mirror does not move"),
@@ -300,7 +393,7 @@ def test_pickles_are_not_opened(tmp_path):
     ("system", "why"),
     [
         (python_control.ss(-np.eye(2), np.eye(2), np.eye(2), 0), "2 inputs and 2 outputs"),
-        (python_control.tf([1.0], [1.0, -0.5], 0.01), "sampled, Ts = 0.01 s"),
+        (python_control.tf([1.0], [1.0, -0.5], 0.01), "the band ends at 5000 Hz"),
         (python_control.tf([1.0], [1.0, -0.5], True), "dt = True: continuous, or sampled how fast"),
         (python_control.tf([1.0, 0.0, 0.0], [1.0, 1.0]), "2 zeros over 1 poles, not strictly proper"),
         (python_control.tf([1.0], [1.0, -5.0]), "unstable, a pole at 0.7958 Hz"),

@@ -554,7 +554,7 @@ def test_a_file_of_several_axes_is_no_mirror_of_a_study(several, tmp_path):
     is_the_refusal(only_fault(lambda: load_mission(tmp_path / "mission.toml", text=named)), several)
 
 
-@pytest.mark.parametrize("command", [("run",), ("export", "fmu"), ("export", "matrices")])
+@pytest.mark.parametrize("command", [("run",)])
 def test_commands_of_one_axis_say_what_they_cannot_do(folder, several, refused, command):
     """Exit code 2, the file with what it holds and what reads it; nothing is written."""
     told = refused(*command, MISSION, "--mirror", several.name)

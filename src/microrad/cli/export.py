@@ -26,7 +26,8 @@ from microrad.cli.frame import (
 from microrad.core.folder import write_whole
 
 if TYPE_CHECKING:
-    from microrad.export.choice import Choice, PaperLoopChoice, PointingChoice
+    from microrad.export.choice import Choice
+    from microrad.mirror.coupled import CoupledMirror
     from microrad.mission.file import MissionFile
 
 exports = group(
@@ -107,13 +108,10 @@ def c(  # noqa: PLR0913, PLR0917  each is an option
     With its inverse, limits and counters, a test bench, a recorded run of the loop and a Makefile; compiled and run
     over that run where there is a C compiler.
     """
-    from microrad.export import choice
     from microrad.export.flight import write
     from microrad.export.identifiers import identifier, suggested
-    from microrad.mirror import coupled
-    from microrad.mission.file import load_loop
 
-    mission, several = load_loop(file, mirror)
+    mission, several = _loaded(file, mirror)
     # Feedback with the inverse of the hysteresis ahead of it: the paper's choice, in the loop that the mission has.
     default = DEFAULT_CONTROLLER if mission.mission.fine_pointing is not None else "PID + inverse"
     default = DEFAULT_OF_SEVERAL if several else default
@@ -122,13 +120,8 @@ def c(  # noqa: PLR0913, PLR0917  each is an option
     folder = output or Path(f"{file.stem}-{name}")
     write.check_output(folder, overwrite)
     with progress_bar() as progress:
-        chosen: Choice = (
-            choice.choose_coupled(mission, coupled.of(several), wanted, progress)
-            if several
-            else choice.choose(mission, wanted, progress)
-        )
         found = write.export_flight(
-            chosen,
+            _chosen(mission, several, wanted, progress),
             folder,
             name=name,
             precision=precision.value,
@@ -146,6 +139,7 @@ def c(  # noqa: PLR0913, PLR0917  each is an option
         "microrad export fmu leo-geo.toml",
         'microrad export fmu leo-geo.toml --controller "PID + inverse" --fmi 3.0',
         "microrad export fmu leo-geo.toml --loop control --output mirror.fmu",
+        "microrad export fmu leo-geo.toml --mirror two-axes.toml --controller LQG",
     )
 )
 @command
@@ -172,20 +166,19 @@ def fmu(  # noqa: PLR0913, PLR0917  each is an option
     from microrad.export import choice
     from microrad.export.fmi.fmu import write_unit
     from microrad.export.identifiers import identifier, suggested
-    from microrad.mission.file import load_mission
 
     if controller is not None and loop is not None:
         raise Refusal("--controller and --loop exclude each other: a controller stands in one loop of the mission.")
-    mission = load_mission(file, mirror)
+    mission, several = _loaded(file, mirror)
     name = identifier(name) if name is not None else suggested(f"{controller} loop" if controller else "mirror")
     path = output or Path(f"{file.stem}-{name}.fmu")
     check_target(path, _OTHER, overwrite=overwrite, begins=b"PK")
     with progress_bar() as progress:
         if controller is not None:
-            unit: Any = choice.loop_unit(_promised(mission, controller, accept, progress))
+            unit: Any = choice.loop_unit(_promised(mission, several, controller, accept, progress))
         else:
             table = loop.value if loop else choice.LOOPS[0 if mission.mission.fine_pointing is not None else 1]
-            unit = choice.plant_unit(mission, table)
+            unit = choice.plant_unit(mission, table, several)
         written = write_unit(unit, path, fmi.value, name)
     return Outcome(written.words)
 
@@ -195,6 +188,7 @@ def fmu(  # noqa: PLR0913, PLR0917  each is an option
         "microrad export matrices leo-geo.toml",
         "microrad export matrices leo-geo.toml --controller LQG --output lqg.mat",
         "microrad export matrices leo-geo.toml --json > models.json",
+        "microrad export matrices leo-geo.toml --mirror two-axes.toml --controller LQG",
     )
 )
 @command
@@ -217,14 +211,17 @@ def matrices(
     """
     from microrad.export import choice
     from microrad.export import matrices as linear
-    from microrad.mission.file import load_mission
 
-    mission = load_mission(file, mirror)
+    mission, several = _loaded(file, mirror)
     path = output or Path(f"{file.stem}.mat")
     if not as_json:
         check_target(path, _OTHER, overwrite=overwrite, begins=b"MATLAB 5.0")
     with progress_bar() as progress:
-        of = choice.source(mission) if controller is None else _promised(mission, controller, accept, progress)
+        of = (
+            choice.source(mission, several)
+            if controller is None
+            else _promised(mission, several, controller, accept, progress)
+        )
         found = linear.models(of)
     if as_json:
         return Outcome(linear.json_text(found))
@@ -232,13 +229,33 @@ def matrices(
     return Outcome(f"{path} written: {', '.join(each.name for each in found)}")
 
 
+def _loaded(file: Path, mirror: Path | None) -> "tuple[MissionFile, CoupledMirror | None]":
+    """The mission, and the mirror of several axes of its fine-pointing loop, given or named by the mission."""
+    from microrad.mirror import coupled
+    from microrad.mission.file import load_loop
+
+    mission, several = load_loop(file, mirror)
+    return mission, None if several is None else coupled.of(several)
+
+
+def _chosen(mission: "MissionFile", several: "CoupledMirror | None", name: str, on_progress: OnProgress) -> "Choice":
+    from microrad.export import choice
+    from microrad.loop.paper_cases import PID, PID_WITH_INVERSE
+    from microrad.mission.file import mirror_of_loop
+
+    of_papers_loop = name in (PID, PID_WITH_INVERSE) and mirror_of_loop(mission) is not None
+    if several is not None and not of_papers_loop:
+        return choice.choose_coupled(mission, several, name, on_progress)
+    return choice.choose(mission, name, on_progress)
+
+
 def _promised(
-    mission: "MissionFile", name: str, accept: bool, on_progress: OnProgress
-) -> "PointingChoice | PaperLoopChoice":
+    mission: "MissionFile", several: "CoupledMirror | None", name: str, accept: bool, on_progress: OnProgress
+) -> "Choice":
     """A controller of the mission, refused where its linear figure is no promise."""
     from microrad.export import choice
 
-    chosen = choice.choose(mission, name, on_progress)
+    chosen = _chosen(mission, several, name, on_progress)
     choice.promised(chosen, accept)
     return chosen
 
@@ -271,8 +288,8 @@ def import_(  # noqa: PLR0913, PLR0917  what a linear model does not say has to 
 ) -> Outcome:
     """Make a mirror file of a linear model from another tool.
 
-    Volts in, an angle out, continuous in time, one input and one output. Such a mirror has no hysteresis; what a linear
-    model does not say has to be given.
+    Volts in, an angle out, one input and one output. A sampled model counts as one whose drive is held over each
+    sample. Such a mirror has no hysteresis; what a linear model does not say has to be given.
     """
     from microrad.export.linear_import import Given, import_mat
 

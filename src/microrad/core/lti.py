@@ -58,7 +58,7 @@ def modal_from_polynomials(numerator: tuple[float, ...], denominator: tuple[floa
     if poles.size > 1 and np.min(distance / np.abs(poles)[:, None].clip(1e-300)) < 1e-6:
         raise ValueError("two poles coincide: the transfer function has no modal form")
     residues = [np.polyval(num, p) / den[0] / np.prod(p - np.delete(poles, i)) for i, p in enumerate(poles)]
-    system = _modal(poles, np.asarray(residues))
+    system = modal_from_residues(poles, np.asarray(residues))
     # Poles that nearly coincide pass the test above and spoil the residues: compare with the polynomials themselves.
     probe = np.geomspace(0.1, 10.0, 9) * float(np.median(np.abs(poles)))
     exact = np.polyval(num, 1j * probe) / np.polyval(den, 1j * probe)
@@ -95,11 +95,16 @@ def modal_from_roots(zeros: Complexes, poles: Complexes, unit_at_hz: float) -> S
         scale * gain * np.prod((p - zeros) / scale) / np.prod((p - np.delete(poles, i)) / scale)
         for i, p in enumerate(poles)
     ]
-    return _modal(poles, np.asarray(residues))
+    return modal_from_residues(poles, np.asarray(residues))
 
 
-def _modal(poles: Complexes, residues: Complexes) -> StateSpace:
-    """Sum of residue/(s - pole), conjugate pairs as real 2x2 blocks."""
+def modal_from_residues(poles: Complexes, residues: Complexes) -> StateSpace:
+    """Sum of residue/(s - pole), conjugate pairs as real 2x2 blocks.
+
+    Args:
+        poles: Poles, rad/s, shape (poles,); complex ones in conjugate pairs.
+        residues: Residue at each of them, likewise.
+    """
     order = poles.size
     A, B, C = np.zeros((order, order)), np.zeros((order, 1)), np.zeros((1, order))
     row = 0

@@ -46,17 +46,23 @@ from microrad.mission.tables.mirror import Mirror as MirrorTable
 LOOPS = ("fine_pointing", "control")
 """Tables of a mission that describe a loop."""
 
+OUTPUT_UNITS = {"displacement": "m", "angle": "rad"}
+"""SI unit of each quantity that a mirror's output may be."""
+
 INPUT_LIMIT_RAD = 0.1
 """Readings and references beyond it are taken for faults: no fine steering mirror or tracking sensor goes so far."""
 
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """The mission file that something was made from, the table of its mirror, and the bias that drives count from."""
+    """The mission file that something was made from, the mirror, and the bias that drives count from.
+
+    ``mirror`` is the table of the mission's mirror, or the one of several axes that takes its place.
+    """
 
     path: Path
     origin: Origin
-    mirror: MirrorTable
+    mirror: MirrorTable | coupled.CoupledMirror
     bias_v: float
 
 
@@ -106,10 +112,27 @@ def names(table: FinePointing | None) -> tuple[str, ...]:
     return (*(() if table is None else controller_study.names(table)), PID, PID_WITH_INVERSE)
 
 
-def source(file: MissionFile) -> Source:
-    """What an export says of the mission that it was made from."""
-    table = file.mission.mirror
-    return Source(file.path, Origin(file.mission.name, file.sha256, table.name), table, table.bias_v)
+def source(file: MissionFile, given: coupled.CoupledMirror | None = None) -> Source:
+    """What an export says of the mission that it was made from.
+
+    Args:
+        file: The mission.
+        given: A mirror of several axes in place of the mission's.
+
+    Raises:
+        ExportError: Its actuators rest at different biases.
+    """
+    if given is None:
+        table = file.mission.mirror
+        return Source(file.path, Origin(file.mission.name, file.sha256, table.name), table, table.bias_v)
+    biases = sorted({actuator.bias_v for actuator in given.actuators})
+    if len(biases) > 1:
+        raise ExportError(
+            f"the actuators of {given.mirror.name!r} rest at {', '.join(f'{bias:g} V' for bias in biases)}, and "
+            "exported code counts all commands from one bias: give all actuators the same, in the mirror file and in "
+            "the amplifier"
+        )
+    return Source(file.path, Origin(file.mission.name, file.sha256, given.mirror.name), given, biases[0])
 
 
 def choose(
@@ -154,21 +177,13 @@ def choose_coupled(
         ExportError: The mission has no such controller, it cannot be built on the mirror, or the actuators rest at
             different biases.
     """
-    biases = sorted({actuator.bias_v for actuator in given.actuators})
-    if len(biases) > 1:
-        raise ExportError(
-            f"the actuators of {given.mirror.name!r} rest at {', '.join(f'{bias:g} V' for bias in biases)}, and "
-            "exported code counts all commands from one bias: give all actuators the same, in the mirror file and in "
-            "the amplifier"
-        )
+    of = source(file, given)
     try:
         scene = coupled_study.scene(file, given, tracking_light_w(file))
         found, (left,) = coupled_study.design_and_promise(scene, on_progress, only=(name,))
         (design,) = found.made
     except ValueError as error:
         raise ExportError(f"{file.path}: {error}") from error
-    origin = replace(source(file).origin, mirror=given.mirror.name)
-    of = replace(source(file), origin=origin, bias_v=biases[0])
     chosen = CoupledChoice(of, scene, design, design.controller, left.worst)
     form, at = sections(flight_controller(chosen)), _looked_at(_whole_controller(chosen))
     places = np.concatenate([np.arange(each.start, each.stop) for each in at.values()])
@@ -349,19 +364,27 @@ def _paper_controller(choice: PaperLoopChoice) -> FlightController:
 
 
 # ---------------------------------------------------------------------------------------------------- plants and loops
-def plant_unit(file: MissionFile, loop: str) -> PlantUnit:
+def plant_unit(file: MissionFile, loop: str, given: coupled.CoupledMirror | None = None) -> PlantUnit:
     """Amplifier and mirror of a mission, at the plant step of one of its loops.
 
     Args:
         file: The mission.
         loop: One of `LOOPS`.
+        given: A mirror of several axes in place of the mission's; it stands in the fine-pointing loop.
 
     Raises:
-        ExportError: The mission has no such loop, or it cannot be built.
+        ExportError: The mission has no such loop, it cannot be built, or not with this mirror.
     """
     if loop not in LOOPS or (loop == LOOPS[0] and file.mission.fine_pointing is None):
         raise ExportError(f"{file.path} has no loop {loop!r}: one of {', '.join(LOOPS)} that is a table of the mission")
+    if given is not None and loop != LOOPS[0]:
+        raise ExportError(
+            f"the loop {loop!r} is of one axis, and {given.mirror.name!r} is a mirror of several: take {LOOPS[0]}"
+        )
     try:
+        if given is not None:
+            made = coupled_study.scene(file, given, tracking_light_w(file)).loop
+            return _plant_unit(source(file, given), made.mirror, made.optics, made.drive, made.timing)
         mirrors = mirror.of(file.mission)
         if loop == LOOPS[0]:
             made = controller_study.scene(file, mirrors, tracking_light_w(file)).loop
@@ -375,7 +398,7 @@ def plant_unit(file: MissionFile, loop: str) -> PlantUnit:
 def _plant_unit(
     of: Source, mirror: model.Mirror, optics: Floats, drive: control.Drive, timing: control.Timing
 ) -> PlantUnit:
-    return PlantUnit(
+    unit = PlantUnit(
         of.origin,
         model.discretise(mirror, timing.step_s),
         optics,
@@ -384,6 +407,15 @@ def _plant_unit(
         drive.slew_v_s * timing.step_s,
         of.bias_v,
     )
+    if not isinstance(of.mirror, coupled.CoupledMirror):
+        return unit
+    quantities = {output.quantity for output in of.mirror.outputs}
+    if len(quantities) > 1:
+        raise ExportError(
+            f"the outputs of {of.mirror.mirror.name!r} are displacements and angles, and a unit shows them as one "
+            "array of one unit: leave the angles out of the mirror file, the line of sight takes nothing from them"
+        )
+    return replace(unit, output_unit=OUTPUT_UNITS[quantities.pop()], element_unit="V")
 
 
 def loop_unit(choice: Choice) -> LoopUnit:

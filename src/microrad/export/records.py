@@ -95,7 +95,8 @@ class PlantUnit:
 
     ``optics`` (axes, outputs) turns the mirror's outputs into line-of-sight angles. ``follow`` is the share of the way
     to the command that the amplifier goes in a step, ``slew_step_v`` its most; ``bandwidth_hz`` (may be infinite) says
-    where ``follow`` comes from.
+    where ``follow`` comes from. The mirror's outputs count in ``output_unit``, "rad" or "m"; what its elements put out
+    counts in ``element_unit``, "rad", or "V" where elements have plain gains.
     """
 
     origin: Origin
@@ -105,6 +106,8 @@ class PlantUnit:
     follow: float
     slew_step_v: float
     bias_v: float
+    output_unit: str = "rad"
+    element_unit: str = "rad"
 
 
 @dataclass(frozen=True, slots=True)

@@ -33,7 +33,7 @@ def is_of_one_axis(document: Document, data: dict[str, Any]) -> bool:
         reason = f"holds a mirror of several axes{_sizes(data)}, and the paper's loop has one"
         advice = (
             "a mirror file of one axis here, and this one in the fine-pointing loop: fine_pointing.mirror_file; "
-            "microrad design and microrad export c take it by --mirror, too"
+            "microrad design and microrad export take it by --mirror, too"
         )
         document.fault("mirror.version", "2", reason, advice)
         return False

@@ -36,7 +36,8 @@ class BenchResult:
     ``largest_difference_v`` is the largest difference of a command from the recorded one, ``bound_v`` what is allowed,
     ``peak_command_v`` the largest recorded command. ``saturated`` and the counters behind it are those of the code's
     state at the end. Times are of one step: each sample's least time over the passes, then the largest (worst) and the
-    median of the samples, less ``clock_ns``, what reading the clock takes.
+    median of the samples, less ``clock_ns``, what reading the clock takes. ``cycles_per_ns`` is the rate of the
+    processor's counter of cycles; 0 where a program cannot read one.
     """
 
     samples: int
@@ -50,6 +51,7 @@ class BenchResult:
     worst_step_ns: float
     median_step_ns: float
     clock_ns: float
+    cycles_per_ns: float
 
 
 def compiler() -> str | None:
@@ -115,7 +117,7 @@ def compile_and_run(folder: Path, name: str, passes: int = 20) -> BenchResult:
     missing = [each for each in (f"{name}.c", f"{name}_bench.c", "vectors.csv") if not (folder / each).is_file()]
     if missing:
         raise ExportError(f"{folder} has no {', no '.join(missing)}: export the code there first (microrad export c)")
-    code, text = _run((str(_compile(folder, name)), "vectors.csv", str(passes)), folder)
+    code, text = run((str(_compile(folder, name)), "vectors.csv", str(passes)), folder)
     found = _numbers(text)
     if code == 1 and found.get("largest_difference_v", 0.0) > found.get("bound_v", math.inf):
         raise ExportError(
@@ -140,14 +142,22 @@ def _compile(folder: Path, name: str) -> Path:
     else:
         sources = sorted(each.name for each in folder.glob("*.c") if not each.name.endswith("_bench.c"))
         command = (*words, *FLAGS, "-o", target.name, *sources, f"{name}_bench.c", "-lm")
-    code, text = _run(command, folder)
+    code, text = run(command, folder)
     if code != 0:
         raise _failure(f"{shlex.join(command)} in {folder} {_ending(code)}", text)
     return target.resolve()
 
 
-def _run(command: Sequence[str], folder: Path) -> tuple[int, str]:
-    """Exit status and what the program wrote; whatever ends the wait ends the program and all that it started."""
+def run(command: Sequence[str], folder: Path) -> tuple[int, str]:
+    """Exit status and what the program wrote; whatever ends the wait ends the program and all that it started.
+
+    Args:
+        command: The program and its arguments.
+        folder: Where it runs.
+
+    Raises:
+        ExportError: It cannot be started, or takes longer than `TIME_LIMIT_S`.
+    """
     # A make that this runs under would pass its own options on, and its locale would translate messages.
     environment = {key: value for key, value in os.environ.items() if key not in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")}
     environment["LC_ALL"] = "C"

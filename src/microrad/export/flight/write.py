@@ -18,6 +18,7 @@ from microrad.export.flight.fixed import fixed_code, quantisation_text, quantise
 from microrad.export.flight.fixed_form import FixedForm
 from microrad.export.flight.operations import FixedOperations, Operations, fixed_operations, operations
 from microrad.export.flight.rounding import RoundingBound, rounding_bound
+from microrad.export.flight.stack import StackUse, stack_use
 from microrad.export.identifiers import identifier, suggested
 from microrad.export.linear_part.sections import Sections, sections
 from microrad.export.records import FlightController, Vectors
@@ -34,8 +35,8 @@ KIND, WHAT = "export", "exported code"
 class FlightExport:
     """What was written: the controller in its form, what a step costs, how exact it is, and what the bench found.
 
-    ``bench`` is None where there is no compiler. ``bound`` belongs to single precision, ``fixed`` to fixed point,
-    ``left`` to the fine-pointing loop.
+    ``bench`` is None where there is no compiler, ``stack`` where that does not tell. ``bound`` belongs to single
+    precision, ``fixed`` to fixed point, ``left`` to the fine-pointing loop.
     """
 
     folder: Path
@@ -49,6 +50,7 @@ class FlightExport:
     fixed: FixedForm | None
     samples: int
     bench: BenchResult | None
+    stack: StackUse | None
 
 
 def check_output(folder: Path, overwrite: bool) -> None:
@@ -105,11 +107,15 @@ def export_flight(
         for file, text in {**files, "vectors.csv": vectors_text(controller, run)}.items():
             (draft / file).write_text(text, encoding="utf-8", newline="\n")
         on_progress(1, 3, "compiling and running the bench")
-        bench = compile_and_run(draft, name if fixed is None else f"{name}_fixed") if compiler() is not None else None
+        code, bench, stack = name if fixed is None else f"{name}_fixed", None, None
+        if compiler() is not None:
+            bench = compile_and_run(draft, code)
+            sources = [file for file in files if file.endswith(".c") and not file.endswith("_bench.c")]
+            stack = stack_use(draft, sources, f"{code}_step")
         for path in draft.iterdir():  # what the compiler left: the folder holds text, for any machine
             if path.name not in files and path.name != "vectors.csv":
                 path.unlink()
-        found = FlightExport(folder, name, precision, controller, left, form, cost, bound, fixed, samples, bench)
+        found = FlightExport(folder, name, precision, controller, left, form, cost, bound, fixed, samples, bench, stack)
         on_progress(2, 3, "writing")
         (draft / "report.txt").write_text(report_text(found) + "\n", encoding="utf-8", newline="\n")
         text = json.dumps(_manifest(found, choice.source, draft), indent=2, ensure_ascii=False)
@@ -160,6 +166,7 @@ def report_text(of: FlightExport) -> str:
         ("margins", ", ".join(margins)),
         ("leaves", left and f"{rms_text(left.linear_rad)} in linear theory, {rms_text(left.simulated_rad)} simulated"),
         ("a step costs", of.cost.words),
+        ("stack", of.stack and of.stack.words),
         ("single", of.bound and of.bound.words),
         *_measured(of.bench),
     ]
@@ -178,7 +185,17 @@ def _measured(b: BenchResult | None) -> list[tuple[str, str]]:
         ("compiled, run", f"{b.samples} samples of the loop: at most {difference} off the kernel (allowed: {allowed})"),
         ("counters", counts),
         ("time a step", f"{b.worst_step_ns:.0f} ns at worst, {b.median_step_ns:.0f} ns in the median, on this machine"),
+        ("cycles", _cycles(b)),
     ]
+
+
+def _cycles(b: BenchResult) -> str:
+    """The times in cycles of the processor's counter; nothing where it has none."""
+    if not b.cycles_per_ns:
+        return ""
+    worst, median = (b.cycles_per_ns * each for each in (b.worst_step_ns, b.median_step_ns))
+    rate = format_quantity(1e9 * b.cycles_per_ns, "Hz", 3)
+    return f"{worst:.0f} at worst, {median:.0f} in the median, of this machine's counter at {rate}"
 
 
 def export_data(of: FlightExport) -> dict[str, Any]:
@@ -203,6 +220,7 @@ def export_data(of: FlightExport) -> dict[str, Any]:
             "simulated_rms_rad_per_axis": of.left.simulated_rad,
         },
         "operations": asdict(of.cost),
+        "stack": None if of.stack is None else asdict(of.stack),
         "bound": None if of.bound is None else asdict(of.bound),
         "bench": None if of.bench is None else asdict(of.bench),
     }

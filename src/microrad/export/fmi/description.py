@@ -1,6 +1,8 @@
 """What a co-simulation unit (FMU) shows of itself: its variables with units, and the model description."""
 
-from dataclasses import dataclass
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from importlib.metadata import version as version_of
 from typing import Literal
 
@@ -15,6 +17,7 @@ Range = Literal["any", "not negative", "positive"]
 UNITS = (
     ("s", (("s", 1),), ()),
     ("V", (("kg", 1), ("m", 2), ("s", -3), ("A", -1)), ()),
+    ("m", (("m", 1),), (("um", "1e6"),)),
     ("rad", (("rad", 1),), (("urad", "1e6"), ("mrad", "1e3"))),
     ("Hz", (("s", -1),), ()),
     ("V/s", (("kg", 1), ("m", 2), ("s", -4), ("A", -1)), ()),
@@ -24,10 +27,10 @@ UNITS = (
 )
 """Units of the variables: name, powers of the base units of the SI, and units to show it in, with their factors."""
 
-BOUC_WEN = (
-    ("d1_rad_v", "d1", kernels.D1, "rad/V", "any", "linear gain"),
+BOUC_WEN: tuple[tuple[str, str, int, str | None, Range, str], ...] = (
+    ("d1", "d1", kernels.D1, None, "any", "linear gain"),
     ("d2_s_v", "d2", kernels.D2, "s/V", "any", "change of the linear gain with the rate of the drive"),
-    ("epsilon_rad_v", "epsilon", kernels.EPSILON, "rad/V", "any", "gain of the hysteresis"),
+    ("epsilon", "epsilon", kernels.EPSILON, None, "any", "gain of the hysteresis"),
     ("delta_s_v", "delta", kernels.DELTA, "s/V", "any", "growth of the hysteresis with the rate of the drive"),
     ("alpha_1_v", "alpha", kernels.ALPHA, "1/V", "any", "decay of the hysteresis"),
     ("beta_1_v", "beta", kernels.BETA, "1/V", "any", "decay that tells loading from unloading"),
@@ -36,8 +39,7 @@ BOUC_WEN = (
     ("rate_limit_v_s", "rate_limit", kernels.RATE_LIMIT, "V/s", "positive", "fastest rate that was identified"),
     ("bias_v", "bias", kernels.BIAS, "V", "any", "drive at rest"),
 )
-"""Parameters of a Bouc-Wen element: name, field in C, column of the kernel, unit, range, meaning."""
-
+"""Parameters of a Bouc-Wen element: name, field in C, column of the kernel, unit (None: of a gain), range, meaning."""
 
 PLANT_COUNTERS = [
     ("rate_clamped", "plant.rate_clamped", "elements and plant steps beyond the identified rate"),
@@ -58,8 +60,9 @@ CONTROLLER_COUNTERS = [
 class Variable:
     """A variable of a unit; its place in the list is its value reference.
 
-    ``place`` is where it stands in the C structure of an instance. It is a whole number if it ``counts``, else a real
-    number. Outputs depend at once on the inputs ``dependencies``, by name.
+    ``size`` is the number of elements of an array; None for a scalar. ``place`` is where it stands in the C structure
+    of an instance, an array from the element ``first`` there. It is a whole number if it ``counts``, else real.
+    ``start`` has a number for each element. Outputs depend at once on the inputs ``dependencies``, by name.
     """
 
     name: str
@@ -67,7 +70,9 @@ class Variable:
     causality: Causality
     description: str
     unit: str = ""
-    start: float | None = None
+    start: tuple[float, ...] | None = None
+    size: int | None = None
+    first: int = 0
     counts: bool = False
     constant: bool = False
     range: Range = "any"
@@ -94,6 +99,28 @@ class Variable:
         """Lower bound of its numbers."""
         return None if self.range == "any" else "0"
 
+    @property
+    def begin(self) -> str:
+        """Where it begins in the C structure of an instance."""
+        return self.place if self.size is None else f"{self.place}[{self.first}]"
+
+    @property
+    def elements(self) -> "tuple[Variable, ...]":
+        """The elements of an array, counted from 1, each a variable by itself; a scalar as it is."""
+        if self.size is None:
+            return (self,)
+        return tuple(
+            replace(
+                self,
+                name=f"{self.name}[{i + 1}]",
+                place=f"{self.place}[{self.first + i}]",
+                start=None if self.start is None else (self.start[i],),
+                size=None,
+                dependencies=tuple(f"{each}[{i + 1}]" for each in self.dependencies),
+            )
+            for i in range(self.size)
+        )
+
 
 def plant_of(unit: PlantUnit | LoopUnit) -> PlantUnit:
     """The plant of a unit."""
@@ -105,20 +132,32 @@ def exponent(row: kernels.Floats) -> float:
     return 1.0 + float(row[kernels.POWER])
 
 
-def variables(unit: PlantUnit | LoopUnit) -> tuple[Variable, ...]:
-    """The variables of a unit by value reference."""
+def variables(unit: PlantUnit | LoopUnit, version: Version) -> tuple[Variable, ...]:
+    """The variables of a unit by value reference: arrays in FMI 3.0, each element by itself in 2.0, which has none.
+
+    Args:
+        unit: The mirror with its amplifier, or a closed loop.
+        version: Version of FMI.
+    """
+    arrays = _variables(unit)
+    return arrays if version == "3.0" else tuple(element for each in arrays for element in each.elements)
+
+
+def _variables(unit: PlantUnit | LoopUnit) -> tuple[Variable, ...]:
     found, counters = [Variable("time", "time_s", "independent", "simulation time", "s")], PLANT_COUNTERS
     if isinstance(unit, LoopUnit):
         found += _loop_signals(unit)
         counters = PLANT_COUNTERS + CONTROLLER_COUNTERS
     else:
-        text = "command to actuator {}, from the bias, held over the communication step"
-        found += _row("command_v", len(unit.plant.actuators), "input", text, "V", start=0.0)
+        text = "command by actuator, from the bias, held over the communication step"
+        found.append(_input("command_v", len(unit.plant.actuators), text, "V"))
     of = plant_of(unit)
-    found += _row("line_of_sight_rad", len(of.optics), "output", "line of sight, axis {}", "rad")
-    found += _row("mirror_rad", len(of.plant.outputs), "output", "output {} of the mirror", "rad", "plant.y")
-    text = "drive of actuator {} behind the amplifier, as seen at its input, from the bias"
-    found += _row("drive_v", len(of.plant.actuators), "output", text, "V", "plant.u")
+    text = "drive by actuator behind the amplifier, as seen at its input, from the bias"
+    found += [
+        _output("line_of_sight_rad", len(of.optics), "line of sight by axis", "rad"),
+        _output(f"mirror_{of.output_unit}", len(of.plant.outputs), "outputs of the mirror", of.output_unit, "plant.y"),
+        _output("drive_v", len(of.plant.actuators), text, "V", "plant.u"),
+    ]
     found += [Variable(name, place, "output", text, counts=True) for name, place, text in counters]
     return (*found, *_parameters(of), *_constants(unit))
 
@@ -126,14 +165,14 @@ def variables(unit: PlantUnit | LoopUnit) -> tuple[Variable, ...]:
 def _loop_signals(unit: LoopUnit) -> list[Variable]:
     axes, actuators = unit.plant.optics.shape[0], len(unit.plant.plant.actuators)
     held = "taken at the begin of the communication step and held over it"
-    found = _row("reference_rad", axes, "input", f"reference of axis {{}}, {held}", "rad", start=0.0)
-    found += _row("disturbance_rad", axes, "input", f"disturbance of axis {{}}, {held}", "rad", start=0.0)
-    for i in range(axes):
-        text = f"error of axis {i + 1}: reference + disturbance - line of sight"
-        seen = (f"reference_rad[{i + 1}]", f"disturbance_rad[{i + 1}]")
-        found.append(Variable(f"error_rad[{i + 1}]", f"error_rad[{i}]", "output", text, "rad", dependencies=seen))
-    text = "command that the last control sample gave actuator {}, from the bias"
-    return found + _row("command_v", actuators, "output", text, "V", "loop.command_v")
+    error = _output("error_rad", axes, "error by axis: reference + disturbance - line of sight", "rad")
+    text = "command by actuator that the last control sample gave, from the bias"
+    return [
+        _input("reference_rad", axes, f"reference by axis, {held}", "rad"),
+        _input("disturbance_rad", axes, f"disturbance by axis, {held}", "rad"),
+        replace(error, dependencies=("reference_rad", "disturbance_rad")),
+        _output("command_v", actuators, text, "V", "loop.command_v"),
+    ]
 
 
 def _parameters(of: PlantUnit) -> list[Variable]:
@@ -145,33 +184,44 @@ def _parameters(of: PlantUnit) -> list[Variable]:
             ("amplifier_slew_v_s", "slew limit of the amplifier, as seen at its input", "V/s", slew),
         )
     ]
+    ending, gain = _gain(of)
     for e, row in enumerate(p.bouc_wen):
         within = f"bouc_wen[{e + 1}]."
         for name, field, column, unit, allowed, meaning in BOUC_WEN:
-            place = f"plant.bouc_wen[{e}].{field}"
-            found.append(_parameter(within + name, place, meaning, unit, float(row[column]), allowed))
+            place, start = f"plant.bouc_wen[{e}].{field}", float(row[column])
+            called, counted = (name, unit) if unit is not None else (f"{name}{ending}", gain)
+            found.append(_parameter(within + called, place, meaning, counted, start, allowed))
         place, meaning = f"plant.exponent[{e}]", "exponent of the hysteresis in its decay"
         found.append(_parameter(f"{within}exponent", place, meaning, "", exponent(row), "positive"))
     for o in range(len(p.operators)):
-        found += _operator_parameters(p, o)
+        found += _operator_parameters(of, o)
     return found
 
 
-def _operator_parameters(p: kernels.Plant, o: int) -> list[Variable]:
-    within, (growth, limit) = f"prandtl_ishlinskii[{o + 1}].", p.operator[o, :2]
+def _gain(of: PlantUnit) -> tuple[str, str]:
+    """How the names of gains of the plant's elements end, and their unit: none where drive and output are volts."""
+    return ("", "") if of.element_unit == "V" else ("_rad_v", "rad/V")
+
+
+def _operator_parameters(of: PlantUnit, o: int) -> list[Variable]:
+    p, within, (growth, limit) = of.plant, f"prandtl_ishlinskii[{o + 1}].", of.plant.operator[o, :2]
+    *polynomial, reach = of.plant.operator[o, 2:].tolist()
     text, fastest = "growth of the thresholds above 0 with the rate of the drive", "fastest rate that was identified"
+    ending, gain = _gain(of)
+    begin, end = int(p.play_start[o]), int(p.play_start[o + 1])
     found = [
         _parameter(f"{within}widening_s", f"plant.widening_s[{o}]", text, "s", growth, "not negative"),
         _parameter(f"{within}rate_limit_v_s", f"plant.rate_limit_v_s[{o}]", fastest, "V/s", limit, "positive"),
     ]
-    plays = range(int(p.play_start[o]), int(p.play_start[o + 1]))
-    for name, unit, values, allowed, text in (
-        ("threshold_v", "V", p.play_threshold, "not negative", "threshold of play {}"),
-        ("weight_rad_v", "rad/V", p.play_weight, "any", "weight of play {}"),
-    ):
-        for at, j in enumerate(plays, start=1):
-            place, start = f"plant.{name}[{j}]", float(values[j])
-            found.append(_parameter(f"{within}{name}[{at}]", place, text.format(at), unit, start, allowed))
+    place, text, values = "plant.threshold_v", "thresholds of the plays", p.play_threshold[begin:end].tolist()
+    found.append(replace(_array(f"{within}threshold_v", place, text, "V", values, "not negative"), first=begin))
+    place, text, values = "plant.weight", "weights of the plays", p.play_weight[begin:end].tolist()
+    found.append(replace(_array(f"{within}weight{ending}", place, text, gain, values, "any"), first=begin))
+    if math.isfinite(reach):
+        name, text = f"{within}polynomial_{of.element_unit.lower()}", "of s^2, |s| s and s^3 beside the plays"
+        found.append(_array(name, f"plant.polynomial[{o}]", text, of.element_unit, polynomial, "any"))
+        text = "drive where s, the drive over it, is 1; beyond it the polynomial keeps its value"
+        found.append(_parameter(f"{within}reach_v", f"plant.reach_v[{o}]", text, "V", reach, "positive"))
     return found
 
 
@@ -191,23 +241,26 @@ def _constants(unit: PlantUnit | LoopUnit) -> list[Variable]:
             ("command_maximum_v", "V", of.maximum_v, "highest command, from the bias"),
         ]
     return [
-        Variable(name, f"constants[{i}]", "local", meaning, unit_name, value, constant=True)
+        Variable(name, f"constants[{i}]", "local", meaning, unit_name, (value,), constant=True)
         for i, (name, unit_name, value, meaning) in enumerate(found)
     ]
 
 
-def _row(
-    name: str, size: int, causality: Causality, text: str, unit: str, place: str = "", start: float | None = None
-) -> list[Variable]:
-    """The elements of an array, each a variable by itself; ``place`` is that of the array where it is not ``name``."""
-    return [
-        Variable(f"{name}[{i + 1}]", f"{place or name}[{i}]", causality, text.format(i + 1), unit, start)
-        for i in range(size)
-    ]
+def _input(name: str, size: int, text: str, unit: str) -> Variable:
+    return Variable(name, name, "input", text, unit, (0.0,) * size, size)
 
 
-def _parameter(name: str, place: str, text: str, unit: str, start: float, allowed: str) -> Variable:
-    return Variable(name, place, "parameter", text, unit, float(start), range=allowed)  # type: ignore[arg-type]
+def _output(name: str, size: int, text: str, unit: str, place: str = "") -> Variable:
+    """An array; ``place`` is where it stands if not under its ``name``."""
+    return Variable(name, place or name, "output", text, unit, None, size)
+
+
+def _parameter(name: str, place: str, text: str, unit: str, start: float, allowed: Range) -> Variable:
+    return Variable(name, place, "parameter", text, unit, (float(start),), range=allowed)
+
+
+def _array(name: str, place: str, text: str, unit: str, start: Sequence[float], allowed: Range) -> Variable:
+    return Variable(name, place, "parameter", text, unit, tuple(map(float, start)), len(start), range=allowed)
 
 
 def _described(unit: PlantUnit | LoopUnit) -> tuple[str, str]:
@@ -238,7 +291,7 @@ def model_description(
         guid: The identifier of its contents, in braces.
         compiled: Names of its C source files, without headers.
     """
-    listed = variables(unit)
+    listed = variables(unit, version)
     places = {v.name: i for i, v in enumerate(listed)}
     unknowns = [(i, [places[d] for d in v.dependencies]) for i, v in enumerate(listed) if v.causality == "output"]
     model, text = _described(unit)

@@ -73,8 +73,9 @@ def write_unit(unit: PlantUnit | LoopUnit, path: Path, version: Version, name: s
 
     Plant: inputs command_v (V from the bias, held over the communication step); outputs mirror_rad, line_of_sight_rad,
     drive_v and counters. Loop: inputs reference_rad and disturbance_rad (rad, taken at the begin of the communication
-    step and held over it); outputs error_rad, line_of_sight_rad, mirror_rad, command_v, drive_v and counters. Arrays
-    are scalars ``command_v[1]``. A communication step is a whole number of plant steps; another one is an error of the
+    step and held over it); outputs error_rad, line_of_sight_rad, mirror_rad, command_v, drive_v and counters. A mirror
+    whose outputs are displacements has mirror_m. Version 2.0 knows no arrays: their elements are variables by
+    themselves, ``command_v[1]``. A communication step is a whole number of plant steps; another one is an error of the
     call, and changes nothing. Parameters act until the initialisation ends.
 
     The library inside is compiled here, if there is a C compiler. The same unit gives the same file.
@@ -107,7 +108,7 @@ def write_unit(unit: PlantUnit | LoopUnit, path: Path, version: Version, name: s
 
 def _texts(unit: PlantUnit | LoopUnit, version: Version, name: str) -> tuple[dict[str, str], str]:
     """All files but the library, and the GUID, which stands for what is in them."""
-    code = unit_code(unit, name)
+    code = unit_code(unit, version, name)
     adapter = f"fmi{version[0]}.c"
     compiled = (*(file for file in code if file.endswith(".c")), adapter)
 
@@ -131,11 +132,12 @@ def _texts(unit: PlantUnit | LoopUnit, version: Version, name: str) -> tuple[dic
 
 
 # -------------------------------------------------------------------------------------------------------------- sources
-def unit_code(unit: PlantUnit | LoopUnit, name: str) -> dict[str, str]:
+def unit_code(unit: PlantUnit | LoopUnit, version: Version, name: str) -> dict[str, str]:
     """The C of a unit without the functions of the standard, as texts by file name.
 
     Args:
         unit: The mirror with its amplifier, or a closed loop.
+        version: Version of the interface, which says what its variables are.
         name: What the unit calls itself, an identifier of C.
 
     Raises:
@@ -151,23 +153,20 @@ def unit_code(unit: PlantUnit | LoopUnit, name: str) -> dict[str, str]:
         code |= {file: text for file, text in flight.items() if file.endswith((".h", ".c")) and "_bench" not in file}
         values = {"name": loop, "plant": plant, "control": control, **_loop_values(unit)}
         code |= {f"{loop}.{kind}": render(f"loop.{kind}.j2", **values) for kind in ("h", "c")}
+    listed = variables(unit, version)
     shown = {
         "name": f"{name}_unit",
         "plant": plant,
         "loop": loop if isinstance(unit, LoopUnit) else "",
-        "variables": variables(unit),
-        "constants": [each.start for each in variables(unit) if each.constant],
+        "of": plant_of(unit),
+        "variables": listed,
+        "constants": [number for each in listed if each.constant for number in each.start or ()],
     }
     return code | {f"{name}_unit.{kind}": render(f"fmi_unit.{kind}.j2", **shown) for kind in ("h", "c")}
 
 
 def _plant_values(unit: PlantUnit) -> dict[str, Any]:
-    """What the templates of a plant are filled with, but for its name. Raises ExportError for a polynomial."""
-    if np.isfinite(unit.plant.operator[:, -1]).any():
-        raise ExportError(
-            "the mirror has a polynomial beside its plays (a hysteretic spring), and the plant in C knows plays alone; "
-            "write a mirror without one"
-        )
+    """What the templates of a plant are filled with, but for its name."""
     p, count = unit.plant, np.diff(unit.plant.rest.start.astype(int))
     row = np.repeat(np.arange(count.size), count)
     return {
@@ -181,6 +180,7 @@ def _plant_values(unit: PlantUnit) -> dict[str, Any]:
         "bouc_wen": [row[: kernels.POWER] for row in p.bouc_wen],
         "exponent": np.array([exponent(row) for row in p.bouc_wen]),
         "operator": list(p.operator),
+        "polynomial": p.operator[:, 2:5] if np.isfinite(p.operator[:, 5]).any() else None,
     }
 
 

@@ -18,6 +18,7 @@ import numpy as np
 
 from microrad.core.folder import read_bytes
 from microrad.core.lti import frequency_response
+from microrad.export.linear_import.hold import without_hold
 from microrad.export.linear_import.matlab import MOST_BYTES, select
 from microrad.export.linear_import.roots import Roots, checked, response, roots_of_control, roots_of_fields
 from microrad.export.records import ExportError
@@ -52,7 +53,8 @@ class Given:
 def import_mat(path: Path, given: Given, variable: str | None = None) -> str:
     """The text of a mirror file from a MATLAB file that has A B C D, z p k or num den, with Ts where it is sampled.
 
-    They are variables of their own or fields of one structure. Where there are several forms, A B C D count.
+    They are variables of their own or fields of one structure. Where there are several forms, A B C D count. Of a
+    sampled model the mirror is the continuous one that gives it when its drive is held over each sample.
 
     Args:
         path: The MATLAB file, version 5 to 7.
@@ -67,8 +69,7 @@ def import_mat(path: Path, given: Given, variable: str | None = None) -> str:
     place = f"{path}, {chosen}" if chosen else str(path)
     said = f"{path.name}, {chosen}" if chosen else path.name
     digest = hashlib.sha256(read_bytes(path, MOST_BYTES)).hexdigest()
-    model = _factored(lambda: roots_of_fields(found, place), place)
-    return _text(model, given, place, (said, f"#   sha256 {digest}"))
+    return _text(lambda: roots_of_fields(found, place), given, place, (said, f"#   sha256 {digest}"))
 
 
 def import_control(system: Any, given: Given, source: str = "python-control") -> str:
@@ -82,13 +83,17 @@ def import_control(system: Any, given: Given, source: str = "python-control") ->
     Raises:
         ExportError: What cannot be said in a mirror file, with the reason.
     """
-    return _text(_factored(lambda: roots_of_control(system, source), source), given, source, (source,))
+    return _text(lambda: roots_of_control(system, source), given, source, (source,))
 
 
-def _factored(make: Callable[[], Roots], source: str) -> Roots:
+def _factored(make: Callable[[], Roots], given: Given, source: str) -> tuple[Roots, float]:
+    """The continuous model, and the sample time of the one that it was made of; 0 where that was continuous."""
     try:
         with np.errstate(all="ignore"):  # the file's response is compared with the model's in the end
-            return checked(make(), source)
+            made = make()
+            if made.period_s:
+                _check_band(given, made.period_s, source)
+            return checked(without_hold(made, source) if made.period_s else made, source), made.period_s
     except ExportError:
         raise
     except (ArithmeticError, ValueError) as error:
@@ -99,8 +104,9 @@ def _factored(make: Callable[[], Roots], source: str) -> Roots:
 
 
 # ---------------------------------------------------------------------------------------------------------------- text
-def _text(model: Roots, given: Given, source: str, said_of: tuple[str, ...]) -> str:
+def _text(make: Callable[[], Roots], given: Given, source: str, said_of: tuple[str, ...]) -> str:
     """``said_of`` is what the file's comments call the source, then further lines of its head."""
+    model, period_s = _factored(make, given, source)
     _check_given(given, source)
     gain = _gain(model, given, source)
     said = "imported from " + "".join(c if c.isprintable() else " " for c in said_of[0])
@@ -108,6 +114,7 @@ def _text(model: Roots, given: Given, source: str, said_of: tuple[str, ...]) -> 
     lines = [
         f"# Mirror {said}: linear, without hysteresis or creep.",
         *said_of[1:],
+        *([f"#   sampled there, Ts = {period_s!r} s; its drive counts as held over each sample"] if period_s else []),
         f"name = {_quoted(given.name)}",
         _line("travel", _quoted(f"{given.travel_rad!r} rad"), stated),
         _line("composition", '"cascade"', "the linear part behind a straight gain"),
@@ -148,6 +155,14 @@ def _check_given(given: Given, source: str) -> None:
         raise ExportError(
             f"{source}: the gain is taken at {at:g} Hz (normalise_at), which is not in the band of {low:g} Hz to "
             f"{high:g} Hz that the model was identified in; give a frequency inside it"
+        )
+
+
+def _check_band(given: Given, period_s: float, source: str) -> None:
+    if given.excited_to_hz > 0.5 / period_s:
+        raise ExportError(
+            f"{source}: the band ends at {given.excited_to_hz:g} Hz, and a model that is sampled at Ts = {period_s:g} "
+            f"s says nothing beyond {0.5 / period_s:g} Hz; give the band that it was identified in"
         )
 
 

@@ -1,7 +1,7 @@
 """A linear system of one input and one output as zeros, poles and gain, from the forms that tools save; its checks."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
 
@@ -27,11 +27,15 @@ _CONJUGATE = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class Roots:
-    """gain x product of (s - zero) over product of (s - pole), s in rad/s; pairs of conjugates to the last bit."""
+    """gain x product of (s - zero) over product of (s - pole); pairs of conjugates to the last bit.
+
+    s is in rad/s, or z of a model that is sampled at ``period_s`` above 0.
+    """
 
     zeros: Complexes
     poles: Complexes
     gain: float
+    period_s: float = 0.0
 
 
 def response(of: Roots, freq_hz: Floats) -> Complexes:
@@ -41,7 +45,8 @@ def response(of: Roots, freq_hz: Floats) -> Complexes:
         of: The system.
         freq_hz: Frequencies in Hz, any shape.
     """
-    return factored(of.zeros, of.poles, of.gain, np.asarray(2j * np.pi * freq_hz, dtype=complex))
+    s = np.asarray(2j * np.pi * freq_hz, dtype=complex)
+    return factored(of.zeros, of.poles, of.gain, np.exp(s * of.period_s) if of.period_s else s)
 
 
 # --------------------------------------------------------------------------------------------------------------- forms
@@ -53,7 +58,7 @@ def roots_of_fields(fields: dict[str, Any], source: str) -> Roots:
         source: What messages call the system.
 
     Raises:
-        ExportError: For what is not one continuous system of one input (in V where its unit is named) and one output.
+        ExportError: For what is not one system of one input (in V where its unit is named) and one output.
     """
     stated = fields.get("InputUnit")  # an export of microrad names its input's unit: a mirror takes volts
     unit = stated.item() if isinstance(stated, np.ndarray) and stated.size == 1 else ""
@@ -61,12 +66,16 @@ def roots_of_fields(fields: dict[str, Any], source: str) -> Roots:
         raise ExportError(
             f"{source}: its input is in {unit}, and a mirror's drive is in V; choose the one from drive to angle"
         )
+    period_s = 0.0
     if "Ts" in fields:
         value = numbers(fields, "Ts", source)
-        _refuse_sampled(float(value.item()) if value.size == 1 else math.nan, source)
-    form = form_of(fields)
+        period_s = _period(float(value.item()) if value.size == 1 else math.nan, source)
+    return replace(_of_form(fields, form_of(fields), period_s, source), period_s=period_s)
+
+
+def _of_form(fields: dict[str, Any], form: tuple[str, ...], period_s: float, source: str) -> Roots:
     if form[0] == "A":
-        return roots_of_states(lti.StateSpace(*(numbers(fields, key, source) for key in form)), source)
+        return roots_of_states(lti.StateSpace(*(numbers(fields, key, source) for key in form)), period_s, source)
     if form[0] == "num":
         num, den = (_row(numbers(fields, key, source), key, source) for key in form)
         return roots_of_coefficients(num, den, source)
@@ -77,12 +86,13 @@ def roots_of_fields(fields: dict[str, Any], source: str) -> Roots:
     return Roots(paired(zeros, "z", source), paired(poles, "p", source), float(gain.item()))
 
 
-def _refuse_sampled(period_s: float, source: str) -> None:
-    if period_s != 0.0:
+def _period(period_s: float, source: str) -> float:
+    if not 0.0 <= period_s < math.inf:
         raise ExportError(
-            f"{source}: sampled, Ts = {period_s:g} s, and a mirror is continuous; convert it first (d2c in MATLAB), or "
-            "say Ts = 0 if it is continuous"
+            f"{source}: sampled, Ts = {period_s:g} s, which is no time; give the sample time in s, or Ts = 0 if it is "
+            "continuous"
         )
+    return period_s
 
 
 def _row(values: Any, key: str, source: str) -> Any:
@@ -93,11 +103,12 @@ def _row(values: Any, key: str, source: str) -> Any:
     return values.reshape(-1)
 
 
-def roots_of_states(system: lti.StateSpace, source: str) -> Roots:
-    """Zeros, poles and gain of a continuous state space of one input and one output.
+def roots_of_states(system: lti.StateSpace, period_s: float, source: str) -> Roots:
+    """Zeros, poles and gain of a state space of one input and one output.
 
     Args:
         system: The state space, time in s; its shapes are checked here.
+        period_s: Its sample time in s; 0 where it is continuous.
         source: What messages call it.
 
     Raises:
@@ -116,16 +127,16 @@ def roots_of_states(system: lti.StateSpace, source: str) -> Roots:
         )
     if n > MOST_ORDER:
         raise ExportError(f"{source}: {n} states, and a mirror has at most {MOST_ORDER}; reduce the model (balred)")
-    refuse_hidden(system, 0.0, source)
+    refuse_hidden(system, period_s, source)
     zeros, poles, gain = factors(*polynomials(entry_of(system, 0, 0)))
     return Roots(paired(zeros, "zeros", source), paired(poles, "poles", source), gain)
 
 
 def roots_of_coefficients(numerator: Floats, denominator: Floats, source: str) -> Roots:
-    """Zeros, poles and gain of a quotient of polynomials in s (rad/s).
+    """Zeros, poles and gain of a quotient of polynomials in s (rad/s) or z.
 
     Args:
-        numerator: Its coefficients, highest power of s (rad/s) first, shape (coefficients,).
+        numerator: Its coefficients, highest power first, shape (coefficients,).
         denominator: Those of the denominator, likewise.
         source: What messages call the system.
 
@@ -153,8 +164,8 @@ def roots_of_control(system: Any, source: str) -> Roots:
         source: What messages call it.
 
     Raises:
-        ExportError: For other objects, several inputs or outputs, sampled ones, and where python-control is not
-            installed.
+        ExportError: For other objects, several inputs or outputs, a sample time that is not known, and where
+            python-control is not installed.
     """
     library = python_control()
     if not isinstance(system, library.StateSpace | library.TransferFunction):
@@ -165,7 +176,6 @@ def roots_of_control(system: Any, source: str) -> Roots:
         raise ExportError(
             f"{system.name} has dt = {system.dt}: continuous, or sampled how fast? Give it dt = 0 or its period in s"
         )
-    _refuse_sampled(float(system.dt), source)
     if (system.ninputs, system.noutputs) != (1, 1):
         found = f"{system.ninputs} inputs and {system.noutputs} outputs"
         raise ExportError(f"{source}: {found}; a mirror file has one drive and one angle: choose")
@@ -173,6 +183,7 @@ def roots_of_control(system: Any, source: str) -> Roots:
         arrays = {key: getattr(system, key) for key in "ABCD"}
     else:
         arrays = {"num": system.num_array[0, 0], "den": system.den_array[0, 0]}
+    arrays["Ts"] = float(system.dt)
     return roots_of_fields({key: np.atleast_2d(np.asarray(value)) for key, value in arrays.items()}, source)
 
 
@@ -181,7 +192,7 @@ def paired(found: Complexes, key: str, source: str) -> Complexes:
     """Real roots as they are, and complex ones in pairs of conjugates that agree to the last bit.
 
     Args:
-        found: The roots in rad/s, shape (roots,).
+        found: The roots, shape (roots,).
         key: What messages call the roots.
         source: What messages call the system.
 

@@ -50,11 +50,24 @@ def whole_plant(loop: PointingLoop, to_drives: Floats) -> WholePlant:
     return WholePlant(loop.timing.period_s, exact, axes, disturbances, nominal_axis_gain(loop))
 
 
+def driven_plant(loop: PointingLoop) -> lti.StateSpace:
+    """All axes of this loop over a control period, without disturbances and noise; sensor as in `design_plant`.
+
+    Inputs: commands of the actuators. Outputs: residuals, optical readings, and the mirror at the line of sight.
+
+    Args:
+        loop: The loop.
+    """
+    actuators = loop.mirror.actuators
+    s, _ = _sampled(loop, np.eye(actuators))
+    return lti.system_to_bits(lti.StateSpace(s.A, s.B[:, :actuators], s.C, s.D[:, :actuators]), lti.DESIGN_BITS)
+
+
 def _sampled(loop: PointingLoop, to_drives: Floats) -> tuple[lti.StateSpace, int]:
     """The loop over a control period, and the number of white sequences behind its disturbances.
 
-    Inputs: commands of the axes, white sequences, optical noise by axis, one for a gauge. Outputs: residuals, optical
-    readings, and the mirror at the line of sight without a gauge's noise.
+    Inputs: commands, white sequences, optical noise by axis, one for a gauge. Outputs: residuals, optical readings, and
+    the mirror at the line of sight without a gauge's noise.
     """
     spread = np.sqrt(loop.optical.every)  # of a hold's noise to low frequencies
     random = tuple(tuple(narrow_band(each) for each in several) for several in loop.disturbances)
@@ -64,7 +77,11 @@ def _sampled(loop: PointingLoop, to_drives: Floats) -> tuple[lti.StateSpace, int
     keep[o.at.held] = False
     shift = o.shift.copy()
     shift[o.newest] = 0.0
-    period, command, factor = np.eye(o.at.order), np.zeros((o.at.order, axes)), np.zeros((o.at.order, o.at.order))
+    period, command, factor = (
+        np.eye(o.at.order),
+        np.zeros((o.at.order, to_drives.shape[1])),
+        np.zeros((o.at.order, o.at.order)),
+    )
     for step in o.steps:
         period = step @ period
         factor = step @ factor @ step.T + o.noise @ o.noise.T
@@ -76,7 +93,8 @@ def _sampled(loop: PointingLoop, to_drives: Floats) -> tuple[lti.StateSpace, int
     rows = np.vstack([o.error, o.reading, loop.optics @ o.mirror])[:, keep]
     D = np.zeros((3 * axes, B.shape[1]))
     D[axes : 2 * axes, -1 - axes : -1] = loop.optical.noise_rad * spread * np.eye(axes)
-    B[:, axes:] = lti.to_bits(B[:, axes:], lti.EXACT_BITS)
+    noise = to_drives.shape[1]
+    B[:, noise:] = lti.to_bits(B[:, noise:], lti.EXACT_BITS)
     return lti.StateSpace(A, B, rows, D), noises.shape[1]
 
 
