@@ -13,7 +13,7 @@ from microrad import mirror
 from microrad.core import kernels, lti
 from microrad.core.arrays import Floats
 from microrad.loop import disturbance
-from microrad.loop.control import amplifier_factor, inverse_arrays, no_feedforward
+from microrad.loop.control import adaptive_arrays, amplifier_factor, at_the_begin, inverse_arrays, no_feedforward
 from microrad.loop.pointing_loop.loop import LoopController, PointingLoop
 from microrad.loop.sensor import StrainGauge
 
@@ -169,6 +169,7 @@ def arrays(
         L=np.asarray(controller.anti_windup, dtype=float),
         actuator=np.tile(np.array(row), (actuators, 1)),
         **inverse_arrays(inverse, timing.period_s),
+        **adaptive_arrays(controller.adaptation, timing.period_s),
     )
     return kernels.by_rows(found)
 
@@ -185,7 +186,7 @@ def check_controller(loop: PointingLoop, controller: LoopController) -> None:
     """
     s, m = controller.system, loop.mirror
     inputs = loop.axes + m.axes + loop.axes
-    outputs = m.actuators * (3 if controller.inverse else 1)
+    outputs = m.actuators * (4 if controller.adaptation else 3 if controller.inverse else 1)
     order = s.A.shape[0]
     wanted = {"A": (order, order), "B": (order, inputs), "C": (outputs, order), "D": (outputs, inputs)}
     matrices = {**{key: getattr(s, key) for key in "ABCD"}, "L": controller.anti_windup}
@@ -248,6 +249,8 @@ def start(
         inverse=_rows(p.inverse_bouc_wen.shape[0]),
         inverse_play=_rows(p.inverse_play_threshold.size),
         inverse_lag=_rows(p.inverse_lag_keep.size),
+        learnt=_rows(p.adaptive_weight.size * kernels.PLAY_FIELDS),
+        track=_rows(len(p.adaptive) * kernels.TRACK_FIELDS),
         work=_rows(m),
         sum=_rows(axes),
         sum_square=_rows(axes),
@@ -256,6 +259,8 @@ def start(
         histogram=np.zeros((LANES, kernels.BINS), dtype=np.int32),
         drawn=np.zeros(0),
     )
+    for rows, begin in zip((state.learnt, state.track), at_the_begin(p), strict=True):
+        rows.reshape(-1, LANES)[: begin.size] = begin.reshape(-1, 1)
     shaped = lti.to_bits(p.shaping_output @ state.shaping.reshape(-1, LANES)[: p.shaping_diagonal.size], lti.EXACT_BITS)
     state.disturbance[:] = shaped.ravel()
     state.error[:] = (shaped + reference(loop, 0, 0, references)[0]).ravel()
