@@ -732,7 +732,8 @@ def statistics_case():
 
 def test_every_counter_is_its_twins():
     ensemble, _ = assert_is_its_twin(statistics_case(), range(0, LANES, 8))
-    assert np.all(np.any(ensemble.lines("counts") > 0, axis=1))
+    counted = np.any(ensemble.lines("counts") > 0, axis=1)
+    assert np.all(np.delete(counted, kernels.COUNT_FALLBACK))  # an adaptive inverse's: tests/core/test_adaptive_kernel
     assert len(ensemble.lines("counts")) == kernels.COUNT_FIELDS == len(pointing.Counts._fields)
 
 

@@ -100,9 +100,14 @@ class PaperLoopChoice:
 Choice = PointingChoice | CoupledChoice | PaperLoopChoice
 
 
-def names(table: FinePointing | None) -> tuple[str, ...]:
-    """The controllers of a mission with this table of its fine-pointing loop, or without one."""
-    return (*(() if table is None else controller_study.names(table)), PID, PID_WITH_INVERSE)
+def names(table: FinePointing | None, of: MirrorTable) -> tuple[str, ...]:
+    """The controllers of a mission.
+
+    Args:
+        table: Its fine-pointing loop, where it has one.
+        of: Its mirror.
+    """
+    return (*(() if table is None else controller_study.offered(table, of)), PID, PID_WITH_INVERSE)
 
 
 def source(file: MissionFile) -> Source:
@@ -124,7 +129,7 @@ def choose(
     Raises:
         ExportError: The mission has no such controller, or it cannot be built on the mission's mirror.
     """
-    m, has = file.mission, names(file.mission.fine_pointing)
+    m, has = file.mission, names(file.mission.fine_pointing, file.mission.mirror)
     if name not in has:
         raise ExportError(f"{file.path} has no controller {name!r}; it has: {'; '.join(has)}")
     try:

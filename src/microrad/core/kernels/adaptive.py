@@ -18,6 +18,7 @@ from microrad.core.kernels.ensemble_records import (
     LEAST_SIZE,
     LEAST_TRAVEL,
     LEAST_WEIGHT,
+    MOST_WEIGHT,
     MEAN,
     MISFIT,
     NEXT_RECIPROCAL,
@@ -164,12 +165,13 @@ def _learn(p, s, a, first, j):  # type: ignore[no-untyped-def]
     Neither moves faster than SPEED. A change of the weights in use turns the prediction about the plays' slow means.
     """
     speed, least = p.adaptive[a, SPEED], p.adaptive[a, LEAST_WEIGHT] if j == first else 0.0
+    most = p.adaptive[a, MOST_WEIGHT]
     at, of, learnt, track = at_row(j * PLAY_FIELDS), at_row(a * TRACK_FIELDS), s.learnt, s.track
     below, inner = at_row((j if j == first else j - 1) * PLAY_FIELDS + SLOPE), 0.0 if j == first else 1.0
     frozen = p.adaptive_weight[j]
     for r in range(ROW_LENGTH):
         change = min(max(track[of + at_row(STRIDE) + r] * learnt[at + at_row(SWUNG) + r], -speed), speed)
-        own = max(learnt[at + at_row(LEARNT) + r] + change, least)
+        own = min(max(learnt[at + at_row(LEARNT) + r] + change, least), most)
         weight = learnt[at + at_row(WEIGHT) + r]
         goal = own if track[of + at_row(IN_USE) + r] == 1.0 else frozen
         move = min(max(goal - weight, -speed), speed)

@@ -32,7 +32,13 @@ DEAD_ZONE_SIGMAS = 1.0
 """Errors of the prediction within so many sigma of the gauge's noise and steps teach nothing."""
 
 LEAST_WEIGHT = 0.5
-"""Share of its first value that the weight at threshold 0 keeps: the slope behind a reversal."""
+"""Share of its first value that the weight at threshold 0, the slope behind a reversal, keeps.
+
+The inverse's gain there is at most twice the first one: a loop with a modulus margin of 0.5 bears that.
+"""
+
+MOST_WEIGHT = 2.0
+"""Largest weight over the mirror's slow gain: what readings of any size cannot take a weight beyond."""
 
 OFFSET_SHARE = 0.25
 """Share of the drive's largest swing that creep and drift may take, as an angle at the slow gain."""
@@ -122,6 +128,7 @@ def _settings(of: Adaptation, model: Play, period_s: float) -> Floats:
     found[kernels.LEAST_SIZE] = len(model.weights_rad_v) * (dead / gain) ** 2 + 1e-300
     found[kernels.LEAST_TRAVEL] = 0.1 * dead / gain
     found[kernels.LEAST_WEIGHT] = LEAST_WEIGHT * model.weights_rad_v[0]
+    found[kernels.MOST_WEIGHT] = MOST_WEIGHT * gain
     found[kernels.OFFSET_LIMIT] = OFFSET_SHARE * gain * of.swing_v
     return found
 
