@@ -221,7 +221,7 @@ class LearningInverse:
 
     def drive(self, target):
         low, high = -1e3, 1e3
-        for _ in range(200):
+        for _ in range(70):
             middle = (low + high) / 2
             low, high = (middle, high) if self.model(middle)[0] < target else (low, middle)
         return (low + high) / 2
@@ -522,6 +522,9 @@ def learns_from(state, of):
     plays[:, kernels.LEARNT] = plays[:, kernels.WEIGHT] = weights[:, None]
     plays[:, kernels.SLOPE] = slopes[:, None]
     plays[:, kernels.RECIPROCAL] = plays[:, kernels.NEXT_RECIPROCAL] = 1.0 / slopes[:, None]
+    for j in range(1, len(weights)):
+        plays[j, kernels.THRESHOLD] = sum(weights[i] * (of.thresholds[j] - of.thresholds[i]) for i in range(j))
+    plays[:, kernels.VOLTS] = np.diff(1.0 / slopes, prepend=0.0)[:, None]
 
 
 def build_state(case, p, first_run, shaping, reference):

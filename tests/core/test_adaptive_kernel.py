@@ -89,3 +89,58 @@ def test_it_is_its_twin(gain):
         assert_allclose(track(ours, field, lanes), [getattr(t.learning, name) for t in twins], rtol=0, atol=ROUNDING)
     assert_array_equal(ours.lines("counts")[:, lanes].T, [t.counts() for t in twins])
     assert np.all(track(ours, kernels.IN_USE) == (gain != 1.0))
+
+
+def test_a_frozen_inverse_that_fits_stays_as_it_is_to_the_last_bit():
+    learns = run(loop_of(gain=1.0, width=1.0, gauge_noise=0.0), wave())
+    assert_array_equal(learnt(learns, kernels.WEIGHT), np.array(WEIGHTS)[:, None] + np.zeros(LANES))
+    assert_array_equal(track(learns, kernels.OFFSET), 0.0)
+    assert_array_equal(learns.lines("counts")[kernels.COUNT_FALLBACK], 0.0)
+
+
+def test_plays_that_nothing_moves_keep_their_weights():
+    small = 0.25 * wave()  # less than the largest threshold
+    found = run(loop_of(), small)
+    assert_array_equal(learnt(found, kernels.LEARNT)[-1], WEIGHTS[-1])
+    assert np.all(np.abs(learnt(found, kernels.LEARNT)[0] - WEIGHTS[0]) > 0.05)
+
+
+def test_weights_move_no_faster_than_they_may():
+    slow = LAW._replace(speed=1e-4)
+    found = run(loop_of(slow), wave())
+    looks = SAMPLES // LAW.cycle + 1
+    moved = [np.max(np.abs(learnt(found, of) - np.array(WEIGHTS)[:, None])) for of in (kernels.LEARNT, kernels.WEIGHT)]
+    assert 0.003 < moved[0] <= 1e-4 * looks * (1.0 + 1e-12)
+    assert moved[1] <= moved[0]
+
+
+def test_readings_that_do_not_follow_teach_nothing_and_the_frozen_inverse_stays():
+    stuck = loop_of()
+    stuck = stuck._replace(loop=stuck.loop._replace(Dc=stuck.loop.Dc * (np.arange(3) != 1)))  # reads 0 all the time
+    found = run(stuck, wave())
+    assert_array_equal(learnt(found, kernels.WEIGHT), np.array(WEIGHTS)[:, None] + np.zeros(LANES))
+    assert np.max(np.abs(learnt(found, kernels.LEARNT) - np.array(WEIGHTS)[:, None])) < 0.05
+
+
+def test_a_mirror_that_is_its_old_self_again_is_a_fallback_and_counted():
+    turned = loop_of(gain=0.7)
+    reference = wave(2 * SAMPLES)
+    first = run(turned, reference[: SAMPLES + 1])
+    assert np.all(track(first, kernels.IN_USE) == 1.0)
+    back = loop_of(gain=1.0, width=1.0)
+    later = pointing.run_kernel(back, 5, np.zeros((0, LANES)), reference[SAMPLES:], state=first.state)
+    assert np.all(later.lines("counts")[kernels.COUNT_FALLBACK] >= 1.0)
+    assert_allclose(learnt(later, kernels.WEIGHT), np.array(WEIGHTS)[:, None] + np.zeros(LANES), atol=0.02)
+
+
+@pytest.mark.parametrize("size", [1e3, 1e150])
+def test_no_reading_takes_weights_beyond_their_limits(size):
+    case = loop_of()
+    D = case.loop.Dc.copy()
+    D[3, 1] = -size  # a gauge of the wrong sign and size
+    wild = run(case._replace(loop=case.loop._replace(Dc=D)), wave())
+    for field in (kernels.LEARNT, kernels.WEIGHT):
+        weights = learnt(wild, field)
+        assert np.all((weights >= 0.0) & (weights <= LAW.most_weight))
+        assert np.all(weights[0] >= LAW.least_weight)
+    assert np.all(np.abs(track(wild, kernels.SLOW)) <= LAW.offset_limit)

@@ -22,6 +22,7 @@ from microrad.export.records import (
     OPTICAL_ERROR,
     READING,
     REFERENCE,
+    AdaptiveLaw,
     ExportError,
     FlightController,
     InverseLaw,
@@ -274,6 +275,21 @@ def inverse_law(of: control.Inverse, period_s: float, by_difference: bool) -> In
     return InverseLaw(**arrays, by_difference=by_difference)
 
 
+def adaptive_law(of: control.Adaptation | None, period_s: float) -> AdaptiveLaw | None:
+    """How an inverse learns, as arrays for exported code; None where it does not.
+
+    Args:
+        of: The adaptation as it was designed.
+        period_s: The control period in seconds.
+    """
+    if of is None:
+        return None
+    arrays = control.adaptive_arrays(of, period_s)
+    return AdaptiveLaw(
+        *(arrays[key] for key in ("adaptive", "adaptive_threshold", "adaptive_weight", "adaptive_start"))
+    )
+
+
 def _margins(of: control.LoopMargins) -> tuple[tuple[str, float, str], ...]:
     return (
         ("modulus margin", of.modulus, ""),
@@ -318,6 +334,7 @@ def _pointing_controller(choice: PointingChoice | CoupledChoice) -> FlightContro
         resolution_v=loop.drive.drive_resolution_v,
         bias_v=choice.source.bias_v,
         margins=margins,
+        adaptation=adaptive_law(made.adaptation, period),
     )
 
 

@@ -18,9 +18,9 @@ from microrad.core.kernels.ensemble_records import (
     LEAST_SIZE,
     LEAST_TRAVEL,
     LEAST_WEIGHT,
-    MOST_WEIGHT,
     MEAN,
     MISFIT,
+    MOST_WEIGHT,
     NEXT_RECIPROCAL,
     OFFSET,
     OFFSET_LIMIT,
@@ -54,11 +54,12 @@ def adapt(p, s):  # type: ignore[no-untyped-def]
     """What one control sample teaches: the prediction's errors stand in ``output`` behind the rates of the targets.
 
     The work of an update is shared out over the samples of a cycle: the plays are looked at, the reading that belongs
-    to them is judged DELAY samples later, and then one play a sample is learnt.
+    to them is judged DELAY samples later, and then one play a sample is learnt. Each actuator is a sample ahead of the
+    one before, so that no sample has the work of all.
     """
-    phase, judges = s.place[SAMPLE] % np.int64(p.adaptive[0, CYCLE]), np.int64(p.adaptive[0, DELAY])
+    cycle, judges = np.int64(p.adaptive[0, CYCLE]), np.int64(p.adaptive[0, DELAY])
     for a in range(p.adaptive.shape[0]):
-        first, last = p.adaptive_start[a], p.adaptive_start[a + 1]
+        first, last, phase = p.adaptive_start[a], p.adaptive_start[a + 1], (s.place[SAMPLE] + a) % cycle
         if phase == 0:
             _look(p, s, a, first, last)
         elif phase == judges:

@@ -48,13 +48,14 @@ DRIVE_BEFORE, DRIVE_NOW, DRIVE_FIELDS = range(3)
     OFFSET_LIMIT,
     ADAPTIVE_COLUMNS,
 ) = range(13)
-LEARNT, WEIGHT, SLOPE, NEXT_RECIPROCAL, RECIPROCAL, THRESHOLD, VOLTS, PLAY, PLAY_SUM, MEAN, SWUNG, PLAY_FIELDS = range(12)
+LEARNT, WEIGHT, SLOPE, NEXT_RECIPROCAL, RECIPROCAL, THRESHOLD, VOLTS, PLAY, PLAY_SUM, MEAN, SWUNG = range(11)
+PLAY_FIELDS = SWUNG + 1
 SLOW, OFFSET, FAST_SUM, PIVOT, IN_USE, MISFIT, FROZEN_MISFIT, SWING, SIZE, STRIDE, SCRATCH = range(11)
 TRACK_FIELDS = SCRATCH + 4
 
-# What was learnt comes into use where its mean square misfit, with the dead zone's square, is below the first share of the
-# frozen inverse's misfit, and stays while its misfit is below the second. Readings are suspect where both misfits are
-# above a share of the square of what the plays swing.
+# What was learnt comes into use where its mean square misfit, with the dead zone's square, is below the first share of
+# the frozen inverse's misfit, and stays while its misfit is below the second. Readings are suspect where both misfits
+# are above a share of the square of what the plays swing.
 TAKE_UP, KEEP_UP, SUSPECT = 0.1, 0.25, 0.25
 
 # Columns of an actuator's parameters beyond those of a Loop: the drive's identified range.

@@ -7,7 +7,7 @@ inside.
 """
 
 from collections.abc import Iterable
-from dataclasses import astuple, dataclass, fields
+from dataclasses import astuple, dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from microrad.core import kernels
 from microrad.export.flight.fixed_form import FixedForm
 from microrad.export.linear_part.sections import Sections, compensated_states
-from microrad.export.records import FlightController, InverseLaw
+from microrad.export.records import AdaptiveLaw, FlightController, InverseLaw
 from microrad.export.templating import Precision
 
 MOST_TRIALS = 256
@@ -69,7 +69,9 @@ def operations(of: FlightController, form: Sections, precision: Precision) -> Op
     found += Operations(comparisons=2) * sum(each.size for each in of.inputs)
     found += _product(form.C) + _product(form.D)
     if of.inverse is not None:
-        found += _inverse(of.inverse, of.actuators, precision)
+        found += _inverse(_frozen_part(of), of.actuators, precision)
+    if of.adaptation is not None:
+        found += _learning(of.adaptation, of.actuators)
     found += _command(of.resolution_v > 0.0) * of.actuators
     return found + _states(form, precision) if form.order else found
 
@@ -139,7 +141,16 @@ def _mended(of: FlightController, form: Sections, precision: Precision) -> Opera
     numbers = form.order + sum(each.size for each in of.inputs) + of.actuators
     if precision == "single" and any(compensated_states(form)):
         numbers += form.order
-    return _SOUND * (numbers if of.inverse is None else numbers + _kept(of.inverse, of.actuators, precision))
+    return _SOUND * (numbers if of.inverse is None else numbers + _kept(_frozen_part(of), of.actuators, precision))
+
+
+def _frozen_part(of: FlightController) -> InverseLaw:
+    """The inverse without what learns in its place: direct gain and plays."""
+    assert of.inverse is not None
+    if of.adaptation is None:
+        return of.inverse
+    none = {name: getattr(of.inverse, name)[:0] for name in ("play_threshold", "play_weight", "play_actuator")}
+    return replace(of.inverse, direct=np.zeros_like(of.inverse.direct), **none)
 
 
 def _kept(of: InverseLaw, actuators: int, precision: Precision) -> int:
@@ -187,6 +198,21 @@ def _inverse(of: InverseLaw, actuators: int, precision: Precision) -> Operations
     found += (_CLAMP + Operations(multiplications=1, additions=3)) * plays
     lag = _COMPENSATED if precision == "single" else _SOUND + Operations(additions=1)
     return found + (Operations(multiplications=1, additions=1) + lag) * lags
+
+
+def _learning(of: AdaptiveLaw, actuators: int) -> Operations:
+    """An adaptive inverse: offset and plays of each sample, and for each actuator the worst that a phase may cost."""
+    offset = _CLAMP + Operations(multiplications=2, additions=7, comparisons=1)
+    play = _CLAMP + Operations(multiplications=1, additions=4)
+    found = offset * actuators + play * of.weight.size
+    for n in np.diff(of.start).tolist():
+        look = Operations(additions=2) + Operations(multiplications=6, additions=11, comparisons=1) * n
+        sound = _SOUND + Operations(additions=6) + Operations(additions=6) * n
+        sums = Operations(multiplications=4, additions=6) * n
+        means = _CLAMP * 2 + Operations(multiplications=13, additions=15, divisions=1, comparisons=7)
+        learn = _CLAMP * 3 + Operations(multiplications=2, additions=6, divisions=1, comparisons=1)
+        found += look | (sound + sums + means + Operations(multiplications=5)) | learn
+    return found
 
 
 def _element(power: bool) -> Operations:

@@ -19,11 +19,14 @@ from microrad.core.arrays import Floats
 from microrad.loop.control.sampled import play_inverse
 from microrad.mirror.hysteresis import BoucWen, Play, slow_gain
 
-GAIN = 0.2
+CYCLE_S = 4e-3
+"""Time of a cycle, at least: what is learnt are means over it, so that faster motions, the loop's own, count little."""
+
+GAIN = 0.4
 """Share of the prediction's error that an update takes away, where it is not noise."""
 
 SLOW_HZ = 1.0
-"""Below it the reading's error counts as creep and drift, which an offset follows; weights learn from what is faster."""
+"""Below it the reading's error counts as creep and drift, which an offset follows; weights learn of what is faster."""
 
 SPEED_1_S = 2.0
 """A weight changes by at most this share of the mirror's slow gain in a second."""
@@ -48,8 +51,9 @@ OFFSET_SHARE = 0.25
 class Adaptation:
     """What an adaptive inverse starts from, by actuator.
 
-    ``plays`` are those of the frozen inverse. ``noise_rad`` is the rms of a reading's noise and steps, ``delay_samples``
-    the samples between a command and the reading that tells of it, and ``swing_v`` the drive's largest swing.
+    ``plays`` are those of the frozen inverse. ``noise_rad`` is the rms of a reading's noise and steps,
+    ``delay_samples`` the samples between a command and the reading that tells of it, and ``swing_v`` the drive's
+    largest swing.
     """
 
     plays: tuple[Play, ...]
@@ -85,7 +89,7 @@ def adaptation(models: Sequence[BoucWen | Play], noise_rad: float, delay_samples
         if min(model.weights_rad_v) < 0.0:
             raise ValueError(
                 f"an adaptive inverse keeps every play's weight at 0 or above, and one of this mirror is "
-                f"{min(model.weights_rad_v):g} rad/V: identify it with weights of at least 0, or take the frozen inverse"
+                f"{min(model.weights_rad_v):g} rad/V: identify it with others, or take the frozen inverse"
             )
         play_inverse(model)  # refuses what has no inverse
         plays.append(model)
@@ -112,13 +116,19 @@ def adaptive_arrays(of: Adaptation | None, period_s: float) -> dict[str, Any]:
     }
 
 
-def cycle_samples(of: Adaptation) -> int:
-    """Samples from one look at the plays to the next: the reading's delay, and then a play a sample."""
-    return 1 + of.delay_samples + max(len(model.thresholds_v) for model in of.plays)
+def cycle_samples(of: Adaptation, period_s: float) -> int:
+    """Samples from one look at the plays to the next: the reading's delay, then a play a sample, or longer.
+
+    Args:
+        of: The adaptation.
+        period_s: Control period.
+    """
+    needed = 1 + of.delay_samples + max(len(model.thresholds_v) for model in of.plays)
+    return max(needed, round(CYCLE_S / period_s))
 
 
 def _settings(of: Adaptation, model: Play, period_s: float) -> Floats:
-    cycle, slow = cycle_samples(of), 2.0 * math.pi * SLOW_HZ * period_s
+    cycle, slow = cycle_samples(of, period_s), 2.0 * math.pi * SLOW_HZ * period_s
     gain, dead = slow_gain(model), DEAD_ZONE_SIGMAS * of.noise_rad
     found = np.zeros(kernels.ADAPTIVE_COLUMNS)
     found[kernels.CYCLE], found[kernels.DELAY] = cycle, of.delay_samples
@@ -133,7 +143,6 @@ def _settings(of: Adaptation, model: Play, period_s: float) -> Floats:
     return found
 
 
-
 def at_the_begin(p: kernels.Ensemble) -> tuple[Floats, Floats]:
     """What an adaptive inverse has learnt at the begin: PLAY_FIELDS numbers for each play, TRACK_FIELDS an actuator.
 
@@ -143,8 +152,10 @@ def at_the_begin(p: kernels.Ensemble) -> tuple[Floats, Floats]:
     plays = np.zeros((p.adaptive_weight.size, kernels.PLAY_FIELDS))
     for first, last in pairwise(p.adaptive_start.tolist()):
         rows, weights = plays[first:last], p.adaptive_weight[first:last]
-        slopes = np.cumsum(weights)
+        slopes, gaps = np.cumsum(weights), np.diff(p.adaptive_threshold[first:last])
         rows[:, kernels.LEARNT] = rows[:, kernels.WEIGHT] = weights
         rows[:, kernels.SLOPE] = slopes
         rows[:, kernels.RECIPROCAL] = rows[:, kernels.NEXT_RECIPROCAL] = 1.0 / slopes
+        rows[1:, kernels.THRESHOLD] = np.cumsum(slopes[:-1] * gaps)
+        rows[:, kernels.VOLTS] = np.diff(1.0 / slopes, prepend=0.0)
     return plays, np.zeros((len(p.adaptive), kernels.TRACK_FIELDS))

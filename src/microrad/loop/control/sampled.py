@@ -249,7 +249,7 @@ def sampled_plant(m: Mirror, drive: Drive, timing: Timing) -> lti.StateSpace:
 
 
 def sampled_path(linear: lti.StateSpace, drive: Drive, timing: Timing) -> lti.StateSpace:
-    """Delay, amplifier and a linear mirror from one of its drives, discrete, at the control period; see `sampled_plant`.
+    """Delay, amplifier and a linear mirror from one of its drives, at the control period; see `sampled_plant`.
 
     Args:
         linear: The mirror from one drive (V) to its outputs (rad), continuous.

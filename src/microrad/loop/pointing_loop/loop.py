@@ -67,8 +67,9 @@ class LoopController:
 
     ``system`` has the inputs optical error by axis, gauge reading by mirror output, reference by axis (all rad), and
     the outputs v by actuator (V) and, with an ``inverse``, the inverse's target (rad at the mirror's output) and its
-    rate (rad/s) by actuator. ``anti_windup`` is L, (states, actuators). With an ``adaptation`` the inverse's plays learn
-    on line; the last outputs are then the gauge's readings less those that the targets make expect, rad, by actuator.
+    rate (rad/s) by actuator. ``anti_windup`` is L, (states, actuators). With an ``adaptation`` the inverse's plays
+    learn on line; the last outputs are then the gauge's readings less those that the targets make expect, rad, by
+    actuator, and no rate is needed.
     """
 
     name: str
@@ -229,11 +230,13 @@ def with_adaptation(made: LoopController, loop: PointingLoop) -> LoopController:
     reading = np.zeros((m, s.B.shape[1]))
     reading[:, loop.axes : loop.axes + m] = np.eye(m)
     target = slice(m, 2 * m)
+    C_made, D_made = s.C.copy(), s.D.copy()
+    C_made[2 * m :], D_made[2 * m :] = 0.0, 0.0  # plays that do not widen need no rate
     system = lti.StateSpace(
         np.block([[s.A, np.zeros((s.order, len(A)))], [B @ s.C[target], A]]),
         np.vstack([s.B, B @ s.D[target]]),
-        np.block([[s.C, np.zeros((len(s.C), len(A)))], [-D @ s.C[target], -C]]),
-        np.vstack([s.D, reading - D @ s.D[target]]),
+        np.block([[C_made, np.zeros((len(s.C), len(A)))], [-D @ s.C[target], -C]]),
+        np.vstack([D_made, reading - D @ s.D[target]]),
     )
     windup = np.vstack([made.anti_windup, np.zeros((len(A), m))])
     noise = math.hypot(loop.gauge.noise_rad, loop.gauge.resolution_rad / math.sqrt(12.0))
