@@ -699,7 +699,7 @@ def test_a_loop_with_zeros_anywhere_is_its_twin(seed):
 def test_the_random_choices_count_everything():
     ensembles = [kernel(random_pointing(seed), 30, 1000 * seed) for seed in range(40)]
     sometimes = np.array([np.any(e.lines("counts") > 0, axis=1) for e in ensembles]).sum(axis=0)
-    assert np.all(sometimes > 5)
+    assert np.all(np.delete(sometimes, kernels.COUNT_FALLBACK) > 5)
 
 
 # ------------------------------------------------------------------------------------------------ statistics

@@ -83,9 +83,9 @@ class FlightController:
     ``system`` has the outputs C x + D m: v by actuator (V); then, with an ``inverse``, its target by actuator (rad);
     then the target's rate by actuator (rad/s), unless the inverse takes it by difference. What the inverse makes of the
     target is added to v; the sum is clipped to ``minimum_v`` and ``maximum_v`` and rounded to ``resolution_v`` (0: not
-    rounded). With an ``adaptation`` the inverse's plays are those that are learnt, and the last outputs are readings less
-    those that the targets make expect, by actuator (rad). Commands count from ``bias_v``, at the amplifier's input.
-    ``margins`` are (name, value, unit).
+    rounded). With an ``adaptation`` the inverse's plays are those that are learnt, and the last outputs are readings
+    less those that the targets make expect, by actuator (rad). Commands count from ``bias_v``, at the amplifier's
+    input. ``margins`` are (name, value, unit).
     """
 
     name: str

@@ -201,18 +201,30 @@ def _inverse(of: InverseLaw, actuators: int, precision: Precision) -> Operations
 
 
 def _learning(of: AdaptiveLaw, actuators: int) -> Operations:
-    """An adaptive inverse: offset and plays of each sample, and for each actuator the worst that a phase may cost."""
+    """An adaptive inverse: offset and plays of each sample, and the worst phase; actuators are a sample apart."""
     offset = _CLAMP + Operations(multiplications=2, additions=7, comparisons=1)
     play = _CLAMP + Operations(multiplications=1, additions=4)
-    found = offset * actuators + play * of.weight.size
-    for n in np.diff(of.start).tolist():
-        look = Operations(additions=2) + Operations(multiplications=6, additions=11, comparisons=1) * n
-        sound = _SOUND + Operations(additions=6) + Operations(additions=6) * n
-        sums = Operations(multiplications=4, additions=6) * n
-        means = _CLAMP * 2 + Operations(multiplications=13, additions=15, divisions=1, comparisons=7)
-        learn = _CLAMP * 3 + Operations(multiplications=2, additions=6, divisions=1, comparisons=1)
-        found += look | (sound + sums + means + Operations(multiplications=5)) | learn
-    return found
+    cycle, delay = (int(of.settings[0, column]) for column in (kernels.CYCLE, kernels.DELAY))
+    plays, worst = np.diff(of.start).tolist(), Operations()
+    for begin in range(cycle):
+        here = Operations()
+        for a, n in enumerate(plays):
+            here += _phase((begin + a) % cycle - delay, delay, n)
+        worst |= here
+    return offset * actuators + play * of.weight.size + worst
+
+
+def _phase(behind: int, delay: int, plays: int) -> Operations:
+    """What an actuator with so many plays does ``behind`` samples after the one in which it judges."""
+    if behind == -delay:
+        return Operations(additions=2) + Operations(multiplications=6, additions=11, comparisons=1) * plays
+    if behind == 0:
+        sums = Operations(multiplications=4, additions=12) * plays
+        means = _CLAMP * 2 + Operations(multiplications=18, additions=21, divisions=1, comparisons=7)
+        return _SOUND + sums + means
+    if 0 < behind <= plays:
+        return _CLAMP * 3 + Operations(multiplications=2, additions=6, divisions=1, comparisons=1)
+    return Operations()
 
 
 def _element(power: bool) -> Operations:
