@@ -16,6 +16,7 @@ from microrad.export.flight import c_code
 from microrad.export.flight.operations import operations
 from microrad.export.linear_part.sections import sections
 from microrad.export.records import ExportError
+from microrad.loop.control import adaptive
 from microrad.loop.pointing_loop.loop import with_adaptation
 
 SAMPLES = 10_000
@@ -44,6 +45,16 @@ def test_it_is_the_kernel_while_it_learns(tmp_path):
     assert (counters.rejected, counters.faults) == (0, 0)
     frozen = replace(of, adaptation=replace(of.adaptation, settings=no_learning(of.adaptation.settings)))
     assert difference(Code(tmp_path / "frozen", frozen), vectors)[0] > 1e-3  # it learnt
+
+
+def test_it_is_the_kernel_where_a_weight_is_held_at_its_least(tmp_path, monkeypatch):
+    monkeypatch.setattr(adaptive, "LEAST_WEIGHT", 0.9)
+    of, vectors = learning.__wrapped__()
+    assert difference(Code(tmp_path, of), vectors)[0] < EXACT
+    lower = of.adaptation.settings.copy()
+    lower[:, kernels.LEAST_WEIGHT] = 0.0
+    other = replace(of, adaptation=replace(of.adaptation, settings=lower))
+    assert difference(Code(tmp_path / "lower", other), vectors)[0] > 1e-4
 
 
 def no_learning(settings):
