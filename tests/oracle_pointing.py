@@ -80,6 +80,7 @@ class Pointing(NamedTuple):
     drive_low: np.ndarray
     drive_high: np.ndarray
     forward: oracles.Mirror
+    adaptive: "Adaptive | None" = None
 
     @property
     def axes(self):
@@ -178,6 +179,117 @@ class TargetInverse(oracles.InverseTwin):
         return u
 
 
+class Adaptive(NamedTuple):
+    """What an adaptive inverse of one actuator starts from, and how it learns; V, rad, and shares a sample or a look.
+
+    ``forgotten`` is what a mean over looks loses of itself at each, ``slow`` what the slow error follows a sample.
+    """
+
+    thresholds: tuple[float, ...]
+    weights: tuple[float, ...]
+    cycle: int
+    delay: int
+    gain: float
+    slow: float
+    forgotten: float
+    dead_zone: float
+    speed: float
+    least_size: float
+    least_travel: float
+    least_weight: float
+    most_weight: float
+    offset_limit: float
+
+
+class LearningInverse:
+    """The inverse of play operators whose weights are learnt, for one actuator: from the mirror's plays themselves.
+
+    Its memory are the plays p of the drive, and the drive for a target is found by bisection of the model's output,
+    which rises with the drive. What was learnt counts from the begin of a cycle on.
+    """
+
+    def __init__(self, of):
+        n = len(of.weights)
+        self.of, self.k, self.fallbacks = of, 0, 0
+        self.p, self.mean, self.swung = np.zeros(n), np.zeros(n), np.zeros(n)
+        self.learnt, self.used, self.coming = (np.array(of.weights) for _ in range(3))
+        self.slow = self.offset = self.pivot = self.stride = 0.0
+        self.in_use = False
+        self.misfit = self.frozen_misfit = self.swing = self.size = 0.0
+        self.plays, self.errors = [], []
+
+    def model(self, u):
+        plays = [oracles.play(p, u, r) for p, r in zip(self.p, self.of.thresholds, strict=True)]
+        return self.used @ plays, np.array(plays)
+
+    def drive(self, target):
+        low, high = -1e3, 1e3
+        for _ in range(70):
+            middle = (low + high) / 2
+            low, high = (middle, high) if self.model(middle)[0] < target else (low, middle)
+        return (low + high) / 2
+
+    def beyond(self, e):
+        return e - within(e, -self.of.dead_zone, self.of.dead_zone)
+
+    def averaged(self, before, new):
+        return before + self.of.forgotten * (new - before)
+
+    def look(self):
+        plays = np.mean(self.plays, axis=0) if self.plays else np.zeros(len(self.p))
+        self.plays = []
+        self.used = self.coming.copy()
+        self.slow, self.offset, self.pivot = self.slow + self.pivot, self.offset + self.pivot, 0.0
+        self.mean = self.averaged(self.mean, plays)
+        swung = plays - self.mean
+        self.swung = np.where(np.abs(swung) > self.of.least_travel, swung, 0.0)
+
+    def judge(self):
+        of, q = self.of, self.swung
+        fast = sum(self.errors) / of.cycle  # the first window is short
+        self.errors = []
+        e = self.beyond(fast + (self.used - self.learnt) @ q)
+        e_frozen = self.beyond(fast + (self.used - of.weights) @ q)
+        self.misfit = self.averaged(self.misfit, e**2)
+        self.frozen_misfit = self.averaged(self.frozen_misfit, e_frozen**2)
+        self.swing = self.averaged(self.swing, (np.array(of.weights) @ q) ** 2)
+        self.size = self.averaged(self.size, q @ q)
+        suspect = min(self.misfit, self.frozen_misfit) > 0.25 * self.swing
+        ten_times_better = self.misfit + of.dead_zone**2 < 0.1 * self.frozen_misfit
+        still_better = self.in_use and self.misfit <= 0.25 * self.frozen_misfit
+        before, self.in_use = self.in_use, (ten_times_better or still_better) and not suspect
+        self.fallbacks += before and not self.in_use
+        self.stride = 0.0 if suspect else of.gain * e / (max(self.size, q @ q) + of.least_size)
+
+    def learn(self, j):
+        of = self.of
+        change = within(self.stride * self.swung[j], -of.speed, of.speed)
+        self.learnt[j] = within(self.learnt[j] + change, of.least_weight if j == 0 else 0.0, of.most_weight)
+        goal = self.learnt[j] if self.in_use else of.weights[j]
+        move = within(goal - self.coming[j], -of.speed, of.speed)
+        self.coming[j] += move
+        self.pivot -= move * self.mean[j]
+
+    def follow(self, target, error):
+        """Drive for a target without creep, and the error of the prediction that was read in this sample."""
+        of, phase = self.of, self.k % self.of.cycle
+        if phase == 0:
+            self.look()
+        if phase == of.delay:
+            self.judge()
+        if of.delay < phase <= of.delay + len(self.p):
+            self.learn(phase - of.delay - 1)
+        fast = error + self.offset - self.slow
+        self.errors.append(fast)
+        self.slow = within(self.slow + of.slow * fast, -of.offset_limit, of.offset_limit)
+        self.offset += of.slow * ((self.slow if self.in_use else 0.0) - self.offset)
+        u = self.drive(target - self.offset)
+        self.p = self.model(u)[1]
+        self.plays.append(self.p)
+        self.k += 1
+        return u
+
+
 class Counts(NamedTuple):
     """What a run counted: by actuator and sample or plant step, summed over actuators and elements."""
 
@@ -187,6 +299,7 @@ class Counts(NamedTuple):
     inverse_clamped: int
     outside: int
     lost: int
+    fallback: int
 
 
 class PointingTwin:
@@ -201,6 +314,7 @@ class PointingTwin:
         self.mirror = oracles.MirrorTwin(case.mirror, case.step_s)
         self.inverse = TargetInverse(case.loop, case.step_s * case.loop.steps_per_sample)
         self.forward = oracles.MirrorTwin(case.forward, case.step_s * case.loop.steps_per_sample)
+        self.learning = LearningInverse(case.adaptive) if case.adaptive else None
         self.s = np.array(shaping, dtype=float)
         self.xc = np.zeros(len(case.loop.Ac))
         self.optical = np.zeros(case.axes)
@@ -241,7 +355,9 @@ class PointingTwin:
         loop, n = self.case.loop, self.case.actuators
         wanted = loop.Cc @ self.xc + loop.Dc @ m
         v = wanted[:n]
-        if self.case.feedforward:
+        if self.learning:
+            v = v + self.learning.follow(wanted[n], wanted[3 * n])
+        elif self.case.feedforward:
             v = v + self.inverse.follow(wanted[n : 2 * n], wanted[2 * n : 3 * n])
         self.forward.step(wanted[len(wanted) - len(self.forward.q) :])
         v = v + self.forward.output()
@@ -287,7 +403,8 @@ class PointingTwin:
 
     def counts(self):
         clamped, inverse = sum(self.mirror.clamped), sum(self.inverse.clamped) + sum(self.forward.clamped)
-        return Counts(self.saturated, self.slew, clamped, inverse, self.outside, self.lost)
+        fallbacks = self.learning.fallbacks if self.learning else 0
+        return Counts(self.saturated, self.slew, clamped, inverse, self.outside, self.lost, fallbacks)
 
 
 def run_twin(case, run, shaping, reference, shift=kernels.UNSHIFTED):
@@ -382,6 +499,7 @@ def build_ensemble(case):
         inverse_lag_weight=record.inverse_lag_weight,
         inverse_lag_actuator=record.inverse_lag_actuator,
         forward=build_forward(case),
+        **adaptive_arrays(case.adaptive),
     )
 
 
@@ -390,6 +508,37 @@ def build_forward(case):
     plant, _ = oracles.build_plant(case.forward, case.step_s * case.loop.steps_per_sample)
     bank = {name: getattr(plant, name) for name in kernels.ForwardBank._fields if name != "drives"}
     return kernels.ForwardBank(**bank, drives=np.ascontiguousarray(case.forward.K))
+
+
+def adaptive_arrays(of):
+    """The kernel's arrays of an adaptive inverse of one actuator, or of none."""
+    columns = np.zeros((1 if of else 0, kernels.ADAPTIVE_COLUMNS))
+    if of:
+        columns[0, kernels.CYCLE], columns[0, kernels.DELAY] = of.cycle, of.delay
+        columns[0, kernels.GAIN], columns[0, kernels.SHARE] = of.gain, of.slow
+        columns[0, kernels.KEEP], columns[0, kernels.DEAD_ZONE] = 1.0 - of.forgotten, of.dead_zone
+        columns[0, kernels.SPEED], columns[0, kernels.LEAST_SIZE] = of.speed, of.least_size
+        columns[0, kernels.LEAST_TRAVEL], columns[0, kernels.LEAST_WEIGHT] = of.least_travel, of.least_weight
+        columns[0, kernels.MOST_WEIGHT], columns[0, kernels.OFFSET_LIMIT] = of.most_weight, of.offset_limit
+    return {
+        "adaptive": columns,
+        "adaptive_threshold": np.array(of.thresholds if of else (), dtype=float),
+        "adaptive_weight": np.array(of.weights if of else (), dtype=float),
+        "adaptive_start": np.array([0, len(of.weights)] if of else [0], dtype=np.int64),
+    }
+
+
+def learns_from(state, of):
+    """Writes what the inverse has learnt at the begin into the kernel's memory: the weights that it starts from."""
+    plays = state.learnt.reshape(-1, kernels.LANES)[: len(of.weights) * kernels.PLAY_FIELDS]
+    plays = plays.reshape(len(of.weights), kernels.PLAY_FIELDS, kernels.LANES)
+    weights, slopes = np.array(of.weights), np.cumsum(of.weights)
+    plays[:, kernels.LEARNT] = plays[:, kernels.WEIGHT] = weights[:, None]
+    plays[:, kernels.SLOPE] = slopes[:, None]
+    plays[:, kernels.RECIPROCAL] = plays[:, kernels.NEXT_RECIPROCAL] = 1.0 / slopes[:, None]
+    for j in range(1, len(weights)):
+        plays[j, kernels.THRESHOLD] = sum(weights[i] * (of.thresholds[j] - of.thresholds[i]) for i in range(j))
+    plays[:, kernels.VOLTS] = np.diff(1.0 / slopes, prepend=0.0)[:, None]
 
 
 def build_state(case, p, first_run, shaping, reference):
@@ -419,6 +568,8 @@ def build_state(case, p, first_run, shaping, reference):
         "inverse_lag": p.inverse_lag_keep.size,
         "forward_bank": kernels.BANK_FIELDS * p.forward.drives.shape[1],
         "forward_play": p.forward.play_threshold.size,
+        "learnt": p.adaptive_weight.size * kernels.PLAY_FIELDS,
+        "track": len(p.adaptive) * kernels.TRACK_FIELDS,
         "work": m,
         "sum": axes,
         "sum_square": axes,
@@ -437,6 +588,8 @@ def build_state(case, p, first_run, shaping, reference):
     state.disturbance[:] = disturbance.ravel()
     state.error[:] = (reference[:, None] + disturbance).ravel()
     state.error_ring[:] = np.tile(state.error, p.sensor_delay_steps + 1)
+    if case.adaptive:
+        learns_from(state, case.adaptive)
     return state
 
 

@@ -729,7 +729,7 @@ def test_a_loop_with_zeros_anywhere_is_its_twin(seed):
 def test_the_random_choices_count_everything():
     ensembles = [kernel(random_pointing(seed), 30, 1000 * seed) for seed in range(40)]
     sometimes = np.array([np.any(e.lines("counts") > 0, axis=1) for e in ensembles]).sum(axis=0)
-    assert np.all(sometimes > 5)
+    assert np.all(np.delete(sometimes, kernels.COUNT_FALLBACK) > 5)
 
 
 # ------------------------------------------------------------------------------------------------ statistics
@@ -762,7 +762,8 @@ def statistics_case():
 
 def test_every_counter_is_its_twins():
     ensemble, _ = assert_is_its_twin(statistics_case(), range(0, LANES, 8))
-    assert np.all(np.any(ensemble.lines("counts") > 0, axis=1))
+    counted = np.any(ensemble.lines("counts") > 0, axis=1)
+    assert np.all(np.delete(counted, kernels.COUNT_FALLBACK))  # an adaptive inverse's: tests/core/test_adaptive_kernel
     assert len(ensemble.lines("counts")) == kernels.COUNT_FIELDS == len(pointing.Counts._fields)
 
 

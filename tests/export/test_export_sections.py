@@ -375,7 +375,7 @@ def flying():
     """The mission's controllers as they fly, with a recorded run: (as designed, minimal, its sections, inputs)."""
     made = {}
     for name in FLYING:
-        assert name in choice.names(designs.mission().mission.fine_pointing)
+        assert name in choice.names(designs.mission().mission.fine_pointing, designs.mission().mission.mirror)
         chosen = designs.chosen(name)
         of = choice.trimmed(choice._whole_controller(chosen))  # before `flight_controller` makes it minimal
         less = choice.flight_controller(chosen)

@@ -19,6 +19,7 @@ def test_every_controllers_worked_example_runs(tmp_path, monkeypatch, capsys):
         exec(block, session)
     printed = capsys.readouterr().out
     assert printed.count("\n") == 11 and "nan" not in printed
+    assert "hysteresis is a Bouc-Wen model" in printed
     assert session["tuned"].margins.modulus >= 0.5 and session["lqg"].residual_rms_rad >= session["bound"]
     assert session["both"].margins.modulus >= 0.5 and session["left"].holds
     assert session["ahead"].forward.bank == session["axes"].loop.mirror.bank

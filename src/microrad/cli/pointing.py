@@ -60,7 +60,8 @@ def design(
         return design_of_several_axes(mission, several, accept, as_json)
     with progress_bar() as progress, refusal_of(mission.path):
         scene = controller_study.scene(mission, mirror_room.of(mission.mission), tracking_light_w(mission))
-        designs, left = zip(*controller_study.design_and_promise(scene, progress), strict=True)
+        offered = controller_study.offered(scene.table, mission.mission.mirror)
+        designs, left = zip(*controller_study.design_and_promise(scene, progress, offered), strict=True)
     marks = [each.mark(accept) for each in left]
     warnings = list(filter(None, [unknown_dynamics(mission.mission.mirror), _broken(designs, left, accept)]))
     code = UNMET if "refused" in marks else MET

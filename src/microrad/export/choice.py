@@ -22,6 +22,7 @@ from microrad.export.records import (
     OPTICAL_ERROR,
     READING,
     REFERENCE,
+    AdaptiveLaw,
     ExportError,
     FlightController,
     InverseLaw,
@@ -107,9 +108,14 @@ class PaperLoopChoice:
 Choice = PointingChoice | CoupledChoice | PaperLoopChoice
 
 
-def names(table: FinePointing | None) -> tuple[str, ...]:
-    """The controllers of a mission with this table of its fine-pointing loop, or without one."""
-    return (*(() if table is None else controller_study.names(table)), PID, PID_WITH_INVERSE)
+def names(table: FinePointing | None, of: MirrorTable) -> tuple[str, ...]:
+    """The controllers of a mission.
+
+    Args:
+        table: Its fine-pointing loop, where it has one.
+        of: Its mirror.
+    """
+    return (*(() if table is None else controller_study.offered(table, of)), PID, PID_WITH_INVERSE)
 
 
 def source(file: MissionFile, given: coupled.CoupledMirror | None = None) -> Source:
@@ -148,7 +154,7 @@ def choose(
     Raises:
         ExportError: The mission has no such controller, or it cannot be built on the mission's mirror.
     """
-    m, has = file.mission, names(file.mission.fine_pointing)
+    m, has = file.mission, names(file.mission.fine_pointing, file.mission.mirror)
     if name not in has:
         raise ExportError(f"{file.path} has no controller {name!r}; it has: {'; '.join(has)}")
     try:
@@ -286,6 +292,21 @@ def inverse_law(of: control.Inverse, period_s: float, by_difference: bool) -> In
     return InverseLaw(**arrays, by_difference=by_difference)
 
 
+def adaptive_law(of: control.Adaptation | None, period_s: float) -> AdaptiveLaw | None:
+    """How an inverse learns, as arrays for exported code; None where it does not.
+
+    Args:
+        of: The adaptation as it was designed.
+        period_s: The control period in seconds.
+    """
+    if of is None:
+        return None
+    arrays = control.adaptive_arrays(of, period_s)
+    return AdaptiveLaw(
+        *(arrays[key] for key in ("adaptive", "adaptive_threshold", "adaptive_weight", "adaptive_start"))
+    )
+
+
 def _margins(of: control.LoopMargins) -> tuple[tuple[str, float, str], ...]:
     return (
         ("modulus margin", of.modulus, ""),
@@ -331,6 +352,7 @@ def _pointing_controller(choice: PointingChoice | CoupledChoice) -> FlightContro
         bias_v=choice.source.bias_v,
         margins=margins,
         forward=None if made.forward is None else forward_arrays(made.forward, loop.mirror.actuators, period),
+        adaptation=adaptive_law(made.adaptation, period),
     )
 
 

@@ -54,6 +54,20 @@ class InverseLaw:
 
 
 @dataclass(frozen=True, slots=True)
+class AdaptiveLaw:
+    """How an inverse of plays learns, with the arrays of `kernels.Ensemble` under their names.
+
+    ``settings`` has a row for each actuator (kernels.CYCLE ...); ``threshold`` (V) and ``weight`` (rad/V) are those of
+    the mirror's plays, those of actuator a from ``start[a]`` to the next.
+    """
+
+    settings: Floats
+    threshold: Floats
+    weight: Floats
+    start: Indices
+
+
+@dataclass(frozen=True, slots=True)
 class Origin:
     """Where a design comes from: names in words, and the mission file that it was made from."""
 
@@ -69,8 +83,10 @@ class FlightController:
     ``system`` has the outputs C x + D m: v by actuator (V); then, with an ``inverse``, its target by actuator (rad);
     then the target's rate by actuator (rad/s), unless the inverse takes it by difference; then, with ``forward``, what
     drives each of its elements. What the inverse makes of the target, and ``forward`` of its drives, is added to v; the
-    sum is clipped to ``minimum_v`` and ``maximum_v`` and rounded to ``resolution_v`` (0: not
-    rounded). Commands count from ``bias_v``, at the amplifier's input. ``margins`` are (name, value, unit).
+    sum is clipped to ``minimum_v`` and ``maximum_v`` and rounded to ``resolution_v`` (0: not rounded). With an
+    ``adaptation`` the inverse's plays are those that are learnt, and the last outputs are readings less those that the
+    targets make expect, by actuator (rad). Commands count from ``bias_v``, at the amplifier's input. ``margins`` are
+    (name, value, unit).
     """
 
     name: str
@@ -87,6 +103,7 @@ class FlightController:
     bias_v: float
     margins: tuple[tuple[str, float, str], ...]
     forward: kernels.ForwardBank | None = None
+    adaptation: AdaptiveLaw | None = None
 
 
 @dataclass(frozen=True, slots=True)

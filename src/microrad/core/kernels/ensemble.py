@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from microrad.core.kernels.adaptive import adapt, adaptive_drive
 from microrad.core.kernels.compiler import compiled_loop, inlined, merged
 from microrad.core.kernels.ensemble_plant import (
     clear_row,
@@ -213,6 +214,9 @@ def _measure_optical(p, s):  # type: ignore[no-untyped-def]
 def _ensemble_inverse(p, s):  # type: ignore[no-untyped-def]
     """Adds to each actuator's output what the inverse makes of its target, as `inverse_drive`, at the rate given."""
     actuators, output, target = p.actuator.shape[0], s.output, s.target
+    adaptive = p.adaptive.shape[0] > 0
+    if adaptive:
+        adapt(p, s)
     for a in range(actuators):
         now = at_row(2 * a + 1)
         for r in range(ROW_LENGTH):
@@ -222,12 +226,16 @@ def _ensemble_inverse(p, s):  # type: ignore[no-untyped-def]
             if p.inverse_lag_actuator[j] == a:
                 for r in range(ROW_LENGTH):
                     target[now + r] -= p.inverse_lag_weight[j] * s.inverse_lag[at_row(j) + r]
-        for r in range(ROW_LENGTH):
-            s.work[at_row(a) + r] = p.inverse_direct[a] * target[now + r]
+        if adaptive:
+            adaptive_drive(p, s, a)
+        else:
+            for r in range(ROW_LENGTH):
+                s.work[at_row(a) + r] = p.inverse_direct[a] * target[now + r]
     for e in range(p.inverse_bouc_wen.shape[0]):
         _inverse_bouc_wen(p, s, e, np.int64(p.inverse_bouc_wen_actuator[e]))
     for a in range(actuators):
-        _inverse_plays(p, s, a)
+        if not adaptive:
+            _inverse_plays(p, s, a)
         for r in range(ROW_LENGTH):
             output[at_row(a) + r] += s.work[at_row(a) + r]
     for j in range(p.inverse_lag_keep.size):

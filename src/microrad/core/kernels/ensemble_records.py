@@ -28,8 +28,35 @@ DRIVE_BEFORE, DRIVE_NOW, DRIVE_FIELDS = range(3)
     COUNT_INVERSE_CLAMPED,
     COUNT_OUTSIDE,
     COUNT_LOST,
+    COUNT_FALLBACK,
     COUNT_FIELDS,
-) = range(7)
+) = range(8)
+
+# Columns of the settings of an adaptive inverse, fields of the rows of a play that it learns, and of an actuator's.
+(
+    CYCLE,
+    DELAY,
+    GAIN,
+    SHARE,
+    KEEP,
+    DEAD_ZONE,
+    SPEED,
+    LEAST_SIZE,
+    LEAST_TRAVEL,
+    LEAST_WEIGHT,
+    MOST_WEIGHT,
+    OFFSET_LIMIT,
+    ADAPTIVE_COLUMNS,
+) = range(13)
+LEARNT, WEIGHT, SLOPE, NEXT_RECIPROCAL, RECIPROCAL, THRESHOLD, VOLTS, PLAY, PLAY_SUM, MEAN, SWUNG = range(11)
+PLAY_FIELDS = SWUNG + 1
+SLOW, OFFSET, FAST_SUM, PIVOT, IN_USE, MISFIT, FROZEN_MISFIT, SWING, SIZE, STRIDE, SCRATCH = range(11)
+TRACK_FIELDS = SCRATCH + 4
+
+# What was learnt comes into use where its mean square misfit, with the dead zone's square, is below the first share of
+# the frozen inverse's misfit, and stays while its misfit is below the second. Readings are suspect where both misfits
+# are above a share of the square of what the plays swing.
+TAKE_UP, KEEP_UP, SUSPECT = 0.1, 0.25, 0.25
 
 # Columns of an actuator's parameters beyond those of a Loop: the drive's identified range.
 DRIVE_LOW, DRIVE_HIGH = SLEW_STEP + 1, SLEW_STEP + 2
@@ -84,6 +111,12 @@ class Ensemble(NamedTuple):
     drives each element of ``forward``); what the inverse makes of the target, and ``forward`` of its drives, is added
     to v ahead of the clip. Rows of ``actuator`` as in `Loop`, then DRIVE_LOW and DRIVE_HIGH, the drive range that the
     mirror was identified in. Inverse as in `Loop`.
+
+    An adaptive inverse (`adapt`) takes the place of the frozen one's plays where ``adaptive`` (actuators; CYCLE ...
+    OFFSET_LIMIT) is not empty; behind the rates then stands the gauge's reading less the one that is predicted, by
+    actuator. Its plays are those of the mirror: ``adaptive_threshold`` in V, the first of an actuator 0, and
+    ``adaptive_weight`` in rad/V at the begin; those of actuator a are from ``adaptive_start[a]`` to the next. No
+    controller has both an adaptive inverse and a ``forward``.
     """
 
     step_s: float
@@ -141,6 +174,10 @@ class Ensemble(NamedTuple):
     inverse_lag_weight: Floats
     inverse_lag_actuator: Indices
     forward: ForwardBank
+    adaptive: Floats
+    adaptive_threshold: Floats
+    adaptive_weight: Floats
+    adaptive_start: Integers
 
 
 class EnsembleState(NamedTuple):
@@ -149,6 +186,9 @@ class EnsembleState(NamedTuple):
     ``place``: control sample, plant step, and 1 where statistics are taken. Rows too: ``sum_square`` (axes) and
     ``largest`` (radial error squared) of every plant step, ``sum`` (axes) of the control samples, ``counts`` (COUNT_*).
     ``histogram`` (LANES, BINS) counts the radial error at the end of each control sample.
+
+    Of an adaptive inverse ``learnt`` has PLAY_FIELDS rows for each play (WEIGHT ... SWUNG), and ``track`` TRACK_FIELDS
+    for each actuator (OFFSET ... STRIDE).
 
     ``drawn`` is empty where the runs draw their random numbers themselves. Else it is what `draw_loop` has drawn for
     the control samples of the next call: runs of other controllers and on other mirrors share it.
@@ -179,6 +219,8 @@ class EnsembleState(NamedTuple):
     inverse_lag: Floats
     forward_bank: Floats
     forward_play: Floats
+    learnt: Floats
+    track: Floats
     work: Floats
     sum: Floats
     sum_square: Floats

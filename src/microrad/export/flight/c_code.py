@@ -12,7 +12,7 @@ from microrad.core import kernels
 from microrad.export.flight.rounding import RoundingBound
 from microrad.export.identifiers import identifier
 from microrad.export.linear_part.sections import Sections, compensated_states
-from microrad.export.records import ExportError, FlightController, InverseLaw, Signal, Vectors
+from microrad.export.records import AdaptiveLaw, ExportError, FlightController, InverseLaw, Signal, Vectors
 from microrad.export.templating import Precision, entries, render
 
 BOUND_SHARE = 1e-12
@@ -41,6 +41,7 @@ def flight_code(
         ExportError: A name that is no identifier; limits between which no command lies; numbers beyond the precision;
             single precision without a bound.
     """
+    refuse_learning(of, precision)
     values = _values(of, form, identifier(name), precision)
     if precision == "single":
         if bound is None:
@@ -112,7 +113,9 @@ class Limits:
 def _values(of: FlightController, form: Sections, name: str, precision: Precision) -> dict[str, Any]:
     kept = np.array(compensated_states(form), dtype=bool) & (precision == "single")
     elements = 0 if of.forward is None else of.forward.drives.shape[1]
-    kinds = ["v (V)", "target (rad)", "rate of the target (rad/s)"][: (form.C.shape[0] - elements) // of.actuators]
+    kinds = ["v (V)", "target (rad)", "rate of the target (rad/s)", "error of the reading (rad)"][
+        : (form.C.shape[0] - elements) // of.actuators
+    ]
     rows = ([*kinds, "drive of each element"], [of.actuators] * len(kinds) + [elements])
     sizes = [size for _, size in form.blocks]
     moves = form.A - np.diag(kept.astype(float))
@@ -138,6 +141,7 @@ def _values(of: FlightController, form: Sections, name: str, precision: Precisio
         "bound_share": bound_share(of),
         **_inverse_values(of.inverse),
         **_forward_values(of.forward),
+        **_adaptive_values(of.adaptation),
     }
 
 
@@ -225,3 +229,55 @@ def _forward_values(of: kernels.ForwardBank | None) -> dict[str, Any]:
         "forward_polynomial": of.operator[:, kernels.REACH - 3 : kernels.REACH],
         "forward_reach": np.where(np.isfinite(reach), reach, 1.0),
     }
+
+
+def _adaptive_values(of: AdaptiveLaw | None) -> dict[str, Any]:
+    """What learns takes the place of the frozen inverse's direct gain and plays."""
+    if of is None:
+        return {"adaptive": None}
+    law = {name: of.settings[:, getattr(kernels, name.upper())] for name in _SETTINGS}
+    cycle, delay = (int(of.settings[0, column]) for column in (kernels.CYCLE, kernels.DELAY))
+    values = {"TAKE_UP": kernels.TAKE_UP, "KEEP_UP": kernels.KEEP_UP, "SUSPECT": kernels.SUSPECT}
+    return {
+        "adaptive": of,
+        "law": law,
+        "cycle": cycle,
+        "reading_delay": delay,
+        "settings": _SETTINGS,
+        "shares": values,
+        "learners": of.weight.size,
+        "slopes": np.concatenate([np.cumsum(w) for w in np.split(of.weight, of.start[1:-1])]),
+        "plays": 0,
+        "direct": False,
+    }
+
+
+_SETTINGS = {
+    "gain": "share of the error that an update takes away",
+    "share": "what the slow error follows in a period",
+    "keep": "what a mean keeps over a cycle",
+    "dead_zone": "rad, of the reading's noise",
+    "speed": "rad/V, the most that a weight changes in a cycle",
+    "least_size": "V^2, added to the plays' mean square",
+    "least_travel": "V, from which on a play counts as excited",
+    "least_weight": "rad/V, of the first play",
+    "most_weight": "rad/V",
+    "offset_limit": "rad, of the slow error",
+}
+
+
+def refuse_learning(of: FlightController, precision: str) -> None:
+    """Refuse an inverse that learns in another precision than double.
+
+    Args:
+        of: The controller.
+        precision: The precision that is asked for.
+
+    Raises:
+        ExportError: It learns, and the precision is another one.
+    """
+    if of.adaptation is not None and precision != "double":
+        raise ExportError(
+            f"controller {of.name!r} learns, and what it learns from rounded readings has no bound that could be "
+            f"stated in {precision} precision: export it in double precision, or the frozen inverse"
+        )

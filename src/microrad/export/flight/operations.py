@@ -7,7 +7,7 @@ they cost inside.
 """
 
 from collections.abc import Iterable
-from dataclasses import astuple, dataclass, fields
+from dataclasses import astuple, dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from microrad.core import kernels
 from microrad.export.flight.fixed_form import FixedForm
 from microrad.export.linear_part.sections import Sections, compensated_states
-from microrad.export.records import FlightController, InverseLaw
+from microrad.export.records import AdaptiveLaw, FlightController, InverseLaw
 from microrad.export.templating import Precision
 
 MOST_TRIALS = 256
@@ -69,7 +69,9 @@ def operations(of: FlightController, form: Sections, precision: Precision) -> Op
     found += Operations(comparisons=2) * sum(each.size for each in of.inputs)
     found += _product(form.C) + _product(form.D)
     if of.inverse is not None:
-        found += _inverse(of.inverse, of.actuators, precision)
+        found += _inverse(_frozen_part(of), of.actuators, precision)
+    if of.adaptation is not None:
+        found += _learning(of.adaptation, of.actuators)
     if of.forward is not None:
         found += _forward(of.forward)
     found += _command(of.resolution_v > 0.0) * of.actuators
@@ -144,7 +146,16 @@ def _mended(of: FlightController, form: Sections, precision: Precision) -> Opera
         numbers += form.order
     if of.forward is not None:
         numbers += _kept_forward(of.forward)
-    return _SOUND * (numbers if of.inverse is None else numbers + _kept(of.inverse, of.actuators, precision))
+    return _SOUND * (numbers if of.inverse is None else numbers + _kept(_frozen_part(of), of.actuators, precision))
+
+
+def _frozen_part(of: FlightController) -> InverseLaw:
+    """The inverse without what learns in its place: direct gain and plays."""
+    assert of.inverse is not None
+    if of.adaptation is None:
+        return of.inverse
+    none = {name: getattr(of.inverse, name)[:0] for name in ("play_threshold", "play_weight", "play_actuator")}
+    return replace(of.inverse, direct=np.zeros_like(of.inverse.direct), **none)
 
 
 def _kept(of: InverseLaw, actuators: int, precision: Precision) -> int:
@@ -226,6 +237,33 @@ def _inverse(of: InverseLaw, actuators: int, precision: Precision) -> Operations
     found += (_CLAMP + Operations(multiplications=1, additions=3)) * plays
     lag = _COMPENSATED if precision == "single" else _SOUND + Operations(additions=1)
     return found + (Operations(multiplications=1, additions=1) + lag) * lags
+
+
+def _learning(of: AdaptiveLaw, actuators: int) -> Operations:
+    """An adaptive inverse: offset and plays of each sample, and the worst phase; actuators are a sample apart."""
+    offset = _CLAMP + Operations(multiplications=2, additions=7, comparisons=1)
+    play = _CLAMP + Operations(multiplications=1, additions=4)
+    cycle, delay = (int(of.settings[0, column]) for column in (kernels.CYCLE, kernels.DELAY))
+    plays, worst = np.diff(of.start).tolist(), Operations()
+    for begin in range(cycle):
+        here = Operations()
+        for a, n in enumerate(plays):
+            here += _phase((begin + a) % cycle - delay, delay, n)
+        worst |= here
+    return offset * actuators + play * of.weight.size + worst
+
+
+def _phase(behind: int, delay: int, plays: int) -> Operations:
+    """What an actuator with so many plays does ``behind`` samples after the one in which it judges."""
+    if behind == -delay:
+        return Operations(additions=2) + Operations(multiplications=6, additions=11, comparisons=1) * plays
+    if behind == 0:
+        sums = Operations(multiplications=4, additions=12) * plays
+        means = _CLAMP * 2 + Operations(multiplications=18, additions=21, divisions=1, comparisons=7)
+        return _SOUND + sums + means
+    if 0 < behind <= plays:
+        return _CLAMP * 3 + Operations(multiplications=2, additions=6, divisions=1, comparisons=1)
+    return Operations()
 
 
 def _element(power: bool) -> Operations:

@@ -4,6 +4,7 @@ The fine-pointing loop has `problem`, `classical`, `lqg` and `tuning`, and its m
 `[control]`, the paper's, has `sampled`, with its margins and the inverses of hysteresis.
 """
 
+from microrad.loop.control.adaptive import Adaptation, adaptation, adaptive_arrays, at_the_begin
 from microrad.loop.control.analysis import (
     LoopMargins,
     MultiloopMargin,
@@ -45,6 +46,7 @@ from microrad.loop.control.sampled import (
     no_feedforward,
     pid,
     play_inverse,
+    sampled_path,
     sampled_plant,
     sensitivity,
     slowest_pole,
@@ -63,6 +65,7 @@ __all__ = [
     "PI_NOTCH",
     "RESIDUAL",
     "RESONANT_DAMPING",
+    "Adaptation",
     "AxisController",
     "DesignPlant",
     "Drive",
@@ -77,8 +80,11 @@ __all__ = [
     "Weights",
     "WholeController",
     "WholePlant",
+    "adaptation",
+    "adaptive_arrays",
     "amplifier_factor",
     "anti_windup",
+    "at_the_begin",
     "by_source",
     "drive_from_mission",
     "gains_from_mission",
@@ -95,6 +101,7 @@ __all__ = [
     "pid",
     "play_inverse",
     "rounded",
+    "sampled_path",
     "sampled_plant",
     "sensitivity",
     "slowest_pole",

@@ -245,8 +245,18 @@ def sampled_plant(m: Mirror, drive: Drive, timing: Timing) -> lti.StateSpace:
     """
     if (m.actuators, m.axes) != (1, 1):
         raise ValueError(f"mirror {m.name!r} has {m.actuators} actuators and {m.axes} axes: give one axis at a time")
-    linear = m.linear_loop
-    n, d = linear.order, timing.delay_steps
+    return sampled_path(m.linear_loop, drive, timing)
+
+
+def sampled_path(linear: lti.StateSpace, drive: Drive, timing: Timing) -> lti.StateSpace:
+    """Delay, amplifier and a linear mirror from one of its drives, at the control period; see `sampled_plant`.
+
+    Args:
+        linear: The mirror from one drive (V) to its outputs (rad), continuous.
+        drive: Its amplifier, of which the bandwidth alone counts here.
+        timing: Clock of the loop.
+    """
+    n, d, outputs = linear.order, timing.delay_steps, linear.C.shape[0]
     Ad, B0, B1 = lti.first_order_hold(linear.A, linear.B, timing.step_s)
     follow = amplifier_factor(drive, timing.step_s)
     A, B = np.zeros((n + 1 + d, n + 1 + d)), np.zeros((n + 1 + d, 1))
@@ -262,7 +272,7 @@ def sampled_plant(m: Mirror, drive: Drive, timing: Timing) -> lti.StateSpace:
     for _ in range(timing.steps_per_sample):
         held = A @ held + B
         power = A @ power
-    return lti.StateSpace(power, held, np.hstack([linear.C, linear.D, np.zeros((1, d))]), np.zeros((1, 1)))
+    return lti.StateSpace(power, held, np.hstack([linear.C, linear.D, np.zeros((outputs, d))]), np.zeros((outputs, 1)))
 
 
 def amplifier_factor(drive: Drive, step_s: float) -> float:

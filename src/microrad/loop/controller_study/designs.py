@@ -15,14 +15,23 @@ from microrad.loop import control
 from microrad.loop.control import DesignPlant, Family, Specification, Tuned
 from microrad.loop.controller_study.scenario import Scene
 from microrad.loop.pointing_loop.design import behind_filter, design_plant
-from microrad.loop.pointing_loop.loop import LoopController, PointingLoop, ReferenceFilter, assemble, with_inverse
+from microrad.loop.pointing_loop.loop import (
+    LoopController,
+    PointingLoop,
+    ReferenceFilter,
+    assemble,
+    with_adaptation,
+    with_inverse,
+)
 from microrad.mirror import from_table, spread
 from microrad.mission.tables.fine_pointing import FinePointing
+from microrad.mission.tables.mirror import Mirror as MirrorTable
 
 BASELINE = "PI, best of a gain grid"
 WITH_INVERSE = f"{control.PI.name} + inverse"
 IN_SERIES = "PI + inverse in series"
-_INVERSE_USED = {WITH_INVERSE: "of the reference", IN_SERIES: "in series"}
+ADAPTIVE = "PI + adaptive inverse in series"
+_INVERSE_USED = {WITH_INVERSE: "of the reference", IN_SERIES: "in series", ADAPTIVE: "in series"}
 DRAWS = 8
 """Mirrors drawn from the identification's covariance that a tuned controller has to hold for."""
 
@@ -130,6 +139,19 @@ def names(f: FinePointing) -> tuple[str, ...]:
     return (*found, IN_SERIES)
 
 
+def offered(f: FinePointing, of: MirrorTable) -> tuple[str, ...]:
+    """The controllers that can be designed for a mission: `names`, and the adaptive inverse where it can learn.
+
+    It learns the weights of play operators, of a mirror that has them, from a strain gauge.
+
+    Args:
+        f: The mission's fine-pointing table.
+        of: Its mirror's table.
+    """
+    learns = f.strain_gauge is not None and of.prandtl_ishlinskii is not None
+    return (*names(f), *([ADAPTIVE] if learns else []))
+
+
 def design(
     scene: Scene,
     on_progress: Progress = lambda done, total, what: None,
@@ -140,10 +162,10 @@ def design(
     Args:
         scene: The mission's fine-pointing loop.
         on_progress: Called with the controllers that are tuned, their number and what is done.
-        only: Names out of `names`, in the order that is wanted; by default all, the baseline first.
+        only: Names out of `offered`, in the order that is wanted; by default all of `names`, the baseline first.
 
     Raises:
-        ValueError: For a name that `names` does not list, and where a modulus margin cannot be met; says why.
+        ValueError: For a name that `offered` does not list, and where a modulus margin cannot be met; says why.
     """
     import scipy.optimize  # noqa: F401  slow to import: once, ahead of the other process
 
@@ -202,7 +224,7 @@ def _tuning(name: str, f: FinePointing, of: Sequence[DesignPlant]) -> Callable[.
     wanted = Specification(f.modulus_margin)
     if name == BASELINE:
         return partial(grid_baseline, of, wanted)
-    if name == IN_SERIES:
+    if name in (IN_SERIES, ADAPTIVE):
         path = ReferenceFilter(f.reference_filter_hz)
         filtered = tuple(behind_filter(p, path.discrete(p.period_s)) for p in of)
         return partial(control.tune, control.PI, filtered, wanted, seed=f.seed)
@@ -217,17 +239,18 @@ def build(name: str, scene: Scene, axis: control.AxisController) -> LoopControll
     """Put a tuned axis controller on all axes of the scene, with its inverse where its name says so.
 
     Args:
-        name: One of `names`.
+        name: One of `offered`.
         scene: The mission's fine-pointing loop.
         axis: The controller of one axis.
 
     Raises:
-        ValueError: The controller reads a gauge that the loop lacks, or its mirror has no inverse.
+        ValueError: The controller reads a gauge that the loop lacks, or its mirror has no inverse, or none that learns.
     """
     if name not in _INVERSE_USED:
         return assemble(name, scene.loop, axis)
     path, inverse = ReferenceFilter(scene.table.reference_filter_hz), control.inverse(scene.loop.mirror)
-    return with_inverse(name, scene.loop, axis, inverse, path, name == IN_SERIES)
+    made = with_inverse(name, scene.loop, axis, inverse, path, name != WITH_INVERSE)
+    return with_adaptation(made, scene.loop) if name == ADAPTIVE else made
 
 
 def grid_baseline(of: Sequence[DesignPlant], wanted: Specification) -> Tuned:

@@ -13,7 +13,7 @@ from microrad import mirror
 from microrad.core import kernels, lti
 from microrad.core.arrays import Floats
 from microrad.loop import disturbance
-from microrad.loop.control import amplifier_factor, inverse_arrays, no_feedforward
+from microrad.loop.control import adaptive_arrays, amplifier_factor, at_the_begin, inverse_arrays, no_feedforward
 from microrad.loop.pointing_loop.loop import ForwardHysteresis, LoopController, PointingLoop
 from microrad.loop.sensor import StrainGauge
 from microrad.mirror.model import bank_arrays
@@ -171,6 +171,7 @@ def arrays(
         actuator=np.tile(np.array(row), (actuators, 1)),
         **inverse_arrays(inverse, timing.period_s),
         forward=forward_arrays(controller.forward, actuators, timing.period_s),
+        **adaptive_arrays(controller.adaptation, timing.period_s),
     )
     return kernels.by_rows(found)
 
@@ -201,7 +202,7 @@ def check_controller(loop: PointingLoop, controller: LoopController) -> None:
     s, m = controller.system, loop.mirror
     inputs = loop.axes + m.axes + loop.axes
     elements = 0 if controller.forward is None else len(controller.forward.bank)
-    outputs = m.actuators * (3 if controller.inverse else 1) + elements
+    outputs = m.actuators * (4 if controller.adaptation else 3 if controller.inverse else 1) + elements
     order = s.A.shape[0]
     wanted = {"A": (order, order), "B": (order, inputs), "C": (outputs, order), "D": (outputs, inputs)}
     matrices = {**{key: getattr(s, key) for key in "ABCD"}, "L": controller.anti_windup}
@@ -266,6 +267,8 @@ def start(
         inverse_lag=_rows(p.inverse_lag_keep.size),
         forward_bank=_rows(kernels.BANK_FIELDS * p.forward.drives.shape[1]),
         forward_play=_rows(p.forward.play_threshold.size),
+        learnt=_rows(p.adaptive_weight.size * kernels.PLAY_FIELDS),
+        track=_rows(len(p.adaptive) * kernels.TRACK_FIELDS),
         work=_rows(m),
         sum=_rows(axes),
         sum_square=_rows(axes),
@@ -274,6 +277,8 @@ def start(
         histogram=np.zeros((LANES, kernels.BINS), dtype=np.int32),
         drawn=np.zeros(0),
     )
+    for rows, begin in zip((state.learnt, state.track), at_the_begin(p), strict=True):
+        rows.reshape(-1, LANES)[: begin.size] = begin.reshape(-1, 1)
     shaped = lti.to_bits(p.shaping_output @ state.shaping.reshape(-1, LANES)[: p.shaping_diagonal.size], lti.EXACT_BITS)
     state.disturbance[:] = shaped.ravel()
     state.error[:] = (shaped + reference(loop, 0, 0, references)[0]).ravel()

@@ -4,10 +4,11 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from microrad.core import lti
 from microrad.core.arrays import Floats
-from microrad.loop.control import AxisController, Drive, Inverse, Timing
+from microrad.loop.control import Adaptation, AxisController, Drive, Inverse, Timing, adaptation, sampled_path
 from microrad.loop.disturbance import Disturbance, Reference
 from microrad.loop.sensor import OpticalSensor, StrainGauge
 from microrad.mirror.hysteresis import BoucWen, Play, gain_only, slow_gain
@@ -84,7 +85,8 @@ class LoopController:
     ``system`` has the inputs optical error by axis, gauge reading by mirror output, reference by axis (all rad), and
     the outputs v by actuator (V) and, with an ``inverse``, the inverse's target (rad at the mirror's output) and its
     rate (rad/s) by actuator, and then, with ``forward``, what drives each of its elements. ``anti_windup`` is L,
-    (states, actuators).
+    (states, actuators). With an ``adaptation`` the inverse's plays learn on line; the last outputs are then the gauge's
+    readings less those that the targets make expect, rad, by actuator, and no rate is needed.
     """
 
     name: str
@@ -92,6 +94,7 @@ class LoopController:
     anti_windup: Floats
     inverse: Inverse | None = None
     forward: ForwardHysteresis | None = None
+    adaptation: Adaptation | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,6 +205,70 @@ def with_inverse(
     )
     windup = np.vstack([feedback.anti_windup, np.zeros((A.shape[0], m))])
     return LoopController(name, system, windup, inverse)
+
+
+EXPECTED_WITHIN = 0.02
+"""Largest error of the response from a target to the reading that is expected of it, as a share of the slow one."""
+
+
+def expected_reading(loop: PointingLoop, actuator: int) -> lti.StateSpace:
+    """From the target of an inverse to the gauge's reading: delay, amplifier and linear mirror, of low order.
+
+    Args:
+        loop: The loop.
+        actuator: Which of its actuators, from 0; it has the mirror's output of that number.
+    """
+    m = loop.mirror
+    linear = m.linear([slow_gain(model) for model in m.bank])
+    own = slice(actuator, actuator + 1)  # what goes through the hysteresis: creep is on the inverse's side
+    through = lti.StateSpace(linear.A, (linear.B - m.B)[:, own], linear.C[own], (linear.D - m.D)[own, own])
+    sampled = sampled_path(through, loop.drive, loop.timing)
+    unit = replace(sampled, C=sampled.C / slow_gain(m.inverse[actuator]))
+    return lti.system_to_bits(lti.reduced(unit, EXPECTED_WITHIN), lti.EXACT_BITS)
+
+
+def with_adaptation(made: LoopController, loop: PointingLoop) -> LoopController:
+    """The controller with its inverse in series made one that learns from the strain gauge.
+
+    Args:
+        made: A controller `with_inverse`, in series.
+        loop: The loop.
+
+    Raises:
+        ValueError: The loop has no strain gauge, or its mirror's hysteresis is none that can be learnt; says why.
+    """
+    if loop.gauge is None:
+        raise ValueError(
+            f"controller {made.name!r} learns from a strain gauge, and this loop has none: give it one "
+            "(fine_pointing.strain_gauge), or take the frozen inverse"
+        )
+    s, m = made.system, loop.mirror.actuators
+    expected = [expected_reading(loop, a) for a in range(m)]
+    A, B, C, D = (block_diag(*(getattr(each, key) for each in expected)) for key in "ABCD")
+    reading = np.zeros((m, s.B.shape[1]))
+    reading[:, loop.axes : loop.axes + m] = np.eye(m)
+    target = slice(m, 2 * m)
+    C_made, D_made = s.C.copy(), s.D.copy()
+    C_made[2 * m :], D_made[2 * m :] = 0.0, 0.0  # plays that do not widen need no rate
+    system = lti.StateSpace(
+        np.block([[s.A, np.zeros((s.order, len(A)))], [B @ s.C[target], A]]),
+        np.vstack([s.B, B @ s.D[target]]),
+        np.block([[C_made, np.zeros((len(s.C), len(A)))], [-D @ s.C[target], -C]]),
+        np.vstack([D_made, reading - D @ s.D[target]]),
+    )
+    windup = np.vstack([made.anti_windup, np.zeros((len(A), m))])
+    noise = math.hypot(loop.gauge.noise_rad, loop.gauge.resolution_rad / math.sqrt(12.0))
+    drive = loop.drive
+    swing = max(abs(drive.minimum_v), abs(drive.maximum_v))
+    delay = max(1, round(max(map(_delay_samples, expected))))
+    learnt = adaptation(loop.mirror.inverse, noise, delay, swing)
+    return replace(made, system=system, anti_windup=windup, adaptation=learnt)
+
+
+def _delay_samples(system: lti.StateSpace) -> float:
+    """Delay of slow signals through a discrete system of unit slow gain: -dG/dz at z = 1."""
+    resolvent = np.linalg.inv(np.eye(system.order) - system.A)
+    return float((system.C @ resolvent @ resolvent @ system.B)[0, 0])
 
 
 def decoupling(loop: PointingLoop) -> Floats:
