@@ -71,6 +71,8 @@ benchmark: $(VENV)/.test
 	$(BIN)/python benchmarks/cubespec_residual.py
 	$(BIN)/python benchmarks/springs_elsewhere.py
 	$(BIN)/python benchmarks/feedforward.py
+	$(BIN)/python benchmarks/adaptive_inverse.py
+	$(BIN)/python benchmarks/coupled_step.py
 	$(BIN)/python benchmarks/studio_map.py
 
 clean:
