@@ -236,7 +236,7 @@ for words in (["presets", "--json"], ["budget", "no.toml"]):
 
 def test_a_command_in_a_fork_ends_and_says_what_the_plain_one_does(call, folder):
     """In a process of its own: one that has threads, as those of the tests have, must not be forked."""
-    scripts = os.environ | {"PYTHONPATH": str(ROOT / "scripts")}
+    scripts = os.environ | {"PYTHONPATH": str(ROOT / "scripts"), "PYTHONUNBUFFERED": ""}
     ran = subprocess.run([sys.executable, "-c", FORKS], env=scripts, capture_output=True, text=True, check=True)
     listed, refused = (tuple(json.loads(line)) for line in ran.stdout.splitlines())
     assert listed == call("presets", "--json") and listed[0] == 0

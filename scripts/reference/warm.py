@@ -38,6 +38,8 @@ def load(words: Sequence[str], folder: Path) -> None:
 
 def run(words: Sequence[str], folder: Path, environment: Mapping[str, str]) -> tuple[int, str, str]:
     """Exit code, output and errors of a command in a fork of this process."""
+    sys.stdout.flush()  # what waits to be written would be written by the fork as well
+    sys.stderr.flush()
     with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
         if (child := os.fork()) == 0:
             _become(words, folder, environment, out, err)
