@@ -473,7 +473,8 @@ def test_nothing_that_a_loop_must_do_is_met_by_a_mirror_without_dynamics():
             assert (each.margin > 0, each.met) == (True, met)
             assert each.because == ("Gauge" if met else "dynamics of the mirror, which its model does not have")
         assert not judged(m, 11e-6)[0].met
-        assert not_reliable(SimpleNamespace(unknown_dynamics=unknown_dynamics(m.mirror))) == ([] if met else [f"Not to be relied on: {unknown_dynamics(m.mirror)}."])
+        of = SimpleNamespace(unknown_dynamics=unknown_dynamics(m.mirror))
+        assert not_reliable(of) == ([] if met else [f"Not to be relied on: {unknown_dynamics(m.mirror)}."])
     assert [each.because for each in judged(known, 5e-6, possible=False)] == ["Gauge", IMPOSSIBLE]
     assert "resonances and its lag are not known" in unknown_dynamics(bare.mirror)
     assert unknown_dynamics(bare.mirror) in summarise(bare.mirror).warnings
