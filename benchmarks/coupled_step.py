@@ -29,7 +29,7 @@ from microrad.mirror.model import Mirror
 HERE = Path(__file__).resolve().parent
 STEP_S, STEPS_A_SAMPLE = 20e-6, 10
 THRESHOLDS = (0.0, 0.05, 0.15, 0.35, 0.7)
-SAMPLES, ROUNDS = 4, 6
+SAMPLES, ROUNDS = 40, 3
 """Control samples in a timed piece, and how often fifteen of each are timed."""
 
 
