@@ -84,7 +84,7 @@ def mission_loop(file: LinkFile, table: LoopTable, seed: int) -> MissionLoop:
     scene = coupled_study.of_mission(file, mirror.of(file.mission), tracking_light_w(file))
     if isinstance(scene, controller_study.Scene) and table.axes == "one":
         scene = replace(scene, loop=scene.axis)
-    return MissionLoop(table, scene, scene.variants[table.mirror], span(table, settings(file), seed))
+    return MissionLoop(table, scene, scene.on(table.mirror), span(table, settings(file), seed))
 
 
 class ControllerTuner:

@@ -190,7 +190,7 @@ def verify(
     Raises:
         ValueError: The linear loop under a design is unstable.
     """
-    loops = scene.variants
+    loops = {variant: scene.on(variant) for variant in scene.has}
     cases = [
         _case(loop, d.controller, spectrum=variant == Variant.GIVEN) for d in designs for variant, loop in loops.items()
     ]
@@ -307,7 +307,7 @@ def error_budget(scene: AnyScene, of: Verified, on_progress: Progress = lambda d
         of: The design, simulated.
         on_progress: Called with the parts of the work that are done, their number and what is done.
     """
-    fine = parts.without(scene.variants[Variant.STRAIGHT], parts.QUANTISATION)
+    fine = parts.without(scene.on(Variant.STRAIGHT), parts.QUANTISATION)
     names = parts.sources(fine)
     left_out = (parts.LIMITS, parts.QUANTISATION, parts.DELAY)
     alone = [parts.without(fine, *(other for other in names if other != name)) for name in names]
@@ -350,9 +350,8 @@ def sines(
     """
     f = scene.table
     cases, what = [], []
-    for variant, loop in scene.variants.items():
-        if variant == Variant.STRAIGHT:
-            continue
+    for variant in (each for each in scene.has if each != Variant.STRAIGHT):
+        loop = scene.on(variant)
         for design in designs:
             for freq in scene.sine_frequencies_hz:
                 following = _following_sine(loop, scene.sine_amplitude_rad, freq)

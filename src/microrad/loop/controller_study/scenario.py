@@ -46,8 +46,12 @@ class AnyScene:
         raise NotImplementedError
 
     @property
-    def variants(self) -> dict[Variant, fine.PointingLoop]:
-        """The loop on each variant of its mirror, the mission's own first."""
+    def has(self) -> tuple[Variant, ...]:
+        """The variants of its mirror, the mission's own first."""
+        raise NotImplementedError
+
+    def on(self, variant: Variant) -> fine.PointingLoop:
+        """The loop on one variant of its mirror, one that it has."""
         raise NotImplementedError
 
     @property
@@ -74,13 +78,15 @@ class Scene(AnyScene):
         return self.loop
 
     @property
-    def variants(self) -> dict[Variant, fine.PointingLoop]:
-        """The loop on each variant of the mirror: without hysteresis each element is its slow gain, as in theory."""
-        straight = parts.without(self.loop, parts.HYSTERESIS)
-        return {
-            variant: straight if variant == Variant.STRAIGHT else with_mirror(self.loop, self.mirrors, variant)
-            for variant in self.mirrors.own
-        }
+    def has(self) -> tuple[Variant, ...]:
+        """The variants of its mirror, the mission's own first."""
+        return tuple(self.mirrors.own)
+
+    def on(self, variant: Variant) -> fine.PointingLoop:
+        """The loop on one variant of the mirror: without hysteresis each element is its slow gain, as in theory."""
+        if variant == Variant.STRAIGHT:
+            return parts.without(self.loop, parts.HYSTERESIS)
+        return with_mirror(self.loop, self.mirrors, variant)
 
     @property
     def unknown_dynamics(self) -> str:

@@ -51,9 +51,13 @@ class CoupledScene(scenario.AnyScene):
         return self.rest
 
     @property
-    def variants(self) -> dict[Variant, PointingLoop]:
-        """The loop with the mirror as it was identified, and without hysteresis: with its gains about rest."""
-        return {Variant.GIVEN: self.loop, Variant.STRAIGHT: replace(self.loop, mirror=self.rest.mirror)}
+    def has(self) -> tuple[Variant, ...]:
+        """The variants of its mirror: as it was identified, and without hysteresis."""
+        return Variant.GIVEN, Variant.STRAIGHT
+
+    def on(self, variant: Variant) -> PointingLoop:
+        """The loop on one variant of the mirror: without hysteresis it has its gains about rest."""
+        return self.loop if variant == Variant.GIVEN else replace(self.loop, mirror=self.rest.mirror)
 
     @property
     def unknown_dynamics(self) -> str:
