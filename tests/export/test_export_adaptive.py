@@ -5,10 +5,18 @@ from functools import cache
 
 import numpy as np
 import pytest
-from numpy.testing import assert_array_equal
 
 import designs
-from export.test_export_flight import EXACT, Code, bench, difference, held, pytestmark, spoiled  # noqa: F401
+from export.test_export_flight import (  # noqa: F401
+    EXACT,
+    Code,
+    bench,
+    difference,
+    garbage_stays_within_limits,
+    held,
+    pytestmark,
+    spoiled,
+)
 from learning_loops import CREEP, PLAYS, in_series, loop_of, softened
 from microrad.core import kernels
 from microrad.export import choice
@@ -23,7 +31,7 @@ SAMPLES = 10_000
 
 
 @cache
-def learning(resolution_v=0.0, learns=True):
+def learning(resolution_v=0.0, learns=True, samples=SAMPLES):
     """The controller of two axes as it flies, and its run on a mirror that has softened and creeps."""
     nominal = loop_of(axes=2)
     nominal = replace(nominal, drive=replace(nominal.drive, drive_resolution_v=resolution_v))
@@ -32,7 +40,7 @@ def learning(resolution_v=0.0, learns=True):
     softer = replace(nominal, mirror=loop_of(softened(PLAYS), CREEP, axes=2).mirror)
     scene = replace(designs.chosen("PI + inverse in series").scene, loop=softer)
     chosen = replace(designs.chosen("PI + inverse in series"), scene=scene, controller=made)
-    return choice.flight_controller(chosen), choice.vectors(chosen, SAMPLES)
+    return choice.flight_controller(chosen), choice.vectors(chosen, samples)
 
 
 def test_it_is_the_kernel_while_it_learns(tmp_path):
@@ -45,6 +53,12 @@ def test_it_is_the_kernel_while_it_learns(tmp_path):
     assert (counters.rejected, counters.faults) == (0, 0)
     frozen = replace(of, adaptation=replace(of.adaptation, settings=no_learning(of.adaptation.settings)))
     assert difference(Code(tmp_path / "frozen", frozen), vectors)[0] > 1e-3  # it learnt
+
+
+@pytest.mark.endurance
+def test_it_is_the_kernel_over_1e5_samples(tmp_path):
+    of, vectors = learning(samples=100_000)
+    assert 0.0 < difference(Code(tmp_path, of), vectors)[0] < EXACT
 
 
 def test_it_is_the_kernel_where_a_weight_is_held_at_its_least(tmp_path, monkeypatch):
@@ -67,16 +81,7 @@ def test_garbage_does_not_take_it_beyond_its_limits_nor_what_it_learns(tmp_path)
     of, vectors = learning(0.35e-3)
     vectors = replace(vectors, inputs=vectors.inputs[:2500], commands=vectors.commands[:2500])
     code = Code(tmp_path, of)
-    bad = spoiled(vectors.inputs, code.number)
-    good, rejected = held(bad)
-    found, counters = code.run(bad)
-    assert np.all(np.isfinite(found))
-    assert np.max(np.abs(found)) <= of.maximum_v
-    assert len(bad) / 10 < rejected == counters.rejected
-    assert_array_equal(found, code.run(good)[0])
-    status, numbers, words = bench(code, replace(vectors, inputs=bad, commands=found), "sanitized")
-    assert (status, words) == (0, "")
-    assert numbers["rejected"] == rejected
+    bad = garbage_stays_within_limits(code, of, vectors)
     state = code.begin()
     code.replay(bad, state)
     assert len(np.unique(code.replay(vectors.inputs[:500], state)[:, 0])) > 50  # it moves again

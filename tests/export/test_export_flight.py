@@ -309,18 +309,7 @@ def test_garbage_does_not_take_several_axes_beyond_their_limits(precision, tmp_p
     chosen = designs.of_three_actuators()
     of, vectors = choice.flight_controller(chosen), choice.vectors(chosen, 2000)
     code = Code(tmp_path, of, precision)
-    bad = spoiled(vectors.inputs, code.number)
-    good, rejected = held(bad)
-    found, counters = code.run(bad)
-    assert np.all(np.isfinite(found))
-    assert np.max(np.abs(found)) <= of.maximum_v
-    assert len(bad) / 10 < rejected == counters.rejected
-    assert_array_equal(found, code.run(good)[0])
-    status, numbers, words = bench(
-        code, replace(vectors, inputs=bad.astype(float), commands=found.astype(float)), "sanitized"
-    )
-    assert (status, words) == (0, "")
-    assert numbers["rejected"] == rejected
+    garbage_stays_within_limits(code, of, vectors)
 
 
 def test_actuators_that_rest_at_different_biases_are_refused():
@@ -509,6 +498,23 @@ def test_another_compiler_makes_the_same_of_it(precision, tmp_path):
 
 GARBAGE = (inf, -inf, nan, 1e38, -1e38, 1e300, -1e300, 5e-324, -1e-310, 1e-40, -0.0, 0.1, -0.1, 0.100001)
 LIMIT_RAD = 0.1
+
+
+def garbage_stays_within_limits(code, of, vectors):
+    """A run with garbage among its readings, under the sanitizers too: rejected, counted, held; the readings."""
+    bad = spoiled(vectors.inputs, code.number)
+    good, rejected = held(bad)
+    found, counters = code.run(bad)
+    assert np.all(np.isfinite(found))
+    assert np.max(np.abs(found)) <= of.maximum_v
+    assert len(bad) / 10 < rejected == counters.rejected
+    assert_array_equal(found, code.run(good)[0])
+    status, numbers, words = bench(
+        code, replace(vectors, inputs=bad.astype(float), commands=found.astype(float)), "sanitized"
+    )
+    assert (status, words) == (0, "")
+    assert numbers["rejected"] == rejected
+    return bad
 
 
 def spoiled(sound, number):

@@ -241,10 +241,10 @@ def _loaded(file: Path, mirror: Path | None) -> "tuple[MissionFile, CoupledMirro
 def _chosen(mission: "MissionFile", several: "CoupledMirror | None", name: str, on_progress: OnProgress) -> "Choice":
     from microrad.export import choice
     from microrad.loop.paper_cases import PID, PID_WITH_INVERSE
-    from microrad.mission.file import mirror_of_loop
 
-    of_papers_loop = name in (PID, PID_WITH_INVERSE) and mirror_of_loop(mission) is not None
-    if several is not None and not of_papers_loop:
+    table = mission.mission.fine_pointing
+    named = table is not None and table.mirror_file is not None  # the paper's loop has the mission's own mirror
+    if several is not None and not (named and name in (PID, PID_WITH_INVERSE)):
         return choice.choose_coupled(mission, several, name, on_progress)
     return choice.choose(mission, name, on_progress)
 
