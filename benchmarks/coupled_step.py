@@ -96,7 +96,7 @@ def measured(m: Mirror, folder: str) -> tuple[float, float, float]:
         twin.run(*pointers, ctypes.c_int64(steps), *ends)
 
     def one_run() -> None:
-        kernels.open_loop(plant, state, drive, ours, bank)
+        model.respond(plant, state, drive, ours, bank)
 
     c_twin()
     one_run()

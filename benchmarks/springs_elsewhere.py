@@ -21,7 +21,6 @@ from collections.abc import Callable
 
 import numpy as np
 
-from microrad.core import kernels
 from microrad.core.periodic import delayed
 from microrad.lab.identify import fit_hysteretic_stiffness, fit_linear
 from microrad.lab.identify.hysteresis.structures import hysteretic_oscillator
@@ -50,7 +49,7 @@ def bouc_wen(drive: np.ndarray) -> np.ndarray:
     oscillator = hysteretic_oscillator(*PUBLISHED)
     plant = model.discretise(oscillator.build(np.array(PUBLISHED)), 1 / (FINE * RATE_HZ))
     output = np.empty((len(drive), 1))
-    kernels.open_loop(plant, model.at_rest(plant), drive, output, np.empty((len(drive), 0)))
+    model.respond(plant, model.at_rest(plant), drive, output, np.empty((len(drive), 0)))
     return output
 
 

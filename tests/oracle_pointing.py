@@ -440,26 +440,25 @@ def build_ensemble(case):
     """The kernel's record of a pointing loop."""
     loop = case.loop
     plant, _ = oracles.build_plant(case.mirror, case.step_s)
+    Ad = oracles.first_order_hold(case.mirror.A, case.mirror.E, case.step_s)[0]
     record, _ = oracles.build_loop(loop, case.step_s)
     states = plant.diagonal.size
     diagonal, coupling = in_pairs(case.As)
     return kernels.Ensemble(
         step_s=plant.step_s,
         feedback=plant.feedback,
+        direct=plant.direct,
         diagonal=plant.diagonal,
         coupling=plant.coupling,
         rest=plant.rest,
-        B0=padded(plant.B0, rows=states),
-        B1=padded(plant.B1, rows=states),
-        E0=padded(plant.E_held - plant.E1, rows=states),
-        E1=padded(plant.E1, rows=states),
-        E_held=padded(plant.E_held, rows=states),
-        E_back=padded(-plant.E1, rows=states),
+        By=padded(plant.B0 + Ad @ plant.B1, rows=states),
+        E=padded(plant.E_held - plant.E1 + Ad @ plant.E1, rows=states),
         F=padded(plant.F, columns=states),
-        G=plant.G,
+        H=plant.F @ plant.E1,
+        G=plant.G + plant.F @ plant.B1,
         Cy=padded(plant.C, columns=states),
-        Dy=plant.D,
-        Ky=plant.K,
+        Dy=plant.D + plant.C @ plant.B1,
+        Ky=plant.K + plant.C @ plant.E1,
         bouc_wen=plant.bouc_wen,
         operator=plant.operator,
         play_start=plant.play_start,
@@ -548,6 +547,8 @@ def build_state(case, p, first_run, shaping, reference):
         "x": p.diagonal.size,
         "x_next": p.diagonal.size,
         "drive": kernels.DRIVE_FIELDS * m,
+        "q": len(p.G),
+        "z": len(p.G),
         "bank": kernels.BANK_FIELDS * len(p.G),
         "play": p.play_threshold.size,
         "y": outputs,
@@ -566,6 +567,7 @@ def build_state(case, p, first_run, shaping, reference):
         "inverse": len(p.inverse_bouc_wen),
         "inverse_play": p.inverse_play_threshold.size,
         "inverse_lag": p.inverse_lag_keep.size,
+        "forward_z": p.forward.drives.shape[1],
         "forward_bank": kernels.BANK_FIELDS * p.forward.drives.shape[1],
         "forward_play": p.forward.play_threshold.size,
         "learnt": p.adaptive_weight.size * kernels.PLAY_FIELDS,

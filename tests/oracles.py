@@ -279,6 +279,11 @@ class MirrorTwin:
         z_next = self.advance_bank(self.mirror.F @ predicted + self.mirror.G @ u_next)
         self.x, self.u, self.z = self.linear(u_next, z_next), u_next, z_next
 
+    def x_less_its_end(self):
+        """x less what u and z at the end of the last step did to it, as kernels keep it."""
+        n, m = len(self.x), self.u.size + self.z.size
+        return self.x - self.transition[:n, n + m :] @ np.concatenate([self.u, self.z]) / self.step_s
+
     def output(self):
         return self.mirror.C @ self.x + self.mirror.D @ self.u + self.mirror.K @ self.z
 

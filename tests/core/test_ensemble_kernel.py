@@ -327,7 +327,7 @@ def assert_same(ensemble, found, lanes, share=rounding):
     assert_array_equal(ensemble.lines("counts")[:, lanes].T, [t.counts() for t in found])
     assert_array_equal(state.place, [len(traces[0]), errors.shape[1], 1])
     memory = {
-        "x": [t.mirror.x for t in found],
+        "x": [t.mirror.x_less_its_end() for t in found],
         "xc": [t.xc for t in found],
         "shaping": [t.s for t in found],
         "error": [t.errors[-1] for t in found],
@@ -341,8 +341,8 @@ def assert_same(ensemble, found, lanes, share=rounding):
         same(ensemble.lines(name)[: len(twin[0]), lanes].T, twin)
     elements = found[0].mirror.q.size
     bank = ensemble.lines("bank")[: elements * kernels.BANK_FIELDS].reshape(elements, kernels.BANK_FIELDS, LANES)
-    same(bank[:, kernels.BANK_Q, lanes].T, [t.mirror.q for t in found])
-    same(bank[:, kernels.BANK_Z, lanes].T, [t.mirror.z for t in found])
+    same(ensemble.lines("q")[:elements, lanes].T, [t.mirror.q for t in found])
+    same(ensemble.lines("z")[:elements, lanes].T, [t.mirror.z for t in found])
     h = [t.mirror.h for t in found]
     same(bank[: len(h[0]), kernels.BANK_H, lanes].T, h)
 

@@ -297,7 +297,7 @@ def hysteresis_loop(
     output, bank, last = np.empty((samples, 1)), np.empty((samples, state.bank.shape[0])), np.full(samples, np.inf)
     for _ in range(1000):
         state.clamped[:] = 0
-        kernels.open_loop(plant, state, drive, output, bank)
+        mirror.respond(plant, state, drive, output, bank)
         if np.max(np.abs(output[:, 0] - last)) <= 1e-6 * np.ptp(output):
             break
         last = output[:, 0].copy()

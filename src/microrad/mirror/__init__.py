@@ -9,6 +9,8 @@ from microrad.mirror.model import (
     from_mission,
     from_table,
     hysteresis_model,
+    respond,
+    retimed,
     unrolled,
 )
 from microrad.mirror.variants import MirrorAxis, MirrorParts, Variant, of
@@ -26,5 +28,7 @@ __all__ = [
     "from_table",
     "hysteresis_model",
     "of",
+    "respond",
+    "retimed",
     "unrolled",
 ]

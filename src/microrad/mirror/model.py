@@ -8,7 +8,7 @@ Drive u in volts at the amplifier's input, output y in radians. All are deviatio
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -355,6 +355,67 @@ def contraction(mirror: Mirror, step_s: float) -> float:
     steepest = [steepest_slope(model) for model, is_fed in zip(mirror.bank, fed, strict=True) if is_fed]
     returning = (mirror.F @ end)[np.ix_(fed, fed)]  # what is not fed cannot return
     return float(np.linalg.norm(returning * np.array(steepest)[None, :], np.inf))
+
+
+class Retimed(NamedTuple):
+    """Matrices of a plant whose state has no part of the end of its step: see `kernels.Ensemble`, by those names."""
+
+    B: Floats
+    E: Floats
+    H: Floats
+    G: Floats
+    D: Floats
+    K: Floats
+
+
+def retimed(plant: kernels.Plant) -> Retimed:
+    """The plant with u and z in each product once.
+
+    Args:
+        plant: The plant.
+    """
+    return Retimed(
+        B=plant.B0 + kernels.advanced(plant, plant.B1),
+        E=plant.E_held - plant.E1 + kernels.advanced(plant, plant.E1),
+        H=plant.F @ plant.E1,
+        G=plant.G + plant.F @ plant.B1,
+        D=plant.D + plant.C @ plant.B1,
+        K=plant.K + plant.CE1,
+    )
+
+
+def respond(plant: kernels.Plant, state: kernels.PlantState, drive: Floats, output: Floats, bank: Floats) -> None:
+    """`kernels.open_loop`, for a mirror of another size than the paper's by columns, which is faster.
+
+    Args:
+        plant: The plant.
+        state: Its state, at rest or as this function left it.
+        drive: Drive about the bias, in V, shape (samples, actuators).
+        output: Outputs about those at rest, shape (samples, outputs); written.
+        bank: Outputs of the hysteresis elements, shape (samples, elements), or of the first few; written.
+    """
+    if isinstance(plant.states, tuple):
+        kernels.open_loop(plant, state, drive, output, bank)
+        return
+    turned, elements, outputs = retimed(plant), len(plant.F), len(plant.C)
+    inputs = elements + turned.B.shape[1]
+
+    def flat(matrix: Floats) -> Floats:
+        return np.ravel(np.pad(matrix, [(0, -size % 4) for size in matrix.shape]), order="F")
+
+    def memory(size: int) -> Floats:
+        return np.zeros(size + -size % 4)
+
+    columns = kernels.Columns(
+        held=flat(np.hstack([turned.E, turned.B])),
+        seen=flat(np.vstack([plant.F, plant.C])),
+        drives=flat(np.vstack([np.hstack([turned.H, turned.G]), np.zeros((outputs, inputs))])),
+        outputs=flat(np.vstack([np.zeros((elements, inputs)), np.hstack([turned.K, turned.D])])),
+        states=memory(plant.diagonal.size),
+        inputs=memory(inputs),
+        sums=memory(elements + outputs),
+    )
+    kernels.open_loop_by_columns(plant, columns, state, drive, output, bank)
 
 
 def at_rest(plant: kernels.Plant) -> kernels.PlantState:

@@ -16,7 +16,6 @@ from microrad.core.kernels.ensemble_records import (
     BANK_FIELDS,
     BANK_H,
     BANK_Q,
-    BANK_Z,
     BINS,
     BINS_LOWEST_OCTAVE,
     BINS_OCTAVE_BITS,
@@ -88,7 +87,7 @@ from microrad.core.kernels.hysteresis import (
     widening_play_response,
 )
 from microrad.core.kernels.loop import closed_loop
-from microrad.core.kernels.plant import Path, PlayPlant, open_loop, play_path
+from microrad.core.kernels.plant import Columns, Path, PlayPlant, open_loop, open_loop_by_columns, play_path
 from microrad.core.kernels.random_numbers import gaussian_kernel
 from microrad.core.kernels.records import (
     ALPHA,
@@ -116,6 +115,7 @@ from microrad.core.kernels.records import (
     Q,
     Rows,
     Z,
+    advanced,
     bouc_wen_rows,
     rows,
 )

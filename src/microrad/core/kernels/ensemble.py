@@ -290,8 +290,9 @@ def _control(p, s, length):  # type: ignore[no-untyped-def]
         _ensemble_inverse(p, s)
     if p.forward.drives.shape[1] > 0:
         counts = s.counts[at_row(COUNT_INVERSE_CLAMPED - COUNT_CLAMPED) :]
-        own = ForwardState(s.forward_bank, s.forward_play, counts)
-        forward_bank(p.forward, own, s.output, p.C.shape[0] - p.forward.drives.shape[1])
+        drives = s.output[at_row(p.C.shape[0] - p.forward.drives.shape[1]) :]
+        own = ForwardState(drives, s.forward_z, s.forward_bank, s.forward_play, counts)
+        forward_bank(p.forward, own, s.output)
     for i in range(states):
         fresh = weigh(p.A[i], s.xc, at_row(0), at_row(1), s.xc_next, at_row(i), True)
         if weigh(p.B[i], s.measured, at_row(0), at_row(1), s.xc_next, at_row(i), fresh):

@@ -11,10 +11,7 @@ from microrad.core.kernels.ensemble_records import (
     BANK_H,
     BANK_H_BEFORE,
     BANK_Q,
-    BANK_Q_NEXT,
     BANK_TRAVEL,
-    BANK_Z,
-    BANK_Z_BEFORE,
     COUNT_CLAMPED,
     DRIVE_BEFORE,
     DRIVE_FIELDS,
@@ -152,6 +149,52 @@ def sum_rows(weights, rows, first, stride, total, row):  # type: ignore[no-untyp
 
 
 @compiled_loop
+def add_product(weights, rows, first, stride, total):  # type: ignore[no-untyped-def]
+    """total += weights @ rows, a row of runs each: two rows of the total at once, and up to four of the others.
+
+    Args:
+        weights: Weights, shape (rows of the total, rows that are weighed).
+        rows: Rows of runs, one behind the other, flat.
+        first: Place of the first row that is weighed.
+        stride: Numbers from one of them to the next.
+        total: Rows of runs, flat, another array; its first ones are added to.
+    """
+    count, size = weights.shape
+    for i in range(0, count - 1, 2):
+        a, b, at, beside = weights[i], weights[i + 1], at_row(i), at_row(i + 1)
+        for j in range(0, size - 3, 4):
+            a0, a1, a2, a3, b0, b1, b2, b3 = a[j], a[j + 1], a[j + 2], a[j + 3], b[j], b[j + 1], b[j + 2], b[j + 3]
+            one = first + stride * np.uint64(j)
+            two, three, four = one + stride, one + np.uint64(2) * stride, one + np.uint64(3) * stride
+            for r in range(ROW_LENGTH):
+                w, x, y, z = rows[one + r], rows[two + r], rows[three + r], rows[four + r]
+                total[at + r] = (((total[at + r] + a0 * w) + a1 * x) + a2 * y) + a3 * z
+                total[beside + r] = (((total[beside + r] + b0 * w) + b1 * x) + b2 * y) + b3 * z
+        j, over = size - size % 4, size % 4
+        one = first + stride * np.uint64(j)
+        two, three = one + stride, one + np.uint64(2) * stride
+        if over == 3:
+            a0, a1, a2, b0, b1, b2 = a[j], a[j + 1], a[j + 2], b[j], b[j + 1], b[j + 2]
+            for r in range(ROW_LENGTH):
+                w, x, y = rows[one + r], rows[two + r], rows[three + r]
+                total[at + r] = ((total[at + r] + a0 * w) + a1 * x) + a2 * y
+                total[beside + r] = ((total[beside + r] + b0 * w) + b1 * x) + b2 * y
+        elif over == 2:
+            a0, a1, b0, b1 = a[j], a[j + 1], b[j], b[j + 1]
+            for r in range(ROW_LENGTH):
+                w, x = rows[one + r], rows[two + r]
+                total[at + r] = (total[at + r] + a0 * w) + a1 * x
+                total[beside + r] = (total[beside + r] + b0 * w) + b1 * x
+        elif over == 1:
+            a0, b0 = a[j], b[j]
+            for r in range(ROW_LENGTH):
+                total[at + r] += a0 * rows[one + r]
+                total[beside + r] += b0 * rows[one + r]
+    if count % 2 == 1:
+        weigh(weights[count - 1], rows, first, stride, total, at_row(count - 1), False)
+
+
+@compiled_loop
 def shift_rows(weights, size, rows, first, stride):  # type: ignore[no-untyped-def]
     """rows[first + stride i:] += weights[i] @ size, in a function by itself as few calls of the loop need it.
 
@@ -184,32 +227,16 @@ def modal_step(diagonal, coupling, x):  # type: ignore[no-untyped-def]
             x[at + at_row(1) + r] = keep1 * b + cross1 * a
 
 
-@compiled_loop
-def _add_element(before, now, bank, e, x):  # type: ignore[no-untyped-def]
-    """x += before z_before + now z of element e, for columns of neighbouring pairs of states."""
-    z, z_before = at_row(e * BANK_FIELDS + BANK_Z), at_row(e * BANK_FIELDS + BANK_Z_BEFORE)
-    for i in range(0, before.shape[0], 2):
-        a, b, c, d = before[i, e], now[i, e], before[i + 1, e], now[i + 1, e]
-        if (a != 0.0) | (b != 0.0) | (c != 0.0) | (d != 0.0):
-            at = at_row(i)
-            for r in range(ROW_LENGTH):
-                first, last = bank[z_before + r], bank[z + r]
-                x[at + r] += a * first + b * last
-                x[at + at_row(1) + r] += c * first + d * last
-
-
 @merged
-def _modal_element(diagonal, coupling, before, now, bank, x):  # type: ignore[no-untyped-def]
-    """x = Ad x + before z_before + now z of the first element, in place: both in one pass over the memory."""
-    z, z_before = at_row(BANK_Z), at_row(BANK_Z_BEFORE)
+def _modal_element(diagonal, coupling, E, z, x):  # type: ignore[no-untyped-def]
+    """x = Ad x + E z of the only element, in place: both in one pass over the memory."""
     for i in range(0, diagonal.size, 2):
         keep0, cross0, keep1, cross1 = diagonal[i], coupling[i], diagonal[i + 1], coupling[i + 1]
-        before0, now0, before1, now1 = before[i, 0], now[i, 0], before[i + 1, 0], now[i + 1, 0]
-        at = at_row(i)
+        gain0, gain1, at = E[i, 0], E[i + 1, 0], at_row(i)
         for r in range(ROW_LENGTH):
-            a, b, first, last = x[at + r], x[at + at_row(1) + r], bank[z_before + r], bank[z + r]
-            x[at + r] = keep0 * a + cross0 * b + before0 * first + now0 * last
-            x[at + at_row(1) + r] = keep1 * b + cross1 * a + before1 * first + now1 * last
+            a, b, held = x[at + r], x[at + at_row(1) + r], z[r]
+            x[at + r] = keep0 * a + cross0 * b + gain0 * held
+            x[at + at_row(1) + r] = keep1 * b + cross1 * a + gain1 * held
 
 
 @inlined
@@ -221,9 +248,9 @@ def _small_exp(x):  # type: ignore[no-untyped-def]
 
 
 @compiled_loop
-def _mend(rows, e, bank, at, rate_gain, power):  # type: ignore[no-untyped-def]
+def _mend(rows, e, bank, z, rate_gain, power):  # type: ignore[no-untyped-def]
     """h and z of those runs whose h changes sign inside the step or decays far; of all for another exponent than 1."""
-    d1, bias = rows[e, D1], rows[e, BIAS]
+    d1, bias, at, row = rows[e, D1], rows[e, BIAS], at_row(e * BANK_FIELDS), at_row(e)
     for r in range(ROW_LENGTH):
         h, end, travel, forcing = (
             bank[at + at_row(BANK_H_BEFORE) + r],
@@ -242,7 +269,7 @@ def _mend(rows, e, bank, at, rate_gain, power):  # type: ignore[no-untyped-def]
                 end = bouc_wen_advance(h, travel, rate, rows, e)
             linear = d1 * row_exp(-rows[e, D2] * rate) * (bank[at + at_row(BANK_Q) + r] + bias) - d1 * bias
             bank[at + at_row(BANK_H) + r] = end
-            bank[at + at_row(BANK_Z) + r] = linear + end
+            z[row + r] = linear + end
 
 
 @inlined
@@ -260,31 +287,30 @@ def _decay(rows, e, h, forcing, travel):  # type: ignore[no-untyped-def]
 
 
 @merged
-def _advance_bouc_wen(rows, e, bank, at, rate_gain, counts):  # type: ignore[no-untyped-def]
-    """BANK_Q to BANK_Q_NEXT, exactly, for a row of runs: as `bouc_wen_step`, with a zero crossing mended by itself.
+def _advance_bouc_wen(rows, e, bank, q, z, rate_gain, counts):  # type: ignore[no-untyped-def]
+    """BANK_Q of element e to q, exactly, for a row of runs: as `bouc_wen_step`, with a zero crossing mended by itself.
 
-    Leaves h, and z = d1 exp(-d2 rate) (q + bias) - d1 bias + h, each with what it was before.
+    Leaves h with what it was before, and z = d1 exp(-d2 rate) (q + bias) - d1 bias + h.
     """
-    limit, delta, d2 = rows[e, RATE_LIMIT], rows[e, DELTA], -rows[e, D2]
+    limit, delta, d2, at, row = rows[e, RATE_LIMIT], rows[e, DELTA], -rows[e, D2], at_row(e * BANK_FIELDS), at_row(e)
     d1, bias, epsilon = rows[e, D1], rows[e, BIAS], rows[e, EPSILON]
     # Several short loops: their constants stay in registers, and their chains of arithmetic overlap from run to run.
     clamped, small = np.int64(0), abs(d2) * limit <= 0.02
     for r in range(ROW_LENGTH):
-        q = bank[at + at_row(BANK_Q_NEXT) + r]
-        travel = q - bank[at + at_row(BANK_Q) + r]
+        end = q[row + r]
+        travel = end - bank[at + at_row(BANK_Q) + r]
         free = travel * rate_gain
         rate = min(max(free, -limit), limit)
         clamped |= bits_of(free - rate)
         grown = _small_exp(d2 * rate)
         bank[at + at_row(BANK_TRAVEL) + r] = travel
-        bank[at + at_row(BANK_Q) + r] = q
-        bank[at + at_row(BANK_Z_BEFORE) + r] = bank[at + at_row(BANK_Z) + r]
-        bank[at + at_row(BANK_Z) + r] = d1 * grown * (q + bias) - d1 * bias
+        bank[at + at_row(BANK_Q) + r] = end
+        z[row + r] = d1 * grown * (end + bias) - d1 * bias
     if not small:
         for r in range(ROW_LENGTH):
             rate = min(max(bank[at + at_row(BANK_TRAVEL) + r] * rate_gain, -limit), limit)
             grown = row_exp(d2 * rate)
-            bank[at + at_row(BANK_Z) + r] = d1 * grown * (bank[at + at_row(BANK_Q) + r] + bias) - d1 * bias
+            z[row + r] = d1 * grown * (bank[at + at_row(BANK_Q) + r] + bias) - d1 * bias
     if clamped != 0:
         for r in range(ROW_LENGTH):
             free = bank[at + at_row(BANK_TRAVEL) + r] * rate_gain
@@ -314,87 +340,91 @@ def _advance_bouc_wen(rows, e, bank, at, rate_gain, counts):  # type: ignore[no-
         unusual |= (bits_of(h) ^ bits_of(end)) | bits_of(near - abs(travel))
         bank[at + at_row(BANK_H_BEFORE) + r] = h
         bank[at + at_row(BANK_H) + r] = end
-        bank[at + at_row(BANK_Z) + r] += end
+        z[row + r] += end
     power = rows[e, POWER] != 0.0
     if unusual < 0 or power:
-        _mend(rows, e, bank, at, rate_gain, power)
+        _mend(rows, e, bank, z, rate_gain, power)
 
 
 @inlined
-def _advance_operator(p, s, o, at):  # type: ignore[no-untyped-def]
-    """BANK_Q to BANK_Q_NEXT for the plays of operator o; leaves z. BANK_TRAVEL holds what widens the thresholds."""
-    bank, counts, play = s.bank, s.counts, s.play
+def _advance_operator(p, s, o):  # type: ignore[no-untyped-def]
+    """BANK_Q of operator o to q with its plays; leaves z. BANK_TRAVEL holds what widens the thresholds."""
+    bank, counts, play, q, z = s.bank, s.counts, s.play, s.q, s.z
+    e = p.bouc_wen.shape[0] + o
+    at, row = at_row(e * BANK_FIELDS), at_row(e)
     widening, limit = p.operator[o, WIDENING], p.operator[o, WIDENING_LIMIT]
-    for r in range(ROW_LENGTH):
-        q = bank[at + at_row(BANK_Q_NEXT) + r]
-        free = abs(q - bank[at + at_row(BANK_Q) + r]) / p.step_s
-        bank[at + at_row(BANK_TRAVEL) + r] = widening * min(free, limit) if widening != 0.0 else 0.0
-        counts[at_row(COUNT_CLAMPED) + r] += 1.0 if (widening != 0.0) & (free > limit) else 0.0
-        bank[at + at_row(BANK_Z_BEFORE) + r] = bank[at + at_row(BANK_Z) + r]
-        bank[at + at_row(BANK_Z) + r] = 0.0
-        bank[at + at_row(BANK_Q) + r] = q
-    for j in range(p.play_start[o], p.play_start[o + 1]):
-        threshold, weight = p.play_threshold[j], p.play_weight[j]
-        wide = 1.0 if threshold > 0.0 else 0.0
-        row = at_row(j)
+    if widening != 0.0:
         for r in range(ROW_LENGTH):
-            q, half = bank[at + at_row(BANK_Q) + r], threshold + wide * bank[at + at_row(BANK_TRAVEL) + r]
-            value = max(q - half, min(q + half, play[row + r]))
-            play[row + r] = value
-            bank[at + at_row(BANK_Z) + r] += weight * value
+            free = abs(q[row + r] - bank[at + at_row(BANK_Q) + r]) / p.step_s
+            bank[at + at_row(BANK_TRAVEL) + r] = widening * min(free, limit)
+            bank[at + at_row(BANK_Q) + r] = q[row + r]
+            counts[at_row(COUNT_CLAMPED) + r] += 1.0 if free > limit else 0.0
     if p.operator[o, REACH] < inf:
         for r in range(ROW_LENGTH):
-            bank[at + at_row(BANK_Z) + r] += polynomial(p.operator, o, bank[at + at_row(BANK_Q) + r])
+            z[row + r] = polynomial(p.operator, o, q[row + r])
+    else:
+        clear_row(z, row)
+    for j in range(p.play_start[o], p.play_start[o + 1]):
+        threshold, weight, own = p.play_threshold[j], p.play_weight[j], at_row(j)
+        if (widening != 0.0) & (threshold > 0.0):
+            for r in range(ROW_LENGTH):
+                end, half = q[row + r], threshold + bank[at + at_row(BANK_TRAVEL) + r]
+                value = max(end - half, min(end + half, play[own + r]))
+                play[own + r] = value
+                z[row + r] += weight * value
+        else:
+            for r in range(ROW_LENGTH):
+                end = q[row + r]
+                value = max(end - threshold, min(end + threshold, play[own + r]))
+                play[own + r] = value
+                z[row + r] += weight * value
 
 
 @inlined
 def _advance_bank(p, s):  # type: ignore[no-untyped-def]
-    """Drive of each element at the end of the step, its operator, and its output before and now."""
+    """z of all elements for their drives q at the end of the step."""
     first_operator = p.bouc_wen.shape[0]
-    for e in range(p.G.shape[0]):
-        at, row = at_row(e * BANK_FIELDS), e * BANK_FIELDS + BANK_Q_NEXT
-        sum_rows(p.G[e], s.drive, at_row(DRIVE_NOW), at_row(DRIVE_FIELDS), s.bank, row)
-        if p.feedback:
-            weigh(p.F[e], s.x, at_row(0), at_row(1), s.bank, at_row(row), False)
-        if e < first_operator:
-            _advance_bouc_wen(p.bouc_wen, e, s.bank, at, 1.0 / p.step_s, s.counts)
-        else:
-            _advance_operator(p, s, e - first_operator, at)
+    for e in range(first_operator):
+        _advance_bouc_wen(p.bouc_wen, e, s.bank, s.q, s.z, 1.0 / p.step_s, s.counts)
+    for o in range(p.operator.shape[0]):
+        _advance_operator(p, s, o)
+
+
+@inlined
+def _drive_bank(p, s):  # type: ignore[no-untyped-def]
+    """q = F x + H z + G u of all elements, with z before the step."""
+    elements = p.G.shape[0]
+    for e in range(elements):
+        sum_rows(p.G[e], s.drive, at_row(DRIVE_NOW), at_row(DRIVE_FIELDS), s.q, e)
+    if p.feedback:
+        add_product(p.F, s.x, at_row(0), at_row(1), s.q)
+        add_product(p.H, s.z, at_row(0), at_row(1), s.q)
 
 
 @compiled_loop
-def forward_bank(p, s, output, first):  # type: ignore[no-untyped-def]
+def forward_bank(p, s, output):  # type: ignore[no-untyped-def]
     """One sample of a feedforward's own hysteresis: what its elements make of their drives is added to the commands.
 
     Args:
         p: A `ForwardBank`.
         s: Its `ForwardState`.
-        output: Rows of runs, flat: commands by actuator, which are added to, and the drives by element.
-        first: Row of the first element's drive.
+        output: Commands by actuator, rows of runs, flat; added to.
     """
-    actuators, elements, first_operator = p.drives.shape[0], p.drives.shape[1], p.bouc_wen.shape[0]
-    for e in range(elements):
-        at, source = at_row(e * BANK_FIELDS), at_row(first + e)
-        for r in range(ROW_LENGTH):
-            s.bank[at + at_row(BANK_Q_NEXT) + r] = output[source + r]
-        if e < first_operator:
-            _advance_bouc_wen(p.bouc_wen, e, s.bank, at, 1.0 / p.step_s, s.counts)
-        else:
-            _advance_operator(p, s, e - first_operator, at)
-    for a in range(actuators):
-        weigh(p.drives[a], s.bank, at_row(BANK_Z), at_row(BANK_FIELDS), output, at_row(a), False)
+    _advance_bank(p, s)
+    for a in range(p.drives.shape[0]):
+        weigh(p.drives[a], s.z, at_row(0), at_row(1), output, at_row(a), False)
 
 
 @inlined
 def ensemble_plant_step(p, s):  # type: ignore[no-untyped-def]
-    """One plant step behind the amplifier's: as `predict` and `plant_step`, for a row of runs.
+    """One plant step behind the amplifier's: as `predict` and `plant_step`, see `Ensemble`.
 
     Args:
         p: An `Ensemble`, for its plant.
         s: An `EnsembleState`: its drive has what it was and what it is at the end of the step; x, y, the bank and its
             counters are taken there.
     """
-    states, elements, several = p.diagonal.size, p.G.shape[0], p.rest.value.size > 0
+    states, several = p.diagonal.size, p.rest.value.size > 0
     if several:  # before x moves
         for i in range(states):
             if p.rest.start[i] < p.rest.start[i + 1]:
@@ -403,28 +433,22 @@ def ensemble_plant_step(p, s):  # type: ignore[no-untyped-def]
                 gain, source, target = p.rest.value[j], at_row(p.rest.column[j]), at_row(i)
                 for r in range(ROW_LENGTH):
                     s.x_next[target + r] += gain * s.x[source + r]
-    if not p.feedback:  # else the drive of an element is that of the predicted x: with z held
-        _advance_bank(p, s)
-    if elements > 0 and not p.feedback:
-        _modal_element(p.diagonal, p.coupling, p.E0, p.E1, s.bank, s.x)
-        for e in range(1, elements):
-            _add_element(p.E0, p.E1, s.bank, e, s.x)
+    if p.G.shape[0] == 1:
+        _modal_element(p.diagonal, p.coupling, p.E, s.z, s.x)
     else:
         modal_step(p.diagonal, p.coupling, s.x)
-    for i in range(states):
-        weigh_some(p.B0[i], s.drive, at_row(DRIVE_BEFORE), at_row(DRIVE_FIELDS), s.x, at_row(i), False)
-        weigh_some(p.B1[i], s.drive, at_row(DRIVE_NOW), at_row(DRIVE_FIELDS), s.x, at_row(i), False)
-        if several and p.rest.start[i] < p.rest.start[i + 1]:
-            for r in range(ROW_LENGTH):
-                s.x[at_row(i) + r] += s.x_next[at_row(i) + r]
-    if p.feedback:
+        add_product(p.E, s.z, at_row(0), at_row(1), s.x)
+    if p.direct:
+        add_product(p.By, s.drive, at_row(DRIVE_BEFORE), at_row(DRIVE_FIELDS), s.x)
+    if several:
         for i in range(states):
-            weigh_some(p.E_held[i], s.bank, at_row(BANK_Z), at_row(BANK_FIELDS), s.x, at_row(i), False)
-        _advance_bank(p, s)
-        for e in range(elements):
-            _add_element(p.E_back, p.E1, s.bank, e, s.x)
+            if p.rest.start[i] < p.rest.start[i + 1]:
+                for r in range(ROW_LENGTH):
+                    s.x[at_row(i) + r] += s.x_next[at_row(i) + r]
+    _drive_bank(p, s)
+    _advance_bank(p, s)
     for o in range(p.Cy.shape[0]):
-        fresh = weigh(p.Cy[o], s.x, at_row(0), at_row(1), s.y, at_row(o), True)
-        fresh = weigh_some(p.Dy[o], s.drive, at_row(DRIVE_NOW), at_row(DRIVE_FIELDS), s.y, at_row(o), fresh)
-        if weigh_some(p.Ky[o], s.bank, at_row(BANK_Z), at_row(BANK_FIELDS), s.y, at_row(o), fresh):
-            clear_row(s.y, at_row(o))
+        sum_rows(p.Ky[o], s.z, at_row(0), at_row(1), s.y, o)
+    add_product(p.Cy, s.x, at_row(0), at_row(1), s.y)
+    if p.direct:
+        add_product(p.Dy, s.drive, at_row(DRIVE_NOW), at_row(DRIVE_FIELDS), s.y)

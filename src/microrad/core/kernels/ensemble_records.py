@@ -19,7 +19,7 @@ BIN_SHIFT = np.int64(52 - BINS_OCTAVE_BITS)
 BIN_OFFSET = np.int64((1023 + BINS_LOWEST_OCTAVE) << BINS_OCTAVE_BITS)
 
 # Fields of a bank element's rows, of an actuator's drive, and of the counters of a run.
-BANK_Q, BANK_H, BANK_Z, BANK_Z_BEFORE, BANK_Q_NEXT, BANK_TRAVEL, BANK_FORCING, BANK_H_BEFORE, BANK_FIELDS = range(9)
+BANK_Q, BANK_H, BANK_TRAVEL, BANK_FORCING, BANK_H_BEFORE, BANK_FIELDS = range(6)
 DRIVE_BEFORE, DRIVE_NOW, DRIVE_FIELDS = range(3)
 (
     COUNT_SATURATED,
@@ -88,6 +88,8 @@ class ForwardState(NamedTuple):
     So what counts as clamped in a plant counts there as COUNT_INVERSE_CLAMPED.
     """
 
+    q: Floats
+    z: Floats
     bank: Floats
     play: Floats
     counts: Floats
@@ -96,9 +98,14 @@ class ForwardState(NamedTuple):
 class Ensemble(NamedTuple):
     """A sampled pointing loop for many runs side by side, as arrays.
 
-    The plant is that of `Plant`, without its counts in the type: one compiled kernel serves every mirror. ``optics``
-    (axes, outputs) turns its outputs into line-of-sight angles y. ``E_held`` is E0 + E1, ``E_back`` what takes it back,
-    -E1. Line-of-sight error e = reference + disturbance - y.
+    The plant is that of `Plant`, without its counts in the type: one compiled kernel serves every mirror. Its state is
+    that of `Plant` less what the end of the step did to it, B1 u + E1 z, so that u and z enter each product once:
+
+        x[k+1] = Ad x[k] + By u[k] + E z[k],   q = F x[k+1] + H z[k] + G u[k+1],   z[k+1] = H[q],
+        outputs = Cy x[k+1] + Dy u[k+1] + Ky z[k+1],
+
+    with By = B0 + Ad B1, E = E0 + Ad E1, H = F E1, G = G + F B1, Dy = D + C B1, Ky = K + C E1 of the plant. ``optics``
+    (axes, outputs) turns the outputs into line-of-sight angles y. Line-of-sight error e = reference + disturbance - y.
 
     Disturbance: s[k+1] = As s + Bs g with independent standard normal g (one a source and plant step; ``purpose`` names
     each source's stream), d = Cs s; As by diagonal and neighbour coupling, no rest. Sensors: the optical one delivers e
@@ -121,16 +128,14 @@ class Ensemble(NamedTuple):
 
     step_s: float
     feedback: bool
+    direct: bool
     diagonal: Floats
     coupling: Floats
     rest: Rows
-    B0: Floats
-    B1: Floats
-    E0: Floats
-    E1: Floats
-    E_held: Floats
-    E_back: Floats
+    By: Floats
+    E: Floats
     F: Floats
+    H: Floats
     G: Floats
     Cy: Floats
     Dy: Floats
@@ -183,6 +188,8 @@ class Ensemble(NamedTuple):
 class EnsembleState(NamedTuple):
     """The memory of `LANES` runs; the kernel writes into these arrays. A row of LANES numbers for each quantity.
 
+    ``q`` and ``z`` are the drives and outputs of the hysteresis elements, ``bank`` what they remember (BANK_*).
+
     ``place``: control sample, plant step, and 1 where statistics are taken. Rows too: ``sum_square`` (axes) and
     ``largest`` (radial error squared) of every plant step, ``sum`` (axes) of the control samples, ``counts`` (COUNT_*).
     ``histogram`` (LANES, BINS) counts the radial error at the end of each control sample.
@@ -199,6 +206,8 @@ class EnsembleState(NamedTuple):
     x: Floats
     x_next: Floats
     drive: Floats
+    q: Floats
+    z: Floats
     bank: Floats
     play: Floats
     y: Floats
@@ -217,6 +226,7 @@ class EnsembleState(NamedTuple):
     inverse: Floats
     inverse_play: Floats
     inverse_lag: Floats
+    forward_z: Floats
     forward_bank: Floats
     forward_play: Floats
     learnt: Floats

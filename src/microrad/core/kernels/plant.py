@@ -3,6 +3,7 @@
 from math import inf
 from typing import Any, NamedTuple
 
+import numpy as np
 from numpy.typing import NDArray
 
 from microrad.core.kernels.compiler import Floats, Integers, compiled_loop, inlined, merged
@@ -162,6 +163,97 @@ def open_loop(plant, state, drive, output, bank):  # type: ignore[no-untyped-def
             output[k, i] = state.y[i]
         for i in range(bank.shape[1]):
             bank[k, i] = state.bank[i, Z]
+
+
+class Columns(NamedTuple):
+    """A `Plant` for many states: the matrices of `Ensemble`, column by column, flat, so that a loop runs down each.
+
+    The inputs are z by element and u by actuator, the sums q by element and y by output. All have zeros behind them, to
+    a multiple of four. ``held`` turns the inputs at the begin of a step into states, ``seen`` states into sums,
+    ``drives`` adds z of the begin and u of the end to q, and ``outputs`` z and u of the end to y. ``states``,
+    ``inputs`` and ``sums`` are memory for a step.
+    """
+
+    held: Floats
+    seen: Floats
+    drives: Floats
+    outputs: Floats
+    states: Floats
+    inputs: Floats
+    sums: Floats
+
+
+@merged
+def _add_columns(total, gains, columns):  # type: ignore[no-untyped-def]
+    """total += sum of gains[j] x column j, four at a time; a number of columns that four divides, one behind the other.
+
+    Unsigned places in a flat array, so that the loop has no test for a negative one: half of the time otherwise.
+    """
+    length, at = np.uint64(total.size), np.uint64(0)
+    for j in range(0, gains.size, 4):
+        a, b, c, d = gains[j], gains[j + 1], gains[j + 2], gains[j + 3]
+        second, third, fourth = at + length, at + np.uint64(2) * length, at + np.uint64(3) * length
+        for i in range(length):
+            begun = a * columns[at + i] + b * columns[second + i]
+            total[i] += begun + (c * columns[third + i] + d * columns[fourth + i])
+        at = fourth + length
+
+
+@compiled_loop
+def open_loop_by_columns(plant, columns, state, drive, output, bank):  # type: ignore[no-untyped-def]
+    """`open_loop` for many states: its x is that of `Ensemble`, so a state goes on in this function alone.
+
+    Args:
+        plant: The `Plant`.
+        columns: Its `Columns`.
+        state: Its `PlantState`.
+        drive: Drive about the bias, V, shape (samples, actuators).
+        output: Outputs about those at rest, shape (samples, outputs); written.
+        bank: Outputs z of the hysteresis elements, shape (samples, elements), or of the first few; written.
+    """
+    x, moved, z, sums = columns.states, state.x_next, columns.inputs, columns.sums
+    first_operator, elements, actuators = len(plant.elements), state.bank.shape[0], state.u.size
+    u, y = z[elements:], sums[elements:]
+    for i in range(moved.size):
+        x[i] = state.x[i]
+    for e in range(elements):
+        z[e] = state.bank[e, Z]
+    for a in range(actuators):
+        u[a] = state.u[a]
+    for k in range(drive.shape[0]):
+        for i in range(0, moved.size, 2):
+            moved[i] = plant.diagonal[i] * x[i] + plant.coupling[i] * x[i + 1]
+            moved[i + 1] = plant.diagonal[i + 1] * x[i + 1] + plant.coupling[i + 1] * x[i]
+        if plant.rest.value.size > 0:
+            for i in range(moved.size):
+                moved[i] += row_product(plant.rest, i, x)
+        for i in range(moved.size):
+            x[i] = moved[i]
+        _add_columns(x, z, columns.held)
+        for a in range(actuators):
+            u[a] = drive[k, a]
+        for i in range(sums.size):
+            sums[i] = 0.0
+        _add_columns(sums, x, columns.seen)
+        _add_columns(sums, z, columns.drives)
+        for e in range(first_operator):
+            z[e] = _bouc_wen_element(plant, state, e, sums[e])
+        for o in range(len(plant.operators)):
+            e = first_operator + o
+            z[e] = _play_operator(plant, state, e, o, sums[e])
+        _add_columns(sums, z, columns.outputs)
+        for i in range(state.y.size):
+            output[k, i] = y[i]
+        for e in range(bank.shape[1]):
+            bank[k, e] = z[e]
+    for i in range(moved.size):
+        state.x[i] = x[i]
+    for e in range(elements):
+        state.bank[e, Z] = z[e]
+    for a in range(actuators):
+        state.u[a] = u[a]
+    for i in range(state.y.size):
+        state.y[i] = y[i]
 
 
 class PlayPlant(NamedTuple):

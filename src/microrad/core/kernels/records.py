@@ -1,7 +1,7 @@
 """What a loop is handed: the plant, the sampled loop, and their states, as named tuples of arrays."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -166,6 +166,23 @@ def rows(matrix: Floats) -> Rows:
         column=np.concatenate([*places, np.zeros(0, dtype=np.int64)]).astype(np.uint64),
         value=np.concatenate([*(row[p] for row, p in zip(matrix, places, strict=True)), np.zeros(0)]),
     )
+
+
+def advanced(plant: Any, matrix: Floats) -> Floats:
+    """Ad times a matrix of states.
+
+    Args:
+        plant: A `Plant`, or what has its ``diagonal``, its ``coupling`` and no rest.
+        matrix: Matrix, shape (states, columns).
+    """
+    neighbours = matrix[np.arange(len(matrix)) ^ 1]
+    product = plant.diagonal[:, None] * matrix + plant.coupling[:, None] * neighbours
+    if isinstance(plant, Plant):
+        start, column, value = plant.rest
+        for i in range(len(matrix)):
+            some = slice(int(start[i]), int(start[i + 1]))
+            product[i] += value[some] @ matrix[column[some]]
+    return np.asarray(product)
 
 
 def bouc_wen_rows(parameters: Sequence[Sequence[float]]) -> Floats:

@@ -117,6 +117,7 @@ def arrays(
     check_controller(loop, controller)
     drive, timing = loop.drive, loop.timing
     plant = mirror.discretise(loop.mirror, timing.step_s)
+    turned = mirror.retimed(plant)
     shaping = shaping or combined_shaping(loop)
     exact = partial(lti.to_bits, bits=lti.EXACT_BITS)
     inverse = controller.inverse or no_feedforward(loop.mirror)
@@ -127,20 +128,18 @@ def arrays(
     found = kernels.Ensemble(
         step_s=timing.step_s,
         feedback=plant.feedback,
+        direct=plant.direct,
         diagonal=lti.decay_to_bits(plant.diagonal, lti.EXACT_BITS),
         coupling=exact(plant.coupling),
         rest=plant.rest._replace(value=exact(plant.rest.value)),
-        B0=exact(plant.B0),
-        B1=exact(plant.B1),
-        E0=exact(plant.E_held - plant.E1),
-        E1=exact(plant.E1),
-        E_held=exact(plant.E_held),
-        E_back=-exact(plant.E1),
+        By=exact(turned.B),
+        E=exact(turned.E),
         F=exact(plant.F),
-        G=exact(plant.G),
+        H=exact(turned.H),
+        G=exact(turned.G),
         Cy=exact(plant.C),
-        Dy=exact(plant.D),
-        Ky=exact(plant.K),
+        Dy=exact(turned.D),
+        Ky=exact(turned.K),
         bouc_wen=plant.bouc_wen,
         operator=plant.operator,
         play_start=plant.play_start,
@@ -247,6 +246,8 @@ def start(
         x=_rows(n),
         x_next=_rows(n),
         drive=_rows(kernels.DRIVE_FIELDS * m),
+        q=_rows(p.G.shape[0]),
+        z=_rows(p.G.shape[0]),
         bank=_rows(kernels.BANK_FIELDS * p.G.shape[0]),
         play=_rows(p.play_threshold.size),
         y=_rows(outputs),
@@ -265,6 +266,7 @@ def start(
         inverse=_rows(p.inverse_bouc_wen.shape[0]),
         inverse_play=_rows(p.inverse_play_threshold.size),
         inverse_lag=_rows(p.inverse_lag_keep.size),
+        forward_z=_rows(p.forward.drives.shape[1]),
         forward_bank=_rows(kernels.BANK_FIELDS * p.forward.drives.shape[1]),
         forward_play=_rows(p.forward.play_threshold.size),
         learnt=_rows(p.adaptive_weight.size * kernels.PLAY_FIELDS),

@@ -10,7 +10,7 @@ from typing import Literal
 
 import numpy as np
 
-from microrad.core import kernels, lti, periodic
+from microrad.core import lti, periodic
 from microrad.core.arrays import Floats
 from microrad.mirror import model
 from microrad.mirror.model import Mirror
@@ -129,7 +129,7 @@ def response(mirror: Mirror, drive_v: Floats, rate_hz: float, steps_per_sample: 
     fine = periodic.delayed(drive_v, rate_hz, delay_s, steps_per_sample)
     plant = model.discretise(mirror, 1.0 / (rate_hz * steps_per_sample))
     output = np.empty((fine.shape[0], mirror.axes))
-    kernels.open_loop(plant, model.at_rest(plant), fine, output, np.empty((fine.shape[0], 0)))
+    model.respond(plant, model.at_rest(plant), fine, output, np.empty((fine.shape[0], 0)))
     return np.ascontiguousarray(output[::steps_per_sample])
 
 

@@ -136,7 +136,7 @@ class JointFit:
         state = mirror.at_rest(plant)
         drive = beyond((drive_v - drive_v[0])[:, None], self.delay_s).copy()
         output = np.empty((len(drive), 1))
-        kernels.open_loop(plant, state, drive, output, np.empty((len(drive), 0)))
+        mirror.respond(plant, state, drive, output, np.empty((len(drive), 0)))
         return late(output, self.delay_s / step_s)[: drive_v.size, 0], int(state.clamped.sum())
 
     def nuisance(self, drive_v: Floats, step_s: float, known: int) -> Floats:
@@ -428,6 +428,6 @@ def behind_linear_part(columns: Floats, linear: LinearPoles | None, run: FitReco
     behind = np.empty_like(columns)
     output, bank = np.empty((columns.shape[0], 1)), np.empty((columns.shape[0], 0))
     for j, column in enumerate(columns.T):
-        kernels.open_loop(plant, mirror.at_rest(plant), column[:, None].copy(), output, bank)
+        mirror.respond(plant, mirror.at_rest(plant), column[:, None].copy(), output, bank)
         behind[:, j] = output[:, 0]
     return late(behind, (linear.delay_s + run.late_s) / run.step_s)

@@ -230,7 +230,7 @@ def _undelayed(plant: kernels.Plant, run: FitRecord) -> Floats:
     bank = np.empty((drive.shape[0], 0))
     for begin in range(0, drive.shape[0], _SLICE):  # the interpreter answers Ctrl-C between two of them
         part = slice(begin, begin + _SLICE)
-        kernels.open_loop(plant, state, drive[part], output[part], bank[part])
+        mirror.respond(plant, state, drive[part], output[part], bank[part])
     return output
 
 

@@ -264,13 +264,11 @@ def _tangents(
         return np.zeros((rows, count), dtype=kind)
 
     before, after, signal, plays, slopes = signals
-    pairs = plant.E1.reshape(-1, 2, operators)[:, ::-1].reshape(states, operators)
-    kept = plant.diagonal[:, None] * plant.E1 + plant.coupling[:, None] * pairs
     live = np.asarray(plant.F.any(axis=1))
     live[row[ends[0] :]] = True
     return kernels.Tangents(
         plant=kernels.PlayPlant(*(v.astype(kind) if v.dtype == np.float64 else v for v in plant)),
-        held=(kept + plant.E_held - plant.E1).astype(kind),
+        held=(kernels.advanced(plant, plant.E1) + plant.E_held - plant.E1).astype(kind),
         strain=(plant.F @ plant.E1).astype(kind),
         through=(plant.C @ plant.E1 + plant.K).astype(kind),
         live=np.flatnonzero(live),
