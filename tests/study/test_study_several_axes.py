@@ -115,6 +115,7 @@ def test_the_report_says_which_mirror_flies(tmp_path):
     assert "stroke for the worst case (actuator" in page
     assert "Against PI (" in page
     assert "gain grid" not in page
+    assert "Bandwidth: lowest frequency" in page and "Crossover" not in page  # whose column is empty
     assert "what the disk margin allows both axes to change by" in page
 
 
