@@ -182,7 +182,7 @@ def test_a_mission_and_an_option_name_the_same_mirror(tmp_path):
 @pytest.mark.parametrize(
     ("mirror", "said"),
     [
-        (None, "does not exist"),
+        (None, "does not exist\n.*expected: an existing file; `microrad identify` writes one"),
         ('name = "one"\ntravel = "2 mrad"\n', "a mirror of one axis"),
         ("version = 2\n", "is missing"),
     ],
