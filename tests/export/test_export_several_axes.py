@@ -71,3 +71,14 @@ def test_what_does_not_fit_is_refused(here, refused, change, command, why):
     told = refused("export", *command[:1], "mission.toml", "--mirror", "two-axes.toml", *command[1:])
     assert why in " ".join(told.split())
     assert sorted(each.name for each in here.iterdir()) == ["mission.toml", "two-axes.toml"]
+
+
+def test_a_unit_of_displacements_and_angles_is_refused(here, refused):
+    angle = '[outputs.4]\nname = "autocollimator"\nquantity = "angle"\n\n[recording]\n'
+    row = "  [-2.6e-6, 0.0, 1.5e-6, 0.0],\n"
+    mixed = TEXT.replace("[recording]\n", angle).replace(row, row + "  [0.0, 0.0, 2.0e-6, 0.0],\n")
+    (here / "two-axes.toml").write_text(mixed, encoding="utf-8")
+    told = " ".join(refused("export", "fmu", "mission.toml", "--mirror", "two-axes.toml").split())
+    assert "the outputs of 'Two axes on a hysteretic spring' are displacements and angles" in told
+    assert "leave the angles out of the mirror file" in told
+    assert sorted(each.name for each in here.iterdir()) == ["mission.toml", "two-axes.toml"]

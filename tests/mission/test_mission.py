@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 
 from microrad.core import lti
 from microrad.mirror import model as mirror
-from microrad.mission.file import MissionError, assumptions, load_mirror, load_mission
+from microrad.mission.file import MissionError, assumptions, load_coupled_mirror, load_mirror, load_mission
 from microrad.mission.model import Mission, Source, mission_schema, source_text
 from microrad.mission.tables.link import half_angle_rad
 from microrad.mission.tables.mirror import BoucWenTable
@@ -641,6 +641,19 @@ def test_a_path_that_leads_to_no_file(tmp_path, load, path, reason):
     with pytest.raises(MissionError, match=reason) as refused:
         load(tmp_path / path)
     assert str(refused.value).replace("\n", "").isprintable()
+
+
+@pytest.mark.parametrize(
+    ("load", "command"), [(load_mission, "init"), (load_mirror, "identify"), (load_coupled_mirror, "identify")]
+)
+@pytest.mark.parametrize("content", [None, ""])
+def test_a_file_that_is_missing_or_empty_is_written_by_the_command_for_it(tmp_path, load, command, content):
+    path = tmp_path / "a.toml"
+    if content is not None:
+        path.write_text(content, encoding="utf-8")
+    with pytest.raises(MissionError) as refused:
+        load(path)
+    assert f"`microrad {command}` writes one" in the_fault(refused.value).expected
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")

@@ -265,6 +265,17 @@ def test_margins_and_parameters_are_the_designs(page, fine):
         assert cells[9] == "nothing"
 
 
+def test_the_crossover_is_explained_where_a_design_has_one(fine):
+    v = fine.verified[0]
+    one, several = v.design.loop_margins, replace(v.design.loop_margins, delay_s=math.nan, crossover_hz=math.nan)
+    for margins, has_one in ((one, True), (replace(one, crossover_hz=math.nan), True), (several, False)):
+        cells = section.design_cells("as it is", margins, ())
+        _, table, below = section.designs([(v.design.name, *cells)], "")
+        assert bool(table.rows[0][table.headings.index("crossover (Hz)")]) is has_one  # or "none"
+        assert ("Crossover: highest" in below.text) is has_one
+        assert below.text.startswith("Bandwidth: lowest frequency at which")
+
+
 def test_controllers_stand_against_disturbances_and_the_open_loop(page, fine):
     heading = "Controllers against disturbances"
     assert page[0][heading][0] == [

@@ -115,6 +115,7 @@ def test_the_report_says_which_mirror_flies(tmp_path):
     assert "stroke for the worst case (actuator" in page
     assert "Against PI (" in page
     assert "gain grid" not in page
+    assert "Bandwidth: lowest frequency" in page and "Crossover" not in page  # whose column is empty
     assert "what the disk margin allows both axes to change by" in page
 
 
@@ -181,7 +182,7 @@ def test_a_mission_and_an_option_name_the_same_mirror(tmp_path):
 @pytest.mark.parametrize(
     ("mirror", "said"),
     [
-        (None, "does not exist"),
+        (None, "does not exist\n.*expected: an existing file; `microrad identify` writes one"),
         ('name = "one"\ntravel = "2 mrad"\n', "a mirror of one axis"),
         ("version = 2\n", "is missing"),
     ],

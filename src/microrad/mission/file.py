@@ -50,6 +50,7 @@ __all__ = [
 
 _BEYOND_LINK = Mission.model_fields.keys() - LinkMission.model_fields.keys()
 _MOST_MIRROR_BYTES = 4_000_000  # the covariance of hundreds of parameters
+_MIRROR_LABEL = "mirror file"
 _MOST_QUOTED = 1000  # characters of a value, before it is clipped
 _MOST_UNKNOWN = 100  # unknown keys of one file for which a near one is looked up
 _Location = tuple[int | str, ...]
@@ -250,7 +251,7 @@ def holds_several_axes(path: str | Path) -> bool:
     Raises:
         MissionError: When it cannot be read, or is no TOML.
     """
-    version = _open(Path(path), "mirror file", "mirror").data.get("version")
+    version = _open(Path(path), _MIRROR_LABEL, "mirror").data.get("version")
     return type(version) is int and version == 2
 
 
@@ -266,7 +267,7 @@ def load_coupled_mirror(path: str | Path, *, text: str | None = None) -> "Couple
     """
     from microrad.mission.tables.coupled_mirror import CoupledMirror
 
-    document = _open(Path(path), "mirror file", "mirror", text)
+    document = _open(Path(path), _MIRROR_LABEL, "mirror", text)
     if not versions.is_of_several_axes(document):
         raise MissionError(document.path, document.faults)
     mirror = check_table(document, CoupledMirror, document.data)
@@ -334,17 +335,20 @@ def _names_in_mirror_files() -> frozenset[str]:
 
 
 def _unreadable(path: Path, label: str, error: UnreadableError) -> MissionError:
-    fault = Fault("", "", 0, f"the {label} {error.reason}", error.expected, file=clipped(str(path)))
+    expected = error.expected
+    if label == _MIRROR_LABEL:
+        expected = expected.replace("`microrad init` writes one to start from", "`microrad identify` writes one")
+    fault = Fault("", "", 0, f"the {label} {error.reason}", expected, file=clipped(str(path)))
     return MissionError(path, [fault])
 
 
 def _open_mirror(path: Path) -> Document:
     """The mirror file of one axis; raises `MissionError` where it holds several, or is no mirror file."""
-    document = _open(path, "mirror file", "mirror")
+    document = _open(path, _MIRROR_LABEL, "mirror")
     if not versions.is_of_one_axis(document, document.data):
         raise MissionError(document.path, document.faults)
     if len(document.text) > MAX_BYTES:
-        raise _unreadable(path, "mirror file", too_large(MAX_BYTES))
+        raise _unreadable(path, _MIRROR_LABEL, too_large(MAX_BYTES))
     return document
 
 

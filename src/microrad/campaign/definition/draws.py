@@ -8,13 +8,14 @@ from typing import Any, NamedTuple
 from microrad.campaign.definition import distributions
 from microrad.campaign.definition.distributions import AnyTable, Distribution
 from microrad.campaign.definition.keys import MIRROR, Key, as_one, find, item_keys, within
-from microrad.campaign.definition.records import Draw, Variable
+from microrad.campaign.definition.records import Cell, Draw, Variable
 from microrad.campaign.definition.tables import VariableTable
 from microrad.campaign.definition.values import NotedError, ValueReader, is_number, quoted_near
 from microrad.campaign.records import InputText
+from microrad.mirror import coupled
+from microrad.mirror.coupled import CoupledMirror
 from microrad.mirror.spread import parameter_units
 from microrad.mission.fields import MOST_ITEMS, Quantity, Several, Share
-from microrad.mission.tables.mirror import Mirror
 from microrad.mission.toml import shown
 
 
@@ -22,12 +23,12 @@ from microrad.mission.toml import shown
 class DrawReader:
     """Reads [inputs] against the raw data of the mission.
 
-    ``mirrors`` are those of the cells, None where a mission has links alone; ``given`` are the keys of other tables.
+    ``cells`` are those of the grid; ``given`` are the keys of other tables.
     """
 
     reader: ValueReader
     data: Mapping[str, Any]
-    mirrors: tuple[Mirror | None, ...]
+    cells: tuple[Cell, ...]
     given: frozenset[str]
 
     def draw(self, key: str, raw: object) -> Draw:
@@ -66,7 +67,11 @@ class DrawReader:
         if key != MIRROR or not isinstance(table, distributions.IdentifiedTable):
             expected = f'[inputs.{MIRROR}] with distribution = "identified", or the key of a single value'
             raise self.reader.fault(at, None, "does not go together with its distribution", expected)
-        for m in self.mirrors:
+        for cell in self.cells:
+            if cell.several_axes is not None:
+                self._is_known(at, cell.several_axes)
+                continue
+            m = cell.mirror
             if m is None or m.uncertainty is None:
                 reason = "is to be identified, but the mission has no mirror, only its links"
                 if m is not None:
@@ -81,6 +86,17 @@ class DrawReader:
                     reason = f"draws {MIRROR}.{parameter}, which the campaign gives too"
                     raise self.reader.fault(at, None, reason, "one of the two removed")
         return Draw(MIRROR, "", None, None)
+
+    def _is_known(self, at: str, mirror: CoupledMirror) -> None:
+        """That a mirror of several axes can be drawn."""
+        if mirror.known is None:
+            reason = f'is to be identified, but the mirror "{mirror.mirror.name}" has no table uncertainty'
+            expected = "a mirror file as microrad identify writes it in fine_pointing.mirror_file"
+            raise self.reader.fault(at, None, reason, expected)
+        try:
+            coupled.draws(mirror, _TRIED, 0)
+        except ValueError as error:
+            raise self.reader.fault(at, None, str(error), "standard errors that leave a mirror") from None
 
     def _drawn_as(self, at: str, key: Key, raw: object, wanted: Distribution) -> Distribution:
         table = self._distribution_table(at, raw)
@@ -149,6 +165,9 @@ class DrawReader:
         total = math.fsum(weights)
         return tuple(float(v) / total for v in weights)
 
+
+_TRIED = 8
+"""Mirrors of several axes that are drawn before any row is, to see that there are such mirrors."""
 
 _INSIDE = 'a smaller deviation, or distribution = "uniform" or "log-uniform" between bounds'
 
@@ -254,17 +273,19 @@ def variable(reader: ValueReader, key: str, table: VariableTable, data: Mapping[
     return Variable(key, found.unit, *bounds_of(reader, at, found.numeric, table.low, table.high))
 
 
-def input_texts(draws: tuple[Draw, ...], mirrors: Sequence[Mirror | None]) -> tuple[InputText, ...]:
+def input_texts(draws: tuple[Draw, ...], cells: Sequence[Cell]) -> tuple[InputText, ...]:
     """The drawn columns in words; an identified mirror has one for each parameter of any cell's mirror.
+
+    Of several axes it has one for each direction that its parameters move in: those are hundreds, and move together.
 
     Args:
         draws: the inputs.
-        mirrors: those of the cells, None where a mission has none.
+        cells: those of the grid.
     """
     found: list[InputText] = []
     for draw in draws:
         if draw.distribution is None:
-            found += _identified_texts(mirrors)
+            found += _identified_texts(cells)
             continue
         words = draw.distribution.words(draw.unit)
         instead = "" if draw.drawn_as is None else f"; drawn as {draw.drawn_as.words(draw.unit)} and weighted"
@@ -272,9 +293,15 @@ def input_texts(draws: tuple[Draw, ...], mirrors: Sequence[Mirror | None]) -> tu
     return tuple(found)
 
 
-def _identified_texts(mirrors: Sequence[Mirror | None]) -> list[InputText]:
+def _identified_texts(cells: Sequence[Cell]) -> list[InputText]:
     found: dict[str, InputText] = {}
-    for table in mirrors:
+    for cell in cells:
+        table, several = cell.mirror, cell.several_axes
+        if several is not None and several.known is not None:
+            words = f"of {len(cell.directions)} standard normal numbers for {len(several.known.parameters)} parameters"
+            for number, name in enumerate(cell.directions, 1):
+                found.setdefault(name, InputText(name, "", f"identified, {number} {words}"))
+            continue
         assert table is not None and table.uncertainty is not None
         errors = table.uncertainty.standard_errors
         for (key, unit), error in zip(parameter_units(table).items(), errors, strict=True):

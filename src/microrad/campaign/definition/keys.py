@@ -12,7 +12,12 @@ from microrad.mission.file import kind_of
 from microrad.mission.model import LinkMission, Mission
 
 MIRROR = "mirror"
-"""What a campaign calls the mirror as a whole: the key of mirror files, and of the covariance of an identification."""
+"""What a campaign calls the mirror as a whole: the key of mirror files, and of the covariance of an identification.
+
+Its covariance is that of the mirror that the loop has: of several axes where the mission names one (`MIRROR_FILE`)."""
+
+MIRROR_FILE = "fine_pointing.mirror_file"
+"""Key of the file of a mirror of several axes."""
 
 _NOT_OF_THE_LOOP = frozenset(
     (

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,13 +11,15 @@ from microrad.campaign.definition import draws as drawing
 from microrad.campaign.definition.cells import CellReader
 from microrad.campaign.definition.distributions import OneOf
 from microrad.campaign.definition.draws import DrawReader
-from microrad.campaign.definition.keys import MIRROR, flat, flat_tables, touches_loop
+from microrad.campaign.definition.keys import MIRROR, MIRROR_FILE, flat, flat_tables, touches_loop
 from microrad.campaign.definition.records import CampaignFile, Cell, Draw, Variable
 from microrad.campaign.definition.tables import CampaignTable, VariableTable
 from microrad.campaign.definition.values import FILE_WORD, ValueReader, text_of
 from microrad.campaign.ledger import argument, is_ledger
 from microrad.campaign.records import CampaignError, Limit
-from microrad.mission.file import MissionFile, check_table, named_files, open_mission
+from microrad.mirror import coupled
+from microrad.mission.file import LinkFile, MissionFile, check_table, mirror_of_loop, named_files, open_mission
+from microrad.mission.model import Mission
 from microrad.mission.tables.link import LinkRequirement
 from microrad.mission.toml import Document, Fault, MissionError, UnreadableError, clipped
 
@@ -96,6 +99,7 @@ class _DefinitionReader:
         data = cell_reader.under_set()
         axes = cell_reader.axes(data)
         cells = () if self.document.faults else cell_reader.cells(data, axes)
+        cells = self._with_several_axes(cells)
         draws = self._draws(data, cells)
         items = ((self.reader, key, table, data) for key, table in self._variables.items())
         variables = self.reader.each(drawing.variable, items)
@@ -135,9 +139,24 @@ class _DefinitionReader:
             self.document.faults.extend(error.faults)
             return None
 
+    def _with_several_axes(self, cells: tuple[Cell, ...]) -> tuple[Cell, ...]:
+        """The cells with the mirrors of several axes that are drawn; none where one of the files holds none."""
+        files = {_several_axes_file(cell.file): cell.file for cell in cells} if MIRROR in self.inputs else {}
+        if files.keys() <= {None}:
+            return cells
+        if MIRROR_FILE in self.inputs:
+            reason = f"is drawn, and [inputs.{MIRROR}] draws the mirror that it names"
+            self.reader.fault(f"inputs.{MIRROR_FILE}", None, reason, "a grid of files, or one of the two removed")
+        try:
+            mirrors = {name: _several_axes(file) for name, file in files.items()}
+        except MissionError as error:
+            self.document.faults.extend(error.faults)
+            return ()
+        return tuple(replace(cell, several_axes=mirrors[_several_axes_file(cell.file)]) for cell in cells)
+
     def _draws(self, data: Mapping[str, Any], cells: tuple[Cell, ...]) -> tuple[Draw, ...]:
         given = frozenset((*self.fixed, *self.grid, *self.inputs, *self._variables))
-        draw_reader = DrawReader(self.reader, data, tuple(cell.mirror for cell in cells), given)
+        draw_reader = DrawReader(self.reader, data, cells, given)
         return self.reader.each(draw_reader.draw, self.inputs.items())
 
     def _limits(self, keep: tuple[str, ...], required: LinkRequirement) -> tuple[Limit, ...]:
@@ -190,7 +209,7 @@ class _DefinitionReader:
             mission=nominal.file,
             cells=cells,
             draws=draws,
-            inputs=drawing.input_texts(draws, [cell.mirror for cell in cells]),
+            inputs=drawing.input_texts(draws, cells),
             fixed={key: text_of(value) for key, value in self.fixed.items()},
             keep=keep,
             limits=limits,
@@ -221,6 +240,17 @@ class _DefinitionReader:
         mirrors = [each.path for each in inner if each is not None]
         own = [each.path for each in mission.inner.values()]
         return tuple(dict.fromkeys([self.document.path, mission.path, *own, *mirrors, *named]))
+
+
+def _several_axes_file(file: LinkFile) -> str | None:
+    """Name of the mirror file of several axes that a mission's loop has, None without one."""
+    m = file.mission
+    return m.fine_pointing.mirror_file if isinstance(m, Mission) and m.fine_pointing is not None else None
+
+
+def _several_axes(file: LinkFile) -> coupled.CoupledMirror | None:
+    table = mirror_of_loop(file) if isinstance(file, MissionFile) else None
+    return None if table is None else coupled.of(table)
 
 
 def _flat_variables(data: Mapping[str, Any]) -> dict[str, Any]:

@@ -6,9 +6,11 @@ from pathlib import Path
 from typing import Any
 
 from microrad.campaign.definition.distributions import Distribution
+from microrad.campaign.definition.keys import MIRROR
 from microrad.campaign.definition.outputs import OUTPUTS, TAIL_OUTPUTS, Output
 from microrad.campaign.definition.tables import CampaignTable
 from microrad.campaign.records import InputText, Limit
+from microrad.mirror import coupled
 from microrad.mission.file import LinkFile
 from microrad.mission.model import Mission
 from microrad.mission.tables.mirror import Mirror
@@ -19,17 +21,27 @@ _LOG_RATIO = 10.0
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """A cell of the grid: its values as text, the raw data of its mission, and that mission."""
+    """A cell of the grid: its values as text, the raw data of its mission, and that mission.
+
+    ``several_axes`` is the mirror that ``fine_pointing.mirror_file`` names, where the campaign draws it.
+    """
 
     values: dict[str, str]
     data: Mapping[str, Any]
     file: LinkFile
+    several_axes: coupled.CoupledMirror | None = None
 
     @property
     def mirror(self) -> Mirror | None:
-        """The mirror of its mission, None where that has links alone."""
+        """The mirror of one axis of its mission, None where that has links alone."""
         m = self.file.mission
         return m.mirror if isinstance(m, Mission) else None
+
+    @property
+    def directions(self) -> tuple[str, ...]:
+        """Columns of the standard normal numbers that a row moves ``several_axes`` by; none without it."""
+        count = 0 if self.several_axes is None else coupled.directions(self.several_axes)
+        return tuple(f"{MIRROR}.{number}" for number in range(1, count + 1))
 
     @property
     def label(self) -> str:

@@ -18,6 +18,7 @@ from microrad.core.arrays import Floats
 from microrad.loop.control import AxisController
 from microrad.loop.pointing_loop import ensemble, traces
 from microrad.loop.pointing_loop.loop import LoopController
+from microrad.mirror.coupled import CoupledMirror
 from microrad.mission.file import LinkFile
 
 Beat = Callable[[], None]
@@ -51,13 +52,17 @@ class _Watch:
 
 @dataclass(frozen=True, slots=True)
 class _Rows:
-    """Drawn rows of a cell: the inputs' columns, weights, and a mission or the reason why there is none."""
+    """Drawn rows of a cell: the inputs' columns, weights, and a mission or the reason why there is none.
+
+    ``mirrors`` are the drawn ones of several axes, None where none is drawn.
+    """
 
     cell: int
     first: int
     columns: dict[str, Floats]
     weight: Floats
     files: list[LinkFile | str]
+    mirrors: list[CoupledMirror | None]
     keys: list[object]
 
 
@@ -151,6 +156,7 @@ class Evaluator:
     def _drawn(self, cell: int, rows: range) -> _Rows:
         columns, weight = sampling.rows(self.campaign, cell, rows.start, len(rows))
         files: list[LinkFile | str] = []
+        mirrors: list[CoupledMirror | None] = []
         keys: list[object] = []
         for i in range(len(rows)):
             values = self.fixed | {key: float(column[i]) for key, column in columns.items()}
@@ -158,8 +164,9 @@ class Evaluator:
                 files.append(self.builder.mission(cell, values))
             except CampaignError as error:
                 files.append(str(error))
+            mirrors.append(self.builder.several_axes(cell, values))
             keys.append(self.builder.loop_key(cell, values))
-        return _Rows(cell, rows.start, columns, weight, files, keys)
+        return _Rows(cell, rows.start, columns, weight, files, mirrors, keys)
 
     def _groups(self, drawn: _Rows) -> Iterator[range]:
         """Neighbours in the chunk that share a loop; every row by itself where nothing is simulated."""
@@ -216,7 +223,7 @@ class Evaluator:
         key = (drawn.keys[group.start], rows)
         if self.memory is not None and key in self.memory:
             return self.memory[key]
-        own, controller = self._loop(file), self.controller(drawn.cell)
+        own, controller = self._loop(file, drawn.mirrors[group.start]), self.controller(drawn.cell)
         if self.campaign.table.tail is not None:
             by, firsts = self._proposal(drawn.cell), range(rows.start, rows.stop, kernels.LANES)
             parts = [importance_sampling.runs(own.row, controller, own.span, by, first, watch) for first in firsts]
@@ -230,10 +237,10 @@ class Evaluator:
             self.memory[key] = found
         return found
 
-    def _loop(self, file: LinkFile) -> MissionLoop:
+    def _loop(self, file: LinkFile, several_axes: CoupledMirror | None = None) -> MissionLoop:
         table = self.campaign.table.loop
         assert table is not None
-        return mission_loop(file, table, self.campaign.table.seed)
+        return mission_loop(file, table, self.campaign.table.seed, several_axes)
 
     def controller(self, cell: int) -> LoopController:
         """The controller of a cell, on the cell's own mission."""
@@ -261,11 +268,12 @@ class Evaluator:
         Raises:
             CampaignError: the row's draws make no mission.
         """
-        file = self._drawn(cell, range(row, row + 1)).files[0]
+        drawn = self._drawn(cell, range(row, row + 1))
+        file = drawn.files[0]
         if isinstance(file, str):
             raise CampaignError(file)
         beat()
-        own = self._loop(file)
+        own = self._loop(file, drawn.mirrors[0])
         found = traces.trace(own.row, self.controller(cell), own.span, row * self.campaign.realisations)
         settled = found.time_s >= own.span.settle_s
         return WorstTrace(

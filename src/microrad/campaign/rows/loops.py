@@ -14,6 +14,7 @@ from microrad.loop import controller_study, coupled_study
 from microrad.loop.control import AxisController
 from microrad.loop.pointing_loop.ensemble import Span
 from microrad.loop.pointing_loop.loop import LoopController, PointingLoop
+from microrad.mirror.coupled import CoupledMirror
 from microrad.mission.file import LinkFile, MissionFile
 from microrad.mission.model import Mission
 from microrad.mission.tables.fine_pointing import FinePointing
@@ -72,16 +73,22 @@ class MissionLoop:
         return coupled_study.as_named(self.scene, self.table.controller, feedback)
 
 
-def mission_loop(file: LinkFile, table: LoopTable, seed: int) -> MissionLoop:
+def mission_loop(file: LinkFile, table: LoopTable, seed: int, several_axes: CoupledMirror | None = None) -> MissionLoop:
     """The loop of a mission that has one. Raises `ValueError` if it cannot be built.
 
     Args:
         file: the mission.
         table: what the campaign simulates of it.
         seed: the campaign's.
+        several_axes: a mirror that is drawn, in place of that of the mission.
     """
     assert isinstance(file, MissionFile)
-    scene = coupled_study.of_mission(file, mirror.of(file.mission), tracking_light_w(file))
+    light_w = tracking_light_w(file)
+    scene: controller_study.AnyScene
+    if several_axes is None:
+        scene = coupled_study.of_mission(file, mirror.of(file.mission), light_w)
+    else:
+        scene = coupled_study.scene(file, several_axes, light_w)
     if isinstance(scene, controller_study.Scene) and table.axes == "one":
         scene = replace(scene, loop=scene.axis)
     return MissionLoop(table, scene, scene.on(table.mirror), span(table, settings(file), seed))

@@ -5,6 +5,7 @@ from collections.abc import Hashable, Mapping
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 from pydantic import ValidationError
 
 from microrad.campaign.definition.distributions import OneOf
@@ -22,6 +23,8 @@ from microrad.campaign.definition.keys import (
 from microrad.campaign.definition.records import CampaignFile, Cell
 from microrad.campaign.definition.values import FILE_WORD
 from microrad.campaign.records import CampaignError
+from microrad.mirror import coupled
+from microrad.mirror.coupled import CoupledMirror
 from microrad.mission.fields import Several
 from microrad.mission.file import LinkFile, check_table
 from microrad.mission.model import LinkMission, Source
@@ -37,7 +40,8 @@ class MissionBuilder:
         self._cells = campaign.cells
         self._listed = {d.key: d.distribution for d in campaign.draws if isinstance(d.distribution, OneOf)}
         self._singles: dict[tuple[int, str], Key | None] = {}
-        self._identified = any(d.distribution is None for d in campaign.draws)
+        self._several_axes = frozenset(key for cell in campaign.cells for key in cell.directions)
+        self._identified = any(d.distribution is None for d in campaign.draws) and not self._several_axes
 
     def mission(self, cell: int, values: Mapping[str, float]) -> LinkFile:
         """The mission of a row of a cell; without any values the cell's own.
@@ -54,10 +58,24 @@ class MissionBuilder:
         data = dict(base.data)
         texts: dict[str, str] = {}
         for key, value in values.items():
-            if not math.isnan(value):  # nan: a parameter that the mirror of this cell has not
+            # nan: a parameter that the mirror of this cell has not
+            if not math.isnan(value) and key not in self._several_axes:
                 data, texts[key] = self._put(cell, data, key, value)
         told = {key: Source(0, f"campaign: drawn, {text}", text, FILE_WORD) for key, text in texts.items()}
         return replace(base.file, mission=_validated(base, data, texts), sources={**base.file.sources, **told})
+
+    def several_axes(self, cell: int, values: Mapping[str, float]) -> CoupledMirror | None:
+        """The mirror of several axes that a row draws; None for that of its mission.
+
+        Args:
+            cell: the cell.
+            values: drawn values by key, in SI units.
+        """
+        own = self._cells[cell]
+        numbers = [values[key] for key in own.directions if key in values]
+        if own.several_axes is None or not numbers:
+            return None
+        return coupled.moved(own.several_axes, np.array(numbers))
 
     def loop_key(self, cell: int, values: Mapping[str, float]) -> Hashable:
         """Equal for rows with the same fine-pointing loop: the values, of the grid and drawn, that the loop has.

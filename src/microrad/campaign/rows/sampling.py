@@ -1,14 +1,16 @@
 """The random numbers of a campaign: any rows by themselves, the same bits whoever asks and in whatever order."""
 
 from collections.abc import Iterator
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from microrad.campaign.definition.distributions import standard_normal
+from microrad.campaign.definition.keys import MIRROR
 from microrad.campaign.definition.records import CampaignFile
 from microrad.core.arrays import Floats
+from microrad.mirror import coupled
 from microrad.mirror import spread as mirror_spread
 
 INPUTS, AGAIN = 1, 2
@@ -45,21 +47,29 @@ def rows(campaign: CampaignFile, cell: int, first: int, count: int) -> tuple[dic
 
 
 def _mirrors(campaign: CampaignFile, cell: int, shares: dict[str, Floats], first: int) -> dict[str, Floats]:
-    """Parameters of mirrors that the identification leaves possible; nan for those that the cell's mirror has not."""
-    table = campaign.cells[cell].mirror
-    assert table is not None and table.uncertainty is not None  # the campaign file's own check
-    keys = table.uncertainty.parameters
-    normals = standard_normal(np.column_stack([shares[f"mirror.{key}"] for key in keys]))
+    """Parameters of mirrors that the identification leaves possible; nan for those that the cell's mirror has not.
+
+    Of a mirror of several axes they are the standard normal numbers that move it.
+    """
+    own = campaign.cells[cell]
+    table = own.mirror
+    if own.several_axes is not None:
+        keys, draw = own.directions, partial(coupled.accepted, own.several_axes)
+    else:
+        assert table is not None and table.uncertainty is not None  # the campaign file's own check
+        keys = tuple(f"{MIRROR}.{key}" for key in table.uncertainty.parameters)
+        draw = partial(mirror_spread.parameters, table)
+    normals = standard_normal(np.column_stack([shares[key] for key in keys]))
 
     def again(row: int) -> Iterator[Floats]:
         stream = _philox(campaign.table.seed, AGAIN, (first + row) << 64)
         while True:
             yield standard_normal(_open_unit(stream.random_raw(len(keys))))
 
-    values = mirror_spread.parameters(table, normals, again)
+    values = draw(normals, again)
     drawn = {draw.key for draw in campaign.draws}
     missing = {name: np.full(len(normals), np.nan) for name in shares if name not in drawn}
-    return missing | {f"mirror.{key}": values[:, i] for i, key in enumerate(keys)}
+    return missing | {key: values[:, i] for i, key in enumerate(keys)}
 
 
 # --------------------------------------------------------------------------------------------------------- unit cube

@@ -3,12 +3,14 @@
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from microrad.core import lti
 from microrad.core.arrays import Complexes, Floats
+from microrad.loop.control import dips
 from microrad.loop.control.analysis import around_poles, bandwidth_hz, cut, moved
 from microrad.loop.control.problem import OPTICAL, RESIDUAL, AxisController, DesignPlant
 
@@ -17,12 +19,6 @@ CUTS = ("command", "optical")
 
 BEYOND = 10.0
 """What stands for |1 + L| at a cut that a loop does not have."""
-
-NEAR_LEAST = 1.3
-"""Dips of |1 + L| within this factor of the deepest one are followed between the grid's points."""
-
-CLOSER = (0.05, 0.0025)
-"""Half widths, over the grid's step, of the three points through which the parabola is laid again and again."""
 
 AT_ONCE = 8192
 """Frequencies, of all controllers together, whose responses are worked out at once: what a processor keeps near."""
@@ -62,8 +58,7 @@ class Judge:
         self._A, self._B, self._C, self._D = _stacked([moved(p).from_command for p in plants])
         grids = [grid(p.system, p.period_s) for p in plants]
         self._edges = np.cumsum([0, *(f.size for f in grids)])
-        self._freq = np.concatenate(grids)
-        self._steps = np.diff(self._freq)  # below 0 from one plant to the next
+        self._freq = np.concatenate(grids)  # falls from one plant to the next
         self._bands = _bands(grids, self._period)
         self._weights = np.concatenate([quadrature(f) for f in grids]) * 2.0 * self._period
         whole = np.concatenate(
@@ -121,8 +116,8 @@ class Judge:
         distances = [np.abs(whole)] + [np.abs(1.0 + cut(K, self._to_sensors, each)) for each in cuts[1:]]
         means = self._mean(self._residual(K / whole[..., None]))
         moduli = np.full((len(K), len(CUTS), self._bands.size), BEYOND)
-        for i, dips in enumerate(self._dips(stack, cuts, distances)):
-            moduli[:, i] = np.minimum.reduceat(dips, self._bands, axis=1)
+        for i, distance in enumerate(self._dips(stack, cuts, distances)):
+            moduli[:, i] = np.minimum.reduceat(distance, self._bands, axis=1)
         for mean, least, distance in zip(means, moduli, distances[-1], strict=True):
             yield float(mean), least.ravel(), self._bandwidths(distance)
 
@@ -153,60 +148,27 @@ class Judge:
         return np.asarray(np.mean(np.add.reduceat(self._weights * spectrum, self._edges[:-1], axis=1), axis=1))
 
     def _dips(self, stack: "_Stack", cuts: Sequence[str], distances: Sequence[Floats]) -> list[Floats]:
-        """The distances by cut, each local minimum on the grid replaced by the least between its points.
-
-        A parabola through a minimum and its neighbours tells where it is; what is near the least of all is looked at
-        again there, more closely each time, so that the least moves smoothly with the controller.
-        """
+        """The distances by cut, each local minimum on the grid replaced by the least between its points: see `dips`."""
         by_cut = []
-        deepest = NEAR_LEAST * np.min([np.min(distance, axis=1) for distance in distances], axis=0)
+        deepest = dips.NEAR_LEAST * np.min([np.min(distance, axis=1) for distance in distances], axis=0)
         for broken_at, distance in zip(cuts, distances, strict=True):
-            found = distance.copy()
-            of, at, where, squared = self._minima(distance)
-            found[of, at] = np.sqrt(np.maximum(squared, 0.0))
-            near = found[of, at] < deepest[of]
-            of, at = of[near], at[near]
-            found[of, at] = self._closer(stack.some(of), broken_at, at, where[near])
+            found, each = distance.copy(), dips.on_grid(distance**2, self._freq)
+            found[each.row, each.at] = np.sqrt(np.maximum(each.squared, 0.0))
+            near = found[each.row, each.at] < deepest[each.row]
+            of, at = each.row[near], each.at[near]
+            plant = np.searchsorted(self._edges, at, side="right") - 1
+            squared_at = partial(self._squared, stack.some(of), broken_at, plant)
+            least = dips.followed(squared_at, each.freq_hz[near], each.width_hz[near])
+            found[of, at] = np.sqrt(np.maximum(least, 0.0))
             by_cut.append(found)
         return by_cut
 
-    def _minima(self, distance: Floats) -> tuple[NDArray[np.intp], NDArray[np.intp], Floats, Floats]:
-        """Controllers, places on the grid, frequencies and squares of the local minima, by parabolas through 3 points.
-
-        ``distance`` is (controllers, frequencies).
-        """
-        squared, before, after = distance**2, self._steps[:-1], self._steps[1:]
-        change = squared[:, 1:] - squared[:, :-1]
-        within = (before > 0.0) & (after > 0.0)
-        of, at = np.nonzero((change[:, :-1] * before < 0.0) & (change[:, 1:] * after > 0.0) & within)
-        before, after = before[at], after[at]
-        left, right = change[of, at] / before, change[of, at + 1] / after
-        slope, curvature = (left * after + right * before) / (before + after), (right - left) / (before + after)
-        where = self._freq[at + 1] - slope / (2.0 * curvature)
-        return of, at + 1, where, squared[of, at + 1] - slope**2 / (4.0 * curvature)
-
-    def _closer(self, stack: "_Stack", broken_at: str, at: NDArray[np.intp], freq_hz: Floats) -> Floats:
-        """Minima of the distance near some frequencies, beside the places ``at`` of the grid; one controller each."""
-        plant = np.searchsorted(self._edges, at, side="right") - 1
-        width, least = np.minimum(self._steps[at - 1], self._steps[at]), np.zeros(at.size)
-        for share in CLOSER:
-            step = share * width
-            near = freq_hz[:, None] + step[:, None] * np.array([-1.0, 0.0, 1.0])
-            squared = self._distance(stack, broken_at, plant, near) ** 2
-            slope = 0.5 * (squared[:, 2] - squared[:, 0])
-            curvature = squared[:, 2] - 2.0 * squared[:, 1] + squared[:, 0]
-            moved = np.where(curvature > 0.0, -slope / np.where(curvature > 0.0, curvature, 1.0), 0.0)
-            moved = np.clip(moved, -0.5 / share, 0.5 / share)  # within the grid's own step
-            freq_hz = freq_hz + moved * step
-            least = squared[:, 1] + moved * (slope + 0.5 * moved * curvature)
-        return np.sqrt(np.maximum(least, 0.0))
-
-    def _distance(self, stack: "_Stack", broken_at: str, plant: NDArray[np.intp], freq_hz: Floats) -> Floats:
-        """|1 + L| of controllers on plants, one of each for each row of frequencies."""
+    def _squared(self, stack: "_Stack", broken_at: str, plant: NDArray[np.intp], freq_hz: Floats) -> Floats:
+        """|1 + L|^2 of controllers on plants, one of each for each row of frequencies."""
         points = np.exp(2j * math.pi * self._period * freq_hz)[..., None, None]
         K = _solved(points, stack.A, stack.B, stack.C, stack.D)[..., 0, :]
         G = _solved(points, self._A[plant], self._B[plant], self._C[plant], self._D[plant])[..., 0]
-        return np.abs(1.0 + cut(K, G, broken_at))
+        return np.abs(1.0 + cut(K, G, broken_at)) ** 2
 
     def _bandwidths(self, distance: Floats) -> Floats:
         parts = (slice(*edge) for edge in zip(self._edges[:-1], self._edges[1:], strict=True))

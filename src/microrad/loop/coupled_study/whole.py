@@ -14,11 +14,12 @@ from microrad.loop.control import (
     MultiloopMargin,
     WholeController,
     WholePlant,
+    dips,
     multiloop_disk_margin,
 )
 from microrad.loop.control.analysis import bandwidth_hz, reachable, resolving
 from microrad.loop.control.classical import LIGHT_DAMPING
-from microrad.loop.control.judge import CLOSER, NEAR_LEAST, Verdict, grid, quadrature
+from microrad.loop.control.judge import Verdict, grid, quadrature
 from microrad.loop.control.search import Scope
 
 BANDS = 10
@@ -96,9 +97,8 @@ def least_moduli(
 ) -> Floats:
     """Least singular values of 1 + L on a grid, each local minimum by what is least between its points.
 
-    A parabola through a minimum and its neighbours tells where it is. What is near the least of all is looked at again
-    there, more closely each time, so that the least moves smoothly with the controller; and so is each light resonance
-    of the closed loop, whose dip may lie between two points.
+    Minima are followed as `dips` says; so is each light resonance of the closed loop, whose dip may lie between two
+    points.
 
     Args:
         plant: The plant of all axes, without what its commands do not reach.
@@ -108,29 +108,20 @@ def least_moduli(
         poles: Poles of the closed loop.
     """
     squared = _least_squares(returned)
-    before, after = freq[1:-1] - freq[:-2], freq[2:] - freq[1:-1]
-    left, right = (squared[1:-1] - squared[:-2]) / before, (squared[2:] - squared[1:-1]) / after
-    slope, bend = (left * after + right * before) / (before + after), (right - left) / (before + after)
-    dips = np.flatnonzero((left < 0.0) & (right > 0.0))
-    where, lowest = freq[1 + dips] - slope[dips] / (2.0 * bend[dips]), squared.copy()
-    lowest[1 + dips] -= slope[dips] ** 2 / (4.0 * bend[dips])
-    near = dips[lowest[1 + dips] < NEAR_LEAST**2 * np.min(squared)]
-    where, width = where[np.isin(dips, near)], np.minimum(before[near], after[near])
+    each, lowest = dips.on_grid(squared[None], freq), squared.copy()
+    lowest[each.at] = each.squared
+    near = each.squared < dips.NEAR_LEAST**2 * np.min(squared)
     at, half = _resonances(poles, plant.period_s)
     places = np.clip(np.searchsorted(freq, at), 1, freq.size - 2)
     finer = half < 0.5 * (freq[places + 1] - freq[places - 1])
-    where, width = np.concatenate([where, at[finer]]), np.concatenate([width, half[finer]])
-    near = np.concatenate([1 + near, places[finer]])
-    for share in CLOSER if near.size else ():
-        points = where[:, None] + share * width[:, None] * np.array([-1.0, 0.0, 1.0])
-        low, middle, high = _least_squares(_returned(plant, system, points.ravel())).reshape(-1, 3).T
-        slope, bend = 0.5 * (high - low), high - 2.0 * middle + low
-        moved = np.clip(np.where(bend > 0.0, -slope / np.where(bend > 0.0, bend, 1.0), 0.0), -0.5 / share, 0.5 / share)
-        where = where + moved * share * width
-        found = np.minimum(middle, middle + moved * (slope + 0.5 * moved * bend))
-    if near.size:
-        lowest[near[: near.size - places[finer].size]] = math.inf  # what the parabola said
-        np.minimum.at(lowest, near, found)
+    where, width = (
+        np.concatenate([own[near], lights[finer]]) for own, lights in ((each.freq_hz, at), (each.width_hz, half))
+    )
+    found = dips.followed(
+        lambda points: _least_squares(_returned(plant, system, points.ravel())).reshape(-1, 3), where, width
+    )
+    lowest[each.at[near]] = math.inf  # what the parabola said
+    np.minimum.at(lowest, np.concatenate([each.at[near], places[finer]]), found)
     return np.sqrt(np.maximum(lowest, 0.0))
 
 

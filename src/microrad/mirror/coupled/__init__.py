@@ -3,7 +3,7 @@
 from microrad.mirror.coupled.geometry import tilts_and_piston
 from microrad.mirror.coupled.reading import of
 from microrad.mirror.coupled.records import Actuator, CoupledMirror, Known, Output, modes, response
-from microrad.mirror.coupled.spread import draws
+from microrad.mirror.coupled.spread import accepted, directions, draws, moved
 from microrad.mirror.coupled.writing import text
 
 __all__ = [
@@ -11,8 +11,11 @@ __all__ = [
     "CoupledMirror",
     "Known",
     "Output",
+    "accepted",
+    "directions",
     "draws",
     "modes",
+    "moved",
     "of",
     "response",
     "text",

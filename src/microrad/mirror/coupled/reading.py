@@ -80,8 +80,7 @@ def _known(table: UncertaintyTable, order: Sequence[int]) -> Known:
     if table.factor is not None:
         factor = np.array(table.factor)
     else:
-        values, vectors = np.linalg.eigh(table.correlation_matrix)
-        factor = vectors * np.sqrt(np.maximum(values, 0.0))
+        factor = lti.covariance_root(table.correlation_matrix)
         factor /= np.linalg.norm(factor, axis=1, keepdims=True)
     own = {str(of + 1): str(place + 1) for place, of in enumerate(order)}
     return Known(tuple(_counted(name, own) for name in table.parameters), np.array(table.standard_errors), factor)

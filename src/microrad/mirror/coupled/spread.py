@@ -1,14 +1,17 @@
 """Mirrors of several axes that an identification leaves possible: drawn from the covariance that its file gives."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
+from itertools import chain, islice
 from typing import Any
 
 import numpy as np
 
 from microrad.core import lti
+from microrad.core.arrays import Floats
 from microrad.mirror.coupled.records import CoupledMirror, Known, modes
 from microrad.mirror.hysteresis import BoucWen, Play, rest_gain, slow_gain
+from microrad.mission.tables.mirror import least_alpha_1_v
 
 TRIES = 1000
 """Times that one mirror is drawn again before its uncertainty is taken for one that no mirror has."""
@@ -29,8 +32,9 @@ def draws(mirror: CoupledMirror, count: int, seed: int) -> tuple[CoupledMirror, 
     """Draw mirrors from the normal distribution that ``known`` describes; none without one.
 
     A decay stays above a tenth of its own, and what is at least 0 in the mirror stays at least 0: the distribution is
-    cut off there. A mirror that runs away at rest or where all plays slide, or whose thresholds change places, is drawn
-    again. Each has a Philox stream of its own, so the first ones are the same for a larger count.
+    cut off there. A mirror that runs away at rest or where all plays slide, whose thresholds change places, or whose
+    Bouc-Wen model grows without bound, is drawn again. Each has a Philox stream of its own, so the first ones are the
+    same for a larger count.
 
     Args:
         mirror: The identified mirror.
@@ -44,29 +48,89 @@ def draws(mirror: CoupledMirror, count: int, seed: int) -> tuple[CoupledMirror, 
     if known is None:
         return ()
     streams = (np.random.SeedSequence(seed, spawn_key=(index,)) for index in range(count))
-    return tuple(_drawn(mirror, known, np.random.Generator(np.random.Philox(stream))) for stream in streams)
+    return tuple(_first(mirror, _normals(stream, known))[0] for stream in streams)
 
 
-def _drawn(mirror: CoupledMirror, known: Known, rng: np.random.Generator) -> CoupledMirror:
-    for _ in range(TRIES):
-        changes = known.standard_errors * (known.factor @ rng.standard_normal(known.factor.shape[1]))
-        found = changed(mirror, dict(zip(known.parameters, changes.tolist(), strict=True)))
+def directions(mirror: CoupledMirror) -> int:
+    """Number of independent directions that the mirror is known in: columns of the factor of its correlation.
+
+    Raises:
+        ValueError: Nothing is known of it.
+    """
+    return int(_known(mirror).factor.shape[1])
+
+
+def accepted(mirror: CoupledMirror, normals: Floats, again: Callable[[int], Iterator[Floats]]) -> Floats:
+    """Standard normal numbers of mirrors, shape (count, `directions`): those given, but where they are no mirror.
+
+    Args:
+        mirror: The identified mirror.
+        normals: Standard normal numbers, shape (count, `directions`), one row for each mirror.
+        again: Given the number of a row that is no mirror, yields other standard normal numbers to draw it from again.
+
+    Raises:
+        ValueError: Nothing is known of the mirror, or `TRIES` draws in a row are no mirror.
+    """
+    found = [_first(mirror, chain((row,), again(i)))[1] for i, row in enumerate(normals)]
+    return np.array(found).reshape(normals.shape)
+
+
+def moved(mirror: CoupledMirror, normals: Floats) -> CoupledMirror:
+    """The mirror with its parameters moved by their standard errors times factor @ normals; an estimate no more.
+
+    Args:
+        mirror: The identified mirror.
+        normals: Standard normal numbers, shape (`directions`,); with zeros the mirror stays as it is.
+
+    Raises:
+        ValueError: Nothing is known of the mirror.
+    """
+    known = _known(mirror)
+    changes = known.standard_errors * (known.factor @ normals)
+    return replace(changed(mirror, dict(zip(known.parameters, changes.tolist(), strict=True))), known=None)
+
+
+def _known(mirror: CoupledMirror) -> Known:
+    if mirror.known is None:
+        raise ValueError(
+            f'the mirror "{mirror.mirror.name}" has no table uncertainty, so nothing can be drawn; `microrad identify` '
+            "writes one into its mirror file"
+        )
+    return mirror.known
+
+
+def _normals(stream: np.random.SeedSequence, known: Known) -> Iterator[Floats]:
+    rng = np.random.Generator(np.random.Philox(stream))
+    while True:
+        yield rng.standard_normal((known.factor.shape[1],))
+
+
+def _first(mirror: CoupledMirror, normals: Iterator[Floats]) -> tuple[CoupledMirror, Floats]:
+    """The first mirror that is one, and the numbers that it is made of."""
+    for row in islice(normals, TRIES):
+        found = moved(mirror, row)
         if _is_one(found):
-            return replace(found, known=None)
+            return found, row
     raise ValueError(
-        f"{TRIES} draws from the uncertainty of {mirror.mirror.name!r} in a row run away or have thresholds out of "
-        "order: its standard errors are too large for a mirror; identify it from more records, or leave the table "
-        "uncertainty out"
+        f"{TRIES} draws from the uncertainty of {mirror.mirror.name!r} in a row run away, have thresholds out of order "
+        "or hysteresis without bound: its standard errors are too large for a mirror; identify it from more records, "
+        "or leave the table uncertainty out"
     )
 
 
 def _is_one(mirror: CoupledMirror) -> bool:
-    """Whether thresholds ascend, and neither stuck nor sliding plays make the mirror grow."""
+    """Whether thresholds ascend, hysteresis is bounded, and neither stuck nor sliding plays make the mirror grow."""
     own = mirror.mirror
     if any(np.any(np.diff(play.thresholds_v) <= 0.0) for play in own.plays):
         return False
+    if not all(map(_is_bounded, own.bouc_wen)):
+        return False
     ends = ([gain(model) for model in own.bank] for gain in (rest_gain, slow_gain))
     return all(lti.growth_1_s(own.A, own.E, own.F, np.array(gains)) < 0.0 for gains in ends) if own.A.size else True
+
+
+def _is_bounded(model: BoucWen) -> bool:
+    return model.exponent >= 1.0 and model.alpha_1_v > least_alpha_1_v(model.beta_1_v, model.gamma_1_v, model.eta_1_v)
 
 
 def changed(mirror: CoupledMirror, by: Mapping[str, float]) -> CoupledMirror:

@@ -177,14 +177,10 @@ def designs(
     """
     margins = "modulus", "gain (dB)", "phase (°)", "delay (µs)", "disk", "bandwidth (Hz)", "crossover (Hz)"
     headings = ("controller", *between, "tuned to", *margins, "bound by")
-    return (
-        about,
-        Table("", headings, rows, (0, 1 + len(between), len(headings) - 1), best=best),
-        Soft(
-            "Bandwidth: lowest frequency at which the sensitivity reaches 0 dB. Crossover: highest frequency at which "
-            "the loop gain does."
-        ),
-    )
+    said = "Bandwidth: lowest frequency at which the sensitivity reaches 0 dB."
+    if any(row[headings.index("crossover (Hz)")] for row in rows):  # a loop of several axes has none
+        said += " Crossover: highest frequency at which the loop gain does."
+    return about, Table("", headings, rows, (0, 1 + len(between), len(headings) - 1), best=best), Soft(said)
 
 
 def tuned_to(values: Mapping[str, float], units: Mapping[str, str]) -> str:
@@ -206,7 +202,7 @@ def design_cells(tuned: str, margins: LoopMargins, bound_by: Sequence[str]) -> t
 
     Args:
         tuned: what it was tuned to, in words.
-        margins: those of its nominal loop; of several axes, which have no delay margin, that is nan.
+        margins: those of its nominal loop; of several axes delay and crossover are nan: they have none.
         bound_by: what keeps its residual from being smaller.
     """
     gain, several = 20.0 * math.log10(margins.gain_up), math.isnan(margins.delay_s)

@@ -1,0 +1,219 @@
+"""Campaigns that draw the mirror of several axes in their loop from the covariance of its file."""
+
+import math
+from contextlib import closing
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from campaign_files import HEAD, IDENTIFIED, POWER
+from microrad.campaign import run
+from microrad.campaign.file import load_campaign
+from microrad.campaign.ledger import Ledger
+from microrad.campaign.rows import evaluate, loops, sampling
+from microrad.campaign.rows.evaluator import Evaluator
+from microrad.campaign.rows.missions import MissionBuilder
+from microrad.loop.pointing_loop import ensemble
+from microrad.mirror import coupled
+from microrad.mirror.hysteresis import BoucWen
+from microrad.mission.file import MissionError
+from several_axes import TEXT, mission_text, two_axes
+
+NAMED = ("[fine_pointing]\n", '[fine_pointing]\nmirror_file = "mirror.toml"\n')
+LOOP = '[loop]\ncontroller = "PI"\nduration = "0.2 s"\nsettle = "0.1 s"\n'
+SMALL = HEAD.replace("runs = 256", "runs = 12").replace("sobol", "random")
+SIGMAS = 4.5
+WITHOUT = TEXT[: TEXT.index("[uncertainty]")]
+MANY = SMALL.replace("runs = 12", "runs = 4000")
+
+
+def written(folder, text, mirror=TEXT):
+    (folder / "mirror.toml").write_text(mirror, encoding="utf-8")
+    (folder / "mission.toml").write_text(mission_text(NAMED), encoding="utf-8")
+    (folder / "campaign.toml").write_text(text, encoding="utf-8")
+    return folder / "campaign.toml"
+
+
+def loaded(folder, text, mirror=TEXT):
+    return load_campaign(written(folder, text, mirror))
+
+
+def drawn_mirrors(campaign, count, cell=0):
+    columns, _ = sampling.rows(campaign, cell, 0, count)
+    builder = MissionBuilder(campaign)
+    rows = ({key: float(column[i]) for key, column in columns.items()} for i in range(count))
+    return [builder.several_axes(cell, values) for values in rows]
+
+
+def known_values(mirror):
+    """The four parameters that the page's mirror is known in."""
+    own = mirror.mirror
+    return -own.A[0, 0], own.A[1, 0], own.plays[0].weights_rad_v[2], mirror.delay_s
+
+
+def same(one, other):
+    """Whether two mirrors have the same numbers."""
+    matrices = all(np.array_equal(getattr(one.mirror, name), getattr(other.mirror, name)) for name in "ABCDEFGK")
+    return matrices and one.mirror.bank == other.mirror.bank and one.delay_s == other.delay_s
+
+
+def test_the_columns_of_a_row_are_the_numbers_that_move_its_mirror(tmp_path):
+    campaign = loaded(tmp_path, MANY + LOOP + IDENTIFIED + POWER)
+    names = [f"mirror.{number}" for number in range(1, 5)]
+    assert [each.key for each in campaign.inputs] == [*names, "communication.transmit_power"]
+    assert campaign.inputs[2].distribution == "identified, 3 of 4 standard normal numbers for 4 parameters"
+    assert campaign.loop_varies and campaign.realisations == 64
+    columns, weight = sampling.rows(campaign, 0, 0, 3)
+    assert np.all(weight == 1.0)
+    known = two_axes().known
+    for row, mirror in enumerate(drawn_mirrors(campaign, 3)):
+        normals = np.array([columns[name][row] for name in names])
+        wanted = np.array(known_values(two_axes())) + known.standard_errors * (known.factor @ normals)
+        np.testing.assert_allclose(known_values(mirror), wanted, rtol=1e-12)
+        assert mirror.known is None
+
+
+def test_drawn_rows_follow_the_covariance_of_the_file(tmp_path):
+    """Mean and covariance as close as so many independent rows tell them: SIGMAS standard errors."""
+    rows = 4000
+    campaign = loaded(tmp_path, MANY + LOOP + IDENTIFIED)
+    values = np.array([known_values(mirror) for mirror in drawn_mirrors(campaign, rows)])
+    known = two_axes().known
+    off = (values - known_values(two_axes())) / known.standard_errors
+    assert np.all(np.abs(off.mean(axis=0)) < SIGMAS / math.sqrt(rows))
+    wanted = known.correlation
+    bound = SIGMAS * np.sqrt((1.0 + wanted**2) / rows)
+    assert np.all(np.abs(off.T @ off / rows - wanted) < bound)
+    assert np.max(np.abs(wanted - np.eye(4))) > 5.0 * np.max(bound)  # and a diagonal would not do
+
+
+def test_the_same_seed_repeats_a_row_whoever_asks_for_it(tmp_path):
+    campaign = loaded(tmp_path, HEAD + LOOP + IDENTIFIED)
+    whole, _ = sampling.rows(campaign, 0, 0, 64)
+    for row in (0, 17, 63):
+        alone, _ = sampling.rows(campaign, 0, row, 1)
+        assert {key: column[row] for key, column in whole.items()} == {key: c[0] for key, c in alone.items()}
+    again, _ = sampling.rows(loaded(tmp_path, HEAD + LOOP + IDENTIFIED), 0, 0, 64)
+    other, _ = sampling.rows(loaded(tmp_path, HEAD.replace("seed = 1", "seed = 2") + LOOP + IDENTIFIED), 0, 0, 64)
+    for key, column in whole.items():
+        assert np.array_equal(again[key], column)
+        assert not np.any(other[key] == column)
+
+
+def test_without_a_draw_the_mirror_is_that_of_the_file_to_the_digit(tmp_path):
+    campaign = loaded(tmp_path, SMALL + LOOP + POWER)
+    assert MissionBuilder(campaign).several_axes(0, {"communication.transmit_power": 5.0}) is None
+    assert same(coupled.moved(two_axes(), np.zeros(4)), two_axes())
+    drawn = loaded(tmp_path, SMALL + LOOP + IDENTIFIED + POWER)
+    nominal, moved = (loops.mission_loop(c.cells[0].file, c.table.loop, 1) for c in (campaign, drawn))
+    assert np.array_equal(nominal.row.mirror.A, moved.row.mirror.A)
+    assert same(replace(two_axes(), mirror=nominal.row.mirror), two_axes())
+
+
+def test_a_row_flies_the_drawn_mirror_under_the_controller_of_the_nominal_one(tmp_path):
+    campaign = loaded(tmp_path, SMALL + LOOP + IDENTIFIED)
+    tuned = dict(enumerate(loops.controllers(campaign, lambda *_: None)))
+    nominal = loops.mission_loop(campaign.mission, campaign.table.loop, campaign.table.seed)
+    evaluator = Evaluator(campaign, tuned)
+    assert np.array_equal(evaluator.controller(0).system.A, nominal.controller(tuned[0]).system.A)
+    chunk = evaluator.rows(0, range(2), lambda: None)
+    assert not chunk.failed
+    for row, mirror in enumerate(drawn_mirrors(campaign, 2)):
+        flown = replace(nominal.row, mirror=mirror.mirror)
+        each = campaign.realisations
+        runs = ensemble.simulate(flown, nominal.controller(tuned[0]), nominal.span, each, first_run=row * each)
+        wanted = evaluate.outputs(campaign.mission, runs, chunk.columns)
+        assert {name: chunk.columns[name][row] for name in wanted} == wanted
+    rms = chunk.columns["residual_rms"]
+    assert rms[0] != rms[1]
+    flat = Evaluator(loaded(tmp_path, SMALL + LOOP + POWER), tuned).rows(0, range(1), lambda: None)
+    assert flat.columns["residual_rms"][0] not in rms
+
+
+def test_the_rows_are_the_same_by_any_number_of_workers(tmp_path):
+    path, found = written(tmp_path, SMALL + LOOP + IDENTIFIED), []
+    for threads in (1, 2):
+        book = tmp_path / f"{threads}.ledger"
+        run.run_campaign(path, book, run.Means(threads=threads))
+        with closing(Ledger.open(book, write=False)) as ledger:
+            found.append({chunk.number: chunk for chunk in ledger.chunks(0)})
+    one, two = found
+    assert one.keys() == two.keys() and len(one) > 1
+    for number, chunk in one.items():
+        assert not chunk.failed
+        for name, column in chunk.columns.items():
+            assert np.array_equal(column, two[number].columns[name]), name
+
+
+def test_a_mirror_that_runs_away_is_drawn_again_and_a_weight_is_at_least_0(tmp_path):
+    wide = TEXT.replace("standard_errors = [0.4, 0.9, 0.004,", "standard_errors = [0.4, 0.9, 0.6,")
+    assert wide != TEXT
+    campaign = loaded(tmp_path, MANY + LOOP + IDENTIFIED, wide)
+    weights = np.array([known_values(mirror)[2] for mirror in drawn_mirrors(campaign, 400)])
+    assert np.min(weights) == 0.0
+    assert 0.4 < np.mean(weights == 0.0) < 0.75  # more than half: some of those above 0 run away
+    assert np.max(weights) < 1.0
+
+
+def test_a_bouc_wen_model_without_bound_is_drawn_again():
+    mirror = two_axes()
+    model = BoucWen(0.02, 0.0, 0.01, 0.0, 2.0, 1.9)
+    own = replace(mirror.mirror, bouc_wen=(model,), plays=mirror.mirror.plays[1:])
+    known = replace(
+        mirror.known,
+        parameters=("hysteresis.1.alpha",),
+        standard_errors=np.array([0.5]),
+        factor=np.ones((1, 1)),
+    )
+    drawn = coupled.draws(replace(mirror, mirror=own, known=known), 50, 1)
+    alphas = np.array([each.mirror.bouc_wen[0].alpha_1_v for each in drawn])
+    assert np.all(alphas > 1.9)
+    assert np.unique(alphas).size == 50
+
+
+ONE_AXIS = 'name = "one"\ntravel = "2 mrad"\n'
+LISTED = '[inputs."fine_pointing.mirror_file"]\ndistribution = "table"\nvalues = ["mirror.toml", "other.toml"]\n'
+
+
+@pytest.mark.parametrize(
+    ("mirror", "more", "said"),
+    [
+        (WITHOUT, "", 'the mirror "Two axes on a hysteretic spring" has no table uncertainty'),
+        (ONE_AXIS, "", "a mirror of one axis"),
+        (None, "", "does not exist"),
+        (TEXT, LISTED, r"\[inputs.mirror\] draws the mirror that it names"),
+    ],
+)
+def test_what_cannot_be_drawn_is_refused(tmp_path, mirror, more, said):
+    path = written(tmp_path, SMALL + LOOP + IDENTIFIED + more, mirror or "")
+    (tmp_path / "other.toml").write_text(TEXT, encoding="utf-8")
+    if mirror is None:
+        (tmp_path / "mirror.toml").unlink()
+    with pytest.raises(MissionError, match=said):
+        load_campaign(path)
+
+
+def test_an_uncertainty_that_leaves_no_mirror_is_refused_where_the_campaign_is_read(tmp_path, monkeypatch):
+    monkeypatch.setattr(coupled.spread, "_is_one", lambda mirror: False)
+    with pytest.raises(MissionError, match="1000 draws from the uncertainty of") as caught:
+        loaded(tmp_path, SMALL + LOOP + IDENTIFIED)
+    assert [fault.key for fault in caught.value.faults] == ["inputs.mirror"]
+
+
+def test_a_mirror_of_each_cell_has_its_own_covariance(tmp_path):
+    """Of a cell that is known in fewer directions the other numbers are left empty."""
+    fewer = WITHOUT + (
+        '[uncertainty]\nparameters = ["modes.decay.1", "modes.frequency.1"]\nstandard_errors = [0.4, 0.9]\n'
+    )
+    path = written(
+        tmp_path, SMALL + LOOP + IDENTIFIED + '[grid]\n"fine_pointing.mirror_file" = ["mirror.toml", "f.toml"]\n'
+    )
+    (tmp_path / "f.toml").write_text(fewer, encoding="utf-8")
+    campaign = load_campaign(path)
+    assert [len(cell.directions) for cell in campaign.cells] == [4, 2]
+    columns, _ = sampling.rows(campaign, 1, 0, 12)
+    assert [bool(np.all(np.isnan(columns[f"mirror.{n}"]))) for n in range(1, 5)] == [False, False, True, True]
+    for mirror in drawn_mirrors(campaign, 12, 1):
+        decay, frequency, *rest = known_values(mirror)
+        assert decay != 18.0 and frequency != 900.0 and tuple(rest) == known_values(two_axes())[2:]
