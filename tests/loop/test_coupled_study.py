@@ -35,7 +35,7 @@ from shipped import DEFAULT
 def plate():
     """Its loop, and two controllers of it."""
     scene = scene_of(three_actuators())
-    return scene, coupled_study.design(scene, only=("PI", "LQG"))
+    return scene, coupled_study.design(scene, only=("PI", "LQG", "H-infinity"))
 
 
 @cache
@@ -45,8 +45,8 @@ def pair():
     return scene, coupled_study.design(scene, only=("LQG",))
 
 
-CASES = [(plate, "PI"), (plate, "LQG"), (pair, "LQG")]
-IDS = ["PI on three actuators", "LQG on three actuators", "LQG on two"]
+CASES = [(plate, "PI"), (plate, "LQG"), (pair, "LQG"), (plate, "H-infinity")]
+IDS = ["PI on three actuators", "LQG on three actuators", "LQG on two", "H-infinity on three actuators"]
 
 
 def chosen(case):

@@ -19,6 +19,7 @@ from microrad.loop.control.classical import (
     RESONANT_DAMPING,
     peak_family,
 )
+from microrad.loop.control.h_infinity import H_INFINITY_OF_AXES
 from microrad.loop.control.lqg import LQG, LQG_OF_AXES, Weights, lqg_controller, lqg_of_axes
 from microrad.loop.control.problem import (
     GAUGE,
@@ -58,6 +59,7 @@ from microrad.loop.control.tuning import Tuned, grid_best, tune
 __all__ = [
     "DISTURBANCE_OBSERVER",
     "GAUGE",
+    "H_INFINITY_OF_AXES",
     "LQG",
     "LQG_OF_AXES",
     "OPTICAL",

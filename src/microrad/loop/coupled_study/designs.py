@@ -15,6 +15,7 @@ from microrad.core.progress import Progress
 from microrad.core.threads import shared_out
 from microrad.loop import control
 from microrad.loop.control import (
+    H_INFINITY_OF_AXES,
     LQG,
     LQG_OF_AXES,
     PI,
@@ -46,11 +47,14 @@ from microrad.mission.tables.fine_pointing import FinePointing
 WITH_FEEDFORWARD = f"{PI.name} + feedforward"
 """The PI with the mirror's hysteresis run forward on the reference: the same feedback, and so the same margins."""
 
+OF_AXES = (LQG_OF_AXES, H_INFINITY_OF_AXES)
+"""Kinds of controllers that are one of all axes; of the others each axis has its own."""
+
 STARTS = 3
-"""Places from which the weights of LQG are followed."""
+"""Places from which the weights of such a controller are followed."""
 
 MODELS = 8
-"""Quadratic models of the whole that the weights of LQG are followed by."""
+"""Quadratic models of the whole that its weights are followed by."""
 
 NOMINAL = 2
 """Plants that controllers are tuned for: at rest and over the whole range. The others have to keep the margin, too."""
@@ -141,10 +145,20 @@ class CoupledDesigns(NamedTuple):
     refused: Mapping[str, str]
 
 
+def families(f: FinePointing) -> tuple[Family, ...]:
+    """Kinds of controller for a mirror of several axes: those of one axis that fit the loop, and those of all at once.
+
+    Args:
+        f: The mission's fine-pointing table.
+    """
+    of_one = [LQG_OF_AXES if family is LQG else family for family in one_axis.families(f)]
+    return (*of_one, H_INFINITY_OF_AXES)
+
+
 def names(f: FinePointing) -> tuple[str, ...]:
     """The controllers that are designed for a mirror of several axes; a feedforward where a reference is known."""
     known = any(each.point_ahead_rad or each.line_of_sight_rate_rad_s for each in references(f))
-    found = [family.name for family in one_axis.families(f)]
+    found = [family.name for family in families(f)]
     return tuple(
         each for name in found for each in ((name, WITH_FEEDFORWARD) if name == PI.name and known else (name,))
     )
@@ -161,8 +175,9 @@ def design(
 ) -> CoupledDesigns:
     """Design controllers that keep the modulus margin with all axes closed.
 
-    LQG is one controller of all axes. Of the other families each axis has one, tuned while the other rests, for the
-    least margin at which the whole keeps the one that is asked for; a family is never worse than one that it contains.
+    LQG and H-infinity are one controller of all axes. Of the other families each axis has one, tuned while the other
+    rests, for the least margin at which the whole keeps the one that is asked for; a family is never worse than one
+    that it contains.
 
     Args:
         scene: The mission's loop.
@@ -179,11 +194,11 @@ def design(
     for name in wanted:
         if name not in has:
             raise ValueError(f"{name!r} is no controller of a mirror of several axes; there are {', '.join(has)}")
-    of, families = plants(scene), {family.name: family for family in one_axis.families(scene.table)}
+    of, kinds = plants(scene), {family.name: family for family in families(scene.table)}
     tuned = [*dict.fromkeys(feedback_of(name) for name in wanted)]
-    turns = [[name for name in tuned if families[name].base or families[name] is PI], *([n] for n in tuned)]
+    turns = [[name for name in tuned if kinds[name].base or kinds[name] is PI], *([n] for n in tuned)]
     turns = [turn for i, turn in enumerate(turns) if turn and (i == 0 or not {*turn} & {*turns[0]})]
-    jobs = [partial(_designed_in_turn, scene, [families[name] for name in turn], of) for turn in turns]
+    jobs = [partial(_designed_in_turn, scene, [kinds[name] for name in turn], of) for turn in turns]
     with shared_out(jobs, lambda i: on_progress(i, len(turns), f"tuning {turns[i][0]}")) as results:
         found: ChainMap[str, CoupledDesign | str] = ChainMap(*results())
     on_progress(len(turns), len(turns), "controllers tuned")
@@ -268,7 +283,7 @@ def design_and_promise(
 def _firmer(
     scene: CoupledScene, broken: CoupledDesign, on_progress: Progress
 ) -> tuple[CoupledDesign, CoupledOutlook] | None:
-    (family,) = (each for each in one_axis.families(scene.table) if each.name == feedback_of(broken.name))
+    (family,) = (each for each in families(scene.table) if each.name == feedback_of(broken.name))
 
     def tuned(margin: float) -> CoupledDesign:
         on_progress(0, 1, f"tuning {broken.name} for a larger margin")
@@ -378,22 +393,23 @@ def _margins(plant: WholePlant, controller: WholeController) -> WholeMargins:
 def _tuned(
     scene: CoupledScene, family: Family, of: Sequence[WholePlant], margin: float
 ) -> tuple[WholeController, dict[str, float]]:
-    """The best controller of a family for some plants, and its values: LQG of the whole, else each axis by itself."""
+    """The best controller of a family for some plants, and its values: of the whole, else each axis by itself."""
     asked, seed = Specification(margin), scene.table.seed
-    if family is not LQG:
+    if family not in OF_AXES:
         alone_of = [[alone(plant, axis) for plant in of] for axis in range(scene.loop.axes)]
         each = [control.tune(family, plants, asked, seed=seed, survey=SURVEY) for plants in alone_of]
         values = {f"{name} {axis}": v for axis, t in zip(AXES, each, strict=True) for name, v in t.values.items()}
         return side_by_side(family.name, [t.controller for t in each]), values
-    search = Search(LQG_OF_AXES, of, asked, scope=ALL_AXES)
+    search = Search(family, of, asked, scope=ALL_AXES)
     near = min((descend(search, start) for start in _weights(search)), key=lambda t: t.score)
     best = settled(search, [near], MODELS)
     named = zip((p.name for p in search.parameters), best.values.tolist(), strict=True)
-    return lqg_of_axes(of[0], Weights(*best.values.tolist()), coarse=True), dict(named)
+    assert family.final is not None
+    return family.final(of[0], best.values), dict(named)
 
 
 def _weights(search: Search) -> list[Trial]:
-    """Places all over the weights of LQG, of which the best ones are followed."""
+    """Places all over the weights of a controller of all axes, of which the best ones are followed."""
     fifths = [(np.arange(5) + 0.5) / 5.0] * len(search.parameters)
     surveyed = search.at_all([np.array(place) for place in product(*fifths)])
     return apart(sorted(surveyed, key=lambda t: t.score), STARTS, 0.1)

@@ -56,6 +56,7 @@ _FINE_TERMS = {
     "OLYMPUS": "a spectrum of vibration, after what was measured on the satellite of that name.",
     "PI": "controller with a proportional and an integral part; PID has a derivative part as well.",
     "LQG": "linear-quadratic-Gaussian controller: a Kalman filter with the best state feedback for it.",
+    "H-infinity": "controller of all axes for the largest error of the mirror's model that a loop of its shape stands.",
 }
 
 
