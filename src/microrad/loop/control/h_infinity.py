@@ -7,7 +7,7 @@ limit, and the Gramians of the factors are the same on both sides.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -89,7 +89,7 @@ def _stabilising(shaped: lti.StateSpace) -> lti.StateSpace:
     square = ABOVE_LEAST**2 * least
     s = _to_continuous(shaped)
     F = -np.linalg.solve(one + s.D.T @ s.D, s.D.T @ s.C + s.B.T @ X)
-    seen = square * np.linalg.solve(((1.0 - square) * np.eye(n) + X @ Z).T, Z @ s.C.T)
+    seen = np.asarray(square * np.linalg.solve(((1.0 - square) * np.eye(n) + X @ Z).T, Z @ s.C.T), dtype=float)
     return lti.StateSpace(s.A + s.B @ F + seen @ (s.C + s.D @ F), seen, s.B.T @ X, -s.D.T)
 
 

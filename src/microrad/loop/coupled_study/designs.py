@@ -36,6 +36,7 @@ from microrad.loop.controller_study import designs as one_axis
 from microrad.loop.controller_study.promises import firmer
 from microrad.loop.controller_study.results import Outlook, shortened
 from microrad.loop.controller_study.scenario import references
+from microrad.loop.coupled_study.directions import ALONG_AXES, along, loop_directions, on_axes
 from microrad.loop.coupled_study.scene import AXES, CoupledScene
 from microrad.loop.coupled_study.whole import ALL_AXES, WholeMargins, alone, side_by_side, whole_margins
 from microrad.loop.pointing_loop.design import whole_plant
@@ -58,6 +59,9 @@ MODELS = 8
 
 NOMINAL = 2
 """Plants that controllers are tuned for: at rest and over the whole range. The others have to keep the margin, too."""
+
+DIRECTION = "direction {} in rad"
+"""Value of a design with loops along other directions than the axes: angle from x towards y, by loop."""
 
 LOOKS, ENOUGH = 8, 0.01
 """Margins that controllers are tuned for until the whole keeps the one asked for, and what it may have to spare."""
@@ -177,7 +181,8 @@ def design(
 
     LQG and H-infinity are one controller of all axes. Of the other families each axis has one, tuned while the other
     rests, for the least margin at which the whole keeps the one that is asked for; a family is never worse than one
-    that it contains.
+    that it contains. These loops go along the axes, or along the modes' `directions` where those pull on each other
+    less.
 
     Args:
         scene: The mission's loop.
@@ -396,16 +401,19 @@ def _tuned(
     """The best controller of a family for some plants, and its values: of the whole, else each axis by itself."""
     asked, seed = Specification(margin), scene.table.seed
     if family not in OF_AXES:
-        alone_of = [[alone(plant, axis) for plant in of] for axis in range(scene.loop.axes)]
+        angles = loop_directions(of[0])
+        alone_of = [[alone(along(plant, angles), loop) for plant in of] for loop in range(scene.loop.axes)]
         each = [control.tune(family, plants, asked, seed=seed, survey=SURVEY) for plants in alone_of]
-        values = {f"{name} {axis}": v for axis, t in zip(AXES, each, strict=True) for name, v in t.values.items()}
-        return side_by_side(family.name, [t.controller for t in each]), values
+        values = {} if angles == ALONG_AXES else {DIRECTION.format(i): a for i, a in enumerate(angles, 1)}
+        named = zip(AXES if angles == ALONG_AXES else "12", each, strict=True)
+        values |= {f"{name} {loop}": v for loop, t in named for name, v in t.values.items()}
+        return on_axes(side_by_side(family.name, [t.controller for t in each]), angles), values
     search = Search(family, of, asked, scope=ALL_AXES)
     near = min((descend(search, start) for start in _weights(search)), key=lambda t: t.score)
     best = settled(search, [near], MODELS)
-    named = zip((p.name for p in search.parameters), best.values.tolist(), strict=True)
+    of_all = zip((p.name for p in search.parameters), best.values.tolist(), strict=True)
     assert family.final is not None
-    return family.final(of[0], best.values), dict(named)
+    return family.final(of[0], best.values), dict(of_all)
 
 
 def _weights(search: Search) -> list[Trial]:
