@@ -420,6 +420,12 @@ def test_an_integrator_adds_up_the_smallest_reading():
     assert step.x[0] > 0
 
 
+@pytest.mark.parametrize("off", [-2.6e-11, 2.5e-11])
+def test_an_integrator_that_rounding_moved_a_little_is_one_again(off):
+    fixed = made(one_axis([[1.0 + off]], [[100.0]], [[1.0]], [[3000.0]]), noise())
+    assert fixed.report.poles == ((1.0 + 0.0j, 1.0 + 0.0j),)
+
+
 def test_a_resting_signal_is_scaled_by_its_limit_and_its_states_by_what_it_can_do():
     of = replace(
         one_axis([[0.9, 0.0], [0.0, 0.5]], np.eye(2), [[1.0, 2.0]], [[0.0, 0.0]]),

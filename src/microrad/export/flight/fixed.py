@@ -61,9 +61,10 @@ def quantised(
     if not LEAST_BITS <= bits <= MOST_BITS:
         raise ExportError(f"{bits} bits in fixed point: give {LEAST_BITS} to {MOST_BITS} (sums have 64)")
     ideal = run_in_double(of, form, v.inputs)
-    made = scaled(of, _with_integrators(form), v.inputs, ideal, bits)
+    exact = _with_integrators(form)
+    made = scaled(of, exact, v.inputs, ideal, bits)
     _refuse_what_does_not_fit(of, made)
-    moved = _poles(form, made)
+    moved = _poles(exact, made)
     _refuse_poles(of, made, moved)
     found = replace(made, report=_report(of, form, made, v.inputs, ideal, moved))
     r = found.report
