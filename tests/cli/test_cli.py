@@ -48,6 +48,7 @@ COMMANDS = (
     "doctor",
     "studio",
     "schema",
+    "explain",
 )
 MICRORAD = (sys.executable, "-m", "microrad")
 COLUMNS = ("--input", "drive", "--output", "angle", "--rate", "1000", "--static")
@@ -777,6 +778,17 @@ def test_schema_is_one_json_document(call):
     result = call("schema")
     assert (result.code, result.err) == (0, "")
     assert "data_rate" in json.loads(result.out)["$defs"]["Communication"]["properties"]
+
+
+def test_explain_says_what_a_key_means_as_text_and_as_json(call):
+    result = call("explain", "fine_pointing.modulus_margin")
+    assert (result.code, result.err) == (0, "")
+    assert result.out.startswith("fine_pointing.modulus_margin (mission file)\n  means     least distance of the loop")
+    (key,) = json.loads(call("explain", "fine_pointing.modulus_margin", "--json").out)
+    assert (key["name"], key["default"]) == ("fine_pointing.modulus_margin", "")
+    refused = call("explain", "modulus_margn")
+    assert (refused.code, refused.out) == (2, "")
+    assert "near it are modulus_margin" in refused.err
 
 
 def test_a_closed_pipe_is_silent_and_a_full_one_is_not():

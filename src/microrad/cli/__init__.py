@@ -190,4 +190,28 @@ def schema() -> Outcome:
     return Outcome(json_text(mission_schema()))
 
 
+@app.command(
+    epilog=examples("microrad explain modulus_margin", "microrad explain fine_pointing", "microrad explain --json d1")
+)
+@command
+def explain(
+    key: Annotated[str, typer.Argument(help="Name of a key or table, or the end of it.", metavar="KEY")],
+    as_json: Json = False,
+) -> Outcome:
+    """Print what a key of a mission or mirror file means.
+
+    Its unit and bounds, what counts where it is left out, the value of the shipped mission with its source, and the
+    modules that read it.
+    """
+    from microrad.mission.explain import explained, text
+
+    try:
+        found = explained(key)
+    except ValueError as error:
+        raise Refusal(str(error)) from error
+    if as_json:
+        return Outcome(json_text([asdict(each) for each in found]))
+    return Outcome(f"{text(found, width())}\n")
+
+
 from microrad.cli import campaign, day, export, lab, link, pointing, studio  # noqa: E402, F401  their commands stand behind these in the help

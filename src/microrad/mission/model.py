@@ -113,9 +113,9 @@ class Requirement(LinkRequirement):
 class Amplifier(Table):
     """From the controller's output to the piezo: gain, then limits at the amplifier's output."""
 
-    gain: Annotated[float, Quantity("", above=0.0)]
-    output_min_v: Voltage
-    output_max_v: Voltage
+    gain: Annotated[float, Quantity("", above=0.0)] = Field(description="volts at the mirror for one volt at the input")
+    output_min_v: Voltage = Field(description="lowest voltage that it can give")
+    output_max_v: Voltage = Field(description="highest voltage that it can give")
     bandwidth_hz: Frequency = Field(description="first-order corner")
     slew_v_s: Rate = Field(description="at the amplifier's output")
 
@@ -134,9 +134,15 @@ class Control(Table):
     plant_step_s: Duration = Field(description="step of the simulated plant")
     drive_resolution_v: Step = Field(description='one count; "0 V" is ideal')
     sensor_resolution_rad: AngleOrZero = Field(description='one count; "0 urad" is ideal')
-    proportional_v_rad: Annotated[float, Quantity("V/rad", "V/mrad", least=0.0)]
-    integral_v_rad_s: Annotated[float, Quantity("V/(rad s)", "V/(mrad s)", least=0.0)]
-    derivative_v_s_rad: Annotated[float, Quantity("V s/rad", "V s/mrad", least=0.0)]
+    proportional_v_rad: Annotated[float, Quantity("V/rad", "V/mrad", least=0.0)] = Field(
+        description="volts for an error of one radian"
+    )
+    integral_v_rad_s: Annotated[float, Quantity("V/(rad s)", "V/(mrad s)", least=0.0)] = Field(
+        description="volts a second for an error of one radian"
+    )
+    derivative_v_s_rad: Annotated[float, Quantity("V s/rad", "V s/mrad", least=0.0)] = Field(
+        description="volts for an error that grows by one radian a second"
+    )
     derivative_filter_s: Duration = Field(description="time constant")
     for_mirror_gain_rad_v: MirrorGain = Field(
         description="for a mirror of another gain the gains are scaled to keep the loop gain"
@@ -151,10 +157,12 @@ class Scenario(Table):
     """The sines that the study runs."""
 
     amplitude_rad: Angle = Field(description="of the pointing reference")
-    pid_frequencies_hz: Frequencies
-    inverse_frequencies_hz: Frequencies
+    pid_frequencies_hz: Frequencies = Field(description="sines that are tracked under PID alone")
+    inverse_frequencies_hz: Frequencies = Field(description="sines that are tracked under PID + inverse")
     loop_frequencies_hz: Frequencies = Field(description="of the hysteresis loops")
-    loop_amplitude_v: Annotated[float, Quantity("V", above=0.0)]
+    loop_amplitude_v: Annotated[float, Quantity("V", above=0.0)] = Field(
+        description="of the sine that the hysteresis loop is drawn with"
+    )
 
 
 def _bias_fits(mirror: Mirror, amplifier: Amplifier) -> Iterator[Problem]:
@@ -258,7 +266,7 @@ RELATIONS: tuple[Relation, ...] = (
 class LinkMission(Table):
     """What a link budget needs; a mission whose tables on mirror and loop are left out."""
 
-    name: Name
+    name: Name = Field(description="what the report calls the mission")
     pointing: Pointing | None = None
     terminals: Terminals
     conventions: LinkConventions

@@ -19,7 +19,9 @@ LEAST_OVERLAP = 0.001
 class TrackingSensor(Table):
     """Quad cell of the satellite's own terminal, which measures the answer; its spot is that of the whole aperture."""
 
-    responsivity_a_w: Annotated[float, Quantity("A/W", above=0.0, most=1e3)]
+    responsivity_a_w: Annotated[float, Quantity("A/W", above=0.0, most=1e3)] = Field(
+        description="current for a watt of light"
+    )
     background_power_w: Annotated[float, Quantity("W", "pW", least=0.0, most=1e6)] = Field(
         description="on all four cells together"
     )
@@ -33,7 +35,9 @@ class TrackingSensor(Table):
 class Scan(Table):
     """A narrow beam led over the uncertainty in place of the wide beacon."""
 
-    pattern: Literal["spiral", "raster", "step-stare"]
+    pattern: Literal["spiral", "raster", "step-stare"] = Field(
+        description="how the beam searches: from the middle outwards, row by row, or from spot to spot"
+    )
     beam_radius_rad: Angle = Field(
         description="off axis, where the partner still sees it; the beam itself is no narrower than diffraction"
     )
@@ -76,6 +80,8 @@ class Acquisition(Table):
     )
     attempts: Annotated[int, Whole("", least=1, most=1000)] = Field(description="before the contact is given up")
     runs: Annotated[int, Whole("", least=100, most=10_000_000)] = Field(description="simulated acquisitions")
-    seed: Annotated[int, Whole("", least=0, most=2**63 - 1)]
+    seed: Annotated[int, Whole("", least=0, most=2**63 - 1)] = Field(
+        description="of the random numbers of the simulated acquisitions"
+    )
     sensor: TrackingSensor | None = None
     scan: Scan | None = None

@@ -35,7 +35,7 @@ class CoupledMirror(Table):
     """A mirror of several axes: its channels, its modes and matrices, its hysteresis, and how it was recorded."""
 
     version: Annotated[int, Whole("", least=2, most=2)] = Field(description="2: a mirror of several axes")
-    name: Name
+    name: Name = Field(description="what the report calls the mirror")
     actuators: dict[str, ActuatorTable] = Field(description="one table for each, [actuators.1] and so on")
     outputs: dict[str, OutputTable] = Field(description="one table for each, [outputs.1] and so on")
     recording: RecordingTable

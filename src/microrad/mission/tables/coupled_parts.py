@@ -71,7 +71,7 @@ PerVolt = Annotated[float, Quantity("1/V")]
 class ActuatorTable(Table):
     """One drive: where it rests, and the range and the rate that the model was identified for."""
 
-    name: Name
+    name: Name = Field(description="what the report calls the actuator")
     bias_v: Voltage = Field(description="drive about which the mirror works")
     drive_min_v: Voltage = Field(description="lowest drive that the model was identified for")
     drive_max_v: Voltage = Field(description="highest drive that the model was identified for")
@@ -89,7 +89,7 @@ class ActuatorTable(Table):
 class OutputTable(Table):
     """One sensor."""
 
-    name: Name
+    name: Name = Field(description="what the report calls the output")
     quantity: Literal["displacement", "angle"] = Field(description="m along z, or rad")
     position_m: Annotated[tuple[float, ...], Several(Quantity("m", "mm"))] | None = Field(
         default=None, description="where a displacement is measured: x and y in the plane of the mirror; or left out"
@@ -196,7 +196,9 @@ class HysteresisTable(Table):
     See `microrad.mirror.hysteresis` for both models.
     """
 
-    model: Literal["plays", "bouc-wen"]
+    model: Literal["plays", "bouc-wen"] = Field(
+        description="which hysteresis the element has, and so which of the other keys"
+    )
     thresholds_v: Annotated[tuple[float, ...], Several(Quantity("V", least=0.0), rising=True)] | None = Field(
         default=None, description="half widths of the plays"
     )

@@ -170,7 +170,9 @@ class QuadCellTable(Table):
     The light is that of the answer, with its wavelength, and with the power of its budget where none is given.
     """
 
-    responsivity_a_w: Annotated[float, Quantity("A/W", above=0.0, most=1e3)]
+    responsivity_a_w: Annotated[float, Quantity("A/W", above=0.0, most=1e3)] = Field(
+        description="current for a watt of light"
+    )
     background_power_w: PowerOrZero = Field(description="on all four together")
     dark_current_a: Annotated[float, Quantity("A", "nA", least=0.0, most=1.0)] = Field(description="of one of them")
     thermal_noise_a_sqrt_hz: Annotated[float, Quantity("A/sqrt(Hz)", "pA/sqrt(Hz)", least=0.0, most=1e-3)] = Field(
@@ -234,10 +236,12 @@ class FinePointing(Table):
     )
     modulus_margin: Annotated[float, Share("")] = Field(description="least distance of the loop from -1")
     quantile: Annotated[float, Share("")] = Field(description="share of the time that the radial error is judged at")
-    runs: Annotated[int, Whole("", least=1, most=100_000)]
+    runs: Annotated[int, Whole("", least=1, most=100_000)] = Field(
+        description="simulated side by side, each with its own noise"
+    )
     duration_s: Seconds = Field(description="of a run, settling included")
     settle_s: Annotated[float, Quantity("s", least=0.0, most=1e9)] = Field(description="left out at the begin of a run")
-    seed: Annotated[int, Whole("", least=0, most=2**63 - 1)]
+    seed: Annotated[int, Whole("", least=0, most=2**63 - 1)] = Field(description="of the random numbers of all runs")
     geometry: GeometryTable
     vibration: VibrationTable
     wheels: WheelsTable | None = None

@@ -37,8 +37,8 @@ LARGEST = "largest"
 class Terminals(Table):
     """The two optical terminals: the satellite's own in low orbit ("leo") and its partner ("geo")."""
 
-    leo_aperture_m: Aperture
-    geo_aperture_m: Aperture
+    leo_aperture_m: Aperture = Field(description="diameter of the telescope of the low satellite")
+    geo_aperture_m: Aperture = Field(description="diameter of the telescope of its partner")
     leo_obscuration: Obscuration | None = Field(
         default=None, description="diameter of the central obscuration over that of the aperture"
     )
@@ -102,15 +102,15 @@ class Beam(Table):
     """What a link has whatever its beam: power, wavelength, quality, distance and losses (all losses positive)."""
 
     transmit_power_w: Power = Field(description="optical power before the optics")
-    wavelength_m: Wavelength
+    wavelength_m: Wavelength = Field(description="of the light, in vacuum")
     strehl: Strehl | None = Field(default=None, description="decibel or ratio as conventions.strehl says")
     wavefront_error_m: Annotated[float, Quantity("m", "nm", least=0.0, most=1e-3)] | None = Field(
         default=None, description="rms, in place of strehl"
     )
     pointing_error_rad: AngleOrZero = Field(description="off the line of sight, radial")
-    distance_m: Distance
-    transmit_optics_loss_db: Loss
-    receive_optics_loss_db: Loss
+    distance_m: Distance = Field(description="between the terminals")
+    transmit_optics_loss_db: Loss = Field(description="from the laser to the transmitting telescope's exit")
+    receive_optics_loss_db: Loss = Field(description="from the receiving telescope's entrance to the detector")
 
     def problems(self) -> Iterator[Problem]:
         """Quality said once, and within the wavefront errors for which it means something."""
@@ -170,8 +170,10 @@ class Background(Table):
 class Receiver(Table):
     """A receiver by what it is made of, in place of a measured sensitivity."""
 
-    modulation: Literal["ook", "dpsk", "bpsk", "ppm"]
-    detector: Literal["photon-counting", "pin", "apd", "preamplified", "homodyne"]
+    modulation: Literal["ook", "dpsk", "bpsk", "ppm"] = Field(description="how bits are put on the light")
+    detector: Literal["photon-counting", "pin", "apd", "preamplified", "homodyne"] = Field(
+        description="how the light is turned into a signal"
+    )
     bit_error_ratio: Annotated[float, Share("", least=1e-18, below=0.5)] = Field(
         description="at which the link is judged"
     )
@@ -187,13 +189,19 @@ class Receiver(Table):
         default=None, description="ook: power of a mark over that of a space"
     )
     efficiency: Efficiency | None = Field(default=None, description="electrons per photon, all detectors but amplified")
-    dark_count_rate_1_s: Annotated[float, Quantity("1/s", least=0.0, most=1e12)] | None = Field(default=None)
+    dark_count_rate_1_s: Annotated[float, Quantity("1/s", least=0.0, most=1e12)] | None = Field(
+        default=None, description="counts a second without light"
+    )
     dark_current_a: Current | None = Field(default=None, description="before avalanche gain")
     thermal_noise_a_sqrt_hz: NoiseDensity | None = Field(
         default=None, description="one-sided, referred to the amplifier's input"
     )
-    avalanche_gain: Annotated[float, Quantity("", least=1.0, most=1e6)] | None = None
-    ionisation_ratio: Annotated[float, Quantity("", least=0.0, most=1.0)] | None = None
+    avalanche_gain: Annotated[float, Quantity("", least=1.0, most=1e6)] | None = Field(
+        default=None, description="electrons for each one that light sets free"
+    )
+    ionisation_ratio: Annotated[float, Quantity("", least=0.0, most=1.0)] | None = Field(
+        default=None, description="of holes to electrons: 0 multiplies with the least noise"
+    )
     noise_figure_db: Annotated[float, Quantity("dB", least=3.0)] | None = Field(
         default=None, description="of the optical amplifier; 3 dB is the quantum limit"
     )

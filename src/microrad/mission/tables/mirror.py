@@ -34,15 +34,19 @@ class LinearPart(Table):
     positive damping lies in the left half plane. A pole may not have a negative one.
     """
 
-    numerator: Coefficients | None = None
-    denominator: Coefficients | None = None
+    numerator: Coefficients | None = Field(
+        default=None, description="of the transfer function in s, highest power first"
+    )
+    denominator: Coefficients | None = Field(
+        default=None, description="of the transfer function in s, highest power first"
+    )
     poles_hz: Roots | None = Field(default=None, description="natural frequencies, rising")
     pole_dampings: Dampings | None = Field(default=None, description="1 for a real pole")
     zeros_hz: Roots | None = Field(default=None, description="natural frequencies, rising; or none")
     zero_dampings: Dampings | None = Field(default=None, description="1 for a real zero, -1 in the right half plane")
     normalise_at_hz: Frequency = Field(description="where its magnitude is divided out")
-    excited_from_hz: Frequency
-    excited_to_hz: Frequency
+    excited_from_hz: Frequency = Field(description="lowest frequency that it was identified at")
+    excited_to_hz: Frequency = Field(description="highest frequency that it was identified at")
 
     def problems(self) -> Iterator[Problem]:
         """A proper fraction, normalised inside its band."""
@@ -148,12 +152,20 @@ class BoucWenTable(Table):
     gamma, eta and exponent generalise Eq. 3, which is what stands when they are left out (see `hysteresis.BoucWen`).
     """
 
-    d1_rad_v: MirrorGain
-    d2_s_v: Annotated[float, Quantity("s/V")]
-    epsilon_rad_v: Annotated[float, Quantity("rad/V", "mrad/V")]
-    delta_s_v: Annotated[float, Quantity("s/V")]
-    alpha_1_v: Annotated[float, Quantity("1/V")]
-    beta_1_v: Annotated[float, Quantity("1/V")]
+    d1_rad_v: MirrorGain = Field(description="output for a volt without hysteresis (Eq. 3)")
+    d2_s_v: Annotated[float, Quantity("s/V")] = Field(
+        description="how that output changes with the rate: d1 exp(-d2 u')"
+    )
+    epsilon_rad_v: Annotated[float, Quantity("rad/V", "mrad/V")] = Field(
+        description="slope of the hysteresis behind a reversal"
+    )
+    delta_s_v: Annotated[float, Quantity("s/V")] = Field(
+        description="how that slope grows with the rate: epsilon exp(delta |u'|)"
+    )
+    alpha_1_v: Annotated[float, Quantity("1/V")] = Field(description="decay of the hysteresis with each volt of travel")
+    beta_1_v: Annotated[float, Quantity("1/V")] = Field(
+        description="share of the decay that turns with the direction of travel"
+    )
     gamma_1_v: Annotated[float, Quantity("1/V")] = Field(
         default=0.0, description="tells the signs of h apart; left out, they are alike"
     )
@@ -178,8 +190,12 @@ class BoucWenTable(Table):
 class PrandtlIshlinskiiTable(Table):
     """Play operators: half widths in V, rising from 0 V, and a weight in rad/V for each."""
 
-    thresholds_v: Annotated[tuple[float, ...], Several(Quantity("V", least=0.0), rising=True)]
-    weights_rad_v: Annotated[tuple[float, ...], Several(Quantity("rad/V", "urad/V", least=0.0))]
+    thresholds_v: Annotated[tuple[float, ...], Several(Quantity("V", least=0.0), rising=True)] = Field(
+        description="half width of each play operator"
+    )
+    weights_rad_v: Annotated[tuple[float, ...], Several(Quantity("rad/V", "urad/V", least=0.0))] = Field(
+        description="output of each play operator for a volt"
+    )
     widening_s: DurationOrZero = Field(
         default=0.0, description="growth of the thresholds above 0 with the drive's rate; or none"
     )
@@ -198,8 +214,12 @@ class PrandtlIshlinskiiTable(Table):
 class CreepTable(Table):
     """Creep beside the hysteresis: drive behind first-order lags, with a weight in rad/V for each time constant."""
 
-    time_constants_s: Annotated[tuple[float, ...], Several(Quantity("s", above=0.0), rising=True)]
-    weights_rad_v: Annotated[tuple[float, ...], Several(Quantity("rad/V", "urad/V"))]
+    time_constants_s: Annotated[tuple[float, ...], Several(Quantity("s", above=0.0), rising=True)] = Field(
+        description="of each first-order lag"
+    )
+    weights_rad_v: Annotated[tuple[float, ...], Several(Quantity("rad/V", "urad/V"))] = Field(
+        description="output that each lag creeps to for a volt"
+    )
 
     def problems(self) -> Iterator[Problem]:
         """A weight for each lag."""
@@ -395,7 +415,7 @@ def _uncertainty_problems(mirror: "Mirror", uncertainty: Uncertainty) -> Iterato
 class Mirror(Table):
     """The fast steering mirror: one hysteresis model, and the linear part that its composition asks for."""
 
-    name: Name
+    name: Name = Field(description="what the report calls the mirror")
     travel_rad: Angle = Field(description="from stop to stop")
     composition: Literal["cascade", "additive", "static"] = Field(
         description="cascade: hysteresis drives the linear part; additive: it is added behind; static: no linear part"

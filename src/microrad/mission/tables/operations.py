@@ -22,7 +22,7 @@ class StationTable(Table):
         description="geodetic, north positive"
     )
     longitude_rad: Longitude = Field(description="east positive")
-    height_m: Annotated[float, Quantity("m", "m", least=-500.0, most=9000.0)]
+    height_m: Annotated[float, Quantity("m", "m", least=-500.0, most=9000.0)] = Field(description="above the ellipsoid")
     mask_rad: Annotated[float, Quantity("rad", "deg", least=0.0, most=HIGHEST_MASK_RAD)] = Field(
         description="lowest elevation at which data flow"
     )
@@ -31,7 +31,7 @@ class StationTable(Table):
 class Downlink(Table):
     """The radio downlink that the relay is set against: one station at a time."""
 
-    data_rate_bit_s: DataRate
+    data_rate_bit_s: DataRate = Field(description="from the partner to the ground")
     setup_s: Seconds = Field(description="from the rise above the mask until data flow")
     delay_s: Seconds = Field(description="from the station to the user")
     stations: dict[str, StationTable] = Field(description="one table for each, [operations.downlink.stations.NAME]")
@@ -56,8 +56,10 @@ class ContactTable(Table):
     slew_angle_rad: Annotated[float, Quantity("rad", "deg", least=0.0, most=math.pi)] = Field(
         description="how far it turns"
     )
-    windows: Annotated[int, Whole("", least=1, most=1000)]
-    window_s: Annotated[float, Quantity("s", "s", above=0.0, most=1000.0)]
+    windows: Annotated[int, Whole("", least=1, most=1000)] = Field(
+        description="pieces of the contact that the fine-pointing loop is simulated in"
+    )
+    window_s: Annotated[float, Quantity("s", "s", above=0.0, most=1000.0)] = Field(description="length of such a piece")
     hold_s: Seconds = Field(description="how long the margin may stay below 0 dB before lock is taken for lost")
 
     def problems(self) -> Iterator[Problem]:
@@ -86,7 +88,9 @@ class Operations(Table):
     runs: Annotated[int, Whole("", least=1, most=10_000)] = Field(
         description="of the span, each with acquisitions drawn"
     )
-    seed: Annotated[int, Whole("", least=0, most=2**63 - 1)]
+    seed: Annotated[int, Whole("", least=0, most=2**63 - 1)] = Field(
+        description="of the random numbers of acquisitions and outages"
+    )
     downlink: Downlink | None = None
     contact: ContactTable | None = None
 
@@ -104,8 +108,12 @@ class Constellation(Table):
         description="delta, star: Walker's patterns around orbit.leo (circular or keplerian), nodes over 360 or "
         "180 deg; file: element sets"
     )
-    satellites: Annotated[int, Whole("", least=1, most=100_000)] | None = None
-    planes: Annotated[int, Whole("", least=1, most=100_000)] | None = None
+    satellites: Annotated[int, Whole("", least=1, most=100_000)] | None = Field(
+        default=None, description="how many of them"
+    )
+    planes: Annotated[int, Whole("", least=1, most=100_000)] | None = Field(
+        default=None, description="orbital planes that they are spread over"
+    )
     phasing: Annotated[int, Whole("", least=0, most=100_000)] | None = Field(
         default=None, description="Walker's F, of planes"
     )

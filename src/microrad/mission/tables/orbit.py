@@ -130,8 +130,12 @@ class OrbitTable(Table):
     altitude_m: Annotated[float, Quantity("m", "km", least=1e5, most=1e9)] | None = Field(
         default=None, description="above the equatorial radius of 6378.137 km"
     )
-    semi_major_axis_m: Annotated[float, Quantity("m", "km", least=6.4e6, most=1e9)] | None = Field(default=None)
-    eccentricity: Annotated[float, Quantity("", least=0.0, most=0.999)] | None = None
+    semi_major_axis_m: Annotated[float, Quantity("m", "km", least=6.4e6, most=1e9)] | None = Field(
+        default=None, description="half of the orbit's longest diameter"
+    )
+    eccentricity: Annotated[float, Quantity("", least=0.0, most=0.999)] | None = Field(
+        default=None, description="0 is a circle"
+    )
     inclination_rad: Annotated[float | str, _INCLINATION] | None = Field(
         default=None, description=f'"{SUN_SYNCHRONOUS}": the node follows the Sun'
     )
@@ -139,7 +143,9 @@ class OrbitTable(Table):
     local_time_s: Annotated[float, Quantity("s", "h", least=0.0, most=86400.0)] | None = Field(
         default=None, description="mean local time of the ascending node, in place of node"
     )
-    argument_of_perigee_rad: Anomaly | None = None
+    argument_of_perigee_rad: Anomaly | None = Field(
+        default=None, description="from the ascending node to the perigee, along the orbit"
+    )
     mean_anomaly_rad: Anomaly | None = Field(default=None, description="at the epoch")
     phase_rad: Anomaly | None = Field(default=None, description="angle from the ascending node at the epoch")
     gravity: Literal["two-body", "j2"] | None = Field(
@@ -172,7 +178,9 @@ class Orbits(Table):
     """Where both terminals fly, and the span of time that is looked at."""
 
     epoch: Annotated[str, UtcEpoch("")] = Field(description="beginning of the span, UTC")
-    duration_s: Annotated[float, Quantity("s", "h", least=60.0, most=LONGEST_S)]
+    duration_s: Annotated[float, Quantity("s", "h", least=60.0, most=LONGEST_S)] = Field(
+        description="how long the satellites are followed"
+    )
     earth: Literal["oblate", "sphere"] = Field(
         description="what hides the partner: the ellipsoid of WGS 84, or a sphere of its equatorial radius"
     )

@@ -1,0 +1,108 @@
+"""What `microrad explain` says of each key: from the tables, the shipped mission, and the modules that read it."""
+
+import re
+import tomllib
+from importlib.util import find_spec
+
+import pytest
+
+from microrad.mission import explain
+from microrad.mission.explain import FILES, explained
+from places import ROOT
+
+KEYS = explain._keys()
+SHIPPED = ROOT / "src" / "microrad" / "mission" / "missions" / "leo-geo.toml"
+
+
+def leaves(data, prefix=""):
+    for key, value in data.items():
+        name = f"{prefix}{key}"
+        if isinstance(value, dict):
+            yield name, None
+            yield from leaves(value, f"{name}.")
+        else:
+            yield name, value
+
+
+def test_every_key_says_what_it_means_and_holds_and_who_reads_it():
+    assert len(KEYS) > 400
+    assert {key.file for key in KEYS} == set(FILES)
+    for key in KEYS:
+        assert len(key.meaning) > 5 or key.meaning == "0 is a circle", key.name
+        assert key.holds, key.name
+        assert key.read_by or key.name.endswith(".NAME"), key.name
+        assert all(find_spec(module) for module in key.read_by), key.name
+
+
+def test_every_key_of_the_shipped_mission_is_found_with_its_value_and_source():
+    text = SHIPPED.read_text("utf-8")
+    for name, value in leaves(tomllib.loads(text)):
+        (key,) = [each for each in explained(name) if each.file == "mission file"]
+        if value is None or key.name.endswith(".NAME") or ".NAME." in key.name:
+            continue
+        shown, sign, comment = key.shipped.partition(" # ")
+        assert tomllib.loads(f"x = {shown}") == {"x": value}
+        assert f"{sign.strip()} {comment}".strip() in text
+
+
+@pytest.mark.parametrize(
+    ("asked", "found"),
+    [
+        ("modulus_margin", ["fine_pointing.modulus_margin"]),
+        ("fine_pointing.modulus_margin", ["fine_pointing.modulus_margin"]),
+        ("fine_pointing", ["fine_pointing"]),
+        ("pointing", ["pointing"]),
+        ("terminals.leo_aperture", ["terminals.leo_aperture"]),
+        ("pointing.lines.body_pointing.error", ["pointing.lines.NAME.error"]),
+        ("pointing.lines.body_pointing", ["pointing.lines.NAME"]),
+        ("bouc_wen.d1", ["bouc_wen.d1"]),
+        ("mirror.bouc_wen.d1", ["mirror.bouc_wen.d1"]),
+        ("actuators.tip.bias", ["actuators.NAME.bias"]),
+        ("bias", ["mirror.bias", "bias", "actuators.NAME.bias"]),
+    ],
+)
+def test_a_key_is_found_by_its_name_or_its_end(asked, found):
+    names = [key.name for key in explained(asked)]
+    assert names == found if asked != "bias" else set(names) <= set(found)
+
+
+def test_units_bounds_and_defaults_are_those_of_the_table():
+    (margin,) = explained("fine_pointing.modulus_margin")
+    assert (margin.holds, margin.default) == ("a number without quotes, above 0 and below 1; as 0.5", "")
+    (power,) = explained("beacon.transmit_power")
+    assert power.holds.startswith("a power with its unit, above 0 W")
+    (mask,) = explained("fine_pointing.mirror_file")
+    assert mask.default == "nothing"
+    (layout,) = explained("fine_pointing.geometry.layout")
+    assert layout.holds == '"two-axis" or "tripod"'
+    (table,) = explained("fine_pointing.geometry")
+    assert "magnification" in table.inside
+
+
+def test_who_reads_a_key_is_who_uses_it_beside_its_table():
+    (margin,) = explained("fine_pointing.modulus_margin")
+    assert "microrad.loop.coupled_study.designs" in margin.read_by
+    assert not any(module.startswith(("microrad.orbit", "microrad.lab")) for module in margin.read_by)
+
+
+def test_the_text_fits_its_columns():
+    text = explain.text(explained("actuators.1.bias") + explained("fine_pointing"), 80)
+    assert max(map(len, text.splitlines())) <= 80
+    assert text.startswith("actuators.NAME.bias (mirror file of several axes)\n  means     drive about which")
+    assert "\n\nfine_pointing (mission file)\n" in text
+
+
+@pytest.mark.parametrize(
+    ("asked", "hint"),
+    [
+        ("modulus_margn", "near it are modulus_margin"),
+        ("", "microrad schema prints all keys"),
+        ("x" * 1000, "microrad schema prints all keys"),
+        ("fine_pointing.", "near it are fine_pointing"),
+    ],
+)
+def test_a_name_that_no_key_has_is_refused_with_what_is_near(asked, hint):
+    with pytest.raises(ValueError, match=re.escape(hint)) as told:
+        explained(asked)
+    assert str(told.value).startswith("no key of a mission or mirror file is called")
+    assert len(str(told.value)) < 250
