@@ -118,7 +118,6 @@ def test_single_precision_stays_within_its_bound_while_it_learns(tmp_path):
     print(f"strays by {found:.2g} V, and its bound is {bound.command_v:.2g} V")
     assert 0.03 * bound.command_v < found < bound.command_v < 1e-4
     assert found < 5e-6 * np.max(np.abs(vectors.commands))
-    assert bound.per_sample_v > 0.0
     status, numbers, _ = bench(code, vectors, passes=0)
     assert (status, numbers["faults"]) == (0, 0)
     assert numbers["bound_v"] == pytest.approx(bound.command_v, rel=1e-5)
@@ -186,6 +185,7 @@ def whole():
 def test_in_fixed_point_it_stays_within_its_report(tmp_path):
     of, vectors, fixed = whole()
     r = fixed.report
+    print(f"whole numbers add {r.error_v:.2g} V, what learns in single precision up to {r.inverse_v:.2g} V")
     assert 1e-8 < r.error_v < 1e-5 < r.inverse_v < 1e-4
     assert r.bound_v <= 2.01 * of.resolution_v
     assert "The inverse, in single precision, adds up to" in quantisation_text(fixed)
