@@ -192,7 +192,8 @@ def compiled(folder: Path, loop: fine.PointingLoop, made: fine.LoopController, i
         records.FlightController(
             made.name, records.Origin("benchmark", "0" * 64, "plays"), period, signals, axes, made.system,
             made.anti_windup, choice.inverse_law(made.inverse, period, False), loop.drive.minimum_v,
-            loop.drive.maximum_v, loop.drive.drive_resolution_v, 6.0, (), choice.adaptive_law(made.adaptation, period),
+            loop.drive.maximum_v, loop.drive.drive_resolution_v, 6.0, (),
+            adaptation=choice.adaptive_law(made.adaptation, period),
         )
     )  # fmt: skip
     looked = np.any(made.system.B, axis=0) | np.any(made.system.D, axis=0)

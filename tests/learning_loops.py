@@ -10,10 +10,27 @@ from microrad.loop.pointing_loop import loop as fine
 from microrad.loop.sensor import OpticalSensor, StrainGauge
 from microrad.mirror import model as mirror
 from microrad.mirror.hysteresis import NO_CREEP, Creep, Play
+from microrad.mission.file import load_mission
+from shipped import SHIPPED
 
 PLAYS = Play((0.0, 0.05, 0.2, 0.5, 1.2), (50e-6, 10e-6, 10e-6, 10e-6, 9e-6))
 CREEP = Creep((1e-6, 1e-6), (0.1, 1.0))
 STILL = disturbance.Reference(0.0, 0.0, 1.0)
+
+
+def with_plays(folder):
+    """The shipped mission with these plays as its mirror, in a file of this folder."""
+    text = SHIPPED.read_text(encoding="utf-8")
+    given = text[text.index("[mirror.linear]") : text.index("[amplifier]")]
+    thresholds, weights = (
+        ", ".join(f'"{each:.6g} {unit}"' for each in values)
+        for values, unit in ((PLAYS.thresholds_v, "V"), (PLAYS.weights_rad_v, "rad/V"))
+    )
+    plays = f"[mirror.prandtl_ishlinskii]\nthresholds = [{thresholds}]\nweights = [{weights}]\n\n"
+    text = text.replace(given, plays).replace('composition = "cascade"', 'composition = "static"')
+    path = folder / "plays.toml"
+    path.write_text(text, encoding="utf-8")
+    return load_mission(path)
 
 
 def softened(model, gain=0.8, width=1.3):

@@ -1,5 +1,6 @@
 """Flight code of an inverse that learns: the kernel's commands, and limits that nothing takes it beyond."""
 
+import subprocess
 from dataclasses import replace
 from functools import cache
 
@@ -7,6 +8,7 @@ import numpy as np
 import pytest
 
 import designs
+from export.test_export_fixed import Compiled, held_extremes
 from export.test_export_flight import (  # noqa: F401
     EXACT,
     Code,
@@ -20,26 +22,37 @@ from export.test_export_flight import (  # noqa: F401
 from learning_loops import CREEP, PLAYS, in_series, loop_of, softened
 from microrad.core import kernels
 from microrad.export import choice
-from microrad.export.flight import c_code
-from microrad.export.flight.operations import operations
+from microrad.export.flight import c_code, double_run, learning_run
+from microrad.export.flight.fixed import fixed_code, quantisation_text, quantised
+from microrad.export.flight.fixed_form import readings
+from microrad.export.flight.operations import fixed_operations, operations
+from microrad.export.flight.rounding import UNIT, errors_before_converter, rounding_bound
 from microrad.export.linear_part.sections import sections
-from microrad.export.records import ExportError
 from microrad.loop.control import adaptive
 from microrad.loop.pointing_loop.loop import with_adaptation
+from microrad.mirror.hysteresis import NO_CREEP
 
 SAMPLES = 10_000
 
 
-@cache
-def learning(resolution_v=0.0, learns=True, samples=SAMPLES):
-    """The controller of two axes as it flies, and its run on a mirror that has softened and creeps."""
-    nominal = loop_of(axes=2)
-    nominal = replace(nominal, drive=replace(nominal.drive, drive_resolution_v=resolution_v))
+def chosen_to_learn(resolution_v=0.0, learns=True, creep=NO_CREEP, **changes):
+    """The choice that `learning` makes a controller of."""
+    nominal = loop_of(creep=creep, axes=2)
+    nominal = replace(nominal, drive=replace(nominal.drive, drive_resolution_v=resolution_v, **changes))
     made = in_series(nominal)
     made = with_adaptation(made, nominal) if learns else made
     softer = replace(nominal, mirror=loop_of(softened(PLAYS), CREEP, axes=2).mirror)
     scene = replace(designs.chosen("PI + inverse in series").scene, loop=softer)
-    chosen = replace(designs.chosen("PI + inverse in series"), scene=scene, controller=made)
+    return replace(designs.chosen("PI + inverse in series"), scene=scene, controller=made)
+
+
+@cache
+def learning(resolution_v=0.0, learns=True, samples=SAMPLES, **changes):
+    """The controller of two axes as it flies, and its run on a mirror that has softened and creeps.
+
+    ``changes`` are of the drive, and ``creep`` is what the inverse knows of it.
+    """
+    chosen = chosen_to_learn(resolution_v, learns, **changes)
     return choice.flight_controller(chosen), choice.vectors(chosen, samples)
 
 
@@ -77,24 +90,167 @@ def no_learning(settings):
     return still
 
 
-def test_garbage_does_not_take_it_beyond_its_limits_nor_what_it_learns(tmp_path):
-    of, vectors = learning(0.35e-3)
+# ------------------------------------------------------------------------------------------------ single precision
+
+
+@cache
+def bounded(**which):
+    """A controller with its run, and the bound of single precision there."""
+    of, vectors = learning(**which)
+    return of, vectors, rounding_bound(of, sections(of), vectors)
+
+
+def stray(folder, of, vectors, bound):
+    """The code in single precision, and the most that it is off the kernel, V."""
+    code = Code(folder, of, "single", bound=bound)
+    return code, difference(code, vectors)[0] * np.max(np.abs(vectors.commands))
+
+
+def test_the_run_in_double_is_the_kernels():
+    of, vectors = learning()
+    found = double_run.run_in_double(of, sections(of), vectors.inputs).free
+    assert 0.0 < np.max(np.abs(found - vectors.commands)) < EXACT * np.max(np.abs(vectors.commands))
+
+
+def test_single_precision_stays_within_its_bound_while_it_learns(tmp_path):
+    of, vectors, bound = bounded()
+    code, found = stray(tmp_path, of, vectors, bound)
+    print(f"strays by {found:.2g} V, and its bound is {bound.command_v:.2g} V")
+    assert 0.03 * bound.command_v < found < bound.command_v < 1e-4
+    assert found < 5e-6 * np.max(np.abs(vectors.commands))
+    status, numbers, _ = bench(code, vectors, passes=0)
+    assert (status, numbers["faults"]) == (0, 0)
+    assert numbers["bound_v"] == pytest.approx(bound.command_v, rel=1e-5)
+    assert "6 times the rms of 64 runs with random roundings" in bound.words
+    joined = " ".join(code.files["flown.h"].replace("\n *", " ").split())
+    assert f"within {bound.command_v:.3g} V of double precision over {SAMPLES} recorded samples" in joined
+    assert "It is 6 times the rms of what 64 runs with random roundings are off." in joined
+
+
+@pytest.mark.endurance
+def test_single_precision_stays_within_its_bound_over_1e5_samples(tmp_path):
+    of, vectors, bound = bounded(samples=100_000)
+    _, found = stray(tmp_path, of, vectors, bound)
+    print(f"strays by {found:.2g} V, and its bound is {bound.command_v:.2g} V")
+    assert 0.03 * bound.command_v < found < bound.command_v < 5e-3
+
+
+KINDS = {
+    "a converter": {"resolution_v": 0.305e-3},
+    "an inverse that takes off creep": {"creep": CREEP},
+    "clipped commands": {"minimum_v": -0.4, "maximum_v": 0.4},
+}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_bound_holds_with(kind, tmp_path):
+    of, vectors, bound = bounded(samples=3000, **KINDS[kind])
+    vectors = c_code.within_limits(of, vectors)
+    assert (vectors.saturated > 100) == (kind == "clipped commands")
+    _, found = stray(tmp_path, of, vectors, bound)
+    assert 0.0 < found <= bound.command_v <= (2.01 * of.resolution_v or 1e-4)
+
+
+def test_the_bound_is_that_of_every_sample(tmp_path):
+    """Ahead of the converter and the clip; it holds from the first sample on, not by its largest alone."""
+    of, vectors = learning(samples=4000)
+    bound = errors_before_converter(of, sections(of), vectors)
+    off = np.abs(Code(tmp_path, of, "single").replay(vectors.inputs) - vectors.commands)
+    assert np.all(off <= bound + 4.0 * UNIT * np.abs(vectors.commands))
+    assert np.max(off[2000:]) > 2.0 * np.max(off[:500])  # it adds up what it learns from
+
+
+def test_roundings_are_as_large_as_they_can_be_and_up_as_often_as_down():
+    rounded = learning_run.Roundings(UNIT, 64)
+    x = np.full((4000, 64), 3.0)
+    off = (rounded(x) - x) / (UNIT * 3.0)
+    assert np.allclose(np.abs(off), 1.0, rtol=1e-6)
+    assert abs(np.mean(off)) < 0.01
+    assert np.max(np.abs(np.corrcoef(off.T) - np.eye(64))) < 0.1  # each run for itself
+    total = rounded.total(x, -x, operations=4)
+    assert np.allclose(np.abs(total), 2.0 * UNIT * 6.0)
+    assert np.array_equal(learning_run.Roundings(0.0, 64)(x), x)
+
+
+# ------------------------------------------------------------------------------------------------ fixed point
+
+
+@cache
+def whole():
+    """A controller with a converter, its run, and it in fixed point."""
+    of, vectors = learning(0.305e-3)
+    return of, c_code.within_limits(of, vectors), quantised(of, sections(of), vectors)
+
+
+def test_in_fixed_point_it_stays_within_its_report(tmp_path):
+    of, vectors, fixed = whole()
+    r = fixed.report
+    print(f"whole numbers add {r.error_v:.2g} V, what learns in single precision up to {r.inverse_v:.2g} V")
+    assert 1e-8 < r.error_v < 1e-5 < r.inverse_v < 1e-4
+    assert r.bound_v <= 2.01 * of.resolution_v
+    assert "The inverse, in single precision, adds up to" in quantisation_text(fixed)
+    for file, text in fixed_code(of, sections(of), fixed, "flown").items():
+        (tmp_path / file).write_text(text)
+    (tmp_path / "vectors.csv").write_text(c_code.vectors_text(of, vectors))
+    for target in ("check", "sanitized"):
+        command = ["make", "-s", target, "CC=gcc", "PASSES=0", *(["CFLAGS=-std=c99 -O1"] if target != "check" else [])]
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+        told = {line.split()[0]: float(line.split()[1]) for line in done.stdout.splitlines() if len(line.split()) == 2}
+        assert (done.returncode, done.stderr) == (0, ""), done.stdout
+        assert 0.0 < told["largest_difference_v"] <= r.bound_v
+        assert (told["rejected"], told["faults"], told["overflowed"]) == (0, 0, 0)
+
+
+def test_in_fixed_point_it_stays_near_without_a_converter(tmp_path):
+    """A command is a word: what it is off is not hidden by a count."""
+    of, vectors = learning()
+    fixed = quantised(of, sections(of), replace(vectors, inputs=vectors.inputs[:4000]))
+    read = readings(fixed, vectors.inputs[:4000])
+    found, _ = Compiled(of, sections(of), fixed, tmp_path).run(read, np.zeros((4000, 2), int), "steps")
+    off = np.max(np.abs(found * 2.0 ** -fixed.output_scale[0] - vectors.commands[:4000]))
+    print(f"strays by {off:.2g} V, and its bound is {fixed.report.bound_v:.2g} V")
+    assert 0.03 * fixed.report.bound_v < off < fixed.report.bound_v < 1e-4
+
+
+def test_no_readings_take_it_beyond_its_limits_in_fixed_point(tmp_path):
+    of, vectors, fixed = whole()
+    recorded = readings(fixed, vectors.inputs)[:500]
+    rng, width = np.random.default_rng(6), recorded.shape[1]
+    every = np.vstack([recorded, held_extremes(rng, 1500, width), recorded])
+    found, (saturated, _) = Compiled(of, sections(of), fixed, tmp_path).run(every, np.zeros((2500, 2), int), "steps")
+    assert np.max(np.abs(found)) * of.resolution_v <= of.maximum_v
+    assert saturated > 100
+    assert len(np.unique(found[-300:, 0])) > 50  # it moves again
+
+
+# ------------------------------------------------------------------------------------------------ garbage and upsets
+
+
+@pytest.mark.parametrize("precision", ["double", "single"])
+def test_garbage_does_not_take_it_beyond_its_limits_nor_what_it_learns(precision, tmp_path):
+    of, vectors = learning(0.305e-3)
     vectors = replace(vectors, inputs=vectors.inputs[:2500], commands=vectors.commands[:2500])
-    code = Code(tmp_path, of)
+    code = Code(tmp_path, of, precision)
     bad = garbage_stays_within_limits(code, of, vectors)
     state = code.begin()
     code.replay(bad, state)
     assert len(np.unique(code.replay(vectors.inputs[:500], state)[:, 0])) > 50  # it moves again
 
 
-@pytest.mark.parametrize("number", [np.nan, np.inf, -np.inf, 1e300, -1e300, 1e11])
-def test_whatever_an_upset_leaves_in_what_it_learns_commands_stay_within_the_limits(number, tmp_path):
+NUMBERS = {
+    "double": (np.nan, np.inf, -np.inf, 1e300, -1e300, 1e11),
+    "single": (np.nan, np.inf, -np.inf, 3e38, -3e38, 1e11),
+}
+
+
+@pytest.mark.parametrize(("precision", "number"), [(each, x) for each, numbers in NUMBERS.items() for x in numbers])
+def test_whatever_an_upset_leaves_in_what_it_learns_commands_stay_within_the_limits(precision, number, tmp_path):
     of, vectors = learning()
-    code, rng = Code(tmp_path, of), np.random.default_rng(7)
+    code, rng = Code(tmp_path, of, precision), np.random.default_rng(7)
     for _ in range(60):
         state = code.begin()
         code.replay(vectors.inputs[:200], state)
-        numbers = np.frombuffer(state, dtype=float, count=len(state) // 8)
+        numbers = np.frombuffer(state, dtype=code.number, count=len(state) // np.dtype(code.number).itemsize)
         numbers[rng.integers(0, len(numbers))] = number
         found = code.replay(vectors.inputs[200:600], state)
         assert np.all(np.isfinite(found))
@@ -117,12 +273,14 @@ def with_cycle(settings, samples):
     return found
 
 
-@pytest.mark.parametrize("precision", ["single", "fixed"])
-def test_another_precision_than_double_is_refused(precision):
-    of, _ = learning()
-    with pytest.raises(ExportError, match=f"stated in {precision} precision: export it in double precision"):
-        c_code.refuse_learning(of, precision)
-    c_code.refuse_learning(learning(learns=False)[0], precision)
+def test_in_fixed_point_it_costs_what_learns_beside():
+    of, _, fixed = whole()
+    (frozen, vectors) = learning(0.305e-3, learns=False, samples=3000)
+    without = fixed_operations(frozen, quantised(frozen, sections(frozen), vectors))
+    found = fixed_operations(of, fixed)
+    assert found.conversions == without.conversions + 2  # the readings' errors
+    more = operations(of, sections(of), "single").divisions - operations(frozen, sections(frozen), "single").divisions
+    assert found.single.divisions == without.single.divisions + more == without.single.divisions + 2
 
 
 def test_the_header_says_what_learns():

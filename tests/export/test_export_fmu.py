@@ -23,6 +23,7 @@ from packaging.requirements import Requirement
 import designs
 import several_axes
 import slaves
+from export.test_export_adaptive import chosen_to_learn
 from loops import IDEAL_DRIVE
 from microrad.core import kernels, lti
 from microrad.export import choice
@@ -423,20 +424,30 @@ def outside(loop, p, state, by_sample):
     return reference, disturbance
 
 
+LEARNS = "an inverse that learns"
 POINTING = {
     "PI + inverse": {},
     "LQG of all axes": {},
+    LEARNS: {},
     "resonant damping": {"delay_steps": 7, "every": 2, "resolution_rad": 2e-8, "field_of_view_rad": 1.5e-4},
 }
 
 
 @pytest.mark.parametrize(
-    ("name", "version"), [("PI + inverse", "2.0"), ("resonant damping", "3.0"), ("LQG of all axes", "3.0")]
+    ("name", "version"),
+    [
+        ("PI + inverse", "2.0"),
+        ("resonant damping", "3.0"),
+        ("LQG of all axes", "3.0"),
+        (LEARNS, "3.0"),
+        pytest.param(LEARNS, "2.0", marks=pytest.mark.endurance),
+    ],
 )
 def test_the_loop_follows_the_kernel_in_the_jitter(tmp_path, name, version):
     """Fine pointing, plant step by plant step; also with a late, coarse optical sensor that loses the spot."""
-    chosen = quiet(coupled() if name == "LQG of all axes" else pointing(name), **POINTING[name])
-    loop, samples = chosen.scene.loop, 800
+    made = coupled() if name == "LQG of all axes" else chosen_to_learn() if name == LEARNS else pointing(name)
+    chosen = quiet(made, **POINTING[name])
+    loop, samples = chosen.scene.loop, 2000 if name == LEARNS else 800
     p = kernel_arrays.arrays(loop, chosen.controller, 11)
     state = kernel_arrays.start(loop, p, 0)
     by_sample = kernel_arrays.reference(loop, 0, samples)
@@ -477,6 +488,10 @@ def test_the_loop_follows_the_kernel_in_the_jitter(tmp_path, name, version):
     assert one.count("saturated") == counts[kernels.COUNT_SATURATED]
     assert one.count("rate_clamped") == counts[kernels.COUNT_CLAMPED]
     assert one.count("slew_limited") == counts[kernels.COUNT_SLEW]
+    if name == LEARNS:
+        assert one.count("fallbacks") == counts[kernels.COUNT_FALLBACK]
+        in_use = state.track.reshape(-1, kernels.TRACK_FIELDS, kernels.LANES)[:m, kernels.IN_USE, 0]
+        assert np.all(in_use == 1.0)  # it has learnt, and commands by it
     one.unit.terminate()
 
 

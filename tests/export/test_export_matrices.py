@@ -14,6 +14,7 @@ from scipy.io import loadmat, savemat
 
 import designs
 import several_axes
+from learning_loops import with_plays
 from microrad.core import lti
 from microrad.export import choice, matrices
 from microrad.export.linear_import.matlab import load
@@ -73,6 +74,12 @@ def pointing():
 @pytest.fixture(scope="module")
 def gauged():
     return designs.chosen("resonant damping")
+
+
+@pytest.fixture(scope="module")
+def learning(tmp_path_factory):
+    """The controller that learns, of the mission with a mirror of plays."""
+    return choice.choose(with_plays(tmp_path_factory.mktemp("plays")), "PI + adaptive inverse in series")
 
 
 MODELS = {}  # what takes seconds is made once
@@ -155,14 +162,14 @@ def test_sampled_plant_of_the_tracking_loop_is_that_of_the_study_with_no_state_t
     assert m.period_s == setup.timing.period_s == 2e-5
 
 
-@pytest.mark.parametrize("which", ["pointing", "gauged"])
+@pytest.mark.parametrize("which", ["pointing", "gauged", "learning"])
 def test_sampled_plant_of_the_pointing_loop_is_what_its_controller_was_designed_for(which, request):
     chosen = request.getfixturevalue(which)
     m = of(chosen, SAMPLED_PLANT)
     freq = grid(m.period_s)
     plant = design_plant(chosen.scene.axis)
     wanted = lti.frequency_response(plant.system, freq, plant.period_s)[:, :, 0]
-    if which == "pointing":
+    if which != "gauged":
         path = chosen.scene.table.reference_filter_hz
         w, T = 2.0 * np.pi * path, plant.period_s
         Ad, Bd = lti.zero_order_hold(np.array([[0.0, 1.0], [-w * w, -2.0 * w]]), np.array([[0.0], [w * w]]), T)
@@ -175,7 +182,7 @@ def test_sampled_plant_of_the_pointing_loop_is_what_its_controller_was_designed_
     assert difference(found[:, 2], wanted[:, control.GAUGE]) < known
     assert [p.name for p in m.outputs] == ["line_of_sight_rad", "optical_error_rad", "gauge_rad"]
     assert m.system.order < plant.system.order
-    assert ("reference filter" in m.meaning) == (which == "pointing")
+    assert ("reference filter" in m.meaning) == (which != "gauged")
 
 
 def test_controller_is_the_one_that_flies(pointing):
@@ -199,11 +206,23 @@ def test_one_controller_without_an_inverse_has_commands_alone(gauged):
     assert "inverse" not in m.meaning
 
 
+def test_one_that_learns_has_the_errors_of_its_readings_beside_its_targets(learning):
+    m, flies = of(learning, CONTROLLER), choice.flight_controller(learning)
+    assert all(np.array_equal(getattr(m.system, key), getattr(flies.system, key)) for key in "ABCD")
+    kinds = {"command_v": "V", "target_rad": "rad", "target_rate_rad_s": "rad/s", "unexpected_error_rad": "rad"}
+    assert [(p.name, p.unit) for p in m.outputs] == [(f"{n}_{i}", u) for n, u in kinds.items() for i in (0, 1)]
+    assert [p.name for p in m.inputs][2:4] == ["gauge_rad_0", "gauge_rad_1"]
+    assert "learns from the readings' errors" in m.meaning
+    slowly = response(m, np.array([1e-3]))[0]
+    np.testing.assert_allclose(slowly[6:, 2:4], np.eye(2), atol=1e-9)  # a reading that nothing made expect is an error
+    np.testing.assert_allclose(slowly[6:, :2], -slowly[2:4, :2], rtol=1e-5)  # and a target makes expect itself
+
+
 def test_target_by_difference_has_no_rate(tracking):
     assert [p.name for p in of(tracking, CONTROLLER).outputs] == ["command_v_0", "target_rad_0"]
 
 
-@pytest.mark.parametrize("which", ["tracking", "pointing", "gauged"])
+@pytest.mark.parametrize("which", ["tracking", "pointing", "gauged", "learning"])
 def test_python_control_has_the_response_of_the_loop(which, request):
     """The exported object against the loop that margins are taken of, and against our own evaluation."""
     chosen = request.getfixturevalue(which)
@@ -216,7 +235,7 @@ def test_python_control_has_the_response_of_the_loop(which, request):
         whole = simulate.sampled_loop(chosen.mirror, chosen.setup)
         wanted = lti.frequency_response(whole, freq, m.period_s)[:, 0, 0]
     else:
-        plant = axis_plant(chosen) if which == "pointing" else design_plant(chosen.scene.axis)
+        plant = design_plant(chosen.scene.axis) if which == "gauged" else axis_plant(chosen)
         wanted = loop_response(plant, chosen.tuned.controller, freq)
     assert difference(theirs, wanted) < NINE_DIGITS
     assert np.min(np.abs(1.0 + theirs)) < 1.0 < np.max(np.abs(theirs))

@@ -8,6 +8,7 @@ from functools import cache
 import pytest
 
 import designs
+from export.test_export_adaptive import learning
 from export.test_export_flight import GENEROUS, PAIRS, pair
 from microrad.export import choice
 from microrad.export.flight.c_code import flight_code
@@ -44,6 +45,13 @@ def inverses(models, precision):
     return flight_code(of, sections(of), "pair", precision, GENEROUS)
 
 
+def learns(precision):
+    of, vectors = learning(0.305e-3, samples=3000)
+    if precision == "fixed":
+        return fixed_code(of, sections(of), quantised(of, sections(of), vectors), "learns")
+    return flight_code(of, sections(of), "learns", precision, GENEROUS)
+
+
 CODE = {
     "rate by difference": lambda: floating(designs.chosen("PID + inverse"), "double", "pid"),
     "inverse in series": lambda: floating(designs.chosen("PI + inverse in series"), "single", "series"),
@@ -52,6 +60,8 @@ CODE = {
     "fixed point": lambda: whole("resonant damping"),
     "fixed point with an inverse": lambda: whole("PI + inverse in series"),
     "plays and creep": lambda: inverses("printed, widening plays that creep", "single"),
+    "an inverse that learns": lambda: learns("single"),
+    "fixed point with an inverse that learns": lambda: learns("fixed"),
     "an exponent": lambda: inverses("exponent 2 without a limit of rate, plays that creep", "double"),
 }
 """Code with each part that flight code may have."""

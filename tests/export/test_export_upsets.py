@@ -2,11 +2,13 @@
 
 import shutil
 import subprocess
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import designs
+from export.test_export_adaptive import learning
 from export.test_export_flight import PAIRS, pair
 from microrad.export.flight import c_code, fixed
 from microrad.export.flight.rounding import RoundingBound
@@ -90,7 +92,13 @@ def turned(folder, of, files, name, counter, values, limits):
     return map(int, done.stdout.split())
 
 
-FLOWN = [("PI + inverse", "double"), ("LQG", "single"), *zip(PAIRS, ("single", "double", "single"), strict=True)]
+LEARNS = "an inverse that learns"
+FLOWN = [
+    ("PI + inverse", "double"),
+    ("LQG", "single"),
+    (LEARNS, "single"),
+    *zip(PAIRS, ("single", "double", "single"), strict=True),
+]
 FLOWN += [
     pytest.param(name, "double" if precision == "single" else "single", marks=pytest.mark.endurance)
     for name, precision in FLOWN
@@ -100,6 +108,8 @@ FLOWN += [
 
 def flown(name):
     """A controller by its name, or with the inverse of a pair of models, and a recorded run."""
+    if name == LEARNS:
+        return learning(0.305e-3, samples=3000)
     return pair(PAIRS[name]) if name in PAIRS else designs.flown(name, 300)
 
 
@@ -118,10 +128,11 @@ def test_no_bit_of_the_state_takes_a_command_beyond_the_limits(tmp_path, name, p
 
 
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc")
-@pytest.mark.parametrize("name", ["PI + inverse", "LQG"])
+@pytest.mark.parametrize("name", ["PI + inverse", "LQG", LEARNS])
 def test_nor_in_fixed_point_and_nothing_overflows(tmp_path, name):
-    of, run = designs.flown(name, 300)
+    of, run = flown(name)
     form = sections(of)
+    run = replace(run, inputs=run.inputs[:300])
     made = fixed.quantised(of, form, run, 32)
     files = fixed.fixed_code(of, form, made, "flown")
     whole = np.rint(run.inputs / made.input_scale).astype(np.int64).clip(-(2**31) + 1, 2**31 - 1).astype(np.int32)

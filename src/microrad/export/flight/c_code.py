@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from microrad.core import kernels
+from microrad.export.flight.learning_rounding import RUNS, SIGMAS
 from microrad.export.flight.rounding import RoundingBound
 from microrad.export.identifiers import identifier
 from microrad.export.linear_part.sections import Sections, compensated_states
@@ -41,7 +42,6 @@ def flight_code(
         ExportError: A name that is no identifier; limits between which no command lies; numbers beyond the precision;
             single precision without a bound.
     """
-    refuse_learning(of, precision)
     values = _values(of, form, identifier(name), precision)
     if precision == "single":
         if bound is None:
@@ -235,7 +235,8 @@ def _adaptive_values(of: AdaptiveLaw | None) -> dict[str, Any]:
     """What learns takes the place of the frozen inverse's direct gain and plays."""
     if of is None:
         return {"adaptive": None}
-    law = {name: of.settings[:, getattr(kernels, name.upper())] for name in _SETTINGS}
+    law = {name: of.settings[:, getattr(kernels, name.upper())] for name in _SETTINGS if name != "forgotten"}
+    law["forgotten"] = 1.0 - of.settings[:, kernels.KEEP]
     cycle, delay = (int(of.settings[0, column]) for column in (kernels.CYCLE, kernels.DELAY))
     values = {"TAKE_UP": kernels.TAKE_UP, "KEEP_UP": kernels.KEEP_UP, "SUSPECT": kernels.SUSPECT}
     return {
@@ -245,6 +246,8 @@ def _adaptive_values(of: AdaptiveLaw | None) -> dict[str, Any]:
         "reading_delay": delay,
         "settings": _SETTINGS,
         "shares": values,
+        "bound_sigmas": SIGMAS,
+        "bound_runs": RUNS,
         "learners": of.weight.size,
         "slopes": np.concatenate([np.cumsum(w) for w in np.split(of.weight, of.start[1:-1])]),
         "plays": 0,
@@ -255,7 +258,7 @@ def _adaptive_values(of: AdaptiveLaw | None) -> dict[str, Any]:
 _SETTINGS = {
     "gain": "share of the error that an update takes away",
     "share": "what the slow error follows in a period",
-    "keep": "what a mean keeps over a cycle",
+    "forgotten": "share of a mean that the next cycle replaces",
     "dead_zone": "rad, of the reading's noise",
     "speed": "rad/V, the most that a weight changes in a cycle",
     "least_size": "V^2, added to the plays' mean square",
@@ -264,20 +267,3 @@ _SETTINGS = {
     "most_weight": "rad/V",
     "offset_limit": "rad, of the slow error",
 }
-
-
-def refuse_learning(of: FlightController, precision: str) -> None:
-    """Refuse an inverse that learns in another precision than double.
-
-    Args:
-        of: The controller.
-        precision: The precision that is asked for.
-
-    Raises:
-        ExportError: It learns, and the precision is another one.
-    """
-    if of.adaptation is not None and precision != "double":
-        raise ExportError(
-            f"controller {of.name!r} learns, and what it learns from rounded readings has no bound that could be "
-            f"stated in {precision} precision: export it in double precision, or the frozen inverse"
-        )

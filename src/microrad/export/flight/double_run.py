@@ -7,6 +7,7 @@ import numpy as np
 
 from microrad.core import kernels
 from microrad.core.arrays import Floats
+from microrad.export.flight.learning_run import Learner, Roundings, laws
 from microrad.export.linear_part.sections import Sections
 from microrad.export.records import FlightController, InverseLaw
 
@@ -65,6 +66,8 @@ class Inverse:
         self.play = np.zeros(self.law.play_threshold.size)
         self.lag = np.zeros(self.law.lag_keep.size)
         n, elements = of.actuators, len(self.law.bouc_wen)
+        learns, exactly = () if of.adaptation is None else laws(of.adaptation), Roundings(0.0, 1)
+        self.learners = [Learner(each, a, exactly) for a, each in enumerate(learns)]
         self.record = InverseRun(*(np.zeros((samples, w)) for w in (n, n, elements, elements, self.lag.size, n)))
 
     def step(self, outputs: Floats) -> Floats:
@@ -73,11 +76,14 @@ class Inverse:
         target = outputs[n : 2 * n].copy()
         np.subtract.at(target, law.lag_actuator.astype(int), law.lag_weight * self.lag)
         rate = (target - self.before) / self.period_s if law.by_difference else outputs[2 * n : 3 * n]
+        added = np.zeros(n) if self.learners else law.direct * target
+        for a, learner in enumerate(self.learners):
+            target[a : a + 1], added[a : a + 1] = learner.step(target[a : a + 1], outputs[3 * n + a : 3 * n + a + 1])
         r.target[k], r.rate[k], r.lag[k] = target, rate, self.lag
-        added = law.direct * target
         for e, a in enumerate(law.bouc_wen_actuator.tolist()):
             added[a] += self._bouc_wen(e, float(target[a]), float(target[a] - self.before[a]), float(rate[a]))
-        self._plays(target, rate, added)
+        if not self.learners:
+            self._plays(target, rate, added)
         self.lag = law.lag_keep * self.lag + (1.0 - law.lag_keep) * added[law.lag_actuator.astype(int)]
         self.before, self.k = target, k + 1
         r.added[k] = added

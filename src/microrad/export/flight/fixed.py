@@ -296,6 +296,7 @@ def _output_constants(of: FlightController, fixed: FixedForm) -> list[dict[str, 
         "v": ("V", "v: the command" + (f" without what the {beside(of)} adds" if beside(of) else "")),
         "target": ("TARGET_RAD", "target of the inverse"),
         "target's rate": ("RATE_RAD_S", "rate of the inverse's target"),
+        "error of the reading": ("UNEXPECTED_RAD", "reading less what the targets make expect"),
         "drive of hysteresis": ("MOTION", "what drives each element of hysteresis"),
     }
     found, first = [], 0
@@ -312,6 +313,7 @@ def _code_beside(of: FlightController, fixed: FixedForm, name: str) -> dict[str,
     words = {
         "target": ("wanted_rad", "target, by actuator"),
         "target's rate": ("wanted_rate_rad_s", "rate of the target, by actuator"),
+        "error of the reading": ("unexpected_error_rad", "reading less what the targets make expect, by actuator"),
         "drive of hysteresis": ("motion", "what drives each element of hysteresis"),
     }
     signals: tuple[Signal, ...] = ()

@@ -175,7 +175,8 @@ def output_groups(of: FlightController) -> tuple[tuple[str, str, int], ...]:
     n, outputs = of.actuators, of.system.C.shape[0]
     if of.forward is not None:
         return ("v", "V", n), ("drive of hysteresis", "V", outputs - n)
-    return (("v", "V", n), ("target", "rad", n), ("target's rate", "rad/s", n))[: outputs // n]
+    kinds = (("v", "V"), ("target", "rad"), ("target's rate", "rad/s"), ("error of the reading", "rad"))
+    return tuple((kind, unit, n) for kind, unit in kinds[: outputs // n])
 
 
 def _output_ranges(of: FlightController, form: Sections, ideal: Run, inputs: Floats) -> Floats:

@@ -256,10 +256,10 @@ def _learning(of: AdaptiveLaw, actuators: int) -> Operations:
 def _phase(behind: int, delay: int, plays: int) -> Operations:
     """What an actuator with so many plays does ``behind`` samples after the one in which it judges."""
     if behind == -delay:
-        return Operations(additions=2) + Operations(multiplications=6, additions=11, comparisons=1) * plays
+        return Operations(additions=2) + Operations(multiplications=6, additions=10, comparisons=1) * plays
     if behind == 0:
         sums = Operations(multiplications=4, additions=12) * plays
-        means = _CLAMP * 2 + Operations(multiplications=18, additions=21, divisions=1, comparisons=7)
+        means = _CLAMP * 2 + Operations(multiplications=14, additions=21, divisions=1, comparisons=7)
         return _SOUND + sums + means
     if 0 < behind <= plays:
         return _CLAMP * 3 + Operations(multiplications=2, additions=6, divisions=1, comparisons=1)
@@ -313,7 +313,10 @@ def _single(of: FlightController, numbers: int) -> dict[str, Any]:
     back = (_CLAMP + Operations(multiplications=1, additions=1, roundings=1)) * actuators
     step = (_SOUND + Operations(multiplications=1, additions=1)) * numbers
     if of.inverse is not None:
-        step += _inverse(of.inverse, actuators, "single") + _SOUND * _kept(of.inverse, actuators, "single")
+        frozen = _frozen_part(of)
+        step += _inverse(frozen, actuators, "single") + _SOUND * _kept(frozen, actuators, "single")
+    if of.adaptation is not None:
+        step += _learning(of.adaptation, actuators)
     if of.forward is not None:
         step += _forward(of.forward) + _SOUND * _kept_forward(of.forward)
     step += _SOUND * (numbers + actuators)

@@ -5,7 +5,7 @@ Algorithms, 2nd ed., SIAM 2002, ch. 3): each operation is wrong by at most ``UNI
 sums are taken, and so is each coefficient and each reading that is rounded to single precision. What that does to the
 outputs of the linear part is summed with the sizes of its impulse responses, C A^j, so that a slowly decaying
 oscillation counts as what it is; integrators and other slow blocks are compensated sums (Kahan). Through the inverse it
-goes by the operators' sensitivities.
+goes by the operators' sensitivities. An inverse that learns has a bound of its own kind, see `learning_rounding`.
 """
 
 import math
@@ -16,11 +16,10 @@ import numpy as np
 from microrad.core import kernels
 from microrad.core.arrays import Floats
 from microrad.export.flight.double_run import ForwardRun, InverseRun, Run, run_in_double, widened
+from microrad.export.flight.learning_rounding import RUNS, SIGMAS, learning_errors
+from microrad.export.flight.learning_run import UNIT
 from microrad.export.linear_part.sections import Sections, compensated_states
 from microrad.export.records import FlightController, InverseLaw, Vectors
-
-UNIT = 2.0**-24
-"""Largest relative error of rounding to single precision."""
 
 _HIGHER_ORDERS = 1.01  # what a first-order analysis leaves out, generously
 _POWER_TOLERANCE = 4e-6  # of h's size: the numerical integration for exponents other than 1, in single precision
@@ -84,9 +83,10 @@ def _words(of: FlightController, command: float, largest: float, growth: float, 
     if largest >= of.maximum_v - of.minimum_v:
         return f"Over these {samples} samples it is not bounded: errors may grow while commands are clipped."
     where = "" if of.resolution_v == 0.0 else f" ({largest:.3g} V ahead of a converter of {of.resolution_v:.3g} V)"
+    kind = "" if of.adaptation is None else f", {SIGMAS:g} times the rms of {RUNS} runs with random roundings"
     return (
-        f"It stays within {command:.3g} V of double over these {samples} samples{where}; over the second half of them "
-        f"that grows by {growth:.2g} V a sample."
+        f"It stays within {command:.3g} V of double over these {samples} samples{where}{kind}; over the second half of "
+        f"them that grows by {growth:.2g} V a sample."
     )
 
 
@@ -102,6 +102,8 @@ def errors_before_converter(of: FlightController, form: Sections, v: Vectors) ->
         v: The recorded run that the bound holds for.
     """
     r = run_in_double(of, form, v.inputs)
+    if of.adaptation is not None:
+        return learning_errors(of, form, r, v.inputs)
     return _settled(of, form, r, *_local(form, v.inputs, r))
 
 
@@ -113,6 +115,8 @@ def errors_of_inverse(of: FlightController, form: Sections, r: Run) -> Floats:
         form: Its linear part.
         r: The run in double precision.
     """
+    if of.adaptation is not None:
+        return learning_errors(of, form, r, None)
     return _settled(of, form, r, np.zeros_like(r.states), 2.0 * UNIT * np.abs(r.outputs))
 
 

@@ -13,7 +13,7 @@ from microrad.core.progress import Progress
 from microrad.core.units import format_quantity
 from microrad.export.choice import Choice, Source, flight_controller, promised, rms_text, vectors
 from microrad.export.flight.build import BenchResult, compile_and_run, compiler
-from microrad.export.flight.c_code import flight_code, refuse_learning, vectors_text, within_limits
+from microrad.export.flight.c_code import flight_code, vectors_text, within_limits
 from microrad.export.flight.fixed import fixed_code, quantisation_text, quantised
 from microrad.export.flight.fixed_form import FixedForm
 from microrad.export.flight.operations import FixedOperations, Operations, fixed_operations, operations
@@ -127,7 +127,6 @@ def _code(
     of: FlightController, form: Sections, run: Vectors, name: str, precision: Precision
 ) -> tuple[dict[str, str], Operations | FixedOperations, RoundingBound | None, FixedForm | None]:
     """Files of one precision, what a step costs, and what the precision costs."""
-    refuse_learning(of, precision)
     if precision == "fixed":
         fixed = quantised(of, form, run)
         return fixed_code(of, form, fixed, name), fixed_operations(of, fixed), None, fixed

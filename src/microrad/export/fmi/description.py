@@ -53,7 +53,8 @@ CONTROLLER_COUNTERS = [
     ("controller_faults", "loop.controller.faults", "results that the controller did not give out"),
     ("lost", "loop.lost", "optical readings with the spot beyond the field of view"),
 ]
-"""Counters of a plant, and those that a loop has beside them: name, place in C, meaning."""
+LEARNING_COUNTERS = [("fallbacks", "loop.controller.fallbacks", "returns of an inverse that learns to the frozen one")]
+"""Counters of a plant, those that a loop has beside them, and those of one that learns: name, place in C, meaning."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,7 +148,8 @@ def _variables(unit: PlantUnit | LoopUnit) -> tuple[Variable, ...]:
     found, counters = [Variable("time", "time_s", "independent", "simulation time", "s")], PLANT_COUNTERS
     if isinstance(unit, LoopUnit):
         found += _loop_signals(unit)
-        counters = PLANT_COUNTERS + CONTROLLER_COUNTERS
+        learns = unit.controller.adaptation is not None
+        counters = PLANT_COUNTERS + CONTROLLER_COUNTERS + (LEARNING_COUNTERS if learns else [])
     else:
         text = "command by actuator, from the bias, held over the communication step"
         found.append(_input("command_v", len(unit.plant.actuators), text, "V"))

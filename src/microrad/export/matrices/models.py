@@ -20,7 +20,7 @@ from microrad.export.records import ExportError, FlightController
 from microrad.loop import control, sine_run
 from microrad.loop.control import GAUGE, OPTICAL, RESIDUAL
 from microrad.loop.control.analysis import moved, reachable
-from microrad.loop.controller_study.designs import IN_SERIES
+from microrad.loop.controller_study.designs import ADAPTIVE, IN_SERIES
 from microrad.loop.pointing_loop.design import behind_filter, design_plant, driven_plant
 from microrad.loop.pointing_loop.loop import ReferenceFilter
 from microrad.loop.sensor import StrainGauge
@@ -173,7 +173,7 @@ def axis_plant(of: PointingChoice) -> control.DesignPlant:
     """
     axis = of.scene.axis
     plant = design_plant(replace(axis, gauge=axis.gauge or StrainGauge(0.0, 0.0)))
-    if of.controller.name == IN_SERIES:
+    if of.controller.name in (IN_SERIES, ADAPTIVE):
         plant = behind_filter(plant, ReferenceFilter(of.scene.table.reference_filter_hz).discrete(plant.period_s))
     plant = moved(plant)
     newest = int(np.argmax(np.abs(plant.system.C[RESIDUAL])))  # the state that holds the residual: minus the angle
@@ -188,7 +188,7 @@ def _pointing_models(of: PointingChoice) -> tuple[LinearModel, LinearModel]:
     if plant.has_gauge:
         rows, outputs = [*rows, GAUGE], {**outputs, "gauge_rad": "rad"}
     slow = "" if every == 1 else f"; a sensor that delivers every {every} samples counts as one of more delay"
-    behind = "reference filter, " if of.controller.name == IN_SERIES else ""
+    behind = "reference filter, " if of.controller.name in (IN_SERIES, ADAPTIVE) else ""
     meaning = (
         f"one axis: computation delay, {behind}amplifier and mirror, its hysteresis at its slow gain, at the "
         f"control samples; the optical error as its sensor delivers it{slow}"
@@ -213,6 +213,9 @@ def _controller(source: Source, of: FlightController) -> LinearModel:
         behind = "; the inverse of the hysteresis, which is not linear, takes its targets behind it"
         if not of.inverse.by_difference:
             kinds["target_rate_rad_s"] = "rad/s"
+    if of.adaptation is not None:
+        kinds["unexpected_error_rad"] = "rad"
+        behind += ", and learns from the readings' errors beside them: what they are off the expected ones"
     meaning = f"{of.name}, as it flies{behind}; its commands are clipped to {of.minimum_v:g} .. {of.maximum_v:g} V"
     inputs = {f"{each.name}_{i}": each.unit for each in of.inputs for i in range(each.size)}
     outputs = {f"{name}_{i}": unit for name, unit in kinds.items() for i in range(of.actuators)}

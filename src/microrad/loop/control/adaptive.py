@@ -19,16 +19,22 @@ from microrad.core.arrays import Floats
 from microrad.loop.control.sampled import play_inverse
 from microrad.mirror.hysteresis import BoucWen, Play, slow_gain
 
-CYCLE_S = 4e-3
+CYCLE_S = 3.2e-3
 """Time of a cycle, at least: what is learnt are means over it, so that faster motions, the loop's own, count little."""
 
-GAIN = 0.4
+GAIN = 0.6
 """Share of the prediction's error that an update takes away, where it is not noise."""
 
-SLOW_HZ = 1.0
+SLOW_HZ = 4.0
 """Below it the reading's error counts as creep and drift, which an offset follows; weights learn of what is faster."""
 
-SPEED_1_S = 2.0
+MEMORY_HZ = 2.0
+"""Corner of the means over the cycles: of the plays, which are learnt about theirs, and of the misfits.
+
+They are longer than the offset's, so that what was learnt stays in use where there is little to judge it by.
+"""
+
+SPEED_1_S = 8.0
 """A weight changes by at most this share of the mirror's slow gain in a second."""
 
 DEAD_ZONE_SIGMAS = 1.0
@@ -128,12 +134,12 @@ def cycle_samples(of: Adaptation, period_s: float) -> int:
 
 
 def _settings(of: Adaptation, model: Play, period_s: float) -> Floats:
-    cycle, slow = cycle_samples(of, period_s), 2.0 * math.pi * SLOW_HZ * period_s
+    cycle, slow, memory = cycle_samples(of, period_s), *(2.0 * math.pi * f * period_s for f in (SLOW_HZ, MEMORY_HZ))
     gain, dead = slow_gain(model), DEAD_ZONE_SIGMAS * of.noise_rad
     found = np.zeros(kernels.ADAPTIVE_COLUMNS)
     found[kernels.CYCLE], found[kernels.DELAY] = cycle, of.delay_samples
     found[kernels.GAIN], found[kernels.DEAD_ZONE] = GAIN, dead
-    found[kernels.SHARE], found[kernels.KEEP] = -math.expm1(-slow), math.exp(-slow * cycle)
+    found[kernels.SHARE], found[kernels.KEEP] = -math.expm1(-slow), math.exp(-memory * cycle)
     found[kernels.SPEED] = SPEED_1_S * gain * cycle * period_s
     found[kernels.LEAST_SIZE] = len(model.weights_rad_v) * (dead / gain) ** 2 + 1e-300
     found[kernels.LEAST_TRAVEL] = 0.1 * dead / gain
