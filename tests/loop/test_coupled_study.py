@@ -15,6 +15,7 @@ from scipy.linalg import block_diag
 from design_plants import axis_plant
 from microrad.core import lti
 from microrad.loop import control, coupled_study
+from microrad.loop.control import h_infinity
 from microrad.loop.controller_study import Outlook, promises
 from microrad.loop.coupled_study import designs, whole
 from microrad.loop.coupled_study.scene import line_of_sight
@@ -303,6 +304,23 @@ def test_loops_of_modes_that_turn_both_axes_go_along_their_directions():
     assert math.degrees(second) == pytest.approx(-78.7, abs=0.06)
     alone_of_page = coupled_study.design(scene_of(replace(two_axes(), known=None)), only=("PI",)).made[0]
     assert not any(name.startswith("direction") for name in alone_of_page.values)
+
+
+def test_h_infinity_damps_each_mode_that_the_commands_reach():
+    """The plate's two tilting modes have dampings of 0.013 and 0.010; its piston is not moved, and keeps its own."""
+    scene, d = chosen(CASES[3])
+    plant = whole_plant(scene.rest, decoupling(scene.rest))
+    made = h_infinity.h_infinity(plant, h_infinity.Shape(*d.values.values()))
+
+    def dampings(A):
+        z = np.linalg.eigvals(A).astype(complex)
+        s = np.log(z[np.abs(z) > 0.05]) / plant.period_s
+        tilting = s[(s.imag > 2 * np.pi * 250.0) & (s.imag < 2 * np.pi * 500.0)]
+        return np.sort(-tilting.real / np.abs(tilting))
+
+    before = dampings(plant.system.A)
+    assert_allclose(before, [0.010, 0.013], atol=5e-4)
+    assert dampings(whole.closed_map(plant, made.system)).min() > 10.0 * before.max()
 
 
 def test_what_hysteresis_breaks_is_tuned_for_a_larger_margin(monkeypatch):
