@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 from microrad.cli.frame import MET, UNMET, Outcome, json_text, progress_bar, refusal_of, width
 
 if TYPE_CHECKING:
+    from microrad.loop.controller_study import AnyScene
     from microrad.loop.coupled_study import CoupledDesign, CoupledDesigns, CoupledOutlook, CoupledScene
     from microrad.mission.file import MissionFile
     from microrad.mission.tables.coupled_mirror import CoupledMirror
@@ -63,16 +64,18 @@ def broken_promises(named: Sequence[str], accept: bool) -> str:
     )
 
 
-def tuned_text(values: Mapping[str, float], margin: float | None) -> str:
+def tuned_text(scene: "AnyScene", values: Mapping[str, float], margin: float | None) -> str:
     """What a controller was tuned to, in words.
 
     Args:
-        values: Its parameters by name.
+        scene: The loop that it was tuned for.
+        values: Its parameters by name, in SI units.
         margin: Modulus margin that hysteresis made it be tuned for; None for the mission's.
     """
-    from microrad.report.fine_pointing.words import larger_margin
+    from microrad.report.fine_pointing.data import parameter_units
+    from microrad.report.fine_pointing.words import larger_margin, tuned_to
 
-    return ", ".join(f"{name} {value:.3g}" for name, value in values.items()) + larger_margin(margin)
+    return tuned_to(values, parameter_units(scene)) + larger_margin(margin)
 
 
 def _text(
@@ -102,7 +105,7 @@ def _text(
         bandwidth = format_quantity(margins.bandwidth_hz, "Hz", 3)
         figures = f"{margins.modulus:.3f}", f"{margins.disk.disk:.3f}", bandwidth
         rows.append((d.name, linear, f"{simulated} {mark}".strip(), *figures))
-        tuned.append((d.name, tuned_text(d.tuned, d.margin)))
+        tuned.append((d.name, tuned_text(scene, d.tuned, d.margin)))
     headings = ("controller", "linear x / y", "simulated x / y", "modulus", "disk", "bandwidth")
     best, (low, high) = (
         min(zip(left, found.made, strict=True), key=lambda each: each[0].simulated_rad)[1],

@@ -97,7 +97,7 @@ def _text(
         gain = "none" if margins["gain_up_db"] is None else f"{margins['gain_up_db']:.1f} dB"
         bandwidth = format_quantity(margins["bandwidth_hz"], "Hz", 3)
         rows.append((d.name, *rms, f"{margins['modulus']:.3f}", f"{margins['phase_deg']:.0f}°", gain, bandwidth))
-        tuned.append((d.name, tuned_text(d.tuned.values, d.margin)))
+        tuned.append((d.name, tuned_text(scene, d.tuned.values, d.margin)))
     headings = ("controller", "linear", "simulated", "modulus", "phase", "gain", "bandwidth")
     tables = [Table("", headings, rows, (0,)), Table("", ("controller", "tuned to"), tuned, (1,))]
     said = tables_text([], [about], width()), tables_text(tables, [f"Warning: {each}." for each in warnings], width())

@@ -6,7 +6,17 @@ from typing import Any
 
 import numpy as np
 
-from microrad.loop.controller_study import AnyDesign, ErrorBudget, FinePointingStudy, Residual, Sine, Verified, families
+from microrad.loop.control import H_INFINITY_OF_AXES
+from microrad.loop.controller_study import (
+    AnyDesign,
+    AnyScene,
+    ErrorBudget,
+    FinePointingStudy,
+    Residual,
+    Sine,
+    Verified,
+    families,
+)
 from microrad.mirror.geometry import StrokeBudget
 from microrad.report.data import fields, finite
 from microrad.report.fine_pointing.words import room
@@ -19,7 +29,7 @@ def fine_pointing_data(fine: FinePointingStudy, required: float) -> dict[str, An
         fine: the study.
         required: largest radial error (rad) that is allowed for the mission's share of the time.
     """
-    r, units = room(fine), parameter_units(fine)
+    r, units = room(fine), parameter_units(fine.scene)
     stroke = {"point_ahead_on_mirror": fine.scene.stroke, "without_point_ahead": fine.scene.stroke_without_point_ahead}
     found: dict[str, Any] = {
         "quantile": fine.quantile,
@@ -45,13 +55,17 @@ def fine_pointing_data(fine: FinePointingStudy, required: float) -> dict[str, An
     return plain
 
 
-def parameter_units(fine: FinePointingStudy) -> dict[str, str]:
-    """Units of the parameters that controllers are tuned by, by name, alone or with an axis; "" is a plain number."""
-    plant = fine.scene.one_axis
+def parameter_units(scene: AnyScene) -> dict[str, str]:
+    """Units of the parameters that controllers are tuned by, by name, alone or with that of a loop; "" is plain.
+
+    Args:
+        scene: the loop that they are tuned for.
+    """
+    plant, loops = scene.one_axis, ("", " x", " y", " 1", " 2")
     units: dict[str, str] = {}
-    for family in families(fine.scene.table):
+    for family in (*families(scene.table), H_INFINITY_OF_AXES):
         try:
-            units |= {f"{p.name}{axis}": p.unit for p in family.parameters(plant) for axis in ("", " x", " y")}
+            units |= {f"{p.name}{loop}": p.unit for p in family.parameters(plant) for loop in loops}
         except ValueError:  # this plant has no such controller
             continue
     return units

@@ -1,7 +1,7 @@
 """The fine-pointing loop as a view: what each controller leaves, its design, the error budget, stroke and sines."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 
 from microrad.core.units import format_quantity
 from microrad.loop.control import LoopMargins
@@ -11,7 +11,7 @@ from microrad.mirror.geometry import StrokeBudget
 from microrad.report.fine_pointing import words
 from microrad.report.fine_pointing.data import parameter_units, rms_by_source, sources
 from microrad.report.plotting.figure import Figure
-from microrad.report.quantities import angle, given_angle, micro, minus, percent, share_of_time
+from microrad.report.quantities import angle, given_angle, micro, percent, share_of_time
 from microrad.report.tables import Cell, Table
 from microrad.report.view import Points, Soft, Verdict, View, told
 
@@ -145,11 +145,11 @@ def limits(fine: FinePointingStudy) -> list[str]:
 
 def designs_view(fine: FinePointingStudy) -> View:
     """What each controller was tuned to, its margins and what it is bound by."""
-    units = parameter_units(fine)
+    units = parameter_units(fine.scene)
     rows = []
     for v in fine.verified:
         inverse = f"; inverse {v.design.inverse}" if v.design.inverse else ""
-        said = tuned_to(v.design.values, units) + inverse + words.larger_margin(v.design.margin)
+        said = words.tuned_to(v.design.values, units) + inverse + words.larger_margin(v.design.margin)
         rows.append((v.design.name, *design_cells(said, v.design.loop_margins, v.design.bound_by)))
     best, about = _best(fine, [v.design.name for v in fine.verified]), ONE_AXIS
     if not isinstance(fine.scene, Scene):
@@ -181,20 +181,6 @@ def designs(
     if any(row[headings.index("crossover (Hz)")] for row in rows):  # a loop of several axes has none
         said += " Crossover: highest frequency at which the loop gain does."
     return about, Table("", headings, rows, (0, 1 + len(between), len(headings) - 1), best=best), Soft(said)
-
-
-def tuned_to(values: Mapping[str, float], units: Mapping[str, str]) -> str:
-    """What a controller was tuned to, in words.
-
-    Args:
-        values: its parameters in SI units, by name.
-        units: their SI units by name; a parameter without one is a plain number.
-    """
-    told = {
-        name: format_quantity(value, units[name], 3) if units.get(name) else f"{value:.3g}"
-        for name, value in values.items()
-    }
-    return minus(", ".join(f"{name} {value}" for name, value in told.items()))
 
 
 def design_cells(tuned: str, margins: LoopMargins, bound_by: Sequence[str]) -> tuple[str, ...]:

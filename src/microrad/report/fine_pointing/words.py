@@ -1,7 +1,7 @@
 """What a fine-pointing study found, in words: the verdict, what theory leaves, the stroke, the warnings."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from microrad.core.units import format_quantity
@@ -13,7 +13,7 @@ from microrad.mirror import Variant
 from microrad.mirror.geometry import StrokeBudget
 from microrad.mission.model import Amplifier, Control
 from microrad.mission.tables.fine_pointing import FinePointing
-from microrad.report.quantities import angle, given_angle, percent, share_of_time
+from microrad.report.quantities import angle, given_angle, minus, percent, share_of_time
 
 NAMES: dict[str, str] = {
     Variant.GIVEN: "mission's mirror",
@@ -55,6 +55,20 @@ class Room:
     with_hysteresis: float
     gained: float
     holds: bool
+
+
+def tuned_to(values: Mapping[str, float], units: Mapping[str, str]) -> str:
+    """What a controller was tuned to, in words.
+
+    Args:
+        values: its parameters in SI units, by name.
+        units: their SI units by name; a parameter without one is a plain number.
+    """
+    told = {
+        name: format_quantity(value, units[name], 3) if units.get(name) else f"{value:.3g}"
+        for name, value in values.items()
+    }
+    return minus(", ".join(f"{name} {value}" for name, value in told.items()))
 
 
 def larger_margin(margin: float | None) -> str:

@@ -56,6 +56,8 @@ _FINE_TERMS = {
     "OLYMPUS": "a spectrum of vibration, after what was measured on the satellite of that name.",
     "PI": "controller with a proportional and an integral part; PID has a derivative part as well.",
     "LQG": "linear-quadratic-Gaussian controller: a Kalman filter with the best state feedback for it.",
+}
+_OF_ALL_AXES = {
     "H-infinity": "controller of all axes for the largest error of the mirror's model that a loop of its shape stands.",
 }
 
@@ -121,7 +123,10 @@ def mirror_of_loop(study: Study) -> str:
 
 def terms(study: Study) -> dict[str, str]:
     """What the page of a study explains: each term, and what it means."""
-    return TERMS if study.fine_pointing is None else TERMS | _FINE_TERMS
+    if study.fine_pointing is None:
+        return TERMS
+    has = {verified.design.name for verified in study.fine_pointing.verified}
+    return TERMS | _FINE_TERMS | {name: said for name, said in _OF_ALL_AXES.items() if name in has}
 
 
 def short(study: Study) -> list[str]:

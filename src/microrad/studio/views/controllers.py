@@ -30,7 +30,8 @@ from microrad.loop.pointing_loop.loop import LoopController, PointingLoop
 from microrad.mirror import Variant
 from microrad.mission.file import MissionFile
 from microrad.mission.tables.fine_pointing import FinePointing
-from microrad.report.fine_pointing.page import ONE_AXIS, design_cells, designs, tuned_to
+from microrad.report.fine_pointing.page import ONE_AXIS, design_cells, designs
+from microrad.report.fine_pointing.words import tuned_to
 from microrad.report.quantities import micro
 from microrad.report.view import Block
 from microrad.studio.views.control import PID, PID_INVERSE, WITH, WITHOUT, Answers, Ask, Controller, Curve
