@@ -34,6 +34,7 @@ _LACKING = 1.5  # times the squared error of a vector fit of as many poles: othe
 _MISFIT = 3.0  # standard deviations of chi-square
 _ZEROS_TO = 10.0  # times the highest frequency, where there is no sample rate
 _EXCHANGES = 12
+_ROUNDING = 1e-10
 _OPEN = 0.05  # periods of the highest frequency
 _UNEVEN = 3.0  # times as much left above the median of the response as below
 
@@ -423,7 +424,7 @@ def _uneven(response: Complexes, residual: Complexes) -> tuple[str, ...]:
     if not large.any() or large.all():
         return ()
     above, below = (float(np.sqrt(np.mean(np.abs(residual[part]) ** 2))) for part in (large, ~large))
-    if above <= _UNEVEN * below:
+    if above <= _UNEVEN * below or above <= _ROUNDING * float(np.abs(response).max()):
         return ()
     return (
         f"the model leaves {above / max(below, 1e-300):.3g} times as much where the response is large: the noise is "
