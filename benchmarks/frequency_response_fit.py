@@ -2,12 +2,12 @@
 
     python benchmarks/frequency_response_fit.py
 
-The tables and their truths are those of tests/response_tables.py. Both get frequencies and response alone and the true
-number of poles; scikit-rf gets the true numbers of real poles and pairs as well, and starts at linear and at logarithmic
-frequencies, of which the better one counts. "data" and "truth" are the relative rms distance of the model to the table
-and to the response behind the noise, root mean square over ten draws of the noise; "weighted" is ours where it is told
-the standard errors, which scikit-rf cannot be. With several inputs and outputs a pole of scikit-rf has a residue of full
-rank: its model has more "states", and follows more of the noise.
+The tables and their truths are those of tests/response_tables.py. Both get frequencies and response alone and the
+true number of poles; scikit-rf gets the true numbers of real poles and pairs as well, and starts at linear and at
+logarithmic frequencies, of which the better one counts. "data" and "truth" are the relative rms distance of the model
+to the table and to the response behind the noise, root mean square over ten draws of the noise; "weighted" is ours
+where it is told the standard errors, which scikit-rf cannot be. With several inputs and outputs a pole of scikit-rf has
+a residue of full rank: its model has more "states", and follows more of the noise.
 
 Times are the best of many calls taken in turn, ours without and with its standard errors (they are made when they are
 asked for). Where there are not as many outputs as inputs, scikit-rf gets the elements filled up to a square, and its
@@ -76,7 +76,7 @@ def best_of(methods: dict[str, Callable[[], object]]) -> dict[str, float]:
 
 
 def errors(table: Table) -> tuple[dict[str, np.ndarray], bool, bool]:
-    """Root mean squares of (data, truth) by method over the draws; whether all fits of ours and of theirs are stable."""
+    """Root mean squares of (data, truth) by method over the draws; whether all of our and of their fits are stable."""
     found: dict[str, list[tuple[float, float]]] = {"ours": [], "weighted": [], "scikit-rf": []}
     stable = [True, True]
     for seed in range(DRAWS):

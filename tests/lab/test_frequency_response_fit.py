@@ -1,5 +1,6 @@
 """`fit_frequency_response`: recovery within its error bars, stability, order, weights, holds, delay, and refusals."""
 
+import re
 import sys
 
 import control as python_control
@@ -14,6 +15,7 @@ from microrad.lab.identify.linear.polish import FrequencyEquations, fit_outputs,
 from microrad.lab.identify.linear.uncertainty import _slopes, transfer_matrix
 from microrad.lab.identify.linear.vector_fitting import sketched, vector_fit
 from microrad.lab.identify.statistics import central_differences
+from places import ROOT
 from response_tables import (
     TABLES,
     anti_resonances,
@@ -264,6 +266,21 @@ def test_without_python_control_it_says_how_to_install_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "control", None)
     with pytest.raises(IdentificationError, match=r"python-control is not installed.*pip install.*\[control\]"):
         fit.to_control()
+
+
+# ---------------------------------------------------------------------------------------------------------------- page
+def test_the_example_of_the_page_prints_what_stands_below_it(tmp_path, monkeypatch, capsys):
+    table = anti_resonances()
+    response = table.response[:, 0, 0]
+    columns = np.column_stack([table.freq_hz, np.abs(response), np.degrees(np.angle(response))])
+    np.savetxt(tmp_path / "bode.csv", columns, delimiter=",", header="frequency,gain,phase", comments="")
+    monkeypatch.chdir(tmp_path)
+    page = (ROOT / "docs" / "identify.md").read_text(encoding="utf-8")
+    ((code, printed),) = re.findall(
+        r"```python\n([^`]*fit_frequency_response[^`]*)```\n\n```text\n(.*?)```", page, re.DOTALL
+    )
+    exec(code, {})
+    assert capsys.readouterr().out == printed
 
 
 # ------------------------------------------------------------------------------------------------------------- refusals
