@@ -23,7 +23,7 @@ from microrad.lab.identify.linear.modal import Hold, ModalModel, order_modes
 from microrad.lab.identify.linear.order import exchanged, reduced
 from microrad.lab.identify.linear.polish import Polished, fit_outputs, normal_equations, polish
 from microrad.lab.identify.linear.response_table import ResponseTable, band_hz, check_numbers, checked
-from microrad.lab.identify.linear.uncertainty import Uncertainty, parameter_covariance, uncertainty
+from microrad.lab.identify.linear.uncertainty import Uncertainty, inverse_normal, uncertainty
 from microrad.lab.identify.linear.vector_fitting import VectorFit, sketched, vector_fit
 from microrad.lab.identify.records import IdentificationError, no_progress
 
@@ -47,9 +47,10 @@ class FrequencyResponseFit:
     which the system has not. `freq_hz` (frequencies,) are those of the table, `residual` (frequencies, outputs, inputs)
     is table less model, and `relative_rms_error` its root mean square over that of the table. `scan` is empty where the
     order was given, and `output_error_rms` in it the plain root mean square of the residual; `reason` says in words why
-    this order. `covariance` (parameters, parameters) is that of the parameters of `pack` with the delay in view, and
-    `errors_from` says in words what it rests on. `known`, with poles, transmission zeros and gains and their standard
-    errors, and `warnings` are made when they are first asked for.
+    this order. `normal` is the normal matrix at the end in the parameters of `pack`, the delay behind them where it was
+    fitted, `variance` that of one row, and `errors_from` says in words what it rests on; `chi_square` is what is left
+    per degree of freedom by the standard errors given, None without them. `known`, with poles, transmission zeros and
+    gains and their standard errors, and `warnings` are made when they are first asked for.
     """
 
     system: StateSpace
@@ -62,16 +63,21 @@ class FrequencyResponseFit:
     relative_rms_error: float
     scan: tuple[OrderScore, ...]
     reason: str
-    covariance: Floats
-    delay_error_s: float
+    normal: Floats
+    variance: float
     errors_from: str
-    misfit: tuple[str, ...]
+    chi_square: float | None
     strictly_proper: bool
 
     @property
     def band_hz(self) -> tuple[float, float]:
         """Lowest frequency of the table above zero, and its highest one."""
         return band_hz(self.freq_hz)
+
+    @cached_property
+    def covariance(self) -> Floats:
+        """Covariance of the parameters of `pack`, the delay behind them where it was fitted."""
+        return inverse_normal(self.normal, self.order) * self.variance
 
     @cached_property
     def known(self) -> Uncertainty:
@@ -81,14 +87,25 @@ class FrequencyResponseFit:
         """
         low, high = self.band_hz
         below = 2 * np.pi * _ZEROS_TO * high if self.rate_hz is None else np.pi * self.rate_hz
+        outputs, inputs = self.modes.direct.shape
         direct = not self.strictly_proper
-        found = uncertainty(self.modes, self.covariance, direct, edge_hz=low, below_rad_s=below)
-        return replace(found, delay_error_s=self.delay_error_s)
+        own = self.order * (1 + inputs + outputs) + outputs * inputs * direct
+        found = uncertainty(self.modes, self.covariance[:own, :own], direct, edge_hz=low, below_rad_s=below)
+        delay = np.diag(self.covariance)[own:]
+        return replace(found, delay_error_s=float(np.sqrt(np.maximum(delay, 0.0)).sum()))
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:
         """What speaks against the model, in words."""
-        return (*self.misfit, *range_warnings(self.known, self.band_hz, of="table", what="measured"))
+        if self.chi_square is None:
+            noise = _uneven(self.residual + self.response(self.freq_hz), self.residual)
+        else:
+            noise = _misfit(self.chi_square) if self.variance > 1.0 else ()
+        return (
+            *noise,
+            *_open_delay(self.known.delay_error_s, self.band_hz[1]),
+            *range_warnings(self.known, self.band_hz, of="table", what="measured"),
+        )
 
     @property
     def poles_rad_s(self) -> Complexes:
@@ -277,7 +294,7 @@ def _from(equations: ElementEquations, start: ModalModel, squared: float) -> Pol
         normal, _, cost = normal_equations(equations, start)
         if cost <= 1e-20 * equations.power:
             return Polished(start, cost, equations.power, equations.rows, normal, 0)
-    return polish(equations, start, iterations=60, tolerance=1e-2 / equations.rows, settled=1.0, fitted=True)
+    return polish(equations, start, iterations=60, tolerance=1e-2 / equations.rows, settled=2.0, fitted=True)
 
 
 def _improved(table: ResponseTable, found: _Found) -> _Found:
@@ -315,17 +332,13 @@ def _best_delay(table: ResponseTable, fitted: Callable[[ElementEquations], Polis
     return min(known.values(), key=lambda found: found.polished.cost)
 
 
-def _with_delay(found: _Found, variance: float) -> tuple[Floats, float]:
-    """Covariance of the parameters and standard error of the delay where both were fitted together.
-
-    The delay turns the table against the model by e^{j w delay}: it is one column more in the normal equations.
-    """
+def _with_delay(found: _Found) -> Floats:
+    """The normal matrix with one column more: by e^{j w delay} the delay turns the table against the model."""
     equations, model = found.equations, found.polished.model
     s = 2j * np.pi * equations.freq_hz[:, None, None]
     column, square = equations.against(model, -s * model.response(equations.freq_hz, equations.hold, equations.rate_hz))
-    normal = np.block([[normal_equations(equations, model)[0], column[:, None]], [column, np.array([square])]])
-    whole = parameter_covariance(replace(found.polished, normal=normal), variance, model.order)
-    return whole[:-1, :-1], float(np.sqrt(max(whole[-1, -1], 0.0)))
+    normal = normal_equations(equations, model)[0]
+    return np.block([[normal, column[:, None]], [column, np.array([square])]])
 
 
 # --------------------------------------------------------------------------------------------------------------- result
@@ -375,7 +388,6 @@ def _result(
     per = polished.cost / freedom
     given, beyond = table.standard_error is not None, 1.0 + _MISFIT * np.sqrt(2.0 / freedom)
     variance = max(1.0, per) if given and per > beyond else 1.0 if given else max(per, 1e-300)
-    covariance, delay_error = _with_delay(found, variance) if delay else (parameter_covariance(polished, variance), 0.0)
     residual = _residual(table, found)
     size = float(np.linalg.norm(table.response))
     return FrequencyResponseFit(
@@ -389,13 +401,10 @@ def _result(
         relative_rms_error=float(np.linalg.norm(residual)) / size if size else 0.0,
         scan=tuple(scan),
         reason=reason,
-        covariance=covariance,
-        delay_error_s=delay_error,
+        normal=_with_delay(found) if delay else polished.normal,
+        variance=variance,
         errors_from=_errors_from(given, variance, per),
-        misfit=(
-            *(_misfit(per, beyond) if given else _uneven(table.response, residual)),
-            *_open_delay(delay_error, table.band_hz[1]),
-        ),
+        chi_square=per if given else None,
         strictly_proper=not table.direct,
     )
 
@@ -408,10 +417,8 @@ def _errors_from(given: bool, variance: float, per: float) -> str:
     return f"the standard errors given, times {variance**0.5:.3g} for what the model leaves beyond them"
 
 
-def _misfit(per: float, beyond: float) -> tuple[str, ...]:
+def _misfit(per: float) -> tuple[str, ...]:
     """What the model leaves beyond the standard errors given, in words."""
-    if per <= beyond:
-        return ()
     return (
         f"the model leaves {per**0.5:.3g} times the standard errors given: the order is too low, the response is not "
         "that of a linear system, or the errors are too small; those of the model are larger by as much.",

@@ -369,8 +369,7 @@ def polish(
         fitted: Whether the model has the best output vectors and direct term for its poles and input vectors already.
     """
     if not fitted:
-        model, _ = fit_outputs(equations, model.poles_rad_s, model.input_vectors)
-    model = _balanced(model)
+        model = _balanced(fit_outputs(equations, model.poles_rad_s, model.input_vectors)[0])
     normal, gradient, cost = normal_equations(equations, model)
     damping, small, done = 1e-3, 0, 0
     while done < iterations and small < 2:

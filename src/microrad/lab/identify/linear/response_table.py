@@ -23,7 +23,9 @@ class ResponseTable(NamedTuple):
 
     def equations(self, delay_s: float = 0.0) -> ElementEquations:
         """Equations with a variance of 1 in each row where the standard errors are known, of one weight otherwise."""
-        turned = self.response * np.exp(2j * np.pi * self.freq_hz * delay_s)[:, None, None]
+        turned = self.response
+        if delay_s:
+            turned = turned * np.exp(2j * np.pi * self.freq_hz * delay_s)[:, None, None]
         known = self.standard_error
         weight = np.ones(turned.shape) if known is None else np.sqrt(2.0) / known
         return ElementEquations(self.freq_hz, turned, weight, self.hold, self.rate_hz, direct=self.direct)

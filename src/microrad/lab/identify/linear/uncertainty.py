@@ -67,22 +67,26 @@ def uncertainty(
     )
 
 
-def parameter_covariance(polished: Polished, variance: float | None = None, null: int | None = None) -> Floats:
-    """Covariance of the parameters of `pack`.
+def parameter_covariance(polished: Polished) -> Floats:
+    """Covariance of the parameters of `pack`, the variance of a row being what is left per degree of freedom."""
+    size = np.sqrt(np.maximum(np.diag(polished.normal), 1e-300))
+    values = np.linalg.eigvalsh(polished.normal / np.outer(size, size))
+    null = int(np.count_nonzero(values <= 1e-11 * values[-1]))
+    freedom = max(polished.rows - values.size + null, 1)
+    return np.asarray(inverse_normal(polished.normal, null) * polished.cost / freedom)
+
+
+def inverse_normal(normal: Floats, null: int) -> Floats:
+    """Inverse of a normal matrix without the directions that change nothing.
 
     Args:
-        polished: A polished model with its normal matrix.
-        variance: Variance of a row of the equations; by default what the model leaves for each degree of freedom.
-        null: Number of directions that change nothing (the scales of the vectors); by default those that rounding
-            hides.
+        normal: The matrix, shape (parameters, parameters).
+        null: Number of such directions: in a modal model the scales of the vectors, one for each state.
     """
-    size = np.sqrt(np.maximum(np.diag(polished.normal), 1e-300))
-    values, vectors = np.linalg.eigh(polished.normal / np.outer(size, size))
-    kept = values > 1e-11 * values[-1] if null is None else np.arange(values.size) >= null
-    inverse = (vectors[:, kept] / values[kept]) @ vectors[:, kept].T / np.outer(size, size)
-    if variance is None:
-        variance = polished.cost / max(polished.rows - int(np.count_nonzero(kept)), 1)
-    return np.asarray(inverse * variance)
+    size = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    values, vectors = np.linalg.eigh(normal / np.outer(size, size))
+    kept = slice(null, None)
+    return np.asarray((vectors[:, kept] / values[kept]) @ vectors[:, kept].T / np.outer(size, size))
 
 
 def transfer_matrix(model: ModalModel, points: Complexes) -> Complexes:
