@@ -11,7 +11,7 @@ from microrad import IdentificationError, fit_frequency_response
 from microrad.core import lti
 from microrad.lab.identify.linear.elements import ElementEquations
 from microrad.lab.identify.linear.modal import ModalModel
-from microrad.lab.identify.linear.polish import FrequencyEquations, fit_outputs, normal_equations, pack, unpack
+from microrad.lab.identify.linear.polish import FrequencyEquations, fit_outputs, normal_equations, pack, polish, unpack
 from microrad.lab.identify.linear.uncertainty import _slopes, transfer_matrix
 from microrad.lab.identify.linear.vector_fitting import sketched, vector_fit
 from microrad.lab.identify.statistics import central_differences
@@ -98,6 +98,20 @@ def test_the_gain_at_the_lowest_frequency_and_its_error():
     off = (fit.known.edge_gain - np.abs(table.true_response[0])) / fit.known.edge_gain_error
     assert np.abs(off).max() < 3.5
     assert (fit.known.edge_gain_error < table.standard_error[0]).all()  # all frequencies say more than one
+
+
+@pytest.mark.parametrize(
+    "build", [anti_resonances, heavy_damping, close_poles, mirror_two_axes, one_drive_three_sensors]
+)
+def test_the_distance_to_the_table_is_least(build):
+    """A search that goes on to rounding gains less than a hundredth of what a standard error is worth."""
+    table = build()
+    fit = fit_frequency_response(table.freq_hz, table.response, table.order, standard_error=table.standard_error)
+    weight = np.sqrt(2) / table.standard_error
+    equations = ElementEquations(table.freq_hz, table.response, weight, "band-limited", None)
+    cost = float(np.sum(np.abs(weight * fit.residual) ** 2))
+    assert cost == pytest.approx(normal_equations(equations, fit.modes)[2], rel=1e-9)
+    assert 0 <= cost - polish(equations, fit.modes, iterations=100, tolerance=1e-12).cost < 0.01
 
 
 # ------------------------------------------------------------------------------------------------------------ stability
@@ -318,6 +332,9 @@ def spoilt(values, at, value):
         ([], [], {}, r"frequencies have the shape \(0,\); give one list"),
         (FREQ_HZ, FLAT.reshape(60, 1), {}, r"response has the shape \(60, 1\); give \(frequencies,\) for one element"),
         (FREQ_HZ, np.zeros((60, 0, 2)), {}, r"response has the shape \(60, 0, 2\); give"),
+        (FREQ_HZ, 0 * FLAT, {}, "the response is 0 at all frequencies, so there is nothing to fit"),
+        ([0.0], [1.0], {}, "the only frequency is 0 Hz; give frequencies above it"),
+        ([1.0], [1.0], {}, "1 frequencies cannot fix 1 poles; give at least 2 frequencies or a lower order"),
         (FREQ_HZ, FLAT, {"orders": 0}, "the order is 0; give at least one pole"),
         (FREQ_HZ, FLAT, {"orders": [2, -1]}, "the order is -1; give at least one pole"),
         (FREQ_HZ, FLAT, {"orders": []}, "no order was given to choose from"),

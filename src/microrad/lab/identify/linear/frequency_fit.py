@@ -29,7 +29,6 @@ from microrad.lab.identify.records import IdentificationError, no_progress
 
 _LARGEST = 24  # orders of a scan
 _NO_BETTER = 6  # orders in a row that gain nothing and end a scan
-_EXACT = 1e-5  # relative error below which sums of squares lack digits
 _LACKING = 1.5  # times the squared error of a vector fit of as many poles: other starts are tried
 _MISFIT = 3.0  # standard deviations of chi-square
 _ZEROS_TO = 10.0  # times the highest frequency, where there is no sample rate
@@ -227,29 +226,22 @@ def _polished(table: ResponseTable, equations: ElementEquations, order: int) -> 
     """The model of least cost from a vector fit of as many poles and, where that lacks something, from others."""
     turned = equations.response
     found = _sketch(table, turned, equations, order)
-    squared = found.rms_error**2 * equations.rows / 2
-    best = _from(equations, _start(equations, found, order), squared)
+    best = _from(equations, _start(equations, found, order))
     least = min(turned.shape[1:])
-    if best.cost > _LACKING * squared and least > 1 and order >= least:
+    if best.cost > _LACKING * found.rms_error**2 * equations.rows / 2 and least > 1 and order >= least:
         other = _sketch(table, turned, equations, -(-order // least))
-        again = _from(
-            equations,
-            _fitted_outputs(equations, reduced(other.modes(), order))[0],
-            other.rms_error**2 * equations.rows / 2,
-        )
+        again = _from(equations, _fitted_outputs(equations, reduced(other.modes(), order))[0])
         best = min(best, again, key=lambda p: p.cost)
     return best
 
 
 def _sketch(table: ResponseTable, response: Complexes, equations: ElementEquations, order: int) -> VectorFit:
-    """A vector fit by sums where these have digits enough, else by QR factorisations."""
+    """A vector fit by sums, or by QR factorisations where the sums are singular."""
     freq, hold, rate_hz = table.freq_hz, table.hold, table.rate_hz
     half = equations.squared[:, : freq.size]
     proper = not table.direct
     try:
-        found = sketched(freq, response, half, equations.scale, order, (hold, rate_hz, proper))
-        if found.rms_error**2 * equations.rows / 2 > _EXACT**2 * equations.power:
-            return found
+        return sketched(freq, response, half, equations.scale, order, (hold, rate_hz, proper))
     except np.linalg.LinAlgError:
         pass
     weight = np.sqrt(half * equations.scale).T.reshape(response.shape)
@@ -285,15 +277,8 @@ def _one_each(found: VectorFit) -> ModalModel:
     return order_modes(poles, inputs.astype(complex), outputs.T.astype(complex), found.direct)
 
 
-def _from(equations: ElementEquations, start: ModalModel, squared: float) -> Polished:
-    """The start, its output vectors fitted, polished: until two steps gain less than a hundredth in chi-square.
-
-    Where the squared error says that it may be exact to rounding already, it is taken as it is.
-    """
-    if squared <= 1e-20 * equations.power:
-        normal, _, cost = normal_equations(equations, start)
-        if cost <= 1e-20 * equations.power:
-            return Polished(start, cost, equations.power, equations.rows, normal, 0)
+def _from(equations: ElementEquations, start: ModalModel) -> Polished:
+    """The start, its output vectors fitted, polished: until two steps gain less than a hundredth in chi-square."""
     return polish(equations, start, iterations=60, tolerance=1e-2 / equations.rows, settled=2.0, fitted=True)
 
 

@@ -88,6 +88,8 @@ def checked(
     _check_length(freq, values, "the response")
     _check_frequencies(freq, form[1])
     _check_finite(freq, values, "the response")
+    if not values.any():
+        raise IdentificationError("the response is 0 at all frequencies, so there is nothing to fit; see its columns.")
     error = None
     if standard_error is not None:
         error = _checked_error(freq, values, np.asarray(standard_error, dtype=float)).reshape(
@@ -135,6 +137,8 @@ def _check_frequencies(freq: Floats, rate_hz: float | None) -> None:
             f"frequency {at + 2}, {freq[at + 1]:g} Hz, does not lie above the one before it, {freq[at]:g} Hz; sort the "
             "table by frequency and leave repeated ones out."
         )
+    if freq[-1] <= 0:
+        raise IdentificationError("the only frequency is 0 Hz; give frequencies above it.")
     if rate_hz is None:
         return
     if not (np.isfinite(rate_hz) and rate_hz > 0):

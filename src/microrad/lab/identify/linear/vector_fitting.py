@@ -213,6 +213,8 @@ def _zeros_of_sigma(left: Floats, columns: Complexes, size: float, poles: Comple
     """Zeros of the scaling function that leaves least while the sum of its real part is given (relaxed)."""
     row = columns.real.sum(axis=0) * (size / len(columns))
     system = left + row[:, None] * row
+    if not (system.diagonal() > 0).all():  # rounding has left nothing of a column
+        raise np.linalg.LinAlgError("the sums are singular")
     length = np.sqrt(system.diagonal())
     sigma = np.linalg.solve(system / (length[:, None] * length), row * size / length) / length
     last = sigma[-1] if abs(sigma[-1]) > 1e-8 else np.copysign(1e-8, sigma[-1])
