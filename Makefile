@@ -64,6 +64,7 @@ benchmark: $(VENV)/.test
 	$(BIN)/python benchmarks/campaign_tail.py
 	$(BIN)/python benchmarks/recording.py
 	$(BIN)/python benchmarks/vector_fitting.py
+	$(BIN)/python benchmarks/frequency_response_fit.py
 	$(BIN)/python benchmarks/hysteresis_fit.py
 	$(BIN)/python benchmarks/cubespec_linear.py
 	$(BIN)/python benchmarks/cubespec_one_model.py

@@ -47,6 +47,8 @@ _PUBLIC = {
     "mirror_file_text": "lab.identify.mirror_file_text",
     "Identification": "lab.identify.Identification",
     "IdentificationError": "lab.identify.IdentificationError",
+    "fit_frequency_response": "lab.identify.fit_frequency_response",
+    "FrequencyResponseFit": "lab.identify.FrequencyResponseFit",
     "parse_quantity": "core.units.parse_quantity",
     "format_quantity": "core.units.format_quantity",
     "UnitError": "core.units.UnitError",

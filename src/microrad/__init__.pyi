@@ -10,8 +10,10 @@ from microrad.core.folder import FolderError
 from microrad.core.units import UnitError
 from microrad.core.units import format_quantity
 from microrad.core.units import parse_quantity
+from microrad.lab.identify import FrequencyResponseFit
 from microrad.lab.identify import Identification
 from microrad.lab.identify import IdentificationError
+from microrad.lab.identify import fit_frequency_response
 from microrad.lab.identify import identify as identify_mirror
 from microrad.lab.identify import mirror_file_text
 from microrad.lab.recording import Recording
@@ -83,6 +85,8 @@ __all__ = [
     "mirror_file_text",
     "Identification",
     "IdentificationError",
+    "fit_frequency_response",
+    "FrequencyResponseFit",
     "parse_quantity",
     "format_quantity",
     "UnitError",

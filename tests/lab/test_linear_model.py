@@ -14,9 +14,6 @@ from microrad.lab.identify.linear.fit import (
     fit_linear,
     fit_percent,
     output_error,
-    parameter_covariance,
-    transfer_matrix,
-    transmission_zeros,
 )
 from microrad.lab.identify.linear.modal import ModalModel, order_modes, simulate, simulate_periodic
 from microrad.lab.identify.linear.order import fit_order, reduced
@@ -29,6 +26,7 @@ from microrad.lab.identify.linear.polish import (
     unpack,
 )
 from microrad.lab.identify.linear.response import response_from_periods
+from microrad.lab.identify.linear.uncertainty import parameter_covariance, transfer_matrix, transmission_zeros
 from microrad.lab.identify.linear.vector_fitting import vector_fit
 from microrad.lab.identify.records import IdentificationError
 from microrad.lab.identify.statistics import rounded_to_error

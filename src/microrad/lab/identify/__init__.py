@@ -3,13 +3,15 @@
 `identify` fits all models and chooses one of them (`selection`), by samples that no fit has seen; `mirror_file_text`
 writes it for a mission. Drives are in volts there and outputs in radians. The steps stand alone too: `linear` for the
 linear part and `stiffness` for hysteretic stiffness, both for any number of inputs and outputs and in any units, and
-`hysteresis` for the hysteresis of one axis.
+`hysteresis` for the hysteresis of one axis. `fit_frequency_response` takes the table of a response in place of
+recordings.
 """
 
 from microrad.lab.identify.hysteresis.bouc_wen import BoucWenFit, fit_bouc_wen
 from microrad.lab.identify.hysteresis.joint import FORMS, JointFit, fit_joint
 from microrad.lab.identify.hysteresis.prandtl_ishlinskii import PrandtlIshlinskiiFit, fit_prandtl_ishlinskii
 from microrad.lab.identify.linear.fit import fit_linear, output_error
+from microrad.lab.identify.linear.frequency_fit import FrequencyResponseFit, fit_frequency_response
 from microrad.lab.identify.linear.response import response_from_records
 from microrad.lab.identify.linear.vector_fitting import vector_fit
 from microrad.lab.identify.mirror_file import mirror_file_text
@@ -24,6 +26,7 @@ __all__ = [
     "MODELS",
     "STATIC",
     "BoucWenFit",
+    "FrequencyResponseFit",
     "Identification",
     "IdentificationError",
     "JointFit",
@@ -32,6 +35,7 @@ __all__ = [
     "Score",
     "Units",
     "fit_bouc_wen",
+    "fit_frequency_response",
     "fit_hysteretic_stiffness",
     "fit_joint",
     "fit_linear",

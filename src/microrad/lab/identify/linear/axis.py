@@ -12,9 +12,7 @@ from microrad.core.progress import Progress
 from microrad.lab.identify.linear.fit import (
     LinearFit,
     OrderScore,
-    Uncertainty,
     output_error,
-    transmission_zeros,
     with_evidence,
 )
 from microrad.lab.identify.linear.modal import HOLD, Hold, ModalModel, simulate, simulate_periodic
@@ -26,6 +24,7 @@ from microrad.lab.identify.linear.response import (
     response_from_periods,
     response_from_records,
 )
+from microrad.lab.identify.linear.uncertainty import Uncertainty, transmission_zeros
 from microrad.lab.identify.records import no_progress
 from microrad.lab.identify.statistics import central_differences
 from microrad.lab.recording import Recording

@@ -15,145 +15,13 @@ from microrad.core.lti import StateSpace
 from microrad.core.progress import Progress
 from microrad.lab.identify.linear.modal import Hold, ModalModel, simulate, simulate_periodic
 from microrad.lab.identify.linear.order import fit_order
-from microrad.lab.identify.linear.polish import Polished, TimeEquations, pack, polish, unpack
+from microrad.lab.identify.linear.polish import Polished, TimeEquations, polish
 from microrad.lab.identify.linear.response import FrequencyResponse, response_from_periods, response_from_records
+from microrad.lab.identify.linear.uncertainty import Uncertainty, parameter_covariance, uncertainty
 from microrad.lab.identify.linear.vector_fitting import check_order
 from microrad.lab.identify.records import IdentificationError, no_progress
-from microrad.lab.identify.statistics import central_differences, colour_inflation, rounded_to_error
+from microrad.lab.identify.statistics import colour_inflation, rounded_to_error
 from microrad.lab.recording import Recording
-
-_STEP = 1e-6
-
-
-@dataclass(frozen=True, eq=False)
-class Uncertainty:
-    """Poles, zeros and gains with standard errors of the complex value.
-
-    `poles_rad_s` and `zeros_rad_s` (transmission zeros below half the sample rate, square systems only) are arrays
-    (poles,) and (zeros,); `dc_gain` and `edge_gain` (outputs, inputs) are the gains at zero frequency and at the lowest
-    excited one. `delay_error_s` is the standard error of the delay of the recording chain, 0 where it was not fitted.
-    """
-
-    poles_rad_s: Complexes
-    poles_error_rad_s: Floats
-    zeros_rad_s: Complexes
-    zeros_error_rad_s: Floats
-    dc_gain: Floats
-    dc_gain_error: Floats
-    edge_gain: Floats
-    edge_gain_error: Floats
-    delay_error_s: float
-
-
-def uncertainty(polished: Polished, response: FrequencyResponse, direct: bool, inflation: float) -> Uncertainty:
-    """Poles, zeros and gains of a polished model, with their standard errors.
-
-    Args:
-        polished: The model and its normal equations.
-        response: The response that it was fitted to.
-        direct: Whether the direct term was fitted.
-        inflation: Factor by which the colour of the residual raises the variance; 1 for white noise.
-    """
-    model = polished.model
-    covariance = parameter_covariance(polished) * inflation
-    m, n = model.real_poles, model.poles_rad_s.size
-    variance = np.diag(covariance)[: 2 * n - m]
-    spread = variance[:n].copy()
-    spread[m:] += variance[n:]
-    spread = np.sqrt(np.maximum(np.concatenate([spread, spread[m:]]), 0.0))
-    zeros = transmission_zeros(model, np.pi * response.rate_hz)
-    points = np.concatenate([[0.0, 2j * np.pi * response.excited_hz[0]], zeros])
-    slopes = _slopes(model, points, direct)
-    values = transfer_matrix(model, points[:2])
-    errors = [np.sqrt(np.maximum(_variance(slopes[k], covariance), 0.0)) for k in (0, 1)]
-    # A gain is real in phase: only the change along the value moves its magnitude.
-    direction = values[1].conj() / np.maximum(np.abs(values[1]), 1e-300)
-    along = np.real(direction[:, :, None] * slopes[1])
-    errors[1] = np.sqrt(np.maximum(_variance(along, covariance), 0.0))
-    return Uncertainty(
-        model.all_poles_rad_s,
-        spread,
-        zeros,
-        _zero_errors(model, zeros, slopes[2:], covariance),
-        values[0].real,
-        errors[0],
-        np.abs(values[1]),
-        errors[1],
-        0.0,
-    )
-
-
-def parameter_covariance(polished: Polished) -> Floats:
-    """Covariance of the parameters of `pack`."""
-    size = np.sqrt(np.maximum(np.diag(polished.normal), 1e-300))
-    values, vectors = np.linalg.eigh(polished.normal / np.outer(size, size))
-    kept = values > 1e-11 * values[-1]
-    inverse = (vectors[:, kept] / values[kept]) @ vectors[:, kept].T / np.outer(size, size)
-    freedom = max(polished.rows - int(np.count_nonzero(kept)), 1)
-    return np.asarray(inverse * polished.cost / freedom)
-
-
-def transfer_matrix(model: ModalModel, points: Complexes) -> Complexes:
-    """Transfer matrix at any complex frequencies (rad/s), shape (points, outputs, inputs).
-
-    Args:
-        model: The modal model.
-        points: Complex frequencies, in rad/s, shape (points,).
-    """
-    return model.combined(1.0 / (np.asarray(points)[:, None] - model.all_poles_rad_s))
-
-
-def transmission_zeros(model: ModalModel, below_rad_s: float) -> Complexes:
-    """Complex frequencies (rad/s) at which the square transfer matrix loses rank; none where it is not square.
-
-    Args:
-        model: The modal model.
-        below_rad_s: Largest modulus of the zeros returned, in rad/s.
-    """
-    from scipy.linalg import eig
-
-    outputs, inputs = model.direct.shape
-    if outputs != inputs:
-        return np.zeros(0, dtype=complex)
-    system, n = model.state_space(), model.order
-    # Balance channels against states, or the pencil mixes volts with rad/s.
-    rate = float(np.max(np.abs(model.poles_rad_s)))
-    reach, seen = float(np.linalg.norm(system.B)), float(np.linalg.norm(system.C))
-    B, C = system.B / reach, system.C / seen
-    pencil = np.block([[system.A / rate, B], [C, system.D * rate / (reach * seen)]])
-    mass = np.zeros_like(pencil)
-    mass[:n, :n] = np.eye(n)
-    top, bottom = eig(pencil, mass, right=False, homogeneous_eigvals=True)
-    finite = np.abs(bottom) > 1e-9 * np.maximum(np.abs(top), 1e-300)
-    zeros = rate * top[finite] / bottom[finite]
-    return np.asarray(np.sort_complex(zeros[np.abs(zeros) <= below_rad_s]).astype(complex))
-
-
-def _slopes(model: ModalModel, points: Complexes, direct: bool) -> Complexes:
-    """Derivative of the transfer matrix at the points by each parameter: (points, outputs, inputs, parameters)."""
-    theta = pack(model, direct)
-    steps = _STEP * np.maximum(np.abs(theta), 1e-9)
-    return central_differences(lambda moved: transfer_matrix(unpack(moved, model), points), theta, steps)
-
-
-def _variance(slopes: Complexes, covariance: Floats) -> Floats:
-    """Variance of the real part plus that of the imaginary part, over the last axis of the slopes."""
-    return np.asarray(np.einsum("...i,ij,...j->...", slopes, covariance, slopes.conj(), optimize=True).real)
-
-
-def _zero_errors(model: ModalModel, zeros: Complexes, slopes: Complexes, covariance: Floats) -> Floats:
-    """At a zero w^H G v = 0, so dz = -(w^H dG v) / (w^H G' v)."""
-    errors = np.empty(zeros.size)
-    for k, zero in enumerate(zeros):
-        left, _, right = np.linalg.svd(transfer_matrix(model, np.array([zero]))[0])
-        w, v = left[:, -1].conj(), right[-1].conj()
-        step = 1e-6 * max(abs(zero), 1e-6)
-        ends = transfer_matrix(model, np.array([zero + step, zero - step]))
-        slope = w @ ((ends[0] - ends[1]) / (2 * step)) @ v
-        moved = np.einsum("o,oip,i->p", w, slopes[k], v) / slope
-        errors[k] = np.sqrt(max(float(_variance(moved, covariance)), 0.0))
-    return errors
-
 
 # Spare poles that are fitted to noise have at most 0.2 of the rms of the residual, those fitted to a tone 0.3 and more,
 # and both decay in ten times the recording or more. A true resonance, however sharp, was fitted by at most twice.
@@ -251,7 +119,7 @@ def fit_linear(
             fits[order] = fit_order(response, order, direct=direct, exchanges=0, fine=not several, smaller=smaller)
         report(done, total, f"order {order}")
     scan = [_score(response, fits[order], direct) for order in candidates] if len(candidates) > 1 else []
-    chosen, reason = _choose(scan) if scan else (candidates[0], f"order {candidates[0]} was given")
+    chosen, reason = choose(scan) if scan else (candidates[0], f"order {candidates[0]} was given")
     polished = fit_order(response, chosen, direct=direct, exchanges=exchanges) if several else fits[chosen]
     report(total - 1, total, "polish in frequency")
     if not periodic:
@@ -261,15 +129,27 @@ def fit_linear(
 
 
 # ---------------------------------------------------------------------------------------------------------------- order
+def given_orders(freq_hz: Floats, orders: int | Sequence[int]) -> list[int]:
+    """The orders that were asked for, rising.
+
+    Args:
+        freq_hz: The frequencies to be fitted, shape (frequencies,).
+        orders: A number of states, or several.
+
+    Raises:
+        IdentificationError: If none is given, or one is below 1 or beyond what so many frequencies can fix.
+    """
+    several = [orders] if isinstance(orders, int | np.integer) else list(orders)
+    if not several:
+        raise IdentificationError("no order was given to choose from; name at least one number of states.")
+    for order in (min(several), max(several)):
+        check_order(freq_hz, order)
+    return sorted({int(order) for order in several})
+
+
 def _candidates(response: FrequencyResponse, orders: int | Sequence[int] | None) -> list[int]:
-    if isinstance(orders, int):
-        orders = [orders]
     if orders is not None:
-        if not orders:
-            raise IdentificationError("no order was given to choose from; name at least one number of states.")
-        for order in (min(orders), max(orders)):
-            check_order(response.freq_hz, order)
-        return sorted(set(orders))
+        return given_orders(response.freq_hz, orders)
     most = response.freq_hz.size - 1
     usual = range(1, 9) if response.response[0].size == 1 else range(4, 29, 4)
     return [order for order in usual if order <= most] or [1]
@@ -297,8 +177,12 @@ def _score(response: FrequencyResponse, fit: Polished, direct: bool) -> OrderSco
     )
 
 
-def _choose(scan: Sequence[OrderScore]) -> tuple[int, str]:
-    """The order of least criterion, and the reason in words."""
+def choose(scan: Sequence[OrderScore]) -> tuple[int, str]:
+    """The order of least criterion, and the reason in words.
+
+    Args:
+        scan: The orders that were compared, rising.
+    """
     best = min(scan, key=lambda score: score.criterion)
     per = [f"{s.order}: {s.chi_square / max(s.freedom, 1):.3g}" for s in scan]
     reason = (
@@ -372,7 +256,8 @@ def _linear_fit(
     steady = all(r.period_samples is not None for r in records)
     errors = [output_error(model, r, response.hold, steady=steady, drop=drop) for r in records]
     inflation = colour_inflation([column for error in errors for column in error.T])
-    known = uncertainty(polished, response, direct, inflation)
+    edge = {"edge_hz": response.excited_hz[0], "below_rad_s": np.pi * response.rate_hz}
+    known = uncertainty(model, parameter_covariance(polished) * inflation, direct, **edge)
     residual = response.response - model.response(response.freq_hz, response.hold, response.rate_hz)
     return with_evidence(model, records, errors, response, residual, known, scan, reason)
 
@@ -414,7 +299,7 @@ def with_evidence(
         scan=tuple(scan),
         reason=reason,
         **vars(known),
-        warnings=(*_tones(model, records, rms, response.hold), *_warnings(known, response)),
+        warnings=(*_tones(model, records, rms, response.hold), *range_warnings(known, response.excited_hz)),
         response=response,
         residual=residual,
     )
@@ -447,8 +332,19 @@ def _mode_share(model: ModalModel, k: int, records: Sequence[Recording], hold: H
     return float(np.max(own.std(axis=0) / residual_rms))
 
 
-def _warnings(known: Uncertainty, response: FrequencyResponse) -> tuple[str, ...]:
-    low, high = response.excited_hz
+def range_warnings(
+    known: Uncertainty, band_hz: tuple[float, float], *, of: str = "recording", what: str = "excited"
+) -> tuple[str, ...]:
+    """What lies beyond the frequencies that were measured, in words.
+
+    Args:
+        known: Poles, zeros and gains.
+        band_hz: Lowest and highest frequency, in Hz.
+        of: What shows them, in a word.
+        what: What they are, in a word.
+    """
+    low, high = band_hz
+    dynamics = "dynamics of the mirror" if of == "recording" else "dynamics"
     found = []
     for name, values in (("pole", known.poles_rad_s), ("zero", known.zeros_rad_s)):
         freq = np.abs(values) / (2 * np.pi)
@@ -456,9 +352,9 @@ def _warnings(known: Uncertainty, response: FrequencyResponse) -> tuple[str, ...
         if outside:
             many, them = ("s", "them") if len(outside) > 1 else ("", "it")
             found.append(
-                f"{name}{many} at {', '.join(f'{f:g}' for f in outside)} Hz outside the excited band, {low:.3g} to "
-                f"{high:.4g} Hz: the recording shows only the flank, so take {them} as a fit of that flank (drift, "
-                "delay), not as dynamics of the mirror."
+                f"{name}{many} at {', '.join(f'{f:g}' for f in outside)} Hz outside the {what} band, {low:.3g} to "
+                f"{high:.4g} Hz: the {of} shows only the flank, so take {them} as a fit of that flank (drift, "
+                f"delay), not as {dynamics}."
             )
     q, i = np.unravel_index(int(np.argmax(np.abs(known.edge_gain))), known.edge_gain.shape)
     dc, dc_error = float(known.dc_gain[q, i]), float(known.dc_gain_error[q, i])
@@ -467,7 +363,7 @@ def _warnings(known: Uncertainty, response: FrequencyResponse) -> tuple[str, ...
         extrapolated = f"{rounded_to_error(dc, dc_error)} ± {dc_error:.2g}"
         seen = f"{rounded_to_error(edge, edge_error)} ± {edge_error:.2g}"
         found.append(
-            f"the gain at zero frequency, {extrapolated}, is extrapolated: at {low:.3g} Hz, the lowest excited "
+            f"the gain at zero frequency, {extrapolated}, is extrapolated: at {low:.3g} Hz, the lowest {what} "
             f"frequency, it is {seen}; use the latter."
         )
     return tuple(found)

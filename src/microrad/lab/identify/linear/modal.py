@@ -15,7 +15,7 @@ a = p T, phi1 = (e^a - 1)/a, phi2 = (phi1 - 1)/a. The first two are exact at the
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -56,7 +56,7 @@ class ModalModel:
     direct: Floats
     delay_s: float = 0.0
 
-    @property
+    @cached_property
     def real_poles(self) -> int:
         """Number of modes with a real pole; they stand first."""
         return int(np.count_nonzero(self.poles_rad_s.imag == 0))
@@ -66,7 +66,7 @@ class ModalModel:
         """Number of states."""
         return 2 * self.poles_rad_s.size - self.real_poles
 
-    @property
+    @cached_property
     def all_poles_rad_s(self) -> Complexes:
         """Every pole, conjugates included."""
         return np.concatenate([self.poles_rad_s, self.poles_rad_s[self.real_poles :].conj()])
@@ -92,7 +92,7 @@ class ModalModel:
         inputs, outputs = self.all_vectors
         return np.asarray((outputs * basis[:, None, :]) @ inputs + self.direct)
 
-    @property
+    @cached_property
     def all_vectors(self) -> tuple[Complexes, Complexes]:
         """Input vectors (all poles, inputs) and output vectors (outputs, all poles), conjugates included."""
         b, c = self.input_vectors, self.output_vectors

@@ -73,7 +73,7 @@ def fit_order(
             coarse, _start(response, (freq, values, power), (order, size), direct), iterations=60, tolerance=3e-5
         )
         for _ in range(exchanges):
-            better = _exchanged(coarse, result, response.excited_hz)
+            better = exchanged(coarse, result, response.excited_hz)
             if better is None:
                 break
             result = better
@@ -157,8 +157,14 @@ def _grown(equations: Equations, model: ModalModel, band: tuple[float, float]) -
 
 
 # ------------------------------------------------------------------------------------------------------------- exchange
-def _exchanged(equations: Equations, now: Polished, band: tuple[float, float]) -> Polished | None:
-    """The best of a few exchanges of a weak mode for a promising one, polished; None where none helps."""
+def exchanged(equations: Equations, now: Polished, band: tuple[float, float]) -> Polished | None:
+    """The best of a few exchanges of a weak mode for a promising one, polished; None where none helps.
+
+    Args:
+        equations: The equations to be met.
+        now: The model whose modes are exchanged.
+        band: Lowest frequency above zero and highest one, in Hz, between which modes are sought.
+    """
     best: Polished | None = None
     for poles, inputs in _without_weakest(equations, now.model):
         rest, _ = fit_outputs(equations, poles, inputs)

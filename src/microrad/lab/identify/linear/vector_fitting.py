@@ -18,6 +18,8 @@ from microrad.lab.identify.linear.modal import Hold, ModalModel, hold_basis, ran
 from microrad.lab.identify.records import IdentificationError
 
 _REAL = 1e-9
+_SKETCH = 0.1
+_PATIENCE = 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,10 +45,14 @@ class VectorFit:
         basis = hold_basis(self.poles_rad_s, freq_hz, self.hold, self.rate_hz)[0]
         return np.asarray(np.einsum("fk,koi->foi", basis, self.residues) + self.direct)
 
-    def modes(self) -> ModalModel:
-        """The same system as rank-one modes: singular vectors of each residue, as many as its rank."""
+    def modes(self, most: int | None = None) -> ModalModel:
+        """The same system as rank-one modes: singular vectors of each residue, as many as its rank.
+
+        Args:
+            most: Largest number of modes for one pole, None for no limit.
+        """
         upper = self.poles_rad_s.imag >= 0
-        return rank_one_modes(self.poles_rad_s[upper], self.residues[upper], self.direct)
+        return rank_one_modes(self.poles_rad_s[upper], self.residues[upper], self.direct, most)
 
 
 def vector_fit(
@@ -107,6 +113,123 @@ def vector_fit(
     )
 
 
+def sketched(
+    freq_hz: Floats,
+    response: Complexes,
+    squared: Floats,
+    scale: Floats,
+    order: int,
+    form: tuple[Hold, float | None, bool] = ("band-limited", None, False),
+    *,
+    iterations: int = 15,
+) -> VectorFit:
+    """Vector fit to start a search from, by sums of products in place of QR factorisations: three times as fast.
+
+    It has half the digits, for the sums are squares, and ends when no pole moves by more than a thirtieth of its decay.
+
+    Args:
+        freq_hz: Frequencies, shape (frequencies,).
+        response: The response, shape (frequencies, outputs, inputs).
+        squared: Squared factor on the error, one row for each element or one for all, shape (elements or 1,
+            frequencies).
+        scale: Factor on that for each element, shape (elements, 1).
+        order: Number of poles.
+        form: What stands between the samples of the drive; the sample rate, which a hold other than band-limited needs;
+            whether the direct term is left out.
+        iterations: Largest number of steps, at least 6.
+
+    Raises:
+        numpy.linalg.LinAlgError: Where the sums are singular.
+    """
+    data = response.reshape(freq_hz.size, -1).T
+    hold, rate_hz, _ = form
+    plane_hz = None if hold == "band-limited" else rate_hz
+    points = np.asarray(_to_plane(np.asarray(2j * np.pi * freq_hz), plane_hz))
+    poles, best = starting_poles(freq_hz, order), None
+    heavy = data * squared
+    power = np.sum(scale * (heavy * data.conj()).real, axis=0)
+    size, done, settled = float(np.sqrt(power.sum())), 0, False
+    while done < iterations and not settled:
+        done += 1
+        real, at = int(np.count_nonzero(poles.imag == 0)), _to_plane(poles, plane_hz)
+        columns = _with_one(real_columns(1.0 / (points[:, None] - at), real))
+        own = columns.conj().T
+        gram = ((own * squared[:, None, :]) @ columns).real
+        cross = (own @ (heavy[:, :, None] * columns)).real
+        explained = (scale[:, :, None] * cross.transpose(0, 2, 1) @ np.linalg.solve(gram, cross)).sum(axis=0)
+        left = ((own * power) @ columns).real - explained
+        moved = _to_pole(_zeros_of_sigma(left, columns, size, at, real), plane_hz)
+        moved = _symmetric(np.where(moved.real > 0, -moved.real + 1j * moved.imag, moved))
+        settled = _moved_by(poles, moved) < _SKETCH
+        poles = moved
+        if done >= _PATIENCE or settled:  # noise may drive the poles away again: the best ones count
+            found = _sketched_residues(freq_hz, data, squared, scale, poles, form)
+            if best is not None and found[3] >= best[3]:
+                break
+            best = found
+    assert best is not None
+    return VectorFit(
+        best[0],
+        best[1].reshape(-1, *response.shape[1:]),
+        best[2].reshape(response.shape[1:]),
+        best[3],
+        hold,
+        rate_hz,
+        done,
+        bool(settled),
+    )
+
+
+def _sketched_residues(
+    freq_hz: Floats,
+    data: Complexes,
+    squared: Floats,
+    scale: Floats,
+    poles: Complexes,
+    form: tuple[Hold, float | None, bool],
+) -> tuple[Complexes, Complexes, Floats, float]:
+    """The poles with their residues (poles, elements) and direct term by sums, and the weighted rms error."""
+    hold, rate_hz, strictly_proper = form
+    n = int(np.count_nonzero(poles.imag == 0))
+    m = (poles.size - n) // 2
+    columns = real_columns(hold_basis(poles, freq_hz, hold, rate_hz, rates=False)[0], n)
+    if not strictly_proper:
+        columns = _with_one(columns)
+    own = columns.conj().T
+    gram, target = ((own * squared[:, None, :]) @ columns).real, (data * squared @ columns.conj()).real
+    solved = np.linalg.solve(gram, target[:, :, None])[:, :, 0]
+    error = np.abs(data - solved @ columns.T) ** 2
+    pair = solved[:, n : n + m] + 1j * solved[:, n + m : n + 2 * m]
+    residues = np.concatenate([solved[:, :n], pair, pair.conj()], axis=1).T
+    direct: Floats = np.zeros(len(data)) if strictly_proper else np.asarray(solved[:, -1])
+    return poles, np.asarray(residues), direct, float(np.sqrt(np.sum(scale * squared * error) / data.size))
+
+
+def _with_one(columns: Complexes) -> Complexes:
+    return np.concatenate([columns, np.ones((len(columns), 1))], axis=1)
+
+
+def _zeros_of_sigma(left: Floats, columns: Complexes, size: float, poles: Complexes, real: int) -> Complexes:
+    """Zeros of the scaling function that leaves least while the sum of its real part is given (relaxed)."""
+    row = columns.real.sum(axis=0) * (size / len(columns))
+    system = left + row[:, None] * row
+    if not (system.diagonal() > 0).all():  # rounding has left nothing of a column
+        raise np.linalg.LinAlgError("the sums are singular")
+    length = np.sqrt(system.diagonal())
+    sigma = np.linalg.solve(system / (length[:, None] * length), row * size / length) / length
+    last = sigma[-1] if abs(sigma[-1]) > 1e-8 else np.copysign(1e-8, sigma[-1])
+    A, b = _sigma_realisation(poles[:real].real, poles[real : (len(poles) + real) // 2])
+    return np.linalg.eigvals(A - b[:, None] * (sigma[:-1] / last)).astype(complex)
+
+
+def _moved_by(before: Complexes, after: Complexes) -> float:
+    """Largest way of a pole over its decay; infinite where a pair has become two real poles or the other way round."""
+    if np.count_nonzero(before.imag) != np.count_nonzero(after.imag):
+        return np.inf
+    a, b = (poles[np.argsort(np.abs(poles) + (poles.imag != 0) * 1e300)] for poles in (before, after))
+    return float(np.max(np.abs(np.abs(a) - np.abs(b)) / np.abs(b.real) + np.abs(a.real / b.real - 1.0)))
+
+
 def check_order(freq: Floats, order: int) -> None:
     """Check that a number of poles can be fitted to so many frequencies.
 
@@ -148,7 +271,8 @@ def starting_poles(freq_hz: Floats, order: int) -> Complexes:
         freq_hz: Frequencies, in Hz, shape (frequencies,).
         order: Number of poles.
     """
-    at = np.quantile(np.sort(freq_hz), (np.arange(order // 2) + 0.5) / max(order // 2, 1))
+    quantiles = (np.arange(order // 2) + 0.5) / max(order // 2, 1)
+    at = np.interp(quantiles * (freq_hz.size - 1), np.arange(freq_hz.size), np.sort(freq_hz))
     pairs = 2 * np.pi * at * (-0.01 + 1j)
     real = [-2 * np.pi * float(np.median(freq_hz))] if order % 2 else []
     return np.concatenate([np.array(real, dtype=complex), pairs, pairs.conj()])

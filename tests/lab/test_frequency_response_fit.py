@@ -1,0 +1,417 @@
+"""`fit_frequency_response`: recovery within its error bars, stability, order, weights, holds, delay, and refusals."""
+
+import re
+import sys
+
+import control as python_control
+import numpy as np
+import pytest
+
+from microrad import IdentificationError, fit_frequency_response
+from microrad.core import lti
+from microrad.lab.identify.linear.elements import ElementEquations
+from microrad.lab.identify.linear.modal import ModalModel
+from microrad.lab.identify.linear.polish import FrequencyEquations, fit_outputs, normal_equations, pack, polish, unpack
+from microrad.lab.identify.linear.uncertainty import _slopes, transfer_matrix
+from microrad.lab.identify.linear.vector_fitting import sketched, vector_fit
+from microrad.lab.identify.statistics import central_differences
+from places import ROOT
+from response_tables import (
+    TABLES,
+    anti_resonances,
+    close_poles,
+    heavy_damping,
+    mirror_two_axes,
+    noisy,
+    one_drive_three_sensors,
+    one_resonance,
+    oscillators,
+    real_poles,
+    slow_response,
+    three_axes,
+    wide_range,
+)
+
+FREQ_HZ = np.geomspace(10, 1000, 60)
+FLAT = np.ones(60, dtype=complex)
+
+
+def drawn_again(table, seed):
+    return noisy(table.true_response, table.standard_error, np.random.default_rng(1000 + seed))
+
+
+def ways(found, truth):
+    """Of each true pole the way to the nearest found one, and which that is."""
+    apart = np.abs(found[:, None] - truth[None, :])
+    return apart.min(axis=0), apart.argmin(axis=0)
+
+
+# ------------------------------------------------------------------------------------------------------------- recovery
+@pytest.mark.parametrize("build", TABLES)
+def test_without_noise_the_system_is_recovered_to_rounding(build):
+    table = build()
+    fit = fit_frequency_response(table.freq_hz, table.true_response, table.order)
+    assert fit.relative_rms_error < 1e-11
+    distance, _ = ways(fit.poles_rad_s, table.poles)
+    assert (distance < 1e-5 * np.abs(table.poles)).all()  # poles of small residues have the fewest digits
+    assert np.abs(fit.system.D - table.system[3]).max() < 1e-6 * np.abs(table.true_response).max()
+    np.testing.assert_allclose(
+        lti.frequency_response(fit.system, table.freq_hz), fit.response(table.freq_hz), rtol=1e-6
+    )
+
+
+@pytest.mark.parametrize("given", [True, False], ids=["errors given", "from the residual"])
+@pytest.mark.parametrize("build", [one_resonance, real_poles, heavy_damping, one_drive_three_sensors])
+def test_standard_errors_cover_the_truth_as_often_as_they_say(build, given):
+    """Noise of one size in each element: what is left of it is its estimate where it is not given."""
+    table = build()
+    level = np.full_like(table.standard_error, np.median(table.standard_error))
+    gain = slow_response(table.system, np.zeros(1))[0].real
+    squared, held = [], []
+    for seed in range(40):
+        response = noisy(table.true_response, level, np.random.default_rng(seed))
+        error = level if given else None
+        fit = fit_frequency_response(table.freq_hz, response, table.order, standard_error=error)
+        distance, which = ways(fit.poles_rad_s, table.poles)
+        squared.append((distance / fit.known.poles_error_rad_s[which]) ** 2)
+        held.append(np.abs(fit.known.dc_gain - gain) < 1.96 * fit.known.dc_gain_error)
+    assert 0.75 < np.mean(squared) < 1.3  # of complex normal errors in their deviation 1
+    assert 0.89 <= np.mean(held) <= 1.0
+
+
+def test_zeros_have_their_errors_too():
+    table = mirror_two_axes()
+    system = lti.StateSpace(*table.system)
+    truth = lti.zeros(system)
+    squared = []
+    for seed in range(25):
+        response = drawn_again(table, seed)
+        fit = fit_frequency_response(table.freq_hz, response, table.order, standard_error=table.standard_error)
+        distance, which = ways(fit.zeros_rad_s, truth)
+        squared.append((distance / fit.known.zeros_error_rad_s[which]) ** 2)
+    assert 0.7 < np.mean(squared) < 1.35
+
+
+def test_the_gain_at_the_lowest_frequency_and_its_error():
+    table = heavy_damping()
+    fit = fit_frequency_response(table.freq_hz, table.response, table.order, standard_error=table.standard_error)
+    off = (fit.known.edge_gain - np.abs(table.true_response[0])) / fit.known.edge_gain_error
+    assert np.abs(off).max() < 3.5
+    assert (fit.known.edge_gain_error < table.standard_error[0]).all()  # all frequencies say more than one
+
+
+@pytest.mark.parametrize(
+    "build", [anti_resonances, heavy_damping, close_poles, mirror_two_axes, one_drive_three_sensors]
+)
+def test_the_distance_to_the_table_is_least(build):
+    """A search that goes on to rounding gains less than a hundredth of what a standard error is worth."""
+    table = build()
+    fit = fit_frequency_response(table.freq_hz, table.response, table.order, standard_error=table.standard_error)
+    weight = np.sqrt(2) / table.standard_error
+    equations = ElementEquations(table.freq_hz, table.response, weight, "band-limited", None)
+    cost = float(np.sum(np.abs(weight * fit.residual) ** 2))
+    assert cost == pytest.approx(normal_equations(equations, fit.modes)[2], rel=1e-9)
+    assert 0 <= cost - polish(equations, fit.modes, iterations=100, tolerance=1e-12).cost < 0.01
+
+
+# ------------------------------------------------------------------------------------------------------------ stability
+@pytest.mark.parametrize("build", TABLES)
+def test_fits_are_stable_and_leave_the_noise(build):
+    table = build()
+    fit = fit_frequency_response(table.freq_hz, table.response, table.order, standard_error=table.standard_error)
+    assert (np.linalg.eigvals(fit.system.A).real < 0).all()
+    assert fit.order == table.order == len(fit.system.A)
+    assert 0.8 < fit.chi_square < 1.15
+    assert (
+        np.abs(fit.residual - (table.response - fit.response(table.freq_hz))).max()
+        < 1e-12 * np.abs(table.response).max()
+    )
+    error = np.linalg.norm(fit.residual) / np.linalg.norm(table.response)
+    assert fit.relative_rms_error == pytest.approx(error, rel=1e-12)
+
+
+@pytest.mark.parametrize("order", [1, 2, 5, 12])
+def test_what_is_unstable_or_nothing_but_noise_gives_a_stable_model(order):
+    s = 2j * np.pi * FREQ_HZ
+    noise = np.random.default_rng(1).standard_normal((60, 2, 2)) + 0j
+    for response in (1 / (s - 300.0) + 1 / (s + 800.0), np.exp(-s * 3e-3), noise, 0 * FLAT + 2.0):
+        fit = fit_frequency_response(FREQ_HZ, response, order)
+        assert (np.linalg.eigvals(fit.system.A).real < 0).all()
+        assert np.isfinite(fit.response(FREQ_HZ)).all()
+
+
+# ---------------------------------------------------------------------------------------------------------------- order
+@pytest.mark.parametrize("build", [one_resonance, real_poles, heavy_damping, close_poles, wide_range, mirror_two_axes])
+def test_the_scan_finds_the_true_order_and_says_why(build):
+    table = build()
+    fit = fit_frequency_response(table.freq_hz, table.response, standard_error=table.standard_error)
+    assert fit.order == table.order
+    assert fit.reason.startswith(f"order {table.order} has the least criterion")
+    assert [score.order for score in fit.scan] == list(range(1, table.order + 7))  # until six in a row gain nothing
+    score = fit.scan[fit.order - 1]
+    assert score.output_error_rms == pytest.approx(np.sqrt(np.mean(np.abs(fit.residual) ** 2)), rel=1e-9)
+
+
+def test_several_orders_are_compared_and_one_is_taken_as_it_is():
+    table = one_resonance()
+    done = []
+    fit = fit_frequency_response(table.freq_hz, table.response, [4, 1, 2], on_progress=lambda *step: done.append(step))
+    assert [score.order for score in fit.scan] == [1, 2, 4]
+    assert fit.order == 2
+    assert "no standard errors were given, so the variance is the least that any of these orders leaves" in fit.reason
+    assert done == [(1, 3, "order 1"), (2, 3, "order 2"), (3, 3, "order 4")]
+    one = fit_frequency_response(table.freq_hz, table.response, np.int64(3))
+    assert (one.order, one.scan, one.reason) == (3, (), "order 3 was given")
+
+
+# -------------------------------------------------------------------------------------------------------------- weights
+def test_weights_decide_where_the_error_is():
+    table = wide_range()
+    known = fit_frequency_response(table.freq_hz, table.response, 5, standard_error=table.standard_error)
+    alike = fit_frequency_response(table.freq_hz, table.response, 5)
+    high = table.freq_hz > 500  # the resonance, a thousandth of what is left of at low frequencies
+    error = [np.abs(f.response(table.freq_hz) / table.true_response - 1)[high].max() for f in (known, alike)]
+    assert error[0] < 2e-3
+    assert error[1] > 20 * error[0]
+
+
+def test_a_frequency_of_large_error_does_not_count():
+    table = one_resonance()
+    spoilt, error = table.response.copy(), table.standard_error.copy()
+    spoilt[50] += 100.0
+    error[50] = 1e4
+    fit = fit_frequency_response(table.freq_hz, spoilt, 2, standard_error=error)
+    without = np.delete(np.arange(200), 50)
+    other = fit_frequency_response(
+        table.freq_hz[without], table.response[without], 2, standard_error=table.standard_error[without]
+    )
+    np.testing.assert_allclose(fit.poles_rad_s, other.poles_rad_s, rtol=1e-8)
+    one_each = fit_frequency_response(table.freq_hz, spoilt[:, 0, 0], 2, standard_error=error[:, 0, 0])
+    np.testing.assert_allclose(one_each.poles_rad_s, fit.poles_rad_s, rtol=1e-12)
+
+
+def test_the_result_says_what_its_errors_rest_on():
+    table = anti_resonances()
+    fit = fit_frequency_response(table.freq_hz, table.response, 6)
+    assert fit.errors_from.startswith("the residual: no standard errors were given")
+    assert any("where the response is large" in text for text in fit.warnings)  # the noise is a share of the response
+    given = fit_frequency_response(table.freq_hz, table.response, 6, standard_error=table.standard_error)
+    assert given.errors_from.startswith("the standard errors given; chi-square per degree of freedom is 1.0")
+    assert given.warnings == ()
+    small = fit_frequency_response(table.freq_hz, table.response, 6, standard_error=table.standard_error / 4)
+    assert "times 4.0" in small.errors_from
+    assert "the model leaves 4.0" in small.warnings[0]
+    np.testing.assert_allclose(small.known.poles_error_rad_s, given.known.poles_error_rad_s, rtol=0.05)
+
+
+def test_poles_beyond_the_table_are_named():
+    table = real_poles()
+    middle = (table.freq_hz > 30) & (table.freq_hz < 3000)
+    fit = fit_frequency_response(table.freq_hz[middle], table.true_response[middle], 4)
+    (text, *_) = fit.warnings
+    assert text.startswith("poles at 1, 10 Hz outside the measured band, 30.")
+    assert "the table shows only the flank" in text
+
+
+# ------------------------------------------------------------------------------------------------------- hold and delay
+@pytest.mark.parametrize("hold", ["zero-order", "first-order"])
+def test_a_sampled_table_gives_the_continuous_system_behind_its_hold(hold):
+    rate_hz, freq = 5000.0, np.linspace(5, 2400, 300)
+    A, B, C, D = oscillators([90, 900], [0.02, 0.05], [1.0, 0.3])
+    Ad, B0, B1 = lti.first_order_hold(A, B, 1 / rate_hz)
+    if hold == "zero-order":
+        B0, B1 = B0 + B1, 0 * B1
+    z = np.exp(2j * np.pi * freq / rate_hz)
+    sampled = np.array([C @ np.linalg.solve(p * np.eye(4) - Ad, B0 + p * B1) + D for p in z])
+    fit = fit_frequency_response(freq, sampled, 4, hold=hold, rate_hz=rate_hz)
+    np.testing.assert_allclose(np.sort_complex(fit.poles_rad_s), np.sort_complex(np.linalg.eigvals(A)), rtol=1e-8)
+    np.testing.assert_allclose(fit.response(freq), sampled, rtol=1e-6, atol=1e-9)
+    exact = slow_response((A, B, C, D), freq)
+    assert np.abs(lti.frequency_response(fit.system, freq) - exact).max() < 1e-7 * np.abs(exact).max()
+
+
+def test_strictly_proper():
+    table = mirror_two_axes()
+    fit = fit_frequency_response(table.freq_hz, table.true_response, 8, strictly_proper=True)
+    assert not fit.system.D.any()
+    assert fit.relative_rms_error > 0.1  # of a system that has a direct term
+    proper = fit_frequency_response(table.freq_hz, table.true_response - table.system[3], 8, strictly_proper=True)
+    assert proper.relative_rms_error < 1e-9
+
+
+def test_a_delay_is_found_with_its_error():
+    table, delay_s = mirror_two_axes(), 1e-4
+    turn = np.exp(-2j * np.pi * table.freq_hz * delay_s)[:, None, None]
+    off = []
+    for seed in range(3):
+        response = drawn_again(table, seed) * turn
+        fit = fit_frequency_response(table.freq_hz, response, 8, standard_error=table.standard_error, delay=True)
+        off.append((fit.delay_s - delay_s) / fit.known.delay_error_s)
+        assert 3e-8 < fit.known.delay_error_s < 7e-8
+        assert fit.relative_rms_error < 0.011
+    assert np.abs(off).max() < 3.5
+    assert fit_frequency_response(table.freq_hz, table.response, 8).delay_s == 0.0
+
+
+def test_a_delay_that_the_table_leaves_open_is_said():
+    """Modes without a direct term: a short delay changes their gains and nothing else."""
+    table = anti_resonances()
+    fit = fit_frequency_response(table.freq_hz, table.true_response, 6, standard_error=table.standard_error, delay=True)
+    assert fit.delay_s < 1e-4
+    assert "the table does not fix the delay: its standard error is" in fit.warnings[0]
+
+
+# ------------------------------------------------------------------------------------------------------- python-control
+def test_round_trip_to_python_control():
+    table = three_axes()
+    fit = fit_frequency_response(table.freq_hz, table.response, 12)
+    system = fit.to_control()
+    assert isinstance(system, python_control.StateSpace)
+    assert system.isctime()
+    response = python_control.frequency_response(system, 2 * np.pi * table.freq_hz).complex
+    np.testing.assert_allclose(np.moveaxis(response, 2, 0), fit.response(table.freq_hz), rtol=1e-8, atol=1e-10)
+    back = fit_frequency_response(table.freq_hz, np.moveaxis(response, 2, 0), 12)
+    np.testing.assert_allclose(np.sort_complex(back.poles_rad_s), np.sort_complex(fit.poles_rad_s), rtol=1e-6)
+
+
+def test_without_python_control_it_says_how_to_install_it(monkeypatch):
+    fit = fit_frequency_response(FREQ_HZ, 1 / (1 + 1j * FREQ_HZ / 100), 1)
+    monkeypatch.setitem(sys.modules, "control", None)
+    with pytest.raises(IdentificationError, match=r"python-control is not installed.*pip install.*\[control\]"):
+        fit.to_control()
+
+
+# ---------------------------------------------------------------------------------------------------------------- page
+def test_the_example_of_the_page_prints_what_stands_below_it(tmp_path, monkeypatch, capsys):
+    table = anti_resonances()
+    response = table.response[:, 0, 0]
+    columns = np.column_stack([table.freq_hz, np.abs(response), np.degrees(np.angle(response))])
+    np.savetxt(tmp_path / "bode.csv", columns, delimiter=",", header="frequency,gain,phase", comments="")
+    monkeypatch.chdir(tmp_path)
+    page = (ROOT / "docs" / "identify.md").read_text(encoding="utf-8")
+    ((code, printed),) = re.findall(
+        r"```python\n([^`]*fit_frequency_response[^`]*)```\n\n```text\n(.*?)```", page, re.DOTALL
+    )
+    exec(code, {})
+    assert capsys.readouterr().out == printed
+
+
+# ------------------------------------------------------------------------------------------------------------- refusals
+def spoilt(values, at, value):
+    values = np.array(values)
+    values[at] = value
+    return values
+
+
+@pytest.mark.parametrize(
+    ("freq", "response", "words", "message"),
+    [
+        (FREQ_HZ, FLAT[:50], {}, "the response has 50 rows and there are 60 frequencies; give one row for each"),
+        (
+            FREQ_HZ[:4],
+            FLAT[:4],
+            {"orders": 5},
+            "4 frequencies cannot fix 5 poles; give at least 6 frequencies or a lower",
+        ),
+        (FREQ_HZ[:6], FLAT[:6], {"orders": 5, "delay": True}, "order 5 has 12 numbers, and 6 frequencies give 12 real"),
+        (
+            FREQ_HZ,
+            spoilt(FLAT, 7, np.nan),
+            {},
+            f"the response at {FREQ_HZ[7]:g} Hz is not finite; leave that frequency",
+        ),
+        (spoilt(FREQ_HZ, 7, np.inf), FLAT, {}, "frequency 8 is inf, which is not finite; leave it out"),
+        (
+            spoilt(FREQ_HZ, 7, 10.0),
+            FLAT,
+            {},
+            "frequency 8, 10 Hz, does not lie above the one before it.*sort the table",
+        ),
+        (FREQ_HZ - 11.0, FLAT, {}, "frequency 1 is -1 Hz, below 0; leave it out"),
+        (np.zeros((2, 30)), FLAT, {}, r"frequencies have the shape \(2, 30\); give one list"),
+        ([], [], {}, r"frequencies have the shape \(0,\); give one list"),
+        (FREQ_HZ, FLAT.reshape(60, 1), {}, r"response has the shape \(60, 1\); give \(frequencies,\) for one element"),
+        (FREQ_HZ, np.zeros((60, 0, 2)), {}, r"response has the shape \(60, 0, 2\); give"),
+        (FREQ_HZ, 0 * FLAT, {}, "the response is 0 at all frequencies, so there is nothing to fit"),
+        ([0.0], [1.0], {}, "the only frequency is 0 Hz; give frequencies above it"),
+        ([1.0], [1.0], {}, "1 frequencies cannot fix 1 poles; give at least 2 frequencies or a lower order"),
+        (FREQ_HZ, FLAT, {"orders": 0}, "the order is 0; give at least one pole"),
+        (FREQ_HZ, FLAT, {"orders": [2, -1]}, "the order is -1; give at least one pole"),
+        (FREQ_HZ, FLAT, {"orders": []}, "no order was given to choose from"),
+        (
+            FREQ_HZ,
+            FLAT,
+            {"standard_error": spoilt(np.ones(60), 3, 0.0)},
+            f"the standard error at {FREQ_HZ[3]:g} Hz is 0; each must be above 0: leave out what was not measured",
+        ),
+        (FREQ_HZ, FLAT, {"standard_error": spoilt(np.ones(60), 3, np.inf)}, "the standard error at .* is not finite"),
+        (
+            FREQ_HZ,
+            FLAT,
+            {"standard_error": np.ones((60, 2))},
+            r"standard errors have the shape \(60, 2\), the response \(60,\); give that shape, or one for each",
+        ),
+        (
+            FREQ_HZ,
+            FLAT,
+            {"rate_hz": 2000.0},
+            "the table reaches 1000 Hz, half the sample rate of 2000 Hz or more; leave",
+        ),
+        (FREQ_HZ, FLAT, {"rate_hz": 0.0}, "the sample rate is 0 Hz; give a rate above 0"),
+        (FREQ_HZ, FLAT, {"hold": "zero-order"}, "a zero-order hold needs the sample rate; give rate_hz"),
+        (FREQ_HZ, FLAT, {"hold": "second-order"}, "hold 'second-order' is not known; use zero-order, first-order or"),
+    ],
+)
+def test_refusals(freq, response, words, message):
+    with pytest.raises(IdentificationError, match=message):
+        fit_frequency_response(freq, response, **words)
+
+
+def test_a_frequency_of_zero_is_taken():
+    freq = np.concatenate([[0.0], FREQ_HZ])
+    fit = fit_frequency_response(freq, 1 / (1 + 1j * freq / 100), 1)
+    np.testing.assert_allclose(fit.poles_rad_s, [-200 * np.pi], rtol=1e-9)
+
+
+# ---------------------------------------------------------------------------------------- what the fast sums stand for
+@pytest.mark.parametrize("direct", [True, False])
+@pytest.mark.parametrize("apart", [0.0, 1e-9], ids=["one weight", "a weight for each element"])
+def test_sums_by_element_are_those_of_the_rows(direct, apart):
+    table = mirror_two_axes()
+    found = vector_fit(table.freq_hz, table.response, 8).modes(most=1)
+    weight = np.repeat(np.linspace(1, 3, table.freq_hz.size), 4).reshape(table.response.shape)
+    power = (weight[:, 0, 0] ** 2)[:, None, None] * np.eye(2)
+    turned = weight * (1 + apart * np.random.default_rng(0).standard_normal(weight.shape))
+    rows = FrequencyEquations(table.freq_hz, table.response, power, "band-limited", None, direct=direct)
+    sums = ElementEquations(table.freq_hz, table.response, turned, "band-limited", None, direct=direct)
+    assert len(sums.squared) == (1 if apart == 0 else 4)
+    (one, cost), (other, other_cost) = (fit_outputs(e, found.poles_rad_s, found.input_vectors) for e in (rows, sums))
+    assert other_cost == pytest.approx(cost, rel=1e-6)
+    np.testing.assert_allclose(other.output_vectors, one.output_vectors, rtol=1e-5, atol=1e-6)
+    for a, b in zip(normal_equations(rows, one), normal_equations(sums, one), strict=True):
+        np.testing.assert_allclose(b, a, rtol=1e-6, atol=1e-6 * np.abs(a).max())
+
+
+@pytest.mark.parametrize("direct", [True, False])
+def test_slopes_are_those_of_differences(direct):
+    generator = np.random.default_rng(3)
+    poles = np.array([-3.0 + 0j, -2.0 + 5j, -1.0 + 9j])
+    b, c = (generator.standard_normal(shape) + 1j * generator.standard_normal(shape) for shape in ((3, 2), (3, 3)))
+    b[0], c[:, 0] = b[0].real, c[:, 0].real
+    model = ModalModel(poles, b, c, generator.standard_normal((3, 2)) * direct)
+    points = np.array([0.0, 4j, -1.5 + 3j])
+    theta = pack(model, direct)
+    steps = np.full(theta.size, 1e-5)
+    slow = central_differences(lambda moved: transfer_matrix(unpack(moved, model), points), theta, steps)
+    np.testing.assert_allclose(_slopes(model, points, direct), slow, atol=1e-8)
+
+
+@pytest.mark.parametrize("build", [one_resonance, heavy_damping, three_axes])
+def test_the_sketch_is_near_the_vector_fit(build):
+    table = build()
+    one = np.ones((1, table.freq_hz.size))
+    fast = sketched(table.freq_hz, table.response, one, np.ones((table.response[0].size, 1)), table.order)
+    slow = vector_fit(table.freq_hz, table.response, table.order)
+    assert fast.rms_error == pytest.approx(slow.rms_error, rel=0.01)
+    distance, _ = ways(fast.poles_rad_s, slow.poles_rad_s)
+    assert (distance < 0.1 * np.abs(slow.poles_rad_s.real)).all()
