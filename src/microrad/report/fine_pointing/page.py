@@ -178,9 +178,11 @@ def designs(
     margins = "modulus", "gain (dB)", "phase (°)", "delay (µs)", "disk", "bandwidth (Hz)", "crossover (Hz)"
     headings = ("controller", *between, "tuned to", *margins, "bound by")
     said = "Bandwidth: lowest frequency at which the sensitivity reaches 0 dB."
-    if any(row[headings.index("crossover (Hz)")] for row in rows):  # a loop of several axes has none
+    filled = [i for i in range(len(headings)) if any(row[i] for row in rows)]
+    if headings.index("crossover (Hz)") in filled:  # a loop of several axes has none, and no delay margin
         said += " Crossover: highest frequency at which the loop gain does."
-    return about, Table("", headings, rows, (0, 1 + len(between), len(headings) - 1), best=best), Soft(said)
+    table = Table("", headings, rows, (0, 1 + len(between), len(headings) - 1), best=best)
+    return about, table.columns(filled), Soft(said)
 
 
 def design_cells(tuned: str, margins: LoopMargins, bound_by: Sequence[str]) -> tuple[str, ...]:
