@@ -368,7 +368,7 @@ class Retimed(NamedTuple):
     K: Floats
 
 
-def retimed(plant: kernels.Plant) -> Retimed:
+def retimed(plant: kernels.Plant | kernels.PlayPlant) -> Retimed:
     """The plant with u and z in each product once.
 
     Args:
@@ -376,11 +376,11 @@ def retimed(plant: kernels.Plant) -> Retimed:
     """
     return Retimed(
         B=plant.B0 + kernels.advanced(plant, plant.B1),
-        E=plant.E_held - plant.E1 + kernels.advanced(plant, plant.E1),
+        E=kernels.advanced(plant, plant.E1) + plant.E_held - plant.E1,
         H=plant.F @ plant.E1,
         G=plant.G + plant.F @ plant.B1,
         D=plant.D + plant.C @ plant.B1,
-        K=plant.K + plant.CE1,
+        K=plant.K + plant.C @ plant.E1,
     )
 
 

@@ -107,12 +107,21 @@ def relative_spread(table: Mirror) -> float:
     return float(np.sqrt(shares @ relative_covariance(table) @ shares))
 
 
+def nothing_known(name: str) -> ValueError:
+    """The refusal to draw mirrors from a file that says nothing of its uncertainty.
+
+    Args:
+        name: The mirror's name.
+    """
+    return ValueError(
+        f'the mirror "{name}" has no table uncertainty, so nothing can be drawn; `microrad identify` writes one into '
+        "its mirror file"
+    )
+
+
 def _uncertainty(table: Mirror) -> Uncertainty:
     if table.uncertainty is None:
-        raise ValueError(
-            f'the mirror "{table.name}" has no table uncertainty, so nothing can be drawn; `microrad identify` writes '
-            "one into its mirror file"
-        )
+        raise nothing_known(table.name)
     return table.uncertainty
 
 

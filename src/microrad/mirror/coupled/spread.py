@@ -11,6 +11,7 @@ from microrad.core import lti
 from microrad.core.arrays import Floats
 from microrad.mirror.coupled.records import CoupledMirror, Known, modes
 from microrad.mirror.hysteresis import BoucWen, Play, rest_gain, slow_gain
+from microrad.mirror.spread import nothing_known
 from microrad.mission.tables.mirror import least_alpha_1_v
 
 TRIES = 1000
@@ -92,10 +93,7 @@ def moved(mirror: CoupledMirror, normals: Floats) -> CoupledMirror:
 
 def _known(mirror: CoupledMirror) -> Known:
     if mirror.known is None:
-        raise ValueError(
-            f'the mirror "{mirror.mirror.name}" has no table uncertainty, so nothing can be drawn; `microrad identify` '
-            "writes one into its mirror file"
-        )
+        raise nothing_known(mirror.mirror.name)
     return mirror.known
 
 

@@ -257,6 +257,7 @@ def _tangents(
     plant: kernels.PlayPlant, places: np.ndarray, signals: tuple[Floats, ...], kind: np.dtype
 ) -> kernels.Tangents:
     states, operators, count = plant.diagonal.size, plant.K.shape[1], places.shape[1]
+    once = mirror.retimed(plant)
     place, row, source, turned = np.ascontiguousarray(places)
     ends = np.array([np.count_nonzero(place == _STATE), np.count_nonzero(place != _BANK)])
 
@@ -268,9 +269,9 @@ def _tangents(
     live[row[ends[0] :]] = True
     return kernels.Tangents(
         plant=kernels.PlayPlant(*(v.astype(kind) if v.dtype == np.float64 else v for v in plant)),
-        held=(kernels.advanced(plant, plant.E1) + plant.E_held - plant.E1).astype(kind),
-        strain=(plant.F @ plant.E1).astype(kind),
-        through=(plant.C @ plant.E1 + plant.K).astype(kind),
+        held=once.E.astype(kind),
+        strain=once.H.astype(kind),
+        through=once.K.astype(kind),
         live=np.flatnonzero(live),
         seen=np.flatnonzero(plant.F.any(axis=0)),
         places=ends,
