@@ -31,11 +31,11 @@ from microrad.loop.pointing_loop import loop as fine
 from microrad.loop.pointing_loop.design import behind_filter, design_plant
 from microrad.loop.pointing_loop.traces import replay
 from microrad.loop.sensor import OpticalSensor, StrainGauge
-from microrad.mirror.hysteresis import NO_CREEP, Creep, Play
+from microrad.mirror.hysteresis import NO_CREEP, Creep, PrandtlIshlinskii
 
 RATE_HZ = 5000
 GAIN = 89e-6
-PLAYS = Play(
+PLAYS = PrandtlIshlinskii(
     (0.0, 0.05, 0.1, 0.2, 0.4, 0.7, 1.1, 1.6), tuple(GAIN * w for w in (0.6, 0.06, 0.06, 0.07, 0.07, 0.05, 0.05, 0.04))
 )
 CREEP = Creep((1e-6, 1e-6, 1e-6), (0.1, 1.0, 10.0))
@@ -43,16 +43,16 @@ FILTER = fine.ReferenceFilter(1000.0)
 NOTHING = np.empty((0, 0, 0))
 
 
-def changed(gain: float, width: float = 1.0, stretch: float = 1.0) -> Play:
+def changed(gain: float, width: float = 1.0, stretch: float = 1.0) -> PrandtlIshlinskii:
     """The plays with another gain, loops wider by the weights beyond the first, and thresholds times a factor."""
     weights = np.array(PLAYS.weights_rad_v)
     weights[1:] *= width
     weights[0] = sum(PLAYS.weights_rad_v) - weights[1:].sum()
-    return Play(tuple(stretch * r for r in PLAYS.thresholds_v), tuple((gain * weights).tolist()))
+    return PrandtlIshlinskii(tuple(stretch * r for r in PLAYS.thresholds_v), tuple((gain * weights).tolist()))
 
 
 def loop_of(
-    model: Play, creep: Creep = NO_CREEP, axes: int = 1, jitter: float = 1.0, body: float = 1.0
+    model: PrandtlIshlinskii, creep: Creep = NO_CREEP, axes: int = 1, jitter: float = 1.0, body: float = 1.0
 ) -> fine.PointingLoop:
     """A fine-pointing loop as the shipped mission's, around a mirror of plays."""
     one = mirror.model.assemble("plays", "static", None, model, creep)

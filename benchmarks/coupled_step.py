@@ -23,7 +23,7 @@ from microrad.loop.pointing_loop import kernel_arrays
 from microrad.loop.pointing_loop.loop import LoopController, PointingLoop
 from microrad.loop.sensor import OpticalSensor
 from microrad.mirror import model
-from microrad.mirror.hysteresis import Play
+from microrad.mirror.hysteresis import PrandtlIshlinskii
 from microrad.mirror.model import Mirror
 
 HERE = Path(__file__).resolve().parent
@@ -42,7 +42,9 @@ def made_up(modes: int, springs: int) -> Mirror:
     B, C, E, F = np.zeros((n, 3)), np.zeros((3, n)), np.zeros((n, springs)), np.zeros((springs, n))
     B[1::2], C[:, 0::2] = -w[:, None] * rng.standard_normal((modes, 3)), 1e-6 * rng.standard_normal((3, modes))
     E[1::2], F[:, 0::2] = -0.3 * w[:, None] * phi, phi.T
-    plays = tuple(Play(THRESHOLDS, (0.0, *rng.uniform(0.1, 0.3, len(THRESHOLDS) - 1))) for _ in range(springs))
+    plays = tuple(
+        PrandtlIshlinskii(THRESHOLDS, (0.0, *rng.uniform(0.1, 0.3, len(THRESHOLDS) - 1))) for _ in range(springs)
+    )
     G, D, K = np.zeros((springs, 3)), np.zeros((3, 3)), 1e-7 * rng.standard_normal((3, springs))
     return Mirror(f"{n} states, {springs} springs", A, B, E, F, G, C, D, K, (), plays, ())
 

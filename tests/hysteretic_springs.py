@@ -8,7 +8,7 @@ from microrad.core import lti
 from microrad.loop.disturbance import Reference
 from microrad.loop.pointing_loop.loop import LoopController, PointingLoop
 from microrad.mirror.coupled import Actuator, CoupledMirror, Output
-from microrad.mirror.hysteresis import BoucWen, Play
+from microrad.mirror.hysteresis import BoucWen, PrandtlIshlinskii
 from microrad.mirror.model import Mirror
 
 GAIN_RAD_V, RESONANCES_HZ, DAMPING = 20e-6, (640.0, 700.0), 0.02
@@ -19,7 +19,7 @@ BODY_HZ = 0.1
 BOUC_WEN = BoucWen(0.0, 0.0, -0.25, 0.0, 0.1, -0.025)
 """Half of its loop is 13 % of a swing of 15 V."""
 
-PLAYS = Play((0.0, 0.5, 2.0, 8.0), (0.0, 0.05, 0.05, 0.08), polynomial_rad=(0.3, 2.0, -1.0), reach_v=50.0)
+PLAYS = PrandtlIshlinskii((0.0, 0.5, 2.0, 8.0), (0.0, 0.05, 0.05, 0.08), polynomial_rad=(0.3, 2.0, -1.0), reach_v=50.0)
 
 FAMILIES = {"Bouc-Wen": BOUC_WEN, "plays": PLAYS}
 
@@ -35,7 +35,7 @@ def on_springs(spring):
     C[:, ::2] = GAIN_RAD_V * np.array([[1.0, 0.04], [-0.02, 1.0]])
     none = np.zeros((2, 2))
     bank = (spring, spring) if isinstance(spring, BoucWen) else ()
-    plays = (spring, spring) if isinstance(spring, Play) else ()
+    plays = (spring, spring) if isinstance(spring, PrandtlIshlinskii) else ()
     mirror = Mirror("two springs", lti.modal_matrix(roots), B, E, F, none, C, none, none, bank, plays, ())
     actuators = tuple(Actuator(f"tilt {axis}", 50.0, 0.0, 100.0, 1e5) for axis in "xy")
     outputs = tuple(Output(axis, "angle") for axis in "xy")

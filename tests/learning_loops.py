@@ -9,11 +9,11 @@ from microrad.loop import control, disturbance
 from microrad.loop.pointing_loop import loop as fine
 from microrad.loop.sensor import OpticalSensor, StrainGauge
 from microrad.mirror import model as mirror
-from microrad.mirror.hysteresis import NO_CREEP, Creep, Play
+from microrad.mirror.hysteresis import NO_CREEP, Creep, PrandtlIshlinskii
 from microrad.mission.file import load_mission
 from shipped import SHIPPED
 
-PLAYS = Play((0.0, 0.05, 0.2, 0.5, 1.2), (50e-6, 10e-6, 10e-6, 10e-6, 9e-6))
+PLAYS = PrandtlIshlinskii((0.0, 0.05, 0.2, 0.5, 1.2), (50e-6, 10e-6, 10e-6, 10e-6, 9e-6))
 CREEP = Creep((1e-6, 1e-6), (0.1, 1.0))
 STILL = disturbance.Reference(0.0, 0.0, 1.0)
 

@@ -9,7 +9,7 @@ from microrad.link import tracking_light_w
 from microrad.loop import coupled_study
 from microrad.mirror import coupled
 from microrad.mirror.coupled import Actuator, CoupledMirror, Output
-from microrad.mirror.hysteresis import Play
+from microrad.mirror.hysteresis import PrandtlIshlinskii
 from microrad.mirror.model import Mirror
 from microrad.mission.file import load_coupled_mirror, load_mission
 from places import ROOT
@@ -54,7 +54,7 @@ def three_actuators(hysteresis=0.05):
     C[:, 0::2] = 1e-6 * sees @ np.linalg.inv(turned)
     E, F = np.zeros((6, 3)), np.zeros((3, 6))
     E[1::2], F[:, 0::2] = -1e3 * np.eye(3), np.eye(3)
-    plays = tuple(Play((0.0, 0.3, 1.0), (0.0, hysteresis, hysteresis)) for _ in range(3))
+    plays = tuple(PrandtlIshlinskii((0.0, 0.3, 1.0), (0.0, hysteresis, hysteresis)) for _ in range(3))
     mirror = Mirror("a plate", A, B, E, F, np.zeros((3, 3)), C, np.zeros((3, 3)), np.zeros((3, 3)), (), plays, ())
     actuators = tuple(Actuator(f"actuator {i + 1}", 50.0, 0.0, 100.0, 1e5) for i in range(3))
     outputs = tuple(Output(f"sensor {i + 1}", "displacement", (z.real, z.imag)) for i, z in enumerate(places.tolist()))

@@ -21,7 +21,7 @@ import oracles
 from microrad.core import kernels, lti
 from microrad.core.kernels import compiler
 from microrad.mirror import model
-from microrad.mirror.hysteresis import Play
+from microrad.mirror.hysteresis import PrandtlIshlinskii
 from oracles import BoucWen, Operator, compose
 from places import TESTS
 
@@ -829,7 +829,7 @@ def test_one_compiled_loop_serves_all_sizes_but_the_unrolled_one():
 def test_a_mirror_that_is_simulated_often_is_unrolled_on_one_axis_and_answers_the_same():
     """Loops of any size take twice as long; those of several axes are not compiled for each fit."""
     system = lti.StateSpace(np.diag([-900.0, -4000.0]), np.ones((2, 1)), np.ones((1, 2)), np.zeros((1, 1)))
-    mirror = model.assemble("two states", "cascade", system, Play((0.0, 0.4), (5e-5, 2e-5)))
+    mirror = model.assemble("two states", "cascade", system, PrandtlIshlinskii((0.0, 0.4), (5e-5, 2e-5)))
     once, often = (model.discretise(mirror, STEP, often=often) for often in (False, True))
     assert (type(once.outputs), type(often.outputs)) == (np.ndarray, tuple)
     drive, answers = make_drive(1, 60), []

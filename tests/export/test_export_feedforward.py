@@ -22,20 +22,20 @@ from microrad.export.linear_part.sections import sections
 from microrad.export.records import Signal, Vectors
 from microrad.loop.pointing_loop.kernel_arrays import forward_arrays
 from microrad.loop.pointing_loop.loop import ForwardHysteresis
-from microrad.mirror.hysteresis import BoucWen, Play
+from microrad.mirror.hysteresis import BoucWen, PrandtlIshlinskii
 from waiting import HANG_S
 
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc")
 
 GENERAL = BoucWen(0.2, -1e-5, -0.25, 2e-5, 0.1, -0.025, 1500.0, 6.0, 0.02, -0.01)
 POWERED = replace(BOUC_WEN, exponent=2.0)
-WIDENING = Play((0.0, 0.5, 4.0), (0.1, 0.05, -0.03), widening_s=1e-4, rate_limit_v_s=1500.0)
+WIDENING = PrandtlIshlinskii((0.0, 0.5, 4.0), (0.1, 0.05, -0.03), widening_s=1e-4, rate_limit_v_s=1500.0)
 BANKS = {
     "Bouc-Wen": ((BOUC_WEN, BOUC_WEN), ()),
     "plays and a polynomial": ((), (PLAYS, PLAYS)),
-    "all that there is": ((GENERAL, BOUC_WEN), (WIDENING, PLAYS, Play((1.0, 3.0), (0.2, 0.1)))),
+    "all that there is": ((GENERAL, BOUC_WEN), (WIDENING, PLAYS, PrandtlIshlinskii((1.0, 3.0), (0.2, 0.1)))),
     "exponent 2": ((POWERED,), ()),
-    "a polynomial alone": ((), (Play((), (), polynomial_rad=(0.3, 2.0, -1.0), reach_v=5.0),)),
+    "a polynomial alone": ((), (PrandtlIshlinskii((), (), polynomial_rad=(0.3, 2.0, -1.0), reach_v=5.0),)),
 }
 each_bank = pytest.mark.parametrize("bank", BANKS)
 

@@ -31,7 +31,7 @@ from microrad.loop.pointing_loop import loop as fine
 from microrad.loop.pointing_loop.loop import PointingLoop, ReferenceFilter, with_inverse
 from microrad.loop.sensor import OpticalSensor
 from microrad.mirror import model as mirror
-from microrad.mirror.hysteresis import NO_CREEP, BoucWen, Creep, Play
+from microrad.mirror.hysteresis import NO_CREEP, BoucWen, Creep, PrandtlIshlinskii
 from microrad.mission.file import load_mission
 from shipped import SHIPPED, without_fine_pointing
 from waiting import HANG_S
@@ -176,7 +176,7 @@ def shipped():
 
 BOUC_WEN = BoucWen(89e-6, -2.96e-7, -22e-6, 4.7e-4, 2.4, 0.6, 3770.0, 6.0)
 PRINTED = replace(BOUC_WEN, epsilon_rad_v=-48e-6, alpha_1_v=38.421, beta_1_v=34.635)
-PLAYS = Play((0.0, 0.1, 0.4, 1.0, 2.0), (50e-6, 12e-6, 12e-6, 8e-6, 7e-6))
+PLAYS = PrandtlIshlinskii((0.0, 0.1, 0.4, 1.0, 2.0), (50e-6, 12e-6, 12e-6, 8e-6, 7e-6))
 CREEP = Creep((4e-6, 4e-6), (0.01, 0.1))
 PAIRS = {  # the models of two actuators, so that each pair is compiled once
     "printed, widening plays that creep": (

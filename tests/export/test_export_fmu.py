@@ -73,8 +73,8 @@ def everything():
         hysteresis.BoucWen(8e-5, 0.0, -2e-5, 0.0, 2.4, 0.6, np.inf, 5.0, gamma_1_v=0.1, eta_1_v=-0.2, exponent=1.7),
     )
     plays = (
-        hysteresis.Play((0.0, 0.3, 0.9), (5e-5, 2e-5, 1e-5), widening_s=2e-4, rate_limit_v_s=300.0),
-        hysteresis.Play((0.0, 0.5), (4e-5, 1e-5)),
+        hysteresis.PrandtlIshlinskii((0.0, 0.3, 0.9), (5e-5, 2e-5, 1e-5), widening_s=2e-4, rate_limit_v_s=300.0),
+        hysteresis.PrandtlIshlinskii((0.0, 0.5), (4e-5, 1e-5)),
     )
     rng = np.random.default_rng(5)
     A = np.array([[-900.0, 3000.0, 50.0], [-3000.0, -900.0, 20.0], [10.0, 5.0, -40.0]])
@@ -106,7 +106,7 @@ def rich_unit():
 
 def play_mirror():
     """A mirror without states: hysteresis alone."""
-    return mirror.assemble("static", "static", None, hysteresis.Play((0.0, 0.4), (5e-5, 2e-5)))
+    return mirror.assemble("static", "static", None, hysteresis.PrandtlIshlinskii((0.0, 0.4), (5e-5, 2e-5)))
 
 
 def play_unit():
@@ -114,7 +114,7 @@ def play_unit():
     return PlantUnit(Origin("m", "0" * 64, "static"), plant, np.eye(1), np.inf, 1.0, np.inf, 0.0)
 
 
-BENT = hysteresis.Play((0.0, 0.4), (0.05, 0.02), polynomial_rad=(0.004, -0.01, 0.02), reach_v=1.5)
+BENT = hysteresis.PrandtlIshlinskii((0.0, 0.4), (0.05, 0.02), polynomial_rad=(0.004, -0.01, 0.02), reach_v=1.5)
 """Plays with a polynomial that ends within the walk of the tests."""
 
 

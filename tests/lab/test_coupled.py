@@ -19,7 +19,7 @@ from microrad.lab.identify.stiffness.fit import amplitude_classes
 from microrad.lab.recording import Recording, multisine_recordings
 from microrad.mirror import coupled
 from microrad.mirror import model as mirror
-from microrad.mirror.hysteresis import Play
+from microrad.mirror.hysteresis import PrandtlIshlinskii
 from microrad.mirror.model import Mirror
 from microrad.mission.file import load_coupled_mirror
 from places import DATA
@@ -48,8 +48,8 @@ def truth(hysteresis):
     B = np.array([[0.0, 0.0], [-700.0, -600.0], [0.0, 0.0], [-800.0, 900.0]])
     C = 1e-5 * np.array([[1.0, 0.0, 0.7, 0.0], [0.8, 0.0, -0.8, 0.0]])
     strain = np.linalg.inv(-C @ np.linalg.solve(A, B)) @ C
-    play = Play((0.1, 0.3, 0.8, 2.0), (0.01 * hysteresis,) * 4)
-    idle = Play((1.0,), (0.0,))  # as many operators as the fit has: then the kernel compiles once
+    play = PrandtlIshlinskii((0.1, 0.3, 0.8, 2.0), (0.01 * hysteresis,) * 4)
+    idle = PrandtlIshlinskii((1.0,), (0.0,))  # as many operators as the fit has: then the kernel compiles once
     E, F, G = np.hstack([B, B]), np.vstack([strain, strain]), np.zeros((4, 2))
     D = 1e-6 * np.array([[2.0, 1.0], [1.0, -2.0]])  # without one, a direct term stands in for a part of the delay
     return Mirror("truth", A, B, E, F, G, C, D, np.zeros((2, 4)), (), (play, play, idle, idle), ())

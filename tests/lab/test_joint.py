@@ -134,9 +134,9 @@ def test_phase_lag_is_not_counted_twice():
 
 
 def fit_like(thresholds, weights):
-    from microrad.mirror.hysteresis import Play
+    from microrad.mirror.hysteresis import PrandtlIshlinskii
 
-    return Play(tuple(thresholds), tuple(weights))
+    return PrandtlIshlinskii(tuple(thresholds), tuple(weights))
 
 
 def test_widening_is_recovered_from_two_rates():

@@ -23,7 +23,7 @@ from microrad.lab.identify.hysteresis.plant_fit import (
 from microrad.lab.identify.hysteresis.structures import hysteretic_oscillator, one_axis
 from microrad.lab.recording import read_recording, recording_from_arrays
 from microrad.mirror import model as mirror
-from microrad.mirror.hysteresis import Play
+from microrad.mirror.hysteresis import PrandtlIshlinskii
 from places import DATA
 from truths import plays, recorded, two_sines
 
@@ -253,13 +253,13 @@ def test_what_is_at_its_bound_is_held_until_it_would_gain_by_leaving():
     """Two of three weights begin at 0: the one that the record needs comes up, the other stays there exactly."""
     drive = two_sines(1200)
     record = recorded(drive, plays(drive, (0.0, 1.0), (6e-5, 2e-5)), noise=1e-4)
-    structure = one_axis("m", Play((0.0, 1.0, 2.0), (8e-5, 0.0, 0.0), 0.0, 100.0))
+    structure = one_axis("m", PrandtlIshlinskii((0.0, 1.0, 2.0), (8e-5, 0.0, 0.0), 0.0, 100.0))
     (run,) = fit_records([replace(record, output=1e-3 * record.output)])
     fit = fit_plant(structure, [run])
     assert fit.converged
     assert fit.values[:2] == pytest.approx([6e-5, 2e-5], rel=0.01)
     assert 0.0 <= fit.values[2] < 3 * fit.standard_errors[2]
-    below = fit_plant(one_axis("m", Play((0.0, 1.0, 2.0), (6e-5, 2e-5, 0.0), 0.0, 100.0)), [_less(run)])
+    below = fit_plant(one_axis("m", PrandtlIshlinskii((0.0, 1.0, 2.0), (6e-5, 2e-5, 0.0), 0.0, 100.0)), [_less(run)])
     assert below.values[2] == 0.0  # it would be negative
 
 

@@ -136,9 +136,9 @@ def test_a_held_drive_is_that_of_a_converter():
 
 
 def mirror_of_gain():
-    from microrad.mirror.hysteresis import Play
+    from microrad.mirror.hysteresis import PrandtlIshlinskii
 
-    return Play((0.0,), (GAIN,))
+    return PrandtlIshlinskii((0.0,), (GAIN,))
 
 
 def mirror_creep():

@@ -31,7 +31,7 @@ from microrad.lab.identify.selection.candidates import refit
 from microrad.lab.identify.selection.choice import choose_best
 from microrad.lab.identify.statistics import propagated
 from microrad.mirror import model as mirror
-from microrad.mirror.hysteresis import Play
+from microrad.mirror.hysteresis import PrandtlIshlinskii
 from microrad.mission.file import load_mirror
 from truths import behind_resonance, bouc_wen, philox, plays, recorded, small_multisine
 
@@ -603,4 +603,4 @@ def test_the_benchs_own_mirror_is_predicted_with_half_the_error_of_the_papers_mo
     assert result.chosen == "prandtl_ishlinskii_joint"
     assert result.score().held_out_rms_percent <= 0.5 * result.score("bouc_wen").held_out_rms_percent
     assert result.score().held_out_rms_percent < 1.0
-    assert isinstance(result.fit().model, Play)
+    assert isinstance(result.fit().model, PrandtlIshlinskii)

@@ -25,7 +25,7 @@ from microrad.lab.identify.stiffness.model import LinearStart, Numbers, scaled
 from microrad.lab.identify.stiffness.search import Search
 from microrad.lab.recording import Recording, multisine_recordings
 from microrad.mirror import model as mirror
-from microrad.mirror.hysteresis import Play
+from microrad.mirror.hysteresis import PrandtlIshlinskii
 from microrad.mirror.model import Mirror
 from places import DATA
 
@@ -199,8 +199,8 @@ def hysteretic_truth():
     B, strain = 700.0 * force, np.roll(force, 1, axis=0).T  # an actuator is stretched where it pushes
     C = np.array([[0.0, 1.0, 0.0, 0.7], [0.0, 0.8, 0.0, -0.8]])
     weights = (0.02, 0.02, 0.02, 0.02)
-    plays = tuple(Play((0.1, 0.3, 0.8, 2.0), tuple(s * w for w in weights)) for s in (1.0, 0.8))
-    idle = Play((1.0,), (0.0,))  # as many operators as the fit has: then the kernel compiles once
+    plays = tuple(PrandtlIshlinskii((0.1, 0.3, 0.8, 2.0), tuple(s * w for w in weights)) for s in (1.0, 0.8))
+    idle = PrandtlIshlinskii((1.0,), (0.0,))  # as many operators as the fit has: then the kernel compiles once
     E, F, G = np.hstack([B, B]), np.vstack([strain, strain]), np.zeros((4, 2))
     return Mirror("truth", A, B, E, F, G, C, np.zeros((2, 2)), np.zeros((2, 4)), (), (*plays, idle, idle), ())
 

@@ -12,7 +12,7 @@ from microrad.loop import control, controller_study
 from microrad.loop.control import adaptive
 from microrad.loop.pointing_loop import ensemble, kernel_arrays
 from microrad.loop.pointing_loop import loop as fine
-from microrad.mirror.hysteresis import NO_CREEP, BoucWen, Creep, Play
+from microrad.mirror.hysteresis import NO_CREEP, BoucWen, Creep, PrandtlIshlinskii
 
 
 @pytest.mark.parametrize("system", [None, resonance(1200.0, 0.02), resonance(300.0, 0.1)])
@@ -58,7 +58,7 @@ def test_on_a_softened_mirror_it_leaves_less_than_the_frozen_inverse():
 
 # ------------------------------------------------------------------------------------------ an inverse by itself
 RATE_HZ, SECONDS = 5000, 2
-EIGHT = Play(
+EIGHT = PrandtlIshlinskii(
     (0.0, 0.05, 0.1, 0.2, 0.4, 0.7, 1.1, 1.6), tuple(89e-6 * w for w in (0.6, 0.06, 0.06, 0.07, 0.07, 0.05, 0.05, 0.04))
 )
 SLOW_CREEP = Creep((1e-6, 1e-6, 1e-6), (0.1, 1.0, 10.0))

@@ -17,7 +17,7 @@ from microrad.loop import sine_run as simulate
 from microrad.loop.control import Drive, Gains, Inverse, Timing
 from microrad.mirror import hysteresis
 from microrad.mirror import model as mirror
-from microrad.mirror.hysteresis import BoucWen, Play
+from microrad.mirror.hysteresis import BoucWen, PrandtlIshlinskii
 from microrad.mission.file import load_mission
 from places import ROOT
 
@@ -130,7 +130,7 @@ def test_the_inverse_of_plays_is_exact(seed):
     thresholds = np.concatenate([[0.0], np.cumsum(rng.uniform(0.1, 1.0, 6))])
     weights = rng.uniform(0.0, 0.03e-3, 7)
     weights[0], weights[3] = 0.05e-3, 0.0
-    direct, inner, inverse_weights = control.play_inverse(Play(tuple(thresholds), tuple(weights)))
+    direct, inner, inverse_weights = control.play_inverse(PrandtlIshlinskii(tuple(thresholds), tuple(weights)))
     wanted = 0.4e-3 * np.cumsum(rng.normal(size=500)) / 10
     drive = direct * wanted + oracles.play_response(wanted, inner, [0.0] * 6) @ np.array(inverse_weights)
     reached = oracles.play_response(drive, thresholds, [0.0] * 7) @ weights
@@ -141,16 +141,16 @@ def test_the_inverse_of_plays_is_exact(seed):
 
 def test_plays_that_stand_still_after_a_reversal_have_no_inverse():
     with pytest.raises(ValueError, match=r"no weight at threshold 0.*identify it again"):
-        control.play_inverse(Play((0.0, 0.5), (0.0, 1e-4)))
-    bent = Play((0.0, 0.5), (1e-4, 1e-4), polynomial_rad=(0.0, 1e-5, 0.0), reach_v=2.0)
+        control.play_inverse(PrandtlIshlinskii((0.0, 0.5), (0.0, 1e-4)))
+    bent = PrandtlIshlinskii((0.0, 0.5), (1e-4, 1e-4), polynomial_rad=(0.0, 1e-5, 0.0), reach_v=2.0)
     with pytest.raises(ValueError, match="has a polynomial beside its plays, and the inverse knows plays alone"):
         control.play_inverse(bent)
     with pytest.raises(ValueError, match="has no inverse"):
-        control.inverse(mirror.assemble("axis", "static", None, Play((0.0, 0.5), (0.0, 1e-4))))
+        control.inverse(mirror.assemble("axis", "static", None, PrandtlIshlinskii((0.0, 0.5), (0.0, 1e-4))))
 
 
 def test_the_inverse_of_several_axes_names_its_actuators():
-    plays = Play((0.0, 0.4), (0.06e-3, 0.02e-3))
+    plays = PrandtlIshlinskii((0.0, 0.4), (0.06e-3, 0.02e-3))
     parts = [mirror.assemble("axis", "static", None, model) for model in (plays, PAPER, plays)]
     inverse = control.inverse(mirror.combine(*parts))
     assert inverse.bouc_wen == (PAPER,)
@@ -180,7 +180,9 @@ def test_the_sampled_plant_is_what_the_compiled_loop_does(mission, composition, 
     The additive plant has a direct path too: an output that follows the amplifier at once.
     """
     drive, timing = Drive(-inf, inf, bandwidth_hz, inf, 0.0, 0.0), Timing(4 * PERIOD, steps, delay)
-    model = Play((0.0, 0.0), (0.06e-3, 0.029e-3)) if composition == "additive" else hysteresis.gain_only(PAPER)
+    model = (
+        PrandtlIshlinskii((0.0, 0.0), (0.06e-3, 0.029e-3)) if composition == "additive" else hysteresis.gain_only(PAPER)
+    )
     m = mirror.assemble("axis", composition, mirror.linear_part(mission.mirror.linear)[0], model)
     volts = np.random.default_rng(4).normal(size=150)
     setup = simulate.Setup(drive, timing, SILENT)
@@ -193,7 +195,7 @@ def test_the_sampled_plant_is_what_the_compiled_loop_does(mission, composition, 
 
 def test_the_sampled_plant_of_a_static_mirror_by_hand():
     """Gain, amplifier and two steps of delay: the first sample arrives after the delay, the rest exponentially."""
-    static = mirror.assemble("axis", "static", None, Play((0.0,), (0.5,)))
+    static = mirror.assemble("axis", "static", None, PrandtlIshlinskii((0.0,), (0.5,)))
     drive, timing = replace(IDEAL_DRIVE, bandwidth_hz=2e3), Timing(4e-5, 2, 3)
     left = np.exp(-2 * pi * 2e3 * 2e-5)
     expected = [0.0, 0.0, 0.5 * (1 - left), 0.5 * (1 - left**3), 0.5 * (1 - left**5)]
@@ -210,7 +212,7 @@ def loops(mission):
     static = mirror.assemble("static", "static", None, hysteresis.gain_only(PAPER))
     w = 2 * pi * 300
     light = lti.modal_from_polynomials((w * w,), (1.0, 0.04 * w, w * w))
-    resonant = mirror.assemble("resonant", "cascade", light, Play((0.0,), (1.0,)))
+    resonant = mirror.assemble("resonant", "cascade", light, PrandtlIshlinskii((0.0,), (1.0,)))
     real, slow = replace(IDEAL_DRIVE, bandwidth_hz=5e3), Timing(1e-4, 2, 3)
     cases = {
         "the mission's": (paper, real, Timing(PERIOD, 2, 2), PI),
@@ -262,7 +264,7 @@ def test_the_gain_margin_is_where_the_loop_becomes_unstable(mission, name):
 
 def test_the_gain_margin_of_an_integrator_is_at_half_the_sample_rate():
     """L = k / (z - 1) is -k/2 at z = -1: unstable from k = 2 on, whatever the clock."""
-    static = mirror.assemble("axis", "static", None, Play((0.0,), (1.0,)))
+    static = mirror.assemble("axis", "static", None, PrandtlIshlinskii((0.0,), (1.0,)))
     plant = control.sampled_plant(static, IDEAL_DRIVE, Timing(1e-3, 1, 0))
     margins = control.margins(control.pid(Gains(0.0, 500.0, 0.0, 1.0), 1e-3), plant, 1e-3)
     assert_allclose(margins.gain_up, 4.0, rtol=1e-3)
@@ -272,7 +274,7 @@ def test_the_phase_margin_of_a_resonance_that_rises_through_one():
     """A light mode past the crossover, turned by delay to where it is stable: 20 degrees at its rising flank."""
     w = 2 * pi * 300
     light = lti.modal_from_polynomials((w * w,), (1.0, 0.01 * w, w * w))
-    m = mirror.assemble("resonant", "cascade", light, Play((0.0,), (1.0,)))
+    m = mirror.assemble("resonant", "cascade", light, PrandtlIshlinskii((0.0,), (1.0,)))
     timing = Timing(1e-4, 1, 8)
     setup = simulate.Setup(IDEAL_DRIVE, timing, control.pid(Gains(0.0, 56.0, 0.0, 1e-4), timing.period_s))
     response = lti.frequency_response(simulate.sampled_loop(m, setup), np.linspace(250, 350, 20_001), 1e-4)[:, 0, 0]
@@ -364,7 +366,7 @@ def test_the_sensitivity_is_the_error_of_a_simulated_sine(straight, freq_hz):
 
 def test_the_sensitivity_of_an_integrator_by_hand():
     """v[k] = sum e, y[k] = v[k-1] / 10 through one sample of hold: 1 + L with L = 0.1 / (z - 1)."""
-    static = mirror.assemble("axis", "static", None, Play((0.0,), (1.0,)))
+    static = mirror.assemble("axis", "static", None, PrandtlIshlinskii((0.0,), (1.0,)))
     setup = simulate.Setup(IDEAL_DRIVE, Timing(1e-3, 1, 0), control.pid(Gains(0.0, 100.0, 0.0, 1.0), 1e-3))
     z = np.exp(2j * pi * 20 * 1e-3)
     s = control.sensitivity(simulate.sampled_loop(static, setup), 20.0, 1e-3)

@@ -25,7 +25,7 @@ from microrad.loop.pointing_loop.loop import (
     nominal_axis_gain,
     with_inverse,
 )
-from microrad.mirror.hysteresis import BoucWen, Play, rest_gain
+from microrad.mirror.hysteresis import BoucWen, PrandtlIshlinskii, rest_gain
 from microrad.mirror.model import Mirror, linearised
 from several_axes import mission, scene_of, three_actuators
 
@@ -283,7 +283,9 @@ REFUSED = {
     "already": (lambda found: (found.loop, forward(found)), "has an inverse or a feedforward of the reference already"),
     "ahead of the linear part": (
         lambda found: (
-            replace(found.loop, mirror=replace(found.loop.mirror, inverse=(Play((0.0,), (20 * URAD,)),) * 2)),
+            replace(
+                found.loop, mirror=replace(found.loop.mirror, inverse=(PrandtlIshlinskii((0.0,), (20 * URAD,)),) * 2)
+            ),
             integral(found),
         ),
         "lies ahead of its linear part, where it has an inverse; use with_inverse",

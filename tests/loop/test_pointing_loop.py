@@ -30,7 +30,7 @@ from microrad.loop.pointing_loop.loop import LoopController, PointingLoop
 from microrad.loop.sensor import OpticalSensor, StrainGauge
 from microrad.mirror import model as mirror
 from microrad.mirror.geometry import Geometry, line_of_sight_matrix
-from microrad.mirror.hysteresis import BoucWen, Play
+from microrad.mirror.hysteresis import BoucWen, PrandtlIshlinskii
 from microrad.mission.file import load_mission
 from shipped import SHIPPED
 
@@ -1059,7 +1059,7 @@ def test_a_late_sensor_reads_the_error_at_the_begin_until_it_has_others():
 
 def test_without_hysteresis_each_element_keeps_its_own_slow_gain():
     """Bouc-Wen elements and plays in one mirror, in either order."""
-    plays = mirror.assemble("plays", "static", None, Play((0.0, 1.0), (30e-6, 12e-6)))
+    plays = mirror.assemble("plays", "static", None, PrandtlIshlinskii((0.0, 1.0), (30e-6, 12e-6)))
     for both in (mirror.combine(paper_mirror(), plays), mirror.combine(plays, paper_mirror())):
         straightened = fine.without_hysteresis(scenario(2, static_mirror(), mirror=both)).mirror
         assert not straightened.plays

@@ -19,7 +19,7 @@ from microrad.loop.pointing_loop.loop import PointingLoop, ReferenceFilter, with
 from microrad.loop.sensor import OpticalSensor
 from microrad.mirror import model as mirror
 from microrad.mirror.geometry import Geometry, line_of_sight_matrix
-from microrad.mirror.hysteresis import NO_CREEP, BoucWen, Creep, Play, slow_gain
+from microrad.mirror.hysteresis import NO_CREEP, BoucWen, Creep, PrandtlIshlinskii, slow_gain
 
 URAD = 1e-6
 RATE_LIMIT_V_S = 3770.0
@@ -28,7 +28,7 @@ FILTER = ReferenceFilter(1000.0)
 
 BOUC_WEN = BoucWen(89e-6, -2.96e-7, -22e-6, 4.7e-4, 2.4, 0.6, RATE_LIMIT_V_S, 6.0)  # never moves the wrong way
 PRINTED = replace(BOUC_WEN, epsilon_rad_v=-48e-6, alpha_1_v=38.421, beta_1_v=34.635)
-PLAYS = Play((0.0, 0.1, 0.4, 1.0, 2.0), (50e-6, 12e-6, 12e-6, 8e-6, 7e-6))
+PLAYS = PrandtlIshlinskii((0.0, 0.1, 0.4, 1.0, 2.0), (50e-6, 12e-6, 12e-6, 8e-6, 7e-6))
 WIDENING = replace(PLAYS, widening_s=1e-4, rate_limit_v_s=RATE_LIMIT_V_S)
 CREEP = Creep((4e-6, 4e-6), (0.01, 0.1))
 MODELS = {
@@ -442,6 +442,6 @@ def test_a_mirror_that_names_no_hysteresis_to_invert_is_refused():
 
 def test_plays_that_stand_still_behind_a_reversal_are_refused():
     loop = loop_of("Prandtl-Ishlinskii")
-    stuck = mirror.assemble("stuck", "static", None, Play((0.1, 1.0), (50e-6, 30e-6)))
+    stuck = mirror.assemble("stuck", "static", None, PrandtlIshlinskii((0.1, 1.0), (50e-6, 30e-6)))
     with pytest.raises(ValueError, match="no weight at threshold 0: it stands still after each reversal"):
         ahead(replace(loop, mirror=stuck), control.inverse(stuck))

@@ -16,7 +16,7 @@ from microrad.loop import paper_cases as tracking
 from microrad.loop import sine_run as simulate
 from microrad.mirror import hysteresis
 from microrad.mirror import model as mirror
-from microrad.mirror.hysteresis import BoucWen, Play
+from microrad.mirror.hysteresis import BoucWen, PrandtlIshlinskii
 from microrad.mission.file import load_mission
 from scenes import cases_of
 from shipped import SHIPPED, edited
@@ -189,7 +189,7 @@ def test_hysteresis_loops(mission, freq_hz, width_percent, peak_mrad):
 
 def test_the_loop_of_plays_has_the_width_of_its_drawing():
     """Plays of thresholds r under +-U: the loop is 2 sum(w r) high at the middle, over 2 sum(w (U - r))."""
-    plays = Play((0.0, 0.5, 2.0), (0.06e-3, 0.02e-3, 0.009e-3))
+    plays = PrandtlIshlinskii((0.0, 0.5, 2.0), (0.06e-3, 0.02e-3, 0.009e-3))
     loop = simulate.hysteresis_loop(plays, 1.0, 6.0, PERIOD)
     lost = 0.02e-3 * 0.5 + 0.009e-3 * 2.0
     assert_allclose(loop.width, 2 * lost / (2 * (0.089e-3 * 6 - lost)), rtol=1e-6)

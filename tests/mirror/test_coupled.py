@@ -13,7 +13,7 @@ import oracles
 from microrad.core import lti
 from microrad.mirror import coupled
 from microrad.mirror.coupled import Actuator, CoupledMirror, Known, Output
-from microrad.mirror.hysteresis import BoucWen, Play
+from microrad.mirror.hysteresis import BoucWen, PrandtlIshlinskii
 from microrad.mirror.model import Mirror
 from microrad.mission.file import MissionError, load_coupled_mirror
 from microrad.mission.tables.coupled_mirror import CoupledMirror as Table
@@ -62,7 +62,7 @@ def made(seed, modes=3, actuators=2, outputs=2, bouc_wen=1, plays=2, fed=True):
 def bent(draw, i):
     """Plays of any weights, every second operator with a polynomial."""
     weights, (c1, c2, c3) = tuple((0.1 * draw(3)).tolist()), (0.1 * draw(3)).tolist()
-    plain = Play((0.0, 0.1 + i, 0.7 + i), weights)
+    plain = PrandtlIshlinskii((0.0, 0.1 + i, 0.7 + i), weights)
     return replace(plain, polynomial_rad=(c1, c2, c3), reach_v=0.5 + i) if i % 2 else plain
 
 
@@ -207,7 +207,7 @@ def whole():
     mirror = made(5, fed=False)
     rated = BoucWen(0.1, -3e-7, -0.02, 5e-4, 2.4, 0.6, 1e4, 5.0, 0.1, 0.2, 1.5)
     plays = (
-        Play((0.2, 0.4), (0.3, -0.1), 2e-5, 2e4),
+        PrandtlIshlinskii((0.2, 0.4), (0.3, -0.1), 2e-5, 2e4),
         replace(mirror.mirror.plays[1], polynomial_rad=(0.1, -0.2, 1 / 3), reach_v=0.7),
     )
     factor = philox(8).standard_normal((5, 3))

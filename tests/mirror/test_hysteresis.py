@@ -14,11 +14,11 @@ from microrad.loop import control
 from microrad.loop import sine_run as simulate
 from microrad.mirror import hysteresis
 from microrad.mirror import model as mirror
-from microrad.mirror.hysteresis import NO_CREEP, BoucWen, Creep, Play
+from microrad.mirror.hysteresis import NO_CREEP, BoucWen, Creep, PrandtlIshlinskii
 
 PRINTED = BoucWen(0.089e-3, -2.96e-7, -0.048e-3, 4.7e-4, 38.421, 34.635, 3770.0, 6.0)  # section 3.3 of the paper
 ADMISSIBLE = replace(PRINTED, epsilon_rad_v=-0.022e-3, alpha_1_v=2.4, beta_1_v=0.6)
-PLAYS = Play((0.0, 0.4, 1.5), (0.06e-3, 0.02e-3, 0.009e-3))
+PLAYS = PrandtlIshlinskii((0.0, 0.4, 1.5), (0.06e-3, 0.02e-3, 0.009e-3))
 WIDENING = replace(PLAYS, widening_s=1e-3)
 SYMMETRIC, ASYMMETRIES = (0.0, 0.0), [(0.5, -0.7), (-0.6, 0.4), (0.9, 0.0), (0.0, 0.9)]
 EXPONENTS = [1.0, 1.5, 2.0, 3.0]

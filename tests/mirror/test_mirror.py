@@ -18,7 +18,7 @@ from microrad.loop import sine_run as simulate
 from microrad.mirror import hysteresis
 from microrad.mirror import model as mirror
 from microrad.mirror import summary as mirror_summary
-from microrad.mirror.hysteresis import BoucWen, Creep, Play
+from microrad.mirror.hysteresis import BoucWen, Creep, PrandtlIshlinskii
 from microrad.mirror.model import Mirror
 from microrad.mission.file import load_mission
 from shipped import SHIPPED, edited
@@ -27,7 +27,7 @@ STEP = 20e-6
 PRINTED = BoucWen(0.089e-3, -2.96e-7, -0.048e-3, 4.7e-4, 38.421, 34.635, 3770.0, 6.0)  # section 3.3 of the paper
 ADMISSIBLE = replace(PRINTED, epsilon_rad_v=-0.022e-3, alpha_1_v=2.4, beta_1_v=0.6)
 RISING = replace(ADMISSIBLE, epsilon_rad_v=0.03e-3)  # the drive term helps: no wrong way at all
-PLAYS = Play((0.0, 0.4, 1.5), (0.06e-3, 0.02e-3, 0.009e-3))
+PLAYS = PrandtlIshlinskii((0.0, 0.4, 1.5), (0.06e-3, 0.02e-3, 0.009e-3))
 WIDENING = replace(PLAYS, widening_s=1e-4, rate_limit_v_s=3000.0)
 POWERED = replace(ADMISSIBLE, gamma_1_v=0.5, eta_1_v=-0.7, exponent=2.0)
 CREEP = Creep((0.004e-3, 0.003e-3, -0.001e-3), (2e-4, 2e-3, 0.5))
@@ -77,7 +77,7 @@ def by_hand(composition, model, drive):
     def linear(signal):
         return lsim(RESONANT[1], signal, STEP * np.arange(len(signal)), interp=True)[1]
 
-    if isinstance(model, Play):
+    if isinstance(model, PrandtlIshlinskii):
         rest = [0.0] * len(model.thresholds_v)
         states, _ = oracles.widening_play_response(
             drive, STEP, model.thresholds_v, model.widening_s, model.rate_limit_v_s, rest
@@ -232,8 +232,8 @@ def stiffening(weight=0.4):
         D=np.zeros((1, 1)),
         K=np.zeros((1, 2)),
         bouc_wen=(),
-        plays=(Play((20e-6, 40e-6), (weight / 2, weight / 2)), Play((60e-6,), (weight / 2,))),
-        inverse=(Play((0.0,), (0.05e-3,)),),
+        plays=(PrandtlIshlinskii((20e-6, 40e-6), (weight / 2, weight / 2)), PrandtlIshlinskii((60e-6,), (weight / 2,))),
+        inverse=(PrandtlIshlinskii((0.0,), (0.05e-3,)),),
     )
 
 
@@ -319,7 +319,7 @@ def test_a_mirror_driven_by_its_input_alone_has_no_loop_through_the_step():
 
 
 def test_the_linear_loop_of_a_fed_back_bank_is_its_response_without_thresholds():
-    m = replace(stiffening(), plays=(Play((0.0, 0.0), (0.3, 0.1)), Play((0.0,), (0.2,))))
+    m = replace(stiffening(), plays=(PrandtlIshlinskii((0.0, 0.0), (0.3, 0.1)), PrandtlIshlinskii((0.0,), (0.2,))))
     loop = m.linear_loop
     drive = np.sin(2 * pi * 250 * 2e-6 * np.arange(4000))
     expected = lsim((loop.A, loop.B, loop.C, loop.D), drive, 2e-6 * np.arange(4000), interp=True)[1]
@@ -522,7 +522,7 @@ def test_the_settled_size_and_the_slope_behind_a_reversal_follow_both_signs(epsi
 
 def test_a_softer_mirror_for_small_drives():
     """Two plays, by hand: 0.1 of the drive, and 0.3 of what is beyond 2 V."""
-    model = hysteresis.Play((0.0, 2.0), (0.1e-3, 0.3e-3))
+    model = hysteresis.PrandtlIshlinskii((0.0, 2.0), (0.1e-3, 0.3e-3))
     assert hysteresis.output_amplitude(model, 1.0) == pytest.approx(0.1e-3)
     assert hysteresis.output_amplitude(model, 4.0) == pytest.approx(1.0e-3)
     assert hysteresis.secant_gain(model, 0.1e-3) == pytest.approx(0.1e-3)

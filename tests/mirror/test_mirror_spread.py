@@ -20,7 +20,7 @@ from microrad.lab.identify.hysteresis.prandtl_ishlinskii import threshold_grid
 from microrad.lab.identify.hysteresis.structures import LinearPoles, Roots, one_axis
 from microrad.lab.identify.records import lead, memory
 from microrad.mirror import spread as mirror_spread
-from microrad.mirror.hysteresis import NO_CREEP, BoucWen, Creep, Play, slow_gain
+from microrad.mirror.hysteresis import NO_CREEP, BoucWen, Creep, PrandtlIshlinskii, slow_gain
 from microrad.mirror.model import hysteresis_model, linear_part
 from microrad.mission.file import MissionError, load_mirror
 from microrad.mission.tables.mirror import place
@@ -395,7 +395,7 @@ def random_covariance(errors, seed=1):
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_every_part_of_a_joint_fit_comes_through_the_file(read, neighbours, sign):
     """The damping of real roots and what was not fitted are held; a weight of 0 counts with its neighbour."""
-    plays = Play((0.0, 0.6, 1.2, 1.9), tuple(sign * w for w in (6e-5, 1.5e-5, 0.0, 1e-5)), 1e-3, 200.0)
+    plays = PrandtlIshlinskii((0.0, 0.6, 1.2, 1.9), tuple(sign * w for w in (6e-5, 1.5e-5, 0.0, 1e-5)), 1e-3, 200.0)
     creep = Creep((sign * 2e-6,) * 2, (0.1, 1.0))
     fit = made_fit("prandtl_ishlinskii_rate_creep", plays, random_covariance(0.04), creep=creep, linear=ROOTS)
     text = mirror_file_text(as_chosen(neighbours, fit), "m")
@@ -479,7 +479,9 @@ def opposed(errors, left):
 @pytest.mark.parametrize("left", [1e-2, 1e-3, 1e-4, 1e-5])
 def test_the_file_has_the_digits_that_a_well_known_sum_needs(read, neighbours, left):
     weights = (3e-5, 3e-5, 1e-5)
-    fit = made_fit("prandtl_ishlinskii_joint", Play((0.0, 0.1, 0.9), weights), opposed((0.21234, 0.21234, 1e-6), left))
+    fit = made_fit(
+        "prandtl_ishlinskii_joint", PrandtlIshlinskii((0.0, 0.1, 0.9), weights), opposed((0.21234, 0.21234, 1e-6), left)
+    )
     text = mirror_file_text(as_chosen(neighbours, fit), "m")
     shares = np.array(weights) / sum(weights)
     relative = fit.fit.covariance / np.outer(weights, weights)
@@ -494,7 +496,7 @@ def test_the_file_has_the_digits_that_a_well_known_sum_needs(read, neighbours, l
 def test_what_the_recordings_leave_open_is_cut_off_and_the_known_sum_is_kept(read, neighbours):
     """Two weights known to three times their size, their sum to a thousandth; a third is lost, its error counts."""
     weights = np.array([3e-5, 3e-5, 1e-9, 1e-5])
-    plays = Play((0.0, 0.1, 0.5, 0.9), tuple(weights.tolist()))
+    plays = PrandtlIshlinskii((0.0, 0.1, 0.5, 0.9), tuple(weights.tolist()))
     fit = made_fit("prandtl_ishlinskii_joint", plays, opposed((3.0, 3.0, 500.0, 1e-4), 1e-3 / 3))
     mirror = read(mirror_file_text(as_chosen(neighbours, fit), "m"))
     assert [key[-1] for key in mirror.uncertainty.parameters] == ["1", "2", "4"]
@@ -512,7 +514,9 @@ def test_what_the_recordings_leave_open_is_cut_off_and_the_known_sum_is_kept(rea
 
 
 def test_a_fit_without_a_free_parameter_writes_no_uncertainty(read, neighbours):
-    fit = made_fit("prandtl_ishlinskii_joint", Play((0.0,), (3e-5,)), lambda names, values: np.zeros((1, 1)))
+    fit = made_fit(
+        "prandtl_ishlinskii_joint", PrandtlIshlinskii((0.0,), (3e-5,)), lambda names, values: np.zeros((1, 1))
+    )
     assert written(read, as_chosen(neighbours, fit)).uncertainty is None
 
 

@@ -276,7 +276,7 @@ class HysteresisLoop:
 
 
 def hysteresis_loop(
-    model: hysteresis.BoucWen | hysteresis.Play, freq_hz: float, amplitude_v: float, step_s: float
+    model: hysteresis.BoucWen | hysteresis.PrandtlIshlinskii, freq_hz: float, amplitude_v: float, step_s: float
 ) -> HysteresisLoop:
     """The static hysteresis model (no linear part) under a sine about its bias, once it repeats itself.
 
@@ -305,9 +305,9 @@ def hysteresis_loop(
     return HysteresisLoop(freq_hz, u, y, y - _linear_output(model, u, step_s), int(state.clamped.sum()))
 
 
-def _linear_output(model: hysteresis.BoucWen | hysteresis.Play, u: Floats, step_s: float) -> Floats:
+def _linear_output(model: hysteresis.BoucWen | hysteresis.PrandtlIshlinskii, u: Floats, step_s: float) -> Floats:
     """The part that is not hysteresis: d1 exp(-d2 u') u for Bouc-Wen, else the slow gain of the plays x u."""
-    if isinstance(model, hysteresis.Play):
+    if isinstance(model, hysteresis.PrandtlIshlinskii):
         return math.fsum(model.weights_rad_v) * u
     rate = np.diff(u, prepend=u[-1]) / step_s
     rate = np.clip(rate, -model.rate_limit_v_s, model.rate_limit_v_s)

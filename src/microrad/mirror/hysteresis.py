@@ -139,7 +139,7 @@ def _moved(slope: Callable[[float], float], d1: float, low: float, high: float) 
 
 
 @dataclass(frozen=True, slots=True)
-class Play:
+class PrandtlIshlinskii:
     """A Prandtl-Ishlinskii operator: z = sum of weight x play(threshold), p <- max(q - r, min(q + r, p)).
 
     With ``widening_s`` each threshold above 0 grows with the drive's rate, r + widening |q'|, up to ``rate_limit_v_s``
@@ -175,26 +175,26 @@ LINE_OF_SIGHT = {"line-of-sight": 1.0, "optical": 1.0, "mechanical": 2.0}
 """Angle of the line of sight by the convention of a mirror's output: reflection doubles a tilt, per axis."""
 
 
-def scaled(model: BoucWen | Play, times: float) -> BoucWen | Play:
+def scaled(model: BoucWen | PrandtlIshlinskii, times: float) -> BoucWen | PrandtlIshlinskii:
     """The same model with its output multiplied by a factor.
 
     Args:
         model: Hysteresis model.
         times: Factor on its output; 2 turns a mechanical angle into that of the line of sight.
     """
-    if isinstance(model, Play):
+    if isinstance(model, PrandtlIshlinskii):
         c1, c2, c3 = model.polynomial_rad
         weights = tuple(times * w for w in model.weights_rad_v)
         return replace(model, weights_rad_v=weights, polynomial_rad=(times * c1, times * c2, times * c3))
     return replace(model, d1_rad_v=times * model.d1_rad_v, epsilon_rad_v=times * model.epsilon_rad_v)
 
 
-def slow_gain(model: BoucWen | Play) -> float:
+def slow_gain(model: BoucWen | PrandtlIshlinskii) -> float:
     """Gain for slow, large drives (rad/V): d1, or the sum of the weights; a polynomial ends at its reach."""
     return model.d1_rad_v if isinstance(model, BoucWen) else math.fsum(model.weights_rad_v)
 
 
-def rest_gain(model: BoucWen | Play) -> float:
+def rest_gain(model: BoucWen | PrandtlIshlinskii) -> float:
     """Gain for motions about rest that are too small to move a play with a threshold (rad/V): d1 + epsilon for Eq. 3.
 
     Behind larger motions the gain lies between this one and the slow one, `slow_gain`.
@@ -205,7 +205,7 @@ def rest_gain(model: BoucWen | Play) -> float:
     return math.fsum(weight for threshold, weight in pairs if threshold == 0.0)
 
 
-def output_amplitude(model: BoucWen | Play, drive_v: float) -> float:
+def output_amplitude(model: BoucWen | PrandtlIshlinskii, drive_v: float) -> float:
     """Amplitude of the settled output (rad) under a slow sine of the drive, Bouc-Wen's h and a polynomial left out.
 
     Args:
@@ -218,7 +218,7 @@ def output_amplitude(model: BoucWen | Play, drive_v: float) -> float:
     return math.fsum(w * max(0.0, drive_v - r) for r, w in pairs)
 
 
-def secant_gain(model: BoucWen | Play, output_rad: float) -> float:
+def secant_gain(model: BoucWen | PrandtlIshlinskii, output_rad: float) -> float:
     """Amplitude of the output over that of the drive (rad/V), for slow sines.
 
     A Prandtl-Ishlinskii model is softer for small drives; a Bouc-Wen model has its slow gain at any amplitude. A
@@ -238,7 +238,7 @@ def secant_gain(model: BoucWen | Play, output_rad: float) -> float:
     return output_rad / (model.thresholds_v[last] + (output_rad - knots[last]) / float(slopes[last]))
 
 
-def gain_only(model: BoucWen | Play, output_rad: float = math.inf) -> BoucWen:
+def gain_only(model: BoucWen | PrandtlIshlinskii, output_rad: float = math.inf) -> BoucWen:
     """Replace a hysteresis model by its gain, and nothing else.
 
     Args:
@@ -249,7 +249,7 @@ def gain_only(model: BoucWen | Play, output_rad: float = math.inf) -> BoucWen:
     return BoucWen(secant_gain(model, output_rad), 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-def steepest_slope(model: BoucWen | Play) -> float:
+def steepest_slope(model: BoucWen | PrandtlIshlinskii) -> float:
     """Bound on |dz/dq| of a model, anywhere in its loops.
 
     A Bouc-Wen element whose |h| grows along a branch (a decay below 0: a hardening spring) has no bound; it is taken
@@ -259,7 +259,7 @@ def steepest_slope(model: BoucWen | Play) -> float:
         ValueError: For a Bouc-Wen model that depends on the rate without a limit, and for plays that depend on it:
             there is no bound.
     """
-    if isinstance(model, Play):
+    if isinstance(model, PrandtlIshlinskii):
         if model.widening_s:
             raise ValueError(
                 "a play operator that is fed back cannot depend on the rate: within a step it has no slope"

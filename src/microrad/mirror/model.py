@@ -14,7 +14,7 @@ import numpy as np
 
 from microrad.core import kernels, lti
 from microrad.core.arrays import Floats
-from microrad.mirror.hysteresis import NO_CREEP, BoucWen, Creep, Play, slow_gain, steepest_slope
+from microrad.mirror.hysteresis import NO_CREEP, BoucWen, Creep, PrandtlIshlinskii, slow_gain, steepest_slope
 from microrad.mission.tables import mirror as mirror_table
 
 
@@ -36,8 +36,8 @@ class Mirror:
     D: Floats
     K: Floats
     bouc_wen: tuple[BoucWen, ...]
-    plays: tuple[Play, ...]
-    inverse: tuple[BoucWen | Play, ...]
+    plays: tuple[PrandtlIshlinskii, ...]
+    inverse: tuple[BoucWen | PrandtlIshlinskii, ...]
     inverse_creep: tuple[Creep, ...] = ()
 
     @property
@@ -56,7 +56,7 @@ class Mirror:
         return self.linear([slow_gain(model) for model in self.bank])
 
     @property
-    def bank(self) -> tuple[BoucWen | Play, ...]:
+    def bank(self) -> tuple[BoucWen | PrandtlIshlinskii, ...]:
         """The hysteresis elements in the order of the rows of F."""
         return (*self.bouc_wen, *self.plays)
 
@@ -91,7 +91,7 @@ def linear_part(table: mirror_table.LinearPart) -> tuple[lti.StateSpace, float]:
 
 def hysteresis_model(
     table: mirror_table.Mirror | mirror_table.Comparison, rate_limit_v_s: float, bias_v: float
-) -> BoucWen | Play:
+) -> BoucWen | PrandtlIshlinskii:
     """The hysteresis model of a mirror table, as a record.
 
     Args:
@@ -103,7 +103,9 @@ def hysteresis_model(
         return BoucWen(**dict(table.bouc_wen), rate_limit_v_s=rate_limit_v_s, bias_v=bias_v)
     p = table.prandtl_ishlinskii
     assert p is not None  # the mission's own check
-    return Play(p.thresholds_v, p.weights_rad_v, p.widening_s, rate_limit_v_s if p.widening_s else math.inf)
+    return PrandtlIshlinskii(
+        p.thresholds_v, p.weights_rad_v, p.widening_s, rate_limit_v_s if p.widening_s else math.inf
+    )
 
 
 def from_table(table: mirror_table.Mirror) -> Mirror:
@@ -117,7 +119,7 @@ def creep_model(table: mirror_table.Mirror) -> Creep:
 
 
 def from_mission(
-    table: mirror_table.Mirror, model: BoucWen | Play, composition: str | None = None, times: float = 1.0
+    table: mirror_table.Mirror, model: BoucWen | PrandtlIshlinskii, composition: str | None = None, times: float = 1.0
 ) -> Mirror:
     """Assemble one axis from the mission's linear part and creep, and a hysteresis model.
 
@@ -140,7 +142,11 @@ def from_mission(
 
 
 def assemble(
-    name: str, composition: str, system: lti.StateSpace | None, model: BoucWen | Play, creep: Creep = NO_CREEP
+    name: str,
+    composition: str,
+    system: lti.StateSpace | None,
+    model: BoucWen | PrandtlIshlinskii,
+    creep: Creep = NO_CREEP,
 ) -> Mirror:
     """Assemble one axis from a linear part, a hysteresis model and the creep beside it.
 
@@ -182,12 +188,14 @@ def assemble(
     )
 
 
-def _elements(model: BoucWen | Play, split: bool) -> tuple[tuple[BoucWen, ...], tuple[Play, ...]]:
+def _elements(
+    model: BoucWen | PrandtlIshlinskii, split: bool
+) -> tuple[tuple[BoucWen, ...], tuple[PrandtlIshlinskii, ...]]:
     """Bank of one model; split into its linear gain first and its hysteresis after it."""
-    if isinstance(model, Play):
+    if isinstance(model, PrandtlIshlinskii):
         if not split or len(model.weights_rad_v) < 2 or model.thresholds_v[0] > 0.0:
             return (), (model,)
-        first = Play(model.thresholds_v[:1], model.weights_rad_v[:1])
+        first = PrandtlIshlinskii(model.thresholds_v[:1], model.weights_rad_v[:1])
         return (), (first, replace(model, thresholds_v=model.thresholds_v[1:], weights_rad_v=model.weights_rad_v[1:]))
     if not split:
         return (model,), ()
@@ -318,7 +326,7 @@ def plant_arrays(step_s: float, discrete: tuple[Floats, ...], mirror: Mirror, *,
     return kernels.by_rows(plant)
 
 
-def bank_arrays(bouc_wen: Sequence[BoucWen], plays: Sequence[Play]) -> dict[str, Any]:
+def bank_arrays(bouc_wen: Sequence[BoucWen], plays: Sequence[PrandtlIshlinskii]) -> dict[str, Any]:
     """Hysteresis elements as the kernels' arrays, by field of `kernels.Plant` and `kernels.ForwardBank`.
 
     Args:

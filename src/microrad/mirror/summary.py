@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from microrad.core import lti
-from microrad.mirror.hysteresis import BoucWen, Creep, Play, slow_gain
+from microrad.mirror.hysteresis import BoucWen, Creep, PrandtlIshlinskii, slow_gain
 from microrad.mirror.model import creep_model, hysteresis_model, linear_part
 from microrad.mission.tables import mirror as mirror_table
 
@@ -27,7 +27,7 @@ class Summary:
 
     name: str
     composition: str
-    model: BoucWen | Play
+    model: BoucWen | PrandtlIshlinskii
     creep: Creep
     roots: tuple[Root, ...]
     dc_gain: float
@@ -59,7 +59,7 @@ class Summary:
         limit = f"{self.rate_limit_v_s:.4g} V/s"
         lines += [
             f"  rate in the hysteresis held at {limit}; clamped samples are counted"
-            if bouc_wen or (isinstance(self.model, Play) and self.model.widening_s)
+            if bouc_wen or (isinstance(self.model, PrandtlIshlinskii) and self.model.widening_s)
             else f"  valid to {limit}"
         ]
         return "\n".join(lines + [f"  warning: {w}" for w in self.warnings])
@@ -131,9 +131,9 @@ def summarise(table: mirror_table.Mirror) -> Summary:
     )
 
 
-def _admissibility(model: BoucWen | Play) -> tuple[str, ...]:
+def _admissibility(model: BoucWen | PrandtlIshlinskii) -> tuple[str, ...]:
     """The warning for a model whose local slope turns negative after a reversal, or none."""
-    if isinstance(model, Play):
+    if isinstance(model, PrandtlIshlinskii):
         return ()
     slope, rate = model.reversal_slope_rad_v(), model.admissible_rate_v_s
     if slope < 0.0:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from functools import cache
 
-from microrad.mirror.hysteresis import LINE_OF_SIGHT, BoucWen, Play, gain_only, scaled
+from microrad.mirror.hysteresis import LINE_OF_SIGHT, BoucWen, PrandtlIshlinskii, gain_only, scaled
 from microrad.mirror.model import Mirror, from_mission, hysteresis_model
 from microrad.mission.model import Mission
 from microrad.mission.tables import mirror as mirror_table
@@ -25,7 +25,7 @@ class Variant(StrEnum):
 class MirrorAxis:
     """One axis of a variant: its hysteresis model, and the plant with it."""
 
-    model: BoucWen | Play
+    model: BoucWen | PrandtlIshlinskii
     plant: Mirror
 
 
@@ -59,7 +59,7 @@ def of(m: Mission) -> MirrorParts:
     }
 
     @cache
-    def axis(model: BoucWen | Play, times: float) -> MirrorAxis:
+    def axis(model: BoucWen | PrandtlIshlinskii, times: float) -> MirrorAxis:
         return MirrorAxis(model, from_mission(table, model, times=times))
 
     turned = {variant: scaled(model, doubled) for variant, model in models.items()}

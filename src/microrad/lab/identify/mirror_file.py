@@ -21,7 +21,7 @@ from microrad.lab.identify.selection.choice import Identification
 from microrad.lab.identify.selection.predictions import Fit
 from microrad.lab.identify.selection.warnings import fit_warnings
 from microrad.lab.identify.statistics import central_differences, correlation, propagated
-from microrad.mirror.hysteresis import BoucWen, Play, scaled, slow_gain
+from microrad.mirror.hysteresis import BoucWen, PrandtlIshlinskii, scaled, slow_gain
 
 _LOST = 100.0  # relative standard error of a value that is as good as held
 _LOOSEST = 1.0  # relative standard error that the file gives to a combination of parameters at most
@@ -161,12 +161,12 @@ def _bouc_wen(values: Floats, errors: Floats, free: Sequence[str], source: str) 
     return lines
 
 
-def _bouc_wen_numbers(m: BoucWen | Play) -> Floats:
+def _bouc_wen_numbers(m: BoucWen | PrandtlIshlinskii) -> Floats:
     assert isinstance(m, BoucWen)
     return np.array([*m.row[:6], m.gamma_1_v, m.eta_1_v, m.exponent])
 
 
-def _rising(fit: Fit, model: BoucWen | Play) -> BoucWen | Play:
+def _rising(fit: Fit, model: BoucWen | PrandtlIshlinskii) -> BoucWen | PrandtlIshlinskii:
     """The model with its output counted as the mirror file counts it: rising with the drive."""
     if not fit.falling:
         return model
@@ -186,7 +186,7 @@ def _plays(thresholds_v: ArrayLike, weights_rad_v: ArrayLike, errors_rad_v: Floa
 
 def _joint_plays(fit: JointFit, source: str) -> list[str]:
     model = _rising(fit, fit.model)
-    assert isinstance(model, Play)
+    assert isinstance(model, PrandtlIshlinskii)
     least = 1e-9 * slow_gain(model)  # what the search leaves of a weight at its bound
     weights = [w if w > least else 0.0 for w in model.weights_rad_v]
     lines = _plays(model.thresholds_v, weights, fit.fit.standard_errors[: len(weights)], source)

@@ -17,7 +17,7 @@ import numpy as np
 from microrad.core import kernels
 from microrad.core.arrays import Floats
 from microrad.loop.control.sampled import play_inverse
-from microrad.mirror.hysteresis import BoucWen, Play, slow_gain
+from microrad.mirror.hysteresis import BoucWen, PrandtlIshlinskii, slow_gain
 
 CYCLE_S = 3.2e-3
 """Time of a cycle, at least: what is learnt are means over it, so that faster motions, the loop's own, count little."""
@@ -62,13 +62,15 @@ class Adaptation:
     largest swing.
     """
 
-    plays: tuple[Play, ...]
+    plays: tuple[PrandtlIshlinskii, ...]
     noise_rad: float
     delay_samples: int
     swing_v: float
 
 
-def adaptation(models: Sequence[BoucWen | Play], noise_rad: float, delay_samples: int, swing_v: float) -> Adaptation:
+def adaptation(
+    models: Sequence[BoucWen | PrandtlIshlinskii], noise_rad: float, delay_samples: int, swing_v: float
+) -> Adaptation:
     """What an adaptive inverse of these models starts from.
 
     Args:
@@ -133,7 +135,7 @@ def cycle_samples(of: Adaptation, period_s: float) -> int:
     return max(needed, round(CYCLE_S / period_s))
 
 
-def _settings(of: Adaptation, model: Play, period_s: float) -> Floats:
+def _settings(of: Adaptation, model: PrandtlIshlinskii, period_s: float) -> Floats:
     cycle, slow, memory = cycle_samples(of, period_s), *(2.0 * math.pi * f * period_s for f in (SLOW_HZ, MEMORY_HZ))
     gain, dead = slow_gain(model), DEAD_ZONE_SIGMAS * of.noise_rad
     found = np.zeros(kernels.ADAPTIVE_COLUMNS)

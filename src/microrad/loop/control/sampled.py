@@ -12,7 +12,7 @@ import numpy as np
 from microrad.core import kernels, lti
 from microrad.core.arrays import Complexes, Floats
 from microrad.loop.control.analysis import LoopMargins, margins_of, real_at_half_the_rate, resolving
-from microrad.mirror.hysteresis import LINE_OF_SIGHT, BoucWen, Creep, Play, slow_gain
+from microrad.mirror.hysteresis import LINE_OF_SIGHT, BoucWen, Creep, PrandtlIshlinskii, slow_gain
 from microrad.mirror.model import Mirror
 from microrad.mission.model import Control, Mission
 
@@ -202,7 +202,7 @@ def inverse_arrays(of: Inverse, period_s: float) -> dict[str, Any]:
     }
 
 
-def play_inverse(model: Play) -> tuple[float, tuple[float, ...], tuple[float, ...]]:
+def play_inverse(model: PrandtlIshlinskii) -> tuple[float, tuple[float, ...], tuple[float, ...]]:
     """Inverse of a Prandtl-Ishlinskii model as (direct gain in V/rad, thresholds in rad, weights in V/rad).
 
     Source: Kuhnen, European Journal of Control 9 (2003) 407: r'_j = sum_{i<j} w_i (r_j - r_i), and w' from the

@@ -11,7 +11,7 @@ from microrad.core.arrays import Floats
 from microrad.loop.control import Adaptation, AxisController, Drive, Inverse, Timing, adaptation, sampled_path
 from microrad.loop.disturbance import Disturbance, Reference
 from microrad.loop.sensor import OpticalSensor, StrainGauge
-from microrad.mirror.hysteresis import BoucWen, Play, gain_only, slow_gain
+from microrad.mirror.hysteresis import BoucWen, PrandtlIshlinskii, gain_only, slow_gain
 from microrad.mirror.model import Mirror
 
 
@@ -69,11 +69,11 @@ class ForwardHysteresis:
     """
 
     bouc_wen: tuple[BoucWen, ...]
-    plays: tuple[Play, ...]
+    plays: tuple[PrandtlIshlinskii, ...]
     drives: Floats
 
     @property
-    def bank(self) -> tuple[BoucWen | Play, ...]:
+    def bank(self) -> tuple[BoucWen | PrandtlIshlinskii, ...]:
         """The elements in the order of the columns of ``drives``."""
         return (*self.bouc_wen, *self.plays)
 

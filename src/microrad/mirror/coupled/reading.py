@@ -9,7 +9,7 @@ import numpy as np
 from microrad.core import lti
 from microrad.core.arrays import Floats
 from microrad.mirror.coupled.records import Actuator, CoupledMirror, Known, Output
-from microrad.mirror.hysteresis import BoucWen, Play
+from microrad.mirror.hysteresis import BoucWen, PrandtlIshlinskii
 from microrad.mirror.model import Mirror
 from microrad.mission.tables.coupled_mirror import MATRICES, in_order
 from microrad.mission.tables.coupled_mirror import CoupledMirror as Table
@@ -67,12 +67,12 @@ def _bouc_wen(table: HysteresisTable) -> BoucWen:
     )
 
 
-def _play(table: HysteresisTable) -> Play:
+def _play(table: HysteresisTable) -> PrandtlIshlinskii:
     limit = math.inf if table.rate_limit_v_s is None else table.rate_limit_v_s
     quadratic, signed, cubic = table.polynomial or (0.0, 0.0, 0.0)
     reach = math.inf if table.reach_v is None else table.reach_v
     plays = table.thresholds_v or (), table.weights or ()
-    return Play(*plays, table.widening_s or 0.0, limit, (quadratic, signed, cubic), reach)
+    return PrandtlIshlinskii(*plays, table.widening_s or 0.0, limit, (quadratic, signed, cubic), reach)
 
 
 def _known(table: UncertaintyTable, order: Sequence[int]) -> Known:

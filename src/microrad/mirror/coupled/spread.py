@@ -10,7 +10,7 @@ import numpy as np
 from microrad.core import lti
 from microrad.core.arrays import Floats
 from microrad.mirror.coupled.records import CoupledMirror, Known, modes
-from microrad.mirror.hysteresis import BoucWen, Play, rest_gain, slow_gain
+from microrad.mirror.hysteresis import BoucWen, PrandtlIshlinskii, rest_gain, slow_gain
 from microrad.mirror.spread import nothing_known
 from microrad.mission.tables.mirror import least_alpha_1_v
 
@@ -141,7 +141,7 @@ def changed(mirror: CoupledMirror, by: Mapping[str, float]) -> CoupledMirror:
     own = mirror.mirror
     roots = [list(root) for root in modes(own.A)]
     matrices: dict[str, Any] = {}
-    elements: dict[int, BoucWen | Play] = {}
+    elements: dict[int, BoucWen | PrandtlIshlinskii] = {}
     delay_s = mirror.delay_s
     for key, change in by.items():
         what, *rest = key.split(".")
@@ -164,13 +164,15 @@ def changed(mirror: CoupledMirror, by: Mapping[str, float]) -> CoupledMirror:
         own,
         A=lti.modal_matrix([(s, w) for s, w in roots]),
         bouc_wen=tuple(model for model in bank if isinstance(model, BoucWen)),
-        plays=tuple(model for model in bank if isinstance(model, Play)),
+        plays=tuple(model for model in bank if isinstance(model, PrandtlIshlinskii)),
         **matrices,
     )
     return replace(mirror, mirror=made, delay_s=delay_s)
 
 
-def _with(model: BoucWen | Play, field: str, item: list[str], change: float) -> BoucWen | Play:
+def _with(
+    model: BoucWen | PrandtlIshlinskii, field: str, item: list[str], change: float
+) -> BoucWen | PrandtlIshlinskii:
     """The model with one of its numbers changed; one that is at least 0 stays so, but for signed ones."""
     value = getattr(model, field)
     values = list(value) if isinstance(value, tuple) else [value]

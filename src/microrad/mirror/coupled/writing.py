@@ -8,7 +8,7 @@ import numpy as np
 
 from microrad.core.arrays import Floats
 from microrad.mirror.coupled.records import CoupledMirror, Known, modes
-from microrad.mirror.hysteresis import BoucWen, Play
+from microrad.mirror.hysteresis import BoucWen, PrandtlIshlinskii
 from microrad.mirror.model import Mirror
 from microrad.mission.file import load_coupled_mirror
 from microrad.mission.tables.coupled_mirror import MATRICES
@@ -103,14 +103,14 @@ def _matrices(mirror: Mirror) -> Iterator[str]:
 
 
 def _hysteresis(mirror: Mirror) -> Iterator[str]:
-    elements: list[BoucWen | Play] = [*mirror.bouc_wen, *mirror.plays]
+    elements: list[BoucWen | PrandtlIshlinskii] = [*mirror.bouc_wen, *mirror.plays]
     for number, element in enumerate(elements, 1):
         yield f"[hysteresis.{number}]"
-        yield from _play_lines(element) if isinstance(element, Play) else _bouc_wen_lines(element)
+        yield from _play_lines(element) if isinstance(element, PrandtlIshlinskii) else _bouc_wen_lines(element)
         yield ""
 
 
-def _play_lines(play: Play) -> Iterator[str]:
+def _play_lines(play: PrandtlIshlinskii) -> Iterator[str]:
     yield 'model = "plays"'
     yield f"thresholds = [{', '.join(_quantity(r, 'V') for r in play.thresholds_v)}]"
     yield f"weights = [{', '.join(_number(w) for w in play.weights_rad_v)}]"

@@ -8,7 +8,7 @@ from microrad.lab.identify import Identification, PrandtlIshlinskiiFit, Score
 from microrad.lab.identify.hysteresis.joint import JointFit
 from microrad.lab.identify.linear.fit import LinearFit
 from microrad.lab.identify.selection.predictions import Fit
-from microrad.mirror.hysteresis import Play
+from microrad.mirror.hysteresis import PrandtlIshlinskii
 from microrad.report.data import fields, finite
 from microrad.report.identification import words
 from microrad.report.identification.parameters import (
@@ -82,7 +82,7 @@ def _parameter_data(fit: Fit) -> dict[str, Any]:
             "sign": fit.sign,
         }
     values: dict[str, Any] = {row.name: fields(row, "value", "standard_error", "unit") for row in parameter_rows(fit)}
-    if isinstance(fit, JointFit) and isinstance(fit.model, Play):
+    if isinstance(fit, JointFit) and isinstance(fit.model, PrandtlIshlinskii):
         values["thresholds_v"] = list(fit.model.thresholds_v)
     return common | values
 

@@ -28,7 +28,7 @@ from microrad.lab.identify.linear.modal import HOLD, Hold, beyond, late
 from microrad.lab.identify.records import SiRecord, Units, fastest_rate, memory, orthonormal, si_records, span
 from microrad.lab.recording import Recording
 from microrad.mirror import model as mirror
-from microrad.mirror.hysteresis import NO_CREEP, BoucWen, Creep, Play, slow_gain
+from microrad.mirror.hysteresis import NO_CREEP, BoucWen, Creep, PrandtlIshlinskii, slow_gain
 from microrad.mirror.model import Mirror
 
 _OPERATORS = 15
@@ -79,7 +79,7 @@ class JointFit:
     structure: AxisStructure
     fit: PlantFit
     mirror: Mirror
-    model: BoucWen | Play
+    model: BoucWen | PrandtlIshlinskii
     creep: Creep
     linear: LinearPoles | None
     rate_limit_v_per_s: float
@@ -108,7 +108,7 @@ class JointFit:
     @property
     def admissible(self) -> bool:
         """Whether the modelled mirror never moves against its drive just after a slow reversal."""
-        if isinstance(self.model, Play):
+        if isinstance(self.model, PrandtlIshlinskii):
             return all(w * slow_gain(self.model) >= 0.0 for w in self.model.weights_rad_v)
         turned = made_rising(self.model)
         return turned.reversal_slope_rad_v() >= -1e-3 * turned.d1_rad_v
@@ -216,7 +216,7 @@ def fit_joint(  # noqa: PLR0913  all but the first three are named options
         return [_between(_fit_record(record, creep_times), hold, of.step_s) for record, of in pairs]
 
     fit_list = prepared(records)
-    model: BoucWen | Play
+    model: BoucWen | PrandtlIshlinskii
     if begin is not None:
         model, creep_rad_v = begin.model, begin.creep.weights_rad_v
     elif form.family == "bouc_wen":
@@ -377,7 +377,7 @@ def _play_start(
     fit_list: Sequence[FitRecord],
     linear: LinearPoles | None,
     creep_times: Sequence[float],
-) -> tuple[Play, tuple[float, ...]]:
+) -> tuple[PrandtlIshlinskii, tuple[float, ...]]:
     """Weights >= 0 of plays and creep by non-negative least squares, the linear part held."""
     operators = 1 if form.family == "linear" else _OPERATORS
     thresholds = threshold_grid(max(float(np.ptp(r.drive_v)) for r in records), operators)
@@ -393,7 +393,7 @@ def _play_start(
     sign = 1.0 if float(matrix[:, 0] @ target) >= 0.0 else -1.0
     weights = sign * non_negative_weights(matrix, sign * target)
     limit = fastest_rate(records)
-    model = Play(tuple(thresholds.tolist()), tuple(weights[:operators].tolist()), 0.0, limit)
+    model = PrandtlIshlinskii(tuple(thresholds.tolist()), tuple(weights[:operators].tolist()), 0.0, limit)
     return model, tuple(weights[operators:].tolist())
 
 

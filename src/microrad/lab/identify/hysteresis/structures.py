@@ -12,7 +12,7 @@ from microrad.core import lti
 from microrad.core.arrays import Floats
 from microrad.lab.identify.hysteresis.plant_fit import Parameter, Structure
 from microrad.mirror import model as mirror
-from microrad.mirror.hysteresis import NO_CREEP, BoucWen, Creep, Play, slow_gain
+from microrad.mirror.hysteresis import NO_CREEP, BoucWen, Creep, PrandtlIshlinskii, slow_gain
 from microrad.mirror.model import Mirror
 from microrad.mission.tables.mirror import roots_from_damping
 
@@ -145,7 +145,7 @@ def hysteretic_oscillator(
 class Axis(NamedTuple):
     """What one axis consists of."""
 
-    model: BoucWen | Play
+    model: BoucWen | PrandtlIshlinskii
     creep: Creep
     linear: LinearPoles | None
 
@@ -164,7 +164,7 @@ class AxisStructure(Structure):
 
 def one_axis(
     name: str,
-    model: BoucWen | Play,
+    model: BoucWen | PrandtlIshlinskii,
     *,
     linear: LinearPoles | None = None,
     creep: Creep = NO_CREEP,
@@ -205,7 +205,7 @@ def one_axis(
         return mirror.assemble(name, composition, system, *_without_zeros(axis.model, axis.creep))
 
     def lag(time_constant_s: float) -> Mirror:
-        return mirror.assemble(name, "static", None, Play((), ()), Creep((1.0,), (time_constant_s,)))
+        return mirror.assemble(name, "static", None, PrandtlIshlinskii((), ()), Creep((1.0,), (time_constant_s,)))
 
     again = partial(
         one_axis,
@@ -226,9 +226,9 @@ def one_axis(
     return AxisStructure(name, (*hysteresis, *lags, *roots), build, late, beside, parts=parts, recipe=again)
 
 
-def _without_zeros(model: BoucWen | Play, creep: Creep) -> tuple[BoucWen | Play, Creep]:
+def _without_zeros(model: BoucWen | PrandtlIshlinskii, creep: Creep) -> tuple[BoucWen | PrandtlIshlinskii, Creep]:
     """The same without plays and lags that have no weight, which take time and add nothing."""
-    if isinstance(model, Play):
+    if isinstance(model, PrandtlIshlinskii):
         kept = [(r, w) for r, w in zip(model.thresholds_v, model.weights_rad_v, strict=True) if w]
         model = replace(model, thresholds_v=tuple(r for r, _ in kept), weights_rad_v=tuple(w for _, w in kept))
     lags = [(w, tau) for w, tau in zip(creep.weights_rad_v, creep.time_constants_s, strict=True) if w]
@@ -280,7 +280,9 @@ def _bouc_wen_part(
     return tuple(used), make
 
 
-def _play_part(model: Play, free: Sequence[str]) -> tuple[tuple[Parameter, ...], Callable[[Floats], Play]]:
+def _play_part(
+    model: PrandtlIshlinskii, free: Sequence[str]
+) -> tuple[tuple[Parameter, ...], Callable[[Floats], PrandtlIshlinskii]]:
     total = abs(slow_gain(model)) or 1.0
     count = len(model.thresholds_v)
     rising = math.copysign(1.0, slow_gain(model))
@@ -294,7 +296,7 @@ def _play_part(model: Play, free: Sequence[str]) -> tuple[tuple[Parameter, ...],
         most = travel / (model.rate_limit_v_s if math.isfinite(model.rate_limit_v_s) else 1.0)
         parameters.append(Parameter("widening", "s", max(model.widening_s, 0.01 * most), 0.0, 3 * most, 0.1 * most))
 
-    def make(values: Floats) -> Play:
+    def make(values: Floats) -> PrandtlIshlinskii:
         widening = float(values[count]) if len(values) > count else model.widening_s
         return replace(model, weights_rad_v=tuple(float(w) for w in values[:count]), widening_s=widening)
 

@@ -27,7 +27,7 @@ from microrad.lab.identify.stiffness.search import Search
 from microrad.lab.identify.stiffness.tangents import Steady
 from microrad.lab.recording import Recording
 from microrad.mirror import coupled
-from microrad.mirror.hysteresis import Play
+from microrad.mirror.hysteresis import PrandtlIshlinskii
 from microrad.mirror.model import Mirror, contraction
 
 THRESHOLDS = (0.02, 0.06, 0.15, 0.4)
@@ -168,7 +168,7 @@ def trust(fit: HystereticStiffnessFit, drive: Floats) -> Trust:
     return Trust(float((largest / fit.motion).max()), math.hypot(left, opened), left, opened)
 
 
-def _further(play: Play, largest: float) -> Play:
+def _further(play: PrandtlIshlinskii, largest: float) -> PrandtlIshlinskii:
     """The same operator with a polynomial that goes on to its largest drive, where that is beyond its reach."""
     if not math.isfinite(play.reach_v) or largest <= play.reach_v:
         return play

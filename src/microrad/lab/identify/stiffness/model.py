@@ -15,7 +15,7 @@ from microrad.core.arrays import Complexes, Floats
 from microrad.lab.identify.linear.modal import ModalModel
 from microrad.lab.identify.linear.order import fit_order
 from microrad.lab.identify.linear.response import FrequencyResponse
-from microrad.mirror.hysteresis import Play
+from microrad.mirror.hysteresis import PrandtlIshlinskii
 from microrad.mirror.model import Mirror
 
 _DELAY_ORDER = 20  # most states of the models that a delay is found with
@@ -36,7 +36,7 @@ class Numbers:
 
     ``decay`` holds s of all pairs and then of the real poles, ``frequency`` w of the pairs (rad/s); ``weights`` and
     ``thresholds`` have the shape (operators, plays), ``polynomial`` (operators, 3) and ``reach`` (operators,), see
-    `hysteresis.Play`. The thresholds and the reach are fixed.
+    `hysteresis.PrandtlIshlinskii`. The thresholds and the reach are fixed.
     """
 
     decay: Floats
@@ -113,7 +113,7 @@ class Numbers:
             A[2 * i, 2 * i + 1], A[2 * i + 1, 2 * i] = -w, w
         assert order == pairs + self.decay.size
         plays = tuple(
-            Play(
+            PrandtlIshlinskii(
                 tuple(self.thresholds[e].tolist()),
                 tuple(self.weights[e].tolist()),
                 polynomial_rad=(float(c[0]), float(c[1]), float(c[2])),
