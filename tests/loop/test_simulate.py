@@ -190,13 +190,13 @@ def test_hysteresis_loops(mission, freq_hz, width_percent, peak_mrad):
 def test_the_loop_of_plays_has_the_width_of_its_drawing():
     """Plays of thresholds r under +-U: the loop is 2 sum(w r) high at the middle, over 2 sum(w (U - r))."""
     plays = PrandtlIshlinskii((0.0, 0.5, 2.0), (0.06e-3, 0.02e-3, 0.009e-3))
-    loop = simulate.hysteresis_loop(plays, 1.0, 6.0, PERIOD)
+    loop = plays.loop(6.0, 1.0, 50_000)
     lost = 0.02e-3 * 0.5 + 0.009e-3 * 2.0
     assert_allclose(loop.width, 2 * lost / (2 * (0.089e-3 * 6 - lost)), rtol=1e-6)
 
 
 def test_a_loop_beyond_the_rate_limit_is_counted():
-    slow = simulate.hysteresis_loop(replace(PRINTED, rate_limit_v_s=2000.0), 100.0, 6.0, PERIOD)
+    slow = replace(PRINTED, rate_limit_v_s=2000.0).loop(6.0, 100.0)
     fast = 500 * 2 / pi * np.arccos(2000 / 3770)  # samples of one period at more than the limit
     assert_allclose(slow.clamped, fast, rtol=0.01)
 

@@ -125,11 +125,10 @@ def _numbers(version: str) -> tuple[int, ...]:
 
 # ------------------------------------------------------------------------------------------------------------ kernels
 def _kernels() -> tuple[bool, str]:
-    from microrad.loop import sine_run as simulate
     from microrad.mirror import hysteresis
 
     printed = hysteresis.BoucWen(0.089e-3, -2.96e-7, -0.048e-3, 0.00047, 38.421, 34.635, 3770.0, 6.0)
-    loop = simulate.hysteresis_loop(printed, 100.0, 6.0, 20e-6)
+    loop = printed.loop(6.0, 100.0)
     width, largest = 100 * loop.width, 1e6 * float(abs(loop.hysteresis_rad).max())
     agrees = abs(width - LOOP_WIDTH_PERCENT) <= _TOLERANCE and abs(largest - LARGEST_HYSTERESIS_URAD) <= _TOLERANCE
     return agrees, (

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from microrad.loop import control
-from microrad.loop.sine_run import HysteresisLoop, Setup, Trace, hysteresis_loop, margins, track_sine
+from microrad.loop.sine_run import Setup, Trace, margins, track_sine
 from microrad.mirror import MirrorParts, Variant
-from microrad.mirror.hysteresis import secant_gain
+from microrad.mirror.hysteresis import HysteresisLoop, secant_gain
 from microrad.mission.model import Control, Conventions, Mission, Requirement, Scenario
 
 PID, PID_WITH_INVERSE = "PID", "PID + inverse"
@@ -83,9 +83,7 @@ def simulate(cases: PaperCases) -> tuple[tuple[HysteresisLoop, ...], control.Loo
 def hysteresis_loops(cases: PaperCases) -> tuple[HysteresisLoop, ...]:
     """Fig. 5: settled loops of the static model at the mission's frequencies, in the mirror's own angle."""
     model, s = cases.mirrors.own[Variant.GIVEN].model, cases.scenario
-    return tuple(
-        hysteresis_loop(model, f, s.loop_amplitude_v, 1.0 / cases.control.rate_hz) for f in s.loop_frequencies_hz
-    )
+    return tuple(model.loop(s.loop_amplitude_v, f, round(cases.control.rate_hz / f)) for f in s.loop_frequencies_hz)
 
 
 def loop_margins(cases: PaperCases) -> control.LoopMargins:

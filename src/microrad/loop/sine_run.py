@@ -10,7 +10,7 @@ from microrad.core import kernels, lti
 from microrad.core.arrays import Floats
 from microrad.loop import control
 from microrad.loop.control import Drive, Inverse, Timing, amplifier_factor, anti_windup
-from microrad.mirror import Mirror, hysteresis
+from microrad.mirror import Mirror
 
 # Plant steps between two returns from the kernel, about 0.1 s, so that an interrupt is answered promptly.
 SLICE_STEPS = 1_000_000
@@ -254,61 +254,3 @@ def sine(amplitude_rad: float, freq_hz: float, period_s: float, settle_s: float 
     steady = slice(samples - round(shown / freq_hz / period_s), samples)
     time = np.arange(samples) * period_s
     return amplitude_rad * np.sin(2 * np.pi * freq_hz * time)[:, None], steady
-
-
-@dataclass(frozen=True, slots=True)
-class HysteresisLoop:
-    """One settled period of a hysteresis model under a sine drive: drive and output about the bias, and its size.
-
-    ``width`` is max h - min h over max y - min y. For a Prandtl-Ishlinskii model h is the output less gain x drive.
-    """
-
-    freq_hz: float
-    drive_v: Floats
-    output_rad: Floats
-    hysteresis_rad: Floats
-    clamped: int
-
-    @property
-    def width(self) -> float:
-        """Share of the output's peak-to-peak that is hysteresis."""
-        return float(np.ptp(self.hysteresis_rad) / np.ptp(self.output_rad))
-
-
-def hysteresis_loop(
-    model: hysteresis.BoucWen | hysteresis.PrandtlIshlinskii, freq_hz: float, amplitude_v: float, step_s: float
-) -> HysteresisLoop:
-    """The static hysteresis model (no linear part) under a sine about its bias, once it repeats itself.
-
-    Repeating: the output moves by at most 1e-6 of its size from one period to the next, or 1000 periods have passed.
-
-    Args:
-        model: The hysteresis model.
-        freq_hz: Frequency of the sine.
-        amplitude_v: Its amplitude.
-        step_s: Time between samples, about: a period has a whole number of them.
-    """
-    static = mirror.assemble("static", "static", None, model)
-    samples = round(1 / freq_hz / step_s)
-    step_s = 1 / freq_hz / samples  # a whole number of samples a period
-    plant = mirror.discretise(static, step_s)
-    state = mirror.at_rest(plant)
-    drive = amplitude_v * np.sin(2 * np.pi * np.arange(1, samples + 1) / samples)[:, None]
-    output, bank, last = np.empty((samples, 1)), np.empty((samples, state.bank.shape[0])), np.full(samples, np.inf)
-    for _ in range(1000):
-        state.clamped[:] = 0
-        mirror.respond(plant, state, drive, output, bank)
-        if np.max(np.abs(output[:, 0] - last)) <= 1e-6 * np.ptp(output):
-            break
-        last = output[:, 0].copy()
-    u, y = drive[:, 0], output[:, 0]
-    return HysteresisLoop(freq_hz, u, y, y - _linear_output(model, u, step_s), int(state.clamped.sum()))
-
-
-def _linear_output(model: hysteresis.BoucWen | hysteresis.PrandtlIshlinskii, u: Floats, step_s: float) -> Floats:
-    """The part that is not hysteresis: d1 exp(-d2 u') u for Bouc-Wen, else the slow gain of the plays x u."""
-    if isinstance(model, hysteresis.PrandtlIshlinskii):
-        return math.fsum(model.weights_rad_v) * u
-    rate = np.diff(u, prepend=u[-1]) / step_s
-    rate = np.clip(rate, -model.rate_limit_v_s, model.rate_limit_v_s)
-    return model.d1_rad_v * (np.exp(-model.d2_s_v * rate) * (u + model.bias_v) - model.bias_v)

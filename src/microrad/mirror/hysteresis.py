@@ -1,13 +1,74 @@
 """Hysteresis models as records: Bouc-Wen, Prandtl-Ishlinskii, and the creep that goes with either.
 
 Drive in volts, output in radians; the names hold for any pair of units (a hysteretic spring: metres and newtons).
+Drives count from the bias. Each response begins at rest at a drive of 0, is exact for a drive that is linear between
+samples, and comes from the kernels that a simulated mirror runs.
 """
 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
+
+from microrad.core import kernels
+from microrad.core.arrays import Floats
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HysteresisLoop:
+    """One settled period of a hysteresis model under a sine drive: drive and output about the bias, and its size.
+
+    ``width`` is max h - min h over max y - min y. For a Prandtl-Ishlinskii model h is the output less gain x drive.
+    ``clamped`` counts the samples of the period beyond the rate limit.
+    """
+
+    freq_hz: float
+    drive_v: Floats
+    output_rad: Floats
+    hysteresis_rad: Floats
+    clamped: int
+
+    @property
+    def width(self) -> float:
+        """Share of the output's peak-to-peak that is hysteresis."""
+        return float(np.ptp(self.hysteresis_rad) / np.ptp(self.output_rad))
+
+
+_Advance = Callable[[Floats, float, Any], tuple[Floats, Floats, Any, int]]
+"""Output, hysteresis and last state behind the first sample of a drive, and the clamped samples."""
+
+_REPEATS, _PERIODS = 1e-6, 1000
+_INVERSIONS = 300
+
+
+def _settled(advance: _Advance, state: Any, amplitude_v: float, freq_hz: float, samples: int) -> HysteresisLoop:
+    """The period that repeats itself: the output moves by at most 1e-6 of its size, or 1000 periods have passed."""
+    for name, value, unit in (("amplitude_v", amplitude_v, "V"), ("freq_hz", freq_hz, "Hz")):
+        if not 0.0 < value < math.inf:
+            raise ValueError(f"{name} of a loop is {value} {unit}: give a finite number above 0")
+    if samples < 8:
+        raise ValueError(f"a loop of {samples} samples a period has no shape: give 8 or more, better 500")
+    drive = amplitude_v * np.sin(2.0 * np.pi * np.arange(samples + 1) / samples)
+    last = np.full(samples, np.inf)
+    for _ in range(_PERIODS):
+        output, hysteresis, state, clamped = advance(drive, 1.0 / freq_hz / samples, state)
+        if np.max(np.abs(output - last)) <= _REPEATS * np.ptp(output):
+            break
+        last = output
+    return HysteresisLoop(freq_hz, drive[1:], output, hysteresis, clamped)
+
+
+def _from_rest(samples: ArrayLike, step_s: float, what: str) -> Floats:
+    """The samples of one signal with the rest before it in front."""
+    signal = np.asarray(samples, dtype=float)
+    if signal.ndim != 1 or not signal.size or not np.isfinite(signal).all():
+        raise ValueError(f"{what} has shape {signal.shape}: give one row of finite samples, shape (samples,)")
+    if not 0.0 < step_s < math.inf:
+        raise ValueError(f"step_s is {step_s} s: give the time between two samples, above 0")
+    return np.concatenate([[0.0], signal])
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +95,80 @@ class BoucWen:
     gamma_1_v: float = 0.0
     eta_1_v: float = 0.0
     exponent: float = 1.0
+
+    def response(self, drive_v: ArrayLike, step_s: float) -> Floats:
+        """Output (rad), shape (samples,), from rest.
+
+        Args:
+            drive_v: Drive about the bias (V), shape (samples,).
+            step_s: Time between samples (s).
+
+        Raises:
+            ValueError: For a drive of another shape or with a number that is not finite, and a step not above 0.
+
+        Example:
+            ```python
+            import numpy as np
+            from microrad import BoucWen
+
+            model = BoucWen(d1_rad_v=50e-6, d2_s_v=0.0, epsilon_rad_v=-8e-6, delta_s_v=0.0, alpha_1_v=0.3, beta_1_v=0.1)
+            print(model.admissible, model.response(np.linspace(0.0, 10.0, 100), step_s=1e-4)[-1])
+            ```
+        """
+        return self._advance(_from_rest(drive_v, step_s, "drive_v"), step_s, 0.0)[0]
+
+    def loop(self, amplitude_v: float, freq_hz: float, samples: int = 500) -> HysteresisLoop:
+        """The loop under a sine about the bias, once it repeats itself to 1e-6, or after 1000 periods.
+
+        Args:
+            amplitude_v: Amplitude of the sine (V), above 0.
+            freq_hz: Its frequency (Hz), above 0.
+            samples: Samples of a period, 8 or more.
+
+        Raises:
+            ValueError: For numbers outside of these.
+        """
+        return _settled(self._advance, 0.0, amplitude_v, freq_hz, samples)
+
+    def inverse(self, output_rad: ArrayLike, step_s: float) -> Floats:
+        """Drive about the bias (V), shape (samples,), that makes the output.
+
+        Eq. 4 of SPIE 11852, 118523B, repeated until h is that of the drive itself, which the sampled loop has no time
+        for: exact where d2 is 0. The rate in exp(-d2 q') stays that of output / d1, as there.
+
+        Args:
+            output_rad: Wanted output (rad), shape (samples,).
+            step_s: Time between samples (s).
+
+        Raises:
+            ValueError: For an output of another shape, a step not above 0, a model without a gain d1, and one that
+                moves against its drive behind a reversal of this output: no drive makes it.
+        """
+        if self.d1_rad_v == 0.0:
+            raise ValueError("a Bouc-Wen model with d1 = 0 has no inverse: its output does not follow the drive")
+        wanted = _from_rest(output_rad, step_s, "output_rad")
+        drive = wanted / self.d1_rad_v
+        rate = np.clip(np.diff(drive, prepend=0.0) / step_s, -self.rate_limit_v_s, self.rate_limit_v_s)
+        gain, offset = self.d1_rad_v * np.exp(-self.d2_s_v * rate), self.d1_rad_v * self.bias_v
+        for _ in range(_INVERSIONS):
+            before, h = drive, self._advance(np.append(0.0, drive), step_s, 0.0)[1]
+            drive = (wanted - h + offset) / gain - self.bias_v
+            if np.max(np.abs(drive - before)) <= 1e-13 * np.max(np.abs(drive)):
+                return drive[1:]
+        raise ValueError(
+            f"no drive was found in {_INVERSIONS} steps that makes this output: behind a reversal the slope of the "
+            f"model is {self.reversal_slope_rad_v(float(np.max(np.abs(rate)))):.3g} rad/V at its fastest rate, and its "
+            "inverse needs one above 0; fit it with admissible=True, or take a Prandtl-Ishlinskii model"
+        )
+
+    def _advance(self, drive_v: Floats, step_s: float, h_rad: float) -> tuple[Floats, Floats, float, int]:
+        output, h, clamped = kernels.bouc_wen_response(drive_v, step_s, np.array(self.row), h_rad)
+        return output[1:], h[1:], float(h[-1]), clamped
+
+    @property
+    def admissible(self) -> bool:
+        """Whether the output never moves against a slow drive behind a reversal."""
+        return self.reversal_slope_rad_v() * math.copysign(1.0, self.d1_rad_v) >= 0.0
 
     @property
     def row(self) -> tuple[float, ...]:
@@ -156,6 +291,110 @@ class PrandtlIshlinskii:
     polynomial_rad: tuple[float, float, float] = (0.0, 0.0, 0.0)
     reach_v: float = math.inf
 
+    def response(self, drive_v: ArrayLike, step_s: float) -> Floats:
+        """Output (rad), shape (samples,), from rest.
+
+        Args:
+            drive_v: Drive about the bias (V), shape (samples,).
+            step_s: Time between samples (s), on which only an operator that widens depends.
+
+        Raises:
+            ValueError: For a drive of another shape or with a number that is not finite, and a step not above 0.
+
+        Example:
+            ```python
+            from microrad import PrandtlIshlinskii
+
+            model = PrandtlIshlinskii(thresholds_v=(0.0, 1.0, 3.0), weights_rad_v=(40e-6, 6e-6, 4e-6))
+            loop = model.loop(amplitude_v=10.0, freq_hz=1.0)
+            print(f"{loop.width:.1%} of the travel is hysteresis")
+            print(model.response(model.inverse(loop.output_rad, step_s=2e-3), step_s=2e-3) - loop.output_rad)
+            ```
+        """
+        return self._advance(_from_rest(drive_v, step_s, "drive_v"), step_s, self._rest)[0]
+
+    def loop(self, amplitude_v: float, freq_hz: float, samples: int = 500) -> HysteresisLoop:
+        """The loop under a sine about the bias, once it repeats itself to 1e-6, or after 1000 periods.
+
+        Args:
+            amplitude_v: Amplitude of the sine (V), above 0.
+            freq_hz: Its frequency (Hz), above 0.
+            samples: Samples of a period, 8 or more.
+
+        Raises:
+            ValueError: For numbers outside of these.
+        """
+        return _settled(self._advance, self._rest, amplitude_v, freq_hz, samples)
+
+    def inverse(self, output_rad: ArrayLike, step_s: float) -> Floats:
+        """Drive about the bias (V), shape (samples,), that makes the output; exact for an operator that does not widen.
+
+        Args:
+            output_rad: Wanted output (rad), shape (samples,).
+            step_s: Time between samples (s).
+
+        Raises:
+            ValueError: For an output of another shape, a step not above 0, and what `inverted` refuses.
+        """
+        wanted = _from_rest(output_rad, step_s, "output_rad")
+        return self.inverted()._advance(wanted, step_s, self._rest)[0]
+
+    def inverted(self) -> "PrandtlIshlinskii":
+        """The inverse as an operator of the same kind: thresholds in rad, weights in V/rad.
+
+        Source: Kuhnen, European Journal of Control 9 (2003) 407: r'_j = sum_{i<j} w_i (r_j - r_i), and w' from the
+        differences of the reciprocals of the cumulated weights. Thresholds above 0 that widen by s widen the inverse's
+        by w_0 s at the rate of the drive (Al Janaideh and Krejci 2013), which is taken as that of the output over the
+        slow gain.
+
+        Raises:
+            ValueError: For a model without weight at threshold 0: it stands still after a reversal; and with a
+                polynomial.
+        """
+        if math.isfinite(self.reach_v):
+            raise ValueError(
+                "the Prandtl-Ishlinskii model has a polynomial beside its plays, and the inverse knows plays alone; "
+                "identify the axis without one"
+            )
+        r, w = np.array(self.thresholds_v), np.array(self.weights_rad_v)
+        slope = np.cumsum(w)
+        if r[0] != 0.0 or np.min(slope) <= 0.0:
+            raise ValueError(
+                "the Prandtl-Ishlinskii model has no weight at threshold 0: it stands still after each reversal and "
+                "has no inverse; identify it again with more samples near the reversals"
+            )
+        thresholds = [float(np.sum(w[:j] * (r[j] - r[:j]))) for j in range(1, r.size)]
+        slow = slow_gain(self)
+        return PrandtlIshlinskii(
+            (0.0, *thresholds),
+            (float(1.0 / slope[0]), *map(float, np.diff(1.0 / slope))),
+            self.weights_rad_v[0] * self.widening_s / slow,
+            self.rate_limit_v_s * slow,
+        )
+
+    def _advance(self, drive_v: Floats, step_s: float, plays: Floats) -> tuple[Floats, Floats, Floats, int]:
+        widening = np.array([self.widening_s, self.rate_limit_v_s])
+        states, clamped = kernels.widening_play_response(drive_v, step_s, np.array(self.thresholds_v), widening, plays)
+        s, (quadratic, signed, cubic) = (
+            np.clip(drive_v, -self.reach_v, self.reach_v) / self.reach_v,
+            self.polynomial_rad,
+        )
+        output = states @ np.array(self.weights_rad_v) + s * (quadratic * s + signed * np.abs(s) + cubic * s**2)
+        return output[1:], (output - slow_gain(self) * drive_v)[1:], states[-1], clamped
+
+    @property
+    def _rest(self) -> Floats:
+        return np.zeros(len(self.thresholds_v))
+
+    @property
+    def admissible(self) -> bool:
+        """Whether the output never moves against the drive: all sums of the first few weights have one sign, or are 0.
+
+        A polynomial is not looked at.
+        """
+        slopes = np.cumsum(self.weights_rad_v)
+        return bool(np.all(slopes * math.copysign(1.0, slow_gain(self)) >= 0.0))
+
 
 @dataclass(frozen=True, slots=True)
 class Creep:
@@ -167,6 +406,30 @@ class Creep:
 
     weights_rad_v: tuple[float, ...] = ()
     time_constants_s: tuple[float, ...] = ()
+
+    def response(self, drive_v: ArrayLike, step_s: float) -> Floats:
+        """What creep adds to the output (rad), shape (samples,), from rest.
+
+        Args:
+            drive_v: Drive about the bias (V), shape (samples,).
+            step_s: Time between samples (s).
+
+        Raises:
+            ValueError: For a drive of another shape or with a number that is not finite, and a step not above 0.
+
+        Example:
+            ```python
+            import numpy as np
+            from microrad import Creep
+
+            creep = Creep(weights_rad_v=(1e-6, 1e-6), time_constants_s=(0.1, 1.0))
+            print(creep.response(np.full(300, 10.0), step_s=0.01)[[9, 99, 299]])
+            ```
+        """
+        drive = _from_rest(drive_v, step_s, "drive_v")
+        lags = np.zeros(len(self.time_constants_s))
+        states = kernels.lag_response(drive, step_s, np.array(self.time_constants_s), lags)
+        return np.asarray(states[1:] @ np.array(self.weights_rad_v))
 
 
 NO_CREEP = Creep()

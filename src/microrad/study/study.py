@@ -14,10 +14,11 @@ from microrad.core.threads import beside, both
 from microrad.link import pointing, requirement
 from microrad.link import study as link_study
 from microrad.link.pointing.outage import Performance
-from microrad.loop import control, controller_study, coupled_study, paper_cases, sine_run
+from microrad.loop import control, controller_study, coupled_study, paper_cases
 from microrad.loop.pointing_loop import ensemble
 from microrad.mirror import Variant
 from microrad.mirror import summary as mirror_summary
+from microrad.mirror.hysteresis import HysteresisLoop
 from microrad.mission.file import MissionFile, with_contents
 from microrad.mission.model import Source
 from microrad.orbit import constellation
@@ -70,7 +71,7 @@ class Study:
     achieved: link.LinkBudget
     margin_map: MarginMap
     summary: mirror_summary.Summary
-    loops: tuple[sine_run.HysteresisLoop, ...]
+    loops: tuple[HysteresisLoop, ...]
     margins: control.LoopMargins
     runs: tuple[paper_cases.Run, ...]
     residual: paper_cases.Run

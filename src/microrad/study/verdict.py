@@ -10,11 +10,11 @@ from microrad import link
 from microrad.link import pointing
 from microrad.link.pointing.outage import Performance
 from microrad.link.requirement import IMPOSSIBLE, Requirement, Subject, derived_from, time_kept
-from microrad.loop import sine_run
 from microrad.loop.controller_study import FinePointingStudy
 from microrad.loop.paper_cases import PID, PID_WITH_INVERSE, PaperCases, Run
 from microrad.mirror import MirrorParts, Variant, hysteresis
 from microrad.mirror import summary as mirror_summary
+from microrad.mirror.hysteresis import HysteresisLoop
 from microrad.mission.model import Amplifier, Source
 from microrad.mission.tables import mirror as mirror_table
 from microrad.mission.tables.link import LinkRequirement
@@ -140,7 +140,7 @@ class Evidence:
 
     amplifier: Amplifier
     cases: PaperCases
-    loops: tuple[sine_run.HysteresisLoop, ...]
+    loops: tuple[HysteresisLoop, ...]
     summary: mirror_summary.Summary
     runs: tuple[Run, ...]
     scan: paper.Scan | None
@@ -271,7 +271,7 @@ def _linear_claim(s: mirror_summary.Summary) -> Claim:
     return Claim("Eq. 2", "linear dynamics of the mirror", ours, "partly" if outside else "yes", why)
 
 
-def _loops_claim(loops: tuple[sine_run.HysteresisLoop, ...]) -> Claim:
+def _loops_claim(loops: tuple[HysteresisLoop, ...]) -> Claim:
     ours = ", ".join(f"{100 * loop.width:.2f} % at {loop.freq_hz:g} Hz" for loop in loops)
     grows = len(loops) > 1 and all(a.width < 0.99 * b.width for a, b in pairwise(loops))
     why = "width of h over the output's peak-to-peak; some of it at 100 Hz is linear phase lag that Eq. 2 holds too"

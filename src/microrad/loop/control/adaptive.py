@@ -1,9 +1,10 @@
 """The adaptive inverse of play operators: what it starts from and how fast it learns, as the kernels' arrays.
 
 The mirror's plays, thresholds fixed, have weights that are updated on line by projected normalised least squares from
-command and reading; the inverse follows from the weights by the recursions of `play_inverse`. Sources: Kuhnen,
-European Journal of Control 9 (2003) 407 (operator, its inverse, weights of at least 0); Goodwin and Sin, Adaptive
-Filtering Prediction and Control (Prentice-Hall 1984), ch. 3 (projection algorithm with a dead zone and constraints).
+command and reading; the inverse follows from the weights by the recursions of `PrandtlIshlinskii.inverted`. Sources:
+Kuhnen, European Journal of Control 9 (2003) 407 (operator, its inverse, weights of at least 0); Goodwin and Sin,
+Adaptive Filtering Prediction and Control (Prentice-Hall 1984), ch. 3 (projection algorithm with a dead zone and
+constraints).
 """
 
 import math
@@ -16,7 +17,6 @@ import numpy as np
 
 from microrad.core import kernels
 from microrad.core.arrays import Floats
-from microrad.loop.control.sampled import play_inverse
 from microrad.mirror.hysteresis import BoucWen, PrandtlIshlinskii, slow_gain
 
 CYCLE_S = 3.2e-3
@@ -99,7 +99,7 @@ def adaptation(
                 f"an adaptive inverse keeps every play's weight at 0 or above, and one of this mirror is "
                 f"{min(model.weights_rad_v):g} rad/V: identify it with others, or take the frozen inverse"
             )
-        play_inverse(model)  # refuses what has no inverse
+        model.inverted()  # refuses what has no inverse
         plays.append(model)
     return Adaptation(tuple(plays), noise_rad, delay_samples, swing_v)
 

@@ -12,7 +12,7 @@ import numpy as np
 from microrad.core import kernels, lti
 from microrad.core.arrays import Complexes, Floats
 from microrad.loop.control.analysis import LoopMargins, margins_of, real_at_half_the_rate, resolving
-from microrad.mirror.hysteresis import LINE_OF_SIGHT, BoucWen, Creep, PrandtlIshlinskii, slow_gain
+from microrad.mirror.hysteresis import LINE_OF_SIGHT, BoucWen, Creep
 from microrad.mirror.model import Mirror
 from microrad.mission.model import Control, Mission
 
@@ -148,8 +148,6 @@ def no_feedforward(m: Mirror) -> Inverse:
 def inverse(m: Mirror) -> Inverse:
     """Inverse of the mirror's hysteresis and creep: Eq. 4 for Bouc-Wen, the closed form for Prandtl-Ishlinskii.
 
-    The rate that widens a rate-dependent operator is that of the reference over the slow gain.
-
     Raises:
         ValueError: For a Prandtl-Ishlinskii model without weight at threshold 0: it stands still after a reversal.
     """
@@ -160,10 +158,9 @@ def inverse(m: Mirror) -> Inverse:
         if isinstance(model, BoucWen):
             bouc_wen.append((model, j))
         else:
-            direct[j], thresholds, weights = play_inverse(model)
-            slow = slow_gain(model)
-            widening[j] = (model.weights_rad_v[0] * model.widening_s / slow, model.rate_limit_v_s * slow)
-            plays += [(r, w, j) for r, w in zip(thresholds, weights, strict=True)]
+            own = model.inverted()
+            direct[j], widening[j] = own.weights_rad_v[0], (own.widening_s, own.rate_limit_v_s)
+            plays += [(r, w, j) for r, w in zip(own.thresholds_v[1:], own.weights_rad_v[1:], strict=True)]
     return Inverse(
         tuple(direct),
         tuple(b for b, _ in bouc_wen),
@@ -200,33 +197,6 @@ def inverse_arrays(of: Inverse, period_s: float) -> dict[str, Any]:
         "inverse_lag_weight": np.array([weight for weight, _, _ in lags]),
         "inverse_lag_actuator": np.array([a for _, _, a in lags], dtype=np.uint64),
     }
-
-
-def play_inverse(model: PrandtlIshlinskii) -> tuple[float, tuple[float, ...], tuple[float, ...]]:
-    """Inverse of a Prandtl-Ishlinskii model as (direct gain in V/rad, thresholds in rad, weights in V/rad).
-
-    Source: Kuhnen, European Journal of Control 9 (2003) 407: r'_j = sum_{i<j} w_i (r_j - r_i), and w' from the
-    differences of the reciprocals of the cumulated weights. Thresholds above 0 that widen by s widen the inverse's by
-    w_0 s (Al Janaideh and Krejci 2013), which `inverse` looks after.
-
-    Raises:
-        ValueError: For a model without weight at threshold 0: it stands still after a reversal; and with a polynomial.
-    """
-    if math.isfinite(model.reach_v):
-        raise ValueError(
-            "the Prandtl-Ishlinskii model has a polynomial beside its plays, and the inverse knows plays alone; "
-            "identify the axis without one"
-        )
-    r, w = np.array(model.thresholds_v), np.array(model.weights_rad_v)
-    slope = np.cumsum(w)
-    if r[0] != 0.0 or np.min(slope) <= 0.0:
-        raise ValueError(
-            "the Prandtl-Ishlinskii model has no weight at threshold 0: it stands still after each reversal and has no "
-            "inverse; identify it again with more samples near the reversals"
-        )
-    thresholds = np.array([np.sum(w[:j] * (r[j] - r[:j])) for j in range(1, r.size)])
-    weights = np.diff(1.0 / slope)
-    return float(1.0 / slope[0]), tuple(map(float, thresholds)), tuple(map(float, weights))
 
 
 def sampled_plant(m: Mirror, drive: Drive, timing: Timing) -> lti.StateSpace:

@@ -1,0 +1,99 @@
+"""Hysteresis models by themselves: arrays in, arrays out, beside the slow twins of the kernels and the whole mirror."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import oracles
+from microrad import mirror
+from microrad.mirror.hysteresis import BoucWen, Creep, PrandtlIshlinskii
+from oracles import bouc_wen_response, lag_response, widening_play_response
+
+BOUC_WEN = BoucWen(50e-6, 0.0, -8e-6, 4e-4, 0.3, 0.1, rate_limit_v_s=2000.0, bias_v=5.0)
+PLAYS = PrandtlIshlinskii((0.0, 1.0, 3.0), (40e-6, 6e-6, 4e-6))
+WIDENING = replace(PLAYS, widening_s=1e-3, rate_limit_v_s=3000.0, polynomial_rad=(1e-6, 2e-6, -3e-6), reach_v=8.0)
+STEP = 1e-4
+DRIVE = 6.0 * np.sin(2 * np.pi * 60 * STEP * np.arange(400)) + np.linspace(0.0, 2.0, 400)
+
+
+def on_a_mirror(model):
+    """The output of a mirror that is this model and nothing else."""
+    plant = mirror.discretise(mirror.assemble("model", "static", None, model), STEP)
+    output, bank = np.empty((DRIVE.size, 1)), np.empty((DRIVE.size, 1))
+    mirror.respond(plant, mirror.at_rest(plant), DRIVE[:, None], output, bank)
+    return output[:, 0]
+
+
+@pytest.mark.parametrize("model", [BOUC_WEN, replace(BOUC_WEN, exponent=1.5, gamma_1_v=0.05), PLAYS, WIDENING])
+def test_a_model_by_itself_answers_as_a_mirror_of_it_alone(model):
+    alone = model.response(DRIVE, STEP)
+    assert_allclose(alone, on_a_mirror(model), rtol=0, atol=1e-12 * np.ptp(alone))
+    straight = DRIVE * np.ptp(alone) / np.ptp(DRIVE)
+    assert np.max(np.abs(alone - straight)) > 1e-3 * np.ptp(alone)
+
+
+def test_responses_are_those_of_the_slow_twins():
+    rest = np.concatenate([[0.0], DRIVE])
+    slow = bouc_wen_response(rest, STEP, oracles.BoucWen(*BOUC_WEN.row[:8]))[0][1:]
+    assert_allclose(BOUC_WEN.response(DRIVE, STEP), slow, rtol=0, atol=1e-9 * np.ptp(slow))
+    states, _ = widening_play_response(rest, STEP, PLAYS.thresholds_v, 1e-3, 3000.0, [0.0] * 3)
+    widened = replace(PLAYS, widening_s=1e-3, rate_limit_v_s=3000.0).response(DRIVE, STEP)
+    assert_allclose(widened, (states @ np.array(PLAYS.weights_rad_v))[1:], rtol=1e-12, atol=1e-18)
+    creep = Creep((1e-6, 2e-6), (0.01, 0.1))
+    lags = lag_response(rest, STEP, np.array([0.01, 0.1]), np.zeros(2))
+    assert_allclose(creep.response(DRIVE, STEP), (lags @ np.array([1e-6, 2e-6]))[1:], rtol=1e-9)
+
+
+@pytest.mark.parametrize("model", [BOUC_WEN, replace(BOUC_WEN, bias_v=0.0, epsilon_rad_v=20e-6), PLAYS])
+def test_the_response_to_the_inverse_is_what_was_wanted(model):
+    wanted = 200e-6 * np.sin(2 * np.pi * 20 * STEP * np.arange(1000)) * np.linspace(0.2, 1.0, 1000)
+    reached = model.response(model.inverse(wanted, STEP), STEP)
+    assert_allclose(reached, wanted, rtol=0, atol=1e-11 * np.ptp(wanted))
+    gain = model.d1_rad_v if isinstance(model, BoucWen) else sum(model.weights_rad_v)
+    assert np.max(np.abs(model.response(wanted / gain, STEP) - wanted)) > 0.01 * np.ptp(wanted)
+
+
+def test_a_lag_with_the_rate_is_left_by_the_inverse_in_part():
+    model = replace(BOUC_WEN, d2_s_v=-3e-7)
+    wanted = 200e-6 * np.sin(2 * np.pi * 20 * STEP * np.arange(1000))
+    left = np.max(np.abs(model.response(model.inverse(wanted, STEP), STEP) - wanted)) / np.ptp(wanted)
+    assert 1e-6 < left < 1e-3
+
+
+def test_a_widening_operator_is_nearly_inverted():
+    model = replace(PLAYS, widening_s=1e-4)
+    wanted = 200e-6 * np.sin(2 * np.pi * 20 * STEP * np.arange(1000))
+    reached = model.response(model.inverse(wanted, STEP), STEP)
+    frozen = model.response(PLAYS.inverse(wanted, STEP), STEP)
+    assert 0.0 < np.max(np.abs(reached - wanted)) < 0.2 * np.max(np.abs(frozen - wanted))
+
+
+def test_only_a_model_that_never_turns_is_admissible():
+    assert BOUC_WEN.admissible
+    assert not replace(BOUC_WEN, epsilon_rad_v=-40e-6).admissible
+    assert replace(BOUC_WEN, d1_rad_v=-50e-6, epsilon_rad_v=8e-6).admissible
+    assert PLAYS.admissible
+    assert replace(PLAYS, weights_rad_v=(40e-6, -30e-6, 4e-6)).admissible
+    assert not replace(PLAYS, weights_rad_v=(40e-6, -50e-6, 30e-6)).admissible
+
+
+def test_what_a_model_cannot_take_is_refused():
+    with pytest.raises(ValueError, match=r"drive_v has shape \(2, 2\): give one row of finite samples"):
+        BOUC_WEN.response(np.ones((2, 2)), STEP)
+    with pytest.raises(ValueError, match="finite samples"):
+        PLAYS.response([0.0, np.nan], STEP)
+    with pytest.raises(ValueError, match=r"output_rad has shape \(0,\)"):
+        PLAYS.inverse([], STEP)
+    with pytest.raises(ValueError, match=r"step_s is 0\.0 s: give the time between two samples"):
+        Creep((1e-6,), (1.0,)).response([1.0], 0.0)
+    with pytest.raises(ValueError, match=r"freq_hz of a loop is 0\.0 Hz: give a finite number above 0"):
+        PLAYS.loop(1.0, 0.0)
+    with pytest.raises(ValueError, match="4 samples a period has no shape"):
+        BOUC_WEN.loop(1.0, 1.0, 4)
+    with pytest.raises(ValueError, match="d1 = 0 has no inverse"):
+        replace(BOUC_WEN, d1_rad_v=0.0).inverse([0.0, 1e-6], STEP)
+    backwards = replace(BOUC_WEN, epsilon_rad_v=-120e-6)
+    with pytest.raises(ValueError, match=r"no drive was found.*slope of the model is -.*fit it with admissible=True"):
+        backwards.inverse(200e-6 * np.sin(np.linspace(0.0, 20.0, 300)), STEP)
