@@ -181,6 +181,13 @@ def parse_quantity(text: object, unit: str, typical: str = "") -> float:
 
     Raises:
         UnitError: For anything else: a bare number, another dimension, a comma, nan, an expression.
+
+    Example:
+        ```python
+        import microrad
+
+        print(microrad.parse_quantity("5 cm", "m"), microrad.parse_quantity("-3 dBm", "W"))
+        ```
     """
     try:
         return _read(text, unit)

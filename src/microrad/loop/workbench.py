@@ -44,6 +44,17 @@ class Controller:
     ``system`` has the error of each axis as the sensor reads it (rad) as inputs, with one axis the gauge's reading of
     the mirror (rad) behind it where it is used, and the command of each axis (V) as outputs. ``anti_windup`` is L,
     shape (states, axes): what a command that is cut off adds to the states.
+
+    Example:
+        ```python
+        import microrad
+
+        mirror = microrad.Mirror.of(50e-6, [1.0], [1 / 6000**2, 2 * 0.4 / 6000, 1.0])
+        loop = microrad.Loop(mirror=mirror, rate_hz=10e3, sensor_noise_rad=0.2e-6)
+        controller = microrad.Controller.pid(0.0, 2e6, rate_hz=10e3)
+        print(loop.margins(controller).modulus)
+        print(loop.simulate(controller, duration_s=0.1, reference_rad=[10e-6]).error_rad[-1])
+        ```
     """
 
     name: str

@@ -20,7 +20,8 @@ from microrad.loop.disturbance.records import Disturbance, band_rms, psd
 from microrad.loop.paper_cases import Run
 from microrad.loop.pointing_loop.ensemble import Ensemble
 from microrad.loop.pointing_loop.traces import PointingTrace
-from microrad.loop.sine_run import HysteresisLoop, Trace
+from microrad.loop.sine_run import Trace
+from microrad.mirror.hysteresis import HysteresisLoop
 from microrad.orbit.day import DayStudy
 from microrad.orbit.visibility.contacts import Contact
 from microrad.report.day.figures import contacts_figure, spans, timeline
@@ -61,6 +62,17 @@ def plot_bode(result: FrequencyResponseFit | FrequencyResponse | Identification,
         TypeError: For another result, and for axes that are none.
         ValueError: For more or fewer axes than panels, and for an identification without a linear part.
         ImportError: Where matplotlib is not installed.
+
+    Example:
+        ```python
+        import numpy as np
+        import microrad
+
+        freq_hz, gain, phase_deg = np.loadtxt("bode.csv", delimiter=",", skiprows=1, unpack=True)
+        fit = microrad.fit_frequency_response(freq_hz, gain * np.exp(1j * np.radians(phase_deg)))
+        axes = microrad.plot_bode(fit)
+        axes[0].figure.savefig("bode.png")
+        ```
     """
     sheets: _Sheets = {
         FrequencyResponseFit: _fit_bode,
@@ -85,6 +97,15 @@ def plot_loops(result: HysteresisLoop | Sequence[HysteresisLoop] | Identificatio
         TypeError: For another result, and for axes that are none.
         ValueError: For no loop, and for more or fewer axes than panels.
         ImportError: Where matplotlib is not installed.
+
+    Example:
+        ```python
+        import microrad
+
+        plays = microrad.PrandtlIshlinskii(thresholds_v=(0.0, 1.0, 3.0), weights_rad_v=(40e-6, 6e-6, 4e-6))
+        axes = microrad.plot_loops([plays.loop(amplitude, freq_hz=1.0) for amplitude in (2.0, 5.0, 10.0)])
+        axes[0].figure.savefig("loops.png")
+        ```
     """
     sheets: _Sheets = {HysteresisLoop: lambda loop: _loops([loop]), Identification: _identified_loops}
     return axes_of(_sheet("plot_loops", result, sheets, HysteresisLoop, _loops), axes)
@@ -106,6 +127,16 @@ def plot_residual(result: Identification | FrequencyResponseFit | Trace | Pointi
         TypeError: For another result, and for axes that are none.
         ValueError: For more or fewer axes than panels.
         ImportError: Where matplotlib is not installed.
+
+    Example:
+        ```python
+        import numpy as np
+        import microrad
+
+        freq_hz, gain, phase_deg = np.loadtxt("bode.csv", delimiter=",", skiprows=1, unpack=True)
+        fit = microrad.fit_frequency_response(freq_hz, gain * np.exp(1j * np.radians(phase_deg)))
+        microrad.plot_residual(fit)
+        ```
     """
     sheets: _Sheets = {
         Identification: lambda found: identification.residuals(identification.shown(found, ())).sheet,
@@ -133,6 +164,16 @@ def plot_spectrum(result: Ensemble | Disturbance, axes: Any = None) -> Any:
         ValueError: For more or fewer axes than two, for runs that were made without a spectrum, and for a disturbance
             of which poles coincide or that does not move.
         ImportError: Where matplotlib is not installed.
+
+    Example:
+        ```python
+        import numpy as np
+        import microrad
+
+        freq_hz = np.geomspace(0.1, 1000, 200)
+        vibration = microrad.fit_spectrum(freq_hz, 160e-12 / (1 + freq_hz**2), convention="radial")
+        microrad.plot_spectrum(vibration)
+        ```
     """
     sheets: _Sheets = {Ensemble: _left_spectrum, Disturbance: _disturbance_spectrum}
     return axes_of(_sheet("plot_spectrum", result, sheets), axes)
@@ -152,6 +193,13 @@ def plot_margin_map(result: Study | LinkStudy, axes: Any = None) -> Any:
         TypeError: For another result, and for axes that are none.
         ValueError: For several axes.
         ImportError: Where matplotlib is not installed.
+
+    Example:
+        ```python
+        import microrad
+
+        microrad.plot_margin_map(microrad.run_study(microrad.load_mission("leo-geo.toml")))
+        ```
     """
     sheets: _Sheets = {
         Study: study_margin_sheet,
@@ -174,6 +222,14 @@ def plot_contacts(result: DayStudy | Sequence[Contact], axes: Any = None) -> Any
         TypeError: For another result, and for axes that are none.
         ValueError: For no contact, and for several axes.
         ImportError: Where matplotlib is not installed.
+
+    Example:
+        ```python
+        import microrad
+
+        leo, relay = microrad.read_elements("satellites.tle")
+        microrad.plot_contacts(microrad.find_contacts(leo, relay, start=leo.epoch.text, duration_s=86_400.0))
+        ```
     """
     sheets: _Sheets = {DayStudy: lambda day: contacts_figure(day).sheet}
     return axes_of(_sheet("plot_contacts", result, sheets, Contact, _contacts), axes)
