@@ -40,6 +40,7 @@ _95 = 1.96  # standard deviations about a normal variable that hold 95 % of it
 _STEP = 1e-3  # of a standard error, by which parameters are moved
 _FINE = 400  # frequencies of a model's curve beside those of its table
 _DENSE = 2000  # frequencies of a disturbance's spectrum
+_AROUND = 30.0  # times the corners of a disturbance, to either side
 _AXIS_LOOKS = ((BLUE, "-"), (VERMILION, "--"), (GREEN, "-."), (ORANGE, ":"))
 
 _Sheets = Mapping[type, Callable[[Any], Sheet]]
@@ -429,12 +430,12 @@ def _left_spectrum(runs: Ensemble) -> Sheet:
 
 
 def _disturbance_spectrum(of: Disturbance) -> Sheet:
-    """From a thirtieth of its slowest corner to ten times its fastest one."""
+    """From well below its slowest corner or line to well above its fastest one."""
     lines_hz = np.array([line.freq_hz for line in of.lines])
     corners = np.concatenate([np.abs(np.linalg.eigvals(of.A)) / (2.0 * np.pi), lines_hz])
     if not corners.size:
         raise ValueError(f'plot_spectrum: "{of.name}" has neither a filter nor lines, so nothing moves')
-    freq = np.geomspace(corners.min() / 30.0, 10.0 * corners.max(), _DENSE)
+    freq = np.geomspace(corners.min() / _AROUND, _AROUND * corners.max(), _DENSE)
     sheet, left, right = spectrum_sheet(freq)
     if of.A.size:
         left.add(Line(freq, 1e12 * psd(of, freq), BLUE, label=of.name))

@@ -231,6 +231,7 @@ def _modelled(panels: tuple[Panel, Panel], model: Modelled, turn: Floats) -> Non
     (size, phase), magnitude = panels, np.abs(model.value)
     look = {**_MODEL, "width": 1.4}
     if model.along is not None and model.across is not None:
+        size.y.low = 0.5 * min(float(magnitude.min()), *(float(line.y.min()) for line in size.all_of(Line)))
         low, spread = np.maximum(magnitude - model.along, 1e-3 * magnitude), np.degrees(model.across)
         label = "95 % confidence of the model"
         size.add(between(model.freq_hz, low, magnitude + model.along, VERMILION, 0.3, label))

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import textwrap
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from microrad.core.installing import advice
 from microrad.report.plotting import scales
-from microrad.report.plotting.layout import Key, Layout, Placed, layout
-from microrad.report.plotting.palette import BLACK, WHITE
+from microrad.report.plotting.layout import INCH, LEAST_MARKER, SWATCH, SWATCH_GAP, Key, Layout, Placed, layout
+from microrad.report.plotting.palette import BLACK, CIVIDIS, WHITE
 from microrad.report.plotting.sheet import Area, Axis, Bars, Dash, Field, Line, Rule, Sheet, Span, Words
 
 if TYPE_CHECKING:
@@ -20,6 +21,9 @@ _GRID: dict[str, Any] = {"color": "#dddddd", "linewidth": 0.6}
 _PLAIN: dict[str, Any] = {"parse_math": False}  # names may have dollar signs in them
 _ACROSS = {"start": "left", "middle": "center", "end": "right"}
 _UP = {"top": "top", "middle": "center", "bottom": "bottom"}
+_TITLE = 10.0  # points, of titles of axes in matplotlib's own style
+_LEAST = 12  # characters of a line
+_DARK = CIVIDIS[3]  # behind white words
 _HIGHEST = 1e30  # in place of infinity, which contours leave out
 
 
@@ -124,26 +128,51 @@ def _ends(axis: Axis, before: tuple[float, float] | None) -> tuple[float | None,
 
 def _ticks_and_titles(ax: Axes, of: Placed, drawn: Sequence[Axes]) -> None:
     """Grid, ticks and titles, but for those that other axes have which share a scale with these."""
+    from matplotlib.ticker import FixedLocator
+
     panel = of.panel
     x_away = not of.x_shown and ax.get_shared_x_axes().joined(ax, drawn[-1])
     y_away = not of.y_shown and ax.get_shared_y_axes().joined(ax, drawn[0])
     ax.set_axisbelow(True)
     sides: Any = (("x", panel.x, x_away, of.x_title), ("y", panel.y, y_away, of.y_title))
-    for name, axis, away, title in sides:
+    for (name, axis, away, title), room in zip(sides, _room(ax), strict=True):
         which = ax.xaxis if name == "x" else ax.yaxis
         which.grid(axis.grid, **(_GRID if axis.grid else {}))
         if axis.words:
             which.set_ticks([*axis.words], [*axis.words.values()], **_PLAIN)
+        elif axis.ticks is not None and axis.log:
+            which.set_ticks([*axis.ticks], [f"{at:g}" for at in axis.ticks])
         elif axis.ticks is not None:
-            which.set_ticks([*axis.ticks], [f"{at:g}" for at in axis.ticks] if axis.log else None)
+            which.set_major_locator(FixedLocator([*axis.ticks], nbins=max(2, int(room / scales.EACH[name]))))
         if axis.log and axis.ticks is not None:
             which.set_ticks([], minor=True)
         if away:
             ax.tick_params(name, **{"labelbottom" if name == "x" else "labelleft": False})
         else:
-            which.set_label_text(title, **_PLAIN)
+            which.set_label_text(_broken(title, room, _TITLE), **_PLAIN)
     if panel.title:
-        ax.set_title(panel.title, fontsize="medium", **_PLAIN)
+        ax.set_title(_broken(panel.title, _room(ax)[0], _TITLE), fontsize="medium", **_PLAIN)
+
+
+def _room(ax: Axes) -> tuple[float, float]:
+    """Width and height of axes in points, about: their place is settled when they are drawn."""
+    box, dots = ax.get_window_extent(), ax.figure.dpi / INCH
+    return box.width / dots, box.height / dots
+
+
+def _broken(text: str, room: float, size: float) -> str:
+    """A text in as many lines as it needs to be no longer than a room.
+
+    Args:
+        text: in one line or several.
+        room: points.
+        size: of its letters, points.
+    """
+    wide = scales.width_of(text, size)
+    if wide <= room:
+        return text
+    most = max(int(len(text) * room / wide), _LEAST)
+    return "\n".join(textwrap.fill(line, most, break_long_words=False) for line in text.split("\n"))
 
 
 # ---------------------------------------------------------------------------------------------------------------- marks
@@ -252,36 +281,48 @@ def _legends(drawn: Sequence[Axes], found: Layout, *, new: bool) -> None:
     """Legends of panels; that of a sheet stands above or below a new figure, and in the first of given axes."""
     for key in found.keys:
         if key.panel is not None:
-            ax = drawn[key.panel]
-            _legend(ax, [ax], key, **_place(key, found.placed[key.panel]))
+            _legend_of_panel(drawn[key.panel], key, found.placed[key.panel])
         elif new:
             side = "lower" if key.of.place == "below" else "upper"
-            _legend(drawn[0].figure, drawn, key, loc=f"outside {side} center", ncols=key.of.columns)
+            _legend(drawn[0].figure, drawn, key, found.width, {"loc": f"outside {side} center"})
         else:
-            _legend(drawn[0], drawn, key, loc="best")
+            _legend(drawn[0], drawn, key, 0.0, {"loc": "best"})
 
 
-def _legend(on: Any, drawn: Sequence[Axes], key: Key, **place: Any) -> None:
+def _legend_of_panel(ax: Axes, key: Key, of: Placed) -> None:
+    """In its place, or above the panel where it is wider than that."""
+    wide, place = _room(ax)[0], key.of.place
+    if place == "above" or (key.width > wide and not of.panel.title):
+        _legend(ax, [ax], key, wide, {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0)})
+    else:
+        _legend(ax, [ax], key, wide, {"loc": "best" if place in ("below", "right") else place})
+
+
+def _legend(on: Any, drawn: Sequence[Axes], key: Key, room: float, place: Mapping[str, Any]) -> None:
+    """A legend of axes on one of them or on their figure.
+
+    Args:
+        on: where it stands.
+        drawn: the axes.
+        key: what the layout knows of it.
+        room: points across; where it needs more it has one column, 0 for any.
+        place: as matplotlib takes it.
+    """
     named: dict[str, Any] = {}
     for ax in drawn:
         for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
             named.setdefault(label, handle)
     if not named:
         return
-    plain = key.of.colour == BLACK
-    look = {"fontsize": "small", "title_fontsize": "small", "frameon": None if plain else False}
-    legend = on.legend([*named.values()], [*named], title=key.of.title or None, **place, **look)
+    plain, columns = key.of.colour == BLACK, key.of.columns if key.width < room else 1
+    labels = [_broken(label, room - SWATCH - 3.0 * SWATCH_GAP, key.of.size) if room else label for label in named]
+    look: dict[str, Any] = {"fontsize": "small", "title_fontsize": "small", "facecolor": "inherit" if plain else _DARK}
+    look["framealpha"] = None if plain else 1.0
+    legend = on.legend([*named.values()], labels, title=key.of.title or None, ncols=columns, **place, **look)
     for text in legend.get_texts():
         text.set_parse_math(False)
         if not plain:
             text.set_color(key.of.colour)
-
-
-def _place(key: Key, of: Placed) -> dict[str, Any]:
-    """Above the panel, or in that corner of it which the layout has found for it."""
-    if key.of.place == "above":
-        return {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "ncols": key.of.columns}
-    left, top, right, bottom = of.inner
-    up = "upper" if key.y + key.height / 2.0 < (top + bottom) / 2.0 else "lower"
-    across = "left" if key.x + key.width / 2.0 < (left + right) / 2.0 else "right"
-    return {"loc": f"{up} {across}", "ncols": key.of.columns}
+    for handle in legend.legend_handles:
+        if getattr(handle, "get_marker", str)() == ".":  # too small to be seen
+            handle.set_markersize(2.0 * LEAST_MARKER)
