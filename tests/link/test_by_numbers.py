@@ -19,10 +19,8 @@ def test_received_power_is_power_density_times_area():
     assert_allclose(power.margin_db(-40.0), power.received_dbm + 40.0)
     assert [line.name for line in power.lines][-1] == "optics" and power.lines[-1].value == -2.0
     assert power.warnings == ()
-    assert (
-        "Transmit gain: the far field of this beam begins at"
-        in received_power(1.0, 8e-6, 1e3, 0.25, 1064e-9).warnings[0]
-    )
+    (near,) = received_power(1.0, 8e-6, 1e3, 0.25, 1064e-9).warnings
+    assert near.startswith("Transmit gain: the far field of this beam begins at")
 
 
 @pytest.mark.parametrize(
@@ -46,12 +44,12 @@ def test_numbers_without_meaning_are_refused(changes, said):
 def test_times_of_a_scan_are_those_of_drawn_targets():
     times = scan_times(100e-6, 20e-6, 5e-3, detection_probability=0.9, jitter_rms_rad=2e-6)
     search = Search(100e-6, 20e-6, 0.2, 0.99)
-    scan = Spiral(search, Detector(5e-3, 0.9), highest_speed(search, 5e-3))
+    scan = Spiral(search, Detector(5e-3, 0.9), 0.9 * highest_speed(search, 5e-3))
     still = scan_times(100e-6, 20e-6, 5e-3)
     drawn = simulate_scan(Spiral(search, Detector(5e-3), scan.speed_rad_s), 4000, seed=1)
     share = float(np.mean(drawn.detected))
     assert abs(share - still.probability) < 4.5 * math.sqrt(share * (1 - share) / 4000) + 2e-3
     assert_allclose(np.mean(drawn.time_s[drawn.detected]), still.mean_s, rtol=0.08)
     assert times.probability < still.probability
-    with pytest.raises(ValueError, match="the overlap.*never lit long enough"):
+    with pytest.raises(ValueError, match=r"the overlap.*never lit long enough"):
         scan_times(100e-6, 20e-6, 5e-3, overlap=0.0)
