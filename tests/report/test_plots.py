@@ -349,6 +349,24 @@ def test_a_second_result_on_the_same_axes_hides_nothing_of_the_first():
     assert alone[0] != alone[1] and len(both[0].lines) == 4
     again = plots.plot_spectrum(slow, axes=plots.plot_spectrum(fast))
     assert again[0].get_xlim() == both[0].get_xlim()
+    t = table(1)
+    larger = fit_frequency_response(t.freq_hz, 1e3 * t.response, t.order)
+    size, _ = plots.plot_bode(larger, axes=plots.plot_bode(result("fit")))
+    low, high = size.get_ylim()
+    assert low < np.abs(t.response).min() and high > 1e3 * np.abs(t.response).max()
+
+
+def test_limits_that_the_sheet_does_not_set_stay_as_matplotlib_has_them():
+    sine = result("sine")
+    ax = plots.plot_residual(sine)
+    ax.plot([0.0, 1.0], [0.0, 1000.0])
+    assert ax.get_xlim()[1] > 1.0 and ax.get_ylim()[1] > 1000.0
+    _, given = pyplot.subplots()
+    given.set_xlim(0.0, 0.1)
+    plots.plot_residual(sine, axes=given)
+    assert given.get_xlim() == (0.0, 0.1)
+    plots.plot_residual(sine, axes=given)
+    assert given.get_xlim()[1] > sine.trace.time_s[-1]
 
 
 def test_long_titles_are_broken_where_axes_are_small_and_long_legends_stand_above():
@@ -440,7 +458,7 @@ def test_axes_that_do_not_fit_are_refused():
 
 def test_what_has_nothing_to_show_is_refused():
     with pytest.raises(
-        ValueError, match="has no linear part; give identify_mirror a broadband recording .* such as models="
+        ValueError, match=r"no linear part; give identify_mirror a broadband recording .* such as models"
     ):
         plots.plot_bode(identified(False))
     found = result("runs")
