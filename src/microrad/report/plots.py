@@ -361,7 +361,7 @@ def _identified_bode(found: Identification) -> Sheet:
     if linear is None:
         raise ValueError(
             "plot_bode: the identification has no linear part; give identify_mirror a broadband recording (a chirp "
-            "or a multisine) among its recordings"
+            "or a multisine) and a model with such a part, such as models=('linear',)"
         )
     of = linear.response
     measured, half = 1e6 * of.response[:, 0, 0], 1e6 * half_width(of.standard_error[:, 0, 0])
@@ -418,7 +418,7 @@ def _errors(time_s: Floats, error_rad: Floats, steady: slice = slice(None)) -> S
 def _left_spectrum(runs: Ensemble) -> Sheet:
     if not np.all(np.isfinite(runs.psd_rad2_hz)):
         raise ValueError(
-            "plot_spectrum: these runs were made without a spectrum; simulate them with one (Case.spectrum)"
+            "plot_spectrum: these runs were made without a spectrum; simulate them as a Case with spectrum=True"
         )
     inner = slice(1, -1)  # neither the mean nor half the control rate
     freq = runs.freq_hz[inner]
