@@ -84,3 +84,15 @@ def test_the_lowest_versions_are_those_of_pyproject():
 def test_the_tests_of_the_bounds_are_there():
     assert all((ROOT / "tests" / each).exists() for each in RELEASE["TESTS"])
     assert (ROOT / RELEASE["OF_THE_PINS"]).exists()
+
+
+# --------------------------------------------------------------------------------------------------------- the workflow
+def test_the_workflow_runs_the_gate_on_the_oldest_and_the_newest_python():
+    text = (ROOT / ".github" / "workflows" / "ci.yml").read_text(encoding="utf-8")
+    described = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    pythons = [each.rpartition(" ")[2] for each in described["classifiers"] if ":: 3." in each]
+    assert f'python: ["{pythons[0]}", "{pythons[-1]}"]\n' in text and "- run: bash .ci/run\n" in text
+    assert described["requires-python"] == f">={pythons[0]},<3.{int(pythons[-1][2:]) + 1}"
+    used = re.findall(r"uses: (.*)", text)
+    assert used and all(re.fullmatch(r"actions/[\w-]+@[0-9a-f]{40} # v[\d.]+", each) for each in used)
+    assert "secrets" not in text and "contents: read\n" in text and "write" not in text
