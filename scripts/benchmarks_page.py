@@ -24,9 +24,9 @@ Release = dict[str, Any]
 HEAD = """# Benchmarks
 
 Each benchmark is a file of `benchmarks/` and says in its first lines what it measures. A ratio compares microrad with
-another program on the same machine in the same run. `make benchmark` runs them all. `MICRORAD_RECORD=yes make benchmark`
-keeps what they find in `benchmarks/results/VERSION.json`, and `scripts/benchmarks_page.py` writes this page from it.
-The last column says whether the bar is met. A figure without a bar is there to be compared with the next release.
+another program on the same machine in the same run. `MICRORAD_RECORD=yes make benchmark` runs them all and keeps what
+they find in `benchmarks/results/VERSION.json`; `scripts/benchmarks_page.py` writes this page from it. The last column
+says whether the bar is met. A figure without a bar is there to be compared with the next release.
 
 ![Each figure that has a bar, as a share of it](benchmarks.svg)
 """

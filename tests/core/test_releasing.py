@@ -42,6 +42,14 @@ def test_a_commit_is_tagged_with_its_version_and_no_other():
     )
 
 
+def test_the_first_part_is_dated_once():
+    text = "# Changelog\n\n## 0.3.0.dev0 (unreleased)\n\n- new\n\n## 0.2.0 (2026-11-26)\n"
+    done = RELEASE["dated"](text, "2027-01-31")
+    assert done == text.replace("0.3.0.dev0 (unreleased)", "0.3.0 (2027-01-31)")
+    with pytest.raises(SystemExit, match=r"is of 0\.3\.0 and no unreleased one: it is frozen already"):
+        RELEASE["dated"](done, "2027-02-01")
+
+
 def test_a_released_version_is_not_that_of_later_commits():
     said = subprocess.run(
         ["git", "-C", ROOT, "tag", "--no-contains", "HEAD"], capture_output=True, text=True, check=False
@@ -83,7 +91,7 @@ def test_the_lowest_versions_are_those_of_pyproject():
 
 def test_the_tests_of_the_bounds_are_there():
     assert all((ROOT / "tests" / each).exists() for each in RELEASE["TESTS"])
-    assert (ROOT / RELEASE["OF_THE_PINS"]).exists()
+    assert all((ROOT / "tests" / each.partition("::")[0]).exists() for each in RELEASE["OF_THE_PINS"])
 
 
 # --------------------------------------------------------------------------------------------------------- the workflow
