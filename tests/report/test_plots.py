@@ -462,7 +462,7 @@ def test_what_has_nothing_to_show_is_refused():
     ):
         plots.plot_bode(identified(False))
     found = result("runs")
-    with pytest.raises(ValueError, match="made without a spectrum; simulate them as a Case with spectrum=True"):
+    with pytest.raises(ValueError, match="made without a spectrum; simulate them from run 0 on, as a Case with"):
         plots.plot_spectrum(replace(found, psd_rad2_hz=np.full_like(found.psd_rad2_hz, math.nan)))
     nothing = Disturbance("calm", np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), (), "assumed", "a test")
     with pytest.raises(ValueError, match='"calm" has neither a filter nor lines'):

@@ -362,7 +362,7 @@ def _errors(time_s: Floats, error_rad: Floats, steady: slice = slice(None)) -> S
 def _left_spectrum(runs: Ensemble) -> Sheet:
     if not np.all(np.isfinite(runs.psd_rad2_hz)):
         raise ValueError(
-            "plot_spectrum: these runs were made without a spectrum; simulate them as a Case with spectrum=True"
+            "plot_spectrum: these runs were made without a spectrum; simulate them from run 0 on, as a Case with spectrum=True"
         )
     inner = slice(1, -1)  # neither the mean nor half the control rate
     freq = runs.freq_hz[inner]
