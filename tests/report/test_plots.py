@@ -430,7 +430,7 @@ def test_every_kind_of_mark_is_drawn():
 def test_another_result_is_refused_with_what_can_be_plotted(plot):
     name = f"plot_{plot}"
     taken = {each for other, each, _ in PLOTS if other == name}
-    with pytest.raises(TypeError, match=f"{name}: cannot plot a str; give one of these: ") as told:
+    with pytest.raises(TypeError, match=f"{name}: cannot plot what is of type str; give one of these: ") as told:
         getattr(plots, name)("what")
     kinds = {type(result(each)).__name__ for each in taken} - {"tuple"}
     assert kinds <= set(re.findall(r"\w+", str(told.value)))
@@ -440,7 +440,9 @@ def test_another_result_is_refused_with_what_can_be_plotted(plot):
 def test_of_several_results_none_may_be_another_or_missing():
     with pytest.raises(ValueError, match="plot_contacts: the sequence is empty; give one Contact or more"):
         plots.plot_contacts([])
-    with pytest.raises(TypeError, match="plot_loops: cannot plot a int; give one of these: HysteresisLoop, Ident"):
+    with pytest.raises(
+        TypeError, match="plot_loops: cannot plot what is of type int; give one of these: HysteresisLoop, Ident"
+    ):
         plots.plot_loops([result("loop"), 3])
     assert not pyplot.get_fignums()
 
@@ -462,7 +464,7 @@ def test_what_has_nothing_to_show_is_refused():
     ):
         plots.plot_bode(identified(False))
     found = result("runs")
-    with pytest.raises(ValueError, match="made without a spectrum; simulate them as a Case with spectrum=True"):
+    with pytest.raises(ValueError, match="made without a spectrum; simulate them from run 0 on, as a Case with"):
         plots.plot_spectrum(replace(found, psd_rad2_hz=np.full_like(found.psd_rad2_hz, math.nan)))
     nothing = Disturbance("calm", np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), (), "assumed", "a test")
     with pytest.raises(ValueError, match='"calm" has neither a filter nor lines'):
