@@ -3,6 +3,8 @@
 import re
 import runpy
 import subprocess
+import sys
+import tarfile
 import tomllib
 from importlib import import_module, metadata
 
@@ -117,3 +119,17 @@ def test_the_citation_names_what_the_project_is_and_no_version_that_would_age():
     assert " ".join(re.search(r"(?ms)^abstract: >-\n(.*?)\n(?=\S)", text)[1].split()).startswith(
         described["description"].partition(":")[0]
     )
+
+
+# --------------------------------------------------------------------------------------------------------- the archives
+def test_every_file_of_the_package_is_in_the_source_archive(tmp_path):
+    command = [sys.executable, "-m", "hatchling", "build", "--target", "sdist", "--directory", tmp_path]
+    subprocess.run(command, cwd=ROOT, check=True, capture_output=True)
+    (archive,) = tmp_path.glob("microrad-*.tar.gz")
+    with tarfile.open(archive) as opened:
+        there = {name.partition("/")[2] for name in opened.getnames()}
+    files = (path for path in (ROOT / "src").rglob("*") if path.is_file() and "__pycache__" not in path.parts)
+    own = {path.relative_to(ROOT).as_posix() for path in files}
+    assert "src/microrad/lab/plans/paper-experiment.toml" in own
+    assert own - there == set()
+    assert {"plans/paper-experiment.toml", "missions/leo-geo.toml", "CITATION.cff", "CHANGELOG.md"} <= there
