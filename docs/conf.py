@@ -36,6 +36,5 @@ autodoc_typehints_format = "short"
 maximum_signature_line_length = 88
 add_module_names = False
 toc_object_entries = False
-suppress_warnings = ["toc.empty_glob"]  # the folder of notebooks may be empty
 pygments_style = "a11y-high-contrast-light"
 pygments_dark_style = "a11y-high-contrast-dark"

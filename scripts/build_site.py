@@ -33,7 +33,7 @@ def build(target: Path) -> list[str]:
     with tempfile.TemporaryDirectory() as temporary:
         sources, trees = Path(temporary, "sources"), Path(temporary, "trees")
         shutil.copytree(ROOT / "docs", sources)
-        for name, text in all_pages().items():
+        for name, text in all_pages(sources).items():
             page = sources / name
             page.parent.mkdir(exist_ok=True)
             page.write_text(text, encoding="utf-8")
