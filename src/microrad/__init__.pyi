@@ -1,95 +1,77 @@
 """The public names, for editors and type checkers. Written by ``scripts/house stub``."""
 
 from microrad.campaign.file import load_campaign
-from microrad.campaign.records import CampaignError
-from microrad.campaign.run import Means as CampaignMeans
-from microrad.campaign.run import resume_campaign
 from microrad.campaign.run import run_campaign
-from microrad.campaign.statistics.summary import summarise_campaign
-from microrad.core.folder import FolderError
-from microrad.core.units import UnitError
-from microrad.core.units import format_quantity
+from microrad.core.errors import MicroradError
 from microrad.core.units import parse_quantity
-from microrad.lab.identify import FrequencyResponseFit
-from microrad.lab.identify import Identification
-from microrad.lab.identify import IdentificationError
 from microrad.lab.identify import fit_frequency_response
+from microrad.lab.identify import fit_hysteresis
 from microrad.lab.identify import identify as identify_mirror
-from microrad.lab.identify import mirror_file_text
-from microrad.lab.recording import Recording
-from microrad.lab.recording import RecordingError
-from microrad.lab.recording import read_arrays
+from microrad.lab.identify import measure_frequency_response
 from microrad.lab.recording import read_recording
 from microrad.lab.recording import recording_from_arrays
-from microrad.lab.recording.list_file import read_list as read_recordings_list
-from microrad.link import LinkError
-from microrad.link.study import LinkStudy
-from microrad.link.study import run_link_study
-from microrad.mission.file import LinkFile
-from microrad.mission.file import MissionError
-from microrad.mission.file import MissionFile
-from microrad.mission.file import load_link
-from microrad.mission.file import load_mirror
+from microrad.link.by_numbers import received_power
+from microrad.link.by_numbers import scan_times
+from microrad.link.pointing import Jitter
+from microrad.link.pointing import best_divergence_for_outage as best_divergence
+from microrad.link.pointing import outage_loss_db
+from microrad.loop.disturbance import fit_spectrum
+from microrad.loop.workbench import Controller
+from microrad.loop.workbench import Loop
+from microrad.loop.workbench import tune
+from microrad.mirror import Mirror
+from microrad.mirror import read_mirror
+from microrad.mirror.hysteresis import BoucWen
+from microrad.mirror.hysteresis import Creep
+from microrad.mirror.hysteresis import PrandtlIshlinskii
 from microrad.mission.file import load_mission
-from microrad.mission.model import mission_schema
-from microrad.orbit import OrbitError
-from microrad.orbit.constellation import ConstellationPlan
-from microrad.orbit.constellation import run_constellation
-from microrad.orbit.day import DayStudy
-from microrad.orbit.day import PointingLoss
-from microrad.orbit.day import run_day_study
-from microrad.orbit.operations import OperationsError
-from microrad.report import summary
-from microrad.report import verdict_text
+from microrad.orbit.between import find_contacts
+from microrad.orbit.files.elements import read_elements
 from microrad.report import write as write_report
-from microrad.study.study import Study
+from microrad.report.plots import plot_bode
+from microrad.report.plots import plot_contacts
+from microrad.report.plots import plot_loops
+from microrad.report.plots import plot_margin_map
+from microrad.report.plots import plot_residual
+from microrad.report.plots import plot_spectrum
 from microrad.study.study import run_study
 
 __all__ = [
+    "BoucWen",
+    "PrandtlIshlinskii",
+    "Creep",
+    "fit_hysteresis",
+    "read_recording",
+    "recording_from_arrays",
+    "measure_frequency_response",
+    "fit_frequency_response",
+    "identify_mirror",
+    "Mirror",
+    "read_mirror",
+    "fit_spectrum",
+    "Controller",
+    "Loop",
+    "tune",
+    "received_power",
+    "Jitter",
+    "outage_loss_db",
+    "best_divergence",
+    "scan_times",
+    "read_elements",
+    "find_contacts",
     "load_mission",
-    "load_mirror",
-    "load_link",
-    "mission_schema",
-    "MissionFile",
-    "LinkFile",
-    "MissionError",
     "run_study",
-    "Study",
-    "run_link_study",
-    "LinkStudy",
-    "run_day_study",
-    "DayStudy",
-    "PointingLoss",
-    "run_constellation",
-    "ConstellationPlan",
     "load_campaign",
     "run_campaign",
-    "resume_campaign",
-    "summarise_campaign",
-    "CampaignMeans",
-    "CampaignError",
     "write_report",
-    "verdict_text",
-    "summary",
-    "FolderError",
-    "LinkError",
-    "OrbitError",
-    "OperationsError",
-    "read_recording",
-    "read_arrays",
-    "read_recordings_list",
-    "recording_from_arrays",
-    "Recording",
-    "RecordingError",
-    "identify_mirror",
-    "mirror_file_text",
-    "Identification",
-    "IdentificationError",
-    "fit_frequency_response",
-    "FrequencyResponseFit",
+    "plot_bode",
+    "plot_loops",
+    "plot_residual",
+    "plot_spectrum",
+    "plot_margin_map",
+    "plot_contacts",
     "parse_quantity",
-    "format_quantity",
-    "UnitError",
+    "MicroradError",
     "__version__",
 ]
 

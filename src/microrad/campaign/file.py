@@ -23,12 +23,21 @@ from microrad.mission.file import LinkFile
 from microrad.mission.toml import Document, MissionError
 
 
-def load_campaign(path: Path) -> CampaignFile:
+def load_campaign(path: str | Path) -> CampaignFile:
     """Read a campaign file and the mission that it draws from.
 
     Raises `MissionError` with every fault of the campaign file, of the mission under its [set] and in the cells of its
     grid; or with what is drawn in vain: without a mission in the middle, or without an effect on what is kept.
+
+    Example:
+        ```python
+        import microrad
+
+        campaign = microrad.load_campaign("campaign.toml")
+        print([draw.key for draw in campaign.draws], campaign.keep)
+        ```
     """
+    path = Path(path)
     campaign, document = read_definition(path)
     missions = _medians(campaign, document)
     if not document.faults:

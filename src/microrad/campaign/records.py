@@ -7,10 +7,13 @@ from typing import Literal, NamedTuple, Protocol
 import numpy as np
 
 from microrad.core.arrays import Floats
+from microrad.core.errors import MicroradError
 
 
-class CampaignError(ValueError):
+class CampaignError(MicroradError):
     """A campaign that cannot be done as asked; the message says what, where, why and what to do."""
+
+    page = "campaigns"
 
 
 # ------------------------------------------------------------------------------------------------------------- running

@@ -71,18 +71,31 @@ class Means:
         return LocalEngine(spec, TARGET, self.threads or self.workers or os.cpu_count() or 1, late_s)
 
 
-def run_campaign(file: Path, path: Path, means: Means, on_progress: Progress = lambda done, total, what: None) -> None:
+def run_campaign(
+    file: str | Path,
+    path: str | Path,
+    means: Means = Means(),
+    on_progress: Progress = lambda done, total, what: None,
+) -> None:
     """Run a campaign file into a new ledger.
 
     Args:
         file: the campaign file.
         path: where the ledger is made.
-        means: what does the work.
+        means: what does the work; by default as many processes as the machine has cores.
         on_progress: called with the rows done, all rows and what is said beside them.
 
     Raises `CampaignError` and `MissionError` for what cannot be run, and KeyboardInterrupt with words that say how to
     go on; what was finished by then is in the ledger.
+
+    Example:
+        ```python
+        import microrad
+
+        microrad.run_campaign("campaign.toml", "campaign.ledger")
+        ```
     """
+    file, path = Path(file), Path(path)
     campaign = load_campaign(file)
     refuse_existing(path)  # before the controllers are tuned
     plan = planned(campaign)

@@ -15,6 +15,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from microrad.core.errors import MicroradError
+
 MANIFEST = "manifest.json"
 _MOST_MANIFEST = 64_000_000
 _OLD = ".old"
@@ -23,7 +25,7 @@ DRAFT = ".draft"
 """End of the name of a file that is not whole yet."""
 
 
-class FolderError(ValueError):
+class FolderError(MicroradError):
     """The output folder cannot be used; the message says why and what to do."""
 
 

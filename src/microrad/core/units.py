@@ -11,6 +11,8 @@ from fractions import Fraction
 from functools import lru_cache
 from typing import NamedTuple
 
+from microrad.core.errors import MicroradError
+
 SPEED_OF_LIGHT_M_S = 299_792_458.0
 """Speed of light in vacuum, exact by the definition of the metre."""
 PLANCK_J_S = 6.626_070_15e-34
@@ -142,7 +144,7 @@ _SPELLINGS = {
 """Units as they are often written, in small letters, and as they are read here."""
 
 
-class UnitError(ValueError):
+class UnitError(MicroradError):
     """A quantity that cannot be read.
 
     `reason` says what is wrong with the value, `expected` what is wanted and `example` what to write.
@@ -179,6 +181,13 @@ def parse_quantity(text: object, unit: str, typical: str = "") -> float:
 
     Raises:
         UnitError: For anything else: a bare number, another dimension, a comma, nan, an expression.
+
+    Example:
+        ```python
+        import microrad
+
+        print(microrad.parse_quantity("5 cm", "m"), microrad.parse_quantity("-3 dBm", "W"))
+        ```
     """
     try:
         return _read(text, unit)

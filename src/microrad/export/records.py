@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from microrad.core import kernels, lti
 from microrad.core.arrays import Floats
+from microrad.core.errors import MicroradError
 
 Indices = NDArray[np.integer]
 
@@ -14,8 +15,10 @@ OPTICAL_ERROR, GAUGE, READING, REFERENCE = "optical_error_rad", "gauge_rad", "re
 """Names of the inputs of a controller."""
 
 
-class ExportError(ValueError):
+class ExportError(MicroradError):
     """What cannot be exported or imported; the message says what, where, why and what to do."""
+
+    page = "export"
 
 
 @dataclass(frozen=True, slots=True)

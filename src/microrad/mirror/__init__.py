@@ -13,6 +13,7 @@ from microrad.mirror.model import (
     retimed,
     unrolled,
 )
+from microrad.mirror.reading import read_mirror
 from microrad.mirror.variants import MirrorAxis, MirrorParts, Variant, of
 
 __all__ = [
@@ -28,6 +29,7 @@ __all__ = [
     "from_table",
     "hysteresis_model",
     "of",
+    "read_mirror",
     "respond",
     "retimed",
     "unrolled",

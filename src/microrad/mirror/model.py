@@ -11,9 +11,10 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from microrad.core import kernels, lti
-from microrad.core.arrays import Floats
+from microrad.core.arrays import Complexes, Floats
 from microrad.mirror.hysteresis import NO_CREEP, BoucWen, Creep, PrandtlIshlinskii, slow_gain, steepest_slope
 from microrad.mission.tables import mirror as mirror_table
 
@@ -59,6 +60,84 @@ class Mirror:
     def bank(self) -> tuple[BoucWen | PrandtlIshlinskii, ...]:
         """The hysteresis elements in the order of the rows of F."""
         return (*self.bouc_wen, *self.plays)
+
+    def response(self, drive_v: ArrayLike, step_s: float) -> Floats:
+        """Outputs (rad) from rest at the bias, shape (samples,) for a drive of that shape, else (samples, outputs).
+
+        Args:
+            drive_v: Drives about the bias (V), linear between samples, shape (samples,) or (samples, actuators).
+            step_s: Time between samples (s).
+
+        Raises:
+            ValueError: For drives of another shape, and where the mirror cannot be simulated at this step, with one
+                that would do.
+
+        Example:
+            ```python
+            import numpy as np
+            from microrad import Mirror, PrandtlIshlinskii
+
+            plays = PrandtlIshlinskii(thresholds_v=(0.0, 1.0, 3.0), weights_rad_v=(40e-6, 6e-6, 4e-6))
+            mirror = Mirror.of(plays, numerator=[1.0], denominator=[1 / 6000**2, 2 * 0.02 / 6000, 1.0])
+            time_s = np.arange(2000) * 1e-5
+            print(np.ptp(mirror.response(10 * np.sin(2 * np.pi * 100 * time_s), step_s=1e-5)))
+            ```
+        """
+        given = np.asarray(drive_v, dtype=float)
+        drive = np.ascontiguousarray(given[:, None] if given.ndim == 1 else given)
+        if drive.ndim != 2 or drive.shape[1] != self.actuators or not drive.size or not np.isfinite(drive).all():
+            raise ValueError(
+                f"drive_v has shape {given.shape}: mirror {self.name!r} takes finite samples of shape "
+                f"(samples, {self.actuators})"
+            )
+        plant = discretise(self, step_s)
+        output = np.empty((len(drive), self.axes))
+        respond(plant, at_rest(plant), drive, output, np.empty((len(drive), 0)))
+        return output[:, 0] if given.ndim == 1 and self.axes == 1 else output
+
+    def frequency_response(self, freq_hz: ArrayLike) -> Complexes:
+        """Complex response with each element at its slow gain (rad/V), shape (frequencies, outputs, actuators).
+
+        Args:
+            freq_hz: Frequencies (Hz), shape (frequencies,).
+        """
+        return lti.frequency_response(self.linear_loop, np.atleast_1d(np.asarray(freq_hz, dtype=float)))
+
+    @classmethod
+    def of(
+        cls,
+        hysteresis: BoucWen | PrandtlIshlinskii | float,
+        numerator: ArrayLike = (1.0,),
+        denominator: ArrayLike = (1.0,),
+        *,
+        creep: Creep = NO_CREEP,
+        name: str = "mirror",
+    ) -> "Mirror":
+        """One axis: the hysteresis drives a linear part of gain 1 at rest, and creep is added behind it.
+
+        Args:
+            hysteresis: Model from the drive (V) to the angle (rad), or a gain (rad/V) for a mirror without.
+            numerator: Coefficients of the linear part, highest power of s first; it is divided by its gain at rest.
+            denominator: The same; every root has a real part below 0.
+            creep: Creep beside it.
+            name: What the mirror is called in messages.
+
+        Raises:
+            ValueError: For a linear part that is improper, not stable, or has no gain at rest.
+        """
+        model = hysteresis if isinstance(hysteresis, BoucWen | PrandtlIshlinskii) else BoucWen(hysteresis, *[0.0] * 5)
+        top, bottom = (np.atleast_1d(np.asarray(c, dtype=float)) for c in (numerator, denominator))
+        if bottom.size == 1:
+            return assemble(name, "static", None, model, creep)
+        if top.size > bottom.size or bottom[0] == 0.0 or np.max(np.roots(bottom).real) >= 0.0 or top[-1] == 0.0:
+            raise ValueError(
+                f"the linear part of mirror {name!r} has a numerator of {top.size} and a denominator of {bottom.size} "
+                "coefficients: give one that is proper and stable (every root of the denominator left of the imaginary "
+                "axis) and that passes a constant"
+            )
+        system = lti.modal_from_polynomials(top.tolist(), bottom.tolist())
+        gain = float(lti.frequency_response(system, np.array([0.0]))[0, 0, 0].real)
+        return assemble(name, "cascade", replace(system, C=system.C / gain, D=system.D / gain), model, creep)
 
     def linear(self, gains: Sequence[float]) -> lti.StateSpace:
         """The mirror with a gain in place of each element.

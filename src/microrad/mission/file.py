@@ -117,6 +117,14 @@ def load_mission(path: str | Path, mirror_path: str | Path | None = None, *, tex
 
     Raises:
         MissionError: With every fault of both files.
+
+    Example:
+        ```python
+        import microrad
+
+        file = microrad.load_mission("leo-geo.toml")
+        print(file.mission.communication.transmit_power_w, file.sources["communication.transmit_power"])
+        ```
     """
     return mission_file(open_mission(path, mirror_path, text=text))
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal, Self
 
+from microrad.core.errors import MicroradError
 from microrad.core.folder import read_bytes
 from microrad.core.units import printable
 
@@ -58,7 +59,7 @@ class Fault:
         return "\n".join([*text, f"    expected: {self.expected}"])
 
 
-class MissionError(ValueError):
+class MissionError(MicroradError):
     """A mission or mirror file that cannot be used: `path`, and every fault found in `faults`, by file and line."""
 
     def __init__(self, path: Path, faults: Iterable[Fault]) -> None:

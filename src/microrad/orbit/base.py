@@ -8,11 +8,14 @@ Times are elapsed seconds since the epoch of the mission. Vectors are axis first
 from typing import NamedTuple, Protocol, TypeVar
 
 from microrad.core.arrays import Floats
+from microrad.core.errors import MicroradError
 from microrad.mission import fields
 
 
-class OrbitError(ValueError):
+class OrbitError(MicroradError):
     """An orbit, an instant or a place is not possible; the message says why, and what to do."""
+
+    page = "day"
 
 
 class Bounded(fields.Bounded):
@@ -22,8 +25,10 @@ class Bounded(fields.Bounded):
     REFUSAL = OrbitError
 
 
-class OperationsError(ValueError):
+class OperationsError(MicroradError):
     """A table, a rate or a plan of the day is not possible; the message says which value, and what to give."""
+
+    page = "day"
 
 
 _Table = TypeVar("_Table")

@@ -75,7 +75,7 @@ def __getattr__(name: str) -> Any:
 
 def write(
     study: "Study",
-    folder: Path,
+    folder: str | Path,
     *,
     overwrite: bool = False,
     on_progress: Progress = lambda done, total, what: None,
@@ -91,12 +91,21 @@ def write(
         parts: those of earlier runs that are kept: none by default.
 
     Raises FolderError if the folder holds something that must not be replaced. Returns the page's path.
+
+    Example:
+        ```python
+        import microrad
+
+        study = microrad.run_study(microrad.load_mission("leo-geo.toml"))
+        print(microrad.write_report(study, "leo-geo-study"))
+        ```
     """
     from microrad.report.results.arrays import study_netcdf
     from microrad.report.results.manifest import manifest_of, write_manifest
     from microrad.report.study.data import summary
     from microrad.report.study.page import study_page
 
+    folder = Path(folder)
     numbers_of = partial(parts.part, study_netcdf, study)
     with whole_folder(folder, overwrite) as draft, beside(numbers_of) as numbers:
         on_progress(0, 3, "figures")

@@ -164,6 +164,16 @@ def run_study(
     Raises:
         ValueError: When the loop is unstable, the mirror has no inverse or the receiver does not take the data rate;
             the message says why.
+
+    Example:
+        ```python
+        import microrad
+
+        study = microrad.run_study(microrad.load_mission("leo-geo.toml"))
+        print(study.achieved.margin_db)
+        for line in study.communication.lines:
+            print(f"{line.name:22} {line.value:9.2f} {line.unit:4} {line.source}")
+        ```
     """
     file = with_contents(link_study.solve_rate(file))
     if any(each.content is None for each in file.contents):  # it may be there when it is read

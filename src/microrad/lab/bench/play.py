@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from microrad.core.arrays import Floats
+from microrad.core.errors import MicroradError
 from microrad.core.progress import Progress
 from microrad.core.units import format_quantity
 from microrad.lab.bench.mirrors import Amplifier, bench_output, bouc_wen_output, linear_output
@@ -16,8 +17,10 @@ from microrad.lab.recording.records import Recording, digest_of, frozen
 _MRAD = 1e3  # recordings are in volts and mrad
 
 
-class BenchError(ValueError):
+class BenchError(MicroradError):
     """A plan that the bench cannot play, or a folder that it cannot write; the message says what to do."""
+
+    page = "bench"
 
 
 @dataclass(frozen=True, slots=True)

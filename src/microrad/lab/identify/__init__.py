@@ -7,12 +7,17 @@ linear part and `stiffness` for hysteretic stiffness, both for any number of inp
 recordings.
 """
 
+from microrad.lab.identify.hysteresis.alone import HysteresisFit, fit_hysteresis
 from microrad.lab.identify.hysteresis.bouc_wen import BoucWenFit, fit_bouc_wen
 from microrad.lab.identify.hysteresis.joint import FORMS, JointFit, fit_joint
 from microrad.lab.identify.hysteresis.prandtl_ishlinskii import PrandtlIshlinskiiFit, fit_prandtl_ishlinskii
 from microrad.lab.identify.linear.fit import fit_linear, output_error
 from microrad.lab.identify.linear.frequency_fit import FrequencyResponseFit, fit_frequency_response
-from microrad.lab.identify.linear.response import response_from_records
+from microrad.lab.identify.linear.response import (
+    FrequencyResponse,
+    measure_frequency_response,
+    response_from_records,
+)
 from microrad.lab.identify.linear.vector_fitting import vector_fit
 from microrad.lab.identify.mirror_file import mirror_file_text
 from microrad.lab.identify.records import IdentificationError, Units
@@ -26,7 +31,9 @@ __all__ = [
     "MODELS",
     "STATIC",
     "BoucWenFit",
+    "FrequencyResponse",
     "FrequencyResponseFit",
+    "HysteresisFit",
     "Identification",
     "IdentificationError",
     "JointFit",
@@ -36,11 +43,13 @@ __all__ = [
     "Units",
     "fit_bouc_wen",
     "fit_frequency_response",
+    "fit_hysteresis",
     "fit_hysteretic_stiffness",
     "fit_joint",
     "fit_linear",
     "fit_prandtl_ishlinskii",
     "identify",
+    "measure_frequency_response",
     "mirror_file_text",
     "output_error",
     "predict",

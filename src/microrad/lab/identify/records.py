@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad.core.arrays import Floats
+from microrad.core.errors import MicroradError
 from microrad.lab.recording import Recording
 
 
@@ -31,8 +32,10 @@ _SAME = 1e-6  # a column whose own part is smaller than this says the same as ot
 _MEDIAN_OF_NORMAL = 0.6745  # median size of a normal variable, in standard deviations
 
 
-class IdentificationError(ValueError):
+class IdentificationError(MicroradError):
     """An identification that cannot be done as asked: the message says why and what to do."""
+
+    page = "identify"
 
 
 @dataclass(frozen=True)

@@ -67,6 +67,14 @@ def read_recording(  # noqa: PLR0913  all but the first four are named options
 
     Raises:
         RecordingError: For anything that cannot be relied upon, naming file, channel, row and remedy.
+
+    Example:
+        ```python
+        import microrad
+
+        recording = microrad.read_recording("loop.csv", inputs="drive", outputs="angle")
+        print(recording.rate_hz, recording.samples, recording.findings)
+        ```
     """
     path = Path(path)
     if rate_hz is not None:
@@ -126,6 +134,16 @@ def recording_from_arrays(
 
     Raises:
         RecordingError: For anything that cannot be relied upon.
+
+    Example:
+        ```python
+        import numpy as np
+        import microrad
+
+        drive_v = np.sin(2 * np.pi * 10 * 1e-3 * np.arange(1000))
+        recording = microrad.recording_from_arrays(drive_v, 40e-6 * drive_v, rate_hz=1000.0)
+        print(recording.samples, recording.step_s)
+        ```
     """
     rate_hz = check_rate(name, rate_hz)
     check_accept(name, accept)

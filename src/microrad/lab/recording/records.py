@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from microrad.core.arrays import Floats
+from microrad.core.errors import MicroradError
 
 MIN_SAMPLES = 200
 
@@ -36,11 +37,13 @@ class Finding:
     output: int | None = None
 
 
-class RecordingError(ValueError):
+class RecordingError(MicroradError):
     """A recording that cannot be used: the message names the file, the place, the fault and the remedy.
 
     `findings` holds the evidence where the checks of the values refused it.
     """
+
+    page = "recordings"
 
     def __init__(self, message: str, findings: Sequence[Finding] = ()) -> None:
         """Keep the message and the findings behind it."""

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from microrad.core.arrays import Floats
+from microrad.core.errors import MicroradError
 from microrad.link import gains, receivers
 from microrad.link.beams import GaussianFall, LitAperture, OffAxis
 from microrad.mission.fields import Quantity
@@ -19,8 +20,10 @@ from microrad.mission.tables.link import Receiver as ReceiverTable
 from microrad.mission.tables.pointing import JitterTable, PointAhead
 
 
-class LinkError(ValueError):
+class LinkError(MicroradError):
     """A question to which this link has no answer; the message says by how many decibels."""
+
+    page = "link"
 
 
 @dataclass(frozen=True, slots=True)

@@ -45,6 +45,14 @@ class Jitter:
     `rms_rad` is the standard deviation per axis about `bias_rad`, not the radial one. The axes may differ, and either
     rms may be 0. Turn the axes until the errors are uncorrelated. Raises ValueError for a value that
     is not finite, or a negative rms.
+
+    Example:
+        ```python
+        import microrad
+
+        jitter = microrad.Jitter(bias_rad=(1e-6, 0.0), rms_rad=(2e-6, 2e-6))
+        print(microrad.outage_loss_db(jitter, half_angle_rad=10e-6, probability=[0.1, 0.003]))
+        ```
     """
 
     bias_rad: tuple[float, float]

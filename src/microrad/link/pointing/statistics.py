@@ -103,6 +103,14 @@ def outage_loss_db(jitter: Jitter, half_angle_rad: ArrayLike, probability: Array
 
     Raises:
         ValueError: As `radial_quantile`, and for a half angle not above 0.
+
+    Example:
+        ```python
+        import microrad
+
+        jitter = microrad.Jitter(bias_rad=(0.0, 0.0), rms_rad=(2e-6, 2e-6))
+        print(microrad.outage_loss_db(jitter, half_angle_rad=10e-6, probability=0.003))
+        ```
     """
     return np.asarray(_DB_PER_SQUARE * (radial_quantile(jitter, probability) / _half_angle(half_angle_rad)) ** 2)
 
@@ -160,6 +168,15 @@ def best_divergence_for_outage(
 
     Raises:
         ValueError: As `best_divergence_for_static_error` and `radial_quantile`.
+
+    Example:
+        ```python
+        import microrad
+
+        jitter = microrad.Jitter(bias_rad=(0.0, 0.0), rms_rad=(2e-6, 2e-6))
+        best = microrad.best_divergence(jitter, probability=0.003, current_half_angle_rad=10e-6)
+        print(best.half_angle_rad, best.loss_db, best.current_excess_db)
+        ```
     """
     radius = float(radial_quantile(jitter, probability))
     return best_divergence_for_static_error(

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from microrad.loop.control import Drive
-from microrad.loop.disturbance import Reference
+from microrad.loop.disturbance import NO_REFERENCE
 from microrad.loop.pointing_loop.loop import PointingLoop, without_hysteresis
 
 REFERENCE, OPTICAL_NOISE, GAUGE_NOISE = "reference", "optical sensor noise", "gauge noise"
@@ -13,7 +13,7 @@ QUANTISATION, LIMITS, HYSTERESIS, DELAY = "quantisation", "limits", "hysteresis"
 
 
 def _without_reference(loop: PointingLoop) -> PointingLoop:
-    return replace(loop, references=tuple(Reference(0.0, 0.0, 1.0) for _ in loop.references))
+    return replace(loop, references=tuple(NO_REFERENCE for _ in loop.references))
 
 
 def _without_optical_noise(loop: PointingLoop) -> PointingLoop:

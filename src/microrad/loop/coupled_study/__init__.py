@@ -1,6 +1,7 @@
 """Controllers of a mission's fine-pointing loop for a mirror of several axes, with the margins of the whole."""
 
 from microrad.loop.coupled_study.designs import (
+    OF_AXES,
     CoupledDesign,
     CoupledDesigns,
     CoupledOutlook,
@@ -12,12 +13,14 @@ from microrad.loop.coupled_study.designs import (
     names,
     outlook,
     plants,
+    tuned_whole,
 )
 from microrad.loop.coupled_study.scene import AXES, CoupledScene, of_mission, scene
-from microrad.loop.coupled_study.whole import WholeMargins
+from microrad.loop.coupled_study.whole import WholeMargins, whole_margins
 
 __all__ = [
     "AXES",
+    "OF_AXES",
     "CoupledDesign",
     "CoupledDesigns",
     "CoupledOutlook",
@@ -33,4 +36,6 @@ __all__ = [
     "outlook",
     "plants",
     "scene",
+    "tuned_whole",
+    "whole_margins",
 ]

@@ -408,6 +408,22 @@ def _tuned(
         named = zip(AXES if angles == ALONG_AXES else "12", each, strict=True)
         values |= {f"{name} {loop}": v for loop, t in named for name, v in t.values.items()}
         return on_axes(side_by_side(family.name, [t.controller for t in each]), angles), values
+    return tuned_whole(family, of, asked)
+
+
+def tuned_whole(
+    family: Family, of: Sequence[WholePlant], asked: Specification
+) -> tuple[WholeController, dict[str, float]]:
+    """The controller of all axes of one of `OF_AXES` that leaves the least mean variance, and its values by name.
+
+    Args:
+        family: Kind of controller.
+        of: Plants of the same axes; the controller is built for the first.
+        asked: What the loop of all axes has to respect on each of them.
+
+    Raises:
+        ValueError: No controller of the family keeps it; says what the best one reaches.
+    """
     search = Search(family, of, asked, scope=ALL_AXES)
     near = min((descend(search, start) for start in _weights(search)), key=lambda t: t.score)
     best = settled(search, [near], MODELS)

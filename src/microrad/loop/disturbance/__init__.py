@@ -1,7 +1,7 @@
 """Disturbances of the line of sight: one-sided spectra as data, shaping filters that realise them, references."""
 
 from microrad.loop.disturbance.discrete import Discrete, discretise, initial_state
-from microrad.loop.disturbance.fits import fit_bands, fit_table
+from microrad.loop.disturbance.fits import fit_bands, fit_spectrum, fit_table
 from microrad.loop.disturbance.records import (
     Disturbance,
     SpectralLine,
@@ -10,7 +10,7 @@ from microrad.loop.disturbance.records import (
     one_input,
     psd,
 )
-from microrad.loop.disturbance.reference import Reference
+from microrad.loop.disturbance.reference import NO_REFERENCE, Reference, SampledReference
 from microrad.loop.disturbance.sources import (
     MICIUS_EDGES_HZ,
     MICIUS_RMS_RAD,
@@ -24,9 +24,11 @@ from microrad.loop.disturbance.tables import read_table
 __all__ = [
     "MICIUS_EDGES_HZ",
     "MICIUS_RMS_RAD",
+    "NO_REFERENCE",
     "Discrete",
     "Disturbance",
     "Reference",
+    "SampledReference",
     "SpectralLine",
     "band_rms",
     "body_pointing",
@@ -34,6 +36,7 @@ __all__ = [
     "discretise",
     "first_order",
     "fit_bands",
+    "fit_spectrum",
     "fit_table",
     "initial_state",
     "olympus",

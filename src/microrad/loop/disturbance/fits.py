@@ -85,6 +85,33 @@ def _refuse_poor_bands(fit: Fit, name: str) -> None:
         )
 
 
+def fit_spectrum(
+    freq_hz: ArrayLike, psd_rad2_hz: ArrayLike, *, convention: Convention, name: str = "vibration"
+) -> Disturbance:
+    """The disturbance of one axis that has a measured one-sided density: a shaping filter fitted to it.
+
+    Args:
+        freq_hz: Frequencies (Hz), rising, shape (rows,).
+        psd_rad2_hz: One-sided density at each of them (rad^2/Hz), above 0, shape (rows,).
+        convention: What the densities are: "radial", of both axes together, or "per-axis".
+        name: What the disturbance is called; its random numbers go by it.
+
+    Raises:
+        ValueError: As `fit_table`, which also says how well the filter fits.
+
+    Example:
+        ```python
+        import numpy as np
+        import microrad
+
+        freq_hz = np.geomspace(0.1, 1000, 200)
+        vibration = microrad.fit_spectrum(freq_hz, 160e-12 / (1 + freq_hz**2), convention="radial")
+        print(vibration.rms_rad)
+        ```
+    """
+    return fit_table(freq_hz, psd_rad2_hz, convention=convention, name=name).disturbance
+
+
 def fit_table(
     freq_hz: ArrayLike, psd_rad2_hz: ArrayLike, *, convention: Convention, name: str = "table", source: str = "given"
 ) -> Fit:

@@ -42,3 +42,30 @@ class Reference:
         lag = -self.line_of_sight_rate_rad_s / body * np.expm1(-body * time)
         sine = self.sine_amplitude_rad * np.sin(2.0 * math.pi * self.sine_freq_hz * time)
         return np.asarray(self.point_ahead_rad + lag + sine)
+
+
+NO_REFERENCE = Reference(0.0, 0.0, 1.0)
+
+
+class SampledReference(Reference):
+    """The reference of one axis by its samples at the control period; the last one holds on behind them."""
+
+    def __init__(self, samples_rad: Floats, period_s: float) -> None:
+        """The samples.
+
+        Args:
+            samples_rad: Reference at the control samples (rad), shape (samples,).
+            period_s: Control period (s).
+        """
+        super().__init__(0.0, 0.0, 1.0)
+        object.__setattr__(self, "_samples_rad", samples_rad)
+        object.__setattr__(self, "_period_s", period_s)
+
+    def at(self, time_s: Floats) -> Floats:
+        """Reference (rad) at these times (s), each that of a control sample."""
+        samples: Floats = self._samples_rad
+        place = np.rint(np.asarray(time_s, dtype=float) / self._period_s).astype(int)
+        return np.asarray(samples[np.minimum(place, samples.size - 1)])
+
+    _samples_rad: Floats
+    _period_s: float

@@ -20,8 +20,8 @@ from microrad.orbit.files.messages import Field, add_field, finite, kvn_field, r
 from microrad.orbit.propagation.mean_elements import REVOLUTION_RAD, ElementSet, check_theory, checked
 
 
-def read_elements(path: Path, name: str | None = None, data: bytes | None = None) -> tuple[ElementSet, ...]:
-    """All element sets of a file in its order, or those of one satellite.
+def read_elements(path: str | Path, name: str | None = None, data: bytes | None = None) -> tuple[ElementSet, ...]:
+    """All element sets of a TLE or OMM file in its order, or those of one satellite.
 
     Args:
         path: The file, in one of the formats of TLE and OMM.
@@ -31,7 +31,16 @@ def read_elements(path: Path, name: str | None = None, data: bytes | None = None
     Raises:
         OrbitError: For a file that is not one of the formats, for the first fault in it with its line, and for a name
             that is not in it.
+
+    Example:
+        ```python
+        import microrad
+
+        for elements in microrad.read_elements("satellites.tle"):
+            print(elements.name, elements.epoch.text, elements.eccentricity)
+        ```
     """
+    path = Path(path)
     text = read_text(path, data)
     found = list(_parsed(path, text))
     if not found:

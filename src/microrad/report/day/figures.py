@@ -392,7 +392,7 @@ def day_figures(day: DayStudy, run: ContactRun | None = None) -> tuple[Figure, .
         day: what the links deliver.
         run: one of its contacts, simulated, or None.
     """
-    found = [_contacts_figure(day), *_along_figure(day), _volume_figure(day), _latency_figure(day), ground_map(day)]
+    found = [contacts_figure(day), *_along_figure(day), _volume_figure(day), _latency_figure(day), ground_map(day)]
     found.append(_assumptions_figure(day))
     return tuple(found if run is None else [*found, _contact_run_figure(day, run)])
 
@@ -401,18 +401,25 @@ def _ways(day: DayStudy) -> tuple[Way, ...]:
     return (day.relay,) if day.direct is None else (day.relay, day.direct)
 
 
-def _contacts_figure(day: DayStudy) -> Figure:
+def contacts_figure(day: DayStudy) -> Figure:
+    """Contacts with the relay and with each station, and the eclipses, over the span of a day."""
     span = day.view.pair.span_s
-    rows = [(day.relay.name, _spans(day.relay.contacts, span[1]))]
+    rows = [(day.relay.name, spans(day.relay.contacts, span[1]))]
     if day.direct is not None:
         for station in dict.fromkeys(day.direct.stations):
             own = tuple(c for c, s in zip(day.direct.contacts, day.direct.stations, strict=True) if s == station)
-            rows.append((f"direct: {station}", _spans(own, span[1])))
+            rows.append((f"direct: {station}", spans(own, span[1])))
     rows.append((f"eclipse of {day.view.pair.leo.name}", day.view.umbra_s))
     return timeline(rows, span, day.view.pair.epoch.text)
 
 
-def _spans(contacts: tuple[orbit.Contact, ...], end_s: float) -> Floats:
+def spans(contacts: Sequence[orbit.Contact], end_s: float) -> Floats:
+    """Begins and ends (n, 2), in seconds since the epoch.
+
+    Args:
+        contacts: in any order.
+        end_s: where the span ends, which cuts off a contact, in seconds since the epoch.
+    """
     return np.array([(c.start_s, min(c.end_s, end_s)) for c in contacts]).reshape(-1, 2)
 
 

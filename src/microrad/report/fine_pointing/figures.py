@@ -58,7 +58,7 @@ class Shown:
             values: the curve there (points,), in the unit of the axis.
             place: place of the controller among those shown, 0 to 2, which shifts its markers away from theirs.
         """
-        freq_hz, values = _seen(freq_hz, values)
+        freq_hz, values = seen(freq_hz, values)
         at = np.geomspace(freq_hz[0], freq_hz[-1], 3 * _MARKS + 1)[1 + place :: 3]
         marks = [int(i) for i in np.unique(np.searchsorted(freq_hz, at[at <= freq_hz[-1]]))]
         return Line(freq_hz, values, self.colour, label=self.name, marker=self.marker, size=5.0, every=marks)
@@ -92,7 +92,7 @@ def shown(fine: FinePointingStudy) -> tuple[Shown, ...]:
     return tuple(Shown(*each) for each in zip(chosen, _COLOURS, _SHAPES, strict=False))
 
 
-def _seen(freq_hz: Floats, values: Floats) -> tuple[Floats, Floats]:
+def seen(freq_hz: Floats, values: Floats) -> tuple[Floats, Floats]:
     """The points of a curve that a logarithmic axis of frequency tells apart."""
     kept = thinned_by_logarithm(freq_hz, values)
     return freq_hz[kept], values[kept]
@@ -111,6 +111,21 @@ def cumulative_rms(freq_hz: Floats, density: Floats) -> Floats:
 # ------------------------------------------------------------------------------------------------ spectra
 
 
+def spectrum_sheet(freq_hz: Floats) -> tuple[Sheet, Panel, Panel]:
+    """A sheet with a panel for spectra (µrad²/Hz) and one for the rms (µrad) that gathers below each frequency.
+
+    Args:
+        freq_hz: frequencies (points,) in Hz, above 0, rising: from the first to the last of them.
+    """
+    sheet = Sheet(7.6, 4.3, widths=(1.45, 1.0), legend=Legend("above", 3))
+    left, right = sheet.panel(0, 0), sheet.panel(0, 1)
+    left.y.title, left.y.log = "spectrum of one axis (µrad²/Hz)", True
+    right.y.title, right.y.low = "rms below that frequency, one axis (µrad)", 0.0
+    for panel in (left, right):
+        panel.x.title, panel.x.log, panel.x.low, panel.x.high = "frequency (Hz)", True, freq_hz[0], freq_hz[-1]
+    return sheet, left, right
+
+
 def spectra(fine: FinePointingStudy, controllers: tuple[Shown, ...]) -> Figure:
     """Spectrum of axis x before and after the loop, and the rms that gathers below each frequency.
 
@@ -120,11 +135,10 @@ def spectra(fine: FinePointingStudy, controllers: tuple[Shown, ...]) -> Figure:
     """
     inner = slice(1, -1)  # neither the mean nor half the control rate
     freq = fine.freq_hz[inner]
-    sheet = Sheet(7.6, 4.3, widths=(1.45, 1.0), legend=Legend("above", 3))
-    left, right = sheet.panel(0, 0), sheet.panel(0, 1)
+    sheet, left, right = spectrum_sheet(freq)
     before = fine.disturbed_rad2_hz[inner]
     columns = {"frequency (Hz)": freq, "before the loop (rad^2/Hz)": before}
-    left.add(Line(*_seen(freq, before * 1e12), label="before the loop"))
+    left.add(Line(*seen(freq, before * 1e12), label="before the loop"))
     noise = _noise_density(fine)
     if noise > 0.0:
         left.add(Rule(noise * 1e12, False, GREY, ":", 1.2, "sensor noise"))
@@ -135,14 +149,11 @@ def spectra(fine: FinePointingStudy, controllers: tuple[Shown, ...]) -> Figure:
             (right, cumulative_rms(freq, after) * 1e6, cumulative_rms(freq, predicted) * 1e6),
         ):
             panel.add(each.line(freq, found, place))
-            panel.add(Line(*_seen(freq, linear), each.colour, *_PREDICTED, name=f"{each.name}, predicted, linear"))
+            panel.add(Line(*seen(freq, linear), each.colour, *_PREDICTED, name=f"{each.name}, predicted, linear"))
         columns[f"{each.name}, simulated (rad^2/Hz)"] = after
         columns[f"{each.name}, predicted (rad^2/Hz)"] = predicted
     left.add(Line(freq[:0], freq[:0], GREY, *_PREDICTED, label="dashed: predicted, linear"))
-    left.y.title, left.y.log, left.y.low = "spectrum of one axis (µrad²/Hz)", True, _floor(controllers, inner)
-    right.y.title, right.y.low = "rms below that frequency, one axis (µrad)", 0.0
-    for panel in (left, right):
-        panel.x.title, panel.x.log, panel.x.low, panel.x.high = "frequency (Hz)", True, freq[0], freq[-1]
+    left.y.low = _floor(controllers, inner)
     caption = (
         "One-sided spectrum of the line of sight about axis x, on the mission's mirror: the disturbances before the "
         "loop, what is left behind it (simulated, with hysteresis), and what linear theory predicts without. "

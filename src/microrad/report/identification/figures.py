@@ -8,11 +8,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from microrad.core.arrays import Floats
+from microrad.core.arrays import Complexes, Floats
 from microrad.lab.identify import Identification
 from microrad.lab.identify.linear.axis import axis_error
 from microrad.lab.identify.linear.fit import LinearFit, fit_percent
@@ -165,35 +165,94 @@ def amplitude_spectrum(signal: Floats, rate_hz: float) -> tuple[Floats, Floats]:
 
 
 # --------------------------------------------------------------------------------------------------------- response
+class Measured(NamedTuple):
+    """A measured response over frequency (Hz), and half the width of its confidence in one component; each (n,)."""
+
+    freq_hz: Floats
+    value: Complexes
+    half: Floats | None = None
+
+
+class Modelled(NamedTuple):
+    """A model's response over frequency (Hz), its label, and half the widths of its confidence; each (n,).
+
+    ``along`` is the confidence of the size, in its unit, and ``across`` that of the phase, in radians.
+    """
+
+    freq_hz: Floats
+    value: Complexes
+    label: str
+    along: Floats | None = None
+    across: Floats | None = None
+
+
+def half_width(standard_error: Floats) -> Floats:
+    """Half the width of 95 % confidence in one component of a complex value.
+
+    Args:
+        standard_error: root of the mean squared distance of the value from the true one, (n,).
+    """
+    return 1.96 / math.sqrt(2.0) * standard_error
+
+
+def bode(panels: tuple[Panel, Panel], measured: Measured, model: Modelled | None = None) -> None:
+    """Size and phase of a measured response, and a model of it on top, each with its confidence where that is known.
+
+    Args:
+        panels: those of size and phase.
+        measured: at frequencies above 0 that rise.
+        model: at frequencies that rise, those of the measured ones among them.
+    """
+    size, phase = panels
+    freq, magnitude = measured.freq_hz, np.abs(measured.value)
+    off = np.degrees(np.unwrap(np.angle(measured.value)))
+    turn = off
+    if model is not None:
+        turn = np.degrees(np.unwrap(np.angle(model.value)))
+        places = np.searchsorted(model.freq_hz, freq)
+        value = model.value[places]
+        off = turn[places] + np.degrees(np.angle(measured.value / np.where(value == 0, 1.0, value)))
+    if measured.half is not None:
+        low = np.maximum(magnitude - measured.half, 1e-3 * magnitude)
+        size.add(between(freq, low, magnitude + measured.half, SKY, 0.6, "95 % confidence"))
+        spread = np.degrees(np.arcsin(np.minimum(measured.half / np.maximum(magnitude, 1e-300), 1.0)))
+        phase.add(between(freq, off - spread, off + spread, SKY, 0.6))
+    size.add(Line(freq, magnitude, label="measured", **_DOTS))
+    phase.add(Line(freq, off, **_DOTS))
+    if model is not None:
+        _modelled(panels, model, turn)
+    both = np.concatenate([turn, off])
+    size.x.log = phase.x.log = size.y.log = True
+    phase.y = Axis("phase (°)", low=float(both.min()) - 20.0, high=float(both.max()) + 20.0)
+
+
+def _modelled(panels: tuple[Panel, Panel], model: Modelled, turn: Floats) -> None:
+    """A model's curves, its phase (degrees) without jumps, and its confidence below them."""
+    (size, phase), magnitude = panels, np.abs(model.value)
+    look = {**_MODEL, "width": 1.4}
+    if model.along is not None and model.across is not None:
+        size.y.low = 0.5 * min(float(magnitude.min()), *(float(line.y.min()) for line in size.all_of(Line)))
+        low, spread = np.maximum(magnitude - model.along, 1e-3 * magnitude), np.degrees(model.across)
+        label = "95 % confidence of the model"
+        size.add(between(model.freq_hz, low, magnitude + model.along, VERMILION, 0.3, label))
+        phase.add(between(model.freq_hz, turn - spread, turn + spread, VERMILION, 0.3))
+    size.add(Line(model.freq_hz, magnitude, **{**look, "label": model.label}))
+    phase.add(Line(model.freq_hz, turn, **{**look, "label": ""}))
+
+
 def response(linear: LinearFit) -> Figure:
     """Measured response with its confidence, the linear model on top, levels of what disturbs it, coherence."""
     found = linear.response
     freq = found.freq_hz
     measured, error = found.response[:, 0, 0] * 1e6, found.standard_error[:, 0, 0] * 1e6
     model = measured - linear.residual[:, 0, 0] * 1e6
-    # 95 % of one component of a complex value whose mean squared distance is the square of the error.
-    half = 1.96 / math.sqrt(2.0) * error
     sheet, panels = grid(_WIDTH, 8.4, 4, share_x=True)
     sheet.heights = (3.0, 2.0, 2.4, 1.2)
     size, phase, levels, coherence = panels
-    for panel in panels:
-        panel.x.log = True
-    magnitude = np.abs(measured)
-    low = np.maximum(magnitude - half, 1e-3 * magnitude)
-    modelled = {**_MODEL, "width": 1.4, "label": f"linear model, order {linear.order}"}
-    size.add(
-        between(freq, low, magnitude + half, SKY, 0.6, "95 % confidence"),
-        Line(freq, magnitude, label="measured", **_DOTS),
-        Line(freq, np.abs(model), **modelled),
-    )
-    size.y = Axis("gain (µrad/V)", log=True)
-    turn = np.degrees(np.unwrap(np.angle(model)))
-    off = turn + np.degrees(np.angle(measured / np.where(model == 0, 1.0, model)))
-    spread = np.degrees(np.arcsin(np.minimum(half / np.maximum(magnitude, 1e-300), 1.0)))
-    phase.add(between(freq, off - spread, off + spread, SKY, 0.6))
-    phase.add(Line(freq, off, **_DOTS), Line(freq, turn, **{**modelled, "label": ""}))
-    both = np.concatenate([turn, off])
-    phase.y = Axis("phase (°)", low=float(both.min()) - 20.0, high=float(both.max()) + 20.0)
+    levels.x.log = coherence.x.log = True
+    label = f"linear model, order {linear.order}"
+    bode((size, phase), Measured(freq, measured, half_width(error)), Modelled(freq, model, label))
+    size.y.title = "gain (µrad/V)"
     levels.add(*_levels(linear))
     levels.y = Axis("level (µrad/V)", log=True)
     coherence.add(Line(freq, found.coherence[:, 0], **_DOTS))

@@ -9,7 +9,7 @@ from microrad.link.pointing.outage import required_error_rad
 from microrad.loop import sine_run as simulate
 from microrad.loop.paper_cases import PID, PID_WITH_INVERSE, Run
 from microrad.mirror import Variant
-from microrad.mission.model import Mission
+from microrad.mission.model import LinkMission, Mission
 from microrad.report.plotting.figure import Figure
 from microrad.report.plotting.palette import BLACK, BLUE, GREEN, ORANGE, SKY, VERMILION, WHITE
 from microrad.report.plotting.sheet import (
@@ -27,7 +27,7 @@ from microrad.report.plotting.sheet import (
     region,
 )
 from microrad.study import paper
-from microrad.study.study import Study
+from microrad.study.study import MarginMap, Study
 
 _LOOKS: tuple[tuple[str, Dash], ...] = ((VERMILION, "--"), (BLUE, "-"))
 
@@ -43,32 +43,8 @@ def paper_figures(study: Study) -> tuple[Figure, ...]:
 def margin_map(study: Study) -> Figure:
     """Fig. 2: link margin over data rate and pointing error."""
     f, m = study.margin_map, study.file.mission
-    sheet, (panel,) = grid(6.4, 4.2)
-    rate, error = f.data_rate_bit_s * 1e-6, f.pointing_error_rad * 1e6
-    required_db = m.requirement.margin_db
-    levels = np.arange(-12.0, 19.0, 3.0)
-    panel.add(Field(rate, error, f.margin_db.T, levels[0], levels[-1], "link margin (dB)", levels))
-    _band(panel, rate, error, np.stack(list(f.by_reading.values())), required_db)
-    for level in (0.0, required_db):
-        x, y = contour(rate, error, f.margin_db.T, level)
-        panel.add(Line(x, y, WHITE, name=f"{level:g} dB"))
-        if (at := np.flatnonzero(np.isfinite(x) & (y > 0.02 * error[-1]))).size:
-            place = at[at.size // 2]
-            panel.add(Words(f"{level:g} dB", x[place], y[place], WHITE, anchor="end", shift=(-3.0, -4.0)))
-    rate_mbit = m.communication.data_rate_bit_s * 1e-6
+    sheet = study_margin_sheet(study)
     under = "" if m.jitter is None else " (exceeded by the jitter for the outage)"
-    budgeted, allowed = "budget" if m.jitter is None else "static error", m.communication.pointing_error_rad * 1e6
-    left = residual_urad(study)
-    beyond = ", beyond the map" if left > error[-1] else ""
-    for at_urad, colour, marker, size, label in (
-        (allowed, VERMILION, "o", 8.0, f"{budgeted}: {rate_mbit:g} Mbit/s at {allowed:g} µrad"),
-        (left, SKY, "D", 7.0, f"simulated residual: {left:.1f} µrad ({m.requirement.residual_statistic}){beyond}"),
-    ):
-        place_at = np.array([rate_mbit]), np.array([min(at_urad, error[-1])])
-        panel.add(Line(*place_at, colour, "", label=label, marker=marker, size=size, edge=WHITE, clip=False))
-    panel.x.title, panel.x.log, panel.x.grid = "data rate (Mbit/s)", True, False
-    panel.y.title, panel.y.grid = "pointing error (µrad)", False
-    panel.legend = Legend("upper right", colour=WHITE)
     counts = [r.photons_per_bit for r in f.readings]
     convention = f"{m.conventions.pointing_loss} pointing loss, Strehl as {m.conventions.strehl}"
     largest = f"at most {f.largest_error_rad * 1e6:.2f} µrad" if f.largest_error_rad > 0 else "not even on axis"
@@ -90,6 +66,50 @@ def margin_map(study: Study) -> Figure:
     return Figure("fig2-margin-map", "Fig. 2  Link margin", caption, sheet, columns)
 
 
+def study_margin_sheet(study: Study) -> Sheet:
+    """Link margin over data rate and pointing error, with the points that are budgeted and simulated."""
+    m = study.file.mission
+    left = study.left_rad(study.residual), m.requirement.residual_statistic
+    return margin_sheet(study.margin_map, m, left)
+
+
+def margin_sheet(f: MarginMap, m: LinkMission, left: tuple[float, str] | None = None) -> Sheet:
+    """Link margin over data rate and pointing error, with the point that is budgeted.
+
+    Args:
+        f: the map.
+        m: the mission that it is of.
+        left: the simulated residual (rad) with its statistic, which is marked where there is one.
+    """
+    sheet, (panel,) = grid(6.4, 4.2)
+    rate, error = f.data_rate_bit_s * 1e-6, f.pointing_error_rad * 1e6
+    required_db = m.requirement.margin_db
+    levels = np.arange(-12.0, 19.0, 3.0)
+    panel.add(Field(rate, error, f.margin_db.T, levels[0], levels[-1], "link margin (dB)", levels))
+    _band(panel, rate, error, np.stack(list(f.by_reading.values())), required_db)
+    for level in (0.0, required_db):
+        x, y = contour(rate, error, f.margin_db.T, level)
+        panel.add(Line(x, y, WHITE, name=f"{level:g} dB"))
+        if (at := np.flatnonzero(np.isfinite(x) & (y > 0.02 * error[-1]))).size:
+            place = at[at.size // 2]
+            panel.add(Words(f"{level:g} dB", x[place], y[place], WHITE, anchor="end", shift=(-3.0, -4.0)))
+    rate_mbit = m.communication.data_rate_bit_s * 1e-6
+    budgeted, allowed = "budget" if m.jitter is None else "static error", m.communication.pointing_error_rad * 1e6
+    points = [(allowed, VERMILION, "o", 8.0, f"{budgeted}: {rate_mbit:g} Mbit/s at {allowed:g} µrad")]
+    if left is not None:
+        left_urad, statistic = left[0] * 1e6, left[1]
+        beyond = ", beyond the map" if left_urad > error[-1] else ""
+        said = f"simulated residual: {left_urad:.1f} µrad ({statistic}){beyond}"
+        points.append((left_urad, SKY, "D", 7.0, said))
+    for at_urad, colour, marker, size, label in points:
+        place_at = np.array([rate_mbit]), np.array([min(at_urad, error[-1])])
+        panel.add(Line(*place_at, colour, "", label=label, marker=marker, size=size, edge=WHITE, clip=False))
+    panel.x.title, panel.x.log, panel.x.grid = "data rate (Mbit/s)", True, False
+    panel.y.title, panel.y.grid = "pointing error (µrad)", False
+    panel.legend = Legend("upper right", colour=WHITE)
+    return sheet
+
+
 def _band(panel: Panel, rate: Floats, error: Floats, maps: Floats, required_db: float) -> None:
     """Hatch where some readings of the conventions have the required margin and others have not."""
     lowest, highest = maps.min(axis=0), maps.max(axis=0)
@@ -101,20 +121,19 @@ def _band(panel: Panel, rate: Floats, error: Floats, maps: Floats, required_db: 
         panel.add(Line(*contour(rate, error, edge.T, required_db), WHITE, ":", 1.0, label))
 
 
-def residual_urad(study: Study) -> float:
-    """The residual in the mission's statistic, in µrad."""
-    return study.left_rad(study.residual) * 1e6
+def loop_look(place: int) -> tuple[str, Dash]:
+    """Colour and dash of a loop, by its place among those drawn together."""
+    colours, dashes = (BLACK, BLUE, GREEN, VERMILION, ORANGE, SKY), ("-", "--", "-.", ":")
+    return colours[place % 6], dashes[place % 4]
 
 
 def hysteresis_loops(study: Study) -> Figure:
     """Fig. 5: output and hysteresis over drive, settled, by frequency."""
     sheet, (left, right) = grid(7.4, 3.6, 1, 2)
-    dashes = ["-", "--", "-.", ":"]
-    colours = [BLACK, BLUE, GREEN, VERMILION, ORANGE, SKY]
     columns: dict[str, Floats] = {}
     bias = study.file.mission.mirror.bias_v
     for i, loop in enumerate(study.loops):
-        drive, look = loop.drive_v + bias, (colours[i % 6], dashes[i % 4])
+        drive, look = loop.drive_v + bias, loop_look(i)
         label = f"{loop.freq_hz:g} Hz: {100 * loop.width:.2f} %"
         left.add(Line(drive, loop.output_rad * 1e3, *look, label=f"{loop.freq_hz:g} Hz"))
         right.add(Line(drive, loop.hysteresis_rad * 1e6, *look, label=label))

@@ -29,7 +29,7 @@ TITLE = 9.0  # size of titles of axes
 SWATCH, SWATCH_GAP, ENTRY_GAP = 20.0, 5.0, 14.0
 BAR, BAR_GAP = 11.0, 9.0  # a colour bar, and what is free before it
 _LEAST = 30.0  # of a panel
-_LEAST_MARKER = 3.5  # in a legend
+LEAST_MARKER = 3.5  # in a legend
 Box = tuple[float, float, float, float]  # left, top, right, bottom
 Entry = Line | Rule | Span | Area | Bars
 
@@ -153,7 +153,7 @@ def _seen(entry: Entry) -> Entry:
     """The entry with a marker large enough to be seen."""
     if not isinstance(entry, Line) or not entry.marker:
         return entry
-    return replace(entry, size=max(entry.size, 2.0 * _LEAST_MARKER if entry.marker == "." else _LEAST_MARKER))
+    return replace(entry, size=max(entry.size, 2.0 * LEAST_MARKER if entry.marker == "." else LEAST_MARKER))
 
 
 def _outside(key: Key, left: float, top: float, right: float, bottom: float) -> tuple[float, float, float]:

@@ -13,7 +13,7 @@ from microrad.report.quantities import minus, power_text
 
 LINE = 1.2  # height of a line of text over its size
 _MARGIN = 0.05  # of the data, to either side
-_EACH = {"x": 40.0, "y": 22.0}  # points that a tick needs
+EACH = {"x": 40.0, "y": 22.0}  # points that a tick needs
 _LEAST_GAP = 6.0
 _DECADES_WITH_MINOR_TICKS = 6
 _STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
@@ -166,7 +166,7 @@ def ticks(axis: Axis, which: str, ends: tuple[float, float], length: float) -> d
     if axis.ticks is not None:
         at = [float(each) for each in axis.ticks if low - 1e-9 * abs(low) <= each <= high + 1e-9 * abs(high)]
         return {each: axis.words[each] for each in at} if axis.words else dict(zip(at, texts(at), strict=True))
-    most = max(2, min(axis.most, int(length / _EACH[which])))
+    most = max(2, min(axis.most, int(length / EACH[which])))
     while True:
         at = decades(low, high, most) if axis.log else rounds(low, high, most)
         found = dict(zip(at, powers(at) if axis.log else texts(at), strict=True))

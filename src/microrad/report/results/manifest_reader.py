@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from microrad.core.errors import MicroradError
 from microrad.core.folder import MANIFEST, read_bytes
 from microrad.mission import file as missionfile
 from microrad.mission.toml import Document, UnreadableError
@@ -29,8 +30,10 @@ _NAME = "name a report.html or a folder of results"
 _ELSE = "run the mission itself with microrad run"
 
 
-class ReproduceError(ValueError):
+class ReproduceError(MicroradError):
     """A file that cannot be run again; the message says why and what to do."""
+
+    page = "report"
 
 
 @dataclass(frozen=True, slots=True)

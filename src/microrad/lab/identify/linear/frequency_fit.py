@@ -192,6 +192,17 @@ def fit_frequency_response(  # noqa: PLR0913  all but the first three are named 
         IdentificationError: If the table has another shape than these, numbers that are not finite, frequencies that do
             not rise or are below 0, or one at or above half of the rate, or standard errors that are not above 0; if an
             order is below 1 or more than so many frequencies can fix; for a hold without a rate.
+
+    Example:
+        ```python
+        import numpy as np
+        import microrad
+
+        freq_hz, gain, phase_deg = np.loadtxt("bode.csv", delimiter=",", skiprows=1, unpack=True)
+        fit = microrad.fit_frequency_response(freq_hz, gain * np.exp(1j * np.radians(phase_deg)))
+        print(fit.order, fit.poles_rad_s, fit.known.poles_error_rad_s, fit.reason)
+        A, B, C, D = fit.system.A, fit.system.B, fit.system.C, fit.system.D
+        ```
     """
     table = checked(freq_hz, response, standard_error, (hold, rate_hz, strictly_proper))
     report = on_progress or no_progress

@@ -10,7 +10,7 @@ model is fitted.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -64,6 +64,64 @@ class _Spectra(NamedTuple):
     freq_hz: Floats
     drive: Complexes
     output: Complexes
+
+
+def measure_frequency_response(
+    recordings: Recording | Sequence[Recording], *, band_hz: tuple[float, float] | None = None, bands: int = BANDS
+) -> FrequencyResponse:
+    """Frequency response with its standard error from recordings with a broadband drive; no model is assumed.
+
+    Recordings that state their period (`period_samples`) are averaged over periods and realisations, which tells noise
+    from distortion; others are averaged in logarithmic bands.
+
+    Args:
+        recordings: One recording, or several of one rate and with the same channels; as many as inputs, or more, unless
+            the drives are broadband and independent.
+        band_hz: Lowest and highest frequency (Hz); by default where the drive has power. Periodic recordings have all
+            their excited lines.
+        bands: Number of logarithmic bands of recordings that are not periodic.
+
+    Raises:
+        IdentificationError: For recordings that cannot be averaged together, some periodic and some not among them, and
+            where the inputs are not excited independently.
+
+    Example:
+        ```python
+        import numpy as np
+        import microrad
+
+        noise = np.random.default_rng(1)
+        drive = noise.standard_normal(20_000)
+        output = np.convolve(drive, [0.0, 0.4, 0.3, 0.2, 0.1])[:20_000] + 0.01 * noise.standard_normal(20_000)
+        measured = microrad.measure_frequency_response(microrad.recording_from_arrays(drive, output, rate_hz=10e3))
+        fit = microrad.fit_frequency_response(
+            measured.freq_hz, measured.response, 2, standard_error=measured.standard_error,
+            hold=measured.hold, rate_hz=measured.rate_hz,
+        )
+        print(fit.poles_rad_s, fit.relative_rms_error)
+        ```
+    """
+    several = [recordings] if isinstance(recordings, Recording) else list(recordings)
+    _check(several)
+    periodic = [r.period_samples is not None for r in several]
+    if any(periodic) and not all(periodic):
+        raise IdentificationError(
+            "some recordings state their period and others do not; measure each kind by itself, or state it for all."
+        )
+    if not all(periodic):
+        return response_from_records(several, band_hz=band_hz, bands=bands)
+    found = response_from_periods(several)
+    if band_hz is None:
+        return found
+    kept = (found.freq_hz >= band_hz[0]) & (found.freq_hz <= band_hz[1])
+    if not kept.any():
+        raise IdentificationError(f"no excited line lies between {band_hz[0]:g} and {band_hz[1]:g} Hz; widen the band.")
+    parts: dict[str, Any] = {
+        field.name: value[kept]
+        for field in fields(found)
+        if isinstance(value := getattr(found, field.name), np.ndarray) and len(value) == kept.size
+    }
+    return replace(found, **parts)
 
 
 # ------------------------------------------------------------------------------------------------- non-periodic drives

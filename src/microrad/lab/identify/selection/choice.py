@@ -173,6 +173,15 @@ def identify(  # noqa: PLR0913  all but the first are named options in practice
 
     Raises:
         IdentificationError: For what cannot be fitted as asked, and where not even the best model follows the output.
+
+    Example:
+        ```python
+        import microrad
+
+        loop = microrad.read_recording("loop.csv", inputs="drive", outputs="angle")
+        found = microrad.identify_mirror([loop], output_unit="urad")
+        print(found.chosen, found.reason)
+        ```
     """
     units, on_progress = Units(input_unit, output_unit, lever_arm_m), on_progress or no_progress
     if not models or not set(models) <= set(MODELS) or len(set(models)) != len(models):

@@ -1,0 +1,100 @@
+"""What `import microrad` offers: each name has an example that runs, types for a strict checker, and one place."""
+
+import inspect
+import re
+import subprocess
+import sys
+import textwrap
+
+import numpy as np
+import pytest
+
+import microrad
+from day_files import element_set
+from microrad.mirror.hysteresis import PrandtlIshlinskii
+from places import ROOT
+from shipped import SHIPPED, without_day, without_fine_pointing
+from small_campaign import campaign_file, without_worker
+
+BLOCK = re.compile(r"```python\n(.*?)```", re.DOTALL)
+
+
+def examples(name):
+    """The examples of a public name: those of its docstring, for a class without one those of its methods."""
+    thing = getattr(microrad, name)
+    own = BLOCK.findall(inspect.getdoc(thing) or "")
+    if inspect.isclass(thing) and not own:
+        own = [e for m in vars(thing).values() if callable(m) for e in BLOCK.findall(inspect.getdoc(m) or "")]
+    return [textwrap.dedent(each) for each in own]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """The files that examples name."""
+    place = tmp_path_factory.mktemp("examples")
+    campaign_file(place)
+    short = without_fine_pointing(without_day(SHIPPED.read_text(encoding="utf-8")))
+    (place / "leo-geo.toml").write_text(short, encoding="utf-8")
+    mirrors = ROOT / "tests" / "corpus" / "0.1.0" / "mirrors"
+    (place / "loop-mirror.toml").write_bytes((mirrors / "identified.toml").read_bytes())
+    (place / "satellites.tle").write_text(
+        element_set() + element_set(revolutions=1.0027, inclination=0.1, name="RELAY", number="70002"), encoding="utf-8"
+    )
+    time_s = np.arange(4000) * 5e-4
+    drive_v = 30.0 + 8.0 * np.sin(2 * np.pi * 3 * time_s)
+    noise = np.random.default_rng(1)
+    angle = 1e6 * PrandtlIshlinskii((0.0, 1.0, 2.0), (40e-6, 6e-6, 4e-6)).response(drive_v - 30.0, 5e-4)
+    rows = np.column_stack([time_s, drive_v, angle + 0.2 * noise.standard_normal(4000)])
+    np.savetxt(place / "loop.csv", rows, delimiter=",", header="time,drive,angle", comments="", fmt="%.9g")
+    freq_hz = np.geomspace(10.0, 3000.0, 120)
+    s = 2j * np.pi * freq_hz
+    response = 40e-6 / (1 + 2 * 0.02 * s / 6000 + (s / 6000) ** 2)
+    response += 2e-7 * (noise.standard_normal(120) + 1j * noise.standard_normal(120))
+    table = np.column_stack([freq_hz, np.abs(response), np.degrees(np.angle(response))])
+    np.savetxt(place / "bode.csv", table, delimiter=",", header="frequency,gain,phase", comments="", fmt="%.9g")
+    return place
+
+
+@pytest.mark.parametrize("name", microrad._PUBLIC)
+def test_every_public_name_has_an_example_that_runs(name, folder, monkeypatch, capsys):
+    monkeypatch.chdir(folder)
+    without_worker(monkeypatch)
+    given = examples(name)
+    assert given, f"{name} has no example"
+    for text in given:
+        assert f"microrad.{name}" in text or f"import {name}" in text or f", {name}" in text
+        exec(compile(text, f"example of {name}", "exec"), {})
+    assert name in ("write_report", "run_campaign") or name.startswith("plot_") or capsys.readouterr().out
+
+
+def test_examples_satisfy_a_strict_type_checker_run_from_outside(tmp_path):
+    texts = [text for name in microrad._PUBLIC for text in examples(name)]
+    body = "".join(f"def example_{i}() -> None:\n{textwrap.indent(text, '    ')}\n\n" for i, text in enumerate(texts))
+    (tmp_path / "examples.py").write_text(body, encoding="utf-8")
+    command = [sys.executable, "-m", "mypy", "--strict", "--cache-dir", str(tmp_path / "cache"), "examples.py"]
+    found = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert found.returncode == 0, found.stdout + found.stderr
+    (tmp_path / "examples.py").write_text(body + "\nimport microrad\nmicrorad.parse_quantity(5)\n", encoding="utf-8")
+    wrong = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert wrong.returncode == 1 and 'Missing positional argument "unit"' in wrong.stdout
+
+
+@pytest.mark.parametrize("name", microrad._MOVED)
+def test_a_name_of_0_1_0_says_where_it_lives_now(name):
+    with pytest.warns(DeprecationWarning, match=rf"microrad\.{name} goes in 0\.3\.0: write from microrad\.") as said:
+        old = getattr(microrad, name)
+    scope = {}
+    exec(str(said[0].message).partition("write ")[2], scope)
+    assert scope[str(said[0].message).rpartition(" ")[2]] is old
+    assert name not in dir(microrad)
+
+
+def test_there_are_few_names_and_they_load_nothing():
+    code = "import sys, microrad; print(len(sys.modules), 'numpy' in sys.modules)"
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    assert loaded[1] == "False"
+    with pytest.raises(AttributeError, match="microrad has no public name 'load_misson'; it has BoucWen, "):
+        microrad.load_misson  # noqa: B018
+    plots = [name for name in microrad._PUBLIC if name.startswith("plot_")]
+    assert len(microrad._PUBLIC) - len(plots) <= 30 and len(plots) == 6
+    assert not microrad._PUBLIC.keys() & microrad._MOVED.keys()
