@@ -7,7 +7,7 @@ author = "The microrad developers"
 copyright = "The microrad developers, BSD-3-Clause"
 version = release = metadata.version("microrad")
 
-extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "site_pages.mathml"]
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "site_pages.extension"]
 exclude_patterns = ["gallery/*", "_static/*"]
 
 html_theme = "furo"

@@ -14,8 +14,8 @@ from site_pages.tables import code, table
 
 _HEAD = """# Conventions, and what each costs in dB
 
-A link budget leaves much to convention: what a Strehl of 0.4 is, whether a divergence is a full or a half angle, and how a
-beam falls off its axis. In microrad each is a key of `[conventions]` in the mission file, and none is assumed. Below two
+A link budget leaves much to convention: what a Strehl of 0.4 is, whether a divergence is a full or a half angle, how a
+beam falls off its axis. In microrad each is a key of `[conventions]` in the mission file, none is assumed. Below two
 missions are read otherwise, one key at a time; the margins were computed when this page was made.
 [Link budgets](link.md) says why each default is what it is.
 """

@@ -3,7 +3,7 @@
 import inspect
 
 import microrad
-from site_pages.tables import table
+from site_pages.tables import plain, table
 
 _HEAD = """# Public names
 
@@ -21,9 +21,27 @@ def names() -> tuple[str, ...]:
 def pages() -> dict[str, str]:
     """The pages by their names in the site: one that lists the names, and one for each."""
     found = {f"names/{name}.md": _page(name) for name in names()}
-    rows = [(f"[{name}]({name}.md)", _first_line(name)) for name in names()]
+    shown = []
+    for title, inside in _groups().items():
+        rows = [(f"[{name}]({name}.md)", plain(_first_line(name))) for name in inside]
+        shown += [f"## {title.capitalize()}", table(("name", "what it is"), rows)]
     tree = "\n".join(("```{toctree}", ":hidden:", "", *names(), "```"))
-    return {"names/index.md": f"{_HEAD}\n{table(('name', 'what it is'), rows)}\n\n{tree}\n", **found}
+    return {"names/index.md": "\n\n".join((_HEAD, *shown, tree)) + "\n", **found}
+
+
+def _groups() -> dict[str, list[str]]:
+    """The names by the comments that stand above them in the package's table."""
+    found: dict[str, list[str]] = {}
+    title = "names"
+    for line in inspect.getsource(microrad).partition("_PUBLIC = {")[2].splitlines():
+        text = line.strip()
+        if text.startswith("}"):
+            break
+        if text.startswith("#"):
+            title = text.removeprefix("#").strip()
+        elif text.startswith('"'):
+            found.setdefault(title, []).append(text.split('"')[1])
+    return found
 
 
 def _first_line(name: str) -> str:
