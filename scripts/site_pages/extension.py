@@ -6,14 +6,21 @@ from typing import Any
 from docutils import nodes
 from latex2mathml.converter import convert
 
+_BAR = '<mo stretchy="false" lspace="0" rspace="0">&#x0007C;</mo>'
+
+
+def _mathml(node: nodes.Node, display: str) -> str:
+    """A formula; bars about a quantity are no operators between two."""
+    return re.sub(r"<mo[^>]*>&#x0007C;</mo>", _BAR, convert(node.astext(), display=display))
+
 
 def _inline(translator: Any, node: nodes.math) -> None:
-    translator.body.append(convert(node.astext()))
+    translator.body.append(_mathml(node, "inline"))
     raise nodes.SkipNode
 
 
 def _block(translator: Any, node: nodes.math_block) -> None:
-    translator.body.append(f'<div class="math">{convert(node.astext(), display="block")}</div>')
+    translator.body.append(f'<div class="math">{_mathml(node, "block")}</div>')
     raise nodes.SkipNode
 
 

@@ -334,7 +334,13 @@ def _acquisition() -> Iterator[Formula]:
         "other source",
         "simulate_scan has any correlation time",
     )
-    yield Formula(f"{a}detection.detection_times", r"P(T < t)", "as the row above", "other source")
+    yield Formula(
+        f"{a}detection.detection_times",
+        r"P(T < t)",
+        "ours: crossings in their order",
+        "other source",
+        "as the row above",
+    )
     yield Formula(
         f"{a}sequence.frame_detection_probability",
         r"\frac{1}{2} \mathrm{erfc}((t - s) / \sqrt{2})",
@@ -346,8 +352,9 @@ def _acquisition() -> Iterator[Formula]:
     yield Formula(
         f"{a}trade.Receiver.detection_time_s",
         r"t \propto P^{-2}",
-        "white noise that does not depend on the light",
+        "matched integration",
         "reduction",
+        "white noise that does not depend on the light",
     )
     yield Formula(
         f"{a}trade.Beams.irradiance_w_m2",
@@ -427,7 +434,7 @@ def pages() -> dict[str, str]:
     )
     parts = [_HEAD, f"{len(every)} formulas: {counted}."]
     for title, group in found.items():
-        parts += [f"## {title}", table(("where", "formula", "source", "status", "difference"), _rows(group))]
+        parts += [f"## {title}", table(("where", "formula", "source", "status", "difference"), _rows(group), wide=True)]
     return {"formulas.md": "\n\n".join(parts) + "\n"}
 
 

@@ -23,7 +23,9 @@ def pages() -> dict[str, str]:
             of_table.setdefault(each.name.rpartition(".")[0], []).append(each)
         for name, inside in of_table.items():
             parts.append(f"### {file}: {plain(f'[{name}]') if name else 'tables'}")
-            parts.append(table(("key", "meaning", "holds", "left out", "shipped", "read by"), map(_row, inside)))
+            parts.append(
+                table(("key", "meaning", "holds", "left out", "shipped", "read by"), map(_row, inside), wide=True)
+            )
     return {"keys.md": "\n\n".join(parts) + "\n"}
 
 

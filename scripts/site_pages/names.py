@@ -52,7 +52,7 @@ def _page(name: str) -> str:
     value = getattr(microrad, name)
     lines = [f".. autofunction:: microrad.{name}"]
     if inspect.isclass(value):
-        lines = [f".. autoclass:: microrad.{name}", "   :members:", "   :undoc-members:"]
+        lines = [f".. autoclass:: microrad.{name}", "   :members:"]
         if issubclass(value, BaseException):
             lines = [f".. autoexception:: microrad.{name}", "   :show-inheritance:"]
     elif not callable(value):

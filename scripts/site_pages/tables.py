@@ -3,15 +3,17 @@
 from collections.abc import Iterable, Sequence
 
 
-def table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+def table(headings: Sequence[str], rows: Iterable[Sequence[str]], *, wide: bool = False) -> str:
     """A table in Markdown; a bar in a cell stays one, and a cell is one line.
 
     Args:
         headings: Those of the columns.
         rows: The cells, as many as there are headings in each row.
+        wide: Whether it rather scrolls sideways than have narrow columns.
     """
     lines = [headings, ["---"] * len(headings), *rows]
-    return "\n".join(
+    head = "```{rst-class} wide\n```\n\n" if wide else ""
+    return head + "\n".join(
         "| " + " | ".join(" ".join(cell.split()).replace("|", "\\|") for cell in line) + " |" for line in lines
     )
 

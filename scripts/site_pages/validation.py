@@ -36,9 +36,9 @@ def pages() -> dict[str, str]:
         ]
         parts += [
             f"## {title}",
-            table(("case", "source", "expected", "obtained", "difference", "within", "test"), rows),
+            table(("case", "source", "expected", "obtained", "difference", "within", "test"), rows, wide=True),
         ]
-    parts += [_RECORDED, table(("case", "expected, and whose", "obtained", "page", "command"), _recorded())]
+    parts += [_RECORDED, table(("case", "expected, and whose", "obtained", "page", "command"), _recorded(), wide=True)]
     return {"validation.md": "\n\n".join(parts) + "\n"}
 
 
