@@ -43,7 +43,7 @@ def build(target: Path) -> list[str]:
         app.build()
         shutil.rmtree(target / ".doctrees", ignore_errors=True)
         raised = re.sub(r"\x1b\[[0-9;]*m", "", warnings.getvalue()).replace(str(sources), "docs")
-    return [line for line in raised.splitlines() if line.strip()] + broken_links(target) + fetched(target)
+    return [line for line in raised.splitlines() if line.strip()] + faults(target)
 
 
 class _Page(HTMLParser):
@@ -71,35 +71,29 @@ def _pages(site: Path) -> dict[Path, _Page]:
     return {path: _Page(path.read_text(encoding="utf-8")) for path in sorted(site.rglob("*.html"))}
 
 
-def broken_links(site: Path) -> list[str]:
-    """Links and anchors of a built site that lead nowhere; addresses elsewhere are not asked for."""
-    pages, wrong = _pages(site.resolve()), []
+def faults(site: Path) -> list[str]:
+    """What is wrong with a built site: links and anchors that lead nowhere, and what would be fetched from elsewhere.
+
+    Addresses elsewhere that are links are not asked for.
+    """
+    wrong, site = [], site.resolve()
+    pages = _pages(site)
     for path, page in pages.items():
+        name = path.relative_to(site)
+        wrong += [f"{name} would fetch {address}" for address in page.fetched if urlsplit(address).netloc]
         for address in {*page.links, *page.fetched}:
             parts = urlsplit(address)
             if parts.scheme or parts.netloc:
                 continue
             there = (path.parent / unquote(parts.path)).resolve() if parts.path else path
-            where = f"{path.relative_to(site.resolve())}: {address}"
             if not there.is_file():
-                wrong.append(f"{where} leads nowhere")
+                wrong.append(f"{name}: {address} leads nowhere")
             elif parts.fragment and there in pages and unquote(parts.fragment) not in pages[there].ids:
-                wrong.append(f"{where} has no such anchor")
-    return sorted(wrong)
-
-
-def fetched(site: Path) -> list[str]:
-    """What pages and styles of a built site would fetch from elsewhere."""
-    wrong = [
-        f"{path.relative_to(site.resolve())} would fetch {address}"
-        for path, page in _pages(site.resolve()).items()
-        for address in page.fetched
-        if urlsplit(address).netloc
-    ]
+                wrong.append(f"{name}: {address} has no such anchor")
     for style in site.rglob("*.css"):
         found = re.findall(r"(?:url\(|@import)\s*['\"]?((?:https?:)?//[^'\")\s]+)", style.read_text(encoding="utf-8"))
         wrong += [f"{style.relative_to(site)} would fetch {address}" for address in found]
-    return wrong
+    return sorted(wrong)
 
 
 def external_links(site: Path) -> list[str]:

@@ -38,7 +38,7 @@ def pages() -> dict[str, str]:
         "no linear model of one amplitude could follow": "what no linear model of one amplitude could follow, rms",
     }
     rows = {
-        "models": table(("model", "fitted", "held out"), _rows("identify.md", models, 2)),
+        "models": table(("model", "fitted", "held out"), _rows("identify.md", models, 2, "held out")),
         "stiffness": table(
             ("model", "100 mV", "200 mV", "300 mV"),
             [

@@ -30,7 +30,7 @@ def pages() -> dict[str, str]:
                 case.shown,
                 f"{case.difference:+.1g}" if case.difference else "0",
                 f"{case.tolerance:.2g}" if case.met else f"**missed**: {case.tolerance:.2g}",
-                code(case.test.removeprefix("tests/")),
+                _test(case.test),
             )
             for case in cases
         ]
@@ -40,6 +40,12 @@ def pages() -> dict[str, str]:
         ]
     parts += [_RECORDED, table(("case", "expected, and whose", "obtained", "page", "command"), _recorded(), wide=True)]
     return {"validation.md": "\n\n".join(parts) + "\n"}
+
+
+def _test(name: str) -> str:
+    """A test by its file and its sentence."""
+    path, _, function = name.removeprefix("tests/").partition("::")
+    return f"{code(path)}: {function.removeprefix('test_').replace('_', ' ')}"
 
 
 def _recorded() -> list[tuple[str, ...]]:
