@@ -19,6 +19,8 @@ import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+from recorded import record
+
 ROOT = Path(__file__).resolve().parent.parent
 MISSION = (ROOT / "missions" / "leo-geo.toml").read_text(encoding="utf-8")
 DATA = Path(os.environ.get("MICRORAD_DATA") or ROOT.parent / "shared" / "data")
@@ -117,6 +119,7 @@ def tell(what: str, bar_s: float, do: Callable[[], None]) -> None:
     before, began = processor_s(), time.perf_counter()
     do()
     clock = time.perf_counter() - began
+    record(what, clock, "s", at_most=bar_s)
     print(
         f"{what:64s} {clock:6.1f} s {processor_s() - before:8.1f} s {bar_s:5.1f} s{'' if clock <= bar_s else '  over'}"
     )

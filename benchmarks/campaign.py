@@ -20,6 +20,8 @@ import time
 from contextlib import closing
 from pathlib import Path
 
+from recorded import record
+
 from microrad.campaign import bundle, run
 from microrad.campaign.file import load_campaign
 from microrad.campaign.records import Engine, Job
@@ -166,6 +168,7 @@ def links(rows: int) -> None:
             chunk = evaluator.rows(0, range(rows), lambda: None)
             took = time.process_time() - began
             assert not chunk.failed, chunk.failed
+            record(f"links alone, {name}: rms{' and ' * bool(key) + key}", rows / took, "rows/s", at_least=100)
             print(f"  {name:24} rms{' and ' * bool(key) + key:36} {rows / took:6.0f}")
 
 

@@ -14,6 +14,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from recorded import record
 from skyfield.api import EarthSatellite, load, wgs84
 
 from microrad import orbit
@@ -56,6 +57,7 @@ def one_pair() -> None:
         seen.doppler_hz(FILE.mission.communication.wavelength_m)
 
     took = seconds(day_at_1_s, 9)
+    record("one pair, one day at 1 s", took, "s", at_most=PAIR_TARGET_S)
     print(f"one pair, one day at 1 s, sight and visibility: {took:.3f} s (at most {PAIR_TARGET_S} s)")
     took = seconds(lambda: orbit.contacts(pair.leo, pair.geo, pair.earth, pair.epoch, pair.span_s), 9)
     print(f"one pair, one day, contacts by root search, all limits: {took:.3f} s")
@@ -87,6 +89,7 @@ def many() -> None:
         planned = time.perf_counter() - began
         times = f"{alone:10.1f} s {limited:9.1f} s {planned:9.1f} s"
         print(f"{count:10d} {found.start_s.size:9d} {times} {megabytes():6.0f} MB")
+    record(f"{count} satellites with 4 slots, one day, planned", planned, "s", at_most=CONSTELLATION_TARGET_S)
     print(f"planned: within reach, with sessions; at most {CONSTELLATION_TARGET_S:g} s for 1000 satellites")
 
 
@@ -104,6 +107,7 @@ def beside_skyfield() -> None:
     peer = seconds(lambda: satellite.find_events(place, begin, end, altitude_degrees=0.0), 3)
     ours = seconds(lambda: orbit.passes(own, station, epoch, (0.0, 7 * DAY_S)), 3)
     count = len(orbit.passes(own, station, epoch, (0.0, 7 * DAY_S)))
+    record("passes of a week over those of skyfield, time", ours / peer)
     print(f"{count} passes in a week: {ours:.2f} s, skyfield {peer:.2f} s, ratio {ours / peer:.2f}")
 
 

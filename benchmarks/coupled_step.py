@@ -14,6 +14,7 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
+from recorded import record
 
 from loop import best
 from microrad.core import kernels, lti
@@ -124,6 +125,8 @@ def main() -> None:
         for modes, springs in ((3, 3), (18, 12)):
             m = made_up(modes, springs)
             twin, one, many = measured(m, folder)
+            record(f"{m.name}: one run over C twin, a plant step", one / twin)
+            record(f"{m.name}: 64 side by side over C twin, a plant step", many / twin)
             print(f"{m.name:36} {twin:6.1f}   {one:7.1f}  {one / twin:5.2f}   {many:15.1f}  {many / twin:5.2f}")
 
 

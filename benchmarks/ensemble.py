@@ -18,6 +18,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from recorded import record
 
 from loop import INTEGER, Counters, best, compiled_twin, twin_parameters
 from microrad import mirror
@@ -95,6 +96,7 @@ def ratio() -> None:
     kernel, noise, c_step = (times[name] / steps * 1e9 for name in ("kernel", "noisy", "twin"))
     print(f"one axis with hysteresis, {runs} runs side by side, ns a plant step and run on one core")
     print(f"  kernel {kernel:6.2f}, C twin {c_step:6.2f}: ratio {kernel / c_step:.3f}")
+    record(f"{runs} runs side by side: kernel over scalar C twin, a plant step", kernel / c_step)
     print(f"  with disturbance and sensor noise {noise:6.2f}, so random numbers cost {noise - kernel:.2f}")
 
 

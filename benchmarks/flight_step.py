@@ -17,6 +17,7 @@ from pathlib import Path
 
 import control as python_control
 import numpy as np
+from recorded import record
 
 from microrad.core import lti
 from microrad.export import choice, records
@@ -146,10 +147,12 @@ def in_python_control(of: records.FlightController, run: records.Vectors) -> flo
     return float(np.median(took))
 
 
-def line(what: str, found: build.BenchResult, dense: build.BenchResult) -> None:
+def line(name: str, what: str, found: build.BenchResult, dense: build.BenchResult) -> None:
     worst, median = found.worst_step_ns, found.median_step_ns
     ratios = f"{worst / dense.worst_step_ns:6.2f} {median / dense.median_step_ns:6.2f}"
     strays = f"{found.largest_difference_v:.1e} of {found.bound_v:.1e} V"
+    if found is not dense:
+        record(f"{name}: {what} over dense C twin, worst step", worst / dense.worst_step_ns)
     print(f"  {what:15} {worst:6.0f} {median:8.0f}   {ratios}       {strays}", flush=True)
 
 
@@ -167,9 +170,9 @@ def compare(name: str, samples: int) -> None:
     print(f"\n{name}: {form.order} states, {sum(each.size for each in of.inputs)} readings, {of.actuators} commands")
     print("                   worst   median   times the twin's   difference from the kernel, bound")
     dense = ran(designed, run, {**double, "code.c": twin(designed)}, "code")
-    line(f"dense, {designed.system.order} states", dense, dense)
+    line(name, f"dense, {designed.system.order} states", dense, dense)
     for precision, (files, code) in made.items():
-        line(precision, ran(of, run, files, code), dense)
+        line(name, precision, ran(of, run, files, code), dense)
     peer = in_python_control(designed, run)
     print(
         f"  python-control         {peer:8.0f}         {peer / dense.median_step_ns:6.0f}       the linear part alone"

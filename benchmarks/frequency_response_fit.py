@@ -27,6 +27,8 @@ from skrf.vectorFitting import VectorFitting
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 
+from recorded import record
+
 from microrad import fit_frequency_response
 from response_tables import TABLES, Table, noisy
 
@@ -118,6 +120,8 @@ def main() -> None:
         found, stable, theirs_stable = errors(table)
         fit_ms, known_ms, theirs_ms = times(table)
         data, truth = ({name: value[k] for name, value in found.items()} for k in (0, 1))
+        record(f"{table.name}: time over scikit-rf", fit_ms / theirs_ms)
+        record(f"{table.name}: error to the truth over scikit-rf", truth["ours"] / truth["scikit-rf"])
         states = f"{table.order}/{table.order * min(table.response.shape[1:])}"
         print(
             f"{table.name:28s} {states:7s} {data['ours']:9.3e} / {data['scikit-rf']:9.3e} "

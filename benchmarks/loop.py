@@ -19,6 +19,7 @@ from pathlib import Path
 
 import control as python_control
 import numpy as np
+from recorded import record
 from scipy.integrate import solve_ivp
 
 from microrad import mirror
@@ -228,6 +229,7 @@ def main() -> None:
             print(f"\n{name}")
             kernel_ns, twin_ns = (times[name] * 1e9 for name in ("kernel", "C twin"))
             print(f"  kernel {kernel_ns:6.1f} ns a step, C twin {twin_ns:6.1f} ns: ratio {ratio:.2f}")
+            record(f"{name}: kernel over C twin, a plant step", ratio)
             print(f"  {period / times['kernel']:.0f} times real time at {1 / period / 1e3:g} kHz on one core")
 
     short = slice(0, round(0.2 / period))

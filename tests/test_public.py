@@ -93,8 +93,6 @@ def test_there_are_few_names_and_they_load_nothing():
     code = "import sys, microrad; print(len(sys.modules), 'numpy' in sys.modules)"
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
     assert loaded[1] == "False"
-    with pytest.raises(AttributeError, match="microrad has no public name 'load_misson'; it has BoucWen, "):
-        microrad.load_misson  # noqa: B018
     plots = [name for name in microrad._PUBLIC if name.startswith("plot_")]
     assert len(microrad._PUBLIC) - len(plots) <= 30 and len(plots) == 6
     assert not microrad._PUBLIC.keys() & microrad._MOVED.keys()

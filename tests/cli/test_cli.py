@@ -821,7 +821,7 @@ def test_every_public_name_exists_once():
 
 
 def test_an_unknown_public_name_says_what_there_is():
-    with pytest.raises(AttributeError, match=r"no public name 'launch'; it has load_mission"):
+    with pytest.raises(AttributeError, match=r"no public name 'launch'; it has BoucWen"):
         microrad.launch  # noqa: B018
 
 

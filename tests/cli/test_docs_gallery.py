@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from microrad import load_link, load_mirror, report
+from microrad import report
 from microrad.core import lti
 from microrad.core.units import parse_quantity
 from microrad.lab.identify import coupled
@@ -24,6 +24,7 @@ from microrad.lab.identify.coupled.ladder import LadderOptions, identify_coupled
 from microrad.loop import controller_study, coupled_study
 from microrad.mirror.model import linearised
 from microrad.mission import presets
+from microrad.mission.file import load_link, load_mirror
 from microrad.report.identification import page as identification
 from microrad.study import study
 from places import DATA, ROOT

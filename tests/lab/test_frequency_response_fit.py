@@ -7,8 +7,8 @@ import control as python_control
 import numpy as np
 import pytest
 
-from microrad import IdentificationError, fit_frequency_response
 from microrad.core import lti
+from microrad.lab.identify import IdentificationError, fit_frequency_response
 from microrad.lab.identify.linear.elements import ElementEquations
 from microrad.lab.identify.linear.modal import ModalModel
 from microrad.lab.identify.linear.polish import FrequencyEquations, fit_outputs, normal_equations, pack, polish, unpack

@@ -92,8 +92,26 @@ def test_what_a_model_cannot_take_is_refused():
         PLAYS.loop(1.0, 0.0)
     with pytest.raises(ValueError, match="4 samples a period has no shape"):
         BOUC_WEN.loop(1.0, 1.0, 4)
+    with pytest.raises(ValueError, match=r"thresholds \(0\.0, 1\.0\) V with 1 weights make no Prandtl"):
+        PrandtlIshlinskii((0.0, 1.0), (1e-6,))
+    with pytest.raises(ValueError, match="give thresholds that rise from 0 V"):
+        PrandtlIshlinskii((1.0, 0.0), (1e-6, 1e-6))
+    with pytest.raises(ValueError, match=r"thresholds cannot widen by -1\.0 s"):
+        PrandtlIshlinskii((0.0,), (1e-6,), widening_s=-1.0)
     with pytest.raises(ValueError, match="d1 = 0 has no inverse"):
         replace(BOUC_WEN, d1_rad_v=0.0).inverse([0.0, 1e-6], STEP)
     backwards = replace(BOUC_WEN, epsilon_rad_v=-120e-6)
     with pytest.raises(ValueError, match=r"no drive was found.*slope of the model is -.*fit it with admissible=True"):
         backwards.inverse(200e-6 * np.sin(np.linspace(0.0, 20.0, 300)), STEP)
+
+
+@pytest.mark.parametrize("model", [BOUC_WEN, replace(PLAYS, widening_s=2e-3)])
+def test_a_loop_is_a_period_of_a_long_run_and_closes(model):
+    loop = model.loop(6.0, 50.0, 400)
+    drive = 6.0 * np.sin(2 * np.pi * np.arange(1, 4001) / 400)
+    run = model.response(drive, 1 / 50 / 400)
+    assert_allclose(loop.output_rad, run[-400:], rtol=0, atol=2e-6 * np.ptp(run))
+    around = np.append(loop.output_rad[-1], loop.output_rad)
+    assert np.max(np.abs(np.diff(around))) < 0.03 * np.ptp(run)
+    slow = model.loop(6.0, 0.5, 400)
+    assert loop.width > 1.02 * slow.width

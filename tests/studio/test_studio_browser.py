@@ -215,7 +215,7 @@ def test_what_is_done_can_be_copied_as_a_command_and_as_python(studio, tab):
     tab.get_by_text("Copied: microrad budget leo-geo.toml").wait_for()
     assert tab.evaluate("navigator.clipboard.readText()") == "microrad budget leo-geo.toml"
     tab.get_by_role("button", name="Copy as Python").click()
-    tab.get_by_text("Copied: from microrad import").wait_for()
+    tab.get_by_text("Copied: from microrad").wait_for()
     lines = tab.evaluate("navigator.clipboard.readText()")
     assert lines == commands.budget(Path("leo-geo.toml")).python  # which test_studio_commands.py runs
 

@@ -8,7 +8,7 @@ samples, and comes from the kernels that a simulated mirror runs.
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -37,28 +37,30 @@ class HysteresisLoop:
         return float(np.ptp(self.hysteresis_rad) / np.ptp(self.output_rad))
 
 
-_Advance = Callable[[Floats, float, Any], tuple[Floats, Floats, Any, int]]
-"""Output, hysteresis and last state behind the first sample of a drive, and the clamped samples."""
+_WholeRun = Callable[[Floats, float], tuple[Floats, Floats]]
+"""Output and hysteresis of a drive from rest."""
 
-_REPEATS, _PERIODS = 1e-6, 1000
+_REPEATS, _PERIODS = 1e-6, 1024
 _INVERSIONS = 300
 
 
-def _settled(advance: _Advance, state: Any, amplitude_v: float, freq_hz: float, samples: int) -> HysteresisLoop:
-    """The period that repeats itself: the output moves by at most 1e-6 of its size, or 1000 periods have passed."""
+def _settled(run: _WholeRun, amplitude_v: float, freq_hz: float, samples: int, limit_v_s: float) -> HysteresisLoop:
+    """The period that repeats itself: the output moves by at most 1e-6 of its size, or 1024 periods have passed."""
     for name, value, unit in (("amplitude_v", amplitude_v, "V"), ("freq_hz", freq_hz, "Hz")):
         if not 0.0 < value < math.inf:
             raise ValueError(f"{name} of a loop is {value} {unit}: give a finite number above 0")
     if samples < 8:
         raise ValueError(f"a loop of {samples} samples a period has no shape: give 8 or more, better 500")
-    drive = amplitude_v * np.sin(2.0 * np.pi * np.arange(samples + 1) / samples)
-    last = np.full(samples, np.inf)
-    for _ in range(_PERIODS):
-        output, hysteresis, state, clamped = advance(drive, 1.0 / freq_hz / samples, state)
-        if np.max(np.abs(output - last)) <= _REPEATS * np.ptp(output):
+    one = amplitude_v * np.sin(2.0 * np.pi * np.arange(1, samples + 1) / samples)
+    step_s, periods = 1.0 / freq_hz / samples, 4
+    while True:
+        output, hysteresis = run(np.tile(one, periods), step_s)
+        before, last = output[-2 * samples : -samples], output[-samples:]
+        if np.max(np.abs(last - before)) <= _REPEATS * np.ptp(last) or periods >= _PERIODS:
             break
-        last = output
-    return HysteresisLoop(freq_hz, drive[1:], output, hysteresis, clamped)
+        periods *= 4
+    clamped = np.count_nonzero(np.abs(np.diff(one, prepend=one[-1])) / step_s > limit_v_s)
+    return HysteresisLoop(freq_hz, one, last, hysteresis[-samples:], int(clamped))
 
 
 def _from_rest(samples: ArrayLike, step_s: float, what: str) -> Floats:
@@ -115,10 +117,10 @@ class BoucWen:
             print(model.admissible, model.response(np.linspace(0.0, 10.0, 100), step_s=1e-4)[-1])
             ```
         """
-        return self._advance(_from_rest(drive_v, step_s, "drive_v"), step_s, 0.0)[0]
+        return self._run(_from_rest(drive_v, step_s, "drive_v"), step_s)[0]
 
     def loop(self, amplitude_v: float, freq_hz: float, samples: int = 500) -> HysteresisLoop:
-        """The loop under a sine about the bias, once it repeats itself to 1e-6, or after 1000 periods.
+        """The loop under a sine about the bias, once it repeats itself to 1e-6, or after 1024 periods.
 
         Args:
             amplitude_v: Amplitude of the sine (V), above 0.
@@ -128,7 +130,7 @@ class BoucWen:
         Raises:
             ValueError: For numbers outside of these.
         """
-        return _settled(self._advance, 0.0, amplitude_v, freq_hz, samples)
+        return _settled(self._from_zero, amplitude_v, freq_hz, samples, self.rate_limit_v_s)
 
     def inverse(self, output_rad: ArrayLike, step_s: float) -> Floats:
         """Drive about the bias (V), shape (samples,), that makes the output.
@@ -151,7 +153,7 @@ class BoucWen:
         rate = np.clip(np.diff(drive, prepend=0.0) / step_s, -self.rate_limit_v_s, self.rate_limit_v_s)
         gain, offset = self.d1_rad_v * np.exp(-self.d2_s_v * rate), self.d1_rad_v * self.bias_v
         for _ in range(_INVERSIONS):
-            before, h = drive, self._advance(np.append(0.0, drive), step_s, 0.0)[1]
+            before, h = drive, self._run(np.append(0.0, drive), step_s)[1]
             drive = (wanted - h + offset) / gain - self.bias_v
             if np.max(np.abs(drive - before)) <= 1e-13 * np.max(np.abs(drive)):
                 return drive[1:]
@@ -161,9 +163,13 @@ class BoucWen:
             "inverse needs one above 0; fit it with admissible=True, or take a Prandtl-Ishlinskii model"
         )
 
-    def _advance(self, drive_v: Floats, step_s: float, h_rad: float) -> tuple[Floats, Floats, float, int]:
-        output, h, clamped = kernels.bouc_wen_response(drive_v, step_s, np.array(self.row), h_rad)
-        return output[1:], h[1:], float(h[-1]), clamped
+    def _from_zero(self, drive_v: Floats, step_s: float) -> tuple[Floats, Floats]:
+        return self._run(np.append(0.0, drive_v), step_s)
+
+    def _run(self, drive_v: Floats, step_s: float) -> tuple[Floats, Floats]:
+        """Output and h behind the first sample, which is rest."""
+        output, h, _ = kernels.bouc_wen_response(drive_v, step_s, np.array(self.row), 0.0)
+        return output[1:], h[1:]
 
     @property
     def admissible(self) -> bool:
@@ -291,6 +297,17 @@ class PrandtlIshlinskii:
     polynomial_rad: tuple[float, float, float] = (0.0, 0.0, 0.0)
     reach_v: float = math.inf
 
+    def __post_init__(self) -> None:
+        """Raises ValueError for thresholds that do not rise from 0 or above, and for weights that do not fit them."""
+        rising = all(a <= b for a, b in pairwise(self.thresholds_v))
+        if len(self.thresholds_v) != len(self.weights_rad_v) or not rising or min(self.thresholds_v, default=0.0) < 0.0:
+            raise ValueError(
+                f"thresholds {self.thresholds_v} V with {len(self.weights_rad_v)} weights make no Prandtl-Ishlinskii "
+                "operator: give thresholds that rise from 0 V or above, and a weight for each"
+            )
+        if not self.widening_s >= 0.0:
+            raise ValueError(f"thresholds cannot widen by {self.widening_s} s: give 0 s, or more for a rate")
+
     def response(self, drive_v: ArrayLike, step_s: float) -> Floats:
         """Output (rad), shape (samples,), from rest.
 
@@ -311,10 +328,10 @@ class PrandtlIshlinskii:
             print(model.response(model.inverse(loop.output_rad, step_s=2e-3), step_s=2e-3) - loop.output_rad)
             ```
         """
-        return self._advance(_from_rest(drive_v, step_s, "drive_v"), step_s, self._rest)[0]
+        return self._run(_from_rest(drive_v, step_s, "drive_v"), step_s)[0]
 
     def loop(self, amplitude_v: float, freq_hz: float, samples: int = 500) -> HysteresisLoop:
-        """The loop under a sine about the bias, once it repeats itself to 1e-6, or after 1000 periods.
+        """The loop under a sine about the bias, once it repeats itself to 1e-6, or after 1024 periods.
 
         Args:
             amplitude_v: Amplitude of the sine (V), above 0.
@@ -324,7 +341,7 @@ class PrandtlIshlinskii:
         Raises:
             ValueError: For numbers outside of these.
         """
-        return _settled(self._advance, self._rest, amplitude_v, freq_hz, samples)
+        return _settled(self._from_zero, amplitude_v, freq_hz, samples, self.rate_limit_v_s)
 
     def inverse(self, output_rad: ArrayLike, step_s: float) -> Floats:
         """Drive about the bias (V), shape (samples,), that makes the output; exact for an operator that does not widen.
@@ -337,7 +354,7 @@ class PrandtlIshlinskii:
             ValueError: For an output of another shape, a step not above 0, and what `inverted` refuses.
         """
         wanted = _from_rest(output_rad, step_s, "output_rad")
-        return self.inverted()._advance(wanted, step_s, self._rest)[0]
+        return self.inverted()._run(wanted, step_s)[0]
 
     def inverted(self) -> "PrandtlIshlinskii":
         """The inverse as an operator of the same kind: thresholds in rad, weights in V/rad.
@@ -372,19 +389,17 @@ class PrandtlIshlinskii:
             self.rate_limit_v_s * slow,
         )
 
-    def _advance(self, drive_v: Floats, step_s: float, plays: Floats) -> tuple[Floats, Floats, Floats, int]:
-        widening = np.array([self.widening_s, self.rate_limit_v_s])
-        states, clamped = kernels.widening_play_response(drive_v, step_s, np.array(self.thresholds_v), widening, plays)
-        s, (quadratic, signed, cubic) = (
-            np.clip(drive_v, -self.reach_v, self.reach_v) / self.reach_v,
-            self.polynomial_rad,
-        )
-        output = states @ np.array(self.weights_rad_v) + s * (quadratic * s + signed * np.abs(s) + cubic * s**2)
-        return output[1:], (output - slow_gain(self) * drive_v)[1:], states[-1], clamped
+    def _from_zero(self, drive_v: Floats, step_s: float) -> tuple[Floats, Floats]:
+        return self._run(np.append(0.0, drive_v), step_s)
 
-    @property
-    def _rest(self) -> Floats:
-        return np.zeros(len(self.thresholds_v))
+    def _run(self, drive_v: Floats, step_s: float) -> tuple[Floats, Floats]:
+        """Output, and what of it is not slow gain x drive, behind the first sample, which is rest."""
+        widening, rest = np.array([self.widening_s, self.rate_limit_v_s]), np.zeros(len(self.thresholds_v))
+        states, _ = kernels.widening_play_response(drive_v, step_s, np.array(self.thresholds_v), widening, rest)
+        quadratic, signed, cubic = self.polynomial_rad
+        s = np.clip(drive_v, -self.reach_v, self.reach_v) / self.reach_v
+        output = states @ np.array(self.weights_rad_v) + s * (quadratic * s + signed * np.abs(s) + cubic * s**2)
+        return output[1:], (output - slow_gain(self) * drive_v)[1:]
 
     @property
     def admissible(self) -> bool:

@@ -264,7 +264,9 @@ def _sheet(
             if all(isinstance(one, each) for one in result):
                 return several(result)
             result = next(one for one in result if not isinstance(one, each))
-    raise TypeError(f"{name}: cannot plot a {type(result).__name__}; give one of these: {', '.join(taken)}")
+    raise TypeError(
+        f"{name}: cannot plot what is of type {type(result).__name__}; give one of these: {', '.join(taken)}"
+    )
 
 
 # ------------------------------------------------------------------------------------------------------------- response
@@ -361,7 +363,7 @@ def _identified_bode(found: Identification) -> Sheet:
     if linear is None:
         raise ValueError(
             "plot_bode: the identification has no linear part; give identify_mirror a broadband recording (a chirp "
-            "or a multisine) among its recordings"
+            "or a multisine) and a model with such a part, such as models=('linear',)"
         )
     of = linear.response
     measured, half = 1e6 * of.response[:, 0, 0], 1e6 * half_width(of.standard_error[:, 0, 0])
@@ -418,7 +420,8 @@ def _errors(time_s: Floats, error_rad: Floats, steady: slice = slice(None)) -> S
 def _left_spectrum(runs: Ensemble) -> Sheet:
     if not np.all(np.isfinite(runs.psd_rad2_hz)):
         raise ValueError(
-            "plot_spectrum: these runs were made without a spectrum; simulate them with one (Case.spectrum)"
+            "plot_spectrum: these runs were made without a spectrum; simulate them from run 0 on, as a Case with "
+            "spectrum=True"
         )
     inner = slice(1, -1)  # neither the mean nor half the control rate
     freq = runs.freq_hz[inner]

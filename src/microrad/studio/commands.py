@@ -32,7 +32,8 @@ class Action:
 def budget(file: Path) -> Action:
     """The link budgets of a mission's file."""
     python = _joined(
-        "from microrad import load_link, run_link_study",
+        "from microrad.link.study import run_link_study",
+        "from microrad.mission.file import load_link",
         "from microrad.report.links.budgets import links_text",
         "",
         f"study = run_link_study(load_link({str(file)!r}))",
@@ -44,7 +45,9 @@ def budget(file: Path) -> Action:
 def contacts(file: Path) -> Action:
     """Contacts with the relay and the ground, and what they deliver."""
     python = _joined(
-        "from microrad import load_link, run_day_study, run_link_study",
+        "from microrad.link.study import run_link_study",
+        "from microrad.mission.file import load_link",
+        "from microrad.orbit.day import run_day_study",
         "from microrad.report.day.page import day_text",
         "",
         f"day = run_day_study(run_link_study(load_link({str(file)!r})))",
@@ -82,7 +85,8 @@ def study(file: Path, folder: Path) -> Action:
     python = _joined(
         "from pathlib import Path",
         "",
-        "from microrad import load_mission, run_study, verdict_text, write_report",
+        "from microrad import load_mission, run_study, write_report",
+        "from microrad.report import verdict_text",
         "",
         f"study = run_study(load_mission({str(file)!r}))",
         f"write_report(study, {_path(folder)})",
@@ -116,11 +120,12 @@ def _campaign(ledger: Path, function: str, arguments: str) -> str:
     return _joined(
         "from pathlib import Path",
         "",
-        f"from microrad import CampaignMeans, {function}, summarise_campaign",
+        f"from microrad.campaign.run import Means, {function}",
+        "from microrad.campaign.statistics.summary import summarise_campaign",
         "from microrad.report.campaign.text import campaign_text",
         "",
         f"ledger = {_path(ledger)}",
-        f"{function}({arguments}, CampaignMeans())",
+        f"{function}({arguments}, Means())",
         f"print(campaign_text(summarise_campaign(ledger), {_WIDTH}))",
     )
 
@@ -135,7 +140,7 @@ def campaign_report(ledger: Path, page: Path) -> Action:
     python = _joined(
         "from pathlib import Path",
         "",
-        "from microrad import summarise_campaign",
+        "from microrad.campaign.statistics.summary import summarise_campaign",
         "from microrad.report.campaign.page import campaign_page",
         "",
         f"text = campaign_page(summarise_campaign({_path(ledger)}))",

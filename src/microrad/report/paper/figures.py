@@ -87,11 +87,11 @@ def margin_sheet(f: MarginMap, m: LinkMission, left: tuple[float, str] | None = 
     levels = np.arange(-12.0, 19.0, 3.0)
     panel.add(Field(rate, error, f.margin_db.T, levels[0], levels[-1], "link margin (dB)", levels))
     _band(panel, rate, error, np.stack(list(f.by_reading.values())), required_db)
-    for level in (0.0, required_db):
+    for part, level in ((2, 0.0), (3, required_db)):  # of five along the contour, so that the words stand apart
         x, y = contour(rate, error, f.margin_db.T, level)
         panel.add(Line(x, y, WHITE, name=f"{level:g} dB"))
         if (at := np.flatnonzero(np.isfinite(x) & (y > 0.02 * error[-1]))).size:
-            place = at[at.size // 2]
+            place = at[part * at.size // 5]
             panel.add(Words(f"{level:g} dB", x[place], y[place], WHITE, anchor="end", shift=(-3.0, -4.0)))
     rate_mbit = m.communication.data_rate_bit_s * 1e-6
     budgeted, allowed = "budget" if m.jitter is None else "static error", m.communication.pointing_error_rad * 1e6

@@ -1,1 +1,1 @@
-"""Figures as data, and their two forms: a static picture, and what the page's script draws."""
+"""Figures as data, and their three forms: a static picture, what the page's script draws, and matplotlib's axes."""

@@ -12,7 +12,7 @@ from microrad.core.installing import advice
 from microrad.report.plotting import scales
 from microrad.report.plotting.layout import INCH, LEAST_MARKER, SWATCH, SWATCH_GAP, Key, Layout, Placed, layout
 from microrad.report.plotting.palette import BLACK, CIVIDIS, WHITE
-from microrad.report.plotting.sheet import Area, Axis, Bars, Dash, Field, Line, Rule, Sheet, Span, Words
+from microrad.report.plotting.sheet import Area, Axis, Bars, Dash, Ends, Field, Line, Rule, Sheet, Span, Words
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -102,7 +102,9 @@ def _given(sheet: Sheet, axes: Any) -> list[Axes]:
 # --------------------------------------------------------------------------------------------------------------- panels
 def _panel(ax: Axes, of: Placed) -> None:
     """Scales, marks and limits of a panel."""
-    panel, before = of.panel, (ax.get_xlim(), ax.get_ylim()) if ax.has_data() else None
+    panel = of.panel
+    x_before = ax.get_xlim() if ax.has_data() and not ax.get_autoscalex_on() else None
+    y_before = ax.get_ylim() if ax.has_data() and not ax.get_autoscaley_on() else None
     if panel.x.log:
         ax.set_xscale("log")
     if panel.y.log:
@@ -113,17 +115,30 @@ def _panel(ax: Axes, of: Placed) -> None:
         ax.set_aspect("equal")
     for mark in panel.marks:
         _MAKERS[type(mark)](ax, of, mark)
+    ax.set_autoscalex_on(x_before is not None or ax.get_autoscalex_on())
+    ax.set_autoscaley_on(y_before is not None or ax.get_autoscaley_on())
     ax.autoscale_view()
-    ax.set_xlim(*_ends(panel.x, before and before[0]))
-    ax.set_ylim(*_ends(panel.y, before and before[1]))
+    if (ends := _ends(panel.x, ax.get_xlim(), x_before)) is not None:
+        ax.set_xlim(*ends)
+    if (ends := _ends(panel.y, ax.get_ylim(), y_before)) is not None:
+        ax.set_ylim(*ends)
 
 
-def _ends(axis: Axis, before: tuple[float, float] | None) -> tuple[float | None, float | None]:
-    """The limits that an axis sets, widened to those that showed other data before; None for those of the data."""
-    low, high = (None if end is None or (axis.log and end <= 0.0) else end for end in (axis.low, axis.high))
-    if before is None or (low is not None and high is not None and low > high):
+def _ends(axis: Axis, now: Ends, before: Ends | None) -> Ends | None:
+    """The limits that an axis sets, widened to those that were fixed for other data before; None where it sets none.
+
+    Args:
+        axis: of the sheet; the end that it does not set is that of the data.
+        now: limits of the data.
+        before: those that were fixed before, if any.
+    """
+    given = [None if end is None or (axis.log and end <= 0.0) else end for end in (axis.low, axis.high)]
+    if given == [None, None] and before is None:
+        return None
+    low, high = (found if end is None else end for end, found in zip(given, now, strict=True))
+    if before is None or low > high or before[0] > before[1]:
         return low, high
-    return None if low is None else min(low, before[0]), None if high is None else max(high, before[1])
+    return min(low, before[0]), max(high, before[1])
 
 
 def _ticks_and_titles(ax: Axes, of: Placed, drawn: Sequence[Axes]) -> None:

@@ -1,0 +1,103 @@
+"""One call from a recording to a hysteresis model with its errors, and to a measured response."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from microrad.lab.identify import IdentificationError, fit_hysteresis, measure_frequency_response
+from microrad.lab.identify.hysteresis.alone import STATIC_FORMS
+from microrad.lab.recording import recording_from_arrays
+from microrad.mirror.hysteresis import BoucWen, Creep, PrandtlIshlinskii
+
+RATE = 10e3
+TIME = np.arange(6000) / RATE
+DRIVE = 30.0 + 5.0 * np.sin(2 * np.pi * 10 * TIME) * np.linspace(0.2, 1.0, TIME.size)
+NOISE = 1e-7 * np.random.default_rng(1).standard_normal(TIME.size)
+BOUC_WEN = BoucWen(50e-6, 0.0, -2e-6, 4e-4, 0.3, 0.1, rate_limit_v_s=2000.0, bias_v=30.0)
+PLAYS = PrandtlIshlinskii((0.0, 1.0, 2.0), (40e-6, 6e-6, 4e-6))
+
+
+def recorded(output):
+    return recording_from_arrays(DRIVE, output, RATE)
+
+
+def test_the_parameters_of_a_known_model_come_back_within_their_errors():
+    fit = fit_hysteresis(recorded(BOUC_WEN.response(DRIVE - 30.0, 1 / RATE) + NOISE))
+    truth = {"d1": 50e-6, "d2": 0.0, "epsilon": -2e-6, "delta": 4e-4, "alpha": 0.3, "beta": 0.1}
+    assert fit.values.keys() == truth.keys() == fit.standard_errors.keys()
+    for name, value in truth.items():
+        assert abs(fit.values[name] - value) < 4.5 * fit.standard_errors[name], name
+    assert fit.standard_errors["d1"] < 1e-3 * 50e-6
+    assert fit.bias_v == 30.0 and fit.admissible and fit.samples == 5700
+    left = fit.response(DRIVE, 1 / RATE) - BOUC_WEN.response(DRIVE - 30.0, 1 / RATE)
+    assert np.std(left) < 0.2e-7
+
+
+@pytest.mark.parametrize("name", [form for form in STATIC_FORMS if form.startswith("prandtl")])
+def test_plays_follow_a_mirror_of_plays(name):
+    fit = fit_hysteresis(recorded(PLAYS.response(DRIVE - 30.0, 1 / RATE) + NOISE), name)
+    assert fit.residual_rms_percent < 0.05
+    assert isinstance(fit.model, PrandtlIshlinskii)
+    assert_allclose(sum(fit.model.weights_rad_v), 50e-6, rtol=0.05 if "creep" in name else 3e-3)
+    assert (fit.creep.weights_rad_v != ()) == ("creep" in name)
+    assert all(key.startswith(("weight at ", "widening", "creep at ")) for key in fit.values)
+
+
+def test_creep_is_told_from_hysteresis():
+    dwell = np.repeat([0.0, 3.0, 6.0, 3.0, 0.0, -3.0, 0.0], 2000)
+    drive = np.convolve(dwell, np.ones(50) / 50, mode="same")
+    creep = Creep((2e-6, 2e-6), (0.1, 1.0))
+    output = PLAYS.response(drive, 1e-3) + creep.response(drive, 1e-3)
+    noise = 1e-7 * np.random.default_rng(2).standard_normal(drive.size)
+    fit = fit_hysteresis(recording_from_arrays(drive, output + noise, 1e3), "prandtl_ishlinskii_creep")
+    found = dict(zip(fit.creep.time_constants_s, fit.creep.weights_rad_v, strict=True))
+    assert found[0.1] == pytest.approx(2e-6, rel=0.25) and found[1.0] == pytest.approx(2e-6, rel=0.25)
+
+
+def test_units_and_several_recordings():
+    loop = PLAYS.response(DRIVE - 30.0, 1 / RATE) + NOISE
+    halves = [recording_from_arrays(1e3 * d, 1e6 * y, RATE) for d, y in ((DRIVE, loop), (DRIVE, loop + 5e-6))]
+    fit = fit_hysteresis(halves, "prandtl_ishlinskii", input_unit="mV", output_unit="urad")
+    assert_allclose(sum(fit.model.weights_rad_v), 50e-6, rtol=3e-3)
+    assert fit.bias_v == pytest.approx(30.0)
+
+
+def test_models_that_are_none_are_refused():
+    with pytest.raises(
+        IdentificationError, match="no hysteresis model is called 'preisach'; there are bouc_wen, prandtl"
+    ):
+        fit_hysteresis(recorded(DRIVE * 1e-6), "preisach")
+
+
+def test_a_measured_response_holds_the_truth_within_its_errors():
+    rng = np.random.default_rng(1)
+    drive = rng.standard_normal(20_000)
+    taps = np.array([0.0, 0.4, 0.3, 0.2, 0.1])
+    output = np.convolve(drive, taps)[:20_000] + 0.05 * rng.standard_normal(20_000)
+    measured = measure_frequency_response(recording_from_arrays(drive, output, RATE))
+    truth = np.exp(-2j * np.pi * np.outer(measured.freq_hz / RATE, np.arange(5))) @ taps
+    score = np.abs(measured.response[:, 0, 0] - truth) / measured.standard_error[:, 0, 0]
+    assert 0.5 < np.sqrt(np.mean(score**2)) < 1.5
+    narrow = measure_frequency_response([recording_from_arrays(drive, output, RATE)], band_hz=(100.0, 1000.0), bands=20)
+    assert narrow.freq_hz[0] > 100.0 and narrow.freq_hz[-1] < 1000.0
+
+
+def test_periods_are_averaged_and_cut_to_a_band():
+    lines = np.arange(1, 200)
+    phases = np.random.default_rng(3).uniform(0, 2 * np.pi, lines.size)
+    one = np.sum(np.cos(2 * np.pi * np.outer(np.arange(1000) / 1000, lines) + phases), axis=1)
+    drive = np.tile(one, 6)
+    output = 0.5 * np.roll(drive, 1) + 1e-3 * np.random.default_rng(4).standard_normal(drive.size)
+    periodic = recording_from_arrays(drive, output, 1000.0, period_samples=1000)
+    whole = measure_frequency_response(periodic)
+    assert_allclose(np.abs(whole.response[:, 0, 0]), 0.5, rtol=0.02)
+    cut = measure_frequency_response(periodic, band_hz=(20.0, 50.0))
+    inside = (whole.freq_hz >= 20.0) & (whole.freq_hz <= 50.0)
+    assert_allclose(cut.response, whole.response[inside], rtol=1e-12)
+    assert cut.standard_error.shape == cut.response.shape and 0 < cut.freq_hz.size < whole.freq_hz.size
+    with pytest.raises(IdentificationError, match=r"no excited line lies between 900 and 950 Hz; widen the band"):
+        measure_frequency_response(periodic, band_hz=(900.0, 950.0))
+    with pytest.raises(IdentificationError, match="some recordings state their period and others do not"):
+        measure_frequency_response([periodic, recording_from_arrays(drive, output, 1000.0)])
+    with pytest.raises(IdentificationError, match="no recording was given"):
+        measure_frequency_response([])

@@ -1,0 +1,55 @@
+"""Links and searches by numbers alone: beside power densities by hand and drawn targets."""
+
+import math
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from microrad.link.acquisition.detection import simulate_scan
+from microrad.link.acquisition.scan import Detector, Search, Spiral, highest_speed
+from microrad.link.by_numbers import received_power, scan_times
+
+
+def test_received_power_is_power_density_times_area():
+    power = received_power(1.0, 8e-6, 45e6, 0.25, 1064e-9, pointing_error_rad=3e-6, losses_db={"optics": 2.0})
+    density = 2.0 / (math.pi * (8e-6 * 45e6) ** 2) * math.exp(-2 * (3 / 8) ** 2)
+    watt = density * math.pi * 0.25**2 / 4 * 10**-0.2
+    assert_allclose(power.received_dbm, 10 * math.log10(watt / 1e-3), rtol=1e-12)
+    assert_allclose(power.margin_db(-40.0), power.received_dbm + 40.0)
+    assert [line.name for line in power.lines][-1] == "optics" and power.lines[-1].value == -2.0
+    assert power.warnings == ()
+    (near,) = received_power(1.0, 8e-6, 1e3, 0.25, 1064e-9).warnings
+    assert near.startswith("Transmit gain: the far field of this beam begins at")
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"power_w": 0.0}, "the power"),
+        ({"half_angle_rad": -1e-6}, "the half angle"),
+        ({"distance_m": math.inf}, "the distance"),
+        ({"aperture_m": 0.0}, "the receiving aperture"),
+        ({"wavelength_m": math.nan}, "the wavelength"),
+        ({"pointing_error_rad": -1e-6}, "the pointing error"),
+        ({"losses_db": {"optics": -2.0}}, "the loss 'optics'.*a loss is positive"),
+    ],
+)
+def test_numbers_without_meaning_are_refused(changes, said):
+    given = {"power_w": 1.0, "half_angle_rad": 8e-6, "distance_m": 45e6, "aperture_m": 0.25, "wavelength_m": 1064e-9}
+    with pytest.raises(ValueError, match=said):
+        received_power(**given | changes)
+
+
+def test_times_of_a_scan_are_those_of_drawn_targets():
+    times = scan_times(100e-6, 20e-6, 5e-3, detection_probability=0.9, jitter_rms_rad=2e-6)
+    search = Search(100e-6, 20e-6, 0.2, 0.99)
+    scan = Spiral(search, Detector(5e-3, 0.9), 0.9 * highest_speed(search, 5e-3))
+    still = scan_times(100e-6, 20e-6, 5e-3)
+    drawn = simulate_scan(Spiral(search, Detector(5e-3), scan.speed_rad_s), 4000, seed=1)
+    share = float(np.mean(drawn.detected))
+    assert abs(share - still.probability) < 4.5 * math.sqrt(share * (1 - share) / 4000) + 2e-3
+    assert_allclose(np.mean(drawn.time_s[drawn.detected]), still.mean_s, rtol=0.08)
+    assert times.probability < still.probability
+    with pytest.raises(ValueError, match=r"the overlap.*never lit long enough"):
+        scan_times(100e-6, 20e-6, 5e-3, overlap=0.0)

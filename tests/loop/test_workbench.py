@@ -1,0 +1,157 @@
+"""A loop by itself, without a mission: beside linear theory, the paper's loop, and one axis beside two."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from microrad import mirror as mirrors
+from microrad.core import lti
+from microrad.loop import control, sine_run
+from microrad.loop.disturbance import fit_spectrum
+from microrad.loop.workbench import Controller, Loop, tune
+from microrad.mirror.hysteresis import PrandtlIshlinskii
+from microrad.mirror.model import Mirror
+
+LINEAR_PART = ([1.0], [1 / 6000**2, 2 * 0.05 / 6000, 1.0])
+STRAIGHT = Mirror.of(50e-6, *LINEAR_PART, name="straight")
+PLAYS = PrandtlIshlinskii((0.0, 1.0, 3.0), (40e-6, 6e-6, 4e-6))
+BENT = Mirror.of(PLAYS, *LINEAR_PART)
+FREQ_HZ = np.geomspace(0.1, 1000, 100)
+VIBRATION = fit_spectrum(FREQ_HZ, 160e-12 / (1 + FREQ_HZ**2), convention="radial")
+LOOP = Loop(mirror=STRAIGHT, rate_hz=10e3, vibration=VIBRATION, sensor_noise_rad=0.2e-6, delay_s=20e-6)
+SLOW = Controller.pid(0.0, 5e6, rate_hz=10e3)
+
+
+def test_runs_scatter_as_linear_theory_says():
+    runs = LOOP.ensemble(SLOW, runs=64, duration_s=1.0, settle_s=0.3)
+    theory = LOOP.residual_rms_rad(SLOW)
+    squares = np.sum(runs.rms_rad**2, axis=1)
+    spread = np.std(squares, ddof=1) / np.sqrt(squares.size)
+    assert abs(np.mean(squares) - theory[0] ** 2) < 4.5 * spread
+    assert spread < 0.05 * theory[0] ** 2
+    louder = replace(LOOP, sensor_noise_rad=2e-6).residual_rms_rad(SLOW)
+    assert louder[0] > 1.005 * theory[0]
+
+
+def test_margins_are_those_of_a_dense_nyquist_curve():
+    margins = LOOP.margins(SLOW)
+    plant = control.sampled_path(STRAIGHT.linear_loop, LOOP.parts.drive, LOOP.parts.timing)
+    freq = np.geomspace(1.0, 4999.0, 200_000)
+    L = lti.frequency_response(lti.series(SLOW.system, plant), freq, 1e-4)[:, 0, 0]
+    assert_allclose(margins.modulus, np.min(np.abs(1 + L)), rtol=1e-4)
+    assert margins.modulus < 0.999
+
+
+def test_a_run_follows_its_reference_as_the_papers_loop_does():
+    """Both kernels run the same loop: PID, hysteresis, a delay and an amplifier with limits."""
+    wanted = 100e-6 * np.sin(2 * np.pi * 20 * 1e-4 * np.arange(1500))[:, None]
+    loop = Loop(
+        mirror=BENT,
+        rate_hz=10e3,
+        delay_s=20e-6,
+        drive_range_v=(-1.5, 1.5),
+        amplifier_bandwidth_hz=2e3,
+        slew_v_s=2000.0,
+    )
+    run = loop.simulate(SLOW, 0.15, reference_rad=wanted[:, 0])
+    drive = control.Drive(-1.5, 1.5, 2e3, 2000.0, 0.0, 0.0)
+    setup = sine_run.Setup(drive, control.Timing(1e-4, 10, 2), SLOW.system)
+    other = sine_run.track("", BENT, setup, control.no_feedforward(BENT), wanted, slice(0, None))
+    assert_allclose(run.reference_rad, wanted, rtol=0, atol=0)
+    assert_allclose(run.error_rad, other.error_rad, rtol=0, atol=1e-9 * np.ptp(other.error_rad))
+    assert other.counts.saturated > 0
+    assert np.max(np.abs(loop.simulate(SLOW, 0.15).error_rad)) == 0.0
+
+
+@pytest.mark.parametrize("kind", ["PI", "PI + notch", "LQG"])
+def test_a_tuned_controller_keeps_its_margin_and_beats_what_was_there(kind):
+    tuned = tune(LOOP, kind, modulus_margin=0.55)
+    assert tuned.margins.modulus >= 0.55
+    assert_allclose(LOOP.margins(tuned.controller).modulus, tuned.margins.modulus, rtol=1e-12)
+    assert 0.0 < tuned.residual_rms_rad[0] < LOOP.residual_rms_rad(SLOW)[0]
+    looser = tune(LOOP, kind, modulus_margin=0.4)
+    assert looser.residual_rms_rad[0] <= tuned.residual_rms_rad[0] * (1 + 1e-6)
+
+
+def test_two_axes_that_leave_each_other_alone_are_tuned_as_one():
+    two = replace(LOOP, mirror=mirrors.combine(STRAIGHT, STRAIGHT))
+    one, both = tune(LOOP, "LQG"), tune(two, "LQG")
+    assert_allclose(both.residual_rms_rad, np.repeat(one.residual_rms_rad, 2), rtol=1e-4)
+    shaped = tune(two, "H-infinity")
+    assert shaped.margins.modulus >= 0.5 and np.all(shaped.residual_rms_rad > both.residual_rms_rad)
+    pid = Controller.pid(0.0, 5e6, rate_hz=10e3, axes=2)
+    assert_allclose(two.residual_rms_rad(pid), np.repeat(LOOP.residual_rms_rad(SLOW), 2), rtol=1e-9)
+
+
+def test_optics_turn_the_outputs_into_line_of_sight():
+    doubled = replace(LOOP, optics=[[2.0]])
+    half = Controller.pid(0.0, 2.5e6, rate_hz=10e3)
+    assert_allclose(doubled.margins(half).modulus, LOOP.margins(SLOW).modulus, rtol=1e-9)
+
+
+def test_damping_reads_the_gauge():
+    gauged = replace(LOOP, gauge_noise_rad=0.05e-6)
+    assert tune(gauged, "resonant damping").residual_rms_rad[0] < tune(LOOP, "PI").residual_rms_rad[0]
+    with pytest.raises(ValueError, match="gauge"):
+        tune(LOOP, "resonant damping")
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"rate_hz": 0.0}, "rate_hz of a loop is 0.0: give a number above 0"),
+        ({"slew_v_s": -1.0}, "slew_v_s of a loop is -1.0"),
+        ({"steps_per_sample": 0}, "0 plant steps a sample: give 1 or more"),
+        ({"drive_range_v": (1.0, 2.0)}, "rest, 0 V, has to lie inside"),
+        ({"delay_s": 13e-6}, "delay_s of a loop is 1.3e-05 s, no whole number of plant steps of 1e-05 s"),
+        ({"delay_s": -1e-5}, "delay_s of a loop is -1e-05 s: give a finite number"),
+        ({"sensor_delay_s": 13e-6}, "sensor_delay_s of a loop is"),
+        ({"sensor_noise_rad": -1.0}, "noise_rad"),
+        ({"optics": [[1.0, 2.0]]}, r"optics of a loop has shape \(1, 2\): give finite numbers of shape \(axes, 1\)"),
+        ({"optics": [[1.0], [1.0]], "gauge_noise_rad": 1e-7}, "one line-of-sight angle for each output"),
+    ],
+)
+def test_a_loop_that_cannot_be_is_refused(changes, said):
+    with pytest.raises(ValueError, match=said):
+        replace(LOOP, **changes)
+
+
+def test_what_does_not_fit_a_loop_is_refused():
+    with pytest.raises(
+        ValueError, match=r"controller 'PID' has 2 inputs, 2 outputs .* a loop of 1 axes takes an error"
+    ):
+        LOOP.margins(Controller.pid(0.0, 1e6, rate_hz=10e3, axes=2))
+    with pytest.raises(ValueError, match=r"reference_rad has shape \(3, 2\): give finite samples of shape"):
+        LOOP.simulate(SLOW, 0.1, reference_rad=np.zeros((3, 2)))
+    with pytest.raises(ValueError, match="makes the loop unstable"):
+        LOOP.margins(Controller.pid(1e6, rate_hz=10e3))
+    with pytest.raises(ValueError, match=r"'H-infinity' cannot be tuned for a loop of one axis: choose one of PI"):
+        tune(LOOP, "H-infinity")
+    with pytest.raises(ValueError, match=r"modulus_margin is 1\.5: give a number above 0 and below 1"):
+        tune(LOOP, "PI", modulus_margin=1.5)
+    with pytest.raises(ValueError, match="has no vibration, so that no controller is best"):
+        tune(replace(LOOP, vibration=()), "PI")
+    with pytest.raises(ValueError, match="make no PID: give finite ones"):
+        Controller.pid(np.nan, rate_hz=1e3)
+    with pytest.raises(ValueError, match="a PID of 1 axes at 0 Hz"):
+        Controller.pid(1.0, rate_hz=0)
+    with pytest.raises(ValueError, match="an ensemble of 0 runs"):
+        LOOP.ensemble(SLOW, 0, 0.1)
+
+
+def test_a_mirror_of_parts_answers_and_refuses():
+    time_s = 1e-5 * np.arange(3000)
+    drive = 5.0 * np.sin(2 * np.pi * 50 * time_s)
+    static = Mirror.of(PLAYS)
+    assert_allclose(static.response(drive, 1e-5), PLAYS.response(drive, 1e-5), rtol=0, atol=1e-12 * 250e-6)
+    response = STRAIGHT.frequency_response([0.0, 6000 / 2 / np.pi])[:, 0, 0]
+    assert_allclose(response, [50e-6, -500e-6j], rtol=1e-9, atol=1e-12)
+    both = mirrors.combine(STRAIGHT, BENT).response(np.column_stack([drive, drive]), 1e-5)
+    assert_allclose(both[:, 1], BENT.response(drive, 1e-5), rtol=0, atol=1e-12 * np.ptp(both))
+    with pytest.raises(ValueError, match=r"drive_v has shape \(3000, 2\): mirror 'straight' takes finite samples"):
+        STRAIGHT.response(np.column_stack([drive, drive]), 1e-5)
+    for numerator, denominator in (([1.0, 0.0, 0.0], [1.0, 1.0]), ([1.0], [1.0, -1.0]), ([1.0, 0.0], [1.0, 2.0, 3.0])):
+        with pytest.raises(ValueError, match="give one that is proper and stable"):
+            Mirror.of(1e-6, numerator, denominator)

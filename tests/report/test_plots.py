@@ -1,0 +1,508 @@
+"""Plots on matplotlib's axes: they show what the sheet has, with units, on the axes that are given; and refusals."""
+
+import math
+import re
+import subprocess
+import sys
+from dataclasses import replace
+
+import matplotlib as mpl
+
+mpl.use("Agg")
+
+import numpy as np
+import pytest
+from matplotlib import pyplot
+from matplotlib.axes import Axes
+from numpy.testing import assert_allclose, assert_array_equal
+
+from microrad.core import lti
+from microrad.lab.identify import fit_frequency_response, identify, response_from_records
+from microrad.lab.recording import recording_from_arrays
+from microrad.loop import disturbance
+from microrad.loop.control import AxisController, Drive, Timing
+from microrad.loop.disturbance import Disturbance, Reference, SpectralLine
+from microrad.loop.pointing_loop import ensemble, traces
+from microrad.loop.pointing_loop import loop as fine
+from microrad.loop.sensor import OpticalSensor
+from microrad.mirror import model as mirror
+from microrad.mirror.hysteresis import BoucWen
+from microrad.report import plots
+from microrad.report.plotting import axes as renderer
+from microrad.report.plotting import interactive, svg
+from microrad.report.plotting.axes import axes_of
+from microrad.report.plotting.layout import layout
+from microrad.report.plotting.sheet import Area, Axis, Bars, Field, Legend, Line, Rule, Span, Words, empty, grid
+from places import ROOT
+from response_tables import TABLES
+from shared import once
+from shipped import plain_study
+from truths import behind_resonance, philox, plays
+
+RATE_HZ = 2000.0
+URAD = 1e-6
+DOLLARS = "$x_^2$ \\frac .csv"
+PAGE = (ROOT / "docs" / "plots.md").read_text(encoding="utf-8")
+
+
+@pytest.fixture(autouse=True)
+def closed():
+    yield
+    pyplot.close("all")
+
+
+# -------------------------------------------------------------------------------------------------------------- results
+def chirp(seconds=2.0):
+    t = np.arange(round(seconds * RATE_HZ)) / RATE_HZ
+    drive = 0.2 * np.sin(2 * np.pi * seconds / math.log(600.0) * (600.0 ** (t / seconds) - 1))
+    output = 0.07 * behind_resonance(drive, RATE_HZ, held=True)
+    output = output + 0.01 * np.std(output) * philox(9).standard_normal(output.size)
+    return recording_from_arrays(drive, output, RATE_HZ, "chirp.csv")
+
+
+def identified(with_chirp):
+    """Two play operators behind the resonance, mrad over V."""
+    drive = 6 - 6 * np.cos(2 * np.pi * 10.0 * np.arange(800) / RATE_HZ)
+    output = behind_resonance(plays(drive, [0.0, 1.0], [0.06, 0.03], rate_hz=RATE_HZ), RATE_HZ, held=True)
+    output = output + 1e-3 * philox(1).standard_normal(output.size)
+    loop = recording_from_arrays(drive, output, RATE_HZ, DOLLARS)
+    return identify(
+        [loop, chirp()] if with_chirp else [loop], models=("prandtl_ishlinskii", "linear")[: 2 if with_chirp else 1]
+    )
+
+
+def loop_of_two_axes():
+    """A mirror that is a gain, two axes of it, under a vibration and an integral controller."""
+    one = mirror.assemble("gain", "static", None, BoucWen(1e-4, 0.0, 0.0, 0.0, 0.0, 0.0))
+    loop = fine.PointingLoop(
+        mirror=mirror.combine(one, one),
+        optics=np.eye(2),
+        drive=Drive(-math.inf, math.inf, math.inf, math.inf, 0.0, 0.0),
+        timing=Timing(1e-3, 1, 0),
+        disturbances=((disturbance.olympus(),),) * 2,
+        optical=OpticalSensor(URAD, math.inf, 0.0, 1, 0),
+        gauge=None,
+        references=(Reference(0.0, 0.0, 1.0),) * 2,
+    )
+    gain, none = np.array([[3000.0]]), np.zeros((1, 1))
+    axis = AxisController(
+        "integral", lti.StateSpace(np.eye(1), np.hstack([gain, none]), np.eye(1), np.hstack([gain, none])), np.eye(1)
+    )
+    return fine.without_hysteresis(loop), fine.assemble("integral", loop, axis)
+
+
+def shaken(*lines):
+    return disturbance.combine(
+        disturbance.olympus(),
+        Disturbance("wheel", np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), lines, "assumed", "a test"),
+    )
+
+
+def table(inputs):
+    return next(each for each in (make() for make in TABLES) if each.response.shape[1:] == (inputs, inputs))
+
+
+def fitted(inputs):
+    t = table(inputs)
+    return fit_frequency_response(t.freq_hz, t.response, t.order, standard_error=t.standard_error)
+
+
+def runs():
+    loop, controller = loop_of_two_axes()
+    return ensemble.simulate(loop, controller, ensemble.Span(3.0, 0.5, 1), 4)
+
+
+def run():
+    return traces.trace(*loop_of_two_axes(), ensemble.Span(0.6, 0.1, 1))
+
+
+RESULTS = {
+    "fit": lambda: fitted(1),
+    "fit of several": lambda: fitted(2),
+    "response": lambda: response_from_records([chirp()]),
+    "identification": lambda: once("identification that is plotted", lambda: identified(True)),
+    "runs": runs,
+    "run": run,
+    "sine": lambda: plain_study().residual,
+    "sine's trace": lambda: plain_study().residual.trace,
+    "vibration": lambda: shaken(SpectralLine(2e-6, 40.0), SpectralLine(1e-6, 80.0)),
+    "loop": lambda: plain_study().loops[0],
+    "loops": lambda: plain_study().loops,
+    "study": plain_study,
+    "links": lambda: plain_study().links,
+    "day": lambda: plain_study().day,
+    "contacts": lambda: plain_study().day.relay.contacts,
+}
+KNOWN = {}
+PLOTS = [
+    ("plot_bode", "fit", 2),
+    ("plot_bode", "fit of several", 8),
+    ("plot_bode", "response", 2),
+    ("plot_bode", "identification", 2),
+    ("plot_loops", "loop", 2),
+    ("plot_loops", "loops", 2),
+    ("plot_loops", "identification", 2),
+    ("plot_residual", "identification", 1),
+    ("plot_residual", "fit", 1),
+    ("plot_residual", "fit of several", 4),
+    ("plot_residual", "sine", 1),
+    ("plot_residual", "sine's trace", 1),
+    ("plot_residual", "run", 1),
+    ("plot_spectrum", "runs", 2),
+    ("plot_spectrum", "vibration", 2),
+    ("plot_margin_map", "study", 1),
+    ("plot_margin_map", "links", 1),
+    ("plot_contacts", "day", 1),
+    ("plot_contacts", "contacts", 1),
+]
+
+
+def result(name):
+    if name not in KNOWN:
+        KNOWN[name] = RESULTS[name]()
+    return KNOWN[name]
+
+
+def listed(drawn):
+    return [drawn] if isinstance(drawn, Axes) else list(drawn)
+
+
+def one_line(text):
+    return " ".join(text.split())
+
+
+# ------------------------------------------------------------------------------------------------------ what they show
+@pytest.fixture
+def sheets(monkeypatch):
+    """The sheets that are drawn."""
+    seen = []
+    monkeypatch.setattr(plots, "axes_of", lambda sheet, axes: seen.append(sheet) or axes_of(sheet, axes))
+    return seen
+
+
+@pytest.mark.parametrize(("plot", "name", "panels"), PLOTS)
+def test_the_axes_show_what_the_sheet_has_with_its_units(sheets, plot, name, panels):
+    drawn = getattr(plots, plot)(result(name))
+    (sheet,) = sheets
+    assert isinstance(drawn, Axes) == (panels == 1)
+    assert len(listed(drawn)) == len(sheet.panels) == panels
+    (figure,) = {ax.figure for ax in listed(drawn)}
+    assert tuple(figure.get_size_inches()) == (sheet.width, sheet.height)
+    for ax, of in zip(listed(drawn), layout(sheet).placed, strict=True):
+        panel = of.panel
+        rules = len(panel.all_of(Rule))
+        lines = [line for line in ax.lines if line.get_transform() == ax.transData]
+        assert len(ax.lines) == len(lines) + rules
+        for line, mark in zip(lines, panel.all_of(Line), strict=True):
+            assert_array_equal(line.get_xdata(), mark.x)
+            assert_array_equal(line.get_ydata(), mark.y)
+            assert mpl.colors.same_color(line.get_color(), mark.colour)
+        assert sum(len(each.patches) for each in ax.containers) == sum(bars.at.size for bars in panel.all_of(Bars))
+        assert sorted(text.get_text() for text in ax.texts) == sorted(words.text for words in panel.all_of(Words))
+        assert (ax.get_xscale() == "log", ax.get_yscale() == "log") == (panel.x.log, panel.y.log)
+        for title, expected, shown in (
+            (ax.get_xlabel(), of.x_title, of.x_shown),
+            (ax.get_ylabel(), of.y_title, of.y_shown),
+        ):
+            assert one_line(title) == (one_line(expected) if shown else "")
+            assert not title or title.endswith(")") or title.startswith("hours since"), title
+        assert ax.title.get_text().replace("\n", " ") == panel.title
+    figure.canvas.draw()
+
+
+@pytest.mark.parametrize(("plot", "name", "panels"), PLOTS)
+def test_given_axes_are_drawn_on_and_given_back_and_no_figure_is_made(plot, name, panels):
+    figure, given = pyplot.subplots(panels, 1, figsize=(3.5, 2.0 * panels), layout="constrained", squeeze=False)
+    other = pyplot.figure()
+    before = pyplot.get_fignums()
+    drawn = listed(getattr(plots, plot)(result(name), given[0, 0] if panels == 1 else given))
+    assert pyplot.get_fignums() == before and pyplot.gcf() is other and not other.axes
+    assert len(drawn) == panels and all(a is b for a, b in zip(drawn, given.ravel(), strict=True))
+    beside = 1 if plot == "plot_margin_map" else 0  # the colour bar
+    assert len(figure.axes) == panels + beside
+    assert all(ax.has_data() and ax.get_xlabel() for ax in drawn)
+    assert not figure.legends
+    figure.canvas.draw()
+
+
+def test_a_bode_plot_shows_the_table_the_model_and_its_confidence():
+    fit, t = result("fit"), table(1)
+    size, phase = plots.plot_bode(fit)
+    dots, model = size.lines
+    assert_allclose(dots.get_ydata(), np.abs(t.response[:, 0, 0]), rtol=1e-12)
+    assert_allclose(model.get_ydata(), np.abs(fit.response(model.get_xdata())[:, 0, 0]), rtol=1e-12)
+    assert set(t.freq_hz) <= set(model.get_xdata())
+    turned = np.radians(phase.lines[0].get_ydata())
+    assert_allclose(np.exp(1j * turned), t.response[:, 0, 0] / np.abs(t.response[:, 0, 0]), atol=1e-9)
+    assert [text.get_text() for text in size.get_legend().get_texts()] == [
+        "measured",
+        "95 % confidence of the model",
+        f"model, order {fit.order}",
+    ]
+    (band,) = size.patches
+    (corners,) = (path.vertices for path in [band.get_path()])
+    assert corners[:, 1].max() > model.get_ydata().max()
+
+
+def test_the_confidence_of_a_model_is_that_of_its_gain_and_what_draws_of_noise_do():
+    fit, t = result("fit"), table(1)
+    along, across = plots.model_spread(fit, np.array([fit.band_hz[0]]))
+    assert_allclose(along[0] / 1.96, fit.known.edge_gain_error, rtol=1e-6)
+    freq = np.array([20.0, 120.0, 500.0])
+    along, across = (each[:, 0, 0] / 1.96 for each in plots.model_spread(fit, freq))
+    true = t.true_response
+    found = []
+    for seed in range(60):
+        normal = philox(seed).standard_normal((2, *true.shape))
+        noisy = true + t.standard_error * (normal[0] + 1j * normal[1]) / math.sqrt(2.0)
+        found.append(
+            fit_frequency_response(t.freq_hz, noisy, t.order, standard_error=t.standard_error).response(freq)[:, 0, 0]
+        )
+    values = np.array(found)
+    mean = values.mean(axis=0)
+    # Sixty draws give a standard deviation to 1 / sqrt(2 x 60) = 9 %; three times that and a little more.
+    assert_allclose(np.std(np.abs(values), axis=0, ddof=1), along, rtol=0.3)
+    assert_allclose(np.std(np.angle(values / mean), axis=0, ddof=1), across, rtol=0.3)
+
+
+def test_a_bode_plot_of_a_measured_response_has_its_confidence():
+    found = result("response")
+    size, _ = plots.plot_bode(found)
+    corners = size.patches[0].get_path().vertices
+    top = np.abs(found.response[:, 0, 0]) + 1.96 / math.sqrt(2.0) * found.standard_error[:, 0, 0]
+    assert np.isin(top, corners[:, 1]).all()
+    assert size.get_ylabel() == "gain (output/input)"
+
+
+def test_loops_show_what_a_line_leaves():
+    loop = result("loop")
+    left, right = plots.plot_loops(loop)
+    assert_allclose(left.lines[0].get_ydata(), 1e3 * loop.output_rad)
+    rest = right.lines[0].get_ydata()
+    assert abs(rest.mean()) < 1e-9 * np.ptp(rest) and abs(rest @ loop.drive_v) < 1e-6 * np.ptp(rest)
+    assert 0.0 < np.ptp(rest) < np.ptp(1e6 * loop.output_rad)
+    several = plots.plot_loops([loop, loop])
+    assert len(several[0].lines) == 2 and len(left.lines) == 1
+
+
+def test_a_spectrum_gathers_to_the_rms():
+    found = result("runs")
+    left, right = plots.plot_spectrum(found)
+    assert left.get_ylabel().endswith("(µrad²/Hz)") and len(left.lines) == 2
+    for axis, line in enumerate(right.lines):
+        assert_allclose(line.get_ydata()[-1], 1e6 * found.axis_rms_rad[axis], rtol=0.2)  # a few segments of them
+    shaken_, still = result("vibration"), shaken()
+    _, right = plots.plot_spectrum(shaken_)
+    line = right.lines[0]
+    assert_allclose(line.get_ydata()[-1], 1e6 * shaken_.rms_rad, rtol=1e-3)
+    x, y = line.get_data()
+    jump = y[x > 40.0][0] ** 2 - y[x < 40.0][-1] ** 2
+    assert 2.0 < jump < 2.1  # half of the square of 2 µrad, and what the filter adds
+    left, _ = plots.plot_spectrum(still)
+    assert len(left.lines) == 1 and len(plots.plot_spectrum(shaken_)[0].lines) == 3
+
+
+def test_the_error_of_a_sine_has_its_steady_part_shaded():
+    found = result("sine")
+    ax = plots.plot_residual(found)
+    assert_array_equal(ax.lines[0].get_ydata(), 1e6 * found.trace.error_rad[:, 0])
+    assert len(ax.patches) == 1 and not plots.plot_residual(result("run")).patches
+
+
+def test_the_residual_of_a_study_is_marked_on_its_map_and_there_is_none_of_links():
+    labels = [
+        [text.get_text() for text in plots.plot_margin_map(result(name)).get_legend().get_texts()]
+        for name in ("study", "links")
+    ]
+    assert labels[0][:-1] == labels[1]
+    assert labels[0][-1].startswith("simulated residual: ")
+
+
+def test_the_contacts_of_a_day_have_a_row_a_way():
+    day = result("day")
+    names = [text.get_text() for text in plots.plot_contacts(day).get_yticklabels()]
+    assert names[0] == day.relay.name and any(name.startswith("direct: ") for name in names) and len(names) > 2
+    ax = plots.plot_contacts(day.relay.contacts[:3])
+    assert [text.get_text() for text in ax.get_yticklabels()] == ["contacts"]
+    assert_allclose(
+        [patch.get_width() for patch in ax.patches], [each.duration_s / 3600 for each in day.relay.contacts[:3]]
+    )
+
+
+# ----------------------------------------------------------------------------------------------------- axes in and out
+def test_axes_that_move_together_have_ticks_and_titles_at_the_outer_ones_only():
+    fit = result("fit")
+    size, phase = plots.plot_bode(fit)
+    assert (size.get_xlabel(), phase.get_xlabel()) == ("", "frequency (Hz)")
+    assert not any(text.get_visible() and text.get_text() for text in size.get_xticklabels())
+    _, apart = pyplot.subplots(2)
+    assert [ax.get_xlabel() for ax in plots.plot_bode(fit, axes=apart)] == ["frequency (Hz)"] * 2
+    _, together = pyplot.subplots(2, sharex=True)
+    assert [ax.get_xlabel() for ax in plots.plot_bode(fit, axes=list(together))] == ["", "frequency (Hz)"]
+
+
+def test_a_second_result_on_the_same_axes_hides_nothing_of_the_first():
+    slow, fast = shaken(SpectralLine(URAD, 0.5)), shaken(SpectralLine(URAD, 500.0))
+    alone = [ax.get_xlim() for ax in (plots.plot_spectrum(slow)[0], plots.plot_spectrum(fast)[0])]
+    both = plots.plot_spectrum(fast, axes=plots.plot_spectrum(slow))
+    assert both[0].get_xlim() == (min(low for low, _ in alone), max(high for _, high in alone))
+    assert alone[0] != alone[1] and len(both[0].lines) == 4
+    again = plots.plot_spectrum(slow, axes=plots.plot_spectrum(fast))
+    assert again[0].get_xlim() == both[0].get_xlim()
+    t = table(1)
+    larger = fit_frequency_response(t.freq_hz, 1e3 * t.response, t.order)
+    size, _ = plots.plot_bode(larger, axes=plots.plot_bode(result("fit")))
+    low, high = size.get_ylim()
+    assert low < np.abs(t.response).min() and high > 1e3 * np.abs(t.response).max()
+
+
+def test_limits_that_the_sheet_does_not_set_stay_as_matplotlib_has_them():
+    sine = result("sine")
+    ax = plots.plot_residual(sine)
+    ax.plot([0.0, 1.0], [0.0, 1000.0])
+    assert ax.get_xlim()[1] > 1.0 and ax.get_ylim()[1] > 1000.0
+    _, given = pyplot.subplots()
+    given.set_xlim(0.0, 0.1)
+    plots.plot_residual(sine, axes=given)
+    assert given.get_xlim() == (0.0, 0.1)
+    plots.plot_residual(sine, axes=given)
+    assert given.get_xlim()[1] > sine.trace.time_s[-1]
+
+
+def test_long_titles_are_broken_where_axes_are_small_and_long_legends_stand_above():
+    _, small = pyplot.subplots(2, figsize=(3.5, 3.0), layout="constrained")
+    plots.plot_spectrum(result("vibration"), axes=small)
+    assert "\n" in small[1].get_ylabel() and "\n" not in plots.plot_bode(result("fit"))[0].get_ylabel()
+    figure, ax = pyplot.subplots(figsize=(3.5, 3.0), layout="constrained")
+    plots.plot_margin_map(result("study"), axes=ax)
+    figure.canvas.draw()
+    assert ax.get_legend().get_window_extent().y0 > ax.get_window_extent().y1 - 1.0
+    wide = plots.plot_margin_map(result("study"))
+    wide.figure.canvas.draw()
+    assert wide.get_legend().get_window_extent().y1 < wide.get_window_extent().y1
+
+
+def test_a_figure_is_drawn_with_the_words_as_they_are():
+    ax = plots.plot_residual(result("identification"))
+    assert "$" in ax.get_title()
+    ax.figure.canvas.draw()
+    assert not ax.title.get_parse_math()
+
+
+# --------------------------------------------------------------------------------------------------------------- marks
+def test_every_kind_of_mark_is_drawn():
+    assert renderer._MAKERS.keys() == svg._MAKERS.keys() == interactive._MAKERS.keys()
+    sheet, (panel, other) = grid(6.0, 4.0, 1, 2)
+    sheet.heading, sheet.legend = "a heading", Legend("below", 2)
+    x, arms = np.arange(4.0), np.full((2, 4), 0.1)
+    ring = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]])
+    panel.add(
+        Line(x, x, "#0072B2", (2.0, 1.0), marker="o", every=[1], x_arms=arms, y_arms=arms, label="a line"),
+        Line(x, x + 1.0, steps=True),
+        Rule(1.0, False, label="a rule"),
+        Span(-math.inf, 1.0, True, "#56B4E9", label="a span"),
+        Area((ring, ring[::-1] / 2.0), "#000000", label="an area", edge="#000000"),
+        Area((ring,), "#000000", hatched=True),
+        Bars(x, 0.0 * x, x, np.full(4, 0.5), "#E69F00", upright=True, label="bars"),
+        Words("$words", 0.5, 0.5, of_panel="xy", box=True),
+    )
+    panel.face, panel.equal, panel.title = "#eeeeee", True, "a $title"
+    panel.x = Axis("x (m)", low=-1.0, high=5.0, ticks={0.0: "none", 4.0: "four$"})
+    other.add(Field(x, x, np.add.outer(x, x), 0.0, 6.0, "a bar (dB)"), Bars(x, x, x + 1.0, x + 0.5, "#E69F00"))
+    other.x, other.y = Axis("x (s)", log=True, low=0.0, ticks=(1.0, 2.0)), Axis("y (s)", ticks=())
+    drawn = axes_of(sheet)
+    first, second = drawn
+    first.figure.canvas.draw()
+    assert [text.get_text() for text in first.get_xticklabels()] == ["none", "four$"]
+    assert first.get_xlim() == (-1.0, 5.0) and first.get_aspect() == 1.0
+    span = next(patch for patch in first.patches if patch.get_label() == "a span")
+    assert span.get_x() == -1.0
+    assert len(first.figure.axes) == 3 and first.figure.axes[2].get_ylabel() == "a bar (dB)"
+    (legend,) = first.figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == ["a line", "a rule", "a span", "an area", "bars"]
+    assert first.figure.get_suptitle() == "a heading"
+    assert [text.get_text() for text in second.get_xticklabels()] == ["1", "2"]
+    assert not second.get_yticks().size
+
+
+# ------------------------------------------------------------------------------------------------------------ refusals
+@pytest.mark.parametrize("plot", ["bode", "loops", "residual", "spectrum", "margin_map", "contacts"])
+def test_another_result_is_refused_with_what_can_be_plotted(plot):
+    name = f"plot_{plot}"
+    taken = {each for other, each, _ in PLOTS if other == name}
+    with pytest.raises(TypeError, match=f"{name}: cannot plot what is of type str; give one of these: ") as told:
+        getattr(plots, name)("what")
+    kinds = {type(result(each)).__name__ for each in taken} - {"tuple"}
+    assert kinds <= set(re.findall(r"\w+", str(told.value)))
+    assert not pyplot.get_fignums()
+
+
+def test_of_several_results_none_may_be_another_or_missing():
+    with pytest.raises(ValueError, match="plot_contacts: the sequence is empty; give one Contact or more"):
+        plots.plot_contacts([])
+    with pytest.raises(
+        TypeError, match="plot_loops: cannot plot what is of type int; give one of these: HysteresisLoop, Ident"
+    ):
+        plots.plot_loops([result("loop"), 3])
+    assert not pyplot.get_fignums()
+
+
+def test_axes_that_do_not_fit_are_refused():
+    fit, (figure, (one, other, third)) = result("fit"), pyplot.subplots(3)
+    with pytest.raises(ValueError, match=r"1 given, and there are 2 panels to draw \(gain \(output/input\), phase"):
+        plots.plot_bode(fit, axes=one)
+    with pytest.raises(ValueError, match="3 given, and there are 2 panels"):
+        plots.plot_bode(fit, axes=[one, other, third])
+    with pytest.raises(TypeError, match=r"a Figure was given; give one matplotlib.axes.Axes for each panel"):
+        plots.plot_bode(fit, axes=[one, figure])
+    assert not one.has_data() and len(pyplot.get_fignums()) == 1
+
+
+def test_what_has_nothing_to_show_is_refused():
+    with pytest.raises(
+        ValueError, match=r"no linear part; give identify_mirror a broadband recording .* such as models"
+    ):
+        plots.plot_bode(identified(False))
+    found = result("runs")
+    with pytest.raises(ValueError, match="made without a spectrum; simulate them from run 0 on, as a Case with"):
+        plots.plot_spectrum(replace(found, psd_rad2_hz=np.full_like(found.psd_rad2_hz, math.nan)))
+    nothing = Disturbance("calm", np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), (), "assumed", "a test")
+    with pytest.raises(ValueError, match='"calm" has neither a filter nor lines'):
+        plots.plot_spectrum(nothing)
+    with pytest.raises(ValueError, match="there is nothing to plot: no contact"):
+        axes_of(empty("no contact"))
+
+
+def test_without_matplotlib_one_sentence_says_how_to_install_it(monkeypatch):
+    fit = result("fit")
+    for name in [each for each in sys.modules if each.partition(".")[0] == "matplotlib"]:
+        monkeypatch.setitem(sys.modules, name, None)
+    with pytest.raises(ImportError) as told:
+        plots.plot_bode(fit)
+    assert str(told.value) == (
+        "matplotlib is not installed, and plots are drawn with it: install it in the project's folder: pip install "
+        "--constraint constraints.txt '.[plot]'"
+    )
+
+
+def test_matplotlib_is_loaded_when_something_is_drawn():
+    code = "import sys, microrad.report.plots; print('matplotlib' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False"
+    assert "matplotlib" in sys.modules
+
+
+# ------------------------------------------------------------------------------------------------------------ the page
+def test_the_examples_of_the_page_run(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    blocks = re.findall(r"(?ms)^```python\n(.*?)^```", PAGE)
+    names = {}
+    for block in blocks:
+        exec(block, names)
+    assert len(blocks) >= 2
+    assert {path.name for path in tmp_path.iterdir()} == set(re.findall(r'savefig\("([^"]+)"', PAGE))
+
+
+def test_the_page_names_each_function():
+    functions = {name for name in vars(plots) if name.startswith("plot_")}
+    assert set(re.findall(r"`(plot_\w+)`", PAGE)) == functions == {plot for plot, _, _ in PLOTS}
