@@ -18,6 +18,8 @@ from urllib.parse import unquote, urlsplit
 from sphinx.application import Sphinx
 
 ROOT = Path(__file__).resolve().parents[1]
+PROJECT_PAGES = ("CONTRIBUTING.md", "CHANGELOG.md")
+"""Pages of the project's own folder that belong into the site."""
 _FETCHING = {"script": "src", "img": "src", "iframe": "src", "link": "href", "source": "src"}
 
 
@@ -33,6 +35,7 @@ def build(target: Path) -> list[str]:
     with tempfile.TemporaryDirectory() as temporary:
         sources, trees = Path(temporary, "sources"), Path(temporary, "trees")
         shutil.copytree(ROOT / "docs", sources)
+        _with_project_pages(sources)
         for name, text in all_pages(sources).items():
             page = sources / name
             page.parent.mkdir(exist_ok=True)
@@ -44,6 +47,16 @@ def build(target: Path) -> list[str]:
         shutil.rmtree(target / ".doctrees", ignore_errors=True)
         raised = re.sub(r"\x1b\[[0-9;]*m", "", warnings.getvalue()).replace(str(sources), "docs")
     return [line for line in raised.splitlines() if line.strip()] + faults(target)
+
+
+def _with_project_pages(sources: Path) -> None:
+    """Put the pages of the project's own folder beside those of docs/, and let links between the two lead there."""
+    for name in PROJECT_PAGES:
+        text = (ROOT / name).read_text(encoding="utf-8")
+        (sources / name).write_text(text.replace("](docs/", "]("), encoding="utf-8")
+    for page in sources.glob("*.md"):
+        text = page.read_text(encoding="utf-8")
+        page.write_text(re.sub(rf"\]\(\.\./({'|'.join(PROJECT_PAGES)})", r"](\1", text), encoding="utf-8")
 
 
 class _Page(HTMLParser):

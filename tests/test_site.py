@@ -47,6 +47,14 @@ def test_every_page_of_the_folder_is_in_it(site):
     assert found <= {path.stem for path in folder.glob("*.html")}
 
 
+def test_the_page_that_a_refusal_names_is_there(site):
+    folder, _ = site
+    sources = (build_site.ROOT / "src" / "microrad").rglob("*.py")
+    named = {page for each in sources for page in re.findall(r'^    page = "(\w+)"$', each.read_text("utf-8"), re.M)}
+    assert {"link", "campaigns"} <= named
+    assert named <= {path.stem for path in folder.glob("*.html")}
+
+
 def test_every_public_name_has_a_page_with_its_arguments(site):
     folder, _ = site
     assert set(names.names()) == {name for name in dir(microrad) if not name.startswith("__")}

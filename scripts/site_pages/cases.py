@@ -72,7 +72,7 @@ def case(name: str, source: str, expected: str, obtained: float, test: str, tole
 @cache
 def module(path: str) -> ModuleType:
     """A file of tests or a benchmark as a module."""
-    for folder in (ROOT / "tests", ROOT / "scripts"):
+    for folder in (ROOT / "tests", ROOT / "scripts", (ROOT / path).parent):
         if str(folder) not in sys.path:
             sys.path.append(str(folder))
     spec = importlib.util.spec_from_file_location(f"cases_{Path(path).stem}", ROOT / path)
