@@ -20,14 +20,13 @@ import time
 from contextlib import closing
 from pathlib import Path
 
-from recorded import record
-
 from microrad.campaign import bundle, run
 from microrad.campaign.file import load_campaign
 from microrad.campaign.records import Engine, Job
 from microrad.campaign.rows.evaluator import Evaluator
 from microrad.campaign.rows.loops import controllers
 from microrad.campaign.rows.plan import planned
+from recorded import record
 
 HERE = Path(__file__).resolve().parent
 MISSION = HERE.parent / "missions" / "leo-geo.toml"

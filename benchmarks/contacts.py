@@ -14,13 +14,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from recorded import record
 from skyfield.api import EarthSatellite, load, wgs84
 
 from microrad import orbit
 from microrad.mission.file import load_mission
 from microrad.orbit import constellation, files, operations
 from microrad.orbit.propagation import mean_elements
+from recorded import record
 
 FILE = load_mission(Path(__file__).resolve().parents[1] / "missions" / "leo-geo.toml")
 DAY_S = 86400.0

@@ -14,7 +14,6 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-from recorded import record
 
 from loop import best
 from microrad.core import kernels, lti
@@ -26,6 +25,7 @@ from microrad.loop.sensor import OpticalSensor
 from microrad.mirror import model
 from microrad.mirror.hysteresis import PrandtlIshlinskii
 from microrad.mirror.model import Mirror
+from recorded import record
 
 HERE = Path(__file__).resolve().parent
 STEP_S, STEPS_A_SAMPLE = 20e-6, 10

@@ -15,8 +15,8 @@ import sys
 import time
 
 import numpy as np
-from cubespec import AMPLITUDES_MV, NEURAL_UM, all_but, realisations, score_um
 
+from cubespec import AMPLITUDES_MV, NEURAL_UM, all_but, realisations, score_um
 from microrad.lab.identify.coupled import Candidate, identify_coupled
 
 BARS_UM = (0.10, 0.14, 0.19)

@@ -11,8 +11,8 @@ import sys
 import time
 
 import numpy as np
-from cubespec import AMPLITUDES_MV, realisations, rms_um
 
+from cubespec import AMPLITUDES_MV, realisations, rms_um
 from microrad.lab.identify.linear.amplitude import amplitude_dependence
 from microrad.lab.identify.linear.fit import fit_linear, output_error
 

@@ -24,8 +24,8 @@ from functools import partial
 from itertools import product
 
 import numpy as np
-from cubespec import AMPLITUDES_MV, NEURAL_UM, realisations, rms_um, score_um
 
+from cubespec import AMPLITUDES_MV, NEURAL_UM, realisations, rms_um, score_um
 from microrad.lab.identify.stiffness.fit import (
     THRESHOLDS,
     HystereticStiffnessFit,

@@ -18,8 +18,8 @@ import sys
 from itertools import pairwise
 
 import numpy as np
-from cubespec import AMPLITUDES_MV, RATE_HZ, all_but, realisations
 
+from cubespec import AMPLITUDES_MV, RATE_HZ, all_but, realisations
 from microrad.lab.identify.linear.response import response_from_periods
 from microrad.lab.identify.stiffness.fit import (
     StiffnessOptions,

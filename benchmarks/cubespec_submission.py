@@ -17,8 +17,8 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from cubespec import AMPLITUDES_MV, BEFORE, DATA, RATE_HZ, realisations, score_um
 
+from cubespec import AMPLITUDES_MV, BEFORE, DATA, RATE_HZ, realisations, score_um
 from microrad.lab.identify.stiffness.fit import (
     HystereticStiffnessFit,
     StiffnessOptions,

@@ -18,7 +18,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from recorded import record
 
 from loop import INTEGER, Counters, best, compiled_twin, twin_parameters
 from microrad import mirror
@@ -29,6 +28,7 @@ from microrad.loop.pointing_loop import ensemble, kernel_arrays, traces
 from microrad.loop.pointing_loop import loop as fine
 from microrad.loop.sensor import OpticalSensor
 from microrad.mission import file as missionfile
+from recorded import record
 
 HERE = Path(__file__).resolve().parent
 PERIOD_S, STEPS = 200e-6, 10

@@ -17,7 +17,6 @@ from pathlib import Path
 
 import control as python_control
 import numpy as np
-from recorded import record
 
 from microrad.core import lti
 from microrad.export import choice, records
@@ -25,6 +24,7 @@ from microrad.export.flight import build, c_code, fixed, operations, rounding
 from microrad.export.linear_part import sections
 from microrad.export.templating import table
 from microrad.mission.file import load_mission
+from recorded import record
 
 MISSION = Path(__file__).resolve().parent.parent / "missions" / "leo-geo.toml"
 CONTROLLERS = ("PI + inverse", "PI + inverse in series", "LQG")

@@ -27,9 +27,8 @@ from skrf.vectorFitting import VectorFitting
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 
-from recorded import record
-
 from microrad import fit_frequency_response
+from recorded import record
 from response_tables import TABLES, Table, noisy
 
 REPEATS = 25

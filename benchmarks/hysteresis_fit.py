@@ -21,7 +21,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from recorded import record
 from scipy.integrate import solve_ivp
 from scipy.optimize import OptimizeResult, least_squares
 
@@ -29,6 +28,7 @@ from microrad.core.kernels import bouc_wen_response
 from microrad.lab.identify.hysteresis.plant_fit import FitRecord, simulate_record, upsampled
 from microrad.lab.identify.hysteresis.structures import hysteretic_oscillator
 from microrad.mirror import model as mirror
+from recorded import record
 
 Model = Callable[[np.ndarray], np.ndarray]
 PAPER = np.array([0.089, -2.96e-7, -0.048, 0.00047, 38.421, 34.635])  # mrad, V and s

@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from recorded import record
 from scipy.integrate import quad
 from scipy.special import j0, j1
 
@@ -28,6 +27,7 @@ from microrad.mission.file import load_mission
 from microrad.mission.model import Mission
 from microrad.mission.tables.link import BeamShape, Terminals
 from microrad.mission.tables.link import Receiver as ReceiverTable
+from recorded import record
 
 FILE = load_mission(Path(__file__).resolve().parents[1] / "missions" / "paper.toml")
 PAPER = FILE.mission

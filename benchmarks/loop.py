@@ -19,7 +19,6 @@ from pathlib import Path
 
 import control as python_control
 import numpy as np
-from recorded import record
 from scipy.integrate import solve_ivp
 
 from microrad import mirror
@@ -29,6 +28,7 @@ from microrad.loop import paper_cases
 from microrad.loop import sine_run as simulate
 from microrad.mirror import hysteresis
 from microrad.mission import file as missionfile
+from recorded import record
 
 HERE = Path(__file__).resolve().parent
 REPEATS = 15

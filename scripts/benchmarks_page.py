@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from microrad.report.plotting.palette import BLUE, GREY, ORANGE
-from microrad.report.plotting.sheet import Legend, Line, Rule, Sheet, grid, rows
+from microrad.report.plotting.sheet import Legend, Line, Rule, Sheet, rows
 from microrad.report.plotting.svg import svg_of
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -28,7 +28,7 @@ another program on the same machine in the same run. `MICRORAD_RECORD=yes make b
 they find in `benchmarks/results/VERSION.json`; `scripts/benchmarks_page.py` writes this page from it. The last column
 says whether the bar is met. A figure without a bar is there to be compared with the next release.
 
-![Each figure that has a bar, as a share of it](benchmarks.svg)
+![Each figure as a share of its bar, or as a ratio to another program](benchmarks.svg)
 """
 
 
@@ -54,16 +54,17 @@ def page(found: list[Release]) -> str:
 def _made_on(release: Release) -> Iterator[str]:
     of, days = release["machine"], sorted({row["date"] for row in release["rows"]})
     versions = ", ".join(f"{name} {release['versions'][name]}" for name in ("python", "numpy", "scipy", "numba"))
-    yield f"Recorded from {days[0]} to {days[-1]}" if len(days) > 1 else f"Recorded on {days[0]}"
-    yield f"on {of['cores']} cores of kind {of['processor']} ({of['architecture']}), with {versions}."
+    when = f"on {days[0]}" if len(days) == 1 else f"from {days[0]} to {days[-1]}"
+    yield f"Recorded {when} on {of['cores']} cores of kind {of['processor']} ({of['architecture']}), with {versions}."
     yield ""
 
 
 def _tables(release: Release) -> Iterator[str]:
     for benchmark, group in groupby(release["rows"], key=lambda row: row["benchmark"]):
-        yield from (f"### {benchmark}", "", "| figure | found | bar | |", "|---|---|---|---|")
+        yield from (f"### benchmarks/{benchmark}.py", "", "| figure | found | bar | met |", "|---|---|---|---|")
         for row in group:
-            yield f"| {row['what']} | {_number(row['value'], row['unit'])} | {_bar(row)} | {_word(row)} |"
+            cells = (row["what"], _number(row["value"], row["unit"]), _bar(row), _word(row))
+            yield f"| {' | '.join(cells)} |"
         yield ""
 
 
@@ -80,23 +81,37 @@ def _bar(row: dict[str, Any]) -> str:
 
 def _word(row: dict[str, Any]) -> str:
     of = share(row)
-    return "" if of is None else "met" if of <= 1 else "missed"
+    return "–" if of is None else "yes" if of <= 1 else "no"
+
+
+def ratio(row: dict[str, Any]) -> float | None:
+    """A ratio to another program that has no bar; None of all else."""
+    return float(row["value"]) if not row["unit"] and share(row) is None else None
+
+
+PANELS = ((share, "share of the bar (1 or less: met)"), (ratio, "ratio without a bar, as it is named"))
 
 
 def figure(found: list[Release]) -> Sheet:
-    """Each figure of the last release that has a bar, as a share of it, and what earlier releases had there."""
-    judged = [(row["benchmark"], row["what"]) for row in found[-1]["rows"] if share(row) is not None]
-    sheet, (panel,) = grid(7.6, 1.1 + 0.2 * len(judged))
-    panel.y = rows([f"{benchmark}: {what}" for benchmark, what in judged], 6.5)
-    panel.x.log, panel.x.title = True, "share of the bar (1 or less: met)"
-    for release in found:
-        of = {(row["benchmark"], row["what"]): share(row) for row in release["rows"]}
-        at = np.array([of.get(each) or np.nan for each in judged])
-        colour, at_row = BLUE if release is found[-1] else GREY, np.arange(len(judged), dtype=float)
-        panel.add(Line(at, at_row, colour, "", label=release["version"], marker="o", size=5.0))
-    panel.add(Rule(1.0, True, ORANGE, "--", label="bar"))
-    sheet.legend = Legend("above", columns=len(found) + 1)
+    """What the last release found, as a share of its bar or as a ratio, and what earlier releases found there."""
+    named = [[_key(row) for row in found[-1]["rows"] if of(row) is not None] for of, _ in PANELS]
+    inches = [0.55 + 0.16 * len(names) for names in named]
+    sheet = Sheet(7.6, 0.5 + sum(inches), tuple(inches), legend=Legend("above", columns=len(found) + 1))
+    for place, ((of, title), names) in enumerate(zip(PANELS, named, strict=True)):
+        panel = sheet.panel(place)
+        panel.y = rows([f"{benchmark}: {what}" for benchmark, what in names], 6.0)
+        panel.x.log, panel.x.title = True, title
+        panel.add(Rule(1.0, True, ORANGE, "--", label="" if place else "1"))
+        for release in found:
+            values = {_key(row): of(row) for row in release["rows"]}
+            at = np.array([np.nan if values.get(each) is None else values[each] for each in names], dtype=float)
+            colour, label = BLUE if release is found[-1] else GREY, "" if place else release["version"]
+            panel.add(Line(at, np.arange(at.size, dtype=float), colour, "", label=label, marker="o", size=4.0))
     return sheet
+
+
+def _key(row: dict[str, Any]) -> tuple[str, str]:
+    return row["benchmark"], row["what"]
 
 
 def main() -> None:

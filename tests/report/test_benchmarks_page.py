@@ -1,0 +1,91 @@
+"""What benchmarks found: kept in one file a release, and said by the page and its figure as it stands there."""
+
+import json
+import sys
+
+import pytest
+
+import benchmarks_page as benchmarks
+import recorded
+from microrad.report.plotting.sheet import Line
+from microrad.report.plotting.svg import svg_of
+
+
+@pytest.fixture
+def kept(tmp_path, monkeypatch):
+    """What is kept so far, in a folder of its own."""
+    monkeypatch.setattr(recorded, "FOLDER", tmp_path / "results")
+    monkeypatch.setattr(recorded.microrad, "__version__", "0.3.0.dev0", raising=False)
+    monkeypatch.setattr(sys, "argv", ["benchmarks/loop.py"])
+    monkeypatch.setenv("MICRORAD_RECORD", "yes")
+    path = tmp_path / "results" / "0.3.0.json"
+    return lambda: json.loads(path.read_text(encoding="utf-8")) if path.exists() else None
+
+
+def row(what, value, unit="", at_most=None, at_least=None):
+    return {"benchmark": "loop", "what": what, "value": value, "unit": unit, "at_most": at_most, "at_least": at_least}
+
+
+# --------------------------------------------------------------------------------------------------------- the recorder
+def test_a_figure_is_kept_where_it_is_asked_for_and_takes_the_place_of_its_last_one(kept, monkeypatch):
+    monkeypatch.delenv("MICRORAD_RECORD")
+    recorded.record("a step", 1.0)
+    assert kept() is None
+    monkeypatch.setenv("MICRORAD_RECORD", "yes")
+    recorded.record("a step", 1.23456)
+    recorded.record("a fit", 50.0, "s", at_most=60.0)
+    recorded.record("a step", 1.5)
+    found = kept()
+    assert (found["version"], found["machine"]["cores"] >= 1, "numpy" in found["versions"]) == ("0.3.0", True, True)
+    dates = {each.pop("date") for each in found["rows"]}
+    assert len(dates) == 1
+    assert found["rows"] == [row("a fit", 50.0, "s", at_most=60.0), row("a step", 1.5)]
+
+
+def test_figures_of_two_machines_are_not_mixed(kept, monkeypatch):
+    recorded.record("a step", 1.23456)
+    assert kept()["rows"][0]["value"] == 1.23
+    monkeypatch.setattr(recorded.machine, "machine", lambda: {"architecture": "another"})
+    with pytest.raises(SystemExit, match="is of another machine or of other libraries: delete it, and record all anew"):
+        recorded.record("a step", 2.0)
+    assert kept()["rows"][0]["value"] == 1.23
+
+
+# ------------------------------------------------------------------------------------------------------------- the page
+def test_page_and_figure_are_those_of_the_kept_figures():
+    found = benchmarks.releases()
+    text = benchmarks.PAGE.read_text(encoding="utf-8")
+    assert text == benchmarks.page(found), "run scripts/benchmarks_page.py"
+    assert benchmarks.FIGURE.read_text(encoding="utf-8") == svg_of(benchmarks.figure(found))
+    assert all(f"| {each['what']} | " in text for each in found[-1]["rows"])
+
+
+def test_a_bar_is_met_from_its_own_side():
+    def release(version, *rows):
+        return {
+            "version": version,
+            "rows": [{**each, "date": "2026-11-26"} for each in rows],
+            "machine": {"cores": 2, "processor": "znver3", "architecture": "x86_64"},
+            "versions": dict.fromkeys(("python", "numpy", "scipy", "numba"), "1"),
+        }
+
+    rows = [
+        row("quick", 0.5, "s", at_most=1.0),
+        row("slow", 2.0, "s", at_most=1.0),
+        row("many", 200.0, "", at_least=50.0),
+        row("few", 1600.0, "rows/s", at_least=3200.0),
+        row("over twin", 0.25),
+    ]
+    assert [benchmarks.share(each) for each in rows] == [0.5, 2.0, 0.25, 2.0, None]
+    assert [benchmarks.ratio(each) for each in rows] == [None, None, None, None, 0.25]
+    releases = [release("0.2.0", row("slow", 3.0, "s", at_most=1.0)), release("0.10.0", *rows)]
+    text = benchmarks.page(releases)
+    assert "## 0.10.0\n\nRecorded on 2026-11-26 on 2 cores of kind znver3 (x86_64), with python 1, " in text
+    assert "| quick | 0.5 s | at most 1 s | yes |\n| slow | 2 s | at most 1 s | no |\n" in text
+    assert "| few | 1 600 rows/s | at least 3 200 rows/s | no |\n| over twin | 0.25 | – | – |\n" in text
+    shares, ratios = benchmarks.figure(releases).panels
+    earlier, last = shares.all_of(Line)
+    assert (earlier.label, last.label) == ("0.2.0", "0.10.0")
+    assert last.x.tolist() == [0.5, 2.0, 0.25, 2.0]
+    assert earlier.x[1] == 3.0 and not (earlier.x[[0, 2, 3]] >= 0).any()
+    assert ratios.all_of(Line)[-1].x.tolist() == [0.25]
