@@ -1,4 +1,5 @@
-# `make demo` runs the shipped mission, `make test` checks everything; each sets up what it needs in .venv first.
+# `make demo` runs the shipped mission, `make site` builds the documentation, `make test` checks everything; each sets up
+# what it needs in .venv first.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
@@ -10,7 +11,7 @@ SIDE_BY_SIDE := --numprocesses 3 --dist loadfile --no-loadscope-reorder --max-wo
 # Without the bytecode of its modules each command of a test begins half a second later.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test unit lint types compiled contract numbers endurance benchmark clean
+.PHONY: demo test unit lint types compiled contract numbers endurance benchmark site clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/.run
@@ -76,8 +77,12 @@ benchmark: $(VENV)/.test
 	$(BIN)/python benchmarks/coupled_step.py
 	$(BIN)/python benchmarks/studio_map.py
 
+# The documentation as HTML, in site/: pages of docs/, references from the code, validation; notebooks are run.
+site: $(VENV)/.test
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python scripts/build_site.py site
+
 clean:
-	rm -rf $(VENV) $(DEMO)
+	rm -rf $(VENV) $(DEMO) site
 
 # Debian ships python3 without venv; where that is so it is installed, or the command to do so is shown.
 $(VENV)/bin/python:
