@@ -49,9 +49,8 @@ def test_creep_is_told_from_hysteresis():
     creep = Creep((2e-6, 2e-6), (0.1, 1.0))
     output = PLAYS.response(drive, 1e-3) + creep.response(drive, 1e-3)
     noise = 1e-7 * np.random.default_rng(2).standard_normal(drive.size)
-    fit = fit_hysteresis(
-        recording_from_arrays(drive, output + noise, 1e3), "prandtl_ishlinskii_creep", output_unit="rad"
-    )
+    staircase = recording_from_arrays(drive, output + noise, 1e3)
+    fit = fit_hysteresis(staircase, "prandtl_ishlinskii_creep", output_unit="rad")
     found = dict(zip(fit.creep.time_constants_s, fit.creep.weights_rad_v, strict=True))
     assert found[0.1] == pytest.approx(2e-6, rel=0.25) and found[1.0] == pytest.approx(2e-6, rel=0.25)
 

@@ -196,8 +196,8 @@ def fit_frequency_response(  # noqa: PLR0913  all but the first three are named 
         orders: A number of states, or several to compare by the Bayesian information criterion; by default 1, 2, ...
             until six in a row gain nothing, 24 at most.
         standard_error: One sigma of the complex value (the root of its mean squared distance from the true one), in the
-            unit of the response, of its shape, (frequencies,) or one number. Each entry weighs by one over it. By default all weigh
-            alike, and the noise is taken from what the model leaves.
+            unit of the response, of its shape, (frequencies,) or one number. Each entry weighs by one over it. By
+            default all weigh alike, and the noise is taken from what the model leaves.
         strictly_proper: Whether the direct term D is left out.
         delay: Whether a pure delay, common to all elements and at least 0, is fitted as well.
         hold: What stands between the samples of the input where the table is that of sampled data: "zero-order",

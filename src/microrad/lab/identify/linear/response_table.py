@@ -155,8 +155,8 @@ def _checked_error(freq: Floats, values: Complexes, error: Floats) -> Floats:
         error = np.full(freq.shape, float(error))
     if error.shape not in (values.shape, freq.shape):
         raise IdentificationError(
-            f"the standard errors have the shape {error.shape}, the response {values.shape}; give that shape, one number, or one "
-            f"for each frequency, {freq.shape}."
+            f"the standard errors have the shape {error.shape}, the response {values.shape}; give that shape, or one "
+            f"for each frequency, {freq.shape}, or one for all."
         )
     _check_finite(freq, error, "the standard error")
     bad = (error <= 0).reshape(freq.size, -1)
