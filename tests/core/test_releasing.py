@@ -10,6 +10,7 @@ from importlib import import_module, metadata
 
 import pytest
 
+import microrad
 from microrad.core.installing import advice
 from places import ROOT
 
@@ -61,7 +62,8 @@ def test_a_released_version_is_not_that_of_later_commits():
 
 
 # ----------------------------------------------------------------------------------------------------------- the names
-MOVED = re.findall(r"(?m)^  \| `(.*)` \| `(.*)` \|$", CHANGELOG)
+MOVED = re.findall(r"(?m)^  \| `(.*)` \| `((?!microrad\.).*)` \|$", CHANGELOG)
+AT_THE_TOP = re.findall(r"(?m)^  \| (`.*`\)?) \| `microrad\.(.*)` \|$", CHANGELOG)
 
 
 def there(name):
@@ -75,6 +77,11 @@ def there(name):
         except ModuleNotFoundError:
             return False
     return True
+
+
+def test_every_name_that_left_the_top_stands_in_the_changelog_with_its_module():
+    said = {(name, module) for names, module in AT_THE_TOP for name in re.findall(r"(?<!\()`(\w+)`", names)}
+    assert said == {(name, place.rpartition(".")[0]) for name, place in microrad._MOVED.items()}
 
 
 @pytest.mark.parametrize(("was", "now"), MOVED)
