@@ -184,8 +184,8 @@ def _candidates(found: CoupledIdentification, *, short: bool = False) -> Table:
     rows = []
     for candidate in ranked:
         shares = words.shares(candidate, found)
-        cells = (words.part(float(shares[k])) for k in shown)
-        name, count, error = candidate.name, str(candidate.parameters), words.part(candidate.error_share)
+        cells = (words.part(float(shares[k]), candidate) for k in shown)
+        name, count, error = candidate.name, str(candidate.parameters), words.part(candidate.error_share, candidate)
         rows.append((name, count, error, *cells, _standing(candidate, found)))
     at = [f"at {quantity(float(found.amplitudes_v[k]), 'V')} rms" for k in shown]
     headings = ("model", "parameters", "held-out error", *at, "")

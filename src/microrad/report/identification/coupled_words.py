@@ -175,9 +175,14 @@ def drawn_amplitude(found: CoupledIdentification) -> int | None:
 
 
 # ----------------------------------------------------------------------------------------------------------- sentences
-def part(share: float) -> str:
-    """An error over the output, in per cent and as many digits as tell candidates apart; "" for nan."""
-    return "" if math.isnan(share) else percent(share, 3)
+def part(share: float, of: Candidate | None = None) -> str:
+    """An error over the output, in per cent and as many digits as tell candidates apart; "" for nan.
+
+    Args:
+        share: the error.
+        of: whose it is; where a search was ended before its optimum the third digit hangs on rounding and is left out.
+    """
+    return "" if math.isnan(share) else percent(share, 2 if of is not None and of.note else 3)
 
 
 def headline(found: CoupledIdentification) -> str:
@@ -186,7 +191,7 @@ def headline(found: CoupledIdentification) -> str:
     name = f"Stopped before the last model, so the choice so far: {own.name}" if found.stopped else _begun(own.name)
     return (
         f"{name} ({counted(own.parameters, 'parameter')}) predicts "
-        f"{counted(len(found.held_out), 'record')} that no fit has seen with an error of {part(own.error_share)} of "
+        f"{counted(len(found.held_out), 'record')} that no fit has seen with an error of {part(own.error_share, own)} of "
         "the rms output."
     )
 
@@ -211,7 +216,7 @@ def worst(found: CoupledIdentification) -> tuple[str, str, float]:
 def worst_text(found: CoupledIdentification) -> str:
     """The same in a sentence."""
     record, output, share = worst(found)
-    return f"The worst is {output} of {record}: {part(share)}."
+    return f"The worst is {output} of {record}: {part(share, found.candidate())}."
 
 
 def by_amplitude(found: CoupledIdentification) -> str:
