@@ -59,6 +59,8 @@ def folder(tmp_path_factory):
 def test_every_public_name_has_an_example_that_runs(name, folder, monkeypatch, capsys):
     monkeypatch.chdir(folder)
     without_worker(monkeypatch)
+    for known in microrad._PUBLIC:  # another test may have had a stand-in of it looked up
+        vars(microrad).pop(known, None)
     given = examples(name)
     assert given, f"{name} has no example"
     for text in given:

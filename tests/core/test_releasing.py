@@ -3,6 +3,8 @@
 import re
 import runpy
 import subprocess
+import sys
+import tarfile
 import tomllib
 from importlib import import_module, metadata
 
@@ -104,3 +106,30 @@ def test_the_workflow_runs_the_gate_on_the_oldest_and_the_newest_python():
     used = re.findall(r"uses: (.*)", text)
     assert used and all(re.fullmatch(r"actions/[\w-]+@[0-9a-f]{40} # v[\d.]+", each) for each in used)
     assert "secrets" not in text and "contents: read\n" in text and "write" not in text
+
+
+# --------------------------------------------------------------------------------------------------------- the citation
+def test_the_citation_names_what_the_project_is_and_no_version_that_would_age():
+    text = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    described = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    fields = dict(re.findall(r"(?m)^([\w-]+): (.+)$", text))
+    assert (fields["cff-version"], fields["title"], fields["license"]) == ("1.2.0", "microrad", described["license"])
+    assert re.findall(r"(?m)^  - ([\w ]+)$", text) == described["keywords"]
+    assert fields.keys() & {"version", "date-released"} == set()
+    assert " ".join(re.search(r"(?ms)^abstract: >-\n(.*?)\n(?=\S)", text)[1].split()).startswith(
+        described["description"].partition(":")[0]
+    )
+
+
+# --------------------------------------------------------------------------------------------------------- the archives
+def test_every_file_of_the_package_is_in_the_source_archive(tmp_path):
+    command = [sys.executable, "-m", "hatchling", "build", "--target", "sdist", "--directory", tmp_path]
+    subprocess.run(command, cwd=ROOT, check=True, capture_output=True)
+    (archive,) = tmp_path.glob("microrad-*.tar.gz")
+    with tarfile.open(archive) as opened:
+        there = {name.partition("/")[2] for name in opened.getnames()}
+    files = (path for path in (ROOT / "src").rglob("*") if path.is_file() and "__pycache__" not in path.parts)
+    own = {path.relative_to(ROOT).as_posix() for path in files}
+    assert "src/microrad/lab/plans/paper-experiment.toml" in own
+    assert own - there == set()
+    assert {"plans/paper-experiment.toml", "missions/leo-geo.toml", "CITATION.cff", "CHANGELOG.md"} <= there

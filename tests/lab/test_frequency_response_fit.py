@@ -416,3 +416,24 @@ def test_the_sketch_is_near_the_vector_fit(build):
     assert fast.rms_error == pytest.approx(slow.rms_error, rel=0.01)
     distance, _ = ways(fast.poles_rad_s, slow.poles_rad_s)
     assert (distance < 0.1 * np.abs(slow.poles_rad_s.real)).all()
+
+
+def test_poles_are_told_as_frequency_and_damping_with_their_errors():
+    freq = np.geomspace(10.0, 3000.0, 200)
+    s = 2j * np.pi * freq
+    truth = 40.0 / (1 + 2 * 0.02 * s / 6000 + (s / 6000) ** 2) / (1 + s / 500)
+    scores = []
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        noisy = truth + 0.2 * (rng.standard_normal(200) + 1j * rng.standard_normal(200)) / np.sqrt(2)
+        fit = fit_frequency_response(freq, noisy, 3, standard_error=0.2)
+        real, pair = fit.natural
+        scores.append([(real.freq_hz - 500 / 2 / np.pi) / real.freq_error_hz])
+        scores[-1] += [
+            (pair.freq_hz - 6000 / 2 / np.pi) / pair.freq_error_hz,
+            (pair.damping - 0.02) / pair.damping_error,
+        ]
+        assert (real.damping, real.damping_error) == (1.0, 0.0)
+    spread = np.sqrt(np.mean(np.square(scores), axis=0))
+    assert np.all(spread > 0.6) and np.all(spread < 1.4)
+    assert repr(fit).startswith("<FrequencyResponseFit of order 3: 1 x 1 elements at 200 frequencies, ")

@@ -22,7 +22,7 @@ def recorded(output):
 
 
 def test_the_parameters_of_a_known_model_come_back_within_their_errors():
-    fit = fit_hysteresis(recorded(BOUC_WEN.response(DRIVE - 30.0, 1 / RATE) + NOISE))
+    fit = fit_hysteresis(recorded(BOUC_WEN.response(DRIVE - 30.0, 1 / RATE) + NOISE), output_unit="rad")
     truth = {"d1": 50e-6, "d2": 0.0, "epsilon": -2e-6, "delta": 4e-4, "alpha": 0.3, "beta": 0.1}
     assert fit.values.keys() == truth.keys() == fit.standard_errors.keys()
     for name, value in truth.items():
@@ -35,7 +35,7 @@ def test_the_parameters_of_a_known_model_come_back_within_their_errors():
 
 @pytest.mark.parametrize("name", [form for form in STATIC_FORMS if form.startswith("prandtl")])
 def test_plays_follow_a_mirror_of_plays(name):
-    fit = fit_hysteresis(recorded(PLAYS.response(DRIVE - 30.0, 1 / RATE) + NOISE), name)
+    fit = fit_hysteresis(recorded(PLAYS.response(DRIVE - 30.0, 1 / RATE) + NOISE), name, output_unit="rad")
     assert fit.residual_rms_percent < 0.05
     assert isinstance(fit.model, PrandtlIshlinskii)
     assert_allclose(sum(fit.model.weights_rad_v), 50e-6, rtol=0.05 if "creep" in name else 3e-3)
@@ -49,7 +49,8 @@ def test_creep_is_told_from_hysteresis():
     creep = Creep((2e-6, 2e-6), (0.1, 1.0))
     output = PLAYS.response(drive, 1e-3) + creep.response(drive, 1e-3)
     noise = 1e-7 * np.random.default_rng(2).standard_normal(drive.size)
-    fit = fit_hysteresis(recording_from_arrays(drive, output + noise, 1e3), "prandtl_ishlinskii_creep")
+    staircase = recording_from_arrays(drive, output + noise, 1e3)
+    fit = fit_hysteresis(staircase, "prandtl_ishlinskii_creep", output_unit="rad")
     found = dict(zip(fit.creep.time_constants_s, fit.creep.weights_rad_v, strict=True))
     assert found[0.1] == pytest.approx(2e-6, rel=0.25) and found[1.0] == pytest.approx(2e-6, rel=0.25)
 
@@ -66,7 +67,7 @@ def test_models_that_are_none_are_refused():
     with pytest.raises(
         IdentificationError, match="no hysteresis model is called 'preisach'; there are bouc_wen, prandtl"
     ):
-        fit_hysteresis(recorded(DRIVE * 1e-6), "preisach")
+        fit_hysteresis(recorded(DRIVE * 1e-6), "preisach", output_unit="rad")
 
 
 def test_a_measured_response_holds_the_truth_within_its_errors():

@@ -155,3 +155,13 @@ def test_a_mirror_of_parts_answers_and_refuses():
     for numerator, denominator in (([1.0, 0.0, 0.0], [1.0, 1.0]), ([1.0], [1.0, -1.0]), ([1.0, 0.0], [1.0, 2.0, 3.0])):
         with pytest.raises(ValueError, match="give one that is proper and stable"):
             Mirror.of(1e-6, numerator, denominator)
+
+
+def test_a_controller_of_another_rate_is_refused_and_a_tuned_one_taken_apart():
+    with pytest.raises(ValueError, match=r"controller 'PID' is made for 1000 Hz, and this loop has 10000 Hz"):
+        LOOP.simulate(Controller.pid(0.0, 1e6, rate_hz=1e3), 0.1)
+    tuned = tune(LOOP, "PI")
+    with pytest.raises(TypeError, match=r"give its \.controller"):
+        LOOP.margins(tuned)
+    assert repr(LOOP) == "<Loop of 1 axes at 10000 Hz around mirror 'straight'>"
+    assert repr(tuned.controller) == "<Controller 'PI': 2 inputs, 1 outputs, 1 states>"

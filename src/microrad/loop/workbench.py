@@ -43,7 +43,8 @@ class Controller:
 
     ``system`` has the error of each axis as the sensor reads it (rad) as inputs, with one axis the gauge's reading of
     the mirror (rad) behind it where it is used, and the command of each axis (V) as outputs. ``anti_windup`` is L,
-    shape (states, axes): what a command that is cut off adds to the states.
+    shape (states, axes): what a command that is cut off adds to the states. A loop of another rate than ``rate_hz``
+    refuses it; None where that is not known.
 
     Example:
         ```python
@@ -60,6 +61,12 @@ class Controller:
     name: str
     system: lti.StateSpace
     anti_windup: Floats
+    rate_hz: float | None = None
+
+    def __repr__(self) -> str:
+        """What it is, without its matrices."""
+        shape = f"{self.system.B.shape[1]} inputs, {self.system.C.shape[0]} outputs, {self.system.order} states"
+        return f"<Controller {self.name!r}: {shape}>"
 
     @classmethod
     def pid(
@@ -93,7 +100,7 @@ class Controller:
         one = control.pid(control.Gains(*gains), 1.0 / rate_hz)
         parts = (one.A, one.B, one.C, one.D, control.anti_windup(one))
         A, B, C, D, windup = (np.asarray(np.kron(np.eye(axes), each), dtype=float) for each in parts)
-        return cls("PID", lti.StateSpace(A, B, C, D), windup)
+        return cls("PID", lti.StateSpace(A, B, C, D), windup, rate_hz)
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,6 +188,10 @@ class Loop:
             raise ValueError("a loop with a gauge needs one line-of-sight angle for each output of the mirror")
         self.parts.optical, self.parts.timing  # noqa: B018  refuses what is wrong of them
 
+    def __repr__(self) -> str:
+        """What it is, without its arrays."""
+        return f"<Loop of {self.axes} axes at {self.rate_hz:g} Hz around mirror {self.mirror.name!r}>"
+
     @property
     def axes(self) -> int:
         """Number of line-of-sight axes."""
@@ -232,7 +243,8 @@ class Loop:
         if self.axes == 1:
             return control.loop_margins(design_plant(self.parts), self._axis(controller))
         plant = whole_plant(self.parts, decoupling(self.parts))
-        whole = control.WholeController(controller.name, self._checked(controller), controller.anti_windup)
+        system = self._checked(controller)
+        whole = control.WholeController(controller.name, system, controller.anti_windup)
         return coupled_study.whole_margins(plant, whole)
 
     def residual_rms_rad(self, controller: Controller) -> Floats:
@@ -310,8 +322,10 @@ class Loop:
             ValueError: It does not fit, or reads a gauge that the loop lacks.
         """
         if self.axes == 1:
-            return assemble(controller.name, self.parts, self._axis(controller))
-        return assemble_whole(controller.name, self.parts, self._checked(controller), controller.anti_windup)
+            axis = self._axis(controller)
+            return assemble(axis.name, self.parts, axis)
+        system = self._checked(controller)
+        return assemble_whole(controller.name, self.parts, system, controller.anti_windup)
 
     def _axis(self, controller: Controller) -> control.AxisController:
         s = self._checked(controller)
@@ -320,6 +334,14 @@ class Loop:
         return control.AxisController(controller.name, lti.StateSpace(s.A, B, s.C, D), controller.anti_windup)
 
     def _checked(self, controller: Controller) -> lti.StateSpace:
+        if isinstance(controller, TunedController):
+            raise TypeError("a tuned controller was given with what is known of it: give its .controller")
+        rate = controller.rate_hz
+        if rate is not None and abs(rate - self.rate_hz) > 1e-9 * self.rate_hz:
+            raise ValueError(
+                f"controller {controller.name!r} is made for {rate:g} Hz, and this loop has {self.rate_hz:g} Hz: make "
+                "one for this rate"
+            )
         s, axes, most = controller.system, self.axes, 2 if self.axes == 1 else self.axes
         fits = s.C.shape[0] == axes <= s.B.shape[1] <= most and controller.anti_windup.shape == (s.order, axes)
         if not fits:
@@ -390,11 +412,11 @@ def tune(
     asked = control.Specification(modulus_margin)
     if loop.axes == 1:
         found = control.tune(kinds[kind], [design_plant(loop.parts)], asked, seed=seed, on_progress=on_progress)
-        made = Controller(kind, found.controller.system, found.controller.anti_windup)
+        made = Controller(kind, found.controller.system, found.controller.anti_windup, loop.rate_hz)
         return TunedController(made, found.values, found.margins, loop.residual_rms_rad(made), found.bound_by)
     whole, values = coupled_study.tuned_whole(kinds[kind], [whole_plant(loop.parts, decoupling(loop.parts))], asked)
     on_progress(1, 1, f"tune {kind}")
-    made = Controller(kind, whole.system, whole.anti_windup)
+    made = Controller(kind, whole.system, whole.anti_windup, loop.rate_hz)
     margins = loop.margins(made)
     bound = (MARGIN,) if margins.modulus < 1.02 * modulus_margin else ()
     return TunedController(made, values, margins, loop.residual_rms_rad(made), bound)

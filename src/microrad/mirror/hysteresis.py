@@ -31,6 +31,10 @@ class HysteresisLoop:
     hysteresis_rad: Floats
     clamped: int
 
+    def __repr__(self) -> str:
+        """What it is, without its samples."""
+        return f"<HysteresisLoop at {self.freq_hz:g} Hz: {self.drive_v.size} samples, {self.width:.2%} wide>"
+
     @property
     def width(self) -> float:
         """Share of the output's peak-to-peak that is hysteresis."""

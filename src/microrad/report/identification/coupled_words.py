@@ -10,6 +10,7 @@ from microrad.core.arrays import Complexes, Floats
 from microrad.core.units import format_quantity, parse_quantity
 from microrad.lab.identify.coupled import Candidate, CoupledIdentification
 from microrad.lab.identify.linear.response import FrequencyResponse
+from microrad.lab.identify.linear.uncertainty import natural
 from microrad.report.identification.parameters import to_error, two_digits
 from microrad.report.identification.terminal import counted
 from microrad.report.quantities import minus, percent, quantity
@@ -162,15 +163,9 @@ def poles(candidate: Candidate) -> list[Pole]:
 
 
 def _pole(pole: complex, error: complex, low_hz: float, high_hz: float) -> Pole:
-    """Errors of modulus and damping from those of real and imaginary part, taken as independent."""
-    size = abs(pole) or 1e-300
-    s, w, ds, dw = pole.real, pole.imag, error.real, error.imag
-    freq = size / (2 * math.pi)
-    if w == 0.0:
-        return Pole(freq, abs(ds) / (2 * math.pi), 1.0, 0.0, low_hz <= freq <= high_hz)
-    freq_error = math.hypot(s * ds, w * dw) / size / (2 * math.pi)
-    damping_error = abs(w) * math.hypot(w * ds, s * dw) / size**3
-    return Pole(freq, freq_error, -s / size, damping_error, low_hz <= freq <= high_hz)
+    """A pole, and whether it lies in the excited band."""
+    of = natural(pole, error)
+    return Pole(of.freq_hz, of.freq_error_hz, of.damping, of.damping_error, low_hz <= of.freq_hz <= high_hz)
 
 
 def drawn_amplitude(found: CoupledIdentification) -> int | None:

@@ -64,8 +64,8 @@ def fit_hysteresis(
     recordings: Recording | Sequence[Recording],
     model: str = "bouc_wen",
     *,
+    output_unit: str,
     input_unit: str = "V",
-    output_unit: str = "rad",
     admissible: bool = False,
     seed: int = 0,
     on_progress: Progress | None = None,
@@ -77,8 +77,8 @@ def fit_hysteresis(
         model: "bouc_wen" (Eq. 3 of SPIE 11852, 118523B), "bouc_wen_classical" (with an exponent, rate-independent),
             "bouc_wen_asymmetric", "prandtl_ishlinskii", "prandtl_ishlinskii_rate" (thresholds widen with the rate), and
             with creep "bouc_wen_creep", "prandtl_ishlinskii_creep" and "prandtl_ishlinskii_rate_creep".
-        input_unit: Unit of the drive: V or mV.
         output_unit: Unit of the output: rad, mrad or urad.
+        input_unit: Unit of the drive: V or mV.
         admissible: Whether a Bouc-Wen model is kept from moving against its drive behind a reversal.
         seed: Seed of the scattered starts of a Bouc-Wen fit.
         on_progress: Called with the starts done, their number and what is done.
@@ -96,7 +96,7 @@ def fit_hysteresis(
         truth = microrad.PrandtlIshlinskii((0.0, 1.0, 2.0), (40e-6, 6e-6, 4e-6))
         output_rad = truth.response(drive_v, 1e-4) + 1e-7 * np.random.default_rng(1).standard_normal(6000)
         recording = microrad.recording_from_arrays(drive_v, output_rad, rate_hz=10e3)
-        fit = microrad.fit_hysteresis(recording, "prandtl_ishlinskii")
+        fit = microrad.fit_hysteresis(recording, "prandtl_ishlinskii", output_unit="rad")
         print(fit.residual_rms_percent, fit.model.inverse([0.0, 1e-4], 1e-4))
         ```
     """
@@ -121,11 +121,7 @@ def _of_plays(fit: PrandtlIshlinskiiFit) -> HysteresisFit:
     names = [f"weight at {threshold:.4g} V" for threshold in fit.thresholds_v]
     return HysteresisFit(
         name=fit.name,
-        model=PrandtlIshlinskii(
-            tuple(fit.thresholds_v.tolist()),
-            tuple((fit.sign * fit.weights_rad_per_v).tolist()),
-            rate_limit_v_s=fit.rate_limit_v_per_s,
-        ),
+        model=fit.model,
         creep=NO_CREEP,
         bias_v=0.0,
         values=dict(zip(names, (fit.sign * fit.weights_rad_per_v).tolist(), strict=True)),

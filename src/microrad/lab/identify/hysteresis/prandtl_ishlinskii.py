@@ -26,6 +26,7 @@ from microrad.lab.identify.records import (
 )
 from microrad.lab.identify.statistics import colour_inflation, percent
 from microrad.lab.recording import Recording
+from microrad.mirror.hysteresis import PrandtlIshlinskii
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +60,13 @@ class PrandtlIshlinskiiFit:
     def falling(self) -> bool:
         """Whether the output falls with the drive."""
         return self.sign < 0
+
+    @property
+    def model(self) -> PrandtlIshlinskii:
+        """The operator, in V and rad, with the sign of the output."""
+        weights = (self.sign * self.weights_rad_per_v).tolist()
+        limit = self.rate_limit_v_per_s
+        return PrandtlIshlinskii(tuple(self.thresholds_v.tolist()), tuple(weights), rate_limit_v_s=limit)
 
     @property
     def parameter_count(self) -> int:

@@ -23,7 +23,7 @@ from microrad.lab.identify.linear.modal import Hold, ModalModel, order_modes
 from microrad.lab.identify.linear.order import exchanged, reduced
 from microrad.lab.identify.linear.polish import Polished, fit_outputs, normal_equations, polish
 from microrad.lab.identify.linear.response_table import ResponseTable, band_hz, check_numbers, checked
-from microrad.lab.identify.linear.uncertainty import Uncertainty, inverse_normal, uncertainty
+from microrad.lab.identify.linear.uncertainty import Natural, Uncertainty, inverse_normal, natural, uncertainty
 from microrad.lab.identify.linear.vector_fitting import VectorFit, sketched, vector_fit
 from microrad.lab.identify.records import IdentificationError, no_progress
 
@@ -67,6 +67,23 @@ class FrequencyResponseFit:
     errors_from: str
     chi_square: float | None
     strictly_proper: bool
+
+    def __repr__(self) -> str:
+        """What it is, without its arrays."""
+        outputs, inputs = self.residual.shape[1:]
+        return (
+            f"<FrequencyResponseFit of order {self.order}: {outputs} x {inputs} elements at {self.freq_hz.size} "
+            f"frequencies, {self.relative_rms_error:.3g} of the table left>"
+        )
+
+    @property
+    def natural(self) -> tuple[Natural, ...]:
+        """Poles as natural frequencies and damping ratios with standard errors, by frequency, one of each pair."""
+        m, n = self.modes.real_poles, self.modes.poles_rad_s.size
+        error = np.sqrt(np.maximum(np.diag(self.covariance)[: 2 * n - m], 0.0))
+        parts = error[:n] + 1j * np.concatenate([np.zeros(m), error[n:]])
+        found = [natural(complex(p), complex(e)) for p, e in zip(self.modes.poles_rad_s, parts, strict=True)]
+        return tuple(sorted(found, key=lambda each: each.freq_hz))
 
     @property
     def band_hz(self) -> tuple[float, float]:
@@ -179,8 +196,8 @@ def fit_frequency_response(  # noqa: PLR0913  all but the first three are named 
         orders: A number of states, or several to compare by the Bayesian information criterion; by default 1, 2, ...
             until six in a row gain nothing, 24 at most.
         standard_error: One sigma of the complex value (the root of its mean squared distance from the true one), in the
-            unit of the response, of its shape or (frequencies,). Each entry weighs by one over it. By default all weigh
-            alike, and the noise is taken from what the model leaves.
+            unit of the response, of its shape, (frequencies,) or one number. Each entry weighs by one over it. By
+            default all weigh alike, and the noise is taken from what the model leaves.
         strictly_proper: Whether the direct term D is left out.
         delay: Whether a pure delay, common to all elements and at least 0, is fitted as well.
         hold: What stands between the samples of the input where the table is that of sampled data: "zero-order",
@@ -199,8 +216,10 @@ def fit_frequency_response(  # noqa: PLR0913  all but the first three are named 
         import microrad
 
         freq_hz, gain, phase_deg = np.loadtxt("bode.csv", delimiter=",", skiprows=1, unpack=True)
-        fit = microrad.fit_frequency_response(freq_hz, gain * np.exp(1j * np.radians(phase_deg)))
-        print(fit.order, fit.poles_rad_s, fit.known.poles_error_rad_s, fit.reason)
+        response = gain * np.exp(1j * np.radians(phase_deg))
+        fit = microrad.fit_frequency_response(freq_hz, response, standard_error=2e-7)  # one sigma of the analyser
+        print(fit.order, fit.reason, *fit.warnings)
+        print(*fit.natural, sep=", ")
         A, B, C, D = fit.system.A, fit.system.B, fit.system.C, fit.system.D
         ```
     """

@@ -151,10 +151,12 @@ def _check_frequencies(freq: Floats, rate_hz: float | None) -> None:
 
 def _checked_error(freq: Floats, values: Complexes, error: Floats) -> Floats:
     """The standard errors in the shape of the response."""
+    if error.ndim == 0:
+        error = np.full(freq.shape, float(error))
     if error.shape not in (values.shape, freq.shape):
         raise IdentificationError(
             f"the standard errors have the shape {error.shape}, the response {values.shape}; give that shape, or one "
-            f"for each frequency, {freq.shape}."
+            f"for each frequency, {freq.shape}, or one for all."
         )
     _check_finite(freq, error, "the standard error")
     bad = (error <= 0).reshape(freq.size, -1)

@@ -1,6 +1,8 @@
 """Poles, transmission zeros and gains of a fitted modal model, with their standard errors from its normal equations."""
 
+import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -65,6 +67,30 @@ def uncertainty(
         errors[1],
         0.0,
     )
+
+
+class Natural(NamedTuple):
+    """A pole by its natural frequency (Hz) and damping ratio, each with its standard error."""
+
+    freq_hz: float
+    freq_error_hz: float
+    damping: float
+    damping_error: float
+
+
+def natural(pole_rad_s: complex, error_rad_s: complex) -> Natural:
+    """A pole as natural frequency and damping, the errors of its two parts taken as independent.
+
+    Args:
+        pole_rad_s: The pole.
+        error_rad_s: Standard errors of its real and of its imaginary part.
+    """
+    size = abs(pole_rad_s) or 1e-300
+    s, w, ds, dw = pole_rad_s.real, pole_rad_s.imag, error_rad_s.real, error_rad_s.imag
+    if w == 0.0:
+        return Natural(size / (2 * math.pi), abs(ds) / (2 * math.pi), -s / size, 0.0)
+    freq_error = math.hypot(s * ds, w * dw) / size / (2 * math.pi)
+    return Natural(size / (2 * math.pi), freq_error, -s / size, abs(w) * math.hypot(w * ds, s * dw) / size**3)
 
 
 def parameter_covariance(polished: Polished) -> Floats:

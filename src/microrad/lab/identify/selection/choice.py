@@ -8,6 +8,7 @@ import numpy as np
 
 from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
+from microrad.lab.identify.hysteresis.joint import JointFit
 from microrad.lab.identify.linear.fit import LinearFit
 from microrad.lab.identify.linear.modal import HOLD, Hold
 from microrad.lab.identify.records import IdentificationError, SiRecord, Units, no_progress, si_records, span
@@ -49,6 +50,8 @@ from microrad.lab.identify.selection.warnings import (
 from microrad.lab.identify.statistics import may_be_chance
 from microrad.lab.identify.travel import check_travel
 from microrad.lab.recording import Recording
+from microrad.mirror.hysteresis import BoucWen, PrandtlIshlinskii
+from microrad.mirror.model import Mirror, assemble
 
 _EXPLAINED = 0.5
 _HARDLY = (
@@ -115,6 +118,17 @@ class Identification:
         """Middle of the fitted drive range."""
         return (self.drive_min_v + self.drive_max_v) / 2
 
+    @property
+    def model(self) -> BoucWen | PrandtlIshlinskii:
+        """The hysteresis of the chosen model, from V to rad: its response, loop and inverse."""
+        return self.fit().model
+
+    @property
+    def mirror(self) -> Mirror:
+        """The mirror of the chosen model, about its bias; without a linear part the hysteresis alone."""
+        fit = self.fit()
+        return fit.mirror if isinstance(fit, JointFit) else assemble(fit.name, "static", None, fit.model)
+
     def fit(self, model: str | None = None) -> Fit:
         """The fit of a model, of the chosen one by default."""
         return self.fits[self._index(model)]
@@ -180,7 +194,8 @@ def identify(  # noqa: PLR0913  all but the first are named options in practice
 
         loop = microrad.read_recording("loop.csv", inputs="drive", outputs="angle")
         found = microrad.identify_mirror([loop], output_unit="urad")
-        print(found.chosen, found.reason)
+        print(found.chosen, found.reason, *found.warnings)
+        print(found.model.inverse([0.0, 50e-6], step_s=1e-3), found.mirror.axes)
         ```
     """
     units, on_progress = Units(input_unit, output_unit, lever_arm_m), on_progress or no_progress
