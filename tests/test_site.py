@@ -63,6 +63,9 @@ def test_every_public_name_has_a_page_with_its_arguments(site):
     for name in names.names():
         page = (folder / "names" / f"{name}.html").read_text(encoding="utf-8")
         assert f'id="microrad.{name}"' in page, name
+        assert 'class="highlight-python' in page, f"{name} has no example"
+        assert "_NestedSequence" not in page, name
+    assert "ArrayLike" in text_of(folder / "names" / "outage_loss_db.html")
     study = text_of(folder / "names" / "run_study.html")
     assert "Parameters" in study and "Raises" in study
     assert "Example" in study and "load_mission" in study

@@ -5,6 +5,10 @@ from typing import Any
 
 from docutils import nodes
 from latex2mathml.converter import convert
+from numpy.typing import ArrayLike
+from sphinx.util.typing import stringify_annotation
+
+from microrad.core.arrays import Complexes, Floats
 
 _BAR = '<mo stretchy="false" lspace="0" rspace="0">&#x0007C;</mo>'
 
@@ -47,8 +51,24 @@ def _plain(line: str) -> str:
     return "`".join(parts)
 
 
+_LONG = {
+    stringify_annotation(kind, mode): name
+    for name, kind in (("ArrayLike", ArrayLike), ("Floats", Floats), ("Complexes", Complexes))
+    for mode in ("smart", "fully-qualified-except-typing")
+}
+"""Types of arrays as Sphinx spells them out, and as the code calls them."""
+
+
+def _signatures(app: Any, what: str, name: str, thing: Any, options: Any, signature: str, returned: str) -> Any:
+    """Signatures in which arrays have the names that they have in the code."""
+    for long, short in _LONG.items():
+        signature, returned = (text and text.replace(long, short) for text in (signature, returned))
+    return signature, returned
+
+
 def setup(app: Any) -> dict[str, bool]:
     """Make them known, the examples before napoleon reads the sections."""
     app.add_html_math_renderer("mathml", (_inline, None), (_block, None))
+    app.connect("autodoc-process-signature", _signatures)
     app.connect("autodoc-process-docstring", _examples, priority=100)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
