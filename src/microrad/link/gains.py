@@ -32,7 +32,7 @@ def checked(name: str, values: ArrayLike, rule: Quantity, why: str = "") -> Floa
 
 
 def aperture_gain_db(diameter_m: float, wavelength_m: float) -> float:
-    """On-axis gain of a uniformly lit circular aperturein dB, (pi D / lambda)^2.
+    """On-axis gain of a uniformly lit circular aperture, in dB, (pi D / lambda)^2.
 
     Args:
         diameter_m: Diameter D of the aperture, in m.
