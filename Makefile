@@ -95,7 +95,7 @@ $(VENV)/bin/python:
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 MACHINE := $(shell $(PYTHON) -c 'import platform as p, sys; print(p.system(), p.machine(), p.libc_ver()[0], "3.%d" % sys.version_info[1], sep="-")' 2>/dev/null)
 ifneq ($(filter $(MACHINE),$(foreach minor,11 12 13 14,Linux-x86_64-glibc-3.$(minor))),)
-$(VENV)/.run: $(VENV)/bin/python pyproject.toml hashes/lab.txt
+$(VENV)/.run: $(VENV)/bin/python pyproject.toml CHANGELOG.md hashes/lab.txt
 	$(PIP) --require-hashes --requirement hashes/lab.txt
 	$(PIP) --no-deps --no-build-isolation --editable .
 	@touch $@
@@ -104,7 +104,7 @@ $(VENV)/.test: $(VENV)/.run hashes/test.txt
 	$(PIP) --require-hashes --requirement hashes/test.txt
 	@touch $@
 else
-$(VENV)/.run: $(VENV)/bin/python pyproject.toml constraints.txt
+$(VENV)/.run: $(VENV)/bin/python pyproject.toml CHANGELOG.md constraints.txt
 	$(PIP) --constraint constraints.txt --editable '.[lab]'
 	@touch $@
 

@@ -189,10 +189,10 @@ def headline(found: CoupledIdentification) -> str:
     """Which model was chosen, and how well it predicts."""
     own = found.candidate()
     name = f"Stopped before the last model, so the choice so far: {own.name}" if found.stopped else _begun(own.name)
+    left = part(own.error_share, own)
     return (
         f"{name} ({counted(own.parameters, 'parameter')}) predicts "
-        f"{counted(len(found.held_out), 'record')} that no fit has seen with an error of {part(own.error_share, own)} of "
-        "the rms output."
+        f"{counted(len(found.held_out), 'record')} that no fit has seen with an error of {left} of the rms output."
     )
 
 
