@@ -6,6 +6,7 @@ samples, and comes from the kernels that a simulated mirror runs.
 """
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -41,30 +42,8 @@ class HysteresisLoop:
         return float(np.ptp(self.hysteresis_rad) / np.ptp(self.output_rad))
 
 
-_WholeRun = Callable[[Floats, float], tuple[Floats, Floats]]
-"""Output and hysteresis of a drive from rest."""
-
 _REPEATS, _PERIODS = 1e-6, 1024
 _INVERSIONS = 300
-
-
-def _settled(run: _WholeRun, amplitude_v: float, freq_hz: float, samples: int, limit_v_s: float) -> HysteresisLoop:
-    """The period that repeats itself: the output moves by at most 1e-6 of its size, or 1024 periods have passed."""
-    for name, value, unit in (("amplitude_v", amplitude_v, "V"), ("freq_hz", freq_hz, "Hz")):
-        if not 0.0 < value < math.inf:
-            raise ValueError(f"{name} of a loop is {value} {unit}: give a finite number above 0")
-    if samples < 8:
-        raise ValueError(f"a loop of {samples} samples a period has no shape: give 8 or more, better 500")
-    one = amplitude_v * np.sin(2.0 * np.pi * np.arange(1, samples + 1) / samples)
-    step_s, periods = 1.0 / freq_hz / samples, 4
-    while True:
-        output, hysteresis = run(np.tile(one, periods), step_s)
-        before, last = output[-2 * samples : -samples], output[-samples:]
-        if np.max(np.abs(last - before)) <= _REPEATS * np.ptp(last) or periods >= _PERIODS:
-            break
-        periods *= 4
-    clamped = np.count_nonzero(np.abs(np.diff(one, prepend=one[-1])) / step_s > limit_v_s)
-    return HysteresisLoop(freq_hz, one, last, hysteresis[-samples:], int(clamped))
 
 
 def _from_rest(samples: ArrayLike, step_s: float, what: str) -> Floats:
@@ -77,49 +56,20 @@ def _from_rest(samples: ArrayLike, step_s: float, what: str) -> Floats:
     return np.concatenate([[0.0], signal])
 
 
-@dataclass(frozen=True, slots=True)
-class BoucWen:
-    """Parameters of Eq. 3 of SPIE 11852, 118523B, in radians, volts and seconds, and what generalises it.
+class _FromRest(ABC):
+    """What a hysteresis model does by itself, from rest at a drive of 0."""
 
-    y = d1 exp(-d2 q') q + h,  h' = epsilon exp(delta |q'|) q' - |q'| |h| (alpha s + beta r + gamma + eta r s) w,
-    with s the sign of h, r that of q', and w = (|h| alpha / |epsilon|)^(exponent - 1), which is 1 for Eq. 3 and leaves
-    alpha and beta their unit (1/V). gamma tells the two signs of h apart and eta rising from falling drive (generalised
-    model of Song and Der Kiureghian, J. Eng. Mech. 132 (2006) 610); epsilon, alpha and beta alone with delta = 0 are
-    the classical model (Wen, J. Eng. Mech. Div. 102 (1976) 249).
-    Beyond ``rate_limit_v_s`` the exponentials are held and each such sample is counted; ``bias_v`` is the resting
-    drive.
-    """
-
-    d1_rad_v: float
-    d2_s_v: float
-    epsilon_rad_v: float
-    delta_s_v: float
-    alpha_1_v: float
-    beta_1_v: float
-    rate_limit_v_s: float = math.inf
-    bias_v: float = 0.0
-    gamma_1_v: float = 0.0
-    eta_1_v: float = 0.0
-    exponent: float = 1.0
+    __slots__ = ()
 
     def response(self, drive_v: ArrayLike, step_s: float) -> Floats:
         """Output (rad), shape (samples,), from rest.
 
         Args:
             drive_v: Drive about the bias (V), shape (samples,).
-            step_s: Time between samples (s).
+            step_s: Time between samples (s); only a model that depends on the rate depends on it.
 
         Raises:
             ValueError: For a drive of another shape or with a number that is not finite, and a step not above 0.
-
-        Example:
-            ```python
-            import numpy as np
-            from microrad import BoucWen
-
-            model = BoucWen(d1_rad_v=50e-6, d2_s_v=0.0, epsilon_rad_v=-8e-6, delta_s_v=0.0, alpha_1_v=0.3, beta_1_v=0.1)
-            print(model.admissible, model.response(np.linspace(0.0, 10.0, 100), step_s=1e-4)[-1])
-            ```
         """
         return self._run(_from_rest(drive_v, step_s, "drive_v"), step_s)[0]
 
@@ -134,7 +84,62 @@ class BoucWen:
         Raises:
             ValueError: For numbers outside of these.
         """
-        return _settled(self._from_zero, amplitude_v, freq_hz, samples, self.rate_limit_v_s)
+        for name, value, unit in (("amplitude_v", amplitude_v, "V"), ("freq_hz", freq_hz, "Hz")):
+            if not 0.0 < value < math.inf:
+                raise ValueError(f"{name} of a loop is {value} {unit}: give a finite number above 0")
+        if samples < 8:
+            raise ValueError(f"a loop of {samples} samples a period has no shape: give 8 or more, better 500")
+        one = amplitude_v * np.sin(2.0 * np.pi * np.arange(1, samples + 1) / samples)
+        step_s, periods = 1.0 / freq_hz / samples, 4
+        while True:
+            output, hysteresis = self._run(np.append(0.0, np.tile(one, periods)), step_s)
+            before, last = output[-2 * samples : -samples], output[-samples:]
+            if np.max(np.abs(last - before)) <= _REPEATS * np.ptp(last) or periods >= _PERIODS:
+                break
+            periods *= 4
+        clamped = np.count_nonzero(np.abs(np.diff(one, prepend=one[-1])) / step_s > self.rate_limit_v_s)
+        return HysteresisLoop(freq_hz, one, last, hysteresis[-samples:], int(clamped))
+
+    rate_limit_v_s: float
+
+    @abstractmethod
+    def _run(self, drive_v: Floats, step_s: float) -> tuple[Floats, Floats]:
+        """Output and hysteresis behind the first sample, which is rest."""
+
+
+@dataclass(frozen=True, slots=True)
+class BoucWen(_FromRest):
+    """Parameters of Eq. 3 of SPIE 11852, 118523B, in radians, volts and seconds, and what generalises it.
+
+    y = d1 exp(-d2 q') q + h,  h' = epsilon exp(delta |q'|) q' - |q'| |h| (alpha s + beta r + gamma + eta r s) w,
+    with s the sign of h, r that of q', and w = (|h| alpha / |epsilon|)^(exponent - 1), which is 1 for Eq. 3 and leaves
+    alpha and beta their unit (1/V). gamma tells the two signs of h apart and eta rising from falling drive (generalised
+    model of Song and Der Kiureghian, J. Eng. Mech. 132 (2006) 610); epsilon, alpha and beta alone with delta = 0 are
+    the classical model (Wen, J. Eng. Mech. Div. 102 (1976) 249).
+    Beyond ``rate_limit_v_s`` the exponentials are held and each such sample is counted; ``bias_v`` is the resting
+    drive.
+
+    Example:
+        ```python
+        import numpy as np
+        from microrad import BoucWen
+
+        model = BoucWen(d1_rad_v=50e-6, d2_s_v=0.0, epsilon_rad_v=-8e-6, delta_s_v=0.0, alpha_1_v=0.3, beta_1_v=0.1)
+        print(model.admissible, model.response(np.linspace(0.0, 10.0, 100), step_s=1e-4)[-1])
+        ```
+    """
+
+    d1_rad_v: float
+    d2_s_v: float
+    epsilon_rad_v: float
+    delta_s_v: float
+    alpha_1_v: float
+    beta_1_v: float
+    rate_limit_v_s: float = math.inf
+    bias_v: float = 0.0
+    gamma_1_v: float = 0.0
+    eta_1_v: float = 0.0
+    exponent: float = 1.0
 
     def inverse(self, output_rad: ArrayLike, step_s: float) -> Floats:
         """Drive about the bias (V), shape (samples,), that makes the output.
@@ -166,9 +171,6 @@ class BoucWen:
             f"model is {self.reversal_slope_rad_v(float(np.max(np.abs(rate)))):.3g} rad/V at its fastest rate, and its "
             "inverse needs one above 0; fit it with admissible=True, or take a Prandtl-Ishlinskii model"
         )
-
-    def _from_zero(self, drive_v: Floats, step_s: float) -> tuple[Floats, Floats]:
-        return self._run(np.append(0.0, drive_v), step_s)
 
     def _run(self, drive_v: Floats, step_s: float) -> tuple[Floats, Floats]:
         """Output and h behind the first sample, which is rest."""
@@ -284,7 +286,7 @@ def _moved(slope: Callable[[float], float], d1: float, low: float, high: float) 
 
 
 @dataclass(frozen=True, slots=True)
-class PrandtlIshlinskii:
+class PrandtlIshlinskii(_FromRest):
     """A Prandtl-Ishlinskii operator: z = sum of weight x play(threshold), p <- max(q - r, min(q + r, p)).
 
     With ``widening_s`` each threshold above 0 grows with the drive's rate, r + widening |q'|, up to ``rate_limit_v_s``
@@ -292,6 +294,16 @@ class PrandtlIshlinskii:
 
     With a finite ``reach_v`` a polynomial stands beside the plays, a spring that hardens or softens: z has in addition
     c1 s^2 + c2 |s| s + c3 s^3, with (c1, c2, c3) = ``polynomial_rad`` and s = q / reach, held at -1 and 1 beyond them.
+
+    Example:
+        ```python
+        from microrad import PrandtlIshlinskii
+
+        model = PrandtlIshlinskii(thresholds_v=(0.0, 1.0, 3.0), weights_rad_v=(40e-6, 6e-6, 4e-6))
+        loop = model.loop(amplitude_v=10.0, freq_hz=1.0)
+        print(f"{loop.width:.1%} of the travel is hysteresis")
+        print(model.response(model.inverse(loop.output_rad, step_s=2e-3), step_s=2e-3) - loop.output_rad)
+        ```
     """
 
     thresholds_v: tuple[float, ...]
@@ -311,41 +323,6 @@ class PrandtlIshlinskii:
             )
         if not self.widening_s >= 0.0:
             raise ValueError(f"thresholds cannot widen by {self.widening_s} s: give 0 s, or more for a rate")
-
-    def response(self, drive_v: ArrayLike, step_s: float) -> Floats:
-        """Output (rad), shape (samples,), from rest.
-
-        Args:
-            drive_v: Drive about the bias (V), shape (samples,).
-            step_s: Time between samples (s), on which only an operator that widens depends.
-
-        Raises:
-            ValueError: For a drive of another shape or with a number that is not finite, and a step not above 0.
-
-        Example:
-            ```python
-            from microrad import PrandtlIshlinskii
-
-            model = PrandtlIshlinskii(thresholds_v=(0.0, 1.0, 3.0), weights_rad_v=(40e-6, 6e-6, 4e-6))
-            loop = model.loop(amplitude_v=10.0, freq_hz=1.0)
-            print(f"{loop.width:.1%} of the travel is hysteresis")
-            print(model.response(model.inverse(loop.output_rad, step_s=2e-3), step_s=2e-3) - loop.output_rad)
-            ```
-        """
-        return self._run(_from_rest(drive_v, step_s, "drive_v"), step_s)[0]
-
-    def loop(self, amplitude_v: float, freq_hz: float, samples: int = 500) -> HysteresisLoop:
-        """The loop under a sine about the bias, once it repeats itself to 1e-6, or after 1024 periods.
-
-        Args:
-            amplitude_v: Amplitude of the sine (V), above 0.
-            freq_hz: Its frequency (Hz), above 0.
-            samples: Samples of a period, 8 or more.
-
-        Raises:
-            ValueError: For numbers outside of these.
-        """
-        return _settled(self._from_zero, amplitude_v, freq_hz, samples, self.rate_limit_v_s)
 
     def inverse(self, output_rad: ArrayLike, step_s: float) -> Floats:
         """Drive about the bias (V), shape (samples,), that makes the output; exact for an operator that does not widen.
@@ -392,9 +369,6 @@ class PrandtlIshlinskii:
             self.weights_rad_v[0] * self.widening_s / slow,
             self.rate_limit_v_s * slow,
         )
-
-    def _from_zero(self, drive_v: Floats, step_s: float) -> tuple[Floats, Floats]:
-        return self._run(np.append(0.0, drive_v), step_s)
 
     def _run(self, drive_v: Floats, step_s: float) -> tuple[Floats, Floats]:
         """Output, and what of it is not slow gain x drive, behind the first sample, which is rest."""
