@@ -165,3 +165,15 @@ def test_a_controller_of_another_rate_is_refused_and_a_tuned_one_taken_apart():
         LOOP.margins(tuned)
     assert repr(LOOP) == "<Loop of 1 axes at 10000 Hz around mirror 'straight'>"
     assert repr(tuned.controller) == "<Controller 'PI': 2 inputs, 1 outputs, 1 states>"
+
+
+def test_a_linear_system_is_a_mirror_and_gets_a_controller():
+    plain = Mirror.of_system(STRAIGHT.linear_loop, "fitted")
+    drive = np.sin(np.arange(500) * 0.05)
+    assert_allclose(plain.response(drive, 1e-5), STRAIGHT.response(drive, 1e-5), rtol=0, atol=1e-17)
+    loop = replace(LOOP, mirror=plain)
+    assert_allclose(loop.residual_rms_rad(SLOW), LOOP.residual_rms_rad(SLOW), rtol=1e-9)
+    runs = loop.ensemble(tune(loop, "PI").controller, runs=1, duration_s=0.05)
+    assert 0.0 < runs.radial_rms_rad < 20e-6
+    with pytest.raises(ValueError, match="linear system of mirror 'fitted' is not stable"):
+        Mirror.of_system(lti.StateSpace(np.eye(1), np.eye(1), np.eye(1), np.zeros((1, 1))), "fitted")

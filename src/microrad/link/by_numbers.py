@@ -95,7 +95,7 @@ def received_power(
         Line("Transmit gain", gains.gaussian_beam_gain_db(half_angle_rad), "dB", beam, angle, "far field", near),
         Line(
             "Pointing loss",
-            -float(gains.gaussian_pointing_loss_db(pointing_error_rad, half_angle_rad)),
+            0.0 - float(gains.gaussian_pointing_loss_db(pointing_error_rad, half_angle_rad)),
             "dB",
             "exp(-2 (error / theta)^2)",
             _GIVEN,

@@ -139,6 +139,23 @@ class Mirror:
         gain = float(lti.frequency_response(system, np.array([0.0]))[0, 0, 0].real)
         return assemble(name, "cascade", replace(system, C=system.C / gain, D=system.D / gain), model, creep)
 
+    @classmethod
+    def of_system(cls, system: lti.StateSpace, name: str = "mirror") -> "Mirror":
+        """A mirror without hysteresis: a continuous linear system from drives (V) to outputs (rad).
+
+        Args:
+            system: Its matrices, stable, such as the ``system`` of `fit_frequency_response`.
+            name: What the mirror is called in messages.
+
+        Raises:
+            ValueError: For a system that is not stable.
+        """
+        if system.order and np.max(np.linalg.eigvals(system.A).real) >= 0.0:
+            raise ValueError(f"the linear system of mirror {name!r} is not stable: every pole has to have a decay")
+        parts: dict[str, Any] = {key: np.zeros(shape) for key, shape in _no_bank(system).items()}
+        parts |= {key: getattr(system, key) for key in "ABCD"}
+        return cls(name=name, bouc_wen=(), plays=(), inverse=(), **parts)
+
     def linear(self, gains: Sequence[float]) -> lti.StateSpace:
         """The mirror with a gain in place of each element.
 
@@ -311,10 +328,15 @@ def linearised(mirror: Mirror, gains: Sequence[float]) -> Mirror:
         mirror: The mirror.
         gains: One for each element of its bank.
     """
-    s, (outputs, inputs) = mirror.linear(gains), mirror.D.shape
-    none = {"E": (s.order, 0), "F": (0, s.order), "G": (0, inputs), "K": (outputs, 0)}
-    parts: dict[str, Any] = {key: np.zeros(shape) for key, shape in none.items()}
-    return replace(mirror, A=s.A, B=s.B, C=s.C, D=s.D, bouc_wen=(), plays=(), **parts)
+    s = mirror.linear(gains)
+    without: dict[str, Any] = {key: np.zeros(shape) for key, shape in _no_bank(s).items()}
+    return replace(mirror, A=s.A, B=s.B, C=s.C, D=s.D, bouc_wen=(), plays=(), **without)
+
+
+def _no_bank(system: lti.StateSpace) -> dict[str, tuple[int, int]]:
+    """Shapes of the matrices of a bank without elements."""
+    n, (outputs, inputs) = system.order, system.D.shape
+    return {"E": (n, 0), "F": (0, n), "G": (0, inputs), "K": (outputs, 0)}
 
 
 def discretise(mirror: Mirror, step_s: float, *, often: bool = False) -> kernels.Plant:
