@@ -657,8 +657,7 @@ def test_kills_at_any_moment_lose_and_double_nothing(path):
     draw, acknowledged, kills = random.Random(3), 0, 10 if os.environ.get("MICRORAD_ENDURANCE") else 3
     for _ in range(kills):
         with process(path, 10**6) as child:
-            while child.stdout.readline().strip() != "open":
-                pass
+            assert "open" in (line.strip() for line in iter(child.stdout.readline, ""))
             lines = [child.stdout.readline() for _ in range(draw.randrange(5))]
             any_moment(draw, 0.03)
             child.kill()

@@ -220,10 +220,8 @@ def _failed(error: BaseException) -> int:
         say(f"{where}; nothing was written. Check free space and permissions.")
         return REFUSED
     if _meant_for_users(error):
-        say(str(error) or "not enough memory")
         page = getattr(error, "page", "") or getattr(error.__cause__, "page", "")
-        if page:
-            print(f"docs/{page}.md says more.", file=sys.stderr)
+        say((str(error) or "not enough memory") + (f" (see docs/{page}.md)" if page else ""))
         return REFUSED
     traceback.print_exception(error)
     say("a fault of microrad or of its installation: run microrad doctor; if all is well, report the lines above.")
