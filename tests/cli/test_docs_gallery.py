@@ -177,6 +177,7 @@ def test_a_recorded_mirror_goes_to_flight(walk):
     walk.through(EXAMPLES[FLIGHT])
 
 
+@pytest.mark.endurance
 def test_a_made_up_mirror_goes_to_flight(walk, monkeypatch, undrawn):
     """The same commands with recordings of a plate on three actuators, a linear model and one controller."""
 
