@@ -1,8 +1,8 @@
 """docs/gallery.md: each example is walked through as it stands, prints what stands there, and has no other figure.
 
-Five of the six are walked through by `make endurance`: the commands and functions in them have tests of their own. That
-of the recorded mirror takes its recordings from the folder that MICRORAD_DATA names; it is walked through once more with
-recordings that are made here and a smaller search.
+Five of the six are walked through by `make endurance`: the commands and functions in them have tests of their own.
+That of the recorded mirror takes its recordings from the folder that MICRORAD_DATA names; it is walked through once
+more with recordings that are made here and a smaller search.
 """
 
 import json
