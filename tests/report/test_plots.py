@@ -246,10 +246,10 @@ def test_a_bode_plot_shows_the_table_the_model_and_its_confidence():
 
 def test_the_confidence_of_a_model_is_that_of_its_gain_and_what_draws_of_noise_do():
     fit, t = result("fit"), table(1)
-    along, across = plots.model_spread(fit, np.array([fit.band_hz[0]]))
-    assert_allclose(along[0] / 1.96, fit.known.edge_gain_error, rtol=1e-6)
+    along, across = fit.response_errors([fit.band_hz[0]])
+    assert_allclose(along[0], fit.known.edge_gain_error, rtol=1e-6)
     freq = np.array([20.0, 120.0, 500.0])
-    along, across = (each[:, 0, 0] / 1.96 for each in plots.model_spread(fit, freq))
+    along, across = (each[:, 0, 0] for each in fit.response_errors(freq))
     true = t.true_response
     found = []
     for seed in range(60):

@@ -12,6 +12,8 @@ from microrad.core.units import ELEMENTARY_CHARGE_C, format_quantity
 RATE_TOLERANCE = 1e-9
 """How far, relatively, a sensor's period or delay may lie from a whole number of control samples or plant steps."""
 
+EXPOSURE = "it runs from the middle of the exposure to the delivery"
+
 _NOT_STATED = "not stated"
 
 
@@ -90,8 +92,9 @@ def optical_sensor(
     """
     _above_zero("control rate", control_rate_hz, "Hz")
     _above_zero("plant step", plant_step_s, "s")
-    every, delay_steps = _every(rate_hz, control_rate_hz), _delay_steps(delay_s, plant_step_s)
-    return OpticalSensor(noise_rad, field_of_view_rad, resolution_rad, every, delay_steps)
+    every = _every(rate_hz, control_rate_hz)
+    steps = delay_steps("optical sensor", delay_s, plant_step_s, EXPOSURE)
+    return OpticalSensor(noise_rad, field_of_view_rad, resolution_rad, every, steps)
 
 
 def _every(rate_hz: float, control_rate_hz: float) -> int:
@@ -116,14 +119,25 @@ def _every(rate_hz: float, control_rate_hz: float) -> int:
     return every
 
 
-def _delay_steps(delay_s: float, plant_step_s: float) -> int:
-    _zero_or_more("optical sensor: delay", delay_s, "s", "it runs from the middle of the exposure to the delivery")
+def delay_steps(what: str, delay_s: float, plant_step_s: float, note: str) -> int:
+    """A delay as a whole number of plant steps.
+
+    Args:
+        what: Whose delay it is, as a message begins.
+        delay_s: The delay (s), 0 or above.
+        plant_step_s: Step at which the plant is simulated (s).
+        note: What it counts, for the message about one that is no delay.
+
+    Raises:
+        ValueError: It is negative, not finite or no whole number of steps; with the nearest that would do.
+    """
+    _zero_or_more(f"{what}: delay", delay_s, "s", note)
     steps = round(delay_s / plant_step_s)
     if abs(steps * plant_step_s - delay_s) > RATE_TOLERANCE * delay_s:
         raise ValueError(
-            f"optical sensor: its delay of {format_quantity(delay_s, 's', 12)} is no whole number of plant steps of "
-            f"{format_quantity(plant_step_s, 's', 12)}: it would be delivered inside a step; the nearest delay that "
-            f"would do is {format_quantity(steps * plant_step_s, 's', 12)}, or choose a plant step that divides it"
+            f"{what}: its delay of {format_quantity(delay_s, 's', 12)} is no whole number of plant steps of "
+            f"{format_quantity(plant_step_s, 's', 12)}: it would end inside a step; the nearest delay that would do is "
+            f"{format_quantity(steps * plant_step_s, 's', 12)}, or choose a plant step that divides it"
         )
     return steps
 

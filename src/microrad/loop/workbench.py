@@ -19,7 +19,7 @@ from microrad.loop.pointing_loop import ensemble, traces
 from microrad.loop.pointing_loop.design import design_plant, whole_plant
 from microrad.loop.pointing_loop.linear import close, stationary
 from microrad.loop.pointing_loop.loop import LoopController, PointingLoop, assemble, assemble_whole, decoupling
-from microrad.loop.sensor import OpticalSensor, StrainGauge
+from microrad.loop.sensor import EXPOSURE, OpticalSensor, StrainGauge, delay_steps
 from microrad.mirror import Mirror
 
 Kind = Literal["PI", "PI + notch", "resonant damping", "disturbance observer", "LQG", "H-infinity"]
@@ -186,7 +186,7 @@ class Loop:
             raise ValueError(f"drive_range_v of a loop is ({low}, {high}) V: rest, 0 V, has to lie inside")
         if self.gauge_noise_rad is not None and self._optics.shape != (self.mirror.axes, self.mirror.axes):
             raise ValueError("a loop with a gauge needs one line-of-sight angle for each output of the mirror")
-        self.parts.optical, self.parts.timing  # noqa: B018  refuses what is wrong of them
+        _ = self.parts  # refuses what is wrong of delays and sensors
 
     def __repr__(self) -> str:
         """What it is, without its arrays."""
@@ -215,15 +215,25 @@ class Loop:
         given = self.vibration if isinstance(self.vibration, tuple) else (self.vibration,)
         period = 1.0 / self.rate_hz
         step = period / self.steps_per_sample
+        late = delay_steps("loop", self.delay_s, step, "it runs from the sample to its command")
+        seen_late = delay_steps("sensor of the loop", self.sensor_delay_s, step, EXPOSURE)
         low, high = self.drive_range_v
         return PointingLoop(
             mirror=self.mirror,
             optics=self._optics,
             drive=control.Drive(low, high, self.amplifier_bandwidth_hz, self.slew_v_s, 0.0, 0.0),
-            timing=control.Timing(period, self.steps_per_sample, _steps("delay_s", self.delay_s, step)),
+            timing=control.Timing(
+                period,
+                self.steps_per_sample,
+                late,
+            ),
             disturbances=(given,) * self.axes,
             optical=OpticalSensor(
-                self.sensor_noise_rad, math.inf, 0.0, 1, _steps("sensor_delay_s", self.sensor_delay_s, step)
+                self.sensor_noise_rad,
+                math.inf,
+                0.0,
+                1,
+                seen_late,
             ),
             gauge=None if self.gauge_noise_rad is None else StrainGauge(self.gauge_noise_rad, 0.0),
             references=(NO_REFERENCE,) * self.axes,
@@ -351,19 +361,6 @@ class Loop:
                 f"for each, and an anti-windup of shape ({s.order}, {axes})"
             )
         return s
-
-
-def _steps(name: str, delay_s: float, step_s: float) -> int:
-    """A delay as a whole number of plant steps."""
-    if not 0.0 <= delay_s < math.inf:
-        raise ValueError(f"{name} of a loop is {delay_s} s: give a finite number of at least 0")
-    steps = round(delay_s / step_s)
-    if abs(steps * step_s - delay_s) > 1e-9 * delay_s:
-        raise ValueError(
-            f"{name} of a loop is {delay_s:g} s, no whole number of plant steps of {step_s:g} s: the nearest that "
-            f"would do is {steps * step_s:g} s, or choose steps_per_sample so that it is one"
-        )
-    return steps
 
 
 def tune(

@@ -5,7 +5,6 @@ Each takes `axes` too, one for each of its panels, and gives them back; without 
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from itertools import cycle, product
 from typing import Any
 
@@ -13,7 +12,6 @@ import numpy as np
 
 from microrad.core.arrays import Complexes, Floats
 from microrad.lab.identify import FrequencyResponseFit, Identification
-from microrad.lab.identify.linear.polish import pack, unpack
 from microrad.lab.identify.linear.response import FrequencyResponse
 from microrad.link.study import LinkStudy
 from microrad.loop.disturbance.records import Disturbance, band_rms, psd
@@ -37,7 +35,6 @@ from microrad.study.study import Study
 from microrad.study.study import margin_map as computed_map
 
 _95 = 1.96  # standard deviations about a normal variable that hold 95 % of it
-_STEP = 1e-3  # of a standard error, by which parameters are moved
 _FINE = 400  # frequencies of a model's curve beside those of its table
 _DENSE = 2000  # frequencies of a disturbance's spectrum
 _AROUND = 30.0  # times the corners of a disturbance, to either side
@@ -306,7 +303,7 @@ def _fit_bode(fit: FrequencyResponseFit) -> Sheet:
     freq = fit.freq_hz[fit.freq_hz > 0.0]
     table = _table(fit)[fit.freq_hz > 0.0]
     fine = np.union1d(freq, np.geomspace(freq[0], freq[-1], _FINE))
-    model, (along, across) = fit.response(fine), model_spread(fit, fine)
+    model, (along, across) = fit.response(fine), (_95 * each for each in fit.response_errors(fine))
 
     def curves(row: int, column: int) -> tuple[Measured, Modelled]:
         at = (slice(None), row, column)
@@ -318,35 +315,6 @@ def _fit_bode(fit: FrequencyResponseFit) -> Sheet:
 def _table(fit: FrequencyResponseFit) -> Complexes:
     """The table that was fitted."""
     return np.asarray(fit.residual + fit.response(fit.freq_hz))
-
-
-def model_spread(fit: FrequencyResponseFit, freq_hz: Floats) -> tuple[Floats, Floats]:
-    """Half the width of a model's 95 % confidence, from the covariance of its parameters, to first order.
-
-    Each direction of the covariance moves all parameters by a small part of its standard deviation.
-
-    Args:
-        fit: the fit.
-        freq_hz: frequencies (frequencies,) in Hz.
-
-    Returns:
-        That of the gain, in its unit, and that of the phase (rad): (frequencies, outputs, inputs) each.
-    """
-    centre, numbers = fit.response(freq_hz), pack(fit.modes, not fit.strictly_proper)
-    size = np.sqrt(np.maximum(np.diag(fit.covariance), 1e-300))
-    values, vectors = np.linalg.eigh(fit.covariance / np.outer(size, size))
-    turn = centre.conj() / np.maximum(np.abs(centre), 1e-300)
-    along, across = np.zeros(centre.shape), np.zeros(centre.shape)
-
-    def response(step: Floats) -> Complexes:
-        model = unpack(numbers + step[: numbers.size], fit.modes)
-        moved = replace(model, delay_s=fit.delay_s + float(step[numbers.size :].sum()))
-        return moved.response(freq_hz, fit.hold, fit.rate_hz)
-
-    for step in (size[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))).T:
-        slope = turn * (response(_STEP * step) - response(-_STEP * step)) / (2.0 * _STEP)
-        along, across = along + slope.real**2, across + slope.imag**2
-    return _95 * np.sqrt(along), _95 * np.sqrt(across) / np.maximum(np.abs(centre), 1e-300)
 
 
 def _measured_bode(found: FrequencyResponse) -> Sheet:

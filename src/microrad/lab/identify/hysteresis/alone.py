@@ -104,60 +104,28 @@ def fit_hysteresis(
         raise IdentificationError(f"no hysteresis model is called '{model}'; there are {', '.join(STATIC_FORMS)}.")
     several = [recordings] if isinstance(recordings, Recording) else list(recordings)
     units = Units(input_unit, output_unit)
+    fit: PrandtlIshlinskiiFit | BoucWenFit | JointFit
     if model == "prandtl_ishlinskii":
-        found = _of_plays(fit_prandtl_ishlinskii(several, units=units))
+        fit = fit_prandtl_ishlinskii(several, units=units)
+        names: Sequence[str] = [f"weight at {threshold:.4g} V" for threshold in fit.thresholds_v]
+        values, errors = fit.sign * fit.weights_rad_per_v, fit.standard_errors_rad_per_v
     elif model == "bouc_wen":
-        found = _of_bouc_wen(
-            fit_bouc_wen(several, seed=seed, admissible=admissible, on_progress=on_progress, units=units)
-        )
+        fit = fit_bouc_wen(several, seed=seed, admissible=admissible, on_progress=on_progress, units=units)
+        names, values, errors = PARAMETERS, fit.values, fit.standard_errors
     else:
-        found = _of_joint(fit_joint(several, model, units, admissible=admissible, seed=seed, on_progress=on_progress))
+        fit = fit_joint(several, model, units, admissible=admissible, seed=seed, on_progress=on_progress)
+        names = [p.name for p in fit.structure.parameters]
+        values, errors = fit.fit.values, fit.fit.standard_errors
     bias_v = float(np.mean([r.drive[0, 0] for r in several])) * units.volts
-    own = found.model if isinstance(found.model, PrandtlIshlinskii) else replace(found.model, bias_v=bias_v)
-    return replace(found, model=own, bias_v=bias_v)
-
-
-def _of_plays(fit: PrandtlIshlinskiiFit) -> HysteresisFit:
-    names = [f"weight at {threshold:.4g} V" for threshold in fit.thresholds_v]
+    own = fit.model
     return HysteresisFit(
         name=fit.name,
-        model=fit.model,
-        creep=NO_CREEP,
-        bias_v=0.0,
-        values=dict(zip(names, (fit.sign * fit.weights_rad_per_v).tolist(), strict=True)),
-        standard_errors=dict(zip(names, fit.standard_errors_rad_per_v.tolist(), strict=True)),
-        not_identified=(),
-        residual_rms_percent=fit.residual_rms_percent,
-        rate_limit_v_s=fit.rate_limit_v_per_s,
-        samples=fit.samples_used,
-    )
-
-
-def _of_bouc_wen(fit: BoucWenFit) -> HysteresisFit:
-    return HysteresisFit(
-        name=fit.name,
-        model=fit.model,
-        creep=NO_CREEP,
-        bias_v=0.0,
-        values=dict(zip(PARAMETERS, fit.values.tolist(), strict=True)),
-        standard_errors=dict(zip(PARAMETERS, fit.standard_errors.tolist(), strict=True)),
-        not_identified=tuple((each.name, each.reason) for each in fit.not_identified),
-        residual_rms_percent=fit.residual_rms_percent,
-        rate_limit_v_s=fit.rate_limit_v_per_s,
-        samples=fit.samples_used,
-    )
-
-
-def _of_joint(fit: JointFit) -> HysteresisFit:
-    names = [p.name for p in fit.structure.parameters]
-    return HysteresisFit(
-        name=fit.name,
-        model=fit.model,
-        creep=fit.creep,
-        bias_v=0.0,
-        values=dict(zip(names, fit.fit.values.tolist(), strict=True)),
-        standard_errors=dict(zip(names, fit.fit.standard_errors.tolist(), strict=True)),
-        not_identified=fit.not_identified,
+        model=own if isinstance(own, PrandtlIshlinskii) else replace(own, bias_v=bias_v),
+        creep=fit.creep if isinstance(fit, JointFit) else NO_CREEP,
+        bias_v=bias_v,
+        values=dict(zip(names, values.tolist(), strict=True)),
+        standard_errors=dict(zip(names, errors.tolist(), strict=True)),
+        not_identified=tuple((name, reason) for name, reason in fit.not_identified),
         residual_rms_percent=fit.residual_rms_percent,
         rate_limit_v_s=fit.rate_limit_v_per_s,
         samples=fit.samples_used,

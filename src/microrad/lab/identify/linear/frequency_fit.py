@@ -21,7 +21,7 @@ from microrad.lab.identify.linear.elements import ElementEquations
 from microrad.lab.identify.linear.fit import OrderScore, choose, given_orders, range_warnings
 from microrad.lab.identify.linear.modal import Hold, ModalModel, order_modes
 from microrad.lab.identify.linear.order import exchanged, reduced
-from microrad.lab.identify.linear.polish import Polished, fit_outputs, normal_equations, polish
+from microrad.lab.identify.linear.polish import Polished, fit_outputs, normal_equations, pack, polish, unpack
 from microrad.lab.identify.linear.response_table import ResponseTable, band_hz, check_numbers, checked
 from microrad.lab.identify.linear.uncertainty import Natural, Uncertainty, inverse_normal, natural, uncertainty
 from microrad.lab.identify.linear.vector_fitting import VectorFit, sketched, vector_fit
@@ -34,6 +34,7 @@ _MISFIT = 3.0  # standard deviations of chi-square
 _ZEROS_TO = 10.0  # times the highest frequency, where there is no sample rate
 _EXCHANGES = 12
 _ROUNDING = 1e-10
+_MOVED = 1e-3  # of a standard error, by which parameters are moved
 _OPEN = 0.05  # periods of the highest frequency
 _UNEVEN = 3.0  # times as much left above the median of the response as below
 
@@ -145,6 +146,31 @@ class FrequencyResponseFit:
             freq_hz: Frequencies, in Hz, shape (frequencies,).
         """
         return self.modes.response(np.atleast_1d(np.asarray(freq_hz, dtype=float)), self.hold, self.rate_hz)
+
+    def response_errors(self, freq_hz: ArrayLike) -> tuple[Floats, Floats]:
+        """Standard errors of the model's gain, in its unit, and of its phase (rad), to first order.
+
+        Each direction of the covariance moves all parameters by a small part of its standard deviation. Both have the
+        shape (frequencies, outputs, inputs).
+
+        Args:
+            freq_hz: Frequencies, in Hz, shape (frequencies,).
+        """
+        centre, numbers = self.response(freq_hz), pack(self.modes, not self.strictly_proper)
+        size = np.sqrt(np.maximum(np.diag(self.covariance), 1e-300))
+        values, vectors = np.linalg.eigh(self.covariance / np.outer(size, size))
+        turn = centre.conj() / np.maximum(np.abs(centre), 1e-300)
+        along, across = np.zeros(centre.shape), np.zeros(centre.shape)
+
+        def response(step: Floats) -> Complexes:
+            model = unpack(numbers + step[: numbers.size], self.modes)
+            moved = replace(self, modes=replace(model, delay_s=self.delay_s + float(step[numbers.size :].sum())))
+            return moved.response(freq_hz)
+
+        for step in (size[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))).T:
+            slope = turn * (response(_MOVED * step) - response(-_MOVED * step)) / (2.0 * _MOVED)
+            along, across = along + slope.real**2, across + slope.imag**2
+        return np.sqrt(along), np.sqrt(across) / np.maximum(np.abs(centre), 1e-300)
 
     def to_control(self) -> Any:
         """The system as a continuous `control.StateSpace`; a delay is left out.
