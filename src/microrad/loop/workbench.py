@@ -222,19 +222,9 @@ class Loop:
             mirror=self.mirror,
             optics=self._optics,
             drive=control.Drive(low, high, self.amplifier_bandwidth_hz, self.slew_v_s, 0.0, 0.0),
-            timing=control.Timing(
-                period,
-                self.steps_per_sample,
-                late,
-            ),
+            timing=control.Timing(period, self.steps_per_sample, late),
             disturbances=(given,) * self.axes,
-            optical=OpticalSensor(
-                self.sensor_noise_rad,
-                math.inf,
-                0.0,
-                1,
-                seen_late,
-            ),
+            optical=OpticalSensor(self.sensor_noise_rad, math.inf, 0.0, 1, seen_late),
             gauge=None if self.gauge_noise_rad is None else StrainGauge(self.gauge_noise_rad, 0.0),
             references=(NO_REFERENCE,) * self.axes,
         )
