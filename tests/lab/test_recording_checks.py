@@ -15,6 +15,7 @@ from microrad.lab.recording import (
     recording_from_arrays,
 )
 from microrad.lab.recording.checks.channel import _trend
+from microrad.lab.recording.checks.sample_rate import rate_of_time
 from places import DATA
 
 needs_data = pytest.mark.skipif(not DATA.is_dir(), reason=f"real recordings are not at {DATA}")
@@ -442,3 +443,13 @@ def test_the_error_of_a_trend_is_that_of_its_blocks():
     told = np.mean([error**2 for _, error in found])
     # Its own scatter is 0.9 %; a straight line through all samples leaves the windowed means 4 % more.
     assert told == pytest.approx(12 * of_means / 8, rel=0.08)
+
+
+@pytest.mark.parametrize(("step_s", "samples"), [(2e-5, 90_000), (5e-4, 12_000), (2e-6, 500_000)])
+def test_the_digits_of_a_long_time_column_are_those_of_its_steps(step_s, samples):
+    """Every 45th of 90 000 samples of 20 us is a multiple of 0.1 ms: the digits are seen between neighbours."""
+    time_s = np.round(step_s * np.arange(samples), 9)
+    stated, findings = rate_of_time("loops.csv", "time", time_s, lambda row: f"row {row}")
+    assert findings == [] and stated.rate_hz == pytest.approx(1 / step_s)
+    (coarse,) = rate_of_time("loops.csv", "time", np.round(time_s, 3), lambda row: f"row {row}")[1]
+    assert "is printed to 0.001 s, coarser than the step" in coarse.message

@@ -98,7 +98,8 @@ def rate_of_time(
 
 def _resolution(time_s: Floats) -> float:
     """Smallest step that the digits, or the type before it became float64, can show."""
-    sample = time_s[:: max(1, time_s.size // 2000)]
+    stride = max(1, time_s.size // 2000)
+    sample = np.concatenate([time_s[::stride], time_s[: 2 * stride]])  # far ones may all be round: neighbours are not
     largest = float(np.max(np.abs(time_s[[0, -1]])))
     rounding = 4 * float(np.spacing(largest))
     if np.array_equal(sample.astype(np.float32).astype(np.float64), sample):
