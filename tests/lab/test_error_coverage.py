@@ -1,6 +1,5 @@
 """Known truths: their simulation and the bound of their errors against closed forms, and a few of them identified."""
 
-import importlib.util
 import math
 import os
 import subprocess
@@ -11,12 +10,9 @@ import numpy as np
 import pytest
 
 import truths
-from places import ROOT
+from places import benchmark
 
-SPEC = importlib.util.spec_from_file_location("error_coverage", ROOT / "benchmarks" / "error_coverage.py")
-coverage = importlib.util.module_from_spec(SPEC)
-sys.modules[SPEC.name] = coverage
-SPEC.loader.exec_module(coverage)
+coverage = benchmark("error_coverage")
 
 ROUNDING = 1e-9
 LAGS = [f"lag {i}" for i in range(len(coverage.LAGS_S))]
@@ -143,7 +139,7 @@ def test_known_truth_is_found_within_its_errors(seed):
 @pytest.mark.endurance
 def test_all_truths_meet_the_bars():
     """As the benchmark prints it, with BLAS in one thread as the command line has it: no line misses a bar."""
-    command, environment = [sys.executable, SPEC.origin], {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+    command, environment = [sys.executable, coverage.__file__], {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
     ran = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     assert ran.returncode == 0, ran.stdout + ran.stderr
     assert len(ran.stdout.splitlines()) > coverage.TRUTHS

@@ -1,6 +1,5 @@
 """Where microrad's link budgets and published ones differ, to the digits that the benchmark prints."""
 
-import importlib.util
 import math
 import sys
 from dataclasses import replace
@@ -10,11 +9,9 @@ import pytest
 
 from microrad import link
 from microrad.link import beams, gains
-from places import ROOT
+from places import benchmark
 
-SPEC = importlib.util.spec_from_file_location("link_conventions", ROOT / "benchmarks" / "link_conventions.py")
-peers = importlib.util.module_from_spec(SPEC)
-SPEC.loader.exec_module(peers)
+peers = benchmark("link_conventions")
 last_printed_digit = 0.00006
 
 

@@ -1,6 +1,5 @@
 """What benchmarks found: kept in one file a release, and said by the page and its figure as it stands there."""
 
-import importlib.util
 import json
 import sys
 
@@ -9,11 +8,9 @@ import pytest
 import benchmarks_page as benchmarks
 from microrad.report.plotting.sheet import Line
 from microrad.report.plotting.svg import svg_of
-from places import ROOT
+from places import benchmark
 
-SPEC = importlib.util.spec_from_file_location("recorded", ROOT / "benchmarks" / "recorded.py")
-recorded = importlib.util.module_from_spec(SPEC)  # the folder on the path would hide packages of the tests
-SPEC.loader.exec_module(recorded)
+recorded = benchmark("recorded")
 
 
 @pytest.fixture
