@@ -42,9 +42,11 @@ def build(target: Path) -> list[str]:
             page.write_text(text, encoding="utf-8")
         warnings = io.StringIO()
         said = {"status": None, "warning": warnings, "confdir": sources, "srcdir": sources}
-        app = Sphinx(outdir=target, doctreedir=trees, buildername="html", freshenv=True, **said)
+        built = Path(temporary, "site")  # what notebooks made is left beside it
+        app = Sphinx(outdir=built, doctreedir=trees, buildername="html", freshenv=True, **said)
         app.build()
-        shutil.rmtree(target / ".doctrees", ignore_errors=True)
+        shutil.rmtree(built / ".doctrees", ignore_errors=True)
+        shutil.move(built, target)
         raised = re.sub(r"\x1b\[[0-9;]*m", "", warnings.getvalue()).replace(str(sources), "docs")
     return [line for line in raised.splitlines() if line.strip()] + faults(target)
 

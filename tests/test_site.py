@@ -37,6 +37,7 @@ def test_nothing_is_wrong_with_it(site):
     folder, ran = site
     assert (ran.returncode, ran.stdout) == (0, f"{folder / 'index.html'}\n"), ran.stdout + ran.stderr
     assert (folder / "index.html").is_file()
+    assert [*folder.parent.iterdir()] == [folder], "something was left beside it"
     assert any(address.startswith("https://") for address in build_site.external_links(folder))
 
 

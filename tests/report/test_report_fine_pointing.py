@@ -19,7 +19,7 @@ from microrad.loop import control, controller_study
 from microrad.loop.control.tuning import MARGIN
 from microrad.loop.controller_study import Difference, ErrorBudget, FinePointingStudy, Part, Residual, Sine, Verified
 from microrad.loop.pointing_loop.design import design_plant
-from microrad.loop.pointing_loop.ensemble import bin_edges_rad
+from microrad.loop.pointing_loop.ensemble import COUNTERS, bin_edges_rad
 from microrad.loop.pointing_loop.linear import close, residual_spectrum, stationary
 from microrad.loop.pointing_loop.loop import ReferenceFilter, assemble, with_inverse
 from microrad.report import quantities
@@ -560,7 +560,7 @@ LIMITS = {
 
 @pytest.mark.parametrize("limit", LIMITS)
 def test_a_limit_that_a_controller_met_is_a_warning_and_on_the_page(fine, mission, limit):
-    assert set(LIMITS) == set(controller_study.COUNTERS)
+    assert set(LIMITS) == set(COUNTERS)
     met = with_residual(fine, THIRD, "comparison", shares={limit: LIMITS[limit]})
     percent = "< 0.001 %" if LIMITS[limit] == 1e-6 else f"{100 * LIMITS[limit]:g} %"
     assert f"fine pointing: {THIRD} on the comparison model: {percent} {limit}" in warned(met, mission)

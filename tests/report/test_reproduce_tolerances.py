@@ -7,7 +7,7 @@ import re
 import pytest
 
 from microrad import report
-from microrad.loop.controller_study import COUNTERS
+from microrad.loop.pointing_loop.ensemble import COUNTERS
 from microrad.report.data import finite
 from microrad.report.links.data import performance_data
 from microrad.report.results import comparison as compared

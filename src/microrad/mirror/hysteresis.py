@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from microrad.core import kernels
 from microrad.core.arrays import Floats
+from microrad.core.labelled import Dataset, Group, variables
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,6 +41,17 @@ class HysteresisLoop:
     def width(self) -> float:
         """Share of the output's peak-to-peak that is hysteresis."""
         return float(np.ptp(self.hysteresis_rad) / np.ptp(self.output_rad))
+
+    def to_xarray(self) -> Dataset:
+        """Drive, output and hysteresis by the sample of the period; frequency, width and ``clamped`` as attributes."""
+        data = variables(
+            "sample",
+            drive=("V", "drive about the bias", self.drive_v),
+            output=("rad", "output about the bias", self.output_rad),
+            hysteresis=("rad", "hysteresis h", self.hysteresis_rad),
+        )
+        said = {"frequency_hz": self.freq_hz, "width": self.width, "clamped": self.clamped}
+        return Group(data, attributes=said).to_xarray()
 
 
 _REPEATS, _PERIODS = 1e-6, 1024

@@ -24,7 +24,6 @@ from microrad.loop.controller_study.designs import (
 from microrad.loop.controller_study.designs import design as plain_designs
 from microrad.loop.controller_study.promises import design, design_and_promise
 from microrad.loop.controller_study.results import (
-    COUNTERS,
     PROMISE,
     Difference,
     ErrorBudget,
@@ -43,7 +42,6 @@ from microrad.loop.controller_study.scenario import AnyScene, Scene, scene, tabl
 
 __all__ = [
     "BASELINE",
-    "COUNTERS",
     "PROMISE",
     "AnyDesign",
     "AnyScene",

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad.core import kernels
 from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
 from microrad.loop.control import inverse
@@ -19,15 +18,6 @@ from microrad.loop.pointing_loop.linear import Stationary, close, residual_spect
 from microrad.loop.pointing_loop.loop import LoopController, PointingLoop
 from microrad.mirror import Variant
 from microrad.mission.tables.fine_pointing import FinePointing
-
-COUNTERS = {
-    "saturated samples": kernels.COUNT_SATURATED,
-    "slew-limited steps": kernels.COUNT_SLEW,
-    "steps beyond the identified rate": kernels.COUNT_CLAMPED,
-    "inverse beyond the identified rate": kernels.COUNT_INVERSE_CLAMPED,
-    "steps outside the identified drive range": kernels.COUNT_OUTSIDE,
-    "samples without the spot": kernels.COUNT_LOST,
-}
 
 PROMISE = 1.5
 """How many times its linear rms a design may leave when it is simulated, before that figure is no promise."""
@@ -277,7 +267,7 @@ def residual(run: ensemble.Ensemble, quantile: float) -> Residual:
         run: The ensemble.
         quantile: Share of the time, 0 to 1, that the error of the record stays below.
     """
-    shares = {name: run.share(counter) for name, counter in COUNTERS.items()}
+    shares = {name: run.share(counter) for name, counter in ensemble.COUNTERS.items()}
     return Residual(
         run.radial_rms_rad,
         run.radial_rms_interval_rad(),

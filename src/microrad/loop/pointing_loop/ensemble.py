@@ -12,12 +12,24 @@ from numpy.typing import NDArray
 
 from microrad.core import compiling, kernels, lti
 from microrad.core.arrays import Floats
+from microrad.core.labelled import TEXT, Dataset, Group, Variable, variables
 from microrad.core.progress import Progress
 from microrad.core.threads import in_background, in_threads
 from microrad.loop.pointing_loop.kernel_arrays import LANES, Shaping, arrays, combined_shaping, reference, start
 from microrad.loop.pointing_loop.loop import LoopController, PointingLoop
 
 SLICE_SAMPLES = 2048  # control samples between two returns from the kernel, and at most in a segment of the spectrum
+
+
+COUNTERS = {
+    "saturated samples": kernels.COUNT_SATURATED,
+    "slew-limited steps": kernels.COUNT_SLEW,
+    "steps beyond the identified rate": kernels.COUNT_CLAMPED,
+    "inverse beyond the identified rate": kernels.COUNT_INVERSE_CLAMPED,
+    "steps outside the identified drive range": kernels.COUNT_OUTSIDE,
+    "samples without the spot": kernels.COUNT_LOST,
+}
+"""Limits that a run may meet, and where `Ensemble.counts` counts them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +83,26 @@ class Ensemble:
         """Share of the time with a larger radial error, over all runs, from the histogram."""
         return histogram_beyond(self.histogram.sum(axis=0), radius_rad)
 
+    def to_xarray(self) -> Dataset:
+        """The same by run, axis, radius, limit and frequency; a radius is the upper edge of its bin."""
+        by_axis = variables(
+            "run axis",
+            rms=("rad", "root mean square of the pointing error, about zero", self.rms_rad),
+            mean=("rad", "mean of the pointing error", self.mean_rad),
+        )
+        largest = variables("run", largest=("rad", "largest radial error", self.largest_rad))
+        binned = variables("run radius", histogram=("1", "control samples by their radial error", self.histogram))
+        met = "how often a limit was met, of all actuators or elements"
+        counts = variables("run limit", counts=("1", met, self.counts[:, list(COUNTERS.values())]))
+        spectrum = ("rad^2/Hz", "one-sided spectrum of the residual, first batch of runs", self.psd_rad2_hz)
+        names = axis_names(self.rms_rad.shape[1])
+        names |= variables("radius", radius=("rad", "radial error, upper edge of its bin", bin_edges_rad()[1:]))
+        names |= variables("limit", limit=(TEXT, "limit", [*COUNTERS]))
+        names |= variables("frequency", frequency=("Hz", "frequency", self.freq_hz))
+        data = {**by_axis, **largest, **binned, **counts, **variables("frequency axis", spectrum=spectrum)}
+        said = {"controller": self.name, "run_s": self.seconds, "samples": self.samples, "steps": self.steps}
+        return Group(data, names, {**said, "readings": self.readings}).to_xarray()
+
     def part(self, first: int, runs: int) -> "Ensemble":
         """The statistics of some of the runs; the spectrum is left as it is.
 
@@ -93,6 +125,11 @@ class Ensemble:
         sampled = counter in (kernels.COUNT_SATURATED, kernels.COUNT_INVERSE_CLAMPED)
         times = self.readings if counter == kernels.COUNT_LOST else self.samples if sampled else self.steps
         return float(np.mean(self.counts[:, counter])) / max(times, 1)  # no reading in a short run: none lost
+
+
+def axis_names(axes: int) -> dict[str, Variable]:
+    """Axes of the line of sight, as a coordinate."""
+    return variables("axis", axis=(TEXT, "axis of the line of sight", ("x", "y")[:axes]))
 
 
 @cache

@@ -7,7 +7,8 @@ import numpy as np
 
 from microrad.core import kernels
 from microrad.core.arrays import Floats
-from microrad.loop.pointing_loop.ensemble import SLICE_SAMPLES, Span, control_samples
+from microrad.core.labelled import Dataset, Group, variables
+from microrad.loop.pointing_loop.ensemble import SLICE_SAMPLES, Span, axis_names, control_samples
 from microrad.loop.pointing_loop.kernel_arrays import LANES, References, arrays, reference, start
 from microrad.loop.pointing_loop.loop import LoopController, PointingLoop
 
@@ -27,6 +28,20 @@ class PointingTrace:
     measured_rad: Floats
     drive_v: Floats
     mirror_rad: Floats
+
+    def to_xarray(self) -> Dataset:
+        """The same by time in s and, where there are several, by axis, actuator and output of the mirror."""
+        by_axis = variables(
+            "time axis",
+            reference=("rad", "pointing reference", self.reference_rad),
+            disturbance=("rad", "disturbance before the loop, at the line of sight", self.disturbance_rad),
+            error=("rad", "pointing error at the line of sight", self.error_rad),
+            measured=("rad", "reading of the optical sensor", self.measured_rad),
+        )
+        drive = variables("time actuator", drive=("V", "drive behind the amplifier, from the bias", self.drive_v))
+        mirror = variables("time output", mirror=("rad", "outputs of the mirror", self.mirror_rad))
+        time = variables("time", time=("s", "time", self.time_s))
+        return Group({**by_axis, **drive, **mirror}, {**time, **axis_names(self.error_rad.shape[1])}).to_xarray()
 
 
 def trace(loop: PointingLoop, controller: LoopController, span: Span, run_number: int = 0) -> PointingTrace:

@@ -3,18 +3,18 @@
 import io
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from operator import attrgetter
+from dataclasses import replace
 from typing import Any
 
 import h5netcdf
 import h5py
 import numpy as np
-from numpy.typing import NDArray
 
 from microrad.core.arrays import Floats
-from microrad.loop.controller_study import COUNTERS, FinePointingStudy, Residual
+from microrad.core.labelled import TEXT, Group, Variable, variables
+from microrad.loop.controller_study import FinePointingStudy, Residual
 from microrad.loop.paper_cases import Run
+from microrad.loop.pointing_loop.ensemble import COUNTERS, axis_names
 from microrad.orbit import Contact
 from microrad.orbit.constellation import ConstellationPlan
 from microrad.orbit.day import DayStudy, Encounter, Way
@@ -22,47 +22,7 @@ from microrad.report.fine_pointing.data import margins, rms_by_source, sources
 from microrad.study.contact_run import ContactRun
 from microrad.study.study import Study
 
-_TEXT = "text"  # in place of a unit
 _SPECTRUM = "rad^2/Hz"
-
-
-@dataclass(frozen=True, slots=True)
-class Variable:
-    """An array by its dimensions, with its unit and its meaning. Texts are of dtype object."""
-
-    dims: tuple[str, ...]
-    values: NDArray[Any]
-    units: str
-    long_name: str
-
-
-Variables = Mapping[str, Variable]
-
-
-@dataclass(frozen=True, slots=True)
-class Group:
-    """Variables by name, coordinates by the dimension that they number, and attributes of the whole."""
-
-    variables: Variables
-    coordinates: Variables = field(default_factory=dict)
-    attributes: Mapping[str, object] = field(default_factory=dict)
-
-
-def variables(dims: str, of: Sequence[Any] = (), /, **columns: tuple[str, str, Any]) -> dict[str, Variable]:
-    """Variables by name.
-
-    Args:
-        dims: the names of their dimensions, blanks between.
-        of: records, one for each place in the variables.
-        columns: unit, meaning, and what the values are: an attribute of the records, a function of one, or an array.
-    """
-    found = {}
-    for name, (units, meaning, what) in columns.items():
-        pick = attrgetter(what) if isinstance(what, str) else what
-        values = [pick(each) for each in of] if callable(pick) else pick
-        array = np.array(values, dtype=object) if units == _TEXT else np.asarray(values)
-        found[name] = Variable(tuple(dims.split()), array, "1" if units == _TEXT else units, meaning)
-    return found
 
 
 def study_netcdf(study: Study) -> bytes:
@@ -157,9 +117,9 @@ def _performance(study: Study) -> Group:
     data = variables(
         "case",
         study.performance.cases,
-        source=(_TEXT, "pointing error", "source"),
-        controller=(_TEXT, "controller", "controller"),
-        mirror=(_TEXT, "variant of the mirror", "mirror"),
+        source=(TEXT, "pointing error", "source"),
+        controller=(TEXT, "controller", "controller"),
+        mirror=(TEXT, "variant of the mirror", "mirror"),
         mean_loss=("dB", "loss of the mean power by pointing", "mean_loss_db"),
         outage_loss=("dB", "pointing loss exceeded for the outage's share of time", "outage_loss_db"),
         uncoded_penalty=("dB", penalty, "uncoded_penalty_db"),
@@ -181,11 +141,11 @@ def _fine_pointing(fine: FinePointingStudy) -> dict[str, Group]:
 
 
 def _controllers(fine: FinePointingStudy) -> dict[str, Variable]:
-    return variables("controller", fine.verified, controller=(_TEXT, "controller", "design.name"))
+    return variables("controller", fine.verified, controller=(TEXT, "controller", "design.name"))
 
 
 def _axes(fine: FinePointingStudy) -> dict[str, Variable]:
-    return variables("axis", axis=(_TEXT, "axis of the line of sight", ("x", "y")[: fine.scene.loop.axes]))
+    return axis_names(fine.scene.loop.axes)
 
 
 def _spectra(fine: FinePointingStudy) -> Group:
@@ -221,8 +181,8 @@ def _residuals(fine: FinePointingStudy) -> Group:
     data |= variables("controller mirror axis", axis_rms=("rad", "rms by axis", axis_rms))
     met = "share of samples or plant steps at which a limit was met"
     data |= variables("controller mirror limit", share=("1", met, shares))
-    names = _controllers(fine) | variables("mirror", mirror=(_TEXT, "variant of the mirror", variants))
-    names |= _axes(fine) | variables("limit", limit=(_TEXT, "limit", limits))
+    names = _controllers(fine) | variables("mirror", mirror=(TEXT, "variant of the mirror", variants))
+    names |= _axes(fine) | variables("limit", limit=(TEXT, "limit", limits))
     return Group(data, names, {"quantile": fine.quantile, "best": fine.best.design.name})
 
 
@@ -233,7 +193,7 @@ def _theory(fine: FinePointingStudy) -> Group:
     total = variables("controller", fine.verified, rms=("rad", "radial rms of all sources", "theory.radial_rms_rad"))
     data = variables("controller source", rms_by_source=("rad", "radial rms that one source leaves", by_source))
     bound = ("rad", "radial rms below which no linear controller comes", fine.optimum_rad)
-    source = variables("source", source=(_TEXT, "source of error", names))
+    source = variables("source", source=(TEXT, "source of error", names))
     return Group({**data, **total, **variables("", bound=bound)}, _controllers(fine) | source)
 
 
@@ -269,8 +229,8 @@ def _error_budget(fine: FinePointingStudy) -> Group:
     without = ("rad", "radial rms of the full loop but for what is left out", "without_rad")
     changed = {"with": ("rad", "radial rms of the full loop", "with_rad"), "without": without}
     data |= variables("left_out", b.differences, **changed)
-    names = variables("part", b.parts, part=(_TEXT, "part of the error", "name"))
-    names |= variables("left_out", b.differences, left_out=(_TEXT, "part that is left out", "name"))
+    names = variables("part", b.parts, part=(TEXT, "part of the error", "name"))
+    names |= variables("left_out", b.differences, left_out=(TEXT, "part that is left out", "name"))
     return Group(data, names, {"controller": b.controller})
 
 
@@ -279,8 +239,8 @@ def _sines(fine: FinePointingStudy) -> Group:
     data = variables(
         "run",
         fine.sines,
-        controller=(_TEXT, "controller", "controller"),
-        mirror=(_TEXT, "variant of the mirror", "variant"),
+        controller=(TEXT, "controller", "controller"),
+        mirror=(TEXT, "variant of the mirror", "variant"),
         frequency=("Hz", "frequency of the sine on axis x", "freq_hz"),
         rms=("rad", "radial rms", "rms_rad"),
         quantile=("rad", f"radial error that {fine.quantile:g} of the time stays below", "quantile_rad"),
@@ -308,8 +268,8 @@ def _spans(contacts: Sequence[Contact]) -> dict[str, Variable]:
         contacts,
         start=("s", "begin, since the epoch", "start_s"),
         end=("s", "end, since the epoch", "end_s"),
-        begins=(_TEXT, "what begins it", "begins"),
-        ends=(_TEXT, "what ends it", "ends"),
+        begins=(TEXT, "what begins it", "begins"),
+        ends=(TEXT, "what ends it", "ends"),
     )
 
 
@@ -356,7 +316,7 @@ def _line_of_sight(day: DayStudy) -> Group:
 
 def _passes(way: Way) -> Group:
     carried = ("bit", "data that it could carry within the span", way.carried_bit)
-    own = variables("contact", station=(_TEXT, "ground station", way.stations), could_carry=carried)
+    own = variables("contact", station=(TEXT, "ground station", way.stations), could_carry=carried)
     return Group({**_spans(way.contacts), **own})
 
 
@@ -382,11 +342,11 @@ def _day_way(way: Way) -> Group:
 def _assumptions(day: DayStudy) -> Group:
     found: dict[str, tuple[str, str, Any]] = {}
     for side in ("low", "high"):
-        found[side] = (_TEXT, f"{side} side of the change", side)
+        found[side] = (TEXT, f"{side} side of the change", side)
         for key, unit in (("relay_bit", "bit"), ("direct_bit", "bit"), ("relay_slow_s", "s"), ("direct_slow_s", "s")):
             name = key.rpartition("_")[0].replace("slow", "latency_99_percent")
             found[f"{name}_{side}"] = (unit, f"{name.replace('_', ' ')} with the {side} side", f"at_{side}.{key}")
-    names = variables("assumption", day.swings, assumption=(_TEXT, "what is changed", "name"))
+    names = variables("assumption", day.swings, assumption=(TEXT, "what is changed", "name"))
     return Group(variables("assumption", day.swings, **found), names)
 
 
@@ -394,9 +354,9 @@ def _contact_run(run: ContactRun) -> Group:
     data = variables(
         "transition",
         run.log,
-        state=(_TEXT, "state that is left", "state"),
-        to=(_TEXT, "state that follows", "to"),
-        cause=(_TEXT, "why", "cause"),
+        state=(TEXT, "state that is left", "state"),
+        to=(TEXT, "state that follows", "to"),
+        cause=(TEXT, "why", "cause"),
         time=("s", "time since the epoch", "time_s"),
     )
     data |= variables(
@@ -417,8 +377,8 @@ def _sessions(plan: ConstellationPlan) -> Group:
     data = variables(
         "session",
         plan.planned,
-        satellite=(_TEXT, "satellite", "satellite"),
-        relay=(_TEXT, "relay", "relay"),
+        satellite=(TEXT, "satellite", "satellite"),
+        relay=(TEXT, "relay", "relay"),
         start=("s", "begin, since the epoch", "start_s"),
         locked=("s", "from when data flow, since the epoch", "locked_s"),
         end=("s", "end, since the epoch", "end_s"),

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from microrad.core.arrays import Complexes, Floats
 from microrad.core.installing import advice
+from microrad.core.labelled import Dataset, Group, variables
 from microrad.core.lti import StateSpace
 from microrad.core.progress import Progress
 from microrad.lab.identify.linear.elements import ElementEquations
@@ -22,6 +23,7 @@ from microrad.lab.identify.linear.fit import OrderScore, choose, given_orders, r
 from microrad.lab.identify.linear.modal import Hold, ModalModel, order_modes
 from microrad.lab.identify.linear.order import exchanged, reduced
 from microrad.lab.identify.linear.polish import Polished, fit_outputs, normal_equations, pack, polish, unpack
+from microrad.lab.identify.linear.response import PER_DRIVE
 from microrad.lab.identify.linear.response_table import ResponseTable, band_hz, check_numbers, checked
 from microrad.lab.identify.linear.uncertainty import Natural, Uncertainty, inverse_normal, natural, uncertainty
 from microrad.lab.identify.linear.vector_fitting import VectorFit, sketched, vector_fit
@@ -76,6 +78,20 @@ class FrequencyResponseFit:
             f"<FrequencyResponseFit of order {self.order}: {outputs} x {inputs} elements at {self.freq_hz.size} "
             f"frequencies, {self.relative_rms_error:.3g} of the table left>"
         )
+
+    def to_xarray(self) -> Dataset:
+        """The model, standard errors of its gain and phase, and what it leaves of the table, by frequency in Hz."""
+        gain_error, phase_error = self.response_errors(self.freq_hz)
+        data = variables(
+            "frequency output input",
+            response=(PER_DRIVE, "complex frequency response of the model", self.response(self.freq_hz)),
+            gain_error=(PER_DRIVE, "standard error of its gain", gain_error),
+            phase_error=("rad", "standard error of its phase", phase_error),
+            residual=(PER_DRIVE, "table less model", self.residual),
+        )
+        names = variables("frequency", frequency=("Hz", "frequency", self.freq_hz))
+        said = {"order": self.order, "delay_s": self.delay_s, "relative_rms_error": self.relative_rms_error}
+        return Group(data, names, said).to_xarray()
 
     @property
     def natural(self) -> tuple[Natural, ...]:

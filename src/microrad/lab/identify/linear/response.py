@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from microrad.core.arrays import Complexes, Floats, Integers
+from microrad.core.labelled import TEXT, Dataset, Group, variables
 from microrad.lab.identify.linear.modal import Hold
 from microrad.lab.identify.records import IdentificationError
 from microrad.lab.recording import Recording
@@ -24,6 +25,9 @@ BANDS = 300
 MIN_LINES = 8
 _EXCITED = 1e-3
 _CONDITION = 1e5
+
+PER_DRIVE = "output/drive"
+"""The unit of a response: what its outputs are in, over what its drives are in."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +60,24 @@ class FrequencyResponse:
     input_names: tuple[str, ...]
     output_names: tuple[str, ...]
     hold: Hold = "zero-order"
+
+    def to_xarray(self) -> Dataset:
+        """The same by frequency in Hz, name of the output and name of the input; without the powers."""
+        elements = variables(
+            "frequency output input",
+            response=(PER_DRIVE, "complex frequency response, output over drive", self.response),
+            standard_error=(PER_DRIVE, "one sigma of its complex value", self.standard_error),
+        )
+        for of, error in (("noise", self.noise_standard_error), ("distortion", self.distortion_standard_error)):
+            if error is not None:
+                meaning = f"the part of one sigma that is {of}"
+                elements |= variables("frequency output input", **{f"{of}_standard_error": (PER_DRIVE, meaning, error)})
+        coherence = variables("frequency output", coherence=("1", "multiple coherence", self.coherence))
+        names = variables("frequency", frequency=("Hz", "frequency", self.freq_hz))
+        names |= variables("output", output=(TEXT, "output", self.output_names))
+        names |= variables("input", input=(TEXT, "drive", self.input_names))
+        said = {"method": self.method, "sample_rate_hz": self.rate_hz, "hold": self.hold}
+        return Group({**elements, **coherence}, names, said).to_xarray()
 
 
 class _Spectra(NamedTuple):

@@ -1,0 +1,59 @@
+"""Results of the library as data sets of xarray: named, with units, and whole behind a file."""
+
+import numpy as np
+import pytest
+import xarray
+from numpy.testing import assert_allclose, assert_array_equal
+
+import microrad
+from microrad.loop.pointing_loop.ensemble import COUNTERS
+
+PLAYS = microrad.PrandtlIshlinskii((0.0, 1.0), (30e-6, 6e-6))
+TWICE = np.random.default_rng(5).standard_normal((2, 8192))
+RECORDING = microrad.recording_from_arrays(TWICE.T, (TWICE * [[2.0], [3.0]]).T, 2000.0)
+LOOP = microrad.Loop(
+    mirror=microrad.Mirror.of(PLAYS), rate_hz=2000.0, sensor_noise_rad=1e-7, drive_range_v=(-1e-6, 1e-6)
+)
+CONTROLLER = microrad.Controller.pid(0.0, 2e6, rate_hz=2000.0)
+FREQ_HZ = np.geomspace(1.0, 100.0, 40)
+RESULTS = {
+    "measured": microrad.measure_frequency_response(RECORDING),
+    "fit": microrad.fit_frequency_response(FREQ_HZ, 1.0 / (1.0 + 1j * FREQ_HZ / 20.0), orders=[1]),
+    "loop": PLAYS.loop(5.0, 1.0),
+    "trace": LOOP.simulate(CONTROLLER, 0.05, reference_rad=np.full(100, 1e-5)),
+    "ensemble": LOOP.ensemble(CONTROLLER, runs=3, duration_s=0.1),
+}
+
+
+@pytest.mark.parametrize("name", RESULTS)
+def test_each_array_has_its_unit_and_meaning_and_comes_back_from_a_file(name, tmp_path):
+    found = RESULTS[name].to_xarray()
+    for of in found.variables.values():
+        assert of.attrs["units"] and of.attrs["long_name"]
+    found.to_netcdf(tmp_path / "found.nc", engine="h5netcdf")
+    with xarray.open_dataset(tmp_path / "found.nc", engine="h5netcdf") as again:
+        assert again.sizes == found.sizes and again.attrs.keys() == found.attrs.keys()
+        for key in found.variables:
+            assert_array_equal(again[key], found[key])
+            assert again[key].attrs["units"] == found[key].attrs["units"]
+
+
+def test_values_are_found_by_their_names():
+    measured, fit, loop, trace, ensemble = (each.to_xarray() for each in RESULTS.values())
+    straight = measured.response.sel(output=RECORDING.output_names[1], input=RECORDING.input_names[1])
+    assert_allclose(straight, 3.0, rtol=1e-6)
+    assert_allclose(abs(measured.response.sel(output=RECORDING.output_names[0])[:, 1]), 0.0, atol=1e-6)
+    assert_allclose(fit.response.sel(frequency=20.0, method="nearest")[0, 0], 0.5 - 0.5j, atol=0.06)
+    assert fit.attrs["order"] == 1 and fit.gain_error.dims == ("frequency", "output", "input")
+    assert float(loop.output.max() - loop.output.min()) * loop.attrs["width"] == pytest.approx(
+        float(loop.hysteresis.max() - loop.hysteresis.min())
+    )
+    assert_array_equal(trace.error.sel(axis="x"), RESULTS["trace"].error_rad[:, 0])
+    assert float(trace.reference[-1, 0]) == 1e-5 and float(trace.time[-1]) == pytest.approx(0.0495)
+    runs = RESULTS["ensemble"]
+    for limit, column in COUNTERS.items():
+        assert_array_equal(ensemble.counts.sel(limit=limit), runs.counts[:, column])
+    assert float(ensemble.counts.sel(limit="saturated samples").min()) > 0
+    assert runs.largest_rad.max() < 1e-9
+    assert int(ensemble.histogram.sel(radius=slice(1e-9, None))[:, 1:].sum()) == 0
+    assert int(ensemble.histogram.sum()) == runs.histogram.sum() == 3 * 200
