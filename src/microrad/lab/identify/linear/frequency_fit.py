@@ -268,10 +268,8 @@ def fit_frequency_response(  # noqa: PLR0913  all but the first three are named 
     table = checked(freq_hz, response, standard_error, (hold, rate_hz, strictly_proper))
     report = on_progress or no_progress
     fits: dict[int, _Found] = {}
-    if orders is None:
-        candidates = list(range(1, min(_LARGEST, table.most) + 1))
-    else:
-        candidates = given_orders(table.freq_hz, orders)
+    candidates = given_orders(table.freq_hz, range(1, min(_LARGEST, table.most) + 1) if orders is None else orders)
+    if orders is not None:
         check_numbers(table, candidates[-1], delay)
     for done, order in enumerate(candidates, start=1):
         fits[order] = _fitted(table, order, delay)
