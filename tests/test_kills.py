@@ -1,0 +1,24 @@
+"""One kill of each command here, a thousand in `make endurance`: see kills.py.
+
+Campaigns, workers of Dask and jobs of the studio are killed in their own tests, too.
+"""
+
+import os
+
+import pytest
+
+import kills
+
+OFTEN = bool(os.environ.get("MICRORAD_ENDURANCE"))
+ELSEWHERE = ("campaign, processes", "campaign, Dask", "studio's job")
+
+
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=[pytest.mark.endurance] if name in ELSEWHERE else []) for name in kills.VICTIMS],
+)
+def test_what_a_kill_leaves_is_whole_and_going_on_ends_as_if_nothing_had_been(name, tmp_path):
+    if "Dask" in name:
+        pytest.importorskip("distributed")
+    count = 200 if OFTEN else 1
+    assert sum(kills.killed(name, count, seed=1, place=tmp_path).values()) == count
