@@ -1,0 +1,283 @@
+"""Pointing errors in time windows: closed forms, quadrature of the weights, drawn motions, and the exposure's line."""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.integrate import quad
+
+from microrad.core import lti
+from microrad.loop import disturbance
+from microrad.loop.disturbance import Disturbance, SpectralLine, olympus, psd
+from microrad.loop.disturbance.records import covariance
+from microrad.loop.disturbance.windows import (
+    ErrorIndex,
+    exposure,
+    rational_rms,
+    recorded_rms,
+    tabulated_rms,
+    windowed_rms,
+)
+
+RADIAL = disturbance.first_order(160e-12, 1.0, convention="per-axis")  # OLYMPUS's radial spectrum, as of one axis
+WHOLE_URAD2 = 80.0 * math.pi
+LINES = Disturbance(
+    "l", np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), (SpectralLine(2e-6, 30.0),), "lines", "test"
+)
+
+
+def resonance(freq_hz=40.0, damping=0.02):
+    """A smooth motion of 1 urad rms: a resonance driven by white noise, which has a rate of finite variance."""
+    w = 2 * math.pi * freq_hz
+    A = np.array([[0.0, 1.0], [-w * w, -2 * damping * w]])
+    B = np.array([[0.0], [2e-6 * math.sqrt(damping * w**3)]])
+    return Disturbance("resonance", A, B, np.array([[1.0, 0.0]]), (), "test", "test")
+
+
+def closed_form_mpe(window_s):
+    """FACTS: MPE^2 = 160 pi (a T - 1 + e^(-a T)) / (a T)^2 urad^2, a = 2 pi 1/s; by its series for short windows."""
+    z = 2 * math.pi * window_s
+    part = (z + math.expm1(-z)) / z**2 if z > 0.1 else sum((-z) ** n / math.factorial(n + 2) for n in range(12))
+    return math.sqrt(2 * WHOLE_URAD2 * part)
+
+
+def closed_form_rpe(window_s):
+    z = 2 * math.pi * window_s
+    if z > 0.1:
+        return math.sqrt(WHOLE_URAD2 - closed_form_mpe(window_s) ** 2)
+    return math.sqrt(-2 * WHOLE_URAD2 * sum((-z) ** n / math.factorial(n + 2) for n in range(1, 14)))
+
+
+# ---- closed forms
+@pytest.mark.parametrize("window_s", [10.0**e for e in range(-9, 8, 2)] + [1.0])
+def test_olympus_at_any_window(window_s):
+    mpe = 1e6 * windowed_rms(RADIAL, ErrorIndex("MPE", window_s))
+    rpe = 1e6 * windowed_rms(RADIAL, ErrorIndex("RPE", window_s))
+    assert_allclose([mpe, rpe], [closed_form_mpe(window_s), closed_form_rpe(window_s)], rtol=1e-9)
+
+
+def test_olympus_at_one_second_and_what_the_rational_form_makes_of_it():
+    mean, left = ErrorIndex("MPE", 1.0), ErrorIndex("RPE", 1.0)
+    assert 1e6 * windowed_rms(RADIAL, mean) == pytest.approx(8.203132, abs=5e-7)
+    assert 1e6 * windowed_rms(RADIAL, left) == pytest.approx(13.565988, abs=5e-7)
+    assert 1e6 * rational_rms(RADIAL, mean) == pytest.approx(9.00223, abs=5e-6)
+    assert windowed_rms(RADIAL, ErrorIndex("APE")) == pytest.approx(1e-6 * math.sqrt(WHOLE_URAD2), rel=1e-12)
+    assert rational_rms(RADIAL, ErrorIndex("APE")) == windowed_rms(RADIAL, ErrorIndex("APE"))
+    half = windowed_rms(olympus(), mean) * math.sqrt(2.0)  # an axis has half the power
+    assert half == pytest.approx(windowed_rms(RADIAL, mean), rel=1e-12)
+
+
+@pytest.mark.parametrize("spacing_s", [1e-3, 0.3, 0.9999, 1.0, 3.0, 1e3])
+def test_the_drift_of_a_first_order_motion(spacing_s):
+    """By the variance of sums of increments of its integral, windows that overlap among them."""
+    a = 2 * math.pi
+
+    def integrated(t):  # variance of the integral over t, over twice the whole variance
+        return (a * t + math.expm1(-a * t)) / a**2
+
+    beside = integrated(spacing_s + 1.0) + integrated(abs(spacing_s - 1.0)) - 2 * integrated(spacing_s)
+    wanted = 4 * WHOLE_URAD2 * integrated(1.0) - 2 * WHOLE_URAD2 * beside
+    for kind in ("PDE", "PRE"):
+        found = 1e6 * windowed_rms(RADIAL, ErrorIndex(kind, 1.0, spacing_s))
+        assert found**2 == pytest.approx(wanted, rel=1e-7, abs=1e-9 * WHOLE_URAD2)
+
+
+# ---- quadrature
+def by_quadrature(motion, index):
+    """The integral of density times weight, between and about the resonance's flanks."""
+    edges = np.concatenate([[0.0], np.geomspace(1e-2, 1e4, 200)])
+    parts = (
+        quad(lambda f: psd(motion, [f])[0] * index.weight(f)[0], a, b, epsrel=1e-9, limit=200)[0]
+        for a, b in pairwise(edges)
+    )
+    return math.sqrt(math.fsum(parts))
+
+
+@pytest.mark.parametrize("window_s", [1e-3, 0.02, 0.4])
+def test_the_exact_form_is_the_integral_of_the_weights(window_s):
+    motion = resonance()
+    for index in (
+        ErrorIndex("MPE", window_s),
+        ErrorIndex("RPE", window_s),
+        ErrorIndex("PDE", window_s, 1.7 * window_s),
+        ErrorIndex("PDE", window_s, 0.3 * window_s),
+    ):
+        assert windowed_rms(motion, index) == pytest.approx(by_quadrature(motion, index), rel=1e-6)
+
+
+@pytest.mark.parametrize("window_s", [1e-6, 1e-4, 1e-2, 1.0])
+def test_what_is_left_of_a_smooth_motion_in_a_short_window_is_its_rate(window_s):
+    w, damping = 2 * math.pi * 40.0, 0.02
+    found = windowed_rms(resonance(), ErrorIndex("RPE", window_s))
+    if w * window_s < 0.1:  # the rate times the window over sqrt 12; the next term is of second order
+        assert found == pytest.approx(1e-6 * w * window_s / math.sqrt(12.0), rel=0.1 * (w * window_s) ** 2 + 1e-7)
+    else:
+        assert found < 1.001e-6
+    assert damping < 0.1
+
+
+def test_rational_forms_are_their_weights():
+    for kind in ("MPE", "RPE"):
+        index = ErrorIndex(kind, 0.03)
+        edges = np.concatenate([[0.0], np.geomspace(0.1, 1e5, 150)])
+        parts = (
+            quad(lambda f, of=index: psd(resonance(), [f])[0] * of.rational_weight(f)[0], a, b, epsrel=1e-9)[0]
+            for a, b in pairwise(edges)
+        )
+        assert rational_rms(resonance(), index) == pytest.approx(math.sqrt(math.fsum(parts)), rel=1e-6)
+    with pytest.raises(ValueError, match="PDE has no rational form: a difference of two means has a delay in it"):
+        rational_rms(resonance(), ErrorIndex("PDE", 1.0, 2.0))
+
+
+def test_lines_count_by_their_weight():
+    """A line of whole periods has no mean in the window, and of half a period 2/pi of its amplitude."""
+    whole, half = ErrorIndex("MPE", 1.0), ErrorIndex("MPE", 1.0 / 60.0)
+    assert windowed_rms(LINES, whole) < 1e-15
+    assert windowed_rms(LINES, half) == pytest.approx(math.sqrt(2.0) * 1e-6 * 2.0 / math.pi, rel=1e-12)
+    assert windowed_rms(LINES, ErrorIndex("RPE", 1.0)) == pytest.approx(math.sqrt(2.0) * 1e-6, rel=1e-12)
+    assert windowed_rms(LINES, ErrorIndex("PDE", 1.0 / 60.0, 1.0 / 60.0)) == pytest.approx(
+        2.0 * windowed_rms(LINES, half), rel=1e-12
+    )
+    assert rational_rms(LINES, ErrorIndex("APE")) == pytest.approx(math.sqrt(2.0) * 1e-6, rel=1e-12)
+
+
+def test_knowledge_errors_take_the_same_of_what_is_known():
+    for known, pointed in (("AKE", "APE"), ("MKE", "MPE"), ("RKE", "RPE")):
+        times = () if known == "AKE" else (0.2,)
+        assert windowed_rms(RADIAL, ErrorIndex(known, *times)) == windowed_rms(RADIAL, ErrorIndex(pointed, *times))
+
+
+# ---- tables and recordings
+@pytest.mark.parametrize("window_s", [1e-4, 0.05, 20.0])
+def test_a_table_of_a_density_is_its_motion(window_s):
+    freq = np.geomspace(1e-7, 1e8, 400)
+    table = psd(RADIAL, freq)
+    for index in (
+        ErrorIndex("APE"),
+        ErrorIndex("MPE", window_s),
+        ErrorIndex("RPE", window_s),
+        ErrorIndex("PDE", window_s, 2.5 * window_s),
+    ):
+        # Between two points the power of frequency is up to 1e-3 off, about the corner.
+        assert tabulated_rms(freq, table, index, "one") == pytest.approx(windowed_rms(RADIAL, index), rel=1e-3)
+        assert tabulated_rms(freq, table / 2.0, index, "two") == pytest.approx(tabulated_rms(freq, table, index, "one"))
+
+
+def test_a_recorded_motion_has_the_indices_of_its_spectrum():
+    """A long one: within five standard errors, from its independent pieces."""
+    step, count = 1e-3, 400_000
+    decay = math.exp(-2 * math.pi * step)
+    noise = np.random.default_rng(3).standard_normal(count)
+    motion = np.empty(count)
+    motion[0] = noise[0]
+    for i in range(1, count):
+        motion[i] = decay * motion[i - 1] + math.sqrt(1 - decay**2) * noise[i]
+    motion *= 1e-6 * math.sqrt(WHOLE_URAD2)
+    for index in (
+        ErrorIndex("APE"),
+        ErrorIndex("MPE", 0.5),
+        ErrorIndex("RPE", 0.5),
+        ErrorIndex("PDE", 0.5, 1.5),
+    ):
+        pieces = [recorded_rms(part, step, index) ** 2 for part in motion.reshape(40, -1)]
+        error = np.std(pieces, ddof=1) / math.sqrt(40)
+        wanted = windowed_rms(RADIAL, index) ** 2
+        assert abs(np.mean(pieces) - wanted) < 5 * error + 0.005 * wanted  # the mean of samples is not quite the mean
+        assert error < 0.1 * wanted
+
+
+def test_the_indices_of_a_short_recording_by_hand():
+    rad = np.array([1.0, 3.0, 2.0, 6.0]) * 1e-6
+    assert recorded_rms(rad, 1.0, ErrorIndex("MPE", 2.0)) == pytest.approx(1e-6 * math.sqrt((4 + 6.25 + 16) / 3))
+    assert recorded_rms(rad, 1.0, ErrorIndex("RPE", 2.0)) == pytest.approx(1e-6 * math.sqrt((1 + 0.25 + 4) / 3))
+    assert recorded_rms(rad, 1.0, ErrorIndex("PDE", 2.0, 2.0)) == pytest.approx(2e-6)
+    assert recorded_rms(rad, 1.0, ErrorIndex("APE")) == pytest.approx(1e-6 * math.sqrt(12.5))
+
+
+# ---- exposures
+def test_the_line_through_an_exposure_by_double_integrals():
+    """Two outputs of one motion: their covariance function, weighed twice by mean and slope, where t > u."""
+    motion, span = resonance(), 0.013
+    C = np.array([[1.0, 0.0], [0.4, 2e-3]])
+    found = exposure(lti.StateSpace(motion.A, motion.B, C, np.zeros((2, 1))), span)
+    P = covariance(motion.A, motion.B)
+    values, vectors = np.linalg.eig(motion.A)
+    right = np.linalg.solve(vectors, P @ C.T)
+    nodes, weights = np.polynomial.legendre.leggauss(40)
+    t = 0.5 * span * (1.0 + nodes)
+    u = 0.5 * t[:, None] * (1.0 + nodes)
+    area = 0.25 * span * weights[:, None] * t[:, None] * weights
+    later = np.exp(values * (t[:, None] - u)[..., None])
+    function = np.einsum("ik,tuk,kj->tuij", C @ vectors, later, right).real
+    function = function + function.swapaxes(2, 3)
+
+    def twice(of_t, of_u):
+        return np.einsum("tu,tu,tuij->ij", area, of_t * of_u, function)
+
+    mean = twice(np.ones_like(u), np.ones_like(u)) / span**2
+    slope_t, slope_u = (12.0 * (at / span - 0.5) / span for at in (t[:, None], u))
+    smear = twice(slope_t, slope_u)
+    whole = C @ P @ C.T
+    scale = np.sqrt(np.outer(np.diag(whole), np.diag(whole)))
+    assert_allclose(found.displacement_rad2 / scale, mean / scale, rtol=0, atol=1e-10)
+    assert_allclose(found.smear_rad2 / scale, smear / scale, rtol=0, atol=1e-9)
+    assert_allclose(found.jitter_rad2 / scale, (whole - mean - smear / 12.0) / scale, rtol=0, atol=1e-9)
+    assert np.all(np.abs(smear / scale) > 0.1)
+
+
+@pytest.mark.parametrize("span", [1e-7, 1e-5, 1e-3, 0.1, 10.0])
+def test_displacement_smear_and_jitter_add_up_and_are_those_of_short_and_long_exposures(span):
+    for motion in (RADIAL, resonance()):
+        one = lti.StateSpace(motion.A, motion.B, motion.C, np.zeros((1, 1)))
+        found = exposure(one, span)
+        displacement, smear, jitter = (
+            float(m[0, 0]) for m in (found.displacement_rad2, found.smear_rad2, found.jitter_rad2)
+        )
+        whole, left = motion.variance_rad2, windowed_rms(motion, ErrorIndex("RPE", span)) ** 2
+        assert displacement == pytest.approx(windowed_rms(motion, ErrorIndex("MPE", span)) ** 2, rel=1e-9)
+        assert displacement + smear / 12.0 + jitter == pytest.approx(whole, rel=1e-9)
+        assert smear / 12.0 + jitter == pytest.approx(left, rel=1e-7)
+    # A motion without a rate of its own moves like a sum of white steps: q T / 10 of its q T / 6 is smear.
+    if span < 1e-4:
+        q = 2 * (2 * math.pi) * RADIAL.variance_rad2
+        short = exposure(lti.StateSpace(RADIAL.A, RADIAL.B, RADIAL.C, np.zeros((1, 1))), span)
+        assert_allclose([short.smear_rad2[0, 0], short.jitter_rad2[0, 0]], [1.2 * q * span, q * span / 15], rtol=1e-3)
+
+
+# ---- refusals
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("MPE",), "MPE needs window_s: give the time in s"),
+        (("PDE", 1.0), "PDE needs spacing_s"),
+        (("APE", 1.0), "APE has no window_s: leave it out"),
+        (("RPE", 1.0, 2.0), "RPE has no spacing_s"),
+        (("MPE", 0.0), "window_s of MPE is 0 s; give a finite number above zero"),
+        (("XPE", 1.0), 'no error index "XPE"; give one of APE, MPE'),
+    ],
+)
+def test_an_index_has_the_times_of_its_definition(words, message):
+    with pytest.raises(ValueError, match=message):
+        ErrorIndex(*words)
+
+
+def test_refusals():
+    index, rad = ErrorIndex("MPE", 1.0), np.ones(50)
+    with pytest.raises(ValueError, match=r"MPE looks at 1 s, and the recording is 0.5 s long: give shorter times or"):
+        recorded_rms(rad, 0.01, index)
+    with pytest.raises(ValueError, match="its times are shorter than two samples of 1 s"):
+        recorded_rms(rad, 1.0, index)
+    with pytest.raises(ValueError, match=r"has the shape \(5, 10\): give one row of finite samples"):
+        recorded_rms(rad.reshape(5, 10), 0.01, index)
+    with pytest.raises(ValueError, match='sided is "": say "one" or "two"'):
+        tabulated_rms([1.0, 2.0], [1.0, 1.0], index, "")
+    with pytest.raises(ValueError, match="a density needs one finite value above 0 for each frequency above 0 Hz"):
+        tabulated_rms([0.0, 2.0], [1.0, 1.0], index, "one")
+    with pytest.raises(ValueError, match=r"pole of 0 rad/s: it is not stationary; give a stable system"):
+        exposure(lti.StateSpace(np.zeros((1, 1)), np.ones((1, 1)), np.ones((1, 1)), np.zeros((1, 1))), 1.0)
+    with pytest.raises(ValueError, match="direct term, so that its variance is infinite"):
+        exposure(lti.StateSpace(-np.ones((1, 1)), np.ones((1, 1)), np.ones((1, 1)), np.ones((1, 1))), 1.0)
+    with pytest.raises(ValueError, match="an exposure is 0 s; give a finite number above zero"):
+        exposure(lti.StateSpace(-np.ones((1, 1)), np.ones((1, 1)), np.ones((1, 1)), np.zeros((1, 1))), 0.0)
