@@ -29,7 +29,7 @@ from microrad.campaign.ledger.ledger import Ledger
 from microrad.mirror.hysteresis import PrandtlIshlinskii
 from shipped import SHIPPED, without_day, without_fine_pointing
 from small_campaign import campaign_file
-from waiting import until
+from waiting import any_moment, until
 
 MARK = "MICRORAD_TEST_KILLS"
 """The variable of the environment by which the processes of a command are known, those that outlive it, too."""
@@ -228,8 +228,7 @@ def killed(name: str, kills: int, seed: int, place: Path) -> Counter[str]:
         mark = f"{os.getpid()}-{attempt}"
         process = _started(victim, folder, mark)
         while process.poll() is None and sum(hits.values()) < kills:
-            with suppress(subprocess.TimeoutExpired):
-                process.wait(dice.uniform(0.0, most_s))
+            any_moment(dice, most_s, process)
             living = members(mark)
             if living and process.poll() is None:
                 hit = dice.choice(living)

@@ -5,9 +5,10 @@ No test asserts how long something took. `test_waiting.py` holds the other files
 
 import faulthandler
 import os
+import subprocess
 import threading
 import time
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pytest
@@ -33,9 +34,17 @@ def until(condition, what, pause=time.sleep):
     return found
 
 
-def any_moment(draw, most_s):
-    """Go on at a moment that ``draw`` (a `random.Random`) chooses, after ``most_s`` at most: nothing is waited for."""
-    time.sleep(draw.uniform(0.0, most_s))
+def any_moment(draw, most_s, process=None):
+    """Go on at a moment that ``draw`` (a `random.Random`) chooses, after ``most_s`` at most: nothing is waited for.
+
+    Where a process is given, one that ends before the moment ends it.
+    """
+    moment_s = draw.uniform(0.0, most_s)
+    if process is None:
+        time.sleep(moment_s)
+        return
+    with suppress(subprocess.TimeoutExpired):
+        process.wait(moment_s)
 
 
 def alive(pid):
