@@ -348,10 +348,39 @@ def stationary(closed: ClosedLoop) -> Stationary:
     return Stationary(np.sum([np.zeros(axes), *by_name.values()], axis=0), drive, by_name)
 
 
+def noise_of(closed: ClosedLoop, source: Source) -> tuple[tuple[Floats, ...], Floats]:
+    """What a source alone adds to the states: at each control sample of a sensor period, and at each plant step.
+
+    Args:
+        closed: The loop under its controller.
+        source: One of its sources.
+    """
+    none = np.zeros((closed.step_noise.shape[0], 0))
+    sampled = tuple(noise[:, source.columns] if source.sampled else none for noise in closed.sample_noise)
+    return sampled, none if source.sampled else closed.step_noise[:, source.columns]
+
+
+def start_of(closed: ClosedLoop, source: Source) -> tuple[Floats, Floats]:
+    """Stationary covariance of the states before a sensor period, and variance of the error (rad^2), of a source alone.
+
+    The variance, per axis, is the mean over the plant steps of the period.
+
+    Args:
+        closed: The loop under its controller, stable.
+        source: One of its sources.
+    """
+    P, errors, _ = _settled(closed, closed.monodromy, source)
+    return P, errors
+
+
 def _variances(closed: ClosedLoop, monodromy: Floats, source: Source) -> tuple[Floats, Floats]:
+    return _settled(closed, monodromy, source)[1:]
+
+
+def _settled(closed: ClosedLoop, monodromy: Floats, source: Source) -> tuple[Floats, Floats, Floats]:
+    """Covariance before a sensor period, and the mean variances of error and drive in it."""
     o, whole = closed.open, closed.step_noise.shape[0]
-    sampled = [n[:, source.columns] if source.sampled else np.zeros((whole, 0)) for n in closed.sample_noise]
-    stepped = closed.step_noise[:, slice(0, 0) if source.sampled else source.columns]
+    sampled, stepped = noise_of(closed, source)
 
     def over_period(P: Floats) -> tuple[Floats, Floats, Floats]:
         errors, drives, count = np.zeros(o.error.shape[0]), np.zeros(o.drive.shape[0]), 0
@@ -366,30 +395,51 @@ def _variances(closed: ClosedLoop, monodromy: Floats, source: Source) -> tuple[F
         return P, errors / count, drives / count
 
     gathered, _, _ = over_period(np.zeros((whole, whole)))
-    _, errors, drives = over_period(lti.gramian(monodromy.T, gathered))
-    return errors, drives
+    P = lti.gramian(monodromy.T, gathered)
+    return P, *over_period(P)[1:]
 
 
 def _line_variances(closed: ClosedLoop, monodromy: Floats, line: Line) -> tuple[Floats, Floats]:
-    """Variances that a line leaves, over its phase: half the squared size of what turns at each plant step.
+    """Variances that a line leaves, over its phase: half the squared size of what turns at each plant step."""
+    states, _ = _turned(closed, monodromy, line)
+    rows = (np.abs(states @ matrix.T) ** 2 for matrix in (closed.open.error, closed.open.drive))
+    errors, drives = (np.asarray(0.5 * np.mean(each, axis=0)) for each in rows)
+    return errors, drives
+
+
+def turning(closed: ClosedLoop, line: Line) -> tuple[Complexes, complex]:
+    """What a line leaves of the error at the plant steps of a sensor period (rad), and by what it turns in one.
+
+    Args:
+        closed: The loop under its controller, stable.
+        line: One of its lines.
+
+    Returns:
+        Complex amplitudes, shape (plant steps, axes), and the factor from one sensor period to the next.
+    """
+    states, z = _turned(closed, closed.monodromy, line)
+    return states @ closed.open.error.T, z
+
+
+def _turned(closed: ClosedLoop, monodromy: Floats, line: Line) -> tuple[Complexes, complex]:
+    """The turning state of the loop without controller at the plant steps of a sensor period, and its factor.
 
     Over a sensor period the line's states turn by a factor z on the unit circle, and so does the whole loop once it has
     settled: its turning state x is the eigenvector of the monodromy for z that has the line's own states in it.
     """
     o, keep = closed.open, _without_disturbances(closed)
-    turning = np.array([1.0, 1.0j])
-    z = complex((monodromy[line.states, line.states] @ turning)[0])
+    unit = np.array([1.0, 1.0j])
+    z = complex((monodromy[line.states, line.states] @ unit)[0])
     x = np.zeros(monodromy.shape[0], dtype=complex)
-    x[line.states] = line.amplitude_rad * turning
+    x[line.states] = line.amplitude_rad * unit
     x[keep] = np.linalg.solve(z * np.eye(int(keep.sum())) - monodromy[np.ix_(keep, keep)], monodromy[keep] @ x)
-    errors, drives = [], []
+    states = []
     for sample in closed.samples:
         x = sample @ x
         for step in closed.steps:
             x = step @ x
-            errors.append(0.5 * np.abs(o.error @ x[: o.at.order]) ** 2)
-            drives.append(0.5 * np.abs(o.drive @ x[: o.at.order]) ** 2)
-    return np.mean(errors, axis=0), np.mean(drives, axis=0)
+            states.append(x[: o.at.order])
+    return np.array(states), z
 
 
 def sensitivity(closed: ClosedLoop, freq_hz: Floats) -> Complexes:

@@ -1,0 +1,127 @@
+"""The error of the linear loop in time windows, by source: `disturbance.windows` for the sampled loop, exactly.
+
+A window is a whole number of readings of the optical sensor, and a mean in it is that of all its plant steps. The sums
+ride along as states; the map of N readings and what noise adds in them come from doubling, so that a window may be as
+long as it likes.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from microrad.core.arrays import Floats
+from microrad.loop.disturbance.windows import ErrorIndex
+from microrad.loop.pointing_loop.linear import ClosedLoop, Line, Source, noise_of, refuse_unstable, start_of, turning
+
+_STILL = 1e-12  # turn in a reading of a line that is at a multiple of its rate
+
+
+@dataclass(frozen=True, slots=True)
+class _Span:
+    """States and sums over some readings: s -> F s + noise of covariance Q; the sums stand behind the states."""
+
+    F: Floats
+    Q: Floats
+
+    def then(self, later: "_Span") -> "_Span":
+        return _Span(later.F @ self.F, later.F @ self.Q @ later.F.T + later.Q)
+
+    def times(self, count: int) -> "_Span":
+        made, doubled = _Span(np.eye(len(self.F)), np.zeros_like(self.Q)), self
+        while count:
+            made, count = (made.then(doubled), count - 1) if count % 2 else (made, count)
+            doubled, count = doubled.then(doubled), count // 2
+        return made
+
+
+def windowed(closed: ClosedLoop, index: ErrorIndex) -> dict[str, Floats]:
+    """Variance that an index takes of the stationary error, by the name of its source, per axis (rad^2), lines too.
+
+    Args:
+        closed: The loop under its controller.
+        index: What counts of the error; its times are rounded to whole readings of the optical sensor.
+
+    Raises:
+        ValueError: The loop is unstable, or a time of the index is less than half of the time between two readings.
+    """
+    refuse_unstable(closed)
+    window, apart = (_readings(closed, index, name) for name in ("window_s", "spacing_s"))
+    found: dict[str, Floats] = {}
+    for source in closed.sources:
+        found[source.name] = found.get(source.name, 0.0) + _noise(closed, source, index, window, apart)
+    for line in closed.open.lines:
+        found[line.name] = found.get(line.name, 0.0) + _line(closed, line, index, window, apart)
+    return found
+
+
+def _readings(closed: ClosedLoop, index: ErrorIndex, name: str) -> int:
+    seconds: float | None = getattr(index, name)
+    period = closed.open.loop.timing.period_s * len(closed.samples)
+    if seconds is None:
+        return 0
+    if not round(seconds / period):
+        raise ValueError(f"{name} of {index.kind} is {seconds:g} s, and the sensor reads every {period:g} s: give more")
+    return round(seconds / period)
+
+
+def _steps_of(closed: ClosedLoop) -> int:
+    """Plant steps from one reading to the next."""
+    return len(closed.samples) * len(closed.steps)
+
+
+def _noise(closed: ClosedLoop, source: Source, index: ErrorIndex, window: int, apart: int) -> Floats:
+    """Variance of what one noise leaves, per axis."""
+    o = closed.open
+    start, whole = start_of(closed, source)
+    if not window:
+        return whole
+    states, axes = len(start), len(o.error)
+    error = np.hstack([o.error, np.zeros((axes, states - o.at.order))])
+    sampled, stepped = noise_of(closed, source)
+    summed = _Span(np.eye(states + axes), np.zeros((states + axes,) * 2))
+    for sample, noise in zip(closed.samples, sampled, strict=True):
+        summed = summed.then(_moved(sample, noise, np.zeros_like(error)))
+        for step in closed.steps:
+            summed = summed.then(_moved(step, stepped, error))
+    still = _signed(summed, axes, 0.0)
+    if index.spacing_s is None:
+        of_all = summed.times(window)
+    else:
+        both = min(window, apart)  # of windows that overlap, what they share is not in the difference
+        of_all = summed.times(both).then(still.times(abs(apart - window))).then(_signed(summed, axes, -1.0).times(both))
+    begun = np.zeros((states + axes,) * 2)
+    begun[:states, :states] = start
+    ended = (of_all.F @ begun @ of_all.F.T + of_all.Q)[states:, states:]
+    mean = np.diag(ended) / (window * _steps_of(closed)) ** 2
+    return np.asarray(whole - mean if index.takes == "RPE" else mean)
+
+
+def _moved(matrix: Floats, noise: Floats, error: Floats) -> _Span:
+    """One map of the states with its noise; the error behind it is added to the sums."""
+    axes, states = error.shape
+    F = np.block([[matrix, np.zeros((states, axes))], [error @ matrix, np.eye(axes)]])
+    into = np.vstack([noise, error @ noise])
+    return _Span(F, into @ into.T)
+
+
+def _signed(span: _Span, axes: int, sign: float) -> _Span:
+    """The same with what it adds to the sums times a sign; 0 leaves them as they are."""
+    keep = np.ones(len(span.F))
+    keep[-axes:] = sign
+    F, Q = span.F * keep[:, None], span.Q * np.outer(keep, keep)
+    F[-axes:, -axes:] = np.eye(axes)
+    return _Span(F, Q)
+
+
+def _line(closed: ClosedLoop, line: Line, index: ErrorIndex, window: int, apart: int) -> Floats:
+    """Variance over the phase of what one line leaves, per axis: what turns adds up to a geometric series."""
+    errors, z = turning(closed, line)
+    whole = np.asarray(np.mean(0.5 * np.abs(errors) ** 2, axis=0))
+    if not window:
+        return whole
+    series = window if abs(1.0 - z) < _STILL else (1.0 - z**window) / (1.0 - z)
+    mean = series * np.sum(errors, axis=0) / (window * _steps_of(closed))
+    if index.spacing_s is not None:
+        mean = mean * (1.0 - z**apart)
+    variance = np.asarray(0.5 * np.abs(mean) ** 2)
+    return whole - variance if index.takes == "RPE" else variance
