@@ -356,6 +356,24 @@ def check_target(path: Path, advice: str, *, overwrite: bool = False, begins: by
         raise Refusal(f"{path} was not written by microrad and is left as it is; {advice}.")
 
 
+def quantity_of(unit: str) -> Callable[[str], float]:
+    """A parser of an option's quantity, whose refusal typer shows with the name of the option.
+
+    Args:
+        unit: Of the SI, in which the value is wanted.
+    """
+
+    def parse(text: str) -> float:
+        from microrad.core.units import UnitError, parse_quantity
+
+        try:
+            return parse_quantity(text, unit)
+        except UnitError as error:
+            raise typer.BadParameter(str(error)) from None
+
+    return parse
+
+
 def option(flag: str, metavar: str, text: str, **settings: Any) -> Any:
     """An option of a command.
 

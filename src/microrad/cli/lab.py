@@ -3,7 +3,6 @@
 import functools
 import os
 import shlex
-from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -25,6 +24,7 @@ from microrad.cli.frame import (
     json_text,
     option,
     progress_bar,
+    quantity_of,
     width,
 )
 from microrad.cli.recordings import Given, Options, common_name, given_recordings, unit_of
@@ -54,27 +54,13 @@ class Model(StrEnum):
     PRANDTL_ISHLINSKII_RATE_CREEP = "prandtl-ishlinskii-rate-creep"
 
 
-def _quantity(unit: str) -> Callable[[str], float]:
-    """A parser of an option's quantity, whose refusal typer shows with the name of the option."""
-
-    def parse(text: str) -> float:
-        from microrad.core.units import UnitError, parse_quantity
-
-        try:
-            return parse_quantity(text, unit)
-        except UnitError as error:
-            raise typer.BadParameter(str(error)) from None
-
-    return parse
-
-
 def _rate(text: str) -> float:
     """A rate in Hz, the unit of which may be left out."""
     try:
         float(text)
     except ValueError:
-        return _quantity("Hz")(text)
-    return _quantity("Hz")(f"{text} Hz")
+        return quantity_of("Hz")(text)
+    return quantity_of("Hz")(f"{text} Hz")
 
 
 def _place(text: str) -> tuple[float, float]:
@@ -82,7 +68,7 @@ def _place(text: str) -> tuple[float, float]:
     parts = text.split(",")
     if len(parts) != 2:
         raise typer.BadParameter(f"'{text}' is no place; give x and y as '12 mm,-6 mm'.")
-    x, y = (_quantity("m")(part.strip()) for part in parts)
+    x, y = (quantity_of("m")(part.strip()) for part in parts)
     return x, y
 
 
@@ -146,7 +132,7 @@ def identify(  # noqa: PLR0913  every argument is a named option
     validate: Annotated[list[Path] | None, option("--validate", "FILE", _VALIDATE)] = None,
     output_unit: Annotated[str | None, option("--output-unit", "UNIT", _OUTPUT_UNITS)] = None,
     input_unit: Annotated[str | None, option("--input-unit", "UNIT", _INPUT_UNITS)] = None,
-    lever_arm: Annotated[float | None, option("--lever-arm", "LENGTH", _LEVER_ARM, parser=_quantity("m"))] = None,
+    lever_arm: Annotated[float | None, option("--lever-arm", "LENGTH", _LEVER_ARM, parser=quantity_of("m"))] = None,
     position: Annotated[list[Any] | None, option("--position", "X,Y", _POSITION, parser=_place)] = None,
     measured_drive: Annotated[bool, typer.Option("--measured-drive", help=_MEASURED)] = False,
     hold_out: Annotated[float | None, option("--hold-out", "SHARE", _HOLD_OUT)] = None,

@@ -12,18 +12,27 @@ from microrad.cli.frame import (
     Accept,
     Json,
     Outcome,
+    Refusal,
     app,
     command,
     examples,
     json_text,
     option,
     progress_bar,
+    quantity_of,
     refusal_of,
     width,
 )
 
 if TYPE_CHECKING:
     from microrad.loop.controller_study import Design, Outlook, Scene
+    from microrad.loop.disturbance.windows import ErrorIndex
+
+
+def _time(name: str, text: str) -> Any:
+    """An option of times, as many as are wanted."""
+    help_text = f"{text} may be repeated."
+    return typer.Option(name, metavar="TIME", help=help_text, parser=quantity_of("s"), show_default=False)
 
 
 @app.command(
@@ -70,6 +79,60 @@ def design(
         found = {"mission_sha256": mission.sha256, "controllers": controllers, "warnings": warnings}
         return Outcome(json_text(found), code)
     return Outcome(_text(scene, designs, left, marks, warnings), code)
+
+
+@app.command(
+    epilog=examples(
+        "microrad pointing leo-geo.toml",
+        "microrad pointing leo-geo.toml --window '1 ms' --window '10 s' --spacing '1 min'",
+        "microrad pointing leo-geo.toml --controller LQG --json",
+    )
+)
+@command
+def pointing(
+    file: Annotated[Path, typer.Argument(help="Mission file with a table [fine_pointing].", metavar="FILE")],
+    window: Annotated[list[float] | None, _time("--window", "Length of a window [default: 10 ms and 1 s];")] = None,
+    spacing: Annotated[list[float] | None, _time("--spacing", "From the begin of a window to that of another;")] = None,
+    controller: Annotated[str, option("--controller", "NAME", "One that microrad design lists.")] = "PI",
+    as_json: Json = False,
+) -> Outcome:
+    """Print the pointing errors of a mission's loop in time windows.
+
+    The indices are those of ECSS-E-ST-60-10C: all of the error (APE), its mean over a window (MPE), what is left beside
+    that mean (RPE), and the difference of the means of two windows (PDE). They are radial rms in theory (linear), by
+    source, of what the loop leaves and of the same disturbances without a loop, exactly; the rational filters of linear
+    tools stand beside that.
+    """
+    from microrad import mirror as mirror_room
+    from microrad.link import tracking_light_w
+    from microrad.loop import controller_study
+    from microrad.loop.pointing_loop.linear import close
+    from microrad.loop.pointing_loop.windows import windowed_errors
+    from microrad.mission.file import load_loop
+    from microrad.report.fine_pointing.windows import windows_data, windows_text
+
+    mission, several = load_loop(file)
+    if several is not None:
+        raise Refusal(f"{file}: its mirror has several axes, and windows are there for one mirror an axis")
+    with progress_bar() as progress, refusal_of(mission.path):
+        indices = _indices(window or [0.01, 1.0], spacing or [])
+        scene = controller_study.scene(mission, mirror_room.of(mission.mission), tracking_light_w(mission))
+        (made,) = controller_study.design(scene, progress, [controller])
+        errors = windowed_errors(close(scene.theory, made.controller), indices)
+    if as_json:
+        data = windows_data(errors)
+        return Outcome(json_text({"mission_sha256": mission.sha256, "controller": made.name, "indices": data}))
+    return Outcome(windows_text(errors, made.name, width()))
+
+
+def _indices(windows: list[float], spacings: list[float]) -> "list[ErrorIndex]":
+    from microrad.loop.disturbance.windows import ErrorIndex
+
+    found = [ErrorIndex("APE")]
+    for each in windows:
+        found += [ErrorIndex("MPE", each), ErrorIndex("RPE", each)]
+        found += [ErrorIndex("PDE", each, apart) for apart in spacings]
+    return found
 
 
 def _broken(designs: "tuple[Design, ...]", left: "tuple[Outlook, ...]", accept: bool) -> str:

@@ -5,12 +5,14 @@ ride along as states; the map of N readings and what noise adds in them come fro
 long as it likes.
 """
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from microrad.core.arrays import Floats
-from microrad.loop.disturbance.windows import ErrorIndex
+from microrad.loop.disturbance.windows import ErrorIndex, rational_rms, windowed_rms
 from microrad.loop.pointing_loop.linear import ClosedLoop, Line, Source, noise_of, refuse_unstable, start_of, turning
 
 _STILL = 1e-12  # turn in a reading of a line that is at a multiple of its rate
@@ -52,6 +54,43 @@ def windowed(closed: ClosedLoop, index: ErrorIndex) -> dict[str, Floats]:
     for line in closed.open.lines:
         found[line.name] = found.get(line.name, 0.0) + _line(closed, line, index, window, apart)
     return found
+
+
+@dataclass(frozen=True, slots=True)
+class WindowedErrors:
+    """What an index takes of a loop's errors, by source: radial rms (rad).
+
+    ``before`` has the disturbances as they are, ``rational`` their sum by the rational form of the weight, nan where
+    there is none, and ``left`` every source of the linear loop's error.
+    """
+
+    index: ErrorIndex
+    before: dict[str, float]
+    rational: float
+    left: dict[str, float]
+
+
+def windowed_errors(closed: ClosedLoop, indices: Sequence[ErrorIndex]) -> tuple[WindowedErrors, ...]:
+    """What each index takes of the disturbances of a loop, and of the error that is left.
+
+    Args:
+        closed: The loop under its controller.
+        indices: What counts.
+
+    Raises:
+        ValueError: As for `windowed`.
+    """
+    found = []
+    for index in indices:
+        left = {name: math.sqrt(max(float(np.sum(each)), 0.0)) for name, each in windowed(closed, index).items()}
+        squares: dict[str, float] = {}
+        rational = 0.0
+        for each in (motion for axis in closed.open.loop.disturbances for motion in axis):
+            squares[each.name] = squares.get(each.name, 0.0) + windowed_rms(each, index) ** 2
+            rational += math.nan if index.spacing_s else rational_rms(each, index) ** 2
+        before = {name: math.sqrt(square) for name, square in squares.items()}
+        found.append(WindowedErrors(index, before, math.sqrt(rational), left))
+    return tuple(found)
 
 
 def _readings(closed: ClosedLoop, index: ErrorIndex, name: str) -> int:

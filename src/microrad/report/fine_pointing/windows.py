@@ -1,0 +1,73 @@
+"""Pointing errors in time windows, by source: tables for people, and the same as data."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from microrad.core.units import format_quantity
+from microrad.loop.disturbance.windows import ErrorIndex
+from microrad.loop.pointing_loop.windows import WindowedErrors
+from microrad.report.fine_pointing.words import source_name
+from microrad.report.quantities import micro, percent
+from microrad.report.tables import Table, tables_text
+
+
+def index_name(index: ErrorIndex) -> str:
+    """What an index is called at the head of a column, a line for each of its times."""
+    lines: list[str] = [index.kind]
+    lines += [] if index.window_s is None else [format_quantity(index.window_s, "s")]
+    lines += [] if index.spacing_s is None else [f"{format_quantity(index.spacing_s, 's')} apart"]
+    return "\n".join(lines)
+
+
+def windows_text(errors: Sequence[WindowedErrors], controller: str, width: int) -> str:
+    """What is left by the loop, what there is without it, and what the rational forms make of that, for a terminal.
+
+    Args:
+        errors: One for each index.
+        controller: Name of the loop's controller.
+        width: Columns of the terminal.
+    """
+    heads = [index_name(each.index) for each in errors]
+    left = _by_source(f"Left by the loop under {controller}", heads, [each.left for each in errors])
+    before = _by_source("Without the loop", heads, [each.before for each in errors])
+    rows = []
+    for head, each in zip(heads, errors, strict=True):
+        exact = _total(each.before)
+        if not math.isnan(each.rational) and each.index.window_s is not None and exact > 0.0:
+            off = percent(each.rational / exact - 1.0)
+            rows.append((head.replace("\n", " "), micro(exact), micro(each.rational), off))
+    filters = Table("Without the loop, by linear filters", ("index", "exact", "rational", "off by"), rows)
+    about = "Radial rms in µrad, in theory: each hysteresis element counts by its slow gain."
+    return "\n".join(
+        (tables_text([], [about], width).strip("\n"), "", tables_text([left, before, filters], [], width).rstrip())
+    )
+
+
+def _by_source(title: str, heads: Sequence[str], columns: Sequence[dict[str, float]]) -> Table:
+    rows = [(source_name(name), *(micro(column[name]) for column in columns)) for name in columns[0]]
+    rows.append(("all", *(micro(_total(column)) for column in columns)))
+    return Table(title, ("source", *heads), rows, totals=1)
+
+
+def _total(rms_by_source: dict[str, float]) -> float:
+    return math.hypot(*rms_by_source.values())
+
+
+def windows_data(errors: Sequence[WindowedErrors]) -> list[dict[str, Any]]:
+    """The same as data: radial rms in rad.
+
+    Args:
+        errors: One for each index.
+    """
+    return [
+        {
+            "index": each.index.kind,
+            "window_s": each.index.window_s,
+            "spacing_s": each.index.spacing_s,
+            "left_rad": {**each.left, "all": _total(each.left)},
+            "without_the_loop_rad": {**each.before, "all": _total(each.before)},
+            "without_the_loop_rational_rad": None if math.isnan(each.rational) else each.rational,
+        }
+        for each in errors
+    ]

@@ -1,0 +1,75 @@
+"""`microrad pointing`: errors in time windows, by source, as text and as data."""
+
+import json
+import math
+import subprocess
+import sys
+
+import pytest
+
+import several_axes
+from microrad.loop.disturbance import olympus
+from microrad.loop.disturbance.windows import ErrorIndex, windowed_rms
+from shipped import DEFAULT
+
+
+@pytest.fixture(scope="module")
+def document():
+    """The data of the shipped mission, with a mean over a second and its drift over a minute."""
+    command = [sys.executable, "-m", "microrad", "pointing", DEFAULT, "--window", "1 s", "--spacing", "1 min", "--json"]
+    ran = subprocess.run(command, capture_output=True, text=True, check=True)
+    return json.loads(ran.stdout)
+
+
+def test_sources_add_up_to_all_and_the_mean_and_the_rest_to_the_whole(document):
+    whole, mean, left, drift = document["indices"]
+    assert [each["index"] for each in document["indices"]] == ["APE", "MPE", "RPE", "PDE"]
+    for each in document["indices"]:
+        for part in ("left_rad", "without_the_loop_rad"):
+            *sources, total = each[part].values()
+            assert total == pytest.approx(math.hypot(*sources), rel=1e-12)
+    for part in ("left_rad", "without_the_loop_rad"):
+        assert mean[part]["all"] ** 2 + left[part]["all"] ** 2 == pytest.approx(whole[part]["all"] ** 2, rel=1e-12)
+        assert drift[part]["all"] == pytest.approx(math.sqrt(2.0) * mean[part]["all"], rel=0.02)  # a minute is long
+    assert whole["left_rad"]["all"] < 0.02 * whole["without_the_loop_rad"]["all"]
+
+
+def test_without_the_loop_the_vibration_is_olympus_in_both_axes(document):
+    _, mean, _, drift = document["indices"]
+    second = math.sqrt(2.0) * windowed_rms(olympus(), ErrorIndex("MPE", 1.0))
+    assert mean["without_the_loop_rad"]["OLYMPUS"] == pytest.approx(second, rel=1e-9)
+    assert mean["without_the_loop_rational_rad"] > 1.003 * mean["without_the_loop_rad"]["all"]
+    assert drift["without_the_loop_rational_rad"] is None and (drift["window_s"], drift["spacing_s"]) == (1.0, 60.0)
+
+
+def test_the_tables_name_sources_windows_and_what_filters_make_of_them(call):
+    code, out, _ = call("pointing", DEFAULT)
+    assert code == 0
+    assert "Left by the loop under PI\n" in out and "Without the loop, by linear filters" in out
+    for words in ("vibration", "(OLYMPUS)", "gauge noise", "MPE 1 s ", "RPE 10 ms "):
+        assert words in out
+    assert max(map(len, out.splitlines())) <= 80
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--window", "1 us"), "window_s of MPE is 1e-06 s, and the sensor reads every 0.0002 s: give more"),
+        (("--window", "0 s"), "window_s of MPE is 0 s; give a finite number above zero"),
+        (("--controller", "best"), "'best' is no controller of this mission; it has PI"),
+    ],
+)
+def test_what_cannot_be_is_refused(refused, options, words):
+    assert words in refused("pointing", DEFAULT, *options)
+
+
+def test_a_time_without_a_unit_is_refused_by_its_option(call):
+    code, out, err = call("pointing", DEFAULT, "--window", "1")
+    assert (code, out) == (2, "") and "'--window': \"1\" is a number without a unit" in err
+
+
+def test_a_mirror_of_several_axes_is_refused(refused, tmp_path):
+    (tmp_path / "two-axes.toml").write_text(several_axes.TEXT, encoding="utf-8")
+    named = several_axes.mission_text(("[fine_pointing]\n", '[fine_pointing]\nmirror_file = "two-axes.toml"\n'))
+    (tmp_path / "m.toml").write_text(named, encoding="utf-8")
+    assert "its mirror has several axes, and windows are there for one mirror an axis" in refused("pointing", "m.toml")
