@@ -42,6 +42,7 @@ COMMANDS = (
     "constellation",
     "presets",
     "design",
+    "pointing",
     "identify",
     "import",
     "bench",

@@ -39,9 +39,8 @@ def windows_text(errors: Sequence[WindowedErrors], controller: str, width: int) 
             rows.append((head.replace("\n", " "), micro(exact), micro(each.rational), off))
     filters = Table("Without the loop, by linear filters", ("index", "exact", "rational", "off by"), rows)
     about = "Radial rms in µrad, in theory: each hysteresis element counts by its slow gain."
-    return "\n".join(
-        (tables_text([], [about], width).strip("\n"), "", tables_text([left, before, filters], [], width).rstrip())
-    )
+    tables = tables_text([left, before, filters], [], width)
+    return f"{tables_text([], [about], width).strip()}\n\n{tables.rstrip()}"
 
 
 def _by_source(title: str, heads: Sequence[str], columns: Sequence[dict[str, float]]) -> Table:
