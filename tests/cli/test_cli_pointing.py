@@ -27,17 +27,21 @@ def test_sources_add_up_to_all_and_the_mean_and_the_rest_to_the_whole(document):
     for each in document["indices"]:
         for part in ("left_rad", "without_the_loop_rad"):
             *sources, total = each[part].values()
-            assert total == pytest.approx(math.hypot(*sources), rel=1e-12)
+            assert total == pytest.approx(math.hypot(*sources), rel=1e-12, abs=0.0)
     for part in ("left_rad", "without_the_loop_rad"):
-        assert mean[part]["all"] ** 2 + left[part]["all"] ** 2 == pytest.approx(whole[part]["all"] ** 2, rel=1e-12)
-        assert drift[part]["all"] == pytest.approx(math.sqrt(2.0) * mean[part]["all"], rel=0.02)  # a minute is long
+        assert mean[part]["all"] ** 2 + left[part]["all"] ** 2 == pytest.approx(
+            whole[part]["all"] ** 2, rel=1e-12, abs=0.0
+        )
+        assert drift[part]["all"] == pytest.approx(
+            math.sqrt(2.0) * mean[part]["all"], rel=0.02, abs=0.0
+        )  # a minute is long
     assert whole["left_rad"]["all"] < 0.02 * whole["without_the_loop_rad"]["all"]
 
 
 def test_without_the_loop_the_vibration_is_olympus_in_both_axes(document):
     _, mean, _, drift = document["indices"]
     second = math.sqrt(2.0) * windowed_rms(olympus(), ErrorIndex("MPE", 1.0))
-    assert mean["without_the_loop_rad"]["OLYMPUS"] == pytest.approx(second, rel=1e-9)
+    assert mean["without_the_loop_rad"]["OLYMPUS"] == pytest.approx(second, rel=1e-9, abs=0.0)
     assert mean["without_the_loop_rational_rad"] > 1.003 * mean["without_the_loop_rad"]["all"]
     assert drift["without_the_loop_rational_rad"] is None and (drift["window_s"], drift["spacing_s"]) == (1.0, 60.0)
 

@@ -96,7 +96,7 @@ def test_a_window_is_a_sum_over_all_pairs_of_plant_steps(every):
                         summed = summed + w * (joint @ error.T)[:, 0]
             steps = readings * every * len(each.steps)
             index = ErrorIndex(kind, *times[: 1 + (kind == "PDE")])
-            assert windowed(each, index)[source.name][0] == pytest.approx(total / steps**2, rel=1e-6)
+            assert windowed(each, index)[source.name][0] == pytest.approx(total / steps**2, rel=1e-6, abs=0.0)
 
 
 def test_without_a_loop_the_error_is_the_motion():
@@ -104,7 +104,7 @@ def test_without_a_loop_the_error_is_the_motion():
     each = closed(controller=OPEN)
     for index in (*INDICES, ErrorIndex("MPE", 1.0), ErrorIndex("PDE", 1.0, 3.0), ErrorIndex("RPE", 1.0)):
         found = variances(windowed(each, index))
-        assert math.sqrt(found["vibration"]) == pytest.approx(windowed_rms(SLOW, index), rel=0.02)
+        assert math.sqrt(found["vibration"]) == pytest.approx(windowed_rms(SLOW, index), rel=0.02, abs=0.0)
         assert math.sqrt(found["wheel"]) == pytest.approx(windowed_rms(LINES, index), rel=0.02, abs=1e-9)
         assert found["optical sensor noise"] == 0.0
 
