@@ -22,6 +22,7 @@ from microrad.report.paper import bench
 from microrad.report.paper import diagrams as drawings
 from microrad.report.paper import page as paper_views
 from microrad.report.plotting.figure import Figure
+from microrad.report.plotting.sheet import Line
 from microrad.report.quantities import minus
 from microrad.report.study import chain, page, words
 from microrad.report.study import contributors as requirement_views
@@ -273,6 +274,21 @@ def test_the_virtual_bench_stands_where_the_paper_measures(written, paper):
     assert [loop.freq_hz for loop in bench.loops()] == [60.0, 80.0, 100.0]
     assert {loop.fitted_hz for loop in bench.loops()} == {100.0}
     assert all(0.0 < loop.error_percent < 0.2 for loop in bench.loops())
+
+
+def test_the_phase_of_the_bench_is_drawn_in_degrees():
+    late = bench.chirp()
+    of = replace(
+        late, response=np.exp(-2j * np.pi * 1e-3 * late.freq_hz), model=np.exp(-2j * np.pi * late.freq_hz * 2e-3)
+    )
+    *_, phase = bench.chirp_figure(of).sheet.panels
+    for line, delay_s in zip(phase.all_of(Line), (1e-3, 2e-3), strict=True):
+        np.testing.assert_allclose(line.y, -360.0 * delay_s * late.freq_hz, atol=1e-6)
+
+
+def test_the_margins_of_the_loop_are_in_decibels_and_degrees(paper):
+    known = replace(paper.margins, gain_up=2.0, phase_rad=math.pi / 3.0)
+    assert page._margins(replace(paper, margins=known))[:2] == [("gain margin", "6.0 dB"), ("phase margin", "60°")]
 
 
 def test_another_kind_of_mirror_leaves_the_bench_out(no_scan, tmp_path):
