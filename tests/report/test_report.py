@@ -16,6 +16,7 @@ import xarray as xr
 
 from microrad import report
 from microrad.core import folder
+from microrad.link.requirement import Requirement
 from microrad.mission import file as missionfile
 from microrad.report.page.templates import inputs_view
 from microrad.report.paper import bench
@@ -24,6 +25,7 @@ from microrad.report.paper import page as paper_views
 from microrad.report.plotting.figure import Figure
 from microrad.report.plotting.sheet import Line
 from microrad.report.quantities import minus
+from microrad.report.requirements import nearest, nearness
 from microrad.report.study import chain, page, words
 from microrad.report.study import contributors as requirement_views
 from microrad.report.tables import Table
@@ -180,6 +182,15 @@ def test_each_requirement_stands_with_its_margin_and_its_contributor(written, pa
     assert f"pointing loss {-lost:.2f} dB; the margin moves most with {paper.tornado.swings[0].key}" in link
     visible = " ".join(parsed((written / "report.html").read_text(encoding="utf-8")).text)
     assert all(row[5] in visible for row in rows)
+
+
+def test_half_of_the_power_is_further_off_than_an_error_of_nine_fifths():
+    power = Requirement("communication", "margin", "dB", 3.0, 3.0 - 10.0 * math.log10(2.0), -10.0 * math.log10(2.0), "")
+    error = Requirement("residual", "error", "rad", 10e-6, 18e-6, -8e-6, "")
+    assert nearness(power)[2] == pytest.approx(0.5)
+    assert nearness(error)[2] == pytest.approx(5.0 / 9.0)
+    assert nearest((error, power)) is power
+    assert nearest((replace(error, actual=21e-6, margin=-11e-6), power)) is not power
 
 
 def test_a_requirement_moved_most_by_a_share_says_by_what_factor(paper):
