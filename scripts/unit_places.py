@@ -4,11 +4,13 @@
 .venv/bin/python scripts/unit_places.py          each kind behind its number of places
 
 A place is a term of a function, as the parser reads it: a product or quotient with a power of 1000, one with pi, a call
-of degrees or radians (or 180 or 360 as a factor), a power of ten or a logarithm (or a call of dbm or watt), one with 2
-or 1/2 beside the name of an angle, a width or a spread. The order is that of a seed, anew for each kind.
+of degrees or radians (or 180 or 360 as a factor), a power of ten or 10 or 20 times a logarithm (or a call of dbm or
+watt), a product or quotient with 2 or 1/2 beside the name of an angle, a width or a spread. The order is that of a
+seed, anew for each kind.
 """
 
 import ast
+import functools
 import random
 import re
 import sys
@@ -20,7 +22,6 @@ SOURCE = Path(__file__).resolve().parent.parent / "src"
 SEED = 20261127
 KINDS = ("factor of 1000", "two pi", "degrees for radians", "decibel for ratio", "half for full")
 _THOUSANDS = {10.0**power for power in (-12, -9, -6, -3, 3, 6, 9, 12)}
-_PI = re.compile(r"\b(np|math)\.pi\b")
 _WIDTH = re.compile(
     r"angle|_rad\b|half|width|divergence|amplitude|peak|field|waist|rms|swing|travel|span|sigma|radius|diameter"
 )
@@ -51,13 +52,18 @@ def drawn(kind: str) -> list[Place]:
     Args:
         kind: one of `KINDS`.
     """
-    places = sorted({place for place in every() if place.kind == kind})
+    places = sorted(place for place in every() if place.kind == kind)
     random.Random(f"{SEED} {kind}").shuffle(places)
     return places
 
 
-def every() -> Iterator[Place]:
+@functools.cache
+def every() -> frozenset[Place]:
     """All places of the package."""
+    return frozenset(_places())
+
+
+def _places() -> Iterator[Place]:
     for file in sorted((SOURCE / "microrad").rglob("*.py")):
         source = file.read_text(encoding="utf-8")
         module = ".".join(file.relative_to(SOURCE).with_suffix("").parts).removesuffix(".__init__")
@@ -77,27 +83,27 @@ def _inside(node: ast.AST, name: str, lines: list[str]) -> Iterator[Place]:
 
 def _kinds(term: ast.expr) -> Iterator[str]:
     if isinstance(term, ast.Call):
-        called = ast.unparse(term.func).rpartition(".")[2]
+        called = getattr(term.func, "attr", getattr(term.func, "id", ""))
         if called in ("radians", "degrees"):
             yield "degrees for radians"
         if called in ("dbm", "watt"):
             yield "decibel for ratio"
     if not isinstance(term, ast.BinOp):
         return
-    numbers, text = {_number(term.left), _number(term.right)}, ast.unparse(term)
+    numbers = {_number(term.left), _number(term.right)}
     if isinstance(term.op, ast.Pow) and _number(term.left) == 10.0:
         yield "decibel for ratio"
     if not isinstance(term.op, ast.Mult | ast.Div):
         return
     if numbers & _THOUSANDS:
         yield "factor of 1000"
-    if _PI.search(text):
+    if any(isinstance(part, ast.Attribute) and part.attr == "pi" for part in ast.walk(term)):
         yield "two pi"
     if numbers & {180.0, 360.0}:
         yield "degrees for radians"
-    if numbers & {10.0, 20.0} and "log10" in text:
+    if numbers & {10.0, 20.0} and "log10" in ast.unparse(term):
         yield "decibel for ratio"
-    if numbers & {2.0, 0.5} and _WIDTH.search(text):
+    if numbers & {2.0, 0.5} and _WIDTH.search(ast.unparse(term)):
         yield "half for full"
 
 

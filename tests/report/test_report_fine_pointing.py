@@ -748,7 +748,8 @@ def test_the_sensitivity_drawn_peaks_at_the_inverse_of_the_modulus_margin(drawn,
 def test_the_sensors_noise_up_to_half_of_its_rate_is_its_variance(fine):
     loop = fine.scene.loop
     half_rate_hz = 0.5 / (loop.timing.period_s * loop.optical.every)
-    assert figures._noise_density(fine) * half_rate_hz == pytest.approx(loop.optical.noise_rad**2, rel=1e-12)
+    variance_rad2 = figures._noise_density(fine) * half_rate_hz
+    assert math.sqrt(variance_rad2) == pytest.approx(loop.optical.noise_rad, rel=1e-12, abs=0.0)
 
 
 def test_cumulative_rms_of_a_flat_spectrum_grows_with_the_root_of_the_band():
