@@ -25,9 +25,19 @@ def test_each_fault_is_found_once_and_changes_the_code(faults):
     every = faults.every()
     for fault in every:
         fault.planted(fault.file(ROOT).read_text(encoding="utf-8"))
-    assert len(every) >= 80
+    assert len(every) >= 140
     assert min(Counter(fault.area for fault in every).values()) >= 4
     assert len({fault.kind for fault in every}) >= 7
+
+
+def test_faults_of_units_stand_where_the_code_converts_twelve_of_each_kind(faults):
+    spec = importlib.util.spec_from_file_location("unit_places", ROOT / "scripts" / "unit_places.py")
+    places = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(places)
+    drawn = [(fault.kind, fault.function) for fault in faults.listed(ROOT / "faults" / "units.toml")]
+    assert Counter(kind for kind, _ in drawn) == dict.fromkeys(places.KINDS, 12)
+    assert len(set(drawn)) == len(drawn)
+    assert {(place.kind, place.function) for place in places.every()} >= set(drawn)
 
 
 @pytest.mark.parametrize(

@@ -162,6 +162,13 @@ def test_sampled_plant_of_the_tracking_loop_is_that_of_the_study_with_no_state_t
     assert m.period_s == setup.timing.period_s == 2e-5
 
 
+def test_margins_are_exported_in_decibels_and_degrees(pointing):
+    known = replace(pointing.tuned.margins, gain_up=2.0, phase_rad=np.pi / 3.0)
+    of = choice.flight_controller(replace(pointing, tuned=replace(pointing.tuned, margins=known)))
+    told = {name: (round(value, 4), unit) for name, value, unit in of.margins}
+    assert (told["gain margin"], told["phase margin"]) == ((6.0206, "dB"), (60.0, "deg"))
+
+
 @pytest.mark.parametrize("which", ["pointing", "gauged", "learning"])
 def test_sampled_plant_of_the_pointing_loop_is_what_its_controller_was_designed_for(which, request):
     chosen = request.getfixturevalue(which)

@@ -33,8 +33,8 @@ def test_bound_of_a_sine_is_that_of_the_textbook():
     """Amplitude A and phase of a sine over whole periods, in units that differ by 1e6: 2 sigma^2/N, over A^2."""
     turns, amplitude = 2 * np.pi * np.arange(1000) / 100, 3e-6
     covariance = coverage.cramer_rao([np.column_stack([np.sin(turns), amplitude * np.cos(turns)])], 1e-7)
-    assert covariance[0, 0] == pytest.approx(2 * 1e-14 / 1000, rel=ROUNDING)
-    assert covariance[1, 1] == pytest.approx(2 * 1e-14 / 1000 / amplitude**2, rel=ROUNDING)
+    assert covariance[0, 0] == pytest.approx(2 * 1e-14 / 1000, rel=ROUNDING, abs=0.0)
+    assert covariance[1, 1] == pytest.approx(2 * 1e-14 / 1000 / amplitude**2, rel=ROUNDING, abs=0.0)
     assert abs(covariance[0, 1]) < ROUNDING * math.sqrt(covariance[0, 0] * covariance[1, 1])
 
 

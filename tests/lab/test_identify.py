@@ -329,6 +329,14 @@ def test_falling_play_is_fitted_by_its_sign():
     np.testing.assert_allclose(falling.weights_rad_per_v, rising.weights_rad_per_v, rtol=1e-9)
 
 
+def test_a_threshold_from_half_of_the_drive_on_is_refused_with_that_half():
+    record = play_record([0.05, 0.02], [0.0, 1.0])
+    half = np.ptp(record.drive) / 2.0
+    with pytest.raises(IdentificationError, match=f"below half of the drive's peak-to-peak, {half:g} V, or"):
+        fit_prandtl_ishlinskii([record], [0.0, half])
+    assert fit_prandtl_ishlinskii([record], [0.0, 0.999 * half]).thresholds_v[1] == 0.999 * half
+
+
 def test_default_thresholds():
     fit = fit_prandtl_ishlinskii([play_record([0.05, 0.03], [0.0, 1.0])], operators=7)
     assert fit.thresholds_v.size == 7

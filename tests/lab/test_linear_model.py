@@ -2,13 +2,14 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
 from microrad.core import lti
-from microrad.lab.identify.linear import order
+from microrad.lab.identify.linear import axis, order
 from microrad.lab.identify.linear.amplitude import amplitude_dependence
 from microrad.lab.identify.linear.fit import (
     fit_linear,
@@ -452,3 +453,10 @@ def test_cubespec_softens_with_amplitude(cubespec):
 )
 def test_a_value_is_printed_with_the_digits_that_its_error_leaves(value, error, shown):
     assert rounded_to_error(value, error) == shown
+
+
+def test_creep_is_looked_for_up_to_ten_radians_of_the_lowest_frequency():
+    lags = axis._lags(SimpleNamespace(excited_hz=(0.1, 100.0)))  # 10 rad at 0.1 Hz last 15.9 s
+    np.testing.assert_allclose(lags, [0.01, 0.0316, 0.1, 0.316, 1.0, 3.16, 10.0], rtol=1e-3)
+    assert axis._lags(SimpleNamespace(excited_hz=(160.0, 1000.0))) == ()  # 9.9 ms
+    assert axis._lags(SimpleNamespace(excited_hz=(159.0, 1000.0))) == (0.01,)

@@ -26,7 +26,7 @@ from microrad.lab.identify import (
     predict,
 )
 from microrad.lab.identify.hysteresis.structures import LinearPoles, Roots, poles_of
-from microrad.lab.identify.selection import candidates, choice
+from microrad.lab.identify.selection import candidates, choice, predictions
 from microrad.lab.identify.selection.candidates import refit
 from microrad.lab.identify.selection.choice import choose_best
 from microrad.lab.identify.statistics import propagated
@@ -604,3 +604,8 @@ def test_the_benchs_own_mirror_is_predicted_with_half_the_error_of_the_papers_mo
     assert result.score().held_out_rms_percent <= 0.5 * result.score("bouc_wen").held_out_rms_percent
     assert result.score().held_out_rms_percent < 1.0
     assert isinstance(result.fit().model, PrandtlIshlinskii)
+
+
+def test_what_a_choice_rests_on_has_its_errors_in_microradians():
+    found = predictions.Evidence((("slow.csv", 2.0),), "fast.csv", 3e-6, 9e-6)
+    assert choice._rests_on(found).endswith("is fast.csv, with 3 µrad rms and 9 µrad at most.")

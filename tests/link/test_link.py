@@ -184,7 +184,9 @@ def test_a_budget_is_the_sum_of_its_lines(budget_of):
 def test_irradiance_times_area_is_the_received_power(budget_of):
     budget = budget_of(MISSION, SOURCES)
     aperture = MISSION.terminals.leo_aperture_m if budget.name == "Answer" else MISSION.terminals.geo_aperture_m
-    assert budget.irradiance_w_m2 * math.pi * aperture**2 / 4 == pytest.approx(budget.received_power_w, rel=1e-9)
+    assert budget.irradiance_w_m2 * math.pi * aperture**2 / 4 == pytest.approx(
+        budget.received_power_w, rel=1e-9, abs=0.0
+    )
     assert budget.irradiance_on_axis_w_m2 > budget.irradiance_w_m2
 
 

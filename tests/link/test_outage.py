@@ -276,7 +276,7 @@ def test_fades_and_penalty_have_the_uncorrected_point_ahead_as_bias(tmp_path, bi
         (float(fades.per_second), float(fades.mean_duration_s)), rel=1e-9
     )
     share = statistics.outage_probability(shifted, HALF_RAD, on_axis - REQUIRED_DB)
-    assert found.fades_per_s * found.fade_s == pytest.approx(float(share), rel=1e-9)
+    assert found.fades_per_s * found.fade_s == pytest.approx(float(share), rel=1e-9, abs=0.0)
     receiver = link.of(mission).receiver
     needed = float(receiver.required_power_w(RATE_BIT_S))
     penalty = pointing.uncoded_penalty_db(
@@ -496,6 +496,6 @@ def test_errors_of_a_histogram_are_even_in_the_square_inside_each_bin():
     assert spread.quantile_rad(1.0) == pytest.approx(math.sqrt(high), rel=1e-12)
     assert np.sum(spread.share) == pytest.approx(1.0)
     mean = (low + middle) / 8 + 3 * (middle + high) / 8
-    assert np.sum(spread.share * spread.radius_rad**2) == pytest.approx(mean, rel=1e-12)
+    assert np.sum(spread.share * spread.radius_rad**2) == pytest.approx(mean, rel=1e-12, abs=0.0)
     inside = spread.radius_rad**2 < middle + 0.3 * (high - middle)
     assert np.sum(spread.share[inside]) == pytest.approx(0.25 + 0.75 * 0.3, abs=0.75 / 32)

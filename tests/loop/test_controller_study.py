@@ -395,6 +395,18 @@ def test_a_margin_out_of_reach_is_refused_with_the_best_there_is(tmp_path):
         controller_study.design(scene_of(changed))
 
 
+def test_margins_are_printed_and_told_in_decibels_and_degrees(scene, tuned):
+    from microrad.cli.pointing import _data, _text
+
+    known = replace(tuned[0][0].tuned.margins, gain_up=2.0, phase_rad=math.pi / 3.0)
+    of = replace(tuned[0][0], tuned=replace(tuned[0][0].tuned, margins=known))
+    left = controller_study.Outlook(1.25e-6, 2.5e-6)
+    told = _data(of, left, "")["margins"]
+    assert (told["gain_up_db"], told["phase_deg"]) == (pytest.approx(6.0206, abs=1e-4), pytest.approx(60.0))
+    row = _text(scene, (of,), (left,), [""], [])
+    assert all(said in row for said in (" 1.250 ", " 2.500 ", " 60° ", " 6.0 dB "))
+
+
 def test_designs_are_plain_data_for_other_tools(scene, tuned):
     from microrad.cli.pointing import _data
 

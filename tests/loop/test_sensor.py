@@ -133,8 +133,8 @@ def test_the_signal_to_noise_ratio_by_hand():
     # 1 nW on 1 A/W is 1 nA; in 2.5 kHz, in units of 1e-27 A2: 2 x 1.602176634e-19 C x 2500 Hz = 8.01088317e-16 A per A
     shot = 8.01088317e-16 * (1e-9 + 0.2e-9 + 4 * 1e-9)  # signal, background, four cells' dark current
     thermal = 4 * (1e-13) ** 2 * 2500.0
-    assert shot == pytest.approx(4.16566e-24, rel=1e-5)
-    assert thermal == pytest.approx(1e-22, rel=1e-12)
+    assert shot == pytest.approx(4.16566e-24, rel=1e-5, abs=0.0)
+    assert thermal == pytest.approx(1e-22, rel=1e-12, abs=0.0)
     assert CELL.signal_to_noise(1e-9, 2500.0) == pytest.approx(1e-9 / math.sqrt(shot + thermal), rel=1e-12)
     assert CELL.signal_to_noise(1e-9, 2500.0) == pytest.approx(97.98, abs=0.005)
 
@@ -142,11 +142,13 @@ def test_the_signal_to_noise_ratio_by_hand():
 def test_the_noise_lines_add_in_squares_and_say_what_they_are():
     lines = {line.name: line for line in CELL.noise_lines(1e-9, 2500.0, source="data sheet")}
     assert list(lines) == ["Signal shot noise", "Background shot noise", "Dark-current shot noise", "Thermal noise"]
-    assert lines["Signal shot noise"].value == pytest.approx(math.sqrt(8.01088317e-25), rel=1e-9)
-    assert lines["Background shot noise"].value == pytest.approx(math.sqrt(0.2 * 8.01088317e-25), rel=1e-9)
-    assert lines["Dark-current shot noise"].value == pytest.approx(2 * math.sqrt(8.01088317e-25), rel=1e-9)
-    assert lines["Thermal noise"].value == pytest.approx(1e-11, rel=1e-12)
-    assert root_sum_square(lines.values()) == pytest.approx(1e-9 / CELL.signal_to_noise(1e-9, 2500.0), rel=1e-12)
+    assert lines["Signal shot noise"].value == pytest.approx(math.sqrt(8.01088317e-25), rel=1e-9, abs=0.0)
+    assert lines["Background shot noise"].value == pytest.approx(math.sqrt(0.2 * 8.01088317e-25), rel=1e-9, abs=0.0)
+    assert lines["Dark-current shot noise"].value == pytest.approx(2 * math.sqrt(8.01088317e-25), rel=1e-9, abs=0.0)
+    assert lines["Thermal noise"].value == pytest.approx(1e-11, rel=1e-12, abs=0.0)
+    assert root_sum_square(lines.values()) == pytest.approx(
+        1e-9 / CELL.signal_to_noise(1e-9, 2500.0), rel=1e-12, abs=0.0
+    )
     assert all(line.unit == "A" and line.source == "data sheet" and "2.5 kHz" in line.basis for line in lines.values())
 
 

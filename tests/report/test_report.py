@@ -16,13 +16,16 @@ import xarray as xr
 
 from microrad import report
 from microrad.core import folder
+from microrad.link.requirement import Requirement
 from microrad.mission import file as missionfile
 from microrad.report.page.templates import inputs_view
 from microrad.report.paper import bench
 from microrad.report.paper import diagrams as drawings
 from microrad.report.paper import page as paper_views
 from microrad.report.plotting.figure import Figure
+from microrad.report.plotting.sheet import Line
 from microrad.report.quantities import minus
+from microrad.report.requirements import nearest, nearness
 from microrad.report.study import chain, page, words
 from microrad.report.study import contributors as requirement_views
 from microrad.report.tables import Table
@@ -181,6 +184,15 @@ def test_each_requirement_stands_with_its_margin_and_its_contributor(written, pa
     assert all(row[5] in visible for row in rows)
 
 
+def test_half_of_the_power_is_further_off_than_an_error_of_nine_fifths():
+    power = Requirement("communication", "margin", "dB", 3.0, 3.0 - 10.0 * math.log10(2.0), -10.0 * math.log10(2.0), "")
+    error = Requirement("residual", "error", "rad", 10e-6, 18e-6, -8e-6, "")
+    assert nearness(power)[2] == pytest.approx(0.5)
+    assert nearness(error)[2] == pytest.approx(5.0 / 9.0)
+    assert nearest((error, power)) is power
+    assert nearest((replace(error, actual=21e-6, margin=-11e-6), power)) is not power
+
+
 def test_a_requirement_moved_most_by_a_share_says_by_what_factor(paper):
     swing = replace(paper.links.tornados[0].swings[0], key="requirement.outage", margin_low_db=0.0, margin_high_db=9.0)
     beyond = replace(swing, margin_high_db=math.nan)
@@ -273,6 +285,21 @@ def test_the_virtual_bench_stands_where_the_paper_measures(written, paper):
     assert [loop.freq_hz for loop in bench.loops()] == [60.0, 80.0, 100.0]
     assert {loop.fitted_hz for loop in bench.loops()} == {100.0}
     assert all(0.0 < loop.error_percent < 0.2 for loop in bench.loops())
+
+
+def test_the_phase_of_the_bench_is_drawn_in_degrees():
+    late = bench.chirp()
+    of = replace(
+        late, response=np.exp(-2j * np.pi * 1e-3 * late.freq_hz), model=np.exp(-2j * np.pi * late.freq_hz * 2e-3)
+    )
+    *_, phase = bench.chirp_figure(of).sheet.panels
+    for line, delay_s in zip(phase.all_of(Line), (1e-3, 2e-3), strict=True):
+        np.testing.assert_allclose(line.y, -360.0 * delay_s * late.freq_hz, atol=1e-6)
+
+
+def test_the_margins_of_the_loop_are_in_decibels_and_degrees(paper):
+    known = replace(paper.margins, gain_up=2.0, phase_rad=math.pi / 3.0)
+    assert page._margins(replace(paper, margins=known))[:2] == [("gain margin", "6.0 dB"), ("phase margin", "60°")]
 
 
 def test_another_kind_of_mirror_leaves_the_bench_out(no_scan, tmp_path):

@@ -40,6 +40,7 @@ from microrad.report.campaign.numbers import share, value
 from microrad.report.campaign.page import campaign_figures, campaign_page
 from microrad.report.campaign.tables import failed_table
 from microrad.report.campaign.text import campaign_text
+from microrad.report.plotting.sheet import Line
 from report_pages import assert_sound, without_scripts
 
 NAME = 'LEO <b>"A&B"</b> $x$'
@@ -651,6 +652,13 @@ def test_the_tail_marks_what_was_wanted_and_the_limit():
     assert not any("limit" in t for t in texts(alone))
     dark = replace(summary.cells[0], tail=replace(summary.cells[0].tail, survival=np.zeros(4), radius_rad=np.ones(4)))
     assert drawing.tail(summary, dark) == ()
+
+
+def test_the_tail_is_drawn_over_microradians():
+    summary = summary_of(2, rows=64)
+    (figure,) = drawing.tail(summary, summary.cells[0])
+    (curve,) = (line for line in figure.sheet.panels[0].all_of(Line) if line.label == "all rows")
+    np.testing.assert_allclose(curve.y, np.exp(-0.5 * (curve.x / 2.0) ** 2), rtol=1e-9)  # Rayleigh's, sigma 2 µrad
 
 
 def test_many_inputs_are_cut_in_the_picture_but_not_in_its_data():

@@ -745,6 +745,13 @@ def test_the_sensitivity_drawn_peaks_at_the_inverse_of_the_modulus_margin(drawn,
         assert np.max(sensitivity.columns[name]) == pytest.approx(1.0 / margin, rel=2e-3)
 
 
+def test_the_sensors_noise_up_to_half_of_its_rate_is_its_variance(fine):
+    loop = fine.scene.loop
+    half_rate_hz = 0.5 / (loop.timing.period_s * loop.optical.every)
+    variance_rad2 = figures._noise_density(fine) * half_rate_hz
+    assert math.sqrt(variance_rad2) == pytest.approx(loop.optical.noise_rad, rel=1e-12, abs=0.0)
+
+
 def test_cumulative_rms_of_a_flat_spectrum_grows_with_the_root_of_the_band():
     freq = np.arange(1.0, 101.0)
     assert_allclose(figures.cumulative_rms(freq, np.full(100, 4e-12)), 2e-6 * np.sqrt(freq), rtol=1e-12)

@@ -346,6 +346,19 @@ def test_the_curve_of_coverage_is_the_budget_s(draft):
     assert curve["y"][-1] > 99.0
 
 
+def test_the_working_point_stands_at_rate_and_error_of_the_mission(view):
+    (point,) = (each for each in link_view.map_plot(view)["data"] if each.get("name") == "working point")
+    assert (point["x"], point["y"]) == ([300.0], [10.0])  # Mbit/s and µrad of the shipped mission
+
+
+def test_each_rule_stands_at_the_angle_that_its_label_says(draft):
+    shapes = pointing_view.coverage_plot(pointing_view.view(draft.link()))["layout"]["shapes"]
+    told = [(shape["x0"], re.search(r": ([\d.]+) µrad$", shape["name"])) for shape in shapes if shape.get("name")]
+    assert len(told) == 4  # the beacon and three rules of summation
+    for at, words in told:
+        assert at == pytest.approx(float(words[1]), rel=5e-3)
+
+
 # ----------------------------------------------------------------------------------------------------------------- day
 def test_the_timeline_has_every_contact_of_either_way(day, figures):
     shown = figures["day-timeline"]

@@ -140,6 +140,7 @@ def test_the_claims_beside_our_values(shipped):
         ("abstract", "yes"),
     ]
     ours = [c.ours for c in result.claims]
+    assert "inferred, hence circular: 3 dB at 300 Mbit/s and 10 µrad imply" in result.claims[2].why
     assert ours[3].startswith("1.07 mrad")
     assert ours[4].startswith("gain 0.1625 at DC")
     assert ours[5] == "2.43 % at 1 Hz, 6.92 % at 60 Hz, 9.86 % at 80 Hz, 14.05 % at 100 Hz"

@@ -347,7 +347,7 @@ def _line(pen: Pen, line: Line) -> None:
             return
     if line.marker:
         every: Any = slice(None) if line.every is None else list(line.every)
-        points = {**pen.scatter(line.x[every], line.y[every], "markers"), "marker": marker(line), **outside}
+        points = {**pen.scatter(line.x[every], line.y[every], "markers"), "marker": marker(line), **outside, **name}
         pen.trace({**points, **(_QUIET if line.dash else {}), **({} if line.dash else _arms(line))}, label, look)
 
 
