@@ -32,7 +32,7 @@ from microrad.loop.control import adaptive
 from microrad.loop.pointing_loop.loop import with_adaptation
 from microrad.mirror.hysteresis import NO_CREEP
 
-SAMPLES = 10_000
+SAMPLES = 4000
 
 
 def chosen_to_learn(resolution_v=0.0, learns=True, creep=NO_CREEP, **changes):
