@@ -58,6 +58,8 @@ def test_what_breaks_its_promise_is_tuned_for_a_larger_margin(light):
 
 def test_a_larger_margin_is_said_beside_the_values(light, call, monkeypatch):
     monkeypatch.setattr(designs, "names", lambda m: (OBSERVER,))
+    made = controller_study.design_and_promise(scene_of(load_mission(light)), only=(OBSERVER,))
+    monkeypatch.setattr(controller_study, "design_and_promise", lambda *args: made)
     done = call("design", "light.toml", "--json")
     assert done.code == 0
     (found,) = json.loads(done.out)["controllers"]
