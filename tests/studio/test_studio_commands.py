@@ -97,7 +97,7 @@ def test_a_study_gives_the_same_verdict_and_the_same_files(home, capsys, monkeyp
 
 def test_controllers_are_designed_alike(folder, capsys, monkeypatch):
     monkeypatch.setattr(controller_study, "design", once(controller_study.design))
-    monkeypatch.setattr(designs, "families", lambda m: (control.PI, control.LQG))
+    monkeypatch.setattr(designs, "families", lambda m: (control.PI,))
     (folder / MISSION).write_text(SHIPPED.read_text("utf-8"), encoding="utf-8")
     out, code, _ = typed(commands.design(MISSION).command, capsys)
     assert code == ("refused" in out)
