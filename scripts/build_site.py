@@ -1,6 +1,8 @@
 """Build the documentation site: the pages of docs/ and those that are made from the code, as HTML without network.
 
-    python scripts/build_site.py [FOLDER]        # site/ by default; prints the path of its first page
+    python scripts/build_site.py [FOLDER [UNRUN...]]        # site/ by default; prints the path of its first page
+
+Notebooks that fit a pattern of UNRUN are shown as they are stored.
 
 A warning of the builder, a notebook that raises, a link or anchor that leads nowhere and anything that a page would
 fetch from elsewhere is a fault; the faults are printed and the exit code is 1.
@@ -11,6 +13,7 @@ import re
 import shutil
 import sys
 import tempfile
+from collections.abc import Sequence
 from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
@@ -23,11 +26,12 @@ PROJECT_PAGES = ("CONTRIBUTING.md", "CHANGELOG.md")
 _FETCHING = {"script": "src", "img": "src", "iframe": "src", "link": "href", "source": "src"}
 
 
-def build(target: Path) -> list[str]:
+def build(target: Path, unrun: Sequence[str] = ()) -> list[str]:
     """Write the site into a folder, which is emptied first, and return what is wrong with it.
 
     Args:
         target: The folder; it is made where it is not there.
+        unrun: Notebooks that are shown as they are stored, by patterns of their names.
     """
     from site_pages import all_pages
 
@@ -43,7 +47,8 @@ def build(target: Path) -> list[str]:
         warnings = io.StringIO()
         said = {"status": None, "warning": warnings, "confdir": sources, "srcdir": sources}
         built = Path(temporary, "site")  # what notebooks made is left beside it
-        app = Sphinx(outdir=built, doctreedir=trees, buildername="html", freshenv=True, **said)
+        settings = {"nb_execution_excludepatterns": list(unrun)}
+        app = Sphinx(outdir=built, doctreedir=trees, buildername="html", freshenv=True, confoverrides=settings, **said)
         app.build()
         shutil.rmtree(built / ".doctrees", ignore_errors=True)
         shutil.move(built, target)
@@ -119,7 +124,7 @@ def external_links(site: Path) -> list[str]:
 def main() -> int:
     """Build it, and say where it is or what is wrong."""
     target = Path(sys.argv[1] if len(sys.argv) > 1 else "site")
-    wrong = build(target)
+    wrong = build(target, sys.argv[2:])
     print("\n".join(wrong) if wrong else target / "index.html")
     return int(bool(wrong))
 

@@ -15,6 +15,10 @@ SHIPPED, DEFAULT = MISSIONS / "paper.toml", MISSIONS / "leo-geo.toml"
 """The paper's mission, which most tests are about, and the one that `microrad init` writes."""
 
 
+RUN_STUDY = study.run_study
+"""The study itself, whatever a test has put in its place."""
+
+
 def without_fine_pointing(text):
     """A mission's text without its fine-pointing loop, which takes most of a study's time."""
     return text[: text.index("# ---", text.index("loop_amplitude = "))]
@@ -51,6 +55,18 @@ def plain_study():
             return study.run_study(load_mission(SHIPPED))
 
     return once("plain study", run)
+
+
+@cache
+def default_study():
+    """The whole study of the mission that `microrad init` writes, without the paper's claims; once for all tests."""
+
+    def run():
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(study.paper, "applies", lambda mission: False)
+            return RUN_STUDY(load_mission(DEFAULT))
+
+    return once("default study", run)
 
 
 @cache

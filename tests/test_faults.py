@@ -82,6 +82,7 @@ def tiny(faults, tmp_path, monkeypatch):
     (tree / "tests" / "test_sharp.py").write_text(A_TEST.format(3, "== 6"), encoding="utf-8")
     for words in (["init", "-q"], ["add", "."]):
         subprocess.run(["git", *words], cwd=tree, check=True)
+    monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")  # the tree's tests need none, and each takes its time
     monkeypatch.setattr(faults, "ROOT", tree)
     monkeypatch.setattr(faults, "SUITE", ())
     return faults.Fault("sum", "link", "sign", "microrad.core.threads:in_threads", "n * 2", "n + 2", "")

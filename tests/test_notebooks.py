@@ -1,10 +1,12 @@
-"""The stored notebooks: their form, and that their prose has no figure of its own. The site's build executes them."""
+"""The stored notebooks: their form, that their prose has no figure of its own, and that their code runs."""
 
 import ast
 import copy
 import json
+import os
 import re
 import sys
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -12,6 +14,8 @@ import pytest
 FOLDER = Path(__file__).resolve().parents[1] / "docs" / "notebooks"
 NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
 STORIES = 8
+RUN_HERE = () if os.environ.get("MICRORAD_ENDURANCE") else NOTEBOOKS[1:]
+"""Those whose code is run in this process, which has all that they import; the site's build executes the others."""
 
 _LIBRARIES = {"microrad", "numpy", "matplotlib"}  # what a plain install with the extra docs has
 _ARTICLE = "SPIE 11852, 118523B"
@@ -89,6 +93,21 @@ def test_nothing_is_wrong_with_its_form(path):
     text = path.read_text(encoding="utf-8")
     assert list(faults(json.loads(text))) == []
     assert text == stored(json.loads(text))
+
+
+@pytest.mark.usefixtures("rows_here")
+@pytest.mark.parametrize("path", RUN_HERE, ids=lambda path: path.stem)
+def test_its_code_runs_and_says_what_was_found(path, tmp_path, monkeypatch, capsys):
+    pyplot = pytest.importorskip("matplotlib.pyplot", reason="nothing is drawn without matplotlib")
+    pyplot.switch_backend("Agg")
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.chdir(tmp_path)
+    names = {}
+    for cell in json.loads(path.read_text(encoding="utf-8"))["cells"]:
+        if cell["cell_type"] == "code":
+            exec("".join(cell["source"]), names)
+    pyplot.close("all")
+    assert "What was found\n  " in capsys.readouterr().out
 
 
 def _with_output(cells):

@@ -1,6 +1,7 @@
 """The documentation site: it builds without a warning, leads nowhere false, loads nothing, and has all that it should.
 
-It is built once for all tests here, which is also what runs its notebooks.
+It is built once for all tests here, with one notebook that is run as the site runs it: each of them starts a process of
+its own. In make endurance all are, as in `make site`; tests/test_notebooks.py runs the code of the others.
 """
 
 import re
@@ -17,13 +18,15 @@ pytest.importorskip("sphinx", reason="the site's builder is not installed (the e
 import build_site
 from site_pages import cases, commands, formulas, names
 from site_pages.tables import plain
+from test_notebooks import RUN_HERE
 
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory):
     """The folder of the built site, by the command that `make site` runs, and what it printed."""
     folder = tmp_path_factory.mktemp("site") / "html"
-    command = [sys.executable, build_site.ROOT / "scripts" / "build_site.py", folder]
+    unrun = [f"{path.stem}*" for path in RUN_HERE]
+    command = [sys.executable, build_site.ROOT / "scripts" / "build_site.py", folder, *unrun]
     ran = subprocess.run(command, capture_output=True, text=True, check=False)
     return folder, ran
 

@@ -141,7 +141,7 @@ def test_the_density_of_the_levels_is_one_and_no_weight_is_large(begin, end):
     assert log_weight[level > end].max() < 1.0 - begin  # and far out they are as small as the probability
 
 
-@pytest.mark.parametrize("sigma", [[1.0], [1.0, 1.0], [3.0, 1.0]])
+@pytest.mark.parametrize("sigma", [[1.0], pytest.param([1.0, 1.0], marks=pytest.mark.endurance), [3.0, 1.0]])
 def test_what_runs_have_along_the_directions_is_standard_normal_under_their_weights(sigma):
     """Its variances, in all and where one direction alone is rare, and its radius is that of the level."""
     by = Proposal(0, np.zeros((1, 1, 1)), np.zeros((1, 1, 1)), np.array(sigma), 6.0, 8.0)

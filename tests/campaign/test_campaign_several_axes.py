@@ -19,6 +19,7 @@ from microrad.mirror import coupled
 from microrad.mirror.hysteresis import BoucWen
 from microrad.mission.file import MissionError
 from several_axes import TEXT, mission_text, two_axes
+from small_campaign import without_worker
 
 NAMED = ("[fine_pointing]\n", '[fine_pointing]\nmirror_file = "mirror.toml"\n')
 LOOP = '[loop]\ncontroller = "PI"\nduration = "0.2 s"\nsettle = "0.1 s"\n'
@@ -131,16 +132,18 @@ def test_a_row_flies_the_drawn_mirror_under_the_controller_of_the_nominal_one(tm
     assert flat.columns["residual_rms"][0] not in rms
 
 
-def test_the_rows_are_the_same_by_any_number_of_workers(tmp_path):
+def test_the_rows_are_the_same_by_two_workers_and_by_none(tmp_path, monkeypatch):
     path, found = written(tmp_path, SMALL + LOOP + IDENTIFIED), []
-    for threads in (1, 2):
-        book = tmp_path / f"{threads}.ledger"
-        run.run_campaign(path, book, run.Means(threads=threads))
+    for name in ("two", "none"):
+        book = tmp_path / f"{name}.ledger"
+        if name == "none":
+            without_worker(monkeypatch)
+        run.run_campaign(path, book, run.Means(threads=2))
         with closing(Ledger.open(book, write=False)) as ledger:
             found.append({chunk.number: chunk for chunk in ledger.chunks(0)})
-    one, two = found
-    assert one.keys() == two.keys() and len(one) > 1
-    for number, chunk in one.items():
+    two, none = found
+    assert none.keys() == two.keys() and len(none) > 1
+    for number, chunk in none.items():
         assert not chunk.failed
         for name, column in chunk.columns.items():
             assert np.array_equal(column, two[number].columns[name]), name

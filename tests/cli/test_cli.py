@@ -247,13 +247,13 @@ def few_controllers(monkeypatch):
 @pytest.fixture
 def designed_once(monkeypatch):
     """Controllers of the one mission of a test, designed once for all that is printed of them."""
-    made, design = [], controller_study.design
+    made, design = [], controller_study.design_and_promise
 
-    def known(scene, on_progress):
-        made[:] = made or [design(scene, on_progress)]
+    def known(scene, on_progress, only):
+        made[:] = made or [design(scene, on_progress, only)]
         return made[0]
 
-    monkeypatch.setattr(controller_study, "design", known)
+    monkeypatch.setattr(controller_study, "design_and_promise", known)
 
 
 @pytest.mark.usefixtures("few_controllers", "designed_once")
@@ -270,6 +270,7 @@ def test_design_prints_each_controller_with_its_margins(call, folder):
     assert len(data["controllers"][0]["matrices"]["A"]) == 2  # an integrator an axis
 
 
+@pytest.mark.usefixtures("designed_once")
 def test_design_says_when_nothing_is_known_of_the_mirrors_dynamics(call, folder, loop_mirror, monkeypatch):
     monkeypatch.setattr(designs, "names", lambda m: (designs.BASELINE,))
     monkeypatch.setattr(designs, "DRAWS", 1)

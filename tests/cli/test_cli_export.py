@@ -29,7 +29,7 @@ def mission(folder):
 
 # --------------------------------------------------------------------------------------------------------------- C code
 @needs_a_compiler
-@pytest.mark.parametrize("precision", ["double", "single", "fixed"])
+@pytest.mark.parametrize("precision", ["double", pytest.param("single", marks=pytest.mark.endurance), "fixed"])
 def test_a_controller_becomes_code_that_keeps_to_the_kernel(mission, call, precision):
     done = call("export", "c", "leo-geo.toml", "--controller", "PID + inverse", "--precision", precision, "--json")
     assert done.code == 0, done.err

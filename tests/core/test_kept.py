@@ -435,16 +435,17 @@ def test_it_is_off_where_the_environment_says_so(monkeypatch, tmp_path):
 def test_the_code_of_a_number_is_known_by_its_files_and_not_by_what_is_compiled_or_gives_a_page_its_looks(
     monkeypatch, tmp_path
 ):
+    core = tmp_path / "core"  # the package is the folder above it, and all that is in there is read
     for name in ("machine.py", "values.toml", "style.css", "__pycache__/machine.pyc"):
-        (tmp_path / name).parent.mkdir(exist_ok=True)
-        (tmp_path / name).write_text("1")
-    monkeypatch.setattr(machine, "__file__", str(tmp_path / "machine.py"))
+        (core / name).parent.mkdir(exist_ok=True)
+        (core / name).write_text("1")
+    monkeypatch.setattr(machine, "__file__", str(core / "machine.py"))
     known = {machine.source_sha256.__wrapped__()}
-    (tmp_path / "__pycache__" / "loops.nbc").write_text("compiled meanwhile")
-    (tmp_path / "style.css").write_text("other looks")
+    (core / "__pycache__" / "loops.nbc").write_text("compiled meanwhile")
+    (core / "style.css").write_text("other looks")
     known.add(machine.source_sha256.__wrapped__())
     assert len(known) == 1
     for name in ("machine.py", "values.toml"):
-        (tmp_path / name).write_text("2")
+        (core / name).write_text("2")
         known.add(machine.source_sha256.__wrapped__())
     assert len(known) == 3

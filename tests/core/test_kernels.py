@@ -215,7 +215,7 @@ def test_asymmetry_quadrant_by_quadrant(epsilon, gamma, eta):
 POWER_ROWS = [PAPER, ADMISSIBLE, ASYMMETRIC, ADMISSIBLE._replace(epsilon=0.03, gamma=-0.4, eta=0.3)]
 
 
-@pytest.mark.parametrize("exponent", [1.5, 2.0, 3.0, 7.3])
+@pytest.mark.parametrize("exponent", [1.5, *(pytest.param(n, marks=pytest.mark.endurance) for n in (2.0, 3.0)), 7.3])
 @pytest.mark.parametrize("row", POWER_ROWS, ids=["paper", "admissible", "asymmetric", "rising"])
 @pytest.mark.parametrize("step_s", [20e-6, 1e-3, 0.02])
 def test_another_exponent_agrees_with_an_adaptive_solver(row, exponent, step_s):

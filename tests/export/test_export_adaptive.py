@@ -32,7 +32,7 @@ from microrad.loop.control import adaptive
 from microrad.loop.pointing_loop.loop import with_adaptation
 from microrad.mirror.hysteresis import NO_CREEP
 
-SAMPLES = 10_000
+SAMPLES = 4000
 
 
 def chosen_to_learn(resolution_v=0.0, learns=True, creep=NO_CREEP, **changes):
@@ -144,7 +144,7 @@ KINDS = {
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_bound_holds_with(kind, tmp_path):
-    of, vectors, bound = bounded(samples=3000, **KINDS[kind])
+    of, vectors, bound = bounded(samples=1500, **KINDS[kind])
     vectors = c_code.within_limits(of, vectors)
     assert (vectors.saturated > 100) == (kind == "clipped commands")
     _, found = stray(tmp_path, of, vectors, bound)
@@ -153,7 +153,7 @@ def test_the_bound_holds_with(kind, tmp_path):
 
 def test_the_bound_is_that_of_every_sample(tmp_path):
     """Ahead of the converter and the clip; it holds from the first sample on, not by its largest alone."""
-    of, vectors = learning(samples=4000)
+    of, vectors = learning()
     bound = errors_before_converter(of, sections(of), vectors)
     off = np.abs(Code(tmp_path, of, "single").replay(vectors.inputs) - vectors.commands)
     assert np.all(off <= bound + 4.0 * UNIT * np.abs(vectors.commands))

@@ -37,7 +37,11 @@ BANKS = {
     "exponent 2": ((POWERED,), ()),
     "a polynomial alone": ((), (PrandtlIshlinskii((), (), polynomial_rad=(0.3, 2.0, -1.0), reach_v=5.0),)),
 }
-each_bank = pytest.mark.parametrize("bank", BANKS)
+REPEATED = {"plays and a polynomial", "exponent 2"}
+"""What the other banks hold, too, or one element of theirs with another power."""
+each_bank = pytest.mark.parametrize(
+    "bank", [pytest.param(bank, marks=[pytest.mark.endurance] if bank in REPEATED else []) for bank in BANKS]
+)
 
 
 @cache

@@ -224,7 +224,7 @@ def test_the_compiled_code_equals_the_twin_to_the_last_bit(name, tmp_path):
 
 
 @needs_compiler
-@pytest.mark.parametrize("bits", [32, 24])
+@pytest.mark.parametrize("bits", [32, pytest.param(24, marks=pytest.mark.endurance)])
 def test_a_step_without_an_inverse_equals_the_twin_and_stays_within_the_limits(bits, tmp_path):
     of, form, v = shipped("LQG")
     fixed, rng = quantised(of, form, v, bits, beyond_a_count=True), np.random.default_rng(7)

@@ -283,11 +283,12 @@ def test_single_precision_stays_within_the_bound_that_it_states(flown, tmp_path)
 # ------------------------------------------------------------------------------------------------ several axes
 
 
-def test_a_controller_of_several_axes_is_the_kernel_over_1e5_samples(tmp_path):
+@pytest.mark.parametrize("samples", [10_000, pytest.param(100_000, marks=pytest.mark.endurance)])
+def test_a_controller_of_several_axes_is_the_kernel_over_many_samples(samples, tmp_path):
     chosen = designs.of_three_actuators()
-    of, vectors = choice.flight_controller(chosen), choice.vectors(chosen, 100_000)
+    of, vectors = choice.flight_controller(chosen), choice.vectors(chosen, samples)
     assert [each.name for each in of.inputs] == ["optical_error_rad"]
-    assert (of.actuators, of.bias_v, vectors.inputs.shape) == (3, 50.0, (100_000, 2))
+    assert (of.actuators, of.bias_v, vectors.inputs.shape) == (3, 50.0, (samples, 2))
     off, counters = difference(Code(tmp_path, of), vectors)
     print(f"off by {off:.2g} of the largest command")
     assert 0.0 < off < EXACT

@@ -393,7 +393,13 @@ def test_a_mission_s_controllers_replay_their_recorded_run(flying, name):
     assert 0.0 <= clipped < limit and often > 20
 
 
-@pytest.mark.parametrize("name", ["PI + inverse in series", "LQG", "disturbance observer"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "PI + inverse in series",
+        *(pytest.param(n, marks=pytest.mark.endurance) for n in ("LQG", "disturbance observer")),
+    ],
+)
 def test_a_mission_s_controllers_replay_a_long_random_run(flying, name):
     of, _, form, recorded = flying[name]
     found, often = difference(of, noise(of, LONG) * np.std(recorded, axis=0), 0.5, form)

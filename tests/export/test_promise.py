@@ -37,6 +37,23 @@ def light(folder):
     return folder / "light.toml"
 
 
+MADE = {}
+
+
+@pytest.fixture(autouse=True)
+def designed_once(monkeypatch):
+    """A controller of that mission is designed once for all that is said of it."""
+    design = controller_study.design_and_promise
+
+    def known(scene, on_progress=None, only=()):
+        key = (scene.table, tuple(only), promises.SHARES)
+        if key not in MADE:
+            MADE[key] = design(scene, only=only)
+        return MADE[key]
+
+    monkeypatch.setattr(controller_study, "design_and_promise", known)
+
+
 @pytest.fixture
 def broken(monkeypatch):
     """No larger margin is tried: what breaks its promise stays as it is."""

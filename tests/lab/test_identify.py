@@ -270,7 +270,7 @@ def test_lowest_slope_is_that_of_the_modelled_output(fit_100hz):
     assert fit_100hz.lowest_slope_rad_per_v <= numeric.min()  # the slope eases within the step behind a reversal
 
 
-@pytest.mark.parametrize("freqs", [(100,), (60, 80, 100)])
+@pytest.mark.parametrize("freqs", [pytest.param((100,), marks=pytest.mark.endurance), (60, 80, 100)])
 def test_admissible_fit_never_turns_against_the_drive(freqs):
     recordings = [record(f, i) for i, f in enumerate(freqs)]
     free, bound = (fit_bouc_wen(recordings, starts=2, admissible=admissible) for admissible in (False, True))

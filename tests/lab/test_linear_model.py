@@ -1,6 +1,7 @@
 """The linear model: the paper's chirp, order, polish, uncertainty, warnings, and the real CubeSpec mirror."""
 
 import math
+import os
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -37,6 +38,7 @@ from places import DATA
 EQ2 = ((1.979e11, 7.051e13, 2.973e13), (1, 2.15e4, 3.737e8, 2.615e12, 8.489e14, 1.829e14))
 POINTS_HZ = np.geomspace(1, 5000, 300)
 CUBESPEC = DATA / "cubespec"
+OFTEN = bool(os.environ.get("MICRORAD_ENDURANCE"))
 needs_cubespec = pytest.mark.skipif(not CUBESPEC.exists(), reason=f"real recording cubespec absent: {CUBESPEC}")
 
 
@@ -407,7 +409,7 @@ def realisations(amplitude_mv):
 def cubespec():
     """One realisation of each amplitude held out; without exchanges, which the benchmark has."""
     found = {}
-    for amplitude_mv in (100, 200, 300):
+    for amplitude_mv in (100, 200, 300) if OFTEN else (100, 300):
         *fitted, held_out = realisations(amplitude_mv)
         found[amplitude_mv] = (fit_linear(fitted, 28, exchanges=0), held_out)
     return found
@@ -415,7 +417,8 @@ def cubespec():
 
 @needs_cubespec
 @pytest.mark.parametrize(
-    ("amplitude_mv", "low_um", "bar_um"), [(100, 0.06, 0.1), (200, 0.09, 0.17), (300, 0.13, 0.225)]
+    ("amplitude_mv", "low_um", "bar_um"),
+    [(100, 0.06, 0.1), pytest.param(200, 0.09, 0.17, marks=pytest.mark.endurance), (300, 0.13, 0.225)],
 )
 def test_cubespec_held_out(cubespec, amplitude_mv, low_um, bar_um):
     fit, held_out = cubespec[amplitude_mv]
@@ -427,7 +430,7 @@ def test_cubespec_held_out(cubespec, amplitude_mv, low_um, bar_um):
 
 @needs_cubespec
 def test_cubespec_softens_with_amplitude(cubespec):
-    change = amplitude_dependence([cubespec[a][0] for a in (300, 100, 200)])
+    change = amplitude_dependence([fit for fit, _ in reversed(cubespec.values())])
     assert (np.diff(change.drive_rms) > 0.09).all()
     assert 6.5 < change.gain_rise_percent < 9
     assert change.resonance_hz[0] == pytest.approx(924.1, abs=0.3)

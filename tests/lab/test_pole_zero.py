@@ -84,7 +84,7 @@ def test_a_resonance_with_creep_is_one_pair_of_poles():
     assert abs(fit.delay_s) < 4 * fit.delay_error_s < 4e-6
 
 
-@pytest.mark.parametrize("between", ["zero-order", "first-order"])
+@pytest.mark.parametrize("between", ["zero-order", pytest.param("first-order", marks=pytest.mark.endurance)])
 def test_a_delay_is_no_pole_and_the_hold_is_the_one_that_was_named(between):
     poles = pair(1200.0, 0.4)
     drive = swept(highest=2500.0)

@@ -95,7 +95,9 @@ def test_a_beam_is_looked_for_at_its_own_margin_and_above_diffraction(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "changes", [{}, PATTERN, received_with("preamplified dpsk")], ids=["gain", "pattern", "receiver"]
+    "changes",
+    [{}, PATTERN, pytest.param(received_with("preamplified dpsk"), marks=pytest.mark.endurance)],
+    ids=["gain", "pattern", "receiver"],
 )
 def test_every_key_has_its_margin_inside_and_not_beyond_its_ends(tmp_path, changes):
     file = link_file(tmp_path, changes, UNLIKE, {"communication.data_rate": "100 Mbit/s"})

@@ -259,7 +259,7 @@ def test_the_parts_of_the_error_budget_combine_where_the_loop_is_linear(scene, f
     assert as_linear.linear
 
 
-@pytest.mark.parametrize("name", [controller_study.BASELINE, "PI + inverse"])
+@pytest.mark.parametrize("name", [pytest.param(controller_study.BASELINE, marks=pytest.mark.endurance), "PI + inverse"])
 def test_the_budget_takes_the_whole_from_what_is_simulated_already(scene, file, tuned, monkeypatch, name):
     """To the bit the rms that the whole loop and the one without hysteresis leave when they are simulated again."""
     (verified,) = controller_study.verify(scene, [by_name(tuned[0])[name]])

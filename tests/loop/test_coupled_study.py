@@ -168,7 +168,9 @@ def _disks(L):
     M = 2.0 * np.linalg.inv(np.eye(2) + L) - np.eye(2)
     t = np.geomspace(0.01, 100.0, 161)
     scaled = M[:, None] * np.array([[np.ones_like(t), 1.0 / t], [t, np.ones_like(t)]]).transpose(2, 0, 1)
-    return 2.0 / np.linalg.norm(scaled, 2, axis=(2, 3)).min(axis=1)
+    squares, product = np.sum(np.abs(scaled) ** 2, axis=(2, 3)), np.abs(np.linalg.det(scaled))
+    largest = np.sqrt((squares + np.sqrt(np.maximum(squares**2 - 4.0 * product**2, 0.0))) / 2.0)
+    return 2.0 / largest.min(axis=1)
 
 
 def _around(freq, values):

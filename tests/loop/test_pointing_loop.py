@@ -139,7 +139,7 @@ def first_order_loop(bandwidth_hz, period_s, axes=2):
     return loop, fine.assemble("integral", loop, integral(step))
 
 
-@pytest.mark.parametrize("bandwidth_hz", [10.0, 100.0, 500.0])
+@pytest.mark.parametrize("bandwidth_hz", [10.0, pytest.param(100.0, marks=pytest.mark.endurance), 500.0])
 def test_a_first_order_loop_on_olympus_leaves_80_pi_over_1_plus_bandwidth(bandwidth_hz):
     """With 1000 samples in each radian of the bandwidth: the exact variance of the sampled loop is 0.1 % above it."""
     period, theory = 1 / (2 * pi * bandwidth_hz * 1000), 80 * pi / (1 + bandwidth_hz) * URAD**2
@@ -470,7 +470,7 @@ def test_coupled_axes_are_decoupled_and_each_is_the_loop_of_one_axis(layout):
     assert np.max(np.abs(linear.sensitivity(close_axis(one, blind), freq)[:, 0, 0] / alone - 1)) > 0.02
 
 
-@pytest.mark.parametrize("late", [3, 5, 7, 10, 13])
+@pytest.mark.parametrize("late", [3, 7, *(pytest.param(n, marks=pytest.mark.endurance) for n in (5, 10, 13))])
 def test_the_sensitivity_of_a_late_sensor_is_the_error_that_sines_leave(late):
     """Exact for whole samples; for a part of one within 0.4 %: the mirror's path between samples is no sine."""
     loop = scenario(1, resonant_mirror(), optical=OpticalSensor(0.0, inf, 0.0, 1, late), gauge=None)

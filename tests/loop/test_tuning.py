@@ -277,7 +277,9 @@ def test_lqg_beats_the_tuned_pi_under_the_same_margin():
 # ------------------------------------------------------------------------------------------------ the search
 
 
-@pytest.mark.parametrize("plant", [RESONANT, NOISY], ids=["at the margin", "within it"])
+@pytest.mark.parametrize(
+    "plant", [RESONANT, pytest.param(NOISY, marks=pytest.mark.endurance)], ids=["at the margin", "within it"]
+)
 def test_each_seed_ends_at_the_same_four_digits(plant):
     found = [tuning.tune(PI, [plant], HALF, seed=s) for s in (7, 7, 8, 9)]
     assert found[0].evaluations == found[1].evaluations != found[2].evaluations
@@ -315,12 +317,24 @@ def test_where_the_residual_does_not_tell_the_gentler_value_is_taken():
     assert found.values == {**alone.values, "idle": 1.7}
 
 
-def test_a_family_that_contains_another_is_never_worse(monkeypatch):
-    spread = [axis_plant(gain=0.089e-3 * g, resonance=(900.0, 0.3)) for g in (1.0, 0.8)]
-    for plants in (spread, [NOISY]):
-        known = tuning.tune(classical.PI, plants, HALF, seed=1)
-        assert tuning.tune(classical.PI_NOTCH, plants, HALF, seed=1, base=known).mean_rms_rad <= known.mean_rms_rad
-    monkeypatch.setattr(tuning, "settle", lambda of, t, models: of.at(np.full(5, 0.4)))  # a search that ends somewhere
+@pytest.mark.parametrize(
+    "plants",
+    [
+        pytest.param(
+            [axis_plant(gain=0.089e-3 * g, resonance=(900.0, 0.3)) for g in (1.0, 0.8)], marks=pytest.mark.endurance
+        ),
+        [NOISY],
+    ],
+    ids=["two plants", "one"],
+)
+def test_a_family_that_contains_another_is_never_worse(plants):
+    known = tuning.tune(classical.PI, plants, HALF, seed=1)
+    assert tuning.tune(classical.PI_NOTCH, plants, HALF, seed=1, base=known).mean_rms_rad <= known.mean_rms_rad
+
+
+def test_a_search_that_ends_somewhere_leaves_the_contained_controller(monkeypatch):
+    known = tuning.tune(classical.PI, [NOISY], HALF, seed=1)
+    monkeypatch.setattr(tuning, "settle", lambda of, t, models: of.at(np.full(5, 0.4)))
     found = tuning.tune(classical.PI_NOTCH, [NOISY], HALF, seed=1, base=known)
     assert found.values["notch depth"] == 1.0
 

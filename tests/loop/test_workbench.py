@@ -65,7 +65,7 @@ def test_a_run_follows_its_reference_as_the_papers_loop_does():
     assert np.max(np.abs(loop.simulate(SLOW, 0.15).error_rad)) == 0.0
 
 
-@pytest.mark.parametrize("kind", ["PI", "PI + notch", "LQG"])
+@pytest.mark.parametrize("kind", ["PI", pytest.param("PI + notch", marks=pytest.mark.endurance), "LQG"])
 def test_a_tuned_controller_keeps_its_margin_and_beats_what_was_there(kind):
     tuned = tune(LOOP, kind, modulus_margin=0.55)
     assert tuned.margins.modulus >= 0.55

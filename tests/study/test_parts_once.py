@@ -4,8 +4,8 @@ from collections import Counter
 
 from microrad import link
 from microrad.core import threads
-from microrad.loop import controller_study
-from microrad.loop.controller_study import designs
+from microrad.loop.control import PI
+from microrad.loop.controller_study import designs, results
 from microrad.mirror import model, variants
 from microrad.study import study
 from shipped import edited_file
@@ -24,8 +24,13 @@ def test_one_study_assembles_its_link_and_each_variant_of_its_mirror_once(tmp_pa
     monkeypatch.setattr(study.mirror, "of", lambda m: entered.append(m) or variants.of(m))
     monkeypatch.setattr(link, "of", lambda m: linked.append(m) or of(m))
     monkeypatch.setattr(threads, "_may_fork", lambda: False)
+    monkeypatch.setattr(study.paper, "PROPORTIONAL_V_MRAD", (1.0,))
+    monkeypatch.setattr(study.paper, "INTEGRAL_V_MRAD_S", (8e3, 16e3))
     monkeypatch.setattr(study.alternatives, "other_readings", lambda *args: ())  # they read the mission in another way
-    monkeypatch.setattr(controller_study, "design", lambda scene, told: designs.design(scene, told, only=("PI",)))
+    monkeypatch.setattr(designs, "families", lambda m: (PI,))
+    monkeypatch.setattr(designs, "names", lambda m: (designs.BASELINE, PI.name))
+    monkeypatch.setattr(results, "SINE_S", 0.2)
+    monkeypatch.setattr(results, "SINE_SETTLE_S", 0.1)
     found = study.run_study(file)
     assert entered == [file.mission]
     assert sum(m is file.mission for m in linked) == 1

@@ -45,8 +45,11 @@ def plate_study():
 
 
 @pytest.fixture(scope="module", autouse=True)
-def _removed():
-    yield
+def _without_scan_and_removed():
+    """The paper's scan has tests of its own, and no part in the loop of several axes."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(study.paper, "applies", lambda mission: False)
+        yield
     if plate_study.cache_info().currsize:
         shutil.rmtree(plate_study()[1])
 
