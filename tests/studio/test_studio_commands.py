@@ -95,8 +95,9 @@ def test_a_study_gives_the_same_verdict_and_the_same_files(home, capsys, monkeyp
         executed(action.python)
 
 
-def test_controllers_are_designed_alike(folder, capsys, monkeypatch):
-    monkeypatch.setattr(designs, "families", lambda m: (control.PI,))
+@pytest.mark.parametrize("family", [control.PI, pytest.param(control.LQG, marks=pytest.mark.endurance)])
+def test_controllers_are_designed_alike(family, folder, capsys, monkeypatch):
+    monkeypatch.setattr(designs, "families", lambda m: (family,))
     (folder / MISSION).write_text(SHIPPED.read_text("utf-8"), encoding="utf-8")
     out, code, _ = typed(commands.design(MISSION).command, capsys)
     assert code == ("refused" in out)
