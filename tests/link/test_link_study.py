@@ -283,7 +283,7 @@ def test_the_answers_light_gives_the_noise_equivalent_angle(tmp_path, changes):
     bandwidth = sensor.noise_bandwidth_hz(5e3)
     assert tracked.signal_to_noise == pytest.approx(cell.signal_to_noise(tracked.power_w, bandwidth), rel=1e-12)
     assert [line.value for line in tracked.noise_lines] == pytest.approx(
-        [line.value for line in cell.noise_lines(tracked.power_w, bandwidth)]
+        [line.value for line in cell.noise_lines(tracked.power_w, bandwidth)], rel=1e-6, abs=0.0
     )
     assert all(line.source.startswith("answer budget; ") for line in tracked.noise_lines)
     assert "Tyler and Fried" in tracked.noise_equivalent_angle.basis

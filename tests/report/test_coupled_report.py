@@ -406,9 +406,10 @@ def test_bands_hold_all_of_the_error_and_of_the_floor(found, page, data):
     (parts, *_), (noise, *_) = words.band_floors(found)
     response = found.responses[0]
     of_mean = response.residual_power * (response.noise_standard_error / response.standard_error)[:, :, 0] ** 2
-    assert np.sum(noise**2, axis=0) == pytest.approx(NOISE_RMS[0] ** 2)  # that of a period, not of the mean of two
+    of_a_period = NOISE_RMS[0] ** 2  # not of the mean of two
+    assert np.sum(noise**2, axis=0) == pytest.approx(of_a_period, rel=1e-6, abs=0.0)
     assert np.sum(parts**2, axis=0) == pytest.approx(
-        (response.residual_power - of_mean).sum(axis=0) + NOISE_RMS[0] ** 2
+        (response.residual_power - of_mean).sum(axis=0) + of_a_period, rel=1e-6, abs=0.0
     )
     assert data["linear_floor_band_rms_m"][0] == parts.tolist()
     assert data["noise_band_rms_m"][0] == noise.tolist()

@@ -152,6 +152,7 @@ def test_markers_stand_where_they_stand(marker, symbol):
 
 def test_a_curve_that_no_legend_shows_may_have_a_name():
     assert only(turned(one(Line(X, Y, name="predicted"))))["name"] == "predicted"
+    assert only(turned(one(Line(X, Y, BLUE, "", marker="o", name="working point"))))["name"] == "working point"
 
 
 def test_error_bars_keep_both_arms():
