@@ -21,6 +21,7 @@ MANIFEST = "manifest.json"
 _MOST_MANIFEST = 64_000_000
 _OLD = ".old"
 
+_DRAFTS = ".microrad"
 DRAFT = ".draft"
 """End of the name of a file that is not whole yet."""
 
@@ -134,12 +135,21 @@ def _new_folder(parent: Path, name: str, suffix: str = "") -> Path:
 
 
 def _sweep(parent: Path, name: str, suffix: str) -> None:
-    """Remove the folders of the name that processes left here when they were killed."""
+    """Remove the folders and files of the name that processes left here when they were killed."""
     form = re.compile(rf"{re.escape(_on_this_machine(name))}(\d{{1,9}})-\w+{re.escape(suffix)}")
     with suppress(OSError):  # of a folder that may be written and not be read
         for path in parent.iterdir():
             if (found := form.fullmatch(path.name)) and _left_behind(path, int(found[1])):
-                shutil.rmtree(path, ignore_errors=True)
+                _remove(path)
+
+
+def _remove(path: Path) -> None:
+    """Remove a file, or a folder with all that is in it; what cannot be removed stays."""
+    if path.is_dir():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        with suppress(OSError):
+            path.unlink()
 
 
 def _on_this_machine(name: str) -> str:
@@ -147,12 +157,12 @@ def _on_this_machine(name: str) -> str:
 
 
 def _left_behind(path: Path, process: int) -> bool:
-    """Whether this is a folder of the same user, and its process is gone; never where that cannot be asked."""
+    """Whether this is a folder or file of the same user, and its process is gone; never where that cannot be asked."""
     if os.name != "posix":
         return False
     try:
         status = path.lstat()
-        if not stat.S_ISDIR(status.st_mode) or status.st_uid != os.getuid():
+        if not (stat.S_ISDIR(status.st_mode) or stat.S_ISREG(status.st_mode)) or status.st_uid != os.getuid():
             return False
         os.kill(process, 0)
     except ProcessLookupError:
@@ -185,7 +195,7 @@ def _replace(draft: Path, folder: Path) -> None:
 def write_whole(path: Path, content: str | bytes, *, durable: bool = True) -> None:
     """Write a file whole or not at all: beside its place first.
 
-    The draft beside it has a name that no other process ever takes, as a killed one may have left its own there.
+    What processes left beside it when they were killed is removed.
 
     Args:
         path: The file, which is replaced.
@@ -193,13 +203,21 @@ def write_whole(path: Path, content: str | bytes, *, durable: bool = True) -> No
         durable: Whether it is on the disk on return. If not, a failure of the machine may cut the file: for one that
             its readers check.
     """
-    draft = path.with_name(f".microrad-{secrets.token_hex(8)}{DRAFT}")
+    with whole_file(path) as draft, draft.open("xb") as file:
+        file.write(content.encode("utf-8") if isinstance(content, str) else content)
+        if durable:
+            file.flush()
+            os.fsync(file.fileno())
+
+
+@contextmanager
+def whole_file(path: Path) -> Iterator[Path]:
+    """A name beside ``path`` for a new file; it becomes ``path`` at the end, or vanishes on any error."""
+    _sweep(path.parent, _DRAFTS, DRAFT)
+    draft = path.with_name(f"{_on_this_machine(_DRAFTS)}{os.getpid()}-{secrets.token_hex(8)}{DRAFT}")
     try:
-        with draft.open("xb") as file:
-            file.write(content.encode("utf-8") if isinstance(content, str) else content)
-            if durable:
-                file.flush()
-                os.fsync(file.fileno())
+        yield draft
         draft.replace(path)
-    finally:
-        draft.unlink(missing_ok=True)
+    except BaseException:
+        _remove(draft)
+        raise
