@@ -72,7 +72,7 @@ class Command:
 
     ``does`` runs it in the current folder and returns its exit code. Where that is refused because results are there,
     ``otherwise`` is what the refusal says to do. ``content`` has readers by pattern of the path: what of a file is the
-    same in each run. ``partly`` has those of files that grow while the command runs: whether they are in order.
+    same in each run. ``partly`` has those of files that grow while the command runs: they fail where one is damaged.
     """
 
     name: str
@@ -80,7 +80,7 @@ class Command:
     prepare: Callable[[Path], None] = lambda here: None
     otherwise: Callable[[], int] | None = None
     content: Mapping[str, Callable[[Path], Any]] = field(default_factory=dict)
-    partly: Mapping[str, Callable[[Path], bool]] = field(default_factory=dict)
+    partly: Mapping[str, Callable[[Path], Any]] = field(default_factory=dict)
 
 
 class Ended(NamedTuple):
@@ -238,17 +238,13 @@ class Layer:
                 if whole:
                     yield f"{name} stays"
                 continue
-            if name not in old and name not in new:
-                yield f"{name} is none of the command's"
-                continue
             partly = None if whole else _of(command.partly, name)
             if partly is not None:
-                try:
-                    right = partly(path)
-                except Exception as error:
-                    right, name = False, f"{name} ({type(error).__name__}: {error})"
-                if not right:
+                if not _reads(partly, path):
                     yield f"{name} is not in order"
+                continue
+            if name not in old and name not in new:
+                yield f"{name} is none of the command's"
                 continue
             like = [each[name] for each in ((new,) if whole else (old, new)) if name in each]
             if like and not any(_same(command, name, path, each) for each in like):
@@ -263,6 +259,15 @@ _DRAFT = re.compile(r"(^|/)\.[^/]*(\.draft|\.part|\.old|\.new)(/|$)|(^|/)\.new-|
 
 def _of(readers: Mapping[str, Any], name: str) -> Any:
     return next((reader for pattern, reader in readers.items() if fnmatch(name, pattern)), None)
+
+
+def _reads(reader: Callable[[Path], Any], path: Path) -> bool:
+    """Whether a file can be read: it is whole then, as far as it is written."""
+    try:
+        reader(path)
+    except Exception:
+        return False
+    return True
 
 
 def _same(command: Command, name: str, path: Path, like: Path) -> bool:
