@@ -1,45 +1,115 @@
-"""The commands that write, each on the smallest files that take it through all its writes."""
+"""The commands that write, each on the smallest files that take it through all its writes.
 
+What they compute is computed once and kept in this process: what is tried here is how it is written.
+"""
+
+import asyncio
+import json
 import os
+import shutil
 import sqlite3
+import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Callable
 from contextlib import closing
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from scipy.io import savemat
 
-from microrad import cli
+from cli.test_cli import write_recording
+from microrad import cli, report
 from microrad.campaign import run
+from microrad.core.errors import MicroradError
+from microrad.export import choice
+from microrad.export.flight import write as flight
+from microrad.export.fmi import fmu
+from microrad.lab import identify
+from microrad.lab.bench import folder as bench
+from microrad.report.campaign import page as campaign_pages
+from microrad.report.identification import page as identification
+from microrad.report.results import arrays
+from microrad.report.study import page as study_pages
+from microrad.studio.guard import signing
+from microrad.studio.jobs import process, queue
+from microrad.studio.jobs.queue import Jobs, Order
+from microrad.studio.recordings.uploads import Uploads
+from microrad.studio.session import Session
+from microrad.studio.views import mirror_form, runs
+from microrad.study import study
+from shipped import SHIPPED, without_day, without_fine_pointing
 from small_campaign import campaign_file, without_worker
 from writes.layer import Command
 
 PATCH = pytest.MonkeyPatch()
+COMPUTED: tuple[tuple[Any, str, Callable[..., Any]], ...] = (
+    (run, "controllers", lambda campaign, *_: campaign.text),
+    (campaign_pages, "campaign_page", lambda found: found.rows),
+    (choice, "choose", lambda *args: args[1]),
+    (choice, "vectors", lambda chosen, samples: samples),
+    (identify, "identify", lambda *_: 0),
+    (identification, "identification_page", lambda *_: 0),
+    (bench, "play_records", lambda plan, seed, _: seed),
+    (study_pages, "study_page", lambda *_: 0),
+)
 
 
 def here_alone() -> None:
-    """Rows are computed in the process of the command, and nothing beside it: its writes have one order."""
+    """Have all be computed in the process of the command, and nothing beside it: its writes have one order."""
     without_worker(PATCH)
     PATCH.setattr(os, "cpu_count", lambda: 1)
+    PATCH.setattr(queue, "start_waiting", lambda jobs: None)
     for module, name, known in COMPUTED:
         PATCH.setattr(module, name, _once(getattr(module, name), known))
+    PATCH.setattr(flight, "compile_and_run", _compiled(flight.compile_and_run))
+    PATCH.setattr(flight, "stack_use", _once(flight.stack_use, lambda *_: 0))
+    PATCH.setattr(fmu, "subprocess", SimpleNamespace(run=_library(), TimeoutExpired=subprocess.TimeoutExpired))
 
 
 def _once(function: Callable[..., Any], known: Callable[..., Any]) -> Callable[..., Any]:
-    """A function that computes once in all runs: what it returns does not depend on what can be written."""
+    """A function that computes once in all runs."""
     results = dict[Any, Any]()
 
     def found(*args: Any, **more: Any) -> Any:
         key = known(*args)
         if key not in results:
-            results[key] = function(*args, **more)
+            made = function(*args, **more)
+            results[key] = list(made) if hasattr(made, "__next__") else made
         return results[key]
 
     return found
 
 
-COMPUTED = ((run, "controllers", lambda campaign, *_: campaign.text),)
+def _compiled(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Compiles once; later it leaves what the compiler has left."""
+    results = dict[str, Any]()
+
+    def found(folder: Path, name: str) -> Any:
+        if name in results:
+            (folder / f"{name}_bench").write_bytes(b"program")
+        else:
+            results[name] = function(folder, name)
+        return results[name]
+
+    return found
+
+
+def _library() -> Callable[..., Any]:
+    """Compiles a library once; later its bytes are written, as by the compiler unseen."""
+    made = dict[str, bytes]()
+
+    def run_once(command: list[str], cwd: Path, **how: Any) -> Any:
+        target = Path(cwd) / command[command.index("-o") + 1]
+        if target.name in made:
+            subprocess.run(["tee", str(target)], input=made[target.name], stdout=subprocess.DEVNULL, check=True)
+            return subprocess.CompletedProcess(command, 0, "", "")
+        done = subprocess.run(command, cwd=cwd, **how)
+        made[target.name] = target.read_bytes()
+        return done
+
+    return run_once
 
 
 def typed(*words: str) -> Callable[[], int]:
@@ -56,16 +126,56 @@ def typed(*words: str) -> Callable[[], int]:
     return does
 
 
-# ----------------------------------------------------------------------------------------------------------- campaigns
+def called(function: Callable[[], Any]) -> Callable[[], int]:
+    """What the studio does, its refusals said as its pages say them."""
+
+    def does() -> int:
+        try:
+            function()
+        except (MicroradError, OSError) as error:
+            print(f"microrad: {error}")
+            return 2
+        return 0
+
+    return does
+
+
+# -------------------------------------------------------------------------------------------------------------- readers
 def rows_of(path: Path) -> dict[str, Any]:
     """What of a ledger is the same in each run."""
     with closing(sqlite3.connect(path)) as ledger:
         assert ledger.execute("PRAGMA integrity_check").fetchone() == ("ok",)
-        found = {name: ledger.execute(f"SELECT * FROM {name} ORDER BY 1, 2, 3").fetchall() for name in ("chunks", "traces")}
         notes = dict(ledger.execute("SELECT key, value FROM notes"))
+        found = {name: ledger.execute(f"SELECT * FROM {name} ORDER BY 1, 2, 3").fetchall() for name in _TABLES}
         return found | {"notes": sorted(notes), "state": notes.get("state")}
 
 
+_TABLES = ("chunks", "traces")
+
+
+def timeless(path: Path) -> dict[str, Any]:
+    """A note without the time at which it was made."""
+    return {key: value for key, value in json.loads(path.read_bytes()).items() if key not in ("at", "pid", "queued")}
+
+
+def part(path: Path) -> bool:
+    """A kept part is checked by whoever reads it."""
+    return path.stat().st_size >= 0
+
+
+# ------------------------------------------------------------------------------------------------------------- missions
+SMALL = without_fine_pointing(without_day(SHIPPED.read_text("utf-8")))
+
+
+def mission(here: Path) -> None:
+    (here / "mission.toml").write_text(SMALL, encoding="utf-8")
+
+
+def shipped(here: Path) -> None:
+    shutil.copyfile(SHIPPED, here / "mission.toml")
+
+
+# ------------------------------------------------------------------------------------------------------------ campaigns
 GRID = """
 [grid]
 "terminals.leo_aperture" = ["6 cm", "7 cm"]
@@ -73,16 +183,207 @@ GRID = """
 [limits.margin]
 least = "1 dB"
 """
-
-
-def _campaign(here: Path) -> None:
-    campaign_file(here, runs=4, worst=1, more=GRID)
-
-
 LEDGER: dict[str, Any] = {
     "content": {"*.ledger": rows_of, "*.ledger-*": lambda path: None},
     "partly": {"*.ledger": rows_of, "*.ledger-*": lambda path: None},
 }
+
+
+def campaign(here: Path) -> None:
+    campaign_file(here, runs=4, worst=1, more=GRID)
+
+
+def ledger(here: Path) -> None:
+    """A campaign that was run."""
+    campaign(here)
+    assert _quietly(here, typed("campaign", "run", "campaign.toml")) in (0, 1)
+
+
+def half(here: Path) -> None:
+    """A ledger without the half of its rows."""
+    ledger(here)
+    with closing(sqlite3.connect(here / "campaign.ledger")) as book, book:
+        book.execute("DELETE FROM chunks WHERE cell = 1")
+        book.execute("""UPDATE notes SET value = '"stopped"' WHERE key = 'state'""")
+
+
+def damaged(here: Path) -> None:
+    """A ledger with a chunk whose checksum is wrong."""
+    ledger(here)
+    with closing(sqlite3.connect(here / "campaign.ledger")) as book, book:
+        book.execute("UPDATE chunks SET sha256 = zeroblob(32) WHERE cell = 1")
+
+
+def exported(*names: str) -> Callable[[Path], None]:
+    def prepare(here: Path) -> None:
+        ledger(here)
+        for name in names:
+            _quietly(here, typed("campaign", "export", "campaign.ledger", name))
+
+    return prepare
+
+
+def _quietly(here: Path, does: Callable[[], int]) -> int:
+    """Run a command to prepare another one."""
+    back = Path.cwd()
+    os.chdir(here)
+    try:
+        return does()
+    finally:
+        os.chdir(back)
+
+
+def export(name: str, *more: str) -> Callable[[], int]:
+    return typed("campaign", "export", "campaign.ledger", name, *more)
+
+
+# ---------------------------------------------------------------------------------------------------------------- bench
+PLAN = """
+name = "Small"
+formats = ["csv", "lvm", "tdms", "mat", "mat73", "npz", "hdf5"]
+
+[limits]
+rate = "5 kHz"
+drive_min = "0 V"
+drive_max = "12 V"
+slew = "20 V/ms"
+samples_per_period = 10
+
+[bench]
+truth = "bench"
+
+[bench.amplifier]
+gain = 15
+output_min = "0 V"
+output_max = "180 V"
+bandwidth = "5 kHz"
+slew = "1 V/us"
+
+[bench.converters]
+bits = 16
+drive_min = "-4 V"
+drive_max = "16 V"
+output_min = "-1 mrad"
+output_max = "2 mrad"
+
+[bench.sensor]
+noise = "1 urad"
+mains = "0 urad"
+mains_frequency = "50 Hz"
+drift = "0 nrad/s"
+
+[excitation.loop]
+kind = "sines"
+frequencies = ["50 Hz"]
+amplitudes = ["2 V"]
+periods = 2
+offset = "6 V"
+"""
+
+
+def plan(here: Path) -> None:
+    (here / "plan.toml").write_text(PLAN, encoding="utf-8")
+
+
+def recording(here: Path) -> None:
+    write_recording(here / "loop.csv")
+
+
+def model(here: Path) -> None:
+    savemat(here / "model.mat", {"num": [[2.0e4]], "den": [[1.0, 80.0, 2.5e7]]})
+
+
+IDENTIFY = ("identify", "loop.csv", "--input", "drive", "--output", "angle", "--rate", "1000", "--static")
+IMPORT = (
+    *("import", "model.mat", "--travel", "2.5 mrad", "--drive", "0 V", "12 V", "--bias", "6 V"),
+    *("--rate-limit", "3770 V/s", "--band", "1 Hz", "5 kHz", "--normalise-at", "2 Hz", "--output-unit", "rad"),
+)
+
+
+def after(prepare: Callable[[Path], None], *words: str) -> Callable[[Path], None]:
+    """Files behind a command that was run on those of another preparation."""
+
+    def prepared(here: Path) -> None:
+        prepare(here)
+        assert _quietly(here, typed(*words)) in (0, 1)
+
+    return prepared
+
+
+# --------------------------------------------------------------------------------------------------------------- studio
+def _session() -> Session:
+    return Session(Path.cwd())
+
+
+def _autosave() -> None:
+    _session().set("communication.transmit_power", "4 W")
+
+
+def _save() -> None:
+    session = _session()
+    session.set("communication.transmit_power", "4 W")
+    session.save()
+
+
+def _save_as() -> None:
+    session = _session()
+    session.save("other.toml")
+
+
+def _beside() -> None:
+    session = _session()
+    session.other = session.draft
+    session.other = None
+
+
+def _write_campaign() -> None:
+    if not runs.campaign_files(_session()):
+        runs.write_campaign(_session())
+
+
+def _form() -> None:
+    mirror_form.keep_form(_session().studio / "form.json", mirror_form.Form())
+
+
+def _submit() -> None:
+    jobs = Jobs(Path.cwd() / ".microrad-studio")
+    if not jobs.listed():
+        jobs.submit(Order("study", "a study", ("init",), Path.cwd(), ("leo-geo.toml",)))
+
+
+def _run_job() -> None:
+    jobs = Jobs(Path.cwd() / ".microrad-studio")
+    if jobs.get(1).state == "queued":
+        process.run_job(jobs.get(1).folder, ("true",))
+
+
+def _cancel() -> None:
+    jobs = Jobs(Path.cwd() / ".microrad-studio")
+    if not jobs.get(1).finished:
+        jobs.cancel(1)
+    jobs.remove(1)
+
+
+async def _blocks() -> AsyncIterator[bytes]:
+    for block in (b"drive,angle\n", b"1,2\n"):
+        yield block
+
+
+def _upload() -> None:
+    uploads = Uploads(Path.cwd() / "uploads")
+    uploads.hold_temporary_files()
+    if not uploads.listed():
+        asyncio.run(uploads.save("loop.csv", _blocks()))
+
+
+def studio(here: Path) -> None:
+    mission(here)
+    assert _quietly(here, called(_session)) == 0
+
+
+def queued(here: Path) -> None:
+    assert _quietly(here, called(_submit)) == 0
+
 
 COMMANDS = (
     Command("init", typed("init")),
@@ -91,8 +392,75 @@ COMMANDS = (
     Command(
         "campaign run",
         typed("campaign", "run", "campaign.toml"),
-        _campaign,
+        campaign,
         typed("campaign", "resume", "campaign.ledger"),
         **LEDGER,
     ),
+    Command("campaign resume", typed("campaign", "resume", "campaign.ledger"), half, **LEDGER),
+    Command("campaign resume, damaged", typed("campaign", "resume", "campaign.ledger"), damaged, **LEDGER),
+    Command("campaign export csv", export("rows.csv"), ledger, export("rows.csv", "--overwrite"), **LEDGER),
+    Command("campaign export parquet", export("rows.parquet"), ledger, export("rows.parquet", "--overwrite"), **LEDGER),
+    Command("campaign export nc", export("rows.nc"), ledger, export("rows.nc", "--overwrite"), **LEDGER),
+    Command("campaign export over nc", export("rows.nc", "--overwrite"), exported("rows.nc"), **LEDGER),
+    Command(
+        "campaign report",
+        typed("campaign", "report", "campaign.ledger"),
+        ledger,
+        typed("campaign", "report", "campaign.ledger", "--overwrite"),
+        **LEDGER,
+    ),
+    Command(
+        "bench",
+        typed("bench", "plan.toml", "--output", "bench"),
+        plan,
+        typed("bench", "plan.toml", "--output", "bench", "--overwrite"),
+    ),
+    Command(
+        "bench --overwrite",
+        typed("bench", "plan.toml", "--output", "bench", "--seed", "1", "--overwrite"),
+        after(plan, "bench", "plan.toml", "--output", "bench"),
+    ),
+    Command("identify", typed(*IDENTIFY), recording, typed(*IDENTIFY, "--overwrite")),
+    Command(
+        "identify --overwrite",
+        typed(*IDENTIFY, "--name", "another", "--mirror-file", "loop-mirror.toml", "--overwrite"),
+        after(recording, *IDENTIFY),
+    ),
+    Command("import", typed(*IMPORT), model, typed(*IMPORT, "--overwrite")),
+    Command(
+        "export c",
+        typed("export", "c", "mission.toml", "--controller", "PI", "--output", "flight"),
+        shipped,
+        typed("export", "c", "mission.toml", "--controller", "PI", "--output", "flight", "--overwrite"),
+    ),
+    Command(
+        "export fmu",
+        typed("export", "fmu", "mission.toml"),
+        shipped,
+        typed("export", "fmu", "mission.toml", "--overwrite"),
+    ),
+    Command(
+        "export matrices",
+        typed("export", "matrices", "mission.toml"),
+        shipped,
+        typed("export", "matrices", "mission.toml", "--overwrite"),
+    ),
+    Command(
+        "run",
+        typed("run", "mission.toml", "--output", "results"),
+        mission,
+        typed("run", "mission.toml", "--output", "results", "--overwrite"),
+        partly={"home/cache/*": part},
+    ),
+    Command("studio: begin", called(_session), mission),
+    Command("studio: edit", called(_autosave), studio),
+    Command("studio: save", called(_save), studio),
+    Command("studio: save as", called(_save_as), studio),
+    Command("studio: second mission", called(_beside), studio),
+    Command("studio: campaign", called(_write_campaign), studio),
+    Command("studio: form", called(_form), studio),
+    Command("studio: job", called(_submit), content={"*job.json": timeless, "*job.code": lambda path: None, "*studio-key": part}),
+    Command("studio: run of a job", called(_run_job), queued, content={"*.json": timeless}),
+    Command("studio: end of a job", called(_cancel), queued),
+    Command("studio: recording", called(_upload)),
 )

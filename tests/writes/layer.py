@@ -121,11 +121,11 @@ class Layer:
     def prepared(self, command: Command) -> None:
         """Make the folder that the runs of a command begin with, and run it here once: what it loads stays loaded."""
         self._fresh()
-        command.prepare(self.here)
-        self._keep("begin")
         with (self.base / "said").open("wb") as words, _told(words.fileno()), contextlib.chdir(self.here):
+            command.prepare(self.here)
+            self._keep("begin")
             command.does()
-        threads = len(os.listdir("/proc/self/task"))
+        threads = len(list(Path("/proc/self/task").iterdir()))
         if threads > 1:
             raise RuntimeError(f"{command.name} has left {threads - 1} threads, beside which no process can be forked")
 

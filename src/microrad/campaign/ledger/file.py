@@ -75,7 +75,7 @@ def install(draft: Path, path: Path) -> None:
     """
     with closing(sqlite3.connect(draft, isolation_level=None)) as connection:
         connection.execute("PRAGMA journal_mode = WAL")
-    for name in files(path)[1:]:
+    for name in (*files(draft)[1:], *files(path)[1:]):
         name.unlink(missing_ok=True)  # a log that is left over would be taken for the new file's
     draft.replace(path)
     if os.name == "posix":  # elsewhere a folder cannot be opened, and its entries need no sync
