@@ -104,9 +104,8 @@ def run_campaign(
     spec = bundle.packed(campaign, controllers(campaign, on_progress))
     with (
         closing(means.engine(spec, campaign.table.row_limit_s + LATE_S)) as engine,  # none there leaves no ledger
-        Ledger.create(path, _head(campaign, spec)) as book,
+        Ledger.create(path, _head(campaign, spec), {"file": str(file.resolve())}) as book,
     ):
-        book.note("file", str(file.resolve()))
         _Runner(campaign, engine, book, on_progress).run()
 
 

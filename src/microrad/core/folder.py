@@ -21,6 +21,7 @@ MANIFEST = "manifest.json"
 _MOST_MANIFEST = 64_000_000
 _OLD = ".old"
 
+_DRAFTS = ".microrad"
 DRAFT = ".draft"
 """End of the name of a file that is not whole yet."""
 
@@ -103,18 +104,20 @@ def whole_folder(folder: Path, overwrite: bool, kind: str = "mission", what: str
     """
     check_folder(folder, overwrite, kind, what)
     folder.parent.mkdir(parents=True, exist_ok=True)
-    draft = _new_folder(folder.parent, f".{folder.name}", ".part")
+    draft = new_folder(folder.parent, f".{folder.name}", ".part")
     try:
-        yield draft
-        draft.chmod(0o755)  # mkdtemp's 0700 is for secrets
-        _replace(draft, folder)
+        with naming(draft, folder):
+            yield draft
+            draft.chmod(0o755)  # mkdtemp's 0700 is for secrets
+            _sync(draft)
+            _replace(draft, folder)
     finally:
         shutil.rmtree(draft, ignore_errors=True)
 
 
 def scratch_folder(what: str) -> Path:
     """A new folder among the temporary files, which whoever asks for it removes."""
-    return _new_folder(Path(tempfile.gettempdir()), f"microrad-{what}")
+    return new_folder(Path(tempfile.gettempdir()), f"microrad-{what}")
 
 
 @contextmanager
@@ -122,24 +125,40 @@ def scratch(what: str) -> Iterator[Path]:
     """A folder among the temporary files, which vanishes at the end."""
     folder = scratch_folder(what)
     try:
-        yield folder
+        with naming(folder, folder):
+            yield folder
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def _new_folder(parent: Path, name: str, suffix: str = "") -> Path:
-    """A new folder for this process; those of the name that processes left here when they were killed are removed."""
+def new_folder(parent: Path, name: str, suffix: str = "") -> Path:
+    """A new folder for this process; those of the name that processes left here when they were killed are removed.
+
+    Args:
+        parent: Where it is made.
+        name: Begin of its name.
+        suffix: End of its name.
+    """
     _sweep(parent, name, suffix)
     return Path(tempfile.mkdtemp(prefix=f"{_on_this_machine(name)}{os.getpid()}-", suffix=suffix, dir=parent))
 
 
 def _sweep(parent: Path, name: str, suffix: str) -> None:
-    """Remove the folders of the name that processes left here when they were killed."""
+    """Remove the folders and files of the name that processes left here when they were killed."""
     form = re.compile(rf"{re.escape(_on_this_machine(name))}(\d{{1,9}})-\w+{re.escape(suffix)}")
     with suppress(OSError):  # of a folder that may be written and not be read
         for path in parent.iterdir():
             if (found := form.fullmatch(path.name)) and _left_behind(path, int(found[1])):
-                shutil.rmtree(path, ignore_errors=True)
+                _remove(path)
+
+
+def _remove(path: Path) -> None:
+    """Remove a file, or a folder with all that is in it; what cannot be removed stays."""
+    if path.is_dir():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        with suppress(OSError):
+            path.unlink()
 
 
 def _on_this_machine(name: str) -> str:
@@ -147,12 +166,12 @@ def _on_this_machine(name: str) -> str:
 
 
 def _left_behind(path: Path, process: int) -> bool:
-    """Whether this is a folder of the same user, and its process is gone; never where that cannot be asked."""
+    """Whether this is a folder or file of the same user, and its process is gone; never where that cannot be asked."""
     if os.name != "posix":
         return False
     try:
         status = path.lstat()
-        if not stat.S_ISDIR(status.st_mode) or status.st_uid != os.getuid():
+        if not (stat.S_ISDIR(status.st_mode) or stat.S_ISREG(status.st_mode)) or status.st_uid != os.getuid():
             return False
         os.kill(process, 0)
     except ProcessLookupError:
@@ -171,35 +190,82 @@ def _replace(draft: Path, folder: Path) -> None:
         draft.rename(folder)
         _sweep(folder.parent, f".{folder.name}", _OLD)
         return
-    old = _new_folder(folder.parent, f".{folder.name}", _OLD)
-    folder.rename(old / folder.name)
+    old = new_folder(folder.parent, f".{folder.name}", _OLD)
     try:
-        draft.rename(folder)
-    except BaseException:
-        (old / folder.name).rename(folder)
-        raise
+        folder.rename(old / folder.name)
+        try:
+            draft.rename(folder)
+        except BaseException:
+            (old / folder.name).rename(folder)
+            raise
     finally:
-        shutil.rmtree(old, ignore_errors=True)
+        if folder.exists():  # else the old one is all that there is
+            shutil.rmtree(old, ignore_errors=True)
 
 
-def write_whole(path: Path, content: str | bytes, *, durable: bool = True) -> None:
+def _sync(folder: Path) -> None:
+    """Have what is in a folder on the disk before its name is: a failure of the machine leaves no half of a file."""
+    for path in folder.rglob("*"):
+        if path.is_file():
+            with path.open("r+b") as file:
+                os.fsync(file.fileno())
+
+
+@contextmanager
+def naming(draft: Path, place: Path) -> Iterator[None]:
+    """Within it, an error of the file system names the place that is written to, not the draft, or nothing.
+
+    Args:
+        draft: What is written.
+        place: What it becomes.
+    """
+    try:
+        yield
+    except OSError as error:
+        at = Path(place if error.filename is None else os.fsdecode(error.filename))
+        at = place / at.relative_to(draft) if at.is_relative_to(draft) else at
+        raise OSError(error.errno, error.strerror or str(error), str(at)) from error
+
+
+def write_whole(path: Path, content: str | bytes, *, durable: bool = True, mode: int | None = None) -> None:
     """Write a file whole or not at all: beside its place first.
 
-    The draft beside it has a name that no other process ever takes, as a killed one may have left its own there.
+    What processes left beside it when they were killed is removed.
 
     Args:
         path: The file, which is replaced.
         content: Bytes, or text that is written in UTF-8 with its line ends as they are.
         durable: Whether it is on the disk on return. If not, a failure of the machine may cut the file: for one that
             its readers check.
+        mode: Who may read and write it; by default what the user's new files have.
     """
-    draft = path.with_name(f".microrad-{secrets.token_hex(8)}{DRAFT}")
-    try:
-        with draft.open("xb") as file:
-            file.write(content.encode("utf-8") if isinstance(content, str) else content)
-            if durable:
-                file.flush()
-                os.fsync(file.fileno())
+    with whole_file(path) as draft, draft.open("xb") as file:
+        if mode is not None:
+            draft.chmod(mode)
+        file.write(content.encode("utf-8") if isinstance(content, str) else content)
+        if durable:
+            file.flush()
+            os.fsync(file.fileno())
+
+
+@contextmanager
+def whole_file(path: Path) -> Iterator[Path]:
+    """A name beside ``path`` for a new file; it becomes ``path`` at the end, or vanishes on any error."""
+    with draft_beside(path) as draft:
+        yield draft
         draft.replace(path)
+
+
+@contextmanager
+def draft_beside(path: Path) -> Iterator[Path]:
+    """A name beside ``path`` for a file that is not whole yet: what has it at the end is removed.
+
+    So is what processes left there when they were killed.
+    """
+    _sweep(path.parent, _DRAFTS, DRAFT)
+    draft = path.with_name(f"{_on_this_machine(_DRAFTS)}{os.getpid()}-{secrets.token_hex(8)}{DRAFT}")
+    try:
+        with naming(draft, path):
+            yield draft
     finally:
-        draft.unlink(missing_ok=True)
+        _remove(draft)

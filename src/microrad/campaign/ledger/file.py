@@ -6,7 +6,7 @@ import os
 import platform
 import shlex
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import closing, contextmanager, suppress
 from datetime import UTC, datetime
 from functools import cache
@@ -39,37 +39,43 @@ def make_empty(path: Path) -> None:
     for name in files(path):
         name.unlink(missing_ok=True)
     with closing(sqlite3.connect(path, isolation_level=None)) as connection:
-        for pragma in (f"application_id = {_APPLICATION}", f"user_version = {FORMAT}"):
-            connection.execute(f"PRAGMA {pragma}")
-        connection.execute("PRAGMA journal_mode = WAL")
         connection.execute("PRAGMA synchronous = FULL")
         connection.execute("BEGIN")
+        for pragma in (f"application_id = {_APPLICATION}", f"user_version = {FORMAT}"):
+            connection.execute(f"PRAGMA {pragma}")
         for statement in _TABLES.split(";"):
             connection.execute(statement)
         connection.execute("COMMIT")
 
 
-def put_head(path: Path, head: Head) -> None:
+def put_head(path: Path, head: Head, notes: Mapping[str, Any]) -> None:
     """Write both copies of the head: one would be all that stands between a flipped bit and the whole campaign.
 
     Args:
         path: an empty ledger.
         head: what it is of.
+        notes: what is noted from the begin, by name.
     """
     payload = chunk_format.pack_head(head)
     with closing(sqlite3.connect(path)) as connection, connection:
         for table in HEADS:
             connection.execute(f"INSERT INTO {table} VALUES (?)", (payload,))
+        for key, value in notes.items():
+            put_note(connection, key, value)
 
 
 def install(draft: Path, path: Path) -> None:
     """Put a closed ledger in its place for good: the name, too, has to survive a power loss.
 
+    It has a log from here on alone: a log is taken in as a file is closed, and nobody hears where that fails.
+
     Args:
         draft: where it was made.
         path: its place.
     """
-    for name in files(path)[1:]:
+    with closing(sqlite3.connect(draft, isolation_level=None)) as connection:
+        connection.execute("PRAGMA journal_mode = WAL")
+    for name in (*files(draft)[1:], *files(path)[1:]):
         name.unlink(missing_ok=True)  # a log that is left over would be taken for the new file's
     draft.replace(path)
     if os.name == "posix":  # elsewhere a folder cannot be opened, and its entries need no sync
@@ -246,6 +252,19 @@ def whole_head(path: Path, connection: sqlite3.Connection) -> Head:
     raise CampaignError(f"{path}: both copies of its head are damaged; begin the campaign anew in another file")
 
 
+def put_note(connection: sqlite3.Connection, key: str, value: Any) -> None:
+    """Note a JSON value by name, in place of the last one.
+
+    Args:
+        connection: to a ledger.
+        key: the name.
+        value: anything that JSON has.
+    """
+    text = json.dumps(value, sort_keys=True)
+    kept = "ON CONFLICT(key) DO UPDATE SET value = excluded.value, sha256 = excluded.sha256"
+    connection.execute(f"INSERT INTO notes VALUES (?, ?, ?) {kept}", (key, text, digest(key, text)))
+
+
 def notes_in(connection: sqlite3.Connection) -> dict[str, Any]:
     """All noted values by name; a damaged one is left out, as if it had not been noted."""
     rows = connection.execute("SELECT key, value, sha256 FROM notes").fetchall()
@@ -299,6 +318,7 @@ def is_written(path: Path) -> bool:
         return False
     with closing(sqlite3.connect(f"{lock.absolute().as_uri()}?mode=rw", uri=True, timeout=0.0)) as glance:
         try:
+            glance.execute("PRAGMA journal_mode = MEMORY")  # to look leaves no file
             glance.execute("BEGIN IMMEDIATE")
         except sqlite3.Error as error:  # a lock that cannot be written to is nobody's
             return code_of(error) == sqlite3.SQLITE_BUSY

@@ -8,12 +8,11 @@ the file itself stays, since taking it away would let two writers pass each othe
 The file itself is in `file`; checks of every byte and mending are in `mending`.
 """
 
-import json
 import sqlite3
 from collections.abc import Iterator, Mapping
 from contextlib import closing, contextmanager, suppress
 from pathlib import Path
-from types import TracebackType
+from types import MappingProxyType, TracebackType
 from typing import Any, Self
 
 from microrad.campaign.ledger import chunk_format, file
@@ -38,19 +37,20 @@ class Ledger:
         self._columns = self.head.columns
 
     @classmethod
-    def create(cls, path: Path, head: Head) -> Self:
+    def create(cls, path: Path, head: Head, notes: Mapping[str, Any] = MappingProxyType({})) -> Self:
         """A new ledger, open for writing. Raises `CampaignError` if there is already a file or none can be.
 
         Args:
             path: the file.
             head: what the ledger is of.
+            notes: JSON values that are noted from the begin, by name.
         """
         with file.errors_in_words(path, "create the ledger"):
             file.refuse_existing(path)
             with closing(file.locked(path)):
                 draft = file.draft_of(path)
                 file.make_empty(draft)
-                file.put_head(draft, head)
+                file.put_head(draft, head, notes)
                 file.refuse_existing(path)
                 file.install(draft, path)
         return cls.open(path, write=True)
@@ -200,11 +200,8 @@ class Ledger:
             key: the name.
             value: anything that JSON has.
         """
-        text = json.dumps(value, sort_keys=True)
         with self._writing(f"note {key!r}"):
-            row = (key, text, file.digest(key, text))
-            kept = "ON CONFLICT(key) DO UPDATE SET value = excluded.value, sha256 = excluded.sha256"
-            self._connection.execute(f"INSERT INTO notes VALUES (?, ?, ?) {kept}", row)
+            file.put_note(self._connection, key, value)
 
     def notes(self) -> dict[str, Any]:
         """All noted values by name; a damaged one is left out, as if it had not been noted."""

@@ -118,7 +118,7 @@ def mend(path: Path) -> None:
         draft = file.draft_of(path)
         with closing(file.connected(path, write=False)) as damaged:
             file.make_empty(draft)
-            file.put_head(draft, file.whole_head(path, damaged))
+            file.put_head(draft, file.whole_head(path, damaged), {})
             with closing(sqlite3.connect(draft)) as mended, mended:
                 for table, (columns, _) in _KEPT.items():
                     marks = ", ".join("?" * len(columns.split(",")))
