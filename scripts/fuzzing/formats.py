@@ -10,6 +10,7 @@ import numpy as np
 from fuzzing import mutate, properties, seeds
 from microrad.lab.recording import read_recording
 from microrad.lab.recording.files import check_file
+from microrad.lab.recording.formats.source import is_time_name
 from microrad.lab.recording.reader import open_source
 from microrad.mission.file import load_link
 from microrad.orbit.earth.epoch import Epoch
@@ -54,9 +55,8 @@ def _recording(path: Path) -> None:
     """The first two channels that are no time, at some rate where the file says none."""
     check_file(path)
     source = open_source(path)
-    clock = source.find_time([])
-    used = [index for index in range(len(source.names)) if index != clock][:2] or [0]
-    is_timed = clock is not None or source.rates(used)
+    used = [index for index, name in enumerate(source.names) if not is_time_name(name)][:2] or [0]
+    is_timed = len(source.names) > used[-1] and (source.find_time(used) is not None or source.rates(used))
     properties.recording(read_recording(path, used[0], used[-1], None if is_timed else seeds.RATE_HZ))
 
 
