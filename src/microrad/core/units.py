@@ -27,6 +27,7 @@ BLANKS = "\t\n\u00a0\u202f"
 _MAX_CHARACTERS = 60
 _MOST_GIVEN = 10  # digits of a number that somebody wrote
 _MAX_DECIBEL = 1000.0  # beyond it the linear value leaves the range of a float
+_SMALLEST, _LARGEST = Decimal("1e-30"), Decimal("1e30")  # SI value of what is a quantity: its powers are floats, too
 
 _BASE = ("kg", "m", "s", "A", "K", "rad", "bit", "photon", "cycle")
 _Dimension = tuple[int | Fraction, ...]  # powers of the base dimensions
@@ -215,10 +216,10 @@ def _read(text: object, unit: str) -> float:
     scale = _scale_of_text(symbol, number, unit)
     if unit in _DECIBELS or scale.dimension != _scale(unit).dimension:
         raise _RefusedError(f"is in {_quoted(symbol)}, another kind of quantity")
-    value = float(Decimal(number) * scale.factor / _scale(unit).factor)
-    if not math.isfinite(value):
-        raise _RefusedError("is too large for a number")
-    return value
+    value = Decimal(number) * scale.factor / _scale(unit).factor
+    if value and not _SMALLEST <= abs(value) <= _LARGEST:
+        raise _RefusedError(f"is {'too large' if abs(value) > 1 else 'too small, and not 0,'} for a quantity")
+    return float(value)
 
 
 def _split(text: str) -> tuple[str, str]:

@@ -23,7 +23,7 @@ Aperture = Annotated[float, Quantity("m", "cm", above=0.0, most=100.0)]
 Wavelength = Annotated[float, Quantity("m", "um", least=1e-8, most=1e-2)]
 Distance = Annotated[float, Quantity("m", "km", above=0.0, most=1e13)]
 Loss = Annotated[float, Quantity("dB", least=0.0)]
-Strehl = Annotated[float, Quantity("", least=0.0)]
+Strehl = Annotated[float, Quantity("", least=0.0, most=1e3)]
 Obscuration = Annotated[float, Quantity("", least=0.0, most=0.95)]
 Efficiency = Annotated[float, Quantity("", above=0.0, most=1.0)]
 Bandwidth = Annotated[float, Quantity("Hz", "GHz", above=0.0, most=1e15)]
@@ -185,7 +185,7 @@ class Receiver(Table):
     order: Annotated[int, Whole("", least=2, most=2**20)] | None = Field(
         default=None, description="ppm: slots in a symbol, a power of two"
     )
-    extinction_ratio_db: Annotated[float, Quantity("dB", above=0.0)] | None = Field(
+    extinction_ratio_db: Annotated[float, Quantity("dB", least=0.01)] | None = Field(
         default=None, description="ook: power of a mark over that of a space"
     )
     efficiency: Efficiency | None = Field(default=None, description="electrons per photon, all detectors but amplified")
