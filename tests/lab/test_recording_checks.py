@@ -45,7 +45,7 @@ def test_samples_of_a_size_that_no_converter_gives(size, where):
     """Their squares are no numbers: the checks warned of an overflow, and went on with infinities."""
     signals = {"drive": multisine(), "output": play(multisine())}
     signals[where] = size * (signals[where] / np.abs(signals[where]).max())
-    with pytest.raises(RecordingError, match="its largest sample.*check its unit") as caught:
+    with pytest.raises(RecordingError, match=r"its largest sample.*check its unit") as caught:
         recording_from_arrays(**signals, rate_hz=RATE_HZ)
     assert f"of the {where} is " in str(caught.value) and f"{size:.4g}, its" in str(caught.value)
 

@@ -259,8 +259,8 @@ def _check_rows(path: Path, draft: _Draft, time: Floats) -> None:
     bad = np.flatnonzero(~np.all(np.abs(values) < _LARGEST, axis=1))
     if bad.size:
         raise OrbitError(
-            f"{path}, {draft.places[bad[0]]}: the state vector at {draft.times[bad[0]]} holds nan, inf or a number beyond "
-            f"{_LARGEST:g}; remove or repair it"
+            f"{path}, {draft.places[bad[0]]}: the state vector at {draft.times[bad[0]]} holds nan, inf or a number "
+            f"beyond {_LARGEST:g}; remove or repair it"
         )
     fallen = np.flatnonzero(np.diff(time) <= 0.0)
     if fallen.size:
