@@ -7,15 +7,21 @@ from typing import Any
 import numpy as np
 
 from microrad import link
+from microrad.campaign.definition.records import CampaignFile
+from microrad.campaign.ledger import chunk_format
+from microrad.campaign.records import Chunk
 from microrad.core.budget import total_db
+from microrad.lab.bench.plan import Plan
 from microrad.lab.recording import Recording
 from microrad.link import study
 from microrad.link.pointing import outage
-from microrad.mission.file import LinkFile
+from microrad.mirror import Mirror, coupled
+from microrad.mission.file import LinkFile, load_coupled_mirror
 from microrad.orbit.base import Orbit
 from microrad.orbit.propagation.mean_elements import ElementSet, Sgp4Orbit
 
 _TIMES_S = np.array([-3600.0, -60.0, 0.0, 60.0, 3600.0])
+_FREQUENCIES_HZ = np.array([0.0, 0.1, 10.0, 1e3, 1e5])
 _ROUNDING_DB = 1e-6
 
 
@@ -82,6 +88,53 @@ def _near(one: float, other: float) -> bool:
 def _falls(what: str, margin: float, data: link.DataLink, table: Any) -> None:
     moved = link.DataLink(data.shared, table, data.requirement, data.jitter, data.beam, data.receiver)
     assert outage.margin_db(moved) <= margin + _ROUNDING_DB, f"margin: rises with {what}"
+
+
+# ------------------------------------------------------------------------------------------------------------- mirrors
+def plant(found: Mirror) -> None:
+    """A mirror has finite matrices, and a finite response that a step does not set off.
+
+    Its linear part does not run away: no pole is right of the imaginary axis.
+    """
+    for name in ("A", "B", "E", "F", "G", "C", "D", "K"):
+        finite(f"matrix {name}", getattr(found, name))
+    finite("response", found.frequency_response(_FREQUENCIES_HZ))
+
+
+def several_axes(found: coupled.CoupledMirror) -> None:
+    """A mirror of several axes that is written is the same when it is read again."""
+    text = coupled.text(found)
+    again = coupled.of(load_coupled_mirror("mirror.toml", text=text))
+    assert coupled.text(again) == text, "a mirror file that is written and read is another one"
+
+
+# ------------------------------------------------------------------------------------------------ plans and campaigns
+def plan(found: Plan) -> None:
+    """Each drive of a plan is finite and within its limits, and its time runs forward."""
+    low, high = found.limits.drive_min_v, found.limits.drive_max_v
+    slack = 1e-9 * (1.0 + abs(low) + abs(high))
+    for each in found.records:
+        drive = each.excitation.drive
+        finite(f"drive {each.excitation.name}", drive)
+        assert drive.ndim == 2 and drive.shape[0] > 0, "a drive without samples"
+        assert low - slack <= drive.min() and drive.max() <= high + slack, "a drive beyond its limits"
+        assert math.isfinite(each.excitation.rate_hz) and each.excitation.rate_hz > 0.0, "a rate that is none"
+
+
+def campaign(found: CampaignFile) -> None:
+    """Each distribution of a campaign gives finite values that rise with the share of draws below them."""
+    share = np.array([1e-6, 0.1, 0.5, 0.9, 1.0 - 1e-6])
+    for each in found.draws:
+        if each.distribution is not None:
+            values = each.distribution.at(share)
+            finite(f"draws of {each.key}", values)
+            assert np.all(np.diff(values) >= 0.0), f"draws of {each.key} fall"
+
+
+def chunk(found: Chunk) -> None:
+    """A chunk that is read and packed again has the same bits."""
+    data = chunk_format.pack_chunk(found)
+    assert chunk_format.pack_chunk(chunk_format.unpack_chunk(data)) == data, "a chunk that is packed is another one"
 
 
 # ---------------------------------------------------------------------------------------------------------- recordings

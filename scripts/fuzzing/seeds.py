@@ -1,9 +1,14 @@
 """Good files, which bad ones are made of; what has fallen before, in tests/corpus/bad, is among them."""
 
+import gzip
+import io
 import json
 import math
+import re
+import sqlite3
 import tempfile
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from datetime import datetime, timedelta
 from functools import cache
 from pathlib import Path
@@ -15,8 +20,13 @@ from scipy.io import savemat
 from sgp4.api import WGS72, Satrec
 from sgp4.exporter import export_omm, export_tle
 
+from campaign_files import HEAD, LOOP, NOISE, POWER
 from link_files import PATTERN, RECEIVERS, SKY, data_with, received_with, written
+from microrad.mirror import coupled
+from microrad.report.results.manifest import ENDING, OPENING
 from preset_files import EXAMPLES, completed
+from several_axes import three_actuators
+from shipped import DEFAULT, SHIPPED, without_day, without_fine_pointing
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 CORPUS = ROOT / "tests" / "corpus"
@@ -74,7 +84,113 @@ def links() -> tuple[bytes, ...]:
     return (*by_files("links", make), *(each.encode("utf-8") for each in old))
 
 
+def _old(kind: str) -> tuple[str, ...]:
+    """The files of a kind that older versions wrote or took."""
+    return tuple(path.read_text(encoding="utf-8") for path in sorted(CORPUS.glob(f"[0-9]*/{kind}/*.toml")))
+
+
+@cache
+def missions() -> tuple[bytes, ...]:
+    """Whole missions: those that are shipped, and those of older versions."""
+    shipped = [path.read_text(encoding="utf-8") for path in (SHIPPED, DEFAULT)]
+    return of_texts(
+        "missions", [*shipped, without_fine_pointing(shipped[0]), without_day(shipped[0]), *_old("missions")]
+    )
+
+
+@cache
+def mirrors() -> tuple[bytes, ...]:
+    """Mirror files of one axis and of several."""
+    page = (ROOT / "docs" / "mirror-file.md").read_text(encoding="utf-8")
+    several = coupled.text(three_actuators())
+    return of_texts("mirrors", [*re.findall(r"```toml\n(.*?)```", page, flags=re.DOTALL), several, *_old("mirrors")])
+
+
+@cache
+def plans() -> tuple[bytes, ...]:
+    """Plans of excitations: those that come with the package, and those of older versions."""
+    folder = ROOT / "src" / "microrad" / "lab" / "plans"
+    return of_texts("plans", [*(p.read_text(encoding="utf-8") for p in sorted(folder.glob("*.toml"))), *_old("plans")])
+
+
+@cache
+def campaigns() -> tuple[bytes, ...]:
+    """Campaign files, beside `beside_campaigns`."""
+    shipped = (ROOT / "src" / "microrad" / "mission" / "missions" / "campaign.toml").read_text(encoding="utf-8")
+    texts = [re.sub(r'(?m)^mission = ".*"', 'mission = "leo-geo.toml"', shipped)]
+    texts += [HEAD + LOOP + POWER, HEAD + LOOP + POWER + NOISE]
+    return of_texts("campaigns", [*texts, *(t for t in _old("campaigns") if t.count("mission = "))])
+
+
+@cache
+def beside_campaigns() -> dict[str, bytes]:
+    """The missions that campaign files name."""
+    links = (CORPUS / "0.2.0" / "campaigns" / "links.toml").read_bytes()
+    return {"mission.toml": SHIPPED.read_bytes(), "links.toml": links, "leo-geo.toml": DEFAULT.read_bytes()}
+
+
 # ---------------------------------------------------------------------------------------------------------- recordings
+@cache
+def lists() -> tuple[bytes, ...]:
+    """Lists of recordings, beside `beside_lists`."""
+    texts = [
+        """name = "fsm 3"
+output = ["x", "y"]
+output_unit = "um"
+lever_arm = "50 mm"
+positions = [["0 mm", "12 mm"], ["10 mm", "-6 mm"]]
+signs = [[1, 0], [-1, 1]]
+
+[recording.slow]
+file = "both.csv"
+input = ["ux", "uy"]
+time = "t"
+
+[recording.again]
+file = "again.npz"
+input = ["u[0]", "u[1]"]
+output = ["y[0]", "y[1]"]
+role = "validation"
+period = 120
+""",
+        """input = "ux"
+output = "x"
+rate = "1 kHz"
+accept = ["drift"]
+
+[recording.first]
+file = "both.csv"
+to = "0.21 s"
+
+[recording.second]
+file = "both.csv"
+from = "0.02 s"
+role = "loops"
+""",
+        """[recording.whole]
+file = "again.npz"
+axes = ["samples", "channels"]
+input = "u"
+output = "y"
+rate = "1000 Hz"
+""",
+    ]
+    return of_texts("lists", texts)
+
+
+@cache
+def beside_lists() -> dict[str, bytes]:
+    """The recordings that lists name."""
+    other = 5.0 * np.cos(2.0 * np.pi * 37.0 * TIME_S)
+    drives = np.column_stack((DRIVE, other))
+    outputs = drives @ np.array([[1.0, -0.3], [0.2, 0.8]])
+    table = np.column_stack((TIME_S, drives, outputs)).tolist()
+    text = "t,ux,uy,x,y\n" + "".join(",".join(f"{each:.9g}" for each in row) + "\n" for row in table)
+    archive = io.BytesIO()
+    np.savez(archive, u=drives[::-1], y=outputs[::-1], fs=RATE_HZ)
+    return {"both.csv": text.encode(), "again.npz": archive.getvalue()}
+
+
 @cache
 def csv() -> tuple[bytes, ...]:
     """Tables as text: with and without a header, a time column, units, remarks; other separators."""
@@ -226,6 +342,28 @@ def npz() -> tuple[bytes, ...]:
     return by_files("npz", make)
 
 
+@cache
+def matrices() -> tuple[bytes, ...]:
+    """MATLAB files of version 5 to 7 with linear systems: state space, zeros and poles, fractions; sampled and not."""
+
+    def make(folder: Path) -> None:
+        system = {
+            "A": np.array([[0.0, 1.0, 0.0], [-4e6, -400.0, 0.0], [0.0, 0.0, -3e3]]),
+            "B": np.array([[0.0], [4e6], [3e3]]),
+            "C": np.array([[0.04, 0.0, 0.01]]),
+            "D": np.zeros((1, 1)),
+        }
+        held = {"A": np.array([[0.5]]), "B": np.array([[1.0]]), "C": np.array([[0.02]]), "D": np.zeros((1, 1))}
+        poles = np.array([[-200.0 + 2000.0j], [-200.0 - 2000.0j]])
+        savemat(folder / "a", system)
+        savemat(folder / "b", {"s": system, "Ts": 0.0}, do_compression=True)
+        savemat(folder / "c", {"z": np.zeros((0, 1)), "p": poles, "k": 1.6e5})
+        savemat(folder / "d", {"sys": {"num": np.array([[0.0, 0.0, 1.6e5]]), "den": np.array([[1.0, 400.0, 4.04e6]])}})
+        savemat(folder / "e", {**held, "Ts": 1e-4})
+
+    return by_files("matrices", make)
+
+
 # -------------------------------------------------------------------------------------------------------------- orbits
 def _satellite(number: int, inclination_deg: float, mean_motion_rev_day: float, eccentricity: float) -> Satrec:
     made, days = Satrec(), (START - datetime(1949, 12, 31)).total_seconds() / 86400.0
@@ -312,3 +450,41 @@ def oem() -> tuple[bytes, ...]:
     lagrange = "INTERPOLATION = LAGRANGE\nINTERPOLATION_DEGREE = 5"
     texts = [text(), text("EME2000", "TAI", lagrange), text("ITRF2000", "GPS"), text(more=covariance), xml]
     return of_texts("oem", texts)
+
+
+# ------------------------------------------------------------------------------------------------- what microrad wrote
+@cache
+def manifests() -> tuple[bytes, ...]:
+    """Manifests of reports, as JSON; those of the pages are in `pages`."""
+    old = (CORPUS / "0.1.0" / "reports" / "manifest.json").read_bytes()
+    inside = [page.partition(OPENING)[2].partition(ENDING)[0].encode() for page in _pages()]
+    return (old, *inside, *fallen("manifests"))
+
+
+def _pages() -> list[str]:
+    return [gzip.decompress(p.read_bytes()).decode() for p in sorted(CORPUS.glob("[0-9]*/reports/report.html.gz"))]
+
+
+@cache
+def pages() -> tuple[bytes, ...]:
+    """Pages of reports, without what stands about their manifests."""
+    around = [page.partition(OPENING) for page in _pages()]
+    texts = ["<!doctype html>microrad study of" + o + r.partition(ENDING)[0] + ENDING + "</html>" for _, o, r in around]
+    return of_texts("pages", texts)
+
+
+@cache
+def ledgers() -> tuple[bytes, ...]:
+    """Ledgers of campaigns."""
+    return (*(path.read_bytes() for path in sorted(CORPUS.glob("[0-9]*/ledgers/*.ledger"))), *fallen("ledgers"))
+
+
+@cache
+def records() -> tuple[tuple[str, bytes], ...]:
+    """What stands in those ledgers, chunk by chunk: its kind and its bytes."""
+    found: list[tuple[str, bytes]] = []
+    for path in sorted(CORPUS.glob("[0-9]*/ledgers/*.ledger")):
+        with closing(sqlite3.connect(f"{path.absolute().as_uri()}?immutable=1", uri=True)) as connection:
+            for kind, table in (("head", "head"), ("chunk", "chunks"), ("trace", "traces")):
+                found += [(kind, row[0]) for row in connection.execute(f"SELECT payload FROM {table} LIMIT 4")]
+    return tuple(found)
