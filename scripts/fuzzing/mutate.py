@@ -47,7 +47,7 @@ _QUOTED = re.compile(r'"[^"\n]*"')
 _DATE = re.compile(r"\d{4}-\d{2,3}(?:-\d\d)?(?:T[\d:.]+Z?)?")
 _UNIT = re.compile(r"(?<=\d) ?[A-Za-zµ%/^]+[A-Za-z0-9µ%/^]*")
 _LOOKALIKE = str.maketrans("01-aeoµ. ", "٠１−аеоμ․\xa0")
-_SIGNS = ("\0", "\n", "\n\n", "\r", "\t", ",", ";", "<", ">", "&", "<!--", "]]>", "[x]\n")
+_SIGNS = ("\0", "\n", "\n\n", "\r", "\t", ",", ";", "<", ">", "&", "<!--", "]]>", "[x]\n", 5000 * "[")
 _DEEP = (30, 200, 3000, 100_000)
 _SOME = (1, 1, 1, 2, 2, 3, 5)
 """How many changes an input gets."""
@@ -351,7 +351,7 @@ def _change(draw: Random, made: list[Any], other: Any) -> None:
         holder[key] = copy.deepcopy(draw.choice([inner[at] for inner, at in _inner([other])]))
     elif how == 3:
         deep: Any = draw.choice(VALUES)
-        for _ in range(draw.choice((5, 60, 900))):
+        for _ in range(draw.choice((5, 40, 150))):
             deep = [deep] if draw.random() < 0.5 else {"x": deep}
         holder[key] = deep
     elif how == 4 and isinstance(holder[key], str):

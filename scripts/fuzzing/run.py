@@ -24,10 +24,6 @@ from random import Random
 from types import FrameType
 from typing import Any, Protocol
 
-MOST_S = 1.0
-"""Processor time that a case may take."""
-MOST_BYTES = 1_000_000_000
-"""Memory that a case may take."""
 _SILENT_S = 60.0  # until a child that finishes no case is taken to hang where no signal reaches it
 _LONGEST_REFUSAL = 20_000
 _KEPT_OF_A_KIND = 3
@@ -35,9 +31,11 @@ _AT = struct.Struct("<qqqdqd")  # number, taken, refused, longest (s), which cas
 
 
 class Format(Protocol):
-    """What is given bad inputs: how one is made, and what takes it, as `formats` has them."""
+    """What is given bad inputs: how one is made, what takes it, and the processor time and memory that it may take."""
 
     name: str
+    most_s: float
+    most_bytes: int
 
     def made(self, draw: Random) -> Any:
         """A bad input; bytes where it is a file's content."""
@@ -149,7 +147,7 @@ def _timer(most_s: float) -> Iterator[None]:
         signal.signal(signal.SIGPROF, before)
 
 
-def here(kind: Format, seed: int, numbers: Sequence[int], most_s: float = MOST_S) -> Tally:
+def here(kind: Format, seed: int, numbers: Sequence[int], most_s: float) -> Tally:
     """Run cases in this process.
 
     Args:
@@ -248,7 +246,7 @@ def _run(kind: Format, seed: int, numbers: range, shared: mmap.mmap, notes: Any,
             made = case(kind, seed, numbers.start)
             judged(kind, made, folder, _SILENT_S)  # what is loaded or compiled once is nobody's
             begin = _peak_bytes()
-            limit = 4 * MOST_BYTES + _virtual_bytes()
+            limit = 4 * kind.most_bytes + _virtual_bytes()
             resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
             tally, written = Tally(kind.name), 0
 
@@ -258,9 +256,9 @@ def _run(kind: Format, seed: int, numbers: range, shared: mmap.mmap, notes: Any,
 
             for number in numbers:
                 tell(number)
-                _count(tally, kind, seed, number, folder, MOST_S)
+                _count(tally, kind, seed, number, folder, kind.most_s)
                 tally.memory_bytes = max(tally.memory_bytes, _peak_bytes() - begin)
-                grown = tally.memory_bytes > MOST_BYTES
+                grown = tally.memory_bytes > kind.most_bytes
                 if grown and not (tally.finds and tally.finds[-1].number == number):
                     tally.finds.append(Find(kind.name, number, f"takes {tally.memory_bytes / 1e9:.1f} GB", ""))
                 for find in tally.finds[written:]:
