@@ -18,9 +18,13 @@ import numpy as np
 from scipy.io import savemat
 
 from fuzzing import mutate, properties, seeds
+from fuzzing.library import CALLS
+from fuzzing.run import Format
+from fuzzing.studio import MESSAGES
 from microrad.campaign.file import load_campaign
 from microrad.campaign.ledger import Ledger, verify
 from microrad.campaign.ledger.file import HEADS, digest, files
+from microrad.cli.frame import refusal_of
 from microrad.export.linear_import import Given, import_mat
 from microrad.lab.bench import load_plan
 from microrad.lab.recording import read_recording
@@ -76,12 +80,15 @@ class FileFormat:
 
 
 def _links(path: Path) -> None:
-    properties.links(load_link(path))
+    file = load_link(path)
+    with refusal_of(path):  # as `microrad budget` has it
+        properties.links(file)
 
 
 def _mission(path: Path) -> None:
     file = load_mission(path)
-    properties.links(file)
+    with refusal_of(path):
+        properties.links(file)
     properties.plant(from_table(file.mission.mirror))
 
 
@@ -267,7 +274,7 @@ def _memory() -> Path | None:
     return memory if memory.is_dir() else None
 
 
-FORMATS = {
+FORMATS: dict[str, Format] = {
     each.name: each
     for each in (
         FileFormat("links", ".toml", seeds.links, mutate.text, _links),
@@ -291,5 +298,7 @@ FORMATS = {
         FileFormat("manifests", ".json", seeds.manifests, _json, _manifest),
         FileFormat("pages", ".html", seeds.pages, mutate.text, _manifest),
         FileFormat("ledgers", ".ledger", seeds.ledgers, _sqlite, _ledger),
+        *MESSAGES,
+        *CALLS,
     )
 }

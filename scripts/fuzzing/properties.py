@@ -1,6 +1,7 @@
 """What any input that is taken must keep; each check raises AssertionError with what is broken."""
 
 import math
+import traceback
 from collections.abc import Iterable
 from typing import Any
 
@@ -43,6 +44,16 @@ def probability(what: str, value: float) -> None:
         value: The probability.
     """
     assert math.isnan(value) or 0.0 <= value <= 1.0, f"{what}: {value!r} is no probability"
+
+
+class DocumentedError(ValueError):
+    """A plain ValueError that a function of microrad raises itself: its docstring says so."""
+
+
+def documented(error: ValueError) -> ValueError:
+    """The error as a refusal where microrad raised it itself; else as it is, as one that slipped through from below."""
+    frames = traceback.extract_tb(error.__traceback__)
+    return DocumentedError(str(error)) if "/microrad/" in frames[-1].filename else error
 
 
 # --------------------------------------------------------------------------------------------------------------- links

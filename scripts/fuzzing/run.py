@@ -24,6 +24,8 @@ from random import Random
 from types import FrameType
 from typing import Any, Protocol
 
+from fuzzing.properties import DocumentedError
+
 _SILENT_S = 60.0  # until a child that finishes no case is taken to hang where no signal reaches it
 _LONGEST_REFUSAL = 20_000
 _KEPT_OF_A_KIND = 3
@@ -88,8 +90,12 @@ def case(kind: Format, seed: int, number: int) -> Any:
 
 
 def is_refusal(error: BaseException) -> bool:
-    """Whether an error is an answer to the user, as the command line has it: a ValueError that microrad defines."""
-    return isinstance(error, ValueError) and type(error).__module__.startswith("microrad.")
+    """Whether an error is an answer to the user, as the command line has it: a ValueError that microrad defines.
+
+    Of a public function a plain ValueError is one, too, where it says so (`properties.documented`).
+    """
+    own = type(error).__module__.startswith("microrad.") or isinstance(error, DocumentedError)
+    return isinstance(error, ValueError) and own
 
 
 def judged(kind: Format, made: Any, folder: Path, most_s: float) -> tuple[bool, str, str]:

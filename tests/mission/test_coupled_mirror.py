@@ -605,4 +605,4 @@ def test_a_mirror_of_one_axis_is_none_of_several():
 def test_a_number_whose_products_are_none_is_refused():
     """It overflowed where the mirror's growth was computed."""
     (fault,) = refusal(edited(("[-900.0, 0.0]", "[-900.0, -1e308]")))
-    assert fault.key == "matrices.E" and "is beyond 1e+100" in fault.reason
+    assert fault.key == "mirror.matrices.E" and "is beyond 1e+100" in fault.reason
