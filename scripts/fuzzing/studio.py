@@ -152,14 +152,19 @@ def _save(made: dict[str, Any], folder: Path) -> None:
 
 # -------------------------------------------------------------------------------------------------------------- drafts
 @cache
+def _draft() -> Draft:
+    return Draft.shipped("mission.toml")
+
+
+@cache
 def _keys() -> tuple[str, ...]:
-    return tuple(Draft.shipped("mission.toml").values)
+    return tuple(_draft().values)
 
 
 def _edits(draw: Random) -> list[tuple[str, str, str]]:
     """Steps of an editor: what is done, to which key, with which text."""
     steps = []
-    for _ in range(draw.choice((1, 1, 2, 4))):
+    for _ in range(draw.choice((1, 1, 2))):
         key = draw.choice(_keys()) if draw.random() < 0.8 else draw.choice((_word(draw), "mirror.x", "orbit", ""))
         how = draw.choice(("set", "set", "set", "set", "slide", "without", "text"))
         given = mutate.text(draw, seeds.missions()).decode("utf-8", "surrogateescape") if how == "text" else ""
@@ -170,7 +175,7 @@ def _edits(draw: Random) -> list[tuple[str, str, str]]:
 
 def _edit(made: list[tuple[str, str, str]], folder: Path) -> None:
     """Each step leaves a draft with its faults in words, or is refused; the draft before it stays whole."""
-    draft, refusals = Draft.shipped(folder / "mission.toml"), []
+    draft, refusals = _draft(), []
     for how, key, text in made:
         try:
             draft = _step(draft, how, key, text)
@@ -180,8 +185,7 @@ def _edit(made: list[tuple[str, str, str]], folder: Path) -> None:
             refusals.append(error)
     assert bool(draft.problems) == bool(draft.report), "a fault without words"
     assert set(draft.values).isdisjoint(each.key for each in draft.absent), "a key that is there is absent"
-    sliders.faulty(draft, draft.values)
-    saved = draft.save()
+    saved = draft.save(folder / "mission.toml")
     assert Draft.open(saved.path).text == draft.text, "a draft that is saved is another one"
     if len(refusals) == len(made):
         raise refusals[0]
@@ -288,7 +292,6 @@ def _answer(made: dict[str, Any], folder: Path) -> None:
     with contextlib.chdir(folder):
         answer = answer_to(request)
     json.dumps(answer, allow_nan=False)
-    assert "this cannot be read" not in answer.get("refused", ""), answer["refused"]
 
 
 MESSAGES = (

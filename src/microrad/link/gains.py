@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from microrad.core.arrays import Floats
+from microrad.core.arrays import Floats, reals
 from microrad.core.units import PLANCK_J_S, SPEED_OF_LIGHT_M_S, format_quantity
 from microrad.mission.fields import Quantity, Share
 
@@ -25,7 +25,7 @@ def checked(name: str, values: ArrayLike, rule: Quantity, why: str = "") -> Floa
     Raises:
         ValueError: For a value that is not finite or out of bounds.
     """
-    array = np.asarray(values, dtype=np.float64)
+    array = reals(values, name)
     for extreme in (np.min(array), np.max(array)) if array.size else ():  # nan is both
         rule.check(name, float(extreme), why)
     return array

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from microrad.core import kernels, lti
-from microrad.core.arrays import Complexes, Floats
+from microrad.core.arrays import LEAST, MOST, Complexes, Floats, reals
 from microrad.mirror.hysteresis import NO_CREEP, BoucWen, Creep, PrandtlIshlinskii, slow_gain, steepest_slope
 from microrad.mission.tables import mirror as mirror_table
 
@@ -83,13 +83,15 @@ class Mirror:
             print(np.ptp(mirror.response(10 * np.sin(2 * np.pi * 100 * time_s), step_s=1e-5)))
             ```
         """
-        given = np.asarray(drive_v, dtype=float)
+        given = reals(drive_v, "drive_v")
         drive = np.ascontiguousarray(given[:, None] if given.ndim == 1 else given)
         if drive.ndim != 2 or drive.shape[1] != self.actuators or not drive.size or not np.isfinite(drive).all():
             raise ValueError(
                 f"drive_v has shape {given.shape}: mirror {self.name!r} takes finite samples of shape "
                 f"(samples, {self.actuators})"
             )
+        if not LEAST <= step_s <= MOST:
+            raise ValueError(f"step_s is {step_s} s: give the time between two samples, above 0")
         plant = discretise(self, step_s)
         output = np.empty((len(drive), self.axes))
         respond(plant, at_rest(plant), drive, output, np.empty((len(drive), 0)))
@@ -100,8 +102,14 @@ class Mirror:
 
         Args:
             freq_hz: Frequencies (Hz), shape (frequencies,).
+
+        Raises:
+            ValueError: For frequencies of another shape, or that are not finite.
         """
-        return lti.frequency_response(self.linear_loop, np.atleast_1d(np.asarray(freq_hz, dtype=float)))
+        freq = np.atleast_1d(reals(freq_hz, "freq_hz"))
+        if freq.ndim != 1 or not np.isfinite(freq).all():
+            raise ValueError(f"freq_hz has shape {freq.shape}: give one row of finite frequencies")
+        return lti.frequency_response(self.linear_loop, freq)
 
     @classmethod
     def of(
@@ -126,7 +134,12 @@ class Mirror:
             ValueError: For a linear part that is improper, not stable, or has no gain at rest.
         """
         model = hysteresis if isinstance(hysteresis, BoucWen | PrandtlIshlinskii) else BoucWen(hysteresis, *[0.0] * 5)
-        top, bottom = (np.atleast_1d(np.asarray(c, dtype=float)) for c in (numerator, denominator))
+        top, bottom = (
+            np.atleast_1d(reals(c, f"{what} of mirror {name!r}"))
+            for what, c in (("numerator", numerator), ("denominator", denominator))
+        )
+        if not all(c.ndim == 1 and c.size and np.isfinite(c).all() for c in (top, bottom)):
+            raise ValueError(f"mirror {name!r}: numerator and denominator have to be rows of finite coefficients")
         if bottom.size == 1:
             return assemble(name, "static", None, model, creep)
         if top.size > bottom.size or bottom[0] == 0.0 or np.max(np.roots(bottom).real) >= 0.0 or top[-1] == 0.0:

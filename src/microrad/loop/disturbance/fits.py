@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from microrad.core.arrays import Floats
+from microrad.core.arrays import Floats, reals
 from microrad.core.units import format_quantity
 from microrad.loop.disturbance.records import Convention, Disturbance, above_zero, band_rms, one_input, rising, share
 from microrad.loop.disturbance.sources import from_terms
@@ -128,7 +128,8 @@ def fit_table(
         ValueError: For columns that are no spectrum (see `read_table`), for a density of zero, and for a poor fit: 3 dB
             off somewhere, or 10 % in the rms over the table.
     """
-    freq, density = checked(np.asarray(freq_hz, dtype=float), np.asarray(psd_rad2_hz, dtype=float), f'"{name}"')
+    freq, density = reals(freq_hz, f'"{name}": freq_hz'), reals(psd_rad2_hz, f'"{name}": psd_rad2_hz')
+    freq, density = checked(freq, density, f'"{name}"')
     freq, density = freq[freq > 0.0], density[freq > 0.0] * share(convention)
     if np.any(density == 0.0):
         raise ValueError(
