@@ -155,8 +155,8 @@ def recording(found: Recording) -> None:
     finite("output", found.output)
     assert found.drive.ndim == found.output.ndim == 2, "a recording is no table"
     assert len(found.drive) == len(found.output) == found.samples, "drive and output have other lengths"
-    assert found.drive.shape[1] == len(found.input_names) == len(found.input_units), "a drive without a name"
-    assert found.output.shape[1] == len(found.output_names) == len(found.output_units), "an output without a name"
+    assert found.drive.shape[1] == len(found.input_names), "a drive without a name"
+    assert found.output.shape[1] == len(found.output_names), "an output without a name"
     assert math.isfinite(found.rate_hz) and found.rate_hz > 0.0, "a rate that is none"
     assert math.isfinite(found.step_s) and found.step_s > 0.0, "time stands still"
     assert len(found.sha256) == 64, "no hash"
@@ -180,5 +180,5 @@ def orbit(found: Orbit, times_s: Any) -> None:
     finite("position", states.position_m)
     finite("velocity", states.velocity_m_s)
     radius, speed = np.linalg.norm(states.position_m, axis=0), np.linalg.norm(states.velocity_m_s, axis=0)
-    assert np.all(radius > 6.3e6) and np.all(radius < 2e9), "an orbit below the ground, or that leaves"
+    assert np.all(radius > 6.3e6) and np.all(radius < 1e10), "an orbit below the ground, or that leaves"
     assert np.all(speed < 12e3), "an orbit faster than what escapes"

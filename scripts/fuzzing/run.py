@@ -210,13 +210,13 @@ def apart(kind: Format, seed: int, numbers: range, keep: Path) -> Tally:
         child = os.fork()
         if not child:
             _run(kind, seed, range(place, numbers.stop), shared, notes, keep)
-        status = _waited_for(child, shared)
+        status, hangs = _waited_for(child, shared)
         number, taken, refused, longest_s, longest, memory = _AT.unpack(shared[:])
         notes.seek(0)
         finds = [Find(kind.name, *json.loads(line)) for line in notes]
         notes.close()
         if status and not any(each.number == number for each in finds):
-            why = f"hangs for {_SILENT_S:g} s" if status == signal.SIGKILL else f"ends the process: status {status}"
+            why = f"hangs for {_SILENT_S:g} s" if hangs else f"ends the process: status {status}"
             finds.append(Find(kind.name, number, why, ""))
             _keep(keep, kind, seed, finds[-1])
         whole.taken += taken
@@ -229,16 +229,17 @@ def apart(kind: Format, seed: int, numbers: range, keep: Path) -> Tally:
     return whole
 
 
-def _waited_for(child: int, shared: mmap.mmap) -> int:
-    """Wait for the end of a child, and kill it where it finishes no case; returns its status."""
-    last, since_s = b"", time.monotonic()
+def _waited_for(child: int, shared: mmap.mmap) -> tuple[int, bool]:
+    """Wait for the end of a child, and kill it where it finishes no case; returns its status, and whether it hung."""
+    last, since_s, hangs = b"", time.monotonic(), False
     while True:
         ended, status = os.waitpid(child, os.WNOHANG)
         if ended:
-            return status
+            return status, hangs
         if shared[:8] != last:
             last, since_s = shared[:8], time.monotonic()
         elif time.monotonic() - since_s > _SILENT_S:
+            hangs = True
             os.kill(child, signal.SIGKILL)
         time.sleep(0.05)
 
@@ -262,10 +263,12 @@ def _run(kind: Format, seed: int, numbers: range, shared: mmap.mmap, notes: Any,
 
             for number in numbers:
                 tell(number)
+                before = tally.taken, tally.refused
                 _count(tally, kind, seed, number, folder, kind.most_s)
                 tally.memory_bytes = max(tally.memory_bytes, _peak_bytes() - begin)
                 grown = tally.memory_bytes > kind.most_bytes
                 if grown and not (tally.finds and tally.finds[-1].number == number):
+                    tally.taken, tally.refused = before
                     tally.finds.append(Find(kind.name, number, f"takes {tally.memory_bytes / 1e9:.1f} GB", ""))
                 for find in tally.finds[written:]:
                     notes.write(json.dumps([find.number, find.what, find.trace]) + "\n")

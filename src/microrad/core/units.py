@@ -21,13 +21,15 @@ PLANCK_J_S = 6.626_070_15e-34
 ELEMENTARY_CHARGE_C = 1.602_176_634e-19
 """Charge of one electron, exact by the definition of the ampere (SI brochure, 9th edition)."""
 
+LEAST, MOST = 1e-30, 1e30
+"""Sizes that a quantity may have in SI units where it is not 0: its powers are floats, too."""
+
 BLANKS = "\t\n\u00a0\u202f"
 """Blanks that do no harm where a text has several lines."""
 
 _MAX_CHARACTERS = 60
 _MOST_GIVEN = 10  # digits of a number that somebody wrote
 _MAX_DECIBEL = 1000.0  # beyond it the linear value leaves the range of a float
-_SMALLEST, _LARGEST = Decimal("1e-30"), Decimal("1e30")  # SI value of what is a quantity: its powers are floats, too
 
 _BASE = ("kg", "m", "s", "A", "K", "rad", "bit", "photon", "cycle")
 _Dimension = tuple[int | Fraction, ...]  # powers of the base dimensions
@@ -217,7 +219,7 @@ def _read(text: object, unit: str) -> float:
     if unit in _DECIBELS or scale.dimension != _scale(unit).dimension:
         raise _RefusedError(f"is in {_quoted(symbol)}, another kind of quantity")
     value = Decimal(number) * scale.factor / _scale(unit).factor
-    if value and not _SMALLEST <= abs(value) <= _LARGEST:
+    if value and not Decimal(repr(LEAST)) <= abs(value) <= Decimal(repr(MOST)):
         raise _RefusedError(f"is {'too large' if abs(value) > 1 else 'too small, and not 0,'} for a quantity")
     return float(value)
 

@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from microrad.core import kernels
-from microrad.core.arrays import LEAST, MOST, Floats, reals
+from microrad.core.arrays import Floats, reals
 from microrad.core.labelled import Dataset, Group, variables
+from microrad.core.units import LEAST, MOST
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,12 +71,18 @@ def _from_rest(samples: ArrayLike, step_s: float, what: str) -> Floats:
     return np.concatenate([[0.0], signal])
 
 
-def _numbers(model: object, name: str) -> None:
-    """Raises ValueError for a parameter of a model that is no finite number; a limit may be infinite."""
-    for each in fields(model):  # type: ignore[arg-type]
-        values = reals(getattr(model, each.name), f"{each.name} of {name}")
-        if not np.all(np.isfinite(values) | (each.name in _LIMITS and values == math.inf)):
-            raise ValueError(f"{each.name} of {name} is {getattr(model, each.name)}: give finite numbers")
+class _Numbers:
+    """A record of a model's numbers; `KIND` is what messages call it."""
+
+    __slots__ = ()
+    KIND: ClassVar[str]
+
+    def check(self) -> None:
+        """Raises ValueError for a parameter that is no finite number; a limit may be infinite."""
+        for each in fields(self):  # type: ignore[arg-type]
+            values = reals(getattr(self, each.name), f"{each.name} of the {self.KIND} model")
+            if not np.all(np.isfinite(values) | (each.name in _LIMITS and values == math.inf)):
+                raise ValueError(f"{each.name} of the {self.KIND} model is {values}: give finite numbers")
 
 
 def _sound(output_rad: Floats) -> Floats:
@@ -88,7 +95,7 @@ def _sound(output_rad: Floats) -> Floats:
     return output_rad
 
 
-class _FromRest(ABC):
+class _FromRest(_Numbers, ABC):
     """What a hysteresis model does by itself, from rest at a drive of 0."""
 
     __slots__ = ()
@@ -105,7 +112,7 @@ class _FromRest(ABC):
                 parameters that make no finite output.
         """
         drive = _from_rest(drive_v, step_s, "drive_v")
-        _numbers(self, f"the {self.KIND} model")
+        self.check()
         return _sound(self._run(drive, step_s)[0])
 
     def loop(self, amplitude_v: float, freq_hz: float, samples: int = 500) -> HysteresisLoop:
@@ -122,7 +129,7 @@ class _FromRest(ABC):
         for name, value, unit in (("amplitude_v", amplitude_v, "V"), ("freq_hz", freq_hz, "Hz")):
             if not LEAST <= value <= MOST:
                 raise ValueError(f"{name} of a loop is {value} {unit}: give a finite number above 0")
-        _numbers(self, f"the {self.KIND} model")
+        self.check()
         if samples < 8:
             raise ValueError(f"a loop of {samples} samples a period has no shape: give 8 or more, better 500")
         one = amplitude_v * np.sin(2.0 * np.pi * np.arange(1, samples + 1) / samples)
@@ -136,7 +143,6 @@ class _FromRest(ABC):
         clamped = np.count_nonzero(np.abs(np.diff(one, prepend=one[-1])) / step_s > self.rate_limit_v_s)
         return HysteresisLoop(freq_hz, one, _sound(last), hysteresis[-samples:], int(clamped))
 
-    KIND: ClassVar[str]
     rate_limit_v_s: float
 
     @abstractmethod
@@ -197,7 +203,7 @@ class BoucWen(_FromRest):
         if self.d1_rad_v == 0.0:
             raise ValueError("a Bouc-Wen model with d1 = 0 has no inverse: its output does not follow the drive")
         wanted = _from_rest(output_rad, step_s, "output_rad")
-        _numbers(self, f"the {self.KIND} model")
+        self.check()
         drive = wanted / self.d1_rad_v
         rate = np.clip(np.diff(drive, prepend=0.0) / step_s, -self.rate_limit_v_s, self.rate_limit_v_s)
         gain, offset = self.d1_rad_v * np.exp(-self.d2_s_v * rate), self.d1_rad_v * self.bias_v
@@ -377,7 +383,7 @@ class PrandtlIshlinskii(_FromRest):
             ValueError: For an output of another shape, a step not above 0, and what `inverted` refuses.
         """
         wanted = _from_rest(output_rad, step_s, "output_rad")
-        _numbers(self, f"the {self.KIND} model")
+        self.check()
         return _sound(self.inverted()._run(wanted, step_s)[0])
 
     def inverted(self) -> "PrandtlIshlinskii":
@@ -399,7 +405,7 @@ class PrandtlIshlinskii(_FromRest):
             )
         r, w = np.array(self.thresholds_v), np.array(self.weights_rad_v)
         slope = np.cumsum(w)
-        if r[0] != 0.0 or np.min(slope) <= 0.0:
+        if r[0] != 0.0 or np.min(slope) < LEAST:
             raise ValueError(
                 "the Prandtl-Ishlinskii model has no weight at threshold 0: it stands still after each reversal and "
                 "has no inverse; identify it again with more samples near the reversals"
@@ -434,12 +440,14 @@ class PrandtlIshlinskii(_FromRest):
 
 
 @dataclass(frozen=True, slots=True)
-class Creep:
+class Creep(_Numbers):
     """Linear creep beside a hysteresis model: weight x drive behind a first-order lag, summed over the lags.
 
     Equal weights at time constants in geometric steps creep with the logarithm of time (Kuhnen, European Journal of
     Control 9 (2003) 407).
     """
+
+    KIND = "creep"
 
     weights_rad_v: tuple[float, ...] = ()
     time_constants_s: tuple[float, ...] = ()
@@ -465,7 +473,7 @@ class Creep:
             ```
         """
         drive = _from_rest(drive_v, step_s, "drive_v")
-        _numbers(self, "creep")
+        self.check()
         constants, weights = (np.array(each, dtype=float) for each in (self.time_constants_s, self.weights_rad_v))
         if constants.shape != weights.shape or not np.all(constants > 0.0):
             raise ValueError(

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from microrad.core import kernels, lti
-from microrad.core.arrays import LEAST, MOST, Complexes, Floats, reals
+from microrad.core.arrays import Complexes, Floats, reals
+from microrad.core.units import LEAST, MOST
 from microrad.mirror.hysteresis import NO_CREEP, BoucWen, Creep, PrandtlIshlinskii, slow_gain, steepest_slope
 from microrad.mission.tables import mirror as mirror_table
 
@@ -95,6 +96,8 @@ class Mirror:
         plant = discretise(self, step_s)
         output = np.empty((len(drive), self.axes))
         respond(plant, at_rest(plant), drive, output, np.empty((len(drive), 0)))
+        if not np.isfinite(output).all():
+            raise ValueError(f"mirror {self.name!r} gives no finite output to this drive at a step of {step_s:g} s")
         return output[:, 0] if given.ndim == 1 and self.axes == 1 else output
 
     def frequency_response(self, freq_hz: ArrayLike) -> Complexes:
@@ -134,6 +137,8 @@ class Mirror:
             ValueError: For a linear part that is improper, not stable, or has no gain at rest.
         """
         model = hysteresis if isinstance(hysteresis, BoucWen | PrandtlIshlinskii) else BoucWen(hysteresis, *[0.0] * 5)
+        for each in (model, creep):
+            each.check()
         top, bottom = (
             np.atleast_1d(reals(c, f"{what} of mirror {name!r}"))
             for what, c in (("numerator", numerator), ("denominator", denominator))
@@ -150,7 +155,13 @@ class Mirror:
             )
         system = lti.modal_from_polynomials(top.tolist(), bottom.tolist())
         gain = float(lti.frequency_response(system, np.array([0.0]))[0, 0, 0].real)
-        return assemble(name, "cascade", replace(system, C=system.C / gain, D=system.D / gain), model, creep)
+        with np.errstate(all="ignore"):
+            system = replace(system, C=system.C / gain, D=system.D / gain)
+        if not all(np.isfinite(each).all() for each in (system.B, system.C)):
+            raise ValueError(
+                f"the linear part of mirror {name!r} has a gain at rest of {gain:g}: look at its coefficients"
+            )
+        return assemble(name, "cascade", system, model, creep)
 
     @classmethod
     def of_system(cls, system: lti.StateSpace, name: str = "mirror") -> "Mirror":

@@ -1,5 +1,6 @@
 """From a file, or from arrays, to a checked `Recording`."""
 
+import math
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
@@ -147,7 +148,10 @@ def recording_from_arrays(
     """
     rate_hz = check_rate(name, rate_hz)
     check_accept(name, accept)
-    u, y = (np.array(reals(a, f"{name}: {what}", RecordingError)) for what, a in (("drive", drive), ("output", output)))
+    u, y = (
+        np.array(reals(a, f"{name}: {what}", RecordingError, most=math.inf))
+        for what, a in (("drive", drive), ("output", output))
+    )
     if u.ndim not in (1, 2) or y.ndim not in (1, 2) or len(u) != len(y) or 0 in (u.size, y.size):
         raise RecordingError(
             f"{name}: drive has shape {u.shape} and output {y.shape}; give arrays of shape (samples,) or (samples, "

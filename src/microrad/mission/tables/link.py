@@ -131,6 +131,7 @@ class Beacon(Beam):
     required_power_w: Threshold = Field(description="power that the sensor needs")
 
 
+_ALIKE_DB = 1e-3
 _DETECTORS: dict[str, tuple[str, ...]] = {
     "ook": ("photon-counting", "pin", "apd", "preamplified"),
     "dpsk": ("preamplified",),
@@ -185,7 +186,7 @@ class Receiver(Table):
     order: Annotated[int, Whole("", least=2, most=2**20)] | None = Field(
         default=None, description="ppm: slots in a symbol, a power of two"
     )
-    extinction_ratio_db: Annotated[float, Quantity("dB", least=0.01)] | None = Field(
+    extinction_ratio_db: Annotated[float, Quantity("dB", above=0.0)] | None = Field(
         default=None, description="ook: power of a mark over that of a space"
     )
     efficiency: Efficiency | None = Field(default=None, description="electrons per photon, all detectors but amplified")
@@ -230,6 +231,9 @@ class Receiver(Table):
         yield from self.choice_problems(what, wanted, ("background", *instead))
         if self.background is not None and self.background_power_w is not None:
             yield Problem("background_power", "stands beside the table background", "one of the two removed")
+        if self.extinction_ratio_db is not None and self.extinction_ratio_db < _ALIKE_DB:
+            reason = f"is below {_ALIKE_DB:g} dB, where marks and spaces are alike"
+            yield Problem("extinction_ratio", reason, 'extinction_ratio = "20 dB" would do')
         if self.order is not None and self.order & (self.order - 1):
             yield Problem("order", "is no power of two", "order = 16 would do")
 
@@ -287,6 +291,8 @@ class Communication(Beam):
 
     def _gain_problems(self, receiver: Receiver) -> Iterator[Problem]:
         """A code that needs no less power than the channel's capacity asks for."""
+        if receiver.modulation == "ook" and (receiver.extinction_ratio_db or 0.0) < _ALIKE_DB:
+            return  # the receiver says so
         limit_db = 10.0 * math.log10(receiver.most_code_gain(self.data_rate_bit_s, self.wavelength_m))
         if receiver.code_gain_db > limit_db:
             at = f"code_rate = {receiver.code_rate:g}"
