@@ -521,3 +521,9 @@ def test_the_example_of_a_bit_error_ratio_is_one_that_links_have():
     name, rule = Receiver.rule_of("bit_error_ratio")
     assert (name, rule.example) == ("bit_error_ratio", "1e-09")
     assert rule.wanted == "a number without quotes, at least 1e-18 and below 0.5"
+
+
+def test_a_fault_beside_a_missing_extinction_ratio_is_told(tmp_path):
+    """The largest gain of a code was computed for marks that are like spaces."""
+    found = faults(tmp_path, received_with("pin ook", extinction_ratio=None, background_power=[1]))
+    assert "communication.receiver.background_power" in found

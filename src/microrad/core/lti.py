@@ -15,8 +15,10 @@ in the last bit of a matrix grows to one in a hundred thousand; so far before th
 DESIGN_BITS = 44
 """Significant bits (6e-14) of the plant of a design: what a controller cancels in it has to stay cancelled."""
 
+STEEPEST = 1e150
+"""Largest coefficient of a transfer function over that of its highest power."""
+
 _MOST_COMBINED = 6
-_STEEPEST = 1e150  # coefficient over that of the highest power
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +56,7 @@ def modal_from_polynomials(numerator: tuple[float, ...], denominator: tuple[floa
         raise ValueError(
             f"numerator of order {num.size - 1} over denominator of order {den.size - 1}: not strictly proper"
         )
-    if np.max(np.abs(np.concatenate([num, den]))) > _STEEPEST * abs(den[0]):
+    if np.max(np.abs(np.concatenate([num, den]))) > STEEPEST * abs(den[0]):
         raise ValueError(f"the highest power of s has a coefficient of {den[0]:g}, which is nothing beside the others")
     poles = np.asarray(np.roots(den), dtype=complex)
     distance = np.abs(poles[:, None] - poles[None, :]) + np.diag(np.full(poles.size, np.inf))

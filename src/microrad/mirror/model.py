@@ -147,6 +147,8 @@ class Mirror:
             raise ValueError(f"mirror {name!r}: numerator and denominator have to be rows of finite coefficients")
         if bottom.size == 1:
             return assemble(name, "static", None, model, creep)
+        if np.max(np.abs([*top, *bottom])) > lti.STEEPEST * abs(bottom[0]) > 0.0:
+            raise ValueError(f"the denominator of mirror {name!r} begins with {bottom[0]:g}, nothing beside the others")
         if top.size > bottom.size or bottom[0] == 0.0 or np.max(np.roots(bottom).real) >= 0.0 or top[-1] == 0.0:
             raise ValueError(
                 f"the linear part of mirror {name!r} has a numerator of {top.size} and a denominator of {bottom.size} "
