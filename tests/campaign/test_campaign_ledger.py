@@ -141,6 +141,16 @@ def test_the_same_chunk_gives_the_same_bytes_on_any_machine():
     assert hashlib.sha256(data).hexdigest() == "03960011ee16b928ebaa57956de692445ea838dcc57a37c245365dd9b9526bee"
 
 
+def test_a_name_that_is_no_text_is_damage_in_words(path):
+    """SQLite quotes it in its error, which Python then could not read."""
+    filled(path, 2)
+    content = path.read_bytes()
+    assert content.count(b"CREATE TABLE chunks") == 1
+    path.write_bytes(content.replace(b"CREATE TABLE chunks", b"CREATE\x82TABLE chunks"))
+    assert "the file is damaged (a text in it is none)" in said(verify, path)
+    assert "the file is damaged (a text in it is none)" in said(Ledger.open, path, write=False)
+
+
 def test_a_flipped_bit_anywhere_in_a_chunk_is_refused():
     data = packed(0)
     draw = random.Random(1)

@@ -202,6 +202,7 @@ def tones(limits=LIMITS, *, lines=None, **changes):
         (lambda: tones(lines=Lines(0.20003, 10, 400)), r"period is 2000.3 samples, no whole number .*: 200 ms"),
         (lambda: tones(lines=Lines(0.2, 11, 14)), r"stop leaves no all line of a multisine with one every 5 Hz"),
         (lambda: tones(lines=Lines(0.2, 10, 5000)), r"stop reaches 5 kHz, 2 samples a period"),
+        (lambda: tones(realisations=6000), r"realisations makes a record of 2400 s at 10 kHz; .* at most 2000 s"),
         (lambda: tones(two_inputs(), realisations=3), r"realisations is 3, no multiple of the 2 inputs, .* of 2"),
     ],
 )

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from microrad.lab import bench
-from microrad.lab.bench import load_plan
+from microrad.lab.bench import load_plan, plan
 from microrad.lab.bench.plan import PlanError, packaged_plans
 
 PLANS = Path(bench.__file__).parent.parent / "plans"
@@ -236,3 +236,28 @@ def test_a_file_goes_before_a_packaged_plan_of_its_name(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("paper-experiment").write_text(changed("^name = .*", 'name = "ours"'), encoding="utf-8")
     assert load_plan("paper-experiment").name == "ours"
+
+
+# ---- sizes
+SINES = """
+[excitation.many]
+kind = "sines"
+use = "validation"
+frequencies = [{}]
+amplitudes = ["1 V"]
+periods = {}
+offset = "6 V"
+"""
+
+
+def test_records_that_would_fill_the_memory_are_refused_before_they_are_designed(refuse):
+    """Each frequency alone has fewer samples than a record may have."""
+    several = ", ".join(f'"{2 + n / 10:g} Hz"' for n in range(100))
+    (fault,) = refuse(TEXT + SINES.format(several, 300)).faults
+    assert fault.key == "excitation.many.frequencies" and "makes a record of" in fault.reason
+
+
+def test_a_plan_has_so_many_samples_in_all(refuse, monkeypatch):
+    monkeypatch.setattr(plan, "_MOST_SAMPLES", 100_000)
+    (fault,) = refuse(TEXT).faults
+    assert fault.reason == "makes a plan of more than 0.1 million samples"

@@ -284,3 +284,16 @@ def test_arrays_under_the_same_checks():
     for words, (drive, output, rate_hz) in faults.items():
         with pytest.raises(RecordingError, match=words):
             recording_from_arrays(drive, output, rate_hz)
+
+
+@pytest.mark.parametrize("drive", [DRIVE + 0j, ["a"] * N, [[1.0], [1.0, 2.0]]])
+def test_arrays_that_are_no_real_numbers_are_refused(drive):
+    """The imaginary part was cut off, with a warning; the rest were errors of NumPy."""
+    with pytest.raises(RecordingError, match="arrays: drive: no array of real numbers; give numbers"):
+        recording_from_arrays(drive, OUTPUT, 100.0)
+
+
+@pytest.mark.parametrize("rate_hz", [5e-324, 1e300])
+def test_rates_that_no_converter_has_are_refused(rate_hz):
+    with pytest.raises(RecordingError, match="give the samples per second"):
+        recording_from_arrays(DRIVE, OUTPUT, rate_hz)

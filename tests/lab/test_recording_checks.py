@@ -39,6 +39,24 @@ def multisine(seed=0, low=5, high=800):
     return 5 * wave / np.abs(wave).max()
 
 
+@pytest.mark.parametrize("size", [1e200, 1e-200, 1e308])
+@pytest.mark.parametrize("where", ["drive", "output"])
+def test_samples_of_a_size_that_no_converter_gives(size, where):
+    """Their squares are no numbers: the checks warned of an overflow, and went on with infinities."""
+    signals = {"drive": multisine(), "output": play(multisine())}
+    signals[where] = size * (signals[where] / np.abs(signals[where]).max())
+    with pytest.raises(RecordingError, match=r"its largest sample.*check its unit") as caught:
+        recording_from_arrays(**signals, rate_hz=RATE_HZ)
+    assert f"of the {where} is " in str(caught.value) and f"{size:.4g}, its" in str(caught.value)
+
+
+def test_infinities_of_both_signs_are_refused_without_a_warning():
+    drive = multisine()
+    drive[[3, 7]] = math.inf, -math.inf
+    with pytest.raises(RecordingError, match="sample 3 of the drive is inf, 2 such samples"):
+        recording_from_arrays(drive, play(multisine()), RATE_HZ)
+
+
 def delayed(values, seconds):
     """Periodic shift; a negative one is an advance."""
     turn = np.exp(-2j * np.pi * np.fft.rfftfreq(N, 1 / RATE_HZ) * seconds)

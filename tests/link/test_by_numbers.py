@@ -53,3 +53,27 @@ def test_times_of_a_scan_are_those_of_drawn_targets():
     assert times.probability < still.probability
     with pytest.raises(ValueError, match=r"the overlap.*never lit long enough"):
         scan_times(100e-6, 20e-6, 5e-3, overlap=0.0)
+
+
+@pytest.mark.parametrize(
+    ("changed", "name"),
+    [
+        ({"half_angle_rad": 1e-320}, "the half angle"),
+        ({"half_angle_rad": 1e308}, "the half angle"),
+        ({"wavelength_m": 1e300}, "the wavelength"),
+        ({"pointing_error_rad": 1e154}, "the pointing error"),
+        ({"losses_db": {"optics": 1e308}}, "the loss 'optics'"),
+    ],
+)
+def test_sizes_that_no_beam_has_are_refused(changed, name):
+    """They divided by zero, or overflowed."""
+    beam = {"power_w": 1.0, "half_angle_rad": 8e-6, "distance_m": 45e6, "aperture_m": 0.25, "wavelength_m": 1064e-9}
+    with pytest.raises(ValueError, match=f"{name} is .*: nothing is below 1e-30 or above 1e\\+30 in SI units"):
+        received_power(**{**beam, **changed})
+
+
+@pytest.mark.parametrize("changed", [{"jitter_rms_rad": 1000.0}, {"overlap": 1.0 - 1e-9}])
+def test_a_scan_that_would_fill_the_memory_is_refused(changed):
+    scan = {"sigma_rad": 100e-6, "beam_radius_rad": 20e-6, "detection_time_s": 5e-3}
+    with pytest.raises(ValueError, match=r"a target is within reach of .* tracks"):
+        scan_times(**{**scan, **changed})

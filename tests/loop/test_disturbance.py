@@ -592,3 +592,21 @@ def test_what_makes_no_sense_is_refused_with_the_reason(build, message):
 
 def test_every_public_name_exists():
     assert all(hasattr(disturbance, name) for name in disturbance.__all__)
+
+
+def test_a_spectrum_that_no_sum_of_filters_follows_is_refused(monkeypatch):
+    """The search for non-negative powers gave up with an error of SciPy."""
+
+    def gives_up(*_):
+        raise RuntimeError("Maximum number of iterations reached.")
+
+    monkeypatch.setattr("scipy.optimize.nnls", gives_up)
+    f = np.geomspace(1.0, 400.0, 40)
+    with pytest.raises(ValueError, match="no sum of a few filters follows this spectrum"):
+        fit_table(f, 1e-12 / (1 + f**2), convention="radial")
+
+
+def test_a_spectrum_of_nothing_is_refused():
+    f = np.geomspace(1.0, 400.0, 40)
+    with pytest.raises(ValueError, match="give three rows or more of a spectrum, in these units"):
+        fit_table(f, 1e-200 / (1 + f**2), convention="radial")

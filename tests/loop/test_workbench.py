@@ -177,3 +177,18 @@ def test_a_linear_system_is_a_mirror_and_gets_a_controller():
     assert 0.0 < runs.radial_rms_rad < 20e-6
     with pytest.raises(ValueError, match="linear system of mirror 'fitted' is not stable"):
         Mirror.of_system(lti.StateSpace(np.eye(1), np.eye(1), np.eye(1), np.zeros((1, 1))), "fitted")
+
+
+def test_a_delay_of_more_states_than_memory_is_refused():
+    mirror = Mirror.of(5e-5, [1.0], [1 / 6000**2, 0.8 / 6000, 1.0])
+    with pytest.raises(ValueError, match="its delay of 1 s is more than 1000 plant steps of 10 µs"):
+        Loop(mirror=mirror, rate_hz=10e3, delay_s=1.0)
+
+
+@pytest.mark.parametrize("rate_hz", [5e-324, 1e300])
+def test_a_loop_and_a_controller_have_a_rate_that_can_be(rate_hz):
+    mirror = Mirror.of(5e-5, [1.0], [1 / 6000**2, 0.8 / 6000, 1.0])
+    with pytest.raises(ValueError, match="rate_hz of a loop is"):
+        Loop(mirror=mirror, rate_hz=rate_hz)
+    with pytest.raises(ValueError, match="give one axis or more and a rate above 0 Hz"):
+        Controller.pid(0.0, 2e6, rate_hz=rate_hz)

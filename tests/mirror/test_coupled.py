@@ -177,13 +177,14 @@ def same(found, mirror):
         np.testing.assert_array_equal(found.known.factor, mirror.known.factor)
 
 
-NUMBER = st.floats(allow_nan=False, allow_infinity=False, width=64)
+NUMBER = st.floats(-1e100, 1e100)
+QUANTITY = st.just(0.0) | st.floats(1e-29, 1e29) | st.floats(-1e29, -1e-29)
 
 
 @settings(deadline=None, max_examples=60)  # the machine may be busy
-@given(gains=st.lists(NUMBER, min_size=4, max_size=4), decay=st.floats(1e-300, 1e300), w=NUMBER, delay=NUMBER)
+@given(gains=st.lists(NUMBER, min_size=4, max_size=4), decay=st.floats(1e-29, 1e29), w=QUANTITY, delay=QUANTITY)
 def test_any_number_reads_back(gains, decay, w, delay):
-    """Without hysteresis nothing can run away: the largest numbers and the smallest."""
+    """Without hysteresis nothing can run away: the largest numbers and the smallest that a file may hold."""
     plain = made(0, modes=1, bouc_wen=0, plays=0)
     A = lti.modal_matrix([(-decay, w)])
     C = np.array([gains[:2], gains[2:]])[:, : A.shape[0]]

@@ -115,3 +115,35 @@ def test_a_loop_is_a_period_of_a_long_run_and_closes(model):
     assert np.max(np.abs(np.diff(around))) < 0.03 * np.ptp(run)
     slow = model.loop(6.0, 0.5, 400)
     assert loop.width > 1.02 * slow.width
+
+
+NO_NUMBERS = {
+    "a parameter that is none": lambda: replace(BOUC_WEN, alpha_1_v=np.nan).response(DRIVE, STEP),
+    "a complex parameter": lambda: replace(BOUC_WEN, alpha_1_v=0.3j).response(DRIVE, STEP),
+    "a weight that is none": lambda: replace(PLAYS, weights_rad_v=(40e-6, np.inf, 4e-6)).loop(5.0, 10.0),
+    "a weight of nothing at 0": lambda: replace(PLAYS, weights_rad_v=(1e-320, 6e-6, 4e-6)).inverse(1e-6 * DRIVE, STEP),
+    "a weight beyond all": lambda: replace(PLAYS, weights_rad_v=(1e300, 6e-6, 4e-6)).response(DRIVE, STEP),
+    "a growth beyond all": lambda: replace(BOUC_WEN, delta_s_v=1.0, rate_limit_v_s=np.inf).response(DRIVE, 1e-9),
+    "a time constant of 0": lambda: Creep((1e-6,), (0.0,)).response(DRIVE, STEP),
+    "fewer time constants than weights": lambda: Creep((1e-6, 1e-6), (0.1,)).response(DRIVE, STEP),
+    "a complex drive": lambda: PLAYS.response(DRIVE + 0j, STEP),
+    "a drive of unequal lists": lambda: PLAYS.response([[1.0], [1.0, 2.0]], STEP),
+    "a drive beyond all": lambda: PLAYS.response(1e200 * DRIVE, STEP),
+    "a step of nothing": lambda: PLAYS.response(DRIVE, 1e-320),
+}
+
+
+@pytest.mark.parametrize("call", NO_NUMBERS.values(), ids=NO_NUMBERS)
+def test_what_makes_no_numbers_is_refused_without_a_warning(call):
+    """They came out as nan, or with warnings of NumPy, an error of the compiler or the imaginary part cut off."""
+    with pytest.raises(ValueError, match=r"give|look for|beyond|no inverse") as caught:
+        call()
+    assert "\n" not in str(caught.value)
+
+
+def test_whole_parameters_compile_nothing_of_their_own():
+    """A row of whole numbers was one of another type."""
+    assert_allclose(
+        BoucWen(1, 0, -1, 0, 1, 0).response(DRIVE, STEP),
+        BoucWen(*map(float, (1, 0, -1, 0, 1, 0))).response(DRIVE, STEP),
+    )

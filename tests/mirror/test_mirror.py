@@ -2,7 +2,7 @@
 
 import re
 from dataclasses import astuple, replace
-from math import exp, inf, pi
+from math import exp, inf, nan, pi
 
 import numba
 import numpy as np
@@ -533,3 +533,30 @@ def test_a_softer_mirror_for_small_drives():
     turns = 4.0 * np.sin(2 * np.pi * np.arange(3000) / 1000)
     states = kernels.play_response(turns, np.array(model.thresholds_v), np.zeros(2))
     assert np.max((states @ np.array(model.weights_rad_v))[1000:]) == pytest.approx(1.0e-3, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((inf, [1.0], [1e-8, 1e-4, 1.0]), "d1_rad_v of the Bouc-Wen model is inf"),
+        ((5e-5, [1.0], [1e-320, 1e-4, 1.0]), r"begins with .*, nothing beside the others"),
+        ((5e-5, [1.0], [1e-8, nan, 1.0]), "rows of finite coefficients"),
+        ((5e-5, [1j], [1e-8, 1e-4, 1.0]), "numerator of mirror 'mirror': no array of real numbers"),
+        ((5e-5, [[1.0]], [1e-8, 1e-4, 1.0]), "rows of finite coefficients"),
+    ],
+)
+def test_a_mirror_of_what_makes_no_numbers_is_refused(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        Mirror.of(*arguments)
+
+
+def test_a_mirror_refuses_drives_steps_and_frequencies_that_are_none():
+    found = Mirror.of(5e-5, [1.0], [1 / 6000**2, 0.8 / 6000, 1.0])
+    for call in (
+        lambda: found.response([1.0, 2.0], nan),
+        lambda: found.response([1.0, 2.0j], 1e-4),
+        lambda: found.frequency_response([1.0, nan]),
+        lambda: found.frequency_response([[1.0, 2.0]]),
+    ):
+        with pytest.raises(ValueError, match="give"):
+            call()

@@ -600,3 +600,9 @@ def test_a_mirror_of_one_axis_is_none_of_several():
     assert [fault.key for fault in faults] == ["mirror.version"]
     assert "travel is a key of version 1: the file holds a mirror of one axis" in faults[0].reason
     assert "load_mirror reads this one" in faults[0].expected
+
+
+def test_a_number_whose_products_are_none_is_refused():
+    """It overflowed where the mirror's growth was computed."""
+    (fault,) = refusal(edited(("[-900.0, 0.0]", "[-900.0, -1e308]")))
+    assert fault.key == "mirror.matrices.E" and "is beyond 1e+100" in fault.reason

@@ -263,7 +263,7 @@ ONE_WRONG = [
     ("delay", '"190 us"', "no whole number of plant_step", "would do"),
     ("delay", '"-20 us"', "below 0 s", "at least 0 s"),
     ("plant_step", '"30 us"', "does not divide the control period 1 / fine_pointing.rate (200 µs)", "would do"),
-    ("plant_step", '"1e-300 s"', "more than 1000000 times", "nearer to 1 / fine_pointing.rate"),
+    ("plant_step", '"1e-20 s"', "more than 1000000 times", "nearer to 1 / fine_pointing.rate"),
     ("amplifier_bandwidth", '"0 Hz"', "not above 0 Hz", "above 0 Hz"),
     ("drive_resolution", '"-1 mV"', "below 0 V", 'drive_resolution = "5 mV"'),
     ("reference_filter", '"2.5 kHz"', "not below half of fine_pointing.rate (2.5 kHz)", "would do"),

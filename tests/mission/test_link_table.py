@@ -132,6 +132,7 @@ def test_a_receivers_value_out_of_bounds_is_refused_with_the_bound(tmp_path, key
         ("preamplified ook", "amplifier_gain", "9 dB", "is below 10 dB"),
         ("preamplified ook", "optical_bandwidth", "0 GHz", "is not above 0 Hz"),
         ("counting ook", "extinction_ratio", "0 dB", "is not above 0 dB"),
+        ("counting ook", "extinction_ratio", "1e-15 dB", "is below 0.001 dB, where marks and spaces are alike"),
         ("apd ook", "avalanche_gain", 0.9, "is below 1"),
         ("apd ook", "ionisation_ratio", 1.1, "is above 1"),
         ("apd ook", "dark_current", "-1 nA", "is below 0 A"),
@@ -520,3 +521,9 @@ def test_the_example_of_a_bit_error_ratio_is_one_that_links_have():
     name, rule = Receiver.rule_of("bit_error_ratio")
     assert (name, rule.example) == ("bit_error_ratio", "1e-09")
     assert rule.wanted == "a number without quotes, at least 1e-18 and below 0.5"
+
+
+def test_a_fault_beside_a_missing_extinction_ratio_is_told(tmp_path):
+    """The largest gain of a code was computed for marks that are like spaces."""
+    found = faults(tmp_path, received_with("pin ook", extinction_ratio=None, background_power=[1]))
+    assert "communication.receiver.background_power" in found

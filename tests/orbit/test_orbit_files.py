@@ -8,6 +8,7 @@ import os
 import pickle
 import subprocess
 import sys
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from importlib.resources import files
 from pathlib import Path
@@ -378,6 +379,18 @@ class Stopped:
         return self.code, (0.0,) * 3, (0.0,) * 3
 
 
+class Silent(Stopped):
+    """A satellite without a second state, which says nothing of it."""
+
+    def __init__(self):
+        super().__init__(0)
+
+    def sgp4_array(self, whole, fraction):
+        error, position, velocity = super().sgp4_array(whole, fraction)
+        position[-1] = math.nan
+        return error, position, velocity
+
+
 WORDS = {
     1: "mean eccentricity", 2: "mean motion", 3: "perturbed eccentricity", 4: "semi-latus rectum",
     5: "below the Earth's surface", 6: "below the Earth's surface: it has decayed",
@@ -393,6 +406,17 @@ def test_each_error_of_sgp4_in_words(tmp_path, code):
             call()
         assert WORDS[code] in str(caught.value) and "2026-03-20T12:01:00.000Z" in str(caught.value)
         assert "EXAMPLE 1" in str(caught.value)
+
+
+def test_elements_for_which_sgp4_gives_no_number_and_no_error(tmp_path):
+    """Its deep-space part divides by the sine of the inclination."""
+    flat = replace(elements(tmp_path, NAMED)[0], inclination_rad=1e-320, mean_motion_rad_s=1.0027 * 2 * math.pi / 86400)
+    with pytest.raises(OrbitError, match="give no number for these elements"):
+        Sgp4Orbit(flat, EPOCH)
+    orbit = Sgp4Orbit(replace(flat, inclination_rad=0.0), EPOCH)
+    object.__setattr__(orbit, "_satellite", Silent())
+    with pytest.raises(OrbitError, match=r"2026-03-20T12:01:00\.000Z.*give no number for these elements"):
+        orbit.states(np.array([0.0, 60.0]))
 
 
 # ----------------------------------------------------------------------------------------------------------------- OMM
@@ -936,8 +960,10 @@ OEM_FAULTS = {
     "leap second of TAI": (HEAD + segment(GRID, TIME_SYSTEM="TAI", STOP_TIME="2016-12-31T23:59:60"), "no leap seconds"),
     "unsorted": (with_word(5, 0, stamp(60)), "does not come after", stamp(240), "line 20"),
     "twice": (with_word(5, 0, stamp(240)), "does not come after"),
-    "nan": (with_word(4, 2, "nan"), "line 20", "nan or inf"),
-    "inf": (with_word(4, 6, "inf"), "line 20", "nan or inf"),
+    "nan": (with_word(4, 2, "nan"), "line 20", "holds nan, inf or a number beyond 1e+300"),
+    "inf": (with_word(4, 6, "inf"), "line 20", "holds nan, inf or a number beyond 1e+300"),
+    "no number in m/s": (with_word(4, 6, "1e308"), "line 20", "holds nan, inf or a number beyond 1e+300"),
+    "distance beyond all": (with_word(4, 2, "1e299"), "line 20", "where no satellite of the Earth is"),
     "word": (with_word(4, 1, "abc"), "line 20", "X is 'abc'"),
     "time": (with_word(4, 0, "20/03/2026"), "line 20", "'20/03/2026', not a date and time"),
     "hour": (with_word(4, 0, "2026-03-20T25:00:00"), "not a date and time"),

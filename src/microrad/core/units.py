@@ -21,6 +21,9 @@ PLANCK_J_S = 6.626_070_15e-34
 ELEMENTARY_CHARGE_C = 1.602_176_634e-19
 """Charge of one electron, exact by the definition of the ampere (SI brochure, 9th edition)."""
 
+LEAST, MOST = 1e-30, 1e30
+"""Sizes that a quantity may have in SI units where it is not 0: its powers are floats, too."""
+
 BLANKS = "\t\n\u00a0\u202f"
 """Blanks that do no harm where a text has several lines."""
 
@@ -215,10 +218,10 @@ def _read(text: object, unit: str) -> float:
     scale = _scale_of_text(symbol, number, unit)
     if unit in _DECIBELS or scale.dimension != _scale(unit).dimension:
         raise _RefusedError(f"is in {_quoted(symbol)}, another kind of quantity")
-    value = float(Decimal(number) * scale.factor / _scale(unit).factor)
-    if not math.isfinite(value):
-        raise _RefusedError("is too large for a number")
-    return value
+    value = Decimal(number) * scale.factor / _scale(unit).factor
+    if value and not Decimal(repr(LEAST)) <= abs(value) <= Decimal(repr(MOST)):
+        raise _RefusedError(f"is {'too large' if abs(value) > 1 else 'too small, and not 0,'} for a quantity")
+    return float(value)
 
 
 def _split(text: str) -> tuple[str, str]:

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from microrad.core.budget import Line, total_db
-from microrad.core.units import format_quantity
+from microrad.core.units import LEAST, MOST, format_quantity
 from microrad.link import gains
 from microrad.link.acquisition.detection import detection_times
 from microrad.link.acquisition.scan import Detector, Search, Spiral, highest_speed
@@ -14,6 +14,13 @@ from microrad.mission.fields import Quantity, Share
 
 _GIVEN = "given"
 _SPEED = 0.9  # of the highest one
+
+
+def _check(name: str, value: float, rule: Quantity, why: str = "") -> None:
+    """Raises ValueError for a value out of bounds, and for one of a size that no quantity has."""
+    rule.check(name, value, why)
+    if value and not LEAST <= abs(value) <= MOST:
+        raise ValueError(f"{name} is {value:g} {rule.unit}: nothing is below {LEAST:g} or above {MOST:g} in SI units")
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,8 +91,8 @@ def received_power(
     above = {"the power": (power_w, "W"), "the half angle": (half_angle_rad, "rad"), "the distance": (distance_m, "m")}
     above |= {"the receiving aperture": (aperture_m, "m"), "the wavelength": (wavelength_m, "m")}
     for name, (value, unit) in above.items():
-        Quantity(unit, above=0.0).check(name, value)
-    Quantity("rad", least=0.0).check("the pointing error", pointing_error_rad)
+        _check(name, value, Quantity(unit, above=0.0))
+    _check("the pointing error", pointing_error_rad, Quantity("rad", least=0.0))
     waist = wavelength_m / (math.pi * half_angle_rad)
     far = gains.far_field_m(2.0 * waist, wavelength_m)
     near = "" if distance_m >= far else f"the far field of this beam begins at {format_quantity(far, 'm')}"
@@ -119,7 +126,7 @@ def received_power(
         ),
     ]
     for name, loss in (losses_db or {}).items():
-        Quantity("dB", least=0.0).check(f"the loss {name!r}", loss, "a loss is positive")
+        _check(f"the loss {name!r}", loss, Quantity("dB", least=0.0), "a loss is positive")
         lines.append(Line(name, -loss, "dB", _GIVEN, _GIVEN, ""))
     return ReceivedPower(tuple(lines))
 
@@ -159,6 +166,10 @@ def scan_times(
         print(f"found with {times.probability:.1%}, half of the time within {times.quantile(0.5):.2f} s")
         ```
     """
+    _check("sigma_rad", sigma_rad, Quantity("rad", above=0.0))
+    _check("the radius of the beam", beam_radius_rad, Quantity("rad", above=0.0))
+    _check("the detection time", detection_time_s, Quantity("s", above=0.0))
+    _check("the jitter", jitter_rms_rad, Quantity("rad", least=0.0))
     why = "without overlap some targets are never lit long enough"
     Share("", above=0.0, below=1.0).check("the overlap", overlap, why)
     search = Search(sigma_rad, beam_radius_rad, overlap, coverage)

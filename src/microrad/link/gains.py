@@ -5,8 +5,8 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from microrad.core.arrays import Floats
-from microrad.core.units import PLANCK_J_S, SPEED_OF_LIGHT_M_S, format_quantity
+from microrad.core.arrays import Floats, reals
+from microrad.core.units import LEAST, PLANCK_J_S, SPEED_OF_LIGHT_M_S, format_quantity
 from microrad.mission.fields import Quantity, Share
 
 DB_PER_NEPER = 10.0 / math.log(10.0)
@@ -25,7 +25,9 @@ def checked(name: str, values: ArrayLike, rule: Quantity, why: str = "") -> Floa
     Raises:
         ValueError: For a value that is not finite or out of bounds.
     """
-    array = np.asarray(values, dtype=np.float64)
+    array = reals(values, name)
+    if rule.unit and rule.above == 0.0 and np.any((array > 0.0) & (array < LEAST)):
+        raise ValueError(f"{name} is below {LEAST:g} {rule.unit}, which nothing is: check unit and scale")
     for extreme in (np.min(array), np.max(array)) if array.size else ():  # nan is both
         rule.check(name, float(extreme), why)
     return array

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from microrad.core import lti
 from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
+from microrad.core.units import LEAST, MOST
 from microrad.loop import control, coupled_study
 from microrad.loop.control.tuning import MARGIN
 from microrad.loop.disturbance import NO_REFERENCE, Disturbance, SampledReference
@@ -93,9 +94,9 @@ class Controller:
             ValueError: For a gain that is not finite, a rate not above 0, and no axis.
         """
         gains = (proportional_v_rad, integral_v_rad_s, derivative_v_s_rad, derivative_filter_s)
-        if not all(map(math.isfinite, gains)) or derivative_filter_s < 0.0:
+        if not all(abs(each) <= MOST for each in gains) or derivative_filter_s < 0.0:
             raise ValueError(f"gains {gains[:3]} and a filter of {derivative_filter_s} s make no PID: give finite ones")
-        if not 0.0 < rate_hz < math.inf or axes < 1:
+        if not LEAST <= rate_hz <= MOST or axes < 1:
             raise ValueError(f"a PID of {axes} axes at {rate_hz} Hz: give one axis or more and a rate above 0 Hz")
         one = control.pid(control.Gains(*gains), 1.0 / rate_hz)
         parts = (one.A, one.B, one.C, one.D, control.anti_windup(one))
@@ -177,7 +178,7 @@ class Loop:
         """Check each number."""
         for name in ("rate_hz", "amplifier_bandwidth_hz", "slew_v_s"):
             value = getattr(self, name)
-            if not value > 0.0 or (name == "rate_hz" and math.isinf(value)):
+            if not LEAST <= value <= MOST and not (value == math.inf and name != "rate_hz"):
                 raise ValueError(f"{name} of a loop is {value}: give a number above 0")
         if self.steps_per_sample < 1:
             raise ValueError(f"a loop has {self.steps_per_sample} plant steps a sample: give 1 or more, better 10")

@@ -8,15 +8,17 @@ samples, and comes from the kernels that a simulated mirror runs.
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from itertools import pairwise
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from microrad.core import kernels
-from microrad.core.arrays import Floats
+from microrad.core.arrays import Floats, reals
 from microrad.core.labelled import Dataset, Group, variables
+from microrad.core.units import LEAST, MOST
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,21 +56,46 @@ class HysteresisLoop:
         return Group(data, attributes=said).to_xarray()
 
 
+_LIMITS = ("rate_limit_v_s", "reach_v")
 _REPEATS, _PERIODS = 1e-6, 1024
 _INVERSIONS = 300
 
 
 def _from_rest(samples: ArrayLike, step_s: float, what: str) -> Floats:
     """The samples of one signal with the rest before it in front."""
-    signal = np.asarray(samples, dtype=float)
+    signal = reals(samples, what)
     if signal.ndim != 1 or not signal.size or not np.isfinite(signal).all():
         raise ValueError(f"{what} has shape {signal.shape}: give one row of finite samples, shape (samples,)")
-    if not 0.0 < step_s < math.inf:
+    if not LEAST <= step_s <= MOST:
         raise ValueError(f"step_s is {step_s} s: give the time between two samples, above 0")
     return np.concatenate([[0.0], signal])
 
 
-class _FromRest(ABC):
+class _Numbers:
+    """A record of a model's numbers; `KIND` is what messages call it."""
+
+    __slots__ = ()
+    KIND: ClassVar[str]
+
+    def check(self) -> None:
+        """Raises ValueError for a parameter that is no finite number; a limit may be infinite."""
+        for each in fields(self):  # type: ignore[arg-type]
+            values = reals(getattr(self, each.name), f"{each.name} of the {self.KIND} model")
+            if not np.all(np.isfinite(values) | (each.name in _LIMITS and values == math.inf)):
+                raise ValueError(f"{each.name} of the {self.KIND} model is {values}: give finite numbers")
+
+
+def _sound(output_rad: Floats) -> Floats:
+    """The output, where it is numbers: the exponentials of a model may grow beyond all."""
+    if not np.isfinite(output_rad).all():
+        at = int(np.argmin(np.isfinite(output_rad)))
+        raise ValueError(
+            f"the model gives no number at sample {at}: look for a parameter or a rate that it was not fitted to"
+        )
+    return output_rad
+
+
+class _FromRest(_Numbers, ABC):
     """What a hysteresis model does by itself, from rest at a drive of 0."""
 
     __slots__ = ()
@@ -81,9 +108,12 @@ class _FromRest(ABC):
             step_s: Time between samples (s); only a model that depends on the rate depends on it.
 
         Raises:
-            ValueError: For a drive of another shape or with a number that is not finite, and a step not above 0.
+            ValueError: For a drive of another shape or with a number that is not finite, a step not above 0, and
+                parameters that make no finite output.
         """
-        return self._run(_from_rest(drive_v, step_s, "drive_v"), step_s)[0]
+        drive = _from_rest(drive_v, step_s, "drive_v")
+        self.check()
+        return _sound(self._run(drive, step_s)[0])
 
     def loop(self, amplitude_v: float, freq_hz: float, samples: int = 500) -> HysteresisLoop:
         """The loop under a sine about the bias, once it repeats itself to 1e-6, or after 1024 periods.
@@ -97,8 +127,9 @@ class _FromRest(ABC):
             ValueError: For numbers outside of these.
         """
         for name, value, unit in (("amplitude_v", amplitude_v, "V"), ("freq_hz", freq_hz, "Hz")):
-            if not 0.0 < value < math.inf:
+            if not LEAST <= value <= MOST:
                 raise ValueError(f"{name} of a loop is {value} {unit}: give a finite number above 0")
+        self.check()
         if samples < 8:
             raise ValueError(f"a loop of {samples} samples a period has no shape: give 8 or more, better 500")
         one = amplitude_v * np.sin(2.0 * np.pi * np.arange(1, samples + 1) / samples)
@@ -110,7 +141,7 @@ class _FromRest(ABC):
                 break
             periods *= 4
         clamped = np.count_nonzero(np.abs(np.diff(one, prepend=one[-1])) / step_s > self.rate_limit_v_s)
-        return HysteresisLoop(freq_hz, one, last, hysteresis[-samples:], int(clamped))
+        return HysteresisLoop(freq_hz, one, _sound(last), hysteresis[-samples:], int(clamped))
 
     rate_limit_v_s: float
 
@@ -141,6 +172,8 @@ class BoucWen(_FromRest):
         ```
     """
 
+    KIND = "Bouc-Wen"
+
     d1_rad_v: float
     d2_s_v: float
     epsilon_rad_v: float
@@ -170,6 +203,7 @@ class BoucWen(_FromRest):
         if self.d1_rad_v == 0.0:
             raise ValueError("a Bouc-Wen model with d1 = 0 has no inverse: its output does not follow the drive")
         wanted = _from_rest(output_rad, step_s, "output_rad")
+        self.check()
         drive = wanted / self.d1_rad_v
         rate = np.clip(np.diff(drive, prepend=0.0) / step_s, -self.rate_limit_v_s, self.rate_limit_v_s)
         gain, offset = self.d1_rad_v * np.exp(-self.d2_s_v * rate), self.d1_rad_v * self.bias_v
@@ -186,7 +220,7 @@ class BoucWen(_FromRest):
 
     def _run(self, drive_v: Floats, step_s: float) -> tuple[Floats, Floats]:
         """Output and h behind the first sample, which is rest."""
-        output, h, _ = kernels.bouc_wen_response(drive_v, step_s, np.array(self.row), 0.0)
+        output, h, _ = kernels.bouc_wen_response(drive_v, step_s, np.array(self.row, dtype=float), 0.0)
         return output[1:], h[1:]
 
     @property
@@ -318,6 +352,8 @@ class PrandtlIshlinskii(_FromRest):
         ```
     """
 
+    KIND = "Prandtl-Ishlinskii"
+
     thresholds_v: tuple[float, ...]
     weights_rad_v: tuple[float, ...]
     widening_s: float = 0.0
@@ -347,7 +383,8 @@ class PrandtlIshlinskii(_FromRest):
             ValueError: For an output of another shape, a step not above 0, and what `inverted` refuses.
         """
         wanted = _from_rest(output_rad, step_s, "output_rad")
-        return self.inverted()._run(wanted, step_s)[0]
+        self.check()
+        return _sound(self.inverted()._run(wanted, step_s)[0])
 
     def inverted(self) -> "PrandtlIshlinskii":
         """The inverse as an operator of the same kind: thresholds in rad, weights in V/rad.
@@ -368,7 +405,7 @@ class PrandtlIshlinskii(_FromRest):
             )
         r, w = np.array(self.thresholds_v), np.array(self.weights_rad_v)
         slope = np.cumsum(w)
-        if r[0] != 0.0 or np.min(slope) <= 0.0:
+        if r[0] != 0.0 or np.min(slope) < LEAST:
             raise ValueError(
                 "the Prandtl-Ishlinskii model has no weight at threshold 0: it stands still after each reversal and "
                 "has no inverse; identify it again with more samples near the reversals"
@@ -384,8 +421,9 @@ class PrandtlIshlinskii(_FromRest):
 
     def _run(self, drive_v: Floats, step_s: float) -> tuple[Floats, Floats]:
         """Output, and what of it is not slow gain x drive, behind the first sample, which is rest."""
-        widening, rest = np.array([self.widening_s, self.rate_limit_v_s]), np.zeros(len(self.thresholds_v))
-        states, _ = kernels.widening_play_response(drive_v, step_s, np.array(self.thresholds_v), widening, rest)
+        thresholds = np.array(self.thresholds_v, dtype=float)
+        widening, rest = np.array([self.widening_s, self.rate_limit_v_s]), np.zeros(thresholds.size)
+        states, _ = kernels.widening_play_response(drive_v, step_s, thresholds, widening, rest)
         quadratic, signed, cubic = self.polynomial_rad
         s = np.clip(drive_v, -self.reach_v, self.reach_v) / self.reach_v
         output = states @ np.array(self.weights_rad_v) + s * (quadratic * s + signed * np.abs(s) + cubic * s**2)
@@ -402,12 +440,14 @@ class PrandtlIshlinskii(_FromRest):
 
 
 @dataclass(frozen=True, slots=True)
-class Creep:
+class Creep(_Numbers):
     """Linear creep beside a hysteresis model: weight x drive behind a first-order lag, summed over the lags.
 
     Equal weights at time constants in geometric steps creep with the logarithm of time (Kuhnen, European Journal of
     Control 9 (2003) 407).
     """
+
+    KIND = "creep"
 
     weights_rad_v: tuple[float, ...] = ()
     time_constants_s: tuple[float, ...] = ()
@@ -420,7 +460,8 @@ class Creep:
             step_s: Time between samples (s).
 
         Raises:
-            ValueError: For a drive of another shape or with a number that is not finite, and a step not above 0.
+            ValueError: For a drive of another shape or with a number that is not finite, a step or a time constant not
+                above 0, and other weights than time constants.
 
         Example:
             ```python
@@ -432,9 +473,15 @@ class Creep:
             ```
         """
         drive = _from_rest(drive_v, step_s, "drive_v")
-        lags = np.zeros(len(self.time_constants_s))
-        states = kernels.lag_response(drive, step_s, np.array(self.time_constants_s), lags)
-        return np.asarray(states[1:] @ np.array(self.weights_rad_v))
+        self.check()
+        constants, weights = (np.array(each, dtype=float) for each in (self.time_constants_s, self.weights_rad_v))
+        if constants.shape != weights.shape or not np.all(constants > 0.0):
+            raise ValueError(
+                f"creep of {weights.size} weights and the time constants {self.time_constants_s} s: give as many "
+                "weights, and time constants above 0"
+            )
+        states = kernels.lag_response(drive, step_s, constants, np.zeros(constants.size))
+        return _sound(np.asarray(states[1:] @ weights))
 
 
 NO_CREEP = Creep()

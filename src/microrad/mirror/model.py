@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from microrad.core import kernels, lti
-from microrad.core.arrays import Complexes, Floats
+from microrad.core.arrays import Complexes, Floats, reals
+from microrad.core.units import LEAST, MOST
 from microrad.mirror.hysteresis import NO_CREEP, BoucWen, Creep, PrandtlIshlinskii, slow_gain, steepest_slope
 from microrad.mission.tables import mirror as mirror_table
 
@@ -83,16 +84,20 @@ class Mirror:
             print(np.ptp(mirror.response(10 * np.sin(2 * np.pi * 100 * time_s), step_s=1e-5)))
             ```
         """
-        given = np.asarray(drive_v, dtype=float)
+        given = reals(drive_v, "drive_v")
         drive = np.ascontiguousarray(given[:, None] if given.ndim == 1 else given)
         if drive.ndim != 2 or drive.shape[1] != self.actuators or not drive.size or not np.isfinite(drive).all():
             raise ValueError(
                 f"drive_v has shape {given.shape}: mirror {self.name!r} takes finite samples of shape "
                 f"(samples, {self.actuators})"
             )
+        if not LEAST <= step_s <= MOST:
+            raise ValueError(f"step_s is {step_s} s: give the time between two samples, above 0")
         plant = discretise(self, step_s)
         output = np.empty((len(drive), self.axes))
         respond(plant, at_rest(plant), drive, output, np.empty((len(drive), 0)))
+        if not np.isfinite(output).all():
+            raise ValueError(f"mirror {self.name!r} gives no finite output to this drive at a step of {step_s:g} s")
         return output[:, 0] if given.ndim == 1 and self.axes == 1 else output
 
     def frequency_response(self, freq_hz: ArrayLike) -> Complexes:
@@ -100,8 +105,14 @@ class Mirror:
 
         Args:
             freq_hz: Frequencies (Hz), shape (frequencies,).
+
+        Raises:
+            ValueError: For frequencies of another shape, or that are not finite.
         """
-        return lti.frequency_response(self.linear_loop, np.atleast_1d(np.asarray(freq_hz, dtype=float)))
+        freq = np.atleast_1d(reals(freq_hz, "freq_hz"))
+        if freq.ndim != 1 or not np.isfinite(freq).all():
+            raise ValueError(f"freq_hz has shape {freq.shape}: give one row of finite frequencies")
+        return lti.frequency_response(self.linear_loop, freq)
 
     @classmethod
     def of(
@@ -126,9 +137,18 @@ class Mirror:
             ValueError: For a linear part that is improper, not stable, or has no gain at rest.
         """
         model = hysteresis if isinstance(hysteresis, BoucWen | PrandtlIshlinskii) else BoucWen(hysteresis, *[0.0] * 5)
-        top, bottom = (np.atleast_1d(np.asarray(c, dtype=float)) for c in (numerator, denominator))
+        for each in (model, creep):
+            each.check()
+        top, bottom = (
+            np.atleast_1d(reals(c, f"{what} of mirror {name!r}"))
+            for what, c in (("numerator", numerator), ("denominator", denominator))
+        )
+        if not all(c.ndim == 1 and c.size and np.isfinite(c).all() for c in (top, bottom)):
+            raise ValueError(f"mirror {name!r}: numerator and denominator have to be rows of finite coefficients")
         if bottom.size == 1:
             return assemble(name, "static", None, model, creep)
+        if np.max(np.abs([*top, *bottom])) > lti.STEEPEST * abs(bottom[0]) > 0.0:
+            raise ValueError(f"the denominator of mirror {name!r} begins with {bottom[0]:g}, nothing beside the others")
         if top.size > bottom.size or bottom[0] == 0.0 or np.max(np.roots(bottom).real) >= 0.0 or top[-1] == 0.0:
             raise ValueError(
                 f"the linear part of mirror {name!r} has a numerator of {top.size} and a denominator of {bottom.size} "
@@ -137,7 +157,13 @@ class Mirror:
             )
         system = lti.modal_from_polynomials(top.tolist(), bottom.tolist())
         gain = float(lti.frequency_response(system, np.array([0.0]))[0, 0, 0].real)
-        return assemble(name, "cascade", replace(system, C=system.C / gain, D=system.D / gain), model, creep)
+        with np.errstate(all="ignore"):
+            system = replace(system, C=system.C / gain, D=system.D / gain)
+        if not all(np.isfinite(each).all() for each in (system.B, system.C)):
+            raise ValueError(
+                f"the linear part of mirror {name!r} has a gain at rest of {gain:g}: look at its coefficients"
+            )
+        return assemble(name, "cascade", system, model, creep)
 
     @classmethod
     def of_system(cls, system: lti.StateSpace, name: str = "mirror") -> "Mirror":

@@ -20,6 +20,8 @@ from microrad.core.units import UnitError, format_quantity, kind_of, parse_quant
 MOST_ITEMS = 1000
 """Items of a list beyond which it is taken for a mistake."""
 
+_LARGEST = 1e100  # plain number: products of three are still floats
+
 UNKNOWN = "unknown"
 """What a preset holds where no source prints a value."""
 _EXAMPLES = (5.0, 1.0, 0.5, 20.0, 45.0, 100.0, 1e3, 0.1, 1e-3)
@@ -307,6 +309,8 @@ def _plain_number(value: object) -> float:
         number = math.inf
     if not math.isfinite(number):
         raise UnitError(value, "is not a finite number", "a finite number", "1.0")
+    if abs(number) > _LARGEST:
+        raise UnitError(value, f"is beyond {_LARGEST:g}", "a number of a mission, or of a mirror", "1.0")
     return number
 
 

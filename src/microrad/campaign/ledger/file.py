@@ -126,6 +126,8 @@ def is_ledger(path: Path) -> bool:
         with closing(sqlite3.connect(f"{path.absolute().as_uri()}?immutable=1", uri=True)) as probe:
             probe.execute("PRAGMA application_id")
         return True
+    except UnicodeDecodeError:  # an error of SQLite that quotes a damaged name
+        return True
     except (OSError, sqlite3.Error) as error:
         if code_of(error) in (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB):
             return code_of(error) == sqlite3.SQLITE_CORRUPT
@@ -346,6 +348,8 @@ def errors_in_words(path: Path, what: str) -> Iterator[None]:
         yield
     except sqlite3.Error as error:
         raise CampaignError(f"{path}: microrad could not {what}: {_words(error, path)}") from error
+    except UnicodeDecodeError as error:  # a text of the file, or an error of SQLite that quotes it
+        raise CampaignError(f"{path}: microrad could not {what}: {_damaged('a text in it is none', path)}") from error
     except OSError as error:
         raise CampaignError(f"{path}: microrad could not {what}: {error.strerror or error}") from error
 
@@ -361,12 +365,16 @@ def _words(error: sqlite3.Error, path: Path) -> str:
         sqlite3.SQLITE_BUSY: (f"another program held the file for longer than {PATIENCE_S:g} s", "Close that program"),
     }
     if code_of(error) == sqlite3.SQLITE_CORRUPT:
-        return (
-            f"the file is damaged ({error}). `microrad campaign resume {argument(path)}` goes on with what can be "
-            "read of it; where nothing can, begin the campaign anew in another file"
-        )
+        return _damaged(str(error), path)
     what, remedy = by_code.get(code_of(error), (str(error), "See to that"))
     return f"{what}. {_safe(path)}{remedy}, then go on with `microrad campaign resume {argument(path)}`"
+
+
+def _damaged(what: str, path: Path) -> str:
+    return (
+        f"the file is damaged ({what}). `microrad campaign resume {argument(path)}` goes on with what can be "
+        "read of it; where nothing can, begin the campaign anew in another file"
+    )
 
 
 def _safe(path: Path) -> str:

@@ -116,7 +116,7 @@ def logarithmic_chirp(
     Raises:
         DesignError: If the drive leaves the limits or contradicts itself.
     """
-    samples = _samples(limits, name, "duration", duration_s)
+    samples = samples_in(limits, name, "duration", duration_s)
     if not start_hz < stop_hz:
         raise DesignError(
             name, Problem("stop", "is not above start", f"a frequency above {format_quantity(start_hz, 'Hz')}")
@@ -164,7 +164,8 @@ def multisine(
         DesignError: If the drive leaves the limits or contradicts itself.
     """
     length = _whole_period(limits, name, lines.period_s)
-    _samples(limits, name, "periods", periods * lines.period_s)
+    samples_in(limits, name, "periods", periods * lines.period_s)
+    samples_in(limits, name, "realisations", realisations * periods * lines.period_s)
     if realisations % limits.inputs:
         counts = f"is {realisations}, no multiple of the {limits.inputs} inputs, so no orthogonal set"
         raise DesignError(name, Problem("realisations", counts, f"a multiple of {limits.inputs}"))
@@ -216,7 +217,7 @@ def growing_sines(
         DesignError: If the drive leaves the limits or contradicts itself.
     """
     block = _whole_block(limits, name, freq_hz, periods)
-    _samples(limits, name, "periods", block * len(amplitudes_v) / limits.rate_hz)
+    samples_in(limits, name, "periods", block * len(amplitudes_v) / limits.rate_hz)
     sine = np.sin(2 * math.pi * freq_hz * np.arange(block) / limits.rate_hz)
     largest = max(amplitudes_v)
     shape = np.concatenate([sine * (amplitude / largest) for amplitude in amplitudes_v])
@@ -253,7 +254,7 @@ def staircase(
     if len(levels_v) < 2:
         raise DesignError(name, Problem("levels", "has one item, which is no step", "at least two levels"))
     for key, seconds in (("rise", rise_s), ("dwell", dwell_s + rise_s)):
-        _samples(limits, name, key, seconds * len(levels_v))
+        samples_in(limits, name, key, seconds * len(levels_v))
     dwell, rise = round(dwell_s * limits.rate_hz), max(round(rise_s * limits.rate_hz), 1)
     if dwell < 1:
         step = format_quantity(1.0 / limits.rate_hz, "s")
@@ -271,8 +272,18 @@ def staircase(
 
 
 # --------------------------------------------------------------------------------------------------------------- limits
-def _samples(limits: Limits, name: str, key: str, seconds: float) -> int:
-    """Number of samples in a time; raises `DesignError` for too many, before they are allocated."""
+def samples_in(limits: Limits, name: str, key: str, seconds: float) -> int:
+    """Number of samples in a time.
+
+    Args:
+        limits: Those of the bench.
+        name: Name of the record.
+        key: Key of the plan that makes it so long.
+        seconds: The time.
+
+    Raises:
+        DesignError: For too many, before they are allocated.
+    """
     most = MOST_SAMPLES / limits.inputs / limits.rate_hz
     if seconds > most:
         reason = f"makes a record of {format_quantity(seconds, 's')} at {format_quantity(limits.rate_hz, 'Hz')}"
@@ -356,7 +367,7 @@ def _on_axis(limits: Limits, name: str, column: Floats, rest_v: float, axis: int
 # -------------------------------------------------------------------------------------------------------- whole periods
 def _whole_block(limits: Limits, name: str, freq_hz: float, periods: int) -> int:
     """Samples in `periods` periods of a sine; raises `DesignError` where that is no whole number."""
-    _samples(limits, name, "periods", periods / freq_hz)
+    samples_in(limits, name, "periods", periods / freq_hz)
     exact = periods * limits.rate_hz / freq_hz
     block = round(exact)
     if block >= 1 and abs(exact - block) <= _WHOLE:
@@ -370,7 +381,7 @@ def _whole_block(limits: Limits, name: str, freq_hz: float, periods: int) -> int
 
 
 def _whole_period(limits: Limits, name: str, period_s: float) -> int:
-    _samples(limits, name, "period", period_s)
+    samples_in(limits, name, "period", period_s)
     exact = period_s * limits.rate_hz
     length = round(exact)
     if length >= 2 and abs(exact - length) <= _WHOLE:

@@ -5,6 +5,7 @@ Every quantity is text with a unit in the file (`duration = "10 s"`) and an SI f
 """
 
 import difflib
+import math
 import zlib
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -24,6 +25,7 @@ from microrad.lab.bench.excitation import (
     growing_sines,
     logarithmic_chirp,
     multisine,
+    samples_in,
     staircase,
 )
 from microrad.mission.fields import Problem, Quantity, Several, Table, Whole
@@ -244,6 +246,8 @@ class SinesTable(ExcitationTable):
         """
         parameters = self.parameters()
         frequencies_hz = parameters.pop("frequencies_hz")
+        seconds = self.periods * len(self.amplitudes_v) * math.fsum(1.0 / f for f in frequencies_hz)
+        samples_in(limits, name, "frequencies", seconds)
         names = [f"{name}-{f:g}hz" for f in frequencies_hz] if len(frequencies_hz) > 1 else [name]
         return tuple(
             growing_sines(limits, **parameters, freq_hz=freq_hz, name=each)
@@ -363,6 +367,7 @@ def select_records(plan: Plan, names: Sequence[str]) -> Plan:
 
 _NAME = set("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_")
 _MOST_EXCITATIONS = 200
+_MOST_SAMPLES = 50_000_000  # of all records together, 400 MB
 
 
 class PlanError(MissionError):
@@ -459,6 +464,7 @@ def _records(
     if frame is None:
         return ()
     records: list[Record] = []
+    left = _MOST_SAMPLES
     for name, table in tables.items():
         if table is None:
             continue
@@ -468,6 +474,11 @@ def _records(
         except DesignError as error:
             _note(document, name, error)
             continue
+        left -= sum(design.drive.size for design in designs)
+        if left < 0:
+            reason = f"makes a plan of more than {_MOST_SAMPLES / 1e6:g} million samples"
+            document.fault(f"excitation.{name}", "", reason, "shorter records, or two plans")
+            return ()
         kind = document.data["excitation"][name]["kind"]
         played = truth if table.truth == "plan" else table.truth
         records += [Record(design, kind, table.use, played, table.noise_share) for design in designs]

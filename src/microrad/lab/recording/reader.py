@@ -1,5 +1,6 @@
 """From a file, or from arrays, to a checked `Recording`."""
 
+import math
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
@@ -7,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from microrad.core.arrays import Floats
+from microrad.core.arrays import Floats, reals
 from microrad.lab.recording.checks.sample_rate import agreed_rate, check_rate, rate_of_time
 from microrad.lab.recording.checks.signals import check_signals
 from microrad.lab.recording.files import check_file, file_format
@@ -147,7 +148,10 @@ def recording_from_arrays(
     """
     rate_hz = check_rate(name, rate_hz)
     check_accept(name, accept)
-    u, y = (np.array(a, dtype=np.float64) for a in (drive, output))
+    u, y = (
+        np.array(reals(a, f"{name}: {what}", RecordingError, most=math.inf))
+        for what, a in (("drive", drive), ("output", output))
+    )
     if u.ndim not in (1, 2) or y.ndim not in (1, 2) or len(u) != len(y) or 0 in (u.size, y.size):
         raise RecordingError(
             f"{name}: drive has shape {u.shape} and output {y.shape}; give arrays of shape (samples,) or (samples, "

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad.core.arrays import Floats
+from microrad.core.units import LEAST, format_quantity
 from microrad.link.acquisition.scan import Duration, Raster, Scan, Spiral, StepStare
 from microrad.link.acquisition.times import TimeDistribution, merged
 from microrad.mission.fields import Bounded, Quantity, Whole
@@ -25,6 +26,9 @@ _RADII = 2048
 _DISTANCES = 8192
 _CELL = 192  # points along each side of a grid cell
 _ALONG = 64  # times along a row
+_SHARP = 1e-3  # rms of the vibration in pitches below which the swath's edges are sharp
+_LOOKS = 1e4  # on one crossing of a target
+_MOST_EDGES = 1e3  # of swaths within reach of a target
 _NODE, _NODE_WEIGHT = np.polynomial.legendre.leggauss(4)
 
 
@@ -41,7 +45,7 @@ def gap_probability(scan: Scan, jitter_rms_rad: float = 0.0) -> float:
     Raises:
         ValueError: If the rms is negative or not finite.
     """
-    _RMS.check("the vibration's rms", jitter_rms_rad)
+    _check_rms(jitter_rms_rad)
     if isinstance(scan, StepStare):
         _, _, probability = _cell(scan, jitter_rms_rad)
         return float(np.mean(np.prod(1.0 - probability, axis=-1)))
@@ -63,7 +67,7 @@ def detection_times(scan: Scan, jitter_rms_rad: float = 0.0) -> TimeDistribution
     Raises:
         ValueError: If the rms is negative or not finite.
     """
-    _RMS.check("the vibration's rms", jitter_rms_rad)
+    _check_rms(jitter_rms_rad)
     if isinstance(scan, Spiral):
         return _spiral_times(scan, jitter_rms_rad)
     if isinstance(scan, Raster):
@@ -71,13 +75,24 @@ def detection_times(scan: Scan, jitter_rms_rad: float = 0.0) -> TimeDistribution
     return _dwell_times(scan, jitter_rms_rad)
 
 
+def _check_rms(jitter_rms_rad: float) -> None:
+    _RMS.check("the vibration's rms", jitter_rms_rad)
+    if 0.0 < jitter_rms_rad < LEAST:
+        raise ValueError(f"the vibration's rms is {jitter_rms_rad} rad; what is below {LEAST:g} is 0: write that")
+
+
 def _levels(scan: Spiral | Raster) -> tuple[Floats, Floats]:
     """Half width of the swath with at least n looks, n = 1, 2, ..., and the probability that look n detects first."""
     p = scan.detector.probability
     look = scan.speed_rad_s * scan.detector.detection_time_s  # path of the beam in one look
     beam = scan.search.beam_radius_rad
-    most = max(int(2.0 * beam / look * (1.0 + 1e-9)), 1)
-    if p < 1.0:
+    most = max(int(min(2.0 * beam / look, 1e9) * (1.0 + 1e-9)), 1)
+    if 2.0 * beam / look > _LOOKS and p < 1.0 / _LOOKS:
+        raise ValueError(
+            f"the beam stays on a target for {2.0 * beam / look:.3g} looks, each of which detects it with a "
+            f"probability of {p:.3g}: scan faster, or count several looks as one"
+        )
+    if 1.0 / _LOOKS < p < 1.0:
         most = min(most, math.ceil(math.log(1e-12) / math.log1p(-p)) + 1)
     number = np.arange(1, (1 if p == 1.0 else most) + 1)
     half = np.sqrt(np.maximum(beam**2 - (number * look / 2.0) ** 2, 0.0))
@@ -113,10 +128,17 @@ def _offsets(scan: Spiral | Raster, jitter_rms_rad: float) -> tuple[Floats, Floa
     pitch = scan.search.pitch_rad
     reach = scan.search.beam_radius_rad + _REACH * jitter_rms_rad
     half = _levels(scan)[0]
-    track = pitch * np.arange(math.ceil(2.0 * reach / pitch) + 1)
+    overlapping = 2.0 * reach / pitch
+    if overlapping * half.size > _MOST_EDGES:
+        raise ValueError(
+            f"a target is within reach of {overlapping:.3g} tracks, and {half.size} looks on each: the tracks lie "
+            f"{format_quantity(pitch, 'rad')} apart, and beam and vibration reach {format_quantity(reach, 'rad')}; let "
+            "them overlap less, or scan a steadier beam"
+        )
+    track = pitch * np.arange(math.ceil(overlapping) + 1)
     edges = np.concatenate([(half + track[:, None]).ravel(), (track[:, None] - half).ravel(), [-reach, reach]])
     edges = np.unique(edges[np.abs(edges) <= reach])
-    step = min(pitch / 16.0, jitter_rms_rad / 2.0) if jitter_rms_rad > 1e-5 * pitch else pitch / 16.0
+    step = min(pitch / 16.0, jitter_rms_rad / 2.0) if jitter_rms_rad > _SHARP * pitch else pitch / 16.0
     parts = np.ceil(np.diff(edges) / step).astype(int)
     low = np.concatenate([a + (b - a) / n * np.arange(n) for a, b, n in zip(edges[:-1], edges[1:], parts, strict=True)])
     width = np.repeat(np.diff(edges) / parts, parts)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from microrad.core.arrays import Floats
+from microrad.core.units import LEAST
 from microrad.link.gains import checked
 from microrad.mission.fields import Quantity, Share
 
@@ -84,13 +85,14 @@ def _inside(limit: Floats, bias: float, rms: float) -> Floats:
 
 
 def _axes(jitter: Jitter) -> tuple[float, float, float, float]:
-    """Bias and rms of the axis with the smaller rms, then of the other."""
-    (first, second) = sorted(zip(jitter.rms_rad, jitter.bias_rad, strict=True), key=lambda axis: axis[0])
+    """Bias and rms of the axis with the smaller rms, then of the other; an rms that nobody could tell from 0 is 0."""
+    rms = [each if each >= LEAST else 0.0 for each in jitter.rms_rad]
+    (first, second) = sorted(zip(rms, jitter.bias_rad, strict=True), key=lambda axis: axis[0])
     return first[1], first[0], second[1], second[0]
 
 
 def _is_rayleigh(jitter: Jitter) -> bool:
-    return jitter.static_rad == 0.0 and jitter.rms_rad[0] == jitter.rms_rad[1] > 0.0
+    return jitter.static_rad == 0.0 and jitter.rms_rad[0] == jitter.rms_rad[1] >= LEAST
 
 
 def _other_leg(radius: Floats, leg: Floats) -> Floats:

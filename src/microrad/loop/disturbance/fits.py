@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from microrad.core.arrays import Floats
-from microrad.core.units import format_quantity
+from microrad.core.arrays import Floats, reals
+from microrad.core.units import LEAST, format_quantity
 from microrad.loop.disturbance.records import Convention, Disturbance, above_zero, band_rms, one_input, rising, share
 from microrad.loop.disturbance.sources import from_terms
 from microrad.loop.disturbance.tables import checked
@@ -15,6 +15,7 @@ from microrad.loop.disturbance.terms import Samples, Term, band_samples, fit_ter
 
 _BAND = 0.05  # allowed error of the rms in a band
 _TABLE_DB = 3.0  # allowed error of a density
+_LEAST_DENSITY = 1e-60  # rad^2/Hz
 _TOTAL = 0.10  # allowed error of the rms over a whole table
 
 
@@ -128,12 +129,18 @@ def fit_table(
         ValueError: For columns that are no spectrum (see `read_table`), for a density of zero, and for a poor fit: 3 dB
             off somewhere, or 10 % in the rms over the table.
     """
-    freq, density = checked(np.asarray(freq_hz, dtype=float), np.asarray(psd_rad2_hz, dtype=float), f'"{name}"')
+    freq, density = reals(freq_hz, f'"{name}": freq_hz'), reals(psd_rad2_hz, f'"{name}": psd_rad2_hz')
+    freq, density = checked(freq, density, f'"{name}"')
     freq, density = freq[freq > 0.0], density[freq > 0.0] * share(convention)
     if np.any(density == 0.0):
         raise ValueError(
             f'"{name}": the density at {freq[np.argmin(density)]:g} Hz is zero, which no filter has; give the noise '
             "floor of the measurement there, or end the table before"
+        )
+    if np.any(density < _LEAST_DENSITY) or freq[0] < LEAST or freq.size < 3:
+        raise ValueError(
+            f'"{name}": {freq.size} rows from {freq.min(initial=math.inf):g} Hz, with a density of '
+            f"{density.min(initial=math.inf):g} rad^2/Hz; give three rows or more of a spectrum, in these units"
         )
     samples = table_samples(freq, density)
     resolved = 0.25 * float(np.min(np.diff(np.log(freq))))  # a resonance narrower than the rows are apart is no data

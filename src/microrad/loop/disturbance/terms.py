@@ -214,7 +214,10 @@ def _powers(samples: Samples, terms: list[Term]) -> list[Term]:
     size = np.linalg.norm(rows, axis=0)
     target = np.where(samples.ceiling, 0.0, 1.0)
     weight = np.where(samples.ceiling, 0.01, samples.trust)  # a ceiling is no aim
-    found = nnls(weight[:, None] * rows / size, weight * target)[0] / size
+    try:
+        found = nnls(weight[:, None] * rows / size, weight * target)[0] / size
+    except RuntimeError:
+        raise ValueError("no sum of a few filters follows this spectrum; look for rows that are far off") from None
     kept = [Term(t.kind, float(v), t.freq_hz, t.damping) for t, v in zip(unit, found, strict=True) if v > 0.0]
     return sorted(kept, key=lambda t: -float(np.max(samples.rows([t]) / samples.wanted)))
 

@@ -23,7 +23,7 @@ Aperture = Annotated[float, Quantity("m", "cm", above=0.0, most=100.0)]
 Wavelength = Annotated[float, Quantity("m", "um", least=1e-8, most=1e-2)]
 Distance = Annotated[float, Quantity("m", "km", above=0.0, most=1e13)]
 Loss = Annotated[float, Quantity("dB", least=0.0)]
-Strehl = Annotated[float, Quantity("", least=0.0)]
+Strehl = Annotated[float, Quantity("", least=0.0, most=1e3)]
 Obscuration = Annotated[float, Quantity("", least=0.0, most=0.95)]
 Efficiency = Annotated[float, Quantity("", above=0.0, most=1.0)]
 Bandwidth = Annotated[float, Quantity("Hz", "GHz", above=0.0, most=1e15)]
@@ -131,6 +131,7 @@ class Beacon(Beam):
     required_power_w: Threshold = Field(description="power that the sensor needs")
 
 
+_ALIKE_DB = 1e-3
 _DETECTORS: dict[str, tuple[str, ...]] = {
     "ook": ("photon-counting", "pin", "apd", "preamplified"),
     "dpsk": ("preamplified",),
@@ -230,6 +231,9 @@ class Receiver(Table):
         yield from self.choice_problems(what, wanted, ("background", *instead))
         if self.background is not None and self.background_power_w is not None:
             yield Problem("background_power", "stands beside the table background", "one of the two removed")
+        if self.extinction_ratio_db is not None and self.extinction_ratio_db < _ALIKE_DB:
+            reason = f"is below {_ALIKE_DB:g} dB, where marks and spaces are alike"
+            yield Problem("extinction_ratio", reason, 'extinction_ratio = "20 dB" would do')
         if self.order is not None and self.order & (self.order - 1):
             yield Problem("order", "is no power of two", "order = 16 would do")
 
@@ -287,6 +291,8 @@ class Communication(Beam):
 
     def _gain_problems(self, receiver: Receiver) -> Iterator[Problem]:
         """A code that needs no less power than the channel's capacity asks for."""
+        if receiver.modulation == "ook" and (receiver.extinction_ratio_db or 0.0) < _ALIKE_DB:
+            return  # the receiver says so
         limit_db = 10.0 * math.log10(receiver.most_code_gain(self.data_rate_bit_s, self.wavelength_m))
         if receiver.code_gain_db > limit_db:
             at = f"code_rate = {receiver.code_rate:g}"

@@ -23,6 +23,7 @@ Coefficients = Annotated[tuple[float, ...], Several(Quantity(""))]
 Roots = Annotated[tuple[float, ...], Several(Quantity("Hz", above=0.0, most=1e12))]
 Dampings = Annotated[tuple[float, ...], Several(Quantity("", least=-1.0, most=1.0))]
 
+_STEEPEST = 1e150  # a coefficient over that of the highest power: 24 poles of 1e6 rad/s
 INDEFINITE = 1e-2
 """How far below 0 the smallest eigenvalue of a correlation matrix may lie: two decimals leave so much."""
 
@@ -74,8 +75,12 @@ class LinearPart(Table):
         if self.denominator[-1] == 0.0:
             advice = "a last coefficient other than 0; model drift apart from the mirror"
             yield Problem("denominator", "ends with 0, which makes the linear part an integrator", advice)
+        largest = max(abs(each) for each in (*self.numerator, *self.denominator))
         if self.denominator[0] == 0.0:
             yield Problem("denominator", "begins with 0", "the highest power of s first, with a factor other than 0")
+        elif largest > _STEEPEST * abs(self.denominator[0]):
+            reason = f"begins with a factor that is nothing beside others: {self.denominator[0]:g} of {largest:g}"
+            yield Problem("denominator", reason, f"coefficients of at most {_STEEPEST:g} times the first one")
         if not zeros:
             yield Problem("numerator", "is zero throughout", "at least one coefficient other than 0")
         elif len(self.numerator) - zeros[0] >= len(self.denominator):

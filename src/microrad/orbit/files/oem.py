@@ -36,6 +36,7 @@ _KNOT_S = 10800.0  # between two rotations of a frame; nutation changes over day
 _KNOTS_AT_ONCE = 2048  # bounds the memory that the series of nutation takes
 _ALIASES = {"TEMEOFDATE": "TEME", "J2000": "EME2000", "TOD_EARTH": "TOD"}
 _RADII_M = (6_356_000.0, 1.5e9)  # from the surface at the poles to where the Earth's gravity ceases to lead
+_LARGEST = 1e300  # number in a file: in m and m/s it is still one
 _REQUIRED = ("OBJECT_NAME", "OBJECT_ID", "CENTER_NAME", "REF_FRAME", "TIME_SYSTEM", "START_TIME", "STOP_TIME")
 _COLUMNS = ("X", "Y", "Z", "X_DOT", "Y_DOT", "Z_DOT")
 
@@ -255,11 +256,11 @@ def _segment(path: Path, draft: _Draft, epoch: Epoch) -> Segment:
 def _check_rows(path: Path, draft: _Draft, time: Floats) -> None:
     """Raises OrbitError for numbers that are not finite, times that do not rise, distances that no satellite has."""
     values = np.array(draft.values)
-    bad = np.flatnonzero(~np.all(np.isfinite(values), axis=1))
+    bad = np.flatnonzero(~np.all(np.abs(values) < _LARGEST, axis=1))
     if bad.size:
         raise OrbitError(
-            f"{path}, {draft.places[bad[0]]}: the state vector at {draft.times[bad[0]]} holds nan or inf; remove or "
-            "repair it"
+            f"{path}, {draft.places[bad[0]]}: the state vector at {draft.times[bad[0]]} holds nan, inf or a number "
+            f"beyond {_LARGEST:g}; remove or repair it"
         )
     fallen = np.flatnonzero(np.diff(time) <= 0.0)
     if fallen.size:
@@ -268,7 +269,8 @@ def _check_rows(path: Path, draft: _Draft, time: Floats) -> None:
             f"{path}, {draft.places[k]}: the epoch {draft.times[k]} does not come after {draft.times[k - 1]} "
             f"({draft.places[k - 1]}); sort the state vectors by time, each once"
         )
-    radius = 1000.0 * np.linalg.norm(values[:, :3], axis=1)
+    with np.errstate(over="ignore"):
+        radius = 1000.0 * np.linalg.norm(values[:, :3], axis=1)
     bad = np.flatnonzero((radius < _RADII_M[0]) | (radius > _RADII_M[1]))
     if bad.size:
         raise OrbitError(

@@ -26,6 +26,7 @@ _SGP4_EPOCH_JULIAN = 2433281.5  # 1949-12-31, from which sgp4init counts days
 
 _DECAYED = "the satellite has decayed, or the time is too far from the epoch of the elements"
 REASONS = {
+    0: "its formulas give no number for these elements",
     1: f"the mean eccentricity leaves 0 to 1: {_DECAYED}",
     2: f"the mean motion falls below zero: {_DECAYED}",
     3: f"the perturbed eccentricity leaves 0 to 1: {_DECAYED}",
@@ -33,7 +34,7 @@ REASONS = {
     5: f"the orbit lies below the Earth's surface: {_DECAYED}",
     6: "the satellite is below the Earth's surface: it has decayed",
 }
-"""What the error codes of SGP4 mean."""
+"""What the error codes of SGP4 mean; 0 is its word for no error."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,8 +156,9 @@ class Sgp4Orbit:
         error, position_km, velocity_km_s = self._satellite.sgp4_array(
             np.full(time.shape, self._satellite.jdsatepoch), days
         )
-        if np.any(error):
-            first = int(np.flatnonzero(error)[0])
+        failed = np.flatnonzero((error != 0) | ~np.all(np.isfinite(position_km), axis=1))
+        if failed.size:
+            first = int(failed[0])
             raise self._failed(int(error[first]), float(time[first]))
         position = np.ascontiguousarray(1000.0 * position_km.T)
         velocity = np.ascontiguousarray(1000.0 * velocity_km_s.T)
@@ -200,8 +202,8 @@ class Sgp4Orbit:
         """Raises OrbitError for a mean perigee that is too low at a time, and where SGP4 itself stops there."""
         satellite = self._satellite
         days = (time_s + self.elements_age_s) / DAY_S + satellite.jdsatepochF
-        error, _, _ = satellite.sgp4(satellite.jdsatepoch, days)
-        if error:
+        error, position_km, _ = satellite.sgp4(satellite.jdsatepoch, days)
+        if error or not all(map(math.isfinite, position_km)):
             raise self._failed(error, time_s)
         height_m = (satellite.am * (1.0 - satellite.em) - 1.0) * _SGP4_RADIUS_M
         if height_m < LEAST_PERIGEE_HEIGHT_M:

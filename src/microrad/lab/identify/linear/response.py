@@ -17,6 +17,7 @@ import numpy as np
 
 from microrad.core.arrays import Complexes, Floats, Integers
 from microrad.core.labelled import TEXT, Dataset, Group, variables
+from microrad.core.units import LEAST, MOST
 from microrad.lab.identify.linear.modal import Hold
 from microrad.lab.identify.records import IdentificationError
 from microrad.lab.recording import Recording
@@ -247,10 +248,10 @@ def _excited_band(spectra: _Spectra) -> tuple[float, float]:
 
 def _band_edges(freq: Floats, low: float, high: float, bands: int, lines: int) -> list[tuple[int, int]]:
     """Half-open line ranges: logarithmic, each with at least `lines` lines, up to but without half the rate."""
-    if not 0 < low < high:
+    if not LEAST <= low < high <= MOST:
         raise IdentificationError(f"the band {low:g} to {high:g} Hz is empty; give a lower and a higher frequency.")
     last = freq.size - 1
-    marks = np.clip(np.round(np.geomspace(low, high, bands + 1) / freq[1]), 1, last).astype(int)
+    marks = np.clip(np.round(np.geomspace(float(low), float(high), bands + 1) / freq[1]), 1, last).astype(int)
     edges, start = [], int(marks[0])
     for mark in marks[1:]:
         if mark - start >= lines:

@@ -5,7 +5,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from microrad.core.arrays import Complexes, Floats
+from microrad.core.arrays import Complexes, Floats, reals
+from microrad.core.units import LEAST, MOST
 from microrad.lab.identify.linear.elements import ElementEquations
 from microrad.lab.identify.linear.modal import Hold
 from microrad.lab.identify.records import IdentificationError
@@ -75,7 +76,8 @@ def checked(
     Raises:
         IdentificationError: For whatever `fit_frequency_response` refuses of a table.
     """
-    freq, values = np.asarray(freq_hz, dtype=float), np.asarray(response, dtype=complex)
+    freq = reals(freq_hz, "the frequencies", IdentificationError)
+    values = _complexes(response)
     if freq.ndim != 1 or freq.size == 0:
         raise IdentificationError(
             f"the frequencies have the shape {freq.shape}; give one list of frequencies, shape (frequencies,)."
@@ -92,7 +94,7 @@ def checked(
         raise IdentificationError("the response is 0 at all frequencies, so there is nothing to fit; see its columns.")
     error = None
     if standard_error is not None:
-        error = _checked_error(freq, values, np.asarray(standard_error, dtype=float)).reshape(
+        error = _checked_error(freq, values, reals(standard_error, "the standard errors", IdentificationError)).reshape(
             freq.size, *_shape(values)
         )
     hold, rate_hz, strictly_proper = form
@@ -101,6 +103,20 @@ def checked(
     if hold != "band-limited" and rate_hz is None:
         raise IdentificationError(f"a {hold} hold needs the sample rate; give rate_hz.")
     return ResponseTable(freq, values.reshape(freq.size, *_shape(values)), error, hold, rate_hz, not strictly_proper)
+
+
+def _complexes(response: ArrayLike) -> Complexes:
+    try:
+        values = np.asarray(response, dtype=complex)
+    except (OverflowError, TypeError, ValueError):
+        raise IdentificationError("the response is no array of complex numbers; give one for each frequency.") from None
+    size = np.abs(values[np.isfinite(values)])
+    if np.any((size > MOST) | ((size < LEAST) & (size > 0.0))):
+        raise IdentificationError(
+            f"the response has a magnitude below {LEAST:g} or above {MOST:g}, and none has that in SI units; check its "
+            "unit."
+        )
+    return values
 
 
 def _shape(values: Complexes) -> tuple[int, int]:
@@ -159,7 +175,7 @@ def _checked_error(freq: Floats, values: Complexes, error: Floats) -> Floats:
             f"for each frequency, {freq.shape}, or one for all."
         )
     _check_finite(freq, error, "the standard error")
-    bad = (error <= 0).reshape(freq.size, -1)
+    bad = (error < LEAST).reshape(freq.size, -1)
     if bad.any():
         at = int(np.argmax(bad.any(axis=1)))
         raise IdentificationError(

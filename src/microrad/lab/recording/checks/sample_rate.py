@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from microrad.core.arrays import Floats
+from microrad.core.units import LEAST, MOST
 from microrad.lab.recording.formats.source import StatedRate
 from microrad.lab.recording.records import Finding, RecordingError
 
@@ -28,11 +29,12 @@ def check_rate(where: str, rate_hz: object) -> float:
     Raises:
         RecordingError: For what is no positive finite number.
     """
-    if isinstance(rate_hz, bool) or not isinstance(rate_hz, (int, float, np.number)) or not 0 < rate_hz < math.inf:
+    is_number = isinstance(rate_hz, int | float | np.integer | np.floating) and not isinstance(rate_hz, bool)
+    if not is_number or not LEAST <= rate_hz <= MOST:  # type: ignore[operator]
         raise RecordingError(
             f"{where}: the sample rate is {rate_hz!r}; give the samples per second as a positive number in Hz."
         )
-    return float(rate_hz)
+    return float(rate_hz)  # type: ignore[arg-type]
 
 
 def agreed_rate(where: str, rate_hz: float | None, stated: Sequence[StatedRate]) -> float:
@@ -61,7 +63,7 @@ def agreed_rate(where: str, rate_hz: float | None, stated: Sequence[StatedRate])
                 f"({other.words}), {other.rate_hz / first.rate_hz:.4g} times as much; correct the wrong one"
                 f"{' (leave the rate out to use that of the file)' if rate_hz is not None else ''}."
             )
-    return first.rate_hz
+    return check_rate(where, first.rate_hz)
 
 
 def rate_of_time(

@@ -13,6 +13,8 @@ from microrad.lab.recording.records import MIN_SAMPLES, Finding, RecordingError
 # The share of an input's variance that the other inputs do not explain; below it the noise of any sensor hides which
 # of them moved the mirror.
 _OWN_SHARE = 1e-6
+# Largest sample of a channel, in whatever unit: what lies beyond is no measurement, and its square no number.
+_LEAST, _MOST = 1e-30, 1e30
 
 
 def check_signals(
@@ -40,7 +42,7 @@ def check_signals(
     drives = list(inputs.values())
     everything = [("input", *item) for item in inputs.items()] + [("output", *item) for item in outputs.items()]
     for _, label, values in everything:
-        _check_finite(where, label, values, place)
+        _check_size(where, label, values, place)
     if (samples := drives[0].size) < MIN_SAMPLES:
         raise RecordingError(
             f"{where}: {samples} samples; at least {MIN_SAMPLES} are needed to tell a hysteresis loop from "
@@ -77,9 +79,9 @@ def _is_constant(values: Floats) -> bool:
     return high - low <= 1e-12 * max(abs(low), abs(high))
 
 
-def _check_finite(where: str, label: str, values: Floats, place: Callable[[int], str]) -> None:
-    # One sum tells: nan and inf survive it. An overflow of the sum alone is caught by the second look.
-    if np.isfinite(np.sum(values)):
+def _check_size(where: str, label: str, values: Floats, place: Callable[[int], str]) -> None:
+    size = max(-float(values.min()), float(values.max()))  # nan where one is
+    if size == 0.0 or _LEAST <= size <= _MOST:
         return
     bad = np.flatnonzero(~np.isfinite(values))
     if bad.size:
@@ -88,6 +90,11 @@ def _check_finite(where: str, label: str, values: Floats, place: Callable[[int],
             f"{where}: {place(row)} of {label} is {values[row]}, {bad.size} such samples in all; "
             "remove or repair it, because hysteresis remembers what happened in a gap."
         )
+    row = int(np.argmax(np.abs(values)))
+    raise RecordingError(
+        f"{where}: {place(row)} of {label} is {values[row]:.4g}, its largest sample, and no converter gives a channel "
+        f"of less than {_LEAST:g} or more than {_MOST:g}; check its unit and scale, or remove or repair the sample."
+    )
 
 
 def _check_varies(where: str, role: str, label: str, values: Floats) -> None:

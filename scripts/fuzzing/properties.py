@@ -1,0 +1,184 @@
+"""What any input that is taken must keep; each check raises AssertionError with what is broken."""
+
+import math
+import traceback
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from microrad import link
+from microrad.campaign.definition.records import CampaignFile
+from microrad.campaign.ledger import chunk_format
+from microrad.campaign.records import Chunk
+from microrad.core.budget import total_db
+from microrad.lab.bench.plan import Plan
+from microrad.lab.recording import Recording
+from microrad.link import study
+from microrad.link.pointing import outage
+from microrad.mirror import Mirror, coupled
+from microrad.mission.file import LinkFile, load_coupled_mirror
+from microrad.orbit.base import Orbit
+from microrad.orbit.propagation.mean_elements import ElementSet, Sgp4Orbit
+
+_TIMES_S = np.array([-3600.0, -60.0, 0.0, 60.0, 3600.0])
+_FREQUENCIES_HZ = np.array([0.0, 0.1, 10.0, 1e3, 1e5])
+_ROUNDING_DB = 1e-6
+
+
+def finite(what: str, values: Any) -> None:
+    """Numbers are finite.
+
+    Args:
+        what: What they are, for the message.
+        values: The numbers, of any shape.
+    """
+    assert np.all(np.isfinite(values)), f"{what}: not finite"
+
+
+def probability(what: str, value: float) -> None:
+    """A probability is one, or nan where there is none.
+
+    Args:
+        what: What it is, for the message.
+        value: The probability.
+    """
+    assert math.isnan(value) or 0.0 <= value <= 1.0, f"{what}: {value!r} is no probability"
+
+
+class DocumentedError(ValueError):
+    """A plain ValueError that a function of microrad raises itself: its docstring says so."""
+
+
+def documented(error: ValueError) -> ValueError:
+    """The error as a refusal where microrad raised it itself; else as it is, as one that slipped through from below."""
+    frames = traceback.extract_tb(error.__traceback__)
+    return DocumentedError(str(error)) if "/microrad/" in frames[-1].filename else error
+
+
+# --------------------------------------------------------------------------------------------------------------- links
+def links(file: LinkFile) -> None:
+    """Budgets add up, and the margin falls with distance, with the pointing error and with jitter."""
+    solved = study.solve_rate(file)
+    data, shared = link.of(solved.mission), link.Shared.of(solved.mission)
+    budgets = [study.communication_budget(data, solved.sources)]
+    for name in ("beacon", "answer"):
+        table = getattr(solved.mission, name)
+        if table is not None:
+            budgets.append(link.beam_budget(name, shared, table, solved.sources))
+    for budget in budgets:
+        _adds_up(budget)
+    margin = outage.margin_db(data)
+    assert math.isclose(margin, budgets[0].margin_db, rel_tol=1e-9, abs_tol=_ROUNDING_DB), "margin: not its budget's"
+    own = data.table
+    _falls("distance", margin, data, own.with_value("distance_m", 1.1 * own.distance_m))
+    if data.jitter is None:
+        error = 1.1 * own.pointing_error_rad + 1e-9
+        if data.beam.fall.loss_db(error) < link.DEEPEST_DB:  # further out there are side lobes
+            _falls("pointing error", margin, data, own.with_value("pointing_error_rad", error))
+        return
+    probability("outage", outage.Exposure.stated(data).short_of(0.0))
+    wider = data.jitter.model_copy(update={"rms_rad": tuple(1.1 * each for each in data.jitter.rms_rad)})
+    moved = link.DataLink(shared, own, data.requirement, wider, data.beam, data.receiver)
+    assert outage.margin_db(moved) <= margin + _ROUNDING_DB, "margin: rises with jitter"
+
+
+def _adds_up(budget: link.LinkBudget) -> None:
+    finite(f"{budget.name} budget", [line.value for line in (*budget.lines, *budget.totals)])
+    received = total_db(budget.lines)
+    required = 10.0 * math.log10(budget.required_power_w) + 30.0
+    assert _near(received - required, budget.margin_db), f"{budget.name}: the margin is not the difference"
+    power = 10.0 ** (received / 10.0 - 3.0)
+    assert math.isclose(power, budget.received_power_w, rel_tol=1e-9), f"{budget.name}: lines are not the power"
+
+
+def _near(one: float, other: float) -> bool:
+    return math.isclose(one, other, rel_tol=1e-9, abs_tol=_ROUNDING_DB)
+
+
+def _falls(what: str, margin: float, data: link.DataLink, table: Any) -> None:
+    moved = link.DataLink(data.shared, table, data.requirement, data.jitter, data.beam, data.receiver)
+    assert outage.margin_db(moved) <= margin + _ROUNDING_DB, f"margin: rises with {what}"
+
+
+# ------------------------------------------------------------------------------------------------------------- mirrors
+def plant(found: Mirror) -> None:
+    """A mirror has finite matrices, and a finite response that a step does not set off.
+
+    Its linear part does not run away: no pole is right of the imaginary axis.
+    """
+    for name in ("A", "B", "E", "F", "G", "C", "D", "K"):
+        finite(f"matrix {name}", getattr(found, name))
+    finite("response", found.frequency_response(_FREQUENCIES_HZ))
+
+
+def several_axes(found: coupled.CoupledMirror) -> None:
+    """A mirror of several axes that is written is the same when it is read again."""
+    text = coupled.text(found)
+    again = coupled.of(load_coupled_mirror("mirror.toml", text=text))
+    assert coupled.text(again) == text, "a mirror file that is written and read is another one"
+
+
+# ------------------------------------------------------------------------------------------------ plans and campaigns
+def plan(found: Plan) -> None:
+    """Each drive of a plan is finite and within its limits, and its time runs forward."""
+    low, high = found.limits.drive_min_v, found.limits.drive_max_v
+    slack = 1e-9 * (1.0 + abs(low) + abs(high))
+    for each in found.records:
+        drive = each.excitation.drive
+        finite(f"drive {each.excitation.name}", drive)
+        assert drive.ndim == 2 and drive.shape[0] > 0, "a drive without samples"
+        assert low - slack <= drive.min() and drive.max() <= high + slack, "a drive beyond its limits"
+        assert math.isfinite(each.excitation.rate_hz) and each.excitation.rate_hz > 0.0, "a rate that is none"
+
+
+def campaign(found: CampaignFile) -> None:
+    """Each distribution of a campaign gives finite values that rise with the share of draws below them."""
+    share = np.array([1e-6, 0.1, 0.5, 0.9, 1.0 - 1e-6])
+    for each in found.draws:
+        if each.distribution is not None:
+            values = each.distribution.at(share)
+            finite(f"draws of {each.key}", values)
+            assert np.all(np.diff(values) >= 0.0), f"draws of {each.key} fall"
+
+
+def chunk(found: Chunk) -> None:
+    """A chunk that is read and packed again has the same bits."""
+    data = chunk_format.pack_chunk(found)
+    assert chunk_format.pack_chunk(chunk_format.unpack_chunk(data)) == data, "a chunk that is packed is another one"
+
+
+# ---------------------------------------------------------------------------------------------------------- recordings
+def recording(found: Recording) -> None:
+    """A recording has finite samples, as many outputs as drives, and a rate of which time runs forward."""
+    finite("drive", found.drive)
+    finite("output", found.output)
+    assert found.drive.ndim == found.output.ndim == 2, "a recording is no table"
+    assert len(found.drive) == len(found.output) == found.samples, "drive and output have other lengths"
+    assert found.drive.shape[1] == len(found.input_names), "a drive without a name"
+    assert found.output.shape[1] == len(found.output_names), "an output without a name"
+    assert math.isfinite(found.rate_hz) and found.rate_hz > 0.0, "a rate that is none"
+    assert math.isfinite(found.step_s) and found.step_s > 0.0, "time stands still"
+    assert len(found.sha256) == 64, "no hash"
+
+
+# -------------------------------------------------------------------------------------------------------------- orbits
+def elements(sets: Iterable[ElementSet]) -> None:
+    """Each element set is an orbit about its own epoch, or is refused there."""
+    for each in sets:
+        orbit(Sgp4Orbit(each, each.epoch), _TIMES_S)
+
+
+def orbit(found: Orbit, times_s: Any) -> None:
+    """States of an orbit are finite, above the ground and below the Moon, and slower than what escapes.
+
+    Args:
+        found: The orbit.
+        times_s: Times at which it has states, in s.
+    """
+    states = found.states(times_s)
+    finite("position", states.position_m)
+    finite("velocity", states.velocity_m_s)
+    radius, speed = np.linalg.norm(states.position_m, axis=0), np.linalg.norm(states.velocity_m_s, axis=0)
+    assert np.all(radius > 6.3e6) and np.all(radius < 1e10), "an orbit below the ground, or that leaves"
+    assert np.all(speed < 12e3), "an orbit faster than what escapes"
