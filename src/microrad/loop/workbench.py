@@ -220,8 +220,8 @@ class Loop:
         for name in ("delay_s", "sensor_delay_s"):
             if not getattr(self, name) <= _MOST_LATE * step:
                 raise ValueError(
-                    f"{name} of a loop is {getattr(self, name)} s, more than {_MOST_LATE} plant steps of {step:g} s, each "
-                    "of them a state: give a shorter one, or fewer steps per sample"
+                    f"{name} of a loop is {getattr(self, name)} s, more than {_MOST_LATE} plant steps of {step:g} s, "
+                    "each of them a state: give a shorter one, or fewer steps per sample"
                 )
         late = delay_steps("loop", self.delay_s, step, "it runs from the sample to its command")
         seen_late = delay_steps("sensor of the loop", self.sensor_delay_s, step, EXPOSURE)
