@@ -207,7 +207,9 @@ def apart(kind: Format, seed: int, numbers: range, keep: Path) -> Tally:
         shared = mmap.mmap(-1, _AT.size)
         shared[:] = _AT.pack(place, 0, 0, 0.0, -1, 0.0)
         notes = tempfile.TemporaryFile("w+")  # noqa: SIM115  closed below, and the child writes to it
-        child = os.fork()
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DeprecationWarning)  # of threads, which a child leaves alone
+            child = os.fork()
         if not child:
             _run(kind, seed, range(place, numbers.stop), shared, notes, keep)
         status, hangs = _waited_for(child, shared)
