@@ -26,7 +26,7 @@ from typing import Any, Protocol
 
 from fuzzing.properties import DocumentedError
 
-_SILENT_S = 60.0  # until a child that finishes no case is taken to hang where no signal reaches it
+_SILENT_S = 300.0  # until a child that finishes no case is taken to hang where no signal reaches it
 _LONGEST_REFUSAL = 20_000
 _KEPT_OF_A_KIND = 3
 _AT = struct.Struct("<qqqdqd")  # number, taken, refused, longest (s), which case that was, most memory (bytes)
