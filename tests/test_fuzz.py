@@ -78,7 +78,7 @@ FALLS = {
     "a traceback": (Fake(lambda: {}["x"]), "KeyError: 'x'"),
     "a broken property": (Fake(breaks), "AssertionError: a property is broken"),
     "no word": (Fake(says_nothing), "DocumentedError without a word"),
-    "a hang": (Fake(never_ends, 0.5), "TooLongError: more than 0.5 s"),
+    "a hang": (Fake(never_ends, 0.1), "TooLongError: more than 0.1 s"),
     "a crash": (Fake(crashes), "ends the process: status 9"),
     "memory": (Fake(grows), "takes 0.2 GB"),
 }

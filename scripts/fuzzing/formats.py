@@ -41,6 +41,7 @@ from microrad.report.results.manifest_reader import altered_parts, read_manifest
 
 Mutate = Callable[[Random, Sequence[bytes]], bytes]
 _GIVEN = Given("a mirror", 2e-3, 1e4, 50.0, 0.0, 100.0, 1.0, 1e3, 10.0, "rad")
+_SHORT = 20_000  # samples of a plan that is designed twice
 _EPOCH = Epoch("2026-03-20T12:00:00Z")
 
 
@@ -103,7 +104,15 @@ def _campaign(path: Path) -> None:
 
 
 def _plan(path: Path) -> None:
-    properties.plan(load_plan(path))
+    found = load_plan(path)
+    properties.plan(found)
+    if sum(each.excitation.samples for each in found.records) < _SHORT:
+        again = load_plan(path).records
+        same = all(
+            np.array_equal(one.excitation.drive, two.excitation.drive)
+            for one, two in zip(found.records, again, strict=True)
+        )
+        assert same, "the same seed gives other drives"
 
 
 def _list(path: Path) -> None:

@@ -178,6 +178,11 @@ def test_renamed_files(tmp_path):
     assert "save it with -v7" in refusal(old, 0, 1)
 
 
+def test_a_name_of_several_lines_makes_no_message_of_several(tmp_path):
+    np.savez(tmp_path / "a.npz", **{"no\nnumbers": np.array("words")})
+    assert "('no\\u000anumbers' holds" in refusal(tmp_path / "a.npz", 0, 1)
+
+
 def test_missing_library(tmp_path, monkeypatch):
     path = tmp_path / "a.tdms"
     tdms(path)

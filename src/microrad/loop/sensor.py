@@ -10,8 +10,6 @@ from microrad.core.budget import Line, root_sum_square
 from microrad.core.units import ELEMENTARY_CHARGE_C, format_quantity
 
 RATE_TOLERANCE = 1e-9
-MOST_LATE = 1000
-"""Plant steps that a delay may have: each is a state of the linear loop."""
 """How far, relatively, a sensor's period or delay may lie from a whole number of control samples or plant steps."""
 
 EXPOSURE = "it runs from the middle of the exposure to the delivery"
@@ -134,11 +132,6 @@ def delay_steps(what: str, delay_s: float, plant_step_s: float, note: str) -> in
         ValueError: It is negative, not finite or no whole number of steps; with the nearest that would do.
     """
     _zero_or_more(f"{what}: delay", delay_s, "s", note)
-    if not delay_s <= MOST_LATE * plant_step_s:
-        raise ValueError(
-            f"{what}: its delay of {format_quantity(delay_s, 's')} is more than {MOST_LATE} plant steps of "
-            f"{format_quantity(plant_step_s, 's')}; give a shorter one, or a longer plant step"
-        )
     steps = round(delay_s / plant_step_s)
     if abs(steps * plant_step_s - delay_s) > RATE_TOLERANCE * delay_s:
         raise ValueError(

@@ -35,6 +35,7 @@ _OF_ONE_AXIS = {
         control.LQG,
     )
 }
+_MOST_LATE = 2000  # plant steps
 _OF_SEVERAL = {"LQG": control.LQG_OF_AXES, "H-infinity": control.H_INFINITY_OF_AXES}
 
 
@@ -216,6 +217,12 @@ class Loop:
         given = self.vibration if isinstance(self.vibration, tuple) else (self.vibration,)
         period = 1.0 / self.rate_hz
         step = period / self.steps_per_sample
+        for name in ("delay_s", "sensor_delay_s"):
+            if not getattr(self, name) <= _MOST_LATE * step:
+                raise ValueError(
+                    f"{name} of a loop is {getattr(self, name)} s, more than {_MOST_LATE} plant steps of {step:g} s, "
+                    "each of them a state: give a shorter one, or fewer steps per sample"
+                )
         late = delay_steps("loop", self.delay_s, step, "it runs from the sample to its command")
         seen_late = delay_steps("sensor of the loop", self.sensor_delay_s, step, EXPOSURE)
         low, high = self.drive_range_v

@@ -258,7 +258,9 @@ def _load_columns(
         )
     if time.size < MIN_SAMPLES:
         return columns, [], []  # refused for its length
-    rate, findings = rate_of_time(str(source.path), label, time * SECONDS[unit], source.place)
+    with np.errstate(invalid="ignore", over="ignore"):  # a damaged time is refused there
+        time_s = time * SECONDS[unit]
+    rate, findings = rate_of_time(str(source.path), label, time_s, source.place)
     return columns, [rate], findings
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from microrad.core.arrays import Floats
 from microrad.core.errors import MicroradError
+from microrad.core.units import printable
 
 MIN_SAMPLES = 200
 
@@ -46,8 +47,8 @@ class RecordingError(MicroradError):
     page = "recordings"
 
     def __init__(self, message: str, findings: Sequence[Finding] = ()) -> None:
-        """Keep the message and the findings behind it."""
-        super().__init__(message)
+        """Keep the message, one line whatever names a file has, and the findings behind it."""
+        super().__init__(printable(message, "\u00a0\u202f"))
         self.findings = tuple(findings)
 
 

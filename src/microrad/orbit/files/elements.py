@@ -83,7 +83,7 @@ _RATE = r"[-+ ][ \d]{5}[-+ ]\d"
 _TLE_FIELDS = {
     "1": (
         (2, 7, "catalogue number", r" *\d+|[A-HJ-NP-Z]\d{4}"), (18, 20, "year of the epoch", r"[ \d]\d"),
-        (20, 32, "day of the epoch", r"[ \d]{2}\d\.\d{1,8} *"),
+        (20, 32, "day of the epoch", r"( {2}| \d|\d\d)\d\.\d{1,8} *"),
         (33, 43, "first derivative of the mean motion", _NUMBER),
         (44, 52, "second derivative of the mean motion", _RATE), (53, 61, "drag term B*", _RATE),
         (62, 63, "type of the ephemeris", r"[ \d]"), (64, 68, "number of the element set", r"[ \d]{4}"),
