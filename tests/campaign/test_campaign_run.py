@@ -13,6 +13,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy import stats
 
 import microrad
 from microrad.campaign import bundle, records, run
@@ -508,6 +509,19 @@ def test_rows_of_a_cell_are_in_their_order_and_their_curves_are_summed(tmp_path,
     held = sum(column.nbytes for chunk in cell.chunks for column in chunk.columns.values())
     assert held == 3 * 24 * 8 and not any(chunk.survival.size for chunk in cell.chunks)
     assert cell.whole().columns["margin"] is found.columns["margin"], "put together once"
+
+
+@pytest.mark.parametrize("sampling", ["latin-hypercube", "sobol", "random"])
+def test_a_set_of_latin_or_sobol_rows_is_one_draw_of_the_mean(tmp_path, sampling):
+    """Four sets of 16 rows whose means are 0 to 3: their rows say as much as these, and not as 64 of their own."""
+    campaign = load_campaign(campaign_file(tmp_path, sampling=sampling))
+    row = np.arange(64.0)
+    columns = {each.name: row // 16 + 10.0 * (row % 16 - 7.5) for each in campaign.outputs}
+    chunk = records.Chunk(0, 0, {"row": row, "weight": np.ones(64), **columns}, (), *np.zeros((2, 1056)))
+    mean = CellRows(campaign, 0, [chunk]).summary().outputs["margin"].mean
+    draws = columns["margin"] if sampling == "random" else np.arange(4.0)
+    exact = stats.ttest_1samp(draws, 0.0).confidence_interval(0.95)
+    np.testing.assert_allclose([mean.low, mean.high], [exact.low, exact.high], rtol=1e-12)
 
 
 @pytest.mark.usefixtures("rows_here")

@@ -119,6 +119,19 @@ def test_what_few_rows_cannot_tell_is_not_known() -> None:
         tail_of_time(share[0], share[0], 0, EDGES, (0.3,), 0.99)
 
 
+def test_far_out_as_many_errors_are_independent_as_where_events_were_many() -> None:
+    """Half of the rows have 40 % of their time beyond the first edge, and eight of 64 a little beyond the second.
+
+    The first says that 252 independent errors know as much: 0.2 x 0.8 over the variance of the mean, 0.04 / 63. None
+    of so many beyond a radius leaves up to 1 - 0.005^(1 / 252) of the time, however short the few excursions are.
+    """
+    share = np.array([[1.0, 0.4, 8e-4], *[[1.0, 0.4, 0.0], [1.0, 0.0, 0.0]] * 3, [1.0, 0.0, 0.0]] * 8)
+    errors = 0.2 * 0.8 / (0.04 / 63)
+    tail = tail_of_time(share.sum(axis=0), (share**2).sum(axis=0), 64, EDGES, (), 0.99)
+    assert tail.survival.tolist() == pytest.approx([1.0, 0.2, 1e-4])
+    assert tail.high[2] > 1.0 - 0.005 ** (1.0 / errors)
+
+
 # ------------------------------------------------------------------------------------------------------ weighted draws
 def weighted(seed: int, draws: int, shift: float) -> tuple[Floats, Floats]:
     """Radii of two normal numbers that are shifted in any direction, and the logarithm of their weights."""

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import tempfile
 import threading
+from pathlib import Path
 
 import pytest
 
@@ -105,6 +106,22 @@ def test_what_a_replacement_that_was_killed_left_goes_once_there_is_another_in_i
         assert left.exists()
     assert {path.name for path in tmp_path.iterdir()} == {"results", ".results-other.old", ".else-x-1-y.old"}
     assert [path.name for path in results.iterdir()] == ["b"]
+
+
+def test_old_results_are_put_back_where_new_ones_cannot_be_moved_into_their_place(tmp_path, monkeypatch):
+    results, rename = tmp_path / "results", Path.rename
+    results.mkdir()
+    (results / "manifest.json").write_text('{"versions": {"microrad": "0"}, "mission": 1}', "utf-8")
+
+    def refused(path, target):
+        if path.suffix == ".part":
+            raise PermissionError(13, "Permission denied", str(target))
+        return rename(path, target)
+
+    monkeypatch.setattr(Path, "rename", refused)
+    with pytest.raises(PermissionError), whole_folder(results, True) as draft:
+        (draft / "b").write_text("b")
+    assert [path.name for path in tmp_path.rglob("*")] == ["results", "manifest.json"]
 
 
 @pytest.mark.skipif(os.name != "posix", reason="elsewhere no process can be asked for by its number without harm")

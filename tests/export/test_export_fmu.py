@@ -615,6 +615,15 @@ def test_a_spring_of_several_axes_follows_the_kernel(slave):
 
 
 @pytest.mark.parametrize("version", VERSIONS)
+def test_each_parameter_has_a_place_of_its_own_that_holds_its_start_value(slave, version):
+    one = slave("rich", version)
+    parameters = [v for v in one.description.modelVariables if v.causality == "parameter"]
+    held = {v.name: one.get(v.name).tolist() for v in parameters}
+    assert held == {v.name: [float(each) for each in v.start.split()] for v in parameters}
+    assert any(name.startswith("prandtl_ishlinskii[2].weight") for name in held)
+
+
+@pytest.mark.parametrize("version", VERSIONS)
 def test_a_parameter_acts_when_it_is_set_before_the_begin(slave, version):
     models = everything().bouc_wen
     d1 = 2.0 * models[1].d1_rad_v

@@ -63,6 +63,14 @@ def test_units_and_several_recordings():
     assert fit.bias_v == pytest.approx(30.0)
 
 
+def test_weights_of_an_output_that_falls_with_the_drive_are_negative_in_model_and_values():
+    fit = fit_hysteresis(
+        recorded(NOISE - PLAYS.response(DRIVE - 30.0, 1 / RATE)), "prandtl_ishlinskii", output_unit="rad"
+    )
+    assert sum(fit.values.values()) == pytest.approx(-50e-6, rel=3e-3)
+    assert sum(fit.model.weights_rad_v) == pytest.approx(-50e-6, rel=3e-3)
+
+
 def test_models_that_are_none_are_refused():
     with pytest.raises(
         IdentificationError, match="no hysteresis model is called 'preisach'; there are bouc_wen, prandtl"

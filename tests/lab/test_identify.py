@@ -247,6 +247,12 @@ def test_coloured_residuals_inflate_the_errors():
     assert colour_inflation([white, coloured]) == colour_inflation([coloured])
 
 
+def test_a_residual_of_one_step_is_not_taken_round_from_its_end_to_its_begin():
+    """Halves of -1 and 1 have the autocorrelation 1 - 3 k / n up to the middle, whose sum to n / 3 is n / 6."""
+    step = np.repeat([-1.0, 1.0], 600)
+    assert colour_inflation([step]) == pytest.approx(1200 / 3, rel=0.01)
+
+
 # -------------------------------------------------------------------------------------------------------- admissibility
 def test_slope_after_reversal_against_a_slow_loop():
     """The printed set turns against the drive, dh/du = -0.974 mrad/V in the limit of no rate; seen in a simulation."""

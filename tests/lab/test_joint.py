@@ -19,7 +19,7 @@ from microrad.lab.identify import (
 )
 from microrad.lab.identify.hysteresis import joint
 from microrad.lab.identify.hysteresis.joint import thin_record, time_constants
-from microrad.lab.identify.hysteresis.plant_fit import PlantProblem, fit_plant, fit_records
+from microrad.lab.identify.hysteresis.plant_fit import FitRecord, PlantProblem, fit_plant, fit_records
 from microrad.lab.identify.hysteresis.prandtl_ishlinskii import threshold_grid
 from microrad.lab.identify.hysteresis.structures import LinearPoles, Roots, poles_of
 from microrad.lab.identify.records import centred, si_records
@@ -357,6 +357,17 @@ def test_a_long_record_does_not_drown_a_short_one():
     assert 0.8 < b < 0.9 < a < 1.0
     assert sum(fit.model.weights_rad_v) == pytest.approx(1e-4 * (a + 1.2 * b / 1.44) / (a + b / 1.44), rel=1e-3)
     assert sum(fit_prandtl_ishlinskii(records).weights_rad_per_v) < 1.03e-4  # every sample counts there
+
+
+def test_a_held_drive_that_was_thinned_is_as_late_as_its_steps_are_on_the_mean():
+    """Steps that a converter holds for 1 ms, of which each eighth is kept: their fundamental comes behind its sine."""
+    thinned = FitRecord("thinned", np.zeros((3, 1)), np.zeros((3, 1)), 8e-3, 1, 0, np.zeros((3, 0)))
+    freq_hz, time_s = 5.0, (np.arange(20_000) + 0.5) * 1e-5
+    held = np.sin(2.0 * np.pi * freq_hz * 1e-3 * np.floor(time_s / 1e-3))
+    turned = np.angle(1j * held @ np.exp(-2j * np.pi * freq_hz * time_s))
+    found = joint._between(thinned, "zero-order", 1e-3)
+    assert found.hold == "first-order"
+    assert found.late_s == pytest.approx(-turned / (2.0 * np.pi * freq_hz), rel=1e-3)
 
 
 def test_thinning_keeps_the_fit_and_never_bends_the_drive(monkeypatch):

@@ -28,7 +28,7 @@ from microrad.lab.identify.linear.polish import (
     unpack,
 )
 from microrad.lab.identify.linear.response import response_from_periods
-from microrad.lab.identify.linear.uncertainty import parameter_covariance, transfer_matrix, transmission_zeros
+from microrad.lab.identify.linear.uncertainty import natural, parameter_covariance, transfer_matrix, transmission_zeros
 from microrad.lab.identify.linear.vector_fitting import vector_fit
 from microrad.lab.identify.records import IdentificationError
 from microrad.lab.identify.statistics import rounded_to_error
@@ -354,6 +354,19 @@ def test_standard_errors_are_those_of_repetition():
     ratio = scatter / np.mean(told, axis=0)
     assert (ratio > 0.4).all()
     assert (ratio < 2.0).all()
+
+
+def test_errors_of_frequency_and_damping_follow_from_those_of_a_poles_parts():
+    """To first order: what each does when a part is moved by a thousandth of its error to either side."""
+    pole, error = complex(-20.0, 1000.0), complex(2.0, 5.0)
+
+    def moved_by(quantity):
+        parts = (1e-3 * error.real, 1e-3j * error.imag)
+        return math.hypot(*((quantity(pole + each) - quantity(pole - each)) / 2e-3 for each in parts))
+
+    found = natural(pole, error)
+    assert found.freq_error_hz == pytest.approx(moved_by(lambda p: abs(p) / (2 * np.pi)), rel=1e-6)
+    assert found.damping_error == pytest.approx(moved_by(lambda p: -p.real / abs(p)), rel=1e-6)
 
 
 def test_transmission_zeros():

@@ -247,6 +247,15 @@ def test_lvm_segments(tmp_path):
     np.testing.assert_allclose(read.drive[:, 0], DRIVE[334:667], atol=1e-12)
 
 
+def test_lvm_segments_of_other_channels_are_not_joined(tmp_path):
+    path = lvm(tmp_path / "a.lvm", segments=3)
+    last = path.read_bytes().rpartition(b"drive\toutput")
+    path.write_bytes(last[0] + b"drive\ttemperature" + last[2])
+    read = read_recording(path, "0/drive", "0/output")
+    np.testing.assert_allclose(read.drive[:, 0], DRIVE[:334], atol=1e-12)
+    assert "'2/drive', '2/temperature'" in refusal(path, "drive", "none")
+
+
 class Searched(bytes):
     """Bytes that count how many were searched through."""
 

@@ -19,8 +19,13 @@ def test_received_power_is_power_density_times_area():
     assert_allclose(power.margin_db(-40.0), power.received_dbm + 40.0)
     assert [line.name for line in power.lines][-1] == "optics" and power.lines[-1].value == -2.0
     assert power.warnings == ()
-    (near,) = received_power(1.0, 8e-6, 1e3, 0.25, 1064e-9).warnings
-    assert near.startswith("Transmit gain: the far field of this beam begins at")
+
+
+def test_the_far_field_begins_at_two_squares_of_the_waists_diameter_over_the_wavelength():
+    begins_m = 8.0 * 1064e-9 / (math.pi * 8e-6) ** 2
+    (near,) = received_power(1.0, 8e-6, 0.99 * begins_m, 0.25, 1064e-9).warnings
+    assert near == "Transmit gain: the far field of this beam begins at 13.48 km"
+    assert received_power(1.0, 8e-6, 1.01 * begins_m, 0.25, 1064e-9).warnings == ()
 
 
 @pytest.mark.parametrize(

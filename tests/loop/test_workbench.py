@@ -163,6 +163,8 @@ def test_a_controller_of_another_rate_is_refused_and_a_tuned_one_taken_apart():
     tuned = tune(LOOP, "PI")
     with pytest.raises(TypeError, match=r"give its \.controller"):
         LOOP.margins(tuned)
+    with pytest.raises(ValueError, match=r"controller 'PI' is made for 10000 Hz, and this loop has 20000 Hz"):
+        replace(LOOP, rate_hz=20e3).margins(tuned.controller)
     assert repr(LOOP) == "<Loop of 1 axes at 10000 Hz around mirror 'straight'>"
     assert repr(tuned.controller) == "<Controller 'PI': 2 inputs, 1 outputs, 1 states>"
 

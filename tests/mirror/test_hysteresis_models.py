@@ -1,5 +1,6 @@
 """Hysteresis models by themselves: arrays in, arrays out, beside the slow twins of the kernels and the whole mirror."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -103,6 +104,15 @@ def test_what_a_model_cannot_take_is_refused():
     backwards = replace(BOUC_WEN, epsilon_rad_v=-120e-6)
     with pytest.raises(ValueError, match=r"no drive was found.*slope of the model is -.*fit it with admissible=True"):
         backwards.inverse(200e-6 * np.sin(np.linspace(0.0, 20.0, 300)), STEP)
+
+
+def test_a_loop_of_microradians_that_settles_slowly_is_run_until_it_is_symmetric():
+    """With beta = 0 h falls towards epsilon / alpha by the way that the drive goes, so its peaks are known."""
+    amplitude_v, alpha_1_v, epsilon_rad_v = 1.0, 0.05, 8e-6
+    model = BoucWen(0.0, 0.0, epsilon_rad_v, 0.0, alpha_1_v, 0.0)
+    peak = epsilon_rad_v / alpha_1_v * math.tanh(alpha_1_v * amplitude_v)
+    loop = model.loop(amplitude_v, 1.0)
+    assert_allclose([loop.output_rad.max(), loop.output_rad.min()], [peak, -peak], rtol=1e-4)
 
 
 @pytest.mark.parametrize("model", [BOUC_WEN, replace(PLAYS, widening_s=2e-3)])

@@ -239,9 +239,16 @@ def test_a_bode_plot_shows_the_table_the_model_and_its_confidence():
         "95 % confidence of the model",
         f"model, order {fit.order}",
     ]
-    (band,) = size.patches
-    (corners,) = (path.vertices for path in [band.get_path()])
-    assert corners[:, 1].max() > model.get_ydata().max()
+
+
+def test_the_bands_of_a_fitted_model_are_the_confidence_of_its_gain_and_of_its_phase():
+    fit = result("fit")
+    for which, ax in enumerate(plots.plot_bode(fit)):
+        x, y = ax.lines[-1].get_data()
+        corners = ax.patches[0].get_path().vertices
+        top = [corners[corners[:, 0] == each, 1].max() for each in x]
+        error = fit.response_errors(x)[which][:, 0, 0]
+        assert_allclose(top, y + 1.96 * (np.degrees(error) if which else error), rtol=1e-9)
 
 
 def test_the_confidence_of_a_model_is_that_of_its_gain_and_what_draws_of_noise_do():
@@ -307,6 +314,14 @@ def test_the_error_of_a_sine_has_its_steady_part_shaded():
     ax = plots.plot_residual(found)
     assert_array_equal(ax.lines[0].get_ydata(), 1e6 * found.trace.error_rad[:, 0])
     assert len(ax.patches) == 1 and not plots.plot_residual(result("run")).patches
+
+
+def test_the_rms_in_the_legend_is_that_of_the_steady_part():
+    """An error of 10 µrad that has settled to 3 µrad for the second half of the time."""
+    error_rad = np.where(np.arange(100) < 50, 10e-6, 3e-6)[:, None]
+    sheet = plots._errors(np.arange(100) / 100.0, error_rad, slice(50, None))
+    (line,) = (each for panel in sheet.panels for each in panel.all_of(Line))
+    assert line.label == "axis 1: rms 3.00 µrad"
 
 
 def test_the_residual_of_a_study_is_marked_on_its_map_and_there_is_none_of_links():

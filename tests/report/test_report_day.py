@@ -218,6 +218,12 @@ def test_the_words_of_a_contact_without_data_say_why(found):
 # ------------------------------------------------------------------------------------------- missions without a table
 
 
+def test_contacts_of_several_days_are_told_in_all_and_by_the_day():
+    day, way = SimpleNamespace(view=SimpleNamespace(days=2.0)), SimpleNamespace(contacts=range(5), contact_s=12_000.0)
+    told = day_words._how_much(day, way)
+    assert told == "is in view 5 times, 200 min in all (2.5 times, 100 min a day)"
+
+
 def test_a_mission_without_orbits_has_no_day(tmp_path, monkeypatch):
     monkeypatch.setattr(study.paper, "applies", lambda mission: False)
     text = SHIPPED.read_text(encoding="utf-8")

@@ -164,6 +164,9 @@ def test_error_bars_keep_both_arms():
         each.get("d") for each in parts(sheet, "path") if each.get("stroke") == BLUE and each.get("fill") == "none"
     )
     assert bars.count("M") == 3 * 3  # each bar with two caps
+    left, right = np.array(re.findall(r"M([\d.]+) [\d.]+L([\d.]+)", bars), dtype=float).T
+    ends, places = np.concatenate([X - arms[0], X + arms[1]]), np.concatenate([left, right])
+    assert np.polyval(np.polyfit(ends, places, 1), ends) == pytest.approx(places, abs=0.02)  # of a rounded place
     assert layout(sheet).placed[0].x_ends[0] < -0.1
 
 

@@ -650,6 +650,15 @@ def test_the_earlier_of_two_losses_counts(sampler, scene):
         assert (found, loss.cause.split()[0]) == (kept, what)
 
 
+def test_what_the_mirror_does_behind_a_loss_is_not_in_its_mean_angle(sampler, scene):
+    narrow = replace(scene.loop, optical=replace(scene.loop.optical, every=1, field_of_view_rad=100e-6))
+    error, angle = np.zeros((50, 2)), np.full((50, 2), 9e-3)
+    error[39], angle[10:40] = 101e-6, (1e-3, 2e-3)  # ten samples of settling, and lost with the thirtieth behind it
+    window = replace(sampler(), loop=narrow)._of(1000.0, steady()(np.zeros(2)), 0.008, error, angle, 10)
+    assert window.radial_rad.size == 30
+    assert_allclose(window.mirror_rad, narrow.optics @ [1e-3, 2e-3], rtol=1e-12)
+
+
 @pytest.mark.parametrize("length", [1, 2, 3, 7])
 def test_the_first_run_is_the_one_that_a_loop_finds(length):
     draw = np.random.Generator(np.random.Philox(key=5))
