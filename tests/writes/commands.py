@@ -6,6 +6,7 @@ What they compute is computed once and kept in this process: what is tried here 
 import asyncio
 import json
 import os
+import re
 import shutil
 import sqlite3
 import subprocess
@@ -46,7 +47,7 @@ from writes.layer import Command
 PATCH = pytest.MonkeyPatch()
 COMPUTED: tuple[tuple[Any, str, Callable[..., Any]], ...] = (
     (run, "controllers", lambda campaign, *_: campaign.text),
-    (campaign_pages, "campaign_page", lambda found: found.rows),
+    (campaign_pages, "campaign_page", lambda *_: 0),
     (choice, "choose", lambda *args: args[1]),
     (choice, "vectors", lambda chosen, samples: samples),
     (identify, "identify", lambda *_: 0),
@@ -191,6 +192,8 @@ LEDGER: dict[str, Any] = {
 
 def campaign(here: Path) -> None:
     campaign_file(here, runs=4, worst=1, more=GRID)
+    text = re.sub(r"(?m)^ *#.*\n|  +#.*$|^\n", "", (here / "mission.toml").read_text("utf-8"))
+    (here / "mission.toml").write_text(text, encoding="utf-8")  # without comments: a ledger holds it twice
 
 
 def ledger(here: Path) -> None:
@@ -204,7 +207,7 @@ def half(here: Path) -> None:
     ledger(here)
     with closing(sqlite3.connect(here / "campaign.ledger")) as book, book:
         book.execute("DELETE FROM chunks WHERE cell = 1")
-        book.execute("""UPDATE notes SET value = '"stopped"' WHERE key = 'state'""")
+        book.execute("DELETE FROM notes WHERE key = 'state'")
 
 
 def damaged(here: Path) -> None:
@@ -377,7 +380,7 @@ def _upload() -> None:
 
 
 def studio(here: Path) -> None:
-    mission(here)
+    (here / "leo-geo.toml").write_text(SMALL, encoding="utf-8")
     assert _quietly(here, called(_session)) == 0
 
 
@@ -399,7 +402,14 @@ COMMANDS = (
     Command("campaign resume", typed("campaign", "resume", "campaign.ledger"), half, **LEDGER),
     Command("campaign resume, damaged", typed("campaign", "resume", "campaign.ledger"), damaged, **LEDGER),
     Command("campaign export csv", export("rows.csv"), ledger, export("rows.csv", "--overwrite"), **LEDGER),
-    Command("campaign export parquet", export("rows.parquet"), ledger, export("rows.parquet", "--overwrite"), **LEDGER),
+    Command(
+        "campaign export parquet",
+        export("rows.parquet"),
+        ledger,
+        export("rows.parquet", "--overwrite"),
+        threads=True,
+        **LEDGER,
+    ),
     Command("campaign export nc", export("rows.nc"), ledger, export("rows.nc", "--overwrite"), **LEDGER),
     Command("campaign export over nc", export("rows.nc", "--overwrite"), exported("rows.nc"), **LEDGER),
     Command(

@@ -72,7 +72,8 @@ class Command:
 
     ``does`` runs it in the current folder and returns its exit code. Where that is refused because results are there,
     ``otherwise`` is what the refusal says to do. ``content`` has readers by pattern of the path: what of a file is the
-    same in each run. ``partly`` has those of files that grow while the command runs: they fail where one is damaged.
+    same in each run. ``threads`` says that it leaves threads, so that it is not run in the process that forks.
+    ``partly`` has those of files that grow while the command runs: they fail where one is damaged.
     """
 
     name: str
@@ -81,6 +82,7 @@ class Command:
     otherwise: Callable[[], int] | None = None
     content: Mapping[str, Callable[[Path], Any]] = field(default_factory=dict)
     partly: Mapping[str, Callable[[Path], Any]] = field(default_factory=dict)
+    threads: bool = False
 
 
 class Ended(NamedTuple):
@@ -124,7 +126,8 @@ class Layer:
         with (self.base / "said").open("wb") as words, _told(words.fileno()), contextlib.chdir(self.here):
             command.prepare(self.here)
             self._keep("begin")
-            command.does()
+            if not command.threads:
+                command.does()
         threads = len(list(Path("/proc/self/task").iterdir()))
         if threads > 1:
             raise RuntimeError(f"{command.name} has left {threads - 1} threads, beside which no process can be forked")
@@ -187,7 +190,7 @@ class Layer:
         seen = {line.split("\t", 5)[5] for line in log if line[0] in "wnt"}
         old, new = _files(self.base / "begin"), _files(self.base / "end")
         changed = [name for name, path in new.items() if name not in old or not _equal(path, old[name])]
-        names = {line.split("\t", 5)[5] for line in log if "\trename\t" in line or "\tlink\t" in line}
+        names = {line.split("\t", 5)[5] for line in log if "\trename\t" in line or "\tlink\t" in line or "\tmkdir\t" in line}
         blind = [
             name for name in changed if name not in seen and not any(name == n or name.startswith(n + "/") for n in names)
         ]
