@@ -21,7 +21,7 @@ import pytest
 from scipy.io import savemat
 
 from cli.test_cli import write_recording
-from microrad import cli, report
+from microrad import cli
 from microrad.campaign import run
 from microrad.core.errors import MicroradError
 from microrad.export import choice
@@ -31,15 +31,12 @@ from microrad.lab import identify
 from microrad.lab.bench import folder as bench
 from microrad.report.campaign import page as campaign_pages
 from microrad.report.identification import page as identification
-from microrad.report.results import arrays
 from microrad.report.study import page as study_pages
-from microrad.studio.guard import signing
 from microrad.studio.jobs import process, queue
 from microrad.studio.jobs.queue import Jobs, Order
 from microrad.studio.recordings.uploads import Uploads
 from microrad.studio.session import Session
 from microrad.studio.views import mirror_form, runs
-from microrad.study import study
 from shipped import SHIPPED, without_day, without_fine_pointing
 from small_campaign import campaign_file, without_worker
 from writes.layer import Command
@@ -157,6 +154,13 @@ _TABLES = ("chunks", "traces")
 def timeless(path: Path) -> dict[str, Any]:
     """A note without the time at which it was made."""
     return {key: value for key, value in json.loads(path.read_bytes()).items() if key not in ("at", "pid", "queued")}
+
+
+def undated(path: Path) -> Any:
+    """A MATLAB file, whose head has a date, and a manifest of recordings without their hashes."""
+    if path.suffix == ".mat":
+        return path.read_bytes()[128:]
+    return {key: value for key, value in json.loads(path.read_bytes()).items() if key != "files_sha256"}
 
 
 def part(path: Path) -> bool:
@@ -296,6 +300,7 @@ def model(here: Path) -> None:
     savemat(here / "model.mat", {"num": [[2.0e4]], "den": [[1.0, 80.0, 2.5e7]]})
 
 
+UNDATED = {"*.mat": undated, "*/manifest.json": undated}
 IDENTIFY = ("identify", "loop.csv", "--input", "drive", "--output", "angle", "--rate", "1000", "--static")
 IMPORT = (
     *("import", "model.mat", "--travel", "2.5 mrad", "--drive", "0 V", "12 V", "--bias", "6 V"),
@@ -424,11 +429,13 @@ COMMANDS = (
         typed("bench", "plan.toml", "--output", "bench"),
         plan,
         typed("bench", "plan.toml", "--output", "bench", "--overwrite"),
+        content=UNDATED,
     ),
     Command(
         "bench --overwrite",
         typed("bench", "plan.toml", "--output", "bench", "--seed", "1", "--overwrite"),
         after(plan, "bench", "plan.toml", "--output", "bench"),
+        content=UNDATED,
     ),
     Command("identify", typed(*IDENTIFY), recording, typed(*IDENTIFY, "--overwrite")),
     Command(
@@ -469,7 +476,11 @@ COMMANDS = (
     Command("studio: second mission", called(_beside), studio),
     Command("studio: campaign", called(_write_campaign), studio),
     Command("studio: form", called(_form), studio),
-    Command("studio: job", called(_submit), content={"*job.json": timeless, "*job.code": lambda path: None, "*studio-key": part}),
+    Command(
+        "studio: job",
+        called(_submit),
+        content={"*job.json": timeless, "*job.code": lambda path: None, "*studio-key": part},
+    ),
     Command("studio: run of a job", called(_run_job), queued, content={"*.json": timeless}),
     Command("studio: end of a job", called(_cancel), queued),
     Command("studio: recording", called(_upload)),

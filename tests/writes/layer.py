@@ -190,9 +190,13 @@ class Layer:
         seen = {line.split("\t", 5)[5] for line in log if line[0] in "wnt"}
         old, new = _files(self.base / "begin"), _files(self.base / "end")
         changed = [name for name, path in new.items() if name not in old or not _equal(path, old[name])]
-        names = {line.split("\t", 5)[5] for line in log if "\trename\t" in line or "\tlink\t" in line or "\tmkdir\t" in line}
+        names = {
+            line.split("\t", 5)[5] for line in log if "\trename\t" in line or "\tlink\t" in line or "\tmkdir\t" in line
+        }
         blind = [
-            name for name in changed if name not in seen and not any(name == n or name.startswith(n + "/") for n in names)
+            name
+            for name in changed
+            if name not in seen and not any(name == n or name.startswith(n + "/") for n in names)
         ]
         if blind:
             raise RuntimeError(f"written without the layer: {', '.join(blind)}")
@@ -218,42 +222,59 @@ class Layer:
         if case.kind == "power cut":
             _cut(self.work, ended.log)
         found += [f"left: {each}" for each in self._left(command, whole=ended.code in (0, 1))]
+        if ended.code == 2:
+            found += self._badly_said(command, ended.said)
         again = self.run(command.does)
         refused = again.code not in (0, 1)
         if refused and command.otherwise is not None:
             again = self.run(command.otherwise)
             refused = again.code not in (0, 1)
-        found += [f"again: {each}" for each in self._left(command, whole=True)]
+        found += [f"again: {each}" for each in self._left(command, whole=True, last=True)]
         if refused and (found or "Traceback" in again.said or not self._is_there(again)):
             found.append(f"again: {again.code} {again.said.strip()[-300:]}")
         return found
+
+    def _badly_said(self, command: Command, said: str) -> Iterator[str]:
+        """What is wrong with a refusal: it is one line, names where it happened, and is true."""
+        words = said[said.rfind("microrad: ") :].strip()
+        if "\n" in words:
+            yield f"says more than a line: {words}"
+        old, new, now = (_files(folder) for folder in (self.base / "begin", self.base / "end", self.work))
+        if not any(piece in words for name in (*old, *new) for piece in Path(name).parts):
+            yield f"names no file: {words}"
+        if re.search(r"nothing was written(?! there)|nothing is", words):
+            for name, path in now.items():
+                kept = name.startswith("here/") and not _DRAFT.search(name) and _of(command.partly, name) is None
+                if kept and (name not in old or not _equal(path, old[name])):
+                    yield f"says that nothing is written, and {name} is: {words}"
 
     @staticmethod
     def _is_there(ended: Ended) -> bool:
         """Whether a run was refused because what it would write is there already."""
         return ended.code == 2 and bool(re.search(r"exists|already", ended.said))
 
-    def _left(self, command: Command, whole: bool) -> Iterator[str]:
-        """Files that are not as before or as the undisturbed run leaves them; and, of a whole run, those that lack."""
+    def _left(self, command: Command, whole: bool, last: bool = False) -> Iterator[str]:
+        """Files that are not as before or as the undisturbed run leaves them; and, of a whole run, those that lack.
+
+        What is not whole yet, and what grows, may be there before the ``last`` run.
+        """
         old, new, now = (_files(folder) for folder in (self.base / "begin", self.base / "end", self.work))
         for name, path in now.items():
-            if _DRAFT.search(name) and name not in new:
-                if whole:
+            partly = _of(command.partly, name)
+            if name not in new and _DRAFT.search(name):
+                if last:
                     yield f"{name} stays"
-                continue
-            partly = None if whole else _of(command.partly, name)
-            if partly is not None:
+            elif name not in old and name not in new and (last or partly is None):
+                yield f"{name} is none of the command's"
+            elif partly is not None and not (whole and name in new):
                 if not _reads(partly, path):
                     yield f"{name} is not in order"
-                continue
-            if name not in old and name not in new:
-                yield f"{name} is none of the command's"
-                continue
-            like = [each[name] for each in ((new,) if whole else (old, new)) if name in each]
-            if like and not any(_same(command, name, path, each) for each in like):
-                yield f"{name} ({path.stat().st_size} bytes) is not whole"
+            else:
+                like = [each[name] for each in ((new,) if whole else (old, new)) if name in each]
+                if like and not any(_same(command, name, path, each) for each in like):
+                    yield f"{name} ({path.stat().st_size} bytes) is not whole"
         if whole:
-            yield from (f"{name} lacks" for name in new if name not in now)
+            yield from (f"{name} lacks" for name in new if name not in now and not (self.work / name).is_dir())
 
 
 _DRAFT = re.compile(r"(^|/)\.[^/]*(\.draft|\.part|\.old|\.new)(/|$)|(^|/)\.new-|^temporary/|\.part(-\w+)?$")
@@ -320,20 +341,20 @@ def _parsed(log: list[str]) -> list[Write]:
         if mark == "?":
             unsynced = any(sizes[each] > synced.get(each, 0) for each in sizes)
             found.append(Write(int(number), call, int(size), path, unsynced))
-        else:
+        elif mark in "bntws":
             _noted(mark, file, int(size), sizes, synced)
     return found
 
 
 def _noted(mark: str, file: str, size: int, sizes: dict[str, int], synced: dict[str, int]) -> None:
     """Keep of a line of the log how long a file is, and how long on the disk for good."""
-    if mark == "n":
-        synced.pop(file, None)
-    sizes[file] = size
-    if mark == "s":
+    if mark == "b":  # what was there before the command is on the disk
+        synced.setdefault(file, size)
+    elif mark in "ns":
         synced[file] = size
-    elif mark == "t" or (file in synced and size < synced[file]):
-        synced[file] = min(size, synced.get(file, 0))
+    else:
+        synced[file] = min(size, synced.get(file, size))
+    sizes[file] = size
 
 
 def _cut(work: Path, log: list[str]) -> None:
@@ -341,7 +362,7 @@ def _cut(work: Path, log: list[str]) -> None:
     sizes, synced = dict[str, int](), dict[str, int]()
     for line in log:
         mark, _, _, file, size, _ = line.split("\t", 5)
-        if mark in "ntws":
+        if mark in "bntws":
             _noted(mark, file, int(size), sizes, synced)
     for path in _files(work).values():
         found = path.stat()

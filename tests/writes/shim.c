@@ -174,6 +174,7 @@ int creat64(const char *path, mode_t mode) { return creat(path, mode); }
     char found[PATH_MAX]; \
     const char *name = armed ? of_fd(fd, found) : NULL; \
     if (!name) return whole; \
+    saw('b', call, fd, name); \
     int error = met(call, WRITES, name); \
     if (error > 0) return errno = error, -1; \
     ssize_t count = error < 0 ? half : whole; \
@@ -214,6 +215,7 @@ ssize_t sendfile64(int fd, int from, off64_t *at, size_t size) { return sent(fd,
     char found[PATH_MAX]; \
     const char *name = armed ? of_fd(fd, found) : NULL; \
     if (!name) return whole; \
+    if (mark) saw('b', call, fd, name); \
     int error = met(call, does, name); \
     if (error > 0) return errno = error, -1; \
     int result = whole; \

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from microrad.campaign.ledger import Head, Ledger
 from microrad.campaign.records import CampaignError, Chunk
+from microrad.core.folder import whole_file
 from microrad.core.installing import advice
 from microrad.orbit.operations import spreadsheet_text
 
@@ -64,18 +65,15 @@ def export_rows(ledger: Ledger, path: Path) -> int:
 @contextmanager
 def _whole_file(path: Path) -> Iterator[Path]:
     """A file beside ``path`` to write; it becomes ``path`` at the end, or vanishes on any error."""
-    part = path.with_name(f".{path.name}-{os.getpid()}.part")
     try:
-        yield part
-        with part.open("r+b") as file:
-            os.fsync(file.fileno())
-        part.replace(path)
+        with whole_file(path) as part:
+            yield part
+            with part.open("r+b") as file:
+                os.fsync(file.fileno())
     except (OSError, RuntimeError) as error:  # RuntimeError is what HDF5 says of a full disk when it closes a file
         raise CampaignError(
             f"{path} could not be written ({error}), so nothing is: free space, or choose another"
         ) from error
-    finally:
-        part.unlink(missing_ok=True)
 
 
 # --------------------------------------------------------------------------------------------------------- the table

@@ -216,8 +216,8 @@ def _failed(error: BaseException) -> int:
         say(said or "interrupted, nothing was written")
         return INTERRUPTED
     if isinstance(error, OSError):
-        where = f"{error.filename}: {error.strerror}" if error.filename else str(error.strerror or error)
-        say(f"{where}; nothing was written. Check free space and permissions.")
+        where, there = (f"{error.filename}: ", " there") if error.filename else ("", "")
+        say(f"{where}{error.strerror or error}; nothing was written{there}. Check free space and permissions.")
         return REFUSED
     if _meant_for_users(error):
         page = getattr(error, "page", "") or getattr(error.__cause__, "page", "")

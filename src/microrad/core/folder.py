@@ -106,9 +106,11 @@ def whole_folder(folder: Path, overwrite: bool, kind: str = "mission", what: str
     folder.parent.mkdir(parents=True, exist_ok=True)
     draft = _new_folder(folder.parent, f".{folder.name}", ".part")
     try:
-        yield draft
-        draft.chmod(0o755)  # mkdtemp's 0700 is for secrets
-        _replace(draft, folder)
+        with _named(draft, folder):
+            yield draft
+            draft.chmod(0o755)  # mkdtemp's 0700 is for secrets
+            _sync(draft)
+            _replace(draft, folder)
     finally:
         shutil.rmtree(draft, ignore_errors=True)
 
@@ -182,14 +184,35 @@ def _replace(draft: Path, folder: Path) -> None:
         _sweep(folder.parent, f".{folder.name}", _OLD)
         return
     old = _new_folder(folder.parent, f".{folder.name}", _OLD)
-    folder.rename(old / folder.name)
     try:
-        draft.rename(folder)
-    except BaseException:
-        (old / folder.name).rename(folder)
-        raise
+        folder.rename(old / folder.name)
+        try:
+            draft.rename(folder)
+        except BaseException:
+            (old / folder.name).rename(folder)
+            raise
     finally:
-        shutil.rmtree(old, ignore_errors=True)
+        if folder.exists():  # else the old one is all that there is
+            shutil.rmtree(old, ignore_errors=True)
+
+
+def _sync(folder: Path) -> None:
+    """Have what is in a folder on the disk before its name is: a failure of the machine leaves no half of a file."""
+    for path in folder.rglob("*"):
+        if path.is_file():
+            with path.open("r+b") as file:
+                os.fsync(file.fileno())
+
+
+@contextmanager
+def _named(draft: Path, place: Path) -> Iterator[None]:
+    """Within it, an error of the file system names the place that is written to, not the draft, or nothing."""
+    try:
+        yield
+    except OSError as error:
+        at = Path(place if error.filename is None else os.fsdecode(error.filename))
+        at = place / at.relative_to(draft) if at.is_relative_to(draft) else at
+        raise OSError(error.errno, error.strerror or str(error), str(at)) from error
 
 
 def write_whole(path: Path, content: str | bytes, *, durable: bool = True) -> None:
@@ -216,8 +239,9 @@ def whole_file(path: Path) -> Iterator[Path]:
     _sweep(path.parent, _DRAFTS, DRAFT)
     draft = path.with_name(f"{_on_this_machine(_DRAFTS)}{os.getpid()}-{secrets.token_hex(8)}{DRAFT}")
     try:
-        yield draft
-        draft.replace(path)
+        with _named(draft, path):
+            yield draft
+            draft.replace(path)
     except BaseException:
         _remove(draft)
         raise

@@ -318,6 +318,7 @@ def is_written(path: Path) -> bool:
         return False
     with closing(sqlite3.connect(f"{lock.absolute().as_uri()}?mode=rw", uri=True, timeout=0.0)) as glance:
         try:
+            glance.execute("PRAGMA journal_mode = MEMORY")  # to look leaves no file
             glance.execute("BEGIN IMMEDIATE")
         except sqlite3.Error as error:  # a lock that cannot be written to is nobody's
             return code_of(error) == sqlite3.SQLITE_BUSY

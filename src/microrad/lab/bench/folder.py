@@ -1,6 +1,7 @@
 """The folder of an experiment: a file for each record, the plan, and a manifest; whole or not at all."""
 
 import hashlib
+import io
 import json
 import math
 import platform
@@ -149,15 +150,17 @@ def _write_mat73(recording: Recording, path: Path) -> None:
     """HDF5 behind MATLAB's own block of 512 bytes; a column of MATLAB is a row here, because HDF5 counts by rows."""
     import h5py
 
-    with h5py.File(path, "w", userblock_size=512) as file:
+    content = io.BytesIO()  # on a full disk HDF5 cannot close a file, and crashes at exit
+    with h5py.File(content, "w", userblock_size=512) as file:
         arrays = {name: values[None, :] for name, _, values in _channels(recording)}
         scalars = {name: np.array([[float(value)]]) for name, value in _facts(recording).items()}
         for name, values in {**arrays, **scalars}.items():
             file.create_dataset(name, data=values).attrs["MATLAB_class"] = np.bytes_("double")
     text = b"MATLAB 7.3 MAT-file, Platform: microrad, HDF5 schema 1.00 ."
-    with path.open("r+b") as file:
-        # text, no subsystem data, version 2.0, byte order
-        file.write(text.ljust(116) + bytes(8) + b"\x00\x02" + b"IM")
+    content.seek(0)
+    # text, no subsystem data, version 2.0, byte order
+    content.write(text.ljust(116) + bytes(8) + b"\x00\x02" + b"IM")
+    path.write_bytes(content.getbuffer())
 
 
 def _write_npz(recording: Recording, path: Path) -> None:
@@ -169,10 +172,12 @@ def _write_npz(recording: Recording, path: Path) -> None:
 def _write_hdf5(recording: Recording, path: Path) -> None:
     import h5py
 
-    with h5py.File(path, "w") as file:
+    content = io.BytesIO()  # as above
+    with h5py.File(content, "w") as file:
         file.attrs.update(_facts(recording))
         for name, unit, values in _channels(recording):
             file.create_dataset(name, data=values).attrs["units"] = unit
+    path.write_bytes(content.getbuffer())
 
 
 _WRITERS: dict[str, tuple[str, Callable[[Recording, Path], None]]] = {
