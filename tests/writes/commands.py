@@ -23,7 +23,7 @@ from scipy.io import savemat
 from cli.test_cli import write_recording
 from microrad import cli
 from microrad.campaign import run
-from microrad.core.errors import MicroradError
+from microrad.core import kept
 from microrad.export import choice
 from microrad.export.flight import write as flight
 from microrad.export.fmi import fmu
@@ -32,6 +32,7 @@ from microrad.lab.bench import folder as bench
 from microrad.report.campaign import page as campaign_pages
 from microrad.report.identification import page as identification
 from microrad.report.study import page as study_pages
+from microrad.studio import server
 from microrad.studio.jobs import process, queue
 from microrad.studio.jobs.queue import Jobs, Order
 from microrad.studio.recordings.uploads import Uploads
@@ -51,6 +52,7 @@ COMPUTED: tuple[tuple[Any, str, Callable[..., Any]], ...] = (
     (identification, "identification_page", lambda *_: 0),
     (bench, "play_records", lambda plan, seed, _: seed),
     (study_pages, "study_page", lambda *_: 0),
+    (kept, "watched_call", lambda function, *_: function.__qualname__),
 )
 
 
@@ -103,7 +105,7 @@ def _library() -> Callable[..., Any]:
         if target.name in made:
             subprocess.run(["tee", str(target)], input=made[target.name], stdout=subprocess.DEVNULL, check=True)
             return subprocess.CompletedProcess(command, 0, "", "")
-        done = subprocess.run(command, cwd=cwd, **how)
+        done = subprocess.run(command, cwd=cwd, check=False, **{name: how[name] for name in how if name != "check"})
         made[target.name] = target.read_bytes()
         return done
 
@@ -130,9 +132,11 @@ def called(function: Callable[[], Any]) -> Callable[[], int]:
     def does() -> int:
         try:
             function()
-        except (MicroradError, OSError) as error:
-            print(f"microrad: {error}")
-            return 2
+        except (ValueError, OSError) as error:
+            if isinstance(error, OSError) or type(error).__module__.startswith("microrad."):
+                print(f"microrad: {error}")
+                return 2
+            raise
         return 0
 
     return does
@@ -163,9 +167,19 @@ def undated(path: Path) -> Any:
     return {key: value for key, value in json.loads(path.read_bytes()).items() if key != "files_sha256"}
 
 
+def text(path: Path) -> Any:
+    """The text of an unsaved mission."""
+    return json.loads(path.read_bytes())["text"]
+
+
+def len_of(path: Path) -> int:
+    """Of what is another in each run, its length."""
+    return path.stat().st_size
+
+
 def part(path: Path) -> bool:
     """A kept part is checked by whoever reads it."""
-    return path.stat().st_size >= 0
+    return path.is_file()
 
 
 # ------------------------------------------------------------------------------------------------------------- missions
@@ -174,6 +188,17 @@ SMALL = without_fine_pointing(without_day(SHIPPED.read_text("utf-8")))
 
 def mission(here: Path) -> None:
     (here / "mission.toml").write_text(SMALL, encoding="utf-8")
+
+
+RUN = ("run", "mission.toml", "--output", "results")
+
+
+def older(here: Path) -> None:
+    """Results of another microrad, to be replaced."""
+    mission(here)
+    (here / "results").mkdir()
+    (here / "results" / "manifest.json").write_text('{"versions": {"microrad": "0.1.0"}, "mission": 1}', "utf-8")
+    (here / "results" / "report.html").write_text("an older page", "utf-8")
 
 
 def shipped(here: Path) -> None:
@@ -329,6 +354,7 @@ def _autosave() -> None:
 
 def _save() -> None:
     session = _session()
+    session.set("communication.transmit_power", "3 W")  # whatever is kept already, it is kept anew
     session.set("communication.transmit_power", "4 W")
     session.save()
 
@@ -360,16 +386,27 @@ def _submit() -> None:
 
 
 def _run_job() -> None:
+    """Run a job; one that was lost is removed and started anew."""
     jobs = Jobs(Path.cwd() / ".microrad-studio")
-    if jobs.get(1).state == "queued":
-        process.run_job(jobs.get(1).folder, ("true",))
+    (job,) = jobs.listed()
+    if job.state in ("lost", "unreadable"):
+        jobs.remove(job.number)
+        _submit()
+        (job,) = jobs.listed()
+    if job.state == "queued":
+        process.run_job(job.folder, ("true",))
 
 
-def _cancel() -> None:
+def _end_job() -> None:
     jobs = Jobs(Path.cwd() / ".microrad-studio")
-    if not jobs.get(1).finished:
-        jobs.cancel(1)
-    jobs.remove(1)
+    for job in jobs.listed():
+        if not job.finished:
+            jobs.cancel(job.number)
+        jobs.remove(job.number)
+
+
+def _way_in() -> None:
+    server.way_in(_session().studio, "http://127.0.0.1:1/?token=a")
 
 
 async def _blocks() -> AsyncIterator[bytes]:
@@ -384,6 +421,11 @@ def _upload() -> None:
         asyncio.run(uploads.save("loop.csv", _blocks()))
 
 
+def edited(here: Path) -> None:
+    studio(here)
+    assert _quietly(here, called(_autosave)) == 0
+
+
 def studio(here: Path) -> None:
     (here / "leo-geo.toml").write_text(SMALL, encoding="utf-8")
     assert _quietly(here, called(_session)) == 0
@@ -393,6 +435,9 @@ def queued(here: Path) -> None:
     assert _quietly(here, called(_submit)) == 0
 
 
+JOB = {"*job.json": timeless, "*.json": timeless, "*job.code": len_of, "*studio-key": len_of, "*/last": len_of}
+NUMBERED = (r"jobs/\d+\b", "jobs/N")
+KEYED = (r"uploads/[0-9a-f]{16}", "uploads/KEY")
 COMMANDS = (
     Command("init", typed("init")),
     Command("init --preset", typed("init", "--preset", "click", "click.toml")),
@@ -464,24 +509,30 @@ COMMANDS = (
     ),
     Command(
         "run",
-        typed("run", "mission.toml", "--output", "results"),
+        typed(*RUN),
         mission,
-        typed("run", "mission.toml", "--output", "results", "--overwrite"),
+        typed(*RUN, "--overwrite"),
         partly={"home/cache/*": part},
     ),
+    Command(
+        "run --overwrite",
+        typed("run", "mission.toml", "--output", "results", "--overwrite"),
+        older,
+        partly={"home/cache/*": part},
+    ),
+    Command("reproduce", typed("reproduce", "results"), after(mission, *RUN), partly={"home/cache/*": part}),
+    Command("campaign status", typed("campaign", "status", "campaign.ledger"), ledger, **LEDGER),
+    Command("campaign verify", typed("campaign", "verify", "campaign.ledger"), ledger, **LEDGER),
     Command("studio: begin", called(_session), mission),
+    Command("studio: way in", called(_way_in), studio),
     Command("studio: edit", called(_autosave), studio),
-    Command("studio: save", called(_save), studio),
+    Command("studio: save", called(_save), edited, content={"*/draft.json": text}, partly={"*/draft.json": text}),
     Command("studio: save as", called(_save_as), studio),
-    Command("studio: second mission", called(_beside), studio),
+    Command("studio: second mission", called(_beside), studio, partly={"*/other.json": timeless}),
     Command("studio: campaign", called(_write_campaign), studio),
     Command("studio: form", called(_form), studio),
-    Command(
-        "studio: job",
-        called(_submit),
-        content={"*job.json": timeless, "*job.code": lambda path: None, "*studio-key": part},
-    ),
-    Command("studio: run of a job", called(_run_job), queued, content={"*.json": timeless}),
-    Command("studio: end of a job", called(_cancel), queued),
-    Command("studio: recording", called(_upload)),
+    Command("studio: job", called(_submit), content=JOB, named=NUMBERED),
+    Command("studio: run of a job", called(_run_job), queued, content=JOB, named=NUMBERED),
+    Command("studio: end of a job", called(_end_job), queued, content=JOB, named=NUMBERED),
+    Command("studio: recording", called(_upload), named=KEYED),
 )

@@ -48,7 +48,7 @@ _PLACES = {
 
 
 class Write(NamedTuple):
-    """An operation: its number, the call, what it is, its file from the folder, and whether a file is not synced yet."""
+    """An operation: its number, the call, what it is, its file from the folder, whether a file is not synced yet."""
 
     number: int
     call: str
@@ -72,7 +72,8 @@ class Command:
 
     ``does`` runs it in the current folder and returns its exit code. Where that is refused because results are there,
     ``otherwise`` is what the refusal says to do. ``content`` has readers by pattern of the path: what of a file is the
-    same in each run. ``threads`` says that it leaves threads, so that it is not run in the process that forks.
+    same in each run. ``named`` is a pattern of names that are others in each run, and what stands in their place.
+    ``threads`` says that it leaves threads, so that it is not run in the process that forks.
     ``partly`` has those of files that grow while the command runs: they fail where one is damaged.
     """
 
@@ -83,6 +84,7 @@ class Command:
     content: Mapping[str, Callable[[Path], Any]] = field(default_factory=dict)
     partly: Mapping[str, Callable[[Path], Any]] = field(default_factory=dict)
     threads: bool = False
+    named: tuple[str, str] = ("^$", "")
 
 
 class Ended(NamedTuple):
@@ -116,6 +118,7 @@ class Layer:
         """
         self.base, self.work = base.resolve(), base.resolve() / "work"
         self.here = self.work / "here"
+        self._stands = (self.base / "begin", self.base / "end", self.work)
         self._shim = ctypes.CDLL(str(shim))
         os.environ.update({name: str(self.work / place) for name, place in _PLACES.items()})
         ctypes.CDLL(None).prctl(36, 1, 0, 0, 0)  # PR_SET_CHILD_SUBREAPER: what a killed run leaves behind ends here
@@ -125,6 +128,8 @@ class Layer:
         self._fresh()
         with (self.base / "said").open("wb") as words, _told(words.fileno()), contextlib.chdir(self.here):
             command.prepare(self.here)
+            shutil.rmtree(self.work / "temporary")  # this process lives on, and with it what it has there
+            (self.work / "temporary").mkdir()
             self._keep("begin")
             if not command.threads:
                 command.does()
@@ -188,8 +193,8 @@ class Layer:
     def _unseen(self, log: list[str]) -> None:
         """Raises RuntimeError where a file is new or another one that the log has not seen: the layer is blind then."""
         seen = {line.split("\t", 5)[5] for line in log if line[0] in "wnt"}
-        old, new = _files(self.base / "begin"), _files(self.base / "end")
-        changed = [name for name, path in new.items() if name not in old or not _equal(path, old[name])]
+        old, new = (_files(folder) for folder in self._stands[:2])
+        changed = [name for name, path in new.items() if path.is_file() and (name not in old or not _equal(path, old[name]))]
         names = {
             line.split("\t", 5)[5] for line in log if "\trename\t" in line or "\tlink\t" in line or "\tmkdir\t" in line
         }
@@ -239,7 +244,7 @@ class Layer:
         words = said[said.rfind("microrad: ") :].strip()
         if "\n" in words:
             yield f"says more than a line: {words}"
-        old, new, now = (_files(folder) for folder in (self.base / "begin", self.base / "end", self.work))
+        old, new, now = (_files(folder, command.named) for folder in self._stands)
         if not any(piece in words for name in (*old, *new) for piece in Path(name).parts):
             yield f"names no file: {words}"
         if re.search(r"nothing was written(?! there)|nothing is", words):
@@ -258,12 +263,14 @@ class Layer:
 
         What is not whole yet, and what grows, may be there before the ``last`` run.
         """
-        old, new, now = (_files(folder) for folder in (self.base / "begin", self.base / "end", self.work))
+        old, new, now = (_files(folder, command.named) for folder in self._stands)
         for name, path in now.items():
             partly = _of(command.partly, name)
             if name not in new and _DRAFT.search(name):
                 if last:
                     yield f"{name} stays"
+            elif path.is_dir() and any(each.startswith(f"{name}/") for each in (*old, *new)):
+                continue
             elif name not in old and name not in new and (last or partly is None):
                 yield f"{name} is none of the command's"
             elif partly is not None and not (whole and name in new):
@@ -274,7 +281,7 @@ class Layer:
                 if like and not any(_same(command, name, path, each) for each in like):
                     yield f"{name} ({path.stat().st_size} bytes) is not whole"
         if whole:
-            yield from (f"{name} lacks" for name in new if name not in now and not (self.work / name).is_dir())
+            yield from (f"{name} lacks" for name in new if name not in now and not new[name].is_dir())
 
 
 _DRAFT = re.compile(r"(^|/)\.[^/]*(\.draft|\.part|\.old|\.new)(/|$)|(^|/)\.new-|^temporary/|\.part(-\w+)?$")
@@ -309,13 +316,13 @@ def _equal(path: Path, like: Path) -> bool:
     return path.is_file() == like.is_file() and (not path.is_file() or path.read_bytes() == like.read_bytes())
 
 
-def _files(folder: Path) -> dict[str, Path]:
-    """Files, and folders without any, below a folder, by their names from there."""
+def _files(folder: Path, named: tuple[str, str] = ("^$", "")) -> dict[str, Path]:
+    """Files, and folders without any, below a folder, by their names from there, with what is another each time."""
     found = {}
     for place, folders, files in os.walk(folder):
         for name in files if files or folders or Path(place) == folder else [""]:
             path = Path(place) / name
-            found[str(path.relative_to(folder))] = path
+            found[re.sub(*named, str(path.relative_to(folder)))] = path
     return found
 
 

@@ -21,7 +21,7 @@ from microrad.campaign.definition.reader import read_definition
 from microrad.campaign.definition.records import CampaignFile
 from microrad.campaign.records import CampaignError
 from microrad.core import lti
-from microrad.core.folder import read_bytes, scratch_folder
+from microrad.core.folder import naming, read_bytes, scratch_folder
 from microrad.core.machine import source_sha256
 from microrad.loop.control import AxisController
 from microrad.mission.file import named_files
@@ -98,10 +98,11 @@ def opened(spec: bytes, any_code: bool = False) -> Opened:
         )
     folder = scratch_folder("campaign")
     try:
-        for name, data in content.files.items():
-            path = _inside(folder, name)
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(data)
+        with naming(folder, folder):
+            for name, data in content.files.items():
+                path = _inside(folder, name)
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.write_bytes(data)
         campaign, _ = read_definition(_inside(folder, content.campaign))  # whoever packed it has tried its rows
         found = Opened(replace(campaign, chunk_rows=content.chunk_rows), content.controllers)
     except BaseException:

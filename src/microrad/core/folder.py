@@ -104,9 +104,9 @@ def whole_folder(folder: Path, overwrite: bool, kind: str = "mission", what: str
     """
     check_folder(folder, overwrite, kind, what)
     folder.parent.mkdir(parents=True, exist_ok=True)
-    draft = _new_folder(folder.parent, f".{folder.name}", ".part")
+    draft = new_folder(folder.parent, f".{folder.name}", ".part")
     try:
-        with _named(draft, folder):
+        with naming(draft, folder):
             yield draft
             draft.chmod(0o755)  # mkdtemp's 0700 is for secrets
             _sync(draft)
@@ -117,7 +117,7 @@ def whole_folder(folder: Path, overwrite: bool, kind: str = "mission", what: str
 
 def scratch_folder(what: str) -> Path:
     """A new folder among the temporary files, which whoever asks for it removes."""
-    return _new_folder(Path(tempfile.gettempdir()), f"microrad-{what}")
+    return new_folder(Path(tempfile.gettempdir()), f"microrad-{what}")
 
 
 @contextmanager
@@ -125,13 +125,20 @@ def scratch(what: str) -> Iterator[Path]:
     """A folder among the temporary files, which vanishes at the end."""
     folder = scratch_folder(what)
     try:
-        yield folder
+        with naming(folder, folder):
+            yield folder
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def _new_folder(parent: Path, name: str, suffix: str = "") -> Path:
-    """A new folder for this process; those of the name that processes left here when they were killed are removed."""
+def new_folder(parent: Path, name: str, suffix: str = "") -> Path:
+    """A new folder for this process; those of the name that processes left here when they were killed are removed.
+
+    Args:
+        parent: Where it is made.
+        name: Begin of its name.
+        suffix: End of its name.
+    """
     _sweep(parent, name, suffix)
     return Path(tempfile.mkdtemp(prefix=f"{_on_this_machine(name)}{os.getpid()}-", suffix=suffix, dir=parent))
 
@@ -183,7 +190,7 @@ def _replace(draft: Path, folder: Path) -> None:
         draft.rename(folder)
         _sweep(folder.parent, f".{folder.name}", _OLD)
         return
-    old = _new_folder(folder.parent, f".{folder.name}", _OLD)
+    old = new_folder(folder.parent, f".{folder.name}", _OLD)
     try:
         folder.rename(old / folder.name)
         try:
@@ -205,8 +212,13 @@ def _sync(folder: Path) -> None:
 
 
 @contextmanager
-def _named(draft: Path, place: Path) -> Iterator[None]:
-    """Within it, an error of the file system names the place that is written to, not the draft, or nothing."""
+def naming(draft: Path, place: Path) -> Iterator[None]:
+    """Within it, an error of the file system names the place that is written to, not the draft, or nothing.
+
+    Args:
+        draft: What is written.
+        place: What it becomes.
+    """
     try:
         yield
     except OSError as error:
@@ -215,7 +227,7 @@ def _named(draft: Path, place: Path) -> Iterator[None]:
         raise OSError(error.errno, error.strerror or str(error), str(at)) from error
 
 
-def write_whole(path: Path, content: str | bytes, *, durable: bool = True) -> None:
+def write_whole(path: Path, content: str | bytes, *, durable: bool = True, mode: int | None = None) -> None:
     """Write a file whole or not at all: beside its place first.
 
     What processes left beside it when they were killed is removed.
@@ -225,8 +237,11 @@ def write_whole(path: Path, content: str | bytes, *, durable: bool = True) -> No
         content: Bytes, or text that is written in UTF-8 with its line ends as they are.
         durable: Whether it is on the disk on return. If not, a failure of the machine may cut the file: for one that
             its readers check.
+        mode: Who may read and write it; by default what the user's new files have.
     """
     with whole_file(path) as draft, draft.open("xb") as file:
+        if mode is not None:
+            draft.chmod(mode)
         file.write(content.encode("utf-8") if isinstance(content, str) else content)
         if durable:
             file.flush()
@@ -236,12 +251,21 @@ def write_whole(path: Path, content: str | bytes, *, durable: bool = True) -> No
 @contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
     """A name beside ``path`` for a new file; it becomes ``path`` at the end, or vanishes on any error."""
+    with draft_beside(path) as draft:
+        yield draft
+        draft.replace(path)
+
+
+@contextmanager
+def draft_beside(path: Path) -> Iterator[Path]:
+    """A name beside ``path`` for a file that is not whole yet: what has it at the end is removed.
+
+    So is what processes left there when they were killed.
+    """
     _sweep(path.parent, _DRAFTS, DRAFT)
     draft = path.with_name(f"{_on_this_machine(_DRAFTS)}{os.getpid()}-{secrets.token_hex(8)}{DRAFT}")
     try:
-        with _named(draft, path):
+        with naming(draft, path):
             yield draft
-            draft.replace(path)
-    except BaseException:
+    finally:
         _remove(draft)
-        raise

@@ -18,6 +18,7 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any
 
+from microrad.core.folder import whole_file
 from microrad.core.installing import advice
 from microrad.studio.guard import address, plain_files, policy
 from microrad.studio.guard.middleware import Guard
@@ -230,8 +231,7 @@ def way_in(studio: Path, url: str) -> str:
         url: the address with the token.
     """
     path = studio / _WAY_IN
-    path.unlink(missing_ok=True)
-    with plain_files.new(path) as file:
+    with whole_file(path) as draft, plain_files.new(draft) as file:
         file.write(_PAGE.format(url=url).encode("ascii"))
     return path.as_uri()
 

@@ -7,6 +7,7 @@ closed tab and a restart.
 from __future__ import annotations
 
 import json
+import os
 import threading
 from collections.abc import Callable
 from contextlib import suppress
@@ -239,5 +240,5 @@ def _sign(path: Path) -> object:
 
 def _keep_out_of_repositories(studio: Path) -> None:
     """Have git overlook the studio's own folder."""
-    with suppress(FileExistsError), (studio / ".gitignore").open("x", encoding="utf-8") as file:
-        file.write("*\n")
+    if not os.path.lexists(studio / ".gitignore"):
+        write_whole(studio / ".gitignore", "*\n")

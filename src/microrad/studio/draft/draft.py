@@ -282,9 +282,7 @@ def _write(target: Path, text: str) -> None:
     """Write whole, through a link to what it names, and keep who may read it."""
     target = target.resolve()
     mode = target.stat().st_mode & 0o777 if target.exists() else None
-    write_whole(target, text)
-    if mode is not None:
-        target.chmod(mode)
+    write_whole(target, text, mode=mode)
 
 
 def _plain(text: str) -> str:

@@ -16,6 +16,7 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
+from microrad.core.folder import draft_beside
 from microrad.studio.guard import plain_files
 
 _NAME = "studio-key"
@@ -95,14 +96,13 @@ def _key() -> bytes | None:
 
 
 def _write_new(path: Path, content: bytes) -> None:
-    """Write a file that is not there yet, for its owner alone; what cannot be written whole is taken back."""
-    with plain_files.new(path) as file:
-        try:
+    """Write a file whole that is not there yet, for its owner alone. Raises FileExistsError where it is."""
+    with draft_beside(path) as draft:
+        with plain_files.new(draft) as file:
             file.write(content)
             file.flush()
-        except OSError:
-            path.unlink()
-            raise
+            os.fsync(file.fileno())
+        os.link(draft, path)
 
 
 def _new_key() -> bytes:

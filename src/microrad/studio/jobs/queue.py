@@ -10,12 +10,11 @@ from __future__ import annotations
 import json
 import os
 import shutil
-import tempfile
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from microrad.core.folder import write_whole
+from microrad.core.folder import new_folder, write_whole
 from microrad.studio.guard import plain_files, signing
 from microrad.studio.guard.signing import SigningError
 from microrad.studio.jobs.files import (
@@ -40,7 +39,7 @@ __all__ = ["Job", "JobError", "Jobs", "Kind", "Order", "Progress", "State"]
 
 _LAST = "last"
 _LAST_FIGURES = 9  # of a last number that is believed
-_NEW = ".new-"  # a folder that is a job not yet
+_NEW = ".new"  # a folder that is a job not yet
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +86,7 @@ class Jobs:
     def _put(self, description: str) -> Path:
         """A new folder with the description of a job and its code, which appears with all or not at all."""
         code = signing.code(description.encode())
-        draft = Path(tempfile.mkdtemp(prefix=_NEW, dir=self.folder))  # its mode is 0700
+        draft = new_folder(self.folder, _NEW)  # its mode is 0700
         try:
             write_whole(draft / JOB, description)
             write_whole(draft / CODE, code)

@@ -7,6 +7,7 @@ second tab; nothing is read from them here (see `microrad.studio.recordings.read
 from __future__ import annotations
 
 import asyncio
+import os
 import re
 import secrets
 import shutil
@@ -94,6 +95,7 @@ class Uploads:
             try:
                 with plain_files.new(place / _PART) as file:
                     await self._fill(file, name, blocks)
+                    await asyncio.to_thread(os.fsync, file.fileno())
                 (place / _PART).rename(place / name)
             except BaseException:  # the browser went away, too
                 shutil.rmtree(place, ignore_errors=True)
