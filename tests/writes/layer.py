@@ -8,6 +8,7 @@ command runs, and beside it home, cache, state and temporary files of its user.
 import atexit
 import contextlib
 import ctypes
+import gc
 import os
 import re
 import select
@@ -153,6 +154,7 @@ class Layer:
     def run(self, does: Callable[[], int], number: int = 0, kind: str = "") -> Ended:
         """Run a command with a fault, or without one; it sees the files as they are."""
         log, said = self.base / "log", self.base / "said"
+        gc.freeze()  # a run shares what is here, and does not look through it
         with log.open("wb") as lines, said.open("wb") as words:
             child = os.fork()
             if child == 0:
@@ -194,7 +196,9 @@ class Layer:
         """Raises RuntimeError where a file is new or another one that the log has not seen: the layer is blind then."""
         seen = {line.split("\t", 5)[5] for line in log if line[0] in "wnt"}
         old, new = (_files(folder) for folder in self._stands[:2])
-        changed = [name for name, path in new.items() if path.is_file() and (name not in old or not _equal(path, old[name]))]
+        changed = [
+            name for name, path in new.items() if path.is_file() and (name not in old or not _equal(path, old[name]))
+        ]
         names = {
             line.split("\t", 5)[5] for line in log if "\trename\t" in line or "\tlink\t" in line or "\tmkdir\t" in line
         }
@@ -281,7 +285,9 @@ class Layer:
                 if like and not any(_same(command, name, path, each) for each in like):
                     yield f"{name} ({path.stat().st_size} bytes) is not whole"
         if whole:
-            yield from (f"{name} lacks" for name in new if name not in now and not new[name].is_dir())
+            for name, path in new.items():
+                if name not in now and path.is_file() and (last or _of(command.partly, name) is None):
+                    yield f"{name} lacks"
 
 
 _DRAFT = re.compile(r"(^|/)\.[^/]*(\.draft|\.part|\.old|\.new)(/|$)|(^|/)\.new-|^temporary/|\.part(-\w+)?$")

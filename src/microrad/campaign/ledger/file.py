@@ -39,10 +39,10 @@ def make_empty(path: Path) -> None:
     for name in files(path):
         name.unlink(missing_ok=True)
     with closing(sqlite3.connect(path, isolation_level=None)) as connection:
-        for pragma in (f"application_id = {_APPLICATION}", f"user_version = {FORMAT}"):
-            connection.execute(f"PRAGMA {pragma}")
         connection.execute("PRAGMA synchronous = FULL")
         connection.execute("BEGIN")
+        for pragma in (f"application_id = {_APPLICATION}", f"user_version = {FORMAT}"):
+            connection.execute(f"PRAGMA {pragma}")
         for statement in _TABLES.split(";"):
             connection.execute(statement)
         connection.execute("COMMIT")
