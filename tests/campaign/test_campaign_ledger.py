@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from microrad.campaign.ledger import Ledger, check_same, chunk_format, mend, mending, verify
+from microrad.campaign.ledger import Ledger, check_same, chunk_format, file, mend, mending, verify
 from microrad.campaign.ledger.chunk_format import Column, Head
 from microrad.campaign.ledger.file import FORMAT, is_written, refuse_existing
 from microrad.campaign.records import CampaignError, Chunk, Failed, WorstTrace
@@ -680,6 +680,29 @@ def test_a_creation_that_was_killed_leaves_nothing_in_the_way(path):
     filled(path, 2)
     assert verify(path).checked == 3
     assert sorted(each.name for each in path.parent.iterdir()) == [path.name, path.name + ".lock"]
+
+
+def test_a_ledger_has_no_log_before_it_is_in_its_place(path, monkeypatch):
+    """What goes through a log is taken in as the file is closed, and SQLite does not tell where that fails."""
+    modes, install = [], file.install
+
+    def looking(draft, place):
+        with contextlib.closing(sqlite3.connect(draft)) as connection:
+            modes.append(connection.execute("PRAGMA journal_mode").fetchone()[0])
+        install(draft, place)
+        with contextlib.closing(sqlite3.connect(place)) as connection:
+            modes.append(connection.execute("PRAGMA journal_mode").fetchone()[0])
+
+    monkeypatch.setattr(file, "install", looking)
+    filled(path, 2)
+    assert modes == ["delete", "wal"]
+
+
+def test_notes_from_the_begin_are_in_a_ledger_that_was_only_made(path, monkeypatch):
+    monkeypatch.setattr(Ledger, "open", lambda *args, **how: None)
+    Ledger.create(path, HEAD, {"file": "campaign.toml"})
+    with contextlib.closing(sqlite3.connect(path)) as connection:
+        assert file.notes_in(connection) == {"file": "campaign.toml"}
 
 
 @pytest.fixture

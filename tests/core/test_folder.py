@@ -1,5 +1,6 @@
 """What a file holds, read without a wait for one that never ends; what killed processes leave behind."""
 
+import errno
 import os
 import subprocess
 import sys
@@ -19,6 +20,13 @@ with scratch("test") as one, whole_folder(Path(sys.argv[1]), False) as two:
     (one / "a").write_text("a")
     (two / "b").write_text("b")
     os.kill(os.getpid(), signal.SIGKILL)
+"""
+KILLED_BEFORE_ITS_FILE_IS_WHOLE = """
+import os, signal, sys
+from pathlib import Path
+from microrad.core.folder import write_whole
+os.fsync = lambda file: os.kill(os.getpid(), signal.SIGKILL)
+write_whole(Path(sys.argv[1]), "a")
 """
 REPLACING = """
 import os, shutil, signal, sys
@@ -132,3 +140,72 @@ def test_two_threads_write_into_one_folder_at_once(tmp_path, monkeypatch):
     write_whole(tmp_path / "a", "of the first")
     assert failed == []
     assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"a": "of the first", "b": "of the other"}
+
+
+@pytest.mark.skipif(os.name != "posix", reason="elsewhere no process can be asked for by its number without harm")
+def test_the_draft_of_a_killed_process_is_gone_with_the_next_file_beside_it(tmp_path):
+    subprocess.run([sys.executable, "-c", KILLED_BEFORE_ITS_FILE_IS_WHOLE, tmp_path / "a"], check=False)
+    assert [path.suffix for path in tmp_path.iterdir()] == [folder.DRAFT]
+    write_whole(tmp_path / "b", "b")
+    assert [path.name for path in tmp_path.iterdir()] == ["b"]
+
+
+FULL = OSError(errno.ENOSPC, "No space left on device")
+
+
+def failing(*args):
+    raise FULL
+
+
+def test_an_error_names_the_file_that_was_to_be_written_and_leaves_the_old_one(tmp_path, monkeypatch):
+    (tmp_path / "a").write_text("old")
+    monkeypatch.setattr(folder.os, "fsync", failing)
+    with pytest.raises(OSError, match="No space left") as caught:
+        write_whole(tmp_path / "a", "new")
+    assert (caught.value.errno, caught.value.filename) == (errno.ENOSPC, str(tmp_path / "a"))
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"a": "old"}
+
+
+def test_an_error_in_a_folder_names_the_place_in_the_folder(tmp_path):
+    with pytest.raises(FileNotFoundError) as caught, whole_folder(tmp_path / "results", False) as draft:
+        (draft / "figures" / "a").write_text("a")
+    assert caught.value.filename == str(tmp_path / "results" / "figures" / "a")
+    with pytest.raises(OSError, match="No space left") as caught, scratch("test") as place:
+        failing()
+    assert caught.value.filename == str(place)
+
+
+def test_a_file_has_its_mode_before_it_has_its_name(tmp_path, monkeypatch):
+    monkeypatch.setattr(folder.Path, "chmod", failing)
+    with pytest.raises(OSError, match="No space left"):
+        write_whole(tmp_path / "a", "new", mode=0o600)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_is_on_the_disk_before_it_has_its_name(tmp_path, monkeypatch):
+    synced = []
+    monkeypatch.setattr(folder.os, "fsync", lambda file: synced.append((os.fstat(file).st_ino, results.exists())))
+    results = tmp_path / "results"
+    with whole_folder(results, False) as draft:
+        (draft / "figures").mkdir()
+        for name in ("a", "figures/b"):
+            (draft / name).write_text(name)
+    assert sorted(synced) == sorted(((results / name).stat().st_ino, False) for name in ("a", "figures/b"))
+
+
+def test_old_results_that_cannot_be_put_back_stay_aside(tmp_path, monkeypatch):
+    results = tmp_path / "results"
+    results.mkdir()
+    (results / "manifest.json").write_text('{"versions": {"microrad": "0"}, "mission": 1}', "utf-8")
+    rename = folder.Path.rename
+
+    def once(path, target):
+        if path != results:
+            failing()
+        return rename(path, target)
+
+    monkeypatch.setattr(folder.Path, "rename", once)
+    with pytest.raises(OSError, match="No space left"), whole_folder(results, True):
+        pass
+    (left,) = tmp_path.iterdir()
+    assert [path.name for path in (left / "results").iterdir()] == ["manifest.json"]

@@ -1,5 +1,6 @@
 """Playing a plan: noise, converters and sensor as the plan says, and its files as libraries read them."""
 
+import errno
 import hashlib
 import json
 import math
@@ -13,6 +14,7 @@ import scipy.io
 from nptdms import TdmsFile
 
 from microrad.core.folder import FolderError
+from microrad.lab.bench import folder as bench_folder
 from microrad.lab.bench import load_plan, play, select_records, write_folder
 from microrad.lab.bench.plan import FORMATS, PlanError
 from microrad.lab.bench.play import BenchError, true_output
@@ -302,6 +304,20 @@ def test_a_folder_is_never_half_written(short, tmp_path):
         write_folder(bad, folder, SEED, overwrite=True)
     assert sorted(path.name for path in folder.iterdir()) == names
     assert list(tmp_path.iterdir()) == [folder]
+
+
+@pytest.mark.parametrize("form", ["mat73", "hdf5"])
+def test_hdf5_is_whole_before_a_disk_can_be_full(short, tmp_path, monkeypatch, form):
+    """HDF5 cannot close a file on a full disk: its errors came one behind the other, and the process crashed."""
+
+    def full(path, content):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(bench_folder.Path, "write_bytes", full)
+    with pytest.raises(OSError, match="No space left") as caught:
+        write_folder(replace(short, formats=(form,)), tmp_path / "bench", SEED)
+    assert caught.value.filename == str(tmp_path / "bench")
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_format_without_its_library_says_what_to_install(short, tmp_path, monkeypatch):

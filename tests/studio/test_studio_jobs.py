@@ -2,6 +2,7 @@
 
 import json
 import os
+import platform
 import re
 import shutil
 import signal
@@ -408,6 +409,17 @@ def test_an_order_that_is_refused_is_not_in_the_queue(studio, tmp_path, monkeypa
     with pytest.raises(JobError, match="No space left on device; check free space and permissions"):
         studio.submit(order(tmp_path, "presets"))
     assert (studio.listed(), [each.name for each in studio.folder.iterdir() if each.is_dir()]) == ((), [])
+
+
+@pytest.mark.skipif(os.name != "posix", reason="elsewhere no process can be asked for by its number without harm")
+def test_what_a_killed_studio_has_left_of_an_order_is_gone_with_the_next_one(studio, tmp_path, monkeypatch):
+    monkeypatch.setattr(jobs_module, "start_waiting", lambda folder: None)
+    gone = subprocess.Popen([sys.executable, "-c", ""])
+    gone.wait()
+    jobs = Jobs(studio)
+    (jobs.folder / f".new-{re.sub('[^A-Za-z0-9]', '_', platform.node())}-{gone.pid}-x").mkdir()
+    jobs.submit(order(tmp_path))
+    assert sorted(path.name for path in jobs.folder.iterdir()) == ["1", "last", "lock"]
 
 
 def test_what_cannot_be_cancelled_or_removed_is_told(studio, tmp_path, monkeypatch):

@@ -261,6 +261,13 @@ def test_a_place_that_cannot_take_the_key_is_told(own_key, tmp_path):
         signing.code(b"text")
 
 
+def test_a_key_is_never_there_before_it_is_whole(own_key, monkeypatch):
+    synced, sync = [], os.fsync
+    monkeypatch.setattr(os, "fsync", lambda file: (sync(file), synced.append(own_key.exists())))
+    signing.code(b"text")
+    assert (synced, [path.name for path in own_key.parent.iterdir()]) == ([False], [own_key.name])
+
+
 def test_a_key_that_cannot_be_written_leaves_nothing(own_key, monkeypatch):
     class Full(io.BytesIO):
         def write(self, data):

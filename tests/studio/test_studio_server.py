@@ -266,6 +266,18 @@ def test_the_page_that_a_browser_is_started_with_is_its_owners_alone(file, tmp_p
     assert server.way_in(studio, url) == page  # a second time
 
 
+def test_a_page_that_cannot_be_written_is_named_and_not_there(file, monkeypatch):
+    def full(path):
+        raise OSError(28, "No space left on device")
+
+    studio = Session(file.parent).studio
+    with pytest.raises(OSError, match="No space left") as caught, monkeypatch.context() as patch:
+        patch.setattr(server.plain_files, "new", full)
+        server.way_in(studio, "http://127.0.0.1:8123/?token=secret")
+    assert caught.value.filename == str(studio / "open.html")
+    assert not (studio / "open.html").exists()
+
+
 def test_only_results_of_a_job_within_the_folder_are_shown(file, tmp_path_factory):
     outside = tmp_path_factory.mktemp("outside") / "secret.html"
     outside.write_text("secret", "utf-8")

@@ -148,6 +148,13 @@ def mode(path):
     return stat.S_IMODE(path.stat().st_mode)
 
 
+def test_a_recording_is_on_the_disk_before_it_has_its_name(tmp_path, monkeypatch):
+    there = []
+    monkeypatch.setattr(os, "fsync", lambda file: there.append([path.name for path in tmp_path.rglob("*.*")]))
+    save(Uploads(tmp_path, LIMITS), "x.csv", b"1")
+    assert there == [[".part"]]
+
+
 @posix
 def test_a_file_is_stored_as_it_came_for_its_owner_only(tmp_path):
     uploads = Uploads(tmp_path / "a" / "uploads", LIMITS)

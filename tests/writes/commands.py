@@ -23,18 +23,22 @@ import pytest
 from scipy.io import savemat
 
 import small_campaign
+from cli import test_cli_coupled
 from cli.test_cli import write_recording
 from microrad import cli, report
 from microrad.campaign import run
 from microrad.campaign.records import Job, Outcome
+from microrad.cli.frame import PROGRESS_FILE, progress_bar
 from microrad.core import kept
 from microrad.export import choice
 from microrad.export.flight import write as flight
 from microrad.export.fmi import fmu
 from microrad.lab import identify
 from microrad.lab.bench import folder as bench
+from microrad.lab.identify import coupled
 from microrad.report.campaign import page as campaign_pages
 from microrad.report.campaign import text as campaign_texts
+from microrad.report.identification import coupled as coupled_page
 from microrad.report.identification import page as identification
 from microrad.report.results import arrays
 from microrad.report.study import page as study_pages
@@ -58,6 +62,8 @@ COMPUTED: tuple[tuple[Any, str, Callable[..., Any]], ...] = (
     (choice, "vectors", lambda chosen, samples: samples),
     (identify, "identify", lambda *_: 0),
     (identification, "identification_page", lambda *_: 0),
+    (coupled, "identify_coupled", lambda *_: 0),
+    (coupled_page, "coupled_page", lambda *_: 0),
     (bench, "play_records", lambda plan, seed, _: seed),
     (study_pages, "study_page", lambda *_: 0),
     (study, "run_study", lambda file, on_progress, *parts: None if parts else 0),
@@ -199,6 +205,11 @@ def undated(path: Path) -> Any:
 def text(path: Path) -> Any:
     """The text of an unsaved mission."""
     return json.loads(path.read_bytes())["text"]
+
+
+def lines(path: Path) -> Any:
+    """Whole lines of progress without their times: the last one may be cut, and a full disk is no fault of the run."""
+    return path.is_file()
 
 
 def len_of(path: Path) -> int:
@@ -348,12 +359,20 @@ def recording(here: Path) -> None:
     write_recording(here / "loop.csv")
 
 
+def two_axes(here: Path) -> None:
+    test_cli_coupled.table(here)
+
+
 def model(here: Path) -> None:
     savemat(here / "model.mat", {"num": [[2.0e4]], "den": [[1.0, 80.0, 2.5e7]]})
 
 
 UNDATED = {"*.mat": undated, "*/manifest.json": undated}
 IDENTIFY = ("identify", "loop.csv", "--input", "drive", "--output", "angle", "--rate", "1000", "--static")
+COUPLED = (
+    *("identify", "axes.csv", "--input", "ux", "--input", "u,y", "--output", "x", "--output", "y"),
+    *("--output-unit", "um", "--name", "axes", "--period", str(test_cli_coupled.PERIOD)),
+)
 IMPORT = (
     *("import", "model.mat", "--travel", "2.5 mrad", "--drive", "0 V", "12 V", "--bias", "6 V"),
     *("--rate-limit", "3770 V/s", "--band", "1 Hz", "5 kHz", "--normalise-at", "2 Hz", "--output-unit", "rad"),
@@ -430,6 +449,14 @@ def _end_job() -> None:
         if not job.finished:
             jobs.cancel(job.number)
         jobs.remove(job.number)
+
+
+def _progress() -> None:
+    """What a job notes while it runs: how far it is."""
+    os.environ[PROGRESS_FILE] = "progress"
+    with progress_bar() as move:
+        move(0, 2, "rows")
+        move(2, 2, "rows")
 
 
 def _way_in() -> None:
@@ -515,6 +542,7 @@ COMMANDS = (
         typed(*IDENTIFY, "--name", "another", "--mirror-file", "loop-mirror.toml", "--overwrite"),
         after(recording, *IDENTIFY),
     ),
+    Command("identify, two axes", typed(*COUPLED), two_axes, typed(*COUPLED, "--overwrite")),
     Command("import", typed(*IMPORT), model, typed(*IMPORT, "--overwrite")),
     Command(
         "export c",
@@ -560,6 +588,51 @@ COMMANDS = (
     Command("studio: form", called(_form), studio),
     Command("studio: job", called(_submit), content=JOB, named=NUMBERED),
     Command("studio: run of a job", called(_run_job), queued, content=JOB, named=NUMBERED),
+    Command(
+        "studio: progress of a job", called(_progress), content={"*/progress": lines}, partly={"*/progress": lines}
+    ),
     Command("studio: end of a job", called(_end_job), queued, content=JOB, named=NUMBERED),
     Command("studio: recording", called(_upload), named=KEYED),
 )
+
+WRITERS = {
+    "campaign/bundle.py": "campaign run",
+    "campaign/engines/local.py": "a folder among the temporary files for each worker, as campaign/bundle.py has one",
+    "campaign/export.py": "campaign export nc",
+    "campaign/ledger/file.py": "campaign run",
+    "campaign/ledger/ledger.py": "campaign run",
+    "campaign/ledger/mending.py": "campaign resume, damaged",
+    "cli/__init__.py": "init",
+    "cli/campaign.py": "campaign init",
+    "cli/coupled.py": "identify, two axes",
+    "cli/export.py": "import",
+    "cli/frame.py": "studio: progress of a job",
+    "cli/installation.py": "tries whether the cache of the compiled loops can be written, by a file without a name",
+    "cli/lab.py": "identify",
+    "core/folder.py": "bench --overwrite",
+    "core/kept.py": "run",
+    "export/flight/stack.py": "a folder among the temporary files, as export/fmi/fmu.py has one",
+    "export/flight/write.py": "export c",
+    "export/fmi/fmu.py": "export fmu",
+    "export/matrices/files.py": "export matrices",
+    "lab/bench/folder.py": "bench",
+    "lab/live_fit.py": "adds a line for the page that looks on, which leaves out one that is cut",
+    "report/__init__.py": "run",
+    "report/identification/coupled.py": "identify, two axes",
+    "report/identification/page.py": "identify",
+    "report/results/manifest.py": "run",
+    "report/results/manifest_reader.py": "reproduce",
+    "report/results/reproduce.py": "reproduce",
+    "studio/draft/draft.py": "studio: save",
+    "studio/guard/plain_files.py": "studio: begin",
+    "studio/guard/signing.py": "studio: job",
+    "studio/jobs/files.py": "studio: run of a job",
+    "studio/jobs/process.py": "studio: run of a job",
+    "studio/jobs/queue.py": "studio: job",
+    "studio/recordings/uploads.py": "studio: recording",
+    "studio/server.py": "studio: way in",
+    "studio/session.py": "studio: edit",
+    "studio/views/mirror_form.py": "studio: form",
+    "studio/views/runs.py": "studio: campaign",
+}
+"""The files of the package that write, each with a command that takes it through that, or why there is none."""
