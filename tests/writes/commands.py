@@ -63,7 +63,7 @@ COMPUTED: tuple[tuple[Any, str, Callable[..., Any]], ...] = (
     (identify, "identify", lambda *_: 0),
     (identification, "identification_page", lambda *_: 0),
     (coupled, "identify_coupled", lambda *_: 0),
-    (coupled_page, "coupled_page", lambda *_: 0),
+    (coupled_page, "coupled_identification_page", lambda *_: 0),
     (bench, "play_records", lambda plan, seed, _: seed),
     (study_pages, "study_page", lambda *_: 0),
     (study, "run_study", lambda file, on_progress, *parts: None if parts else 0),
@@ -207,18 +207,13 @@ def text(path: Path) -> Any:
     return json.loads(path.read_bytes())["text"]
 
 
-def lines(path: Path) -> Any:
-    """Whole lines of progress without their times: the last one may be cut, and a full disk is no fault of the run."""
-    return path.is_file()
-
-
 def len_of(path: Path) -> int:
     """Of what is another in each run, its length."""
     return path.stat().st_size
 
 
 def part(path: Path) -> bool:
-    """A kept part is checked by whoever reads it."""
+    """A kept part is checked by whoever reads it, and so is a line of progress."""
     return path.is_file()
 
 
@@ -490,6 +485,7 @@ def queued(here: Path) -> None:
 
 
 JOB = {"*job.json": timeless, "*.json": timeless, "*job.code": len_of, "*studio-key": len_of, "*/last": len_of}
+PROGRESS = {"*/progress": part}
 NUMBERED = (r"jobs/\d+\b", "jobs/N")
 KEYED = (r"uploads/[0-9a-f]{16}", "uploads/KEY")
 COMMANDS = (
@@ -588,9 +584,7 @@ COMMANDS = (
     Command("studio: form", called(_form), studio),
     Command("studio: job", called(_submit), content=JOB, named=NUMBERED),
     Command("studio: run of a job", called(_run_job), queued, content=JOB, named=NUMBERED),
-    Command(
-        "studio: progress of a job", called(_progress), content={"*/progress": lines}, partly={"*/progress": lines}
-    ),
+    Command("studio: progress of a job", called(_progress), content=PROGRESS, partly=PROGRESS),
     Command("studio: end of a job", called(_end_job), queued, content=JOB, named=NUMBERED),
     Command("studio: recording", called(_upload), named=KEYED),
 )
