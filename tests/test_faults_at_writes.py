@@ -56,9 +56,9 @@ def cases(text):
 
 
 def test_a_few_writes_of_a_few_commands():
-    done = run("--each", "30", "init", "campaign run", "bench --overwrite", "studio: job", "studio: save")
+    done = run("--each", "60", "init", "campaign run", "bench --overwrite", "studio: job", "studio: save")
     assert (done.returncode, done.stderr) == (0, ""), done.stdout
-    assert min(cases(done.stdout)[:-1]) > 0, done.stdout
+    assert cases(done.stdout)[0] >= 20
 
 
 @pytest.mark.endurance

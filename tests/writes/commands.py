@@ -594,7 +594,6 @@ WRITERS = {
     "campaign/engines/local.py": "a folder among the temporary files for each worker, as campaign/bundle.py has one",
     "campaign/export.py": "campaign export nc",
     "campaign/ledger/file.py": "campaign run",
-    "campaign/ledger/ledger.py": "campaign run",
     "campaign/ledger/mending.py": "campaign resume, damaged",
     "cli/__init__.py": "init",
     "cli/campaign.py": "campaign init",
