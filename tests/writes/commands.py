@@ -355,7 +355,7 @@ def recording(here: Path) -> None:
 
 
 def two_axes(here: Path) -> None:
-    test_cli_coupled.table(here)
+    test_cli_coupled.arrays(here)
 
 
 def model(here: Path) -> None:
@@ -365,8 +365,8 @@ def model(here: Path) -> None:
 UNDATED = {"*.mat": undated, "*/manifest.json": undated}
 IDENTIFY = ("identify", "loop.csv", "--input", "drive", "--output", "angle", "--rate", "1000", "--static")
 COUPLED = (
-    *("identify", "axes.csv", "--input", "ux", "--input", "u,y", "--output", "x", "--output", "y"),
-    *("--output-unit", "um", "--name", "axes", "--period", str(test_cli_coupled.PERIOD)),
+    *("identify", "u_100mV.npy", "--output-file", "y_100mV.npy", *test_cli_coupled.AXES),
+    *("--output-unit", "um", "--name", "axes"),
 )
 IMPORT = (
     *("import", "model.mat", "--travel", "2.5 mrad", "--drive", "0 V", "12 V", "--bias", "6 V"),
