@@ -75,7 +75,8 @@ class Command:
     ``does`` runs it in the current folder and returns its exit code. Where that is refused because results are there,
     ``otherwise`` is what the refusal says to do. ``content`` has readers by pattern of the path: what of a file is the
     same in each run. ``named`` is a pattern of names that are others in each run, and what stands in their place.
-    ``threads`` says that it leaves threads, so that it is not run in the process that forks.
+    ``threads`` says that it leaves threads, so that it is not run in the process that forks. ``stays`` is a pattern of
+    drafts that no later run takes away.
     ``partly`` has those of files that grow while the command runs: they fail where one is damaged.
     """
 
@@ -87,6 +88,7 @@ class Command:
     partly: Mapping[str, Callable[[Path], Any]] = field(default_factory=dict)
     threads: bool = False
     named: tuple[str, str] = ("^$", "")
+    stays: str = ""
 
 
 class Ended(NamedTuple):
@@ -288,7 +290,7 @@ class Layer:
         for name, path in now.items():
             partly = _of(command.partly, name)
             if name not in new and _DRAFT.search(name):
-                if last:
+                if last and not fnmatch(name, command.stays):
                     yield f"{name} stays"
             elif path.is_dir() and any(each.startswith(f"{name}/") for each in (*old, *new)):
                 continue

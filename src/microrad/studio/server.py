@@ -231,8 +231,8 @@ def way_in(studio: Path, url: str) -> str:
         url: the address with the token.
     """
     path = studio / _WAY_IN
-    with whole_file(path) as draft, plain_files.new(draft) as file:
-        file.write(_PAGE.format(url=url).encode("ascii"))
+    with whole_file(path) as draft:
+        plain_files.write_new(draft, _PAGE.format(url=url).encode("ascii"))
     return path.as_uri()
 
 

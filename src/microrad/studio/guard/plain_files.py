@@ -33,6 +33,19 @@ def new(path: Path) -> BinaryIO:
     return os.fdopen(os.open(path, flags, 0o600), "wb")
 
 
+def write_new(path: Path, content: bytes) -> None:
+    """Write a file that was not there before, for its owner alone; it is on the disk on return. Raises OSError.
+
+    Args:
+        path: the file.
+        content: its bytes.
+    """
+    with new(path) as file:
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
+
+
 def content(path: Path, most: int = MOST_BYTES) -> bytes:
     """The bytes of a plain file. Raises OSError where there is none, a link included, and for more than `most`.
 

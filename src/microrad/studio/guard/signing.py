@@ -98,10 +98,7 @@ def _key() -> bytes | None:
 def _write_new(path: Path, content: bytes) -> None:
     """Write a file whole that is not there yet, for its owner alone. Raises FileExistsError where it is."""
     with draft_beside(path) as draft:
-        with plain_files.new(draft) as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
+        plain_files.write_new(draft, content)
         os.link(draft, path)
 
 
