@@ -1,8 +1,10 @@
 """A mission being edited: one value changes and no other byte, and the faults are those of the command line."""
 
 import hashlib
+import os
 import stat
 import tomllib
+from pathlib import Path
 
 import pytest
 
@@ -439,11 +441,22 @@ def test_a_place_that_cannot_be_written_is_told(draft, tmp_path, name):
 
 
 def test_a_full_disk_leaves_the_file_as_it_was(draft, tmp_path, monkeypatch):
-    def full(path, text):
+    def full(path, text, mode):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(drafts, "write_whole", full)
     with pytest.raises(DraftError, match="No space left on device; check free space and permissions, or save under"):
+        draft.set(APERTURE, "8 cm").save()
+    assert hashlib.sha256((tmp_path / "m.toml").read_bytes()).hexdigest() == draft.sha256
+
+
+@pytest.mark.skipif(os.name != "posix", reason="POSIX has modes of files")
+def test_a_file_whose_mode_cannot_be_kept_is_left_as_it_is(draft, tmp_path, monkeypatch):
+    def refused(path, mode):
+        raise PermissionError(1, "Operation not permitted")
+
+    monkeypatch.setattr(Path, "chmod", refused)
+    with pytest.raises(DraftError, match="cannot be written: Operation not permitted"):
         draft.set(APERTURE, "8 cm").save()
     assert hashlib.sha256((tmp_path / "m.toml").read_bytes()).hexdigest() == draft.sha256
 

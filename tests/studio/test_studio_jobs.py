@@ -416,10 +416,9 @@ def test_what_a_killed_studio_has_left_of_an_order_is_gone_with_the_next_one(stu
     monkeypatch.setattr(jobs_module, "start_waiting", lambda folder: None)
     gone = subprocess.Popen([sys.executable, "-c", ""])
     gone.wait()
-    jobs = Jobs(studio)
-    (jobs.folder / f".new-{re.sub('[^A-Za-z0-9]', '_', platform.node())}-{gone.pid}-x").mkdir()
-    jobs.submit(order(tmp_path))
-    assert sorted(path.name for path in jobs.folder.iterdir()) == ["1", "last", "lock"]
+    (studio.folder / f".new-{re.sub('[^A-Za-z0-9]', '_', platform.node())}-{gone.pid}-x").mkdir()
+    studio.submit(order(tmp_path))
+    assert sorted(path.name for path in studio.folder.iterdir()) == ["1", "last", "lock"]
 
 
 def test_what_cannot_be_cancelled_or_removed_is_told(studio, tmp_path, monkeypatch):

@@ -111,8 +111,8 @@ def test_a_change_of_another_thread_is_not_lost_by_saving(session, monkeypatch):
         def __exit__(self, *_):
             real.release()
 
-    def slow(path, text, write=drafts.write_whole):
-        write(path, text)
+    def slow(path, text, mode, write=drafts.write_whole):
+        write(path, text, mode=mode)
         other.start()
         until(lambda: waits.is_set() or not other.is_alive(), "the other thread at the lock")
 
