@@ -264,7 +264,7 @@ def test_a_damaged_chunk_stops_the_export_and_leaves_the_old_file(tmp_path, kind
     path.write_bytes(data)
     assert "chunk 2 of cell 0 is damaged" in said(exported, path, target)
     assert target.read_text() == "last week's"
-    assert [each for each in tmp_path.iterdir() if each.name.endswith(".part")] == []
+    assert [each for each in tmp_path.iterdir() if each.name.startswith(".microrad-")] == []
 
 
 def test_a_missing_pyarrow_is_told_by_what_to_install(tmp_path, monkeypatch):
@@ -309,6 +309,27 @@ def test_a_full_disk_leaves_the_old_file_and_no_part_of_a_new_one(tmp_path):
         assert {target.read_text() for target in targets} == {"last week's"}
     finally:
         subprocess.run(["umount", "-l", folder], check=True)
+
+
+UNCUT = """
+    import io
+    from microrad.campaign import export
+    class Full(io.FileIO):
+        def truncate(self, size=None):
+            raise OSError(28, "No space left on device")
+    class Disk(export._Disk, Full):
+        pass
+    export._Disk = Disk
+"""
+
+
+def test_a_netcdf_whose_length_cannot_be_set_is_refused_and_nothing_crashes(tmp_path):
+    path, target = write(tmp_path), tmp_path / "rows.nc"
+    code = [sys.executable, "-W", "error", "-c", textwrap.dedent(UNCUT + FULL), str(path), str(target)]
+    ended = subprocess.run(code, capture_output=True, text=True, check=False)
+    assert (ended.returncode, ended.stderr) == (0, "")
+    assert ended.stdout.startswith(f"{target} could not be written") and "No space left" in ended.stdout
+    assert not target.exists()
 
 
 PEAK = """

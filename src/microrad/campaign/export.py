@@ -215,6 +215,14 @@ class _Disk(io.FileIO):
             self.seek(len(rest), io.SEEK_CUR)
         return size
 
+    def truncate(self, size: int | None = None) -> int:
+        """Make it as long as that, or take it as that long after an error."""
+        try:
+            return super().truncate(size)
+        except OSError as error:
+            self.error = self.error or error
+            return self.tell() if size is None else size
+
     def readinto(self, data: Any) -> int:
         """Read, with zeros for what could not be written."""
         count = super().readinto(data)
