@@ -731,7 +731,9 @@ def test_a_file_of_progress_that_cannot_be_written_is_refused(call, folder, monk
     monkeypatch.setenv(frame.PROGRESS_FILE, str(folder / "none" / "progress"))
     result = call("identify", write_recording(folder / "loop.csv"), *COLUMNS)
     assert (result.code, result.out) == (2, "")
-    assert f"microrad: {folder / 'none' / 'progress'}: No such file or directory; nothing was written there." in result.err
+    assert (
+        f"microrad: {folder / 'none' / 'progress'}: No such file or directory; nothing was written there." in result.err
+    )
 
 
 # --------------------------------------------------------------------------------------------------- doctor and schema

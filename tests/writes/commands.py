@@ -26,7 +26,7 @@ import small_campaign
 from cli import test_cli_coupled
 from cli.test_cli import write_recording
 from microrad import cli, report
-from microrad.campaign import run
+from microrad.campaign import bundle, run
 from microrad.campaign.records import Job, Outcome
 from microrad.cli.frame import PROGRESS_FILE, progress_bar
 from microrad.core import kept
@@ -55,6 +55,8 @@ from writes.layer import Command
 
 PATCH = pytest.MonkeyPatch()
 COMPUTED: tuple[tuple[Any, str, Callable[..., Any]], ...] = (
+    (run, "load_campaign", Path.read_bytes),
+    (bundle, "read_definition", Path.read_bytes),
     (run, "controllers", lambda campaign, *_: campaign.text),
     (campaign_pages, "campaign_page", lambda *_: 0),
     (campaign_texts, "campaign_text", lambda *_: 0),
