@@ -121,9 +121,9 @@ def _start(channel: Any) -> tuple[np.datetime64, float] | None:
 
 
 def _channels(tdms: Any, unusable: dict[str, str]) -> Iterator[tuple[str, Any]]:
-    for group, channel in ((group, channel) for group in tdms.groups() for channel in group.channels()):
+    for channel, of_group in ((channel, g.properties) for g in tdms.groups() for channel in g.channels()):
         name = f"{channel.group_name}/{channel.name}"
-        for properties in (channel.properties, group.properties, tdms.properties):
+        for properties in (channel.properties, of_group, tdms.properties):
             _check_scales(name, properties)
         if len(channel) == 0:
             unusable[name] = "holds no samples; record again, or name another"
