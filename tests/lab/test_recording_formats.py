@@ -59,6 +59,13 @@ def test_tdms(tmp_path):
     check(read_recording(path, 0, 1, RATE_HZ), ("bench/drive", "bench/output"))
 
 
+@pytest.mark.parametrize("more", [{"NI_Number_Of_Scales": 2**31 - 1}, {"NI_Scale[999999999]_Scale_Type": "Linear"}])
+def test_tdms_of_more_scales_than_memory_is_refused(tmp_path, more):
+    """The library made one after the other."""
+    path = tdms(tmp_path / "a.tdms", more={"drive": more})
+    assert "'bench/drive' states" in refusal(path, "drive", "output")
+
+
 @pytest.fixture
 def library_says(monkeypatch):
     """What npTDMS writes to stderr, which it keeps from when it is imported."""

@@ -147,6 +147,11 @@ def _check_frequencies(freq: Floats, rate_hz: float | None) -> None:
         raise IdentificationError(
             f"frequency {at + 1} is {freq[at]:g} Hz, below 0; leave it out, positive ones say all."
         )
+    if ((freq > 0) & (freq < LEAST)).any():
+        at = int(np.argmax((freq > 0) & (freq < LEAST)))
+        raise IdentificationError(
+            f"frequency {at + 1} is {freq[at]:g} Hz, below {LEAST:g}; check the unit of the column."
+        )
     if (np.diff(freq) <= 0).any():
         at = int(np.argmax(np.diff(freq) <= 0))
         raise IdentificationError(

@@ -4,9 +4,10 @@ The lead-in of a segment is described in National Instruments' "TDMS File Format
 """
 
 import logging
+import re
 import struct
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,8 @@ _LEAD_IN = 28
 _INCOMPLETE = 0xFFFF_FFFF_FFFF_FFFF
 _VERSIONS = (4712, 4713)
 _BIG_ENDIAN = 1 << 6
+_SCALE = re.compile(r"NI_Scale\[(\d{1,18})\]")
+_MOST_SCALES = 1000  # of a channel
 _OF_NUMBERS = ("Cropping data", "Unsupported scale type")
 
 
@@ -118,14 +121,24 @@ def _start(channel: Any) -> tuple[np.datetime64, float] | None:
 
 
 def _channels(tdms: Any, unusable: dict[str, str]) -> Iterator[tuple[str, Any]]:
-    for channel in (channel for group in tdms.groups() for channel in group.channels()):
+    for channel, of_group in ((channel, g.properties) for g in tdms.groups() for channel in g.channels()):
         name = f"{channel.group_name}/{channel.name}"
+        for properties in (channel.properties, of_group, tdms.properties):
+            _check_scales(name, properties)
         if len(channel) == 0:
             unusable[name] = "holds no samples; record again, or name another"
         elif channel.dtype.kind not in "iuf":
             unusable[name] = f"holds {channel.dtype}, not real numbers; save numbers, or name another"
         else:
             yield name, channel
+
+
+def _check_scales(name: str, properties: Mapping[str, Any]) -> None:
+    """Raises ValueError for more scales than a channel has: the library makes each, whether it is described or not."""
+    numbers = [int(found[1]) + 1 for key in properties if (found := _SCALE.match(key))]
+    most = max([*numbers, int(properties.get("NI_Number_Of_Scales", 0))])
+    if most > _MOST_SCALES:
+        raise ValueError(f"'{name}' states {most} scales")
 
 
 def _channel(path: Path, name: str, channel: Any) -> Channel:
