@@ -947,15 +947,6 @@ def test_units_that_contradict_each_other_are_refused(refused, folder):
     assert "--output-unit is mrad and the files say urad" in message
 
 
-def test_a_recording_for_validation_in_another_unit_than_the_fitted_one_is_refused(refused, folder):
-    fitted = with_units(folder, "time,Drive (V),Tilt (urad)").rename(folder / "fitted.csv")
-    held = with_units(folder, "time,Drive (V),Tilt (mrad)").rename(folder / "held.csv")
-    numbers = ("--input", 1, "--output", 2, "--rate", 1000, "--static")
-    message = refused("identify", fitted, *numbers, "--validate", held)
-    assert "the files say different units of the output, urad (" in message
-    assert f"{held.name}): identify them apart, or convert them." in message
-
-
 def test_one_recording_for_fit_and_validation_is_refused(refused, folder):
     path = write_recording(folder / "loop.csv")
     message = refused("identify", path, *COLUMNS, "--validate", path)

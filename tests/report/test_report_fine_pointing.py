@@ -745,10 +745,11 @@ def test_the_sensitivity_drawn_peaks_at_the_inverse_of_the_modulus_margin(drawn,
         assert np.max(sensitivity.columns[name]) == pytest.approx(1.0 / margin, rel=2e-3)
 
 
-def test_the_sensors_noise_up_to_half_of_its_rate_is_its_variance(fine):
-    loop = fine.scene.loop
-    half_rate_hz = 0.5 / (loop.timing.period_s * loop.optical.every)
-    variance_rad2 = figures._noise_density(fine) * half_rate_hz
+@pytest.mark.parametrize("every", [1, 5])
+def test_the_sensors_noise_up_to_half_of_its_rate_is_its_variance(fine, every):
+    loop = replace(fine.scene.loop, optical=replace(fine.scene.loop.optical, every=every))
+    half_rate_hz = 0.5 / (loop.timing.period_s * every)
+    variance_rad2 = figures._noise_density(replace(fine, scene=replace(fine.scene, loop=loop))) * half_rate_hz
     assert math.sqrt(variance_rad2) == pytest.approx(loop.optical.noise_rad, rel=1e-12, abs=0.0)
 
 
