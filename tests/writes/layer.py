@@ -159,6 +159,7 @@ class Layer:
         """Run a command with a fault, or without one; it sees the files as they are."""
         log, said = self.base / "log", self.base / "said"
         gc.freeze()  # a run shares what is here, and does not look through it
+        sys.stdout.flush()  # else what waits here to be printed is printed by the run, too
         with log.open("wb") as lines, said.open("wb") as words:
             child = os.fork()
             if child == 0:
