@@ -479,7 +479,7 @@ def measure() -> None:
         "16-PPM with background, gaussian": (ppm_mission(), {calls: partial(rate_by_rate, ppm_mission(), 10)}),
     }
     for name, (mission, peers) in cases.items():
-        ours = partial(link.margin_map, mission, RATES_BIT_S, ERRORS_RAD)
+        ours = partial(link.margin_map, link.of(mission), RATES_BIT_S, ERRORS_RAD)
         (margins, *others), (seconds, *times) = medians_s([ours, *peers.values()], 21)
         record(f"margin map of 1000 x 1000: {name}", 1e3 * seconds, "ms", at_most=1e3 * TARGET_S)
         print(f"{name:36} {1e3 * seconds:10.2f} {seconds / TARGET_S:10.4f}  the target")
