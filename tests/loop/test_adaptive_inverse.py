@@ -168,11 +168,20 @@ def test_a_model_that_is_to_be_reduced_keeps_its_slow_gain_and_the_bound_that_is
 def test_it_is_offered_where_a_mirror_has_plays_and_a_mission_a_gauge():
     import shipped
     from microrad.mission.file import load_mission
+    from microrad.mission.tables.mirror import PrandtlIshlinskiiTable
 
     mission = load_mission(shipped.SHIPPED).mission
     table, of = mission.fine_pointing, mission.mirror
     assert controller_study.offered(table, of) == controller_study.names(table)  # Bouc-Wen
-    plays = of.model_copy(update={"prandtl_ishlinskii": object(), "bouc_wen": None})
+
+    def with_plays(weights_rad_v=(4e-5, 1e-6), widening_s=0.0):
+        given = {"thresholds_v": (0.0, 1.0), "weights_rad_v": weights_rad_v, "widening_s": widening_s}
+        table = PrandtlIshlinskiiTable.model_construct(**given)
+        return of.model_copy(update={"prandtl_ishlinskii": table, "bouc_wen": None})
+
+    plays = with_plays()
     assert controller_study.offered(table, plays)[-1] == "PI + adaptive inverse in series"
     blind = table.model_copy(update={"strain_gauge": None})
     assert controller_study.offered(blind, plays) == controller_study.names(blind)
+    for other in (with_plays(widening_s=1e-3), with_plays((4e-5, -1e-6)), with_plays((0.0, 1e-6))):
+        assert controller_study.offered(table, other) == controller_study.names(table)

@@ -4,7 +4,7 @@ The fine-pointing loop has `problem`, `classical`, `lqg` and `tuning`, and its m
 `[control]`, the paper's, has `sampled`, with its margins and the inverses of hysteresis.
 """
 
-from microrad.loop.control.adaptive import Adaptation, adaptation, adaptive_arrays, at_the_begin
+from microrad.loop.control.adaptive import Adaptation, adaptation, adaptive_arrays, at_the_begin, cannot_learn
 from microrad.loop.control.analysis import (
     LoopMargins,
     MultiloopMargin,
@@ -87,6 +87,7 @@ __all__ = [
     "anti_windup",
     "at_the_begin",
     "by_source",
+    "cannot_learn",
     "drive_from_mission",
     "gains_from_mission",
     "grid_best",

@@ -82,26 +82,39 @@ def adaptation(
     Raises:
         ValueError: A model is no Prandtl-Ishlinskii operator of weights of at least 0 that depend on no rate.
     """
-    plays = []
     for model in models:
-        if isinstance(model, BoucWen):
-            raise ValueError(
-                "an adaptive inverse learns the weights of play operators, and this mirror's hysteresis is a Bouc-Wen "
-                "model: identify it as a Prandtl-Ishlinskii operator, or take the frozen inverse"
-            )
-        if model.widening_s:
-            raise ValueError(
-                "an adaptive inverse keeps its thresholds, and those of this mirror widen with the drive's rate: "
-                "identify it without widening, or take the frozen inverse"
-            )
-        if min(model.weights_rad_v) < 0.0:
-            raise ValueError(
-                f"an adaptive inverse keeps every play's weight at 0 or above, and one of this mirror is "
-                f"{min(model.weights_rad_v):g} rad/V: identify it with others, or take the frozen inverse"
-            )
-        model.inverted()  # refuses what has no inverse
-        plays.append(model)
-    return Adaptation(tuple(plays), noise_rad, delay_samples, swing_v)
+        if words := cannot_learn(model):
+            raise ValueError(words)
+    plays = tuple(model for model in models if isinstance(model, PrandtlIshlinskii))
+    return Adaptation(plays, noise_rad, delay_samples, swing_v)
+
+
+def cannot_learn(model: BoucWen | PrandtlIshlinskii) -> str:
+    """Why an inverse of a model cannot learn, in words; empty where it can.
+
+    Args:
+        model: Hysteresis of an actuator.
+    """
+    if isinstance(model, BoucWen):
+        return (
+            "an adaptive inverse learns the weights of play operators, and this mirror's hysteresis is a Bouc-Wen "
+            "model: identify it as a Prandtl-Ishlinskii operator, or take the frozen inverse"
+        )
+    if model.widening_s:
+        return (
+            "an adaptive inverse keeps its thresholds, and those of this mirror widen with the drive's rate: "
+            "identify it without widening, or take the frozen inverse"
+        )
+    if min(model.weights_rad_v) < 0.0:
+        return (
+            f"an adaptive inverse keeps every play's weight at 0 or above, and one of this mirror is "
+            f"{min(model.weights_rad_v):g} rad/V: identify it with others, or take the frozen inverse"
+        )
+    try:
+        model.inverted()
+    except ValueError as error:  # it has no inverse
+        return str(error)
+    return ""
 
 
 def adaptive_arrays(of: Adaptation | None, period_s: float) -> dict[str, Any]:

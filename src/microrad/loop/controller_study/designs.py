@@ -23,7 +23,7 @@ from microrad.loop.pointing_loop.loop import (
     with_adaptation,
     with_inverse,
 )
-from microrad.mirror import from_table, spread
+from microrad.mirror import from_table, hysteresis_model, spread
 from microrad.mission.tables.fine_pointing import FinePointing
 from microrad.mission.tables.mirror import Mirror as MirrorTable
 
@@ -142,13 +142,13 @@ def names(f: FinePointing) -> tuple[str, ...]:
 def offered(f: FinePointing, of: MirrorTable) -> tuple[str, ...]:
     """The controllers that can be designed for a mission: `names`, and the adaptive inverse where it can learn.
 
-    It learns the weights of play operators, of a mirror that has them, from a strain gauge.
+    It learns the weights of play operators that do not widen, of a mirror that has them, from a strain gauge.
 
     Args:
         f: The mission's fine-pointing table.
         of: Its mirror's table.
     """
-    learns = f.strain_gauge is not None and of.prandtl_ishlinskii is not None
+    learns = f.strain_gauge is not None and not control.cannot_learn(hysteresis_model(of, math.inf, 0.0))
     return (*names(f), *([ADAPTIVE] if learns else []))
 
 
