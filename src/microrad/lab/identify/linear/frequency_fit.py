@@ -46,13 +46,13 @@ class FrequencyResponseFit:
     """A stable model of a table, with its evidence.
 
     `system` is continuous, real and block-diagonal, in rad/s; `modes` the same as poles and vectors, with the delay,
-    which the system has not. `freq_hz` (frequencies,) are those of the table, `residual` (frequencies, outputs, inputs)
-    is table less model, and `relative_rms_error` its root mean square over that of the table. `scan` is empty where the
-    order was given, and `output_error_rms` in it the plain root mean square of the residual; `reason` says in words why
-    this order. `normal` is the normal matrix at the end in the parameters of `pack`, the delay behind them where it was
-    fitted, `variance` that of one row, and `errors_from` says in words what it rests on; `chi_square` is what is left
-    per degree of freedom by the standard errors given, None without them. `known`, with poles, transmission zeros and
-    gains and their standard errors, and `warnings` are made when they are first asked for.
+    which the system has not. `freq_hz` (frequencies,) and `table` (frequencies, outputs, inputs) are what was fitted.
+    `scan` is empty where the order was given, and `output_error_rms` in it the plain root mean square of the residual;
+    `reason` says in words why this order. `normal` is the normal matrix at the end in the parameters of `pack`, the
+    delay behind them where it was fitted, `variance` that of one row, and `errors_from` says in words what it rests on;
+    `chi_square` is what is left per degree of freedom by the standard errors given, None without them. `residual`,
+    `known`, with poles, transmission zeros and gains and their standard errors, and `warnings` are made when they are
+    first asked for.
     """
 
     system: StateSpace
@@ -61,8 +61,7 @@ class FrequencyResponseFit:
     hold: Hold
     rate_hz: float | None
     freq_hz: Floats
-    residual: Complexes
-    relative_rms_error: float
+    table: Complexes
     scan: tuple[OrderScore, ...]
     reason: str
     normal: Floats
@@ -73,7 +72,7 @@ class FrequencyResponseFit:
 
     def __repr__(self) -> str:
         """What it is, without its arrays."""
-        outputs, inputs = self.residual.shape[1:]
+        outputs, inputs = self.table.shape[1:]
         return (
             f"<FrequencyResponseFit of order {self.order}: {outputs} x {inputs} elements at {self.freq_hz.size} "
             f"frequencies, {self.relative_rms_error:.3g} of the table left>"
@@ -108,6 +107,17 @@ class FrequencyResponseFit:
         return band_hz(self.freq_hz)
 
     @cached_property
+    def residual(self) -> Complexes:
+        """Table less model, shape (frequencies, outputs, inputs)."""
+        return np.asarray(self.table - self.response(self.freq_hz))
+
+    @property
+    def relative_rms_error(self) -> float:
+        """Root mean square of the residual over that of the table."""
+        size = float(np.linalg.norm(self.table))
+        return float(np.linalg.norm(self.residual)) / size if size else 0.0
+
+    @cached_property
     def covariance(self) -> Floats:
         """Covariance of the parameters of `pack`, the delay behind them where it was fitted."""
         return inverse_normal(self.normal, self.order) * self.variance
@@ -131,7 +141,7 @@ class FrequencyResponseFit:
     def warnings(self) -> tuple[str, ...]:
         """What speaks against the model, in words."""
         if self.chi_square is None:
-            noise = _uneven(self.residual + self.response(self.freq_hz), self.residual)
+            noise = _uneven(self.table, self.residual)
         else:
             noise = _misfit(self.chi_square) if self.variance > 1.0 else ()
         return (
@@ -443,8 +453,6 @@ def _result(
     per = polished.cost / freedom
     given, beyond = table.standard_error is not None, 1.0 + _MISFIT * np.sqrt(2.0 / freedom)
     variance = max(1.0, per) if given and per > beyond else 1.0 if given else max(per, 1e-300)
-    residual = _residual(table, found)
-    size = float(np.linalg.norm(table.response))
     return FrequencyResponseFit(
         system=model.state_space(),
         modes=model,
@@ -452,8 +460,7 @@ def _result(
         hold=table.hold,
         rate_hz=table.rate_hz,
         freq_hz=table.freq_hz,
-        residual=residual,
-        relative_rms_error=float(np.linalg.norm(residual)) / size if size else 0.0,
+        table=table.response,
         scan=tuple(scan),
         reason=reason,
         normal=_with_delay(found) if delay else polished.normal,
