@@ -81,7 +81,7 @@ def test_the_drift_of_a_first_order_motion(spacing_s):
     wanted = 4 * WHOLE_URAD2 * integrated(1.0) - 2 * WHOLE_URAD2 * beside
     for kind in ("PDE", "PRE"):
         found = 1e6 * windowed_rms(RADIAL, ErrorIndex(kind, 1.0, spacing_s))
-        assert found**2 == pytest.approx(wanted, rel=1e-7, abs=1e-9 * WHOLE_URAD2)
+        assert found**2 == pytest.approx(wanted, rel=1e-9, abs=1e-12 * WHOLE_URAD2)
 
 
 # ---- quadrature

@@ -1,4 +1,4 @@
-"""Names for arrays by what is in them; their shapes stand where they are used."""
+"""Arrays: names by what is in them, whose shapes stand where they are used, and what users give as one."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray

@@ -27,6 +27,11 @@ class Variable:
     units: str
     long_name: str
 
+    @property
+    def attributes(self) -> dict[str, str]:
+        """Unit and meaning, as files of netCDF name them."""
+        return {"units": self.units, "long_name": self.long_name}
+
 
 Variables = Mapping[str, Variable]
 
@@ -44,13 +49,9 @@ class Group:
         import xarray
 
         def parts(given: Variables) -> dict[str, Any]:
-            return {name: (v.dims, v.values, _attributes(v)) for name, v in given.items()}
+            return {name: (v.dims, v.values, v.attributes) for name, v in given.items()}
 
         return xarray.Dataset(parts(self.variables), parts(self.coordinates), dict(self.attributes))
-
-
-def _attributes(of: Variable) -> dict[str, str]:
-    return {"units": of.units, "long_name": of.long_name}
 
 
 def variables(dims: str, of: Sequence[Any] = (), /, **columns: tuple[str, str, Any]) -> dict[str, Variable]:

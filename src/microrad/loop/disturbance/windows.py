@@ -13,7 +13,7 @@ squares.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any, Literal, get_args
 
@@ -159,6 +159,8 @@ def _windowed(A: Floats, B: Floats, C: Floats, index: ErrorIndex) -> float:
     if index.window_s is None:
         return whole
     window, spacing = index.window_s, index.spacing_s
+    if spacing is not None and spacing < window:  # what both windows share is not in the difference of their sums
+        return (spacing / window) ** 2 * _windowed(A, B, C, replace(index, window_s=spacing, spacing_s=window))
     phi = _phi(A, b, window)
     mean = 2.0 * float((C @ phi[2]).item())
     if spacing is not None:
@@ -172,18 +174,11 @@ def _windowed(A: Floats, B: Floats, C: Floats, index: ErrorIndex) -> float:
 
 
 def _lagged(A: Floats, b: Floats, C: Floats, window: float, spacing: float) -> float:
-    """Covariance of the means of two windows of which one begins later: by second differences where they overlap."""
+    """Covariance of the means of two windows of which one begins when the other has ended, or later."""
     from scipy.linalg import expm
 
-    if spacing >= window:
-        steps = _phi(A, np.eye(A.shape[0]), window, 1)[1]
-        return float((C @ expm(A * (spacing - window)) @ steps @ steps @ b).item())
-
-    def twice_integrated(span: float) -> float:
-        return span**2 * float((C @ _phi(A, b, span, 2)[2]).item()) if span > 0.0 else 0.0
-
-    ends = twice_integrated(spacing + window) + twice_integrated(window - spacing)
-    return (ends - 2.0 * twice_integrated(spacing)) / window**2
+    steps = _phi(A, np.eye(A.shape[0]), window, 1)[1]
+    return float((C @ expm(A * (spacing - window)) @ steps @ steps @ b).item())
 
 
 def _phi(A: Floats, b: Floats, span: float, count: int = _CHAIN) -> dict[int, Floats]:
@@ -208,10 +203,10 @@ def rational_rms(disturbance: Disturbance, index: ErrorIndex) -> float:
     Raises:
         ValueError: For a difference of two means, which has no rational form.
     """
+    if index.window_s is None:
+        return disturbance.rms_rad
     high, middle, low = index._numerator
     lines = (0.5 * each.amplitude_rad**2 * float(index.rational_weight(each.freq_hz)[0]) for each in disturbance.lines)
-    if index.window_s is None or not disturbance.A.size:
-        return math.sqrt((disturbance.rms_rad**2 if index.window_s is None else 0.0) or math.fsum(lines))
     n, per_s = disturbance.A.shape[0], 1.0 / index.window_s
     filter_A = per_s * np.array([[-6.0, -12.0], [1.0, 0.0]])
     fed = per_s * np.vstack([disturbance.C, np.zeros((1, n))])

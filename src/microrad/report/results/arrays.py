@@ -56,7 +56,7 @@ def _netcdf_bytes(groups: Mapping[str, Group], attributes: Mapping[str, str]) ->
                 kind = h5py.string_dtype() if of.values.dtype == object else of.values.dtype
                 missing = np.nan if of.values.dtype.kind == "f" and name not in each.coordinates else None
                 made = group.create_variable(name, of.dims, kind, data=of.values, fillvalue=missing)
-                made.attrs.update({"units": of.units, "long_name": of.long_name})
+                made.attrs.update(of.attributes)
     return content.getvalue()
 
 
