@@ -379,3 +379,10 @@ def test_the_amplifiers_share_of_one_step(bandwidth_hz, share):
     assert control.amplifier_factor(replace(IDEAL_DRIVE, bandwidth_hz=bandwidth_hz), 1e-5) == pytest.approx(
         share, rel=1e-4
     )
+
+
+def test_a_direct_path_that_no_double_can_divide_by_is_none():
+    one = lti.StateSpace(np.array([[1.0]]), np.array([[1e-4]]), np.array([[2.0]]), np.array([[1e-320]]))
+    assert np.array_equal(control.anti_windup(one), [[0.0]])
+    there = lti.StateSpace(one.A, one.B, one.C, np.array([[1e-20]]))
+    assert control.anti_windup(there) == pytest.approx(1e16, rel=1e-12)

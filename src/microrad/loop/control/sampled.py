@@ -11,6 +11,7 @@ import numpy as np
 
 from microrad.core import kernels, lti
 from microrad.core.arrays import Complexes, Floats
+from microrad.core.units import LEAST
 from microrad.loop.control.analysis import LoopMargins, margins_of, real_at_half_the_rate, resolving
 from microrad.mirror.hysteresis import LINE_OF_SIGHT, BoucWen, Creep
 from microrad.mirror.model import Mirror
@@ -116,9 +117,11 @@ def pid(gains: Gains, period_s: float) -> lti.StateSpace:
 def anti_windup(controller: lti.StateSpace) -> Floats:
     """Conditioning gain L = B D^-1: the states follow the error that would just have reached the limit.
 
-    Source: Hanus, Kinnaert and Henrotte, Automatica 23 (1987) 729. Zero where the controller has no direct path.
+    Source: Hanus, Kinnaert and Henrotte, Automatica 23 (1987) 729. Zero where the controller has no direct path, and
+    where it has one that no double can divide by.
     """
-    return np.asarray(controller.B @ np.linalg.pinv(controller.D))
+    direct = np.where(np.abs(controller.D) < LEAST, 0.0, controller.D)
+    return np.asarray(controller.B @ np.linalg.pinv(direct))
 
 
 @dataclass(frozen=True, slots=True)
