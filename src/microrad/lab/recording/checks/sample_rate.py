@@ -55,6 +55,8 @@ def agreed_rate(where: str, rate_hz: float | None, stated: Sequence[StatedRate])
             f"{where}: the file does not say how fast it was sampled; give the rate (--rate, rate_hz) in Hz, or name "
             "the time column (time)."
         )
+    for each in known:
+        check_rate(f"{where} ({each.words})" if each.words != "given" else where, each.rate_hz)
     first = known[0]
     for other in known[1:]:
         if abs(other.rate_hz - first.rate_hz) > _SAME_RATE * first.rate_hz:
@@ -63,7 +65,7 @@ def agreed_rate(where: str, rate_hz: float | None, stated: Sequence[StatedRate])
                 f"({other.words}), {other.rate_hz / first.rate_hz:.4g} times as much; correct the wrong one"
                 f"{' (leave the rate out to use that of the file)' if rate_hz is not None else ''}."
             )
-    return check_rate(where, first.rate_hz)
+    return first.rate_hz
 
 
 def rate_of_time(

@@ -18,6 +18,7 @@ import numpy as np
 from microrad.core.arrays import Floats
 from microrad.lab.recording.files import sha256_of
 from microrad.lab.recording.formats.source import Container, StatedRate
+from microrad.lab.recording.formats.text import short
 from microrad.lab.recording.records import RecordingError
 
 _END = b"***End_of_Header***"
@@ -176,7 +177,7 @@ class LvmSource(Container):
                     cell = cells[column].strip() if column < len(cells) else ""
                     value = self._number(cell)
                     if value is None or not np.isfinite(value):
-                        what = f"'{cell}' is not a finite number" if cell else "the cell is empty"
+                        what = f"'{short(cell)}' is not a finite number" if cell else "the cell is empty"
                         raise RecordingError(
                             f"{self.path}: line {number}, {self.label(index)}: {what}; repair the cell or cut the "
                             "recording there, because hysteresis remembers what happened in a gap."
@@ -191,8 +192,8 @@ def _separator(path: Path, header: dict[str, str]) -> str:
     word = header.get("Separator", "Tab")
     if word.casefold() not in _SEPARATORS:
         raise RecordingError(
-            f"{path}: the header names the separator '{word}'; LVM files have Tab or Comma: correct that word, or "
-            "export the recording again from LabVIEW."
+            f"{path}: the header names the separator '{short(word)}'; LVM files have Tab or Comma: correct that word, "
+            "or export the recording again from LabVIEW."
         )
     return _SEPARATORS[word.casefold()]
 
