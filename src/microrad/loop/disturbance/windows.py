@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from microrad.core import lti
-from microrad.core.arrays import Floats
+from microrad.core.arrays import Complexes, Floats
 from microrad.loop.disturbance.records import Disturbance, above_zero, covariance, rising
 
 Sides = Literal["one", "two"]
@@ -33,6 +33,8 @@ IndexKind = Literal["APE", "MPE", "RPE", "PDE", "PRE", "AKE", "MKE", "RKE"]
 _POINTING = {"AKE": "APE", "MKE": "MPE", "RKE": "RPE"}
 _SPACED = ("PDE", "PRE")
 _SMALL = 1e-4  # part of the whole below which a difference loses digits, and another form is taken
+_SOUND = 1e7  # condition of the modes, above which they are not taken
+_ONCE: Floats = 1.0 / np.cumprod(np.arange(1.0, 15.0))  # 1 / (k + 1)!, for series up to 0.5
 _CHAIN = 7  # functions phi_1 to phi_7
 _CALM = 3.0  # turns of the longest time, up to which a weight is integrated as it is
 _PRECISE: dict[str, Any] = {"epsabs": 0.0, "epsrel": 1e-10, "limit": 400}
@@ -147,38 +149,113 @@ def windowed_rms(disturbance: Disturbance, index: ErrorIndex) -> float:
         disturbance: The disturbance of one axis.
         index: What counts of it.
     """
-    A, B, C = disturbance.A, disturbance.B, disturbance.C
+    motion = Motion.of(lti.StateSpace(disturbance.A, disturbance.B, disturbance.C, _nothing(disturbance)))
     lines = (0.5 * each.amplitude_rad**2 * float(index.weight(each.freq_hz)[0]) for each in disturbance.lines)
-    return math.sqrt(max(_windowed(A, B, C, index) if A.size else 0.0, 0.0) + math.fsum(lines))
+    return math.sqrt(max(motion.windowed(index).item(), 0.0) + math.fsum(lines))
 
 
-def _windowed(A: Floats, B: Floats, C: Floats, index: ErrorIndex) -> float:
-    """Variance that an index takes of y = C x with x' = A x + B w, which has one output."""
+def _nothing(disturbance: Disturbance) -> Floats:
+    return np.zeros((1, disturbance.B.shape[1]))
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """A stationary motion by its modes: the covariance of y(t + lag) with y(t) is the sum of e^(rate lag) pair.
+
+    Args:
+        rate: Poles (rad/s), shape (modes,).
+        pair: What each mode adds to the covariance at no lag (rad^2), shape (modes, outputs, outputs).
+        system: x' = A x + B w, y = C x.
+        sound: Whether the modes keep their digits: they nearly coincide elsewhere, and the system itself is taken.
+    """
+
+    rate: Complexes
+    pair: Complexes
+    system: lti.StateSpace
+    sound: bool
+
+    @classmethod
+    def of(cls, system: lti.StateSpace) -> "Motion":
+        """The motion of a stable system under white noise of unit two-sided density at each input.
+
+        Args:
+            system: x' = A x + B w, y = C x; without a direct term, whose variance is infinite.
+        """
+        A, B, C = system.A, system.B, system.C
+        rate, modes = np.linalg.eig(A) if A.size else (np.zeros(0, complex), np.zeros((0, 0), complex))
+        if A.size and np.linalg.cond(modes) > _SOUND:
+            return cls(rate, np.zeros((0, len(C), len(C)), complex), system, False)
+        fed = np.linalg.solve(modes, B.astype(complex))
+        together = -(fed @ fed.conj().T) / (rate[:, None] + rate.conj())
+        left, right = C @ modes, together @ modes.conj().T @ C.T
+        return cls(rate, np.einsum("im,mj->mij", left, right), system, True)
+
+    def windowed(self, index: ErrorIndex) -> Floats:
+        """Covariance that an index takes of it (rad^2), shape (outputs, outputs).
+
+        Args:
+            index: What counts of it.
+        """
+        if not self.sound:
+            return _windowed(self.system.A, self.system.B, self.system.C, index)
+        window, spacing, scale = index.window_s, index.spacing_s, 1.0
+        if window is None:
+            return _both_halves(self.pair.sum(axis=0).real)
+        if spacing is not None and spacing < window:  # what both windows share is not in the difference of their sums
+            window, spacing, scale = spacing, window, (spacing / window) ** 2
+        left, once = _less_than_whole(self.rate * window)
+        if index.takes == "RPE":
+            weight = left
+        elif spacing is None:
+            weight = 1.0 - left
+        else:
+            weight = 2.0 * scale * (1.0 - left - np.exp(self.rate * (spacing - window)) * once**2)
+        return _both_halves(np.tensordot(weight, self.pair, 1).real)
+
+
+def _both_halves(matrix: Floats) -> Floats:
+    return np.asarray(0.5 * (matrix + matrix.T))
+
+
+def _less_than_whole(z: Complexes) -> tuple[Complexes, Complexes]:
+    """1 - 2 (e^z - 1 - z) / z^2 and (e^z - 1) / z, by series where the differences lose digits."""
+    near = np.abs(z) < 0.5
+    far = np.where(near, 1.0, z)
+    once = np.expm1(far) / far
+    powers = np.where(near, z, 0.0)[:, None] ** np.arange(len(_ONCE) - 1)
+    return (
+        np.where(near, -2.0 * powers[:, 1:] @ _ONCE[2:], 1.0 - 2.0 * (once - 1.0) / far),
+        np.where(near, powers @ _ONCE[:-1], once),
+    )
+
+
+def _windowed(A: Floats, B: Floats, C: Floats, index: ErrorIndex) -> Floats:
+    """Covariance that an index takes of y = C x with x' = A x + B w, by matrix exponentials."""
     b = covariance(A, B) @ C.T
-    whole = float((C @ b).item())
+    whole = _both_halves(C @ b)
     if index.window_s is None:
         return whole
     window, spacing = index.window_s, index.spacing_s
     if spacing is not None and spacing < window:  # what both windows share is not in the difference of their sums
         return (spacing / window) ** 2 * _windowed(A, B, C, replace(index, window_s=spacing, spacing_s=window))
     phi = _phi(A, b, window)
-    mean = 2.0 * float((C @ phi[2]).item())
+    mean = 2.0 * _both_halves(C @ phi[2])
     if spacing is not None:
-        return 2.0 * (mean - _lagged(A, b, C, window, spacing))
+        return 2.0 * (mean - _both_halves(_lagged(A, b, C, window, spacing)))
     if index.takes == "MPE":
         return mean
-    if whole - mean > _SMALL * whole:
-        return whole - mean
+    if np.trace(whole - mean) > _SMALL * np.trace(whole):
+        return np.asarray(whole - mean)
     step = A * window
-    return float((window / 6.0 * (C @ B) @ (C @ B).T - 2.0 * C @ step @ step @ phi[4]).item())
+    return np.asarray(window / 6.0 * (C @ B) @ (C @ B).T - 2.0 * _both_halves(C @ step @ step @ phi[4]))
 
 
-def _lagged(A: Floats, b: Floats, C: Floats, window: float, spacing: float) -> float:
+def _lagged(A: Floats, b: Floats, C: Floats, window: float, spacing: float) -> Floats:
     """Covariance of the means of two windows of which one begins when the other has ended, or later."""
     from scipy.linalg import expm
 
     steps = _phi(A, np.eye(A.shape[0]), window, 1)[1]
-    return float((C @ expm(A * (spacing - window)) @ steps @ steps @ b).item())
+    return np.asarray(C @ expm(A * (spacing - window)) @ steps @ steps @ b)
 
 
 def _phi(A: Floats, b: Floats, span: float, count: int = _CHAIN) -> dict[int, Floats]:

@@ -1,0 +1,329 @@
+"""What a source adds to an error index: the distribution of its part of the error, about each axis.
+
+Over time each source is taken as its class says, over the ensemble as the interpretation says (ECSS-E-ST-60-10C A.1.2):
+"temporal" is the worst-case satellite at a random time, "ensemble" a random satellite at its worst time, "mixed" a
+random satellite at a random time. A noise has no worst time; it stands with as many standard deviations there as hold
+the confidence.
+
+| class | APE | MPE | RPE | PDE |
+|---|---|---|---|---|
+| constant | b | b | 0 | 0 |
+| random | s | 0 | s | 0 |
+| process | its density times the weight of the index | | | |
+| periodic | a | a w | a sqrt(1 - 2 w c + w^2), c = cos 2 pi f t | 2 a w sin pi f s |
+| drift | 0 to r P | r T/2 to r (P - T/2) | -r T/2 to r T/2 | r s |
+| transient | a exp(-t/d) | a m exp(-t/d), t up to P - T | what is left | MPE (exp(-s/d) - 1) |
+
+w = sinc f T, m = d/T (1 - exp(-T/d)), P the period, s the spacing, t evenly drawn. PRE takes the windows of two
+periods: the same as PDE of what is stationary, and for a drift or a transient, which begin anew, the difference over
+what the spacing leaves beside whole periods. Behind a transfer a ramp keeps G(0) r t + G'(0) r, and a transient is
+that of an exponential through the transfer.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from statistics import NormalDist
+from typing import Literal, get_args
+
+import numpy as np
+
+from microrad.core import lti
+from microrad.core.arrays import Floats
+from microrad.link.error_budget.distributions import Part, case, mixture
+from microrad.link.error_budget.sources import ErrorSource, SourceKind, Spread
+from microrad.loop.disturbance.windows import ErrorIndex
+
+Interpretation = Literal["temporal", "ensemble", "mixed"]
+
+_GAUSS = np.polynomial.hermite_e.hermegauss(16)  # over a Gaussian ensemble
+_EVEN = np.polynomial.legendre.leggauss(16)  # over an even one
+_TURN = np.exp(2j * np.pi * (np.arange(32) + 0.5) / 32)  # phases of a sinusoid
+_HARDLY = 0.5  # width beside the mean, up to which a size is hardly spread
+_WITHIN = np.polynomial.legendre.leggauss(12)  # positions in a window
+_SOUND = 1e9  # condition of the modes of a transient, above which they coincide
+_STRIPS = 8  # of a window, in which a transient is taken as straight
+_PATH = np.linspace(0.0, 1.0, 33) ** 2  # times of a transient, finer where it falls fast
+
+
+@dataclass(frozen=True, slots=True)
+class Requirement:
+    """What has to be kept: an index, over what its confidence counts, and about which axes.
+
+    Args:
+        index: What of the error counts, with window and spacing.
+        confidence: Share of times, satellites, or both in which the error has to be within the limit.
+        interpretation: "temporal", "ensemble" or "mixed", as above.
+        axes: One axis, or two for the radial error, by their places from 0.
+        limit_rad: The limit (rad); None where what is left is asked for alone.
+        observation_s: Time in which both windows of a PDE lie, and behind which the second one of a PRE does (s).
+
+    Raises:
+        ValueError: For what is no confidence, another interpretation, more than two axes, a limit not above 0, and an
+            observation period that is missing, not in the definition of the index, or does not fit its times.
+    """
+
+    index: ErrorIndex
+    confidence: float = 0.9973
+    interpretation: Interpretation = "temporal"
+    axes: tuple[int, ...] = (0, 1)
+    limit_rad: float | None = None
+    observation_s: float | None = None
+
+    def __post_init__(self) -> None:
+        """Check each field against the others."""
+        if not 0.0 < self.confidence < 1.0:
+            raise ValueError(f"a confidence of {self.confidence:g}: give a share above 0 and below 1")
+        if self.interpretation not in get_args(Interpretation):
+            raise ValueError(
+                f'no interpretation "{self.interpretation}"; give one of {", ".join(get_args(Interpretation))}'
+            )
+        if len(set(self.axes)) != len(self.axes) or len(self.axes) not in (1, 2) or min(self.axes) < 0:
+            raise ValueError(f"axes {self.axes}: give one, or two for the radial error, by their places from 0")
+        if self.limit_rad is not None and not 0.0 < self.limit_rad < math.inf:
+            raise ValueError(f"a limit of {self.limit_rad:g} rad; give a finite one above zero")
+        takes, observed = self.index.takes, self.observation_s
+        if (observed is None) == (takes in ("PDE", "PRE")):
+            said = (
+                "needs observation_s: give the time in s" if observed is None else "has no observation_s: leave it out"
+            )
+            raise ValueError(f"{self.index.kind} {said}")
+        if observed is not None and self.index.window_s is not None and self.index.spacing_s is not None:
+            if takes == "PDE" and self.index.window_s + self.index.spacing_s > observed:
+                raise ValueError(
+                    f"PDE: both windows have to lie in the observation period of {observed:g} s; give it longer"
+                )
+            if takes == "PRE" and self.index.spacing_s < observed:
+                raise ValueError(f"PRE: its windows lie in two observation periods of {observed:g} s; space them wider")
+
+
+@dataclass(frozen=True, slots=True)
+class Contribution:
+    """A source's part of an index: its name, its class, and the distribution of its error about all axes."""
+
+    name: str
+    kind: SourceKind | Literal["loop"]
+    part: Part
+
+
+def contribution(source: ErrorSource, required: Requirement) -> Contribution:
+    """What a source adds to an index under a requirement, the lines of a process left out.
+
+    Args:
+        source: The source.
+        required: The index and over what it is taken.
+
+    Raises:
+        ValueError: For an index of more or longer windows than the period of a drift or of a transient holds.
+    """
+    if required.interpretation == "ensemble":
+        part = _scaled(_at_its_worst(source, required), source.size)
+    else:
+        in_time = _IN_TIME[source.kind](source, required.index)
+        part = (
+            in_time.times(source.size.worst) if required.interpretation == "temporal" else _scaled(in_time, source.size)
+        )
+    return Contribution(source.name, source.kind, part)
+
+
+def contributions(sources: Sequence[ErrorSource], required: Requirement) -> tuple[Contribution, ...]:
+    """What each source adds, in their order; see `contribution`.
+
+    Args:
+        sources: The sources, of the same axes.
+        required: The index and over what it is taken.
+
+    Raises:
+        ValueError: As `contribution`, for sources of unlike numbers of axes, and for an axis that they have not.
+    """
+    if len({source.axes for source in sources}) > 1:
+        raise ValueError(f"the sources have {sorted({source.axes for source in sources})} axes; give all as many gains")
+    if sources and max(required.axes) >= sources[0].axes:
+        raise ValueError(f"axis {max(required.axes)} is asked for, and the sources have {sources[0].axes} from 0 on")
+    return tuple(contribution(each, required) for source in sources for each in (source, *_lines(source)))
+
+
+def _lines(source: ErrorSource) -> list[ErrorSource]:
+    """The lines of a process, each as a periodic error of its name."""
+    lines = source.process.lines if source.process else ()
+    size = source.size.mean
+    return [
+        replace(
+            source, kind="periodic", process=None, freq_hz=line.freq_hz, size=Spread("fixed", size * line.amplitude_rad)
+        )
+        for line in lines
+    ]
+
+
+def _scaled(unit: Part, size: Spread) -> Part:
+    """The part of a size that is spread over the ensemble, from that of a size of 1.
+
+    A size times a value in time is as spread as the size is, so that the cases are those of the value; of a noise, and
+    of a size that is hardly spread, they are those of the size.
+    """
+    if size.shape == "fixed" or not size.width:
+        return unit.times(size.mean)
+    if unit.covariance.any() or size.width < _HARDLY * abs(size.mean):
+        at, weight = _GAUSS if size.shape == "gaussian" else _EVEN
+        return mixture([unit.times(float(size.mean + size.width * each)) for each in at], weight / np.sum(weight))
+    value, weight = _values(unit)
+    spread = size.width * value
+    if size.shape == "uniform":
+        return case(unit.axes, mean=size.mean * value, half_width=spread, weight=weight)
+    return case(unit.axes, mean=size.mean * value, covariance=spread[:, :, None] * spread[:, None], weight=weight)
+
+
+def _values(unit: Part) -> tuple[Floats, Floats]:
+    """What an error without a Gaussian is in time: values, shape (values, axes), and the weight of each."""
+    value, weight = unit.mean[:, None], unit.weight[:, None]
+    if unit.half_width.any():
+        at, share = _EVEN
+        value, weight = value + at[:, None] * unit.half_width[:, None], weight * (0.5 * share)
+    if unit.amplitude.any():
+        turned = (unit.amplitude[:, None] * _TURN[:, None]).real
+        value, weight = value + turned, weight * np.full(len(_TURN), 1.0 / len(_TURN))
+    return value.reshape(-1, unit.axes), weight.ravel()
+
+
+# -------------------------------------------------------------------------------------- at a random time, of size 1
+def _constant(source: ErrorSource, index: ErrorIndex) -> Part:
+    gain, _ = source.slow()
+    return case(source.axes, mean=gain if index.takes in ("APE", "MPE") else None)
+
+
+def _random(source: ErrorSource, index: ErrorIndex) -> Part:
+    if index.takes not in ("APE", "RPE"):
+        return case(source.axes)
+    if isinstance(source.transfer, lti.StateSpace):
+        raise ValueError(
+            f"{source.name}: an error that is anew from moment to moment has no spectrum, so that nothing is known of "
+            'it behind a transfer; give gains, or the class "process"'
+        )
+    gain = np.asarray(source.transfer)
+    return (
+        case(source.axes, half_width=gain)
+        if source.even_in_time
+        else case(source.axes, covariance=np.outer(gain, gain))
+    )
+
+
+def _process(source: ErrorSource, index: ErrorIndex) -> Part:
+    return case(source.axes, covariance=source.motion.windowed(index))
+
+
+def _periodic(source: ErrorSource, index: ErrorIndex) -> Part:
+    assert source.freq_hz is not None
+    return _sinusoid(source, index, source.freq_hz, 1.0)
+
+
+def _sinusoid(source: ErrorSource, index: ErrorIndex, freq_hz: float, amplitude: float) -> Part:
+    whole = amplitude * source.response(freq_hz)
+    if index.window_s is None:
+        return case(source.axes, amplitude=whole)
+    share = float(np.sinc(freq_hz * index.window_s))
+    if index.takes == "MPE":
+        return case(source.axes, amplitude=whole * share)
+    if index.spacing_s is not None:
+        return case(source.axes, amplitude=whole * share * 2.0 * math.sin(math.pi * freq_hz * index.spacing_s))
+    at, weight = _WITHIN
+    left = np.exp(1j * math.pi * freq_hz * index.window_s * at) - share
+    return case(source.axes, amplitude=np.outer(left, whole), weight=0.5 * weight)
+
+
+def _drift(source: ErrorSource, index: ErrorIndex) -> Part:
+    assert source.period_s is not None
+    gain, lag = source.slow()
+    period, window = source.period_s, _window(source, index, source.period_s)
+    if index.takes == "RPE":
+        return case(source.axes, half_width=gain * window / 2.0)
+    if index.takes in ("APE", "MPE"):
+        return case(source.axes, mean=gain * period / 2.0 + lag, half_width=gain * (period - window) / 2.0)
+    assert index.spacing_s is not None
+    if index.takes == "PDE":
+        return case(source.axes, mean=gain * index.spacing_s)
+    beside = math.fmod(index.spacing_s, period)
+    again = beside / period
+    return case(source.axes, mean=np.outer([beside, beside - period], gain), weight=np.array([1.0 - again, again]))
+
+
+def _transient(source: ErrorSource, index: ErrorIndex) -> Part:
+    assert source.period_s is not None
+    period, window = source.period_s, _window(source, index, source.period_s)
+    last = period - window - (index.spacing_s or 0.0) * (index.takes == "PDE")
+    edges = last * _PATH
+    middle, weight = 0.5 * (edges[1:] + edges[:-1]), np.diff(edges) / last
+    path = _Path(source)
+    if index.takes == "RPE":
+        mean = path.mean(middle, window)
+        along = np.array([path.value(middle + window * each) for each in np.linspace(0.0, 1.0, _STRIPS + 1)]) - mean
+        level, half = 0.5 * (along[1:] + along[:-1]), 0.5 * (along[1:] - along[:-1])
+        return case(source.axes, mean=level, half_width=half, weight=np.tile(weight / _STRIPS, _STRIPS))
+    ends, between = path.mean(edges, window), path.mean(middle, window)
+    if index.spacing_s is not None:
+        apart = index.spacing_s if index.takes == "PDE" else math.fmod(index.spacing_s, period)
+        ends, between = path.mean(edges + apart, window) - ends, path.mean(middle + apart, window) - between
+    mean = (ends[1:] + 4.0 * between + ends[:-1]) / 6.0
+    return case(source.axes, mean=mean, half_width=0.5 * (ends[1:] - ends[:-1]), weight=weight)
+
+
+class _Path:
+    """An exponential of size 1 behind a transfer: its value at some times, and its mean in windows that begin there."""
+
+    def __init__(self, source: ErrorSource) -> None:
+        assert source.decay_s is not None
+        rate, through = np.full((1, 1), -1.0 / source.decay_s), source.transfer
+        if isinstance(through, lti.StateSpace):
+            n = through.order
+            A = np.block([[through.A, through.B], [np.zeros((1, n)), rate]])
+            C, start = np.hstack([through.C, through.D]), np.append(np.zeros(n), 1.0)
+        else:
+            A, C, start = rate, np.asarray(through, dtype=float)[:, None], np.ones(1)
+        self._rates, modes = np.linalg.eig(A)
+        if np.linalg.cond(modes) > _SOUND:
+            raise ValueError(
+                f"{source.name}: its time constant of {source.decay_s:g} s is a pole of its transfer; move one by 0.1 %"
+            )
+        self._each = (C @ modes) * np.linalg.solve(modes, start.astype(complex))
+
+    def value(self, times_s: Floats) -> Floats:
+        """Shape (times, axes)."""
+        return np.asarray((np.exp(np.outer(times_s, self._rates)) @ self._each.T).real)
+
+    def mean(self, times_s: Floats, window_s: float) -> Floats:
+        """Of windows that begin at some times, shape (times, axes); the value where the window has no length."""
+        if not window_s:
+            return self.value(times_s)
+        turn = self._rates * window_s
+        return np.asarray(((np.exp(np.outer(times_s, self._rates)) * np.expm1(turn) / turn) @ self._each.T).real)
+
+
+def _window(source: ErrorSource, index: ErrorIndex, period_s: float) -> float:
+    """Window of an index (s), 0 for none, once it is seen to fit into the period of a source."""
+    needs = (index.window_s or 0.0) + (index.spacing_s or 0.0) * (index.takes == "PDE")
+    if needs >= period_s:
+        raise ValueError(
+            f"{source.name}: {index.kind} looks at {needs:g} s, and it begins anew every {period_s:g} s; give shorter "
+            "times, or the class that it has over many periods"
+        )
+    return index.window_s or 0.0
+
+
+_IN_TIME = {
+    "constant": _constant,
+    "random": _random,
+    "process": _process,
+    "periodic": _periodic,
+    "drift": _drift,
+    "transient": _transient,
+}
+
+
+# ------------------------------------------------------------------------------------- at its worst time, of size 1
+def _at_its_worst(source: ErrorSource, required: Requirement) -> Part:
+    """What the error is at its largest, of one case: a mean on each axis, its sign that of the largest."""
+    part = _IN_TIME[source.kind](source, required.index)
+    sigmas = NormalDist().inv_cdf(0.5 * (1.0 + required.confidence))
+    worst = np.max(np.abs(part.mean) + np.abs(part.half_width) + np.abs(part.amplitude), axis=0)
+    noise = sigmas * np.sqrt(np.max(np.diagonal(part.covariance, axis1=1, axis2=2), axis=0))
+    sign = np.where(np.sum(part.mean, axis=0) < 0.0, -1.0, 1.0)
+    return case(source.axes, mean=sign * np.hypot(worst, noise) if not worst.any() else sign * (worst + noise))

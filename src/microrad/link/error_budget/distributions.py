@@ -1,0 +1,362 @@
+"""Distributions of pointing errors by their characteristic functions, and of sums of them: no central limit.
+
+A part is a mixture of cases. In each of them the error about all axes together is a mean, a Gaussian, an even spread
+along one direction and a sinusoid of random phase, added up, so that the characteristic function of a case is
+
+    exp(i u'm - u'Cu / 2) sinc(u'h) J0(abs(u'a)),  sinc x = sin x / x.
+
+Those of independent parts multiply. What lies within a limit follows from the Fourier series of the density on a range
+that holds it all but for less than 1e-9.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from microrad.core.arrays import Complexes, Floats, Integers
+
+_SIGMAS = 8.0  # of the Gaussian part that the range of the series holds on each side
+_OF_ALL = 10.0  # of all parts together, where their bounds add up to more
+_NEGLIGIBLE = 1e-11  # characteristic function at which the series ends
+_CHUNK, _MOST, _MOST_PLANE = 16, 1 << 14, 256  # terms at a time, and at most along an axis
+_BLOCK = 2_000_000  # numbers of an intermediate array
+_TAPER = 6.0  # width of the taper that ends a series of the most terms
+_NO_SPREAD = 1e-12  # standard deviation beside the mean below which all is taken as constant
+
+
+_SURE = np.ones(1)
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """An error about each of n axes as a mixture of cases, k of them.
+
+    Args:
+        weight: Probability of each case, shape (k,); they add up to 1.
+        mean: Mean (rad), shape (k, n).
+        covariance: Covariance of the Gaussian (rad^2), shape (k, n, n).
+        half_width: Half of an even spread along one direction (rad), shape (k, n).
+        amplitude: Complex amplitude of a sinusoid (rad), shape (k, n): its phases are those of the axes to each other.
+    """
+
+    weight: Floats
+    mean: Floats
+    covariance: Floats
+    half_width: Floats
+    amplitude: Complexes
+
+    @property
+    def axes(self) -> int:
+        """Number of axes."""
+        return int(self.mean.shape[1])
+
+    @property
+    def whole_mean(self) -> Floats:
+        """Mean of all cases (rad), shape (n,)."""
+        return np.asarray(self.weight @ self.mean)
+
+    @property
+    def whole_covariance(self) -> Floats:
+        """Covariance of all cases (rad^2), shape (n, n)."""
+        off, turned = self.mean - self.whole_mean, self.amplitude[:, :, None] * self.amplitude[:, None].conj()
+        each = self.covariance + _squares(self.half_width) / 3.0 + 0.5 * turned.real + _squares(off)
+        return np.asarray(np.tensordot(self.weight, each, 1))
+
+    def times(self, factor: float) -> "Part":
+        """The same error, so many times as large."""
+        return Part(
+            self.weight, self.mean * factor, self.covariance * factor**2, self.half_width * factor,
+            self.amplitude * factor,
+        )  # fmt: skip
+
+
+def _squares(vectors: Floats) -> Floats:
+    return np.asarray(vectors[:, :, None] * vectors[:, None])
+
+
+def case(
+    axes: int,
+    *,
+    mean: Floats | None = None,
+    covariance: Floats | None = None,
+    half_width: Floats | None = None,
+    amplitude: Complexes | None = None,
+    weight: Floats = _SURE,
+) -> Part:
+    """A part of one case, or of as many as `weight` has; what is not given is zero.
+
+    Args:
+        axes: Number of axes.
+        mean: Mean (rad), shape (k, n), or (n,) of one case; the rest alike.
+        covariance: Covariance of the Gaussian (rad^2).
+        half_width: Half of an even spread (rad).
+        amplitude: Complex amplitude of a sinusoid (rad).
+        weight: Probability of each case.
+    """
+    cases = len(weight)
+    none = np.zeros((cases, axes))
+    return Part(
+        weight,
+        none if mean is None else mean.reshape(cases, axes),
+        np.zeros((cases, axes, axes)) if covariance is None else covariance.reshape(cases, axes, axes),
+        none if half_width is None else half_width.reshape(cases, axes),
+        none.astype(complex) if amplitude is None else amplitude.reshape(cases, axes),
+    )
+
+
+def mixture(parts: Sequence[Part], weight: Floats) -> Part:
+    """One of several parts, each with its probability.
+
+    Args:
+        parts: The parts.
+        weight: Probability of each, shape (parts,).
+    """
+    if len(parts) == 1:
+        return parts[0]
+    joined = (
+        np.concatenate([getattr(part, name) for part in parts])
+        for name in ("mean", "covariance", "half_width", "amplitude")
+    )
+    return Part(np.concatenate([w * part.weight for w, part in zip(weight, parts, strict=True)]), *joined)
+
+
+@dataclass(frozen=True, slots=True)
+class Bundle:
+    """The cases of several parts, one behind the other; part p has those from begin[p] on."""
+
+    cases: Part
+    begin: Integers
+
+    @classmethod
+    def of(cls, parts: Sequence[Part]) -> "Bundle":
+        """Gather them.
+
+        Args:
+            parts: The parts, of the same axes, at least one.
+        """
+        sizes = [len(part.weight) for part in parts]
+        return cls(mixture(parts, np.ones(len(parts))), np.cumsum([0, *sizes[:-1]]))
+
+    def without(self, at: int, instead: Part | None = None) -> "Bundle":
+        """The same without a part, or with another in its place.
+
+        Args:
+            at: Place of the part.
+            instead: What stands there then.
+        """
+        end = [*self.begin, len(self.cases.weight)][at + 1]
+        first, last = slice(0, self.begin[at]), slice(end, None)
+        put = [_some(self.cases, first), *([] if instead is None else [instead]), _some(self.cases, last)]
+        more = 0 if instead is None else len(instead.weight)
+        behind = self.begin[at + 1 :] - (end - self.begin[at]) + more
+        begin = np.concatenate([self.begin[:at], [self.begin[at]] * (instead is not None), behind])
+        return Bundle(mixture(put, np.ones(len(put))), begin.astype(np.int64))
+
+    def about(self, axes: tuple[int, ...]) -> "Sum":
+        """The sum of the parts about one axis, or about two for the radial error.
+
+        Args:
+            axes: Places of the axes.
+        """
+        of, at = self.cases, list(axes)
+        chosen = Part(
+            of.weight, of.mean[:, at], of.covariance[:, at][:, :, at], of.half_width[:, at], of.amplitude[:, at]
+        )
+        return Sum(Bundle(chosen, self.begin))
+
+
+def _some(part: Part, of: slice) -> Part:
+    return Part(part.weight[of], part.mean[of], part.covariance[of], part.half_width[of], part.amplitude[of])
+
+
+class Sum:
+    """The sum of independent parts about one axis, or about two for the radial error.
+
+    Args:
+        bundle: The parts, all about one axis or all about two.
+    """
+
+    def __init__(self, bundle: Bundle) -> None:
+        """Gather moments, and what the series has to hold."""
+        of, begin = bundle.cases, bundle.begin
+        self.axes = of.axes
+
+        def by_part(values: Floats) -> Floats:
+            return np.add.reduceat(values, begin, axis=0)
+
+        weight = of.weight[:, None]
+        means = by_part(weight * of.mean)
+        turned = (of.amplitude[:, :, None] * of.amplitude[:, None].conj()).real
+        each = of.covariance + _squares(of.half_width) / 3.0 + 0.5 * turned + _squares(of.mean)
+        spread = by_part(weight[:, :, None] * each) - _squares(means)
+        self.mean, self.covariance = np.asarray(means.sum(axis=0)), np.asarray(spread.sum(axis=0))
+        counts = np.diff([*begin, len(of.weight)])
+        off = np.abs(of.mean - np.repeat(means, counts, axis=0)) + np.abs(of.half_width) + np.abs(of.amplitude)
+        bounds = np.maximum.reduceat(off, begin, axis=0)
+        gaussian = np.maximum.reduceat(np.diagonal(of.covariance, axis1=1, axis2=2), begin, axis=0).sum(axis=0)
+        every = bounds.sum(axis=0) + _SIGMAS * np.sqrt(gaussian)
+        reach = np.minimum(every, _OF_ALL * self.sigma + bounds.max(axis=0))
+        self._centre = self.mean
+        if self.axes == 2:  # a circle about zero has to lie within the square of the series
+            self._centre, reach = np.zeros(2), math.sqrt(2.0) * (reach + np.abs(self.mean))
+        self._range = float(np.max(reach))
+
+        alone = np.repeat(counts == 1, counts)
+        self._mean, self._gaussian = of.mean[alone].sum(axis=0) - self._centre, of.covariance[alone].sum(axis=0)
+        self._even = of.half_width[alone & of.half_width.any(axis=1)]
+        self._turning = of.amplitude[alone & of.amplitude.any(axis=1)]
+        self._mixed = Part(of.weight[~alone], of.mean[~alone], of.covariance[~alone], of.half_width[~alone],
+                           of.amplitude[~alone])  # fmt: skip
+        self._begin = np.cumsum([0, *counts[counts > 1][:-1]]) if (counts > 1).any() else np.zeros(0, dtype=int)
+
+    @property
+    def sigma(self) -> Floats:
+        """Standard deviation about each axis (rad), shape (n,)."""
+        return np.asarray(np.sqrt(np.maximum(np.diag(self.covariance), 0.0)))
+
+    def characteristic(self, u: Floats) -> Complexes:
+        """Characteristic function about the centre at some points (1/rad), shape (points, n); returns shape (points,).
+
+        Where the parts of one case leave less than 1e-11, it is taken as 0.
+        """
+        from scipy.special import j0
+
+        found = np.exp(1j * (u @ self._mean) - 0.5 * np.einsum("pi,ij,pj->p", u, self._gaussian, u))
+        if len(self._even):
+            found *= np.prod(np.sinc(u @ self._even.T / np.pi), axis=1)
+        if len(self._turning):
+            found *= np.prod(j0(np.abs(u @ self._turning.T)), axis=1)
+        some = np.flatnonzero(np.abs(found) >= _NEGLIGIBLE)
+        found[np.abs(found) < _NEGLIGIBLE] = 0.0
+        if len(self._begin):
+            block = max(_BLOCK // len(self._mixed.weight), 1)
+            for first in range(0, len(some), block):
+                at = some[first : first + block]
+                found[at] *= self._of_mixed(u[at])
+        return np.asarray(found)
+
+    def _of_mixed(self, u: Floats) -> Complexes:
+        """Product over the parts of several cases, shape (points,)."""
+        from scipy.special import j0
+
+        of = self._mixed
+        each = np.repeat(of.weight[None, :].astype(complex), len(u), axis=0)
+        for some, factor in (
+            (of.mean.any(axis=1), lambda at: np.exp(1j * (u @ of.mean[at].T))),
+            (
+                of.covariance.any(axis=(1, 2)),
+                lambda at: np.exp(-0.5 * np.einsum("pi,kij,pj->pk", u, of.covariance[at], u)),
+            ),
+            (of.half_width.any(axis=1), lambda at: np.sinc(u @ of.half_width[at].T / np.pi)),
+            (of.amplitude.any(axis=1), lambda at: j0(np.abs(u @ of.amplitude[at].T))),
+        ):
+            if some.all():
+                each *= factor(some)
+            elif some.any():
+                each[:, some] *= factor(some)
+        return np.asarray(np.prod(np.add.reduceat(each, self._begin, axis=1), axis=1))
+
+    def quantile(self, share: float) -> float:
+        """Size of the error, radial for two axes, that is not exceeded with a probability (rad).
+
+        Args:
+            share: The probability, above 0 and below 1.
+        """
+        from scipy.optimize import brentq
+
+        if self._constant:
+            return float(np.linalg.norm(self.mean))
+        within, most = self._within(), self._most
+        if within(most) <= share:
+            return most
+        return float(brentq(lambda size: within(size) - share, 0.0, most, xtol=1e-13 * most, rtol=1e-11))
+
+    @property
+    def _most(self) -> float:
+        return self._range + float(np.linalg.norm(self._centre))
+
+    @property
+    def _constant(self) -> bool:
+        return float(np.max(self.sigma)) <= _NO_SPREAD * float(np.linalg.norm(self.mean)) or self._range == 0.0
+
+    def within(self, size_rad: float) -> float:
+        """Probability that the error, radial for two axes, is not above a size (rad)."""
+        if self._constant:
+            return float(size_rad >= np.linalg.norm(self.mean))
+        if size_rad >= self._most:
+            return 1.0
+        return float(min(max(self._within()(size_rad), 0.0), 1.0))
+
+    def density(self, points: int = 401) -> tuple[Floats, Floats]:
+        """Errors about the one axis (rad) and their probability density (1/rad), each of shape (points,).
+
+        Args:
+            points: How many, evenly over the range of the error.
+        """
+        step = math.pi / self._range
+        terms = self._terms(step, 0, _MOST)
+        at = np.linspace(-self._range, self._range, points)
+        waves = np.exp(-1j * np.outer(at, step * np.arange(1, len(terms) + 1)))
+        return at + self._centre[0], np.asarray((0.5 + (waves @ terms).real) / self._range)
+
+    def _terms(self, step: float, axis: int, most: int) -> Complexes:
+        """Characteristic function at 1, 2, ... steps along an axis, up to where it is negligible."""
+        unit = np.eye(self.axes)[axis]
+        found, count = np.zeros(0, dtype=complex), 2 * _CHUNK
+        while True:
+            more = self.characteristic(step * np.outer(np.arange(len(found) + 1, count + 1), unit))
+            found = np.concatenate([found, more])
+            if np.max(np.abs(more[-_CHUNK:])) < _NEGLIGIBLE:
+                return found
+            if count >= most:
+                return np.asarray(found * _taper(np.arange(1, count + 1) / count))
+            count = min(max(count + _CHUNK, count * 3 // 2), most)
+
+    def _within(self) -> Callable[[float], float]:
+        """Probability as a function of the size, from one evaluation of the characteristic function."""
+        step = math.pi / self._range
+        if self.axes == 2:
+            return self._within_circle(step)
+        terms = self._terms(step, 0, _MOST)
+        at, centre, reach = step * np.arange(1, len(terms) + 1), float(self._centre[0]), self._range
+
+        def within(size: float) -> float:
+            low, high = max(-size - centre, -reach), min(size - centre, reach)
+            if high <= low:
+                return 0.0
+            waves = (np.exp(-1j * at * low) - np.exp(-1j * at * high)) / (1j * at)
+            return float(0.5 * (high - low) + (terms @ waves).real) / reach
+
+        return within
+
+    def _within_circle(self, step: float) -> Callable[[float], float]:
+        from scipy.special import j1
+
+        counts = [len(self._terms(step, axis, _MOST_PLANE)) for axis in range(2)]
+        x, y = np.arange(counts[0] + 1), np.arange(-counts[1], counts[1] + 1)
+        plane = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
+        twice = np.where(plane[:, 0] > 0, 2.0, 1.0)  # the other half plane is the conjugate
+        terms = twice * self.characteristic(np.asarray(step * plane)).real
+        for axis, count in enumerate(counts):
+            if count == _MOST_PLANE:
+                terms *= _taper(plane[:, axis] / count)
+        at = step * np.hypot(*plane.T)
+        keep = (np.abs(terms) > _NEGLIGIBLE) & (at > 0.0)
+        terms, at = terms[keep], at[keep]
+        area = (2.0 * self._range) ** 2
+
+        def within(size: float) -> float:
+            return float(math.pi * size**2 + 2.0 * math.pi * size * (terms / at) @ j1(at * size)) / area
+
+        return within
+
+
+def _taper(share: Floats) -> Floats:
+    """Factors of the terms of a series that ends too early, by their place in it.
+
+    They blur the density with a kernel of no variance and no fourth moment, so that quantiles hardly move.
+    """
+    x = 0.5 * (_TAPER * share) ** 2
+    return np.asarray(np.exp(-x) * (1.0 + x + 0.5 * x**2))

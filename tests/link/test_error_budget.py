@@ -1,0 +1,394 @@
+"""The pointing budget engine: distributions against closed forms and draws, classes against their paths in time."""
+
+import math
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import integrate, signal, stats
+
+from microrad.core import lti
+from microrad.link.error_budget.budget import budget, shares, total
+from microrad.link.error_budget.contributions import Requirement, contribution, contributions
+from microrad.link.error_budget.distributions import Bundle, case
+from microrad.link.error_budget.sources import ErrorSource, Spread
+from microrad.loop.disturbance import Disturbance, SpectralLine, first_order, olympus
+from microrad.loop.disturbance.windows import ErrorIndex, Motion, windowed_rms
+
+ONE = np.array([1.0])
+APE = Requirement(ErrorIndex("APE"), axes=(0,))
+P = 0.9973
+
+
+def source(kind, size=1.0, spread="fixed", width=0.0, gains=ONE, **more):
+    return ErrorSource(f"a {kind} error", kind, Spread(spread, size, width), gains, **more)
+
+
+def alone(part, axes=(0,)):
+    return Bundle.of([part]).about(axes)
+
+
+# -------------------------------------------------------------------------------------------------------- distributions
+@pytest.mark.parametrize(
+    ("part", "wanted", "rel"),
+    [
+        (case(1, covariance=np.array([4.0])), 2.0 * stats.norm.ppf(0.5 * (1.0 + P)), 1e-9),
+        (case(1, half_width=np.array([2.0])), 2.0 * P, 1e-6),
+        (
+            case(1, amplitude=np.array([2.0 + 0j])),
+            2.0 * math.sin(0.5 * math.pi * P),
+            1e-4,
+        ),  # its density has a pole there
+        (case(1, mean=np.array([-3.0])), 3.0, 1e-15),
+    ],
+    ids=["gaussian", "even", "sinusoid", "constant"],
+)
+def test_the_quantile_of_one_part_is_its_closed_form(part, wanted, rel):
+    assert alone(part).quantile(P) == pytest.approx(wanted, rel=rel, abs=0.0)
+    assert alone(part.times(1e-6)).quantile(P) == pytest.approx(1e-6 * wanted, rel=rel, abs=0.0)
+
+
+def test_the_sum_of_two_even_parts_is_a_triangle():
+    whole = Bundle.of([case(1, half_width=np.array([1.0]))] * 2).about((0,))
+    assert whole.quantile(P) == pytest.approx(2.0 - 2.0 * math.sqrt(1.0 - P), rel=1e-8)
+    assert whole.within(1.0) == pytest.approx(0.75, abs=1e-8)
+
+
+def test_two_like_gaussian_axes_are_rayleigh_and_unlike_ones_rice():
+    assert alone(case(2, covariance=np.eye(2)), (0, 1)).quantile(P) == pytest.approx(stats.rayleigh.ppf(P), rel=1e-8)
+    off = case(2, mean=np.array([3.0, 4.0]), covariance=np.eye(2))
+    assert alone(off, (0, 1)).quantile(P) == pytest.approx(stats.rice.ppf(P, 5.0), rel=1e-8)
+
+
+def test_correlated_axes_are_those_of_the_turned_ones():
+    turn = np.array([[0.8, -0.6], [0.6, 0.8]])
+    straight, turned = np.diag([9.0, 1.0]), turn @ np.diag([9.0, 1.0]) @ turn.T
+    quantiles = [alone(case(2, covariance=each), (0, 1)).quantile(P) for each in (straight, turned)]
+    assert quantiles[1] == pytest.approx(quantiles[0], rel=1e-8)
+
+
+def test_a_density_adds_up_to_one_and_has_its_moments():
+    whole = Bundle.of([case(1, half_width=np.array([1.0])), case(1, covariance=np.array([0.2]), mean=ONE)]).about((0,))
+    at, density = whole.density(2001)
+    moments = [integrate.trapezoid(density * at**k, at) for k in range(3)]
+    assert moments == pytest.approx([1.0, 1.0, 1.0 + 1.0 / 3.0 + 0.2], rel=1e-6)
+
+
+def unlike(draw, count):
+    """Draws of what `UNLIKE` adds up to."""
+    even, rate = draw.uniform(-2.0, 4.0, count), draw.normal(0.0, 1.0, count)
+    turning = 4.0 * np.cos(draw.uniform(0.0, 2.0 * np.pi, count))
+    fading = 9.0 * np.exp(-draw.uniform(0.0, 20.0, count) / 2.0)
+    return even + 3.0 * rate * draw.uniform(0.0, 1.0, count) + turning + fading
+
+
+UNLIKE = (
+    source("constant", 1.0, "uniform", 3.0),
+    source("drift", 0.0, "gaussian", 1.0, period_s=3.0),
+    source("periodic", 4.0, freq_hz=1.0),
+    source("transient", 9.0, period_s=20.0, decay_s=2.0),
+)
+
+
+@pytest.mark.parametrize("draws", [2_000_000, pytest.param(100_000_000, marks=pytest.mark.endurance)])
+def test_four_unlike_classes_are_as_draws_of_them(draws):
+    required = replace(APE, interpretation="mixed")
+    found = total(contributions(UNLIKE, required), required).quantile_rad
+    draw, below, block = np.random.default_rng(30), [0, 0, 0], 2_000_000
+    for _ in range(draws // block):
+        sizes = np.abs(unlike(draw, block))
+        below = [
+            n + int(np.sum(sizes <= found * (1.0 + off))) for n, off in zip(below, (-1e-3, 0.0, 1e-3), strict=True)
+        ]
+    deviation = 5.0 * math.sqrt(P * (1.0 - P) * draws)
+    assert abs(below[1] - P * draws) < deviation
+    if draws >= 100_000_000:  # within a thousandth: the counts there lie on both sides
+        assert below[0] < P * draws < below[2]
+
+
+# ---------------------------------------------------------------------------------------------------- classes, in time
+WINDOW_S, SPACING_S = 0.7, 3.1
+TIMED = {
+    "constant": {},
+    "periodic": {"freq_hz": 0.9},
+    "drift": {"period_s": 20.0},
+    "transient": {"period_s": 20.0, "decay_s": 1.5},
+}
+
+
+def path(kind, times):
+    if kind == "constant":
+        return np.ones(times.shape)
+    if kind == "periodic":
+        return np.cos(2.0 * np.pi * 0.9 * times)
+    behind = np.fmod(times, 20.0)
+    return behind if kind == "drift" else np.exp(-behind / 1.5)
+
+
+def drawn_errors(kind, takes):
+    """The error of an index by its definition, at many places of windows that lie within one period."""
+    count = 4000
+    places = (np.arange(count) + 0.5) / count * (20.0 - WINDOW_S - SPACING_S * (takes == "PDE"))
+    begin = places + 20.0 * (np.arange(count) % 9)
+    inside = (np.arange(400) + 0.5) / 400 * WINDOW_S
+    mean = np.mean(path(kind, begin[:, None] + inside), axis=1)
+    if takes == "APE":
+        return path(kind, 180.0 * (np.arange(400_000) + 0.5) / 400_000)
+    if takes == "MPE":
+        return mean
+    if takes == "RPE":
+        return (path(kind, begin[:, None] + inside[2::5]) - mean[:, None]).ravel()
+    return np.mean(path(kind, begin[:, None] + SPACING_S + inside), axis=1) - mean
+
+
+@pytest.mark.parametrize("takes", ["APE", "MPE", "RPE", "PDE"])
+@pytest.mark.parametrize("kind", TIMED)
+def test_a_class_is_its_path_in_time(kind, takes):
+    window = {} if takes == "APE" else {"window_s": WINDOW_S}
+    apart = {"spacing_s": SPACING_S} if takes == "PDE" else {}
+    required = Requirement(
+        ErrorIndex(takes, **window, **apart), axes=(0,), observation_s=10.0 if takes == "PDE" else None
+    )
+    found = alone(contribution(source(kind, **TIMED[kind]), required).part)
+    drawn = drawn_errors(kind, takes)
+    assert float(found.mean[0]) == pytest.approx(np.mean(drawn), abs=0.02)
+    assert float(found.sigma[0]) == pytest.approx(np.std(drawn), rel=0.03, abs=1e-9)
+    resolved = 3e-3 * float(np.max(np.abs(drawn)))
+    for share in (0.3, 0.7, 0.95):
+        assert found.quantile(share) == pytest.approx(np.quantile(np.abs(drawn), share), rel=0.03, abs=resolved)
+
+
+def test_reproducibility_of_what_begins_anew_is_over_what_is_left_beside_whole_periods():
+    drift = source("drift", 2.0, period_s=20.0)
+    for spacing, mean, variance in ((40.0, 0.0, 0.0), (45.0, 0.0, 4.0 * 75.0)):
+        required = Requirement(ErrorIndex("PRE", 0.7, spacing), axes=(0,), observation_s=20.0)
+        found = alone(contribution(drift, required).part)
+        assert float(found.mean[0]) == pytest.approx(mean, abs=1e-9)
+        assert float(found.covariance[0, 0]) == pytest.approx(variance, rel=1e-12, abs=1e-9)
+
+
+def test_a_random_error_is_in_no_mean_and_even_where_it_is_said():
+    for takes, there in (("APE", 1.0), ("MPE", 0.0), ("RPE", 1.0)):
+        index = ErrorIndex(takes) if takes == "APE" else ErrorIndex(takes, 1.0)
+        part = contribution(source("random", 3.0), Requirement(index, axes=(0,))).part
+        assert alone(part).sigma[0] == pytest.approx(3.0 * there)
+    assert alone(contribution(source("random", 3.0, even_in_time=True), APE).part).quantile(P) == pytest.approx(3.0 * P)
+
+
+@pytest.mark.parametrize(
+    "index",
+    [ErrorIndex("APE"), ErrorIndex("MPE", 0.3), ErrorIndex("RPE", 0.3), ErrorIndex("PDE", 0.3, 1.0)],
+    ids=lambda index: index.kind,
+)
+def test_a_process_is_its_disturbance_and_its_lines_are_sinusoids(index):
+    shaken = replace(olympus(), lines=(SpectralLine(3e-6, 7.3),))
+    required = Requirement(index, axes=(0,), observation_s=None if index.spacing_s is None else 9.0)
+    found = total(contributions([source("process", 2.0, process=shaken)], required), required)
+    assert len(found.contributions) == 2
+    assert found.sigma_rad[0] == pytest.approx(2.0 * windowed_rms(shaken, index), rel=1e-9, abs=0.0)
+
+
+# ------------------------------------------------------------------------------------------------------------ transfers
+FAST = lti.StateSpace(
+    np.array([[-3.0, -40.0], [1.0, 0.0]]),
+    np.array([[1.0], [0.0]]),
+    np.array([[3.0, 0.0], [0.0, 20.0]]),
+    np.zeros((2, 1)),
+)
+
+
+def seen(drive, times):
+    """What a drive leaves behind the transfer, by quadrature of its own."""
+    return signal.lsim((FAST.A, FAST.B, FAST.C, FAST.D), drive, times)[1]
+
+
+def test_a_drift_behind_a_transfer_is_its_ramp_and_lag():
+    part = contribution(source("drift", 1.0, gains=FAST, period_s=30.0), replace(APE, axes=(0, 1))).part
+    times = np.linspace(0.0, 30.0, 30001)
+    late = seen(times, times)[20000:]
+    assert part.mean[0] - part.half_width[0] + 2.0 * part.half_width[0] * 20.0 / 30.0 == pytest.approx(
+        late[0], rel=1e-6
+    )
+    assert late[-1] - late[0] == pytest.approx(2.0 * part.half_width[0] / 3.0, rel=1e-6, abs=1e-9)
+
+
+def test_a_transient_behind_a_transfer_is_the_response_to_it():
+    part = contribution(
+        source("transient", 1.0, gains=FAST, period_s=12.0, decay_s=0.8), replace(APE, axes=(0, 1))
+    ).part
+    times = np.linspace(0.0, 12.0, 24001)
+    response = seen(np.exp(-times / 0.8), times)
+    assert part.whole_mean == pytest.approx(np.mean(response, axis=0), rel=2e-3, abs=1e-4)
+    assert np.sqrt(np.diag(part.whole_covariance)) == pytest.approx(np.std(response, axis=0), rel=5e-3)
+
+
+def test_a_sinusoid_behind_a_transfer_turns_about_both_axes():
+    part = contribution(source("periodic", 1.0, gains=FAST, freq_hz=0.9), replace(APE, axes=(0, 1))).part
+    times = np.linspace(0.0, 20.0 / 0.9, 200001)
+    late = seen(np.cos(2.0 * np.pi * 0.9 * times), times)[100000:-1]
+    assert part.whole_covariance == pytest.approx(np.cov(late.T, bias=True), rel=1e-3, abs=1e-4)
+
+
+def test_a_process_behind_a_transfer_has_its_spectrum_times_the_response():
+    shaken = first_order(2e-6, 3.0, convention="per-axis")
+    found = Motion.of(
+        lti.StateSpace(shaken.A, shaken.B, np.vstack([shaken.C, 2.0 * shaken.C]), np.zeros((2, shaken.B.shape[1])))
+    )
+    assert found.windowed(ErrorIndex("MPE", 0.2))[1, 1] == pytest.approx(
+        4.0 * windowed_rms(shaken, ErrorIndex("MPE", 0.2)) ** 2, rel=1e-12, abs=0.0
+    )
+    part = contribution(source("process", 1.0, gains=FAST, process=shaken), replace(APE, axes=(0, 1))).part
+
+    def density(freq, at):
+        one = abs(lti.frequency_response(FAST, np.array([freq]))[0, at, 0]) ** 2
+        w = 2.0 * np.pi * freq
+        return one * 2.0 * abs((shaken.C @ np.linalg.solve(1j * w - shaken.A, shaken.B)).item()) ** 2
+
+    for at in range(2):
+        wanted = integrate.quad(density, 0.0, np.inf, args=(at,), epsrel=1e-9, epsabs=0.0, limit=500)[0]
+        assert part.covariance[0, at, at] == pytest.approx(wanted, rel=1e-7, abs=0.0)
+
+
+TWICE = lti.StateSpace(
+    np.array([[-2.0, 1.0], [0.0, -2.0]]), np.array([[0.0], [1.0]]), np.array([[1.0, 0.0]]), np.zeros((1, 1))
+)
+
+
+@pytest.mark.parametrize(
+    "index",
+    [
+        ErrorIndex("MPE", 0.3),
+        ErrorIndex("RPE", 1e-4),
+        ErrorIndex("RPE", 0.3),
+        ErrorIndex("PDE", 0.3, 0.9),
+        ErrorIndex("PDE", 0.9, 0.3),
+    ],
+    ids=str,
+)
+def test_poles_that_coincide_are_as_poles_that_nearly_do(index):
+    apart = replace(TWICE, A=np.array([[-2.0 * 1.01, 1.0], [0.0, -2.0 / 1.01]]))
+    both = [Motion.of(each) for each in (TWICE, apart)]
+    assert [each.sound for each in both] == [False, True]
+    same, near = (each.windowed(index).item() for each in both)
+    assert same == pytest.approx(near, rel=1e-3, abs=0.0)
+
+
+# --------------------------------------------------------------------------------------------------- over the ensemble
+def test_the_interpretations_take_the_worst_satellite_the_worst_time_or_neither():
+    sizes = {}
+    for name in ("temporal", "ensemble", "mixed"):
+        required = replace(APE, interpretation=name)
+        sizes[name] = alone(contribution(source("periodic", 0.0, "gaussian", 1.0, freq_hz=1.0), required).part)
+    assert sizes["temporal"].sigma[0] == pytest.approx(3.0 / math.sqrt(2.0))  # amplitude of 3 sigma
+    assert sizes["ensemble"].sigma[0] == pytest.approx(1.0)  # its peak, of a random satellite
+    assert sizes["mixed"].sigma[0] == pytest.approx(math.sqrt(0.5))
+    draw = np.random.default_rng(5)
+    drawn = np.abs(draw.normal(size=400_000) * np.cos(draw.uniform(0.0, 2.0 * np.pi, 400_000)))
+    assert sizes["mixed"].quantile(0.95) == pytest.approx(np.quantile(drawn, 0.95), rel=0.01)
+
+
+def test_a_constant_over_an_ensemble_is_its_spread():
+    mixed = replace(APE, interpretation="mixed")
+    even = contribution(source("constant", 1.0, "uniform", 3.0), mixed).part
+    assert alone(even).quantile(0.5) == pytest.approx(1.5)  # of -2 to 4
+    assert alone(contribution(source("constant", 1.0, "gaussian", 3.0), mixed).part).sigma[0] == pytest.approx(3.0)
+    assert alone(contribution(source("constant", 1.0, "gaussian", 3.0), APE).part).quantile(P) == pytest.approx(10.0)
+    assert alone(contribution(source("constant", -1.0, "uniform", 3.0), APE).part).quantile(P) == pytest.approx(4.0)
+
+
+def test_noise_at_its_worst_time_has_as_many_sigma_as_hold_the_confidence():
+    required = replace(APE, interpretation="ensemble")
+    found = total(contributions([source("random", 2.0)], required), required)
+    assert found.quantile_rad == pytest.approx(2.0 * stats.norm.ppf(0.5 * (1.0 + P)))
+
+
+# -------------------------------------------------------------------------------------------------------------- totals
+def test_the_rules_add_means_and_the_squares_of_deviations():
+    parts = [source("constant", 2.0), source("random", 3.0), source("random", 4.0)]
+    found = total(contributions(parts, APE), APE)
+    assert found.by_rules_rad == pytest.approx(2.0 + stats.norm.ppf(0.5 * (1.0 + P)) * 5.0)
+    assert found.quantile_rad < found.by_rules_rad
+
+
+def test_totals_of_several_requirements_are_each_as_by_itself():
+    parts = [replace(each, transfer=np.array([1.0, 0.5])) for each in UNLIKE]
+    asked = [
+        replace(APE, axes=axes, interpretation=name) for axes in ((0,), (1,), (0, 1)) for name in ("temporal", "mixed")
+    ]
+    together = budget(parts, asked)
+    assert [each.quantile_rad for each in together] == pytest.approx(
+        [total(contributions(parts, each), each).quantile_rad for each in asked], rel=1e-12
+    )
+    assert together[0].quantile_rad == pytest.approx(2.0 * together[2].quantile_rad, rel=1e-6)
+
+
+def test_shares_rank_sources_and_say_how_far_each_may_grow():
+    required = replace(APE, limit_rad=14.0)
+    parts = [source("random", 4.0), source("random", 1.0), source("constant", 3.0)]
+    found = shares(total(contributions(parts, required), required))
+    assert [each.name for each in found] == ["a random error", "a constant error", "a random error"]
+    grown = [source("random", 4.0 * found[0].allowed), *parts[1:]]
+    assert total(contributions(grown, required), required).quantile_rad == pytest.approx(14.0, rel=1e-6)
+    assert sum(each.growth for each in found) == pytest.approx(1.0, rel=1e-3)  # all of them by 1 % is all by 1 %
+    assert found[1].without_rad == pytest.approx(stats.norm.ppf(0.5 * (1.0 + P)) * math.sqrt(17.0), rel=1e-6)
+    tight = shares(total(contributions(parts, required), replace(required, limit_rad=3.0)))
+    assert tight[2].allowed == 0.0  # the large one alone is more
+
+
+def test_a_limit_is_kept_or_not():
+    parts = [source("random", 4.0)]
+    kept = [total(contributions(parts, APE), replace(APE, limit_rad=limit)).holds for limit in (12.1, 11.9, None)]
+    assert kept == [True, False, None]
+
+
+# ------------------------------------------------------------------------------------------------------------- refusals
+HUMMING = replace(olympus(), lines=(SpectralLine(1e-6, 1.0),))
+AT_2 = replace(FAST, A=np.diag([-2.0, -3.0]))
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: Spread("bent", 1.0), 'no shape "bent"'),
+        (lambda: Spread("fixed", 1.0, 2.0), "a fixed size has no width"),
+        (lambda: Spread("gaussian", math.nan), "give finite ones"),
+        (lambda: source("odd"), 'no class "odd"'),
+        (lambda: source("periodic"), "needs freq_hz"),
+        (lambda: source("constant", freq_hz=1.0), "has no freq_hz"),
+        (lambda: source("drift", period_s=-1.0), "above zero"),
+        (lambda: source("process"), "a spectrum belongs to a process"),
+        (lambda: source("random", -1.0), "give a size of 0 or above"),
+        (lambda: source("constant", gains=np.zeros((2, 2))), "give a finite one for each axis"),
+        (lambda: source("constant", gains=replace(FAST, A=np.eye(2))), "has a pole of 1 rad/s; give a stable system"),
+        (lambda: source("process", 1.0, "gaussian", 1.0, process=HUMMING), "the lines of a process have one size"),
+        (lambda: contribution(source("random", gains=FAST), APE), 'give gains, or the class "process"'),
+        (
+            lambda: contribution(source("drift", period_s=1.0), Requirement(ErrorIndex("MPE", 2.0))),
+            "begins anew every 1 s",
+        ),
+        (
+            lambda: contribution(source("transient", gains=AT_2, period_s=9.0, decay_s=0.5), APE),
+            "is a pole of its transfer",
+        ),
+        (lambda: contributions([source("random"), source("random", gains=np.ones(2))], APE), "give all as many gains"),
+        (lambda: contributions([source("random")], replace(APE, axes=(1,))), "axis 1 is asked for"),
+        (lambda: total([], APE), "a budget without a source"),
+        (lambda: replace(APE, confidence=1.0), "give a share"),
+        (lambda: replace(APE, interpretation="both"), 'no interpretation "both"'),
+        (lambda: replace(APE, axes=(0, 1, 2)), "give one, or two"),
+        (lambda: replace(APE, limit_rad=0.0), "above zero"),
+        (lambda: replace(APE, observation_s=1.0), "has no observation_s"),
+        (lambda: Requirement(ErrorIndex("PDE", 1.0, 2.0)), "PDE needs observation_s"),
+        (lambda: Requirement(ErrorIndex("PDE", 1.0, 2.0), observation_s=2.5), "give it longer"),
+        (lambda: Requirement(ErrorIndex("PRE", 1.0, 2.0), observation_s=2.5), "space them wider"),
+    ],
+)
+def test_what_is_no_budget_is_refused(make, said):
+    with pytest.raises(ValueError, match=re.escape(said)):
+        make()
+
+
+def test_a_spectrum_of_no_variance_is_refused():
+    with pytest.raises(ValueError, match="has no variance"):
+        Disturbance("drifting", np.zeros((1, 1)), np.ones((1, 1)), np.ones((1, 1)), (), "", "")
