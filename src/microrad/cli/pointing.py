@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from microrad.cli.coupled_design import broken_promises, design_of_several_axes, tuned_text
+from microrad.cli.error_budget import sources_beside, totals_of
 from microrad.cli.frame import (
     MET,
     UNMET,
@@ -27,6 +28,9 @@ from microrad.cli.frame import (
 if TYPE_CHECKING:
     from microrad.loop.controller_study import Design, Outlook, Scene
     from microrad.loop.disturbance.windows import ErrorIndex
+    from microrad.loop.pointing_loop.linear import ClosedLoop
+    from microrad.loop.pointing_loop.windows import WindowedErrors
+    from microrad.mission.file import MissionFile
 
 
 def _time(name: str, text: str) -> Any:
@@ -86,6 +90,7 @@ def design(
         "microrad pointing leo-geo.toml",
         "microrad pointing leo-geo.toml --window '1 ms' --window '10 s' --spacing '1 min'",
         "microrad pointing leo-geo.toml --controller LQG --json",
+        "microrad pointing leo-geo.toml --sources errors.csv",
     )
 )
 @command
@@ -94,35 +99,67 @@ def pointing(
     window: Annotated[list[float] | None, _time("--window", "Length of a window [default: 10 ms and 1 s];")] = None,
     spacing: Annotated[list[float] | None, _time("--spacing", "From the begin of a window to that of another;")] = None,
     controller: Annotated[str, option("--controller", "NAME", "One that microrad design lists.")] = "PI",
+    sources: Annotated[
+        Path | None, option("--sources", "LIST", "Sources of errors as CSV or XLSX, a row each.")
+    ] = None,
     as_json: Json = False,
 ) -> Outcome:
-    """Print the pointing errors of a mission's loop in time windows.
+    """Print the pointing errors of a mission in time windows, and its budget of them.
 
     The indices are those of ECSS-E-ST-60-10C: all of the error (APE), its mean over a window (MPE), what is left beside
     that mean (RPE), and the difference of the means of two windows (PDE). They are radial rms in theory (linear), by
     source, of what the loop leaves and of the same disturbances without a loop, exactly; the rational filters of linear
     tools stand beside that.
+
+    A mission with a table [error_budget], or a list of sources beside it, has a budget: each requirement with its total
+    by the rules of the standard and as a full distribution, what each source weighs, and how large it may become. The
+    exit code is 1 when a limit is not kept.
     """
+    from microrad.mission.file import MissionFile, load_link, load_mission
+    from microrad.report.error_budget import budget_data, budget_view
+    from microrad.report.fine_pointing.windows import windows_data, windows_text
+    from microrad.report.view import views_text
+
+    mission = load_link(file)
+    with refusal_of(mission.path):
+        indices = _indices(window or [0.01, 1.0], spacing or [])
+        asked = sources_beside(mission, sources, indices)
+    table, data, texts, closed = mission.mission.error_budget, dict[str, Any](), list[str](), None
+    loop, needed = mission if isinstance(mission, MissionFile) else None, asked is None or (table and table.with_loop)
+    if needed or (loop and loop.mission.fine_pointing):
+        closed, errors = _closed(loop or load_mission(file), controller, indices)
+        data |= {"controller": controller, "indices": windows_data(errors)}
+        texts.append(windows_text(errors, controller, width()))
+    code = MET
+    if asked is not None:
+        with refusal_of(mission.path):
+            totals = totals_of(*asked, closed if table is not None and table.with_loop else None)
+        code = UNMET if any(each.holds is False for each in totals.values()) else MET
+        data["budget"] = budget_data(totals, {each.name: each.origin for each in asked[0]})
+        texts.append(views_text(budget_view(totals).blocks, width()).strip("\n"))
+    if as_json:
+        return Outcome(json_text({"mission_sha256": mission.sha256, **data}), code)
+    return Outcome("\n\n".join(texts), code)
+
+
+def _closed(
+    mission: "MissionFile", controller: str, indices: "list[ErrorIndex]"
+) -> "tuple[ClosedLoop, tuple[WindowedErrors, ...]]":
+    """The mission's loop under one of its controllers, and its errors in each index."""
     from microrad import mirror as mirror_room
     from microrad.link import tracking_light_w
     from microrad.loop import controller_study
     from microrad.loop.pointing_loop.linear import close
     from microrad.loop.pointing_loop.windows import windowed_errors
-    from microrad.mission.file import load_loop
-    from microrad.report.fine_pointing.windows import windows_data, windows_text
+    from microrad.mission.file import mirror_of_loop
 
-    mission, several = load_loop(file)
-    if several is not None:
-        raise Refusal(f"{file}: its mirror has several axes, and windows are there for one mirror an axis")
+    if mirror_of_loop(mission) is not None:
+        raise Refusal(f"{mission.path}: its mirror has several axes, and windows are there for one mirror an axis")
     with progress_bar() as progress, refusal_of(mission.path):
-        indices = _indices(window or [0.01, 1.0], spacing or [])
         scene = controller_study.scene(mission, mirror_room.of(mission.mission), tracking_light_w(mission))
         (made,) = controller_study.design(scene, progress, [controller])
-        errors = windowed_errors(close(scene.theory, made.controller), indices)
-    if as_json:
-        data = windows_data(errors)
-        return Outcome(json_text({"mission_sha256": mission.sha256, "controller": made.name, "indices": data}))
-    return Outcome(windows_text(errors, made.name, width()))
+        closed = close(scene.theory, made.controller)
+        return closed, windowed_errors(closed, indices)
 
 
 def _indices(windows: list[float], spacings: list[float]) -> "list[ErrorIndex]":

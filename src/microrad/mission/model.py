@@ -13,6 +13,7 @@ from pydantic import Field
 from microrad.core.units import format_quantity
 from microrad.mission.fields import Problem, Quantity, Several, Share, Table
 from microrad.mission.tables.acquisition import Acquisition
+from microrad.mission.tables.error_budget import ErrorBudget
 from microrad.mission.tables.fine_pointing import FinePointing, clock_problems
 from microrad.mission.tables.link import (
     Beacon,
@@ -277,6 +278,7 @@ class LinkMission(Table):
     channel: Channel | None = None
     jitter: JitterTable | None = None
     point_ahead: PointAhead | None = None
+    error_budget: ErrorBudget | None = None
     acquisition: Acquisition | None = None
     orbit: Orbits | None = None
     operations: Operations | None = None

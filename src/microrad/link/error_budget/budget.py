@@ -12,7 +12,7 @@ import numpy as np
 
 from microrad.core.arrays import Floats
 from microrad.link.error_budget.contributions import Contribution, Requirement, contributions
-from microrad.link.error_budget.distributions import Bundle
+from microrad.link.error_budget.distributions import Bundle, Series, Sum, each_without
 from microrad.link.error_budget.sources import ErrorSource
 from microrad.link.pointing.summation import sigma_multiple
 
@@ -103,7 +103,7 @@ def budget(sources: Sequence[ErrorSource], requirements: Sequence[Requirement]) 
 def _bundled(found: Sequence[Contribution]) -> Bundle:
     if not found:
         raise ValueError("a budget without a source: give one or more")
-    return Bundle.of([each.part for each in found])
+    return Bundle.of([part for each in found for part in each.parts])
 
 
 def _total(found: Sequence[Contribution], bundle: Bundle, required: Requirement) -> Total:
@@ -115,6 +115,9 @@ def _total(found: Sequence[Contribution], bundle: Bundle, required: Requirement)
 
 _SMALL = 1e-3  # growth of a source by which that of the total is seen
 _FAR = 1e6  # times its size, beyond which a source does not matter
+_STEP = 4.0  # between two sizes that are tried
+_HELD = 2.0  # limits, or totals, up to which the range of a series reaches
+_DIGITS = 1e-5  # part to which a size or a total of others is found
 
 
 def shares(of: Total) -> tuple[Share, ...]:
@@ -123,31 +126,51 @@ def shares(of: Total) -> tuple[Share, ...]:
     Args:
         of: The total.
     """
-    bundle = _bundled(of.contributions)
-    found = [_share(of, bundle, at) for at in range(len(of.contributions))]
-    return tuple(sorted(found, key=lambda each: -each.growth))
+    required = of.required
+    parts = [Bundle.of(each.parts).about(required.axes) for each in of.contributions]
+    if all(part.constant for part in parts):
+        found = [_of_constant(of, each.name, own) for each, own in zip(of.contributions, parts, strict=True)]
+    else:
+        u, others = each_without(parts, _HELD * max(of.quantile_rad, required.limit_rad or 0.0))
+        found = [
+            _share(of, each.name, own, series, u)
+            for each, own, series in zip(of.contributions, parts, others, strict=True)
+        ]
+    return tuple(sorted(found, key=lambda each: -float(f"{each.growth:.2e}")))  # what is alike keeps its order
 
 
-def _share(of: Total, bundle: Bundle, at: int) -> Share:
-    required, part = of.required, of.contributions[at].part
+def _share(of: Total, name: str, own: Sum, others: Series, u: Floats) -> Share:
+    whole, confidence, limit = of.quantile_rad, of.required.confidence, of.required.limit_rad
 
-    def times(factor: float) -> float:
-        return bundle.without(at, part.times(factor)).about(required.axes).quantile(required.confidence)
+    def spare(size_rad: float, times: float) -> float:
+        return others.within(size_rad, own.at(times * u)) - confidence
 
-    about, whole = Bundle.of([part]).about(required.axes), of.quantile_rad
-    growth = (times(1.0 + _SMALL) / whole - 1.0) / _SMALL if whole else 0.0
-    allowed = None if required.limit_rad is None else _allowed(times, required.limit_rad)
-    return Share(of.contributions[at].name, about.mean, about.sigma, times(0.0), growth, allowed)
+    by_source = spare(whole, 1.0 + _SMALL) - spare(whole, 1.0 - _SMALL)
+    by_size = spare(whole * (1.0 + _SMALL), 1.0) - spare(whole * (1.0 - _SMALL), 1.0)
+    growth = -by_source / by_size if by_size > 0.0 > by_source else 0.0
+    allowed = None if limit is None else _allowed(lambda times: spare(limit, times))
+    return Share(name, own.mean, own.sigma, others.quantile(confidence, _DIGITS), growth, allowed)
 
 
-def _allowed(times: Callable[[float], float], limit_rad: float) -> float:
+def _of_constant(of: Total, name: str, own: Sum) -> Share:
+    """The same where nothing of the budget is spread, so that lengths of means are all."""
+    limit, others = of.required.limit_rad, of.mean_rad - own.mean
+    growth = float(own.mean @ of.mean_rad) / of.quantile_rad**2 if of.quantile_rad else 0.0
+    allowed = None
+    if limit is not None:
+        allowed = _allowed(lambda times: limit - float(np.linalg.norm(others + times * own.mean)))
+    return Share(name, own.mean, own.sigma, float(np.linalg.norm(others)), growth, allowed)
+
+
+def _allowed(spare: Callable[[float], float]) -> float:
+    """How many times as large a source may be while something is to spare."""
     from scipy.optimize import brentq
 
-    if times(0.0) > limit_rad:
+    if spare(0.0) < 0.0:
         return 0.0
-    high = 1.0
-    while times(high) <= limit_rad:
-        high *= 4.0
+    low, high = 0.0, 1.0
+    while spare(high) >= 0.0:
+        low, high = high, high * _STEP
         if high > _FAR:
             return np.inf
-    return float(brentq(lambda factor: times(factor) - limit_rad, 0.0, high, xtol=1e-9 * high, rtol=1e-9))
+    return float(brentq(spare, low, high, xtol=_DIGITS * high, rtol=_DIGITS))

@@ -99,15 +99,15 @@ class Requirement:
 
 @dataclass(frozen=True, slots=True)
 class Contribution:
-    """A source's part of an index: its name, its class, and the distribution of its error about all axes."""
+    """What a source adds to an index: its name, its class, and the independent parts that its error is the sum of."""
 
     name: str
     kind: SourceKind | Literal["loop"]
-    part: Part
+    parts: tuple[Part, ...]
 
 
 def contribution(source: ErrorSource, required: Requirement) -> Contribution:
-    """What a source adds to an index under a requirement, the lines of a process left out.
+    """What a source adds to an index under a requirement.
 
     Args:
         source: The source.
@@ -116,14 +116,15 @@ def contribution(source: ErrorSource, required: Requirement) -> Contribution:
     Raises:
         ValueError: For an index of more or longer windows than the period of a drift or of a transient holds.
     """
+    parts = tuple(_part(each, required) for one in source.by_axis for each in (one, *_lines(one)))
+    return Contribution(source.name, source.kind, parts)
+
+
+def _part(source: ErrorSource, required: Requirement) -> Part:
     if required.interpretation == "ensemble":
-        part = _scaled(_at_its_worst(source, required), source.size)
-    else:
-        in_time = _IN_TIME[source.kind](source, required.index)
-        part = (
-            in_time.times(source.size.worst) if required.interpretation == "temporal" else _scaled(in_time, source.size)
-        )
-    return Contribution(source.name, source.kind, part)
+        return _scaled(_at_its_worst(source, required), source.size)
+    in_time = _IN_TIME[source.kind](source, required.index)
+    return in_time.times(source.size.worst) if required.interpretation == "temporal" else _scaled(in_time, source.size)
 
 
 def contributions(sources: Sequence[ErrorSource], required: Requirement) -> tuple[Contribution, ...]:
@@ -140,7 +141,7 @@ def contributions(sources: Sequence[ErrorSource], required: Requirement) -> tupl
         raise ValueError(f"the sources have {sorted({source.axes for source in sources})} axes; give all as many gains")
     if sources and max(required.axes) >= sources[0].axes:
         raise ValueError(f"axis {max(required.axes)} is asked for, and the sources have {sources[0].axes} from 0 on")
-    return tuple(contribution(each, required) for source in sources for each in (source, *_lines(source)))
+    return tuple(contribution(source, required) for source in sources)
 
 
 def _lines(source: ErrorSource) -> list[ErrorSource]:

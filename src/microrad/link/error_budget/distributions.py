@@ -20,8 +20,9 @@ from microrad.core.arrays import Complexes, Floats, Integers
 _SIGMAS = 8.0  # of the Gaussian part that the range of the series holds on each side
 _OF_ALL = 10.0  # of all parts together, where their bounds add up to more
 _NEGLIGIBLE = 1e-11  # characteristic function at which the series ends
-_CHUNK, _MOST, _MOST_PLANE = 16, 1 << 14, 256  # terms at a time, and at most along an axis
+_CHUNK, _MOST, _MOST_PLANE, _MOST_OF_OTHERS = 16, 1 << 14, 256, 128  # terms at a time, and at most along an axis
 _BLOCK = 2_000_000  # numbers of an intermediate array
+_KERNELS = 64  # that a grid keeps
 _TAPER = 6.0  # width of the taper that ends a series of the most terms
 _NO_SPREAD = 1e-12  # standard deviation beside the mean below which all is taken as constant
 
@@ -237,6 +238,10 @@ class Sum:
                 found[at] *= self._of_mixed(u[at])
         return np.asarray(found)
 
+    def at(self, u: Floats) -> Complexes:
+        """Characteristic function about zero at some points (1/rad), shape (points, n); returns shape (points,)."""
+        return np.asarray(self.characteristic(u) * np.exp(1j * (u @ self._centre)))
+
     def _of_mixed(self, u: Floats) -> Complexes:
         """Product over the parts of several cases, shape (points,)."""
         from scipy.special import j0
@@ -264,30 +269,20 @@ class Sum:
         Args:
             share: The probability, above 0 and below 1.
         """
-        from scipy.optimize import brentq
-
-        if self._constant:
+        if self.constant:
             return float(np.linalg.norm(self.mean))
-        within, most = self._within(), self._most
-        if within(most) <= share:
-            return most
-        return float(brentq(lambda size: within(size) - share, 0.0, most, xtol=1e-13 * most, rtol=1e-11))
+        return self.series().quantile(share)
 
     @property
-    def _most(self) -> float:
-        return self._range + float(np.linalg.norm(self._centre))
-
-    @property
-    def _constant(self) -> bool:
+    def constant(self) -> bool:
+        """Whether nothing of it is spread."""
         return float(np.max(self.sigma)) <= _NO_SPREAD * float(np.linalg.norm(self.mean)) or self._range == 0.0
 
     def within(self, size_rad: float) -> float:
         """Probability that the error, radial for two axes, is not above a size (rad)."""
-        if self._constant:
+        if self.constant:
             return float(size_rad >= np.linalg.norm(self.mean))
-        if size_rad >= self._most:
-            return 1.0
-        return float(min(max(self._within()(size_rad), 0.0), 1.0))
+        return float(min(max(self.series().within(size_rad), 0.0), 1.0))
 
     def density(self, points: int = 401) -> tuple[Floats, Floats]:
         """Errors about the one axis (rad) and their probability density (1/rad), each of shape (points,).
@@ -295,62 +290,167 @@ class Sum:
         Args:
             points: How many, evenly over the range of the error.
         """
-        step = math.pi / self._range
-        terms = self._terms(step, 0, _MOST)
         at = np.linspace(-self._range, self._range, points)
-        waves = np.exp(-1j * np.outer(at, step * np.arange(1, len(terms) + 1)))
-        return at + self._centre[0], np.asarray((0.5 + (waves @ terms).real) / self._range)
+        series = self.series()
+        density = (0.5 + (np.exp(-1j * np.outer(at, series.grid.u[:, 0])) @ series.terms).real) / self._range
+        return at + self._centre[0], np.asarray(density)
 
-    def _terms(self, step: float, axis: int, most: int) -> Complexes:
-        """Characteristic function at 1, 2, ... steps along an axis, up to where it is negligible."""
-        unit = np.eye(self.axes)[axis]
+    def series(self, reach_rad: float = 0.0) -> "Series":
+        """The series of the density, for a range that reaches at least so far (rad)."""
+        reach = max(self._range, reach_rad)
+        step = math.pi / reach
+        if self.axes == 1:
+            terms = self._terms(step)
+            u = step * np.arange(1.0, len(terms) + 1.0)[:, None]
+            return Series(Grid(u, float(self._centre[0]), reach), terms)
+        count = _count(lambda u: np.abs(self.characteristic(u)), step, _MOST_PLANE)
+        u, weight = _plane(step, count, _MOST_PLANE)
+        terms = weight * self.characteristic(u)
+        keep = np.abs(terms) > _NEGLIGIBLE
+        return Series(Grid(u[keep], 0.0, reach), terms[keep])
+
+    def _terms(self, step: float) -> Complexes:
+        """Characteristic function of one axis at 1, 2, ... steps, up to where it is negligible."""
         found, count = np.zeros(0, dtype=complex), 2 * _CHUNK
         while True:
-            more = self.characteristic(step * np.outer(np.arange(len(found) + 1, count + 1), unit))
+            more = self.characteristic(step * np.arange(len(found) + 1.0, count + 1.0)[:, None])
             found = np.concatenate([found, more])
             if np.max(np.abs(more[-_CHUNK:])) < _NEGLIGIBLE:
                 return found
-            if count >= most:
+            if count >= _MOST:
                 return np.asarray(found * _taper(np.arange(1, count + 1) / count))
-            count = min(max(count + _CHUNK, count * 3 // 2), most)
+            count = min(max(count + _CHUNK, count * 3 // 2), _MOST)
 
-    def _within(self) -> Callable[[float], float]:
-        """Probability as a function of the size, from one evaluation of the characteristic function."""
-        step = math.pi / self._range
-        if self.axes == 2:
-            return self._within_circle(step)
-        terms = self._terms(step, 0, _MOST)
-        at, centre, reach = step * np.arange(1, len(terms) + 1), float(self._centre[0]), self._range
 
-        def within(size: float) -> float:
-            low, high = max(-size - centre, -reach), min(size - centre, reach)
-            if high <= low:
-                return 0.0
-            waves = (np.exp(-1j * at * low) - np.exp(-1j * at * high)) / (1j * at)
-            return float(0.5 * (high - low) + (terms @ waves).real) / reach
+class Grid:
+    """Where the characteristic function of an error is known, and what of it lies within a size.
 
-        return within
+    Args:
+        u: The points (1/rad), shape (points, axes), the origin left out.
+        centre: Centre of the range, of one axis (rad); 0 for two.
+        reach: Half of the range (rad).
+    """
 
-    def _within_circle(self, step: float) -> Callable[[float], float]:
+    def __init__(self, u: Floats, centre: float, reach: float) -> None:
+        """Keep the points."""
+        self.u, self.centre, self.reach = u, centre, reach
+        self._at = np.hypot(*u.T) if u.shape[1] == 2 else u[:, 0]
+        self._known: dict[float, tuple[float, Complexes | Floats]] = {}
+
+    def kernel(self, size_rad: float) -> tuple[float, Complexes | Floats]:
+        """Share of the range that lies within a size, and the weight of each term."""
+        if size_rad not in self._known:
+            if len(self._known) > _KERNELS:
+                self._known.clear()
+            self._known[size_rad] = self._kernel(size_rad)
+        return self._known[size_rad]
+
+    def _kernel(self, size_rad: float) -> tuple[float, Complexes | Floats]:
         from scipy.special import j1
 
-        counts = [len(self._terms(step, axis, _MOST_PLANE)) for axis in range(2)]
-        x, y = np.arange(counts[0] + 1), np.arange(-counts[1], counts[1] + 1)
-        plane = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
-        twice = np.where(plane[:, 0] > 0, 2.0, 1.0)  # the other half plane is the conjugate
-        terms = twice * self.characteristic(np.asarray(step * plane)).real
-        for axis, count in enumerate(counts):
-            if count == _MOST_PLANE:
-                terms *= _taper(plane[:, axis] / count)
-        at = step * np.hypot(*plane.T)
-        keep = (np.abs(terms) > _NEGLIGIBLE) & (at > 0.0)
-        terms, at = terms[keep], at[keep]
-        area = (2.0 * self._range) ** 2
+        at = self._at
+        if self.u.shape[1] == 2:
+            area = (2.0 * self.reach) ** 2
+            return math.pi * size_rad**2 / area, 2.0 * math.pi * size_rad / area * j1(at * size_rad) / at
+        low, high = max(-size_rad - self.centre, -self.reach), min(size_rad - self.centre, self.reach)
+        if high <= low:
+            return 0.0, np.zeros(at.shape)
+        waves = (np.exp(-1j * at * low) - np.exp(-1j * at * high)) / (1j * at)
+        return 0.5 * (high - low) / self.reach, waves / self.reach
 
-        def within(size: float) -> float:
-            return float(math.pi * size**2 + 2.0 * math.pi * size * (terms / at) @ j1(at * size)) / area
 
-        return within
+@dataclass(frozen=True, slots=True)
+class Series:
+    """Fourier series of the density of an error.
+
+    Args:
+        grid: Where the characteristic function is known.
+        terms: What it is there, shape (points,).
+    """
+
+    grid: Grid
+    terms: Complexes
+
+    def within(self, size_rad: float, factor: Complexes | float = 1.0) -> float:
+        """Probability that the error, radial for two axes, is not above a size.
+
+        Args:
+            size_rad: The size (rad).
+            factor: Characteristic function of a further part on the grid, shape (points,).
+        """
+        flat, kernel = self.grid.kernel(size_rad)
+        return float(flat + ((self.terms * factor) @ kernel).real)
+
+    def quantile(self, share: float, rel: float = 1e-11) -> float:
+        """Size that is not exceeded with a probability (rad).
+
+        Args:
+            share: The probability.
+            rel: Part of the range to which it is found.
+        """
+        from scipy.optimize import brentq
+
+        most = self.grid.reach + abs(self.grid.centre)
+        if self.within(most) <= share:
+            return most
+        return float(brentq(lambda size: self.within(size) - share, 0.0, most, xtol=rel * most, rtol=1e-11))
+
+
+def _count(size: Callable[[Floats], Floats], step: float, most: int) -> int:
+    """Steps along each of two axes, beyond which a characteristic function is negligible in all directions."""
+    count = 2 * _CHUNK
+    while count < most:
+        edge = np.arange(-count, count + 1.0)
+        side = np.full(edge.shape, float(count))
+        ring = np.concatenate([np.stack([side, edge], axis=1), np.stack([edge, side], axis=1)])
+        if np.max(size(step * ring)) < _NEGLIGIBLE:
+            return count
+        count = min(count * 3 // 2, most)
+    return count
+
+
+def _plane(step: float, count: int, most: int) -> tuple[Floats, Floats]:
+    """Points of half a plane without the origin, and how often each stands for itself and its conjugate, tapered."""
+    plane = np.stack(np.meshgrid(np.arange(count + 1.0), np.arange(-count, count + 1.0), indexing="ij"), axis=-1)
+    half = plane.reshape(-1, 2)
+    half = half[(half[:, 0] > 0) | (half[:, 1] > 0)]
+    weight = np.full(len(half), 2.0)
+    if count >= most:
+        weight *= _taper(half[:, 0] / count) * _taper(half[:, 1] / count)
+    return step * half, weight
+
+
+def each_without(sums: Sequence[Sum], reach_rad: float) -> tuple[Floats, list[Series]]:
+    """Series of all parts but one, for each of them, about zero; and the points (1/rad) that they have in common.
+
+    Args:
+        sums: The parts, each by itself, about the same one or two axes.
+        reach_rad: How far the range reaches (rad).
+    """
+    step = math.pi / reach_rad
+    if sums[0].axes == 2:
+        u, weight = _plane(step, _count(lambda u: np.abs(_others(sums, u)), step, _MOST_OF_OTHERS), _MOST_OF_OTHERS)
+    else:
+        count = 4 * _CHUNK
+        while count < _MOST and np.max(np.abs(_others(sums, step * _last(count)))) >= _NEGLIGIBLE:
+            count = min(2 * count, _MOST)
+        u = step * np.arange(1.0, count + 1.0)[:, None]
+        weight = _taper(np.arange(1, count + 1) / count) if count >= _MOST else np.ones(count)
+    grid = Grid(u, 0.0, reach_rad)
+    return u, [Series(grid, weight * rest) for rest in _others(sums, u)]
+
+
+def _last(count: int) -> Floats:
+    return np.arange(count - _CHUNK, count + 1.0)[:, None]
+
+
+def _others(sums: Sequence[Sum], u: Floats) -> Complexes:
+    """Product of the characteristic functions of all but one, for each, shape (sums, points)."""
+    each = np.array([one.at(u) for one in sums])
+    before, behind = np.ones_like(each), np.ones_like(each)
+    np.cumprod(each[:-1], axis=0, out=before[1:])
+    np.cumprod(each[:0:-1], axis=0, out=behind[-2::-1])
+    return np.asarray(before * behind)
 
 
 def _taper(share: Floats) -> Floats:

@@ -1,7 +1,7 @@
 """Sources of pointing errors, as a budget takes them: what each is in time, over the ensemble, and about each axis."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal, get_args
 
@@ -18,7 +18,6 @@ SourceKind = Literal["constant", "random", "process", "periodic", "drift", "tran
 SpreadShape = Literal["fixed", "gaussian", "uniform"]
 
 _TIMED = {"process": (), "periodic": ("freq_hz",), "drift": ("period_s",), "transient": ("period_s", "decay_s")}
-_UNITS = {"drift": "rad/s"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +83,7 @@ class ErrorSource:
         period_s: From one calibration to the next of a drift, from one event to the next of a transient (s).
         decay_s: Time constant of a transient (s).
         even_in_time: Whether a random error is even up to its size in time; Gaussian of that standard deviation else.
+        apart: Whether each axis has an error of its own, as large as its gain; else one error reaches all of them.
         origin: Where the numbers come from.
 
     Raises:
@@ -100,6 +100,7 @@ class ErrorSource:
     period_s: float | None = None
     decay_s: float | None = None
     even_in_time: bool = False
+    apart: bool = False
     origin: str = "given"
 
     def __post_init__(self) -> None:
@@ -129,6 +130,8 @@ class ErrorSource:
             if self.transfer.B.shape[1] != 1 or slowest >= 0.0:
                 why = f"has a pole of {slowest:g} rad/s" if slowest >= 0.0 else f"has {self.transfer.B.shape[1]} inputs"
                 raise ValueError(f"{self.name}: its transfer {why}; give a stable system of one input")
+            if self.apart:
+                raise ValueError(f"{self.name}: errors apart by axis need gains; give a source for each axis instead")
             return
         gains = np.asarray(self.transfer, dtype=float)
         if gains.ndim != 1 or not gains.size or not np.isfinite(gains).all():
@@ -140,9 +143,12 @@ class ErrorSource:
         return self.transfer.C.shape[0] if isinstance(self.transfer, lti.StateSpace) else len(self.transfer)
 
     @property
-    def unit(self) -> str:
-        """Unit of its size."""
-        return _UNITS.get(self.kind, "rad")
+    def by_axis(self) -> tuple["ErrorSource", ...]:
+        """The same as errors that have nothing to do with each other: one for each axis where they are apart."""
+        if not self.apart:
+            return (self,)
+        gains = np.diag(np.asarray(self.transfer, dtype=float))
+        return tuple(replace(self, transfer=each, apart=False) for each in gains if each.any())
 
     @cached_property
     def motion(self) -> Motion:

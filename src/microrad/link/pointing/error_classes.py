@@ -16,7 +16,7 @@ Interpretation = Literal["temporal", "mixed"]
 WORST_SATELLITE_SIGMAS = 3.0
 """The worst-case satellite lies this far out in the ensemble: ECSS-E-ST-60-10C leaves out members beyond 3 sigma."""
 
-_SIGMAS = {"1-sigma": 1.0, "2-sigma": 2.0, "3-sigma": 3.0}
+SIGMAS = {"1-sigma": 1.0, "2-sigma": 2.0, "3-sigma": 3.0}
 _CHOICES = (
     ("kind", get_args(ErrorClass)),
     ("statistic", get_args(Statistic)),
@@ -144,7 +144,7 @@ def basis(stated: StatedError, interpretation: Interpretation = "temporal") -> s
 
 
 def _worst(stated: StatedError) -> float:
-    sigmas = _SIGMAS.get(stated.statistic, WORST_SATELLITE_SIGMAS)  # the worst-case satellite is at its bound
+    sigmas = SIGMAS.get(stated.statistic, WORST_SATELLITE_SIGMAS)  # the worst-case satellite is at its bound
     along = stated.error_rad * WORST_SATELLITE_SIGMAS / sigmas
     return along / math.sqrt(2.0) if stated.axes == "radial" else along
 
@@ -153,11 +153,11 @@ def _spread(stated: StatedError) -> float:
     radial = stated.axes == "radial"
     if stated.statistic == "bound":
         return stated.error_rad / (2.0 if radial else math.sqrt(3.0))
-    return stated.error_rad / _SIGMAS[stated.statistic] / (math.sqrt(2.0) if radial else 1.0)
+    return stated.error_rad / SIGMAS[stated.statistic] / (math.sqrt(2.0) if radial else 1.0)
 
 
 def _worst_text(stated: StatedError) -> str:
-    factor = WORST_SATELLITE_SIGMAS / _SIGMAS.get(stated.statistic, WORST_SATELLITE_SIGMAS)
+    factor = WORST_SATELLITE_SIGMAS / SIGMAS.get(stated.statistic, WORST_SATELLITE_SIGMAS)
     along = "error" if factor == 1.0 else f"{factor:g} error"
     return f"{along} / sqrt(2) about each axis" if stated.axes == "radial" else along
 
@@ -166,5 +166,5 @@ def _spread_text(stated: StatedError) -> str:
     radial = stated.axes == "radial"
     if stated.statistic == "bound":
         return "error / 2, evenly over a disc" if radial else "error / sqrt(3), evenly up to the bound"
-    sigmas = f"{_SIGMAS[stated.statistic]:g}"
+    sigmas = f"{SIGMAS[stated.statistic]:g}"
     return f"error / ({sigmas} sqrt(2))" if radial else f"error / {sigmas}"

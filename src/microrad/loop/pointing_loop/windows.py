@@ -46,14 +46,47 @@ def windowed(closed: ClosedLoop, index: ErrorIndex) -> dict[str, Floats]:
     Raises:
         ValueError: The loop is unstable, or a time of the index is less than half of the time between two readings.
     """
+    found = windowed_noise(closed, index)
+    for name, variance in windowed_lines(closed, index):
+        found[name] = found.get(name, 0.0) + variance
+    return found
+
+
+def windowed_noise(closed: ClosedLoop, index: ErrorIndex) -> dict[str, Floats]:
+    """The same of the noises alone, which are Gaussian.
+
+    Args:
+        closed: The loop under its controller.
+        index: What counts of the error.
+
+    Raises:
+        ValueError: As `windowed`.
+    """
     refuse_unstable(closed)
-    window, apart = (_readings(closed, index, name) for name in ("window_s", "spacing_s"))
+    window, apart = _times(closed, index)
     found: dict[str, Floats] = {}
     for source in closed.sources:
         found[source.name] = found.get(source.name, 0.0) + _noise(closed, source, index, window, apart)
-    for line in closed.open.lines:
-        found[line.name] = found.get(line.name, 0.0) + _line(closed, line, index, window, apart)
     return found
+
+
+def windowed_lines(closed: ClosedLoop, index: ErrorIndex) -> list[tuple[str, Floats]]:
+    """The same of each spectral line, with its name; a line of an axis stands there, and is zero on the others.
+
+    Args:
+        closed: The loop under its controller.
+        index: What counts of the error.
+
+    Raises:
+        ValueError: As `windowed`.
+    """
+    refuse_unstable(closed)
+    window, apart = _times(closed, index)
+    return [(line.name, _line(closed, line, index, window, apart)) for line in closed.open.lines]
+
+
+def _times(closed: ClosedLoop, index: ErrorIndex) -> tuple[int, int]:
+    return _readings(closed, index, "window_s"), _readings(closed, index, "spacing_s")
 
 
 @dataclass(frozen=True, slots=True)

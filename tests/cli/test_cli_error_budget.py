@@ -1,0 +1,161 @@
+"""The budget of `microrad pointing`: a mission's table, a list beside it, its own loop, and the exit code."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from microrad.link.error_budget import ErrorSource, Requirement, Spread, budget
+from microrad.loop.disturbance.windows import ErrorIndex
+from shipped import SHIPPED, without_fine_pointing
+
+TABLE = """
+[error_budget]
+with_loop = false
+
+[error_budget.sources.alignment]
+class = "constant"
+size = "2 urad"            # assumption: calibrated on the ground
+statistic = "3-sigma"
+axes = "together"
+gains = [1.0, 0.5]
+
+[error_budget.sources.thermo_elastic]
+class = "periodic"
+size = "1.5 urad"
+statistic = "fixed"
+axes = "each"
+gains = [0.0, 1.0]
+frequency = "0.2 mHz"
+
+[error_budget.requirements.code_word]
+index = "RPE"
+window = "10 ms"
+confidence = 0.9973
+interpretation = "temporal"
+axes = "radial"
+limit = "4 urad"
+
+[error_budget.requirements.drift]
+index = "APE"
+confidence = 0.95
+interpretation = "temporal"
+axes = "y"
+limit = "2 urad"
+"""
+LIST = "name,class,size,statistic,axes,x,y,origin\nstar tracker,random,3 urad,3-sigma,each,1,1,data sheet\n"
+
+
+@pytest.fixture
+def mission(tmp_path):
+    """A mission without a loop, with a budget of two sources, and a list of one beside it."""
+    (tmp_path / "errors.csv").write_text(LIST, "utf-8")
+    path = tmp_path / "m.toml"
+    path.write_text(without_fine_pointing(SHIPPED.read_text("utf-8")) + TABLE, "utf-8")
+    return path
+
+
+def changed(path, *changes):
+    text = path.read_text("utf-8")
+    for old, new in changes:
+        assert text.count(old) == 1
+        text = text.replace(old, new)
+    path.write_text(text, "utf-8")
+
+
+def test_the_table_and_the_list_are_the_engine_s_budget(call, mission, tmp_path):
+    code, out, _ = call("pointing", str(mission), "--sources", str(tmp_path / "errors.csv"), "--json")
+    found = {each["requirement"]: each for each in json.loads(out)["budget"]}
+    sources = (
+        ErrorSource("alignment", "constant", Spread("gaussian", 0.0, 2e-6 / 3.0), np.array([1.0, 0.5])),
+        ErrorSource("thermo_elastic", "periodic", Spread("fixed", 1.5e-6), np.array([0.0, 1.0]), freq_hz=2e-4),
+        ErrorSource("star tracker", "random", Spread("fixed", 1e-6), np.ones(2), apart=True),
+    )
+    wanted = budget(sources, (Requirement(ErrorIndex("RPE", 0.01)), Requirement(ErrorIndex("APE"), 0.95, axes=(1,))))
+    for each, name in zip(wanted, ("code_word", "drift"), strict=True):
+        assert found[name]["by_distribution_rad"] == pytest.approx(each.quantile_rad, rel=1e-9, abs=0.0)
+        assert found[name]["by_rules_rad"] == pytest.approx(each.by_rules_rad, rel=1e-9, abs=0.0)
+    assert found["code_word"]["by_distribution_rad"] == pytest.approx(
+        1e-6 * math.sqrt(-2.0 * math.log(1.0 - 0.9973)), rel=1e-6, abs=0.0
+    )  # of the star tracker alone: Rayleigh
+    assert (found["code_word"]["holds"], found["drift"]["holds"], code) == (True, False, 1)
+    origins = {each["name"]: each["origin"] for each in found["drift"]["sources"]}
+    assert origins == {
+        "alignment": "assumption: calibrated on the ground",
+        "thermo_elastic": origins["thermo_elastic"],
+        "star tracker": "data sheet",
+    }
+    assert "line" in origins["thermo_elastic"]
+
+
+def test_the_tables_fit_a_terminal_and_say_what_is_kept_and_what_weighs(call, mission):
+    changed(mission, ('limit = "2 urad"', 'limit = "4 urad"'))
+    code, out, _ = call("pointing", str(mission))
+    assert code == 0
+    assert max(map(len, out.splitlines())) <= 80
+    for words in (
+        "Requirements, µrad",
+        "99.73 % of the time",
+        "PASS",
+        "alignment",
+        "times",
+        "By the rules: abs(mean)",
+    ):
+        assert words in out
+
+
+def test_a_list_alone_is_taken_in_the_windows_that_are_asked_for(call, mission, tmp_path):
+    mission.write_text(without_fine_pointing(SHIPPED.read_text("utf-8")), "utf-8")
+    options = ("--sources", str(tmp_path / "errors.csv"), "--window", "1 s", "--spacing", "1 min", "--json")
+    code, out, _ = call("pointing", str(mission), *options)
+    found = json.loads(out)["budget"]
+    assert code == 0
+    assert [each["index"] for each in found] == ["APE", "MPE", "RPE", "PDE"]
+    assert [each["holds"] for each in found] == [None] * 4
+    assert found[0]["by_distribution_rad"] == found[2]["by_distribution_rad"] > found[1]["by_distribution_rad"] == 0.0
+
+
+def test_what_the_loop_leaves_is_a_source_of_its_window(call, tmp_path):
+    path = tmp_path / "m.toml"
+    path.write_text(SHIPPED.read_text("utf-8") + TABLE.replace("with_loop = false", "with_loop = true"), "utf-8")
+    _, out, _ = call("pointing", str(path), "--window", "10 ms", "--json")
+    document = json.loads(out)
+    left = next(each for each in document["indices"] if each["index"] == "RPE")["left_rad"]
+    word = next(each for each in document["budget"] if each["requirement"] == "code_word")
+    loop = [each for each in word["sources"] if each["class"] == "loop"]
+    assert math.hypot(*(value for each in loop for value in each["sigma_rad"])) == pytest.approx(
+        left["all"], rel=1e-9, abs=0.0
+    )
+    assert {each["name"] for each in loop} == set(left) - {"all"}
+
+
+@pytest.mark.parametrize(
+    ("changes", "options", "words"),
+    [
+        ([], ("--sources", "none.csv"), "none.csv: cannot be read"),
+        (
+            [("sources.alignment]", 'sources."star tracker"]')],
+            ("--sources", "errors.csv"),
+            'errors.csv: "star tracker" is a source',
+        ),
+        ([('window = "10 ms"\n', "")], (), 'is missing, and index = "RPE" needs it'),
+        ([('index = "APE"', 'index = "APE"\nwindow = "1 s"')], (), 'does not belong to index = "APE"'),
+        ([('axes = "y"', 'axes = "z"')], (), "needs 3 axes, and the sources have 2"),
+        ([("gains = [0.0, 1.0]", "gains = [1.0]")], (), "has 1 items, and others have 2"),
+        ([('frequency = "0.2 mHz"', 'period = "1 h"')], (), 'is missing, and class = "periodic" needs it'),
+        (
+            [('index = "APE"', 'index = "PDE"\nwindow = "1 s"\nspacing = "9 s"\nobservation = "9 s"')],
+            (),
+            "PDE: both windows have to lie in the observation period of 9 s",
+        ),
+    ],
+)
+def test_what_is_no_budget_is_refused(refused, mission, changes, options, words):
+    changed(mission, *changes)
+    assert words in refused("pointing", "m.toml", *options)
+
+
+def test_a_loop_that_is_asked_for_and_not_there_is_refused(refused, mission):
+    changed(mission, ("with_loop = false", "with_loop = true"))
+    assert "has no table [fine_pointing]: microrad init writes one" in refused("pointing", "m.toml")

@@ -1,0 +1,96 @@
+"""Lists of error sources as tables of a spreadsheet: what is read, and every refusal in a line."""
+
+import re
+
+import pytest
+
+from microrad.mission.source_list import COLUMNS, SourceListError, read_sources
+
+HEAD = "name,class,size,rate,statistic,axes,x,y,z,corner,frequency,period,decay,origin"
+ROWS = (
+    "alignment,constant,2 urad,,3-sigma,each,1,0.5,,,,,,ground calibration",
+    "star tracker,random,3 urad,,bound,each,1,1,,,,,,",
+    "drift,drift,,0.1 nrad/s,1-sigma,each,1,1,,,,6 h,,",
+    "wheels,process,1 urad,,1-sigma,each,1,1,,40 Hz,,,,",
+    "unloading,transient,5 urad,,fixed,together,0.5,-1,,,,95 min,20 s,",
+)
+
+
+def listed(folder, *rows, head=HEAD, name="errors.csv"):
+    path = folder / name
+    path.write_text("\n".join([head, *rows]) + "\n", "utf-8")
+    return path
+
+
+def test_each_row_is_a_source_as_a_mission_states_it(tmp_path):
+    path = listed(tmp_path, *ROWS)
+    found = read_sources(path)
+    assert [each.name for each in found] == ["alignment", "star tracker", "drift", "wheels", "unloading"]
+    first, _, drift, wheels, last = (each.source for each in found)
+    assert (first.kind, first.size_rad, first.statistic, first.gains) == ("constant", 2e-6, "3-sigma", (1.0, 0.5))
+    assert (drift.rate_rad_s, drift.period_s) == pytest.approx((1e-10, 21600.0), rel=1e-12, abs=0.0)
+    assert wheels.corner_hz == 40.0
+    assert last.gains == (0.5, -1.0)
+    assert [found[0].origin, found[1].origin] == ["ground calibration", f"{path}, row 3"]
+
+
+@pytest.mark.parametrize("separator", [";", "\t"])
+def test_semicolons_and_tabs_separate_cells_too_and_blank_rows_and_columns_are_nothing(tmp_path, separator):
+    rows = [row.replace(",", separator) for row in (ROWS[0] + ",,", "," * 13, ROWS[1])]
+    path = listed(tmp_path, *rows, head=(HEAD + ",").replace(",", separator).upper())
+    assert [each.source.size_rad for each in read_sources(path)] == pytest.approx([2e-6, 3e-6], rel=1e-12, abs=0.0)
+
+
+def test_a_workbook_is_read_like_a_text(tmp_path):
+    openpyxl = pytest.importorskip("openpyxl", reason="the extra xlsx is not installed")
+    book = openpyxl.Workbook()
+    for row in (HEAD, *ROWS):
+        cells = row.split(",")
+        book.active.append([float(cell) if re.fullmatch(r"-?[0-9.]+", cell) else cell or None for cell in cells])
+    book.save(tmp_path / "errors.xlsx")
+    found = read_sources(tmp_path / "errors.xlsx")
+    assert [each.source for each in found] == [each.source for each in read_sources(listed(tmp_path, *ROWS))]
+
+
+def test_the_columns_are_the_keys_of_a_source():
+    assert {*COLUMNS, "x", "y", "z", "origin"} == set(HEAD.split(","))
+
+
+@pytest.mark.parametrize(
+    ("rows", "head", "said"),
+    [
+        (["a,constant,2 V,,fixed,together,1,1"], HEAD, 'row 2, a: size is in "V"'),
+        (["a,constant,,,fixed,together,1,1"], HEAD, "size is missing"),
+        (["a,bent,1 urad,,fixed,together,1,1"], HEAD, 'row 2, a: class is "bent"'),
+        (["a,constant,1 urad,,fixed,together,1,1,,1 Hz"], HEAD, 'corner does not belong to class = "constant"'),
+        (["a,process,1 urad,,fixed,together,1,1,,1 Hz"], HEAD, "statistic does not belong to a process"),
+        (["a,random,1 urad,,fixed,together,1,1"], HEAD, "statistic does not belong to a random error"),
+        (["a,constant,1 urad,,fixed,together,one,1"], HEAD, 'row 2, x: "one" is no number'),
+        (["a,constant,1 urad,,fixed,together,inf,1"], HEAD, "row 2, a: gains"),
+        (["a,constant,1 urad,,fixed,together,,"], HEAD, "gains"),
+        ([",constant,1 urad,,fixed,together,1,1"], HEAD, "row 2: has no name"),
+        (["a,constant,1 urad,,fixed,together,1,1"] * 2, HEAD, "row 3: is a second 'a'"),
+        (["a,constant"], HEAD.replace("size", "length"), 'no column is called "length"'),
+        (["a,constant"], "name,class,size,axes,x", 'it has no column "statistic"'),
+        (["a,constant"], HEAD + ",x", "two columns have one name"),
+        ([], HEAD, "holds no source"),
+        (['"a,constant'], HEAD, "is no table of cells"),
+    ],
+)
+def test_what_is_no_source_is_refused_in_a_line(tmp_path, rows, head, said):
+    with pytest.raises(SourceListError, match=re.escape(said)) as refused:
+        read_sources(listed(tmp_path, *rows, head=head))
+    assert "\n" not in str(refused.value)
+    assert str(refused.value).startswith(str(tmp_path))
+
+
+def test_files_that_are_no_list_are_refused(tmp_path):
+    with pytest.raises(SourceListError, match="cannot be read"):
+        read_sources(tmp_path / "none.csv")
+    (tmp_path / "other.csv").write_bytes(b"\xff\xfe\x00name")
+    with pytest.raises(SourceListError, match="no text in UTF-8"):
+        read_sources(tmp_path / "other.csv")
+    pytest.importorskip("openpyxl", reason="the extra xlsx is not installed")
+    (tmp_path / "other.xlsx").write_bytes(b"PK\x03\x04 nothing more")
+    with pytest.raises(SourceListError, match="is no workbook"):
+        read_sources(tmp_path / "other.xlsx")
