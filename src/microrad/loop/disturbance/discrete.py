@@ -78,7 +78,7 @@ def _sampled_filter(disturbance: Disturbance, step_s: float) -> tuple[Floats, Fl
     seen = lti.gramian(Ad, C.T @ C)  # what a unit of noise on each state adds to the output's variance
     columns = [np.zeros((A.shape[0], 0))]
     for b in B.T[:, :, None]:
-        root = lti.covariance_root(noise_covariance(A, b, step_s))
+        root = lti.covariance_root(_noise_covariance(A, b, step_s))
         parts, directions = lti.principal_axes(root.T @ seen @ root)
         kept = parts > _DROPPED * np.sum(parts)
         variance = float((C @ covariance(A, b) @ C.T).item())
@@ -87,15 +87,10 @@ def _sampled_filter(disturbance: Disturbance, step_s: float) -> tuple[Floats, Fl
     return Ad, np.hstack(columns)
 
 
-def noise_covariance(A: Floats, b: Floats, step_s: float) -> Floats:
+def _noise_covariance(A: Floats, b: Floats, step_s: float) -> Floats:
     """Integral of exp(A s) b b' exp(A' s) over a step: Van Loan's exponential over a short time, then doubled.
 
     Doubled because the exponential also holds exp(-A s), which overflows where a pole is fast against the step.
-
-    Args:
-        A: Map of the states of a stable filter (1/s), shape (n, n).
-        b: What white noise of unit two-sided density adds to them, shape (n, inputs).
-        step_s: Length of the step (s).
     """
     from scipy.linalg import expm
 

@@ -17,17 +17,20 @@ from microrad.loop.disturbance.recorded_tests import (
     stationarity,
     whiteness,
 )
-from microrad.loop.disturbance.records import Disturbance, one_input
+from microrad.loop.disturbance.records import Disturbance, one_input, psd
 from microrad.loop.disturbance.sources import from_terms
 from microrad.loop.disturbance.terms import Samples, fit_terms, states_of, with_states
 
+FITTED = 0.8
+"""Share of half of the sample rate up to which a spectrum is fitted: above it stands the filter against folding."""
+
 _BROAD = 0.03  # rows of the density closer than this fraction of their frequency are averaged
-_SURE = 0.03  # relative standard error of a row's density below which all rows count alike
+_SURE = 0.015  # relative standard error of a row's density below which all rows count alike
 _TOLD = 0.1  # above it a row tells nothing of how well the filter fits
 _SLOW = 0.6  # the same below the segments' first frequencies, in three rows
 _FIRST_BIN = 2  # of the segments; below it the window still sees what was detrended
 _LEAST_DAMPING = 0.005  # a resonance that rows of 3 % show
-_WELL = 0.1  # misfit of a row (natural logarithm), in units of which it is that of chance
+_WELL = 0.05  # misfit of a row (natural logarithm), in units of which it is that of chance
 _FOLDED = 2  # multiples of the sample rate whose folding is taken one by one
 _BEYOND = 2.0 * (math.pi**2 / 6.0 - 1.0 - 0.25) * (_FOLDED + 1) ** 2  # all further ones, as 1/f^2 at the next
 _MOST_STATES = 24
@@ -38,7 +41,7 @@ class RecordedFit:
     """A recorded motion as a disturbance of one axis, and what speaks for it.
 
     ``disturbance`` has the lines and the shaping filter, of ``order`` states, without mean and slope, which are those
-    of ``motion``. ``worst_db`` is the largest ratio of its density to the recorded one, in decibels of power, near
+    of ``motion``. ``band_limited`` says that the samples were taken behind a filter against folding. ``worst_db`` is the largest ratio of its density to the recorded one, in decibels of power, near
     ``worst_at_hz``, among the rows that the recording tells to a tenth. ``correlation_s`` is the time after which the
     motion without its lines has forgotten all but 1/e.
     """
@@ -46,6 +49,7 @@ class RecordedFit:
     motion: RecordedMotion
     disturbance: Disturbance
     order: int
+    band_limited: bool
     worst_db: float
     worst_at_hz: float
     correlation_s: float
@@ -59,8 +63,8 @@ def fit_recording(
     """Fit lines and a shaping filter to a recorded motion.
 
     Mean and slope are taken off by least squares, lines by `find_lines`, and the rest is Welch's density in rows of
-    3 % of their frequency, each as sure as it is averaged. The filter's density is folded at half of the sample rate,
-    as sampling folds that of the motion, so that its variance is that of the samples.
+    3 % of their frequency, each as sure as it is averaged, up to 0.8 of half of the sample rate. Sampling folds what is
+    faster, unless a filter was before it: both are tried, and the one that fits better is taken.
 
     Args:
         samples_rad: The motion (rad), evenly sampled, shape (samples,) with 200 samples or more.
@@ -76,48 +80,74 @@ def fit_recording(
     if order is not None and not 1 <= order <= _MOST_STATES:
         raise ValueError(f'"{name}": a shaping filter of {order} states; give 1 to {_MOST_STATES}')
     lines, rest = find_lines(motion.rest_rad, step_s)
-    samples, sure = _rows(rest, motion)
-    range_hz = float(samples.centre_hz[0]) / 3.0, 2.0 * motion.half_rate_hz
-    terms = fit_terms(samples, range_hz, _LEAST_DAMPING, _WELL)
-    terms = with_states(samples, terms, range_hz, _LEAST_DAMPING, order)
-    filtered = one_input(from_terms(terms, name, "", "recorded"))
-    off = np.where(sure, samples.misfit(terms) / samples.trust, 0.0)
-    worst = int(np.argmax(np.abs(off)))
-    worst_db, at_hz = 10.0 * float(off[worst]) / math.log(10.0), float(samples.centre_hz[worst])
-    states = states_of(terms)
+    range_hz = 2.0 / motion.duration_s, motion.half_rate_hz
+    found = []
+    for folded in (True, False):
+        samples, sure = _rows(rest, motion, folded)
+        terms = fit_terms(samples, range_hz, _LEAST_DAMPING, _WELL)
+        terms = with_states(samples, terms, range_hz, _LEAST_DAMPING, order)
+        misfit = samples.misfit(terms)
+        off = np.where(sure, misfit / samples.trust, 0.0)
+        worst = int(np.argmax(np.abs(off)))
+        worst_db, at_hz = 10.0 * float(off[worst]) / math.log(10.0), float(samples.centre_hz[worst])
+        found.append((float(misfit @ misfit), not folded, terms, worst_db, at_hz))
+    _, band_limited, terms, worst_db, at_hz = min(found, key=lambda each: each[:2])
+    filtered, states = one_input(from_terms(terms, name, "", "recorded")), states_of(terms)
     basis = (
         f"fit of {states} states and {len(lines)} lines to {motion.duration_s:.4g} s; worst {worst_db:+.2f} dB near "
         f"{at_hz:.4g} Hz"
     )
-    innovations = one_step_residual(filtered, rest, step_s)
+    spectrum = _spectrum(filtered, motion, band_limited)
+    residual = one_step_residual(spectrum, rest, step_s)
     return RecordedFit(
         motion,
         replace(filtered, lines=lines, basis=basis),
         states,
+        band_limited,
         worst_db,
         at_hz,
         correlation_s(rest, step_s),
-        whiteness(innovations, states),
-        stationarity(filtered, rest, innovations, step_s),
+        whiteness(residual, states),
+        stationarity(spectrum, rest, residual),
     )
 
 
-def _rows(rest: Floats, motion: RecordedMotion) -> tuple[Samples, NDArray[np.bool_]]:
+def _spectrum(filtered: Disturbance, motion: RecordedMotion, band_limited: bool) -> Floats:
+    """Density of the samples under a filter at the frequencies of their transform, up to those that are fitted."""
+    count, rate = motion.samples_rad.size, 2.0 * motion.half_rate_hz
+    freq = np.arange(math.floor(FITTED * (count // 2)) + 1) * rate / count
+    grid = np.append(0.0, np.geomspace(0.1 * freq[1], freq[-1], 8000))
+    S = psd(filtered, grid)
+    if not band_limited:
+        S = S + sum(psd(filtered, image) for image in _images(grid, rate))
+        S = S + _BEYOND * psd(filtered, np.array([(_FOLDED + 1) * rate]))
+    return np.asarray(np.exp(np.interp(freq, grid, np.log(S))))
+
+
+def _rows(rest: Floats, motion: RecordedMotion, folded: bool) -> tuple[Samples, NDArray[np.bool_]]:
     """The density in rows, as `fit_terms` takes them, and whether each of them is sure to a tenth.
 
-    Below the first frequencies of the segments it is the periodogram of all of the recording.
+    ``folded`` rows hold what sampling folds into them. Below the first frequencies of the segments it is the periodogram of all of the recording.
     """
     slow, fast = (_averaged(*density(rest, motion.step_s, parts), below) for parts, below in ((1, PARTS), (PARTS, 0)))
     centre, width, wanted, error = (np.concatenate(both) for both in zip(slow, fast, strict=True))
+    kept = centre <= FITTED * motion.half_rate_hz
+    centre, width, wanted, error = centre[kept], width[kept], wanted[kept], error[kept]
     own = centre[:, None] + 0.3 * width[:, None] * np.array([-1.0, 0.0, 1.0])
     rate = 2.0 * motion.half_rate_hz
-    images = [abs(k * rate + side * centre) for k in range(1, _FOLDED + 1) for side in (-1, 1)]
-    nodes = np.column_stack([own, *images, np.full(centre.size, (_FOLDED + 1) * rate)])
-    weights = np.tile([1 / 3] * 3 + [1.0] * len(images) + [_BEYOND], centre.size)
+    images = _images(centre, rate)
+    further = np.column_stack([*images, np.full(centre.size, (_FOLDED + 1) * rate)])
+    nodes = np.hstack([own, further]) if folded else own
+    weights = np.tile(([1 / 3] * 3 + [1.0] * len(images) + [_BEYOND])[: nodes.shape[1]], centre.size)
     starts = np.arange(centre.size) * nodes.shape[1]
     trust, given = np.minimum(1.0, _SURE / error), np.zeros(centre.size, dtype=bool)
     sure = error <= max(_TOLD, float(np.min(error)))
     return Samples(nodes.ravel(), weights, starts, wanted, given, trust, centre), sure
+
+
+def _images(freq: Floats, rate_hz: float) -> list[Floats]:
+    """Frequencies that sampling folds onto these, one by one; those beyond are `_BEYOND` times the next."""
+    return [abs(k * rate_hz + side * freq) for k in range(1, _FOLDED + 1) for side in (-1, 1)]
 
 
 def _averaged(freq: Floats, power: Floats, segments: int, below: int) -> tuple[Floats, Floats, Floats, Floats]:

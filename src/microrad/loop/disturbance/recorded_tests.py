@@ -6,8 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from microrad.core.arrays import Floats
-from microrad.loop.disturbance.discrete import noise_covariance
-from microrad.loop.disturbance.records import Disturbance, psd
 
 BY_CHANCE = 1e-3
 """Probability below which what is seen is no chance."""
@@ -17,6 +15,7 @@ WORTH_SAYING = 1.1
 
 _LAGS = 20
 _BLOCKS = 8
+_ENDS = 50
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,47 +98,50 @@ def correlation_s(rest_rad: Floats, step_s: float) -> float:
     return float(np.argmax(found < found[0] / math.e)) * step_s
 
 
-def one_step_residual(disturbance: Disturbance, rest_rad: Floats, step_s: float) -> Floats:
-    """What a motion has beside the prediction by its own past under a shaping filter (rad), but for its begin.
+def one_step_residual(density_rad2_hz: Floats, rest_rad: Floats, step_s: float) -> Floats:
+    """What a motion has beside the prediction by its own past under a spectrum, over its standard error.
 
-    The predictor is the stationary Kalman filter of the filter at the motion's steps, without measurement noise, as a
-    cascade of second-order sections: its zeros are the filter's poles.
+    The motion is band-limited to the frequencies of the spectrum and sampled at twice the last of them. Its predictor's
+    error is the motion behind the inverse of the spectrum's minimum-phase factor, which follows from the cepstrum
+    (A. V. Oppenheim and R. W. Schafer, Discrete-Time Signal Processing, ch. 13). A fiftieth at each end is left out.
 
     Args:
-        disturbance: The shaping filter; its lines are not used.
-        rest_rad: The motion without lines (rad), shape (samples,).
+        density_rad2_hz: One-sided density at the first frequencies of the motion's transform, shape (frequencies,).
+        rest_rad: The motion without lines, mean and drift (rad), shape (samples,).
         step_s: Between two samples (s).
     """
-    from scipy.linalg import expm, solve_discrete_are
-    from scipy.signal import sosfilt, zpk2sos
+    from scipy.fft import irfft, rfft
+    from scipy.signal.windows import tukey
 
-    A, C = np.asarray(expm(disturbance.A * step_s)), disturbance.C
-    scale = math.sqrt(float(np.mean(rest_rad**2)))
-    Q = noise_covariance(disturbance.A, disturbance.B / scale, step_s)
-    P = np.asarray(solve_discrete_are(A.T, C.T, Q, np.zeros((1, 1))))
-    gain = A @ P @ C.T / (C @ P @ C.T)
-    sections = zpk2sos(np.linalg.eigvals(A), np.linalg.eigvals(A - gain @ C), 1.0)
-    found = sosfilt(sections, rest_rad)
-    return np.asarray(found[found.size // 50 :])
+    last = density_rad2_hz.size - 1
+    samples = 2 * last
+    cepstrum = irfft(0.5 * np.log(density_rad2_hz), samples)
+    cepstrum[1:last] *= 2.0
+    cepstrum[last + 1 :] = 0.0
+    factor = np.exp(rfft(cepstrum))
+    moved = rfft(rest_rad * tukey(rest_rad.size, 2.0 / _ENDS))[: last + 1] / factor
+    moved[last] = moved[last].real
+    found = irfft(moved, samples) * math.sqrt(2.0 * step_s * samples / rest_rad.size)
+    return np.asarray(found[samples // _ENDS : samples - samples // _ENDS])
 
 
-def whiteness(residual_rad: Floats, states: int) -> Whiteness:
+def whiteness(residual: Floats, states: int) -> Whiteness:
     """Ljung and Box's test (Biometrika 65, 297, 1978) over twenty lags more than the filter has parameters.
 
     Args:
-        residual_rad: One-step-ahead residual (rad), shape (samples,).
+        residual: One-step-ahead residual, shape (samples,).
         states: States of the filter, each with two parameters.
     """
     from scipy.stats import chi2
 
-    lags, count = _LAGS + 2 * states, residual_rad.size
-    middle = residual_rad - np.mean(residual_rad)
+    lags, count = _LAGS + 2 * states, residual.size
+    middle = residual - np.mean(residual)
     correlation = np.array([middle[k:] @ middle[: count - k] for k in range(1, lags + 1)]) / (middle @ middle)
     statistic = count * (count + 2.0) * float(np.sum(correlation**2 / (count - np.arange(1, lags + 1))))
     return Whiteness(lags, statistic, float(chi2.sf(statistic, _LAGS)), float(np.max(np.abs(correlation))))
 
 
-def stationarity(disturbance: Disturbance, rest_rad: Floats, residual_rad: Floats, step_s: float) -> Stationarity:
+def stationarity(density_rad2_hz: Floats, rest_rad: Floats, residual: Floats) -> Stationarity:
     """Whether the variances of eight equal parts are those of a stationary motion.
 
     The mean square over a time T of Gaussian motion with the one-sided density S has the variance of a chi-square of
@@ -147,18 +149,14 @@ def stationarity(disturbance: Disturbance, rest_rad: Floats, residual_rad: Float
     samples. The ratio of the largest to the smallest is Hartley's (Biometrika 37, 308, 1950).
 
     Args:
-        disturbance: The shaping filter that was fitted; its lines are not used.
-        rest_rad: The motion without lines (rad), shape (samples,).
-        residual_rad: Its one-step-ahead residual (rad), shape (samples,).
-        step_s: Between two samples (s).
+        density_rad2_hz: The density that was fitted, at the first frequencies of the motion's transform, from 0 on.
+        rest_rad: The motion without lines, mean and drift (rad), shape (samples,).
+        residual: Its one-step-ahead residual, shape (samples,).
     """
-    length = rest_rad.size // _BLOCKS
-    freq = np.append(0.0, np.geomspace(0.01 / (length * step_s), 0.5 / step_s, 4000))
-    S = psd(disturbance, freq)
-    freedom = 2.0 * length * step_s * float(np.trapezoid(S, freq)) ** 2 / float(np.trapezoid(S**2, freq))
+    S = density_rad2_hz
+    freedom = 2.0 / _BLOCKS * float(np.sum(S)) ** 2 / float(S @ S)
     return Stationarity(
-        _block_test("the motion", rest_rad, min(freedom, float(length))),
-        _block_test("its fast part", residual_rad, float(residual_rad.size // _BLOCKS)),
+        _block_test("the motion", rest_rad, freedom), _block_test("its fast part", residual, residual.size / _BLOCKS)
     )
 
 

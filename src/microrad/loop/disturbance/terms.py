@@ -22,6 +22,7 @@ _BROADEST = 0.9  # of the second-order terms: poles of damping 1 coincide, and t
 _NODES = 64  # per band: enough for a resonance of damping 0.05 in a band of a decade
 _FINENESS = 0.03  # rows of a table closer than this fraction of their frequency are averaged
 _WIDE = 100.0  # bound of a variance in natural logarithms: numbers stay numbers
+_LEANER = 1.05  # times the spread, below which a state less is preferred: what chance gives to one more
 _NEGLIGIBLE = 1e-12  # of the largest density: ends the logarithm of a sum that vanishes at a row
 
 
@@ -211,7 +212,7 @@ def with_states(
         terms: The terms of `fit_terms`.
         range_hz: Lowest and highest corner of a term.
         least_damping: Least damping ratio of a term of second order.
-        states: How many, 1 or more; None for as few as leave no more than 1.02 times the spread. There are fewer where
+        states: How many, 1 or more; None for as few as leave little more spread. There are fewer where
             a further term is left without variance.
     """
     limits = (*range_hz, least_damping)
@@ -220,7 +221,7 @@ def with_states(
         if not trials:
             break
         best = min(trials, key=lambda trial: _spread(samples, trial))
-        if states is None and _spread(samples, best) > 1.02 * _spread(samples, terms):
+        if states is None and _spread(samples, best) > _LEANER * _spread(samples, terms):
             break
         terms = best
     while states is not None and (more := states - states_of(terms)) > 0:
