@@ -19,7 +19,7 @@ from microrad.loop.disturbance.recorded_tests import (
 )
 from microrad.loop.disturbance.records import Disturbance, one_input, psd
 from microrad.loop.disturbance.sources import from_terms
-from microrad.loop.disturbance.terms import Samples, fit_terms, states_of, with_states
+from microrad.loop.disturbance.terms import LEANER, Samples, fit_terms, states_of, with_states
 
 FITTED = 0.8
 """Share of half of the sample rate up to which a spectrum is fitted: above it stands the filter against folding."""
@@ -90,7 +90,8 @@ def fit_recording(
         off = np.where(sure, misfit / samples.trust, 0.0)
         worst = int(np.argmax(np.abs(off)))
         worst_db, at_hz = 10.0 * float(off[worst]) / math.log(10.0), float(samples.centre_hz[worst])
-        found.append((float(misfit @ misfit), not folded, terms, worst_db, at_hz))
+        cost = float(misfit @ misfit) * LEANER ** (2 * states_of(terms))
+        found.append((cost, not folded, terms, worst_db, at_hz))
     _, band_limited, terms, worst_db, at_hz = min(found, key=lambda each: each[:2])
     filtered, states = one_input(from_terms(terms, name, "", "recorded")), states_of(terms)
     basis = (

@@ -17,12 +17,14 @@ from microrad.core.arrays import Floats
 
 Kind = Literal["first-order", "low-pass", "band-pass"]
 
+LEANER = 1.05
+"""Times the spread of a fit below which one of a state less is preferred: what chance gives to one more."""
+
 _MAX_TERMS = 12
 _BROADEST = 0.9  # of the second-order terms: poles of damping 1 coincide, and then no modal form exists
 _NODES = 64  # per band: enough for a resonance of damping 0.05 in a band of a decade
 _FINENESS = 0.03  # rows of a table closer than this fraction of their frequency are averaged
 _WIDE = 100.0  # bound of a variance in natural logarithms: numbers stay numbers
-_LEANER = 1.05  # times the spread, below which a state less is preferred: what chance gives to one more
 _NEGLIGIBLE = 1e-12  # of the largest density: ends the logarithm of a sum that vanishes at a row
 
 
@@ -221,7 +223,7 @@ def with_states(
         if not trials:
             break
         best = min(trials, key=lambda trial: _spread(samples, trial))
-        if states is None and _spread(samples, best) > _LEANER * _spread(samples, terms):
+        if states is None and _spread(samples, best) > LEANER * _spread(samples, terms):
             break
         terms = best
     while states is not None and (more := states - states_of(terms)) > 0:
