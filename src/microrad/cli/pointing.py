@@ -11,6 +11,7 @@ from microrad.cli.frame import (
     UNMET,
     Accept,
     Json,
+    OnProgress,
     Outcome,
     Refusal,
     app,
@@ -25,8 +26,15 @@ from microrad.cli.frame import (
 )
 
 if TYPE_CHECKING:
+    from microrad.lab.recording import Motion
     from microrad.loop.controller_study import Design, Outlook, Scene
+    from microrad.loop.disturbance.recorded_fit import RecordedFit
     from microrad.loop.disturbance.windows import ErrorIndex
+
+_RECORDING = "Measured motion (CSV, text, LVM, TDMS, MAT, NPY, NPZ, HDF5), each channel one axis."
+_AXES = "Its channels, by name or number from 0: one to three [default: all but the time]."
+_RATE = "Its sample rate: '2 kHz' [default: what the file says]."
+_UNIT = "Its unit where the file states none: urad, arcsec or another one of angles."
 
 
 def _time(name: str, text: str) -> Any:
@@ -86,43 +94,86 @@ def design(
         "microrad pointing leo-geo.toml",
         "microrad pointing leo-geo.toml --window '1 ms' --window '10 s' --spacing '1 min'",
         "microrad pointing leo-geo.toml --controller LQG --json",
+        "microrad pointing leo-geo.toml --recording jitter.tdms --axes 'bench/x,bench/y'",
+        "microrad pointing leo-geo.toml --recording jitter.npy --rate '2 kHz' --unit urad",
     )
 )
 @command
-def pointing(
+def pointing(  # noqa: PLR0913  every argument is a named option
     file: Annotated[Path, typer.Argument(help="Mission file with a table [fine_pointing].", metavar="FILE")],
+    *,
     window: Annotated[list[float] | None, _time("--window", "Length of a window [default: 10 ms and 1 s];")] = None,
     spacing: Annotated[list[float] | None, _time("--spacing", "From the begin of a window to that of another;")] = None,
     controller: Annotated[str, option("--controller", "NAME", "One that microrad design lists.")] = "PI",
+    recording: Annotated[Path | None, option("--recording", "REC", _RECORDING)] = None,
+    axes: Annotated[str | None, option("--axes", "NAME,NAME", _AXES)] = None,
+    rate: Annotated[float | None, option("--rate", "HZ", _RATE, parser=quantity_of("Hz"))] = None,
+    time: Annotated[str | None, option("--time", "COLUMN", "Time (s), to read its rate off.")] = None,
+    unit: Annotated[str | None, option("--unit", "UNIT", _UNIT)] = None,
     as_json: Json = False,
 ) -> Outcome:
-    """Print the pointing errors of a mission's loop in time windows.
+    """Print the pointing errors of a mission's loop in time windows, and what it leaves of a recorded motion.
 
     The indices are those of ECSS-E-ST-60-10C: all of the error (APE), its mean over a window (MPE), what is left beside
     that mean (RPE), and the difference of the means of two windows (PDE). They are radial rms in theory (linear), by
     source, of what the loop leaves and of the same disturbances without a loop, exactly; the rational filters of linear
-    tools stand beside that.
+    tools stand beside that. --recording takes a measured motion through the loop in two ways: played as it is, and as
+    the spectrum that is fitted to it.
     """
     from microrad import mirror as mirror_room
+    from microrad.lab.recording import read_motion
     from microrad.link import tracking_light_w
     from microrad.loop import controller_study
     from microrad.loop.pointing_loop.linear import close
+    from microrad.loop.pointing_loop.played import recorded_residual
     from microrad.loop.pointing_loop.windows import windowed_errors
     from microrad.mission.file import load_loop
+    from microrad.report.fine_pointing.recording import RecordedAxis, recording_data, recording_text
     from microrad.report.fine_pointing.windows import windows_data, windows_text
 
     mission, several = load_loop(file)
     if several is not None:
         raise Refusal(f"{file}: its mirror has several axes, and windows are there for one mirror an axis")
+    given = [flag for flag, value in (("axes", axes), ("rate", rate), ("time", time), ("unit", unit)) if value]
+    if recording is None and given:
+        raise Refusal(f"--{given[0]} is for a recording: name it with --recording, or leave --{given[0]} out.")
+    names = [] if axes is None else [name.strip() for name in axes.split(",")]
+    motion = None if recording is None else read_motion(recording, names, rate, time=time, unit=unit)
     with progress_bar() as progress, refusal_of(mission.path):
         indices = _indices(window or [0.01, 1.0], spacing or [])
         scene = controller_study.scene(mission, mirror_room.of(mission.mission), tracking_light_w(mission))
+        fits = [] if motion is None else _fits(motion, scene.table.settle_s, progress)
         (made,) = controller_study.design(scene, progress, [controller])
         errors = windowed_errors(close(scene.theory, made.controller), indices)
+        alone = controller_study.on_one_axis(made, scene)
+        left = [RecordedAxis(fit, recorded_residual(scene.axis, alone, fit, scene.table.settle_s)) for fit in fits]
     if as_json:
-        data = windows_data(errors)
-        return Outcome(json_text({"mission_sha256": mission.sha256, "controller": made.name, "indices": data}))
-    return Outcome(windows_text(errors, made.name, width()))
+        data: dict[str, Any] = {
+            "mission_sha256": mission.sha256,
+            "controller": made.name,
+            "indices": windows_data(errors),
+        }
+        if motion is not None:
+            data["recording"] = recording_data(motion.path, motion.sha256, left, scene.axis)
+        return Outcome(json_text(data))
+    texts = [windows_text(errors, made.name, width())]
+    if motion is not None:
+        texts.append(recording_text(motion.path, left, scene.axis, made.name, width()))
+    return Outcome("\n\n".join(texts))
+
+
+def _fits(motion: "Motion", settle_s: float, on_progress: OnProgress) -> "list[RecordedFit]":
+    """A recording's axes as disturbances, once they are seen to be long enough for a loop that settles in that time."""
+    from microrad.loop.disturbance.recorded_fit import fit_recording
+    from microrad.loop.pointing_loop.played import refuse_short
+
+    found: list[RecordedFit] = []
+    with refusal_of(Path(motion.path)):
+        for name, samples in zip(motion.names, motion.samples_rad.T, strict=True):
+            on_progress(len(found), len(motion.names), "fitting the recording")
+            found.append(fit_recording(samples, 1.0 / motion.rate_hz, name=name))
+            refuse_short(found[-1], settle_s)
+    return found
 
 
 def _indices(windows: list[float], spacings: list[float]) -> "list[ErrorIndex]":

@@ -41,9 +41,10 @@ class RecordedFit:
     """A recorded motion as a disturbance of one axis, and what speaks for it.
 
     ``disturbance`` has the lines and the shaping filter, of ``order`` states, without mean and slope, which are those
-    of ``motion``. ``band_limited`` says that the samples were taken behind a filter against folding. ``worst_db`` is the largest ratio of its density to the recorded one, in decibels of power, near
-    ``worst_at_hz``, among the rows that the recording tells to a tenth. ``correlation_s`` is the time after which the
-    motion without its lines has forgotten all but 1/e.
+    of ``motion``. ``band_limited`` says that the samples were taken behind a filter against folding. ``worst_db`` is
+    the largest ratio of the fitted density to the recorded one, in decibels of power, near ``worst_at_hz``, among the
+    rows that the recording tells to a tenth. ``correlation_s`` is the time after which the motion without its lines has
+    forgotten all but 1/e.
     """
 
     motion: RecordedMotion
@@ -128,7 +129,8 @@ def _spectrum(filtered: Disturbance, motion: RecordedMotion, band_limited: bool)
 def _rows(rest: Floats, motion: RecordedMotion, folded: bool) -> tuple[Samples, NDArray[np.bool_]]:
     """The density in rows, as `fit_terms` takes them, and whether each of them is sure to a tenth.
 
-    ``folded`` rows hold what sampling folds into them. Below the first frequencies of the segments it is the periodogram of all of the recording.
+    ``folded`` rows hold what sampling folds into them. Below the first frequencies of the segments they are those of the
+    periodogram of all of the recording.
     """
     slow, fast = (_averaged(*density(rest, motion.step_s, parts), below) for parts, below in ((1, PARTS), (PARTS, 0)))
     centre, width, wanted, error = (np.concatenate(both) for both in zip(slow, fast, strict=True))

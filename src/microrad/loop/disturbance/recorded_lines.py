@@ -1,6 +1,7 @@
 """Spectral lines in a recorded motion: sinusoids that keep amplitude and phase from its first eighth to its last."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 
@@ -32,7 +33,7 @@ def find_lines(rest_rad: Floats, step_s: float) -> tuple[tuple[SpectralLine, ...
     """
     count = rest_rad.size
     window = _hann(count)
-    time = step_s * (np.arange(count) - 0.5 * (count - 1))
+    time: Floats = step_s * (np.arange(count, dtype=float) - 0.5 * (count - 1))
     found: list[tuple[float, complex]] = []
     rest, refused = rest_rad, np.zeros(count // 2 + 1, dtype=bool)
     refused[: math.ceil(_LEAST_PERIODS)] = True
@@ -72,8 +73,8 @@ def _power_and_floor(rest: Floats, window: Floats) -> tuple[Floats, Floats]:
     edges[-1] = power.size
     if len(edges) > 2 and edges[-1] - edges[-2] < 48:
         del edges[-2]
-    medians = [float(np.median(power[a:b])) / math.log(2.0) for a, b in zip(edges, edges[1:], strict=False)]
-    centres = [0.5 * (a + b - 1) for a, b in zip(edges, edges[1:], strict=False)]
+    medians = [float(np.median(power[a:b])) / math.log(2.0) for a, b in pairwise(edges)]
+    centres = [0.5 * (a + b - 1) for a, b in pairwise(edges)]
     least = _LEAST_FLOOR * float(np.max(power)) + np.finfo(float).tiny
     floor = np.interp(np.arange(power.size), centres, np.log(np.maximum(medians, least)))
     return power, np.asarray(np.exp(floor))
@@ -84,7 +85,7 @@ def _wave(time: Floats, freq: float, amplitude: complex) -> Floats:
 
 
 def _refined(rest: Floats, time: Floats, window: Floats, freq: float) -> tuple[float, complex]:
-    """Frequency and complex amplitude of least squares under the window near a frequency, by Gauss and Newton's steps."""
+    """Frequency and complex amplitude of least squares under the window near a frequency, by Gauss-Newton steps."""
     amplitude = 0j
     for _ in range(6):
         turning = np.exp(2j * math.pi * freq * time)

@@ -62,7 +62,9 @@ class BlockTest:
             )
         if self.growth_p < BY_CHANCE and max(self.growth, 1.0 / self.growth) > WORTH_SAYING**2:
             word = "grows" if self.growth > 1.0 else "falls"
-            return f"the variance of {self.of} {word} {max(self.growth, 1.0 / self.growth):.3g} times over the recording"
+            return (
+                f"the variance of {self.of} {word} {max(self.growth, 1.0 / self.growth):.3g} times over the recording"
+            )
         return ""
 
 

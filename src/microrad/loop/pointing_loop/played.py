@@ -12,7 +12,7 @@ import numpy as np
 from microrad.core.arrays import Floats
 from microrad.core.units import format_quantity
 from microrad.loop.disturbance import Disturbance, band_rms, psd
-from microrad.loop.disturbance.recorded import RecordedMotion, beyond_rms, density, edge_s, resampled
+from microrad.loop.disturbance.recorded import beyond_rms, density, edge_s, resampled
 from microrad.loop.disturbance.recorded_fit import RecordedFit
 from microrad.loop.pointing_loop.linear import ClosedLoop, close, refuse_unstable, stationary
 from microrad.loop.pointing_loop.loop import LoopController, PointingLoop
@@ -194,13 +194,3 @@ def _reason(
         f"recording and {format_quantity(math.sqrt(has[worst]), 'rad', 3)} of the fit: a line or a resonance that the "
         "fit misses"
     )
-
-
-def played_from(motion: RecordedMotion, step_s: float) -> float:
-    """Highest frequency (Hz) up to which a recording is played as it is.
-
-    Args:
-        motion: The recording.
-        step_s: The plant's step (s).
-    """
-    return min(motion.half_rate_hz, 0.5 / step_s)
