@@ -13,6 +13,9 @@ from microrad.loop.disturbance.records import above_zero
 PASSED = 0.9
 """Share of half of the lower of two rates up to which a resampled motion is what it was; at the half it has ended."""
 
+LEAST_SAMPLES = 200
+"""Samples of a recording below which nothing is told of its spectrum."""
+
 _STOPPED_DB = 80.0  # of what lies above half of the new rate, and of the images of what lies below half of the old one
 _SAME_RATE = 1e-9  # rates that differ by less are one
 _CLOCK = 1e-7  # by which a ratio of two rates may be off for smaller whole numbers; clocks differ by more
@@ -50,7 +53,9 @@ class RecordedMotion:
     @property
     def rest_rad(self) -> Floats:
         """The samples without mean and drift."""
-        return np.asarray(self.samples_rad - self.trend_rad(self.step_s * np.arange(self.samples_rad.size)))
+        return np.asarray(
+            self.samples_rad - self.trend_rad(self.step_s * np.arange(self.samples_rad.size, dtype=float))
+        )
 
     def trend_rad(self, time_s: Floats) -> Floats:
         """Mean and drift alone at some times (s) from the first sample on."""
@@ -82,13 +87,9 @@ def recorded_motion(samples_rad: ArrayLike, step_s: float, name: str = "recordin
         )
     if np.ptp(samples) <= 1e-12 * float(np.max(np.abs(samples))):
         raise ValueError(f'"{name}" stands still at {samples[0]:g} rad; name a channel that moves')
-    time = step_s * (np.arange(samples.size) - 0.5 * (samples.size - 1))
+    time: Floats = step_s * (np.arange(samples.size, dtype=float) - 0.5 * (samples.size - 1))
     mean = float(np.mean(samples))
     return RecordedMotion(name, samples, step_s, mean, float(time @ (samples - mean) / (time @ time)))
-
-
-LEAST_SAMPLES = 200
-"""Samples of a recording below which nothing is told of its spectrum."""
 
 
 def resampled(motion: RecordedMotion, step_s: float) -> Floats:
@@ -124,7 +125,7 @@ def resampled(motion: RecordedMotion, step_s: float) -> Floats:
     low_pass = firwin(taps | 1, 0.5 * (1.0 + PASSED) / faster, window=("kaiser", beta))
     count = math.floor(motion.duration_s / step_s * (1.0 + _SAME_RATE)) + 1
     rest = resample_poly(motion.rest_rad, up, down, window=low_pass)[:count]
-    return np.asarray(rest + motion.trend_rad(step_s * np.arange(rest.size)))
+    return np.asarray(rest + motion.trend_rad(step_s * np.arange(rest.size, dtype=float)))
 
 
 def _in_whole_numbers(ratio: float) -> Fraction:

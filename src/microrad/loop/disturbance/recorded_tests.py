@@ -20,7 +20,7 @@ _ENDS = 50
 
 @dataclass(frozen=True, slots=True)
 class Whiteness:
-    """Ljung and Box's test of the one-step-ahead residual: its statistic over so many lags, and how often chance has it.
+    """Ljung and Box's test of the one-step-ahead residual: statistic over so many lags, and how often chance has it.
 
     ``largest`` is the largest autocorrelation among them, which says how much a small probability matters.
     """
@@ -61,10 +61,8 @@ class BlockTest:
                 f"motion of this spectrum stays within {self.usual:.3g} times"
             )
         if self.growth_p < BY_CHANCE and max(self.growth, 1.0 / self.growth) > WORTH_SAYING**2:
-            word = "grows" if self.growth > 1.0 else "falls"
-            return (
-                f"the variance of {self.of} {word} {max(self.growth, 1.0 / self.growth):.3g} times over the recording"
-            )
+            word, times = ("grows", self.growth) if self.growth > 1.0 else ("falls", 1.0 / self.growth)
+            return f"the variance of {self.of} {word} {times:.3g} times over the recording"
         return ""
 
 

@@ -94,7 +94,7 @@ def play(closed: ClosedLoop, motion_rad: Floats, axis: int = 0) -> Floats:
     o, whole = closed.open, closed.step_noise.shape[0]
     per_period = len(closed.samples) * len(closed.steps)
     now = o.at.errors.start + axis
-    state, read = np.eye(whole, whole + per_period), []
+    state, read = np.eye(whole, whole + per_period), list[Floats]()
     for sample in closed.samples:
         state = sample @ state
         for step in closed.steps:

@@ -33,9 +33,10 @@ def recording_text(path: str, axes: Sequence[RecordedAxis], loop: PointingLoop, 
         width: Columns of the terminal.
     """
     first = axes[0].fit.motion
+    duration, rate = format_quantity(first.duration_s, "s"), format_quantity(2.0 * first.half_rate_hz, "Hz")
     about = (
-        f"Recording {path}: {format_quantity(first.duration_s, 's')} at {format_quantity(2 * first.half_rate_hz, 'Hz')}, "
-        "each channel one axis, in place of the mission's vibration, wheels and body. Angles in µrad rms, drift in µrad/s."
+        f"Recording {path}: {duration} at {rate}, each channel one axis, in place of the mission's vibration, wheels "
+        "and body. Angles in µrad rms, drift in µrad/s."
     )
     tables = [_motions(axes), _fits(axes), _left(axes, controller)]
     return f"{tables_text([], [about], width).strip()}\n\n{tables_text(tables, sentences(axes, loop), width).strip()}"
@@ -95,14 +96,14 @@ def sentences(axes: Sequence[RecordedAxis], loop: PointingLoop) -> list[str]:
     motion, played, step = axes[0].fit.motion, axes[0].left.played, loop.timing.step_s
     said = [
         f"Played from {format_quantity(played.begin_s, 's')} to {format_quantity(played.end_s, 's')} of the recording, "
-        "mean and drift with it, through the linear loop from rest; fitted by covariance, exactly. What the sensors add "
-        "stands beside both."
+        "mean and drift with it, through the linear loop from rest; fitted by covariance, exactly. Both about their "
+        "mean; what the sensors add stands beside them."
     ]
     if motion.half_rate_hz < 0.5 / loop.timing.period_s:
         said.append(
             f"Warning: the recording ends at {format_quantity(motion.half_rate_hz, 'Hz')}, and the loop reads up to "
-            f"{format_quantity(0.5 / loop.timing.period_s, 'Hz')}: what moves faster is in neither residual as it is. "
-            "Record faster."
+            f"{format_quantity(0.5 / loop.timing.period_s, 'Hz')}: faster motion is not played, and the fit only "
+            "goes on as it ended. Record faster."
         )
     for each in axes:
         said += _of_axis(each, step)
@@ -129,7 +130,7 @@ def _of_axis(each: RecordedAxis, step_s: float) -> list[str]:
     if left.reason:
         said.append(f"{name}: played and fitted differ by {percent(left.difference)}: {left.reason}.")
     else:
-        said.append(f"{name}: played and fitted agree to {percent(AGREEMENT)}.")
+        said.append(f"{name}: played and fitted agree within {percent(AGREEMENT)}.")
     return said
 
 
