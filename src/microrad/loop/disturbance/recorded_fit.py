@@ -30,6 +30,8 @@ _TOLD = 0.1  # above it a row tells nothing of how well the filter fits
 _SLOW = 0.6  # the same below the segments' first frequencies, in three rows
 _FIRST_BIN = 2  # of the segments; below it the window still sees what was detrended
 _LEAST_DAMPING = 0.005  # a resonance that rows of 3 % show
+_BY_CHANCE = 1.2  # mean squared misfit of the rows, over its expectation, up to which a fit is as good as any
+_FEW = 2  # states of such a fit for which no leaner one is looked for
 _WELL = 0.05  # misfit of a row (natural logarithm), in units of which it is that of chance
 _FOLDED = 2  # multiples of the sample rate whose folding is taken one by one
 _BEYOND = 2.0 * (math.pi**2 / 6.0 - 1.0 - 0.25) * (_FOLDED + 1) ** 2  # all further ones, as 1/f^2 at the next
@@ -65,7 +67,8 @@ def fit_recording(
 
     Mean and slope are taken off by least squares, lines by `find_lines`, and the rest is Welch's density in rows of
     3 % of their frequency, each as sure as it is averaged, up to 0.8 of half of the sample rate. Sampling folds what is
-    faster, unless a filter was before it: both are tried, and the one that fits better is taken.
+    faster, unless a filter was before it: both are tried, and the one that fits better, or as well with fewer states,
+    is taken.
 
     Args:
         samples_rad: The motion (rad), evenly sampled, shape (samples,) with 200 samples or more.
@@ -91,8 +94,11 @@ def fit_recording(
         off = np.where(sure, misfit / samples.trust, 0.0)
         worst = int(np.argmax(np.abs(off)))
         worst_db, at_hz = 10.0 * float(off[worst]) / math.log(10.0), float(samples.centre_hz[worst])
-        cost = float(misfit @ misfit) * LEANER ** (2 * states_of(terms))
+        spread = float(np.mean((misfit / _SURE) ** 2))
+        cost = spread * LEANER ** (2 * states_of(terms))
         found.append((cost, not folded, terms, worst_db, at_hz))
+        if spread < _BY_CHANCE and states_of(terms) <= _FEW:
+            break
     _, band_limited, terms, worst_db, at_hz = min(found, key=lambda each: each[:2])
     filtered, states = one_input(from_terms(terms, name, "", "recorded")), states_of(terms)
     basis = (
@@ -129,7 +135,7 @@ def _spectrum(filtered: Disturbance, motion: RecordedMotion, band_limited: bool)
 def _rows(rest: Floats, motion: RecordedMotion, folded: bool) -> tuple[Samples, NDArray[np.bool_]]:
     """The density in rows, as `fit_terms` takes them, and whether each of them is sure to a tenth.
 
-    ``folded`` rows hold what sampling folds into them. Below the first frequencies of the segments they are those of the
+    ``folded`` rows hold what sampling folds into them. Below the first frequencies of the segments they are of the
     periodogram of all of the recording.
     """
     slow, fast = (_averaged(*density(rest, motion.step_s, parts), below) for parts, below in ((1, PARTS), (PARTS, 0)))
