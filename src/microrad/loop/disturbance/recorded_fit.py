@@ -19,17 +19,17 @@ from microrad.loop.disturbance.recorded_tests import (
 )
 from microrad.loop.disturbance.records import Disturbance, one_input, psd
 from microrad.loop.disturbance.sources import from_terms
-from microrad.loop.disturbance.terms import LEANER, Samples, fit_terms, states_of, with_states
+from microrad.loop.disturbance.terms import Samples, cost, fit_terms, states_of, with_states
 
 FITTED = 0.8
 """Share of half of the sample rate up to which a spectrum is fitted: above it stands the filter against folding."""
 
-_BROAD = 0.03  # rows of the density closer than this fraction of their frequency are averaged
+_BROAD = 0.05  # rows of the density closer than this fraction of their frequency are averaged
 _SURE = 0.015  # relative standard error of a row's density below which all rows count alike
 _TOLD = 0.1  # above it a row tells nothing of how well the filter fits
 _SLOW = 0.6  # the same below the segments' first frequencies, in three rows
 _FIRST_BIN = 2  # of the segments; below it the window still sees what was detrended
-_LEAST_DAMPING = 0.005  # a resonance that rows of 3 % show
+_LEAST_DAMPING = 0.005  # a resonance that rows of 5 % show
 _BY_CHANCE = 1.2  # mean squared misfit of the rows, over its expectation, up to which a fit is as good as any
 _FEW = 2  # states of such a fit for which no leaner one is looked for
 _WELL = 0.05  # misfit of a row (natural logarithm), in units of which it is that of chance
@@ -66,7 +66,7 @@ def fit_recording(
     """Fit lines and a shaping filter to a recorded motion.
 
     Mean and slope are taken off by least squares, lines by `find_lines`, and the rest is Welch's density in rows of
-    3 % of their frequency, each as sure as it is averaged, up to 0.8 of half of the sample rate. Sampling folds what is
+    5 % of their frequency, each as sure as it is averaged, up to 0.8 of half of the sample rate. Sampling folds what is
     faster, unless a filter was before it: both are tried, and the one that fits better, or as well with fewer states,
     is taken.
 
@@ -94,10 +94,8 @@ def fit_recording(
         off = np.where(sure, misfit / samples.trust, 0.0)
         worst = int(np.argmax(np.abs(off)))
         worst_db, at_hz = 10.0 * float(off[worst]) / math.log(10.0), float(samples.centre_hz[worst])
-        spread = float(np.mean((misfit / _SURE) ** 2))
-        cost = spread * LEANER ** (2 * states_of(terms))
-        found.append((cost, not folded, terms, worst_db, at_hz))
-        if spread < _BY_CHANCE and states_of(terms) <= _FEW:
+        found.append((cost(samples, terms), not folded, terms, worst_db, at_hz))
+        if float(np.mean((misfit / _SURE) ** 2)) < _BY_CHANCE and states_of(terms) <= _FEW:
             break
     _, band_limited, terms, worst_db, at_hz = min(found, key=lambda each: each[:2])
     filtered, states = one_input(from_terms(terms, name, "", "recorded")), states_of(terms)

@@ -17,14 +17,12 @@ from microrad.core.arrays import Floats
 
 Kind = Literal["first-order", "low-pass", "band-pass"]
 
-LEANER = 1.05
-"""Times the spread of a fit below which one of a state less is preferred: what chance gives to one more."""
-
 _MAX_TERMS = 12
 _BROADEST = 0.9  # of the second-order terms: poles of damping 1 coincide, and then no modal form exists
 _NODES = 64  # per band: enough for a resonance of damping 0.05 in a band of a decade
 _FINENESS = 0.03  # rows of a table closer than this fraction of their frequency are averaged
 _WIDE = 100.0  # bound of a variance in natural logarithms: numbers stay numbers
+_A_STATE = 25.0  # of a cost: more than chance gives to a state
 _NEGLIGIBLE = 1e-12  # of the largest density: ends the logarithm of a sum that vanishes at a row
 
 
@@ -214,8 +212,8 @@ def with_states(
         terms: The terms of `fit_terms`.
         range_hz: Lowest and highest corner of a term.
         least_damping: Least damping ratio of a term of second order.
-        states: How many, 1 or more; None for as few as leave little more spread. There are fewer where
-            a further term is left without variance.
+        states: How many, 1 or more; None for the least `cost`. There are fewer where a further term is left without
+            variance.
     """
     limits = (*range_hz, least_damping)
     while states is None or states_of(terms) > states:
@@ -223,7 +221,7 @@ def with_states(
         if not trials:
             break
         best = min(trials, key=lambda trial: _spread(samples, trial))
-        if states is None and _spread(samples, best) > LEANER * _spread(samples, terms):
+        if states is None and cost(samples, best) > cost(samples, terms):
             break
         terms = best
     while states is not None and (more := states - states_of(terms)) > 0:
@@ -232,6 +230,16 @@ def with_states(
             break
         terms = fuller
     return terms
+
+
+def cost(samples: Samples, terms: list[Term]) -> float:
+    """Misfit and states in one number, to compare fits: rows times the logarithm of the mean square, and 25 a state.
+
+    Args:
+        samples: What the sum of the terms is compared with.
+        terms: The terms.
+    """
+    return 2.0 * samples.wanted.size * math.log(_spread(samples, terms)) + _A_STATE * states_of(terms)
 
 
 def _smaller(terms: list[Term]) -> list[list[Term]]:

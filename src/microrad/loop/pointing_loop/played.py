@@ -187,10 +187,13 @@ def _reason(
         model[near] += 0.5 * line.amplitude_rad**2 / width / model[near].size
     band = np.floor(_BANDS_PER_OCTAVE * np.log2(freq / freq[0]))
     starts = np.flatnonzero(np.diff(band, prepend=-1.0))
-    had, has = (np.add.reduceat(left / motion * each, starts) * width for each in (motion, model))
+    gain = left / motion
+    had, has = (np.add.reduceat(gain * each, starts) * width for each in (motion, model))
     worst = int(np.argmax(np.abs(had - has)))
+    inside = slice(starts[worst], freq.size if worst + 1 == starts.size else starts[worst + 1])
+    at = freq[inside][np.argmax(np.abs(gain * (motion - model))[inside])]
     return (
-        f"near {freq[starts[worst]]:.3g} Hz the loop leaves {format_quantity(math.sqrt(had[worst]), 'rad', 3)} of the "
+        f"near {at:.4g} Hz the loop leaves {format_quantity(math.sqrt(had[worst]), 'rad', 3)} of the "
         f"recording and {format_quantity(math.sqrt(has[worst]), 'rad', 3)} of the fit: a line or a resonance that the "
         "fit misses"
     )
