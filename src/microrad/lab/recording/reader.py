@@ -238,7 +238,8 @@ def read_motion(
 
 def _angle(source: Source, index: int, unit: str | None) -> float:
     """The unit of a channel in rad."""
-    stated = source.units[index].strip() or bracketed_unit(source.names[index])
+    behind = bracketed_unit(source.names[index])
+    stated = source.units[index].strip() or ("" if set(behind) <= set("0123456789, ") else behind)  # no column's number
     where = f"{source.path}: {source.label(index)}"
     if not stated and unit is None:
         raise RecordingError(f"{where}: no unit is stated; give it (--unit, unit), 'urad' for example.")
