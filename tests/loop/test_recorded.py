@@ -152,6 +152,24 @@ def test_a_line_that_the_fit_misses_and_power_beyond_the_recording_are_named(bot
         assert beyond.difference < -0.05 and "above 800 Hz, where the recording has ended" in beyond.reason
 
 
+def test_drift_that_the_loop_lets_through_is_named():
+    """A loop without an integrator leaves most of a drift."""
+    samples = 1e-6 * np.random.default_rng(15).standard_normal(16_000)
+    samples = lfilter([1.0], [1.0, -1.6, 0.64], samples) + 100e-6 * np.arange(samples.size) / 1600.0
+    fit = fit_recording(samples, 1.0 / 1600.0, order=2)
+    left = recorded_residual(LOOP.parts, LOOP.assembled(Controller.pid(100.0, 0.0, rate_hz=2000.0)), fit, SETTLE)
+    assert left.difference > 0.05 and left.reason.startswith("drift, and what settles slowly")
+    assert left.played.mean_rad > 100e-6
+
+
+def test_a_spectrum_that_no_small_filter_has_makes_no_motion_unsteady():
+    """Behind a smooth filter of fifty samples the density falls by ten orders, and the fit is many decibels off."""
+    samples = np.convolve(1e-6 * np.random.default_rng(16).standard_normal(8000), np.hanning(50), "same")
+    fit = fit_recording(samples, 1e-3, order=2)
+    assert abs(fit.worst_db) > 6.0 and not fit.whiteness.white
+    assert fit.stationarity.stationary
+
+
 def test_mean_and_drift_are_named_and_played():
     time = np.arange(32_000) / 1600.0
     samples = drawn(1600.0, 20.0, 10, ()) + 300e-6 + 5e-6 * (time - time.mean())

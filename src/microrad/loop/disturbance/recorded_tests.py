@@ -145,18 +145,21 @@ def stationarity(density_rad2_hz: Floats, rest_rad: Floats, residual: Floats) ->
     """Whether the variances of eight equal parts are those of a stationary motion.
 
     The mean square over a time T of Gaussian motion with the one-sided density S has the variance of a chi-square of
-    2 T (integral of S)^2 / (integral of S^2) degrees of freedom, and of the one-step-ahead residual of its number of
-    samples. The ratio of the largest to the smallest is Hartley's (Biometrika 37, 308, 1950).
+    2 T (integral of S)^2 / (integral of S^2) degrees of freedom; of the one-step-ahead residual S is its periodogram,
+    whose square is twice as large by chance, so that white residuals have one for each sample. The ratio of the largest
+    to the smallest is Hartley's (Biometrika 37, 308, 1950).
 
     Args:
         density_rad2_hz: The density that was fitted, at the first frequencies of the motion's transform, from 0 on.
         rest_rad: The motion without lines, mean and drift (rad), shape (samples,).
         residual: Its one-step-ahead residual, shape (samples,).
     """
-    S = density_rad2_hz
-    freedom = 2.0 / _BLOCKS * float(np.sum(S)) ** 2 / float(S @ S)
+    from scipy.fft import rfft
+
+    slow, fast = density_rad2_hz, np.abs(rfft(residual)) ** 2
+    of_motion, of_residual = (float(np.sum(S)) ** 2 / float(S @ S) * 2.0 / _BLOCKS for S in (slow, fast))
     return Stationarity(
-        _block_test("the motion", rest_rad, freedom), _block_test("its fast part", residual, residual.size / _BLOCKS)
+        _block_test("the motion", rest_rad, of_motion), _block_test("its fast part", residual, 2.0 * of_residual)
     )
 
 

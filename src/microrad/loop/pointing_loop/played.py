@@ -148,7 +148,12 @@ def recorded_residual(
     beyond = beyond_rms(fit.motion, 0.5 / step) if fit.motion.half_rate_hz > 0.5 / step else 0.0
     reason = ""
     if abs(played.rms_rad / fitted - 1.0) > AGREEMENT:
-        reason = _reason(fit, known, moved[1:][begin:end], kept, step, fitted**2 - played.rms_rad**2)
+        trend = play(still, fit.motion.trend_rad(step * np.arange(moved.size, dtype=float)))
+        missing = fitted**2 - played.rms_rad**2
+        if float(np.var(trend[begin:end])) > -0.5 * missing > 0.0:
+            reason = "drift, and what settles slowly behind the begin, are no part of the fit"
+        else:
+            reason = _reason(fit, known, moved[1:][begin:end], kept, step, missing)
     return RecordedResidual(played, fitted, noise, beyond, reason)
 
 
