@@ -205,7 +205,7 @@ def fit_terms(samples: Samples, range_hz: tuple[float, float], least_damping: fl
 def with_states(
     samples: Samples, terms: list[Term], range_hz: tuple[float, float], least_damping: float, states: int | None
 ) -> list[Term]:
-    """The terms with another number of states; each step to it is the one with the least spread.
+    """The terms with another number of states; each step to it is the one of the least `cost`.
 
     Args:
         samples: What the sum of the terms is compared with.
@@ -217,10 +217,11 @@ def with_states(
     """
     limits = (*range_hz, least_damping)
     while states is None or states_of(terms) > states:
-        trials = [_polished(samples, trial, limits) for trial in _smaller(terms)]
+        least = 1 if states is None else states
+        trials = [_polished(samples, trial, limits) for trial in _smaller(terms) if states_of(trial) >= least]
         if not trials:
             break
-        best = min(trials, key=lambda trial: _spread(samples, trial))
+        best = min(trials, key=lambda trial: cost(samples, trial))
         if states is None and cost(samples, best) > cost(samples, terms):
             break
         terms = best
@@ -243,13 +244,11 @@ def cost(samples: Samples, terms: list[Term]) -> float:
 
 
 def _smaller(terms: list[Term]) -> list[list[Term]]:
-    """The terms with a state less in each way: without one of first order, or with one of second order made first."""
-    found = []
+    """The terms with fewer states in each way: without one of them, or with one of second order made one of first."""
+    found = [[*terms[:i], *terms[i + 1 :]] for i in range(len(terms)) if len(terms) > 1]
     for i, t in enumerate(terms):
         if t.kind != "first-order":
             found.append([*terms[:i], replace(t, kind="first-order", damping=_BROADEST), *terms[i + 1 :]])
-        elif len(terms) > 1:
-            found.append([*terms[:i], *terms[i + 1 :]])
     return found
 
 
