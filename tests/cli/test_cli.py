@@ -43,6 +43,7 @@ COMMANDS = (
     "presets",
     "design",
     "pointing",
+    "jitter",
     "identify",
     "import",
     "bench",

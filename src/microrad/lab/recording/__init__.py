@@ -5,13 +5,14 @@ The values keep the units of the file; `identify` is told what they are. `list_f
 """
 
 from microrad.lab.recording.checks.together import check_together
-from microrad.lab.recording.reader import read_recording, recording_from_arrays
+from microrad.lab.recording.reader import read_motion, read_recording, recording_from_arrays
 from microrad.lab.recording.realisations import AXES, multisine_recordings, read_arrays
 from microrad.lab.recording.records import (
     ACCEPTABLE,
     MIN_SAMPLES,
     ROLES,
     Finding,
+    Motion,
     Recording,
     RecordingError,
     read_in,
@@ -24,12 +25,14 @@ __all__ = [
     "MIN_SAMPLES",
     "ROLES",
     "Finding",
+    "Motion",
     "Recording",
     "RecordingError",
     "check_together",
     "multisine_recordings",
     "read_arrays",
     "read_in",
+    "read_motion",
     "read_recording",
     "recording_from_arrays",
     "stated_units",

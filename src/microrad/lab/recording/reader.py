@@ -9,19 +9,21 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from microrad.core.arrays import Floats, reals
+from microrad.core.units import parse_quantity
 from microrad.lab.recording.checks.sample_rate import agreed_rate, check_rate, rate_of_time
 from microrad.lab.recording.checks.signals import check_signals
 from microrad.lab.recording.files import check_file, file_format
 from microrad.lab.recording.formats.lvm import LvmSource
 from microrad.lab.recording.formats.matlab import MatlabSource
 from microrad.lab.recording.formats.numpy_files import NumpySource
-from microrad.lab.recording.formats.source import SECONDS, Source, StatedRate, time_unit
+from microrad.lab.recording.formats.source import SECONDS, Source, StatedRate, bracketed_unit, is_time_name, time_unit
 from microrad.lab.recording.formats.tdms import TdmsSource
 from microrad.lab.recording.formats.text import TextSource
 from microrad.lab.recording.records import (
     ACCEPTABLE,
     MIN_SAMPLES,
     Finding,
+    Motion,
     Recording,
     RecordingError,
     digest_of,
@@ -33,6 +35,8 @@ Part = tuple[float, float | None]
 """First and last time, in s from the first sample; None for the end."""
 
 WHOLE: Part = (0.0, None)
+
+_MOST_AXES = 3
 
 
 def read_recording(  # noqa: PLR0913  all but the first four are named options
@@ -178,6 +182,77 @@ def recording_from_arrays(
         checked_period(name, period_samples, len(u)),
         findings=carried(name, findings, accept),
     )
+
+
+def read_motion(
+    path: str | Path,
+    axes: Sequence[Column] = (),
+    rate_hz: float | None = None,
+    *,
+    time: Column | None = None,
+    unit: str | None = None,
+) -> Motion:
+    """Read a recorded motion of the line of sight, one axis a channel, from any file that `read_recording` reads.
+
+    Args:
+        path: The file.
+        axes: The channels, one to three; by default all but the time.
+        rate_hz: Sample rate where the file states none; where both are known they must agree to 0.1 %.
+        time: The time column (s); by default one that is plainly called so.
+        unit: Unit of the channels where the file states none: "urad", "arcsec" or another one of angles.
+
+    Raises:
+        RecordingError: For no channel or more than three, another unit than one of angles, gaps, samples that are no
+            number, and anything else that cannot be relied upon.
+    """
+    path = Path(path)
+    rate_hz = None if rate_hz is None else check_rate(str(path), rate_hz)
+    check_file(path)
+    source = open_source(path)
+    used = [source.resolve(each, "axis") for each in axes]
+    if not used:
+        named = None if time is None else source.resolve(time, "time")
+        used = [index for index, name in enumerate(source.names) if index != named and not is_time_name(name)]
+    if not 1 <= len(used) <= _MOST_AXES or len(set(used)) < len(used):
+        listed = ", ".join(f"'{source.names[index]}'" for index in used[:10])
+        raise RecordingError(
+            f"{path}: {len(used)} channels ({listed}) as axes; name one to three that differ (--axes, axes)."
+        )
+    scales = [_angle(source, index, unit) for index in used]
+    clock = _clock(source, used, time)
+    columns, rates, findings = _load_columns(source, used, clock, time is None and rate_hz is not None)
+    rate = agreed_rate(str(path), rate_hz, [*source.rates(used), *rates])
+    _check_lengths(source, used, columns)
+    for index, column in zip(used, columns, strict=True):
+        bad = np.flatnonzero(~np.isfinite(column))
+        if bad.size:
+            raise RecordingError(
+                f"{path}: {source.place(int(bad[0]))} of {source.label(index)} is {column[bad[0]]}, {bad.size} such "
+                "samples in all; cut out a part without them: what is filled in was not measured."
+            )
+    if refused := [each.message for each in findings if each.refused]:
+        raise RecordingError(f"{path}: {'. Also: '.join(refused)}.")
+    names = tuple(source.names[index] for index in used)
+    return Motion(str(path), source.sha256, names, _table(columns) * np.array(scales), rate)
+
+
+def _angle(source: Source, index: int, unit: str | None) -> float:
+    """The unit of a channel in rad."""
+    behind = bracketed_unit(source.names[index])
+    stated = source.units[index].strip() or ("" if set(behind) <= set("0123456789, ") else behind)  # no column's number
+    where = f"{source.path}: {source.label(index)}"
+    if not stated and unit is None:
+        raise RecordingError(f"{where}: no unit is stated; give it (--unit, unit), 'urad' for example.")
+    try:
+        scales = [parse_quantity(f"1 {each}", "rad") for each in (stated, unit) if each]
+    except ValueError:
+        raise RecordingError(
+            f"{where} is in '{stated or unit}', which is no angle; name channels of angles (--axes, axes), in urad or "
+            "arcsec for example, or convert it."
+        ) from None
+    if len(set(scales)) > 1:
+        raise RecordingError(f"{where} is in '{stated}' and {unit} is given; leave out the unit, or correct the file.")
+    return scales[0]
 
 
 # ---------------------------------------------------------------------------------------------------------- opening

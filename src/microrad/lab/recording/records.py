@@ -92,6 +92,20 @@ class Recording:
         return replace(self, drive=self.drive[:samples], output=self.output[:samples])
 
 
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A recorded motion: `samples_rad` (samples, axes) at a constant rate, each axis by the name of its channel.
+
+    `sha256` is the digest of the file's bytes.
+    """
+
+    path: str
+    sha256: str
+    names: tuple[str, ...]
+    samples_rad: Floats
+    rate_hz: float
+
+
 def frozen(values: Floats) -> Floats:
     """The same values, contiguous and read-only."""
     values = np.ascontiguousarray(values)

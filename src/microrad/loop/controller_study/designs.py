@@ -253,6 +253,16 @@ def build(name: str, scene: Scene, axis: control.AxisController) -> LoopControll
     return with_adaptation(made, scene.loop) if name == ADAPTIVE else made
 
 
+def on_one_axis(made: Design, scene: Scene) -> LoopController:
+    """A design on the loop of one axis, ``scene.axis``.
+
+    Args:
+        made: One of `design`.
+        scene: The mission's fine-pointing loop.
+    """
+    return build(made.name, replace(scene, loop=scene.axis), made.tuned.controller)
+
+
 def grid_baseline(of: Sequence[DesignPlant], wanted: Specification) -> Tuned:
     """The best PI on a grid of both its parameters over their whole range: what the tuned ones are held against.
 

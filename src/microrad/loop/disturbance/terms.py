@@ -22,6 +22,7 @@ _BROADEST = 0.9  # of the second-order terms: poles of damping 1 coincide, and t
 _NODES = 64  # per band: enough for a resonance of damping 0.05 in a band of a decade
 _FINENESS = 0.03  # rows of a table closer than this fraction of their frequency are averaged
 _WIDE = 100.0  # bound of a variance in natural logarithms: numbers stay numbers
+_A_STATE = 25.0  # of a cost: more than chance gives to a state
 _NEGLIGIBLE = 1e-12  # of the largest density: ends the logarithm of a sum that vanishes at a row
 
 
@@ -169,6 +170,11 @@ def _evenly(rows_hz: Floats) -> tuple[Floats, Floats]:
     return nodes, np.full(nodes.size, 1.0 / nodes.size)
 
 
+def states_of(terms: list[Term]) -> int:
+    """States of the filter that has the sum of these terms."""
+    return sum(1 if t.kind == "first-order" else 2 for t in terms)
+
+
 def fit_terms(samples: Samples, range_hz: tuple[float, float], least_damping: float, tolerance: float) -> list[Term]:
     """Find few terms whose rows follow the samples.
 
@@ -194,6 +200,56 @@ def fit_terms(samples: Samples, range_hz: tuple[float, float], least_damping: fl
             break
         terms = more
     return _fewer(samples, terms, limits, tolerance)
+
+
+def with_states(
+    samples: Samples, terms: list[Term], range_hz: tuple[float, float], least_damping: float, states: int | None
+) -> list[Term]:
+    """The terms with another number of states; each step to it is the one of the least `cost`.
+
+    Args:
+        samples: What the sum of the terms is compared with.
+        terms: The terms of `fit_terms`.
+        range_hz: Lowest and highest corner of a term.
+        least_damping: Least damping ratio of a term of second order.
+        states: How many, 1 or more; None for the least `cost`. There are fewer where a further term is left without
+            variance.
+    """
+    limits = (*range_hz, least_damping)
+    while states is None or states_of(terms) > states:
+        least = 1 if states is None else states
+        trials = [_polished(samples, trial, limits) for trial in _smaller(terms) if states_of(trial) >= least]
+        if not trials:
+            break
+        best = min(trials, key=lambda trial: cost(samples, trial))
+        if states is None and cost(samples, best) > cost(samples, terms):
+            break
+        terms = best
+    while states is not None and (more := states - states_of(terms)) > 0:
+        fuller = _with_one_more(samples, terms, limits, ("first-order",) if more == 1 else ("low-pass", "band-pass"))
+        if states_of(fuller) <= states_of(terms):
+            break
+        terms = fuller
+    return terms
+
+
+def cost(samples: Samples, terms: list[Term]) -> float:
+    """Misfit and states in one number, to compare fits: rows times the logarithm of the mean square, and 25 a state.
+
+    Args:
+        samples: What the sum of the terms is compared with.
+        terms: The terms.
+    """
+    return 2.0 * samples.wanted.size * math.log(_spread(samples, terms)) + _A_STATE * states_of(terms)
+
+
+def _smaller(terms: list[Term]) -> list[list[Term]]:
+    """The terms with fewer states in each way: without one of them, or with one of second order made one of first."""
+    found = [[*terms[:i], *terms[i + 1 :]] for i in range(len(terms)) if len(terms) > 1]
+    for i, t in enumerate(terms):
+        if t.kind != "first-order":
+            found.append([*terms[:i], replace(t, kind="first-order", damping=_BROADEST), *terms[i + 1 :]])
+    return found
 
 
 def _worst(samples: Samples, terms: list[Term]) -> float:
@@ -222,11 +278,15 @@ def _powers(samples: Samples, terms: list[Term]) -> list[Term]:
     return sorted(kept, key=lambda t: -float(np.max(samples.rows([t]) / samples.wanted)))
 
 
-def _with_one_more(samples: Samples, terms: list[Term], limits: tuple[float, float, float]) -> list[Term]:
-    """The terms and the best of several new ones where the sum lacks most."""
+def _with_one_more(
+    samples: Samples,
+    terms: list[Term],
+    limits: tuple[float, float, float],
+    kinds: tuple[Kind, ...] = ("low-pass", "band-pass"),
+) -> list[Term]:
+    """The terms and the best of several new ones of these kinds where the sum lacks most."""
     freq = float(np.clip(samples.centre_hz[np.argmin(samples.misfit(terms))], *limits[:2]))
     dampings = [z for z in (0.7, 0.3, 0.1, 0.03, 0.01, 0.003) if z >= limits[2]]
-    kinds: tuple[Kind, ...] = ("low-pass", "band-pass")
     trials = [_powers(samples, [*terms, Term(k, 1.0, freq, z)]) for k, z in product(kinds, dampings)]
     return _polished(samples, min(trials, key=lambda trial: _spread(samples, trial)), limits)
 

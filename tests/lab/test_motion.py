@@ -1,0 +1,68 @@
+"""A recorded motion of the line of sight from the files of a laboratory: its axes, its unit, and what is refused."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from microrad.lab.recording import RecordingError, read_motion
+
+COUNT = 400
+TIME = np.arange(COUNT) / 500.0
+X, Y = np.sin(TIME), np.cos(3.0 * TIME)
+
+
+def csv(path, heading, *columns):
+    np.savetxt(path, np.column_stack(columns), delimiter=",", header=heading, comments="", fmt="%.12g")
+    return path
+
+
+def test_columns_but_the_time_are_axes_in_the_unit_that_each_states(tmp_path):
+    motion = read_motion(csv(tmp_path / "jitter.csv", "time (s),x (urad),y [arcsec]", TIME, X, Y))
+    assert motion.names == ("x (urad)", "y [arcsec]") and motion.rate_hz == pytest.approx(500.0, rel=1e-6)
+    assert_allclose(motion.samples_rad[:, 0], 1e-6 * X, rtol=1e-9, atol=1e-18)
+    assert_allclose(motion.samples_rad[:, 1], np.radians(Y / 3600.0), rtol=1e-9, atol=1e-18)
+
+
+def test_an_array_has_the_rate_and_the_unit_that_are_given(tmp_path):
+    np.save(tmp_path / "jitter.npy", np.column_stack([X, Y]))
+    motion = read_motion(tmp_path / "jitter.npy", ("1",), 500.0, unit="mrad")
+    assert motion.samples_rad.shape == (COUNT, 1)
+    assert_allclose(motion.samples_rad[:, 0], 1e-3 * Y, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("heading", "options", "words"),
+    [
+        ("time,x (V),y (urad)", {}, "column 1 ('x (V)') is in 'V', which is no angle; name channels of angles"),
+        ("time,x (urad),y", {}, "column 2 ('y'): no unit is stated; give it (--unit, unit), 'urad' for example"),
+        ("time,x (urad),y", {"axes": ("1",)}, None),
+        ("time,x (urad),y (urad)", {"unit": "mrad"}, "is in 'urad' and mrad is given; leave out the unit"),
+        ("time,x (urad),y (urad)", {"rate_hz": 400.0}, "two sample rates"),
+        ("a (urad),b (urad),c (urad)", {}, "does not say how fast it was sampled; give the rate (--rate, rate_hz)"),
+        ("time,x (urad),y (urad)", {"axes": ("x (urad)", "x (urad)")}, "2 channels ('x (urad)', 'x (urad)') as axes"),
+        ("time,x (urad),y (urad)", {"axes": ("z",)}, "no axis"),
+    ],
+)
+def test_what_is_no_motion_of_the_line_of_sight_is_refused(tmp_path, heading, options, words):
+    path = csv(tmp_path / "jitter.csv", heading, TIME, X, Y)
+    if words is None:
+        assert read_motion(path, **options).names == ("x (urad)",)
+        return
+    with pytest.raises(RecordingError) as refused:
+        read_motion(path, **options)
+    assert words in str(refused.value) and "\n" not in str(refused.value)
+
+
+def test_more_than_three_axes_gaps_and_samples_that_are_no_number_are_refused(tmp_path):
+    four = csv(tmp_path / "four.csv", "a (urad),b (urad),c (urad),d (urad)", X, Y, X, Y)
+    with pytest.raises(RecordingError, match=r"4 channels \('a \(urad\)', .*\) as axes; name one to three"):
+        read_motion(four, rate_hz=500.0)
+    gap = csv(tmp_path / "gap.csv", "time,x (urad)", np.where(TIME > 0.3, TIME + 0.1, TIME), X)
+    with pytest.raises(RecordingError, match=r"1 gap, about 50 samples lost\. Cut the recording there"):
+        read_motion(gap)
+    np.save(tmp_path / "nan.npy", np.where(np.arange(COUNT) == 7, np.nan, X))
+    with pytest.raises(RecordingError, match=r"sample 7 of .* is nan, 1 such samples in all; cut out a part"):
+        read_motion(tmp_path / "nan.npy", rate_hz=500.0, unit="urad")
+    shaken = csv(tmp_path / "shaken.csv", "time,x (urad)", TIME + 3e-4 * np.sin(40 * np.arange(COUNT)), X)
+    with pytest.raises(RecordingError, match=r"the steps scatter by .* resample to a constant step"):
+        read_motion(shaken)

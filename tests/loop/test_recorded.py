@@ -1,0 +1,271 @@
+"""Recorded motion as a disturbance: played and fitted against a known spectrum, its lines, and what is left of it."""
+
+import math
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.signal import lfilter
+
+from microrad.loop.disturbance import Disturbance, SampledReference, SpectralLine, combine, discretise, olympus, psd
+from microrad.loop.disturbance.recorded import density, edge_s, recorded_motion, resampled
+from microrad.loop.disturbance.recorded_fit import fit_recording
+from microrad.loop.disturbance.recorded_lines import find_lines
+from microrad.loop.disturbance.recorded_tests import stationarity
+from microrad.loop.disturbance.terms import Term, term_filter
+from microrad.loop.pointing_loop.ensemble import Span
+from microrad.loop.pointing_loop.linear import close, stationary
+from microrad.loop.pointing_loop.played import play, recorded_residual, refuse_short
+from microrad.loop.pointing_loop.traces import side_by_side
+from microrad.loop.workbench import Controller, Loop
+from microrad.mirror.model import Mirror
+
+LINES = (SpectralLine(6e-6, 47.3), SpectralLine(3e-6, 160.21))
+KNOWN = replace(olympus(), lines=LINES)
+MIRROR = Mirror.of(50e-6, [1.0], [1 / 3000**2, 2 * 0.1 / 3000, 1.0])
+LOOP = Loop(mirror=MIRROR, rate_hz=2000.0, vibration=(KNOWN,), sensor_noise_rad=0.1e-6, delay_s=2e-4)
+TRACKING = Controller.pid(0.0, 6e6, rate_hz=2000.0)
+STEP = LOOP.parts.timing.step_s
+SETTLE = 0.5
+
+
+def drawn(rate_hz, duration_s, seed, lines=LINES):
+    """OLYMPUS of an axis, sampled exactly, and lines."""
+    random, count = np.random.default_rng(seed), round(rate_hz * duration_s)
+    kept, rms = math.exp(-2.0 * math.pi / rate_hz), math.sqrt(40e-12 * math.pi)
+    noise = rms * random.standard_normal(count) * math.sqrt(1.0 - kept**2)
+    noise[0] /= math.sqrt(1.0 - kept**2)
+    time = np.arange(count) / rate_hz
+    turning = sum(x.amplitude_rad * np.sin(2 * math.pi * (x.freq_hz * time + random.uniform())) for x in lines)
+    return lfilter([1.0], [1.0, -kept], noise) + turning
+
+
+CASES = {"slower": (1600.0, 40.0, LINES), "faster": (25_000.0, 12.0, LINES), "spectrum alone": (3000.0, 40.0, ())}
+
+
+@cache
+def both(name):
+    """A recording slower than the loop or faster than its plant, what the loop leaves of it, and the lines in it."""
+    rate_hz, duration_s, lines = CASES[name]
+    fit = fit_recording(drawn(rate_hz, duration_s, 3, lines) + 40e-6, 1.0 / rate_hz, name="jitter")
+    return fit, recorded_residual(LOOP.parts, LOOP.assembled(TRACKING), fit, SETTLE), lines
+
+
+@pytest.fixture(scope="module")
+def small():
+    """A small recording under a filter of a chosen order."""
+    return fit_recording(drawn(250.0, 20.0, 13, ()), 4e-3, order=4, name="small")
+
+
+def test_the_recordings_have_other_rates_than_the_loop():
+    assert 1600.0 < LOOP.rate_hz < 1.0 / STEP < 25_000.0
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_played_and_fitted_agree_with_each_other_and_with_the_known_spectrum(name):
+    """Within 5 %; chance is a third of that.
+
+    The rms of Gaussian motion over a time T has the relative standard error 1 / sqrt(2 n), n = 2 T (integral of S)^2 /
+    (integral of S^2). The loop leaves a band wider than 100 Hz, so that n > 2400 and the error < 1.5 % in 12 s; lines
+    have none. A slower recording holds what is above 800 Hz folded below it.
+    """
+    fit, left, lines = both(name)
+    known = replace(LOOP.parts, disturbances=((replace(KNOWN, lines=lines),),))
+    theory = stationary(close(known, LOOP.assembled(TRACKING))).error_by_source
+    exact = math.sqrt(float(theory["OLYMPUS"][0]))
+    assert abs(left.difference) < 0.05 and left.reason == ""
+    assert left.played.rms_rad == pytest.approx(exact, rel=0.05, abs=0.0)
+    assert left.fitted_rms_rad == pytest.approx(exact, rel=0.05, abs=0.0)
+    assert left.noise_rms_rad == pytest.approx(math.sqrt(float(theory["optical sensor noise"][0])), rel=1e-9, abs=0.0)
+    assert left.played.least_rms_rad < left.played.rms_rad < left.played.most_rms_rad < 1.2 * left.played.rms_rad
+    assert left.played.begin_s == pytest.approx(SETTLE, rel=1e-9, abs=0.0)
+    assert fit.motion.duration_s - left.played.end_s <= edge_s(fit.motion, STEP) + 2.0 / LOOP.rate_hz
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_the_fit_is_the_known_filter_and_leaves_white_and_stationary_motion(name):
+    fit, _, _ = both(name)
+    assert fit.order == 1 and not fit.band_limited and abs(fit.worst_db) < 3.0
+    fast = np.geomspace(10.0, 0.4 / fit.motion.step_s, 30)
+    assert_allclose(psd(fit.disturbance, fast), psd(olympus(), fast), rtol=0.03)
+    assert fit.whiteness.white and fit.whiteness.largest < 0.02
+    assert fit.stationarity.stationary and fit.stationarity.reason == ""
+    assert 0.05 < fit.correlation_s < 0.3  # 1 / (2 pi 1 Hz) is 0.16 s
+
+
+def test_lines_are_found_to_a_hundredth_of_their_amplitude_and_a_thousandth_of_their_frequency():
+    """The standard error of an amplitude under a Hann window is sqrt(1.5 S / T): 0.4 % of each of these in 120 s."""
+    lines, rest = find_lines(recorded_motion(drawn(1600.0, 120.0, 3), 1.0 / 1600.0).rest_rad, 1.0 / 1600.0)
+    for found, known in zip(sorted(lines, key=lambda x: x.freq_hz), LINES, strict=True):
+        assert found.amplitude_rad == pytest.approx(known.amplitude_rad, rel=0.01, abs=0.0)
+        assert found.freq_hz == pytest.approx(known.freq_hz, rel=1e-3, abs=0.0)
+    freq, power, _ = density(rest, 1.0 / 1600.0)
+    around = (freq > 40.0) & (freq < 55.0)
+    assert np.max(power[around]) < 5.0 * np.median(power[around])
+
+
+def test_a_narrow_resonance_and_noise_are_no_lines():
+    """A resonance of 1.4 Hz stands far above the density around it, and turns; what is found is no tenth of its rms."""
+    resonance = Disturbance("plate", *term_filter(Term("low-pass", 4e-12, 120.0, 0.006)), (), "", "test")
+    model = discretise(combine(olympus(), resonance), 1e-3)
+    random, x, samples = np.random.default_rng(5), np.zeros(3), []
+    for noise in random.standard_normal((40_000, model.Bd.shape[1])):
+        x = model.Ad @ x + model.Bd @ noise
+        samples.append(float(model.C[0] @ x))
+    lines, _ = find_lines(recorded_motion(samples, 1e-3).rest_rad, 1e-3)
+    assert all(line.amplitude_rad < 0.2 * 2e-6 for line in lines)
+    assert find_lines(recorded_motion(drawn(1000.0, 40.0, 6, ()), 1e-3).rest_rad, 1e-3)[0] == ()
+
+
+def test_a_burst_is_said_not_to_be_stationary_and_what_the_loop_leaves_in_it():
+    samples = drawn(1600.0, 15.0, 7, ())
+    samples[12_000:13_500] += 4e-6 * np.random.default_rng(8).standard_normal(1500)
+    fit = fit_recording(samples, 1.0 / 1600.0)
+    assert not fit.stationarity.stationary
+    assert "the variance of its fast part in 8 equal parts differs" in fit.stationarity.reason
+    assert fit.stationarity.fast.ratio > 2.0 > fit.stationarity.fast.usual
+    left = recorded_residual(LOOP.parts, LOOP.assembled(TRACKING), fit, SETTLE)
+    assert left.played.most_rms_rad > 1.3 * left.played.rms_rad
+    assert (abs(left.difference) > 0.05) == ("not stationary" in left.reason)
+
+
+def test_a_motion_that_grows_is_not_stationary_for_its_trend():
+    white = np.random.default_rng(9).standard_normal(20_000)
+    density_of_white, still = np.ones(8001), stationarity(np.ones(8001), white, white)
+    assert still.stationary and still.motion.usual == pytest.approx(still.fast.usual, rel=0.05, abs=0.0)
+    grown = white * np.linspace(0.9, 1.1, white.size)
+    found = stationarity(density_of_white, grown, grown)
+    assert found.fast.growth == pytest.approx((1.1 / 0.9) ** 2, rel=0.25, abs=0.0)
+    assert found.fast.growth_p < 1e-6 and "in 8 equal parts differs" in found.reason
+    ratio_alone = replace(found.fast, ratio_p=0.5)
+    assert "grows" in ratio_alone.verdict and "over the recording" in ratio_alone.verdict
+
+
+def test_a_line_that_the_fit_misses_and_power_beyond_the_recording_are_named():
+    fit, left, _ = both("slower")
+    samples = fit.motion.samples_rad[: round(8.0 / fit.motion.step_s)]
+    fit, lines = replace(fit, motion=recorded_motion(samples, fit.motion.step_s)), fit.disturbance.lines
+    controller, fast = LOOP.assembled(TRACKING), min(lines, key=lambda x: x.amplitude_rad)
+    without = replace(fit, disturbance=replace(fit.disturbance, lines=(fast,)))
+    missed = recorded_residual(LOOP.parts, controller, without, SETTLE)
+    assert missed.difference > 0.05 and "a line or a resonance that the fit misses" in missed.reason
+    assert float(missed.reason.split()[1]) == pytest.approx(LINES[0].freq_hz, abs=1.0)
+    hiss = Disturbance("hiss", *term_filter(Term("band-pass", left.fitted_rms_rad**2, 3000.0, 0.1)), (), "", "test")
+    more = replace(combine(replace(fit.disturbance, lines=()), hiss), lines=lines)
+    beyond = recorded_residual(LOOP.parts, controller, replace(fit, disturbance=more), SETTLE)
+    assert beyond.difference < -0.05 and "above 800 Hz, where the recording has ended" in beyond.reason
+
+
+def test_drift_that_the_loop_lets_through_is_named(small):
+    """A loop without an integrator leaves most of a drift."""
+    samples = small.motion.samples_rad + 100e-6 * small.motion.step_s * np.arange(small.motion.samples_rad.size)
+    drifting = replace(small, motion=recorded_motion(samples, small.motion.step_s))
+    proportional = LOOP.assembled(Controller.pid(100.0, 0.0, rate_hz=2000.0))
+    left = recorded_residual(LOOP.parts, proportional, drifting, SETTLE)
+    assert left.difference > 0.05 and left.reason.startswith("drift, and what settles slowly")
+    assert left.played.mean_rad > 100e-6
+
+
+def test_a_spectrum_that_no_small_filter_has_makes_no_motion_unsteady():
+    """Behind a smooth filter of fifty samples the density falls by ten orders, and the fit is many decibels off."""
+    samples = np.convolve(1e-6 * np.random.default_rng(16).standard_normal(8000), np.hanning(50), "same")
+    fit = fit_recording(samples, 1e-3, order=2)
+    assert abs(fit.worst_db) > 6.0 and not fit.whiteness.white
+    assert fit.stationarity.stationary
+
+
+def test_mean_and_drift_are_named_and_played():
+    time = np.arange(32_000) / 1600.0
+    samples = drawn(1600.0, 20.0, 10, ()) + 300e-6 + 5e-6 * (time - time.mean())
+    motion = recorded_motion(samples, 1.0 / 1600.0)
+    alone = recorded_motion(drawn(1600.0, 20.0, 10, ()), 1.0 / 1600.0)
+    assert motion.mean_rad - alone.mean_rad == pytest.approx(300e-6, rel=1e-9, abs=0.0)
+    assert motion.slope_rad_s - alone.slope_rad_s == pytest.approx(5e-6, rel=1e-9, abs=0.0)
+    assert_allclose(motion.rest_rad, alone.rest_rad, atol=1e-15)
+    moved, still = resampled(motion, STEP), resampled(alone, STEP)
+    assert_allclose(moved - still, 300e-6 + 5e-6 * (STEP * np.arange(moved.size) - time.mean()), rtol=1e-9)
+
+
+# ---------------------------------------------------------------------------------------------------------- resampling
+def tone(rate_hz, freq_hz, count=20_000):
+    return np.sin(2.0 * math.pi * freq_hz * np.arange(count) / rate_hz)
+
+
+@pytest.mark.parametrize("freq_hz", [5030.0, 5400.0, 7100.0, 12000.0])
+def test_what_is_above_half_of_the_new_rate_does_not_appear_below(freq_hz):
+    rate_hz = 25_000.0
+    moved = resampled(recorded_motion(tone(rate_hz, freq_hz), 1.0 / rate_hz), 1e-4)[100:-100]
+    assert np.max(np.abs(moved)) < 1e-3
+
+
+def test_a_slower_recording_has_no_images_above_half_of_its_rate():
+    moved = resampled(recorded_motion(tone(1600.0, 600.0), 1.0 / 1600.0), 1e-4)[1000:-1000]
+    freq, power, _ = density(moved, 1e-4)
+    assert np.max(power[freq > 810.0]) < 1e-6 * np.max(power)
+    assert math.sqrt(2.0 * float(np.mean(moved**2))) == pytest.approx(1.0, rel=1e-3, abs=0.0)
+
+
+@pytest.mark.parametrize("rate_hz", [25_000.0, 4_000.0, 7_919.3])
+def test_what_is_below_half_of_both_rates_is_where_it_was(rate_hz):
+    moved = resampled(recorded_motion(tone(rate_hz, 333.0), 1.0 / rate_hz), 1e-4)
+    inside = slice(500, moved.size - 500)
+    assert_allclose(moved[inside], tone(10_000.0, 333.0, moved.size)[inside], atol=1e-3)
+
+
+def test_a_recording_at_the_loops_own_rate_is_itself():
+    samples = drawn(1.0 / STEP, 1.0, 11)
+    assert_allclose(resampled(recorded_motion(samples, STEP), STEP * (1.0 + 1e-12)), samples, rtol=1e-9, atol=0.0)
+    assert edge_s(recorded_motion(samples, STEP), STEP) == 0.0
+
+
+# ------------------------------------------------------------------------------------------------------------- playing
+@pytest.mark.parametrize("every", [1, 2])
+def test_a_motion_is_played_as_the_kernel_plays_a_reference(every):
+    """A reference is straight between control samples, and so is this motion at the plant steps."""
+    quiet = replace(LOOP, vibration=(), sensor_noise_rad=0.0).parts
+    quiet = replace(quiet, optical=replace(quiet.optical, every=every))
+    controller = LOOP.assembled(Controller.pid(0.0, 4e5, rate_hz=2000.0))
+    samples = drawn(2000.0, 0.6, 12)
+    wanted = [[SampledReference(samples, quiet.timing.period_s)]]
+    error, _ = side_by_side(quiet, controller, Span(0.5, 0.0, 1), wanted)
+    per_sample = quiet.timing.steps_per_sample
+    steps = np.interp(np.arange(1000 * per_sample + 1) / per_sample, np.arange(samples.size), samples)
+    played = play(close(quiet, controller), steps)
+    assert_allclose(played[per_sample - 1 :: per_sample][:999], error[0, 1:, 0], rtol=0.0, atol=1e-9 * np.ptp(samples))
+
+
+# ------------------------------------------------------------------------------------------------------------ refusals
+def test_a_filter_of_a_chosen_order_has_so_many_states(small):
+    assert small.order == small.disturbance.A.shape[0] == 4
+    assert small.disturbance.rms_rad == pytest.approx(olympus().rms_rad, rel=0.3, abs=0.0)
+
+
+@pytest.mark.parametrize(
+    ("samples", "step_s", "words"),
+    [
+        (np.zeros((300, 2)), 1e-3, r"has the shape \(300, 2\): give one row of 200 samples or more"),
+        (np.arange(199.0), 1e-3, r"has the shape \(199,\)"),
+        (np.append(np.arange(300.0), np.nan), 1e-3, "sample 300 is nan, 1 such samples in all; cut the recording"),
+        (np.full(300, 2e-6), 1e-3, "stands still at 2e-06 rad; name a channel that moves"),
+        (np.arange(300.0), 0.0, 'the step of "jitter" is 0 s'),
+    ],
+)
+def test_what_is_no_motion_is_refused(samples, step_s, words):
+    with pytest.raises(ValueError, match=words):
+        recorded_motion(samples, step_s, "jitter")
+
+
+def test_other_orders_rates_and_lengths_are_refused(small):
+    samples = small.motion.samples_rad
+    with pytest.raises(ValueError, match="a shaping filter of 0 states; give 1 to 24"):
+        fit_recording(samples, 4e-3, order=0)
+    with pytest.raises(ValueError, match="rates may differ 10000 times"):
+        resampled(small.motion, 1e-8)
+    refuse_short(small, 10.0)
+    with pytest.raises(ValueError, match=r'"small" lasts 20 s; the loop settles in 19 s, and ten times the .* record'):
+        refuse_short(small, 19.0)
+    unstable = LOOP.assembled(Controller.pid(0.0, 1e8, rate_hz=2000.0))
+    with pytest.raises(ValueError, match="is unstable: a pole at"):
+        recorded_residual(LOOP.parts, unstable, small, 0.0)
