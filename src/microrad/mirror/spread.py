@@ -32,11 +32,42 @@ def draws(table: Mirror, count: int, seed: int) -> tuple[Mirror, ...]:
     Raises:
         ValueError: Without an `uncertainty`, and where `TRIES` draws in a row are no mirror.
     """
+    return tuple(mirror for mirror, _ in drawn(table, count, seed))
+
+
+def drawn(table: Mirror, count: int, seed: int) -> tuple[tuple[Mirror, Floats], ...]:
+    """The mirrors of `draws`, each with the factors of its parameters, shape (parameters,).
+
+    Args:
+        table: The identified mirror.
+        count: How many mirrors are drawn.
+        seed: Seed of the random numbers.
+
+    Raises:
+        ValueError: As `draws`.
+    """
     uncertainty = _uncertainty(table)
     places = [place(table, key) for key in uncertainty.parameters]
     root = lti.covariance_root(relative_covariance(table))
     streams = (np.random.SeedSequence(seed, spawn_key=(index,)) for index in range(count))
     return tuple(_drawn(table, places, root, np.random.Generator(np.random.Philox(stream))) for stream in streams)
+
+
+def moved(table: Mirror, factors: Floats) -> Mirror | None:
+    """The mirror with its parameters multiplied; None where a file with it would be refused, or a value turned.
+
+    Args:
+        table: The identified mirror.
+        factors: Factors of its uncertain parameters, shape (parameters,).
+
+    Raises:
+        ValueError: Without an `uncertainty`.
+    """
+    if any(_turned(table, factors)):
+        return None
+    places = [place(table, key) for key in _uncertainty(table).parameters]
+    found = _moved(table, places, factors)
+    return None if any(_faults(found, places)) else found
 
 
 def parameters(table: Mirror, normals: Floats, again: Callable[[int], Iterator[Floats]]) -> Floats:
@@ -153,9 +184,11 @@ def _share_of_gain(table: Mirror, at: Place) -> float:
 
 
 # -------------------------------------------------------------------------------------------------------------- drawing
-def _drawn(table: Mirror, places: list[Place], root: Floats, rng: np.random.Generator) -> Mirror:
+def _drawn(
+    table: Mirror, places: list[Place], root: Floats, rng: np.random.Generator
+) -> tuple[Mirror, Floats]:
     normals = (rng.standard_normal(len(places)) for _ in range(TRIES))
-    return _accepted(table, places, root, normals)[0]
+    return _accepted(table, places, root, normals)
 
 
 def _accepted(table: Mirror, places: list[Place], root: Floats, normals: Iterator[Floats]) -> tuple[Mirror, Floats]:
