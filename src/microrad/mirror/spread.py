@@ -111,6 +111,15 @@ def _unit(table: Mirror, at: Place) -> str:
     return rule.unit if isinstance(rule, Quantity) else rule.each.unit
 
 
+def values(table: Mirror) -> Floats:
+    """Values of the uncertain parameters in SI units, shape (parameters,); of a list that scales together its first.
+
+    Raises:
+        ValueError: Without an `uncertainty`.
+    """
+    return np.array([_first(table, key) for key in _uncertainty(table).parameters])
+
+
 def relative_covariance(table: Mirror) -> Floats:
     """Covariance (n, n) of the factors, 1 on average, that a draw multiplies the n parameters with.
 
@@ -120,10 +129,10 @@ def relative_covariance(table: Mirror) -> Floats:
         ValueError: Without an `uncertainty`.
     """
     uncertainty = _uncertainty(table)
-    values, vectors = np.linalg.eigh(np.array(uncertainty.correlation_rows))
-    repaired = (vectors * np.maximum(values, 0.0)) @ vectors.T
+    sizes, vectors = np.linalg.eigh(np.array(uncertainty.correlation_rows))
+    repaired = (vectors * np.maximum(sizes, 0.0)) @ vectors.T
     # the correlation is that of the values, the covariance that of their factors: a negative value turns the sign
-    errors = np.array(uncertainty.standard_errors) * np.sign([_first(table, key) for key in uncertainty.parameters])
+    errors = np.array(uncertainty.standard_errors) * np.sign(values(table))
     errors /= np.sqrt(np.diag(repaired))
     return np.asarray(errors[:, None] * repaired * errors)
 
@@ -184,9 +193,7 @@ def _share_of_gain(table: Mirror, at: Place) -> float:
 
 
 # -------------------------------------------------------------------------------------------------------------- drawing
-def _drawn(
-    table: Mirror, places: list[Place], root: Floats, rng: np.random.Generator
-) -> tuple[Mirror, Floats]:
+def _drawn(table: Mirror, places: list[Place], root: Floats, rng: np.random.Generator) -> tuple[Mirror, Floats]:
     normals = (rng.standard_normal(len(places)) for _ in range(TRIES))
     return _accepted(table, places, root, normals)
 

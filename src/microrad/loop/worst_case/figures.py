@@ -12,7 +12,7 @@ from microrad.core import lti
 from microrad.core.arrays import Complexes, Floats
 from microrad.core.threads import in_threads
 from microrad.loop.control import dips
-from microrad.loop.control.analysis import resolving
+from microrad.loop.control.analysis import around_poles
 from microrad.loop.coupled_study.whole import least_squares
 from microrad.loop.disturbance.windows import ErrorIndex
 from microrad.loop.pointing_loop.design import read_each_sample, sampled_mirrors
@@ -20,7 +20,7 @@ from microrad.loop.pointing_loop.linear import ClosedLoop, close, straightened
 from microrad.loop.pointing_loop.loop import LoopController, PointingLoop
 from microrad.loop.pointing_loop.windows import windowed_in_all
 
-AT_ONCE = 32
+AT_ONCE = 64
 """Mirrors whose matrices are worked on at once: what a processor keeps near."""
 
 LIGHT = 0.2
@@ -73,7 +73,9 @@ def figures(
     parts = [mirrors[first : first + AT_ONCE] for first in range(0, len(mirrors), AT_ONCE)]
     jobs = [partial(_together, loop, fixed, margins, part, indices) for part in parts]
     found = in_threads(jobs, workers=threads)
-    return Figures(*(np.concatenate([getattr(each, name) for each in found]) for name in ("rms_rad", "modulus", "pole")))
+    return Figures(
+        *(np.concatenate([getattr(each, name) for each in found]) for name in ("rms_rad", "modulus", "pole"))
+    )
 
 
 def _together(
@@ -89,12 +91,14 @@ def _together(
     size = np.max(np.abs(poles), axis=-1) ** (1.0 / len(closed.samples))
     rms, modulus = np.full((len(mirrors), len(indices)), math.inf), np.zeros(len(mirrors))
     stable = np.flatnonzero(size < 1.0)
+    if 0 < stable.size < size.size:
+        stack = lti.StateSpace(*(getattr(stack, key)[stable] for key in "ABCD"))
+        closed = close(loop, controller, stack)
     if stable.size:
-        some = lti.StateSpace(*(getattr(stack, key)[stable] for key in "ABCD"))
-        closed = close(loop, controller, some)
         squares = [np.sum(windowed_in_all(closed, index), axis=-1) for index in indices]
         rms[stable] = np.sqrt(np.maximum(np.stack(squares, axis=-1), 0.0))
-        modulus[stable] = margins.least(some)
+        each_sample = loop.optical.every == 1
+        modulus[stable] = margins.least(stack, poles[stable] if each_sample else margins.poles(stack))
     return Figures(rms, modulus, size)
 
 
@@ -114,25 +118,37 @@ class Margins:
         """
         self._loop, s, axes = read_each_sample(loop), controller.system, loop.axes
         self._controller, self._period = controller, loop.timing.period_s
-        own = _stacked([loop.mirror.linear_loop])
-        of_plant, of_loop = sampled_mirrors(self._loop, own).A, close(self._loop, controller, own).poles
-        poles = [np.linalg.eigvals(A).ravel() for A in (of_plant, s.A)]
-        self._freq = resolving(np.concatenate([of_loop[0], *poles]), self._period)
         used = np.any(s.B != 0.0, axis=0) | np.any(s.D != 0.0, axis=0)
         optical, gauge = used[:axes].any(), used[axes : axes + loop.mirror.axes].any()
         self._cuts = [_at_optical] * bool(optical) + [_at_commands] * bool(gauge)
+        self._readings = axes + loop.mirror.axes * bool(gauge)
+        own = _stacked([loop.mirror.linear_loop])
+        of_plant = np.linalg.eigvals(self._plants(own).A).ravel()
+        self._freq = _grid(np.concatenate([of_plant, np.linalg.eigvals(s.A), self.poles(own).ravel()]), self._period)
         self._answers = self._response(self._freq)
 
-    def least(self, mirrors: lti.StateSpace) -> Floats:
+    def _plants(self, mirrors: lti.StateSpace) -> lti.StateSpace:
+        """From commands to the readings that the controller takes."""
+        s = sampled_mirrors(self._loop, mirrors)
+        return lti.StateSpace(s.A, s.B, s.C[..., : self._readings, :], s.D[: self._readings])
+
+    def poles(self, mirrors: lti.StateSpace) -> Complexes:
+        """Poles of the closed loops on a stack of mirrors, shape (mirrors, poles)."""
+        return close(self._loop, self._controller, mirrors).poles
+
+    def least(self, mirrors: lti.StateSpace, poles: Complexes) -> Floats:
         """Modulus margin on each of a stack of mirrors, shape (mirrors,); 0 where the loop is unstable.
 
         Minima are followed as `dips` says; so is each light resonance of the closed loop, whose dip may lie between two
         frequencies of the grid.
+
+        Args:
+            mirrors: The stack.
+            poles: What `poles` gives for it.
         """
-        plants, freq = sampled_mirrors(self._loop, mirrors), self._freq
+        plants, freq = self._plants(mirrors), self._freq
         rows = np.moveaxis(lti.resolvent_rows(plants.A, plants.C, self._points(freq)), 3, 1)
         G, axes = rows @ plants.B[:, None], self._loop.axes
-        poles = close(self._loop, self._controller, mirrors).poles
         squared = [_least_squares(cut(self._answers, G, axes)) for cut in self._cuts]
         least = np.min(squared, axis=(0, 2))
         light = _light(poles, self._period)
@@ -159,12 +175,18 @@ class Margins:
 
     def _response(self, freq_hz: Floats) -> Complexes:
         """Of the controller from readings to commands, shape (frequencies, actuators, readings)."""
-        s, readings = self._controller.system, self._loop.axes + self._loop.mirror.axes
+        s, readings = self._controller.system, self._readings
         rows = lti.resolvent_rows(s.A[None], s.C[None], self._points(freq_hz))[0]
         return np.asarray(np.moveaxis(rows, 2, 0) @ s.B[:, :readings] + s.D[:, :readings])
 
     def _points(self, freq_hz: Floats) -> Complexes:
         return np.exp(2j * math.pi * self._period * freq_hz)
+
+
+def _grid(poles: Complexes, period_s: float) -> Floats:
+    """Frequencies (Hz) to half the rate, close enough for dips that are followed: logarithmic, linear, and by pole."""
+    parts = [np.geomspace(1e-5, 0.5, 160) / period_s, np.linspace(0.0, 0.5, 101)[1:] / period_s]
+    return np.unique(np.concatenate([*parts, around_poles(np.unique(poles), period_s, 1.5) * (1.0 + 1e-9)]))
 
 
 _Cut = Callable[[Complexes, Complexes, int], Complexes]
@@ -173,7 +195,7 @@ _Cut = Callable[[Complexes, Complexes, int], Complexes]
 def _at_optical(K: Complexes, G: Complexes, axes: int) -> Complexes:
     """1 + L of the loop cut at the optical sensor, that of the gauge closed."""
     through = K[..., :axes]
-    if np.any(K[..., axes:]):
+    if K.shape[-1] > axes:
         closed = np.eye(K.shape[-2]) - K[..., axes:] @ G[..., axes:, :]
         through = np.linalg.solve(closed, np.broadcast_to(through, (*closed.shape[:-1], axes)))
     return np.asarray(np.eye(axes) - G[..., :axes, :] @ through)
