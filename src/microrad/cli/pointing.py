@@ -23,6 +23,7 @@ from microrad.cli.frame import (
     refusal_of,
     width,
 )
+from microrad.cli.worst_case import worst_case_of
 
 if TYPE_CHECKING:
     from microrad.loop.controller_study import Design, Outlook, Scene
@@ -86,6 +87,7 @@ def design(
         "microrad pointing leo-geo.toml",
         "microrad pointing leo-geo.toml --window '1 ms' --window '10 s' --spacing '1 min'",
         "microrad pointing leo-geo.toml --controller LQG --json",
+        "microrad pointing leo-geo.toml --worst-case --mirror lab-mirror.toml",
     )
 )
 @command
@@ -94,6 +96,8 @@ def pointing(
     window: Annotated[list[float] | None, _time("--window", "Length of a window [default: 10 ms and 1 s];")] = None,
     spacing: Annotated[list[float] | None, _time("--spacing", "From the begin of a window to that of another;")] = None,
     controller: Annotated[str, option("--controller", "NAME", "One that microrad design lists.")] = "PI",
+    mirror: Annotated[Path | None, option("--mirror", "FILE", "Mirror file in place of the mission's mirror.")] = None,
+    worst_case: Annotated[bool, typer.Option("--worst-case", help="Look for the worst identified mirror.")] = False,
     as_json: Json = False,
 ) -> Outcome:
     """Print the pointing errors of a mission's loop in time windows.
@@ -102,6 +106,10 @@ def pointing(
     that mean (RPE), and the difference of the means of two windows (PDE). They are radial rms in theory (linear), by
     source, of what the loop leaves and of the same disturbances without a loop, exactly; the rational filters of linear
     tools stand beside that.
+
+    With --worst-case it prints how far these errors and the modulus margin may go on the mirrors that the
+    identification leaves possible, and simulates the worst of them. The exit code is then 1 when the loop is unstable
+    on one of them.
     """
     from microrad import mirror as mirror_room
     from microrad.link import tracking_light_w
@@ -111,7 +119,11 @@ def pointing(
     from microrad.mission.file import load_loop
     from microrad.report.fine_pointing.windows import windows_data, windows_text
 
-    mission, several = load_loop(file)
+    mission, several = load_loop(file, mirror)
+    if worst_case:
+        with refusal_of(mission.path):
+            wanted = _indices(window or [], spacing or [])
+        return worst_case_of(mission, several, controller, wanted, as_json)
     if several is not None:
         raise Refusal(f"{file}: its mirror has several axes, and windows are there for one mirror an axis")
     with progress_bar() as progress, refusal_of(mission.path):

@@ -99,7 +99,7 @@ def _sampled(loop: PointingLoop, to_drives: Floats) -> tuple[lti.StateSpace, int
 
 
 def sampled_mirrors(loop: PointingLoop, mirrors: lti.StateSpace) -> lti.StateSpace:
-    """A stack of mirrors in the loop over a control period, without disturbances and noise; sensor as in `design_plant`.
+    """A stack of mirrors in the loop over a control period, without disturbances; sensor as in `design_plant`.
 
     Inputs: commands of the actuators. Outputs: optical readings by axis, and the mirror's own outputs.
 

@@ -14,6 +14,7 @@ from microrad.loop.worst_case.search import (
     of_scene,
     worst_case,
 )
+from microrad.loop.worst_case.uncertain import Uncertain, of_several_axes, of_table
 
 __all__ = [
     "APE",
@@ -24,11 +25,14 @@ __all__ = [
     "Sensitivity",
     "Simulated",
     "Subject",
+    "Uncertain",
     "Worst",
     "WorstCase",
     "course",
     "figures",
     "of_coupled_scene",
     "of_scene",
+    "of_several_axes",
+    "of_table",
     "worst_case",
 ]

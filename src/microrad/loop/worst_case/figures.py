@@ -16,7 +16,7 @@ from microrad.loop.control.analysis import around_poles
 from microrad.loop.coupled_study.whole import least_squares
 from microrad.loop.disturbance.windows import ErrorIndex
 from microrad.loop.pointing_loop.design import read_each_sample, sampled_mirrors
-from microrad.loop.pointing_loop.linear import ClosedLoop, close, straightened
+from microrad.loop.pointing_loop.linear import close, straightened
 from microrad.loop.pointing_loop.loop import LoopController, PointingLoop
 from microrad.loop.pointing_loop.windows import windowed_in_all
 
@@ -73,9 +73,8 @@ def figures(
     parts = [mirrors[first : first + AT_ONCE] for first in range(0, len(mirrors), AT_ONCE)]
     jobs = [partial(_together, loop, fixed, margins, part, indices) for part in parts]
     found = in_threads(jobs, workers=threads)
-    return Figures(
-        *(np.concatenate([getattr(each, name) for each in found]) for name in ("rms_rad", "modulus", "pole"))
-    )
+    names = ("rms_rad", "modulus", "pole")
+    return Figures(*(np.concatenate([getattr(each, name) for each in found]) for name in names))
 
 
 def _together(
@@ -180,7 +179,7 @@ class Margins:
         return np.asarray(np.moveaxis(rows, 2, 0) @ s.B[:, :readings] + s.D[:, :readings])
 
     def _points(self, freq_hz: Floats) -> Complexes:
-        return np.exp(2j * math.pi * self._period * freq_hz)
+        return np.asarray(np.exp(2j * math.pi * self._period * freq_hz))
 
 
 def _grid(poles: Complexes, period_s: float) -> Floats:
@@ -194,10 +193,11 @@ _Cut = Callable[[Complexes, Complexes, int], Complexes]
 
 def _at_optical(K: Complexes, G: Complexes, axes: int) -> Complexes:
     """1 + L of the loop cut at the optical sensor, that of the gauge closed."""
-    through = K[..., :axes]
-    if K.shape[-1] > axes:
-        closed = np.eye(K.shape[-2]) - K[..., axes:] @ G[..., axes:, :]
-        through = np.linalg.solve(closed, np.broadcast_to(through, (*closed.shape[:-1], axes)))
+    optical, gauge = K[..., :axes], K[..., axes:]
+    if not gauge.shape[-1]:
+        return np.asarray(np.eye(axes) - G @ optical)
+    closed = np.eye(K.shape[-2]) - gauge @ G[..., axes:, :]
+    through = np.linalg.solve(closed, np.broadcast_to(optical, (*closed.shape[:-1], axes)))
     return np.asarray(np.eye(axes) - G[..., :axes, :] @ through)
 
 

@@ -77,11 +77,11 @@ class Simulated:
         samples = math.log(TIMES) / max(abs(math.log(pole)), 1e-12) if pole > 0.0 else FEWEST
         seconds = period * round(min(max(samples, FEWEST), MOST))
         gains = [rest_gain(model) if self.at_rest else slow_gain(model) for model in mirror.bank]
-        linear = replace(parts.without(loop, parts.LIMITS), mirror=linearised(mirror, gains))
-        runs = ((linear, straightened(self.controller, loop)), (replace(loop, mirror=mirror), self.controller))
+        straight = replace(parts.without(loop, parts.LIMITS), mirror=linearised(mirror, gains))
+        runs = ((straight, straightened(self.controller, loop)), (replace(loop, mirror=mirror), self.controller))
         span, offset = Span(seconds, 0.0, seed=0), loop.references[0].point_ahead_rad
-        courses = [course(trace(each, under, span).error_rad, offset) for each, under in runs]
-        return InTime(pole, *courses, seconds, offset)
+        linear, full = (course(trace(each, under, span).error_rad, offset) for each, under in runs)
+        return InTime(pole, linear, full, seconds, offset)
 
     def _from_offset(self) -> PointingLoop:
         """The loop with an offset to follow and nothing else."""

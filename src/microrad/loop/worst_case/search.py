@@ -15,7 +15,7 @@ from microrad.loop.disturbance.windows import ErrorIndex
 from microrad.loop.pointing_loop.loop import LoopController, PointingLoop
 from microrad.loop.worst_case.figures import Figures, figures
 from microrad.loop.worst_case.in_time import InTime, Simulated
-from microrad.loop.worst_case.uncertain import Moved, Uncertain, of_several_axes, of_table
+from microrad.loop.worst_case.uncertain import Moved, Uncertain
 from microrad.mirror.hysteresis import rest_gain, slow_gain
 
 APE = ErrorIndex("APE")
@@ -125,34 +125,29 @@ class Subject:
         return replace(found, rms_rad=np.sqrt(self.alike) * found.rms_rad)
 
 
-def of_scene(scene: Scene, design: Design) -> Subject:
+def of_scene(scene: Scene, known: Uncertain, design: Design) -> Subject:
     """A controller of a mission whose mirror stands on each axis: the drawn mirror is that of all its axes.
 
     The axes are alike and decoupled, so one of them tells of all.
 
     Args:
         scene: The mission's fine-pointing loop.
+        known: What is known of its mirror, `of_table`.
         design: A controller that was designed for it.
-
-    Raises:
-        ValueError: The mirror's file has no table `uncertainty`.
     """
-    known, axis = of_table(scene.mirrors.table), scene.axis
+    axis = scene.axis
     controller = build(design.name, replace(scene, loop=axis), design.tuned.controller)
     return Subject(axis, scene.loop.axes, Simulated(axis, controller, at_rest=False), known)
 
 
-def of_coupled_scene(scene: CoupledScene, design: CoupledDesign) -> Subject:
+def of_coupled_scene(scene: CoupledScene, known: Uncertain, design: CoupledDesign) -> Subject:
     """A controller of a mission with a mirror of several axes, about rest.
 
     Args:
         scene: The mission's loop.
+        known: What is known of its mirror, `of_several_axes`.
         design: A controller that was designed for it.
-
-    Raises:
-        ValueError: The mirror file has no table `uncertainty`.
     """
-    known = of_several_axes(scene.mirror)
     return Subject(scene.rest, 1, Simulated(scene.loop, design.controller, at_rest=True), known)
 
 
@@ -160,7 +155,7 @@ def worst_case(
     subject: Subject,
     seed: int,
     indices: Sequence[ErrorIndex] = (APE,),
-    extent: Extent = Extent(),  # noqa: B008  frozen
+    extent: Extent = Extent(),
     threads: int | None = None,
     on_progress: Progress = lambda done, total, what: None,
 ) -> WorstCase:
