@@ -1,6 +1,6 @@
 """The worst that a loop may become on an identified mirror, over what the identification leaves open of it."""
 
-from microrad.loop.worst_case.figures import Figures, figures
+from microrad.loop.worst_case.batch import Figures, figures
 from microrad.loop.worst_case.in_time import InTime, Simulated, course
 from microrad.loop.worst_case.search import (
     APE,

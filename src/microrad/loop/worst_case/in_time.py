@@ -20,7 +20,7 @@ Course = Literal["settles", "grows"]
 """What an error does with time."""
 
 OFFSET = 0.25
-"""Offset of the start, as a share of how far the drives reach."""
+"""Offset of the start, as a share of how far the drives reach, or of what the optical sensor sees."""
 
 TIMES, FEWEST, MOST = 1e3, 300, 20_000
 """By how much the slowest pole decays or grows in a run, and the control samples of the shortest and longest run."""
@@ -89,7 +89,7 @@ class Simulated:
         quiet = (*names, parts.OPTICAL_NOISE, parts.GAUGE_NOISE, parts.QUANTISATION)
         loop = parts.without(self.loop, *quiet)
         low, high = max(loop.drive_range_v[0], loop.drive.minimum_v), min(loop.drive_range_v[1], loop.drive.maximum_v)
-        offset = OFFSET * nominal_axis_gain(loop) * min(-low, high)
+        offset = OFFSET * min(nominal_axis_gain(loop) * min(-low, high), loop.optical.field_of_view_rad)
         return replace(loop, references=(Reference(offset, 0.0, 1.0),) * loop.axes)
 
 

@@ -13,7 +13,7 @@ from microrad.loop.controller_study import Design, Scene, build
 from microrad.loop.coupled_study import CoupledDesign, CoupledScene
 from microrad.loop.disturbance.windows import ErrorIndex
 from microrad.loop.pointing_loop.loop import LoopController, PointingLoop
-from microrad.loop.worst_case.figures import Figures, figures
+from microrad.loop.worst_case.batch import Figures, figures
 from microrad.loop.worst_case.in_time import InTime, Simulated
 from microrad.loop.worst_case.uncertain import Moved, Uncertain
 from microrad.mirror.hysteresis import rest_gain, slow_gain

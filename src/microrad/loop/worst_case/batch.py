@@ -23,6 +23,9 @@ from microrad.loop.pointing_loop.windows import windowed_in_all
 AT_ONCE = 64
 """Mirrors whose matrices are worked on at once: what a processor keeps near."""
 
+AROUND = 3.0
+"""Factor between distances of frequencies from a pole: close enough for dips that are followed."""
+
 LIGHT = 0.2
 """Damping below which a pole of the closed loop may hide a dip between two frequencies of the grid."""
 
@@ -122,8 +125,10 @@ class Margins:
         self._cuts = [_at_optical] * bool(optical) + [_at_commands] * bool(gauge)
         self._readings = axes + loop.mirror.axes * bool(gauge)
         own = _stacked([loop.mirror.linear_loop])
-        of_plant = np.linalg.eigvals(self._plants(own).A).ravel()
-        self._freq = _grid(np.concatenate([of_plant, np.linalg.eigvals(s.A), self.poles(own).ravel()]), self._period)
+        poles = np.concatenate([np.linalg.eigvals(self._plants(own).A).ravel(), np.linalg.eigvals(s.A)])
+        parts = [np.geomspace(1e-5, 0.5, 160) / self._period, np.linspace(0.0, 0.5, 101)[1:] / self._period]
+        near = around_poles(np.unique(poles), self._period, AROUND) * (1.0 + 1e-9)  # an undamped one has no response
+        self._freq = np.unique(np.concatenate([*parts, near]))
         self._answers = self._response(self._freq)
 
     def _plants(self, mirrors: lti.StateSpace) -> lti.StateSpace:
@@ -180,12 +185,6 @@ class Margins:
 
     def _points(self, freq_hz: Floats) -> Complexes:
         return np.asarray(np.exp(2j * math.pi * self._period * freq_hz))
-
-
-def _grid(poles: Complexes, period_s: float) -> Floats:
-    """Frequencies (Hz) to half the rate, close enough for dips that are followed: logarithmic, linear, and by pole."""
-    parts = [np.geomspace(1e-5, 0.5, 160) / period_s, np.linspace(0.0, 0.5, 101)[1:] / period_s]
-    return np.unique(np.concatenate([*parts, around_poles(np.unique(poles), period_s, 1.5) * (1.0 + 1e-9)]))
 
 
 _Cut = Callable[[Complexes, Complexes, int], Complexes]
