@@ -12,6 +12,7 @@ from microrad.core.progress import Progress
 from microrad.loop.controller_study import Design, Scene, build
 from microrad.loop.coupled_study import CoupledDesign, CoupledScene
 from microrad.loop.disturbance.windows import ErrorIndex
+from microrad.loop.pointing_loop.linear import close, refuse_unstable
 from microrad.loop.pointing_loop.loop import LoopController, PointingLoop
 from microrad.loop.worst_case.batch import Figures, figures
 from microrad.loop.worst_case.in_time import InTime, Simulated
@@ -19,6 +20,9 @@ from microrad.loop.worst_case.uncertain import Moved, Uncertain
 from microrad.mirror.hysteresis import rest_gain, slow_gain
 
 APE = ErrorIndex("APE")
+
+MANY_STATES = 16
+"""States of a mirror beyond which fewer mirrors are looked at: each takes up to 25 ms of a processor with 36 states."""
 
 INDEPENDENT = 1e-3
 """Least part of a parameter's standard error that the more sensitive ones leave open, for a direction of its own."""
@@ -35,6 +39,11 @@ class Extent:
     draws: int = 1000
     most_sensitive: int = 10
     sigmas: float = 3.0
+
+    @classmethod
+    def for_states(cls, states: int) -> "Extent":
+        """What some ten seconds are enough for: less for a mirror of many states."""
+        return cls() if states <= MANY_STATES else cls(draws=200, most_sensitive=7)
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,7 +164,7 @@ def worst_case(
     subject: Subject,
     seed: int,
     indices: Sequence[ErrorIndex] = (APE,),
-    extent: Extent = Extent(),
+    extent: Extent | None = None,
     threads: int | None = None,
     on_progress: Progress = lambda done, total, what: None,
 ) -> WorstCase:
@@ -170,19 +179,20 @@ def worst_case(
         subject: The loop, its controller and what is known of its mirror.
         seed: Seed of the draws; the first of them are those that designs with this seed have to hold for.
         indices: What counts of the error; APE is all of it.
-        extent: How far it is looked for.
+        extent: How far it is looked for; by default what the mirror's states leave time for.
         threads: Threads to share the mirrors, by default one for each core; the result does not depend on them.
         on_progress: Called with the steps that are done, their number and the one at hand.
 
     Raises:
-        ValueError: For a time of an index below half of the time between two readings, and where the uncertainty
-            leaves no mirror.
+        ValueError: The loop is unstable on the mirror as it was identified, a time of an index is below half of the
+            time between two readings, or the uncertainty leaves no mirror.
     """
-    known = subject.known
+    known, extent = subject.known, extent or Extent.for_states(len(subject.theory.mirror.A))
 
     def step(done: int, what: str) -> None:
         on_progress(done, 4, what)
 
+    refuse_unstable(close(subject.theory, subject.controller))
     step(0, "sensitivity of the parameters")
     own = known.moved(np.zeros(known.rows.shape[1]))
     assert own is not None

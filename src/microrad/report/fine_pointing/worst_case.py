@@ -18,22 +18,22 @@ def worst_case_text(found: WorstCase, width: int) -> str:
         found: The worst case.
         width: Columns of the terminal.
     """
-    extent, names = found.extent, [index_name(index).replace("\n", " ") for index in found.indices]
+    extent, heads = found.extent, [index_name(index) for index in found.indices]
     about = (
         f"The loop under {found.controller} on {extent.draws} mirrors drawn from what is known of its mirror, and on "
         f"{found.corners} corners of its {len(found.most_sensitive)} most sensitive parameters at {extent.sigmas:g} "
         "standard errors. In theory (linear); errors are radial rms."
     )
     rows: list[tuple[str, ...]] = [
-        (name, *map(_error, (own, drawn.median, drawn.worse, worst.value)))
-        for name, own, drawn, worst in zip(names, found.nominal_rad, found.drawn_rad, found.largest_rad, strict=True)
+        (head.replace("\n", " "), *map(_error, (own, drawn.median, drawn.worse, worst.value)))
+        for head, own, drawn, worst in zip(heads, found.nominal_rad, found.drawn_rad, found.largest_rad, strict=True)
     ]
     drawn = found.drawn_modulus
     margins = (found.nominal_modulus, drawn.median, drawn.worse, found.smallest_modulus.value)
     rows.append(("modulus margin", *(f"{value:.4f}" for value in margins)))
     figures = Table("", ("figure", "as identified", "median", "95 % of draws", "worst"), rows)
-    columns, worst = ("parameter", *names, "modulus margin"), (*found.largest_rad, found.smallest_modulus)
-    changes = [(each.parameter, *map(percent, (*each.rms, each.modulus))) for each in found.most_sensitive]
+    columns, worst = ("parameter", *heads, "modulus\nmargin"), (*found.largest_rad, found.smallest_modulus)
+    changes = [(each.parameter, *map(_change, (*each.rms, each.modulus))) for each in found.most_sensitive]
     places = [
         (each.parameter, *(minus(f"{at.sigmas[each.parameter]:+.1f}") for at in worst)) for each in found.most_sensitive
     ]
@@ -48,6 +48,10 @@ def worst_case_text(found: WorstCase, width: int) -> str:
 
 def _error(value_rad: float) -> str:
     return quantity(value_rad, "rad", 5) if math.isfinite(value_rad) else "unstable"
+
+
+def _change(share: float) -> str:
+    return percent(share) if math.isfinite(share) else "unstable"
 
 
 def _unstable(found: WorstCase) -> list[str]:
