@@ -7,6 +7,10 @@ The whole command in a process of its own, then the figures of 2024 mirrors one 
 axes is that of docs/mirror-file.md, which knows four parameters: 1000 draws and 16 corners.
 """
 
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command line does, before NumPy is loaded
+
 import subprocess
 import sys
 import tempfile
@@ -15,8 +19,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
-sys.path.insert(0, str(ROOT / "tests"))
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 
 import several_axes
 from microrad.loop import control, worst_case
@@ -24,6 +27,7 @@ from microrad.loop.pointing_loop.design import design_plant
 from microrad.loop.pointing_loop.linear import close, stationary
 from microrad.loop.pointing_loop.loop import assemble
 from microrad.mission.file import load_loop
+from places import ROOT
 from recorded import record
 from scenes import scene_of
 

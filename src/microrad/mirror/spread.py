@@ -243,9 +243,10 @@ def _turned(table: Mirror, factors: Floats) -> Iterator[tuple[str, str]]:
 def _faults(moved: Mirror, places: list[Place]) -> Iterator[tuple[str, str]]:
     """What the checks of a mirror file would say of the tables that moved: key and reason."""
     for name in dict.fromkeys(at.table for at in places):
-        part = getattr(moved, name)
+        part, changed = getattr(moved, name), {at.field for at in places if at.table == name}
         for field, info in type(part).model_fields.items():
-            yield from ((f"{name}.{info.alias or field}", why) for why in _out_of_range(getattr(part, field), info))
+            if field in changed:
+                yield from ((f"{name}.{info.alias or field}", why) for why in _out_of_range(getattr(part, field), info))
         yield from ((f"{name}.{problem.key}".rstrip("."), problem.reason) for problem in part.problems())
 
 
