@@ -161,6 +161,15 @@ def test_it_comes_out_the_same_twice_and_on_any_number_of_threads(file):
     assert first != worst_case.worst_case(subject, 4, INDICES, extent, 1)
 
 
+def test_of_many_parameters_those_are_moved_one_by_one_that_matter_to_first_order(file, monkeypatch):
+    subject, _ = subject_of(file)
+    all_of_them = worst_case.worst_case(subject, 1, extent=replace(SMALL, draws=1))
+    monkeypatch.setattr(worst_case.search, "CLOSELY", 2)
+    two = worst_case.worst_case(subject, 1, extent=replace(SMALL, draws=1))
+    assert two.most_sensitive == all_of_them.most_sensitive[:2]
+    assert (all_of_them.corners, two.corners) == (8, 4)
+
+
 def test_draws_are_those_that_designs_have_to_hold_for(file):
     table = file.mission.mirror
     known = worst_case.of_table(table)

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
@@ -23,6 +22,12 @@ APE = ErrorIndex("APE")
 
 MANY_STATES = 16
 """States of a mirror beyond which fewer mirrors are looked at: each takes up to 25 ms of a processor with 36 states."""
+
+CLOSELY = 40
+"""Parameters, at most, that are moved one by one; of more those that matter most to first order."""
+
+UNBOUNDED = 1e6
+"""Relative change that stands for one without bound."""
 
 INDEPENDENT = 1e-3
 """Least part of a parameter's standard error that the more sensitive ones leave open, for a direction of its own."""
@@ -249,24 +254,32 @@ def _ranked(
 ) -> tuple[Figures, list[Sensitivity]]:
     """Figures of the mirror as it is, first of those of mirrors moved by one parameter, and how much each matters."""
     known = subject.known
-    names = np.repeat(np.arange(len(known.parameters)), 2)
-    moved = [known.moved(sign * row) for row in known.rows for sign in (1.0, -1.0)]
-    kept = np.array([each is not None for each in moved])
-    found = subject.figures([own, *(each for each in moved if each is not None)], indices, threads)
-    rms = np.abs(found.rms_rad[1:] / found.rms_rad[0] - 1.0)
-    modulus = np.abs(found.modulus[1:] / found.modulus[0] - 1.0)
-    return found, sorted(
-        (
-            Sensitivity(name, tuple(_most(rms, at)), float(_most(modulus[:, None], at)[0]))
-            for name, at in ((n, names[kept] == i) for i, n in enumerate(known.parameters))
-        ),
-        key=lambda each: -each.largest,
-    )
+    many = len(known.parameters) > CLOSELY
+    looked_at = _likely(subject, own, indices, threads) if many else [*range(len(known.parameters))]
+    moved = [(number, known.moved(sign * known.rows[number])) for number in looked_at for sign in (1.0, -1.0)]
+    there = [(number, each) for number, each in moved if each is not None]
+    found = subject.figures([own, *(each for _, each in there)], indices, threads)
+    changes, numbers = _changes(found), np.array([number for number, _ in there])
+    largest = {i: np.max(changes[numbers == i], axis=0, initial=0.0).tolist() for i in looked_at}
+    each = [Sensitivity(known.parameters[i], tuple(rms), modulus) for i, (*rms, modulus) in largest.items()]
+    return found, sorted(each, key=lambda one: -one.largest)
 
 
-def _most(changes: Floats, at: NDArray[np.bool_]) -> list[float]:
-    """Largest of some rows, by column; 0 of none."""
-    return list(np.max(changes[at], axis=0, initial=0.0).tolist())
+def _changes(found: Figures) -> Floats:
+    """Sizes of the relative changes of all figures from those of the first mirror, one row for each of the others."""
+    values = np.column_stack([found.rms_rad, found.modulus])
+    return np.asarray(np.abs(values[1:] / values[0] - 1.0))
+
+
+def _likely(subject: Subject, own: Moved, indices: Sequence[ErrorIndex], threads: int | None) -> list[int]:
+    """The parameters that matter most to first order, by the slopes along the independent directions; rising."""
+    rows = subject.known.rows
+    moved = [subject.known.moved(sign * each) for each in np.eye(rows.shape[1]) for sign in (1.0, -1.0)]
+    found = subject.figures([own, *(each or own for each in moved)], indices, threads)
+    values = np.column_stack([found.rms_rad, found.modulus])
+    slopes = 0.5 * (values[1::2] - values[2::2]) / values[0]
+    matters = np.max(np.abs(rows @ np.where(np.isfinite(slopes), slopes, UNBOUNDED)), axis=1)
+    return sorted(map(int, np.argsort(-matters, kind="stable")[:CLOSELY]))
 
 
 def _independent(rows: Floats, order: Sequence[int], most: int) -> Floats:
