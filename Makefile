@@ -57,6 +57,7 @@ benchmark: $(VENV)/.test
 	$(BIN)/python benchmarks/loop.py
 	$(BIN)/python benchmarks/ensemble.py
 	$(BIN)/python benchmarks/controllers.py
+	$(BIN)/python benchmarks/worst_case.py
 	$(BIN)/python benchmarks/flight_step.py
 	$(BIN)/python benchmarks/answer.py
 	$(BIN)/python benchmarks/link_conventions.py

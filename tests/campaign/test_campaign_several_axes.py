@@ -198,7 +198,7 @@ def test_what_cannot_be_drawn_is_refused(tmp_path, mirror, more, said):
 
 
 def test_an_uncertainty_that_leaves_no_mirror_is_refused_where_the_campaign_is_read(tmp_path, monkeypatch):
-    monkeypatch.setattr(coupled.spread, "_is_one", lambda mirror: False)
+    monkeypatch.setattr(coupled.spread, "is_one", lambda mirror: False)
     with pytest.raises(MissionError, match="1000 draws from the uncertainty of") as caught:
         loaded(tmp_path, SMALL + LOOP + IDENTIFIED)
     assert [fault.key for fault in caught.value.faults] == ["inputs.mirror"]

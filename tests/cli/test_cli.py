@@ -44,6 +44,7 @@ COMMANDS = (
     "design",
     "pointing",
     "jitter",
+    "worst-case",
     "identify",
     "import",
     "bench",

@@ -10,6 +10,7 @@ import pytest
 import several_axes
 from microrad.loop.disturbance import olympus
 from microrad.loop.disturbance.windows import ErrorIndex, windowed_rms
+from places import ROOT
 from shipped import DEFAULT
 
 
@@ -77,3 +78,29 @@ def test_a_mirror_of_several_axes_is_refused(refused, tmp_path):
     named = several_axes.mission_text(("[fine_pointing]\n", '[fine_pointing]\nmirror_file = "two-axes.toml"\n'))
     (tmp_path / "m.toml").write_text(named, encoding="utf-8")
     assert "its mirror has several axes, and windows are there for one mirror an axis" in refused("pointing", "m.toml")
+
+
+IDENTIFIED = ROOT / "tests" / "corpus" / "0.2.0" / "mirrors" / "identified.toml"
+
+
+def test_the_worst_case_of_an_identified_mirror_is_printed_and_verified_in_time(call):
+    code, out, _ = call("worst-case", DEFAULT, "--mirror", IDENTIFIED, "--window", "10 ms", "--json")
+    found = json.loads(out)
+    assert code == 0 and found["controller"] == "PI"
+    assert (found["corners"], found["unstable_draws"], found["unstable_corners"]) == (64, 0, 0)
+    assert [each["index"] for each in found["errors"]] == ["APE", "MPE", "RPE"]
+    for each in found["errors"]:
+        drawn, worst = each["drawn_rad"], each["largest_rad"]
+        assert drawn["median"] <= drawn["worse"] <= worst["value"] and each["nominal_rad"] <= worst["value"]
+    assert found["smallest_modulus"]["value"] <= found["drawn_modulus"]["worse"] <= found["nominal_modulus"]
+    names = [each["parameter"] for each in found["most_sensitive"]]
+    assert names[0] == "bouc_wen.d1" and {*names} == {*found["smallest_modulus"]["sigmas"]}
+    assert found["verified_in_time"]["agrees"] and found["verified_in_time"]["linear"] == "settles"
+
+
+def test_a_worst_case_needs_a_mirror_of_which_something_is_known(refused):
+    words = refused("worst-case", DEFAULT)
+    assert (
+        "has no table uncertainty, so nothing can be drawn; `microrad identify` writes one into its mirror file"
+        in words
+    )

@@ -20,10 +20,10 @@ from microrad.cli.frame import (
     json_text,
     option,
     progress_bar,
-    quantity_of,
     refusal_of,
     width,
 )
+from microrad.cli.windows import indices_of, time_option
 
 if TYPE_CHECKING:
     from microrad.loop.controller_study import Design, Outlook, Scene
@@ -31,12 +31,6 @@ if TYPE_CHECKING:
     from microrad.loop.pointing_loop.linear import ClosedLoop
     from microrad.loop.pointing_loop.windows import WindowedErrors
     from microrad.mission.file import MissionFile
-
-
-def _time(name: str, text: str) -> Any:
-    """An option of times, as many as are wanted."""
-    help_text = f"{text} may be repeated."
-    return typer.Option(name, metavar="TIME", help=help_text, parser=quantity_of("s"), show_default=False)
 
 
 @app.command(
@@ -96,8 +90,8 @@ def design(
 @command
 def pointing(
     file: Annotated[Path, typer.Argument(help="Mission file with a table [fine_pointing].", metavar="FILE")],
-    window: Annotated[list[float] | None, _time("--window", "Length of a window [default: 10 ms and 1 s];")] = None,
-    spacing: Annotated[list[float] | None, _time("--spacing", "From the begin of a window to that of another;")] = None,
+    window: Annotated[list[float] | None, time_option("--window", "Length of a window [default: 10 ms and 1 s];")] = None,
+    spacing: Annotated[list[float] | None, time_option("--spacing", "From the begin of a window to that of another;")] = None,
     controller: Annotated[str, option("--controller", "NAME", "One that microrad design lists.")] = "PI",
     sources: Annotated[
         Path | None, option("--sources", "LIST", "Sources of errors as CSV or XLSX, a row each.")
@@ -122,7 +116,7 @@ def pointing(
 
     mission = load_link(file)
     with refusal_of(mission.path):
-        indices = _indices(window or [0.01, 1.0], spacing or [])
+        indices = indices_of(window or [0.01, 1.0], spacing or [])
         asked = sources_beside(mission, sources, indices)
     table, data, texts, closed = mission.mission.error_budget, dict[str, Any](), list[str](), None
     loop, needed = mission if isinstance(mission, MissionFile) else None, asked is None or (table and table.with_loop)
@@ -160,16 +154,6 @@ def _closed(
         (made,) = controller_study.design(scene, progress, [controller])
         closed = close(scene.theory, made.controller)
         return closed, windowed_errors(closed, indices)
-
-
-def _indices(windows: list[float], spacings: list[float]) -> "list[ErrorIndex]":
-    from microrad.loop.disturbance.windows import ErrorIndex
-
-    found = [ErrorIndex("APE")]
-    for each in windows:
-        found += [ErrorIndex("MPE", each), ErrorIndex("RPE", each)]
-        found += [ErrorIndex("PDE", each, apart) for apart in spacings]
-    return found
 
 
 def _broken(designs: "tuple[Design, ...]", left: "tuple[Outlook, ...]", accept: bool) -> str:

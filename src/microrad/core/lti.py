@@ -217,19 +217,19 @@ def first_order_hold(A: Floats, B: Floats, step_s: float) -> tuple[Floats, Float
     """Exact step for an input linear over it: x[k+1] = Ad x[k] + B0 u[k] + B1 u[k+1]; returns Ad, B0, B1.
 
     Args:
-        A: Matrix of the continuous system, shape (states, states).
-        B: Its input matrix, shape (states, inputs).
+        A: Matrix of the continuous system, shape (..., states, states).
+        B: Its input matrix, shape (..., states, inputs).
         step_s: The step, s.
     """
     from scipy.linalg import expm
 
-    n, m = A.shape[0], B.shape[1]
-    block = np.zeros((n + 2 * m, n + 2 * m))
-    block[:n, :n], block[:n, n : n + m] = A * step_s, B * step_s
-    block[n : n + m, n + m :] = np.eye(m)
+    n, m = B.shape[-2:]
+    block = np.zeros((*A.shape[:-2], n + 2 * m, n + 2 * m))
+    block[..., :n, :n], block[..., :n, n : n + m] = A * step_s, B * step_s
+    block[..., n : n + m, n + m :] = np.eye(m)
     e = expm(block)
-    ramp = e[:n, n + m :]
-    return e[:n, :n], e[:n, n : n + m] - ramp, ramp
+    ramp = e[..., :n, n + m :]
+    return e[..., :n, :n], e[..., :n, n : n + m] - ramp, ramp
 
 
 def zero_order_hold(A: Floats, B: Floats, step_s: float) -> tuple[Floats, Floats]:
@@ -300,12 +300,12 @@ def gramian(A: Floats, Q: Floats) -> Floats:
 
     Args:
         A: The matrix, shape (states, states), stable; states that turn without damping may stand beside the stable ones
-            where Q has nothing of them.
-        Q: One symmetric matrix, shape (states, states), or a stack of them.
+            where Q has nothing of them. Or a stack of matrices.
+        Q: One symmetric matrix, shape (states, states), or a stack of them, for each A its own where both are stacks.
     """
     X, power = Q, A
     for _ in range(64):
-        more = power.T @ X @ power
+        more = power.mT @ X @ power
         X = X + more
         if not np.any(_diagonal(more) > 1e-15 * np.abs(_diagonal(X))):  # rounding leaves values below 0
             break

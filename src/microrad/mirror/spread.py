@@ -32,11 +32,42 @@ def draws(table: Mirror, count: int, seed: int) -> tuple[Mirror, ...]:
     Raises:
         ValueError: Without an `uncertainty`, and where `TRIES` draws in a row are no mirror.
     """
+    return tuple(mirror for mirror, _ in drawn(table, count, seed))
+
+
+def drawn(table: Mirror, count: int, seed: int) -> tuple[tuple[Mirror, Floats], ...]:
+    """The mirrors of `draws`, each with the factors of its parameters, shape (parameters,).
+
+    Args:
+        table: The identified mirror.
+        count: How many mirrors are drawn.
+        seed: Seed of the random numbers.
+
+    Raises:
+        ValueError: As `draws`.
+    """
     uncertainty = _uncertainty(table)
     places = [place(table, key) for key in uncertainty.parameters]
     root = lti.covariance_root(relative_covariance(table))
     streams = (np.random.SeedSequence(seed, spawn_key=(index,)) for index in range(count))
     return tuple(_drawn(table, places, root, np.random.Generator(np.random.Philox(stream))) for stream in streams)
+
+
+def moved(table: Mirror, factors: Floats) -> Mirror | None:
+    """The mirror with its parameters multiplied; None where a file with it would be refused, or a value turned.
+
+    Args:
+        table: The identified mirror.
+        factors: Factors of its uncertain parameters, shape (parameters,).
+
+    Raises:
+        ValueError: Without an `uncertainty`.
+    """
+    if any(_turned(table, factors)):
+        return None
+    places = [place(table, key) for key in _uncertainty(table).parameters]
+    found = _moved(table, places, factors)
+    return None if any(_faults(found, places)) else found
 
 
 def parameters(table: Mirror, normals: Floats, again: Callable[[int], Iterator[Floats]]) -> Floats:
@@ -80,6 +111,15 @@ def _unit(table: Mirror, at: Place) -> str:
     return rule.unit if isinstance(rule, Quantity) else rule.each.unit
 
 
+def values(table: Mirror) -> Floats:
+    """Values of the uncertain parameters in SI units, shape (parameters,); of a list that scales together its first.
+
+    Raises:
+        ValueError: Without an `uncertainty`.
+    """
+    return np.array([_first(table, key) for key in _uncertainty(table).parameters])
+
+
 def relative_covariance(table: Mirror) -> Floats:
     """Covariance (n, n) of the factors, 1 on average, that a draw multiplies the n parameters with.
 
@@ -89,10 +129,10 @@ def relative_covariance(table: Mirror) -> Floats:
         ValueError: Without an `uncertainty`.
     """
     uncertainty = _uncertainty(table)
-    values, vectors = np.linalg.eigh(np.array(uncertainty.correlation_rows))
-    repaired = (vectors * np.maximum(values, 0.0)) @ vectors.T
+    sizes, vectors = np.linalg.eigh(np.array(uncertainty.correlation_rows))
+    repaired = (vectors * np.maximum(sizes, 0.0)) @ vectors.T
     # the correlation is that of the values, the covariance that of their factors: a negative value turns the sign
-    errors = np.array(uncertainty.standard_errors) * np.sign([_first(table, key) for key in uncertainty.parameters])
+    errors = np.array(uncertainty.standard_errors) * np.sign(values(table))
     errors /= np.sqrt(np.diag(repaired))
     return np.asarray(errors[:, None] * repaired * errors)
 
@@ -153,9 +193,9 @@ def _share_of_gain(table: Mirror, at: Place) -> float:
 
 
 # -------------------------------------------------------------------------------------------------------------- drawing
-def _drawn(table: Mirror, places: list[Place], root: Floats, rng: np.random.Generator) -> Mirror:
+def _drawn(table: Mirror, places: list[Place], root: Floats, rng: np.random.Generator) -> tuple[Mirror, Floats]:
     normals = (rng.standard_normal(len(places)) for _ in range(TRIES))
-    return _accepted(table, places, root, normals)[0]
+    return _accepted(table, places, root, normals)
 
 
 def _accepted(table: Mirror, places: list[Place], root: Floats, normals: Iterator[Floats]) -> tuple[Mirror, Floats]:
@@ -203,9 +243,10 @@ def _turned(table: Mirror, factors: Floats) -> Iterator[tuple[str, str]]:
 def _faults(moved: Mirror, places: list[Place]) -> Iterator[tuple[str, str]]:
     """What the checks of a mirror file would say of the tables that moved: key and reason."""
     for name in dict.fromkeys(at.table for at in places):
-        part = getattr(moved, name)
+        part, changed = getattr(moved, name), {at.field for at in places if at.table == name}
         for field, info in type(part).model_fields.items():
-            yield from ((f"{name}.{info.alias or field}", why) for why in _out_of_range(getattr(part, field), info))
+            if field in changed:
+                yield from ((f"{name}.{info.alias or field}", why) for why in _out_of_range(getattr(part, field), info))
         yield from ((f"{name}.{problem.key}".rstrip("."), problem.reason) for problem in part.problems())
 
 

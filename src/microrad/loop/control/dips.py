@@ -4,7 +4,7 @@ A parabola through a minimum and its neighbours tells where it is. What is near 
 there, more closely each time.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -51,16 +51,19 @@ def on_grid(squared: Floats, freq_hz: Floats) -> Dips:
     return Dips(row, at + 1, freq_hz[at + 1] - slope / (2.0 * curvature), lowest, np.minimum(before, after))
 
 
-def followed(squared_at: Callable[[Floats], Floats], freq_hz: Floats, width_hz: Floats) -> Floats:
+def followed(
+    squared_at: Callable[[Floats], Floats], freq_hz: Floats, width_hz: Floats, closer: Sequence[float] = CLOSER
+) -> Floats:
     """Squares of the minima near some frequencies, shape (minima,).
 
     Args:
         squared_at: Squares of the distance at frequencies (Hz), both of the shape (minima, 3), a row for each minimum.
         freq_hz: Where the minima are about, in Hz, shape (minima,).
         width_hz: How far from there they are sought, in Hz, shape (minima,).
+        closer: Half widths of the parabolas, over the width, each smaller than the one before.
     """
     least = np.zeros(freq_hz.size)
-    for share in CLOSER if freq_hz.size else ():
+    for share in closer if freq_hz.size else ():
         step = share * width_hz
         low, middle, high = squared_at(freq_hz[:, None] + step[:, None] * np.array([-1.0, 0.0, 1.0])).T
         slope, curvature = 0.5 * (high - low), high - 2.0 * middle + low

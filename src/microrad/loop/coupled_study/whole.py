@@ -107,7 +107,7 @@ def least_moduli(
         returned: 1 + L there, shape (frequencies, axes, axes).
         poles: Poles of the closed loop.
     """
-    squared = _least_squares(returned)
+    squared = least_squares(returned)
     each, lowest = dips.on_grid(squared[None], freq), squared.copy()
     lowest[each.at] = each.squared
     near = each.squared < dips.NEAR_LEAST**2 * np.min(squared)
@@ -118,7 +118,7 @@ def least_moduli(
         np.concatenate([own[near], lights[finer]]) for own, lights in ((each.freq_hz, at), (each.width_hz, half))
     )
     found = dips.followed(
-        lambda points: _least_squares(_returned(plant, system, points.ravel())).reshape(-1, 3), where, width
+        lambda points: least_squares(_returned(plant, system, points.ravel())).reshape(-1, 3), where, width
     )
     lowest[each.at[near]] = math.inf  # what the parabola said
     np.minimum.at(lowest, np.concatenate([each.at[near], places[finer]]), found)
@@ -140,8 +140,8 @@ def _returned(plant: WholePlant, system: lti.StateSpace, freq: Floats) -> Comple
     return np.asarray(np.eye(axes) - lti.frequency_response(to_sensor, freq, plant.period_s) @ to_command)
 
 
-def _least_squares(matrices: Complexes) -> Floats:
-    """Squares of the least singular values of matrices of two rows and columns."""
+def least_squares(matrices: Complexes) -> Floats:
+    """Squares of the least singular values of matrices of two rows and columns, shape (matrices, 2, 2)."""
     squares = np.sum(matrices.real**2 + matrices.imag**2, axis=(1, 2))
     area = np.abs(_determinant(matrices)) ** 2
     return np.asarray(2.0 * area / (squares + np.sqrt(np.maximum(squares**2 - 4.0 * area, 0.0))))
@@ -203,7 +203,7 @@ def whole_margins(plant: WholePlant, controller: WholeController) -> WholeMargin
     returned = _returned(moved, system, freq)
     least = least_moduli(moved, system, freq, returned, poles[-1])
     margin = multiloop_disk_margin(freq, returned - np.eye(plant.axes))
-    return WholeMargins(float(np.min(least)), margin, bandwidth_hz(freq, np.sqrt(_least_squares(returned))))
+    return WholeMargins(float(np.min(least)), margin, bandwidth_hz(freq, np.sqrt(least_squares(returned))))
 
 
 def _misfit(plant: WholePlant, controller: WholeController) -> None:

@@ -98,6 +98,28 @@ def _sampled(loop: PointingLoop, to_drives: Floats) -> tuple[lti.StateSpace, int
     return lti.StateSpace(A, B, rows, D), noises.shape[1]
 
 
+def sampled_mirrors(loop: PointingLoop, mirrors: lti.StateSpace) -> lti.StateSpace:
+    """A stack of mirrors in the loop over a control period, without disturbances; sensor as in `design_plant`.
+
+    Inputs: commands of the actuators. Outputs: optical readings by axis, and the mirror's own outputs.
+
+    Args:
+        loop: The loop.
+        mirrors: A stack of linear mirrors, continuous, of the size of the loop's own.
+    """
+    o = open_loop(replace(read_each_sample(loop), disturbances=((),) * loop.axes), mirrors)
+    keep = np.ones(o.at.order, dtype=bool)
+    keep[o.at.held] = False
+    shift, period = o.shift.copy(), np.eye(o.at.order)
+    shift[o.newest] = 0.0
+    for step in o.steps:
+        period = step @ period
+    reading = np.broadcast_to(o.reading, (*o.mirror.shape[:-2], *o.reading.shape))
+    rows = np.concatenate([reading, o.mirror], axis=-2)[..., keep]
+    A, B = (period @ shift)[..., keep, :][..., keep], period[..., keep, o.newest]
+    return lti.StateSpace(A, B, rows, np.zeros((rows.shape[-2], B.shape[-1])))
+
+
 def read_each_sample(loop: PointingLoop) -> PointingLoop:
     """The loop with an optical sensor that delivers every control sample, later by half of what its hold adds."""
     extra = round(0.5 * (loop.optical.every - 1) * loop.timing.steps_per_sample)

@@ -2,6 +2,9 @@
 
 The same recursions as the kernel's, with each hysteresis element replaced by its slow gain and without limits,
 quantisation or inverse: what is linear of the loop is here exactly, so the simulation can be held against it.
+
+The matrices of many loops, which differ by their mirrors alone, stand behind each other in stacks: shapes that are said
+here are then those of the last axes.
 """
 
 import math
@@ -80,14 +83,20 @@ class OpenLoop:
     lines: tuple[Line, ...]
 
 
-def open_loop(loop: PointingLoop) -> OpenLoop:
-    """The matrices of the loop without controller; the reference is left out (zero)."""
-    linear, m, axes = loop.mirror.linear_loop, loop.mirror.actuators, loop.axes
+def open_loop(loop: PointingLoop, mirrors: lti.StateSpace | None = None) -> OpenLoop:
+    """The matrices of the loop without controller; the reference is left out (zero).
+
+    Args:
+        loop: The loop.
+        mirrors: A stack of linear mirrors, continuous, of the size of the loop's own, that take the place of that one.
+    """
+    linear, m, axes = mirrors or loop.mirror.linear_loop, loop.mirror.actuators, loop.axes
     each_axis = [(i, each) for i, several in enumerate(loop.disturbances) for each in several]
     parts = [(i, each.name, disturbance.discretise(each, loop.timing.step_s)) for i, each in each_axis]
     at = _layout(loop, sum(d.Ad.shape[0] for _, _, d in parts))
-    mirror, drive, error = (np.zeros((rows, at.order)) for rows in (loop.mirror.axes, m, axes))
-    mirror[:, at.mirror], mirror[:, at.drive], drive[:, at.drive] = linear.C, linear.D, np.eye(m)
+    mirror = np.zeros((*linear.C.shape[:-1], at.order))
+    drive, error = (np.zeros((rows, at.order)) for rows in (m, axes))
+    mirror[..., at.mirror], mirror[..., at.drive], drive[:, at.drive] = linear.C, linear.D, np.eye(m)
     shaping = _Shaping(at, axes)
     for i, name, model in parts:
         shaping.add(i, name, model)
@@ -100,14 +109,15 @@ def open_loop(loop: PointingLoop) -> OpenLoop:
     now = slice(at.errors.start, at.errors.start + axes)
     through = shaping.output - loop.optics @ mirror
     noise = np.hstack([np.zeros((at.order, 0)), *shaping.noise])
-    noise[now] = through @ noise
+    noise[now] = shaping.output @ noise
     error[:, now] = np.eye(axes)
     reading = np.zeros((axes, at.order))
     reading[:, at.errors.stop - axes : at.errors.stop] = np.eye(axes)
+    held = lti.first_order_hold(linear.A, linear.B, loop.timing.step_s)
     return OpenLoop(
         loop=loop,
         at=at,
-        steps=tuple(_step(loop, at, still, j, through) for j in range(loop.timing.steps_per_sample)),
+        steps=tuple(_step(loop, at, still, j, through, held) for j in range(loop.timing.steps_per_sample)),
         noise=noise,
         sources=tuple(shaping.sources),
         error=error,
@@ -154,19 +164,20 @@ class _Shaping:
         self._next, self._columns = here.stop, columns.stop
 
 
-def _step(loop: PointingLoop, at: Layout, still: Floats, j: int, through: Floats) -> Floats:
+def _step(
+    loop: PointingLoop, at: Layout, still: Floats, j: int, through: Floats, held: tuple[Floats, Floats, Floats]
+) -> Floats:
     """The map of plant step j: the amplifier follows the command that is due, the mirror the drive, the error both."""
-    linear, timing, m = loop.mirror.linear_loop, loop.timing, loop.mirror.actuators
-    Ad, B0, B1 = lti.first_order_hold(linear.A, linear.B, timing.step_s)
+    timing, m, (Ad, B0, B1) = loop.timing, loop.mirror.actuators, held
     follow = amplifier_factor(loop.drive, timing.step_s)
     age = -((j - timing.delay_steps) // timing.steps_per_sample)
     due = slice(at.commands.start + age * m, at.commands.start + (age + 1) * m)
-    A = still.copy()
-    A[at.mirror, at.mirror], A[at.mirror, at.drive] = Ad, B0 + B1 * (1.0 - follow)
-    A[at.drive, at.drive] = (1.0 - follow) * np.eye(m)
-    A[at.mirror, due] += B1 * follow
-    A[at.drive, due] += follow * np.eye(m)
-    A[at.errors.start : at.errors.start + loop.axes] = through @ A
+    A = np.broadcast_to(still, (*Ad.shape[:-2], *still.shape)).copy()
+    A[..., at.mirror, at.mirror], A[..., at.mirror, at.drive] = Ad, B0 + B1 * (1.0 - follow)
+    A[..., at.drive, at.drive] = (1.0 - follow) * np.eye(m)
+    A[..., at.mirror, due] += B1 * follow
+    A[..., at.drive, due] += follow * np.eye(m)
+    A[..., at.errors.start : at.errors.start + loop.axes, :] = through @ A
     return A
 
 
@@ -206,11 +217,15 @@ class ClosedLoop:
                 total = step @ total
         return total
 
+    @property
+    def poles(self) -> Complexes:
+        """Poles z over a period of the optical sensor, disturbances left out, shape (poles,)."""
+        keep = _without_disturbances(self)
+        return np.asarray(np.linalg.eigvals(self.monodromy[..., keep, :][..., keep]), dtype=complex)
+
     def worst_pole(self) -> tuple[float, float]:
         """Largest |z| over a control sample among the poles, disturbances left out, and its frequency in Hz."""
-        keep = _without_disturbances(self)
-        poles = np.linalg.eigvals(self.monodromy[np.ix_(keep, keep)])
-        period = self.open.loop.timing.period_s * len(self.samples)
+        poles, period = self.poles, self.open.loop.timing.period_s * len(self.samples)
         at = int(np.argmax(np.abs(poles)))
         size = float(np.abs(poles[at])) ** (1.0 / len(self.samples))
         return size, float(abs(np.angle(poles[at])) / (2.0 * math.pi * period))
@@ -244,24 +259,25 @@ def straightened(controller: LoopController, loop: PointingLoop) -> LoopControll
     return LoopController(controller.name, lti.StateSpace(s.A, s.B, C, D), controller.anti_windup)
 
 
-def close(loop: PointingLoop, controller: LoopController) -> ClosedLoop:
+def close(loop: PointingLoop, controller: LoopController, mirrors: lti.StateSpace | None = None) -> ClosedLoop:
     """The linear loop under a controller, whose inverse counts as the reciprocal of the slow gain.
 
     Args:
         loop: The loop.
         controller: The controller of all its axes.
+        mirrors: A stack of linear mirrors as for `open_loop`; the inverse stays that of the loop's own.
     """
-    o, c = open_loop(loop), straightened(controller, loop)
+    o, c = open_loop(loop, mirrors), straightened(controller, loop)
     s, n, axes, outputs = c.system, o.at.order, loop.axes, loop.mirror.axes
     whole, readings = n + s.order, axes + outputs
-    read = np.zeros((readings, whole))
-    read[:axes, o.at.held], read[axes:, :n] = np.eye(axes), o.mirror
+    read = np.zeros((*o.mirror.shape[:-2], readings, whole))
+    read[..., :axes, o.at.held], read[..., axes:, :n] = np.eye(axes), o.mirror
     act, from_readings = np.eye(whole), np.zeros((whole, readings))
     act[:n, :n] = o.shift
     from_readings[o.newest], from_readings[n:] = s.D[:, :readings], s.B[:, :readings]
     act[o.newest] = 0.0
     act[o.newest, n:], act[n:, n:] = s.C, s.A
-    act += from_readings @ read
+    act = act + from_readings @ read
     take, into = np.eye(whole), np.zeros((whole, readings))  # a new optical reading, and its noise
     take[o.at.held] = 0.0
     take[o.at.held, :n] = o.reading
@@ -271,8 +287,8 @@ def close(loop: PointingLoop, controller: LoopController) -> ClosedLoop:
     samples = (fresh, *[held] * (loop.optical.every - 1))
     steps = []
     for A in o.steps:
-        block = np.eye(whole)
-        block[:n, :n] = A
+        block = np.broadcast_to(np.eye(whole), (*A.shape[:-2], whole, whole)).copy()
+        block[..., :n, :n] = A
         steps.append(block)
     sources = (
         *o.sources,
@@ -340,7 +356,7 @@ def stationary(closed: ClosedLoop) -> Stationary:
     monodromy = closed.monodromy
     by_name: dict[str, Floats] = {}
     drive = np.zeros(o.drive.shape[0])
-    found = [(source.name, *_variances(closed, monodromy, source)) for source in closed.sources]
+    found = [(source.name, *_settled(closed, monodromy, noise_of(closed, source))[1:]) for source in closed.sources]
     found += [(line.name, *_line_variances(closed, monodromy, line)) for line in o.lines]
     for name, errors, drives in found:
         by_name[name] = by_name.get(name, np.zeros(axes)) + errors
@@ -348,7 +364,11 @@ def stationary(closed: ClosedLoop) -> Stationary:
     return Stationary(np.sum([np.zeros(axes), *by_name.values()], axis=0), drive, by_name)
 
 
-def noise_of(closed: ClosedLoop, source: Source) -> tuple[tuple[Floats, ...], Floats]:
+Noise = tuple[tuple[Floats, ...], Floats]
+"""What is added to the states, columns of unit white sequences: at each control sample and at each plant step."""
+
+
+def noise_of(closed: ClosedLoop, source: Source) -> Noise:
     """What a source alone adds to the states: at each control sample of a sensor period, and at each plant step.
 
     Args:
@@ -356,46 +376,47 @@ def noise_of(closed: ClosedLoop, source: Source) -> tuple[tuple[Floats, ...], Fl
         source: One of its sources.
     """
     none = np.zeros((closed.step_noise.shape[0], 0))
-    sampled = tuple(noise[:, source.columns] if source.sampled else none for noise in closed.sample_noise)
+    sampled = tuple(noise[..., source.columns] if source.sampled else none for noise in closed.sample_noise)
     return sampled, none if source.sampled else closed.step_noise[:, source.columns]
 
 
-def start_of(closed: ClosedLoop, source: Source) -> tuple[Floats, Floats]:
-    """Stationary covariance of the states before a sensor period, and variance of the error (rad^2), of a source alone.
+def noise_of_all(closed: ClosedLoop) -> Noise:
+    """What all sources together add to the states, as `noise_of`; lines are no noise."""
+    return closed.sample_noise, closed.step_noise
+
+
+def start_of(closed: ClosedLoop, noise: Noise) -> tuple[Floats, Floats]:
+    """Stationary covariance of the states before a sensor period, and variance of the error (rad^2), of a noise alone.
 
     The variance, per axis, is the mean over the plant steps of the period.
 
     Args:
         closed: The loop under its controller, stable.
-        source: One of its sources.
+        noise: What is added to its states, as `noise_of` has it.
     """
-    P, errors, _ = _settled(closed, closed.monodromy, source)
+    P, errors, _ = _settled(closed, closed.monodromy, noise)
     return P, errors
 
 
-def _variances(closed: ClosedLoop, monodromy: Floats, source: Source) -> tuple[Floats, Floats]:
-    return _settled(closed, monodromy, source)[1:]
-
-
-def _settled(closed: ClosedLoop, monodromy: Floats, source: Source) -> tuple[Floats, Floats, Floats]:
+def _settled(closed: ClosedLoop, monodromy: Floats, added: Noise) -> tuple[Floats, Floats, Floats]:
     """Covariance before a sensor period, and the mean variances of error and drive in it."""
     o, whole = closed.open, closed.step_noise.shape[0]
-    sampled, stepped = noise_of(closed, source)
+    sampled, stepped = added
 
     def over_period(P: Floats) -> tuple[Floats, Floats, Floats]:
         errors, drives, count = np.zeros(o.error.shape[0]), np.zeros(o.drive.shape[0]), 0
         for sample, noise in zip(closed.samples, sampled, strict=True):
-            P = sample @ P @ sample.T + noise @ noise.T
+            P = sample @ P @ sample.mT + noise @ noise.mT
             for step in closed.steps:
-                P = step @ P @ step.T + stepped @ stepped.T
-                head = P[: o.at.order, : o.at.order]
-                errors += np.einsum("ij,jk,ik->i", o.error, head, o.error)
-                drives += np.einsum("ij,jk,ik->i", o.drive, head, o.drive)
+                P = step @ P @ step.mT + stepped @ stepped.T
+                head = P[..., : o.at.order, : o.at.order]
+                errors = errors + np.einsum("ij,...jk,ik->...i", o.error, head, o.error)
+                drives = drives + np.einsum("ij,...jk,ik->...i", o.drive, head, o.drive)
                 count += 1
         return P, errors / count, drives / count
 
     gathered, _, _ = over_period(np.zeros((whole, whole)))
-    P = lti.gramian(monodromy.T, gathered)
+    P = lti.gramian(monodromy.mT, gathered)
     return P, *over_period(P)[1:]
 
 
@@ -415,7 +436,8 @@ def turning(closed: ClosedLoop, line: Line) -> tuple[Complexes, complex]:
         line: One of its lines.
 
     Returns:
-        Complex amplitudes, shape (plant steps, axes), and the factor from one sensor period to the next.
+        Complex amplitudes, shape (plant steps, axes), and the factor from one sensor period to the next. Of a stack of
+        loops the amplitudes have its axes behind that of the plant steps.
     """
     states, z = _turned(closed, closed.monodromy, line)
     return states @ closed.open.error.T, z
@@ -429,16 +451,18 @@ def _turned(closed: ClosedLoop, monodromy: Floats, line: Line) -> tuple[Complexe
     """
     o, keep = closed.open, _without_disturbances(closed)
     unit = np.array([1.0, 1.0j])
-    z = complex((monodromy[line.states, line.states] @ unit)[0])
-    x = np.zeros(monodromy.shape[0], dtype=complex)
-    x[line.states] = line.amplitude_rad * unit
-    x[keep] = np.linalg.solve(z * np.eye(int(keep.sum())) - monodromy[np.ix_(keep, keep)], monodromy[keep] @ x)
+    own = monodromy.reshape(-1, *monodromy.shape[-2:])[0]  # a stack has the same disturbances in each loop
+    z = complex((own[line.states, line.states] @ unit)[0])
+    x = np.zeros((*monodromy.shape[:-1], 1), dtype=complex)
+    x[..., line.states, 0] = line.amplitude_rad * unit
+    moved = monodromy[..., keep, :]
+    x[..., keep, :] = np.linalg.solve(z * np.eye(int(keep.sum())) - moved[..., keep], moved @ x)
     states = []
     for sample in closed.samples:
         x = sample @ x
         for step in closed.steps:
             x = step @ x
-            states.append(x[: o.at.order])
+            states.append(x[..., : o.at.order, 0])
     return np.array(states), z
 
 

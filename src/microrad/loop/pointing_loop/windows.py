@@ -13,7 +13,16 @@ import numpy as np
 
 from microrad.core.arrays import Floats
 from microrad.loop.disturbance.windows import ErrorIndex, rational_rms, windowed_rms
-from microrad.loop.pointing_loop.linear import ClosedLoop, Line, Source, noise_of, refuse_unstable, start_of, turning
+from microrad.loop.pointing_loop.linear import (
+    ClosedLoop,
+    Line,
+    Noise,
+    noise_of,
+    noise_of_all,
+    refuse_unstable,
+    start_of,
+    turning,
+)
 
 _STILL = 1e-12  # turn in a reading of a line that is at a multiple of its rate
 
@@ -26,10 +35,10 @@ class _Span:
     Q: Floats
 
     def then(self, later: "_Span") -> "_Span":
-        return _Span(later.F @ self.F, later.F @ self.Q @ later.F.T + later.Q)
+        return _Span(later.F @ self.F, later.F @ self.Q @ later.F.mT + later.Q)
 
     def times(self, count: int) -> "_Span":
-        made, doubled = _Span(np.eye(len(self.F)), np.zeros_like(self.Q)), self
+        made, doubled = _Span(np.eye(self.F.shape[-1]), np.zeros_like(self.Q)), self
         while count:
             made, count = (made.then(doubled), count - 1) if count % 2 else (made, count)
             doubled, count = doubled.then(doubled), count // 2
@@ -66,7 +75,8 @@ def windowed_noise(closed: ClosedLoop, index: ErrorIndex) -> dict[str, Floats]:
     window, apart = _times(closed, index)
     found: dict[str, Floats] = {}
     for source in closed.sources:
-        found[source.name] = found.get(source.name, 0.0) + _noise(closed, source, index, window, apart)
+        left = _noise(closed, noise_of(closed, source), index, window, apart)
+        found[source.name] = found.get(source.name, 0.0) + left
     return found
 
 
@@ -83,6 +93,23 @@ def windowed_lines(closed: ClosedLoop, index: ErrorIndex) -> list[tuple[str, Flo
     refuse_unstable(closed)
     window, apart = _times(closed, index)
     return [(line.name, _line(closed, line, index, window, apart)) for line in closed.open.lines]
+
+
+def windowed_in_all(closed: ClosedLoop, index: ErrorIndex) -> Floats:
+    """Variance that an index takes of the stationary error, of all sources together, per axis (rad^2), lines too.
+
+    Args:
+        closed: The loop under its controller, or a stack of loops; each of them stable, which is not looked at.
+        index: What counts of the error, as for `windowed`.
+
+    Raises:
+        ValueError: A time of the index is less than half of the time between two readings.
+    """
+    window, apart = _times(closed, index)
+    found = _noise(closed, noise_of_all(closed), index, window, apart)
+    for line in closed.open.lines:
+        found = found + _line(closed, line, index, window, apart)
+    return found
 
 
 def _times(closed: ClosedLoop, index: ErrorIndex) -> tuple[int, int]:
@@ -141,15 +168,15 @@ def _steps_of(closed: ClosedLoop) -> int:
     return len(closed.samples) * len(closed.steps)
 
 
-def _noise(closed: ClosedLoop, source: Source, index: ErrorIndex, window: int, apart: int) -> Floats:
+def _noise(closed: ClosedLoop, added: Noise, index: ErrorIndex, window: int, apart: int) -> Floats:
     """Variance of what one noise leaves, per axis."""
     o = closed.open
-    start, whole = start_of(closed, source)
+    start, whole = start_of(closed, added)
     if not window:
         return whole
-    states, axes = len(start), len(o.error)
+    states, axes = start.shape[-1], len(o.error)
     error = np.hstack([o.error, np.zeros((axes, states - o.at.order))])
-    sampled, stepped = noise_of(closed, source)
+    sampled, stepped = added
     summed = _Span(np.eye(states + axes), np.zeros((states + axes,) * 2))
     for sample, noise in zip(closed.samples, sampled, strict=True):
         summed = summed.then(_moved(sample, noise, np.zeros_like(error)))
@@ -161,27 +188,29 @@ def _noise(closed: ClosedLoop, source: Source, index: ErrorIndex, window: int, a
     else:
         both = min(window, apart)  # of windows that overlap, what they share is not in the difference
         of_all = summed.times(both).then(still.times(abs(apart - window))).then(_signed(summed, axes, -1.0).times(both))
-    begun = np.zeros((states + axes,) * 2)
-    begun[:states, :states] = start
-    ended = (of_all.F @ begun @ of_all.F.T + of_all.Q)[states:, states:]
-    mean = np.diag(ended) / (window * _steps_of(closed)) ** 2
+    begun = np.zeros((*start.shape[:-2], states + axes, states + axes))
+    begun[..., :states, :states] = start
+    ended = (of_all.F @ begun @ of_all.F.mT + of_all.Q)[..., states:, states:]
+    mean = np.diagonal(ended, axis1=-2, axis2=-1) / (window * _steps_of(closed)) ** 2
     return np.asarray(whole - mean if index.takes == "RPE" else mean)
 
 
 def _moved(matrix: Floats, noise: Floats, error: Floats) -> _Span:
     """One map of the states with its noise; the error behind it is added to the sums."""
     axes, states = error.shape
-    F = np.block([[matrix, np.zeros((states, axes))], [error @ matrix, np.eye(axes)]])
-    into = np.vstack([noise, error @ noise])
-    return _Span(F, into @ into.T)
+    F = np.zeros((*matrix.shape[:-2], states + axes, states + axes))
+    F[..., :states, :states], F[..., states:, :states] = matrix, error @ matrix
+    F[..., states:, states:] = np.eye(axes)
+    into = np.concatenate([noise, error @ noise], axis=-2)
+    return _Span(F, into @ into.mT)
 
 
 def _signed(span: _Span, axes: int, sign: float) -> _Span:
     """The same with what it adds to the sums times a sign; 0 leaves them as they are."""
-    keep = np.ones(len(span.F))
+    keep = np.ones(span.F.shape[-1])
     keep[-axes:] = sign
     F, Q = span.F * keep[:, None], span.Q * np.outer(keep, keep)
-    F[-axes:, -axes:] = np.eye(axes)
+    F[..., -axes:, -axes:] = np.eye(axes)
     return _Span(F, Q)
 
 

@@ -3,7 +3,7 @@
 from microrad.mirror.coupled.geometry import tilts_and_piston
 from microrad.mirror.coupled.reading import of
 from microrad.mirror.coupled.records import Actuator, CoupledMirror, Known, Output, modes, response
-from microrad.mirror.coupled.spread import accepted, directions, draws, moved
+from microrad.mirror.coupled.spread import accepted, directions, drawn, draws, is_one, moved
 from microrad.mirror.coupled.writing import text
 
 __all__ = [
@@ -13,7 +13,9 @@ __all__ = [
     "Output",
     "accepted",
     "directions",
+    "drawn",
     "draws",
+    "is_one",
     "modes",
     "moved",
     "of",

@@ -45,11 +45,23 @@ def draws(mirror: CoupledMirror, count: int, seed: int) -> tuple[CoupledMirror, 
     Raises:
         ValueError: Where `TRIES` draws in a row are no mirror.
     """
-    known = mirror.known
-    if known is None:
-        return ()
+    return tuple(each for each, _ in drawn(mirror, count, seed)) if mirror.known is not None else ()
+
+
+def drawn(mirror: CoupledMirror, count: int, seed: int) -> tuple[tuple[CoupledMirror, Floats], ...]:
+    """The mirrors of `draws`, each with the standard normal numbers that it is made of, shape (`directions`,).
+
+    Args:
+        mirror: The identified mirror.
+        count: How many mirrors are drawn.
+        seed: Seed of the random numbers.
+
+    Raises:
+        ValueError: Nothing is known of the mirror, or `TRIES` draws in a row are no mirror.
+    """
+    known = _known(mirror)
     streams = (np.random.SeedSequence(seed, spawn_key=(index,)) for index in range(count))
-    return tuple(_first(mirror, _normals(stream, known))[0] for stream in streams)
+    return tuple(_first(mirror, _normals(stream, known)) for stream in streams)
 
 
 def directions(mirror: CoupledMirror) -> int:
@@ -107,7 +119,7 @@ def _first(mirror: CoupledMirror, normals: Iterator[Floats]) -> tuple[CoupledMir
     """The first mirror that is one, and the numbers that it is made of."""
     for row in islice(normals, TRIES):
         found = moved(mirror, row)
-        if _is_one(found):
+        if is_one(found):
             return found, row
     raise ValueError(
         f"{TRIES} draws from the uncertainty of {mirror.mirror.name!r} in a row run away, have thresholds out of order "
@@ -116,7 +128,7 @@ def _first(mirror: CoupledMirror, normals: Iterator[Floats]) -> tuple[CoupledMir
     )
 
 
-def _is_one(mirror: CoupledMirror) -> bool:
+def is_one(mirror: CoupledMirror) -> bool:
     """Whether thresholds ascend, hysteresis is bounded, and neither stuck nor sliding plays make the mirror grow."""
     own = mirror.mirror
     if any(np.any(np.diff(play.thresholds_v) <= 0.0) for play in own.plays):

@@ -1,0 +1,227 @@
+"""The worst case over an identified mirror: against one mirror at a time, scans by hand, and the loop in time."""
+
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import several_axes
+from campaign_files import MIRROR
+from microrad.loop import control, coupled_study, worst_case
+from microrad.loop.disturbance.windows import ErrorIndex
+from microrad.loop.pointing_loop.design import design_plant, whole_plant
+from microrad.loop.pointing_loop.linear import close, stationary
+from microrad.loop.pointing_loop.loop import assemble, assemble_whole, decoupling
+from microrad.loop.pointing_loop.windows import windowed_errors
+from microrad.loop.worst_case import APE, Extent, Simulated, Subject, in_time
+from microrad.mirror import coupled, from_table, spread
+from microrad.mirror.hysteresis import rest_gain
+from microrad.mirror.model import linearised
+from microrad.mission.file import load_loop
+from microrad.report.fine_pointing.worst_case import worst_case_data, worst_case_text
+from scenes import scene_of
+from shipped import DEFAULT
+
+INDICES = (APE, ErrorIndex("MPE", 0.01), ErrorIndex("RPE", 0.01), ErrorIndex("PDE", 0.01, 0.02))
+PARAMETERS = ("bouc_wen.d1", "linear.poles.1", "linear.pole_dampings.1")
+SMALL = Extent(draws=20, most_sensitive=3)
+
+
+def table_of(folder, errors=(0.02, 0.03, 0.1), correlation="", **changes):
+    """A mirror of one mode, damped little, with what is known of its gain, frequency and damping."""
+    text = MIRROR.replace("pole_dampings = [0.5]", "pole_dampings = [0.1]").replace("1 kHz", "600 Hz")
+    names = str(list(PARAMETERS)).replace("'", '"')
+    text += f"\n[uncertainty]\nparameters = {names}\nstandard_errors = {list(errors)}\n{correlation}"
+    (folder / "mirror.toml").write_text(text, encoding="utf-8")
+    return load_loop(DEFAULT, folder / "mirror.toml")[0]
+
+
+def subject_of(file, family=control.PI, values=(60.0, 1500.0)):
+    """The loop of a mission under a controller of one axis, and that controller; nothing is tuned."""
+    scene = scene_of(file)
+    axis = family.build(design_plant(scene.axis), np.array(values))
+    simulated = Simulated(scene.axis, assemble(axis.name, scene.axis, axis), at_rest=False)
+    return Subject(scene.axis, 2, simulated, worst_case.of_table(file.mission.mirror)), axis
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    return table_of(tmp_path_factory.mktemp("mirror"))
+
+
+def by_itself(subject, axis, mirror):
+    """Radial rms by index, and modulus margin, of one mirror in the functions that know no stacks."""
+    loop = replace(subject.theory, mirror=mirror)
+    errors = windowed_errors(close(loop, subject.controller), INDICES)
+    rms = [np.sqrt(2.0) * np.linalg.norm([*each.left.values()]) for each in errors]
+    return rms, control.loop_margins(design_plant(loop), axis).modulus
+
+
+def test_the_worst_corner_is_that_of_a_scan_by_hand(file):
+    subject, axis = subject_of(file)
+    found = worst_case.worst_case(subject, 1, extent=replace(SMALL, draws=1))
+    corners = []
+    for signs in product((-1.0, 1.0), repeat=3):
+        factors = 1.0 + 3.0 * np.array(signs) * np.array([0.02, 0.03, 0.1])
+        mirror = from_table(spread.moved(file.mission.mirror, factors))
+        loop = replace(subject.theory, mirror=mirror)
+        rms = np.sqrt(2.0) * stationary(close(loop, subject.controller)).radial_rms_rad
+        corners.append((signs, rms, control.loop_margins(design_plant(loop), axis).modulus))
+    (largest,) = found.largest_rad
+    signs, rms, _ = max(corners, key=lambda corner: corner[1])
+    assert largest.value == pytest.approx(rms, rel=1e-9, abs=0.0)
+    assert_allclose([largest.sigmas[name] for name in PARAMETERS], 3.0 * np.array(signs), rtol=1e-9)
+    signs, _, modulus = min(corners, key=lambda corner: corner[2])
+    assert found.smallest_modulus.value == pytest.approx(modulus, rel=1e-9, abs=0.0)
+    # a resonance is nearest to -1 where it is least damped and the gain is highest
+    assert signs[0] == 1.0 and signs[2] == -1.0
+    assert_allclose([found.smallest_modulus.sigmas[name] for name in PARAMETERS], 3.0 * np.array(signs), rtol=1e-9)
+    assert (found.corners, found.corners_left_out, found.unstable_corners) == (8, 0, 0)
+
+
+@pytest.mark.parametrize(
+    ("family", "values"), [(control.PI, (60.0, 1500.0)), (control.RESONANT_DAMPING, None)], ids=["optical", "both"]
+)
+def test_many_mirrors_at_once_have_the_figures_of_each_by_itself(file, family, values):
+    if values is None:
+        parameters = family.parameters(design_plant(scene_of(file).axis))
+        values = [p.least * (p.most / p.least) ** 0.3 if p.log else 0.5 * (p.least + p.most) for p in parameters]
+    subject, axis = subject_of(file, family, values)
+    drawn = subject.known.drawn(20, 5)
+    found = subject.figures(drawn, INDICES, 1)
+    for (mirror, _), rms, modulus in zip(drawn, found.rms_rad, found.modulus, strict=True):
+        expected, margin = by_itself(subject, axis, mirror)
+        assert_allclose(rms, expected, rtol=1e-9)
+        assert modulus == pytest.approx(margin, rel=1e-9, abs=0.0)
+    assert found.unstable == 0 and np.ptp(found.modulus) > 1e-3
+
+
+@pytest.fixture(scope="module")
+def two_axes():
+    """The page's mirror of two axes under PI controllers that nobody tuned."""
+    scene = several_axes.scene_of(several_axes.two_axes())
+    plant = coupled_study.plants(scene)[0]
+    one = control.PI.build(coupled_study.whole.alone(plant, 0), np.array([3.0, 800.0]))
+    both = coupled_study.whole.side_by_side("PI", [one, one])
+    controller = assemble_whole("PI", scene.rest, both.system, both.anti_windup)
+    subject = Subject(
+        scene.rest,
+        1,
+        Simulated(scene.loop, controller, at_rest=True),
+        worst_case.of_several_axes(scene.mirror),
+    )
+    return subject, both
+
+
+def test_mirrors_of_two_axes_have_the_least_singular_value_of_the_whole(two_axes):
+    subject, both = two_axes
+    drawn = subject.known.drawn(20, 5)
+    found = subject.figures(drawn, (APE,), 1)
+    to_drives = decoupling(subject.theory)
+    for (mirror, _), rms, modulus in zip(drawn, found.rms_rad, found.modulus, strict=True):
+        still = linearised(mirror, [rest_gain(model) for model in mirror.bank])
+        loop = replace(subject.theory, mirror=still)
+        assert rms[0] == pytest.approx(stationary(close(loop, subject.controller)).radial_rms_rad, rel=1e-9, abs=0.0)
+        whole = coupled_study.whole_margins(whole_plant(loop, to_drives), both).modulus
+        assert modulus == pytest.approx(whole, rel=1e-9, abs=0.0)
+    assert found.unstable == 0
+
+
+def test_a_stable_loop_settles_in_time_and_an_unstable_one_grows(tmp_path):
+    file = table_of(tmp_path, errors=(0.25, 0.03, 0.1))
+    subject, _ = subject_of(file)
+    calm = worst_case.worst_case(subject, 1, extent=Extent(draws=1, most_sensitive=1, sigmas=0.1)).verified_in_time
+    assert (calm.theory, calm.linear, calm.with_hysteresis, calm.agrees) == ("settles", "settles", "settles", True)
+    wild = worst_case.worst_case(subject_of(file, values=(100.0, 1500.0))[0], 1, INDICES, SMALL)
+    assert wild.unstable_corners > 0 and wild.smallest_modulus.value == 0.0
+    assert wild.smallest_modulus.sigmas["bouc_wen.d1"] == pytest.approx(3.0)
+    assert all(np.isinf(worst.value) for worst in wild.largest_rad) and np.isfinite(wild.nominal_rad).all()
+    seen = wild.verified_in_time
+    assert seen.pole > 1.0 and (seen.theory, seen.linear) == ("grows", "grows")
+    text = worst_case_text(wild, 80)
+    for words in (f"{wild.unstable_corners} of the corners", "unstable", "does not settle", "bouc_wen.d1", "+3.0"):
+        assert words in text
+    assert worst_case_data(wild)["verified_in_time"]["theory"] == "grows"
+
+
+def test_an_error_that_neither_falls_nor_rises_has_not_settled():
+    time = np.arange(900)[:, None]
+    assert in_time.course(np.cos(time), 1.0) == "grows"
+    assert in_time.course(np.exp(-time / 100.0) * np.cos(time), 1.0) == "settles"
+    assert in_time.course(1e-3 * np.cos(time), 1.0) == "settles"
+
+
+def test_a_sensor_slower_than_the_control_counts_as_in_a_design(file):
+    subject, axis = subject_of(file)
+    slow = replace(subject.theory, optical=replace(subject.theory.optical, every=2))
+    subject = replace(subject, theory=slow)
+    drawn = subject.known.drawn(3, 5)
+    found = subject.figures(drawn, INDICES, 1)
+    for (mirror, _), rms, modulus in zip(drawn, found.rms_rad, found.modulus, strict=True):
+        expected, margin = by_itself(subject, axis, mirror)
+        assert_allclose(rms, expected, rtol=1e-9)
+        assert modulus == pytest.approx(margin, rel=1e-9, abs=0.0)
+
+
+def test_it_comes_out_the_same_twice_and_on_any_number_of_threads(file):
+    subject, _ = subject_of(file)
+    extent = replace(SMALL, draws=100)
+    first, again, alone = (worst_case.worst_case(subject, 3, INDICES, extent, threads) for threads in (2, 2, 1))
+    assert first == again == alone
+    assert first != worst_case.worst_case(subject, 4, INDICES, extent, 1)
+
+
+def test_of_many_parameters_those_are_moved_one_by_one_that_matter_to_first_order(file, monkeypatch):
+    subject, _ = subject_of(file)
+    all_of_them = worst_case.worst_case(subject, 1, extent=replace(SMALL, draws=1))
+    monkeypatch.setattr(worst_case.search, "CLOSELY", 2)
+    two = worst_case.worst_case(subject, 1, extent=replace(SMALL, draws=1))
+    assert two.most_sensitive == all_of_them.most_sensitive[:2]
+    assert (all_of_them.corners, two.corners) == (8, 4)
+
+
+def test_draws_are_those_that_designs_have_to_hold_for(file):
+    table = file.mission.mirror
+    known = worst_case.of_table(table)
+    for (mirror, sigmas), drawn in zip(known.drawn(8, 1), spread.draws(table, 8, 1), strict=True):
+        np.testing.assert_array_equal(mirror.A, from_table(drawn).A)
+        assert drawn.bouc_wen.d1_rad_v == pytest.approx(table.bouc_wen.d1_rad_v * (1 + 0.02 * sigmas[0]), rel=1e-12)
+
+
+def test_corners_of_parameters_that_hang_together_are_as_far_off_as_of_others(tmp_path):
+    """Two that are known by their sum alone do not go against each other by three standard errors."""
+    known = worst_case.of_table(table_of(tmp_path, correlation="correlation = [-0.99, 0.0, 0.1]\n").mission.mirror)
+    correlation = known.rows @ known.rows.T
+    assert correlation[0, 1] == pytest.approx(-0.99)
+    across = worst_case.search._independent(known.rows, (1, 0, 2), 10)
+    assert_allclose(across @ across.T, np.eye(3), atol=1e-12)
+    for signs in product((-1.0, 1.0), repeat=3):
+        off = known.rows @ (3.0 * np.array(signs) @ across)
+        assert off @ np.linalg.solve(correlation, off) == pytest.approx(27.0)
+        assert off[1] == pytest.approx(3.0 * signs[0])  # the first one in all its standard error, the next in its rest
+        assert off[0] == pytest.approx(-0.99 * 3.0 * signs[0] + np.sqrt(1 - 0.99**2) * 3.0 * signs[1])
+
+
+def test_no_corner_turns_a_value(tmp_path):
+    known = worst_case.of_table(table_of(tmp_path, errors=(0.6, 0.03, 0.1)).mission.mirror)
+    _, sigmas = known.moved(np.array([-3.0, 1.0, 0.0]))
+    assert_allclose(sigmas, [-0.9 / 0.6, 1.0, 0.0], atol=1e-12)
+    assert known.moved(np.array([0.0, 0.0, 100.0])) is None  # a pair of poles without damping below 1
+
+
+def test_a_larger_mirror_is_looked_at_less_often():
+    assert Extent.for_states(10) == Extent(1000, 10, 3.0)
+    assert Extent.for_states(36).draws < 1000
+
+
+def test_a_mirror_of_several_axes_moves_as_its_file_says():
+    mirror = several_axes.two_axes()
+    known = worst_case.of_several_axes(mirror)
+    moved, sigmas = known.moved(3.0 * known.rows[0])
+    assert sigmas[0] == pytest.approx(3.0)
+    assert moved.A[0, 0] == pytest.approx(mirror.mirror.A[0, 0] - 3.0 * 0.4)
+    with pytest.raises(ValueError, match="has no table uncertainty, so nothing can be drawn; `microrad identify`"):
+        worst_case.of_several_axes(replace(mirror, known=None))
+    assert coupled.drawn(mirror, 2, 1)[1][0].mirror.A[0, 0] == coupled.draws(mirror, 2, 1)[1].mirror.A[0, 0]
