@@ -58,6 +58,7 @@ benchmark: $(VENV)/.test
 	$(BIN)/python benchmarks/ensemble.py
 	$(BIN)/python benchmarks/controllers.py
 	$(BIN)/python benchmarks/worst_case.py
+	$(BIN)/python benchmarks/error_budget.py
 	$(BIN)/python benchmarks/flight_step.py
 	$(BIN)/python benchmarks/answer.py
 	$(BIN)/python benchmarks/link_conventions.py

@@ -90,8 +90,12 @@ def design(
 @command
 def pointing(
     file: Annotated[Path, typer.Argument(help="Mission file with a table [fine_pointing].", metavar="FILE")],
-    window: Annotated[list[float] | None, time_option("--window", "Length of a window [default: 10 ms and 1 s];")] = None,
-    spacing: Annotated[list[float] | None, time_option("--spacing", "From the begin of a window to that of another;")] = None,
+    window: Annotated[
+        list[float] | None, time_option("--window", "Length of a window [default: 10 ms and 1 s];")
+    ] = None,
+    spacing: Annotated[
+        list[float] | None, time_option("--spacing", "From the begin of a window to that of another;")
+    ] = None,
     controller: Annotated[str, option("--controller", "NAME", "One that microrad design lists.")] = "PI",
     sources: Annotated[
         Path | None, option("--sources", "LIST", "Sources of errors as CSV or XLSX, a row each.")

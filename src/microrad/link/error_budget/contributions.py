@@ -272,13 +272,13 @@ class _Path:
 
     def __init__(self, source: ErrorSource) -> None:
         assert source.decay_s is not None
-        rate, through = np.full((1, 1), -1.0 / source.decay_s), source.transfer
-        if isinstance(through, lti.StateSpace):
-            n = through.order
-            A = np.block([[through.A, through.B], [np.zeros((1, n)), rate]])
-            C, start = np.hstack([through.C, through.D]), np.append(np.zeros(n), 1.0)
-        else:
-            A, C, start = rate, np.asarray(through, dtype=float)[:, None], np.ones(1)
+        rate, through = -1.0 / source.decay_s, source.transfer
+        if not isinstance(through, lti.StateSpace):
+            self._rates, self._each = np.array([rate]), np.asarray(through, dtype=float)[:, None]
+            return
+        n = through.order
+        A = np.block([[through.A, through.B], [np.zeros((1, n)), np.full((1, 1), rate)]])
+        C, start = np.hstack([through.C, through.D]), np.append(np.zeros(n), 1.0)
         self._rates, modes = np.linalg.eig(A)
         if np.linalg.cond(modes) > _SOUND:
             raise ValueError(

@@ -247,13 +247,9 @@ class Sum:
         from scipy.special import j0
 
         of = self._mixed
-        each = np.repeat(of.weight[None, :].astype(complex), len(u), axis=0)
+        each = _turns(u, of.mean) * of.weight
         for some, factor in (
-            (of.mean.any(axis=1), lambda at: np.exp(1j * (u @ of.mean[at].T))),
-            (
-                of.covariance.any(axis=(1, 2)),
-                lambda at: np.exp(-0.5 * np.einsum("pi,kij,pj->pk", u, of.covariance[at], u)),
-            ),
+            (of.covariance.any(axis=(1, 2)), lambda at: np.exp(-0.5 * _quadratic(u, of.covariance[at]))),
             (of.half_width.any(axis=1), lambda at: np.sinc(u @ of.half_width[at].T / np.pi)),
             (of.amplitude.any(axis=1), lambda at: j0(np.abs(u @ of.amplitude[at].T))),
         ):
@@ -320,6 +316,21 @@ class Sum:
             if count >= _MOST:
                 return np.asarray(found * _taper(np.arange(1, count + 1) / count))
             count = min(max(count + _CHUNK, count * 3 // 2), _MOST)
+
+
+def _quadratic(u: Floats, covariance: Floats) -> Floats:
+    """u'Cu of each case, shape (points, cases)."""
+    return np.asarray(np.einsum("pi,kij,pj->pk", u, covariance, u))
+
+
+def _turns(u: Floats, mean: Floats) -> Complexes:
+    """exp(i u'm) of each case, shape (points, cases); one behind the other where the points are evenly spaced."""
+    step = u[-1] - u[-2] if len(u) > 1 else u[0]
+    if u.shape[1] > 1 or not np.allclose(np.diff(u[:, 0]), step, rtol=1e-9, atol=0.0):
+        return np.asarray(np.exp(1j * (u @ mean.T)))
+    found = np.empty((len(u), len(mean)), dtype=complex)
+    found[0], found[1:] = np.exp(1j * (mean @ u[0])), np.exp(1j * (mean @ step))
+    return np.multiply.accumulate(found, axis=0, out=found)
 
 
 class Grid:
