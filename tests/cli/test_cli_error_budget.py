@@ -156,6 +156,19 @@ def test_what_is_no_budget_is_refused(refused, mission, changes, options, words)
     assert words in refused("pointing", "m.toml", *options)
 
 
+def test_a_correlation_of_the_table_makes_one_line_of_two_sources(call, mission):
+    more = TABLE[TABLE.index("[error_budget.sources.alignment]") : TABLE.index("[error_budget.sources.thermo")]
+    again = more.replace("sources.alignment", "sources.mounting")
+    link = '[error_budget.correlations.bench]\nfirst = "alignment"\nsecond = "mounting"\ncoefficient = 1.0\n'
+    mission.write_text(mission.read_text("utf-8") + again + link, "utf-8")
+    changed(mission, ('confidence = 0.95\ninterpretation = "temporal"', 'confidence = 0.95\ninterpretation = "mixed"'))
+    _, out, _ = call("pointing", str(mission), "--json")
+    found = {each["requirement"]: each for each in json.loads(out)["budget"]}["drift"]
+    joined = next(each for each in found["sources"] if "with" in each["name"])
+    assert joined["name"] == "alignment with mounting"
+    assert joined["sigma_rad"] == [pytest.approx(2e-6 / 3.0, rel=1e-9, abs=0.0)]  # 2 of them, times a gain of a half
+
+
 def test_a_loop_that_is_asked_for_and_not_there_is_refused(refused, mission):
     changed(mission, ("with_loop = false", "with_loop = true"))
     assert "has no table [fine_pointing]: microrad init writes one" in refused("pointing", "m.toml")

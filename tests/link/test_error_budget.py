@@ -11,6 +11,7 @@ from scipy import integrate, signal, stats
 from microrad.core import lti
 from microrad.link.error_budget.budget import budget, shares, total
 from microrad.link.error_budget.contributions import Requirement, contribution, contributions
+from microrad.link.error_budget.correlation import Correlation
 from microrad.link.error_budget.distributions import Bundle, case
 from microrad.link.error_budget.sources import ErrorSource, Spread
 from microrad.loop.disturbance import Disturbance, SpectralLine, first_order, olympus
@@ -407,3 +408,54 @@ def test_what_is_no_budget_is_refused(make, said):
 def test_a_spectrum_of_no_variance_is_refused():
     with pytest.raises(ValueError, match="has no variance"):
         Disturbance("drifting", np.zeros((1, 1)), np.ones((1, 1)), np.ones((1, 1)), (), "", "")
+
+
+# --------------------------------------------------------------------------------------------------------- correlation
+def two(first=3.0, second=4.0, **more):
+    return [replace(source("random", size, **more), name=name) for name, size in (("a", first), ("b", second))]
+
+
+@pytest.mark.parametrize(("rho", "sigma"), [(1.0, 7.0), (0.0, 5.0), (-1.0, 1.0), (0.5, math.sqrt(37.0))])
+def test_correlated_errors_add_as_their_matrix_says(rho, sigma):
+    (found,) = budget([*two(), source("constant", 1.0)], [APE], [Correlation("a", "b", rho)])
+    assert float(found.sigma_rad[0]) == pytest.approx(sigma, rel=1e-12)
+    names = [each.name for each in found.contributions]
+    assert names == (["a with b", "a constant error"] if rho else ["a", "b", "a constant error"])
+
+
+def test_correlated_errors_have_the_signs_of_their_gains_and_keep_axes_apart():
+    gains = np.array([1.0, -2.0])
+    both = Requirement(ErrorIndex("APE"))
+    (together,) = budget(two(gains=gains), [both], [Correlation("a", "b", 0.5)])
+    (apart,) = budget(two(gains=gains, apart=True), [both], [Correlation("a", "b", 0.5)])
+    wanted = 37.0 * np.outer(gains, gains)
+    assert together.contributions[0].parts[0].covariance[0] == pytest.approx(wanted)
+    assert apart.contributions[0].parts[0].covariance[0] == pytest.approx(np.diag(np.diag(wanted)))
+
+
+def test_constants_on_the_worst_satellite_stay_as_they_are_and_go_along_over_all():
+    parts = [replace(source("constant", 0.0, "gaussian", size), name=name) for name, size in (("a", 3.0), ("b", 4.0))]
+    temporal, mixed = budget(parts, [APE, replace(APE, interpretation="mixed")], [Correlation("a", "b", 1.0)])
+    assert [each.name for each in temporal.contributions] == ["a", "b"]
+    assert temporal.quantile_rad == pytest.approx(21.0)
+    assert float(mixed.sigma_rad[0]) == pytest.approx(7.0)
+
+
+@pytest.mark.parametrize(
+    ("sources", "correlations", "said"),
+    [
+        (two(), [Correlation("a", "c", 0.5)], "name two sources out of a, b"),
+        (two(), [Correlation("a", "a", 0.5)], "name two sources"),
+        (two(), [Correlation("a", "b", 1.5)], "give one from -1 to 1"),
+        (two(even_in_time=True), [Correlation("a", "b", 0.5)], "only two Gaussian errors of one class"),
+        ([*two()[:1], replace(source("constant", 0.0, "gaussian", 1.0), name="b")], [Correlation("a", "b", 0.5)], "only two Gaussian"),
+        (
+            [*two(), replace(source("random", 1.0), name="c")],
+            [Correlation("a", "b", 0.9), Correlation("b", "c", 0.9), Correlation("a", "c", -0.9)],
+            "their matrix has the eigenvalue -0.8, so that no errors can be correlated so",
+        ),
+    ],
+)  # fmt: skip
+def test_correlations_that_cannot_be_are_refused(sources, correlations, said):
+    with pytest.raises(ValueError, match=re.escape(said)):
+        budget(sources, [APE], correlations)

@@ -198,6 +198,7 @@ def test_a_recording_is_dropped_identified_while_one_looks_on_and_its_mirror_use
     before = studio.file.read_text("utf-8")
     tab.get_by_role("button", name="Use this mirror in the mission").click()
     tab.get_by_text("[mirror] of the mission names stage.toml now").wait_for()
+    tab.get_by_role("status").get_by_text("not saved", exact=True).wait_for()  # it was saved before
     tab.get_by_role("button", name="Save", exact=True).click()
     tab.get_by_role("status").get_by_text("saved", exact=True).wait_for()
     assert tomllib.loads(studio.file.read_text("utf-8"))["mirror"] == {"file": "stage.toml"}

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from microrad.loop.disturbance.windows import ErrorIndex
     from microrad.loop.pointing_loop.linear import ClosedLoop
     from microrad.mission.file import LinkFile
+    from microrad.mission.tables.error_budget import ErrorBudget
 
 
 def sources_beside(
@@ -67,24 +68,30 @@ def _observed(index: "ErrorIndex") -> float | None:
 
 
 def totals_of(
-    sources: "Sequence[ErrorSource]", asked: "Mapping[str, Requirement]", closed: "ClosedLoop | None"
+    sources: "Sequence[ErrorSource]",
+    asked: "Mapping[str, Requirement]",
+    table: "ErrorBudget | None",
+    closed: "ClosedLoop | None",
 ) -> "dict[str, Total]":
     """The totals by the names of their requirements.
 
     Args:
         sources: The sources.
         asked: The requirements.
-        closed: The loop whose errors are sources, too; None without.
+        table: The mission's table, which has correlations and says whether the loop is a source.
+        closed: The mission's loop; None without.
 
     Raises:
         ValueError: As the budget does.
     """
-    from microrad.link.error_budget import budget, contributions, total
-    from microrad.link.error_budget.assembly import loop_contributions
+    from microrad.link.error_budget import budget, contributions, correlated, total
+    from microrad.link.error_budget.assembly import correlations_of, loop_contributions
 
-    if closed is None:
-        return dict(zip(asked, budget(sources, list(asked.values())), strict=True))
-    return {
-        name: total([*contributions(sources, required), *loop_contributions(closed, required)], required)
-        for name, required in asked.items()
-    }
+    correlations = correlations_of(table)
+    if closed is None or table is None or not table.with_loop:
+        return dict(zip(asked, budget(sources, list(asked.values()), correlations), strict=True))
+    found = {}
+    for name, required in asked.items():
+        own = correlated(contributions(sources, required), sources, correlations)
+        found[name] = total([*own, *loop_contributions(closed, required)], required)
+    return found

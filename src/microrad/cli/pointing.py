@@ -131,7 +131,7 @@ def pointing(
     code = MET
     if asked is not None:
         with refusal_of(mission.path):
-            totals = totals_of(*asked, closed if table is not None and table.with_loop else None)
+            totals = totals_of(*asked, table, closed)
         code = UNMET if any(each.holds is False for each in totals.values()) else MET
         data["budget"] = budget_data(totals, {each.name: each.origin for each in asked[0]})
         texts.append(views_text(budget_view(totals).blocks, width()).strip("\n"))

@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from microrad.core.units import format_quantity
 from microrad.link.error_budget import Requirement, Share, Total, shares
 from microrad.report.fine_pointing.windows import index_name
 from microrad.report.fine_pointing.words import source_name
@@ -34,7 +35,7 @@ def budget_view(totals: Mapping[str, Total]) -> View:
 def requirement_text(required: Requirement) -> str:
     """An index with its times, its share, and its axes, in words."""
     index = index_name(required.index).replace("\n", " ")
-    observed = "" if required.observation_s is None else f" within {required.observation_s:g} s"
+    observed = "" if required.observation_s is None else f" within {format_quantity(required.observation_s, 's')}"
     share = f"{percent(required.confidence, 4)} {_SHARE_OF[required.interpretation]}"
     return f"{index}{observed}, {_AXES[required.axes]}, {share}"
 
@@ -47,7 +48,7 @@ def _summary(totals: Mapping[str, Total]) -> Table:
         shown = "" if limit is None else micro(limit)
         rows.append(
             (
-                name,
+                _shown(name),
                 requirement_text(total.required),
                 micro(total.by_rules_rad),
                 Cell(micro(total.quantile_rad), mark),
@@ -74,7 +75,7 @@ def _sources(name: str, total: Total, ranked: Sequence[Share]) -> Table:
     )
     more = ("may be",) if limited else ()
     headings = ("source", "class", "mean", "deviation", "weight", "total without it", *more)
-    title = f"{name}: {requirement_text(total.required)}, µrad"
+    title = f"{_shown(name)}: {requirement_text(total.required)}, µrad"
     return Table(title, headings, rows, (0, 1), totals=1, brief=(0, 2, 3, 4, *([6] if limited else [5])))
 
 
@@ -88,6 +89,11 @@ def _row(each: Share, kind: str) -> tuple[str, ...]:
         weight,
         micro(each.without_rad),
     )
+
+
+def _shown(name: str) -> str:
+    """A key of a file as words."""
+    return name.replace("_", " ")
 
 
 def _kind(total: Total, name: str) -> str:

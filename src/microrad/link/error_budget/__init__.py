@@ -2,10 +2,12 @@
 
 from microrad.link.error_budget.budget import Share, Total, budget, shares, total
 from microrad.link.error_budget.contributions import Contribution, Interpretation, Requirement, contributions
+from microrad.link.error_budget.correlation import Correlation, correlated
 from microrad.link.error_budget.sources import ErrorSource, Spread
 
 __all__ = [
     "Contribution",
+    "Correlation",
     "ErrorSource",
     "Interpretation",
     "Requirement",
@@ -14,6 +16,7 @@ __all__ = [
     "Total",
     "budget",
     "contributions",
+    "correlated",
     "shares",
     "total",
 ]

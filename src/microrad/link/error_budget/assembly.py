@@ -6,6 +6,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from microrad.link.error_budget.contributions import Contribution, Requirement
+from microrad.link.error_budget.correlation import Correlation
 from microrad.link.error_budget.distributions import Part, case
 from microrad.link.error_budget.sources import ErrorSource, Spread
 from microrad.link.pointing.error_classes import SIGMAS
@@ -71,6 +72,16 @@ def sources_of(table: ErrorBudget, origins: Mapping[str, str]) -> tuple[ErrorSou
         origins: Where the numbers of each source come from, by its name.
     """
     return tuple(source_of(name, stated, origins[name]) for name, stated in table.sources.items())
+
+
+def correlations_of(table: ErrorBudget | None) -> tuple[Correlation, ...]:
+    """The correlations of a mission's table; none without one.
+
+    Args:
+        table: The table.
+    """
+    stated = {} if table is None or table.correlations is None else table.correlations
+    return tuple(Correlation(each.first, each.second, each.coefficient) for each in stated.values())
 
 
 def requirement_of(stated: BudgetRequirement) -> Requirement:

@@ -12,6 +12,7 @@ import numpy as np
 
 from microrad.core.arrays import Floats
 from microrad.link.error_budget.contributions import Contribution, Requirement, contributions
+from microrad.link.error_budget.correlation import Correlation, correlated
 from microrad.link.error_budget.distributions import Bundle, Series, Sum, each_without
 from microrad.link.error_budget.sources import ErrorSource
 from microrad.link.pointing.summation import sigma_multiple
@@ -79,22 +80,25 @@ def total(found: Sequence[Contribution], required: Requirement) -> Total:
     return _total(found, _bundled(found), required)
 
 
-def budget(sources: Sequence[ErrorSource], requirements: Sequence[Requirement]) -> tuple[Total, ...]:
+def budget(
+    sources: Sequence[ErrorSource], requirements: Sequence[Requirement], correlations: Sequence[Correlation] = ()
+) -> tuple[Total, ...]:
     """The totals of the same sources under several requirements.
 
     Args:
         sources: The sources, of the same axes.
         requirements: What has to be kept.
+        correlations: Which sources are correlated, and how.
 
     Raises:
-        ValueError: As `contributions`, and for no source.
+        ValueError: As `contributions` and `correlated`, and for no source.
     """
     known: dict[Requirement, tuple[tuple[Contribution, ...], Bundle]] = {}
     totals = []
     for required in requirements:
         alike = replace(required, axes=(0,), limit_rad=None)
         if alike not in known:
-            found = contributions(sources, required)
+            found = correlated(contributions(sources, required), sources, correlations)
             known[alike] = found, _bundled(found)
         totals.append(_total(*known[alike], required))
     return tuple(totals)
@@ -131,16 +135,16 @@ def shares(of: Total) -> tuple[Share, ...]:
     if all(part.constant for part in parts):
         found = [_of_constant(of, each.name, own) for each, own in zip(of.contributions, parts, strict=True)]
     else:
-        u, others = each_without(parts, _HELD * max(of.quantile_rad, required.limit_rad or 0.0))
+        others = each_without(parts, _HELD * max(of.quantile_rad, required.limit_rad or 0.0))
         found = [
-            _share(of, each.name, own, series, u)
+            _share(of, each.name, own, series)
             for each, own, series in zip(of.contributions, parts, others, strict=True)
         ]
     return tuple(sorted(found, key=lambda each: -float(f"{each.growth:.2e}")))  # what is alike keeps its order
 
 
-def _share(of: Total, name: str, own: Sum, others: Series, u: Floats) -> Share:
-    whole, confidence, limit = of.quantile_rad, of.required.confidence, of.required.limit_rad
+def _share(of: Total, name: str, own: Sum, others: Series) -> Share:
+    whole, confidence, limit, u = of.quantile_rad, of.required.confidence, of.required.limit_rad, others.u
 
     def spare(size_rad: float, times: float) -> float:
         return others.within(size_rad, own.at(times * u)) - confidence

@@ -288,7 +288,7 @@ class Sum:
         """
         at = np.linspace(-self._range, self._range, points)
         series = self.series()
-        density = (0.5 + (np.exp(-1j * np.outer(at, series.grid.u[:, 0])) @ series.terms).real) / self._range
+        density = (0.5 + (np.exp(-1j * np.outer(at, series.u[:, 0])) @ series.terms).real) / self._range
         return at + self._centre[0], np.asarray(density)
 
     def series(self, reach_rad: float = 0.0) -> "Series":
@@ -298,12 +298,12 @@ class Sum:
         if self.axes == 1:
             terms = self._terms(step)
             u = step * np.arange(1.0, len(terms) + 1.0)[:, None]
-            return Series(Grid(u, float(self._centre[0]), reach), terms)
+            return Series.of(Grid(u, float(self._centre[0]), reach), terms)
         count = _count(lambda u: np.abs(self.characteristic(u)), step, _MOST_PLANE)
         u, weight = _plane(step, count, _MOST_PLANE)
         terms = weight * self.characteristic(u)
-        keep = np.abs(terms) > _NEGLIGIBLE
-        return Series(Grid(u[keep], 0.0, reach), terms[keep])
+        keep = np.abs(terms) > _NEGLIGIBLE  # the kernels of the others are not needed
+        return Series.of(Grid(u[keep], 0.0, reach), terms[keep])
 
     def _terms(self, step: float) -> Complexes:
         """Characteristic function of one axis at 1, 2, ... steps, up to where it is negligible."""
@@ -375,22 +375,40 @@ class Series:
     """Fourier series of the density of an error.
 
     Args:
-        grid: Where the characteristic function is known.
-        terms: What it is there, shape (points,).
+        grid: Where characteristic functions are known.
+        terms: The error's where it is not negligible, shape (kept,).
+        kept: Which points of the grid these are, shape (kept,).
     """
 
     grid: Grid
     terms: Complexes
+    kept: Integers
+
+    @classmethod
+    def of(cls, grid: Grid, terms: Complexes) -> "Series":
+        """Keep the terms that count.
+
+        Args:
+            grid: The grid.
+            terms: The characteristic function at all of its points.
+        """
+        kept = np.flatnonzero(np.abs(terms) > _NEGLIGIBLE)
+        return cls(grid, terms[kept], kept)
+
+    @property
+    def u(self) -> Floats:
+        """Where the terms stand (1/rad), shape (kept, axes)."""
+        return np.asarray(self.grid.u[self.kept])
 
     def within(self, size_rad: float, factor: Complexes | float = 1.0) -> float:
         """Probability that the error, radial for two axes, is not above a size.
 
         Args:
             size_rad: The size (rad).
-            factor: Characteristic function of a further part on the grid, shape (points,).
+            factor: Characteristic function of a further part at `u`, shape (kept,).
         """
         flat, kernel = self.grid.kernel(size_rad)
-        return float(flat + ((self.terms * factor) @ kernel).real)
+        return float(flat + ((self.terms * factor) @ kernel[self.kept]).real)
 
     def quantile(self, share: float, rel: float = 1e-11) -> float:
         """Size that is not exceeded with a probability (rad).
@@ -431,8 +449,8 @@ def _plane(step: float, count: int, most: int) -> tuple[Floats, Floats]:
     return step * half, weight
 
 
-def each_without(sums: Sequence[Sum], reach_rad: float) -> tuple[Floats, list[Series]]:
-    """Series of all parts but one, for each of them, about zero; and the points (1/rad) that they have in common.
+def each_without(sums: Sequence[Sum], reach_rad: float) -> list[Series]:
+    """Series of all parts but one, for each of them, about zero, on one grid.
 
     Args:
         sums: The parts, each by itself, about the same one or two axes.
@@ -448,7 +466,7 @@ def each_without(sums: Sequence[Sum], reach_rad: float) -> tuple[Floats, list[Se
         u = step * np.arange(1.0, count + 1.0)[:, None]
         weight = _taper(np.arange(1, count + 1) / count) if count >= _MOST else np.ones(count)
     grid = Grid(u, 0.0, reach_rad)
-    return u, [Series(grid, weight * rest) for rest in _others(sums, u)]
+    return [Series.of(grid, weight * rest) for rest in _others(sums, u)]
 
 
 def _last(count: int) -> Floats:

@@ -6,7 +6,7 @@ from typing import Annotated, Literal, get_args
 from pydantic import Field
 
 from microrad.mission.fields import Problem, Quantity, Several, Share, Switch, Table
-from microrad.mission.tables.mirror import ANGLE_MOST, Frequency
+from microrad.mission.tables.mirror import ANGLE_MOST, Frequency, Name
 from microrad.mission.tables.pointing import AngleOrZero, Statistic
 
 Time = Annotated[float, Quantity("s", "s", above=0.0, most=1e9)]
@@ -72,6 +72,14 @@ class BudgetSource(Table):
             )
 
 
+class BudgetCorrelation(Table):
+    """How two sources go along with each other."""
+
+    first: Name = Field(description="name of a source, random or constant and Gaussian")
+    second: Name = Field(description="name of another one of its class")
+    coefficient: Annotated[float, Quantity("", least=-1.0, most=1.0)] = Field(description="of their correlation")
+
+
 class BudgetRequirement(Table):
     """One requirement on the pointing errors."""
 
@@ -100,13 +108,17 @@ class ErrorBudget(Table):
         description="true: what the fine-pointing loop leaves is a source, too"
     )
     sources: dict[str, BudgetSource] = Field(description="one table for each, [error_budget.sources.NAME]")
+    correlations: dict[str, BudgetCorrelation] | None = Field(
+        default=None, description="one table for each, [error_budget.correlations.NAME]; all else is uncorrelated"
+    )
     requirements: dict[str, BudgetRequirement] = Field(
         description="one table for each, [error_budget.requirements.NAME]"
     )
 
     def __hash__(self) -> int:
         """Of what is in it, in its order."""
-        return hash((self.with_loop, tuple(self.sources.items()), tuple(self.requirements.items())))
+        tables = (self.sources, self.correlations or {}, self.requirements)
+        return hash((self.with_loop, *(tuple(table.items()) for table in tables)))
 
     @property
     def axes(self) -> int:
