@@ -415,6 +415,9 @@ def two(first=3.0, second=4.0, **more):
     return [replace(source("random", size, **more), name=name) for name, size in (("a", first), ("b", second))]
 
 
+UNLIKE_PAIR = [two()[0], replace(source("constant", 0.0, "gaussian", 1.0), name="b")]
+
+
 @pytest.mark.parametrize(("rho", "sigma"), [(1.0, 7.0), (0.0, 5.0), (-1.0, 1.0), (0.5, math.sqrt(37.0))])
 def test_correlated_errors_add_as_their_matrix_says(rho, sigma):
     (found,) = budget([*two(), source("constant", 1.0)], [APE], [Correlation("a", "b", rho)])
@@ -448,14 +451,14 @@ def test_constants_on_the_worst_satellite_stay_as_they_are_and_go_along_over_all
         (two(), [Correlation("a", "a", 0.5)], "name two sources"),
         (two(), [Correlation("a", "b", 1.5)], "give one from -1 to 1"),
         (two(even_in_time=True), [Correlation("a", "b", 0.5)], "only two Gaussian errors of one class"),
-        ([*two()[:1], replace(source("constant", 0.0, "gaussian", 1.0), name="b")], [Correlation("a", "b", 0.5)], "only two Gaussian"),
+        (UNLIKE_PAIR, [Correlation("a", "b", 0.5)], "only two Gaussian errors of one class"),
         (
             [*two(), replace(source("random", 1.0), name="c")],
             [Correlation("a", "b", 0.9), Correlation("b", "c", 0.9), Correlation("a", "c", -0.9)],
             "their matrix has the eigenvalue -0.8, so that no errors can be correlated so",
         ),
     ],
-)  # fmt: skip
+)
 def test_correlations_that_cannot_be_are_refused(sources, correlations, said):
     with pytest.raises(ValueError, match=re.escape(said)):
         budget(sources, [APE], correlations)

@@ -56,8 +56,8 @@ def correlated(
     least = float(np.min(np.linalg.eigvalsh(matrix), initial=0.0))
     if least < -_INDEFINITE:
         raise ValueError(
-            f"correlations of {', '.join(names)}: their matrix has the eigenvalue {least:.3g}, so that no errors can be "
-            "correlated so; give a positive semidefinite one"
+            f"correlations of {', '.join(names)}: their matrix has the eigenvalue {least:.3g}, so that no errors can "
+            "be correlated so; give a positive semidefinite one"
         )
     merged = list(found)
     for group in _groups(matrix):
@@ -76,8 +76,8 @@ def _check(each: Correlation, by_name: dict[str, ErrorSource]) -> None:
     fits = all(source is not None and _gaussian(source) for source in both)
     if len(kinds) > 1 or not fits:
         raise ValueError(
-            f"{where}: only two Gaussian errors of one class, random or constant, that reach the axes by gains and alike "
-            "have one; state the common cause as a source of its own"
+            f"{where}: only two Gaussian errors of one class, random or constant, that reach the axes by gains and "
+            "alike have one; state the common cause as a source of its own"
         )
 
 
