@@ -9,6 +9,7 @@ import pytest
 from scipy import integrate, signal, stats
 
 from microrad.core import lti
+from microrad.link.error_budget.assembly import source_of
 from microrad.link.error_budget.budget import budget, shares, total
 from microrad.link.error_budget.contributions import Requirement, contribution, contributions
 from microrad.link.error_budget.correlation import Correlation
@@ -16,6 +17,8 @@ from microrad.link.error_budget.distributions import Bundle, case
 from microrad.link.error_budget.sources import ErrorSource, Spread
 from microrad.loop.disturbance import Disturbance, SpectralLine, first_order, olympus
 from microrad.loop.disturbance.windows import ErrorIndex, Motion, windowed_rms
+from microrad.mission.source_list import read_sources
+from places import ROOT
 
 ONE = np.array([1.0])
 APE = Requirement(ErrorIndex("APE"), axes=(0,))
@@ -462,3 +465,12 @@ def test_constants_on_the_worst_satellite_stay_as_they_are_and_go_along_over_all
 def test_correlations_that_cannot_be_are_refused(sources, correlations, said):
     with pytest.raises(ValueError, match=re.escape(said)):
         budget(sources, [APE], correlations)
+
+
+def test_the_page_s_list_comes_to_what_the_page_says(tmp_path):
+    text = (ROOT / "docs" / "pointing.md").read_text("utf-8")
+    (tmp_path / "errors.csv").write_text(re.search(r"```text\n(name,class.*?)```", text, re.DOTALL)[1], "utf-8")
+    parts = [source_of(each.name, each.source, each.origin) for each in read_sources(tmp_path / "errors.csv")]
+    (found,) = budget(parts, [Requirement(ErrorIndex("RPE", 0.01))])
+    exact, rules = (f"{1e6 * each:.2f} µrad" for each in (found.quantile_rad, found.by_rules_rad))
+    assert f"come to {exact} by their distribution and to\n{rules} by the rules" in text

@@ -13,12 +13,12 @@ def test_every_controllers_worked_example_runs(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     text = (ROOT / "docs" / "pointing.md").read_text(encoding="utf-8")
     blocks = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
-    assert len(blocks) == 13
+    assert len(blocks) == 14
     session: dict[str, object] = {}
     for block in blocks:
         exec(block, session)
     printed = capsys.readouterr().out
-    assert printed.count("\n") == 14 and "nan" not in printed
+    assert printed.count("\n") == 16 and "nan" not in printed
     assert "hysteresis is a Bouc-Wen model" in printed
     assert "mean of an axis over 1 s: 5.8005 urad, by the rational filter +9.7%" in printed
     assert session["tuned"].margins.modulus >= 0.5 and session["lqg"].residual_rms_rad >= session["bound"]
