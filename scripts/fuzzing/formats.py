@@ -27,13 +27,14 @@ from microrad.campaign.ledger.file import HEADS, digest, files
 from microrad.cli.frame import refusal_of
 from microrad.export.linear_import import Given, import_mat
 from microrad.lab.bench import load_plan
-from microrad.lab.recording import read_recording
+from microrad.lab.recording import read_motion, read_recording
 from microrad.lab.recording.files import check_file
 from microrad.lab.recording.formats.source import is_time_name
 from microrad.lab.recording.list_file import read_list
 from microrad.lab.recording.reader import open_source
 from microrad.mirror import coupled, from_table, read_mirror
 from microrad.mission.file import holds_several_axes, load_coupled_mirror, load_link, load_mirror, load_mission
+from microrad.mission.source_list import read_sources
 from microrad.orbit.earth.epoch import Epoch
 from microrad.orbit.files import read_elements, read_oem
 from microrad.orbit.files.elements import checksum
@@ -155,6 +156,15 @@ def _recording(path: Path) -> None:
     used = [index for index, name in enumerate(source.names) if not is_time_name(name)][:2] or [0]
     is_timed = len(source.names) > used[-1] and (source.find_time(used) is not None or source.rates(used))
     properties.recording(read_recording(path, used[0], used[-1], None if is_timed else seeds.RATE_HZ))
+
+
+def _motion(path: Path) -> None:
+    found = read_motion(path, unit="urad") if path.stat().st_size % 2 else read_motion(path, rate_hz=seeds.RATE_HZ)
+    properties.finite("motion", found.samples_rad)
+
+
+def _sources(path: Path) -> None:
+    properties.budget(read_sources(path))
 
 
 def _elements(path: Path) -> None:
@@ -292,6 +302,9 @@ FORMATS: dict[str, Format] = {
         FileFormat("plans", ".toml", seeds.plans, mutate.text, _plan, most_s=20.0, most_bytes=2_000_000_000),
         FileFormat("campaigns", ".toml", seeds.campaigns, mutate.text, _campaign, seeds.beside_campaigns),
         FileFormat("lists", ".toml", seeds.lists, mutate.text, _list, seeds.beside_lists),
+        FileFormat("sources", ".csv", seeds.sources, mutate.text, _sources),
+        FileFormat("workbooks", ".xlsx", seeds.workbooks, mutate.binary, _sources),
+        FileFormat("motions", ".csv", seeds.motions, mutate.text, _motion),
         FileFormat("csv", ".csv", seeds.csv, mutate.text, _recording),
         FileFormat("tdms", ".tdms", seeds.tdms, mutate.binary, _recording),
         FileFormat("lvm", ".lvm", seeds.lvm, mutate.text, _recording),

@@ -2,7 +2,8 @@
 
 import math
 import traceback
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,9 +16,14 @@ from microrad.core.budget import total_db
 from microrad.lab.bench.plan import Plan
 from microrad.lab.recording import Recording
 from microrad.link import study
+from microrad.link.error_budget import Requirement
+from microrad.link.error_budget import budget as error_budget
+from microrad.link.error_budget.assembly import source_of
 from microrad.link.pointing import outage
+from microrad.loop.disturbance.windows import ErrorIndex
 from microrad.mirror import Mirror, coupled
 from microrad.mission.file import LinkFile, load_coupled_mirror
+from microrad.mission.source_list import ListedSource
 from microrad.orbit.base import Orbit
 from microrad.orbit.propagation.mean_elements import ElementSet, Sgp4Orbit
 
@@ -163,6 +169,26 @@ def recording(found: Recording) -> None:
 
 
 # -------------------------------------------------------------------------------------------------------------- orbits
+def budget(listed: Sequence[ListedSource]) -> None:
+    """A budget of a list is finite, grows as its sources do, and is a multiple of them where all grow alike.
+
+    Args:
+        listed: The list.
+    """
+    try:
+        sources = [source_of(each.name, each.source, each.origin) for each in listed]
+        index = ErrorIndex("RPE", 0.01) if len(listed) % 2 else ErrorIndex("APE")
+        required = Requirement(index, axes=tuple(range(min(sources[0].axes, 2))))
+        (found,) = error_budget([replace(each) for each in sources], [required])
+        (twice,) = error_budget([replace(each, size=each.size.times(2.0)) for each in sources], [required])
+    except ValueError as error:
+        raise documented(error) from error
+    finite("budget", [found.by_rules_rad, found.quantile_rad, *found.mean_rad, *found.sigma_rad])
+    assert twice.quantile_rad >= found.quantile_rad >= 0.0, "a budget falls with its sources"
+    same = math.isclose(twice.quantile_rad, 2.0 * found.quantile_rad, rel_tol=1e-6)
+    assert same, "twice the sources are not twice the budget"
+
+
 def elements(sets: Iterable[ElementSet]) -> None:
     """Each element set is an orbit about its own epoch, or is refused there."""
     for each in sets:

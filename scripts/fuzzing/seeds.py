@@ -15,6 +15,7 @@ from pathlib import Path
 
 import h5py
 import numpy as np
+import openpyxl
 from nptdms import ChannelObject, TdmsWriter
 from scipy.io import savemat
 from sgp4.api import WGS72, Satrec
@@ -189,6 +190,48 @@ def beside_lists() -> dict[str, bytes]:
     archive = io.BytesIO()
     np.savez(archive, u=drives[::-1], y=outputs[::-1], fs=RATE_HZ)
     return {"both.csv": text.encode(), "again.npz": archive.getvalue()}
+
+
+_SOURCES = """name,class,size,rate,statistic,axes,x,y,corner,frequency,period,decay,origin
+alignment,constant,2 urad,,3-sigma,each,1,1,,,,,calibration
+star tracker,random,3 urad,,bound,each,1,1,,,,,data sheet
+thermo-elastic,periodic,1.5 urad,,bound,together,1,0.5,,0.18 mHz,,,
+drift,drift,,0.1 nrad/s,1-sigma,each,1,1,,,6 h,,
+wheels,process,0.5 urad,,1-sigma,each,1,1,40 Hz,,,,
+unloading,transient,4 urad,,fixed,together,0.5,1,,,95 min,20 s,
+"""
+
+
+@cache
+def sources() -> tuple[bytes, ...]:
+    """Lists of error sources: all classes, a few of them, and three axes between semicolons."""
+    few = "".join(_SOURCES.splitlines(keepends=True)[:3])
+    wide = "name;class;size;statistic;axes;x;y;z\na;constant;1 mrad;fixed;each;1;0;-1\n"
+    return of_texts("sources", [_SOURCES, few, wide])
+
+
+@cache
+def workbooks() -> tuple[bytes, ...]:
+    """The first of these as a workbook."""
+
+    def make(folder: Path) -> None:
+        book = openpyxl.Workbook()
+        for line in _SOURCES.splitlines():
+            book.active.append([cell or None for cell in line.split(",")])
+        book.save(folder / "sources.xlsx")
+
+    return by_files("workbooks", make)
+
+
+@cache
+def motions() -> tuple[bytes, ...]:
+    """Recorded motions: with a time and a unit, with two axes, and without either."""
+    rows = np.column_stack([TIME_S, 1e3 * OUTPUT, -OUTPUT])
+    head, two = "time (s),x (urad)\n", "time (s),x (urad),y (mrad)\n"
+    lines = [",".join(f"{value:.6g}" for value in row) for row in rows]
+    one = head + "".join(f"{line.rpartition(',')[0]}\n" for line in lines)
+    alone = "x\n" + "".join(f"{line.split(',')[1]}\n" for line in lines)
+    return of_texts("motions", [one, two + "\n".join(lines) + "\n", alone])
 
 
 @cache

@@ -1,6 +1,7 @@
 """Lists of error sources as tables of a spreadsheet: what is read, and every refusal in a line."""
 
 import re
+from zipfile import ZIP_DEFLATED, ZipFile
 
 import pytest
 
@@ -94,3 +95,12 @@ def test_files_that_are_no_list_are_refused(tmp_path):
     (tmp_path / "other.xlsx").write_bytes(b"PK\x03\x04 nothing more")
     with pytest.raises(SourceListError, match="is no workbook"):
         read_sources(tmp_path / "other.xlsx")
+
+
+def test_a_workbook_that_unpacks_to_more_than_memory_has_is_refused(tmp_path):
+    pytest.importorskip("openpyxl", reason="the extra xlsx is not installed")
+    path = tmp_path / "bomb.xlsx"
+    with ZipFile(path, "w", ZIP_DEFLATED) as book:
+        book.writestr("xl/sharedStrings.xml", bytes(101_000_000))
+    with pytest.raises(SourceListError, match="is no workbook .it unpacks to 101 MB"):
+        read_sources(path)

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
+from zipfile import ZipFile
 
 from pydantic import ValidationError
 
@@ -22,7 +22,7 @@ _KEYS = {info.alias or name for name, info in BudgetSource.model_fields.items()}
 COLUMNS = ("name", *(info.alias or name for name, info in BudgetSource.model_fields.items() if name != "gains"))
 """Columns of a list beside those of the axes, x, y and z, and the origin."""
 
-_MOST_BYTES, _MOST_ROWS, _MOST_SHOWN = 20_000_000, 10_000, 60
+_MOST_BYTES, _MOST_UNPACKED_BYTES, _MOST_ROWS, _MOST_SHOWN = 20_000_000, 100_000_000, 10_000, 60
 
 
 class SourceListError(MicroradError):
@@ -141,14 +141,19 @@ def _of_workbook(path: Path) -> Iterator[list[str]]:
             f"{path}: reading a workbook needs the library openpyxl, which is not installed; install it "
             f"{advice('xlsx')}, or save the sheet as CSV"
         ) from None
+    data = io.BytesIO(_bytes(path))
     try:
-        book = load_workbook(io.BytesIO(_bytes(path)), read_only=True, data_only=True)
-        for row in book.worksheets[0].iter_rows(values_only=True):
+        with ZipFile(data) as parts:
+            size = sum(each.file_size for each in parts.infolist())
+        if size > _MOST_UNPACKED_BYTES:
+            raise ValueError(f"it unpacks to {size // 10**6} MB")
+        for row in load_workbook(data, read_only=True, data_only=True).worksheets[0].iter_rows(values_only=True):
             yield ["" if cell is None else str(cell) for cell in row]
-    except (BadZipFile, KeyError, ValueError, IndexError, TypeError, AttributeError, OSError) as error:
-        raise SourceListError(
-            f"{path}: is no workbook ({_short(str(error))}); save it again as .xlsx, or as CSV"
-        ) from None
+    except SourceListError:
+        raise
+    except Exception as error:  # whatever a damaged one raises in there
+        what = _short(" ".join(str(error).split()) or type(error).__name__)
+        raise SourceListError(f"{path}: is no workbook ({what}); save it again as .xlsx, or as CSV") from None
 
 
 def _bytes(path: Path) -> bytes:
