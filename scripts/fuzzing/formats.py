@@ -91,6 +91,8 @@ def _mission(path: Path) -> None:
     file = load_mission(path)
     with refusal_of(path):
         properties.links(file)
+        if file.mission.error_budget is not None:
+            properties.mission_budget(file.mission.error_budget)
     properties.plant(from_table(file.mission.mirror))
 
 

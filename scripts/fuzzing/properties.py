@@ -16,14 +16,15 @@ from microrad.core.budget import total_db
 from microrad.lab.bench.plan import Plan
 from microrad.lab.recording import Recording
 from microrad.link import study
-from microrad.link.error_budget import Requirement
+from microrad.link.error_budget import Requirement, shares
 from microrad.link.error_budget import budget as error_budget
-from microrad.link.error_budget.assembly import source_of
+from microrad.link.error_budget.assembly import correlations_of, requirement_of, source_of, sources_of
 from microrad.link.pointing import outage
 from microrad.loop.disturbance.windows import ErrorIndex
 from microrad.mirror import Mirror, coupled
 from microrad.mission.file import LinkFile, load_coupled_mirror
 from microrad.mission.source_list import ListedSource
+from microrad.mission.tables.error_budget import ErrorBudget
 from microrad.orbit.base import Orbit
 from microrad.orbit.propagation.mean_elements import ElementSet, Sgp4Orbit
 
@@ -169,6 +170,24 @@ def recording(found: Recording) -> None:
 
 
 # -------------------------------------------------------------------------------------------------------------- orbits
+def mission_budget(table: ErrorBudget) -> None:
+    """A mission's budget is finite under each requirement.
+
+    Args:
+        table: The mission's table.
+    """
+    try:
+        sources = sources_of(table, dict.fromkeys(table.sources, ""))
+        asked = [requirement_of(each) for each in table.requirements.values()]
+        found = error_budget(sources, asked, correlations_of(table)) if sources else ()
+    except ValueError as error:
+        raise documented(error) from error
+    for each in found:
+        finite("budget", [each.by_rules_rad, each.quantile_rad, *each.mean_rad, *each.sigma_rad])
+        for share in shares(each) if each.quantile_rad else ():
+            finite("share", [share.without_rad, share.growth])
+
+
 def budget(listed: Sequence[ListedSource]) -> None:
     """A budget of a list is finite, grows as its sources do, and is a multiple of them where all grow alike.
 

@@ -90,13 +90,43 @@ def _old(kind: str) -> tuple[str, ...]:
     return tuple(path.read_text(encoding="utf-8") for path in sorted(CORPUS.glob(f"[0-9]*/{kind}/*.toml")))
 
 
+_BUDGET = """
+[error_budget]
+with_loop = false
+
+[error_budget.sources.alignment]
+class = "constant"
+size = "2 urad"
+statistic = "3-sigma"
+axes = "each"
+gains = [1.0, 0.5]
+
+[error_budget.sources.orbit]
+class = "periodic"
+size = "1 urad"
+statistic = "fixed"
+axes = "together"
+gains = [1.0, -1.0]
+frequency = "0.18 mHz"
+
+[error_budget.requirements.word]
+index = "PDE"
+window = "10 ms"
+spacing = "1 min"
+observation = "95 min"
+confidence = 0.9973
+interpretation = "mixed"
+axes = "radial"
+limit = "10 urad"
+"""
+
+
 @cache
 def missions() -> tuple[bytes, ...]:
     """Whole missions: those that are shipped, and those of older versions."""
     shipped = [path.read_text(encoding="utf-8") for path in (SHIPPED, DEFAULT)]
-    return of_texts(
-        "missions", [*shipped, without_fine_pointing(shipped[0]), without_day(shipped[0]), *_old("missions")]
-    )
+    less = without_fine_pointing(shipped[0]), without_day(shipped[0])
+    return of_texts("missions", [*shipped, *less, less[0] + _BUDGET, *_old("missions")])
 
 
 @cache

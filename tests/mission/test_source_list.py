@@ -102,5 +102,5 @@ def test_a_workbook_that_unpacks_to_more_than_memory_has_is_refused(tmp_path):
     path = tmp_path / "bomb.xlsx"
     with ZipFile(path, "w", ZIP_DEFLATED) as book:
         book.writestr("xl/sharedStrings.xml", bytes(101_000_000))
-    with pytest.raises(SourceListError, match="is no workbook .it unpacks to 101 MB"):
+    with pytest.raises(SourceListError, match=r"is no workbook .it unpacks to 101 MB"):
         read_sources(path)
