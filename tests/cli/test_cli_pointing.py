@@ -61,11 +61,34 @@ def test_the_tables_name_sources_windows_and_what_filters_make_of_them(call):
     [
         (("--window", "1 us"), "window_s of MPE is 1e-06 s, and the sensor reads every 0.0002 s: give more"),
         (("--window", "0 s"), "window_s of MPE is 0 s; give a finite number above zero"),
+        (("--simulate", "0"), "0 runs leave no errors: ask for 1 run or more, 2 for an interval"),
+        (("--simulate", "2", "--window", "2 s"), "MPE looks at 2 s of a run, and 1.5 s are left behind its settling"),
+        (("--simulate", "2", "--window", "0.2 ms"), "MPE over 200 µs looks at one control sample of a run: give a"),
         (("--controller", "best"), "'best' is no controller of this mission; it has PI"),
     ],
 )
 def test_what_cannot_be_is_refused(refused, options, words):
     assert words in refused("pointing", DEFAULT, *options)
+
+
+def test_runs_stand_beside_linear_theory_in_the_same_windows(call):
+    """The printed hysteresis of the shipped mission adds more than all sensor noise: it shows in every index."""
+    options = ("--window", "10 ms", "--spacing", "0.1 s", "--simulate", "16", "--json")
+    code, out, _ = call("pointing", DEFAULT, *options)
+    document = json.loads(out)
+    found = document["simulated"]["indices"]
+    assert (code, document["simulated"]["runs"]) == (0, 16)
+    for each, linear in zip(found, document["indices"], strict=True):
+        times = [(one["index"], one["window_s"], one["spacing_s"]) for one in (each, linear)]
+        assert times[0] == times[1]
+        assert each["linear_rad"] == pytest.approx(linear["left_rad"]["all"], rel=0.01, abs=0.0)
+        assert each["simulated_rad"] > each["linear_rad"] + each["interval_rad"] > each["linear_rad"]
+        assert each["simulated_rad"] == pytest.approx(math.hypot(*each["simulated_by_axis_rad"]), rel=1e-12, abs=0.0)
+    _, out, _ = call("pointing", DEFAULT, *options[:-2], "1")
+    assert "Simulated, with hysteresis\n" in out and "simulated in 1 run " in " ".join(out.split())
+    rows = [line.split() for line in out[out.index("Simulated, with") :].splitlines() if line.split()[:1] == ["APE"]]
+    assert [row[-1] for row in rows] == ["unknown"]
+    assert max(map(len, out.splitlines())) <= 80
 
 
 def test_a_time_without_a_unit_is_refused_by_its_option(call):

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from microrad.loop.controller_study import Design, Outlook, Scene
     from microrad.loop.disturbance.windows import ErrorIndex
     from microrad.loop.pointing_loop.linear import ClosedLoop
+    from microrad.loop.pointing_loop.simulated_windows import SimulatedErrors
     from microrad.loop.pointing_loop.windows import WindowedErrors
     from microrad.mission.file import MissionFile
 
@@ -85,16 +86,24 @@ def design(
         "microrad pointing leo-geo.toml --window '1 ms' --window '10 s' --spacing '1 min'",
         "microrad pointing leo-geo.toml --controller LQG --json",
         "microrad pointing leo-geo.toml --sources errors.csv",
+        "microrad pointing leo-geo.toml --simulate 128",
     )
 )
 @command
 def pointing(
     file: Annotated[Path, typer.Argument(help="Mission file with a table [fine_pointing].", metavar="FILE")],
-    window: Annotated[list[float] | None, time_option("--window", "Length of a window [default: 10 ms and 1 s];")] = None,
-    spacing: Annotated[list[float] | None, time_option("--spacing", "From the begin of a window to that of another;")] = None,
+    window: Annotated[
+        list[float] | None, time_option("--window", "Length of a window [default: 10 ms and 1 s];")
+    ] = None,
+    spacing: Annotated[
+        list[float] | None, time_option("--spacing", "From the begin of a window to that of another;")
+    ] = None,
     controller: Annotated[str, option("--controller", "NAME", "One that microrad design lists.")] = "PI",
     sources: Annotated[
         Path | None, option("--sources", "LIST", "Sources of errors as CSV or XLSX, a row each.")
+    ] = None,
+    simulate: Annotated[
+        int | None, option("--simulate", "RUNS", "Runs of the loop in the same windows, with hysteresis.")
     ] = None,
     as_json: Json = False,
 ) -> Outcome:
@@ -103,7 +112,7 @@ def pointing(
     The indices are those of ECSS-E-ST-60-10C: all of the error (APE), its mean over a window (MPE), what is left beside
     that mean (RPE), and the difference of the means of two windows (PDE). They are radial rms in theory (linear), by
     source, of what the loop leaves and of the same disturbances without a loop, exactly; the rational filters of linear
-    tools stand beside that.
+    tools stand beside that. --simulate has the same indices of runs on the mission's mirror, with intervals of 99 %.
 
     A mission with a table [error_budget], or a list of sources beside it, has a budget: each requirement with its total
     by the rules of the standard and as a full distribution, what each source weighs, and how large it may become. The
@@ -111,6 +120,7 @@ def pointing(
     """
     from microrad.mission.file import MissionFile, load_link, load_mission
     from microrad.report.error_budget import budget_data, budget_view
+    from microrad.report.fine_pointing.simulated_windows import simulated_data, simulated_view
     from microrad.report.fine_pointing.windows import windows_data, windows_text
     from microrad.report.view import views_text
 
@@ -120,10 +130,13 @@ def pointing(
         asked = sources_beside(mission, sources, indices)
     table, data, texts, closed = mission.mission.error_budget, dict[str, Any](), list[str](), None
     loop, needed = mission if isinstance(mission, MissionFile) else None, asked is None or (table and table.with_loop)
-    if needed or (loop and loop.mission.fine_pointing):
-        closed, errors = _closed(loop or load_mission(file), controller, indices)
+    if needed or simulate is not None or (loop and loop.mission.fine_pointing):
+        closed, errors, simulated = _closed(loop or load_mission(file), controller, indices, simulate)
         data |= {"controller": controller, "indices": windows_data(errors)}
         texts.append(windows_text(errors, controller, width()))
+        if simulate is not None:
+            data["simulated"] = {"runs": simulate, "indices": simulated_data(simulated)}
+            texts.append(views_text(simulated_view(simulated, simulate).blocks, width()).strip("\n"))
     code = MET
     if asked is not None:
         with refusal_of(mission.path):
@@ -137,13 +150,15 @@ def pointing(
 
 
 def _closed(
-    mission: "MissionFile", controller: str, indices: "list[ErrorIndex]"
-) -> "tuple[ClosedLoop, tuple[WindowedErrors, ...]]":
-    """The mission's loop under one of its controllers, and its errors in each index."""
+    mission: "MissionFile", controller: str, indices: "list[ErrorIndex]", simulate: int | None
+) -> "tuple[ClosedLoop, tuple[WindowedErrors, ...], tuple[SimulatedErrors, ...]]":
+    """The mission's loop under one of its controllers, its errors in each index, and those of so many runs of it."""
     from microrad import mirror as mirror_room
     from microrad.link import tracking_light_w
     from microrad.loop import controller_study
+    from microrad.loop.controller_study.results import span
     from microrad.loop.pointing_loop.linear import close
+    from microrad.loop.pointing_loop.simulated_windows import simulated_windows
     from microrad.loop.pointing_loop.windows import windowed_errors
     from microrad.mission.file import mirror_of_loop
 
@@ -153,7 +168,12 @@ def _closed(
         scene = controller_study.scene(mission, mirror_room.of(mission.mission), tracking_light_w(mission))
         (made,) = controller_study.design(scene, progress, [controller])
         closed = close(scene.theory, made.controller)
-        return closed, windowed_errors(closed, indices)
+        errors = windowed_errors(closed, indices)
+        simulated: tuple[SimulatedErrors, ...] = ()
+        if simulate is not None:
+            asked = span(scene.table), simulate
+            simulated = simulated_windows(scene.loop, made.controller, indices, *asked, on_progress=progress)
+        return closed, errors, simulated
 
 
 def _broken(designs: "tuple[Design, ...]", left: "tuple[Outlook, ...]", accept: bool) -> str:
