@@ -85,7 +85,7 @@ def test_runs_stand_beside_linear_theory_in_the_same_windows(call):
         assert each["simulated_rad"] > each["linear_rad"] + each["interval_rad"] > each["linear_rad"]
         assert each["simulated_rad"] == pytest.approx(math.hypot(*each["simulated_by_axis_rad"]), rel=1e-12, abs=0.0)
     _, out, _ = call("pointing", DEFAULT, *options[:-2], "1")
-    assert "Simulated, with hysteresis\n" in out and "simulated in 1 run " in " ".join(out.split())
+    assert "Simulated, with hysteresis\n" in out and "Number of runs: 1;" in " ".join(out.split())
     rows = [line.split() for line in out[out.index("Simulated, with") :].splitlines() if line.split()[:1] == ["APE"]]
     assert [row[-1] for row in rows] == ["unknown"]
     assert max(map(len, out.splitlines())) <= 80

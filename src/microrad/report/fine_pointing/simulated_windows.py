@@ -29,8 +29,8 @@ def simulated_view(errors: Sequence[SimulatedErrors], runs: int) -> View:
     ]
     table = Table("Simulated, with hysteresis", ("index", "linear", "simulated", "99 % interval"), rows)
     about = (
-        f"Radial rms in µrad, both at the control samples: linear in theory, simulated in {runs} run{'s' * (runs > 1)} on the "
-        "mission's mirror. The interval is that of the spread between the runs."
+        "Radial rms in µrad, both at the control samples: linear in theory, simulated on the mission's mirror. "
+        f"Number of runs: {runs}; their spread gives the interval."
     )
     return View(table.title, [table, Points([about])])
 
