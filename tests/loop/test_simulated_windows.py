@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from functools import reduce
 from itertools import pairwise
 
 import numpy as np
@@ -121,6 +122,65 @@ def test_theory_at_the_samples_is_theory_at_all_plant_steps_where_each_sample_ha
     for index in INDICES:
         at_all_steps = sum(windowed(closed, index).values())
         assert_allclose(windowed_in_all(closed, index, at_samples=True), at_all_steps, rtol=1e-12)
+
+
+def drawn_loop(number):
+    """A loop and a PI that keeps it stable, settled to e^-20 behind a thousand samples, of a seed of its own."""
+    rng = np.random.default_rng([20, number])
+    while True:
+        rate = 10.0 ** rng.uniform(2.5, 4.0)
+        modes = [2.0 * math.pi * rate * rng.uniform(0.05, 1.0) for _ in range(rng.integers(1, 3))]
+        forms = [[1 / w**2, 2 * 10.0 ** rng.uniform(-2.0, 0.0) / w, 1.0] for w in modes]
+        share = rng.uniform(0.2, 0.8)
+        light = np.ones(1) if len(forms) == 1 else share * np.array(forms[1]) + (1.0 - share) * np.array(forms[0])
+        steps, gain, line = int(rng.choice([1, 2, 5])), 10.0 ** rng.uniform(-6.0, -4.0), ()
+        step = 1.0 / rate / steps
+        if rng.random() < 0.3:
+            wheel = SpectralLine(10.0 ** rng.uniform(-7.0, -5.5), rate * rng.uniform(0.01, 0.4))
+            line = (replace(LINE, lines=(wheel,)),)
+        level, corner = 10.0 ** rng.uniform(-14.0, -10.0), rate * 10.0 ** rng.uniform(-3.5, -1.0)
+        loop = Loop(
+            mirror=Mirror.of(gain, light.tolist(), reduce(np.polymul, forms)),
+            rate_hz=rate,
+            vibration=(first_order(level, corner, convention="per-axis", name="vibration"), *line),
+            sensor_noise_rad=10.0 ** rng.uniform(-7.5, -5.5),
+            delay_s=int(rng.integers(0, 2 * steps + 1)) * step,
+            sensor_delay_s=int(rng.integers(0, steps + 1)) * step,
+            steps_per_sample=steps,
+        )
+        proportional, integral = rng.uniform(0.0, 0.5) / gain, 10.0 ** rng.uniform(-2.0, -0.3) / gain * rate
+        controller = loop.assembled(Controller.pid(proportional, integral, rate_hz=rate))
+        if close(loop.parts, controller).worst_pole()[0] < 0.98:
+            return loop.parts, controller
+
+
+def missed(number, off=1.0):
+    """Which indices of a drawn loop have exact theory, so many times as large, outside the interval of 64 runs."""
+    loop, controller = drawn_loop(number)
+    period = loop.timing.period_s
+    times = [10.0 ** np.random.default_rng([21, number]).uniform(0.5, 2.0) * period for _ in range(2)]
+    indices = [ErrorIndex("APE"), *(ErrorIndex(kind, times[0]) for kind in ("MPE", "RPE")), ErrorIndex("PDE", *times)]
+    found = simulated_windows(loop, controller, indices, Span(7000 * period, 1000 * period, number), 64)
+    assert all(each.interval_rad < 0.1 * each.rms_rad for each in found)
+    return [abs(each.rms_rad - off * each.linear_rad) > each.interval_rad for each in found]
+
+
+@pytest.mark.parametrize("loops", [6, *(pytest.param(loops, marks=pytest.mark.endurance) for loops in (200, 1000))])
+def test_exact_theory_lies_in_the_intervals_of_runs_of_random_loops(loops):
+    """An interval of 99 % misses once in a hundred, so that misses of an index are binomial in the loops drawn.
+
+    Each index has to lie in the middle 99.8 % of that: 0 to 2 of 6 loops, 0 to 8 of 200, 2 to 21 of 1000. The loops are
+    independent of each other, the indices of a loop are not.
+    """
+    from scipy.stats import binom
+
+    misses = np.sum([missed(number) for number in range(loops)], axis=0)
+    fewest, most = binom.ppf([0.001, 0.999], loops, 0.01)
+    assert np.all((fewest <= misses) & (misses <= most)), misses
+
+
+def test_theory_that_is_a_tenth_off_lies_outside_of_them():
+    assert np.all([missed(number, off) for number, off in enumerate((0.9, 1.1))])
 
 
 def test_one_run_has_no_interval_and_the_share_of_many_is_student_s():
