@@ -91,6 +91,55 @@ def test_runs_stand_beside_linear_theory_in_the_same_windows(call):
     assert max(map(len, out.splitlines())) <= 80
 
 
+@pytest.fixture
+def coded(tmp_path):
+    """Writes the shipped mission with a code word of some length, and a margin that pointing misses at times."""
+
+    def write(word, margin="5.5 dB"):
+        text = DEFAULT.read_text("utf-8")
+        for old, new in (
+            ('[requirement]\nmargin = "3 dB"', f'[requirement]\nmargin = "{margin}"'),
+            ("[communication]\n", f'[communication]\ncode_word = "{word}"\n'),
+        ):
+            assert text.count(old) == 1
+            text = text.replace(old, new)
+        (tmp_path / "m.toml").write_text(text, "utf-8")
+        return tmp_path / "m.toml"
+
+    return write
+
+
+def test_a_code_word_averages_over_fades_that_are_shorter(call, coded):
+    shares = []
+    for word in ("0.4 ms", "50 ms"):
+        code, out, _ = call("pointing", coded(word), "--window", "10 ms", "--simulate", "16", "--json")
+        found = json.loads(out)["simulated"]["code_words"]
+        assert code == 0
+        for each in (found["lost"], found["time"]):
+            assert 0.0 <= each["low"] <= each["value"] <= each["high"] <= 1.0
+        shares.append((found["lost"]["value"], found["time"]["value"]))
+        assert found["words"] == 16 * round(1.5 / found["code_word_s"])
+    assert shares[0][1] == shares[1][1] > 0.02
+    assert shares[1][0] < 0.5 * shares[0][0] < shares[0][1]
+    _, out, _ = call("pointing", coded("10 ms"), "--window", "10 ms", "--simulate", "16")
+    assert "Lost to pointing, simulated" in out and "code words of 10 ms" in out and "Of 2400 code words" in out
+    _, out, _ = call("pointing", DEFAULT, "--window", "10 ms", "--simulate", "1", "--json")
+    assert "code_words" not in json.loads(out)["simulated"]
+
+
+@pytest.mark.parametrize(
+    ("word", "words"),
+    [
+        ("2 s", "a code word of 2 s is longer than a run, of which 1.5 s are left behind its settling: make the runs"),
+        ("0.1 ms", "a code word of 100 µs has less than two control samples, 200 µs apart"),
+        ("0 s", "communication.code_word"),
+    ],
+)
+def test_a_code_word_that_no_run_holds_is_refused(refused, coded, word, words):
+    coded(word)
+    assert words in refused("pointing", "m.toml", "--window", "10 ms", "--simulate", "2")
+
+
 def test_a_time_without_a_unit_is_refused_by_its_option(call):
     code, out, err = call("pointing", DEFAULT, "--window", "1")
     assert (code, out) == (2, "") and "'--window': \"1\" is a number without a unit" in err

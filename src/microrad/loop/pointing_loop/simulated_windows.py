@@ -15,6 +15,7 @@ import numpy as np
 
 from microrad.core import kernels
 from microrad.core.arrays import Floats
+from microrad.core.intervals import student
 from microrad.core.progress import Progress
 from microrad.core.threads import in_threads
 from microrad.core.units import format_quantity
@@ -186,12 +187,9 @@ def half_width(by_run: Floats) -> float:
     Args:
         by_run: What is averaged, shape (runs,).
     """
-    from scipy.special import stdtrit
-
     if by_run.size < 2:
         return math.inf
-    spread = float(np.std(by_run, ddof=1)) / math.sqrt(by_run.size)
-    return float(stdtrit(by_run.size - 1, 0.5 + CONFIDENCE / 2.0)) * spread
+    return student(CONFIDENCE, by_run.size - 1) * float(np.std(by_run, ddof=1)) / math.sqrt(by_run.size)
 
 
 def window_samples(loop: PointingLoop, index: ErrorIndex, span: Span) -> tuple[int, int]:
