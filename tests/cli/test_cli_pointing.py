@@ -11,7 +11,7 @@ import several_axes
 from microrad.loop.disturbance import olympus
 from microrad.loop.disturbance.windows import ErrorIndex, windowed_rms
 from places import ROOT
-from shipped import DEFAULT
+from shipped import DEFAULT, without_fine_pointing
 
 
 @pytest.fixture(scope="module")
@@ -125,6 +125,20 @@ def test_a_code_word_averages_over_fades_that_are_shorter(call, coded):
     assert "Lost to pointing, simulated" in out and "code words of 10 ms" in out and "Of 2400 code words" in out
     _, out, _ = call("pointing", DEFAULT, "--window", "10 ms", "--simulate", "1", "--json")
     assert "code_words" not in json.loads(out)["simulated"]
+
+
+def test_words_at_the_largest_data_rate_have_what_is_left_of_its_margin(call, coded):
+    """Solved for 10 urad, so that less than the margin is left beyond that: the loop hardly ever is."""
+    path = coded("10 ms", "3 dB")
+    text = path.read_text("utf-8").replace('data_rate = "300 Mbit/s"', 'data_rate = "largest"', 1)
+    path.write_text(text, "utf-8")
+    code, out, _ = call("pointing", path, "--window", "10 ms", "--simulate", "2", "--json")
+    assert code == 0 and json.loads(out)["simulated"]["code_words"]["lost"]["value"] == 0.0
+
+
+def test_runs_of_a_mission_without_a_loop_are_refused(refused, tmp_path):
+    (tmp_path / "m.toml").write_text(without_fine_pointing(DEFAULT.read_text("utf-8")), "utf-8")
+    assert "has no table [fine_pointing]: microrad init writes one" in refused("pointing", "m.toml", "--simulate", "2")
 
 
 @pytest.mark.parametrize(

@@ -96,6 +96,14 @@ def test_runs_without_hysteresis_are_linear_theory_and_those_with_it_are_not():
     """The line and the vibration move slowly: 2.5 s hold few of their periods, and their interval is the widest."""
     for found in simulated(PLAIN, runs=64):
         assert abs(found.rms_rad - found.linear_rad) < 1.5 * found.interval_rad < 0.2 * found.rms_rad
+    slow = replace(PLAIN.parts, optical=replace(PLAIN.parts.optical, every=3))
+    in_readings = (
+        ErrorIndex("APE"),
+        *(ErrorIndex(kind, 0.009) for kind in ("MPE", "RPE")),
+        ErrorIndex("PDE", 0.009, 0.006),
+    )
+    for found in simulated_windows(slow, PLAIN.assembled(TRACKING), in_readings, SPAN, 64):
+        assert abs(found.rms_rad - found.linear_rad) < 1.5 * found.interval_rad < 0.1 * found.rms_rad
     bent = simulated(BENT, runs=64, indices=INDICES[:3])
     assert any(abs(found.rms_rad - found.linear_rad) > 2.0 * found.interval_rad for found in bent)
 

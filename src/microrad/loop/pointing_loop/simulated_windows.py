@@ -192,18 +192,8 @@ def half_width(by_run: Floats) -> float:
     return student(CONFIDENCE, by_run.size - 1) * float(np.std(by_run, ddof=1)) / math.sqrt(by_run.size)
 
 
-def window_samples(loop: PointingLoop, index: ErrorIndex, span: Span) -> tuple[int, int]:
-    """Window and spacing of an index in control samples; 0 for a time that it has not.
-
-    Args:
-        loop: The loop, for its clock.
-        index: What counts; its times are rounded to whole readings of the optical sensor.
-        span: How long a run is, and what is left out at its begin.
-
-    Raises:
-        ValueError: For a window that is shorter than two control samples, or that does not fit into a run behind the
-            settling, and for a run that ends before it has settled.
-    """
+def _times(loop: PointingLoop, index: ErrorIndex, span: Span) -> tuple[int, int]:
+    """Window and spacing of an index in control samples, 0 for a time that it has not; refused where no run has it."""
     window, apart = (readings * loop.optical.every for readings in readings_of(loop, index))
     total, settle = control_samples(loop, span)
     period = loop.timing.period_s
@@ -221,20 +211,6 @@ def window_samples(loop: PointingLoop, index: ErrorIndex, span: Span) -> tuple[i
     return window, apart
 
 
-def tally_of(loop: PointingLoop, index: ErrorIndex, span: Span) -> Tally:
-    """What an index counts of runs: its mean squares (rad^2), axis by axis.
-
-    Args:
-        loop: The loop.
-        index: What counts.
-        span: How long a run is, and what is left out at its begin.
-
-    Raises:
-        ValueError: As `window_samples`.
-    """
-    return _Squares(index, *window_samples(loop, index, span))
-
-
 def simulated_windows(
     loop: PointingLoop,
     controller: LoopController,
@@ -250,22 +226,23 @@ def simulated_windows(
     Args:
         loop: The loop.
         controller: The controller of all its axes.
-        indices: What counts of the error.
+        indices: What counts of the error; their times are rounded to whole readings of the optical sensor.
         span: How long a run is, what is left out at its begin, and the seed.
         runs: How many runs there are, 1 or more.
         threads: Threads to share them, by default one for each core.
         on_progress: Called with the runs that are done, their number and what is done.
 
     Raises:
-        ValueError: As `tallied` and `window_samples`, and for a loop that is unstable in theory.
+        ValueError: As `tallied`, for a window that is shorter than two control samples or does not fit into a run
+            behind its settling, and for a loop that is unstable in theory.
     """
     closed = close(loop, controller)
     refuse_unstable(closed)
+    times = [_times(loop, index, span) for index in indices]
 
-    def tallies() -> list[Tally]:
-        return [tally_of(loop, index, span) for index in indices]
+    def tallies() -> list[_Squares]:
+        return [_Squares(index, *each) for index, each in zip(indices, times, strict=True)]
 
-    tallies()  # refused before anything is simulated
     found = tallied(loop, controller, span, runs, tallies, threads=threads, on_progress=on_progress)
     return tuple(_errors(index, squares, closed) for index, squares in zip(indices, found, strict=True))
 
