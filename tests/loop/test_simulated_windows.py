@@ -124,6 +124,17 @@ def test_theory_at_the_samples_is_the_spectrum_there_under_the_weight_of_their_m
         assert abs(windowed_in_all(closed, index) / found - 1.0) > 1e-4
 
 
+def test_a_line_at_the_samples_is_what_a_run_without_noise_repeats_there():
+    loop = replace(PLAIN, vibration=LINE, sensor_noise_rad=0.0)
+    closed = close(loop.parts, loop.assembled(TRACKING))
+    error = trace(loop.parts, loop.assembled(TRACKING), Span(3.0, 0.0, 1)).error_rad[-100:, 0]  # three periods
+    means = np.mean([np.roll(error, k) for k in range(7)], axis=0)
+    for index, square in zip(INDICES, (error**2, means**2, error**2 - means**2), strict=False):
+        found = windowed_in_all(closed, index, at_samples=True)
+        assert_allclose(found, [np.mean(square)], rtol=1e-6)
+        assert abs(windowed_in_all(closed, index) / found - 1.0) > 1e-4
+
+
 def test_theory_at_the_samples_is_theory_at_all_plant_steps_where_each_sample_has_one():
     loop = replace(PLAIN, steps_per_sample=1)
     closed = close(loop.parts, loop.assembled(TRACKING))
