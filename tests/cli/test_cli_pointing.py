@@ -11,7 +11,7 @@ import several_axes
 from microrad.loop.disturbance import olympus
 from microrad.loop.disturbance.windows import ErrorIndex, windowed_rms
 from places import ROOT
-from shipped import DEFAULT
+from shipped import DEFAULT, without_fine_pointing
 
 
 @pytest.fixture(scope="module")
@@ -61,11 +61,97 @@ def test_the_tables_name_sources_windows_and_what_filters_make_of_them(call):
     [
         (("--window", "1 us"), "window_s of MPE is 1e-06 s, and the sensor reads every 0.0002 s: give more"),
         (("--window", "0 s"), "window_s of MPE is 0 s; give a finite number above zero"),
+        (("--simulate", "0"), "0 runs leave no errors: ask for 1 run or more, 2 for an interval"),
+        (("--simulate", "2", "--window", "2 s"), "MPE looks at 2 s of a run, and 1.5 s are left behind its settling"),
+        (("--simulate", "2", "--window", "0.2 ms"), "MPE over 200 µs looks at one control sample of a run: give a"),
         (("--controller", "best"), "'best' is no controller of this mission; it has PI"),
     ],
 )
 def test_what_cannot_be_is_refused(refused, options, words):
     assert words in refused("pointing", DEFAULT, *options)
+
+
+def test_runs_stand_beside_linear_theory_in_the_same_windows(call):
+    """The printed hysteresis of the shipped mission adds more than all sensor noise: it shows in every index."""
+    options = ("--window", "10 ms", "--spacing", "0.1 s", "--simulate", "16", "--json")
+    code, out, _ = call("pointing", DEFAULT, *options)
+    document = json.loads(out)
+    found = document["simulated"]["indices"]
+    assert (code, document["simulated"]["runs"]) == (0, 16)
+    for each, linear in zip(found, document["indices"], strict=True):
+        times = [(one["index"], one["window_s"], one["spacing_s"]) for one in (each, linear)]
+        assert times[0] == times[1]
+        assert each["linear_rad"] == pytest.approx(linear["left_rad"]["all"], rel=0.01, abs=0.0)
+        assert each["simulated_rad"] > each["linear_rad"] + each["interval_rad"] > each["linear_rad"]
+        assert each["simulated_rad"] == pytest.approx(math.hypot(*each["simulated_by_axis_rad"]), rel=1e-12, abs=0.0)
+    _, out, _ = call("pointing", DEFAULT, *options[:-2], "1")
+    assert "Simulated, with hysteresis\n" in out and "Number of runs: 1;" in " ".join(out.split())
+    rows = [line.split() for line in out[out.index("Simulated, with") :].splitlines() if line.split()[:1] == ["APE"]]
+    assert [row[-1] for row in rows] == ["unknown"]
+    assert max(map(len, out.splitlines())) <= 80
+
+
+@pytest.fixture
+def coded(tmp_path):
+    """Writes the shipped mission with a code word of some length, and a margin that pointing misses at times."""
+
+    def write(word, margin="5.5 dB"):
+        text = DEFAULT.read_text("utf-8")
+        for old, new in (
+            ('[requirement]\nmargin = "3 dB"', f'[requirement]\nmargin = "{margin}"'),
+            ("[communication]\n", f'[communication]\ncode_word = "{word}"\n'),
+        ):
+            assert text.count(old) == 1
+            text = text.replace(old, new)
+        (tmp_path / "m.toml").write_text(text, "utf-8")
+        return tmp_path / "m.toml"
+
+    return write
+
+
+def test_a_code_word_averages_over_fades_that_are_shorter(call, coded):
+    shares = []
+    for word in ("0.4 ms", "50 ms"):
+        code, out, _ = call("pointing", coded(word), "--window", "10 ms", "--simulate", "16", "--json")
+        found = json.loads(out)["simulated"]["code_words"]
+        assert code == 0
+        for each in (found["lost"], found["time"]):
+            assert 0.0 <= each["low"] <= each["value"] <= each["high"] <= 1.0
+        shares.append((found["lost"]["value"], found["time"]["value"]))
+        assert found["words"] == 16 * round(1.5 / found["code_word_s"])
+    assert shares[0][1] == shares[1][1] > 0.02
+    assert shares[1][0] < 0.5 * shares[0][0] < shares[0][1]
+    _, out, _ = call("pointing", coded("10 ms"), "--window", "10 ms", "--simulate", "16")
+    assert "Lost to pointing, simulated" in out and "code words of 10 ms" in out and "Of 2400 code words" in out
+    _, out, _ = call("pointing", DEFAULT, "--window", "10 ms", "--simulate", "1", "--json")
+    assert "code_words" not in json.loads(out)["simulated"]
+
+
+def test_words_at_the_largest_data_rate_have_what_is_left_of_its_margin(call, coded):
+    """Solved for 10 urad, so that less than the margin is left beyond that: the loop hardly ever is."""
+    path = coded("10 ms", "3 dB")
+    text = path.read_text("utf-8").replace('data_rate = "300 Mbit/s"', 'data_rate = "largest"', 1)
+    path.write_text(text, "utf-8")
+    code, out, _ = call("pointing", path, "--window", "10 ms", "--simulate", "2", "--json")
+    assert code == 0 and json.loads(out)["simulated"]["code_words"]["lost"]["value"] == 0.0
+
+
+def test_runs_of_a_mission_without_a_loop_are_refused(refused, tmp_path):
+    (tmp_path / "m.toml").write_text(without_fine_pointing(DEFAULT.read_text("utf-8")), "utf-8")
+    assert "has no table [fine_pointing]: microrad init writes one" in refused("pointing", "m.toml", "--simulate", "2")
+
+
+@pytest.mark.parametrize(
+    ("word", "words"),
+    [
+        ("2 s", "a code word of 2 s is longer than a run, of which 1.5 s are left behind its settling: make the runs"),
+        ("0.1 ms", "a code word of 100 µs has less than two control samples, 200 µs apart"),
+        ("0 s", "communication.code_word"),
+    ],
+)
+def test_a_code_word_that_no_run_holds_is_refused(refused, coded, word, words):
+    coded(word)
+    assert words in refused("pointing", "m.toml", "--window", "10 ms", "--simulate", "2")
 
 
 def test_a_time_without_a_unit_is_refused_by_its_option(call):

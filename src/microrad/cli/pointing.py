@@ -26,10 +26,10 @@ from microrad.cli.frame import (
 from microrad.cli.windows import indices_of, time_option
 
 if TYPE_CHECKING:
+    from microrad.link.pointing.code_words import LostWords
     from microrad.loop.controller_study import Design, Outlook, Scene
     from microrad.loop.disturbance.windows import ErrorIndex
-    from microrad.loop.pointing_loop.linear import ClosedLoop
-    from microrad.loop.pointing_loop.windows import WindowedErrors
+    from microrad.loop.pointing_loop.simulated_windows import SimulatedErrors
     from microrad.mission.file import MissionFile
 
 
@@ -85,6 +85,7 @@ def design(
         "microrad pointing leo-geo.toml --window '1 ms' --window '10 s' --spacing '1 min'",
         "microrad pointing leo-geo.toml --controller LQG --json",
         "microrad pointing leo-geo.toml --sources errors.csv",
+        "microrad pointing leo-geo.toml --simulate 128",
     )
 )
 @command
@@ -100,6 +101,9 @@ def pointing(
     sources: Annotated[
         Path | None, option("--sources", "LIST", "Sources of errors as CSV or XLSX, a row each.")
     ] = None,
+    simulate: Annotated[
+        int | None, option("--simulate", "RUNS", "Runs of the loop in the same windows, with hysteresis.")
+    ] = None,
     as_json: Json = False,
 ) -> Outcome:
     """Print the pointing errors of a mission in time windows, and its budget of them.
@@ -107,14 +111,18 @@ def pointing(
     The indices are those of ECSS-E-ST-60-10C: all of the error (APE), its mean over a window (MPE), what is left beside
     that mean (RPE), and the difference of the means of two windows (PDE). They are radial rms in theory (linear), by
     source, of what the loop leaves and of the same disturbances without a loop, exactly; the rational filters of linear
-    tools stand beside that.
+    tools stand beside that. --simulate has the same indices of runs on the mission's mirror, with intervals of 99 %,
+    and the code words that are lost in them where communication.code_word says how long one is.
 
     A mission with a table [error_budget], or a list of sources beside it, has a budget: each requirement with its total
     by the rules of the standard and as a full distribution, what each source weighs, and how large it may become. The
     exit code is 1 when a limit is not kept.
     """
+    from microrad.loop.pointing_loop.linear import close
+    from microrad.loop.pointing_loop.windows import windowed_errors
     from microrad.mission.file import MissionFile, load_link, load_mission
     from microrad.report.error_budget import budget_data, budget_view
+    from microrad.report.fine_pointing.simulated_windows import simulated_data, simulated_view
     from microrad.report.fine_pointing.windows import windows_data, windows_text
     from microrad.report.view import views_text
 
@@ -124,10 +132,18 @@ def pointing(
         asked = sources_beside(mission, sources, indices)
     table, data, texts, closed = mission.mission.error_budget, dict[str, Any](), list[str](), None
     loop, needed = mission if isinstance(mission, MissionFile) else None, asked is None or (table and table.with_loop)
-    if needed or (loop and loop.mission.fine_pointing):
-        closed, errors = _closed(loop or load_mission(file), controller, indices)
+    if needed or simulate is not None or (loop and loop.mission.fine_pointing):
+        loop = loop or load_mission(file)
+        scene, made = _designed(loop, controller)
+        with refusal_of(mission.path):
+            closed = close(scene.theory, made.controller)
+            errors = windowed_errors(closed, indices)
         data |= {"controller": controller, "indices": windows_data(errors)}
         texts.append(windows_text(errors, controller, width()))
+        if simulate is not None:
+            simulated, lost = _simulated(loop, scene, made, indices, simulate)
+            data["simulated"] = simulated_data(simulated, lost, simulate)
+            texts.append(views_text(simulated_view(simulated, lost, simulate).blocks, width()).strip("\n"))
     code = MET
     if asked is not None:
         with refusal_of(mission.path):
@@ -140,15 +156,11 @@ def pointing(
     return Outcome("\n\n".join(texts), code)
 
 
-def _closed(
-    mission: "MissionFile", controller: str, indices: "list[ErrorIndex]"
-) -> "tuple[ClosedLoop, tuple[WindowedErrors, ...]]":
-    """The mission's loop under one of its controllers, and its errors in each index."""
+def _designed(mission: "MissionFile", controller: str) -> "tuple[Scene, Design]":
+    """The mission's loop, and one of its controllers."""
     from microrad import mirror as mirror_room
     from microrad.link import tracking_light_w
     from microrad.loop import controller_study
-    from microrad.loop.pointing_loop.linear import close
-    from microrad.loop.pointing_loop.windows import windowed_errors
     from microrad.mission.file import mirror_of_loop
 
     if mirror_of_loop(mission) is not None:
@@ -156,8 +168,27 @@ def _closed(
     with progress_bar() as progress, refusal_of(mission.path):
         scene = controller_study.scene(mission, mirror_room.of(mission.mission), tracking_light_w(mission))
         (made,) = controller_study.design(scene, progress, [controller])
-        closed = close(scene.theory, made.controller)
-        return closed, windowed_errors(closed, indices)
+        return scene, made
+
+
+def _simulated(
+    mission: "MissionFile", scene: "Scene", made: "Design", indices: "list[ErrorIndex]", runs: int
+) -> "tuple[tuple[SimulatedErrors, ...], LostWords | None]":
+    """The errors of so many runs in each index, and the code words that they lose where the mission has some."""
+    from microrad import link
+    from microrad.link.pointing.code_words import FadeMargin, lost_words
+    from microrad.link.study import solve_rate
+    from microrad.loop.controller_study.results import span
+    from microrad.loop.pointing_loop.simulated_windows import simulated_windows
+
+    word = mission.mission.communication.code_word_s
+    with progress_bar() as progress, refusal_of(mission.path):
+        asked = scene.loop, made.controller
+        errors = simulated_windows(*asked, indices, span(scene.table), runs, on_progress=progress)
+        if word is None:
+            return errors, None
+        margin = FadeMargin.of(link.of(solve_rate(mission).mission))
+        return errors, lost_words(margin, word, *asked, span(scene.table), runs, on_progress=progress)
 
 
 def _broken(designs: "tuple[Design, ...]", left: "tuple[Outlook, ...]", accept: bool) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 from microrad.campaign.definition.outputs import Output
 from microrad.campaign.records import Interval, OutputSummary
 from microrad.core.arrays import Floats
+from microrad.core.intervals import binomial_band, student
 
 PICTURE_BINS = 40
 
@@ -223,34 +224,6 @@ def _tails(rows: Ordered, rank: int, probability: float) -> tuple[float, float]:
     few = float(betaincc(hits + 1.0, max(size - hits, 1e-300), probability)) if hits < size else 1.0
     many = float(betainc(max(hits, 1e-300), size - hits + 1.0, probability)) if hits > 0.0 else 1.0
     return few, many
-
-
-def binomial_band(hits: Floats, trials: Floats, confidence: float) -> tuple[Floats, Floats]:
-    """Ends of Clopper and Pearson's interval, for real numbers of hits and trials, too.
-
-    Args:
-        hits: numbers of hits (n,).
-        trials: numbers of trials (n,).
-        confidence: that of the interval, within (0, 1).
-    """
-    from scipy.special import betaincinv
-
-    beyond, missed = (1.0 - confidence) / 2.0, np.maximum(trials - hits, 0.0)
-    low = np.where(hits > 0.0, betaincinv(np.maximum(hits, 1e-300), missed + 1.0, beyond), 0.0)
-    high = np.where(missed > 0.0, betaincinv(hits + 1.0, np.maximum(missed, 1e-300), 1.0 - beyond), 1.0)
-    return low, high
-
-
-def student(confidence: float, freedom: float) -> float:
-    """Half width of the interval of Student's t.
-
-    Args:
-        confidence: that of the interval, within (0, 1).
-        freedom: degrees of freedom, inf for the normal distribution.
-    """
-    from scipy.special import stdtrit
-
-    return float(stdtrit(freedom, 0.5 + confidence / 2.0))
 
 
 # ---------------------------------------------------------------------------------------------------------- one output

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad.campaign.records import Interval, Sensitivity
-from microrad.campaign.statistics.intervals import student
 from microrad.core.arrays import Floats
+from microrad.core.intervals import student
 
 MOST_ROWS = 20_000
 SURROGATE_ROWS = 4_096

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from microrad.campaign.records import Interval, Tail
-from microrad.campaign.statistics.intervals import binomial_band, student
 from microrad.core.arrays import Floats
+from microrad.core.intervals import binomial_band, student
 
 TAIL_POINTS = 200
 _MOST = 1e12  # independent errors, where rows hardly differ

@@ -310,11 +310,19 @@ def _fades(
     """How often the loss exceeds the margin, for how long, and what to doubt of it."""
     if motion is None or margin_db < 0.0:
         return math.nan, math.nan, ""
-    half = fall.half_angle_rad
-    # the margin that a Gaussian beam has where this one has its own
-    like = beams.GaussianFall(half).loss_db(fall.error_rad(margin_db))
-    found = pointing.fades(jitter, motion.velocity_rms_rad_s, half, like)
+    like = like_gaussian_db(fall, margin_db)
+    found = pointing.fades(jitter, motion.velocity_rms_rad_s, fall.half_angle_rad, like)
     return float(found.per_second), float(found.mean_duration_s), motion.warning
+
+
+def like_gaussian_db(fall: beams.OffAxis, margin_db: float) -> float:
+    """The loss (dB) that a Gaussian beam of the same half angle has where this one has lost a margin.
+
+    Args:
+        fall: How the beam falls off.
+        margin_db: The margin (dB), 0 or above.
+    """
+    return float(beams.GaussianFall(fall.half_angle_rad).loss_db(fall.error_rad(margin_db)))
 
 
 def _uncoded(data: link.DataLink, jitter: pointing.Jitter, half_angle_rad: float) -> float:

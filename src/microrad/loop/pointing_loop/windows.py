@@ -23,6 +23,7 @@ from microrad.loop.pointing_loop.linear import (
     start_of,
     turning,
 )
+from microrad.loop.pointing_loop.loop import PointingLoop
 
 _STILL = 1e-12  # turn in a reading of a line that is at a multiple of its rate
 
@@ -95,25 +96,39 @@ def windowed_lines(closed: ClosedLoop, index: ErrorIndex) -> list[tuple[str, Flo
     return [(line.name, _line(closed, line, index, window, apart)) for line in closed.open.lines]
 
 
-def windowed_in_all(closed: ClosedLoop, index: ErrorIndex) -> Floats:
+def windowed_in_all(closed: ClosedLoop, index: ErrorIndex, *, at_samples: bool = False) -> Floats:
     """Variance that an index takes of the stationary error, of all sources together, per axis (rad^2), lines too.
 
     Args:
         closed: The loop under its controller, or a stack of loops; each of them stable, which is not looked at.
         index: What counts of the error, as for `windowed`.
+        at_samples: Whether the error is looked at where each control sample ends alone, and not at all plant steps.
 
     Raises:
         ValueError: A time of the index is less than half of the time between two readings.
     """
     window, apart = _times(closed, index)
-    found = _noise(closed, noise_of_all(closed), index, window, apart)
+    found = _noise(closed, noise_of_all(closed), index, window, apart, at_samples=at_samples)
     for line in closed.open.lines:
-        found = found + _line(closed, line, index, window, apart)
+        found = found + _line(closed, line, index, window, apart, at_samples=at_samples)
     return found
 
 
 def _times(closed: ClosedLoop, index: ErrorIndex) -> tuple[int, int]:
-    return _readings(closed, index, "window_s"), _readings(closed, index, "spacing_s")
+    return readings_of(closed.open.loop, index)
+
+
+def readings_of(loop: PointingLoop, index: ErrorIndex) -> tuple[int, int]:
+    """Window and spacing of an index in whole readings of the optical sensor; 0 for a time that it has not.
+
+    Args:
+        loop: The loop, for its clock.
+        index: What counts of the error.
+
+    Raises:
+        ValueError: A time of the index is less than half of the time between two readings.
+    """
+    return _readings(loop, index, "window_s"), _readings(loop, index, "spacing_s")
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,9 +168,9 @@ def windowed_errors(closed: ClosedLoop, indices: Sequence[ErrorIndex]) -> tuple[
     return tuple(found)
 
 
-def _readings(closed: ClosedLoop, index: ErrorIndex, name: str) -> int:
+def _readings(loop: PointingLoop, index: ErrorIndex, name: str) -> int:
     seconds: float | None = getattr(index, name)
-    period = closed.open.loop.timing.period_s * len(closed.samples)
+    period = loop.timing.period_s * loop.optical.every
     if seconds is None:
         return 0
     if not round(seconds / period):
@@ -163,15 +178,24 @@ def _readings(closed: ClosedLoop, index: ErrorIndex, name: str) -> int:
     return round(seconds / period)
 
 
-def _steps_of(closed: ClosedLoop) -> int:
-    """Plant steps from one reading to the next."""
-    return len(closed.samples) * len(closed.steps)
+def _every(closed: ClosedLoop, *, at_samples: bool) -> int:
+    """Plant steps from one that the error is looked at to the next."""
+    return len(closed.steps) if at_samples else 1
 
 
-def _noise(closed: ClosedLoop, added: Noise, index: ErrorIndex, window: int, apart: int) -> Floats:
+def _looks(closed: ClosedLoop, every: int) -> int:
+    """How often the error is looked at from one reading to the next."""
+    return len(closed.samples) * len(closed.steps) // every
+
+
+def _noise(
+    closed: ClosedLoop, added: Noise, index: ErrorIndex, window: int, apart: int, *, at_samples: bool = False
+) -> Floats:
     """Variance of what one noise leaves, per axis."""
-    o = closed.open
+    o, every = closed.open, _every(closed, at_samples=at_samples)
     start, whole = start_of(closed, added)
+    if every > 1:
+        whole = _at_samples(closed, added, start)
     if not window:
         return whole
     states, axes = start.shape[-1], len(o.error)
@@ -180,8 +204,8 @@ def _noise(closed: ClosedLoop, added: Noise, index: ErrorIndex, window: int, apa
     summed = _Span(np.eye(states + axes), np.zeros((states + axes,) * 2))
     for sample, noise in zip(closed.samples, sampled, strict=True):
         summed = summed.then(_moved(sample, noise, np.zeros_like(error)))
-        for step in closed.steps:
-            summed = summed.then(_moved(step, stepped, error))
+        for number, step in enumerate(closed.steps, 1):
+            summed = summed.then(_moved(step, stepped, np.zeros_like(error) if number % every else error))
     still = _signed(summed, axes, 0.0)
     if index.spacing_s is None:
         of_all = summed.times(window)
@@ -191,8 +215,21 @@ def _noise(closed: ClosedLoop, added: Noise, index: ErrorIndex, window: int, apa
     begun = np.zeros((*start.shape[:-2], states + axes, states + axes))
     begun[..., :states, :states] = start
     ended = (of_all.F @ begun @ of_all.F.mT + of_all.Q)[..., states:, states:]
-    mean = np.diagonal(ended, axis1=-2, axis2=-1) / (window * _steps_of(closed)) ** 2
+    mean = np.diagonal(ended, axis1=-2, axis2=-1) / (window * _looks(closed, every)) ** 2
     return np.asarray(whole - mean if index.takes == "RPE" else mean)
+
+
+def _at_samples(closed: ClosedLoop, added: Noise, start: Floats) -> Floats:
+    """Variance of the error where the control samples end, per axis, from the states' before a sensor period."""
+    o, (sampled, stepped) = closed.open, added
+    P, found = start, []
+    for sample, noise in zip(closed.samples, sampled, strict=True):
+        P = sample @ P @ sample.mT + noise @ noise.mT
+        for step in closed.steps:
+            P = step @ P @ step.mT + stepped @ stepped.T
+        head = P[..., : o.at.order, : o.at.order]
+        found.append(np.einsum("ij,...jk,ik->...i", o.error, head, o.error))
+    return np.asarray(np.mean(found, axis=0))
 
 
 def _moved(matrix: Floats, noise: Floats, error: Floats) -> _Span:
@@ -214,14 +251,18 @@ def _signed(span: _Span, axes: int, sign: float) -> _Span:
     return _Span(F, Q)
 
 
-def _line(closed: ClosedLoop, line: Line, index: ErrorIndex, window: int, apart: int) -> Floats:
+def _line(
+    closed: ClosedLoop, line: Line, index: ErrorIndex, window: int, apart: int, *, at_samples: bool = False
+) -> Floats:
     """Variance over the phase of what one line leaves, per axis: what turns adds up to a geometric series."""
+    every = _every(closed, at_samples=at_samples)
     errors, z = turning(closed, line)
+    errors = errors[every - 1 :: every]
     whole = np.asarray(np.mean(0.5 * np.abs(errors) ** 2, axis=0))
     if not window:
         return whole
     series = window if abs(1.0 - z) < _STILL else (1.0 - z**window) / (1.0 - z)
-    mean = series * np.sum(errors, axis=0) / (window * _steps_of(closed))
+    mean = series * np.sum(errors, axis=0) / (window * _looks(closed, every))
     if index.spacing_s is not None:
         mean = mean * (1.0 - z**apart)
     variance = np.asarray(0.5 * np.abs(mean) ** 2)

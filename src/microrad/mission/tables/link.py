@@ -276,6 +276,9 @@ class Communication(Beam):
         default=None, description="as measured, at its bit error ratio"
     )
     receiver: Receiver | None = Field(default=None, description="in place of receiver_sensitivity")
+    code_word_s: Annotated[float, Quantity("s", "s", above=0.0, most=1e4)] | None = Field(
+        default=None, description="how long a code word, or what is interleaved with it, lasts"
+    )
     beam: BeamShape | None = Field(default=None, description="absent: uniform, unobscured")
 
     def problems(self) -> Iterator[Problem]:

@@ -1,0 +1,79 @@
+"""Pointing errors of simulated runs in time windows: a table for people, and the same as data."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
+
+from microrad.link.pointing.code_words import LostWords
+from microrad.loop.pointing_loop.simulated_windows import SimulatedErrors
+from microrad.report.fine_pointing.windows import index_name
+from microrad.report.quantities import micro, percent, quantity
+from microrad.report.tables import Table
+from microrad.report.view import Block, Points, View
+
+
+def simulated_view(errors: Sequence[SimulatedErrors], lost: LostWords | None, runs: int) -> View:
+    """The indices of runs beside those of linear theory, and the code words that they lose, with their intervals.
+
+    Args:
+        errors: One for each index.
+        lost: What is lost; None where the mission has no code word.
+        runs: How many runs there were.
+    """
+    rows = [
+        (
+            index_name(each.index).replace("\n", " "),
+            micro(each.linear_rad),
+            micro(each.rms_rad),
+            "unknown" if math.isinf(each.interval_rad) else f"± {micro(each.interval_rad)}",
+        )
+        for each in errors
+    ]
+    table = Table("Simulated, with hysteresis", ("index", "linear", "simulated", "99 % interval"), rows)
+    about = (
+        "Radial rms in µrad, both at the control samples: linear in theory, simulated on the mission's mirror. "
+        f"Number of runs: {runs}; their spread gives the interval."
+    )
+    blocks: list[Block] = [table, Points([about])]
+    return View(table.title, blocks if lost is None else [*blocks, *_lost(lost)])
+
+
+def _lost(lost: LostWords) -> list[Block]:
+    word = quantity(lost.code_word_s, "s")
+    rows = [
+        (what, percent(share.value, 3), f"{percent(share.low, 3)} to {percent(share.high, 3)}")
+        for what, share in ((f"code words of {word}", lost.lost), ("time", lost.time))
+    ]
+    about = (
+        f"Of {lost.words} code words those whose mean power is less than the required margin asks for, and the share "
+        "of the time with less than that. Where none or all are lost, the interval takes them as independent."
+    )
+    return [Table("Lost to pointing, simulated", ("share of", "lost", "99 % interval"), rows), Points([about])]
+
+
+def simulated_data(errors: Sequence[SimulatedErrors], lost: LostWords | None, runs: int) -> dict[str, Any]:
+    """The same as data: rms in rad, the interval as its half width, None where it is not known.
+
+    Args:
+        errors: One for each index.
+        lost: What is lost; None where the mission has no code word.
+        runs: How many runs there were.
+    """
+    found = {"runs": runs, "indices": _indices(errors)}
+    return found if lost is None else {**found, "code_words": asdict(lost)}
+
+
+def _indices(errors: Sequence[SimulatedErrors]) -> list[dict[str, Any]]:
+    return [
+        {
+            "index": each.index.kind,
+            "window_s": each.index.window_s,
+            "spacing_s": each.index.spacing_s,
+            "linear_rad": each.linear_rad,
+            "simulated_rad": each.rms_rad,
+            "interval_rad": None if math.isinf(each.interval_rad) else each.interval_rad,
+            "simulated_by_axis_rad": each.axis_rms_rad.tolist(),
+        }
+        for each in errors
+    ]

@@ -1,0 +1,116 @@
+"""Code words lost to pointing: against whole runs in memory, the closed form of the share of time, and the fades."""
+
+import math
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from link_files import link_file
+from microrad import link
+from microrad.core.intervals import binomial_band, clustered_band
+from microrad.link.pointing import outage
+from microrad.link.pointing.code_words import FadeMargin, lost_words
+from microrad.link.pointing.radial_error import Jitter
+from microrad.link.pointing.statistics import outage_probability, radius_of_loss_rad, transmission
+from microrad.loop.disturbance import first_order
+from microrad.loop.disturbance.windows import ErrorIndex
+from microrad.loop.pointing_loop.ensemble import Span
+from microrad.loop.pointing_loop.linear import close
+from microrad.loop.pointing_loop.traces import trace
+from microrad.loop.pointing_loop.windows import windowed_in_all
+from microrad.loop.workbench import Controller, Loop
+from microrad.mirror.model import Mirror
+
+SLOW = first_order(160e-12, 5.0, convention="per-axis", name="vibration")
+LOOP = Loop(
+    mirror=Mirror.of(50e-6, [1.0], [1 / 3000**2, 2 * 0.1 / 3000, 1.0]),
+    rate_hz=1000.0,
+    vibration=SLOW,
+    sensor_noise_rad=0.5e-6,
+    steps_per_sample=2,
+)
+CONTROLLER = LOOP.assembled(Controller.pid(0.0, 5e5, rate_hz=1000.0))
+SPAN = Span(3.3, 0.3, 1)
+MARGIN = FadeMargin(half_angle_rad=100e-6, ahead_rad=5e-6, loss_db=1.0)
+
+
+def lost(margin=MARGIN, word_s=0.02, span=SPAN, runs=3, **settings):
+    return lost_words(margin, word_s, LOOP.parts, CONTROLLER, span, runs, **settings)
+
+
+def test_words_are_those_of_whole_runs_in_memory():
+    words, time = [], []
+    for run in range(3):
+        error = trace(LOOP.parts, CONTROLLER, SPAN, run).error_rad[300:, 0]
+        power = np.exp(-2.0 * ((np.abs(error) + 5e-6) / 100e-6) ** 2)
+        words.append(np.mean(power.reshape(-1, 20).mean(axis=1) < 10.0**-0.1))
+        time.append(np.mean(power < 10.0**-0.1))
+    found = lost()
+    assert found.words == 3 * 150
+    assert 0.01 < found.lost.value < found.time.value < 0.99
+    assert_allclose([found.lost.value, found.time.value], [np.mean(words), np.mean(time)], rtol=1e-12)
+    assert found.lost.low < found.lost.value < found.lost.high
+    assert found == lost(threads=1)
+
+
+def test_the_share_of_time_is_that_of_a_gaussian_and_short_words_have_it_too():
+    margin = FadeMargin(100e-6, 0.0, 1.0)
+    found = lost(margin, 0.002, Span(10.3, 0.3, 1), 64)
+    variance = windowed_in_all(close(LOOP.parts, CONTROLLER), ErrorIndex("APE"), at_samples=True)
+    wanted = float(outage_probability(Jitter((0.0, 0.0), (math.sqrt(variance[0]), 0.0)), 100e-6, 1.0))
+    assert found.time.low < wanted < found.time.high < 1.1 * found.time.low
+    assert found.lost.value == pytest.approx(found.time.value, rel=0.1, abs=0.0)
+    long = lost(margin, 10.0, Span(10.3, 0.3, 1), 64)  # a mean over all of a run hardly varies, and is above the least
+    assert (long.words, long.lost.value, long.time) == (64, 0.0, found.time)
+
+
+def test_the_margin_is_that_of_the_link_s_fades(tmp_path):
+    data = link.of(link_file(tmp_path).mission)
+    margin, under = FadeMargin.of(data), outage.Exposure.stated(data)
+    reach = under.fall.error_rad(under.on_axis_db - data.requirement.margin_db)
+    assert margin.half_angle_rad == under.fall.half_angle_rad
+    assert float(transmission(reach, margin.half_angle_rad)) == pytest.approx(
+        10.0 ** (-0.1 * margin.loss_db), rel=1e-12, abs=0.0
+    )
+    assert float(radius_of_loss_rad(margin.half_angle_rad, margin.loss_db)) == pytest.approx(reach, rel=1e-12, abs=0.0)
+
+
+def test_a_link_that_misses_its_margin_on_the_axis_loses_all_words():
+    found = lost(FadeMargin(100e-6, 0.0, -0.1))
+    assert (found.lost.value, found.time.value, found.lost.high) == (1.0, 1.0, 1.0)
+    assert found.lost.low == pytest.approx(0.005 ** (1.0 / found.words), rel=1e-9, abs=0.0)
+
+
+def test_one_run_tells_nothing_of_its_interval():
+    assert (lost(runs=1).lost.low, lost(runs=1).lost.high) == (0.0, 1.0)
+
+
+def test_the_interval_of_clusters_holds_whether_their_trials_are_alike_or_not():
+    """Misses of 4000 intervals of 99 %, at each side of what chance allows: 40 are wanted of one that is exact."""
+    rng = np.random.default_rng(1)
+    for alike in (0.0, 0.1, 0.5):
+        misses, widths = 0, []
+        for _ in range(4000):
+            own = rng.beta(0.3 * (1 / alike - 1), 0.7 * (1 / alike - 1), 64) if alike else np.full(64, 0.3)
+            low, high = clustered_band(rng.binomial(50, own) / 50, 50, 0.99)
+            misses += not low < 0.3 < high
+            widths.append(high - low)
+        assert 5 < misses < 65, (alike, misses)
+        wanted = 2.0 * 2.576 * math.sqrt(0.21 * (1.0 + 49.0 * alike) / 3200.0)
+        assert wanted < np.mean(widths) < 1.15 * wanted
+    assert clustered_band(np.zeros(64), 50, 0.99) == (0.0, binomial_band(np.zeros(1), np.array([3200.0]), 0.99)[1][0])
+
+
+@pytest.mark.parametrize(
+    ("word_s", "runs", "words"),
+    [
+        (5.0, 2, "a code word of 5 s is longer than a run, of which 3 s are left behind its settling"),
+        (0.001, 2, "a code word of 1 ms has less than two control samples, 1 ms apart"),
+        (0.02, 0, "0 runs leave no errors"),
+    ],
+)
+def test_words_that_no_run_can_have_are_refused(word_s, runs, words):
+    with pytest.raises(ValueError, match=words) as refused:
+        lost(MARGIN, word_s, runs=runs)
+    assert "\n" not in str(refused.value)
