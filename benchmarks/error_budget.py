@@ -76,9 +76,8 @@ def main() -> None:
         took = min(seconds(asked) for _ in range(REPEATS))
         record(f"budget of {SOURCES} sources, {interpretation}", took, "s", at_most=BAR_S)
         over = "" if took <= BAR_S else "  over"
-        print(
-            f"{SOURCES} sources, {AXES} axes, {len(INDICES)} indices, {interpretation:8s} {took:.3f} s, bar {BAR_S} s{over}"
-        )
+        what = f"{SOURCES} sources, {AXES} axes, {len(INDICES)} indices, {interpretation}"
+        print(f"{what:48s} {took:.3f} s, bar {BAR_S} s{over}")
 
 
 def seconds(asked: list[Requirement]) -> float:
