@@ -162,7 +162,7 @@ class LvmSource(Container):
             rows = file.read(segment.span[1] - segment.span[0])
         try:
             rows = rows.replace(b",", b".") if self._comma else rows
-            table = np.loadtxt(io.BytesIO(rows), encoding=_ENCODING, **layout)
+            table = np.loadtxt(io.BytesIO(rows), encoding=_ENCODING, **layout) if rows else np.empty((0, len(columns)))
         except (ValueError, IndexError):
             table = np.empty((0, 0))
         if len(table) != segment.rows or not np.isfinite(table).all():
