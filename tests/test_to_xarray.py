@@ -6,6 +6,7 @@ import xarray
 from numpy.testing import assert_allclose, assert_array_equal
 
 import microrad
+from microrad.core.labelled import TEXT, variables
 from microrad.loop.pointing_loop.ensemble import COUNTERS
 
 PLAYS = microrad.PrandtlIshlinskii((0.0, 1.0), (30e-6, 6e-6))
@@ -57,3 +58,8 @@ def test_values_are_found_by_their_names():
     assert runs.largest_rad.max() < 1e-9
     assert int(ensemble.histogram.sel(radius=slice(1e-9, None))[:, 1:].sum()) == 0
     assert int(ensemble.histogram.sum()) == runs.histogram.sum() == 3 * 200
+
+
+def test_texts_have_the_unit_1():
+    (found,) = variables("input", name=(TEXT, "what an input is called", ["first", "second"])).values()
+    assert (found.units, found.values.tolist()) == ("1", ["first", "second"])

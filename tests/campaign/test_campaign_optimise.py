@@ -472,6 +472,18 @@ def test_a_limit_by_which_the_first_look_saw_no_finite_value_keeps_its_scale():
     assert "residual_quantile" not in found.bound_by
 
 
+def test_the_reason_names_the_share_of_the_limit_that_is_missed_alone():
+    noise = 0.1 * gaussian(400, 6)
+
+    def evaluate(x):
+        return {"margin": 10.0 + noise, "answer_margin": 3.0 * x[0] - 3.0 + noise}
+
+    limits = (Limit("margin", 5.0, None, "test"), Limit("answer_margin", 0.0, None, "test"))
+    found = optimise(problem(limits=limits), evaluate, never, quiet)
+    share = 100.0 * np.mean(evaluate([found.best.values["x0"]])["answer_margin"] >= 0.0)
+    assert found.reason == f"no candidate keeps answer_margin >= 0 dB in 99 % of rows; the best has {share:.4g} %"
+
+
 def test_limits_that_exclude_each_other():
     noise = 0.1 * gaussian(400, 6)
 

@@ -145,3 +145,9 @@ def test_the_background_that_is_not_known_yet_is_any(tmp_path):
     assert most(background_power=None, background=sky) > known
     rate = {"communication.data_rate": "largest"}
     assert most() > known
+
+
+def test_the_gain_against_shot_noise_is_in_proportion_to_its_excess():
+    one, two, five = (Code(0.5, 1e-9).ook_current(2.0, 0.0, excess) for excess in (1.0, 2.0, 5.0))
+    assert two > one
+    assert five - one == pytest.approx(4.0 * (two - one), rel=1e-9)

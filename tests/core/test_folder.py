@@ -226,3 +226,10 @@ def test_old_results_that_cannot_be_put_back_stay_aside(tmp_path, monkeypatch):
         pass
     (left,) = tmp_path.iterdir()
     assert [path.name for path in (left / "results").iterdir()] == ["manifest.json"]
+
+
+def test_results_of_another_kind_are_not_replaced(tmp_path):
+    (tmp_path / "manifest.json").write_text('{"versions": {"microrad": "0.2.0"}, "bench": {}}', "utf-8")
+    folder.check_folder(tmp_path, overwrite=True, kind="bench")
+    with pytest.raises(folder.FolderError, match="holds files that are not results of microrad"):
+        folder.check_folder(tmp_path, overwrite=True, kind="mission")
