@@ -14,7 +14,7 @@ from microrad.campaign.ledger import Ledger
 from microrad.campaign.rows import evaluate, loops, sampling
 from microrad.campaign.rows.evaluator import Evaluator
 from microrad.campaign.rows.missions import MissionBuilder
-from microrad.loop.pointing_loop import ensemble
+from microrad.loop.pointing_loop import ensemble, traces
 from microrad.mirror import coupled
 from microrad.mirror.hysteresis import BoucWen
 from microrad.mission.file import MissionError
@@ -126,6 +126,10 @@ def test_a_row_flies_the_drawn_mirror_under_the_controller_of_the_nominal_one(tm
         runs = ensemble.simulate(flown, nominal.controller(tuned[0]), nominal.span, each, first_run=row * each)
         wanted = evaluate.outputs(campaign.mission, runs, chunk.columns)
         assert {name: chunk.columns[name][row] for name in wanted} == wanted
+    seen = evaluator.trace(0, 1, lambda: None)  # the first run of that row
+    run_of = [traces.trace(flown, nominal.controller(tuned[0]), nominal.span, number) for number in (each, 1)]
+    first, other = (run.error_rad[run.time_s >= nominal.span.settle_s] for run in run_of)
+    assert np.array_equal(seen.error_rad, first) and not np.array_equal(seen.error_rad, other)
     rms = chunk.columns["residual_rms"]
     assert rms[0] != rms[1]
     flat = Evaluator(loaded(tmp_path, SMALL + LOOP + POWER), tuned).rows(0, range(1), lambda: None)

@@ -11,6 +11,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import nullcontext
 from pathlib import Path
 
 import h5py
@@ -972,3 +973,11 @@ def test_a_model_that_explains_nothing_unseen_is_refused(refused, folder):
     message = refused("identify", path, *COLUMNS)
     assert "do not support a model" in message
     assert "at most 50 % is a model" in message
+
+
+def test_an_empty_file_is_replaced_and_a_foreign_one_is_not(tmp_path):
+    path = tmp_path / "mirror.zip"
+    for content, stays in ((b"", False), (b"PK and more", False), (b"a letter", True)):
+        path.write_bytes(content)
+        with pytest.raises(frame.Refusal, match="was not written by microrad") if stays else nullcontext():
+            frame.check_target(path, "choose another name", overwrite=True, begins=b"PK")
