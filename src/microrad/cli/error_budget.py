@@ -92,6 +92,6 @@ def totals_of(
         return dict(zip(asked, budget(sources, list(asked.values()), correlations), strict=True))
     found = {}
     for name, required in asked.items():
-        own = correlated(contributions(sources, required), sources, correlations)
+        own = correlated(contributions(sources, required), sources, required, correlations)
         found[name] = total([*own, *loop_contributions(closed, required)], required)
     return found

@@ -98,7 +98,7 @@ def budget(
     for required in requirements:
         alike = replace(required, axes=(0,), limit_rad=None)
         if alike not in known:
-            found = correlated(contributions(sources, required), sources, correlations)
+            found = correlated(contributions(sources, required), sources, required, correlations)
             known[alike] = found, _bundled(found)
         totals.append(_total(*known[alike], required))
     return tuple(totals)
@@ -121,6 +121,7 @@ _SMALL = 1e-3  # growth of a source by which that of the total is seen
 _FAR = 1e6  # times its size, beyond which a source does not matter
 _STEP = 4.0  # between two sizes that are tried
 _HELD = 2.0  # limits, or totals, up to which the range of a series reaches
+_NOTHING = 1e-12  # of a variance, below which others have none
 _DIGITS = 1e-5  # part to which a size or a total of others is found
 
 
@@ -137,13 +138,24 @@ def shares(of: Total) -> tuple[Share, ...]:
     else:
         others = each_without(parts, _HELD * max(of.quantile_rad, required.limit_rad or 0.0))
         found = [
-            _share(of, each.name, own, series)
-            for each, own, series in zip(of.contributions, parts, others, strict=True)
+            _share(of, each.name, own, series, _without(of, at, own, series))
+            for at, (each, own, series) in enumerate(zip(of.contributions, parts, others, strict=True))
         ]
     return tuple(sorted(found, key=lambda each: -float(f"{each.growth:.2e}")))  # what is alike keeps its order
 
 
-def _share(of: Total, name: str, own: Sum, others: Series) -> Share:
+def _without(of: Total, at: int, own: Sum, others: Series) -> float:
+    """The total without a source: by its series, or anew where this ends too early."""
+    left, spread = of.mean_rad - own.mean, of.sigma_rad**2 - own.covariance.diagonal()
+    if np.max(spread) <= _NOTHING * np.max(of.sigma_rad) ** 2:
+        return float(np.linalg.norm(left))
+    if others.whole:
+        return others.quantile(of.required.confidence, _DIGITS)
+    rest = [each for place, each in enumerate(of.contributions) if place != at]
+    return _bundled(rest).about(of.required.axes).quantile(of.required.confidence)
+
+
+def _share(of: Total, name: str, own: Sum, others: Series, without: float) -> Share:
     whole, confidence, limit, u = of.quantile_rad, of.required.confidence, of.required.limit_rad, others.u
 
     def spare(size_rad: float, times: float) -> float:
@@ -151,9 +163,9 @@ def _share(of: Total, name: str, own: Sum, others: Series) -> Share:
 
     by_source = spare(whole, 1.0 + _SMALL) - spare(whole, 1.0 - _SMALL)
     by_size = spare(whole * (1.0 + _SMALL), 1.0) - spare(whole * (1.0 - _SMALL), 1.0)
-    growth = -by_source / by_size if by_size > 0.0 > by_source else 0.0
-    allowed = None if limit is None else _allowed(lambda times: spare(limit, times))
-    return Share(name, own.mean, own.sigma, others.quantile(confidence, _DIGITS), growth, allowed)
+    growth = -by_source / by_size if by_size > 0.0 else 0.0
+    allowed = None if limit is None else _allowed(own, lambda times: spare(limit, times))
+    return Share(name, own.mean, own.sigma, without, growth, allowed)
 
 
 def _of_constant(of: Total, name: str, own: Sum) -> Share:
@@ -162,17 +174,19 @@ def _of_constant(of: Total, name: str, own: Sum) -> Share:
     growth = float(own.mean @ of.mean_rad) / of.quantile_rad**2 if of.quantile_rad else 0.0
     allowed = None
     if limit is not None:
-        allowed = _allowed(lambda times: limit - float(np.linalg.norm(others + times * own.mean)))
+        allowed = _allowed(own, lambda times: limit - float(np.linalg.norm(others + times * own.mean)))
     return Share(name, own.mean, own.sigma, float(np.linalg.norm(others)), growth, allowed)
 
 
-def _allowed(spare: Callable[[float], float]) -> float:
-    """How many times as large a source may be while something is to spare."""
+def _allowed(own: Sum, spare: Callable[[float], float]) -> float:
+    """How many times as large a source may be while something is to spare; its own size counts as one that may do."""
     from scipy.optimize import brentq
 
-    if spare(0.0) < 0.0:
-        return 0.0
+    if not own.mean.any() and not own.sigma.any():
+        return np.inf
     low, high = 0.0, 1.0
+    if spare(high) < 0.0 and spare(low) < 0.0:
+        return 0.0
     while spare(high) >= 0.0:
         low, high = high, high * _STEP
         if high > _FAR:

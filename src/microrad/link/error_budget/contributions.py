@@ -3,7 +3,8 @@
 Over time each source is taken as its class says, over the ensemble as the interpretation says (ECSS-E-ST-60-10C A.1.2):
 "temporal" is the worst-case satellite at a random time, "ensemble" a random satellite at its worst time, "mixed" a
 random satellite at a random time. A noise has no worst time; it stands with as many standard deviations there as hold
-the confidence.
+the confidence. The sign that an error has at its worst time, or on the worst satellite where it is spread about zero,
+is open: sizes add up there.
 
 | class | APE | MPE | RPE | PDE |
 |---|---|---|---|---|
@@ -16,8 +17,8 @@ the confidence.
 
 w = sinc f T, m = d/T (1 - exp(-T/d)), P the period, s the spacing, t evenly drawn. PRE takes the windows of two
 periods: the same as PDE of what is stationary, and for a drift or a transient, which begin anew, the difference over
-what the spacing leaves beside whole periods. Behind a transfer a ramp keeps G(0) r t + G'(0) r, and a transient is
-that of an exponential through the transfer.
+what the spacing leaves beside whole periods, of windows that no new begin cuts. Behind a transfer a transient is that
+of an exponential through it.
 """
 
 import math
@@ -40,10 +41,18 @@ _GAUSS = np.polynomial.hermite_e.hermegauss(16)  # over a Gaussian ensemble
 _EVEN = np.polynomial.legendre.leggauss(16)  # over an even one
 _TURN = np.exp(2j * np.pi * (np.arange(32) + 0.5) / 32)  # phases of a sinusoid
 _HARDLY = 0.5  # width beside the mean, up to which a size is hardly spread
-_WITHIN = np.polynomial.legendre.leggauss(12)  # positions in a window
+_WITHIN, _WITHIN_MANY = (np.polynomial.legendre.leggauss(count) for count in (12, 64))  # positions in a window
 _SOUND = 1e9  # condition of the modes of a transient, above which they coincide
-_STRIPS = 8  # of a window, in which a transient is taken as straight
-_PATH = np.linspace(0.0, 1.0, 33) ** 2  # times of a transient, finer where it falls fast
+_STRIPS = 6  # of a window, in which a transient is taken as straight
+_TURNING = 200  # times at most by the turns of a transient
+_EVENLY = np.linspace(0.0, 1.0, 5)
+_LOGARITHMS = np.log(np.concatenate([np.linspace(1.0, 0.0, 13)[1:-1], np.geomspace(1.0 / 12.0, 1e-6, 12)[1:]]))
+"""Of what is left of a transient between pieces in which it is nearly straight."""
+_MANY_TURNS = 16.0  # of a sinusoid in a window
+_FOLDED = 64  # pieces of a Gaussian without its sign
+_ROUNDING = 1e-9  # of a spacing that is whole periods
+_SOUND = 1e9  # condition of the modes of a transient, above which they coincide
+_STRIPS = 6  # of a window, in which a transient is taken as straight
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,9 +131,23 @@ def contribution(source: ErrorSource, required: Requirement) -> Contribution:
 
 def _part(source: ErrorSource, required: Requirement) -> Part:
     if required.interpretation == "ensemble":
-        return _scaled(_at_its_worst(source, required), source.size)
-    in_time = _IN_TIME[source.kind](source, required.index)
-    return in_time.times(source.size.worst) if required.interpretation == "temporal" else _scaled(in_time, source.size)
+        return _folded(_at_its_worst(source, required), source.size)
+    in_time, size = _IN_TIME[source.kind](source, required.index), source.size
+    if required.interpretation == "mixed":
+        return _scaled(in_time, size)
+    worst = in_time.times(size.worst)
+    return _outwards(worst) if size.width and not size.mean else worst
+
+
+def _outwards(part: Part) -> Part:
+    """The part with the sign about each axis that makes its mean positive: that of the worst satellite is open."""
+    sign = np.where(part.whole_mean < 0.0, -1.0, 1.0)
+    if sign.min() > 0.0:
+        return part
+    return Part(
+        part.weight, part.mean * sign, part.covariance * np.outer(sign, sign), part.half_width * sign,
+        part.amplitude * sign,
+    )  # fmt: skip
 
 
 def contributions(sources: Sequence[ErrorSource], required: Requirement) -> tuple[Contribution, ...]:
@@ -137,8 +160,14 @@ def contributions(sources: Sequence[ErrorSource], required: Requirement) -> tupl
     Raises:
         ValueError: As `contribution`, for sources of unlike numbers of axes, and for an axis that they have not.
     """
-    if len({source.axes for source in sources}) > 1:
-        raise ValueError(f"the sources have {sorted({source.axes for source in sources})} axes; give all as many gains")
+    for each in sources:
+        if each.axes != sources[0].axes:
+            raise ValueError(
+                f"{each.name} has gains for {each.axes} axes, and {sources[0].name} for {sources[0].axes}; "
+                "give all as many"
+            )
+    if len({each.name for each in sources}) < len(sources):
+        raise ValueError("two sources have one name; give each its own")
     if sources and max(required.axes) >= sources[0].axes:
         raise ValueError(f"axis {max(required.axes)} is asked for, and the sources have {sources[0].axes} from 0 on")
     return tuple(contribution(source, required) for source in sources)
@@ -164,7 +193,8 @@ def _scaled(unit: Part, size: Spread) -> Part:
     """
     if size.shape == "fixed" or not size.width:
         return unit.times(size.mean)
-    if unit.covariance.any() or size.width < _HARDLY * abs(size.mean):
+    moving = unit.half_width.any() or unit.amplitude.any()
+    if unit.covariance.any() or (moving and size.width < _HARDLY * abs(size.mean)):
         at, weight = _GAUSS if size.shape == "gaussian" else _EVEN
         return mixture([unit.times(float(size.mean + size.width * each)) for each in at], weight / np.sum(weight))
     value, weight = _values(unit)
@@ -188,7 +218,7 @@ def _values(unit: Part) -> tuple[Floats, Floats]:
 
 # -------------------------------------------------------------------------------------- at a random time, of size 1
 def _constant(source: ErrorSource, index: ErrorIndex) -> Part:
-    gain, _ = source.slow()
+    gain = source.at_rest()
     return case(source.axes, mean=gain if index.takes in ("APE", "MPE") else None)
 
 
@@ -226,45 +256,80 @@ def _sinusoid(source: ErrorSource, index: ErrorIndex, freq_hz: float, amplitude:
         return case(source.axes, amplitude=whole * share)
     if index.spacing_s is not None:
         return case(source.axes, amplitude=whole * share * 2.0 * math.sin(math.pi * freq_hz * index.spacing_s))
-    at, weight = _WITHIN
-    left = np.exp(1j * math.pi * freq_hz * index.window_s * at) - share
+    turns = freq_hz * index.window_s
+    if turns > _MANY_TURNS:  # its mean is so small that it hardly matters where in the window the error is
+        return case(source.axes, amplitude=whole * math.sqrt(1.0 - share**2))
+    at, weight = _WITHIN if turns <= 1.0 else _WITHIN_MANY
+    left = np.exp(1j * math.pi * turns * at) - share
     return case(source.axes, amplitude=np.outer(left, whole), weight=0.5 * weight)
 
 
 def _drift(source: ErrorSource, index: ErrorIndex) -> Part:
     assert source.period_s is not None
-    gain, lag = source.slow()
-    period, window = source.period_s, _window(source, index, source.period_s)
+    if isinstance(source.transfer, lti.StateSpace):
+        raise ValueError(
+            f"{source.name}: behind a transfer each new begin of a drift is a step, of which its rate says nothing; "
+            "give gains, or what is left as a process"
+        )
+    gain, period = np.asarray(source.transfer, dtype=float), source.period_s
+    window = _window(source, index, period)
     if index.takes == "RPE":
         return case(source.axes, half_width=gain * window / 2.0)
     if index.takes in ("APE", "MPE"):
-        return case(source.axes, mean=gain * period / 2.0 + lag, half_width=gain * (period - window) / 2.0)
+        return case(source.axes, mean=gain * period / 2.0, half_width=gain * (period - window) / 2.0)
     assert index.spacing_s is not None
     if index.takes == "PDE":
         return case(source.axes, mean=gain * index.spacing_s)
-    beside = math.fmod(index.spacing_s, period)
+    beside = _beside(index.spacing_s, period)
     again = beside / period
     return case(source.axes, mean=np.outer([beside, beside - period], gain), weight=np.array([1.0 - again, again]))
+
+
+def _beside(spacing_s: float, period_s: float) -> float:
+    """What a spacing leaves beside whole periods (s); 0 where that is rounding."""
+    left = math.fmod(spacing_s, period_s)
+    return 0.0 if min(left, period_s - left) < _ROUNDING * spacing_s else left
 
 
 def _transient(source: ErrorSource, index: ErrorIndex) -> Part:
     assert source.period_s is not None
     period, window = source.period_s, _window(source, index, source.period_s)
-    last = period - window - (index.spacing_s or 0.0) * (index.takes == "PDE")
-    edges = last * _PATH
-    middle, weight = 0.5 * (edges[1:] + edges[:-1]), np.diff(edges) / last
-    path = _Path(source)
+    path, last = _Path(source), period - window
+    if index.takes == "PRE" and index.spacing_s is not None:
+        beside = _beside(index.spacing_s, period)
+        if not beside:
+            return case(source.axes)
+        # the second window lies in the same period as the first one would, or in the next one
+        both = [(0.0, last - beside, beside), (period - beside, last, beside - period)]
+        spans = [(begin, end, apart) for begin, end, apart in both if end > begin]
+        whole = math.fsum(end - begin for begin, end, _ in spans)
+        if not whole:
+            raise ValueError(
+                f"{source.name}: no two windows of {window:g} s so far apart lie within periods; give shorter ones"
+            )
+        parts = [_between(path, begin, end, window, apart) for begin, end, apart in spans]
+        return mixture(parts, np.array([(end - begin) / whole for begin, end, _ in spans]))
+    if index.spacing_s is not None:
+        return _between(path, 0.0, last - index.spacing_s, window, index.spacing_s)
     if index.takes == "RPE":
+        edges = path.edges(0.0, last)
+        middle, weight = 0.5 * (edges[1:] + edges[:-1]), np.diff(edges) / last
         mean = path.mean(middle, window)
         along = np.array([path.value(middle + window * each) for each in np.linspace(0.0, 1.0, _STRIPS + 1)]) - mean
         level, half = 0.5 * (along[1:] + along[:-1]), 0.5 * (along[1:] - along[:-1])
         return case(source.axes, mean=level, half_width=half, weight=np.tile(weight / _STRIPS, _STRIPS))
-    ends, between = path.mean(edges, window), path.mean(middle, window)
-    if index.spacing_s is not None:
-        apart = index.spacing_s if index.takes == "PDE" else math.fmod(index.spacing_s, period)
-        ends, between = path.mean(edges + apart, window) - ends, path.mean(middle + apart, window) - between
+    return _between(path, 0.0, last, window, None)
+
+
+def _between(path: "_Path", begin_s: float, end_s: float, window_s: float, apart_s: float | None) -> Part:
+    """Means of windows that begin in a span, evenly; or differences to those that begin so much later."""
+    edges = path.edges(begin_s, end_s)
+    middle, weight = 0.5 * (edges[1:] + edges[:-1]), np.diff(edges) / (end_s - begin_s)
+    ends, between = path.mean(edges, window_s), path.mean(middle, window_s)
+    if apart_s is not None:
+        ends, between = path.mean(edges + apart_s, window_s) - ends, path.mean(middle + apart_s, window_s) - between
     mean = (ends[1:] + 4.0 * between + ends[:-1]) / 6.0
-    return case(source.axes, mean=mean, half_width=0.5 * (ends[1:] - ends[:-1]), weight=weight)
+    return case(ends.shape[1], mean=mean, half_width=0.5 * (ends[1:] - ends[:-1]), weight=weight)
 
 
 class _Path:
@@ -274,7 +339,7 @@ class _Path:
         assert source.decay_s is not None
         rate, through = -1.0 / source.decay_s, source.transfer
         if not isinstance(through, lti.StateSpace):
-            self._rates, self._each = np.array([rate]), np.asarray(through, dtype=float)[:, None]
+            self._rates, self._each = np.array([complex(rate)]), np.asarray(through, dtype=float)[:, None]
             return
         n = through.order
         A = np.block([[through.A, through.B], [np.zeros((1, n)), np.full((1, 1), rate)]])
@@ -285,6 +350,16 @@ class _Path:
                 f"{source.name}: its time constant of {source.decay_s:g} s is a pole of its transfer; move one by 0.1 %"
             )
         self._each = (C @ modes) * np.linalg.solve(modes, start.astype(complex))
+
+    def edges(self, begin_s: float, end_s: float) -> Floats:
+        """Times between which it is nearly straight: evenly by what each of its modes has left, and evenly in time."""
+        found = [begin_s + (end_s - begin_s) * _EVENLY]
+        for rate in self._rates:
+            if abs(rate.imag) > abs(rate.real):  # a few turns, as long as they are there
+                found.append(np.arange(0.0, 7.0 / -rate.real, 0.25 / abs(rate.imag))[:_TURNING])
+            found.append(_LOGARITHMS / rate.real)
+        every = np.sort(np.concatenate(found))
+        return np.asarray(every[(every >= begin_s) & (every <= end_s)])
 
     def value(self, times_s: Floats) -> Floats:
         """Shape (times, axes)."""
@@ -321,10 +396,40 @@ _IN_TIME = {
 
 # ------------------------------------------------------------------------------------- at its worst time, of size 1
 def _at_its_worst(source: ErrorSource, required: Requirement) -> Part:
-    """What the error is at its largest, of one case: a mean on each axis, its sign that of the largest."""
+    """The largest size of the error about each axis, of one case: which sign it has there is open."""
     part = _IN_TIME[source.kind](source, required.index)
+    sizes = np.abs(part.mean) + np.abs(part.half_width) + np.abs(part.amplitude)
+    worst = np.max(sizes, axis=0)
+    if source.kind == "periodic" and required.index.takes == "RPE":
+        assert source.freq_hz is not None and required.index.window_s is not None
+        turns = source.freq_hz * required.index.window_s
+        left = np.exp(1j * math.pi * turns * np.linspace(-1.0, 1.0, 257)) - np.sinc(turns)
+        worst = np.max(np.abs(left)) * np.abs(source.response(source.freq_hz))
     sigmas = NormalDist().inv_cdf(0.5 * (1.0 + required.confidence))
-    worst = np.max(np.abs(part.mean) + np.abs(part.half_width) + np.abs(part.amplitude), axis=0)
     noise = sigmas * np.sqrt(np.max(np.diagonal(part.covariance, axis1=1, axis2=2), axis=0))
-    sign = np.where(np.sum(part.mean, axis=0) < 0.0, -1.0, 1.0)
-    return case(source.axes, mean=sign * np.hypot(worst, noise) if not worst.any() else sign * (worst + noise))
+    return case(source.axes, mean=np.asarray(worst + noise))
+
+
+def _folded(worst: Part, size: Spread) -> Part:
+    """The size of an error over the ensemble, from the largest one of a size of 1: without its sign."""
+    level, half, weight = _sizes(size)
+    return case(
+        worst.axes, mean=np.outer(level, worst.mean[0]), half_width=np.outer(half, worst.mean[0]), weight=weight
+    )
+
+
+def _sizes(size: Spread) -> tuple[Floats, Floats, Floats]:
+    """What a spread is without its sign, as even pieces: middles, half widths, and the share in each."""
+    mean, width = abs(size.mean), size.width
+    if size.shape == "fixed" or not width:
+        return np.array([mean]), np.zeros(1), np.ones(1)
+    if size.shape == "uniform":
+        if mean >= width:
+            return np.array([mean]), np.array([width]), np.ones(1)
+        inner, outer = width - mean, mean / width  # both signs up to there, and one beyond
+        found = np.array([0.5 * inner, width]), np.array([0.5 * inner, mean]), np.array([1.0 - outer, outer])
+        return found if mean else (found[0][:1], found[1][:1], np.ones(1))
+    edges = np.linspace(0.0, mean + 5.0 * width, _FOLDED + 1)
+    below = np.array([NormalDist(mean, width).cdf(each) - NormalDist(mean, width).cdf(-each) for each in edges])
+    share = np.diff(below)
+    return 0.5 * (edges[1:] + edges[:-1]), 0.5 * np.diff(edges), share / share.sum()

@@ -7,9 +7,11 @@ import numpy as np
 
 from microrad.core.arrays import Floats
 from microrad.core.lti import StateSpace
-from microrad.link.error_budget.contributions import Contribution
+from microrad.link.error_budget.contributions import Contribution, Requirement
 from microrad.link.error_budget.distributions import case
 from microrad.link.error_budget.sources import ErrorSource
+from microrad.link.pointing.error_classes import WORST_SATELLITE_SIGMAS
+from microrad.link.pointing.summation import sigma_multiple
 
 _INDEFINITE = 1e-9  # how far below 0 rounding may leave an eigenvalue of the matrix
 
@@ -30,24 +32,33 @@ class Correlation:
 
 
 def correlated(
-    found: Sequence[Contribution], sources: Sequence[ErrorSource], correlations: Sequence[Correlation]
+    found: Sequence[Contribution],
+    sources: Sequence[ErrorSource],
+    required: Requirement,
+    correlations: Sequence[Correlation],
 ) -> tuple[Contribution, ...]:
-    """Contributions in which those of correlated sources have become one; it has both names.
+    """Contributions in which those of correlated sources have become one; it has the names of all.
 
-    Where nothing of them is spread, as of constants on the worst satellite, they stay as they are.
+    On the worst satellite correlated constants lie three of their common deviations out; at its worst time a correlated
+    noise stands with as many of them as hold the confidence.
 
     Args:
         found: What each source adds to an index, in the order of the sources.
         sources: The sources.
+        required: The index and over what it is taken.
         correlations: Which of them are correlated; all others are not.
 
     Raises:
-        ValueError: For a source that is not there, or cannot be correlated, for a coefficient beyond 1, and for
-            coefficients that no errors can have together: their matrix has a negative eigenvalue.
+        ValueError: For a source that is not there, or cannot be correlated, for a coefficient beyond 1, for a pair that
+            is stated twice, for correlated constants of satellites at their worst time, and for coefficients that no
+            errors can have together: their matrix has a negative eigenvalue.
     """
     by_name = {source.name: source for source in sources}
     for each in correlations:
-        _check(each, by_name)
+        _check(each, by_name, required)
+    pairs = [frozenset((each.first, each.second)) for each in correlations]
+    if len(set(pairs)) < len(pairs):
+        raise ValueError("two correlations are of the same sources; give each pair once")
     names = list(dict.fromkeys(name for each in correlations for name in (each.first, each.second)))
     matrix = np.eye(len(names))
     for each in correlations:
@@ -61,11 +72,11 @@ def correlated(
         )
     merged = list(found)
     for group in _groups(matrix):
-        merged = _merged(merged, [names[place] for place in group], matrix[np.ix_(group, group)], by_name)
+        merged = _merged(merged, [names[place] for place in group], matrix[np.ix_(group, group)], by_name, required)
     return tuple(merged)
 
 
-def _check(each: Correlation, by_name: dict[str, ErrorSource]) -> None:
+def _check(each: Correlation, by_name: dict[str, ErrorSource], required: Requirement) -> None:
     both = [by_name.get(name) for name in (each.first, each.second)]
     where = f"correlation of {each.first} and {each.second}"
     if None in both or each.first == each.second:
@@ -78,6 +89,13 @@ def _check(each: Correlation, by_name: dict[str, ErrorSource]) -> None:
         raise ValueError(
             f"{where}: only two Gaussian errors of one class, random or constant, that reach the axes by gains and "
             "alike have one; state the common cause as a source of its own"
+        )
+
+    constant = any(kind == "constant" for kind, _ in kinds)
+    if constant and required.interpretation == "ensemble":
+        raise ValueError(
+            f"{where}: the sizes of correlated constants have no common distribution here; take the interpretation "
+            "temporal or mixed"
         )
 
 
@@ -97,26 +115,34 @@ def _groups(matrix: Floats) -> list[list[int]]:
 
 
 def _merged(
-    found: list[Contribution], names: list[str], matrix: Floats, by_name: dict[str, ErrorSource]
+    found: list[Contribution],
+    names: list[str],
+    matrix: Floats,
+    by_name: dict[str, ErrorSource],
+    required: Requirement,
 ) -> list[Contribution]:
     chosen = [each for each in found if each.name in names]
-    spread = np.array([_deviation(each, by_name[each.name]) for each in chosen])
-    if not spread.any():
+    sources = [by_name[each.name] for each in chosen]
+    counts = required.index.takes in (("APE", "RPE") if sources[0].kind == "random" else ("APE", "MPE"))
+    if not counts:
         return found
     order = [names.index(each.name) for each in chosen]
+    spread = np.array([_deviation(source) * np.asarray(source.transfer, dtype=float) for source in sources])
     together = np.einsum("ij,ia,jb->ab", matrix[np.ix_(order, order)], spread, spread)
-    if by_name[names[0]].apart:
+    if sources[0].apart:
         together = np.diag(np.diag(together))
-    mean = np.sum([part.whole_mean for each in chosen for part in each.parts], axis=0)
-    whole = replace(
-        chosen[0],
-        name=" with ".join(each.name for each in chosen),
-        parts=(case(len(mean), mean=mean, covariance=together),),
-    )
+    axes, sigma = sources[0].axes, np.sqrt(np.maximum(np.diag(together), 0.0))
+    mean = np.sum([source.size.mean * np.asarray(source.transfer) for source in sources], axis=0)
+    if sources[0].kind == "random":
+        ends = required.interpretation == "ensemble"
+        part = case(axes, mean=sigma_multiple(required.confidence) * sigma) if ends else case(axes, covariance=together)
+    elif required.interpretation == "temporal":
+        part = case(axes, mean=np.abs(mean) + WORST_SATELLITE_SIGMAS * sigma)
+    else:
+        part = case(axes, mean=mean, covariance=together)
+    whole = replace(chosen[0], name=" with ".join(each.name for each in chosen), parts=(part,))
     return [whole if each is chosen[0] else each for each in found if each is chosen[0] or each not in chosen]
 
 
-def _deviation(of: Contribution, source: ErrorSource) -> Floats:
-    """Standard deviation about each axis with the sign of its gain (rad), shape (axes,)."""
-    variance = np.sum([np.diag(part.whole_covariance) for part in of.parts], axis=0)
-    return np.asarray(np.sign(np.asarray(source.transfer)) * np.sqrt(variance))
+def _deviation(source: ErrorSource) -> float:
+    return source.size.mean if source.kind == "random" else source.size.width

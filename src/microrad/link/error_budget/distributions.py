@@ -24,6 +24,7 @@ _CHUNK, _MOST, _MOST_PLANE, _MOST_OF_OTHERS = 16, 1 << 14, 256, 128  # terms at 
 _BLOCK = 2_000_000  # numbers of an intermediate array
 _KERNELS = 64  # that a grid keeps
 _TAPER = 6.0  # width of the taper that ends a series of the most terms
+_FAR_OFF = 0.01  # deviation beside the length of a mean, up to which only its direction counts
 _NO_SPREAD = 1e-12  # standard deviation beside the mean below which all is taken as constant
 
 
@@ -182,7 +183,7 @@ class Sum:
     def __init__(self, bundle: Bundle) -> None:
         """Gather moments, and what the series has to hold."""
         of, begin = bundle.cases, bundle.begin
-        self.axes = of.axes
+        self._bundle, self.axes = bundle, of.axes
 
         def by_part(values: Floats) -> Floats:
             return np.add.reduceat(values, begin, axis=0)
@@ -267,7 +268,21 @@ class Sum:
         """
         if self.constant:
             return float(np.linalg.norm(self.mean))
+        if self.axes == 2 and float(np.max(self.sigma)) < _FAR_OFF * float(np.linalg.norm(self.mean)):
+            return self._along_the_mean().quantile(share)
         return self.series().quantile(share)
+
+    def _along_the_mean(self) -> "Sum":
+        """The same in the direction of the mean alone: what lies across it hardly makes a large mean longer."""
+        of, u = self._bundle.cases, self.mean / np.linalg.norm(self.mean)
+        along = Part(
+            of.weight,
+            (of.mean @ u)[:, None],
+            np.einsum("i,kij,j->k", u, of.covariance, u)[:, None, None],
+            (of.half_width @ u)[:, None],
+            (of.amplitude @ u)[:, None],
+        )
+        return Sum(Bundle(along, self._bundle.begin))
 
     @property
     def constant(self) -> bool:
@@ -378,22 +393,25 @@ class Series:
         grid: Where characteristic functions are known.
         terms: The error's where it is not negligible, shape (kept,).
         kept: Which points of the grid these are, shape (kept,).
+        whole: Whether the terms go on until they are negligible; they are tapered else.
     """
 
     grid: Grid
     terms: Complexes
     kept: Integers
+    whole: bool = True
 
     @classmethod
-    def of(cls, grid: Grid, terms: Complexes) -> "Series":
+    def of(cls, grid: Grid, terms: Complexes, whole: bool = True) -> "Series":
         """Keep the terms that count.
 
         Args:
             grid: The grid.
             terms: The characteristic function at all of its points.
+            whole: Whether no further ones are missing.
         """
         kept = np.flatnonzero(np.abs(terms) > _NEGLIGIBLE)
-        return cls(grid, terms[kept], kept)
+        return cls(grid, terms[kept], kept, whole)
 
     @property
     def u(self) -> Floats:
@@ -458,15 +476,17 @@ def each_without(sums: Sequence[Sum], reach_rad: float) -> list[Series]:
     """
     step = math.pi / reach_rad
     if sums[0].axes == 2:
-        u, weight = _plane(step, _count(lambda u: np.abs(_others(sums, u)), step, _MOST_OF_OTHERS), _MOST_OF_OTHERS)
+        most = _MOST_OF_OTHERS
+        count = _count(lambda u: np.abs(_others(sums, u)), step, most)
+        u, weight = _plane(step, count, most)
     else:
-        count = 4 * _CHUNK
+        most, count = _MOST, 4 * _CHUNK
         while count < _MOST and np.max(np.abs(_others(sums, step * _last(count)))) >= _NEGLIGIBLE:
             count = min(2 * count, _MOST)
         u = step * np.arange(1.0, count + 1.0)[:, None]
         weight = _taper(np.arange(1, count + 1) / count) if count >= _MOST else np.ones(count)
     grid = Grid(u, 0.0, reach_rad)
-    return [Series.of(grid, weight * rest) for rest in _others(sums, u)]
+    return [Series.of(grid, weight * rest, count < most) for rest in _others(sums, u)]
 
 
 def _last(count: int) -> Floats:

@@ -148,7 +148,7 @@ class ErrorSource:
         if not self.apart:
             return (self,)
         gains = np.diag(np.asarray(self.transfer, dtype=float))
-        return tuple(replace(self, transfer=each, apart=False) for each in gains if each.any())
+        return tuple(replace(self, transfer=each, apart=False) for each in gains)
 
     @cached_property
     def motion(self) -> Motion:
@@ -162,12 +162,9 @@ class ErrorSource:
             return lti.frequency_response(self.transfer, np.array([freq_hz]))[0, :, 0]
         return np.asarray(self.transfer, dtype=complex)
 
-    def slow(self) -> tuple[Floats, Floats]:
-        """Gain to each axis at rest, and what a rate of 1/s leaves behind there (s): G(0) and G'(0)."""
+    def at_rest(self) -> Floats:
+        """Gain to each axis of what does not change, shape (axes,)."""
         if not isinstance(self.transfer, lti.StateSpace):
-            return np.asarray(self.transfer, dtype=float), np.zeros(self.axes)
+            return np.asarray(self.transfer, dtype=float)
         A, B, C, D = self.transfer.A, self.transfer.B, self.transfer.C, self.transfer.D
-        if not A.size:
-            return D[:, 0], np.zeros(self.axes)
-        once = np.linalg.solve(A, B)
-        return np.asarray((D - C @ once)[:, 0]), np.asarray(-(C @ np.linalg.solve(A, once))[:, 0])
+        return np.asarray((D - C @ np.linalg.solve(A, B))[:, 0] if A.size else D[:, 0])
