@@ -128,6 +128,7 @@ def test_what_the_loop_leaves_is_a_source_of_its_window(call, tmp_path):
         left["all"], rel=1e-9, abs=0.0
     )
     assert {each["name"] for each in loop} == set(left) - {"all"}
+    assert {each["origin"] for each in loop} == {"the mission's fine-pointing loop"}
 
 
 @pytest.mark.parametrize(
@@ -141,6 +142,7 @@ def test_what_the_loop_leaves_is_a_source_of_its_window(call, tmp_path):
         ),
         ([('window = "10 ms"\n', "")], (), 'is missing, and index = "RPE" needs it'),
         ([('index = "APE"', 'index = "APE"\nwindow = "1 s"')], (), 'does not belong to index = "APE"'),
+        ([("with_loop = false", "with_loop = true"), ('index = "APE"', 'index = "AKE"')], (), "is of what is known"),
         ([('axes = "y"', 'axes = "z"')], (), "needs 3 axes, and the sources have 2"),
         ([("gains = [0.0, 1.0]", "gains = [1.0]")], (), "has 1 items, and others have 2"),
         ([('frequency = "0.2 mHz"', 'period = "1 h"')], (), 'is missing, and class = "periodic" needs it'),
@@ -166,6 +168,7 @@ def test_a_correlation_of_the_table_makes_one_line_of_two_sources(call, mission)
     found = {each["requirement"]: each for each in json.loads(out)["budget"]}["drift"]
     joined = next(each for each in found["sources"] if "with" in each["name"])
     assert joined["name"] == "alignment with mounting"
+    assert joined["origin"].count("calibrated on the ground") == 2
     assert joined["sigma_rad"] == [pytest.approx(2e-6 / 3.0, rel=1e-9, abs=0.0)]  # 2 of them, times a gain of a half
 
 

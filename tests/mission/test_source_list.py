@@ -68,7 +68,7 @@ def test_the_columns_are_the_keys_of_a_source():
         (["a,random,1 urad,,fixed,together,1,1"], HEAD, "statistic does not belong to a random error"),
         (["a,constant,1 urad,,fixed,together,one,1"], HEAD, 'row 2, x: "one" is no number'),
         (["a,constant,1 urad,,fixed,together,inf,1"], HEAD, "row 2, a: gains"),
-        (["a,constant,1 urad,,fixed,together,,"], HEAD, "gains"),
+        (["a,constant,1 urad,,fixed,together"], HEAD, "gains"),
         ([",constant,1 urad,,fixed,together,1,1"], HEAD, "row 2: has no name"),
         (["a,constant,1 urad,,fixed,together,1,1"] * 2, HEAD, "row 3: is a second 'a'"),
         (["a,constant"], HEAD.replace("size", "length"), 'no column is called "length"'),
@@ -104,3 +104,16 @@ def test_a_workbook_that_unpacks_to_more_than_memory_has_is_refused(tmp_path):
         book.writestr("xl/sharedStrings.xml", bytes(101_000_000))
     with pytest.raises(SourceListError, match=r"is no workbook .it unpacks to 101 MB"):
         read_sources(path)
+
+
+@pytest.mark.parametrize(
+    ("row", "said"),
+    [
+        ("a,constant,1 urad,,fixed,each,1,,1", "row 2, a: y is empty before z; give 0 where nothing gets there"),
+        ("a,constant,1 urad,,fixed,each,,1", "row 2, a: x is empty before y"),
+        ("a,constant,1 urad,,fixed,each,1,1,,,,,,said,9", 'row 2: "9" stands in a column without a name'),
+    ],
+)
+def test_a_cell_that_is_empty_or_too_much_moves_no_other(tmp_path, row, said):
+    with pytest.raises(SourceListError, match=re.escape(said)):
+        read_sources(listed(tmp_path, row))

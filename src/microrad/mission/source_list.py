@@ -58,6 +58,12 @@ def read_sources(path: Path) -> tuple[ListedSource, ...]:
     for number, cells in enumerate(rows, 2):
         if number > _MOST_ROWS:
             raise SourceListError(f"{path}: more than {_MOST_ROWS} rows; give fewer sources")
+        if extra := next(
+            (cell for place, cell in enumerate(cells) if cell.strip() and not "".join(head[place : place + 1])), ""
+        ):
+            raise SourceListError(
+                f'{path}, row {number}: "{_short(extra)}" stands in a column without a name; name it, or remove it'
+            )
         row = {key: cell.strip() for key, cell in zip(head, cells, strict=False) if key and cell.strip()}
         if row:
             found.append(_source(f"{path}, row {number}", row, {each.name for each in found}))
@@ -84,7 +90,12 @@ def _source(where: str, row: dict[str, str], taken: set[str]) -> ListedSource:
     if not name or name in taken:
         raise SourceListError(f"{where}: {'has no name' if not name else f'is a second {_short(name)!r}'}; give it one")
     origin = row.pop("origin", where)
-    gains = [row.pop(axis, None) for axis in _AXES]
+    gains = [row.pop(axis, "") for axis in _AXES]
+    last = max((place for place, cell in enumerate(gains) if cell), default=0)
+    if empty := [axis for axis, cell in zip(_AXES, gains[:last], strict=False) if not cell]:
+        raise SourceListError(
+            f"{where}, {_short(name)}: {empty[0]} is empty before {_AXES[last]}; give 0 where nothing gets there"
+        )
     data: dict[str, Any] = {
         **row,
         "gains": [_number(where, axis, cell) for axis, cell in zip(_AXES, gains, strict=True) if cell],

@@ -45,12 +45,13 @@ def _summary(totals: Mapping[str, Total]) -> Table:
     for name, total in totals.items():
         limit = total.required.limit_rad
         mark = "" if total.holds is None else "PASS" if total.holds else "FAIL"
+        rules = "" if limit is None else "PASS" if total.by_rules_rad <= limit else "FAIL"
         shown = "" if limit is None else micro(limit)
         rows.append(
             (
                 _shown(name),
                 requirement_text(total.required),
-                micro(total.by_rules_rad),
+                Cell(micro(total.by_rules_rad), rules),
                 Cell(micro(total.quantile_rad), mark),
                 shown,
             )
@@ -82,13 +83,18 @@ def _sources(name: str, total: Total, ranked: Sequence[Share]) -> Table:
 def _row(each: Share, kind: str) -> tuple[str, ...]:
     weight = percent(each.growth)
     return (
-        source_name(each.name),
+        _name(each, kind),
         kind,
         _length(each.mean_rad),
         _length(each.sigma_rad),
         weight,
         micro(each.without_rad),
     )
+
+
+def _name(each: Share, kind: str) -> str:
+    """A source of the loop as the loop's page calls it; another one as its file does."""
+    return source_name(each.name) if kind == "loop" else _shown(each.name)
 
 
 def _shown(name: str) -> str:
@@ -154,6 +160,12 @@ def _data(name: str, total: Total, origins: Mapping[str, str]) -> dict[str, Any]
     }
 
 
+def _origin(name: str, origins: Mapping[str, str]) -> str:
+    """Where a source's numbers come from; of correlated ones, those of each."""
+    names = [name] if name in origins else name.split(" with ")
+    return "; ".join(origins[each] for each in names if each in origins)
+
+
 def _source_data(each: Share, kind: str, origins: Mapping[str, str]) -> dict[str, Any]:
     allowed = None if each.allowed is None or math.isinf(each.allowed) else each.allowed
     return {
@@ -164,5 +176,5 @@ def _source_data(each: Share, kind: str, origins: Mapping[str, str]) -> dict[str
         "weight": each.growth,
         "total_without_it_rad": each.without_rad,
         "may_be_times": allowed,
-        "origin": origins.get(each.name, ""),
+        "origin": "the mission's fine-pointing loop" if kind == "loop" else _origin(each.name, origins),
     }

@@ -138,6 +138,13 @@ class ErrorBudget(Table):
                     f"has {len(source.gains)} items, and others have {self.axes}",
                     "as many each",
                 )
+        known = [name for name, each in self.requirements.items() if each.index in ("AKE", "MKE", "RKE")]
+        if self.with_loop and known:
+            yield Problem(
+                f"requirements.{known[0]}.index",
+                "is of what is known, and the loop leaves errors of the pointing",
+                "with_loop = false, and sources of knowledge alone",
+            )
         if self.with_loop and self.axes != 2:
             yield Problem("with_loop", f"has two axes, and the sources have {self.axes}", "gains for x and y")
         for name, required in self.requirements.items():
