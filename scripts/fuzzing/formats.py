@@ -93,7 +93,7 @@ def _mission(path: Path) -> None:
         properties.links(file)
         if file.mission.error_budget is not None:
             properties.mission_budget(file.mission.error_budget)
-    properties.plant(from_table(file.mission.mirror))
+        properties.plant(from_table(file.mission.mirror))
 
 
 def _mirror(path: Path) -> None:
@@ -304,8 +304,8 @@ FORMATS: dict[str, Format] = {
         FileFormat("plans", ".toml", seeds.plans, mutate.text, _plan, most_s=20.0, most_bytes=2_000_000_000),
         FileFormat("campaigns", ".toml", seeds.campaigns, mutate.text, _campaign, seeds.beside_campaigns),
         FileFormat("lists", ".toml", seeds.lists, mutate.text, _list, seeds.beside_lists),
-        FileFormat("sources", ".csv", seeds.sources, mutate.text, _sources),
-        FileFormat("workbooks", ".xlsx", seeds.workbooks, mutate.binary, _sources),
+        FileFormat("sources", ".csv", seeds.sources, mutate.text, _sources, most_s=5.0),
+        FileFormat("workbooks", ".xlsx", seeds.workbooks, mutate.binary, _sources, most_s=5.0),
         FileFormat("motions", ".csv", seeds.motions, mutate.text, _motion),
         FileFormat("csv", ".csv", seeds.csv, mutate.text, _recording),
         FileFormat("tdms", ".tdms", seeds.tdms, mutate.binary, _recording),

@@ -121,6 +121,7 @@ _SMALL = 1e-3  # growth of a source by which that of the total is seen
 _FAR = 1e6  # times its size, beyond which a source does not matter
 _STEP = 4.0  # between two sizes that are tried
 _HELD = 2.0  # limits, or totals, up to which the range of a series reaches
+_NO_GROWTH = 1e-9  # below which it is rounding
 _NOTHING = 1e-12  # of a variance, below which others have none
 _DIGITS = 1e-5  # part to which a size or a total of others is found
 
@@ -164,6 +165,7 @@ def _share(of: Total, name: str, own: Sum, others: Series, without: float) -> Sh
     by_source = spare(whole, 1.0 + _SMALL) - spare(whole, 1.0 - _SMALL)
     by_size = spare(whole * (1.0 + _SMALL), 1.0) - spare(whole * (1.0 - _SMALL), 1.0)
     growth = -by_source / by_size if by_size > 0.0 else 0.0
+    growth = growth if abs(growth) > _NO_GROWTH else 0.0
     allowed = None if limit is None else _allowed(own, lambda times: spare(limit, times))
     return Share(name, own.mean, own.sigma, without, growth, allowed)
 
