@@ -266,3 +266,8 @@ def test_what_is_written_can_be_read_back(value, unit):
     text = format_quantity(value, unit, 6)
     assert parse_quantity(text, unit) == pytest.approx(value, rel=5.1e-6, abs=0.0)
     assert re.fullmatch(r"\S+ \S.*", text)
+
+
+def test_a_value_of_ten_digits_keeps_them_and_one_of_eleven_is_taken_as_computed():
+    assert format_input(1.234567891e-6, "rad") == "1.234567891 µrad"
+    assert format_input(1.2345678912e-6, "rad") == "1.235 µrad"

@@ -19,6 +19,7 @@ from scipy.sparse import csc_array
 
 from microrad.lab.recording import RecordingError, multisine_recordings, read_recording
 from microrad.lab.recording.formats.lvm import _Blanks
+from microrad.lab.recording.reader import open_source
 
 N, RATE_HZ = 1000, 2000.0
 TIME_S = np.arange(N) / RATE_HZ
@@ -789,3 +790,10 @@ def test_multisine_recordings():
     np.testing.assert_array_equal(read[1].output[512:], y[:, :, 1, 1])
     with pytest.raises(RecordingError, match="the same samples, realisations and periods"):
         multisine_recordings(u, y[:, :, :2], RATE_HZ)
+
+
+def test_the_last_comment_of_as_many_words_names_the_columns(tmp_path):
+    rows = "".join(f"{k / 1000} {k % 7} {0.1 * (k % 7)}\n" for k in range(40))
+    path = tmp_path / "named.txt"
+    path.write_text(f"# made by hand today\n# first second third\n# time drive angle\n{rows}", "utf-8")
+    assert tuple(name.strip() for name in open_source(path).names) == ("time", "drive", "angle")

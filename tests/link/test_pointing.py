@@ -9,6 +9,8 @@ from hypothesis import strategies as st
 
 import budgets
 from microrad.core.budget import Line, root_sum_square, total_db
+from microrad.link.pointing.error_classes import error_term
+from microrad.link.pointing.summation import radial_total_rad
 from microrad.mission.file import load_mission
 from microrad.mission.model import LinkMission
 from microrad.mission.tables.pointing import PointAhead, PointingLine
@@ -259,3 +261,10 @@ def test_unlike_units_have_no_root_sum_square():
         root_sum_square([line(1.0, "dB")])
     with pytest.raises(ValueError, match="these are in none"):
         root_sum_square([])
+
+
+def test_what_is_left_for_a_line_over_all_satellites_is_by_their_budget():
+    of, total = budgets.open_loop(MISSION, SOURCES, interpretation="mixed"), 900e-6
+    for each in of.allocation(total):
+        lines = [line.with_error(each.largest_rad) if line.name == each.name else line for line in of.stated]
+        assert radial_total_rad([error_term(line, "mixed") for line in lines], of.confidence) == pytest.approx(total)

@@ -399,3 +399,9 @@ def test_statistics_are_of_the_steady_part():
     )
     assert trace.peak_rad == 3.0
     assert trace.rms_rad == pytest.approx(np.sqrt(11 / 3))
+
+
+def test_a_reversal_every_ten_samples_counts_and_one_every_eleven_does_not():
+    for half, counted in ((10, True), (11, False)):
+        cycle = np.abs(np.arange(20 * half) % (2 * half) - half).astype(float)[:, None]
+        assert (simulate.alternations(cycle, 0.1) > 0) == counted
