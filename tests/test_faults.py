@@ -104,7 +104,7 @@ def test_the_file_that_catches_a_fault_is_named_and_the_code_is_as_before(faults
     assert (tmp_path / "copy/src/microrad/core/threads.py").read_text(encoding="utf-8") == TWICE
 
 
-def test_tests_that_fail_without_a_fault_are_told(faults, tiny, tmp_path):
+def test_tests_that_fail_without_a_fault_are_told_and_left_out(faults, tiny, tmp_path, capsys):
     (faults.ROOT / "tests" / "test_sharp.py").write_text(A_TEST.format(3, "== 7"), encoding="utf-8")
-    with pytest.raises(SystemExit, match=r"without a mistake these fail already: tests/test_sharp\.py::test_3$"):
-        faults.callers([tiny], tmp_path)
+    assert list(faults.callers([tiny], tmp_path)["sum"]) == ["tests/test_blunt.py::test_2"]
+    assert "left out, as they fail without a mistake: tests/test_sharp.py::test_3\n" in capsys.readouterr().out
