@@ -12,7 +12,7 @@ from packaging.utils import canonicalize_name
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "licences.md"
 PROJECT = "microrad"
-EXTRAS = ("lab", "cluster", "parquet", "control", "studio", "plot", "docs")
+EXTRAS = ("lab", "xlsx", "cluster", "parquet", "control", "studio", "plot", "docs")
 _LOWEST = {"python_version": "3.11", "python_full_version": "3.11.0"}  # the Python that needs most packages
 _LONGEST = 50  # characters of a field that names a licence; a longer one is its text
 
