@@ -44,7 +44,7 @@ def test_the_advice_is_a_command_for_the_projects_folder_with_an_extra_that_ther
         for path in (ROOT / "src").rglob("*.py")
         for extra in re.findall(r"""\badvice\(["'](\w+)""", path.read_text(encoding="utf-8"))
     }
-    assert {"lab", "cluster", "parquet", "control", "plot", "studio"} == said <= set(extras)
+    assert {"lab", "xlsx", "cluster", "parquet", "control", "plot", "studio"} == said <= set(extras)
 
 
 # ------------------------------------------------------------------------------------------------------------- the pins
