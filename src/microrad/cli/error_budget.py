@@ -33,6 +33,7 @@ def sources_beside(
     from microrad.link.error_budget.assembly import requirement_of, source_of, sources_of
     from microrad.mission.model import source_text
     from microrad.mission.source_list import SourceListError, read_sources
+    from microrad.report.fine_pointing.windows import index_text
 
     table = mission.mission.error_budget
     if table is None and listed is None:
@@ -51,16 +52,10 @@ def sources_beside(
             raise Refusal(f'{listed}: "{min(twice)}" is a source of {mission.path}, too: give it once')
         found += more
     if table is None:
-        asked = {_name(index): Requirement(index, observation_s=_observed(index)) for index in indices}
+        asked = {index_text(index): Requirement(index, observation_s=_observed(index)) for index in indices}
     else:
         asked = {name: requirement_of(each) for name, each in table.requirements.items()}
     return tuple(found), asked
-
-
-def _name(index: "ErrorIndex") -> str:
-    from microrad.report.fine_pointing.windows import index_name
-
-    return index_name(index).replace("\n", " ")
 
 
 def _observed(index: "ErrorIndex") -> float | None:

@@ -1,5 +1,6 @@
 """Commands of the fine-pointing loop: controllers designed for a mission, with their margins and what they leave."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -130,27 +131,33 @@ def pointing(
     with refusal_of(mission.path):
         indices = indices_of(window or [0.01, 1.0], spacing or [])
         asked = sources_beside(mission, sources, indices)
-    table, data, texts, closed = mission.mission.error_budget, dict[str, Any](), list[str](), None
+    table, closed = mission.mission.error_budget, None
     loop, needed = mission if isinstance(mission, MissionFile) else None, asked is None or (table and table.with_loop)
+    data, texts, code = dict[str, Any](), list[str](), MET
+
+    def told(key: str, of_data: Callable[[], Any], of_text: Callable[[], str]) -> None:
+        if as_json:
+            data[key] = of_data()
+        else:
+            texts.append(of_text().strip("\n"))
+
     if needed or simulate is not None or (loop and loop.mission.fine_pointing):
         loop = loop or load_mission(file)
         scene, made = _designed(loop, controller)
         with refusal_of(mission.path):
             closed = close(scene.theory, made.controller)
             errors = windowed_errors(closed, indices)
-        data |= {"controller": controller, "indices": windows_data(errors)}
-        texts.append(windows_text(errors, controller, width()))
+        data["controller"] = controller
+        told("indices", lambda: windows_data(errors), lambda: windows_text(errors, controller, width()))
         if simulate is not None:
-            simulated, lost = _simulated(loop, scene, made, indices, simulate)
-            data["simulated"] = simulated_data(simulated, lost, simulate)
-            texts.append(views_text(simulated_view(simulated, lost, simulate).blocks, width()).strip("\n"))
-    code = MET
+            found = *_simulated(loop, scene, made, indices, simulate), simulate
+            view = simulated_view(*found)
+            told("simulated", lambda: simulated_data(*found), lambda: views_text(view.blocks, width()))
     if asked is not None:
         with refusal_of(mission.path):
             totals = totals_of(*asked, table, closed)
         code = UNMET if any(each.holds is False for each in totals.values()) else MET
-        data["budget"] = budget_data(totals, {each.name: each.origin for each in asked[0]})
-        texts.append(views_text(budget_view(totals).blocks, width()).strip("\n"))
+        told("budget", lambda: budget_data(totals), lambda: views_text(budget_view(totals).blocks, width()))
     if as_json:
         return Outcome(json_text({"mission_sha256": mission.sha256, **data}), code)
     return Outcome("\n\n".join(texts), code)

@@ -1,16 +1,16 @@
 """A budget of pointing errors: each requirement with its totals, and what each source means for it."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 from microrad.core.units import format_quantity
 from microrad.link.error_budget import Requirement, Share, Total, shares
-from microrad.report.fine_pointing.windows import index_name
+from microrad.report.fine_pointing.windows import index_text
 from microrad.report.fine_pointing.words import source_name
 from microrad.report.quantities import micro, percent
 from microrad.report.tables import Cell, Table
-from microrad.report.view import Block, Points, View
+from microrad.report.view import Points, View
 
 _AXES = {(0,): "about x", (1,): "about y", (2,): "about z", (0, 1): "radial"}
 _SHARE_OF = {
@@ -26,18 +26,15 @@ def budget_view(totals: Mapping[str, Total]) -> View:
     Args:
         totals: What was found, by the name of its requirement.
     """
-    ranked = {name: shares(total) for name, total in totals.items()}
-    blocks: list[Block] = [_summary(totals)]
-    blocks += [_sources(name, total, ranked[name]) for name, total in totals.items()]
-    return View("Pointing error budget", [*blocks, Points(_remarks(totals))])
+    sources = [_sources(name, total) for name, total in totals.items()]
+    return View("Pointing error budget", [_summary(totals), *sources, Points(_remarks(totals))])
 
 
 def requirement_text(required: Requirement) -> str:
     """An index with its times, its share, and its axes, in words."""
-    index = index_name(required.index).replace("\n", " ")
     observed = "" if required.observation_s is None else f" within {format_quantity(required.observation_s, 's')}"
     share = f"{percent(required.confidence, 4)} {_SHARE_OF[required.interpretation]}"
-    return f"{index}{observed}, {_AXES[required.axes]}, {share}"
+    return f"{index_text(required.index)}{observed}, {_AXES[required.axes]}, {share}"
 
 
 def _summary(totals: Mapping[str, Total]) -> Table:
@@ -60,9 +57,9 @@ def _summary(totals: Mapping[str, Total]) -> Table:
     return Table("Requirements, µrad", headings, rows, (0, 1))
 
 
-def _sources(name: str, total: Total, ranked: Sequence[Share]) -> Table:
+def _sources(name: str, total: Total) -> Table:
     limited = total.required.limit_rad is not None
-    rows = [(*_row(each, _kind(total, each.name)), *([_allowed(each)] if limited else [])) for each in ranked]
+    rows = [(*_row(each), *([_allowed(each)] if limited else [])) for each in shares(total)]
     rows.append(
         (
             "all",
@@ -80,30 +77,21 @@ def _sources(name: str, total: Total, ranked: Sequence[Share]) -> Table:
     return Table(title, headings, rows, (0, 1), totals=1, brief=(0, 2, 3, 4, *([6] if limited else [5])))
 
 
-def _row(each: Share, kind: str) -> tuple[str, ...]:
-    weight = percent(each.growth)
+def _row(each: Share) -> tuple[str, ...]:
+    kind = each.contribution.kind
     return (
-        _name(each, kind),
+        source_name(each.name) if kind == "loop" else _shown(each.name),
         kind,
         _length(each.mean_rad),
         _length(each.sigma_rad),
-        weight,
+        percent(each.growth),
         micro(each.without_rad),
     )
-
-
-def _name(each: Share, kind: str) -> str:
-    """A source of the loop as the loop's page calls it; another one as its file does."""
-    return source_name(each.name) if kind == "loop" else _shown(each.name)
 
 
 def _shown(name: str) -> str:
     """A key of a file as words."""
     return name.replace("_", " ")
-
-
-def _kind(total: Total, name: str) -> str:
-    return next(each.kind for each in total.contributions if each.name == name)
 
 
 def _length(of: Any) -> str:
@@ -129,17 +117,16 @@ def _remarks(totals: Mapping[str, Total]) -> list[str]:
     return [*said, *([f"The rules are too small for {', '.join(low)}."] if low else [])]
 
 
-def budget_data(totals: Mapping[str, Total], origins: Mapping[str, str]) -> list[dict[str, Any]]:
+def budget_data(totals: Mapping[str, Total]) -> list[dict[str, Any]]:
     """The same as data, angles in rad.
 
     Args:
         totals: What was found, by the name of its requirement.
-        origins: Where the numbers of each source come from, by its name.
     """
-    return [_data(name, total, origins) for name, total in totals.items()]
+    return [_data(name, total) for name, total in totals.items()]
 
 
-def _data(name: str, total: Total, origins: Mapping[str, str]) -> dict[str, Any]:
+def _data(name: str, total: Total) -> dict[str, Any]:
     required = total.required
     return {
         "requirement": name,
@@ -156,25 +143,19 @@ def _data(name: str, total: Total, origins: Mapping[str, str]) -> dict[str, Any]
         "by_rules_rad": total.by_rules_rad,
         "by_distribution_rad": total.quantile_rad,
         "holds": total.holds,
-        "sources": [_source_data(each, _kind(total, each.name), origins) for each in shares(total)],
+        "sources": [_source_data(each) for each in shares(total)],
     }
 
 
-def _origin(name: str, origins: Mapping[str, str]) -> str:
-    """Where a source's numbers come from; of correlated ones, those of each."""
-    names = [name] if name in origins else name.split(" with ")
-    return "; ".join(origins[each] for each in names if each in origins)
-
-
-def _source_data(each: Share, kind: str, origins: Mapping[str, str]) -> dict[str, Any]:
+def _source_data(each: Share) -> dict[str, Any]:
     allowed = None if each.allowed is None or math.isinf(each.allowed) else each.allowed
     return {
         "name": each.name,
-        "class": kind,
+        "class": each.contribution.kind,
         "mean_rad": each.mean_rad.tolist(),
         "sigma_rad": each.sigma_rad.tolist(),
         "weight": each.growth,
         "total_without_it_rad": each.without_rad,
         "may_be_times": allowed,
-        "origin": "the mission's fine-pointing loop" if kind == "loop" else _origin(each.name, origins),
+        "origin": each.contribution.origin,
     }

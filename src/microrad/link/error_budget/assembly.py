@@ -16,6 +16,7 @@ from microrad.loop.pointing_loop.linear import ClosedLoop
 from microrad.loop.pointing_loop.windows import windowed_lines, windowed_noise
 from microrad.mission.tables.error_budget import BudgetRequirement, BudgetSource, ErrorBudget
 
+_LOOP = "the mission's fine-pointing loop"
 _PLACES = {"x": (0,), "y": (1,), "z": (2,), "radial": (0, 1)}
 
 
@@ -121,4 +122,4 @@ def loop_contributions(closed: ClosedLoop, required: Requirement) -> tuple[Contr
     for line, variance in windowed_lines(closed, required.index):
         amplitudes = np.diag(np.sqrt(2.0 * np.maximum(variance, 0.0))).astype(complex)
         parts.setdefault(line, []).extend(case(len(variance), amplitude=each) for each in amplitudes if each.any())
-    return tuple(Contribution(name, "loop", tuple(each)) for name, each in parts.items() if each)
+    return tuple(Contribution(name, "loop", tuple(each), _LOOP) for name, each in parts.items() if each)

@@ -50,7 +50,7 @@ class Share:
     """What one source means for a total.
 
     Args:
-        name: The source.
+        contribution: The source's part of the total.
         mean_rad: Its mean about each axis of the requirement.
         sigma_rad: Its standard deviation about each of them.
         without_rad: The total, by the distribution, without it.
@@ -59,12 +59,17 @@ class Share:
             alone miss it, None without a limit, infinite where it does not matter.
     """
 
-    name: str
+    contribution: Contribution
     mean_rad: Floats
     sigma_rad: Floats
     without_rad: float
     growth: float
     allowed: float | None
+
+    @property
+    def name(self) -> str:
+        """The source."""
+        return self.contribution.name
 
 
 def total(found: Sequence[Contribution], required: Requirement) -> Total:
@@ -135,11 +140,11 @@ def shares(of: Total) -> tuple[Share, ...]:
     required = of.required
     parts = [Bundle.of(each.parts).about(required.axes) for each in of.contributions]
     if all(part.constant for part in parts):
-        found = [_of_constant(of, each.name, own) for each, own in zip(of.contributions, parts, strict=True)]
+        found = [_of_constant(of, each, own) for each, own in zip(of.contributions, parts, strict=True)]
     else:
         others = each_without(parts, _HELD * max(of.quantile_rad, required.limit_rad or 0.0))
         found = [
-            _share(of, each.name, own, series, _without(of, at, own, series))
+            _share(of, each, own, series, _without(of, at, own, series))
             for at, (each, own, series) in enumerate(zip(of.contributions, parts, others, strict=True))
         ]
     return tuple(sorted(found, key=lambda each: -float(f"{each.growth:.2e}")))  # what is alike keeps its order
@@ -156,7 +161,7 @@ def _without(of: Total, at: int, own: Sum, others: Series) -> float:
     return _bundled(rest).about(of.required.axes).quantile(of.required.confidence)
 
 
-def _share(of: Total, name: str, own: Sum, others: Series, without: float) -> Share:
+def _share(of: Total, each: Contribution, own: Sum, others: Series, without: float) -> Share:
     whole, confidence, limit, u = of.quantile_rad, of.required.confidence, of.required.limit_rad, others.u
 
     def spare(size_rad: float, times: float) -> float:
@@ -167,17 +172,17 @@ def _share(of: Total, name: str, own: Sum, others: Series, without: float) -> Sh
     growth = -by_source / by_size if by_size > 0.0 else 0.0
     growth = growth if abs(growth) > _NO_GROWTH else 0.0
     allowed = None if limit is None else _allowed(own, lambda times: spare(limit, times))
-    return Share(name, own.mean, own.sigma, without, growth, allowed)
+    return Share(each, own.mean, own.sigma, without, growth, allowed)
 
 
-def _of_constant(of: Total, name: str, own: Sum) -> Share:
+def _of_constant(of: Total, each: Contribution, own: Sum) -> Share:
     """The same where nothing of the budget is spread, so that lengths of means are all."""
     limit, others = of.required.limit_rad, of.mean_rad - own.mean
     growth = float(own.mean @ of.mean_rad) / of.quantile_rad**2 if of.quantile_rad else 0.0
     allowed = None
     if limit is not None:
         allowed = _allowed(own, lambda times: limit - float(np.linalg.norm(others + times * own.mean)))
-    return Share(name, own.mean, own.sigma, float(np.linalg.norm(others)), growth, allowed)
+    return Share(each, own.mean, own.sigma, float(np.linalg.norm(others)), growth, allowed)
 
 
 def _allowed(own: Sum, spare: Callable[[float], float]) -> float:

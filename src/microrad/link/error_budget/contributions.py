@@ -33,6 +33,7 @@ from microrad.core import lti
 from microrad.core.arrays import Floats
 from microrad.link.error_budget.distributions import Part, case, mixture
 from microrad.link.error_budget.sources import ErrorSource, SourceKind, Spread
+from microrad.link.pointing.summation import sigma_multiple
 from microrad.loop.disturbance.windows import ErrorIndex
 
 Interpretation = Literal["temporal", "ensemble", "mixed"]
@@ -108,11 +109,15 @@ class Requirement:
 
 @dataclass(frozen=True, slots=True)
 class Contribution:
-    """What a source adds to an index: its name, its class, and the independent parts that its error is the sum of."""
+    """What a source adds to an index: its name, its class, and the independent parts that its error is the sum of.
+
+    ``origin`` says where its numbers come from.
+    """
 
     name: str
     kind: SourceKind | Literal["loop"]
     parts: tuple[Part, ...]
+    origin: str
 
 
 def contribution(source: ErrorSource, required: Requirement) -> Contribution:
@@ -126,7 +131,7 @@ def contribution(source: ErrorSource, required: Requirement) -> Contribution:
         ValueError: For an index of more or longer windows than the period of a drift or of a transient holds.
     """
     parts = tuple(_part(each, required) for one in source.by_axis for each in (one, *_lines(one)))
-    return Contribution(source.name, source.kind, parts)
+    return Contribution(source.name, source.kind, parts, source.origin)
 
 
 def _part(source: ErrorSource, required: Requirement) -> Part:
@@ -405,8 +410,9 @@ def _at_its_worst(source: ErrorSource, required: Requirement) -> Part:
         turns = source.freq_hz * required.index.window_s
         left = np.exp(1j * math.pi * turns * np.linspace(-1.0, 1.0, 257)) - np.sinc(turns)
         worst = np.max(np.abs(left)) * np.abs(source.response(source.freq_hz))
-    sigmas = NormalDist().inv_cdf(0.5 * (1.0 + required.confidence))
-    noise = sigmas * np.sqrt(np.max(np.diagonal(part.covariance, axis1=1, axis2=2), axis=0))
+    noise = sigma_multiple(required.confidence) * np.sqrt(
+        np.max(np.diagonal(part.covariance, axis1=1, axis2=2), axis=0)
+    )
     return case(source.axes, mean=np.asarray(worst + noise))
 
 

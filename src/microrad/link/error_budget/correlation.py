@@ -1,7 +1,7 @@
 """Sources of a budget that are correlated: what they add together, in place of what each adds by itself."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -140,7 +140,8 @@ def _merged(
         part = case(axes, mean=np.abs(mean) + WORST_SATELLITE_SIGMAS * sigma)
     else:
         part = case(axes, mean=mean, covariance=together)
-    whole = replace(chosen[0], name=" with ".join(each.name for each in chosen), parts=(part,))
+    name, origin = " with ".join(each.name for each in chosen), "; ".join(each.origin for each in chosen)
+    whole = Contribution(name, chosen[0].kind, (part,), origin)
     return [whole if each is chosen[0] else each for each in found if each is chosen[0] or each not in chosen]
 
 

@@ -24,10 +24,8 @@ _CHUNK, _MOST, _MOST_PLANE, _MOST_OF_OTHERS = 16, 1 << 14, 256, 128  # terms at 
 _BLOCK = 2_000_000  # numbers of an intermediate array
 _KERNELS = 64  # that a grid keeps
 _TAPER = 6.0  # width of the taper that ends a series of the most terms
-_FAR_OFF = 0.01  # deviation beside the length of a mean, up to which only its direction counts
+_FAR_OFF = 0.012  # deviation beside the length of a mean, up to which only its direction counts
 _NO_SPREAD = 1e-12  # standard deviation beside the mean below which all is taken as constant
-
-
 _SURE = np.ones(1)
 
 
@@ -58,13 +56,6 @@ class Part:
     def whole_mean(self) -> Floats:
         """Mean of all cases (rad), shape (n,)."""
         return np.asarray(self.weight @ self.mean)
-
-    @property
-    def whole_covariance(self) -> Floats:
-        """Covariance of all cases (rad^2), shape (n, n)."""
-        off, turned = self.mean - self.whole_mean, self.amplitude[:, :, None] * self.amplitude[:, None].conj()
-        each = self.covariance + _squares(self.half_width) / 3.0 + 0.5 * turned.real + _squares(off)
-        return np.asarray(np.tensordot(self.weight, each, 1))
 
     def times(self, factor: float) -> "Part":
         """The same error, so many times as large."""
@@ -141,21 +132,6 @@ class Bundle:
         sizes = [len(part.weight) for part in parts]
         return cls(mixture(parts, np.ones(len(parts))), np.cumsum([0, *sizes[:-1]]))
 
-    def without(self, at: int, instead: Part | None = None) -> "Bundle":
-        """The same without a part, or with another in its place.
-
-        Args:
-            at: Place of the part.
-            instead: What stands there then.
-        """
-        end = [*self.begin, len(self.cases.weight)][at + 1]
-        first, last = slice(0, self.begin[at]), slice(end, None)
-        put = [_some(self.cases, first), *([] if instead is None else [instead]), _some(self.cases, last)]
-        more = 0 if instead is None else len(instead.weight)
-        behind = self.begin[at + 1 :] - (end - self.begin[at]) + more
-        begin = np.concatenate([self.begin[:at], [self.begin[at]] * (instead is not None), behind])
-        return Bundle(mixture(put, np.ones(len(put))), begin.astype(np.int64))
-
     def about(self, axes: tuple[int, ...]) -> "Sum":
         """The sum of the parts about one axis, or about two for the radial error.
 
@@ -167,10 +143,6 @@ class Bundle:
             of.weight, of.mean[:, at], of.covariance[:, at][:, :, at], of.half_width[:, at], of.amplitude[:, at]
         )
         return Sum(Bundle(chosen, self.begin))
-
-
-def _some(part: Part, of: slice) -> Part:
-    return Part(part.weight[of], part.mean[of], part.covariance[of], part.half_width[of], part.amplitude[of])
 
 
 class Sum:
@@ -288,23 +260,6 @@ class Sum:
     def constant(self) -> bool:
         """Whether nothing of it is spread."""
         return float(np.max(self.sigma)) <= _NO_SPREAD * float(np.linalg.norm(self.mean)) or self._range == 0.0
-
-    def within(self, size_rad: float) -> float:
-        """Probability that the error, radial for two axes, is not above a size (rad)."""
-        if self.constant:
-            return float(size_rad >= np.linalg.norm(self.mean))
-        return float(min(max(self.series().within(size_rad), 0.0), 1.0))
-
-    def density(self, points: int = 401) -> tuple[Floats, Floats]:
-        """Errors about the one axis (rad) and their probability density (1/rad), each of shape (points,).
-
-        Args:
-            points: How many, evenly over the range of the error.
-        """
-        at = np.linspace(-self._range, self._range, points)
-        series = self.series()
-        density = (0.5 + (np.exp(-1j * np.outer(at, series.u[:, 0])) @ series.terms).real) / self._range
-        return at + self._centre[0], np.asarray(density)
 
     def series(self, reach_rad: float = 0.0) -> "Series":
         """The series of the density, for a range that reaches at least so far (rad)."""

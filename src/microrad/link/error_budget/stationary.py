@@ -15,11 +15,7 @@ def motion_behind(process: Disturbance, transfer: Floats | lti.StateSpace) -> Mo
         process: What drives the transfer, of one axis.
         transfer: Gains, shape (axes,), or a system of one input.
     """
-    A, B, C = process.A, process.B, process.C
-    if not isinstance(transfer, lti.StateSpace):
-        return Motion.of(lti.StateSpace(A, B, np.outer(transfer, C), np.zeros((len(transfer), B.shape[1]))))
-    n, outputs = transfer.order, len(transfer.C)
-    series = np.block([[A, np.zeros((len(A), n))], [transfer.B @ C, transfer.A]])
-    fed = np.vstack([B, np.zeros((n, B.shape[1]))])
-    seen = np.hstack([transfer.D @ C, transfer.C])
-    return Motion.of(lti.StateSpace(series, fed, seen, np.zeros((outputs, B.shape[1]))))
+    A, B = process.A, process.B
+    if isinstance(transfer, lti.StateSpace):
+        return Motion.of(lti.series(lti.StateSpace(A, B, process.C, np.zeros((1, B.shape[1]))), transfer))
+    return Motion.of(lti.StateSpace(A, B, np.outer(transfer, process.C), np.zeros((len(transfer), B.shape[1]))))

@@ -7,7 +7,7 @@ from typing import Any
 
 from microrad.link.pointing.code_words import LostWords
 from microrad.loop.pointing_loop.simulated_windows import SimulatedErrors
-from microrad.report.fine_pointing.windows import index_name
+from microrad.report.fine_pointing.windows import index_text
 from microrad.report.quantities import micro, percent, quantity
 from microrad.report.tables import Table
 from microrad.report.view import Block, Points, View
@@ -23,7 +23,7 @@ def simulated_view(errors: Sequence[SimulatedErrors], lost: LostWords | None, ru
     """
     rows = [
         (
-            index_name(each.index).replace("\n", " "),
+            index_text(each.index),
             micro(each.linear_rad),
             micro(each.rms_rad),
             "unknown" if math.isinf(each.interval_rad) else f"± {micro(each.interval_rad)}",

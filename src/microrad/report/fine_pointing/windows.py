@@ -20,6 +20,11 @@ def index_name(index: ErrorIndex) -> str:
     return "\n".join(lines)
 
 
+def index_text(index: ErrorIndex) -> str:
+    """The same in one line."""
+    return index_name(index).replace("\n", " ")
+
+
 def windows_text(errors: Sequence[WindowedErrors], controller: str, width: int) -> str:
     """What is left by the loop, what there is without it, and what the rational forms make of that, for a terminal.
 
@@ -32,11 +37,11 @@ def windows_text(errors: Sequence[WindowedErrors], controller: str, width: int) 
     left = _by_source(f"Left by the loop under {controller}", heads, [each.left for each in errors])
     before = _by_source("Without the loop", heads, [each.before for each in errors])
     rows = []
-    for head, each in zip(heads, errors, strict=True):
+    for each in errors:
         exact = _total(each.before)
         if not math.isnan(each.rational) and each.index.window_s is not None and exact > 0.0:
             off = percent(each.rational / exact - 1.0)
-            rows.append((head.replace("\n", " "), micro(exact), micro(each.rational), off))
+            rows.append((index_text(each.index), micro(exact), micro(each.rational), off))
     filters = Table("Without the loop, by linear filters", ("index", "exact", "rational", "off by"), rows)
     about = "Radial rms in µrad, in theory: each hysteresis element counts by its slow gain."
     tables = tables_text([left, before, filters], [], width)

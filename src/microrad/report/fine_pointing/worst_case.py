@@ -6,7 +6,7 @@ from typing import Any
 
 from microrad.core.units import format_quantity
 from microrad.loop.worst_case import InTime, WorstCase
-from microrad.report.fine_pointing.windows import index_name
+from microrad.report.fine_pointing.windows import index_name, index_text
 from microrad.report.quantities import angle, minus, percent, quantity
 from microrad.report.tables import Table, tables_text
 
@@ -25,8 +25,10 @@ def worst_case_text(found: WorstCase, width: int) -> str:
         "standard errors. In theory (linear); errors are radial rms."
     )
     rows: list[tuple[str, ...]] = [
-        (head.replace("\n", " "), *map(_error, (own, drawn.median, drawn.worse, worst.value)))
-        for head, own, drawn, worst in zip(heads, found.nominal_rad, found.drawn_rad, found.largest_rad, strict=True)
+        (index_text(index), *map(_error, (own, drawn.median, drawn.worse, worst.value)))
+        for index, own, drawn, worst in zip(
+            found.indices, found.nominal_rad, found.drawn_rad, found.largest_rad, strict=True
+        )
     ]
     drawn = found.drawn_modulus
     margins = (found.nominal_modulus, drawn.median, drawn.worse, found.smallest_modulus.value)
