@@ -10,13 +10,14 @@ from link_files import link_file
 from microrad import link
 from microrad.core.intervals import binomial_band, clustered_band
 from microrad.link.pointing import outage
-from microrad.link.pointing.code_words import FadeMargin, lost_words
+from microrad.link.pointing.code_words import FadeMargin, words_asked
 from microrad.link.pointing.radial_error import Jitter
 from microrad.link.pointing.statistics import outage_probability, radius_of_loss_rad, transmission
 from microrad.loop.disturbance import first_order
 from microrad.loop.disturbance.windows import ErrorIndex
 from microrad.loop.pointing_loop.ensemble import Span
 from microrad.loop.pointing_loop.linear import close
+from microrad.loop.pointing_loop.simulated_windows import ask
 from microrad.loop.pointing_loop.traces import trace
 from microrad.loop.pointing_loop.windows import windowed_in_all
 from microrad.loop.workbench import Controller, Loop
@@ -36,7 +37,9 @@ MARGIN = FadeMargin(half_angle_rad=100e-6, ahead_rad=5e-6, loss_db=1.0)
 
 
 def lost(margin=MARGIN, word_s=0.02, span=SPAN, runs=3, **settings):
-    return lost_words(margin, word_s, LOOP.parts, CONTROLLER, span, runs, **settings)
+    asked = words_asked(margin, word_s, LOOP.parts, span)
+    (found,) = ask([asked], LOOP.parts, CONTROLLER, span, runs, **settings)
+    return found
 
 
 def test_words_are_those_of_whole_runs_in_memory():

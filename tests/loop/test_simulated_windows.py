@@ -13,7 +13,7 @@ from microrad.loop.disturbance import Disturbance, SpectralLine, first_order
 from microrad.loop.disturbance.windows import ErrorIndex
 from microrad.loop.pointing_loop.ensemble import Span
 from microrad.loop.pointing_loop.linear import close, residual_spectrum
-from microrad.loop.pointing_loop.simulated_windows import Windows, half_width, simulated_windows
+from microrad.loop.pointing_loop.simulated_windows import Windows, ask, half_width, simulated_windows, windows_asked
 from microrad.loop.pointing_loop.traces import trace
 from microrad.loop.pointing_loop.windows import windowed, windowed_in_all
 from microrad.loop.workbench import Controller, Loop
@@ -222,3 +222,12 @@ def test_what_no_run_can_have_is_refused(index, runs, span, words):
     with pytest.raises(ValueError, match=words) as refused:
         simulated(PLAIN, (index,), span, runs)
     assert "\n" not in str(refused.value)
+
+
+def test_several_questions_are_asked_of_the_same_runs_at_once():
+    parts, controller = BENT.parts, BENT.assembled(TRACKING)
+    one, other = (windows_asked(parts, controller, indices, SPAN) for indices in (INDICES[:2], INDICES[2:3]))
+    together = ask([one, other], parts, controller, SPAN, 3)
+    apart = simulated(BENT, INDICES[:2]), simulated(BENT, INDICES[2:3])
+    for left, right in zip(together, apart, strict=True):
+        assert [each.rms_rad for each in left] == [each.rms_rad for each in right]

@@ -183,19 +183,18 @@ def _simulated(
 ) -> "tuple[tuple[SimulatedErrors, ...], LostWords | None]":
     """The errors of so many runs in each index, and the code words that they lose where the mission has some."""
     from microrad import link
-    from microrad.link.pointing.code_words import FadeMargin, lost_words
+    from microrad.link.pointing.code_words import FadeMargin, words_asked
     from microrad.link.study import solve_rate
     from microrad.loop.controller_study.results import span
-    from microrad.loop.pointing_loop.simulated_windows import simulated_windows
+    from microrad.loop.pointing_loop.simulated_windows import Question, ask, windows_asked
 
-    word = mission.mission.communication.code_word_s
+    word, loop, of_run = mission.mission.communication.code_word_s, scene.loop, span(scene.table)
     with progress_bar() as progress, refusal_of(mission.path):
-        asked = scene.loop, made.controller
-        errors = simulated_windows(*asked, indices, span(scene.table), runs, on_progress=progress)
-        if word is None:
-            return errors, None
-        margin = FadeMargin.of(link.of(solve_rate(mission).mission))
-        return errors, lost_words(margin, word, *asked, span(scene.table), runs, on_progress=progress)
+        asked: list[Question[Any]] = [windows_asked(loop, made.controller, indices, of_run)]
+        if word is not None:
+            asked.append(words_asked(FadeMargin.of(link.of(solve_rate(mission).mission)), word, loop, of_run))
+        errors, *lost = ask(asked, loop, made.controller, of_run, runs, on_progress=progress)
+    return errors, lost[0] if lost else None
 
 
 def _broken(designs: "tuple[Design, ...]", left: "tuple[Outlook, ...]", accept: bool) -> str:

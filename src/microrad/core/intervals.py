@@ -35,6 +35,18 @@ def student(confidence: float, freedom: float) -> float:
     return float(stdtrit(freedom, 0.5 + confidence / 2.0))
 
 
+def counted(clusters: int, confidence: float) -> float:
+    """Share of the independent trials that is counted where so few clusters tell of their number; 1 for one.
+
+    Args:
+        clusters: Number of clusters.
+        confidence: That of the interval, within (0, 1).
+
+    Source: E. L. Korn and B. I. Graubard, Survey Methodology 24 (1998) 193.
+    """
+    return (student(confidence, math.inf) / student(confidence, clusters - 1)) ** 2 if clusters > 1 else 1.0
+
+
 def clustered_band(shares: Floats, each: int, confidence: float) -> tuple[float, float]:
     """Ends of the interval of a share that was seen in independent clusters of as many trials each.
 
@@ -53,7 +65,6 @@ def clustered_band(shares: Floats, each: int, confidence: float) -> tuple[float,
     trials = float(clusters * each)
     variance = float(np.var(shares, ddof=1)) / clusters
     if variance > 0.0:
-        wider = (student(confidence, math.inf) / student(confidence, clusters - 1)) ** 2
-        trials = min(trials, share * (1.0 - share) / variance * wider)
+        trials = min(trials, share * (1.0 - share) / variance * counted(clusters, confidence))
     low, high = binomial_band(np.array([share * trials]), np.array([trials]), confidence)
     return float(low[0]), float(high[0])

@@ -8,7 +8,7 @@ import numpy as np
 
 from microrad.campaign.records import Interval, Tail
 from microrad.core.arrays import Floats
-from microrad.core.intervals import binomial_band, student
+from microrad.core.intervals import binomial_band, counted
 
 TAIL_POINTS = 200
 _MOST = 1e12  # independent errors, where rows hardly differ
@@ -168,7 +168,7 @@ def _poisson(of: _Weights, draws: int, confidence: float) -> tuple[Floats, Float
     share, one = of.sum / draws, of.heaviest / draws
     rest = np.maximum(of.square / draws - share**2, 0.0)
     variance = rest / (draws - 1) if draws > 1 else share**2  # that of one event
-    few, beyond = _few(draws, confidence), (1.0 - confidence) / 2.0
+    few, beyond = counted(draws, confidence), (1.0 - confidence) / 2.0
 
     def end(share: Floats, variance: Floats, level: float) -> Floats:
         """Quantile of the gamma distribution with this mean, and with the variance of few draws."""
@@ -198,13 +198,8 @@ class _Band:
 
 def _band(share: Floats, size: Floats, rows: int, confidence: float) -> _Band:
     share, size = np.clip(share, 0.0, 1.0), np.where(np.isnan(size), float(rows), size)
-    few = _few(rows, confidence)
+    few = counted(rows, confidence)
     return _Band(*_falling(share, *binomial_band(share * size * few, size * few, confidence)), size)
-
-
-def _few(rows: int, confidence: float) -> float:
-    """Share of the independent errors that is counted where so few rows tell of their number."""
-    return (student(confidence, math.inf) / student(confidence, rows - 1)) ** 2 if rows > 1 else 1.0
 
 
 def _falling(share: Floats, low: Floats, high: Floats) -> tuple[Floats, Floats, Floats]:

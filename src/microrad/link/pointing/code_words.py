@@ -4,6 +4,7 @@ A code averages the light over its word: it is lost where the mean received powe
 margin asks for. The word begins anew behind each other one, from the end of the settling on.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,13 +12,12 @@ import numpy as np
 from microrad import link
 from microrad.core.arrays import Floats
 from microrad.core.intervals import clustered_band
-from microrad.core.progress import Progress
 from microrad.core.units import format_quantity
 from microrad.link.pointing.outage import Exposure, like_gaussian_db
 from microrad.link.pointing.statistics import transmission
 from microrad.loop.pointing_loop.ensemble import Span, control_samples
-from microrad.loop.pointing_loop.loop import LoopController, PointingLoop
-from microrad.loop.pointing_loop.simulated_windows import CONFIDENCE, Windows, tallied
+from microrad.loop.pointing_loop.loop import PointingLoop
+from microrad.loop.pointing_loop.simulated_windows import CONFIDENCE, Question, Windows
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,32 +72,18 @@ class LostWords:
     time: Share
 
 
-def lost_words(
-    margin: FadeMargin,
-    code_word_s: float,
-    loop: PointingLoop,
-    controller: LoopController,
-    span: Span,
-    runs: int,
-    *,
-    threads: int | None = None,
-    on_progress: Progress = lambda done, total, what: None,
-) -> LostWords:
-    """Count the code words that are lost in many runs, at their control samples.
+def words_asked(margin: FadeMargin, code_word_s: float, loop: PointingLoop, span: Span) -> Question[LostWords]:
+    """The question how many code words are lost in runs, at their control samples.
 
     Args:
         margin: What the link may lose.
         code_word_s: Length of a code word (s); it is rounded to whole control samples.
         loop: The loop.
-        controller: The controller of all its axes.
         span: How long a run is, what is left out at its begin, and the seed.
-        runs: How many runs there are, 1 or more.
-        threads: Threads to share them, by default one for each core.
-        on_progress: Called with the runs that are done, their number and what is done.
 
     Raises:
-        ValueError: As `tallied`, and for a code word of less than two control samples or longer than a run is behind
-            its settling.
+        ValueError: For a code word of less than two control samples or longer than a run is behind its settling, and
+            for a run that ends before it has settled.
     """
     total, settle = control_samples(loop, span)
     period, samples = loop.timing.period_s, total - settle
@@ -113,12 +99,13 @@ def lost_words(
             f"a code word of {word} is longer than a run, of which {left} are left behind its settling: make the runs "
             "longer"
         )
-    (found,) = tallied(
-        loop, controller, span, runs, lambda: [_Lost(margin, length)], threads=threads, on_progress=on_progress
-    )
-    of_words, of_time = found.T
     words = samples // length
-    return LostWords(code_word_s, runs * words, Share.of(of_words, words), Share.of(of_time, samples))
+
+    def answer(found: Sequence[Floats]) -> LostWords:
+        of_words, of_time = found[0].T
+        return LostWords(code_word_s, len(of_words) * words, Share.of(of_words, words), Share.of(of_time, samples))
+
+    return Question(lambda: [_Lost(margin, length)], answer)
 
 
 class _Lost:

@@ -9,7 +9,8 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Protocol
+from itertools import islice
+from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 
@@ -28,6 +29,7 @@ from microrad.loop.pointing_loop.windows import readings_of, windowed_in_all
 
 CONFIDENCE = 0.99
 """That of the intervals."""
+_Answer = TypeVar("_Answer")
 
 
 class Tally(Protocol):
@@ -41,26 +43,37 @@ class Tally(Protocol):
         """Mean over what was counted, run by run, shape (numbers, LANES)."""
 
 
-def tallied(
+@dataclass(frozen=True, slots=True)
+class Question(Generic[_Answer]):
+    """What is asked of runs: what counts of them, and what follows from it.
+
+    ``tallies`` makes what counts, for a batch of runs. ``answer`` takes the means of each, shape (runs, numbers).
+    """
+
+    tallies: Callable[[], Sequence[Tally]]
+    answer: Callable[[Sequence[Floats]], _Answer]
+
+
+def ask(
+    questions: Sequence[Question[Any]],
     loop: PointingLoop,
     controller: LoopController,
     span: Span,
     runs: int,
-    tallies: Callable[[], Sequence[Tally]],
     *,
     threads: int | None = None,
     on_progress: Progress = lambda done, total, what: None,
-) -> list[Floats]:
-    """What is counted of many runs, one after the other: for each tally its means, shape (runs, numbers).
+) -> list[Any]:
+    """The answers to questions about the same runs, which are simulated once.
 
     They are the runs of `ensemble.simulate`, on any number of threads.
 
     Args:
+        questions: What is asked.
         loop: The loop.
         controller: The controller of all its axes.
         span: How long a run is, what is left out at its begin, and the seed.
         runs: How many runs there are, 1 or more.
-        tallies: Makes what counts, for a batch of runs.
         threads: Threads to share them, by default one for each core.
         on_progress: Called with the runs that are done, their number and what is done.
 
@@ -72,7 +85,7 @@ def tallied(
         raise ValueError(f"{runs} runs leave no errors: ask for 1 run or more, 2 for an interval")
 
     def batch(first: int) -> list[Floats]:
-        counting = tallies()
+        counting = [tally for question in questions for tally in question.tallies()]
         for at, error in _residual(loop, controller, span, first):
             for each in counting:
                 each.add(at, error)
@@ -83,8 +96,9 @@ def tallied(
     def tell(done: int, _: int) -> None:
         on_progress(min(done * LANES, runs), runs, "simulating windows")
 
-    found = in_threads(jobs, tell, threads)
-    return [np.concatenate(parts, axis=1).T[:runs] for parts in zip(*found, strict=True)]
+    parts = zip(*in_threads(jobs, tell, threads), strict=True)
+    means = iter([np.concatenate(each, axis=1).T[:runs] for each in parts])
+    return [question.answer([*islice(means, len(question.tallies()))]) for question in questions]
 
 
 def _residual(
@@ -211,6 +225,34 @@ def _times(loop: PointingLoop, index: ErrorIndex, span: Span) -> tuple[int, int]
     return window, apart
 
 
+def windows_asked(
+    loop: PointingLoop, controller: LoopController, indices: Sequence[ErrorIndex], span: Span
+) -> Question[tuple[SimulatedErrors, ...]]:
+    """The question what each index takes of the error of runs at their control samples, one result for each index.
+
+    Args:
+        loop: The loop.
+        controller: The controller of all its axes.
+        indices: What counts of the error; their times are rounded to whole readings of the optical sensor.
+        span: How long a run is, what is left out at its begin, and the seed.
+
+    Raises:
+        ValueError: For a window that is shorter than two control samples or does not fit into a run behind its
+            settling, and for a loop that is unstable in theory.
+    """
+    closed = close(loop, controller)
+    refuse_unstable(closed)
+    times = [_times(loop, index, span) for index in indices]
+
+    def tallies() -> list[_Squares]:
+        return [_Squares(index, *each) for index, each in zip(indices, times, strict=True)]
+
+    def answer(found: Sequence[Floats]) -> tuple[SimulatedErrors, ...]:
+        return tuple(_errors(index, squares, closed) for index, squares in zip(indices, found, strict=True))
+
+    return Question(tallies, answer)
+
+
 def simulated_windows(
     loop: PointingLoop,
     controller: LoopController,
@@ -221,30 +263,24 @@ def simulated_windows(
     threads: int | None = None,
     on_progress: Progress = lambda done, total, what: None,
 ) -> tuple[SimulatedErrors, ...]:
-    """What each index takes of the error of many runs at their control samples, one result for each index.
+    """That question alone.
 
     Args:
         loop: The loop.
         controller: The controller of all its axes.
-        indices: What counts of the error; their times are rounded to whole readings of the optical sensor.
+        indices: What counts of the error.
         span: How long a run is, what is left out at its begin, and the seed.
         runs: How many runs there are, 1 or more.
         threads: Threads to share them, by default one for each core.
         on_progress: Called with the runs that are done, their number and what is done.
 
     Raises:
-        ValueError: As `tallied`, for a window that is shorter than two control samples or does not fit into a run
-            behind its settling, and for a loop that is unstable in theory.
+        ValueError: As `windows_asked` and `ask`.
     """
-    closed = close(loop, controller)
-    refuse_unstable(closed)
-    times = [_times(loop, index, span) for index in indices]
-
-    def tallies() -> list[_Squares]:
-        return [_Squares(index, *each) for index, each in zip(indices, times, strict=True)]
-
-    found = tallied(loop, controller, span, runs, tallies, threads=threads, on_progress=on_progress)
-    return tuple(_errors(index, squares, closed) for index, squares in zip(indices, found, strict=True))
+    asked = windows_asked(loop, controller, indices, span)
+    (found,) = ask([asked], loop, controller, span, runs, threads=threads, on_progress=on_progress)
+    answer: tuple[SimulatedErrors, ...] = found
+    return answer
 
 
 def _errors(index: ErrorIndex, squares: Floats, closed: ClosedLoop) -> SimulatedErrors:

@@ -56,8 +56,9 @@ def windowed(closed: ClosedLoop, index: ErrorIndex) -> dict[str, Floats]:
     Raises:
         ValueError: The loop is unstable, or a time of the index is less than half of the time between two readings.
     """
-    found = windowed_noise(closed, index)
-    for name, variance in windowed_lines(closed, index):
+    refuse_unstable(closed)
+    found = _by_source(closed, index)
+    for name, variance in _by_line(closed, index):
         found[name] = found.get(name, 0.0) + variance
     return found
 
@@ -73,7 +74,11 @@ def windowed_noise(closed: ClosedLoop, index: ErrorIndex) -> dict[str, Floats]:
         ValueError: As `windowed`.
     """
     refuse_unstable(closed)
-    window, apart = _times(closed, index)
+    return _by_source(closed, index)
+
+
+def _by_source(closed: ClosedLoop, index: ErrorIndex) -> dict[str, Floats]:
+    window, apart = readings_of(closed.open.loop, index)
     found: dict[str, Floats] = {}
     for source in closed.sources:
         left = _noise(closed, noise_of(closed, source), index, window, apart)
@@ -92,7 +97,11 @@ def windowed_lines(closed: ClosedLoop, index: ErrorIndex) -> list[tuple[str, Flo
         ValueError: As `windowed`.
     """
     refuse_unstable(closed)
-    window, apart = _times(closed, index)
+    return _by_line(closed, index)
+
+
+def _by_line(closed: ClosedLoop, index: ErrorIndex) -> list[tuple[str, Floats]]:
+    window, apart = readings_of(closed.open.loop, index)
     return [(line.name, _line(closed, line, index, window, apart)) for line in closed.open.lines]
 
 
@@ -107,15 +116,11 @@ def windowed_in_all(closed: ClosedLoop, index: ErrorIndex, *, at_samples: bool =
     Raises:
         ValueError: A time of the index is less than half of the time between two readings.
     """
-    window, apart = _times(closed, index)
+    window, apart = readings_of(closed.open.loop, index)
     found = _noise(closed, noise_of_all(closed), index, window, apart, at_samples=at_samples)
     for line in closed.open.lines:
         found = found + _line(closed, line, index, window, apart, at_samples=at_samples)
     return found
-
-
-def _times(closed: ClosedLoop, index: ErrorIndex) -> tuple[int, int]:
-    return readings_of(closed.open.loop, index)
 
 
 def readings_of(loop: PointingLoop, index: ErrorIndex) -> tuple[int, int]:

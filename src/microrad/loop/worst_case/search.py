@@ -8,7 +8,7 @@ import numpy as np
 
 from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
-from microrad.loop.controller_study import Design, Scene, build
+from microrad.loop.controller_study import Design, Scene, on_one_axis
 from microrad.loop.coupled_study import CoupledDesign, CoupledScene
 from microrad.loop.disturbance.windows import ErrorIndex
 from microrad.loop.pointing_loop.linear import close, refuse_unstable
@@ -149,9 +149,8 @@ def of_scene(scene: Scene, known: Uncertain, design: Design) -> Subject:
         known: What is known of its mirror, `of_table`.
         design: A controller that was designed for it.
     """
-    axis = scene.axis
-    controller = build(design.name, replace(scene, loop=axis), design.tuned.controller)
-    return Subject(axis, scene.loop.axes, Simulated(axis, controller, at_rest=False), known)
+    simulated = Simulated(scene.axis, on_one_axis(design, scene), at_rest=False)
+    return Subject(scene.axis, scene.loop.axes, simulated, known)
 
 
 def of_coupled_scene(scene: CoupledScene, known: Uncertain, design: CoupledDesign) -> Subject:
