@@ -86,8 +86,9 @@ def fit_recording(
     lines, rest = find_lines(motion.rest_rad, step_s)
     range_hz = 2.0 / motion.duration_s, motion.half_rate_hz
     found = []
+    measured = _measured(rest, motion)
     for folded in (True, False):
-        samples, sure = _rows(rest, motion, folded)
+        samples, sure = _rows(*measured, motion, folded)
         terms = fit_terms(samples, range_hz, _LEAST_DAMPING, _WELL)
         terms = with_states(samples, terms, range_hz, _LEAST_DAMPING, order)
         misfit = samples.misfit(terms)
@@ -130,16 +131,24 @@ def _spectrum(filtered: Disturbance, motion: RecordedMotion, band_limited: bool)
     return np.asarray(np.exp(np.interp(freq, grid, np.log(S))))
 
 
-def _rows(rest: Floats, motion: RecordedMotion, folded: bool) -> tuple[Samples, NDArray[np.bool_]]:
-    """The density in rows, as `fit_terms` takes them, and whether each of them is sure to a tenth.
+def _measured(rest: Floats, motion: RecordedMotion) -> tuple[Floats, Floats, Floats, Floats]:
+    """Centre (Hz), width (Hz), density and its relative standard error of rows, each of shape (rows,).
 
-    ``folded`` rows hold what sampling folds into them. Below the first frequencies of the segments they are of the
-    periodogram of all of the recording.
+    Below the first frequencies of the segments they are of the periodogram of all of the recording.
     """
     slow, fast = (_averaged(*density(rest, motion.step_s, parts), below) for parts, below in ((1, PARTS), (PARTS, 0)))
     centre, width, wanted, error = (np.concatenate(both) for both in zip(slow, fast, strict=True))
     kept = centre <= FITTED * motion.half_rate_hz
-    centre, width, wanted, error = centre[kept], width[kept], wanted[kept], error[kept]
+    return centre[kept], width[kept], wanted[kept], error[kept]
+
+
+def _rows(
+    centre: Floats, width: Floats, wanted: Floats, error: Floats, motion: RecordedMotion, folded: bool
+) -> tuple[Samples, NDArray[np.bool_]]:
+    """The rows as `fit_terms` takes them, and whether each of them is sure to a tenth.
+
+    ``folded`` rows hold what sampling folds into them.
+    """
     own = centre[:, None] + 0.3 * width[:, None] * np.array([-1.0, 0.0, 1.0])
     rate = 2.0 * motion.half_rate_hz
     images = _images(centre, rate)

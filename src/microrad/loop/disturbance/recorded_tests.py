@@ -1,6 +1,7 @@
 """What a fitted disturbance leaves of the recording that it was fitted to: is it white, and was it stationary."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -172,31 +173,36 @@ def _block_test(of: str, motion: Floats, freedom: float) -> BlockTest:
     place = np.arange(_BLOCKS) - 0.5 * (_BLOCKS - 1)
     slope = float(place @ np.log(variances) / (place @ place))
     error = math.sqrt(float(polygamma(1, 0.5 * freedom)) / float(place @ place))
-    ratio = float(np.max(variances) / np.min(variances))
+    ratio, chance_of = float(np.max(variances) / np.min(variances)), _chance_of_ratio(freedom)
     return BlockTest(
         of,
         ratio,
-        _usual_ratio(freedom),
-        _chance_of_ratio(ratio, freedom),
+        _usual(chance_of),
+        chance_of(ratio),
         math.exp(slope * (_BLOCKS - 1)),
         float(2.0 * norm.sf(abs(slope) / error)),
     )
 
 
-def _chance_of_ratio(ratio: float, freedom: float) -> float:
+def _chance_of_ratio(freedom: float) -> Callable[[float], float]:
     """Probability that the largest of eight independent chi-squares is so many times the smallest, or more."""
     from scipy.stats import chi2
 
     x = chi2.ppf(np.append(np.geomspace(1e-9, 1e-3, 200), np.linspace(1.1e-3, 1.0 - 1e-9, 4000)), freedom)
-    inside = chi2.cdf(ratio * x, freedom) - chi2.cdf(x, freedom)
-    below = _BLOCKS * float(np.trapezoid(chi2.pdf(x, freedom) * inside ** (_BLOCKS - 1), x))
-    return min(max(1.0 - below, 0.0), 1.0)
+    density, below_x = chi2.pdf(x, freedom), chi2.cdf(x, freedom)
+
+    def chance(ratio: float) -> float:
+        inside = chi2.cdf(ratio * x, freedom) - below_x
+        below = _BLOCKS * float(np.trapezoid(density * inside ** (_BLOCKS - 1), x))
+        return min(max(1.0 - below, 0.0), 1.0)
+
+    return chance
 
 
-def _usual_ratio(freedom: float) -> float:
+def _usual(chance_of: Callable[[float], float]) -> float:
     from scipy.optimize import brentq
 
     def beyond(logarithm: float) -> float:
-        return _chance_of_ratio(math.exp(logarithm), freedom) - BY_CHANCE
+        return chance_of(math.exp(logarithm)) - BY_CHANCE
 
     return math.exp(float(brentq(beyond, 1e-9, 60.0, xtol=1e-4)))
