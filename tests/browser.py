@@ -121,6 +121,11 @@ def fits(page, name, picture):
     page.set_viewport_size(before)
 
 
+def draft_is(page, words):
+    """Wait until the page says of its mission that it is "saved", with all that was let go, or "not saved"."""
+    page.get_by_role("status").get_by_text(words, exact=True).wait_for()
+
+
 def until(page, there, what):
     """Wait until something holds on this side; the page goes on meanwhile."""
     return waiting.until(there, what, pause=lambda seconds: page.wait_for_timeout(1000.0 * seconds))

@@ -21,6 +21,7 @@ from scipy.io import savemat
 from sgp4.api import WGS72, Satrec
 from sgp4.exporter import export_omm, export_tle
 
+from budget_files import HEADING, LIST, ROWS, TABLE
 from campaign_files import HEAD, LOOP, NOISE, POWER
 from link_files import PATTERN, RECEIVERS, SKY, data_with, received_with, written
 from microrad.mirror import coupled
@@ -90,43 +91,12 @@ def _old(kind: str) -> tuple[str, ...]:
     return tuple(path.read_text(encoding="utf-8") for path in sorted(CORPUS.glob(f"[0-9]*/{kind}/*.toml")))
 
 
-_BUDGET = """
-[error_budget]
-with_loop = false
-
-[error_budget.sources.alignment]
-class = "constant"
-size = "2 urad"
-statistic = "3-sigma"
-axes = "each"
-gains = [1.0, 0.5]
-
-[error_budget.sources.orbit]
-class = "periodic"
-size = "1 urad"
-statistic = "fixed"
-axes = "together"
-gains = [1.0, -1.0]
-frequency = "0.18 mHz"
-
-[error_budget.requirements.word]
-index = "PDE"
-window = "10 ms"
-spacing = "1 min"
-observation = "95 min"
-confidence = 0.9973
-interpretation = "mixed"
-axes = "radial"
-limit = "10 urad"
-"""
-
-
 @cache
 def missions() -> tuple[bytes, ...]:
     """Whole missions: those that are shipped, and those of older versions."""
     shipped = [path.read_text(encoding="utf-8") for path in (SHIPPED, DEFAULT)]
     less = without_fine_pointing(shipped[0]), without_day(shipped[0])
-    return of_texts("missions", [*shipped, *less, less[0] + _BUDGET, *_old("missions")])
+    return of_texts("missions", [*shipped, *less, less[0] + TABLE, *_old("missions")])
 
 
 @cache
@@ -222,22 +192,13 @@ def beside_lists() -> dict[str, bytes]:
     return {"both.csv": text.encode(), "again.npz": archive.getvalue()}
 
 
-_SOURCES = """name,class,size,rate,statistic,axes,x,y,corner,frequency,period,decay,origin
-alignment,constant,2 urad,,3-sigma,each,1,1,,,,,calibration
-star tracker,random,3 urad,,bound,each,1,1,,,,,data sheet
-thermo-elastic,periodic,1.5 urad,,bound,together,1,0.5,,0.18 mHz,,,
-drift,drift,,0.1 nrad/s,1-sigma,each,1,1,,,6 h,,
-wheels,process,0.5 urad,,1-sigma,each,1,1,40 Hz,,,,
-unloading,transient,4 urad,,fixed,together,0.5,1,,,95 min,20 s,
-"""
-
-
 @cache
 def sources() -> tuple[bytes, ...]:
     """Lists of error sources: all classes, a few of them, and three axes between semicolons."""
-    few = "".join(_SOURCES.splitlines(keepends=True)[:3])
+    rows = [HEADING, *ROWS]
+    few = "\n".join(rows[:3])
     wide = "name;class;size;statistic;axes;x;y;z\na;constant;1 mrad;fixed;each;1;0;-1\n"
-    return of_texts("sources", [_SOURCES, few, wide])
+    return of_texts("sources", ["\n".join(rows), LIST, few, wide])
 
 
 @cache
@@ -246,7 +207,7 @@ def workbooks() -> tuple[bytes, ...]:
 
     def make(folder: Path) -> None:
         book = openpyxl.Workbook()
-        for line in _SOURCES.splitlines():
+        for line in (HEADING, *ROWS):
             book.active.append([cell or None for cell in line.split(",")])
         book.save(folder / "sources.xlsx")
 

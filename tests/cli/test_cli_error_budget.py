@@ -6,45 +6,10 @@ import math
 import numpy as np
 import pytest
 
+from budget_files import LIST, TABLE
 from microrad.link.error_budget import ErrorSource, Requirement, Spread, budget
 from microrad.loop.disturbance.windows import ErrorIndex
 from shipped import SHIPPED, without_fine_pointing
-
-TABLE = """
-[error_budget]
-with_loop = false
-
-[error_budget.sources.alignment]
-class = "constant"
-size = "2 urad"            # assumption: calibrated on the ground
-statistic = "3-sigma"
-axes = "together"
-gains = [1.0, 0.5]
-
-[error_budget.sources.thermo_elastic]
-class = "periodic"
-size = "1.5 urad"
-statistic = "fixed"
-axes = "each"
-gains = [0.0, 1.0]
-frequency = "0.2 mHz"
-
-[error_budget.requirements.code_word]
-index = "RPE"
-window = "10 ms"
-confidence = 0.9973
-interpretation = "temporal"
-axes = "radial"
-limit = "4 urad"
-
-[error_budget.requirements.drift]
-index = "APE"
-confidence = 0.95
-interpretation = "temporal"
-axes = "y"
-limit = "2 urad"
-"""
-LIST = "name,class,size,statistic,axes,x,y,origin\nstar tracker,random,3 urad,3-sigma,each,1,1,data sheet\n"
 
 
 @pytest.fixture

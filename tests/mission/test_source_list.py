@@ -5,19 +5,11 @@ from zipfile import ZIP_DEFLATED, ZipFile
 
 import pytest
 
+from budget_files import HEADING, ROWS
 from microrad.mission.source_list import COLUMNS, SourceListError, read_sources
 
-HEAD = "name,class,size,rate,statistic,axes,x,y,z,corner,frequency,period,decay,origin"
-ROWS = (
-    "alignment,constant,2 urad,,3-sigma,each,1,0.5,,,,,,ground calibration",
-    "star tracker,random,3 urad,,bound,each,1,1,,,,,,",
-    "drift,drift,,0.1 nrad/s,1-sigma,each,1,1,,,,6 h,,",
-    "wheels,process,1 urad,,1-sigma,each,1,1,,40 Hz,,,,",
-    "unloading,transient,5 urad,,fixed,together,0.5,-1,,,,95 min,20 s,",
-)
 
-
-def listed(folder, *rows, head=HEAD, name="errors.csv"):
+def listed(folder, *rows, head=HEADING, name="errors.csv"):
     path = folder / name
     path.write_text("\n".join([head, *rows]) + "\n", "utf-8")
     return path
@@ -38,14 +30,14 @@ def test_each_row_is_a_source_as_a_mission_states_it(tmp_path):
 @pytest.mark.parametrize("separator", [";", "\t"])
 def test_semicolons_and_tabs_separate_cells_too_and_blank_rows_and_columns_are_nothing(tmp_path, separator):
     rows = [row.replace(",", separator) for row in (ROWS[0] + ",,", "," * 13, ROWS[1])]
-    path = listed(tmp_path, *rows, head=(HEAD + ",").replace(",", separator).upper())
+    path = listed(tmp_path, *rows, head=(HEADING + ",").replace(",", separator).upper())
     assert [each.source.size_rad for each in read_sources(path)] == pytest.approx([2e-6, 3e-6], rel=1e-12, abs=0.0)
 
 
 def test_a_workbook_is_read_like_a_text(tmp_path):
     openpyxl = pytest.importorskip("openpyxl", reason="the extra xlsx is not installed")
     book = openpyxl.Workbook()
-    for row in (HEAD, *ROWS):
+    for row in (HEADING, *ROWS):
         cells = row.split(",")
         book.active.append([float(cell) if re.fullmatch(r"-?[0-9.]+", cell) else cell or None for cell in cells])
     book.save(tmp_path / "errors.xlsx")
@@ -54,28 +46,29 @@ def test_a_workbook_is_read_like_a_text(tmp_path):
 
 
 def test_the_columns_are_the_keys_of_a_source():
-    assert {*COLUMNS, "x", "y", "z", "origin"} == set(HEAD.split(","))
+    assert {*COLUMNS, "x", "y", "z", "origin"} == set(HEADING.split(","))
 
 
 @pytest.mark.parametrize(
     ("rows", "head", "said"),
     [
-        (["a,constant,2 V,,fixed,together,1,1"], HEAD, 'row 2, a: size is in "V"'),
-        (["a,constant,,,fixed,together,1,1"], HEAD, "size is missing"),
-        (["a,bent,1 urad,,fixed,together,1,1"], HEAD, 'row 2, a: class is "bent"'),
-        (["a,constant,1 urad,,fixed,together,1,1,,1 Hz"], HEAD, 'corner does not belong to class = "constant"'),
-        (["a,process,1 urad,,fixed,together,1,1,,1 Hz"], HEAD, "statistic does not belong to a process"),
-        (["a,random,1 urad,,fixed,together,1,1"], HEAD, "statistic does not belong to a random error"),
-        (["a,constant,1 urad,,fixed,together,one,1"], HEAD, 'row 2, x: "one" is no number'),
-        (["a,constant,1 urad,,fixed,together,inf,1"], HEAD, "row 2, a: gains"),
-        (["a,constant,1 urad,,fixed,together"], HEAD, "gains"),
-        ([",constant,1 urad,,fixed,together,1,1"], HEAD, "row 2: has no name"),
-        (["a,constant,1 urad,,fixed,together,1,1"] * 2, HEAD, "row 3: is a second 'a'"),
-        (["a,constant"], HEAD.replace("size", "length"), 'no column is called "length"'),
+        (["a,constant,2 V,,fixed,together,1,1"], HEADING, 'row 2, a: size is in "V"'),
+        (["a,constant,,,fixed,together,1,1"], HEADING, "size is missing"),
+        (["a,bent,1 urad,,fixed,together,1,1"], HEADING, 'row 2, a: class is "bent"'),
+        (["a,constant,1 urad,,fixed,together,1,1,,1 Hz"], HEADING, 'corner does not belong to class = "constant"'),
+        (["a,process,1 urad,,fixed,together,1,1,,1 Hz"], HEADING, "statistic does not belong to a process"),
+        (["a,random,1 urad,,fixed,together,1,1"], HEADING, "statistic does not belong to a random error"),
+        (["a,constant,1 urad,,fixed,together,one,1"], HEADING, 'row 2, x: "one" is no number'),
+        (["a,constant,1 urad,,fixed,together,inf,1"], HEADING, "row 2, a: gains"),
+        (["a,constant,1 urad,,fixed,together"], HEADING, "gains"),
+        ([",constant,1 urad,,fixed,together,1,1"], HEADING, "row 2: has no name"),
+        (["a,constant,1 urad,,fixed,together,1,1"] * 2, HEADING, "row 3: is a second 'a'"),
+        (["a,constant"], HEADING.replace("size", "length"), 'no column is called "length"'),
         (["a,constant"], "name,class,size,axes,x", 'it has no column "statistic"'),
-        (["a,constant"], HEAD + ",x", "two columns have one name"),
-        ([], HEAD, "holds no source"),
-        (['"a,constant'], HEAD, "is no table of cells"),
+        (["a,constant"], f'{HEADING},"of\ntwo lines"', 'no column is called "of two lines"'),
+        (["a,constant"], HEADING + ",x", "two columns have one name"),
+        ([], HEADING, "holds no source"),
+        (['"a,constant'], HEADING, "is no table of cells"),
     ],
 )
 def test_what_is_no_source_is_refused_in_a_line(tmp_path, rows, head, said):

@@ -12,7 +12,7 @@ from urllib.parse import urlsplit
 import numpy as np
 import pytest
 
-from browser import check_quiet, fits, until
+from browser import check_quiet, draft_is, fits, until
 from cli.test_cli import write_recording
 from microrad.lab import bench
 from microrad.studio.views.mirror import read_fits
@@ -198,9 +198,9 @@ def test_a_recording_is_dropped_identified_while_one_looks_on_and_its_mirror_use
     before = studio.file.read_text("utf-8")
     tab.get_by_role("button", name="Use this mirror in the mission").click()
     tab.get_by_text("[mirror] of the mission names stage.toml now").wait_for()
-    tab.get_by_role("status").get_by_text("not saved", exact=True).wait_for()  # it was saved before
+    draft_is(tab, "not saved")  # it was saved before
     tab.get_by_role("button", name="Save", exact=True).click()
-    tab.get_by_role("status").get_by_text("saved", exact=True).wait_for()
+    draft_is(tab, "saved")
     assert tomllib.loads(studio.file.read_text("utf-8"))["mirror"] == {"file": "stage.toml"}
     studio.file.write_text(before, "utf-8")
     mission = opened()

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from browser import Studio, fits, until
+from browser import Studio, draft_is, fits, until
 from microrad.campaign.statistics.interim import Interim
 from microrad.campaign.statistics.summary import summarise_campaign
 from microrad.report.campaign import words as campaign_words
@@ -67,7 +67,7 @@ def test_an_aperture_is_changed_checked_saved_and_budgeted_by_the_command_line(s
     tab.get_by_text("No faults.").wait_for()
     before = studio.file.read_text("utf-8")
     tab.get_by_role("button", name="Save", exact=True).click()
-    tab.get_by_role("status").get_by_text("saved", exact=True).wait_for()
+    draft_is(tab, "saved")
     after = studio.file.read_text("utf-8")
     assert after == before.replace('leo_aperture = "5 cm"  ', 'leo_aperture = "6 cm"  ')
     assert after != before
@@ -121,7 +121,7 @@ def test_a_file_that_another_program_changes_is_told_and_opened_again(studio, ta
         tab.get_by_role("button", name="Back to the saved file").click()
         tab.get_by_role("button", name="Open again").click()
         api.expect(tab.get_by_label("geo_aperture")).to_have_value(size)
-        tab.get_by_role("status").get_by_text("saved", exact=True).wait_for()
+        draft_is(tab, "saved")
 
 
 def test_a_text_too_long_for_a_message_is_not_pasted(tab):
@@ -190,7 +190,7 @@ def test_a_table_is_added_from_its_example_and_saved_under_another_name(studio, 
     assert "channel" not in re.findall(r"^\[(\w+)", kept["text"], re.MULTILINE)
     tab.get_by_role("button", name="Back to the saved file").click()
     tab.get_by_role("button", name="Lose the changes").click()
-    tab.get_by_role("status").get_by_text("saved", exact=True).wait_for()
+    draft_is(tab, "saved")
     (studio.folder / "with-channel.toml").unlink()
 
 

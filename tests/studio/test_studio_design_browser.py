@@ -5,7 +5,7 @@ import json
 import pytest
 
 import budgets
-from browser import check_quiet, fits, until
+from browser import check_quiet, draft_is, fits, until
 from microrad import link
 from microrad.link.study import largest_rate
 from microrad.report.quantities import signed
@@ -36,14 +36,9 @@ def links(links_tab):
     """The page of the links with its map, on the paper's mission, as each test leaves it."""
     shown_margin(links_tab, "+3.00 dB")
     links_tab.wait_for_function(CORNER)
-    kept(links_tab)
+    draft_is(links_tab, "saved")
     assert typed(links_tab, APERTURE).input_value() == "5 cm"
     return links_tab
-
-
-def kept(page):
-    """Wait until the page says that its mission is the file's: until whatever was let go has been taken, too."""
-    page.get_by_role("status").get_by_text("saved", exact=True).wait_for()
 
 
 def typed(page, label):
@@ -85,7 +80,7 @@ def test_the_margin_and_the_map_follow_a_typed_aperture(studio, links):
     links.wait_for_function(f"before => ({CORNER})() !== before", arg=before)
     assert written(studio) == text  # typed and not let go
     typed(links, APERTURE).press("Enter")
-    links.get_by_text("not saved", exact=True).wait_for()
+    draft_is(links, "not saved")
     assert written(studio) == text.replace('leo_aperture = "5 cm"', 'leo_aperture = "6 cm"') != text
     rate = largest_rate(link.of(mission_at(studio.file, terminals__leo_aperture="6 cm")[0]))
     links.get_by_text(f"At most {rate / 1e6:.3g} Mbit/s at 10 µrad").wait_for()
@@ -94,7 +89,7 @@ def test_the_margin_and_the_map_follow_a_typed_aperture(studio, links):
     ).wait_for()
     typed(links, APERTURE).fill("5 cm")
     typed(links, APERTURE).press("Enter")
-    kept(links)
+    draft_is(links, "saved")
     shown_margin(links, "+3.00 dB")
 
 
@@ -108,7 +103,7 @@ def test_a_slider_that_is_moved_shows_its_value_in_the_map_and_writes_it_when_le
     links.wait_for_function(f"before => ({CORNER})() > before + 4.0", arg=before)
     assert written(studio) == text
     links.mouse.up()
-    links.get_by_text("not saved", exact=True).wait_for()
+    draft_is(links, "not saved")
     value = typed(links, APERTURE).input_value()
     assert 5.0 < float(value.removesuffix(" cm")) < 20.0
     there = margin_at(studio.file, terminals__leo_aperture=value)
@@ -124,7 +119,7 @@ def test_tabs_of_the_links_follow_each_other(studio, links, opened):
     typed(links, APERTURE).press("Enter")
     there = margin_at(studio.file, terminals__leo_aperture="7 cm")
     shown_margin(links, there)
-    links.get_by_text("not saved", exact=True).wait_for()
+    draft_is(links, "not saved")
     second = opened("link")
     second.wait_for_function("() => document.querySelector('.margin-card .value')?.textContent")
     assert typed(second, APERTURE).input_value() == "7 cm"
@@ -140,10 +135,10 @@ def test_a_slider_that_is_typed_is_in_the_file_that_a_click_on_save_writes_at_on
     for last in ("8 cm", "5 cm"):
         size.fill("7 cm")
         size.press("Enter")
-        links.get_by_role("status").get_by_text("not saved", exact=True).wait_for()
+        draft_is(links, "not saved")
         size.fill(last)
         links.get_by_role("button", name="Save", exact=True).click()
-        kept(links)
+        draft_is(links, "saved")
         assert studio.file.read_text("utf-8") == before.replace('leo_aperture = "5 cm"', f'leo_aperture = "{last}"')
     shown_margin(links, "+3.00 dB")
 
@@ -166,7 +161,7 @@ def test_quick_steps_of_a_slider_never_go_back_and_end_at_the_last_in_map_field_
     assert drawn[-1] == pytest.approx(view.margin_db[0, 0], abs=0.006)
     typed(links, APERTURE).fill("5 cm")
     typed(links, APERTURE).press("Enter")
-    kept(links)
+    draft_is(links, "saved")
     shown_margin(links, "+3.00 dB")
 
 
@@ -199,7 +194,7 @@ def test_a_page_that_is_opened_on_a_faulty_mission_promises_nothing_in_grey(stud
     check_quiet(opened_now, studio.base)
     typed(links, APERTURE).fill("5 cm")
     typed(links, APERTURE).press("Enter")
-    kept(links)
+    draft_is(links, "saved")
     shown_margin(links, "+3.00 dB")
 
 

@@ -128,6 +128,8 @@ def _reason(error: ValidationError) -> str:
 
 
 def _short(text: str) -> str:
+    """The begin of a cell in one line."""
+    text = " ".join(text.split())
     return text if len(text) <= _MOST_SHOWN else f"{text[: _MOST_SHOWN - 1]}…"
 
 
