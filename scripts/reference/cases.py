@@ -20,7 +20,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from reference import warm
+from reference import told, warm
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 GALLERY = ROOT / "docs" / "gallery"
@@ -55,6 +55,14 @@ class Place:
         if warm.is_loaded:
             return _told(["microrad", *command], (0, 1), *warm.run(command, self.folder, self._environment()))
         return self.program(sys.executable, "-m", "microrad", *command, ends=(0, 1))
+
+    def told(self, *words: object) -> list[str]:
+        """A command of microrad and whatever it says, as lines."""
+        command = [str(word) for word in words]
+        code, out, err = warm.run(command, self.folder, self._environment())
+        if code not in (0, 1, 2):
+            raise CommandFailedError(f"microrad {' '.join(command)} ended with {code}: {err.strip()}")
+        return told.plain(f"$ microrad {' '.join(command)}\n{out}{err}[{code}]")
 
     def json(self, *words: object) -> Any:
         """The JSON document that a command prints."""
@@ -446,7 +454,7 @@ CASES: Mapping[str, Case] = {
 """All cases; a file reference/NAME.json each."""
 
 
-def measured(name: str) -> Any:
+def measured(case: Case) -> Any:
     """What a case finds, in a temporary folder of its own."""
     with tempfile.TemporaryDirectory(prefix="microrad-numbers-") as folder:
-        return CASES[name].measure(Place(Path(folder)))
+        return case.measure(Place(Path(folder)))

@@ -1,0 +1,198 @@
+"""What commands say and draw, as lines of text: word for word, and each curve by a few of its figures.
+
+Left out is what differs from run to run or from machine to machine: hashes, versions, paths, times of this machine.
+"""
+
+import csv
+import difflib
+import json
+import math
+import re
+from collections.abc import Iterator, Sequence
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+DIGITS = 4
+"""Of a figure of a curve."""
+
+NEGLIGIBLE = 1e-9
+"""Of the largest magnitude of a curve: what is smaller counts as 0, as a mean of a sine."""
+
+BLOCKS = {"p", "h1", "h2", "h3", "h4", "tr", "li", "figcaption", "summary", "div", "dt", "dd", "pre", "caption"}
+CELLS = {"td", "th"}
+SKIPPED = {"script", "style", "svg", "head"}
+
+LEFT_OUT = (
+    (r"\b[0-9a-f]{12,64}\b", "HASH"),
+    (r"\b0\.\d+\.\d+(?:\.dev\d+)?(?:\+\w+)?\b", "VERSION"),
+    (r"^Made with .*$", "Made with VERSIONS."),
+    (r"^machine \| .*$", "machine"),
+    (r"(?:/[\w.-]+)*/microrad-numbers-\w+", "FOLDER"),
+)
+"""What differs from run to run, and what stands in its place."""
+
+PLOTTED = {"name", "x", "y", "z", "text", "base", "error_x", "error_y", "array", "arrayminus", "title", "range", "type"}
+PLOTTED |= {"data", "layout", "xaxis", "yaxis", "shapes", "annotations", "x0", "x1", "y0", "y1", "label", "tickvals"}
+PLOTTED |= {"ticktext", "keys", "entries", "mode", "fill", "hovertemplate", "width"}
+"""Keys of an interactive figure that are kept: what is drawn and said, not how it looks."""
+
+
+def load(path: Path) -> list[str]:
+    """Lines of a file of the reference; none where there is no such file."""
+    return path.read_text(encoding="utf-8").splitlines() if path.exists() else []
+
+
+def save(path: Path, lines: Sequence[str]) -> None:
+    """Write a file of the reference."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def differences(name: str, was: Sequence[str], now: Sequence[str]) -> list[str]:
+    """Lines that are not what they were, with - what was and + what is.
+
+    Args:
+        name: The case, in front of each.
+        was: Lines of the reference.
+        now: Lines as they are said now.
+    """
+    compared = difflib.unified_diff(was, now, lineterm="", n=0)
+    return [f"{name}: {line}" for line in compared if line[:1] in "+-" and not line.startswith(("+++", "---"))]
+
+
+def plain(text: str) -> list[str]:
+    """Lines of a text without what is left out."""
+    return [_kept(line.rstrip()) for line in text.splitlines()]
+
+
+def _kept(line: str) -> str:
+    for pattern, word in LEFT_OUT:
+        line = re.sub(pattern, word, line)
+    return line
+
+
+class _Page(HTMLParser):
+    """The words of a page, a block a line and cells side by side, and its figures' data."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.lines: list[str] = []
+        self.plots: list[str] = []
+        self._words: list[str] = []
+        self._inside = 0
+        self._plot = False
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        if tag in BLOCKS:
+            self._end()
+        self._inside += tag in SKIPPED
+        self._plot = tag == "script" and dict(attrs).get("class") == "plot"
+
+    def handle_endtag(self, tag: str) -> None:
+        if tag in SKIPPED:
+            self._inside -= 1
+            self._plot = False
+        if tag in CELLS:
+            self._words.append(" | ")
+        if tag in BLOCKS:
+            self._end()
+
+    def handle_data(self, data: str) -> None:
+        if self._plot:
+            self.plots.append(data)
+        elif not self._inside:
+            self._words.append(data)
+
+    def _end(self) -> None:
+        line = re.sub(r"\s+", " ", "".join(self._words)).strip().rstrip("| ")
+        if line:
+            self.lines.append(_kept(line))
+        self._words = []
+
+
+def page(path: Path) -> list[str]:
+    """A report: its words, then its interactive figures."""
+    read = _Page()
+    read.feed(path.read_text(encoding="utf-8"))
+    read.close()
+    return [
+        *read.lines,
+        *(line for i, plot in enumerate(read.plots) for line in _plotted(json.loads(plot), f"plot {i}")),
+    ]
+
+
+def _plotted(data: Any, name: str) -> Iterator[str]:
+    """What an interactive figure draws."""
+    if isinstance(data, dict):
+        for key, value in data.items():
+            if re.sub(r"\d+$", "", key) in PLOTTED or key in PLOTTED:
+                yield from _plotted(value, f"{name}.{key}")
+    elif isinstance(data, list) and data and all(_is_number(each) or each is None for each in data):
+        yield f"{name}: {curve([math.nan if each is None else each for each in data])}"
+    elif isinstance(data, list) and data and all(isinstance(each, str) for each in data):
+        yield f"{name}: {len(data)} {' ; '.join(dict.fromkeys(data[:20]))}"
+    elif isinstance(data, list):
+        for i, each in enumerate(data):
+            yield from _plotted(each, f"{name}[{i}]")
+    elif isinstance(data, str):
+        yield f"{name}: {data}"
+    elif _is_number(data):
+        yield f"{name}: {data:.{DIGITS}g}"
+
+
+def table(path: Path) -> list[str]:
+    """A table of numbers in a file: each column by a few of its figures, what is no number by its words."""
+    with path.open(encoding="utf-8", newline="") as file:
+        heading, *rows = csv.reader(line for line in file if not line.startswith("#"))
+    found = [f"{path.name}: {len(rows)} rows"]
+    for i, title in enumerate(heading):
+        cells = [row[i] if i < len(row) else "" for row in rows]
+        try:
+            told = curve([float(cell or "nan") for cell in cells])
+        except ValueError:
+            told = " ; ".join(dict.fromkeys(cells[:20]))
+        found.append(f"{path.name}: {title}: {told}")
+    return [_kept(line) for line in found]
+
+
+def curve(values: Sequence[float]) -> str:
+    """What tells a curve apart; a short one whole."""
+    finite = [each for each in values if math.isfinite(each)]
+    largest = max(map(abs, finite), default=0.0)
+    if len(values) <= 8:
+        return " ".join(_said(each, largest) for each in values)
+    if not finite:
+        return f"{len(values)} without a number"
+    mean = math.fsum(finite) / len(finite)
+    slope = math.fsum(each * i for i, each in enumerate(finite)) / len(finite) ** 2
+    rms = math.sqrt(math.fsum(each * each for each in finite) / len(finite))
+    figures = {"first": finite[0], "last": finite[-1], "min": min(finite), "max": max(finite), "mean": mean}
+    figures |= {"rms": rms, "slope": slope, "distinct": len(set(finite))}
+    return f"{len(values)}, {len(finite)}: " + ", ".join(f"{k} {_said(v, largest)}" for k, v in figures.items())
+
+
+def _said(value: float, largest: float) -> str:
+    if not math.isfinite(value):
+        return str(value)
+    return f"{0.0 if abs(value) < NEGLIGIBLE * largest else value:.{DIGITS}g}"
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def study(folder: Path) -> list[str]:
+    """What a study or an identification leaves in a folder: its page, the data of its figures, its plans."""
+    found: list[str] = []
+    for path in sorted(folder.rglob("*")):
+        name = path.relative_to(folder).as_posix()
+        if path.suffix == ".html":
+            found += [f"== {name}", *page(path)]
+        elif path.suffix == ".csv":
+            found += table(path)
+        elif path.suffix in {".ionrc", ".toml"}:
+            found += [f"== {name}", *plain(path.read_text(encoding="utf-8"))]
+        elif path.is_file() and path.suffix not in {".svg", ".json"}:
+            found.append(f"== {name}")
+    return found
