@@ -426,6 +426,15 @@ def test_what_to_change_for_the_stroke_just_meets_it(tmp_path, shipped):
     assert 0.0 <= stroke()[0].margin < 1.01e-6
 
 
+@pytest.mark.parametrize("margin_db", [-1.0, -20.0, -4000.0])
+def test_power_is_advised_up_to_ten_times_of_what_there_is_however_much_lacks(margin_db):
+    r = SimpleNamespace(subject="communication", margin=margin_db, met=False)
+    lost = SimpleNamespace(key="communication.distance", swing_db=3.0)
+    said = requirement_views.advice_for_power(SimpleNamespace(transmit_power_w=5.0), r, SimpleNamespace(swings=[lost]))
+    near = "; to meet it, take communication.transmit_power = 6.3 W or more"
+    assert said == (near if margin_db == -1.0 else "; to meet it, change communication.distance")
+
+
 def test_a_judged_pointing_loss_beyond_20_db_is_warned_of(tmp_path):
     """A beam of 15 cm that its loop leaves 12 µrad off: the budget at its static error of 1 µrad warns of nothing."""
     wide = ('leo_aperture = "5 cm"', 'leo_aperture = "15 cm"')

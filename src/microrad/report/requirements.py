@@ -86,7 +86,7 @@ def first_warning(warnings: Sequence[str]) -> str:
 
 
 # -------------------------------------------------------------------------------------------------------------- advice
-_MOST = 10.0  # times the power that there is: more of it is no advice
+_MOST_DB = 10.0  # above the power that there is: more of it is no advice
 
 
 def advice_for_links(study: LinkStudy, r: Requirement) -> str:
@@ -101,7 +101,7 @@ def advice_for_links(study: LinkStudy, r: Requirement) -> str:
         return ""
     if r.subject == "cone":
         return advice_for_cone(study, r)
-    if r.subject == "communication" and m.jitter is not None and _factor(r) > _MOST and max(m.jitter.rms_rad) > 0.0:
+    if r.subject == "communication" and m.jitter is not None and -r.margin > _MOST_DB and max(m.jitter.rms_rad) > 0.0:
         return _of_jitter(study, r)
     return advice_for_power(getattr(m, r.subject), r, next(t for t in study.tornados if t.of.lower() == r.subject))
 
@@ -127,9 +127,9 @@ def advice_for_power(beam: Beam, r: Requirement, tornado: link.Tornado) -> str:
         r: the requirement.
         tornado: what moves the link's margin.
     """
-    factor = _factor(r)
-    if factor <= _MOST:
-        return advise_at_least(r, f"{r.subject}.transmit_power", factor * beam.transmit_power_w, "W")
+    if -r.margin <= _MOST_DB:
+        enough_w = beam.transmit_power_w * float(10.0 ** (-r.margin / 10.0))
+        return advise_at_least(r, f"{r.subject}.transmit_power", enough_w, "W")
     known = [s for s in tornado.swings if math.isfinite(s.swing_db) and not s.key.startswith("requirement.")]
     return advise_change(r, known[0].key) if known else ""
 
@@ -139,11 +139,6 @@ def _of_jitter(study: LinkStudy, r: Requirement) -> str:
     if not solved:
         return advise_change(r, "jitter.rms")
     return advise_at_most(r, "jitter.rms", solved[-1].high, "rad")
-
-
-def _factor(r: Requirement) -> float:
-    """How many times the power would just meet a margin."""
-    return float(10.0 ** (-r.margin / 10.0))
 
 
 # -------------------------------------------------------------------------------------------------------------- clauses
