@@ -90,10 +90,14 @@ def _told(command: list[str], ends: tuple[int, ...], code: int, out: str, err: s
 
 @dataclass(frozen=True)
 class Case:
-    """What is run for a file of the reference; `quick` ones are compared at every gate."""
+    """What is run for a file of the reference; `quick` ones are compared at every gate.
+
+    What is told of a `simulated` loop has digits that a rounding moves.
+    """
 
     measure: Callable[[Place], Any]
     quick: bool = True
+    simulated: bool = False
 
 
 # --------------------------------------------------------------------------------------------------------------- files

@@ -1,4 +1,4 @@
-"""Missions unlike each other: every choice of a mission file stands in one of them, and no number is as it is shipped.
+"""Missions unlike each other, with choices that the shipped one has not made and numbers of their own.
 
 What the commands say of them is kept word for word (`told`).
 """
@@ -16,7 +16,7 @@ FIXED = re.compile(
     r"|numerator|denominator|normalise_at|excited_from|excited_to|rate_limit|bias|drive_min|drive_max|boresight"
     r"|magnification|coupling|rate_feedforward|strehl|output_min|output_max|gain|fine_pointing\.rate|control\.\w*"
     r"|fine_pointing\.delay|plant_step|optical_sensor\.rate|optical_sensor\.delay|hold|edges|exponent|alpha|beta|epsilon"
-    r"|relay_share|transverse_velocity|point_ahead|loop_amplitude|ionisation_ratio|code_rate|efficiency|bit_error_ratio|spacing|observation|limit|eccentricity|duration)"
+    r"|relay_share|m_squared|transverse_velocity|point_ahead|loop_amplitude|ionisation_ratio|code_rate|efficiency|bit_error_ratio|spacing|observation|limit|eccentricity|duration)"
 )
 """Keys whose numbers stay: whole numbers, times that have to be multiples of each other, bounds."""
 
@@ -68,9 +68,10 @@ def edited(text: str, changes: Mapping[str, str | None], more: str = "") -> str:
         table, _, key = name.rpartition(".")
         if value is None:
             raise ValueError(f"{name} is not there")
-        if f"\n[{table}]\n" not in text:
+        head = rf"(?m)^\[{re.escape(table)}\]\n"
+        if not re.search(head, text):
             text += f"\n[{table}]\n"
-        text = text.replace(f"\n[{table}]\n", f"\n[{table}]\n{key} = {value}\n")
+        text = re.sub(head, lambda found, line=f"{key} = {value}\n": found[0] + line, text)
     return text + more
 
 
@@ -157,7 +158,7 @@ BUDGET = """
 with_loop = WITH_LOOP
 
 [error_budget.sources.alignment]
-class = "constant"
+class = "random"
 size = "2.2 urad"            # assumption: calibrated on the ground
 statistic = "3-sigma"
 axes = "together"
@@ -172,7 +173,7 @@ gains = [0.3, 1.0]
 frequency = "0.2 mHz"
 
 [error_budget.sources.tracker]
-class = "random"
+class = "constant"
 size = "1.1 urad"
 statistic = "bound"
 axes = "each"
@@ -203,9 +204,16 @@ gains = [0.5, -1.0]
 period = "95 min"
 decay = "20 s"
 
+[error_budget.sources.mount]
+class = "random"
+size = "1.3 urad"
+statistic = "2-sigma"
+axes = "together"
+gains = [0.8, 0.6]
+
 [error_budget.correlations.bench]
 first = "alignment"
-second = "tracker"
+second = "mount"
 coefficient = 0.4
 
 [error_budget.requirements.code_word]
@@ -285,6 +293,27 @@ def links(place: Place) -> list[str]:
     return found
 
 
+def crosslink(place: Place) -> list[str]:
+    """A link without a loop, at numbers of its own, and its day."""
+    file = place.write("crosslink.toml", generic(CROSSLINK, 9))
+    return [
+        line for words in (("budget", "--verbose"), ("contacts",)) for line in place.told(words[0], file, *words[1:])
+    ]
+
+
+NONSENSE = '"5 parsec"', "-1e9", "true", '"0 m"', "[]", '["a", "b"]'
+"""Values that most keys cannot have."""
+
+
+def refused(place: Place) -> list[str]:
+    """A mission in which every value is one of `NONSENSE`: each key says what it expects."""
+    found: list[str] = []
+    for value in NONSENSE:
+        lines = [re.sub(r"^(\w+) = .*", rf"\1 = {value}", line) for line in SHIPPED.splitlines()]
+        found += place.told("budget", place.write("mission.toml", "\n".join(lines) + BUDGET))
+    return found
+
+
 # ------------------------------------------------------------------------------------------------------------ missions
 def whole(
     text: str,
@@ -314,18 +343,24 @@ def whole(
             found += told.study(place.folder / "study")
         for words in commands:
             found += place.told(*(file if word == "FILE" else word for word in words))
-        return found
+        return told.settled(found)
 
     return measure
 
 
-POINTING = ("pointing", "FILE"), ("design", "FILE")
+POINTING = (("pointing", "FILE"),)
 DAY = ("contacts", "FILE"), ("constellation", "FILE")
+
+CALM = {"epsilon": '"-0.024 mrad/V"', "alpha": '"2.7 1/V"', "beta": '"0.7 1/V"'}
+"""Hysteresis that never moves the wrong way: what the paper's set does behind a reversal makes much of a rounding."""
 
 ADDITIVE = {
     **SHORT,
     **vibration("bands"),
     "mirror.composition": '"additive"',
+    **{f"mirror.bouc_wen.{key}": value for key, value in CALM.items()},
+    "mirror.comparison.bouc_wen.alpha": '"3.1 1/V"',
+    "mirror.comparison.bouc_wen.beta": '"1.2 1/V"',
     "conventions.residual": '"radial"',
     "conventions.mirror_angle": '"optical"',
     "requirement.residual_statistic": '"rms"',
@@ -388,10 +423,113 @@ ROUGH = {
     "acquisition.attempts": "2",
     "requirement.pointing_error": '"4 urad"',
 }
+PLAYS = """
+[mirror]
+name = "Plays that creep"
+travel = "2.3 mrad"
+composition = "cascade"
+rate_limit = "4.1 kV/s"
+bias = "5.3 V"
+drive_min = "0.4 V"
+drive_max = "11.2 V"
+
+[mirror.linear]
+poles = ["1.13 kHz", "2.4 kHz"]
+pole_dampings = [0.023, 0.04]
+zeros = ["1.9 kHz"]
+zero_dampings = [0.031]
+normalise_at = "2 Hz"
+excited_from = "1 Hz"
+excited_to = "1.6 kHz"
+
+[mirror.prandtl_ishlinskii]
+thresholds = ["0 V", "0.8 V", "2.7 V"]
+weights = ["141 urad/V", "13 urad/V", "4 urad/V"]
+
+[mirror.creep]
+time_constants = ["0.03 s", "0.7 s"]
+weights = ["2.1 urad/V", "3.3 urad/V"]
+
+[mirror.uncertainty]
+parameters = ["prandtl_ishlinskii.weights.1", "prandtl_ishlinskii.weights.3"]
+standard_errors = [0.004, 0.11]
+correlation = [-0.4]
+"""
+TRIPOD = {
+    **SHORT,
+    "fine_pointing.geometry.layout": '"tripod"',
+    "fine_pointing.geometry.actuator_radius": '"11 mm"',
+    "fine_pointing.geometry.travel_angle": '"mechanical"',
+    "fine_pointing.geometry.magnification": "0.9",
+    "fine_pointing.optical_sensor.quad_cell.background_power": '"3 pW"',
+    "fine_pointing.reference.point_ahead_on_mirror": "false",
+    "amplifier.gain": "14",
+    "amplifier.output_min": '"-8 V"',
+    "amplifier.output_max": '"151 V"',
+    "scenario.loop_amplitude": '"4.1 V"',
+    "control.proportional": '"0.01 V/mrad"',
+    "control.integral": '"160 V/(mrad s)"',
+    "conventions.mirror_angle": '"mechanical"',
+    "requirement.residual_statistic": '"rms"',
+}
+COUPLED = {
+    **SHORT,
+    "fine_pointing.mirror_file": '"two-axes.toml"',
+    "fine_pointing.duration": '"0.2 s"',
+    "amplifier.gain": "1",
+    "amplifier.output_max": '"100 V"',
+}
+STATIC = {key: value for key, value in SHORT.items() if key.startswith("scenario")} | {
+    "mirror.composition": '"static"',
+    "communication.data_rate": '"largest"',
+    "conventions.residual": '"radial"',
+}
+BY_FILES = {
+    **SHORT,
+    "orbit.leo.kind": '"elements"',
+    "orbit.leo.file": '"satellites.tle"',
+    "orbit.leo.object": '"70001"',
+    "orbit.duration": '"7 h"',
+    "constellation.pattern": '"file"',
+    "constellation.file": '"satellites.tle"',
+    "constellation.terminals": "2",
+    "operations.downlink.stations.south.latitude": '"-44.2 deg"',
+    "operations.downlink.stations.south.longitude": '"-70.6 deg"',
+    "operations.downlink.stations.south.height": '"31 m"',
+    "operations.downlink.stations.south.mask": '"7 deg"',
+    "orbit.geo.limits.sun_exclusion": '"21 deg"',
+    **{f"orbit.leo.{key}": None for key in ("altitude", "inclination", "local_time", "phase", "gravity")},
+    **{f"constellation.{key}": None for key in ("satellites", "planes", "phasing")},
+}
+
+
+def elements(*sets: tuple[str, str, float, float, int, float, float]) -> str:
+    """Element sets of an epoch of the missions: name, number, inclination, node (deg), eccentricity, anomaly, turns."""
+    lines = []
+    for name, number, inclination, node, eccentricity, anomaly, turns in sets:
+        first = f"1 {number}U 26001A   26079.40000000  .00001000  00000-0  50000-4 0  999"
+        second = (
+            f"2 {number} {inclination:8.4f} {node:8.4f} {eccentricity:07d}  81.0000 {anomaly:8.4f} {turns:11.8f}    1"
+        )
+        lines += [name, *(f"{line}{_digit(line)}" for line in (first, second))]
+    return "\n".join(lines) + "\n"
+
+
+def _digit(line: str) -> int:
+    return sum(int(c) if c.isdigit() else c == "-" for c in line) % 10
+
+
+SATELLITES = elements(
+    ("FIRST", "70001", 97.4, 101.0, 11000, 17.0, 15.21),
+    ("SECOND", "70002", 63.1, 222.0, 23000, 140.0, 14.93),
+    ("THIRD", "70003", 28.7, 19.0, 4000, 301.0, 15.07),
+)
+BARE = without(SHIPPED, "acquisition", "orbit", "operations", "constellation", "fine_pointing")
+
 CASES: Mapping[str, Case] = {
     "links": Case(links),
-    "whole-shipped": Case(whole(SHIPPED, 1, SHORT, *POINTING, *DAY, ("budget", "FILE"))),
-    "whole-additive": Case(whole(PAPER, 2, ADDITIVE, *POINTING, *DAY)),
+    "whole-shipped": Case(whole(SHIPPED, 1, SHORT, *POINTING, *DAY, ("budget", "FILE")), simulated=True),
+    "whole-additive": Case(whole(PAPER, 2, ADDITIVE, *POINTING, *DAY), simulated=True),
     "whole-keplerian": Case(
         whole(
             SHIPPED,
@@ -401,8 +539,15 @@ CASES: Mapping[str, Case] = {
             *DAY,
             beside={"spectrum.csv": SPECTRUM},
             more=BUDGET.replace("WITH_LOOP", "true"),
-        )
+        ),
+        simulated=True,
     ),
-    "whole-rough": Case(whole(SHIPPED, 4, ROUGH, *POINTING)),
+    "whole-rough": Case(whole(SHIPPED, 4, ROUGH, *POINTING), simulated=True),
+    "whole-tripod": Case(whole(without(SHIPPED, "mirror"), 5, TRIPOD, *POINTING, more=PLAYS), simulated=True),
+    "whole-coupled": Case(whole(SHIPPED, 6, COUPLED, *POINTING, beside={"two-axes.toml": TWO_AXES}), simulated=True),
+    "whole-static": Case(whole(without(BARE, r"mirror\.linear"), 7, STATIC, ("budget", "FILE")), simulated=True),
+    "whole-elements": Case(whole(SHIPPED, 8, BY_FILES, *DAY, beside={"satellites.tle": SATELLITES}), simulated=True),
+    "crosslink": Case(crosslink),
+    "refused": Case(refused),
 }
 """All of them; a file reference/told/NAME.txt each."""

@@ -19,6 +19,16 @@ DIGITS = 4
 NEGLIGIBLE = 1e-9
 """Of the largest magnitude of a curve: what is smaller counts as 0, as a mean of a sine."""
 
+UNSETTLED = re.compile(
+    r"monte-carlo-tail|quantisation|too few samples|share of the time beyond|annotations\[\d+\]\.[xy]"
+)
+"""Lines of a simulated loop that a rounding moves by more than `NEAR`."""
+
+NEAR = 0.02
+"""By which share a number may be another one; or by two of its last decimal place, or by one."""
+
+_NUMBER = re.compile(r"(?<![\w.])\d+(?:\.\d+)?(?:e[+-]?\d+)?(?![\w.]*\w)")
+
 BLOCKS = {"p", "h1", "h2", "h3", "h4", "tr", "li", "figcaption", "summary", "div", "dt", "dd", "pre", "caption"}
 CELLS = {"td", "th"}
 SKIPPED = {"script", "style", "svg", "head"}
@@ -49,16 +59,43 @@ def save(path: Path, lines: Sequence[str]) -> None:
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
-def differences(name: str, was: Sequence[str], now: Sequence[str]) -> list[str]:
+def differences(name: str, was: Sequence[str], now: Sequence[str], *, simulated: bool) -> list[str]:
     """Lines that are not what they were, with - what was and + what is.
 
     Args:
         name: The case, in front of each.
         was: Lines of the reference.
         now: Lines as they are said now.
+        simulated: Of loops with quantisers, which part from each other by a rounding: numbers may be others by `NEAR`.
     """
-    compared = difflib.unified_diff(was, now, lineterm="", n=0)
-    return [f"{name}: {line}" for line in compared if line[:1] in "+-" and not line.startswith(("+++", "---"))]
+    matched = difflib.SequenceMatcher(
+        None, [_NUMBER.sub("#", each) for each in was], [_NUMBER.sub("#", each) for each in now], autojunk=False
+    )
+    found: list[str] = []
+    for kind, i, k, j, m in matched.get_opcodes():
+        pairs = zip(was[i:k], now[j:m], strict=True) if kind == "equal" else ()
+        apart = (
+            [each for each in pairs if each[0] != each[1] and not (simulated and _alike(*each))]
+            if kind == "equal"
+            else [("", "")]
+        )
+        old, new = ([each[n] for each in apart] for n in (0, 1)) if kind == "equal" else (was[i:k], now[j:m])
+        found += [f"{name}: - {line}" for line in old] + [f"{name}: + {line}" for line in new]
+    return found
+
+
+def _alike(was: str, now: str) -> bool:
+    """Whether two lines of the same words have nearly the same numbers."""
+    old, new = _NUMBER.findall(was), _NUMBER.findall(now)
+    values = was.rpartition(": ")[2]  # a short curve whole, whose values have one unit
+    least = NEAR * max(map(float, _NUMBER.findall(values)), default=0.0) if not values.strip("-+.e0123456789 ") else 0.0
+    return all(_near(*each, least) for each in zip(old, new, strict=True))
+
+
+def _near(was: str, now: str, least: float) -> bool:
+    mantissa, _, exponent = was.partition("e")
+    last_place = 10.0 ** (int(exponent or 0) - len(mantissa.partition(".")[2]))
+    return abs(float(was) - float(now)) <= max(least, NEAR * abs(float(was)), 2.001 * last_place if "." in was else 1.0)
 
 
 def plain(text: str) -> list[str]:
@@ -111,6 +148,13 @@ class _Page(HTMLParser):
         self._words = []
 
 
+def settled(lines: Sequence[str]) -> list[str]:
+    """Lines of a simulated loop without what a rounding moves: tails of few samples, least values."""
+    return [
+        re.sub(r" \d+ distinct:|(?:first|last|min) \S+ ?", "", line) for line in lines if not UNSETTLED.search(line)
+    ]
+
+
 def page(path: Path) -> list[str]:
     """A report: its words, then its interactive figures."""
     read = _Page()
@@ -118,8 +162,13 @@ def page(path: Path) -> list[str]:
     read.close()
     return [
         *read.lines,
-        *(line for i, plot in enumerate(read.plots) for line in _plotted(json.loads(plot), f"plot {i}")),
+        *(line for plot in map(json.loads, read.plots) for line in _plotted(plot, f"plot of {_drawn(plot)}")),
     ]
+
+
+def _drawn(plot: Any) -> str:
+    """What stands on the vertical axis of a figure."""
+    return str(plot["layout"].get("yaxis", {}).get("title", {}).get("text", ""))
 
 
 def _plotted(data: Any, name: str) -> Iterator[str]:
@@ -168,8 +217,10 @@ def curve(values: Sequence[float]) -> str:
     slope = math.fsum(each * i for i, each in enumerate(finite)) / len(finite) ** 2
     rms = math.sqrt(math.fsum(each * each for each in finite) / len(finite))
     figures = {"first": finite[0], "last": finite[-1], "min": min(finite), "max": max(finite), "mean": mean}
-    figures |= {"rms": rms, "slope": slope, "distinct": len(set(finite))}
-    return f"{len(values)}, {len(finite)}: " + ", ".join(f"{k} {_said(v, largest)}" for k, v in figures.items())
+    figures |= {"rms": rms, "slope": slope}
+    return f"{len(values)}, {len(finite)}, {len(set(finite))} distinct: " + ", ".join(
+        f"{k} {_said(v, largest)}" for k, v in figures.items()
+    )
 
 
 def _said(value: float, largest: float) -> str:
