@@ -203,6 +203,7 @@ def test_a_requirement_moved_most_by_a_share_says_by_what_factor(paper):
     )
     assert said([level]).endswith("9.00 dB for ±0.5 dB")
     assert said([beyond]) == said([]) == ""
+    assert "channel.loss" in said([level, replace(swing, margin_high_db=9.0 + 1e-12)])  # equal but for a rounding
 
 
 def test_each_box_of_the_chain_holds_its_own_numbers(paper):

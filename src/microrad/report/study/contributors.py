@@ -121,11 +121,11 @@ def worst_axis(study: Study) -> StrokeBudget:
 
 
 def most_sensitive(swings: Sequence[link.Swing]) -> str:
-    """The input that moves a margin most, and by how much, or nothing."""
+    """The input that moves a margin most, the first of a tornado with a number, and by how much, or nothing."""
     known = [s for s in swings if math.isfinite(s.swing_db)]
     if not known:
         return ""
-    top = max(known, key=lambda s: s.swing_db)
+    top = known[0]  # they stand by their size, and equal ones as the mission has their keys
     step = (
         "ten times more or less" if top.key.endswith(_BY_TEN) else "±0.5 dB" if top.unit.startswith("dB") else "±10 %"
     )
