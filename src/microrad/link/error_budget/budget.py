@@ -50,7 +50,8 @@ class Share:
     """What one source means for a total.
 
     Args:
-        contribution: The source's part of the total.
+        contribution: The source's part of the error.
+        total_rad: The total, by the distribution.
         mean_rad: Its mean about each axis of the requirement.
         sigma_rad: Its standard deviation about each of them.
         without_rad: The total, by the distribution, without it.
@@ -60,6 +61,7 @@ class Share:
     """
 
     contribution: Contribution
+    total_rad: float
     mean_rad: Floats
     sigma_rad: Floats
     without_rad: float
@@ -70,6 +72,11 @@ class Share:
     def name(self) -> str:
         """The source."""
         return self.contribution.name
+
+    @property
+    def part_rad(self) -> float:
+        """Its part of the total (rad): those of all sources add up to it, as the total grows in proportion to them."""
+        return self.growth * self.total_rad
 
 
 def total(found: Sequence[Contribution], required: Requirement) -> Total:
@@ -120,6 +127,16 @@ def _total(found: Sequence[Contribution], bundle: Bundle, required: Requirement)
     multiple = sigma_multiple(required.confidence)
     rules = float(np.linalg.norm(whole.mean) + multiple * np.linalg.norm(whole.sigma))
     return Total(required, tuple(found), whole.mean, whole.sigma, rules, whole.quantile(required.confidence))
+
+
+def beyond(of: Total, size_rad: Floats) -> Floats:
+    """Probability of an error that is larger, radial for two axes, shape (sizes,).
+
+    Args:
+        of: The total.
+        size_rad: The sizes (rad), shape (sizes,).
+    """
+    return 1.0 - _bundled(of.contributions).about(of.required.axes).within(size_rad)
 
 
 _SMALL = 1e-3  # growth of a source by which that of the total is seen
@@ -177,7 +194,7 @@ def _share(of: Total, each: Contribution, own: Sum, others: tuple[Series, Series
     if limit is not None:
         others_rad = float(np.linalg.norm(of.mean_rad - own.mean))
         allowed = _allowed(own, others_rad, limit, lambda times: spare(far, limit, times))
-    return Share(each, own.mean, own.sigma, without, growth, allowed)
+    return Share(each, of.quantile_rad, own.mean, own.sigma, without, growth, allowed)
 
 
 def _of_constant(of: Total, each: Contribution, own: Sum) -> Share:
@@ -188,7 +205,7 @@ def _of_constant(of: Total, each: Contribution, own: Sum) -> Share:
     allowed = None
     if limit is not None:
         allowed = _allowed(own, without, limit, lambda times: limit - float(np.linalg.norm(others + times * own.mean)))
-    return Share(each, own.mean, own.sigma, without, growth, allowed)
+    return Share(each, of.quantile_rad, own.mean, own.sigma, without, growth, allowed)
 
 
 def _allowed(own: Sum, others_rad: float, limit_rad: float, spare: Callable[[float], float]) -> float:
