@@ -74,6 +74,11 @@ class Share:
         return self.contribution.name
 
     @property
+    def key(self) -> tuple[str, str]:
+        """Its name and class: the loop may have a source of the name of another one."""
+        return self.name, self.contribution.kind
+
+    @property
     def part_rad(self) -> float:
         """Its part of the total (rad): those of all sources add up to it, as the total grows in proportion to them."""
         return self.growth * self.total_rad

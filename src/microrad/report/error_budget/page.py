@@ -55,11 +55,10 @@ def _marked(total_rad: float, limit_rad: float | None) -> Cell:
 
 def _sources(judged: Sequence[Judged]) -> Table:
     """Every source, with its contribution to each requirement and the share of the total that it is."""
-    found = {(share.name, share.contribution.kind): share.contribution for each in judged for share in each.shares}
-    by_name = [{(share.name, share.contribution.kind): share for share in each.shares} for each in judged]
+    by_key = [{share.key: share for share in each.shares} for each in judged]
     rows = []
-    for key, of in found.items():
-        cells = [cell for own in by_name for cell in _contribution(own.get(key))]
+    for key, of in words.sources(judged).items():
+        cells = [cell for own in by_key for cell in _contribution(own.get(key))]
         rows.append((words.source_shown(of), of.kind, of.statistic, *cells, of.origin))
     totals = [cell for each in judged for cell in (micro(each.total.quantile_rad), "")]
     rows.append(("all", "", "", *totals, ""))

@@ -36,6 +36,15 @@ def requirement_text(required: Requirement) -> str:
     return f"{index_text(required.index)}{observed}, {AXES[required.axes]}, {share}"
 
 
+def sources(judged: Sequence[Judged]) -> dict[tuple[str, str], Contribution]:
+    """Every source of a budget by its name and class, in the order in which it matters.
+
+    Args:
+        judged: the requirements.
+    """
+    return {share.key: share.contribution for each in judged for share in each.shares}
+
+
 def most(of: Judged) -> str:
     """The source that contributes most to a requirement, with its numbers."""
     share = of.shares[0]
