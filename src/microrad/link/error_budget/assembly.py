@@ -153,7 +153,7 @@ def loop_contributions(closed: ClosedLoop, required: Requirement) -> tuple[Contr
         amplitudes = np.diag(np.sqrt(2.0 * np.maximum(variance, 0.0))).astype(complex)
         parts.setdefault(line, []).extend(case(len(variance), amplitude=each) for each in amplitudes if each.any())
     origin = f"{_LOOP} {closed.controller.name}"
-    return tuple(Contribution(name, "loop", tuple(each), origin) for name, each in parts.items() if each)
+    return tuple(Contribution(name, "loop", tuple(each), origin, "rms") for name, each in parts.items() if each)
 
 
 # --------------------------------------------------------------------------------------------------- a mission's budget

@@ -45,7 +45,7 @@ def _requirements(judged: Sequence[Judged]) -> Table:
             )
         )
     headings = ("requirement", "what is kept, how often", "by the rules", "by the distribution", "limit")
-    return Table("Requirements, µrad", headings, rows, (0, 1))
+    return Table("Requirements, µrad", headings, rows, (0, 1), cards=True)
 
 
 def _marked(total_rad: float, limit_rad: float | None) -> Cell:
@@ -65,7 +65,8 @@ def _sources(judged: Sequence[Judged]) -> Table:
     parts = [part for each in judged for part in (words.shown(each.name), "share")]
     headings = ("source", "class", "statistic", *parts, "from")
     brief = (0, *range(3, 3 + len(parts), 2))
-    return Table("Contributions, µrad", headings, rows, (0, 1, 2, 3 + len(parts)), totals=1, brief=brief)
+    words_in = 0, 1, 2, 3 + len(parts)
+    return Table("Contributions, µrad", headings, rows, words_in, totals=1, cards=True, brief=brief)
 
 
 def _contribution(share: Share | None) -> tuple[str, str]:
