@@ -126,18 +126,19 @@ def _distribution(panel: Panel, of: Judged) -> None:
     total, required = of.total, of.total.required
     allowed, axes = 1.0 - required.confidence, words.AXES[required.axes]
     low = allowed / _TAIL
-    panel.add(Line(1e6 * of.size_rad, np.maximum(of.beyond, 0.1 * low), BLUE, width=1.6, label="share beyond"))
+    beyond = 100.0 * np.maximum(of.beyond, 0.1 * low)
+    panel.add(Line(1e6 * of.size_rad, beyond, BLUE, width=1.6, label="larger errors"))
     if required.limit_rad is not None:
         panel.add(Rule(1e6 * required.limit_rad, True, VERMILION, "--", 1.4, "limit"))
     panel.add(Rule(1e6 * total.by_rules_rad, True, GREY, "-.", 1.2, "total by the rules"))
-    panel.add(Rule(allowed, False, BLACK, ":", 0.9, "share allowed"))
-    size, share = np.array([[1e6 * total.quantile_rad], [allowed]])
+    panel.add(Rule(100.0 * allowed, False, BLACK, ":", 0.9, "share allowed"))
+    size, share = np.array([[1e6 * total.quantile_rad], [100.0 * allowed]])
     panel.add(Line(size, share, BLACK, "", label="total by the distribution", marker="o"))
     kept = f"{index_text(required.index)}, {percent(required.confidence, 4)}"
     panel.title = shortened(f"{words.shown(of.name)}: {kept}", 46)
     panel.x = Axis("radial error (µrad)" if axes == "radial" else f"error {axes} (µrad)", low=0.0, most=6)
     panel.x.high = 1e6 * max(float(of.size_rad[-1]), 1.1 * total.by_rules_rad) or 1.0
-    panel.y = Axis("share beyond it", log=True, low=low, high=2.0)
+    panel.y = Axis("larger errors (%)", log=True, low=100.0 * low, high=200.0)
 
 
 # ------------------------------------------------------------------------------------------------ spectra
@@ -162,7 +163,7 @@ def spectra(budget: PointingErrorBudget) -> Figure:
         columns[label] = weight
     most = 1e12 * max(float(np.nanmax(density)) for density in budget.spectra.values()) or 1.0
     above.y = Axis("spectrum, all axes (µrad²/Hz)", log=True, low=most / _FALL, high=3.0 * most)
-    below.y = Axis("share that counts", low=0.0)
+    below.y = Axis("weight of the window (1)", low=0.0)
     above.x, below.x = (Axis(title, log=True, low=freq[0], high=freq[-1]) for title in ("", "frequency (Hz)"))
     caption = (
         "Above: one-sided spectra of the sources that have one, about all axes together. Below: the share of them that "
