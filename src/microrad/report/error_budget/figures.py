@@ -39,22 +39,24 @@ _FALL = 1e6  # of a spectrum, below its largest, that is drawn
 _ABOUT = 3.0 * (np.arange(96) * (math.sqrt(5.0) - 1.0) / 2.0 % 1.0 - 0.5)  # steps of the scale with one mean weight
 
 
-def budget_figures(budget: PointingErrorBudget) -> tuple[Figure, ...]:
+def budget_figures(budget: PointingErrorBudget, stacked: bool = False) -> tuple[Figure, ...]:
     """The figures of a budget; that of the spectra where a source has one.
 
     Args:
         budget: what was found.
+        stacked: whether requirements stand below each other, for a page that does not part what stands side by side.
     """
-    drawn = contributions(budget.judged), distributions(budget.judged)
+    drawn = contributions(budget.judged, stacked), distributions(budget.judged, stacked)
     return (*drawn, spectra(budget)) if budget.spectra else drawn
 
 
 # ------------------------------------------------------------------------------------------------ contributions
-def contributions(judged: Sequence[Judged]) -> Figure:
+def contributions(judged: Sequence[Judged], stacked: bool = False) -> Figure:
     """What each source contributes to each total, as bars by its class.
 
     Args:
         judged: the requirements.
+        stacked: whether they stand below each other.
     """
     sources = words.sources(judged)
     parts = [{share.key: share.part_rad for share in each.shares} for each in judged]
@@ -65,7 +67,7 @@ def contributions(judged: Sequence[Judged]) -> Figure:
     texts, kinds = [words.source_shown(sources[key]) for key in drawn], [sources[key].kind for key in drawn]
     looks = [*kinds, "others"] if others else kinds
     names = [shortened(each, 26) for each in (*texts, f"{len(others)} others")][: len(looks)]
-    across = 2 if len(judged) in (2, 4) else min(len(judged), _ACROSS)
+    across = 1 if stacked else 2 if len(judged) == _ACROSS + 1 else min(len(judged), _ACROSS)
     down = math.ceil(len(judged) / across)
     sheet = Sheet(WIDTH, 0.4 + down * (0.9 + 0.26 * len(names)), (1.0,) * down, (1.0,) * across, share_y=True)
     sheet.legend = Legend("above", 8)
@@ -100,13 +102,14 @@ def _bars(panel: Panel, values: Floats, looks: Sequence[str]) -> None:
 
 
 # ------------------------------------------------------------------------------------------------ distributions
-def distributions(judged: Sequence[Judged]) -> Figure:
+def distributions(judged: Sequence[Judged], stacked: bool = False) -> Figure:
     """How often each error is larger than a size, with its limit and its totals.
 
     Args:
         judged: the requirements.
+        stacked: whether they stand below each other.
     """
-    across = min(len(judged), 2)
+    across = 1 if stacked else min(len(judged), 2)
     down = math.ceil(len(judged) / across)
     sheet = Sheet(WIDTH, 0.4 + 2.85 * down, (1.0,) * down, (1.0,) * across, legend=Legend("above", 5))
     columns: dict[str, Column] = {}

@@ -1,5 +1,7 @@
-"""The pointing budget: its lines by class, the totals of each rule against the beacon, what is left, point-ahead; and
-below them the budget of pointing errors in time windows."""
+"""The pointing budget: its lines by class, the totals of each rule against the beacon, what is left, point-ahead.
+
+Below them stands the budget of pointing errors in time windows, for a mission that has one.
+"""
 
 from __future__ import annotations
 
@@ -61,6 +63,7 @@ class PointingPage(SliderPage[PointingView]):
         self.errors.visible = table is not None
         if table is not None:
             self.state.text = "Computing ..."
+            layout.grey(self.budget, True)
             background_tasks.create_lazy(self._errors(view, table), name=f"errors {id(self)}")
 
     async def _errors(self, view: PointingView, table: ErrorBudget) -> None:
@@ -70,6 +73,7 @@ class PointingPage(SliderPage[PointingView]):
             found = View("", [str(error)])
         if view is self.view_now:
             self.state.text = ""
+            layout.grey(self.budget, False)
             self.budget.show_blocks(found.blocks, await in_thread(self.errors, drawn, found.blocks))
 
 

@@ -33,7 +33,7 @@ def view(file: LinkFile, table: ErrorBudget) -> View:
     else:
         found = assembly.judge(asked, _closed(file))
         said = [f"The loop is under {LOOP} here; microrad run takes the best controller of its study."]
-    return budget_view(found, budget_figures(found), said)
+    return budget_view(found, budget_figures(found, stacked=True), said)
 
 
 def _closed(file: LinkFile) -> ClosedLoop:
