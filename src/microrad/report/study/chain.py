@@ -135,8 +135,8 @@ def _residual(study: Study) -> Stage:
         lines = [f"{micro(quantile_rad)} µrad at {share_of_time(fine.quantile)}, vibration", f"({lines[0]})"]
     budget = [r.met for r in study.requirements if r.subject == "error budget"]
     met = all((*budget, *(r.met for r in study.requirements if r.subject in ("residual", "fine pointing"))))
-    lines += [f"error budget: {sum(budget)} of {len(budget)} kept"] if budget else []
     lines.append(f"allowed {_angle(m.requirement.pointing_error_rad)}")
+    lines += [f"error budget: {sum(budget)} of {len(budget)} kept"] if budget else []
     return Stage("Residual", tuple(lines), "PASS" if met else "FAIL")
 
 
