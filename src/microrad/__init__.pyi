@@ -30,8 +30,8 @@ from microrad.orbit.files.elements import read_elements
 from microrad.report import write as write_report
 from microrad.report.plots import plot_bode
 from microrad.report.plots import plot_contacts
-from microrad.report.plots import plot_loops
 from microrad.report.plots import plot_contributions
+from microrad.report.plots import plot_loops
 from microrad.report.plots import plot_margin_map
 from microrad.report.plots import plot_pointing_errors
 from microrad.report.plots import plot_residual
