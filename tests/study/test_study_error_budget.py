@@ -36,7 +36,7 @@ def test_each_requirement_of_the_table_is_a_line_of_the_verdict_by_the_full_dist
     for line, of in zip((word, drift), found.error_budget.judged, strict=True):
         assert (line.required, line.actual) == (of.total.required.limit_rad, of.total.quantile_rad)
         assert line.margin == line.required - line.actual
-        assert line.limited_by == of.shares[0].name
+        assert line.limited_by == of.shares[0].name.replace("_", " ")
     assert (found.met, drift.mark) == (True, "PASS")
     text = words.verdict_text(found)
     assert "drift (APE)" in text and "every requirement is met" in text

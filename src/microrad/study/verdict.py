@@ -93,7 +93,7 @@ def of_error_budget(
         assert limit is not None  # a mission states one
         name = f"{of.name.replace('_', ' ')} ({of.total.required.index.kind})"
         derived = derived_from(sources, f"error_budget.requirements.{of.name}.", "error_budget.sources.")
-        most = of.shares[0].name
+        most = of.shares[0].name.replace("_", " ")
         return Requirement("error budget", name, "rad", limit, found, limit - found, most, lacking, derived)
 
     return tuple(map(line, budget.judged))
