@@ -95,5 +95,5 @@ def test_there_are_few_names_and_they_load_nothing():
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
     assert loaded[1] == "False"
     plots = [name for name in microrad._PUBLIC if name.startswith("plot_")]
-    assert len(microrad._PUBLIC) - len(plots) <= 30 and len(plots) == 6
+    assert len(microrad._PUBLIC) - len(plots) <= 30 and len(plots) == 8
     assert not microrad._PUBLIC.keys() & microrad._MOVED.keys()

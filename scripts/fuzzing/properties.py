@@ -177,7 +177,7 @@ def mission_budget(table: ErrorBudget) -> None:
         table: The mission's table.
     """
     try:
-        sources = sources_of(table, dict.fromkeys(table.sources, ""))
+        sources = sources_of(table, {})
         asked = [requirement_of(each) for each in table.requirements.values()]
         found = error_budget(sources, asked, correlations_of(table)) if sources else ()
     except ValueError as error:

@@ -45,6 +45,8 @@ _PUBLIC = {
     "plot_loops": "report.plots.plot_loops",
     "plot_residual": "report.plots.plot_residual",
     "plot_spectrum": "report.plots.plot_spectrum",
+    "plot_pointing_errors": "report.plots.plot_pointing_errors",
+    "plot_contributions": "report.plots.plot_contributions",
     "plot_margin_map": "report.plots.plot_margin_map",
     "plot_contacts": "report.plots.plot_contacts",
     # what all have in common

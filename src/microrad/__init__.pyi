@@ -30,8 +30,10 @@ from microrad.orbit.files.elements import read_elements
 from microrad.report import write as write_report
 from microrad.report.plots import plot_bode
 from microrad.report.plots import plot_contacts
+from microrad.report.plots import plot_contributions
 from microrad.report.plots import plot_loops
 from microrad.report.plots import plot_margin_map
+from microrad.report.plots import plot_pointing_errors
 from microrad.report.plots import plot_residual
 from microrad.report.plots import plot_spectrum
 from microrad.study.study import run_study
@@ -68,6 +70,8 @@ __all__ = [
     "plot_loops",
     "plot_residual",
     "plot_spectrum",
+    "plot_pointing_errors",
+    "plot_contributions",
     "plot_margin_map",
     "plot_contacts",
     "parse_quantity",

@@ -93,7 +93,7 @@ def test_what_the_loop_leaves_is_a_source_of_its_window(call, tmp_path):
         left["all"], rel=1e-9, abs=0.0
     )
     assert {each["name"] for each in loop} == set(left) - {"all"}
-    assert {each["origin"] for each in loop} == {"the mission's fine-pointing loop"}
+    assert {each["origin"] for each in loop} == {"the mission's fine-pointing loop under PI"}
 
 
 @pytest.mark.parametrize(
@@ -139,4 +139,6 @@ def test_a_correlation_of_the_table_makes_one_line_of_two_sources(call, mission)
 
 def test_a_loop_that_is_asked_for_and_not_there_is_refused(refused, mission):
     changed(mission, ("with_loop = false", "with_loop = true"))
-    assert "has no table [fine_pointing]: microrad init writes one" in refused("pointing", "m.toml")
+    told = refused("pointing", "m.toml")
+    assert "error_budget.with_loop = true" in told
+    assert "expected: the table [fine_pointing], which microrad init writes, or false" in told

@@ -572,6 +572,40 @@ def test_weights_add_up_to_one_where_signs_differ_and_a_source_may_always_be_as_
     assert {each.name: each.allowed for each in missed}["a drift error"] == math.inf  # it adds nothing
 
 
+def test_weights_are_what_each_source_grows_the_total_by_however_loose_the_limit():
+    both, each = np.array([1.0, 1.0]), {"gains": np.array([1.0, 1.0]), "apart": True}
+    parts = [
+        source("periodic", 1.1, gains=np.array([0.0, 1.0]), freq_hz=1.0),
+        replace(source("random", 0.06, **each), name="a"),
+        replace(source("random", 0.08, gains=both), name="b"),
+    ]
+    required = Requirement(ErrorIndex("APE"), limit_rad=9.0)
+    found = {each.name: each.growth for each in shares(total(contributions(parts, required), required))}
+    for place, each in enumerate(parts):
+        ends = []
+        for times in (0.999, 1.001):
+            scaled = [*parts[:place], replace(each, size=each.size.times(times)), *parts[place + 1 :]]
+            ends.append(math.log(total(contributions(scaled, required), required).quantile_rad))
+        assert found[each.name] == pytest.approx((ends[1] - ends[0]) / 0.002, rel=1e-3)
+
+
+@pytest.mark.parametrize("size", [0.6, 0.9, 0.95])
+def test_a_bias_may_grow_until_it_meets_the_limit_and_no_further(size):
+    parts = [source("constant", size), source("random", 0.01)]
+    required = replace(APE, limit_rad=1.0)
+    found = {each.name: each for each in shares(total(contributions(parts, required), required))}
+    one_sided = stats.norm.ppf(P) * 0.01  # nothing is left of the other side
+    assert found["a constant error"].allowed == pytest.approx((1.0 - one_sided) / size, rel=1e-4)
+
+
+def test_a_bias_that_another_one_cancels_may_hardly_grow():
+    parts = [source("constant", 10.0), replace(source("constant", -10.0), name="b"), source("random", 0.3)]
+    required = replace(APE, limit_rad=2.0)
+    allowed = {each.name: each.allowed for each in shares(total(contributions(parts, required), required))}
+    for name in ("a constant error", "b"):
+        assert 10.0 * (allowed[name] - 1.0) == pytest.approx(2.0 - stats.norm.ppf(P) * 0.3, rel=1e-3)
+
+
 def test_without_its_only_source_a_budget_is_nothing():
     both = Requirement(ErrorIndex("APE"))
     one = source("random", 1.0, gains=np.ones(2), apart=True)

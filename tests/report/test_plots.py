@@ -16,12 +16,15 @@ from matplotlib import pyplot
 from matplotlib.axes import Axes
 from numpy.testing import assert_allclose, assert_array_equal
 
+from budget_files import kept_study
 from microrad.core import lti
 from microrad.lab.identify import fit_frequency_response, identify, response_from_records
 from microrad.lab.recording import recording_from_arrays
+from microrad.link.error_budget import ErrorSource, Requirement, Spread, assembly
 from microrad.loop import disturbance
 from microrad.loop.control import AxisController, Drive, Timing
 from microrad.loop.disturbance import Disturbance, Reference, SpectralLine
+from microrad.loop.disturbance.windows import ErrorIndex
 from microrad.loop.pointing_loop import ensemble, traces
 from microrad.loop.pointing_loop import loop as fine
 from microrad.loop.sensor import OpticalSensor
@@ -116,6 +119,19 @@ def run():
     return traces.trace(*loop_of_two_axes(), ensemble.Span(0.6, 0.1, 1))
 
 
+def budget():
+    """Two requirements on a noise and a process."""
+    gains = np.ones(2)
+    noise = ErrorSource("noise", "random", Spread("fixed", 1e-6), gains)
+    process = disturbance.first_order(1e-13, 20.0, convention="per-axis")
+    wheels = ErrorSource("wheels", "process", Spread("fixed", 1.0), gains, process=process)
+    required = {
+        "mean": Requirement(ErrorIndex("MPE", 1e-3), limit_rad=1e-5),
+        "all": Requirement(ErrorIndex("APE"), axes=(1,), limit_rad=1e-5),
+    }
+    return assembly.judge(assembly.stated((noise, wheels), required), None)
+
+
 RESULTS = {
     "fit": lambda: fitted(1),
     "fit of several": lambda: fitted(2),
@@ -132,6 +148,8 @@ RESULTS = {
     "links": lambda: plain_study().links,
     "day": lambda: plain_study().day,
     "contacts": lambda: plain_study().day.relay.contacts,
+    "study with a budget": kept_study,
+    "budget": budget,
 }
 KNOWN = {}
 PLOTS = [
@@ -150,6 +168,11 @@ PLOTS = [
     ("plot_residual", "run", 1),
     ("plot_spectrum", "runs", 2),
     ("plot_spectrum", "vibration", 2),
+    ("plot_spectrum", "budget", 2),
+    ("plot_pointing_errors", "budget", 2),
+    ("plot_pointing_errors", "study with a budget", 2),
+    ("plot_contributions", "budget", 2),
+    ("plot_contributions", "study with a budget", 2),
     ("plot_margin_map", "study", 1),
     ("plot_margin_map", "links", 1),
     ("plot_contacts", "day", 1),
@@ -484,6 +507,11 @@ def test_what_has_nothing_to_show_is_refused():
     nothing = Disturbance("calm", np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), (), "assumed", "a test")
     with pytest.raises(ValueError, match='"calm" has neither a filter nor lines'):
         plots.plot_spectrum(nothing)
+    still = replace(result("budget"), spectra={})
+    with pytest.raises(ValueError, match="no source of this budget has a spectrum"):
+        plots.plot_spectrum(still)
+    with pytest.raises(ValueError, match=r"the study has no budget of pointing errors: .* no table \[error_budget\]"):
+        plots.plot_contributions(plain_study())
     with pytest.raises(ValueError, match="there is nothing to plot: no contact"):
         axes_of(empty("no contact"))
 

@@ -14,6 +14,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from budget_files import TABLE
 from microrad.report.plotting.figure import Figure as Reported
 from microrad.report.plotting.sheet import Line, grid
 from microrad.report.tables import Cell, Table
@@ -117,9 +118,9 @@ class Visit:
 
 @pytest.fixture(scope="module")
 def session(tmp_path_factory):
-    """A folder with a mission, a campaign, a recording and jobs that have ended; its day is computed."""
+    """A folder with a mission and its budget of errors, a campaign, a recording, ended jobs; its day is computed."""
     folder = tmp_path_factory.mktemp("folder")
-    (folder / "leo-geo.toml").write_text(SHIPPED.read_text("utf-8"), "utf-8")
+    (folder / "leo-geo.toml").write_text(SHIPPED.read_text("utf-8") + TABLE, "utf-8")
     found = Session(folder)
     found.other = found.draft
     runs.write_campaign(found)
@@ -177,7 +178,7 @@ def every_time(session, build):
         leave += 1
 
 
-WAITS = {"compare": 2, "control": 4, "day": 2, "link": 3, "mirror": 4, "mission": 0, "pointing": 3, "runs": 17}
+WAITS = {"compare": 2, "control": 4, "day": 2, "link": 3, "mirror": 4, "mission": 0, "pointing": 5, "runs": 17}
 
 
 @pytest.mark.parametrize("name", WAITS)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from budget_files import loaded
 from campaign_files import HEAD, POWER
 from microrad import report
 from microrad.campaign.file import load_campaign
@@ -60,6 +61,16 @@ def test_the_loop_is_that_of_the_named_mirror():
     assert fine.scene.loop.mirror.name == "a plate"
     assert [v.design.name for v in fine.verified] == ["PI"]
     assert set(fine.best.simulated) == {Variant.GIVEN, Variant.STRAIGHT}
+
+
+def test_a_budget_of_pointing_errors_takes_what_that_loop_leaves():
+    fine = plate_study()[0].fine_pointing
+    file = loaded(whole=True)  # the paper's mission with a budget; its table is all that counts here
+    asked = study.error_budget.of_mission(file.mission.error_budget, file.sources)
+    found = study.pointing_errors(asked, fine)
+    drift = next(each for each in found.judged if each.name == "drift")  # an APE about y
+    left = math.fsum(share.sigma_rad[0] ** 2 for share in drift.shares if share.contribution.kind == "loop")
+    assert_allclose(left, fine.best.theory.error[1], rtol=1e-6)
 
 
 def test_without_hysteresis_the_simulation_is_the_theory():

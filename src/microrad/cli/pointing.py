@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from microrad.cli.coupled_design import broken_promises, design_of_several_axes, tuned_text
-from microrad.cli.error_budget import sources_beside, totals_of
+from microrad.cli.error_budget import stated_beside
 from microrad.cli.frame import (
     MET,
     UNMET,
@@ -119,10 +119,12 @@ def pointing(
     by the rules of the standard and as a full distribution, what each source weighs, and how large it may become. The
     exit code is 1 when a limit is not kept.
     """
+    from microrad.link.error_budget.assembly import judge
     from microrad.loop.pointing_loop.linear import close
     from microrad.loop.pointing_loop.windows import windowed_errors
     from microrad.mission.file import MissionFile, load_link, load_mission
-    from microrad.report.error_budget import budget_data, budget_view
+    from microrad.report.error_budget.data import budget_data
+    from microrad.report.error_budget.page import budget_view
     from microrad.report.fine_pointing.simulated_windows import simulated_data, simulated_view
     from microrad.report.fine_pointing.windows import windows_data, windows_text
     from microrad.report.view import views_text
@@ -130,9 +132,8 @@ def pointing(
     mission = load_link(file)
     with refusal_of(mission.path):
         indices = indices_of(window or [0.01, 1.0], spacing or [])
-        asked = sources_beside(mission, sources, indices)
-    table, closed = mission.mission.error_budget, None
-    loop, needed = mission if isinstance(mission, MissionFile) else None, asked is None or (table and table.with_loop)
+        asked = stated_beside(mission, sources, indices)
+    loop, closed = mission if isinstance(mission, MissionFile) else None, None
     data, texts, code = dict[str, Any](), list[str](), MET
 
     def told(key: str, of_data: Callable[[], Any], of_text: Callable[[], str]) -> None:
@@ -141,7 +142,7 @@ def pointing(
         else:
             texts.append(of_text().strip("\n"))
 
-    if needed or simulate is not None or (loop and loop.mission.fine_pointing):
+    if asked is None or asked.with_loop or simulate is not None or (loop and loop.mission.fine_pointing):
         loop = loop or load_mission(file)
         scene, made = _designed(loop, controller)
         with refusal_of(mission.path):
@@ -155,9 +156,9 @@ def pointing(
             told("simulated", lambda: simulated_data(*found), lambda: views_text(view.blocks, width()))
     if asked is not None:
         with refusal_of(mission.path):
-            totals = totals_of(*asked, table, closed)
-        code = UNMET if any(each.holds is False for each in totals.values()) else MET
-        told("budget", lambda: budget_data(totals), lambda: views_text(budget_view(totals).blocks, width()))
+            budget = judge(asked, closed)
+        code = UNMET if any(each.total.holds is False for each in budget.judged) else MET
+        told("budget", lambda: budget_data(budget), lambda: views_text(budget_view(budget).blocks, width()))
     if as_json:
         return Outcome(json_text({"mission_sha256": mission.sha256, **data}), code)
     return Outcome("\n\n".join(texts), code)

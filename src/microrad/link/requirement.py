@@ -12,8 +12,9 @@ from microrad.link.study import LinkStudy
 from microrad.mission.model import Source
 from microrad.mission.tables.link import LinkRequirement
 
-Subject = Literal["cone", "beacon", "answer", "communication", "residual", "stroke", "fine pointing"]
-"""What a requirement is about: the beacon's cone, a margin, the error that a loop leaves, or the mirror's stroke."""
+Subject = Literal["cone", "beacon", "answer", "communication", "residual", "stroke", "fine pointing", "error budget"]
+"""What a requirement is about: the beacon's cone, a margin, the error that a loop leaves, the mirror's stroke, or what
+the budget of pointing errors comes to."""
 
 ROUNDING = 1e-9
 """Share of a number, or decibels, that rounding may take from it."""

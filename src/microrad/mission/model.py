@@ -212,6 +212,15 @@ def _point_ahead_fits(point_ahead: PointAhead | None, fine: FinePointing | None)
         yield Problem("fine_pointing.reference.point_ahead", reason, f'point_ahead = "{shown}" would do')
 
 
+def _loop_there(error_budget: ErrorBudget | None, fine: FinePointing | None) -> Iterator[Problem]:
+    """What a loop leaves needs a loop."""
+    if error_budget is not None and error_budget.with_loop and fine is None:
+        reason = "is true, and the mission has no table fine_pointing"
+        yield Problem(
+            "error_budget.with_loop", reason, "the table [fine_pointing], which microrad init writes, or false"
+        )
+
+
 def _needs_orbit(name: str) -> Callable[..., Iterator[Problem]]:
     """A table that means nothing without the orbits."""
 
@@ -260,6 +269,7 @@ RELATIONS: tuple[Relation, ...] = (
     (("mirror", "amplifier"), _bias_fits),
     (("control", "scenario"), _frequencies_fit),
     (("point_ahead", "fine_pointing"), _point_ahead_fits),
+    (("error_budget", "fine_pointing"), _loop_there),
 )
 """What has to fit between tables of a whole mission."""
 

@@ -136,6 +136,7 @@ def study_figures(study: "Study", parts: Kept = NOTHING) -> "StudyFigures":
         parts: those of earlier runs that are kept: none by default.
     """
     from microrad.report.day.figures import day_figures
+    from microrad.report.error_budget.figures import budget_figures
     from microrad.report.fine_pointing.figures import fine_pointing_figures
     from microrad.report.fine_pointing.tails import tail_figures
     from microrad.report.links.figures import link_figures
@@ -149,6 +150,7 @@ def study_figures(study: "Study", parts: Kept = NOTHING) -> "StudyFigures":
         fine_pointing_figures(study, parts),
         tail_figures(study),
         link_figures(study.links),
+        () if study.error_budget is None else budget_figures(study.error_budget),
         () if study.day is None else day_figures(study.day, study.contact),
     )
 

@@ -13,6 +13,7 @@ import numpy as np
 from microrad.core.arrays import Complexes, Floats
 from microrad.lab.identify import FrequencyResponseFit, Identification
 from microrad.lab.identify.linear.response import FrequencyResponse
+from microrad.link.error_budget.assembly import PointingErrorBudget
 from microrad.link.study import LinkStudy
 from microrad.loop.disturbance.records import Disturbance, band_rms, psd
 from microrad.loop.paper_cases import Run
@@ -23,6 +24,7 @@ from microrad.mirror.hysteresis import HysteresisLoop
 from microrad.orbit.day import DayStudy
 from microrad.orbit.visibility.contacts import Contact
 from microrad.report.day.figures import contacts_figure, spans, timeline
+from microrad.report.error_budget import figures as errors
 from microrad.report.fine_pointing.figures import cumulative_rms, seen, spectrum_sheet
 from microrad.report.identification import figures as identification
 from microrad.report.identification.figures import Measured, Modelled, bode, half_width
@@ -146,12 +148,13 @@ def plot_residual(result: Identification | FrequencyResponseFit | Trace | Pointi
     return axes_of(_sheet("plot_residual", result, sheets), axes)
 
 
-def plot_spectrum(result: Ensemble | Disturbance, axes: Any = None) -> Any:
+def plot_spectrum(result: Ensemble | Disturbance | PointingErrorBudget, axes: Any = None) -> Any:
     """One-sided spectrum of the line of sight about an axis, and the rms that gathers below each frequency.
 
     Args:
         result: runs of a pointing loop (each axis of what is left), or a disturbance (its lines stand in the rms, and
-            are marked in the spectrum).
+            are marked in the spectrum); or a budget of pointing errors (the spectra of its sources about all axes, and
+            in place of the rms the weight of each window).
         axes: matplotlib's, for spectrum and rms; None for a new figure.
 
     Returns:
@@ -173,8 +176,74 @@ def plot_spectrum(result: Ensemble | Disturbance, axes: Any = None) -> Any:
         microrad.plot_spectrum(vibration)
         ```
     """
-    sheets: _Sheets = {Ensemble: _left_spectrum, Disturbance: _disturbance_spectrum}
+    sheets: _Sheets = {
+        Ensemble: _left_spectrum,
+        Disturbance: _disturbance_spectrum,
+        PointingErrorBudget: _budget_spectra,
+    }
     return axes_of(_sheet("plot_spectrum", result, sheets), axes)
+
+
+def plot_pointing_errors(result: PointingErrorBudget | Study, axes: Any = None) -> Any:
+    """How often each error of a budget is larger than a size, with its limit, and its totals by rules and distribution.
+
+    Args:
+        result: a budget of pointing errors, or a study that has one.
+        axes: matplotlib's, one for each requirement; None for a new figure.
+
+    Returns:
+        The axes, an array where there are several requirements.
+
+    Raises:
+        TypeError: For another result, and for axes that are none.
+        ValueError: For a study without such a budget, and for more or fewer axes than requirements.
+        ImportError: Where matplotlib is not installed.
+
+    Example:
+        ```python
+        import microrad
+
+        study = microrad.run_study(microrad.load_mission("leo-geo.toml"))
+        if study.error_budget is not None:
+            microrad.plot_pointing_errors(study)
+        ```
+    """
+    sheets: _Sheets = {
+        PointingErrorBudget: lambda of: errors.distributions(of.judged).sheet,
+        Study: lambda of: errors.distributions(_budget_of(of).judged).sheet,
+    }
+    return axes_of(_sheet("plot_pointing_errors", result, sheets), axes)
+
+
+def plot_contributions(result: PointingErrorBudget | Study, axes: Any = None) -> Any:
+    """What each source of a budget of pointing errors contributes to each requirement, as bars by its class.
+
+    Args:
+        result: a budget of pointing errors, or a study that has one.
+        axes: matplotlib's, one for each requirement; None for a new figure.
+
+    Returns:
+        The axes, an array where there are several requirements.
+
+    Raises:
+        TypeError: For another result, and for axes that are none.
+        ValueError: For a study without such a budget, and for more or fewer axes than requirements.
+        ImportError: Where matplotlib is not installed.
+
+    Example:
+        ```python
+        import microrad
+
+        study = microrad.run_study(microrad.load_mission("leo-geo.toml"))
+        if study.error_budget is not None:
+            microrad.plot_contributions(study)
+        ```
+    """
+    sheets: _Sheets = {
+        PointingErrorBudget: lambda of: errors.contributions(of.judged).sheet,
+        Study: lambda of: errors.contributions(_budget_of(of).judged).sheet,
+    }
+    return axes_of(_sheet("plot_contributions", result, sheets), axes)
 
 
 def plot_margin_map(result: Study | LinkStudy, axes: Any = None) -> Any:
@@ -414,6 +483,18 @@ def _disturbance_spectrum(of: Disturbance) -> Sheet:
     below = np.sqrt(np.cumsum(band_rms(of, np.concatenate([[0.0], freq])) ** 2))
     right.add(Line(freq, 1e6 * below, BLUE, name=of.name))
     return sheet
+
+
+def _budget_spectra(budget: PointingErrorBudget) -> Sheet:
+    if not budget.spectra:
+        raise ValueError("plot_spectrum: no source of this budget has a spectrum: none is a process or a loop")
+    return errors.spectra(budget).sheet
+
+
+def _budget_of(study: Study) -> PointingErrorBudget:
+    if study.error_budget is None:
+        raise ValueError("the study has no budget of pointing errors: its mission has no table [error_budget]")
+    return study.error_budget
 
 
 # ------------------------------------------------------------------------------------------------------------- contacts

@@ -13,9 +13,11 @@ from microrad.core.progress import Progress
 from microrad.core.threads import beside, both
 from microrad.link import pointing, requirement
 from microrad.link import study as link_study
+from microrad.link.error_budget import assembly as error_budget
 from microrad.link.pointing.outage import Performance
 from microrad.loop import control, controller_study, coupled_study, paper_cases
 from microrad.loop.pointing_loop import ensemble
+from microrad.loop.pointing_loop.linear import close
 from microrad.mirror import Variant
 from microrad.mirror import summary as mirror_summary
 from microrad.mirror.hysteresis import HysteresisLoop
@@ -62,6 +64,8 @@ class Study:
     the paper leaves open.
     ``links`` holds what follows from the links' tables alone, ``performance`` what the simulated residuals cost them.
     ``tornado`` is what moves the judged margin, at the error that its loop leaves.
+    ``error_budget`` is the budget of pointing errors, under the best controller of the fine-pointing loop where what
+    that leaves is in it; None for a mission without that table.
     ``day`` is what the link delivers under the best of those residuals, ``contact`` one of its contacts in time, and
     ``plan`` that of a constellation; each is None where the mission lacks a table for it.
     """
@@ -81,6 +85,7 @@ class Study:
     fine_pointing: controller_study.FinePointingStudy | None
     performance: pointing_penalty.LinkPerformance
     tornado: link.Tornado
+    error_budget: error_budget.PointingErrorBudget | None
     day: day_study.DayStudy | None
     contact: contact_run.ContactRun | None
     plan: constellation.ConstellationPlan | None
@@ -179,6 +184,7 @@ def run_study(
     if any(each.content is None for each in file.contents):  # it may be there when it is read
         parts = kept.NOTHING
     m, q, sources = file.mission, file.mission.requirement, file.sources
+    asked = None if m.error_budget is None else error_budget.of_mission(m.error_budget, sources)
     mirrors = mirror.of(m)
     cases = paper_cases.of(m, mirrors)
 
@@ -223,6 +229,10 @@ def run_study(
     cause = verdict.residual_cause(mirrors, q.residual_statistic, residual, runs)
     by_paper = verdict.of_residual(q, mirrors, sources, achieved, left_rad, cause)
     requirements, papers_loop = judged(links, by_paper, fine, case)
+    errors = None
+    if asked is not None:
+        errors = pointing_errors(asked, fine, parts)
+        requirements += verdict.of_error_budget(errors, sources, fine if asked.with_loop else None)
     if case is not None:
         loss = day_study.PointingLoss(case.outage_loss_db, case.outage, f"{case.controller}, {case.source}")
     else:
@@ -247,6 +257,7 @@ def run_study(
         fine_pointing=fine,
         performance=found,
         tornado=tornado(links, left_rad if case is None else case.error_rad),
+        error_budget=errors,
         day=day,
         contact=contact,
         plan=plan,
@@ -269,6 +280,20 @@ def fine_pointing_loop(
     if isinstance(scene, coupled_study.CoupledScene):
         return parts.part(coupled_study.design_and_simulate, scene, on_progress=on_progress)
     return parts.part(controller_study.design_and_simulate, scene, on_progress=on_progress)
+
+
+def pointing_errors(
+    asked: error_budget.Stated, fine: controller_study.FinePointingStudy | None, parts: kept.Kept = kept.NOTHING
+) -> error_budget.PointingErrorBudget:
+    """The budget of pointing errors, with what the best controller of the fine-pointing loop leaves where it is asked.
+
+    Args:
+        asked: What the mission asks for.
+        fine: The study of the fine-pointing loop, None where the mission has none.
+        parts: The results of earlier runs that are kept.
+    """
+    closed = None if fine is None or not asked.with_loop else close(fine.scene.theory, fine.best.design.controller)
+    return parts.part(error_budget.judge, asked, closed)
 
 
 def judged(

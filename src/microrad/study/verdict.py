@@ -8,6 +8,7 @@ import numpy as np
 
 from microrad import link
 from microrad.link import pointing
+from microrad.link.error_budget.assembly import Judged, PointingErrorBudget
 from microrad.link.pointing.outage import Performance
 from microrad.link.requirement import IMPOSSIBLE, Requirement, Subject, derived_from, time_kept
 from microrad.loop.controller_study import FinePointingStudy
@@ -73,6 +74,29 @@ def of_fine_pointing(
         _error("fine pointing", f"{title} ({controller})", q, left, cause, lacking),
         Requirement("communication", name, "dB", q.margin_db, case.margin_db, spare, cause, doubt, derived),
     )
+
+
+def of_error_budget(
+    budget: PointingErrorBudget, sources: Mapping[str, Source], fine: FinePointingStudy | None
+) -> tuple[Requirement, ...]:
+    """The requirements on the pointing errors, each by the full distribution, with the source that weighs most.
+
+    Args:
+        budget: The budget.
+        sources: Where each value of the mission comes from, by its dotted key.
+        fine: The study of the fine-pointing loop where what it leaves is a source.
+    """
+    lacking = "" if fine is None else _lacking(fine.scene.unknown_dynamics)
+
+    def line(of: Judged) -> Requirement:
+        limit, found = of.total.required.limit_rad, of.total.quantile_rad
+        assert limit is not None  # a mission states one
+        name = f"{of.name.replace('_', ' ')} ({of.total.required.index.kind})"
+        derived = derived_from(sources, f"error_budget.requirements.{of.name}.", "error_budget.sources.")
+        most = of.shares[0].name.replace("_", " ")
+        return Requirement("error budget", name, "rad", limit, found, limit - found, most, lacking, derived)
+
+    return tuple(map(line, budget.judged))
 
 
 def unknown(mirror: mirror_table.Mirror) -> str:

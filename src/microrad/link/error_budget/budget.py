@@ -50,7 +50,8 @@ class Share:
     """What one source means for a total.
 
     Args:
-        contribution: The source's part of the total.
+        contribution: The source's part of the error.
+        total_rad: The total, by the distribution.
         mean_rad: Its mean about each axis of the requirement.
         sigma_rad: Its standard deviation about each of them.
         without_rad: The total, by the distribution, without it.
@@ -60,6 +61,7 @@ class Share:
     """
 
     contribution: Contribution
+    total_rad: float
     mean_rad: Floats
     sigma_rad: Floats
     without_rad: float
@@ -70,6 +72,16 @@ class Share:
     def name(self) -> str:
         """The source."""
         return self.contribution.name
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """Its name and class: the loop may have a source of the name of another one."""
+        return self.name, self.contribution.kind
+
+    @property
+    def part_rad(self) -> float:
+        """Its part of the total (rad): those of all sources add up to it, as the total grows in proportion to them."""
+        return self.growth * self.total_rad
 
 
 def total(found: Sequence[Contribution], required: Requirement) -> Total:
@@ -122,6 +134,16 @@ def _total(found: Sequence[Contribution], bundle: Bundle, required: Requirement)
     return Total(required, tuple(found), whole.mean, whole.sigma, rules, whole.quantile(required.confidence))
 
 
+def beyond(of: Total, size_rad: Floats) -> Floats:
+    """Probability of an error that is larger, radial for two axes, shape (sizes,).
+
+    Args:
+        of: The total.
+        size_rad: The sizes (rad), shape (sizes,).
+    """
+    return 1.0 - _bundled(of.contributions).about(of.required.axes).within(size_rad)
+
+
 _SMALL = 1e-3  # growth of a source by which that of the total is seen
 _FAR = 1e6  # times its size, beyond which a source does not matter
 _STEP = 4.0  # between two sizes that are tried
@@ -142,10 +164,12 @@ def shares(of: Total) -> tuple[Share, ...]:
     if all(part.constant for part in parts):
         found = [_of_constant(of, each, own) for each, own in zip(of.contributions, parts, strict=True)]
     else:
-        others = each_without(parts, _HELD * max(of.quantile_rad, required.limit_rad or 0.0))
+        far = near = each_without(parts, _HELD * max(of.quantile_rad, required.limit_rad or 0.0))
+        if not all(series.whole for series in far):  # one that reaches less far has more of its terms
+            near = each_without(parts, _HELD * of.quantile_rad)
         found = [
-            _share(of, each, own, series, _without(of, at, own, series))
-            for at, (each, own, series) in enumerate(zip(of.contributions, parts, others, strict=True))
+            _share(of, each, own, (close, wide), _without(of, at, own, close))
+            for at, (each, own, close, wide) in enumerate(zip(of.contributions, parts, near, far, strict=True))
         ]
     return tuple(sorted(found, key=lambda each: -float(f"{each.growth:.2e}")))  # what is alike keeps its order
 
@@ -161,41 +185,50 @@ def _without(of: Total, at: int, own: Sum, others: Series) -> float:
     return _bundled(rest).about(of.required.axes).quantile(of.required.confidence)
 
 
-def _share(of: Total, each: Contribution, own: Sum, others: Series, without: float) -> Share:
-    whole, confidence, limit, u = of.quantile_rad, of.required.confidence, of.required.limit_rad, others.u
+def _share(of: Total, each: Contribution, own: Sum, others: tuple[Series, Series], without: float) -> Share:
+    whole, confidence, limit, (near, far) = of.quantile_rad, of.required.confidence, of.required.limit_rad, others
 
-    def spare(size_rad: float, times: float) -> float:
-        return others.within(size_rad, own.at(times * u)) - confidence
+    def spare(series: Series, size_rad: float, times: float) -> float:
+        return series.within(size_rad, own.at(times * series.u)) - confidence
 
-    by_source = spare(whole, 1.0 + _SMALL) - spare(whole, 1.0 - _SMALL)
-    by_size = spare(whole * (1.0 + _SMALL), 1.0) - spare(whole * (1.0 - _SMALL), 1.0)
+    by_source = spare(near, whole, 1.0 + _SMALL) - spare(near, whole, 1.0 - _SMALL)
+    by_size = spare(near, whole * (1.0 + _SMALL), 1.0) - spare(near, whole * (1.0 - _SMALL), 1.0)
     growth = -by_source / by_size if by_size > 0.0 else 0.0
     growth = growth if abs(growth) > _NO_GROWTH else 0.0
-    allowed = None if limit is None else _allowed(own, lambda times: spare(limit, times))
-    return Share(each, own.mean, own.sigma, without, growth, allowed)
+    allowed = None
+    if limit is not None:
+        others_rad = float(np.linalg.norm(of.mean_rad - own.mean))
+        allowed = _allowed(own, others_rad, limit, lambda times: spare(far, limit, times))
+    return Share(each, of.quantile_rad, own.mean, own.sigma, without, growth, allowed)
 
 
 def _of_constant(of: Total, each: Contribution, own: Sum) -> Share:
     """The same where nothing of the budget is spread, so that lengths of means are all."""
     limit, others = of.required.limit_rad, of.mean_rad - own.mean
+    without = float(np.linalg.norm(others))
     growth = float(own.mean @ of.mean_rad) / of.quantile_rad**2 if of.quantile_rad else 0.0
     allowed = None
     if limit is not None:
-        allowed = _allowed(own, lambda times: limit - float(np.linalg.norm(others + times * own.mean)))
-    return Share(each, own.mean, own.sigma, float(np.linalg.norm(others)), growth, allowed)
+        allowed = _allowed(own, without, limit, lambda times: limit - float(np.linalg.norm(others + times * own.mean)))
+    return Share(each, of.quantile_rad, own.mean, own.sigma, without, growth, allowed)
 
 
-def _allowed(own: Sum, spare: Callable[[float], float]) -> float:
-    """How many times as large a source may be while something is to spare; its own size counts as one that may do."""
+def _allowed(own: Sum, others_rad: float, limit_rad: float, spare: Callable[[float], float]) -> float:
+    """How many times as large a source may be while something is to spare; its own size counts as one that may do.
+
+    What lies beyond the range of a series comes in again from its other end, so that a mean walks out of the limit in
+    steps that are short beside it.
+    """
     from scipy.optimize import brentq
 
     if not own.mean.any() and not own.sigma.any():
         return np.inf
-    low, high = 0.0, 1.0
+    low, high, mean_rad = 0.0, 1.0, float(np.linalg.norm(own.mean))
     if spare(high) < 0.0 and spare(low) < 0.0:
         return 0.0
     while spare(high) >= 0.0:
-        low, high = high, high * _STEP
+        walks = 0.0 < high * mean_rad < others_rad + _HELD * limit_rad
+        low, high = high, min(high * _STEP, high + 0.5 * limit_rad / mean_rad if walks else np.inf)
         if high > _FAR:
             return np.inf
     return float(brentq(spare, low, high, xtol=_DIGITS * high, rtol=_DIGITS))

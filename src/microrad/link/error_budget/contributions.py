@@ -111,13 +111,14 @@ class Requirement:
 class Contribution:
     """What a source adds to an index: its name, its class, and the independent parts that its error is the sum of.
 
-    ``origin`` says where its numbers come from.
+    ``origin`` says where its numbers come from, ``statistic`` how its size was stated.
     """
 
     name: str
     kind: SourceKind | Literal["loop"]
     parts: tuple[Part, ...]
     origin: str
+    statistic: str = ""
 
 
 def contribution(source: ErrorSource, required: Requirement) -> Contribution:
@@ -131,7 +132,7 @@ def contribution(source: ErrorSource, required: Requirement) -> Contribution:
         ValueError: For an index of more or longer windows than the period of a drift or of a transient holds.
     """
     parts = tuple(_part(each, required) for one in source.by_axis for each in (one, *_lines(one)))
-    return Contribution(source.name, source.kind, parts, source.origin)
+    return Contribution(source.name, source.kind, parts, source.origin, source.statistic)
 
 
 def _part(source: ErrorSource, required: Requirement) -> Part:

@@ -141,7 +141,8 @@ def _merged(
     else:
         part = case(axes, mean=mean, covariance=together)
     name, origin = " with ".join(each.name for each in chosen), "; ".join(each.origin for each in chosen)
-    whole = Contribution(name, chosen[0].kind, (part,), origin)
+    statistic = ", ".join(dict.fromkeys(each.statistic for each in chosen))
+    whole = Contribution(name, chosen[0].kind, (part,), origin, statistic)
     return [whole if each is chosen[0] else each for each in found if each is chosen[0] or each not in chosen]
 
 

@@ -24,9 +24,12 @@ _CHUNK, _MOST, _MOST_PLANE, _MOST_OF_OTHERS = 16, 1 << 14, 256, 128  # terms at 
 _BLOCK = 2_000_000  # numbers of an intermediate array
 _KERNELS = 64  # that a grid keeps
 _TAPER = 6.0  # width of the taper that ends a series of the most terms
+_ENDED = 1e-6  # characteristic function at the last terms of a series, below which no taper has to end it
+_LAST = 2e-5  # taper of those
 _FAR_OFF = 0.012  # deviation beside the length of a mean, up to which only its direction counts
 _NO_SPREAD = 1e-12  # standard deviation beside the mean below which all is taken as constant
 _SURE = np.ones(1)
+_HALVES = 2.0  # points of a plane for which one of half of it stands: itself and its conjugate
 
 
 @dataclass(frozen=True, slots=True)
@@ -240,9 +243,25 @@ class Sum:
         """
         if self.constant:
             return float(np.linalg.norm(self.mean))
-        if self.axes == 2 and float(np.max(self.sigma)) < _FAR_OFF * float(np.linalg.norm(self.mean)):
-            return self._along_the_mean().quantile(share)
-        return self.series().quantile(share)
+        return (self._along_the_mean() if self._far_off else self).series().quantile(share)
+
+    @property
+    def _far_off(self) -> bool:
+        """Whether its mean is so long that only its direction counts."""
+        return self.axes == 2 and float(np.max(self.sigma)) < _FAR_OFF * float(np.linalg.norm(self.mean))
+
+    def within(self, size_rad: Floats) -> Floats:
+        """Probability that the error, radial for two axes, is not above a size, shape (sizes,).
+
+        Args:
+            size_rad: The sizes (rad), shape (sizes,).
+        """
+        if self.constant:
+            return np.asarray(np.linalg.norm(self.mean) <= size_rad, dtype=float)
+        series = (self._along_the_mean() if self._far_off else self).series()
+        reach = series.grid.reach + abs(series.grid.centre)
+        found = [1.0 if size >= reach else series.within(size) for size in size_rad.tolist()]
+        return np.clip(found, 0.0, 1.0)
 
     def _along_the_mean(self) -> "Sum":
         """The same in the direction of the mean alone: what lies across it hardly makes a large mean longer."""
@@ -270,10 +289,10 @@ class Sum:
             u = step * np.arange(1.0, len(terms) + 1.0)[:, None]
             return Series.of(Grid(u, float(self._centre[0]), reach), terms)
         count = _count(lambda u: np.abs(self.characteristic(u)), step, _MOST_PLANE)
-        u, weight = _plane(step, count, _MOST_PLANE)
-        terms = weight * self.characteristic(u)
+        u, taper = _plane(step, count, _MOST_PLANE)
+        terms = _HALVES * self.characteristic(u)
         keep = np.abs(terms) > _NEGLIGIBLE  # the kernels of the others are not needed
-        return Series.of(Grid(u[keep], 0.0, reach), terms[keep])
+        return Series.of(Grid(u[keep], 0.0, reach), terms[keep], None if taper is None else taper[keep])
 
     def _terms(self, step: float) -> Complexes:
         """Characteristic function of one axis at 1, 2, ... steps, up to where it is negligible."""
@@ -348,25 +367,30 @@ class Series:
         grid: Where characteristic functions are known.
         terms: The error's where it is not negligible, shape (kept,).
         kept: Which points of the grid these are, shape (kept,).
-        whole: Whether the terms go on until they are negligible; they are tapered else.
+        taper: What ends the terms where they do not go on until they are negligible, shape (kept,); None where they do.
     """
 
     grid: Grid
     terms: Complexes
     kept: Integers
-    whole: bool = True
+    taper: Floats | None = None
 
     @classmethod
-    def of(cls, grid: Grid, terms: Complexes, whole: bool = True) -> "Series":
+    def of(cls, grid: Grid, terms: Complexes, taper: Floats | None = None) -> "Series":
         """Keep the terms that count.
 
         Args:
             grid: The grid.
             terms: The characteristic function at all of its points.
-            whole: Whether no further ones are missing.
+            taper: What ends them where further ones are missing.
         """
         kept = np.flatnonzero(np.abs(terms) > _NEGLIGIBLE)
-        return cls(grid, terms[kept], kept, whole)
+        return cls(grid, terms[kept], kept, None if taper is None else taper[kept])
+
+    @property
+    def whole(self) -> bool:
+        """Whether the terms go on until they are negligible."""
+        return self.taper is None
 
     @property
     def u(self) -> Floats:
@@ -381,7 +405,10 @@ class Series:
             factor: Characteristic function of a further part at `u`, shape (kept,).
         """
         flat, kernel = self.grid.kernel(size_rad)
-        return float(flat + ((self.terms * factor) @ kernel[self.kept]).real)
+        terms = self.terms * factor
+        if self.taper is not None and np.max(np.abs(terms[self.taper < _LAST]), initial=0.0) > _ENDED:
+            terms = terms * self.taper
+        return float(flat + (terms @ kernel[self.kept]).real)
 
     def quantile(self, share: float, rel: float = 1e-11) -> float:
         """Size that is not exceeded with a probability (rad).
@@ -411,15 +438,12 @@ def _count(size: Callable[[Floats], Floats], step: float, most: int) -> int:
     return count
 
 
-def _plane(step: float, count: int, most: int) -> tuple[Floats, Floats]:
-    """Points of half a plane without the origin, and how often each stands for itself and its conjugate, tapered."""
+def _plane(step: float, count: int, most: int) -> tuple[Floats, Floats | None]:
+    """Points of half a plane without the origin, and the taper of a series that ends too early there."""
     plane = np.stack(np.meshgrid(np.arange(count + 1.0), np.arange(-count, count + 1.0), indexing="ij"), axis=-1)
     half = plane.reshape(-1, 2)
     half = half[(half[:, 0] > 0) | (half[:, 1] > 0)]
-    weight = np.full(len(half), 2.0)
-    if count >= most:
-        weight *= _taper(half[:, 0] / count) * _taper(half[:, 1] / count)
-    return step * half, weight
+    return step * half, _taper(half[:, 0] / count) * _taper(half[:, 1] / count) if count >= most else None
 
 
 def each_without(sums: Sequence[Sum], reach_rad: float) -> list[Series]:
@@ -433,15 +457,17 @@ def each_without(sums: Sequence[Sum], reach_rad: float) -> list[Series]:
     if sums[0].axes == 2:
         most = _MOST_OF_OTHERS
         count = _count(lambda u: np.abs(_others(sums, u)), step, most)
-        u, weight = _plane(step, count, most)
+        u, taper = _plane(step, count, most)
+        each = _HALVES * _others(sums, u)
     else:
         most, count = _MOST, 4 * _CHUNK
         while count < _MOST and np.max(np.abs(_others(sums, step * _last(count)))) >= _NEGLIGIBLE:
             count = min(2 * count, _MOST)
         u = step * np.arange(1.0, count + 1.0)[:, None]
-        weight = _taper(np.arange(1, count + 1) / count) if count >= _MOST else np.ones(count)
+        taper = _taper(np.arange(1, count + 1) / count) if count >= _MOST else None
+        each = _others(sums, u)
     grid = Grid(u, 0.0, reach_rad)
-    return [Series.of(grid, weight * rest, count < most) for rest in _others(sums, u)]
+    return [Series.of(grid, rest, taper) for rest in each]
 
 
 def _last(count: int) -> Floats:

@@ -85,6 +85,7 @@ class ErrorSource:
         even_in_time: Whether a random error is even up to its size in time; Gaussian of that standard deviation else.
         apart: Whether each axis has an error of its own, as large as its gain; else one error reaches all of them.
         origin: Where the numbers come from.
+        statistic: How its size was stated, such as "3-sigma"; "" where that is not known.
 
     Raises:
         ValueError: For another kind, a time that its kind lacks or has not, a transfer of another shape or one that is
@@ -102,6 +103,7 @@ class ErrorSource:
     even_in_time: bool = False
     apart: bool = False
     origin: str = "given"
+    statistic: str = ""
 
     def __post_init__(self) -> None:
         """Check the kind, what it needs, and the transfer."""

@@ -12,6 +12,7 @@ import numpy as np
 
 from microrad.core.arrays import Floats
 from microrad.core.labelled import TEXT, Group, Variable, variables
+from microrad.link.error_budget.assembly import Judged, PointingErrorBudget
 from microrad.loop.controller_study import FinePointingStudy, Residual
 from microrad.loop.paper_cases import Run
 from microrad.loop.pointing_loop.ensemble import COUNTERS, axis_names
@@ -28,7 +29,8 @@ _SPECTRUM = "rad^2/Hz"
 def study_netcdf(study: Study) -> bytes:
     """The content of results.nc.
 
-    It has margin map, hysteresis loops, traces, fine-pointing loop and the day; each variable with its unit.
+    It has margin map, hysteresis loops, traces, fine-pointing loop, the budget of pointing errors and the day; each
+    variable with its unit.
     """
     groups = {"margin_map": _map(study), "link_performance": _performance(study), **_loops(study)}
     for run in study.runs:
@@ -36,6 +38,8 @@ def study_netcdf(study: Study) -> bytes:
         groups[f"tracking/{name}"] = _trace(run)
     if study.fine_pointing is not None:
         groups |= _fine_pointing(study.fine_pointing)
+    if study.error_budget is not None:
+        groups |= _pointing_errors(study.error_budget)
     if study.day is not None:
         groups |= _day(study.day, study.contact, study.plan)
     return _netcdf_bytes(groups, {"title": study.file.mission.name, "mission_sha256": study.file.sha256})
@@ -246,6 +250,51 @@ def _sines(fine: FinePointingStudy) -> Group:
         quantile=("rad", f"radial error that {fine.quantile:g} of the time stays below", "quantile_rad"),
     )
     return Group(data)
+
+
+# ------------------------------------------------------------------------------------------------ pointing errors
+def _pointing_errors(budget: PointingErrorBudget) -> dict[str, Group]:
+    """Requirements with their totals and distributions, every source under each of them, and spectra."""
+    judged, curves = budget.judged, "requirement size"
+    data = variables(
+        "requirement",
+        judged,
+        index=(TEXT, "index", "total.required.index.kind"),
+        confidence=("1", "share that keeps the limit", "total.required.confidence"),
+        limit=("rad", "limit", "total.required.limit_rad"),
+        by_rules=("rad", "total by the rules of ECSS-E-ST-60-10C", "total.by_rules_rad"),
+        by_distribution=("rad", "total by the full distribution", "total.quantile_rad"),
+    )
+    data |= variables(
+        curves, judged, error=("rad", "size of an error", "size_rad"), beyond=("1", "share of larger ones", "beyond")
+    )
+    names = variables("requirement", judged, requirement=(TEXT, "requirement", "name"))
+    found = {"requirements": Group(data, names), "sources": _sources_of_errors(judged)}
+    if budget.spectra:
+        density = ("rad^2/Hz", "one-sided spectrum of all axes together", [*budget.spectra.values()])
+        axes = variables("source", source=(TEXT, "source", [*budget.spectra]))
+        axes |= variables("frequency", frequency=("Hz", "frequency", budget.freq_hz))
+        found["spectra"] = Group(variables("source frequency", density=density), axes)
+    return {f"error_budget/{name}": group for name, group in found.items()}
+
+
+def _sources_of_errors(judged: Sequence[Judged]) -> Group:
+    """One entry a source and requirement: sources that are correlated may stand together for one of them alone."""
+    allowed = "how many times as large it may be until the limit is met, inf for any"
+    data = variables(
+        "entry",
+        [share for each in judged for share in each.shares],
+        source=(TEXT, "source", "name"),
+        kind=(TEXT, "class", "contribution.kind"),
+        mean=("rad", "length of its mean", lambda share: math.hypot(*share.mean_rad)),
+        deviation=("rad", "length of its standard deviations", lambda share: math.hypot(*share.sigma_rad)),
+        contribution=("rad", "part of the total by the distribution", "part_rad"),
+        weight=("1", "growth of the total for that of the source, both as a share", "growth"),
+        without=("rad", "total without it", "without_rad"),
+        may_be=("1", allowed, "allowed"),
+    )
+    of = [each.name for each in judged for _ in each.shares]
+    return Group(data | variables("entry", requirement=(TEXT, "requirement", of)))
 
 
 # ------------------------------------------------------------------------------------------------ day

@@ -121,6 +121,9 @@ def tolerances(s: ConverterSteps) -> dict[str, Tolerance]:
         "formula": Tolerance(1e-8, {"dB": 1e-8, "dBm": 1e-8, "rad": 1e-12, "": 1e-12}),
         # Riccati equations and eigenvalues lose up to nine digits (seen: 2e-7 between processors).
         "linear theory": Tolerance(1e-5, {"rad": 1e-12, "": 1e-5}),
+        # A total's growth is a difference at 1e-3 of it, of numbers known to 1e-9; searches for a size end at 1e-5 of a
+        # range that reaches as far as 10 times the total.
+        "searched": Tolerance(1e-4, {"rad": 1e-12, "": 1e-5}),
         "orbit": _orbit(),
         # One run: a conversion that falls to the other side moves it by steps of its converters.
         "run": Tolerance(SMOOTH, {"rad": s.run_rad}),
@@ -178,7 +181,9 @@ SUMMARY: Mapping[str, tuple[str, ...]] = {
     "interval": ("fine_pointing.controllers[].simulated.*.rms_interval_rad",),
     "gain": ("fine_pointing.{rms_gained_over_baseline,rms_left_to_gain.baseline_with_hysteresis}",),
     "added": ("fine_pointing.error_budget.differences[].added_rms_rad",),
+    "searched": ("error_budget[].sources[].{weight,contribution_rad,total_without_it_rad,may_be_times}",),
     "exact": (
+        "error_budget[].{window_s,spacing_s,observation_s,confidence,limit_rad}",
         "{residual,runs[],fine_pointing.sines[]}.frequency_hz",
         "runs[].{rate_clamped,saturated,slew_limited,alternating}",
         "links.acquisition.ways[].runs",
@@ -191,6 +196,9 @@ SUMMARY: Mapping[str, tuple[str, ...]] = {
         "fine_pointing.{linear_bound_rms_rad,rms_left_to_gain.linear_at_baseline,rms_left_to_gain.linear_at_nearest}",
         "fine_pointing.controllers[].{theory_rms_rad,theory_rms_by_source_rad.*,margins.*}",
         "fine_pointing.error_budget.parts[].theory_rms_rad",
+        "error_budget[].{mean_rad,sigma_rad}[]",
+        "error_budget[].{by_rules_rad,by_distribution_rad}",
+        "error_budget[].sources[].{mean_rad,sigma_rad}[]",
     ),
     "run": (
         "{residual,runs[]}.{peak_rad,rms_rad,used_rad}",
@@ -235,7 +243,8 @@ SUMMARY: Mapping[str, tuple[str, ...]] = {
 FIGURES: Mapping[str, tuple[str, ...]] = {
     "exact": ("claims-scan",),
     "formula": ("fig2-margin-map", "{tornado,tornado-answer,tornado-beacon}", "wide-beam-or-scan"),
-    "linear theory": ("fine-pointing-sensitivity",),
+    "linear theory": ("fine-pointing-sensitivity", "pointing-errors-{distribution,spectrum}"),
+    "searched": ("pointing-errors-contributions",),
     "orbit": ("along-contact", "day-timeline", "world-map"),
     "run": ("comparison", "fig5-hysteresis-loops", "fig6-pid", "fig8-inverse", "fig4-chirp", "fig5-bench-loops"),
     "added": ("fine-pointing-budget", "fine-pointing-errors"),

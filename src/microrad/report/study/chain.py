@@ -133,8 +133,10 @@ def _residual(study: Study) -> Stage:
     if fine is not None:
         quantile_rad = fine.best.simulated[Variant.GIVEN].quantile_rad
         lines = [f"{micro(quantile_rad)} µrad at {share_of_time(fine.quantile)}, vibration", f"({lines[0]})"]
-    met = all(r.met for r in study.requirements if r.subject in ("residual", "fine pointing"))
+    budget = [r.met for r in study.requirements if r.subject == "error budget"]
+    met = all((*budget, *(r.met for r in study.requirements if r.subject in ("residual", "fine pointing"))))
     lines.append(f"allowed {_angle(m.requirement.pointing_error_rad)}")
+    lines += [f"error budget: {sum(budget)} of {len(budget)} kept"] if budget else []
     return Stage("Residual", tuple(lines), "PASS" if met else "FAIL")
 
 

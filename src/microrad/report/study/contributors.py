@@ -5,10 +5,12 @@ from collections.abc import Callable, Mapping, Sequence
 
 from microrad import link
 from microrad.link.budget.lines import FREE_SPACE_LOSS, POINTING_LOSS
+from microrad.link.error_budget.assembly import Judged, size_key
 from microrad.link.requirement import Requirement, Subject
 from microrad.loop.controller_study.parts import GAUGE_NOISE, OPTICAL_NOISE
 from microrad.mirror import Variant
 from microrad.mirror.geometry import StrokeBudget
+from microrad.report.error_budget.words import most
 from microrad.report.fine_pointing.words import source_name
 from microrad.report.quantities import percent, quantity
 from microrad.report.requirements import (
@@ -63,7 +65,10 @@ def contributor(study: Study, r: Requirement) -> str:
         r: a requirement of it.
     """
     fine = study.fine_case is not None and r in study.requirements
-    said = r.unknown or (_OF_FINE if fine else _CONTRIBUTORS)[r.subject](study, r.limited_by)
+    if r.subject == "error budget":
+        said = r.unknown or most(_judged(study, r))
+    else:
+        said = r.unknown or (_OF_FINE if fine else _CONTRIBUTORS)[r.subject](study, r.limited_by)
     return f"{said[:1].upper()}{said[1:]}"
 
 
@@ -88,8 +93,8 @@ def advice(study: Study, r: Requirement) -> str:
         return ""
     if r.subject == "communication":
         return advice_for_power(m.communication, r, study.tornado)
-    if r.subject == "stroke":
-        return _of_stroke(study, r)
+    if own := {"stroke": _of_stroke, "error budget": _of_source}.get(r.subject):
+        return own(study, r)
     if r.subject == "fine pointing":
         noise = _OF_NOISE.get(r.limited_by)
         return advise_change(r, noise) if noise else advise_change(r, "fine_pointing.rate", "raise")
@@ -97,6 +102,29 @@ def advice(study: Study, r: Requirement) -> str:
         held = "amplifier.slew" if "slew limit" in r.limited_by else "amplifier.output_max"
         return advise_change(r, held if r.limited_by.startswith("the amplifier") else "control.integral", "raise")
     return advice_for_links(study.links, r)
+
+
+def _judged(study: Study, r: Requirement) -> Judged:
+    """What the budget of pointing errors, which there is, has for a requirement of it."""
+    assert study.error_budget is not None
+    own = [each for each in study.requirements if each.subject == "error budget"]
+    return study.error_budget.judged[own.index(r)]
+
+
+def _of_source(study: Study, r: Requirement) -> str:
+    """The source that weighs most may be smaller, or has to be."""
+    share, table = _judged(study, r).shares[0], study.file.mission.error_budget
+    assert table is not None  # such a requirement has it
+    if share.contribution.kind == "loop":
+        noise = _OF_NOISE.get(share.name)
+        return advise_change(r, noise) if noise else advise_change(r, "fine_pointing.rate", "raise")
+    stated = table.sources.get(share.name)
+    if stated is None:  # several that are correlated
+        return ""
+    key, size = size_key(share.name, stated.kind), stated.rate_rad_s if stated.kind == "drift" else stated.size_rad
+    if not size or not share.allowed or not math.isfinite(share.allowed):
+        return advise_change(r, key)
+    return advise_at_most(r, key, size * share.allowed, "rad/s" if stated.kind == "drift" else "rad")
 
 
 def _of_stroke(study: Study, r: Requirement) -> str:

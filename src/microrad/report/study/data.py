@@ -7,6 +7,7 @@ from microrad.report.data import fields
 from microrad.report.day.constellation import plan_data
 from microrad.report.day.contact_run import contact_run_data
 from microrad.report.day.data import day_data
+from microrad.report.error_budget.data import budget_data
 from microrad.report.fine_pointing.data import fine_pointing_data
 from microrad.report.links.data import budgets_data, performance_data
 from microrad.report.requirements import requirement_data
@@ -64,6 +65,7 @@ def summary(study: Study) -> dict[str, Any]:
         "contact": None if study.contact is None else contact_run_data(study.contact),
         "constellation": None if study.plan is None else plan_data(study.plan),
         "fine_pointing": None if fine is None else fine_pointing_data(fine, m.requirement.pointing_error_rad),
+        **({} if study.error_budget is None else {"error_budget": budget_data(study.error_budget)}),
         "warnings": words.warnings(study),
     }
 

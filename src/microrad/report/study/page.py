@@ -16,6 +16,7 @@ from microrad.report.day import words as day_words
 from microrad.report.day.constellation import constellation_view
 from microrad.report.day.contact_run import contact_sentences, transitions_table, windows_table
 from microrad.report.day.page import day_view
+from microrad.report.error_budget.page import budget_view
 from microrad.report.fine_pointing.page import fine_pointing_view
 from microrad.report.fine_pointing.tails import tail_view
 from microrad.report.links.views import (
@@ -47,12 +48,13 @@ class StudyFigures:
     fine: tuple[Figure, ...] = ()
     tails: tuple[Figure, ...] = ()
     links: tuple[Figure, ...] = ()
+    errors: tuple[Figure, ...] = ()
     day: tuple[Figure, ...] = ()
 
     @property
     def every(self) -> tuple[Figure, ...]:
         """All of them, in the order of the files."""
-        return (*self.study, *self.bench, *self.fine, *self.tails, *self.links, *self.day)
+        return (*self.study, *self.bench, *self.fine, *self.tails, *self.links, *self.errors, *self.day)
 
 
 def study_page(study: Study, drawn: StudyFigures, manifest: Mapping[str, Any]) -> str:
@@ -84,6 +86,9 @@ def study_views(study: Study, drawn: StudyFigures) -> tuple[View, ...]:
         _mirror_and_loop(study),
         None if fine is None else fine_pointing_view(fine, required, drawn.fine),
         None if fine is None else tail_view(fine, required, drawn.tails),
+        None
+        if study.error_budget is None
+        else budget_view(study.error_budget, drawn.errors, words.loop_in_budget(study)),
         _day(study, drawn.day),
         paper_view(study, (*drawn.study, *drawn.bench), words.papers_loop_view(study), _readings(study)),
         inputs_view(study.file.sources),

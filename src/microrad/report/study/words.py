@@ -10,12 +10,13 @@ from microrad.core.units import format_quantity
 from microrad.link.budget.lines import DEEPEST_DB, POINT_AHEAD_LOSS, POINTING_LOSS
 from microrad.link.requirement import IMPOSSIBLE, Subject, time_kept
 from microrad.loop.controller_study import Scene
+from microrad.loop.controller_study.results import PROMISE
 from microrad.loop.paper_cases import Run
 from microrad.mirror import Variant
 from microrad.mission.file import changed_from_shipped
 from microrad.report.day import words as day_words
 from microrad.report.fine_pointing import words as fine_pointing_words
-from microrad.report.quantities import minus, quantity, signed
+from microrad.report.quantities import angle, minus, quantity, signed
 from microrad.report.requirements import (
     derived_words,
     first_warning,
@@ -260,6 +261,18 @@ def _rate_lost(cost: Cost) -> str:
     return "" if math.isnan(cost.data_rate_bit_s) else f" or {-cost.data_rate_bit_s * 1e-6:.0f} Mbit/s"
 
 
+def loop_in_budget(study: Study) -> list[str]:
+    """How the part of the loop in the budget of pointing errors compares with its runs, or nothing."""
+    fine, table = study.fine_pointing, study.file.mission.error_budget
+    if fine is None or table is None or not table.with_loop:
+        return []
+    left, linear = fine.best.simulated[Variant.GIVEN].rms_rad, fine.best.theory.radial_rms_rad
+    return [
+        f"In all, {fine.best.design.name} leaves {angle(linear)} rms by that theory, and {angle(left)} simulated with "
+        "hysteresis."
+    ]
+
+
 def found(study: Study) -> str:
     """How the partner is found, or nothing."""
     f, p = study.links.finding, study.open_loop.reading
@@ -355,6 +368,7 @@ def ranked_warnings(study: Study) -> dict[str, list[str]]:
         own, others = fine_pointing_words.warnings(study.fine_pointing, m.control, m.amplifier)
     paper = [*_of_loops(study), *_of_runs(study)]
     judged = paper if study.fine_pointing is None else []
+    own = [*own, *_of_budget_loop(study)]
     found = {
         "The verdict": [*_of_verdict(study), *map(Warned, _of_sources(study)), *_of_links(study)],
         "The model of the mirror": [*map(Warned, study.summary.warnings)],
@@ -385,7 +399,20 @@ def _of_links(study: Study) -> list[Warned]:
     return [Warned(text, about[budget.name]) for budget in study.links.budgets for text in budget.warnings]
 
 
+def _of_budget_loop(study: Study) -> list[str]:
+    """That the loop leaves far more than the budget of pointing errors has of it, or nothing."""
+    said, fine = loop_in_budget(study), study.fine_pointing
+    if not said or fine is None:
+        return []
+    times = fine.best.simulated[Variant.GIVEN].rms_rad / fine.best.theory.radial_rms_rad
+    if times <= PROMISE:
+        return []
+    return [f"the error budget takes the loop by its linear theory; simulated, it leaves {times:.2f} times as much rms"]
+
+
 def _of_fine_loop(text: str) -> Warned:
+    if text.startswith("the error budget"):
+        return Warned(text, "error budget")
     return Warned(text, "stroke" if "the stroke does not cover" in text else "fine pointing")
 
 

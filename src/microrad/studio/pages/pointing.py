@@ -1,13 +1,23 @@
-"""The pointing budget: its lines by class, the totals of each rule against the beacon, what is left, point-ahead."""
+"""The pointing budget: its lines by class, the totals of each rule against the beacon, what is left, point-ahead.
+
+Below them stands the budget of pointing errors in time windows, for a mission that has one.
+"""
 
 from __future__ import annotations
 
+from nicegui import background_tasks, ui
+
+from microrad.mission.file import LinkFile
+from microrad.mission.tables.error_budget import ErrorBudget
+from microrad.report.view import View
 from microrad.studio import commands
 from microrad.studio.pages import layout
 from microrad.studio.pages.elements import Blocks, Figure
+from microrad.studio.pages.in_thread import in_thread
 from microrad.studio.pages.sliders import SliderPage
 from microrad.studio.session import Session
 from microrad.studio.views import pointing as pointing_view
+from microrad.studio.views.plots import drawn
 from microrad.studio.views.pointing import PointingView
 
 TITLE = "Pointing"
@@ -34,7 +44,12 @@ class PointingPage(SliderPage[PointingView]):
         layout.heading("Lines and totals")
         self.bars = Figure("Half widths of the lines and totals of the rules; in numbers in the tables below")
         self.told = Blocks()
-        self.dimmed = (self.coverage, self.bars, self.told)
+        with ui.column().classes("w-full") as self.errors:
+            layout.heading("Pointing error budget")
+            self.state = ui.label().classes("soft").props('role="status"')
+            self.budget = Blocks()
+        self.errors.visible = False
+        self.dimmed = (self.coverage, self.bars, self.told, self.errors)
 
     async def show(self, view: PointingView) -> None:
         """Both plots."""
@@ -42,5 +57,27 @@ class PointingPage(SliderPage[PointingView]):
         await self.bars.draw(pointing_view.lines_plot(view))
 
     def show_rest(self, view: PointingView) -> None:
-        """Tables and sentences."""
+        """Tables and sentences; the budget of errors, which takes longer, comes behind them."""
         self.told.show_blocks(pointing_view.blocks(view))
+        table = view.file.mission.error_budget
+        self.errors.visible = table is not None
+        if table is not None:
+            self.state.text = "Computing ..."
+            layout.grey(self.budget, True)
+            background_tasks.create_lazy(self._errors(view, table), name=f"errors {id(self)}")
+
+    async def _errors(self, view: PointingView, table: ErrorBudget) -> None:
+        try:
+            found = await in_thread(self.errors, _budget, view.file, table)
+        except ValueError as error:
+            found = View("", [str(error)])
+        if view is self.view_now:
+            self.state.text = ""
+            layout.grey(self.budget, False)
+            self.budget.show_blocks(found.blocks, await in_thread(self.errors, drawn, found.blocks))
+
+
+def _budget(file: LinkFile, table: ErrorBudget) -> View:
+    from microrad.studio.views import errors
+
+    return errors.view(file, table)

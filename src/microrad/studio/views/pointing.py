@@ -29,6 +29,7 @@ POINTS = 241
 
 _CLASSES = {"bias": BLUE, "random": ORANGE, "drift": GREEN, "transient": SKY, "total": GREY}
 _LINES = "pointing.lines."
+_SOURCES, _REQUIRED = "error_budget.sources.", "error_budget.requirements."
 _OTHERS = {
     "beacon.divergence": "Beacon",
     "point_ahead.transverse_velocity": "Point-ahead",
@@ -39,10 +40,11 @@ _OTHERS = {
 
 @dataclass(frozen=True, slots=True)
 class PointingView:
-    """The open-loop pointing budget of a mission, and its point-ahead where it has one."""
+    """The open-loop pointing budget of a mission, and its point-ahead where it has one; and the mission itself."""
 
     budget: OpenLoopPointing
     ahead: PointAheadEffect | None
+    file: LinkFile
 
     @property
     def half_angle_rad(self) -> float:
@@ -54,22 +56,30 @@ def view(file: LinkFile) -> PointingView:
     """The pointing budget of a mission; raises ValueError as `pointing.open_loop_budget` does."""
     m, data = file.mission, link.of(file.mission)
     p = pointing.open_loop_budget(m.pointing, data.shared, m.beacon, file.sources)
-    return PointingView(p, link_study.point_ahead(data))
+    return PointingView(p, link_study.point_ahead(data), file)
 
 
 def sliders(draft: Draft) -> dict[str, tuple[Slider, ...]]:
-    """The numbers that move the budget: its lines, the beacon's cone, the confidence, the point-ahead."""
-    found = grouped(draft, ("Errors", *dict.fromkeys(_OTHERS.values())), _group)
-    return {name: tuple(map(_named, those)) if name == "Errors" else those for name, those in found.items()}
+    """The numbers that move the budgets: lines, the beacon's cone, the confidence, point-ahead, sources and limits."""
+    groups = ("Errors", *dict.fromkeys(_OTHERS.values()), *_OF_BUDGET)
+    found, named = grouped(draft, groups, _group), ("Errors", *_OF_BUDGET)
+    return {name: tuple(map(_named, those)) if name in named else those for name, those in found.items()}
+
+
+_OF_BUDGET = {"Sources": (_SOURCES, (".size", ".rate")), "Limits": (_REQUIRED, (".limit",))}
 
 
 def _group(key: str) -> str:
-    return "Errors" if key.startswith(_LINES) and key.endswith(".error") else _OTHERS.get(key, "")
+    if key.startswith(_LINES) and key.endswith(".error"):
+        return "Errors"
+    own = (name for name, (begin, ends) in _OF_BUDGET.items() if key.startswith(begin) and key.endswith(ends))
+    return next(own, _OTHERS.get(key, ""))
 
 
 def _named(made: Slider) -> Slider:
-    """The slider of a line, called by the line."""
-    name = made.key.removeprefix(_LINES).removesuffix(".error").replace("_", " ").replace("-", " ")
+    """The slider of a line, a source or a requirement, called by it."""
+    begin = next(each for each in (_LINES, _SOURCES, _REQUIRED) if made.key.startswith(each))
+    name = made.key.removeprefix(begin).rpartition(".")[0].replace("_", " ").replace("-", " ")
     return replace(made, label=name[:1].upper() + name[1:])
 
 

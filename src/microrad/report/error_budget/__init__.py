@@ -1,0 +1,1 @@
+"""The budget of pointing errors: its tables, figures and plain data."""

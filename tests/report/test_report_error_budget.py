@@ -1,0 +1,175 @@
+"""The budget of pointing errors as tables, figures, arrays and plain data: the same numbers in each."""
+
+import io
+import math
+
+import numpy as np
+import pytest
+import xarray
+
+from budget_files import kept_study, looped_study
+from microrad import report
+from microrad.link.error_budget import ErrorSource, Requirement, Spread, assembly
+from microrad.loop.disturbance.windows import ErrorIndex
+from microrad.report.error_budget import figures
+from microrad.report.error_budget.data import budget_data
+from microrad.report.error_budget.page import budget_view
+from microrad.report.plotting.sheet import Bars, Line, Rule
+from microrad.report.quantities import micro, percent
+from microrad.report.results import tolerances
+from microrad.report.results.arrays import study_netcdf
+from microrad.report.results.comparison import is_number, leaves
+from microrad.report.study.data import summary
+from microrad.report.study.page import StudyFigures, study_page, study_views
+from microrad.report.tables import Table
+from microrad.report.view import Points, View, views_text
+from report_pages import assert_sound
+
+
+def tables(view):
+    return [block for block in view.blocks if isinstance(block, Table)]
+
+
+@pytest.fixture(scope="module")
+def looped():
+    return looped_study()
+
+
+def test_contributions_add_up_to_the_total_by_the_distribution(looped):
+    for each in looped.error_budget.judged:
+        parts = math.fsum(share.part_rad for share in each.shares)
+        assert parts == pytest.approx(each.total.quantile_rad, rel=1e-3)
+
+
+def test_the_page_has_every_source_with_its_class_statistic_origin_and_contribution(looped):
+    (view,) = (each for each in study_views(looped, StudyFigures()) if each.title == "Pointing error budget")
+    requirements, sources = tables(view)
+    judged = {each.name: each for each in looped.error_budget.judged}
+    word = judged["code_word"]
+    row = next(row for row in requirements.rows if row[0] == "code word")
+    assert [str(cell) for cell in row[2:]] == [
+        f"{micro(word.total.by_rules_rad)} {'PASS' if word.total.by_rules_rad <= 4e-6 else 'FAIL'}",
+        f"{micro(word.total.quantile_rad)} {'PASS' if word.total.holds else 'FAIL'}",
+        "4.00",
+    ]
+    share = next(share for share in judged["drift"].shares if share.name == "thermo_elastic")
+    row = next(row for row in sources.rows if row[0] == "thermo elastic")
+    assert row[1:3] == ("periodic", "fixed")
+    assert row[5:7] == (micro(share.part_rad), percent(share.growth))
+    origins = {row[0]: row[-1] for row in sources.rows}
+    assert origins["alignment"] == "assumption: calibrated on the ground"
+    assert origins["vibration (OLYMPUS)"].endswith(f"under {looped.fine_pointing.best.design.name}")
+    (remarks,) = (block for block in view.blocks if isinstance(block, Points))
+    assert any("simulated with hysteresis" in line for line in remarks.lines)
+    inner = [block for block in view.blocks if isinstance(block, View)]
+    assert [each.title for each in inner] == ["code word: each source", "drift: each source"]
+
+
+def test_a_terminal_of_80_columns_has_all_of_it(looped):
+    text = views_text(budget_view(looped.error_budget).blocks, 80)
+    assert max(map(len, text.splitlines())) <= 80
+    for words in ("Contributions, µrad", "code word: each source", "nothing is left", "By the rules"):
+        assert words in text
+
+
+def test_figures_have_the_numbers_of_the_budget(looped):
+    judged = looped.error_budget.judged
+    bars, curves, spectra = figures.budget_figures(looped.error_budget)
+    for each, panel in zip(judged, bars.sheet.panels, strict=True):
+        drawn = math.fsum(float(np.sum(mark.end)) for mark in panel.all_of(Bars))
+        assert drawn == pytest.approx(1e6 * each.total.quantile_rad, rel=1e-3)
+        assert panel.x.title.endswith("(µrad)")
+    for each, panel in zip(judged, curves.sheet.panels, strict=True):
+        limit, rules, allowed = (mark.at for mark in panel.all_of(Rule))
+        required = each.total.required
+        assert (limit, rules) == (1e6 * required.limit_rad, 1e6 * each.total.by_rules_rad)
+        curve, dot = panel.all_of(Line)
+        at = np.interp(float(dot.x[0]), curve.x, np.log(curve.y))
+        assert at == pytest.approx(math.log(allowed), rel=0.02)
+        assert allowed == pytest.approx(100.0 * (1.0 - required.confidence))
+    above, below = spectra.sheet.panels
+    left = above.all_of(Line)[-1]
+    assert left.label == f"left by the loop under {looped.fine_pointing.best.design.name}"
+    held = np.isfinite(left.y)
+    power = float(np.sum(np.diff(left.x[held]) * 0.5 * (left.y[held][1:] + left.y[held][:-1])))
+    theory = float(np.sum(looped.fine_pointing.best.theory.error))
+    assert power == pytest.approx(1e12 * theory, rel=0.05)  # of the control samples, and theory is of all plant steps
+    assert [line.label for line in below.all_of(Line)] == ["weight of RPE 10 ms: code word"]
+    assert len(above.all_of(Rule)) == 1  # of the periodic source
+
+
+def test_a_weight_is_that_of_the_index_where_it_does_not_ripple():
+    freq = np.geomspace(1e-3, 1e3, 400)
+    for kind in ("MPE", "RPE"):
+        index = ErrorIndex(kind, 1.0)
+        found, exact = figures.mean_weight(index, freq), index.weight(freq)
+        slow = freq < 0.3
+        assert np.allclose(found[slow], exact[slow], atol=2e-3)
+    apart = figures.mean_weight(ErrorIndex("PDE", 1e-3, 600.0), freq)
+    assert np.mean(apart[(freq > 1.0) & (freq < 30.0)]) == pytest.approx(2.0, rel=0.02)  # twice that of a mean
+
+
+def test_stacked_requirements_stand_below_each_other(looped):
+    for figure in figures.budget_figures(looped.error_budget, stacked=True):
+        assert {panel.column for panel in figure.sheet.panels} == {0}
+
+
+def test_many_sources_are_drawn_up_to_a_number_and_the_others_together():
+    sources = [ErrorSource(f"noise {n}", "random", Spread("fixed", n * 1e-7), np.ones(1)) for n in range(1, 21)]
+    required = Requirement(ErrorIndex("APE"), axes=(0,), limit_rad=1e-5)
+    (each,) = assembly.judge(assembly.stated(sources, {"all": required}), None).judged
+    (panel,) = figures.contributions([each]).sheet.panels
+    assert len(panel.y.words) == 16
+    assert panel.y.words[15.0] == "5 others"
+    assert panel.y.words[0.0] == "noise 20"
+    drawn = math.fsum(float(np.sum(mark.end)) for mark in panel.all_of(Bars))
+    assert drawn == pytest.approx(1e6 * each.total.quantile_rad, rel=1e-3)
+
+
+def test_results_and_summary_hold_what_the_page_shows(looped):
+    tree = xarray.open_datatree(io.BytesIO(study_netcdf(looped)), engine="h5netcdf")
+    required, sources = tree["error_budget/requirements"], tree["error_budget/sources"]
+    data = {each["requirement"]: each for each in summary(looped)["error_budget"]}
+    assert [*data] == list(required["requirement"].values)
+    for name, each in data.items():
+        row = required.sel(requirement=name)
+        assert float(row["by_distribution"]) == each["by_distribution_rad"]
+        own = sources["contribution"].values[sources["requirement"].values == name]
+        assert own.tolist() == [source["contribution_rad"] for source in each["sources"]]
+        assert np.interp(each["by_distribution_rad"], row["error"], row["beyond"]) == pytest.approx(
+            1.0 - each["confidence"], rel=0.05
+        )
+    assert tree["error_budget/spectra"]["density"].attrs["units"] == "rad^2/Hz"
+
+
+def test_every_number_of_the_budget_has_a_stated_tolerance(looped):
+    data = {"error_budget": budget_data(looped.error_budget)}
+    places = [place for place, _, was, _ in leaves(data, data, "") if is_number(was) and not isinstance(was, bool)]
+    assert len(places) > 90
+    assert [place for place in places if tolerances.stated(place) is None] == []
+    names = [figure.name for figure in figures.budget_figures(looped.error_budget)]
+    assert [name for name in names if tolerances.stated_for_figure(name) is None] == []
+
+
+def test_the_page_of_a_study_with_a_budget_is_sound():
+    found = kept_study()
+    drawn = report.study_figures(found)
+    assert [figure.name for figure in drawn.errors] == ["pointing-errors-contributions", "pointing-errors-distribution"]
+    manifest = {key: {} for key in ("inputs_sha256", "machine", "files_sha256")}
+    manifest |= {"mission": {"file": "m.toml", "sha256": ""}, "mirror": None, "randomness": ""}
+    page = study_page(found, drawn, manifest)
+    assert_sound(page)
+    assert page.count('id="pointing-error-budget"') == 1
+    assert page.count('id="figure-pointing-errors-') == 2
+
+
+def test_a_list_without_limits_has_no_marks_and_says_nothing_of_what_may_be(tmp_path):
+    asked = assembly.stated(
+        assembly.sources_of(kept_study().file.mission.error_budget, {}),
+        {"APE": Requirement(ErrorIndex("APE"))},
+    )
+    view = budget_view(assembly.judge(asked, None))
+    requirements, _ = tables(view)
+    assert [str(cell) for cell in requirements.rows[0][2:]][2] == ""
+    (inner,) = (block for block in view.blocks if isinstance(block, View))
+    assert "may be" not in inner.blocks[1].headings
