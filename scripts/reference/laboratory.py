@@ -1,0 +1,203 @@
+"""The laboratory, word for word: recordings unlike each other, what is refused of them and what is fitted to them.
+
+The recordings are made here, from seeds: a mirror with play operators, a resonance and noise, which no model fits
+exactly. They are printed to six digits, so that no processor's sine moves them.
+"""
+
+import json
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from reference import told
+from reference.cases import Case, Place
+
+Floats = NDArray[np.float64]
+
+LIBRARY = Path(__file__).with_name("library.py")
+"""The program that calls public functions in a case's folder."""
+
+RATE = 1730.0
+"""Samples per second where a recording has no rate of its own."""
+
+
+# ---------------------------------------------------------------------------------------------------------- recordings
+def times(samples: int, rate: float = RATE) -> Floats:
+    """Times of samples, in s."""
+    return np.arange(samples) / rate
+
+
+def sines(t: Floats, middle: float = 4.3, amplitude: float = 2.9, frequency: float = 7.3) -> Floats:
+    """A drive of two sines, whose amplitude grows over the first half, in V."""
+    growth = np.minimum(0.4 + 1.2 * t / t[-1], 1.0)
+    return middle + growth * amplitude * np.sin(2 * np.pi * frequency * t) + 0.4 * np.sin(2 * np.pi * 1.9 * t + 0.3)
+
+
+def chirp(t: Floats, first: float = 1.7, last: float = 480.0, middle: float = 4.1, amplitude: float = 0.41) -> Floats:
+    """A drive whose frequency grows exponentially, in V."""
+    growth = np.log(last / first) / t[-1]
+    return middle + amplitude * np.sin(2 * np.pi * first * np.expm1(growth * t) / growth)
+
+
+def noise(samples: int, seed: int, size: float = 1.0) -> Floats:
+    """Normal random numbers."""
+    return size * np.random.Generator(np.random.PCG64(seed)).standard_normal(samples)
+
+
+def plays(drive: Floats, gains: Mapping[float, float]) -> Floats:
+    """The sum of play operators from rest at 0, their gains by their thresholds."""
+    thresholds, weights = np.array(list(gains)), np.array(list(gains.values()))
+    state, found = np.zeros(thresholds.size), np.empty(drive.size)
+    for i, u in enumerate(drive):
+        state = np.clip(state, u - thresholds, u + thresholds)
+        found[i] = state @ weights
+    return found
+
+
+def resonance(values: Floats, frequency: float = 211.0, damping: float = 0.08, rate: float = RATE) -> Floats:
+    """A second-order low-pass of gain 1, by its poles in the z plane, with the delay of a sample."""
+    pole = np.exp(2 * np.pi * frequency / rate * complex(-damping, np.sqrt(1 - damping**2)))
+    denominator = [1.0, -2 * pole.real, abs(pole) ** 2]
+    return lfilter([0.0, sum(denominator)], denominator, values)
+
+
+GAINS = {0.0: 0.061, 0.31: 0.009, 1.17: 0.011, 2.6: 0.007}
+"""Of the mirror in mrad/V, by the thresholds of its plays in V."""
+
+
+def mirror(drive: Floats, seed: int, rate: float = RATE, rest: float = 4.2, scatter: float = 2e-4) -> Floats:
+    """The angle of a mirror in mrad, about an offset, with noise."""
+    angle = resonance(plays(drive - rest, GAINS), rate=rate)
+    return 0.131 + angle + noise(drive.size, seed, scatter)
+
+
+def table(columns: Mapping[str, Floats], separator: str = ",", digits: int = 6) -> str:
+    """Columns as text, under their names."""
+    rows = zip(*(values.tolist() for values in columns.values()), strict=True)
+    lines = [separator.join(columns), *(separator.join(f"{each:.{digits}g}" for each in row) for row in rows)]
+    return "\n".join(lines) + "\n"
+
+
+# -------------------------------------------------------------------------------------------------------------- checks
+def quantised(values: Floats, step: float) -> Floats:
+    """As a converter of this step gives it."""
+    return np.round(values / step) * step
+
+
+def doubtful() -> dict[str, tuple[dict[str, Floats], dict[str, Any]]]:
+    """Recordings with something to be found in each, and what is said to read them."""
+    t = times(2350)
+    u = sines(t)
+    y = mirror(u, 11)
+    quiet = mirror(u, 12, scatter=0.0)
+    smooth = 0.13 + 0.07 * resonance(u - 4.3) + noise(t.size, 23, 1e-4)
+    broad = chirp(times(3100))
+    follows = mirror(broad, 13, scatter=1e-5)
+    clock = t + 0.37
+    dice = noise(t.size, 14)
+    fast = 3.7 + 0.31 * noise(t.size, 19)
+    one = {"inputs": "u", "outputs": "y", "rate_hz": RATE}
+    timed = {"inputs": "u", "outputs": "y"}
+    pairs: dict[str, tuple[Floats, Floats]] = {
+        "fine": (u, y),
+        "drive-of-few-levels": (quantised(u, 0.021), y),
+        "levels-refused": (u, quantised(quiet, 0.0147)),
+        "levels-noted": (u, quantised(quiet, 0.0029)),
+        "levels-dithered": (u, quantised(quiet + 0.013 * dice, 0.0147)),
+        "levels-of-a-stepping-drive": (quantised(u, 0.97), quantised(0.08 * quantised(u, 0.97), 0.0147)),
+        "drift-noted": (u, smooth + 0.017 * t),
+        "drift-falls": (u, smooth - 0.011 * t),
+        "drift-refused": (u, y - 0.9 * t),
+        "drift-of-a-step": (
+            np.where(t < 0.1, 1.3, 4.9),
+            0.07 * np.where(t < 0.1, 1.3, 6.1 - 1.9 * np.exp(0.1 - t)) + 1e-4 * dice,
+        ),
+        "clipped-high": (u, np.minimum(quiet, 0.29)),
+        "clipped-low": (u, np.maximum(quiet, -0.03)),
+        "clipped-drive": (np.clip(u, 2.1, 6.3), mirror(np.clip(u, 2.1, 6.3), 15)),
+        "clipped-pile": (fast, np.clip(0.07 * fast, 0.231, 0.2805)),
+        "resting-at-its-limit": (
+            np.clip(2.9 * u - 8.0, 1.1, 7.7),
+            mirror(np.clip(2.9 * u - 8.0, 1.1, 7.7), 16, scatter=0.0),
+        ),
+        "dead": (broad, noise(broad.size, 17, 0.01)),
+        "swapped": (follows, broad),
+        "leads": (broad[:-3], 0.07 * broad[3:]),
+        "leads-upside-down": (broad[:-2], -0.07 * broad[2:]),
+        "leads-narrow": (u[:-4], 0.07 * u[4:]),
+        "behind-a-high-pass": (broad, lfilter([1.0, -1.0], [1.0, -0.9985], 0.07 * broad) + noise(broad.size, 18, 1e-5)),
+        "flicker": (4.7 + 1e-5 * dice, y),
+        "short": (u[:187], y[:187]),
+        "drive-constant": (np.full(t.size, 4.7), y),
+        "output-constant": (u, np.full(t.size, -0.21)),
+        "nan": (u, np.where(np.arange(t.size) == 1234, np.nan, y)),
+        "infinite": (np.where(np.arange(t.size) == 777, -np.inf, u), y),
+        "huge": (u, np.where(np.arange(t.size) == 321, -3.1e31, y)),
+        "tiny": (1e-33 * u, y),
+    }
+    found = {name: ({"u": drive, "y": output}, one) for name, (drive, output) in pairs.items()}
+    for name, time in {
+        "time": clock,
+        "time-jitters": clock + 0.03 / RATE * dice,
+        "time-scatters": clock + 0.11 / RATE * np.clip(dice, -2, 2),
+        "time-has-a-gap": clock + np.where(t > 0.83, 2.9 / RATE, 0.0) + np.where(t > 1.1, 5.0 / RATE, 0.0),
+        "time-stops": np.where(np.arange(t.size) == 431, clock[430], clock),
+        "time-runs-back": np.where(t > 0.9, clock - 0.41, clock),
+        "time-is-coarse": quantised(clock, 0.001),
+        "time-is-coarser": quantised(clock, 0.0001),
+        "time-is-nan": np.where(np.arange(t.size) == 99, np.nan, clock),
+    }.items():
+        found[name] = ({"t": time, "u": u, "y": y}, timed)
+    found["two-rates"] = ({"t": 0.37 + 1.017 * t, "u": u, "y": y}, one)
+    found["no-rate"] = ({"u": u, "y": y}, timed)
+    v = 2.2 + 1.1 * np.sin(2 * np.pi * 11.9 * t + 0.7)
+    both = {"inputs": ["u", "v"], "outputs": ["y", "z"], "rate_hz": RATE}
+    y2, z2 = y + 0.02 * v, 0.3 - 0.04 * v + 0.003 * u + 1e-4 * noise(t.size, 20)
+    found |= {
+        "two": ({"u": u, "v": v, "y": y2, "z": z2}, both),
+        "two-of-one": ({"u": u, "v": 0.7 - 0.31 * u, "y": y2, "z": z2}, both),
+        "two-one-rests": ({"u": u, "v": 2.2 + 0 * v, "y": y, "z": z2}, both),
+        "two-one-is-faint": ({"u": u, "v": 2.2 + 1e-3 * v, "y": y, "z": z2}, both),
+        "two-one-rests-together": (
+            {"u": u, "v": 2.2 + 1e-3 * v, "y": y, "z": noise(t.size, 21, 0.1)},
+            both | {"alone": False},
+        ),
+        "two-one-is-dead": ({"u": u, "v": v, "y": y, "z": noise(t.size, 22, 0.1)}, both),
+        "two-part": ({"u": u, "v": v, "y": y2 + 0.03 * t, "z": z2}, both | {"part_s": (0.213, 1.109)}),
+        "two-period": ({"u": u, "v": v, "y": y2, "z": z2}, both | {"period_samples": 237}),
+        "two-no-part": ({"u": u, "v": v, "y": y2, "z": z2}, both | {"part_s": (0.9, 1.7)}),
+        "two-no-period": ({"u": u, "v": v, "y": y2, "z": z2}, both | {"period_samples": 4711}),
+        "two-twice": ({"u": u, "v": v, "y": y2, "z": z2}, both | {"inputs": ["v", 1]}),
+        "two-no-name": ({"u": u, "v": v, "y": y2, "z": z2}, both | {"outputs": ["y", "zed"]}),
+        "two-same": ({"u": u, "v": v, "y": y2, "z": z2}, both | {"outputs": ["y", "v"]}),
+    }
+    return found
+
+
+def checks(place: Place) -> list[str]:
+    """What each check finds, refused and taken on."""
+    said = {}
+    for name, (columns, options) in doubtful().items():
+        said[place.write(f"{name}.csv", table(columns, digits=9 if "t" in columns or name == "flicker" else 6))] = (
+            options
+        )
+    place.write("recordings.json", json.dumps(said))
+    found = library(place, "findings")
+    for name, *options in (("clipped-high",), ("drift-refused", "--accept", "clipping"), ("dead", "--accept", "drift")):
+        channels = ("--input", "u", "--output", "y", "--rate", "1730")
+        found += place.told("identify", f"{name}.csv", *channels, "--static", *options)
+    return found
+
+
+def library(place: Place, word: str) -> list[str]:
+    """What public functions return on the files of the case, as lines."""
+    return told.plain(f"== {word}\n{place.program(sys.executable, LIBRARY, word)}")
+
+
+CASES: Mapping[str, Case] = {"lab-checks": Case(checks)}
+"""All of them; a file reference/told/NAME.txt each."""
