@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from reference import told
-from reference.cases import Case, Place
+from reference.cases import Case, Place, changed
 
 Floats = NDArray[np.float64]
 
@@ -96,7 +96,7 @@ def doubtful() -> dict[str, tuple[dict[str, Floats], dict[str, Any]]]:
     y = mirror(u, 11)
     quiet = mirror(u, 12, scatter=0.0)
     smooth = 0.13 + 0.07 * resonance(u - 4.3) + noise(t.size, 23, 1e-4)
-    broad = chirp(times(3100))
+    broad, odd = chirp(times(3100)), lines(0, 7)[:, 0]
     follows = mirror(broad, 13, scatter=1e-5)
     clock = t + 0.37
     dice = noise(t.size, 14)
@@ -130,7 +130,7 @@ def doubtful() -> dict[str, tuple[dict[str, Floats], dict[str, Any]]]:
         "leads": (broad[:-3], 0.07 * broad[3:]),
         "leads-upside-down": (broad[:-2], -0.07 * broad[2:]),
         "leads-narrow": (u[:-4], 0.07 * u[4:]),
-        "behind-a-high-pass": (broad, lfilter([1.0, -1.0], [1.0, -0.9985], 0.07 * broad) + noise(broad.size, 18, 1e-5)),
+        "behind-a-high-pass": (odd, lfilter([1.0, -1.0], [1.0, -0.9985], 0.07 * odd) + noise(odd.size, 18, 1e-5)),
         "flicker": (4.7 + 1e-5 * dice, y),
         "short": (u[:187], y[:187]),
         "drive-constant": (np.full(t.size, 4.7), y),
@@ -194,10 +194,221 @@ def checks(place: Place) -> list[str]:
     return found
 
 
+# ------------------------------------------------------------------------------------------------------------- mirrors
+MIRROR = """
+name = "Generic"
+travel = "1.7 mrad"
+composition = "COMPOSITION"
+rate_limit = "730 V/s"
+bias = "4.2 V"
+drive_min = "-1.3 V"
+drive_max = "9.1 V"
+
+[linear]
+poles = ["310 Hz", "1.9 kHz", "87 Hz"]
+pole_dampings = [0.07, 0.6, 1.0]
+zeros = ["430 Hz", "140 Hz"]
+zero_dampings = [0.09, -1.0]
+normalise_at = "3.1 Hz"
+excited_from = "1.3 Hz"
+excited_to = "640 Hz"
+
+[creep]
+time_constants = ["0.07 s", "0.9 s"]
+weights = ["1.3 urad/V", "-0.6 urad/V"]
+"""
+"""A mirror file of version 1, but for its hysteresis."""
+
+COEFFICIENTS = """
+numerator = [1.3, 41.0, 4.7e6]
+denominator = [1.0, 930.0, 1.3e6, 5.1e8, 1.1e11]
+normalise_at = "2.3 Hz"
+excited_from = "1.7 Hz"
+excited_to = "410 Hz"
+"""
+PLAYS = """
+[prandtl_ishlinskii]
+thresholds = ["0 V", "0.7 V", "2.9 V"]
+weights = ["57 urad/V", "8.3 urad/V", "6.1 urad/V"]
+widening = "31 us"
+"""
+BOUC_WEN = """
+[bouc_wen]
+d1 = "0.071 mrad/V"
+d2 = "-2.3e-6 s/V"
+epsilon = "-14 urad/V"
+delta = "0.00031 s/V"
+alpha = "1.9 1/V"
+beta = "0.4 1/V"
+gamma = "-0.13 1/V"
+eta = "0.17 1/V"
+exponent = 1.3
+"""
+KNOWN = """
+[uncertainty]
+parameters = ["bouc_wen.d1", "bouc_wen.epsilon", "bouc_wen.alpha", "linear.poles.1", "linear.zeros"]
+standard_errors = [0.011, 0.07, 0.13, 0.004, 0.03]
+correlation = [0.3, -0.2, 0.6, 0.1, 0.0, -0.4, 0.2, -0.1, 0.05, 0.3]
+"""
+SEVERAL = """
+version = 2
+name = "Three sensors on two actuators"
+
+[actuators.1]
+name = "tilt about x"
+bias = "41 V"
+drive_min = "-3 V"
+drive_max = "97 V"
+rate_limit = "17 kV/s"
+
+[actuators.2]
+name = "tilt about y"
+bias = "53 V"
+drive_min = "7 V"
+drive_max = "103 V"
+rate_limit = "23 kV/s"
+
+[outputs.1]
+name = "east"
+quantity = "displacement"
+position = ["31 mm", "2 mm"]
+
+[outputs.2]
+name = "north"
+quantity = "displacement"
+position = ["-13 mm", "27 mm"]
+
+[outputs.3]
+name = "south"
+quantity = "displacement"
+position = ["-17 mm", "-23 mm"]
+
+[recording]
+delay = "83 us"
+rate = "1.9 kHz"
+steps_per_sample = 3
+excited_from = "1.3 Hz"
+excited_to = "470 Hz"
+
+[modes]
+decay = ["19 1/s", "41 1/s", "730 1/s"]
+frequency = ["890 rad/s", "-1210 rad/s", "0 rad/s"]
+
+[matrices]
+B = [[0.0, 3.0], [-890.0, -21.0], [1.7, 0.0], [27.0, -1190.0], [310.0, -170.0]]
+C = [
+  [0.1e-6, 0.2e-6, -3.1e-6, 0.0, 0.9e-6],
+  [2.7e-6, 0.0, 1.3e-6, 0.3e-6, -0.4e-6],
+  [-2.3e-6, 0.1e-6, 1.9e-6, 0.0, 0.2e-6],
+]
+D = [[1.3e-9, 0.0], [0.0, -2.1e-9], [0.7e-9, 0.4e-9]]
+E = [[0.0, 0.0, 3.0], [-870.0, 0.0, 0.0], [0.0, 11.0, 0.0], [0.0, -930.0, 0.0], [0.0, 0.0, 270.0]]
+F = [[1.0, 0.0, 0.02, 0.0, 0.0], [0.0, 0.03, 0.9, 0.0, 0.0]FREE]
+GIVEN
+K = [[0.0, 0.0, 1.7e-8], [0.0, 0.0, -0.9e-8], [0.0, 0.0, 0.6e-8]]
+
+[hysteresis.1]
+model = "plays"
+thresholds = ["0.4 V", "1.9 V", "7 V"]
+weights = [0.031, 0.023, 0.017]
+polynomial = [0.03, -0.02, 0.05]
+reach = "11 V"
+
+[hysteresis.2]
+model = "plays"
+thresholds = ["0.7 V", "2.3 V"]
+weights = [0.029, 0.013]
+
+[hysteresis.3]
+model = "bouc-wen"
+d1 = 0.07
+epsilon = -0.013
+alpha = "0.4 1/V"
+beta = "0.1 1/V"
+gamma = "0.03 1/V"
+eta = "-0.02 1/V"
+exponent = 1.2
+
+[uncertainty]
+parameters = ["modes.decay.1", "modes.frequency.2", "matrices.B.4.1", "hysteresis.1.weights.2", "recording.delay"]
+standard_errors = [0.7, 1.3, 1.9, 0.003, 3.0e-6]
+correlation = [0.1, -0.2, 0.6, 0.0, 0.3, 0.1, 0.2, -0.1, 0.0, 0.4]
+"""
+"""A mirror file of version 2: hysteresis of the stiffness, and beside the modes one of the drives."""
+
+
+def mirrors(place: Place) -> list[str]:
+    """Models of hysteresis and mirrors by the public functions, mirror files of both versions among them."""
+    by_roots, dynamics = MIRROR, MIRROR[MIRROR.index("[linear]") : MIRROR.index("[creep]")]
+    by_coefficients = changed(by_roots, (dynamics, f"[linear]{COEFFICIENTS}\n"))
+    free = {"FREE": ", [0.0, 0.0, 0.0, 0.0, 0.0]", "GIVEN": "G = [[0.0, 0.0], [0.0, 0.0], [0.6, -0.3]]"}
+    several = changed(SEVERAL, *free.items())
+    files = {
+        "cascade": changed(by_roots, ("COMPOSITION", "cascade")) + BOUC_WEN + KNOWN,
+        "additive": changed(by_coefficients, ("COMPOSITION", "additive")) + PLAYS,
+        "static": changed(by_roots, ("COMPOSITION", "static"), (dynamics, "")) + BOUC_WEN,
+        "compared": changed(by_roots, ("COMPOSITION", "cascade")) + PLAYS + BOUC_WEN.replace("[", "[comparison."),
+        "several": several,
+        "wrong": changed(by_roots, ("COMPOSITION", "static"), ('"9.1 V"', '"-2 V"')) + PLAYS + BOUC_WEN,
+        "several-wrong": changed(several, ("[310.0, -170.0]", "[310.0]"), ("decay = [", 'decay = ["-1 1/s", ')),
+    }
+    for name, text in files.items():
+        place.write(f"{name}-mirror.toml", text)
+    return [*library(place, "hysteresis"), *library(place, "mirrors")]
+
+
+# --------------------------------------------------------------------------------------------------- linear responses
+def turned(drives: Floats, rate: float = RATE) -> dict[str, Floats]:
+    """Two drives and what three sensors read of them, each with modes, signs and an offset of its own."""
+    u, v = drives.T
+    slow = resonance(u - 4.2, 137.0, 0.06, rate), resonance(v + 1.3, 223.0, 0.11, rate)
+    fast = resonance(0.7 * u - 0.4 * v, 391.0, 0.09, rate)
+    found = {"x": 61.0 * slow[0] - 3.0 * slow[1] + 2.0 * fast, "y": -5.0 * slow[0] + 47.0 * slow[1] - 4.0 * fast}
+    found["z"] = 23.0 * slow[0] + 31.0 * slow[1] + 9.0 * fast
+    offset = {"x": 3.1, "y": -7.7, "z": 1.9}
+    scatter = {"x": 0.11, "y": 0.07, "z": 0.19}
+    read = {
+        key: values + offset[key] + noise(u.size, 41 + i, scatter[key]) for i, (key, values) in enumerate(found.items())
+    }
+    return {"u": u, "v": v, **read}
+
+
+def lines(realisation: int, periods: int = 3, length: int = 360, amplitude: float = 0.31) -> Floats:
+    """Two drives of odd harmonics with random phases, orthogonal in each pair of realisations, whole periods (V)."""
+    dice = np.random.Generator(np.random.PCG64(61 + realisation // 2))
+    harmonics = np.arange(3, 110, 2)
+    phases = dice.uniform(0, 2 * np.pi, (2, harmonics.size))
+    turn = np.array([0.0, np.pi * (realisation % 2)])
+    angles = 2 * np.pi * np.outer(np.arange(length), harmonics) / length
+    one = np.stack([np.sin(angles + phases[i] + turn[i]).sum(axis=1) for i in range(2)], axis=1)
+    return np.tile(np.array([4.2, -1.3]) + amplitude * np.array([0.41, 0.29]) * one, (periods, 1))
+
+
+def responses(place: Place) -> list[str]:
+    """Frequency responses, measured and fitted, by the public functions."""
+    for realisation in range(4):
+        place.write(f"lines-{realisation}.csv", table(turned(lines(realisation))))
+    t = times(2300)
+    for i, (first, second) in enumerate(((0.53, 0.07), (-0.11, 0.47))):
+        drives = np.stack([chirp(t, middle=4.2, amplitude=first), chirp(t, 2.3, 410.0, -1.3, second)], axis=1)
+        place.write(f"chirp-{i}.csv", table(turned(drives)))
+    return [*library(place, "frequency_responses"), *library(place, "measured")]
+
+
+def fitted(place: Place) -> list[str]:
+    """Each form of hysteresis fitted by the public function."""
+    return library(place, "fitted")
+
+
 def library(place: Place, word: str) -> list[str]:
     """What public functions return on the files of the case, as lines."""
     return told.plain(f"== {word}\n{place.program(sys.executable, LIBRARY, word)}")
 
 
-CASES: Mapping[str, Case] = {"lab-checks": Case(checks)}
+CASES: Mapping[str, Case] = {
+    "lab-checks": Case(checks),
+    "lab-mirrors": Case(mirrors),
+    "lab-responses": Case(responses),
+    "lab-fitted": Case(fitted),
+}
 """All of them; a file reference/told/NAME.txt each."""
