@@ -130,7 +130,10 @@ def doubtful() -> dict[str, tuple[dict[str, Floats], dict[str, Any]]]:
         "leads": (broad[:-3], 0.07 * broad[3:]),
         "leads-upside-down": (broad[:-2], -0.07 * broad[2:]),
         "leads-narrow": (u[:-4], 0.07 * u[4:]),
-        "behind-a-high-pass": (odd, lfilter([1.0, -1.0], [1.0, -0.9985], 0.07 * odd) + noise(odd.size, 18, 1e-5)),
+        "behind-a-high-pass": (
+            odd,
+            lfilter([1.0, -1.0], [1.0, -0.99], 0.07 * (odd - odd.mean())) + noise(odd.size, 18, 1e-5),
+        ),
         "flicker": (4.7 + 1e-5 * dice, y),
         "short": (u[:187], y[:187]),
         "drive-constant": (np.full(t.size, 4.7), y),
@@ -376,7 +379,7 @@ def turned(drives: Floats, rate: float = RATE) -> dict[str, Floats]:
 def lines(realisation: int, periods: int = 3, length: int = 360, amplitude: float = 0.31) -> Floats:
     """Two drives of odd harmonics with random phases, orthogonal in each pair of realisations, whole periods (V)."""
     dice = np.random.Generator(np.random.PCG64(61 + realisation // 2))
-    harmonics = np.arange(3, 110, 2)
+    harmonics = np.arange(3, 0.3 * length, 2)
     phases = dice.uniform(0, 2 * np.pi, (2, harmonics.size))
     turn = np.array([0.0, np.pi * (realisation % 2)])
     angles = 2 * np.pi * np.outer(np.arange(length), harmonics) / length
@@ -384,10 +387,15 @@ def lines(realisation: int, periods: int = 3, length: int = 360, amplitude: floa
     return np.tile(np.array([4.2, -1.3]) + amplitude * np.array([0.41, 0.29]) * one, (periods, 1))
 
 
+def behind(columns: Mapping[str, Floats], first: int) -> dict[str, Floats]:
+    """A recording without its first samples, which begins when the mirror has settled."""
+    return {key: values[first:] for key, values in columns.items()}
+
+
 def responses(place: Place) -> list[str]:
     """Frequency responses, measured and fitted, by the public functions."""
     for realisation in range(4):
-        place.write(f"lines-{realisation}.csv", table(turned(lines(realisation))))
+        place.write(f"lines-{realisation}.csv", table(behind(turned(lines(realisation, 4)), 360)))
     t = times(2300)
     for i, (first, second) in enumerate(((0.53, 0.07), (-0.11, 0.47))):
         drives = np.stack([chirp(t, middle=4.2, amplitude=first), chirp(t, 2.3, 410.0, -1.3, second)], axis=1)
@@ -400,6 +408,124 @@ def fitted(place: Place) -> list[str]:
     return library(place, "fitted")
 
 
+# ------------------------------------------------------------------------------------------------------ identification
+def identified(place: Place, *words: str, as_json: bool = False, digits: int = 3) -> list[str]:
+    """What `microrad identify` says and writes: its page and the mirror file.
+
+    Args:
+        place: The folder.
+        words: Of the command.
+        as_json: Whether its JSON document is asked for, which is kept number by number.
+        digits: Of a number of the document and of the mirror file.
+    """
+    command = ("identify", *words, "--mirror-file", "found.toml", "--overwrite")
+    if as_json:
+        said = [f"$ microrad {' '.join(command)} --json", *told.numbers(place.json(*command), digits)]
+    else:
+        said = place.told(*command)
+    for name, lines in (("found.html", told.page), ("found.toml", lambda path: written(path, digits))):
+        if (path := place.folder / name).exists():
+            said += [f"== {name}", *lines(path)]
+            path.unlink()
+    return said
+
+
+def written(path: Path, digits: int = told.DIGITS) -> list[str]:
+    """A mirror file, its numbers shortened."""
+    return told.shortened(path.read_text(encoding="utf-8"), digits)
+
+
+def static(place: Place) -> list[str]:
+    """The hysteresis alone, from loops with units, signs, parts and faults of all kinds."""
+    t = times(760)
+    u = sines(t, 4.3, 2.9, 9.7)
+    y = mirror(u, 3)
+    place.write("loops.csv", table({"drive": u, "angle": y}))
+    place.write("other.csv", table({"drive": sines(t, 4.9, 2.3, 13.7), "angle": mirror(sines(t, 4.9, 2.3, 13.7), 4)}))
+    place.write("millivolts.csv", table({"drive [mV]": 1e3 * u, "angle [urad]": 71.0 - 1e3 * y}))
+    place.write(
+        "lever.csv", table({"t": t + 0.3, "drive": u + 0.05 * noise(t.size, 71), "tip": 37.0 * y + 1.9 * t}, digits=9)
+    )
+    one = 3.9 + 2.1 * np.sin(2 * np.pi * 17.3 * t)
+    lags = lfilter([0.0, 0.004], [1.0, -0.996], one - 4.2)
+    place.write("creeps.csv", table({"drive": one, "angle": mirror(one, 5) + 0.006 * lags}))
+    for name, drive in (("wrong-way", u), ("other-way", sines(t, 4.1, 2.4, 12.1))):
+        back = resonance(plays(drive - 4.2, {0.0: 0.031, 0.21: -0.043, 0.9: 0.051})) + noise(t.size, 72, 1e-4)
+        place.write(f"{name}.csv", table({"drive": drive, "angle": back}))
+    place.write("unrelated.csv", table({"drive": u, "angle": 0.3 * np.sin(2 * np.pi * 31.0 * t) + 0.01 * u}))
+    place.write("far.csv", table({"drive": u, "angle": 9000.0 * y}))
+    columns = ("--input", "0", "--output", "1", "--static")
+    timed = (*columns, "--rate", "1730")
+    found = identified(place, "loops.csv", *timed)
+    both = ("loops.csv", "other.csv", *timed, "--hold-out", "0.37", "--name", "Two recordings")
+    found += identified(place, *both, as_json=True)
+    found += identified(place, "millivolts.csv", *timed, "--model", "prandtl-ishlinskii")
+    lever = ("--input", "drive", "--output", "tip", "--static", "--output-unit", "um", "--lever-arm", "37 mm")
+    found += identified(place, "lever.csv", *lever, "--measured-drive", "--accept", "jitter")
+    found += identified(place, "creeps.csv", *timed, "--model", "bouc-wen-creep", "--period", "100")
+    found += identified(place, "wrong-way.csv", *timed, "--validate", "other-way.csv", "--admissible", "--seed", "3")
+    found += identified(place, "wrong-way.csv", *timed, "--hold-out", "0.21")
+    for words in (
+        ("unrelated.csv", *timed, "--accept", "dead"),
+        ("far.csv", *timed),
+        ("loops.csv", *timed, "--output-unit", "um"),
+        ("loops.csv", *timed, "--lever-arm", "31 mm"),
+        ("loops.csv", *timed, "--hold-out", "1.2"),
+        ("loops.csv", *timed, "--position", "3 mm,-1 mm"),
+        ("loops.csv", "loops.csv", *timed),
+        ("millivolts.csv", *timed, "--output-unit", "mrad"),
+        ("loops.csv", "millivolts.csv", *timed),
+        ("loops.csv", *columns, "--rate", "1730 V"),
+        ("loops.csv", "--output", "1", "--static"),
+        ("loops.csv", *timed, "--axes", "samples", "--time", "0"),
+        ("loops.csv", *timed, "--output-file", "other.csv"),
+        ("loops.csv", *timed, "--name", " "),
+        ("none.csv", *timed),
+        ("loops.csv", *timed, "--report", "found.toml"),
+    ):
+        found += identified(place, *words)
+    return found
+
+
+def whole(place: Place) -> list[str]:
+    """All models, from loops with a chirp, and with multisines whose distortion and noise are told apart."""
+    t = times(640)
+    u = sines(t, 4.3, 2.9, 9.7)
+    place.write("loops.csv", table({"u": u, "y": mirror(u, 3)}))
+    v = sines(t[:420], 4.9, 2.3, 13.7)
+    place.write("other.csv", table({"u": v, "y": mirror(v, 4)}))
+    w = chirp(times(900), 3.1)
+    place.write("chirp.csv", table({"u": w, "y": mirror(w, 5)}))
+    for i in range(2):
+        x = lines(i, 4, 240, 0.09)[:, 0]
+        place.write(f"lines-{i}.csv", table(behind({"u": x, "y": mirror(x, 6 + i)}, 240)))
+    columns = ("--input", "u", "--output", "y", "--rate", "1730 Hz")
+    found = identified(place, "loops.csv", "chirp.csv", *columns, "--validate", "other.csv")
+    periodic = (*columns, "--period", "240", "--model", "prandtl-ishlinskii-rate")
+    return found + identified(place, "loops.csv", "lines-0.csv", "lines-1.csv", *periodic, as_json=True)
+
+
+def axes(place: Place) -> list[str]:
+    """Mirrors of two drives and three sensors: linear, and with hysteresis of the drives."""
+    gains = {0.0: 1.0, 0.13: -0.21, 0.5: -0.17}
+    for i in range(4):
+        drives = lines(i, 4, 120)
+        place.write(f"line-{i}.csv", table(behind(turned(drives), 120)))
+        for size, amplitude in (("small", 0.23), ("large", 0.9)):
+            drives = lines(i, 4, 90, amplitude)
+            rest = np.array([4.2, -1.3])
+            bent = np.stack([plays(column, gains) for column in (drives - rest).T], axis=1) + rest
+            columns = turned(bent) | {"u": drives[:, 0], "v": drives[:, 1]}
+            place.write(f"{size}-{i}.csv", table(behind(columns, 90)))
+    channels = ("--input", "u", "--input", "v", "--output", "x", "--output", "y", "--output", "z", "--rate", "1730")
+    places = [word for at in ("11 mm,2 mm", "-7 mm,13 mm", "-5 mm,-9 mm") for word in ("--position", at)]
+    straight = [f"line-{i}.csv" for i in range(4)]
+    found = identified(place, *straight, *channels, *places, "--output-unit", "um", "--period", "120")
+    bent = [f"{size}-{i}.csv" for size in ("small", "large") for i in range(3)]
+    judged = ("--validate", "small-3.csv", "--validate", "large-3.csv")
+    return found + identified(place, *bent, *judged, *channels, "--output-unit", "urad", "--period", "90", as_json=True)
+
+
 def library(place: Place, word: str) -> list[str]:
     """What public functions return on the files of the case, as lines."""
     return told.plain(f"== {word}\n{place.program(sys.executable, LIBRARY, word)}")
@@ -410,5 +536,8 @@ CASES: Mapping[str, Case] = {
     "lab-mirrors": Case(mirrors),
     "lab-responses": Case(responses),
     "lab-fitted": Case(fitted),
+    "lab-static": Case(static),
+    "lab-whole": Case(whole),
+    "lab-axes": Case(axes),
 }
 """All of them; a file reference/told/NAME.txt each."""

@@ -13,12 +13,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from told import curve
+
+sys.path.insert(0, str(Path(__file__).parent.parent))
 
 import microrad
 from microrad import BoucWen, Creep, Mirror, PrandtlIshlinskii
 from microrad.mirror import coupled, spread
 from microrad.mission.file import load_coupled_mirror, load_mirror
+from reference.told import curve
 
 ACCEPTABLE = ("jitter", "clipping", "dead", "quantisation", "drift", "unexcited", "lead")
 

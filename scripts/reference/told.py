@@ -13,6 +13,8 @@ from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
+from reference.quantities import flatten
+
 DIGITS = 4
 """Of a figure of a curve."""
 
@@ -96,6 +98,31 @@ def _near(was: str, now: str, least: float) -> bool:
     mantissa, _, exponent = was.partition("e")
     last_place = 10.0 ** (int(exponent or 0) - len(mantissa.partition(".")[2]))
     return abs(float(was) - float(now)) <= max(least, NEAR * abs(float(was)), 2.001 * last_place if "." in was else 1.0)
+
+
+def numbers(data: Any, digits: int = DIGITS) -> list[str]:
+    """Each number and short word of a JSON document, a line each.
+
+    Args:
+        data: The document.
+        digits: Of a number.
+    """
+    return [_kept(f"{name}: {_short(value, digits)} {unit}".rstrip()) for name, value, unit, _ in flatten(data)]
+
+
+def _short(value: object, digits: int) -> str:
+    return f"{value:.{digits}g}" if isinstance(value, float) else str(value)
+
+
+def shortened(text: str, digits: int = DIGITS) -> list[str]:
+    """Lines of a file that is written to be read back, its numbers with so many digits.
+
+    Args:
+        text: The file's text.
+        digits: Of a number with a decimal point or an exponent.
+    """
+    number = re.compile(r"(?<![\w.])-?\d+(?:\.\d+(?:e[+-]?\d+)?|e[+-]?\d+)(?![\w.])")
+    return [number.sub(lambda found: f"{float(found[0]):.{digits}g}", line) for line in plain(text)]
 
 
 def plain(text: str) -> list[str]:

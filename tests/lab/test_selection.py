@@ -304,6 +304,8 @@ def test_creep_on_a_short_record_is_refused():
     assert refused.model == "prandtl_ishlinskii_creep"
     assert "lasts 0.01 s" in refused.reason  # half of it is held out
     assert "staircase of 10 s" in refused.reason
+    with pytest.raises(IdentificationError, match=r"_creep' was fitted: .* 10 s[^;]*; there are prandtl"):
+        mirror_file_text(result, "Mirror", model="prandtl_ishlinskii_creep")
     with pytest.raises(IdentificationError, match=r"do not support prandtl_ishlinskii_creep: .* lasts 0\.01 s"):
         identify([record], models=("prandtl_ishlinskii_creep",))
 
