@@ -516,6 +516,18 @@ def test_a_mirror_file_of_a_joint_fit_is_the_same_mirror(found, name, sign, tmp_
         assert table.bouc_wen.eta_1_v == pytest.approx(-0.15, rel=0.1)
 
 
+def test_a_widening_of_nothing_is_written_without_an_error(found, tmp_path):
+    """Its derivative was taken to both sides of its bound, and thresholds cannot narrow."""
+    drives = [centred_loop(f) for f in (2.5, 10.0)]
+    records = [recorded(d, plays(d, THRESHOLDS, WEIGHTS), seed=k) for k, d in enumerate(drives)]
+    fit = fit_joint(records, "prandtl_ishlinskii_rate", Units(), starts=1)
+    fit = replace(fit, fit=replace(fit.fit, values=np.append(fit.fit.values[:-1], 0.0)))
+    path = tmp_path / "mirror.toml"
+    path.write_text(mirror_file_text(as_chosen(found, fit), "m"), encoding="utf-8")
+    known = load_mirror(path).mirror.uncertainty.parameters
+    assert "prandtl_ishlinskii.weights.1" in known and "prandtl_ishlinskii.widening" not in known
+
+
 def test_standard_errors_in_the_file_are_propagated_ones(found, tmp_path):
     drives = [centred_loop(f) for f in (2.5, 10.0)]
     records = [recorded(d, bouc_wen(d, 1000.0, EQ3, gamma=0.25, eta=-0.15), seed=k) for k, d in enumerate(drives)]
