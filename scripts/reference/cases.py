@@ -62,7 +62,8 @@ class Place:
         code, out, err = warm.run(command, self.folder, self._environment())
         if code not in (0, 1, 2):
             raise CommandFailedError(f"microrad {' '.join(command)} ended with {code}: {err.strip()}")
-        return told.plain(f"$ microrad {' '.join(command)}\n{out}{err}[{code}]")
+        said = re.sub(r"microrad: compiling the loops .*\n", "", err)  # where nobody has run them before
+        return told.plain(f"$ microrad {' '.join(command)}\n{out}{said}[{code}]")
 
     def json(self, *words: object) -> Any:
         """The JSON document that a command prints."""

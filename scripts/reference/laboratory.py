@@ -5,14 +5,18 @@ exactly. They are printed to six digits, so that no processor's sine moves them.
 """
 
 import json
+import re
 import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
+from scipy import signal
+from scipy.io import savemat
+from scipy.signal import cont2discrete, lfilter
 
 from reference import told
 from reference.cases import Case, Place, changed
@@ -60,10 +64,10 @@ def plays(drive: Floats, gains: Mapping[float, float]) -> Floats:
 
 
 def resonance(values: Floats, frequency: float = 211.0, damping: float = 0.08, rate: float = RATE) -> Floats:
-    """A second-order low-pass of gain 1, by its poles in the z plane, with the delay of a sample."""
-    pole = np.exp(2 * np.pi * frequency / rate * complex(-damping, np.sqrt(1 - damping**2)))
-    denominator = [1.0, -2 * pole.real, abs(pole) ** 2]
-    return lfilter([0.0, sum(denominator)], denominator, values)
+    """A second-order low-pass of gain 1, its input held over each sample."""
+    w = 2 * np.pi * frequency
+    (numerator,), denominator, _ = cont2discrete(([w**2], [1.0, 2 * damping * w, w**2]), 1 / rate)
+    return lfilter(numerator, denominator, values)
 
 
 GAINS = {0.0: 0.061, 0.31: 0.009, 1.17: 0.011, 2.6: 0.007}
@@ -362,12 +366,11 @@ def mirrors(place: Place) -> list[str]:
 
 # --------------------------------------------------------------------------------------------------- linear responses
 def turned(drives: Floats, rate: float = RATE) -> dict[str, Floats]:
-    """Two drives and what three sensors read of them, each with modes, signs and an offset of its own."""
+    """Two drives and what three sensors read of them, two modes of both, each with an offset of its own."""
     u, v = drives.T
-    slow = resonance(u - 4.2, 137.0, 0.06, rate), resonance(v + 1.3, 223.0, 0.11, rate)
-    fast = resonance(0.7 * u - 0.4 * v, 391.0, 0.09, rate)
-    found = {"x": 61.0 * slow[0] - 3.0 * slow[1] + 2.0 * fast, "y": -5.0 * slow[0] + 47.0 * slow[1] - 4.0 * fast}
-    found["z"] = 23.0 * slow[0] + 31.0 * slow[1] + 9.0 * fast
+    first = resonance(0.9 * (u - 4.2) - 0.2 * (v + 1.3), 137.0, 0.06, rate)
+    second = resonance(0.3 * (u - 4.2) + 1.1 * (v + 1.3), 223.0, 0.11, rate)
+    found = {"x": 61.0 * first - 3.0 * second, "y": -5.0 * first + 47.0 * second, "z": 23.0 * first + 31.0 * second}
     offset = {"x": 3.1, "y": -7.7, "z": 1.9}
     scatter = {"x": 0.11, "y": 0.07, "z": 0.19}
     read = {
@@ -409,30 +412,40 @@ def fitted(place: Place) -> list[str]:
 
 
 # ------------------------------------------------------------------------------------------------------ identification
-def identified(place: Place, *words: str, as_json: bool = False, digits: int = 3) -> list[str]:
+def identified(place: Place, *words: str, as_json: bool = False, several: bool = False, digits: int = 3) -> list[str]:
     """What `microrad identify` says and writes: its page and the mirror file.
 
     Args:
         place: The folder.
         words: Of the command.
         as_json: Whether its JSON document is asked for, which is kept number by number.
-        digits: Of a number of the document and of the mirror file.
+        several: Whether the mirror has several axes: what its file makes of a drive is kept in place of its states.
+        digits: Of a number of the document, the figures and the mirror file: a search ends where it is flat.
     """
     command = ("identify", *words, "--mirror-file", "found.toml", "--overwrite")
     if as_json:
         said = [f"$ microrad {' '.join(command)} --json", *told.numbers(place.json(*command), digits)]
     else:
         said = place.told(*command)
-    for name, lines in (("found.html", told.page), ("found.toml", lambda path: written(path, digits))):
-        if (path := place.folder / name).exists():
-            said += [f"== {name}", *lines(path)]
-            path.unlink()
+    for path, lines in (
+        (place.folder / "found.html", lambda page: told.page(page, digits, 1e-4)),
+        (place.folder / "found.toml", lambda file: told.plain(file.read_text(encoding="utf-8"))),
+    ):
+        if path.exists():
+            kept = told.shortened(lines(path), digits)
+            kept = kept[: kept.index("[modes]")] if "[modes]" in kept else kept
+            said += [f"== {path.name}", *map(_settled, kept)]
+    if several:
+        said += library(place, "found")
+    for name in ("found.html", "found.toml"):
+        (place.folder / name).unlink(missing_ok=True)
     return said
 
 
-def written(path: Path, digits: int = told.DIGITS) -> list[str]:
-    """A mirror file, its numbers shortened."""
-    return told.shortened(path.read_text(encoding="utf-8"), digits)
+def _settled(line: str) -> str:
+    """A line without what rounding decides: how many values of a row differ, and the states of several axes."""
+    line = re.sub(r", distinct \d+$", "", line)
+    return re.sub(r"(\[modes\]).*", r"\1", line)
 
 
 def static(place: Place) -> list[str]:
@@ -474,7 +487,7 @@ def static(place: Place) -> list[str]:
         ("loops.csv", *timed, "--position", "3 mm,-1 mm"),
         ("loops.csv", "loops.csv", *timed),
         ("millivolts.csv", *timed, "--output-unit", "mrad"),
-        ("loops.csv", "millivolts.csv", *timed),
+        ("loops.csv", "millivolts.csv", *timed, "--name", "One of them states its units"),
         ("loops.csv", *columns, "--rate", "1730 V"),
         ("loops.csv", "--output", "1", "--static"),
         ("loops.csv", *timed, "--axes", "samples", "--time", "0"),
@@ -500,30 +513,315 @@ def whole(place: Place) -> list[str]:
         x = lines(i, 4, 240, 0.09)[:, 0]
         place.write(f"lines-{i}.csv", table(behind({"u": x, "y": mirror(x, 6 + i)}, 240)))
     columns = ("--input", "u", "--output", "y", "--rate", "1730 Hz")
-    found = identified(place, "loops.csv", "chirp.csv", *columns, "--validate", "other.csv")
-    periodic = (*columns, "--period", "240", "--model", "prandtl-ishlinskii-rate")
-    return found + identified(place, "loops.csv", "lines-0.csv", "lines-1.csv", *periodic, as_json=True)
+    found = identified(
+        place, "loops.csv", "chirp.csv", *columns, "--validate", "other.csv", "--name", "All models", digits=2
+    )
+    periodic = (*columns, "--period", "240", "--model", "prandtl-ishlinskii-rate", "--name", "Lines")
+    return found + identified(place, "loops.csv", "lines-0.csv", "lines-1.csv", *periodic, as_json=True, digits=2)
+
+
+SEARCHED = re.compile(r"(candidates\.hysteretic|worst|verdict|band_error|delay_s|responses\.\d+\.modelled).*")
+"""What the search for hysteretic stiffness leaves: it is ended before its optimum, elsewhere on each processor."""
+
+
+def sprung(drives: Floats) -> dict[str, Floats]:
+    """Two drives and what three sensors read of two modes whose springs lose some stiffness to hysteresis."""
+    steps, forces = 10, (drives - np.array([4.2, -1.3])) @ np.array([[0.9, 0.3], [-0.2, 1.1]])
+    w, damping = 2 * np.pi * np.array([137.0, 223.0]), np.array([0.05, 0.07])
+    thresholds, weights = np.array([[0.04, 0.17], [0.06, 0.21]]), np.array([[0.11, 0.08], [0.07, 0.1]])
+    place, speed, state, found = np.zeros(2), np.zeros(2), np.zeros((2, 2)), np.empty(forces.shape)
+    for i, force in enumerate(forces):
+        found[i] = place
+        for _ in range(steps):
+            state = np.clip(state, place[:, None] - thresholds, place[:, None] + thresholds)
+            pull = force - place + (weights * state).sum(axis=1)
+            speed = speed + (w**2 * pull - 2 * damping * w * speed) / (RATE * steps)
+            place = place + speed / (RATE * steps)
+    offset, scatter = np.array([3.1, -7.7, 1.9]), np.array([0.02, 0.013, 0.031])
+    read = found @ np.array([[61.0, -5.0, 23.0], [-3.0, 47.0, 31.0]]) + offset
+    dice = noise(read.size, int(1e3 * np.ptp(drives)) % 997).reshape(read.shape) * scatter
+    return dict(zip("uvxyz", np.hstack([drives, read + dice]).T, strict=True))
 
 
 def axes(place: Place) -> list[str]:
-    """Mirrors of two drives and three sensors: linear, and with hysteresis of the drives."""
-    gains = {0.0: 1.0, 0.13: -0.21, 0.5: -0.17}
+    """Mirrors of two drives and three sensors: linear, and with hysteresis of the stiffness."""
     for i in range(4):
-        drives = lines(i, 4, 120)
-        place.write(f"line-{i}.csv", table(behind(turned(drives), 120)))
-        for size, amplitude in (("small", 0.23), ("large", 0.9)):
-            drives = lines(i, 4, 90, amplitude)
-            rest = np.array([4.2, -1.3])
-            bent = np.stack([plays(column, gains) for column in (drives - rest).T], axis=1) + rest
-            columns = turned(bent) | {"u": drives[:, 0], "v": drives[:, 1]}
-            place.write(f"{size}-{i}.csv", table(behind(columns, 90)))
+        place.write(f"line-{i}.csv", table(behind(turned(lines(i, 4, 120)), 120)))
+        for size, amplitude in (("small", 0.13), ("large", 0.6)):
+            place.write(f"{size}-{i}.csv", table(behind(sprung(lines(i, 4, 90, amplitude)), 90), digits=7))
     channels = ("--input", "u", "--input", "v", "--output", "x", "--output", "y", "--output", "z", "--rate", "1730")
     places = [word for at in ("11 mm,2 mm", "-7 mm,13 mm", "-5 mm,-9 mm") for word in ("--position", at)]
     straight = [f"line-{i}.csv" for i in range(4)]
-    found = identified(place, *straight, *channels, *places, "--output-unit", "um", "--period", "120")
+    found = identified(
+        place, *straight, *channels, *places, "--output-unit", "um", "--period", "120", "--name", "Line", several=True
+    )
     bent = [f"{size}-{i}.csv" for size in ("small", "large") for i in range(3)]
-    judged = ("--validate", "small-3.csv", "--validate", "large-3.csv")
-    return found + identified(place, *bent, *judged, *channels, "--output-unit", "urad", "--period", "90", as_json=True)
+    judged = ("--validate", "small-3.csv", "--validate", "large-3.csv", "--name", "Sprung")
+    words = (*bent, *judged, *channels, "--output-unit", "urad", "--period", "90")
+    sprung_ones = told.numbers(place.json("identify", *words, "--mirror-file", "found.toml"), 3)
+    return [*found, *(line for line in sprung_ones if not SEARCHED.match(line))]
+
+
+# -------------------------------------------------------------------------------------------------------------- bench
+PLAN = """
+name = "Generic plan"
+formats = [FORMATS]
+
+[limits]
+rate = "7 kHz"
+drive_min = "-1.3 V"
+drive_max = "9.7 V"
+slew = "13 V/ms"
+samples_per_period = 7
+
+[bench]
+truth = "bench"
+axes = AXES
+crosstalk = -0.07
+
+[bench.amplifier]
+gain = 11
+output_min = "-17 V"
+output_max = "113 V"
+bandwidth = "1.9 kHz"
+slew = "0.7 V/us"
+
+[bench.converters]
+bits = 12
+drive_min = "-2.3 V"
+drive_max = "10.1 V"
+output_min = "-0.7 mrad"
+output_max = "1.9 mrad"
+
+[bench.sensor]
+noise = "1.7 urad"
+mains = "2.3 urad"
+mains_frequency = "60 Hz"
+drift = "700 nrad/s"
+
+[excitation.sweep]
+kind = "chirp"
+start = "3.1 Hz"
+stop = "870 Hz"
+duration = "0.23 s"
+amplitude = "0.43 V"
+offset = "4.7 V"
+
+[excitation.growing]
+kind = "sines"
+frequencies = ["35 Hz", "70 Hz"]
+amplitudes = ["0.9 V", "2.3 V", "3.1 V"]
+periods = 2
+offset = "4.3 V"
+noise_share = 0.03
+
+[excitation.steps]
+kind = "staircase"
+levels = ["4.1 V", "7.3 V", "-0.7 V", "2.9 V"]
+dwell = "31 ms"
+rise = "2.3 ms"
+rate = "4.1 kHz"
+
+[excitation.lines]
+kind = "multisine"
+use = "validation"
+lines = "odd-random"
+start = "14 Hz"
+stop = "700 Hz"
+period = "0.1 s"
+rms = "0.31 V"
+offset = "4.9 V"
+periods = 2
+realisations = 2
+seed = 17
+"""
+PRINTED = """
+[excitation.linear]
+kind = "chirp"
+truth = "linear"
+start = "7 Hz"
+stop = "430 Hz"
+duration = "0.11 s"
+amplitude = "1.3 V"
+offset = "3.7 V"
+
+[excitation.printed]
+kind = "sines"
+truth = "bouc-wen"
+frequencies = ["56 Hz"]
+amplitudes = ["2.7 V"]
+periods = 3
+offset = "4.4 V"
+"""
+
+
+def bench(place: Place) -> list[str]:
+    """Plans of all excitations, played into each mirror and format, and plans that are refused."""
+    one = changed(PLAN, ("FORMATS", '"csv"'), ("AXES", "1"))
+    two = changed(PLAN, ("FORMATS", '"csv", "lvm", "tdms", "mat", "mat73", "npz", "hdf5"'), ("AXES", "2"))
+    two = changed(two, ('offset = "4.7 V"', 'offset = "4.7 V"\naxis = 2'))
+    place.write("one.toml", one.replace('lines = "odd-random"', 'lines = "all"') + PRINTED)
+    place.write("two.toml", two)
+    found: list[str] = []
+    for name, words in (("one", ("--seed", "7")), ("two", ())):
+        found += place.told("bench", f"{name}.toml", "--output", name, *words)
+        for path in sorted((place.folder / name).glob("*.csv")):
+            found += [re.sub(r", distinct \d+$", "", line) for line in told.table(path)]
+        manifest = json.loads((place.folder / name / "manifest.json").read_text(encoding="utf-8"))
+        found += told.numbers(manifest["records"])
+    place.write(
+        "recordings.json",
+        json.dumps(
+            {
+                f"two/{path.name}": {"inputs": ["drive1", "drive2"], "outputs": ["angle1", "angle2"], "alone": False}
+                for path in sorted((place.folder / "two").iterdir())
+                if path.stem.startswith("steps")
+            }
+        ),
+    )
+    found += library(place, "read")
+    for changes in (
+        (('"9.7 V"', '"12 V"'),),
+        (('stop = "870 Hz"', 'stop = "1.9 kHz"'), ('amplitude = "0.43 V"', 'amplitude = "7 V"')),
+        (("periods = 2\noffset", "periods = 3\noffset"), ('"35 Hz", "70 Hz"', '"33 Hz", "71 Hz"')),
+        (('rise = "2.3 ms"', 'rise = "0.3 ms"'), ('"7.3 V"', '"11.3 V"')),
+        (('period = "0.1 s"', 'period = "0.10003 s"'), ('lines = "odd-random"', 'lines = "some"')),
+        (('kind = "chirp"', 'kind = "chrip"'), ("bits = 12", "bits = 3"), ('noise = "1.7 urad"', "noise_share = 11")),
+        (('start = "3.1 Hz"', 'start = "900 Hz"'), ('dwell = "31 ms"', 'dwell = "0.1 ms"')),
+        (('output_max = "1.9 mrad"', 'output_max = "0.3 mrad"'),),
+    ):
+        place.write("wrong.toml", changed(one, *changes))
+        found += place.told("bench", "wrong.toml", "--output", "wrong")
+    found += place.told("bench", "one.toml", "--output", "one")
+    return found
+
+
+# ------------------------------------------------------------------------------------------------------------- formats
+def formats(place: Place) -> list[str]:
+    """Files of each format, with units, times, comments and names of many kinds; lists and arrays."""
+    t = times(331)
+    u, y = sines(t), mirror(sines(t), 91)
+    rows = [f"{time:.9f};{a:.5f};{b:.6f}".replace(".", ",") for time, a, b in zip(t + 0.1, u, y, strict=True)]
+    spaced = [f"{a:.5f} {b:.6f}" for a, b in zip(1e3 * u, 1e3 * y, strict=True)]
+    pairs = [f"{1e3 * time:.6f}\t{a:.5f}\t{b:.6f}" for time, a, b in zip(t, u, y, strict=True)]
+    texts = {
+        "semicolons.csv": "# a comment\nZeit;Spannung;Winkel\ns;V;mrad\n" + "\n".join(rows) + "\n",
+        "points.csv": "Zeit;Spannung;Winkel\ns;V;mrad\n" + "\n".join(rows).replace(",", ".") + "\n",
+        "spaces.dat": "% drive and angle\n" + "\n".join(spaced) + "\n",
+        "tabs.tsv": "Time (ms)\tdrive [V]\tangle (mrad)\n" + "\n".join(pairs) + "\n",
+        "words.csv": "drive,angle\n" + "\n".join(row.replace(" ", ",") for row in spaced[:250]) + "\n3.1,off\n",
+        "ragged.csv": "drive,angle\n" + "\n".join(row.replace(" ", ",") for row in spaced[:250]) + "\n3.1\n",
+    }
+    for name, text in texts.items():
+        place.write(name, text)
+    whole_array = np.round(np.stack([u, 0.7 * u[::-1]], axis=1), 6), np.round(np.stack([y, -y], axis=1), 6)
+    np.save(place.folder / "bare.npy", np.column_stack([*whole_array]))
+    np.savez(place.folder / "named.npz", drive=whole_array[0][:, 0], both=whole_array[1], fs=np.array(RATE))
+    savemat(place.folder / "structure.mat", {"s": {"u": whole_array[0], "y": whole_array[1], "dt": 1 / RATE}})
+    with h5py.File(place.folder / "groups.h5", "w") as file:
+        group = file.create_group("bench")
+        group.attrs["rate_hz"] = RATE
+        for key, unit, values in (("u", "mV", 1e3 * whole_array[0][:, 0]), ("y", "urad", 1e3 * whole_array[1][:, 1])):
+            group.create_dataset(key, data=values).attrs["units"] = unit
+        file.create_dataset("other/u", data=whole_array[0][:, 1])
+    rate = {"rate_hz": RATE}
+    wanted: list[tuple[str, dict[str, Any]]] = [
+        ("semicolons.csv", {"inputs": "Spannung", "outputs": "Winkel"}),
+        ("points.csv", {"inputs": "Spannung", "outputs": "Winkel"}),
+        ("spaces.dat", {"inputs": 0, "outputs": 1, **rate}),
+        ("tabs.tsv", {"inputs": 1, "outputs": 2, "part_s": (0.03, 0.17), "period_samples": 97}),
+        ("words.csv", {"inputs": 0, "outputs": 1, **rate}),
+        ("ragged.csv", {"inputs": 0, "outputs": 1, **rate}),
+        ("bare.npy", {"inputs": ["data[0]", "data[1]"], "outputs": ["data[3]", "data[2]"], **rate, "alone": False}),
+        ("named.npz", {"inputs": "drive", "outputs": "both[1]"}),
+        ("structure.mat", {"inputs": "s/u[1]", "outputs": "s/y[0]", "accept": ["lead"]}),
+        ("groups.h5", {"inputs": "bench/u", "outputs": "y"}),
+        ("groups.h5", {"inputs": "u", "outputs": "y"}),
+        ("bare.npy", {"inputs": "data[0]", "outputs": "data[4]", **rate}),
+        ("structure.mat", {"inputs": "s/v", "outputs": "s/y[0]"}),
+    ]
+    place.write("recordings.json", json.dumps(wanted))
+    found = library(place, "read")
+    shape = np.stack([np.stack([lines(i, 3, 240).reshape(3, 240, 2)], axis=0)[0] for i in range(2)], axis=0)
+    read = np.stack(
+        [np.stack([turned(d.reshape(-1, 2))[key] for key in "xyz"], axis=1).reshape(3, 240, 3) for d in shape]
+    )
+    np.save(place.folder / "drives.npy", np.round(shape.transpose(1, 0, 3, 2), 6))  # periods, realisations, channels
+    np.save(place.folder / "outputs.npy", np.round(read.transpose(1, 0, 3, 2), 5))
+    np.savez(place.folder / "swapped.npz", u=shape.transpose(1, 0, 3, 2), y=read.transpose(0, 1, 3, 2))
+    found += library(place, "arrays")
+    t = times(760)
+    loops = sines(t, 4.3, 2.9, 9.7)
+    place.write("loops.csv", table({"drive": loops, "angle": 1e3 * mirror(loops, 3)}))
+    listed = """
+name = "From a list"
+input = "drive"
+output = 1
+rate = "1730 Hz"
+output_unit = "urad"
+
+[recording.early]
+file = "loops.csv"
+to = "0.31 s"
+role = "loops"
+
+[recording.late]
+file = "loops.csv"
+from = "0.31 s"
+role = "validation"
+"""
+    place.write("list.toml", listed)
+    found += identified(place, "list.toml", "--static")
+    for changes in (
+        (('from = "0.31 s"', 'from = "0.21 s"'),),
+        (('role = "loops"', 'role = "loop"'), ("output = 1", 'output_units = "V"'), ('to = "0.31 s"', 'to = "0 s"')),
+        (('role = "loops"', 'role = "validation"'),),
+        (('output_unit = "urad"', 'output_unit = "urad"\nsigns = [[1, -1]]'),),
+        (('output_unit = "urad"', 'output_unit = "urad"\naccept = ["noise"]\naxes = ["channels"]'),),
+        (('from = "0.31 s"', 'from = "0.43 s"\nto = "0.47 s"'),),
+    ):
+        place.write("list.toml", changed(listed, *changes))
+        found += place.told("identify", "list.toml", "--static")
+    return found + place.told("identify", "list.toml", "--rate", "100")
+
+
+# -------------------------------------------------------------------------------------------------------------- import
+GIVEN = ("--travel", "1.7 mrad", "--drive", "-1.3 V", "9.1 V", "--bias", "4.2 V", "--rate-limit", "730 V/s")
+BAND = ("--band", "1.3 Hz", "640 Hz", "--normalise-at", "3.1 Hz", "--output-unit", "mrad")
+
+
+def imported(place: Place) -> list[str]:
+    """Linear models of other tools in each form, and what no mirror can be; keys explained."""
+    w = 2 * np.pi * np.array([310.0, 87.0])
+    system = signal.TransferFunction([0.071 * w[0] ** 2 * w[1]], np.polymul([1.0, 0.14 * w[0], w[0] ** 2], [1.0, w[1]]))
+    space, roots = system.to_ss(), system.to_zpk()
+    held = signal.cont2discrete((system.num, system.den), 1 / 7300.0)
+    forms: dict[str, dict[str, Any]] = {
+        "coefficients": {"num": system.num, "den": system.den},
+        "space": {"s": {"A": space.A, "B": space.B, "C": space.C, "D": space.D, "Ts": 0.0}},
+        "roots": {"z": [], "p": roots.poles, "k": roots.gain},
+        "sampled": {"num": held[0], "den": held[1], "Ts": held[2]},
+        "falling": {"num": -system.num, "den": system.den},
+        "unstable": {"num": system.num, "den": system.den * [1, -1, 1, 1]},
+        "improper": {"num": np.polymul(system.num, [1.0, 2.0, 3.0, 4.0]), "den": system.den},
+        "two": {"a": {"num": system.num, "den": system.den}, "b": {"num": 2.0 * system.num, "den": system.den}},
+        "nothing": {"x": system.num},
+    }
+    found: list[str] = []
+    for name, values in forms.items():
+        savemat(place.folder / f"{name}.mat", values)
+        found += place.told("import", f"{name}.mat", *GIVEN, *BAND)
+    found += place.told("import", "two.mat", *GIVEN, *BAND, "--variable", "b", "--name", "The second")
+    found += place.told("import", "roots.mat", *GIVEN, *BAND)
+    wrong = ("--bias", "14.2 V"), ("--band", "700 Hz", "640 Hz"), ("--normalise-at", "1 Hz"), ("--travel", "3 V")
+    for words in wrong:
+        found += place.told("import", "roots.mat", *GIVEN, *BAND, *words, "--output", "other.toml")
+    for path in sorted(place.folder.glob("*-mirror.toml")):
+        found += [f"== {path.name}", *told.shortened(told.plain(path.read_text(encoding="utf-8")), 6)]
+    for key in ("modulus_margin", "mirror.bouc_wen.eta", "thresholds", "hysteresis", "nonsense"):
+        found += place.told("explain", key)
+    schema = json.loads(place.run("schema"))
+    return [*found, *told.numbers({key: schema["$defs"][key] for key in sorted(schema["$defs"]) if "Mirror" in key})]
 
 
 def library(place: Place, word: str) -> list[str]:
@@ -539,5 +837,8 @@ CASES: Mapping[str, Case] = {
     "lab-static": Case(static),
     "lab-whole": Case(whole),
     "lab-axes": Case(axes),
+    "lab-bench": Case(bench),
+    "lab-formats": Case(formats),
+    "lab-import": Case(imported),
 }
 """All of them; a file reference/told/NAME.txt each."""

@@ -18,6 +18,7 @@ sys.path.insert(0, str(Path(__file__).parent.parent))
 
 import microrad
 from microrad import BoucWen, Creep, Mirror, PrandtlIshlinskii
+from microrad.lab.recording import read_arrays
 from microrad.mirror import coupled, spread
 from microrad.mission.file import load_coupled_mirror, load_mirror
 from reference.told import curve
@@ -100,6 +101,58 @@ def findings() -> Iterator[str]:
                 for each in found.findings:
                     refused = "refused" if each.refused else "noted"
                     yield f"  {each.kind}, {each.channel}, {each.row}, {each.output}, {refused}: {each.message}"
+
+
+def read() -> Iterator[str]:
+    """Recordings as they are read by the options in `recordings.json`, by the files' names or in pairs with them."""
+    wanted = json.loads(Path("recordings.json").read_text(encoding="utf-8"))
+    for name, options in wanted.items() if isinstance(wanted, dict) else wanted:
+        try:
+            yield from _recording(name, microrad.read_recording(name, **options))
+        except microrad.MicroradError as error:
+            yield f"{name}: {error}"
+
+
+def _recording(name: str, found: Any) -> Iterator[str]:
+    for key in (
+        "path",
+        "rate_hz",
+        "input_names",
+        "output_names",
+        "input_units",
+        "output_units",
+        "period_samples",
+        "role",
+    ):
+        yield f"{name}.{key}: {getattr(found, key)}"
+    yield from said(f"{name}.drive", found.drive)
+    yield from said(f"{name}.output", found.output)
+    yield from (f"{name}: {each.kind}: {each.message}" for each in found.findings)
+
+
+def arrays() -> Iterator[str]:
+    """Recordings from whole arrays of periods, realisations and channels."""
+    axes = ("periods", "realisations", "channels", "samples")
+    one, other = "drives.npy", "outputs.npy"
+    for found in read_arrays(one, rate_hz=1730.0, axes=axes, output_path=other):
+        yield from _recording(found.path, found)
+    for found in read_arrays(one, rate_hz=1730.0, axes=axes, output_path=other, part_s=(0.07, 0.29)):
+        yield from _recording(found.path, found)
+    wrong: dict[str, dict[str, Any]] = {
+        "no rate": {"axes": axes, "output_path": other},
+        "an axis twice": {"axes": ("samples", "samples", "channels", "periods"), "output_path": other},
+        "no samples": {"axes": axes[:3], "output_path": other},
+        "an axis misspelt": {"axes": ("period", *axes[1:]), "output_path": other},
+        "the same array": {"axes": axes, "rate_hz": 1730.0},
+        "axes changed": {"axes": (axes[1], axes[0], *axes[2:]), "output_path": other, "rate_hz": 1730.0},
+        "periods twice": {"axes": axes, "output_path": other, "rate_hz": 1730.0, "period_samples": 240},
+        "too few samples": {"axes": (*axes[:2], axes[3], axes[2]), "output_path": other, "rate_hz": 1730.0},
+    }
+    for name, options in wrong.items():
+        yield refused(name, lambda options=options: read_arrays(one, **options))
+    swapped = {"axes": axes, "rate_hz": 1730.0}
+    yield refused("other shapes", lambda: read_arrays("swapped.npz", "u", "y", **swapped))
+    yield refused("columns", lambda: read_arrays("spaces.dat", **swapped))
 
 
 # ---------------------------------------------------------------------------------------------------------- hysteresis
@@ -227,6 +280,20 @@ def _of_several(path: Path, drives: np.ndarray[Any, Any]) -> Iterator[str]:
         yield from said(f"{path}.drawn.{i}", drawn.mirror)
 
 
+def found() -> Iterator[str]:
+    """The mirror of several axes in `found.toml`, by what it does: three digits, as a search found it."""
+    mirror = coupled.of(load_coupled_mirror("found.toml"))
+    t = np.arange(400) / mirror.rate_hz
+    waves = [0.3 * np.sin(2 * np.pi * 4.7 * t + i) + 0.1 * np.sin(2 * np.pi * 61.0 * t) for i in range(2)]
+    for name, values in (
+        ("response", mirror.response(np.column_stack(waves))),
+        ("gain", np.abs(mirror.mirror.frequency_response([7.0, 90.0, 210.0]))),
+    ):
+        for at in np.ndindex(values.shape[1:]):
+            row = curve(values[(slice(None), *at)].tolist(), 3, 1e-3).partition(", distinct")[0]
+            yield f"{name}[:, {', '.join(map(str, at))}]: {row}"
+
+
 # ---------------------------------------------------------------------------------------------------- linear responses
 def table_of(freq: np.ndarray[Any, Any], delay_s: float) -> np.ndarray[Any, Any]:
     """A response of three outputs to two drives, shape (frequencies, 3, 2): three modes behind a delay."""
@@ -343,7 +410,10 @@ def fitted() -> Iterator[str]:
     yield refused("no such unit", lambda: microrad.fit_hysteresis(recording, output_unit="um"))
 
 
-WORDS = {each.__name__: each for each in (findings, hysteresis, mirrors, frequency_responses, measured, fitted)}
+WORDS = {
+    each.__name__: each
+    for each in (findings, read, arrays, hysteresis, mirrors, found, frequency_responses, measured, fitted)
+}
 
 
 if __name__ == "__main__":
