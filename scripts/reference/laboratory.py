@@ -559,7 +559,11 @@ def axes(place: Place) -> list[str]:
     judged = ("--validate", "small-3.csv", "--validate", "large-3.csv", "--name", "Sprung")
     words = (*bent, *judged, *channels, "--output-unit", "urad", "--period", "90")
     sprung_ones = told.numbers(place.json("identify", *words, "--mirror-file", "found.toml"), 3)
-    return [*found, *(line for line in sprung_ones if not SEARCHED.match(line))]
+    for size, amplitude in (("small", 0.13), ("large", 0.6)):
+        for i in (0, 2, 4):
+            columns = sprung(lines(i, 4, 90, amplitude) * [1.0, 0.0] + [0.0, -1.3])
+            place.write(f"spring-{size}-{i}.csv", table(behind({key: columns[key] for key in "ux"}, 90), digits=7))
+    return [*found, *(line for line in sprung_ones if not SEARCHED.match(line)), *library(place, "stiffness")]
 
 
 # -------------------------------------------------------------------------------------------------------------- bench

@@ -18,6 +18,7 @@ sys.path.insert(0, str(Path(__file__).parent.parent))
 
 import microrad
 from microrad import BoucWen, Creep, Mirror, PrandtlIshlinskii
+from microrad.lab.identify import fit_hysteretic_stiffness
 from microrad.lab.recording import read_arrays
 from microrad.mirror import coupled, spread
 from microrad.mission.file import load_coupled_mirror, load_mirror
@@ -410,9 +411,34 @@ def fitted() -> Iterator[str]:
     yield refused("no such unit", lambda: microrad.fit_hysteresis(recording, output_unit="um"))
 
 
+def stiffness() -> Iterator[str]:
+    """Hysteretic stiffness of one axis, from periodic drives in `spring*.csv`, after three steps of its search."""
+    wanted: dict[str, Any] = {"inputs": "u", "outputs": "x", "rate_hz": 1730.0, "period_samples": 90}
+    records = [microrad.read_recording(path, **wanted, alone=False) for path in sorted(Path().glob("spring*.csv"))]
+    fit = fit_hysteretic_stiffness(records, order=2, iterations=3)
+    for key in (
+        "rate_hz",
+        "sub_steps",
+        "order",
+        "parameters",
+        "redundant",
+        "amplitudes",
+        "classes",
+        "iterations",
+        "names",
+    ):
+        yield from said(key, getattr(fit, key))
+    for key in (
+        "error_rms",
+        "start_error_rms",
+        "costs",
+    ):  # of a search that goes on, and is elsewhere on each processor
+        yield f"{key}: {curve(np.asarray(getattr(fit, key)).tolist(), 3)}"
+
+
 WORDS = {
     each.__name__: each
-    for each in (findings, read, arrays, hysteresis, mirrors, found, frequency_responses, measured, fitted)
+    for each in (findings, read, arrays, hysteresis, mirrors, found, frequency_responses, measured, fitted, stiffness)
 }
 
 
