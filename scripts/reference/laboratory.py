@@ -444,8 +444,7 @@ def identified(place: Place, *words: str, as_json: bool = False, several: bool =
 
 def _settled(line: str) -> str:
     """A line without what rounding decides: how many values of a row differ, and the states of several axes."""
-    line = re.sub(r", distinct \d+$", "", line)
-    return re.sub(r"(\[modes\]).*", r"\1", line)
+    return re.sub(r"(\[modes\]).*", r"\1", told.DISTINCT.sub("", line))
 
 
 def static(place: Place) -> list[str]:
@@ -670,7 +669,7 @@ def bench(place: Place) -> list[str]:
     for name, words in (("one", ("--seed", "7")), ("two", ())):
         found += place.told("bench", f"{name}.toml", "--output", name, *words)
         for path in sorted((place.folder / name).glob("*.csv")):
-            found += [re.sub(r", distinct \d+$", "", line) for line in told.table(path)]
+            found += [told.DISTINCT.sub("", line) for line in told.table(path)]
         manifest = json.loads((place.folder / name / "manifest.json").read_text(encoding="utf-8"))
         found += told.numbers(manifest["records"])
     place.write(

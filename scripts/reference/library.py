@@ -22,7 +22,7 @@ from microrad.lab.identify import fit_hysteretic_stiffness
 from microrad.lab.recording import read_arrays
 from microrad.mirror import coupled, spread
 from microrad.mission.file import load_coupled_mirror, load_mirror
-from reference.told import curve
+from reference.told import DISTINCT, curve
 
 ACCEPTABLE = ("jitter", "clipping", "dead", "quantisation", "drift", "unexcited", "lead")
 
@@ -75,8 +75,7 @@ def _array(name: str, values: np.ndarray[Any, Any]) -> Iterator[str]:
 
 
 def _curve(values: np.ndarray[Any, Any]) -> str:
-    """A row; how many of its values differ is left out, as rounding tells values of a loop apart."""
-    return curve(values.astype(float).tolist()).partition(", distinct")[0]
+    return DISTINCT.sub("", curve(values.astype(float).tolist()))
 
 
 def refused(name: str, call: Callable[[], Any]) -> str:
@@ -291,7 +290,7 @@ def found() -> Iterator[str]:
         ("gain", np.abs(mirror.mirror.frequency_response([7.0, 90.0, 210.0]))),
     ):
         for at in np.ndindex(values.shape[1:]):
-            row = curve(values[(slice(None), *at)].tolist(), 3, 1e-3).partition(", distinct")[0]
+            row = DISTINCT.sub("", curve(values[(slice(None), *at)].tolist(), 3, 1e-3))
             yield f"{name}[:, {', '.join(map(str, at))}]: {row}"
 
 

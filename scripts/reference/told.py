@@ -34,6 +34,9 @@ NEAR = 0.02
 
 _NUMBER = re.compile(r"(?<![\w.])\d+(?:\.\d+)?(?:e[+-]?\d+)?(?![\w.]*\w)")
 
+DISTINCT = re.compile(r", \d+ distinct(?=: )")
+"""How many values of a row differ, which a rounding decides where values come again."""
+
 BLOCKS = {"p", "h1", "h2", "h3", "h4", "tr", "li", "figcaption", "summary", "div", "dt", "dd", "pre", "caption"}
 CELLS = {"td", "th"}
 SKIPPED = {"script", "style", "svg", "head"}
