@@ -69,6 +69,12 @@ class Place:
         """The JSON document that a command prints."""
         return json.loads(self.run(*words, "--json"))
 
+    def python(self, program: Path, word: str) -> str:
+        """A program in Python with a word behind its name; returns what it prints."""
+        if warm.is_loaded:
+            return _told([program.name, word], (0,), *warm.run([word], self.folder, self._environment(), program))
+        return self.program(sys.executable, program, word)
+
     def program(self, *words: object, ends: tuple[int, ...] = (0,)) -> str:
         """Any program; returns what it prints."""
         command = [str(word) for word in words]

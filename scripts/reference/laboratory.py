@@ -6,7 +6,6 @@ exactly. They are printed to six digits, so that no processor's sine moves them.
 
 import json
 import re
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -829,7 +828,7 @@ def imported(place: Place) -> list[str]:
 
 def library(place: Place, word: str) -> list[str]:
     """What public functions return on the files of the case, as lines."""
-    return told.plain(f"== {word}\n{place.program(sys.executable, LIBRARY, word)}")
+    return told.plain(f"== {word}\n{place.python(LIBRARY, word)}")
 
 
 CASES: Mapping[str, Case] = {
