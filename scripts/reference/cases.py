@@ -62,11 +62,18 @@ class Place:
         code, out, err = warm.run(command, self.folder, self._environment())
         if code not in (0, 1, 2):
             raise CommandFailedError(f"microrad {' '.join(command)} ended with {code}: {err.strip()}")
-        return told.plain(f"$ microrad {' '.join(command)}\n{out}{err}[{code}]")
+        said = re.sub(r"microrad: compiling the loops .*\n", "", err)  # where nobody has run them before
+        return told.plain(f"$ microrad {' '.join(command)}\n{out}{said}[{code}]")
 
     def json(self, *words: object) -> Any:
         """The JSON document that a command prints."""
         return json.loads(self.run(*words, "--json"))
+
+    def python(self, program: Path, word: str) -> str:
+        """A program in Python with a word behind its name; returns what it prints."""
+        if warm.is_loaded:
+            return _told([program.name, word], (0,), *warm.run([word], self.folder, self._environment(), program))
+        return self.program(sys.executable, program, word)
 
     def program(self, *words: object, ends: tuple[int, ...] = (0,)) -> str:
         """Any program; returns what it prints."""

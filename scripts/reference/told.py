@@ -8,13 +8,18 @@ import difflib
 import json
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
+from reference.quantities import flatten
+
 DIGITS = 4
 """Of a figure of a curve."""
+
+LONG = 6
+"""Digits behind the point from which a number is no printed one, but one that is read again."""
 
 NEGLIGIBLE = 1e-9
 """Of the largest magnitude of a curve: what is smaller counts as 0, as a mean of a sine."""
@@ -29,12 +34,15 @@ NEAR = 0.02
 
 _NUMBER = re.compile(r"(?<![\w.])\d+(?:\.\d+)?(?:e[+-]?\d+)?(?![\w.]*\w)")
 
+DISTINCT = re.compile(r", \d+ distinct(?=: )")
+"""How many values of a row differ, which a rounding decides where values come again."""
+
 BLOCKS = {"p", "h1", "h2", "h3", "h4", "tr", "li", "figcaption", "summary", "div", "dt", "dd", "pre", "caption"}
 CELLS = {"td", "th"}
 SKIPPED = {"script", "style", "svg", "head"}
 
 LEFT_OUT = (
-    (r"\b[0-9a-f]{12,64}\b", "HASH"),
+    (r"(?<![.\d])\b[0-9a-f]{12,64}\b", "HASH"),
     (r"\b0\.\d+\.\d+(?:\.dev\d+)?(?:\+\w+)?\b", "VERSION"),
     (r"^Made with .*$", "Made with VERSIONS."),
     (r"^machine \| .*$", "machine"),
@@ -98,6 +106,31 @@ def _near(was: str, now: str, least: float) -> bool:
     return abs(float(was) - float(now)) <= max(least, NEAR * abs(float(was)), 2.001 * last_place if "." in was else 1.0)
 
 
+def numbers(data: Any, digits: int = DIGITS) -> list[str]:
+    """Each number and short word of a JSON document, a line each.
+
+    Args:
+        data: The document.
+        digits: Of a number.
+    """
+    return [f"{name}: {_short(value, digits)} {unit}".rstrip() for name, value, unit, _ in flatten(data)]
+
+
+def _short(value: object, digits: int) -> str:
+    return f"{value:.{digits}g}" if isinstance(value, float) else str(value)
+
+
+def shortened(lines: Iterable[str], digits: int = DIGITS) -> list[str]:
+    """Lines with the long numbers of what is written to be read back cut to so many digits.
+
+    Args:
+        lines: The lines.
+        digits: Of a number with more than `LONG` of them behind its point.
+    """
+    number = re.compile(rf"(?<![\w.])-?\d+\.\d{{{LONG},}}(?:e[+-]?\d+)?(?![\w.])")
+    return [re.sub(r" +#", " #", number.sub(lambda found: f"{float(found[0]):.{digits}g}", line)) for line in lines]
+
+
 def plain(text: str) -> list[str]:
     """Lines of a text without what is left out."""
     return [_kept(line.rstrip()) for line in text.splitlines()]
@@ -155,14 +188,21 @@ def settled(lines: Sequence[str]) -> list[str]:
     ]
 
 
-def page(path: Path) -> list[str]:
-    """A report: its words, then its interactive figures."""
+def page(path: Path, digits: int = DIGITS, negligible: float = NEGLIGIBLE) -> list[str]:
+    """A report: its words, then its interactive figures.
+
+    Args:
+        path: The page.
+        digits: Of a figure of a curve.
+        negligible: Share of the largest magnitude of a curve below which a figure counts as 0.
+    """
+    how = digits, negligible
     read = _Page()
     read.feed(path.read_text(encoding="utf-8"))
     read.close()
     return [
         *read.lines,
-        *(line for plot in map(json.loads, read.plots) for line in _plotted(plot, f"plot of {_drawn(plot)}")),
+        *(line for plot in map(json.loads, read.plots) for line in _plotted(plot, f"plot of {_drawn(plot)}", how)),
     ]
 
 
@@ -171,23 +211,23 @@ def _drawn(plot: Any) -> str:
     return str(plot["layout"].get("yaxis", {}).get("title", {}).get("text", ""))
 
 
-def _plotted(data: Any, name: str) -> Iterator[str]:
-    """What an interactive figure draws."""
+def _plotted(data: Any, name: str, how: tuple[int, float]) -> Iterator[str]:
+    """What an interactive figure draws; `how` are the last two arguments of `curve`."""
     if isinstance(data, dict):
         for key, value in data.items():
             if re.sub(r"\d+$", "", key) in PLOTTED or key in PLOTTED:
-                yield from _plotted(value, f"{name}.{key}")
+                yield from _plotted(value, f"{name}.{key}", how)
     elif isinstance(data, list) and data and all(_is_number(each) or each is None for each in data):
-        yield f"{name}: {curve([math.nan if each is None else each for each in data])}"
+        yield f"{name}: {curve([math.nan if each is None else each for each in data], *how)}"
     elif isinstance(data, list) and data and all(isinstance(each, str) for each in data):
         yield f"{name}: {len(data)} {' ; '.join(dict.fromkeys(data[:20]))}"
     elif isinstance(data, list):
         for i, each in enumerate(data):
-            yield from _plotted(each, f"{name}[{i}]")
+            yield from _plotted(each, f"{name}[{i}]", how)
     elif isinstance(data, str):
         yield f"{name}: {data}"
     elif _is_number(data):
-        yield f"{name}: {data:.{DIGITS}g}"
+        yield f"{name}: {data:.{how[0]}g}"
 
 
 def table(path: Path) -> list[str]:
@@ -205,12 +245,24 @@ def table(path: Path) -> list[str]:
     return [_kept(line) for line in found]
 
 
-def curve(values: Sequence[float]) -> str:
-    """What tells a curve apart; a short one whole."""
+def curve(values: Sequence[float], digits: int = DIGITS, negligible: float = NEGLIGIBLE) -> str:
+    """What tells a curve apart; a short one whole.
+
+    Args:
+        values: Of the curve.
+        digits: Of each of its figures.
+        negligible: Share of the largest magnitude below which a figure counts as 0.
+    """
+
+    def said(value: float) -> str:
+        if not math.isfinite(value):
+            return str(value)
+        return f"{0.0 if abs(value) < negligible * largest else value:.{digits}g}"
+
     finite = [each for each in values if math.isfinite(each)]
     largest = max(map(abs, finite), default=0.0)
     if len(values) <= 8:
-        return " ".join(_said(each, largest) for each in values)
+        return " ".join(said(each) for each in values)
     if not finite:
         return f"{len(values)} without a number"
     mean = math.fsum(finite) / len(finite)
@@ -219,14 +271,8 @@ def curve(values: Sequence[float]) -> str:
     figures = {"first": finite[0], "last": finite[-1], "min": min(finite), "max": max(finite), "mean": mean}
     figures |= {"rms": rms, "slope": slope}
     return f"{len(values)}, {len(finite)}, {len(set(finite))} distinct: " + ", ".join(
-        f"{k} {_said(v, largest)}" for k, v in figures.items()
+        f"{k} {said(v)}" for k, v in figures.items()
     )
-
-
-def _said(value: float, largest: float) -> str:
-    if not math.isfinite(value):
-        return str(value)
-    return f"{0.0 if abs(value) < NEGLIGIBLE * largest else value:.{DIGITS}g}"
 
 
 def _is_number(value: object) -> bool:

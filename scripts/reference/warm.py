@@ -7,11 +7,16 @@ import runpy
 import sys
 import tempfile
 import traceback
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import IO, NoReturn
 
-LIBRARIES = ("numba", "scipy.linalg", "scipy.optimize", "scipy.signal", "xarray", "h5netcdf")
+LIBRARIES = (
+    *("numba", "scipy.linalg", "scipy.optimize", "scipy.signal", "xarray", "h5netcdf", "jinja2"),
+    *("microrad.lab.bench", "microrad.lab.identify", "microrad.export.linear_import"),
+    "microrad.report.identification.page",
+)
 """What most commands load beside what the first one does."""
 
 is_loaded = False
@@ -28,7 +33,7 @@ def load(words: Sequence[str], folder: Path) -> None:
     ends = os.dup(1)
     with tempfile.TemporaryFile() as out:
         os.dup2(out.fileno(), 1)
-        code = _microrad(words)
+        code = _ended(words)
         sys.stdout.flush()
         os.dup2(ends, 1)
     os.close(ends)
@@ -36,19 +41,28 @@ def load(words: Sequence[str], folder: Path) -> None:
     is_loaded = code == 0
 
 
-def run(words: Sequence[str], folder: Path, environment: Mapping[str, str]) -> tuple[int, str, str]:
-    """Exit code, output and errors of a command in a fork of this process."""
+def run(
+    words: Sequence[str], folder: Path, environment: Mapping[str, str], program: Path | None = None
+) -> tuple[int, str, str]:
+    """Exit code, output and errors of a command in a fork of this process.
+
+    Args:
+        words: Of the command.
+        folder: Where it runs.
+        environment: Its variables.
+        program: A file of Python in place of microrad.
+    """
     sys.stdout.flush()  # what waits to be written would be written by the fork as well
     sys.stderr.flush()
     with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
         if (child := os.fork()) == 0:
-            _become(words, folder, environment, out, err)
+            _become(partial(_ended, words, program), folder, environment, out, err)
         code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
         return code, _text(out), _text(err)
 
 
 def _become(
-    words: Sequence[str], folder: Path, environment: Mapping[str, str], out: IO[bytes], err: IO[bytes]
+    command: Callable[[], int], folder: Path, environment: Mapping[str, str], out: IO[bytes], err: IO[bytes]
 ) -> NoReturn:
     code = 70
     try:
@@ -57,7 +71,7 @@ def _become(
         os.chdir(folder)
         os.environ.clear()
         os.environ.update(environment)
-        code = _microrad(words)
+        code = command()
     except BaseException:
         traceback.print_exc()
     finally:
@@ -66,11 +80,14 @@ def _become(
         os._exit(code)
 
 
-def _microrad(words: Sequence[str]) -> int:
-    """`python -m microrad` with these words, in this process."""
-    sys.argv = ["microrad", *words]
+def _ended(words: Sequence[str], program: Path | None = None) -> int:
+    """`python -m microrad` with these words in this process, or another program."""
+    sys.argv = [str(program or "microrad"), *words]
     try:
-        runpy.run_module("microrad", run_name="__main__", alter_sys=True)
+        if program:
+            runpy.run_path(str(program), run_name="__main__")
+        else:
+            runpy.run_module("microrad", run_name="__main__", alter_sys=True)
     except SystemExit as end:
         return end.code if isinstance(end.code, int) else int(end.code is not None)
     return 0

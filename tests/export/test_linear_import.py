@@ -224,7 +224,7 @@ def test_what_is_given_stands_in_the_file_and_what_it_came_from(tmp_path):
 def test_one_of_several_systems_is_chosen_by_its_name(tmp_path):
     first, second = dict(SHAPES["roots"]), {**SHAPES["roots"], "k": 3.0 * GAIN}
     path = save(tmp_path, first=first, second=second, note="text")
-    with pytest.raises(ExportError, match=r"model\.mat holds 2 systems, 'first', 'second'; choose one by its name"):
+    with pytest.raises(ExportError, match=r"model\.mat holds 2 systems, 'first', 'second'; choose one by its name$"):
         import_mat(path, GIVEN)
     assert difference(answer(tmp_path, import_mat(path, GIVEN, "second"), BAND), 3.0 * by_roots(BAND)) < NINE_DIGITS
     with pytest.raises(ExportError, match="has no system 'third'; it has 'first', 'second'"):
@@ -356,6 +356,7 @@ def test_what_is_no_linear_mirror_is_refused(fields, why, tmp_path):
         ({"bias_v": 20.0}, r"would be refused: .*bias is outside drive_min to drive_max"),
         ({"normalise_at_hz": 0.5}, r"the gain is taken at 0\.5 Hz .*not in the band of 1 Hz to 5000 Hz"),
         ({"normalise_at_hz": 9000.0}, r"the gain is taken at 9000 Hz .*not in the band of 1 Hz to 5000 Hz"),
+        ({"excited_from_hz": 9000.0}, r"the band begins at 9000 Hz and ends at 5000 Hz; give its lower end first"),
         ({"drive_min_v": 12.0, "drive_max_v": 0.0}, r"would be refused: drive_max is not above drive_min"),
         ({"name": "x" * 201}, "would be refused: name: "),
     ],

@@ -219,13 +219,13 @@ def test_decimal_commas_beside_separating_commas(tmp_path):
     assert "decimal commas" in refusal(write(tmp_path / "a.csv", rows, "drive,output"), 0, 1)
 
 
-@pytest.mark.parametrize(("bad", "cells"), [("1.0,2.0", 2), ("1,2,3,4", 4)])
+@pytest.mark.parametrize(("bad", "cells"), [("1.0,2.0", "2 cells"), ("1,2,3,4", "4 cells"), ("1.0", "1 cell")])
 @pytest.mark.parametrize("row", [0, 250, N - 1])
 def test_ragged_rows(tmp_path, bad, cells, row):
     rows = list(ROWS)
     rows[row] = bad
     message = refusal(write(tmp_path / "a.csv", rows))
-    assert f"line {row + 2} has {cells} cells where 3 are expected" in message
+    assert f"line {row + 2} has {cells} where 3 are expected" in message
 
 
 def test_ragged_rows_of_white_space(tmp_path):

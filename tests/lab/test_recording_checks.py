@@ -179,6 +179,11 @@ def test_coarse_output():
     assert "quantisation" not in notes(SINE, GOOD)
 
 
+def test_a_drive_of_two_levels_is_one_step_of_100_per_cent():
+    drive = np.where(np.sin(2 * np.pi * 3.7 * TIME_S) > 0, 4.9, 1.3)
+    assert "moves in steps of 3.6, 100 % of its peak-to-peak (2 levels)" in notes(drive, play(drive))["quantisation"]
+
+
 def test_dither_makes_up_for_coarse_steps():
     step = np.ptp(GOOD) / 20
     assert "dithered" in notes(SINE, step * np.round((GOOD + step * noise()) / step))["quantisation"]
@@ -471,3 +476,9 @@ def test_the_digits_of_a_long_time_column_are_those_of_its_steps(step_s, samples
     assert findings == [] and stated.rate_hz == pytest.approx(1 / step_s)
     (coarse,) = rate_of_time("loops.csv", "time", np.round(time_s, 3), lambda row: f"row {row}")[1]
     assert "is printed to 0.001 s, coarser than the step" in coarse.message
+
+
+def test_one_sample_that_was_written_twice_is_told_once():
+    time_s = np.where(np.arange(N) == 431, 0.43, TIME_S)
+    with pytest.raises(RecordingError, match=r"0\.001 s is usual, once in all; samples were written twice"):
+        rate_of_time("loops.csv", "time", time_s, lambda row: f"row {row}")

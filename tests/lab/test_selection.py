@@ -304,6 +304,8 @@ def test_creep_on_a_short_record_is_refused():
     assert refused.model == "prandtl_ishlinskii_creep"
     assert "lasts 0.01 s" in refused.reason  # half of it is held out
     assert "staircase of 10 s" in refused.reason
+    with pytest.raises(IdentificationError, match=r"_creep' was fitted: .* 10 s[^;]*; there are prandtl"):
+        mirror_file_text(result, "Mirror", model="prandtl_ishlinskii_creep")
     with pytest.raises(IdentificationError, match=r"do not support prandtl_ishlinskii_creep: .* lasts 0\.01 s"):
         identify([record], models=("prandtl_ishlinskii_creep",))
 
@@ -512,6 +514,18 @@ def test_a_mirror_file_of_a_joint_fit_is_the_same_mirror(found, name, sign, tmp_
     if name == "bouc_wen_asymmetric":
         assert abs(table.bouc_wen.gamma_1_v) == pytest.approx(0.25, rel=0.1)
         assert table.bouc_wen.eta_1_v == pytest.approx(-0.15, rel=0.1)
+
+
+def test_a_widening_of_nothing_is_written_without_an_error(found, tmp_path):
+    """Its derivative was taken to both sides of its bound, and thresholds cannot narrow."""
+    drives = [centred_loop(f) for f in (2.5, 10.0)]
+    records = [recorded(d, plays(d, THRESHOLDS, WEIGHTS), seed=k) for k, d in enumerate(drives)]
+    fit = fit_joint(records, "prandtl_ishlinskii_rate", Units(), starts=1)
+    fit = replace(fit, fit=replace(fit.fit, values=np.append(fit.fit.values[:-1], 0.0)))
+    path = tmp_path / "mirror.toml"
+    path.write_text(mirror_file_text(as_chosen(found, fit), "m"), encoding="utf-8")
+    known = load_mirror(path).mirror.uncertainty.parameters
+    assert "prandtl_ishlinskii.weights.1" in known and "prandtl_ishlinskii.widening" not in known
 
 
 def test_standard_errors_in_the_file_are_propagated_ones(found, tmp_path):

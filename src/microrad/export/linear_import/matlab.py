@@ -61,9 +61,8 @@ def select(path: Path, variable: str | None) -> tuple[str, dict[str, Any]]:
         return next(iter(systems.items()))
     if systems:
         listed = ", ".join(repr(name) for name in systems)
-        raise ExportError(
-            f"{path} holds {len(systems)} systems, {listed}; choose one by its name ('' has no structure)"
-        )
+        bare = " ('' has no structure)" if "" in systems else ""
+        raise ExportError(f"{path} holds {len(systems)} systems, {listed}; choose one by its name{bare}")
     raise ExportError(f"{path} has no linear system; {_what_it_has(systems, variables)}")
 
 

@@ -151,6 +151,8 @@ def _check_given(given: Given, source: str) -> None:
     if given.output_unit not in ("rad", "mrad", "urad"):
         raise ExportError(f"{source}: output_unit = {given.output_unit!r} is none of rad, mrad, urad; give one of them")
     low, at, high = given.excited_from_hz, given.normalise_at_hz, given.excited_to_hz
+    if low >= high:
+        raise ExportError(f"{source}: the band begins at {low:g} Hz and ends at {high:g} Hz; give its lower end first")
     if not low <= at <= high:
         raise ExportError(
             f"{source}: the gain is taken at {at:g} Hz (normalise_at), which is not in the band of {low:g} Hz to "

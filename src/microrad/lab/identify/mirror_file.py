@@ -260,14 +260,15 @@ def _uncertainty(fit: Fit, identification: Identification, source: str) -> list[
 def _joint_covariance(fit: JointFit) -> tuple[dict[str, float], Floats]:
     """Numbers of the mirror file (SI) by their keys, and their covariance, parameters at a bound being held."""
     parameters, at = fit.structure.parameters, fit.fit.values
-    bounds = [(p.lower, p.upper) for p in parameters]
-    distance = np.abs(np.array(bounds) - at[:, None]).min(axis=1)
+    lower, upper = np.array([(p.lower, p.upper) for p in parameters]).T
+    distance = np.minimum(at - lower, upper - at)
     scale = np.array([p.scale for p in parameters])
+    step = 1e-6 * scale
 
     def values(where: Floats) -> Floats:
         return np.array(list(_numbers(fit, where).values()))
 
-    jacobian = central_differences(values, at, 1e-6 * scale)
+    jacobian = central_differences(values, np.clip(at, lower + step, upper - step), step)  # no step beyond a bound
     weight = np.array([p.name.startswith("weight") for p in parameters])
     covariance = _holding(fit.fit.covariance, ~weight & (distance <= _BOUND * scale))
     numbers = _numbers(fit, at)

@@ -254,7 +254,7 @@ def _scan(linear: LinearFit) -> Table | None:
             str(s.order),
             str(s.parameters),
             f"{s.chi_square / max(s.freedom, 1):.4g}",
-            f"{s.criterion:.6g}",
+            f"{s.criterion:.5g}",
             f"{s.output_error_rms * 1e6:.4g} µrad",
             "chosen" if s.order == linear.order else "",
         )

@@ -140,7 +140,8 @@ class Identification:
     def _index(self, model: str | None) -> int:
         names = [score.model for score in self.scores]
         if (model or self.chosen) not in names:
-            raise IdentificationError(f"no model '{model}' was fitted; there are {', '.join(names)}.")
+            why = next((f": {each.reason.rstrip('.')}" for each in self.refused if each.model == model), "")
+            raise IdentificationError(f"no model '{model}' was fitted{why}; there are {', '.join(names)}.")
         return names.index(model or self.chosen)
 
 

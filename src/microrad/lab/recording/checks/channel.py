@@ -68,7 +68,7 @@ def quantisation(label: str, values: Floats, drives: Sequence[Floats] | None) ->
     if step == 0 or span / step >= _LEVELS_NOTE:
         return []
     levels = np.unique(subsample(values)).size
-    coarse = f"{label} moves in steps of {step:.4g}, {100 * step / span:.2g} % of its peak-to-peak ({levels} levels"
+    coarse = f"{label} moves in steps of {step:.4g}, {_percent(step / span)} of its peak-to-peak ({levels} levels"
     if drives is None:
         return [Finding("quantisation", label, None, f"{coarse}); a finer converter would drive more evenly", False)]
     shown = max(_places(drive, step / span) for drive in drives)
@@ -81,6 +81,11 @@ def quantisation(label: str, values: Floats, drives: Sequence[Floats] | None) ->
         f"{0.02 * span / step:.2g} steps wide: use a smaller range of the converter or a larger motion"
     )
     return [Finding("quantisation", label, None, text, refused)]
+
+
+def _percent(share: float) -> str:
+    """Two digits of a share, and no power of ten where it is all."""
+    return f"{100 * share:.{2 if share < 0.995 else 3}g} %"
 
 
 def _places(drive: Floats, share: float) -> int:
@@ -117,7 +122,7 @@ def drift(label: str, values: Floats, drives: Sequence[Floats]) -> list[Finding]
     if not refused and max(_crossings(c) for c in u) < _CROSSINGS:
         return []
     text = (
-        f"{label} drifts by {trend:.4g} ± {error:.2g} over the record, {100 * share:.2g} % of its peak-to-peak, where "
+        f"{label} drifts by {trend:.4g} ± {error:.2g} over the record, {_percent(share)} of its peak-to-peak, where "
         "the drive does not: creep or a warming sensor; let it settle before recording, or record shorter"
     )
     return [Finding("drift", label, None, text, refused)]

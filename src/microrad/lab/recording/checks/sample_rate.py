@@ -148,7 +148,8 @@ def _steps(
         row = int(stops[0])
         raise RecordingError(
             f"{where}: {place(row + 1)}, {label}: {steps[row]:.6g} s since the sample before, where {usual:.6g} s is "
-            f"usual, {stops.size} times in all; samples were written twice or late: remove them or record again."
+            f"usual, {'once' if stops.size == 1 else f'{stops.size} times'} in all; samples were written twice or "
+            "late: remove them or record again."
         )
     deviation = steps - step_s
     square = float(deviation @ deviation) / steps.size - slack**2 / 6

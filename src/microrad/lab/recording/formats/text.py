@@ -362,8 +362,9 @@ def _parse_slowly(path: Path, layout: Layout, indices: Sequence[int]) -> list[Fl
                 continue
             cells = split(line.rstrip("\n"), layout.delimiter)
             if len(cells) != layout.columns:
+                count = f"{len(cells)} cell{'s' if len(cells) != 1 else ''}"
                 raise RecordingError(
-                    f"{path}: line {number} has {len(cells)} cells where {layout.columns} are expected, separated by "
+                    f"{path}: line {number} has {count} where {layout.columns} are expected, separated by "
                     f"{DELIMITER_NAMES[layout.delimiter]} ('{short(line)}'); repair or remove the line."
                 )
             for column, values in zip(indices, columns, strict=True):
