@@ -78,6 +78,8 @@ def tiny(faults, tmp_path, monkeypatch):
         file.write_text(text, encoding="utf-8")
     (tree / "tests").mkdir()
     (tree / "pytest.ini").write_text("[pytest]\n", encoding="utf-8")
+    (tree / "scripts").mkdir()
+    (tree / "scripts" / "numbers").write_text("# no case moves\n", encoding="utf-8")
     (tree / "tests" / "test_blunt.py").write_text(A_TEST.format(2, "== 4"), encoding="utf-8")
     (tree / "tests" / "test_sharp.py").write_text(A_TEST.format(3, "== 6"), encoding="utf-8")
     for words in (["init", "-q"], ["add", "."]):
