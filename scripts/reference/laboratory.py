@@ -442,7 +442,12 @@ def identified(place: Place, *words: str, as_json: bool = False, several: bool =
 
 
 def _settled(line: str) -> str:
-    """A line without what rounding decides: how many values of a row differ, and the states of several axes."""
+    """A line without what rounding decides.
+
+    That is how many values of a row differ, the states of several axes, and the third digit of a correlation.
+    """
+    if line.startswith("plot of autocorrelation"):
+        line = re.sub(r"-?\d+\.\d+(?:e-?\d+)?", lambda found: f"{float(found[0]):.2g}", line)
     return re.sub(r"(\[modes\]).*", r"\1", told.DISTINCT.sub("", line))
 
 
