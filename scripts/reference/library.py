@@ -19,6 +19,7 @@ sys.path.insert(0, str(Path(__file__).parent.parent))
 import microrad
 from microrad import BoucWen, Creep, Mirror, PrandtlIshlinskii
 from microrad.lab.identify import fit_hysteretic_stiffness
+from microrad.lab.identify.stiffness.fit import StiffnessOptions
 from microrad.lab.recording import read_arrays
 from microrad.mirror import coupled, spread
 from microrad.mission.file import load_coupled_mirror, load_mirror
@@ -411,10 +412,10 @@ def fitted() -> Iterator[str]:
 
 
 def stiffness() -> Iterator[str]:
-    """Hysteretic stiffness of one axis, from periodic drives in `spring*.csv`, after three steps of its search."""
+    """Hysteretic stiffness of one axis, from periodic drives in `spring*.csv`, after two steps of its search."""
     wanted: dict[str, Any] = {"inputs": "u", "outputs": "x", "rate_hz": 1730.0, "period_samples": 90}
     records = [microrad.read_recording(path, **wanted, alone=False) for path in sorted(Path().glob("spring*.csv"))]
-    fit = fit_hysteretic_stiffness(records, order=2, iterations=3)
+    fit = fit_hysteretic_stiffness(records, order=2, iterations=2, options=StiffnessOptions(few_first=0))
     for key in (
         "rate_hz",
         "sub_steps",
