@@ -10,6 +10,7 @@ from budget_files import KEPT, kept_study, loaded, looped_study, mission_text
 from microrad import report
 from microrad.link.requirement import IMPOSSIBLE
 from microrad.loop import controller_study
+from microrad.mirror import Variant
 from microrad.report.error_budget.data import budget_data
 from microrad.report.study import chain, contributors, words
 from microrad.report.study.data import summary
@@ -108,6 +109,16 @@ def test_what_weighs_most_may_be_of_the_loop():
     assert said.startswith("Vibration (OLYMPUS): ")
     assert "fine_pointing.rate" in todo
     assert budget_data(found.error_budget) == report.summary(found)["error_budget"]
+
+
+@pytest.mark.parametrize(("of_the_ratio", "warned"), [(0.99, True), (1.01, False)])
+def test_a_loop_that_leaves_far_more_than_its_theory_says_is_warned_of(monkeypatch, of_the_ratio, warned):
+    found = looped_study()
+    best = found.fine_pointing.best
+    ratio = best.simulated[Variant.GIVEN].rms_rad / best.theory.radial_rms_rad
+    monkeypatch.setattr(words, "PROMISE", of_the_ratio * ratio)
+    said = f"the error budget takes the loop by its linear theory; simulated, it leaves {ratio:.2f} times as much rms"
+    assert (said in words.ranked_warnings(found)["The loop that is judged"]) is warned
 
 
 def test_a_requirement_on_an_unknown_loop_is_not_met():

@@ -368,11 +368,10 @@ def ranked_warnings(study: Study) -> dict[str, list[str]]:
         own, others = fine_pointing_words.warnings(study.fine_pointing, m.control, m.amplifier)
     paper = [*_of_loops(study), *_of_runs(study)]
     judged = paper if study.fine_pointing is None else []
-    own = [*own, *_of_budget_loop(study)]
     found = {
         "The verdict": [*_of_verdict(study), *map(Warned, _of_sources(study)), *_of_links(study)],
         "The model of the mirror": [*map(Warned, study.summary.warnings)],
-        "The loop that is judged": [*map(_of_fine_loop, own), *map(Warned, judged)],
+        "The loop that is judged": [*map(_of_fine_loop, own), *_of_budget_loop(study), *map(Warned, judged)],
         "The day": [*_of_day(study), *map(Warned, _not_run(study))],
         "Other controllers": [*map(Warned, others)],
         "The paper's loop and figures": [] if judged else [*map(Warned, paper)],
@@ -399,7 +398,7 @@ def _of_links(study: Study) -> list[Warned]:
     return [Warned(text, about[budget.name]) for budget in study.links.budgets for text in budget.warnings]
 
 
-def _of_budget_loop(study: Study) -> list[str]:
+def _of_budget_loop(study: Study) -> list[Warned]:
     """That the loop leaves far more than the budget of pointing errors has of it, or nothing."""
     said, fine = loop_in_budget(study), study.fine_pointing
     if not said or fine is None:
@@ -407,12 +406,11 @@ def _of_budget_loop(study: Study) -> list[str]:
     times = fine.best.simulated[Variant.GIVEN].rms_rad / fine.best.theory.radial_rms_rad
     if times <= PROMISE:
         return []
-    return [f"the error budget takes the loop by its linear theory; simulated, it leaves {times:.2f} times as much rms"]
+    text = f"the error budget takes the loop by its linear theory; simulated, it leaves {times:.2f} times as much rms"
+    return [Warned(text, "error budget")]
 
 
 def _of_fine_loop(text: str) -> Warned:
-    if text.startswith("the error budget"):
-        return Warned(text, "error budget")
     return Warned(text, "stroke" if "the stroke does not cover" in text else "fine pointing")
 
 
