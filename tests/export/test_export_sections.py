@@ -13,6 +13,7 @@ import designs
 from microrad.core import lti
 from microrad.export import choice
 from microrad.export.identifiers import LONGEST, identifier, suggested
+from microrad.export.linear_part import block_diagonal as block_diagonal_form
 from microrad.export.linear_part.block_diagonal import block_diagonal
 from microrad.export.linear_part.modes import minimal, modes
 from microrad.export.linear_part.sections import MODAL, TRIANGULAR, sections
@@ -221,6 +222,24 @@ def test_a_complex_pair_turns_in_a_rotation():
         assert form.A[at, at] == form.A[at + 1, at + 1]
         assert form.A[at, at + 1] == -form.A[at + 1, at] != 0.0
     assert_allclose(np.sort_complex(np.linalg.eigvals(form.A)), np.sort_complex(poles), rtol=1e-12)
+
+
+def test_states_count_in_the_direction_in_which_an_output_rises_whatever_signs_the_schur_form_has(monkeypatch):
+    """Which signs it has depends on the processor."""
+    A = mixed([0.9, 0.5, 0.2, 0.2, -0.4]) + 0.1 * np.eye(5, k=2)
+    C, plain = np.array([[1.0, 0.3, -0.7, 0.4, 1.1]]), block_diagonal_form.schur
+
+    def turned(matrix):
+        T, Q = plain(matrix)
+        signs = np.where(np.arange(len(T)) % 2, -1.0, 1.0)
+        return signs[:, None] * T * signs, Q * signs
+
+    found = block_diagonal(A, C, 100.0)
+    monkeypatch.setattr(block_diagonal_form, "schur", turned)
+    again = block_diagonal(A, C, 100.0)
+    for name in ("blocks", "basis", "inverse"):
+        assert_allclose(getattr(again, name), getattr(found, name), atol=1e-12, err_msg=name)
+    assert np.all(C @ found.basis > 0.0)
 
 
 def test_the_dense_matrix_is_block_diagonal_and_has_the_poles():

@@ -69,7 +69,8 @@ def block_diagonal(A: Floats | Wide, C: Floats | Wide, bound: float) -> BlockDia
     """The block-diagonal form of a square matrix with the smallest blocks that the bound allows.
 
     With a bound of 0 each connected part of A is one block. Within a block those modes stand first whose eigenvectors
-    the outputs show least: a mode that a zero cancels then drives nothing, however large it grows.
+    the outputs show least: a mode that a zero cancels then drives nothing, however large it grows. The
+    output that shows a state most rises with it, on each processor.
 
     Args:
         A: The matrix, finite, shape (states, states), with states of comparable sizes: the bound is absolute.
@@ -91,7 +92,19 @@ def block_diagonal(A: Floats | Wide, C: Floats | Wide, bound: float) -> BlockDia
     for each in slices(sizes):
         if each.stop - each.start == 2:
             basis[:, each], blocks[each, each] = _rotation(basis[:, each], blocks[each, each], bound)
+    sign = _signs(C @ basis, sizes)
+    basis, blocks = basis * sign, sign[:, None] * blocks * sign
     return BlockDiagonal(blocks, basis, _inverse(basis), sizes)
+
+
+def _signs(shown: Wide, sizes: tuple[int, ...]) -> Wide:
+    """1 or -1 for each state, with which the output that shows it most rises with it; a pair has that of its first."""
+    most = np.take_along_axis(shown, np.argmax(np.abs(shown), axis=0)[None], axis=0)[0]
+    sign = np.where(most < 0.0, -1.0, 1.0).astype(np.longdouble)
+    for each in slices(sizes):
+        if each.stop - each.start == 2:
+            sign[each] = sign[each.start]
+    return sign
 
 
 @dataclass(frozen=True, slots=True)
