@@ -76,18 +76,14 @@ def differences(name: str, was: Sequence[str], now: Sequence[str], *, simulated:
         now: Lines as they are said now.
         simulated: Of loops with quantisers, which part from each other by a rounding: numbers may be others by `NEAR`.
     """
-    matched = difflib.SequenceMatcher(
-        None, [_NUMBER.sub("#", each) for each in was], [_NUMBER.sub("#", each) for each in now], autojunk=False
-    )
+    words = [[_NUMBER.sub("#", line) for line in lines] for lines in (was, now)]
     found: list[str] = []
-    for kind, i, k, j, m in matched.get_opcodes():
-        pairs = zip(was[i:k], now[j:m], strict=True) if kind == "equal" else ()
-        apart = (
-            [each for each in pairs if each[0] != each[1] and not (simulated and _alike(*each))]
-            if kind == "equal"
-            else [("", "")]
-        )
-        old, new = ([each[n] for each in apart] for n in (0, 1)) if kind == "equal" else (was[i:k], now[j:m])
+    for kind, i, k, j, m in difflib.SequenceMatcher(None, *words, autojunk=False).get_opcodes():
+        old, new = was[i:k], now[j:m]
+        if kind == "equal":  # but for numbers
+            apart = [each for each in zip(old, new, strict=True) if each[0] != each[1]]
+            apart = [each for each in apart if not (simulated and _alike(*each))]
+            old, new = [each[0] for each in apart], [each[1] for each in apart]
         found += [f"{name}: - {line}" for line in old] + [f"{name}: + {line}" for line in new]
     return found
 
