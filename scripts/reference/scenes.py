@@ -536,13 +536,19 @@ CASES: Mapping[str, Case] = {
         ),
         simulated=True,
     ),
-    "whole-rough": Case(whole(SHIPPED, 4, ROUGH, *POINTING), simulated=True),
+    "whole-rough": Case(whole(SHIPPED, 4, ROUGH, *POINTING), quick=False, simulated=True),
     "whole-tripod": Case(
-        whole(without(SHIPPED, "mirror", "constellation"), 5, TRIPOD, *POINTING, more=PLAYS), simulated=True
+        whole(without(SHIPPED, "mirror", "constellation"), 5, TRIPOD, *POINTING, more=PLAYS),
+        quick=False,
+        simulated=True,
     ),
-    "whole-coupled": Case(whole(SHIPPED, 6, COUPLED, *POINTING, beside={"two-axes.toml": TWO_AXES}), simulated=True),
+    "whole-coupled": Case(
+        whole(SHIPPED, 6, COUPLED, *POINTING, beside={"two-axes.toml": TWO_AXES}), quick=False, simulated=True
+    ),
     "whole-static": Case(whole(without(BARE, r"mirror\.linear"), 7, STATIC, ("budget", "FILE")), simulated=True),
-    "whole-elements": Case(whole(SHIPPED, 8, BY_FILES, *DAY, beside={"satellites.tle": SATELLITES}), simulated=True),
+    "whole-elements": Case(
+        whole(SHIPPED, 8, BY_FILES, *DAY, beside={"satellites.tle": SATELLITES}), quick=False, simulated=True
+    ),
     "crosslink": Case(crosslink),
     "refused": Case(refused),
 }
