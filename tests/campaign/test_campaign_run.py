@@ -7,6 +7,8 @@ import shutil
 import signal
 import sqlite3
 import subprocess
+import sys
+import tempfile
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -17,6 +19,7 @@ from scipy import stats
 
 import microrad
 from microrad.campaign import bundle, records, run
+from microrad.campaign.engines import cluster
 from microrad.campaign.export import export_rows
 from microrad.campaign.file import load_campaign
 from microrad.campaign.ledger import Ledger, chunk_format, mending
@@ -28,9 +31,19 @@ from microrad.campaign.rows.loops import controllers
 from microrad.campaign.rows.plan import planned
 from microrad.campaign.statistics.cell import CellRows
 from microrad.campaign.statistics.summary import summarise_campaign
-from microrad.core import kernels
+from microrad.core import folder, kernels
 from shipped import SHIPPED
-from small_campaign import campaign_file, children, finished, halted, halting, kill, started, without_worker
+from small_campaign import (
+    Here,
+    campaign_file,
+    children,
+    finished,
+    halted,
+    halting,
+    kill,
+    started,
+    without_worker,
+)
 from waiting import HANG_S, any_moment, gone, until
 
 OFTEN = bool(os.environ.get("MICRORAD_ENDURANCE"))
@@ -155,6 +168,33 @@ def test_others_may_read_its_ledger_alone_and_ctrl_c_stops_at_once_and_says_how_
     assert summarise_campaign(book).progress.state == "stopped"
     assert call("campaign", "resume", book).code in (0, 1)
     assert table(book) == undisturbed
+
+
+@pytest.mark.skipif(os.name != "posix", reason="elsewhere no process can be asked for by its number without harm")
+def test_no_files_of_a_bundle_stay_behind_a_campaign_whose_workers_were_killed_or_live_on(monkeypatch, tmp_path):
+    """Those of a cluster are processes of their own, and live on."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "tmp"))
+    (tmp_path / "tmp").mkdir()
+    path = campaign_file(tmp_path, runs=2)
+    ended = subprocess.Popen([sys.executable, "-c", ""])
+    ended.wait()
+
+    class Engine(Here):
+        def outcomes(self, jobs):
+            yield from super().outcomes(jobs)
+            cluster.install("c", run.TARGET, self.spec, bundle.code_sha256())
+            cluster._openings["c"].opened()
+            left = folder.scratch_folder(bundle.SCRATCH)
+            left.rename(left.with_name(left.name.replace(f"-{os.getpid()}-", f"-{ended.pid}-")))
+            assert len(list((tmp_path / "tmp").iterdir())) == 3
+
+        def close(self):
+            cluster.forget("c")
+            vars(self).pop("work")
+
+    monkeypatch.setattr(run.Means, "engine", lambda means, spec, late_s: Engine(spec))
+    run.run_campaign(path, tmp_path / "c.ledger")
+    assert list((tmp_path / "tmp").iterdir()) == []
 
 
 # --------------------------------------------------------------------------------------------------- same rows, however

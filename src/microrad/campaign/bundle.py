@@ -29,6 +29,8 @@ from microrad.mission.file import named_files
 _MOST_BYTES = 1_000_000_000  # of a file: more than any of those who read it take
 LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "sgp4", "skyfield")
 """Libraries whose version may move the last digits of a row."""
+SCRATCH = "campaign"
+"""What the folders among the temporary files are called that hold the files of opened bundles."""
 
 
 @cache
@@ -96,7 +98,7 @@ def opened(spec: bytes, any_code: bool = False) -> Opened:
             f"this worker runs other code than the campaign: {code_sha256()} here, {content.code} there; install the "
             "same microrad, Python and libraries on every worker"
         )
-    folder = scratch_folder("campaign")
+    folder = scratch_folder(SCRATCH)
     try:
         with naming(folder, folder):
             for name, data in content.files.items():

@@ -5,7 +5,7 @@ import math
 import os
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing, suppress
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from importlib.metadata import version
@@ -38,10 +38,11 @@ from microrad.campaign.rows.plan import planned
 from microrad.campaign.statistics.cell import CellRows
 from microrad.campaign.statistics.intervals import ordered
 from microrad.core.arrays import Floats
+from microrad.core.folder import sweep_scratch
 from microrad.core.progress import Progress
 from microrad.core.units import format_quantity
 
-TARGET = "microrad.campaign.work:open_work"
+TARGET = "microrad.campaign.work:Work"
 _NEWS = 1.1  # times the rows that the quantile shown meanwhile is of, before it is computed again
 _TIMED_S = 0.2  # of rows, before a campaign of links alone begins
 LATE_S = 30.0
@@ -103,7 +104,7 @@ def run_campaign(
         campaign = replace(campaign, chunk_rows=plan.timed_chunk(row_s(campaign)))
     spec = bundle.packed(campaign, controllers(campaign, on_progress))
     with (
-        closing(means.engine(spec, campaign.table.row_limit_s + LATE_S)) as engine,  # none there leaves no ledger
+        _closing(means.engine(spec, campaign.table.row_limit_s + LATE_S)) as engine,  # none there leaves no ledger
         Ledger.create(path, _head(campaign, spec), {"file": str(file.resolve())}) as book,
     ):
         _Runner(campaign, engine, book, on_progress).run()
@@ -128,8 +129,18 @@ def resume_campaign(path: Path, means: Means, on_progress: Progress = lambda don
         opened = bundle.opened(head.bundle, any_code=True)
         campaign = load_campaign(file) if file.is_file() else opened.campaign
         check_same(head.hashes, bundle.hashes(campaign), path)
-        with closing(means.engine(head.bundle, opened.campaign.table.row_limit_s + LATE_S)) as engine:
+        with _closing(means.engine(head.bundle, opened.campaign.table.row_limit_s + LATE_S)) as engine:
             _Runner(opened.campaign, engine, book, on_progress).run()
+
+
+@contextmanager
+def _closing(engine: Engine) -> Iterator[Engine]:
+    """Close an engine at the end, and remove what its workers on this machine left when they were killed."""
+    try:
+        with closing(engine):
+            yield engine
+    finally:
+        sweep_scratch(bundle.SCRATCH)
 
 
 def row_s(campaign: CampaignFile, clock: Callable[[], float] = time.perf_counter) -> float:

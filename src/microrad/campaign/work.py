@@ -1,7 +1,6 @@
 """What a worker does: the rows of a chunk, one row by itself, or the trace of a row; the same bytes everywhere."""
 
 from collections.abc import Callable
-from functools import lru_cache
 
 from microrad.campaign.bundle import code_sha256, opened
 from microrad.campaign.ledger import chunk_format
@@ -11,7 +10,7 @@ from microrad.campaign.rows.loops import mission_loop
 from microrad.campaign.rows.plan import planned
 from microrad.loop.pointing_loop import ensemble, traces
 
-__all__ = ["Work", "code_sha256", "open_work"]
+__all__ = ["Work", "code_sha256"]
 
 
 class Work:
@@ -44,9 +43,3 @@ class Work:
         else:
             found = self.evaluator.rows(job.cell, self.plan.rows_of(job.number), beat, number=job.number)
         return chunk_format.pack_chunk(found)
-
-
-@lru_cache(maxsize=2)
-def open_work(spec: bytes) -> Work:
-    """The work of a campaign; kept, so that the next job of the same campaign finds it open."""
-    return Work(spec)

@@ -120,6 +120,11 @@ def scratch_folder(what: str) -> Path:
     return new_folder(Path(tempfile.gettempdir()), f"microrad-{what}")
 
 
+def sweep_scratch(what: str) -> None:
+    """Remove the scratch folders that processes of this machine left behind when they were killed."""
+    _sweep(Path(tempfile.gettempdir()), f"microrad-{what}", "")
+
+
 @contextmanager
 def scratch(what: str) -> Iterator[Path]:
     """A folder among the temporary files, which vanishes at the end."""
