@@ -74,12 +74,16 @@ def _processes(folder: Path) -> tuple[str, ...]:
 
 
 _ON_DASK = """
-import sys
+import sys, traceback
 from distributed import LocalCluster
 from microrad.cli import main
-with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
-    sys.argv = ["microrad", *sys.argv[1:], "--scheduler", cluster.scheduler_address]
-    main()
+try:
+    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
+        sys.argv = ["microrad", *sys.argv[1:], "--scheduler", cluster.scheduler_address]
+        main()
+except Exception:  # of a cluster whose worker was killed while it began or ended: not the code 1 of the command
+    traceback.print_exc()
+    sys.exit(3)
 """
 
 

@@ -317,6 +317,55 @@ def test_the_rules_add_means_and_the_squares_of_deviations():
     assert found.quantile_rad < found.by_rules_rad
 
 
+# ECSS-E-ST-60-10C, Annex C: the ensembles of Table C-2 about x, y, z (arcsec; periods are "orbit" and "less than the
+# observation period" there), what Tables C-3 and C-4 print of each source, their totals, and twice these
+ANNEX_C = {
+    "star tracker noise": ("random", "fixed", ((10.0, 0.0), (5.0, 0.0), (5.0, 0.0)), {}),
+    "star tracker bias": ("constant", "gaussian", ((0.0, 20.0 / 3.0), (0.0, 10.0 / 3.0), (0.0, 10.0 / 3.0)), {}),
+    "controller and actuators": ("random", "gaussian", ((1.0, 3.0), (1.0, 3.0), (1.0, 3.0)), {}),
+    "thermoelastic": ("periodic", "uniform", ((2.0, 2.0), (2.0, 2.0), (2.0, 2.0)), {"freq_hz": 1.0 / 5400.0}),
+    "misalignment": ("constant", "uniform", ((0.0, 5.0), (0.0, 5.0), (0.0, 5.0)), {}),
+    "targeting": ("periodic", "gaussian", ((0.0, 5.0), (0.0, 1.0), (0.0, 5.0)), {"freq_hz": 1.0 / 5400.0}),
+    "flexible modes": ("periodic", "gaussian", ((0.0, 3.0), (0.0, 5.0), (0.0, 3.0)), {"freq_hz": 1.0}),
+}
+C_3 = (
+    (10.0, 6.67, 3.16, 1.63, 2.89, 3.54, 2.12, 13.51, 27.01),
+    (5.0, 3.33, 3.16, 1.63, 2.89, 0.71, 3.54, 8.37, 16.75),
+    (5.0, 3.33, 3.16, 1.63, 2.89, 3.54, 2.12, 8.61, 17.21),
+)
+C_4 = (
+    (10.0, 0.0, 3.16, 0.0, 0.0, 0.0, 2.12, 10.70, 21.40),
+    (5.0, 0.0, 3.16, 0.0, 0.0, 0.0, 3.54, 6.89, 13.78),
+    (5.0, 0.0, 3.16, 0.0, 0.0, 0.0, 2.12, 6.28, 12.57),
+)
+
+
+@pytest.mark.parametrize(
+    ("index", "printed", "limits", "within"),
+    [
+        (ErrorIndex("APE"), C_3, (60.0, 20.0, 20.0), 0.0051),
+        (ErrorIndex("RPE", window_s=30.0), C_4, (30.0, 10.0, 10.0), 0.051),  # zeros of one digit
+    ],
+    ids=["APE", "RPE"],
+)
+@pytest.mark.parametrize("axis", [0, 1, 2], ids="xyz")
+def test_the_standard_s_worked_example_comes_out_to_its_digits(index, printed, limits, within, axis):
+    confidence = 2.0 * stats.norm.cdf(2.0) - 1.0  # the example's "95 %" is twice the deviation
+    required = Requirement(index, confidence, "mixed", axes=(0,), limit_rad=limits[axis])
+    sources = [
+        ErrorSource(name, kind, Spread(shape, *sizes[axis]), ONE, **more)
+        for name, (kind, shape, sizes, more) in ANNEX_C.items()
+    ]
+    own = contributions(sources, required)
+    found = total(own, required)
+    deviations = [alone(*each.parts).sigma[0] for each in own]
+    assert deviations == pytest.approx(printed[axis][:-2], abs=within, rel=0.0)
+    assert found.sigma_rad[0] == pytest.approx(printed[axis][-2], abs=0.0051, rel=0.0)
+    assert found.by_rules_rad == pytest.approx(printed[axis][-1], abs=0.0102, rel=0.0)  # twice what is rounded
+    assert found.mean_rad[0] == pytest.approx(0.0, abs=1e-12)  # "all of the errors in the budget have zero mean"
+    assert (found.by_rules_rad <= limits[axis]) == (index.kind == "APE" or axis == 0)  # as it says there
+
+
 def test_totals_of_several_requirements_are_each_as_by_itself():
     parts = [replace(each, transfer=np.array([1.0, 0.5])) for each in UNLIKE]
     asked = [replace(APE, axes=axes, interpretation=name) for axes in ((0,), (1,)) for name in ("temporal", "mixed")]

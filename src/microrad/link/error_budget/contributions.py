@@ -52,8 +52,6 @@ _LOGARITHMS = np.log(np.concatenate([np.linspace(1.0, 0.0, 13)[1:-1], np.geomspa
 _MANY_TURNS = 16.0  # of a sinusoid in a window
 _FOLDED = 64  # pieces of a Gaussian without its sign
 _ROUNDING = 1e-9  # of a spacing that is whole periods
-_SOUND = 1e9  # condition of the modes of a transient, above which they coincide
-_STRIPS = 6  # of a window, in which a transient is taken as straight
 
 
 @dataclass(frozen=True, slots=True)
