@@ -52,7 +52,7 @@ def test_a_recording_is_data_with_all_that_was_found_in_it(document):
     assert {*axis["stationarity"]} == {"stationary", "reason", "motion", "fast_part"}
     assert {*axis["left"]} == {
         *("begin_s", "end_s", "mean_rad", "played_rms_rad", "quietest_eighth_rms_rad", "loudest_eighth_rms_rad"),
-        *("fitted_rms_rad", "sensors_rms_rad", "cut_off_rms_rad", "difference", "reason"),
+        *("fitted_rms_rad", "sensors_rms_rad", "simulated_rms_rad", "cut_off_rms_rad", "difference", "reason"),
     }
     assert (axis["name"], recording["rate_hz"]) == ("x (urad)", pytest.approx(RATE_HZ, rel=1e-6))
     assert axis["mean_rad"] == pytest.approx(32e-6, rel=0.1) and axis["slope_rad_s"] == pytest.approx(0.5e-6, rel=0.5)
@@ -73,14 +73,16 @@ def test_a_recordings_tables_and_sentences_fit_a_terminal(tmp_path):
     other = replace(fit, whiteness=replace(fit.whiteness, p_value=0.0), stationarity=tests)
     played = Played(0.5, 2.9, 1e-9, 3e-6, 2.9e-6, 4e-6)
     axes = (
-        RecordedAxis(fit, RecordedResidual(played, 3.01e-6, 1e-7, 2e-7, "")),
-        RecordedAxis(other, RecordedResidual(played, 2.5e-6, 1e-7, 0.0, "the recording is not stationary: a burst")),
+        RecordedAxis(fit, RecordedResidual(played, 3.01e-6, 1e-7, 3.3e-6, 2e-7, "")),
+        RecordedAxis(
+            other, RecordedResidual(played, 2.5e-6, 1e-7, 3.3e-6, 0.0, "the recording is not stationary: a burst")
+        ),
     )
     loop = Loop(mirror=Mirror.of(50e-6, [1.0], [1 / 3000**2, 2 * 0.1 / 3000, 1.0]), rate_hz=RATE_HZ).parts
     text = recording_text("jitter.csv", axes, loop, "PI", 80)
     assert max(map(len, text.splitlines())) <= 80
     said = " ".join(text.split())
-    assert "Recorded" in said and "Left by the loop under PI" in said and "radial 4.24 3.91 8.4 %" in said
+    assert "Recorded" in said and "Left by the loop under PI" in said and "radial 4.24 3.91 8.4 % 4.67" in said
     assert "x: 0.200 µrad above" in said and "half of the plant's rate, are cut off." in said
     assert "the one-step-ahead residual of the fit is not white below 400 Hz" in said
     assert "not stationary, the variance of its fast part in 8 equal parts differs 9 times" in said

@@ -14,6 +14,7 @@ from numpy.testing import assert_allclose
 from microrad import mirror
 from microrad.loop import control, controller_study
 from microrad.loop.controller_study import designs, parts, results, scenario
+from microrad.loop.disturbance import Misalignment
 from microrad.loop.pointing_loop import ensemble, traces
 from microrad.loop.pointing_loop.design import design_plant
 from microrad.loop.pointing_loop.linear import close, stationary
@@ -21,6 +22,7 @@ from microrad.loop.pointing_loop.loop import assemble
 from microrad.mirror import hysteresis
 from microrad.mirror import spread as mirror_spread
 from microrad.mission.file import load_mission
+from microrad.mission.tables.fine_pointing import MisalignmentTable
 from scenes import scene_of
 from shipped import SHIPPED, whole_study
 from shipped import edited_file as edited_shipped
@@ -349,8 +351,22 @@ def test_a_part_that_is_left_out_leaves_the_others_as_they_were(scene, tuned):
     assert np.abs(whole).max() > 1e-6
 
 
+def test_a_misalignment_is_in_every_run_a_source_of_its_own_and_in_the_stroke(file, scene):
+    of = MisalignmentTable.model_validate({"offset": ["20 urad", "-5 urad"], "drift": ["0 urad/s", "100 urad/s"]})
+    fine = file.mission.fine_pointing.model_copy(update={"misalignment": of})
+    moved = scene_of(replace(file, mission=file.mission.model_copy(update={"fine_pointing": fine})))
+    assert moved.loop.unknown == (Misalignment(20e-6, 0.0), Misalignment(-5e-6, 100e-6))
+    assert moved.axis.unknown == moved.loop.unknown[:1] and scene.loop.unknown == ()
+    assert parts.sources(moved.loop) == (*parts.sources(scene.loop)[:-1], parts.MISALIGNMENT, parts.REFERENCE)
+    assert parts.without(moved.loop, parts.MISALIGNMENT).unknown == ()
+    more = [m.total_rad - s.total_rad for m, s in zip(moved.own_stroke, scene.own_stroke, strict=True)]
+    assert more == pytest.approx([20e-6, 5e-6 + 100e-6 * fine.duration_s], rel=1e-9)
+
+
 def test_an_unknown_part_is_refused_with_those_there_are(scene):
-    with pytest.raises(ValueError, match=r"no part 'wheels'; it has reference, optical sensor noise.*OLYMPUS, body"):
+    with pytest.raises(
+        ValueError, match=r"no part 'wheels'; it has reference, misalignment, optical sensor noise.*OLYMPUS, body"
+    ):
         parts.without(scene.loop, "wheels")
 
 

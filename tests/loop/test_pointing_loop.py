@@ -14,7 +14,7 @@ from scipy.stats import kstest
 from microrad.core import kernels, lti
 from microrad.loop import control, disturbance
 from microrad.loop.control import AxisController, Drive, Timing
-from microrad.loop.disturbance import Disturbance, Reference
+from microrad.loop.disturbance import Disturbance, Misalignment, Reference, SampledReference
 from microrad.loop.pointing_loop import ensemble, kernel_arrays, linear, traces
 from microrad.loop.pointing_loop import loop as fine
 from microrad.loop.pointing_loop.design import (
@@ -984,6 +984,36 @@ def test_the_mean_is_that_of_the_control_samples_and_the_rms_that_of_all_plant_s
     assert_allclose(found.mean_rad[0], np.mean(errors, axis=0), rtol=1e-9)
     assert_allclose(found.rms_rad[0], np.sqrt(np.mean(errors**2, axis=0)), rtol=0.01)
     assert not np.allclose(found.rms_rad[0], np.sqrt(np.mean(errors**2, axis=0)), rtol=1e-9, atol=0)
+
+
+@pytest.mark.parametrize("axes", [1, 2])
+def test_what_no_controller_knows_is_a_reference_to_one_that_looks_at_none(axes):
+    """To the last bit; and one that feeds its reference forward takes only what it knows."""
+    course = tuple(Misalignment(offset, rate) for offset, rate in ((20 * URAD, 30 * URAD), (-5 * URAD, 0.0)))[:axes]
+    loop = replace(scenario(axes, optical=OpticalSensor(URAD, inf, 0.0, 1, 10)), references=(STILL,) * axes)
+    period, span = loop.timing.period_s, Span(0.3, 0.1, 4)
+    as_reference = tuple(SampledReference(each.at(period * np.arange(4000)), period) for each in course)
+    known, unknown = replace(loop, references=as_reference), replace(loop, unknown=course)
+    of = pi_for(loop)
+    seen, unseen = (traces.trace(each, of, span) for each in (known, unknown))
+    assert_array_equal(seen.error_rad, unseen.error_rad)
+    assert_array_equal(seen.drive_v, unseen.drive_v)
+    assert_allclose(unseen.disturbance_rad, seen.disturbance_rad + seen.reference_rad, rtol=0, atol=1e-18)
+    assert not unseen.reference_rad.any()
+    assert np.array_equal(*(ensemble.simulate(each, of, span, 2).histogram for each in (known, unknown)))
+    s = of.system
+    forward = replace(of, system=replace(s, D=s.D + np.pad(np.eye(axes), ((0, 0), (2 * axes, 0)))))
+    seen, unseen = (traces.trace(each, forward, span) for each in (known, unknown))
+    assert np.ptp(seen.drive_v - unseen.drive_v) > 0.0
+    assert_array_equal(unseen.error_rad, traces.trace(unknown, of, span).error_rad)
+
+
+def test_a_controller_with_an_integrator_takes_an_offset_off_and_lags_behind_a_drift():
+    """By its rate over 2 pi times the frequency of the integral: the final value."""
+    loop = quiet(scenario(of=static_mirror(), unknown=(Misalignment(20 * URAD, 500 * URAD),)))
+    error = traces.trace(loop, pi_for(loop, integral_hz=200.0), Span(0.4, 0.1, 1)).error_rad[:, 0]
+    assert error[0] == pytest.approx(20 * URAD)
+    assert error[-1] == pytest.approx(500 * URAD / (2 * pi * 200.0), rel=1e-3, abs=0.0)
 
 
 def test_runs_side_by_side_have_references_of_their_own():

@@ -128,7 +128,7 @@ def test_only_wheels_strain_gauge_and_quad_cell_may_be_left_out(refuse, load):
 
 def test_what_is_optional_has_no_other_default():
     optional = {name for name, field in FinePointing.model_fields.items() if not field.is_required()}
-    assert optional == {"wheels", "strain_gauge", "mirror_file"}
+    assert optional == {"wheels", "misalignment", "strain_gauge", "mirror_file"}
     shipped = {key.removeprefix("fine_pointing.") for key in load_mission(SHIPPED).sources if "fine_pointing" in key}
     assert {key for key in shipped if "." not in key} == {
         field.alias or name
@@ -176,6 +176,20 @@ def test_the_wheel_that_is_commented_out_has_the_lines_that_it_says(load):
     )
     lines = [(line.freq_hz, line.amplitude_rad) for line in made.lines]
     np.testing.assert_allclose(lines, [(50.0, 0.25e-6), (100.0, 0.1e-6)], rtol=1e-12)
+
+
+MISALIGNED = '[fine_pointing.misalignment]\noffset = ["20 urad", "-5 urad"]\ndrift = ["0.1 urad/s", "0 urad/s"]\n\n'
+
+
+def test_a_misalignment_has_an_offset_and_a_drift_about_each_axis(load, refuse):
+    text = TEXT.replace("[fine_pointing.optical_sensor]", f"{MISALIGNED}[fine_pointing.optical_sensor]")
+    found = load(text).misalignment
+    assert (found.offset_rad, found.drift_rad_s) == (pytest.approx((20e-6, -5e-6)), pytest.approx((1e-7, 0.0)))
+    for key, item in (("offset", '"-5 urad"'), ("drift", '"0 urad/s"')):
+        fault = refuse(text.replace(f", {item}]", "]"))
+        assert (fault.key, fault.reason) == (f"fine_pointing.misalignment.{key}", "has 1 items")
+        assert fault.expected.startswith("two, for x and y")
+    assert refuse(text.replace('"0.1 urad/s"', '"0.1 urad"')).key == "fine_pointing.misalignment.drift"
 
 
 def test_the_quad_cell_that_is_commented_out_has_the_noise_that_it_says(load):

@@ -180,10 +180,10 @@ def _measure(p, s, reference, shift, drawn):  # type: ignore[no-untyped-def]
         if p.gauge_resolution > 0.0:
             for r in range(ROW_LENGTH):
                 measured[at + r] = quantised(measured[at + r], p.gauge_resolution)
-    own = np.uint64(1 if reference.shape[1] > 1 else 0)
+    own, known = np.uint64(1 if reference.shape[1] > 1 else 0), reference.shape[0] - axes
     for i in range(axes):
         for r in range(ROW_LENGTH):
-            s.measured[at_row(axes + outputs + i) + r] = reference[i, own * r]
+            s.measured[at_row(axes + outputs + i) + r] = reference[known + i, own * r]
 
 
 @inlined
@@ -368,7 +368,7 @@ def ensemble_loop(p, s, reference, residual, trace, shift):  # type: ignore[no-u
         p: The `Ensemble`.
         s: Its `EnsembleState`; the random numbers that the runs begin with are drawn already.
         reference: Reference of each axis, rad, shape (samples + 1, axes, 1), or with LANES in place of the 1 where each
-            run has its own.
+            run has its own. Of twice as many axes the controller knows the second half alone.
         residual: Line-of-sight error at the begin of each sample, rad, shape (samples, axes, LANES); written if it has
             rows.
         trace: What there is once a sample has measured, shape (samples, channels, LANES): disturbance by axis, drive

@@ -8,12 +8,16 @@ from microrad.loop.control import Drive
 from microrad.loop.disturbance import NO_REFERENCE
 from microrad.loop.pointing_loop.loop import PointingLoop, without_hysteresis
 
-REFERENCE, OPTICAL_NOISE, GAUGE_NOISE = "reference", "optical sensor noise", "gauge noise"
+REFERENCE, MISALIGNMENT, OPTICAL_NOISE, GAUGE_NOISE = "reference", "misalignment", "optical sensor noise", "gauge noise"
 QUANTISATION, LIMITS, HYSTERESIS, DELAY = "quantisation", "limits", "hysteresis", "computation delay"
 
 
 def _without_reference(loop: PointingLoop) -> PointingLoop:
     return replace(loop, references=tuple(NO_REFERENCE for _ in loop.references))
+
+
+def _without_misalignment(loop: PointingLoop) -> PointingLoop:
+    return replace(loop, unknown=())
 
 
 def _without_optical_noise(loop: PointingLoop) -> PointingLoop:
@@ -44,6 +48,7 @@ def _without_delay(loop: PointingLoop) -> PointingLoop:
 
 SWITCHES: dict[str, Callable[[PointingLoop], PointingLoop]] = {
     REFERENCE: _without_reference,
+    MISALIGNMENT: _without_misalignment,
     OPTICAL_NOISE: _without_optical_noise,
     GAUGE_NOISE: _without_gauge_noise,
     QUANTISATION: _without_quantisation,
@@ -77,10 +82,11 @@ def without(loop: PointingLoop, *names: str) -> PointingLoop:
 
 
 def sources(loop: PointingLoop) -> tuple[str, ...]:
-    """What brings error into the loop by itself: its disturbances, noises and reference.
+    """What brings error into the loop by itself: its disturbances, noises, misalignment and reference.
 
     Quantisation is none: in a loop at rest it does nothing.
     """
     names = dict.fromkeys(each.name for several in loop.disturbances for each in several)
     gauge = () if loop.gauge is None else (GAUGE_NOISE,)
-    return (*names, OPTICAL_NOISE, *gauge, REFERENCE)
+    unknown = (MISALIGNMENT,) if loop.unknown else ()
+    return (*names, OPTICAL_NOISE, *gauge, *unknown, REFERENCE)

@@ -317,7 +317,7 @@ def error_budget(scene: AnyScene, of: Verified, on_progress: Progress = lambda d
 
 
 def _following_sine(loop: PointingLoop, amplitude_rad: float, freq_hz: float) -> PointingLoop:
-    alone = parts.without(loop, parts.REFERENCE, BODY_POINTING)
+    alone = parts.without(loop, parts.REFERENCE, parts.MISALIGNMENT, BODY_POINTING)
     first = replace(alone.references[0], sine_amplitude_rad=amplitude_rad, sine_freq_hz=freq_hz)
     return replace(alone, references=(first, *alone.references[1:]))
 

@@ -19,6 +19,7 @@ from microrad.mission.tables.fine_pointing import FinePointing, OpticalSensorTab
 from microrad.mission.tables.pointing import Pointing
 
 BODY_POINTING = "body pointing"
+MISALIGNMENT_KEYS = ("fine_pointing.misalignment.offset", "fine_pointing.misalignment.drift")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -134,6 +135,7 @@ def scene(file: MissionFile, mirrors: MirrorParts, received_power_w: float | Non
         gauge=None if gauge is None else sensor.StrainGauge(gauge.noise_rad, gauge.resolution_rad),
         references=references(f),
         drive_range_v=mirrors.drive_range_v,
+        unknown=misalignments(f),
     )
     scale = fine.nominal_axis_gain(loop) / abs(float(fine.in_band_gain(one)[0, 0]))
     axis = replace(
@@ -142,6 +144,7 @@ def scene(file: MissionFile, mirrors: MirrorParts, received_power_w: float | Non
         optics=np.array([[scale]]),
         disturbances=loop.disturbances[:1],
         references=loop.references[:1],
+        unknown=loop.unknown[:1],
     )
     with_it, without = (stroke(f, mirrors, chain, m.pointing, file.sources, on_mirror) for on_mirror in (True, False))
     freqs = sorted({*m.scenario.pid_frequencies_hz, *m.scenario.inverse_frequencies_hz})
@@ -284,6 +287,12 @@ def references(f: FinePointing) -> tuple[disturbance.Reference, ...]:
     )
 
 
+def misalignments(f: FinePointing) -> tuple[disturbance.Misalignment, ...]:
+    """By axis: what no controller knows, static and drifting; nothing where the table is not there."""
+    of = f.misalignment
+    return () if of is None else tuple(map(disturbance.Misalignment, of.offset_rad, of.drift_rad_s))
+
+
 def stroke(
     f: FinePointing,
     mirrors: MirrorParts,
@@ -331,10 +340,11 @@ def demand(f: FinePointing, pointing: Pointing, on_mirror: bool) -> geometry.Str
     r = f.reference
     lag = r.line_of_sight_rate_rad_s * (1.0 - r.rate_feedforward) / (2.0 * math.pi * f.body.bandwidth_hz)
     body = f.body.error_rad / (math.sqrt(2.0) if f.body.convention == "radial" else 1.0)
+    own = [abs(each.offset_rad) + abs(each.rate_rad_s) * f.duration_s for each in misalignments(f)] or [0.0, 0.0]
     return geometry.StrokeDemand(
         body_pointing_rad=(body, body),
         point_ahead_rad=(r.point_ahead_rad, 0.0),
-        bias_rad=(pointing.bias_rad, pointing.bias_rad),
+        bias_rad=(pointing.bias_rad + own[0], pointing.bias_rad + own[1]),
         rate_lag_rad=(lag, 0.0),
         point_ahead_on_mirror=on_mirror,
     )
@@ -350,8 +360,9 @@ def demand_sources(pointing: Pointing, sources: Mapping[str, Source]) -> dict[st
     named = {
         "body_pointing_rad": ("fine_pointing.body.error",),
         "point_ahead_rad": ("fine_pointing.reference.point_ahead",),
-        "bias_rad": tuple(
-            f"pointing.lines.{name}.error" for name, line in pointing.lines.items() if line.kind == "bias"
+        "bias_rad": (
+            *(f"pointing.lines.{name}.error" for name, line in pointing.lines.items() if line.kind == "bias"),
+            *(key for key in MISALIGNMENT_KEYS if key in sources),
         ),
         "rate_lag_rad": ("fine_pointing.reference.line_of_sight_rate", "fine_pointing.reference.rate_feedforward"),
     }

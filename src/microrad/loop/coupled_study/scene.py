@@ -77,10 +77,12 @@ class CoupledScene(scenario.AnyScene):
 
     @property
     def static_v(self) -> tuple[float, ...]:
-        """Drives (V, from the bias, without sign) for the known part of the pointing error, once it has settled."""
+        """Drives (V, from the bias, without sign) for the known part of the error, once it has settled, and an offset."""
         settled = np.array(
             [float(each.at(np.array(SETTLED / each.body_bandwidth_hz))) for each in self.loop.references]
         )
+        if self.loop.unknown:
+            settled = settled + [float(each.at(np.array(0.0))) for each in self.loop.unknown]
         drives = decoupling(self.rest) / nominal_axis_gain(self.rest) @ settled
         return tuple(np.abs(drives).tolist())
 
@@ -135,6 +137,7 @@ def scene(file: MissionFile, mirror: CoupledMirror, received_power_w: float | No
             min(a.drive_max_v - a.bias_v for a in mirror.actuators),
         ),
         held=piston,
+        unknown=scenario.misalignments(f),
     )
     seen = read_each_sample(loop)
     plain = [linearised(mirror.mirror, gains) for gains in _gains(mirror, loop.drive_range_v)]

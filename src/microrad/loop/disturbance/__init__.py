@@ -10,7 +10,7 @@ from microrad.loop.disturbance.records import (
     one_input,
     psd,
 )
-from microrad.loop.disturbance.reference import NO_REFERENCE, Reference, SampledReference
+from microrad.loop.disturbance.reference import NO_REFERENCE, Misalignment, Reference, SampledReference
 from microrad.loop.disturbance.sources import (
     MICIUS_EDGES_HZ,
     MICIUS_RMS_RAD,
@@ -27,6 +27,7 @@ __all__ = [
     "NO_REFERENCE",
     "Discrete",
     "Disturbance",
+    "Misalignment",
     "Reference",
     "SampledReference",
     "SpectralLine",

@@ -44,6 +44,28 @@ class Reference:
         return np.asarray(self.point_ahead_rad + lag + sine)
 
 
+@dataclass(frozen=True, slots=True)
+class Misalignment:
+    """A static offset and a steady drift of one axis, of which no controller knows: offset + rate t.
+
+    Raises ValueError for a number that is not finite.
+    """
+
+    offset_rad: float
+    rate_rad_s: float
+
+    def __post_init__(self) -> None:
+        """Check each number."""
+        if not (math.isfinite(self.offset_rad) and math.isfinite(self.rate_rad_s)):
+            raise ValueError(
+                f"a misalignment of {self.offset_rad:g} rad and {self.rate_rad_s:g} rad/s; give finite numbers"
+            )
+
+    def at(self, time_s: Floats) -> Floats:
+        """Misalignment (rad) at these times (s)."""
+        return self.offset_rad + self.rate_rad_s * np.asarray(time_s, dtype=float)
+
+
 NO_REFERENCE = Reference(0.0, 0.0, 1.0)
 
 

@@ -283,7 +283,7 @@ def start(
         rows.reshape(-1, LANES)[: begin.size] = begin.reshape(-1, 1)
     shaped = lti.to_bits(p.shaping_output @ state.shaping.reshape(-1, LANES)[: p.shaping_diagonal.size], lti.EXACT_BITS)
     state.disturbance[:] = shaped.ravel()
-    state.error[:] = (shaped + reference(loop, 0, 0, references)[0]).ravel()
+    state.error[:] = (shaped + reference(loop, 0, 0, references)[0, :axes]).ravel()
     state.error_ring[:] = np.tile(state.error, p.sensor_delay_steps + 1)
     return state
 
@@ -325,6 +325,8 @@ def uniform(gaussians: Floats) -> Floats:
 def reference(loop: PointingLoop, begin: int, end: int, references: Sequence[References] = ()) -> Floats:
     """Reference (rad) at some control samples: (samples, axes, 1), one for all runs, or (samples, axes, LANES).
 
+    Where the loop has what no controller knows, the axes stand twice: with that first, then without it.
+
     Args:
         loop: The loop, for its clock and its own references.
         begin: First control sample.
@@ -335,4 +337,7 @@ def reference(loop: PointingLoop, begin: int, end: int, references: Sequence[Ref
     time: Floats = np.arange(begin, end + 1, dtype=float) * loop.timing.period_s
     each = [np.stack([r.at(time) for r in of], axis=1) for of in references or (loop.references,)]
     each += each[-1:] * (LANES - len(each) if references else 0)
-    return np.ascontiguousarray(np.stack(each, axis=2))
+    known = np.stack(each, axis=2)
+    if loop.unknown:
+        known = np.hstack([known + np.stack([u.at(time) for u in loop.unknown], axis=1)[:, :, None], known])
+    return np.ascontiguousarray(known)

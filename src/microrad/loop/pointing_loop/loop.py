@@ -9,7 +9,7 @@ from scipy.linalg import block_diag
 from microrad.core import lti
 from microrad.core.arrays import Floats
 from microrad.loop.control import Adaptation, AxisController, Drive, Inverse, Timing, adaptation, sampled_path
-from microrad.loop.disturbance import Disturbance, Reference
+from microrad.loop.disturbance import Disturbance, Misalignment, Reference, SampledReference
 from microrad.loop.sensor import OpticalSensor, StrainGauge
 from microrad.mirror.hysteresis import BoucWen, PrandtlIshlinskii, gain_only, slow_gain
 from microrad.mirror.model import Mirror
@@ -22,7 +22,8 @@ class PointingLoop:
     ``optics`` (axes, outputs) turns the mirror's outputs into line-of-sight angles. ``disturbances`` has, by axis, what
     adds to the error; ``references`` the known part of it. ``drive_range_v`` is the range about the bias in which the
     mirror was identified. ``held`` (rows, outputs) are sums of the mirror's outputs that its drives are to leave where
-    they are, such as a piston. The error is reference + disturbance - mirror.
+    they are, such as a piston. ``unknown`` has, by axis, the course of what else adds to the error, of which no
+    controller knows; it may be empty. The error is reference + unknown + disturbance - mirror.
     """
 
     mirror: Mirror
@@ -35,6 +36,7 @@ class PointingLoop:
     references: tuple[Reference, ...]
     drive_range_v: tuple[float, float] = (-math.inf, math.inf)
     held: Floats | None = None
+    unknown: tuple[Misalignment | SampledReference, ...] = ()
 
     @property
     def axes(self) -> int:

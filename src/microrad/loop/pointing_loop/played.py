@@ -1,7 +1,8 @@
-"""A recorded motion in the linear loop: played step by step as it is, and as the spectrum that was fitted to it.
+"""A recorded motion in the loop: played step by step as it is, and as the spectrum that was fitted to it.
 
 Played, the motion stands at each plant step where the disturbances stand, and the loop starts from rest: the recursions
-are those of `linear`. The loop's own disturbances and noises are left out. Fitted, the covariance is exact.
+are those of `linear`. The loop's own disturbances and noises are left out. Fitted, the covariance is exact. Simulated,
+the motion is played to the mirror with its hysteresis, limits and quantisation, straight between control samples.
 """
 
 import math
@@ -11,9 +12,10 @@ import numpy as np
 
 from microrad.core.arrays import Floats
 from microrad.core.units import format_quantity
-from microrad.loop.disturbance import Disturbance, band_rms, psd
+from microrad.loop.disturbance import NO_REFERENCE, Disturbance, SampledReference, band_rms, psd
 from microrad.loop.disturbance.recorded import beyond_rms, density, edge_s, resampled
 from microrad.loop.disturbance.recorded_fit import RecordedFit
+from microrad.loop.pointing_loop.ensemble import Span, simulate
 from microrad.loop.pointing_loop.linear import ClosedLoop, close, refuse_unstable, stationary
 from microrad.loop.pointing_loop.loop import LoopController, PointingLoop
 
@@ -44,9 +46,10 @@ class Played:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RecordedResidual:
-    """What the linear loop of one axis leaves of a recorded motion.
+    """What the loop of one axis leaves of a recorded motion.
 
-    ``fitted_rms_rad`` is that of the fitted spectrum, ``noise_rms_rad`` what the loop's sensors add to either.
+    ``played`` is of the linear loop, ``fitted_rms_rad`` that of the fitted spectrum there, ``noise_rms_rad`` what the
+    loop's sensors add to either. ``simulated_rms_rad`` is of the motion played to the mirror with its hysteresis.
     ``beyond_loop_rad`` is the rms of the recording above half of the plant's rate, which is not played;
     ``reason`` says why the two differ, "" where they do not.
     """
@@ -54,6 +57,7 @@ class RecordedResidual:
     played: Played
     fitted_rms_rad: float
     noise_rms_rad: float
+    simulated_rms_rad: float
     beyond_loop_rad: float
     reason: str
 
@@ -120,7 +124,7 @@ def play(closed: ClosedLoop, motion_rad: Floats, axis: int = 0) -> Floats:
 def recorded_residual(
     loop: PointingLoop, controller: LoopController, fit: RecordedFit, settle_s: float
 ) -> RecordedResidual:
-    """What the linear loop leaves of a recorded motion, played and fitted.
+    """What the loop leaves of a recorded motion: played, fitted and simulated.
 
     Args:
         loop: The loop of one axis; its own disturbances are left out.
@@ -145,6 +149,7 @@ def recorded_residual(
     theory = stationary(close(replace(loop, disturbances=((known,),)), controller)).error_by_source
     fitted = math.sqrt(float(theory[known.name][0]))
     noise = math.sqrt(sum(float(each[0]) for name, each in theory.items() if name != known.name))
+    simulated = _simulated(loop, controller, moved, Span((begin + kept.size) * step, begin * step, 0))
     beyond = beyond_rms(fit.motion, 0.5 / step) if fit.motion.half_rate_hz > 0.5 / step else 0.0
     reason = ""
     if abs(played.rms_rad / fitted - 1.0) > AGREEMENT:
@@ -154,7 +159,22 @@ def recorded_residual(
             reason = "drift, and what settles slowly behind the begin, are no part of the fit"
         else:
             reason = _reason(fit, known, moved[1:][begin:end], kept, step, missing)
-    return RecordedResidual(played, fitted, noise, beyond, reason)
+    return RecordedResidual(played, fitted, noise, simulated, beyond, reason)
+
+
+def _simulated(loop: PointingLoop, controller: LoopController, moved_rad: Floats, span: Span) -> float:
+    """Rms (rad) about its mean of what the loop leaves of a motion on the mirror as it is, but for noises."""
+    timing, gauge = loop.timing, loop.gauge
+    quiet = replace(
+        loop,
+        disturbances=((),),
+        references=(NO_REFERENCE,),
+        optical=replace(loop.optical, noise_rad=0.0),
+        gauge=None if gauge is None else replace(gauge, noise_rad=0.0),
+        unknown=(SampledReference(moved_rad[:: timing.steps_per_sample], timing.period_s),),
+    )
+    run = simulate(quiet, controller, span, 1)
+    return math.sqrt(float(run.rms_rad[0, 0] ** 2 - run.mean_rad[0, 0] ** 2))
 
 
 def _played(error: Floats, begin_s: float, end_s: float) -> Played:

@@ -62,11 +62,11 @@ def trace(loop: PointingLoop, controller: LoopController, span: Span, run_number
     errors, rest = np.empty((total, axes)), np.empty((total, _channels(loop, p)))
     for part, residual, recorded in _recorded(loop, p, total, run_number):
         errors[part], rest[part] = residual[:, :, 0], recorded[:, :, 0]
-    drives = axes + kernels.DRIVE_FIELDS * m
+    drives, driven = axes + kernels.DRIVE_FIELDS * m, reference(loop, 0, total)[:-1, :, 0]
     return PointingTrace(
         time_s=np.arange(total, dtype=float) * loop.timing.period_s,
-        reference_rad=reference(loop, 0, total)[:-1, :, 0],
-        disturbance_rad=rest[:, :axes],
+        reference_rad=driven[:, -axes:],
+        disturbance_rad=rest[:, :axes] + (driven[:, :axes] - driven[:, -axes:]),
         error_rad=errors,
         measured_rad=rest[:, drives + outputs : drives + outputs + axes],
         drive_v=rest[:, axes + kernels.DRIVE_NOW : drives : kernels.DRIVE_FIELDS],
@@ -172,4 +172,5 @@ def replay(loop: PointingLoop, controller: LoopController, samples: int, seed: i
         disturbance[k], error[k] = first(state.disturbance, 0, axes), first(state.error, 0, axes)
         kernels.ensemble_loop(p, state, references[k : k + 2], nothing, nothing, kernels.UNSHIFTED)
         inputs[k], commands[k] = first(state.measured, 0, read), first(state.command, k % length * m, m)
+    disturbance += references[:-1, :axes, 0] - references[:-1, -axes:, 0]  # what is not known
     return Replay(inputs, commands, disturbance, error, first(state.counts, 0, kernels.COUNT_FIELDS).copy())

@@ -12,6 +12,7 @@ from pydantic import Field
 from microrad.core.units import format_quantity
 from microrad.mission.fields import Problem, Quantity, Several, Share, Switch, Table, Whole
 from microrad.mission.tables.mirror import ANGLE_MOST, Angle, DurationOrZero, Frequency, Name
+from microrad.mission.tables.pointing import TwoOffsets, two_axes_problems
 
 STEP_TOLERANCE = 1e-9
 """How far, relatively, a period or a delay may lie from a whole number of plant steps or control samples."""
@@ -32,6 +33,7 @@ AngleOrZero = Annotated[float, Quantity("rad", "urad", least=0.0, most=ANGLE_MOS
 Seconds = Annotated[float, Quantity("s", above=0.0, most=1e9)]
 Step = Annotated[float, Quantity("s", "us", above=0.0)]
 Resolution = Annotated[float, Quantity("V", "mV", least=0.0)]
+TwoDrifts = Annotated[tuple[float, ...], Several(Quantity("rad/s", "urad/s", least=-ANGLE_MOST, most=ANGLE_MOST))]
 Level = Annotated[float, Quantity("rad^2/Hz", "urad^2/Hz", least=0.0, most=1.0)]
 Edges = Annotated[tuple[float, ...], Several(Quantity("Hz", least=0.0, most=1e12), rising=True)]
 BandRms = Annotated[tuple[float, ...], Several(Quantity("rad", "urad", above=0.0, most=ANGLE_MOST))]
@@ -164,6 +166,20 @@ class BodyTable(Table):
     convention: Convention
 
 
+class MisalignmentTable(Table):
+    """What stands between the line of sight and the tracking sensor for good: no controller knows it beforehand.
+
+    In a run it begins where the run does, and each controller has to take it off the error.
+    """
+
+    offset_rad: TwoOffsets = Field(description="static, about x and y")
+    drift_rad_s: TwoDrifts = Field(description="steady from the begin of a run on, about x and y")
+
+    def problems(self) -> Iterator[Problem]:
+        """Two axes."""
+        yield from two_axes_problems(offset=(self.offset_rad, "1 urad"), drift=(self.drift_rad_s, "1 urad/s"))
+
+
 class QuadCellTable(Table):
     """Four photodiodes with an amplifier each, and the light on them, for the sensor's noise-equivalent angle.
 
@@ -246,6 +262,7 @@ class FinePointing(Table):
     vibration: VibrationTable
     wheels: WheelsTable | None = None
     body: BodyTable
+    misalignment: MisalignmentTable | None = None
     optical_sensor: OpticalSensorTable
     strain_gauge: StrainGaugeTable | None = None
     reference: ReferenceTable

@@ -1,7 +1,7 @@
 """The tables of a mission about its open-loop pointing: budget lines with their class, jitter, point-ahead."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Annotated, Literal
 
 from pydantic import Field
@@ -63,6 +63,13 @@ class Pointing(Table):
             yield Problem("lines", "holds no error", "a table such as [pointing.lines.body_pointing]")
 
 
+def two_axes_problems(**lists: tuple[Sequence[float], str]) -> Iterator[Problem]:
+    """Lists that have not one value for each axis, by their keys, with what an item could be."""
+    for key, (values, item) in lists.items():
+        if len(values) != 2:
+            yield Problem(key, f"has {len(values)} items", f'two, for x and y: {key} = ["{item}", "{item}"]')
+
+
 class JitterTable(Table):
     """What fine pointing leaves, for a link that is budgeted without a simulated loop."""
 
@@ -72,9 +79,7 @@ class JitterTable(Table):
 
     def problems(self) -> Iterator[Problem]:
         """Two axes."""
-        for key, values in (("bias", self.bias_rad), ("rms", self.rms_rad)):
-            if len(values) != 2:
-                yield Problem(key, f"has {len(values)} items", f'two, for x and y: {key} = ["1 urad", "1 urad"]')
+        yield from two_axes_problems(bias=(self.bias_rad, "1 urad"), rms=(self.rms_rad, "1 urad"))
 
 
 class PointAhead(Table):

@@ -13,6 +13,8 @@ from microrad.report.data import fields
 from microrad.report.quantities import angle, micro, minus, percent
 from microrad.report.tables import Table, tables_text
 
+_RADIAL = "played_rms_rad", "fitted_rms_rad", "sensors_rms_rad", "simulated_rms_rad"
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RecordedAxis:
@@ -66,23 +68,25 @@ def _left(axes: Sequence[RecordedAxis], controller: str) -> Table:
     rows = []
     for each in axes:
         left, p = each.left, each.left.played
-        parts = f"{micro(p.least_rms_rad)} to {micro(p.most_rms_rad)}"
-        figures = (micro(p.rms_rad), micro(left.fitted_rms_rad), percent(left.difference), parts)
-        rows.append((each.fit.motion.name, *figures, micro(p.mean_rad), micro(left.noise_rms_rad)))
+        figures = (micro(p.rms_rad), micro(left.fitted_rms_rad), percent(left.difference))
+        more = (left.simulated_rms_rad, p.mean_rad, left.noise_rms_rad)
+        rows.append((each.fit.motion.name, *figures, *map(micro, more)))
     if len(axes) == 2:
-        played, fitted, noise = _radial(axes)
-        rows.append(("radial", micro(played), micro(fitted), percent(played / fitted - 1.0), "", "", micro(noise)))
-    headings = ("axis", "played", "fitted", "off by", "eighths", "mean", "sensors")
+        played, fitted, noise, simulated = _radial(axes)
+        off = percent(played / fitted - 1.0)
+        rows.append(("radial", micro(played), micro(fitted), off, micro(simulated), "", micro(noise)))
+    headings = ("axis", "played", "fitted", "off by", "simulated", "mean", "sensors")
     return Table(f"Left by the loop under {controller}", headings, rows, totals=len(axes) == 2)
 
 
-def _radial(axes: Sequence[RecordedAxis]) -> tuple[float, float, float]:
-    """Rms of two axes together: played, fitted, and of the sensors' noise."""
+def _radial(axes: Sequence[RecordedAxis]) -> tuple[float, float, float, float]:
+    """Rms of two axes together: played, fitted, of the sensors' noise, and simulated."""
     left = [each.left for each in axes]
     return (
         math.hypot(*(each.played.rms_rad for each in left)),
         math.hypot(*(each.fitted_rms_rad for each in left)),
         math.hypot(*(each.noise_rms_rad for each in left)),
+        math.hypot(*(each.simulated_rms_rad for each in left)),
     )
 
 
@@ -96,8 +100,9 @@ def sentences(axes: Sequence[RecordedAxis], loop: PointingLoop) -> list[str]:
     motion, played, step = axes[0].fit.motion, axes[0].left.played, loop.timing.step_s
     said = [
         f"Played from {format_quantity(played.begin_s, 's')} to {format_quantity(played.end_s, 's')} of the recording, "
-        "mean and drift with it, through the linear loop from rest; fitted by covariance, exactly. Both about their "
-        "mean; what the sensors add stands beside them."
+        "mean and drift with it, through the linear loop from rest; fitted by covariance, exactly; simulated on the "
+        "mission's mirror with its hysteresis, limits and quantisation. All about their mean; what the sensors add "
+        "stands beside them."
     ]
     if motion.half_rate_hz < 0.5 / loop.timing.period_s:
         said.append(
@@ -153,7 +158,7 @@ def recording_data(path: str, sha256: str, axes: Sequence[RecordedAxis], loop: P
         "sentences": sentences(axes, loop),
     }
     if len(axes) == 2:
-        found["radial"] = dict(zip(("played_rms_rad", "fitted_rms_rad", "sensors_rms_rad"), _radial(axes), strict=True))
+        found["radial"] = dict(zip(_RADIAL, _radial(axes), strict=True))
     return found
 
 
@@ -178,6 +183,7 @@ def _axis_data(each: RecordedAxis) -> dict[str, Any]:
             "quietest_eighth_rms_rad": left.played.least_rms_rad,
             "loudest_eighth_rms_rad": left.played.most_rms_rad,
             "fitted_rms_rad": left.fitted_rms_rad,
+            "simulated_rms_rad": left.simulated_rms_rad,
             "sensors_rms_rad": left.noise_rms_rad,
             "cut_off_rms_rad": left.beyond_loop_rad,
             **fields(left, "difference", "reason"),

@@ -364,7 +364,7 @@ def _stroke_warnings(fine: FinePointingStudy) -> list[str]:
     return [
         f"the stroke does not cover the worst case on {axis.label}: {angle(axis.needed_rad)} needed to either side, "
         f"{angle(axis.available_rad)} available (root sum square {angle(axis.needed_rss_rad)}); the simulated "
-        "runs leave out the static misalignment, so they may stay within limits that the worst case exceeds"
+        "runs leave out the biases of [pointing], so they may stay within limits that the worst case exceeds"
         for axis in fine.scene.own_stroke
         if not axis.fits
     ]

@@ -177,7 +177,7 @@ def _step(loop: PointingLoop, of: LoopController, wanted: Ask, bandwidth_hz: flo
 
 def _sine(loop: PointingLoop, of: LoopController, wanted: Ask) -> Curve:
     """A sine of the reference on axis x under vibration and noise, body pointing and point-ahead left out."""
-    alone = parts.without(loop, parts.REFERENCE, BODY_POINTING)
+    alone = parts.without(loop, parts.REFERENCE, parts.MISALIGNMENT, BODY_POINTING)
     sine = replace(alone.references[0], sine_amplitude_rad=wanted.sine_rad, sine_freq_hz=wanted.sine_hz)
     shown = _SHOWN_PERIODS / wanted.sine_hz
     settle = max(0.4, 1.0 / wanted.sine_hz)
