@@ -77,7 +77,7 @@ class CoupledScene(scenario.AnyScene):
 
     @property
     def static_v(self) -> tuple[float, ...]:
-        """Drives (V, from the bias, without sign) for the known part of the error, once it has settled, and an offset."""
+        """Drives (V, from the bias, no sign) for the known part of the error, once it has settled, and an offset."""
         settled = np.array(
             [float(each.at(np.array(SETTLED / each.body_bandwidth_hz))) for each in self.loop.references]
         )
