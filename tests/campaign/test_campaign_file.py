@@ -6,6 +6,7 @@ import pickle
 import re
 from contextlib import suppress
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -191,6 +192,8 @@ def test_files_that_a_mission_names_belong_to_the_campaign(tmp_path):
     c = loaded(tmp_path, text)
     assert c.files[-1] == tmp_path / "a.csv"
     assert named_files(c.mission.mission) == ("a.csv",)
+    of = c.mission.mission.model_copy(update={"constellation": SimpleNamespace(file="shell.tle")})
+    assert named_files(of) == ("shell.tle", "a.csv")
     text = text.replace('"a.csv"\n', '"a.csv"\n[inputs."fine_pointing.vibration.file"]\n') + (
         'distribution = "table"\nvalues = ["a.csv", "b.csv"]\n'
     )

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 from scipy import stats
 
 from microrad.campaign.records import Sensitivity
-from microrad.campaign.statistics.sensitivity import MOST_ROWS, sensitivity
+from microrad.campaign.statistics.sensitivity import MOST_ROWS, _bins, _inside, _ratio, sensitivity
 from microrad.core.arrays import Floats
 from truths import philox
 
@@ -143,6 +143,18 @@ def test_rows_without_a_value_are_left_out() -> None:
     assert of(holes_x, holes_y) == of(x[kept], y[kept])
     assert of(holes_x, holes_y).rows == 597
     assert of(holes_x, holes_y) != of(x, y)
+
+
+def test_an_input_that_does_not_matter_explains_nothing_in_the_mean() -> None:
+    """Levels and slopes of the bins both follow the noise: either bias alone is ten times the standard error here."""
+    random, found = np.random.default_rng(3), []
+    for _ in range(200):
+        x, y = random.uniform(size=500), random.standard_normal(500)
+        place, bins = _bins(x)
+        across, off = _inside(x, place), (y - np.mean(y)) / np.std(y)
+        parts = (np.ones(500), across, across**2, off, across * off, off**2)
+        found.append(float(_ratio(np.stack([np.bincount(place, part, bins) for part in parts]))[0]))
+    assert abs(np.mean(found)) < 4.0 * np.std(found) / math.sqrt(200.0) < 0.01
 
 
 def test_what_does_not_vary_explains_nothing() -> None:

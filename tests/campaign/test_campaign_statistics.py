@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose
 from scipy import stats
 
 from microrad.campaign.definition.outputs import OUTPUTS
+from microrad.campaign.records import Progress
 from microrad.campaign.statistics.intervals import (
     Moments,
     _tails,
@@ -21,6 +22,7 @@ from microrad.campaign.statistics.intervals import (
     quantile_interval,
     share_interval,
 )
+from microrad.campaign.statistics.summary import progress
 from microrad.core.arrays import Floats
 from truths import philox
 
@@ -120,6 +122,20 @@ def test_moments_of_nothing_one_the_same_and_without_end() -> None:
     assert (same.mean, same.deviation) == (0.1, 0.0)
     assert moments(np.array([1.0, -math.inf])).least == -math.inf
     assert math.isnan(moments(np.array([1.0, math.inf, 1.0, 1.0])).deviation)
+
+
+# ------------------------------------------------------------------------------------------------------------- progress
+@pytest.mark.parametrize(
+    ("state", "written", "total", "left_s", "said"),
+    [
+        ("running", True, 2048, 384.0, "running"),
+        ("running", False, 2048, 384.0, "stopped"),
+        ("complete", False, 512, 0.0, "complete"),
+    ],
+)
+def test_the_time_left_is_that_of_the_rows_that_are_not_done(state, written, total, left_s, said) -> None:
+    found = progress(512, 2048, {"seconds": 128.0, "state": state}, written)
+    assert found == Progress(512, total, 128.0, 4.0, left_s, said)
 
 
 # ------------------------------------------------------------------------------------------------------------ intervals

@@ -305,6 +305,8 @@ def test_the_report_is_true(name):
         assert o.noise_measured == pytest.approx(measured, rel=1e-6, abs=1e-18)
         assert measured <= 2.0 * o.noise_predicted
         assert 0.0 <= o.cycle_found <= o.cycle_bound
+        own = 2.0 ** -fixed.output_scale[i] / math.sqrt(12.0)  # rounding of the output itself
+        assert o.noise_predicted >= own * (1.0 - 1e-12)
     assert any(o.noise_measured > 0.3 * o.noise_predicted for o in r.outputs)
     ranges = fixed.word * np.exp2(-np.array(fixed.state_scale))
     peaks = np.max(np.abs(double_run.run_in_double(of, form, v.inputs).states), axis=0)

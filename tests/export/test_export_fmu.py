@@ -614,9 +614,9 @@ def test_a_spring_of_several_axes_follows_the_kernel(slave):
     assert "prandtl_ishlinskii[2].reach_v" not in one.places
 
 
-@pytest.mark.parametrize("version", VERSIONS)
-def test_each_parameter_has_a_place_of_its_own_that_holds_its_start_value(slave, version):
-    one = slave("rich", version)
+@pytest.mark.parametrize(("unit", "version"), [*(("rich", each) for each in VERSIONS), ("spring", "3.0")])
+def test_each_parameter_has_a_place_of_its_own_that_holds_its_start_value(slave, unit, version):
+    one = slave(unit, version)
     parameters = [v for v in one.description.modelVariables if v.causality == "parameter"]
     held = {v.name: one.get(v.name).tolist() for v in parameters}
     assert held == {v.name: [float(each) for each in v.start.split()] for v in parameters}

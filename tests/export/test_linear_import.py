@@ -296,6 +296,7 @@ HIDING = {"A": np.diag([-1.0, -20.0]), "B": np.array([[1.0], [0.0]]), "C": np.on
         (states(Ts=np.zeros((2, 2))), "sampled, Ts = nan s"),
         (states(Ts=math.inf), "Ts holds a number that is not finite"),
         (states(Ts=2e-3), "the band ends at 5000 Hz, .* says nothing beyond 250 Hz"),
+        (states(Ts=1.01e-4), r"the band ends at 5000 Hz, .* says nothing beyond 4950\.5 Hz"),
         (sampled_roots([1.1, 0.5]), r"unstable, a pole at \|z\| = 1\.1 at 0 Hz"),
         (sampled_roots([1.0, 0.5]), r"an integrator, a pole at \|z\| = 1 at 0 Hz"),
         (sampled_roots([-0.4, 0.9]), r"negative real axis, \|z\| = 0\.4 at 2\.5e\+04 Hz, turns its sign"),

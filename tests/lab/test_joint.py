@@ -504,6 +504,7 @@ def test_poles_of_a_linear_part_and_back():
     assert found.normalise_at_hz == pytest.approx(math.sqrt(1.0 * 15.0))
     far = LinearPoles(Roots((40.0, 150.0), (1.0, 0.35)), Roots((5000.0,), (1.0,)), 3.0).system
     assert poles_of(far, (1.0, 400.0), 1000.0).zeros.frequencies_hz == ()
+    assert poles_of(far, (1.0, 400.0), 5050.0).zeros.frequencies_hz == pytest.approx((5000.0,), rel=1e-6)
 
 
 def test_errors_are_propagated():

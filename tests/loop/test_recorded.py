@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.signal import lfilter
+from scipy.stats import kstest
 
 from microrad.loop.disturbance import Disturbance, SampledReference, SpectralLine, combine, discretise, olympus, psd
 from microrad.loop.disturbance.recorded import density, edge_s, recorded_motion, resampled
 from microrad.loop.disturbance.recorded_fit import fit_recording
 from microrad.loop.disturbance.recorded_lines import find_lines
-from microrad.loop.disturbance.recorded_tests import stationarity
+from microrad.loop.disturbance.recorded_tests import stationarity, whiteness
 from microrad.loop.disturbance.terms import Term, term_filter
 from microrad.loop.pointing_loop.ensemble import Span, simulate
 from microrad.loop.pointing_loop.linear import close, stationary
@@ -131,6 +132,19 @@ def test_a_burst_is_said_not_to_be_stationary_and_what_the_loop_leaves_in_it():
     left = recorded_residual(LOOP.parts, LOOP.assembled(TRACKING), fit, SETTLE)
     assert left.played.most_rms_rad > 1.3 * left.played.rms_rad
     assert (abs(left.difference) > 0.05) == ("not stationary" in left.reason)
+
+
+@pytest.mark.parametrize("states", [1, 4])
+def test_white_residuals_of_a_fit_have_p_values_as_often_below_any_share(states):
+    """Each fitted parameter takes the freedom of a lag: here those of an autoregression, fitted by squares."""
+    p_values = []
+    for seed in range(120):
+        samples = np.random.default_rng(seed).standard_normal(2000)
+        past = np.column_stack([samples[2 * states - k : -k] for k in range(1, 2 * states + 1)])
+        now = samples[2 * states :]
+        p_values.append(whiteness(now - past @ np.linalg.lstsq(past, now, rcond=None)[0], states).p_value)
+    assert kstest(p_values, "uniform").pvalue > 1e-3
+    assert kstest(np.array(p_values) ** 0.5, "uniform").pvalue < 1e-3  # which is no wide net
 
 
 def test_a_motion_that_grows_is_not_stationary_for_its_trend():

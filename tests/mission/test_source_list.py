@@ -27,6 +27,12 @@ def test_each_row_is_a_source_as_a_mission_states_it(tmp_path):
     assert [found[0].origin, found[1].origin] == ["ground calibration", f"{path}, row 3"]
 
 
+def test_a_text_with_a_byte_order_mark_is_read_as_one_without(tmp_path):
+    path, marked = listed(tmp_path, *ROWS), tmp_path / "marked.csv"
+    marked.write_bytes(b"\xef\xbb\xbf" + path.read_bytes())
+    assert [each.source for each in read_sources(marked)] == [each.source for each in read_sources(path)]
+
+
 @pytest.mark.parametrize("separator", [";", "\t"])
 def test_semicolons_and_tabs_separate_cells_too_and_blank_rows_and_columns_are_nothing(tmp_path, separator):
     rows = [row.replace(",", separator) for row in (ROWS[0] + ",,", "," * 13, ROWS[1])]

@@ -4,6 +4,8 @@ import json
 import math
 import re
 from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -46,6 +48,18 @@ def identified():
     """An identification, and each model as it was handed over."""
     seen = []
     return identify([recorded()], models=STATIC[:2], on_fit=seen.append), seen
+
+
+def test_a_controller_is_kept_for_the_content_of_a_mirror_file_not_for_its_name(monkeypatch):
+    made = []
+    monkeypatch.setattr(control_model, "_kept", {})
+    monkeypatch.setattr(control_model, "_controller", lambda file, name: made.append(file.mirror_file.sha256) or name)
+    before, anew = (
+        SimpleNamespace(sha256="m", mirror_file=SimpleNamespace(sha256=each, path=Path("mirror.toml"))) for each in "ab"
+    )
+    for file in (before, anew, before):
+        assert control_model.controller(file, "PI") == "PI"
+    assert made == ["a", "b"]
 
 
 # ------------------------------------------------------------------------------------------------------------ live fits
