@@ -299,7 +299,7 @@ FORMATS: dict[str, Format] = {
     each.name: each
     for each in (
         FileFormat("links", ".toml", seeds.links, mutate.text, _links),
-        FileFormat("missions", ".toml", seeds.missions, mutate.text, _mission),
+        FileFormat("missions", ".toml", seeds.missions, mutate.text, _mission, most_s=3.0),
         FileFormat("mirrors", ".toml", seeds.mirrors, mutate.text, _mirror),
         FileFormat("plans", ".toml", seeds.plans, mutate.text, _plan, most_s=20.0, most_bytes=2_000_000_000),
         FileFormat("campaigns", ".toml", seeds.campaigns, mutate.text, _campaign, seeds.beside_campaigns),

@@ -655,6 +655,28 @@ def test_a_bias_that_another_one_cancels_may_hardly_grow():
         assert 10.0 * (allowed[name] - 1.0) == pytest.approx(2.0 - stats.norm.ppf(P) * 0.3, rel=1e-3)
 
 
+@pytest.mark.parametrize("noise", [0.003, 0.03, 0.05])
+def test_shares_of_a_mean_that_dwarfs_its_spread_are_those_of_budgets_made_anew(noise):
+    """A long bias and little noise: weights by small changes, and what each may be by a budget of that size."""
+    required = replace(APE, axes=(0, 1), limit_rad=1.0 + 3.0 * noise)
+
+    def total_rad(bias=1.0, spread=1.0):
+        sources = (
+            source("constant", 0.9 * bias, gains=np.array([1.0, 0.0])),
+            source("random", noise * spread, gains=np.ones(2), apart=True),
+        )
+        return total(contributions(sources, required), required)
+
+    whole, small = total_rad().quantile_rad, 1e-4
+    found = {each.contribution.kind: each for each in shares(total_rad())}
+    for kind, key in (("constant", "bias"), ("random", "spread")):
+        up, down = (total_rad(**{key: 1.0 + change}).quantile_rad for change in (small, -small))
+        assert found[kind].growth == pytest.approx((up - down) / (2.0 * small * whole), rel=0.01, abs=0.0)
+        allowed = total_rad(**{key: found[kind].allowed}).quantile_rad
+        assert allowed == pytest.approx(required.limit_rad, rel=4e-3, abs=0.0)  # what lies across the mean is left out
+        assert found[kind].without_rad == pytest.approx(total_rad(**{key: 1e-9}).quantile_rad, rel=1e-4, abs=0.0)
+
+
 def test_without_its_only_source_a_budget_is_nothing():
     both = Requirement(ErrorIndex("APE"))
     one = source("random", 1.0, gains=np.ones(2), apart=True)

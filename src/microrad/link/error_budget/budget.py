@@ -147,6 +147,7 @@ def beyond(of: Total, size_rad: Floats) -> Floats:
 _SMALL = 1e-3  # growth of a source by which that of the total is seen
 _FAR = 1e6  # times its size, beyond which a source does not matter
 _STEP = 4.0  # between two sizes that are tried
+_FAR_OFF = 0.045  # deviation beside the length of a mean, up to which shares are those along it
 _HELD = 2.0  # limits, or totals, up to which the range of a series reaches
 _NO_GROWTH = 1e-9  # below which it is rounding
 _NOTHING = 1e-12  # of a variance, below which others have none
@@ -161,38 +162,45 @@ def shares(of: Total) -> tuple[Share, ...]:
     """
     required = of.required
     parts = [Bundle.of(each.parts).about(required.axes) for each in of.contributions]
+    whole = _bundled(of.contributions).about(required.axes)
     if all(part.constant for part in parts):
         found = [_of_constant(of, each, own) for each, own in zip(of.contributions, parts, strict=True)]
     else:
-        far = near = each_without(parts, _HELD * max(of.quantile_rad, required.limit_rad or 0.0))
+        far_off = whole.is_far_off(_FAR_OFF)
+        along = [each.along(whole.mean / np.linalg.norm(whole.mean)) for each in parts] if far_off else parts
+        far = near = each_without(along, _HELD * max(of.quantile_rad, required.limit_rad or 0.0))
         if not all(series.whole for series in far):  # one that reaches less far has more of its terms
-            near = each_without(parts, _HELD * of.quantile_rad)
+            near = each_without(along, _HELD * of.quantile_rad)
         found = [
-            _share(of, each, own, (close, wide), _without(of, at, own, close))
-            for at, (each, own, close, wide) in enumerate(zip(of.contributions, parts, near, far, strict=True))
+            _share(of, each, both, (close, wide), _without(of, at, both[0], None if far_off else close))
+            for at, (each, *both, close, wide) in enumerate(zip(of.contributions, parts, along, near, far, strict=True))
         ]
     return tuple(sorted(found, key=lambda each: -float(f"{each.growth:.2e}")))  # what is alike keeps its order
 
 
-def _without(of: Total, at: int, own: Sum, others: Series) -> float:
-    """The total without a source: by its series, or anew where this ends too early."""
+def _without(of: Total, at: int, own: Sum, others: Series | None) -> float:
+    """The total without a source: by its series, or anew where there is none, or it ends too early."""
     left, spread = of.mean_rad - own.mean, of.sigma_rad**2 - own.covariance.diagonal()
     if np.max(spread) <= _NOTHING * np.max(of.sigma_rad) ** 2:
         return float(np.linalg.norm(left))
-    if others.whole:
+    if others is not None and others.whole:
         return others.quantile(of.required.confidence, _DIGITS)
     rest = [each for place, each in enumerate(of.contributions) if place != at]
     return _bundled(rest).about(of.required.axes).quantile(of.required.confidence)
 
 
-def _share(of: Total, each: Contribution, own: Sum, others: tuple[Series, Series], without: float) -> Share:
+def _share(of: Total, each: Contribution, both: Sequence[Sum], others: tuple[Series, Series], without: float) -> Share:
+    """``both`` is the source's part as it is, and as it counts; ``others`` near the total, and as far as the limit."""
     whole, confidence, limit, (near, far) = of.quantile_rad, of.required.confidence, of.required.limit_rad, others
+    own, counted = both
 
     def spare(series: Series, size_rad: float, times: float) -> float:
-        return series.within(size_rad, own.at(times * series.u)) - confidence
+        return series.within(size_rad, counted.at(times * series.u)) - confidence
 
-    by_source = spare(near, whole, 1.0 + _SMALL) - spare(near, whole, 1.0 - _SMALL)
-    by_size = spare(near, whole * (1.0 + _SMALL), 1.0) - spare(near, whole * (1.0 - _SMALL), 1.0)
+    spread = float(np.linalg.norm(of.sigma_rad)) / max(whole, np.finfo(float).tiny)
+    small = _SMALL * min(1.0, spread / _FAR_OFF)  # short beside what is spread, too
+    by_source = spare(near, whole, 1.0 + small) - spare(near, whole, 1.0 - small)
+    by_size = spare(near, whole * (1.0 + small), 1.0) - spare(near, whole * (1.0 - small), 1.0)
     growth = -by_source / by_size if by_size > 0.0 else 0.0
     growth = growth if abs(growth) > _NO_GROWTH else 0.0
     allowed = None

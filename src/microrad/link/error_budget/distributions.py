@@ -243,12 +243,11 @@ class Sum:
         """
         if self.constant:
             return float(np.linalg.norm(self.mean))
-        return (self._along_the_mean() if self._far_off else self).series().quantile(share)
+        return (self._along_the_mean() if self.is_far_off(_FAR_OFF) else self).series().quantile(share)
 
-    @property
-    def _far_off(self) -> bool:
-        """Whether its mean is so long that only its direction counts."""
-        return self.axes == 2 and float(np.max(self.sigma)) < _FAR_OFF * float(np.linalg.norm(self.mean))
+    def is_far_off(self, most: float) -> bool:
+        """Whether its mean is so long that only its direction counts: no deviation is more than a part of it."""
+        return self.axes == 2 and float(np.max(self.sigma)) < most * float(np.linalg.norm(self.mean))
 
     def within(self, size_rad: Floats) -> Floats:
         """Probability that the error, radial for two axes, is not above a size, shape (sizes,).
@@ -258,14 +257,18 @@ class Sum:
         """
         if self.constant:
             return np.asarray(np.linalg.norm(self.mean) <= size_rad, dtype=float)
-        series = (self._along_the_mean() if self._far_off else self).series()
+        series = (self._along_the_mean() if self.is_far_off(_FAR_OFF) else self).series()
         reach = series.grid.reach + abs(series.grid.centre)
         found = [1.0 if size >= reach else series.within(size) for size in size_rad.tolist()]
         return np.clip(found, 0.0, 1.0)
 
     def _along_the_mean(self) -> "Sum":
         """The same in the direction of the mean alone: what lies across it hardly makes a large mean longer."""
-        of, u = self._bundle.cases, self.mean / np.linalg.norm(self.mean)
+        return self.along(self.mean / np.linalg.norm(self.mean))
+
+    def along(self, u: Floats) -> "Sum":
+        """The same in a direction alone, a unit vector of shape (n,)."""
+        of = self._bundle.cases
         along = Part(
             of.weight,
             (of.mean @ u)[:, None],
