@@ -91,6 +91,50 @@ def test_runs_stand_beside_linear_theory_in_the_same_windows(call):
     assert max(map(len, out.splitlines())) <= 80
 
 
+NAMED = """
+[error_budget]
+with_loop = true
+
+[error_budget.requirements.code_word]
+index = "RPE"
+window = "10 ms"
+confidence = 0.9973
+interpretation = "temporal"
+axes = "radial"
+limit = "5 urad"
+
+[error_budget.requirements.handover]
+index = "PDE"
+window = "0.1 s"
+spacing = "5 min"
+observation = "10 min"
+confidence = 0.95
+interpretation = "temporal"
+axes = "x"
+limit = "5 urad"
+"""
+
+
+def test_windows_are_those_that_the_requirements_name_and_runs_leave_out_what_does_not_fit(call, tmp_path):
+    mission = tmp_path / "m.toml"
+    mission.write_text(DEFAULT.read_text("utf-8") + NAMED, "utf-8")
+    code, out, _ = call("pointing", mission, "--simulate", "2", "--json")
+    found = json.loads(out)
+
+    def times(part):
+        return [(each["index"], each["window_s"], each["spacing_s"]) for each in part["indices"]]
+
+    assert code == 0
+    assert times(found) == [("APE", None, None), ("RPE", 0.01, None), ("PDE", 0.1, 300.0)]
+    assert times(found["simulated"]) == times(found)[:2]
+    assert found["simulated"]["left_out"] == ["PDE 100 ms 300 s apart"]
+    code, out, _ = call("pointing", mission, "--simulate", "2")
+    said = " ".join(out.split())
+    assert (code, said.count("Longer than a run behind its settling, and left out: PDE 100 ms 300 s apart.")) == (0, 1)
+    code, out, _ = call("pointing", mission, "--window", "1 s", "--json")
+    assert times(json.loads(out)) == [("APE", None, None), ("MPE", 1.0, None), ("RPE", 1.0, None)]
+
+
 @pytest.fixture
 def coded(tmp_path):
     """Writes the shipped mission with a code word of some length, and a margin that pointing misses at times."""

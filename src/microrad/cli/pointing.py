@@ -24,7 +24,7 @@ from microrad.cli.frame import (
     refusal_of,
     width,
 )
-from microrad.cli.windows import indices_of, time_option
+from microrad.cli.windows import indices_of_mission, time_option
 
 if TYPE_CHECKING:
     from microrad.link.pointing.code_words import LostWords
@@ -93,7 +93,8 @@ def design(
 def pointing(
     file: Annotated[Path, typer.Argument(help="Mission file with a table [fine_pointing].", metavar="FILE")],
     window: Annotated[
-        list[float] | None, time_option("--window", "Length of a window [default: 10 ms and 1 s];")
+        list[float] | None,
+        time_option("--window", "Length of a window [default: those of the requirements, else 10 ms, 1 s];"),
     ] = None,
     spacing: Annotated[
         list[float] | None, time_option("--spacing", "From the begin of a window to that of another;")
@@ -131,7 +132,7 @@ def pointing(
 
     mission = load_link(file)
     with refusal_of(mission.path):
-        indices = indices_of(window or [0.01, 1.0], spacing or [])
+        indices = indices_of_mission(mission.mission.error_budget, window or [], spacing or [])
         asked = stated_beside(mission, sources, indices)
     loop, closed = mission if isinstance(mission, MissionFile) else None, None
     data, texts, code = dict[str, Any](), list[str](), MET
@@ -151,7 +152,8 @@ def pointing(
         data["controller"] = controller
         told("indices", lambda: windows_data(errors), lambda: windows_text(errors, controller, width()))
         if simulate is not None:
-            found = *_simulated(loop, scene, made, indices, simulate), simulate
+            kept, left_out = (indices, []) if window or spacing else _fitting(scene, indices)
+            found = *_simulated(loop, scene, made, kept, simulate), simulate, left_out
             view = simulated_view(*found)
             told("simulated", lambda: simulated_data(*found), lambda: views_text(view.blocks, width()))
     if asked is not None:
@@ -177,6 +179,13 @@ def _designed(mission: "MissionFile", controller: str) -> "tuple[Scene, Design]"
         scene = controller_study.scene(mission, mirror_room.of(mission.mission), tracking_light_w(mission))
         (made,) = controller_study.design(scene, progress, [controller])
         return scene, made
+
+
+def _fitting(scene: "Scene", indices: "list[ErrorIndex]") -> "tuple[list[ErrorIndex], list[ErrorIndex]]":
+    """The indices whose times fit into a run behind its settling, and the others."""
+    room_s = scene.table.duration_s - scene.table.settle_s
+    fits = {each: (each.window_s or 0.0) + (each.spacing_s or 0.0) <= room_s for each in indices}
+    return [each for each in indices if fits[each]], [each for each in indices if not fits[each]]
 
 
 def _simulated(

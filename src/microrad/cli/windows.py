@@ -8,6 +8,9 @@ from microrad.cli.frame import quantity_of
 
 if TYPE_CHECKING:
     from microrad.loop.disturbance.windows import ErrorIndex
+    from microrad.mission.tables.error_budget import ErrorBudget
+
+_DEFAULT_S = [0.01, 1.0]
 
 
 def time_option(name: str, text: str) -> Any:
@@ -38,3 +41,23 @@ def indices_of(windows: list[float], spacings: list[float]) -> "list[ErrorIndex]
         found += [ErrorIndex("MPE", each), ErrorIndex("RPE", each)]
         found += [ErrorIndex("PDE", each, apart) for apart in spacings]
     return found
+
+
+def indices_of_mission(table: "ErrorBudget | None", windows: list[float], spacings: list[float]) -> "list[ErrorIndex]":
+    """The indices of the windows that are given; without any, those that the mission's requirements name.
+
+    Args:
+        table: The mission's table of errors.
+        windows: As `indices_of`; 10 ms and 1 s where neither they nor the requirements say another.
+        spacings: As there.
+
+    Raises:
+        ValueError: As `indices_of`, and for a requirement that cannot be.
+    """
+    from microrad.link.error_budget.assembly import requirement_of
+
+    stated = (
+        [] if table is None or windows or spacings else [requirement_of(r).index for r in table.requirements.values()]
+    )
+    named = [each for each in dict.fromkeys(stated) if each.window_s is not None and each.kind == each.takes]
+    return [*indices_of([], []), *named] if named else indices_of(windows or _DEFAULT_S, spacings)

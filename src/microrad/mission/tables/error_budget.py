@@ -107,7 +107,9 @@ class ErrorBudget(Table):
     with_loop: Annotated[bool, Switch("")] = Field(
         description="true: what the fine-pointing loop leaves is a source, too"
     )
-    sources: dict[str, BudgetSource] = Field(description="one table for each, [error_budget.sources.NAME]")
+    sources: dict[str, BudgetSource] = Field(
+        default_factory=dict, description="one table for each, [error_budget.sources.NAME]; none where the loop is all"
+    )
     correlations: dict[str, BudgetCorrelation] | None = Field(
         default=None, description="one table for each, [error_budget.correlations.NAME]; all else is uncorrelated"
     )

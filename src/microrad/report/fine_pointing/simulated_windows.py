@@ -6,6 +6,7 @@ from dataclasses import asdict
 from typing import Any
 
 from microrad.link.pointing.code_words import LostWords
+from microrad.loop.disturbance.windows import ErrorIndex
 from microrad.loop.pointing_loop.simulated_windows import SimulatedErrors
 from microrad.report.fine_pointing.windows import index_text
 from microrad.report.quantities import micro, percent, quantity
@@ -13,13 +14,16 @@ from microrad.report.tables import Table
 from microrad.report.view import Block, Points, View
 
 
-def simulated_view(errors: Sequence[SimulatedErrors], lost: LostWords | None, runs: int) -> View:
+def simulated_view(
+    errors: Sequence[SimulatedErrors], lost: LostWords | None, runs: int, left_out: Sequence[ErrorIndex] = ()
+) -> View:
     """The indices of runs beside those of linear theory, and the code words that they lose, with their intervals.
 
     Args:
         errors: One for each index.
         lost: What is lost; None where the mission has no code word.
         runs: How many runs there were.
+        left_out: What does not fit into a run.
     """
     rows = [
         (
@@ -35,7 +39,8 @@ def simulated_view(errors: Sequence[SimulatedErrors], lost: LostWords | None, ru
         "Radial rms in µrad, both at the control samples: linear in theory, simulated on the mission's mirror. "
         f"Number of runs: {runs}; their spread gives the interval."
     )
-    blocks: list[Block] = [table, Points([about])]
+    longer = f"Longer than a run behind its settling, and left out: {', '.join(map(index_text, left_out))}."
+    blocks: list[Block] = [table, Points([about, *([longer] if left_out else [])])]
     return View(table.title, blocks if lost is None else [*blocks, *_lost(lost)])
 
 
@@ -52,15 +57,18 @@ def _lost(lost: LostWords) -> list[Block]:
     return [Table("Lost to pointing, simulated", ("share of", "lost", "99 % interval"), rows), Points([about])]
 
 
-def simulated_data(errors: Sequence[SimulatedErrors], lost: LostWords | None, runs: int) -> dict[str, Any]:
+def simulated_data(
+    errors: Sequence[SimulatedErrors], lost: LostWords | None, runs: int, left_out: Sequence[ErrorIndex] = ()
+) -> dict[str, Any]:
     """The same as data: rms in rad, the interval as its half width, None where it is not known.
 
     Args:
         errors: One for each index.
         lost: What is lost; None where the mission has no code word.
         runs: How many runs there were.
+        left_out: What does not fit into a run.
     """
-    found = {"runs": runs, "indices": _indices(errors)}
+    found = {"runs": runs, "indices": _indices(errors), "left_out": [index_text(each) for each in left_out]}
     return found if lost is None else {**found, "code_words": asdict(lost)}
 
 
