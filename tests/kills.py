@@ -190,6 +190,7 @@ def _started(victim: Victim, folder: Path, mark: str) -> subprocess.Popen[str]:
         "XDG_STATE_HOME": str(folder / "state"),
         "TMPDIR": str(folder / "tmp"),
         "MICRORAD_KEEP": "no",
+        "PYTHONPATH": os.pathsep.join([str(_PACKAGE.parent), str(Path(__file__).parent)]),  # this tree
     }
     with (folder.parent / f"{folder.name}.said").open("a", encoding="utf-8") as said:
         return subprocess.Popen(
@@ -231,7 +232,7 @@ def killed(name: str, kills: int, seed: int, place: Path) -> Counter[str]:
             folder.mkdir()
             victim.prepare(folder)
         mark = f"{os.getpid()}-{attempt}"
-        process = _started(victim, folder, mark)
+        process, before = _started(victim, folder, mark), sum(hits.values())
         while process.poll() is None and sum(hits.values()) < kills:
             any_moment(dice, most_s, process)
             living = members(mark)
@@ -244,6 +245,7 @@ def killed(name: str, kills: int, seed: int, place: Path) -> Counter[str]:
         until(lambda mark=mark: not members(mark), f"the end of what {name} had started")
         said = (place / f"{folder.name}.said").read_text(encoding="utf-8")
         assert f'File "{_PACKAGE}' not in said, said  # libraries may say how their own processes were killed
+        assert done or sum(hits.values()) > before, said  # whoever was not killed ends well
         if done:
             assert victim.found(folder) == wanted
             now = _names(folder)
