@@ -258,8 +258,8 @@ def killed(name: str, kills: int, seed: int, place: Path) -> Counter[str]:
 
 
 def _names(folder: Path) -> list[str]:
-    """What stands in a folder when all has ended, but for the studio's own of each job."""
-    return [name for name in sorted(listing(folder)) if not name.startswith("studio/")]
+    """What stands in a folder when all has ended, but for the studio's own of each job and Dask's of its workers."""
+    return [name for name in sorted(listing(folder)) if not name.startswith(("studio/", "tmp/dask-scratch-space"))]
 
 
 def main() -> None:

@@ -203,11 +203,24 @@ def test_a_time_without_a_unit_is_refused_by_its_option(call):
     assert (code, out) == (2, "") and "'--window': \"1\" is a number without a unit" in err
 
 
-def test_a_mirror_of_several_axes_is_refused(refused, tmp_path):
+def test_a_mirror_of_several_axes_has_windows_that_its_design_and_its_runs_agree_with(call, tmp_path):
     (tmp_path / "two-axes.toml").write_text(several_axes.TEXT, encoding="utf-8")
     named = several_axes.mission_text(("[fine_pointing]\n", '[fine_pointing]\nmirror_file = "two-axes.toml"\n'))
     (tmp_path / "m.toml").write_text(named, encoding="utf-8")
-    assert "its mirror has several axes, and windows are there for one mirror an axis" in refused("pointing", "m.toml")
+    options = ("--window", "10 ms", "--simulate", "16", "--json")
+    code, out, _ = call("pointing", tmp_path / "m.toml", *options)
+    document = json.loads(out)
+    whole, mean, left = (each["left_rad"]["all"] for each in document["indices"])
+    assert (code, math.hypot(mean, left)) == (0, pytest.approx(whole, rel=1e-9, abs=0.0))
+    _, out, _ = call("design", tmp_path / "m.toml", "--json")
+    (designed,) = [each for each in json.loads(out)["controllers"] if each["name"] == "PI"]
+    assert whole == pytest.approx(math.hypot(*designed["residual_rms_rad"]), rel=1e-6, abs=0.0)
+    for each, linear in zip(document["simulated"]["indices"], (whole, mean, left), strict=True):
+        assert each["linear_rad"] == pytest.approx(linear, rel=0.01, abs=0.0)
+        assert each["simulated_rad"] == pytest.approx(
+            linear, abs=2.0 * each["interval_rad"], rel=0.0
+        )  # little hysteresis
+        assert each["interval_rad"] < 0.15 * linear
 
 
 IDENTIFIED = ROOT / "tests" / "corpus" / "0.2.0" / "mirrors" / "identified.toml"

@@ -14,7 +14,6 @@ from microrad.cli.frame import (
     Accept,
     Json,
     Outcome,
-    Refusal,
     app,
     command,
     examples,
@@ -28,8 +27,9 @@ from microrad.cli.windows import indices_of_mission, time_option
 
 if TYPE_CHECKING:
     from microrad.link.pointing.code_words import LostWords
-    from microrad.loop.controller_study import Design, Outlook, Scene
+    from microrad.loop.controller_study import AnyScene, Design, Outlook, Scene
     from microrad.loop.disturbance.windows import ErrorIndex
+    from microrad.loop.pointing_loop.loop import LoopController
     from microrad.loop.pointing_loop.simulated_windows import SimulatedErrors
     from microrad.mission.file import MissionFile
 
@@ -147,7 +147,7 @@ def pointing(
         loop = loop or load_mission(file)
         scene, made = _designed(loop, controller)
         with refusal_of(mission.path):
-            closed = close(scene.theory, made.controller)
+            closed = close(scene.theory, made)
             errors = windowed_errors(closed, indices)
         data["controller"] = controller
         told("indices", lambda: windows_data(errors), lambda: windows_text(errors, controller, width()))
@@ -166,22 +166,23 @@ def pointing(
     return Outcome("\n\n".join(texts), code)
 
 
-def _designed(mission: "MissionFile", controller: str) -> "tuple[Scene, Design]":
+def _designed(mission: "MissionFile", controller: str) -> "tuple[AnyScene, LoopController]":
     """The mission's loop, and one of its controllers."""
     from microrad import mirror as mirror_room
     from microrad.link import tracking_light_w
-    from microrad.loop import controller_study
-    from microrad.mission.file import mirror_of_loop
+    from microrad.loop import controller_study, coupled_study
 
-    if mirror_of_loop(mission) is not None:
-        raise Refusal(f"{mission.path}: its mirror has several axes, and windows are there for one mirror an axis")
     with progress_bar() as progress, refusal_of(mission.path):
-        scene = controller_study.scene(mission, mirror_room.of(mission.mission), tracking_light_w(mission))
+        scene = coupled_study.of_mission(mission, mirror_room.of(mission.mission), tracking_light_w(mission))
+        if isinstance(scene, coupled_study.CoupledScene):
+            (both,) = coupled_study.design(scene, progress, [controller]).made
+            return scene, both.controller
+        assert isinstance(scene, controller_study.Scene)
         (made,) = controller_study.design(scene, progress, [controller])
-        return scene, made
+        return scene, made.controller
 
 
-def _fitting(scene: "Scene", indices: "list[ErrorIndex]") -> "tuple[list[ErrorIndex], list[ErrorIndex]]":
+def _fitting(scene: "AnyScene", indices: "list[ErrorIndex]") -> "tuple[list[ErrorIndex], list[ErrorIndex]]":
     """The indices whose times fit into a run behind its settling, and the others."""
     room_s = scene.table.duration_s - scene.table.settle_s
     fits = {each: (each.window_s or 0.0) + (each.spacing_s or 0.0) <= room_s for each in indices}
@@ -189,7 +190,7 @@ def _fitting(scene: "Scene", indices: "list[ErrorIndex]") -> "tuple[list[ErrorIn
 
 
 def _simulated(
-    mission: "MissionFile", scene: "Scene", made: "Design", indices: "list[ErrorIndex]", runs: int
+    mission: "MissionFile", scene: "AnyScene", made: "LoopController", indices: "list[ErrorIndex]", runs: int
 ) -> "tuple[tuple[SimulatedErrors, ...], LostWords | None]":
     """The errors of so many runs in each index, and the code words that they lose where the mission has some."""
     from microrad import link
@@ -200,10 +201,10 @@ def _simulated(
 
     word, loop, of_run = mission.mission.communication.code_word_s, scene.loop, span(scene.table)
     with progress_bar() as progress, refusal_of(mission.path):
-        asked: list[Question[Any]] = [windows_asked(loop, made.controller, indices, of_run)]
+        asked: list[Question[Any]] = [windows_asked(loop, made, indices, of_run, scene.theory)]
         if word is not None:
             asked.append(words_asked(FadeMargin.of(link.of(solve_rate(mission).mission)), word, loop, of_run))
-        errors, *lost = ask(asked, loop, made.controller, of_run, runs, on_progress=progress)
+        errors, *lost = ask(asked, loop, made, of_run, runs, on_progress=progress)
     return errors, lost[0] if lost else None
 
 

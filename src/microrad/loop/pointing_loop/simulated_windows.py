@@ -226,7 +226,11 @@ def _times(loop: PointingLoop, index: ErrorIndex, span: Span) -> tuple[int, int]
 
 
 def windows_asked(
-    loop: PointingLoop, controller: LoopController, indices: Sequence[ErrorIndex], span: Span
+    loop: PointingLoop,
+    controller: LoopController,
+    indices: Sequence[ErrorIndex],
+    span: Span,
+    theory: PointingLoop | None = None,
 ) -> Question[tuple[SimulatedErrors, ...]]:
     """The question what each index takes of the error of runs at their control samples, one result for each index.
 
@@ -235,12 +239,13 @@ def windows_asked(
         controller: The controller of all its axes.
         indices: What counts of the error; their times are rounded to whole readings of the optical sensor.
         span: How long a run is, what is left out at its begin, and the seed.
+        theory: The loop that the linear figures are of; by default the same, at the slow gains of its hysteresis.
 
     Raises:
         ValueError: For a window that is shorter than two control samples or does not fit into a run behind its
             settling, and for a loop that is unstable in theory.
     """
-    closed = close(loop, controller)
+    closed = close(theory or loop, controller)
     refuse_unstable(closed)
     times = [_times(loop, index, span) for index in indices]
 

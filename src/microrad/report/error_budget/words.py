@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from microrad.core.units import format_quantity
 from microrad.link.error_budget import Contribution, Requirement, Share
 from microrad.link.error_budget.assembly import Judged
-from microrad.report.fine_pointing.windows import index_text
+from microrad.report.fine_pointing.windows import BY_GAINS, index_text
 from microrad.report.fine_pointing.words import source_name
 from microrad.report.quantities import angle, micro, percent
 
@@ -72,7 +72,7 @@ def remarks(judged: Sequence[Judged]) -> list[str]:
     ]
     kinds = {share.contribution.kind for each in judged for share in each.shares}
     if "loop" in kinds:
-        said.append("What the loop leaves is that of linear theory: each hysteresis element counts by its slow gain.")
+        said.append(f"What the loop leaves is that of linear theory: {BY_GAINS}.")
     return [*said, *_too_small(judged)]
 
 

@@ -11,6 +11,9 @@ from microrad.report.fine_pointing.words import source_name
 from microrad.report.quantities import micro, percent
 from microrad.report.tables import Table, tables_text
 
+BY_GAINS = "each hysteresis element counts by its slow gain, in a mirror of several axes by that about rest"
+"""What linear theory makes of hysteresis."""
+
 
 def index_name(index: ErrorIndex) -> str:
     """What an index is called at the head of a column, a line for each of its times."""
@@ -43,7 +46,7 @@ def windows_text(errors: Sequence[WindowedErrors], controller: str, width: int) 
             off = percent(each.rational / exact - 1.0)
             rows.append((index_text(each.index), micro(exact), micro(each.rational), off))
     filters = Table("Without the loop, by linear filters", ("index", "exact", "rational", "off by"), rows)
-    about = "Radial rms in µrad, in theory: each hysteresis element counts by its slow gain."
+    about = f"Radial rms in µrad, in theory: {BY_GAINS}."
     tables = tables_text([left, before, filters], [], width)
     return f"{tables_text([], [about], width).strip()}\n\n{tables.rstrip()}"
 
