@@ -180,6 +180,31 @@ def test_reproducibility_of_what_begins_anew_is_over_what_is_left_beside_whole_p
         assert float(found.covariance[0, 0]) == pytest.approx(variance, rel=1e-12, abs=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("shape", "wanted"),
+    [("gaussian", math.sqrt(2.0) * stats.norm.ppf(0.5 * (1.0 + P))), ("uniform", 2.0 - 2.0 * math.sqrt(1.0 - P))],
+)
+def test_a_bias_that_is_another_one_in_each_observation_is_in_reproducibility_alone_by_the_difference_of_two(
+    shape, wanted
+):
+    """ECSS-E-ST-60-10C, Table B-2: of even ones a triangle; of the worst satellite one end less the other."""
+    bias = source("per-observation", 0.3, spread=shape, width=1.0)
+    between = replace(APE, index=ErrorIndex("PRE", window_s=1.0, spacing_s=100.0), observation_s=50.0)
+    for name in ("mixed", "ensemble"):
+        required = replace(between, interpretation=name)
+        assert total(contributions([bias], required), required).quantile_rad == pytest.approx(wanted, rel=1e-3, abs=0.0)
+    required = replace(between, interpretation="temporal")
+    ends = 6.0 if shape == "gaussian" else 2.0
+    assert total(contributions([bias], required), required).quantile_rad == pytest.approx(ends, rel=1e-9, abs=0.0)
+    like, within = replace(bias, kind="constant"), replace(between, index=ErrorIndex("PDE", 1.0, 10.0))
+    assert total(contributions([like], between), between).quantile_rad == 0.0
+    assert total(contributions([bias], within), within).quantile_rad == 0.0
+    for kind in ("APE", "MPE", "RPE"):
+        required = replace(APE, index=ErrorIndex(kind, None if kind == "APE" else 1.0), interpretation="mixed")
+        both = (total(contributions([each], required), required).quantile_rad for each in (bias, like))
+        assert next(both) == pytest.approx(next(both), rel=1e-12, abs=0.0)
+
+
 def test_a_random_error_is_in_no_mean_and_even_where_it_is_said():
     for takes, there in (("APE", 1.0), ("MPE", 0.0), ("RPE", 1.0)):
         index = ErrorIndex(takes) if takes == "APE" else ErrorIndex(takes, 1.0)
@@ -321,7 +346,7 @@ def test_the_rules_add_means_and_the_squares_of_deviations():
 # observation period" there), what Tables C-3 and C-4 print of each source, their totals, and twice these
 ANNEX_C = {
     "star tracker noise": ("random", "fixed", ((10.0, 0.0), (5.0, 0.0), (5.0, 0.0)), {}),
-    "star tracker bias": ("constant", "gaussian", ((0.0, 20.0 / 3.0), (0.0, 10.0 / 3.0), (0.0, 10.0 / 3.0)), {}),
+    "star tracker bias": ("per-observation", "gaussian", ((0.0, 20.0 / 3.0), (0.0, 10.0 / 3.0), (0.0, 10.0 / 3.0)), {}),
     "controller and actuators": ("random", "gaussian", ((1.0, 3.0), (1.0, 3.0), (1.0, 3.0)), {}),
     "thermoelastic": ("periodic", "uniform", ((2.0, 2.0), (2.0, 2.0), (2.0, 2.0)), {"freq_hz": 1.0 / 5400.0}),
     "misalignment": ("constant", "uniform", ((0.0, 5.0), (0.0, 5.0), (0.0, 5.0)), {}),

@@ -62,6 +62,11 @@ def test_the_columns_are_the_keys_of_a_source():
         (["a,constant,,,fixed,together,1,1"], HEADING, "size is missing"),
         (["a,bent,1 urad,,fixed,together,1,1"], HEADING, 'row 2, a: class is "bent"'),
         (["a,constant,1 urad,,fixed,together,1,1,,1 Hz"], HEADING, 'corner does not belong to class = "constant"'),
+        (
+            ["a,per-observation,1 urad,,fixed,together,1,1"],
+            HEADING,
+            "statistic leaves no other one in the next observation",
+        ),
         (["a,process,1 urad,,fixed,together,1,1,,1 Hz"], HEADING, "statistic does not belong to a process"),
         (["a,random,1 urad,,fixed,together,1,1"], HEADING, "statistic does not belong to a random error"),
         (["a,constant,1 urad,,fixed,together,one,1"], HEADING, 'row 2, x: "one" is no number'),

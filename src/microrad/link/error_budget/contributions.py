@@ -9,6 +9,7 @@ is open: sizes add up there.
 | class | APE | MPE | RPE | PDE |
 |---|---|---|---|---|
 | constant | b | b | 0 | 0 |
+| per-observation | b | b | 0 | 0 |
 | random | s | 0 | s | 0 |
 | process | its density times the weight of the index | | | |
 | periodic | a | a w | a sqrt(1 - 2 w c + w^2), c = cos 2 pi f t | 2 a w sin pi f s |
@@ -18,7 +19,8 @@ is open: sizes add up there.
 w = sinc f T, m = d/T (1 - exp(-T/d)), P the period, s the spacing, t evenly drawn. PRE takes the windows of two
 periods: the same as PDE of what is stationary, and for a drift or a transient, which begin anew, the difference over
 what the spacing leaves beside whole periods, of windows that no new begin cuts. Behind a transfer a transient is that
-of an exponential through it.
+of an exponential through it. An error that is another one in each observation is in a PRE by the difference of two
+that are drawn by themselves (Table B-2): of the worst satellite, from one end of its spread to the other.
 """
 
 import math
@@ -129,7 +131,10 @@ def contribution(source: ErrorSource, required: Requirement) -> Contribution:
     Raises:
         ValueError: For an index of more or longer windows than the period of a drift or of a transient holds.
     """
-    parts = tuple(_part(each, required) for one in source.by_axis for each in (one, *_lines(one)))
+    if source.kind == "per-observation" and required.index.takes == "PRE":
+        parts = tuple(part for one in source.by_axis for part in _other_observation(one, required))
+    else:
+        parts = tuple(_part(each, required) for one in source.by_axis for each in (one, *_lines(one)))
     return Contribution(source.name, source.kind, parts, source.origin, source.statistic)
 
 
@@ -187,6 +192,23 @@ def _lines(source: ErrorSource) -> list[ErrorSource]:
         )
         for line in lines
     ]
+
+
+def _other_observation(source: ErrorSource, required: Requirement) -> tuple[Part, ...]:
+    """The difference of an error in two observations, which its spread over the ensemble is drawn for anew."""
+    unit, about_zero = case(source.axes, mean=source.at_rest()), replace(source.size, mean=0.0)
+    if required.interpretation == "mixed":
+        return (_scaled(unit, about_zero),) * 2
+    if required.interpretation == "temporal":
+        return (_outwards(unit.times(2.0 * about_zero.worst)),)
+    outwards = _outwards(unit)
+    if about_zero.shape == "gaussian":
+        return (_folded(outwards, replace(about_zero, width=math.sqrt(2.0) * about_zero.width)),)
+    edges = np.linspace(0.0, 1.0, _FOLDED + 1)  # of two evenly spread ones: a triangle
+    level, half = about_zero.width * (edges[1:] + edges[:-1]), about_zero.width * np.diff(edges)
+    share = np.diff(1.0 - (1.0 - edges) ** 2)
+    mean = outwards.mean[0]
+    return (case(source.axes, mean=np.outer(level, mean), half_width=np.outer(half, mean), weight=share),)
 
 
 def _scaled(unit: Part, size: Spread) -> Part:
@@ -390,6 +412,7 @@ def _window(source: ErrorSource, index: ErrorIndex, period_s: float) -> float:
 
 _IN_TIME = {
     "constant": _constant,
+    "per-observation": _constant,
     "random": _random,
     "process": _process,
     "periodic": _periodic,

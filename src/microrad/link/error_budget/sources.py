@@ -14,7 +14,7 @@ from microrad.link.pointing.error_classes import WORST_SATELLITE_SIGMAS
 from microrad.loop.disturbance import Disturbance
 from microrad.loop.disturbance.windows import Motion
 
-SourceKind = Literal["constant", "random", "process", "periodic", "drift", "transient"]
+SourceKind = Literal["constant", "per-observation", "random", "process", "periodic", "drift", "transient"]
 SpreadShape = Literal["fixed", "gaussian", "uniform"]
 
 _TIMED = {"process": (), "periodic": ("freq_hz",), "drift": ("period_s",), "transient": ("period_s", "decay_s")}
@@ -66,6 +66,7 @@ class ErrorSource:
     In time it is, by its kind,
 
     - "constant": the same at all times, a bias;
+    - "per-observation": a bias that is another one in each observation period, as of a star tracker on other stars;
     - "random": anew from moment to moment, faster than any window: Gaussian of the standard deviation `size`, or even
       up to it where `even_in_time`;
     - "process": Gaussian with the spectrum of `process`, times `size`, a number;

@@ -14,13 +14,14 @@ AngleRate = Annotated[float, Quantity("rad/s", "urad/s", least=0.0, most=1e3)]
 Gains = Annotated[tuple[float, ...], Several(Quantity("", least=-1e6, most=1e6))]
 AngleLimit = Annotated[float, Quantity("rad", "urad", above=0.0, most=ANGLE_MOST)]
 
-SourceClass = Literal["constant", "random", "process", "periodic", "drift", "transient"]
+SourceClass = Literal["constant", "per-observation", "random", "process", "periodic", "drift", "transient"]
 IndexName = Literal["APE", "MPE", "RPE", "PDE", "PRE", "AKE", "MKE", "RKE"]
 AxesName = Literal["x", "y", "z", "radial"]
 MOST_AXES = len(get_args(AxesName)) - 1
 
 _NEEDED: dict[str, dict[str, str]] = {
     "constant": {"size": '"1 urad"'},
+    "per-observation": {"size": '"1 urad"'},
     "random": {"size": '"1 urad"'},
     "process": {"size": '"1 urad"', "corner": '"1 Hz"'},
     "periodic": {"size": '"1 urad"', "frequency": '"0.2 mHz"'},
@@ -40,8 +41,9 @@ class BudgetSource(Table):
 
     kind: SourceClass = Field(
         alias="class",
-        description="constant; random: anew from moment to moment; process: Gaussian below its corner; periodic: a "
-        "sinusoid of random phase; drift: a ramp that begins anew; transient: decays and comes again",
+        description="constant; per-observation: constant in an observation period, another in the next; random: anew "
+        "from moment to moment; process: Gaussian below its corner; periodic: a sinusoid of random phase; drift: a "
+        "ramp that begins anew; transient: decays and comes again",
     )
     size_rad: AngleOrZero | None = Field(
         default=None, description="value, deviation, rms, amplitude or peak, by the class"
@@ -64,6 +66,10 @@ class BudgetSource(Table):
         yield from self.choice_problems(f'class = "{self.kind}"', _NEEDED[self.kind])
         if not 1 <= len(self.gains) <= MOST_AXES:
             yield Problem("gains", f"has {len(self.gains)} items", "one for each axis: gains = [1.0, 1.0]")
+        if self.kind == "per-observation" and self.statistic == "fixed":
+            yield Problem(
+                "statistic", "leaves no other one in the next observation", 'class = "constant", or how it is spread'
+            )
         if self.kind == "process" and self.statistic != "1-sigma":
             yield Problem("statistic", "does not belong to a process", 'its rms: statistic = "1-sigma"')
         if self.kind == "random" and self.statistic == "fixed":

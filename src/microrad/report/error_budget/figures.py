@@ -13,7 +13,7 @@ from microrad.report.error_budget import words
 from microrad.report.fine_pointing.windows import index_text
 from microrad.report.plotting import sheet as sheets
 from microrad.report.plotting.figure import Figure
-from microrad.report.plotting.palette import BLACK, BLUE, GREEN, GREY, ORANGE, SKY, VERMILION
+from microrad.report.plotting.palette import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION
 from microrad.report.plotting.sheet import WIDTH, Axis, Bars, Dash, Legend, Line, Panel, Rule, Sheet, Words, shortened
 from microrad.report.quantities import micro, percent
 from microrad.report.tables import Column
@@ -23,6 +23,7 @@ _LOOKS: tuple[tuple[str, Dash], ...] = (
 )  # fmt: skip
 _CLASSES = {
     "constant": BLUE,
+    "per-observation": PURPLE,
     "random": ORANGE,
     "process": SKY,
     "periodic": GREEN,

@@ -7,6 +7,7 @@ from microrad.core.arrays import Floats
 
 # Okabe and Ito's palette: told apart by colour-blind readers. Line styles differ too, for print in grey.
 BLACK, ORANGE, SKY, GREEN, BLUE, VERMILION = "#000000", "#E69F00", "#56B4E9", "#009E73", "#0072B2", "#D55E00"
+PURPLE = "#CC79A7"
 WHITE, GREY = "#ffffff", "#777777"
 
 MOST_POINTS = 1200  # of a curve; extremes are kept
