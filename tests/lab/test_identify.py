@@ -23,6 +23,7 @@ from microrad.lab.identify import (
     predict,
 )
 from microrad.lab.identify.hysteresis.bouc_wen import _bound_gradient
+from microrad.lab.identify.mirror_file import _names
 from microrad.lab.identify.records import fastest_rate, lead, si_records, transient
 from microrad.lab.identify.selection import candidates
 from microrad.lab.identify.selection.choice import choose_best
@@ -682,3 +683,8 @@ def test_the_gradient_of_the_bound_is_that_of_differences(epsilon):
     steps = np.diag(1e-6 * np.abs(values))
     slopes = [(bound(values + s) - bound(values - s)) / (2 * s.sum()) for s in steps]
     np.testing.assert_allclose(_bound_gradient(values), slopes, rtol=1e-7, atol=1e-12)
+
+
+def test_more_than_three_recordings_are_counted_behind_the_first():
+    assert _names(["x/a.csv", "b.csv", "c.csv"]) == "a.csv, b.csv, c.csv"
+    assert _names(["x/a.csv", "b.csv", "c.csv", "d.csv"]) == "a.csv and 3 more"

@@ -174,6 +174,8 @@ def test_what_no_recordings_can_be_made_of(tmp_path):
     )
     message = refusal(path, "u", "y", rate_hz=RATE_HZ)
     assert "realisation 0: sample 7 of period 1 of the output, y[0] is nan, 1 such samples" in message
+    later = refusal(path, "u", "y", rate_hz=RATE_HZ, part_s=(0.1, None))  # the file's samples, not the part's
+    assert "sample 7 of period 1 of the output, y[0] is nan" in later
     text = tmp_path / "a.csv"
     text.write_text("u,y\n" + "1,2\n" * 300)
     assert "--axes (axes) is for arrays (NPY, NPZ, MAT, HDF5) and this file holds columns" in refusal(text, "u", "y")

@@ -14,7 +14,7 @@ from microrad.lab.recording import (
     read_recording,
     recording_from_arrays,
 )
-from microrad.lab.recording.checks.channel import _trend
+from microrad.lab.recording.checks.channel import _trend, drift
 from microrad.lab.recording.checks.sample_rate import rate_of_time
 from places import DATA
 
@@ -201,6 +201,9 @@ def test_drift(sign):
     assert "drift" not in notes(SINE, GOOD)
     ramp = np.linspace(0, 5, N) + 0.1 * SINE
     assert "drift" not in notes(ramp, play(ramp))
+    drifting, resting = GOOD + np.linspace(0, 0.02 * span, N), np.where(TIME_S > 2.0, 1.0, 1.0 + 1e-6)
+    assert drift("the output", drifting, [SINE, resting])  # a drive that rests hides nothing under one that moves
+    assert not drift("the output", drifting, [resting])
 
 
 # ----------------------------------------------------------------------------------------------------------------- lead

@@ -277,6 +277,9 @@ def test_point_ahead_left_in_the_error_costs_what_it_adds_there(read):
     assert line_of(budget_of(left), "Point-ahead loss").value == pytest.approx(-cost, rel=1e-9)
     assert line_of(budget_of(corrected), "Point-ahead loss").value == 0.0
     assert budget_of(corrected).margin_db - budget_of(left).margin_db == pytest.approx(cost, rel=1e-9)
+    assert budget_of(left).irradiance_on_axis_w_m2 == pytest.approx(
+        budget_of(corrected).irradiance_on_axis_w_m2, rel=1e-9
+    )
     both = [budgets.answer(f.mission, f.sources).margin_db for f in (corrected, left)]
     theta = 20e-6
     assert both[0] - both[1] == pytest.approx(

@@ -86,6 +86,8 @@ def test_gains_keep_the_loop_gain(mission):
     same = control.gains_from_mission(mission.control, 0.089e-3)
     assert_allclose([same.proportional, same.integral, same.derivative], [1e3, 16e6, 0.0], rtol=1e-12)
     assert_allclose([half.proportional, half.integral], [0.5e3, 8e6], rtol=1e-12)
+    damping = mission.control.model_copy(update={"derivative_v_s_rad": 3.0})
+    assert control.gains_from_mission(damping, 2 * 0.089e-3).derivative == pytest.approx(1.5, rel=1e-12)
     assert half.derivative_filter_s == same.derivative_filter_s == pytest.approx(1e-4)
 
 
