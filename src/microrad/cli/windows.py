@@ -44,7 +44,7 @@ def indices_of(windows: list[float], spacings: list[float]) -> "list[ErrorIndex]
 
 
 def indices_of_mission(table: "ErrorBudget | None", windows: list[float], spacings: list[float]) -> "list[ErrorIndex]":
-    """The indices of the windows that are given; without any, those that the mission's requirements name.
+    """The indices of the windows that are given; without any, those that requirements on the loop name.
 
     Args:
         table: The mission's table of errors.
@@ -56,8 +56,7 @@ def indices_of_mission(table: "ErrorBudget | None", windows: list[float], spacin
     """
     from microrad.link.error_budget.assembly import requirement_of
 
-    stated = (
-        [] if table is None or windows or spacings else [requirement_of(r).index for r in table.requirements.values()]
-    )
+    own = table is not None and table.with_loop and not windows and not spacings
+    stated = [requirement_of(each).index for each in table.requirements.values()] if table is not None and own else []
     named = [each for each in dict.fromkeys(stated) if each.window_s is not None and each.kind == each.takes]
     return [*indices_of([], []), *named] if named else indices_of(windows or _DEFAULT_S, spacings)

@@ -86,7 +86,7 @@ class Simulated:
     def _from_offset(self) -> PointingLoop:
         """The loop with an offset to follow and nothing else."""
         names = {each.name for several in self.loop.disturbances for each in several}
-        quiet = (*names, parts.OPTICAL_NOISE, parts.GAUGE_NOISE, parts.QUANTISATION)
+        quiet = (*names, parts.OPTICAL_NOISE, parts.GAUGE_NOISE, parts.QUANTISATION, parts.MISALIGNMENT)
         loop = parts.without(self.loop, *quiet)
         low, high = max(loop.drive_range_v[0], loop.drive.minimum_v), min(loop.drive_range_v[1], loop.drive.maximum_v)
         offset = OFFSET * min(nominal_axis_gain(loop) * min(-low, high), loop.optical.field_of_view_rad)
