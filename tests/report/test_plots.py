@@ -304,6 +304,17 @@ def test_a_bode_plot_of_a_measured_response_has_its_confidence():
     assert size.get_ylabel() == "gain (output/input)"
 
 
+def test_a_bode_plot_of_an_identification_has_the_model_where_the_measured_points_less_their_residual_are():
+    found = result("identification")
+    of = found.linear
+    size, _ = plots.plot_bode(found)
+    (model,) = [line for line in size.lines if "linear model" in str(line.get_label())]
+    drawn = np.interp(of.response.freq_hz, *model.get_data())
+    here, beyond = (np.abs(1e6 * (of.response.response + sign * of.residual)[:, 0, 0]) for sign in (-1.0, 1.0))
+    assert_allclose(drawn, here, rtol=1e-3)
+    assert np.max(np.abs(drawn / beyond - 1.0)) > 0.01
+
+
 def test_loops_show_what_a_line_leaves():
     loop = result("loop")
     left, right = plots.plot_loops(loop)

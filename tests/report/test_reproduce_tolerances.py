@@ -111,6 +111,12 @@ def test_each_kind_of_number_has_its_own_tolerance(summary, of_ran, place, insid
     assert [difference.place for difference in found] == [place]
 
 
+def test_a_number_that_was_finite_and_is_not_any_more_is_another_one():
+    for was, now in ((1.0, math.inf), (-math.inf, 1.0), (1.0, math.nan), (math.inf, -math.inf)):
+        assert compared.compare({"a_db": was}, {"a_db": now}, lambda *_: math.inf).differences
+    assert compared.compare({"a_db": math.inf}, {"a_db": math.inf}, lambda *_: math.inf).differences == ()
+
+
 def test_a_number_without_a_stated_tolerance_has_to_be_the_same(of_ran):
     allowed = reproduce.of_summary(of_ran)
     assert compared.compare({"new_db": 1.0}, {"new_db": 1.0}, allowed).differences == ()

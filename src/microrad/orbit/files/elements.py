@@ -47,7 +47,7 @@ def read_elements(path: str | Path, name: str | None = None, data: bytes | None 
         raise OrbitError(f"{path}: no element set is in the file; give a TLE or an OMM")
     if name is None:
         return tuple(found)
-    wanted, number = name.strip().casefold(), name.strip().casefold().lstrip("0")
+    wanted, number = name.strip().casefold(), name.strip().casefold().lstrip("0") or "0"
     chosen = tuple(e for e in found if wanted == e.name.casefold() or number == e.catalogue_number.casefold())
     if not chosen:
         near = difflib.get_close_matches(wanted, [e.name.casefold() for e in found], 3, 0.0)
