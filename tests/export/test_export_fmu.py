@@ -282,6 +282,14 @@ def test_it_holds_its_sources_and_licence(archive, version):
     assert not [each for each in names if "bench" in each or "Makefile" in each]
 
 
+@pytest.mark.parametrize("version", VERSIONS)
+def test_the_error_of_a_loop_depends_at_once_on_reference_and_disturbance_and_its_command_on_nothing(archive, version):
+    description = fmpy.read_model_description(archive("loop", version))
+    at_once = {each.variable.name.partition("[")[0]: each.dependencies or [] for each in description.outputs}
+    named = {key: {v.name.partition("[")[0] for v in found} for key, found in at_once.items()}
+    assert named["error_rad"] == {"reference_rad", "disturbance_rad"} and not named["command_v"]
+
+
 def test_the_build_description_names_the_sources(archive):
     description = fmpy.read_model_description(archive("loop", "3.0"), validate=True)
     found = description.buildConfigurations[0].sourceFileSets[0]

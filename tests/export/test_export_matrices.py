@@ -6,6 +6,7 @@ import struct
 import sys
 import zlib
 from dataclasses import replace
+from types import SimpleNamespace
 
 import control as python_control
 import numpy as np
@@ -18,6 +19,7 @@ from learning_loops import with_plays
 from microrad.core import lti
 from microrad.export import choice, matrices
 from microrad.export.linear_import.matlab import load
+from microrad.export.matrices import files as matrices_files
 from microrad.export.matrices.forms import LinearModel, Port, forms, polynomials
 from microrad.export.matrices.models import (
     CONTROLLER,
@@ -526,6 +528,11 @@ def test_a_form_that_is_refused_is_missing_with_its_reason(tmp_path):
     record = loadmat(tmp_path / "a.mat")["made"][0, 0]
     assert "z" not in record.dtype.names and "num" not in record.dtype.names
     assert "not minimal" in record["zpkRefused"].item() and "not minimal" in record["tfRefused"].item()
+
+
+def test_each_form_has_the_reason_of_its_own():
+    fields = matrices_files._form_fields(SimpleNamespace(zero_pole_gain="of roots", transfer_function="of powers"))
+    assert fields == {"zpkRefused": "of roots", "tfRefused": "of powers"}
 
 
 def test_mat_is_the_same_from_day_to_day(written, tmp_path):

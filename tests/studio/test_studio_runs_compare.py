@@ -1,6 +1,7 @@
 """What the studio's pages of the mission, of runs and of comparisons show, without a browser."""
 
 import json
+import os
 import re
 import tomllib
 from dataclasses import replace
@@ -361,6 +362,11 @@ def test_the_study_of_exactly_this_text_is_found(session, draft):
     assert (found.folder, found.verdict, found.met) == ("mine", "of this text", False)
     assert [(each.text, each.required, each.met) for each in found.numbers] == [("2.00 dB", "3.00 dB", False)]
     assert compare_view.finished_study(session, draft.set("terminals.leo_aperture", "6 cm")) is None
+    put("again", draft.sha256, "a second one")
+    for latest, older in (("mine", "again"), ("again", "mine")):
+        os.utime(session.folder / older / "manifest.json", (1e9, 1e9))
+        os.utime(session.folder / latest / "manifest.json", (2e9, 2e9))
+        assert compare_view.finished_study(session, draft).folder == latest
 
 
 # ------------------------------------------------------------------------------------------- the other, kept on disk
