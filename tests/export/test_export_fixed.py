@@ -10,6 +10,7 @@ import subprocess
 import tempfile
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -445,6 +446,13 @@ def test_a_resting_signal_is_scaled_by_its_limit_and_its_states_by_what_it_can_d
 
 
 @needs_compiler
+@pytest.mark.parametrize(("limit", "counts"), [(1.0, 100), (0.9999, 99), (0.994, 99), (1.0 - 1e-12, 100)])
+def test_counts_stay_within_limits_that_are_no_multiples_of_the_resolution(limit, counts):
+    of = SimpleNamespace(resolution_v=0.01, minimum_v=-limit, maximum_v=limit)
+    made = fixed_form._converter(of, 20)
+    assert (made.lowest, made.highest) == (-counts, counts)
+
+
 def test_without_converter_and_limits_commands_are_words(tmp_path):
     of = slow_design(0.99, limit_v=math.inf, resolution_v=0.0)
     form, fixed = sections(of), made(of, noise())

@@ -104,6 +104,12 @@ def test_a_job_takes_what_the_command_line_has_kept_unless_the_environment_says_
         assert made_here == (keep == "yes")
 
 
+def test_of_a_long_output_its_end_is_read(tmp_path):
+    (tmp_path / "stdout").write_text("".join(f"{k}\n" for k in range(100_000)))
+    found = jobs_files.output(tmp_path, "stdout")
+    assert found.endswith("99998\n99999\n") and len(found) == 200_000
+
+
 def test_a_job_that_ends_with_1_is_done(tmp_path):
     folder = written(tmp_path / "jobs", cwd=str(tmp_path))
     jobs_process.run_job(folder, python("raise SystemExit(1)"))
