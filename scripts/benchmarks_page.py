@@ -24,9 +24,10 @@ Release = dict[str, Any]
 HEAD = """# Benchmarks
 
 Each benchmark is a file of `benchmarks/` and says in its first lines what it measures. A ratio compares microrad with
-another program on the same machine in the same run. `MICRORAD_RECORD=yes make benchmark` runs them all and keeps what
-they find in `benchmarks/results/VERSION.json`; `scripts/benchmarks_page.py` writes this page from it. The last column
-says whether the bar is met. A figure without a bar is there to be compared with the next release.
+another program on the same machine in the same run. `MICRORAD_RECORD=yes make benchmark` runs those of a release
+and keeps what they find in `benchmarks/results/VERSION.json`; `scripts/benchmarks_page.py` writes this page from it.
+The last column says whether the bar is met. A figure without a bar is there to be compared with the next release.
+<!-- promise: benchmarks-1 -->
 
 ![Each figure as a share of its bar, or as a ratio to another program](benchmarks.svg)
 """

@@ -33,7 +33,7 @@ def build(target: Path, unrun: Sequence[str] = ()) -> list[str]:
         target: The folder; it is made where it is not there.
         unrun: Notebooks that are shown as they are stored, by patterns of their names.
     """
-    from site_pages import all_pages
+    from site_pages import all_pages, promises
 
     shutil.rmtree(target, ignore_errors=True)
     with tempfile.TemporaryDirectory() as temporary:
@@ -44,6 +44,8 @@ def build(target: Path, unrun: Sequence[str] = ()) -> list[str]:
             page = sources / name
             page.parent.mkdir(exist_ok=True)
             page.write_text(text, encoding="utf-8")
+        for page in sources.glob("*.md"):
+            page.write_text(promises.linked(page.read_text(encoding="utf-8")), encoding="utf-8")
         warnings = io.StringIO()
         said = {"status": None, "warning": warnings, "confdir": sources, "srcdir": sources}
         built = Path(temporary, "site")  # what notebooks made is left beside it

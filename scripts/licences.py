@@ -24,10 +24,12 @@ wheel have licences of their own, whose texts are in the wheel. `{PROJECT}` in t
 installation has, the others come with an extra. Of what every installation has no package states the GPL or the LGPL.
 `npTDMS`, which reads and writes TDMS files, is under the LGPL and optional: the extra `lab` brings it, and without it
 everything else works. What only tests and benchmarks need is not listed. `scripts/licences.py` writes this page.
+<!-- promise: licences-1 -->
 
 | package | licence | brought by |
 |---|---|---|
 """
+TAIL = "\n<!-- promise: licences-2 -->\n"
 
 
 def brought(extra: str) -> set[str]:
@@ -72,4 +74,4 @@ def rows() -> Iterator[tuple[str, str]]:
 
 
 if __name__ == "__main__":
-    PAGE.write_text(HEAD + "".join(f"{row}\n" for _, row in rows()), encoding="utf-8")
+    PAGE.write_text(HEAD + "".join(f"{row}\n" for _, row in rows()) + TAIL, encoding="utf-8")

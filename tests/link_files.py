@@ -18,6 +18,15 @@ DIODE = {
 }
 RECEIVERS = {
     "homodyne bpsk": {"modulation": "bpsk", "detector": "homodyne", "efficiency": 0.7},
+    "heterodyne bpsk": {"modulation": "bpsk", "detector": "heterodyne", "efficiency": 0.7, "phase_error": "0.2 rad"},
+    "homodyne qpsk": {"modulation": "qpsk", "detector": "homodyne", "efficiency": 0.7, "polarisations": 2},
+    "heterodyne qpsk": {
+        "modulation": "qpsk",
+        "detector": "heterodyne",
+        "efficiency": 0.7,
+        "phase_error": "5 deg",
+        "polarisations": 2,
+    },
     "preamplified dpsk": {"modulation": "dpsk", "detector": "preamplified", "noise_figure": "4 dB"},
     "preamplified ook": {
         "modulation": "ook",
@@ -33,7 +42,19 @@ RECEIVERS = {
     "apd ook": {"modulation": "ook", "detector": "apd", **DIODE, "avalanche_gain": 20, "ionisation_ratio": 0.2},
 }
 RECEIVERS = {name: COMMON | table for name, table in RECEIVERS.items()}
+OPTIONAL = {"polarisations", "phase_error"}  # of receivers with an oscillator
 SKY = {"spectral_radiance": "10 W/(m^2 sr um)", "field_of_view": "100 urad", "filter_bandwidth": "1 nm"}
+FADING = """
+[communication.fading]
+series = "fades.csv"
+unit = "linear"
+normalised = "mean"
+sampling = "100 us"
+code = "ccsds-k7-1-2"
+interleaving = "block"
+interleaver = "5 ms"
+bit_error_ratio = 1e-6
+"""
 GAUSSIAN = {"profile": "gaussian", "radius": "2 cm", "m_squared": 1.2}
 PATTERN = {"conventions.pointing_loss": "pattern", "communication.beam": GAUSSIAN}
 

@@ -5,7 +5,10 @@ from microrad.mission.file import load_link
 from microrad.mission.presets import preset_text
 from microrad.mission.toml import scan
 
-NAMES = ("click", "crosslink", "leo-hicali", "oicets-artemis", "paper", "sentinel1-edrs", "spot4-artemis", "tbird")
+NAMES = (
+    *("click", "crosslink", "dsoc", "leo-hicali", "llcd", "oicets-artemis"),
+    *("paper", "qpsk-crosslink", "sda-crosslink", "sentinel1-edrs", "spot4-artemis", "tbird"),
+)
 
 
 BODY = {"pointing.lines.body_pointing.error": '"300 urad"'}
@@ -26,8 +29,70 @@ ERROR = {"communication.pointing_error": '"2 urad"'}
 HOLE = {"terminals.geo_obscuration": "0.3"}
 
 
+SKY = {"channel.zenith_transmission": "0.9", "channel.elevation": '"40 deg"'}
+
+
+COUNTER = {
+    "communication.receiver.efficiency": "0.5",
+    "communication.receiver.dark_count_rate": '"10000 1/s"',
+    "communication.receiver.background_power": '"0 pW"',
+    "communication.receiver.bit_error_ratio": "1e-6",
+    "communication.receiver.code_gain": '"3 dB"',
+    "communication.receiver.code_rate": "0.5",
+}
+
+
 EXAMPLES = {
     "paper": {},
+    "dsoc": {
+        **BODY,
+        **LOSSES,
+        **OWN,
+        **ERROR,
+        **HOLE,
+        **SKY,
+        **COUNTER,
+        "communication.receiver.order": "64",
+        "communication.receiver.bandwidth": '"2 GHz"',
+    },
+    "llcd": {
+        **BODY,
+        **LOSSES,
+        **OWN,
+        **ERROR,
+        **HOLE,
+        **SKY,
+        **COUNTER,
+        "communication.transmit_power": '"1 W"',
+        "communication.receiver.order": "16",
+        "communication.receiver.bandwidth": '"8 GHz"',
+    },
+    "qpsk-crosslink": {
+        **BODY,
+        **OWN,
+        **ERROR,
+        "communication.receive_optics_loss": '"3 dB"',
+        "communication.implementation_loss": '"2 dB"',
+        "communication.transmit_power": '"1 W"',
+        "communication.receiver.efficiency": "0.5",
+        "communication.receiver.code_gain": '"5 dB"',
+        "communication.receiver.code_rate": "0.8",
+        "communication.receiver.bandwidth": '"4 GHz"',
+    },
+    "sda-crosslink": {
+        **BODY,
+        **LOSSES,
+        **ERROR,
+        "communication.strehl": "0.8",
+        "communication.implementation_loss": '"2 dB"',
+        "terminals.leo_aperture": '"30 cm"',
+        "terminals.geo_aperture": '"8 cm"',
+        "communication.receiver.noise_figure": '"5 dB"',
+        "communication.receiver.amplifier_gain": '"35 dB"',
+        "communication.receiver.optical_bandwidth": '"20 GHz"',
+        "communication.receiver.extinction_ratio": '"15 dB"',
+        "communication.receiver.code_gain": '"5 dB"',
+    },
     "crosslink": {},
     "oicets-artemis": {**LOSSES, **SENSITIVITY, **ERROR, **HOLE},
     "spot4-artemis": {

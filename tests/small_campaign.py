@@ -8,14 +8,12 @@ import sys
 import threading
 import time
 from contextlib import contextmanager
-from functools import cached_property
 from pathlib import Path
 
 import psutil
 
 from microrad.campaign import run
-from microrad.campaign.engines import worker
-from microrad.campaign.records import Outcome
+from reference.programs.campaign import Here
 from shipped import SHIPPED
 from waiting import HANG_S, any_moment, beside, until
 
@@ -55,28 +53,6 @@ def campaign_file(
         encoding="utf-8",
     )
     return path
-
-
-class Here:
-    """An engine without a worker: it does one job after the other in the process of the test."""
-
-    def __init__(self, spec):
-        self.spec = spec
-
-    @cached_property
-    def work(self):
-        return worker.open_target(run.TARGET, self.spec)
-
-    def outcomes(self, jobs):
-        for job in jobs:
-            try:
-                outcome = Outcome(job, "done", self.work.do(job, lambda: None))
-            except Exception as error:
-                outcome = Outcome(job, "raised", reason=worker.words(error))
-            yield outcome
-
-    def close(self):
-        pass
 
 
 def without_worker(patch):

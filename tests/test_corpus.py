@@ -69,6 +69,7 @@ def test_a_file_of_an_older_version_is_read_or_refused_with_how_to_migrate(path,
     assert "Traceback" not in done.err
 
 
+@pytest.mark.promise("releasing-2")
 def test_each_release_has_every_kind():
     for release in CORPUS.glob("[0-9]*"):
         assert {path.name for path in release.iterdir()} == READS.keys()

@@ -55,12 +55,14 @@ def cases(text):
     return [int(number) for number in re.findall(r"^all +([\d ]+)$", text, re.MULTILINE)[0].split()]
 
 
+@pytest.mark.promise("releasing-7")
 def test_a_few_writes_of_a_few_commands():
     done = run("--each", "60", "init", "campaign run", "bench --overwrite", "studio: job", "studio: save")
     assert (done.returncode, done.stderr) == (0, ""), done.stdout
     assert cases(done.stdout)[0] >= 20
 
 
+@pytest.mark.promise("releasing-7")
 @pytest.mark.endurance
 def test_every_write_of_every_command():
     done = run("--all", limit_s=ALL_S)
@@ -80,6 +82,7 @@ def planted(folder, body):
     return done.stdout
 
 
+@pytest.mark.promise("releasing-7")
 @pytest.mark.parametrize(
     ("body", "words"),
     [
@@ -106,6 +109,7 @@ def test_a_writer_without_a_fault_passes(tmp_path):
     assert planted(tmp_path, body) == ""
 
 
+@pytest.mark.promise("releasing-7")
 def test_every_file_of_the_package_that_writes_has_its_command():
     from writes.commands import COMMANDS, WRITERS
 
@@ -113,7 +117,20 @@ def test_every_file_of_the_package_that_writes_has_its_command():
     assert writing == set(WRITERS)
     names = [command.name for command in COMMANDS]
     assert len(set(names)) == len(names)
-    assert sum(how in names for how in WRITERS.values()) == len(WRITERS) - 4
+    assert sum(how in names for how in WRITERS.values()) == len(WRITERS) - 10
+
+
+@pytest.mark.promise("releasing-8")
+def test_the_page_has_each_way_and_its_cases_add_up():
+    from writes.commands import COMMANDS
+    from writes.layer import KINDS
+
+    page = (ROOT / "docs" / "releasing.md").read_text(encoding="utf-8")
+    rows = re.findall(r"(?m)^\| ([a-z ]+) \| ([^|]+) \| ([\d ]+) \|$", page)
+    *ways, (last, commands, total) = [(name, what, int(count.replace(" ", ""))) for name, what, count in rows]
+    assert tuple(name for name, *_ in ways) == KINDS
+    assert last == "all" and 30 < int(commands.removesuffix(" commands")) <= len(COMMANDS)
+    assert sum(count for *_, count in ways) == total
 
 
 def writes(path):

@@ -1,5 +1,6 @@
 """The house: its rooms as drawn, as they are and as the contract has them; no circle of files; what a room may take."""
 
+import ast
 import importlib.machinery
 import importlib.util
 import re
@@ -30,10 +31,55 @@ def house():
     return made
 
 
+@pytest.mark.promise("decisions-2")
 def test_the_rooms_are_those_of_the_contract_and_nothing_else_stands_beside_them():
     beside = {"__init__.py", "__init__.pyi", "__main__.py", "py.typed", "__pycache__"}
     assert {path.name for path in PACKAGE.iterdir()} - beside == set(ROOMS)
     assert len(ROOMS) == 13
+
+
+ASKING = {"socket", "http", "urllib", "ftplib", "requests", "httpx", "aiohttp", "urllib3"}
+"""Modules by which a program asks others over the network."""
+
+
+@pytest.mark.promise("decisions-1", "readme-8")
+def test_nothing_in_the_package_asks_the_network():
+    """The studio answers, and quotes addresses; tables of the Earth's rotation are those that skyfield brings along."""
+    found, loaded = set(), []
+    for path in PACKAGE.rglob("*.py"):
+        text = path.read_text(encoding="utf-8")
+        loaded += re.findall(r"load\.timescale\((.*?)\)", text)
+        for node in ast.walk(ast.parse(text)):
+            names = [each.name for each in node.names] if isinstance(node, ast.Import) else []
+            names += [node.module or ""] if isinstance(node, ast.ImportFrom) and not node.level else []
+            found |= {
+                (name, path.relative_to(PACKAGE).as_posix()) for name in names if name.partition(".")[0] in ASKING
+            }
+    assert loaded and set(loaded) == {"builtin=True"}
+    assert {name for name, path in found if not path.startswith("studio/")} == set()
+    assert {name for name, _ in found} <= {"socket", "urllib.parse", "http"}
+
+
+DECISIONS = (ROOT / "docs" / "decisions.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.promise("decisions-2")
+def test_the_page_of_decisions_lists_the_rooms_in_their_order():
+    section = DECISIONS.partition("## The rooms")[2].partition("## ")[0]
+    assert "thirteen rooms" in section
+    assert re.findall(r"`(\w+)`", section.partition(": ")[2].partition("Whoever")[0]) == ROOMS
+
+
+@pytest.mark.promise("decisions-3")
+def test_what_is_not_used_is_no_dependency_and_no_import():
+    """Integration step by step is left to benchmarks, tests and evidence: hysteresis is advanced exactly."""
+    pinned = (ROOT / "constraints.txt").read_text(encoding="utf-8").lower()
+    own = (path for path in PACKAGE.rglob("*.py") if "verification" not in path.parts)
+    texts = [path.read_text(encoding="utf-8") for path in own]
+    for name in ("slycot", "poliastro", "hapsira", "sippy", "sippy-unipi", "pint", "unyt"):
+        assert re.search(rf"(?m)^{name}==", pinned) is None, name
+        assert not any(re.search(rf"(?m)^\s*(?:import|from) {name}\b", text) for text in texts), name
+    assert not any(re.search(r"\bPool\(|\bastropy\b.*import|solve_ivp|odeint", text) for text in texts)
 
 
 def test_tests_stand_in_folders_of_the_same_names():

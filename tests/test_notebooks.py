@@ -84,6 +84,7 @@ def notebook():
     return copy.deepcopy(json.loads(NOTEBOOKS[0].read_text(encoding="utf-8")))
 
 
+@pytest.mark.promise("readme-17")
 def test_there_is_one_for_each_story():
     assert [int(path.name[:2]) for path in NOTEBOOKS] == list(range(1, STORIES + 1))
 
@@ -95,6 +96,7 @@ def test_nothing_is_wrong_with_its_form(path):
     assert text == stored(json.loads(text))
 
 
+@pytest.mark.promise("readme-17")
 @pytest.mark.usefixtures("rows_here")
 @pytest.mark.parametrize("path", RUN_HERE, ids=lambda path: path.stem)
 def test_its_code_runs_and_says_what_was_found(path, tmp_path, monkeypatch, capsys):

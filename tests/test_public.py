@@ -55,6 +55,8 @@ def folder(tmp_path_factory):
     return place
 
 
+@pytest.mark.promise("readme-1", "readme-17")
+@pytest.mark.promise("index-1")
 @pytest.mark.parametrize("name", microrad._PUBLIC)
 def test_every_public_name_has_an_example_that_runs(name, folder, monkeypatch, capsys):
     monkeypatch.chdir(folder)
@@ -69,6 +71,20 @@ def test_every_public_name_has_an_example_that_runs(name, folder, monkeypatch, c
     assert name in ("write_report", "run_campaign") or name.startswith("plot_") or capsys.readouterr().out
 
 
+@pytest.mark.promise("index-3")
+def test_the_example_of_the_front_page_runs(folder, monkeypatch, capsys):
+    monkeypatch.chdir(folder)
+    without_worker(monkeypatch)
+    (text,) = BLOCK.findall((ROOT / "docs" / "index.md").read_text(encoding="utf-8"))
+    scope = {}
+    exec(text, scope)
+    study = scope["study"]
+    assert study.met is False  # the folder's mission has no loop that keeps to what is required
+    assert capsys.readouterr().out == f"False {study.achieved.margin_db}\n"
+    (shown,) = [r for r in study.requirements if r.name == "communication margin"]
+    assert shown.actual == study.achieved.margin_db
+
+
 def test_examples_satisfy_a_strict_type_checker_run_from_outside(tmp_path):
     texts = [text for name in microrad._PUBLIC for text in examples(name)]
     body = "".join(f"def example_{i}() -> None:\n{textwrap.indent(text, '    ')}\n\n" for i, text in enumerate(texts))
@@ -78,6 +94,38 @@ def test_examples_satisfy_a_strict_type_checker_run_from_outside(tmp_path):
     found = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert found.returncode == 1 and "Found 1 error " in found.stdout, found.stdout + found.stderr
     assert 'Missing positional argument "unit"' in found.stdout
+
+
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.promise("readme-16", "readme-31")
+def test_the_code_of_the_readme_runs(folder, monkeypatch):
+    (folder / "missions").mkdir(exist_ok=True)
+    (folder / "missions" / "leo-geo.toml").write_bytes((folder / "leo-geo.toml").read_bytes())
+    monkeypatch.chdir(folder)
+    ran = []
+    monkeypatch.setattr(microrad, "run_study", lambda file: ran.append(file) or "study", raising=False)
+    (code,) = BLOCK.findall(README)
+    known = {}
+    exec(code, known)
+    assert len(ran) == 1 and known["study"] == "study"
+    poles_hz = [abs(pole) / (2.0 * np.pi) for pole in np.linalg.eigvals(known["fit"].system.A)]
+    assert min(abs(pole - 6000 / (2 * np.pi)) for pole in poles_hz) < 10.0
+    loop = known["plays"].response(8.0 * np.sin(np.linspace(0.0, 20.0, 500)), 5e-4)
+    assert np.ptp(loop[200:]) == pytest.approx(16.0 * 46e-6, rel=0.1)
+
+
+@pytest.mark.promise("readme-16", "readme-22")
+def test_the_readme_lists_each_public_name():
+    section = README.partition("## In Python")[2].partition("\n## ")[0]
+    rows = re.findall(r"(?m)^\| .*? \| (`.*`) \|$", section)
+    listed = {name for row in rows for name in re.findall("`(.*?)`", row)}
+    assert microrad._PUBLIC.keys() - listed == {"parse_quantity", "MicroradError"}
+    assert listed <= microrad._PUBLIC.keys()
+    plots = [name for name in microrad._PUBLIC if name.startswith("plot_")]
+    assert "Fewer than thirty names and eight plots" in section
+    assert (len(microrad._PUBLIC) - len(plots) < 30, len(plots)) == (True, 8)
 
 
 @pytest.mark.parametrize("name", microrad._MOVED)
@@ -90,6 +138,7 @@ def test_a_name_of_0_1_0_says_where_it_lives_now(name):
     assert name not in dir(microrad)
 
 
+@pytest.mark.promise("decisions-1", "readme-16")
 def test_there_are_few_names_and_they_load_nothing():
     code = "import sys, microrad; print(len(sys.modules), 'numpy' in sys.modules)"
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()

@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import microrad
 from microrad.core.labelled import TEXT, variables
-from microrad.loop.pointing_loop.ensemble import COUNTERS
+from microrad.loop.pointing_loop.ensemble import COUNTERS, bin_edges_rad
 
 PLAYS = microrad.PrandtlIshlinskii((0.0, 1.0), (30e-6, 6e-6))
 TWICE = np.random.default_rng(5).standard_normal((2, 8192))
@@ -26,6 +26,7 @@ RESULTS = {
 }
 
 
+@pytest.mark.promise("readme-16")
 @pytest.mark.parametrize("name", RESULTS)
 def test_each_array_has_its_unit_and_meaning_and_comes_back_from_a_file(name, tmp_path):
     found = RESULTS[name].to_xarray()
@@ -52,6 +53,7 @@ def test_values_are_found_by_their_names():
     assert_array_equal(trace.error.sel(axis="x"), RESULTS["trace"].error_rad[:, 0])
     assert float(trace.reference[-1, 0]) == 1e-5 and float(trace.time[-1]) == pytest.approx(0.0495)
     runs = RESULTS["ensemble"]
+    assert_array_equal(ensemble.radius, bin_edges_rad()[1:])
     for limit, column in COUNTERS.items():
         assert_array_equal(ensemble.counts.sel(limit=limit), runs.counts[:, column])
     assert float(ensemble.counts.sel(limit="saturated samples").min()) > 0

@@ -32,6 +32,8 @@ from microrad.lab.recording.files import check_file
 from microrad.lab.recording.formats.source import is_time_name
 from microrad.lab.recording.list_file import read_list
 from microrad.lab.recording.reader import open_source
+from microrad.link.fade_series import read_fade_series
+from microrad.link.fade_series.records import Normalisation, Unit
 from microrad.mirror import coupled, from_table, read_mirror
 from microrad.mission.file import holds_several_axes, load_coupled_mirror, load_link, load_mirror, load_mission
 from microrad.mission.source_list import read_sources
@@ -42,6 +44,8 @@ from microrad.report.results.manifest_reader import altered_parts, read_manifest
 
 Mutate = Callable[[Random, Sequence[bytes]], bytes]
 _GIVEN = Given("a mirror", 2e-3, 1e4, 50.0, 0.0, 100.0, 1.0, 1e3, 10.0, "rad")
+_UNITS: tuple[Unit, ...] = ("linear", "dB")
+_NORMALISED: tuple[Normalisation, ...] = ("mean", "largest", "as-given")
 _SHORT = 20_000  # samples of a plan that is designed twice
 _EPOCH = Epoch("2026-03-20T12:00:00Z")
 
@@ -158,6 +162,14 @@ def _recording(path: Path) -> None:
     used = [index for index, name in enumerate(source.names) if not is_time_name(name)][:2] or [0]
     is_timed = len(source.names) > used[-1] and (source.find_time(used) is not None or source.rates(used))
     properties.recording(read_recording(path, used[0], used[-1], None if is_timed else seeds.RATE_HZ))
+
+
+def _fades(path: Path) -> None:
+    """Levels or ratios, of which power 1 is the mean or the largest, sampled as the file says or as it is told."""
+    number = path.stat().st_size
+    unit, normalised = _UNITS[number % 2], _NORMALISED[number % 3]
+    period_s = None if number % 5 == 0 else 1.0 / seeds.RATE_HZ
+    properties.fades(read_fade_series(path, unit=unit, normalised=normalised, period_s=period_s))
 
 
 def _motion(path: Path) -> None:
@@ -307,6 +319,7 @@ FORMATS: dict[str, Format] = {
         FileFormat("sources", ".csv", seeds.sources, mutate.text, _sources, most_s=5.0),
         FileFormat("workbooks", ".xlsx", seeds.workbooks, mutate.binary, _sources, most_s=5.0),
         FileFormat("motions", ".csv", seeds.motions, mutate.text, _motion),
+        FileFormat("fades", ".csv", seeds.fades, mutate.text, _fades),
         FileFormat("csv", ".csv", seeds.csv, mutate.text, _recording),
         FileFormat("tdms", ".tdms", seeds.tdms, mutate.binary, _recording),
         FileFormat("lvm", ".lvm", seeds.lvm, mutate.text, _recording),

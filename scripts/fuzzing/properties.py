@@ -19,6 +19,7 @@ from microrad.link import study
 from microrad.link.error_budget import Requirement, shares
 from microrad.link.error_budget import budget as error_budget
 from microrad.link.error_budget.assembly import correlations_of, requirement_of, source_of, sources_of
+from microrad.link.fade_series import CodedLink, FadeSeries, code, coded_fading
 from microrad.link.pointing import outage
 from microrad.loop.disturbance.windows import ErrorIndex
 from microrad.mirror import Mirror, coupled
@@ -86,7 +87,7 @@ def links(file: LinkFile) -> None:
         return
     probability("outage", outage.Exposure.stated(data).short_of(0.0))
     wider = data.jitter.model_copy(update={"rms_rad": tuple(1.1 * each for each in data.jitter.rms_rad)})
-    moved = link.DataLink(shared, own, data.requirement, wider, data.beam, data.receiver)
+    moved = link.assembled(shared, own, data.requirement, wider)
     assert outage.margin_db(moved) <= margin + _ROUNDING_DB, "margin: rises with jitter"
 
 
@@ -104,7 +105,7 @@ def _near(one: float, other: float) -> bool:
 
 
 def _falls(what: str, margin: float, data: link.DataLink, table: Any) -> None:
-    moved = link.DataLink(data.shared, table, data.requirement, data.jitter, data.beam, data.receiver)
+    moved = link.assembled(data.shared, table, data.requirement, data.jitter)
     assert outage.margin_db(moved) <= margin + _ROUNDING_DB, f"margin: rises with {what}"
 
 
@@ -167,6 +168,21 @@ def recording(found: Recording) -> None:
     assert math.isfinite(found.rate_hz) and found.rate_hz > 0.0, "a rate that is none"
     assert math.isfinite(found.step_s) and found.step_s > 0.0, "time stands still"
     assert len(found.sha256) == 64, "no hash"
+
+
+def fades(found: FadeSeries) -> None:
+    """A series has powers that are 0 or above, its own scale, and fades; a code over it has an error ratio."""
+    finite("power", found.power)
+    assert np.all(found.power >= 0.0) and np.any(found.power > 0.0), "no power"
+    assert math.isfinite(found.duration_s) and found.duration_s > 0.0, "time stands still"
+    whole = {"mean": np.mean, "largest": np.max}.get(found.normalised)
+    assert whole is None or math.isclose(whole(found.power), 1.0, rel_tol=1e-9), "another scale"
+    coded = CodedLink(code("ccsds-k7-1-2"), found, 1e9, "block", 8.0 * found.period_s)
+    probability("mean error ratio", coded.mean_ratio(1.0))
+    own = coded_fading(coded, 3.0, 1e-6)
+    for each in (own.ratio.value, own.lost.value, own.fades.share):
+        probability("a share", each)
+    assert own.penalty_db == math.inf or math.isfinite(own.penalty_db), "a cost that is none"
 
 
 # -------------------------------------------------------------------------------------------------------------- orbits

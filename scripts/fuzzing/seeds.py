@@ -227,6 +227,18 @@ def motions() -> tuple[bytes, ...]:
 
 
 @cache
+def fades() -> tuple[bytes, ...]:
+    """Series of received power: with and without a time, as ratios, in W and as levels."""
+    levels = -6.0 + 6.0 * np.sin(2.0 * np.pi * 23.0 * TIME_S)
+    texts = []
+    for head, values in (("power", 10.0 ** (0.1 * levels)), ("power (W)", 1e-6 + 0.0 * levels), ("power (dB)", levels)):
+        texts.append(f"{head}\n" + "".join(f"{each:.6g}\n" for each in values))
+        rows = zip(TIME_S.tolist(), values.tolist(), strict=True)
+        texts.append(f"time (s),{head}\n" + "".join(f"{t:.3f},{each:.6g}\n" for t, each in rows))
+    return of_texts("fades", texts)
+
+
+@cache
 def csv() -> tuple[bytes, ...]:
     """Tables as text: with and without a header, a time column, units, remarks; other separators."""
     rows = list(zip(TIME_S.tolist(), DRIVE.tolist(), OUTPUT.tolist(), strict=True))

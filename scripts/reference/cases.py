@@ -42,6 +42,7 @@ class Place:
     def __init__(self, folder: Path) -> None:
         """An empty folder with the shipped mission in it."""
         self.folder = folder
+        self.variables: dict[str, str] = {}  # of the environment, in place of this process's
         self.write("leo-geo.toml", MISSION)
 
     def write(self, name: str, text: str) -> str:
@@ -56,10 +57,15 @@ class Place:
             return _told(["microrad", *command], (0, 1), *warm.run(command, self.folder, self._environment()))
         return self.program(sys.executable, "-m", "microrad", *command, ends=(0, 1))
 
-    def told(self, *words: object) -> list[str]:
-        """A command of microrad and whatever it says, as lines."""
+    def told(self, *words: object, program: Path | None = None) -> list[str]:
+        """A command of microrad and whatever it says, as lines.
+
+        Args:
+            words: The command.
+            program: A file of Python that is microrad but for what its first line says.
+        """
         command = [str(word) for word in words]
-        code, out, err = warm.run(command, self.folder, self._environment())
+        code, out, err = warm.run(command, self.folder, self._environment(), program)
         if code not in (0, 1, 2):
             raise CommandFailedError(f"microrad {' '.join(command)} ended with {code}: {err.strip()}")
         said = re.sub(r"microrad: compiling the loops .*\n", "", err)  # where nobody has run them before
@@ -68,6 +74,13 @@ class Place:
     def json(self, *words: object) -> Any:
         """The JSON document that a command prints."""
         return json.loads(self.run(*words, "--json"))
+
+    def printed(self, program: Path) -> list[str]:
+        """What a program in Python prints, as lines."""
+        code, out, err = warm.run([], self.folder, self._environment(), program)
+        if code:
+            raise CommandFailedError(f"{program.name} ended with {code}: {err.strip()}")
+        return told.plain(out + err)
 
     def python(self, program: Path, word: str) -> str:
         """A program in Python with a word behind its name; returns what it prints."""
@@ -86,7 +99,7 @@ class Place:
     def _environment(self) -> dict[str, str]:
         """With the threads of the linear algebra as a user has them."""
         given = {name: value for name, value in os.environ.items() if name != "OPENBLAS_NUM_THREADS"}
-        return given | {"XDG_STATE_HOME": str(self.folder / "state"), "MICRORAD_KEEP": "no"}
+        return given | {"XDG_STATE_HOME": str(self.folder / "state"), "MICRORAD_KEEP": "no"} | self.variables
 
 
 def _told(command: list[str], ends: tuple[int, ...], code: int, out: str, err: str) -> str:
@@ -99,12 +112,14 @@ def _told(command: list[str], ends: tuple[int, ...], code: int, out: str, err: s
 class Case:
     """What is run for a file of the reference; `quick` ones are compared at every gate.
 
-    What is told of a `simulated` loop has digits that a rounding moves.
+    What is told of a `simulated` loop has digits that a rounding moves. What functions return `inside` is held where it
+    does not depend on how fast the machine is.
     """
 
     measure: Callable[[Place], Any]
     quick: bool = True
     simulated: bool = False
+    inside: bool = True
 
 
 # --------------------------------------------------------------------------------------------------------------- files
@@ -198,6 +213,11 @@ def command(*words: str) -> Callable[[Place], Any]:
     return lambda place: place.json(*words, "leo-geo.toml")
 
 
+def standard(place: Place) -> Any:
+    """The shipped mission against the standard that is known."""
+    return {"standard": place.json("budget", "leo-geo.toml", "--standard", "sda")["standard"]}
+
+
 # ------------------------------------------------------------------------------------------------------------- presets
 GIVEN = {
     "pointing.lines.body_pointing.error": '"300 urad"',
@@ -217,6 +237,19 @@ GIVEN = {
     "communication.transmit_optics_loss": '"1 dB"',
     "communication.receive_optics_loss": '"2 dB"',
     "communication.receiver_sensitivity": '"200 photon/bit"',
+    "communication.implementation_loss": '"1 dB"',
+    "communication.receiver.order": "16",
+    "communication.receiver.efficiency": "0.5",
+    "communication.receiver.dark_count_rate": '"10000 1/s"',
+    "communication.receiver.background_power": '"0.1 pW"',
+    "communication.receiver.noise_figure": '"5 dB"',
+    "communication.receiver.amplifier_gain": '"35 dB"',
+    "communication.receiver.optical_bandwidth": '"20 GHz"',
+    "communication.receiver.extinction_ratio": '"15 dB"',
+    "communication.receiver.bit_error_ratio": "1e-6",
+    "communication.receiver.code_gain": '"2 dB"',
+    "communication.receiver.code_rate": "0.5",
+    "communication.receiver.bandwidth": '"6 GHz"',
     "jitter.bandwidth": '"10 Hz"',
     "requirement.pointing_error": '"10 urad"',
 }
@@ -436,7 +469,10 @@ def export_matrices(place: Place) -> Any:
 
 
 # ---------------------------------------------------------------------------------------------------------------- list
-PRESETS = ("click", "crosslink", "leo-hicali", "oicets-artemis", "paper", "sentinel1-edrs", "spot4-artemis", "tbird")
+PRESETS = (
+    *("click", "crosslink", "dsoc", "leo-hicali", "llcd", "oicets-artemis"),
+    *("paper", "qpsk-crosslink", "sda-crosslink", "sentinel1-edrs", "spot4-artemis", "tbird"),
+)
 
 CASES: Mapping[str, Case] = {
     "budget": Case(budget),
@@ -461,6 +497,7 @@ CASES: Mapping[str, Case] = {
     "mission-results": Case(mission_results, quick=False),
     "mission-shipped": Case(mission_shipped, quick=False),
     **{f"preset-{name}": Case(preset(name)) for name in PRESETS},
+    "standard": Case(standard),
 }
 """All cases; a file reference/NAME.json each."""
 

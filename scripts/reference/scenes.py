@@ -127,6 +127,14 @@ RECEIVERS = {
     "counting-ook": {"modulation": '"ook"', **COUNTER, "extinction_ratio": '"19 dB"'},
     "pin": {"detector": '"pin"', **DIODE},
     "apd": {"detector": '"apd"', **DIODE, "avalanche_gain": "21.0", "ionisation_ratio": "0.23"},
+    "heterodyne-qpsk": {
+        "modulation": '"qpsk"',
+        "detector": '"heterodyne"',
+        "efficiency": "0.71",
+        "polarisations": "2",
+        "phase_error": '"73 mrad"',
+        "inter_symbol_loss": '"0.37 dB"',
+    },
 }
 SKY = """
 [communication.receiver.background]
@@ -246,6 +254,50 @@ limit = "9 urad"
 """
 
 
+COUPLINGS = {
+    "fibre": """
+[communication.coupling]
+into = "single-mode fibre"
+mode_radius = "4.7 um"
+focal_length = "39 cm"
+lateral_error = "0.8 um"
+angular_error = "3 mrad"
+defocus = "51 nm"
+coma = "-37 nm"
+pointing_error = "1.7 urad"
+""",
+    "fibre-at-random": """
+[communication.coupling]
+into = "single-mode fibre"
+mode_radius = "best"
+astigmatism = "62 nm"
+spherical = "23 nm"
+
+[communication.coupling.jitter]
+bias = ["0.3 urad", "-0.9 urad"]
+rms = ["1.1 urad", "0.7 urad"]
+bandwidth = "44 Hz"
+""",
+    "multi-mode": """
+[communication.coupling]
+into = "multi-mode fibre"
+core_radius = "9 um"
+numerical_aperture = 0.11
+focal_length = "52 cm"
+pointing_error = "6 urad"
+""",
+    "detector-of-a-twin": """
+[communication.coupling]
+into = "detector"
+detector_radius = "11 um"
+focal_length = "1.3 m"
+coma = "48 nm"
+twin = true
+""",
+}
+"""What takes the light at the receiver: each end, pointed by each kind of error."""
+
+
 def receiver(name: str) -> dict[str, str | None]:
     """Changes that put a receiver in place of a sensitivity."""
     table = {f"communication.receiver.{key}": value for key, value in (CODED | RECEIVERS[name]).items()}
@@ -285,6 +337,13 @@ def links(place: Place) -> list[str]:
             changes |= {"communication.code_word": '"0.2 ms"'}
         file = place.write(f"{name}.toml", edited(generic(bare, seed), changes, more))
         found += place.told("budget", file, "--verbose") if seed % 2 else place.told("budget", file)
+    for seed, (name, table) in enumerate(COUPLINGS.items()):
+        changes = {"terminals.geo_obscuration": "0.27"}
+        if seed % 2:
+            changes |= {"jitter.bias": '["2.1 urad", "-0.6 urad"]', "jitter.rms": '["2.2 urad", "1.3 urad"]'}
+            changes |= {"jitter.bandwidth": '"31 Hz"'}
+        file = place.write(f"{name}.toml", edited(generic(bare, seed), changes) + table)
+        found += place.told("budget", file, "--verbose")
     return found
 
 

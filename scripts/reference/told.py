@@ -8,10 +8,14 @@ import difflib
 import json
 import math
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import fields, is_dataclass
+from functools import cached_property
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from reference.quantities import flatten
 
@@ -45,11 +49,13 @@ CELLS = {"td", "th"}
 SKIPPED = {"script", "style", "svg", "head"}
 
 LEFT_OUT = (
-    (r"(?<![.\d])\b[0-9a-f]{12,64}\b", "HASH"),
-    (r"\b0\.\d+\.\d+(?:\.dev\d+)?(?:\+\w+)?\b", "VERSION"),
+    (r"\{[0-9a-f]{8}(?:-[0-9a-f]{4}){3}-[0-9a-f]{12}\}", "{UUID}"),
+    (r"(?<![\w.])(?=\d*[a-f])[0-9a-f]{12,64}\b|(?<=SHA-256 )[0-9a-f]{12,64}\b", "HASH"),
+    (r"(?<![\w.])0\.\d+\.\d+(?:\.dev\d+)?(?:\+\w+)?\b", "VERSION"),
     (r"^Made with .*$", "Made with VERSIONS."),
     (r"^machine \| .*$", "machine"),
     (r"(?:/[\w.-]+)*/microrad-numbers-\w+", "FOLDER"),
+    (r" in [\d.]+ (?:ms|s|min), [\d.e+]+ rows a second", " in TIME, so many rows a second"),
 )
 """What differs from run to run, and what stands in its place."""
 
@@ -224,9 +230,66 @@ def _plotted(data: Any, name: str, how: tuple[int, float]) -> Iterator[str]:
         for i, each in enumerate(data):
             yield from _plotted(each, f"{name}[{i}]", how)
     elif isinstance(data, str):
-        yield f"{name}: {data}"
+        yield f"{name}: {' '.join(data.splitlines())}"
     elif _is_number(data):
         yield f"{name}: {data:.{how[0]}g}"
+
+
+def flat(name: str, data: Any) -> Iterator[str]:
+    """All that a value holds, a line each: of records their fields, of arrays their shape and what tells them apart.
+
+    Args:
+        name: What stands before each line.
+        data: A record, a JSON document, numbers or words.
+    """
+    data = _fields(data)
+    if isinstance(data, Mapping):
+        for key, value in data.items():
+            yield from flat(f"{name}.{key}", value)
+    elif isinstance(data, set | frozenset):
+        yield from flat(name, sorted(data, key=str))
+    elif isinstance(data, list | tuple | np.ndarray):
+        try:
+            values = np.asarray(data)
+        except ValueError:  # lists that are not equally long
+            values = np.empty(0, dtype=object)
+        if values.dtype.kind in "iufc":
+            yield from _array(name, values)
+        else:
+            for i, each in enumerate(data):
+                yield from flat(f"{name}[{i}]", each)
+    elif isinstance(data, float | complex | np.inexact):
+        yield f"{name}: {data:.{DIGITS}g}"
+    elif isinstance(data, bytes):
+        yield from flat(name, data.decode())
+    elif data is None or isinstance(data, str | int | np.generic | Path):
+        yield _kept(f"{name}: {' / '.join(str(data).splitlines())}")
+    else:
+        yield f"{name}: a {type(data).__name__}"
+
+
+def _fields(data: Any) -> Any:
+    """A record as its fields and properties by name; whatever else as it is."""
+    if is_dataclass(data) and not isinstance(data, type):
+        known = {name: value for kind in reversed(type(data).__mro__) for name, value in vars(kind).items()}
+        computed = [name for name, value in known.items() if isinstance(value, property | cached_property)]
+        names = [*(field.name for field in fields(data)), *computed]
+        return {name: _value(data, name) for name in names if not name.startswith("_")}
+    return data._asdict() if hasattr(data, "_asdict") else data
+
+
+def _value(data: Any, name: str) -> Any:
+    try:
+        return getattr(data, name)
+    except (ValueError, ArithmeticError) as refused:
+        return f"refused: {refused}"
+
+
+def _array(name: str, values: np.ndarray) -> Iterator[str]:
+    shape = f" {'x'.join(map(str, values.shape))}" if values.ndim > 1 else ""
+    parts = [("", values)] if values.dtype.kind != "c" else [(" real", values.real), (" imaginary", values.imag)]
+    for part, found in parts:
+        yield f"{name}{part}{shape}: {DISTINCT.sub('', curve(found.astype(float).ravel().tolist()))}"
 
 
 def table(path: Path) -> list[str]:
@@ -253,7 +316,7 @@ def curve(values: Sequence[float], digits: int = DIGITS, negligible: float = NEG
         negligible: Share of the largest magnitude below which a figure counts as 0.
     """
 
-    def said(value: float) -> str:
+    def said(value: float, digits: int = digits) -> str:
         if not math.isfinite(value):
             return str(value)
         return f"{0.0 if abs(value) < negligible * largest else value:.{digits}g}"
@@ -269,7 +332,7 @@ def curve(values: Sequence[float], digits: int = DIGITS, negligible: float = NEG
     rms = math.sqrt(math.fsum(each * each for each in finite) / len(finite))
     figures = {"first": finite[0], "last": finite[-1], "min": min(finite), "max": max(finite), "mean": mean}
     figures |= {"rms": rms, "slope": slope}
-    return f"{len(values)}, {len(finite)}, {len(set(finite))} distinct: " + ", ".join(
+    return f"{len(values)}, {len(finite)}, {len({said(each, 9) for each in finite})} distinct: " + ", ".join(
         f"{k} {said(v)}" for k, v in figures.items()
     )
 

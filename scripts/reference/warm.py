@@ -12,8 +12,11 @@ from functools import partial
 from pathlib import Path
 from typing import IO, NoReturn
 
+from reference import inside
+
 LIBRARIES = (
     *("numba", "scipy.linalg", "scipy.optimize", "scipy.signal", "xarray", "h5netcdf", "jinja2"),
+    *("skyfield.api", "microrad.campaign.run", "microrad.report.study.page", "microrad.export.flight.write"),
     *("microrad.lab.bench", "microrad.lab.identify", "microrad.export.linear_import"),
     "microrad.report.identification.page",
 )
@@ -22,13 +25,16 @@ LIBRARIES = (
 is_loaded = False
 """Whether this process has them, and those that it forks."""
 
+inside_of: list[Path] = []
+"""Folder where each command of a case leaves what the functions inside of it return."""
+
 
 def load(words: Sequence[str], folder: Path) -> None:
     """Run a command once in a process without threads, which the forks then have loaded."""
     global is_loaded  # noqa: PLW0603
+    os.environ["MICRORAD_KEEP"] = "no"
     for name in LIBRARIES:
         importlib.import_module(name)
-    os.environ["MICRORAD_KEEP"] = "no"
     os.chdir(folder)
     ends = os.dup(1)
     with tempfile.TemporaryFile() as out:
@@ -55,8 +61,9 @@ def run(
     sys.stdout.flush()  # what waits to be written would be written by the fork as well
     sys.stderr.flush()
     with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
+        left = inside_of[-1] / f"{len(list(inside_of[-1].iterdir())) + 1}.json" if is_loaded and inside_of else None
         if (child := os.fork()) == 0:
-            _become(partial(_ended, words, program), folder, environment, out, err)
+            _become(partial(_watched, left, words, program), folder, environment, out, err)
         code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
         return code, _text(out), _text(err)
 
@@ -78,6 +85,18 @@ def _become(
         sys.stdout.flush()
         sys.stderr.flush()
         os._exit(code)
+
+
+def _watched(left: Path | None, words: Sequence[str], program: Path | None) -> int:
+    """A command of which it is written down what its functions return, where there is a file for that."""
+    if left is None:
+        return _ended(words, program)
+    watch = inside.Watch()
+    watch.begin()
+    try:
+        return _ended(words, program)
+    finally:
+        watch.end(left)
 
 
 def _ended(words: Sequence[str], program: Path | None = None) -> int:

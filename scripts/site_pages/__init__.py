@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from site_pages import choose, commands, conventions, formulas, keys, names, validation
+from site_pages import choose, commands, conventions, formulas, keys, names, promises, validation
 
 _NOTEBOOKS = """# Notebooks
 
@@ -17,7 +17,7 @@ def all_pages(sources: Path) -> dict[str, str]:
         sources: The folder, whose notebooks get a page that lists them.
     """
     made: dict[str, str] = {}
-    for each in (names, commands, keys, choose, conventions, formulas, validation):
+    for each in (names, commands, keys, choose, conventions, formulas, promises, validation):
         made |= each.pages()
     notebooks = [f"notebooks/{each.stem}" for each in sorted((sources / "notebooks").glob("*.ipynb"))]
     tree = "\n".join(("```{toctree}", ":maxdepth: 1", "", *notebooks, "```"))

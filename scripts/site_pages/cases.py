@@ -92,6 +92,27 @@ def _parametrised(test: Callable[..., None]) -> Iterator[tuple[tuple[str, ...], 
                 yield names, each
 
 
+def evidence(*names: str) -> Iterator[Case]:
+    """What these checks of `microrad verify` compare, one case each.
+
+    Args:
+        names: Of the checks.
+    """
+    from microrad.report.verification.checks import every
+    from microrad.report.verification.workspace import Workspace
+
+    by_name = {check.name: check for check in every()}
+    with tempfile.TemporaryDirectory() as folder:
+        workspace = Workspace(Path(folder), None)
+        for check in (by_name[name] for name in names):
+            for each in check.run(workspace):
+                what = f"{each.what} ({each.unit})" if each.unit else each.what
+                yield case(what, check.source, f"{each.expected:.10g}", each.obtained, _EVIDENCE, each.tolerance)
+
+
+_EVIDENCE = "tests/report/test_verification.py::test_all_evidence_holds"
+
+
 # ---------------------------------------------------------------------------------------------------------- link
 def link() -> Iterator[Case]:
     """All cases of tests/link/test_facts_link.py that hold a number against printed digits."""
@@ -127,18 +148,7 @@ def conventions() -> Iterator[Case]:
     gain = ours['Margin, microrad with "gain"'] + peers.mathworks(peers.MATHWORKS)["Receive pointing"]
     same = f"{path}::test_told_to_read_likewise_microrad_has_the_peers_margin"
     yield case("margin, read as the example reads pointing (dB)", source, "-2.5297", gain, same, 1e-4)
-    test = f"{path}::test_difference_to_mathworks_is_the_two_pointing_terms"
-    for term, text in (("Transmit gain", "103.0383"), ("Receive gain", "101.6994"), ("Free space", "-258.1776")):
-        yield case(f"{term.lower()} (dB)", source, text, ours[term], test)
-    liang = {row.term: row for row in peers.liang_rows()}
-    others = sum(liang[term].difference for term in ("Transmit gain", "Transmit pointing", "Receive pointing"))
-    yield case(
-        "margin at the quoted distance of 5419 km, without the three terms that differ (dB)",
-        "Liang et al., IEEE WoWMoM 2022, Eq. (1) to (3)",
-        "3.00",
-        liang["Margin"].ours - others,
-        f"{path}::test_difference_to_liang_is_gain_and_pointing",
-    )
+    yield from evidence("mathworks-link", "liang-link")
 
 
 def pointing() -> Iterator[Case]:
@@ -181,12 +191,10 @@ def pointing() -> Iterator[Case]:
 
 def receivers() -> Iterator[Case]:
     """Photons per bit at 1e-9, the noise of avalanches, and the air mass."""
-    from microrad.link import gains
     from microrad.link import receivers as built
 
     common = {"wavelength_m": 1.55e-6, "bit_error_ratio": 1e-9, "bandwidth_hz": 1e10}
     pin = built.OokPin(**common, quantum_efficiency=1.0, thermal_noise_a_sqrt_hz=0.0)
-    ppm = built.PpmCounting(**common, detection_efficiency=1.0, order=16)
     path = "tests/link/test_receivers.py"
     half_q = f"{path}::test_a_photodiode_without_noise_of_its_own_needs_half_q_squared"
     yield case(
@@ -196,29 +204,13 @@ def receivers() -> Iterator[Case]:
         pin.photons_per_bit(1e9),
         half_q,
     )
-    erasures = f"{path}::test_ppm_without_background_is_an_erasure_channel"
-    yield case(
-        "16-PPM, counted without background (photons per bit)",
-        "erasure channel",
-        "5.01",
-        ppm.photons_per_bit(1e9),
-        erasures,
-    )
-    for gain, ratio, text in ((100.0, 1.0, "100.00"), (100.0, 0.0, "1.99"), (10.0, 0.02, "2.062")):
-        name = f"excess noise factor at a gain of {gain:g}, ionisation ratio {ratio:g}"
-        value = built.apd_excess_noise_factor(gain, ratio)
-        yield case(name, "McIntyre 1966", text, value, f"{path}::test_mcintyre_noise_has_its_textbook_limits")
-    path = "tests/link/test_link_beams.py"
-    air = gains.air_mass(0.0)
-    yield case(
-        "air mass at the horizon", "Kasten and Young 1989", "37.9", air, f"{path}::test_air_mass_of_kasten_and_young"
-    )
+    yield from evidence("ideal-receivers", "avalanche", "clear-sky")
 
 
 # -------------------------------------------------------------------------------------------------------- orbit
 def orbit() -> Iterator[Case]:
     """The published verification of SGP4, and the geometry of a low orbit and a slot."""
-    yield _sgp4()
+    yield from evidence("sgp4")
     from microrad.orbit.earth.figure import EARTH_RADIUS_M
     from microrad.orbit.propagation import analytic
     from microrad.orbit.visibility.contacts import coplanar_contact
@@ -240,25 +232,6 @@ def orbit() -> Iterator[Case]:
         math.degrees(analytic.sun_synchronous_inclination_rad(500e3)),
         "tests/orbit/test_orbit.py::test_the_sun_synchronous_inclination_at_500_km_is_97_4_degrees",
     )
-
-
-def _sgp4() -> Case:
-    path = "tests/orbit/test_orbit_files.py"
-    tests, largest, checked = module(path), 0.0, set()
-    with tempfile.TemporaryDirectory() as folder:
-        for one, two, every in tests.verification_cases():
-            table = every[np.abs(every[:, 0]) <= 14 * 1440.0]
-            text = "\n".join(tests.summed(line.ljust(69)) for line in (one, two))
-            try:
-                (found,) = tests.elements(Path(folder), text)
-                states = tests.Sgp4Orbit(found, found.epoch).states(60.0 * table[:, 0])
-            except tests.OrbitError:
-                continue
-            largest = max(largest, float(np.max(np.abs(states.position_m - 1000 * table[:, 1:4].T))))
-            checked.add(one[2:7])
-    name = f"SGP4, largest difference of a position over {len(checked)} satellites, 14 days (mm)"
-    source, test = "Vallado et al., AIAA 2006-6753, SGP4-VER", "test_sgp4_against_the_published_verification"
-    return case(name, source, "0.0", 1000.0 * largest, f"{path}::{test}", 1.0)
 
 
 # --------------------------------------------------------------------------------------------- mirror and control
@@ -306,36 +279,12 @@ def mirror() -> Iterator[Case]:
 
 def control() -> Iterator[Case]:
     """Margins of several loops at once."""
-    from microrad.core import lti
-    from microrad.loop.control import analysis
-
-    path = "tests/loop/test_loop_analysis.py"
-    satellite = module(path).SATELLITE
-    freq_hz = np.concatenate([[1e-6], np.geomspace(1e-3, 1e3, 4001)])
-    found = analysis.multiloop_disk_margin(
-        freq_hz, lti.frequency_response(satellite, freq_hz) @ np.array([[1.0, -2.0], [0.0, 1.0]])
-    )
-    test = f"{path}::test_the_spinning_satellite_has_its_published_multiloop_margin"
-    for what, text, value in (
-        ("disk margin", "0.3754", found.disk),
-        ("phase (deg)", "21.26", math.degrees(found.disk_phase_rad)),
-        ("gain (dB)", "3.30", 20 * math.log10(found.disk_gain[1])),
-    ):
-        source = "Seiler, Packard and Gahinet, spinning satellite (bounds 0.2 % apart)"
-        yield case(f"multiloop {what}", source, text, value, test, 3e-3 * float(text))
+    return evidence("spinning-satellite")
 
 
 def random_numbers() -> Iterator[Case]:
     """The generator behind all simulated noise."""
-    from microrad.core.kernels.random_numbers import philox
-
-    path = "tests/core/test_ensemble_kernel.py"
-    for number, texts in enumerate(module(path).KNOWN_ANSWERS, 1):
-        counter, key, answer = ([int(word, 16) for word in text.split()] for text in texts)
-        words = [int(word) for word in philox(*map(np.uint64, (*counter, *key)))]
-        wrong = sum(word != wanted for word, wanted in zip(words, answer, strict=True))
-        name = f"Philox 4x32-10, known answer {number}: words that differ"
-        yield case(name, "Random123, kat_vectors", "0", wrong, f"{path}::test_philox_gives_the_known_answers", 0.0)
+    return evidence("random-numbers")
 
 
 GROUPS: dict[str, Callable[[], Iterator[Case]]] = {

@@ -50,6 +50,7 @@ _COVERED = (
     "link.pointing.statistics",
     "link.pointing.summation",
     "link.pointing.fading",
+    "link.coupling.ends",
 )
 
 
@@ -220,6 +221,21 @@ def _receivers() -> Iterator[Formula]:
         agrawal,
         "exact",
     )
+    yield Formula(f"{r}BpskHeterodyne", r"P_b = \frac{1}{2} \mathrm{erfc} \sqrt{q n / (1 + 2 q N)}", agrawal, "exact")
+    yield Formula(
+        f"{r}QpskHomodyne",
+        r"P_b = \left\langle \frac{1}{2} \mathrm{erfc} \left[ \sqrt{q n / (1 + q N)} \right. \right. "
+        r"\left. \left. (\cos \phi - \sin \phi) \right] \right\rangle",
+        "both quadratures: Yuen and Shapiro 1980; phase error: Prabhu, IEEE Trans. AES-12 (1976) 275",
+        "exact",
+    )
+    yield Formula(
+        f"{r}QpskHeterodyne",
+        r"P_b = \left\langle \frac{1}{2} \mathrm{erfc} \left[ \sqrt{q n / (1 + 2 q N)} \right. \right. "
+        r"\left. \left. (\cos \phi - \sin \phi) \right] \right\rangle",
+        "as above, with the image band",
+        "exact",
+    )
     yield Formula(
         f"{r}background_power_w", r"L A \pi \sin^2(\phi / 2)\, d", "radiance over the cone of the field", "exact"
     )
@@ -260,8 +276,31 @@ def _pointing() -> Iterator[Formula]:
     yield Formula(f"{f}fades", r"\bar t = P / \nu", "share of time over rate", "exact")
     yield Formula(f"{f}mean_error_ratio", r"\int P_b(h)\, p(h)\, dh", "mean over slow fades", "exact")
     yield Formula(f"{f}uncoded_penalty_db", r"E[P_b(10^{x/10} h)] = P_b(1)", "solved for x", "exact")
+    yield Formula(f"{f}penalty_db", r"\sum_k p_k P_b(10^{x/10} h_k) = P_b(1)", "solved for x", "exact")
     yield Formula(
-        "link.pointing.radial_error.radial_cdf",
+        f"{f}fades_of_both",
+        r"\frac{1}{\sqrt{2 \pi}} \int \int p(\mathbf{u})\, p(\mathbf{v})\, |\nabla L \cdot \dot{\boldsymbol\sigma}|\, "
+        r"\delta(L - L_0)\, d\mathbf{u}\, d\mathbf{v}",
+        "Rice 1944, for the four axes of two ends, whose losses L add up; by quadrature",
+        "exact",
+    )
+    e = "link.coupling.ends."
+    yield Formula(
+        f"{e}best_truncation",
+        r"2 a^2 (e^{-a^2} - e^2 e^{-a^2 e^2}) = e^{-a^2 e^2} - e^{-a^2}",
+        "most of \\(2 (e^{-a^2 e^2} - e^{-a^2})^2 / a^2\\), Ruilier 1998",
+        "exact",
+    )
+    yield Formula(f"{e}truncation_of_mode", r"a = \frac{\pi w D}{2 \lambda f}", "Gaussian mode in the focus", "exact")
+    yield Formula(
+        f"{e}turbulent_share",
+        r"8 a^2 \int_0^1 \int_0^1 e^{-(a^2 + A)(u^2 + v^2)} I_0(2 A u v)\, u v\, du\, dv",
+        "Dikmelik and Davidson 2005, for a Gaussian coherence of the field; by quadrature",
+        "exact",
+    )
+    yield Formula(f"{e}narrowed", r"2 f \tan \arcsin NA", "cone of a fibre in the aperture", "exact")
+    yield Formula(
+        "link.radial_error.radial_cdf",
         r"P(r < R)",
         "two Gaussian axes with any bias and rms, by quadrature; noncentral chi-square of like axes",
         "exact",

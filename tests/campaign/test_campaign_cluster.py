@@ -139,6 +139,7 @@ def engine(there, stuck):
     one.close()
 
 
+@pytest.mark.promise("campaigns-61")
 def test_every_job_has_its_own_result_and_both_workers_work(engine):
     outcomes = engine.outcomes(iter(chunks(*range(20))))
     first, places = next(outcomes), set()
@@ -150,6 +151,7 @@ def test_every_job_has_its_own_result_and_both_workers_work(engine):
     assert len(places) == 2
 
 
+@pytest.mark.promise("campaigns-53")
 def test_jobs_are_taken_only_as_fast_as_they_start(engine):
     taken = []
     outcomes = engine.outcomes(taken.append(j) or j for j in chunks(*range(99)))
@@ -168,6 +170,8 @@ def test_errors_are_of_their_job_alone_and_keep_their_words(engine):
     assert outcomes[104].reason == "SystemExit: enough"
 
 
+@pytest.mark.promise("campaigns-54")
+@pytest.mark.promise("campaigns-62")
 def test_a_job_that_kills_its_worker_has_died_and_those_that_waited_there_come_out(engine):
     outcomes = run(engine, chunks(0, 100, *range(1, 10)))
     assert kinds(outcomes) == {100: "died"}
@@ -175,6 +179,7 @@ def test_a_job_that_kills_its_worker_has_died_and_those_that_waited_there_come_o
     assert outcomes[100].reason.endswith(" ended")
 
 
+@pytest.mark.promise("campaigns-55")
 @pytest.mark.parametrize(
     "silent", [pytest.param(101, marks=pytest.mark.endurance), 106], ids=["hangs", "keeps the lock"]
 )
@@ -201,6 +206,8 @@ def test_a_job_whose_worker_ended_has_died_and_is_not_late_however_slowly_that_i
     engine._kill(ended)  # as where it ends between the look and this
 
 
+@pytest.mark.promise("campaigns-53")
+@pytest.mark.promise("campaigns-61")
 def test_workers_killed_at_random_lose_and_double_nothing(engine, stuck):
     """Job 107 is endless until it is killed; so a kill hits a job, however the others fall between them."""
     jobs = 60 if os.environ.get("MICRORAD_ENDURANCE") else 15
@@ -247,6 +254,7 @@ def connect(elsewhere, table="{}", late_s=20.0):
     return DaskEngine(table.encode(), TARGET, elsewhere.address, late_s=late_s)
 
 
+@pytest.mark.promise("campaigns-46", "campaigns-56")
 def test_a_scheduler_that_goes_away_is_told(elsewhere):
     elsewhere.worker("--no-nanny")
     one = connect(elsewhere, '{"0": "work", "1": "work", "2": "work", "else": "endless"}')
@@ -271,6 +279,7 @@ def test_workers_elsewhere_serve_one_engine_after_another_and_forget(there):
     one.close()
 
 
+@pytest.mark.promise("campaigns-52")
 def test_a_worker_with_other_code_is_refused_with_both_hashes(there, monkeypatch):
     monkeypatch.setenv("CODE_OF_TARGET", "d1ff")  # in this process
     one = connect(there)
@@ -288,6 +297,7 @@ def lonely(tmp_path_factory):
     print(one.log)
 
 
+@pytest.mark.promise("campaigns-53")
 def test_a_scheduler_without_workers_is_told(lonely, monkeypatch):
     monkeypatch.setattr(cluster, "_NO_WORKERS_S", 1.0)
     one = connect(lonely)
@@ -327,3 +337,23 @@ def test_without_distributed_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(CampaignError, match=r"constraints.txt '\.\[cluster\]'"):
         DaskEngine(b"{}", TARGET, "tcp://127.0.0.1:9")
+
+
+@pytest.mark.promise("campaigns-55")
+def test_a_worker_without_a_nanny_is_sent_away():
+    """Where there is no nanny that could kill it, the scheduler retires it and takes no more from it."""
+    asked = []
+
+    def call(what, *args, **options):
+        asked.append((what, options))
+        if what == "run":
+            raise ValueError("no nanny")
+
+    scheduler = SimpleNamespace(retire_workers="retire")
+    engine = SimpleNamespace(_call=call, _client=SimpleNamespace(_run="run", scheduler=scheduler))
+    DaskEngine._kill(engine, "tcp://127.0.0.1:9")
+    address = {"workers": ["tcp://127.0.0.1:9"]}
+    assert asked == [
+        ("run", address | {"nanny": True}),
+        ("retire", address | {"close_workers": True, "remove": True}),
+    ]

@@ -1,5 +1,6 @@
 """The local engine: whatever a job does to its process, the others come out, and nothing is left behind."""
 
+import json
 import os
 import random
 import signal
@@ -487,3 +488,10 @@ def test_a_clock_counts_seconds_awake(monkeypatch):
     until(lambda: clock.now() > 0.49, "the last of these times")
     clock.close()
     assert clock.now() == pytest.approx(0.1 + 0.15 + 0.2 + 0.05)
+
+
+def test_a_job_that_is_done_begins_the_count_of_deaths_anew(engine, monkeypatch):
+    monkeypatch.setattr(local, "_DEATHS", 4)
+    killed = {str(number): "killed" for number in range(0, 24, 3)}  # each takes its process down, twice at most
+    outcomes = run(engine(json.dumps(killed), threads=1), chunks(24))
+    assert set(kinds(outcomes)) == set(map(int, killed))

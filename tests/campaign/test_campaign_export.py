@@ -106,6 +106,7 @@ def said(call, *args):
     return str(caught.value)
 
 
+@pytest.mark.promise("campaigns-48", "campaigns-49")
 @pytest.mark.parametrize("kind", FORMATS)
 @pytest.mark.parametrize("together", [16384, 64, 50, 7])
 def test_every_format_has_the_same_table_to_the_last_bit(tmp_path, kind, together, monkeypatch):
@@ -118,6 +119,7 @@ def test_every_format_has_the_same_table_to_the_last_bit(tmp_path, kind, togethe
         assert list(map(repr, found[name])) == list(map(repr, wanted[name])), name
 
 
+@pytest.mark.promise("campaigns-48")
 @pytest.mark.parametrize("kind", FORMATS)
 def test_the_same_chunks_give_the_same_bytes_whatever_the_order_in_which_they_came(tmp_path, kind):
     targets = [tmp_path / f"{name}.{kind}" for name in ("a", "b", "c")]
@@ -128,6 +130,7 @@ def test_the_same_chunks_give_the_same_bytes_whatever_the_order_in_which_they_ca
     assert first == second != other
 
 
+@pytest.mark.promise("campaigns-48", "campaigns-49")
 def test_each_column_has_its_unit_and_meaning_and_the_table_its_origin(tmp_path):
     path = write(tmp_path)
     for kind in FORMATS:
@@ -183,6 +186,7 @@ def margins(whole, number):
     return [(at + draw.randrange(8 * ROWS), draw.randrange(8)) for _ in range(20)]
 
 
+@pytest.mark.promise("campaigns-49")
 def test_a_flipped_bit_in_parquet_is_an_error_where_without_checksums_it_is_silent(tmp_path):
     target = tmp_path / "rows.parquet"
     exported(write(tmp_path), target)
@@ -204,6 +208,7 @@ def test_a_flipped_bit_in_parquet_is_an_error_where_without_checksums_it_is_sile
     assert flips(target, spots, lambda path: numbers(path, False))[1] > 0
 
 
+@pytest.mark.promise("campaigns-49")
 def test_a_flipped_bit_in_netcdf_is_an_error_where_without_checksums_it_is_silent(tmp_path):
     target, plain = tmp_path / "rows.nc", tmp_path / "plain.nc"
     exported(write(tmp_path), target)
@@ -220,6 +225,7 @@ def test_a_flipped_bit_in_netcdf_is_an_error_where_without_checksums_it_is_silen
     assert flips(target, margins(target.read_bytes(), 0), numbers) == (len(spots), 0)
 
 
+@pytest.mark.promise("campaigns-49")
 @pytest.mark.parametrize("kind", ["nc", "parquet"])
 def test_no_flip_among_the_values_of_any_column_is_silent(tmp_path, kind):
     target = tmp_path / f"rows.{kind}"
@@ -255,6 +261,7 @@ def test_what_cannot_be_exported_is_refused_and_writes_nothing(tmp_path):
     assert (tmp_path / "rows.csv").exists()
 
 
+@pytest.mark.promise("campaigns-46", "campaigns-48")
 @pytest.mark.parametrize("kind", FORMATS)
 def test_a_damaged_chunk_stops_the_export_and_leaves_the_old_file(tmp_path, kind):
     path, target = write(tmp_path), tmp_path / f"rows.{kind}"
@@ -267,6 +274,7 @@ def test_a_damaged_chunk_stops_the_export_and_leaves_the_old_file(tmp_path, kind
     assert [each for each in tmp_path.iterdir() if each.name.startswith(".microrad-")] == []
 
 
+@pytest.mark.promise("campaigns-49")
 def test_a_missing_pyarrow_is_told_by_what_to_install(tmp_path, monkeypatch):
     path = write(tmp_path)
     monkeypatch.setitem(sys.modules, "pyarrow", None)
@@ -290,6 +298,7 @@ FULL = """
 """
 
 
+@pytest.mark.promise("campaigns-48")
 def test_a_full_disk_leaves_the_old_file_and_no_part_of_a_new_one(tmp_path):
     path, folder = write(tmp_path, numbers=(range(40), range(40))), tmp_path / "small"
     folder.mkdir()

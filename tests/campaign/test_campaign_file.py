@@ -12,13 +12,15 @@ import numpy as np
 import pytest
 
 from campaign_files import HEAD, IDENTIFIED, LOOP, NOISE, POWER, UNCERTAINTY, loaded, written
+from microrad import link
 from microrad.campaign.definition import keys
 from microrad.campaign.definition.records import Variable
 from microrad.campaign.file import load_campaign
 from microrad.campaign.ledger import file
 from microrad.campaign.records import CampaignError
-from microrad.campaign.rows import evaluate, sampling
+from microrad.campaign.rows import evaluate, loops, sampling
 from microrad.campaign.rows.missions import MissionBuilder
+from microrad.loop.pointing_loop.ensemble import Span
 from microrad.mission.file import MissionError, load_mission, named_files, open_mission
 from scenes import scene_of
 from shipped import SHIPPED
@@ -44,6 +46,7 @@ def line_of(folder, piece):
 
 
 # ------------------------------------------------------------------------------------------------------------- reading
+@pytest.mark.promise("campaigns-7")
 def test_a_campaign_with_everything_in_it(tmp_path):
     text = f"""{HEAD.replace("256", "300")}realisations = 32
 row_limit = "60 s"
@@ -108,6 +111,13 @@ high = "12 cm"
     assert "takes as long as 64" in c.warnings[1]
 
 
+@pytest.mark.promise("campaigns-7", "campaigns-16", "campaigns-17", "campaigns-18")
+def test_a_loop_may_begin_without_settling(tmp_path):
+    """Its duration is no longer than what the mission settles for."""
+    campaign = loaded(tmp_path, HEAD + LOOP.replace('"1 s"', '"0.5 s"') + 'settle = "0 s"\n')
+    assert (campaign.table.loop.settle_s, campaign.table.loop.duration_s) == (0.0, 0.5)
+
+
 def test_what_is_left_out_has_its_default(tmp_path):
     c = loaded(tmp_path, HEAD + POWER)
     assert (c.rows, c.most_rows, c.block, c.realisations, c.loop_varies) == (256, 256, 32, 1, False)
@@ -119,8 +129,17 @@ def test_what_is_left_out_has_its_default(tmp_path):
     assert "residual_rms" in with_loop.keep
     assert "volume" not in with_loop.keep
     assert [(each.output, each.most) for each in with_loop.limits][1] == ("residual_quantile", 1e-5)
+    own, f = with_loop.table.loop, with_loop.mission.mission.fine_pointing
+    assert (own.axes, own.mirror, loops.span(own, f, 1)) == ("both", "given", Span(1.0, f.settle_s, 1))
+    bare = own.model_copy(update={"duration_s": None, "settle_s": 0.1})
+    assert loops.span(bare, f, 2) == Span(f.duration_s, 0.1, 2) and f.duration_s != 1.0
+    listed = loaded(
+        tmp_path, HEAD + distributed("terminals.leo_aperture", 'distribution = "table"\nvalues = ["4 cm", "5 cm"]')
+    )
+    assert listed.draws[0].distribution.probabilities == (0.5, 0.5)
 
 
+@pytest.mark.promise("campaigns-19")
 @pytest.mark.parametrize(
     ("inputs", "varies", "realisations"), [(POWER, False, 1), (NOISE, True, 64), (IDENTIFIED, True, 64)]
 )
@@ -129,6 +148,7 @@ def test_realisations_follow_from_whether_rows_share_their_loop(tmp_path, inputs
     assert (c.loop_varies, c.realisations) == (varies, realisations)
 
 
+@pytest.mark.promise("campaigns-20")
 def test_random_rows_are_not_rounded(tmp_path):
     c = loaded(tmp_path, HEAD.replace("sobol", "random").replace("256", "301") + POWER)
     assert (c.rows, c.warnings) == (301, ())
@@ -161,6 +181,7 @@ def test_a_grid_may_give_what_the_mission_leaves_open(tmp_path):
     assert "in no source" in faults(tmp_path, HEAD, changes=unknown)[0].reason
 
 
+@pytest.mark.promise("campaigns-7")
 def test_words_lists_and_switches_in_set_and_grid(tmp_path):
     text = f"""{HEAD}{POWER}
 [set]
@@ -454,6 +475,7 @@ def placed(text, added):
     return f"{head}{root}\n[inputs{rest}{tables}\n"
 
 
+@pytest.mark.promise("campaigns-8")
 @pytest.mark.parametrize("what", REFUSED)
 def test_a_wrong_value_is_refused_with_its_key_and_line(tmp_path, what):
     old, new, key, reason = REFUSED[what]
@@ -466,6 +488,7 @@ def test_a_wrong_value_is_refused_with_its_key_and_line(tmp_path, what):
     assert load_campaign(written(tmp_path, text)).rows == 256  # and without it nothing is refused
 
 
+@pytest.mark.promise("campaigns-7")
 @pytest.mark.parametrize("what", ADDED)
 def test_what_does_not_fit_is_refused_with_its_key(tmp_path, what):
     added, key, reason = ADDED[what]
@@ -492,6 +515,7 @@ def test_a_set_of_a_thousand_parts_is_told(tmp_path, added, reason):
     assert [fault.reason for fault in faults(tmp_path, placed(HEAD + POWER, added))] == [reason]
 
 
+@pytest.mark.promise("campaigns-8")
 @pytest.mark.parametrize(
     ("text", "nearest"),
     [
@@ -509,6 +533,7 @@ def test_a_slip_of_the_pen_is_told_what_was_probably_meant(tmp_path, text, neare
     assert [fault.nearest for fault in faults(tmp_path, text)] == [nearest]
 
 
+@pytest.mark.promise("campaigns-8")
 def test_all_faults_come_at_once(tmp_path):
     text = HEAD.replace("sobol", "sobl") + POWER.replace("5 W", "5 m") + '[set]\n"terminals.leo_aperture" = "1"\n'
     found = faults(tmp_path, text + '[grid]\n"terminals.geo_aperture" = []\n[limits.nothing]\nleast = 1\n')
@@ -541,6 +566,7 @@ def test_files_that_are_not_there_are_named(tmp_path):
     assert "is missing" in faults(tmp_path, HEAD.partition("\n")[2])[0].reason
 
 
+@pytest.mark.promise("campaigns-17")
 def test_a_loop_or_a_day_needs_a_mission_that_has_one(tmp_path):
     assert "needs a mission with the table" in faults(tmp_path, HEAD + LOOP, whole=False)[0].reason
     keep = HEAD + 'keep = ["volume"]\n' + POWER
@@ -689,6 +715,7 @@ def test_more_runs_than_noise_streams_have_numbers_for(tmp_path):
 
 
 # ---------------------------------------------------------------------------------------------------- missions of rows
+@pytest.mark.promise("campaigns-14")
 def test_a_row_has_the_drawn_values_to_the_last_bit(tmp_path):
     c = loaded(tmp_path, f'{HEAD}{LOOP}{POWER}{NOISE}{IDENTIFIED}[set]\nmirror = "mirror.toml"\n')
     builder = MissionBuilder(c)
@@ -711,6 +738,7 @@ def test_a_row_has_the_drawn_values_to_the_last_bit(tmp_path):
     assert c.cells[0].file.mission.mirror.uncertainty is not None
 
 
+@pytest.mark.promise("readme-12")
 def test_a_row_is_the_mission_that_a_file_with_its_values_would_be(tmp_path):
     c = loaded(tmp_path, HEAD + POWER + distributed("terminals.leo_aperture", TABLE + 'values = ["5 cm", "7 cm"]'))
     row = MissionBuilder(c).mission(0, {"communication.transmit_power": 4.5, "terminals.leo_aperture": 0.07}).mission
@@ -740,6 +768,7 @@ def test_whole_numbers_of_a_table_stay_whole(tmp_path):
     assert MissionBuilder(c).mission(0, {"acquisition.attempts": 2.0}).mission.acquisition.attempts == 2
 
 
+@pytest.mark.promise("campaigns-12")
 @pytest.mark.parametrize(
     ("key", "head", "jitter"),
     [
@@ -767,6 +796,7 @@ def test_a_drawn_key_that_nothing_reads_is_refused_by_name(tmp_path, key, head, 
     assert ("jitter.bias or jitter.rms" in found.expected) is jitter
 
 
+@pytest.mark.promise("campaigns-12")
 @pytest.mark.parametrize("jitter", [False, True], ids=["static", "jitter"])
 def test_every_drawable_key_moves_an_output_or_is_refused(tmp_path, jitter):
     """Each quantity of the mission is drawn about its value; those that are refused are those that move nothing."""
@@ -805,6 +835,7 @@ def test_a_drawn_key_is_read_where_one_cell_reads_it(tmp_path):
     assert loaded(tmp_path, HEAD + distributed("communication.pointing_error", body) + grid).draws
 
 
+@pytest.mark.promise("campaigns-8")
 def test_a_row_that_is_no_mission_says_key_value_and_reason(tmp_path):
     c = loaded(tmp_path, HEAD + POWER)
     with pytest.raises(CampaignError, match=r'communication\.transmit_power = "-1\.0 W" is not above 0 W'):
@@ -817,6 +848,7 @@ def test_a_row_that_is_no_mission_says_key_value_and_reason(tmp_path):
     )
 
 
+@pytest.mark.promise("campaigns-13", "campaigns-14")
 def test_mirrors_of_a_grid_are_each_drawn_from_their_own_covariance(tmp_path):
     path = written(tmp_path, f'{HEAD}{IDENTIFIED}[grid]\nmirror = ["mirror.toml", "other.toml"]\n')
     text = (tmp_path / "mirror.toml").read_text(encoding="utf-8")
@@ -898,6 +930,7 @@ def test_only_keys_that_touch_the_loop_change_it(tmp_path, sensor):
     assert keys.touches_loop("conventions.mirror_angle", file.mission)  # a word
 
 
+@pytest.mark.promise("campaigns-6")
 def test_rows_with_the_same_loop_have_the_same_key(tmp_path):
     text = f'{HEAD}{LOOP}{POWER}{NOISE}[grid]\n"terminals.geo_aperture" = ["15 cm", "20 cm"]\n'
     text += '"fine_pointing.strain_gauge.noise" = ["0.1 urad", "0.2 urad"]\n'
@@ -909,3 +942,34 @@ def test_rows_with_the_same_loop_have_the_same_key(tmp_path):
     assert one != builder.loop_key(1, {power: 4.0, noise: 1e-6})  # another gauge
     assert one == builder.loop_key(2, {power: 4.0, noise: 1e-6})  # another partner's aperture
     assert hash(one) == hash(builder.loop_key(2, {power: 4.0, noise: 1e-6}))
+
+
+SENSITIVITY = 'receiver_sensitivity = "291.2 photon/bit" #'
+RECEIVER = """receiver.modulation = "qpsk"
+receiver.detector = "heterodyne"
+receiver.efficiency = 0.7
+receiver.bit_error_ratio = 1e-7
+receiver.code = "dvb-s2-1-2"
+receiver.bandwidth = "4 GHz"
+receiver.phase_error = "50 mrad"
+receiver.inter_symbol_loss = "0.3 dB" #"""
+
+
+@pytest.mark.promise("link-97")
+def test_a_rows_receiver_has_its_drawn_phase_error_and_loss(tmp_path):
+    drawn = "".join(
+        f'[inputs."communication.receiver.{key}"]\ndistribution = "uniform"\nlow = "{low}"\nhigh = "{high}"\n'
+        for key, low, high in (("phase_error", "20 mrad", "90 mrad"), ("inter_symbol_loss", "0.1 dB", "1 dB"))
+    )
+    c = loaded(tmp_path, HEAD + drawn, changes=((SENSITIVITY, RECEIVER),))
+    columns, _ = sampling.rows(c, 0, 0, 8)
+    phases, losses = columns["communication.receiver.phase_error"], columns["communication.receiver.inter_symbol_loss"]
+    assert np.ptp(phases) > 0.03
+    margins = []
+    for phase, loss in zip(phases, losses, strict=True):
+        values = {"communication.receiver.phase_error": float(phase), "communication.receiver.inter_symbol_loss": 0.5}
+        m = MissionBuilder(c).mission(0, values).mission
+        assert m.communication.receiver.phase_error_rad == phase
+        assert 0.1 <= loss <= 1.0
+        margins.append(float(link.margin_of_error(link.of(m), 1e-5)))
+    assert np.all(np.diff(np.asarray(margins)[np.argsort(phases)]) < 0.0)

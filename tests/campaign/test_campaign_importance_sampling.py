@@ -141,6 +141,7 @@ def test_the_density_of_the_levels_is_one_and_no_weight_is_large(begin, end):
     assert log_weight[level > end].max() < 1.0 - begin  # and far out they are as small as the probability
 
 
+@pytest.mark.promise("campaigns-25")
 @pytest.mark.parametrize("sigma", [[1.0], pytest.param([1.0, 1.0], marks=pytest.mark.endurance), [3.0, 1.0]])
 def test_what_runs_have_along_the_directions_is_standard_normal_under_their_weights(sigma):
     """Its variances, in all and where one direction alone is rare, and its radius is that of the level."""
@@ -163,6 +164,7 @@ def test_what_runs_have_along_the_directions_is_standard_normal_under_their_weig
 # --------------------------------------------------------------------------------------------------------- directions
 
 
+@pytest.mark.promise("campaigns-25")
 def test_directions_are_orthonormal_and_make_the_error_of_the_linear_loop(gaussian, controller):
     """The runs' errors are those of their levels but for the thousandth of the variance that is left as drawn."""
     sigma = theory(gaussian, controller)
@@ -192,6 +194,7 @@ def test_the_covariance_at_the_end_depends_on_when_the_sensor_last_delivered(sce
 # --------------------------------------------------------------------------------------------------------------- tails
 
 
+@pytest.mark.promise("campaigns-25")
 def test_the_tail_of_a_gaussian_loop_is_rayleigh(gaussian, controller):
     sigma = theory(gaussian, controller)
     radius, weight = many(gaussian, controller, proposal(gaussian, controller, SPAN, 5.256 * sigma[0]))
@@ -261,6 +264,7 @@ def test_the_tail_with_a_line(gaussian, controller):
     assert math.exp(-0.5 * x**2) < 0.5 * (found - 3.0 * error)  # and the noise alone has less
 
 
+@pytest.mark.promise("campaigns-28")
 def test_with_hysteresis_and_limits_the_tail_is_that_of_plain_runs(scene, mission, controller):
     loop = scenario.with_mirror(scene.loop, scene.mirrors, "comparison")
     plain = ensemble.simulate(loop, controller, Span(1.6, 0.5, 8), 3 * LANES)

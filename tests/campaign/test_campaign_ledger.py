@@ -123,6 +123,7 @@ def test_runs_at_the_ends_are_left_out_and_put_back(values):
     assert len(data) < 300
 
 
+@pytest.mark.promise("campaigns-45")
 def test_a_trace_and_a_head_come_back():
     got = chunk_format.unpack_trace(chunk_format.pack_trace(replace(TRACE, value=np.nan)))
     assert (got.cell, got.row, got.output) == (0, 17, "margin") and np.isnan(got.value)
@@ -236,6 +237,7 @@ def test_chunks_come_in_order_however_they_were_put(path):
         assert (found.checked, found.damaged, found.missing, found.faults, found.sound) == (4, (), ((0, 1),), (), True)
 
 
+@pytest.mark.promise("campaigns-57")
 def test_a_chunk_twice_is_one_chunk_and_with_other_content_is_refused(path):
     other = replace(chunk(0), failed=())
     with Ledger.create(path, HEAD) as ledger:
@@ -308,6 +310,7 @@ def test_a_ledger_is_never_begun_over_a_file_nor_opened_where_none_is(path, tmp_
 ANEW = "name the file that `microrad campaign run` wrote, or, if it is this one, begin the campaign anew in another"
 
 
+@pytest.mark.promise("campaigns-46")
 @pytest.mark.parametrize("write", [True, False])
 def test_files_that_are_no_ledger_are_refused(path, write):
     path.write_text("my notes, which are long enough for SQLite to look at\n" * 100)
@@ -434,6 +437,7 @@ def test_mending_reads_each_chunk_once_where_sqlite_gets_to_the_end(path, monkey
     assert sorted(each for each in hashed if len(each) == 2) == sorted(payloads)
 
 
+@pytest.mark.promise("campaigns-46")
 def test_a_bit_flipped_in_one_copy_of_the_head_costs_nothing_and_in_both_is_told(path):
     payloads = filled(path)
     first = path.read_bytes().index(b'b.toml"]')
@@ -483,6 +487,7 @@ def opened(path):
     return False
 
 
+@pytest.mark.promise("campaigns-2", "campaigns-46")
 def test_wherever_a_bit_flips_it_is_found_or_harmless_and_what_can_be_read_is_kept(path_in_memory):
     path = path_in_memory
     payloads = filled(path)
@@ -521,6 +526,7 @@ def test_a_page_overwritten_by_another_program_costs_little_but_for_those_that_l
     assert cheap > 0.9 * pages
 
 
+@pytest.mark.promise("campaigns-46")
 def test_a_file_cut_short_is_told(path):
     filled(path)
     whole = path.read_bytes()
@@ -535,6 +541,7 @@ def test_a_file_cut_short_is_told(path):
 ENDLESS = "WITH RECURSIVE c(n) AS (SELECT 0 UNION ALL SELECT n + 1 FROM c) SELECT 0 cell, n number, n sha256, n payload"
 
 
+@pytest.mark.promise("campaigns-46")
 @pytest.mark.parametrize(
     "changes, named",
     [
@@ -572,6 +579,7 @@ def left_behind(path, count):
     return files, payloads
 
 
+@pytest.mark.promise("campaigns-46")
 def test_a_damaged_log_of_a_killed_writer_costs_what_is_behind_the_damage(path):
     """SQLite ends a log at the first frame whose checksum is wrong: those chunks are missing, and are done again."""
     files, payloads = left_behind(path, 8)
@@ -643,6 +651,7 @@ def process(path, count):
             child.stdout.read()
 
 
+@pytest.mark.promise("campaigns-46")
 def test_a_second_process_may_read_but_not_write_until_the_first_is_gone(path):
     with process(path, 3) as child:
         assert [child.stdout.readline().strip() for _ in range(4)] == ["open", "0", "1", "2"]
@@ -663,6 +672,7 @@ def test_a_second_process_may_read_but_not_write_until_the_first_is_gone(path):
     assert verify(path).checked == 4
 
 
+@pytest.mark.promise("campaigns-45")
 def test_kills_at_any_moment_lose_and_double_nothing(path):
     draw, acknowledged, kills = random.Random(3), 0, 10 if os.environ.get("MICRORAD_ENDURANCE") else 3
     for _ in range(kills):
@@ -788,3 +798,17 @@ def test_a_program_that_holds_the_file_is_told(path, monkeypatch):
         assert "another program held the file" in said(verify, path)  # which is no damage
     with Ledger.open(path, write=False) as ledger:
         assert len(ledger.done()) == 3
+
+
+@pytest.mark.promise("campaigns-45")
+def test_a_chunk_is_written_through_to_the_disk_with_its_sha256(path):
+    """SQLite's `synchronous = FULL` (2): each transaction ends behind a sync of the log."""
+    with Ledger.create(path, HEAD) as ledger:
+        assert ledger._connection.execute("PRAGMA synchronous").fetchone() == (2,)
+        assert not ledger._connection.in_transaction
+        ledger.put(0, 0, packed(0))
+        assert not ledger._connection.in_transaction
+        ((checksum, payload),) = ledger._connection.execute("SELECT sha256, payload FROM chunks").fetchall()
+    assert payload == packed(0)
+    assert checksum == file.digest(0, 0, payload) and len(checksum) == 32
+    assert checksum != file.digest(0, 1, payload)

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from link_files import FADING
 from microrad import link
 from microrad.campaign import bundle, run
 from microrad.campaign.definition.keys import find, flat
@@ -18,17 +19,19 @@ from microrad.campaign.rows.missions import MissionBuilder
 from microrad.campaign.rows.plan import planned
 from microrad.campaign.statistics.summary import summarise_campaign
 from microrad.core import reads
+from microrad.link import radial_error
+from microrad.link import study as link_study
 from microrad.link.beams import LitAperture
 from microrad.link.pointing import outage as under_jitter
-from microrad.link.pointing import radial_error
 from microrad.link.pointing.outage import Exposure
 from microrad.link.variation import LINK_TABLES
 from microrad.mission.fields import Several
-from microrad.mission.file import load_link, open_mission
+from microrad.mission.file import load_link, named_files, open_mission
 from microrad.mission.toml import MissionError
+from microrad.orbit import day as day_study
 from preset_files import NAMES as PRESETS
 from preset_files import completed
-from shipped import SHIPPED
+from shipped import SHIPPED, without_fine_pointing
 
 CROSSLINK = SHIPPED.parent.parent / "docs" / "gallery" / "crosslink.toml"
 HEAD = 'mission = "{name}.toml"\nseed = 1\nruns = 4\nsampling = "random"\n'
@@ -67,6 +70,7 @@ def faults(folder, name, body, head=HEAD):
 
 
 # ------------------------------------------------------------------------------------------------------- which files
+@pytest.mark.promise("campaigns-10")
 @pytest.mark.parametrize("name", [*PRESETS, "gallery"])
 def test_a_campaign_takes_what_a_budget_takes(tmp_path, name):
     own = load_link(mission(tmp_path, name)).mission
@@ -75,6 +79,16 @@ def test_a_campaign_takes_what_a_budget_takes(tmp_path, name):
     assert ("beacon_margin" in columns, "answer_margin" in columns) == (own.beacon is not None, own.answer is not None)
     gained = 10.0 * np.log10(columns["communication.transmit_power"] / own.communication.transmit_power_w)
     np.testing.assert_allclose(columns["margin"] - gained, Exposure.stated(link.of(own)).margin_db, atol=1e-9)
+
+
+def test_a_series_of_fades_goes_with_a_campaign_and_leaves_its_margins_alone(tmp_path):
+    plain = rows(loaded(tmp_path, mission(tmp_path, "gallery").stem, POWER))
+    path = mission(tmp_path, "faded")
+    path.write_text(path.read_text(encoding="utf-8") + FADING, encoding="utf-8")
+    np.savetxt(tmp_path / "fades.csv", 1.0 + 0.5 * np.sin(np.arange(2000) / 40.0), header="power", comments="")
+    campaign = loaded(tmp_path, "faded", POWER)
+    np.testing.assert_array_equal(rows(campaign)["margin"], plain["margin"])
+    assert "fades.csv" in named_files(campaign.mission.mission)
 
 
 def test_what_links_alone_have_not_is_refused_once(tmp_path):
@@ -91,6 +105,7 @@ def test_what_links_alone_have_not_is_refused_once(tmp_path):
     assert (found.key, found.reason) == ("set.control.rate", "is no key of the mission")
 
 
+@pytest.mark.promise("campaigns-11")
 def test_the_largest_rate_is_solved_for_once_for_each_cell(tmp_path):
     mission(tmp_path, "gallery")
     fixed = '[set]\n"communication.data_rate" = "largest"\n[grid]\n"communication.distance" = ["500 km", "1000 km"]\n'
@@ -161,6 +176,7 @@ def test_every_quantity_is_drawn_from_any_distribution_or_read_by_nothing(tmp_pa
     assert np.ptp(columns["margin"]) > 0.0 and len(found) >= 14
 
 
+@pytest.mark.promise("campaigns-9")
 def test_each_item_of_a_list_has_its_own_key(tmp_path):
     mission(tmp_path, "gallery")
     first = '[inputs."jitter.rms.1"]\ndistribution = "uniform"\nlow = "1 urad"\nhigh = "9 urad"\n'
@@ -180,6 +196,7 @@ def test_each_item_of_a_list_has_its_own_key(tmp_path):
     assert found.reason == "is an item of jitter.rms, which stands in [inputs] as a whole"
 
 
+@pytest.mark.promise("campaigns-9", "campaigns-10")
 def test_a_list_is_drawn_as_one_number_which_its_items_follow_in_proportion(tmp_path):
     """As in --solve, the number is the largest item; the drawn margin is that of the mission with both items."""
     path = mission(tmp_path, "gallery")
@@ -242,6 +259,7 @@ def content(book):
     return sizes, book.with_suffix(".csv").read_bytes(), reads.digest(said)
 
 
+@pytest.mark.promise("campaigns-5")
 def test_chunks_are_cut_to_what_a_row_costs(tmp_path):
     mission(tmp_path, "gallery")
     campaign = loaded(tmp_path, "gallery", DRAWN, EVEN.replace("64", "4096"))
@@ -311,3 +329,19 @@ def test_a_bundle_of_a_stranger_is_refused(tmp_path, change):
     for odd in (b"", b"7", b"{}", b"[" * 100_000):
         with pytest.raises(CampaignError, match="never"):
             bundle.opened(odd)
+
+
+@pytest.mark.promise("campaigns-17")
+def test_a_row_of_the_day_has_what_that_day_delivers(tmp_path):
+    """Volume and time in contact of each row are those of the mission's own day at its power."""
+    key, stated = "communication.transmit_power", 'transmit_power = "5 W"'
+    text = without_fine_pointing(SHIPPED.read_text(encoding="utf-8")).replace('duration = "24 h"', 'duration = "6 h"')
+    assert text.count(stated) == 1
+    (tmp_path / "whole.toml").write_text(text, encoding="utf-8")
+    drawn = f'[inputs."{key}"]\ndistribution = "uniform"\nlow = "4 W"\nhigh = "6 W"\n'
+    found = rows(loaded(tmp_path, "whole", drawn, HEAD + 'keep = ["volume", "contact_time"]\n'), 2)
+    for power_w, volume_bit, contact_s in zip(*(found[name] for name in (key, "volume", "contact_time")), strict=True):
+        own = load_link(tmp_path / "whole.toml", text=text.replace(stated, f'transmit_power = "{float(power_w)!r} W"'))
+        relay = day_study.run_day_study(link_study.run_link_study(own)).relay
+        assert (volume_bit, contact_s) == pytest.approx((relay.capacity_bit, relay.contact_s), rel=1e-12)
+    assert found["volume"][0] != found["volume"][1] and found["contact_time"][0] > 3600.0

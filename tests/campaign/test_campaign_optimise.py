@@ -3,17 +3,25 @@
 import math
 import os
 import re
+from concurrent.futures import ThreadPoolExecutor
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import scipy.optimize
 from scipy.optimize import NonlinearConstraint, brentq, differential_evolution
 from scipy.stats import beta, norm
 
 import budgets
+from campaign_files import HEAD, LOOP, POWER, loaded
 from microrad import link
+from microrad.campaign.optimisation.campaign import _CandidateRows
 from microrad.campaign.optimisation.candidates import Problem, Variable
 from microrad.campaign.optimisation.search import optimise
 from microrad.campaign.records import CampaignError, Limit
+from microrad.campaign.rows import loops
+from microrad.campaign.rows.evaluator import Evaluator
+from microrad.core import threads as in_threads
 from microrad.mission.file import load_link
 from microrad.mission.presets import preset_text
 from microrad.report.campaign.optimum import fresh_rows_sentence, optimum_data, optimum_text
@@ -76,6 +84,7 @@ def with_values(file, aperture, divergence=None, answer_error=None):
     return m.model_copy(update={"terminals": terminals, "answer": answer})
 
 
+@pytest.mark.promise("campaigns-41")
 def test_smallest_aperture_is_that_of_the_normal_quantile(mission):
     """P(margin(aperture) + Gaussian loss >= 3 dB) >= 0.99: the aperture follows from the normal quantile alone."""
     rows, spread = 4000, 0.7
@@ -248,6 +257,7 @@ def test_a_rough_output_does_not_stop_the_search():
     assert -44.05 < found.best.cost < -43.6
 
 
+@pytest.mark.promise("campaigns-40")
 def test_maximising_an_output():
     """margin = 6 - (x - 0.3)^2 + noise * x: its mean is largest at 0.3."""
     noise = gaussian(1000, 8)
@@ -271,6 +281,7 @@ def test_without_limits_the_cost_alone_decides():
     assert found.best.values["x0"] == pytest.approx(0.7, abs=1e-2)
 
 
+@pytest.mark.promise("campaigns-44")
 def test_the_last_digits_of_a_processor_do_not_move_the_search():
     noise, rounding = 0.1 * gaussian(400, 6), np.random.default_rng(3)
 
@@ -309,6 +320,7 @@ def test_a_limit_from_above_and_one_from_both_sides():
 
 
 # ------------------------------------------------------------------------------------------------ what rows can say
+@pytest.mark.promise("campaigns-40")
 def test_the_share_kept_is_that_of_the_rows_with_clopper_and_pearsons_interval():
     found = optimise(problem(confidence=0.9), rising(), rising(seed=1), quiet)
     kept, rows = found.best.kept[0], rising()(np.array([found.best.cost]))["margin"]
@@ -359,6 +371,7 @@ def test_rows_with_weights_count_by_them():
     assert share.low < 0.99 < share.high + 1e-3
 
 
+@pytest.mark.promise("campaigns-42")
 def test_an_optimum_that_leans_on_its_rows_is_told():
     found = optimise(problem(), rising(), rising(rows=4000, seed=5, spread=1.6), quiet)
     assert found.feasible and not found.confirmed and found.warnings == ()
@@ -377,6 +390,7 @@ def test_an_optimum_that_leans_on_its_rows_is_told():
     assert optimum_text(good).splitlines()[1] == "Fresh rows agree."
 
 
+@pytest.mark.promise("campaigns-42")
 def test_fresh_rows_that_fall_short_by_chance_agree_within_their_interval():
     found = optimise(problem(), rising(), rising(seed=5, spread=1.1), quiet)
     share = found.fresh.kept[0].share
@@ -390,6 +404,7 @@ def test_fresh_rows_that_fall_short_by_chance_agree_within_their_interval():
     )
 
 
+@pytest.mark.promise("campaigns-43")
 def test_the_check_is_no_toss_of_a_coin():
     """Of optima on a limit fresh rows fall short as often as not (52 % of 2000 with 400 rows); 85 % are confirmed.
 
@@ -658,9 +673,90 @@ def test_the_least_that_is_not_refused():
     assert optimise(problem(confidence=0.999), rising(rows=1000), rising(rows=1000), quiet).evaluations > 0
 
 
+@pytest.mark.promise("campaigns-3")
 def test_help_says_what_the_number_of_threads_is_of(call):
     said = {name: " ".join(call("campaign", name, "--help").out.split()) for name in ("run", "resume", "optimise")}
     assert "--threads N Threads of this process [default: one a core]" in said["optimise"]
     assert all(
         "--threads N Processes of this machine [default: one a core]" in said[name] for name in ("run", "resume")
     )
+
+
+# ------------------------------------------------------------------------------------------------------ its candidates
+APERTURES = """
+[grid]
+"communication.distance" = ["36000 km", "40000 km"]
+[optimise]
+minimise = "terminals.leo_aperture"
+confidence = 0.9
+rows = 16
+evaluations = 20
+[optimise.variables."terminals.leo_aperture"]
+low = "3 cm"
+high = "12 cm"
+"""
+
+
+@pytest.mark.promise("campaigns-40", "campaigns-60")
+def test_candidates_have_the_same_draws_in_the_first_cell_of_a_grid(tmp_path):
+    campaign = loaded(tmp_path, HEAD + POWER + APERTURES, whole=False)
+    rows = _CandidateRows(campaign, 16, 1)
+    (small, large, fresh) = (rows.columns([x], first)["margin"] for x, first in ((0.05, 0), (0.1, 0), (0.05, 16)))
+    assert np.ptp(small) > 0.1
+    np.testing.assert_allclose(large - small, large[0] - small[0], atol=1e-9)
+    assert not set(fresh) & set(small)
+    given = campaign.cells[0].file.mission.terminals.leo_aperture_m
+    wanted = Evaluator(campaign, {}).rows(0, range(16), lambda: None).columns["margin"]
+    other = Evaluator(campaign, {}).rows(1, range(16), lambda: None).columns["margin"]
+    assert rows.columns([given])["margin"].tolist() == wanted.tolist() != other.tolist()
+
+
+@pytest.mark.promise("campaigns-3")
+@pytest.mark.parametrize("threads", [None, 3])
+def test_candidates_are_computed_by_as_many_threads_as_are_asked_for_or_one_a_core(tmp_path, monkeypatch, threads):
+    campaign, asked = loaded(tmp_path, HEAD + POWER + APERTURES, whole=False), []
+    here = _CandidateRows(campaign, 16, 1).columns([0.05])["margin"]
+    monkeypatch.setattr(
+        in_threads, "ThreadPoolExecutor", lambda max_workers: asked.append(max_workers) or ThreadPoolExecutor(2)
+    )
+    monkeypatch.setattr(os, "cpu_count", lambda: 7)
+    assert _CandidateRows(campaign, 16, threads).columns([0.05])["margin"].tolist() == here.tolist()
+    assert asked == [threads or 7]
+
+
+@pytest.mark.promise("campaigns-41")
+def test_a_variable_that_touches_the_loop_has_its_controller_tuned_anew(tmp_path, monkeypatch):
+    noise = "fine_pointing.optical_sensor.noise"
+    text = (
+        HEAD
+        + POWER
+        + LOOP
+        + APERTURES.replace('"terminals.leo_aperture"]', f'"{noise}"]')
+        .replace('minimise = "terminals.leo_aperture"', f'minimise = "{noise}"')
+        .replace('"3 cm"', '"1 urad"')
+        .replace('"12 cm"', '"9 urad"')
+    )
+    tuner = loops.ControllerTuner(loaded(tmp_path, text))
+    monkeypatch.setattr(
+        loops,
+        "mission_loop",
+        lambda file, table, seed: SimpleNamespace(tuned=lambda: [file.mission.fine_pointing.optical_sensor.noise_rad]),
+    )
+    first = tuner.tuned(0, {noise: 2e-6})
+    assert first == [2e-6] and tuner.tuned(0, {noise: 3e-6}) == [3e-6]
+    assert tuner.tuned(0, {noise: 2e-6, "communication.transmit_power": 4.0}) is first
+
+
+@pytest.mark.promise("campaigns-41")
+def test_it_searches_from_several_places(monkeypatch):
+    searched, real = [], scipy.optimize.minimize
+
+    def minimize(of, start, **how):
+        searched.append((how["method"], tuple(start)))
+        return real(of, start, **how)
+
+    monkeypatch.setattr(scipy.optimize, "minimize", minimize)
+    asked = problem(variables=unit_cube(2), minimise="residual_rms", limits=(), evaluations=200)
+    optimise(asked, as_rows(two_wells), as_rows(two_wells), quiet)
+    assert {method for method, _ in searched} == {"COBYQA"}
+    assert len({start for _, start in searched}) > 2

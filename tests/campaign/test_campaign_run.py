@@ -9,6 +9,7 @@ import sqlite3
 import subprocess
 import sys
 import tempfile
+import tracemalloc
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -18,6 +19,7 @@ import pytest
 from scipy import stats
 
 import microrad
+from campaign_files import MIRROR, UNCERTAINTY
 from microrad.campaign import bundle, records, run
 from microrad.campaign.engines import cluster
 from microrad.campaign.export import export_rows
@@ -30,6 +32,7 @@ from microrad.campaign.rows.evaluator import Evaluator
 from microrad.campaign.rows.loops import controllers
 from microrad.campaign.rows.plan import planned
 from microrad.campaign.statistics.cell import CellRows
+from microrad.campaign.statistics.sensitivity import sensitivity
 from microrad.campaign.statistics.summary import summarise_campaign
 from microrad.core import folder, kernels
 from shipped import SHIPPED
@@ -107,6 +110,8 @@ def held(path, book):
 
 
 # --------------------------------------------------------------------------------------------------------------- kills
+@pytest.mark.promise("decisions-1", "readme-12")
+@pytest.mark.promise("campaigns-1", "campaigns-46", "campaigns-47")
 def test_kills_of_worker_and_parent_change_nothing(call, long, tmp_path):
     """Where there are few kills, the second one is of the other kind."""
     path, campaign, undisturbed = long
@@ -142,6 +147,7 @@ def test_kills_of_worker_and_parent_change_nothing(call, long, tmp_path):
     assert gone(*dead)
 
 
+@pytest.mark.promise("campaigns-2", "campaigns-4", "campaigns-46", "campaigns-47")
 @pytest.mark.usefixtures("rows_here")
 def test_others_may_read_its_ledger_alone_and_ctrl_c_stops_at_once_and_says_how_to_go_on(call, long, tmp_path):
     """At once: of the chunks that workers finish from then on, no more is taken in than the one that was at hand."""
@@ -226,6 +232,8 @@ GRID = """
 """
 
 
+@pytest.mark.promise("decisions-1", "readme-12")
+@pytest.mark.promise("campaigns-3", "campaigns-19")
 @pytest.mark.parametrize(
     "means",
     [
@@ -243,6 +251,8 @@ def test_any_number_of_processes_gives_the_bits_of_none(short, tmp_path, means, 
     assert table(book) == undisturbed
 
 
+@pytest.mark.promise("readme-12")
+@pytest.mark.promise("campaigns-19", "campaigns-60")
 def test_rows_by_themselves_and_in_any_chunk_are_the_same(short):
     _, campaign, _ = short
     evaluator = Evaluator(campaign, dict(enumerate(controllers(campaign, _quiet))))
@@ -264,6 +274,7 @@ def _still():
     pass
 
 
+@pytest.mark.promise("campaigns-5")
 def test_cells_have_the_same_draws_and_differ_by_their_value(short):
     path, _, _ = short
     with Ledger.open(path.with_name("campaign.ledger"), write=False) as book:
@@ -276,6 +287,8 @@ def test_cells_have_the_same_draws_and_differ_by_their_value(short):
 
 
 # -------------------------------------------------------------------------------------------------------------- damage
+@pytest.mark.promise("decisions-1", "readme-12")
+@pytest.mark.promise("campaigns-46", "campaigns-47")
 @pytest.mark.usefixtures("rows_here")
 def test_a_flipped_bit_is_found_and_only_its_chunk_done_again(call, short, tmp_path):
     path, campaign, undisturbed = short
@@ -300,6 +313,8 @@ def test_a_flipped_bit_is_found_and_only_its_chunk_done_again(call, short, tmp_p
     assert call("campaign", "verify", book).code == 0
 
 
+@pytest.mark.promise("decisions-1", "readme-12")
+@pytest.mark.promise("campaigns-4", "campaigns-46", "campaigns-47")
 @pytest.mark.usefixtures("rows_here")
 def test_a_full_disk_stops_it_in_words_and_it_goes_on_once_there_is_room(call, short, tmp_path):
     path, _, undisturbed = short
@@ -323,6 +338,7 @@ def test_a_full_disk_stops_it_in_words_and_it_goes_on_once_there_is_room(call, s
 
 
 # ------------------------------------------------------------------------------------------------------ another version
+@pytest.mark.promise("campaigns-46")
 def test_another_mission_or_campaign_is_refused_with_both_hashes(short, tmp_path):
     path, campaign, _ = short
     for name in ("mission.toml", "campaign.toml", "campaign.ledger"):
@@ -342,6 +358,7 @@ def test_another_mission_or_campaign_is_refused_with_both_hashes(short, tmp_path
     run.resume_campaign(book, run.Means(threads=1))
 
 
+@pytest.mark.promise("campaigns-46")
 def test_other_code_is_refused_with_both_hashes(call, short, tmp_path, monkeypatch):
     path, _, _ = short
     changed = tmp_path / "changed"
@@ -357,6 +374,7 @@ def test_other_code_is_refused_with_both_hashes(call, short, tmp_path, monkeypat
 
 
 # ---------------------------------------------------------------------------------------------------------- failed rows
+@pytest.mark.promise("campaigns-8", "campaigns-16", "campaigns-46")
 @pytest.mark.usefixtures("rows_here")
 def test_rows_that_raise_or_never_end_are_failed_rows_and_the_rest_is_as_without_them(tmp_path, monkeypatch):
     """The clock goes by the signs of life, 0.15 s from one to the next: the machine may be as busy as it likes."""
@@ -397,6 +415,7 @@ weights = [9, 1]
         assert alone.columns["margin"][0] == found.sample["margin"][row]
 
 
+@pytest.mark.promise("campaigns-46")
 def test_a_row_without_a_number_is_tried_again_by_itself_and_then_blamed(tmp_path, monkeypatch):
     campaign = load_campaign(campaign_file(tmp_path, runs=4))
     evaluator = Evaluator(campaign, dict(enumerate(controllers(campaign, _quiet))))
@@ -441,6 +460,7 @@ class _Fragile:
         pass
 
 
+@pytest.mark.promise("campaigns-46", "campaigns-54")
 def test_a_row_that_takes_its_worker_down_is_found_and_the_rest_of_its_chunk_kept(tmp_path, monkeypatch):
     path = campaign_file(tmp_path, runs=4 * kernels.LANES, duration="10 s")
     campaign = load_campaign(path)
@@ -523,6 +543,7 @@ least = "1 dB"
 """
 
 
+@pytest.mark.promise("campaigns-35")
 @pytest.mark.parametrize("looks", [(), (1, 3)], ids=["at the end", "meanwhile"])
 def test_rows_of_a_cell_are_in_their_order_and_their_curves_are_summed(tmp_path, looks):
     campaign = load_campaign(campaign_file(tmp_path))
@@ -551,6 +572,7 @@ def test_rows_of_a_cell_are_in_their_order_and_their_curves_are_summed(tmp_path,
     assert cell.whole().columns["margin"] is found.columns["margin"], "put together once"
 
 
+@pytest.mark.promise("campaigns-21", "campaigns-32")
 @pytest.mark.parametrize("sampling", ["latin-hypercube", "sobol", "random"])
 def test_a_set_of_latin_or_sobol_rows_is_one_draw_of_the_mean(tmp_path, sampling):
     """Four sets of 16 rows whose means are 0 to 3: their rows say as much as these, and not as 64 of their own."""
@@ -564,6 +586,7 @@ def test_a_set_of_latin_or_sobol_rows_is_one_draw_of_the_mean(tmp_path, sampling
     np.testing.assert_allclose([mean.low, mean.high], [exact.low, exact.high], rtol=1e-12)
 
 
+@pytest.mark.promise("campaigns-7", "campaigns-29")
 @pytest.mark.usefixtures("rows_here")
 def test_it_stops_when_the_wanted_quantile_is_known_well_enough(tmp_path):
     path = campaign_file(tmp_path, runs=64, more=PRECISION.format(width="0.02 dB", most=20_000))
@@ -578,6 +601,21 @@ def test_it_stops_when_the_wanted_quantile_is_known_well_enough(tmp_path):
         with Ledger.open(tmp_path / "campaign.ledger", write=False) as book:
             last = len(planned(campaign).chunks(0, before))
             assert not CellRows(campaign, 0, [each for each in book.chunks(0) if each.number < last]).is_precise()
+
+
+def test_a_round_is_judged_by_its_own_chunks_alone(monkeypatch):
+    """A campaign that goes on has chunks of later rounds in its ledger already; one has 32 rows here."""
+    plan, seen = SimpleNamespace(chunks=lambda cell, rows: range(rows // 32)), []
+    kept = [SimpleNamespace(number=number) for number in range(8)]
+
+    def rows(campaign, cell, chunks):
+        seen.extend(each.number for each in chunks)
+        return SimpleNamespace(is_precise=lambda: True)
+
+    monkeypatch.setattr(run, "CellRows", rows)
+    runner = SimpleNamespace(plan=plan, book=SimpleNamespace(chunks=lambda cell: kept))
+    runner.campaign = SimpleNamespace(table=SimpleNamespace(precision=object()))
+    assert run._Runner._precise(runner, 0, 128) and seen == [0, 1, 2, 3]
 
 
 RADIUS = """
@@ -598,3 +636,142 @@ def test_a_precision_of_the_radial_error_counts_the_time_of_all_rows(tmp_path, w
     found = summarise_campaign(begun(tmp_path, path))
     assert found.cells[0].rows == rounds[rounds_done - 1] and len(rounds) > 1
     assert found.progress.state == "complete"
+
+
+@pytest.mark.promise("campaigns-3")
+@pytest.mark.parametrize(
+    ("means", "threads"), [({}, 7), ({"threads": 3}, 3), ({"workers": 3}, 3), ({"scheduler": "tcp://head:1"}, None)]
+)
+def test_a_process_for_each_core_works_or_as_many_as_are_asked_for_or_a_scheduler(monkeypatch, means, threads):
+    monkeypatch.setattr(os, "cpu_count", lambda: 7)
+    monkeypatch.setattr(run, "LocalEngine", lambda spec, target, threads, late_s: ("here", threads, late_s))
+    monkeypatch.setattr(run, "DaskEngine", lambda spec, target, address, late_s: (address, None, late_s))
+    assert run.Means(**means).engine(b"", 330.0) == (means.get("scheduler", "here"), threads, 330.0)
+
+
+@pytest.mark.promise("campaigns-16")
+def test_the_rows_kept_in_time_are_the_worst_in_the_first_limits_output(short):
+    path, campaign, _ = short
+    with Ledger.open(path.with_name("campaign.ledger"), write=False) as book:
+        traces = book.traces()
+        margins = [np.concatenate([chunk.columns["margin"] for chunk in book.chunks(cell)]) for cell in (0, 1)]
+    assert (campaign.table.worst, campaign.limits[0].output) == (1, "margin")
+    assert [(each.cell, each.row, each.output) for each in traces] == [
+        (cell, int(np.argmin(margin)), "margin") for cell, margin in enumerate(margins)
+    ]
+    assert [each.value for each in traces] == [float(margin.min()) for margin in margins]
+
+
+class _Gone(Here):
+    """An engine whose scheduler goes away behind the first chunk."""
+
+    def outcomes(self, jobs):
+        yield next(super().outcomes(jobs))
+        raise CampaignError("the scheduler at tcp://head:1 is gone")
+
+
+@pytest.mark.promise("campaigns-46", "campaigns-47", "campaigns-56")
+def test_an_engine_that_goes_away_leaves_what_is_done_and_another_goes_on(short, tmp_path, monkeypatch):
+    path, _, undisturbed = short
+    monkeypatch.setattr(run, "load_campaign", by_four)
+    book = tmp_path / "campaign.ledger"
+    with monkeypatch.context() as patched:
+        patched.setattr(run.Means, "engine", lambda means, spec, late_s: _Gone(spec))
+        with pytest.raises(CampaignError) as caught:
+            run.run_campaign(path, book, run.Means(scheduler="tcp://head:1"))
+    words = f"the scheduler at tcp://head:1 is gone; 4 rows are in {book}. Go on with: microrad campaign resume"
+    assert str(caught.value).startswith(words)
+    assert len(chunks_in(book)) == 1
+    without_worker(monkeypatch)
+    run.resume_campaign(book, run.Means())
+    assert table(book) == undisturbed
+
+
+@pytest.mark.promise("campaigns-35")
+def test_rows_take_8_bytes_a_value_and_about_twice_as_many_while_they_are_put_together(tmp_path):
+    cell, names, rows = CellRows(load_campaign(campaign_file(tmp_path)), 0), ("row", "weight", "margin", "x", "y"), 1000
+    tracemalloc.start()
+    try:
+        for number in range(100):
+            columns = {name: np.arange(rows) + float(rows * number) for name in names}
+            cell.take(records.Chunk(0, number, columns, (), np.zeros(0), np.zeros(0)))
+        values, held = 100 * rows * len(names), tracemalloc.get_traced_memory()[0]
+        tracemalloc.reset_peak()
+        cell.whole()
+        now, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert held / values == pytest.approx(8.0, rel=0.05) and now / values == pytest.approx(8.0, rel=0.05)
+    assert 1.9 < peak / held < 2.2
+
+
+@pytest.mark.promise("campaigns-29")
+def test_each_round_has_half_as_many_rows_as_all_before_in_whole_chunks_and_blocks(tmp_path):
+    path = campaign_file(tmp_path, runs=256, sampling="sobol", more=PRECISION.format(width="0.02 dB", most=8192))
+    campaign = load_campaign(path)
+    plan = planned(campaign)
+    unit = max(plan.largest_chunk, campaign.block)
+    assert plan.rounds[0] == max(campaign.rows, unit) and plan.rounds[-1] == 8192 and len(plan.rounds) > 3
+    for before, after in itertools.pairwise(plan.rounds):
+        assert after % unit == 0 and after % campaign.block == 0
+        assert 1.5 * before <= after < 1.5 * before + unit or after == 8192
+
+
+@pytest.mark.promise("campaigns-45", "campaigns-52")
+def test_a_campaign_in_one_piece_needs_none_of_its_files(tmp_path):
+    """What a worker on another machine opens: mission, mirror and controllers are in it."""
+    mirror = '[set]\nmirror = "mirror.toml"\n[inputs.mirror]\ndistribution = "identified"\n'
+    path = campaign_file(tmp_path, runs=4, more=mirror)
+    (tmp_path / "mirror.toml").write_text(MIRROR + UNCERTAINTY, encoding="utf-8")
+    campaign = load_campaign(path)
+    tuned = controllers(campaign, _quiet)
+    spec, wanted = bundle.packed(campaign, tuned), Evaluator(campaign, dict(enumerate(tuned))).rows(0, range(1), _still)
+    for file in tmp_path.iterdir():
+        file.unlink()
+    opened = bundle.opened(spec)
+    found = Evaluator(opened.campaign, dict(enumerate(opened.controllers))).rows(0, range(1), _still)
+    assert not found.failed and list(found.columns) == list(wanted.columns)
+    for name, column in wanted.columns.items():
+        np.testing.assert_array_equal(found.columns[name], column)
+    assert found.columns["mirror.bouc_wen.d1"][0] != campaign.mission.mission.mirror.bouc_wen.d1_rad_v
+
+
+@pytest.mark.promise("campaigns-52")
+@pytest.mark.parametrize("library", [*bundle.LIBRARIES, "python", "microrad"])
+def test_another_python_library_or_microrad_is_other_code(monkeypatch, library):
+    own = bundle.code_sha256()
+    if library == "python":
+        monkeypatch.setattr(bundle.platform, "python_version", lambda: "another")
+    elif library == "microrad":
+        monkeypatch.setattr(bundle, "source_sha256", lambda: "another")
+    else:
+        real = bundle.version
+        monkeypatch.setattr(bundle, "version", lambda name: "another" if name == library else real(name))
+    assert bundle.code_sha256.__wrapped__() != own
+    monkeypatch.undo()
+    assert bundle.code_sha256.__wrapped__() == own
+
+
+@pytest.mark.promise("campaigns-1", "campaigns-36", "campaigns-60")
+@pytest.mark.usefixtures("rows_here")
+def test_what_matters_is_told_of_the_first_cell_and_of_limited_outputs(tmp_path):
+    """The second cell has limits and rows as the first, and its own sensitivities would be others."""
+    more = """
+[inputs."communication.pointing_error"]
+distribution = "uniform"
+low = "1 urad"
+high = "9 urad"
+[grid]
+"terminals.leo_aperture" = ["3 cm", "9 cm"]
+"""
+    (tmp_path / "mission.toml").write_text(SHIPPED.read_text(encoding="utf-8"), encoding="utf-8")
+    (tmp_path / "campaign.toml").write_text(LINKS + more, encoding="utf-8")
+    found = summarise_campaign(begun(tmp_path))
+    assert [each.output for each in found.sensitivities] == ["margin"] and len(found.cells[0].outputs) > 1
+    cells = [found.sample["cell"] == float(number) for number in (0, 1)]
+    keys = ("communication.transmit_power", "communication.pointing_error")
+    first, second = (
+        sensitivity({key: found.sample[key][cell] for key in keys}, found.sample["margin"][cell], "margin")
+        for cell in cells
+    )
+    assert found.sensitivities[0] == first != second

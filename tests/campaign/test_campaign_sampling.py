@@ -34,6 +34,7 @@ DRAWN = {
 }
 
 
+@pytest.mark.promise("campaigns-7")
 @pytest.mark.parametrize("name", DRAWN)
 @pytest.mark.parametrize("method", METHODS)
 def test_marginals_are_those_of_scipy(name, method):
@@ -52,6 +53,7 @@ def test_a_range_has_no_density_outside():
     assert LogUniform(1.0, 2.0).log_density(np.array([-1.0, 0.99, 2.01])).tolist() == [-math.inf] * 3
 
 
+@pytest.mark.promise("campaigns-7")
 @pytest.mark.parametrize("method", METHODS)
 def test_values_of_a_table_come_as_often_as_their_weights(method):
     table = OneOf((0.05, 0.06, 0.08), (0.5, 0.125, 0.375), ("5 cm", "6 cm", "8 cm"), False)
@@ -80,6 +82,7 @@ def test_a_row_by_itself_is_the_same_as_in_any_range(method, dimensions):
     assert sampling.uniform(method, 7, 64, 0, 5, 3).shape == (3, 0)
 
 
+@pytest.mark.promise("campaigns-20", "campaigns-60")
 @pytest.mark.parametrize("seed", [0, 1, 2**64 - 1])
 def test_rows_are_independent_of_each_other_and_of_neighbouring_seeds(seed):
     drawn = sampling.uniform("random", seed, 64, 3, 10**9, 4000)
@@ -105,6 +108,7 @@ def test_words_at_the_ends_of_their_range_stay_inside():
 
 
 # ---------------------------------------------------------------------------------------------------------- even cubes
+@pytest.mark.promise("campaigns-5")
 @pytest.mark.parametrize(("runs", "block"), [(1, 16), (100, 16), (128, 16), (256, 32), (2048, 256), (10**6, 4096)])
 def test_a_block_is_an_eighth_of_the_runs_within_bounds(runs, block):
     assert block_rows(runs) == block
@@ -116,6 +120,7 @@ def strata(points):
     return [np.bincount((column * size).astype(int), minlength=size) for column in points.T]
 
 
+@pytest.mark.promise("campaigns-5", "campaigns-20")
 @pytest.mark.parametrize("method", METHODS)
 def test_each_block_has_one_point_in_each_stratum_of_each_input(method):
     for number in range(3):
@@ -126,6 +131,7 @@ def test_each_block_has_one_point_in_each_stratum_of_each_input(method):
     assert not all(np.all(count == 1) for count in across)  # two halves of two blocks
 
 
+@pytest.mark.promise("campaigns-21")
 def test_blocks_are_independent_replicates():
     """Their means spread as those of independent sets: no correlation from one block to the next."""
     for method in ("latin-hypercube", "sobol"):
@@ -135,6 +141,7 @@ def test_blocks_are_independent_replicates():
         assert abs(np.mean(means) - 0.25) < 4.0 * np.std(means) / math.sqrt(800)
 
 
+@pytest.mark.promise("campaigns-20")
 def test_sobol_knows_a_smooth_mean_better_than_a_hypercube_and_that_better_than_random():
     """Spread of the mean of a product of five inputs over 40 seeds, 1024 rows in blocks of 128."""
     spread = {}
@@ -146,6 +153,7 @@ def test_sobol_knows_a_smooth_mean_better_than_a_hypercube_and_that_better_than_
 
 
 # ------------------------------------------------------------------------------------------------------------ campaigns
+@pytest.mark.promise("campaigns-5", "campaigns-60")
 def test_columns_come_in_the_order_of_the_file_and_are_the_same_for_all_cells(tmp_path):
     other = '[inputs."terminals.leo_aperture"]\ndistribution = "uniform"\nlow = "4 cm"\nhigh = "6 cm"\n'
     c = campaign(tmp_path, inputs=POWER + other + '[grid]\n"terminals.geo_aperture" = ["15 cm", "20 cm"]\n')
@@ -178,6 +186,7 @@ def test_columns_and_weights_of_a_row_by_itself_are_those_of_the_range(tmp_path,
     assert not np.array_equal(weight[:10], weight[10:20])
 
 
+@pytest.mark.promise("campaigns-22")
 @pytest.mark.parametrize("method", METHODS)
 def test_weights_average_to_one_and_bring_the_mean_back(tmp_path, method):
     c = campaign(tmp_path, method, 8192, POWER + WIDE)
@@ -220,6 +229,8 @@ def test_only_what_reaches_every_value_can_stand_for_another_distribution(case):
 
 
 # --------------------------------------------------------------------------------------------------- identified mirrors
+@pytest.mark.promise("readme-12")
+@pytest.mark.promise("campaigns-13")
 def test_identified_mirrors_have_the_covariance_of_their_file(tmp_path):
     c = campaign(tmp_path, "sobol", 4096, f'{IDENTIFIED}[set]\nmirror = "mirror.toml"\n')
     columns, weight = sampling.rows(c, 0, 0, 4096)

@@ -47,6 +47,7 @@ def points(kind: str, seed: int, rows: int, inputs: int) -> Floats:
     return np.concatenate(sets)
 
 
+@pytest.mark.promise("campaigns-37", "campaigns-38")
 @pytest.mark.parametrize("kind", ["random", "sobol"])
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_indices_of_known_functions(name: str, kind: str) -> None:
@@ -63,6 +64,7 @@ def test_indices_of_known_functions(name: str, kind: str) -> None:
         assert found.total["x2"].low > 0.2 > found.first["x2"].high
 
 
+@pytest.mark.promise("campaigns-32")
 @pytest.mark.parametrize(
     ("name", "kind"),
     [
@@ -89,6 +91,7 @@ def test_intervals_hold_the_known_indices(name: str, kind: str) -> None:
     assert max(widths) < 0.35
 
 
+@pytest.mark.promise("campaigns-38")
 def test_a_function_without_a_surrogate_has_no_total_indices() -> None:
     x = philox(2).random((3000, 2))
     board = np.sign(np.sin(9.0 * math.pi * x[:, 0]) * np.sin(9.0 * math.pi * x[:, 1]))
@@ -145,6 +148,7 @@ def test_rows_without_a_value_are_left_out() -> None:
     assert of(holes_x, holes_y) != of(x, y)
 
 
+@pytest.mark.promise("campaigns-37")
 def test_an_input_that_does_not_matter_explains_nothing_in_the_mean() -> None:
     """Levels and slopes of the bins both follow the noise: either bias alone is ten times the standard error here."""
     random, found = np.random.default_rng(3), []
@@ -171,6 +175,7 @@ def test_what_does_not_vary_explains_nothing() -> None:
     assert (alone.total, alone.note) == ({}, "no total indices: no input varies")
 
 
+@pytest.mark.promise("campaigns-39")
 def test_too_few_rows_and_no_inputs() -> None:
     x = philox(12).random((63, 1))
     assert of(x, x[:, 0]).note == "63 good rows are too few to say what matters: 64 are needed"
@@ -180,6 +185,7 @@ def test_too_few_rows_and_no_inputs() -> None:
     assert sensitivity({}, x[:, 0], "y").note == "no inputs are drawn"
 
 
+@pytest.mark.promise("campaigns-38")
 def test_inputs_that_depend_on_each_other_have_no_total_indices() -> None:
     x = philox(13).normal(size=(1000, 3))
     x[:, 2] = 0.8 * x[:, 1] + 0.6 * x[:, 2]
@@ -190,6 +196,7 @@ def test_inputs_that_depend_on_each_other_have_no_total_indices() -> None:
     assert of(x[:, :2], x[:, 0] + x[:, 1]).total != {}
 
 
+@pytest.mark.promise("campaigns-39")
 def test_rank_correlations() -> None:
     x = philox(14).random((400, 2))
     y = np.exp(5.0 * x[:, 0]) + 20.0 * x[:, 1].round(1)
@@ -214,6 +221,7 @@ def test_rank_correlations() -> None:
     assert 180 <= held < 200
 
 
+@pytest.mark.promise("campaigns-39")
 def test_it_is_the_same_each_time_and_looks_at_no_more_rows_than_it_says() -> None:
     x = philox(16).random((MOST_ROWS + 500, 2))
     y = x[:, 0] + x[:, 1] ** 2

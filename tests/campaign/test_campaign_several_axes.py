@@ -59,6 +59,7 @@ def same(one, other):
     return matrices and one.mirror.bank == other.mirror.bank and one.delay_s == other.delay_s
 
 
+@pytest.mark.promise("campaigns-14")
 def test_the_columns_of_a_row_are_the_numbers_that_move_its_mirror(tmp_path):
     campaign = loaded(tmp_path, MANY + LOOP + IDENTIFIED + POWER)
     names = [f"mirror.{number}" for number in range(1, 5)]
@@ -75,6 +76,8 @@ def test_the_columns_of_a_row_are_the_numbers_that_move_its_mirror(tmp_path):
         assert mirror.known is None
 
 
+@pytest.mark.promise("campaigns-13", "campaigns-14")
+@pytest.mark.promise("pointing-77")
 def test_drawn_rows_follow_the_covariance_of_the_file(tmp_path):
     """Mean and covariance as close as so many independent rows tell them: SIGMAS standard errors."""
     rows = 4000
@@ -112,6 +115,7 @@ def test_without_a_draw_the_mirror_is_that_of_the_file_to_the_digit(tmp_path):
     assert same(replace(two_axes(), mirror=nominal.row.mirror), two_axes())
 
 
+@pytest.mark.promise("campaigns-6", "campaigns-19")
 def test_a_row_flies_the_drawn_mirror_under_the_controller_of_the_nominal_one(tmp_path):
     campaign = loaded(tmp_path, SMALL + LOOP + IDENTIFIED)
     tuned = dict(enumerate(loops.controllers(campaign, lambda *_: None)))
@@ -153,6 +157,7 @@ def test_the_rows_are_the_same_by_two_workers_and_by_none(tmp_path, monkeypatch)
             assert np.array_equal(column, two[number].columns[name]), name
 
 
+@pytest.mark.promise("campaigns-15")
 def test_a_mirror_that_runs_away_is_drawn_again_and_a_weight_is_at_least_0(tmp_path):
     wide = TEXT.replace("standard_errors = [0.4, 0.9, 0.004,", "standard_errors = [0.4, 0.9, 0.6,")
     assert wide != TEXT
@@ -208,6 +213,7 @@ def test_an_uncertainty_that_leaves_no_mirror_is_refused_where_the_campaign_is_r
     assert [fault.key for fault in caught.value.faults] == ["inputs.mirror"]
 
 
+@pytest.mark.promise("campaigns-13")
 def test_a_mirror_of_each_cell_has_its_own_covariance(tmp_path):
     """Of a cell that is known in fewer directions the other numbers are left empty."""
     fewer = WITHOUT + (

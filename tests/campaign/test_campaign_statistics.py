@@ -40,6 +40,7 @@ DATA = {
 }
 
 
+@pytest.mark.promise("campaigns-31")
 @pytest.mark.parametrize("kind", DATA)
 def test_quantiles_are_those_of_numpy(kind: str) -> None:
     values = DATA[kind](philox(1))
@@ -91,6 +92,7 @@ def test_picture_of_values_a_step_of_rounding_apart_has_them_all(value: float) -
 
 
 # -------------------------------------------------------------------------------------------------------------- moments
+@pytest.mark.promise("campaigns-31")
 def test_moments_are_those_of_numpy_even_far_from_zero() -> None:
     values = 1e9 + philox(7).normal(size=1000)
     found = moments(values)
@@ -125,6 +127,7 @@ def test_moments_of_nothing_one_the_same_and_without_end() -> None:
 
 
 # ------------------------------------------------------------------------------------------------------------- progress
+@pytest.mark.promise("campaigns-46")
 @pytest.mark.parametrize(
     ("state", "written", "total", "left_s", "said"),
     [
@@ -139,6 +142,7 @@ def test_the_time_left_is_that_of_the_rows_that_are_not_done(state, written, tot
 
 
 # ------------------------------------------------------------------------------------------------------------ intervals
+@pytest.mark.promise("campaigns-32")
 def test_mean_of_independent_rows_has_students_interval() -> None:
     values = philox(10).normal(size=12)
     found = mean_interval(moments(values), 0.9)
@@ -147,6 +151,7 @@ def test_mean_of_independent_rows_has_students_interval() -> None:
     assert math.isnan(mean_interval(moments(values[:1]), 0.9).low)
 
 
+@pytest.mark.promise("campaigns-21", "campaigns-32")
 def test_blocks_of_sobol_rows_give_a_narrower_interval_that_holds() -> None:
     held, narrower = 0, 0
     for seed in range(60):
@@ -160,6 +165,7 @@ def test_blocks_of_sobol_rows_give_a_narrower_interval_that_holds() -> None:
     assert narrower == 60
 
 
+@pytest.mark.promise("campaigns-32")
 def test_shares_have_clopper_and_pearsons_interval() -> None:
     for hits, trials in ((0, 20), (3, 20), (20, 20), (1, 5000)):
         found = proportion_interval(hits, trials, 0.99)
@@ -170,6 +176,7 @@ def test_shares_have_clopper_and_pearsons_interval() -> None:
     assert math.isnan(share_interval(Moments(), 0.99).value)
 
 
+@pytest.mark.promise("campaigns-32")
 def test_interval_of_a_weighted_share_holds_where_that_without_weights_does_not() -> None:
     held = plain = 0
     for seed in range(400):
@@ -183,6 +190,7 @@ def test_interval_of_a_weighted_share_holds_where_that_without_weights_does_not(
     assert plain < 300
 
 
+@pytest.mark.promise("campaigns-32")
 def test_quantile_interval_has_the_order_statistics_that_the_binomial_distribution_says() -> None:
     values = np.sort(philox(12).normal(size=200))
     for share in (0.1, 0.5, 0.9):
@@ -238,6 +246,7 @@ def columns(values: Floats, rows: Floats | None = None) -> dict[str, Floats]:
     return {"row": numbers, "weight": np.ones(values.size), "margin": values}
 
 
+@pytest.mark.promise("campaigns-21")
 def test_an_output_has_a_summary() -> None:
     values = philox(14).normal(size=256)
     values[[3, 77]] = math.nan

@@ -61,6 +61,7 @@ def shares(counts: np.ndarray) -> Floats:
     return np.asarray(np.cumsum(counts[:, ::-1], axis=1)[:, ::-1] / counts.sum(axis=1, keepdims=True))
 
 
+@pytest.mark.promise("campaigns-34")
 def test_interval_of_a_correlated_tail_holds_rayleighs_quantile() -> None:
     probability = 1e-4
     exact = SIGMA * math.sqrt(-2.0 * math.log(probability))
@@ -79,6 +80,7 @@ def test_interval_of_a_correlated_tail_holds_rayleighs_quantile() -> None:
     assert naive < 93
 
 
+@pytest.mark.promise("campaigns-28", "campaigns-31")
 def test_tail_is_that_of_the_histogram() -> None:
     counts = counted(1, 64, 10_000, 20.0)
     share = shares(counts)
@@ -106,6 +108,7 @@ def test_between_edges_the_radius_is_rayleighs() -> None:
         assert linear == pytest.approx(tail.wanted[probability].value, rel=2e-3)
 
 
+@pytest.mark.promise("campaigns-33")
 def test_what_few_rows_cannot_tell_is_not_known() -> None:
     share = shares(counted(2, 4, 1000, 20.0))
     tail = tail_of_time(share.sum(axis=0), (share**2).sum(axis=0), 4, EDGES, (0.3, 1e-6), 0.99)
@@ -119,6 +122,7 @@ def test_what_few_rows_cannot_tell_is_not_known() -> None:
         tail_of_time(share[0], share[0], 0, EDGES, (0.3,), 0.99)
 
 
+@pytest.mark.promise("campaigns-32")
 def test_far_out_as_many_errors_are_independent_as_where_events_were_many() -> None:
     """Half of the rows have 40 % of their time beyond the first edge, and eight of 64 a little beyond the second.
 
@@ -141,6 +145,7 @@ def weighted(seed: int, draws: int, shift: float) -> tuple[Floats, Floats]:
     return radius, shift**2 / 2.0 - np.log(i0e(shift * radius)) - shift * radius
 
 
+@pytest.mark.promise("campaigns-34")
 @pytest.mark.parametrize(("draws", "miss"), [(64, 1.0), (256, 0.8), (640, 1.0)])
 def test_interval_of_a_weighted_tail_holds_rayleighs_quantile(draws: int, miss: float) -> None:
     probability, held, widths = 1e-6, 0, []
@@ -282,6 +287,7 @@ def slow(tmp_path_factory: pytest.TempPathFactory) -> Slow:
     return Slow(tmp_path_factory.mktemp("slow"))
 
 
+@pytest.mark.promise("campaigns-28", "campaigns-32")
 def test_interval_of_a_loops_tail_holds_rayleighs_quantile(slow: Slow) -> None:
     """64 rows of 4 s each; some 50 excursions are in each repetition."""
     probability, samples = 1e-4, 64 * 20_000
@@ -309,6 +315,7 @@ def test_interval_of_a_loops_tail_holds_rayleighs_quantile(slow: Slow) -> None:
     assert 30 < np.median(events) < 100
 
 
+@pytest.mark.promise("campaigns-58")
 def test_importance_sampling_needs_a_twentieth_of_the_runs(slow: Slow) -> None:
     """Against twenty times as many plain runs of the same length outright, and by what both are worth."""
     probability, runs = 1e-6, 128
@@ -330,6 +337,7 @@ def test_importance_sampling_needs_a_twentieth_of_the_runs(slow: Slow) -> None:
     assert 20 * runs * 1000 * relative**2 > 2 * 20 * runs
 
 
+@pytest.mark.promise("campaigns-27")
 @pytest.mark.usefixtures("rows_here")
 def test_a_campaign_says_how_likely_its_error_is(slow: Slow) -> None:
     """From the command's own ledger: text, data and page."""

@@ -22,8 +22,11 @@ from microrad.campaign.definition import tables
 from microrad.campaign.definition.reader import block_rows
 from microrad.campaign.engines import cluster
 from microrad.campaign.file import load_campaign
+from microrad.campaign.records import Chunk
 from microrad.campaign.rows import sampling
-from microrad.campaign.statistics import sensitivity
+from microrad.campaign.statistics import sensitivity, summary
+from microrad.campaign.statistics.cell import CellRows
+from microrad.campaign.statistics.intervals import proportion_interval
 from places import ROOT
 from small_campaign import without_worker
 from waiting import HANG_S
@@ -98,6 +101,7 @@ def first_sentence(text):
 
 
 # -------------------------------------------------------------------------------------------------------- commands
+@pytest.mark.promise("campaigns-2")
 def test_every_command_of_the_page_is_run_here():
     text = Path(__file__).read_text(encoding="utf-8")
     for words in COMMANDS:
@@ -106,10 +110,12 @@ def test_every_command_of_the_page_is_run_here():
     assert [words[:2] for words in COMMANDS if words[0] == "dask"] == [["dask", "scheduler"], ["dask", "worker"]]
 
 
+@pytest.mark.promise("campaigns-4", "campaigns-7")
 def test_the_links_come_to_what_stands_below_their_file(folder):
     assert first_sentence(folder[1]) == below("links.toml")
 
 
+@pytest.mark.promise("campaigns-2")
 def test_status_resume_verify_and_report_of_a_campaign_that_is_complete(folder):
     again = command("microrad", "campaign", "status", "links.ledger")
     assert again == (0, folder[1], "")
@@ -121,12 +127,15 @@ def test_status_resume_verify_and_report_of_a_campaign_that_is_complete(folder):
     assert folder[0].joinpath("links.html").read_text(encoding="utf-8").endswith("</html>")
 
 
+@pytest.mark.promise("campaigns-7", "campaigns-29")
 def test_a_precision_ends_before_its_most_rows_where_it_is_reached(folder):
     rows = [int(line.split(",")[0]) for line in folder[0].joinpath("rows.csv").read_text().splitlines()[1:]]
     per_cell = [rows.count(cell) for cell in range(2)]
     assert min(per_cell) >= 512 and max(per_cell) <= 4096 and min(per_cell) < 4096
 
 
+@pytest.mark.promise("readme-12")
+@pytest.mark.promise("campaigns-1", "campaigns-18", "campaigns-30", "campaigns-31", "campaigns-33")
 def test_the_loop_prints_what_stands_on_the_page(folder, monkeypatch):
     monkeypatch.setenv("COLUMNS", "110")
     ran = call("campaign", "run", "loop.toml", "--json")
@@ -138,12 +147,15 @@ def test_the_loop_prints_what_stands_on_the_page(folder, monkeypatch):
     assert first_sentence(shown.out).startswith(below("loop.toml"))
 
 
+@pytest.mark.promise("readme-12")
+@pytest.mark.promise("campaigns-26")
 def test_a_rare_radius_of_the_loop(folder):
     ran = call("campaign", "run", "tail.toml")
     assert ran.code == 0
     assert below("tail.toml") in " ".join(ran.out.split())
 
 
+@pytest.mark.promise("campaigns-40")
 def test_the_optimum_keeps_the_limit_on_fresh_rows(folder):
     found = command("microrad", "campaign", "optimise", "aperture.toml")
     assert found.code == 0
@@ -151,6 +163,7 @@ def test_the_optimum_keeps_the_limit_on_fresh_rows(folder):
     assert "Fresh rows " in found.out
 
 
+@pytest.mark.promise("campaigns-50")
 def test_exports_read_back_as_the_page_says(folder, capsys):
     for name in ("rows.parquet", "rows.nc"):
         assert call("campaign", "export", "links.ledger", name).code == 0
@@ -160,6 +173,7 @@ def test_exports_read_back_as_the_page_says(folder, capsys):
     assert capsys.readouterr().out == EXPORTED
 
 
+@pytest.mark.promise("campaigns-39", "campaigns-59")
 def test_python_prints_what_stands_below_it(folder, capsys):
     exec(IN_PYTHON, {})
     assert capsys.readouterr().out == PYTHON
@@ -171,18 +185,32 @@ def test_python_prints_what_stands_below_it(folder, capsys):
     assert float(re.search(r"missed ([\d.]+)", PYTHON)[1]) == pytest.approx(exact, rel=0.25)
 
 
+@pytest.mark.promise("campaigns-23", "campaigns-24")
 def test_drawn_too_far_out_the_mean_is_wrong_as_the_page_warns(folder):
     told("a few rows near 5 W carry nearly all the weight of means and quantiles")
     text = FILES["rare.toml"].replace('mean = "4.7 W"', 'mean = "4.4 W"').replace('"0.25 W"', '"0.15 W"')
     path = folder[0] / "far.toml"
     path.write_text(text, encoding="utf-8")
-    errors = {}
+    errors, missed, warned = {}, {}, {}
     for name in ("far.toml", "rare.toml"):
-        drawn, weight = sampling.rows(load_campaign(folder[0] / name), 0, 0, 1024)
+        campaign = load_campaign(folder[0] / name)
+        drawn, weight = sampling.rows(campaign, 0, 0, 1024)
         margin_db = 3.0 + 10.0 * np.log10(drawn["communication.transmit_power"] / 5.0)
         errors[name] = abs((weight * margin_db).sum() / weight.sum() - 3.0)
+        columns = {"row": np.arange(1024.0), "weight": weight, "margin": margin_db}
+        cell = CellRows(campaign, 0, [Chunk(0, 0, columns, (), np.zeros(0), np.zeros(0))])
+        missed[name], (warned[name],) = cell.summary(()).missed, summary._warnings(campaign, [cell])
     assert errors["far.toml"] == pytest.approx(0.2, abs=0.05)
     assert errors["rare.toml"] < 0.02
+    found = missed["rare.toml"]
+    told(f"{100 * found.value:.3f} %, {100 * found.low:.3f} to {100 * found.high:.3f} %")
+    told("known as 80 000 rows without weights would know it")
+    plain = proportion_interval(80_000 * found.value, 80_000, 0.95)
+    assert found.high - found.low == pytest.approx(plain.high - plain.low, rel=0.05)
+    assert missed["far.toml"].low < found.value < missed["far.toml"].high  # still right
+    told("worth for a mean, 9 of 1024 there and 329 above")
+    worth = [float(words.rpartition("worth ")[2].split()[0]) for words in (warned["far.toml"], warned["rare.toml"])]
+    assert [round(each) for each in worth] == [9, 329]
 
 
 # --------------------------------------------------------------------------------------------------------- a cluster
@@ -223,6 +251,8 @@ def cluster_commands():
             process.wait(HANG_S)
 
 
+@pytest.mark.promise("decisions-1", "readme-12")
+@pytest.mark.promise("campaigns-3", "campaigns-51")
 def test_a_cluster_gives_the_same_bytes(folder, cluster_commands, monkeypatch):
     told("cluster.csv is rows.csv to the byte")
     monkeypatch.setattr(cluster, "_CONNECT_S", HANG_S)  # the scheduler is only starting
@@ -233,6 +263,7 @@ def test_a_cluster_gives_the_same_bytes(folder, cluster_commands, monkeypatch):
 
 
 # ------------------------------------------------------------------------------------------------------------ figures
+@pytest.mark.promise("campaigns-46", "campaigns-52")
 def test_words_in_quotes_are_those_of_the_program():
     """What a user sees, in the table of the ledger and on a cluster."""
     sources = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "src" / "microrad").rglob("*.py"))
@@ -243,6 +274,17 @@ def test_words_in_quotes_are_those_of_the_program():
         assert words in sources, words
 
 
+@pytest.mark.promise(
+    "campaigns-5",
+    "campaigns-16",
+    "campaigns-38",
+    "campaigns-39",
+    "campaigns-52",
+    "campaigns-53",
+    "campaigns-54",
+    "campaigns-55",
+    "campaigns-56",
+)
 def test_figures_of_the_page_are_those_of_the_program():
     import dask
     import distributed  # noqa: F401  brings its configuration

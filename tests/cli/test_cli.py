@@ -12,6 +12,7 @@ import subprocess
 import sys
 import time
 from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -30,7 +31,7 @@ from microrad.loop.controller_study import designs
 from microrad.report.identification import page as identification
 from microrad.study import study
 from places import ROOT
-from shipped import plain_study, without_day, without_fine_pointing
+from shipped import default_study, plain_study, without_day, without_fine_pointing
 from waiting import HANG_S, lines_of, until
 
 PAPER = ROOT / "src" / "microrad" / "mission" / "missions" / "leo-geo.toml"
@@ -50,6 +51,7 @@ COMMANDS = (
     "import",
     "bench",
     "doctor",
+    "verify",
     "studio",
     "schema",
     "explain",
@@ -120,6 +122,8 @@ def test_the_examples_are_good_usage(command):
         group.commands[name].make_context(name, args)
 
 
+@pytest.mark.promise("index-1")
+@pytest.mark.promise("releasing-9")
 def test_help_lists_every_command_and_completion(call):
     result = call("--help")
     assert "Exit code: 0 done, 1 a requirement is not met, 2 bad usage or a bad file." in " ".join(result.out.split())
@@ -135,7 +139,9 @@ def test_identify_says_how_columns_are_counted(call):
     assert "counted from 0" in " ".join(call("identify", "--help").out.split())
 
 
+@pytest.mark.promise("readme-5")
 @pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.promise("readme-23")
 def test_readme_names_every_command(command):
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     if not text.strip():
@@ -143,6 +149,7 @@ def test_readme_names_every_command(command):
     assert f"microrad {command}" in text
 
 
+@pytest.mark.promise("decisions-1")
 def test_help_loads_nothing_heavy():
     heavy = ["numpy", "scipy", "numba", "pydantic", "xarray", "contourpy", "h5py", "rich", "jinja2"]
     code = f"import sys, microrad, microrad.cli; print([m for m in {heavy} if m in sys.modules])"
@@ -168,6 +175,9 @@ def test_bad_usage_is_refused(refused, args, words):
 
 
 # --------------------------------------------------------------------------------------------------------------- init
+@pytest.mark.promise("readme-5")
+@pytest.mark.promise("index-2")
+@pytest.mark.promise("readme-23")
 def test_init_writes_the_packaged_mission_and_the_next_command(call, folder):
     assert call("init") == (0, "leo-geo.toml written. Next: microrad run leo-geo.toml\n", "")
     assert listing(folder) == {"leo-geo.toml": PAPER.read_bytes()}
@@ -197,6 +207,9 @@ def test_a_full_disk_leaves_no_part_of_a_file(refused, monkeypatch):
 
 
 # ---------------------------------------------------------------------------------------------------------------- run
+@pytest.mark.promise("readme-1", "readme-5", "report-1")
+@pytest.mark.promise("index-1", "index-2")
+@pytest.mark.promise("readme-23")
 def test_init_then_run(call, folder):
     """Without the fine-pointing loop and the day: the whole is run by test_docs_gallery.py."""
     call("init")
@@ -211,7 +224,9 @@ def test_init_then_run(call, folder):
     assert sorted(p.name for p in folder.iterdir()) == ["leo-geo-study", "leo-geo.toml"]
 
 
+@pytest.mark.promise("gallery-9", "readme-1", "readme-5", "report-1", "report-7")
 @pytest.mark.usefixtures("undrawn")
+@pytest.mark.promise("readme-23")
 def test_identify_then_run_on_the_mirror_it_wrote(call, refused, folder, loop_mirror, plain):
     args = ("run", plain, "--mirror", loop_mirror, "--json")
     result = call(*args)
@@ -232,6 +247,23 @@ def test_identify_then_run_on_the_mirror_it_wrote(call, refused, folder, loop_mi
     assert (folder / "leo-geo-study" / "report.html").stat().st_size > 1000
 
 
+@pytest.mark.promise("readme-5", "report-1", "report-7")
+@pytest.mark.usefixtures("undrawn")
+def test_a_run_that_meets_every_requirement_is_exit_0(call, folder, monkeypatch):
+    found = default_study()
+    monkeypatch.setattr(study, "run_study", lambda *args: found)
+    result = call("run", PAPER)
+    assert (result.code, result.err) == (0, "")
+    assert "and every requirement is met." in " ".join(result.out.split())
+    assert (folder / "leo-geo-study" / "report.html").is_file()
+    first, beacon, *others = found.requirements
+    missed = replace(found, requirements=(first, replace(beacon, margin=-1.0), *others))
+    monkeypatch.setattr(study, "run_study", lambda *args: missed)
+    assert call("run", PAPER, "--overwrite").code == 1
+    assert call("run", PAPER, "--overwrite", "--exit-on", "closes").code == 0
+
+
+@pytest.mark.promise("report-1", "report-7")
 @pytest.mark.usefixtures("undrawn")
 def test_a_link_that_does_not_close_is_exit_1_and_has_its_report(call, folder, loop_mirror):
     dim = mission(folder / "dim.toml", ('required_power = "10 pW"', 'required_power = "1 nW"'))
@@ -259,7 +291,11 @@ def designed_once(monkeypatch):
     monkeypatch.setattr(controller_study, "design_and_promise", known)
 
 
+@pytest.mark.promise("choose-6")
+@pytest.mark.promise("readme-5")
+@pytest.mark.promise("pointing-1", "pointing-2")
 @pytest.mark.usefixtures("few_controllers", "designed_once")
+@pytest.mark.promise("readme-23")
 def test_design_prints_each_controller_with_its_margins(call, folder):
     call("init")
     result = call("design", "leo-geo.toml")
@@ -293,6 +329,7 @@ def test_design_refuses_what_it_cannot_design(refused, folder, plain):
     assert "hard.toml" in message and "modulus margin" in message
 
 
+@pytest.mark.promise("readme-5", "report-1")
 def test_run_refuses_missing_and_faulty_files(refused, folder):
     assert "no-such.toml" in refused("run", "no-such.toml")
     faulty = mission(
@@ -304,6 +341,7 @@ def test_run_refuses_missing_and_faulty_files(refused, folder):
     assert "no-mirror.toml" in refused("run", PAPER, "--mirror", "no-mirror.toml")
 
 
+@pytest.mark.promise("report-1")
 def test_run_never_replaces_what_it_did_not_write_and_says_so_before_computing(refused, folder, monkeypatch):
     monkeypatch.setattr(study, "run_study", lambda *args: pytest.fail("computed first"))
     (folder / "photos").mkdir()
@@ -329,6 +367,7 @@ def test_run_refuses_an_unstable_loop_and_a_mirror_without_inverse(refused, fold
     assert "has no inverse" in refused("run", plain, "--mirror", stuck)
 
 
+@pytest.mark.promise("report-1", "report-3")
 def test_a_full_disk_during_run_leaves_nothing_but_the_verdict(call, folder, monkeypatch, loop_mirror, plain):
     def full(*args, **kwargs):
         raise OSError(errno.ENOSPC, "No space left on device")
@@ -342,6 +381,7 @@ def test_a_full_disk_during_run_leaves_nothing_but_the_verdict(call, folder, mon
     assert listing(folder) == before
 
 
+@pytest.mark.promise("report-5")
 @pytest.mark.usefixtures("undrawn")
 def test_a_cache_folder_that_cannot_be_used_is_told_once_and_the_run_goes_on(call, folder, monkeypatch):
     (folder / "cache").write_text("no folder", encoding="utf-8")
@@ -357,6 +397,7 @@ def test_a_cache_folder_that_cannot_be_used_is_told_once_and_the_run_goes_on(cal
     assert (folder / "leo-geo-study" / "report.html").is_file()
 
 
+@pytest.mark.promise("report-5")
 @pytest.mark.usefixtures("undrawn")
 def test_a_cache_folder_that_cannot_be_written_is_told_once_and_the_run_goes_on(call, folder, monkeypatch):
     found, access = plain_study(), os.access
@@ -438,6 +479,7 @@ def interruptible():
     signal.signal(signal.SIGINT, before)
 
 
+@pytest.mark.promise("report-1", "report-3")
 @pytest.mark.usefixtures("interruptible")
 @pytest.mark.parametrize(
     ("name", "package", "module", "function"),
@@ -516,6 +558,9 @@ def test_an_interrupt_behind_another_error_is_an_interrupt(call, folder, monkeyp
 
 
 # ----------------------------------------------------------------------------------------------------------- identify
+@pytest.mark.promise("identify-2")
+@pytest.mark.promise("readme-5")
+@pytest.mark.promise("readme-23")
 def test_identify_prints_both_models_and_writes_the_mirror(call, folder):
     result = call("identify", write_recording(folder / "loop.csv"), *COLUMNS)
     assert (result.code, result.err) == (0, "")
@@ -530,6 +575,7 @@ def test_identify_prints_both_models_and_writes_the_mirror(call, folder):
     assert sorted(p.name for p in folder.iterdir()) == ["loop-mirror.html", "loop-mirror.toml", "loop.csv"]
 
 
+@pytest.mark.promise("identify-13")
 @pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize(("options", "hold"), [([], "zero-order"), (["--measured-drive"], "first-order")])
 def test_identify_is_told_what_the_drive_does_between_samples(refused, folder, monkeypatch, options, hold):
@@ -571,6 +617,7 @@ def test_identify_json_names_and_models(call, folder):
     assert 'name = "lab mirror"' in (folder / "lab.toml").read_text(encoding="utf-8")
 
 
+@pytest.mark.promise("recordings-1")
 @pytest.mark.parametrize(
     ("text", "rate_hz"), [("200", 200.0), ("200 Hz", 200.0), ("50 kHz", 50e3), ("1e3", 1e3), ("0.5MHz", 5e5)]
 )
@@ -676,6 +723,7 @@ def test_identify_looks_at_the_mirror_file_before_and_after_fitting(call, refuse
     assert (folder / "loop-mirror.toml").read_text() == "mine"
 
 
+@pytest.mark.promise("readme-5")
 @pytest.mark.usefixtures("undrawn")
 def test_progress_goes_to_a_terminal_and_never_to_stdout(call, folder, monkeypatch):
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
@@ -741,7 +789,9 @@ def test_a_file_of_progress_that_cannot_be_written_is_refused(call, folder, monk
 
 
 # --------------------------------------------------------------------------------------------------- doctor and schema
+@pytest.mark.promise("readme-5")
 @pytest.mark.skipif("NUMBA_DISABLE_JIT" in os.environ, reason="doctor calls switched-off compilation a problem")
+@pytest.mark.promise("readme-23")
 def test_doctor_finds_this_installation_in_order(call):
     result = call("doctor")
     assert (result.code, result.err) == (0, ""), result.out
@@ -780,12 +830,16 @@ def test_doctor_finds_an_old_library(monkeypatch):
     assert "notthere" in absent.found
 
 
+@pytest.mark.promise("readme-5")
+@pytest.mark.promise("readme-23")
 def test_schema_is_one_json_document(call):
     result = call("schema")
     assert (result.code, result.err) == (0, "")
     assert "data_rate" in json.loads(result.out)["$defs"]["Communication"]["properties"]
 
 
+@pytest.mark.promise("readme-5")
+@pytest.mark.promise("readme-23")
 def test_explain_says_what_a_key_means_as_text_and_as_json(call):
     result = call("explain", "fine_pointing.modulus_margin")
     assert (result.code, result.err) == (0, "")
@@ -816,6 +870,7 @@ def test_a_closed_pipe_is_silent_and_a_full_one_is_not():
 
 
 # ------------------------------------------------------------------------------------------------------- public screen
+@pytest.mark.promise("readme-22")
 def test_every_public_name_exists_once():
     modules = {module.name for module in pkgutil.iter_modules(microrad.__path__)}
     assert not modules & set(microrad._PUBLIC), "a public name would hide the module of that name"
@@ -882,6 +937,8 @@ offset = "6 V"
 """
 
 
+@pytest.mark.promise("bench-1", "bench-2")
+@pytest.mark.promise("readme-10")
 @pytest.mark.usefixtures("undrawn")
 def test_bench_writes_recordings_that_identify_takes_as_a_folder(call, folder):
     (folder / "plan.toml").write_text(PLAN)
@@ -926,6 +983,7 @@ def with_units(folder, header):
     return path
 
 
+@pytest.mark.promise("recordings-1")
 @pytest.mark.usefixtures("undrawn")
 def test_units_in_the_header_are_taken_and_said(call, folder):
     path = with_units(folder, "time,Drive (mV),Tilt (urad)")
@@ -935,6 +993,23 @@ def test_units_in_the_header_are_taken_and_said(call, folder):
     assert 'drive_max = "0.012 V"' in (folder / "units-mirror.toml").read_text(encoding="utf-8")
 
 
+@pytest.mark.promise("recordings-1", "recordings-8")
+@pytest.mark.usefixtures("undrawn")
+def test_a_time_column_by_name_and_a_fault_that_is_taken_on(refused, folder):
+    path = write_recording(folder / "creeping.csv")
+    table = np.loadtxt(path, delimiter=",", skiprows=1)
+    table[:, 2] += np.linspace(0.0, 3.0 * np.ptp(table[:, 2]), table.shape[0])
+    np.savetxt(path, table, delimiter=",", header="clock,drive,angle", comments="", fmt="%.9g")
+    words = ("identify", path, "--input", "drive", "--output", "angle", "--static")
+    assert "give the rate (--rate, rate_hz) in Hz, or name the time column" in refused(*words)
+    message = " ".join(refused(*words, "--time", "clock").split())
+    assert "of its peak-to-peak, where the drive does not" in message
+    assert "--accept drift" in message
+    message = refused(*words, "--time", "clock", "--accept", "drift", "--output-unit", "rad")
+    assert "drift" not in message and "a tilt of " in message  # it was read
+
+
+@pytest.mark.promise("recordings-1")
 @pytest.mark.usefixtures("undrawn")
 def test_units_that_nobody_states_are_assumed_and_said(call, folder):
     result = call("identify", write_recording(folder / "loop.csv"), *COLUMNS)

@@ -91,6 +91,9 @@ def test_every_command_has_an_example_that_names_it(call):
 
 
 # --------------------------------------------------------------------------------------------------------------- init
+@pytest.mark.promise("readme-12")
+@pytest.mark.promise("campaigns-2")
+@pytest.mark.promise("readme-24")
 def test_init_writes_a_campaign_and_its_mission_and_never_overwrites(call, folder, refused):
     shown = call("campaign", "init")
     assert (shown.code, sorted(listing(folder))) == (0, ["campaign.toml", "leo-geo.toml"])
@@ -111,6 +114,7 @@ def test_init_refuses_a_folder_that_is_not_there(refused):
 
 
 # ---------------------------------------------------------------------------------------------------------------- run
+@pytest.mark.promise("campaigns-2", "campaigns-4")
 def test_a_run_prints_and_keeps_what_status_shows(call, folder):
     (folder / "my runs").mkdir()
     file = written(folder / "my runs", LINKS, whole=False)
@@ -121,6 +125,7 @@ def test_a_run_prints_and_keeps_what_status_shows(call, folder):
     assert mending.verify(book, [(0, 0)]).missing == ()
 
 
+@pytest.mark.promise("campaigns-2", "campaigns-4")
 @pytest.mark.usefixtures("rows_here")
 def test_rows_that_miss_a_limit_are_an_exit_code(call, folder):
     file = written(folder, LINKS.replace('"1 dB"', '"30 dB"'), whole=False)
@@ -166,6 +171,7 @@ def test_a_number_of_threads_is_at_least_one(there, refused, count):
     assert "--threads" in refused("campaign", "run", "campaign.toml", "--ledger", "new.ledger", "--threads", count)
 
 
+@pytest.mark.promise("campaigns-63")
 def test_a_missing_package_is_named_with_its_extra(there, call, refused, monkeypatch):
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     assert "pip install --constraint constraints.txt '.[parquet]'" in refused(
@@ -182,6 +188,7 @@ def test_a_missing_package_is_named_with_its_extra(there, call, refused, monkeyp
 
 
 # ----------------------------------------------------------------------------------------------- the wrong kind of file
+@pytest.mark.promise("campaigns-4")
 @pytest.mark.parametrize("command", ["run", "optimise"])
 def test_what_is_no_campaign_file_is_refused(there, refused, command):
     (there / "empty").touch()
@@ -195,6 +202,7 @@ def test_what_is_no_campaign_file_is_refused(there, refused, command):
         assert words in refused("campaign", command, file), file
 
 
+@pytest.mark.promise("campaigns-46")
 @pytest.mark.parametrize(
     "command", [("status",), ("resume",), ("verify",), ("report",), ("export", "rows.csv")], ids=lambda words: words[0]
 )
@@ -220,6 +228,7 @@ def test_a_ledger_goes_nowhere_but_into_a_folder(there, refused):
 
 
 # --------------------------------------------------------------------------------------------------- status and resume
+@pytest.mark.promise("campaigns-2", "campaigns-4")
 def test_status_of_what_is_complete_and_of_what_is_not(there, call):
     shown, data = call("campaign", "status", "campaign.ledger"), call("campaign", "status", "campaign.ledger", "--json")
     assert (shown.code, data.code) == (0, 0) and "Complete: 64 rows" in shown.out
@@ -230,7 +239,9 @@ def test_status_of_what_is_complete_and_of_what_is_not(there, call):
     assert parsed(data.out) and "Complete" not in shown.out
 
 
+@pytest.mark.promise("campaigns-2")
 @pytest.mark.usefixtures("rows_here")
+@pytest.mark.promise("readme-24")
 def test_resume_comes_to_what_was_there(there, call):
     before = call("campaign", "export", "campaign.ledger", "before.csv")
     shortened(there)
@@ -240,6 +251,8 @@ def test_resume_comes_to_what_was_there(there, call):
     assert (there / "after.csv").read_bytes() == (there / "before.csv").read_bytes()
 
 
+@pytest.mark.promise("readme-12")
+@pytest.mark.promise("campaigns-4", "campaigns-46")
 @pytest.mark.usefixtures("rows_here")
 def test_an_interrupt_says_how_to_go_on(there, call, monkeypatch):
     def interrupt(*args):
@@ -283,6 +296,7 @@ def test_a_ledger_that_cannot_be_written_is_read_all_the_same(there, call, tmp_p
 
 
 # -------------------------------------------------------------------------------------------------------------- verify
+@pytest.mark.promise("campaigns-2", "campaigns-4", "campaigns-46")
 @pytest.mark.usefixtures("rows_here")
 def test_verify_finds_a_flipped_bit_and_resume_mends_it(there, call):
     sound, data = call("campaign", "verify", "campaign.ledger"), call("campaign", "verify", "campaign.ledger", "--json")
@@ -299,6 +313,7 @@ def test_verify_finds_a_flipped_bit_and_resume_mends_it(there, call):
 
 
 # --------------------------------------------------------------------------------------------------- export and report
+@pytest.mark.promise("campaigns-2")
 @pytest.mark.parametrize(("name", "begins"), [("r.csv", b"cell,"), ("r.parquet", b"PAR1"), ("r.nc", b"\x89HDF")])
 def test_export_writes_and_replaces_only_what_it_wrote(there, call, refused, name, begins):
     shown = call("campaign", "export", "campaign.ledger", name)
@@ -318,6 +333,7 @@ def test_export_refuses_other_kinds_and_places(there, refused, name):
     assert name in refused("campaign", "export", "campaign.ledger", name)
 
 
+@pytest.mark.promise("campaigns-2")
 def test_the_report_is_a_page_and_replaces_nothing_but_a_page(there, call, refused):
     shown = call("campaign", "report", "campaign.ledger")
     page = (there / "campaign.html").read_text(encoding="utf-8")
@@ -332,6 +348,8 @@ def test_the_report_is_a_page_and_replaces_nothing_but_a_page(there, call, refus
 
 
 # ------------------------------------------------------------------------------------------------------------ optimise
+@pytest.mark.promise("readme-12")
+@pytest.mark.promise("campaigns-2", "campaigns-4", "campaigns-42")
 def test_optimise_finds_the_least_aperture(call, folder):
     file = written(folder, LINKS + OPTIMISE.format(low="3 cm", high="12 cm"), whole=False)
     shown, data = call("campaign", "optimise", file), call("campaign", "optimise", file, "--json")
@@ -348,6 +366,7 @@ def test_optimise_finds_the_least_aperture(call, folder):
     assert sorted(p.name for p in folder.iterdir()) == ["campaign.toml", "mirror.toml", "mission.toml", "plain.toml"]
 
 
+@pytest.mark.promise("campaigns-4")
 def test_optimise_says_when_no_design_will_do(call, folder):
     file = written(folder, LINKS + OPTIMISE.format(low="1 cm", high="2 cm"), whole=False)
     shown, data = call("campaign", "optimise", file), call("campaign", "optimise", file, "--json")

@@ -2,15 +2,18 @@
 
 import functools
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from microrad.cli import recordings
-from microrad.lab.identify import coupled
+from microrad.lab.identify import IdentificationError, coupled, response_from_records
 from microrad.lab.identify.coupled.ladder import LadderOptions, identify_coupled
-from microrad.mirror.coupled import of
+from microrad.lab.identify.coupled.wiring import check_wiring
+from microrad.lab.recording import multisine_recordings
+from microrad.mirror.coupled import Output, of
 from microrad.mission.file import load_coupled_mirror
 
 RATE_HZ, PERIOD = 2000.0, 512
@@ -117,6 +120,9 @@ drift = "0 nrad/s"
 
 
 # -------------------------------------------------------------------------------------------------------- what is done
+@pytest.mark.promise("mirror-file-1", "mirror-file-29")
+@pytest.mark.promise("identify-38", "identify-46", "recordings-16", "recordings-23")
+@pytest.mark.promise("readme-9")
 def test_arrays_become_a_mirror_file_of_version_2(call, folder, quick):
     third = Y[:, :1] - 0.5 * Y[:, 1:]
     result = call("identify", *arrays(folder, output=np.concatenate((Y, third), axis=1)), *AXES, "--output-unit", "m",
@@ -125,7 +131,7 @@ def test_arrays_become_a_mirror_file_of_version_2(call, folder, quick):
     assert (result.code, result.err) == (0, "")
     lines = result.out.splitlines()
     assert lines[0] == "drive in V (assumed, --input-unit says otherwise), output in m (given)"
-    assert len(lines) <= 27
+    assert len(lines) <= 25
     assert "u_100mV-mirror.toml written (coupled linear, order 4)." in result.out
     text = (folder / "u_100mV-mirror.toml").read_text(encoding="utf-8")
     assert text.startswith("# Mirror identified from 4 recording(s), model coupled linear, order 4.\n")
@@ -142,6 +148,8 @@ def test_arrays_become_a_mirror_file_of_version_2(call, folder, quick):
     assert left.std() < 0.1 * Y.std()  # the drive of the truth is a sum of sines between its samples, too
 
 
+@pytest.mark.promise("identify-38", "recordings-1")
+@pytest.mark.promise("readme-9")
 @pytest.mark.usefixtures("quick")
 def test_columns_of_tables_and_json(call, folder):
     for r in range(4):
@@ -158,6 +166,7 @@ def test_columns_of_tables_and_json(call, folder):
     assert (folder / "axes-mirror.html").is_file()
 
 
+@pytest.mark.promise("recordings-1", "recordings-16")
 def test_arrays_for_validation(call, folder, given):
     fitted, other = arrays(folder), arrays(folder, *experiment(5, 1), "other")
     result = call("identify", *fitted, "--validate", *other, *AXES, "--output-unit", "um", "--input-unit", "mV")
@@ -168,6 +177,7 @@ def test_arrays_for_validation(call, folder, given):
     assert (given["drive_unit"], given["output_unit"], given["signs"]) == ("mV", "um", None)
 
 
+@pytest.mark.promise("identify-38", "recordings-19", "recordings-20", "recordings-21")
 @pytest.mark.usefixtures("quick")
 def test_a_list_with_validation(call, folder):
     drive, output = experiment(5, 1)
@@ -207,6 +217,7 @@ output_unit = "um"
     assert 'name = "from a list"' in (folder / "bench-mirror.toml").read_text(encoding="utf-8")
 
 
+@pytest.mark.promise("identify-44")
 @pytest.mark.usefixtures("quick")
 def test_stopped_with_what_was_found_so_far(call, folder, monkeypatch):
     def stop(candidate):
@@ -228,6 +239,7 @@ def test_stopped_before_the_first_model_nothing_is_written(call, folder):
     assert sorted(path.name for path in folder.iterdir()) == ["u_100mV.npy", "y_100mV.npy"]
 
 
+@pytest.mark.promise("readme-9")
 @pytest.mark.usefixtures("quick")
 def test_a_folder_of_the_virtual_bench_whose_drives_are_played_one_after_the_other(call, folder):
     plan = PLAN
@@ -246,6 +258,7 @@ def test_a_folder_of_the_virtual_bench_whose_drives_are_played_one_after_the_oth
 
 
 # ------------------------------------------------------------------------------------------------------------ refusals
+@pytest.mark.promise("recordings-16", "recordings-23")
 @pytest.mark.parametrize(
     ("options", "words"),
     [
@@ -278,6 +291,7 @@ def test_what_means_nothing_for_several_channels(refused, folder, quick, options
     assert words in " ".join(message.split())
 
 
+@pytest.mark.promise("recordings-1")
 def test_options_beside_a_list_are_refused(refused, folder):
     (folder / "list.toml").write_text("[recording.a]\nfile = 'a.npz'\n")
     for option in (["--input", "u"], ["--output-file", "y.npy"], ["--rate", "2 kHz"], ["--lever-arm", "1 mm"]):
@@ -306,6 +320,7 @@ def test_drives_that_cannot_be_told_apart_are_refused_by_all_recordings(refused,
     assert "the input 'drive[1]' moves in none of the recordings" in message
 
 
+@pytest.mark.promise("recordings-25")
 def test_an_actuator_that_moves_nothing(refused, folder):
     noise = np.random.Generator(np.random.Philox(2)).standard_normal(Y.shape)
     output = 1e-6 * U[:, :1] * np.array([1.0, 0.5])[:, None, None] + 1e-7 * noise
@@ -321,6 +336,7 @@ def test_one_recording_for_fit_and_validation_is_refused(refused, folder):
     assert "u_100mV.npy realisation 0: the same data as u_100mV.npy realisation 0; give each recording once" in message
 
 
+@pytest.mark.promise("identify-39")
 def test_amplitudes_of_other_lengths_rates_or_channels(refused, folder):
     whole, short = arrays(folder), arrays(folder, U[:300], Y[:300], "200mV")
     files = (whole[0], short[0], *whole[1:], *short[1:])
@@ -350,6 +366,7 @@ output = "y"
     assert "slow.npz realisation 0: the sample rate is 500 Hz and that of u_100mV.npy realisation 0 2000 Hz" in message
 
 
+@pytest.mark.promise("identify-48", "recordings-24")
 @pytest.mark.parametrize(
     ("signs", "words"),
     [
@@ -376,6 +393,7 @@ output_file = "y_100mV.npy"
     assert words in message
 
 
+@pytest.mark.promise("identify-48", "recordings-24")
 def test_a_sensor_that_four_places_show_to_be_reversed(refused, folder):
     """Four displacements of a flat mirror: a plane for each drive, but for the sensor that is wired the wrong way."""
     places = np.array([[10.0, 0.0], [0.0, 10.0], [-10.0, 1.0], [2.0, -10.0]])
@@ -388,6 +406,23 @@ def test_a_sensor_that_four_places_show_to_be_reversed(refused, folder):
     message = refused("identify", *arrays(folder, output=output), *AXES, "--output-unit", "m", *options)
     assert "% of what the outputs show is neither tilt nor piston of the positions that are stated" in message
     assert "it would agree where the output 'output[2]' is reversed" in message
+
+
+@pytest.mark.promise("identify-48", "recordings-23", "recordings-24")
+def test_places_of_three_sensors_agree_with_any_response_and_a_line_of_them_is_refused():
+    third = Y[:, :1] - 0.5 * Y[:, 1:]
+    output = np.concatenate((Y, -third), axis=1)  # as it is wired, and with each sensor turned round
+    outputs = [
+        Output(f"y{k}", "displacement", position_m=place)
+        for k, place in enumerate([(0.01, 0), (0, 0.01), (-0.01, -0.01)])
+    ]
+    for turned in ((1, 1, 1), (-1, 1, 1), (1, 1, -1)):
+        sign = np.array(turned)[:, None, None]
+        check_wiring("u.npy", response_from_records(multisine_recordings(U, sign * output, RATE_HZ)), outputs, None)
+    on_a_line = [replace(each, position_m=(0.01 * k, 0.02 * k)) for k, each in enumerate(outputs)]
+    found = response_from_records(multisine_recordings(U, output, RATE_HZ))
+    with pytest.raises(IdentificationError, match="do not give the tilts: all displacements lie on one line"):
+        check_wiring("u.npy", found, on_a_line, None)
 
 
 # --------------------------------------------------------------------------------------------------------------- names

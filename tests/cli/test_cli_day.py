@@ -59,6 +59,7 @@ def words_of(page):
 
 
 # ------------------------------------------------------------------------------------------------------------ contacts
+@pytest.mark.promise("day-1", "day-3", "day-4", "day-5")
 @pytest.mark.parametrize("name", MISSIONS)
 def test_contacts_in_words_without_a_number_that_is_none(call, folder, name):
     result = call("contacts", path_of(folder, MISSIONS[name]))
@@ -74,6 +75,9 @@ def test_contacts_in_words_without_a_number_that_is_none(call, folder, name):
     assert ("at a time (median)" in said) == (name not in ("no contact", "nothing at all", "always in view"))
 
 
+@pytest.mark.promise("readme-5")
+@pytest.mark.promise("day-1", "day-5")
+@pytest.mark.promise("readme-23")
 def test_the_words_of_a_day(call, folder):
     said = call("contacts", path_of(folder)).out
     data = json.loads(call("contacts", path_of(folder), "--json").out)
@@ -98,6 +102,8 @@ def test_words_of_a_share_keep_the_view_apart_from_what_is_granted(call, folder)
     assert view.search(whole).group() == view.search(half).group()
 
 
+@pytest.mark.promise("readme-8")
+@pytest.mark.promise("day-3")
 def test_contacts_as_csv(call, folder):
     result = call("contacts", path_of(folder, {"orbit.duration": "12 h"}), "--csv")
     assert (result.code, result.err) == (0, "")
@@ -131,6 +137,7 @@ def no_constant(text):
     raise AssertionError(text)
 
 
+@pytest.mark.promise("day-3")
 @pytest.mark.parametrize("name", ["plain", "nothing at all", "no downlink", "always in view"])
 def test_contacts_as_json(call, folder, name):
     result = call("contacts", path_of(folder, MISSIONS[name]), "--json")
@@ -151,6 +158,8 @@ def test_contacts_as_json(call, folder, name):
         assert factors[-len(known) :] == known == sorted(known, reverse=True)
 
 
+@pytest.mark.promise("report-12")
+@pytest.mark.promise("day-3")
 @pytest.mark.parametrize("name", ["plain", "nothing at all"])
 def test_contacts_as_a_page_that_loads_nothing(call, folder, name):
     result = call("contacts", path_of(folder, MISSIONS[name]), "--html")
@@ -177,6 +186,9 @@ def test_a_name_is_no_markup(call, folder):
 
 
 # ------------------------------------------------------------------------------------------------------- constellation
+@pytest.mark.promise("readme-5")
+@pytest.mark.promise("day-3")
+@pytest.mark.promise("readme-23")
 def test_a_constellation_in_words(call, folder):
     result = call("constellation", path_of(folder))
     assert (result.code, result.err) == (0, "")
@@ -185,6 +197,8 @@ def test_a_constellation_in_words(call, folder):
     assert not NO_NUMBER.search(result.out)
 
 
+@pytest.mark.promise("gallery-23", "readme-8")
+@pytest.mark.promise("day-3", "day-34")
 def test_a_constellation_as_csv_plan_and_json(call, folder):
     path = path_of(folder)
     rows = list(csv.DictReader(io.StringIO(call("constellation", path, "--csv").out)))
@@ -200,6 +214,7 @@ def test_a_constellation_as_csv_plan_and_json(call, folder):
     assert "@ 2026/03/20-12:00:00" in plan
 
 
+@pytest.mark.promise("day-4")
 def test_a_constellation_that_carries_nothing_is_exit_code_1(call, folder):
     for form in ((), ("--csv",), ("--json",), ("--contact-plan",)):
         result = call("constellation", path_of(folder, BLIND), *form)
@@ -232,6 +247,7 @@ def test_forms_exclude_each_other(refused, folder, command, flags):
     assert "exclude each other; give one of them." in said
 
 
+@pytest.mark.promise("day-4")
 @pytest.mark.parametrize(
     ("command", "changes", "words"),
     [
@@ -255,6 +271,7 @@ def test_what_does_not_hold_is_refused_in_words(refused, folder, command, change
         assert word in said, said
 
 
+@pytest.mark.promise("day-4")
 def test_expired_elements_are_refused_by_both_commands(refused, folder):
     (folder / "a.tle").write_text(element_set(day=20.0), encoding="utf-8")
     leo = {"orbit.leo": {"kind": "elements", "file": "a.tle"}, **ALONE}
@@ -262,6 +279,7 @@ def test_expired_elements_are_refused_by_both_commands(refused, folder):
     assert "the elements are expired" in refused("constellation", path_of(folder, {"constellation": BY_FILE}))
 
 
+@pytest.mark.promise("day-4")
 def test_a_file_that_is_not_there(refused, folder):
     for command in ("contacts", "constellation"):
         assert "nowhere.toml" in refused(command, "nowhere.toml")
@@ -304,6 +322,7 @@ def test_help_lists_both_commands(call, folder):
             assert flag in text
 
 
+@pytest.mark.promise("day-1")
 def test_the_loss_is_the_jitters_where_the_mission_has_one(call, folder):
     jitter = {"jitter": {"bias": ["1 urad", "0 urad"], "rms": ["3 urad", "3 urad"], "bandwidth": "50 Hz"}}
     path = path_of(folder, jitter)

@@ -29,6 +29,8 @@ def changed(path, *changes):
     path.write_text(text, "utf-8")
 
 
+@pytest.mark.promise("readme-5")
+@pytest.mark.promise("pointing-44", "pointing-56", "pointing-63")
 def test_the_table_and_the_list_are_the_engine_s_budget(call, mission, tmp_path):
     code, out, _ = call("pointing", str(mission), "--sources", str(tmp_path / "errors.csv"), "--json")
     found = {each["requirement"]: each for each in json.loads(out)["budget"]}
@@ -54,6 +56,7 @@ def test_the_table_and_the_list_are_the_engine_s_budget(call, mission, tmp_path)
     assert "line" in origins["thermo_elastic"]
 
 
+@pytest.mark.promise("pointing-63")
 def test_the_tables_fit_a_terminal_and_say_what_is_kept_and_what_weighs(call, mission):
     changed(mission, ('limit = "2 urad"', 'limit = "4 urad"'))
     code, out, _ = call("pointing", str(mission))
@@ -81,6 +84,7 @@ def test_a_list_alone_is_taken_in_the_windows_that_are_asked_for(call, mission, 
     assert found[0]["by_distribution_rad"] == found[2]["by_distribution_rad"] > found[1]["by_distribution_rad"] == 0.0
 
 
+@pytest.mark.promise("pointing-45", "pointing-47", "pointing-61")
 def test_what_the_loop_leaves_is_a_source_of_its_window(call, tmp_path):
     path = tmp_path / "m.toml"
     path.write_text(SHIPPED.read_text("utf-8") + TABLE.replace("with_loop = false", "with_loop = true"), "utf-8")
@@ -96,6 +100,7 @@ def test_what_the_loop_leaves_is_a_source_of_its_window(call, tmp_path):
     assert {each["origin"] for each in loop} == {"the mission's fine-pointing loop under PI"}
 
 
+@pytest.mark.promise("pointing-53")
 @pytest.mark.parametrize(
     ("changes", "options", "words"),
     [
@@ -123,6 +128,24 @@ def test_what_is_no_budget_is_refused(refused, mission, changes, options, words)
     assert words in refused("pointing", "m.toml", *options)
 
 
+@pytest.mark.promise("pointing-63")
+@pytest.mark.parametrize(
+    "line",
+    ['index = "RPE"', "confidence = 0.9973", 'axes = "radial"', 'limit = "4 urad"', 'interpretation = "temporal"'],
+)
+def test_nothing_of_a_requirement_has_a_default(refused, mission, line):
+    head, behind = mission.read_text("utf-8").split("[error_budget.requirements.code_word]")
+    mission.write_text(f"{head}[error_budget.requirements.code_word]{behind.replace(line, '', 1)}", "utf-8")
+    words = refused("pointing", "m.toml")
+    assert f"error_budget.requirements.code_word.{line.partition(' ')[0]}" in words and "missing" in words
+
+
+@pytest.mark.promise("pointing-47")
+def test_a_list_beside_the_mission_is_no_part_of_a_run(refused, mission):
+    assert "No such option: --sources" in refused("run", "m.toml", "--sources", "errors.csv")
+
+
+@pytest.mark.promise("pointing-60")
 def test_a_correlation_of_the_table_makes_one_line_of_two_sources(call, mission):
     more = TABLE[TABLE.index("[error_budget.sources.alignment]") : TABLE.index("[error_budget.sources.thermo")]
     again = more.replace("sources.alignment", "sources.mounting")

@@ -9,7 +9,8 @@ import zipfile
 import pytest
 
 from microrad.export.flight import build
-from microrad.mission.file import load_mirror
+from microrad.loop import controller_study
+from microrad.mission.file import load_mirror, load_mission
 from shipped import SHIPPED, without_fine_pointing
 
 needs_a_compiler = pytest.mark.skipif(build.compiler() is None, reason="no C compiler")
@@ -28,6 +29,8 @@ def mission(folder):
 
 
 # --------------------------------------------------------------------------------------------------------------- C code
+@pytest.mark.promise("readme-14")
+@pytest.mark.promise("export-2", "export-14")
 @needs_a_compiler
 @pytest.mark.parametrize("precision", ["double", pytest.param("single", marks=pytest.mark.endurance), "fixed"])
 def test_a_controller_becomes_code_that_keeps_to_the_kernel(mission, call, precision):
@@ -46,7 +49,10 @@ def test_a_controller_becomes_code_that_keeps_to_the_kernel(mission, call, preci
     assert 0 < found["operations"]["multiplications"] < 1000
 
 
+@pytest.mark.promise("readme-13")
+@pytest.mark.promise("export-4", "export-5")
 @needs_a_compiler
+@pytest.mark.promise("readme-25")
 def test_the_folder_holds_sources_vectors_and_hashes_and_nothing_compiled(mission, call):
     done = call("export", "c", "leo-geo.toml", "--controller", "PID", "--name", "mirror_loop", "--output", "flight")
     assert done.code == 0, done.err
@@ -81,6 +87,7 @@ def test_results_are_replaced_only_when_asked_to(mission, call, refused):
     assert (mission / "mine" / "thesis.txt").read_text(encoding="utf-8") == "mine"
 
 
+@pytest.mark.promise("export-27")
 @pytest.mark.parametrize(
     ("extra", "words"),
     [
@@ -94,6 +101,7 @@ def test_code_that_cannot_be_is_refused_with_the_reason(mission, refused, extra,
     assert words in refused("export", "c", "leo-geo.toml", *extra)
 
 
+@pytest.mark.promise("export-27")
 def test_a_mirror_without_an_inverse_is_refused_where_one_is_asked_for(mission, refused):
     text = (mission / "leo-geo.toml").read_text(encoding="utf-8")
     begin, end = text.index("[mirror.bouc_wen]"), text.index("# A set with the same slow loop")
@@ -109,6 +117,7 @@ def test_a_compiler_that_is_not_there_is_refused_and_nothing_is_written(mission,
 
 
 # ----------------------------------------------------------------------------------------------------------------- FMU
+@pytest.mark.promise("readme-13")
 @pytest.mark.parametrize(
     ("extra", "name", "version"),
     [
@@ -117,6 +126,7 @@ def test_a_compiler_that_is_not_there_is_refused_and_nothing_is_written(mission,
         (("--controller", "PID + inverse"), "leo-geo-pid_inverse_loop.fmu", "2.0"),
     ],
 )
+@pytest.mark.promise("readme-25")
 def test_a_unit_is_written_with_its_description(mission, call, extra, name, version):
     done = call("export", "fmu", "leo-geo.toml", *extra)
     assert done.code == 0, done.err
@@ -149,6 +159,9 @@ def test_a_loop_that_the_mission_does_not_have_is_refused(mission, refused):
 
 
 # ------------------------------------------------------------------------------------------------------------- matrices
+@pytest.mark.promise("readme-13")
+@pytest.mark.promise("export-33")
+@pytest.mark.promise("readme-25")
 def test_matrices_go_to_a_matlab_file_and_to_json(mission, call):
     scipy_io = pytest.importorskip("scipy.io")
     done = call("export", "matrices", "leo-geo.toml", "--controller", "PID + inverse")
@@ -160,6 +173,9 @@ def test_matrices_go_to_a_matlab_file_and_to_json(mission, call):
 
 
 # --------------------------------------------------------------------------------------------------------------- import
+@pytest.mark.promise("readme-13")
+@pytest.mark.promise("export-1", "export-36")
+@pytest.mark.promise("readme-25")
 def test_a_linear_model_makes_a_mirror_file(mission, call):
     assert call("export", "matrices", "leo-geo.toml", "--output", "models.mat").code == 0
     done = call("import", "models.mat", "--variable", "mirror", *IMPORT)
@@ -171,6 +187,7 @@ def test_a_linear_model_makes_a_mirror_file(mission, call):
     assert made.prandtl_ishlinskii.weights_rad_v == pytest.approx((8.9e-5,), rel=1e-9)  # d1
 
 
+@pytest.mark.promise("export-36")
 def test_what_a_linear_model_does_not_say_has_a_unit(mission, call, refused):
     assert call("export", "matrices", "leo-geo.toml", "--output", "models.mat").code == 0
     words = ["6" if each == "6 V" else each for each in IMPORT]
@@ -185,3 +202,12 @@ def test_an_imported_mirror_does_not_replace_other_files(mission, call, refused)
     words = ("import", "models.mat", "--variable", "mirror", *IMPORT, "--output", "mine.toml")
     assert "left as it is" in refused(*words)
     assert "was not written by microrad" in refused(*words, "--overwrite")
+
+
+@pytest.mark.promise("export-4")
+def test_the_controllers_are_those_of_design_and_of_the_table_control(mission, refused):
+    m = load_mission(mission / "leo-geo.toml").mission
+    said = refused("export", "c", "leo-geo.toml", "--controller", "none").strip().removesuffix(" (see docs/export.md)")
+    listed = said.partition("it has: ")[2].split("; ")
+    assert listed == [*controller_study.offered(m.fine_pointing, m.mirror), "PID", "PID + inverse"]
+    assert len(listed) > 6

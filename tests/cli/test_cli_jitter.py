@@ -40,6 +40,7 @@ def document(tmp_path_factory):
     return json.loads(ran.stdout)
 
 
+@pytest.mark.promise("pointing-67")
 def test_a_recording_is_data_with_all_that_was_found_in_it(document):
     recording = document["recording"]
     assert {*recording} == {"file", "sha256", "rate_hz", "duration_s", "axes", "sentences"}
@@ -65,6 +66,9 @@ def test_a_recording_is_data_with_all_that_was_found_in_it(document):
     assert any("the recording ends at 500 Hz, and the loop reads up to 2.5 kHz" in s for s in recording["sentences"])
 
 
+@pytest.mark.promise("readme-5")
+@pytest.mark.promise("pointing-65", "pointing-67", "pointing-68")
+@pytest.mark.promise("readme-23")
 def test_a_recordings_tables_and_sentences_fit_a_terminal(tmp_path):
     step = 1.0 / RATE_HZ
     motion = read_motion(jitter(tmp_path / "jitter.csv", 3.0))
@@ -113,6 +117,7 @@ def test_a_recording_that_is_not_there_is_refused(refused):
     assert "no-such.csv" in refused("jitter", DEFAULT, "no-such.csv")
 
 
+@pytest.mark.promise("mirror-file-31")
 def test_a_mirror_of_several_axes_is_refused(refused, tmp_path):
     (tmp_path / "two-axes.toml").write_text(several_axes.TEXT, encoding="utf-8")
     named = several_axes.mission_text(("[fine_pointing]\n", '[fine_pointing]\nmirror_file = "two-axes.toml"\n'))

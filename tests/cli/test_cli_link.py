@@ -67,6 +67,9 @@ def said(result, start):
 
 
 # ----------------------------------------------------------------------------------------------------- the plain table
+@pytest.mark.promise("readme-5", "report-7")
+@pytest.mark.promise("link-1", "link-2")
+@pytest.mark.promise("readme-23")
 def test_the_shipped_mission_has_a_budget_and_closes(call, folder):
     path = folder / "leo-geo.toml"
     text = without_fine_pointing(SHIPPED.read_text(encoding="utf-8"))
@@ -87,6 +90,7 @@ def test_the_shipped_mission_has_a_budget_and_closes(call, folder):
     assert "Marked \u201c!\u201d in the tables:" in whole.out
 
 
+@pytest.mark.promise("gallery-4")
 def test_an_edited_aperture_moves_the_margin_by_its_area_and_its_beam(call, folder):
     before = json.loads(call("budget", file_with(folder), "--json").out)["budgets"][0]["margin_db"]
     after = json.loads(call("budget", file_with(folder, {"terminals.leo_aperture": "6 cm"}), "--json").out)
@@ -96,12 +100,23 @@ def test_an_edited_aperture_moves_the_margin_by_its_area_and_its_beam(call, fold
     assert after["budgets"][0]["margin_db"] - before == pytest.approx(expected, abs=1e-9)
 
 
+@pytest.mark.promise("report-7")
+@pytest.mark.promise("link-3")
 def test_a_link_that_does_not_close_is_exit_code_1_with_a_minus_sign(call, folder):
     result = call("budget", file_with(folder), "--data-rate", "1 Gbit/s")
     assert (result.code, result.err) == (1, "")
     assert said(result, "The links do not close").startswith("The links do not close: communication \u22122.23 dB,")
     for form in FORMS[1:]:
         assert call("budget", file_with(folder), "--data-rate", "1 Gbit/s", *form).code == 1
+
+
+@pytest.mark.promise("link-3")
+@pytest.mark.parametrize(("flags", "code"), [((), 1), (("--exit-on", "closes"), 0)])
+def test_links_that_close_may_be_asked_for_alone(call, folder, flags, code):
+    """The beacon covers its partner for 53 % of the satellites' times, and every margin is above 0 dB."""
+    path = file_with(folder, {"pointing.confidence": 0.99})
+    assert call("budget", path, *flags).code == code
+    assert call("budget", path, *flags, "--data-rate", "1 Gbit/s").code == 1
 
 
 @pytest.mark.parametrize("width", [80, 120, 160])
@@ -161,6 +176,7 @@ def test_a_solved_rate_ends_at_the_receivers_bandwidth(call, folder):
     assert found["budgets"][0]["margin_db"] > 3.0
 
 
+@pytest.mark.promise("link-2")
 def test_flags_may_be_given_together(call, folder):
     result = call("budget", file_with(folder), "--data-rate", "1 Gbit/s", "--pointing-error", "5 urad", "--json")
     assert json.loads(result.out)["budgets"][0]["margin_db"] == pytest.approx(3.0 - 5.2288 + 0.75 * 2.2301, abs=2e-3)
@@ -176,6 +192,7 @@ def finite(data, path=""):
     return [(path, data)] if isinstance(data, int | float) and not isinstance(data, bool) else []
 
 
+@pytest.mark.promise("link-1", "link-2")
 def test_json_is_one_document_of_finite_numbers_with_units_in_their_keys(call, folder):
     result = call(
         "budget", file_with(folder, JITTER, {"acquisition.scan": data_with({})["acquisition"]["scan"]}), "--json"
@@ -243,6 +260,7 @@ def rows(text):
     return list(csv.reader(io.StringIO(text)))
 
 
+@pytest.mark.promise("link-2")
 def test_csv_is_a_table_with_a_heading_and_one_line_a_row(call, folder):
     result = call("budget", file_with(folder), "--csv")
     heading, *body = rows(result.out)
@@ -254,6 +272,7 @@ def test_csv_is_a_table_with_a_heading_and_one_line_a_row(call, folder):
     assert "\u2212" not in "".join(row[2] for row in body)  # a spreadsheet reads a hyphen
 
 
+@pytest.mark.promise("readme-7")
 def test_csv_holds_the_same_numbers_as_the_json_to_the_last_digit(call, folder):
     path = file_with(folder)
     found = json.loads(call("budget", path, "--json").out)
@@ -292,6 +311,8 @@ def test_csv_has_no_formula_that_a_mission_brings_along(call, folder):
 
 
 # ---------------------------------------------------------------------------------------------------------------- HTML
+@pytest.mark.promise("readme-7", "report-12")
+@pytest.mark.promise("link-1", "link-2")
 def test_html_is_one_page_that_loads_nothing(call, folder):
     path = file_with(folder, JITTER, {"acquisition.scan": data_with({})["acquisition"]["scan"]})
     page = call("budget", path, "--html").out
@@ -315,6 +336,7 @@ def test_the_page_says_what_the_command_line_gave(call, folder):
 
 
 # ---------------------------------------------------------------------------------------------------------- other files
+@pytest.mark.promise("readme-7")
 @pytest.mark.parametrize(
     "changes",
     [
@@ -341,6 +363,7 @@ def test_every_kind_of_file_has_a_budget_in_every_form(call, folder, changes):
         assert not NO_NUMBER.search(re.sub(r"<svg.*?</svg>", "", without_scripts(result.out), flags=re.DOTALL))
 
 
+@pytest.mark.promise("readme-7")
 @pytest.mark.parametrize("name", RECEIVERS)
 def test_every_receiver_has_a_budget_in_every_form(call, folder, name):
     path = file_with(folder, BARE, received_with(name))
@@ -349,6 +372,8 @@ def test_every_receiver_has_a_budget_in_every_form(call, folder, name):
         assert (result.code in (0, 1), result.err) == (True, "")
 
 
+@pytest.mark.promise("readme-7")
+@pytest.mark.promise("link-1")
 def test_a_file_of_links_alone_has_no_more_than_they(call, folder):
     result = call("budget", file_with(folder, BARE))
     assert said(result, "The links close") == "The links close, and every requirement is met: communication +3.00 dB."
@@ -380,6 +405,7 @@ def test_an_input_that_a_receiver_does_not_take_leaves_no_infinite_swing(call, f
     assert "communication.data_rate takes the link beyond its receiver" in line
 
 
+@pytest.mark.promise("link-39")
 def test_jitter_is_said_with_its_outage(call, folder):
     line = said(call("budget", file_with(folder, JITTER), "--verbose"), "Under the jitter")
     assert re.fullmatch(
@@ -428,6 +454,7 @@ def test_a_flag_that_cannot_be_meant_is_refused_in_words(refused, folder, args, 
     assert words in refused("budget", file_with(folder), *args)
 
 
+@pytest.mark.promise("link-26")
 @pytest.mark.parametrize("name", ["preamplified dpsk", "counting ppm", "pin ook"])
 def test_a_rate_above_the_receivers_bandwidth_is_refused_with_the_most_it_takes(refused, folder, name):
     path = file_with(folder, received_with(name))
@@ -444,6 +471,7 @@ def test_a_rate_that_no_margin_leaves_is_refused_with_its_reason(refused, folder
     assert "200 dB" in message
 
 
+@pytest.mark.promise("link-3")
 def test_no_file_a_folder_and_a_faulty_file_are_refused_with_what_to_do(refused, folder):
     assert "does not exist" in refused("budget", "none.toml")
     assert "is a directory" in refused("budget", folder)
@@ -456,6 +484,9 @@ def test_no_file_a_folder_and_a_faulty_file_are_refused_with_what_to_do(refused,
 
 
 # ------------------------------------------------------------------------------------------------------------- presets
+@pytest.mark.promise("readme-5", "readme-7")
+@pytest.mark.promise("link-2")
+@pytest.mark.promise("readme-23")
 def test_presets_are_listed_with_what_is_missing_from_each(call, folder):
     result = call("presets")
     assert (result.code, result.err) == (0, "")
@@ -474,6 +505,8 @@ def test_presets_as_json_name_every_unknown_key(call):
     assert all(each["title"] for each in found)
 
 
+@pytest.mark.promise("gallery-17", "readme-5", "readme-7")
+@pytest.mark.promise("link-2", "link-55")
 @pytest.mark.parametrize("name", NAMES)
 def test_a_preset_is_written_and_its_budget_asks_for_each_unknown_key_once(call, folder, name):
     result = call("init", "--preset", name, f"{name}.toml")

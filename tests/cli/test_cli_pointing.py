@@ -4,12 +4,16 @@ import json
 import math
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import pytest
 
 import several_axes
+from link_files import FADING
+from microrad.cli.windows import indices_of_mission
 from microrad.loop.disturbance import olympus
 from microrad.loop.disturbance.windows import ErrorIndex, windowed_rms
+from microrad.report.fine_pointing import worst_case
 from places import ROOT
 from shipped import DEFAULT, without_fine_pointing
 
@@ -22,6 +26,8 @@ def document():
     return json.loads(ran.stdout)
 
 
+@pytest.mark.promise("pointing-34")
+@pytest.mark.promise("pointing-33")
 def test_sources_add_up_to_all_and_the_mean_and_the_rest_to_the_whole(document):
     whole, mean, left, drift = document["indices"]
     assert [each["index"] for each in document["indices"]] == ["APE", "MPE", "RPE", "PDE"]
@@ -39,6 +45,7 @@ def test_sources_add_up_to_all_and_the_mean_and_the_rest_to_the_whole(document):
     assert whole["left_rad"]["all"] < 0.02 * whole["without_the_loop_rad"]["all"]
 
 
+@pytest.mark.promise("pointing-34")
 def test_without_the_loop_the_vibration_is_olympus_in_both_axes(document):
     _, mean, _, drift = document["indices"]
     second = math.sqrt(2.0) * windowed_rms(olympus(), ErrorIndex("MPE", 1.0))
@@ -47,15 +54,29 @@ def test_without_the_loop_the_vibration_is_olympus_in_both_axes(document):
     assert drift["without_the_loop_rational_rad"] is None and (drift["window_s"], drift["spacing_s"]) == (1.0, 60.0)
 
 
-def test_the_tables_name_sources_windows_and_what_filters_make_of_them(call):
+@pytest.mark.promise("readme-5")
+@pytest.mark.promise("pointing-33", "pointing-34")
+@pytest.mark.promise("readme-23")
+def test_the_tables_name_sources_windows_and_what_filters_make_of_them(call, document):
     code, out, _ = call("pointing", DEFAULT)
     assert code == 0
     assert "Left by the loop under PI\n" in out and "Without the loop, by linear filters" in out
     for words in ("vibration", "(OLYMPUS)", "gauge noise", "MPE 1 s ", "RPE 10 ms "):
         assert words in out
     assert max(map(len, out.splitlines())) <= 80
+    options = ("--window", "1 ms", "--spacing", "1 min", "--controller", "LQG", "--json")
+    found = json.loads(call("pointing", DEFAULT, *options).out)
+    assert found["controller"] == "LQG"
+    assert found["indices"][0]["left_rad"]["all"] < document["indices"][0]["left_rad"]["all"]  # that of PI
+    assert [(each["index"], each["window_s"], each["spacing_s"]) for each in found["indices"]] == [
+        ("APE", None, None),
+        ("MPE", 0.001, None),
+        ("RPE", 0.001, None),
+        ("PDE", 0.001, 60.0),
+    ]
 
 
+@pytest.mark.promise("pointing-38")
 @pytest.mark.parametrize(
     ("options", "words"),
     [
@@ -71,6 +92,7 @@ def test_what_cannot_be_is_refused(refused, options, words):
     assert words in refused("pointing", DEFAULT, *options)
 
 
+@pytest.mark.promise("pointing-37")
 def test_runs_stand_beside_linear_theory_in_the_same_windows(call):
     """The printed hysteresis of the shipped mission adds more than all sensor noise: it shows in every index."""
     options = ("--window", "10 ms", "--spacing", "0.1 s", "--simulate", "16", "--json")
@@ -115,6 +137,7 @@ limit = "5 urad"
 """
 
 
+@pytest.mark.promise("pointing-33", "pointing-38")
 def test_windows_are_those_that_the_requirements_name_and_runs_leave_out_what_does_not_fit(call, tmp_path):
     mission = tmp_path / "m.toml"
     mission.write_text(DEFAULT.read_text("utf-8") + NAMED, "utf-8")
@@ -153,6 +176,8 @@ def coded(tmp_path):
     return write
 
 
+@pytest.mark.promise("link-4")
+@pytest.mark.promise("pointing-39")
 def test_a_code_word_averages_over_fades_that_are_shorter(call, coded):
     shares = []
     for word in ("0.4 ms", "50 ms"):
@@ -171,6 +196,48 @@ def test_a_code_word_averages_over_fades_that_are_shorter(call, coded):
     assert "code_words" not in json.loads(out)["simulated"]
 
 
+@pytest.mark.promise("pointing-110")
+def test_a_code_of_the_mission_has_its_error_ratio_under_the_simulated_errors(call, tmp_path):
+    table = FADING.replace('series = "fades.csv"\nunit = "linear"\nnormalised = "mean"\nsampling = "100 us"\n', "")
+    (tmp_path / "m.toml").write_text(DEFAULT.read_text("utf-8") + table, "utf-8")
+    code, out, _ = call("pointing", tmp_path / "m.toml", "--window", "10 ms", "--simulate", "2", "--json")
+    found = json.loads(out)["simulated"]["coded"]
+    assert (code, found["code"], found["target"], found["span_s"]) == (0, "ccsds-k7-1-2", 1e-6, 5e-3)
+    assert 0.0 <= found["ratio"]["low"] <= found["ratio"]["value"] <= found["ratio"]["high"] < 0.5
+    assert 0.0 < found["penalty_db"] < 10.0
+    table = table.replace('"5 ms"', '"5 s"')
+    (tmp_path / "m.toml").write_text(DEFAULT.read_text("utf-8") + table, "utf-8")
+    code, _, told = call("pointing", tmp_path / "m.toml", "--window", "10 ms", "--simulate", "2")
+    assert code == 2
+    assert "the interleaver spans 5 s, longer than a run, of which 1.5 s are left" in " ".join(told.split())
+
+
+@pytest.mark.promise("pointing-38", "pointing-41", "pointing-42")
+@pytest.mark.endurance
+def test_the_shipped_mission_leaves_in_its_runs_what_the_page_says(call, coded):
+    """Of 64 runs: rms with their intervals, and code words of three lengths; numbers of a simulated loop, to 2 %."""
+    options = ("--window", "10 ms", "--simulate", "64", "--json")
+    lost, time = [], []
+    for word in ("1 ms", "10 ms", "50 ms"):
+        _, out, _ = call("pointing", coded(word), *options)
+        found = json.loads(out)
+        document = found["simulated"]
+        lost.append(document["code_words"]["lost"])
+        time.append(document["code_words"]["time"]["value"])
+    assert [each["value"] for each in lost] == pytest.approx([0.114, 0.0288, 0.0005], rel=0.02, abs=6e-5)
+    assert (lost[1]["low"], lost[1]["high"]) == pytest.approx((0.0245, 0.0334), rel=0.02)
+    assert time == pytest.approx([0.14] * 3, abs=0.005)
+    apart = [
+        each["linear_rad"] / of_all_steps["left_rad"]["all"] - 1.0
+        for each, of_all_steps in zip(document["indices"], found["indices"], strict=True)
+    ]
+    assert max(map(abs, apart)) == pytest.approx(0.004, rel=0.2)
+    whole, mean, _ = document["indices"]
+    for each, figures in ((whole, (1.94, 0.012, 1.34)), (mean, (0.494, 0.007, 0.375))):
+        found = [1e6 * each[key] for key in ("simulated_rad", "interval_rad", "linear_rad")]
+        assert found == pytest.approx(figures, rel=0.02, abs=5e-4)
+
+
 def test_words_at_the_largest_data_rate_have_what_is_left_of_its_margin(call, coded):
     """Solved for 10 urad, so that less than the margin is left beyond that: the loop hardly ever is."""
     path = coded("10 ms", "3 dB")
@@ -185,6 +252,7 @@ def test_runs_of_a_mission_without_a_loop_are_refused(refused, tmp_path):
     assert "has no table [fine_pointing]: microrad init writes one" in refused("pointing", "m.toml", "--simulate", "2")
 
 
+@pytest.mark.promise("pointing-40")
 @pytest.mark.parametrize(
     ("word", "words"),
     [
@@ -226,6 +294,9 @@ def test_a_mirror_of_several_axes_has_windows_that_its_design_and_its_runs_agree
 IDENTIFIED = ROOT / "tests" / "corpus" / "0.2.0" / "mirrors" / "identified.toml"
 
 
+@pytest.mark.promise("readme-5")
+@pytest.mark.promise("pointing-63", "pointing-72")
+@pytest.mark.promise("readme-23")
 def test_the_worst_case_of_an_identified_mirror_is_printed_and_verified_in_time(call):
     code, out, _ = call("worst-case", DEFAULT, "--mirror", IDENTIFIED, "--window", "10 ms", "--json")
     found = json.loads(out)
@@ -241,9 +312,31 @@ def test_the_worst_case_of_an_identified_mirror_is_printed_and_verified_in_time(
     assert found["verified_in_time"]["agrees"] and found["verified_in_time"]["linear"] == "settles"
 
 
+@pytest.mark.promise("pointing-72")
 def test_a_worst_case_needs_a_mirror_of_which_something_is_known(refused):
     words = refused("worst-case", DEFAULT)
     assert (
         "has no table uncertainty, so nothing can be drawn; `microrad identify` writes one into its mirror file"
         in words
     )
+
+
+@pytest.mark.promise("pointing-72")
+@pytest.mark.parametrize(("draws", "corners", "code"), [(0, 0, 0), (1, 0, 1), (0, 1, 1)])
+def test_an_unstable_draw_or_corner_alone_ends_the_worst_case_with_1(call, monkeypatch, draws, corners, code):
+    found = SimpleNamespace(unstable_draws=draws, unstable_corners=corners)
+    monkeypatch.setattr("microrad.loop.worst_case.worst_case", lambda *args, **options: found)
+    monkeypatch.setattr(worst_case, "worst_case_data", lambda found: {})
+    assert call("worst-case", DEFAULT, "--mirror", IDENTIFIED, "--window", "10 ms", "--json").code == code
+
+
+def test_a_spacing_goes_before_the_windows_that_requirements_name(monkeypatch):
+    named = SimpleNamespace(index=ErrorIndex("RPE", 0.02))
+    monkeypatch.setattr("microrad.link.error_budget.assembly.requirement_of", lambda table: named)
+    table = SimpleNamespace(with_loop=True, requirements={"data": None})
+    assert [each.window_s for each in indices_of_mission(table, [], [])] == [None, 0.02]
+    found = indices_of_mission(table, [], [2.0])
+    assert [(each.kind, each.window_s, each.spacing_s) for each in found if each.kind == "PDE"] == [
+        ("PDE", 0.01, 2.0),
+        ("PDE", 1.0, 2.0),
+    ]

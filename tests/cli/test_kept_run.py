@@ -102,6 +102,7 @@ def manifest_of(call, output, *more):
     return json.loads((output / "manifest.json").read_text("utf-8"))
 
 
+@pytest.mark.promise("report-4", "report-14")
 @pytest.mark.parametrize("change", [rewrite, delete])
 def test_a_run_is_of_what_was_read(call, files, monkeypatch, change):
     run, meanwhile = study.run_study, []
@@ -134,6 +135,7 @@ def touched(folder):
     return {path: (path.read_bytes(), path.stat().st_mtime_ns) for path in folder.rglob("*") if path.is_file()}
 
 
+@pytest.mark.promise("report-1", "report-4", "report-5", "report-22")
 def test_a_fresh_run_and_reproduce_take_and_keep_nothing(call, files, monkeypatch):
     cache = files / "cache"
     first = manifest_of(call, files / "first")

@@ -69,6 +69,7 @@ def track(of, field, lanes=slice(None)):
     return of.lines("track")[field, lanes]
 
 
+@pytest.mark.promise("hysteresis-18", "pointing-25", "pointing-26")
 @pytest.mark.parametrize("gain", [0.8, 1.0])
 def test_it_is_its_twin(gain):
     case, lanes = loop_of(gain=gain, gauge_noise=2e-3), [0, 41]
@@ -91,6 +92,7 @@ def test_it_is_its_twin(gain):
     assert np.all(track(ours, kernels.IN_USE) == (gain != 1.0))
 
 
+@pytest.mark.promise("pointing-26")
 def test_a_frozen_inverse_that_fits_stays_as_it_is_to_the_last_bit():
     learns = run(loop_of(gain=1.0, width=1.0, gauge_noise=0.0), wave())
     assert_array_equal(learnt(learns, kernels.WEIGHT), np.array(WEIGHTS)[:, None] + np.zeros(LANES))
@@ -98,6 +100,7 @@ def test_a_frozen_inverse_that_fits_stays_as_it_is_to_the_last_bit():
     assert_array_equal(learns.lines("counts")[kernels.COUNT_FALLBACK], 0.0)
 
 
+@pytest.mark.promise("pointing-25")
 def test_plays_that_nothing_moves_keep_their_weights():
     small = 0.25 * wave()  # less than the largest threshold
     found = run(loop_of(), small)
@@ -105,6 +108,7 @@ def test_plays_that_nothing_moves_keep_their_weights():
     assert np.all(np.abs(learnt(found, kernels.LEARNT)[0] - WEIGHTS[0]) > 0.05)
 
 
+@pytest.mark.promise("pointing-25")
 def test_weights_move_no_faster_than_they_may():
     slow = LAW._replace(speed=1e-4)
     found = run(loop_of(slow), wave())
@@ -114,6 +118,7 @@ def test_weights_move_no_faster_than_they_may():
     assert moved[1] <= moved[0]
 
 
+@pytest.mark.promise("pointing-25")
 def test_readings_that_do_not_follow_teach_nothing_and_the_frozen_inverse_stays():
     stuck = loop_of()
     stuck = stuck._replace(loop=stuck.loop._replace(Dc=stuck.loop.Dc * (np.arange(3) != 1)))  # reads 0 all the time
@@ -122,6 +127,7 @@ def test_readings_that_do_not_follow_teach_nothing_and_the_frozen_inverse_stays(
     assert np.max(np.abs(learnt(found, kernels.LEARNT) - np.array(WEIGHTS)[:, None])) < 0.05
 
 
+@pytest.mark.promise("pointing-25")
 def test_a_mirror_that_is_its_old_self_again_is_a_fallback_and_counted():
     turned = loop_of(gain=0.7)
     reference = wave(2 * SAMPLES)
@@ -133,6 +139,7 @@ def test_a_mirror_that_is_its_old_self_again_is_a_fallback_and_counted():
     assert_allclose(learnt(later, kernels.WEIGHT), np.array(WEIGHTS)[:, None] + np.zeros(LANES), atol=0.02)
 
 
+@pytest.mark.promise("hysteresis-18", "pointing-25")
 @pytest.mark.parametrize("size", [1e3, 1e150])
 def test_no_reading_takes_weights_beyond_their_limits(size):
     case = loop_of()

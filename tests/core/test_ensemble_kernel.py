@@ -56,6 +56,9 @@ def gaussians(seed, first_run, purpose, first_block, blocks):
     return numbers.reshape(-1, LANES)
 
 
+@pytest.mark.promise("decisions-1")
+@pytest.mark.promise("sampled-loop-16")
+@pytest.mark.promise("pointing-10", "sampled-loop-16")
 @known_answers
 def test_philox_gives_the_known_answers(counter, key, answer):
     assert list(pointing.philox(counter, key)) == answer
@@ -395,6 +398,9 @@ ONE_AXIS = {
 }
 
 
+@pytest.mark.promise("decisions-1")
+@pytest.mark.promise("sampled-loop-3")
+@pytest.mark.promise("pointing-9", "sampled-loop-3")
 @pytest.mark.parametrize("shape", ONE_AXIS.values(), ids=ONE_AXIS.keys())
 def test_a_loop_around_any_mirror_is_its_twin(shape):
     rng = np.random.default_rng(3)
@@ -418,6 +424,7 @@ def test_axes_actuators_and_outputs_of_any_number(axes, actuators, outputs):
     assert ensemble.residual.shape == (40, axes, LANES)
 
 
+@pytest.mark.promise("readme-19")
 def test_all_runs_of_a_batch_are_their_twins():
     rng = np.random.default_rng(8)
     mirror = random_mirror(rng, 2, 2, bouc_wen=(PAPER, ASYMMETRIC), operators=(WIDENING, BENT))
@@ -587,6 +594,7 @@ COUNTED = {  # what a feature makes the kernel count
 }
 
 
+@pytest.mark.promise("pointing-9", "sampled-loop-15")
 @pytest.mark.parametrize("name", FEATURES)
 def test_a_loop_with_one_feature_is_its_twin_and_not_the_loop_without_it(name):
     case, without = FEATURES[name]
@@ -628,6 +636,9 @@ def test_an_error_on_the_edge_of_the_field_of_view_is_still_seen_and_the_first_r
         assert_array_equal(ensemble.lines("counts")[kernels.COUNT_LOST], 0 if seen else 3)
 
 
+@pytest.mark.promise("decisions-1")
+@pytest.mark.promise("sampled-loop-16")
+@pytest.mark.promise("pointing-10", "sampled-loop-16")
 def test_no_stream_has_two_uses():
     """The purposes of the sources, then those of the sensors' words, then what starts each source: one word in all."""
     assert 0 < kernels.SENSOR_PURPOSE < kernels.START_PURPOSE - 1000
@@ -701,6 +712,7 @@ def random_pointing(seed):
     )
 
 
+@pytest.mark.promise("sampled-loop-3")
 @pytest.mark.parametrize("seed", range(40))
 def test_a_loop_with_a_random_choice_of_everything_is_its_twin(seed):
     assert_is_its_twin(random_pointing(seed), (seed, 63 - seed), samples=30, first_run=1000 * seed)
@@ -760,6 +772,7 @@ def statistics_case():
     return case._replace(gauge_noise=0.01, drive_low=np.full(2, -1.0), drive_high=np.full(2, 1.0))
 
 
+@pytest.mark.promise("sampled-loop-15")
 def test_every_counter_is_its_twins():
     ensemble, _ = assert_is_its_twin(statistics_case(), range(0, LANES, 8))
     counted = np.any(ensemble.lines("counts") > 0, axis=1)
@@ -767,6 +780,7 @@ def test_every_counter_is_its_twins():
     assert len(ensemble.lines("counts")) == kernels.COUNT_FIELDS == len(pointing.Counts._fields)
 
 
+@pytest.mark.promise("pointing-98")
 def test_the_histogram_counts_the_radial_error_at_the_end_of_each_control_sample():
     from microrad.loop.pointing_loop.ensemble import bin_edges_rad  # the rest of this file needs the kernel alone
 
@@ -840,6 +854,7 @@ def test_a_run_in_several_calls_is_one_run_bit_for_bit(cuts):
         assert_array_equal(getattr(state, name), getattr(whole.state, name), err_msg=name)
 
 
+@pytest.mark.promise("readme-19")
 def test_a_run_does_not_depend_on_its_batch_bit_for_bit():
     case, samples, i = statistics_case(), 30, 41
     start, reference = make_start(case), make_reference(case, samples)

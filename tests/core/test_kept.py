@@ -76,6 +76,7 @@ def drafts(place):
 ONE = Inputs(2.0, "one")
 
 
+@pytest.mark.promise("report-4")
 def test_a_part_is_computed_once_and_again_for_what_it_reads(place):
     for inputs in (ONE, ONE, replace(ONE, label="other"), replace(ONE, limit=9.0)):
         found = Kept(place).part(samples, inputs, 3, on_progress=print)
@@ -143,6 +144,7 @@ def test_a_kept_part_does_not_end_a_run_with_values_that_have_no_digest(place):
     assert (CALLS, parts.trouble) == ([2.0, "?"], "")
 
 
+@pytest.mark.promise("decisions-1", "report-5")
 @pytest.mark.parametrize("spoil", ["cut", "empty", "flipped", "other"])
 def test_a_damaged_part_is_made_again_without_a_word(place, spoil, capfd):
     Kept(place).part(samples, ONE, 3)
@@ -160,6 +162,7 @@ def test_a_damaged_part_is_made_again_without_a_word(place, spoil, capfd):
         assert file.read_bytes() == content
 
 
+@pytest.mark.promise("report-4")
 @pytest.mark.parametrize("of", ["source_sha256", "machine", "versions"])
 def test_parts_of_other_code_libraries_or_machines_are_not_taken(place, monkeypatch, of):
     Kept(place).part(samples, ONE, 3)
@@ -179,6 +182,7 @@ def test_a_file_in_the_place_of_the_folder_is_told_once(place):
     assert place.read_text() == "not a folder"
 
 
+@pytest.mark.promise("report-5")
 @pytest.mark.skipif(sys.platform == "win32", reason="no such permissions")
 @pytest.mark.parametrize("mode", [0o777, 0o770, 0o707])
 def test_a_folder_into_which_others_may_write_is_not_used(place, mode):
@@ -212,6 +216,7 @@ def entered(monkeypatch):
     return but
 
 
+@pytest.mark.promise("report-5")
 @pytest.mark.skipif(sys.platform == "win32", reason="no such permissions")
 def test_a_folder_below_one_that_others_may_write_into_is_not_used(tmp_path, entered):
     shared = tmp_path / "shared"
@@ -246,6 +251,7 @@ def test_a_folder_behind_a_link_of_another_user_is_not_used(tmp_path, entered):
     assert f"{link} is another user's" in Kept(place).trouble
 
 
+@pytest.mark.promise("report-5")
 @pytest.mark.skipif(sys.platform == "win32", reason="no such permissions")
 def test_the_folders_that_are_made_are_private(tmp_path):
     Kept(tmp_path / "new" / "microrad" / "parts")
@@ -253,6 +259,7 @@ def test_the_folders_that_are_made_are_private(tmp_path):
     assert [each.stat().st_mode & 0o777 for each in made] == [0o700] * 3
 
 
+@pytest.mark.promise("report-5")
 def test_a_folder_that_cannot_be_written_is_told_once(place, monkeypatch):
     asked = []
     monkeypatch.setattr(os, "access", lambda path, mode: asked.append((path, mode)))
@@ -263,6 +270,7 @@ def test_a_folder_that_cannot_be_written_is_told_once(place, monkeypatch):
     assert (asked, CALLS, files(place)) == ([(place, os.W_OK | os.X_OK)], [2.0, 2.0], [])
 
 
+@pytest.mark.promise("report-5")
 @pytest.mark.skipif(sys.platform == "win32", reason="no such permissions")
 def test_parts_are_private(place):
     Kept(place).part(samples, ONE, 3)
@@ -282,6 +290,7 @@ def test_a_full_disk_ends_the_keeping_and_nothing_else(place, monkeypatch):
     assert not files(place)
 
 
+@pytest.mark.promise("report-5")
 def test_the_folder_stays_within_its_size(place):
     parts = Kept(place, most_bytes=40_000)
     for gain in range(6):
@@ -300,6 +309,7 @@ def test_only_the_latest_results_of_a_part_are_kept(place):
     assert len(files(place)) == kept.MOST_OF_A_PART
 
 
+@pytest.mark.promise("report-5")
 def test_many_at_once_do_no_harm(place):
     def run(number):
         parts = Kept(place)
@@ -329,6 +339,7 @@ print(repr(parts.trouble))
 """
 
 
+@pytest.mark.promise("report-5")
 def test_two_processes_at_once_do_no_harm(place):
     piped = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
     runs = [subprocess.Popen([sys.executable, "-c", AT_ONCE, place, step], **piped) for step in "25"]
@@ -363,6 +374,7 @@ def test_a_draft_of_another_run_is_left_alone_and_one_of_a_run_that_was_killed_g
     assert drafts(place) == sorted(others[1:])
 
 
+@pytest.mark.promise("report-5")
 @pytest.mark.parametrize("of", ["_latest_first", "_touch", "write_whole"])
 def test_a_folder_that_vanishes_meanwhile_ends_nothing(place, monkeypatch, of):
     """As another run makes room in it, or the user deletes it: each step finds the folder gone."""
@@ -423,6 +435,7 @@ def test_a_user_without_a_home_has_nothing_kept(monkeypatch):
     assert CALLS == [2.0, 2.0]
 
 
+@pytest.mark.promise("report-4", "report-5")
 def test_it_is_off_where_the_environment_says_so(monkeypatch, tmp_path):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     monkeypatch.setenv(kept.OFF, "no")

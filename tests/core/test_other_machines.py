@@ -1,6 +1,7 @@
 """The same digits behind the linear algebra of other processors: a reduced case, each side with nothing kept."""
 
 import os
+import re
 import subprocess
 import sys
 
@@ -23,9 +24,9 @@ for variant, of in sorted(found.simulated.items()):
 """
 
 
-def told(path, name, machine):
+def told(path, name, machine, **more):
     """What one controller of a mission is tuned to and leaves, each number to its last digit."""
-    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OPENBLAS_CORETYPE": machine}
+    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OPENBLAS_CORETYPE": machine, **more}
     ran = subprocess.run(
         [sys.executable, "-c", _CASE.format(path=str(path), name=name)],
         env=environment,
@@ -36,11 +37,61 @@ def told(path, name, machine):
     return ran.stdout
 
 
-@pytest.mark.parametrize("name", ["LQG", pytest.param("PI + notch", marks=pytest.mark.endurance)])
-def test_the_shipped_loop_is_tuned_and_simulated_to_the_same_digits_on_another_processor(name):
-    one, other = (told(SHIPPED, name, machine) for machine in ("Prescott", "Haswell"))
-    assert one == other
+@pytest.mark.promise("decisions-1", "sampled-loop-12")
+@pytest.mark.promise("pointing-13", "sampled-loop-12")
+@pytest.mark.parametrize(
+    ("name", "machines"),
+    [
+        ("LQG", ("Prescott", "Haswell")),
+        pytest.param("PI + notch", ("Prescott", "Haswell", "Zen"), marks=pytest.mark.endurance),
+    ],
+)
+def test_the_shipped_loop_is_tuned_and_simulated_to_the_same_digits_on_another_processor(name, machines):
+    one, *others = (told(SHIPPED, name, machine) for machine in machines)
+    assert all(other == one for other in others)
     assert one.count("rad") == 0 and one.count("\n") >= 4
+
+
+_SEVERAL_AXES = """
+from microrad.loop import coupled_study
+from several_axes import scene_of, three_actuators
+
+for each in coupled_study.design(scene_of(three_actuators()), only=("PI", "LQG")).made:
+    print(each.name, each.values)
+    print([f"{1e6 * rad:.3f} urad" for rad in each.residual_rad])
+    print(f"{each.margins.modulus:.3f}, {each.margins.disk.disk:.3f}")
+"""
+
+
+@pytest.mark.promise("pointing-81")
+@pytest.mark.endurance
+def test_a_loop_of_several_axes_is_tuned_to_the_same_values_on_another_processor():
+    path = os.pathsep.join(sys.path)
+    own = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": path}
+    one, other = (
+        subprocess.run(
+            [sys.executable, "-c", _SEVERAL_AXES],
+            env={**own, "OPENBLAS_CORETYPE": machine},
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+        for machine in ("Prescott", "Haswell")
+    )
+    assert one == other
+    assert one.count("urad") == 4
+
+
+@pytest.mark.promise("pointing-14")
+@pytest.mark.endurance
+def test_loops_without_fused_multiply_add_leave_the_same_to_the_tolerance_of_runs():
+    """Two steps of the sensor's converter over the root of 64 runs, as docs/report.md has it."""
+    numbers = re.compile(r"^(given|comparison|no hysteresis) ([0-9.e-]+)", re.MULTILINE)
+    plain = {"NUMBA_CPU_NAME": "x86-64-v2", "NUMBA_CPU_FEATURES": "+sse4.2,+avx,-fma"}
+    one, other = (numbers.findall(told(SHIPPED, "PI", "Prescott", **more)) for more in ({}, plain))
+    assert len(one) == 3 and [name for name, _ in one] == [name for name, _ in other]
+    for (_, own), (_, without) in zip(one, other, strict=True):
+        assert float(without) == pytest.approx(float(own), abs=6.8e-9, rel=0.0)
 
 
 def test_a_processor_without_vectors_is_named_by_what_it_has():

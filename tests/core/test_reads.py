@@ -76,6 +76,7 @@ WITH_C = replace(MISSION, sources={"a": Beam(3.0), "b": Beam(4.0), "c": Beam(1.0
 OTHER_SAMPLES = replace(MISSION, samples=np.array([0.0, 1.0, 2.0000000001]))
 
 
+@pytest.mark.promise("report-4")
 @pytest.mark.parametrize(
     ("function", "seen", "unseen"),
     [
@@ -142,6 +143,7 @@ def test_arguments_that_are_no_records_are_read_as_they_are_given():
     assert not reads.agree((1.0,))
 
 
+@pytest.mark.promise("report-4")
 @pytest.mark.parametrize(
     ("one", "other"),
     [

@@ -20,6 +20,7 @@ PART = re.compile(r"(?m)^## (\S+) \((unreleased|\d{4}-\d\d-\d\d)\)$")
 
 
 # --------------------------------------------------------------------------------------------------------- the version
+@pytest.mark.promise("releasing-1", "releasing-2")
 def test_the_version_is_that_of_the_first_part_and_a_dated_part_is_a_release():
     parts = PART.findall(CHANGELOG)
     assert len(parts) == CHANGELOG.count("\n## ")
@@ -31,10 +32,22 @@ def test_the_version_is_that_of_the_first_part_and_a_dated_part_is_a_release():
         RELEASE["stated"]("# Changelog\n")
 
 
+@pytest.mark.promise("releasing-1")
 def test_what_is_installed_has_that_version():
     assert metadata.version("microrad") == RELEASE["stated"](CHANGELOG), f"installed before: {advice()}"
 
 
+@pytest.mark.promise("releasing-1")
+def test_the_version_stands_nowhere_else():
+    described = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    assert "version" not in described["project"] and described["project"]["dynamic"] == ["version"]
+    assert described["tool"]["hatch"]["version"]["path"] == "CHANGELOG.md"
+    version = RELEASE["stated"](CHANGELOG)
+    files = [path for path in (ROOT / "src").rglob("*.py*") if path.suffix in (".py", ".pyi")]
+    assert [path for path in files if f'"{version}"' in path.read_text(encoding="utf-8")] == []
+
+
+@pytest.mark.promise("releasing-1", "releasing-2")
 def test_a_commit_is_tagged_with_its_version_and_no_other():
     fault = RELEASE["fault"]
     assert fault("0.2.0", ["0.2.0"]) == fault("0.3.0.dev0", []) == ""
@@ -45,6 +58,7 @@ def test_a_commit_is_tagged_with_its_version_and_no_other():
     )
 
 
+@pytest.mark.promise("releasing-2")
 def test_the_first_part_is_dated_once():
     text = "# Changelog\n\n## 0.3.0.dev0 (unreleased)\n\n- new\n\n## 0.2.0 (2026-11-26)\n"
     done = RELEASE["dated"](text, "2027-01-31")
@@ -53,6 +67,7 @@ def test_the_first_part_is_dated_once():
         RELEASE["dated"](done, "2027-02-01")
 
 
+@pytest.mark.promise("releasing-2")
 def test_a_released_version_is_not_that_of_later_commits():
     said = subprocess.run(
         ["git", "-C", ROOT, "tag", "--no-contains", "HEAD"], capture_output=True, text=True, check=False
@@ -91,6 +106,7 @@ def test_a_name_that_moved_is_where_the_changelog_says(was, now):
 
 
 # ---------------------------------------------------------------------------------------------------------- the bounds
+@pytest.mark.promise("releasing-2")
 def test_the_lowest_versions_are_those_of_pyproject():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     found = list(RELEASE["lowest"](project))
@@ -98,12 +114,71 @@ def test_the_lowest_versions_are_those_of_pyproject():
     assert {text.partition(">=")[0] for text in project["dependencies"]} < {each.partition("==")[0] for each in found}
 
 
+@pytest.mark.promise("releasing-2")
 def test_the_tests_of_the_bounds_are_there():
     assert all((ROOT / "tests" / each).exists() for each in RELEASE["TESTS"])
     assert all((ROOT / "tests" / each.partition("::")[0]).exists() for each in RELEASE["OF_THE_PINS"])
 
 
+@pytest.mark.promise("releasing-6")
+def test_no_lower_bound_is_below_what_is_known_not_to_do():
+    described = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    bounds = dict(text.split(">=") for text in described["dependencies"] if ">=" in text)
+    page = " ".join((ROOT / "docs" / "releasing.md").read_text(encoding="utf-8").split())
+    said = {"skyfield": re.search(r"They pass with skyfield ([\d.]+), which is the lower bound now", page)[1]}
+    said |= {name: re.search(rf"\b{name} before ([\d.]+\d)", page)[1] for name in ("typer", "markupsafe", "h5py")}
+    assert {name: bounds[name] for name in said} == said
+    refused = re.search(r"\bnumba ([\d.]+) \(refuses", page)[1]
+    assert [int(part) for part in bounds["numba"].split(".")] > [int(part) for part in refused.split(".")]
+
+
+@pytest.mark.promise("releasing-10")
+def test_the_newest_versions_are_tried_with_what_a_test_asks_of_hatchling(monkeypatch):
+    asked = []
+
+    def environment(python, folder, *wanted):
+        asked.extend(map(str, wanted))
+        return folder, {}
+
+    tested = RELEASE["tested"]
+    monkeypatch.setitem(tested.__globals__, "_environment", environment)
+    monkeypatch.setitem(tested.__globals__, "_run", lambda *words, **more: None)
+    tested("python")
+    assert [each.partition("==")[0] for each in asked].count("hatchling") == 1
+
+
+@pytest.mark.promise("releasing-4")
+def test_what_is_tried_of_an_archive_is_what_the_page_says():
+    page = " ".join((ROOT / "docs" / "releasing.md").read_text(encoding="utf-8").split())
+    said = re.search(r"An archive alone in an empty environment, .*?: (.*?) \(`scripts/release check`\)", page)[1]
+    programs = [words for words in RELEASE["TRIED"] if words[0] == "microrad"]
+    assert [words[1] for words in programs] == ["--version", "doctor", "init", "run"]
+    assert said.startswith(
+        "`microrad --version`, `doctor`, `init` and `run` of the shipped mission, and each public name"
+    )
+    assert [words[0] for words in RELEASE["TRIED"] if words not in programs] == ["python"]
+    assert "__init__.pyi" in RELEASE["PUBLIC"] and "getattr(microrad, name)" in RELEASE["PUBLIC"]
+
+
+@pytest.mark.promise("releasing-2")
+def test_a_freeze_dates_the_changelog_and_keeps_reference_and_corpus(tmp_path, monkeypatch):
+    (tmp_path / "CHANGELOG.md").write_text("# Changelog\n\n## 0.3.0.dev0 (unreleased)\n", encoding="utf-8")
+    (tmp_path / "reference" / "0.2.0").mkdir(parents=True)
+    (tmp_path / "reference" / "case.json").write_text("{}", encoding="utf-8")
+    (tmp_path / "pyproject.toml").write_bytes((ROOT / "pyproject.toml").read_bytes())
+    written, freeze = [], RELEASE["freeze"]
+    monkeypatch.setitem(freeze.__globals__, "ROOT", tmp_path)
+    monkeypatch.setitem(freeze.__globals__, "corpus", written.append)
+    freeze()
+    assert re.fullmatch(r"# Changelog\n\n## 0\.3\.0 \(\d{4}-\d\d-\d\d\)\n", (tmp_path / "CHANGELOG.md").read_text())
+    kept = sorted(path.relative_to(tmp_path).as_posix() for path in (tmp_path / "reference").rglob("*.json"))
+    assert kept == ["reference/0.3.0/case.json", "reference/case.json"]
+    assert not (tmp_path / "reference" / "0.2.0").exists()
+    assert written == [tmp_path / "tests" / "corpus" / "0.3.0"]
+
+
 # --------------------------------------------------------------------------------------------------------- the workflow
+@pytest.mark.promise("releasing-3", "releasing-5")
 def test_the_workflow_runs_the_gate_on_the_oldest_and_the_newest_python():
     text = (ROOT / ".github" / "workflows" / "ci.yml").read_text(encoding="utf-8")
     described = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -111,11 +186,20 @@ def test_the_workflow_runs_the_gate_on_the_oldest_and_the_newest_python():
     assert f'python: ["{pythons[0]}", "{pythons[-1]}"]\n' in text and "- run: bash .ci/run\n" in text
     assert described["requires-python"] == f">={pythons[0]},<3.{int(pythons[-1][2:]) + 1}"
     used = re.findall(r"uses: (.*)", text)
+    archives = text.partition("  archives:\n")[2]
+    assert archives.startswith("    if: github.ref_type == 'tag'\n    needs: gate\n")
+    steps = [each for each in re.findall(r"- run: (.*)", archives) if "release" in each]
+    assert steps == [
+        ".venv/bin/python scripts/release build",
+        f".venv/bin/python scripts/release check python{pythons[0]} python{pythons[-1]}",
+    ]
+    assert "twine" not in text and "pypi" not in text.lower()
     assert used and all(re.fullmatch(r"actions/[\w-]+@[0-9a-f]{40} # v[\d.]+", each) for each in used)
     assert "secrets" not in text and "contents: read\n" in text and "write" not in text
 
 
 # --------------------------------------------------------------------------------------------------------- the citation
+@pytest.mark.promise("releasing-1")
 def test_the_citation_names_what_the_project_is_and_no_version_that_would_age():
     text = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
     described = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -129,6 +213,7 @@ def test_the_citation_names_what_the_project_is_and_no_version_that_would_age():
 
 
 # --------------------------------------------------------------------------------------------------------- the archives
+@pytest.mark.promise("releasing-1")
 def test_every_file_of_the_package_is_in_the_source_archive(tmp_path):
     command = [sys.executable, "-m", "hatchling", "build", "--target", "sdist", "--directory", tmp_path]
     subprocess.run(command, cwd=ROOT, check=True, capture_output=True)

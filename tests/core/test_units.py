@@ -44,6 +44,7 @@ def test_constants_are_those_of_the_si():
     assert h.si.value == PLANCK_J_S
 
 
+@pytest.mark.promise("mirror-file-3")
 @pytest.mark.parametrize(("prefix", "symbol"), SYMBOLS)
 def test_every_symbol_agrees_with_astropy(prefix, symbol):
     ours = parse_quantity(f"2.5 {prefix}{symbol}", SI[symbol])
@@ -70,6 +71,7 @@ def test_numbers_pass_through(number, compound):
     assert parse_quantity(f"{number} {text}", unit) == pytest.approx(expected, rel=1e-13, abs=0.0)
 
 
+@pytest.mark.promise("mirror-file-3")
 @pytest.mark.parametrize(
     ("text", "unit", "value"),
     [
@@ -93,6 +95,8 @@ def test_what_is_read(text, unit, value):
     assert parse_quantity(text, unit) == value
 
 
+@pytest.mark.promise("mirror-file-3")
+@pytest.mark.promise("decisions-1")
 @pytest.mark.parametrize(
     ("text", "unit", "reason", "advice"),
     [

@@ -33,7 +33,11 @@ def of(name):
     return found
 
 
+@pytest.mark.promise("readme-5", "readme-13", "readme-14")
+@pytest.mark.promise("export-2", "export-5")
 @pytest.mark.skipif(build.compiler() is None, reason="no C compiler")
+@pytest.mark.promise("readme-23")
+@pytest.mark.promise("readme-25")
 def test_flight_code_goes_from_the_mission_to_a_compiled_run(mission, call):
     (command,) = of("microrad export c")
     assert f"    {' '.join(command)}" in README
@@ -49,6 +53,9 @@ def test_flight_code_goes_from_the_mission_to_a_compiled_run(mission, call):
     assert json.loads((folder / "manifest.json").read_text())["samples"] == 5000
 
 
+@pytest.mark.promise("readme-13")
+@pytest.mark.promise("export-28")
+@pytest.mark.promise("readme-25")
 def test_units_are_written(mission, call):
     for command in of("microrad export fmu"):
         done = call(*command[1:])
@@ -56,6 +63,7 @@ def test_units_are_written(mission, call):
     assert {path.suffix for path in mission.iterdir()} == {".toml", ".fmu"}
 
 
+@pytest.mark.promise("export-33", "export-35", "export-36")
 def test_matrices_go_out_and_a_mirror_comes_in(mission, call, capsys):
     (out,), (into,) = of("microrad export matrices"), of("microrad import")
     for command in (out, into):

@@ -56,6 +56,7 @@ def learning(resolution_v=0.0, learns=True, samples=SAMPLES, **changes):
     return choice.flight_controller(chosen), choice.vectors(chosen, samples)
 
 
+@pytest.mark.promise("export-18", "export-19")
 def test_it_is_the_kernel_while_it_learns(tmp_path):
     of, vectors = learning()
     assert [each.name for each in of.inputs] == ["optical_error_rad", "gauge_rad", "reference_rad"]
@@ -112,6 +113,7 @@ def test_the_run_in_double_is_the_kernels():
     assert 0.0 < np.max(np.abs(found - vectors.commands)) < EXACT * np.max(np.abs(vectors.commands))
 
 
+@pytest.mark.promise("export-18", "export-19")
 def test_single_precision_stays_within_its_bound_while_it_learns(tmp_path):
     of, vectors, bound = bounded()
     code, found = stray(tmp_path, of, vectors, bound)
@@ -160,6 +162,7 @@ def test_the_bound_is_that_of_every_sample(tmp_path):
     assert np.max(off[2000:]) > 2.0 * np.max(off[:500])  # it adds up what it learns from
 
 
+@pytest.mark.promise("export-19")
 def test_roundings_are_as_large_as_they_can_be_and_up_as_often_as_down():
     rounded = learning_run.Roundings(UNIT, 64)
     x = np.full((4000, 64), 3.0)
@@ -182,6 +185,8 @@ def whole():
     return of, c_code.within_limits(of, vectors), quantised(of, sections(of), vectors)
 
 
+@pytest.mark.promise("export-18", "export-20")
+@pytest.mark.promise("export-14")
 def test_in_fixed_point_it_stays_within_its_report(tmp_path):
     of, vectors, fixed = whole()
     r = fixed.report
@@ -226,6 +231,7 @@ def test_no_readings_take_it_beyond_its_limits_in_fixed_point(tmp_path):
 # ------------------------------------------------------------------------------------------------ garbage and upsets
 
 
+@pytest.mark.promise("export-18")
 @pytest.mark.parametrize("precision", ["double", "single"])
 def test_garbage_does_not_take_it_beyond_its_limits_nor_what_it_learns(precision, tmp_path):
     of, vectors = learning(0.305e-3)
@@ -243,6 +249,7 @@ NUMBERS = {
 }
 
 
+@pytest.mark.promise("export-18")
 @pytest.mark.parametrize(("precision", "number"), [(each, x) for each, numbers in NUMBERS.items() for x in numbers])
 def test_whatever_an_upset_leaves_in_what_it_learns_commands_stay_within_the_limits(precision, number, tmp_path):
     of, vectors = learning()
@@ -273,6 +280,7 @@ def with_cycle(settings, samples):
     return found
 
 
+@pytest.mark.promise("export-20")
 def test_in_fixed_point_it_costs_what_learns_beside():
     of, _, fixed = whole()
     (frozen, vectors) = learning(0.305e-3, learns=False, samples=3000)
@@ -283,6 +291,7 @@ def test_in_fixed_point_it_costs_what_learns_beside():
     assert found.single.divisions == without.single.divisions + more == without.single.divisions + 2
 
 
+@pytest.mark.promise("export-18")
 def test_the_header_says_what_learns():
     of, _ = learning()
     files = c_code.flight_code(of, sections(of), "flown", "double")

@@ -85,6 +85,7 @@ def test_a_compiler_that_is_not_there_is_refused(monkeypatch: pytest.MonkeyPatch
 
 
 # ----------------------------------------------------------------------------------------------------- the results
+@pytest.mark.promise("export-22")
 @needs_compiler
 def test_the_bench_s_lines_become_a_record(tmp_path: Path) -> None:
     assert build.compile_and_run(written(tmp_path), "gain", passes=11) == EXPECTED

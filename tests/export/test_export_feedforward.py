@@ -74,6 +74,7 @@ def flown(bank, samples=1500):
 
 
 # ---------------------------------------------------------------------------------------------------- the same numbers
+@pytest.mark.promise("export-16")
 @each_bank
 def test_double_precision_is_the_kernel(bank, tmp_path):
     of, vectors = flown(bank)
@@ -86,6 +87,7 @@ def test_double_precision_is_the_kernel(bank, tmp_path):
     assert np.abs(vectors.commands).max() > 5.0
 
 
+@pytest.mark.promise("export-16")
 @pytest.mark.parametrize("samples", [20_000, pytest.param(100_000, marks=pytest.mark.endurance)])
 def test_it_is_the_kernel_over_many_samples(samples, tmp_path):
     of, vectors = flown("plays and a polynomial", samples)
@@ -104,6 +106,7 @@ def test_the_run_in_double_is_the_kernels(bank):
     assert_allclose(commands, vectors.commands, rtol=0, atol=1e-9 * np.abs(vectors.commands).max())
 
 
+@pytest.mark.promise("export-16")
 @each_bank
 def test_single_precision_stays_within_its_bound(bank, tmp_path):
     of, vectors = flown(bank)
@@ -113,7 +116,7 @@ def test_single_precision_stays_within_its_bound(bank, tmp_path):
     off, _ = difference(code, vectors)
     found = off * np.max(np.abs(vectors.commands))
     print(f"{bank}: {found:.3g} V, bound {bound.command_v:.3g} V")
-    assert 1e-8 < found <= bound.command_v < 5e-2
+    assert 1e-8 < found <= bound.command_v < 1e-3
     ahead = errors_before_converter(of, form, vectors)
     assert np.all(np.abs(code.replay(vectors.inputs) - vectors.commands) <= ahead + 1e-5)
 
@@ -175,6 +178,7 @@ def test_it_costs_what_is_stated(bank, tmp_path):
 
 
 # ---------------------------------------------------------------------------------------------------- what is written
+@pytest.mark.promise("export-4")
 def test_it_is_written_with_its_report(tmp_path):
     found = export_flight(base(), tmp_path / "out", samples=500)
     assert found.bench.faults == 0
@@ -187,6 +191,7 @@ def test_it_is_written_with_its_report(tmp_path):
 
 
 # -------------------------------------------------------------------------------------------------------- fixed point
+@pytest.mark.promise("export-14", "export-16")
 def test_in_fixed_point_it_stays_within_its_report(tmp_path):
     """The linear part in whole numbers, hysteresis in single precision."""
     of, vectors = flown("all that there is")
@@ -202,7 +207,7 @@ def test_in_fixed_point_it_stays_within_its_report(tmp_path):
     done = subprocess.run(words, check=True, capture_output=True, text=True, timeout=HANG_S)
     numbers = {line.split()[0]: float(line.split()[1]) for line in done.stdout.splitlines()}
     print(f"{numbers['largest_difference_v']:.3g} V, bound {r.bound_v:.3g} V")
-    assert 0.0 < numbers["largest_difference_v"] <= r.bound_v < 1e-3
+    assert 0.0 < numbers["largest_difference_v"] <= r.bound_v < 1e-4
     assert numbers["rate_clamped"] == vectors.rate_clamped
     assert numbers["overflowed"] == numbers["faults"] == 0
     assert "The feedforward, in single precision, adds up to" in fixed.quantisation_text(made)

@@ -205,6 +205,7 @@ def held_extremes(rng, samples, width):
 needs_compiler = pytest.mark.skipif(not COMPILERS, reason="no gcc or clang here")
 
 
+@pytest.mark.promise("export-14")
 @needs_compiler
 @pytest.mark.parametrize("name", ONE_OF_EACH)
 def test_the_compiled_code_equals_the_twin_to_the_last_bit(name, tmp_path):
@@ -245,6 +246,7 @@ def test_a_step_without_an_inverse_equals_the_twin_and_stays_within_the_limits(b
     assert np.min(commands) < of.minimum_v + of.resolution_v
 
 
+@pytest.mark.promise("export-6")
 @needs_compiler
 @pytest.mark.parametrize("name", ["PI + inverse in series", "PID + inverse"])
 def test_a_step_with_an_inverse_stays_within_the_limits_for_any_readings(name, tmp_path):
@@ -263,6 +265,7 @@ def test_a_step_with_an_inverse_stays_within_the_limits_for_any_readings(name, t
     assert np.max(commands) > of.maximum_v - of.resolution_v
 
 
+@pytest.mark.promise("export-14")
 @needs_compiler
 @pytest.mark.parametrize("name", ONE_OF_EACH)
 def test_the_bench_holds_the_recorded_run(name, tmp_path):
@@ -292,6 +295,8 @@ def test_the_bench_holds_the_recorded_run(name, tmp_path):
 
 
 # ----------------------------------------------------------------------------------------------------------- the report
+@pytest.mark.promise("readme-14")
+@pytest.mark.promise("export-17")
 @pytest.mark.parametrize("name", SHIPPED)
 def test_the_report_is_true(name):
     of, form, v = shipped(name)
@@ -318,6 +323,7 @@ def test_the_report_is_true(name):
     assert r.samples == len(v.inputs)
 
 
+@pytest.mark.promise("export-17")
 @pytest.mark.parametrize("name", SHIPPED)
 def test_the_poles_and_the_response_are_those_of_the_coefficients(name):
     of, form, _ = shipped(name)
@@ -365,6 +371,7 @@ def test_a_row_that_rounds_up_beyond_a_word_takes_a_coarser_scale():
     assert rows.value.tolist() == [[32, 32], [63, 64]]
 
 
+@pytest.mark.promise("export-17")
 def test_the_text_of_the_report_has_units():
     text = quantisation_text(form_of("PI + inverse"))
     units = ("rad/s", " rad ", " Hz", " dB", " bits", " V  ")
@@ -445,6 +452,7 @@ def test_a_resting_signal_is_scaled_by_its_limit_and_its_states_by_what_it_can_d
     assert "at rest" in quantisation_text(fixed)
 
 
+@pytest.mark.promise("export-13")
 @needs_compiler
 @pytest.mark.parametrize(("limit", "counts"), [(1.0, 100), (0.9999, 99), (0.994, 99), (1.0 - 1e-12, 100)])
 def test_counts_stay_within_limits_that_are_no_multiples_of_the_resolution(limit, counts):
@@ -478,6 +486,7 @@ def test_a_controller_without_states_is_a_gain(tmp_path):
     assert np.max(np.abs(found)) > 100
 
 
+@pytest.mark.promise("export-9")
 def test_the_anti_windup_holds_the_state_at_the_limit():
     of = one_axis([[1.0]], [[300.0]], [[1.0]], [[3000.0]], limit_v=1.0, windup=0.09)
     inputs = np.full((400, 1), 8e-4)
@@ -499,6 +508,7 @@ def test_other_words_are_refused(bits):
         made(slow_design(0.99), noise(), bits)
 
 
+@pytest.mark.promise("export-17")
 def test_poles_that_reach_the_circle_are_refused():
     of = slow_design(1.0 - 1e-9)
     with pytest.raises(ExportError) as told:
@@ -511,6 +521,7 @@ def test_poles_that_reach_the_circle_are_refused():
     assert after.real < 1.0
 
 
+@pytest.mark.promise("export-17")
 def test_commands_that_stray_by_more_than_a_count_are_refused_unless_said():
     of = slow_design(0.999, resolution_v=1e-5)
     with pytest.raises(ExportError) as told:
@@ -523,6 +534,7 @@ def test_commands_that_stray_by_more_than_a_count_are_refused_unless_said():
     assert made(of, noise(), 32).report.error_v < 0.01 * of.resolution_v
 
 
+@pytest.mark.promise("export-17")
 def test_numbers_that_do_not_fit_are_refused():
     of = one_axis([[0.9]], [[1.0]], [[1.0]], [[1.0]], resolution_v=1e-30)
     with pytest.raises(ExportError, match=r"'a design' does not fit into words of 32 bits.*single precision"):
@@ -543,6 +555,7 @@ def test_names_are_identifiers():
     }
 
 
+@pytest.mark.promise("export-17")
 def test_the_report_measures_the_swing_of_a_rest():
     """A coarse oscillation keeps swinging at rest, by no more than the report says is possible."""
     z = 0.9995 * np.exp(0.5j)

@@ -182,7 +182,10 @@ CHECKED += [
 """All that a mirror may have, a loop, and a mirror of several axes; the rest is made of the same parts."""
 
 
+@pytest.mark.promise("readme-13")
+@pytest.mark.promise("export-1", "export-28")
 @pytest.mark.parametrize(("name", "version"), CHECKED)
+@pytest.mark.promise("readme-25")
 def test_fmpy_finds_no_fault(archive, name, version):
     path = archive(name, version)
     assert validate_fmu(str(path)) == []
@@ -199,6 +202,7 @@ def test_fmpy_finds_no_fault(archive, name, version):
     assert units[f"mirror_{output}"] == output and units["amplifier_slew_v_s"] == "V/s" and units["drive_v"] == "V"
 
 
+@pytest.mark.promise("export-28")
 def test_vectors_are_arrays_in_3_0_and_their_elements_variables_in_2_0(archive):
     two, three = (fmpy.read_model_description(archive("rich", version)) for version in VERSIONS)
     shapes = {v.name: v.shape for v in three.modelVariables}
@@ -246,6 +250,7 @@ def test_fmpy_notices_a_fault(archive, tmp_path):
     assert any("Outputs" in problem for problem in validate_fmu(str(tmp_path)))
 
 
+@pytest.mark.promise("export-30")
 @pytest.mark.parametrize("version", VERSIONS)
 def test_the_start_values_are_those_of_the_design(archive, version):
     description = fmpy.read_model_description(archive("rich", version))
@@ -267,6 +272,7 @@ def test_the_start_values_are_those_of_the_design(archive, version):
     assert start["plant_step_s"] == 2e-5
 
 
+@pytest.mark.promise("export-28")
 @pytest.mark.parametrize("version", VERSIONS)
 def test_it_holds_its_sources_and_licence(archive, version):
     with zipfile.ZipFile(archive("loop", version)) as opened:
@@ -282,6 +288,7 @@ def test_it_holds_its_sources_and_licence(archive, version):
     assert not [each for each in names if "bench" in each or "Makefile" in each]
 
 
+@pytest.mark.promise("export-29")
 @pytest.mark.parametrize("version", VERSIONS)
 def test_the_error_of_a_loop_depends_at_once_on_reference_and_disturbance_and_its_command_on_nothing(archive, version):
     description = fmpy.read_model_description(archive("loop", version))
@@ -337,6 +344,7 @@ def sine(freq_hz):
     return simulate.track(c.name, c.mirror, c.setup, c.inverse, reference, steady)
 
 
+@pytest.mark.promise("export-29")
 @pytest.mark.parametrize(
     ("version", "freq_hz"), [("2.0", 25.0), pytest.param("3.0", 15.0, marks=pytest.mark.endurance)]
 )
@@ -362,6 +370,7 @@ def test_the_mirror_follows_the_kernel_over_figure_8(slave, version, freq_hz):
     one.unit.terminate()
 
 
+@pytest.mark.promise("export-29")
 @pytest.mark.parametrize(("version", "freq_hz"), [("3.0", 25.0), ("2.0", 15.0)])
 def test_the_closed_loop_follows_the_kernel_over_figure_8(slave, version, freq_hz):
     trace, timing = sine(freq_hz), tracking().setup.timing
@@ -384,6 +393,7 @@ def test_the_closed_loop_follows_the_kernel_over_figure_8(slave, version, freq_h
     assert one.get("time")[0] == pytest.approx(samples * timing.period_s)
 
 
+@pytest.mark.promise("export-28")
 @pytest.mark.parametrize("version", VERSIONS)
 def test_fmpys_own_simulation_runs_the_loop(archive, version):
     """The high-level call that users make, with a reference as an array over time."""
@@ -445,6 +455,7 @@ POINTING = {
 }
 
 
+@pytest.mark.promise("export-18", "export-21")
 @pytest.mark.parametrize(
     ("name", "version"),
     [
@@ -507,6 +518,7 @@ def test_the_loop_follows_the_kernel_in_the_jitter(tmp_path, name, version):
     one.unit.terminate()
 
 
+@pytest.mark.promise("export-29")
 @pytest.mark.parametrize("version", [AGAIN["2.0"], "3.0"])
 def test_a_long_communication_step_holds_its_inputs(slave, version):
     unit = UNITS["pointing"]()
@@ -605,6 +617,7 @@ def spring_by_kernel(unit, of, commands, steps):
     return output[steps - 1 :: steps], u
 
 
+@pytest.mark.promise("export-32")
 def test_a_spring_of_several_axes_follows_the_kernel(slave):
     """Hysteresis in the stiffness with a polynomial beside its plays, beyond whose reach the walk goes."""
     unit, own = UNITS["spring"](), spring().mirror
@@ -631,6 +644,7 @@ def test_each_parameter_has_a_place_of_its_own_that_holds_its_start_value(slave,
     assert any(name.startswith("prandtl_ishlinskii[2].weight") for name in held)
 
 
+@pytest.mark.promise("export-30")
 @pytest.mark.parametrize("version", VERSIONS)
 def test_a_parameter_acts_when_it_is_set_before_the_begin(slave, version):
     models = everything().bouc_wen
@@ -645,6 +659,7 @@ def test_a_parameter_acts_when_it_is_set_before_the_begin(slave, version):
 
 
 # ------------------------------------------------------------------------------------------------- state and life cycle
+@pytest.mark.promise("export-31")
 @pytest.mark.parametrize("version", VERSIONS)
 def test_a_state_comes_back(slave, version):
     """Within an instance, as bytes into another one, and to the begin with its parameters by a reset."""
@@ -673,6 +688,7 @@ def test_a_state_comes_back(slave, version):
     assert np.max(np.abs(again - begun)) > 0.0
 
 
+@pytest.mark.promise("export-31")
 @pytest.mark.parametrize(("name", "version"), [("pointing", "2.0"), ("coupled", "3.0")])
 def test_a_killed_process_is_continued_by_another_to_the_last_bit(archive, tmp_path, name, version):
     path, saved = archive(name, version), tmp_path / "state"
@@ -713,6 +729,7 @@ def test_two_instances_do_not_know_each_other(slave, version):
     assert_follows([b for _, b in found], rich_by_kernel(-0.5 * commands)[0])
 
 
+@pytest.mark.promise("export-30")
 @pytest.mark.parametrize("version", VERSIONS)
 @pytest.mark.parametrize("steps", [0.5, 2.00001, 0.0, -1.0, np.nan, np.inf])
 def test_a_part_of_a_plant_step_is_refused(slave, version, steps):
@@ -726,6 +743,7 @@ def test_a_part_of_a_plant_step_is_refused(slave, version, steps):
     np.testing.assert_array_equal(driven(one, commands, unit.plant.step_s), driven(other, commands, unit.plant.step_s))
 
 
+@pytest.mark.promise("export-30")
 @pytest.mark.parametrize("version", VERSIONS)
 def test_a_step_is_whole_up_to_rounding(slave, version):
     """What differences of times leave is no part of a step, also late in a simulation."""
@@ -768,6 +786,25 @@ def test_an_impossible_parameter_is_refused(slave, version, name, value, wanted)
     assert one.said[-1] == f"parameter {name} is {value:g}: it has to be {wanted}"
 
 
+@pytest.mark.promise("export-30")
+def test_parameters_of_a_closed_loop_are_the_mirrors_and_its_inverse_stays(slave):
+    """The first command is made before the mirror has moved: by the inverse that was designed."""
+    name = "bouc_wen[1].d1_rad_v"
+    designed = slave("loop", "3.0")
+    changed = slave("loop", "3.0", **{name: 1.5 * designed.get(name)[0]})
+    period_s, commands, moved = tracking().setup.timing.period_s, [], []
+    for one in (designed, changed):
+        one.set("reference_rad", [1e-4])
+        one.step(period_s)
+        commands.append(one.get("command_v")[0])
+        for _ in range(20):
+            one.step(period_s)
+        moved.append(one.get("mirror_rad")[0])
+    assert commands[0] == commands[1] != one.get("bias_v")[0]
+    assert abs(moved[1] / moved[0] - 1.0) > 0.01
+
+
+@pytest.mark.promise("export-30")
 @pytest.mark.parametrize("version", VERSIONS)
 def test_what_cannot_be_set_is_refused(slave, version):
     one = slave("rich", version)
@@ -872,6 +909,7 @@ def test_it_runs_where_there_is_no_microrad(archive, tmp_path):
     assert_follows(found["line_of_sight_rad"], trace.output_rad[: samples + 1, 0])
 
 
+@pytest.mark.promise("export-28")
 def test_without_a_compiler_it_holds_sources_alone(tmp_path, monkeypatch):
     monkeypatch.setattr(fmu, "compiler", lambda: None)
     made = fmu.write_unit(UNITS["mirror"](), tmp_path / "bare.fmu", "3.0", "bare")

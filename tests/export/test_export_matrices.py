@@ -137,6 +137,7 @@ def rounding(system, freq_hz, period_s):
 
 
 # ---------------------------------------------------------------------------------------------------------- the models
+@pytest.mark.promise("export-33")
 def test_mirror_and_its_linear_part_are_those_of_the_mission(file):
     part, whole = matrices.models(choice.source(file))
     m = file.mission.mirror
@@ -154,6 +155,7 @@ def test_mirror_and_its_linear_part_are_those_of_the_mission(file):
     assert f"{size:.6g}" in part.meaning and "6 V" in whole.meaning
 
 
+@pytest.mark.promise("export-33")
 def test_sampled_plant_of_the_tracking_loop_is_that_of_the_study_with_no_state_too_many(tracking):
     m, setup = of(tracking, SAMPLED_PLANT), tracking.setup
     whole = control.sampled_plant(tracking.mirror, setup.drive, setup.timing)
@@ -215,6 +217,7 @@ def test_one_controller_without_an_inverse_has_commands_alone(gauged):
     assert "inverse" not in m.meaning
 
 
+@pytest.mark.promise("export-21")
 def test_one_that_learns_has_the_errors_of_its_readings_beside_its_targets(learning):
     m, flies = of(learning, CONTROLLER), choice.flight_controller(learning)
     assert all(np.array_equal(getattr(m.system, key), getattr(flies.system, key)) for key in "ABCD")
@@ -231,6 +234,7 @@ def test_target_by_difference_has_no_rate(tracking):
     assert [p.name for p in of(tracking, CONTROLLER).outputs] == ["command_v_0", "target_rad_0"]
 
 
+@pytest.mark.promise("export-21", "export-33")
 @pytest.mark.parametrize("which", ["tracking", "pointing", "gauged", "learning"])
 def test_python_control_has_the_response_of_the_loop(which, request):
     """The exported object against the loop that margins are taken of, and against our own evaluation."""
@@ -262,6 +266,7 @@ def test_static_mirror_has_no_linear_part(tmp_path):
     assert matrices.to_control(m)(0.0) == m.system.D.item()
 
 
+@pytest.mark.promise("export-33")
 def test_a_chosen_controller_brings_its_plant_and_its_loop(file, tracking):
     assert [each.name for each in models(file)] == ["linear_part", "mirror"]
     names = ["linear_part", "mirror", "sampled_plant", "controller", "loop"]
@@ -286,6 +291,7 @@ def answer_of_plate(own, gains, freq_hz):
     return np.array(found)
 
 
+@pytest.mark.promise("export-34")
 def test_a_mirror_of_several_axes_goes_out_at_its_slow_gain_and_as_it_is_about_rest(plate):
     own, freq = plate.scene.mirror.mirror, np.geomspace(1.0, 1e4, 60)
     slow, rest = of(plate, MIRROR), of(plate, MIRROR_AT_REST)
@@ -301,6 +307,7 @@ def test_a_mirror_of_several_axes_goes_out_at_its_slow_gain_and_as_it_is_about_r
     ]
 
 
+@pytest.mark.promise("export-34")
 def test_sampled_plant_of_several_axes_is_what_their_controller_was_designed_for(plate):
     m, designed = of(plate, SAMPLED_PLANT), coupled_study.plants(plate.scene)[0]
     freq = grid(m.period_s)
@@ -316,6 +323,7 @@ def test_sampled_plant_of_several_axes_is_what_their_controller_was_designed_for
     assert "a mode that no output shows" in forms(m).zero_pole_gain  # the piston of the plate
 
 
+@pytest.mark.promise("export-34")
 def test_loop_of_several_axes_is_controller_and_plant_and_keeps_its_margin(plate):
     loop, plant, controller = (of(plate, name) for name in (LOOP, SAMPLED_PLANT, CONTROLLER))
     freq = grid(loop.period_s)
@@ -391,6 +399,7 @@ def test_eq_2_in_coefficients_costs_every_digit_of_a_state_space(file):
     assert tf.denominator == pytest.approx(file.mission.mirror.linear.denominator, rel=1e-10)
 
 
+@pytest.mark.promise("export-33")
 def test_error_of_the_coefficients_is_the_one_they_have(tracking):
     """The sampled loop in powers of z: slow poles near 1 cost digits, and how many is said."""
     m = of(tracking, LOOP)
@@ -495,6 +504,7 @@ def test_mat_reads_back_to_the_last_bit(written):
         same(m, back[m.name].fields)
 
 
+@pytest.mark.promise("export-1", "export-33")
 def test_scipy_reads_the_same_numbers(written):
     found, path = written
     variables = loadmat(path, struct_as_record=True)
@@ -508,6 +518,7 @@ def test_scipy_reads_the_same_numbers(written):
         assert record["MissionSha256"].item() == m.origin.mission_sha256
 
 
+@pytest.mark.promise("export-33")
 def test_scipy_reads_zeros_poles_and_coefficients(written):
     found, path = written
     variables = loadmat(path)
@@ -523,6 +534,7 @@ def test_scipy_reads_zeros_poles_and_coefficients(written):
     assert np.array_equal(record["num"][0, 1][0], transfer_function(several, 0, 1).numerator)
 
 
+@pytest.mark.promise("export-33")
 def test_a_form_that_is_refused_is_missing_with_its_reason(tmp_path):
     matrices.write_mat([model(np.diag([-1.0, -2.0]), [[1], [0]], [[1, 1]])], tmp_path / "a.mat")
     record = loadmat(tmp_path / "a.mat")["made"][0, 0]
@@ -535,6 +547,7 @@ def test_each_form_has_the_reason_of_its_own():
     assert fields == {"zpkRefused": "of roots", "tfRefused": "of powers"}
 
 
+@pytest.mark.promise("export-33")
 def test_mat_is_the_same_from_day_to_day(written, tmp_path):
     found, path = written
     matrices.write_mat(found, tmp_path / "again.mat")
@@ -644,6 +657,7 @@ def test_random_damage_is_refused_or_read_and_nothing_else(file, tmp_path):
 
 
 # ----------------------------------------------------------------------------------------------------------------- JSON
+@pytest.mark.promise("export-33")
 def test_json_reads_back_to_the_last_bit(written):
     found, _ = written
     data = json.loads(matrices.json_text(found))
@@ -680,6 +694,7 @@ def test_python_control_has_the_same_matrices_and_names(pointing):
         assert all(np.array_equal(getattr(theirs, key), getattr(m.system, key)) for key in "ABCD")
 
 
+@pytest.mark.promise("export-35")
 def test_without_python_control_the_extra_is_named(file, monkeypatch):
     monkeypatch.setitem(sys.modules, "control", None)
     with pytest.raises(ExportError, match=r"not installed.*constraints.txt '\.\[control\]'"):

@@ -82,12 +82,14 @@ def found(name, folder):
     return FOUND[name]
 
 
+@pytest.mark.promise("export-25", "export-39")
 @needs_checker
 @pytest.mark.parametrize("name", sorted(HELD))
 def test_each_deviation_is_one_that_the_page_gives_a_reason_for(name, tmp_path):
     assert [each for each in found(name, tmp_path) if not script().is_permitted(each, PERMITTED)] == []
 
 
+@pytest.mark.promise("export-25")
 @needs_checker
 def test_the_page_names_no_deviation_that_there_is_not(tmp_path):
     rules = set()
@@ -98,17 +100,21 @@ def test_the_page_names_no_deviation_that_there_is_not(tmp_path):
     assert rules == {each.rule for each in PERMITTED}
 
 
+@pytest.mark.promise("export-25", "export-26", "export-39")
 @needs_checker
 def test_a_rule_that_is_broken_is_said(tmp_path, capsys):
     """A jump, and a shift of a signed number outside the files for which the page permits one."""
     code = "int jump(int x);\nint jump(int x)\n{\n    goto end;\nend:\n    return x << 1;\n}\n"
     (tmp_path / "jump.c").write_text(code, encoding="utf-8")
+    (tmp_path / "jump_bench.c").write_text(code, encoding="utf-8")  # a bench does not fly
     assert script().main([str(tmp_path)]) == 1
     said = capsys.readouterr().out
     assert f"{tmp_path / 'jump.c'}:4: rule 15.1, which docs/export.md names no deviation from" in said
     assert "jump.c:6: rule 10.1" in said
+    assert "jump_bench" not in said
 
 
+@pytest.mark.promise("export-39")
 @needs_checker
 def test_the_statement_counts_each_rule_with_its_reason(tmp_path, capsys):
     for file, text in CODE["feedback"]().items():

@@ -244,6 +244,7 @@ def wild(of: FlightController) -> Floats:
 
 
 # ------------------------------------------------------------------------------------------------- against the code
+@pytest.mark.promise("export-22")
 @needs_gxx
 @pytest.mark.parametrize(
     ("name", "precision"),
@@ -276,6 +277,7 @@ PLAIN_AGAIN = ("no converter", "rate given", "widening of nothing")
 """What differs from another one by a line or two of its code."""
 
 
+@pytest.mark.promise("export-22")
 @needs_gxx
 @pytest.mark.parametrize(
     ("name", "precision"),
@@ -357,6 +359,7 @@ FIXED_AGAIN = {"no inverse", "rate given"}
 """What differs from another one by its numbers, or by a rate that is read and not computed."""
 
 
+@pytest.mark.promise("export-22")
 @needs_gxx
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=[pytest.mark.endurance] if name in FIXED_AGAIN else []) for name in FIXED]
@@ -399,6 +402,7 @@ def test_a_controller_without_states_costs_nothing_for_them() -> None:
     assert found.additions == np.count_nonzero(of.system.D) + of.actuators  # what the limits took off
 
 
+@pytest.mark.promise("export-22")
 def test_counts_add_up_and_are_said_in_words() -> None:
     a, b = Operations(multiplications=2, divisions=1), Operations(multiplications=1, powers=3)
     assert a + b == Operations(multiplications=3, divisions=1, powers=3)

@@ -186,6 +186,7 @@ def test_the_run_in_double_is_the_recorded_one(name):
     assert np.max(np.abs(commands)) > 0.5
 
 
+@pytest.mark.promise("export-14", "export-15")
 @pytest.mark.parametrize("name", SHIPPED)
 def test_single_precision_stays_within_its_bound(name):
     of, form, v = shipped(name)
@@ -221,6 +222,7 @@ def test_the_compiled_code_stays_within_it(name, tmp_path):
     assert float(told["peak_command_v"]) == pytest.approx(np.max(np.abs(v.commands)))
 
 
+@pytest.mark.promise("export-14")
 def test_what_integrators_lose_grows_with_the_samples():
     of, form, v = shipped("PI + inverse")
     half = Vectors(*(getattr(v, key)[: SAMPLES // 2] for key in ("inputs", "commands")), 0, 0)
@@ -445,6 +447,7 @@ def test_the_bound_holds_where_commands_are_clipped():
     assert "not bounded" not in bound.words
 
 
+@pytest.mark.promise("export-15")
 def test_errors_that_may_feed_themselves_are_bounded_by_the_limits_alone():
     of = one_axis(integral(), windup=1.5, limit_v=1.0)
     inputs = np.full((400, 1), 8e-4)
@@ -455,6 +458,12 @@ def test_errors_that_may_feed_themselves_are_bounded_by_the_limits_alone():
     calm = rounding.rounding_bound(of, sections(of), vectors_of(inputs * 1e-3))
     assert calm.command_v < 1e-5
     assert "not bounded" not in calm.words
+
+
+@pytest.mark.parametrize("samples", [1000, 1001])
+def test_a_bound_that_rises_evenly_grows_by_its_rise_a_sample(samples):
+    found = rounding._growth(2.5e-9 * np.arange(samples))
+    assert found == pytest.approx(2.5e-9, rel=3e-3)
 
 
 def test_neighbouring_counts_are_a_count_apart():

@@ -327,6 +327,7 @@ REFUSED = {
 }
 
 
+@pytest.mark.promise("export-27")
 @pytest.mark.parametrize("name", REFUSED)
 def test_what_cannot_fly_is_refused_with_the_reason(name):
     of, words = REFUSED[name]
@@ -367,6 +368,7 @@ def test_a_minimal_controller_is_left_as_it_is():
     assert minimal(of) is of and sections(of).order == 3
 
 
+@pytest.mark.promise("export-27")
 @pytest.mark.parametrize(
     ("name", "left"),
     [("unobservable", 1), ("uncontrollable", 1), ("uncontrollable, mixed", 2), ("a delay behind the last output", 2)],
@@ -461,6 +463,7 @@ def test_names_that_code_can_bear_come_back(name):
     assert identifier(name) == name
 
 
+@pytest.mark.promise("export-27")
 @pytest.mark.parametrize(
     ("name", "why"),
     [

@@ -18,6 +18,8 @@ def here(folder):
     return folder
 
 
+@pytest.mark.promise("mirror-file-30")
+@pytest.mark.promise("export-32")
 @pytest.mark.skipif(build.compiler() is None, reason="no C compiler")
 @pytest.mark.parametrize(("fmi", "first"), [("2.0", "command_v[1]"), ("3.0", "command_v")])
 def test_a_unit_of_all_axes_is_written(here, call, fmi, first):
@@ -34,6 +36,9 @@ def test_a_unit_of_all_axes_is_written(here, call, fmi, first):
     assert (weight.start.split()[-1], weight.unit) == ("0.03", None)
 
 
+@pytest.mark.promise("mirror-file-30")
+@pytest.mark.promise("export-32")
+@pytest.mark.promise("pointing-77")
 @pytest.mark.skipif(build.compiler() is None, reason="no C compiler")
 def test_a_controller_of_all_axes_goes_out_with_its_loop(here, call, monkeypatch):
     asked, designed = [], designs.of_three_actuators()
@@ -49,6 +54,7 @@ def test_a_controller_of_all_axes_goes_out_with_its_loop(here, call, monkeypatch
     assert [(given[1].mirror.name, given[2]) for given in asked] == [("Two axes on a hysteretic spring", "LQG")] * 2
 
 
+@pytest.mark.promise("mirror-file-30")
 def test_matrices_of_all_axes_are_written(here, call):
     done = call("export", "matrices", "mission.toml", "--mirror", "two-axes.toml")
     assert (done.code, done.out) == (0, "mission.mat written: mirror, mirror_at_rest\n")

@@ -33,6 +33,7 @@ edge: { sourcename: "x.c:elsewhere" targetname: "pow" label: "x.c:5:1" }
 needs_gcc = pytest.mark.skipif(sys.platform != "linux" or shutil.which("gcc") is None, reason="no gcc on Linux")
 
 
+@pytest.mark.promise("export-24")
 def test_the_deepest_chain_counts_and_what_the_step_does_not_call_is_left_out():
     found = stack.deepest(GRAPH, "step")
     assert found == stack.StackUse(100 + 40 + 30, ("exp",))
@@ -44,6 +45,7 @@ def test_a_frame_that_is_not_fixed_and_a_step_that_is_not_there_have_no_stack():
     assert stack.deepest(GRAPH.replace("30 bytes (static)", "30 bytes (dynamic)"), "step") is None
 
 
+@pytest.mark.promise("export-24")
 def test_a_compiler_that_does_not_tell_has_none(tmp_path, monkeypatch):
     (tmp_path / "cc").write_text("#!/bin/sh\nexit 1\n")
     (tmp_path / "cc").chmod(0o755)
@@ -86,6 +88,7 @@ int main(void)
 """
 
 
+@pytest.mark.promise("export-24")
 @needs_gcc
 def test_a_step_takes_as_much_of_a_painted_stack_as_is_stated(tmp_path, monkeypatch):
     """Fixed point without an inverse calls no library, so that all of its stack is stated."""
@@ -105,6 +108,7 @@ def test_a_step_takes_as_much_of_a_painted_stack_as_is_stated(tmp_path, monkeypa
     assert found.most_bytes / 2 < step - nothing <= found.most_bytes + 16  # the caller's own frame, of an alignment
 
 
+@pytest.mark.promise("export-23")
 def test_cycles_are_times_in_steps_of_the_counter_and_left_out_without_one():
     found = build.BenchResult(10, 0.0, 1.0, 1e-12, 0, 0, 0, 0, 200.0, 100.0, 18.0, 2.5)
     assert (
@@ -114,6 +118,7 @@ def test_cycles_are_times_in_steps_of_the_counter_and_left_out_without_one():
     assert dict(write._measured(replace(found, cycles_per_ns=0.0)))["cycles"] == ""
 
 
+@pytest.mark.promise("export-23", "export-24")
 @needs_gcc
 def test_the_report_states_it(tmp_path, monkeypatch):
     monkeypatch.setenv("CC", "gcc")

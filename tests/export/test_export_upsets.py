@@ -113,6 +113,7 @@ def flown(name):
     return pair(PAIRS[name]) if name in PAIRS else designs.flown(name, 300)
 
 
+@pytest.mark.promise("export-6", "export-18")
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc")
 @pytest.mark.parametrize(("name", "precision"), FLOWN)
 def test_no_bit_of_the_state_takes_a_command_beyond_the_limits(tmp_path, name, precision):

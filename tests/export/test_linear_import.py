@@ -3,9 +3,10 @@
 import hashlib
 import math
 import pickle
+import re
 import struct
 import sys
-from dataclasses import replace
+from dataclasses import fields, replace
 from types import SimpleNamespace
 
 import control as python_control
@@ -22,6 +23,7 @@ from microrad.export.matrices.forms import floats, polynomials
 from microrad.export.records import ExportError
 from microrad.mirror import model as mirror
 from microrad.mission.file import load_mirror, load_mission
+from places import ROOT
 from shipped import SHIPPED
 
 NINE_DIGITS = 1e-9
@@ -91,6 +93,8 @@ def test_mirror_of_the_mission_through_mat_and_mirror_file(models, tmp_path):
     assert abs(found[0]) > 0.0 and difference(found, part) > 0.1  # rad/V is no ratio
 
 
+@pytest.mark.promise("mirror-file-56")
+@pytest.mark.promise("export-38")
 def test_mirror_of_the_mission_through_python_control(models, tmp_path):
     text = import_control(matrices.to_control(models[1]), GIVEN, "our export")
     wanted = lti.frequency_response(models[1].system, BAND)[:, 0, 0]
@@ -98,6 +102,8 @@ def test_mirror_of_the_mission_through_python_control(models, tmp_path):
     assert "imported from our export" in text
 
 
+@pytest.mark.promise("mirror-file-53", "mirror-file-54")
+@pytest.mark.promise("export-36")
 @pytest.mark.parametrize("where", ["variables", "structure", "sampled at 0"])
 @pytest.mark.parametrize("shape", list(SHAPES))
 def test_every_form_gives_its_own_response(shape, where, tmp_path):
@@ -110,6 +116,20 @@ def test_every_form_gives_its_own_response(shape, where, tmp_path):
     assert difference(found, wanted) < NINE_DIGITS
 
 
+@pytest.mark.promise("mirror-file-61")
+def test_what_the_line_for_matlab_saves_is_taken(tmp_path):
+    page = (ROOT / "docs" / "mirror-file.md").read_text(encoding="utf-8")
+    (line,) = re.findall(r"(?m)^    (s = struct\(.*)$", page)
+    fields = dict.fromkeys(re.findall(r"'(\w+)', sys\.\1\b", line), STATES)
+    assert fields.keys() == {"A", "B", "C", "D", "Ts"} and line.endswith("save('model.mat', 's', '-v7')")
+    saved = {name: getattr(states, name, 0.0) for name, states in fields.items()}  # Ts of a continuous system
+    savemat(tmp_path / "model.mat", {"s": saved}, do_compression=True)  # as -v7 does
+    wanted = lti.frequency_response(STATES, BAND)[:, 0, 0]
+    assert difference(answer(tmp_path, import_mat(tmp_path / "model.mat", GIVEN), BAND), wanted) < NINE_DIGITS
+
+
+@pytest.mark.promise("mirror-file-56")
+@pytest.mark.promise("export-38")
 def test_transfer_function_of_python_control(tmp_path):
     system = python_control.tf(np.poly(ZEROS).real * GAIN, np.poly(POLES).real)
     assert difference(answer(tmp_path, import_control(system, GIVEN), BAND), by_roots(BAND)) < NINE_DIGITS
@@ -134,6 +154,8 @@ def coefficients(system):
     return num[None], den[None], np.finfo(float).eps * np.max(lost)
 
 
+@pytest.mark.promise("mirror-file-57")
+@pytest.mark.promise("export-37")
 @pytest.mark.parametrize("shape", ["states", "roots", "coefficients", "python-control"])
 def test_a_sampled_model_becomes_the_continuous_one_behind_its_hold(shape, tmp_path):
     """There and back: sampled by SciPy, imported, the response is that of the model it was."""
@@ -204,6 +226,8 @@ def test_a_negative_factor_is_no_falling_mirror(tmp_path):
     assert difference(answer(tmp_path, text, BAND), by_roots(BAND, [4e4], POLES, -3.0)) < NINE_DIGITS
 
 
+@pytest.mark.promise("mirror-file-53", "mirror-file-55", "mirror-file-57")
+@pytest.mark.promise("export-36")
 def test_what_is_given_stands_in_the_file_and_what_it_came_from(tmp_path):
     path = save(tmp_path, **SHAPES["roots"])
     text = import_mat(path, replace(GIVEN, name='A "quoted" name'))
@@ -245,6 +269,7 @@ def test_states_count_where_there_are_several_forms(tmp_path):
     assert difference(wanted, by_roots(BAND)) > 0.1
 
 
+@pytest.mark.promise("mirror-file-53")
 def test_linear_part_alone_has_no_drive_in_volts(models, tmp_path):
     matrices.write_mat(models, tmp_path / "models.mat")
     with pytest.raises(ExportError, match=r"its input is in rad, and a mirror's drive is in V"):
@@ -269,6 +294,8 @@ TWO = {"A": -np.eye(2), "B": np.eye(2), "C": np.ones((1, 2)), "D": np.zeros((1, 
 HIDING = {"A": np.diag([-1.0, -20.0]), "B": np.array([[1.0], [0.0]]), "C": np.ones((1, 2)), "D": np.zeros((1, 1))}
 
 
+@pytest.mark.promise("mirror-file-53")
+@pytest.mark.promise("export-36", "export-37")
 @pytest.mark.parametrize(
     ("fields", "why"),
     [
@@ -322,6 +349,10 @@ HIDING = {"A": np.diag([-1.0, -20.0]), "B": np.array([[1.0], [0.0]]), "C": np.on
         (roots(poles=[-300.0, -300.0], zeros=[]), r"two poles coincide at 47\.75 Hz"),
         (roots(poles=[-300.0, -300.0 * (1 + 1e-8)], zeros=[], k=9.0), "differ from the model by .* nearly coincide"),
         (roots(poles=[-300.0, -600.0], zeros=[-300.0]), r"not minimal, a zero cancels the pole at 47\.75 Hz"),
+        (
+            roots(poles=[-300.0, -600.0], zeros=[-300.0 * (1 + 2e-9)]),
+            r"not minimal, a zero cancels the pole at 47\.75 Hz",
+        ),
         (roots(zeros=[0.0]), "a zero at 0 Hz: the mirror does not hold an angle"),
         (roots(k=-GAIN), "the output falls as the drive rises"),
         ({"num": [[1.0, 2.0]], "den": [[1.0, 2.0]]}, "1 zeros over 1 poles, not strictly proper"),
@@ -371,6 +402,7 @@ def element(kind, data):
     return struct.pack("<II", kind, len(data)) + data + b"\0" * (-len(data) % 8)
 
 
+@pytest.mark.promise("mirror-file-53")
 def test_objects_of_matlab_are_refused_with_what_to_save(tmp_path):
     """MATLAB saves `ss` as an object of its own, whose format is not published."""
     parts = ((6, struct.pack("<II", 17, 0)), (1, b"sys"), (1, b"MCOS"), (1, b"ss"))
@@ -391,6 +423,7 @@ def test_pickles_are_not_opened(tmp_path):
     assert not (tmp_path / "sprung").exists()
 
 
+@pytest.mark.promise("mirror-file-56")
 @pytest.mark.parametrize(
     ("system", "why"),
     [
@@ -408,18 +441,41 @@ def test_objects_that_are_no_linear_mirror_are_refused(system, why):
         import_control(system, GIVEN, "bench")
 
 
+@pytest.mark.promise("mirror-file-56")
 def test_without_python_control_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "control", None)
     with pytest.raises(ExportError, match=r"constraints.txt '\.\[control\]'"):
         import_control(object(), GIVEN)
 
 
+@pytest.mark.promise("mirror-file-57")
 def test_a_mirror_file_that_says_something_else_is_never_returned(tmp_path, monkeypatch):
     path = save(tmp_path, **SHAPES["roots"])
     assert import_mat(path, GIVEN)
     monkeypatch.setattr(mirror_file, "READ_BACK", 1e-18)
     with pytest.raises(ExportError, match="the mirror file would differ from the model"):
         import_mat(path, GIVEN)
+
+
+@pytest.mark.promise("mirror-file-57")
+def test_a_mirror_file_is_compared_from_a_tenth_of_the_band_to_ten_times_its_end(tmp_path, monkeypatch):
+    seen = []
+    own = mirror_file.frequency_response
+    monkeypatch.setattr(mirror_file, "frequency_response", lambda m, freq: (seen.append(freq), own(m, freq))[1])
+    import_mat(save(tmp_path, **SHAPES["roots"]), GIVEN)
+    (freq,) = seen
+    assert (freq[0], freq[-1]) == pytest.approx((0.1, 50e3), rel=1e-12) and len(freq) == 200
+    assert mirror_file.READ_BACK == 1e-9
+
+
+@pytest.mark.promise("mirror-file-55")
+def test_nothing_that_is_given_has_a_value_of_its_own():
+    names = [each.name for each in fields(Given)]
+    assert names[0] == "name" and names[-1] == "output_unit"
+    whole = {name: getattr(GIVEN, name) for name in names}
+    for name in names:
+        with pytest.raises(TypeError, match=f"missing 1 required positional argument: '{name}'"):
+            Given(**{key: value for key, value in whole.items() if key != name})
 
 
 def test_scipy_sees_the_same_file(tmp_path):

@@ -60,7 +60,8 @@ def broken(monkeypatch):
     monkeypatch.setattr(promises, "SHARES", ())
 
 
-def test_what_breaks_its_promise_is_tuned_for_a_larger_margin(light):
+@pytest.mark.promise("pointing-3", "pointing-4", "pointing-6", "sampled-loop-5")
+def test_what_breaks_its_promise_is_tuned_for_a_larger_margin(light, monkeypatch):
     """The observer left 8 times its linear figure; without a larger margin it still does."""
     scene = scene_of(load_mission(light))
     ((kept, left),) = controller_study.design_and_promise(scene, only=(OBSERVER,))
@@ -71,8 +72,34 @@ def test_what_breaks_its_promise_is_tuned_for_a_larger_margin(light):
     (before,) = controller_study.outlook(scene, [plain])
     assert plain.margin is None
     assert before.linear_rad < left.linear_rad < left.simulated_rad < 0.5 * before.simulated_rad
+    monkeypatch.setattr(controller_study, "plain_designs", lambda scene, only: (plain,))
+    ran = controller_study.design_and_simulate_one(scene, OBSERVER)  # as `microrad run` has each
+    assert ran.design is plain and ran.simulated["given"].rms_rad > 1.5 * ran.theory.radial_rms_rad
 
 
+@pytest.mark.promise("pointing-7")
+@pytest.mark.endurance
+@pytest.mark.parametrize(
+    ("name", "margin", "figures"),
+    [("LQG", 0.9, (1.12, 8.3, 1.82, 2.0)), (OBSERVER, 0.7, (1.15, 8.0, 1.49, 1.9))],
+    ids=["LQG", "observer"],
+)
+def test_a_light_resonance_costs_what_the_page_says(light, name, margin, figures):
+    """Of the mission's own runs, not a few short ones: linear and simulated rms before, and for the larger margin."""
+    text = light.read_text(encoding="utf-8")
+    for short, own in (("runs = 4 ", "runs = 64 "), ('"0.4 s"', '"2 s"'), ('settle = "0.1 s"', 'settle = "0.5 s"')):
+        text = text.replace(short, own)
+    light.write_text(text, encoding="utf-8")
+    scene = scene_of(load_mission(light))
+    (plain,) = designs.design(scene, only=(name,))
+    (before,) = controller_study.outlook(scene, [plain])
+    ((kept, left),) = controller_study.design_and_promise(scene, only=(name,))
+    assert kept.margin == pytest.approx(margin)
+    found = [1e6 * rad for rad in (before.linear_rad, before.simulated_rad, left.linear_rad, left.simulated_rad)]
+    assert found == pytest.approx(figures, rel=0.03)
+
+
+@pytest.mark.promise("pointing-4")
 def test_a_larger_margin_is_said_beside_the_values(light, call, monkeypatch):
     monkeypatch.setattr(designs, "names", lambda m: (OBSERVER,))
     done = call("design", "light.toml", "--json")
@@ -85,6 +112,7 @@ def test_a_larger_margin_is_said_beside_the_values(light, call, monkeypatch):
     assert words.larger_margin(0.7) == "; for a modulus margin of 0.7, for the mirror's hysteresis"
 
 
+@pytest.mark.promise("pointing-4", "pointing-5")
 def test_of_larger_margins_the_one_that_leaves_least_is_taken():
     figures = {0.6: (1.0, 4.0), 0.8: (2.0, 2.5), 0.9: (2.4, 2.6)}  # 0.7 is out of reach
 
@@ -103,6 +131,9 @@ def test_of_larger_margins_the_one_that_leaves_least_is_taken():
     assert promises.firmer(0.5, tuned, judged) is None
 
 
+@pytest.mark.promise("export-3")
+@pytest.mark.promise("sampled-loop-5")
+@pytest.mark.promise("pointing-3", "pointing-4", "sampled-loop-5")
 def test_the_simulated_figure_is_that_of_the_missions_runs(light):
     file = load_mission(light)
     scene = scene_of(file)
@@ -116,6 +147,7 @@ def test_the_simulated_figure_is_that_of_the_missions_runs(light):
     assert not controller_study.Outlook(1.0, math.nan).holds
 
 
+@pytest.mark.promise("pointing-3", "pointing-5", "sampled-loop-5")
 def test_design_shows_both_figures_and_refuses_by_the_simulated_one(light, call, monkeypatch, broken):
     monkeypatch.setattr(designs, "names", lambda m: (controller_study.BASELINE, OBSERVER))
     done = call("design", "light.toml", "--json")
@@ -153,6 +185,8 @@ def row_of(printed, name):
     return next(line for line in printed.splitlines() if line.split()[:1] == name.split()[:1])
 
 
+@pytest.mark.promise("export-3")
+@pytest.mark.promise("pointing-5")
 def test_what_breaks_its_promise_is_exported_only_where_that_is_accepted(light, call, refused, monkeypatch, broken):
     monkeypatch.setattr(write, "compiler", lambda: None)
     said = refused(*WORDS)
@@ -167,6 +201,8 @@ def test_what_breaks_its_promise_is_exported_only_where_that_is_accepted(light, 
     assert f"times the {linear.strip()} rms an axis of linear theory" in said
 
 
+@pytest.mark.promise("export-3")
+@pytest.mark.promise("pointing-5")
 @pytest.mark.parametrize("what", ["matrices", "fmu"])
 def test_matrices_and_units_are_held_to_it_too(light, call, refused, what, broken):
     said = refused("export", what, *WORDS[2:])

@@ -35,6 +35,7 @@ def slew(excitation):
 
 
 # ---- chirp
+@pytest.mark.promise("bench-7")
 def test_a_logarithmic_chirp_has_its_limits_amplitude_and_offset():
     chirp = logarithmic_chirp(
         LIMITS, start_hz=1.0, stop_hz=1000.0, duration_s=4.0, amplitude_v=0.5, offset_v=6.0, name="small"
@@ -59,6 +60,7 @@ def test_a_drive_is_read_only():
 
 
 # ---- multisine
+@pytest.mark.promise("bench-7")
 @pytest.mark.parametrize("choice", ["all", "odd", "odd-random"])
 def test_a_multisine_has_the_lines_asked_for_and_no_others(choice):
     (sines,) = multisine(LIMITS, Lines(0.2, 10.0, 1000.0, choice), **SMALL)
@@ -92,6 +94,7 @@ def test_a_multisine_repeats_itself_and_begins_near_its_rest():
     assert 2.0 < crest < 5.0
 
 
+@pytest.mark.promise("bench-8")
 def test_phases_are_random_over_the_circle_and_told_by_the_seed():
     (one,) = multisine(LIMITS, Lines(1.0, 1.0, 1000.0), **SMALL)
     (same,) = multisine(LIMITS, Lines(1.0, 1.0, 1000.0), **SMALL)
@@ -103,6 +106,7 @@ def test_phases_are_random_over_the_circle_and_told_by_the_seed():
     assert abs((turns[1:] / turns[:-1]).mean()) < 1.0 - 1e-3
 
 
+@pytest.mark.promise("bench-7")
 @pytest.mark.parametrize("inputs", [2, 3])
 def test_realisations_are_orthogonal_at_every_line(inputs):
     limits = two_inputs(inputs=inputs)
@@ -122,6 +126,7 @@ def test_realisations_are_orthogonal_at_every_line(inputs):
 
 
 # ---- sines and staircases
+@pytest.mark.promise("bench-7")
 def test_sines_grow_in_whole_periods():
     sines = growing_sines(LIMITS, freq_hz=40.0, amplitudes_v=[1.0, 2.0, 6.0], periods=3, offset_v=6.0)
     assert sines.samples == 3 * 750
@@ -140,6 +145,7 @@ def test_a_sine_that_fills_samples_in_threes_has_three_periods_as_its_period():
     assert growing_sines(LIMITS, freq_hz=60.0, amplitudes_v=[6.0], periods=3, offset_v=6.0).period_samples is None
 
 
+@pytest.mark.promise("bench-7")
 def test_a_staircase_holds_its_levels_and_ramps_between_them():
     steps = staircase(LIMITS, levels_v=[6.0, 9.0, 3.0], dwell_s=0.1, rise_s=0.005)
     assert steps.rest_v == 6.0
@@ -152,6 +158,7 @@ def test_a_staircase_holds_its_levels_and_ramps_between_them():
     assert slew(steps) == pytest.approx(6.0 / 0.005)
 
 
+@pytest.mark.promise("bench-8")
 def test_only_the_chosen_axis_moves():
     drive = growing_sines(two_inputs(), freq_hz=50.0, amplitudes_v=[2.0], periods=2, offset_v=5.0, axis=1).drive
     assert np.ptp(drive[:, 0]) == 0.0
@@ -178,6 +185,7 @@ def tones(limits=LIMITS, *, lines=None, **changes):
     return multisine(limits, lines or Lines(0.2, 10.0, 400.0), **{**SMALL, **changes})
 
 
+@pytest.mark.promise("bench-4", "bench-5")
 @pytest.mark.parametrize(
     ("design", "message"),
     [
@@ -195,6 +203,7 @@ def tones(limits=LIMITS, *, lines=None, **changes):
         (lambda: sines(freq_hz=70.0), r"or a frequency of 69.93006\d+ Hz"),
         (lambda: sines(freq_hz=2000.0, periods=1), r"frequencies reaches 2 kHz, 5 samples a period"),
         (lambda: steps(rise_s=1e-4), r"rise makes the largest step one of 120 kV/s, limits.slew is 20 kV/s; .* 600 µs"),
+        (lambda: steps(levels_v=[12.0, 0.0], rise_s=1e-4), r"rise makes the largest step one of 120 kV/s, .* 600 µs"),
         (lambda: steps(levels_v=[0.0, 13.0]), r"levels has 13 V, outside limits.drive_min to limits.drive_max"),
         (lambda: steps(levels_v=[1.0]), r"levels has one item, which is no step; would fit: at least two levels"),
         (lambda: steps(dwell_s=1e-6), r"dwell is shorter than half a sample; would fit: at least 100 µs"),
@@ -217,6 +226,7 @@ def test_every_limit_that_is_broken_is_named_at_once():
     assert [p.key for p in refused.value.problems] == ["stop", "amplitude", "amplitude", "amplitude"]
 
 
+@pytest.mark.promise("bench-4")
 def test_the_advice_fits():
     tight = two_inputs(inputs=1, slew_v_s=2e3)
     with pytest.raises(DesignError, match=r"limits.slew is 2 kV/s; would fit: at most (\S+ m?V)") as refused:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from microrad.core import lti
+from microrad.core.kernels import play_response
 from microrad.lab.bench.mirrors import (
     EQ2_DENOMINATOR,
     EQ2_NUMERATOR,
@@ -72,6 +73,7 @@ def slow_bench_output(drive, rest_v, rate_hz, amplifier, substeps):
     return np.array(output)
 
 
+@pytest.mark.promise("bench-9")
 @pytest.mark.parametrize("kind", ["smooth", "slewing"])
 def test_the_benchs_mirror_agrees_with_small_euler_steps(kind):
     if kind == "smooth":
@@ -85,7 +87,9 @@ def test_the_benchs_mirror_agrees_with_small_euler_steps(kind):
     assert np.ptp(fast) > 0.1
 
 
+@pytest.mark.promise("bench-9")
 def test_halving_the_fine_step_changes_nothing_beyond_the_stated_bound():
+    assert FINE_STEP_S == 2.5e-6
     chirp = 6.0 + 0.5 * np.sin(2 * np.pi * (10.0 * np.arange(20_000) / RATE_HZ) * 10.0 ** np.linspace(0, 2.4, 20_000))
     for drive, rate_hz in (
         (chirp, RATE_HZ),
@@ -110,6 +114,7 @@ def test_standing_still_is_stepped_by_samples_without_a_difference():
     assert np.ptp(whole) > 0.4
 
 
+@pytest.mark.promise("bench-5", "bench-10")
 def test_eq2_is_played_as_printed():
     drive = 6.0 + 0.5 * philox(1).standard_normal(2000)
     system = lti.modal_from_polynomials(EQ2_NUMERATOR, EQ2_DENOMINATOR)
@@ -124,6 +129,7 @@ def test_eq2_is_played_as_printed():
     assert np.ptp(expected) > 0.05
 
 
+@pytest.mark.promise("bench-5", "bench-10")
 def test_eq3_is_played_as_printed():
     drive = sine(100.0, 6.0, 3)
     output = bouc_wen_output(drive, 6.0, RATE_HZ)
@@ -133,7 +139,20 @@ def test_eq3_is_played_as_printed():
     assert 100 * np.ptp(h) / np.ptp(output[drive.size // 3 :]) == pytest.approx(14.05, rel=2e-3)
 
 
+@pytest.mark.promise("bench-10")
+def test_the_first_sample_that_a_drive_can_move_is_the_one_behind_it():
+    """But for Eq. 3, whose drive is straight between the samples."""
+    drive = np.repeat([6.0, 6.5], [10, 50])
+    held = bench_output(drive, 6.0, RATE_HZ, AMPLIFIER), linear_output(drive, 6.0, RATE_HZ)
+    for output in held:
+        assert np.ptp(output[:11]) < 1e-12
+        assert abs(output[11] - output[10]) > 1e-6
+    straight = bouc_wen_output(drive, 6.0, RATE_HZ)
+    assert abs(straight[10] - straight[9]) > 0.04  # d1 x 0.5 V
+
+
 # ---- what a real mirror shows
+@pytest.mark.promise("gallery-6")
 def test_gain_and_loop_grow_with_amplitude():
     lags, gains = zip(*(lag_deg(10.0, amplitude) for amplitude in (0.1, 0.5, 2.0, 6.0)), strict=True)
     assert np.all(np.diff(lags) > 0.1)
@@ -142,12 +161,14 @@ def test_gain_and_loop_grow_with_amplitude():
     assert 0.088 < gains[-1] < 0.092
 
 
+@pytest.mark.promise("bench-9")
 def test_the_loop_grows_mildly_with_rate():
     """Beyond the lag that a small sine has at the same frequency, which is linear."""
     slow, fast = (lag_deg(f, 6.0)[0] - lag_deg(f, 0.1)[0] for f in (2.0, 60.0))
     assert 1.05 < fast / slow < 1.5
 
 
+@pytest.mark.promise("bench-9")
 def test_the_two_branches_of_a_loop_differ():
     drive = sine(5.0, 6.0, 2)
     output = bench_output(drive, 6.0, RATE_HZ, AMPLIFIER)[drive.size // 2 :]
@@ -155,6 +176,7 @@ def test_the_two_branches_of_a_loop_differ():
     assert 0.002 < abs(second[2]) / abs(second[1]) < 0.02
 
 
+@pytest.mark.promise("bench-9")
 def test_creep_behind_a_step_is_logarithmic_over_decades():
     rate_hz = 50.0
     drive = np.concatenate([np.full(20, 6.0), np.full(round(1000 * rate_hz), 9.0)])
@@ -169,12 +191,14 @@ def test_creep_behind_a_step_is_logarithmic_over_decades():
     assert np.all(np.diff(back[70::50]) < 0)
 
 
+@pytest.mark.promise("bench-9")
 def test_a_resting_mirror_stays_where_it_is():
     output = bench_output(np.full(5000, 7.0), 7.0, RATE_HZ, AMPLIFIER)
     assert np.ptp(output) < 1e-12
     assert output[0] == pytest.approx(BenchMirror().at_rest(7.0))
 
 
+@pytest.mark.promise("bench-5", "bench-9")
 def test_a_slow_amplifier_and_a_slew_limit_hold_the_mirror_back():
     drive = np.repeat([6.0, 9.0], [10, 4000])
     usual, narrow, slewing = (
@@ -187,9 +211,33 @@ def test_a_slow_amplifier_and_a_slew_limit_hold_the_mirror_back():
     assert 100 < reach[2] < 150  # 2.4 V at 1 V/ms
 
 
+@pytest.mark.promise("bench-9")
 def test_the_density_of_plays_is_smooth():
     weights = BenchMirror().weights_mrad_v
     assert weights.size == 60
     assert np.all(weights > 0)
     assert weights.sum() == pytest.approx(0.021)
     assert np.abs(np.diff(weights, 2)).max() < 0.2 * weights.max()
+
+
+@pytest.mark.promise("bench-9")
+def test_creep_is_spread_evenly_over_seven_decades():
+    """Each lag stands in the middle of its half of a decade."""
+    mirror = BenchMirror()
+    half = math.sqrt(10.0) ** 0.5
+    assert mirror.lag_times_s[0] / half == pytest.approx(0.01)
+    assert mirror.lag_times_s[-1] * half == pytest.approx(1e5)
+    assert np.diff(np.log10(mirror.lag_times_s)) == pytest.approx(np.full(13, 0.5))
+    assert mirror.creep_share_decade == 0.01
+
+
+@pytest.mark.promise("bench-9")
+def test_rest_is_what_a_decaying_sine_leaves():
+    """Each play operator ends within the last decrement of the sine, 10 V x 20 / 4000, of the middle."""
+    mirror, samples = BenchMirror(), np.arange(4000)
+    drive = 7.0 + 10.0 * (1.0 - samples / samples[-1]) * np.sin(2 * np.pi * samples / 20)
+    plays = play_response(drive, mirror.thresholds_v, np.full(mirror.operators, 0.0))[-1]
+    assert np.abs(plays - 7.0).max() < 0.06
+    extension = mirror.direct_mrad_v * drive[-1] + mirror.weights_mrad_v @ plays
+    assert mirror.saturated(np.array(extension)) == pytest.approx(mirror.at_rest(7.0), rel=2e-3)
+    assert mirror.at_rest(7.0) != pytest.approx(mirror.at_rest(7.1), rel=2e-3)

@@ -4,6 +4,7 @@ import contextlib
 import hashlib
 import re
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ import pytest
 from microrad.lab import bench
 from microrad.lab.bench import load_plan, plan
 from microrad.lab.bench.plan import PlanError, packaged_plans
+from places import ROOT
 
 PLANS = Path(bench.__file__).parent.parent / "plans"
 PAPER = PLANS / "paper-experiment.toml"
@@ -45,6 +47,7 @@ def changed(old, new, text=TEXT):
 
 
 # ---- packaged plans
+@pytest.mark.promise("bench-2", "bench-3", "bench-13")
 def test_the_packaged_plans_are_found_by_name():
     assert packaged_plans() == ("mirror-characterisation", "paper-experiment")
     for name in packaged_plans():
@@ -53,6 +56,7 @@ def test_the_packaged_plans_are_found_by_name():
         assert plan.sha256 == hashlib.sha256((PLANS / f"{name}.toml").read_bytes()).hexdigest()
 
 
+@pytest.mark.promise("bench-3")
 @pytest.mark.parametrize("path", sorted(PLANS.glob("*.toml")), ids=lambda p: p.stem)
 def test_every_value_of_a_packaged_plan_says_where_it_comes_from(path):
     for line in path.read_text(encoding="utf-8").split("\n"):
@@ -60,6 +64,9 @@ def test_every_value_of_a_packaged_plan_says_where_it_comes_from(path):
             assert re.search(r" # (paper|assumption): \S", line), line
 
 
+@pytest.mark.promise("bench-3", "bench-5", "bench-6", "bench-8")
+@pytest.mark.promise("readme-10")
+@pytest.mark.promise("bench-7")
 def test_the_papers_experiment_is_read_in_si():
     plan = load_plan(PAPER)
     assert (plan.limits.rate_hz, plan.limits.drive_max_v, plan.limits.slew_v_s) == (50e3, 12.0, 20e3)
@@ -75,6 +82,7 @@ def test_the_papers_experiment_is_read_in_si():
         assert np.allclose(loop.excitation.drive[:, 0], 6 * np.sin(2 * np.pi * freq_hz * time_s) + 6, atol=1e-9)
 
 
+@pytest.mark.promise("bench-3")
 def test_the_characterisation_holds_records_out():
     plan = load_plan("mirror-characterisation")
     uses = {record.excitation.name: record.use for record in plan.records}
@@ -84,6 +92,76 @@ def test_the_characterisation_holds_records_out():
     creep = next(record.excitation for record in plan.records if record.kind == "staircase")
     assert creep.rate_hz == 1e3
     assert len(creep.step_samples) == 5
+    loops = [record.excitation for record in plan.records if record.kind == "sines" and record.use == "identification"]
+    assert len({each.name.rpartition("-")[2] for each in loops}) == len(loops) == 4
+    for each in loops:
+        tops = [part.max() - 6.0 for part in np.array_split(each.drive[:, 0], 3)]
+        assert tops[0] < tops[1] < tops[2], each.name
+    small = {r.kind: np.ptp(r.excitation.drive) for r in plan.records if r.use == "identification"}
+    assert max(small["multisine"], small["chirp"]) < 2.0 < min(np.ptp(each.drive) for each in loops)
+
+
+PAGE = (ROOT / "docs" / "bench.md").read_text(encoding="utf-8")
+
+
+def keys(table):
+    return {info.alias or name for name, info in table.model_fields.items()}
+
+
+@pytest.mark.promise("bench-5")
+def test_the_page_has_the_keys_of_the_plan_and_their_defaults():
+    rows = re.findall(r"^\| (`.+?) \| (.+) \|$", PAGE.partition("| `kind` |")[0], re.MULTILINE)
+    found = {}
+    for first, meaning in rows:
+        table = re.match(r"`((?:\w+\.)*)", first)[1]
+        names = re.findall(r"`(?:\w+\.)*(\w+|\*)`", first)
+        found.setdefault(table, set()).update(re.findall(r"`(\w+)`", meaning) if names == ["*"] else names)
+    amplifier, converters, sensor = (
+        plan.BenchTable.model_fields[name].annotation for name in ("amplifier", "converters", "sensor")
+    )
+    assert found == {
+        "": keys(plan.PlanTable) - {"limits", "bench", "excitation"},
+        "limits.": keys(plan.LimitsTable),
+        "bench.": keys(plan.BenchTable) - {"amplifier", "converters", "sensor"},
+        "bench.amplifier.": keys(amplifier),
+        "bench.converters.": keys(converters),
+        "bench.sensor.": keys(sensor),
+    }
+    listed = dict(rows)
+    assert tuple(re.findall(r"`(\w+)`", listed["`formats`"])) == plan.FORMATS
+    assert re.findall(r"\((\d)\)", listed["`bench.axes`, `bench.crosstalk`"]) == ["1", "0"]
+    assert [plan.BenchTable.model_fields[name].default for name in ("axes", "crosstalk")] == [1, 0.0]
+    truths = re.findall(r"`([a-z-]+)`", listed["`bench.truth`"])
+    assert truths == ["bench", "linear", "bouc-wen"] == list(get_args(plan.BenchTable.model_fields["truth"].annotation))
+
+
+@pytest.mark.promise("bench-7", "bench-8")
+def test_the_page_has_the_keys_of_each_kind_of_excitation():
+    rows = re.findall(r"^\| `(\w+)` \| (`.+) \| (.+) \|$", PAGE.partition("| `kind` |")[2], re.MULTILINE)
+    assert [kind for kind, _, _ in rows] == list(plan.KINDS)
+    common = keys(plan.ExcitationTable)
+    for kind, named, _ in rows:
+        lines = set() if kind != "multisine" else {"all", "odd"}  # what the key `lines` may say
+        assert set(re.findall(r"`(\w+)`", named)) - lines == keys(plan.KINDS[kind]) - common - {"kind", "axis"}
+        assert ("axis" in keys(plan.KINDS[kind])) == (kind != "multisine")
+    assert common == {"use", "rate", "truth", "noise_share"}
+
+
+@pytest.mark.promise("bench-6", "bench-7", "bench-8")
+def test_records_are_named_after_their_excitation(tmp_path):
+    text = changed("^frequencies = .*", 'frequencies = ["100 Hz"]') + (
+        '[excitation.m]\nkind = "multisine"\nlines = "odd"\nstart = "10 Hz"\nstop = "1 kHz"\nperiod = "0.1 s"\n'
+        'rms = "0.2 V"\noffset = "6 V"\nperiods = 2\nrealisations = 2\nseed = 1\nnoise_share = 0.1\n'
+        '[excitation.s]\nkind = "staircase"\nlevels = ["2 V", "8 V"]\ndwell = "1 s"\nrise = "5 ms"\nrate = "1 kHz"\n'
+        'use = "validation"\naxis = 1\n'
+    )
+    path = tmp_path / "plan.toml"
+    path.write_text(text, encoding="utf-8")
+    *_, loop, one, two, steps = load_plan(path).records
+    assert [r.excitation.name for r in (loop, one, two, steps)] == ["loop", "m-1", "m-2", "s"]
+    assert (steps.use, steps.truth, steps.excitation.rate_hz, steps.noise_share) == ("validation", "bench", 1e3, None)
+    assert (two.use, two.noise_share, two.excitation.rate_hz) == ("identification", 0.1, 50e3)
+    assert steps.excitation.rest_v == 2.0
 
 
 def test_a_plan_can_be_cut_down():
@@ -95,6 +173,7 @@ def test_a_plan_can_be_cut_down():
 
 
 # ---- faults
+@pytest.mark.promise("bench-4", "bench-5")
 @pytest.mark.parametrize(
     ("old", "new", "key", "message"),
     [
@@ -179,6 +258,7 @@ def test_a_list_in_place_of_a_table_is_told(refuse, table):
     assert "expected: a table with the keys" in str(fault) or "is no table" in str(fault)
 
 
+@pytest.mark.promise("bench-4")
 @pytest.mark.parametrize(
     ("old", "new", "part"),
     [
@@ -194,6 +274,7 @@ def test_a_fault_stands_on_its_line(refuse, old, new, part):
     assert text.split("\n")[fault.line - 1].startswith(part)
 
 
+@pytest.mark.promise("bench-4")
 def test_faults_of_all_kinds_are_told_at_once(refuse):
     text = changed("^rate = .*", 'rate = "50 kHz"')
     text = changed("^gain = 15", 'gain = "15 V"', text)
@@ -232,6 +313,7 @@ def test_a_file_that_is_not_there_is_told_with_the_packaged_plans(tmp_path):
         load_plan(tmp_path / "binary.toml")
 
 
+@pytest.mark.promise("bench-2", "bench-13")
 def test_a_file_goes_before_a_packaged_plan_of_its_name(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("paper-experiment").write_text(changed("^name = .*", 'name = "ours"'), encoding="utf-8")

@@ -49,6 +49,7 @@ def quiet(plan):
 
 
 # ---- what a recording holds
+@pytest.mark.promise("bench-1", "bench-2", "bench-13")
 def test_a_recording_is_in_volts_and_mrad_with_its_names(short):
     (recording,) = play(short, SEED)
     assert (recording.path, recording.input_names, recording.output_names) == ("loop-100hz", ("drive",), ("angle",))
@@ -61,6 +62,7 @@ def test_a_recording_is_in_volts_and_mrad_with_its_names(short):
     assert recording.sha256 == digest
 
 
+@pytest.mark.promise("bench-8")
 def test_the_same_seed_gives_the_same_samples_and_another_one_others(paper):
     plan = select_records(paper, ["loop-60hz", "loop-100hz"])
     one, again, other = play(plan, 1), play(plan, 1), play(plan, 2)
@@ -78,6 +80,7 @@ def test_the_same_seed_gives_the_same_samples_and_another_one_others(paper):
 
 
 # ---- sensor and converters
+@pytest.mark.promise("bench-5")
 def test_noise_is_a_share_of_the_outputs_rms_about_its_mean(paper):
     plan = select_records(paper, ["chirp"])
     (recording,) = play(plan, SEED)
@@ -90,6 +93,7 @@ def test_noise_is_a_share_of_the_outputs_rms_about_its_mean(paper):
     assert 0.97 < low / high < 1.03  # white
 
 
+@pytest.mark.promise("bench-5")
 def test_noise_is_absolute_where_the_plan_says_so(short):
     for rms_rad in (1e-6, 5e-6):
         plan = with_sensor(short, sensor_noise_rad=rms_rad)
@@ -98,6 +102,7 @@ def test_noise_is_absolute_where_the_plan_says_so(short):
         assert 0.96 < np.std(noise) / (rms_rad * 1e3) < 1.04
 
 
+@pytest.mark.promise("bench-5")
 def test_both_converters_have_the_bits_and_ranges_of_the_plan(short):
     plan = quiet(with_sensor(short, converters_bits=10))
     (recording,) = play(plan, SEED)
@@ -114,6 +119,7 @@ def test_both_converters_have_the_bits_and_ranges_of_the_plan(short):
     assert 0.0 < np.abs(fine.drive - asked).max() < 1e-6
 
 
+@pytest.mark.promise("bench-5")
 def test_mains_and_drift_are_seen_in_the_output(short):
     plain = play(with_sensor(quiet(short), converters_bits=24), SEED)[0].output
     hum = play(with_sensor(quiet(short), converters_bits=24, sensor_mains_rad=2e-6), SEED)[0].output - plain
@@ -124,6 +130,7 @@ def test_mains_and_drift_are_seen_in_the_output(short):
     assert drifted[-1, 0] * 1e3 == pytest.approx(0.12, rel=1e-2)
 
 
+@pytest.mark.promise("bench-10")
 def test_an_output_beyond_its_converter_is_refused(short):
     plan = with_sensor(short, converters_output_max_rad=1e-3)
     with pytest.raises(
@@ -132,6 +139,7 @@ def test_an_output_beyond_its_converter_is_refused(short):
         play(plan, SEED)
 
 
+@pytest.mark.promise("bench-5", "bench-7", "bench-8", "bench-11")
 def test_axes_answer_their_own_drive_and_some_of_the_others(tmp_path, paper):
     text = paper.text.replace('truth = "bench"', 'axes = 2\ncrosstalk = 0.05\ntruth = "bench"', 1)
     text = text.partition("[excitation.chirp]")[0] + (
@@ -157,6 +165,43 @@ def test_axes_answer_their_own_drive_and_some_of_the_others(tmp_path, paper):
         load_plan(tmp_path / "three.toml")
 
 
+@pytest.mark.promise("bench-7", "bench-12")
+def test_lines_and_steps_of_a_record_are_in_the_manifest(tmp_path, paper):
+    text = paper.text.partition("[excitation.chirp]")[0] + (
+        '[excitation.m]\nkind = "multisine"\nlines = "odd"\nstart = "10 Hz"\nstop = "100 Hz"\nperiod = "0.1 s"\n'
+        'rms = "0.2 V"\noffset = "6 V"\nperiods = 2\nrealisations = 1\nseed = 1\ntruth = "linear"\n'
+        '[excitation.s]\nkind = "staircase"\nlevels = ["2 V", "8 V"]\ndwell = "0.5 s"\nrise = "5 ms"\nrate = "1 kHz"\n'
+        'truth = "linear"\n'
+    )
+    (tmp_path / "plan.toml").write_text(text, encoding="utf-8")
+    plan = load_plan(tmp_path / "plan.toml")
+    write_folder(plan, tmp_path / "records", SEED)
+    lines, steps = json.loads((tmp_path / "records" / "manifest.json").read_text(encoding="utf-8"))["records"]
+    assert (lines["files"], steps["files"]) == (["m.tdms"], ["s.tdms"])
+    assert (lines["lines"], lines["step_samples"]) == ([1, 3, 5, 7, 9], [])
+    assert (steps["lines"], steps["step_samples"], steps["rest_v"], steps["rate_hz"]) == ([], [505], 2.0, 1e3)
+
+
+@pytest.mark.promise("bench-5", "bench-10")
+def test_an_amplifier_stands_before_the_benchs_own_mirror_alone(paper):
+    """Its slew is that of its output: with twice the gain twice as much is the same."""
+
+    def played(truth, **changes):
+        plan = select_records(paper, ["loop-100hz"])
+        amplifier = plan.bench.amplifier.model_copy(update=changes)
+        plan = replace(plan, bench=plan.bench.model_copy(update={"amplifier": amplifier}))
+        record = replace(plan.records[0], truth=truth)
+        return true_output(plan, record)[1]
+
+    usual, slow = {}, {"bandwidth_hz": 50.0}
+    assert np.array_equal(played("linear", **usual), played("linear", **slow))
+    assert np.array_equal(played("bouc-wen", **usual), played("bouc-wen", **slow))
+    assert np.abs(played("bench", **usual) - played("bench", **slow)).max() > 0.01
+    limited = {"gain": 15.0, "slew_v_s": 30e3}
+    assert np.array_equal(played("bench", **limited), played("bench", gain=30.0, slew_v_s=60e3))
+    assert np.abs(played("bench", **usual) - played("bench", **limited)).max() > 0.01
+
+
 def test_progress_names_each_record(paper):
     seen = []
     play(select_records(paper, ["loop-60hz", "loop-80hz"]), SEED, lambda *told: seen.append(told))
@@ -179,6 +224,7 @@ def from_lvm(path):
     assert segment["Delta_X"] == [2e-5, 2e-5]
     assert segment["Samples"] == [6000, 6000]
     assert segment["Y_Unit_Label"] == ["V", "mrad"]
+    assert {str(each) for each in [data["Date"], *np.ravel(segment["Date"])]} == {"1904/01/01"}
     assert segment["Channel names"] == ["X_Value", "drive", "angle"]
     assert np.allclose(np.diff(segment["data"][:, 0]), 2e-5, rtol=1e-6)
     return segment["data"][:, 1], segment["data"][:, 2]
@@ -210,7 +256,7 @@ def from_mat73(path):
         scipy.io.loadmat(path)
     with h5py.File(path) as file:
         assert file["drive"].attrs["MATLAB_class"] == b"double"
-        assert file["rate_hz"][:] == 50e3
+        assert (file["rate_hz"][0, 0], file["period_samples"][0, 0]) == (50e3, 500)
         return file["drive"][0], file["angle"][0]
 
 
@@ -223,7 +269,7 @@ def from_npz(path):
 
 def from_hdf5(path):
     with h5py.File(path) as file:
-        assert file.attrs["rate_hz"] == 50e3
+        assert (file.attrs["rate_hz"], file.attrs["period_samples"]) == (50e3, 500)
         assert file["angle"].attrs["units"] == "mrad"
         return file["drive"][:], file["angle"][:]
 
@@ -247,6 +293,8 @@ def folder(short, tmp_path_factory):
     return folder
 
 
+@pytest.mark.promise("bench-1", "bench-5", "bench-11")
+@pytest.mark.promise("gallery-6", "readme-10")
 @pytest.mark.parametrize("form", FORMATS)
 def test_a_file_holds_what_was_played(folder, short, form):
     name, read = READERS[form]
@@ -257,6 +305,7 @@ def test_a_file_holds_what_was_played(folder, short, form):
         assert np.array_equal(found, expected) if exact else np.allclose(found, expected, rtol=1e-8, atol=1e-9)
 
 
+@pytest.mark.promise("bench-2", "bench-12", "bench-13")
 def test_the_folder_holds_plan_and_manifest(folder, short):
     assert (folder / "plan.toml").read_text(encoding="utf-8") == short.text
     manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
@@ -264,6 +313,8 @@ def test_the_folder_holds_plan_and_manifest(folder, short):
     assert (manifest["seed"], manifest["plan"]["sha256"]) == (SEED, short.sha256)
     assert (record["use"], record["kind"], record["truth"]) == ("identification", "sines", "bouc-wen")
     assert (record["rate_hz"], record["period_samples"], record["rest_v"]) == (50e3, 500, 6.0)
+    assert (record["lines"], record["step_samples"]) == ([], [])
+    assert set(manifest["versions"]) == {"python", "microrad", "numpy", "scipy", "numba"}
     assert record["files"] == [name for name, _ in READERS.values()]
     for name, digest in manifest["files_sha256"].items():
         assert hashlib.sha256((folder / name).read_bytes()).hexdigest() == digest
@@ -292,6 +343,7 @@ def test_a_folder_is_not_replaced_unless_asked_and_ours(short, tmp_path):
     assert (foreign / "thesis.tex").exists()
 
 
+@pytest.mark.promise("bench-12")
 def test_a_folder_is_never_half_written(short, tmp_path):
     folder = tmp_path / "out"
     bad = with_sensor(short, converters_output_max_rad=1e-3)
@@ -320,6 +372,7 @@ def test_hdf5_is_whole_before_a_disk_can_be_full(short, tmp_path, monkeypatch, f
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.promise("licences-1")
 def test_a_format_without_its_library_says_what_to_install(short, tmp_path, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "nptdms", None)
     with pytest.raises(BenchError, match=r"needs npTDMS, which is not installed: .* constraints.txt '\.\[lab\]'"):

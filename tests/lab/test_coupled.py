@@ -1,6 +1,7 @@
 """The ladder for several channels: what it chooses, what it hands on bit for bit, how it stops, what it refuses."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from scipy.linalg import block_diag
 from microrad.core import kernels
 from microrad.core.periodic import delayed
 from microrad.lab.identify.coupled import hysteretic, identify_coupled, ladder, linear, linear_errors
-from microrad.lab.identify.coupled.channels import channels
+from microrad.lab.identify.coupled.channels import _rounded_bias, channels
 from microrad.lab.identify.coupled.held_out import held_out_error, smallest_within_noise
 from microrad.lab.identify.coupled.ladder import LadderOptions
 from microrad.lab.identify.linear.modal import ModalModel
@@ -96,6 +97,9 @@ def found(hysteretic_records):
 
 
 # ----------------------------------------------------------------------------------------------------------- the choice
+@pytest.mark.promise("hysteretic-stiffness-15")
+@pytest.mark.promise("identify-40", "identify-41", "identify-43")
+@pytest.mark.promise("identify-61")
 def test_hysteretic_stiffness_is_found_where_it_is(found):
     result, _, _ = found
     names = [candidate.name for candidate in result.candidates]
@@ -115,6 +119,7 @@ def test_hysteretic_stiffness_is_found_where_it_is(found):
     assert not result.stopped and result.refused == ()
 
 
+@pytest.mark.promise("identify-42", "identify-45")
 def test_errors_are_rms_by_amplitude_output_and_band(found, hysteretic_records):
     result, _, _ = found
     own = result.candidate()
@@ -130,6 +135,7 @@ def test_errors_are_rms_by_amplitude_output_and_band(found, hysteretic_records):
     assert result.bands_hz.size == own.band_error_rms.shape[1] + 1
 
 
+@pytest.mark.promise("identify-43", "identify-45")
 def test_the_linear_model_is_enough_where_the_truth_is_linear():
     result = identify_coupled(records(0.0, 1e-2, linear.STEPS), output_unit="rad", options=ORDERS)
     assert result.chosen == "coupled linear, order 4"
@@ -148,6 +154,7 @@ def test_the_linear_model_is_enough_where_the_truth_is_linear():
     assert (size.real < 1.0).all() and (size.imag < 1.0).all()
 
 
+@pytest.mark.promise("identify-43")
 def test_the_smaller_model_wins_unless_the_difference_is_certain():
     class Own:
         def __init__(self, losses):
@@ -160,7 +167,22 @@ def test_the_smaller_model_wins_unless_the_difference_is_certain():
     assert smallest_within_noise([near, large], [10, 20])[0] == 0
 
 
+@pytest.mark.promise("identify-40")
+def test_what_is_held_out_is_seen_by_no_fit(hysteretic_records):
+    few = hysteretic_records[:4]
+    changed = [*few[:3], replace(few[3], output=1.5 * few[3].output[::-1], sha256="changed")]
+    quick = LadderOptions(axis_orders=(2,), linear_orders=(2,))
+    one, other = (identify_coupled(each, output_unit="rad", options=quick) for each in (few, changed))
+    assert one.held_out == other.held_out == ("0.4 V, 3",)
+    for a, b in zip(one.candidates, other.candidates, strict=True):
+        for name in "ABCD":
+            np.testing.assert_array_equal(getattr(a.model.mirror, name), getattr(b.model.mirror, name))
+        assert b.error_share > 1.2 * a.error_share
+
+
 # ---------------------------------------------------------------------------------------------------- what is handed on
+@pytest.mark.promise("hysteretic-stiffness-15")
+@pytest.mark.promise("decisions-1")
 def test_the_model_is_the_fit_and_the_file_is_the_model(found, tmp_path):
     result, _, _ = found
     for candidate in result.candidates:
@@ -172,6 +194,7 @@ def test_the_model_is_the_fit_and_the_file_is_the_model(found, tmp_path):
         assert np.abs(read.response(drive)).max() > 0
 
 
+@pytest.mark.promise("mirror-file-52")
 def test_errors_of_the_hysteretic_fit_come_from_its_records(found):
     own = found[0].candidate()
     known = own.model.known
@@ -182,6 +205,7 @@ def test_errors_of_the_hysteretic_fit_come_from_its_records(found):
     assert {"hysteresis.1.weights.1", "hysteresis.1.polynomial.2"} < set(known.parameters)
 
 
+@pytest.mark.promise("identify-41")
 def test_each_amplitude_has_its_response_and_the_models(found):
     result, _, _ = found
     for response, modelled in zip(result.responses, result.modelled, strict=True):
@@ -202,6 +226,8 @@ def test_derivatives_of_a_linear_model_against_differences(hysteretic_records):
     theta = np.concatenate([-poles.real, poles[1:].imag, plant.B.ravel(), plant.C.ravel(), direct.ravel(), [0.0]])
     names = linear_errors.names(ModalModel(poles, b, c, direct), range(2), range(2))
     assert len(names) == theta.size == exact.shape[3]
+    of_outputs = [f"matrices.C.{output}.{state}" for output in (1, 2) for state in range(1, 6)]
+    assert [name for name in names if name.startswith("matrices.C")] == of_outputs, "as C is ravelled"
     freq = response.freq_hz[slice(0, 200, 20)]
 
     def modelled(values):
@@ -226,6 +252,7 @@ def test_derivatives_of_a_linear_model_against_differences(hysteretic_records):
 
 
 # ------------------------------------------------------------------------------------------- progress, and how it stops
+@pytest.mark.promise("hysteretic-stiffness-15")
 def test_progress_names_the_best_model_so_far(found):
     result, told, heard = found
     assert [candidate.name for candidate in heard] == [candidate.name for candidate in result.candidates]
@@ -235,6 +262,7 @@ def test_progress_names_the_best_model_so_far(found):
     assert "hysteretic stiffness, order 4, iteration 1 of 25; best so far coupled linear, order 4: " in iterations[0]
 
 
+@pytest.mark.promise("identify-44")
 def test_stopped_it_returns_what_was_found(hysteretic_records):
     def stop(candidate):
         if candidate.kind == "coupled linear":
@@ -297,6 +325,7 @@ def test_drives_that_copy_each_other_are_named(hysteretic_records):
         identify_coupled(copied, output_unit="rad", options=SHORT)
 
 
+@pytest.mark.promise("identify-39", "identify-40", "identify-50")
 def test_chirps_of_each_drive_give_linear_models(hysteretic_records):
     time = np.arange(4096) / RATE_HZ
     chirp = np.sin(2 * np.pi * (5.0 * time + 40.0 * time**2)) * np.minimum(1.0, 20 * np.minimum(time, time[-1] - time))
@@ -323,6 +352,7 @@ def identify_actuators(given):
     return actuators, tuple(coupled.Output(name, "angle") for name in given[0].output_names)
 
 
+@pytest.mark.promise("identify-39")
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -389,3 +419,12 @@ def test_rounding_in_the_records_is_no_bias(bias):
     output = output + 0.01 * rng.standard_normal(output.shape)
     found = channels(multisine_recordings(drive, output, 2000.0), (), "V", "um", None)
     assert [actuator.bias_v for actuator in found.actuators] == [bias, bias, bias]
+
+
+@pytest.mark.parametrize(("period_samples", "rest"), [(None, 6.0), (256, 6.75)])
+def test_a_drive_rests_where_it_begins_and_a_periodic_one_at_its_mean(period_samples, rest):
+    """A step up for a quarter of the time: where it began is where it rests, unless it comes again and again."""
+    drive = np.full((512, 1), 6.0)
+    drive[np.arange(512) % 256 >= 192] = 9.0
+    records = [SimpleNamespace(drive=drive, period_samples=period_samples)]
+    assert _rounded_bias(records) == pytest.approx([rest])

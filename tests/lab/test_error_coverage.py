@@ -2,15 +2,18 @@
 
 import math
 import os
+import re
 import subprocess
 import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import stats
 
 import truths
-from places import benchmark
+from microrad.lab.identify.hysteresis.prandtl_ishlinskii import threshold_grid
+from places import ROOT, benchmark
 
 coverage = benchmark("error_coverage")
 
@@ -29,6 +32,7 @@ def test_bound_of_a_line_is_that_of_the_textbook():
     assert coverage.cramer_rao([time[:, None]] * 2, 0.3)[0, 0] == pytest.approx(one[0, 0] / 2, rel=ROUNDING)
 
 
+@pytest.mark.promise("identify-31")
 def test_bound_of_a_sine_is_that_of_the_textbook():
     """Amplitude A and phase of a sine over whole periods, in units that differ by 1e6: 2 sigma^2/N, over A^2."""
     turns, amplitude = 2 * np.pi * np.arange(1000) / 100, 3e-6
@@ -49,6 +53,7 @@ def test_errors_of_functions_of_correlated_values():
 
 
 # ---- the truths
+@pytest.mark.promise("identify-31")
 @pytest.mark.parametrize("seed", [0, 1])
 def test_truth_is_what_slower_twins_say(seed):
     """Hysteresis, resonance, creep and delay of a truth, by the oracles of the tests from the delayed drive."""
@@ -84,6 +89,7 @@ def judged(off, error=1.0, name="damping"):
     return coverage.Judged(0, name, 10.0, 10.0 + off * error, error, 0.5)
 
 
+@pytest.mark.promise("identify-31")
 def test_line_of_the_table_counts_what_is_known_and_what_is_held():
     rows = (judged(0.5), judged(-1.9), judged(2.0), judged(0.0, 11.0), judged(0.0, math.nan))
     line = coverage.Line("damping", rows)
@@ -95,6 +101,7 @@ def test_line_of_the_table_counts_what_is_known_and_what_is_held():
     assert str(line) == "damping                       5    60%    67%    9 to  99 %    2.00  too few known"
 
 
+@pytest.mark.promise("identify-31")
 @pytest.mark.parametrize(
     ("offs", "error", "missed"),
     [
@@ -120,7 +127,47 @@ def test_table_takes_weights_together_and_the_residual_apart():
     ]
 
 
+@pytest.mark.promise("decisions-1")
+def test_the_page_of_decisions_has_the_line_of_the_table():
+    decisions, identify = (
+        (ROOT / "docs" / f"{name}.md").read_text(encoding="utf-8") for name in ("decisions", "identify")
+    )
+    count, share = re.search(r"\| \*\*all parameters\*\* \| (\d+) \| 100 % \| (\d+ %) ", identify).groups()
+    assert f"{share} of {count} parameters within 1.96 of their errors" in decisions
+
+
+@pytest.mark.promise("identify-56")
+def test_the_lines_of_the_page_belong_together():
+    """Each interval is that of some number of cases that rounds to the share; all parameters are those above them."""
+    page = (ROOT / "docs" / "identify.md").read_text(encoding="utf-8")
+    row = r"(?m)^\| (.*?) \| (\d+) \| (\d+) % \| (\d+) % \((\d+) to (\d+)\) \| ([\d.]+) \|$"
+    *parts, (_, *whole) = [(name, *map(float, cells)) for name, *cells in re.findall(row, page)]
+    assert len(parts) == len({name for name, *_ in parts}) == 14
+    for name, cases, known, held, low, high, width in [*parts, ("all", *whole)]:
+        with_error = round(cases * known / 100.0)
+        ends = [
+            tuple(round(100 * end) for end in stats.binomtest(k, with_error).proportion_ci(method="exact"))
+            for k in range(with_error + 1)
+            if abs(100.0 * k / with_error - held) <= 0.5
+        ]
+        assert (low, high) in ends, name
+        assert known >= 80.0 and 1.0 < width < 2.0
+    assert sum(cases for name, cases, *_ in parts if not name.startswith("residual")) == whole[0]
+    below = {name for name, _, _, held, *_ in parts if not 90.0 <= held <= 99.0}
+    assert below == {"d1", "delta"}
+
+
+@pytest.mark.promise("identify-57")
+def test_the_models_were_true_but_for_the_noise():
+    assert coverage.THRESHOLDS_V.tolist() == threshold_grid(coverage.SPAN_V, 15).tolist()
+    np.testing.assert_allclose(np.diff(np.log10(coverage.LAGS_S)), 1.0)
+    for seed in range(6):
+        models = coverage.FAMILIES[coverage.draw_truth(seed).family]
+        assert len({name.partition("_")[0] for name in models}) == 1
+
+
 # ---- a few of them identified
+@pytest.mark.promise("decisions-1")
 @pytest.mark.parametrize("seed", [32, pytest.param(12, marks=pytest.mark.endurance)])
 def test_known_truth_is_found_within_its_errors(seed):
     """Plays with creep and a delay, and with a delay: each number within four of its errors."""
@@ -136,6 +183,9 @@ def test_known_truth_is_found_within_its_errors(seed):
     assert 0.5 < by["resonance"].error / by["resonance"].bound < 2.0
 
 
+@pytest.mark.promise("identify-31")
+@pytest.mark.promise("decisions-1")
+@pytest.mark.promise("identify-53")
 @pytest.mark.endurance
 def test_all_truths_meet_the_bars():
     """As the benchmark prints it, with BLAS in one thread as the command line has it: no line misses a bar."""

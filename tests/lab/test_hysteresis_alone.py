@@ -21,6 +21,7 @@ def recorded(output):
     return recording_from_arrays(DRIVE, output, RATE)
 
 
+@pytest.mark.promise("choose-3")
 def test_the_parameters_of_a_known_model_come_back_within_their_errors():
     fit = fit_hysteresis(recorded(BOUC_WEN.response(DRIVE - 30.0, 1 / RATE) + NOISE), output_unit="rad")
     truth = {"d1": 50e-6, "d2": 0.0, "epsilon": -2e-6, "delta": 4e-4, "alpha": 0.3, "beta": 0.1}
@@ -33,6 +34,7 @@ def test_the_parameters_of_a_known_model_come_back_within_their_errors():
     assert np.std(left) < 0.2e-7
 
 
+@pytest.mark.promise("choose-3")
 @pytest.mark.parametrize("name", [form for form in STATIC_FORMS if form.startswith("prandtl")])
 def test_plays_follow_a_mirror_of_plays(name):
     fit = fit_hysteresis(recorded(PLAYS.response(DRIVE - 30.0, 1 / RATE) + NOISE), name, output_unit="rad")
@@ -43,6 +45,7 @@ def test_plays_follow_a_mirror_of_plays(name):
     assert all(key.startswith(("weight at ", "widening", "creep at ")) for key in fit.values)
 
 
+@pytest.mark.promise("choose-3")
 def test_creep_is_told_from_hysteresis():
     dwell = np.repeat([0.0, 3.0, 6.0, 3.0, 0.0, -3.0, 0.0], 2000)
     drive = np.convolve(dwell, np.ones(50) / 50, mode="same")

@@ -1,14 +1,19 @@
 """Identification: recoveries, uncertainty, held-out honesty, and mirror files, each against known parameters."""
 
 import math
+import os
 import re
+import subprocess
+import sys
 import tomllib
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import scipy.optimize
 from scipy.integrate import solve_ivp
+from scipy.signal import lfilter
 
 from microrad.core.kernels import bouc_wen_response, play_response
 from microrad.lab.identify import (
@@ -22,15 +27,16 @@ from microrad.lab.identify import (
     mirror_file_text,
     predict,
 )
-from microrad.lab.identify.hysteresis.bouc_wen import _bound_gradient
+from microrad.lab.identify.hysteresis.bouc_wen import _bound_gradient, _not_identified
+from microrad.lab.identify.hysteresis.plant_fit import _not_identified as _not_identified_jointly
 from microrad.lab.identify.mirror_file import _names
 from microrad.lab.identify.records import fastest_rate, lead, si_records, transient
 from microrad.lab.identify.selection import candidates
 from microrad.lab.identify.selection.choice import choose_best
-from microrad.lab.identify.statistics import colour_inflation
+from microrad.lab.identify.statistics import colour_inflation, may_be_chance
 from microrad.lab.recording import read_recording, recording_from_arrays
 from microrad.mission.file import load_mirror
-from places import DATA
+from places import DATA, ROOT
 
 RATE_HZ = 50_000.0
 D1, D2, EPSILON, DELTA, ALPHA, BETA = PAPER = (0.089e-3, -2.96e-7, -0.048e-3, 0.00047, 38.421, 34.635)
@@ -97,6 +103,7 @@ def identification():
 
 
 # -------------------------------------------------------------------------------------------------- recovery, Bouc-Wen
+@pytest.mark.promise("identify-19")
 def test_recovers_the_paper_from_100_hz(fit_100hz):
     assert abs(fit_100hz.model.d1_rad_v / D1 - 1) < 0.002
     assert abs(fit_100hz.model.delta_s_v / DELTA - 1) < 0.05
@@ -115,6 +122,75 @@ def test_100_hz_predicts_other_frequencies(fit_100hz, freq_hz):
     rms_percent = 100 * np.sqrt(np.mean(residual**2)) / np.ptp(prediction.measured_rad)
     assert 0 < rms_percent < 0.3
     assert prediction.clamped == 0
+
+
+@pytest.mark.promise("identify-29")
+def test_a_rate_beyond_the_fitted_one_is_clamped_and_counted(fit_100hz):
+    assert fit_100hz.rate_limit_v_per_s == pytest.approx(6 * 2 * np.pi * 100, rel=0.01)
+    fast = record(140, noise=0.0)
+    rate = np.abs(np.diff(fast.drive[:, 0])) * RATE_HZ
+    prediction = predict(fit_100hz, fast)
+    assert prediction.clamped == pytest.approx(np.sum(rate > fit_100hz.rate_limit_v_per_s), abs=50)
+    assert prediction.clamped > 1000
+    free = replace(fit_100hz, model=replace(fit_100hz.model, rate_limit_v_s=math.inf))
+    assert np.abs(free.response(fast.drive[:, 0], fast.step_s)[0] - prediction.model_rad).max() > 1e-6
+
+
+@pytest.mark.promise("identify-23")
+def test_residuals_are_in_per_cent_of_the_largest_fitted_output():
+    small = play_record([0.05, 0.02], [0.0, 1.0])
+    large = replace(small, drive=2.0 * small.drive, output=2.0 * small.output, path="large", sha256="large")
+    found = identify([small, large], 0.5, models=("prandtl_ishlinskii",))
+    assert found.span_rad == pytest.approx(1e-3 * np.ptp(large.output[:2000]))
+    left = np.concatenate([p.residual_rad[p.split :] for p in found.predictions[0]])
+    assert found.score().held_out_rms_percent == pytest.approx(100 * np.sqrt(np.mean(left**2)) / found.span_rad)
+
+
+@pytest.mark.promise("identify-24")
+@pytest.mark.parametrize(
+    ("error", "between", "named"), [(0.48, 0.0, False), (0.52, 0.0, True), (0.1, 0.94, False), (0.1, -0.96, True)]
+)
+def test_what_counts_as_not_identified(error, between, named):
+    values = np.array(PAPER)
+    size = np.where(np.arange(6) == 0, error, 0.01) * np.abs(values)
+    correlation = np.eye(6)
+    correlation[0, 1] = correlation[1, 0] = between
+    covariance = size[:, None] * correlation * size
+    assert ("d1" in {each.name for each in _not_identified(values, covariance, False, False)}) == named
+    structure = SimpleNamespace(
+        parameters=[SimpleNamespace(name=f"p{k}", lower=-math.inf, upper=math.inf, unit="") for k in range(6)]
+    )
+    assert ("p0" in dict(_not_identified_jointly(structure, values, covariance))) == named
+    structure.parameters[3].upper = values[3]
+    assert "at its bound" in dict(_not_identified_jointly(structure, values, covariance))["p3"]
+
+
+@pytest.mark.promise("identify-27")
+@pytest.mark.endurance
+def test_other_processors_find_the_same_parameters():
+    """Other kernels of BLAS move the parameters of a chosen model by less than a hundredth of their errors."""
+    code = (
+        "import sys; sys.path[:0] = ['tests', 'tests/lab']\n"
+        "import numpy as np, truths\n"
+        "from microrad.lab.identify import identify\n"
+        "def of(drive, seed, name, **words):\n"
+        "    strain = truths.plays(drive, (0.0, 0.6, 1.9), (6e-5, 1.5e-5, 1e-5))\n"
+        "    output = truths.behind_resonance(strain, 4000.0, held=True)\n"
+        "    return truths.recorded(drive, output, 4000.0, seed=seed, name=name, **words)\n"
+        "loops = [of(truths.two_sines(6000, 4000.0, f), k, f'{f}') for k, f in enumerate((2.0, 12.0))]\n"
+        "wide = of(truths.small_multisine(4000.0, 4000, 2), 0, 'wide', noise=3e-3, period=4000)\n"
+        "fit = identify([wide, *loops], models=('linear', 'prandtl_ishlinskii_joint')).fit().fit\n"
+        "print(*fit.values.tolist(), *fit.standard_errors.tolist())"
+    )
+    found = []
+    for kernels in ("Prescott", "Haswell"):
+        environment = {**os.environ, "OPENBLAS_CORETYPE": kernels, "OPENBLAS_NUM_THREADS": "1"}
+        ran = subprocess.run(
+            [sys.executable, "-c", code], env=environment, cwd=ROOT, capture_output=True, text=True, check=True
+        )
+        found.append(np.array(list(map(float, ran.stdout.split()))).reshape(2, -1))
+    (one, errors), (other, _) = found
+    assert np.all(np.abs(one - other) <= 0.01 * errors) and np.all(errors >= 0.0) and one.size > 5
 
 
 def test_recovers_from_an_independent_generator():
@@ -147,6 +223,7 @@ def test_several_records_know_more(fit_100hz, fit_trio):
     assert fit_trio.samples_used < 15_000
 
 
+@pytest.mark.promise("identify-6")
 def test_offsets_are_found_per_record():
     records = [record(100, 1), record(60, 2)]
     shifted = [replace(r, output=r.output + c) for r, c in zip(records, (0.5, -2.0), strict=True)]
@@ -169,6 +246,7 @@ def test_bounded_hysteresis(fit_100hz, fit_trio):
 
 
 # ---------------------------------------------------------------------------------------------------- starts and seeds
+@pytest.mark.promise("identify-26")
 def test_starts_are_reported(fit_100hz):
     costs = np.array(fit_100hz.start_rms_percent)
     assert costs.shape == (12,)
@@ -176,6 +254,7 @@ def test_starts_are_reported(fit_100hz):
     assert fit_100hz.agreeing_starts == np.sum(costs <= costs.min() * math.sqrt(1.001))
 
 
+@pytest.mark.promise("identify-26")
 def test_a_start_in_a_wrong_minimum_is_not_counted():
     fit = fit_bouc_wen([record(100)], admissible=True)
     assert 1 <= fit.agreeing_starts < 12
@@ -199,6 +278,7 @@ def test_progress_is_called_per_start():
 
 
 # --------------------------------------------------------------------------------------------------------- uncertainty
+@pytest.mark.promise("identify-24")
 def test_standard_errors_match_the_scatter():
     fits = [fit_bouc_wen([record(100, 10 + seed)], starts=1) for seed in range(12)]
     scatter = np.std([fit.values for fit in fits], axis=0, ddof=1)
@@ -217,6 +297,7 @@ def test_condition_and_correlation(fit_100hz, fit_trio):
     np.testing.assert_allclose(fit_100hz.covariance, fit_100hz.covariance.T)
 
 
+@pytest.mark.promise("identify-24")
 def test_parameters_not_identified_are_named_with_reason(fit_100hz, fit_trio):
     reasons = {item.name: item.reason for item in fit_100hz.not_identified}
     assert {"alpha", "beta", "d2"} <= set(reasons)
@@ -237,6 +318,7 @@ def test_delta_is_not_identified_from_a_triangle_of_one_rate():
     assert "one rate only" in reasons["delta"]
 
 
+@pytest.mark.promise("identify-24")
 def test_coloured_residuals_inflate_the_errors():
     white = philox(1).standard_normal(20_000)
     assert 1.0 <= colour_inflation([white]) < 1.2
@@ -246,6 +328,16 @@ def test_coloured_residuals_inflate_the_errors():
         coloured[k] = 0.9 * coloured[k - 1] + white[k]
     assert colour_inflation([coloured]) == pytest.approx(19.0, rel=0.25)  # (1 + 0.9) / (1 - 0.9)
     assert colour_inflation([white, coloured]) == colour_inflation([coloured])
+
+
+def test_a_difference_of_models_may_be_chance_where_the_noise_is_coloured():
+    """Three standard errors of white noise are less than one of noise of which only one sample in 19 is new."""
+    white = philox(1).standard_normal(20_000)
+    coloured = lfilter([1.0], [1.0, -0.9], white)
+    for noise, chance in ((white, False), (coloured, True)):
+        difference = noise - noise.mean() + 3.0 * noise.std() / math.sqrt(noise.size)
+        assert may_be_chance([difference], [np.zeros(noise.size)]) is chance
+    assert may_be_chance([white], [white])
 
 
 def test_a_residual_of_one_step_is_not_taken_round_from_its_end_to_its_begin():
@@ -277,6 +369,7 @@ def test_lowest_slope_is_that_of_the_modelled_output(fit_100hz):
     assert fit_100hz.lowest_slope_rad_per_v <= numeric.min()  # the slope eases within the step behind a reversal
 
 
+@pytest.mark.promise("identify-19", "identify-22")
 @pytest.mark.parametrize("freqs", [pytest.param((100,), marks=pytest.mark.endurance), (60, 80, 100)])
 def test_admissible_fit_never_turns_against_the_drive(freqs):
     recordings = [record(f, i) for i, f in enumerate(freqs)]
@@ -308,6 +401,7 @@ def test_admissible_set_is_recognised():
 
 
 # --------------------------------------------------------------------------------------------------- play operators
+@pytest.mark.promise("identify-19")
 def test_play_weights_are_recovered():
     thresholds, weights = [0.0, 0.5, 1.0, 2.0], [0.05, 0.01, 0.0, 0.03]
     fit = fit_prandtl_ishlinskii([play_record(weights, thresholds)], thresholds)
@@ -344,6 +438,7 @@ def test_a_threshold_from_half_of_the_drive_on_is_refused_with_that_half():
     assert fit_prandtl_ishlinskii([record], [0.0, 0.999 * half]).thresholds_v[1] == 0.999 * half
 
 
+@pytest.mark.promise("identify-51")
 def test_default_thresholds():
     fit = fit_prandtl_ishlinskii([play_record([0.05, 0.03], [0.0, 1.0])], operators=7)
     assert fit.thresholds_v.size == 7
@@ -351,6 +446,7 @@ def test_default_thresholds():
     assert 0.4 < fit.thresholds_v[-1] / np.ptp(play_record([0.05], [0.0]).drive) < 0.5
 
 
+@pytest.mark.promise("identify-51")
 @pytest.mark.parametrize("thresholds", [[0.5, 1.0], [0.0, 1.0, 1.0], [0.0, 50.0], [0.0, math.nan], [[0.0, 1.0]], []])
 def test_thresholds_are_refused(thresholds):
     with pytest.raises(IdentificationError, match="must start at 0"):
@@ -358,11 +454,13 @@ def test_thresholds_are_refused(thresholds):
 
 
 # --------------------------------------------------------------------------------------------------- shared machinery
+@pytest.mark.promise("identify-18")
 def test_transient_is_one_sweep_of_the_range():
     assert transient(sine(100)) == pytest.approx(500 * 0.6782, abs=2)  # up from the middle, then down to -0.9
     assert transient(np.linspace(0, 1, 1000)) == 500  # never more than half
 
 
+@pytest.mark.promise("identify-29")
 def test_fastest_rate_ignores_spikes_and_noise():
     exact = 6 * 2 * np.pi * 100
     clean = record(100)
@@ -399,6 +497,7 @@ def test_units_are_refused(words, message):
         identify([record(100)], **words)
 
 
+@pytest.mark.promise("identify-8")
 @pytest.mark.parametrize(
     ("words", "message"),
     [
@@ -438,6 +537,7 @@ def test_a_drive_of_steps_has_a_rate(monkeypatch):
 
 
 # ----------------------------------------------------------------------------------------------------------- held out
+@pytest.mark.promise("identify-1", "identify-11")
 def test_choice_on_held_out_samples(identification):
     by_name = {score.model: score for score in identification.scores}
     assert identification.chosen == "bouc_wen"
@@ -450,6 +550,7 @@ def test_choice_on_held_out_samples(identification):
         assert f"{score.held_out_rms_percent:.3g} %" in identification.reason
 
 
+@pytest.mark.promise("identify-23")
 def test_straight_line_is_the_least_squares_line():
     r = play_record([0.05, 0.03], [0.0, 1.0])
     result = identify([r], 0.5, models=("prandtl_ishlinskii",))
@@ -463,6 +564,7 @@ def test_straight_line_is_the_least_squares_line():
     assert result.straight_line.held_out_rms_percent == pytest.approx(held_out, rel=1e-9)
 
 
+@pytest.mark.promise("identify-8", "identify-9")
 def test_held_out_samples_are_not_seen_by_the_fit():
     original = record(100, 5, seconds=0.2)
     drive, output = original.drive.copy(), original.output.copy()
@@ -485,6 +587,7 @@ def test_held_out_samples_are_not_seen_by_the_fit():
     assert any("The residual grows" in w for w in b.warnings)
 
 
+@pytest.mark.promise("identify-9")
 def test_states_are_carried_into_the_held_out_part():
     r = play_record([0.05, 0.05], [0.0, 2.0], noise=0)
     fit = fit_prandtl_ishlinskii([r], [0.0, 2.0])
@@ -495,6 +598,7 @@ def test_states_are_carried_into_the_held_out_part():
     assert np.max(np.abs(fresh)) > 1e-6
 
 
+@pytest.mark.promise("identify-1", "identify-29")
 def test_warnings_of_two_rates(identification):
     text = "\n".join(identification.warnings)
     assert "drives from 0 V to 12 V" in text
@@ -507,6 +611,8 @@ def test_warnings_of_two_rates(identification):
     assert identification.travel_rad == pytest.approx(1.07e-3, rel=0.02)
 
 
+@pytest.mark.promise("identify-6")
+@pytest.mark.promise("identify-54")
 def test_warnings_of_one_rate_drift_and_noise():
     r = record(100, 3, seconds=0.2)
     trend = 0.05 * np.ptp(r.output) * np.linspace(0, 1, r.samples)[:, None]
@@ -519,6 +625,7 @@ def test_warnings_of_one_rate_drift_and_noise():
     assert result.drift_rad == pytest.approx(0.05 * result.span_rad, rel=0.2)
 
 
+@pytest.mark.promise("identify-11")
 @pytest.mark.parametrize(("extra", "best"), [(0.1, 1), (0.5, 0)])
 def test_a_tie_goes_to_the_admissible_model(fit_100hz, extra, best):
     """Extra residuals of 0.1 rms raise the mean square by 1 %, which 1000 samples cannot tell; 0.5 rms they can."""
@@ -571,6 +678,8 @@ def number(text, unit):
     return float(value)
 
 
+@pytest.mark.promise("mirror-file-1")
+@pytest.mark.promise("readme-9")
 @pytest.mark.parametrize("model", STATIC)
 def test_mirror_file_reads_back(identification, model):
     text = mirror_file_text(identification, 'A "mirror" \\ µ', model=model)
@@ -603,6 +712,7 @@ def test_mirror_file_reads_back(identification, model):
     assert min(weights[1:]) > 0
 
 
+@pytest.mark.promise("identify-24")
 def test_mirror_file_carries_its_origin(identification):
     text = mirror_file_text(identification, "m")
     for source in identification.sources:
@@ -658,6 +768,8 @@ def test_a_mission_accepts_the_mirror_file(identification, model, tmp_path):
         assert mirror.bouc_wen.epsilon_rad_v == pytest.approx(identification.fit(model).model.epsilon_rad_v, rel=1e-12)
 
 
+@pytest.mark.promise("mirror-file-7")
+@pytest.mark.promise("identify-6")
 @pytest.mark.parametrize("model", STATIC[:2])
 def test_falling_sensor_gives_a_rising_mirror(model):
     rising = record(100, 3)

@@ -85,6 +85,7 @@ def sine(freq_hz, samples=3000, rate_hz=1000.0):
 
 
 # ---------------------------------------------------------------------------------------- plays, linear part, widening
+@pytest.mark.promise("identify-19", "identify-20")
 def test_plays_behind_a_resonance_are_recovered():
     record = recorded(DRIVE, behind_resonance(plays(DRIVE, THRESHOLDS, WEIGHTS), 1000.0))
     fit = fit_joint([record], "prandtl_ishlinskii_joint", UNITS, linear=RESONANCE, hold="first-order")
@@ -95,6 +96,7 @@ def test_plays_behind_a_resonance_are_recovered():
     assert static.residual_rms_percent > 2 * fit.residual_rms_percent
 
 
+@pytest.mark.promise("identify-10")
 def test_the_linear_part_moves_with_the_rest_where_it_is_free():
     drives = (two_sines(), two_sines(freq_hz=10.0))
     loops = [
@@ -117,6 +119,9 @@ def test_the_linear_part_moves_with_the_rest_where_it_is_free():
     assert free.residual_rms_rad == pytest.approx(float(np.sqrt(np.mean(by_hand**2))), rel=1e-12)
 
 
+@pytest.mark.promise("choose-3")
+@pytest.mark.promise("identify-20")
+@pytest.mark.promise("hysteresis-20")
 def test_phase_lag_is_not_counted_twice():
     """A lag of the linear part looks like hysteresis that grows with frequency, and is none."""
     truth = loop_width(fit_like(THRESHOLDS, WEIGHTS), sine(0.5))
@@ -139,6 +144,8 @@ def fit_like(thresholds, weights):
     return PrandtlIshlinskii(tuple(thresholds), tuple(weights))
 
 
+@pytest.mark.promise("choose-3")
+@pytest.mark.promise("identify-19")
 def test_widening_is_recovered_from_two_rates():
     drives = [two_sines(freq_hz=f) for f in (1.0, 8.0)]
     records = [recorded(d, plays(d, THRESHOLDS, WEIGHTS, widening=1e-3), seed=k) for k, d in enumerate(drives)]
@@ -183,8 +190,10 @@ def assert_creep_recovered(fit, weights=(CREEP,) * 3):
         assert error < 0.3 * CREEP
 
 
+@pytest.mark.promise("identify-19", "identify-20")
+@pytest.mark.promise("hysteresis-16")
 def test_each_lag_of_the_creep_has_a_weight_of_its_own():
-    weights = (6e-6, 0.0, 3e-6)
+    weights = (6e-6, 0.0, -3e-6)
     output = plays(DRIVE, THRESHOLDS, WEIGHTS)
     output += sum(creep(DRIVE, 1000.0, (tau,), weight) for tau, weight in zip(CREEP_TIMES, weights, strict=True))
     fit = fit_joint([recorded(DRIVE, output, noise=3e-4)], "prandtl_ishlinskii_creep", UNITS)
@@ -198,6 +207,7 @@ def test_each_lag_of_the_creep_has_a_weight_of_its_own():
     assert not any(name == "creep at 0.01 s" for name, _ in fit.not_identified)
 
 
+@pytest.mark.promise("identify-9", "identify-14", "identify-19")
 def test_creep_is_recovered_whatever_went_before_the_record():
     for before in (None, 9.0):
         fit = fit_joint([crept(before)], "prandtl_ishlinskii_creep", UNITS)
@@ -225,6 +235,8 @@ def test_creep_beside_a_resonance():
     assert_plays_recovered(fit)
 
 
+@pytest.mark.promise("identify-20", "identify-52")
+@pytest.mark.promise("hysteresis-16")
 def test_time_constants_are_decades_that_the_records_show():
     def times(samples, rate_hz):
         drive = two_sines(samples, rate_hz, 10 * rate_hz / samples)
@@ -250,6 +262,7 @@ def asymmetric(generalised):
     return fit_joint(generalised, "bouc_wen_asymmetric", UNITS)
 
 
+@pytest.mark.promise("identify-19")
 def test_asymmetric_parameters_are_recovered(generalised, asymmetric):
     d1, d2, epsilon, delta, alpha, beta = EQ3
     assert_recovered(
@@ -286,6 +299,7 @@ def test_a_falling_sensor_turns_the_signs(generalised, asymmetric):
     assert_allclose(fit.response(drive, 1e-3)[0], -asymmetric.response(drive, 1e-3)[0], atol=1e-8)
 
 
+@pytest.mark.promise("identify-22")
 def test_falling_plays_have_falling_weights():
     record = recorded(DRIVE, -behind_resonance(plays(DRIVE, THRESHOLDS, WEIGHTS), 1000.0))
     fit = fit_joint([record], "prandtl_ishlinskii_joint", UNITS, linear=RESONANCE, hold="first-order")
@@ -294,6 +308,7 @@ def test_falling_plays_have_falling_weights():
     assert fit.admissible
 
 
+@pytest.mark.promise("identify-19")
 def test_the_classical_exponent_is_recovered():
     drive = two_sines(1200, 400.0)
     classical = (EQ3[0], 0.0, EQ3[2], 0.0, *EQ3[4:])
@@ -324,6 +339,7 @@ def lowest_slope(fit, drive, step_s):
     return float(np.min((np.diff(output)[moving] / travel[moving])[drive.size // 4 :]))
 
 
+@pytest.mark.promise("identify-22")
 def test_an_admissible_fit_never_moves_the_wrong_way(paper_loops, monkeypatch):
     """Behind a slow reversal; at 100 Hz delta steepens h again, which the bound does not count."""
     monkeypatch.setattr(joint, "_EVALUATIONS", 25)  # the bound holds on the way, too
@@ -344,6 +360,7 @@ def test_an_admissible_fit_never_moves_the_wrong_way(paper_loops, monkeypatch):
 
 
 # ------------------------------------------------------------------------------------------------- weights and thinning
+@pytest.mark.promise("identify-20")
 def test_a_long_record_does_not_drown_a_short_one():
     """Two gains cannot both be right, and each relative residual counts alike.
 
@@ -409,6 +426,7 @@ def test_starts_on_fewer_samples_lead_to_the_same_fit(monkeypatch):
     assert screened.fit.agreeing_starts == whole.fit.agreeing_starts == 2
 
 
+@pytest.mark.promise("identify-51", "identify-52")
 def test_parameters_in_which_the_output_is_linear():
     """Their derivatives take one simulation, whatever the step; those by two are the same."""
     fit = fit_joint([crept(None)], "prandtl_ishlinskii_rate_creep", UNITS)
@@ -423,6 +441,7 @@ def test_parameters_in_which_the_output_is_linear():
 
 
 # --------------------------------------------------------------------------------------------------------- predictions
+@pytest.mark.promise("identify-9")
 def test_what_a_record_adds_comes_from_its_known_part_alone():
     fit = fit_joint([crept(None)], "prandtl_ishlinskii_creep", UNITS)
     record = crept(9.0, seed=4)
@@ -437,6 +456,7 @@ def test_what_a_record_adds_comes_from_its_known_part_alone():
     assert predict(fit, replace(record, output=moved), 1500).model_rad.mean() > known.model_rad.mean() + 0.05
 
 
+@pytest.mark.promise("identify-9")
 def test_a_split_of_zero_says_that_all_is_unseen():
     fit = fit_joint([crept(None)], "prandtl_ishlinskii_creep", UNITS)
     record = crept(9.0, seed=4)
@@ -484,6 +504,7 @@ def test_creep_is_what_a_real_record_needs():
 
 
 # ------------------------------------------------------------------------------------------------- parts of the whole
+@pytest.mark.promise("identify-19")
 def test_every_form_can_be_fitted_and_run():
     record = recorded(DRIVE[:1500], plays(DRIVE[:1500], THRESHOLDS, WEIGHTS))
     for name in ("linear", "bouc_wen_joint", "prandtl_ishlinskii_rate_creep"):

@@ -16,6 +16,7 @@ from microrad.lab.identify.linear.fit import (
     fit_linear,
     fit_percent,
     output_error,
+    range_warnings,
 )
 from microrad.lab.identify.linear.modal import ModalModel, order_modes, simulate, simulate_periodic
 from microrad.lab.identify.linear.order import fit_order, reduced
@@ -28,7 +29,13 @@ from microrad.lab.identify.linear.polish import (
     unpack,
 )
 from microrad.lab.identify.linear.response import response_from_periods
-from microrad.lab.identify.linear.uncertainty import natural, parameter_covariance, transfer_matrix, transmission_zeros
+from microrad.lab.identify.linear.uncertainty import (
+    Uncertainty,
+    natural,
+    parameter_covariance,
+    transfer_matrix,
+    transmission_zeros,
+)
 from microrad.lab.identify.linear.vector_fitting import vector_fit
 from microrad.lab.identify.records import IdentificationError
 from microrad.lab.identify.statistics import rounded_to_error
@@ -471,8 +478,19 @@ def test_a_value_is_printed_with_the_digits_that_its_error_leaves(value, error, 
     assert rounded_to_error(value, error) == shown
 
 
+@pytest.mark.promise("identify-14")
 def test_creep_is_looked_for_up_to_ten_radians_of_the_lowest_frequency():
     lags = axis._lags(SimpleNamespace(excited_hz=(0.1, 100.0)))  # 10 rad at 0.1 Hz last 15.9 s
     np.testing.assert_allclose(lags, [0.01, 0.0316, 0.1, 0.316, 1.0, 3.16, 10.0], rtol=1e-3)
     assert axis._lags(SimpleNamespace(excited_hz=(160.0, 1000.0))) == ()  # 9.9 ms
     assert axis._lags(SimpleNamespace(excited_hz=(159.0, 1000.0))) == (0.01,)
+
+
+@pytest.mark.parametrize(("dc", "warned"), [(-2.02, False), (-2.2, True), (2.02, False), (2.2, True), (-1.8, True)])
+def test_a_falling_gain_is_warned_of_where_it_differs_at_the_lowest_frequency(dc, warned):
+    edge = 2.0  # a magnitude, as of every frequency
+    roots = np.empty(0, dtype=complex)
+    known = Uncertainty(
+        roots, np.empty(0), roots, np.empty(0), *(np.array([[each]]) for each in (dc, 0.01, edge, 0.01)), 0.0
+    )
+    assert bool(range_warnings(known, (1.0, 1000.0))) is warned

@@ -16,6 +16,7 @@ def csv(path, heading, *columns):
     return path
 
 
+@pytest.mark.promise("pointing-64")
 def test_columns_but_the_time_are_axes_in_the_unit_that_each_states(tmp_path):
     motion = read_motion(csv(tmp_path / "jitter.csv", "time (s),x (urad),y [arcsec]", TIME, X, Y))
     assert motion.names == ("x (urad)", "y [arcsec]") and motion.rate_hz == pytest.approx(500.0, rel=1e-6)
@@ -23,6 +24,7 @@ def test_columns_but_the_time_are_axes_in_the_unit_that_each_states(tmp_path):
     assert_allclose(motion.samples_rad[:, 1], np.radians(Y / 3600.0), rtol=1e-9, atol=1e-18)
 
 
+@pytest.mark.promise("pointing-64")
 def test_an_array_has_the_rate_and_the_unit_that_are_given(tmp_path):
     np.save(tmp_path / "jitter.npy", np.column_stack([X, Y]))
     motion = read_motion(tmp_path / "jitter.npy", ("1",), 500.0, unit="mrad")
@@ -30,6 +32,7 @@ def test_an_array_has_the_rate_and_the_unit_that_are_given(tmp_path):
     assert_allclose(motion.samples_rad[:, 0], 1e-3 * Y, rtol=1e-12)
 
 
+@pytest.mark.promise("pointing-69")
 @pytest.mark.parametrize(
     ("heading", "options", "words"),
     [
@@ -53,6 +56,7 @@ def test_what_is_no_motion_of_the_line_of_sight_is_refused(tmp_path, heading, op
     assert words in str(refused.value) and "\n" not in str(refused.value)
 
 
+@pytest.mark.promise("pointing-64", "pointing-69")
 def test_more_than_three_axes_gaps_and_samples_that_are_no_number_are_refused(tmp_path):
     four = csv(tmp_path / "four.csv", "a (urad),b (urad),c (urad),d (urad)", X, Y, X, Y)
     with pytest.raises(RecordingError, match=r"4 channels \('a \(urad\)', .*\) as axes; name one to three"):

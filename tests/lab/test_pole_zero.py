@@ -12,12 +12,16 @@ from scipy.signal import chirp, lsim
 from microrad.lab.identify.hysteresis.joint import JointFit, fit_joint
 from microrad.lab.identify.hysteresis.plant_fit import coloured_scatter, held
 from microrad.lab.identify.hysteresis.structures import LinearPoles, Roots
+from microrad.lab.identify.linear import axis
 from microrad.lab.identify.linear.axis import fit_axis
 from microrad.lab.identify.linear.modal import late
+from microrad.lab.identify.linear.pole_zero import PoleZero, PoleZeroProblem, Root
+from microrad.lab.identify.linear.response import response_from_records
 from microrad.lab.identify.records import Units
 from microrad.lab.identify.selection.candidates import _fewer_poles, _without_spare_poles
 from microrad.lab.recording import recording_from_arrays
 from microrad.mirror import model as mirror
+from microrad.mission.tables.fine_pointing import FinePointing
 from truths import behind_resonance, creep, philox, plays, recorded, two_sines
 
 NONE = np.zeros((0, 0))  # nothing of a record's own
@@ -74,6 +78,7 @@ def assert_poles(fit, *poles):
 
 
 # ------------------------------------------------------------------------------------------------------------- poles
+@pytest.mark.promise("identify-7", "identify-14", "identify-17")
 def test_a_resonance_with_creep_is_one_pair_of_poles():
     poles = pair(420.0, 0.025)
     drive = swept()
@@ -84,6 +89,7 @@ def test_a_resonance_with_creep_is_one_pair_of_poles():
     assert abs(fit.delay_s) < 4 * fit.delay_error_s < 4e-6
 
 
+@pytest.mark.promise("identify-7", "identify-12", "identify-13", "identify-17")
 @pytest.mark.parametrize("between", ["zero-order", pytest.param("first-order", marks=pytest.mark.endurance)])
 def test_a_delay_is_no_pole_and_the_hold_is_the_one_that_was_named(between):
     poles = pair(1200.0, 0.4)
@@ -96,6 +102,50 @@ def test_a_delay_is_no_pole_and_the_hold_is_the_one_that_was_named(between):
     assert min(s.criterion for s in other.scan) > min(s.criterion for s in fit.scan) + 4.0
 
 
+@pytest.mark.promise("identify-16")
+def test_the_scan_ends_where_three_orders_in_a_row_gain_nothing():
+    drive, told = swept(), []
+    fit = fit_axis(
+        [measured(drive, answer(drive, pair(420.0, 0.2)))],
+        hold="first-order",
+        on_progress=lambda *call: told.append(call),
+    )
+    assert [what for _, _, what in told if what.startswith("order")] == [f"order {n}" for n in range(1, 6)]
+    assert fit.order == 2
+    assert "criterion" in fit.reason and "chi-square + parameters x ln values" in fit.reason
+    assert {total for _, total, _ in told} == {8 + 2}  # as many orders as are tried at most, and two steps behind them
+
+
+def test_what_a_record_cannot_show_is_no_pole():
+    """A pair that rings for a third of the record, and a real pole slower than the fastest lag of creep."""
+    drive = swept()
+    found_response = response_from_records([measured(drive, answer(drive, pair(420.0, 0.2)))])
+    with_creep = PoleZeroProblem(found_response, (0.01, 0.1), 0.6)
+    assert with_creep.slowest_hz == pytest.approx(1 / (2 * math.pi * 0.01))  # 16 Hz
+    assert PoleZeroProblem(found_response, (), 0.6).slowest_hz == pytest.approx(found_response.excited_hz[0])
+    for rings_s, shown in ((0.18, True), (0.2, False)):
+        assert with_creep.shows(Root(420.0, 1 / (2 * math.pi * 420.0 * rings_s))) == shown
+    wrong = PoleZero((Root(300.0, 0.2),), (), 0.0)  # what it leaves at a frequency counts as noise there
+    before, after = (
+        float(np.mean(each.residual(wrong)[: each.values] ** 2)) for each in (with_creep, with_creep.worth_less(wrong))
+    )
+    assert before > 100.0
+    assert 0.3 < after < 1.5
+    fitted = with_creep.fitted(PoleZero((Root(420.0, 0.2),), (), 0.0))
+    assert fitted.criterion == pytest.approx(fitted.chi_square + fitted.parameters * math.log(with_creep.values))
+
+
+@pytest.mark.promise("identify-7", "identify-16")
+def test_what_the_estimate_of_a_narrow_resonance_adds_of_itself_is_taken_off():
+    drive = swept()
+    record = recording_from_arrays(drive, answer(drive, pair(420.0, 0.01)), RATE, "chirp")
+    rough = replace(response_from_records([record], bands=500), hold="first-order")
+    fit = PoleZeroProblem(rough, (), 0.6).fitted(PoleZero((Root(421.0, 0.011),), (), 0.0))
+    better = PoleZeroProblem(axis._unbiased([record], rough, fit), (), 0.6).fitted(fit.at)
+    assert fit.at.poles[0].damping > 1.25 * 0.01  # smeared over a band
+    assert better.at.poles[0].damping == pytest.approx(0.01, rel=0.05)
+
+
 def test_a_pole_and_a_zero_that_the_response_needs_stay():
     poles = [-2 * np.pi * 60.0 + 0j, *pair(1200.0, 0.3)]
     drive = swept()
@@ -104,6 +154,7 @@ def test_a_pole_and_a_zero_that_the_response_needs_stay():
     assert abs(abs(fit.zeros_rad_s[0]) / (2 * np.pi) - 66.0) < 4 * fit.zeros_error_rad_s[0] / (2 * np.pi)
 
 
+@pytest.mark.promise("identify-15")
 def test_the_loss_of_small_loops_is_no_pole():
     poles = pair(420.0, 0.05)
     drive = swept(size=1.0)
@@ -112,12 +163,16 @@ def test_the_loss_of_small_loops_is_no_pole():
     assert_poles(fit, *poles)
 
 
+@pytest.mark.promise("identify-16")
 def test_a_shift_between_samples():
     time = np.arange(300.0)[:, None]
     for samples in (0.0, 3.0, -2.0, 0.4, -1.3):
         shifted = late(np.sin(2 * np.pi * 0.1 * time), samples)
         away = np.abs(shifted - np.sin(2 * np.pi * 0.1 * (time - samples)))[10:-10].max()
         assert away < (1e-12 if samples == round(samples) else 1e-5)
+    for frequency, holds in ((0.2, True), (0.4, False)):  # of the sample rate
+        shifted, true = (np.sin(2 * np.pi * frequency * (time - by)) for by in (0.0, 0.4))
+        assert (np.abs(late(shifted, 0.4) - true)[20:-20].max() < 1e-4) == holds
     assert_allclose(late(np.sin(time), 400.0)[:5], 0.0, atol=1e-12)  # it rests before its first sample
 
 
@@ -156,6 +211,7 @@ def simulated(plant, drive):
     return output[:, 0]
 
 
+@pytest.mark.promise("identify-12")
 def test_the_delay_is_fitted_with_the_poles_and_belongs_to_the_recording():
     drive = swept(seconds=0.6, lowest=5.0, size=3.0)
     poles = pair(700.0, 0.3)
@@ -165,11 +221,13 @@ def test_the_delay_is_fitted_with_the_poles_and_belongs_to_the_recording():
     assert fit.delay_s == pytest.approx(1e-4, abs=1e-6)
     assert fit.linear.poles.frequencies_hz[0] == pytest.approx(700.0, rel=2e-3)
     assert fit.fit.converged
+    assert "delay_s" in FinePointing.model_fields  # a controller's own
     simulated_late = fit.response(drive, 1 / RATE)[0]
     at_once = replace(fit, linear=replace(fit.linear, delay_s=0.0)).response(drive, 1 / RATE)[0]
     assert_allclose(simulated_late[2:], at_once[:-2], atol=2e-3 * np.ptp(at_once))  # two samples later
 
 
+@pytest.mark.promise("identify-24")
 def test_the_error_of_a_sum_counts_the_colour_of_what_is_left():
     """Of a mean of correlated noise the variance is that of white noise times (1 + a) / (1 - a)."""
     a, n = 0.9, 4000
@@ -187,6 +245,7 @@ def test_the_error_of_a_sum_counts_the_colour_of_what_is_left():
     assert_allclose(np.diag(plain) / n, 1.0, rtol=0.3)
 
 
+@pytest.mark.promise("identify-24")
 def test_what_a_fit_takes_out_of_a_residual_is_given_back():
     """Sines at the lowest ten lines and an offset, fitted to white noise: its variance there comes out as it is."""
     n = 400
@@ -218,6 +277,7 @@ def fitted_to(linear, errors):
     return JointFit(**(dict.fromkeys(f.name for f in fields(JointFit)) | parts | {"linear": linear}))
 
 
+@pytest.mark.promise("identify-10")
 def test_a_pole_with_its_zero_and_one_that_is_hardly_known_are_what_may_be_spare():
     """A slow real pair of pole and zero, a resonance that is known, and a pole far beyond the band."""
     linear = LinearPoles(Roots((11.0, 400.0, 20e3), (1.0, 0.03, 1.0)), Roots((11.5, 900.0), (1.0, 1.0)), 30.0, 1e-4)
@@ -231,6 +291,7 @@ def test_a_pole_with_its_zero_and_one_that_is_hardly_known_are_what_may_be_spare
     assert _fewer_poles(fitted_to(LinearPoles(Roots((400.0,), (0.03,)), Roots((), ()), 30.0), (100.0,))) == []
 
 
+@pytest.mark.promise("identify-10")
 def test_poles_go_as_long_as_the_held_out_recordings_do_not_need_them():
     """Of three poles the recordings need one: without it what is left is ten times as large."""
     noise = philox(4).standard_normal(2000)

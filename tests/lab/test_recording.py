@@ -29,6 +29,8 @@ def refusal(path, input_column=1, output_column=2, rate_hz=100.0):
     return message
 
 
+@pytest.mark.promise("recordings-2", "recordings-4")
+@pytest.mark.promise("readme-9")
 @pytest.mark.parametrize("delimiter", [",", ";", "\t", " ", "   ", ", "])
 @pytest.mark.parametrize(
     "header", [None, "time,drive,output", "# time,drive,output", "% remark\n\ntime,drive,output\ns,V,mrad"]
@@ -45,6 +47,7 @@ def test_reads_delimiters_and_headers(tmp_path, delimiter, header):
     assert read.path == str(path)
 
 
+@pytest.mark.promise("recordings-4")
 @pytest.mark.parametrize(
     "change",
     [
@@ -161,6 +164,7 @@ def test_name_given_twice(tmp_path):
     assert "columns 1, 2 are all named 'x'" in message
 
 
+@pytest.mark.promise("recordings-5")
 @pytest.mark.parametrize("column", [3, -1, "7", True])
 def test_number_out_of_range(tmp_path, column):
     message = refusal(write(tmp_path / "a.csv", ROWS), 1, column)
@@ -168,6 +172,7 @@ def test_number_out_of_range(tmp_path, column):
     assert "numbered from 0 to 2" in message
 
 
+@pytest.mark.promise("recordings-5")
 def test_digits_name_a_column_by_number(tmp_path):
     read = read_recording(write(tmp_path / "a.csv", ROWS), "1", "2", 100.0)
     np.testing.assert_array_equal(read.output[:, 0], OUTPUT)
@@ -177,6 +182,7 @@ def test_same_column_twice(tmp_path):
     assert "input and output are both column 1 ('drive')" in refusal(write(tmp_path / "a.csv", ROWS), "drive", 1)
 
 
+@pytest.mark.promise("recordings-2", "recordings-26")
 @pytest.mark.parametrize(
     ("cell", "words"),
     [
@@ -234,6 +240,7 @@ def test_ragged_rows_of_white_space(tmp_path):
     assert "line 100 has 4 cells" in refusal(write(tmp_path / "a.txt", rows, None))
 
 
+@pytest.mark.promise("recordings-26")
 @pytest.mark.parametrize(("column", "role"), [(1, "input"), (2, "output")])
 def test_constant_column(tmp_path, column, role):
     rows = [",".join(["3.5" if i == column else cell for i, cell in enumerate(row.split(","))]) for row in ROWS]
@@ -242,6 +249,7 @@ def test_constant_column(tmp_path, column, role):
     assert "constant at 3.5" in message
 
 
+@pytest.mark.promise("recordings-26")
 def test_too_few_samples(tmp_path):
     message = refusal(write(tmp_path / "a.csv", ROWS[: MIN_SAMPLES - 1]))
     assert f"{MIN_SAMPLES - 1} samples; at least {MIN_SAMPLES}" in message

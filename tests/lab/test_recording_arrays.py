@@ -5,6 +5,8 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
+from microrad.lab.identify import IdentificationError
+from microrad.lab.identify.linear.response import response_from_periods
 from microrad.lab.recording import AXES, RecordingError, multisine_recordings, read_arrays
 from places import DATA
 
@@ -67,6 +69,7 @@ def check(read, expected=WHOLE):
         assert not one.drive.flags.writeable
 
 
+@pytest.mark.promise("recordings-15")
 @pytest.mark.parametrize("order", [(0, 1, 2, 3), (3, 2, 1, 0), (2, 0, 3, 1)])
 @pytest.mark.parametrize("name", WRITERS)
 def test_each_format_and_order_gives_the_same_recordings(tmp_path, name, order):
@@ -81,6 +84,7 @@ def test_each_format_and_order_gives_the_same_recordings(tmp_path, name, order):
     assert read[0].input_units == (("V", "V") if group else ("", ""))
 
 
+@pytest.mark.promise("recordings-16")
 def test_outputs_in_a_file_of_their_own(tmp_path):
     np.save(tmp_path / "u.npy", U)
     np.save(tmp_path / "y.npy", Y)
@@ -105,6 +109,7 @@ def test_an_output_in_a_file_of_its_own_that_follows_no_drive(tmp_path):
     assert "the output 'output[1]' follows the drives in none of the recordings" in refusal(tmp_path / "u.npy", **words)
 
 
+@pytest.mark.promise("recordings-15", "recordings-16")
 def test_axes_that_an_array_does_not_have(tmp_path):
     path = tmp_path / "a.npz"
     np.savez(path, u=U[:, 0, 0, 0], y=Y[:, :1, 0, 0], wide=Y[:, :, 0, 0], fs=RATE_HZ)
@@ -116,6 +121,7 @@ def test_axes_that_an_array_does_not_have(tmp_path):
     assert [(r.drive.shape, r.period_samples) for r in three] == [((400, 2), 200)] * 3
 
 
+@pytest.mark.promise("recordings-20")
 def test_a_part_of_each_realisation(tmp_path):
     path = tmp_path / "a.npz"
     np.savez(path, u=U, y=Y, fs=RATE_HZ)
@@ -125,6 +131,7 @@ def test_a_part_of_each_realisation(tmp_path):
     assert "0.4 s to 9 s is no part of a recording of 0.8 s" in refusal(path, "u", "y", part_s=(0.4, 9.0))
 
 
+@pytest.mark.promise("recordings-15", "recordings-18")
 @pytest.mark.parametrize(
     ("axes", "words"),
     [
@@ -147,6 +154,7 @@ def test_wrong_axes(tmp_path, axes, words):
     assert words in refusal(path, "u", "y", axes=axes)
 
 
+@pytest.mark.promise("recordings-18")
 def test_periods_called_channels_are_copies_of_each_other(tmp_path):
     path = tmp_path / "a.npz"
     np.savez(path, u=U, y=Y[:, :2], fs=RATE_HZ)
@@ -157,6 +165,35 @@ def test_periods_called_channels_are_copies_of_each_other(tmp_path):
     assert "realisation 0 and 1 more: the input 'u[1]' is a copy of the input 'u[0]'" in message
 
 
+@pytest.mark.promise("recordings-18")
+def test_channels_and_realisations_that_are_exchanged_show_only_where_there_are_fewer_realisations(tmp_path):
+    path, exchanged = tmp_path / "a.npz", ("samples", "realisations", "channels", "periods")
+    np.savez(path, u=U, y=Y[:, :2], fs=RATE_HZ)
+    wrong = read_arrays(path, "u", "y", axes=exchanged)
+    assert [r.drive.shape for r in wrong] == [(800, 3)] * 2
+    with pytest.raises(IdentificationError, match="2 records for 3 inputs: at least 3 realisations"):
+        response_from_periods(wrong)
+    np.savez(path, u=U[:, :, :2], y=Y[:, :2, :2], fs=RATE_HZ)
+    assert response_from_periods(read_arrays(path, "u", "y", axes=exchanged)).response.shape[1:] == (2, 2)
+
+
+@pytest.mark.promise("recordings-18")
+@pytest.mark.parametrize(("change", "fits"), [(0.45, True), (0.55, False)])
+def test_a_drive_may_differ_by_half_its_rms_from_period_to_period(tmp_path, change, fits):
+    path = tmp_path / "a.npz"
+    drive = U - U.mean(axis=0)
+    other = np.roll(drive[..., 0], 37, axis=0)
+    other -= drive[..., 0] * np.mean(other * drive[..., 0], axis=0) / np.mean(drive[..., 0] ** 2, axis=0)
+    rms = [np.sqrt(np.mean(a**2, axis=(0, 2), keepdims=True)) for a in (other, drive[..., 0])]
+    drive[..., 1] = drive[..., 0] + change * other * rms[1] / rms[0]
+    np.savez(path, u=drive, y=Y, fs=RATE_HZ)
+    if fits:
+        assert len(read_arrays(path, "u", "y", axes=AXES)) == 3
+    else:
+        assert "differs from period 0 to 1 by" in refusal(path, "u", "y")
+
+
+@pytest.mark.promise("recordings-16", "recordings-18")
 def test_what_no_recordings_can_be_made_of(tmp_path):
     path = tmp_path / "a.npz"
     np.savez(path, u=U, y=Y, short=Y[:300], fewer=Y[:, :, :2], text=np.array(["a"]), slow=np.array(3.0), fs=RATE_HZ)

@@ -50,6 +50,7 @@ def test_samples_of_a_size_that_no_converter_gives(size, where):
     assert f"of the {where} is " in str(caught.value) and f"{size:.4g}, its" in str(caught.value)
 
 
+@pytest.mark.promise("recordings-26")
 def test_infinities_of_both_signs_are_refused_without_a_warning():
     drive = multisine()
     drive[[3, 7]] = math.inf, -math.inf
@@ -125,6 +126,7 @@ def test_honest_records_pass(drive, bits, level, sign):
 
 
 # ------------------------------------------------------------------------------------------------------------- clipping
+@pytest.mark.promise("readme-9")
 def test_clipped_output():
     message = refusal(SINE, np.minimum(GOOD, 9.0), "clipping")
     assert "the output is clipped at 9: 28 flat tops, the first at sample 149, 1345 samples" in message
@@ -132,12 +134,14 @@ def test_clipped_output():
     assert "clipped at 2:" in refusal(SINE, np.maximum(GOOD, 2.0), "clipping")
 
 
+@pytest.mark.promise("recordings-27")
 def test_clipped_drive():
     message = refusal(np.minimum(SINE, 9.0), GOOD, "clipping")
     assert "the drive is clipped at 9" in message
     assert "lower the drive" in message
 
 
+@pytest.mark.promise("recordings-27")
 def test_clipped_between_samples():
     drive = multisine(high=1600)
     message = refusal(drive, np.clip(drive, -2.5, np.inf) + 0.0, "clipping")
@@ -145,6 +149,7 @@ def test_clipped_between_samples():
     assert "hardly any just beside it" in message
 
 
+@pytest.mark.promise("recordings-27")
 def test_rest_at_a_limit_is_no_clipping():
     """The same flat tops, where the drive rests as well."""
     assert "clipping" not in notes(TRAPEZOID, 0.1 * TRAPEZOID)
@@ -152,6 +157,8 @@ def test_rest_at_a_limit_is_no_clipping():
 
 
 # ----------------------------------------------------------------------------------------------------------------- dead
+@pytest.mark.promise("recordings-27")
+@pytest.mark.promise("readme-9")
 @pytest.mark.parametrize("name", HONEST)
 def test_dead_output(name):
     message = refusal(HONEST[name], 1e-3 * noise(), "dead")
@@ -164,6 +171,7 @@ def test_flickering_output():
         recording_from_arrays(SINE, np.round(0.4 * noise()), RATE_HZ)
 
 
+@pytest.mark.promise("recordings-27")
 def test_weak_response_is_not_dead():
     assert "dead" not in notes(SINE, SINE + 30 * np.std(SINE) * noise() * 0.1)
 
@@ -184,12 +192,15 @@ def test_a_drive_of_two_levels_is_one_step_of_100_per_cent():
     assert "moves in steps of 3.6, 100 % of its peak-to-peak (2 levels)" in notes(drive, play(drive))["quantisation"]
 
 
+@pytest.mark.promise("recordings-27")
 def test_dither_makes_up_for_coarse_steps():
     step = np.ptp(GOOD) / 20
     assert "dithered" in notes(SINE, step * np.round((GOOD + step * noise()) / step))["quantisation"]
 
 
 # ---------------------------------------------------------------------------------------------------------------- drift
+@pytest.mark.promise("recordings-29")
+@pytest.mark.promise("readme-9")
 @pytest.mark.parametrize("sign", [1, -1])
 def test_drift(sign):
     span = np.ptp(GOOD)
@@ -207,6 +218,8 @@ def test_drift(sign):
 
 
 # ----------------------------------------------------------------------------------------------------------------- lead
+@pytest.mark.promise("recordings-27", "recordings-28")
+@pytest.mark.promise("readme-9")
 @pytest.mark.parametrize("samples", [1, 3])
 @pytest.mark.parametrize("drive", [multisine(), SINE], ids=["multisine", "sine"])
 def test_output_that_leads(drive, samples):
@@ -217,6 +230,8 @@ def test_output_that_leads(drive, samples):
     assert lead == pytest.approx(samples, rel=0.1)
     assert "swap input and output" in message
     assert "lead" not in notes(drive[samples:], drive[:-samples])
+    if drive is not SINE:  # wired the other way round it leads as well; one frequency alone could not tell
+        assert "the output leads the drive by" in refusal(drive[:-samples], -ahead, "lead")
 
 
 def test_half_a_sample_of_multiplexing_passes():
@@ -225,6 +240,7 @@ def test_half_a_sample_of_multiplexing_passes():
     assert "lead" in refusal(drive, delayed(drive, -1 / RATE_HZ), "lead")
 
 
+@pytest.mark.promise("recordings-27")
 def test_high_pass_is_a_plain_lead():
     drive = multisine()
     freq = np.fft.rfftfreq(N, 1 / RATE_HZ)
@@ -232,6 +248,8 @@ def test_high_pass_is_a_plain_lead():
     assert "as behind a high-pass" in notes(drive, output)["lead"]
 
 
+@pytest.mark.promise("recordings-27")
+@pytest.mark.promise("readme-9")
 def test_swapped_channels():
     output = play_response(SINE, np.array([0.0, 1.0, 2.0]), np.full(3, SINE[0])) @ np.array([1.0, 0.3, 0.3])
     assert "lead" not in notes(SINE, output)
@@ -240,6 +258,7 @@ def test_swapped_channels():
 
 
 # ----------------------------------------------------------------------------------------------------------- excitation
+@pytest.mark.promise("recordings-2", "recordings-27")
 def test_excited_band_is_always_told():
     assert "from 1.25 to 199.2 Hz" in notes(multisine(), multisine() + 0.01 * noise())["unexcited"]
     assert "from 7 to 7.75 Hz" in notes(SINE, GOOD)["unexcited"]
@@ -265,6 +284,7 @@ def one_of_several(drives, outputs, name):
     return recording_from_arrays(np.column_stack(drives), np.column_stack(outputs), RATE_HZ, name, alone=False)
 
 
+@pytest.mark.promise("recordings-22", "recordings-27")
 def test_an_input_may_rest_in_one_recording_and_not_in_all():
     strong, faint, still = multisine(1), multisine(2), np.full(N, 5.0)
     for other in (1e-4 * faint, still):
@@ -279,6 +299,7 @@ def test_an_input_may_rest_in_one_recording_and_not_in_all():
         one_of_several((still, still), (strong,), "still")
 
 
+@pytest.mark.promise("recordings-22")
 def test_a_sensor_may_be_dead_while_the_other_axis_is_driven_and_not_always():
     wave, still = multisine(1), np.zeros(N)
     first = one_of_several((wave, still), (wave + 0.1 * noise(3), noise(4)), "first")
@@ -291,6 +312,7 @@ def test_a_sensor_may_be_dead_while_the_other_axis_is_driven_and_not_always():
         one_of_several((wave, multisine(2)), (wave + 0.1 * noise(3), noise(4)), "both driven")
 
 
+@pytest.mark.promise("recordings-22", "recordings-26")
 def test_drives_may_copy_each_other_in_one_recording_and_not_in_all():
     """Orthogonal multisines: the second drive is turned round from one realisation to the next."""
     a, b = multisine(1), multisine(2)
@@ -345,6 +367,7 @@ def printed(time_s, digits=6):
     return [f"{t:.{digits}f}" for t in time_s]
 
 
+@pytest.mark.promise("recordings-8", "recordings-27")
 @pytest.mark.parametrize(
     ("name", "scale", "digits"),
     [("time", 1, 6), ("t", 1, 3), ("Time (ms)", 1e3, 3), ("time_us", 1e6, 0), ("Zeit [s]", 1, 9), ("time", 1, 2)],
@@ -359,6 +382,7 @@ def test_rate_of_a_time_column(tmp_path, name, scale, digits):
     assert all("coarser than the step" in message for message in coarse)
 
 
+@pytest.mark.promise("recordings-8", "recordings-9")
 def test_time_column_by_name(tmp_path):
     path = text(tmp_path / "a.csv", printed(TIME_S), unit="clock")
     assert "give the rate (--rate, rate_hz) in Hz, or name the time column" in time_refusal(path)
@@ -368,12 +392,15 @@ def test_time_column_by_name(tmp_path):
     assert "the time is in 'h'; convert it" in time_refusal(path)
 
 
+@pytest.mark.promise("recordings-9")
 def test_two_rates(tmp_path):
     message = time_refusal(text(tmp_path / "a.csv", printed(TIME_S)), 1002.0)
     assert "two sample rates: 1002 Hz (given) and 1000 Hz (column 0 ('time'): 4000 samples in 3.999 s)" in message
     assert read_recording(tmp_path / "a.csv", "drive", "output", 1000.5).rate_hz == 1000.5
 
 
+@pytest.mark.promise("recordings-26")
+@pytest.mark.promise("readme-9")
 def test_gap_in_time(tmp_path):
     time_s = TIME_S + np.where(np.arange(N) >= 700, 0.010, 0) + np.where(np.arange(N) >= 900, 0.005, 0)
     message = time_refusal(text(tmp_path / "a.csv", printed(time_s)))
@@ -381,6 +408,7 @@ def test_gap_in_time(tmp_path):
     assert "2 gaps, about 15 samples lost" in message
 
 
+@pytest.mark.promise("recordings-26")
 def test_time_that_stops_or_runs_back(tmp_path):
     time_s = TIME_S.copy()
     time_s[500] = time_s[499]
@@ -412,7 +440,165 @@ def test_time_of_words_is_noted(tmp_path):
     assert "the rate given was believed" in read.findings[0].message
 
 
+# ----------------------------------------------------------------------------------------------------- limits of checks
+SLOW = np.sin(2 * np.pi * 0.9 * TIME_S)
+
+
+def steps_of(scatter):
+    """Times whose steps scatter by a share of the usual one, as rms; those of white jitter by sqrt(2) times its rms."""
+    jitter = philox(8).standard_normal(N)
+    steps = np.diff(jitter)
+    return TIME_S + jitter * scatter / RATE_HZ / np.std(steps)
+
+
+def levels_of(count):
+    """A long sine, and the same in so many steps of peak-to-peak."""
+    drive = np.sin(2 * np.pi * 0.31 * np.arange(4 * N) / RATE_HZ)
+    return drive, np.round(drive * count / 2) * 2 / count
+
+
+def shifted_by(samples):
+    """A multisine, and an output so many samples before it."""
+    return multisine(), delayed(multisine(), -samples / RATE_HZ)
+
+
+def clipped_laplace(count):
+    """White noise of long tails, of which so many samples stand at a limit."""
+    values = philox(4).laplace(size=20_000)
+    return np.minimum(values, np.sort(values)[-count]), values
+
+
+def trend_of(share, seconds=1.0, level=0.0):
+    """Drive, and output with a trend of a share of its peak-to-peak; `seconds` is the period of the drive."""
+    drive = np.sin(2 * np.pi * TIME_S / seconds)
+    ramp = np.linspace(-0.5, 0.5, N)
+    output = drive + level * noise()
+    size = 0.0
+    for _ in range(60):  # the ramp widens the range
+        size = share * np.ptp(output + size * ramp)
+    return drive, output + size * ramp
+
+
+def tones(*parts):
+    return sum(size * np.sin(2 * np.pi * hz * TIME_S + hz) for hz, size in parts)
+
+
+# What is recorded on either side of a limit: what kind of finding, what stands on this side, what on the other.
+LIMITS = {
+    "quantisation noted": ("quantisation", levels_of(520), levels_of(480), False),
+    "quantisation refused": ("quantisation", levels_of(52), levels_of(48), True),
+    "clipping of an output": ("clipping", (SLOW, np.minimum(SLOW, 0.9942)), (SLOW, np.minimum(SLOW, 0.988)), True),
+    "steps of a clipped output": (
+        "clipping",
+        (SLOW, np.minimum(np.round(SLOW / 0.005) * 0.005, 0.98)),
+        (SLOW, np.minimum(np.round(SLOW / 0.002) * 0.002, 0.98)),
+        True,
+    ),
+    "one peak": (
+        "clipping",
+        (SLOW, np.where(TIME_S < 0.5, np.minimum(SLOW, 0.9), 0.85 * SLOW)),
+        (SLOW, np.where(TIME_S < 1.7, np.minimum(SLOW, 0.9), 0.85 * SLOW)),
+        True,
+    ),
+    "flanks of a drive": ("clipping", (TRAPEZOID, TRAPEZOID), (np.minimum(SLOW, 0.9), 1.0 * SLOW), True),
+    "drift refused": ("drift", trend_of(0.45), trend_of(0.55), True),
+    "drift noted": ("drift", trend_of(0.004), trend_of(0.006), False),
+    "drift in noise": ("drift", trend_of(0.02, level=0.5), trend_of(0.02, level=0.01), False),
+    "cycles of the drive": ("drift", trend_of(0.05, 2.9), trend_of(0.05, 1.6), False),
+    "motion over the offset": (
+        "unexcited",
+        (1e3 + 0.0155 * tones((7.0, 1.0)), tones((7.0, 1.0))),
+        (1e3 + 0.0130 * tones((7.0, 1.0)), tones((7.0, 1.0))),
+        True,
+    ),
+    "lead of a multisine": ("lead", shifted_by(0.7), shifted_by(0.8), True),
+    "lead in noise": (
+        "lead",
+        (tones((7.0, 1.0)), np.sin(2 * np.pi * 7 * TIME_S + 7.06) + 0.45 * noise()),
+        (tones((7.0, 1.0)), np.sin(2 * np.pi * 7 * TIME_S + 7.06) + 0.003 * noise()),
+        True,
+    ),
+    "lead of a sine": (
+        "lead",
+        (tones((7.0, 1.0)), np.sin(2 * np.pi * 7 * TIME_S + 7.0 + np.radians(26.5))),
+        (tones((7.0, 1.0)), np.sin(2 * np.pi * 7 * TIME_S + 7.0 + np.radians(23.5))),
+        True,
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.promise("recordings-27", "recordings-28")
+@pytest.mark.parametrize(("kind", "within", "beyond", "refused"), LIMITS.values(), ids=LIMITS)
+def test_each_limit_holds_on_both_sides(kind, within, beyond, refused):
+    def found(drive, output):
+        carried = recording_from_arrays(drive, output + 0.0, RATE_HZ, accept=[kind]).findings
+        return [f.refused for f in carried if f.kind == kind and (f.refused or kind != "unexcited")]
+
+    assert True not in found(*within) and (refused or not found(*within))
+    assert found(*beyond) and found(*beyond)[-1] == refused
+
+
+@pytest.mark.promise("recordings-27")
+def test_samples_that_pile_up_are_told_from_a_thousandth_on():
+    for count, told in ((18, False), (24, True)):
+        clipped, drive = clipped_laplace(count)
+        carried = recording_from_arrays(drive, clipped, RATE_HZ, accept=["clipping"]).findings
+        assert any(f.kind == "clipping" for f in carried) == told
+
+
+@pytest.mark.promise("recordings-27")
+def test_each_limit_of_jitter():
+    for scatter, told in ((0.009, []), (0.011, [False]), (0.095, [False]), (0.105, [True])):
+        _, findings = rate_of_time("loops.csv", "time", steps_of(scatter), lambda row: f"row {row}")
+        assert [f.refused for f in findings] == told, scatter
+
+
+@pytest.mark.promise("recordings-27")
+def test_an_answer_to_a_step_is_no_drift():
+    """The trend is above half of peak-to-peak, and the drive behind a slow low-pass explains it."""
+    drive = np.where(TIME_S > 0.4, 1.0, 0.0) + 0.02 * SLOW
+    answer = np.where(TIME_S > 0.4, 1.0 - np.exp(-np.maximum(TIME_S - 0.4, 0.0) / 0.4), 0.0) + 0.02 * SLOW
+    assert "drift" not in notes(drive, answer + 1e-4 * noise())
+
+
+@pytest.mark.promise("recordings-26")
+def test_the_share_of_an_input_that_is_its_own():
+    a, b = multisine(1), multisine(2)
+    b = b - a * (a @ b) / (a @ a)
+    b = b * np.std(a) / np.std(b)
+    for share, fits in ((0.8e-6, False), (1.2e-6, True)):
+        drive = np.column_stack((a, a + math.sqrt(share) * b))
+        if fits:
+            recording_from_arrays(drive, a + b, RATE_HZ)
+        else:
+            with pytest.raises(RecordingError, match="the drive 1 is a copy of the drive 0: only"):
+                recording_from_arrays(drive, a + b, RATE_HZ)
+
+
+@pytest.mark.promise("recordings-27")
+def test_the_power_of_a_faint_input():
+    strong, faint = multisine(1), multisine(2)
+    faint = faint * np.std(strong) / np.std(faint)
+    for power, refused in ((1.2e-6, False), (0.8e-6, True)):
+        drive = np.column_stack((strong, math.sqrt(power) * faint))
+        carried = recording_from_arrays(drive, strong + 0.01 * noise(), RATE_HZ, accept=["unexcited"]).findings
+        assert any(f.refused for f in carried) == refused
+
+
+@pytest.mark.promise("recordings-27")
+def test_the_excited_band_has_all_but_a_thousandth_of_the_power():
+    """The ends are those behind which half a thousandth lies."""
+    for share, seen in ((3e-4, False), (2e-3, True)):
+        drive = tones((50.0, 1.0), (5.0, math.sqrt(share)), (300.0, math.sqrt(share)))
+        band = notes(drive, drive + 0.01 * noise())["unexcited"].partition("excited from ")[2].partition(" Hz")[0]
+        low, high = map(float, band.split(" to "))
+        assert ((low < 6.0) == seen) and ((high > 299.0) == seen)
+        assert low < 50.5 and high > 49.5
+
+
 # --------------------------------------------------------------------------------------------------------------- accept
+@pytest.mark.promise("recordings-2")
+@pytest.mark.promise("readme-9")
 def test_findings_name_file_line_and_channel(tmp_path):
     path = text(tmp_path / "a.csv", printed(TIME_S), output=np.minimum(GOOD, 9.0))
     message = time_refusal(path)
@@ -420,6 +606,7 @@ def test_findings_name_file_line_and_channel(tmp_path):
     assert "the first at line 151," in message  # sample 149 behind the header
 
 
+@pytest.mark.promise("recordings-29")
 def test_all_faults_are_told_at_once():
     with pytest.raises(RecordingError) as caught:
         recording_from_arrays(SINE, np.minimum(GOOD, 9.0), RATE_HZ, accept=["drift"])
@@ -428,6 +615,7 @@ def test_all_faults_are_told_at_once():
         recording_from_arrays(np.minimum(SINE, 9.0), noise(), RATE_HZ)
 
 
+@pytest.mark.promise("recordings-29")
 @pytest.mark.parametrize("accept", [["gap"], ["nan"], "drift", ["drift", "everything"]])
 def test_unknown_accept(accept):
     with pytest.raises(RecordingError, match="give a sequence of jitter, clipping") as caught:

@@ -17,9 +17,10 @@ from nptdms.log import log_manager
 from scipy.io import savemat
 from scipy.sparse import csc_array
 
-from microrad.lab.recording import RecordingError, multisine_recordings, read_recording
-from microrad.lab.recording.formats.lvm import _Blanks
+from microrad.lab.recording import RecordingError, files, multisine_recordings, read_in, read_recording
+from microrad.lab.recording.formats.lvm import LvmSource, _Blanks
 from microrad.lab.recording.reader import open_source
+from microrad.lab.recording.records import digest_of
 
 N, RATE_HZ = 1000, 2000.0
 TIME_S = np.arange(N) / RATE_HZ
@@ -52,6 +53,8 @@ def tdms(path, *, step=1 / RATE_HZ, drive=DRIVE, output=OUTPUT, more=None):
     return path
 
 
+@pytest.mark.promise("recordings-2", "recordings-4", "recordings-5")
+@pytest.mark.promise("readme-9")
 def test_tdms(tmp_path):
     path = tdms(tmp_path / "a.tdms")
     read = read_recording(path, "bench/drive", "output")
@@ -90,6 +93,7 @@ def test_tdms_with_a_name_that_is_no_text_is_read_in_silence(tmp_path, library_s
     assert library_says.getvalue() == ""
 
 
+@pytest.mark.promise("recordings-10")
 def test_tdms_ignores_a_stale_index(tmp_path):
     path = tdms(tmp_path / "a.tdms")
     tdms(tmp_path / "b.tdms", drive=DRIVE[:300], output=OUTPUT[:300])
@@ -98,6 +102,7 @@ def test_tdms_ignores_a_stale_index(tmp_path):
     assert "index" in refusal(tmp_path / "a.tdms_index", 0, 1)
 
 
+@pytest.mark.promise("recordings-9")
 def test_tdms_rate_disagrees(tmp_path):
     message = refusal(tdms(tmp_path / "a.tdms"), "drive", "output", 2003.0)
     assert "2003 Hz (given) and 2000 Hz (wf_increment = 0.0005 s of 'bench/drive')" in message
@@ -110,11 +115,13 @@ def test_tdms_two_increments(tmp_path):
     assert "1000 Hz" in refusal(path, "drive", "output")
 
 
+@pytest.mark.promise("recordings-26")
 def test_tdms_lengths_differ(tmp_path):
     message = refusal(tdms(tmp_path / "a.tdms", output=OUTPUT[:-5]), "drive", "output")
     assert "has 1000 samples and channel 1 ('bench/output') 995" in message
 
 
+@pytest.mark.promise("recordings-26")
 def test_tdms_starts_differ(tmp_path):
     start = np.datetime64("2026-01-01T00:00:00")
     late = start + np.timedelta64(10, "ms")
@@ -126,12 +133,14 @@ def test_tdms_starts_differ(tmp_path):
     assert "'bench/output' starts 0.01 s apart from 'bench/drive'" in refusal(path, "drive", "output")
 
 
+@pytest.mark.promise("recordings-9")
 def test_tdms_without_increment_needs_a_rate(tmp_path):
     path = tdms(tmp_path / "a.tdms", step=0.0)
     assert "give the rate (--rate, rate_hz) in Hz" in refusal(path, "drive", "output")
     check(read_recording(path, "drive", "output", RATE_HZ), ("bench/drive", "bench/output"))
 
 
+@pytest.mark.promise("recordings-10", "recordings-26")
 @pytest.mark.parametrize(
     ("damage", "words"),
     [
@@ -166,6 +175,7 @@ def test_empty_tdms(tmp_path):
     assert "'g/none' holds no samples; record again" in message
 
 
+@pytest.mark.promise("recordings-3", "recordings-11")
 def test_renamed_files(tmp_path):
     path = tmp_path / "a.tdms"
     path.write_text("drive,output\n" + "1,2\n" * 300)
@@ -191,6 +201,8 @@ def test_a_name_of_several_lines_makes_no_message_of_several(tmp_path):
     assert "('no\\u000anumbers' holds" in refusal(tmp_path / "a.npz", 0, 1)
 
 
+@pytest.mark.promise("recordings-10")
+@pytest.mark.promise("licences-1")
 def test_missing_library(tmp_path, monkeypatch):
     path = tmp_path / "a.tdms"
     tdms(path)
@@ -232,6 +244,8 @@ def lvm(path, *, x_columns="No", comma=False, segments=1, gap_s=0.0, comment="",
     return path
 
 
+@pytest.mark.promise("recordings-4", "recordings-14")
+@pytest.mark.promise("readme-9")
 @pytest.mark.parametrize("x_columns", ["No", "One", "Multi"])
 @pytest.mark.parametrize("comma", [False, True])
 @pytest.mark.parametrize("comment", ["", "started"])
@@ -245,6 +259,7 @@ def test_lvm(tmp_path, x_columns, comma, comment):
         np.testing.assert_array_equal(other[:, -2:], np.column_stack((read.drive, read.output)))
 
 
+@pytest.mark.promise("recordings-4")
 def test_lvm_segments(tmp_path):
     path = lvm(tmp_path / "a.lvm", segments=3)
     check(read_recording(path, "drive", "output"))
@@ -253,6 +268,23 @@ def test_lvm_segments(tmp_path):
     assert "'drive' may be '0/drive', '1/drive', '2/drive'" in refusal(path, "drive", "output")
     read = read_recording(path, "1/drive", "1/output")
     np.testing.assert_allclose(read.drive[:, 0], DRIVE[334:667], atol=1e-12)
+
+
+def test_a_cell_of_a_later_lvm_segment_is_named_by_its_line(tmp_path):
+    path = lvm(tmp_path / "a.lvm", segments=3)
+    lines = path.read_bytes().split(b"\r\n")
+    last = max(k for k, line in enumerate(lines) if line.count(b"\t") == 2 and line.startswith(b"\t"))
+    lines[last] = b"\tnan\t1.0"
+    path.write_bytes(b"\r\n".join(lines))
+    assert f"line {last + 1}" in refusal(path, "drive", "output")
+
+
+def test_each_row_of_joined_lvm_segments_has_its_own_line(tmp_path):
+    path = lvm(tmp_path / "a.lvm", segments=3)
+    lines = [k for k, line in enumerate(path.read_bytes().split(b"\r\n"), 1) if line.startswith(b"\t")]
+    source = LvmSource(path)
+    assert len(lines) == N and [source.place(row) for row in range(N)] == [f"line {k}" for k in lines]
+    assert source.place(N) == "the end"
 
 
 def test_lvm_segments_of_other_channels_are_not_joined(tmp_path):
@@ -328,6 +360,8 @@ def matlab73(path, **variables):
     return path
 
 
+@pytest.mark.promise("recordings-4", "recordings-6", "recordings-9")
+@pytest.mark.promise("readme-9")
 def test_matlab_v5(tmp_path):
     path = tmp_path / "a.mat"
     savemat(path, {"drive": DRIVE, "x": np.column_stack((DRIVE, OUTPUT)), "fs": RATE_HZ, "note": "hello"})
@@ -337,6 +371,7 @@ def test_matlab_v5(tmp_path):
     assert "2500 Hz (given) and 2000 Hz (fs = 2000 Hz)" in refusal(path, "drive", "x[1]", 2500.0)
 
 
+@pytest.mark.promise("recordings-4", "recordings-11")
 def test_matlab_structure(tmp_path):
     path = tmp_path / "a.mat"
     savemat(path, {"run": {"drive": DRIVE, "output": OUTPUT, "dt": 1 / RATE_HZ, "in": {"t": TIME_S}}})
@@ -344,6 +379,8 @@ def test_matlab_structure(tmp_path):
     check(read_recording(path, "run/drive", "output", time="t"), ("run/drive", "run/output"))
 
 
+@pytest.mark.promise("recordings-4")
+@pytest.mark.promise("readme-9")
 def test_matlab_v73(tmp_path):
     both = np.column_stack((DRIVE, OUTPUT))
     path = matlab73(tmp_path / "a.mat", both=both, dt=1 / RATE_HZ)
@@ -351,6 +388,7 @@ def test_matlab_v73(tmp_path):
     assert "nearest is 'both[1]'" in refusal(path, "both[0]", "both[2]")
 
 
+@pytest.mark.promise("recordings-4", "recordings-11")
 def test_matlab_array_of_structures(tmp_path):
     """As a real-time system writes its channels."""
     made = np.zeros((1, 2), dtype=[("Name", object), ("Data", object), ("dt", object)])
@@ -362,6 +400,7 @@ def test_matlab_array_of_structures(tmp_path):
     assert "'run/Y[0]/Name' holds text; save numbers" in refusal(tmp_path / "a.mat", "run/Y[0]/Name", 1)
 
 
+@pytest.mark.promise("recordings-26")
 @pytest.mark.parametrize(("kept", "missing"), [(200, 7992), (1000, 7192), (9000, 7256)])
 def test_truncated_matlab(tmp_path, kept, missing):
     path = tmp_path / "a.mat"
@@ -385,6 +424,7 @@ def test_damaged_matlab_names_the_variable(tmp_path):
     assert "incorrect data check" in message
 
 
+@pytest.mark.promise("recordings-11")
 @pytest.mark.parametrize(
     ("value", "words"),
     [
@@ -404,6 +444,7 @@ def test_matlab_variables_that_are_no_channel(tmp_path, monkeypatch, value, word
     assert words.replace("10000", "100") in refusal(path, "x", "output", RATE_HZ)
 
 
+@pytest.mark.promise("recordings-13")
 def test_a_matlab_file_that_unpacks_to_too_much(tmp_path, monkeypatch):
     monkeypatch.setattr("microrad.lab.recording.files._UNPACKED_BYTES", 100_000)
     path = tmp_path / "a.mat"
@@ -428,6 +469,8 @@ def test_too_little_memory_is_no_damage(tmp_path, monkeypatch):
 
 
 # --------------------------------------------------------------------------------------------------------------- NumPy
+@pytest.mark.promise("recordings-4")
+@pytest.mark.promise("readme-9")
 def test_numpy_archive(tmp_path):
     path = tmp_path / "a.npz"
     np.savez(path, drive=DRIVE, output=OUTPUT[:, None], sample_rate=RATE_HZ)
@@ -438,6 +481,7 @@ def test_numpy_archive(tmp_path):
     assert read.rate_hz == RATE_HZ
 
 
+@pytest.mark.promise("recordings-4", "recordings-6")
 def test_numpy_array(tmp_path):
     path = tmp_path / "a.npy"
     np.save(path, np.column_stack((DRIVE, OUTPUT)))
@@ -447,6 +491,7 @@ def test_numpy_array(tmp_path):
     assert "give the rate" in refusal(path, 0, 1)
 
 
+@pytest.mark.promise("recordings-6")
 def test_many_axes(tmp_path):
     path = tmp_path / "a.npy"
     np.save(path, np.stack((DRIVE, OUTPUT), axis=1)[:, :, None, None] * np.ones((1, 1, 3, 2)))
@@ -462,6 +507,7 @@ class Trap:
         return (pytest.fail, ("unpickled",))
 
 
+@pytest.mark.promise("recordings-10")
 def test_pickles_are_never_loaded(tmp_path):
     path = tmp_path / "a.npz"
     header = io.BytesIO()
@@ -485,6 +531,7 @@ def test_arrays_of_objects_are_not_called_truncated(tmp_path):
     assert "truncated" not in message
 
 
+@pytest.mark.promise("recordings-13")
 def test_numpy_arrays_that_are_no_channel(tmp_path, monkeypatch):
     path = tmp_path / "a.npz"
     np.savez_compressed(
@@ -500,6 +547,7 @@ def test_numpy_arrays_that_are_no_channel(tmp_path, monkeypatch):
     check(read_recording(path, "drive", "output", RATE_HZ))
 
 
+@pytest.mark.promise("recordings-26")
 def test_truncated_numpy(tmp_path):
     path = tmp_path / "a.npy"
     np.save(path, np.column_stack((DRIVE, OUTPUT)))
@@ -542,6 +590,7 @@ def test_headers_of_numpy_that_are_none(tmp_path, archive, header, words):
     assert words in refusal(path, 0, 0)
 
 
+@pytest.mark.promise("recordings-26")
 def test_nan_in_an_array(tmp_path):
     path = tmp_path / "a.npz"
     np.savez(path, drive=DRIVE, output=np.where(np.arange(N) == 77, np.nan, OUTPUT))
@@ -560,6 +609,8 @@ def hdf5(path):
     return path
 
 
+@pytest.mark.promise("recordings-4", "recordings-5", "recordings-14")
+@pytest.mark.promise("readme-9")
 def test_hdf5(tmp_path):
     path = hdf5(tmp_path / "a.h5")
     read = read_recording(path, "drive", "run/output")
@@ -570,6 +621,7 @@ def test_hdf5(tmp_path):
     assert "there is no input channel 9: the HDF5 file has 3 channels" in refusal(path, 9, 0)
 
 
+@pytest.mark.promise("recordings-26")
 def test_truncated_hdf5(tmp_path):
     path = hdf5(tmp_path / "a.h5")
     path.write_bytes(path.read_bytes()[:3000])
@@ -608,6 +660,7 @@ def odd_hdf5(tmp_path_factory):
     return folder / "a.h5"
 
 
+@pytest.mark.promise("recordings-12")
 @pytest.mark.parametrize(
     ("name", "words"),
     [
@@ -734,6 +787,7 @@ def test_a_filter_whose_pieces_cannot_be_checked(tmp_path):
     )
 
 
+@pytest.mark.promise("recordings-11")
 def test_matlab_v73_variables_that_are_no_channel(tmp_path):
     path = matlab73(tmp_path / "a.mat", drive=DRIVE, output=OUTPUT, table=DRIVE, cell=DRIVE, word=DRIVE, flag=DRIVE)
     with h5py.File(path, "a") as file:
@@ -755,7 +809,68 @@ def test_matlab_v73_variables_that_are_no_channel(tmp_path):
         assert f"the output '{name}' is no channel: '{name}' {words}" in refusal(path, "drive", name, RATE_HZ)
 
 
+@pytest.mark.promise("recordings-4")
+@pytest.mark.parametrize("suffix", ["h5", "hdf5", "hdf"])
+def test_suffixes_of_hdf5_and_a_rate_in_a_dataset(tmp_path, suffix):
+    path = tmp_path / f"a.{suffix}"
+    with h5py.File(path, "w") as file:
+        file["run/drive"], file["run/output"], file["run/dt"] = DRIVE, OUTPUT, 1 / RATE_HZ
+    check(read_recording(path, "drive", "output"), ("run/drive", "run/output"))
+
+
+RATE_NAMES = ("fs", "sample_rate", "sampling_rate", "rate_hz", "dt", "ts", "sample_time", "sampling_period")
+
+
+@pytest.mark.promise("recordings-7")
+@pytest.mark.parametrize("name", RATE_NAMES)
+def test_names_that_state_a_rate_count_for_their_group(tmp_path, name):
+    value = RATE_HZ if name in RATE_NAMES[:4] else 1 / RATE_HZ
+    np.savez(tmp_path / "a.npz", drive=DRIVE, output=OUTPUT, **{name: value})
+    check(read_recording(tmp_path / "a.npz", "drive", "output"))
+    path = hdf5(tmp_path / "a.h5")
+    with h5py.File(path, "a") as file:
+        del file["run"].attrs["fs"]
+        file["run"].attrs[name], file["other/drive"] = value, DRIVE
+    check(read_recording(path, "run/drive", "run/output"), ("run/drive", "run/output"))
+    assert "give the rate" in refusal(path, "other/drive", "other/output")
+
+
+@pytest.mark.promise("recordings-30")
+def test_a_part_of_a_file_is_checked_alone_and_named(tmp_path):
+    path = tmp_path / "a.npz"
+    np.savez(path, drive=DRIVE, output=np.where(np.arange(N) < 600, OUTPUT, np.nan), fs=RATE_HZ)
+    assert "is nan, 400 such samples" in refusal(path, "drive", "output")
+    read = read_recording(path, "drive", "output", part_s=(0.05, 0.3))
+    np.testing.assert_array_equal(read.drive[:, 0], DRIVE[100:600])
+    assert read.path == f"{path} from 0.05 s to 0.3 s"
+    assert read.sha256 == digest_of(read.drive, read.output)
+    assert "is nan" in refusal(path, "drive", "output", part_s=(0.05, None))
+
+
+@pytest.mark.promise("recordings-13")
+def test_a_small_file_may_unpack_to_so_much(tmp_path):
+    path = tmp_path / "a.npz"
+    for size, most in ((1_000, 256e6), (12_000_000, 256e6), (20_000_000, 400e6), (150_000_000, 2e9)):
+        with path.open("wb") as file:
+            file.truncate(size)
+        assert files.most_unpacked(path) == most
+
+
+@pytest.mark.promise("recordings-8", "recordings-14")
+def test_a_row_of_units_says_what_the_time_is_in(tmp_path):
+    rows = "".join(f"{1e3 * t:.3f},{u:.9f},{y:.9f}\n" for t, u, y in zip(TIME_S, DRIVE, OUTPUT, strict=True))
+    (tmp_path / "a.csv").write_text(f"time,drive,output\nms,V,mrad\n{rows}")
+    read = read_recording(tmp_path / "a.csv", "drive", "output")
+    assert read.rate_hz == pytest.approx(RATE_HZ)
+    assert (read.input_units, read.output_units) == (("V",), ("mrad",))
+    assert read_in(read, "V", "mrad") is read
+    with pytest.raises(RecordingError, match="the output is to be read in urad and the file says mrad"):
+        read_in(read, "V", "urad")
+    np.testing.assert_allclose(read.drive[:, 0], DRIVE, atol=1e-8)
+
+
 # ----------------------------------------------------------------------------------------------------- several channels
+@pytest.mark.promise("recordings-5")
 def test_several_channels(tmp_path):
     rng = np.random.Generator(np.random.Philox(3))
     u = rng.standard_normal((N, 2))
@@ -772,6 +887,7 @@ def test_several_channels(tmp_path):
         assert "period" in refusal(path, 0, 2, period_samples=period)
 
 
+@pytest.mark.promise("recordings-26")
 def test_copies_are_refused(tmp_path):
     path = tmp_path / "a.npz"
     np.savez(path, a=DRIVE, b=3 - 2 * DRIVE, y=OUTPUT, fs=RATE_HZ)
@@ -780,6 +896,7 @@ def test_copies_are_refused(tmp_path):
     assert "drive the inputs independently" in message
 
 
+@pytest.mark.promise("recordings-17")
 def test_multisine_recordings():
     rng = np.random.Generator(np.random.Philox(4))
     u = np.repeat(rng.standard_normal((512, 2, 3, 1)), 2, axis=3)
@@ -797,3 +914,15 @@ def test_the_last_comment_of_as_many_words_names_the_columns(tmp_path):
     path = tmp_path / "named.txt"
     path.write_text(f"# made by hand today\n# first second third\n# time drive angle\n{rows}", "utf-8")
     assert tuple(name.strip() for name in open_source(path).names) == ("time", "drive", "angle")
+
+
+def test_an_lvm_channel_has_the_time_column_before_itself(tmp_path):
+    path = lvm(tmp_path / "a.lvm", x_columns="Multi")
+    head, heading, body = path.read_bytes().decode("latin-1").rpartition("output\r\n")
+    head = head.replace("Delta_X\t5.0E-4\t5.0E-4", "Delta_X\t5.0E-4\t1.0E-3")
+    rows = [line.split("\t") for line in body.split("\r\n") if line]
+    slower = [f"{t}\t{u}\t{2.0 * float(t):.6f}\t{y}\r\n" for t, u, _, y in rows]
+    path.write_bytes("".join([head, heading, *slower]).encode("latin-1"))
+    source = LvmSource(path)
+    assert source.names[1::2] == ("drive", "output")
+    assert [source.find_time([channel]) for channel in (1, 3)] == [0, 2]

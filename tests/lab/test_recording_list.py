@@ -42,6 +42,7 @@ def refusal(folder, text):
     return message
 
 
+@pytest.mark.promise("recordings-19", "recordings-20", "recordings-21")
 def test_columns_period_units_and_roles_by_file(tmp_path):
     write_csv(tmp_path / "both.csv", "t;ux, slow;uy;x;y".replace(";", ","))
     (tmp_path / "both.csv").write_text((tmp_path / "both.csv").read_text().replace("ux, slow", "ux"))
@@ -102,6 +103,7 @@ def test_a_name_with_a_comma_is_one_column(tmp_path):
     assert found.recordings[0].input_names == ("u, x",)
 
 
+@pytest.mark.promise("recordings-19")
 def test_every_fault_is_told_at_once(tmp_path):
     found = faults(
         tmp_path,
@@ -144,6 +146,7 @@ c = 3
     assert len(found) == len(words)
 
 
+@pytest.mark.promise("recordings-19", "recordings-20")
 def test_what_does_not_fit_together(tmp_path):
     found = faults(
         tmp_path,
@@ -207,6 +210,7 @@ def test_a_list_that_does_not_exist(tmp_path):
         read_list(tmp_path / "none.toml")
 
 
+@pytest.mark.promise("recordings-14", "recordings-20")
 def test_what_the_recordings_contradict(tmp_path):
     write_csv(tmp_path / "a.csv", "t,ux (mV),uy (mV),x (um),y (um)")
     start = "input = [1, 2]\noutput = [3, 4]\n"
@@ -227,6 +231,7 @@ def test_what_the_recordings_contradict(tmp_path):
     assert "2 inputs and 1 outputs, where" in message
 
 
+@pytest.mark.promise("recordings-20", "recordings-21", "recordings-31")
 def test_the_list_of_the_documentation_is_read(tmp_path):
     page = (ROOT / "docs" / "recordings.md").read_text(encoding="utf-8")
     text = page.partition("```toml\n")[2].partition("```")[0]

@@ -30,6 +30,7 @@ def prepared(drive, rate_hz=RATE):
 
 
 # ------------------------------------------------------------------------------------------------- reversals and rates
+@pytest.mark.promise("identify-5")
 def test_a_step_to_the_first_sample_of_a_sine_is_no_reason_to_refuse_it():
     output = truths.plays(FROM_REST, [0.0, 0.6, 1.9], [6e-5, 1.5e-5, 1e-5])
     found = identify([truths.recorded(FROM_REST, output, RATE)], models=("prandtl_ishlinskii",))
@@ -39,6 +40,7 @@ def test_a_step_to_the_first_sample_of_a_sine_is_no_reason_to_refuse_it():
     assert not any("noisy" in text for text in found.warnings)
 
 
+@pytest.mark.promise("identify-5")
 @pytest.mark.parametrize("samples", [6400, 7000, 14_000])
 def test_one_step_is_neither_the_rate_of_the_loops_nor_their_limit(samples):
     record = prepared(FROM_REST[:samples])
@@ -47,6 +49,7 @@ def test_one_step_is_neither_the_rate_of_the_loops_nor_their_limit(samples):
     assert loop_rates(record) == pytest.approx((PEAK, PEAK), rel=0.01)
 
 
+@pytest.mark.promise("identify-5")
 def test_one_spike_changes_nothing():
     drive = 5.0 + 4.0 * np.sin(2 * np.pi * 20 * TIME)
     spiked = drive.copy()
@@ -56,6 +59,7 @@ def test_one_spike_changes_nothing():
     assert loop_rates(prepared(spiked)) == pytest.approx(loop_rates(prepared(drive)), rel=1e-3)
 
 
+@pytest.mark.promise("identify-5")
 def test_reversals_stand_where_the_drive_turns_and_noise_makes_none():
     drive = 5.0 + 4.0 * np.sin(2 * np.pi * 20 * TIME)
     turns = np.arange(250, 14_000, 500)  # a quarter of a period, then each half
@@ -63,11 +67,17 @@ def test_reversals_stand_where_the_drive_turns_and_noise_makes_none():
     for noise in (0.0, 0.05):
         found = turning_points(drive + noise * truths.philox(1).standard_normal(drive.size))
         assert found.tolist() == assert_close
+    for part, turns in ((0.04, 0), (0.06, 2)):  # a drive that goes back by a part of its range, and on
+        back = np.concatenate(
+            [np.linspace(0.0, 0.5, 200), np.linspace(0.5, 0.5 - part, 50), np.linspace(0.5 - part, 1.0, 300)]
+        )
+        assert turning_points(back).size == turns
     assert turning_points(np.linspace(0.0, 1.0, 500)).size == 0
     with pytest.raises(IdentificationError, match="never reverses"):
         prepared(np.linspace(0.0, 1.0, 500))
 
 
+@pytest.mark.promise("identify-5")
 def test_fast_edges_of_a_staircase_keep_their_rate():
     """Edges of 3 V and 6 V in 5 ms, with 2 s of rest between them."""
     levels, time = [6, 9, 12, 6, 0, 6], np.arange(12_000) / 1000.0
@@ -77,6 +87,7 @@ def test_fast_edges_of_a_staircase_keep_their_rate():
     assert loop_rates(prepared(drive, 1000.0))[1] == pytest.approx(1200.0, rel=0.01)
 
 
+@pytest.mark.promise("identify-6")
 def test_noise_of_the_drive_is_told_by_its_median_size():
     drive = 5.0 + 4.0 * np.sin(2 * np.pi * 20 * TIME)
     assert noisiness(prepared(FROM_REST)) < 0.01
@@ -95,6 +106,7 @@ def remembered(drive, before, rate_hz=2000.0, noise=2e-4):
     return truths.recorded(drive, output, rate_hz, noise=noise)
 
 
+@pytest.mark.promise("identify-18")
 @pytest.mark.parametrize("before", [[], np.linspace(-6.0, 0.0, 50), np.linspace(4.5, 0.0, 50)])
 def test_a_growing_loop_is_used_whole_whatever_the_mirror_remembers(before, monkeypatch):
     record = remembered(5.0 + GROWING, np.array(before) + 5.0)
@@ -113,6 +125,7 @@ def test_a_growing_loop_is_used_whole_whatever_the_mirror_remembers(before, monk
     assert (np.max(abs(at_rest.weights_rad_per_v - WEIGHTS)) > 6e-7) == (len(before) > 0)
 
 
+@pytest.mark.promise("identify-18")
 def test_memory_is_a_function_of_the_range_swept_so_far():
     """Of plays that came from elsewhere, less those from rest: it stands still in each loop that is repeated."""
     ramps = memory(GROWING, GROWING.size)
@@ -130,6 +143,8 @@ def test_memory_is_a_function_of_the_range_swept_so_far():
     assert memory(GROWING, 2000)[2000:].tolist() == memory(GROWING, 2000)[1999:2000].tolist() * 6000  # unknown beyond
 
 
+@pytest.mark.promise("identify-18")
+@pytest.mark.promise("readme-9")
 def test_a_staircase_keeps_its_dwells_and_creep():
     """A level that nothing but the range swept tells from the one before is free; what creeps on it counts."""
     levels, time = [6, 9, 12, 6, 0, 6], np.arange(12_000) / 200.0
@@ -149,6 +164,7 @@ def test_a_staircase_keeps_its_dwells_and_creep():
     assert np.std(slope[dwells[1] - 900 : dwells[1] + 900]) > 2.0  # how it moves meanwhile does
 
 
+@pytest.mark.promise("identify-18")
 def test_an_unseen_record_of_which_half_is_not_judged_is_told():
     known, unseen = remembered(5.0 + GROWING[::-1], []), remembered(5.0 + GROWING, [], noise=3e-4)
     found = identify([known], models=("prandtl_ishlinskii",), validation=[unseen])

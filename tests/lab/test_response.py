@@ -62,6 +62,7 @@ def periodic(model, drives, noise=0.0, seed=0, periods=2, cubic=0.0, settle=4):
 
 
 # ------------------------------------------------------------------------------------------------------------- chirps
+@pytest.mark.promise("identify-7")
 def test_chirp_with_noise_offset_and_trend():
     model, u = mirror(), chirp(4.0, 2.0, 3000.0)
     y = simulate(model, u[:, None], RATE_HZ)[:, 0]
@@ -94,6 +95,18 @@ def test_a_delay_does_not_bias_the_bands():
     width = np.gradient(found.freq_hz)[2:-2]
     assert error.max() < 0.01
     assert (2 * np.pi * width * 10 / RATE_HZ).max() > 0.25
+
+
+def test_what_bands_leave_of_a_record_is_no_more_of_two_alike():
+    """Powers are of a record, whether one or several were averaged."""
+    model, u = mirror(), chirp(2.0, 20.0, 3000.0)
+    y = simulate(model, u[:, None], RATE_HZ)[:, 0] + 0.02 * philox(3).standard_normal(u.size)
+    one, two = (response_from_records([recording(u, y)] * count, bands=50) for count in (1, 2))
+    np.testing.assert_allclose(two.drive_power, one.drive_power, rtol=1e-9)
+    # less by the parameter of each band: 1 / (1 - 1 / n) at n lines, and at 2 n
+    np.testing.assert_allclose(two.residual_power, one.residual_power, rtol=0.25)
+    assert (two.residual_power <= one.residual_power).all()
+    assert two.residual_power.sum() > 0.5 * one.residual_power.sum() > 0.0
 
 
 def test_several_inputs_from_as_many_chirps():
@@ -129,6 +142,7 @@ def test_linear_mirror_without_noise_is_exact():
     assert (found.standard_error < 1e-6 * np.abs(found.response).max()).all()
 
 
+@pytest.mark.promise("identify-4")
 def test_noise_and_distortion_are_told_apart():
     model = mirror()
     scale = np.std(simulate(model, np.tile(multisine(0), 4)[:, None], RATE_HZ))

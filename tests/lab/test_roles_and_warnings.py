@@ -55,17 +55,20 @@ WIDE = {"chirp": chirp(), "small multisine": multisine(0.3), "noise": philox(1).
 
 
 # --------------------------------------------------------------------------------------------------------------- roles
+@pytest.mark.promise("identify-3")
 @pytest.mark.parametrize("name", LOOPS)
 def test_loops_are_not_broadband(name):
     assert not is_broadband(recording(LOOPS[name]))
 
 
+@pytest.mark.promise("identify-3")
 @pytest.mark.parametrize("name", WIDE)
 def test_broadband_drives_are_told(name):
     assert is_broadband(recording(WIDE[name]))
     assert is_broadband(recording(3.0 + 1e-4 * WIDE[name]))  # neither offset nor size matter
 
 
+@pytest.mark.promise("identify-3")
 def test_a_small_broadband_record_is_for_the_linear_part_and_a_large_one_is_a_loop():
     sine, small, large = recording(SINE), recording(multisine(0.3)), recording(multisine(5.0))
     found = roles([sine, small, large])
@@ -74,6 +77,16 @@ def test_a_small_broadband_record_is_for_the_linear_part_and_a_large_one_is_a_lo
     assert found.loops == [sine, large]
 
 
+@pytest.mark.promise("identify-3")
+@pytest.mark.parametrize(("size", "small"), [(0.49, True), (0.51, False)])
+def test_small_is_at_most_half_of_the_largest_drive(size, small):
+    sine = recording(SINE)
+    wide = multisine(1.0)
+    record = recording(size * np.ptp(SINE) * wide / np.ptp(wide))
+    assert roles([sine, record]).broadband == ([record] if small else [])
+
+
+@pytest.mark.promise("identify-3")
 def test_where_all_records_are_broadband_they_are_loops_too():
     small, large = recording(multisine(0.3)), recording(multisine(5.0))
     found = roles([small, large])
@@ -82,6 +95,7 @@ def test_where_all_records_are_broadband_they_are_loops_too():
     assert roles([recording(SINE)]) == ([], [], roles([recording(SINE)]).loops) or not roles([recording(SINE)]).response
 
 
+@pytest.mark.promise("identify-3")
 def test_the_highest_rate_wins_and_a_periodic_record_goes_before_a_chirp():
     sine = recording(SINE)
     slow = recording(multisine(0.3), rate_hz=1000.0, period=8000)
@@ -106,6 +120,7 @@ def brute_force(a, b, lags):
     return [sum(a[k] * b[k - lag] for k in range(lag, len(a))) / size for lag in range(lags + 1)]
 
 
+@pytest.mark.promise("identify-28")
 def test_the_residual_test_is_what_it_says():
     residual, drive = 2.0 + philox(3).standard_normal(300), 5.0 + philox(4).standard_normal(300)
     test = residual_test(residual, drive)
@@ -123,6 +138,7 @@ def test_the_residual_test_is_what_it_says():
     assert_allclose(test.cross_correlation, brute_force(white, input_, 50), atol=1e-7)
 
 
+@pytest.mark.promise("identify-28")
 def test_noise_passes_and_colour_does_not():
     noise, drive = philox(5).standard_normal((2, 20_000))
     shares = [residual_test(philox(s).standard_normal(5000), drive[:5000]).outside for s in range(20)]
@@ -144,6 +160,7 @@ def test_noise_passes_and_colour_does_not():
     assert any("a better model of these recordings exists" in text for text in residual_warnings(followed))
 
 
+@pytest.mark.promise("identify-28")
 def test_a_smooth_drive_gives_false_alarms_now_and_then():
     """Neighbouring lags of a sine say the same: A^2 of its two phases is chi-square, and 15 % exceed 1.96^2."""
     alarms = [not residual_test(philox(s).standard_normal(1000), SINE[:1000]).independent for s in range(100)]
@@ -156,6 +173,7 @@ def test_a_residual_of_zeros_is_no_reason_to_stop():
     assert test.independent
 
 
+@pytest.mark.promise("identify-28")
 def test_shares_outside_are_counted():
     test = ResidualTest(100, 0.2, np.array([0.3, 0.1, -0.3, 0.0]), np.array([0.1, -0.25]))
     assert test.outside == (0.5, 0.5)
@@ -195,6 +213,7 @@ def test_held_out_samples_beyond_the_fitted_drives_are_counted():
     assert warnings.held_out_warnings([record], Units(), (-1.0, 11.0), [seen]) == []
 
 
+@pytest.mark.promise("identify-26")
 def test_a_search_that_did_not_settle_is_told():
     drive = truths.two_sines()
     result = identify(

@@ -3,6 +3,7 @@
 import pickle
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -33,6 +34,8 @@ from microrad.lab.identify.statistics import propagated
 from microrad.mirror import model as mirror
 from microrad.mirror.hysteresis import PrandtlIshlinskii
 from microrad.mission.file import load_mirror
+from microrad.report.identification.parameters import parameter_rows
+from places import ROOT
 from truths import behind_resonance, bouc_wen, philox, plays, recorded, small_multisine
 
 RATE = 4000.0
@@ -106,6 +109,8 @@ def numbers(fit):
 
 
 # -------------------------------------------------------------------------------------------------------------- choice
+@pytest.mark.promise("choose-2")
+@pytest.mark.promise("identify-1", "identify-11")
 def test_the_model_of_the_truth_is_chosen(found):
     assert found.chosen == "prandtl_ishlinskii_joint"
     assert [s.model for s in found.scores] == list(FEW)
@@ -122,6 +127,9 @@ def test_the_model_of_the_truth_is_chosen(found):
     assert found.refused == ()
 
 
+@pytest.mark.promise("identify-3", "identify-8")
+@pytest.mark.promise("readme-9")
+@pytest.mark.promise("identify-54")
 def test_what_each_recording_served_for(found):
     assert [(s.path, s.role, s.fitted, s.held_out) for s in found.sources] == [
         ("loop-2hz", "loops", 3000, 3000),
@@ -133,6 +141,7 @@ def test_what_each_recording_served_for(found):
     assert static.linear is None
 
 
+@pytest.mark.promise("identify-3")
 @pytest.mark.usefixtures("unpolished")
 def test_a_broadband_record_that_no_fit_used_is_said_to_be_unused(loops, wide):
     slower = replace(wide, path="slower", rate_hz=2000.0)
@@ -142,6 +151,7 @@ def test_a_broadband_record_that_no_fit_used_is_said_to_be_unused(loops, wide):
     assert {s.path: s.fitted for s in without.sources} == {"loop-2hz": 3000, "wide": 0}
 
 
+@pytest.mark.promise("identify-10", "identify-12")
 def test_the_winner_is_polished_with_everything_free(loops, monkeypatch):
     """From poles that are off, to those of the truth; the broadband record belongs to that fit."""
     off = LinearPoles(Roots((153.0,), (0.33,)), Roots((), ()), 3.0)
@@ -158,8 +168,16 @@ def test_the_winner_is_polished_with_everything_free(loops, monkeypatch):
     text = mirror_file_text(result, "m")
     assert f"± standard error {error:.2g} Hz, from wide" in text
     assert "(broadband): 8000 samples fitted" in text
+    (told,) = [
+        line for line in text.splitlines() if line.startswith("# recording: drive held between samples, output ")
+    ]
+    assert "± " in told and told.endswith(
+        " late, a delay that belongs to the recording chain and is no part of the mirror"
+    )
+    assert "delay" in [row.name for row in parameter_rows(result.fit())]  # which are those of the report
 
 
+@pytest.mark.promise("identify-10", "identify-25")
 def test_the_polish_is_kept_only_where_it_is_no_worse(loops, wide, monkeypatch):
     """Where it is worse the model stays where it was, with the errors that poles have there."""
     real = candidates.fit_joint
@@ -188,6 +206,7 @@ def test_the_polish_is_kept_only_where_it_is_no_worse(loops, wide, monkeypatch):
     assert refit(None, static, (), None) == (static, ())  # nothing to be freed
 
 
+@pytest.mark.promise("identify-10", "identify-11")
 def test_more_than_one_model_is_polished_before_the_choice(found, loops, wide, monkeypatch):
     """The second on held parts is the better one once everything is free."""
     turned = []
@@ -209,7 +228,35 @@ def test_more_than_one_model_is_polished_before_the_choice(found, loops, wide, m
     identify([wide, *loops], models=models)
     assert turned == ["prandtl_ishlinskii_joint"]
 
+    def duller(candidates, fit, predictions, on_progress):
+        turned.append(fit.name)
+        worse = [replace(p, model_rad=p.measured_rad - 100.0 * p.residual_rad) for p in predictions]
+        return replace(fit), tuple(worse if fit.name == "prandtl_ishlinskii_joint" else predictions)
 
+    turned.clear()
+    monkeypatch.setattr(choice, "refit", duller)
+    assert identify([wide, *loops], models=models).chosen == "linear"
+    assert turned == ["prandtl_ishlinskii_joint", "linear"]  # that wins now, and was not among the first
+
+
+@pytest.mark.promise("identify-10")
+def test_the_two_best_with_a_linear_part_are_polished_if_they_leave_at_most_twice_as_much(found):
+    joint = found.fit("prandtl_ishlinskii_joint")
+
+    def order(*sizes):
+        residual = philox(1).standard_normal(100)
+        left = [(SimpleNamespace(residual_rad=size * residual, split=0),) for size in sizes]
+        return candidates.within_reach([joint] * len(sizes), left)
+
+    assert order(1.9, 1.0, 1.5) == [1, 2]
+    assert order(2.1, 1.0) == [1]
+    assert order(1.9, 1.0) == [1, 0]
+    static = [found.fit("prandtl_ishlinskii"), joint]
+    left = [(SimpleNamespace(residual_rad=np.ones(9) * size, split=0),) for size in (1.0, 1.5)]
+    assert candidates.within_reach(static, left) == [1]
+
+
+@pytest.mark.promise("identify-11")
 @pytest.mark.parametrize("extra", [0.0, 1e-3, 0.5])
 def test_a_tie_goes_to_fewer_parameters(found, extra):
     few, many = found.fit("linear"), found.fit("prandtl_ishlinskii_joint")
@@ -220,6 +267,9 @@ def test_a_tie_goes_to_fewer_parameters(found, extra):
 
 
 # ----------------------------------------------------------------------------------------------------- what no fit sees
+@pytest.mark.promise("choose-2")
+@pytest.mark.promise("identify-8", "identify-9")
+@pytest.mark.promise("readme-9")
 @pytest.mark.usefixtures("unpolished")
 def test_the_held_out_part_is_seen_by_no_fit(loops, wide, found):
     changed = []
@@ -242,7 +292,9 @@ def test_the_held_out_part_is_seen_by_no_fit(loops, wide, found):
     assert line.held_out_rms_percent > 5 * unmoved.held_out_rms_percent
 
 
+@pytest.mark.promise("identify-8", "identify-9")
 @pytest.mark.usefixtures("unpolished")
+@pytest.mark.promise("identify-54")
 def test_validation_is_seen_by_no_fit(loops, wide):
     unseen = loop(5.0, seed=7, amplitude=0.8)
     turned = replace(unseen, output=-unseen.output)
@@ -263,6 +315,7 @@ def test_validation_is_seen_by_no_fit(loops, wide):
     assert results[0].predictions[0][2].split == results[0].predictions[0][2].start
 
 
+@pytest.mark.promise("identify-8")
 def test_a_share_can_be_held_out_beside_validation(loops):
     result = identify(loops, models=("prandtl_ishlinskii",), validation=[loop(5.0)], hold_out=0.25)
     assert [(s.fitted, s.held_out) for s in result.sources] == [(4500, 1500), (4500, 1500), (0, 6000)]
@@ -270,6 +323,7 @@ def test_a_share_can_be_held_out_beside_validation(loops):
         identify(loops, models=("prandtl_ishlinskii",), hold_out=0.0)
 
 
+@pytest.mark.promise("identify-3")
 @pytest.mark.usefixtures("unpolished")
 def test_a_broadband_record_that_is_a_loop_keeps_its_held_out_part(wide):
     """Where all records are broadband they are split, and the linear part is fitted to the same first part."""
@@ -287,6 +341,8 @@ def test_a_broadband_record_that_is_a_loop_keeps_its_held_out_part(wide):
 
 
 # -------------------------------------------------------------------------------------------------------------- refusal
+@pytest.mark.promise("identify-19")
+@pytest.mark.promise("identify-54")
 def test_a_model_without_its_linear_part_is_refused(loops):
     result = identify(loops, models=FEW)
     assert [s.model for s in result.scores] == ["prandtl_ishlinskii"]
@@ -296,6 +352,8 @@ def test_a_model_without_its_linear_part_is_refused(loops):
         identify(loops, models=("linear",))
 
 
+@pytest.mark.promise("identify-19", "identify-21")
+@pytest.mark.promise("identify-54")
 def test_creep_on_a_short_record_is_refused():
     drive = truths.two_sines(1000, 50_000.0, 200.0)
     record = recorded(drive, plays(drive, THRESHOLDS, WEIGHTS), 50_000.0)
@@ -310,6 +368,7 @@ def test_creep_on_a_short_record_is_refused():
         identify([record], models=("prandtl_ishlinskii_creep",))
 
 
+@pytest.mark.promise("identify-21")
 def test_a_joint_fit_that_fails_is_refused_with_its_reason(loops, monkeypatch):
     def failing(*_, **__):
         raise IdentificationError("the mirror cannot be simulated at a step of 0.00025 s")
@@ -323,6 +382,7 @@ def test_a_joint_fit_that_fails_is_refused_with_its_reason(loops, monkeypatch):
         identify(loops, models=("prandtl_ishlinskii_rate",))
 
 
+@pytest.mark.promise("identify-21")
 def test_an_output_that_does_not_follow_the_drive_is_refused():
     drive = truths.two_sines(4000)
     output = 1e-3 * philox(3).standard_normal(4000)
@@ -360,6 +420,7 @@ def test_a_model_of_the_truth_leaves_noise_and_a_wrong_one_does_not(found, loops
     assert "the model does not depend on rate" not in "\n".join(found.warnings)
 
 
+@pytest.mark.promise("gallery-7")
 @pytest.mark.usefixtures("unpolished")
 def test_a_pole_outside_the_excited_band_is_told(loops):
     drive = small_multisine(RATE, 4000, 2, highest=0.02)
@@ -420,9 +481,14 @@ def test_error_of_a_model_fitted_side_by_side(loops, monkeypatch):
         identify(loops, models=STATIC[:2], side_by_side=True)
 
 
+@pytest.mark.promise("choose-2")
+@pytest.mark.promise("identify-1", "identify-19")
+@pytest.mark.promise("readme-9")
 def test_the_list_of_models_is_whole():
     assert (*STATIC, *FORMS) == MODELS
     assert len(MODELS) == 12
+    table = (ROOT / "docs" / "identify.md").read_text(encoding="utf-8").partition("| name | hysteresis | refused |")[2]
+    assert set(re.findall(r"^\| `(\w+)` \|", table.partition("\n\n")[0], re.MULTILINE)) == set(MODELS)
 
 
 # ---------------------------------------------------------------------------------------------------------- mirror file
@@ -528,6 +594,8 @@ def test_a_widening_of_nothing_is_written_without_an_error(found, tmp_path):
     assert "prandtl_ishlinskii.weights.1" in known and "prandtl_ishlinskii.widening" not in known
 
 
+@pytest.mark.promise("identify-24")
+@pytest.mark.promise("readme-9")
 def test_standard_errors_in_the_file_are_propagated_ones(found, tmp_path):
     drives = [centred_loop(f) for f in (2.5, 10.0)]
     records = [recorded(d, bouc_wen(d, 1000.0, EQ3, gamma=0.25, eta=-0.15), seed=k) for k, d in enumerate(drives)]
@@ -602,6 +670,8 @@ def test_eq_3_fitted_at_100_hz_predicts_60_and_80_hz(paper):
         assert np.std(beyond) < 1e-4 * np.ptp(exact)  # what is left is the sensor's noise
 
 
+@pytest.mark.promise("choose-4")
+@pytest.mark.promise("bench-1")
 @pytest.mark.usefixtures("unpolished")
 def test_the_benchs_own_mirror_is_predicted_with_half_the_error_of_the_papers_model(monkeypatch):
     """A reduced plan; the truth is none of the models. Held out are a frequency and amplitude, and a multisine."""
@@ -620,6 +690,32 @@ def test_the_benchs_own_mirror_is_predicted_with_half_the_error_of_the_papers_mo
     assert isinstance(result.fit().model, PrandtlIshlinskii)
 
 
+@pytest.mark.promise("identify-30")
+@pytest.mark.endurance
+def test_the_table_of_the_page_is_what_the_benchs_plan_gives():
+    """To half of the last digit that is printed, and a hundredth for where a search ends."""
+    plan = bench.load_plan("mirror-characterisation")
+    pairs = list(play_records(plan, seed=1))
+    known, unseen = ([r for record, r in pairs if record.use == use] for use in ("identification", "validation"))
+    result = identify(known, models=MODELS, validation=unseen)
+    page = (ROOT / "docs" / "identify.md").read_text(encoding="utf-8").partition("| model | fitted | held out |")[2]
+    rows = re.findall(r"^\| `(\w+)`(.*) \| ([\d.]+) \| ([\d.]+) \|$", page.partition("\n\n")[0], re.MULTILINE)
+    assert [name for name, chosen, _, _ in rows if "chosen" in chosen] == [result.chosen]
+    assert len(rows) == 11
+    for name, _, fitted, held_out in rows:
+        score = result.score(name)
+        assert score.fit_rms_percent == pytest.approx(float(fitted), rel=0.01, abs=5e-4)
+        assert score.held_out_rms_percent == pytest.approx(float(held_out), rel=0.01, abs=5e-4)
+
+
 def test_what_a_choice_rests_on_has_its_errors_in_microradians():
     found = predictions.Evidence((("slow.csv", 2.0),), "fast.csv", 3e-6, 9e-6)
     assert choice._rests_on(found).endswith("is fast.csv, with 3 µrad rms and 9 µrad at most.")
+
+
+@pytest.mark.promise("identify-11")
+def test_a_tie_goes_to_the_admissible_model_however_many_parameters_it_has():
+    wrong_way, plays = (SimpleNamespace(admissible=good, parameter_count=n) for good, n in ((False, 6), (True, 10)))
+    noise = philox(2).standard_normal(1000)
+    assert choose_best([wrong_way, plays], [[noise], [noise]]) == 1
+    assert choose_best([plays, wrong_way], [[noise], [noise]]) == 0

@@ -1,22 +1,30 @@
 """One mirror for all amplitudes: exact derivatives, recovery of a known mirror, the real CubeSpec mirror, refusals."""
 
 import itertools
+import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from microrad.core import kernels
 from microrad.core.periodic import delayed
+from microrad.lab import identify
 from microrad.lab.identify import fit_hysteretic_stiffness, fit_linear, output_error, predicted_error
 from microrad.lab.identify.linear.modal import ModalModel
+from microrad.lab.identify.linear.response import response_from_periods
 from microrad.lab.identify.records import IdentificationError
 from microrad.lab.identify.stiffness import springs as springs_of
 from microrad.lab.identify.stiffness import tangents
 from microrad.lab.identify.stiffness.fit import (
     StiffnessOptions,
     _expected_squares,
+    _few,
+    _further,
+    _middle,
     _pole_errors,
+    amplitude_classes,
     simulate_hysteretic_stiffness,
     trust,
 )
@@ -27,7 +35,7 @@ from microrad.lab.recording import Recording, multisine_recordings
 from microrad.mirror import model as mirror
 from microrad.mirror.hysteresis import PrandtlIshlinskii
 from microrad.mirror.model import Mirror
-from places import DATA
+from places import DATA, ROOT, benchmark
 
 CUBESPEC = DATA / "cubespec"
 needs_cubespec = pytest.mark.skipif(not CUBESPEC.exists(), reason=f"real recording cubespec absent: {CUBESPEC}")
@@ -80,6 +88,7 @@ def path_of(numbers):
     return plant, drive, tangents.simulate_path(plant, drive)
 
 
+@pytest.mark.promise("hysteretic-stiffness-1", "hysteretic-stiffness-3")
 def test_the_path_is_that_of_the_open_loop(numbers):
     _, drive, path = path_of(numbers)
     plant = mirror.discretise(numbers.mirror("m"), STEADY.step_s)
@@ -92,6 +101,7 @@ def test_the_path_is_that_of_the_open_loop(numbers):
     assert {0, 1, 2, 3} == set(np.unique(path.moved[:, 1]))
 
 
+@pytest.mark.promise("hysteretic-stiffness-11")
 def test_tangents_against_differences(numbers):
     plant, drive, path = path_of(numbers)
     exact = tangents.jacobian(plant, numbers, STEADY, (path, drive), np.float64, lead=PERIOD)
@@ -110,6 +120,7 @@ def test_tangents_against_differences(numbers):
         np.testing.assert_allclose(single[:, :, i], exact[:, :, i], rtol=0, atol=2e-5 * size)
 
 
+@pytest.mark.promise("hysteretic-stiffness-11")
 def test_the_gradient_is_that_of_the_derivatives_and_of_differences(numbers):
     """From one pass back along the path; a real record has an error, and here it is the whole output."""
     record = replace(STEADY, output=philox(4).standard_normal((PERIOD, 2)))
@@ -136,6 +147,7 @@ def test_the_gradient_is_that_of_the_derivatives_and_of_differences(numbers):
         assert gradient[i] == pytest.approx(difference, rel=1e-4, abs=1e-6 * np.abs(expected).max())
 
 
+@pytest.mark.promise("hysteretic-stiffness-11")
 def test_the_curvature_of_a_search_is_near_that_of_all_samples(numbers):
     """From half of the period, scaled; both halves are not the same. Numbers that are not wanted have none."""
     plant = tangents.play_plant(numbers, STEADY.step_s)
@@ -159,6 +171,7 @@ def test_tangents_begin_early_enough_for_the_slowest_mode(numbers):
     assert 0.0 < np.max(missed) < 3e-3
 
 
+@pytest.mark.promise("hysteretic-stiffness-5")
 def test_poles_at_rest_have_the_plays_that_never_stick_in_them_and_errors_of_their_own(numbers):
     stuck = replace(numbers, thresholds=numbers.thresholds + 0.1)
     np.testing.assert_allclose(stuck.poles_at_rest, [-30 + 600j, -100, -50])
@@ -181,6 +194,7 @@ def test_other_units_of_drive_and_output_change_nothing_else(numbers):
     np.testing.assert_allclose(output, 3 * plain, rtol=0, atol=1e-10)
 
 
+@pytest.mark.promise("mirror-file-36", "hysteretic-stiffness-3")
 def test_the_interpolated_drive_is_late_and_passes_through_the_samples():
     drive = multisine(5)
     fine = delayed(drive, RATE_HZ, 2 / RATE_HZ, 4)
@@ -247,6 +261,7 @@ def rms(values):
     return float(np.sqrt(np.mean(values**2)))
 
 
+@pytest.mark.promise("hysteretic-stiffness-3", "hysteretic-stiffness-10", "hysteretic-stiffness-11")
 def test_a_known_mirror_is_recovered(known, training):
     fit, steps = known
     assert fit.order == 4 and fit.mirror.A.shape == (4, 4)
@@ -262,11 +277,13 @@ def test_a_known_mirror_is_recovered(known, training):
     assert (fit.poles_error_rad_s.imag > 0).all() and (fit.poles_error_rad_s.imag < 20).all()
     springs, modes, plays = 4, 2, 4
     assert len(fit.mirror.plays) == springs + 2
+    assert min(w for play in fit.mirror.plays for w in play.weights_rad_v[1:]) >= 0.0
     of_springs = springs * (modes + 2 + 3) + 2 * springs + plays * springs
     assert fit.parameters == 2 * modes + 4 * (2 + 2 + 2) + of_springs + 2 * (plays + 2) + 4 + 1
     assert fit.redundant == 2
 
 
+@pytest.mark.promise("choose-3")
 @pytest.mark.parametrize("amplitude", [0.45, 0.9])
 def test_an_amplitude_between_is_predicted_far_better_than_by_a_linear_model(known, straight, amplitude):
     held_out = record_of(hysteretic_truth(), amplitude, 77)
@@ -276,6 +293,7 @@ def test_an_amplitude_between_is_predicted_far_better_than_by_a_linear_model(kno
     assert linear < rms(held_out.output)
 
 
+@pytest.mark.promise("hysteretic-stiffness-13")
 def test_the_error_expected_of_unseen_records_is_that_of_new_ones(known):
     """On three new records of each amplitude; more than is left of those fitted, which tells too little."""
     fit, _ = known
@@ -287,6 +305,7 @@ def test_the_error_expected_of_unseen_records_is_that_of_new_ones(known):
     assert rms(fit.error_rms) < rms(fit.unseen_error_rms) < rms(found)
 
 
+@pytest.mark.promise("hysteretic-stiffness-10")
 def test_a_record_that_is_noisier_counts_less():
     """Alone as far as its own noise goes: what no linear model follows counts in all records of its amplitude."""
     quiet = [record_of(hysteretic_truth(), 0.6, k) for k in range(4)]
@@ -299,6 +318,7 @@ def test_a_record_that_is_noisier_counts_less():
     assert 0.5 * before[1] < after[1] < 2.0 * before[1]
 
 
+@pytest.mark.promise("hysteretic-stiffness-9", "hysteretic-stiffness-26")
 def test_a_fit_says_how_far_it_is_to_be_trusted(known):
     """Inside its records, and at twice their largest amplitude, where the error is a guess at what goes on there."""
     found = []
@@ -314,6 +334,27 @@ def test_a_fit_says_how_far_it_is_to_be_trusted(known):
     assert beyond.error_rms > 2 * inside.error_rms
 
 
+@pytest.mark.promise("hysteretic-stiffness-28")
+def test_a_large_motion_in_one_mode_softens_the_other():
+    """The drives of a mode do not push the other; the plays that a slow large motion of one slides are both modes'."""
+    truth, step_s = hysteretic_truth(), 1 / (8 * RATE_HZ)
+    time = step_s * np.arange(16 * RATE_HZ)
+    plant = mirror.discretise(truth, step_s)
+
+    def gain(large):
+        drive = np.outer(large * np.sin(2 * np.pi * 7.0 * time), [8.0, 7.0])
+        drive += np.outer(1e-3 * np.sin(2 * np.pi * 41.0 * time), [8.0, -9.0])
+        output = np.empty_like(drive)
+        kernels.open_loop(plant, mirror.at_rest(plant), drive, output, np.empty((len(drive), 0)))
+        second = (output @ [0.8, -1.0])[len(time) // 2 :]  # of what the sensors see, the second mode's part
+        return abs(np.exp(-2j * np.pi * 41.0 * time[len(time) // 2 :]) @ second)
+
+    assert gain(0.3) > 1.01 * gain(0.0)
+
+
+@pytest.mark.promise("mirror-file-28")
+@pytest.mark.promise("identify-41")
+@pytest.mark.promise("hysteretic-stiffness-28")
 def test_the_resonance_falls_with_the_amplitude_as_the_truth_does(known):
     """Peak of the response to a small and to a large multisine: the same for the fit and the truth."""
     truth = hysteretic_truth()
@@ -346,6 +387,7 @@ def many(training):
     return fit_hysteretic_stiffness(training, order=8, options=StiffnessOptions(delay_s=7e-4, exchanges=0))
 
 
+@pytest.mark.promise("mirror-file-39", "hysteretic-stiffness-6", "hysteretic-stiffness-7")
 def test_no_fit_runs_away_where_its_plays_slide(many, training):
     """No combination of sliding plays grows; a thousand periods, and then ten times the drive, stay where they are."""
     m, sums = many.mirror, [sum(play.weights_rad_v) for play in many.mirror.plays]
@@ -387,6 +429,7 @@ def springs():
     return springs_of.begin(start, [large], [middle], 5, (0.05, 0.2, 0.5), fixed_delay=False), model, middle
 
 
+@pytest.mark.promise("hysteretic-stiffness-10")
 def test_light_springs_hardly_change_the_linear_model_they_stand_in(springs):
     (found, free), model, middle = springs
     numbers = found.numbers(free)
@@ -398,6 +441,7 @@ def test_light_springs_hardly_change_the_linear_model_they_stand_in(springs):
     assert 0.0 < np.linalg.norm(away) < 0.05 * np.linalg.norm(linear)  # a step is straight, not free of images
 
 
+@pytest.mark.promise("hysteretic-stiffness-3", "hysteretic-stiffness-5", "hysteretic-stiffness-12")
 def test_each_free_number_moves_what_it_says_and_weights_leave_the_gain_alone(springs):
     found, free = springs[0]
     numbers = found.numbers(free)
@@ -419,6 +463,87 @@ def test_each_free_number_moves_what_it_says_and_weights_leave_the_gain_alone(sp
     assert abs((plays @ numbers.weights[5]) @ drive) < 1e-12 * size
 
 
+@pytest.mark.promise("hysteretic-stiffness-12")
+def test_thresholds_are_the_same_parts_of_the_largest_drive_for_all_springs_and_are_not_fitted(springs):
+    """The drive counts at the steps of the plant, a delay behind its samples, so that its largest is near theirs."""
+    found, free = springs[0]
+    thresholds, farthest = found.numbers(free).thresholds, np.abs(2.0 * STEADY.drive).max()
+    np.testing.assert_allclose(thresholds / thresholds[0, 3], np.tile([0.0, 0.1, 0.4, 1.0], (7, 1)), rtol=1e-12)
+    assert thresholds[0, 3] == pytest.approx(0.5 * farthest, rel=0.1)
+    others = found.numbers(free + 0.01)
+    np.testing.assert_array_equal(others.thresholds, thresholds)
+    scaled_by = found.numbers(np.where(found.kinds == "phi", 2.0, 1.0) * free)
+    np.testing.assert_array_equal(scaled_by.F, 2.0 * found.numbers(free).F)
+
+
+@pytest.mark.promise("hysteretic-stiffness-10", "hysteretic-stiffness-11")
+def test_a_fit_begins_at_the_middle_amplitude_and_with_a_record_of_each(training):
+    """The middle is next to the geometric mean over the records: 0.6 V, and 1.2 V where most records have it."""
+    amplitudes, classes = amplitude_classes(training)
+    assert amplitudes[_middle(amplitudes, classes)] == pytest.approx(0.6, rel=1e-6)
+    more = [*training[:1], *training[3:4], *training[6:], *training[6:]]
+    assert amplitudes[_middle(*amplitude_classes(more))] == pytest.approx(1.2, rel=1e-6)
+    steady = [replace(STEADY, drive=record.drive) for record in training]
+    assert _few(steady, classes) == [0, 3, 6]
+    alone = [replace(r, drive=r.drive * (np.arange(2) == k % 2)) for k, r in enumerate(steady)]
+    assert _few(alone, classes) == [0, 1, 3, 4, 6, 7]  # and one of each set of actuators
+
+
+PAGE = (ROOT / "docs" / "hysteretic-stiffness.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.promise("hysteretic-stiffness-14")
+def test_the_lines_of_the_page_run(known, training, monkeypatch, capsys):
+    """With a fit that is there already: what is asked for, and what there is to print."""
+    asked = []
+    monkeypatch.setattr(identify, "fit_hysteretic_stiffness", lambda *a, **k: (asked.append((a, k)), known[0])[1])
+    (code,) = re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL)
+    found = {"recordings": training, "unseen": training[0]}
+    exec(code, found)
+    assert asked == [((training,), {"order": 36, "options": StiffnessOptions(springs=12)})]
+    assert str(known[0].softening) in capsys.readouterr().out
+    assert rms(found["error"][PERIOD:]) == pytest.approx(known[0].error_rms[0], rel=0.05)
+
+
+@pytest.mark.promise("hysteretic-stiffness-13")
+def test_the_benchmark_chooses_by_what_is_expected_of_unseen_records(monkeypatch, capsys):
+    """The fit that is expected to leave least counts, whatever it leaves of the fold's own record."""
+    bench, fitted = benchmark("cubespec_one_model"), []
+
+    def fit(groups, order, options, iterations):
+        fitted.append(([r for group in groups for r in group], order))
+        expected = np.array([3e-6] * 3 if order == 28 else [2e-6] * 3)
+        return SimpleNamespace(
+            order=order, classes=(0, 1, 2), amplitudes=(1.0, 2.0, 3.0), unseen_error_rms=expected, iterations=1,
+            converged=True, softening=0.1, parameters=10, redundant=0,
+        )  # fmt: skip
+
+    monkeypatch.setattr(bench, "fitted", fit)
+    monkeypatch.setattr(bench, "scores", lambda of, groups, held: np.array([0.5 if of.order == 28 else 0.9] * 3))
+    monkeypatch.setattr(bench, "predicted_error", lambda of, record, drop: np.zeros(3))
+    groups = [tuple(f"{a} mV, {k}" for k in range(6)) for a in (100, 200, 300)]
+    options = {"order": "28,36", "springs": "12", "thresholds": "0.02:0.4", "seen": "100,200,300", "iterations": "60"}
+    np.testing.assert_array_equal(bench.fold(groups, 5, options), [0.9] * 3)
+    assert "fold 5, held out" in capsys.readouterr().out
+    assert [order for _, order in fitted] == [28, 36]
+    assert all(len(records) == 15 and not any(r.endswith(", 5") for r in records) for records, _ in fitted)
+
+
+@pytest.mark.promise("hysteretic-stiffness-17", "hysteretic-stiffness-18", "hysteretic-stiffness-23")
+@pytest.mark.parametrize(("pairs", "numbers"), [(18, 760), (14, 632), (17, 770)])
+def test_the_counts_of_the_page_are_those_of_such_mirrors(pairs, numbers):
+    """Three actuators and sensors, twelve springs, four thresholds; 36 or 28 states, once with two real poles."""
+    poles = np.array([-20.0 + 1j * w for w in np.linspace(300.0, 2400.0, pairs)] + [-70.0, -90.0] * (pairs == 17))
+    draw = philox(12).standard_normal
+    b, c = draw((len(poles), 3)) + 0j, draw((3, len(poles))) + 0j
+    wide = replace(STEADY, drive=multisine(8, inputs=3)[:64], output=np.zeros((64, 3)))
+    start = LinearStart(ModalModel(poles, b, c, np.zeros((3, 3))), 0.0)
+    found, free = springs_of.begin(start, [wide], [wide], 12, (0.02, 0.06, 0.15, 0.4), fixed_delay=False)
+    assert found.mirror.B.shape[0] == (28 if pairs == 14 else 36)
+    assert free.size - found.redundant == numbers
+
+
+@pytest.mark.promise("hysteretic-stiffness-6", "hysteretic-stiffness-7")
 @pytest.mark.parametrize("softening", [0.05, 0.5, 0.89])
 def test_springs_never_gain_energy(springs, softening):
     """The energy of the docstring falls along every free path, and its stiffness is above zero."""
@@ -484,6 +609,7 @@ def free_energies(numbers, count, state):
     return np.array(found)
 
 
+@pytest.mark.promise("hysteretic-stiffness-11")
 def test_a_step_that_meets_a_limit_is_the_best_within_it():
     """Of two numbers that nearly do the same the first cannot fall far: the second is not to make up for its whole way.
 
@@ -502,6 +628,7 @@ def test_a_step_that_meets_a_limit_is_the_best_within_it():
     assert other == pytest.approx([-0.1, 1.09], rel=1e-6)
 
 
+@pytest.mark.promise("hysteretic-stiffness-11")
 def test_few_records_first_lead_nearly_as_far(training):
     """A step on one record of each amplitude costs less, and most of the error is gone after four."""
     options = StiffnessOptions(delay_s=7e-4, exchanges=0, few_first=4)
@@ -526,6 +653,7 @@ def siso(poles, size=20.0):
     return ModalModel(np.array(poles), np.full((count, 1), size + 0j), np.full((1, count), size + 0j), np.zeros((1, 1)))
 
 
+@pytest.mark.promise("hysteretic-stiffness-4")
 def test_springs_stand_on_pairs_in_the_recorded_band_alone():
     """A real pole and a pair above half of the sample rate stand for a delay: springs push them, and no more."""
     found, free = of_siso(siso([-70.0, -20 + 900j, -3000 + 9000j]), 3)
@@ -551,6 +679,7 @@ def test_a_start_of_small_modes_is_soft_enough():
         assert 0.0 < found.softening(found.numbers(free)) < 0.0201
 
 
+@pytest.mark.promise("hysteretic-stiffness-5")
 def test_an_actuator_that_rests_at_the_middle_amplitude_has_no_gain_there(springs):
     """Its plays and powers count in full; nothing is divided by how far it moved."""
     model, drive = springs[1], STEADY.drive * np.array([1.0, 0.0])
@@ -595,6 +724,171 @@ def test_a_delay_that_is_given_is_kept(training):
 
 
 # ------------------------------------------------------------------------------------------------------------- CubeSpec
+def rows_of(heading):
+    """The rows of a table of the page: the first cell, and the numbers in the others."""
+    return dict(lines_of(heading))
+
+
+def lines_of(heading):
+    lines = itertools.takewhile(lambda line: line.startswith("|"), PAGE.partition(heading)[2].splitlines()[1:])
+    for line in lines:
+        name, *cells = (cell.strip(" *") for cell in line.strip("|").split("|"))
+        yield name, [float(cell) if cell else None for cell in cells]
+
+
+FOLDS = "| held out | 100 mV | 200 mV | 300 mV |\n"
+BANDS = "| 300 mV: model | linear | noise |\n"
+
+
+@pytest.mark.promise(
+    "hysteretic-stiffness-17", "hysteretic-stiffness-18", "hysteretic-stiffness-22", "hysteretic-stiffness-20"
+)
+def test_the_figures_of_the_page_belong_together():
+    folds = rows_of(FOLDS)
+    each = np.array([folds[f"fold {k}"] for k in range(6)])
+    np.testing.assert_allclose(folds["mean of six"], each.mean(axis=0), rtol=0, atol=1e-4)
+    assert "The mean of the other four folds is 0.070, 0.094 and 0.139 µm" in PAGE
+    np.testing.assert_allclose(each[1:5].mean(axis=0), [0.070, 0.094, 0.139], rtol=0, atol=1e-3)
+    assert (np.array(folds["mean of six"]) < folds["best published model, neural, on other records"]).all()
+    bands = {name: np.reshape(cells, (3, 3)) for name, cells in rows_of(BANDS).items()}
+    whole, parts = bands.pop("all"), np.array(list(bands.values()))
+    np.testing.assert_allclose(np.sqrt(np.sum(parts**2, axis=0)), whole, rtol=0, atol=2.5e-3)  # of nine rounded ones
+    assert (parts[:8, 0, 0] < parts[:8, 0, 1]).all()  # 100 mV: below linear in every band that is driven
+    above = parts[:, :, 0] - parts[:, :, 1] > 0.0011
+    assert not above[:6].any() and above[6:, 1:].all()
+    excess = np.sqrt(np.sum(parts[6:, 1:, 0] ** 2 - parts[6:, 1:, 1] ** 2, axis=0))
+    np.testing.assert_allclose(excess, [0.037, 0.057], rtol=0, atol=2e-3)
+    np.testing.assert_allclose(whole[:, 2] ** 2 / whole[:, 1] ** 2, 0.01, atol=0.006)
+    assert whole[2, 0] == pytest.approx(whole[2, 1], rel=0.05)
+
+
+@pytest.fixture(scope="module")
+def cubespec():
+    """The six realisations of each amplitude."""
+    bench = benchmark("cubespec")
+    return bench, bench.realisations()
+
+
+@pytest.mark.promise(
+    "hysteretic-stiffness-17", "hysteretic-stiffness-19", "hysteretic-stiffness-21", "hysteretic-stiffness-25"
+)
+@needs_cubespec
+@pytest.mark.promise("hysteretic-stiffness-30")
+def test_what_the_recordings_of_cubespec_say_without_a_fit(cubespec):
+    """Limits of linear models, noise, periods that differ, and the responses of two amplitudes beside the third."""
+    _, groups = cubespec
+    assert [(len(group), group[0].drive.shape[1], group[0].output.shape[1]) for group in groups] == [(6, 3, 3)] * 3
+    for group, volts in zip(groups, (0.1, 0.2, 0.3), strict=True):
+        assert np.mean([record.drive.std(axis=0) for record in group]) == pytest.approx(volts, rel=0.02)
+        assert response_from_periods(group[:5], skip_periods=0).freq_hz[-1] == pytest.approx(2999.0, abs=0.5)
+    limit = rows_of(FOLDS)["what no linear model of one amplitude could follow, rms"]
+    told = {name: np.reshape(cells, (3, 3)) for name, cells in rows_of(BANDS).items()}
+    edges = benchmark("cubespec_residual").EDGES_HZ
+    assert [f"{a:.0f} to {b:.0f} Hz" for a, b in itertools.pairwise(edges)] == ["0 to 500 Hz", *list(told)[1:-1]]
+    responses = []
+    for k, group in enumerate(groups):
+        response = response_from_periods(group[:5], skip_periods=0)
+        responses.append(response)
+        first, second = group[5].output.reshape(2, -1, 3)
+        at = np.fft.rfftfreq(len(first), 1 / 6400.0)
+        noise = 2 * np.abs(np.fft.rfft(second - first, axis=0) / len(first)) ** 2 / 4
+        assert 1e6 * np.sqrt(response.residual_power.sum(axis=0).mean()) == pytest.approx(limit[k], abs=5e-4)
+        for (low, high), name in zip(itertools.pairwise(edges), told, strict=False):
+            inside = (response.freq_hz >= low) & (response.freq_hz < high)
+            linear = response.residual_power[inside].sum(axis=0).mean()
+            own = noise[(at >= low) & (at < high)].sum(axis=0).mean()
+            np.testing.assert_allclose(1e6 * np.sqrt([linear, own]), told[name][k, 1:], rtol=0, atol=6e-4)
+    apart = [1e6 * rms(np.subtract(*r.output.reshape(2, -1, 3))) for r in groups[0]]
+    np.testing.assert_allclose(apart[1:3], [0.11, 0.10], atol=5e-3)
+    assert min(apart) > 0.01 and max(apart[:1] + apart[3:]) < 0.03
+    shares = {}
+    for low, high in itertools.pairwise(edges[:-1]):
+        used = (responses[0].freq_hz >= low) & (responses[0].freq_hz < high)
+        small, middle, large = (r.response[used].ravel() for r in responses)
+        weight = (np.conj(large - small) @ (middle - small)).real / np.sum(np.abs(large - small) ** 2)
+        shares[low] = float(weight)
+    assert shares[0.5] == pytest.approx(0.4, abs=0.05)
+    assert 0.55 < shares[500.0] < 0.65 and max(shares.values()) < 0.7
+
+
+@pytest.mark.promise("hysteretic-stiffness-17", "hysteretic-stiffness-20", "hysteretic-stiffness-21")
+@pytest.mark.endurance
+@needs_cubespec
+@pytest.mark.promise("hysteretic-stiffness-30")
+def test_fold_5_of_cubespec_leaves_what_the_page_says(cubespec):
+    """The whole fit, minutes long. A search ends where eight steps gain less than a hundredth of the error, before its
+    optimum, and rounding leads it there on another path: a few such hundredths are let pass.
+    """
+    bench, groups = cubespec
+    one_model, residual = benchmark("cubespec_one_model"), benchmark("cubespec_residual")
+    fit = fit_hysteretic_stiffness(bench.all_but(groups, 5), order=36, options=StiffnessOptions(springs=12))
+    assert fit.parameters - fit.redundant == 760
+    assert one_model.scores(fit, groups, 5) == pytest.approx(rows_of(FOLDS)["fold 5"], rel=0.05)
+    left = [residual.left(fit, group, 5)[0][1:] for group in groups]
+    found = [1e6 * np.sqrt(np.mean(np.sum(power, axis=0))) for power in left]
+    assert found == pytest.approx(rows_of(BANDS)["all"][::3], rel=0.05)
+
+
+@pytest.mark.promise("hysteretic-stiffness-24", "hysteretic-stiffness-26")
+@pytest.mark.endurance
+@needs_cubespec
+@pytest.mark.parametrize(("seen", "left_um"), [((0, 2), (None, 0.141, 0.125)), ((0, 1), (None, None, 0.470))])
+def test_an_amplitude_of_cubespec_that_no_fit_saw(cubespec, seen, left_um):
+    """Between the amplitudes of the records it is followed, beyond them it is not, and `trust` says so."""
+    bench, groups = cubespec
+    train = bench.all_but([groups[k] for k in seen], 5)
+    fit = fit_hysteretic_stiffness(train, order=36, options=StiffnessOptions(springs=12))
+    scores = benchmark("cubespec_one_model").scores(fit, groups, 5)
+    for found, told in zip(scores, left_um, strict=True):
+        assert told is None or found == pytest.approx(told, rel=0.1)
+    if seen == (0, 1):
+        said = trust(fit, groups[2][5].drive)
+        assert (said.motion, 1e6 * said.error_rms) == pytest.approx((1.83, 0.111), rel=0.1)
+
+
+@pytest.mark.promise("hysteretic-stiffness-24")
+def test_what_the_page_says_of_a_blind_fit_goes_with_its_table():
+    """Fold 5: 0.141 um at 200 mV is 43 % more than where it was seen, and 0.146 um at 300 mV is that of the table."""
+    _, middle, large = rows_of(FOLDS)["fold 5"]
+    page = " ".join(PAGE.split())
+    assert "it leaves 0.141 µm at 200 mV, 43 % more than the fit that saw it" in page
+    assert 0.141 / middle == pytest.approx(1.43, abs=0.01)
+    assert "leaves 0.125 µm at 300 mV, less than the 0.146 µm of the fit to all three" in page
+    assert large == pytest.approx(0.146, abs=5e-4)
+
+
+ELSEWHERE = "| | 10 N | 25 N | 35 N, never seen | 50 N |\n"
+
+
+@pytest.mark.promise("hysteretic-stiffness-27")
+@pytest.mark.endurance
+def test_springs_elsewhere_leave_what_the_page_says(capsys):
+    """Linear models are the same anywhere. A search ends before its optimum, and rounding leads it to another place."""
+    benchmark("springs_elsewhere").main()
+    printed = [line.split()[2:] for line in capsys.readouterr().out.splitlines() if " N " in line]
+    names, rows = zip(*lines_of(ELSEWHERE), strict=True)
+    assert len(printed) == 8 and [names[k].split()[0].strip(",") for k in (0, 3)] == ["Bouc-Wen", "Duffing"]
+    for place, (springs, linear, own) in enumerate((rows[:3], rows[3:])):
+        for k, cells in enumerate(printed[4 * place : 4 * place + 4]):
+            assert 0.5 * springs[k] < float(cells[0]) < min(1.5 * springs[k], 0.5 * linear[k])
+            assert float(cells[1]) == pytest.approx(linear[k], rel=0.02)
+            assert own[k] is None if len(cells) == 2 else float(cells[2]) == pytest.approx(own[k], rel=0.03)
+
+
+@pytest.mark.promise("hysteretic-stiffness-17")
+@pytest.mark.promise("hysteretic-stiffness-30")
+def test_a_model_is_scored_as_the_page_says():
+    """Rms by channel and period without the first samples of each, and their mean; by hand, of constants."""
+    bench = benchmark("cubespec")
+    drive, period = np.zeros((1000, 2)), 500
+    output = np.repeat([[1.0, 2.0], [3.0, 4.0]], period, axis=0) * 1e-6
+    output[: bench.DROP] = 7.0
+    record = Recording("r", "", drive, output, 1.0, ("a", "b"), ("c", "d"), period)
+    seen = []
+    assert bench.score_um(lambda u: (seen.append(u), np.zeros((len(u), 2)))[1], record) == pytest.approx(2.5)
+    assert seen[0].shape == (2000, 2)  # the end of the record ran before it
+
+
 @needs_cubespec
 def test_one_model_of_cubespec_beats_the_linear_compromise():
     def of(amplitude_mv):
@@ -617,6 +911,7 @@ def test_one_model_of_cubespec_beats_the_linear_compromise():
 
 
 # ------------------------------------------------------------------------------------------------------------- refusals
+@pytest.mark.promise("hysteretic-stiffness-10")
 def test_one_amplitude_is_refused(training):
     with pytest.raises(IdentificationError, match=r"all 3 records have one amplitude, 0\.3 rms .* another amplitude"):
         fit_hysteretic_stiffness(training[:3])
@@ -650,3 +945,25 @@ def test_other_arguments_that_cannot_be(training, known):
         fit_hysteretic_stiffness(training, options=StiffnessOptions(sub_steps=0))
     with pytest.raises(IdentificationError, match=r"at 2000 Hz, where the model has 2 and 2 at 1000 Hz"):
         predicted_error(known[0], replace(training[0], rate_hz=2000.0))
+
+
+def test_an_operator_that_goes_on_is_the_same_within_its_old_reach():
+    play = PrandtlIshlinskii((0.0, 1.0), (2e-6, 1e-6), reach_v=3.0, polynomial_rad=(4e-6, 2e-6, 1e-6))
+    further = _further(play, 7.5)
+    assert further.reach_v == 7.5
+    for freq_hz, amplitude_v in ((1.0, 2.9), (7.0, 1.3)):
+        own, other = (model.loop(amplitude_v, freq_hz) for model in (play, further))
+        np.testing.assert_allclose(other.output_rad, own.output_rad, rtol=0, atol=1e-12 * np.ptp(own.output_rad))
+    assert _further(play, 2.0) is play
+
+
+@pytest.mark.promise("hysteretic-stiffness-29")
+def test_the_proof_stands_where_the_page_says():
+    said = " ".join(springs_of.__doc__.split())
+    for step in (
+        "No drive makes such a mirror run away. Without drive",
+        "never grows",
+        "rises without bound with the states",
+    ):
+        assert step in said
+    assert springs_of.MOST_SOFTENING == 0.9

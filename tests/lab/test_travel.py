@@ -16,6 +16,7 @@ def recorded(size, name="loop.csv"):
     return recording_from_arrays(WAVE, np.column_stack((0.1 * WAVE, size / 10.0 * WAVE)), 1000.0, name)
 
 
+@pytest.mark.promise("recordings-25")
 @pytest.mark.parametrize(
     ("per_rad", "unit", "options", "words"),
     [

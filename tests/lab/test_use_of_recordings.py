@@ -38,6 +38,7 @@ def wide(periods=3, name="wide", rate_hz=RATE, seed=5):
 
 
 # -------------------------------------------------------------------------------------------------------------- splits
+@pytest.mark.promise("identify-8")
 def test_one_period_is_split_where_the_drive_has_swept_its_range():
     """Its first half goes from 5 V to 9 V and back, and says nothing of 1 V."""
     one = loop(1)
@@ -53,6 +54,7 @@ def test_one_period_is_split_where_the_drive_has_swept_its_range():
     assert "sweeps 5 V to 9 V of the 1 V to 9 V that were recorded; hold less out" in told
 
 
+@pytest.mark.promise("identify-8")
 def test_a_growing_loop_is_split_behind_its_largest_sweep_and_others_in_the_middle():
     assert split_points([growing([1, 2, 3, 4])], None, validated=False) == [pytest.approx(6000 + 720, abs=30)]
     assert split_points([growing([4, 3, 2, 1]), loop(7)], None, validated=False) == [4000, 3500]
@@ -66,6 +68,7 @@ def test_a_growing_loop_is_split_behind_its_largest_sweep_and_others_in_the_midd
 
 
 # --------------------------------------------------------------------------------------------------------------- roles
+@pytest.mark.promise("identify-3")
 def test_a_role_goes_before_what_the_drive_looks_like():
     sine, small, large = loop(4), wide(), replace(wide(), path="large", drive=wide().drive * 30)
     assert roles([sine, small]).broadband == [small]
@@ -77,6 +80,7 @@ def test_a_role_goes_before_what_the_drive_looks_like():
     assert roles([as_wide, small]) == ([as_wide, small], [as_wide, small], [small])
 
 
+@pytest.mark.promise("identify-3")
 def test_a_role_that_a_drive_contradicts_is_refused():
     with pytest.raises(IdentificationError, match=r"loop: its role is broadband and its drive is a sine.* role loops"):
         roles([replace(loop(4), role="broadband"), growing([1, 4])])
@@ -88,6 +92,7 @@ def test_a_role_that_a_drive_contradicts_is_refused():
         identify([growing([1, 4])], validation=[replace(loop(4), role="loops")])
 
 
+@pytest.mark.promise("identify-8")
 def test_a_recording_for_validation_is_seen_by_no_fit():
     found = identify([growing([1, 4]), replace(loop(4), role="validation")], models=PLAYS)
     assert [(s.path, s.role, s.fitted, s.held_out) for s in found.sources] == [
@@ -96,6 +101,7 @@ def test_a_recording_for_validation_is_seen_by_no_fit():
     ]
 
 
+@pytest.mark.promise("identify-3")
 def test_a_narrow_drive_may_be_broadband_by_its_role_and_is_told():
     """A multisine of half a decade about a resonance."""
     time = np.arange(8000) / RATE
@@ -110,6 +116,7 @@ def test_a_narrow_drive_may_be_broadband_by_its_role_and_is_told():
 
 
 # ------------------------------------------------------------------------------------------------- what no fit has seen
+@pytest.mark.promise("identify-3")
 def test_what_is_fitted_by_nothing_is_told():
     slow = wide(name="slow", rate_hz=1000.0)
     served = roles([loop(4), wide(), slow])
@@ -123,6 +130,7 @@ def test_what_is_fitted_by_nothing_is_told():
     assert any(w.startswith("wide: broadband, and fitted by nothing") for w in found.warnings)
 
 
+@pytest.mark.promise("identify-4")
 def test_one_period_of_a_multisine_is_fitted_as_a_drive_that_does_not_repeat():
     found = identify([loop(6), wide(1)], models=("linear",))
     assert found.linear.fit_percent[0] > 90
@@ -134,6 +142,7 @@ def test_one_period_of_a_multisine_is_fitted_as_a_drive_that_does_not_repeat():
     assert use_warnings(pair, linear=True) == []
 
 
+@pytest.mark.promise("identify-9")
 def test_the_choice_says_what_it_rests_on_and_names_the_worst_recording():
     quiet, noisy = loop(4, name="a/quiet.csv"), loop(8, freq_hz=4.0, name="b/noisy.csv", noise=3e-3)
     found = identify([quiet, noisy], models=PLAYS)

@@ -64,6 +64,7 @@ def test_eq2_is_recovered_exactly_behind_each_hold(hold):
     np.testing.assert_allclose(lti.frequency_response(modes.state_space(), BAND_HZ), exact, rtol=1e-9)
 
 
+@pytest.mark.promise("identify-13")
 def test_a_wrong_hold_leaves_its_half_sample():
     eq2 = lti.modal_from_polynomials(*EQ2)
     held = sampled_response(eq2, BAND_HZ, "zero-order")
@@ -71,6 +72,18 @@ def test_a_wrong_hold_leaves_its_half_sample():
     error = lti.frequency_response(fit.modes().state_space(), BAND_HZ) / lti.frequency_response(eq2, BAND_HZ) - 1
     assert 0.2 < np.abs(error[-1, 0, 0]) < 0.4  # 2 sin(pi f / 2 rate) = 0.31 at 5 kHz
     assert np.abs(error[0, 0, 0]) < 1e-3
+
+
+@pytest.mark.promise("identify-13")
+def test_another_hold_is_half_a_sample_of_delay_and_bends_the_response_above_a_tenth_of_the_rate():
+    slow, rate = lti.modal_from_polynomials((1.0,), (1e-3, 1.0)), 50_000.0
+    freq = np.array([0.001, 0.03, 0.09, 0.2, 0.3]) * rate
+    held, straight = (sampled_response(slow, freq, hold)[:, 0, 0] for hold in HOLDS[:2])
+    apart = held / straight
+    assert np.abs(np.angle(apart * np.exp(1j * np.pi * freq / rate)))[:3].max() < 0.01
+    bent = np.abs(np.abs(apart) - 1.0)
+    assert bent[:3].max() < 0.05
+    assert bent[3:].min() > 0.1
 
 
 def test_several_channels_share_their_poles():

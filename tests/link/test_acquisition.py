@@ -73,6 +73,7 @@ def test_frames_detect_by_the_gaussian_tail():
     assert frames_detection_probability(0.9, 3) == pytest.approx(0.999, rel=1e-12)
 
 
+@pytest.mark.promise("link-45", "link-48")
 def test_the_papers_sequence_has_its_order_and_its_light_times():
     stages = paper_sequence(TIMING, CHANCES)
     assert [stage.name for stage in stages] == [
@@ -138,6 +139,7 @@ def by_matrix(stages, attempts):
     return reach[0], moment[0] / reach[0]
 
 
+@pytest.mark.promise("link-45", "link-46")
 @pytest.mark.parametrize("attempts", [1, 2, 5])
 def test_the_solution_is_that_of_the_absorbing_chain(attempts):
     stages = paper_sequence(TIMING, CHANCES)
@@ -155,6 +157,8 @@ def test_times_are_exact_for_one_stage_that_is_repeated():
     assert outcome.lost.time_s == pytest.approx([20.0]) and outcome.lost.weight == pytest.approx([0.75**4])
 
 
+@pytest.mark.promise("readme-7")
+@pytest.mark.promise("link-45")
 def test_the_sequence_and_its_simulation_agree():
     stages, attempts, runs = paper_sequence(TIMING, CHANCES), 4, 20_000
     outcome, drawn = solve_sequence(stages, attempts), simulate(stages, attempts, runs, seed=100)
@@ -218,6 +222,7 @@ def test_irradiance_is_that_of_a_gaussian_beam_and_holds_its_power():
     assert np.trapezoid(ring, radius) == pytest.approx(4.0, rel=1e-6)
 
 
+@pytest.mark.promise("link-53")
 def test_detection_time_follows_the_noise():
     # ratio 6 of signal to rms noise, 1e-10 W of noise in a second
     power = np.array([1e-10, 2e-10])

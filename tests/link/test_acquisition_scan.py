@@ -123,6 +123,7 @@ def test_closed_form_and_simulation_agree_without_vibration(scan):
         assert within_99(np.mean(runs.detected & (runs.time_s <= quantile)), share * times.probability, 12_000)
 
 
+@pytest.mark.promise("link-49")
 @pytest.mark.parametrize("rms", [3 * URAD, 10 * URAD])
 @pytest.mark.parametrize(
     ("scan", "correlation_time_s", "samples"),
@@ -183,6 +184,7 @@ def test_a_swath_narrower_than_the_pitch_leaves_its_share_of_gaps():
     assert gap_probability(touching) == pytest.approx(1 - math.pi / math.sqrt(12), abs=6e-4)
 
 
+@pytest.mark.promise("link-49")
 def test_a_fast_vibration_breaks_what_the_closed_form_assumes():
     scan, rms = Spiral(SEARCH, SURE, 28 * URAD / LOOK_S), 4 * URAD
     runs = simulate_scan(scan, 4000, 3, Vibration(rms, 5e-5), 200)

@@ -11,8 +11,8 @@ from microrad import link
 from microrad.core.intervals import binomial_band, clustered_band
 from microrad.link.pointing import outage
 from microrad.link.pointing.code_words import FadeMargin, words_asked
-from microrad.link.pointing.radial_error import Jitter
 from microrad.link.pointing.statistics import outage_probability, radius_of_loss_rad, transmission
+from microrad.link.radial_error import Jitter
 from microrad.loop.disturbance import first_order
 from microrad.loop.disturbance.windows import ErrorIndex
 from microrad.loop.pointing_loop.ensemble import Span
@@ -42,6 +42,7 @@ def lost(margin=MARGIN, word_s=0.02, span=SPAN, runs=3, **settings):
     return found
 
 
+@pytest.mark.promise("pointing-39", "pointing-40")
 def test_words_are_those_of_whole_runs_in_memory():
     words, time = [], []
     for run in range(3):
@@ -68,6 +69,7 @@ def test_the_share_of_time_is_that_of_a_gaussian_and_short_words_have_it_too():
     assert (long.words, long.lost.value, long.time) == (64, 0.0, found.time)
 
 
+@pytest.mark.promise("pointing-39", "pointing-40")
 def test_the_margin_is_that_of_the_link_s_fades(tmp_path):
     data = link.of(link_file(tmp_path).mission)
     margin, under = FadeMargin.of(data), outage.Exposure.stated(data)
@@ -79,6 +81,7 @@ def test_the_margin_is_that_of_the_link_s_fades(tmp_path):
     assert float(radius_of_loss_rad(margin.half_angle_rad, margin.loss_db)) == pytest.approx(reach, rel=1e-12, abs=0.0)
 
 
+@pytest.mark.promise("pointing-40")
 def test_a_link_that_misses_its_margin_on_the_axis_loses_all_words():
     found = lost(FadeMargin(100e-6, 0.0, -0.1))
     assert (found.lost.value, found.time.value, found.lost.high) == (1.0, 1.0, 1.0)
@@ -89,6 +92,7 @@ def test_one_run_tells_nothing_of_its_interval():
     assert (lost(runs=1).lost.low, lost(runs=1).lost.high) == (0.0, 1.0)
 
 
+@pytest.mark.promise("pointing-40")
 def test_the_interval_of_clusters_holds_whether_their_trials_are_alike_or_not():
     """Misses of 4000 intervals of 99 %, at each side of what chance allows: 40 are wanted of one that is exact."""
     rng = np.random.default_rng(1)
@@ -105,6 +109,7 @@ def test_the_interval_of_clusters_holds_whether_their_trials_are_alike_or_not():
     assert clustered_band(np.zeros(64), 50, 0.99) == (0.0, binomial_band(np.zeros(1), np.array([3200.0]), 0.99)[1][0])
 
 
+@pytest.mark.promise("pointing-40")
 @pytest.mark.parametrize(
     ("word_s", "runs", "words"),
     [

@@ -38,6 +38,7 @@ def alone(part, axes=(0,)):
 
 
 # -------------------------------------------------------------------------------------------------------- distributions
+@pytest.mark.promise("pointing-55", "pointing-58")
 @pytest.mark.parametrize(
     ("part", "wanted", "rel"),
     [
@@ -57,12 +58,14 @@ def test_the_quantile_of_one_part_is_its_closed_form(part, wanted, rel):
     assert alone(part.times(1e-6)).quantile(P) == pytest.approx(1e-6 * wanted, rel=rel, abs=0.0)
 
 
+@pytest.mark.promise("pointing-55")
 def test_the_sum_of_two_even_parts_is_a_triangle():
     whole = Bundle.of([case(1, half_width=np.array([1.0]))] * 2).about((0,))
     assert whole.quantile(P) == pytest.approx(2.0 - 2.0 * math.sqrt(1.0 - P), rel=1e-8)
     assert whole.series().within(1.0) == pytest.approx(0.75, abs=1e-8)
 
 
+@pytest.mark.promise("pointing-55", "pointing-63")
 def test_two_like_gaussian_axes_are_rayleigh_and_unlike_ones_rice():
     assert alone(case(2, covariance=np.eye(2)), (0, 1)).quantile(P) == pytest.approx(stats.rayleigh.ppf(P), rel=1e-8)
     off = case(2, mean=np.array([3.0, 4.0]), covariance=np.eye(2))
@@ -76,6 +79,7 @@ def test_correlated_axes_are_those_of_the_turned_ones():
     assert quantiles[1] == pytest.approx(quantiles[0], rel=1e-8)
 
 
+@pytest.mark.promise("pointing-52")
 def test_errors_that_reach_both_axes_together_lie_on_a_line_and_those_apart_do_not():
     both = Requirement(ErrorIndex("APE"))
     together, apart = (
@@ -103,6 +107,7 @@ UNLIKE = (
 )
 
 
+@pytest.mark.promise("pointing-52", "pointing-55", "pointing-58", "pointing-60")
 @pytest.mark.parametrize("draws", [2_000_000, pytest.param(100_000_000, marks=pytest.mark.endurance)])
 def test_four_unlike_classes_are_as_draws_of_them(draws):
     required = replace(APE, interpretation="mixed")
@@ -154,6 +159,7 @@ def drawn_errors(kind, takes):
     return np.mean(path(kind, begin[:, None] + SPACING_S + inside), axis=1) - mean
 
 
+@pytest.mark.promise("pointing-49", "pointing-50", "pointing-58")
 @pytest.mark.parametrize("takes", ["APE", "MPE", "RPE", "PDE"])
 @pytest.mark.parametrize("kind", TIMED)
 def test_a_class_is_its_path_in_time(kind, takes):
@@ -171,6 +177,7 @@ def test_a_class_is_its_path_in_time(kind, takes):
         assert found.quantile(share) == pytest.approx(np.quantile(np.abs(drawn), share), rel=0.03, abs=resolved)
 
 
+@pytest.mark.promise("pointing-51")
 def test_reproducibility_of_what_begins_anew_is_over_what_is_left_beside_whole_periods():
     drift = source("drift", 2.0, period_s=20.0)
     for spacing, mean, variance in ((40.0, 0.0, 0.0), (45.0, 0.0, 4.0 * 75.0)):
@@ -180,6 +187,7 @@ def test_reproducibility_of_what_begins_anew_is_over_what_is_left_beside_whole_p
         assert float(found.covariance[0, 0]) == pytest.approx(variance, rel=1e-12, abs=1e-9)
 
 
+@pytest.mark.promise("pointing-50", "pointing-51")
 @pytest.mark.parametrize(
     ("shape", "wanted"),
     [("gaussian", math.sqrt(2.0) * stats.norm.ppf(0.5 * (1.0 + P))), ("uniform", 2.0 - 2.0 * math.sqrt(1.0 - P))],
@@ -205,6 +213,7 @@ def test_a_bias_that_is_another_one_in_each_observation_is_in_reproducibility_al
         assert next(both) == pytest.approx(next(both), rel=1e-12, abs=0.0)
 
 
+@pytest.mark.promise("pointing-50")
 def test_a_random_error_is_in_no_mean_and_even_where_it_is_said():
     for takes, there in (("APE", 1.0), ("MPE", 0.0), ("RPE", 1.0)):
         index = ErrorIndex(takes) if takes == "APE" else ErrorIndex(takes, 1.0)
@@ -215,6 +224,7 @@ def test_a_random_error_is_in_no_mean_and_even_where_it_is_said():
     )
 
 
+@pytest.mark.promise("pointing-50")
 @pytest.mark.parametrize(
     "index",
     [ErrorIndex("APE"), ErrorIndex("MPE", 0.3), ErrorIndex("RPE", 0.3), ErrorIndex("PDE", 0.3, 1.0)],
@@ -242,6 +252,7 @@ def seen(drive, times):
     return signal.lsim((FAST.A, FAST.B, FAST.C, FAST.D), drive, times)[1]
 
 
+@pytest.mark.promise("pointing-58", "pointing-59")
 def test_a_transient_behind_a_transfer_is_the_response_to_it():
     part = contribution(
         source("transient", 1.0, gains=FAST, period_s=12.0, decay_s=0.8), replace(APE, axes=(0, 1))
@@ -252,6 +263,7 @@ def test_a_transient_behind_a_transfer_is_the_response_to_it():
     assert alone(part, (0, 1)).sigma == pytest.approx(np.std(response, axis=0), rel=5e-3)
 
 
+@pytest.mark.promise("pointing-58", "pointing-59")
 def test_a_sinusoid_behind_a_transfer_turns_about_both_axes():
     part = contribution(source("periodic", 1.0, gains=FAST, freq_hz=0.9), replace(APE, axes=(0, 1))).parts[0]
     times = np.linspace(0.0, 20.0 / 0.9, 200001)
@@ -259,6 +271,7 @@ def test_a_sinusoid_behind_a_transfer_turns_about_both_axes():
     assert alone(part, (0, 1)).covariance == pytest.approx(np.cov(late.T, bias=True), rel=1e-3, abs=1e-4)
 
 
+@pytest.mark.promise("pointing-59")
 def test_a_process_behind_a_transfer_has_its_spectrum_times_the_response():
     shaken = first_order(2e-6, 3.0, convention="per-axis")
     found = Motion.of(
@@ -304,6 +317,7 @@ def test_poles_that_coincide_are_as_poles_that_nearly_do(index):
 
 
 # --------------------------------------------------------------------------------------------------- over the ensemble
+@pytest.mark.promise("pointing-54")
 def test_the_interpretations_take_the_worst_satellite_the_worst_time_or_neither():
     sizes = {}
     for name in ("temporal", "ensemble", "mixed"):
@@ -317,6 +331,7 @@ def test_the_interpretations_take_the_worst_satellite_the_worst_time_or_neither(
     assert sizes["mixed"].quantile(0.95) == pytest.approx(np.quantile(drawn, 0.95), rel=0.01)
 
 
+@pytest.mark.promise("pointing-54")
 def test_a_constant_over_an_ensemble_is_its_spread():
     mixed = replace(APE, interpretation="mixed")
     even = contribution(source("constant", 1.0, "uniform", 3.0), mixed).parts[0]
@@ -328,6 +343,7 @@ def test_a_constant_over_an_ensemble_is_its_spread():
     assert alone(contribution(source("constant", -1.0, "uniform", 3.0), APE).parts[0]).quantile(P) == pytest.approx(4.0)
 
 
+@pytest.mark.promise("pointing-54")
 def test_noise_at_its_worst_time_has_as_many_sigma_as_hold_the_confidence():
     required = replace(APE, interpretation="ensemble")
     found = total(contributions([source("random", 2.0)], required), required)
@@ -335,6 +351,7 @@ def test_noise_at_its_worst_time_has_as_many_sigma_as_hold_the_confidence():
 
 
 # -------------------------------------------------------------------------------------------------------------- totals
+@pytest.mark.promise("pointing-55")
 def test_the_rules_add_means_and_the_squares_of_deviations():
     parts = [source("constant", 2.0), *two()]
     found = total(contributions(parts, APE), APE)
@@ -365,6 +382,7 @@ C_4 = (
 )
 
 
+@pytest.mark.promise("pointing-62")
 @pytest.mark.parametrize(
     ("index", "printed", "limits", "within"),
     [
@@ -401,6 +419,7 @@ def test_totals_of_several_requirements_are_each_as_by_itself():
     assert together[0].quantile_rad == pytest.approx(2.0 * together[2].quantile_rad, rel=1e-6)
 
 
+@pytest.mark.promise("pointing-49")
 def test_shares_rank_sources_and_say_how_far_each_may_grow():
     required = replace(APE, limit_rad=14.0)
     parts = [*two(4.0, 1.0), source("constant", 3.0)]
@@ -427,6 +446,7 @@ HUMMING = replace(olympus(), lines=(SpectralLine(1e-6, 1.0),))
 AT_2 = replace(FAST, A=np.diag([-2.0, -3.0]))
 
 
+@pytest.mark.promise("pointing-51", "pointing-59")
 @pytest.mark.parametrize(
     ("make", "said"),
     [
@@ -481,12 +501,30 @@ CONSTANTS = [replace(source("constant", 0.0, "gaussian", size), name=name) for n
 UNLIKE_PAIR = [two()[0], replace(source("constant", 0.0, "gaussian", 1.0), name="b")]
 
 
+@pytest.mark.promise("pointing-60", "pointing-63")
 @pytest.mark.parametrize(("rho", "sigma"), [(1.0, 7.0), (0.0, 5.0), (-1.0, 1.0), (0.5, math.sqrt(37.0))])
 def test_correlated_errors_add_as_their_matrix_says(rho, sigma):
     (found,) = budget([*two(), source("constant", 1.0)], [APE], [Correlation("a", "b", rho)])
     assert float(found.sigma_rad[0]) == pytest.approx(sigma, rel=1e-12)
     names = [each.name for each in found.contributions]
     assert names == (["a with b", "a constant error"] if rho else ["a", "b", "a constant error"])
+
+
+def test_correlations_are_of_their_pairs_in_whatever_order_they_are_named():
+    three = [replace(source("random", size), name=name) for name, size in (("a", 1.0), ("b", 2.0), ("c", 4.0))]
+    named = [Correlation("c", "b", 0.5), Correlation("c", "a", 0.0), Correlation("b", "a", -0.25)]
+    wanted = 1.0 + 4.0 + 16.0 + 2.0 * (0.5 * 4.0 * 2.0 - 0.25 * 2.0 * 1.0)
+    for given in (named, named[::-1], [named[2], named[0]]):
+        (found,) = budget(three, [APE], given)
+        assert float(found.sigma_rad[0]) ** 2 == pytest.approx(wanted, rel=1e-12)
+
+
+def test_each_requirement_has_the_parts_of_its_own_confidence():
+    worst = replace(APE, interpretation="ensemble")
+    asked = [replace(worst, confidence=0.9973), replace(worst, confidence=0.95)]
+    strict, loose = budget(two(), asked)
+    (alone_there,) = budget(two(), asked[1:])
+    assert loose.quantile_rad == alone_there.quantile_rad < 0.8 * strict.quantile_rad
 
 
 def test_correlated_errors_have_the_signs_of_their_gains_and_keep_axes_apart():
@@ -499,6 +537,7 @@ def test_correlated_errors_have_the_signs_of_their_gains_and_keep_axes_apart():
     assert apart.contributions[0].parts[0].covariance[0] == pytest.approx(np.diag(np.diag(wanted)))
 
 
+@pytest.mark.promise("pointing-60")
 @pytest.mark.parametrize(("rho", "sigma"), [(1.0, 7.0), (-1.0, 1.0)])
 def test_correlated_constants_lie_three_common_deviations_out_on_the_worst_satellite(rho, sigma):
     asked = [APE, replace(APE, interpretation="mixed")]
@@ -518,6 +557,7 @@ def test_correlated_noises_stand_with_common_deviations_at_their_worst_time():
     assert none.quantile_rad == 0.0 and len(none.contributions) == 2
 
 
+@pytest.mark.promise("pointing-60")
 @pytest.mark.parametrize(
     ("sources", "correlations", "said"),
     [
@@ -539,6 +579,7 @@ def test_correlations_that_cannot_be_are_refused(sources, correlations, said):
         budget(sources, [APE], correlations)
 
 
+@pytest.mark.promise("pointing-48")
 def test_the_page_s_list_comes_to_what_the_page_says(tmp_path):
     text = (ROOT / "docs" / "pointing.md").read_text("utf-8")
     (tmp_path / "errors.csv").write_text(re.search(r"```text\n(name,class.*?)```", text, re.DOTALL)[1], "utf-8")
@@ -549,6 +590,7 @@ def test_the_page_s_list_comes_to_what_the_page_says(tmp_path):
 
 
 # ------------------------------------------------------------------------------------------- signs, restarts, and ends
+@pytest.mark.promise("pointing-54")
 def test_signs_of_what_is_spread_about_zero_do_not_cancel_on_the_worst_satellite():
     parts = [replace(each, transfer=gains) for each, gains in zip(CONSTANTS, (ONE, -ONE), strict=True)]
     assert total(contributions(parts, APE), APE).quantile_rad == pytest.approx(3.0 * 7.0)
@@ -562,6 +604,7 @@ def test_signs_of_what_is_spread_about_zero_do_not_cancel_on_the_worst_satellite
     )
 
 
+@pytest.mark.promise("pointing-54")
 def test_sizes_add_up_at_the_worst_time_whatever_their_signs():
     worst = replace(APE, interpretation="ensemble")
     parts = [source("constant", 2.0, gains=-ONE), source("random", 1.0), source("periodic", 1.0, freq_hz=1.0)]
@@ -579,6 +622,7 @@ def test_sizes_add_up_at_the_worst_time_whatever_their_signs():
         assert found.quantile_rad == pytest.approx(np.quantile(drawn, 0.9), rel=1e-3)
 
 
+@pytest.mark.promise("pointing-51")
 @pytest.mark.parametrize(("spacing", "decay"), [(1999.0, 300.0), (1250.0, 100.0), (1600.0, 900.0)])
 def test_the_second_window_of_a_transient_begins_anew_too(spacing, decay):
     fades = source("transient", 1.0, period_s=1000.0, decay_s=decay)
@@ -600,6 +644,7 @@ def test_whole_periods_apart_there_is_no_difference_though_they_do_not_divide_in
         assert alone(found).quantile(P) == pytest.approx(0.0, abs=1e-12)
 
 
+@pytest.mark.promise("pointing-57")
 @pytest.mark.parametrize("decay", [0.3, 1.0, 5.0])
 def test_a_transient_that_is_short_beside_its_period_is_resolved(decay):
     part = contribution(source("transient", 1.0, period_s=1000.0, decay_s=decay), APE).parts[0]
@@ -633,6 +678,7 @@ def test_a_mean_that_dwarfs_its_spread_is_kept_with_the_spread_along_it():
         assert found - 100.0 * math.sqrt(2.0) == pytest.approx(exact - 100.0 * math.sqrt(2.0), rel=5e-3)
 
 
+@pytest.mark.promise("pointing-49")
 def test_weights_add_up_to_one_where_signs_differ_and_a_source_may_always_be_as_it_is():
     parts = [source("constant", 3.0), replace(source("constant", -1.0), name="b"), source("random", 0.5)]
     required = replace(APE, limit_rad=4.0)
@@ -646,6 +692,7 @@ def test_weights_add_up_to_one_where_signs_differ_and_a_source_may_always_be_as_
     assert {each.name: each.allowed for each in missed}["a drift error"] == math.inf  # it adds nothing
 
 
+@pytest.mark.promise("pointing-49")
 def test_weights_are_what_each_source_grows_the_total_by_however_loose_the_limit():
     both, each = np.array([1.0, 1.0]), {"gains": np.array([1.0, 1.0]), "apart": True}
     parts = [

@@ -61,6 +61,7 @@ def test_five_watts_without_losses():
     assert received == pytest.approx(-43.88, abs=half_a_hundredth_db)  # 5 W, 5 cm, 15 cm, 42 000 km
 
 
+@pytest.mark.promise("link-12")
 def test_the_papers_margin_is_reproduced():
     budget = budgets.communication(MISSION, SOURCES)
     # paper, section 2.2: 3 dB at 300 Mbit/s and 10 µrad, from which the sensitivity was inferred
@@ -163,6 +164,7 @@ def test_the_radiant_intensity_is_that_before_the_air(budget_of):
 
 
 # ---- the shape of a budget
+@pytest.mark.promise("decisions-1", "readme-7")
 @pytest.mark.parametrize("budget_of", BUDGETS)
 def test_a_budget_is_the_sum_of_its_lines(budget_of):
     budget = budget_of(MISSION, SOURCES)
@@ -190,6 +192,7 @@ def test_irradiance_times_area_is_the_received_power(budget_of):
     assert budget.irradiance_on_axis_w_m2 > budget.irradiance_w_m2
 
 
+@pytest.mark.promise("link-7")
 def test_photons_received_for_each_bit_stand_in_the_budget():
     budget, beam = budgets.communication(MISSION, SOURCES, data_rate_bit_s=1e9), MISSION.communication
     photons = budget.received_power_w * beam.wavelength_m / (6.62607015e-34 * 299_792_458.0) / 1e9
@@ -209,6 +212,8 @@ def test_more_light_received_than_sent_is_no_margin(tmp_path):
     assert link_study.run_link_study(link_file(tmp_path)).communication.possible
 
 
+@pytest.mark.promise("decisions-1")
+@pytest.mark.promise("link-9")
 def test_a_term_at_zero_decibel_is_a_line():
     zero = [line for line in budgets.communication(MISSION, SOURCES).lines if line.value == 0.0]
     names = {"Transmit optics loss", "Receive optics loss", "Tracking split loss", "Implementation loss"}
@@ -238,6 +243,7 @@ def test_a_beam_takes_its_losses_too():
     assert after.irradiance_on_axis_w_m2 == pytest.approx(before.irradiance_on_axis_w_m2 * 10**-0.1, rel=1e-9)
 
 
+@pytest.mark.promise("readme-7")
 def test_sources_travel_into_the_lines():
     lines = {line.name: line for line in budgets.communication(MISSION, SOURCES, data_rate_bit_s=1e8).lines}
     assert lines["Transmit power"].source == "paper: Table 2"
@@ -331,6 +337,7 @@ def test_impossible_points_are_refused(rate, error, what):
         budgets.communication(MISSION, SOURCES, error, rate)
 
 
+@pytest.mark.promise("decisions-1")
 def test_an_unknown_convention_is_named():
     with pytest.raises(ValueError, match='"top-hat" is neither "gaussian" nor "gain"'):
         gains.pointing_loss_db(1e-6, 0.05, 1.55e-6, "top-hat")

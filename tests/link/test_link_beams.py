@@ -39,6 +39,7 @@ def field(truncation, obscuration, x):
 
 
 # ---- aperture: gain on the axis
+@pytest.mark.promise("readme-7")
 @pytest.mark.parametrize(("truncation", "obscuration"), SHAPES)
 def test_gain_is_that_of_the_diffraction_integral(truncation, obscuration):
     # G = 4 pi / lambda^2 |field's integral|^2 / power before the aperture; radius 1, field exp(-(a rho)^2)
@@ -67,6 +68,7 @@ def test_the_best_truncation_behind_an_obscuration_is_that_of_their_series():
         assert -best.fun == pytest.approx(brute, abs=1e-6)
 
 
+@pytest.mark.promise("link-13")
 @settings(deadline=None)
 @given(st.floats(1e-4, 5.0), st.floats(0.0, 0.95))
 def test_no_beam_has_more_gain_than_even_light_over_the_same_opening(truncation, obscuration):
@@ -129,6 +131,7 @@ def test_loss_is_that_of_a_two_dimensional_fourier_integral():
     assert float(lit(a, e).loss_db(angle(x))) == pytest.approx(-20 * math.log10(abs(total / whole)), abs=1e-7)
 
 
+@pytest.mark.promise("link-14")
 @pytest.mark.parametrize(("truncation", "obscuration", "m_squared"), [(1.12, 0.0, 1.0), (1.5, 0.2, 1.0), (2.0, 0, 1.4)])
 def test_the_far_field_carries_the_power_that_passes(truncation, obscuration, m_squared):
     shape = lit(truncation, obscuration, m_squared)
@@ -253,6 +256,7 @@ def test_a_beam_of_which_one_hundredth_passes_the_obscuration_is_taken():
 
 
 # ---- gains and losses
+@pytest.mark.promise("link-20")
 @pytest.mark.parametrize(("elevation", "printed"), [(90.0, 1.0), (30.0, 1.9943), (10.0, 5.586), (0.0, 37.92)])
 def test_air_mass_of_kasten_and_young(elevation, printed):
     # Kasten and Young 1989: 0.50572, 6.07995 deg, 1.6364; the horizon has 37.9
@@ -265,6 +269,8 @@ def test_an_elevation_beyond_horizon_or_zenith_is_refused(elevation):
         gains.air_mass(math.radians(elevation))
 
 
+@pytest.mark.promise("readme-7")
+@pytest.mark.promise("link-20")
 def test_a_clear_sky_costs_its_zenith_times_the_air_mass():
     assert gains.clear_sky_loss_db(0.5, math.pi / 2) == pytest.approx(3.0103, abs=2e-3)
     at_thirty = gains.clear_sky_loss_db(0.8, math.radians(30.0))
@@ -314,6 +320,7 @@ def test_an_obscuration_takes_its_area():
             gains.obscuration_loss_db(hole)
 
 
+@pytest.mark.promise("link-57")
 def test_a_terminal_measured_before_flight():
     # LUCE engineering model: 90 mW, 9.4 urad full angle at 1/e2, 560 MW/sr measured
     assert gains.peak_radiant_intensity_w_sr(0.09, 4.7e-6) == pytest.approx(2.594e9, rel=2e-4)

@@ -24,6 +24,7 @@ def by_term(rows):
 
 
 # ---- the peers' own numbers, worked out by hand and by a package that implements the same formulas
+@pytest.mark.promise("link-16")
 def test_mathworks_inter_satellite_example():
     peer = peers.mathworks(peers.MATHWORKS)
     assert peer["Transmit gain"] == digits(103.0383)
@@ -44,6 +45,7 @@ def test_liangs_quoted_distance_leaves_three_decibels():
 
 
 # ---- what microrad differs by
+@pytest.mark.promise("link-16")
 def test_difference_to_mathworks_is_the_two_pointing_terms():
     rows = by_term(peers.mathworks_rows())
     assert rows["Margin"].ours == digits(-2.4218)
@@ -54,6 +56,7 @@ def test_difference_to_mathworks_is_the_two_pointing_terms():
         assert rows[same].difference == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.promise("link-16")
 def test_other_readings_of_the_mathworks_example():
     rows = by_term(peers.mathworks_rows())
     assert rows['Margin, microrad with "gain"'].ours == digits(-2.4655)
@@ -79,6 +82,8 @@ def test_lines_of_both_sides_add_up_to_the_received_power(table):
     assert sum(row.peer for row in rows[:total]) == pytest.approx(rows[total].peer, abs=1e-9)
 
 
+@pytest.mark.promise("decisions-1")
+@pytest.mark.promise("link-12", "link-13")
 @pytest.mark.parametrize(
     ("convention", "margin_db", "difference_db"),
     [
@@ -107,6 +112,7 @@ def test_told_to_read_likewise_microrad_has_the_peers_margin():
         assert row.difference == pytest.approx(0.0, abs=1e-4 if "gain" in row.term else 1e-9)
 
 
+@pytest.mark.promise("link-12", "link-13", "link-17")
 @pytest.mark.parametrize(
     ("term", "ours", "peer"),
     [
@@ -131,6 +137,7 @@ def test_terms_at_ten_microradian(term, ours, peer):
     assert row.peer == digits(peer)
 
 
+@pytest.mark.promise("link-17")
 def test_a_fibre_loses_what_its_mode_overlaps_less():
     """Coupling into a single-mode fibre in the pupil: its mode times a tilted wavefront, over a grid of the pupil."""
     radius, tilt = 0.075, 2 * math.pi / 1.55e-6 * 10e-6
@@ -157,6 +164,7 @@ def test_the_uncut_gaussian_has_more_gain_than_the_aperture_can():
 
 
 # ---- the peer that can be installed
+@pytest.mark.promise("link-18")
 def test_without_the_package_the_comparison_says_how_to_get_it(monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "ogs_linkbudget", None)
     monkeypatch.delitem(sys.modules, "ogs_linkbudget.config", raising=False)

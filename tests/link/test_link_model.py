@@ -1,6 +1,8 @@
 """From the tables of a mission to its margin: receivers, lines and map against each other and against formulas."""
 
+import dataclasses
 import math
+import re
 
 import numpy as np
 import pytest
@@ -36,6 +38,11 @@ DIODE = {
 }
 BUILT = {
     "homodyne bpsk": receivers.BpskHomodyne(**COMMON, quantum_efficiency=0.7),
+    "heterodyne bpsk": receivers.BpskHeterodyne(**COMMON, quantum_efficiency=0.7, phase_error_rad=0.2),
+    "homodyne qpsk": receivers.QpskHomodyne(**COMMON, quantum_efficiency=0.7, polarisations=2),
+    "heterodyne qpsk": receivers.QpskHeterodyne(
+        **COMMON, quantum_efficiency=0.7, phase_error_rad=math.radians(5.0), polarisations=2
+    ),
     "preamplified dpsk": receivers.DpskPreamplified(**COMMON, noise_figure_db=4.0),
     "preamplified ook": receivers.OokPreamplified(
         **COMMON, noise_figure_db=4.0, gain_db=35.0, optical_bandwidth_hz=20e9, extinction_ratio=100.0
@@ -69,13 +76,16 @@ def budget_of(file, *point):
 
 
 # ---- receivers
+@pytest.mark.promise("choose-10")
+@pytest.mark.promise("link-22")
 @pytest.mark.parametrize("name", RECEIVERS)
 def test_each_receiver_of_a_file_is_the_record_of_its_values(read, name):
     file = read(received_with(name))
     built = link.of(file.mission).receiver
     assert type(built) is type(BUILT[name])
-    for key in built.__slots__:
-        assert getattr(built, key) == pytest.approx(getattr(BUILT[name], key), rel=1e-12, abs=0.0), key
+    for key, expected in dataclasses.asdict(BUILT[name]).items():
+        close = expected if expected is None else pytest.approx(expected, rel=1e-12, abs=0.0)
+        assert getattr(built, key) == close, key
     expected = float(BUILT[name].required_power_w(RATE))
     budget = budget_of(file)
     assert budget.required_power_w == pytest.approx(expected, rel=1e-9, abs=0.0)
@@ -92,12 +102,15 @@ def test_every_pair_of_the_table_is_built():
     assert set(BUILT) == set(RECEIVERS)
 
 
+@pytest.mark.promise("choose-10")
+@pytest.mark.promise("link-22")
 def test_a_measured_sensitivity_is_no_receiver(read):
     file = read()
     assert link.of(file.mission).receiver is None
     assert budget_of(file).required_power_w == pytest.approx(291.2 * PHOTON_J * RATE, rel=1e-9, abs=0.0)
 
 
+@pytest.mark.promise("link-27")
 @pytest.mark.parametrize("name", ["counting ook", "counting ppm", "pin ook", "apd ook"])
 def test_a_sky_comes_through_aperture_field_filter_and_optics(read, name):
     sky = received_with(name, background=SKY, background_power=None)
@@ -109,7 +122,10 @@ def test_a_sky_comes_through_aperture_field_filter_and_optics(read, name):
     assert link.of(file.mission).receiver.background_power_w == pytest.approx(expected, rel=1e-6, abs=0.0)
 
 
-@pytest.mark.parametrize("name", ["homodyne bpsk", "preamplified dpsk", "preamplified ook"])
+@pytest.mark.promise("link-27")
+@pytest.mark.parametrize(
+    "name", ["homodyne bpsk", "heterodyne bpsk", "homodyne qpsk", "preamplified dpsk", "preamplified ook"]
+)
 def test_a_sky_is_photons_in_a_mode_behind_the_optics(read, name):
     file = read(received_with(name, background=SKY), {"communication.receive_optics_loss": "3 dB"})
     expected = 10e6 * WAVELENGTH**5 / (2 * PLANCK_J_S * SPEED_OF_LIGHT_M_S**2) * 10**-0.3
@@ -120,10 +136,12 @@ def test_a_sky_is_photons_in_a_mode_behind_the_optics(read, name):
 def test_a_rate_above_the_bandwidth_is_refused_with_the_highest(read, name):
     file = read(received_with(name))
     highest = link.of(file.mission).receiver.highest_data_rate_bit_s
-    limit = {"counting ppm": 4e9 * 0.8 / 4}.get(name, 4e9 * 0.8)
+    bits = RECEIVERS[name].get("polarisations", 1) * (2 if RECEIVERS[name]["modulation"] == "qpsk" else 1)
+    limit = 4e9 * 0.8 / 4 if name == "counting ppm" else 4e9 * 0.8 * bits
     assert highest == pytest.approx(limit, rel=1e-12)
     assert math.isfinite(budget_of(file, 1e-5, highest).margin_db)
-    said = r"so at most 800 Mbit/s of data" if name == "counting ppm" else r"so at most 3\.2 Gbit/s of data"
+    shown = {"counting ppm": "800 Mbit/s", "homodyne qpsk": "12.8 Gbit/s", "heterodyne qpsk": "12.8 Gbit/s"}
+    said = re.escape(f"so at most {shown.get(name, '3.2 Gbit/s')} of data")
     with pytest.raises(ValueError, match=said):
         budget_of(file, 1e-5, highest * 1.001)
     with pytest.raises(ValueError, match=said):
@@ -191,6 +209,7 @@ def test_a_whole_map_is_the_budget_at_any_of_its_points(read, change):
         assert margins[i, j] == pytest.approx(budget_of(file, errors[j], rates[i]).margin_db, abs=1e-6)
 
 
+@pytest.mark.promise("link-14")
 def test_a_link_through_everything_is_what_the_formulas_say(read):
     file = read(
         PATTERN,
@@ -240,6 +259,7 @@ def test_a_link_through_everything_is_what_the_formulas_say(read):
         "Receive optics loss",
         "Tracking split loss",
         "Implementation loss",
+        "Inter-symbol loss",
     ]
     area = math.pi * 0.15**2 / 4 * (1 - 0.3**2)
     assert budget.irradiance_w_m2 * area * 10**-0.2 == pytest.approx(budget.received_power_w, rel=1e-9, abs=0.0)
@@ -248,6 +268,19 @@ def test_a_link_through_everything_is_what_the_formulas_say(read):
     )
 
 
+@pytest.mark.promise("link-4", "link-20")
+def test_without_a_channel_there_is_vacuum_and_without_an_obscuration_none(read):
+    for make in (budgets.communication, budgets.beacon, budgets.answer):
+        plain, through = (make(each.mission, each.sources) for each in (read(), read(CHANNEL)))
+        assert "Clear-sky loss" not in {line.name for line in plain.lines}
+        assert line_of(through, "Clear-sky loss").value < -1.9
+        assert through.margin_db - plain.margin_db == pytest.approx(line_of(through, "Clear-sky loss").value, abs=1e-9)
+    terminals = read().mission.terminals
+    assert (terminals.leo_obscuration, terminals.geo_obscuration) == (None, None)
+    assert (terminals.called("leo"), terminals.called("geo")) == ("LEO", "GEO")
+
+
+@pytest.mark.promise("link-14")
 def test_obscurations_are_lines_of_the_terminal_that_receives(read):
     file = read(HOLES, {"terminals.leo_name": "Cubesat", "terminals.geo_name": "Relay"})
     assert line_of(budgets.beacon(file.mission, file.sources), "Relay obscuration loss").value == pytest.approx(
@@ -259,6 +292,7 @@ def test_obscurations_are_lines_of_the_terminal_that_receives(read):
     assert not any("obscuration" in line.name for line in budget_of(read()).lines)
 
 
+@pytest.mark.promise("link-14")
 def test_an_even_light_behind_an_obscuration_has_its_open_area(read):
     beam = {**PATTERN, "communication.beam": {"profile": "uniform"}, **HOLES}
     assert line_of(budget_of(read(beam)), "Illumination").value == pytest.approx(10 * math.log10(1 - 0.2**2))
@@ -266,6 +300,7 @@ def test_an_even_light_behind_an_obscuration_has_its_open_area(read):
     assert line_of(budget_of(read(plain)), "Illumination").value == 0.0
 
 
+@pytest.mark.promise("link-44")
 def test_point_ahead_left_in_the_error_costs_what_it_adds_there(read):
     corrected, left = read(), read(UNCORRECTED)
     angle = 2 * 10.65e3 / SPEED_OF_LIGHT_M_S
@@ -303,6 +338,7 @@ def warned(budget, word):
     return [each for each in budget.warnings if word in each]
 
 
+@pytest.mark.promise("link-9")
 def test_terms_left_at_zero_are_said_in_one_warning(read):
     budget = budget_of(
         read({"communication.strehl": 0.0, "point_ahead": None, "communication.tracking_split_loss": "1 dB"})
@@ -316,6 +352,7 @@ def test_terms_left_at_zero_are_said_in_one_warning(read):
     assert budget_of(read(losses, {"communication.tracking_split_loss": "1 dB"})).warnings == ()
 
 
+@pytest.mark.promise("link-9")
 def test_a_link_nearer_than_the_far_field_is_warned_of(read):
     begins = 2 * 0.15**2 / WAVELENGTH
     near, far = ({"communication.distance": f"{begins * f / 1e3:.6f} km"} for f in (0.999, 1.001))
@@ -324,6 +361,7 @@ def test_a_link_nearer_than_the_far_field_is_warned_of(read):
     assert not warned(budget_of(read(far)), "far field")
 
 
+@pytest.mark.promise("link-9")
 @pytest.mark.parametrize(("link_name", "diameter"), [("beacon", 0.05), ("answer", 0.15)])
 def test_a_beam_wider_than_its_aperture_is_warned_of(read, link_name, diameter):
     # (1 - exp(-a^2))^2 is 0.1 dB at a truncation of 2.116
@@ -336,6 +374,7 @@ def test_a_beam_wider_than_its_aperture_is_warned_of(read, link_name, diameter):
         assert bool(warned(budget(file.mission, file.sources), "cuts it: 0.1")) == wide
 
 
+@pytest.mark.promise("link-9")
 @pytest.mark.parametrize(("change", "line"), [({}, "Pointing loss"), (UNCORRECTED, "Point-ahead loss")])
 def test_a_pointing_loss_beyond_twenty_decibels_is_warned_of(read, change, line):
     half = 2 * WAVELENGTH / (math.pi * 0.05)
@@ -347,16 +386,19 @@ def test_a_pointing_loss_beyond_twenty_decibels_is_warned_of(read, change, line)
         assert bool(found) == deep
 
 
+@pytest.mark.promise("link-9")
 def test_a_strehl_beyond_five_decibels_is_warned_of(read):
     for loss, bad in ((5.1, True), (4.9, False)):
         assert bool(warned(budget_of(read({"communication.strehl": loss})), "no core to speak of")) == bad
 
 
+@pytest.mark.promise("link-20")
 def test_turbulence_is_said_to_be_missing(read):
     assert warned(budget_of(read(CHANNEL)), "turbulence is not in this budget")
     assert not warned(budget_of(read()), "turbulence")
 
 
+@pytest.mark.promise("link-14")
 def test_an_obscuration_that_a_reading_leaves_out_is_warned_of(read):
     found = warned(budget_of(read(HOLES)), "the obscuration of 0.2 is not in it")
     assert len(found) == 1
@@ -365,6 +407,7 @@ def test_an_obscuration_that_a_reading_leaves_out_is_warned_of(read):
     assert not warned(budget_of(read({"terminals.leo_obscuration": 0.0})), "is not in it")
 
 
+@pytest.mark.promise("link-14")
 @pytest.mark.parametrize(("name", "end", "other"), [("beacon", "leo", "geo"), ("answer", "geo", "leo")])
 def test_an_obscuration_of_the_terminal_that_sends_a_gaussian_beam_is_warned_of(read, name, end, other):
     budget = {"beacon": budgets.beacon, "answer": budgets.answer}[name]
@@ -389,6 +432,7 @@ def test_a_beam_that_is_cut_and_obscured_is_warned_of_both(read):
     assert "wider core; the obscuration of 0.3 is not in it" in said
 
 
+@pytest.mark.promise("link-9")
 @pytest.mark.parametrize("name", ["beacon", "answer"])
 def test_a_beam_and_an_error_that_are_no_small_angles_are_warned_of(read, name):
     budget = {"beacon": budgets.beacon, "answer": budgets.answer}[name]
@@ -401,6 +445,7 @@ def test_a_beam_and_an_error_that_are_no_small_angles_are_warned_of(read, name):
         assert bool(warned(budget(file.mission, file.sources), "Pointing loss: the error of")) == wide
 
 
+@pytest.mark.promise("link-9")
 @pytest.mark.parametrize("how", [{}, PATTERN, {"conventions.pointing_loss": "gain"}], ids=["w", "pattern", "gain"])
 def test_an_error_of_the_data_link_that_is_no_small_angle_is_warned_of_beside_its_depth(read, how):
     for milliradians, wide in ((100.1, True), (99.9, False)):

@@ -28,6 +28,7 @@ def only(solution):
     return interval
 
 
+@pytest.mark.promise("link-6")
 def test_power_rate_and_distance_are_those_of_the_formulas(tmp_path):
     margin = link_performance.margin_db(link.of(link_file(tmp_path).mission))
     spare = 10.0 ** ((margin - 3.0) / 10.0)
@@ -38,13 +39,17 @@ def test_power_rate_and_distance_are_those_of_the_formulas(tmp_path):
     assert only(solved(tmp_path, "communication.distance")).high == pytest.approx(42e6 * math.sqrt(spare), rel=1e-9)
 
 
+@pytest.mark.promise("link-6")
 def test_a_loss_in_decibels_is_what_is_to_spare(tmp_path):
     less = {"communication.data_rate": "100 Mbit/s"}
     margin = link_performance.margin_db(link.of(link_file(tmp_path, less).mission))
-    loss = only(solved(tmp_path, "communication.transmit_optics_loss", less))
+    solution = solved(tmp_path, "communication.transmit_optics_loss", less)
+    assert solution.solved.searched == (0.0, 60.0)
+    loss = only(solution)
     assert loss.low_open and loss.high == pytest.approx(margin - 3.0, abs=1e-9)
 
 
+@pytest.mark.promise("link-6")
 def test_an_aperture_has_a_least_and_a_most(tmp_path):
     """Its gain grows by the square, and the pointing loss of its narrower beam by the square in decibels."""
     solution = solved(tmp_path, "terminals.leo_aperture")
@@ -60,6 +65,7 @@ def test_an_aperture_has_a_least_and_a_most(tmp_path):
     assert solution.file.sources["terminals.leo_aperture"].comment == "solved for: 3 dB of communication"
 
 
+@pytest.mark.promise("link-6")
 def test_a_jitter_of_equal_axes_is_that_of_rayleigh(tmp_path):
     file = link_file(tmp_path, NO_BEAMS, JITTER)
     m = file.mission
@@ -73,6 +79,8 @@ def test_a_jitter_of_equal_axes_is_that_of_rayleigh(tmp_path):
     ).communication.margin_db == pytest.approx(3.0)
 
 
+@pytest.mark.promise("link-6")
+@pytest.mark.promise("campaigns-9")
 def test_a_key_of_two_axes_keeps_their_proportion_and_an_axis_stands_by_itself(tmp_path):
     both = solved(tmp_path, "jitter.rms", NO_BEAMS, UNLIKE)
     x, y = both.file.mission.jitter.rms_rad
@@ -81,6 +89,7 @@ def test_a_key_of_two_axes_keeps_their_proportion_and_an_axis_stands_by_itself(t
     assert one.file.mission.jitter.rms_rad == (3e-6, only(one).high)
 
 
+@pytest.mark.promise("link-6")
 def test_a_beam_is_looked_for_at_its_own_margin_and_above_diffraction(tmp_path):
     solution = solved(tmp_path, "answer.divergence")
     found = only(solution)
@@ -94,6 +103,8 @@ def test_a_beam_is_looked_for_at_its_own_margin_and_above_diffraction(tmp_path):
     )
 
 
+@pytest.mark.promise("readme-7")
+@pytest.mark.promise("link-2", "link-6")
 @pytest.mark.parametrize(
     "changes",
     [{}, PATTERN, pytest.param(received_with("preamplified dpsk"), marks=pytest.mark.endurance)],
@@ -124,6 +135,7 @@ def test_every_key_has_its_margin_inside_and_not_beyond_its_ends(tmp_path, chang
                     assert variation.margin_or_none(link.of(beyond), link_performance.margin_db) < 3.0, key
 
 
+@pytest.mark.promise("link-6")
 def test_what_no_value_leaves_is_said_with_the_most(call, tmp_path):
     far = written(tmp_path, data_with(NO_BEAMS | {"communication.data_rate": "100 Gbit/s"}))
     result = call("budget", far, "--solve", "terminals.leo_aperture")
@@ -137,6 +149,7 @@ def test_what_no_value_leaves_is_said_with_the_most(call, tmp_path):
     assert (data["intervals"], data["value"], result.code) == ([], 0.05, 1)
 
 
+@pytest.mark.promise("link-2", "link-6")
 def test_the_solution_stands_first_and_the_budgets_have_it(call, tmp_path):
     path = written(tmp_path, data_with(NO_BEAMS))
     result = call("budget", path, "--solve", "terminals.leo_aperture")
@@ -153,6 +166,7 @@ def test_the_solution_stands_first_and_the_budgets_have_it(call, tmp_path):
     assert data["budgets"][0]["margin_db"] == pytest.approx(3.0, abs=1e-9)
 
 
+@pytest.mark.promise("link-6")
 def test_what_holds_as_far_as_was_looked_says_how_far(call, tmp_path):
     """It said "at any value", and the margin ends at four times the largest that was looked at."""
     near = written(tmp_path, data_with(NO_BEAMS | {"communication.distance": "10 m"}))
@@ -163,6 +177,7 @@ def test_what_holds_as_far_as_was_looked_says_how_far(call, tmp_path):
     )
 
 
+@pytest.mark.promise("link-6")
 def test_the_table_and_the_page_say_what_was_solved_for(call, tmp_path):
     path = written(tmp_path, data_with(NO_BEAMS))
     words = ("budget", path, "--solve", "communication.transmit_power")

@@ -2,7 +2,7 @@
 
 import math
 import re
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ from microrad.link import study as link_study
 from microrad.link.acquisition import detection, scan, sequence
 from microrad.link.acquisition import partner_search as link_acquisition
 from microrad.link.budget.lines import LEFT_AT_ZERO
-from microrad.link.pointing.radial_error import Jitter
+from microrad.link.radial_error import Jitter
 from microrad.loop import sensor
 from microrad.mission.file import LinkFile
 from microrad.report import requirements
@@ -53,6 +53,7 @@ def plain(tmp_path_factory):
 
 
 # ------------------------------------------------------------------------------------------------- budgets
+@pytest.mark.promise("readme-7")
 def test_the_shipped_mission_has_the_study_of_its_links(tmp_path, plain):
     file = edited_file(tmp_path, ("runs = 4000 ", "runs = 2000 "))
     found = link_study.run_link_study(LinkFile(file.mission, file.path, file.text, file.sha256, file.sources))
@@ -62,6 +63,8 @@ def test_the_shipped_mission_has_the_study_of_its_links(tmp_path, plain):
     assert "paper: Table 2" in next(line.source for line in found.communication.lines if line.name == "Transmit power")
 
 
+@pytest.mark.promise("report-8")
+@pytest.mark.promise("link-33")
 def test_the_beacon_is_judged_by_how_often_it_covers_its_partner(tmp_path):
     """By a million draws: 100 µrad constant about both axes, 100 µrad rms about each, in a cone of 390 µrad."""
     lines = {"pointing.lines.misalignment.error": "100 urad", "pointing.lines.orbit_knowledge.error": "0 urad"}
@@ -77,6 +80,8 @@ def test_the_beacon_is_judged_by_how_often_it_covers_its_partner(tmp_path):
         assert re.search(rf"covers its partner +{100 * confidence:g} % +98\.\d %", links_text(found, 80))
 
 
+@pytest.mark.promise("report-7", "report-8")
+@pytest.mark.promise("link-34")
 def test_errors_that_were_derived_from_the_cone_are_held_against_their_root_sum_square_alone(tmp_path):
     def row(*change):
         file = edited_file(tmp_path, ("runs = 4000 ", "runs = 100 "), *change)
@@ -197,6 +202,7 @@ def test_the_tornado_holds_each_input_with_the_largest_swing_first(plain):
     assert {key.partition(".")[0] for key in by_key} == {"communication", "terminals"}
 
 
+@pytest.mark.promise("link-4")
 def test_jitter_of_the_mission_is_studied_where_it_is_given(tmp_path, plain):
     assert plain.under_jitter is None
     jitter = {"jitter": {"bias": ["0 urad", "0 urad"], "rms": ["2 urad", "2 urad"], "bandwidth": "50 Hz"}}
@@ -222,6 +228,7 @@ def test_each_preset_with_its_gaps_filled_is_studied(tmp_path, name):
 
 
 # ---------------------------------------------------------------------------------------------- data rate solved for
+@pytest.mark.promise("link-8")
 def test_the_largest_data_rate_leaves_the_required_margin(tmp_path, plain):
     found = studied(tmp_path, {"communication.data_rate": "largest"})
     rate = found.file.mission.communication.data_rate_bit_s
@@ -235,6 +242,7 @@ def test_the_largest_data_rate_leaves_the_required_margin(tmp_path, plain):
     assert "solved for" in line.source
 
 
+@pytest.mark.promise("link-8")
 def test_the_largest_data_rate_is_judged_at_the_required_error_and_not_at_the_budgeted_one(tmp_path):
     stricter = {"communication.data_rate": "largest", "requirement.pointing_error": "15 urad"}
     found = studied(tmp_path, stricter)
@@ -298,6 +306,7 @@ def test_without_a_quad_cell_no_light_is_tracked(tmp_path):
 
 
 # ---------------------------------------------------------------------------------------------------- point-ahead
+@pytest.mark.promise("link-44")
 def test_point_ahead_is_71_microradians_and_3_6_half_angles_of_the_beam(plain):
     effect, half = plain.point_ahead, 1.55e-6 / (math.pi * 0.025)
     angle = 2 * 10_650 / LIGHT_M_S
@@ -310,6 +319,7 @@ def test_point_ahead_is_71_microradians_and_3_6_half_angles_of_the_beam(plain):
     assert effect.loss_db == pytest.approx(left_out, rel=1e-12)
 
 
+@pytest.mark.promise("link-44")
 @pytest.mark.parametrize("changes", [{}, PATTERN, {"conventions.pointing_loss": "gain"}], ids=["w", "pattern", "gain"])
 def test_point_ahead_left_out_costs_the_budget_what_the_study_says(tmp_path, changes):
     corrected, not_corrected = studied(tmp_path, changes), studied(tmp_path, changes, UNCORRECTED)
@@ -331,6 +341,7 @@ def within(radius_rad, bias_rad, rms_rad):
     return float(ncx2.cdf((radius_rad / rms_rad) ** 2, 2, (bias_rad / rms_rad) ** 2))
 
 
+@pytest.mark.promise("link-47")
 def test_each_beam_suffices_as_far_off_its_axis_as_it_brings_the_power_that_is_needed(plain):
     found = plain.finding
     assert found.beacon_radius_rad == pytest.approx(reach_rad(4.0, 390 * URAD, 0.15, 10e-12), rel=1e-6)
@@ -342,6 +353,7 @@ def test_each_beam_suffices_as_far_off_its_axis_as_it_brings_the_power_that_is_n
     assert f"{found.chances.return_coverage:.4f}" == "1.0000"
 
 
+@pytest.mark.promise("link-47")
 def test_the_narrow_beam_back_suffices_to_its_1_e2_at_most_and_nowhere_without_margin_on_its_axis(tmp_path):
     half = 1.55e-6 / (math.pi * 0.025)
     strong = studied(tmp_path, {"communication.transmit_power": "100 W"}).finding
@@ -354,6 +366,7 @@ def test_the_narrow_beam_back_suffices_to_its_1_e2_at_most_and_nowhere_without_m
     assert uncorrected.return_radius_rad == pytest.approx(half, rel=1e-12)
 
 
+@pytest.mark.promise("link-47")
 def test_a_beam_with_power_to_spare_is_counted_on_down_to_20_db(tmp_path):
     strong = studied(tmp_path, {"beacon.required_power": "0.01 pW"}).finding
     assert strong.beacon_radius_rad == pytest.approx(390 * URAD * math.sqrt(20.0 / (20 / math.log(10))), rel=1e-9)
@@ -369,6 +382,7 @@ def drawn(radius_rad, ahead_rad=0.0, count=1_000_000):
     return share, NORMAL_99 * math.sqrt(share * (1 - share) / count)
 
 
+@pytest.mark.promise("link-46", "link-47", "link-49")
 def test_the_chances_are_those_of_draws_and_of_textbook_distributions(tmp_path, plain):
     chances = plain.finding.chances
     share, interval = drawn(reach_rad(4.0, 390 * URAD, 0.15, 10e-12))
@@ -416,6 +430,7 @@ def test_a_partner_that_points_without_error_is_hit(tmp_path):
     assert studied(tmp_path, {"answer.pointing_error": "0 urad"}).finding.chances.answer_coverage == 1.0
 
 
+@pytest.mark.promise("link-45", "link-47", "link-48")
 def test_stages_take_the_times_of_the_mission(plain):
     light = 44e6 / LIGHT_M_S
     stages = {stage.name: stage for stage in plain.finding.wide.stages}
@@ -448,6 +463,7 @@ def agrees(found):
     return near and abs(found.simulated_mean_s - found.outcome.mean_time_s) <= interval
 
 
+@pytest.mark.promise("link-45")
 def test_the_closed_form_and_the_simulation_agree_and_the_log_is_the_first_run(tmp_path, plain):
     assert plain.finding.wide.name == "wide beacon"
     twice = link_study.run_link_study(
@@ -462,6 +478,7 @@ def test_the_closed_form_and_the_simulation_agree_and_the_log_is_the_first_run(t
         assert found.outcome.success_probability + found.outcome.lost.probability == pytest.approx(1.0)
 
 
+@pytest.mark.promise("link-45")
 def test_the_seed_decides_the_runs(tmp_path):
     first, same, other = (
         studied(tmp_path, {"acquisition.seed": seed}).finding.wide.simulated.time_s for seed in (1, 1, 2)
@@ -540,6 +557,7 @@ def test_a_direction_that_is_known_without_error_is_not_scanned(tmp_path):
     assert studied(tmp_path, sure).finding.chances.beacon_coverage == 1.0
 
 
+@pytest.mark.promise("link-50")
 def test_the_scan_waits_for_the_light_that_the_sensor_needs(tmp_path, monkeypatch, plain):
     monkeypatch.setattr(link_acquisition, "TRADE_RAD", np.array([1e-4]))
     half = math.sqrt(8) * 1.55e-6 / (math.pi * 0.05)  # of diffraction at the aperture, wider than 20 urad
@@ -561,6 +579,7 @@ def test_the_scan_waits_for_the_light_that_the_sensor_needs(tmp_path, monkeypatc
     assert (data["scan_stated_detection_s"], data["scan_needed_detection_s"]) == pytest.approx((1e-3, needed))
 
 
+@pytest.mark.promise("link-50")
 @pytest.mark.parametrize("used_urad", [1, 27, 28, 60])
 def test_no_beam_of_a_scan_is_brighter_than_its_aperture_makes_it(tmp_path, used_urad):
     changes = {"acquisition.scan.beam_radius": f"{used_urad} urad", "beacon.required_power": "10 nW"}
@@ -622,6 +641,7 @@ def test_an_answer_in_the_noise_keeps_its_angle_down_to_the_least_signal(tmp_pat
         assert (tracked.noise_equivalent_angle is not None) == seen
 
 
+@pytest.mark.promise("link-4")
 def test_stages_have_the_names_of_the_terminals(tmp_path):
     named = {"terminals.leo_name": "OICETS", "terminals.geo_name": "ARTEMIS"}
     names = [stage.name for stage in studied(tmp_path, named).finding.wide.stages]
@@ -631,6 +651,7 @@ def test_stages_have_the_names_of_the_terminals(tmp_path):
     assert [stage.name for stage in twins][-3::2] == ["LCT (partner) locks", "LCT (own) locks"]
 
 
+@pytest.mark.promise("link-4")
 def test_a_mission_without_a_scan_is_found_by_its_beacon_alone(tmp_path):
     found = studied(tmp_path).finding
     assert (found.scanned, found.scan, found.trade) == (None, None, None)
@@ -646,6 +667,7 @@ def wide_time_s(sigma_rad, receive=1.0):
     return np.maximum(0.01 * (10e-12 / edge) ** 2, 1e-3)
 
 
+@pytest.mark.promise("link-53")
 def test_the_trade_spreads_the_beacons_power_or_leads_it_over_the_uncertainty(plain):
     trade, sigma = plain.finding.trade, link_acquisition.TRADE_RAD
     assert_allclose(trade.sigma_rad, sigma)
@@ -666,6 +688,7 @@ def test_the_trade_spreads_the_beacons_power_or_leads_it_over_the_uncertainty(pl
     assert shaken.probability < detection.detection_times(spiral).probability
 
 
+@pytest.mark.promise("link-53")
 @pytest.mark.parametrize(
     ("changes", "receive"),
     [
@@ -684,6 +707,7 @@ def test_the_trade_counts_all_losses_but_those_off_axis(tmp_path, monkeypatch, c
     assert_allclose(found.trade.wide_time_s, wide_time_s(sigma, receive), rtol=1e-9)
 
 
+@pytest.mark.promise("link-49")
 def test_the_uncertainty_of_a_search_is_that_of_the_worse_axis(tmp_path):
     """With its bias, and whichever axis that is."""
     study = link_study.run_link_study(link_file(tmp_path, {"acquisition.runs": 2000}))
@@ -701,6 +725,7 @@ def lit_by(folder, radius, aperture="5 cm", error="0 urad"):
     return link_study.run_link_study(link_file(folder, PATTERN, changes))
 
 
+@pytest.mark.promise("link-7")
 def test_the_best_radius_of_a_beam_is_the_published_one(tmp_path):
     """Klein and Degnan (1974): 1.12 radii of the beam to that of an unobscured aperture, on the axis."""
     found = lit_by(tmp_path, "10 mm")
@@ -711,6 +736,7 @@ def test_the_best_radius_of_a_beam_is_the_published_one(tmp_path):
     )
 
 
+@pytest.mark.promise("link-7")
 def test_an_aperture_that_grows_around_an_unchanged_beam_is_pointed_out(tmp_path):
     def told(aperture):
         study = lit_by(tmp_path, "20 mm", aperture, "2 urad")
@@ -721,4 +747,8 @@ def test_an_aperture_that_grows_around_an_unchanged_beam_is_pointed_out(tmp_path
     assert quiet == []
     (sentence,) = said
     assert sentence.startswith("The beam's radius of 20 mm leaves ")
+    study = lit_by(tmp_path, "20 mm", "10 cm", "2 urad")
+    for gained_db, worth in ((0.49, False), (0.5, True)):
+        near = replace(study, beam_radius=replace(study.beam_radius, gained_db=gained_db))
+        assert (sentence.partition(" leaves ")[0] in " ".join(links_words.short(near))) is worth
     assert link_study.run_link_study(link_file(tmp_path)).beam_radius is None

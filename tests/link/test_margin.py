@@ -28,6 +28,7 @@ SHAKEN = {
 }
 
 
+@pytest.mark.promise("link-5")
 def test_a_link_that_is_below_0_db_most_of_the_time_does_not_close(call, tmp_path):
     """2 cm under 60 µrad rms per axis: +3.79 dB at the static error, below 0 dB for 0.65 of the time."""
     path = written(tmp_path, data_with(SHAKEN | {"communication.transmit_power": "40 W"}))
@@ -45,6 +46,7 @@ def test_a_link_that_is_below_0_db_most_of_the_time_does_not_close(call, tmp_pat
     assert said.startswith(f"The links do not close: communication {signed(budget['margin_db'], 'dB')}.\n")
 
 
+@pytest.mark.promise("link-5")
 @pytest.mark.parametrize("changes", [[], [PATTERN]], ids=["gaussian", "pattern"])
 def test_the_margin_of_the_budget_is_the_one_under_the_jitter(tmp_path, changes):
     jitter = {"jitter": {"bias": ["1 urad", "2 urad"], "rms": ["3 urad", "4 urad"], "bandwidth": "50 Hz"}}
@@ -58,6 +60,7 @@ def test_the_margin_of_the_budget_is_the_one_under_the_jitter(tmp_path, changes)
     assert [line.name for line in plain.communication.totals] == ["Received power", "Required power", "Margin"]
 
 
+@pytest.mark.promise("link-5", "link-8")
 def test_a_rate_is_solved_for_at_the_error_of_the_outage(tmp_path):
     jitter = {"jitter": {"bias": ["0 urad", "0 urad"], "rms": ["5 urad", "5 urad"], "bandwidth": "50 Hz"}}
     found = link_study.run_link_study(link_file(tmp_path, NO_BEAMS, jitter, {"communication.data_rate": "largest"}))
@@ -66,6 +69,7 @@ def test_a_rate_is_solved_for_at_the_error_of_the_outage(tmp_path):
     assert found.under_jitter.data_rate_bit_s == pytest.approx(found.largest_rate_bit_s, rel=1e-9)
 
 
+@pytest.mark.promise("link-5")
 def test_a_static_error_in_place_of_a_jitter_is_refused(call, tmp_path):
     result = call("budget", written(tmp_path, data_with(SHAKEN)), "--pointing-error", "5 urad")
     assert result.code == 2
@@ -111,6 +115,7 @@ def drawn(rng):
     }
 
 
+@pytest.mark.promise("link-5")
 @pytest.mark.parametrize("seed", range(20))
 def test_a_link_that_closes_keeps_its_margin_by_simulation(tmp_path, seed):
     """1e5 errors are drawn; the share below 0 dB is at most the outage, but for five deviations of that share."""
@@ -148,6 +153,7 @@ high = "{high!r} W"
 """
 
 
+@pytest.mark.promise("link-3", "link-5")
 @pytest.mark.usefixtures("rows_here")
 @pytest.mark.parametrize(
     ("seed", "code"),

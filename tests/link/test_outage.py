@@ -83,6 +83,9 @@ def test_a_mission_without_jitter_has_no_such_performance(tmp_path):
     assert under(tmp_path)[0] is None
 
 
+@pytest.mark.promise("readme-7")
+@pytest.mark.promise("link-39")
+@pytest.mark.promise("sampled-loop-18")
 @pytest.mark.parametrize("values", KNOWN.values(), ids=KNOWN)
 def test_a_known_jitter_costs_what_its_closed_forms_say(tmp_path, values):
     found, _ = under(tmp_path, jittery(*values))
@@ -139,6 +142,7 @@ def test_a_beam_that_never_meets_its_target_still_has_a_mean_loss(tmp_path):
     assert (found.outage, found.short) == (pytest.approx(1.0), pytest.approx(1.0))
 
 
+@pytest.mark.promise("link-4")
 def test_the_outage_of_the_mission_decides_the_quantile(tmp_path):
     for outage in (0.3, 1e-4):
         found, _ = under(tmp_path, jittery((0, 0), (3, 3)), {"requirement.outage": outage})
@@ -146,6 +150,8 @@ def test_the_outage_of_the_mission_decides_the_quantile(tmp_path):
         assert found.outage_loss_db == pytest.approx(loss_db(rayleigh), rel=0.01)
 
 
+@pytest.mark.promise("readme-7")
+@pytest.mark.promise("link-40")
 def test_fades_of_equal_axes_are_the_level_crossings_of_rice(tmp_path):
     found, _ = under(tmp_path, jittery((0, 0), (4, 4), 40))
     radius = HALF_RAD * math.sqrt((ON_AXIS_DB - REQUIRED_DB) / DB_PER_SQUARE)
@@ -167,6 +173,7 @@ def test_fades_are_known_while_the_required_margin_is_there_on_axis(tmp_path, ma
     assert (found.short == 1.0) is not known
 
 
+@pytest.mark.promise("link-38")
 def test_an_apertures_pattern_is_taken_as_it_is(tmp_path):
     found, mission = under(tmp_path, jittery((0, 0), (6, 6)), PATTERN, {"communication.transmit_power": "50 W"})
     fall, rms = link.of(mission).beam.fall, 6 * URAD
@@ -187,6 +194,7 @@ def test_an_apertures_pattern_is_taken_as_it_is(tmp_path):
 
 
 # ------------------------------------------------------------------------------------------------------- penalty
+@pytest.mark.promise("link-39")
 @pytest.mark.parametrize("name", ["counting ook", "preamplified dpsk"])
 def test_the_uncoded_penalty_brings_the_mean_bit_error_ratio_back(tmp_path, name):
     found, mission = under(tmp_path, jittery((0, 0), (2, 2)), received_with(name))
@@ -199,6 +207,7 @@ def test_the_uncoded_penalty_brings_the_mean_bit_error_ratio_back(tmp_path, name
     assert found.uncoded_penalty_db > found.mean_loss_db
 
 
+@pytest.mark.promise("link-39")
 def test_there_is_no_uncoded_penalty_of_a_receiver_that_is_known_by_its_sensitivity_alone(tmp_path):
     assert math.isnan(under(tmp_path, jittery((0, 0), (2, 2)))[0].uncoded_penalty_db)
 
@@ -226,6 +235,20 @@ def test_a_curve_that_is_none_is_not_called_a_lack_of_power(tmp_path, monkeypatc
         )
         with pytest.raises(ValueError, match="bit error ratio"):
             under(tmp_path, jittery((0, 0), (60, 60)), received_with("preamplified dpsk"))
+
+
+@pytest.mark.promise("link-38")
+def test_the_uncoded_penalty_is_that_of_a_gaussian_beam_of_the_same_half_angle(tmp_path):
+    found, mission = under(tmp_path, jittery((0, 0), (4, 4)), PATTERN, received_with("counting ook"))
+    receiver, fall = link.of(mission).receiver, link.of(mission).beam.fall
+    needed = float(receiver.required_power_w(RATE_BIT_S))
+    penalty = pointing.uncoded_penalty_db(
+        record((0, 0), (4, 4)),
+        fall.half_angle_rad,
+        lambda power: receiver.bit_error_ratio_at(needed * power, RATE_BIT_S),
+    )
+    assert found.uncoded_penalty_db == pytest.approx(penalty, rel=1e-9)
+    assert fall.half_angle_rad != pytest.approx(HALF_RAD, rel=0.05)
 
 
 # --------------------------------------------------------------------------------------------------- point-ahead
@@ -327,6 +350,7 @@ def sine(amplitude_rad, samples=4000):
     return amplitude_rad * np.sin(2 * math.pi * (np.arange(samples) + 0.5) / samples)
 
 
+@pytest.mark.promise("link-42")
 @pytest.mark.parametrize("residual", ["per-axis", "radial"])
 def test_a_tracked_sine_costs_the_mean_over_its_course(mission, residual):
     conventions = mission.conventions.model_copy(update={"residual": residual})
@@ -360,6 +384,7 @@ def test_a_standing_part_of_a_tracked_error_is_its_bias(mission):
 
 
 # --------------------------------------------------------------------------------------------------------- costs
+@pytest.mark.promise("link-42")
 def test_hysteresis_costs_the_difference_between_the_same_controller_with_it_and_without(mission):
     left = {("PID", "given"): 12, ("PID", "comparison"): 11, ("PID", "no hysteresis"): 9, ("other", "given"): 5}
     runs = [tracked(sine(size * URAD), *names) for names, size in left.items()]
@@ -423,6 +448,8 @@ def falling(rms_rad, corner_hz=50.0):
     return rms_rad**2 * shape / np.trapezoid(shape, FREQ_HZ)
 
 
+@pytest.mark.promise("link-38")
+@pytest.mark.promise("sampled-loop-17", "sampled-loop-18")
 def test_the_residual_of_the_loop_costs_what_a_jitter_of_its_moments_does(mission):
     values = ((1, -2), (2, 3))
     spectrum = np.column_stack([falling(2 * URAD), falling(3 * URAD)])
@@ -438,6 +465,7 @@ def test_the_residual_of_the_loop_costs_what_a_jitter_of_its_moments_does(missio
     assert case.margin_db == pytest.approx(ON_AXIS_DB - case.outage_loss_db, abs=1e-6)
 
 
+@pytest.mark.promise("link-40")
 def test_fades_are_known_on_the_mirror_whose_spectrum_is_known(mission):
     spectrum = np.column_stack([falling(2 * URAD), falling(3 * URAD)])
     same = residual((0, 0), (2, 3))
@@ -457,6 +485,7 @@ def test_fades_are_known_on_the_mirror_whose_spectrum_is_known(mission):
     assert [cost.mirror for cost in found.costs] == ["given", "comparison"]
 
 
+@pytest.mark.promise("link-40")
 def test_a_spectrum_that_ends_too_early_is_doubted(mission):
     flat = np.full((FREQ_HZ.size, 2), (2 * URAD) ** 2 / FREQ_HZ[-1])
     (case,) = costs_of(mission, (), fine_study(flat, given=residual((0, 0), (2, 2)))).cases
@@ -486,6 +515,7 @@ def test_hysteresis_costs_the_loop_under_vibration_what_it_adds_to_its_quantile(
     assert cost.data_rate_bit_s < 0.0
 
 
+@pytest.mark.promise("sampled-loop-17")
 def test_errors_of_a_histogram_are_even_in_the_square_inside_each_bin():
     counts = np.zeros(bin_edges_rad().size - 1, dtype=np.int64)
     counts[300:302] = 1, 3

@@ -109,6 +109,7 @@ def test_the_confident_divergence_is_covered_with_just_the_confidence(orbit, bod
 
 
 # ---- lines
+@pytest.mark.promise("link-30")
 def test_each_line_says_where_it_comes_from_and_what_it_means():
     lines = {line.name: line for line in budgets.open_loop(MISSION, SOURCES).lines}
     assert list(lines) == ["Body pointing", "Orbit knowledge", "Misalignment", "Point-ahead"]
@@ -125,6 +126,7 @@ def test_each_line_says_where_it_comes_from_and_what_it_means():
     assert budgets.open_loop(MISSION, {}).lines[0].source == "not stated"
 
 
+@pytest.mark.promise("link-30", "link-31", "link-32")
 def test_the_papers_lines_have_the_means_and_deviations_of_their_classes():
     budget = budgets.open_loop(MISSION, SOURCES)
     body, orbit, misalignment, ahead = budget.terms
@@ -140,6 +142,7 @@ def test_the_papers_lines_have_the_means_and_deviations_of_their_classes():
     assert budget.total_rad("esa-1993") == pytest.approx((300 + 24 + math.hypot(248, 1)) * URAD, rel=1e-12)
 
 
+@pytest.mark.promise("link-31")
 def test_over_all_satellites_a_constant_error_spreads():
     budget = budgets.open_loop(MISSION, SOURCES, interpretation="mixed")
     assert budget.error.bias_rad == (0.0, 0.0)
@@ -157,6 +160,8 @@ def test_shares_without_any_error_are_zero():
 
 
 # ---- coverage
+@pytest.mark.promise("report-8")
+@pytest.mark.promise("link-33")
 def test_the_beacon_covers_as_often_as_drawn_errors_lie_in_its_cone():
     budget = budgets.open_loop(MISSION, SOURCES)
     draw, count = np.random.Generator(np.random.Philox(key=5)), 400_000
@@ -184,6 +189,7 @@ def test_without_a_beacon_the_errors_still_add_up_but_nothing_is_covered():
 
 
 # ---- point-ahead
+@pytest.mark.promise("link-29")
 def test_point_ahead_left_alone_is_a_bias_of_71_microradians_about_one_axis():
     budget = budgets.open_loop(with_point_ahead("10.65 km/s", False), SOURCES)
     line, term = budget.lines[-1], budget.terms[-1]
@@ -196,6 +202,7 @@ def test_point_ahead_left_alone_is_a_bias_of_71_microradians_about_one_axis():
     assert budget.reading.coverage < budgets.open_loop(MISSION, SOURCES).reading.coverage
 
 
+@pytest.mark.promise("link-4", "link-29")
 def test_a_corrected_point_ahead_leaves_its_error():
     budget = budgets.open_loop(with_point_ahead("10.65 km/s", True, "7 urad"), SOURCES)
     assert budget.point_ahead.corrected is True

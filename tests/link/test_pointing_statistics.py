@@ -12,7 +12,7 @@ from scipy.stats import t as student
 
 from microrad.link.pointing import fading as pf
 from microrad.link.pointing import statistics as ps
-from microrad.link.pointing.radial_error import Jitter
+from microrad.link.radial_error import Jitter
 
 URAD = 1e-6
 THETA = 10.0 * URAD
@@ -75,6 +75,7 @@ def test_a_static_error_loses_8_686_db_times_its_square():
 
 
 # ---- a million draws
+@pytest.mark.promise("link-37", "link-38")
 @each_kind
 def test_a_million_draws_agree_within_the_99_percent_interval(jitter):
     draws = 1_000_000
@@ -95,6 +96,7 @@ def test_a_million_draws_agree_within_the_99_percent_interval(jitter):
 
 
 # ---- other quadrature
+@pytest.mark.promise("link-37")
 @each_kind
 def test_the_loss_of_an_outage_turns_the_outage_of_a_loss_round_and_shapes_are_kept(jitter):
     p = np.array([1e-20, 1e-12, 1e-3])
@@ -103,6 +105,7 @@ def test_the_loss_of_an_outage_turns_the_outage_of_a_loss_round_and_shapes_are_k
     assert ps.outage_probability(jitter, np.full((4, 1), THETA), [0.0, 1.0, 3.0]).shape == (4, 3)
 
 
+@pytest.mark.promise("link-37")
 @pytest.mark.parametrize("ratio", [1e-5, 0.1, 1.0, 30.0])
 def test_the_mean_agrees_with_quadrature_per_axis(ratio):
     jitter = Jitter((0.4 * ratio * URAD, 0.0), (0.5 * ratio * URAD, ratio * URAD))
@@ -120,6 +123,7 @@ def test_the_mean_agrees_with_quadrature_per_axis(ratio):
 
 
 # ---- best divergence
+@pytest.mark.promise("link-37")
 def test_the_best_divergence_for_an_outage_of_biased_axes_is_the_best_of_a_sweep():
     best = ps.best_divergence_for_outage(BIASED, 1e-3, current_half_angle_rad=THETA)
     sweep = np.geomspace(1.0, 100.0, 2001) * URAD
@@ -168,6 +172,7 @@ def test_the_uncoded_penalty_meets_the_closed_form_of_an_exponential_error_ratio
     assert extra > float(ps.mean_loss_db(jitter, THETA))
 
 
+@pytest.mark.promise("link-37")
 def test_the_uncoded_penalty_of_biased_axes_meets_a_sum_over_both_axes():
     def curve(power):
         return 0.5 * erfc(np.sqrt(10.0 * power))
@@ -237,6 +242,7 @@ def test_the_top_octave_is_shared_out_as_the_integral_says_on_any_grid():
     assert narrow.top_octave_share == pytest.approx([1.0, 1.0])
 
 
+@pytest.mark.promise("link-40")
 @pytest.mark.parametrize(("power", "warned"), [(3.0, True), (6.0, False)])
 def test_a_spectrum_that_falls_no_faster_than_the_third_power_is_warned_of(power, warned):
     freq = np.geomspace(0.01, 1000.0, 4001)
@@ -304,6 +310,7 @@ def simulated(jitter, corners_hz, key, samples=2**19, step_s=0.004):
     return np.array(axes)
 
 
+@pytest.mark.promise("link-37")
 @pytest.mark.parametrize("jitter", [UNEQUAL, BIASED, Jitter((1 * URAD, 2 * URAD), (0.0, 3 * URAD))])
 def test_simulated_motion_fades_as_often_and_as_long_within_its_99_percent_interval(jitter):
     corners, step_s, blocks, margin_db = (3.0, 1.5), 0.004, 64, 2.5

@@ -9,7 +9,7 @@ from scipy.integrate import quad
 from scipy.special import erfc
 from scipy.stats import ncx2, norm
 
-from microrad.link.pointing.radial_error import Jitter, density_on_circle, radial_cdf, radial_quantile, radial_survival
+from microrad.link.radial_error import Jitter, density_on_circle, radial_cdf, radial_quantile, radial_survival
 
 URAD = 1e-6
 EQUAL = Jitter((0.0, 0.0), (3.0 * URAD, 3.0 * URAD))
@@ -52,6 +52,7 @@ def test_a_million_draws_agree_within_the_99_percent_interval(jitter):
     assert np.all(np.abs(np.mean(radius[:, None] < points, axis=0) - p) <= wide * np.sqrt(p * (1.0 - p) / draws))
 
 
+@pytest.mark.promise("link-37")
 @pytest.mark.parametrize("bias_in_rms", [0.0, 0.3, 3.0, 12.0])
 def test_equal_axes_with_bias_follow_the_noncentral_chi_squared_into_the_tails(bias_in_rms):
     rms = 2.0 * URAD
@@ -169,6 +170,7 @@ def test_nearly_equal_axes_join_the_equal_ones_and_a_thin_axis_leaves_a_line():
     assert beside == pytest.approx(math.erf(math.sqrt(400**2 - 250**2) / 300 / math.sqrt(2)), rel=1e-8)
 
 
+@pytest.mark.promise("link-37")
 @pytest.mark.parametrize(
     ("call", "message"),
     [

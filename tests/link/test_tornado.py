@@ -65,6 +65,7 @@ def up_and_down(factor, share=RELATIVE):
     return tuple(10 * factor * math.log10(1 + sign * share) for sign in (-1, 1))
 
 
+@pytest.mark.promise("link-10", "link-22")
 def test_the_swings_are_those_of_the_formulas(tmp_path):
     found = swings(tmp_path)
     margin = budgets.communication(link_file(tmp_path).mission, {}).margin_db
@@ -98,6 +99,7 @@ CASES = {
 }
 
 
+@pytest.mark.promise("link-10")
 @pytest.mark.parametrize("name", CASES)
 def test_every_swing_is_the_budget_with_one_key_changed(tmp_path, name):
     file = link_file(tmp_path, *CASES[name])
@@ -182,6 +184,7 @@ def test_the_margin_of_the_other_beams_over_their_own_inputs(tmp_path, name, end
     assert not any(key.startswith("communication.") for key in found)
 
 
+@pytest.mark.promise("link-10")
 @pytest.mark.parametrize(("name", "diameter"), [("beacon", 0.05), ("answer", 0.15)])
 def test_no_beam_is_moved_below_diffraction(tmp_path, name, diameter):
     least = 2 * math.sqrt(8) * 1.55e-6 / (math.pi * diameter)
@@ -193,6 +196,7 @@ def test_no_beam_is_moved_below_diffraction(tmp_path, name, diameter):
     assert moved.high == pytest.approx(1.05 * least * (1 + RELATIVE), rel=1e-9)
 
 
+@pytest.mark.promise("link-5", "link-10")
 @pytest.mark.parametrize(
     "changes", [[], [PATTERN], [LEFT], [received_with("apd ook")]], ids=["w", "pattern", "ahead", "apd"]
 )
@@ -242,6 +246,7 @@ def test_the_margin_under_a_jitter_of_equal_axes_is_at_a_quantile_of_rayleigh(tm
     )
 
 
+@pytest.mark.promise("link-10")
 def test_a_study_holds_a_tornado_for_each_margin_that_there_is(tmp_path):
     file = link_file(tmp_path, {"acquisition": None}, JITTER)
     m, sources = file.mission, file.sources
@@ -257,8 +262,8 @@ def test_a_study_holds_a_tornado_for_each_margin_that_there_is(tmp_path):
 @pytest.mark.parametrize("name", RECEIVERS)
 def test_a_receivers_values_are_among_the_inputs(tmp_path, name):
     found = {key.removeprefix("communication.receiver.") for key in swings(tmp_path, received_with(name))}
-    plain = set(RECEIVERS[name]) - {"modulation", "detector", "order", "bandwidth"}
-    without_code = name in ("homodyne bpsk", "preamplified dpsk")  # linear in the rate: the code's rate changes nothing
+    plain = set(RECEIVERS[name]) - {"modulation", "detector", "order", "bandwidth", "polarisations"}
+    without_code = "psk" in name  # linear in the rate: the code's rate changes nothing
     plain -= {"code_rate"} if without_code else set()
     missing = plain - found
     assert missing <= {"code_rate", "dark_count_rate", "dark_current"}, missing
@@ -273,6 +278,7 @@ def test_a_background_of_the_sky_is_among_the_inputs(tmp_path):
 
 
 # ---- bounds
+@pytest.mark.promise("link-10")
 def test_a_value_at_its_bound_moves_to_the_other_side_only(tmp_path):
     at_bounds = swings(
         tmp_path,
@@ -298,6 +304,7 @@ def test_a_strehl_ratio_moves_by_a_share_of_itself_and_not_beyond_one(tmp_path, 
     assert moved.swing_db == pytest.approx(10 * math.log10(high / low), abs=1e-9)
 
 
+@pytest.mark.promise("link-10")
 @pytest.mark.parametrize(("ratio", "low", "high"), [(1e-6, 1e-7, 1e-5), (1e-18, 1e-18, 1e-17), (0.1, 0.01, 0.3)])
 def test_a_bit_error_ratio_moves_by_a_factor_of_ten(tmp_path, ratio, low, high):
     found = swings(tmp_path, received_with("preamplified dpsk", bit_error_ratio=ratio))
@@ -306,6 +313,7 @@ def test_a_bit_error_ratio_moves_by_a_factor_of_ten(tmp_path, ratio, low, high):
     assert moved.swing_db == pytest.approx(10 * math.log10(math.log(0.5 / low) / math.log(0.5 / high)), abs=1e-9)
 
 
+@pytest.mark.promise("link-10")
 def test_an_extinction_ratio_stays_above_none(tmp_path):
     found = swings(tmp_path, received_with("pin ook", extinction_ratio="0.3 dB"))
     moved = found["communication.receiver.extinction_ratio"]
@@ -398,3 +406,14 @@ def test_every_quantity_of_the_links_tables_is_tried(tmp_path):
                 ]
                 assert any(isinstance(rule, Quantity) for rule in (*info.metadata, *inner)), name
     assert GAUSSIAN["m_squared"] > 1.0
+
+
+@pytest.mark.promise("link-92")
+def test_a_phase_error_and_its_ratio_move_no_further_than_some_power_reaches(tmp_path):
+    found = swings(tmp_path, received_with("heterodyne qpsk", phase_error="0.155 rad"))  # 0.1652 rad at the most
+    for key in ("phase_error", "bit_error_ratio"):
+        moved = found[f"communication.receiver.{key}"]
+        assert math.isfinite(moved.swing_db)
+        assert moved.swing_db > 1.0
+        assert (0.155 if key == "phase_error" else 1e-6) == moved.value
+        assert moved.high < 0.1652 if key == "phase_error" else 1e-7 < moved.low < 1e-6

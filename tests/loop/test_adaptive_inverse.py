@@ -1,5 +1,7 @@
 """A pointing loop whose inverse learns: what is expected of a reading, what is refused, and what it brings."""
 
+import re
+import runpy
 from dataclasses import replace
 
 import numpy as np
@@ -13,8 +15,10 @@ from microrad.loop.control import adaptive
 from microrad.loop.pointing_loop import ensemble, kernel_arrays
 from microrad.loop.pointing_loop import loop as fine
 from microrad.mirror.hysteresis import NO_CREEP, BoucWen, Creep, PrandtlIshlinskii
+from places import ROOT
 
 
+@pytest.mark.promise("hysteresis-18", "pointing-25")
 @pytest.mark.parametrize("system", [None, resonance(1200.0, 0.02), resonance(300.0, 0.1)])
 def test_the_reading_that_is_expected_is_the_loops_own_in_low_order(system):
     loop = loop_of(system=system)
@@ -28,6 +32,7 @@ def test_the_reading_that_is_expected_is_the_loops_own_in_low_order(system):
     assert expected.order < whole.order
 
 
+@pytest.mark.promise("pointing-25")
 def test_creep_belongs_to_the_inverse_and_not_to_the_reading_that_a_target_makes_expect():
     without, with_it = (fine.expected_reading(loop_of(creep=creep), 0) for creep in (NO_CREEP, CREEP))
     freq = np.array([0.1, 10.0, 200.0])
@@ -108,15 +113,17 @@ def straightened(width, seed, learns=True):
     return off[3 * samples // 4 :]
 
 
-@pytest.mark.parametrize(("width", "peak", "rms"), [("weights", 0.65, 0.25), ("thresholds", 0.9, 0.3)])
+@pytest.mark.promise("pointing-28")
+@pytest.mark.parametrize(("width", "peak", "rms"), [("weights", 0.55, 0.08), ("thresholds", 0.78, 0.11)])
 def test_within_two_seconds_the_worst_error_is_below_one_per_cent(width, peak, rms):
     """Of 64 runs in ordinary jitter, after -20 % gain, +30 % width and creep; the frozen inverse is off by 20 %."""
     off, frozen = straightened(width, 1), straightened(width, 1, learns=False)
-    worst, worst_rms = np.max(np.abs(off)), np.max(np.sqrt(np.mean(off**2, axis=0)))
-    print(f"wider {width}: worst peak {worst:.2f} %, worst rms {worst_rms:.2f} % of peak-to-peak")
-    assert 0.3 < worst < peak
-    assert 0.05 < worst_rms < rms
-    assert np.max(np.abs(frozen)) > 15.0
+    by_run, worst = np.sqrt(np.mean(off**2, axis=0)), np.max(np.abs(off))
+    print(f"wider {width}: worst peak {worst:.2f} %, worst rms {np.max(by_run):.2f} % of peak-to-peak")
+    assert_allclose(worst, peak, rtol=0.05)
+    assert_allclose(np.median(by_run), rms, atol=0.01)
+    assert np.max(by_run) < 0.22
+    assert_allclose(np.median(np.sqrt(np.mean(frozen**2, axis=0))), 13.0, atol=1.0)
 
 
 def test_shorter_cycles_and_a_faster_offset_bring_it_there(monkeypatch):
@@ -125,15 +132,43 @@ def test_shorter_cycles_and_a_faster_offset_bring_it_there(monkeypatch):
     assert np.max(np.abs(straightened("thresholds", 1))) > 1.0
 
 
+@pytest.mark.promise("hysteresis-18", "pointing-25")
+def test_what_it_learns_by_is_what_the_page_says():
+    """At 5 kHz: a cycle of 3.2 ms, 60 % of an error, 4 Hz, means over 0.08 s, limits of weights and their speed."""
+    first, gain = EIGHT.weights_rad_v[0], sum(EIGHT.weights_rad_v)
+    (found,) = adaptive.adaptive_arrays(adaptive.adaptation([EIGHT], 0.1e-6, 2, 12.0), 1.0 / RATE_HZ)["adaptive"]
+    assert found[kernels.CYCLE] == 3.2e-3 * RATE_HZ
+    assert found[kernels.GAIN] == 0.6
+    assert found[kernels.SHARE] == pytest.approx(1.0 - np.exp(-2 * np.pi * 4.0 / RATE_HZ))
+    assert found[kernels.KEEP] == pytest.approx(np.exp(-3.2e-3 / 0.08), rel=1e-3)
+    assert found[kernels.LEAST_WEIGHT] == pytest.approx(0.5 * first)
+    assert found[kernels.MOST_WEIGHT] == pytest.approx(2.0 * gain)
+    assert found[kernels.SPEED] == pytest.approx(8.0 * gain * 3.2e-3)
+    assert found[kernels.DEAD_ZONE] == pytest.approx(0.1e-6)
+
+
+@pytest.mark.promise("pointing-29")
 @pytest.mark.endurance
-def test_of_512_runs_nearly_all_stay_below_one_per_cent():
-    for width, most in {"weights": 0.0, "thresholds": 0.03}.items():
-        peaks = np.array([np.max(np.abs(straightened(width, seed)), axis=0) for seed in range(1, 9)])
+def test_of_768_runs_nearly_all_stay_below_one_per_cent():
+    for width, above, worst in (("weights", 0, 1.0), ("thresholds", 12, 1.29)):
+        peaks = np.array([np.max(np.abs(straightened(width, seed)), axis=0) for seed in range(1, 13)])
         print(f"wider {width}: {np.sum(peaks > 1.0)} of {peaks.size} runs above 1 %, the worst {np.max(peaks):.2f} %")
-        assert np.mean(peaks > 1.0) <= most
-        assert np.max(peaks) < 1.4
+        assert abs(np.sum(peaks > 1.0) - above) <= above / 6.0
+        assert np.max(peaks) <= 1.02 * worst
 
 
+@pytest.mark.promise("choose-7")
+@pytest.mark.promise("pointing-30")
+@pytest.mark.endurance
+def test_on_random_mirrors_no_second_is_much_worse_than_under_the_frozen_inverse(capsys):
+    runpy.run_path(str(ROOT / "benchmarks" / "adaptive_inverse.py"))["scenarios"](160)
+    printed = capsys.readouterr().out
+    assert "10240 runs of 4 s" in printed
+    worst = float(re.search(r"worst second ([0-9.]+) of the frozen one's rms", printed)[1])
+    assert 1.0 < worst < 1.0245
+
+
+@pytest.mark.promise("pointing-24", "pointing-27")
 @pytest.mark.parametrize(
     ("loop", "words"),
     [
@@ -165,6 +200,8 @@ def test_a_model_that_is_to_be_reduced_keeps_its_slow_gain_and_the_bound_that_is
     assert 9 >= orders[0] > orders[1] > orders[2]
 
 
+@pytest.mark.promise("choose-7")
+@pytest.mark.promise("pointing-24")
 def test_it_is_offered_where_a_mirror_has_plays_and_a_mission_a_gauge():
     import shipped
     from microrad.mission.file import load_mission

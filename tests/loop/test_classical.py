@@ -88,6 +88,7 @@ def tustin(freq_hz, prewarped_hz):
 # ------------------------------------------------------------------------------------------------ test plants, sections
 
 
+@pytest.mark.promise("sampled-loop-2")
 @pytest.mark.parametrize("delay", [0, 1, 2])
 @pytest.mark.parametrize("resonance", [None, (300.0, 0.02)])
 def test_the_test_plants_are_their_zero_order_hold(delay, resonance):
@@ -141,6 +142,7 @@ def test_a_peak_is_exact_at_its_centre_and_half_its_power_a_damping_ratio_away()
 # ------------------------------------------------------------------------------------------------ linear theory
 
 
+@pytest.mark.promise("pointing-16")
 def test_pi_is_proportional_plus_backward_integral():
     controller = PI.build(PLAIN, np.array([200.0, 800.0]))
     z, Ki = at(FREQ), 2 * np.pi * 200.0 / GAIN
@@ -165,6 +167,7 @@ def test_pid_adds_a_filtered_derivative():
     assert_allclose(respond(controller.system, FREQ)[:, 0, 0], textbook, rtol=1e-9)
 
 
+@pytest.mark.promise("pointing-17")
 def test_pi_notch_is_pi_times_the_prewarped_biquad():
     values = np.array([150.0, 900.0, 890.0, 0.05, 0.8])
     K = respond(PI_NOTCH.build(RESONANT, values).system, FREQ)[:, 0, 0]
@@ -175,6 +178,7 @@ def test_pi_notch_is_pi_times_the_prewarped_biquad():
     assert_allclose(centre[0] / centre[1], 0.05, rtol=1e-8)
 
 
+@pytest.mark.promise("choose-7")
 def test_a_notch_carries_the_loop_past_a_resonance_that_pi_cannot_pass():
     values = np.array([161.0, 373.0, 898.0, 0.05, 1.76])
     S = sensitivity(RESONANT, PI_NOTCH.build(RESONANT, values), FREQ)
@@ -183,6 +187,7 @@ def test_a_notch_carries_the_loop_past_a_resonance_that_pi_cannot_pass():
     assert np.max(np.abs(poles(RESONANT, PI.build(RESONANT, values[:2])))) > 1.0
 
 
+@pytest.mark.promise("pointing-17")
 def test_the_notch_is_sought_at_the_resonance_and_spans_the_band_without_one():
     centre, depth = PI_NOTCH.parameters(RESONANT)[2:4]
     assert_allclose((centre.least, centre.most, depth.most), (600.0, 1350.0, 1.0), rtol=1e-6)
@@ -190,6 +195,7 @@ def test_the_notch_is_sought_at_the_resonance_and_spans_the_band_without_one():
     assert_allclose((centre.least, centre.most, depth.most), (25.0, 2450.0, 3.0), rtol=1e-6)
 
 
+@pytest.mark.promise("pointing-18")
 def test_resonant_damping_is_integral_of_the_error_and_a_second_order_filter_of_the_gauge():
     K = respond(RESONANT_DAMPING.build(RESONANT, np.array([100.0, 1100.0, 0.3, 0.4])).system, FREQ)[:, 0, :]
     z, q = at(FREQ), tustin(FREQ, 1100.0)
@@ -197,6 +203,8 @@ def test_resonant_damping_is_integral_of_the_error_and_a_second_order_filter_of_
     assert_allclose(K[:, 1], 0.4 / GAIN / (q**2 + 2 * 0.3 * q + 1), rtol=1e-8)
 
 
+@pytest.mark.promise("choose-7")
+@pytest.mark.promise("pointing-18")
 @pytest.mark.parametrize(
     ("resonance_hz", "values"),
     [(300.0, (360.0, 0.45, 0.2)), (900.0, (1300.0, 0.1, 0.15)), (1200.0, (1300.0, 0.2, -0.1))],
@@ -216,6 +224,8 @@ def test_position_feedback_damps_a_resonance_that_the_integral_alone_does_not(re
     assert wrong_way < 0.0  # unstable
 
 
+@pytest.mark.promise("choose-7")
+@pytest.mark.promise("pointing-19")
 def test_disturbance_observer_has_the_sensitivity_of_internal_model_control():
     bandwidth, lead, damping = 600.0, 700.0, 0.8
     controller = DISTURBANCE_OBSERVER.build(PLAIN, np.array([bandwidth, lead, damping]))
@@ -224,6 +234,7 @@ def test_disturbance_observer_has_the_sensitivity_of_internal_model_control():
     assert_allclose(sensitivity(PLAIN, controller, FREQ), 1 - F * textbook_plant(FREQ), rtol=1e-6)
 
 
+@pytest.mark.promise("pointing-19")
 def test_disturbance_observer_inverts_a_prominent_resonance():
     controller = DISTURBANCE_OBSERVER.build(RESONANT, np.array([2200.0, 635.0, 0.41]))
     q, qr = tustin(FREQ, 2200.0), tustin(FREQ, 900.0)
@@ -243,6 +254,8 @@ def test_disturbance_observer_integrates_also_where_the_plant_is_not_its_model()
     assert np.abs(sensitivity(other, controller, 1e-4))[0] < 1e-5
 
 
+@pytest.mark.promise("choose-7")
+@pytest.mark.promise("pointing-21")
 def test_peaks_take_out_their_lines_and_nothing_else_does():
     values = np.array([216.0, 731.0, 50.0, 1e-3])
     lines = np.array([80.0, 160.0])
@@ -255,6 +268,7 @@ def test_peaks_take_out_their_lines_and_nothing_else_does():
     )
 
 
+@pytest.mark.promise("pointing-21")
 @pytest.mark.parametrize("line_hz", [5.0, 80.0, 700.0, 1800.0])
 def test_one_peak_divides_the_sensitivity_by_one_plus_its_gain_wherever_the_line(line_hz):
     """Also where the loop without it has long lost its phase."""
@@ -274,6 +288,7 @@ def test_every_design_is_stable_and_rejects_ten_times_more_a_decade_below():
         assert S[1] / S[0] == pytest.approx(10.0, rel=1e-3), name
 
 
+@pytest.mark.promise("pointing-16")
 @pytest.mark.parametrize("name", ["PI", "PI + notch"])
 def test_the_integral_frequency_is_where_the_integral_crosses_the_slow_gain(name):
     """S = f / f_i far below it."""
@@ -442,6 +457,7 @@ def test_a_plant_without_optical_sensor_is_refused(family):
         family.parameters(blind)
 
 
+@pytest.mark.promise("choose-7")
 def test_resonant_damping_is_refused_without_a_gauge():
     plant = axis_plant(resonance=(900.0, 0.02), gauge=False)
     for call in (lambda: RESONANT_DAMPING.parameters(plant), lambda: RESONANT_DAMPING.build(plant, np.ones(4))):

@@ -91,6 +91,8 @@ def test_gains_keep_the_loop_gain(mission):
     assert half.derivative_filter_s == same.derivative_filter_s == pytest.approx(1e-4)
 
 
+@pytest.mark.promise("mirror-file-7")
+@pytest.mark.promise("sampled-loop-1")
 def test_the_drive_is_seen_at_the_amplifiers_input_about_the_bias(mission):
     drive = control.drive_from_mission(mission)
     assert_allclose([drive.minimum_v, drive.maximum_v], [-6.0, 6.0], rtol=1e-12)
@@ -98,6 +100,7 @@ def test_the_drive_is_seen_at_the_amplifiers_input_about_the_bias(mission):
     assert_allclose([drive.drive_resolution_v, drive.sensor_resolution_rad], [0.305e-3, 0.027e-6], rtol=1e-12)
 
 
+@pytest.mark.promise("sampled-loop-1")
 def test_timing_is_in_whole_plant_steps(mission):
     timing = control.timing_from_mission(mission.control)
     assert (timing.steps_per_sample, timing.delay_steps) == (2, 2)
@@ -126,6 +129,8 @@ def test_anti_windup_without_direct_path_is_zero():
 # ------------------------------------------------------------------------------------------------ inverses
 
 
+@pytest.mark.promise("choose-3")
+@pytest.mark.promise("hysteresis-14", "hysteresis-15")
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_the_inverse_of_plays_is_exact(seed):
     rng = np.random.default_rng(seed)
@@ -141,6 +146,7 @@ def test_the_inverse_of_plays_is_exact(seed):
     assert np.max(np.abs(without - wanted)) > 1e-5
 
 
+@pytest.mark.promise("mirror-file-21")
 def test_plays_that_stand_still_after_a_reversal_have_no_inverse():
     with pytest.raises(ValueError, match=r"no weight at threshold 0.*identify it again"):
         PrandtlIshlinskii((0.0, 0.5), (0.0, 1e-4)).inverted()
@@ -151,6 +157,7 @@ def test_plays_that_stand_still_after_a_reversal_have_no_inverse():
         control.inverse(mirror.assemble("axis", "static", None, PrandtlIshlinskii((0.0, 0.5), (0.0, 1e-4))))
 
 
+@pytest.mark.promise("hysteresis-15")
 def test_the_inverse_of_several_axes_names_its_actuators():
     plays = PrandtlIshlinskii((0.0, 0.4), (0.06e-3, 0.02e-3))
     parts = [mirror.assemble("axis", "static", None, model) for model in (plays, PAPER, plays)]
@@ -172,6 +179,7 @@ def test_no_feedforward_does_nothing(straight):
 SILENT = lti.StateSpace(np.zeros((1, 1)), np.zeros((1, 1)), np.zeros((1, 1)), np.zeros((1, 1)))
 
 
+@pytest.mark.promise("sampled-loop-1")
 @pytest.mark.parametrize("composition", ["cascade", "additive"])
 @pytest.mark.parametrize("bandwidth_hz", [inf, 5e3])
 @pytest.mark.parametrize("steps", [1, 2, 4])
@@ -202,6 +210,25 @@ def test_the_sampled_plant_of_a_static_mirror_by_hand():
     left = np.exp(-2 * pi * 2e3 * 2e-5)
     expected = [0.0, 0.0, 0.5 * (1 - left), 0.5 * (1 - left**3), 0.5 * (1 - left**5)]
     assert_allclose(respond(control.sampled_plant(static, drive, timing), np.ones(5))[:, 0], expected, rtol=1e-12)
+
+
+@pytest.mark.promise("hysteresis-9")
+@pytest.mark.parametrize(("bandwidth_hz", "share"), [(5e3, 0.02), (inf, None)])
+def test_an_amplifier_with_a_bandwidth_keeps_the_rate_finite_and_an_ideal_one_leaves_it_to_the_step(
+    bandwidth_hz, share
+):
+    """A step of 0.5 V on a mirror whose growth with the rate has no limit, in plant steps of 20 us and of half."""
+    model = BoucWen(0.089e-3, 0.0, -0.022e-3, 1e-4, 2.4, 0.6)
+    m, drive = mirror.assemble("axis", "static", None, model), replace(IDEAL_DRIVE, bandwidth_hz=bandwidth_hz)
+    ends = []
+    for steps in (5, 10):
+        setup = simulate.Setup(drive, Timing(100e-6, steps, 0), SILENT)
+        trace = simulate.track("step", m, setup, Inverse(direct=(1.0,)), np.full((40, 1), 0.5), slice(None))
+        ends.append(trace.output_rad[-1, 0] - 0.089e-3 * 0.5)
+    if share is None:
+        assert abs(ends[1]) > 2.0 * abs(ends[0]) > 1e-6
+    else:
+        assert_allclose(ends[1], ends[0], rtol=share)
 
 
 # ------------------------------------------------------------------------------------------------ margins

@@ -76,6 +76,8 @@ def by_name(found):
     return {d.name: d for d in found}
 
 
+@pytest.mark.promise("readme-11")
+@pytest.mark.promise("sampled-loop-1")
 def test_the_scene_is_the_missions(scene, file):
     f = file.mission.fine_pointing
     loop = scene.loop
@@ -95,6 +97,8 @@ def test_the_scene_is_the_missions(scene, file):
     )
 
 
+@pytest.mark.promise("mirror-file-8")
+@pytest.mark.promise("pointing-8")
 def test_a_telescope_and_a_mechanical_angle_scale_the_line_of_sight(tmp_path):
     changed = edited_file(
         tmp_path,
@@ -106,12 +110,14 @@ def test_a_telescope_and_a_mechanical_angle_scale_the_line_of_sight(tmp_path):
     assert_allclose(design_plant(scene.axis).gain_rad_v, 0.5 * 0.089e-3, rtol=1e-12)
 
 
+@pytest.mark.promise("mirror-file-8")
 def test_a_line_of_sight_angle_behind_a_telescope_is_refused(tmp_path):
     changed = edited_file(tmp_path, ("magnification = 1.0 ", "magnification = 4.0 "))
     with pytest.raises(ValueError, match=r'magnification = 4.*"line-of-sight".*"optical" or "mechanical"'):
         scene_of(changed)
 
 
+@pytest.mark.promise("report-8")
 def test_the_stroke_of_the_papers_mission_with_and_without_point_ahead(scene):
     """Body 300 + point-ahead 71 + misalignment 248 + lag 4.06 µrad against half of 12 V x 0.089 mrad/V."""
     x, y = scene.stroke
@@ -126,6 +132,9 @@ def test_the_stroke_of_the_papers_mission_with_and_without_point_ahead(scene):
     assert 2.0 < x.travel_rad / 2 / x.needed_rad < 2.01  # the nominal travel would cover it twice
 
 
+@pytest.mark.promise("choose-6")
+@pytest.mark.promise("readme-11")
+@pytest.mark.promise("sampled-loop-6")
 def test_every_design_meets_its_margin_and_none_beats_the_optimum(scene, tuned):
     found, said = tuned
     bound = controller_study.optimum_rms_rad(scene.axis)
@@ -172,13 +181,18 @@ watched_call(designs.design, of, on_progress=wait, only=(designs.BASELINE, desig
     assert (ran.stderr, ran.stdout) in {("", "1\n"), ("", "2\n")}
 
 
+@pytest.mark.promise("choose-7")
+@pytest.mark.promise("pointing-94")
 def test_theory_allows_no_20_percent_in_the_shipped_scenario(scene, tuned):
     """The best PI of the grid is within 4 % of the best that any linear controller can do."""
     bound, baseline = controller_study.optimum_rms_rad(scene.axis), by_name(tuned[0])[controller_study.BASELINE]
     assert 1.0 < baseline.tuned.residual_rms_rad / bound < 1.04
+    assert 1.0 < by_name(tuned[0])["PI"].tuned.residual_rms_rad / bound < 1.03
     assert by_name(tuned[0])["LQG"].tuned.residual_rms_rad < 1.01 * baseline.tuned.residual_rms_rad
 
 
+@pytest.mark.promise("choose-7")
+@pytest.mark.promise("readme-11")
 def test_with_wheel_lines_the_tuned_loop_beats_the_best_pi_by_20_percent(tmp_path):
     """Lines of 4.5 and 1.3 µrad at 80 and 160 Hz: simulated without hysteresis, as the linear theory says."""
     changed = edited_file(tmp_path, ("\n[fine_pointing.body]", WHEELS))
@@ -221,6 +235,7 @@ def test_wheels_and_a_sensor_at_half_the_rate_of_the_control_are_verified_also_w
     assert np.all(np.isnan(found.predicted_rad2_hz))
 
 
+@pytest.mark.promise("sampled-loop-5")
 def test_simulated_without_hysteresis_as_the_lyapunov_equation_says(best):
     for verified in best.values():
         straight = verified.simulated["no hysteresis"]
@@ -229,12 +244,30 @@ def test_simulated_without_hysteresis_as_the_lyapunov_equation_says(best):
         assert straight.shares == {}
 
 
+@pytest.mark.promise("readme-11")
+@pytest.mark.promise("hysteresis-12")
 def test_the_printed_hysteresis_costs_more_than_the_admissible_one(best):
     for verified in best.values():
         given, other = verified.simulated["given"], verified.simulated["comparison"]
         assert given.rms_rad > 1.1 * verified.theory.radial_rms_rad
         assert 0.97 < other.rms_rad / verified.theory.radial_rms_rad < 1.08
         assert verified.meets(10e-6) and not verified.meets(given.quantile_rad * 0.999)
+
+
+@pytest.mark.promise("decisions-1")
+@pytest.mark.promise("pointing-96")
+def test_what_the_printed_hysteresis_adds_and_what_an_inverse_in_series_takes_off():
+    found = {v.design.name: v for v in whole_study()[0].fine_pointing.verified}
+
+    def added_urad(name, variant="given"):
+        simulated = found[name].simulated
+        return 1e6 * math.sqrt(simulated[variant].rms_rad ** 2 - simulated["no hysteresis"].rms_rad ** 2)
+
+    assert_allclose([added_urad(name) for name in ("PI", "PI + inverse in series")], [1.17, 0.88], rtol=0.02)
+    assert added_urad("PI", "comparison") < 0.5 * added_urad("PI")
+    noise = found["PI"].theory.error_by_source
+    of_sensors = sum(float(np.sum(of)) for name, of in noise.items() if "noise" in name)
+    assert added_urad("PI") > 1e6 * math.sqrt(of_sensors)
 
 
 def test_halving_the_plant_step_moves_no_residual_by_one_percent(scene, file, tuned):
@@ -257,6 +290,9 @@ def test_the_parts_of_the_error_budget_combine_where_the_loop_is_linear(scene, f
     hysteresis = next(d for d in budget.differences if d.name == parts.HYSTERESIS)
     assert hysteresis.added_rad > 0.3 * budget.together_rad
     assert budget.dominant == "OLYMPUS"
+    delay = next(d for d in budget.differences if d.name == parts.DELAY)
+    late = [replace(delay, with_rad=1.0, without_rad=0.0) if d is delay else d for d in budget.differences]
+    assert replace(budget, differences=tuple(late)).dominant == "OLYMPUS", "without its delay a loop is another loop"
     as_linear = replace(budget, full_rad=budget.together_rad)
     assert as_linear.linear
 
@@ -351,6 +387,7 @@ def test_a_part_that_is_left_out_leaves_the_others_as_they_were(scene, tuned):
     assert np.abs(whole).max() > 1e-6
 
 
+@pytest.mark.promise("pointing-9")
 def test_a_misalignment_is_in_every_run_a_source_of_its_own_and_in_the_stroke(file, scene):
     of = MisalignmentTable.model_validate({"offset": ["20 urad", "-5 urad"], "drift": ["0 urad/s", "100 urad/s"]})
     fine = file.mission.fine_pointing.model_copy(update={"misalignment": of})
@@ -379,6 +416,9 @@ def test_a_sine_is_tracked_better_with_the_inverse(scene, file, tuned):
         assert rms["PI + inverse", variant, 25.0] < 0.4 * rms["PI", variant, 25.0]
 
 
+@pytest.mark.promise("gallery-9", "gallery-16")
+@pytest.mark.promise("sampled-loop-11")
+@pytest.mark.promise("pointing-11", "sampled-loop-11")
 def test_an_uncertain_mirror_is_tuned_for_its_draws(tmp_path):
     """A gain known to 10 %: the margin holds for each drawn mirror, at a price."""
     changed = edited_file(tmp_path, ("\n[mirror.comparison.bouc_wen]", UNCERTAIN))
@@ -411,6 +451,7 @@ def test_a_margin_out_of_reach_is_refused_with_the_best_there_is(tmp_path):
         controller_study.design(scene_of(changed))
 
 
+@pytest.mark.promise("pointing-3", "pointing-63")
 def test_margins_are_printed_and_told_in_decibels_and_degrees(scene, tuned):
     from microrad.cli.pointing import _data, _text
 
@@ -423,6 +464,7 @@ def test_margins_are_printed_and_told_in_decibels_and_degrees(scene, tuned):
     assert all(said in row for said in (" 1.250 ", " 2.500 ", " 60° ", " 6.0 dB "))
 
 
+@pytest.mark.promise("pointing-2", "sampled-loop-3")
 def test_designs_are_plain_data_for_other_tools(scene, tuned):
     from microrad.cli.pointing import _data
 

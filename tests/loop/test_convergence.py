@@ -66,6 +66,7 @@ CASES = {
 }
 
 
+@pytest.mark.promise("hysteresis-21")
 @pytest.mark.parametrize("case", CASES.values(), ids=CASES.keys())
 def test_the_step_is_of_second_order(case):
     """Two, by a fit over many steps.

@@ -58,6 +58,7 @@ def chosen(case):
 
 
 # --------------------------------------------------------------------------------------------------------- the scene
+@pytest.mark.promise("pointing-78")
 def test_commands_move_their_axis_alone_and_no_piston():
     scene = scene_of(three_actuators())
     to_drives = decoupling(scene.rest)
@@ -69,6 +70,8 @@ def test_commands_move_their_axis_alone_and_no_piston():
     assert np.abs(scene.rest.held @ gain @ least).max() > 0.05 * np.abs(gain @ least).max()
 
 
+@pytest.mark.promise("mirror-file-34")
+@pytest.mark.promise("pointing-78")
 def test_displacements_become_angles_of_the_beam():
     """A tilt towards x by t turns the beam by 2 t about the telescope's magnification; what rises with x leans away."""
     file = mission(("magnification = 1.0", "magnification = 8.0"))
@@ -85,6 +88,23 @@ def test_displacements_become_angles_of_the_beam():
     assert piston is None
 
 
+def test_drives_reach_as_far_as_every_actuator_allows():
+    """Each rests at its own bias: none is driven beyond what the amplifier gives, on either side."""
+    plain = three_actuators()
+
+    def reach(*biases_v):
+        found = tuple(replace(a, bias_v=v) for a, v in zip(plain.actuators, biases_v, strict=True))
+        drive = scene_of(replace(plain, actuators=found)).loop.drive
+        return drive.minimum_v, drive.maximum_v
+
+    lower, upper = reach(40.0, 40.0, 40.0), reach(60.0, 60.0, 60.0)
+    assert upper == pytest.approx((lower[0] - 20.0, lower[1] - 20.0))
+    assert reach(40.0, 60.0, 50.0) == pytest.approx((lower[0], upper[1]))
+
+
+@pytest.mark.promise("mirror-file-34")
+@pytest.mark.promise("hysteresis-19")
+@pytest.mark.promise("hysteresis-19", "pointing-78")
 def test_gains_at_rest_and_over_the_drive_range():
     """By hand: slow drives of 50 V strain the page's first spring by 50 (1 + 20 / 900) V, which slides for less."""
     scene = scene_of(two_axes())
@@ -96,6 +116,7 @@ def test_gains_at_rest_and_over_the_drive_range():
     assert weight == pytest.approx(0.0923, rel=1e-2)
 
 
+@pytest.mark.promise("mirror-file-50", "mirror-file-51")
 def test_drawn_mirrors_follow_the_covariance_and_those_that_are_none_are_drawn_again():
     mirror = two_axes()
     drawn = coupled.draws(mirror, 400, 3)
@@ -128,6 +149,7 @@ def test_elements_in_another_order_keep_what_is_known_of_them():
 
 
 # ------------------------------------------------------------------------------------------------------------- LQG
+@pytest.mark.promise("pointing-78")
 def test_lqg_of_two_axes_that_leave_each_other_alone_is_that_of_each():
     """The Riccati equations fall apart then: an oracle that knows nothing of several axes."""
     one = axis_plant(resonance=(400.0, 0.05), gauge=False)
@@ -151,6 +173,7 @@ def test_lqg_of_two_axes_that_leave_each_other_alone_is_that_of_each():
     assert_allclose(found[:, 1, 1] / expected, 1.0, atol=1e-6)
 
 
+@pytest.mark.promise("pointing-78")
 def test_lqg_beats_one_loop_an_axis_where_the_axes_pull_on_each_other():
     _, found = plate()
     left = {d.name: float(np.linalg.norm(d.residual_rad)) for d in found.made}
@@ -178,6 +201,7 @@ def _around(freq, values):
     return np.linspace(freq[max(at - 2, 0)], freq[min(at + 2, freq.size - 1)], 200)
 
 
+@pytest.mark.promise("pointing-78", "sampled-loop-8")
 @pytest.mark.parametrize("case", CASES, ids=IDS)
 def test_margins_are_those_of_the_closed_loop_on_a_dense_grid(case):
     """From the state-space of the whole sampled loop, by brute force; the search's own come from design plants."""
@@ -194,6 +218,7 @@ def test_margins_are_those_of_the_closed_loop_on_a_dense_grid(case):
     assert d.margins.modulus >= scene.table.modulus_margin
 
 
+@pytest.mark.promise("pointing-78", "sampled-loop-8")
 @pytest.mark.parametrize("case", CASES[1:], ids=IDS[1:])
 def test_no_change_within_the_disk_makes_the_loop_unstable_and_one_just_beyond_does(case):
     """Changes (1 + d/2) / (1 - d/2) of both loops at once, d complex and real gains, at the sensor."""
@@ -222,6 +247,7 @@ def _axis_parts(scene, d):
     return lti.StateSpace(s.A, s.B[:, :2], back @ s.C, (back @ s.D)[:, :2]), d.controller.anti_windup
 
 
+@pytest.mark.promise("pointing-78")
 def test_the_margin_holds_for_mirrors_that_the_identification_leaves_possible(monkeypatch):
     """With errors twenty times those of the page; tuned for the mirror itself, the margin is missed on one of them."""
     known = replace(two_axes().known, standard_errors=np.array([8.0, 18.0, 0.0, 0.0]))
@@ -290,6 +316,7 @@ def test_without_hysteresis_the_simulated_residual_is_that_of_theory(case):
     assert_allclose(run.axis_rms_rad / d.residual_rad, 1.0, atol=0.1)
 
 
+@pytest.mark.promise("pointing-78")
 def test_with_hysteresis_the_outlook_is_near():
     scene, found = plate()
     for d, left in zip(found.made, coupled_study.outlook(scene, found.made), strict=True):
@@ -298,6 +325,7 @@ def test_with_hysteresis_the_outlook_is_near():
         assert left.simulated_rad == pytest.approx(math.hypot(*(axis.simulated_rad for axis in left.axes)))
 
 
+@pytest.mark.promise("pointing-78")
 def test_loops_of_modes_that_turn_both_axes_go_along_their_directions():
     """The plate's modes lie 11.3 degrees off the axes; both loops together decouple them at each frequency."""
     _, d = chosen(CASES[0])
@@ -308,6 +336,9 @@ def test_loops_of_modes_that_turn_both_axes_go_along_their_directions():
     assert not any(name.startswith("direction") for name in alone_of_page.values)
 
 
+@pytest.mark.promise("choose-7")
+@pytest.mark.promise("sampled-loop-13")
+@pytest.mark.promise("pointing-78", "sampled-loop-13")
 def test_h_infinity_damps_each_mode_that_the_commands_reach():
     """The plate's two tilting modes have dampings of 0.013 and 0.010; its piston is not moved, and keeps its own."""
     scene, d = chosen(CASES[3])
@@ -322,15 +353,18 @@ def test_h_infinity_damps_each_mode_that_the_commands_reach():
 
     before = dampings(plant.system.A)
     assert_allclose(before, [0.010, 0.013], atol=5e-4)
-    assert dampings(whole.closed_map(plant, made.system)).min() > 10.0 * before.max()
+    assert dampings(whole.closed_map(plant, made.system)).min() == pytest.approx(0.16, abs=0.006)
+    lqg = _axis_parts(*chosen(CASES[1]))[0]
+    assert dampings(whole.closed_map(plant, lqg)).min() == pytest.approx(0.033, abs=0.003)
 
 
+@pytest.mark.promise("pointing-78")
 def test_what_hysteresis_breaks_is_tuned_for_a_larger_margin(monkeypatch):
-    """As if all were left twice but for what is tuned for a margin of 0.7 or above."""
+    """As if all left 1.51 times as much but for what is tuned for a margin of 0.7 or above, which leaves 1.49."""
     scene, _ = plate()
 
     def judged(scene, found, on_progress=None):
-        times = [1.2 if d.margins.modulus > 0.69 else 2.0 for d in found]
+        times = [1.49 if d.margins.modulus > 0.69 else 1.51 for d in found]
         return tuple(
             coupled_study.CoupledOutlook(tuple(Outlook(r, t * r) for r in d.residual_rad.tolist()))
             for d, t in zip(found, times, strict=True)
@@ -366,6 +400,7 @@ FAULTS = {
 }
 
 
+@pytest.mark.promise("pointing-82")
 @pytest.mark.parametrize("name", FAULTS)
 def test_a_mirror_that_does_not_fit_is_refused(name):
     change, told = FAULTS[name]
@@ -409,6 +444,8 @@ def quick(monkeypatch, folder):
     return folder
 
 
+@pytest.mark.promise("mirror-file-30", "mirror-file-36")
+@pytest.mark.promise("pointing-63", "pointing-76", "pointing-82")
 def test_design_prints_one_controller_of_all_axes(quick, call):
     result = call("design", "mission.toml", "--mirror", "two-axes.toml")
     assert result.code == 0
@@ -421,6 +458,7 @@ def test_design_prints_one_controller_of_all_axes(quick, call):
     assert re.search(r"tilt about y +0\.\d+ +\d\.\d+ +\d+\.?\d* %", result.out)
 
 
+@pytest.mark.promise("pointing-93")
 def test_design_prints_a_feedforward_beside_its_feedback(quick, call, monkeypatch):
     monkeypatch.setattr(designs, "names", lambda f: ("PI", "PI + feedforward"))
     result = call("design", "mission.toml", "--mirror", "two-axes.toml", "--json")
@@ -430,9 +468,10 @@ def test_design_prints_a_feedforward_beside_its_feedback(quick, call, monkeypatc
     assert np.shape(ahead["matrices"]["C"]) == (2 + 2, len(plain["matrices"]["A"]) + 4)
     assert np.shape(ahead["matrices"]["drives_of_hysteresis"]) == (2, 2)
     assert "drives_of_hysteresis" not in plain["matrices"]
-    assert all(v < 1.1 * p for v, p in zip(ahead["simulated_rms_rad"], plain["simulated_rms_rad"], strict=True))
+    assert ahead["simulated_rms_rad"] == pytest.approx(plain["simulated_rms_rad"], rel=0.1)
 
 
+@pytest.mark.promise("pointing-82")
 def test_design_prints_its_matrices(quick, call):
     result = call("design", "mission.toml", "--mirror", "two-axes.toml", "--json")
     (found,) = json.loads(result.out)["controllers"]

@@ -35,6 +35,7 @@ def skewed(first, second, modes=((240.0, 0.01), (310.0, 0.01))):
     return plant_of(modes, M, np.linalg.inv(M))
 
 
+@pytest.mark.promise("pointing-78")
 @pytest.mark.parametrize("angles", [(12.3, -78.9), (40.0, 85.0), (-20.5, 70.0), (-44.0, 60.0)])
 def test_modes_of_two_directions_are_found_and_leave_no_pull_at_any_frequency(angles):
     plant = skewed(*(DEG * a for a in angles))
@@ -56,6 +57,7 @@ def test_modes_of_two_directions_are_found_and_leave_no_pull_at_any_frequency(an
     assert across < 0.01 * response  # by what rounding to a tenth of a degree leaves
 
 
+@pytest.mark.promise("pointing-78")
 def test_axes_that_leave_each_other_alone_stay_the_directions():
     assert directions.loop_directions(skewed(0.0, math.pi / 2)) == ALONG_AXES
     assert directions.loop_directions(skewed(0.02 * DEG, 90.0 * DEG)) == ALONG_AXES

@@ -75,6 +75,7 @@ def mixture():
 # closed forms
 
 
+@pytest.mark.promise("pointing-8")
 def test_olympus_has_15_853_urad_radial_and_half_its_power_on_each_axis():
     axis = olympus()
     assert_allclose(sqrt(2) * axis.rms_rad, sqrt(80 * pi) * URAD, rtol=1e-12)
@@ -84,6 +85,7 @@ def test_olympus_has_15_853_urad_radial_and_half_its_power_on_each_axis():
     assert_allclose(psd(olympus(convention="per-axis"), f), 160e-12 / (1 + f**2), rtol=1e-12)
 
 
+@pytest.mark.promise("sampled-loop-7")
 @pytest.mark.parametrize(("bandwidth_hz", "radial_urad"), [(10, 4.780), (100, 1.577), (500, 0.708)])
 def test_olympus_behind_a_first_order_loop_leaves_80_pi_over_1_plus_bandwidth(bandwidth_hz, radial_urad):
     axis = density(olympus())
@@ -92,6 +94,7 @@ def test_olympus_behind_a_first_order_loop_leaves_80_pi_over_1_plus_bandwidth(ba
     assert_allclose(sqrt(left), radial_urad * URAD, rtol=5e-4)
 
 
+@pytest.mark.promise("pointing-9")
 def test_body_pointing_is_maximally_flat_with_half_power_at_its_bandwidth():
     body = body_pointing(300 * URAD, 3, 0.2)
     f = np.array([0.0, 0.05, 0.2, 2.0])
@@ -103,6 +106,7 @@ def test_body_pointing_is_maximally_flat_with_half_power_at_its_bandwidth():
     assert_allclose(radial.rms_rad, 100 * URAD / sqrt(2), rtol=1e-12)
 
 
+@pytest.mark.promise("pointing-8")
 def test_the_variance_is_the_integral_of_the_density_and_half_the_squared_amplitudes():
     d = mixture()
     noise = integral(density(d), 0, inf, (0.5, 1, 5, 6.5, 7, 7.5, 10, 40, 100, 1000))
@@ -121,6 +125,7 @@ def test_the_rms_by_band_is_the_integral_over_the_band_with_its_lines():
     assert_allclose(band_rms(lines_only, [20.0, 30.0, 40.0]), [25.0**2 * 1e-9 / sqrt(2), 0.0], rtol=1e-12)
 
 
+@pytest.mark.promise("pointing-9")
 def test_wheel_lines_grow_with_the_square_of_the_speed_at_multiples_of_it():
     slow, fast = (wheels(speed, (1, 2.8), (1e-9, 2e-10), convention="per-axis") for speed in (20.0, 40.0))
     assert [line.freq_hz for line in fast.lines] == [40.0, 112.0]
@@ -324,6 +329,7 @@ def test_a_level_of_zero_is_a_disturbance_that_does_nothing():
 # fits
 
 
+@pytest.mark.promise("pointing-9")
 @pytest.mark.parametrize(("convention", "part"), [("per-axis", 1.0), ("radial", sqrt(0.5))])
 def test_the_micius_bands_are_met_with_one_white_input(convention, part):
     fit = fit_bands(MICIUS_EDGES_HZ, MICIUS_RMS_RAD, convention=convention, name="Micius")
@@ -490,6 +496,7 @@ def test_a_table_that_cannot_be_read_is_refused(tmp_path):
         read_table(tmp_path / "image.csv")
 
 
+@pytest.mark.promise("pointing-9")
 def test_a_table_goes_from_file_to_fit(tmp_path):
     f = np.geomspace(0.01, 100, 60)
     lines = "\n".join(f"{x:.6e},{160 / (1 + x * x):.6e}" for x in f)

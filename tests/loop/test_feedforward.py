@@ -106,7 +106,10 @@ def measured_delays(loop):
     return (-np.angle(filtered) / w * np.eye(loop.axes) - answer.imag / w) / (abs(rate) / w), abs(rate) / w
 
 
+@pytest.mark.promise("hysteretic-stiffness-16")
+@pytest.mark.promise("pointing-84", "pointing-91")
 @each_family
+@pytest.mark.promise("pointing-99")
 def test_commands_are_those_of_the_slow_twin(family):
     """Without feedback, sample by sample; the springs' algebra about rest by hand, as each axis has its own spring."""
     found = scene(family)
@@ -127,7 +130,10 @@ def test_commands_are_those_of_the_slow_twin(family):
 
 
 # ----------------------------------------------------------------------------------------------------- what it leaves
+@pytest.mark.promise("hysteretic-stiffness-16")
+@pytest.mark.promise("pointing-85")
 @each_family
+@pytest.mark.promise("pointing-99")
 def test_slow_motions_of_one_axis_are_followed_exactly(family):
     """One axis without feedback: the spring's force is made up for, and a gain alone is not enough."""
     model = FAMILIES[family]
@@ -178,6 +184,7 @@ def test_it_leaves_a_tenth_of_what_a_linear_feedforward_leaves_and_a_thirtieth_o
     assert np.all(left < 0.03 * alone)
 
 
+@pytest.mark.promise("pointing-85")
 def test_springs_that_bend_more_than_the_line_of_sight_are_made_up_for_to_first_order():
     """Three actuators, and modes that all of them excite: slow motions, without feedback."""
     made = scene_of(three_actuators(0.05))
@@ -192,6 +199,7 @@ def test_springs_that_bend_more_than_the_line_of_sight_are_made_up_for_to_first_
     assert np.all(by_gain > 0.02 * 100 * URAD)
 
 
+@pytest.mark.promise("pointing-84")
 def test_what_its_lead_leaves_is_of_second_order_in_the_delay():
     """On a straight mirror, T all of its delays: (w T)^2 / 2 of the series, and what filter and resonance add."""
     made = scene("plays")
@@ -207,6 +215,7 @@ def test_what_its_lead_leaves_is_of_second_order_in_the_delay():
 
 
 # ------------------------------------------------------------------------------------------- the model run ahead of it
+@pytest.mark.promise("pointing-88")
 @each_family
 def test_the_models_own_loop_run_ahead_leaves_what_feedback_alone_leaves(family):
     """Its drive as feedforward and its output as reference, C e_m + C (e - e_m) = C e: whether it is right or wrong."""
@@ -222,6 +231,7 @@ def test_the_models_own_loop_run_ahead_leaves_what_feedback_alone_leaves(family)
     assert RAD_V * np.abs(model.commands).max() < 1e-6
 
 
+@pytest.mark.promise("pointing-90")
 @each_family
 def test_errors_of_the_model_cost_their_share(family):
     """With a gain 20 % too large it leaves what the missing fifth does; a resonance off by 5 % costs nothing."""
@@ -242,6 +252,7 @@ def test_errors_of_the_model_cost_their_share(family):
 
 
 # -------------------------------------------------------------------------------------------- theory, designs, refusals
+@pytest.mark.promise("pointing-84")
 def test_feedback_and_its_theory_are_left_as_they_are():
     found = scene("plays")
     feedback = integral(found)
@@ -260,6 +271,8 @@ def test_the_elements_of_a_feedforward_count_in_theory_by_their_slow_gains():
         assert np.abs(slow @ q).max() > 0.1 * np.abs(v[:, -2:]).max()
 
 
+@pytest.mark.promise("choose-7")
+@pytest.mark.promise("pointing-78")
 def test_it_is_designed_where_a_reference_is_known_and_has_the_margins_of_its_feedback():
     made = scene("Bouc-Wen")
     assert coupled_study.names(made.table)[:3] == ("PI", "PI + feedforward", "PI + notch")
@@ -301,6 +314,7 @@ def test_what_it_does_not_fit_is_refused(name):
         with_feedforward("ahead", loop, feedback, PATH)
 
 
+@pytest.mark.promise("pointing-90")
 def test_a_controller_without_an_output_for_each_element_is_refused():
     found = scene("plays")
     controller = forward(found)
@@ -310,6 +324,8 @@ def test_a_controller_without_an_output_for_each_element_is_refused():
         arrays(found.loop, short, 1)
 
 
+@pytest.mark.promise("choose-7")
+@pytest.mark.promise("export-27")
 def test_an_inverse_is_refused_with_what_to_take_instead():
     found = scene("plays")
     axis = AxisController("I", lti.StateSpace(np.eye(1), np.eye(1, 2), np.eye(1), np.eye(1, 2)), np.eye(1))

@@ -77,6 +77,7 @@ def least_norm(s):
     return 1.0 / math.sqrt(1.0 - np.max(np.linalg.eigvals(reached @ seen).real))
 
 
+@pytest.mark.promise("pointing-78", "sampled-loop-13")
 @every_case
 @every_shape
 def test_the_shaped_loop_has_the_norm_that_it_was_made_for(make, shape):
@@ -95,6 +96,7 @@ def test_the_shaped_loop_has_the_norm_that_it_was_made_for(make, shape):
     whole.whole_margins(plant, made)  # stable
 
 
+@pytest.mark.promise("pointing-78")
 @every_case
 def test_it_has_integral_action_and_lets_go_of_the_clip(make):
     plant = plant_of(make)

@@ -104,6 +104,7 @@ def scaled(controller, factor):
 # ------------------------------------------------------------------------------------------------ variances
 
 
+@pytest.mark.promise("sampled-loop-7")
 @pytest.mark.parametrize("bandwidth_hz", [10.0, 100.0, 500.0])
 def test_a_first_order_loop_leaves_80_pi_over_1_plus_fb_of_olympus(bandwidth_hz):
     period_s = 1e-6
@@ -125,6 +126,7 @@ def test_white_sensor_noise_through_a_first_order_loop(share):
     assert variance[analysis.COMMAND].sum() * plant.gain_rad_v**2 == near(variance[RESIDUAL].sum(), rel=1e-12)
 
 
+@pytest.mark.promise("sampled-loop-4")
 def test_variances_are_those_of_a_long_simulation():
     plant = axis_plant(resonance=(900.0, 0.05), corner_hz=50.0)
     controller = both_sensors(plant)
@@ -140,6 +142,7 @@ def test_variances_are_those_of_a_long_simulation():
         assert abs(np.mean(squares) - expected) < 4 * error
 
 
+@pytest.mark.promise("sampled-loop-4")
 @pytest.mark.parametrize("corner_hz", [1e-3, 0.01, 0.1])
 def test_variances_are_those_of_scipy_even_for_time_constants_of_a_million_samples(corner_hz):
     plant = axis_plant(resonance=(900.0, 0.005), corner_hz=corner_hz, disturbance_rad=1e-4)
@@ -259,6 +262,7 @@ def python_loop(plant, controller):
     return python_control.ss(*(getattr(lti.series(G, K), key) for key in "ABCD"), plant.period_s)
 
 
+@pytest.mark.promise("sampled-loop-8")
 @pytest.mark.parametrize("name", LOOPS)
 def test_margins_are_those_of_python_control(name):
     plant, controller = LOOPS[name]
@@ -278,6 +282,7 @@ def test_margins_are_those_of_python_control(name):
         assert ours.crossover_hz == near(crossover / (2 * math.pi), rel=1e-3)
 
 
+@pytest.mark.promise("sampled-loop-8")
 @pytest.mark.parametrize("name", LOOPS)
 def test_disk_margins_are_those_of_python_control(name):
     plant, controller = LOOPS[name]
@@ -298,6 +303,7 @@ def test_gain_margins_are_where_the_loop_turns_unstable(name):
     assert radius(plant, scaled(controller, 0.999 * limit)) < 1.0 < radius(plant, scaled(controller, 1.001 * limit))
 
 
+@pytest.mark.promise("sampled-loop-10")
 @pytest.mark.parametrize("name", LOOPS)
 def test_margins_end_where_dense_computation_and_poles_say(name):
     plant, controller = LOOPS[name]
@@ -323,6 +329,22 @@ def test_margins_end_where_dense_computation_and_poles_say(name):
     assert radius(plant, scaled(controller, found.gain_up * (1.0 + 1e-8))) > 1.0
 
 
+@pytest.mark.promise("sampled-loop-8", "sampled-loop-9")
+@pytest.mark.parametrize("name", LOOPS)
+def test_a_modulus_margin_implies_margins_of_gain_and_phase_and_bounds_the_peak(name):
+    found = analysis.loop_margins(*LOOPS[name])
+    m = found.modulus
+    assert 0.0 < m < 1.0
+    assert found.gain_up >= 1.0 / (1.0 - m) * (1.0 - 1e-9)
+    assert found.phase_rad >= 2.0 * math.asin(m / 2.0) * (1.0 - 1e-9)
+    assert found.peak == near(1.0 / m, rel=1e-9)
+    low, high = found.disk_gain
+    assert low == near((2.0 - found.disk) / (2.0 + found.disk), rel=1e-12)
+    assert high == near(1.0 / low, rel=1e-12)
+    assert found.disk_phase_rad == near(2.0 * math.atan(found.disk / 2.0), rel=1e-12)
+
+
+@pytest.mark.promise("sampled-loop-10")
 @pytest.mark.parametrize("name", LOOPS)
 def test_margins_do_not_depend_on_the_grid(name):
     plant, controller = LOOPS[name]
@@ -349,6 +371,7 @@ def test_a_conditionally_stable_loop_has_a_gain_margin_downwards():
         assert radius(plant, scaled(cubic, inside * limit)) < 1.0 < radius(plant, scaled(cubic, outside * limit))
 
 
+@pytest.mark.promise("sampled-loop-8")
 @pytest.mark.parametrize("resonance", [None, (700.0, 0.003)])
 def test_the_delay_margin_is_the_number_of_samples_that_the_loop_bears(resonance):
     plants = [axis_plant(gauge=False, resonance=resonance, delay=2 + n) for n in range(45)]
@@ -396,6 +419,7 @@ def test_a_loop_without_gain_has_every_margin_and_no_reach():
     assert found.disk_phase_rad == near(math.pi / 2)
 
 
+@pytest.mark.promise("sampled-loop-11")
 def test_two_sensors_report_the_worse_of_both_cuts():
     plant = axis_plant(resonance=(900.0, 0.02))
     controller = both_sensors(plant)
@@ -411,6 +435,7 @@ def test_two_sensors_report_the_worse_of_both_cuts():
     assert analysis.loop_margins(plant, single) == analysis.margins_at(plant, single)
 
 
+@pytest.mark.promise("sampled-loop-11")
 @pytest.mark.parametrize("first", analysis.BREAKS)
 def test_each_margin_is_the_worse_one_of_both_cuts(first, monkeypatch):
     """Of two sets of numbers, each of which is the worse one throughout: by hand, since few loops have a way down."""
@@ -428,6 +453,7 @@ def test_each_margin_is_the_worse_one_of_both_cuts(first, monkeypatch):
         assert getattr(found, name) == getattr(worse, name), name
 
 
+@pytest.mark.promise("sampled-loop-9")
 def test_the_peak_is_the_largest_rejection_of_the_disturbance():
     """A sine on the line of sight, against the closed loop's own response from it to the residual."""
     plant = axis_plant(resonance=(900.0, 0.02))
@@ -452,6 +478,7 @@ SATELLITE = lti.StateSpace(
 """The spinning satellite of Seiler, Packard and Gahinet, under the feedback [[1, -2], [0, 1]]."""
 
 
+@pytest.mark.promise("sampled-loop-8")
 def test_the_spinning_satellite_has_its_published_multiloop_margin():
     freq_hz = np.concatenate([[1e-6], np.geomspace(1e-3, 1e3, 4001)])
     L = lti.frequency_response(SATELLITE, freq_hz) @ np.array([[1.0, -2.0], [0.0, 1.0]])
@@ -506,6 +533,7 @@ def test_a_loop_of_another_shape_is_refused():
 # ------------------------------------------------------------------------------------------------ refusals
 
 
+@pytest.mark.promise("pointing-31")
 def test_an_unstable_loop_is_refused_with_pole_frequency_and_modulus():
     plant = pure_gain(PERIOD)
     controller = integrator(2.5 / plant.gain_rad_v)  # pole at 1 - 2.5, L = -1.25 at half the rate
@@ -541,6 +569,7 @@ def test_an_anti_windup_column_that_does_not_fit_is_refused():
             analysis.refuse_misfit(pure_gain(PERIOD), replace(integrator(1.0), anti_windup=column))
 
 
+@pytest.mark.promise("pointing-31")
 def test_a_controller_of_another_rate_is_refused():
     analysis.refuse_misfit(pure_gain(PERIOD), integrator(1.0), period_s=PERIOD)
     with pytest.raises(
@@ -549,6 +578,7 @@ def test_a_controller_of_another_rate_is_refused():
         analysis.refuse_misfit(pure_gain(PERIOD), integrator(1.0), period_s=1e-4)
 
 
+@pytest.mark.promise("sampled-loop-2")
 def test_a_plant_without_delay_is_refused():
     plant = pure_gain(PERIOD)
     D = plant.system.D.copy()

@@ -53,6 +53,7 @@ def test_all_of_the_error_is_what_linear_theory_says():
             assert_allclose([mean[n] + left[n] for n in theory], [*theory.values()], rtol=1e-12)
 
 
+@pytest.mark.promise("pointing-35")
 @pytest.mark.parametrize("every", [1, 3])
 def test_a_window_is_a_sum_over_all_pairs_of_plant_steps(every):
     """Each state's covariance with each later one, step by step, for the noise of the sensor and of the vibration."""

@@ -60,6 +60,7 @@ def simulate(plant, controller, white, disturbance, limit=math.inf, windup=True)
 # ------------------------------------------------------------------------------------------------ the optimum
 
 
+@pytest.mark.promise("pointing-20", "sampled-loop-6")
 @pytest.mark.parametrize("noise_rad", [0.1e-6, 1e-6, 20e-6])
 @pytest.mark.parametrize("corner_hz", [1.0, 100.0])
 def test_a_scalar_loop_reaches_the_prediction_error_of_its_riccati_equation(noise_rad, corner_hz):
@@ -78,6 +79,7 @@ def test_a_scalar_loop_reaches_the_prediction_error_of_its_riccati_equation(nois
     assert residual_variance(plant, misled) > 1.00001 * p
 
 
+@pytest.mark.promise("pointing-20")
 @pytest.mark.parametrize("weight", [1e-4, 1e-2, 1.0])
 @pytest.mark.parametrize("gauge", [True, False])
 def test_the_cost_is_that_of_the_separation_principle(weight, gauge):
@@ -109,6 +111,7 @@ def cost(plant, controller, rho):
     return closed.C[RESIDUAL] @ P @ closed.C[RESIDUAL] + rho * 2.0 * (size - next_one)
 
 
+@pytest.mark.promise("pointing-20", "sampled-loop-6")
 def test_no_pi_on_a_fine_grid_beats_it():
     plant = axis_plant(gauge=False)
     best = math.inf

@@ -139,6 +139,7 @@ def first_order_loop(bandwidth_hz, period_s, axes=2):
     return loop, fine.assemble("integral", loop, integral(step))
 
 
+@pytest.mark.promise("sampled-loop-7")
 @pytest.mark.parametrize("bandwidth_hz", [10.0, pytest.param(100.0, marks=pytest.mark.endurance), 500.0])
 def test_a_first_order_loop_on_olympus_leaves_80_pi_over_1_plus_bandwidth(bandwidth_hz):
     """With 1000 samples in each radian of the bandwidth: the exact variance of the sampled loop is 0.1 % above it."""
@@ -334,6 +335,7 @@ def test_white_noise_through_an_integrator_leaves_g_over_2_minus_g_of_its_varian
     assert_allclose(found.drive, found.error / fine.nominal_axis_gain(loop) ** 2, rtol=1e-12)
 
 
+@pytest.mark.promise("sampled-loop-4")
 def test_stationary_is_the_lyapunov_solution_of_matrices_written_by_hand():
     """One plant step a sample, one sample of delay, a slow amplifier, PI on the error, a gauge fed back, OLYMPUS."""
     T, K, kp, ki, kg, follow = 1e-4, 1.0, 0.15, 0.09, -0.12, 0.3
@@ -456,6 +458,7 @@ DECOUPLED = {
 }
 
 
+@pytest.mark.promise("pointing-9")
 @pytest.mark.parametrize("layout", DECOUPLED)
 def test_coupled_axes_are_decoupled_and_each_is_the_loop_of_one_axis(layout):
     """With a controller that reads the gauges: the optics turn commands and readings, and no axis moves another."""
@@ -543,6 +546,7 @@ def test_lines_and_noise_of_several_disturbances_add_up_on_two_axes_behind_a_slo
 # ------------------------------------------------------------------------------------------------ 5. spectrum
 
 
+@pytest.mark.promise("pointing-98")
 @pytest.mark.parametrize("variant", ["one axis", "resonance damped by the gauge", "two coupled axes"])
 def test_the_residual_spectrum_is_that_of_the_ensemble_within_its_interval(variant):
     """Averaged over bands of 8 bins and more, each of which has 320 periodograms of 64 runs."""
@@ -622,6 +626,7 @@ ONE_AXIS = (
 one_axis = pytest.mark.parametrize("variant", ONE_AXIS)
 
 
+@pytest.mark.promise("pointing-11", "sampled-loop-2")
 @one_axis
 def test_the_design_plant_closed_by_hand_leaves_the_variance_of_the_control_samples(variant):
     loop, axis = an_axis(variant)
@@ -650,6 +655,7 @@ def test_the_design_plant_closed_by_hand_is_the_stationary_loop_where_a_sample_h
     assert found[-1] > 0.001 * np.sum(found)
 
 
+@pytest.mark.promise("sampled-loop-2")
 @one_axis
 def test_the_loop_gain_of_the_design_plant_is_that_of_the_linear_loop(variant):
     """L = -P_o C_o / (1 - C_g P_g), with P from the command to both readings."""
@@ -741,6 +747,7 @@ def test_a_narrow_band_has_the_variance_of_its_line_at_its_frequency():
 # ------------------------------------------------------------------------------------------------ 7. refusals
 
 
+@pytest.mark.promise("pointing-31")
 def test_an_unstable_loop_is_refused_with_its_pole_its_frequency_and_the_control_period():
     loop = fast(1e-3, disturbances=((),))
     unstable = fine.assemble("fast integral", loop, integral(2.5 / fine.nominal_axis_gain(loop)))  # pole at 1 - 2.5
@@ -771,6 +778,7 @@ def test_the_worst_pole_of_a_slow_sensor_is_counted_by_control_sample():
         assert_allclose(closed.worst_pole()[0], (1 - 3 * g) ** (1 / 3), rtol=1e-9)
 
 
+@pytest.mark.promise("pointing-31")
 @pytest.mark.parametrize("key", ["A", "B", "C", "D", "L"])
 @pytest.mark.parametrize("bad", [nan, inf])
 def test_a_controller_with_a_number_that_is_not_finite_is_refused_by_the_matrix(key, bad):
@@ -791,6 +799,7 @@ def with_one(matrix, value):
     return changed
 
 
+@pytest.mark.promise("pointing-31")
 def test_a_controller_of_the_wrong_size_is_refused_by_the_matrix_and_the_size_that_would_do():
     loop, one = scenario(2), scenario(1)
     with pytest.raises(ValueError) as refused:
@@ -914,6 +923,9 @@ def noisy(axes=2):
 FIELDS = ("rms_rad", "mean_rad", "largest_rad", "histogram", "counts", "psd_rad2_hz")
 
 
+@pytest.mark.promise("readme-12", "readme-19")
+@pytest.mark.promise("sampled-loop-16")
+@pytest.mark.promise("pointing-10", "pointing-97", "sampled-loop-16")
 def test_results_are_those_of_the_run_whatever_the_threads_and_the_number_of_runs():
     loop, controller = noisy()
     span, told = Span(0.2, 0.05, 7), []
@@ -950,6 +962,8 @@ def test_cases_that_share_what_they_draw_are_the_runs_that_each_would_be_alone()
                 assert_array_equal(getattr(found, field), getattr(alone, field))
 
 
+@pytest.mark.promise("readme-19")
+@pytest.mark.promise("pointing-10")
 def test_another_seed_gives_other_numbers_and_the_same_seed_the_same():
     loop, controller = noisy()
     first, again, other, high = (
@@ -961,6 +975,7 @@ def test_another_seed_gives_other_numbers_and_the_same_seed_the_same():
         assert abs(np.corrcoef(first[:, 0], another[:, 0])[0, 1]) < 0.45  # 64 pairs
 
 
+@pytest.mark.promise("pointing-98")
 @pytest.mark.parametrize("run", [0, 5, 66])
 def test_a_trace_is_the_run_of_its_number(run):
     """One plant step a sample: rms, mean and largest are those of the samples behind the settling time."""
@@ -977,6 +992,7 @@ def test_a_trace_is_the_run_of_its_number(run):
     assert found.seconds == 1500 * 2e-4
 
 
+@pytest.mark.promise("pointing-98")
 def test_the_mean_is_that_of_the_control_samples_and_the_rms_that_of_all_plant_steps():
     loop, controller = noisy(1)
     found = ensemble.simulate(loop, controller, Span(0.2, 0.1, 1), 1)
@@ -986,6 +1002,7 @@ def test_the_mean_is_that_of_the_control_samples_and_the_rms_that_of_all_plant_s
     assert not np.allclose(found.rms_rad[0], np.sqrt(np.mean(errors**2, axis=0)), rtol=1e-9, atol=0)
 
 
+@pytest.mark.promise("pointing-8")
 @pytest.mark.parametrize("axes", [1, 2])
 def test_what_no_controller_knows_is_a_reference_to_one_that_looks_at_none(axes):
     """To the last bit; and one that feeds its reference forward takes only what it knows."""
@@ -1034,6 +1051,7 @@ def test_runs_side_by_side_have_references_of_their_own():
     assert not np.allclose(errors[0], errors[1], rtol=0.0, atol=URAD)
 
 
+@pytest.mark.promise("pointing-8")
 def test_a_trace_adds_up():
     """Reference and disturbance less the mirror is the error; the sensor reads it with its noise, one sample late."""
     loop, controller = VARIANTS["two coupled axes"]()
@@ -1050,6 +1068,7 @@ def test_a_trace_adds_up():
     assert abs(np.corrcoef(noise[1:, 0], noise[:-1, 0])[0, 1]) < 0.06
 
 
+@pytest.mark.promise("pointing-10", "sampled-loop-16")
 def test_disturbances_of_the_two_axes_and_of_two_runs_are_independent():
     loop, controller = noisy()
     loop = replace(loop, disturbances=((disturbance.first_order(1e-12, 200.0, convention="per-axis"),),) * 2)
@@ -1067,6 +1086,7 @@ def test_a_disturbance_of_many_inputs_shares_no_random_numbers_with_the_next_axi
     assert np.unique(purposes).size == purposes.size
 
 
+@pytest.mark.promise("pointing-9")
 def test_a_disturbance_line_starts_at_another_phase_in_each_run_and_axis():
     line = disturbance.wheels(250.0, (1.0,), (URAD / 250.0**2,), convention="per-axis")
     loop = quiet(scenario(2))
@@ -1098,6 +1118,7 @@ def test_without_hysteresis_each_element_keeps_its_own_slow_gain():
         assert_allclose(fine.in_band_gain(straightened), fine.in_band_gain(both), rtol=1e-12)
 
 
+@pytest.mark.promise("pointing-10", "sampled-loop-16")
 def test_leaving_a_disturbance_out_changes_nothing_of_the_others():
     """In a linear loop the traces of its parts add up to that of the whole, to rounding."""
     lines = disturbance.wheels(40.0, (1.0, 2.5), (1e-9, 4e-10), convention="per-axis")
@@ -1120,6 +1141,19 @@ def test_leaving_a_disturbance_out_changes_nothing_of_the_others():
         assert np.max(np.abs(part[:, 2:4])) > URAD
 
 
+@pytest.mark.promise("pointing-13")
+def test_what_is_simulated_is_made_of_numbers_of_32_bits():
+    loop, controller = noisy()
+    p = kernel_arrays.arrays(loop, controller, 1)
+    found = {name: getattr(p, name) for name in ("By", "E", "H", "Cy", "Dy", "Ky", "coupling", "optics")}
+    assert lti.EXACT_BITS == 32
+    for name, values in found.items():
+        mantissa = np.frexp(np.asarray(values, dtype=float))[0] * 2.0**32
+        assert_array_equal(mantissa, np.rint(mantissa), err_msg=name)
+    assert sum(np.count_nonzero(values) for values in found.values()) > 10
+
+
+@pytest.mark.promise("pointing-98")
 def test_quantiles_from_the_histogram_are_those_of_the_trace_within_1_percent():
     loop, controller = noisy()
     found = ensemble.simulate(loop, controller, Span(4.1, 0.1, 3), 1)
@@ -1133,11 +1167,14 @@ def test_quantiles_from_the_histogram_are_those_of_the_trace_within_1_percent():
     assert found.largest_rad[0] >= np.max(radial) * (1.0 - 1e-13)
 
 
+@pytest.mark.promise("pointing-98")
 def test_the_quantile_of_a_uniform_square_is_its_share():
     """Radial errors whose squares are uniform: the quantile is the largest times sqrt(share)."""
     largest = 13 * URAD
     errors = largest * np.sqrt((np.arange(200_000) + 0.5) / 200_000)
-    counts = np.histogram(errors, ensemble.bin_edges_rad())[0]
+    edges = ensemble.bin_edges_rad()
+    assert np.max(edges[2:-1] / edges[1:-2]) < 1.031
+    counts = np.histogram(errors, edges)[0]
     for share in (0.01, 0.25, 0.5, 0.9, 0.98):
         assert_allclose(ensemble.histogram_quantile(counts, share), largest * sqrt(share), rtol=1e-4)
     assert np.isnan(ensemble.histogram_quantile(np.zeros_like(counts), 0.5))
@@ -1219,6 +1256,9 @@ def test_the_interval_of_the_rms_is_that_of_the_scatter_of_its_square():
     assert replace(found, rms_rad=rms[:1]).radial_rms_interval_rad() == inf
 
 
+@pytest.mark.promise("readme-18")
+@pytest.mark.promise("sampled-loop-15")
+@pytest.mark.promise("pointing-98", "sampled-loop-15")
 def test_each_counter_is_a_share_of_what_it_counts():
     """Saturation and the inverse's rate by control sample, lost spots by reading, the rest by plant step."""
     loop, controller = excursion(1.0)
@@ -1230,6 +1270,7 @@ def test_each_counter_is_a_share_of_what_it_counts():
         assert found.share(counter) == 60 / times, counter
 
 
+@pytest.mark.promise("pointing-9", "sampled-loop-15")
 @pytest.mark.parametrize("size", [3.0, -30.0])
 def test_beyond_its_stroke_the_loop_counts_stays_bounded_and_recovers(size):
     """20 ms behind an excursion beyond the stroke the error is that of one that stays within; windup would not end."""

@@ -129,6 +129,7 @@ def filtered(reference, time_s):
 # ------------------------------------------------------------------------------------------------ reference filter
 
 
+@pytest.mark.promise("hysteresis-17", "pointing-22")
 def test_the_filter_gives_the_target_and_its_rate_at_the_end_of_each_sample():
     """The rate is the target's derivative: differences of it agree to (w T)^2 / 12, which holding the input brings."""
     period = 5e-6
@@ -163,6 +164,7 @@ def test_the_filter_is_critically_damped_and_has_unit_gain():
     assert_allclose(target[-1], 1.0, rtol=1e-6)
 
 
+@pytest.mark.promise("pointing-22")
 @pytest.mark.parametrize("layout", ["two-axis", "tripod"])
 def test_the_controller_drives_each_inverse_with_its_mirrors_angle_and_its_rate(layout):
     """Two coupled axes: targets are the filtered references turned back through the optics; rates their derivatives."""
@@ -221,6 +223,7 @@ def following_error(loop, controller):
     return (traced.mirror_rad[:, 0] - wanted)[traced.time_s > 0.05], traced
 
 
+@pytest.mark.promise("pointing-22")
 @pytest.mark.parametrize("model", MODELS)
 def test_without_feedback_the_mirror_follows_the_filtered_reference_with_the_inverse(model):
     """At least these factors nearer than with the slow gain; plays to below 0.1 % of the stroke, Bouc-Wen to 1.5 %."""
@@ -262,6 +265,7 @@ def test_coupled_axes_follow_their_filtered_references_without_feedback(layout):
 # ------------------------------------------------------------------------------------------------ noise
 
 
+@pytest.mark.promise("pointing-22")
 @models
 def test_sensor_noise_does_not_reach_an_inverse_that_the_reference_drives(model):
     """Without feedback the drive is the same to the last bit, whatever the sensor reads."""
@@ -299,6 +303,9 @@ RATE_DEPENDENT = (
 )
 
 
+@pytest.mark.promise("mirror-file-12")
+@pytest.mark.promise("hysteresis-17")
+@pytest.mark.promise("hysteresis-17", "pointing-23")
 @pytest.mark.parametrize("model", RATE_DEPENDENT)
 @pytest.mark.parametrize("freq_hz", [400.0, 3000.0])
 def test_a_reference_faster_than_the_identified_rate_is_counted_and_the_drive_stays_bounded(model, freq_hz):
@@ -343,6 +350,7 @@ def test_a_step_of_the_reference_is_bounded_and_ends_where_it_should(model):
     assert (counted > 0) == (not model.startswith("Prandtl"))
 
 
+@pytest.mark.promise("pointing-23")
 def test_a_drive_beyond_the_identified_range_is_counted_at_each_plant_step():
     loop = loop_of("Prandtl-Ishlinskii", drive_range_v=(-0.5, 2.0))
     controller, span = ahead(loop, control.inverse(loop.mirror)), Span(0.2, 0.0, 1)
@@ -391,6 +399,7 @@ SERIES = [  # model, amplitude of each line, |S| with the inverse within, and at
 ]
 
 
+@pytest.mark.promise("pointing-22")
 @pytest.mark.parametrize(("model", "amplitude_rad", "within", "without"), SERIES)
 def test_an_inverse_in_series_gives_the_loop_gain_of_the_straight_mirror(model, amplitude_rad, within, without):
     loop = sampled(model)
@@ -430,6 +439,7 @@ def test_a_series_inverse_at_its_stroke_is_counted_and_recovers():
 # ------------------------------------------------------------------------------------------------ refusals
 
 
+@pytest.mark.promise("export-27")
 def test_a_mirror_that_names_no_hysteresis_to_invert_is_refused():
     loop = loop_of("Bouc-Wen")
     stiff = replace(loop, mirror=replace(loop.mirror, inverse=(), inverse_creep=()))
@@ -440,6 +450,7 @@ def test_a_mirror_that_names_no_hysteresis_to_invert_is_refused():
     assert "use with_feedforward, which runs it forward" in str(refused.value)
 
 
+@pytest.mark.promise("mirror-file-21")
 def test_plays_that_stand_still_behind_a_reversal_are_refused():
     loop = loop_of("Prandtl-Ishlinskii")
     stuck = mirror.assemble("stuck", "static", None, PrandtlIshlinskii((0.1, 1.0), (50e-6, 30e-6)))

@@ -44,7 +44,9 @@ def test_a_slower_sensor_is_counted_in_control_samples_and_its_delay_in_plant_st
     assert built(rate_hz=5e3 / 3).every == 3  # 1666.666... Hz, to the last bit or nearly
 
 
-@pytest.mark.parametrize(("rate_hz", "nearest_hz"), [(3e3, 2.5e3), (4.9e3, 5e3), (1.6e3, 5e3 / 3), (1.0e3 + 0.1, 1e3)])
+@pytest.mark.parametrize(
+    ("rate_hz", "nearest_hz"), [(3e3, 2.5e3), (4.9e3, 5e3), (1.6e3, 5e3 / 3), (3.45e3, 2.5e3), (1.0e3 + 0.1, 1e3)]
+)
 def test_a_rate_between_the_control_samples_is_refused_with_the_nearest_that_would_do(rate_hz, nearest_hz):
     with pytest.raises(
         ValueError, match=r"^optical sensor: its sample rate of .* does not divide the control rate of 5 kHz"

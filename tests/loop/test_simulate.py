@@ -114,6 +114,7 @@ def continuous_error(freq_hz, duration_s):
     return np.array([parts(t, state)[1] for t, state in zip(solution.t, solution.y.T, strict=True)])
 
 
+@pytest.mark.promise("decisions-1")
 def test_the_slow_sine_against_an_adaptive_solver():
     """1 Hz: a record of this loop gives 0.98 µrad rms, which does not reproduce; two solvers agree on 1.0124."""
     error = continuous_error(1.0, 1.5)
@@ -162,6 +163,7 @@ def test_the_runs_are_those_of_the_scenario(runs):
     assert [r.mirror for r in runs[::5]] == ["given", "no hysteresis", "comparison"]
 
 
+@pytest.mark.promise("decisions-1")
 def test_halving_the_plant_step_moves_no_error_by_one_percent(tmp_path, runs):
     halved = tracking.sine_runs(cases_of(edited(tmp_path, ('plant_step = "10 us"', 'plant_step = "5 us"'))))
     moved = []
@@ -278,6 +280,7 @@ def chattering():
     return np.array(commands), np.array(errors), beyond
 
 
+@pytest.mark.promise("hysteresis-17")
 def test_a_feedforward_that_takes_its_rate_from_itself_chatters(chattering):
     """Its peaks are small, but by a limit cycle of eight samples, half of them beyond the identified rate."""
     commands, errors, beyond = chattering
@@ -297,6 +300,7 @@ def test_a_feedforward_that_takes_its_rate_from_itself_chatters(chattering):
     assert np.std(np.diff(honest.command_v[:, 0])) < 0.05
 
 
+@pytest.mark.promise("hysteresis-17")
 def test_that_chattering_is_counted(chattering):
     commands, _, _ = chattering
     assert simulate.alternations(commands[:, None], 2 * 0.305e-3) > 1000
@@ -324,6 +328,7 @@ def test_a_sine_settles_over_whole_periods(freq_hz, periods, samples_a_period):
 # ------------------------------------------------------------------------------------------------ counters and slices
 
 
+@pytest.mark.promise("readme-18")
 def test_saturation_is_counted(tmp_path):
     """A drive of +-2 V where the sine needs 3.4 V."""
     mission = edited(
@@ -340,6 +345,7 @@ def test_saturation_is_counted(tmp_path):
     assert 100e-6 < trace.peak_rad < 200e-6
 
 
+@pytest.mark.promise("readme-18")
 def test_slew_is_counted(tmp_path):
     """133 V/s where a 25 Hz sine needs 530 V/s; one plant step a sample, so that each shows in the trace."""
     slow = ('slew = "1 V/us"', 'slew = "0.002 V/us"')
@@ -355,6 +361,7 @@ def test_slew_is_counted(tmp_path):
     assert 0 <= trace.counts.slew_limited - at_limit <= 1  # the last step has no sample behind it
 
 
+@pytest.mark.promise("readme-18")
 def test_clamping_is_counted(tmp_path):
     mission = edited(tmp_path, ('rate_limit = "3770 V/s"', 'rate_limit = "400 V/s"'))
     m, setup = mission_setup(mission)
@@ -365,6 +372,7 @@ def test_clamping_is_counted(tmp_path):
     assert_allclose(trace.counts.clamped / (2 * len(trace.time_s)), share, rtol=0.15)
 
 
+@pytest.mark.promise("hysteresis-17")
 def test_a_zigzag_of_the_command_is_counted():
     """A reference that zigzags for 40 samples, passed on as a command; then it rests."""
     reference = np.concatenate([np.tile([0.0, 1e-4], 20), np.zeros(60)])[:, None]

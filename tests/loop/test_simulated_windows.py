@@ -61,6 +61,7 @@ def of_all_samples(error, index):
     return np.mean((np.array([error[k + apart : k + apart + window].mean() for k in starts]) - mean) ** 2)
 
 
+@pytest.mark.promise("pointing-37", "pointing-38")
 def test_slices_give_what_all_samples_of_each_run_give():
     """A window of 2.5 s is longer than a slice of 2048 samples, and the end of the settling is inside one."""
     runs = [trace(BENT.parts, BENT.assembled(TRACKING), SPAN, run).error_rad[200:, 0] for run in range(3)]
@@ -108,6 +109,7 @@ def test_runs_without_hysteresis_are_linear_theory_and_those_with_it_are_not():
     assert any(abs(found.rms_rad - found.linear_rad) > 2.0 * found.interval_rad for found in bent)
 
 
+@pytest.mark.promise("pointing-38")
 def test_theory_at_the_samples_is_the_spectrum_there_under_the_weight_of_their_mean():
     """(sin(N x) / (N sin x))^2 of N samples, x = pi f T; the spectrum of the residual is that of the samples, too."""
     loop = replace(PLAIN, vibration=SLOW)
@@ -184,6 +186,7 @@ def missed(number, off=1.0):
     return [abs(each.rms_rad - off * each.linear_rad) > each.interval_rad for each in found]
 
 
+@pytest.mark.promise("pointing-43")
 @pytest.mark.parametrize("loops", [6, *(pytest.param(loops, marks=pytest.mark.endurance) for loops in (200, 1000))])
 def test_exact_theory_lies_in_the_intervals_of_runs_of_random_loops(loops):
     """An interval of 99 % misses once in a hundred, so that misses of an index are binomial in the loops drawn.
@@ -202,11 +205,13 @@ def test_theory_that_is_a_tenth_off_lies_outside_of_them():
     assert np.all([missed(number, off) for number, off in enumerate((0.9, 1.1))])
 
 
+@pytest.mark.promise("pointing-38")
 def test_one_run_has_no_interval_and_the_share_of_many_is_student_s():
     assert half_width(np.ones(1)) == math.inf and half_width(np.ones(2)) == 0.0
     assert half_width(np.array([0.0, 2.0])) == pytest.approx(63.657, rel=1e-4, abs=0.0)
 
 
+@pytest.mark.promise("pointing-38")
 @pytest.mark.parametrize(
     ("index", "runs", "span", "words"),
     [

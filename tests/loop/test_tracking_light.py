@@ -24,6 +24,7 @@ def test_the_light_is_the_answers_unless_the_cell_states_it_or_the_noise_is_give
     assert tracking_light_w(stated) == pytest.approx(3e-9, rel=1e-12)
 
 
+@pytest.mark.promise("pointing-9")
 def test_noise_follows_from_the_light_and_is_refused_without():
     file, given = load_mission(DEFAULT), load_mission(SHIPPED)
     assert noise_rad(file, 4e-9) < noise_rad(file, 1e-9)

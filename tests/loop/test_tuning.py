@@ -133,6 +133,7 @@ def test_many_controllers_are_judged_as_each_alone():
     assert len({v.mean_rad2 for v in found}) == len(found)
 
 
+@pytest.mark.promise("pointing-11", "sampled-loop-12")
 def test_the_judge_means_variances_and_takes_the_worst_margins_of_all_plants():
     plants = [PLAIN, axis_plant(gauge=False, gain=0.11e-3, resonance=(1200.0, 0.1))]
     controller = pi(PLAIN, [400.0, 0.1])
@@ -175,6 +176,7 @@ def test_the_free_optimum_of_one_gain_is_that_of_a_scalar_minimiser():
     assert found.bound_by == ()
 
 
+@pytest.mark.promise("pointing-11", "sampled-loop-12")
 def test_a_tuned_pi_is_the_best_of_a_fine_grid_with_exact_variances_and_margins():
     best = (math.inf, None)
     for integral in np.geomspace(100.0, 2e3, 24):
@@ -189,10 +191,11 @@ def test_a_tuned_pi_is_the_best_of_a_fine_grid_with_exact_variances_and_margins(
     assert 0.98 * best[0] < found.residual_rms_rad < 1.002 * best[0]
 
 
+@pytest.mark.promise("pointing-12")
 @pytest.mark.parametrize("plant", [QUIET, RESONANT], ids=["quiet", "resonant"])
 def test_the_margin_is_respected_and_named_where_it_binds(plant):
     found = tuning.tune(PI, [plant], Specification(0.7), seed=1)
-    assert 0.7 <= found.least_modulus < 0.705
+    assert 0.7 <= found.least_modulus < 0.7 * 1.0015  # a thousandth more is aimed at, and values are rounded
     assert modulus(plant, found.controller) == near(found.least_modulus, rel=1e-3)
     assert found.margins == analysis.loop_margins(plant, found.controller)
     assert tuning.MARGIN in found.bound_by
@@ -201,6 +204,7 @@ def test_the_margin_is_respected_and_named_where_it_binds(plant):
     assert freer.residual_rms_rad < 0.98 * found.residual_rms_rad
 
 
+@pytest.mark.promise("sampled-loop-10")
 def test_a_narrow_dip_beside_the_grid_does_not_cost_the_margin():
     sharp = axis_plant(resonance=(700.0, 0.003), gauge=False)
     found = tuning.tune(INTEGRAL, [sharp], HALF, seed=2)
@@ -277,6 +281,7 @@ def test_lqg_beats_the_tuned_pi_under_the_same_margin():
 # ------------------------------------------------------------------------------------------------ the search
 
 
+@pytest.mark.promise("pointing-12", "pointing-13")
 @pytest.mark.parametrize(
     "plant", [RESONANT, pytest.param(NOISY, marks=pytest.mark.endurance)], ids=["at the margin", "within it"]
 )
@@ -287,6 +292,7 @@ def test_each_seed_ends_at_the_same_four_digits(plant):
     assert all(v == float(f"{v:.3e}") for v in found[0].values.values())
 
 
+@pytest.mark.promise("pointing-12", "sampled-loop-12")
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=[pytest.mark.endurance] if name in REPEATED else []) for name in FLAT]
 )
@@ -301,6 +307,7 @@ def test_nothing_beside_a_tuned_controller_is_better(name):
     assert best.violation < 1e-8
 
 
+@pytest.mark.promise("pointing-12")
 def test_a_place_is_the_same_wherever_the_last_search_sets_out(monkeypatch):
     of = search.Search(LQG, [RESONANT], HALF)
     starts = (of.at(np.array([0.3, 0.5, 0.3])), of.at(np.array([0.25, 0.45, 0.5])))
@@ -308,6 +315,7 @@ def test_a_place_is_the_same_wherever_the_last_search_sets_out(monkeypatch):
     assert np.max(np.abs(places[0] - places[1])) < 1e-7  # over the bounds: 1e-6 of a value that spans six decades
 
 
+@pytest.mark.promise("pointing-12")
 def test_where_the_residual_does_not_tell_the_gentler_value_is_taken():
     idle = Parameter("idle", "", 1.0, 2.0, gentle=1.7)
     both = Family("PI", lambda plant: (*PI.parameters(plant), idle), lambda plant, v: pi(plant, v[:2]))
@@ -317,6 +325,7 @@ def test_where_the_residual_does_not_tell_the_gentler_value_is_taken():
     assert found.values == {**alone.values, "idle": 1.7}
 
 
+@pytest.mark.promise("pointing-12")
 @pytest.mark.parametrize(
     "plants",
     [
@@ -332,6 +341,7 @@ def test_a_family_that_contains_another_is_never_worse(plants):
     assert tuning.tune(classical.PI_NOTCH, plants, HALF, seed=1, base=known).mean_rms_rad <= known.mean_rms_rad
 
 
+@pytest.mark.promise("pointing-12")
 def test_a_search_that_ends_somewhere_leaves_the_contained_controller(monkeypatch):
     known = tuning.tune(classical.PI, [NOISY], HALF, seed=1)
     monkeypatch.setattr(tuning, "settle", lambda of, t, models: of.at(np.full(5, 0.4)))
@@ -349,6 +359,7 @@ def test_the_notch_is_sought_beside_the_pi_and_far_from_it():
     assert 1.0259e-6 < tuning.tune(classical.PI_NOTCH, [PLAIN], HALF, seed=1).mean_rms_rad < 1.0269e-6
 
 
+@pytest.mark.promise("pointing-12")
 @pytest.mark.parametrize("node", [1e-3, 0.02, 0.2])
 @pytest.mark.parametrize("x", [0.0, 1e-4, 0.03, 0.5, 0.99, 1.0])
 def test_the_points_of_a_slope_lie_within_the_bounds(x, node):
@@ -369,6 +380,51 @@ def test_an_optimum_beside_a_kink_is_the_same_from_every_start():
     assert (first.mean_rms_rad, first.least_modulus) == (second.mean_rms_rad, second.least_modulus)
 
 
+@pytest.mark.promise("pointing-12")
+def test_a_search_begins_at_a_hypercube_half_of_it_beside_what_it_contains(monkeypatch):
+    class LookedError(Exception):
+        """Ends the search behind its first look."""
+
+    def first(family, seed, base=None):
+        with pytest.raises(LookedError) as looked:
+            tuning.tune(family, [NOISY], HALF, seed=seed, base=base)
+        return np.array(looked.value.args[0])
+
+    known = tuning.grid_best(classical.PI, [NOISY], HALF, [[2 * math.pi * 20.0], [2 * math.pi * 900.0]])
+
+    def look(of, places):
+        raise LookedError(places)
+
+    monkeypatch.setattr(search.Search, "at_all", look)
+    alone = first(classical.PI, 1)
+    assert alone.shape == (100, 2)
+    assert np.array_equal(np.sort(np.floor(100 * alone), axis=0), np.repeat(np.arange(100.0)[:, None], 2, axis=1))
+    assert np.array_equal(alone, first(classical.PI, 1)) and not np.array_equal(alone, first(classical.PI, 2))
+    beside = first(classical.PI_NOTCH, 1, known)
+    assert np.ptp(beside[::2, :2], axis=0).tolist() == [0.0, 0.0]
+    assert np.min(np.ptp(beside[1::2], axis=0)) > 0.9
+
+
+@pytest.mark.promise("pointing-12")
+def test_local_searches_set_out_from_eight_places_at_most_or_until_three_agree(monkeypatch):
+    begun, costs = [], iter(range(100))
+    descend, settle = tuning.descend, tuning.settle
+    monkeypatch.setattr(tuning, "descend", lambda *args: begun.append(1) or descend(*args))
+    tuning.tune(PI, [NOISY], HALF, seed=1)
+    assert len(begun) == 3  # of one optimum
+    begun.clear()
+
+    def elsewhere(of, start):
+        """Each search as if it ended somewhere of its own, better than the last."""
+        begun.append(1)
+        return replace(start, cost=start.cost - next(costs))
+
+    monkeypatch.setattr(tuning, "descend", elsewhere)
+    monkeypatch.setattr(tuning, "settle", lambda of, trial, models: settle(of, of.at(trial.place), models))
+    tuning.tune(PI, [NOISY], HALF, seed=1)
+    assert len(begun) == 8
+
+
 def test_progress_is_reported_up_to_its_total():
     told = []
     tuning.tune(PI, [PLAIN], HALF, seed=1, on_progress=lambda *args: told.append(args))
@@ -380,6 +436,7 @@ def test_progress_is_reported_up_to_its_total():
     assert {t[1:] for t in told} == {(total, "tune PI")}
 
 
+@pytest.mark.promise("pointing-11", "sampled-loop-12")
 def test_robust_tuning_keeps_the_margin_where_nominal_tuning_loses_it():
     plants = [axis_plant(gauge=False, gain=0.089e-3 * g, noise_rad=0.1e-6) for g in (1.0, 0.8, 1.2)]
     nominal = tuning.tune(PI, plants[:1], HALF, seed=1)
@@ -396,6 +453,7 @@ def test_robust_tuning_keeps_the_margin_where_nominal_tuning_loses_it():
     assert robust.residual_rms_rad > nominal.residual_rms_rad
 
 
+@pytest.mark.promise("pointing-16")
 def test_the_best_of_a_grid_is_one_of_its_points():
     grid = ([200.0, 400.0, 800.0, 1600.0, 3200.0], [1e-4, 0.1, 0.4])
     found = tuning.grid_best(PI, [PLAIN], HALF, grid)
@@ -438,6 +496,7 @@ def test_a_family_without_a_stable_member_is_refused():
     )
 
 
+@pytest.mark.promise("pointing-31")
 def test_a_specification_out_of_reach_is_refused_with_what_was_reached():
     asked = Specification(0.9, bandwidth_hz=900.0)
     with pytest.raises(

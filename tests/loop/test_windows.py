@@ -51,6 +51,7 @@ def closed_form_rpe(window_s):
 
 
 # ---- closed forms
+@pytest.mark.promise("pointing-35")
 @pytest.mark.parametrize("window_s", [10.0**e for e in range(-9, 8, 2)] + [1.0])
 def test_olympus_at_any_window(window_s):
     mpe = 1e6 * windowed_rms(RADIAL, ErrorIndex("MPE", window_s))
@@ -58,6 +59,7 @@ def test_olympus_at_any_window(window_s):
     assert_allclose([mpe, rpe], [closed_form_mpe(window_s), closed_form_rpe(window_s)], rtol=1e-9)
 
 
+@pytest.mark.promise("pointing-36")
 def test_olympus_at_one_second_and_what_the_rational_form_makes_of_it():
     mean, left = ErrorIndex("MPE", 1.0), ErrorIndex("RPE", 1.0)
     assert 1e6 * windowed_rms(RADIAL, mean) == pytest.approx(8.203132, abs=5e-7)
@@ -69,6 +71,7 @@ def test_olympus_at_one_second_and_what_the_rational_form_makes_of_it():
     assert half == pytest.approx(windowed_rms(RADIAL, mean), rel=1e-12, abs=0.0)
 
 
+@pytest.mark.promise("pointing-35")
 @pytest.mark.parametrize("spacing_s", [1e-3, 0.3, 0.9999, 1.0, 3.0, 1e3])
 def test_the_drift_of_a_first_order_motion(spacing_s):
     """By the variance of sums of increments of its integral, windows that overlap among them."""
@@ -95,6 +98,7 @@ def by_quadrature(motion, index):
     return math.sqrt(math.fsum(parts))
 
 
+@pytest.mark.promise("pointing-32", "pointing-35")
 @pytest.mark.parametrize("window_s", [1e-3, 0.02, 0.4])
 def test_the_exact_form_is_the_integral_of_the_weights(window_s):
     motion = resonance()
@@ -119,9 +123,27 @@ def test_what_is_left_of_a_smooth_motion_in_a_short_window_is_its_rate(window_s)
         assert found < 1.001e-6
 
 
+@pytest.mark.promise("pointing-35")
+def test_the_weights_are_those_of_the_standard():
+    for freq_hz in (0.4, 7.0, 33.0):
+        x = 2 * math.pi * freq_hz * 0.03
+        mean = 2 * (1 - math.cos(x)) / x**2
+        apart = 2 * (1 - math.cos(2 * math.pi * freq_hz * 0.7)) * mean
+        for index, wanted in (
+            (ErrorIndex("MPE", 0.03), mean),
+            (ErrorIndex("RPE", 0.03), 1 - mean),
+            (ErrorIndex("PDE", 0.03, 0.7), apart),
+        ):
+            assert index.weight(freq_hz)[0] == pytest.approx(wanted, rel=1e-9)
+
+
+@pytest.mark.promise("pointing-35")
 def test_rational_forms_are_their_weights():
     for kind in ("MPE", "RPE"):
         index = ErrorIndex(kind, 0.03)
+        s = 2j * math.pi * 7.0 * 0.03
+        filtered = {"MPE": 2 * (s + 6), "RPE": s * (s + math.sqrt(12))}[kind] / (s * s + 6 * s + 12)
+        assert index.rational_weight(7.0)[0] == pytest.approx(abs(filtered) ** 2, rel=1e-12)
         edges = np.concatenate([[0.0], np.geomspace(0.1, 1e5, 150)])
         parts = (
             quad(lambda f, of=index: psd(resonance(), [f])[0] * of.rational_weight(f)[0], a, b, epsrel=1e-9)[0]
@@ -144,6 +166,7 @@ def test_lines_count_by_their_weight():
     assert rational_rms(LINES, ErrorIndex("APE")) == pytest.approx(math.sqrt(2.0) * 1e-6, rel=1e-12, abs=0.0)
 
 
+@pytest.mark.promise("pointing-32", "pointing-53")
 def test_knowledge_errors_take_the_same_of_what_is_known():
     for known, pointed in (("AKE", "APE"), ("MKE", "MPE"), ("RKE", "RPE")):
         times = () if known == "AKE" else (0.2,)
@@ -151,6 +174,7 @@ def test_knowledge_errors_take_the_same_of_what_is_known():
 
 
 # ---- tables and recordings
+@pytest.mark.promise("pointing-35")
 @pytest.mark.parametrize("window_s", [1e-4, 0.05, 20.0])
 def test_a_table_of_a_density_is_its_motion(window_s):
     freq = np.geomspace(1e-7, 1e8, 400)
@@ -191,6 +215,7 @@ def test_a_recorded_motion_has_the_indices_of_its_spectrum():
         assert error < 0.1 * wanted
 
 
+@pytest.mark.promise("pointing-35")
 def test_the_indices_of_a_short_recording_by_hand():
     rad = np.array([1.0, 3.0, 2.0, 6.0]) * 1e-6
     of = [ErrorIndex("MPE", 2.0), ErrorIndex("RPE", 2.0), ErrorIndex("PDE", 2.0, 2.0), ErrorIndex("APE")]
@@ -199,6 +224,7 @@ def test_the_indices_of_a_short_recording_by_hand():
 
 
 # ---- exposures
+@pytest.mark.promise("pointing-35")
 def test_the_line_through_an_exposure_by_double_integrals():
     """Two outputs of one motion: their covariance function, weighed twice by mean and slope, where t > u."""
     motion, span = resonance(), 0.013
@@ -265,6 +291,7 @@ def test_an_index_has_the_times_of_its_definition(words, message):
         ErrorIndex(*words)
 
 
+@pytest.mark.promise("pointing-35")
 def test_refusals():
     index, rad = ErrorIndex("MPE", 1.0), np.ones(50)
     with pytest.raises(ValueError, match=r"MPE looks at 1 s, and the recording is 0.5 s long: give shorter times or"):

@@ -79,6 +79,8 @@ def test_two_axes_that_leave_each_other_alone_are_tuned_as_one():
     two = replace(LOOP, mirror=mirrors.combine(STRAIGHT, STRAIGHT))
     one, both = tune(LOOP, "LQG"), tune(two, "LQG")
     assert_allclose(both.residual_rms_rad, np.repeat(one.residual_rms_rad, 2), rtol=1e-4)
+    with pytest.raises(ValueError, match=r"is made for 10000 Hz, and this loop has 20000 Hz"):
+        replace(two, rate_hz=20e3).margins(both.controller)
     shaped = tune(two, "H-infinity")
     assert shaped.margins.modulus >= 0.5 and np.all(shaped.residual_rms_rad > both.residual_rms_rad)
     pid = Controller.pid(0.0, 5e6, rate_hz=10e3, axes=2)
@@ -118,6 +120,7 @@ def test_a_loop_that_cannot_be_is_refused(changes, said):
         replace(LOOP, **changes)
 
 
+@pytest.mark.promise("choose-7")
 def test_what_does_not_fit_a_loop_is_refused():
     with pytest.raises(
         ValueError, match=r"controller 'PID' has 2 inputs, 2 outputs .* a loop of 1 axes takes an error"

@@ -13,6 +13,7 @@ import oracles
 from microrad.core import lti
 from microrad.mirror import coupled
 from microrad.mirror.coupled import Actuator, CoupledMirror, Known, Output
+from microrad.mirror.coupled.spread import changed
 from microrad.mirror.hysteresis import BoucWen, PrandtlIshlinskii
 from microrad.mirror.model import Mirror
 from microrad.mission.file import MissionError, load_coupled_mirror
@@ -94,6 +95,7 @@ def twin_of(mirror):
 
 
 # ------------------------------------------------------------------------------------------------------------ response
+@pytest.mark.promise("mirror-file-27", "mirror-file-28", "mirror-file-33", "mirror-file-36", "mirror-file-37")
 @pytest.mark.parametrize("fed", [True, False])
 def test_the_response_is_that_of_the_twin_to_a_drive_of_the_delay_ago(fed):
     """The drive between samples from its lines, the plant by dense matrix exponentials."""
@@ -120,6 +122,100 @@ def test_a_step_too_long_for_the_stiffness_names_one_that_would_do():
         stiff.response(np.zeros((SAMPLES, 2)))
 
 
+@pytest.mark.promise("mirror-file-34")
+def test_the_units_of_states_and_of_elements_are_free():
+    """Each pair of states in another unit, and each play's output in another: the response is the same."""
+    mirror = made(4, bouc_wen=0)
+    m, drive = mirror.mirror, drive_of(2, 2)[1]
+    states = np.concatenate(
+        [np.full(2 if w else 1, size) for (_, w), size in zip(coupled.modes(m.A), (3.0, 0.2, 7.0), strict=True)]
+    )
+    of_z = np.array([0.5, 4.0])
+    plays = tuple(
+        replace(
+            p,
+            weights_rad_v=tuple(size * w for w in p.weights_rad_v),
+            polynomial_rad=tuple(size * c for c in p.polynomial_rad),
+        )
+        for p, size in zip(m.plays, of_z, strict=True)
+    )
+    other = replace(
+        m,
+        B=states[:, None] * m.B,
+        E=states[:, None] * m.E / of_z,
+        F=m.F / states,
+        C=m.C / states,
+        K=m.K / of_z,
+        plays=plays,
+    )
+    expected = mirror.response(drive)
+    found = replace(mirror, mirror=other).response(drive)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-10 * np.abs(expected).max())
+    halved = replace(mirror, mirror=replace(m, B=0.5 * m.B)).response(drive)
+    assert np.abs(halved - expected).max() > 0.01 * np.abs(expected).max()
+
+
+@pytest.mark.promise("mirror-file-35", "mirror-file-44")
+def test_a_mode_has_the_frequency_and_damping_that_its_two_numbers_are_written_for():
+    f, d = 140.0, 0.1
+    decay, frequency = 2 * np.pi * f * d, 2 * np.pi * f * np.sqrt(1 - d**2)
+    A = lti.modal_matrix([(-decay, frequency), (-400.0, 0.0)])
+    np.testing.assert_array_equal(A, [[-decay, -frequency, 0], [frequency, -decay, 0], [0, 0, -400.0]])
+    pole = np.linalg.eigvals(A)[0]
+    assert abs(pole) / (2 * np.pi) == pytest.approx(f) and -pole.real / abs(pole) == pytest.approx(d)
+    turned = lti.modal_matrix([(-decay, -frequency)])
+    np.testing.assert_array_equal(turned, A[:2, :2].T)  # below 0 the two states turn the other way
+
+
+@pytest.mark.promise("mirror-file-37")
+def test_another_step_is_another_response_where_hysteresis_is_fed_back():
+    """The step that counts is that of `steps_per_sample`."""
+    mirror, drive = made(4, bouc_wen=0), drive_of(2, 2)[1]
+    assert mirror.step_s == 1.0 / (mirror.rate_hz * mirror.steps_per_sample)
+    coarse, fine = (replace(mirror, steps_per_sample=n).response(drive) for n in (2, 8))
+    assert 1e-4 < np.abs(coarse - fine).max() / np.abs(fine).max() < 0.1
+
+
+@pytest.mark.promise("mirror-file-39")
+@pytest.mark.parametrize("elements", [6, 7])
+def test_each_combination_of_up_to_six_operators_is_looked_at(elements):
+    """Two that hold each other where both slide: the one that slides alone runs away, and is seen among six."""
+    A, E, F = -np.eye(2), np.zeros((2, elements)), np.zeros((elements, 2))
+    E[0, :2], F[:2, 0] = (1.0, -1.0), 1.0
+    gains = np.zeros(elements)
+    gains[:2] = 3.0
+    growth = lti.growth_1_s(A, E, F, gains)
+    assert growth == pytest.approx(2.0 if elements == 6 else -1.0)
+
+
+@pytest.mark.promise("hysteretic-stiffness-8")
+def test_a_polynomial_may_soften_a_spring_until_it_rests_at_two_places():
+    """k q = z(q) with z = 1.5 k q^2 to its reach of 1, held beyond it: rest at 0 and at 1.5, none at 2 / 3."""
+    w, s = 600.0, -60.0
+    k = (s**2 + w**2) / w
+    play = PrandtlIshlinskii((0.0,), (0.0,), polynomial_rad=(1.5 * k, 0.0, 0.0), reach_v=1.0)
+    one = Mirror(
+        name="two rests",
+        A=lti.modal_matrix([(s, w)]),
+        B=np.array([[k], [0.0]]),
+        E=np.array([[1.0], [0.0]]),
+        F=np.array([[0.0, 1.0]]),
+        G=np.zeros((1, 1)),
+        C=np.array([[0.0, 1.0]]),
+        D=np.zeros((1, 1)),
+        K=np.zeros((1, 1)),
+        bouc_wen=(),
+        plays=(play,),
+        inverse=(),
+    )
+    step_s, ends = 1e-4, []
+    for push in (0.05, 2.0):
+        drive = np.where(np.arange(4000) < 1000, push, 0.0)
+        ends.append(one.response(drive, step_s)[-1])
+    np.testing.assert_allclose(ends, [0.0, 1.5], atol=1e-6)
+
+
+@pytest.mark.promise("mirror-file-35", "mirror-file-44")
 def test_modes_are_found_in_the_order_of_their_states():
     roots = [(-1.0, 0.0), (-2.0, 30.0), (-3.0, -40.0), (-2.0, 0.0), (-2.0, 0.0)]
     assert coupled.modes(lti.modal_matrix(roots)) == tuple(roots)
@@ -142,6 +238,7 @@ def test_a_plant_in_another_form_or_of_other_channels_is_refused():
 
 
 # ---------------------------------------------------------------------------------------------------------- round trip
+@pytest.mark.promise("mirror-file-27", "mirror-file-29")
 @settings(deadline=None, max_examples=60)  # the machine may be busy
 @given(
     seed=st.integers(0, 10**6),
@@ -236,6 +333,7 @@ def whole():
     )
 
 
+@pytest.mark.promise("mirror-file-29", "mirror-file-49", "mirror-file-51")
 def test_all_that_a_file_holds_reads_back():
     mirror = whole()
     found = read_back(mirror)
@@ -246,6 +344,7 @@ def test_all_that_a_file_holds_reads_back():
     np.testing.assert_allclose(np.diag(found.known.correlation), 1.0, atol=1e-15)
 
 
+@pytest.mark.promise("mirror-file-52")
 def test_a_covariance_may_be_larger_than_a_mission_file():
     """Of 240 parameters: more than the megabyte that other files have."""
     mirror = made(5, modes=20, actuators=3, outputs=3, bouc_wen=0, plays=0)
@@ -278,6 +377,8 @@ def test_the_text_is_to_be_read_by_people():
     assert max(len(line) for line in lines) < 130
 
 
+@pytest.mark.promise("mirror-file-33")
+@pytest.mark.promise("hysteresis-1")
 def test_elements_of_both_models_may_stand_in_any_order():
     """A file may count plays first; the plant has Bouc-Wen elements first."""
     mirror = made(5)
@@ -326,6 +427,7 @@ def placed(*places):
     return tuple(Output(f"y {i}", "displacement", place) for i, place in enumerate(places))
 
 
+@pytest.mark.promise("mirror-file-34", "mirror-file-38")
 def test_tilts_and_piston_of_a_plane_that_is_turned():
     """A plane through three or four places: turned about x it rises at positive y, about y at negative x."""
     tilt_x, tilt_y, piston = 3e-4, -2e-4, 5e-6
@@ -337,6 +439,7 @@ def test_tilts_and_piston_of_a_plane_that_is_turned():
         np.testing.assert_allclose(found, [tilt_x, tilt_y, piston], rtol=1e-3, atol=1e-9)
 
 
+@pytest.mark.promise("mirror-file-38")
 def test_more_places_than_three_average_their_noise():
     """Four sensors on a circle of radius r: a tilt has the variance of one over 2 r^2, the piston a quarter of it."""
     matrix = coupled.tilts_and_piston(placed((0.03, 0), (0, 0.03), (-0.03, 0), (0, -0.03)))
@@ -369,3 +472,15 @@ def test_places_that_do_not_span_the_tilts_are_refused(places, reason):
 
 def test_places_almost_on_a_line_still_span():
     assert np.isfinite(coupled.tilts_and_piston(placed((0.0, 0.0), (0.01, 1e-5), (0.02, 0.0)))).all()
+
+
+def test_every_change_of_an_element_is_made():
+    mirror = whole()
+    own = mirror.mirror.bank[0]
+    by = {"hysteresis.1.d1": 1e-7, "hysteresis.1.alpha": 0.5, "hysteresis.1.beta": -0.25}
+    found = changed(mirror, by)
+    first = found.mirror.bank[0]
+    assert first.d1_rad_v == own.d1_rad_v + 1e-7
+    assert first.alpha_1_v == own.alpha_1_v + 0.5
+    assert first.beta_1_v == own.beta_1_v - 0.25
+    assert found.mirror.bank[1:] == mirror.mirror.bank[1:]

@@ -30,6 +30,7 @@ def reflected_angles(normal, incidence_rad):
 
 
 # ---------------------------------------------------------------------------------------------- reflection
+@pytest.mark.promise("pointing-9")
 @pytest.mark.parametrize("incidence_deg", [0.0, 22.5, 45.0, 70.0])
 def test_a_reflected_ray_turns_by_twice_the_tilt_in_the_plane_and_by_two_cosines_across(incidence_deg):
     incidence = math.radians(incidence_deg)
@@ -46,6 +47,7 @@ def test_an_optical_output_is_already_the_beam_at_normal_incidence():
     np.testing.assert_allclose(oblique, np.diag([1.0, math.sqrt(0.5)]), rtol=1e-15)
 
 
+@pytest.mark.promise("pointing-9")
 def test_a_telescope_divides_the_angle_and_a_rotation_turns_x_towards_y():
     seen = geometry.line_of_sight_matrix(Geometry("mechanical", magnification=10.0, rotation_rad=math.pi / 2))
     np.testing.assert_allclose(seen @ [1.0, 0.0], [0.0, 0.2], atol=1e-16)
@@ -203,6 +205,7 @@ def test_magnification_multiplies_and_a_mechanical_angle_halves():
     assert mechanical[0].ratio_rss == pytest.approx(1.25e-3 / (3.0 * rss), rel=1e-12)
 
 
+@pytest.mark.promise("mirror-file-8")
 def test_the_travel_is_counted_by_its_own_convention_whatever_the_model_counts():
     as_optical, as_mechanical = (
         stroke_budget(Geometry(angle, magnification=3.0), demand(), **PAPER) for angle in ("optical", "mechanical")

@@ -60,6 +60,7 @@ by_epsilon = pytest.mark.parametrize("epsilon", [-0.022e-3, 0.022e-3])
 # ------------------------------------------------------------------------------------------------ branches and slopes
 
 
+@pytest.mark.promise("hysteresis-3", "hysteresis-10")
 @by_exponent
 @by_asymmetry
 @by_epsilon
@@ -198,6 +199,22 @@ def test_a_polynomial_adds_to_the_steepest_slope_what_it_has_at_its_reach():
     assert twice.polynomial_rad == (4e-5, -2e-5, 6e-5) and twice.reach_v == 2.0
 
 
+@pytest.mark.promise("hysteretic-stiffness-2", "mirror-file-48", "mirror-file-49")
+def test_a_polynomial_is_added_to_the_plays_and_keeps_its_value_beyond_its_reach():
+    """Of either sign it hardens or softens; far beyond its reach it is what it was there."""
+    drive = np.array([0.5, 1.0, 2.0, 2.5, 40.0, -1.0, -2.0, -9.0])
+    plain = PLAYS.response(drive, 1e-3)
+    for c1, c2, c3 in ((2e-5, -1e-5, 3e-5), (-2e-5, 1e-5, -3e-5)):
+        bent = replace(PLAYS, polynomial_rad=(c1, c2, c3), reach_v=2.0)
+        s = np.clip(drive / 2.0, -1.0, 1.0)
+        added = bent.response(drive, 1e-3) - plain
+        assert_allclose(added, c1 * s**2 + c2 * np.abs(s) * s + c3 * s**3, rtol=0, atol=1e-17)
+        assert added[2] == pytest.approx(added[4]) and abs(added[4]) == pytest.approx(4e-5)
+    middle = replace(PLAYS, weights_rad_v=(0.0,) * 3, polynomial_rad=(0.0, -1e-5, 0.0), reach_v=2.0)
+    softer = middle.response(drive[:3], 1e-3) / drive[:3]
+    assert_allclose(softer / softer[0], [1.0, 2.0, 4.0], rtol=1e-12)  # in proportion to the amplitude
+
+
 def test_without_rate_limit_a_rate_dependent_model_has_no_steepest_slope():
     with pytest.raises(ValueError, match="depends on rate needs a finite rate limit"):
         hysteresis.steepest_slope(replace(PRINTED, rate_limit_v_s=inf))
@@ -205,6 +222,37 @@ def test_without_rate_limit_a_rate_dependent_model_has_no_steepest_slope():
 
 
 # ------------------------------------------------------------------------------------------------ records
+
+
+@pytest.mark.promise("hysteresis-8", "hysteresis-9")
+def test_the_growth_with_the_rate_means_nothing_beyond_the_rates_that_were_recorded():
+    """What the rate of a sine of 6 V multiplies epsilon by, at 100 Hz and at 1 kHz, and held at the limit."""
+    free = replace(PRINTED, rate_limit_v_s=inf)
+    swing = free.reversal_slope_rad_v() - free.d1_rad_v
+
+    def growth(model, freq_hz):
+        return (model.reversal_slope_rad_v(2 * pi * freq_hz * 6.0) - model.d1_rad_v) / swing
+
+    assert_allclose([growth(free, 100.0), growth(free, 1000.0)], [5.9, 5e7], rtol=0.02)
+    assert_allclose(growth(PRINTED, 1000.0), 5.9, rtol=0.02)
+
+
+@pytest.mark.promise("hysteresis-13")
+def test_of_epsilon_alpha_and_beta_a_slow_record_fixes_one_combination():
+    """epsilon / (alpha - beta), where h settles, by the errors of least squares in equal noise on three slow sines."""
+    drive = np.concatenate([np.sin(2 * pi * np.arange(1, 401) / 200) * amplitude for amplitude in (2.0, 4.0, 6.0)])
+    names = ("epsilon_rad_v", "alpha_1_v", "beta_1_v")
+
+    def h(**factors):
+        return respond(replace(PRINTED, **{n: f * getattr(PRINTED, n) for n, f in factors.items()}), drive, 1.0)[1]
+
+    slopes = np.column_stack([(h(**{name: 1.001}) - h(**{name: 0.999})) / 0.002 for name in names])
+    covariance = np.linalg.inv(slopes.T @ slopes)  # of relative errors, times the noise's variance
+    difference = PRINTED.alpha_1_v - PRINTED.beta_1_v
+    combined = np.array([1.0, -PRINTED.alpha_1_v / difference, PRINTED.beta_1_v / difference])
+    errors = np.sqrt(np.diag(covariance))
+    assert np.sqrt(combined @ covariance @ combined) < 0.2 * np.min(errors)
+    assert np.max(np.abs(np.triu(covariance / np.outer(errors, errors), 1))) > 0.9
 
 
 @by_exponent
@@ -257,6 +305,7 @@ def triangle(amplitude, samples, periods=3.25):
     return amplitude * (4 * np.abs((phase + 0.75) % 1 - 0.5) - 1)
 
 
+@pytest.mark.promise("hysteresis-15")
 def test_the_inverse_of_widening_plays_is_exact_at_a_constant_rate():
     """A triangle: exact on each flank once all plays move, where drive and reference over slow gain have one rate.
 

@@ -35,6 +35,8 @@ def test_a_model_by_itself_answers_as_a_mirror_of_it_alone(model):
     assert np.max(np.abs(alone - straight)) > 1e-3 * np.ptp(alone)
 
 
+@pytest.mark.promise("mirror-file-16", "mirror-file-19", "mirror-file-22", "hysteretic-stiffness-1")
+@pytest.mark.promise("mirror-file-59")
 def test_responses_are_those_of_the_slow_twins():
     rest = np.concatenate([[0.0], DRIVE])
     slow = bouc_wen_response(rest, STEP, oracles.BoucWen(*BOUC_WEN.row[:8]))[0][1:]
@@ -63,6 +65,7 @@ def test_a_lag_with_the_rate_is_left_by_the_inverse_in_part():
     assert 1e-6 < left < 1e-3
 
 
+@pytest.mark.promise("hysteresis-15")
 def test_a_widening_operator_is_nearly_inverted():
     model = replace(PLAYS, widening_s=1e-4)
     wanted = 200e-6 * np.sin(2 * np.pi * 20 * STEP * np.arange(1000))
@@ -71,6 +74,7 @@ def test_a_widening_operator_is_nearly_inverted():
     assert 0.0 < np.max(np.abs(reached - wanted)) < 0.2 * np.max(np.abs(frozen - wanted))
 
 
+@pytest.mark.promise("hysteresis-11", "hysteresis-12")
 def test_only_a_model_that_never_turns_is_admissible():
     assert BOUC_WEN.admissible
     assert not replace(BOUC_WEN, epsilon_rad_v=-40e-6).admissible
@@ -80,6 +84,8 @@ def test_only_a_model_that_never_turns_is_admissible():
     assert not replace(PLAYS, weights_rad_v=(40e-6, -50e-6, 30e-6)).admissible
 
 
+@pytest.mark.promise("choose-3")
+@pytest.mark.promise("hysteresis-17")
 def test_what_a_model_cannot_take_is_refused():
     with pytest.raises(ValueError, match=r"drive_v has shape \(2, 2\): give one row of finite samples"):
         BOUC_WEN.response(np.ones((2, 2)), STEP)
@@ -115,6 +121,7 @@ def test_a_loop_of_microradians_that_settles_slowly_is_run_until_it_is_symmetric
     assert_allclose([loop.output_rad.max(), loop.output_rad.min()], [peak, -peak], rtol=1e-4)
 
 
+@pytest.mark.promise("hysteretic-stiffness-1")
 @pytest.mark.parametrize("model", [BOUC_WEN, replace(PLAYS, widening_s=2e-3)])
 def test_a_loop_is_a_period_of_a_long_run_and_closes(model):
     loop = model.loop(6.0, 50.0, 400)

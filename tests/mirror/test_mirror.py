@@ -97,6 +97,9 @@ def by_hand(composition, model, drive):
     }[composition]()
 
 
+@pytest.mark.promise("mirror-file-11", "mirror-file-16", "mirror-file-19")
+@pytest.mark.promise("decisions-1")
+@pytest.mark.promise("hysteresis-1", "hysteresis-2", "hysteresis-19")
 @pytest.mark.parametrize(
     ("composition", "model"),
     [
@@ -135,6 +138,8 @@ def test_a_composition_is_its_block_diagram(composition, model):
     assert np.max(np.abs(expected)) > 10e-6
 
 
+@pytest.mark.promise("mirror-file-11", "mirror-file-22")
+@pytest.mark.promise("hysteresis-16")
 @pytest.mark.parametrize("composition", ["static", "cascade", "additive"])
 @pytest.mark.parametrize("model", [PRINTED, WIDENING], ids=["Bouc-Wen", "widening plays"])
 def test_creep_is_added_to_every_composition(composition, model):
@@ -187,6 +192,7 @@ def test_the_compositions_differ():
         assert np.max(np.abs(outputs[i] - outputs[j])) > 1e-6
 
 
+@pytest.mark.promise("mirror-file-11")
 @pytest.mark.parametrize("composition", ["cascade", "additive"])
 def test_a_composition_without_its_linear_part_is_refused(composition):
     with pytest.raises(ValueError, match=f'composition "{composition}" needs a linear part.*"static"'):
@@ -202,6 +208,8 @@ def test_a_mission_gives_its_composition_or_the_one_asked_for(table):
     assert mirror.from_mission(table, PRINTED, "static").A.size == 0
 
 
+@pytest.mark.promise("mirror-file-10", "mirror-file-14")
+@pytest.mark.promise("hysteresis-20")
 @pytest.mark.parametrize("freq_hz", [1.0, 2.0, 100.0])
 def test_the_linear_part_is_one_where_it_is_normalised(tmp_path, freq_hz):
     table = edited(tmp_path, ('normalise_at = "2 Hz"', f'normalise_at = "{freq_hz} Hz"')).mirror
@@ -302,6 +310,7 @@ def test_two_axes_track_in_one_loop_as_in_two():
     assert together.counts.alternating == sum(c.alternating for c in counts)
 
 
+@pytest.mark.promise("hysteresis-22")
 def test_a_loop_through_the_step_is_refused_with_a_step_that_is_accepted():
     m, coarse = stiffening(weight=3.0), 2e-3
     with pytest.raises(ValueError, match=r"'stiffening'.*no contraction at a step of 0\.002 s") as refusal:
@@ -312,6 +321,19 @@ def test_a_loop_through_the_step_is_refused_with_a_step_that_is_accepted():
     assert mirror.contraction(m, coarse) >= 1.0
     assert mirror.contraction(m, usable) < 0.51 <= 1.02 * mirror.contraction(m, 2 * usable)
     mirror.discretise(m, usable)
+
+
+@pytest.mark.promise("hysteresis-22")
+def test_the_contraction_is_the_largest_row_sum_of_f_e1_and_the_steepest_slopes():
+    m, step_s = stiffening(weight=3.0), 1e-4
+    # E1: the share of a ramp of z from 0 to 1 over the step that x has at its end
+    ramp = step_s * np.linspace(0.0, 1.0, 2001)
+    ends = [
+        lsim((m.A, m.E[:, [j]], np.eye(2), np.zeros((2, 1))), ramp / step_s, ramp, interp=True)[1][-1] for j in (0, 1)
+    ]
+    sums = np.abs(m.F @ np.array(ends).T) @ np.array([3.0, 1.5])
+    assert_allclose(mirror.contraction(m, step_s), np.max(sums), rtol=1e-6)
+    assert np.max(sums) > 0.01
 
 
 def test_a_mirror_driven_by_its_input_alone_has_no_loop_through_the_step():
@@ -328,6 +350,26 @@ def test_the_linear_loop_of_a_fed_back_bank_is_its_response_without_thresholds()
     assert share < 1e-4
     without = lsim((m.A, m.B, m.C, m.D), drive, 2e-6 * np.arange(4000), interp=True)[1]
     assert np.max(np.abs(without - expected)) / np.ptp(expected) > 0.1
+
+
+@pytest.mark.promise("choose-3")
+def test_hysteresis_in_the_path_of_the_input_leaves_the_resonance_where_it_is_and_in_the_stiffness_does_not():
+    """Fundamental of the answer to a sine, over that to a small one: behind plays it rises alike at all frequencies."""
+    small, large = 0.02, 4.0
+
+    def gain(m, amplitude, freq_hz):
+        step_s = 1.0 / (freq_hz * 200)
+        time = step_s * np.arange(20 * 200)
+        output, _ = run(m, amplitude * np.sin(2 * pi * freq_hz * time), step_s)
+        return abs(np.exp(-2j * pi * freq_hz * time[-2000:]) @ output[-2000:, 0]) / 1000 / amplitude
+
+    def rises(m):
+        return [gain(m, large, f) / gain(m, small, f) for f in (250.0, 500.0)]
+
+    below, above = rises(mirror.assemble("axis", "cascade", RESONANT[0], PLAYS))
+    assert below > 1.2 and abs(above / below - 1.0) < 0.01
+    below, above = rises(stiffening())
+    assert below < 0.8 and above > 1.2  # 400 Hz at rest: the resonance has risen, towards 473 Hz where all plays slide
 
 
 # ------------------------------------------------------------------------------------------------ models
@@ -354,6 +396,7 @@ def test_gain_only_is_a_straight_line(model):
     assert hysteresis.slow_gain(straight) == pytest.approx(slope, rel=1e-14)
 
 
+@pytest.mark.promise("mirror-file-7", "mirror-file-12")
 def test_hysteresis_model_takes_limit_and_bias_from_the_mission(table):
     assert mirror.hysteresis_model(table, 3770.0, 6.0) == PRINTED
     compared = mirror.hysteresis_model(table.comparison, 100.0, 1.0)
@@ -384,6 +427,8 @@ def numerical_slope(model, rate_v_s):
     return -(output[1] - output[0]) / travelled[1]
 
 
+@pytest.mark.promise("mirror-file-17")
+@pytest.mark.promise("hysteresis-10", "sampled-loop-14")
 @pytest.mark.parametrize("rate_v_s", [1e-3, 500.0, 3000.0, 9000.0])
 @pytest.mark.parametrize("model", [PRINTED, ADMISSIBLE, RISING], ids=["printed", "admissible", "rising"])
 def test_the_slope_after_a_reversal_is_the_numerical_one(model, rate_v_s):
@@ -393,6 +438,7 @@ def test_the_slope_after_a_reversal_is_the_numerical_one(model, rate_v_s):
     assert_allclose(formula, expected, rtol=1e-4, atol=1e-9)
 
 
+@pytest.mark.promise("hysteresis-10", "hysteresis-12")
 def test_the_branch_settles_where_the_record_says():
     for model, sign in ((PRINTED, -1), (ADMISSIBLE, -1), (RISING, 1)):
         ramp = np.linspace(0, LONG, 20_001)
@@ -402,6 +448,9 @@ def test_the_branch_settles_where_the_record_says():
     assert_allclose(ADMISSIBLE.settled_rad, 12.2e-6, rtol=0.005)
 
 
+@pytest.mark.promise("gallery-3", "readme-21")
+@pytest.mark.promise("hysteresis-12", "sampled-loop-14")
+@pytest.mark.promise("hysteresis-12", "pointing-96", "sampled-loop-14")
 def test_the_printed_mirror_first_moves_the_wrong_way():
     slope = PRINTED.reversal_slope_rad_v()
     assert_allclose(slope - PRINTED.d1_rad_v, -0.98e-3, rtol=0.02)
@@ -421,6 +470,8 @@ def test_how_far_a_mirror_moves_the_wrong_way_when_its_drive_term_outweighs_its_
     assert_allclose(model.wrong_way_rad, np.max(output) - output[0], rtol=1e-4)
 
 
+@pytest.mark.promise("readme-21")
+@pytest.mark.promise("hysteresis-11")
 @pytest.mark.parametrize("model", [ADMISSIBLE, RISING], ids=["admissible", "rising"])
 def test_an_admissible_mirror_never_moves_the_wrong_way(model):
     assert model.reversal_slope_rad_v() > 0.0
@@ -446,6 +497,7 @@ def test_admissible_rates_at_the_ends(model, rate_v_s):
     assert model.admissible_rate_v_s == rate_v_s
 
 
+@pytest.mark.promise("mirror-file-12")
 def test_the_growth_of_the_slope_is_held_at_the_rate_limit():
     beyond = ADMISSIBLE.reversal_slope_rad_v(1e6)
     assert beyond == ADMISSIBLE.reversal_slope_rad_v(3770.0)
@@ -466,6 +518,8 @@ ADMISSIBLE_TABLE = (
 )
 
 
+@pytest.mark.promise("readme-21")
+@pytest.mark.promise("hysteresis-12")
 def test_the_summary_warns_of_the_papers_mirror(table):
     summary = mirror_summary.summarise(table)
     reversal, pole, zero, gain = summary.warnings
@@ -510,6 +564,7 @@ def test_the_summary_of_a_static_mirror_has_no_linear_part(tmp_path):
     assert "gain at DC" not in str(summary)
 
 
+@pytest.mark.promise("mirror-file-17")
 @pytest.mark.parametrize("beta", [-2.0, 0.0, 2.0])
 @pytest.mark.parametrize("epsilon", [-0.02e-3, 0.02e-3])
 def test_the_settled_size_and_the_slope_behind_a_reversal_follow_both_signs(epsilon, beta):
@@ -520,6 +575,7 @@ def test_the_settled_size_and_the_slope_behind_a_reversal_follow_both_signs(epsi
     assert_allclose((output[-2] - output[-1]) / 1e-6, model.reversal_slope_rad_v(), rtol=1e-4)
 
 
+@pytest.mark.promise("mirror-file-19")
 def test_a_softer_mirror_for_small_drives():
     """Two plays, by hand: 0.1 of the drive, and 0.3 of what is beyond 2 V."""
     model = hysteresis.PrandtlIshlinskii((0.0, 2.0), (0.1e-3, 0.3e-3))

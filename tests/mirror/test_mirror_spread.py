@@ -81,6 +81,8 @@ def gains(mirrors):
 
 
 # ------------------------------------------------------------------------------------------------------- in the file
+@pytest.mark.promise("mirror-file-12", "mirror-file-24")
+@pytest.mark.promise("identify-25")
 def test_a_mirror_without_uncertainty_stays_valid_and_cannot_be_drawn(read):
     mirror = read(PLAYS)
     assert mirror.uncertainty is None
@@ -89,6 +91,9 @@ def test_a_mirror_without_uncertainty_stays_valid_and_cannot_be_drawn(read):
             ask()
 
 
+@pytest.mark.promise("mirror-file-24")
+@pytest.mark.promise("identify-25")
+@pytest.mark.promise("mirror-file-60")
 def test_the_uncertainty_is_read_with_its_lower_triangle(read):
     names = ["bouc_wen.epsilon", "linear.poles.2", "creep.weights"]
     given = read(BOUC_WEN + table(names, [0.1, 0.02, 1], [0.5, -0.25, 0.125])).uncertainty
@@ -103,6 +108,7 @@ TWO = ["bouc_wen.d1", "bouc_wen.alpha"]
 THREE = [*TWO, "bouc_wen.beta"]
 
 
+@pytest.mark.promise("mirror-file-24")
 @pytest.mark.parametrize(
     ("given", "words"),
     [
@@ -132,6 +138,7 @@ THREE = [*TWO, "bouc_wen.beta"]
         ("[uncertainty]\nstandard_errors = [0.1]", r"is missing.*parameters = \[.bouc_wen.d1.*linear.poles.1"),
     ],
 )
+@pytest.mark.promise("mirror-file-60")
 def test_refused(read, given, words):
     with pytest.raises(MissionError) as caught:
         read(BOUC_WEN + given)
@@ -183,6 +190,9 @@ def drawn_values(mirrors):
     )
 
 
+@pytest.mark.promise("mirror-file-24")
+@pytest.mark.promise("identify-25")
+@pytest.mark.promise("mirror-file-60")
 def test_the_draws_have_the_covariance_of_the_table(read):
     mirror = read(BOUC_WEN + table(NAMES, ERRORS, CORRELATION))
     count = 2000
@@ -265,6 +275,7 @@ def test_an_uncertainty_that_no_mirror_has_is_refused_with_its_reason(read, monk
     assert any(re.search(f'"m" leaves no mirror: none of 1 draws is one, 1 times {words}', each) for each in refusals)
 
 
+@pytest.mark.promise("identify-25")
 def test_the_spread_of_the_slow_gain_follows_from_the_table(read):
     weights = ["prandtl_ishlinskii.weights.1", "prandtl_ishlinskii.weights.3"]
     correlated = read(PLAYS + table(weights, [0.1, 0.2], [-0.8]))
@@ -312,6 +323,7 @@ def neighbours():
     return identify([record], models=("prandtl_ishlinskii",))
 
 
+@pytest.mark.promise("identify-25")
 def test_neighbouring_weights_are_drawn_apart_and_their_sum_is_not(read, neighbours):
     """The standard error of the sum from the least squares themselves, by NumPy."""
     fit = neighbours.fit()
@@ -334,6 +346,7 @@ def test_neighbouring_weights_are_drawn_apart_and_their_sum_is_not(read, neighbo
     assert abs(gains(drawn).mean() / total - 1.0) < 5 * of_sum / 20
 
 
+@pytest.mark.promise("hysteresis-13")
 def test_the_covariance_of_a_bouc_wen_fit_comes_through_the_file(read):
     """Where the sensor falls d1, epsilon and beta have their signs turned, and correlations between the two kinds."""
     drives = [truths.two_sines(3000, freq_hz=f) for f in (2.0, 6.0)]
@@ -392,6 +405,7 @@ def random_covariance(errors, seed=1):
     return of
 
 
+@pytest.mark.promise("identify-25")
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_every_part_of_a_joint_fit_comes_through_the_file(read, neighbours, sign):
     """The damping of real roots and what was not fitted are held; a weight of 0 counts with its neighbour."""
@@ -445,6 +459,7 @@ def test_shares_of_alpha_are_propagated_with_their_correlation(read, neighbours,
     assert "bouc_wen.exponent" not in mirror.uncertainty.parameters
 
 
+@pytest.mark.promise("identify-25")
 def test_a_share_at_its_bound_is_held_so_that_beta_goes_with_alpha(read, neighbours):
     fit = made_fit(
         "bouc_wen_joint", BoucWen(8e-5, 1e-5, -3e-5, 4e-3, 1.5, 0.999 * 1.5, 200.0), random_covariance(0.03, 2)
@@ -476,6 +491,7 @@ def opposed(errors, left):
     return of
 
 
+@pytest.mark.promise("identify-25")
 @pytest.mark.parametrize("left", [1e-2, 1e-3, 1e-4, 1e-5])
 def test_the_file_has_the_digits_that_a_well_known_sum_needs(read, neighbours, left):
     weights = (3e-5, 3e-5, 1e-5)
@@ -493,6 +509,7 @@ def test_the_file_has_the_digits_that_a_well_known_sum_needs(read, neighbours, l
     assert digits == 3 if left >= 1e-2 else digits > 3
 
 
+@pytest.mark.promise("identify-25")
 def test_what_the_recordings_leave_open_is_cut_off_and_the_known_sum_is_kept(read, neighbours):
     """Two weights known to three times their size, their sum to a thousandth; a third is lost, its error counts."""
     weights = np.array([3e-5, 3e-5, 1e-9, 1e-5])

@@ -36,6 +36,7 @@ def test_a_variant_is_stored_as_its_text(tmp_path):
         assert file.attrs["mirror"] == "no hysteresis" and list(file) == ["given"]
 
 
+@pytest.mark.promise("mirror-file-8", "mirror-file-12", "mirror-file-23")
 @pytest.mark.parametrize(("angle", "times"), [("line-of-sight", 1.0), ("optical", 1.0), ("mechanical", 2.0)])
 def test_the_line_of_sight_moves_by_twice_a_mechanical_angle(angle, times):
     parts = mirror.of(mission(angle))

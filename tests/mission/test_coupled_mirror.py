@@ -5,7 +5,8 @@ import re
 import pytest
 
 from microrad.mission.file import MissionError, load_coupled_mirror, load_mirror, load_mission
-from microrad.mission.tables.coupled_mirror import CoupledMirror, parameters
+from microrad.mission.tables.coupled_mirror import CoupledMirror, in_order, parameters
+from microrad.mission.tables.coupled_parts import ModesTable
 from microrad.mission.toml import scan
 from places import ROOT
 from waiting import no_hang
@@ -385,6 +386,23 @@ FAULTS = {
 }
 
 
+@pytest.mark.promise(
+    "mirror-file-1",
+    "mirror-file-5",
+    "mirror-file-33",
+    "mirror-file-39",
+    "mirror-file-40",
+    "mirror-file-41",
+    "mirror-file-42",
+    "mirror-file-43",
+    "mirror-file-44",
+    "mirror-file-45",
+    "mirror-file-46",
+    "mirror-file-47",
+    "mirror-file-48",
+    "mirror-file-49",
+    "mirror-file-51",
+)
 @pytest.mark.parametrize("name", FAULTS)
 def test_what_is_wrong_is_told_once_with_its_key_and_a_remedy(name):
     change, key, reason, expected = FAULTS[name]
@@ -400,6 +418,7 @@ def test_what_is_wrong_is_told_once_with_its_key_and_a_remedy(name):
     assert fault.line == (lines[there[0]] if there else 0)
 
 
+@pytest.mark.promise("mirror-file-5", "mirror-file-29")
 def test_faults_of_all_tables_are_told_together():
     text = edited(
         ("version = 2", "version = 2\ncreep = 1"),
@@ -418,6 +437,7 @@ def test_faults_of_all_tables_are_told_together():
     }
 
 
+@pytest.mark.promise("mirror-file-45")
 def test_what_stands_without_its_table_is_told_for_each_matrix():
     modes = TEXT[TEXT.index("[modes]") : TEXT.index("[matrices]")]
     keys = {fault.key: fault.reason for fault in refusal(edited((modes, "")))}
@@ -432,6 +452,7 @@ def test_what_stands_without_its_table_is_told_for_each_matrix():
     assert set(keys.values()) == {"stands without a table [hysteresis.1]"}
 
 
+@pytest.mark.promise("mirror-file-51")
 def test_rows_of_another_length_are_told_once():
     rows = ", ".join(["[0.5, 0.5]"] * 2 + ["[0.6, 0.8]"] + ["[1.0, 1.0]"])
     fault = only_fault(lambda: loaded(edited((CORRELATION, f"factor = [{rows}]\n"))))
@@ -440,6 +461,7 @@ def test_rows_of_another_length_are_told_once():
     assert fault.reason.endswith("; 3 of 4 rows have another length than 1")
 
 
+@pytest.mark.promise("mirror-file-42")
 def test_two_displacements_with_places_are_too_few():
     third = TEXT[TEXT.index("[outputs.3]") : TEXT.index("[recording]")]
     faults = refusal(edited((third, ""), (C, "C = [[0.0, 0.0, -3.0e-6, 0.0], [2.6e-6, 0.0, 1.5e-6, 0.0]]")))
@@ -449,12 +471,73 @@ def test_two_displacements_with_places_are_too_few():
     assert len(loaded(re.sub(r"position = .*\n", "", unplaced)).outputs) == 2
 
 
+@pytest.mark.promise("mirror-file-12", "mirror-file-40", "mirror-file-41", "mirror-file-42")
+@pytest.mark.parametrize("name", ["Two axes on a hysteretic spring", "tilt about x", "sensor at 0 degrees", "Tip-tilt"])
+def test_a_name_has_200_characters_at_most_and_one_at_least(name, tmp_path):
+    text, old = (ONE_AXIS, "Tip-tilt stage, axis x") if name == "Tip-tilt" else (TEXT, name)
+
+    def load(new):
+        assert text.count(f'name = "{old}"') == 1
+        path = tmp_path / "mirror.toml"
+        path.write_text(text.replace(f'name = "{old}"', f'name = "{new}"'), encoding="utf-8")
+        (load_mirror if text == ONE_AXIS else load_coupled_mirror)(path)
+
+    load("n" * 200)
+    assert only_fault(lambda: load("")).key.endswith("name")
+    assert only_fault(lambda: load("n" * 201)).key.endswith("name")
+
+
+@pytest.mark.promise("mirror-file-40")
+@pytest.mark.parametrize("key", ["actuators", "outputs"])
+def test_a_mirror_has_an_actuator_and_an_output_at_least(key):
+    first, last = TEXT.index(f"[{key}.1]"), TEXT.index({"actuators": "[outputs.1]", "outputs": "[recording]"}[key])
+    fault = only_fault(lambda: loaded(f"{TEXT[:first]}[{key}]\n{TEXT[last:]}"))
+    assert (fault.key, fault.reason) == (f"mirror.{key}", "is empty")
+
+
+@pytest.mark.promise("mirror-file-40")
+def test_a_hundred_modes_are_taken_and_one_more_is_not():
+    def of(count):
+        return {"decay": ["1 1/s"] * count, "frequency": ["0 rad/s"] * count}
+
+    assert ModesTable.model_validate(of(100)).states == 100
+    with pytest.raises(ValueError, match="is a list of 101 items"):
+        ModesTable.model_validate(of(101))
+
+
+@pytest.mark.promise("mirror-file-43")
+@pytest.mark.parametrize(("steps", "taken"), [(1, True), (1000, True), (0, False), (1001, False)])
+def test_steps_of_a_sample_are_one_to_a_thousand(steps, taken):
+    text = edited(("steps_per_sample = 4", f"steps_per_sample = {steps}"))
+    if taken:
+        assert loaded(text).recording.steps_per_sample == steps
+    else:
+        assert only_fault(lambda: loaded(text)).key == "mirror.recording.steps_per_sample"
+
+
+@pytest.mark.promise("mirror-file-52")
+def test_a_file_of_several_axes_may_have_four_times_the_bytes_of_a_mission(tmp_path):
+    path = tmp_path / "mirror.toml"
+
+    def filled(text, size):
+        path.write_text(text + "#" * (size - len(text)), encoding="utf-8")
+
+    filled(TEXT, 4_000_000)
+    assert load_coupled_mirror(path).states == 4
+    filled(TEXT, 4_000_001)
+    assert "larger than 4000 kB" in only_fault(lambda: load_coupled_mirror(path)).reason
+    filled(MISSION.read_text(encoding="utf-8"), 1_000_001)
+    assert "larger than 1000 kB" in only_fault(lambda: load_mission(path)).reason
+
+
+@pytest.mark.promise("mirror-file-42")
 def test_an_angle_has_no_place():
     faults = refusal(edited(('quantity = "displacement"', 'quantity = "angle"')))
     assert [fault.key for fault in faults] == ["mirror.outputs.1.position"]
     assert "an angle, which is alike everywhere" in faults[0].reason
 
 
+@pytest.mark.promise("mirror-file-48")
 def test_a_rate_that_nothing_feeds_back_is_taken():
     """The same element that is refused in the stiffness, driven by the drive alone."""
     element = f'{BOUC_WEN}delta = "1e-4 s/V"\nrate_limit = "1 kV/s"\n'
@@ -462,6 +545,7 @@ def test_a_rate_that_nothing_feeds_back_is_taken():
     assert loaded(edited((PLAYS, element), (F, rows))).hysteresis["2"].delta_s_v == 1e-4
 
 
+@pytest.mark.promise("mirror-file-39")
 def test_a_stiffness_at_the_edge_of_running_away():
     """The pair -18 +- 900i with E W F: stable while the weights sum to less than 1, as x2' = (1 - W) 900 x1 - 18 x2."""
     for last, stable in (("0.9395", True), ("0.941", False)):
@@ -472,6 +556,7 @@ def test_a_stiffness_at_the_edge_of_running_away():
             assert "run away" in refusal(text)[0].reason
 
 
+@pytest.mark.promise("mirror-file-50")
 def test_parameters_are_named_with_their_values():
     found = parameters(loaded(TEXT))
     assert found["modes.decay.2"] == 21.0
@@ -545,6 +630,7 @@ def is_the_refusal(fault, path):
     assert "fine_pointing.mirror_file" in fault.expected
 
 
+@pytest.mark.promise("mirror-file-31")
 def test_a_file_of_several_axes_is_no_mirror_of_a_study(several, tmp_path):
     is_the_refusal(only_fault(lambda: load_mirror(several)), several)
     is_the_refusal(only_fault(lambda: load_mission(MISSION, several)), several)
@@ -554,6 +640,7 @@ def test_a_file_of_several_axes_is_no_mirror_of_a_study(several, tmp_path):
     is_the_refusal(only_fault(lambda: load_mission(tmp_path / "mission.toml", text=named)), several)
 
 
+@pytest.mark.promise("mirror-file-31")
 @pytest.mark.parametrize("command", [("run",)])
 def test_commands_of_one_axis_say_what_they_cannot_do(folder, several, refused, command):
     """Exit code 2, the file with what it holds and what reads it; nothing is written."""
@@ -565,6 +652,7 @@ def test_commands_of_one_axis_say_what_they_cannot_do(folder, several, refused, 
     assert [path.name for path in folder.iterdir()] == [several.name]
 
 
+@pytest.mark.promise("mirror-file-31")
 def test_a_mirror_of_several_axes_inside_a_mission_is_refused():
     text = MISSION.read_text(encoding="utf-8").replace("[mirror]\n", "[mirror]\nversion = 2\n")
     fault = only_fault(lambda: load_mission(MISSION, text=text))
@@ -573,6 +661,7 @@ def test_a_mirror_of_several_axes_inside_a_mission_is_refused():
     assert fault.line == next(s.line for s in scan(text) if s.key == "mirror.version")
 
 
+@pytest.mark.promise("mirror-file-1", "mirror-file-2", "mirror-file-5")
 def test_keys_of_version_2_in_a_mirror_of_one_axis(tmp_path):
     def told(text):
         (tmp_path / "mirror.toml").write_text(text, encoding="utf-8")
@@ -595,6 +684,7 @@ def test_keys_of_version_2_in_a_mirror_of_one_axis(tmp_path):
         assert told(edited(("version = 2", f"version = {other}"))) == [("mirror.version", unknown)]
 
 
+@pytest.mark.promise("mirror-file-1")
 def test_a_mirror_of_one_axis_is_none_of_several():
     faults = refusal(ONE_AXIS)
     assert [fault.key for fault in faults] == ["mirror.version"]
@@ -606,3 +696,8 @@ def test_a_number_whose_products_are_none_is_refused():
     """It overflowed where the mirror's growth was computed."""
     (fault,) = refusal(edited(("[-900.0, 0.0]", "[-900.0, -1e308]")))
     assert fault.key == "mirror.matrices.E" and "is beyond 1e+100" in fault.reason
+
+
+def test_numbered_tables_are_in_the_order_of_their_numbers():
+    tables = {str(number): f"table {number}" for number in (1, 10, 11, 2, 3, 9)}
+    assert in_order(tables) == tuple(f"table {number}" for number in (1, 2, 3, 9, 10, 11))

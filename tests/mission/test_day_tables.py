@@ -6,7 +6,20 @@ import pickle
 import numpy as np
 import pytest
 
-from day_files import ALONE, BY_FILE, EPOCH, HELD, KEPLERIAN, KIRUNA, LIMITS, day_file, day_path, element_set, ephemeris
+from day_files import (
+    ALONE,
+    BY_FILE,
+    EPOCH,
+    HELD,
+    KEPLERIAN,
+    KIRUNA,
+    LIMITS,
+    day_data,
+    day_file,
+    day_path,
+    element_set,
+    ephemeris,
+)
 from microrad import orbit
 from microrad.mission.file import MissionError, load_link, load_mission
 from microrad.mission.tables.operations import Constellation, Downlink
@@ -61,6 +74,7 @@ REFUSED = [
     ("orbit.leo.longitude", "0 deg", 'does not belong to kind = "circular"', "this line removed"),
     ("orbit.leo.file", "a.tle", 'does not belong to kind = "circular"', "this line removed"),
     ("orbit.leo.object", "ISS", 'does not belong to kind = "circular"', "this line removed"),
+    ("orbit.leo.gravity", "two-body", 'is "two-body", in which no node follows the Sun', 'gravity = "j2"'),
     ("orbit.leo.inclination", "sunsynchronous", "does not begin with a plain number", 'or "sun-synchronous"'),
     ("orbit.leo.inclination", "190 deg", "is above", 'or "sun-synchronous"'),
     ("orbit.leo.inclination", None, 'is missing, and kind = "circular" needs it', 'inclination = "97.4 deg" would do'),
@@ -111,6 +125,7 @@ REFUSED = [
 ]
 
 
+@pytest.mark.promise("day-7", "day-8", "day-16")
 @pytest.mark.parametrize(("key", "value", "reason", "advice"), REFUSED)
 def test_a_key_is_refused_with_its_value_the_reason_and_what_to_do(tmp_path, key, value, reason, advice):
     path = day_path(tmp_path, {key: value})
@@ -239,6 +254,7 @@ def with_epoch(folder, text):
     return path
 
 
+@pytest.mark.promise("day-7")
 @pytest.mark.parametrize(
     ("text", "epoch"),
     [
@@ -310,6 +326,7 @@ def test_no_orbit_so_high_is_sun_synchronous(tmp_path):
 BY_ELEMENTS = {"orbit.leo": {"kind": "elements", "file": "a.tle"}, **ALONE}
 
 
+@pytest.mark.promise("day-12")
 @pytest.mark.parametrize(
     ("text", "words"),
     [
@@ -348,6 +365,7 @@ def test_an_epoch_outside_an_ephemeris_is_refused_with_both_spans(tmp_path, firs
     assert LOW.epoch.utc(first)[:16] in said
 
 
+@pytest.mark.promise("day-22")
 def test_an_ephemeris_that_just_covers_the_span_leaves_no_tail(tmp_path):
     for last, tail in ((86400.0, 0.0), (90000.0, 3600.0), (260000.0, 86400.0)):
         (tmp_path / "a.oem").write_text(ephemeris(LOW, np.arange(0.0, last + 1.0, 100.0)), encoding="utf-8")
@@ -355,6 +373,7 @@ def test_an_ephemeris_that_just_covers_the_span_leaves_no_tail(tmp_path):
         assert orbit.pair(file.mission.orbit, file.mission.terminals, tmp_path).tail_s == pytest.approx(tail, abs=1e-3)
 
 
+@pytest.mark.promise("day-8", "day-12", "day-22")
 def test_the_tail_of_elements_ends_with_their_life(tmp_path):
     for day, tail in ((79.5 - 13.5, 43200.0), (79.5, 86400.0)):
         (tmp_path / "a.tle").write_text(element_set(day=day - 0.0), encoding="utf-8")
@@ -380,6 +399,7 @@ def test_the_shipped_file_is_read_whole_and_edited(tmp_path):
     assert (fault.key, fault.value) == (f"{KIRUNA}.mask", '"95 deg"')
 
 
+@pytest.mark.promise("day-7", "day-8", "day-16", "day-43")
 def test_tables_become_orbits_with_their_numbers(tmp_path):
     own = day_file(tmp_path, {"orbit.leo": {**KEPLERIAN, LIMITS.rpartition(".")[2]: HELD}}, ALONE)
     pair = orbit.pair(own.mission.orbit, own.mission.terminals, tmp_path)
@@ -395,6 +415,85 @@ def test_tables_become_orbits_with_their_numbers(tmp_path):
     assert pair.geo.orbit.longitude_rad == pytest.approx(math.radians(143.0))
 
 
+@pytest.mark.promise("day-8")
+def test_a_circle_has_its_height_over_the_equator_its_node_and_its_phase(tmp_path):
+    angles = {"orbit.leo.inclination": "51.6 deg", "orbit.leo.node": "30 deg", "orbit.leo.phase": "40 deg"}
+    other = {"orbit.leo.local_time": None, "orbit.leo.gravity": "two-body"}
+    own = day_file(tmp_path, angles, other)
+    circle = orbit.pair(own.mission.orbit, own.mission.terminals, tmp_path).leo.orbit
+    assert (circle.semi_major_axis_m, circle.eccentricity, circle.j2) == (6_878_137.0, 0.0, False)
+    found = circle.inclination_rad, circle.node_rad, circle.argument_of_perigee_rad + circle.mean_anomaly_rad
+    assert np.degrees(found) == pytest.approx([51.6, 30.0, 40.0])
+
+
+@pytest.mark.promise("day-15")
+@pytest.mark.parametrize("end", ["leo", "geo"])
+@pytest.mark.parametrize("limited", [True, False])
+def test_without_limits_only_the_earth_stands_in_the_way(tmp_path, end, limited):
+    own = day_file(tmp_path, {} if limited else {f"orbit.{end}.limits": None})
+    found = orbit.pair(own.mission.orbit, own.mission.terminals, tmp_path)
+    assert (getattr(found, end).limits == orbit.UNLIMITED) is not limited
+
+
+@pytest.mark.promise("day-8")
+@pytest.mark.parametrize("wanted", ["EXAMPLE 2", "70002"])
+def test_a_satellite_of_a_file_goes_by_its_name_or_its_number(tmp_path, wanted):
+    second = element_set(name="EXAMPLE 2", number="70002", inclination=60.0)
+    (tmp_path / "a.tle").write_text(element_set() + second, encoding="utf-8")
+    own = day_file(tmp_path, BY_ELEMENTS, {"orbit.leo.object": wanted})
+    found = orbit.pair(own.mission.orbit, own.mission.terminals, tmp_path).leo.orbit.elements
+    assert (found.name, found.catalogue_number) == ("EXAMPLE 2", "70002")
+
+
+@pytest.mark.promise("day-7")
+@pytest.mark.parametrize("kind", ["circular", "keplerian", "geostationary", "elements", "ephemeris"])
+def test_either_end_is_of_any_kind(tmp_path, kind):
+    (tmp_path / "a.tle").write_text(element_set(), encoding="utf-8")
+    (tmp_path / "a.oem").write_text(ephemeris(LOW, np.arange(0.0, 90000.0, 100.0)), encoding="utf-8")
+    table = {
+        "circular": day_data()["orbit"]["leo"],
+        "keplerian": KEPLERIAN,
+        "geostationary": {"kind": "geostationary", "longitude": "9 deg"},
+        "elements": {"kind": "elements", "file": "a.tle"},
+        "ephemeris": {"kind": "ephemeris", "file": "a.oem"},
+    }[kind]
+    tables = day_file(tmp_path, {"orbit.leo": table, "orbit.geo": table}, ALONE).mission
+    pair = orbit.pair(tables.orbit, tables.terminals, tmp_path)
+    assert type(pair.leo.orbit) is type(pair.geo.orbit)
+    places = [end.orbit.states(np.array([600.0])).position_m for end in (pair.leo, pair.geo)]
+    np.testing.assert_array_equal(*places)
+    assert 6.5e6 < np.linalg.norm(places[0]) < 4.3e7
+
+
+@pytest.mark.promise("day-42")
+def test_no_key_is_there_for_what_a_day_leaves_out(tmp_path):
+    """Air, weather, thrust, the Moon, the body's own shadow, the budget of the radio link."""
+    m = day_file(tmp_path).mission
+    keys = " ".join([*flat(m.orbit.model_dump()), *flat(m.operations.model_dump())])
+    assert "orbit.leo" not in keys and "leo.altitude_m" in keys and "downlink.data_rate_bit_s" in keys
+    for left_out in (
+        "drag",
+        "thrust",
+        "station_keeping",
+        "refraction",
+        "weather",
+        "cloud",
+        "moon",
+        "shadow",
+        "antenna",
+    ):
+        assert left_out not in keys.lower()
+
+
+def flat(table, start=""):
+    """Dotted names of the values of a table."""
+    found = []
+    for name, value in table.items():
+        found += flat(value, f"{start}{name}.") if isinstance(value, dict) else [f"{start}{name}"]
+    return found
+
+
+@pytest.mark.promise("day-8")
 def test_sun_synchronous_is_the_inclination_whose_node_follows_the_sun(tmp_path):
     own = orbit.pair(day_file(tmp_path).mission.orbit, day_file(tmp_path).mission.terminals, tmp_path).leo.orbit
     assert math.degrees(own.inclination_rad) == pytest.approx(97.4, abs=0.05)

@@ -24,6 +24,7 @@ def leaves(data, prefix=""):
             yield name, value
 
 
+@pytest.mark.promise("readme-5")
 def test_every_key_says_what_it_means_and_holds_and_who_reads_it():
     assert len(KEYS) > 400
     assert {key.file for key in KEYS} == set(FILES)

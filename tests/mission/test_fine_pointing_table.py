@@ -74,6 +74,7 @@ def refuse(load):
 
 
 # ---- a good table
+@pytest.mark.promise("pointing-1")
 def test_the_shipped_table_is_read_in_si(load):
     table = load(TEXT)
     assert (table.rate_hz, table.delay_s, table.plant_step_s) == (5e3, 200e-6, 40e-6)
@@ -126,6 +127,7 @@ def test_only_wheels_strain_gauge_and_quad_cell_may_be_left_out(refuse, load):
     assert load(re.sub(r"\[fine_pointing\.strain_gauge\]\n.*\n.*\n", "", TEXT)).strain_gauge is None
 
 
+@pytest.mark.promise("pointing-8")
 def test_what_is_optional_has_no_other_default():
     optional = {name for name, field in FinePointing.model_fields.items() if not field.is_required()}
     assert optional == {"wheels", "misalignment", "strain_gauge", "mirror_file"}
@@ -137,6 +139,7 @@ def test_what_is_optional_has_no_other_default():
     }
 
 
+@pytest.mark.promise("pointing-9")
 @pytest.mark.parametrize(
     ("keys", "expected"),
     [
@@ -533,3 +536,9 @@ def test_the_schema_has_the_kinds_of_plain_values():
     assert not {"wheels", "strain_gauge"} & set(tables["FinePointing"]["required"])
     for name in ("FinePointing", "GeometryTable", "VibrationTable", "WheelsTable", "BodyTable", "ReferenceTable"):
         assert tables[name]["additionalProperties"] is False
+
+
+def test_the_highest_harmonic_of_a_wheel_is_judged_wherever_it_stands(refuse):
+    fault = refuse(edited(("wheels.harmonics", "[2000.0, 1.0]"), text=uncommented("fine_pointing.wheels")))
+    assert fault.key == "fine_pointing.wheels.speed"
+    assert "puts harmonic 2000 at " in fault.reason

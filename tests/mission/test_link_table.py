@@ -1,10 +1,11 @@
 """What a file about links may hold: each refusal with its limit, all of them at once, and what is taken."""
 
 import math
+import re
 
 import pytest
 
-from link_files import GAUSSIAN, PATTERN, RECEIVERS, SKY, data_with, link_file, received_with, written
+from link_files import GAUSSIAN, OPTIONAL, PATTERN, RECEIVERS, SKY, data_with, link_file, received_with, written
 from microrad.core.units import parse_quantity
 from microrad.link.beams import LitAperture
 from microrad.link.gains import gaussian_beam_gain_db
@@ -161,6 +162,7 @@ def test_a_background_is_bounded(tmp_path, key, value, said):
     assert said in text
 
 
+@pytest.mark.promise("link-20")
 @pytest.mark.parametrize(
     ("key", "value", "said"),
     [
@@ -183,6 +185,7 @@ def test_ten_degrees_and_the_zenith_are_taken(tmp_path):
 
 
 # ---- what belongs together
+@pytest.mark.promise("link-4")
 @pytest.mark.parametrize("link", ["communication", "beacon", "answer"])
 def test_the_quality_of_a_beam_is_said_once(tmp_path, link):
     found, text = the_fault(tmp_path, {f"{link}.strehl": None})
@@ -212,6 +215,7 @@ def test_a_strehl_ratio_is_above_zero_and_at_most_one(tmp_path, link, strehl):
     assert link_file(tmp_path, {"conventions.strehl": "decibel", f"{link}.strehl": strehl})
 
 
+@pytest.mark.promise("link-15")
 @pytest.mark.parametrize(("link", "aperture", "diameter"), [("beacon", "leo", 0.05), ("answer", "geo", 0.15)])
 @pytest.mark.parametrize(("convention", "factor"), [("full-1/e2", 2.0), ("half-1/e2", 1.0)])
 def test_no_beam_is_narrower_than_diffraction_leaves_it(tmp_path, link, aperture, diameter, convention, factor):
@@ -229,6 +233,8 @@ def test_no_beam_is_narrower_than_diffraction_leaves_it(tmp_path, link, aperture
         assert link_file(tmp_path, conventions, {f"{link}.divergence": enough})
 
 
+@pytest.mark.promise("link-15")
+@pytest.mark.promise("link-59")
 def test_widths_of_an_aperture_lit_evenly_are_no_divergences_of_a_gaussian_beam():
     """9.4 urad at 847 nm from 95 mm: the width at half maximum, and no full angle at 1/e2 by any reading."""
     diameter, wavelength = 95e-3, 847e-9
@@ -243,6 +249,7 @@ def test_widths_of_an_aperture_lit_evenly_are_no_divergences_of_a_gaussian_beam(
     assert gaussian_beam_gain_db(9.4e-6 / 2) - even.gain_db == pytest.approx(4.65, abs=0.01)
 
 
+@pytest.mark.promise("link-15")
 def test_a_width_that_is_a_half_angle_and_no_full_one(tmp_path):
     """9.4 urad at 847 nm from 95 mm, as docs/link.md has it."""
     terminal = {"terminals.geo_aperture": "95 mm", "answer.wavelength": "847 nm", "answer.divergence": "9.4 urad"}
@@ -254,6 +261,7 @@ def test_a_width_that_is_a_half_angle_and_no_full_one(tmp_path):
     )
 
 
+@pytest.mark.promise("link-15")
 def test_the_narrowest_gaussian_beam_has_the_gain_of_the_whole_aperture():
     half = narrowest_half_angle_rad(0.05, 1.55e-6)
     assert 8 / half**2 == pytest.approx((math.pi * 0.05 / 1.55e-6) ** 2, rel=1e-12)
@@ -261,6 +269,7 @@ def test_the_narrowest_gaussian_beam_has_the_gain_of_the_whole_aperture():
     assert half_angle_rad(780e-6, "half-1/e2") == 780e-6
 
 
+@pytest.mark.promise("link-4")
 def test_a_pattern_needs_a_beam_and_a_beam_a_pattern(tmp_path):
     found, text = the_fault(tmp_path, {"conventions.pointing_loss": "pattern"})
     assert found == "conventions.pointing_loss"
@@ -273,6 +282,7 @@ def test_a_pattern_needs_a_beam_and_a_beam_a_pattern(tmp_path):
     assert link_file(tmp_path, PATTERN).mission.communication.beam.radius_m == pytest.approx(0.02)
 
 
+@pytest.mark.promise("link-4")
 @pytest.mark.parametrize(
     ("beam", "expected"),
     [
@@ -303,6 +313,8 @@ def test_a_beam_that_its_obscuration_stops_is_refused(tmp_path):
     assert link_file(tmp_path, holed, {"communication.beam": {**GAUSSIAN, "radius": "9.895 mm"}})
 
 
+@pytest.mark.promise("choose-10")
+@pytest.mark.promise("link-4")
 def test_one_receiver_is_said(tmp_path):
     found, text = the_fault(tmp_path, {"communication.receiver_sensitivity": None})
     assert found == "communication.receiver_sensitivity"
@@ -318,11 +330,14 @@ def test_one_receiver_is_said(tmp_path):
 FITTING = {
     "ook": {"photon-counting", "pin", "apd", "preamplified"},
     "dpsk": {"preamplified"},
-    "bpsk": {"homodyne"},
+    "bpsk": {"homodyne", "heterodyne"},
+    "qpsk": {"homodyne", "heterodyne"},
     "ppm": {"photon-counting"},
 }
 
 
+@pytest.mark.promise("choose-11")
+@pytest.mark.promise("link-23")
 @pytest.mark.parametrize("modulation", FITTING)
 @pytest.mark.parametrize("name", RECEIVERS)
 def test_a_detector_that_does_not_receive_the_modulation_is_refused_with_those_that_do(tmp_path, name, modulation):
@@ -332,22 +347,25 @@ def test_a_detector_that_does_not_receive_the_modulation_is_refused_with_those_t
     found, text = the_fault(tmp_path, received_with(name, modulation=modulation))
     assert found == "communication.receiver.detector"
     assert text.startswith(f'does not receive modulation = "{modulation}": ')
-    assert {each for each in FITTING["ook"] | {"homodyne"} if f'detector = "{each}"' in text} == FITTING[modulation]
+    assert {each for each in FITTING["ook"] | FITTING["bpsk"] if f'detector = "{each}"' in text} == FITTING[modulation]
 
 
+@pytest.mark.promise("link-22")
 @pytest.mark.parametrize("name", RECEIVERS)
 def test_each_key_that_a_receiver_needs_is_missed(tmp_path, name):
     assert link_file(tmp_path, received_with(name)).mission.communication.receiver is not None
-    for key in RECEIVERS[name]:
+    for key in RECEIVERS[name].keys() - OPTIONAL:
         found, text = the_fault(tmp_path, received_with(name, **{key: None}))
         assert found == f"communication.receiver.{key}"
         assert text.startswith("is missing")
 
 
+@pytest.mark.promise("link-22")
 @pytest.mark.parametrize("name", RECEIVERS)
 def test_each_key_that_a_receiver_has_no_use_for_is_refused(tmp_path, name):
     every = {key: value for table in RECEIVERS.values() for key, value in table.items()}
-    surplus = {key: value for key, value in every.items() if key not in RECEIVERS[name]}
+    own = RECEIVERS[name].keys() | (OPTIONAL if RECEIVERS[name]["modulation"] in ("bpsk", "qpsk") else set())
+    surplus = {key: value for key, value in every.items() if key not in own}
     found = faults(tmp_path, received_with(name, **surplus))  # all of them at once
     assert set(found) == {f"communication.receiver.{key}" for key in surplus}
     table = RECEIVERS[name]
@@ -371,6 +389,7 @@ def test_every_problem_of_a_receiver_is_told_at_once(tmp_path):
     assert set(found) == {f"communication.receiver.{key}" for key in ("order", "efficiency", "noise_figure")}
 
 
+@pytest.mark.promise("link-3")
 def test_every_fault_of_a_file_is_told_at_once(tmp_path):
     found = faults(
         tmp_path,
@@ -421,6 +440,7 @@ def test_what_does_not_fit_between_tables_is_all_told_at_once(tmp_path):
 
 
 # ---- which file is read as what
+@pytest.mark.promise("link-1", "link-4")
 def test_links_load_without_a_mirror_and_without_beacon_and_answer(tmp_path):
     file = link_file(tmp_path)
     assert type(file.mission) is LinkMission
@@ -436,6 +456,7 @@ def test_a_link_is_nothing_without_these_tables(tmp_path, table):
     assert text.startswith("is missing: a table with the keys ")
 
 
+@pytest.mark.promise("link-4")
 def test_what_nothing_reads_may_be_left_out(tmp_path):
     gone = dict.fromkeys(("beacon", "answer", "acquisition", "pointing", "conventions.divergence"))
     assert link_file(tmp_path, gone).mission.pointing is None
@@ -494,6 +515,7 @@ def test_the_largest_data_rate_is_read_as_one_to_be_solved_for(tmp_path):
 
 
 # ---- for editors
+@pytest.mark.promise("link-4")
 @pytest.mark.parametrize("schema", [LinkMission.model_json_schema(by_alias=True), mission_schema()])
 def test_the_schema_describes_the_links_keys(schema):
     tables = schema["$defs"]
@@ -505,8 +527,17 @@ def test_the_schema_describes_the_links_keys(schema):
     assert {"leo_obscuration", "geo_obscuration", "leo_name"} <= tables["Terminals"]["properties"].keys()
     assert {"zenith_transmission", "elevation"} == tables["Channel"]["properties"].keys()
     receiver = tables["Receiver"]["properties"]
-    assert {key for table in RECEIVERS.values() for key in table} | {"background"} == receiver.keys()
-    assert receiver["detector"]["enum"] == ["photon-counting", "pin", "apd", "preamplified", "homodyne"]
+    others = {"background", "code", "inter_symbol_loss"}
+    assert {key for table in RECEIVERS.values() for key in table} | others == receiver.keys()
+    assert receiver["detector"]["enum"] == [
+        "photon-counting",
+        "pin",
+        "apd",
+        "preamplified",
+        "homodyne",
+        "heterodyne",
+    ]
+    assert not {"code", "code_gain", "code_rate", *OPTIONAL} & set(tables["Receiver"]["required"])
     assert receiver["bit_error_ratio"]["exclusiveMaximum"] == 0.5
     assert receiver["bit_error_ratio"]["minimum"] == 1e-18
     assert {"const": "largest"} in tables["Communication"]["properties"]["data_rate"]["anyOf"]
@@ -527,3 +558,18 @@ def test_a_fault_beside_a_missing_extinction_ratio_is_told(tmp_path):
     """The largest gain of a code was computed for marks that are like spaces."""
     found = faults(tmp_path, received_with("pin ook", extinction_ratio=None, background_power=[1]))
     assert "communication.receiver.background_power" in found
+
+
+# ---- phases
+@pytest.mark.promise("link-92")
+@pytest.mark.parametrize(("name", "limit"), [("heterodyne bpsk", 0.32112), ("heterodyne qpsk", 0.16523)])
+def test_a_phase_error_with_a_floor_above_the_ratio_is_refused_with_the_largest(tmp_path, name, limit):
+    # a normal deviate of 1e-6 beyond pi / 4 to one side, of 0.5e-6 beyond pi / 2 to each
+    found, text = the_fault(tmp_path, received_with(name, phase_error="0.4 rad"))
+    assert found == "communication.receiver.phase_error"
+    modulation = RECEIVERS[name]["modulation"]
+    assert text.startswith(f'leaves no power that reaches bit_error_ratio = 1e-06 with modulation = "{modulation}": ')
+    largest = re.search(r'at most "([^"]+)" rms', text).group(1)
+    assert parse_quantity(largest, "rad") == pytest.approx(limit, rel=2e-3)
+    assert link_file(tmp_path, received_with(name, phase_error=largest)).mission
+    assert the_fault(tmp_path, received_with(name, phase_error=f"{limit * 1.01:.4f} rad"))[0] == found

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import math
 import os
 import pickle
 import re
@@ -17,13 +18,17 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from microrad.core import lti
+from microrad.core.units import UnitError
 from microrad.mirror import model as mirror
+from microrad.mission.fields import Quantity
 from microrad.mission.file import MissionError, assumptions, load_coupled_mirror, load_mirror, load_mission
 from microrad.mission.model import Mission, Source, mission_schema, source_text
 from microrad.mission.tables.link import half_angle_rad
 from microrad.mission.tables.mirror import BoucWenTable
 from microrad.mission.toml import Document, scan
+from microrad.studio.draft.draft import Draft
 from places import ROOT
+from shipped import DEFAULT, SHIPPED
 from waiting import no_hang
 
 PAPER = ROOT / "missions" / "paper.toml"
@@ -110,6 +115,10 @@ def test_a_mission_file_keeps_its_origin():
     assert file.mirror_file is None
 
 
+@pytest.mark.promise("mirror-file-6")
+@pytest.mark.promise("readme-5")
+@pytest.mark.promise("index-2")
+@pytest.mark.promise("readme-23")
 def test_every_value_has_a_source_with_its_line():
     file = load_mission(PAPER)
     lines = TEXT.split("\n")
@@ -122,6 +131,15 @@ def test_every_value_has_a_source_with_its_line():
     assert file.sources["name"].text == f"mission file, line {line_of('name', TEXT)}"
 
 
+@pytest.mark.promise("mirror-file-6")
+@pytest.mark.promise("index-2")
+def test_the_mission_that_init_writes_says_where_each_value_comes_from():
+    sources = load_mission(ROOT / "missions" / "leo-geo.toml").sources
+    assert [key for key, source in sources.items() if not source.kind] == ["name", "mirror.name"]
+    assert {source.kind for source in sources.values()} == {"", "paper", "literature", "assumption"}
+    assert sources["communication.transmit_power"].value == '"5 W"'
+
+
 def test_assumptions_are_exactly_the_lines_marked_so():
     listed = assumptions(load_mission(PAPER).sources)
     assert len(listed) == sum("# assumption:" in line or "# derived:" in line for line in TEXT.split("\n"))
@@ -129,6 +147,7 @@ def test_assumptions_are_exactly_the_lines_marked_so():
     assert all(comment.startswith(("assumption:", "derived:")) for _, _, comment in listed)
 
 
+@pytest.mark.promise("mirror-file-6")
 def test_sources_name_each_comment_once_and_the_lack_of_one():
     sources = {"a": Source(1, "paper: Table 2"), "b": Source(2, "paper: Table 2"), "c": Source(3, "see: there")}
     assert source_text(sources, "a", "b") == "paper: Table 2"
@@ -137,6 +156,19 @@ def test_sources_name_each_comment_once_and_the_lack_of_one():
     assert Source(3, "paper").kind == ""
 
 
+@pytest.mark.promise("mirror-file-6")
+def test_the_first_word_of_a_comment_in_a_mirror_file_says_what_its_value_is(tmp_path):
+    path = tmp_path / "mirror.toml"
+    for word in ("paper", "assumption", "measured", "identified"):
+        line = f'travel = "2.4 mrad"  # {word}: on a bench'
+        path.write_text(re.sub("(?m)^travel = .*$", line, MIRROR_TEXT), encoding="utf-8")
+        source = load_mirror(path).sources["mirror.travel"]
+        assert (source.kind, source.comment) == (word, f"{word}: on a bench")
+        listed = [key for key, *_ in assumptions(load_mission(PAPER, path).sources)]
+        assert ("mirror.travel" in listed) == (word == "assumption")
+
+
+@pytest.mark.promise("decisions-1")
 def test_a_mission_is_frozen_and_can_be_copied_and_pickled():
     mission = load_mission(PAPER).mission
     with pytest.raises(pydantic.ValidationError):
@@ -198,6 +230,7 @@ def test_a_resolution_of_zero_is_an_ideal_converter(tmp_path):
 
 
 # ---- one value wrong
+@pytest.mark.promise("mirror-file-7", "mirror-file-12", "mirror-file-14", "mirror-file-17")
 @pytest.mark.parametrize(
     ("key", "value", "reason", "expected"),
     [
@@ -236,6 +269,12 @@ def test_a_resolution_of_zero_is_an_ideal_converter(tmp_path):
         ("mirror.linear.numerator", "[1, 2, 3, 4, 5, 6]", "no lower order than denominator", "fewer"),
         ("mirror.linear.numerator", '[1, "2"]', "item 2", "without quotes"),
         ("mirror.linear.denominator", "[0, 1, 2, 3, 4, 5]", "begins with 0", "highest power"),
+        (
+            "mirror.linear.denominator",
+            "[1, 2, 3, 4, 5, 0]",
+            "ends with 0, which makes the linear part an integrator",
+            "other than 0",
+        ),
         ("mirror.linear.denominator", "5", "not a list", "a list"),
         ("mirror.linear.normalise_at", '"10 kHz"', "outside excited_from to excited_to (1 Hz to 5 kHz)", "1 Hz to"),
         ("mirror.linear.excited_to", '"0.5 Hz"', "not above excited_from", "goes up"),
@@ -268,6 +307,7 @@ def test_a_whole_number_beyond_floats_is_no_gain(refuse):
     )  # fmt: skip
 
 
+@pytest.mark.promise("mirror-file-11", "mirror-file-12")
 def test_a_static_mirror_has_no_linear_part(refuse):
     text = edited("mirror.composition", '"static"')
     fault = the_fault(refuse(text))
@@ -284,6 +324,7 @@ def test_a_bias_outside_the_amplifier_names_both(refuse):
     assert fault.expected == "0 V to 10 V"
 
 
+@pytest.mark.promise("mirror-file-12", "mirror-file-17")
 @pytest.mark.parametrize(
     ("key", "value", "fault_key", "reason"),
     [
@@ -318,6 +359,7 @@ def test_what_a_mirror_was_identified_for_fits_together(refuse, key, value, faul
     assert reason in fault.reason
 
 
+@pytest.mark.promise("mirror-file-17", "mirror-file-18")
 def test_the_asymmetry_that_is_taken_is_the_one_that_keeps_h_bounded():
     """In both directions and on both sides of zero the decay of |h| is above 0, and nothing else is asked for."""
     rng, taken = np.random.default_rng(1), 0
@@ -333,6 +375,7 @@ def test_the_asymmetry_that_is_taken_is_the_one_that_keeps_h_bounded():
     assert 30 < taken < 270
 
 
+@pytest.mark.promise("mirror-file-12", "mirror-file-17")
 def test_what_generalises_a_model_may_be_left_out(tmp_path):
     plain = load_mission(PAPER).mission.mirror
     assert (plain.bouc_wen.gamma_1_v, plain.bouc_wen.eta_1_v, plain.bouc_wen.exponent) == (0.0, 0.0, 1.0)
@@ -353,6 +396,7 @@ weights = ["2 urad/V", "-1 urad/V"]
 """
 
 
+@pytest.mark.promise("mirror-file-22")
 @pytest.mark.parametrize(
     ("old", "new", "key", "reason", "expected"),
     [
@@ -362,6 +406,7 @@ weights = ["2 urad/V", "-1 urad/V"]
         ('"100 ms"', '"2 s"', "time_constants", "does not rise", "rising"),
     ],
 )
+@pytest.mark.promise("mirror-file-59")
 def test_creep_has_a_weight_for_each_lag(refuse, old, new, key, reason, expected):
     assert CREEP.count(old) == 1
     fault = the_fault(refuse(TEXT + CREEP.replace(old, new)))
@@ -395,6 +440,8 @@ def test_steps_within_the_tolerance_are_taken(tmp_path, step):
 
 
 # ---- keys and tables
+@pytest.mark.promise("mirror-file-5")
+@pytest.mark.promise("decisions-1")
 def test_an_unknown_key_is_shown_with_the_nearest_and_not_missed_as_well(refuse):
     text = edited("communication.wavelength", '"1.55 um"', renamed="wavelenght")
     fault = the_fault(refuse(text))
@@ -427,6 +474,24 @@ def test_a_missing_key_is_told_with_its_table_and_an_example(refuse):
     assert 'data_rate = "5 Mbit/s"' in fault.expected
 
 
+@pytest.mark.promise("decisions-1")
+def test_each_quantity_of_a_mission_refuses_another_kind_of_unit():
+    tried = set()
+    for path in (SHIPPED, DEFAULT):
+        for key, value in Draft.open(path).values.items():
+            rule = getattr(value.about, "rule", None)
+            if isinstance(rule, Quantity) and rule.unit:
+                number = rule.example.partition(" ")[0]
+                assert rule.read(rule.example) > -math.inf
+                with pytest.raises(UnitError):
+                    rule.read(f"{number} {'s' if rule.unit != 's' else 'V'}")
+                with pytest.raises(UnitError):
+                    rule.read(float(number))
+                tried.add(key)
+    assert len(tried) > 100
+
+
+@pytest.mark.promise("decisions-1")
 def test_no_quantity_of_a_mission_has_a_default(refuse):
     for key in load_mission(PAPER).sources:
         found = [fault.key for fault in refuse(edited(key, None)).faults]
@@ -472,6 +537,7 @@ def test_a_table_where_a_value_belongs(refuse):
 
 
 # ---- everything at once
+@pytest.mark.promise("decisions-1", "readme-5")
 def test_all_faults_are_reported_at_once_in_the_order_of_the_file(refuse):
     text = edited("pointing.lines.body_pointing.error", '"-1 urad"')
     text = edited("terminals.leo_aperture", "5 cm", text)  # no quotes: not TOML
@@ -712,6 +778,7 @@ weights = ["60 urad/V", "20 urad/V", "0 urad/V"]
 MIRROR_WITHOUT_MODEL = re.sub(r"\[bouc_wen\].*", "", MIRROR_TEXT, flags=re.DOTALL)
 
 
+@pytest.mark.promise("mirror-file-1", "mirror-file-2")
 def test_a_mirror_file_stands_for_the_mirror_table(tmp_path):
     (tmp_path / "lab").mkdir()
     (tmp_path / "lab" / "mirror.toml").write_text(MIRROR_TEXT, encoding="utf-8")
@@ -729,6 +796,7 @@ def test_a_mirror_file_stands_for_the_mirror_table(tmp_path):
     assert file.mirror_file.sources["mirror.travel"] == file.sources["mirror.travel"]
 
 
+@pytest.mark.promise("mirror-file-2")
 def test_a_mirror_from_the_command_line_replaces_the_missions(tmp_path):
     mirror = tmp_path / "play.toml"
     mirror.write_text(MIRROR_WITHOUT_MODEL.replace('"2.5 mrad"', '"2 mrad"  #') + PLAY, encoding="utf-8")
@@ -742,6 +810,7 @@ def test_a_mirror_from_the_command_line_replaces_the_missions(tmp_path):
     assert not any(key.startswith("mirror.bouc_wen") for key in file.sources)
 
 
+@pytest.mark.promise("mirror-file-20")
 def test_plays_widen_where_the_file_says_so(refuse, tmp_path):
     mirror = tmp_path / "play.toml"
     mirror.write_text(MIRROR_WITHOUT_MODEL + PLAY, encoding="utf-8")
@@ -754,6 +823,7 @@ def test_plays_widen_where_the_file_says_so(refuse, tmp_path):
     assert "below 0" in fault.reason
 
 
+@pytest.mark.promise("mirror-file-2")
 def test_faults_of_a_mirror_file_name_that_file_beside_those_of_the_mission(refuse, tmp_path):
     mirror = tmp_path / "mirror.toml"
     text = edited("bouc_wen.d1", "0.089", edited("travel", '"2.5 m"', MIRROR_TEXT))
@@ -768,6 +838,7 @@ def test_faults_of_a_mirror_file_name_that_file_beside_those_of_the_mission(refu
     assert f"{mirror}, line {line_of('travel', text)}: mirror.travel" in str(error)
 
 
+@pytest.mark.promise("mirror-file-2")
 @pytest.mark.parametrize(
     ("table", "reason"),
     [
@@ -795,6 +866,7 @@ def test_a_mirror_file_that_is_no_toml(refuse, tmp_path):
         load_mirror(mirror)
 
 
+@pytest.mark.promise("mirror-file-12", "mirror-file-20", "mirror-file-23")
 @pytest.mark.parametrize(
     ("body", "key", "reason"),
     [
@@ -816,6 +888,7 @@ def test_what_a_mirror_must_hold(tmp_path, body, key, reason):
     assert any(fault.key == key and reason in fault.reason for fault in refused.value.faults), str(refused.value)
 
 
+@pytest.mark.promise("mirror-file-11", "mirror-file-12")
 def test_a_cascade_needs_its_linear_part(tmp_path):
     path = tmp_path / "mirror.toml"
     text = re.sub(r"\[linear\].*?(?=\[bouc_wen\])", "", MIRROR_TEXT, flags=re.DOTALL)
@@ -950,6 +1023,7 @@ def with_roots(*changes):
     return TEXT[:start] + table + TEXT[end:]
 
 
+@pytest.mark.promise("mirror-file-13", "mirror-file-14")
 def test_a_linear_part_by_roots_is_the_one_by_coefficients(tmp_path):
     path = tmp_path / "roots.toml"
     path.write_text(with_roots(), encoding="utf-8")
@@ -963,6 +1037,7 @@ def test_a_linear_part_by_roots_is_the_one_by_coefficients(tmp_path):
     np.testing.assert_allclose(responses[0], responses[1], rtol=5e-3)
 
 
+@pytest.mark.promise("mirror-file-13", "mirror-file-14", "mirror-file-15")
 @pytest.mark.parametrize(
     ("changes", "key", "reason"),
     [

@@ -14,6 +14,7 @@ TEXT = SHIPPED.read_text("utf-8")
 TABLE_2 = "paper: Table 2"
 
 
+@pytest.mark.promise("mirror-file-6")
 @pytest.mark.parametrize(
     ("key", "comment", "value", "was"),
     [
@@ -57,6 +58,7 @@ def test_lists_and_switches_are_compared_by_what_they_mean():
     assert was("point_ahead.corrected", "false") == was("point_ahead.corrected", "1") == "true"
 
 
+@pytest.mark.promise("index-2")
 def test_everything_that_is_shipped_keeps_its_source():
     file = load_mission(SHIPPED)
     assert {key: s.was for key, s in file.sources.items() if s.was} == {}
@@ -65,6 +67,7 @@ def test_everything_that_is_shipped_keeps_its_source():
         assert {s.key for s in said if origins.written_for(s.key, s.comment, s.value)} == set()
 
 
+@pytest.mark.promise("mirror-file-6")
 def test_a_budget_says_what_was_changed_and_from_what(tmp_path):
     line = TEXT[: TEXT.index("leo_aperture")].count("\n") + 1
     path = tmp_path / "mission.toml"

@@ -11,8 +11,9 @@ from microrad.mission.fields import NOT_PUBLISHED, UNKNOWN, ProblemsError, Quant
 from microrad.mission.file import load_link, load_mission
 from microrad.mission.presets import PAPER, preset_text, presets
 from microrad.mission.toml import MissionError
+from places import ROOT
 from preset_files import EXAMPLES, NAMES, as_file, completed, statements
-from shipped import SHIPPED
+from shipped import DEFAULT, SHIPPED
 
 # values that let a file be read; they are no estimates of the terminals
 
@@ -30,6 +31,22 @@ def test_presets_stand_by_name_and_their_names_are_those_of_their_files():
     assert all(each.text == preset_text(each.name) for each in presets())
 
 
+@pytest.mark.promise("readme-7")
+def test_ten_of_them_are_of_the_literature():
+    assert len([name for name in NAMES if name not in ("crosslink", "sda-crosslink")]) == 10
+    assert "to be changed into one's own" in next(each.title for each in presets() if each.name == "crosslink")
+    assert "The presets hold ten links from the literature" in (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.promise("readme-4")
+def test_the_shipped_mission_has_what_the_paper_prints_and_a_source_for_all_else():
+    paper, own = (load_mission(path).sources for path in (SHIPPED, DEFAULT))
+    printed = {key: each.value for key, each in paper.items() if each.comment.startswith("paper")}
+    assert len(printed) > 40
+    assert {key: own[key].value for key in printed} == printed
+    assert [key for key, each in own.items() if not each.comment] == ["name", "mirror.name"]
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_a_preset_is_told_by_its_first_comment_line(name):
     preset = next(each for each in presets() if each.name == name)
@@ -37,6 +54,8 @@ def test_a_preset_is_told_by_its_first_comment_line(name):
     assert ":" in preset.title or " to " in preset.title
 
 
+@pytest.mark.promise("gallery-17", "readme-7")
+@pytest.mark.promise("link-3", "link-55")
 @pytest.mark.parametrize("name", NAMES)
 def test_every_unknown_key_and_nothing_else_is_a_fault(tmp_path, name):
     preset = next(each for each in presets() if each.name == name)
@@ -62,6 +81,8 @@ def test_known_and_unknown_values_are_all_values(name):
     assert len(set(preset.unknown)) == len(preset.unknown)
 
 
+@pytest.mark.promise("readme-7")
+@pytest.mark.promise("link-54", "link-55")
 @pytest.mark.parametrize("name", NAMES)
 def test_each_value_says_where_it_comes_from_and_no_unknown_one_claims_a_source(name):
     for each in statements(preset_text(name)):
@@ -86,6 +107,7 @@ def test_a_preset_with_its_unknown_values_given_is_a_link(tmp_path, name):
     assert [key for key, kind in kinds.items() if not kind] == (["name", "mirror.name"] if preset.whole else ["name"])
 
 
+@pytest.mark.promise("link-55")
 @pytest.mark.parametrize("name", NAMES)
 def test_one_value_left_unknown_is_still_refused(tmp_path, name):
     for key in EXAMPLES[name]:
@@ -94,13 +116,17 @@ def test_one_value_left_unknown_is_still_refused(tmp_path, name):
         assert [fault.key for fault in caught.value.faults] == [key]
 
 
+@pytest.mark.promise("link-54")
 def test_a_crosslink_begins_with_less_than_25_lines(tmp_path):
     """Whole, with its comments: it is the file that one changes into one's own link."""
     text = preset_text("crosslink")
-    assert len(text.splitlines()) < 25
+    assert len(text.splitlines()) == 24
     path = tmp_path / "crosslink.toml"
     path.write_text(text, encoding="utf-8")
-    terminals = load_link(path).mission.terminals
+    m = load_link(path).mission
+    assert {m.pointing, m.beacon, m.answer, m.acquisition, m.jitter, m.channel, m.point_ahead} == {None}
+    assert (m.conventions.strehl, m.conventions.divergence) == ("unused", "unused")
+    terminals = m.terminals
     assert (terminals.leo_name, terminals.geo_name) == ("A", "B")
 
 
@@ -112,6 +138,7 @@ def test_conventions_and_the_required_margin_are_no_facts(name):
     assert all(each.comment.startswith("assumption: ") for each in found)
 
 
+@pytest.mark.promise("link-57")
 def test_luce_has_its_power_and_the_on_axis_intensity_that_was_measured(tmp_path):
     text = preset_text("oicets-artemis")
     assert value_of("oicets-artemis", "communication.transmit_power") == "90 mW"
@@ -126,6 +153,7 @@ def test_luce_has_its_power_and_the_on_axis_intensity_that_was_measured(tmp_path
     assert budget.irradiance_w_m2 == pytest.approx(350e-9, rel=5e-3)
 
 
+@pytest.mark.promise("link-84")
 @pytest.mark.parametrize(
     ("name", "key", "value", "comment"),
     [
@@ -133,6 +161,13 @@ def test_luce_has_its_power_and_the_on_axis_intensity_that_was_measured(tmp_path
         ("sentinel1-edrs", "communication.distance", "45000 km", "longest range"),
         ("oicets-artemis", "communication.data_rate", "49.3724 Mbit/s", "usually rounded to 50 Mbit/s"),
         ("tbird", "jitter.rms", ["35 urad", "35 urad"], "20 to 35 urad rms per axis"),
+        ("dsoc", "communication.transmit_power", "4 W", "on average"),
+        ("dsoc", "communication.receiver.modulation", "ppm", "abstract"),
+        ("llcd", "terminals.geo_aperture", "80 cm", "four of 40 cm"),
+        ("llcd", "communication.receiver.modulation", "ppm", "Grein et al."),
+        ("qpsk-crosslink", "communication.receiver.modulation", "qpsk", "PM-QPSK"),
+        ("qpsk-crosslink", "communication.receiver.polarisations", 2, "PM-QPSK"),
+        ("sda-crosslink", "communication.receiver.bit_error_ratio", 1e-6, "OCT-039"),
         ("click", "communication.data_rate", "20 Mbit/s", "17.7 Mbit/s at 520 km"),
     ],
 )
@@ -143,7 +178,9 @@ def test_what_is_published_of_a_flown_link_stands_in_its_preset(name, key, value
     assert comment in line.comment
 
 
-@pytest.mark.parametrize(("name", "width_rad"), [("tbird", 380e-6), ("click", math.radians(14.6 / 3600))])
+@pytest.mark.parametrize(
+    ("name", "width_rad"), [("tbird", 380e-6), ("click", math.radians(14.6 / 3600)), ("sda-crosslink", 15e-6)]
+)
 def test_beams_published_at_half_of_their_maximum_have_half_of_it_there(tmp_path, name, width_rad):
     loss = [
         budgets.communication(file.mission, file.sources, pointing_error_rad=angle).margin_db
@@ -158,6 +195,8 @@ def test_the_beacon_of_click_is_converted_from_its_width_at_half_of_the_maximum(
     assert math.exp(-2 * (math.radians(0.75) / 2 / half_rad) ** 2) == pytest.approx(0.5, rel=1e-3)
 
 
+@pytest.mark.promise("readme-4")
+@pytest.mark.promise("link-54")
 def test_the_paper_is_a_whole_mission_whose_links_are_read_alone_too(tmp_path):
     assert [preset.name for preset in presets() if preset.whole] == [PAPER]
     link = load_link(as_file(tmp_path, PAPER, preset_text(PAPER)))
@@ -168,10 +207,16 @@ def test_the_paper_is_a_whole_mission_whose_links_are_read_alone_too(tmp_path):
 
 
 def test_each_terminal_of_a_flown_link_has_its_own_name(tmp_path):
-    names = [completed(tmp_path, name).mission.terminals for name in NAMES if name not in ("paper", "crosslink")]
+    names = [
+        completed(tmp_path, name).mission.terminals
+        for name in NAMES
+        if name not in ("paper", "crosslink", "qpsk-crosslink", "sda-crosslink")
+    ]
     assert [(each.called("leo"), each.called("geo")) for each in names] == [
         ("CLICK-B", "CLICK-C"),
+        ("DSOC", "Palomar"),
         ("CubeSat", "HICALI"),
+        ("LLCD", "LLGT"),
         ("OICETS", "ARTEMIS"),
         ("Sentinel-1A", "EDRS-A"),
         ("SPOT-4", "ARTEMIS"),

@@ -15,6 +15,7 @@ def listed(folder, *rows, head=HEADING, name="errors.csv"):
     return path
 
 
+@pytest.mark.promise("pointing-46")
 def test_each_row_is_a_source_as_a_mission_states_it(tmp_path):
     path = listed(tmp_path, *ROWS)
     found = read_sources(path)
@@ -40,6 +41,7 @@ def test_semicolons_and_tabs_separate_cells_too_and_blank_rows_and_columns_are_n
     assert [each.source.size_rad for each in read_sources(path)] == pytest.approx([2e-6, 3e-6], rel=1e-12, abs=0.0)
 
 
+@pytest.mark.promise("pointing-44")
 def test_a_workbook_is_read_like_a_text(tmp_path):
     openpyxl = pytest.importorskip("openpyxl", reason="the extra xlsx is not installed")
     book = openpyxl.Workbook()
@@ -51,6 +53,7 @@ def test_a_workbook_is_read_like_a_text(tmp_path):
     assert [each.source for each in found] == [each.source for each in read_sources(listed(tmp_path, *ROWS))]
 
 
+@pytest.mark.promise("pointing-46")
 def test_the_columns_are_the_keys_of_a_source():
     assert {*COLUMNS, "x", "y", "z", "origin"} == set(HEADING.split(","))
 
@@ -89,6 +92,7 @@ def test_what_is_no_source_is_refused_in_a_line(tmp_path, rows, head, said):
     assert str(refused.value).startswith(str(tmp_path))
 
 
+@pytest.mark.promise("pointing-44")
 def test_files_that_are_no_list_are_refused(tmp_path):
     with pytest.raises(SourceListError, match="cannot be read"):
         read_sources(tmp_path / "none.csv")

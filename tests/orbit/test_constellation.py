@@ -53,6 +53,7 @@ def turned(angle_rad):
     return math.remainder(angle_rad, 2.0 * math.pi)
 
 
+@pytest.mark.promise("day-31")
 @pytest.mark.parametrize(("pattern", "round_deg"), [("delta", 360.0), ("star", 180.0)])
 @pytest.mark.parametrize(("satellites", "planes", "phasing"), [(12, 3, 1), (15, 5, 3), (4, 1, 0), (6, 6, 5)])
 def test_walkers_pattern(tmp_path, pattern, round_deg, satellites, planes, phasing):
@@ -84,6 +85,7 @@ def test_the_phase_of_a_delta_goes_round_to_itself(tmp_path):
     assert angles == {(0.0, 0.0), (120.0, 60.0), (240.0, 30.0)}
 
 
+@pytest.mark.promise("day-31")
 def test_relays_stand_at_their_longitudes_with_the_limits_of_the_partner(tmp_path):
     pair, _, relays = made(tmp_path)
     assert [r.name for r in relays] == ["east", "west"]
@@ -108,6 +110,7 @@ def test_every_opportunity_is_a_contact_of_its_pair(tmp_path):
         np.testing.assert_allclose(np.array(mine), np.array([(c.start_s, c.end_s) for c in alone]), rtol=0, atol=1e-5)
 
 
+@pytest.mark.promise("day-33")
 def test_opportunities_of_a_plan_are_the_seconds_in_which_the_link_closes(tmp_path, plan):
     pair, own, relays = made(tmp_path, SIX_HOURS)
     rows, time_s = as_rows(plan.opportunities), np.arange(0.0, 21600.0) + 0.5
@@ -153,6 +156,8 @@ def test_no_satellite_has_no_opportunity(tmp_path):
 
 
 # ------------------------------------------------------------------------------------------------------------ sessions
+@pytest.mark.promise("readme-8")
+@pytest.mark.promise("day-32")
 @pytest.mark.parametrize("terminals", [1, 2])
 def test_a_terminal_serves_one_satellite_at_a_time_and_a_satellite_has_one(plan, two_terminals, terminals):
     p = plan if terminals == 1 else two_terminals
@@ -175,6 +180,7 @@ def test_a_terminal_serves_one_satellite_at_a_time_and_a_satellite_has_one(plan,
         assert s.locked_s[k] == s.start_s[k] + 60.0
 
 
+@pytest.mark.promise("gallery-22")
 def test_more_terminals_serve_more(plan, two_terminals):
     assert two_terminals.volume_bit > 1.1 * plan.volume_bit
     assert np.all((plan.use > 0.3) & (plan.use <= 1.0))
@@ -186,6 +192,7 @@ def test_more_terminals_serve_more(plan, two_terminals):
         assert p.use == pytest.approx(np.array(busy) / (p.terminals * 21600.0))
 
 
+@pytest.mark.promise("day-32", "day-33")
 def test_a_planned_session_has_the_rate_that_its_largest_range_leaves(tmp_path, plan):
     pair, own, relays = made(tmp_path, SIX_HOURS)
     by_name = {t.name: t for t in (*own, *relays)}
@@ -204,6 +211,7 @@ def test_a_planned_session_has_the_rate_that_its_largest_range_leaves(tmp_path, 
     assert pair.span_s == plan.span_s
 
 
+@pytest.mark.promise("day-33")
 def test_a_session_over_several_rates_has_the_one_that_closes_throughout(tmp_path):
     rates = {"operations.rates": ["200 Mbit/s", "300 Mbit/s", "350 Mbit/s"]}
     plan, _ = planned(tmp_path, SIX_HOURS, rates)
@@ -227,6 +235,7 @@ def with_elements(folder, text):
     return planned(folder, SIX_HOURS, FILED)[0]
 
 
+@pytest.mark.promise("day-31")
 def test_a_file_of_elements_is_a_constellation(tmp_path):
     text = "".join(element_set(name=f"EXAMPLE {k}", number=f"7000{k}", inclination=40.0 + 10 * k) for k in (1, 2, 3))
     plan = with_elements(tmp_path, text)
@@ -262,6 +271,7 @@ def test_a_file_of_elements_that_is_none_is_refused(tmp_path, text, words):
 
 
 # ------------------------------------------------------------------------------------------------------------ in words
+@pytest.mark.promise("day-34")
 def test_the_csv_has_every_session(plan):
     rows = list(csv.DictReader(io.StringIO(operations.csv_text(plan.planned, plan.epoch.utc))))
     assert len(rows) == len(plan.planned)
@@ -272,6 +282,7 @@ def test_the_csv_has_every_session(plan):
         assert row["end (UTC)"] == plan.epoch.utc(one.end_s)
 
 
+@pytest.mark.promise("day-35")
 def test_the_contact_plan_has_every_session_with_data_in_whole_seconds(plan):
     lines = plan.contact_plan().splitlines()
     contacts = [line.split() for line in lines if line.startswith("a contact")]

@@ -90,6 +90,7 @@ def summed(parts, offset):
     return lambda t: offset + sum(a * np.sin(w * t + p) for a, w, p in parts)
 
 
+@pytest.mark.promise("day-14")
 @settings(max_examples=150, deadline=None)
 @given(waves, st.floats(-2.0, 2.0))
 @example([(1.0, 0.15, 0.0)], -0.9999)
@@ -103,6 +104,7 @@ def test_positive_intervals_agree_with_a_dense_grid(parts, offset):
     np.testing.assert_array_equal(inside(found, dense)[clear], values[clear] > 0.0)
 
 
+@pytest.mark.promise("day-14")
 @settings(max_examples=150, deadline=None)
 @given(waves, st.floats(-2.0, 2.0))
 def test_every_end_is_a_change_of_sign_or_an_end_of_the_span(parts, offset):
@@ -112,7 +114,7 @@ def test_every_end_is_a_change_of_sign_or_an_end_of_the_span(parts, offset):
     assert (found.size > 0 and found[0, 0] == 0.0) or f(np.zeros(1))[0] < 1e-5
     steepest = sum(abs(a) * w for a, w, _ in parts)
     inner = found[(found > 0.0) & (found < 100.0)]
-    assert np.all(np.abs(f(inner)) <= steepest * events.TOLERANCE_S + 1e-15)
+    assert np.all(np.abs(f(inner)) <= steepest * 1e-6 + 1e-15)
 
 
 @pytest.mark.parametrize("centre", [40.0, 40.5, 40.37, 0.3, 99.7])
@@ -225,6 +227,8 @@ def test_the_complement_of_the_complement_is_the_set():
 
 
 # ---- the numbers checked by hand: a low orbit in the plane of the equator
+@pytest.mark.promise("readme-8")
+@pytest.mark.promise("day-41")
 @pytest.mark.parametrize(("grazing_m", "minutes"), [(0.0, 58.12), (100e3, 56.72)])
 def test_a_coplanar_contact_takes_as_long_by_search_as_by_hand(grazing_m, minutes):
     by_hand = coplanar_contact(EARTH_RADIUS_M + 500e3, grazing_m)
@@ -308,6 +312,8 @@ PARTNERS = {
 }
 
 
+@pytest.mark.promise("readme-8")
+@pytest.mark.promise("day-11", "day-13", "day-15", "day-41", "day-42")
 @pytest.mark.parametrize("partner", PARTNERS.values(), ids=PARTNERS.keys())
 @pytest.mark.parametrize("earth", [ROUND, FLAT], ids=["sphere", "oblate"])
 def test_contacts_agree_with_a_dense_grid(partner, earth):
@@ -320,6 +326,7 @@ def test_contacts_agree_with_a_dense_grid(partner, earth):
     np.testing.assert_array_equal(inside(found, dense)[sure], clear[sure])
 
 
+@pytest.mark.promise("day-41")
 @settings(max_examples=25, deadline=None)
 @given(any_angle, any_angle, st.floats(0.0, math.pi), st.booleans())
 def test_visibility_is_the_same_both_ways_to_the_last_bit(node, phase, inclination, oblate):
@@ -452,6 +459,8 @@ LIMITED = {
 }
 
 
+@pytest.mark.promise("readme-8", "day-43")
+@pytest.mark.promise("day-5", "day-16", "day-17", "day-41")
 @pytest.mark.parametrize("pair", LIMITED.values(), ids=LIMITED.keys())
 def test_limits_agree_with_a_dense_grid_and_name_the_cause(pair):
     """Up to half a thousandth of the rate: an orbit without drifts does not turn as gravity with J2 would turn it."""
@@ -484,6 +493,7 @@ def test_a_limit_broken_for_seconds_between_two_samples_is_found():
     np.testing.assert_allclose(sight(low, other, np.sort(edges)).rate_rad_s, 0.2, rtol=1e-5)
 
 
+@pytest.mark.promise("day-16")
 @pytest.mark.parametrize("held", ["nadir", "sun"])
 @pytest.mark.parametrize("orbit", [leo(), SLOT, PARTNERS["elongated"]], ids=["low", "slot", "elongated"])
 def test_the_rate_of_a_body_is_that_of_its_axes(held, orbit):
@@ -528,6 +538,7 @@ def test_gravity_turns_the_normal_of_an_orbit_and_with_it_the_body():
     np.testing.assert_allclose(np.cross(rate, now, axis=0), slope, rtol=0, atol=1e-4 * lift.max())
 
 
+@pytest.mark.promise("day-17")
 def test_the_sun_behind_the_earth_does_not_blind():
     """At an equinox the Sun, the Earth and a slot are in one line once a day."""
     blind = limited(SLOT, sun=60 * deg)
@@ -603,6 +614,7 @@ def height_over(surface, position_m):
     return np.hypot(across - EARTH_RADIUS_M * np.cos(angle), position_m[2] - polar * np.sin(angle)).min()
 
 
+@pytest.mark.promise("day-11")
 @pytest.mark.parametrize("surface", [ROUND, FLAT], ids=["sphere", "oblate"])
 def test_the_height_over_the_earth_is_the_distance_to_its_figure(surface):
     position_m = leo(phase_rad=0.0).states(np.linspace(0.0, 1420.0, 5)).position_m
@@ -734,6 +746,7 @@ def edges_of_skyfield(sky, high):
     return sky.seconds(times), values
 
 
+@pytest.mark.promise("day-41")
 @pytest.mark.parametrize("kind", ["slot", "elements"])
 def test_a_week_of_contacts_is_that_of_skyfield_within_a_second(sky, kind):
     from skyfield.api import wgs84
@@ -753,6 +766,7 @@ def test_a_week_of_contacts_is_that_of_skyfield_within_a_second(sky, kind):
     np.testing.assert_allclose(stops, times[values == 0], rtol=0, atol=one_second)
 
 
+@pytest.mark.promise("day-41")
 @pytest.mark.parametrize("place", [(78.2, 15.4, 450.0, 5.0), (-33.0, -70.7, 600.0, 10.0), (0.0, 0.0, 0.0, 60.0)])
 def test_a_week_of_passes_is_that_of_skyfield_within_a_second(sky, place):
     from skyfield.api import wgs84

@@ -166,6 +166,8 @@ def test_the_contacts_are_those_of_every_second(day, seconds):
     assert day.view.gap_s == pytest.approx(max(gaps), abs=2.0)
 
 
+@pytest.mark.promise("readme-8")
+@pytest.mark.promise("day-5")
 def test_what_a_contact_reaches_is_what_its_seconds_reach(day, seconds):
     speed = np.diff(seconds.far - seconds.own, axis=1)
     middle = ((seconds.far - seconds.own)[:, 1:] + (seconds.far - seconds.own)[:, :-1]) / 2.0
@@ -190,6 +192,8 @@ def test_the_range_between_samples_is_the_orbits(day, seconds):
         assert np.max(np.abs(range_m(seconds.time_s[chosen]) - seconds.range_m[chosen])) < 1.0
 
 
+@pytest.mark.promise("readme-8")
+@pytest.mark.promise("day-5", "day-19", "day-22", "day-23")
 def test_without_acquisition_volume_and_latency_are_those_of_packets(quick, seconds, links):
     found = quick(NO_SEARCH)
     o, way = found.operations, found.relay
@@ -212,6 +216,7 @@ def test_without_acquisition_volume_and_latency_are_those_of_packets(quick, seco
         assert got == pytest.approx(sent[order, 0][np.searchsorted(shares, wanted)], abs=3.0)
 
 
+@pytest.mark.promise("day-5")
 def test_a_contact_at_the_end_of_the_span_counts_up_to_it(quick, seconds, links):
     found = quick(NO_SEARCH, {"orbit.duration": "6.8 h"})  # in the long contact about half past seven
     cut, last = found.view.encounters[-1].contact, found.view.contacts[len(found.view.encounters) - 1]
@@ -225,6 +230,7 @@ def test_a_contact_at_the_end_of_the_span_counts_up_to_it(quick, seconds, links)
     assert found.view.contact_s == found.relay.contact_s == pytest.approx(np.sum(seconds.seen[until]), abs=10.0)
 
 
+@pytest.mark.promise("day-19", "day-23")
 def test_delays_add_to_every_latency(quick):
     delayed = {"operations.relay_delay": "101 s", "operations.downlink.delay": "51 s"}
     short, long = quick(SIX_HOURS, NO_SEARCH), quick(SIX_HOURS, NO_SEARCH, delayed)
@@ -233,6 +239,8 @@ def test_delays_add_to_every_latency(quick):
     assert long.direct.slow_s - short.direct.slow_s == pytest.approx(50.0)
 
 
+@pytest.mark.promise("readme-8")
+@pytest.mark.promise("day-5", "day-19", "day-20")
 def test_the_time_to_lock_is_drawn_from_the_acquisitions(day, links, seconds):
     rate = seconds.rate_bit_s(links, [300e6], 3.0)
     o, simulated = day.operations, links.finding.wide.simulated
@@ -251,6 +259,7 @@ def test_the_time_to_lock_is_drawn_from_the_acquisitions(day, links, seconds):
     assert day.relay.capacity_spread_bit[0] <= day.relay.capacity_bit <= day.relay.capacity_spread_bit[1]
 
 
+@pytest.mark.promise("day-20")
 def test_acquisitions_that_fail_are_counted_and_carry_nothing(quick, tmp_path):
     hard = {"acquisition.lock_probability": 0.5, "acquisition.attempts": 1, "operations.runs": 200}
     found, easy = quick(SIX_HOURS, hard), quick(SIX_HOURS, NO_SEARCH)
@@ -262,6 +271,7 @@ def test_acquisitions_that_fail_are_counted_and_carry_nothing(quick, tmp_path):
     assert found.relay.capacity_spread_bit[0] < 0.6 * found.relay.capacity_spread_bit[1]
 
 
+@pytest.mark.promise("day-19", "day-21")
 def test_rates_stepped_with_range(quick, seconds, links):
     found = quick(NO_SEARCH, RATES)
     rates = found.operations.rates_bit_s
@@ -275,6 +285,8 @@ def test_rates_stepped_with_range(quick, seconds, links):
         assert c.largest_range_m == pytest.approx(42_000e3 * 10.0 ** ((margin - 3.0) / 20.0), rel=1e-9)
 
 
+@pytest.mark.promise("readme-8")
+@pytest.mark.promise("day-21")
 def test_a_loss_and_an_outage_of_the_simulated_loop_take_their_share(quick, links):
     plain = quick(SIX_HOURS, NO_SEARCH)
     stated = given_loss(links)
@@ -287,6 +299,7 @@ def test_a_loss_and_an_outage_of_the_simulated_loop_take_their_share(quick, link
     assert deaf.closings[0].largest_range_m == pytest.approx(plain.closings[0].largest_range_m * 10.0**-0.15)
 
 
+@pytest.mark.promise("day-19")
 def test_the_relays_share_is_granted_from_the_beginning(quick, seconds, links):
     found = quick(NO_SEARCH, {"operations.relay_share": 0.4})
     rate = seconds.rate_bit_s(links, [300e6], 3.0)
@@ -311,6 +324,7 @@ def test_a_contact_that_goes_on_behind_the_span_is_granted_a_share_of_what_it_ha
     assert cut.duration_s == pytest.approx(0.5 * (end_s - second.start_s))
 
 
+@pytest.mark.promise("day-19", "day-23")
 def test_a_full_store_loses_the_newest(quick, seconds, links):
     found = quick(NO_SEARCH, {"operations.store": "0.6 GB"})
     o, rate = found.operations, seconds.rate_bit_s(links, [300e6], 3.0)
@@ -348,6 +362,8 @@ def stations_by_second(day, setup_s):
     return rate, log
 
 
+@pytest.mark.promise("readme-8")
+@pytest.mark.promise("day-24")
 @pytest.mark.parametrize("stations", [{}, {"operations.downlink.stations.tromso": TROMSO}])
 def test_the_direct_downlink_has_one_station_at_a_time(quick, seconds, stations):
     found = quick(NO_SEARCH, stations)
@@ -368,6 +384,7 @@ def test_the_direct_downlink_has_one_station_at_a_time(quick, seconds, stations)
     same_latencies(way, sent, left, 120.0)
 
 
+@pytest.mark.promise("day-24")
 def test_a_pass_shorter_than_the_setup_carries_nothing(quick):
     found = quick(NO_SEARCH, {"operations.downlink.setup": "600 s", "orbit.duration": "12 h"})
     assert found.direct.contacts
@@ -417,6 +434,7 @@ def test_two_satellites_in_one_slot_are_refused(quick):
         quick(SIX_HOURS, {"orbit.leo": {"kind": "geostationary", "longitude": "143 deg"}, "orbit.geo.limits": None})
 
 
+@pytest.mark.promise("day-19")
 def test_the_seed_makes_the_day(quick):
     hard = {"acquisition.lock_probability": 0.6, "operations.runs": 5}
     one, same, other = (quick(SIX_HOURS, hard, {"operations.seed": seed}) for seed in (3, 3, 4))
@@ -426,6 +444,7 @@ def test_the_seed_makes_the_day(quick):
     np.testing.assert_array_equal(one.direct.carried_bit, other.direct.carried_bit)
 
 
+@pytest.mark.promise("day-8")
 def test_an_ephemeris_of_the_same_orbit_has_the_same_contacts(quick, day, tmp_path):
     own = day.view.pair.leo.orbit
     (tmp_path / "a.oem").write_text(ephemeris(own, np.arange(0.0, 172801.0, 60.0)), encoding="utf-8")
@@ -443,6 +462,7 @@ def test_an_ephemeris_of_the_same_orbit_has_the_same_contacts(quick, day, tmp_pa
 
 
 # -------------------------------------------------------------------------------------------- constants of the mission
+@pytest.mark.promise("day-5")
 def test_constants_that_the_contacts_exceed_are_said(quick):
     beyond = {
         "communication.distance": "40000 km",
@@ -461,6 +481,23 @@ def test_constants_that_the_contacts_exceed_are_said(quick):
     assert "velocity across the line of sight of 10.6" in said[2]
     enough = {"communication.distance": "44100 km", "point_ahead.transverse_velocity": "10.7 km/s"}
     assert quick({"orbit.duration": "8 h"}, enough).warnings == ()
+
+
+@pytest.mark.promise("day-5")
+@pytest.mark.parametrize(("given_rad_s", "said"), [(200e-6, True), (253.5e-6, False)])
+def test_a_rate_of_the_line_of_sight_beyond_that_of_the_loop_is_said(day, given_rad_s, said):
+    """The contacts reach 255 urad/s: 253.5 is within a hundredth of that."""
+    reference = SimpleNamespace(line_of_sight_rate_rad_s=given_rad_s)
+    beam = SimpleNamespace(distance_m=44_100e3)
+    m = SimpleNamespace(
+        communication=beam,
+        beacon=None,
+        answer=None,
+        point_ahead=None,
+        fine_pointing=SimpleNamespace(reference=reference),
+    )
+    warnings = geometry.beyond_the_mission(m, day.view)
+    assert [text.partition(" is ")[0] for text in warnings] == ["fine_pointing.reference.line_of_sight_rate"] * said
 
 
 # --------------------------------------------------------------------------------------------------------- assumptions
@@ -498,6 +535,8 @@ def tables_of(case):
     }
 
 
+@pytest.mark.promise("readme-8")
+@pytest.mark.promise("day-5")
 def test_each_side_changes_just_its_own_key(links, day, monkeypatch):
     cases = {}
 
@@ -528,6 +567,16 @@ def test_each_side_changes_just_its_own_key(links, day, monkeypatch):
             if s.name == "attitude of the satellite":  # slew, Sun and eclipse stay
                 assert {k.rpartition(".")[2] for k in differs} == {"attitude", "boresight", "field_of_regard_rad"}
 
+    sides = {s.name: [cases[mark.relay_bit] for mark in (s.at_low, s.at_high)] for s in found}
+    assert [c.loss.loss_db for c in sides["pointing loss"]] == [0.0, day.loss.loss_db + 3.0]
+    assert [c.slower for c in sides["time of acquisition"]] == [0.5, 2.0]
+    for name, of in (
+        ("laser data rate", lambda case: case.data.table.data_rate_bit_s),
+        ("instrument data rate", lambda case: case.operations.instrument_rate_bit_s),
+        ("radio data rate", lambda case: case.operations.downlink.data_rate_bit_s),
+    ):
+        assert [of(case) / of(own) for case in sides[name]] == [0.5, 2.0], name
+
 
 SIDES = {
     ("laser data rate", 0): {"communication.data_rate": "150 Mbit/s"},
@@ -554,6 +603,7 @@ SIDES = {
 }
 
 
+@pytest.mark.promise("day-5")
 def test_each_side_is_the_day_of_a_mission_edited_so(quick, tmp_path, monkeypatch):
     with monkeypatch.context() as whole:
         whole.setattr(day_study, "swings", assumptions.swings)
@@ -670,6 +720,7 @@ def test_the_track_is_open_where_the_contacts_are(day, seconds):
     assert (kiruna.latitude_rad, kiruna.longitude_rad) == (station.latitude_rad, station.longitude_rad)
 
 
+@pytest.mark.promise("report-7")
 def test_nothing_about_a_day_is_asked_of_a_mission_without_its_tables(tmp_path):
     links = link_study.run_link_study(day_file(tmp_path, ALONE, {"operations": None}))
     with pytest.raises(ValueError, match=r"no table \[operations\]: microrad init writes one"):
@@ -689,6 +740,7 @@ def test_an_uncorrected_point_ahead_is_in_the_loss_and_so_in_the_reach(tmp_path)
     assert again.loss_db == loss.loss_db
 
 
+@pytest.mark.promise("day-5")
 def test_orbits_that_end_with_the_span_are_said_to(quick, tmp_path):
     assert not any("behind the span" in w for w in quick(SIX_HOURS).warnings)
     found = quick({"orbit.epoch": "2050-12-31T12:00:00Z", "orbit.duration": "6 h"})
@@ -696,6 +748,7 @@ def test_orbits_that_end_with_the_span_are_said_to(quick, tmp_path):
     assert any(w.startswith("the orbits hold for 0 s behind the span") for w in found.warnings)
 
 
+@pytest.mark.promise("day-16")
 def test_a_contact_cut_by_the_sun_counts_as_one_rise(quick):
     found = quick({})
     assert (len(found.view.encounters), found.view.rises) == (15, 14)

@@ -2,6 +2,7 @@
 
 import math
 import re
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -23,7 +24,7 @@ from places import ROOT
 from scenes import scene_of
 
 PAGE = (ROOT / "docs" / "day.md").read_text(encoding="utf-8")
-SAID = " ".join(re.sub(r"\n- ", " ", PAGE).split())
+SAID = " ".join(re.sub(r"\n- | *<!-- promise: day-\d+ -->", " ", PAGE).split())
 TABLES = re.findall(r"```toml\n(.*?)```", PAGE, flags=re.DOTALL)
 ORBITS = TABLES[0].split("\n\n")
 LIMITS, OPERATIONS = TABLES[1:]
@@ -51,6 +52,14 @@ def told(*sentences):
     """These words stand on the page, wherever its lines break."""
     for sentence in sentences:
         assert sentence in SAID, sentence
+
+
+@pytest.mark.promise("readme-34")
+def test_each_table_of_orbits_and_of_the_day_stands_on_the_page():
+    headings = re.findall(r"(?m)^\[((?:orbit|operations|constellation)[\w.]*)\]", TEXT)
+    tables = {re.sub(r"(stations|relays)\.\w+", r"\1.NAME", each) for each in headings}
+    assert len(tables) == 11
+    assert [each for each in sorted(tables - {"orbit"}) if f"[{each}]" not in PAGE] == []
 
 
 def shipped(table):
@@ -115,6 +124,7 @@ def ends(seen):
 
 
 # -------------------------------------------------------------------------------------------------------- examples
+@pytest.mark.promise("day-6", "day-38", "day-39", "day-40")
 def test_every_example_prints_what_stands_below_it(monkeypatch, capsys):
     monkeypatch.chdir(ROOT)
     examples = re.findall(r"```python\n(.*?)```\n\n```text\n(.*?)```", PAGE, flags=re.DOTALL)
@@ -125,6 +135,8 @@ def test_every_example_prints_what_stands_below_it(monkeypatch, capsys):
         assert capsys.readouterr().out == printed
 
 
+@pytest.mark.promise("readme-8")
+@pytest.mark.promise("day-7", "day-8")
 @pytest.mark.parametrize("table", ORBITS, ids=[re.search('kind = "([a-z]+)"', table)[1] for table in ORBITS])
 def test_each_kind_of_orbit_comes_to_what_stands_below_it(view, table):
     seen = view(table)
@@ -132,6 +144,7 @@ def test_each_kind_of_orbit_comes_to_what_stands_below_it(view, table):
     assert said == [f"{len(seen.encounters)} contacts, {seen.contact_s / 60.0:.2f} min"]
 
 
+@pytest.mark.promise("day-3")
 def test_the_commands_of_the_page_run(call, tmp_path):
     commands = [line.split() for line in re.findall(r"(?m)^    microrad (.*?)(?: +#.*| > .*)?$", PAGE)]
     assert len(commands) == 4
@@ -142,6 +155,7 @@ def test_the_commands_of_the_page_run(call, tmp_path):
 
 
 # --------------------------------------------------------------------------------------------------------- the words
+@pytest.mark.promise("day-10", "day-11", "day-13")
 def test_what_moves_the_ends_of_contacts(view, day):
     own = day.view
     inclination = f'inclination = "{math.degrees(analytic.sun_synchronous_inclination_rad(500e3))!r} deg"'
@@ -158,6 +172,7 @@ def test_what_moves_the_ends_of_contacts(view, day):
     told(f"{furthest / 1e3:.0f}".replace("44036", "44 036") + f" km take {light_s:.3f} s")
 
 
+@pytest.mark.promise("day-12")
 @pytest.mark.parametrize(
     ("table", "change", "reason"),
     [
@@ -180,6 +195,7 @@ def test_what_the_page_says_is_refused_is_refused(replaced, folder, table, chang
     assert reason in str(refused.value)
 
 
+@pytest.mark.promise("day-12")
 def test_an_ephemeris_is_used_within_its_span(replaced, folder):
     told("Elements are used up to 14 days from their epoch, an ephemeris within its usable span.")
     m = replaced(ORBITS[3], shipped("orbit").replace('"24 h"', '"72 h"')).mission
@@ -187,6 +203,7 @@ def test_an_ephemeris_is_used_within_its_span(replaced, folder):
         orbit.pair(m.orbit, m.terminals, folder)
 
 
+@pytest.mark.promise("day-18", "day-43")
 def test_limits_and_the_sun(view, day):
     found = [e.contact for e in day.view.encounters]
     (cut,) = [k for k, c in enumerate(found) if c.ends == "Sun near the line of sight of LEO"]
@@ -199,6 +216,8 @@ def test_limits_and_the_sun(view, day):
     assert "field of regard of LEO" in causes and "Earth" not in causes
 
 
+@pytest.mark.promise("gallery-20")
+@pytest.mark.promise("day-19", "day-20", "day-25")
 def test_rates_share_and_store(replaced, links, day):
     def of(*change):
         m = replaced(OPERATIONS.replace(*change) if change else OPERATIONS).mission
@@ -230,6 +249,22 @@ def test_rates_share_and_store(replaced, links, day):
     assert kept.latency.delivered_bit + kept.latency.missing_bit == pytest.approx(kept.generated_bit - kept.lost_bit)
 
 
+@pytest.mark.promise("day-19")
+@pytest.mark.parametrize("way", ["wide beacon", "scan"])
+def test_the_acquisition_of_the_operations_is_the_one_that_is_drawn(replaced, links, day, way):
+    m = replaced(OPERATIONS.replace('"wide beacon"', f'"{way}"')).mission
+    asked = replace(links, file=replace(links.file, mission=m))
+    found = day_study.relay(asked, day.loss).capacity_bit
+    rates = flow.rate_table(flow.closings(m.operations, link.of(m), day.loss))
+    by = {
+        name: flow.relay(m.operations, day.view, rates, day.loss.outage, each, 1.0).capacity_bit
+        for name, each in (("wide beacon", links.finding.wide), ("scan", links.finding.scan))
+    }
+    assert by["wide beacon"] != by["scan"]
+    assert found == by[way]
+
+
+@pytest.mark.promise("day-36", "day-37")
 def test_the_papers_claim(links, day):
     relay, direct = day.relay, day.direct
     minutes = [c.duration_s / 60.0 for c in relay.contacts]
@@ -262,6 +297,7 @@ def lqg():
     return file.mission, scene, controller_study.Design("LQG", tuned, assemble("LQG", scene.loop, tuned.controller))
 
 
+@pytest.mark.promise("day-38")
 def test_what_the_simulated_loop_leaves(lqg, links, day):
     m, scene, design = lqg
     (verified,) = controller_study.verify(scene, (design,))
@@ -271,6 +307,7 @@ def test_what_the_simulated_loop_leaves(lqg, links, day):
     assert m.fine_pointing.quantile == 0.997 and f"loss_db={loss:.2f}" in PAGE
 
 
+@pytest.mark.promise("day-27", "day-29")
 def test_one_contact_in_time(lqg, links, day):
     m, scene, design = lqg
     study = SimpleNamespace(scene=scene, best=SimpleNamespace(design=design))
@@ -285,6 +322,7 @@ def test_one_contact_in_time(lqg, links, day):
 
 
 # ---------------------------------------------------------------------------------------------------- constellation
+@pytest.mark.promise("day-33")
 def test_the_constellation(links):
     plan = constellation.run_constellation(links.file, day_study.given_loss(links))
     reach = np.sum(plan.opportunities.end_s - plan.opportunities.start_s) / 3600.0
@@ -300,6 +338,7 @@ def test_the_constellation(links):
     assert counted == pytest.approx(sum(one.end_s - one.locked_s for one in plan.planned))
 
 
+@pytest.mark.promise("day-31")
 def test_a_pattern_repeats_elements_and_a_file_goes_with_every_kind(folder):
     told("`[constellation]` repeats a circular or Keplerian `orbit.leo`", "and goes with every kind of `orbit.leo`")
     path = folder / "many.toml"
@@ -314,6 +353,7 @@ def test_a_pattern_repeats_elements_and_a_file_goes_with_every_kind(folder):
     assert only.name == "DEMO"
 
 
+@pytest.mark.promise("day-31")
 @pytest.mark.parametrize(("pattern", "round_deg"), [("delta", 360.0), ("star", 180.0)])
 def test_walkers_patterns_are_as_told(links, pattern, round_deg):
     told('`"delta"` spreads the nodes over 360 deg, `"star"` over 180 deg', "360 deg F / `satellites` apart in phase")

@@ -12,7 +12,7 @@ from microrad.link import study as link_study
 from microrad.orbit import EARTH_RADIUS_M, GEOSTATIONARY_RADIUS_M
 from microrad.orbit import day as day_study
 from microrad.orbit.day import NOTHING, Numbers, Swing
-from microrad.orbit.day.ground_track import LONGEST_S, STEP_S, ground_track
+from microrad.orbit.day.ground_track import LONGEST_S, STEP_S, _outline, ground_track
 from microrad.report.day.figures import day_figures
 
 SIX_HOURS = {"orbit.duration": "6 h", **ALONE}
@@ -74,6 +74,15 @@ def test_from_the_outline_of_a_slot_the_line_of_sight_grazes_the_earth(track_of)
     assert np.linalg.norm(nearest, axis=0) == pytest.approx(np.full(low.shape[1], GRAZING_M), abs=10.0)
     assert np.all(np.sum(low * relay, axis=0) < 0.0)  # beyond the limb, not before it
     assert around(track.relay)[:, 0] == pytest.approx(around(track.relay)[:, -1])
+
+
+def test_an_outline_across_the_date_line_comes_in_from_the_other_side():
+    found = _outline("relay", 0.0, math.radians(160.0), math.radians(60.0))
+    longitude = found.around_longitude_rad
+    assert np.all((-math.pi <= longitude) & (longitude < math.pi))
+    assert np.count_nonzero(np.abs(np.diff(longitude)) > math.pi) == 2
+    east = np.degrees(longitude) % 360.0
+    assert (east.min(), east.max()) == (pytest.approx(100.0, abs=0.1), pytest.approx(220.0, abs=0.1))
 
 
 def test_from_the_outline_of_a_station_the_satellite_stands_at_its_mask(track_of):

@@ -141,6 +141,7 @@ def served(*pieces):
     return found
 
 
+@pytest.mark.promise("day-22")
 def test_a_store_by_hand():
     # 10 bit/s for 100 s; the link takes 30 bit/s from 50 s to 100 s
     got = deliver(10.0, (0.0, 100.0), INF, served((50.0, (50.0, 30.0))), (0.0, 100.0), 0.25)
@@ -158,6 +159,7 @@ def test_a_store_by_hand():
     assert all(latency.quantile(p) == pytest.approx(x, rel=rounding) for p, x in wanted)
 
 
+@pytest.mark.promise("day-22")
 def test_a_full_store_loses_the_newest_and_takes_in_what_the_link_takes_out():
     # full at 20 s; the link takes 4 bit/s from 40 s to 60 s, then 40 bit/s to 70 s
     got = deliver(10.0, (0.0, 60.0), 200.0, served((40.0, (20.0, 4.0), (10.0, 40.0))), (0.0, 70.0), 0.0)
@@ -173,6 +175,7 @@ def test_a_full_store_loses_the_newest_and_takes_in_what_the_link_takes_out():
     assert latency.quantile(1e-9) == pytest.approx(5.0, abs=1e-6)
 
 
+@pytest.mark.promise("day-23")
 def test_data_left_on_board_is_later_than_any_latency():
     got = deliver(10.0, (0.0, 100.0), INF, served((100.0, (10.0, 60.0))), (0.0, 200.0), 1.0)
     assert (got.delivered_bit[-1], got.stored_bit[-1], got.latency.delivered_share) == (600.0, 400.0, 0.6)
@@ -184,6 +187,7 @@ def test_data_left_on_board_is_later_than_any_latency():
     assert latency.cdf(1e9) == 0.6
 
 
+@pytest.mark.promise("day-22")
 def test_a_longer_span_than_the_observed_one_delivers_the_rest():
     more = served((100.0, (10.0, 60.0)), (150.0, (10.0, 60.0)))
     got = deliver(10.0, (0.0, 100.0), INF, more, (-50.0, 200.0), 0.0)
@@ -207,6 +211,7 @@ def test_without_production_or_without_a_contact_there_is_nothing_to_be_late():
     assert math.isnan(mean_s(dark.latency))
 
 
+@pytest.mark.promise("day-21")
 def test_outages_take_their_share_of_the_volume():
     half = Service(np.array([0.0, 100.0]), np.array([20.0]), 0.25)
     got = deliver(10.0, (0.0, 100.0), INF, [half], (0.0, 100.0), 0.0)
@@ -261,6 +266,7 @@ def days(draw):
     return production, capacity, services, span
 
 
+@pytest.mark.promise("day-22")
 @properties
 @given(days())
 def test_the_store_agrees_with_packets_second_by_second(day):
@@ -429,6 +435,8 @@ def read_plan(text):
     return reference, contacts, ranges
 
 
+@pytest.mark.promise("gallery-24")
+@pytest.mark.promise("day-35")
 def test_the_contact_plan_is_read_back():
     sessions = [
         planned("B", "GEO", 100.0, 101.0, 200.0, 8e8),
@@ -465,6 +473,7 @@ def test_an_epoch_within_a_second_is_kept():
     assert read_plan(plan_of([planned()], lambda t: utc(t + 0.8)))[0] == NOON
 
 
+@pytest.mark.promise("day-35")
 def test_what_is_left_out_of_the_contact_plan_is_said():
     sessions = [planned(locked_s=12.2, end_s=12.9), planned(start_s=20.0, locked_s=20.0, end_s=40.0, rate_bit_s=7.0)]
     text = plan_of(sessions)

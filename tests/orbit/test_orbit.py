@@ -3,6 +3,7 @@
 import dataclasses
 import itertools
 import math
+import socket
 import subprocess
 import sys
 from datetime import datetime
@@ -21,8 +22,8 @@ from scipy.optimize import brentq
 
 from microrad.core.units import SPEED_OF_LIGHT_M_S
 from microrad.orbit.base import OrbitError
+from microrad.orbit.earth import epoch, sun
 from microrad.orbit.earth import figure as earth
-from microrad.orbit.earth import sun
 from microrad.orbit.earth.epoch import Epoch
 from microrad.orbit.propagation import analytic
 
@@ -153,6 +154,7 @@ def test_a_time_outside_the_tables_is_refused(time_s):
         START.earth_rotation_rad(np.array([0.0, time_s]))
 
 
+@pytest.mark.promise("day-9")
 @pytest.mark.parametrize("text", ["1975-02-03T04:05:06Z", "1998-12-31T20:00:00Z", "2016-12-31T23:00:00Z", START.text])
 def test_the_earth_turns_as_in_astropy(text):
     """UT1 of astropy's newer table and skyfield's differ by some ms (predictions): 1 ms is 7e-8 rad."""
@@ -164,6 +166,7 @@ def test_the_earth_turns_as_in_astropy(text):
     np.testing.assert_allclose(np.diff(angle), earth.ROTATION_RAD_S * np.diff(time_s), rtol=1e-6)
 
 
+@pytest.mark.promise("day-9")
 @pytest.mark.parametrize("text", ["1990-06-01T03:00:00Z", "2016-12-31T23:00:00Z", START.text, "2050-12-29T12:00:00Z"])
 def test_the_earth_turns_as_in_skyfield(text):
     from skyfield.api import load
@@ -189,6 +192,16 @@ def test_the_angle_is_the_same_seen_from_an_instant_decades_before():
     early, late = Epoch("1973-06-01T00:00:00Z"), Epoch("2049-03-04T05:06:07Z")
     apart = early.earth_rotation_rad(early.seconds_to(late)) - late.earth_rotation_rad(0.0)
     assert abs(float(wrapped(apart))) < 3.6e-11  # a float of 2.4e9 s is good to 4.8e-7 s, 3.5e-11 rad
+
+
+@pytest.mark.promise("day-9")
+def test_no_table_is_downloaded(monkeypatch):
+    def asked(*args, **more):
+        raise AssertionError("the network was asked for")
+
+    monkeypatch.setattr(socket, "socket", asked)
+    monkeypatch.setattr(socket, "getaddrinfo", asked)
+    assert epoch._tables.__wrapped__().first_day == epoch._tables().first_day
 
 
 def test_the_tables_of_time_are_read_only_when_an_instant_needs_them():
@@ -382,6 +395,7 @@ def whole_disc_hidden(r, to_sun, shape, points=1440):
     return bool(np.all((half**2 >= square * (p @ p - 1.0)) & (half < 0.0)))
 
 
+@pytest.mark.promise("day-17")
 @pytest.mark.parametrize(("shape", "doubt_rad"), [("sphere", 1e-7), ("oblate", 1.8e-5)])
 @pytest.mark.parametrize("altitude_m", [400e3, 2000e3, 35.8e6])
 def test_night_is_when_the_whole_disc_of_the_sun_is_behind_the_earth(shape, doubt_rad, altitude_m):
@@ -468,6 +482,7 @@ def flown(orbit, span_s, j2, times):
     return flight.y[:3], flight.y[3:]
 
 
+@pytest.mark.promise("day-42")
 @pytest.mark.parametrize("name", ["circle", "two-body ellipse"])
 def test_two_bodies_move_as_integration_says(name):
     orbit = ORBITS[name]
@@ -494,6 +509,8 @@ def elements(r, v):
     return axis, size, np.unwrap(node), np.unwrap(perigee), np.unwrap(eccentric - size * np.sin(eccentric))
 
 
+@pytest.mark.promise("readme-8")
+@pytest.mark.promise("day-10")
 @pytest.mark.parametrize("inclination_deg", [28.0, 63.4, 97.4])
 def test_the_drifts_are_those_of_a_day_of_integration(inclination_deg):
     """Means over one turn at both ends of a day; what is left is of second order in J2, a thousandth."""
@@ -520,6 +537,21 @@ def test_without_flattening_nothing_drifts():
     assert dataclasses.replace(LOW, j2=False).secular_rates_rad_s() == (0.0, 0.0, LOW.mean_motion_rad_s)
 
 
+@pytest.mark.promise("day-10")
+def test_flattening_turns_a_circle_and_leaves_it_one():
+    """No periodic term: neither its radius nor its inclination swings."""
+    orbit = analytic.circular("c", START, 500e3, math.radians(60.0), 0.5, 0.0, True)
+    r, v = orbit.states(np.linspace(0.0, 2.0 * DAY_S, 500))
+    np.testing.assert_allclose(length(r), RE + 500e3, rtol=1e-12)
+    normal = np.cross(r, v, axis=0)
+    node = np.unwrap(np.arctan2(normal[0], -normal[1]))
+    assert abs(node[-1] - node[0]) > 0.1
+    turned = np.cross(r[:, :-1], r[:, 1:], axis=0)  # nearly the normal: the plane turns by 0.01 deg between two of them
+    tilt = np.arccos(turned[2] / length(turned))
+    np.testing.assert_allclose(np.minimum(tilt, math.pi - tilt), math.radians(60.0), rtol=0.0, atol=2e-3)
+
+
+@pytest.mark.promise("day-8")
 def test_a_circle_starts_at_its_phase_past_the_node():
     orbit = analytic.circular("c", START, 500e3, math.radians(60.0), 0.5, math.pi / 2, True)
     r, v = orbit.states(np.array([0.0]))
@@ -599,6 +631,7 @@ def test_an_altitude_or_eccentricity_without_a_sun_synchronous_orbit_is_refused(
         analytic.sun_synchronous_inclination_rad(500e3, 1.0)
 
 
+@pytest.mark.promise("day-8")
 @pytest.mark.parametrize("hours", [0.0, 10.5, 18.0])
 def test_a_node_of_local_time_stays_at_its_hour_from_the_mean_sun(hours):
     """The true Sun runs up to 17 min before or behind the mean Sun; over a year the mean difference goes away."""
@@ -622,6 +655,8 @@ def test_a_node_of_noon_is_at_the_longitude_where_it_is_noon():
 
 
 # ---- the low satellite and the slot
+@pytest.mark.promise("readme-8")
+@pytest.mark.promise("day-8")
 def test_a_slot_stands_over_its_longitude():
     time_s = np.linspace(0.0, 10.0 * DAY_S, 100)
     below = earth.subpoint(SLOT.states(time_s).position_m, START.earth_rotation_rad(time_s))
@@ -700,6 +735,7 @@ def station(latitude_deg, longitude_deg, height_m, mask_deg=5.0):
     return earth.Station("G", math.radians(latitude_deg), math.radians(longitude_deg), height_m, math.radians(mask_deg))
 
 
+@pytest.mark.promise("day-9", "day-11")
 @pytest.mark.parametrize("site", STATIONS)
 def test_a_station_stands_where_astropy_has_it_and_turns_with_the_earth(site):
     time_s = np.linspace(0.0, DAY_S, 25)
@@ -716,6 +752,7 @@ def test_a_station_stands_where_astropy_has_it_and_turns_with_the_earth(site):
     np.testing.assert_allclose(below.latitude_rad, math.radians(site[0]), rtol=0.0, atol=1e-11)
 
 
+@pytest.mark.promise("day-42")
 @pytest.mark.parametrize("site", STATIONS)
 def test_elevation_is_that_of_skyfield(site):
     from skyfield.api import load, wgs84

@@ -87,6 +87,7 @@ def refused(tmp_path, text, *words, read=read_elements):
 
 
 # ----------------------------------------------------------------------------------------------------------------- TLE
+@pytest.mark.promise("day-8")
 def test_tle_with_and_without_a_name(tmp_path):
     (named,) = elements(tmp_path, NAMED)
     assert named.name == "EXAMPLE 1" and named.catalogue_number == "90001"
@@ -133,6 +134,8 @@ def verification_cases():
     ]
 
 
+@pytest.mark.promise("readme-8")
+@pytest.mark.promise("day-42")
 def test_sgp4_against_the_published_verification(tmp_path):
     """Positions within 1 mm, for all cases that are in orbit, up to 14 days from the epoch."""
     checked, refusals = set(), {}
@@ -155,6 +158,7 @@ def test_sgp4_against_the_published_verification(tmp_path):
     assert sum("the perigee is" in text for text in refusals.values()) == 4 and "mean motion" in refusals["33334"]
 
 
+@pytest.mark.promise("day-9")
 def test_sgp4_against_skyfield_in_teme_and_gcrs(tmp_path):
     (found,) = elements(tmp_path, NAMED)
     orbit = Sgp4Orbit(found, Epoch("2026-03-22T03:04:05.25Z"))
@@ -316,6 +320,7 @@ def test_what_is_no_file_of_text_is_refused_with_its_own_reason(tmp_path, monkey
 
 
 # --------------------------------------------------------------------------------------------------------------- decay
+@pytest.mark.promise("day-12")
 def test_expired_elements(tmp_path):
     (found,) = elements(tmp_path, NAMED)
     late = Sgp4Orbit(found, Epoch("2026-04-02T12:00:00Z"))
@@ -462,6 +467,8 @@ def as_json(fields):
 NOTATIONS = {"kvn": kvn, "units": lambda f: kvn(f, units=True), "xml": xml, "json": as_json, "csv": comma}
 
 
+@pytest.mark.promise("readme-8")
+@pytest.mark.promise("day-8")
 @pytest.mark.parametrize("notation", NOTATIONS)
 def test_omm_gives_the_orbit_of_the_tle(tmp_path, notation):
     (found,) = elements(tmp_path, NOTATIONS[notation](FIELDS))
@@ -614,6 +621,7 @@ def oem_xml(time_s, version="3.0", **changes):
     )
 
 
+@pytest.mark.promise("readme-8")
 @pytest.mark.parametrize(
     ("method", "position_m", "velocity_m_s"),
     [
@@ -672,6 +680,7 @@ def test_hermite_is_the_polynomial_through_its_points(tmp_path):
         assert orbit.states(t).position_m[0] == pytest.approx(value, abs=1e-6)
 
 
+@pytest.mark.promise("day-8")
 def test_xml_equals_kvn(tmp_path):
     time_s = np.linspace(0.0, 6000.0, 61)
     of_kvn = ephemeris(tmp_path, HEAD + segment(GRID)).states(time_s)
@@ -739,6 +748,7 @@ def in_teme(frame, time_s):
     return np.einsum("ijn,jn->in", turn, truth(time_s).position_m)
 
 
+@pytest.mark.promise("day-9")
 @pytest.mark.parametrize("frame", ROTATIONS)
 def test_frames_against_skyfield(tmp_path, frame):
     """Positions at and between the nodes; velocities by differences, so that the frame's own motion is in them."""
@@ -765,6 +775,7 @@ def test_rotations_between_hours(tmp_path):
 
 
 # ----------------------------------------------------------------------------------------------------- spans, segments
+@pytest.mark.promise("day-12")
 def test_span_by_usable_times(tmp_path):
     text = HEAD + segment(GRID, USEABLE_START_TIME=stamp(600), USEABLE_STOP_TIME=stamp(3000))
     orbit = ephemeris(tmp_path, text)

@@ -128,6 +128,7 @@ def test_no_satellite_and_no_terminal_has_two_sessions_at_once(case):
             assert a[4] <= b[3] or b[4] <= a[3], (a, b)
 
 
+@pytest.mark.promise("day-32")
 @properties
 @given(cases())
 def test_each_session_lies_in_one_view_and_is_long_enough(case):
@@ -180,6 +181,7 @@ def test_one_satellite_alone_is_served_to_the_end_of_its_view():
     assert got.locked_s.tolist() == [7.0]
 
 
+@pytest.mark.promise("day-32")
 def test_two_satellites_take_turns_and_the_first_goes_on_while_nobody_waits():
     got = schedule(opportunities((0, 0, 0.0, 60.0), (1, 0, 25.0, 60.0)), 2, 1, 1, RULES, 0.0)
     # looked at after 10, 20 and 30 s: at 30 s the other waits
@@ -187,6 +189,7 @@ def test_two_satellites_take_turns_and_the_first_goes_on_while_nobody_waits():
     assert listed(got) == turns
 
 
+@pytest.mark.promise("day-32")
 def test_a_remainder_too_short_to_be_worthwhile_is_left():
     views = ((0, 0, 0.0, 8.0), (1, 0, 0.0, 10.9))
     assert [s[0] for s in listed(schedule(opportunities(*views), 2, 1, 1, RULES, 0.0))] == [0]
@@ -194,6 +197,7 @@ def test_a_remainder_too_short_to_be_worthwhile_is_left():
     assert [s[0] for s in listed(schedule(opportunities(*longer), 2, 1, 1, RULES, 0.0))] == [0, 1]
 
 
+@pytest.mark.promise("day-32")
 def test_the_longest_waiting_goes_first_not_the_lowest_index():
     views = ((0, 0, 0.0, 20.0), (0, 0, 30.0, 60.0), (2, 0, 20.0, 29.0), (1, 0, 20.0, 24.0), (1, 0, 30.0, 60.0))
     got = listed(schedule(opportunities(*views), 3, 1, 1, RULES, 0.0))
@@ -267,6 +271,7 @@ def sessions(*rows):
     return Sessions(*(np.array(x) for x in (satellite, relay, terminal)), *(np.array(t, dtype=float) for t in times))
 
 
+@pytest.mark.promise("day-32")
 def test_totals_count_data_from_lock_to_end_and_gaps_from_data_to_data():
     got = sessions((0, 0, 0, 10, 12, 20), (1, 0, 1, 11, 15, 40), (2, 0, 2, 16, 17, 18), (0, 1, 0, 50, 55, 60))
     each = totals(got, got.satellite, 4, volumes(got, 2.0), (0.0, 100.0))

@@ -1,6 +1,8 @@
 """What benchmarks found: kept in one file a release, and said by the page and its figure as it stands there."""
 
+import ast
 import json
+import re
 import sys
 
 import pytest
@@ -8,7 +10,7 @@ import pytest
 import benchmarks_page as benchmarks
 from microrad.report.plotting.sheet import Line
 from microrad.report.plotting.svg import svg_of
-from places import benchmark
+from places import ROOT, benchmark
 
 recorded = benchmark("recorded")
 
@@ -29,6 +31,7 @@ def row(what, value, unit="", at_most=None, at_least=None):
 
 
 # --------------------------------------------------------------------------------------------------------- the recorder
+@pytest.mark.promise("benchmarks-1", "releasing-2")
 def test_a_figure_is_kept_where_it_is_asked_for_and_takes_the_place_of_its_last_one(kept, monkeypatch):
     monkeypatch.delenv("MICRORAD_RECORD")
     recorded.record("a step", 1.0)
@@ -44,6 +47,7 @@ def test_a_figure_is_kept_where_it_is_asked_for_and_takes_the_place_of_its_last_
     assert found["rows"] == [row("a fit", 50.0, "s", at_most=60.0), row("a step", 1.5)]
 
 
+@pytest.mark.promise("benchmarks-1")
 def test_figures_of_two_machines_are_not_mixed(kept, monkeypatch):
     recorded.record("a step", 1.23456)
     assert kept()["rows"][0]["value"] == 1.23
@@ -53,7 +57,39 @@ def test_figures_of_two_machines_are_not_mixed(kept, monkeypatch):
     assert kept()["rows"][0]["value"] == 1.23
 
 
+LISTED = {
+    "loop.py": "C twin|solve_ivp|import control",
+    "ensemble.py": "C twin",
+    "hysteresis_fit.py": "solve_ivp",
+    "frequency_response_fit.py": "skrf",
+    "recording.py": "ten million samples",
+    "contacts.py": "constellation sees four slots|1000 x 4",
+    "link_conventions.py": "Where link budgets differ",
+}
+"""What `make benchmark` prints by README.md, and what of each benchmark says so."""
+
+
+@pytest.mark.promise("benchmarks-1", "readme-20")
+@pytest.mark.promise("identify-55")
+def test_make_benchmark_runs_each_benchmark_and_what_the_readme_lists():
+    text = (ROOT / "Makefile").read_text(encoding="utf-8")
+    ran = set(re.findall(r"benchmarks/([\w.]+)", text.partition("\nbenchmark:")[2].partition("\n\n")[0]))
+    assert {path.name for path in (ROOT / "benchmarks").glob("*.py")} >= ran >= LISTED.keys()
+    for name, words in LISTED.items():
+        source = (ROOT / "benchmarks" / name).read_text(encoding="utf-8")
+        assert [word for word in words.split("|") if word not in source] == [], name
+    assert {f"{each['benchmark']}.py" for release in benchmarks.releases() for each in release["rows"]} <= ran
+
+
+@pytest.mark.promise("benchmarks-1")
+def test_each_benchmark_says_first_what_it_measures():
+    for name in re.findall(r"benchmarks/([\w.]+)", (ROOT / "Makefile").read_text(encoding="utf-8")):
+        said = ast.get_docstring(ast.parse((ROOT / "benchmarks" / name).read_text(encoding="utf-8")))
+        assert said and len(said.splitlines()[0].split()) > 5, name
+
+
 # ------------------------------------------------------------------------------------------------------------- the page
+@pytest.mark.promise("benchmarks-1")
 def test_page_and_figure_are_those_of_the_kept_figures():
     found = benchmarks.releases()
     text = benchmarks.PAGE.read_text(encoding="utf-8")
@@ -62,6 +98,7 @@ def test_page_and_figure_are_those_of_the_kept_figures():
     assert all(f"| {each['what']} | " in text for each in found[-1]["rows"])
 
 
+@pytest.mark.promise("benchmarks-1")
 def test_a_bar_is_met_from_its_own_side():
     def release(version, *rows):
         return {

@@ -24,7 +24,7 @@ from microrad.mirror.model import Mirror
 from microrad.report.identification import coupled_words as words
 from microrad.report.identification.coupled_figures import MOST, bands, coupled_figures, error_over_parameters
 from microrad.report.identification.terminal import MOST_LINES
-from microrad.report.plotting.sheet import Line, Rule, Span
+from microrad.report.plotting.sheet import Area, Line, Rule, Span
 from report_pages import assert_sound, without_scripts
 
 RATE_HZ, PERIOD = 1000.0, 256
@@ -186,6 +186,7 @@ def row_of(page, first):
 
 
 # ----------------------------------------------------------------------------------------------------- the same numbers
+@pytest.mark.promise("identify-45", "identify-46")
 def test_the_verdict_is_the_same_in_all_faces(found, page, text, data):
     headline, amplitudes, worst, rests, reason = words.verdict(found)
     assert headline == (
@@ -205,6 +206,7 @@ def test_the_verdict_is_the_same_in_all_faces(found, page, text, data):
     assert data["worst"] == {"record": "small <3>.npy", "output": "y1", "error_share": pytest.approx(0.05753)}
 
 
+@pytest.mark.promise("identify-46")
 @pytest.mark.parametrize("number", range(4))
 def test_each_candidate_is_in_all_faces(found, page, text, data, number):
     own = found.candidates[number]
@@ -223,6 +225,36 @@ def test_each_candidate_is_in_all_faces(found, page, text, data, number):
     assert of["record_error_share"] == dict(zip(HELD_OUT, own.record_share.tolist(), strict=True))
 
 
+UNITS = re.compile(r"_(v|m|hz|s|m_v|v_s|rad|rad_v|rad_s)$")
+WITHOUT_UNIT = re.compile(r"parameters|order|error_share|share|damping|number|count|records|_per_sample")
+
+
+@pytest.mark.promise("identify-46")
+def test_the_worst_output_is_that_with_the_largest_share_of_its_own_size(tmp_path):
+    """Half of the smaller output is missing and a third of the larger one, which is more in metres."""
+    sizes = np.array([[3e-6, 1e-6], [6e-6, 2e-6]])
+    errors = sizes * np.array([1 / 3, 1 / 2])
+    found = found_of(
+        candidates=tuple(replace(each, error_rms=errors) for each in found_of().candidates), output_rms=sizes
+    )
+    rows = rows_of(page_of(found, tmp_path).read_text(encoding="utf-8"))
+    assert [row[-1] for row in rows if row[0] in ("100 mV", "200 mV") and len(row) == 7] == ["y1, 50 %"] * 2
+
+
+def test_the_key_of_a_number_ends_in_its_unit(data):
+    def numbers(value, key):
+        if isinstance(value, dict):
+            return {k for name, each in value.items() for k in numbers(each, name if isinstance(name, str) else key)}
+        if isinstance(value, list):
+            return {k for each in value for k in numbers(each, key)}
+        return {key} if isinstance(value, int | float) and not isinstance(value, bool) else set()
+
+    found = numbers({k: v for k, v in data.items() if k != "candidates"}, "") | numbers(data["candidates"], "")
+    assert {key for key in found if not UNITS.search(key) and not WITHOUT_UNIT.search(key)} == set(HELD_OUT)
+    assert {"bands_hz", "error_rms_m", "delay_s", "rate_limit_v_s"} <= found
+
+
+@pytest.mark.promise("identify-45", "identify-46")
 def test_errors_by_amplitude_and_record_stand_beside_floor_and_noise(found, page, text, data):
     floor = words.linear_floor(found)
     linear = f"{1e9 * float(np.sqrt(np.mean(floor[0] ** 2))):.3g}"
@@ -233,6 +265,7 @@ def test_errors_by_amplitude_and_record_stand_beside_floor_and_noise(found, page
     assert re.search(rf"100 mV +82.7 +5.23 % +{linear} +", text)
 
 
+@pytest.mark.promise("identify-45")
 def test_poles_by_hand(found, page, data):
     pair, real = words.poles(found.candidate())
     size = np.hypot(20.0, 500.0)
@@ -256,6 +289,7 @@ def test_a_pole_whose_error_is_not_known_has_its_digits():
     assert words.pole_error_text(own.poles_error_rad_s).startswith("Standard errors that are not known")
 
 
+@pytest.mark.promise("identify-45")
 def test_range_delay_and_amplitude_dependence_are_said(page, data):
     assert row_of(page, "piezo 1") == ["piezo 1", "5 V", "4.25 V", "5.75 V", "15 kV/s"]
     assert "The drive acts 200 µs ± 5 µs late." in plain(page)
@@ -265,6 +299,7 @@ def test_range_delay_and_amplitude_dependence_are_said(page, data):
     assert ["200 mV", "2.104", "78.2", "0.1", "0.04"] in rows_of(page)
 
 
+@pytest.mark.promise("identify-45", "identify-47")
 def test_what_the_mirror_file_does_not_hold_is_said(found, page, data):
     said = words.not_held(found)
     assert data["not_in_the_mirror_file"] == said and all(sentence in plain(page) for sentence in said)
@@ -283,6 +318,7 @@ def test_what_the_mirror_file_does_not_hold_is_said(found, page, data):
 
 
 # --------------------------------------------------------------------------------------------------------- the terminal
+@pytest.mark.promise("identify-46")
 def test_the_terminal_is_short(text):
     lines = text.splitlines()
     assert len(lines) <= MOST_LINES == 23 and max(map(len, lines)) <= 80
@@ -291,6 +327,7 @@ def test_the_terminal_is_short(text):
     assert "- 1 refused model: see the report, or --json." in lines
 
 
+@pytest.mark.promise("identify-46")
 def test_the_terminal_is_short_however_much_there_is_to_say():
     many = tuple(
         candidate(f"coupled linear, order {n}", "coupled linear", 10 * n, 0.5 - 0.01 * n) for n in range(1, 30)
@@ -322,6 +359,7 @@ def test_refused_models_have_their_reasons(page, data):
     assert data["refused"] == {"hysteretic stiffness, order 9": "the fitted mirror <runs> away"}
 
 
+@pytest.mark.promise("identify-44")
 def test_a_ladder_that_was_stopped_says_so(tmp_path):
     found = found_of(stopped=True)
     begins = (
@@ -364,6 +402,7 @@ def test_every_axis_has_its_unit_and_no_panel_is_empty(found):
             assert lines and all(np.isfinite(line.y).any() for line in lines)
 
 
+@pytest.mark.promise("identify-45")
 def test_the_winner_is_marked_among_points_of_each_candidate(found):
     (panel,) = error_over_parameters(found).sheet.panels
     lines = {line.label: line for line in panel.all_of(Line)}
@@ -385,6 +424,7 @@ def test_noise_far_below_all_models_is_said_and_leaves_them_their_room():
         assert ("Noise, 0.158 %, lies far below." in figure.caption) is (not drawn)
 
 
+@pytest.mark.promise("identify-45")
 def test_the_response_has_a_panel_for_each_pair_with_measured_and_modelled(found):
     panels = coupled_figures(found)["response"].sheet.panels
     assert [p.title for p in panels] == [
@@ -399,9 +439,15 @@ def test_the_response_has_a_panel_for_each_pair_with_measured_and_modelled(found
         assert by["measured"].y.max() == pytest.approx(1e9 * np.abs(measured.response[:, k // 2, k % 2]).max())
         assert by["modelled"].y.max() == pytest.approx(by["measured"].y.max() / 1.02, rel=0.01)
         assert 0.0 < by["measured less modelled, rms"].y.max() < 0.05 * by["measured"].y.max()
+        (interval,) = panel.all_of(Area)
+        half = 1.96 / np.sqrt(2.0) * measured.standard_error[:, k // 2, k % 2]
+        top = np.abs(measured.response[:, k // 2, k % 2]) + half
+        assert interval.label == "95 % confidence"
+        assert interval.rings[0][:, 1].max() == pytest.approx(1e9 * top.max(), rel=1e-3)
         assert panel.y.log and panel.x.log
 
 
+@pytest.mark.promise("identify-45")
 def test_bands_hold_all_of_the_error_and_of_the_floor(found, page, data):
     (parts, *_), (noise, *_) = words.band_floors(found)
     response = found.responses[0]
@@ -423,6 +469,7 @@ def test_bands_hold_all_of_the_error_and_of_the_floor(found, page, data):
     assert (noise.y <= 1.5 * floor.y).all()
 
 
+@pytest.mark.promise("identify-49")
 def test_without_responses_what_is_missing_is_said(tmp_path):
     alone = found_of(responses=(None, None), modelled=(None, None), dependence=None, noise_rms=np.full((2, 2), np.nan))
     assert list(coupled_figures(alone)) == ["error-over-parameters", "bands"]
@@ -443,7 +490,8 @@ def test_an_amplitude_of_which_nothing_is_held_out_is_left_out(tmp_path):
     assert not re.search(r"\bnan\b", plain(page_of(found, tmp_path).read_text("utf-8")))
 
 
-def test_of_many_channels_the_first_are_drawn(found):
+@pytest.mark.promise("identify-49")
+def test_of_many_channels_the_first_are_drawn(found, tmp_path):
     outputs, drives = 6, 5
     wide = np.tile(found.responses[0].response, (1, 3, 3))[:, :outputs, :drives]
     none = np.zeros((3, 0)), np.zeros((0, 3)), np.zeros((0, drives)), np.zeros((outputs, 0))
@@ -485,5 +533,10 @@ def test_of_many_channels_the_first_are_drawn(found):
     assert len(figures["bands"].sheet.panels) == 2 * MOST
     assert all("Of 6 outputs and 5 drives the first 4 are drawn." in figures[n].caption for n in ("response", "bands"))
     assert {panel.y.title for panel in figures["response"].sheet.panels} == {"gain (nrad/V)", ""}
+    whole = report.coupled_identification_data(many)
+    assert (len(whole["outputs"]), len(whole["actuators"])) == (outputs, drives)
+    page = page_of(many, tmp_path).read_text("utf-8")
+    assert {f"u{k}" for k in range(drives)} <= {row[0] for row in rows_of(page) if row}
+    assert all(any(f"y{k}" in cell for row in rows_of(page) for cell in row) for k in range(outputs))
     text = report.coupled_identification_text(many)
     assert len(text.splitlines()) <= MOST_LINES and max(map(len, text.splitlines())) <= 80

@@ -7,13 +7,15 @@ from importlib import import_module, util
 
 import pytest
 import typer
+import xarray as xr
 
 from microrad import cli, report
-from microrad.core import machine
+from microrad.core import kept, machine
 from microrad.mission import toml as document
 from microrad.report.plotting import palette
 from microrad.report.results import comparison as compared
 from microrad.report.results import tolerances
+from microrad.report.results.arrays import study_netcdf
 from microrad.report.results.manifest import MOST_INPUT_BYTES
 from microrad.report.study.page import study_views
 from microrad.studio import server, session
@@ -22,7 +24,7 @@ from microrad.studio.guard import middleware as guard
 from microrad.studio.jobs import process as jobs_process
 from microrad.studio.recordings import reading, uploads
 from places import ROOT
-from shipped import default_study, plain_drawn, plain_study
+from shipped import default_study, plain_drawn, plain_study, whole_study
 
 FINE = ("Fine pointing under vibration and noise", "Monte Carlo tails", "Pointing error budget")
 
@@ -68,6 +70,7 @@ def test_pages_that_are_linked_exist(text):
 
 
 # -------------------------------------------------------------------------------------------------------------- report
+@pytest.mark.promise("report-6")
 def test_the_parts_of_the_report_are_those_of_the_page():
     """Of a whole study; those of the fine-pointing loop and of a budget of errors are not in this one."""
     parts = re.findall(r"(?m)^\| (.+?) \|", REPORT.partition("| part | says |")[2].partition("\n\n")[0])
@@ -76,6 +79,7 @@ def test_the_parts_of_the_report_are_those_of_the_page():
     assert [each for each in parts if each in FINE] == list(FINE)
 
 
+@pytest.mark.promise("report-8")
 def test_each_requirement_stands_in_the_table():
     """As the shipped mission has them: with a share of the time for its "a share", and without what varies behind."""
     measured = (ROOT / "reference" / "mission-shipped.json").read_text(encoding="utf-8")
@@ -88,12 +92,61 @@ def test_each_requirement_stands_in_the_table():
         assert any(each.startswith(begin) for each in listed), name
 
 
+@pytest.mark.promise("report-5", "report-11", "report-14", "report-15", "report-16")
 def test_the_numbers_of_the_report_are_those_of_the_code():
     told(REPORT, f"in words to {100 * compared.WORDS_SHARE:g} %", f"at most {palette.MOST_POINTS} points")
     assert set(re.findall(r"`([A-Z0-9_]+)`", REPORT)) == set(machine.VARIABLES)
-    told(REPORT, f"up to {MOST_INPUT_BYTES / 1e6:g} MB each")
+    told(REPORT, f"up to {MOST_INPUT_BYTES / 1e6:g} MB each", f"stays below {kept.MOST_BYTES / 1e9:g} GB")
 
 
+PARTS = {
+    "controller_study.design_and_simulate": "the tuned and simulated fine-pointing loop",
+    "coupled_study.design_and_simulate": "the tuned and simulated fine-pointing loop",
+    "error_budget.judge": "the budget of pointing errors",
+    "paper_cases.simulate": "the runs of the paper's loop",
+    "_largest": "and by other readings",
+    "paper.scan": "the scan of the paper's claims",
+    "find_partner": "the acquisitions",
+    "day_study.run_day_study": "the day",
+    "contact_run.of_mission": "the contact in time",
+    "constellation.run_constellation": "the constellation",
+    "chirp": "the records of the virtual bench",
+    "loops": "the records of the virtual bench",
+    "pictures": "the drawn figures",
+    "sensitivity_size": "the drawn figures",
+    "study_netcdf": "`results.nc`",
+}
+"""Functions that a run hands to the parts that are kept, and what the page says of them."""
+
+
+@pytest.mark.promise("report-4")
+def test_the_parts_that_are_kept_are_those_of_the_page():
+    rooms = [ROOT / "src" / "microrad" / room for room in ("link", "study", "report", "cli")]
+    texts = [path.read_text(encoding="utf-8") for room in rooms for path in room.rglob("*.py")]
+    found = {name for text in texts for name in re.findall(r"parts\.part,? ?\(?([\w.]+)", text)}
+    assert found == PARTS.keys()
+    section = REPORT.partition("## Parts that are kept")[2].partition("While such a part")[0]
+    told(section, *PARTS.values())
+
+
+@pytest.mark.promise("report-13")
+def test_the_groups_of_the_results_are_those_of_the_page(tmp_path):
+    """But for those of a budget of errors, which this mission does not have."""
+    rows = re.findall(r"(?m)^\| (`.*?`) \|", REPORT.partition("| group | holds |")[2].partition("\n\n")[0])
+    listed = []
+    for row in rows:
+        first, *others = re.findall("`(.*?)`", row)
+        within = [first.replace(first.rpartition("/")[2], other) for other in others]
+        listed += [first, *(within if "/" in first else others)]
+    (tmp_path / "results.nc").write_bytes(study_netcdf(whole_study()[0]))
+    with xr.open_datatree(tmp_path / "results.nc", engine="h5netcdf") as tree:
+        found = {node.path.removeprefix("/") for node in tree.subtree if node.variables}
+    kinds = ("hysteresis_loops/", "tracking/")
+    assert {each for each in listed if not each.startswith("error_budget/")} - {f"{kind}..." for kind in kinds} <= found
+    assert {each for each in found if not each.startswith(kinds)} <= {*listed, "hysteresis_models"}
+
+
+@pytest.mark.promise("report-17")
 def test_each_kind_of_tolerance_has_its_row():
     section = REPORT.split("## Run it again")[1]
     rows = re.findall(r"(?m)^\| (\w[\w ]+) \| .* \| .* \| .* \|$", section)[1:]
@@ -131,6 +184,7 @@ def contracts():
     return tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"]["contracts"]
 
 
+@pytest.mark.promise("decisions-2")
 def test_the_table_of_rooms_is_the_contract():
     rows = re.findall(r"(?m)^\| `(\w+)` \|", CONTRIBUTING)
     assert ["__main__", *rows] == contracts()[0]["layers"]
@@ -154,8 +208,18 @@ def test_targets_of_make_exist(target):
     assert re.search(rf"(?m)^{target}:", (ROOT / "Makefile").read_text(encoding="utf-8"))
 
 
+@pytest.mark.promise("readme-4", "readme-27")
 def test_the_text_in_the_readme_is_what_the_shipped_mission_prints():
     """It says nothing of the paper's claims."""
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     assert f"```text\n{report.verdict_text(default_study(), 80)}\n```\n" in text
     assert all(len(line) <= 80 for line in text.partition("```text\n")[2].partition("```")[0].splitlines())
+
+
+@pytest.mark.promise("decisions-4")
+def test_contributing_says_how_to_add_what_the_page_of_decisions_names():
+    page = " ".join((ROOT / "docs" / "decisions.md").read_text(encoding="utf-8").split())
+    named = re.search(r"how to add an? (.*?)\.", page)[1].replace(" or ", ", ").replace(", a ", ", ")
+    assert len(named.split(", ")) == 5
+    for each in named.split(", "):
+        assert re.search(rf"(?m)^## Add an? {each}\b", CONTRIBUTING), each

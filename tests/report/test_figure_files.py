@@ -3,6 +3,7 @@
 import csv
 import json
 import pickle
+import re
 from pathlib import Path
 
 import numpy as np
@@ -15,11 +16,25 @@ from shipped import whole_drawn
 COLUMNS = json.loads(Path(__file__).with_name("figure_columns.json").read_text(encoding="utf-8"))
 """Headings of the data of each figure of the shipped mission, which spreadsheets of users are made for."""
 
+SI = {"rad", "s", "bit/s", "bit", "dB", "Hz", "m", "V", "rad/s", "rad/V", "V/rad", "V/(rad s)", "rad^2/Hz", "SI", "0"}
+"""Units in the headings; an input of a tornado has its unit in a column of its own, and a switch is (1) or (0)."""
 
+
+@pytest.mark.promise("report-2")
 def test_the_data_of_each_figure_have_their_columns():
     found = {figure.name: [*figure.columns] for figure in whole_drawn().every}
     assert {name: found.get(name) for name in COLUMNS} == COLUMNS
     assert found.keys() == COLUMNS.keys()
+
+
+@pytest.mark.promise("report-2")
+def test_columns_are_in_si_and_a_map_in_degrees():
+    units = {
+        (name, re.search(r"\(([^()]*(?:\([^()]*\))?)\)$", each)) for name, every in COLUMNS.items() for each in every
+    }
+    found = {(name, unit[1]) for name, unit in units if unit}
+    assert {unit for name, unit in found if name != "world-map"} <= SI
+    assert {unit for name, unit in found if name == "world-map"} == {"deg"}
 
 
 def test_pictures_are_kept_as_they_were_drawn(tmp_path, monkeypatch):
@@ -32,10 +47,14 @@ def test_pictures_are_kept_as_they_were_drawn(tmp_path, monkeypatch):
     assert parts.part(report.pictures, given) == drawn
 
 
+@pytest.mark.promise("report-2")
 def test_numbers_end_early_and_stay_empty_where_there_are_none():
     columns = {"a (m)": [1.0, float("nan"), float("inf")], "b": [0.5]}
     made = {name: np.array(values) for name, values in columns.items()}
     assert report.columns_csv(made) == b"a (m),b\r\n1,0.5\r\n,\r\ninf,\r\n"
+    third = np.array([1.0 / 3.0])
+    assert report.columns_csv({"a": third, "b": 2e-9 * third}) == b"a,b\r\n0.333333333,6.66666667e-10\r\n"
+    assert report.columns_csv({"a": third, "b": ("c",)}) == b"a,b\r\n0.333333333,c\r\n"
     named = {"input": ("a,b", "c"), **made}
     assert [*csv.reader(report.columns_csv(named).decode().splitlines())] == [
         ["input", "a (m)", "b"],

@@ -166,6 +166,7 @@ def test_the_page_loads_nothing_and_has_its_sections_in_order(page, full):
     assert page.stat().st_size < 3e6
 
 
+@pytest.mark.promise("report-12")
 def test_every_figure_stands_in_its_section(page):
     text = text_of(page)
     parts = dict(zip(SECTIONS, re.split(r"<h2 .*?</h2>", text)[1:], strict=True))
@@ -173,6 +174,7 @@ def test_every_figure_stands_in_its_section(page):
     assert counted == {"Recordings": 1, "Linear part": 2, "Loops": 1, "Time response": 1, "Residuals": 2}
 
 
+@pytest.mark.promise("readme-9")
 def test_the_ranking_holds_the_numbers_of_the_scores(page, full):
     text = text_of(page)
     for score in (*full.scores, full.straight_line):
@@ -193,6 +195,7 @@ def test_the_ranking_holds_the_numbers_of_the_scores(page, full):
     assert listed == [s.model for s in sorted((*full.scores, full.straight_line), key=lambda s: s.held_out_rms_percent)]
 
 
+@pytest.mark.promise("gallery-7")
 def test_the_parameter_table_holds_value_and_error_of_every_model(page, full):
     text = text_of(page)
     for score, fit in zip(full.scores, full.fits, strict=True):
@@ -274,6 +277,7 @@ def test_recordings_have_their_roles_hashes_and_findings(full, recordings, no_fi
     assert "noticed nothing" in text_of(write(clean, tmp_path / "s.html"))
 
 
+@pytest.mark.promise("readme-9")
 def test_refused_models_and_warnings_stand_before_the_numbers(page, full):
     text = html.unescape(text_of(page))
     assert [r.model for r in full.refused] == ["prandtl_ishlinskii_creep"]
@@ -300,6 +304,7 @@ def test_every_axis_has_a_label_with_its_unit(full, recordings):
     assert len(drawn["excitation"].sheet.panels) == 2 * len(figures.shown(full, recordings)) == 10
 
 
+@pytest.mark.promise("gallery-8")
 def test_loops_show_measured_and_modelled_output_and_the_hysteresis(full, recordings):
     drawing = figures.loops(figures.shown(full, recordings), full)
     left, right = drawing.sheet.panels[:2]

@@ -29,8 +29,12 @@ from microrad.loop.pointing_loop import ensemble, traces
 from microrad.loop.pointing_loop import loop as fine
 from microrad.loop.sensor import OpticalSensor
 from microrad.mirror import model as mirror
-from microrad.mirror.hysteresis import BoucWen
+from microrad.mirror.hysteresis import BoucWen, PrandtlIshlinskii
 from microrad.report import plots
+from microrad.report.day.figures import contacts_figure
+from microrad.report.error_budget.figures import budget_figures
+from microrad.report.identification import figures as identification
+from microrad.report.paper.figures import margin_map
 from microrad.report.plotting import axes as renderer
 from microrad.report.plotting import interactive, svg
 from microrad.report.plotting.axes import axes_of
@@ -203,14 +207,16 @@ def sheets(monkeypatch):
     return seen
 
 
+@pytest.mark.promise("plots-1", "plots-2", "plots-5", "plots-10")
 @pytest.mark.parametrize(("plot", "name", "panels"), PLOTS)
 def test_the_axes_show_what_the_sheet_has_with_its_units(sheets, plot, name, panels):
     drawn = getattr(plots, plot)(result(name))
     (sheet,) = sheets
-    assert isinstance(drawn, Axes) == (panels == 1)
+    assert isinstance(drawn, Axes) if panels == 1 else drawn.shape == (panels,)
     assert len(listed(drawn)) == len(sheet.panels) == panels
     (figure,) = {ax.figure for ax in listed(drawn)}
     assert tuple(figure.get_size_inches()) == (sheet.width, sheet.height)
+    assert pyplot.get_fignums() == [figure.number]
     for ax, of in zip(listed(drawn), layout(sheet).placed, strict=True):
         panel = of.panel
         rules = len(panel.all_of(Rule))
@@ -233,6 +239,7 @@ def test_the_axes_show_what_the_sheet_has_with_its_units(sheets, plot, name, pan
     figure.canvas.draw()
 
 
+@pytest.mark.promise("plots-5", "plots-10")
 @pytest.mark.parametrize(("plot", "name", "panels"), PLOTS)
 def test_given_axes_are_drawn_on_and_given_back_and_no_figure_is_made(plot, name, panels):
     figure, given = pyplot.subplots(panels, 1, figsize=(3.5, 2.0 * panels), layout="constrained", squeeze=False)
@@ -244,10 +251,45 @@ def test_given_axes_are_drawn_on_and_given_back_and_no_figure_is_made(plot, name
     beside = 1 if plot == "plot_margin_map" else 0  # the colour bar
     assert len(figure.axes) == panels + beside
     assert all(ax.has_data() and ax.get_xlabel() for ax in drawn)
+    assert all(
+        isinstance(each, (mpl.lines.Line2D, mpl.patches.Patch)) for ax in drawn for each in [*ax.lines, *ax.patches]
+    )
     assert not figure.legends
     figure.canvas.draw()
 
 
+def drawn_by_the_report():
+    """What the report draws of the same results, by the function that plots them: panels with their lines and bars."""
+    found, day, wanted = result("identification"), result("day"), result("budget")
+    of = identification.identification_figures(found, ())
+    contributed, distributed, spectra = budget_figures(wanted)
+    return {
+        ("plot_bode", "identification"): of["response"].sheet.panels[:2],
+        ("plot_loops", "identification"): of["loops"].sheet.panels,
+        ("plot_residual", "identification"): of["residuals"].sheet.panels,
+        ("plot_spectrum", "budget"): spectra.sheet.panels,
+        ("plot_pointing_errors", "budget"): distributed.sheet.panels,
+        ("plot_contributions", "budget"): contributed.sheet.panels,
+        ("plot_margin_map", "study"): margin_map(result("study")).sheet.panels,
+        ("plot_contacts", "day"): contacts_figure(day).sheet.panels,
+    }
+
+
+@pytest.mark.promise("plots-1")
+def test_curves_colours_and_units_are_those_of_the_report():
+    for (plot, name), panels in drawn_by_the_report().items():
+        for ax, panel in zip(listed(getattr(plots, plot)(result(name))), panels, strict=True):
+            lines = [line for line in ax.lines if line.get_transform() == ax.transData]
+            for line, mark in zip(lines, panel.all_of(Line), strict=True):
+                assert_array_equal(line.get_ydata(), mark.y)
+                assert mpl.colors.same_color(line.get_color(), mark.colour)
+            bars = [patch.get_facecolor() for each in ax.containers for patch in each.patches]
+            for bar, colour in zip(bars, [b.colour for b in panel.all_of(Bars) for _ in b.at], strict=True):
+                assert mpl.colors.same_color(bar[:3], colour)
+            assert one_line(ax.get_ylabel()) in ("", one_line(panel.y.title)), plot
+
+
+@pytest.mark.promise("plots-5", "plots-11")
 def test_a_bode_plot_shows_the_table_the_model_and_its_confidence():
     fit, t = result("fit"), table(1)
     size, phase = plots.plot_bode(fit)
@@ -264,6 +306,7 @@ def test_a_bode_plot_shows_the_table_the_model_and_its_confidence():
     ]
 
 
+@pytest.mark.promise("plots-11")
 def test_the_bands_of_a_fitted_model_are_the_confidence_of_its_gain_and_of_its_phase():
     fit = result("fit")
     for which, ax in enumerate(plots.plot_bode(fit)):
@@ -274,6 +317,7 @@ def test_the_bands_of_a_fitted_model_are_the_confidence_of_its_gain_and_of_its_p
         assert_allclose(top, y + 1.96 * (np.degrees(error) if which else error), rtol=1e-9)
 
 
+@pytest.mark.promise("plots-11")
 def test_the_confidence_of_a_model_is_that_of_its_gain_and_what_draws_of_noise_do():
     fit, t = result("fit"), table(1)
     along, across = fit.response_errors([fit.band_hz[0]])
@@ -295,6 +339,7 @@ def test_the_confidence_of_a_model_is_that_of_its_gain_and_what_draws_of_noise_d
     assert_allclose(np.std(np.angle(values / mean), axis=0, ddof=1), across, rtol=0.3)
 
 
+@pytest.mark.promise("plots-11")
 def test_a_bode_plot_of_a_measured_response_has_its_confidence():
     found = result("response")
     size, _ = plots.plot_bode(found)
@@ -302,6 +347,16 @@ def test_a_bode_plot_of_a_measured_response_has_its_confidence():
     top = np.abs(found.response[:, 0, 0]) + 1.96 / math.sqrt(2.0) * found.standard_error[:, 0, 0]
     assert np.isin(top, corners[:, 1]).all()
     assert size.get_ylabel() == "gain (output/input)"
+
+
+@pytest.mark.promise("plots-11")
+def test_the_band_of_an_identification_is_that_of_its_measured_response():
+    of = result("identification").linear.response
+    size, _ = plots.plot_bode(result("identification"))
+    corners = size.patches[0].get_path().vertices
+    top = 1e6 * (np.abs(of.response[:, 0, 0]) + 1.96 / math.sqrt(2.0) * of.standard_error[:, 0, 0])
+    found = [corners[corners[:, 0] == each, 1].max() for each in of.freq_hz]
+    assert_allclose(found, top, rtol=1e-9)
 
 
 def test_a_bode_plot_of_an_identification_has_the_model_where_the_measured_points_less_their_residual_are():
@@ -315,6 +370,7 @@ def test_a_bode_plot_of_an_identification_has_the_model_where_the_measured_point
     assert np.max(np.abs(drawn / beyond - 1.0)) > 0.01
 
 
+@pytest.mark.promise("plots-2")
 def test_loops_show_what_a_line_leaves():
     loop = result("loop")
     left, right = plots.plot_loops(loop)
@@ -326,6 +382,19 @@ def test_loops_show_what_a_line_leaves():
     assert len(several[0].lines) == 2 and len(left.lines) == 1
 
 
+@pytest.mark.promise("plots-3")
+def test_loops_have_their_drive_in_volts_and_the_loop_of_an_inverse_has_it_in_radians():
+    model = PrandtlIshlinskii((0.0, 1.0), (40e-6, 6e-6))
+    loop, back = model.loop(5.0, freq_hz=1.0), model.inverted().loop(200e-6, freq_hz=1.0)
+    for left, right in (plots.plot_loops(loop), plots.plot_loops(back)):
+        assert left.get_xlabel() == right.get_xlabel() == "drive about the bias (V)"
+        assert (left.get_ylabel(), right.get_ylabel()) == ("output (mrad)", "output less line (µrad)")
+    assert_allclose(back.drive_v.max(), 200e-6)  # radians, where the label says volts
+    wanted = np.concatenate([np.linspace(0.0, end, 400) for end in (200e-6,)] + [back.drive_v])
+    assert 4.0 < model.inverse(wanted, 1e-3).max() < 6.0
+
+
+@pytest.mark.promise("plots-2")
 def test_a_spectrum_gathers_to_the_rms():
     found = result("runs")
     left, right = plots.plot_spectrum(found)
@@ -390,6 +459,7 @@ def test_axes_that_move_together_have_ticks_and_titles_at_the_outer_ones_only():
     assert [ax.get_xlabel() for ax in plots.plot_bode(fit, axes=list(together))] == ["", "frequency (Hz)"]
 
 
+@pytest.mark.promise("plots-7")
 def test_a_second_result_on_the_same_axes_hides_nothing_of_the_first():
     slow, fast = shaken(SpectralLine(URAD, 0.5)), shaken(SpectralLine(URAD, 500.0))
     alone = [ax.get_xlim() for ax in (plots.plot_spectrum(slow)[0], plots.plot_spectrum(fast)[0])]
@@ -418,6 +488,7 @@ def test_limits_that_the_sheet_does_not_set_stay_as_matplotlib_has_them():
     assert given.get_xlim()[1] > sine.trace.time_s[-1]
 
 
+@pytest.mark.promise("plots-6")
 def test_long_titles_are_broken_where_axes_are_small_and_long_legends_stand_above():
     _, small = pyplot.subplots(2, figsize=(3.5, 3.0), layout="constrained")
     plots.plot_spectrum(result("vibration"), axes=small)
@@ -429,6 +500,37 @@ def test_long_titles_are_broken_where_axes_are_small_and_long_legends_stand_abov
     wide = plots.plot_margin_map(result("study"))
     wide.figure.canvas.draw()
     assert wide.get_legend().get_window_extent().y1 < wide.get_window_extent().y1
+
+
+@pytest.mark.promise("plots-6")
+def test_letters_have_the_size_that_is_set():
+    for size in (6.0, 13.0):
+        with mpl.rc_context({"font.size": size, "axes.labelsize": "medium", "xtick.labelsize": "medium"}):
+            ax = plots.plot_contacts(result("day"))
+            assert {ax.xaxis.label.get_size(), ax.get_xticklabels()[0].get_size()} == {size}
+
+
+@pytest.mark.promise("plots-9")
+def test_a_colour_bar_takes_its_room_from_the_axes_that_it_belongs_to():
+    figure, (one, other) = pyplot.subplots(1, 2)
+    before = [ax.get_position().width for ax in (one, other)]
+    plots.plot_margin_map(result("study"), axes=one)
+    assert one.get_position().width < 0.95 * before[0]
+    assert other.get_position().width == before[1]
+    assert figure.axes[2].get_position().x1 <= other.get_position().x0
+
+
+@pytest.mark.promise("plots-8")
+def test_a_legend_of_several_panels_stands_above_a_new_figure_and_in_the_first_of_given_axes():
+    new = plots.plot_loops(result("identification"))
+    figure = new[0].figure
+    figure.canvas.draw()
+    (legend,) = figure.legends
+    assert legend.get_window_extent().y0 > max(ax.get_window_extent().y1 for ax in new)
+    _, given = pyplot.subplots(new.size, 1)
+    first, *others = plots.plot_loops(result("identification"), axes=given)
+    assert [text.get_text() for text in first.get_legend().get_texts()] == [t.get_text() for t in legend.get_texts()]
+    assert all(ax.get_legend() is None for ax in others)
 
 
 def test_a_figure_is_drawn_with_the_words_as_they_are():
@@ -474,8 +576,23 @@ def test_every_kind_of_mark_is_drawn():
     assert not second.get_yticks().size
 
 
+@pytest.mark.parametrize(("anchor", "part"), [("start", 0.0), ("middle", 0.5), ("end", 1.0)])
+def test_the_box_of_a_text_lies_behind_it_whichever_side_stands_at_its_place(anchor, part):
+    sheet, (panel,) = grid(6.0, 4.0, 1, 1)
+    panel.add(Words("a relay", 0.5, 0.5, of_panel="xy", anchor=anchor, box=True))
+    drawn = svg.svg_of(sheet)
+    left, wide = map(float, re.search(r'<rect x="(\S+)" y="\S+" width="(\S+)" \S+ \S+ fill-opacity', drawn).groups())
+    place, words = re.search(r'<text x="(\S+)" ([^>]*)>a relay<', drawn).groups()
+    assert ("text-anchor" in words, wide > 10.0) == (anchor != "start", True)
+    assert left + part * wide == pytest.approx(float(place), abs=0.02)
+
+
 # ------------------------------------------------------------------------------------------------------------ refusals
-@pytest.mark.parametrize("plot", ["bode", "loops", "residual", "spectrum", "margin_map", "contacts"])
+@pytest.mark.promise("plots-4")
+@pytest.mark.parametrize(
+    "plot",
+    ["bode", "loops", "residual", "spectrum", "pointing_errors", "contributions", "margin_map", "contacts"],
+)
 def test_another_result_is_refused_with_what_can_be_plotted(plot):
     name = f"plot_{plot}"
     taken = {each for other, each, _ in PLOTS if other == name}
@@ -527,6 +644,8 @@ def test_what_has_nothing_to_show_is_refused():
         axes_of(empty("no contact"))
 
 
+@pytest.mark.promise("plots-1")
+@pytest.mark.promise("readme-22")
 def test_without_matplotlib_one_sentence_says_how_to_install_it(monkeypatch):
     fit = result("fit")
     for name in [each for each in sys.modules if each.partition(".")[0] == "matplotlib"]:
@@ -555,6 +674,46 @@ def test_the_examples_of_the_page_run(tmp_path, monkeypatch):
         exec(block, names)
     assert len(blocks) >= 2
     assert {path.name for path in tmp_path.iterdir()} == set(re.findall(r'savefig\("([^"]+)"', PAGE))
+
+
+TITLES = {
+    ("plot_bode", "fit"): [("", "gain (output/input)"), ("frequency (Hz)", "phase (°)")],
+    ("plot_loops", "loop"): [
+        ("drive about the bias (V)", "output (mrad)"),
+        ("drive about the bias (V)", "output less line (µrad)"),
+    ],
+    ("plot_residual", "run"): [("time (s)", "pointing error (µrad)")],
+    ("plot_residual", "fit"): [("frequency (Hz)", "size (output/input)")],
+    ("plot_spectrum", "vibration"): [
+        ("frequency (Hz)", "spectrum of one axis (µrad²/Hz)"),
+        ("frequency (Hz)", "rms below that frequency, one axis (µrad)"),
+    ],
+    ("plot_spectrum", "budget"): [
+        ("", "spectrum, all axes (µrad²/Hz)"),
+        ("frequency (Hz)", "weight of the window (1)"),
+    ],
+    ("plot_pointing_errors", "budget"): [
+        ("radial error (µrad)", "larger errors (%)"),
+        ("error about y (µrad)", "larger errors (%)"),
+    ],
+    ("plot_contributions", "budget"): [("contribution (µrad)", "")] * 2,
+    ("plot_margin_map", "links"): [("data rate (Mbit/s)", "pointing error (µrad)")],
+    ("plot_contacts", "contacts"): [("hours since the epoch", "")],
+}
+
+
+@pytest.mark.promise("plots-2")
+def test_the_table_of_the_page_has_what_each_function_takes_and_draws():
+    rows = re.findall(r"^\| `(plot_\w+)` \| (.+) \| (.+) \|$", PAGE, re.MULTILINE)
+    for function, taken, _ in rows:
+        kinds = set()
+        for plot, name, _ in PLOTS:
+            several = result(name) if plot == function else ()
+            kinds |= {type(each).__name__ for each in (several if isinstance(several, tuple) else [several])}
+        assert kinds == set(re.findall(r"`(\w+)`", taken)), function
+    for (plot, name), titles in TITLES.items():
+        drawn = listed(getattr(plots, plot)(result(name)))
+        assert [(one_line(ax.get_xlabel()), one_line(ax.get_ylabel())) for ax in drawn] == titles, plot
 
 
 def test_the_page_names_each_function():

@@ -9,13 +9,14 @@ import re
 import xml.etree.ElementTree as ET
 from dataclasses import replace
 from html.parser import HTMLParser
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import xarray as xr
 
 from microrad import report
-from microrad.core import folder
+from microrad.core import folder, machine
 from microrad.link.requirement import Requirement
 from microrad.mission import file as missionfile
 from microrad.report.page.templates import inputs_view
@@ -29,8 +30,10 @@ from microrad.report.requirements import nearest, nearness
 from microrad.report.study import chain, page, words
 from microrad.report.study import contributors as requirement_views
 from microrad.report.tables import Table
+from microrad.report.view import Verbatim
 from microrad.study import study
 from microrad.study.pointing_penalty import Cost
+from places import ROOT
 from report_pages import assert_sound
 from shipped import SHIPPED, edited_file, plain_drawn, plain_study
 
@@ -84,6 +87,7 @@ def parsed(text):
     return links
 
 
+@pytest.mark.promise("decisions-1", "report-2", "report-3")
 def test_the_page_loads_nothing(written):
     text = (written / "report.html").read_text(encoding="utf-8")
     links = parsed(text)
@@ -97,6 +101,7 @@ def test_the_page_loads_nothing(written):
     assert not re.search(r"url\((?!#)", styles)
 
 
+@pytest.mark.promise("report-6")
 def test_the_page_opens_with_the_verdict_and_keeps_its_order(written, paper):
     text = (written / "report.html").read_text(encoding="utf-8")
     links = parsed(text)
@@ -134,6 +139,17 @@ def test_the_page_opens_with_the_verdict_and_keeps_its_order(written, paper):
     assert text.count("<figure ") == len(re.findall('<figure [^>]*id="figure-', text))
 
 
+@pytest.mark.promise("link-1")
+def test_the_links_stand_in_the_report_with_what_the_residual_costs(written, paper):
+    visible = " ".join(parsed((written / "report.html").read_text(encoding="utf-8")).text)
+    for title in ("Open-loop pointing", "Communication", "Beacon", "Answer", "Acquisition", "What moves the margin"):
+        assert title in visible, title
+    begin = visible.index("What pointing costs the link")
+    case = paper.performance.case("sine of 25 Hz", "PID + inverse", "given")
+    for shown in (f"{case.mean_loss_db:.2f}", f"{case.outage_loss_db:.2f}", f"{case.margin_db:+.2f}"):
+        assert shown in visible[begin:], shown
+
+
 def test_a_warning_of_a_budget_stands_once_on_the_page(written, paper):
     text = html.unescape((written / "report.html").read_text(encoding="utf-8"))
     assert len(paper.links.warnings) == 3
@@ -141,6 +157,7 @@ def test_a_warning_of_a_budget_stands_once_on_the_page(written, paper):
     assert text.count("What \u201c!\u201d marks in the tables stands under Warnings.") == 1
 
 
+@pytest.mark.promise("report-6")
 def test_what_limits_the_link_stands_below_the_verdict_and_a_warning_of_the_day_once(written, paper):
     text = html.unescape((written / "report.html").read_text(encoding="utf-8"))
     rests = text[text.index("What the verdict rests on:") : text.index('id="terms"')]
@@ -160,6 +177,7 @@ def test_terms_are_explained_below_the_verdict_and_stand_on_the_page(written):
     assert len(re.findall("<li>", text[begin:end])) == len(words.TERMS)
 
 
+@pytest.mark.promise("report-6", "report-8")
 def test_each_requirement_stands_with_its_margin_and_its_contributor(written, paper):
     rows = requirement_views.judged_table(paper, paper.requirements).rows
     assert [row[4].mark for row in rows] == ["derived", "PASS", "PASS", "FAIL", "FAIL"]
@@ -206,6 +224,7 @@ def test_a_requirement_moved_most_by_a_share_says_by_what_factor(paper):
     assert "channel.loss" in said([level, replace(swing, margin_high_db=9.0 + 1e-12)])  # equal but for a rounding
 
 
+@pytest.mark.promise("report-6")
 def test_each_box_of_the_chain_holds_its_own_numbers(paper):
     boxes = {box.name: box for box in chain.stages(paper)}
     day = paper.day
@@ -250,6 +269,7 @@ def test_each_box_of_the_chain_holds_its_own_numbers(paper):
     )
 
 
+@pytest.mark.promise("report-6")
 def test_the_chain_shows_the_numbers_of_the_study_in_its_boxes(written, paper):
     boxes = chain.stages(paper)
     assert [b.name for b in boxes] == ["Orbit", "Link", "Pointing", "Mirror", "Loop", "Residual", "Volume", "Verdict"]
@@ -273,6 +293,7 @@ def test_the_chain_shows_the_numbers_of_the_study_in_its_boxes(written, paper):
     assert marks[5] == marks[7] == "✗ FAIL"
 
 
+@pytest.mark.promise("report-6")
 def test_the_virtual_bench_stands_where_the_paper_measures(written, paper):
     found = bench.chirp()
     assert 96.9 <= found.fit_percent < 97.1
@@ -310,6 +331,7 @@ def test_another_kind_of_mirror_leaves_the_bench_out(no_scan, tmp_path):
     assert "Fig. 4, what differs from the paper: Not drawn: the mission's mirror is not of the paper's kind" in visible
 
 
+@pytest.mark.promise("report-6")
 def test_table_2_sets_the_mission_beside_the_paper(written, paper):
     rows = {row[0]: row[1:] for row in paper_views.links_tables(paper)[0].rows}
     assert rows["Pointing accuracy"] == ("300 µrad", "300 µrad", "10 µrad", "10 µrad")
@@ -321,6 +343,7 @@ def test_table_2_sets_the_mission_beside_the_paper(written, paper):
     assert paper_views.projects_table(paper).rows[-1] == ("", f"this mission: {paper.file.mission.name}", "", "300", "")
 
 
+@pytest.mark.promise("report-6")
 def test_each_figure_of_the_paper_is_the_one_of_ours_that_stands_for_it(paper):
     drawn = plain_drawn()
     found = {view.title: view for view in paper_views.paper_view(paper, (*drawn.study, *drawn.bench)).views}
@@ -349,6 +372,7 @@ def test_each_figure_of_the_paper_is_the_one_of_ours_that_stands_for_it(paper):
     assert [block.text.partition(": ")[2][:10] for block in fourth.blocks] == ["Not drawn:"]
 
 
+@pytest.mark.promise("report-6")
 def test_the_drawings_hold_the_numbers_of_mission_and_bench(paper):
     relay, p = drawings.relay(paper), paper.open_loop
     widths = {row["text"]: row["width"] for row in relay["errors"]}
@@ -385,6 +409,7 @@ def test_the_page_holds_what_the_paper_is_judged_by(written):
         assert claim in text
 
 
+@pytest.mark.promise("report-2")
 def test_each_figure_is_an_svg_with_its_data(written):
     drawn = plain_drawn().every
     assert [f.name for f in drawn] == [
@@ -431,6 +456,7 @@ def test_the_map_shows_the_contours_with_their_labels_and_the_band_of_the_readin
     assert "6 dB" not in words  # no other contour has a label
 
 
+@pytest.mark.promise("report-2", "report-13")
 def test_results_carry_units_and_the_numbers_of_the_study(written, paper):
     tree = xr.open_datatree(written / "results.nc", engine="h5netcdf")
     try:
@@ -450,11 +476,20 @@ def test_results_carry_units_and_the_numbers_of_the_study(written, paper):
         tree.close()
 
 
+@pytest.mark.promise("decisions-1", "report-2", "report-6")
 def test_the_manifest_names_mission_versions_and_every_file(written, paper):
     manifest = json.loads((written / "manifest.json").read_text(encoding="utf-8"))
     assert manifest["mission"]["text"] == SHIPPED.read_text(encoding="utf-8")
     assert manifest["mission"]["sha256"] == hashlib.sha256(SHIPPED.read_bytes()).hexdigest()
     assert {"python", "microrad", "numpy", "numba"} <= set(manifest["versions"])
+    assert manifest["machine"] == machine.machine()
+    drawn = "64 runs; seed 1 of [acquisition], 4000 runs; seed 1 of [operations], 20 runs; seed 1 of the virtual bench"
+    assert drawn in manifest["randomness"]
+    shown = " ".join(parsed((written / "report.html").read_text(encoding="utf-8")).text).rpartition(
+        "This page holds what"
+    )[2]
+    for said in (manifest["mission"]["sha256"], drawn, f"numpy {manifest['versions']['numpy']}", "processor: "):
+        assert said in shown
     assert manifest["summary"]["margin_db"]["communication_at_residual"] == paper.achieved.margin_db
     files = {str(p.relative_to(written)): p for p in written.rglob("*") if p.is_file() and p.name != "manifest.json"}
     assert set(manifest["files_sha256"]) == set(files)
@@ -462,6 +497,7 @@ def test_the_manifest_names_mission_versions_and_every_file(written, paper):
         assert manifest["files_sha256"][name] == hashlib.sha256(path.read_bytes()).hexdigest()
 
 
+@pytest.mark.promise("report-3")
 def test_two_runs_write_the_same_page_and_figures(paper, written, tmp_path):
     """The first one's figures may be another process's."""
     report.write(paper, tmp_path / "again")
@@ -469,6 +505,7 @@ def test_two_runs_write_the_same_page_and_figures(paper, written, tmp_path):
         assert (tmp_path / "again" / path.relative_to(written)).read_bytes() == path.read_bytes()
 
 
+@pytest.mark.promise("report-1", "report-22")
 def test_results_are_never_replaced_silently(paper, tmp_path, monkeypatch):
     monkeypatch.setattr(report, "study_figures", lambda *args: page.StudyFigures())
     target = tmp_path / "out"
@@ -483,6 +520,7 @@ def test_results_are_never_replaced_silently(paper, tmp_path, monkeypatch):
     assert sorted(p.name for p in tmp_path.iterdir()) == ["out"]
 
 
+@pytest.mark.promise("report-1", "report-22")
 @pytest.mark.parametrize("manifest", [None, "{}", "not JSON", '{"versions": {"other": "1"}}', '{"versions": 3}'])
 def test_a_folder_of_others_is_never_replaced(tmp_path, manifest):
     (tmp_path / "thesis.txt").write_text("years of work")
@@ -500,6 +538,7 @@ def test_a_file_in_the_place_of_the_folder_is_refused(tmp_path):
         report.check_folder(path, overwrite=True)
 
 
+@pytest.mark.promise("report-1")
 @pytest.mark.parametrize("error", [KeyboardInterrupt, OSError(28, "No space left on device"), MemoryError])
 def test_an_interrupted_write_leaves_nothing_and_keeps_the_old(tmp_path, error):
     target = tmp_path / "out"
@@ -543,6 +582,7 @@ def test_a_hopeless_link_is_reported_not_refused(tmp_path):
     assert "not even on axis" in report.write(hopeless, tmp_path / "out").read_text(encoding="utf-8")
 
 
+@pytest.mark.promise("decisions-1", "report-6")
 def test_verdict_and_summary_say_the_same(paper):
     text, data = report.verdict_text(paper), report.summary(paper)
     assert data["closes"] is True
@@ -568,6 +608,7 @@ def test_a_drive_beyond_the_identified_rate_is_the_first_thing_said(no_scan, pap
     assert "Not to be relied on" not in report.verdict_text(paper)
 
 
+@pytest.mark.promise("report-6")
 def test_warnings_of_a_requirement_that_is_missed_stand_first(paper, monkeypatch):
     """Those of the others follow by what is to spare, and what puts the verdict in doubt is before both."""
     by = {r.subject: r for r in paper.requirements}
@@ -593,6 +634,36 @@ def test_warnings_of_a_requirement_that_is_missed_stand_first(paper, monkeypatch
     assert found["The loop that is judged"] == own[::-1]
 
 
+@pytest.mark.promise("report-6")
+def test_warnings_stand_in_the_groups_that_the_page_of_the_report_names(paper, monkeypatch):
+    monkeypatch.setattr(words.fine_pointing_words, "warnings", lambda *_: (["own"], ["other"]))
+    for name, said in (("_of_verdict", [words.Warned("doubt")]), ("_of_runs", ["a limit"]), ("_of_budget_loop", [])):
+        monkeypatch.setattr(words, name, lambda study, said=said: said)
+    monkeypatch.setattr(words, "placards", lambda sources: [SimpleNamespace(text="beyond")])
+    found = words.ranked_warnings(replace(paper, fine_pointing=object()))
+    assert all(found.values())
+    page_of_report = (ROOT / "docs" / "report.md").read_text(encoding="utf-8")
+    listed = re.search("what they put in doubt: (.*?): limits met", page_of_report)[1]
+    assert sorted(each.lower() for each in found) == sorted(listed.split(", "))
+
+
+@pytest.mark.promise("decisions-1", "report-6")
+def test_the_mirror_stands_with_its_model_the_margins_and_each_run_with_its_counts(paper):
+    (view,) = (each for each in page.study_views(paper, plain_drawn()) if each.title == "Mirror and loop")
+    (model,) = (block.text for block in view.blocks if isinstance(block, Verbatim))
+    assert model.splitlines() == [line for line in str(paper.summary).splitlines() if "  warning" not in line]
+    margins, runs = (block for block in view.blocks if isinstance(block, Table))
+    assert [row[0] for row in margins.rows][:2] == ["gain margin", "phase margin"]
+    assert (runs.folded, len(runs.rows)) == (f"Each of {len(paper.runs)} runs, with its counts", len(paper.runs))
+    for row, run in zip(runs.rows, paper.runs, strict=True):
+        c = run.trace.counts
+        assert row[:3] == [run.mirror, run.controller, f"{run.freq_hz:g} Hz"]
+        assert row[3:5] == [f"{1e6 * run.trace.peak_rad:.2f} µrad", f"{1e6 * run.trace.rms_rad:.2f} µrad"]
+        counts = c.clamped + c.inverse_clamped, c.saturated, c.slew_limited, c.alternating
+        assert row[5:] == [str(count) for count in counts]
+
+
+@pytest.mark.promise("report-6")
 def test_warnings_stand_by_what_they_cost_in_decibels(paper):
     """The mission's range is exceeded by 4.8 %, 0.41 dB by its square; what the others cost is not known."""
     (costly,) = (w for w in words._of_day(paper) if w.text.startswith("communication.distance is 42000 km"))
@@ -626,6 +697,7 @@ def test_the_headline_names_the_link_that_does_not_close(no_scan, tmp_path):
     assert "communication" not in said
 
 
+@pytest.mark.promise("report-8")
 def test_an_amplifier_at_its_limits_is_named_as_the_cause_and_claims_are_not_judged(no_scan, tmp_path):
     weak = study.run_study(edited_file(tmp_path, ('output_max = "180 V"', 'output_max = "100 V"'), day=False))
     assert "What limits it: the amplifier's limits (" in report.verdict_text(weak, 160, verbose=True)
@@ -633,6 +705,7 @@ def test_an_amplifier_at_its_limits_is_named_as_the_cause_and_claims_are_not_jud
     assert any("beyond the amplifier's range" in w for w in report.summary(weak)["warnings"])
 
 
+@pytest.mark.promise("report-6")
 @pytest.mark.usefixtures("no_scan")
 def test_a_changed_value_does_not_keep_the_papers_name(paper, tmp_path):
     assert missionfile.changed_from_shipped(paper.file.sources) == ()
@@ -648,7 +721,9 @@ def test_a_changed_value_does_not_keep_the_papers_name(paper, tmp_path):
         assert [table.rows[k][0].text for k in table.filters["changed from what is shipped"]] == keys
         assert f"{len(keys)} changed from what is shipped" in table.folded
     for comment in (" # my own", ""):  # a comment of one's own, or none, hides no change
-        text = re.sub('leo_aperture = "5 cm".*', f'leo_aperture = "6 cm"{comment}', SHIPPED.read_text(encoding="utf-8"))
+        text = re.sub(
+            'leo_aperture = "5 cm".*', f'leo_aperture = "67 mm"{comment}', SHIPPED.read_text(encoding="utf-8")
+        )
         (tmp_path / "own.toml").write_text(text, encoding="utf-8")
         (table,) = inputs_view(missionfile.load_mission(tmp_path / "own.toml").sources).blocks
         rows = table.filters["changed from what is shipped"]

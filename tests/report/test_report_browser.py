@@ -130,6 +130,7 @@ def visible(figure, selector):
     return figure.query_selector(selector).is_visible()
 
 
+@pytest.mark.promise("report-2", "report-3", "report-11", "report-12")
 @pytest.mark.parametrize(("name", "width"), SEEN)
 def test_each_figure_comes_alive_and_nothing_is_loaded_or_complained_of(opened, files, name, width):
     assert files(name).stat().st_size <= MOST_BYTES
@@ -167,6 +168,7 @@ def assert_no_barrier(page):
     assert [(each["id"], each["impact"], each["nodes"][0]["html"][:150]) for each in found] == []
 
 
+@pytest.mark.promise("report-12")
 @pytest.mark.parametrize("width", [400, pytest.param(1280, marks=pytest.mark.endurance)])
 def test_the_page_of_budgets_is_pictures_with_their_numbers_below(opened, files, width):
     here = opened("budget", width)
@@ -179,6 +181,19 @@ def test_the_page_of_budgets_is_pictures_with_their_numbers_below(opened, files,
     assert_no_barrier(here.page)
 
 
+GROUND = "selector => getComputedStyle(document.querySelector(selector)).backgroundColor"
+
+
+@pytest.mark.promise("report-9")
+def test_the_page_is_dark_where_the_browser_is_and_its_figures_stay_white(opened):
+    dark, light, white = "rgb(15, 20, 25)", opened("budget"), "rgb(255, 255, 255)"
+    assert light.page.evaluate(GROUND, "body") == white
+    here = opened("budget", color_scheme="dark")
+    assert here.page.evaluate(GROUND, "body") == dark
+    assert here.page.evaluate(GROUND, ":is(.picture, .drawings):has(svg)") == white
+
+
+@pytest.mark.promise("report-11")
 def test_a_legend_switches_a_curve_by_the_keyboard(report_page):
     here = report_page
     figure = here.figure("Fig. 8")
@@ -194,6 +209,7 @@ def test_a_legend_switches_a_curve_by_the_keyboard(report_page):
     here.page.wait_for_function(f"([figure, count]) => ({shown})(figure) === count", arg=[figure, before])
 
 
+@pytest.mark.promise("report-11")
 def test_hovering_gives_values_with_units(report_page):
     here = report_page
     figure = here.figure("Fig. 2")
@@ -204,6 +220,7 @@ def test_hovering_gives_values_with_units(report_page):
     assert re.search(r"data rate: [\d.]+ Mbit/s.*pointing error: [\d.]+ µrad.*link margin: [\d.−]+ dB", said)
 
 
+@pytest.mark.promise("report-11")
 def test_zoom_and_reset(report_page):
     here = report_page
     figure = here.figure("Fig. 5")
@@ -236,6 +253,7 @@ def test_a_figure_follows_the_width_of_the_page(report_page):
     here.page.wait_for_function(f"figure => !({narrow})(figure)", arg=figure)
 
 
+@pytest.mark.promise("report-2", "report-10", "report-11")
 def test_the_pictures_print_and_the_buttons_do_not(report_page, tmp_path):
     here = report_page
     for figure in here.figures()[:3]:
@@ -253,6 +271,7 @@ def test_the_pictures_print_and_the_buttons_do_not(report_page, tmp_path):
 SHOWN = "each => each.getBoundingClientRect().height > 2 * each.querySelector('summary').getBoundingClientRect().height"
 
 
+@pytest.mark.promise("report-10")
 @pytest.mark.parametrize(
     "name",
     [
@@ -273,6 +292,7 @@ def test_paper_is_wide_enough_and_shows_what_is_folded(opened, name):
     assert not any(each.is_visible() for each in here.figures("nav, button, details.data"))
 
 
+@pytest.mark.promise("report-11")
 def test_without_scripts_every_figure_is_its_picture(opened):
     here = opened(unfolded=False, java_script_enabled=False)
     assert len(here.figures("figure")) > 10
@@ -282,6 +302,7 @@ def test_without_scripts_every_figure_is_its_picture(opened):
     assert here.page.query_selector(".interactive") is None
 
 
+@pytest.mark.promise("report-11")
 def test_points_are_saved_as_a_table_where_there_is_no_folder(opened):
     here = opened("day")
     figure = here.figure("From recording to delivery")
@@ -302,6 +323,7 @@ HERE = """id => {
 """Whether something that was folded is open and in view."""
 
 
+@pytest.mark.promise("report-9")
 def test_a_link_opens_what_is_folded_about_its_place(opened):
     inner, figure = "by-other-readings", "figure-fig5-hysteresis-loops"
     here = opened(unfolded=False, anchor=f"#{inner}")
@@ -326,6 +348,7 @@ def test_a_link_opens_what_is_folded_about_its_place(opened):
     assert here.said == []
 
 
+@pytest.mark.promise("report-9")
 def test_each_heading_links_to_itself(report_page):
     link = "h.id ? h.lastChild : h.closest('details').previousElementSibling"
     pair = f"[h.id || h.closest('details').id, ({link}).hash]"
@@ -338,6 +361,7 @@ def test_each_heading_links_to_itself(report_page):
 BOXES = "[...document.querySelectorAll('.chain li')].map(each => Math.round(each.getBoundingClientRect().left))"
 
 
+@pytest.mark.promise("report-9")
 def test_contents_stand_open_and_the_chain_in_rows_where_there_is_room_for_them(folded_page, opened):
     here = folded_page
     lefts = here.page.evaluate(BOXES)
@@ -357,6 +381,8 @@ def test_contents_stand_open_and_the_chain_in_rows_where_there_is_room_for_them(
     assert narrow.page.is_visible(first)
 
 
+@pytest.mark.promise("mirror-file-6")
+@pytest.mark.promise("report-6", "report-9")
 def test_buttons_and_search_leave_the_rows_that_they_name(report_page):
     """By the keys: what was just unfolded may still move away from under a pointer."""
     here = report_page

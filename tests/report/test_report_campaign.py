@@ -333,6 +333,7 @@ def boxes(figure):
 
 
 # --------------------------------------------------------------------------------------------------------- every case
+@pytest.mark.promise("report-12")
 def test_each_page_is_whole_loads_nothing_and_escapes_its_texts(case):
     text = case.html
     page = Page(text)
@@ -362,6 +363,7 @@ def test_no_picture_is_empty_or_has_texts_that_overlap(case):
                     )
 
 
+@pytest.mark.promise("campaigns-31")
 def test_the_terminal_has_the_verdict_first_and_the_progress_last_within_its_width(case):
     for width in (80, 140):
         text = campaign_text(case.summary, width)
@@ -385,6 +387,8 @@ def test_the_data_is_json_without_arrays_and_says_the_same(case):
 
 
 # ------------------------------------------------------------------------------------------------------------- verdict
+@pytest.mark.promise("readme-12")
+@pytest.mark.promise("campaigns-31")
 @pytest.mark.parametrize(
     ("name", "said", "word"),
     [
@@ -490,6 +494,8 @@ def test_values_stand_in_the_users_units(number, unit, name, said):
     assert value(number, unit, name) == said
 
 
+@pytest.mark.promise("readme-12")
+@pytest.mark.promise("campaigns-1", "campaigns-31")
 def test_what_matters_names_the_inputs_that_matter_and_no_others():
     summary = summary_of(6)
     margin, residual = campaign_words.matters(summary)
@@ -506,6 +512,7 @@ def test_what_matters_names_the_inputs_that_matter_and_no_others():
     assert said.endswith("; Q2 = 0.41.")
 
 
+@pytest.mark.promise("campaigns-31")
 def test_the_tail_is_read_off_at_the_limit():
     tail = rayleigh_tail(2e-6)
     found = campaign_words.beyond(tail, 9e-6)
@@ -535,6 +542,7 @@ def test_the_tail_says_the_least_probability_that_is_known():
     assert rows[0][:2] == ("10 %", "4.29 µrad")
 
 
+@pytest.mark.promise("campaigns-31")
 @pytest.mark.parametrize(
     ("state", "done", "rate", "left", "said"),
     [
@@ -551,6 +559,7 @@ def test_the_progress_has_pace_and_time_left_while_it_runs(state, done, rate, le
     assert campaign_words.progress_words(summary) == said
 
 
+@pytest.mark.promise("campaigns-31", "campaigns-46")
 def test_failed_rows_stand_with_seed_and_reason_and_the_rest_is_counted():
     summary = summary_of(2, rows=60, failed=60)
     text, page = campaign_text(summary, 140), Page(campaign_page(summary))
@@ -592,6 +601,7 @@ def test_outputs_that_are_the_same_in_every_row_stand_in_a_sentence_not_in_the_t
 
 
 # ------------------------------------------------------------------------------------------------------------ pictures
+@pytest.mark.promise("campaigns-2", "campaigns-31")
 def test_sections_are_there_where_they_have_something_to_show_and_only_there():
     def drawn_in(name):
         return {key: len(figures) for key, figures in made(name).figures.items() if figures}
@@ -636,7 +646,7 @@ def test_an_axis_has_a_prefix_that_suits_its_values():
         ([2.0], "furlong", "", 1.0, "furlong"),
     ):
         found = scale(np.array(values), unit, name)
-        assert found.factor == pytest.approx(factor)
+        assert found.factor == pytest.approx(factor, rel=1e-12, abs=0.0)
         assert found.label == label
 
 
@@ -785,6 +795,7 @@ def unknown_beyond(summary, least, most):
     return replace(summary, cells=(replace(cell, outputs=outputs),))
 
 
+@pytest.mark.promise("campaigns-31")
 def test_a_quantile_that_the_rows_cannot_know_is_a_dash_and_is_not_in_the_picture():
     whole, few = summary_of(2), unknown_beyond(summary_of(2), 0.01, 0.99)
     headings, rows = campaign_tables.output_table(few.cells[0], 9)
@@ -817,6 +828,7 @@ def test_quantiles_come_in_pairs_and_those_known_first():
     assert campaign_tables.chosen_quantiles([replace(nine, quantiles=few)], 3) == [0.05, 0.5, 0.95]
 
 
+@pytest.mark.promise("readme-12")
 def test_the_page_has_the_intervals_of_the_quantiles():
     made_of = made("two inputs")
     median = made_of.summary.cells[0].outputs["margin"].quantiles[0.5]

@@ -5,6 +5,7 @@ import hashlib
 import html
 import io
 import json
+import math
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -19,9 +20,11 @@ from microrad.loop.pointing_loop.loop import assemble
 from microrad.mission.file import load_mission, with_contents
 from microrad.orbit import day as day_study
 from microrad.orbit.operations import OperationsError
+from microrad.report.day import tables
 from microrad.report.day import words as day_words
 from microrad.report.day.contact_run import contact_sentences, windows_table
 from microrad.report.day.figures import day_figures
+from microrad.report.quantities import duration, volume
 from microrad.report.results.manifest import manifest_of
 from microrad.study import contact_run, study
 from scenes import scene_of
@@ -70,6 +73,8 @@ def test_the_study_has_a_day_and_a_plan_but_no_contact_in_time_without_a_fine_lo
         assert contact_run.of_mission(m.operations, m.acquisition, links.data, found.day, links.finding, None) is None
 
 
+@pytest.mark.promise("readme-1", "report-6")
+@pytest.mark.promise("day-2")
 def test_the_page_answers_with_contacts_volumes_latencies_and_the_assumption(written, found):
     text = (written / "report.html").read_text(encoding="utf-8")
     begin = text.index('<h2 id="delivers">What the link delivers<')
@@ -79,6 +84,101 @@ def test_the_page_answers_with_contacts_volumes_latencies_and_the_assumption(wri
     for needed in ("15 times", "median", "99 % within", "What matters most", "GB", "Doppler"):
         assert needed in section
     assert section.count("<figure") == len(FIGURES) + 1
+
+
+@pytest.mark.promise("day-5")
+def test_the_table_of_contacts_has_both_ways_in_the_order_of_their_rise(found):
+    day = found.day
+    utc = day.view.pair.epoch.utc
+    wanted = [(e.contact, e, bit) for e, bit in zip(day.encounters, day.relay.carried_bit, strict=True)]
+    wanted += [(c, None, bit) for c, bit in zip(day.direct.contacts, day.direct.carried_bit, strict=True)]
+    wanted.sort(key=lambda item: item[0].start_s)
+    rows = tables.contacts_table(day).rows
+    for row, (contact, seen, bit) in zip(rows, wanted, strict=True):
+        assert row[1:4] == (
+            utc(contact.start_s)[:19].replace("T", " "),
+            utc(contact.end_s)[11:19],
+            f"{contact.duration_s / 60.0:.2f}",
+        )
+        assert row[9] == volume(bit)
+        causes = dict.fromkeys("mask" if "mask" in each else each for each in (contact.begins, contact.ends))
+        assert row[10] == " to ".join(causes)
+        if seen is None:
+            assert (row[0], *row[4:9]) == ("kiruna", "", "", "", "", f"{math.degrees(contact.highest_rad):.1f}")
+        else:
+            assert row[4:9] == (
+                f"{seen.range_least_m / 1e3:.0f} to {seen.range_most_m / 1e3:.0f}",
+                f"{seen.point_ahead_most_rad * 1e6:.1f}",
+                f"{seen.rate_most_rad_s * 1e6:.0f}",
+                f"{seen.doppler_most_hz / 1e9:.2f}",
+                "",
+            )
+    assert {"Earth", "mask", "Earth to Sun near the line of sight of LEO"} <= {row[10] for row in rows}
+
+
+@pytest.mark.promise("day-1", "day-5", "day-23")
+def test_the_ways_stand_side_by_side(found):
+    day = found.day
+    table = tables.ways_table(day)
+    assert table.headings == ("", "relay", "direct downlink")
+    rows = {row[0]: row[1:] for row in table.rows}
+    assert rows["could carry"] == (volume(day.relay.capacity_bit), volume(day.direct.capacity_bit))
+    assert rows["made by the instrument"] == (volume(32.4 * 8e9),) * 2
+    assert min(day.relay.capacity_bit, day.direct.capacity_bit) > day.relay.generated_bit
+    assert rows["longest time without contact"] == (duration(day.view.gap_s), duration(day.direct.gap_s))
+    assert rows["latency of what is kept, 99 %"] == (duration(day.relay.slow_s), duration(day.direct.slow_s))
+    never = SimpleNamespace(**{name: getattr(day.relay, name) for name in USED}, slow_s=math.inf)
+    assert tables.ways_table(replace(day, relay=never)).rows[-1][1] == "never"
+
+
+USED = (
+    "name",
+    "contacts",
+    "contact_s",
+    "gap_s",
+    "capacity_bit",
+    "failed_contacts",
+    "generated_bit",
+    "lost_bit",
+    "history",
+    "on_board_bit",
+    "arrived_bit",
+    "median_s",
+)
+
+
+@pytest.mark.promise("day-5")
+def test_assumptions_stand_by_how_far_they_move_the_ratio(found):
+    day = found.day
+    factors = [s.factor for s in day.swings]
+    assert factors == sorted(factors, reverse=True) and factors[0] > 1.5
+    table = tables.assumptions_table(day)
+    assert [heading.replace("\n", " ") for heading in table.headings[-3:]] == ["ratio", "99 % by relay", "99 % direct"]
+    assert list(dict.fromkeys(row[0] for row in table.rows)) == [s.name for s in day.swings]
+    named = day_words.assumption_words(day)[0]
+    assert named.startswith(
+        f"What matters most to the ratio of the two volumes, each assumption changed alone: {day.swings[0].name}"
+    )
+
+
+def test_latencies_depend_most_on_what_triples_them_whichever_side_is_as_it_is(found):
+    day, (doubled, tripled, *_) = found.day, found.day.swings
+
+    def late(s, here_s, low_s, high_s):
+        ends = zip(("here", "at_low", "at_high"), (here_s, low_s, high_s), strict=True)
+        return replace(s, **{end: replace(getattr(s, end), relay_slow_s=t, direct_slow_s=100.0) for end, t in ends})
+
+    swings = (late(doubled, 600.0, 600.0, 1200.0), late(tripled, 1800.0, 600.0, 1800.0))
+    said = day_words.assumption_words(replace(day, swings=swings))[-1]
+    assert said.startswith(f"How late data arrive depends most on {tripled.name}: ")
+
+
+@pytest.mark.promise("day-5")
+def test_the_reach_of_each_rate_is_said(found):
+    (closing,) = found.day.closings
+    assert closing.largest_range_m < found.day.view.largest("range_most_m")
+    said = day_words.rate_words(found.day)
+    assert f"has the demanded 3 dB for 300 Mbit/s up to {closing.largest_range_m / 1e3:.0f} km." in said
 
 
 def test_a_reach_that_follows_from_a_choice_says_so(found):
@@ -97,6 +197,7 @@ def test_each_claim_of_the_paper_about_contacts_is_judged(found):
     assert "99 % within" in claims["data reach the ground in almost real time"].ours
 
 
+@pytest.mark.promise("report-6")
 def test_each_figure_of_the_day_stands_with_its_data(written, found):
     names = [f.name for f in day_figures(found.day, found.contact)]
     assert names == [*FIGURES, "contact-run"]
@@ -124,6 +225,8 @@ def test_the_latency_curve_is_the_distribution(found):
     np.testing.assert_allclose(share, found.day.relay.latency.cdf(latency), rtol=0, atol=1e-12)
 
 
+@pytest.mark.promise("report-2", "report-13")
+@pytest.mark.promise("day-34")
 def test_results_hold_the_day(written, found):
     tree = xr.open_datatree(written / "results.nc", engine="h5netcdf")
     day = tree["day"]
@@ -148,6 +251,7 @@ def test_results_hold_the_day(written, found):
     tree.close()
 
 
+@pytest.mark.promise("report-2")
 def test_the_sessions_stand_as_csv_and_as_a_contact_plan(written, found):
     rows = list(csv.reader(io.StringIO((written / "sessions.csv").read_text(encoding="utf-8"))))
     assert len(rows) == 1 + len(found.plan.planned)
@@ -168,6 +272,7 @@ def test_the_summary_is_plain_data(found):
 # ----------------------------------------------------------------------------------------------- the contact in time
 
 
+@pytest.mark.promise("day-2", "day-26")
 def test_the_contact_of_the_mission_has_its_geometry(found):
     encounter = found.day.view.encounters[0]
     run = found.contact
@@ -181,6 +286,7 @@ def test_the_contact_of_the_mission_has_its_geometry(found):
     ].to == "slew"
 
 
+@pytest.mark.promise("day-26")
 def test_a_later_contact_is_free_from_the_end_of_the_one_before(found, fine, tmp_path):
     m = edited_file(tmp_path, ("number = 1 ", "number = 3 "), whole=True).mission
     run = contact_run.of_mission(m.operations, m.acquisition, found.links.data, found.day, found.links.finding, fine)
@@ -224,6 +330,7 @@ def test_contacts_of_several_days_are_told_in_all_and_by_the_day():
     assert told == "is in view 5 times, 200 min in all (2.5 times, 100 min a day)"
 
 
+@pytest.mark.promise("report-7")
 def test_a_mission_without_orbits_has_no_day(tmp_path, monkeypatch):
     monkeypatch.setattr(study.paper, "applies", lambda mission: False)
     text = SHIPPED.read_text(encoding="utf-8")

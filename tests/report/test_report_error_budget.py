@@ -25,6 +25,8 @@ from microrad.report.tables import Table
 from microrad.report.view import Points, View, views_text
 from report_pages import assert_sound
 
+P = 0.9973
+
 
 def tables(view):
     return [block for block in view.blocks if isinstance(block, Table)]
@@ -35,12 +37,15 @@ def looped():
     return looped_study()
 
 
+@pytest.mark.promise("pointing-49")
 def test_contributions_add_up_to_the_total_by_the_distribution(looped):
     for each in looped.error_budget.judged:
         parts = math.fsum(share.part_rad for share in each.shares)
         assert parts == pytest.approx(each.total.quantile_rad, rel=1e-3)
 
 
+@pytest.mark.promise("report-6")
+@pytest.mark.promise("pointing-47", "pointing-56")
 def test_the_page_has_every_source_with_its_class_statistic_origin_and_contribution(looped):
     (view,) = (each for each in study_views(looped, StudyFigures()) if each.title == "Pointing error budget")
     requirements, sources = tables(view)
@@ -65,6 +70,7 @@ def test_the_page_has_every_source_with_its_class_statistic_origin_and_contribut
     assert [each.title for each in inner] == ["code word: each source", "drift: each source"]
 
 
+@pytest.mark.promise("pointing-49", "pointing-63")
 def test_a_terminal_of_80_columns_has_all_of_it(looped):
     text = views_text(budget_view(looped.error_budget).blocks, 80)
     assert max(map(len, text.splitlines())) <= 80
@@ -72,6 +78,22 @@ def test_a_terminal_of_80_columns_has_all_of_it(looped):
         assert words in text
 
 
+@pytest.mark.promise("pointing-49")
+def test_the_row_of_a_source_has_its_moments_about_both_axes_and_what_may_become_of_it(looped):
+    """2 µrad at 3 sigma with gains of 1 and 0.5: in a mean over a window about both axes, and in nothing without it."""
+    of = next(each for each in looped.error_budget.judged if each.name == "code_word")
+    (view,) = (each for each in budget_view(looped.error_budget).views if each.title == "code word: each source")
+    (table,) = tables(view)
+    assert table.headings == ("source", "mean", "deviation", "weight", "total without it", "may be")
+    for row, share in zip(table.rows, of.shares, strict=False):
+        both = [micro(math.hypot(*share.mean_rad)), micro(math.hypot(*share.sigma_rad))]
+        assert len(share.mean_rad) == len(share.sigma_rad) == 2
+        assert [str(cell) for cell in row[1:5]] == [*both, percent(share.growth), micro(share.without_rad)]
+
+
+@pytest.mark.promise("plots-2")
+@pytest.mark.promise("report-6")
+@pytest.mark.promise("pointing-47")
 def test_figures_have_the_numbers_of_the_budget(looped):
     judged = looped.error_budget.judged
     bars, curves, spectra = figures.budget_figures(looped.error_budget)
@@ -124,6 +146,20 @@ def test_many_sources_are_drawn_up_to_a_number_and_the_others_together():
     assert panel.y.words[0.0] == "noise 20"
     drawn = math.fsum(float(np.sum(mark.end)) for mark in panel.all_of(Bars))
     assert drawn == pytest.approx(1e6 * each.total.quantile_rad, rel=1e-3)
+
+
+@pytest.mark.promise("report-13")
+@pytest.mark.promise("pointing-56")
+def test_what_a_command_prints_says_where_the_rules_are_too_small():
+    """A transient that is rare and large: three deviations are less than it is for a quarter of a percent of times."""
+    rare = ErrorSource("unloading", "transient", Spread("fixed", 2e-5), np.ones(1), period_s=5700.0, decay_s=100.0)
+    sources = [rare, ErrorSource("noise", "random", Spread("fixed", 1e-6), np.ones(1))]
+    asked = {name: Requirement(ErrorIndex("APE"), share, axes=(0,)) for name, share in (("strict", P), ("loose", 0.9))}
+    found = assembly.judge(assembly.stated(sources, asked), None)
+    strict, loose = (each.total.by_rules_rad / each.total.quantile_rad for each in found.judged)
+    assert strict < 0.9 and loose > 1.0
+    said = " ".join(views_text(budget_view(found).blocks, 80).split()).partition("The rules are too small for ")[2]
+    assert said.startswith(f"strict ({percent(1.0 - strict)}).")
 
 
 def test_results_and_summary_hold_what_the_page_shows(looped):

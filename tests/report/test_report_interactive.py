@@ -449,6 +449,7 @@ def test_a_legend_without_a_place_keeps_clear_of_the_curves():
 
 
 # ------------------------------------------------------------------------------------------------ points and numbers
+@pytest.mark.promise("report-11")
 def test_decimation_keeps_ends_peaks_and_gaps():
     x = np.arange(100_000.0)
     y = np.sin(x / 1e3)
@@ -559,6 +560,7 @@ def test_numbers_stand_below_a_picture_where_they_are_wanted():
     assert "<details" not in page_of(figure)
 
 
+@pytest.mark.promise("report-11", "report-12")
 def test_a_page_carries_the_library_once_and_only_for_interactive_figures():
     figure = a_figure(title='Title "A" <b>')
     page = page_of(figure, figure, files=True)
@@ -573,6 +575,7 @@ def test_a_page_carries_the_library_once_and_only_for_interactive_figures():
     assert 'role="img"' in page_of(static)
 
 
+@pytest.mark.promise("licences-1", "report-11")
 def test_the_library_is_whole_licensed_and_ends_no_element():
     found = re.findall(r"<script>(.*?)</script>", scripts.library(), re.DOTALL)
     assert len(found) == 2

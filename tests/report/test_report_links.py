@@ -118,6 +118,7 @@ def test_the_cells_of_a_case_are_its_record(plain):
     ]
 
 
+@pytest.mark.promise("report-6")
 @pytest.mark.parametrize("added", [True, False])
 def test_a_line_of_the_pointing_budget_stands_in_every_face_once_the_mission_has_it(tmp_path, added):
     """As CONTRIBUTING says: a table of the mission, and no code."""
@@ -152,6 +153,7 @@ def test_what_hysteresis_costs_has_its_sign_and_is_blank_where_there_is_no_rate(
     assert links.cost_cells(Cost("a", "b", "c", margin_db, rate_bit_s)) == cells
 
 
+@pytest.mark.promise("report-6")
 def test_costs_stand_in_the_row_of_their_case_and_the_best_controller_is_marked(plain):
     cases = [
         case(plain, source=FINE, controller=name, mirror=mirror)
@@ -264,15 +266,17 @@ def test_the_penalty_is_said_with_a_code_and_without_however_rare_the_fades(plai
         assert (data["coded_penalty_many_fades_db"], data["coded_penalty_no_interleaver_db"]) == (0.414, 2.456)
 
 
+@pytest.mark.promise("link-39")
 def test_a_receiver_that_is_known_has_its_penalty_on_the_page_although_no_fade_is_as_deep(tmp_path):
     found = studied(tmp_path, NO_SCAN, JITTER, received_with("preamplified dpsk"))
     page = links_page(found)
     assert "less than one a year" in page
     assert 0.5 < found.under_jitter.uncoded_penalty_db < 2.0
-    assert f'<td class="number">{found.under_jitter.uncoded_penalty_db:.2f}</td>' in page
+    assert re.search(rf'<td class="number">{found.under_jitter.uncoded_penalty_db:.2f}(</td>| <span class="mark)', page)
     assert "Penalty, the power that the errors cost: with a code" in page
 
 
+@pytest.mark.promise("link-39")
 @pytest.mark.parametrize("name", [None, "preamplified dpsk"])
 def test_the_rows_of_the_jitter_stand_in_the_csv(tmp_path, name):
     found = studied(tmp_path, NO_SCAN, JITTER, received_with(name) if name else {})
@@ -385,6 +389,7 @@ def test_a_total_that_one_of_two_budgets_lacks_is_an_empty_cell(plain):
     assert equal.totals == 3
 
 
+@pytest.mark.promise("report-6")
 def test_what_two_budgets_say_of_a_line_stands_there_where_it_differs(plain):
     own = next(b for b in plain.budgets if b.name == "Communication")
     at = next(k for k, line in enumerate(own.lines) if k and not line.warning)
@@ -414,6 +419,7 @@ def test_two_budgets_of_other_lines_are_two_tables(plain):
 
 
 # --------------------------------------------------------------------------------------------------------- acquisition
+@pytest.mark.promise("report-6")
 def test_the_rows_of_acquisition_are_those_of_the_record(plain):
     view = acquisition_view(plain.finding, ())
     (ways,) = (block for block in view.blocks if isinstance(block, Table))
@@ -458,6 +464,7 @@ def texts(figure):
     return [each.text for each in ET.fromstring(figure.svg).iter(f"{SVG}text")]
 
 
+@pytest.mark.promise("report-6")
 def test_the_figures_are_svg_with_their_numbers_beside_them(plain):
     drawn = link_figures(plain)
     assert [figure.name for figure in drawn] == [*TORNADOS, "wide-beam-or-scan"]
@@ -490,6 +497,7 @@ def test_the_captions_give_the_missions_own_numbers(plain):
     assert f"finds {least:.1f} % or more." in trade.caption
 
 
+@pytest.mark.promise("report-12")
 def test_there_is_no_trade_without_a_scan(tmp_path):
     both = ["tornado", "tornado-beacon", "tornado-answer"]
     assert [figure.name for figure in link_figures(studied(tmp_path, NO_SCAN))] == both
@@ -592,6 +600,7 @@ def test_the_page_holds_every_line_and_no_hyphen_for_a_minus(plain):
     assert page.count("<table") == page.count("</table>")
 
 
+@pytest.mark.promise("report-6")
 @pytest.mark.parametrize("name", ["pin ook", "counting ppm"])
 def test_the_noise_of_a_receiver_has_its_table(tmp_path, plain, name):
     assert name in RECEIVERS

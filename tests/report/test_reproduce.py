@@ -13,7 +13,7 @@ from microrad import cli, report
 from microrad.core import machine
 from microrad.mission import file as missionfile
 from microrad.report.results import comparison as compared
-from microrad.report.results import manifest_reader, reproduce, tolerances
+from microrad.report.results import manifest, manifest_reader, reproduce, tolerances
 from microrad.report.results.manifest import with_manifest
 from microrad.report.results.reproduce import reproduction_data
 from microrad.report.study import page
@@ -93,6 +93,7 @@ def call(capsys, *args):
 
 
 # ---------------------------------------------------------------------------------------------------------------- same
+@pytest.mark.promise("decisions-1", "report-1", "report-3", "report-14", "report-15")
 def test_the_same_inputs_give_nothing_that_differs(written, capsys):
     code, out, _ = call(capsys, written / "report.html", "--json")
     found = json.loads(out)
@@ -104,7 +105,9 @@ def test_the_same_inputs_give_nothing_that_differs(written, capsys):
     assert found["compared"] == "to the last bit"
 
 
+@pytest.mark.promise("readme-5", "report-14", "report-21")
 @pytest.mark.parametrize("name", ["", "manifest.json"])
+@pytest.mark.promise("readme-23")
 def test_a_folder_or_its_manifest_will_do(not_run, written, capsys, name):
     code, out, _ = call(capsys, written / name)
     assert code == 0
@@ -112,6 +115,7 @@ def test_a_folder_or_its_manifest_will_do(not_run, written, capsys, name):
     assert "Same machine and versions: compared to the last bit." in out
 
 
+@pytest.mark.promise("report-2")
 def test_the_page_and_the_manifest_beside_it_carry_the_same(written, ran):
     inside, beside = manifest_reader.read_manifest(written / "report.html").data, manifest_of(written)
     hashes = [each.pop("files_sha256") for each in (inside, beside)]
@@ -125,6 +129,7 @@ def test_the_page_and_the_manifest_beside_it_carry_the_same(written, ran):
 
 
 # -------------------------------------------------------------------------------------------------------------- changed
+@pytest.mark.promise("report-20", "report-21")
 def test_a_changed_aperture_is_told_with_what_follows(changed, capsys, monkeypatch):
     monkeypatch.setattr(report, "study_figures", lambda *args: page.StudyFigures())
 
@@ -159,6 +164,7 @@ def test_a_changed_number_is_told_with_its_size(not_run, changed, capsys):
     assert "margin_db.beacon: was 6.30" in out
 
 
+@pytest.mark.promise("report-15")
 def test_a_verdict_turned_round_is_told(not_run, changed):
     def pass_all(data):
         for each in data["summary"]["requirements"]:
@@ -177,6 +183,7 @@ def last_bit(data):
     data["summary"]["margin_db"]["beacon"] = math.nextafter(beacon, math.inf)
 
 
+@pytest.mark.promise("report-15", "report-16")
 def test_the_last_bit_counts_on_the_same_machine_alone(not_run, changed, capsys):
     code, out, _ = call(capsys, changed(last_bit))
     assert code == 1
@@ -190,6 +197,7 @@ def test_the_last_bit_counts_on_the_same_machine_alone(not_run, changed, capsys)
     assert re.search(r"other versions: compared to stated tolerances \(processor was another and is \S+\)\.", out)
 
 
+@pytest.mark.promise("report-16")
 @pytest.mark.parametrize(
     "change",
     [
@@ -207,6 +215,7 @@ def test_whatever_changes_arithmetic_makes_another_machine(not_run, changed, cha
     assert set(found.unlike) <= {*machine.machine(), "OPENBLAS_CORETYPE", "numpy"}
 
 
+@pytest.mark.promise("report-16")
 def test_a_machine_that_is_said_by_its_architecture_alone_is_another(not_run, changed, capsys):
     code, out, _ = call(capsys, changed(lambda data: (last_bit(data), data.update(machine="x86_64"))))
     assert code == 0
@@ -214,6 +223,7 @@ def test_a_machine_that_is_said_by_its_architecture_alone_is_another(not_run, ch
     assert "was none" not in out
 
 
+@pytest.mark.promise("report-4", "report-16")
 def test_the_machine_says_what_changes_arithmetic(monkeypatch):
     monkeypatch.delenv("OPENBLAS_CORETYPE", raising=False)
     before = machine.machine()
@@ -223,14 +233,19 @@ def test_the_machine_says_what_changes_arithmetic(monkeypatch):
     assert all(before[name] for name in ("processor", "instruction sets", "C library", "numpy's BLAS", "scipy's BLAS"))
 
 
-def test_the_machine_does_not_say_whose_it_is(monkeypatch):
+@pytest.mark.promise("report-16")
+def test_neither_machine_nor_manifest_say_whose_it_is(monkeypatch, ran, written):
     monkeypatch.setattr(platform, "node", lambda: "secret-host")
     for name in ("HOSTNAME", "USER", "LOGNAME", "HOME"):
         monkeypatch.setenv(name, "secret-user")
     assert "secret" not in " ".join(machine.machine().values())
+    made = manifest.manifest_of(ran, report.summary(ran), written)
+    assert made["machine"] == machine.machine() and "secret" not in json.dumps(made)
+    assert str(written.parent) not in json.dumps(made)
 
 
 # --------------------------------------------------------------------------------------- altered, or drawn differently
+@pytest.mark.promise("report-20")
 def test_a_number_changed_on_the_page_alone_is_told(not_run, written, tmp_path, capsys):
     text = (written / "report.html").read_text(encoding="utf-8")
     assert text.count(">residual pointing error</td>") == 1
@@ -244,6 +259,7 @@ def test_a_number_changed_on_the_page_alone_is_told(not_run, written, tmp_path, 
     assert "other pointing error" in out
 
 
+@pytest.mark.promise("report-20")
 def test_a_summary_changed_within_its_tolerance_is_told(not_run, changed):
     def little(data):
         elsewhere(data)
@@ -271,6 +287,7 @@ def rewritten(folder, name, old, new):
     return folder, data
 
 
+@pytest.mark.promise("report-20")
 @pytest.mark.parametrize("name", ["report.html", "figures/tornado.csv", "results.nc"])
 def test_a_file_beside_a_manifest_that_was_changed_is_told(not_run, copy, capsys, name):
     with (copy / name).open("ab") as file:
@@ -280,6 +297,7 @@ def test_a_file_beside_a_manifest_that_was_changed_is_told(not_run, copy, capsys
     assert f"{name} beside it was changed after the report was written" in out
 
 
+@pytest.mark.promise("report-19")
 def test_another_layout_and_other_words_of_the_page_leave_the_numbers_agreeing(not_run, written, tmp_path, capsys):
     found = manifest_reader.read_manifest(written / "report.html")
 
@@ -302,6 +320,7 @@ def test_another_layout_and_other_words_of_the_page_leave_the_numbers_agreeing(n
     assert "Left out of this study" in out
 
 
+@pytest.mark.promise("report-14", "report-15")
 def test_figure_data_beside_the_report_are_compared_as_numbers(not_run, copy, changed, capsys):
     name = "figures/tornado.csv"
     first = (copy / name).read_text(encoding="utf-8").splitlines()[1].split(",")[2]
@@ -326,6 +345,7 @@ def test_figure_data_beside_the_report_are_compared_as_numbers(not_run, copy, ch
     assert [d.place for d in there.differences] == [f"{name}: margin lower (dB), row 1"]
 
 
+@pytest.mark.promise("report-19")
 def test_figure_data_that_do_not_stand_beside_the_report_are_told(not_run, changed, capsys):
     def other(data):
         data["files_sha256"]["figures/fig6-pid.csv"] = "0" * 64
@@ -336,6 +356,46 @@ def test_figure_data_that_do_not_stand_beside_the_report_are_told(not_run, chang
     assert "the numbers agree (" in out
     assert "other than this run's: data of figures." in out
     assert "not byte for byte the same: figures/fig6-pid.csv; their numbers are not compared" in out
+
+
+@pytest.mark.promise("report-14")
+def test_a_file_that_the_mission_names_is_carried_up_to_a_megabyte():
+    named = {
+        "a.csv": b"x" * manifest.MOST_INPUT_BYTES,
+        "b.csv": b"x" * (manifest.MOST_INPUT_BYTES + 1),
+        "c.png": b"\xff",
+    }
+    assert [*manifest._input_texts(named)] == ["a.csv"]
+    assert manifest.MOST_INPUT_BYTES == 1_000_000
+
+
+@pytest.mark.promise("report-19")
+def test_curves_are_not_compared_elsewhere(not_run, copy):
+    name = "figures/latency.csv"
+    head = (copy / name).read_text(encoding="utf-8").partition("\n")[0]
+    folder, data = rewritten(copy, name, head, f"{head}\n0.25,0.5,0.25,0.5")
+    (folder / "report.html").unlink()
+
+    def found(change):
+        change(data)
+        (folder / "manifest.json").write_text(json.dumps(data), encoding="utf-8")
+        return reproduce.reproduce(folder)
+
+    here, there = found(lambda data: None), found(elsewhere)
+    assert (here.read, here.same) == ((name,), False)
+    assert (there.files, there.read, there.same) == ((name,), (), True)
+
+
+@pytest.mark.promise("report-20")
+def test_a_report_without_hashes_of_its_page_and_summary_is_held_against_what_it_has(not_run, written, tmp_path):
+    found = manifest_reader.read_manifest(written / "report.html")
+    data = {key: value for key, value in found.data.items() if key not in ("page_sha256", "summary_sha256")}
+    path = tmp_path / "report.html"
+    path.write_text(
+        with_manifest(found.page.replace("<h3>", '<h3 class="new">'), page.embedded(data)), encoding="utf-8"
+    )
+    again = reproduce.reproduce(path)
+    assert (again.altered, again.same, again.layout) == ((), True, True)
 
 
 def test_a_file_with_other_line_ends_is_not_called_changed(tmp_path):
@@ -380,6 +440,7 @@ REFUSED = {
 }
 
 
+@pytest.mark.promise("report-21")
 @pytest.mark.parametrize("case", REFUSED)
 def test_what_is_no_whole_report_is_refused_in_words(written, tmp_path, capsys, case):
     make, words = REFUSED[case]
@@ -392,6 +453,7 @@ def test_what_is_no_whole_report_is_refused_in_words(written, tmp_path, capsys, 
     assert len(err) < 500
 
 
+@pytest.mark.promise("report-21")
 def test_what_is_no_text_or_not_there_is_refused_in_words(tmp_path, capsys):
     (tmp_path / "image.html").write_bytes(b"\x89PNG\xff\xfe")
     assert "is no text, so no report of microrad" in call(capsys, tmp_path / "image.html")[2]
@@ -521,6 +583,7 @@ def test_names_that_were_replaced_are_put_back_before_comparing():
     assert json.loads(again) == {"file": '../a"b<.tle'}
 
 
+@pytest.mark.promise("report-14", "report-21")
 def test_a_mirror_file_that_is_not_carried_is_not_read(tmp_path, ran):
     secret = tmp_path / "secret.toml"
     secret.write_text('password = "open"\n')
@@ -534,6 +597,7 @@ def test_a_mirror_file_that_is_not_carried_is_not_read(tmp_path, ran):
     assert "password" not in str(told.value)
 
 
+@pytest.mark.promise("report-14", "report-21")
 def test_a_named_file_that_is_not_carried_is_refused(tmp_path):
     text = SHIPPED.read_text(encoding="utf-8")
     text = re.sub(r'(?m)^spectrum = "olympus".*\n', 'spectrum = "table"\nfile = "/etc/passwd"\n', text)
@@ -569,6 +633,7 @@ def a_millionth(place, unit, was, now):
     return 1e-6 * max(abs(was), abs(now))
 
 
+@pytest.mark.promise("report-14")
 def test_what_is_compared_and_what_counts():
     was = {"a": 1.0, "b": [1.0, 2.0], "c": True, "d": "3.10 dB left", "e": None, "g": "PID"}
     now = {"a": 1.0 + 1e-9, "b": [1.0, 2.1, 3.0], "c": 1, "d": "3.11 dB left", "f": 0.0, "g": "PI"}
@@ -589,6 +654,7 @@ def test_what_is_compared_and_what_counts():
     assert compared.compare(was, was, None).differences == ()
 
 
+@pytest.mark.promise("report-15")
 def test_numbers_in_words_are_roundings_and_counts_are_not():
     def differ(was, now):
         return bool(compared.compare(was, now, a_millionth).differences)

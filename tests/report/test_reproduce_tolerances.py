@@ -4,6 +4,7 @@ import copy
 import math
 import re
 
+import numpy as np
 import pytest
 
 from microrad import report
@@ -12,9 +13,12 @@ from microrad.report.data import finite
 from microrad.report.links.data import performance_data
 from microrad.report.results import comparison as compared
 from microrad.report.results import reproduce, tolerances
+from places import ROOT
 from shipped import whole_drawn, whole_study
 
 STEP_RAD = 0.305e-3 * 0.089e-3  # of the drive, through the mirror: 0.0271 µrad
+
+TEXT = (ROOT / "docs" / "report.md").read_text(encoding="utf-8")
 
 
 @pytest.fixture(scope="module")
@@ -48,6 +52,7 @@ def moved(summary, place, by):
 
 
 # -------------------------------------------------------------------------------------------------------------- stated
+@pytest.mark.promise("report-17")
 def test_every_number_of_a_summary_has_a_stated_tolerance(summary, of_ran):
     known, found = tolerances.tolerances(of_ran), numbers(summary)
     assert len(found) > 2000
@@ -79,6 +84,7 @@ def test_each_kind_is_one_that_is_used(of_ran):
 
 
 # --------------------------------------------------------------------------------------------------------------- bites
+@pytest.mark.promise("report-17")
 def test_the_scale_is_made_of_the_largest_step_and_the_number_of_runs(ran, of_ran):
     assert of_ran.step_rad == pytest.approx(STEP_RAD, rel=1e-3)
     assert of_ran.run_rad == 2.0 * of_ran.step_rad
@@ -88,6 +94,56 @@ def test_the_scale_is_made_of_the_largest_step_and_the_number_of_runs(ran, of_ra
     assert of_ran.run_db == pytest.approx(slope_db_rad * of_ran.run_rad, rel=0.5)
 
 
+@pytest.mark.promise("report-18")
+def test_two_roundings_differ_by_a_quarter_of_the_distance_that_a_statistic_may_move():
+    rng = np.random.default_rng(1)
+    first, second = (each - np.round(each) for each in rng.uniform(0.0, 100.0, (2, 100_000, 2)))
+    apart = math.sqrt(np.mean(np.sum((first - second) ** 2, axis=1)))
+    assert apart == pytest.approx(1.0 / math.sqrt(3.0), rel=0.01)
+    assert f"{apart:.2f}" == "0.58"
+    assert tolerances.APART / apart == pytest.approx(3.5, abs=0.1)
+
+
+@pytest.mark.promise("report-17")
+def test_the_table_of_kinds_has_the_distances_of_the_shipped_mission(ran, of_ran):
+    found, m = tolerances.tolerances(of_ran), ran.file.mission
+    rows = dict(re.findall(r"(?m)^\| (\w[\w ]*) \| [^|]* \| ([^|]*) \| [^|]* \|$", TEXT))
+    runs = m.fine_pointing.runs
+    assert runs == 64
+    said = {
+        "exact": "none" if found["exact"] == tolerances.Tolerance() else "",
+        "formula": f"{found['formula'].relative:.0e}; {found['formula'].distance['dB']:.0e} dB".replace("e-0", "e-"),
+        "linear theory": f"{found['linear theory'].relative:.0e}".replace("e-0", "e-"),
+        "searched": f"{found['searched'].relative:.0e}".replace("e-0", "e-"),
+        "orbit": f"{1e6 * found['orbit'].distance['s']:.0f} µs, and what a satellite does in them; "
+        f"{found['orbit'].relative:.0e}".replace("e-0", "e-"),
+        "run": f"two steps of the converters ({1e6 * found['run'].distance['rad']:.3f} µrad)",
+        "runs": f"two steps over the root of the runs ({1e9 * found['runs'].distance['rad']:.1f} nrad for {runs})",
+        "largest": "four steps",
+        "interval": f"a tenth of what it is known to itself, {100 * found['interval'].relative:.1f} % for {runs} runs",
+        "gain": "two tolerances of an rms, over it",
+        "added": "√(2 rms · 2 tolerances of an rms)",
+        "link": f"what four steps cost at the error that is allowed ({found['link'].distance['dB']:.2f} dB); "
+        f"{100 * found['link'].relative:.0f} %",
+        "fades": f"{100 * found['fades'].relative:.0f} %",
+        "drawn": "four of the draws",
+        "failed": "one in one of the days drawn",
+        "volume": f"5 times the loss's tolerance in dB over all runs, {100 * found['volume'].relative:.1f} %",
+        "spectrum": "4/√runs",
+    }
+    assert {kind: rows[kind] for kind in said} == said
+    step, runs_rad = of_ran.step_rad, of_ran.runs_rad
+    assert found["largest"].distance["rad"] == pytest.approx(4.0 * step)
+    assert found["gain"].distance[""] == pytest.approx(2.0 * runs_rad / ran.fine_pointing.optimum_rad)
+    assert found["added"].distance["rad"] == pytest.approx(
+        math.sqrt(2.0 * ran.fine_pointing.budget.full_rad * 2.0 * runs_rad)
+    )
+    assert found["drawn"].distance[""] == 4.0 / m.acquisition.runs
+    assert found["failed"].distance[""] == 1.0 / m.operations.runs
+    assert found["spectrum"].relative == 4.0 / math.sqrt(runs)
+
+
+@pytest.mark.promise("report-17")
 @pytest.mark.parametrize(
     ("place", "inside", "outside"),
     [
@@ -117,6 +173,7 @@ def test_a_number_that_was_finite_and_is_not_any_more_is_another_one():
     assert compared.compare({"a_db": math.inf}, {"a_db": math.inf}, lambda *_: math.inf).differences == ()
 
 
+@pytest.mark.promise("report-18")
 def test_a_number_without_a_stated_tolerance_has_to_be_the_same(of_ran):
     allowed = reproduce.of_summary(of_ran)
     assert compared.compare({"new_db": 1.0}, {"new_db": 1.0}, allowed).differences == ()

@@ -43,6 +43,7 @@ def test_correlated_samples_are_worth_what_their_squares_are():
     assert max(white) <= RUNS * SAMPLES
 
 
+@pytest.mark.promise("report-6")
 def test_intervals_hold_the_true_quantile_and_are_not_idle():
     shares, inside, widths = (0.5, 0.9, 0.99), [], []
     for seed in range(60):
@@ -68,6 +69,7 @@ def test_what_too_few_samples_cannot_tell_is_not_told():
     assert math.isnan(tails.quantile(single, 0.5).low_rad)
 
 
+@pytest.mark.promise("report-6")
 def test_the_time_beyond_a_radius_has_an_interval_even_where_none_was_seen():
     left = residual(2)
     share, low, high = tails.beyond(left, true_quantile_rad(0.99))

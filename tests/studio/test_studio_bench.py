@@ -106,6 +106,7 @@ def test_nobody_looks_on_without_a_file_and_a_disk_that_refuses_does_not_end_the
     assert [each.name for each in tmp_path.iterdir()] == [LIVE_FITS]
 
 
+@pytest.mark.promise("studio-12")
 def test_the_command_writes_its_fits_beside_its_progress(call, folder, monkeypatch):
     """`microrad identify` hands `live_fit_writer` to `identify`: without it the page shows no live fit."""
     record = recorded()
@@ -180,6 +181,7 @@ IN_URAD = listed(("drive [V]", ""), ("angle [urad]", ""))
 PLAYED = listed(("multisine/y", "rad"), ("multisine/u", "mV"), rates=(500.0,))
 
 
+@pytest.mark.promise("studio-12")
 def test_units_and_channels_are_guessed_anew_for_another_recording():
     first = mirror_form.shown(Form(), IN_MRAD, "a", "a.csv", alone=True)
     first = mirror_form.edited(first, IN_MRAD, replace(first.setting, rate="200", name="mine", static=True))
@@ -216,6 +218,7 @@ def test_a_channel_brings_its_unit_unless_it_was_set_for_it():
     )  # the page does not know the channels yet
 
 
+@pytest.mark.promise("studio-12")
 @pytest.mark.parametrize(
     ("setting", "use", "words"),
     [
@@ -314,6 +317,7 @@ def test_the_form_becomes_the_command(tmp_path):
         mirror_form.identification(tmp_path, recordings[1:], setting)
 
 
+@pytest.mark.promise("studio-8")
 def test_the_form_is_kept_for_other_tabs(tmp_path):
     form = Form(Setting(1, 2, "5 kHz", accept=("drift",), name="a"), {"key": "check"})
     path = tmp_path / "form.json"
@@ -369,6 +373,7 @@ def test_a_recording_is_drawn_with_its_units():
     assert not loop["config"]["displaylogo"]
 
 
+@pytest.mark.promise("studio-12")
 def test_a_model_is_drawn_over_what_was_measured():
     fit = fitted("bouc_wen", 0.4)
     figure = mirror_view.loop_plot(fit, 0, "V")
@@ -422,6 +427,7 @@ weights = ["80 urad/V", "9 urad/V"]
 """
 
 
+@pytest.mark.promise("studio-12")
 def test_a_mission_takes_an_identified_mirror_and_keeps_the_rest(tmp_path):
     (tmp_path / "found").mkdir()
     (tmp_path / "found" / "stage.toml").write_text(MIRROR)
@@ -475,6 +481,7 @@ def answers(pi):
     return pi.ask(control_view.ask_of("100 urad", "300 urad", "15 Hz", 5000.0), (WITH, WITHOUT))
 
 
+@pytest.mark.promise("studio-12")
 def test_the_controllers_are_those_of_the_study_and_of_control(mission):
     names = control_model.names(mission.mission.fine_pointing)
     assert names == (*controller_study.names(mission.mission.fine_pointing), PID, PID_INVERSE)
@@ -483,6 +490,8 @@ def test_the_controllers_are_those_of_the_study_and_of_control(mission):
         control_model.controller(mission, "none")
 
 
+@pytest.mark.promise("readme-15")
+@pytest.mark.promise("studio-12")
 def test_a_tuned_controller_has_the_numbers_of_the_study(mission, pi):
     scene = scene_of(mission)
     tuned = controller_study.tune("PI", scene.table, controller_study.plants(scene, scene.table.seed))
@@ -506,6 +515,7 @@ def test_a_controller_is_tuned_once_for_a_text(mission, pi, tmp_path):
     assert control_model.controller(load_mission(SHIPPED), "PI") is pi
 
 
+@pytest.mark.promise("studio-12")
 def test_step_sine_and_jitter_answer_what_they_are_asked(mission, pi, answers):
     step = answers.step[WITHOUT]
     assert step.found_rad[0] == 0.0
@@ -561,6 +571,7 @@ def test_a_step_beyond_the_sensor_s_field_of_view_says_why_the_loop_stands_still
     assert control_view.answer_words(curves, "Error").endswith("at most 100 mrad.")
 
 
+@pytest.mark.promise("studio-12")
 def test_the_warnings_of_the_mirror_s_file_stand_beside_the_margins(mission, pi, tmp_path):
     text = "# Mirror identified.\n# Warning: Not valid above 18.85 V/s.\n# Warning: b.\n" + MIRROR
     (tmp_path / "stage.toml").write_text(text)
@@ -599,6 +610,7 @@ def test_margins_in_words_against_what_is_asked_for(mission, pi):
     assert control_view.sensitivity_plot(bound)["data"] == control_view.gain_plot(bound)["data"] == []
 
 
+@pytest.mark.promise("studio-12")
 def test_plots_carry_units_limits_and_both_variants(pi, answers):
     shown = {
         control_view.step_plot: ("time (ms)", "line of sight, axis x (µrad)"),
@@ -622,6 +634,7 @@ def test_plots_carry_units_limits_and_both_variants(pi, answers):
     assert control_view.answer_words({}, "Error") == ""
 
 
+@pytest.mark.promise("studio-12")
 @pytest.mark.parametrize(
     ("typed", "words"),
     [

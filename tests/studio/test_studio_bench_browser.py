@@ -95,6 +95,7 @@ def choose(tab, label, option):
     wanted.click()
 
 
+@pytest.mark.promise("studio-21")
 def test_what_is_no_recording_is_refused_in_words(studio, mirror, tmp_path):
     tab, words = mirror, mirror.get_by_role("alert").first
     drop(tab, {"name": "../evil.csv", "mimeType": "text/csv", "buffer": b"1,2\n3,4\n"})
@@ -158,6 +159,7 @@ def figure_title(tab, words):
     return tab.locator(".js-plotly-plot text", has_text=words)
 
 
+@pytest.mark.promise("readme-15")
 def test_a_recording_is_dropped_identified_while_one_looks_on_and_its_mirror_used(studio, opened, recording, picture):
     (file, says), tab = recording, opened("mirror")
     drop(tab, file)

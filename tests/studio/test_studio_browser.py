@@ -49,6 +49,7 @@ def field(page, key):
 
 
 # ------------------------------------------------------------------------------------------------------------ mission
+@pytest.mark.promise("studio-1", "studio-12")
 def test_an_aperture_is_changed_checked_saved_and_budgeted_by_the_command_line(studio, tab, call, picture):
     """The way of a mission: changed in the form, refused with the command line's words, corrected, saved, run."""
     show_table(tab, "terminals")
@@ -95,6 +96,7 @@ def test_an_aperture_is_changed_checked_saved_and_budgeted_by_the_command_line(s
     fits(tab, "compare", picture)
 
 
+@pytest.mark.promise("studio-12")
 def test_the_text_and_the_form_follow_each_other(studio, tab, picture):
     show_table(tab, "terminals")
     value = field(tab, "geo_aperture").get_by_label("geo_aperture")
@@ -124,6 +126,7 @@ def test_a_file_that_another_program_changes_is_told_and_opened_again(studio, ta
         draft_is(tab, "saved")
 
 
+@pytest.mark.promise("studio-20")
 def test_a_text_too_long_for_a_message_is_not_pasted(tab):
     text = tab.locator(".cm-content")
     text.click()
@@ -210,6 +213,8 @@ def test_html_in_a_missions_name_is_text(studio, tab):
     tab.locator(".cm-content").get_by_text("onerror").wait_for(state="detached")
 
 
+@pytest.mark.promise("readme-15")
+@pytest.mark.promise("studio-14")
 def test_what_is_done_can_be_copied_as_a_command_and_as_python(studio, tab):
     tab.get_by_role("button", name="Copy as command").click()
     tab.get_by_text("Copied: microrad budget leo-geo.toml").wait_for()
@@ -240,6 +245,7 @@ def job(page, number):
     return page.get_by_role("article").filter(has=page.get_by_role("heading", name=re.compile(rf"^{number}\.")))
 
 
+@pytest.mark.promise("studio-17")
 def test_a_study_is_cancelled_in_mid_run_from_another_tab_after_a_reload(studio, tab, opened, picture):
     tab.get_by_role("link", name="Runs").click()
     tab.get_by_role("button", name="Run the study").click()
@@ -258,6 +264,7 @@ def test_a_study_is_cancelled_in_mid_run_from_another_tab_after_a_reload(studio,
     job(tab, 1).wait_for(state="detached")
 
 
+@pytest.mark.promise("studio-12")
 def test_a_study_ends_with_its_verdict_and_a_report_in_the_page(studio, tab, picture):
     tab.get_by_role("link", name="Runs").click()
     api.expect(tab.get_by_label("Folder for the results")).to_have_value(re.compile("leo-geo-study"))

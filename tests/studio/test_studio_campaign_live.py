@@ -104,6 +104,7 @@ def vars_of(interval):
 
 
 # ---------------------------------------------------------------------------------------------------------- the reader
+@pytest.mark.promise("studio-13")
 def test_a_growing_ledger_says_at_each_time_what_its_rows_say(growing):
     """Chunks come out of order, some rows have failed, and the campaign's own summary is the measure."""
     reader = Interim(growing.path)
@@ -127,6 +128,7 @@ def test_a_growing_ledger_says_at_each_time_what_its_rows_say(growing):
     assert campaign_words.headline(whole) == campaign_words.headline(summarise_campaign(growing.path))
 
 
+@pytest.mark.promise("studio-27")
 def test_each_chunk_is_read_once(growing, monkeypatch):
     taken = []
     take = interim.CellRows.take
@@ -174,6 +176,7 @@ def test_another_campaign_in_the_same_place_and_chunks_taken_out_are_read_anew(g
     for path in growing.path.parent.glob("x.ledger*"):
         path.unlink()
     growing.begin(seed=2)
+    assert reader.look().cells[0].rows == 0, "nothing is left of the one before"
     growing.put(0, 1, 2)
     same(reader.look(), summarise_campaign(growing.path))
     assert reader.found.cells[0].rows == 3 * growing.rows
@@ -245,6 +248,7 @@ def test_a_ledger_that_is_not_there_yet_says_nothing(tmp_path, at_once):
     assert tabs.look(path) == Live()
 
 
+@pytest.mark.promise("studio-27")
 def test_damage_and_other_files_are_told_and_what_was_read_stays(growing, at_once):
     tabs = LiveCampaigns()
     growing.put(0)
@@ -322,6 +326,7 @@ def test_of_a_grid_that_has_begun_the_combinations_are_told(tmp_path, at_once):
         assert next(iter(each.plots)) == "Distribution of residual_rms"
 
 
+@pytest.mark.promise("studio-13")
 def test_the_plot_shows_the_report_s_distribution_and_what_has_a_limit_first(growing, at_once):
     growing.put(0, 1, 2)
     found = campaign_view.figures(LiveCampaigns().look(growing.path))

@@ -66,6 +66,7 @@ def once(compute):
 
 
 # ------------------------------------------------------------------------------------------------------- same numbers
+@pytest.mark.promise("studio-1", "studio-14")
 @pytest.mark.parametrize(
     "action",
     [commands.budget(MISSION), commands.contacts(MISSION)],
@@ -81,6 +82,8 @@ def test_what_prints_prints_the_same(home, capsys, monkeypatch, action):
     assert len(out.splitlines()) > 20
 
 
+@pytest.mark.promise("readme-1")
+@pytest.mark.promise("studio-14")
 def test_a_study_gives_the_same_verdict_and_the_same_files(home, capsys, monkeypatch):
     monkeypatch.setattr(study, "run_study", once(study.run_study))
     monkeypatch.setattr(microrad, "run_study", study.run_study, raising=False)
@@ -95,6 +98,7 @@ def test_a_study_gives_the_same_verdict_and_the_same_files(home, capsys, monkeyp
         executed(action.python)
 
 
+@pytest.mark.promise("studio-14")
 @pytest.mark.parametrize("family", [control.PI, pytest.param(control.LQG, marks=pytest.mark.endurance)])
 def test_controllers_are_designed_alike(family, folder, capsys, monkeypatch):
     monkeypatch.setattr(designs, "families", lambda m: (family,))
@@ -107,6 +111,7 @@ def test_controllers_are_designed_alike(family, folder, capsys, monkeypatch):
     assert len(found) >= 3
 
 
+@pytest.mark.promise("studio-14")
 @pytest.mark.usefixtures("undrawn")
 def test_a_mirror_is_identified_alike(folder, capsys):
     write_recording(folder / "a loop.csv")
@@ -181,6 +186,7 @@ def test_units_that_the_file_denies_are_refused_in_both(folder, capsys, header, 
     assert "give what the files say" in err
 
 
+@pytest.mark.promise("studio-14")
 @pytest.mark.usefixtures("rows_here")
 def test_a_campaign_gives_the_same_rows(folder, capsys):
     campaign_file(folder, runs=32)

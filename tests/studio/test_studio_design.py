@@ -11,9 +11,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from link_files import RECEIVERS, data_with, link_file, received_with
+from link_files import FADING, RECEIVERS, data_with, link_file, received_with
 from microrad import link
 from microrad.link import study as link_study
+from microrad.link.fade_series import FadeSeriesError
 from microrad.link.pointing import outage as under_jitter
 from microrad.orbit import day as day_study
 from microrad.report.day import figures as day_plots
@@ -138,6 +139,8 @@ def test_a_fault_is_told_beside_its_slider_in_the_words_of_the_command_line(draf
 
 
 # ------------------------------------------------------------------------------------------------------------ attempts
+@pytest.mark.promise("readme-15")
+@pytest.mark.promise("studio-12")
 def test_an_attempt_is_the_study_of_the_changed_file_and_leaves_the_draft(draft):
     found = sliders.attempt(draft, "terminals.leo_aperture", "6 cm", link_view.view)
     margin = found.view.margins[0]
@@ -160,6 +163,8 @@ def test_an_attempt_with_a_fault_has_no_view_and_one_that_cannot_be_budgeted_say
 
 
 # --------------------------------------------------------------------------------------------------------------- links
+@pytest.mark.promise("readme-15")
+@pytest.mark.promise("studio-12")
 def test_the_map_is_the_margin_of_the_link_and_its_contour_has_the_margin_that_it_names(view):
     frame = view.frame
     assert np.array_equal(view.margin_db, link.margin_map(view.data, frame.data_rate_bit_s, frame.pointing_error_rad))
@@ -193,6 +198,7 @@ def test_the_contour_of_a_built_receiver_has_its_margin(tmp_path, name):
     assert frame.data_rate_bit_s[-1] <= found.data.receiver.highest_data_rate_bit_s
 
 
+@pytest.mark.promise("link-5")
 def test_under_a_jitter_the_page_has_the_margin_of_the_outage(tmp_path):
     """As the budget of the command line, whatever the static pointing error is."""
     shaken = {"jitter": {"bias": ["0 urad", "0 urad"], "rms": ["4 urad", "4 urad"], "bandwidth": "50 Hz"}}
@@ -219,6 +225,14 @@ def test_the_frame_stands_still_until_the_working_point_leaves_it(draft, view):
     assert near.frame is view.frame
     assert far.frame is not view.frame
     assert far.frame.data_rate_bit_s[0] < 90e9 < far.frame.data_rate_bit_s[-1]
+
+
+def test_the_frame_moves_for_a_required_error_beyond_it(draft, view):
+    beyond_rad = 3.0 * view.frame.pointing_error_rad[-1]
+    strict = link_view.view(draft.set("requirement.pointing_error", f"{1e6 * beyond_rad:.9g} urad").link(), view.frame)
+    assert strict.frame.pointing_error_rad[-1] >= strict.data.requirement.pointing_error_rad > beyond_rad * (1 - 1e-8)
+    same = draft.set("requirement.pointing_error", f"{1e6 * view.frame.pointing_error_rad[-2]:.9g} urad")
+    assert link_view.view(same.link(), view.frame).frame is view.frame
 
 
 def test_margins_say_whether_they_are_met(draft):
@@ -281,6 +295,7 @@ def test_sliders_are_those_of_the_links_and_the_seldom_moved_stand_behind(draft)
     assert not link_view.second("terminals.leo_aperture")
 
 
+@pytest.mark.promise("studio-12")
 def test_the_study_of_the_links_gives_tables_sentences_and_what_moves_the_margin(draft):
     study = link_study.run_link_study(draft.link())
     blocks = link_view.blocks(study)
@@ -298,7 +313,21 @@ def test_the_study_of_the_links_gives_tables_sentences_and_what_moves_the_margin
     assert (marked in blocks, marked in far) == (False, True)
 
 
+def test_the_links_show_a_code_under_the_fades_of_a_series_beside_the_draft(tmp_path):
+    path = tmp_path / "mission.toml"
+    path.write_text(Draft.shipped(path).text + FADING, encoding="utf-8")
+    faded = Draft.open(path)
+    with pytest.raises(FadeSeriesError, match=r"line \d+: .*fades\.csv: there is no such file"):
+        link_study.run_link_study(faded.link())
+    power = 1.0 + 0.5 * np.sin(np.arange(2000) / 40.0)
+    np.savetxt(tmp_path / "fades.csv", power, header="power", comments="")
+    blocks = link_view.blocks(link_study.run_link_study(faded.link()))
+    views = {each.title: each for each in blocks if isinstance(each, View)}
+    assert "Under the fades of fades.csv" in views["Coded link under fades"].blocks[0]
+
+
 # ------------------------------------------------------------------------------------------------------------ pointing
+@pytest.mark.promise("studio-12")
 def test_what_is_left_for_a_line_meets_the_beacon_by_either_rule(draft):
     wide = draft.set("beacon.divergence", "2000 urad")
     rows = pointing_view.blocks(pointing_view.view(wide.link()))[0].rows
@@ -310,6 +339,7 @@ def test_what_is_left_for_a_line_meets_the_beacon_by_either_rule(draft):
         assert met.budget.total_rad(rule) == pytest.approx(met.half_angle_rad, rel=3e-3)  # of three digits
 
 
+@pytest.mark.promise("readme-15")
 def test_the_tables_of_the_shipped_mission_say_what_its_beacon_covers(draft):
     lines, note, shown, said, ahead = pointing_view.blocks(pointing_view.view(draft.link()))
     assert lines.headings[3:5] == ("largest allowed", "largest allowed,\nECSS")
@@ -337,6 +367,7 @@ def test_without_beacon_and_point_ahead_the_page_says_so(tmp_path):
     assert len(link_view.view(bare).margins) == 1
 
 
+@pytest.mark.promise("studio-12")
 def test_the_curve_of_coverage_is_the_budget_s(draft):
     found = pointing_view.view(draft.link())
     curve = pointing_view.coverage_plot(found)["data"][0]
@@ -360,6 +391,7 @@ def test_each_rule_stands_at_the_angle_that_its_label_says(draft):
 
 
 # ----------------------------------------------------------------------------------------------------------------- day
+@pytest.mark.promise("studio-12")
 def test_the_timeline_has_every_contact_of_either_way(day, figures):
     shown = figures["day-timeline"]
     begins, ends = shown.columns["relay, start (s)"], shown.columns["relay, end (s)"]
@@ -370,6 +402,7 @@ def test_the_timeline_has_every_contact_of_either_way(day, figures):
     assert bars["base"][0] == pytest.approx(day.direct.contacts[0].start_s / 3600.0, rel=1e-5)
 
 
+@pytest.mark.promise("studio-12", "studio-13", "studio-30")
 def test_the_map_is_that_of_the_report_and_loads_nothing(day, figures):
     shown = plots.drawn(day_view.blocks(day))
     kind, _, data = shown["world-map"].partition(",")
@@ -384,6 +417,7 @@ def test_the_map_is_that_of_the_report_and_loads_nothing(day, figures):
     assert not any(isinstance(each, str) for name, each in shown.items() if name != "world-map")
 
 
+@pytest.mark.promise("studio-12")
 def test_volumes_end_where_the_ways_do(day, figures):
     drawn = plots.figure(figures["data-volume"].sheet)["data"]
     names = "made by the instrument", "relay", "direct downlink"
@@ -392,6 +426,7 @@ def test_volumes_end_where_the_ways_do(day, figures):
     assert max(drawn[4]["y"]) == pytest.approx(day.direct.history.largest_stored_bit / 8e9, rel=0.05)
 
 
+@pytest.mark.promise("studio-12")
 def test_latencies_rise_to_what_arrives_and_pass_their_median(day, figures):
     shown = figures["latency"].columns
     time_s, share = shown["relay, latency (s)"], shown["relay, share"]
@@ -402,6 +437,8 @@ def test_latencies_rise_to_what_arrives_and_pass_their_median(day, figures):
     assert share[-1] == pytest.approx(1.0)
 
 
+@pytest.mark.promise("readme-15")
+@pytest.mark.promise("studio-12")
 def test_the_blocks_of_the_day_have_its_numbers_and_warnings(day):
     blocks = day_view.blocks(day)
     ways, contacts, swings = (each for each in blocks if isinstance(each, Table))

@@ -2,6 +2,7 @@
 
 import hashlib
 import os
+import re
 import stat
 import tomllib
 from pathlib import Path
@@ -41,6 +42,8 @@ def test_the_shipped_mission_is_a_draft_without_faults(tmp_path):
     assert draft.file().mission == load_mission(DEFAULT).mission
 
 
+@pytest.mark.promise("readme-15")
+@pytest.mark.promise("studio-12")
 def test_every_value_has_its_text_its_source_and_what_it_may_hold(draft):
     sources = load_mission(SHIPPED).sources
     assert list(draft.values) == list(sources)
@@ -115,6 +118,8 @@ def test_absent_keys_are_those_that_a_table_may_still_have(draft):
 
 
 # ----------------------------------------------------------------------------------------------------------------- set
+@pytest.mark.promise("readme-15")
+@pytest.mark.promise("studio-10")
 @pytest.mark.parametrize(
     ("key", "typed", "raw"),
     [
@@ -156,6 +161,7 @@ def test_what_is_typed_as_it_stands_changes_nothing(draft):
         assert draft.set(key, f" {value.raw} ") is draft
 
 
+@pytest.mark.promise("studio-12")
 @pytest.mark.parametrize(
     ("key", "typed"),
     [
@@ -223,6 +229,15 @@ def test_line_ends_and_a_byte_order_mark_stay(tmp_path, mark, ends):
     assert draft.with_text(TEXT) is draft
 
 
+def test_a_value_without_a_comment_keeps_the_line_end_behind_it(tmp_path):
+    text = re.sub(r'^leo_aperture = "5 cm".*$', 'leo_aperture = "5 cm"', TEXT, flags=re.MULTILINE)
+    content = text.replace("\n", "\r\n").encode()
+    (tmp_path / "m.toml").write_bytes(content)
+    Draft.open(tmp_path / "m.toml").set(APERTURE, "8 cm").save()
+    after = (tmp_path / "m.toml").read_bytes()
+    assert after == content.replace(b'leo_aperture = "5 cm"', b'leo_aperture = "8 cm"') != content
+
+
 def test_mixed_line_ends_stay_too(tmp_path):
     lines = TEXT.split("\n")
     content = "".join(line + ("\r\n" if n % 3 else "\n") for n, line in enumerate(lines[:-1])).encode()
@@ -240,6 +255,15 @@ def test_a_key_that_its_table_may_have_gets_a_line_of_its_own(draft):
         'geo_aperture = "15 cm"                # paper: Table 2\nleo_obscuration = 0.2\n',
     )
     assert new.without("terminals.leo_obscuration").text == TEXT
+
+
+def test_a_list_over_several_lines_goes_with_all_of_them(tmp_path):
+    line = next(each for each in TEXT.split("\n") if each.startswith("pid_frequencies"))
+    items = tomllib.loads(line)["pid_frequencies"]
+    broken = "\n".join(["pid_frequencies = [", *(f'    "{each}",' for each in items), "]"])
+    (tmp_path / "m.toml").write_text(TEXT.replace(line, broken), "utf-8")
+    new = Draft.open(tmp_path / "m.toml").without("scenario.pid_frequencies")
+    assert new.text == TEXT.replace(f"{line}\n", "")
 
 
 def test_a_line_is_added_at_the_end_of_a_text_that_has_no_last_line_end(tmp_path):
@@ -331,6 +355,7 @@ def test_tables_come_and_go_by_text(draft):
 
 
 # ------------------------------------------------------------------------------------------------------------ problems
+@pytest.mark.promise("readme-15")
 def test_faults_of_many_kinds_are_those_of_the_command_line(draft, call, tmp_path):
     text = (
         TEXT.replace('leo_aperture = "5 cm"', "leo_aperture = 5")
@@ -381,6 +406,8 @@ def test_a_text_that_is_no_mission_at_all_is_a_draft_that_says_so(draft, text, w
 
 
 # ---------------------------------------------------------------------------------------------------------------- disk
+@pytest.mark.promise("readme-15")
+@pytest.mark.promise("studio-1")
 def test_a_saved_draft_is_the_file_that_the_command_line_reads(draft, tmp_path):
     new = draft.set(APERTURE, "8 cm").save()
     assert (new.changed, new.path) == (False, tmp_path / "m.toml")
@@ -392,6 +419,7 @@ def test_a_saved_draft_is_the_file_that_the_command_line_reads(draft, tmp_path):
     assert tomllib.loads(new.text)["terminals"]["leo_aperture"] == "8 cm"
 
 
+@pytest.mark.promise("studio-11")
 def test_the_last_of_two_tabs_is_told(draft, tmp_path):
     one, two = draft.set(APERTURE, "8 cm"), draft.set(APERTURE, "9 cm")
     saved = one.save()
@@ -440,6 +468,7 @@ def test_a_place_that_cannot_be_written_is_told(draft, tmp_path, name):
         draft.save(tmp_path / name)
 
 
+@pytest.mark.promise("studio-29")
 def test_a_full_disk_leaves_the_file_as_it_was(draft, tmp_path, monkeypatch):
     def full(path, text, mode):
         raise OSError(28, "No space left on device")

@@ -25,6 +25,8 @@ def shown(draft):
     return errors.view(file, file.mission.error_budget)
 
 
+@pytest.mark.promise("decisions-1")
+@pytest.mark.promise("studio-12", "studio-13")
 def test_the_page_has_the_view_of_the_report(tmp_path):
     view = shown(opened(tmp_path, mission_text(*KEPT)))
     assert views_text([view], 100) == views_text([budget_view(kept_study().error_budget)], 100)
@@ -46,6 +48,7 @@ def test_sizes_and_limits_have_sliders_that_move_it(tmp_path):
     assert (rows[0][4], moved[0][4]) == ("4.00", "5.00")
 
 
+@pytest.mark.promise("studio-12")
 def test_the_loop_is_a_source_under_the_controller_that_pointing_takes(tmp_path):
     view = shown(opened(tmp_path, SHIPPED.read_text("utf-8") + LOOP))
     origins = {row[-1] for row in view.blocks[1].rows}

@@ -142,6 +142,7 @@ def test_own_names_pass(host):
     assert len(inner.scopes) == 1
 
 
+@pytest.mark.promise("studio-22", "studio-25")
 @pytest.mark.parametrize(
     ("host", "status"),
     [
@@ -171,6 +172,7 @@ def test_a_forged_host_is_refused(host, status):
     assert inner.scopes == []
 
 
+@pytest.mark.promise("studio-22")
 @pytest.mark.parametrize(
     "origin",
     [
@@ -197,6 +199,7 @@ def test_a_foreign_page_is_refused(origin):
     assert ask(guard(inner), "POST", origin=PAGE).body == "inside"
 
 
+@pytest.mark.promise("studio-22")
 def test_a_page_asks_under_its_own_name_alone():
     """Another program may listen on [::1] with the same port: its pages are not those of 127.0.0.1."""
     inner = Inner()
@@ -211,6 +214,7 @@ def test_a_page_asks_under_its_own_name_alone():
         inner.scopes.clear()
 
 
+@pytest.mark.promise("studio-22")
 def test_what_acts_must_say_where_it_comes_from():
     inner = Inner()
     for method in ("POST", "PUT", "DELETE", "PATCH", "OPTIONS"):
@@ -233,6 +237,8 @@ def test_another_site_may_lead_here_but_not_embed_or_fetch(site):
     assert len(inner.scopes) == 1
 
 
+@pytest.mark.promise("readme-15")
+@pytest.mark.promise("studio-22")
 @pytest.mark.parametrize(
     "cookie",
     [
@@ -259,6 +265,7 @@ def test_without_the_token_nothing_is_answered(cookie):
     assert inner.scopes == []
 
 
+@pytest.mark.promise("studio-32")
 @pytest.mark.parametrize("cookie", [COOKIE, f"a=b; {COOKIE}", ["a=b", COOKIE], f"microrad_studio_{PORT}=old; {COOKIE}"])
 def test_with_the_token_in_the_cookie_pages_and_websockets_pass(cookie):
     inner = Inner()
@@ -295,6 +302,7 @@ def test_headers_of_a_proxy_do_not_reach_the_application():
 
 
 # --------------------------------------------------------------------------------------------------- the token's way in
+@pytest.mark.promise("studio-3", "studio-22")
 def test_the_token_moves_from_the_address_into_a_cookie():
     inner = Inner()
     reply = ask(guard(inner), query=f"token={TOKEN}", cookie=None)
@@ -367,6 +375,7 @@ def test_a_length_that_is_no_number_is_refused(length):
     assert inner.scopes == []
 
 
+@pytest.mark.promise("studio-20")
 @pytest.mark.parametrize(
     ("path", "limit"), [("/", 1000), (UPLOAD, 100_000 + 65_536), (UPLOAD + "/x", 1000), ("/upload", 1000)]
 )
@@ -433,6 +442,7 @@ def directives(reply):
     return dict(part.split(" ", 1) for part in reply.headers[b"content-security-policy"].decode().split("; "))
 
 
+@pytest.mark.promise("studio-22", "studio-30")
 def test_answers_carry_the_policy_in_place_of_their_own():
     theirs = [(b"Referrer-Policy", b"unsafe-url"), (b"content-security-policy", b"default-src *"), (b"x-own", b"1")]
     reply = ask(guard(Inner(headers=theirs)), host=f"localhost:{PORT}")
@@ -450,6 +460,7 @@ def test_answers_carry_the_policy_in_place_of_their_own():
     assert not re.search(r"https?:|\*", reply.headers[b"content-security-policy"].decode())
 
 
+@pytest.mark.promise("studio-22")
 def test_each_answer_has_a_nonce_of_its_own_that_the_page_is_given():
     inner = Inner()
     app = guard(inner)
@@ -466,6 +477,7 @@ def test_refusals_carry_the_policy_and_no_script_at_all():
     assert "script-src" not in directives(reply)
 
 
+@pytest.mark.promise("studio-22")
 def test_documents_run_in_a_sandbox():
     app = guard(Inner(), documents=("/results/",))
     rules = directives(ask(app, path="/results/7/report.html"))
@@ -480,6 +492,7 @@ def test_a_head_request_has_no_body():
     assert int(ask(guard(Inner()), "HEAD", cookie=None).headers[b"content-length"]) > 100
 
 
+@pytest.mark.promise("studio-25")
 def test_html_is_escaped_in_refusals():
     body = ask(guard(Inner()), host="<b>&\"'x").body
     assert "&lt;b&gt;&amp;&quot;&#x27;x" in body
@@ -533,6 +546,7 @@ def test_names_and_origins():
             address.hosts(80, (wrong,))
 
 
+@pytest.mark.promise("studio-22")
 def test_tokens_cannot_be_guessed_and_short_ones_are_refused():
     assert len({address.new_token() for _ in range(100)}) == 100
     assert len(address.new_token()) >= 43
@@ -761,6 +775,7 @@ def test_a_message_that_announces_its_size_is_refused_before_it_is_sent(server):
     assert (1009).to_bytes(2, "big") in answer
 
 
+@pytest.mark.promise("studio-20")
 @pytest.mark.parametrize(
     "large",
     [
@@ -853,6 +868,7 @@ def tab(browser):
     context.close()
 
 
+@pytest.mark.promise("studio-30")
 def test_a_page_of_the_studio_works_in_a_browser_under_the_policy(studio, tab):
     here = f"http://127.0.0.1:{studio}/"
     tab.goto(f"{here}?token={TOKEN}")

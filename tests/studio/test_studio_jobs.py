@@ -65,6 +65,7 @@ def python(code):
 
 
 # ------------------------------------------------------------------------------------------------------------ one job
+@pytest.mark.promise("studio-15", "studio-16")
 def test_a_job_runs_by_itself_and_leaves_its_output_and_code(studio, tmp_path):
     job = studio.submit(order(tmp_path, "init", "mine.toml", results=("mine.toml",)))
     assert (job.number, job.title, job.kind, job.results) == (1, "a title", "study", ("mine.toml",))
@@ -76,6 +77,7 @@ def test_a_job_runs_by_itself_and_leaves_its_output_and_code(studio, tmp_path):
     assert job.started.endswith("Z")
 
 
+@pytest.mark.promise("studio-8")
 def test_what_a_job_keeps_is_for_its_owner_alone(studio, tmp_path):
     job = studio.submit(order(tmp_path, "presets"))
     for folder in (studio.folder.parent, studio.folder, job.folder):
@@ -91,6 +93,7 @@ def test_a_failed_job_says_what_the_command_line_said(studio, tmp_path, call, mo
     assert "the mission file does not exist" in job.words
 
 
+@pytest.mark.promise("studio-19")
 def test_a_job_takes_what_the_command_line_has_kept_unless_the_environment_says_no(tmp_path, monkeypatch):
     """The part is the number of the process that made it."""
     code = "import os; from microrad.core import kept; print(kept.of_user().part(os.getpid))"
@@ -128,6 +131,7 @@ def test_a_job_that_ends_with_1_while_it_is_cancelled_is_done_if_it_says_what_it
     assert (jobs_files.read_job(folder).state, jobs_files.read_job(folder).code) == (state, 1)
 
 
+@pytest.mark.promise("studio-29")
 def test_a_job_ended_by_a_signal_says_which(tmp_path):
     folder = written(tmp_path / "jobs", cwd=str(tmp_path))
     jobs_process.run_job(folder, python("import os; os.kill(os.getpid(), 9)"))
@@ -151,6 +155,8 @@ def test_no_file_of_the_working_folder_is_taken_for_a_module(studio, tmp_path):
     assert "mine" not in studio.output(job.number)
 
 
+@pytest.mark.promise("readme-15")
+@pytest.mark.promise("studio-4")
 def test_a_job_goes_on_when_whoever_started_it_is_gone(tmp_path):
     """The page and its server are there to look on: both may be killed."""
     campaign_file(tmp_path, runs=64)
@@ -210,6 +216,7 @@ def interrupt_waits(process):
     return bool(int(pending, 16) >> (signal.SIGINT - 1) & 1)
 
 
+@pytest.mark.promise("studio-16", "studio-17")
 def test_a_cancelled_campaign_keeps_its_rows_and_resumes_with_progress_handed_over(studio, tmp_path, monkeypatch):
     campaign_file(tmp_path, runs=384)  # in two chunks
     (tmp_path / "halt").touch()
@@ -238,6 +245,7 @@ def test_a_cancelled_campaign_keeps_its_rows_and_resumes_with_progress_handed_ov
     assert "of 384" not in studio.output(again.number, "stderr")
 
 
+@pytest.mark.promise("studio-17")
 def test_a_command_that_does_not_listen_is_asked_harder_each_time(tmp_path, monkeypatch):
     folder = written(tmp_path / "jobs", cwd=str(tmp_path))
     deaf = (
@@ -294,6 +302,7 @@ def test_a_job_that_waits_and_is_cancelled_never_starts(studio, tmp_path):
 
 
 # -------------------------------------------------------------------------------------------------------------- queue
+@pytest.mark.promise("studio-15")
 def test_the_queue_goes_on_in_order_and_nothing_starts_twice(studio, tmp_path):
     """Many programs look at the queue at once; each job's file tells how often and when it ran."""
     for number in range(1, 5):
@@ -318,6 +327,7 @@ def test_who_looks_at_the_list_starts_what_nobody_started(studio, tmp_path):
 
 
 # ------------------------------------------------------------------------------------------------------------- crashes
+@pytest.mark.promise("studio-18")
 def test_a_job_whose_process_is_killed_is_lost_ends_with_it_and_lets_the_next_one_go(studio, tmp_path):
     """The process that watches over it alone: nobody would hear that the command is to stop."""
     campaign_file(tmp_path, runs=4096, duration="1 s")
@@ -371,6 +381,7 @@ def test_a_working_folder_that_is_gone_is_told(studio, tmp_path):
 
 
 # ------------------------------------------------------------------------------------------------------------ the list
+@pytest.mark.promise("studio-18")
 def test_a_finished_job_is_removed_with_its_output_and_its_number_is_not_used_again(studio, tmp_path):
     job = ended(studio.submit(order(tmp_path, "init", "kept.toml")).folder)
     studio.remove(job.number)
@@ -403,6 +414,7 @@ def test_an_order_that_cannot_be_run_is_refused(studio, tmp_path, change, words)
     assert studio.listed() == ()
 
 
+@pytest.mark.promise("studio-29")
 def test_an_order_that_is_refused_is_not_in_the_queue(studio, tmp_path, monkeypatch):
     write = jobs_module.write_whole
 

@@ -83,6 +83,7 @@ def test_the_editor_cannot_undo_its_way_from_one_mission_into_another(session, o
     assert '"7 cm"' in page.editor.value
 
 
+@pytest.mark.promise("studio-12")
 def test_a_mission_that_was_never_saved_is_not_dropped_without_a_word(tmp_path):
     session = Session(tmp_path)
     assert mission._lost(session) == ""  # as it began: it can be begun again
@@ -126,6 +127,7 @@ def test_a_change_of_another_thread_is_not_lost_by_saving(session, monkeypatch):
     assert '"16 cm"' not in session.draft.path.read_text("utf-8")
 
 
+@pytest.mark.promise("studio-11")
 def test_two_tabs_show_what_the_other_sets_also_when_both_set_at_once(session, opened):
     one, two = opened(), opened()
     one.form._typed(LEO, "6 cm")
@@ -191,6 +193,7 @@ def test_many_faults_are_counted_and_the_first_are_listed(session, opened):
 
 
 # ----------------------------------------------------------------------------------------------------- changed on disk
+@pytest.mark.promise("studio-11")
 def test_a_file_that_another_program_changes_is_told(session):
     path, revision = session.draft.path, session.revision
     assert (session.disk, session.disk_words(), layout._words(session.draft, session.disk)) == ("", "", "saved")
@@ -237,6 +240,7 @@ def test_what_is_no_file_any_more_is_not_read(session):
     assert session.disk == "changed"
 
 
+@pytest.mark.promise("studio-11")
 def test_a_study_of_a_file_that_another_program_has_changed_is_not_run(session, monkeypatch):
     asked = []
     monkeypatch.setattr(runs, "submit", lambda *order: asked.append(order))
@@ -256,6 +260,7 @@ def test_a_study_of_a_file_that_another_program_has_changed_is_not_run(session, 
     client.delete()
 
 
+@pytest.mark.promise("studio-17")
 def test_a_campaign_that_was_cancelled_goes_on_and_one_that_is_done_gets_its_report(session, monkeypatch):
     asked = []
 

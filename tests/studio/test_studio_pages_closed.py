@@ -325,6 +325,7 @@ def test_pages_wait_by_the_one_way_that_ends_with_them():
     assert found == {("in_thread.py", "io_bound"), ("in_thread.py", "sleep")}
 
 
+@pytest.mark.promise("studio-13")
 def test_blocks_of_the_report_are_shown_as_text_and_what_was_unfolded_stays_so(monkeypatch):
     """Every kind of block; a name in one is never markup."""
     at, svg = np.array([0.0, 1.0]), "<svg xmlns='http://www.w3.org/2000/svg'/>"

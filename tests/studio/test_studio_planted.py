@@ -56,6 +56,7 @@ PLANTED = {
 }
 
 
+@pytest.mark.promise("studio-22")
 @pytest.mark.parametrize("how", PLANTED)
 def test_a_planted_job_is_never_started(jobs, started, tmp_path, how):
     """As the right code and nothing else tells it from one that is."""
@@ -112,6 +113,7 @@ def test_what_a_moved_job_has_done_is_still_told(jobs, tmp_path):
     assert (job.state, job.title) == ("done", "mine")
 
 
+@pytest.mark.promise("studio-22")
 def test_a_studio_opened_in_a_strangers_folder_starts_and_believes_nothing(tmp_path, started):
     place = tmp_path / ".microrad-studio" / "jobs"
     (place / "7").mkdir(parents=True)
@@ -218,6 +220,7 @@ def test_the_form_of_the_mirror_is_read_from_a_plain_file_alone(tmp_path):
 
 
 # ------------------------------------------------------------------------------------------------------------ the key
+@pytest.mark.promise("studio-6", "studio-23")
 def test_the_key_is_made_once_for_this_user_alone_and_outside_of_the_folder(own_key, tmp_path):
     assert not signing.is_ours(b"text", "")
     assert not own_key.exists()  # to look makes none
@@ -233,6 +236,7 @@ def test_the_key_is_made_once_for_this_user_alone_and_outside_of_the_folder(own_
     assert not signing.is_ours(b"text", code)
 
 
+@pytest.mark.promise("studio-23")
 @pytest.mark.parametrize(
     ("spoil", "words"),
     [
@@ -298,6 +302,7 @@ def test_a_home_of_somebody_else_is_told(own_key, monkeypatch, jobs, tmp_path):
     assert jobs.listed() == ()
 
 
+@pytest.mark.promise("studio-23")
 def test_a_relative_state_home_is_ignored(monkeypatch):
     monkeypatch.setenv("XDG_STATE_HOME", "here")
     assert signing.key_file() == Path.home() / ".local" / "state" / "microrad" / "studio-key"

@@ -44,6 +44,7 @@ def test_tables_that_the_papers_mission_could_get():
     assert not {"beacon", "orbit", "mirror", "pointing"} & set(found)
 
 
+@pytest.mark.promise("studio-12")
 def test_a_commented_example_comes_to_life_where_it_stands(draft):
     got = with_table(draft, "fine_pointing.wheels")
     lines = got.text.split("\n")
@@ -252,6 +253,7 @@ def test_a_ledger_that_is_named_like_an_option_is_none():
     assert action.arguments == ("campaign", "report", "./-x.ledger", "./--help", "--overwrite")
 
 
+@pytest.mark.promise("studio-18")
 def test_only_results_that_are_there_and_inside_are_offered(session, tmp_path_factory):
     outside = tmp_path_factory.mktemp("outside") / "secret.html"
     outside.write_text("secret", "utf-8")
@@ -264,6 +266,7 @@ def test_only_results_that_are_there_and_inside_are_offered(session, tmp_path_fa
 
 
 # ------------------------------------------------------------------------------------------------------------ compare
+@pytest.mark.promise("studio-12")
 def test_keys_that_differ_with_their_sources(draft):
     there = draft.set("terminals.leo_aperture", "6 cm").set("conventions.strehl", "ratio")
     found = compare_view.differences(draft, there)
@@ -297,6 +300,7 @@ def test_a_table_of_one_mission_alone_is_one_difference(draft):
     assert found[1:] == ("2 keys", "not given")
 
 
+@pytest.mark.promise("studio-12")
 def test_the_numbers_are_those_of_the_link_study(session, draft):
     found = {each.name: each for each in compare_view.link_numbers(draft)}
     study = link_study.run_link_study(load_link(session.folder / "leo-geo.toml"))
@@ -325,6 +329,8 @@ def test_numbers_beside_each_other_with_their_change():
     assert compare_view.beside(here, here)[0][3] == "same"
 
 
+@pytest.mark.promise("readme-15")
+@pytest.mark.promise("studio-12", "studio-13")
 def test_two_missions_are_compared_in_the_report_s_views(session, draft):
     there, names = draft.set("terminals.leo_aperture", "6 cm"), ("a.toml", "b.toml")
     links, verdicts, differ = compare_view.blocks(session, draft, there, names)
@@ -344,6 +350,7 @@ def test_two_missions_are_compared_in_the_report_s_views(session, draft):
     assert same.text == "Every key has the same value in both."
 
 
+@pytest.mark.promise("studio-12")
 def test_the_study_of_exactly_this_text_is_found(session, draft):
     def put(folder, sha256, verdict):
         requirement = {"name": "margin", "unit": "dB", "required": 3.0, "actual": 2.0, "met": False}
@@ -369,11 +376,24 @@ def test_the_study_of_exactly_this_text_is_found(session, draft):
         assert compare_view.finished_study(session, draft).folder == latest
 
 
+def test_a_study_with_a_requirement_that_is_not_known_is_not_met(session, draft):
+    known = {"name": "margin", "unit": "dB", "required": 3.0, "actual": 4.0, "met": True}
+    for folder, others in (("known", []), ("unknown", [{**known, "actual": None, "met": False}])):
+        (session.folder / folder).mkdir()
+        summary = {"verdict": "as it is", "requirements": [known, *others]}
+        data = json.dumps({"mission": {"sha256": draft.sha256}, "summary": summary})
+        (session.folder / folder / "manifest.json").write_text(data, "utf-8")
+        found = compare_view.finished_study(session, draft)
+        assert ([each.met for each in found.numbers], found.met) == ([True], not others)
+        (session.folder / folder / "manifest.json").unlink()
+
+
 # ------------------------------------------------------------------------------------------- the other, kept on disk
 def again(session):
     return Session(session.folder)
 
 
+@pytest.mark.promise("studio-8")
 def test_the_other_mission_survives_a_restart(session, draft):
     assert again(session).other is None
     paper = Draft.shipped(session.inside("leo-geo.toml"))

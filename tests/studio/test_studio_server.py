@@ -40,6 +40,7 @@ def file(tmp_path):
 
 
 # ----------------------------------------------------------------------------------------------------------- session
+@pytest.mark.promise("studio-6", "studio-7")
 def test_a_session_opens_the_file_that_it_is_given(file):
     other = file.with_name("other.toml")
     other.write_text(file.read_text("utf-8").replace('leo_aperture = "5 cm"', 'leo_aperture = "7 cm"'), "utf-8")
@@ -48,6 +49,7 @@ def test_a_session_opens_the_file_that_it_is_given(file):
     assert Session(file.parent).draft.values[APERTURE].typed == "5 cm"
 
 
+@pytest.mark.promise("studio-7")
 def test_an_empty_folder_gets_the_shipped_mission_unsaved(tmp_path):
     session = Session(tmp_path)
     assert session.draft.text == DEFAULT.read_text("utf-8")
@@ -55,6 +57,7 @@ def test_an_empty_folder_gets_the_shipped_mission_unsaved(tmp_path):
     assert not (tmp_path / "leo-geo.toml").exists()
 
 
+@pytest.mark.promise("studio-7", "studio-9")
 def test_unsaved_changes_survive_a_restart(file):
     before = file.read_bytes()
     Session(file.parent, file).set(APERTURE, "6 cm")
@@ -82,6 +85,7 @@ def test_what_was_saved_is_read_from_the_file_after_a_restart(file):
     assert not again.draft.changed
 
 
+@pytest.mark.promise("studio-11")
 def test_a_file_changed_behind_unsaved_changes_is_not_overwritten_after_a_restart(file):
     Session(file.parent, file).set(APERTURE, "6 cm")
     file.write_text(file.read_text("utf-8").replace('"15 cm"', '"16 cm"'), "utf-8")
@@ -107,6 +111,7 @@ def test_a_note_of_unsaved_changes_opens_nothing_outside_of_the_folder(file, tmp
     assert Session(file.parent).draft.path == file
 
 
+@pytest.mark.promise("studio-6", "studio-22")
 def test_nothing_outside_of_the_folder_is_opened(file, tmp_path_factory):
     elsewhere = tmp_path_factory.mktemp("elsewhere")
     with pytest.raises(NameRefusedError, match="is outside of"):
@@ -133,6 +138,7 @@ def test_a_change_is_kept_where_the_studios_folder_was_removed(file):
     assert Session(file.parent).draft.values[APERTURE].typed == "6 cm"
 
 
+@pytest.mark.promise("studio-9")
 def test_changes_of_two_tabs_are_both_kept(file):
     session = Session(file.parent, file)
     keys = ("communication.transmit_power", "beacon.transmit_power")
@@ -180,6 +186,7 @@ def test_only_the_missions_of_the_folder_itself_are_listed(file):
     assert [path.name for path in Session(file.parent).missions()] == ["b.toml", "leo-geo.toml"]
 
 
+@pytest.mark.promise("studio-8")
 def test_the_studios_own_folder_is_private_and_overlooked_by_git(file):
     Session(file.parent)
     folder = file.parent / STUDIO
@@ -194,6 +201,9 @@ def taken_port():
         yield listener.getsockname()[1]
 
 
+@pytest.mark.promise("readme-15")
+@pytest.mark.promise("studio-2", "studio-3", "studio-22")
+@pytest.mark.promise("readme-26")
 def test_a_free_port_is_taken_on_this_machine_alone():
     entrance = server.listen()
     with closing(entrance.listener):
@@ -207,6 +217,7 @@ def test_a_free_port_is_taken_on_this_machine_alone():
             assert again.token != entrance.token
 
 
+@pytest.mark.promise("studio-24")
 def test_an_address_for_others_is_the_only_name(monkeypatch):
     monkeypatch.setattr(server, "_bound", lambda host, port: socket.create_server(("127.0.0.1", port)))
     entrance = server.listen(exposed="192.0.2.7")
@@ -278,6 +289,7 @@ def test_a_page_that_cannot_be_written_is_named_and_not_there(file, monkeypatch)
     assert not (studio / "open.html").exists()
 
 
+@pytest.mark.promise("studio-22")
 def test_only_results_of_a_job_within_the_folder_are_shown(file, tmp_path_factory):
     outside = tmp_path_factory.mktemp("outside") / "secret.html"
     outside.write_text("secret", "utf-8")
@@ -305,6 +317,7 @@ def test_a_number_that_no_job_can_have_shows_nothing(file):
 
 
 # ------------------------------------------------------------------------------------------------------------ command
+@pytest.mark.promise("studio-5", "studio-8")
 def test_a_second_studio_in_a_folder_is_refused(refused, folder, monkeypatch):
     monkeypatch.setattr(server, "serve", lambda *_: pytest.fail("there are two of them"))
     with server.alone(Session(folder).studio):
@@ -319,6 +332,7 @@ def test_a_second_studio_in_a_folder_is_refused(refused, folder, monkeypatch):
         assert f"microrad: {folder} is open in another studio; go on" in refused("studio", "--no-browser")
 
 
+@pytest.mark.promise("studio-2")
 def test_a_port_in_use_is_refused(refused):
     with taken_port() as port:
         said = refused("studio", "--no-browser", "--port", port)
@@ -337,6 +351,7 @@ def test_a_file_that_is_no_text_is_refused(refused, folder):
     assert "picture.toml" in refused("studio", "picture.toml", "--no-browser")
 
 
+@pytest.mark.promise("studio-2")
 def test_an_installation_without_the_studio_says_what_to_install(refused, monkeypatch):
     monkeypatch.setattr(server.util, "find_spec", lambda name: None)
     said = refused("studio")
@@ -346,6 +361,7 @@ def test_an_installation_without_the_studio_says_what_to_install(refused, monkey
     )
 
 
+@pytest.mark.promise("studio-24")
 def test_to_be_open_to_others_needs_the_flag_typed_out_with_an_address(refused):
     for short in ("--expose", "--expose-to-net", "--host"):
         assert "No such option" in refused("studio", short, "192.0.2.1", "--no-browser")
@@ -385,7 +401,10 @@ def running(folder, *args, browser=None):
 HANGUP = pytest.param(getattr(signal, "SIGHUP", 1), marks=pytest.mark.endurance)
 
 
+@pytest.mark.promise("readme-15")
+@pytest.mark.promise("studio-2", "studio-4", "studio-6")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, HANGUP])
+@pytest.mark.promise("readme-26")
 def test_the_address_opens_the_studio_and_a_signal_ends_it(file, number):
     before = listing(file.parent)
     with running(file.parent, "leo-geo.toml") as (process, url):
@@ -403,6 +422,7 @@ def test_the_address_opens_the_studio_and_a_signal_ends_it(file, number):
     assert kept == before
 
 
+@pytest.mark.promise("studio-4")
 def test_a_second_signal_breaks_nothing_off_and_a_third_does():
     uvicorn = pytest.importorskip("uvicorn")
     own = server._server(uvicorn.Config(None), lambda: None)
@@ -448,7 +468,9 @@ while [ -e {folder}/open ]; do sleep 0.1; done
 """
 
 
+@pytest.mark.promise("studio-2", "studio-22")
 @pytest.mark.skipif(os.name != "posix", reason="the browser of the test is a shell script")
+@pytest.mark.promise("readme-26")
 def test_a_browser_is_started_without_the_token_on_its_command_line(file, tmp_path_factory):
     """Every user of the machine may read command lines. This browser ends as late as one that is closed by hand."""
     told = tmp_path_factory.mktemp("browser")
@@ -482,6 +504,8 @@ def test_a_browser_is_started_without_the_token_on_its_command_line(file, tmp_pa
     assert not page.exists()
 
 
+@pytest.mark.promise("readme-15")
+@pytest.mark.promise("studio-4", "studio-16")
 def test_a_job_goes_on_when_the_studio_ends(file):
     session = Session(file.parent)
     with running(file.parent) as (process, _):
@@ -495,6 +519,7 @@ def test_a_job_goes_on_when_the_studio_ends(file):
     assert session.jobs.get(job.number).state == "cancelled"
 
 
+@pytest.mark.promise("readme-15")
 def test_every_page_is_there():
     pages = Path(server.__file__).parent / "pages"
     assert [name for name in server.PAGES if not (pages / f"{name}.py").is_file()] == []

@@ -61,6 +61,7 @@ def test_a_decomposed_name_is_composed():
     assert safe_name("u\u0308.csv") == "\u00fc.csv"
 
 
+@pytest.mark.promise("studio-22")
 @pytest.mark.parametrize(
     ("name", "why"),
     [
@@ -107,6 +108,7 @@ def test_names_beside_the_refused_ones_are_taken():
         assert safe_name(name) == name
 
 
+@pytest.mark.promise("studio-22")
 @posix
 def test_paths_stay_within_their_folder(tmp_path):
     root, outside = tmp_path / "root", tmp_path / "outside.toml"
@@ -179,6 +181,7 @@ def test_a_file_is_stored_as_it_came_for_its_owner_only(tmp_path):
     assert uploads.listed() == (second,)
 
 
+@pytest.mark.promise("studio-20")
 def test_a_file_over_the_limit_stops_the_sender_and_leaves_nothing(tmp_path):
     uploads = Uploads(tmp_path, LIMITS)
     sent = 0
@@ -195,6 +198,7 @@ def test_a_file_over_the_limit_stops_the_sender_and_leaves_nothing(tmp_path):
     assert save(uploads, "just.csv", bytes(1000)).size == 1000
 
 
+@pytest.mark.promise("studio-20")
 def test_number_and_sum_of_the_files_are_bounded(tmp_path):
     uploads = Uploads(tmp_path, LIMITS)
     for k in range(2):
@@ -240,6 +244,7 @@ def test_what_breaks_off_leaves_nothing(tmp_path, fault):
     assert everything(tmp_path) == []
 
 
+@pytest.mark.promise("studio-29")
 def test_a_full_disk_is_said(tmp_path):
     with pytest.raises(UploadError, match=r"'x.csv' could not be stored: No space left on device"):
         save(Uploads(tmp_path, LIMITS), "x.csv", b"1", OSError(28, "No space left on device"))
@@ -308,6 +313,7 @@ def test_an_upload_that_is_broken_off_is_no_fault_of_the_studio(tmp_path, monkey
     assert len(everything(tmp_path / "uploads")) == 2  # the file in its folder
 
 
+@pytest.mark.promise("studio-20")
 def test_an_upload_that_hangs_is_ended_and_those_behind_it_are_not_read_before(tmp_path, monkeypatch):
     drop = pytest.importorskip("nicegui") and importlib.import_module("microrad.studio.pages.drop")
     read = []
@@ -394,6 +400,7 @@ def test_what_no_recording_is_in_is_cleared_away_at_the_start(tmp_path, monkeypa
     assert save(uploads, "x.csv", b"1").size == 1
 
 
+@pytest.mark.promise("studio-8")
 def test_temporary_files_lie_in_the_private_folder(tmp_path, monkeypatch):
     monkeypatch.setattr(tempfile, "tempdir", tempfile.gettempdir())
     uploads = Uploads(tmp_path / "uploads", LIMITS)
@@ -546,6 +553,7 @@ class Opened:
         return Path.touch, (Path(self.path),)
 
 
+@pytest.mark.promise("studio-22")
 @pytest.mark.parametrize("suffix", ["npy", "npz"])
 def test_pickles_are_not_loaded(tmp_path, suffix):
     trace, path = tmp_path / "trace", tmp_path / f"evil.{suffix}"
@@ -577,6 +585,7 @@ def bomb(path, header, megabytes):
     return path
 
 
+@pytest.mark.promise("studio-20", "studio-22")
 def test_a_zip_bomb_is_refused_by_what_it_states(tmp_path):
     path = bomb(tmp_path / "bomb.npz", npy_header(25_000_000), 200)
     for columns in (None, Columns((0,), (1,), rate_hz=1e3)):
@@ -641,6 +650,7 @@ def test_a_tdms_file_that_states_a_trillion_samples_counts_for_what_it_holds(tmp
     assert "bytes are missing" in refused(path)
 
 
+@pytest.mark.promise("studio-21")
 @posix
 @pytest.mark.parametrize("how", ["external", "virtual", "link"])
 def test_data_of_other_files_are_not_read(tmp_path, how):
@@ -680,6 +690,7 @@ def standing_in(monkeypatch, tmp_path, program):
     return path
 
 
+@pytest.mark.promise("studio-21")
 def test_a_reader_that_hangs_is_ended_with_what_it_started(tmp_path, monkeypatch):
     program = """
         import subprocess, sys, time
@@ -698,6 +709,7 @@ def test_a_reader_that_hangs_is_ended_with_what_it_started(tmp_path, monkeypatch
     assert gone(int(children[0]))
 
 
+@pytest.mark.promise("studio-21")
 @pytest.mark.parametrize(
     ("program", "words"),
     [
@@ -743,6 +755,7 @@ def test_names_too_long_for_a_request_are_refused(tmp_path, loop):
     assert "give their numbers instead" in refused(path, Columns(("x" * 40_000,), (2,)))
 
 
+@pytest.mark.promise("studio-20", "studio-21", "studio-22")
 @linux
 def test_the_process_bounds_itself_before_it_reads(tmp_path):
     limits = {"memory_bytes": 3_000_000_000, "cpu_s": 20, "wall_s": 40}

@@ -52,6 +52,7 @@ def test_a_reading_is_the_mission_written_so(tmp_path, found, key, change):
     assert found[key].margin_db == pytest.approx(float(link.margin_of_error(link.of(m), np.array([left]))[0]), abs=1e-9)
 
 
+@pytest.mark.promise("gallery-2", "gallery-3", "report-6")
 def test_the_page_and_the_verdict_say_which_of_them_turn_it(found):
     study = plain_study()
     (said,) = words.read_otherwise(study)

@@ -151,6 +151,8 @@ def check_order(found):
 
 
 # ------------------------------------------------------------------------------------------------- a whole contact
+@pytest.mark.promise("readme-8")
+@pytest.mark.promise("day-26", "day-28", "day-29")
 def test_a_contact_goes_from_the_slew_to_data_and_ends_with_its_cause(whole, finding):
     check_order(whole)
     assert route(whole.log) == [*FIRST, "end"]
@@ -172,6 +174,7 @@ def test_a_contact_goes_from_the_slew_to_data_and_ends_with_its_cause(whole, fin
     assert 58.1 < 2 * HALF_S / 60 < 58.2  # minutes
 
 
+@pytest.mark.promise("day-26")
 def test_windows_spread_from_lock_to_the_end_over_the_geometry_of_their_moment(whole):
     begins = np.array([w.start_s for w in whole.windows])
     assert_allclose(begins, np.linspace(whole.first_data_s, HALF_S - 1.0, 8), rtol=0, atol=1e-9)
@@ -189,6 +192,7 @@ def test_windows_spread_from_lock_to_the_end_over_the_geometry_of_their_moment(w
     assert whole.sampled_s == pytest.approx(8.0)
 
 
+@pytest.mark.promise("day-30")
 def test_the_margin_follows_the_range_and_the_error(whole, file):
     """The budget at the range of a sample and at its error."""
     for w in (whole.windows[0], whole.windows[4]):
@@ -213,6 +217,7 @@ def test_the_margin_of_a_window_that_is_cut_short_follows_the_range_of_its_own_t
         assert found.margin_db[k] == pytest.approx(budget.margin_db, abs=1e-6)
 
 
+@pytest.mark.promise("day-30")
 def test_the_residual_of_a_window_is_the_ensembles_with_the_same_references(file, scene, design, sampler):
     """To the last bit that of the run of its number, and about the rms of 64 runs."""
     how = settings(window_s=1.5, settle_s=0.5, seed=7)
@@ -231,6 +236,7 @@ def test_the_residual_of_a_window_is_the_ensembles_with_the_same_references(file
 
 
 # ------------------------------------------------------------------------------------------------------ references
+@pytest.mark.promise("day-30")
 def test_a_moving_reference_is_what_a_first_order_body_leaves_of_a_changing_rate():
     """Euler's steps of e' = rate(t) - w e, from long before."""
     moving = MovingReference(30e-6, 2e-6, 0.1, point_ahead_rate_rad_s=-0.5e-6, acceleration_rad_s2=0.3e-6)
@@ -250,6 +256,7 @@ def test_a_moving_reference_that_stands_still_is_a_settled_reference():
         MovingReference(30e-6, 2e-6, 0.1, acceleration_rad_s2=math.nan)
 
 
+@pytest.mark.promise("day-26")
 def test_point_ahead_and_rate_of_the_moment_reach_the_mirror(sampler):
     """Same random numbers with and without them: the mirror's mean angle differs by just what they are, on x."""
 
@@ -275,6 +282,7 @@ def test_a_second_mirror_takes_the_point_ahead_and_feedforward_the_rate(file, sa
     assert_array_equal(seen.radial_rad, still.radial_rad)
 
 
+@pytest.mark.promise("day-30")
 def test_references_of_a_window_begin_with_it_and_not_with_its_settling(sampler):
     """A line is followed over the window whatever the settling; the references at its begin and its end."""
 
@@ -290,6 +298,7 @@ def test_references_of_a_window_begin_with_it_and_not_with_its_settling(sampler)
         assert_allclose(moving.at(np.array([settle, settle + 0.4])), ahead + lag, rtol=1e-9)
 
 
+@pytest.mark.promise("day-30")
 @pytest.mark.parametrize("corrected", [True, False])
 def test_a_point_ahead_that_is_not_corrected_is_that_of_the_geometry(file, sampler, corrected):
     ahead = file.mission.point_ahead.model_copy(update={"corrected": corrected})
@@ -420,6 +429,7 @@ def test_a_scan_finds_the_partner_instead(run, finding):
 
 
 # ------------------------------------------------------------------------------------------------------------ slew
+@pytest.mark.promise("day-28")
 def test_a_body_that_is_not_free_in_time_turns_late(run):
     found = run(contact(free_from_s=960.0), settings(windows=1))
     check_order(found)
@@ -462,6 +472,8 @@ def losing(run, shaken):
     return run(contact(), settings(windows=6, seed=2), scene=shaken(*STRONG))
 
 
+@pytest.mark.promise("readme-8")
+@pytest.mark.promise("day-26")
 def test_strong_vibration_loses_lock_and_regains_it(losing):
     check_order(losing)
     again = ["loss", "re-acquire", "data"]
@@ -493,6 +505,7 @@ def test_the_cause_of_a_loss_says_what_happened(losing):
         assert after.cause == "the light has gone there and back, 280 ms"
 
 
+@pytest.mark.promise("day-26")
 def test_lock_is_lost_at_the_first_stretch_that_is_too_long(losing):
     for window in losing.windows:
         since = since_below(window, 0.01)
@@ -612,6 +625,7 @@ def test_a_whole_window_ends_a_row_of_losses(run, whole, monkeypatch):
     assert found.log[-1].cause == "given up after 5 losses of lock in as many windows in a row; seen by its own sensor"
 
 
+@pytest.mark.promise("day-26")
 def test_a_spot_beyond_the_field_of_view_is_lost_at_once(run, shaken, design):
     scene = shaken(*HARD)
     narrow = replace(scene.loop.optical, field_of_view_rad=200e-6)

@@ -196,6 +196,7 @@ def differing(text, folder, known):
 
 
 # ----------------------------------------------------------------------------------------------------------- the tests
+@pytest.mark.promise("decisions-1", "report-4")
 @pytest.mark.parametrize("changed", HERE, ids=" and ".join)
 def test_changed_keys_give_the_numbers_of_a_study_without_kept_parts(changed, place):
     draft = shorter(SHIPPED)
@@ -205,6 +206,7 @@ def test_changed_keys_give_the_numbers_of_a_study_without_kept_parts(changed, pl
     assert differing(draft.text, *place(SHIPPED)) == []
 
 
+@pytest.mark.promise("decisions-1")
 @pytest.mark.endurance
 @pytest.mark.parametrize("table", ["", *TABLES])
 @pytest.mark.parametrize("path", [SHIPPED, DEFAULT], ids=lambda path: path.stem)
@@ -217,6 +219,7 @@ def test_any_changed_key_gives_the_numbers_of_a_study_without_kept_parts(path, t
     assert {what: wrong for what, each in found.items() if (wrong := differing(each.text, *place(path)))} == {}
 
 
+@pytest.mark.promise("report-4")
 def test_what_is_not_read_is_not_computed_again(place, monkeypatch):
     def computed(*args, **beside):
         pytest.fail("computed again")

@@ -2,6 +2,8 @@
 
 from collections import Counter
 
+import pytest
+
 from microrad import link
 from microrad.core import threads
 from microrad.loop.control import PI
@@ -11,6 +13,7 @@ from microrad.study import study
 from shipped import edited_file
 
 
+@pytest.mark.promise("decisions-1")
 def test_one_study_assembles_its_link_and_each_variant_of_its_mirror_once(tmp_path, monkeypatch):
     changes = ("runs = 64 ", "runs = 1 "), ('duration = "2 s" ', 'duration = "0.1 s" '), ('= "0.5 s" ', '= "0.05 s" ')
     file = edited_file(tmp_path, *changes, whole=True, day=False)

@@ -13,6 +13,7 @@ from microrad.link.requirement import IMPOSSIBLE
 from microrad.loop import sine_run as simulate
 from microrad.mirror.summary import summarise, unknown_dynamics
 from microrad.mission.file import load_mission
+from microrad.orbit import day as day_study
 from microrad.report.fine_pointing.words import not_reliable
 from microrad.report.links.views import performance_table
 from microrad.report.links.words import consequences
@@ -68,6 +69,7 @@ def test_the_shipped_mission_closes(shipped):
     assert result.beacon.margin_db > 0 < result.answer.margin_db
 
 
+@pytest.mark.promise("readme-21", "report-8")
 def test_the_achieved_margin_is_at_the_worst_residual(shipped):
     """Gaussian pointing loss 8.686 (theta / theta_d)^2 dB with theta_d = lambda / (pi D / 2)."""
     result, _ = shipped
@@ -89,6 +91,7 @@ def test_the_achieved_margin_is_at_the_worst_residual(shipped):
     assert compared.margin_db > 4.0
 
 
+@pytest.mark.promise("report-8")
 def test_the_lines_of_the_verdict(shipped):
     result, _ = shipped
     *beams, stroke, fine, margin = result.requirements
@@ -119,6 +122,17 @@ def test_the_lines_of_the_verdict(shipped):
     cone = requirement(result, "beacon cone over the root sum square")
     assert_allclose([cone.required, cone.actual], [np.sqrt(300**2 + 24**2 + 248**2 + 1**2) * 1e-6, 390e-6], rtol=1e-9)
     assert_allclose(requirement(result, "communication").required, 3.0)
+
+
+@pytest.mark.promise("readme-1", "report-6")
+@pytest.mark.promise("day-2", "index-1")
+def test_the_day_is_that_of_the_simulated_loop(shipped):
+    result = shipped[0]
+    best = next(c for c in result.performance.cases if f"{c.controller}, {c.source}" == result.day.loss.source)
+    assert (result.day.loss.loss_db, result.day.loss.outage) == (best.outage_loss_db, best.outage)
+    assert best.controller == "LQG"
+    assert result.day.loss.loss_db < day_study.given_loss(result.links).loss_db - 1.0
+    assert result.contact is not None and result.contact.contact.start_s == result.day.encounters[0].contact.start_s
 
 
 def test_the_claims_beside_our_values(shipped):
@@ -153,6 +167,8 @@ def test_the_claims_beside_our_values(shipped):
     assert "Nowhere together with these: PID + inverse stays within 10 µrad" in result.claims[9].why
 
 
+@pytest.mark.promise("report-8")
+@pytest.mark.promise("link-1", "link-42")
 @pytest.mark.parametrize(
     ("source", "controller", "margin_db", "cost_db", "cost_mbit_s"),
     [
@@ -253,6 +269,7 @@ def test_a_larger_transmitter_also_narrows_the_beam(shipped, variant):
     assert_allclose(raised, 20 * log10(6 / 5) - loss * ((6 / 5) ** 2 - 1), atol=1e-9)
 
 
+@pytest.mark.promise("report-8")
 def test_the_residual_passes_in_rms(shipped, variant):
     result = variant(('residual_statistic = "peak"', 'residual_statistic = "rms"'))
     before, after = (requirement(r, "residual pointing error") for r in (shipped[0], result))
@@ -284,6 +301,7 @@ def plays(weights='"60 urad/V", "20 urad/V", "9 urad/V"'):
     return (tables, table), ('composition = "cascade"', 'composition = "static"')
 
 
+@pytest.mark.promise("report-8")
 def test_a_static_mirror_of_plays_runs_through(coarse, tmp_path):
     result = study.run_study(edited_file(tmp_path, *plays(), day=False))
     assert result.scan is None
@@ -394,6 +412,7 @@ def test_a_jitter_is_not_summed_with_what_the_simulated_loop_leaves(tmp_path):
     assert "static error: 300 Mbit/s at 10" in drawn.plot and "budget: 300 Mbit/s at 10" in other.plot
 
 
+@pytest.mark.promise("report-6")
 @pytest.mark.parametrize("shipped", [DEFAULT, SHIPPED], ids=["met", "missed"])
 def test_what_to_change_for_the_stroke_just_meets_it(tmp_path, shipped):
     text = shipped.read_text(encoding="utf-8")

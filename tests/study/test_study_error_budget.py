@@ -30,6 +30,8 @@ def missed():
         return study.run_study(loaded(*KEPT[1:]))
 
 
+@pytest.mark.promise("report-8")
+@pytest.mark.promise("pointing-47")
 def test_each_requirement_of_the_table_is_a_line_of_the_verdict_by_the_full_distribution():
     found = kept_study()
     word, drift = budget_lines(found)
@@ -44,6 +46,7 @@ def test_each_requirement_of_the_table_is_a_line_of_the_verdict_by_the_full_dist
     assert chain.stages(found)[-3].lines[-1] == "error budget: 2 of 2 kept"
 
 
+@pytest.mark.promise("report-6", "report-8")
 def test_a_requirement_that_is_missed_says_what_contributes_most_and_how_large_that_may_be(missed):
     _, drift = budget_lines(missed)
     assert (missed.met, drift.mark, missed.closes) == (False, "FAIL", True)
@@ -88,6 +91,7 @@ def test_a_mission_without_the_table_has_none_of_it():
     assert all("error budget" not in line for stage in chain.stages(found) for line in stage.lines)
 
 
+@pytest.mark.promise("pointing-47")
 def test_the_loop_is_that_of_the_judged_controller_and_is_not_designed_again(monkeypatch):
     monkeypatch.setattr(controller_study, "design", None)
     found, fine = looped_study(), whole_study()[0].fine_pointing

@@ -12,10 +12,10 @@ from numpy.testing import assert_allclose
 
 from budget_files import loaded
 from campaign_files import HEAD, POWER
-from microrad import report
+from microrad import link, mirror, report
 from microrad.campaign.file import load_campaign
 from microrad.campaign.rows.loops import mission_loop
-from microrad.loop import coupled_study
+from microrad.loop import coupled_study, paper_cases
 from microrad.loop.pointing_loop import ensemble
 from microrad.loop.pointing_loop.loop import decoupling
 from microrad.mirror import Variant, coupled
@@ -55,6 +55,8 @@ def _without_scan_and_removed():
         shutil.rmtree(plate_study()[1])
 
 
+@pytest.mark.promise("mirror-file-30")
+@pytest.mark.promise("pointing-76", "pointing-77")
 def test_the_loop_is_that_of_the_named_mirror():
     fine = plate_study()[0].fine_pointing
     assert isinstance(fine.scene, coupled_study.CoupledScene)
@@ -80,6 +82,24 @@ def test_without_hysteresis_the_simulation_is_the_theory():
     assert 0.1 * only.theory.radial_rms_rad < bound <= 1.01 * only.theory.radial_rms_rad
 
 
+@pytest.mark.promise("pointing-77")
+def test_the_papers_sines_keep_their_mirror_and_the_verdict_is_the_links_under_the_best_controller():
+    found = plate_study()[0]
+    m, fine = found.file.mission, found.fine_pointing
+    assert {run.mirror for run in found.runs} >= {"given"}
+    cases = paper_cases.of(m, mirror.of(m))
+    peaks = {(r.controller, r.freq_hz): r.trace.peak_rad for r in paper_cases.sine_runs(cases) if r.mirror == "given"}
+    assert {(r.controller, r.freq_hz): r.trace.peak_rad for r in found.runs if r.mirror == "given"} == peaks
+    (line,) = (r for r in found.requirements if r.name.startswith("link margin for"))
+    (own,) = (r for r in found.requirements if r.name.startswith("fine pointing at"))
+    left = fine.best.simulated[Variant.GIVEN].quantile_rad
+    assert own.actual == left != fine.best.simulated[Variant.STRAIGHT].quantile_rad
+    assert_allclose(line.actual, link.margin_of_error(link.of(m), left), rtol=1e-12)
+    volts = (m.amplifier.output_min_v / m.amplifier.gain, m.amplifier.output_max_v / m.amplifier.gain)
+    assert_allclose(fine.scene.reach_v, np.array(volts) - 50.0, rtol=1e-12)
+
+
+@pytest.mark.promise("pointing-77")
 def test_the_parts_of_the_error_make_up_the_whole():
     budget = plate_study()[0].fine_pointing.budget
     assert_allclose(budget.combined_rad, budget.together_rad, rtol=0.1)
@@ -87,6 +107,7 @@ def test_the_parts_of_the_error_make_up_the_whole():
     assert_allclose(vibration.rms_rad, vibration.theory_rad, rtol=0.1)
 
 
+@pytest.mark.promise("pointing-77", "pointing-82")
 def test_the_stroke_is_that_of_each_actuator():
     """Drives by the least norm beside a piston of 0, from the mirror's own slow gain."""
     found = plate_study()[0]
@@ -111,6 +132,7 @@ def test_the_stroke_is_that_of_each_actuator():
     assert_allclose(stroke.required / stroke.actual, max(shares), rtol=1e-9)
 
 
+@pytest.mark.promise("pointing-77")
 def test_the_contact_flies_that_loop():
     """Its windows leave what the ensemble leaves, and the mirror follows reference and body."""
     found = plate_study()[0]
@@ -123,6 +145,7 @@ def test_the_contact_flies_that_loop():
         assert abs(window.mirror_rad[1]) < 2.0 * body
 
 
+@pytest.mark.promise("mirror-file-30")
 def test_the_report_says_which_mirror_flies(tmp_path):
     page = report.write(plate_study()[0], tmp_path / "out").read_text(encoding="utf-8")
     assert page.count("a plate, 3 actuators, 3 outputs, 6 states, 3 hysteresis elements") == 2
@@ -147,6 +170,8 @@ def test_a_report_runs_again_from_the_mirror_that_it_carries(tmp_path, monkeypat
     assert again.same
 
 
+@pytest.mark.promise("mirror-file-30")
+@pytest.mark.promise("pointing-77")
 def test_a_campaign_flies_that_loop(tmp_path, monkeypatch):
     """A row is the ensemble of the mission's loop under the controller that is tuned for it."""
     written(tmp_path, coupled.text(three_actuators()))
@@ -183,6 +208,7 @@ def test_a_campaign_refuses_what_is_for_a_mirror_on_each_axis(tmp_path, line, ke
     assert [fault.key for fault in caught.value.faults] == [key]
 
 
+@pytest.mark.promise("pointing-76")
 def test_a_mission_and_an_option_name_the_same_mirror(tmp_path):
     named, table = load_loop(written(tmp_path))
     (tmp_path / "plain.toml").write_text(mission_text(*SHORT), encoding="utf-8")
@@ -211,6 +237,7 @@ def test_a_mirror_file_that_is_none_of_several_axes_is_refused(tmp_path, mirror,
         study.run_study(load_mission(path))
 
 
+@pytest.mark.promise("mirror-file-31")
 def test_the_studio_says_where_its_controllers_are(tmp_path):
     with pytest.raises(ValueError, match="microrad design has its controllers"):
         controllers.controller(load_mission(written(tmp_path)), "PI")

@@ -16,7 +16,7 @@ from microrad.campaign.records import CampaignError
 from microrad.campaign.rows import evaluate
 from microrad.campaign.rows.loops import mission_loop
 from microrad.campaign.rows.missions import MissionBuilder
-from microrad.core import reads
+from microrad.core import kernels, reads
 from microrad.loop.pointing_loop import ensemble
 from microrad.mission.fields import Table
 from microrad.mission.file import LinkFile
@@ -102,6 +102,7 @@ class _Runs:
 
     radial_rms_rad = 1e-6
     largest_rad = np.array([1e-6])
+    histogram = np.ones((1, kernels.BINS), dtype=np.int64)
 
     def quantile_rad(self, probability: float) -> float:
         """Some error."""

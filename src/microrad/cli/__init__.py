@@ -214,4 +214,4 @@ def explain(
     return Outcome(f"{text(found, width())}\n")
 
 
-from microrad.cli import campaign, day, export, jitter, lab, link, pointing, studio, worst_case  # noqa: E402, F401  their commands stand behind these in the help
+from microrad.cli import campaign, day, export, jitter, lab, link, pointing, studio, verify, worst_case  # noqa: E402, F401  their commands stand behind these in the help

@@ -64,18 +64,21 @@ def contacts(
     from microrad.orbit import day as day_study
     from microrad.report.day.data import day_csv, day_data
     from microrad.report.day.page import day_page, day_text
+    from microrad.report.marks import with_marks
 
     links = _links(file)
     with refusal_of(file), progress_bar() as progress:
         day = day_study.run_day_study(links, on_progress=progress)
     code = MET if day.relay.capacity_bit > 0.0 else UNMET
     if as_json:
-        return Outcome(json_text({"mission": links.file.mission.name, **day_data(day)}), code)
+        return Outcome(
+            json_text(with_marks({"mission": links.file.mission.name, **day_data(day)}, links.file.sources)), code
+        )
     if as_csv:
         return Outcome(day_csv(day), code)
     if as_html:
         return Outcome(day_page(day, links), code)
-    return Outcome(day_text(day, width()), code)
+    return Outcome(day_text(day, width(), links.file.sources), code)
 
 
 @app.command(

@@ -3,7 +3,6 @@
 Libraries and our own modules are imported inside the probes: one that does not load is a line of the answer.
 """
 
-import contextlib
 import os
 import platform
 import re
@@ -17,6 +16,7 @@ from importlib import import_module, metadata, resources
 from pathlib import Path
 
 from microrad.core.installing import advice
+from microrad.core.integrity import from_source, other_versions
 
 # The loop of Eq. 3 of SPIE 11852, 118523B, with the printed parameters and u = 6 sin(2 pi 100 Hz t) + 6 V at 50 kHz:
 # width in % of the peak-to-peak output and max|h| in µrad, found with an adaptive solver too.
@@ -26,7 +26,6 @@ _TOLERANCE = 0.01  # in the units above: the last printed digit
 
 _FLOOR = re.compile(r"([A-Za-z0-9_.-]+)\s*>=\s*([0-9.]+)")
 _REINSTALL = f"install again {advice('', '--force-reinstall')}"
-_CONSTRAINTS = Path(__file__).resolve().parents[3] / "constraints.txt"
 _PINNED = "pinned versions"
 _CACHE_ADVICE = "set NUMBA_CACHE_DIR to a folder that you may write to: without a cache every start compiles anew"
 
@@ -104,17 +103,13 @@ def _library(name: str, lowest: str) -> tuple[bool, str]:
 
 def _pins() -> Check:
     """Whether all that is installed has the version that was tested: the first suspect of a number that differs."""
-    if not _CONSTRAINTS.is_file():
-        return Check(
-            _PINNED, True, "not compared: installed without the project's folder, where constraints.txt stands"
-        )
-    pinned, other = dict(re.findall(r"(\S+)==(\S+)", _CONSTRAINTS.read_text(encoding="utf-8"))), {}
-    for name, version in pinned.items():
-        with contextlib.suppress(metadata.PackageNotFoundError):
-            if (found := metadata.version(name)) != version:
-                other[name] = f"{name} {found} (tested: {version})"
+    other = other_versions()
+    if other is None:
+        return Check(_PINNED, True, "not compared: nothing says which versions were tested")
     if not other:
         return Check(_PINNED, True, "those of constraints.txt")
+    if not from_source():  # where another one is the user's choice
+        return Check(_PINNED, True, f"not all of those that were tested: {', '.join(other.values())}")
     command = f"in the project's folder: python -m pip install --constraint constraints.txt {' '.join(other)}"
     return Check(_PINNED, False, f"not those of constraints.txt: {', '.join(other.values())}", command)
 

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
         "microrad budget leo-geo.toml --solve communication.transmit_power",
         "microrad budget leo-geo.toml --csv > budget.csv",
         "microrad budget leo-geo.toml --html > budget.html",
+        "microrad budget leo-geo.toml --standard sda",
     )
 )
 @command
@@ -42,6 +43,9 @@ def budget(  # noqa: PLR0913, PLR0917  each is an option
     pointing_error: Annotated[str | None, option("--pointing-error", "ANGLE", "In place of the mission's.")] = None,
     solve: Annotated[
         str | None, option("--solve", "KEY", "Its values with the required margin, one in its place.")
+    ] = None,
+    standard: Annotated[
+        str | None, option("--standard", "NAME", "What a published standard asks, and what the links have: sda.")
     ] = None,
     as_csv: Annotated[bool, typer.Option("--csv", help="Print one line a row, for a spreadsheet.")] = False,
     as_html: Annotated[bool, typer.Option("--html", help="Print one page that loads nothing.")] = False,
@@ -53,16 +57,21 @@ def budget(  # noqa: PLR0913, PLR0917  each is an option
 
     The verdict, what limits the links, and communication, beacon and answer line by line; --verbose has the source of
     each line and where it holds, the pointing budget, the light on the tracking sensor and acquisition, too. No loop is
-    simulated. The exit code is 0 when every requirement is met and 1 when one is not.
+    simulated. The exit code is 0 when every requirement is met and 1 when one is not; those of a standard do not count.
     """
     if sum((as_csv, as_html, as_json)) > 1:
         raise Refusal("--csv, --html and --json exclude each other; give one of them.")
+    from microrad.link import compliance
     from microrad.link import study as link_study
     from microrad.link.requirement import met
     from microrad.mission.file import load_link
     from microrad.report.links.budgets import links_csv, links_text
     from microrad.report.links.data import links_data
 
+    try:
+        asked = None if standard is None else compliance.standard(standard)
+    except ValueError as error:
+        raise Refusal(f"--standard: {error}") from error
     loaded = load_link(file)
     if pointing_error is not None and loaded.mission.jitter is not None:
         raise Refusal(
@@ -73,16 +82,17 @@ def budget(  # noqa: PLR0913, PLR0917  each is an option
     with refusal_of(file):
         solution = None if solve is None else link_study.solve_key(given, solve)
         study = link_study.run_link_study(given if solution is None else solution.file)
+        against = None if asked is None else compliance.compliance(study, asked)
     code = exit_on.code(met=met(study), closes=study.closes)
     if as_json:
-        return Outcome(json_text(links_data(study, solution)), code)
+        return Outcome(json_text(links_data(study, solution, against)), code)
     if as_csv:
-        return Outcome(links_csv(study, solution), code)
+        return Outcome(links_csv(study, solution, against), code)
     if as_html:
         from microrad.report.links.views import links_page
 
-        return Outcome(links_page(study, solution), code)
-    return Outcome(links_text(study, width(), verbose=verbose, solution=solution), code)
+        return Outcome(links_page(study, solution, against), code)
+    return Outcome(links_text(study, width(), verbose=verbose, solution=solution, against=against), code)
 
 
 def _changed(file: "LinkFile", data_rate: str | None, pointing_error: str | None) -> "LinkFile":

@@ -27,6 +27,7 @@ from microrad.cli.windows import indices_of_mission, time_option
 
 if TYPE_CHECKING:
     from microrad.link.pointing.code_words import LostWords
+    from microrad.link.pointing.coded_residual import CodedResidual
     from microrad.loop.controller_study import AnyScene, Design, Outlook, Scene
     from microrad.loop.disturbance.windows import ErrorIndex
     from microrad.loop.pointing_loop.loop import LoopController
@@ -153,7 +154,8 @@ def pointing(
         told("indices", lambda: windows_data(errors), lambda: windows_text(errors, controller, width()))
         if simulate is not None:
             kept, left_out = (indices, []) if window or spacing else _fitting(scene, indices)
-            found = *_simulated(loop, scene, made, kept, simulate), simulate, left_out
+            errors_of_runs, lost, coded = _simulated(loop, scene, made, kept, simulate)
+            found = errors_of_runs, lost, simulate, left_out, coded
             view = simulated_view(*found)
             told("simulated", lambda: simulated_data(*found), lambda: views_text(view.blocks, width()))
     if asked is not None:
@@ -191,21 +193,25 @@ def _fitting(scene: "AnyScene", indices: "list[ErrorIndex]") -> "tuple[list[Erro
 
 def _simulated(
     mission: "MissionFile", scene: "AnyScene", made: "LoopController", indices: "list[ErrorIndex]", runs: int
-) -> "tuple[tuple[SimulatedErrors, ...], LostWords | None]":
-    """The errors of so many runs in each index, and the code words that they lose where the mission has some."""
+) -> "tuple[tuple[SimulatedErrors, ...], LostWords | None, CodedResidual | None]":
+    """The errors of so many runs in each index; words that they lose and the coded error ratio, as the mission asks."""
     from microrad import link
     from microrad.link.pointing.code_words import FadeMargin, words_asked
+    from microrad.link.pointing.coded_residual import CodedBeam, coded_asked
     from microrad.link.study import solve_rate
     from microrad.loop.controller_study.results import span
     from microrad.loop.pointing_loop.simulated_windows import Question, ask, windows_asked
 
-    word, loop, of_run = mission.mission.communication.code_word_s, scene.loop, span(scene.table)
+    table, loop, of_run = mission.mission.communication, scene.loop, span(scene.table)
+    word = table.code_word_s
     with progress_bar() as progress, refusal_of(mission.path):
         asked: list[Question[Any]] = [windows_asked(loop, made, indices, of_run, scene.theory)]
         if word is not None:
             asked.append(words_asked(FadeMargin.of(link.of(solve_rate(mission).mission)), word, loop, of_run))
-        errors, *lost = ask(asked, loop, made, of_run, runs, on_progress=progress)
-    return errors, lost[0] if lost else None
+        if table.fading is not None:
+            asked.append(coded_asked(CodedBeam.of(link.of(solve_rate(mission).mission)), loop, of_run))
+        errors, *found = ask(asked, loop, made, of_run, runs, on_progress=progress)
+    return errors, found[0] if word is not None else None, found[-1] if table.fading is not None else None
 
 
 def _broken(designs: "tuple[Design, ...]", left: "tuple[Outlook, ...]", accept: bool) -> str:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 @command
 def studio(
     file: Annotated[
-        Path | None, typer.Argument(help="Mission file [default: the last one, or the paper's].", metavar="FILE")
+        Path | None, typer.Argument(help="Mission file [default: the last one, or microrad init's].", metavar="FILE")
     ] = None,
     port: Annotated[
         int, option("--port", "N", "Port [default: a free one].", min=0, max=65535, show_default=False)

@@ -10,10 +10,13 @@ power without a code is taken from above and the least one from below, so that n
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from statistics import NormalDist
 
 _LOWEST_RATE = 1e-4  # gains have come to their limit, by 0.001 dB
 _BISECTIONS = 100
+_SIGN_STEP = 0.02
+_SURE = 1e-9  # share of a bit that is left unsaid below which the capacity has no digits
 
 
 def excess_noise_factor(gain: float, ionisation_ratio: float) -> float:
@@ -33,17 +36,30 @@ class Code:
     rate: float
     bit_error_ratio: float
 
-    def ppm_counting(self) -> float:
-        """Pulse-position modulation with a photon counter; the same for each order M.
+    def ppm_counting(self, order: int = 2, background: float | None = None) -> float:
+        """Pulse-position modulation with a photon counter; without background the same for each order M.
 
         A pulse of n counts is missed with exp(-n), and without background nothing else goes wrong: an erasure channel
         with (1 - exp(-n)) log2 M bits for each word (Massey 1981, IEEE Trans. Commun. 29, 1615). So n is at least
         -ln(1 - r), which is n / (R log2 M) for each bit; without a code it is ln(1 / 2p). Background asks for more
-        of both, and leaves less gain.
+        of both, and leaves less gain: the least counts are then those of the capacity with soft decisions, and without
+        a code the counts are at most those that Bhattacharyya's bound and the union over M - 1 slots ask for.
+
+        Args:
+            order: Number M of slots in a word.
+            background: Counts without signal for each bit of information; None is for any background.
         """
+        from microrad.core.pulse_capacity import least_pulse_counts
+
         said = self._said
         least = -math.log1p(-said) if said < 0.5 else -math.log(self._unsaid)
-        return self._rate * self._natural / least
+        dark = self._rate * self._natural / least
+        if not background or 1.0 - said < _SURE:
+            return dark
+        slot = background * math.log2(order) / order  # of the line without a code; with it, a slot is shorter by R
+        union = math.log(order / (2.0 * self.bit_error_ratio))
+        uncoded = union + 2.0 * math.sqrt(slot * union)
+        return min(dark, self._rate * uncoded / least_pulse_counts(order, said, slot * self._rate))
 
     def ook_counting(self, mark: float, space: float, background: float | None = None) -> float:
         """Largest gain of on-off keying with a photon counter, marks and spaces equally likely.
@@ -90,9 +106,13 @@ class Code:
         """
         return self._gaussian(self._q**2 / 2.0) + math.sqrt(self._gaussian(self._q**2))
 
-    def bpsk_homodyne(self) -> float:
-        """Two opposite phases with homodyne detection: the signal over noise is Q^2 without a code."""
-        return self._gaussian(self._q**2)
+    def phases(self) -> float:
+        """Two or four phases against an oscillator, each quadrature with a sign of its own in Gaussian noise.
+
+        Without a code the signal over noise of a quadrature is Q^2. With one it is at least that at which a sign, with
+        soft decisions, leaves as much untold as the code and its errors do.
+        """
+        return self._rate * self._q**2 / _least_snr(self._unsaid)
 
     def dpsk_preamplified(self) -> float:
         """Phase differences behind an optical amplifier: n / N is ln(1 / 2p) without a code.
@@ -108,7 +128,7 @@ class Code:
         A mark is missed with e = exp(-2 n), a Z-channel: n solves h((1 + e) / 2) - h(e) / 2 = r. Light in the spaces,
         of whichever source, only takes away from that.
         """
-        missed = _rising(lambda e: _one_less_entropy(e) + _entropy(e) / 2.0, self._unsaid, 1.0)
+        missed = _rising(lambda e: _one_less_entropy(e) + entropy(e) / 2.0, self._unsaid, 1.0)
         return -math.log(missed) / 2.0 / self._rate
 
     @property
@@ -118,7 +138,7 @@ class Code:
         z is the sum of the roots of the products of their probabilities. An outcome leaves an error q, and z is the
         mean of 2 sqrt(q (1 - q)), of which h(q) is a convex function: no more than 1 - h(q) at the mean is told.
         """
-        crossed = _rising(_entropy, self._unsaid, 0.5)
+        crossed = _rising(entropy, self._unsaid, 0.5)
         return -math.log(4.0 * crossed * (1.0 - crossed)) / self._rate
 
     @property
@@ -131,7 +151,7 @@ class Code:
 
     @property
     def _unsaid(self) -> float:
-        return 1.0 - self._rate + self._rate * _entropy(self.bit_error_ratio)
+        return 1.0 - self._rate + self._rate * entropy(self.bit_error_ratio)
 
     @property
     def _natural(self) -> float:
@@ -177,9 +197,35 @@ class _OnOff:
         return level * math.log(level / dim) - level + dim
 
 
-def _entropy(share: float) -> float:
-    """Binary entropy in bits."""
+def entropy(share: float) -> float:
+    """Binary entropy of a share in bits."""
     return -(share * math.log(share) + (1.0 - share) * math.log1p(-share)) / math.log(2.0) if 0.0 < share < 1.0 else 0.0
+
+
+def untold_of_a_sign(snr: float) -> float:
+    """Bits that a real symbol of either sign in Gaussian noise leaves untold with soft decisions: 1 - its capacity.
+
+    The mean of log2(1 + exp(-2 a y)) over y, normal about a = sqrt(snr). It is summed in equal steps: the singularities
+    nearest to the real axis are pi / 2a away from it, which leaves an error of exp(-pi^2 / (a step)).
+
+    Args:
+        snr: Signal squared over the variance of the noise, from 0 to about 100.
+    """
+    import numpy as np
+
+    a = math.sqrt(snr)
+    y = np.arange(-12.0, 12.0 + _SIGN_STEP, _SIGN_STEP)
+    density = np.exp(-(y**2) / 2.0) / math.sqrt(2.0 * math.pi)
+    return float((density * np.logaddexp(0.0, -2.0 * a * (y + a))).sum()) * _SIGN_STEP / math.log(2.0)
+
+
+@lru_cache(maxsize=1024)
+def _least_snr(untold: float) -> float:
+    low, high = 0.0, 100.0
+    for _ in range(_BISECTIONS):
+        middle = (low + high) / 2.0
+        low, high = (middle, high) if untold_of_a_sign(middle) > untold else (low, middle)
+    return high
 
 
 def _one_less_entropy(lean: float) -> float:

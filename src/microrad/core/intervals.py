@@ -1,10 +1,20 @@
 """Intervals of confidence: Student's t, Clopper and Pearson's of a share, and that of a share seen in clusters."""
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
 from microrad.core.arrays import Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Interval:
+    """A mean with the ends of its interval of confidence."""
+
+    value: float
+    low: float
+    high: float
 
 
 def binomial_band(hits: Floats, trials: Floats, confidence: float) -> tuple[Floats, Floats]:

@@ -1,6 +1,6 @@
 """Link budgets: of the beacon, its answer and the communication link, and what follows from them."""
 
-from microrad.link.budget.assembly import DataLink, LinkError, Shared, of, required_dbm
+from microrad.link.budget.assembly import DataLink, LinkError, Shared, assembled, jitter_of, of, required_dbm
 from microrad.link.budget.lines import DEEPEST_DB, LinkBudget, beam_budget, communication_budget, tracking_light_w
 from microrad.link.budget.maps import (
     IdealReceiver,
@@ -29,12 +29,14 @@ __all__ = [
     "Shared",
     "Swing",
     "Tornado",
+    "assembled",
     "beam_budget",
     "beam_passes",
     "communication_budget",
     "convention_maps",
     "ideal_receivers",
     "implied_sensitivity",
+    "jitter_of",
     "largest_data_rate",
     "largest_pointing_error",
     "margin_map",

@@ -19,6 +19,9 @@ the budget of pointing errors comes to."""
 ROUNDING = 1e-9
 """Share of a number, or decibels, that rounding may take from it."""
 
+UNDER_FADES = "communication margin under fades"
+"""The name of the margin that a series of received power leaves."""
+
 DERIVED = "derived"
 """Mark of a requirement that is met by the choice of an input."""
 
@@ -68,7 +71,17 @@ def of_links(study: LinkStudy) -> tuple[Requirement, ...]:
     return (
         *of_beams(study),
         _of_budget(study.file.sources, "communication", study.communication, m.requirement.margin_db, name),
+        *of_fading(study),
     )
+
+
+def of_fading(study: LinkStudy) -> tuple[Requirement, ...]:
+    """The margin that a series of received power leaves, where the mission names one."""
+    found, required = study.fading, study.file.mission.requirement.margin_db
+    if found is None:
+        return ()
+    left = found.margin_left_db
+    return (Requirement("communication", UNDER_FADES, "dB", required, left, left - required, "fades of the series"),)
 
 
 def met(study: LinkStudy) -> bool:

@@ -15,6 +15,8 @@ from microrad.core.units import format_quantity
 from microrad.link import pointing, variation
 from microrad.link.acquisition.partner_search import Finding, Sent, Tracking, answer_on_sensor, find_partner
 from microrad.link.budget import assembly
+from microrad.link.fade_series.coded import CodedFading
+from microrad.link.fade_series.of_mission import fading_of
 from microrad.link.pointing.outage import (
     Performance,
     error_rad,
@@ -66,7 +68,8 @@ class LinkStudy:
     that is kept but for the outage, and the margin at the static pointing error stands below it. ``receiver_noise`` are
     the noise terms of the communication receiver at the received power, where it is given by what it is made of.
     ``data`` is the communication link assembled. ``tornados`` has one of each budget, in the same order.
-    ``beam_radius`` is None unless the mission has one.
+    ``beam_radius`` is None unless the mission has one. ``fading`` is the link under a series of received power, at its
+    static margin.
     """
 
     file: LinkFile
@@ -83,6 +86,7 @@ class LinkStudy:
     point_ahead: PointAheadEffect | None
     beam_radius: BeamRadius | None
     finding: Finding | None
+    fading: CodedFading | None = None
 
     @property
     def budgets(self) -> tuple[link.LinkBudget, ...]:
@@ -223,6 +227,7 @@ def run_link_study(file: LinkFile, parts: kept.Kept = kept.NOTHING) -> LinkStudy
         point_ahead=point_ahead(data),
         beam_radius=beam_radius(data),
         finding=found,
+        fading=fading_of(data, link.communication_budget(data, sources).margin_db, file.path.parent, sources),
     )
 
 

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from microrad.link.budget.assembly import Shared, communication_beam
+from microrad.link.budget.assembly import Shared, communication_beam, receiving_end
 from microrad.link.budget.lines import beam_budget
 from microrad.link.receivers import RateError
 from microrad.mission.fields import Quantity, Several, Share, Table, rule_of_field
@@ -18,6 +18,8 @@ LINK_TABLES = (
     "communication.receiver",
     "communication.receiver.background",
     "communication.beam",
+    "communication.coupling",
+    "communication.coupling.jitter",
     "channel",
     "point_ahead",
 )
@@ -71,7 +73,7 @@ def inputs(tables: Table, name: str) -> Iterator[Input]:
     for field, info in type(table).model_fields.items():
         value, key = getattr(table, field), f"{name}.{info.alias or field}"
         rule = rule_of_field(info)
-        if isinstance(rule, Quantity) and isinstance(value, float):
+        if isinstance(rule, Quantity) and isinstance(value, float) and not math.isnan(value):  # no word in its place
             yield Input(key, name, field, None, value, rule)
         if isinstance(rule, Several):
             for item, number in enumerate(value or ()):
@@ -115,9 +117,14 @@ def _table(tables: Table, name: str) -> Table | None:
 
 
 def beam_passes(m: LinkMission) -> bool:
-    """Whether the obscuration lets some of the data's beam pass."""
+    """Whether the obscuration lets some of the data's beam pass, and the receiver can take and do with some light."""
+    beam, receiver = m.communication, m.communication.receiver
+    if receiver is not None and not receiver.reaches_ratio:
+        return False
     try:
-        communication_beam(m.terminals, m.communication, m.conventions.pointing_loss)
+        communication_beam(m.terminals, beam, m.conventions.pointing_loss)
+        if beam.coupling is not None:
+            receiving_end(m.terminals, beam.coupling, beam.wavelength_m)
     except ValueError:
         return False
     return True

@@ -193,6 +193,7 @@ def named_files(m: LinkMission) -> tuple[str, ...]:
     """Files that the mission names beside its mirror, as it names them: seen from the mission file."""
     tables = [] if m.orbit is None else [m.orbit.leo, m.orbit.geo]
     named = [t.file for t in tables] + [None if m.constellation is None else m.constellation.file]
+    named.append(None if m.communication.fading is None else m.communication.fading.series)
     if isinstance(m, Mission) and m.fine_pointing is not None:
         named += [m.fine_pointing.vibration.file, m.fine_pointing.mirror_file]
     return tuple(name for name in dict.fromkeys(named) if name is not None)

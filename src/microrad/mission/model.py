@@ -4,6 +4,7 @@ Every quantity is text with a unit in the file (`transmit_power = "5 W"`) and an
 (`transmit_power_w`). No quantity of the mission has a default. `file` reads the file and reports the faults.
 """
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
@@ -201,6 +202,34 @@ def _outage_given(jitter: JitterTable | None, requirement: LinkRequirement) -> I
         yield Problem("requirement.outage", reason, "a share of the time, outage = 0.003 for 0.3 %")
 
 
+def _coupling_fits(
+    terminals: Terminals, communication: Communication, requirement: LinkRequirement
+) -> Iterator[Problem]:
+    """A fibre whose cone the telescope's fills, and an outage for a receiver that points at random."""
+    c = communication.coupling
+    if c is None:
+        return
+    if c.numerical_aperture is not None and c.focal_length_m is not None:
+        cone = 2.0 * c.focal_length_m * math.tan(math.asin(c.numerical_aperture))
+        if cone <= (terminals.geo_obscuration or 0.0) * terminals.geo_aperture_m:
+            size = format_quantity(cone, "m")
+            reason = f"leaves {size} of the aperture, no more than terminals.geo_obscuration stops"
+            yield Problem("communication.coupling.numerical_aperture", reason, "a larger one, or a longer focal_length")
+    if c.angular_error_rad and c.focal_length_m is not None:
+        # truncation times shift of the mode in the aperture; that of the best mode is no more than without obscuration
+        given = not math.isnan(c.mode_radius_m or math.nan)
+        of_aperture = math.pi * (c.mode_radius_m or 0.0) / communication.wavelength_m
+        off = of_aperture if given else 1.121 * 2.0 * c.focal_length_m / terminals.geo_aperture_m
+        most = math.atan(8.0 / off)
+        if c.angular_error_rad > most:
+            limit = format_quantity(most, "rad")
+            reason = f"turns the fibre's mode out of the aperture: beyond {limit} it takes no light to speak of"
+            yield Problem("communication.coupling.angular_error", reason, f"at most {limit}")
+    if c.is_random and requirement.outage is None:
+        reason = "is missing, and the margin under the receiver's jitter is the one that is kept but for it"
+        yield Problem("requirement.outage", reason, "a share of the time, outage = 0.003 for 0.3 %")
+
+
 def _point_ahead_fits(point_ahead: PointAhead | None, fine: FinePointing | None) -> Iterator[Problem]:
     """One point-ahead: the mirror's largest is that of the largest velocity."""
     if point_ahead is None or fine is None:
@@ -257,6 +286,7 @@ LINK_RELATIONS: tuple[Relation, ...] = (
     (("terminals", "communication"), obscuration_fits),
     (("pointing", "beacon"), _cone_fits),
     (("jitter", "requirement"), _outage_given),
+    (("terminals", "communication", "requirement"), _coupling_fits),
     (("orbit", "operations"), _needs_orbit("operations")),
     (("orbit", "constellation"), _needs_orbit("constellation")),
     (("operations", "acquisition"), _scan_there),

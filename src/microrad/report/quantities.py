@@ -4,7 +4,7 @@ import math
 import re
 
 from microrad.core.units import format_quantity
-from microrad.link.pointing.radial_error import SMALLEST_PROBABILITY
+from microrad.link.radial_error import SMALLEST_PROBABILITY
 
 MINUS = "\u2212"
 """The sign in front of a negative number, which is no hyphen."""

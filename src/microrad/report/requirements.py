@@ -15,21 +15,23 @@ from microrad.report.quantities import apart, signed
 from microrad.report.tables import Cell, Table
 
 
-def requirement_table(found: Sequence[Requirement], causes: Sequence[str] = ()) -> Table:
+def requirement_table(found: Sequence[Requirement], causes: Sequence[str] = (), name: str = "requirements") -> Table:
     """Requirements with what is achieved.
 
     Args:
         found: the requirements.
         causes: what contributes most to each, shown where there is room for it; none leaves the column out.
+        name: of the list in the JSON that has them.
     """
     rows: list[list[str | Cell]] = [
         [r.name, *reversed(apart(r.actual, r.required, r.unit)), margin_text(r), Cell("", r.mark), *causes[k : k + 1]]
         for k, r in enumerate(found)
     ]
     headings, brief = ("requirement", "required", "achieved", "to spare", ""), (0, 1, 2, 3, 4)
+    names = {place: [f"{name}.{r.name}.{what}" for r in found] for place, what in ((2, "actual"), (3, "margin"))}
     if not causes:
-        return Table("", headings, rows, (0,), cards=True)
-    return Table("", (*headings, "contributes most"), rows, (0, 5), cards=True, brief=brief)
+        return Table("", headings, rows, (0,), cards=True, names=names)
+    return Table("", (*headings, "contributes most"), rows, (0, 5), cards=True, brief=brief, names=names)
 
 
 def met_words(found: Sequence[Requirement]) -> str:

@@ -78,6 +78,9 @@ class Table:
     stand out, the last ``totals`` are sums. A page shows a ``folded`` table behind that sentence, one in ``cards`` with
     each row as a card where it is narrow, and for each of ``filters`` a button that leaves only those rows. A terminal
     that has no room for all columns shows those in ``brief``.
+
+    ``names`` says of a column what its numbers are in the JSON: one dotted name, or one for each row; "" is none. By
+    them `marks` finds those that have a sign.
     """
 
     title: str
@@ -91,12 +94,19 @@ class Table:
     cards: bool = False
     filters: Mapping[str, Sequence[int]] = field(default_factory=dict)
     brief: Sequence[int] = ()
+    names: Mapping[int, str | Sequence[str]] = field(default_factory=dict)
+
+    def name(self, row: int, column: int) -> str:
+        """The dotted name of a number in the JSON; "" for words, and where it is not told."""
+        told = self.names.get(column, "")
+        return told if isinstance(told, str) else told[row]
 
     def columns(self, kept: Sequence[int]) -> "Table":
         """The table with some of its columns."""
         words = [place for place, column in enumerate(kept) if column in self.words]
         headings, rows = [self.headings[k] for k in kept], [[row[k] for k in kept] for row in self.rows]
-        return replace(self, headings=headings, rows=rows, words=words)
+        names = {place: self.names[column] for place, column in enumerate(kept) if column in self.names}
+        return replace(self, headings=headings, rows=rows, words=words, names=names)
 
     def for_width(self, width: int) -> "Table":
         """The table as a terminal of so many columns has room for it."""

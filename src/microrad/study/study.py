@@ -310,7 +310,7 @@ def judged(
         fine: The study of the fine-pointing loop, None where the mission has none.
         case: The link under the best controller of that loop, None without it.
     """
-    beams = requirement.of_beams(links)
+    beams = (*requirement.of_beams(links), *requirement.of_fading(links))
     if fine is None or case is None:
         return (*beams, *by_paper), ()
     return (*beams, *verdict.of_fine_pointing(links.data.requirement, links.file.sources, fine, case)), by_paper

@@ -10,7 +10,7 @@ import numpy as np
 from microrad import link
 from microrad.campaign.definition.outputs import OUTPUTS
 from microrad.core import kernels
-from microrad.core.arrays import Floats
+from microrad.core.arrays import Floats, Integers
 from microrad.link.pointing.outage import Exposure, stated_outage
 from microrad.link.requirement import IMPOSSIBLE
 from microrad.loop import controller_study
@@ -19,6 +19,7 @@ from microrad.mission.file import LinkFile
 from microrad.mission.model import Mission, Source
 from microrad.mission.tables.fine_pointing import FinePointing
 from microrad.mission.tables.link import Beacon, LinkRequirement
+from microrad.study.pointing_penalty import Binned
 
 if TYPE_CHECKING:
     from microrad.orbit import day as day_study
@@ -58,8 +59,12 @@ def outputs(file: LinkFile, runs: ensemble.Ensemble | None, keep: Collection[str
 
 def exceeded(runs: ensemble.Ensemble) -> Floats:
     """Share of the time with a radial error of at least the lower edge of each bin, (bins,)."""
-    counts = runs.histogram.sum(axis=0, dtype=np.int64)
+    counts = _counts(runs)
     return np.asarray(1.0 - (np.cumsum(counts) - counts) / np.sum(counts))
+
+
+def _counts(runs: ensemble.Ensemble) -> Integers:
+    return np.asarray(np.sum(runs.histogram, axis=0, dtype=np.int64))
 
 
 # ------------------------------------------------------------------------------------------------------------ residual
@@ -84,7 +89,8 @@ def _exposure(data: link.DataLink, runs: ensemble.Ensemble | None) -> Exposure:
     if runs is None:
         under = Exposure.stated(data)
     else:
-        under = Exposure.of(data, runs.quantile_rad(1.0 - stated_outage(data.requirement)), runs.beyond)
+        quantile_rad = runs.quantile_rad(1.0 - stated_outage(data.requirement))
+        under = Exposure.of(data, quantile_rad, runs.beyond, lambda: Binned.of(_counts(runs)))
     if not under.possible:
         raise link.LinkError(IMPOSSIBLE)
     return under

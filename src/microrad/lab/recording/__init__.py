@@ -5,7 +5,7 @@ The values keep the units of the file; `identify` is told what they are. `list_f
 """
 
 from microrad.lab.recording.checks.together import check_together
-from microrad.lab.recording.reader import read_motion, read_recording, recording_from_arrays
+from microrad.lab.recording.reader import read_motion, read_recording, read_signal, recording_from_arrays
 from microrad.lab.recording.realisations import AXES, multisine_recordings, read_arrays
 from microrad.lab.recording.records import (
     ACCEPTABLE,
@@ -15,6 +15,7 @@ from microrad.lab.recording.records import (
     Motion,
     Recording,
     RecordingError,
+    Signal,
     read_in,
     stated_units,
 )
@@ -28,12 +29,14 @@ __all__ = [
     "Motion",
     "Recording",
     "RecordingError",
+    "Signal",
     "check_together",
     "multisine_recordings",
     "read_arrays",
     "read_in",
     "read_motion",
     "read_recording",
+    "read_signal",
     "recording_from_arrays",
     "stated_units",
 ]

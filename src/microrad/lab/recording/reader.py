@@ -26,6 +26,7 @@ from microrad.lab.recording.records import (
     Motion,
     Recording,
     RecordingError,
+    Signal,
     digest_of,
     frozen,
 )
@@ -219,10 +220,8 @@ def read_motion(
             f"{path}: {len(used)} channels ({listed}) as axes; name one to three that differ (--axes, axes)."
         )
     scales = [_angle(source, index, unit) for index in used]
-    clock = _clock(source, used, time)
-    columns, rates, findings = _load_columns(source, used, clock, time is None and rate_hz is not None)
-    rate = agreed_rate(str(path), rate_hz, [*source.rates(used), *rates])
-    _check_lengths(source, used, columns)
+    columns, stated = _sampled(source, used, time, rate_hz)
+    rate = agreed_rate(str(path), rate_hz, stated)
     for index, column in zip(used, columns, strict=True):
         bad = np.flatnonzero(~np.isfinite(column))
         if bad.size:
@@ -230,16 +229,63 @@ def read_motion(
                 f"{path}: {source.place(int(bad[0]))} of {source.label(index)} is {column[bad[0]]}, {bad.size} such "
                 "samples in all; cut out a part without them: what is filled in was not measured."
             )
-    if refused := [each.message for each in findings if each.refused]:
-        raise RecordingError(f"{path}: {'. Also: '.join(refused)}.")
     names = tuple(source.names[index] for index in used)
     return Motion(str(path), source.sha256, names, _table(columns) * np.array(scales), rate)
 
 
+def read_signal(path: str | Path, channel: Column | None = None, rate_hz: float | None = None) -> Signal:
+    """Read one channel as it is, of any length, from any file that `read_recording` reads; its values are not judged.
+
+    Args:
+        path: The file.
+        channel: The channel; by default the only one beside the time.
+        rate_hz: Sample rate where the file states none; where both are known they must agree to 0.1 %.
+
+    Raises:
+        RecordingError: For several channels of which none is named, a time with gaps or jitter, two rates, and a file
+            that cannot be read.
+    """
+    path = Path(path)
+    rate_hz = None if rate_hz is None else check_rate(str(path), rate_hz)
+    check_file(path)
+    source = open_source(path, alone=True)
+    if channel is None:
+        found = [index for index, name in enumerate(source.names) if not is_time_name(name)]
+        if len(found) != 1:
+            listed = ", ".join(f"'{name}'" for name in source.names[:10])
+            raise RecordingError(
+                f"{path}: the file has {len(found)} channels beside its time ({listed}); name the one."
+            )
+        index = found[0]
+    else:
+        index = source.resolve(channel, "signal")
+    (samples,), stated = _sampled(source, [index], None, rate_hz)
+    known = rate_hz is not None or stated
+    rate = agreed_rate(str(path), rate_hz, stated) if known else None
+    return Signal(str(path), source.sha256, source.names[index], _stated_unit(source, index), frozen(samples), rate)
+
+
+def _sampled(
+    source: Source, used: list[int], time: Column | None, rate_hz: float | None
+) -> tuple[list[Floats], list[StatedRate]]:
+    """Channels of equal length, and the rates that file and time column state; a time that scatters is refused."""
+    clock = _clock(source, used, time)
+    columns, rates, findings = _load_columns(source, used, clock, time is None and rate_hz is not None)
+    _check_lengths(source, used, columns)
+    if refused := [each.message for each in findings if each.refused]:
+        raise RecordingError(f"{source.path}: {'. Also: '.join(refused)}.")
+    return columns, [*source.rates(used), *rates]
+
+
+def _stated_unit(source: Source, index: int) -> str:
+    """The unit of a channel as the file or the channel's name says it; '' for none."""
+    behind = bracketed_unit(source.names[index])
+    return source.units[index].strip() or ("" if set(behind) <= set("0123456789, ") else behind)  # no column's number
+
+
 def _angle(source: Source, index: int, unit: str | None) -> float:
     """The unit of a channel in rad."""
-    behind = bracketed_unit(source.names[index])
-    stated = source.units[index].strip() or ("" if set(behind) <= set("0123456789, ") else behind)  # no column's number
+    stated = _stated_unit(source, index)
     where = f"{source.path}: {source.label(index)}"
     if not stated and unit is None:
         raise RecordingError(f"{where}: no unit is stated; give it (--unit, unit), 'urad' for example.")
@@ -256,9 +302,18 @@ def _angle(source: Source, index: int, unit: str | None) -> float:
 
 
 # ---------------------------------------------------------------------------------------------------------- opening
-def open_source(path: Path) -> Source:
-    """The file as named channels. Raises RecordingError for a file of no known format, or a damaged one."""
-    return _SOURCES[file_format(path)](path)
+def open_source(path: Path, *, alone: bool = False) -> Source:
+    """The file as named channels.
+
+    Args:
+        path: The file.
+        alone: Whether a text may have a single column.
+
+    Raises:
+        RecordingError: For a file of no known format, or a damaged one.
+    """
+    found = file_format(path)
+    return TextSource(path, alone) if found == "text" else _SOURCES[found](path)
 
 
 def _open_hdf5(path: Path, matlab: bool) -> Source:

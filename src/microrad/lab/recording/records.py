@@ -106,6 +106,21 @@ class Motion:
     rate_hz: float
 
 
+@dataclass(frozen=True, eq=False)
+class Signal:
+    """One channel as it stands in a file: `samples` (samples,) in `unit`, '' where the file states none.
+
+    `rate_hz` is None where nobody says it. `sha256` is the digest of the file's bytes.
+    """
+
+    path: str
+    sha256: str
+    name: str
+    unit: str
+    samples: Floats
+    rate_hz: float | None
+
+
 def frozen(values: Floats) -> Floats:
     """The same values, contiguous and read-only."""
     values = np.ascontiguousarray(values)

@@ -2,7 +2,8 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -10,14 +11,29 @@ from numpy.typing import ArrayLike
 
 from microrad.core.arrays import Floats
 from microrad.core.errors import MicroradError
-from microrad.link import gains, receivers
-from microrad.link.beams import GaussianFall, LitAperture, OffAxis
+from microrad.link import coupling, gains, receivers
+from microrad.link.beams import GaussianFall, LitAperture
+from microrad.link.radial_error import Jitter, radial_quantile, radial_steps
 from microrad.mission.fields import Quantity
 from microrad.mission.model import LinkMission
 from microrad.mission.tables import pointing as pointing_table
-from microrad.mission.tables.link import Beam, Channel, Communication, LinkConventions, LinkRequirement, Terminals
+from microrad.mission.tables.coupling import Coupling
+from microrad.mission.tables.link import (
+    QUADRATURES,
+    Beam,
+    Channel,
+    Communication,
+    LinkConventions,
+    LinkRequirement,
+    Terminals,
+)
 from microrad.mission.tables.link import Receiver as ReceiverTable
 from microrad.mission.tables.pointing import JitterTable, PointAhead
+
+RAREST = 1e-16
+"""Share of the time below which an outage is none that is told from it."""
+SLOWEST_BIT_S = 1.0
+"""Data rate from which on a link is one."""
 
 
 class LinkError(MicroradError):
@@ -31,7 +47,7 @@ class TransmittedBeam:
     """What leaves an aperture: gain on the axis, relative to an isotropic antenna, and how it falls off."""
 
     gain_db: float
-    fall: OffAxis
+    fall: LitAperture | GaussianFall
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,10 +86,50 @@ class Shared:
 
 
 @dataclass(frozen=True, slots=True)
+class Receiving:
+    """What takes the light at the receiver, and how the receiving terminal points.
+
+    ``on_axis_db`` is the loss of a receiver that points without error. ``jitter`` is None where its error is static,
+    ``error_rad``, or has the distribution of the transmitter's (``twin``).
+    """
+
+    end: coupling.End
+    on_axis_db: float
+    error_rad: float
+    jitter: Jitter | None
+    twin: bool
+
+    @property
+    def is_random(self) -> bool:
+        """Whether the receiver's error has a distribution."""
+        return self.twin or self.jitter is not None
+
+    @property
+    def static_db(self) -> float:
+        """Loss by the static error in its worst direction, without that on the axis."""
+        return self.end.worst_loss_db(self.error_rad) - self.on_axis_db if self.error_rad else 0.0
+
+    def losses(self, radius_rad: Floats, share: Floats) -> coupling.Losses:
+        """Losses by the receiver's error, without that on the axis, where the transmitter has these errors.
+
+        Args:
+            radius_rad: Radial pointing errors of the transmitter (rad); a twin has their like.
+            share: The share of the time of each.
+        """
+        if self.twin:
+            return coupling.of_radii(self.end, radius_rad, share)
+        if self.jitter is not None:
+            return coupling.of_jitter(self.end, self.jitter)
+        return coupling.Losses.single(self.static_db)
+
+
+@dataclass(frozen=True, slots=True)
 class DataLink:
     """The communication link, assembled from its table: its beam, its receiver, and what is required of it.
 
-    ``receiver`` is None where its sensitivity is given as measured.
+    ``receiver`` is None where its sensitivity is given as measured. ``receiving`` is None where all of the light falls
+    on the detector. ``receive_pointing_db`` is what the receiver's own pointing costs: by its static error, or what
+    its losses add to those by the transmitter's stated error, both together exceeded for the outage.
     """
 
     shared: Shared
@@ -82,6 +138,13 @@ class DataLink:
     jitter: JitterTable | None
     beam: TransmittedBeam
     receiver: receivers.Receiver | None
+    receiving: Receiving | None
+    receive_pointing_db: float
+
+    @property
+    def coupling_db(self) -> float:
+        """Loss into the fibre or detector of a receiver that points without error."""
+        return 0.0 if self.receiving is None else self.receiving.on_axis_db
 
 
 def of(m: LinkMission) -> DataLink:
@@ -107,7 +170,77 @@ def assembled(
         ValueError: As `of`.
     """
     beam = communication_beam(shared.terminals, table, shared.conventions.pointing_loss)
-    return DataLink(shared, table, requirement, jitter, beam, _receiver(shared.terminals, table))
+    receiving = None if table.coupling is None else _receiving(shared.terminals, table.coupling, table.wavelength_m)
+    lost = 0.0
+    if receiving is not None:
+        sent = None if jitter is None else jitter_of(jitter)
+        stated = (sent, table.pointing_error_rad, shared.point_ahead_rad, requirement.outage)
+        lost = receiving.static_db if not receiving.is_random else _added_db(receiving, beam.fall, *stated)
+    receiver = _receiver(shared.terminals, table)
+    return DataLink(shared, table, requirement, jitter, beam, receiver, receiving, lost)
+
+
+def jitter_of(table: JitterTable) -> Jitter:
+    """The jitter that a table states."""
+    (bias_x, bias_y), (rms_x, rms_y) = table.bias_rad, table.rms_rad
+    return Jitter((bias_x, bias_y), (rms_x, rms_y))
+
+
+@lru_cache(maxsize=256)  # most inputs that are moved leave both ends' errors alone
+def _added_db(
+    receiving: Receiving,
+    fall: LitAperture | GaussianFall,
+    jitter: Jitter | None,
+    error_rad: float,
+    ahead_rad: float,
+    outage: float | None,
+) -> float:
+    """What the receiver's random error adds to the loss that the transmitter's exceeds for the outage."""
+    assert outage is not None  # a mission with such a receiver has to state it
+    if jitter is None:
+        radius, share = np.array([error_rad]), np.ones(1)
+    else:
+        radius, share = radial_steps(jitter)
+        error_rad = float(radial_quantile(jitter, max(outage, RAREST)))
+    both = coupling.BothEnds(coupling.of_beam(fall, radius + ahead_rad, share), receiving.losses(radius, share))
+    return both.quantile_db(outage) - float(fall.loss_db(error_rad + ahead_rad))
+
+
+def _receiving(terminals: Terminals, table: Coupling, wavelength_m: float) -> Receiving:
+    end = receiving_end(terminals, table, wavelength_m)
+    jitter = None if table.jitter is None else jitter_of(table.jitter)
+    return Receiving(end, float(end.loss_db(0.0)), table.pointing_error_rad or 0.0, jitter, bool(table.twin))
+
+
+def receiving_end(terminals: Terminals, table: Coupling, wavelength_m: float) -> coupling.End:
+    """What takes the light at the receiver.
+
+    Args:
+        terminals: The terminals, of which GEO's aperture receives.
+        table: The table on what stands in its focus.
+        wavelength_m: Wavelength of the light (m).
+
+    Raises:
+        ValueError: For an aberration above half the wavelength, and a fibre's cone within the obscuration.
+    """
+    diameter, hole, focal = terminals.geo_aperture_m, terminals.geo_obscuration or 0.0, table.focal_length_m or math.inf
+    wavefront = coupling.Aberrations(
+        *(each or 0.0 for each in (table.defocus_m, table.astigmatism_m, table.coma_m, table.spherical_m))
+    )
+    pupil, offset = coupling.Pupil(diameter, wavelength_m, hole, wavefront), (table.lateral_error_m or 0.0) / focal
+    if table.into == "single-mode fibre":
+        mode, tilt = table.mode_radius_m or math.nan, math.tan(table.angular_error_rad or 0.0)
+        best = math.isnan(mode)
+        truncation = coupling.best_truncation(hole) if best else coupling.truncation_of_mode(pupil, mode, focal)
+        shift = 2.0 * focal * tilt / diameter if tilt else 0.0
+        return coupling.SingleModeFibre(replace(pupil, truncation=truncation, shift=shift), offset)
+    if table.into == "multi-mode fibre":
+        assert table.core_radius_m is not None  # the table has it
+        assert table.numerical_aperture is not None
+        cone = coupling.narrowed(pupil, table.numerical_aperture, focal)
+        return coupling.Disk(cone, offset, table.core_radius_m / focal)
+    assert table.detector_radius_m is not None  # the table has it
+    return coupling.Disk(pupil, offset, table.detector_radius_m / focal)
 
 
 def communication_beam(terminals: Terminals, beam: Communication, convention: str) -> TransmittedBeam:
@@ -154,6 +287,14 @@ def strehl_db(beam: Beam, convention: str) -> float:
     return gains.strehl_loss_db(ratio, "ratio")
 
 
+_COHERENT: dict[tuple[str, str], Callable[..., receivers.Receiver]] = {
+    ("bpsk", "homodyne"): receivers.BpskHomodyne,
+    ("bpsk", "heterodyne"): receivers.BpskHeterodyne,
+    ("qpsk", "homodyne"): receivers.QpskHomodyne,
+    ("qpsk", "heterodyne"): receivers.QpskHeterodyne,
+}
+
+
 def _receiver(terminals: Terminals, link: Communication) -> receivers.Receiver | None:
     table = link.receiver
     if table is None:
@@ -162,8 +303,8 @@ def _receiver(terminals: Terminals, link: Communication) -> receivers.Receiver |
         "wavelength_m": link.wavelength_m,
         "bit_error_ratio": table.bit_error_ratio,
         "bandwidth_hz": table.bandwidth_hz,
-        "code_gain_db": table.code_gain_db,
-        "code_rate": table.code_rate,
+        "code_gain_db": table.net_gain_db,
+        "code_rate": table.rate_of_code,
     }
     extinction = math.inf if table.extinction_ratio_db is None else float(10.0 ** (table.extinction_ratio_db / 10.0))
     diode = {
@@ -178,22 +319,25 @@ def _receiver(terminals: Terminals, link: Communication) -> receivers.Receiver |
     kind: Callable[..., receivers.Receiver]
     own: dict[str, Any]
     match table.detector, table.modulation:
-        case "homodyne", _:
-            kind, own = receivers.BpskHomodyne, {"quantum_efficiency": table.efficiency or 1.0}
+        case "homodyne" | "heterodyne", _:
+            kind = _COHERENT[table.modulation, table.detector]
+            own = {"quantum_efficiency": table.efficiency or 1.0, "polarisations": table.polarisations or 1}
+            own["phase_error_rad"] = table.phase_error_rad or 0.0
         case "preamplified", "dpsk":
             kind, own = receivers.DpskPreamplified, {"noise_figure_db": table.noise_figure_db}
         case "preamplified", _:
             kind, own = receivers.OokPreamplified, {"noise_figure_db": table.noise_figure_db, **filtered}
             own["extinction_ratio"] = extinction
         case "photon-counting", "ppm":
-            kind, own = receivers.PpmCounting, {**counter, "order": table.order or 2}
+            gap = None if table.named_code is None else table.named_code.gap_db
+            kind, own = receivers.PpmCounting, {**counter, "order": table.order or 2, "code_gap_db": gap}
         case "photon-counting", _:
             kind, own = receivers.OokCounting, {**counter, "extinction_ratio": extinction}
         case "pin", _:
             kind, own = receivers.OokPin, diode
         case _:
             kind, own = receivers.OokApd, {**diode, **avalanche}
-    if table.detector in ("homodyne", "preamplified"):
+    if table.detector in ("homodyne", "heterodyne", "preamplified"):
         own["background_photons_per_mode"] = _per_mode(link)
     else:
         own["background_power_w"] = _background_w(terminals, link, table)
@@ -243,6 +387,43 @@ def required_dbm(data: DataLink, data_rate_bit_s: ArrayLike) -> Floats:
     assert photons is not None
     measured: Floats = 10.0 * np.log10(photons * gains.photon_energy_j(data.table.wavelength_m) * rate) + 30.0
     return measured
+
+
+def at_capacity(data: DataLink, data_rate_bit_s: float) -> receivers.Receiver:
+    """The link's receiver with the best code that there can be at the rate of its own; it must have a receiver.
+
+    Args:
+        data: The communication link.
+        data_rate_bit_s: Data rate, in bit/s, of which the counts of background in a bit follow.
+    """
+    table, receiver = data.table.receiver, data.receiver
+    assert table is not None and receiver is not None
+    if isinstance(receiver, receivers.PpmCounting) and table.rate_of_code < 1.0:
+        return replace(receiver, code_gain_db=0.0, code_gap_db=0.0)
+    most_db = 10.0 * math.log10(table.most_code_gain(data_rate_bit_s, data.table.wavelength_m))
+    right = {"phase_error_rad": 0.0} if table.modulation in QUADRATURES else {}
+    return replace(receiver, code_gain_db=max(most_db, 0.0), **right)
+
+
+def rate_at_power(receiver: receivers.Receiver, power_dbm: float) -> float | None:
+    """Largest data rate (bit/s) that a receiver has at a power, or the highest that it takes; None where there is none.
+
+    Args:
+        receiver: The receiver, with its code.
+        power_dbm: Average power at the receiver, in dBm.
+    """
+    from scipy.optimize import brentq
+
+    def excess(lg_rate: float) -> float:
+        return gains.dbm(float(receiver.required_power_w(10.0**lg_rate))) - power_dbm
+
+    highest = receiver.highest_data_rate_bit_s
+    slowest = min(SLOWEST_BIT_S, highest)
+    if excess(math.log10(slowest)) > 0.0:
+        return None
+    if excess(math.log10(highest)) <= 0.0:
+        return highest
+    return float(10.0 ** brentq(excess, math.log10(slowest), math.log10(highest), xtol=1e-10))
 
 
 def check_grid(data_rate_bit_s: Floats, pointing_error_rad: Floats) -> None:

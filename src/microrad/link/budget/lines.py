@@ -11,13 +11,21 @@ import numpy as np
 
 from microrad.core.budget import Line, total_db
 from microrad.core.units import format_input, format_quantity
-from microrad.link import gains
-from microrad.link.budget.assembly import DataLink, Shared, check_grid, required_dbm, strehl_db
+from microrad.link import coupling, gains
+from microrad.link.budget.assembly import DataLink, Shared, check_grid, strehl_db
+from microrad.link.budget.receiver_lines import (
+    GIVEN,
+    LEFT_AT_ZERO,
+    NOT_GIVEN,
+    ROUNDING_DB,
+    inter_symbol_lines,
+    required_lines,
+)
 from microrad.mission.file import MissionFile
 from microrad.mission.model import Source, source_text
+from microrad.mission.tables.coupling import Coupling
 from microrad.mission.tables.link import Beacon, Communication, half_angle_rad
 
-_GIVEN = "whatever the pointing error and the data rate"
 _TRANSMITTING = (
     "uniformly lit, unobscured, diffraction-limited: an upper bound, of which a Gaussian beam cut by the aperture "
     "reaches 0.81 at best (Klein and Degnan 1974)"
@@ -32,22 +40,23 @@ _POINTING_BASIS = {
     "pattern": ("far field of the lit aperture, by its diffraction integral", "main lobe of a perfect wavefront"),
 }
 _RECEIVING = "area pi D^2 / 4, all of its light on the detector"
+_COUPLED = "area pi D^2 / 4; what takes its light stands below"
 CHOSEN = "chosen for this evaluation"
-_NOT_GIVEN = "not given"
-LEFT_AT_ZERO = "left at 0 dB"
-"""The warning of a loss that is stated as nothing."""
 STREHL_LOSS, POINTING_LOSS, POINT_AHEAD_LOSS = "Strehl loss", "Pointing loss", "Point-ahead loss"
-_ROUNDING_DB = 1e-9  # of a link whose rate is solved for 0 dB
+COUPLING_LOSS, RECEIVE_POINTING_LOSS = "Coupling loss", "Receive pointing loss"
 FREE_SPACE_LOSS, CLEAR_SKY_LOSS = "Free-space loss", "Clear-sky loss"
 DEEPEST_DB = 20.0  # pointing loss beyond which side lobes and scatter decide, not the main lobe
 WIDEST_RAD = 0.1  # half angle or error beyond which a small angle is none
 _CUT_DB = 0.1  # gain beyond which it counts that the aperture cuts a beam that is taken as whole
+_MANY_MODES = 20.0  # of the normalised frequency V: about a hundred modes in each polarisation
 _WORST_STREHL_DB = 5.0  # beyond it the core of the beam no longer has the shape of the perfect one
 
 
 @dataclass(frozen=True, slots=True)
 class LinkBudget:
     """One link: `lines` add up to the received power in dBm, `totals` are received power, required power and margin.
+
+    What extinction and phase error add to the required power stands before it among the totals, as a part of it.
 
     `irradiance_w_m2` stands at the receiving aperture with every loss up to there, at the pointing error;
     `irradiance_on_axis_w_m2` is that of the same beam pointed without error and before Strehl.
@@ -76,7 +85,7 @@ class LinkBudget:
     @property
     def closes(self) -> bool:
         """Whether there is a margin of at least 0 dB, and the budget is physically possible."""
-        return self.margin_db >= -_ROUNDING_DB and self.possible
+        return self.margin_db >= -ROUNDING_DB and self.possible
 
     def loss_db(self, *names: str) -> float:
         """The loss of these lines together, positive; 0 for a name that is not among the lines."""
@@ -85,7 +94,7 @@ class LinkBudget:
     @property
     def at_zero(self) -> tuple[str, ...]:
         """Names of the losses that are stated as 0 dB, or not given at all."""
-        return tuple(line.name for line in self.lines if line.warning == LEFT_AT_ZERO)
+        return tuple(line.name for line in (*self.lines, *self.totals) if line.warning == LEFT_AT_ZERO)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -127,10 +136,13 @@ def communication_budget(
     transmit = write.transmit(_lit_gain(write, data), _pointing_line(data, error, error_source), with_ahead)
     receive = (
         *write.receive("geo"),
+        *_coupling_lines(write, data),
         write.loss("Tracking split loss", "tracking_split_loss"),
         write.loss("Implementation loss", "implementation_loss"),
+        *inter_symbol_lines(beam, write.source),
     )
-    return _budget("Communication", transmit, receive, _required_line(data, rate, write, rate_source), beam, rate)
+    required = required_lines(data, rate, rate_source, write.source, total_db(transmit + receive))
+    return _budget("Communication", transmit, receive, required, beam, rate)
 
 
 def beam_budget(name: str, shared: Shared, beam: Beacon | None, sources: Mapping[str, Source]) -> LinkBudget:
@@ -171,9 +183,9 @@ def _gaussian_budget(write: "Writer", beam: Beacon, receiver: str) -> LinkBudget
     pointing = Line(POINTING_LOSS, loss, "dB", basis, source, regime, doubts)
     with_ahead = float(gains.gaussian_pointing_loss_db(error + write.shared.point_ahead_rad, half))
     level = gains.dbm(beam.required_power_w)
-    required = Line("Required power", level, "dBm", "as given", write.source("required_power"), _GIVEN)
+    required = Line("Required power", level, "dBm", "as given", write.source("required_power"), GIVEN)
     transmit = write.transmit((gain,), pointing, with_ahead)
-    return _budget(write.table.capitalize(), transmit, write.receive(receiver), required, beam)
+    return _budget(write.table.capitalize(), transmit, write.receive(receiver), (required,), beam)
 
 
 def _cut_by_aperture(half_angle_rad: float, aperture_m: float, wavelength_m: float) -> str:
@@ -254,7 +266,7 @@ class Writer:
             key: Field of the table without its `_db`; the loss is positive there and negative in the line.
         """
         value = getattr(self.beam, f"{key}_db")
-        return Line(name, 0.0 - value, "dB", "as given", self.source(key), _GIVEN, "" if value else LEFT_AT_ZERO)
+        return Line(name, 0.0 - value, "dB", "as given", self.source(key), GIVEN, "" if value else LEFT_AT_ZERO)
 
     def gain(self, end: str, regime: str) -> Line:
         """Gain of a whole, evenly lit aperture.
@@ -274,12 +286,14 @@ class Writer:
     def receive(self, end: str) -> tuple[Line, ...]:
         """Lines from the receiving aperture on: its gain, its obscuration if the mission gives one, its optics."""
         hole = getattr(self.shared.terminals, f"{end}_obscuration")
-        lines = [self.gain(end, _RECEIVING)]
+        coupled = isinstance(self.beam, Communication) and self.beam.coupling is not None
+        regime = _COUPLED if coupled else _RECEIVING
+        lines = [self.gain(end, regime)]
         if hole is not None:
             name = f"{self.shared.terminals.called(end)} obscuration loss"
             source = source_text(self.sources, f"terminals.{end}_obscuration")
             value, basis = 0.0 - gains.obscuration_loss_db(hole), f"1 - e^2, e = {hole:g}"
-            lines.append(Line(name, value, "dB", basis, source, _RECEIVING))
+            lines.append(Line(name, value, "dB", basis, source, regime))
         return (*lines, self.loss("Receive optics loss", "receive_optics_loss"))
 
     def transmit(self, gain: tuple[Line, ...], pointing: Line, with_ahead_db: float) -> tuple[Line, ...]:
@@ -295,7 +309,7 @@ class Writer:
         channel = [] if self.shared.channel is None else [self._channel()]
         return (
             Line(
-                "Transmit power", gains.dbm(beam.transmit_power_w), "dBm", power, self.source("transmit_power"), _GIVEN
+                "Transmit power", gains.dbm(beam.transmit_power_w), "dBm", power, self.source("transmit_power"), GIVEN
             ),
             *gain,
             self.loss("Transmit optics loss", "transmit_optics_loss"),
@@ -333,7 +347,7 @@ class Writer:
         ahead = self.shared.point_ahead
         regime = "added to the pointing error in its worst direction"
         if ahead is None:
-            return Line(POINT_AHEAD_LOSS, 0.0, "dB", "taken as corrected", _NOT_GIVEN, regime, LEFT_AT_ZERO)
+            return Line(POINT_AHEAD_LOSS, 0.0, "dB", "taken as corrected", NOT_GIVEN, regime, LEFT_AT_ZERO)
         source = source_text(self.sources, "point_ahead.transverse_velocity", "point_ahead.corrected")
         if ahead.corrected:
             return Line(
@@ -385,6 +399,49 @@ def _lit_gain(write: Writer, data: DataLink) -> tuple[Line, ...]:
     return (whole, Line("Illumination", lit.gain_db - whole.value, "dB", basis, source, regime))
 
 
+def _coupling_lines(write: Writer, data: DataLink) -> tuple[Line, ...]:
+    """What the fibre or the detector does not take, pointed without error, and what the receiver's pointing costs."""
+    receiving, table = data.receiving, data.table.coupling
+    if receiving is None or table is None:
+        return ()
+    end, name = receiving.end, f"{write.table}.coupling"
+    keys = [f"{name}.{key}" for key in table.keys_of_light]
+    share = float(end.share(0.0))
+    basis = f"{table.into}: {share:.4g} of the light in the aperture"
+    regime = "plane wave, scalar optics, no stray light"
+    if isinstance(end, coupling.SingleModeFibre):
+        basis += f", a = {end.pupil.truncation:.4g}"
+        regime = f"overlap with a Gaussian mode, {regime}"
+    doubts = _few_modes(table, data.table.wavelength_m)
+    lines = [
+        Line(COUPLING_LOSS, 0.0 - data.coupling_db, "dB", basis, source_text(write.sources, *keys), regime, doubts)
+    ]
+    value, warning = 0.0 - data.receive_pointing_db, _deep(data.receive_pointing_db)
+    if receiving.is_random:
+        outage = data.requirement.outage or 0.0
+        basis = f"what it adds to the pointing loss, both together exceeded for {100.0 * outage:g} % of the time"
+        own = "twin" if receiving.twin else "jitter.rms"
+        regime = "errors of the two ends independent"
+    elif table.pointing_error_rad is None:
+        basis, own, regime, warning = "taken as none", "", "static error in its worst direction", LEFT_AT_ZERO
+    else:
+        basis = f"error = {format_input(table.pointing_error_rad, 'rad')}"
+        own, regime = "pointing_error", "static error in its worst direction"
+        warning = warning if table.pointing_error_rad else LEFT_AT_ZERO
+    source = source_text(write.sources, f"{name}.{own}") if own else NOT_GIVEN
+    return (*lines, Line(RECEIVE_POINTING_LOSS, value, "dB", basis, source, regime, warning))
+
+
+def _few_modes(table: Coupling, wavelength_m: float) -> str:
+    """The warning that a fibre has too few modes to take all light that falls on its core."""
+    if table.core_radius_m is None or table.numerical_aperture is None:
+        return ""
+    parameter = 2.0 * math.pi * table.core_radius_m * table.numerical_aperture / wavelength_m
+    if parameter > _MANY_MODES:
+        return ""
+    return f"the fibre has V = {parameter:.3g}, too few modes (below {_MANY_MODES:g}) to take all light on its core"
+
+
 def _pointing_line(data: DataLink, error_rad: float, source: str) -> Line:
     loss = 0.0 - float(data.beam.fall.loss_db(error_rad))
     formula, regime = _POINTING_BASIS[data.shared.conventions.pointing_loss]
@@ -393,32 +450,15 @@ def _pointing_line(data: DataLink, error_rad: float, source: str) -> Line:
     return Line(POINTING_LOSS, loss, "dB", basis, source, f"{regime}; static error", doubts)
 
 
-def _required_line(data: DataLink, rate_bit_s: float, write: Writer, rate_source: str) -> Line:
-    beam, level = data.table, float(required_dbm(data, rate_bit_s))
-    rate = f"R = {format_input(rate_bit_s, 'bit/s')}"
-    if beam.receiver is None:
-        sensitivity = format_input(beam.receiver_sensitivity_photon_bit or math.nan, "photon/bit")
-        basis, key = f"n (h c / lambda) R, n = {sensitivity}, {rate}", "receiver_sensitivity"
-        regime = "sensitivity the same at every data rate"
-    else:
-        r = beam.receiver
-        photons = gains.watt(level) / gains.photon_energy_j(beam.wavelength_m) / rate_bit_s
-        basis = (
-            f"{r.modulation.upper()}, {r.detector}: {photons:.4g} photon/bit at a bit error ratio of "
-            f"{r.bit_error_ratio:g}, code gain {r.code_gain_db:g} dB, {rate}"
-        )
-        key, regime = "receiver.modulation", "noise of the receiver as given, white; no intersymbol interference"
-    return Line("Required power", level, "dBm", basis, f"{write.source(key)}; {rate_source}", regime)
-
-
 def _budget(
     name: str,
     transmit: tuple[Line, ...],
     receive: tuple[Line, ...],
-    required: Line,
+    needed: tuple[Line, ...],
     beam: Beacon | Communication,
     rate_bit_s: float | None = None,
 ) -> LinkBudget:
+    *parts, required = needed
     received_dbm = total_db(transmit + receive)
     photons, light = None, "sum of the lines above"
     if rate_bit_s is not None:
@@ -434,6 +474,7 @@ def _budget(
         lines=transmit + receive,
         totals=(
             Line("Received power", received_dbm, "dBm", light, "computed", _AS_LINES),
+            *parts,
             required,
             Line("Margin", margin, "dB", "received power less required power", "computed", _AS_LINES),
         ),

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,7 +11,16 @@ from numpy.typing import ArrayLike
 from microrad.core.arrays import Floats
 from microrad.core.units import format_quantity
 from microrad.link import gains
-from microrad.link.budget.assembly import DataLink, LinkError, assembled, check_grid, required_dbm, strehl_db
+from microrad.link.budget.assembly import (
+    SLOWEST_BIT_S,
+    DataLink,
+    LinkError,
+    assembled,
+    check_grid,
+    rate_at_power,
+    required_dbm,
+    strehl_db,
+)
 from microrad.link.budget.lines import CHOSEN, given_or_own
 from microrad.link.receivers import BpskHomodyne, DpskPreamplified, OokCounting
 from microrad.mission.model import Source, source_text
@@ -21,8 +31,6 @@ BIT_ERROR_RATIO = 1e-9
 
 QUANTUM_LIMIT_DB = 10.0 * math.log10(2.0)
 """Noise figure of an ideal phase-insensitive amplifier at high gain."""
-
-_SLOWEST_BIT_S = 1.0
 
 
 def received_on_axis_dbm(data: DataLink, strehl_loss_db: float | None = None) -> float:
@@ -38,10 +46,12 @@ def received_on_axis_dbm(data: DataLink, strehl_loss_db: float | None = None) ->
         + beam.receive_optics_loss_db
         + beam.tracking_split_loss_db
         + beam.implementation_loss_db
+        + (0.0 if beam.receiver is None else beam.receiver.inter_symbol_loss_db or 0.0)
         + (strehl_db(beam, data.shared.conventions.strehl) if strehl_loss_db is None else strehl_loss_db)
         + gains.free_space_loss_db(beam.distance_m, beam.wavelength_m)
         + data.shared.clear_sky_db
         + gains.obscuration_loss_db(terminals.geo_obscuration or 0.0)
+        + data.coupling_db
     )
     receiving = gains.aperture_gain_db(terminals.geo_aperture_m, beam.wavelength_m)
     return gains.dbm(beam.transmit_power_w) + data.beam.gain_db + receiving - losses
@@ -50,12 +60,14 @@ def received_on_axis_dbm(data: DataLink, strehl_loss_db: float | None = None) ->
 def pointing_loss_db(data: DataLink, pointing_error_rad: ArrayLike) -> Floats:
     """Loss (positive, dB) of the communication link at each pointing error, with an uncorrected point-ahead added.
 
+    What the receiver's own pointing costs is in it, the same at each error.
+
     Args:
         data: The communication link.
         pointing_error_rad: Radial pointing errors, in rad, any shape.
     """
     error = np.asarray(pointing_error_rad, dtype=np.float64)
-    return data.beam.fall.loss_db(error + data.shared.point_ahead_rad)
+    return data.beam.fall.loss_db(error + data.shared.point_ahead_rad) + data.receive_pointing_db
 
 
 def margin_map(data: DataLink, data_rate_bit_s: ArrayLike, pointing_error_rad: ArrayLike) -> Floats:
@@ -122,29 +134,23 @@ def rate_at_loss(data: DataLink, margin_db: float, loss_db: float) -> float:
     available = received_on_axis_dbm(data) - loss_db - margin_db
     built = data.receiver
     if built is None:
-        spare_db = available - float(required_dbm(data, _SLOWEST_BIT_S))
+        spare_db = available - float(required_dbm(data, SLOWEST_BIT_S))
         if spare_db < 0.0:
             raise LinkError(
-                f"not even {format_quantity(_SLOWEST_BIT_S, 'bit/s')} leaves a margin of {margin_db:g} dB: "
+                f"not even {format_quantity(SLOWEST_BIT_S, 'bit/s')} leaves a margin of {margin_db:g} dB: "
                 f"{-spare_db:.2f} dB are missing"
             )
-        return _SLOWEST_BIT_S * float(10.0 ** (spare_db / 10.0))
+        return SLOWEST_BIT_S * float(10.0 ** (spare_db / 10.0))
     highest = built.highest_data_rate_bit_s
-    if float(required_dbm(data, highest)) <= available:
-        return highest
-    slowest = min(_SLOWEST_BIT_S, highest)
-    missing = float(required_dbm(data, slowest)) - available
-    if missing > 0.0:
+    rate = rate_at_power(built, available)
+    if rate is None:
+        slowest = min(SLOWEST_BIT_S, highest)
+        missing = float(required_dbm(data, slowest)) - available
         raise LinkError(
             f"not even {format_quantity(slowest, 'bit/s')} leaves a margin of {margin_db:g} dB: "
             f"{missing:.2f} dB are missing, mostly against noise that does not fall with the rate"
         )
-    from scipy.optimize import brentq
-
-    def excess(lg_rate: float) -> float:
-        return float(required_dbm(data, 10.0**lg_rate)) - available
-
-    return float(10.0 ** brentq(excess, math.log10(slowest), math.log10(highest), xtol=1e-10))
+    return rate
 
 
 def largest_pointing_error(data: DataLink, margin_db: float, data_rate_bit_s: float) -> float:
@@ -211,7 +217,7 @@ def implied_sensitivity(data: DataLink) -> tuple[SensitivityReading, ...]:
         for loss in ("gaussian", "gain"):
             error = requirement.pointing_error_rad + data.shared.point_ahead_rad
             lost = float(gains.pointing_loss_db(error, aperture, wavelength, loss))
-            level = on_axis - lost - requirement.margin_db - rate_dbm
+            level = on_axis - lost - data.receive_pointing_db - requirement.margin_db - rate_dbm
             readings.append(SensitivityReading(loss, strehl, float(10.0 ** (level / 10.0))))
     return tuple(readings)
 
@@ -279,7 +285,11 @@ def ideal_receivers(
     received = received_on_axis_dbm(data) - float(pointing_loss_db(data, error))
     source = f"{source_text(sources, 'communication.data_rate')}; {error_source}"
     rate = beam.data_rate_bit_s
-    common = {"wavelength_m": beam.wavelength_m, "bit_error_ratio": BIT_ERROR_RATIO, "bandwidth_hz": 2.0 * rate}
+    common: dict[str, Any] = {
+        "wavelength_m": beam.wavelength_m,
+        "bit_error_ratio": BIT_ERROR_RATIO,
+        "bandwidth_hz": 2.0 * rate,
+    }
     ideal = (
         ("Homodyne BPSK", BpskHomodyne(**common, quantum_efficiency=1.0), "BER = erfc(sqrt(2 n)) / 2"),
         ("Preamplified DPSK", DpskPreamplified(**common, noise_figure_db=QUANTUM_LIMIT_DB), "BER = exp(-n) / 2"),

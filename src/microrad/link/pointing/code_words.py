@@ -11,7 +11,7 @@ import numpy as np
 
 from microrad import link
 from microrad.core.arrays import Floats
-from microrad.core.intervals import clustered_band
+from microrad.core.intervals import Interval, clustered_band
 from microrad.core.units import format_quantity
 from microrad.link.pointing.outage import Exposure, like_gaussian_db
 from microrad.link.pointing.statistics import transmission
@@ -43,33 +43,22 @@ class FadeMargin:
             ValueError: For a data rate that the receiver does not take.
         """
         under = Exposure.stated(data)
-        spare = under.on_axis_db - data.requirement.margin_db
+        spare = under.on_axis_db - data.receive_pointing_db - data.requirement.margin_db
         loss = spare if spare < 0.0 else like_gaussian_db(under.fall, spare)
         return cls(under.fall.half_angle_rad, under.ahead_rad, loss)
 
 
 @dataclass(frozen=True, slots=True)
-class Share:
-    """A share with its interval of 99 %, from the spread between the runs."""
-
-    value: float
-    low: float
-    high: float
-
-    @classmethod
-    def of(cls, by_run: Floats, each: int) -> "Share":
-        """From the share in each run, of so many trials."""
-        return cls(float(np.mean(by_run)), *clustered_band(by_run, each, CONFIDENCE))
-
-
-@dataclass(frozen=True, slots=True)
 class LostWords:
-    """Share of the ``words`` of all runs that are lost, and share of the time with less than the required margin."""
+    """Share of the ``words`` of all runs that are lost, and share of the time with less than the required margin.
+
+    Both with intervals of 99 %, from the spread between the runs.
+    """
 
     code_word_s: float
     words: int
-    lost: Share
-    time: Share
+    lost: Interval
+    time: Interval
 
 
 def words_asked(margin: FadeMargin, code_word_s: float, loop: PointingLoop, span: Span) -> Question[LostWords]:
@@ -103,9 +92,14 @@ def words_asked(margin: FadeMargin, code_word_s: float, loop: PointingLoop, span
 
     def answer(found: Sequence[Floats]) -> LostWords:
         of_words, of_time = found[0].T
-        return LostWords(code_word_s, len(of_words) * words, Share.of(of_words, words), Share.of(of_time, samples))
+        return LostWords(code_word_s, len(of_words) * words, _share(of_words, words), _share(of_time, samples))
 
     return Question(lambda: [_Lost(margin, length)], answer)
+
+
+def _share(by_run: Floats, each: int) -> Interval:
+    """The share over all runs from that in each, of so many trials."""
+    return Interval(float(np.mean(by_run)), *clustered_band(by_run, each, CONFIDENCE))
 
 
 class _Lost:

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
-from microrad.link.pointing.radial_error import RADIUS, two_axes
+from microrad.link.radial_error import RADIUS, two_axes
 from microrad.mission.fields import Quantity
 from microrad.mission.tables.pointing import ErrorClass, Statistic
 

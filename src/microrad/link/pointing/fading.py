@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike
 from microrad.core.arrays import Floats
 from microrad.core.units import format_quantity
 from microrad.link.gains import checked
-from microrad.link.pointing.radial_error import RADIUS, Jitter, density_on_circle, radial_survival
 from microrad.link.pointing.statistics import outage_probability, radius_of_loss_rad, transmission
+from microrad.link.radial_error import RADIUS, Jitter, density_on_circle, radial_survival
 from microrad.mission.fields import Quantity
 
 ErrorRatio = Callable[[Floats], Floats]
@@ -27,6 +27,9 @@ MOST_POWER_DB = 100.0
 
 _REACH = 12.0  # standard deviations about the bias that a mean over the pointing error takes in
 _RADII = 4001  # edges of its steps of the radial error
+_CIRCLES = 192  # of the receiver's error, in fades of two ends
+_SECTORS = 32  # of directions that have nearly one speed
+_STILL = 0.01
 
 
 class NoPowerError(ValueError):
@@ -191,6 +194,71 @@ def fades(
     return Fades(rate, np.divide(share, rate, out=never, where=rate > 0.0), share)
 
 
+@dataclass(frozen=True, slots=True)
+class MovingEnd:
+    """One end of a link: its jitter, the rms velocity of its axes (rad/s), and the half angle at 1/e2 of its beam."""
+
+    jitter: Jitter
+    velocity_rms_rad_s: tuple[float, float]
+    half_angle_rad: float
+
+    @property
+    def moved(self) -> "MovingEnd":
+        """The end with an axis that stands still moving by a hundredth of the other, which has both be one case."""
+        rms, speed = self.jitter.rms_rad, self.velocity_rms_rad_s
+        rms = (max(rms[0], _STILL * rms[1]), max(rms[1], _STILL * rms[0]))
+        speed = (max(speed[0], _STILL * speed[1]), max(speed[1], _STILL * speed[0]))
+        return MovingEnd(Jitter(self.jitter.bias_rad, rms), speed, self.half_angle_rad)
+
+
+def fades_of_both(sent: MovingEnd, received: MovingEnd, margin_db: float) -> Fades:
+    """Rate, length and share of the fades where two independent ends together lose more than a margin.
+
+    Given the error of the receiver, the transmitter may lose what is left: its circle is crossed with the speed of both
+    losses (Rice 1944, for four axes). An axis that stands still counts as moving by a hundredth of the other.
+
+    Args:
+        sent: The transmitter, whose errors have a distribution.
+        received: The receiver, whose errors have a distribution.
+        margin_db: Fade margin, in dB, above 0.
+    """
+    # the end whose errors are the smaller ones against its beam is looked at circle by circle
+    inner, outer = sorted((sent.moved, received.moved), key=lambda end: max(end.jitter.rms_rad) / end.half_angle_rad)
+    farthest, widest = (float(radius_of_loss_rad(end.half_angle_rad, margin_db)) for end in (inner, outer))
+    static, reach = inner.jitter.static_rad, _REACH * max(inner.jitter.rms_rad)
+    first, last = (math.asin(min(max(at / farthest, 0.0), 1.0)) for at in (static - reach, static + reach))
+    node, weight = np.polynomial.legendre.leggauss(_CIRCLES)
+    turn, width = first + (last - first) * (node + 1.0) / 2.0, (last - first) / 2.0 * weight
+    at, left = (
+        farthest * np.sin(turn),
+        widest * np.cos(turn),
+    )  # circles of the one end, and what they leave to the other
+    width = width * farthest * np.cos(turn)
+    (fast, share), (other, other_share) = _speeds(outer, left), _speeds(inner, at)
+    # by how much faster the other end has to move for the same change of loss
+    ratio = np.tan(turn)[:, None, None] * outer.half_angle_rad / inner.half_angle_rad
+    speed = np.sqrt(fast[:, :, None] + ratio**2 * other[:, None, :])
+    rate = float(np.einsum("r,ri,rj,rij", width, share, other_share, speed)) / math.sqrt(2.0 * math.pi)
+    lost = radial_survival(outer.jitter, left)
+    faded = float(radial_survival(inner.jitter, farthest) + np.sum(width * np.sum(other_share, axis=1) * lost))
+    never = math.inf if faded > 0.0 else 0.0
+    return Fades(np.asarray(rate), np.asarray(faded / rate if rate > 0.0 else never), np.asarray(faded))
+
+
+def _speeds(end: MovingEnd, radius: Floats) -> tuple[Floats, Floats]:
+    """Outward variances (rad^2/s^2) round circles, and the density of each (1/rad); like directions together."""
+    square_x, _, density = density_on_circle(end.jitter, radius)
+    bins = np.minimum((square_x * _SECTORS).astype(int), _SECTORS - 1)
+    along_x = (np.arange(_SECTORS) + 0.5) / _SECTORS
+    together, exact = np.zeros((radius.size, _SECTORS)), np.zeros((radius.size, _SECTORS))
+    rows = np.arange(radius.size)[:, None]
+    np.add.at(together, (rows, bins), density)
+    np.add.at(exact, (rows, bins), density * square_x)
+    along_x = np.where(together > 0.0, exact / np.where(together > 0.0, together, 1.0), along_x)
+    fast_x, fast_y = (each**2 for each in end.velocity_rms_rad_s)
+    return along_x * fast_x + (1.0 - along_x) * fast_y, together
+
+
 # ------------------------------------------------------------------------------------- power that the fluctuation costs
 def mean_error_ratio(jitter: Jitter, half_angle_rad: float, extra_power_db: float, error_ratio: ErrorRatio) -> float:
     """Mean bit error ratio over the pointing error, at the received power 10^(extra / 10) h.
@@ -244,7 +312,21 @@ def uncoded_penalty_db(jitter: Jitter, half_angle_rad: float, error_ratio: Error
         NoPowerError: When `MOST_POWER_DB` do not reach the target.
         ValueError: When the target is not between 0 and 1, and as `mean_error_ratio`.
     """
-    power, share = _power_shares(jitter, half_angle_rad)
+    return penalty_db(*_power_shares(jitter, half_angle_rad), error_ratio)
+
+
+def penalty_db(power: Floats, share: Floats, error_ratio: ErrorRatio) -> float:
+    """Extra power in dB that brings the mean bit error ratio over fluctuating power back to the target.
+
+    Args:
+        power: Received powers over that without pointing error, falling.
+        share: The share of the time of each.
+        error_ratio: As for `uncoded_penalty_db`.
+
+    Raises:
+        NoPowerError: As `uncoded_penalty_db`.
+        ValueError: As `uncoded_penalty_db`.
+    """
     target = _mean_over(np.ones(1), np.ones(1), 0.0, error_ratio)
     if not 0.0 < target < 1.0:
         raise ValueError(f"the bit error ratio at power 1 is {target:g}; it is the target and must be between 0 and 1")

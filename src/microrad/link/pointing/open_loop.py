@@ -10,7 +10,6 @@ from microrad.core.budget import Line, root_sum_square
 from microrad.core.units import format_quantity
 from microrad.link.budget.assembly import Shared
 from microrad.link.pointing.error_classes import ErrorTerm, Interpretation, StatedError, basis, error_term
-from microrad.link.pointing.radial_error import Jitter, radial_cdf
 from microrad.link.pointing.summation import (
     Allocation,
     Rule,
@@ -20,6 +19,7 @@ from microrad.link.pointing.summation import (
     mean_and_sigma,
     summations,
 )
+from microrad.link.radial_error import Jitter, radial_cdf
 from microrad.mission.model import Source, source_text
 from microrad.mission.tables.link import Beacon, half_angle_rad
 from microrad.mission.tables.pointing import PointAhead, Pointing, point_ahead_rad

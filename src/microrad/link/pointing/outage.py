@@ -2,19 +2,17 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
-from functools import lru_cache
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
 
 import numpy as np
 
 from microrad import link
 from microrad.core.arrays import Floats
-from microrad.link import beams, gains, pointing
+from microrad.link import beams, coupling, gains, pointing
+from microrad.link.budget.assembly import RAREST
+from microrad.link.radial_error import radial_steps
 from microrad.mission.tables.link import LinkRequirement
-from microrad.mission.tables.pointing import JitterTable
-
-_STEPS = 4000  # of the radial error, for a distribution that is known and not sampled
-_RAREST = 1e-16
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +22,8 @@ class Exposure:
     ``on_axis_db`` is its margin without any. ``ahead_rad`` is an uncorrected point-ahead, which is added to the length
     of every error. ``quantile_rad`` is the error that is exceeded for the mission's outage, and ``beyond`` gives the
     share of the time with a larger error than one in rad. ``lost_db`` is sent over received power without any error.
+    ``received_db`` is what the receiver's own static error costs it. Where that has a distribution, ``both`` are the
+    losses at either end, of whose sum everything is; ``share`` is the outage then.
     """
 
     fall: beams.OffAxis
@@ -32,15 +32,25 @@ class Exposure:
     ahead_rad: float
     quantile_rad: float
     beyond: Callable[[float], float]
+    received_db: float
+    both: coupling.BothEnds | None
+    share: float
 
     @classmethod
-    def of(cls, data: link.DataLink, quantile_rad: float, beyond: Callable[[float], float]) -> "Exposure":
+    def of(
+        cls,
+        data: link.DataLink,
+        quantile_rad: float,
+        beyond: Callable[[float], float],
+        errors: "Callable[[], ErrorDistribution]",
+    ) -> "Exposure":
         """The link under errors of which a quantile and the share beyond any size are known.
 
         Args:
             data: The communication link.
             quantile_rad: Radial error that is exceeded for the mission's outage, in rad.
             beyond: Share of the time with a larger radial error than the one given, in rad.
+            errors: Gives the errors themselves, which a receiver with errors of its own asks for.
 
         Raises:
             ValueError: For a data rate that the receiver does not take.
@@ -48,21 +58,33 @@ class Exposure:
         received_dbm = link.received_on_axis_dbm(data)
         on_axis_db = received_dbm - float(link.required_dbm(data, data.table.data_rate_bit_s))
         lost_db = gains.dbm(data.table.transmit_power_w) - received_dbm
-        return cls(data.beam.fall, on_axis_db, lost_db, data.shared.point_ahead_rad, quantile_rad, beyond)
+        fall, ahead, receiving = data.beam.fall, data.shared.point_ahead_rad, data.receiving
+        both, received, outage = None, 0.0, 0.0
+        if receiving is not None and receiving.is_random:
+            own, outage = errors(), stated_outage(data.requirement)
+            sent = coupling.of_beam(fall, own.radius_rad + ahead, own.share)
+            both = coupling.BothEnds(sent, receiving.losses(own.radius_rad, own.share))
+        elif receiving is not None:
+            received = receiving.static_db
+        return cls(fall, on_axis_db, lost_db, ahead, quantile_rad, beyond, received, both, outage)
 
     @classmethod
     def stated(cls, data: link.DataLink) -> "Exposure":
         """The exposure of a link whose loop is not simulated: under its jitter, or at its static error all the time."""
         error = error_rad(data)
         if data.jitter is None:
-            return cls.of(data, error, lambda reach_rad: float(error > reach_rad))
-        jitter = _jitter(data.jitter)
-        return cls.of(data, error, lambda reach_rad: float(pointing.radial_survival(jitter, reach_rad)))
+            still = ErrorDistribution(np.array([error]), np.ones(1))
+            return cls.of(data, error, lambda reach_rad: float(error > reach_rad), lambda: still)
+        jitter = link.jitter_of(data.jitter)
+        beyond = partial(_beyond, jitter)
+        return cls.of(data, error, beyond, partial(GaussianErrors.of, jitter))
 
     @property
     def outage_loss_db(self) -> float:
-        """Pointing loss that is not exceeded but for the outage."""
-        return float(self.fall.loss_db(self.quantile_rad + self.ahead_rad))
+        """Pointing loss at both ends that is not exceeded but for the outage."""
+        if self.both is not None:
+            return self.both.quantile_db(self.share)
+        return float(self.fall.loss_db(self.quantile_rad + self.ahead_rad)) + self.received_db
 
     @property
     def margin_db(self) -> float:
@@ -74,9 +96,16 @@ class Exposure:
         """Whether no more light arrives than was sent, but for the outage: see `LinkBudget.possible`."""
         return self.lost_db + self.outage_loss_db >= 0.0
 
+    @property
+    def received_mean_db(self) -> float:
+        """Loss of the mean power by the receiver's own pointing."""
+        return self.received_db if self.both is None else self.both.received.mean_db
+
     def short_of(self, margin_db: float) -> float:
         """Share of the time with less than a margin."""
-        spare = self.on_axis_db - margin_db
+        spare = self.on_axis_db - margin_db - self.received_db
+        if self.both is not None:  # an error may bring light back to a receiver that lies off its axis
+            return self.both.beyond(spare)
         reach = self.fall.error_rad(spare) - self.ahead_rad
         return 1.0 if spare < 0.0 or reach < 0.0 else self.beyond(reach)
 
@@ -109,12 +138,7 @@ class GaussianErrors(ErrorDistribution):
     @classmethod
     def of(cls, jitter: pointing.Jitter) -> "GaussianErrors":
         """The distribution of the radial errors that this jitter makes."""
-        reach = jitter.static_rad + 12.0 * max(jitter.rms_rad)
-        if reach == jitter.static_rad:
-            return cls(np.array([reach]), np.ones(1), jitter)
-        edges = np.linspace(0.0, reach, _STEPS + 1)
-        share = np.maximum(-np.diff(pointing.radial_survival(jitter, edges)), 0.0)
-        return cls((edges[1:] + edges[:-1]) / 2.0, share / np.sum(share), jitter)
+        return cls(*radial_steps(jitter), jitter)
 
     def quantile_rad(self, probability: float) -> float:
         """Error that a share of the time stays below."""
@@ -122,13 +146,17 @@ class GaussianErrors(ErrorDistribution):
 
     def beyond(self, error_rad: float) -> float:
         """Share of the time with a larger error."""
-        return float(pointing.radial_survival(self.jitter, error_rad))
+        return _beyond(self.jitter, error_rad)
+
+
+def _beyond(jitter: pointing.Jitter, error_rad: float) -> float:
+    return float(pointing.radial_survival(jitter, error_rad))
 
 
 @lru_cache(maxsize=256)  # most rows of a campaign draw something else than the jitter
 def _exact_quantile_rad(jitter: pointing.Jitter, exceeded: float) -> float:
     """Error that is exceeded for a share of the time, which is told from none down to the last digit of 1."""
-    return float(pointing.radial_quantile(jitter, max(exceeded, _RAREST)))
+    return float(pointing.radial_quantile(jitter, max(exceeded, RAREST)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,14 +202,15 @@ class Performance:
 
 
 def performance_under_jitter(data: link.DataLink) -> Performance | None:
-    """The link under the mission's own jitter, or None where it gives none."""
-    if data.jitter is None:
+    """The link under the jitter that the mission states of either end, or None where it states none."""
+    if data.jitter is None and (data.receiving is None or data.receiving.jitter is None):
         return None
-    jitter, speed = _jitter(data.jitter), 2.0 * math.pi * data.jitter.bandwidth_hz
-    rms_x, rms_y = jitter.rms_rad
-    motion = pointing.SpectralMotion(
-        (rms_x, rms_y), (speed * rms_x, speed * rms_y), (0.0, 0.0), data.jitter.bandwidth_hz
-    )
+    if data.jitter is None:
+        jitter, bandwidth_hz = pointing.Jitter((data.table.pointing_error_rad, 0.0), (0.0, 0.0)), 0.0
+    else:
+        jitter, bandwidth_hz = link.jitter_of(data.jitter), data.jitter.bandwidth_hz
+    speed, (rms_x, rms_y) = 2.0 * math.pi * bandwidth_hz, jitter.rms_rad
+    motion = pointing.SpectralMotion((rms_x, rms_y), (speed * rms_x, speed * rms_y), (0.0, 0.0), bandwidth_hz)
     return performance(data, "jitter as given", "", "", GaussianErrors.of(jitter), jitter, motion)
 
 
@@ -193,7 +222,7 @@ def error_rad(data: link.DataLink) -> float:
     """
     if data.jitter is None:
         return data.table.pointing_error_rad
-    return _exact_quantile_rad(_jitter(data.jitter), stated_outage(data.requirement))
+    return _exact_quantile_rad(link.jitter_of(data.jitter), stated_outage(data.requirement))
 
 
 def stated_outage(requirement: LinkRequirement) -> float:
@@ -219,11 +248,6 @@ def margin_db(data: link.DataLink) -> float:
     return Exposure.stated(data).margin_db
 
 
-def _jitter(table: JitterTable) -> pointing.Jitter:
-    (bias_x, bias_y), (rms_x, rms_y) = table.bias_rad, table.rms_rad
-    return pointing.Jitter((bias_x, bias_y), (rms_x, rms_y))
-
-
 def performance(
     data: link.DataLink,
     source: str,
@@ -245,17 +269,18 @@ def performance(
         motion: What the spectrum says of each axis; None where it is not known, and the fades are then nan.
     """
     q, kept = data.requirement, 1.0 - stated_outage(data.requirement)
-    under = Exposure.of(data, errors.quantile_rad(kept), errors.beyond)
+    under = Exposure.of(data, errors.quantile_rad(kept), errors.beyond, lambda: errors)
     fall, ahead = under.fall, under.ahead_rad
     half, shifted = fall.half_angle_rad, with_point_ahead(jitter, ahead)
-    fades_per_s, fade_s, warning = _fades(shifted, motion, fall, under.on_axis_db - q.margin_db)
+    spare = under.on_axis_db - under.received_db - q.margin_db
+    fades_per_s, fade_s, warning = _fades(shifted, motion, data, spare)
     return Performance(
         source=source,
         controller=controller,
         mirror=mirror,
         jitter=jitter,
         error_rad=under.quantile_rad,
-        mean_loss_db=_mean_loss_db(errors, fall.loss_db(errors.radius_rad + ahead)),
+        mean_loss_db=_mean_loss_db(errors, fall.loss_db(errors.radius_rad + ahead)) + under.received_mean_db,
         outage_loss_db=under.outage_loss_db,
         margin_db=under.margin_db,
         possible=under.possible,
@@ -265,7 +290,7 @@ def performance(
         best=pointing.best_divergence_for_static_error(
             errors.quantile_rad(kept) + ahead, smallest_half_angle_rad=half, current_half_angle_rad=half
         ),
-        uncoded_penalty_db=_uncoded(data, shifted, half),
+        uncoded_penalty_db=_uncoded(data, shifted, under),
         fades_per_s=fades_per_s,
         fade_s=fade_s,
         fade_warning=warning,
@@ -305,14 +330,45 @@ def _rate(data: link.DataLink, loss_db: float) -> float:
 
 
 def _fades(
-    jitter: pointing.Jitter, motion: pointing.SpectralMotion | None, fall: beams.OffAxis, margin_db: float
+    jitter: pointing.Jitter, motion: pointing.SpectralMotion | None, data: link.DataLink, margin_db: float
 ) -> tuple[float, float, str]:
     """How often the loss exceeds the margin, for how long, and what to doubt of it."""
     if motion is None or margin_db < 0.0:
         return math.nan, math.nan, ""
-    like = like_gaussian_db(fall, margin_db)
-    found = pointing.fades(jitter, motion.velocity_rms_rad_s, fall.half_angle_rad, like)
+    fall, velocity = data.beam.fall, motion.velocity_rms_rad_s
+    sent = pointing.MovingEnd(jitter, velocity, fall.half_angle_rad)
+    moves, random = max(jitter.rms_rad) > 0.0, data.receiving is not None and data.receiving.is_random
+    left = margin_db if moves else margin_db - float(fall.loss_db(jitter.static_rad))  # what the receiver may lose
+    if random and left < 0.0:
+        return math.nan, math.nan, ""
+    received = _moving(data, sent, left) if random else None
+    if received is None:
+        found = pointing.fades(jitter, velocity, fall.half_angle_rad, like_gaussian_db(fall, margin_db))
+    elif moves:
+        like = fall.half_angle_rad * math.sqrt(margin_db / like_gaussian_db(fall, margin_db))
+        found = pointing.fades_of_both(replace(sent, half_angle_rad=like), received, margin_db)
+    else:
+        found = pointing.fades(received.jitter, received.velocity_rms_rad_s, received.half_angle_rad, left)
     return float(found.per_second), float(found.mean_duration_s), motion.warning
+
+
+def _moving(data: link.DataLink, sent: pointing.MovingEnd, margin_db: float) -> pointing.MovingEnd | None:
+    """The receiver as one with a Gaussian beam that has lost the margin at the same error; None where it stands still.
+
+    The motion of a jitter is that of its bandwidth, and of a twin that of the transmitter. An end that no error makes
+    lose the margin alone stands still, too.
+    """
+    receiving, table = data.receiving, data.table.coupling
+    if receiving is None or table is None or not receiving.is_random or margin_db == 0.0:
+        return None
+    lost_rad = receiving.end.error_rad(margin_db)
+    if math.isinf(lost_rad):
+        return None
+    half = lost_rad / math.sqrt(margin_db / float(beams.GaussianFall(1.0).loss_db(1.0)))
+    if table.jitter is None:
+        return replace(sent, half_angle_rad=half)
+    jitter, speed = link.jitter_of(table.jitter), 2.0 * math.pi * table.jitter.bandwidth_hz
+    return pointing.MovingEnd(jitter, (speed * jitter.rms_rad[0], speed * jitter.rms_rad[1]), half)
 
 
 def like_gaussian_db(fall: beams.OffAxis, margin_db: float) -> float:
@@ -325,7 +381,7 @@ def like_gaussian_db(fall: beams.OffAxis, margin_db: float) -> float:
     return float(beams.GaussianFall(fall.half_angle_rad).loss_db(fall.error_rad(margin_db)))
 
 
-def _uncoded(data: link.DataLink, jitter: pointing.Jitter, half_angle_rad: float) -> float:
+def _uncoded(data: link.DataLink, jitter: pointing.Jitter, under: Exposure) -> float:
     """Extra power that brings the mean bit error ratio back to the target, with the curve of the mission's receiver.
 
     nan for a receiver of which only the measured sensitivity is known, infinite where no power makes up for it.
@@ -335,9 +391,16 @@ def _uncoded(data: link.DataLink, jitter: pointing.Jitter, half_angle_rad: float
         return math.nan
     rate = data.table.data_rate_bit_s
     needed = float(receiver.required_power_w(rate))
+
+    def error_ratio(power: Floats) -> Floats:
+        return receiver.bit_error_ratio_at(needed * power, rate)
+
     try:
-        return pointing.uncoded_penalty_db(
-            jitter, half_angle_rad, lambda power: receiver.bit_error_ratio_at(needed * power, rate)
-        )
+        if under.both is None:
+            alone = pointing.uncoded_penalty_db(jitter, under.fall.half_angle_rad, error_ratio)
+            return alone + under.received_db
+        sent = coupling.of_beam(beams.GaussianFall(under.fall.half_angle_rad), *radial_steps(jitter))
+        losses = coupling.BothEnds(sent, under.both.received).sum
+        return pointing.penalty_db(10.0 ** (-losses.loss_db / 10.0), losses.share, error_ratio)
     except pointing.NoPowerError:
         return math.inf

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from microrad.core.arrays import Floats
 from microrad.core.units import format_quantity
 from microrad.link.gains import checked
-from microrad.link.pointing.radial_error import RADIUS, Jitter, radial_quantile, radial_survival
+from microrad.link.radial_error import RADIUS, Jitter, radial_quantile, radial_survival
 from microrad.mission.fields import Quantity
 
 _DB_PER_SQUARE = 20.0 / math.log(10.0)  # loss in dB is 8.686 (r / theta)^2

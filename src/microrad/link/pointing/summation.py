@@ -8,7 +8,7 @@ from typing import Literal
 
 from microrad.core.units import format_quantity
 from microrad.link.pointing.error_classes import ErrorTerm, Interpretation, StatedError, error_term
-from microrad.link.pointing.radial_error import Jitter, radial_quantile
+from microrad.link.radial_error import Jitter, radial_quantile
 from microrad.mission.fields import Quantity, Share
 
 Rule = Literal["rss", "esa-1993", "ecss-axis", "ecss-radial", "exact"]

@@ -7,11 +7,18 @@ from microrad.link.receivers.base import (
     background_photons_per_mode,
     background_power_w,
 )
-from microrad.link.receivers.coherent import BpskHomodyne, DpskPreamplified
+from microrad.link.receivers.coherent import (
+    BpskHeterodyne,
+    BpskHomodyne,
+    DpskPreamplified,
+    QpskHeterodyne,
+    QpskHomodyne,
+)
 from microrad.link.receivers.counting import OokCounting, PpmCounting
 from microrad.link.receivers.photocurrent import OokApd, OokPin, OokPreamplified
 
 __all__ = [
+    "BpskHeterodyne",
     "BpskHomodyne",
     "DpskPreamplified",
     "OokApd",
@@ -19,6 +26,8 @@ __all__ = [
     "OokPin",
     "OokPreamplified",
     "PpmCounting",
+    "QpskHeterodyne",
+    "QpskHomodyne",
     "RateError",
     "Receiver",
     "apd_excess_noise_factor",

@@ -157,8 +157,8 @@ class Receiver(Bounded, ABC):
             ValueError: For a negative power and a rate that is not positive.
             RateError: For a rate above the bandwidth.
         """
-        powers = checked("the received power", power_w, _POWER)
-        power, rate = np.broadcast_arrays(powers * self._code_gain, self._rates(data_rate_bit_s))
+        powers, rates = checked("the received power", power_w, _POWER), self._rates(data_rate_bit_s)
+        power, rate = np.broadcast_arrays(powers * self._gain(rates), rates)
         return np.asarray(self._ratio(power, rate), dtype=np.float64)
 
     def required_power_w(self, data_rate_bit_s: ArrayLike) -> Floats:
@@ -167,12 +167,16 @@ class Receiver(Bounded, ABC):
         Raises ValueError for a rate that is not positive, `RateError` for one above the bandwidth.
         """
         rate = self._rates(data_rate_bit_s)
-        return np.asarray(self._power_w(rate) / self._code_gain, dtype=np.float64)
+        return np.asarray(self._power_w(rate) / self._gain(rate), dtype=np.float64)
 
     def photons_per_bit(self, data_rate_bit_s: ArrayLike) -> Floats:
         """Photons at the detector for each information bit, at the required power; errors as of `required_power_w`."""
         rate = np.asarray(data_rate_bit_s, dtype=np.float64)
         return np.asarray(self.required_power_w(rate) / (rate * self._photon_j), dtype=np.float64)
+
+    def net_gain_db(self, data_rate_bit_s: ArrayLike) -> Floats:
+        """What the code gains at each data rate, in dB per bit of information; errors as of `required_power_w`."""
+        return np.asarray(10.0 * np.log10(self._gain(self._rates(data_rate_bit_s))), dtype=np.float64)
 
     def symbol_rate_hz(self, data_rate_bit_s: ArrayLike) -> Floats:
         """Symbols (for PPM: slots) per second on the line at each data rate."""
@@ -205,9 +209,9 @@ class Receiver(Bounded, ABC):
     def _photon_j(self) -> float:
         return photon_energy_j(self.wavelength_m)
 
-    @property
-    def _code_gain(self) -> float:
-        return float(10.0 ** (self.code_gain_db / 10.0))
+    def _gain(self, rate: Floats) -> Floats:
+        """What the code gains at each data rate, as a ratio of power."""
+        return np.asarray(10.0 ** (self.code_gain_db / 10.0))
 
     @property
     def _symbols_per_bit(self) -> float:

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from microrad.core.arrays import Floats
 from microrad.core.budget import Line
+from microrad.core.capacity import entropy
+from microrad.core.pulse_capacity import least_pulse_counts
 from microrad.link.receivers import base
 from microrad.mission.fields import Quantity
 
@@ -103,9 +105,13 @@ class PpmCounting(_Counter):
     42-138, Eq. 6), to about 1e-20. Empty slots carry no signal; fields otherwise as in `OokCounting`. Hard decisions on
     words: a code that uses the counts themselves gains more, which belongs into `code_gain_db`. No dead time, no slot
     jitter.
+
+    `code_gap_db` stands for a code in place of `code_gain_db`: the power that it needs over what the capacity with soft
+    decisions asks for at its rate, in the background that there is at the data rate (`core.pulse_capacity`).
     """
 
     order: int
+    code_gap_db: Annotated[float | None, Quantity("dB", least=0.0), "no code does with less than capacity"] = None
 
     def __post_init__(self) -> None:
         """Raises ValueError if the order is no power of two."""
@@ -114,6 +120,8 @@ class PpmCounting(_Counter):
             raise ValueError(
                 f"the order of the pulse-position modulation is {self.order:g}: it is a power of two above 1"
             )
+        if self.code_gap_db is not None and self.code_gain_db:
+            raise ValueError("code_gain_db stands beside code_gap_db: a code has one of both")
 
     @property
     def _symbols_per_bit(self) -> float:
@@ -148,6 +156,17 @@ class PpmCounting(_Counter):
         highest = union + 2.0 * np.sqrt(floor * union)
         row = np.arange(float(floor.size))
         return _counts_at(lambda n, i: table.error_ratio(n, i.astype(int)), target, np.asarray(lowest), highest, row)
+
+    def _gain(self, rate: Floats) -> Floats:
+        if self.code_gap_db is None:
+            return base.Receiver._gain(self, rate)
+        slot_rate = np.asarray(self.symbol_rate_hz(rate))
+        share = self.code_rate * (1.0 - entropy(self.bit_error_ratio))
+        floors = self._floor(slot_rate)
+        least = [least_pulse_counts(self.order, share, float(floor)) for floor in floors.ravel()]
+        counts = np.reshape(least, slot_rate.shape) * 10.0 ** (self.code_gap_db / 10.0)
+        per_watt = self.order * self._counts_per_joule / (counts * slot_rate)
+        return np.asarray(self._power_w(rate) * per_watt, dtype=np.float64)
 
     def _noise(self, power: float, symbol_rate: float) -> tuple[Line, ...]:
         pulse = power * self.order * self._counts_per_joule / symbol_rate

@@ -6,9 +6,12 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from microrad.core import phase_error
 from microrad.core.capacity import Code, excess_noise_factor
 from microrad.core.units import PLANCK_J_S, SPEED_OF_LIGHT_M_S, format_quantity
+from microrad.mission.codes import NamedCode, codes, nearest
 from microrad.mission.fields import OrWord, Problem, Quantity, Share, Table, Whole
+from microrad.mission.tables.coupling import Coupling
 from microrad.mission.tables.mirror import ANGLE_MOST, Angle, Name
 
 LOWEST_ELEVATION_RAD = math.radians(10.0)
@@ -135,7 +138,8 @@ _ALIKE_DB = 1e-3
 _DETECTORS: dict[str, tuple[str, ...]] = {
     "ook": ("photon-counting", "pin", "apd", "preamplified"),
     "dpsk": ("preamplified",),
-    "bpsk": ("homodyne",),
+    "bpsk": ("homodyne", "heterodyne"),
+    "qpsk": ("homodyne", "heterodyne"),
     "ppm": ("photon-counting",),
 }
 """The detectors that each modulation is received with."""
@@ -152,8 +156,13 @@ _NEEDS: dict[str, dict[str, str]] = {
     },
     "preamplified": {"noise_figure": '"4 dB"'},
     "homodyne": {"efficiency": "0.8"},
+    "heterodyne": {"efficiency": "0.8"},
 }
 """The keys that each detector needs, with a value that could stand there."""
+
+
+QUADRATURES = {"bpsk": 1, "qpsk": 2}
+"""How many quadratures of the field carry a bit of their own, of modulations that are received with an oscillator."""
 
 
 class Background(Table):
@@ -171,15 +180,16 @@ class Background(Table):
 class Receiver(Table):
     """A receiver by what it is made of, in place of a measured sensitivity."""
 
-    modulation: Literal["ook", "dpsk", "bpsk", "ppm"] = Field(description="how bits are put on the light")
-    detector: Literal["photon-counting", "pin", "apd", "preamplified", "homodyne"] = Field(
+    modulation: Literal["ook", "dpsk", "bpsk", "qpsk", "ppm"] = Field(description="how bits are put on the light")
+    detector: Literal["photon-counting", "pin", "apd", "preamplified", "homodyne", "heterodyne"] = Field(
         description="how the light is turned into a signal"
     )
     bit_error_ratio: Annotated[float, Share("", least=1e-18, below=0.5)] = Field(
         description="at which the link is judged"
     )
-    code_gain_db: Loss = Field(description="net, in power per information bit")
-    code_rate: Efficiency = Field(description="information bits per bit sent")
+    code: Name | None = Field(default=None, description="by its name, in place of code_gain and code_rate")
+    code_gain_db: Loss | None = Field(default=None, description="net, in power per information bit")
+    code_rate: Efficiency | None = Field(default=None, description="information bits per bit sent")
     bandwidth_hz: Bandwidth = Field(description="highest symbol rate, slot rate for ppm")
     background_power_w: PowerOrZero | None = Field(default=None, description="behind the filter, on the detector")
     background: Background | None = Field(default=None, description="in place of background_power")
@@ -210,6 +220,15 @@ class Receiver(Table):
         default=None, description="of the optical amplifier"
     )
     optical_bandwidth_hz: Bandwidth | None = Field(default=None, description="of the filter behind the amplifier")
+    polarisations: Annotated[int, Whole("", least=1, most=2)] | None = Field(
+        default=None, description="bpsk, qpsk: how many carry bits of their own; absent: 1"
+    )
+    phase_error_rad: Annotated[float, Quantity("rad", "deg", least=0.0, most=phase_error.LARGEST_RAD)] | None = Field(
+        default=None, description="bpsk, qpsk: rms, what the phase lock leaves in a symbol; absent: 0"
+    )
+    inter_symbol_loss_db: Loss | None = Field(
+        default=None, description="power that interference between symbols costs; absent: 0"
+    )
 
     def problems(self) -> Iterator[Problem]:
         """A detector that receives the modulation, and the keys of both and no others."""
@@ -225,10 +244,14 @@ class Receiver(Table):
             wanted["extinction_ratio"] = '"20 dB"'
             if self.detector == "preamplified":
                 wanted |= {"optical_bandwidth": '"20 GHz"', "amplifier_gain": '"35 dB"'}
-        if self.background is None and self.detector not in ("homodyne", "preamplified"):
+        if self.background is None and self.detector not in ("homodyne", "heterodyne", "preamplified"):
             wanted["background_power"] = '"0 pW"'
         instead = () if self.background is None else ("background_power",)
-        yield from self.choice_problems(what, wanted, ("background", *instead))
+        coherent = ("polarisations", "phase_error") if self.modulation in QUADRATURES else ()
+        free = ("background", *instead, *coherent, "inter_symbol_loss", "code", "code_gain", "code_rate")
+        yield from self.choice_problems(what, wanted, free)
+        yield from self._code_problems()
+        yield from self._phase_problems()
         if self.background is not None and self.background_power_w is not None:
             yield Problem("background_power", "stands beside the table background", "one of the two removed")
         if self.extinction_ratio_db is not None and self.extinction_ratio_db < _ALIKE_DB:
@@ -236,6 +259,70 @@ class Receiver(Table):
             yield Problem("extinction_ratio", reason, 'extinction_ratio = "20 dB" would do')
         if self.order is not None and self.order & (self.order - 1):
             yield Problem("order", "is no power of two", "order = 16 would do")
+
+    @property
+    def named_code(self) -> NamedCode | None:
+        """The code that is given by its name."""
+        return None if self.code is None else codes().get(self.code)
+
+    @property
+    def rate_of_code(self) -> float:
+        """Information bits per bit sent, of a code by its name or as given."""
+        code = self.named_code
+        return self.code_rate or 1.0 if code is None else code.rate
+
+    @property
+    def net_gain_db(self) -> float:
+        """Net gain of the code in dB; 0 of one whose threshold is a distance from capacity (`gap_db`)."""
+        code = self.named_code
+        if code is None:
+            return self.code_gain_db or 0.0
+        return 0.0 if code.gap_db is not None else code.net_gain_db(self.bit_error_ratio)
+
+    @property
+    def reaches_ratio(self) -> bool:
+        """Whether some power reaches the bit error ratio, whatever phase error is left."""
+        error, quadratures = self.phase_error_rad or 0.0, QUADRATURES.get(self.modulation)
+        return quadratures is None or phase_error.floor(error, quadratures) < self.bit_error_ratio
+
+    def _code_problems(self) -> Iterator[Problem]:
+        """A code said one way; by its name only where its source says what it needs here."""
+        if self.code is None:
+            for key, value, example in (
+                ("code_gain", self.code_gain_db, '"0 dB"'),
+                ("code_rate", self.code_rate, "1.0"),
+            ):
+                if value is None:
+                    yield Problem(key, "is missing, and so is code", f"{key} = {example} would do without a code")
+            return
+        for key, value in (("code_gain", self.code_gain_db), ("code_rate", self.code_rate)):
+            if value is not None:
+                yield Problem(key, "stands beside code, which has its own", "one of the two removed")
+        code = self.named_code
+        if code is None:
+            yield Problem("code", f'is "{self.code}", which is no code that is known here', nearest(self.code))
+        elif self.modulation not in code.modulations:
+            reason = f"is a code for {' and '.join(code.modulations)} ({code.source}), not for {self.modulation}"
+            yield Problem("code", reason, "another code, or code_gain and code_rate in its place")
+        elif not code.known:
+            reason = f"has no threshold that a source prints ({code.source})"
+            yield Problem("code", reason, f"code_gain as measured, with code_rate = {code.rate:.4g}, in its place")
+        elif not code.holds_at(self.bit_error_ratio):
+            least, most = code.ratios
+            reason = f'is {self.bit_error_ratio:g}, and code = "{code.name}" has its threshold printed for another'
+            at = f"{most:g}" if least else f"at most {most:g}"
+            yield Problem("bit_error_ratio", reason, f"bit_error_ratio {'= ' if least else ''}{at} ({code.source})")
+
+    def _phase_problems(self) -> Iterator[Problem]:
+        """A phase error with which some power reaches the bit error ratio."""
+        quadratures = QUADRATURES.get(self.modulation)
+        if quadratures is None or self.reaches_ratio:
+            return
+        most = phase_error.largest_rms_rad(self.bit_error_ratio, quadratures)
+        limit = format_quantity(most * (1.0 - 1e-3), "rad")
+        ratio = format_quantity(self.bit_error_ratio, "").rstrip()
+        reason = f'leaves no power that reaches bit_error_ratio = {ratio} with modulation = "{self.modulation}"'
+        yield Problem("phase_error", reason, f'at most "{limit}" rms, or another bit_error_ratio')
 
     def most_code_gain(self, data_rate_bit_s: float, wavelength_m: float) -> float:
         """Largest net gain that a code can have on this receiver, as a ratio of power (see `capacity`).
@@ -246,22 +333,70 @@ class Receiver(Table):
             data_rate_bit_s: Data rate, in bit/s; what is not above 0 counts as not given.
             wavelength_m: Wavelength of the light, in m.
         """
-        code = Code(self.code_rate, self.bit_error_ratio)
+        code, signalless = Code(self.rate_of_code, self.bit_error_ratio), self._counts(data_rate_bit_s, wavelength_m)
         if self.modulation == "ppm":
-            return code.ppm_counting()
-        if self.modulation == "bpsk":
-            return code.bpsk_homodyne()
+            return code.ppm_counting(self.order or 2, signalless)
+        if self.modulation in QUADRATURES:
+            return code.phases()
         if self.detector == "preamplified":
             return code.dpsk_preamplified() if self.modulation == "dpsk" else code.ook_preamplified()
         space = 2.0 / (10.0 ** (min(self.extinction_ratio_db or 0.0, 300.0) / 10.0) + 1.0)
         if self.detector != "photon-counting":
             excess = excess_noise_factor(self.avalanche_gain or 1.0, self.ionisation_ratio or 0.0)
             return code.ook_current(2.0 - space, space, excess)
+        return code.ook_counting(2.0 - space, space, signalless)
+
+    def _counts(self, data_rate_bit_s: float, wavelength_m: float) -> float | None:
+        """Counts without signal for each bit of information; None where they are not known."""
         light = self.background_power_w
         if light is None or not data_rate_bit_s > 0.0:
-            return code.ook_counting(2.0 - space, space)
+            return None
         counts = (self.efficiency or 0.0) * light * wavelength_m / (PLANCK_J_S * SPEED_OF_LIGHT_M_S)
-        return code.ook_counting(2.0 - space, space, (counts + (self.dark_count_rate_1_s or 0.0)) / data_rate_bit_s)
+        return (counts + (self.dark_count_rate_1_s or 0.0)) / data_rate_bit_s
+
+
+class Fading(Table):
+    """The code that goes through fades, and a series of received power in time; without one, simulated residuals."""
+
+    series: Name | None = Field(
+        default=None, description="file of the received power in time, seen from the mission file"
+    )
+    unit: Literal["linear", "dB"] | None = Field(default=None, description="linear: ratios or W; dB: 10 log10")
+    normalised: Literal["mean", "largest", "as-given"] | None = Field(
+        default=None, description="power of the series that the budget's received power is: its mean, its largest, or 1"
+    )
+    sampling_s: Annotated[float, Quantity("s", "us", above=0.0, most=1e4)] | None = Field(
+        default=None, description="time between two samples, where the file does not say it"
+    )
+    channel: Name | None = Field(default=None, description="of the power, where the file has several")
+    code: Literal["ccsds-k7-1-2"] = Field(description="ccsds-k7-1-2: convolutional, soft decisions, BPSK")
+    interleaving: Literal["none", "block", "convolutional"] = Field(
+        description="block: over blocks behind each other; convolutional: over a window that slides along"
+    )
+    interleaver_s: Annotated[float, Quantity("s", "ms", above=0.0, most=1e4)] | None = Field(
+        default=None, description="time over which neighbouring symbols are spread"
+    )
+    bit_error_ratio: Annotated[float, Share("", least=1e-18, below=0.5)] | None = Field(
+        default=None, description="behind the decoder; that of the table receiver where there is one"
+    )
+
+    def problems(self) -> Iterator[Problem]:
+        """A span exactly for an interleaver, and what a series needs exactly with one."""
+        if self.series is None:
+            for key, value in (("unit", self.unit), ("normalised", self.normalised), ("channel", self.channel)):
+                if value is not None:
+                    yield Problem(key, "stands without a series", "this line removed, or series with a file")
+            if self.sampling_s is not None:
+                yield Problem("sampling", "stands without a series", "this line removed, or series with a file")
+        for key, value, example in (("unit", self.unit, "linear"), ("normalised", self.normalised, "mean")):
+            if self.series is not None and value is None:
+                yield Problem(key, "is missing, and series needs it", f'{key} = "{example}" would do')
+        if self.interleaving == "none" and self.interleaver_s is not None:
+            advice = 'this line removed, or interleaving = "block"'
+            yield Problem("interleaver", 'does not belong to interleaving = "none"', advice)
+        if self.interleaving != "none" and self.interleaver_s is None:
+            reason = f'is missing, and interleaving = "{self.interleaving}" needs it'
+            yield Problem("interleaver", reason, 'interleaver = "10 ms" would do')
 
 
 class Communication(Beam):
@@ -280,6 +415,8 @@ class Communication(Beam):
         default=None, description="how long a code word, or what is interleaved with it, lasts"
     )
     beam: BeamShape | None = Field(default=None, description="absent: uniform, unobscured")
+    coupling: Coupling | None = Field(default=None, description="absent: all of the light on the detector")
+    fading: Fading | None = Field(default=None, description="received power in time, and a code that goes through it")
 
     def problems(self) -> Iterator[Problem]:
         """One receiver."""
@@ -291,14 +428,32 @@ class Communication(Beam):
             yield Problem("receiver_sensitivity", "stands beside the table receiver", "one of the two removed")
         if self.receiver is not None:
             yield from self._gain_problems(self.receiver)
+        if self.coupling is not None:
+            yield from self.coupling.wavefront_problems(self.wavelength_m)
+        if self.fading is not None:
+            yield from self._fading_problems(self.fading)
+
+    def _fading_problems(self, fading: Fading) -> Iterator[Problem]:
+        """One target, and light whose power is the decoder's signal over noise."""
+        receiver = self.receiver
+        if receiver is None and fading.bit_error_ratio is None:
+            reason = "is missing, and so is the table receiver, which has one"
+            yield Problem("fading.bit_error_ratio", reason, "bit_error_ratio = 1e-6 would do")
+        if receiver is not None and fading.bit_error_ratio is not None:
+            yield Problem("fading.bit_error_ratio", "stands beside that of the table receiver", "this line removed")
+        if receiver is not None and receiver.modulation != "bpsk":
+            reason = f'is of BPSK, and the receiver has modulation = "{receiver.modulation}"'
+            yield Problem("fading.code", reason, 'modulation = "bpsk", or a measured receiver_sensitivity')
 
     def _gain_problems(self, receiver: Receiver) -> Iterator[Problem]:
         """A code that needs no less power than the channel's capacity asks for."""
         if receiver.modulation == "ook" and (receiver.extinction_ratio_db or 0.0) < _ALIKE_DB:
             return  # the receiver says so
+        if receiver.code_gain_db is None:
+            return  # a named code is held against capacity by a test
         limit_db = 10.0 * math.log10(receiver.most_code_gain(self.data_rate_bit_s, self.wavelength_m))
         if receiver.code_gain_db > limit_db:
-            at = f"code_rate = {receiver.code_rate:g}"
+            at = f"code_rate = {receiver.rate_of_code:g}"
             ratio = format_quantity(receiver.bit_error_ratio, "").rstrip()
             reason = (
                 f"is more than any code can gain: {limit_db:.3g} dB at {at} and bit_error_ratio = {ratio}, where "

@@ -43,7 +43,9 @@ def satellites_table(plan: ConstellationPlan) -> Table:
         for k, name in enumerate(plan.satellites[:MOST_ROWS])
     ]
     headings = ("satellite", "sessions", "with data", "longest time without", "volume")
-    return Table("What each satellite gets", headings, rows, (0,), folded="What each satellite gets")
+    of, title = ("sessions", "with_data_s", "longest_gap_s", "volume_bit"), "What each satellite gets"
+    names = {place: f"constellation.satellites.x.{name}" for place, name in enumerate(of, 1)}
+    return Table(title, headings, rows, (0,), folded=title, names=names)
 
 
 def constellation_view(plan: ConstellationPlan) -> View:

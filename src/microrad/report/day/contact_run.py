@@ -71,7 +71,9 @@ def windows_table(run: ContactRun, quantile: float) -> Table:
         )
         for w in run.windows
     ]
-    return Table("", headings, rows, ())
+    of = ["start_s", "range_m", "point_ahead_rad", "rate_rad_s", "rms_rad", "quantile_rad", "largest_rad"]
+    of += ["lowest_margin_db", "share_below_0_db"]
+    return Table("", headings, rows, (), names={k: f"contact.windows.{name}" for k, name in enumerate(of)})
 
 
 def transitions_table(run: ContactRun) -> Table:

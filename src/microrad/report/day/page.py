@@ -1,11 +1,14 @@
 """What pages show of a day: its view in the page of a study, and a page of its own."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 from microrad.link.study import LinkStudy
+from microrad.mission.model import Source
 from microrad.orbit.day import DayStudy
 from microrad.report.day import words
 from microrad.report.day.tables import assumptions_table, contacts_table, ways_table
+from microrad.report.marks import marked
 from microrad.report.plotting.figure import Figure
 from microrad.report.view import Points, Verdict, View, opened, told, views_text
 
@@ -25,18 +28,20 @@ def day_page(day: DayStudy, links: LinkStudy) -> str:
 
     headline, *sentences = words.sentences(day)
     lead = Verdict(headline, good=day.relay.capacity_bit > 0.0)
-    views = (day_view(day, sentences, day_figures(day)), inputs_view(links.file.sources))
+    shown = marked([day_view(day, sentences, day_figures(day))], links.file.sources)
+    views = [*(each for each in shown if isinstance(each, View)), inputs_view(links.file.sources)]
     return mission_page(links.file, "contacts", [lead], views)
 
 
-def day_text(day: DayStudy, width: int) -> str:
+def day_text(day: DayStudy, width: int, sources: Mapping[str, Source] = MappingProxyType({})) -> str:
     """The day for a terminal: its answers, its warnings and its tables.
 
     Args:
         day: what the links deliver.
         width: columns of the terminal.
+        sources: of each value of the mission, by its dotted key, for the signs of its numbers.
     """
-    return views_text([day_view(day, words.sentences(day), ())], width)
+    return views_text(marked([day_view(day, words.sentences(day), ())], sources), width)
 
 
 def day_view(

@@ -37,7 +37,11 @@ def contacts_table(day: DayStudy) -> Table:
             if isinstance(c, Pass)
         ]
     found = [row for _, row in sorted(rows, key=lambda item: item[0])]
-    return Table("Contacts", CONTACT_COLUMNS, found, (0, 10), brief=(0, 1, 2, 3, 9, 10), folded="Every contact")
+    of = ["start_s", "end_s", "duration_s", "range_most_m", "point_ahead_most_rad", "line_of_sight_rate_most_rad_s"]
+    of += ["doppler_most_hz", "highest_elevation_rad", "could_carry_bit"]
+    names = {place: f"day.contacts.{name}" for place, name in enumerate(of, 1)}
+    brief = (0, 1, 2, 3, 9, 10)
+    return Table("Contacts", CONTACT_COLUMNS, found, (0, 10), brief=brief, folded="Every contact", names=names)
 
 
 def _row(day: DayStudy, partner: str, c: Contact, between: tuple[str, ...], bit: float) -> tuple[str, ...]:
@@ -80,9 +84,15 @@ def ways_table(day: DayStudy) -> Table:
         ("latency of what is kept, median", *(duration(w.median_s) for w in ways)),
         ("latency of what is kept, 99 %", *(duration(w.slow_s) for w in ways)),
     ]
+    of = ["contacts", "contact_s", "longest_gap_s", "could_carry_bit", "contacts_without_acquisition"]
+    of += ["generated_bit", "lost_bit", "", "on_board_at_end_bit", "arrived_bit", "latency_median_s"]
+    of.append("latency_99_percent_s")
+    names = {
+        place: [f"day.{way}.{name}" if name else "" for name in of] for place, way in enumerate(("relay", "direct"), 1)
+    }
     carried = " and ".join(f"{volume(w.capacity_bit)} by {w.name}" for w in ways)
     folded = f"What the ways could carry: {carried}; line by line"
-    return Table("Relay and direct downlink", ("", *(w.name for w in ways)), rows, (0,), folded=folded)
+    return Table("Relay and direct downlink", ("", *(w.name for w in ways)), rows, (0,), folded=folded, names=names)
 
 
 def assumptions_table(day: DayStudy) -> Table:
@@ -94,9 +104,10 @@ def assumptions_table(day: DayStudy) -> Table:
         if text != NOTHING
     ]
     headings = ("assumption", "changed to", "relay", "direct", "ratio", "99 % by\nrelay", "99 %\ndirect")
-    return Table(
-        "One assumption changed", headings, rows, (0, 1), folded="One assumption changed, all others as they are"
-    )
+    of = ("relay_could_carry_bit", "direct_could_carry_bit", "", "relay_latency_99_percent_s")
+    names = {place: f"day.{name}" if name else "" for place, name in enumerate((*of, "direct_latency_99_percent_s"), 2)}
+    folded = "One assumption changed, all others as they are"
+    return Table("One assumption changed", headings, rows, (0, 1), folded=folded, names=names)
 
 
 def _numbers(n: Numbers, direct: bool) -> tuple[str, ...]:

@@ -101,6 +101,7 @@ def residuals_view(fine: FinePointingStudy, required_rad: float) -> View:
         rows,
         groups=(("", 1), ("theory", 1), *((words.NAMES[v], 3) for v in variants)),
         best=_best(fine, [v.design.name for v in fine.verified]),
+        names={1: "fine_pointing.theory_rms_rad"} | _simulated_names(variants),
     )
     met = limits(fine)
     shares = "Limits met, as a share of control samples (saturation, lost spot, the inverse's rate) or plant steps:"
@@ -120,6 +121,13 @@ def residuals_view(fine: FinePointingStudy, required_rad: float) -> View:
             Points(met),
         ),
     )
+
+
+def _simulated_names(variants: Sequence[str]) -> dict[int, str]:
+    """What the columns of each variant of the mirror are in the JSON."""
+    of = "rms_rad", "quantile_rad", "largest_rad"
+    named = [f"fine_pointing.simulated.{variant}.{name}" for variant in variants for name in of]
+    return dict(enumerate(named, 2))
 
 
 def _simulated(residual: Residual | None, required_rad: float) -> tuple[str | Cell, ...]:
@@ -181,7 +189,9 @@ def designs(
     filled = [i for i in range(len(headings)) if any(row[i] for row in rows)]
     if headings.index("crossover (Hz)") in filled:  # a loop of several axes has none, and no delay margin
         said += " Crossover: highest frequency at which the loop gain does."
-    table = Table("", headings, rows, (0, 1 + len(between), len(headings) - 1), best=best)
+    of = "modulus", "gain_up_db", "phase_rad", "delay_s", "disk", "bandwidth_hz", "crossover_hz"
+    names = {place: f"controllers.margins.{name}" for place, name in enumerate(of, 2 + len(between))}
+    table = Table("", headings, rows, (0, 1 + len(between), len(headings) - 1), best=best, names=names)
     return about, table.columns(filled), Soft(said)
 
 
@@ -224,7 +234,9 @@ def sources_view(fine: FinePointingStudy) -> View:
         left = [micro(by_source.get(name, math.nan)) for name in names]
         rows.append([v.design.name, *left, micro(v.theory.radial_rms_rad)])
     best = _best(fine, [row[0] for row in rows])
-    table = Table("", ("controller", *map(words.source_name, names), "all"), rows, (0,), best=best)
+    of = dict.fromkeys(range(1, len(names) + 1), "fine_pointing.theory_rms_by_source_rad.x")
+    of[len(names) + 1] = "fine_pointing.theory_rms_rad"
+    table = Table("", ("controller", *map(words.source_name, names), "all"), rows, (0,), best=best, names=of)
     said = "Radial rms in theory (µrad) that each source leaves behind the loop by itself."
     return View("Controllers against disturbances", (said, table), folded=True)
 
@@ -255,14 +267,17 @@ def budget_view(fine: FinePointingStudy) -> View:
         "theory, rms (µrad)",
         "share of variance",
     )
+    simulated = [*["error_budget.parts.x.rms_rad"] * len(parts), "error_budget.combined_rms_rad"]
+    simulated += ["error_budget.together_without_hysteresis_rms_rad", "error_budget.full_rms_rad"]
+    in_theory = "error_budget.parts.x.theory_rms_rad"
     left_out = [(d.name, micro(d.with_rad), micro(d.without_rad), micro(d.added_rad)) for d in b.differences]
     effects = ("left out of the full loop", "rms with it (µrad)", "without it (µrad)", "it adds (µrad)")
     return View(
         f"Error budget of {b.controller}",
         (
             " ".join(budget_sentences(fine)),
-            Table("", headings, [*parts, *totals], totals=len(totals)),
-            Table("", effects, left_out),
+            Table("", headings, [*parts, *totals], totals=len(totals), names={1: simulated, 2: in_theory}),
+            Table("", effects, left_out, names=dict.fromkeys((1, 2, 3), "error_budget.parts.x.rms_rad")),
             Soft("Added is the root of the difference of the squares; it is negative where the part helps."),
         ),
         "error-budget-parts",
@@ -305,8 +320,15 @@ def stroke_view(fine: FinePointingStudy) -> View:
     sums = [[name, *map(show, axes)] for name, show in _stroke_rows(axes[0].travel_angle)]
     named = [(f"{name}{' (this mission)' if several is ours else ''}", len(several)) for name, several in groups]
     heading = "half range (µrad)\npairs: worst case / root sum square"
+    of = [*[f"stroke.lines_rad.{line.name}" for line in axes[0].lines], "stroke.total_rad", "stroke.needed_rad"]
+    of += ["stroke.available_rad", "stroke.margin_rad", "", "stroke.largest_magnification"]
     table = Table(
-        "", (heading, *(axis.name for axis in axes)), [*rows, *sums], groups=(("", 1), *named), totals=len(sums)
+        "",
+        (heading, *(axis.name for axis in axes)),
+        [*rows, *sums],
+        groups=(("", 1), *named),
+        totals=len(sums),
+        names=dict.fromkeys(range(1, len(axes) + 1), of),
     )
     notes = [f"{line.name}: {line.basis.partition(';')[0]}. {line.source}" for line in axes[0].lines]
     square = (
@@ -359,6 +381,7 @@ def sines_view(fine: FinePointingStudy, required_rad: float) -> View | None:
     names = list(dict.fromkeys(s.controller for s in fine.sines))
     rows = [[name, *(_sine(found.get((name, *column)), required_rad) for column in columns)] for name in names]
     headings = ("controller", *(f"{freq:g} Hz" for _, freq in columns))
+    of = dict.fromkeys(range(1, len(headings)), "fine_pointing.sines.rms_rad")
     amplitude, time = given_angle(fine.scene.sine_amplitude_rad), share_of_time(fine.quantile)
     return View(
         "The paper's sines under vibration and noise",
@@ -366,7 +389,7 @@ def sines_view(fine: FinePointingStudy, required_rad: float) -> View | None:
             f"Fig. 6 and 8 again: a {amplitude} sine on axis x with vibration and sensor noise on both axes. Body "
             "pointing and point-ahead are left out: the stroke would not hold them beside it. Radial error in µrad: "
             f"rms / {time}. {words.tracked(fine, required_rad)}",
-            Table("", headings, rows, groups=(("", 1), *groups), best=_best(fine, names)),
+            Table("", headings, rows, groups=(("", 1), *groups), best=_best(fine, names), names=of),
         ),
         folded=True,
     )

@@ -6,16 +6,21 @@ from dataclasses import asdict
 from typing import Any
 
 from microrad.link.pointing.code_words import LostWords
+from microrad.link.pointing.coded_residual import CodedResidual
 from microrad.loop.disturbance.windows import ErrorIndex
 from microrad.loop.pointing_loop.simulated_windows import SimulatedErrors
 from microrad.report.fine_pointing.windows import index_text
-from microrad.report.quantities import micro, percent, quantity
+from microrad.report.quantities import micro, percent, power_text, quantity
 from microrad.report.tables import Table
 from microrad.report.view import Block, Points, View
 
 
 def simulated_view(
-    errors: Sequence[SimulatedErrors], lost: LostWords | None, runs: int, left_out: Sequence[ErrorIndex] = ()
+    errors: Sequence[SimulatedErrors],
+    lost: LostWords | None,
+    runs: int,
+    left_out: Sequence[ErrorIndex] = (),
+    coded: CodedResidual | None = None,
 ) -> View:
     """The indices of runs beside those of linear theory, and the code words that they lose, with their intervals.
 
@@ -24,6 +29,7 @@ def simulated_view(
         lost: What is lost; None where the mission has no code word.
         runs: How many runs there were.
         left_out: What does not fit into a run.
+        coded: The coded link; None where the mission has no code with a known error rate.
     """
     rows = [
         (
@@ -41,7 +47,26 @@ def simulated_view(
     )
     longer = f"Longer than a run behind its settling, and left out: {', '.join(map(index_text, left_out))}."
     blocks: list[Block] = [table, Points([about, *([longer] if left_out else [])])]
-    return View(table.title, blocks if lost is None else [*blocks, *_lost(lost)])
+    blocks += [] if lost is None else _lost(lost)
+    return View(table.title, blocks if coded is None else [*blocks, *_coded(coded)])
+
+
+def _coded(c: CodedResidual) -> list[Block]:
+    spread = "without an interleaver"
+    if c.interleaving != "none":
+        spread = f"with a {c.interleaving} interleaver over {quantity(c.span_s, 's')}"
+    beyond = math.isinf(c.penalty_db)
+    interval = "unknown" if math.isinf(c.ratio.high) else f"{power_text(c.ratio.low)} to {power_text(c.ratio.high)}"
+    rows = [
+        ("mean bit error ratio", power_text(c.ratio.value), interval),
+        ("power that pointing costs", "beyond 20 dB" if beyond else quantity(c.penalty_db, "dB"), ""),
+    ]
+    about = (
+        f"{c.code}, BPSK with soft decisions, {spread}, at {quantity(c.on_axis_db, 'dB')} more on the axis than the "
+        f"code needs at constant power; the cost brings the mean back to {power_text(c.target)}. Power falls with each "
+        "simulated error as that of a Gaussian beam, and stands still over a control sample."
+    )
+    return [Table("Coded link, simulated", ("of the coded link", "value", "99 % interval"), rows), Points([about])]
 
 
 def _lost(lost: LostWords) -> list[Block]:
@@ -58,7 +83,11 @@ def _lost(lost: LostWords) -> list[Block]:
 
 
 def simulated_data(
-    errors: Sequence[SimulatedErrors], lost: LostWords | None, runs: int, left_out: Sequence[ErrorIndex] = ()
+    errors: Sequence[SimulatedErrors],
+    lost: LostWords | None,
+    runs: int,
+    left_out: Sequence[ErrorIndex] = (),
+    coded: CodedResidual | None = None,
 ) -> dict[str, Any]:
     """The same as data: rms in rad, the interval as its half width, None where it is not known.
 
@@ -67,9 +96,15 @@ def simulated_data(
         lost: What is lost; None where the mission has no code word.
         runs: How many runs there were.
         left_out: What does not fit into a run.
+        coded: The coded link; None where the mission has no code with a known error rate.
     """
-    found = {"runs": runs, "indices": _indices(errors), "left_out": [index_text(each) for each in left_out]}
-    return found if lost is None else {**found, "code_words": asdict(lost)}
+    found: dict[str, Any] = {
+        "runs": runs,
+        "indices": _indices(errors),
+        "left_out": [index_text(each) for each in left_out],
+    }
+    found |= {} if lost is None else {"code_words": asdict(lost)}
+    return found if coded is None else {**found, "coded": asdict(coded)}
 
 
 def _indices(errors: Sequence[SimulatedErrors]) -> list[dict[str, Any]]:

@@ -7,17 +7,22 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from microrad.core.budget import Line
+from microrad.link.compliance import Compliance
 from microrad.link.requirement import of_links
 from microrad.link.study import LinkStudy, Solution
 from microrad.mission.model import source_text
 from microrad.orbit.operations import spreadsheet_text
 from microrad.report.links import words
+from microrad.report.links.standard import short_view, standard_rows, standard_view
 from microrad.report.links.views import budget_table, links_views
+from microrad.report.marks import marked
 from microrad.report.requirements import first_warning, requirement_table
 from microrad.report.view import Block, Soft, views_text
 
 UNDER_JITTER = "Communication under jitter"
 """The lines of what the jitter does to the communication link, beside its budget."""
+UNDER_FADES = "Communication under fades"
+"""The lines of what a series of received power does to the communication link."""
 SOLVED = "Solved"
 """The values of a key that leave the required margin, ahead of the budgets."""
 COLUMNS = ("budget", "line", "value", "unit", "basis", "source", "holds for", "warning")
@@ -41,7 +46,8 @@ def jitter_lines(study: LinkStudy) -> list[Line]:
     p = study.under_jitter
     if p is None:
         return []
-    source = source_text(study.file.sources, "jitter.bias", "jitter.rms", "requirement.outage")
+    table = "communication.coupling.jitter" if study.data.jitter is None else "jitter"
+    source = source_text(study.file.sources, f"{table}.bias", f"{table}.rms", "requirement.outage")
     regime, known = "Gaussian errors about the bias, two axes", math.isfinite(p.uncoded_penalty_db)
     back = "power that brings the mean bit error ratio back to its target"
     rows = [
@@ -55,12 +61,34 @@ def jitter_lines(study: LinkStudy) -> list[Line]:
     return [replace(found[0], warning=doubt), *found[1:]]
 
 
-def links_csv(study: LinkStudy, solution: Solution | None = None) -> str:
+def fading_lines(study: LinkStudy) -> list[Line]:
+    """What a series of received power does to the coded link, beside its budget."""
+    f = study.fading
+    if f is None:
+        return []
+    source = source_text(study.file.sources, "communication.fading.series")
+    regime = "BPSK, soft decisions, known channel"
+    rows = [
+        ("Mean bit error ratio", f.ratio.value, "", f"{f.code} over {f.source}"),
+        ("Windows above the target", f.lost.value, "", "share of the windows"),
+        (
+            "Penalty of the fades",
+            0.0 - f.penalty_db,
+            "dB",
+            "power that brings the mean bit error ratio back to its target",
+        ),
+        ("Margin under the fades", f.margin_left_db, "dB", "static margin less the penalty"),
+    ]
+    return [Line(*row, source, regime) for row in rows if math.isfinite(row[1])]
+
+
+def links_csv(study: LinkStudy, solution: Solution | None = None, against: Compliance | None = None) -> str:
     """Every line with its value in full, for a spreadsheet, behind the values of a key that were solved for.
 
     Args:
         study: the links, at their budgeted errors or under their jitter.
         solution: the values of a key that leave the required margin, if one was solved for.
+        against: a standard with what the links have of it, which stands last.
     """
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
@@ -68,14 +96,23 @@ def links_csv(study: LinkStudy, solution: Solution | None = None) -> str:
     for solved in [] if solution is None else _solution_rows(solution):
         writer.writerow([SOLVED, *solved, "", "", ""])
     jitter = [(UNDER_JITTER, line) for line in jitter_lines(study)]
-    for name, line in (*lines(study), *jitter):
+    fades = [(UNDER_FADES, line) for line in fading_lines(study)]
+    for name, line in (*lines(study), *jitter, *fades):
         value = repr(float(line.value))  # every digit, as JSON has it
         texts = map(spreadsheet_text, (line.basis, line.source, line.regime, line.warning))
         writer.writerow([name, spreadsheet_text(line.name), value, line.unit, *texts])
+    for name, subject, value, unit, *rest in [] if against is None else standard_rows(against):
+        writer.writerow([name, subject, value, unit, *map(spreadsheet_text, rest)])
     return buffer.getvalue().rstrip("\n")
 
 
-def links_text(study: LinkStudy, width: int, verbose: bool = False, solution: Solution | None = None) -> str:
+def links_text(
+    study: LinkStudy,
+    width: int,
+    verbose: bool = False,
+    solution: Solution | None = None,
+    against: Compliance | None = None,
+) -> str:
     """The verdict with a line for each requirement, what limits it, and the budgets, for a terminal.
 
     Args:
@@ -83,6 +120,7 @@ def links_text(study: LinkStudy, width: int, verbose: bool = False, solution: So
         width: columns of the terminal.
         verbose: adds where each line comes from and holds, the other tables, every sentence and every warning.
         solution: the values of a key that leave the required margin, which stand first.
+        against: a standard with what the links have of it, which stands last.
     """
     below = (
         [*words.consequences(study), first_warning(study.warnings)] if verbose else []
@@ -90,9 +128,13 @@ def links_text(study: LinkStudy, width: int, verbose: bool = False, solution: So
     limits = [sentence for sentence in words.short(study) if sentence not in below]
     blocks: list[Block] = [] if solution is None else [Soft(words.solution_text(solution))]
     blocks += [words.verdict(study), requirement_table(of_links(study)), *limits]
-    if not verbose:
-        return views_text([*blocks, *(budget_table(b).columns((0, 1, 2)) for b in study.budgets)], width)
-    return views_text([*blocks, *links_views(study)], width)
+    if verbose:
+        blocks += links_views(study)
+    else:
+        blocks += [budget_table(b).columns((0, 1, 2)) for b in study.budgets]
+    if against is not None:
+        blocks.append(standard_view(against) if verbose else short_view(against))
+    return views_text(marked(blocks, study.file.sources), width)
 
 
 def _solution_rows(s: Solution) -> Iterator[tuple[str, str, str, str]]:

@@ -1,29 +1,37 @@
 """The links as plain data, in SI units with the unit in each key."""
 
+import math
 from dataclasses import asdict
 from typing import Any
 
 from microrad.core.budget import Line
 from microrad.link import Swing
 from microrad.link.acquisition.partner_search import Finding, Found, Tracking
+from microrad.link.compliance import Compliance
+from microrad.link.fade_series.coded import CodedFading
 from microrad.link.pointing import OpenLoopPointing
 from microrad.link.pointing.outage import Performance
 from microrad.link.requirement import met, of_links
 from microrad.link.study import LinkStudy, Solution
 from microrad.report.data import fields
+from microrad.report.links.standard import standard_data
+from microrad.report.marks import with_marks
 from microrad.report.requirements import requirement_data
 
 
-def links_data(study: LinkStudy, solution: Solution | None = None) -> dict[str, Any]:
+def links_data(study: LinkStudy, solution: Solution | None = None, against: Compliance | None = None) -> dict[str, Any]:
     """The verdict on the links, their budgets and what follows from them, after the values that were solved for.
 
     Args:
         study: the links, at their budgeted errors or under their jitter.
         solution: the values of a key that leave the required margin, if one was solved for.
+        against: a standard with what the links have of it, if one was asked for.
     """
     judged = [requirement_data(r) for r in of_links(study)]
     solved = {} if solution is None else {"solved": _solution_data(solution)}
-    return {"closes": study.closes, "met": met(study), "requirements": judged, **solved, **budgets_data(study)}
+    found = {"closes": study.closes, "met": met(study), "requirements": judged, **solved, **budgets_data(study)}
+    found |= {} if against is None else {"standard": standard_data(against)}
+    return with_marks(found, study.file.sources)
 
 
 def _solution_data(s: Solution) -> dict[str, Any]:
@@ -61,7 +69,28 @@ def budgets_data(study: LinkStudy) -> dict[str, Any]:
         "tracking": None if study.tracking is None else _tracking(study.tracking),
         "acquisition": None if study.finding is None else finding_data(study.finding),
         "under_jitter": None if study.under_jitter is None else performance_data(study.under_jitter),
+        **({} if study.fading is None else {"fading": fading_data(study.fading)}),
         "warnings": list(study.warnings),
+    }
+
+
+def fading_data(f: CodedFading) -> dict[str, Any]:
+    """The coded link under a series of received power; a cost that no power makes up for is none."""
+    return {
+        **fields(f, "code", "source", "target", "interleaving", "span_s", "window_s", "words"),
+        "bit_error_ratio": f.ratio.value,
+        "bit_error_ratio_interval": [f.ratio.low, f.ratio.high],
+        "lost": f.lost.value,
+        "lost_interval": [f.lost.low, f.lost.high],
+        "penalty_db": f.penalty_db,
+        "static_margin_db": f.margin_db,
+        "margin_db": f.margin_left_db,
+        "fades": {
+            "level_db": 10.0 * math.log10(f.fades.level),
+            "per_s": f.fades.per_second,
+            **fields(f.fades, "share", "mean_s", "median_s", "ninetieth_s", "longest_s", "unresolved"),
+        },
+        "curve": {"span_s": list(f.curve.span_s), "penalty_db": list(f.curve.penalty_db)},
     }
 
 

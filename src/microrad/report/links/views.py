@@ -3,29 +3,31 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from microrad.core.budget import Line
+from microrad.core.intervals import Interval
 from microrad.core.units import format_quantity
 from microrad.link import LinkBudget
-from microrad.link.acquisition.partner_search import LONGEST_LOOK_S, Finding, Found, Scanned
+from microrad.link.acquisition.partner_search import EARLY, LONGEST_LOOK_S, Finding, Found, Scanned
+from microrad.link.compliance import Compliance
+from microrad.link.fade_series.coded import CodedFading
 from microrad.link.pointing import OpenLoopPointing
 from microrad.link.pointing.outage import Performance, stated_outage
 from microrad.link.requirement import met, of_links
 from microrad.link.study import LinkStudy, Solution
 from microrad.report.links import words
+from microrad.report.links.standard import standard_view
+from microrad.report.marks import marked
 from microrad.report.plotting.figure import Figure
-from microrad.report.quantities import given_angle, minus, quantity
+from microrad.report.quantities import given_angle, minus, percent, power_text, quantity
 from microrad.report.requirements import derived_words, requirement_table
 from microrad.report.tables import Cell, Table
 from microrad.report.view import Block, Points, Soft, Verdict, View, opened, told
 
 if TYPE_CHECKING:
     from microrad.study.pointing_penalty import Cost, LinkPerformance
-
-EARLY = 0.9
-"""Share of the acquisitions that end in lock by the time that the table states."""
 
 RAREST_FADE_HZ = 1.0 / (365.25 * 86400.0)
 """Fades rarer than one in a year are not counted."""
@@ -34,21 +36,25 @@ _LINES = ("line", "value", "basis", "source", "holds for")
 _NO_VALUE = "\u2013"
 
 
-def links_page(study: LinkStudy, solution: Solution | None = None) -> str:
+def links_page(study: LinkStudy, solution: Solution | None = None, against: Compliance | None = None) -> str:
     """The budgets as one page that loads nothing, with their figures and no drawing library: their numbers stand below.
 
     Args:
         study: the links, at their budgeted errors or under their jitter.
         solution: the values of a key that leave the required margin, if one was solved for.
+        against: a standard with what the links have of it, if one was asked for.
     """
     from microrad.report.links.figures import link_figures
     from microrad.report.page.templates import inputs_view, mission_page
 
     judged = of_links(study)
     said = [] if solution is None else [words.solution_text(solution)]
-    views = (*links_views(study, [figure.static for figure in link_figures(study)]), inputs_view(study.file.sources))
     lead = Verdict(words.verdict(study), told(requirement_table(judged), derived_words(judged), *said), met(study))
-    return mission_page(study.file, "budget", [lead], views, data="below")
+    blocks: list[Block] = [lead, *links_views(study, [figure.static for figure in link_figures(study)])]
+    blocks += [] if against is None else [standard_view(against)]
+    first, *views = marked(blocks, study.file.sources)
+    shown = [*(each for each in views if isinstance(each, View)), inputs_view(study.file.sources)]
+    return mission_page(study.file, "budget", [first], shown, data="below")
 
 
 def links_views(
@@ -71,7 +77,8 @@ def links_views(
         outage, said = stated_outage(study.data.requirement), words.under_jitter_sentence(under, study)
         performance = performance_view((under,), (), outage, [said])
     budgets = budgets or budgets_view(study, [budget_table(b) for b in study.budgets], figures)
-    return told(pointing_view(study.open_loop), budgets, performance, acquisition_view(study.finding, figures))  # type: ignore[return-value]
+    fading = fading_view(study.fading)
+    return told(pointing_view(study.open_loop), budgets, performance, fading, acquisition_view(study.finding, figures))  # type: ignore[return-value]
 
 
 # ------------------------------------------------------------------------------------------------------------ pointing
@@ -94,6 +101,7 @@ def pointing_view(p: OpenLoopPointing | None) -> View | None:
         rows,
         (0, words_from, words_from + 1),
         brief=(0, 1, 2, 3, 5, 6) if largest else (),  # without what ECSS leaves
+        names={1: line_names("pointing", p.lines), 3: "pointing.left_for_each.x.largest_rad" if largest else ""},
     )
     sums = "; ".join(f"{each.name} {quantity(each.total_rad, 'rad')}" for each in p.summations)
     beside = [] if half is None else ["beacon's half angle"]
@@ -106,6 +114,7 @@ def pointing_view(p: OpenLoopPointing | None) -> View | None:
         ],
         (0, *range(2, 6 + len(beside))),
         folded=f"Totals at {100 * p.confidence:g} %: {sums}",
+        names={1: "pointing.totals.x.total_rad"},
     )
     note = (
         ""
@@ -146,18 +155,32 @@ def coverage(p: OpenLoopPointing) -> list[str]:
 
 
 # ------------------------------------------------------------------------------------------------------------- budgets
-def lines_table(title: str, lines: Sequence[Line], totals: Sequence[Line] = ()) -> Table:
+def lines_table(title: str, lines: Sequence[Line], totals: Sequence[Line] = (), names: Sequence[str] = ()) -> Table:
     """Lines of a budget with its sums; a page shows the sums, and the lines when it is asked.
 
     Args:
         title: what a page shows in place of the folded lines, before the sums.
         lines: the lines.
         totals: their sums.
+        names: dotted ones of all of these in the JSON.
     """
     sums = "; ".join(f"{line.name.lower()} {quantity(line.value, line.unit)}" for line in totals)
     rows = [_row(line) for line in (*lines, *totals)]
     folded = f"{title}: {sums}" if sums else title
-    return Table(title, _LINES, rows, (0, 2, 3, 4), totals=len(totals), folded=folded)
+    named = {1: names} if names else {}
+    return Table(title, _LINES, rows, (0, 2, 3, 4), totals=len(totals), folded=folded, names=named)
+
+
+def line_names(name: str, lines: Sequence[Line], totals: Sequence[Line] = ()) -> list[str]:
+    """The dotted names of lines and their sums in the JSON.
+
+    Args:
+        name: dotted, of the record that has both.
+        lines: the lines.
+        totals: their sums.
+    """
+    named = (("lines", lines), ("totals", totals))
+    return [f"{name}.{of}.{line.name}.value" for of, several in named for line in several]
 
 
 def _row(line: Line) -> tuple[str | Cell, ...]:
@@ -167,7 +190,11 @@ def _row(line: Line) -> tuple[str | Cell, ...]:
 
 def budget_table(budget: LinkBudget) -> Table:
     """A budget line by line."""
-    return lines_table(budget.name, budget.lines, budget.totals)
+    return lines_table(budget.name, budget.lines, budget.totals, _names(budget))
+
+
+def _names(budget: LinkBudget) -> list[str]:
+    return line_names(f"budgets.{budget.name}", budget.lines, budget.totals)
 
 
 def paired_tables(budget: LinkBudget, other: LinkBudget, headings: tuple[str, str]) -> tuple[Table, ...]:
@@ -183,7 +210,7 @@ def paired_tables(budget: LinkBudget, other: LinkBudget, headings: tuple[str, st
     """
     if [line.name for line in budget.lines] != [line.name for line in other.lines]:
         named = zip((budget, other), headings, strict=True)
-        return tuple(lines_table(f"{b.name}, {heading}", b.lines, b.totals) for b, heading in named)
+        return tuple(lines_table(f"{b.name}, {heading}", b.lines, b.totals, _names(b)) for b, heading in named)
     own, others = ({line.name: line for line in b.totals} for b in (budget, other))
     names = dict.fromkeys((*own, *others))
     sums = [_paired(own.get(name), others.get(name), headings) for name in names]
@@ -192,7 +219,10 @@ def paired_tables(budget: LinkBudget, other: LinkBudget, headings: tuple[str, st
         f"{quantity(b.margin_db, 'dB')} {heading}" for b, heading in zip((budget, other), headings, strict=True)
     )
     columns, folded = ("line", *headings, *_LINES[2:]), f"{budget.name}: margin {margins}"
-    return (Table(budget.name, columns, rows, (0, 3, 4, 5), totals=len(sums), folded=folded),)
+    lines = line_names(f"budgets.{budget.name}", budget.lines)
+    lines += [f"budgets.{budget.name}.totals.{name}.value" for name in names]
+    of = {1: lines, 2: lines}
+    return (Table(budget.name, columns, rows, (0, 3, 4, 5), totals=len(sums), folded=folded, names=of),)
 
 
 def _paired(one: Line | None, two: Line | None, headings: tuple[str, str]) -> tuple[str | Cell, ...]:
@@ -234,10 +264,17 @@ def budgets_view(
     noise, light = study.receiver_noise, study.tracking
     tables = [*tables]
     if noise:
-        tables.append(lines_table("Noise of the communication receiver, at the received power", noise))
+        tables.append(
+            lines_table(
+                "Noise of the communication receiver, at the received power",
+                noise,
+                names=line_names("receiver_noise", noise),
+            )
+        )
     if light is not None and light.noise_equivalent_angle is not None:
         name = "The answer's light on the tracking sensor"
-        tables.append(lines_table(name, light.noise_lines, [light.noise_equivalent_angle]))
+        named = [*line_names("tracking", light.noise_lines), "tracking.noise_equivalent_angle_rad"]
+        tables.append(lines_table(name, light.noise_lines, [light.noise_equivalent_angle], named))
     below: tuple[Block, ...] = (warned,) if warned else ("Marked \u201c!\u201d in the tables:", Points(study.warnings))
     moving = [f for f in figures if f.name.startswith("tornado")]
     said = Points([*words.consequences(study), *sentences])
@@ -245,6 +282,65 @@ def budgets_view(
         "Link budgets",
         told(*tables, *(below if study.warnings else ()), said, *opened(moving, [f.name for f in moving[:1]]), *more),
     )
+
+
+# -------------------------------------------------------------------------------------------------------------- fading
+def fading_view(f: CodedFading | None) -> View | None:
+    """The coded link under a series of received power, with what the span of an interleaver changes."""
+    if f is None:
+        return None
+    rows = [
+        ("mean bit error ratio", power_text(f.ratio.value), interval_words(f.ratio)),
+        ("windows above the target", percent(f.lost.value), interval_words(f.lost, percent)),
+        ("power that the fades cost", cost_text(f.penalty_db), f"brings the mean back to {power_text(f.target)}"),
+        ("margin under the fades", cost_text(f.margin_left_db), f"of {quantity(f.margin_db, 'dB')} at constant power"),
+    ]
+    names = ("fading.bit_error_ratio", "fading.lost", "fading.penalty_db", "fading.margin_db")
+    found = Table("", ("under the fades", "value", "how it is known"), rows, (0, 2), names={1: names})
+    fades = Table(
+        f"Fades below {quantity(10.0 * math.log10(f.fades.level), 'dB')}, where the code is at its target",
+        ("share of the time", "a second", "mean", "median", "90 %", "longest"),
+        [
+            (
+                percent(f.fades.share),
+                quantity(f.fades.per_second, "Hz"),
+                *(quantity(each, "s") if math.isfinite(each) else _NO_VALUE for each in _durations(f)),
+            )
+        ],
+        names={k: f"fading.fades.{name}" for k, name in enumerate(_FADES)},
+    )
+    spans = zip(f.curve.span_s, f.curve.penalty_db, strict=True)
+    curve = Table(
+        "What an interleaver brings",
+        ("span", "power that the fades cost"),
+        [(quantity(span, "s") if span else "none", cost_text(cost)) for span, cost in spans],
+        names={1: "fading.curve.penalty_db"},
+    )
+    return View("Coded link under fades", (words.under_fades(f), found, fades, curve, Soft(words.fading_note(f))))
+
+
+_FADES = ("share", "per_s", "mean_s", "median_s", "ninetieth_s", "longest_s")
+
+
+def _durations(f: CodedFading) -> tuple[float, ...]:
+    return f.fades.mean_s, f.fades.median_s, f.fades.ninetieth_s, f.fades.longest_s
+
+
+def interval_words(found: Interval, text: Callable[[float], str] = power_text) -> str:
+    """The interval of a mean over a series, in words.
+
+    Args:
+        found: the mean with its interval.
+        text: makes text of a number.
+    """
+    if not math.isfinite(found.high):
+        return "the series is too short for an interval"
+    return f"{text(found.low)} to {text(found.high)} with 99 % confidence, between parts of the series"
+
+
+def cost_text(cost_db: float) -> str:
+    """Decibels, or that no power will do."""
+    return quantity(cost_db, "dB") if math.isfinite(cost_db) else "beyond any power" if cost_db > 0.0 else "none"
 
 
 # --------------------------------------------------------------------------------------------------------- performance
@@ -269,6 +365,15 @@ def performance_view(
             *fade_sentences(cases),
         ),
     )
+
+
+_PERFORMANCE = (
+    *("performance.rms_rad", "performance.mean_loss_db", "performance.outage_loss_db"),
+    *("performance.uncoded_penalty_db", "performance.margin_db", "performance.outage"),
+    *("performance.below_required_margin", "performance.best_half_angle_rad", "performance.lost_against_best_db"),
+    *("performance.data_rate_bit_s", "hysteresis_costs.margin_change_db", "hysteresis_costs.data_rate_change_bit_s"),
+)
+"""Names of the numbers of a row in the JSON."""
 
 
 def performance_table(cases: Sequence[Performance], costs: Sequence[Cost], outage: float, best: str = "") -> Table:
@@ -311,6 +416,7 @@ def performance_table(cases: Sequence[Performance], costs: Sequence[Cost], outag
         best=marked,
         brief=(0, 1, 2, 3, 5, 7, 8),
         folded=f"The link under each of {len(cases)} pointing errors" if len(cases) > 3 else "",
+        names=dict(enumerate(_PERFORMANCE, 3)),
     )
 
 
@@ -413,30 +519,37 @@ def acquisition_view(found: Finding | None, figures: Sequence[Figure]) -> View |
         return None
     at = f"{100 * EARLY:g} % within"
     headings = ("way", "lock", "simulated", "mean time", "simulated", at)
-    ways = Table("", headings, [_way(w) for w in found.ways], (0,))
+    ways = Table("", headings, [_way(w) for w in found.ways], (0,), names=dict(enumerate(_WAYS, 1)))
     trade = opened([f for f in figures if not f.name.startswith("tornado")], ())
     stages = [view for w in found.ways for view in (_stages(w),)]
     return View("Acquisition", told(*acquisition_paragraphs(found), ways, *stages, *trade))
 
 
+_WAYS = tuple(
+    f"acquisition.ways.{name}"
+    for name in ("x.success_probability", "x.simulated_success_probability", "x.mean_time_s", "x.simulated_mean_time_s")
+)
+
+
 def _way(w: Found) -> list[str]:
     """One way; what never locks has no times."""
-    o, late = w.outcome, w.outcome.locked.given_success().quantile(EARLY) if w.possible else math.nan
+    o = w.outcome
     return [
         w.name,
         f"{o.success_probability:.4f}" if w.possible else "never",
         f"{w.simulated_probability:.4f}",
         quantity(o.mean_time_s, "s") if w.possible else _NO_VALUE,
         words.simulated_mean(w),
-        quantity(late, "s") if w.possible else _NO_VALUE,
+        quantity(w.early_s, "s") if w.possible else _NO_VALUE,
     ]
 
 
 def _stages(w: Found) -> View:
     stages = [(s.name, quantity(s.longest_s, "s"), f"{s.success_probability:.4f}", s.on_failure) for s in w.stages]
     run = [(t.stage, t.to, t.cause, f"{t.time_s:.3f} s") for t in w.log]
+    names = {1: "acquisition.stages.x.longest_s", 2: "acquisition.stages.x.success_probability"}
     tables = (
-        Table("", ("stage", "at most", "succeeds", "else back to"), stages, (0, 3)),
+        Table("", ("stage", "at most", "succeeds", "else back to"), stages, (0, 3), names=names),
         Table("One simulated run", ("stage", "goes to", "cause", "time"), run, (0, 1, 2)),
     )
     return View(f"Stages of the {w.name}, and one simulated run", tables, folded=True, listed=False)

@@ -7,10 +7,12 @@ from microrad import link
 from microrad.core.units import format_input
 from microrad.link import Swing
 from microrad.link.acquisition.partner_search import Found, Tracking
+from microrad.link.fade_series.coded import CodedFading
 from microrad.link.pointing.outage import Performance, error_rad, required_error_rad
 from microrad.link.requirement import of_links, time_kept
 from microrad.link.study import BeamRadius, LinkStudy, PointAheadEffect, Solution
-from microrad.report.quantities import quantity, signed
+from microrad.report.marks import with_sign
+from microrad.report.quantities import power_text, quantity, signed
 from microrad.report.requirements import advice_for_links, derived_words, first_warning, met_words, nearest
 
 _WORTH_DB = 0.5  # of a margin: what another radius of the beam would have to bring
@@ -18,7 +20,10 @@ _WORTH_DB = 0.5  # of a margin: what another radius of the beam would have to br
 
 def verdict(study: LinkStudy) -> str:
     """Whether the links close and have what is required of them. "The links close" stands above no FAIL."""
-    margins = ", ".join(f"{b.name.lower()} {signed(b.margin_db, 'dB')}" for b in study.budgets)
+    margins = ", ".join(
+        with_sign(f"{b.name.lower()} {signed(b.margin_db, 'dB')}", study.file.sources, f"budgets.{b.name}.margin_db")
+        for b in study.budgets
+    )
     failed = [r for r in of_links(study) if not r.met]
     if not study.closes:
         return f"The links do not close: {margins}."
@@ -38,6 +43,8 @@ def short(study: LinkStudy) -> list[str]:
         f"The margin is the power received over the power needed, for communication {at}.",
         *consequences(study)[:2],
     ]
+    if study.fading is not None:
+        said.append(under_fades(study.fading))
     r = nearest(found)
     which = "Nearest to its limit is" if r.met else "What limits it is"
     said.append(f"{which} the {r.name}, by {r.because}{advice_for_links(study, r)}.")
@@ -124,6 +131,30 @@ def point_ahead(p: PointAheadEffect) -> str:
     )
 
 
+def under_fades(f: CodedFading) -> str:
+    """The coded link under a series of received power, in a sentence."""
+    spread = "without an interleaver"
+    if f.interleaving != "none":
+        spread = f"with a {f.interleaving} interleaver over {quantity(f.span_s, 's')}"
+    cost = f"cost {quantity(f.penalty_db, 'dB')}, which leaves a margin of {signed(f.margin_left_db, 'dB')}"
+    if math.isinf(f.penalty_db):
+        cost = "cost more than any power makes up for"
+    return (
+        f"Under the fades of {f.source}, {f.code} {spread}: mean bit error ratio {power_text(f.ratio.value)} at the "
+        f"power that is there; the fades {cost}."
+    )
+
+
+def fading_note(f: CodedFading) -> str:
+    """How the table of fades is to be read."""
+    return (
+        "Power 1 of the series is the received power of the budget at its static pointing error; jitter of the mission "
+        "is not added to it. Symbols are BPSK with soft decisions and the channel's state is known; those of an error "
+        "event, a few tens, are spread at random over the span, and power stands still over a sample. Cost: the power "
+        f"over constant power that brings the mean bit error ratio back to {power_text(f.target)}."
+    )
+
+
 def under_jitter_sentence(p: Performance, study: LinkStudy) -> str:
     """The link under its jitter, in two sentences.
 
@@ -132,8 +163,10 @@ def under_jitter_sentence(p: Performance, study: LinkStudy) -> str:
         study: the links that it is of.
     """
     narrowest = ", the narrowest of the aperture" if p.best.at_limit else ""
+    receiving = study.data.receiving
+    both = " of both ends" if receiving is not None and receiving.is_random else ""
     return (
-        f"Under the jitter: mean pointing loss {p.mean_loss_db:.2f} dB; {p.outage_loss_db:.2f} dB at most for "
+        f"Under the jitter: mean pointing loss{both} {p.mean_loss_db:.2f} dB; {p.outage_loss_db:.2f} dB at most for "
         f"{time_kept(study.data.requirement)}, which leaves a margin of {signed(p.margin_db, 'dB')}; below 0 dB "
         f"for a share of {quantity(p.outage, '')} of the time; best half angle "
         f"{quantity(p.best.half_angle_rad, 'rad')}{narrowest}. "

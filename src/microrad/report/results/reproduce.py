@@ -179,14 +179,16 @@ def of_summary(steps: ConverterSteps) -> comparison.Allowed:
 
 def _of_tables(manifest: ReadManifest, again: Again, name: str, elsewhere: bool) -> Comparison:
     """The numbers of a figure's data, which stand beside the report, held against those of now."""
+    was = (content_beside(manifest, name) or b"").decode("utf-8", "replace")
+    now = (again.folder / name).read_text(encoding="utf-8")
+    if not elsewhere:  # to the last bit: a curve has no tolerance
+        return comparison.compare_tables(name, was, now, None)
     found = tolerances.tolerances(again.steps)[tolerances.stated_for_figure(Path(name).stem) or "exact"]
 
     def allowed(place: str, unit: str, was: float, now: float) -> float:
         return found.allowed(was, now, unit) + comparison.DIGITS_SHARE * max(abs(was), abs(now))
 
-    was = (content_beside(manifest, name) or b"").decode("utf-8", "replace")
-    now = (again.folder / name).read_text(encoding="utf-8")
-    return comparison.compare_tables(name, was, now, allowed if elsewhere else None)
+    return comparison.compare_tables(name, was, now, allowed)
 
 
 def _lines(was: str, now: str) -> tuple[str, ...]:

@@ -8,7 +8,8 @@ from microrad.link import pointing
 from microrad.loop.controller_study import Scene
 from microrad.mirror import Variant
 from microrad.mirror.hysteresis import output_amplitude
-from microrad.report.quantities import micro, quantity, share_of_time, signed
+from microrad.report.marks import with_sign
+from microrad.report.quantities import micro, quantity, share_of_time, signed, volume
 from microrad.report.study.contributors import worst_axis
 from microrad.study.study import Study
 
@@ -36,6 +37,11 @@ def stages(study: Study) -> tuple[Stage, ...]:
     )
 
 
+def _signed(study: Study, text: str, name: str) -> str:
+    """A number with the sign that it has in the JSON under a dotted name."""
+    return with_sign(text, study.file.sources, name)
+
+
 def _angle(value_rad: float) -> str:
     return format_quantity(value_rad, "rad", 3)
 
@@ -59,12 +65,13 @@ def _link(study: Study) -> Stage:
     m = study.file.mission
     c, kind = m.communication, "margin" if m.jitter is None else "static margin"
     beam = study.links.data.beam.fall.half_angle_rad
+    margin = _signed(study, signed(study.static.margin_db, "dB"), "margin_db.communication_static")
     return Stage(
         "Link",
         (
             f"{format_quantity(c.data_rate_bit_s, 'bit/s')} with {format_quantity(c.transmit_power_w, 'W')}",
             f"beam {_angle(beam)} (half, 1/e²)",
-            f"{kind} {signed(study.static.margin_db, 'dB')} as budgeted,",
+            f"{kind} {margin} as budgeted,",
             f"at {_angle(c.pointing_error_rad)} off axis",
         ),
     )
@@ -109,7 +116,7 @@ def _mirror(study: Study) -> Stage:
 def _with_stroke(study: Study, lines: list[str]) -> Stage:
     axis = worst_axis(study)
     lines.append(f"stroke ({axis.name}): {micro(axis.needed_rad)} µrad needed,")
-    lines.append(f"{micro(axis.available_rad)} µrad available")
+    lines.append(_signed(study, f"{micro(axis.available_rad)} µrad available", "fine_pointing.stroke.x.available_rad"))
     return Stage("Mirror", tuple(lines), next(r.mark for r in study.requirements if r.subject == "stroke"))
 
 
@@ -122,7 +129,9 @@ def _loop(study: Study) -> Stage:
     if fine is not None:
         design = fine.best.design
         lines.append(f"{design.name} at {format_quantity(1.0 / fine.scene.loop.timing.period_s, 'Hz')}")
-        lines.append(f"modulus {design.loop_margins.modulus:.2f}, {design.loop_margins.bandwidth_hz:.3g} Hz wide")
+        modulus = _signed(study, f"{design.loop_margins.modulus:.2f}", "fine_pointing.margins.modulus")
+        width = _signed(study, f"{design.loop_margins.bandwidth_hz:.3g} Hz wide", "fine_pointing.margins.bandwidth_hz")
+        lines.append(f"modulus {modulus}, {width}")
     return Stage("Loop", tuple(lines))
 
 
@@ -132,7 +141,8 @@ def _residual(study: Study) -> Stage:
     lines = [f"{_angle(left)} {m.requirement.residual_statistic}, {run.freq_hz:g} Hz sine"]
     if fine is not None:
         quantile_rad = fine.best.simulated[Variant.GIVEN].quantile_rad
-        lines = [f"{micro(quantile_rad)} µrad at {share_of_time(fine.quantile)}, vibration", f"({lines[0]})"]
+        simulated = _signed(study, f"{micro(quantile_rad)} µrad", "fine_pointing.simulated.given.quantile_rad")
+        lines = [f"{simulated} at {share_of_time(fine.quantile)}, vibration", f"({lines[0]})"]
     budget = [r.met for r in study.requirements if r.subject == "error budget"]
     met = all((*budget, *(r.met for r in study.requirements if r.subject in ("residual", "fine pointing"))))
     lines.append(f"allowed {_angle(m.requirement.pointing_error_rad)}")
@@ -146,20 +156,22 @@ def _volume(study: Study) -> Stage:
         rate = study.margin_map.largest_rate_bit_s
         text = "no rate has the required margin" if math.isnan(rate) else f"up to {quantity(rate, 'bit/s')}"
         return Stage("Volume", (text, "no orbits given: no volume a day"))
+    relay, direct = day.relay, day.direct
     lines = [
-        f"{quantity(day.relay.capacity_bit / 8.0, 'B')} possible by the relay",
-        f"{quantity(day.relay.arrived_bit / 8.0, 'B')} of the instrument's",
+        f"{_signed(study, volume(relay.capacity_bit), 'day.relay.could_carry_bit')} possible by the relay",
+        f"{_signed(study, volume(relay.arrived_bit), 'day.relay.arrived_bit')} of the instrument's",
     ]
-    if day.direct is not None:
-        lines.append(f"{quantity(day.direct.capacity_bit / 8.0, 'B')} direct to ground")
+    if direct is not None:
+        lines.append(f"{_signed(study, volume(direct.capacity_bit), 'day.direct.could_carry_bit')} direct to ground")
     return Stage("Volume", tuple(lines))
 
 
 def _verdict(study: Study) -> Stage:
     passed = sum(r.met for r in study.requirements)
+    margin = _signed(study, signed(study.margin_db, "dB"), "margin_db.judged")
     lines = (
         f"{passed} of {len(study.requirements)} requirements met",
-        f"link at {'the residual' if study.fine_case is None else 'the outage'} {signed(study.margin_db, 'dB')},",
+        f"link at {'the residual' if study.fine_case is None else 'the outage'} {margin},",
         f"{study.file.mission.requirement.margin_db:g} dB required",
     )
     return Stage("Verdict", lines, "PASS" if study.met else "FAIL")

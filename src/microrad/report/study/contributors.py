@@ -36,7 +36,8 @@ def judged_table(study: Study, found: Sequence[Requirement]) -> Table:
         study: a run of a whole mission.
         found: requirements of it.
     """
-    return requirement_table(found, [contributor(study, r) for r in found])
+    name = "requirements" if found is study.requirements else "papers_loop"
+    return requirement_table(found, [contributor(study, r) for r in found], name)
 
 
 def readings_table(study: Study) -> Table:
@@ -46,7 +47,8 @@ def readings_table(study: Study) -> Table:
     own = Reading("as it stands", "", "", left, margin)
     rows = [_reading(r, r.meets(m.requirement) and not unknown(m.mirror)) for r in (own, *study.other_readings)]
     headings = ("key", "read as", "instead", "residual", "margin", "link closes", "residual and margin as required")
-    return Table("", headings, rows, (0, 1, 2, 5, 6), best=(0,))
+    names = {3: "other_readings.residual_rad", 4: "other_readings.margin_db"}
+    return Table("", headings, rows, (0, 1, 2, 5, 6), best=(0,), names=names)
 
 
 def _reading(r: Reading, met: bool) -> list[str | Cell]:

@@ -10,6 +10,7 @@ from microrad.report.day.data import day_data
 from microrad.report.error_budget.data import budget_data
 from microrad.report.fine_pointing.data import fine_pointing_data
 from microrad.report.links.data import budgets_data, performance_data
+from microrad.report.marks import with_marks
 from microrad.report.requirements import requirement_data
 from microrad.report.study import words
 from microrad.study.study import Study
@@ -18,7 +19,7 @@ from microrad.study.study import Study
 def summary(study: Study) -> dict[str, Any]:
     """The study as plain data, in SI units with the unit in each key."""
     m, fine = study.file.mission, study.fine_pointing
-    return {
+    found = {
         "mission": m.name,
         "mission_sha256": study.file.sha256,
         "closes": study.closes,
@@ -68,6 +69,7 @@ def summary(study: Study) -> dict[str, Any]:
         **({} if study.error_budget is None else {"error_budget": budget_data(study.error_budget)}),
         "warnings": words.warnings(study),
     }
+    return with_marks(found, study.file.sources)
 
 
 def _run_data(run: Run) -> dict[str, Any]:

@@ -19,6 +19,7 @@ from microrad.report.day.page import day_view
 from microrad.report.error_budget.page import budget_view
 from microrad.report.fine_pointing.page import fine_pointing_view
 from microrad.report.fine_pointing.tails import tail_view
+from microrad.report.foundation import foundation_view
 from microrad.report.links.views import (
     budget_table,
     budgets_view,
@@ -27,6 +28,7 @@ from microrad.report.links.views import (
     performance_view,
     residuals_sentence,
 )
+from microrad.report.marks import Marks
 from microrad.report.page.templates import drawing, inputs_view, mission_page
 from microrad.report.paper.page import paper_view
 from microrad.report.plotting.figure import Figure
@@ -92,9 +94,10 @@ def study_views(study: Study, drawn: StudyFigures) -> tuple[View, ...]:
         _day(study, drawn.day),
         paper_view(study, (*drawn.study, *drawn.bench), words.papers_loop_view(study), _readings(study)),
         inputs_view(study.file.sources),
-        _not_in_study(study),
     )
-    return tuple(block for block in found if isinstance(block, View))
+    marks = Marks.of(study.file.sources)
+    shown = [*marks.blocks(found), foundation_view(study.file.sources, marks.legend)]
+    return tuple(block for block in (*shown, _not_in_study(study)) if isinstance(block, View))
 
 
 def verdict_view(study: Study) -> View:
@@ -125,8 +128,10 @@ def _mirror_and_loop(study: Study) -> View:
         [_run(run) for run in study.runs],
         (0, 1),
         folded=f"Each of {len(study.runs)} runs, with its counts",
+        names=dict(enumerate(("runs.peak_rad", "runs.rms_rad"), 3)),
     )
-    margins = Table("", (heading, "value"), _margins(study))
+    of = [f"margins.{name}" for name in ("gain_up_db", "phase_rad", "delay_s", "modulus", "crossover_hz")]
+    margins = Table("", (heading, "value"), _margins(study), names={1: of})
     said = words.mirror_of_loop(study)
     return View("Mirror and loop", told(said, Verbatim("\n".join(lines)), margins, runs), "mirror")
 

@@ -16,6 +16,8 @@ from microrad.mirror import Variant
 from microrad.mission.file import changed_from_shipped
 from microrad.report.day import words as day_words
 from microrad.report.fine_pointing import words as fine_pointing_words
+from microrad.report.foundation import placards
+from microrad.report.marks import marked, with_sign
 from microrad.report.quantities import angle, minus, quantity, signed
 from microrad.report.requirements import (
     derived_words,
@@ -26,7 +28,7 @@ from microrad.report.requirements import (
     nearness,
 )
 from microrad.report.study import contributors
-from microrad.report.view import Points, Verdict, View, told, views_text
+from microrad.report.view import Block, Points, Verdict, View, told, views_text
 from microrad.study.pointing_penalty import FINE, Cost
 from microrad.study.study import Study
 
@@ -80,16 +82,22 @@ def headline(study: Study) -> str:
     at = _judged_at(study)
     if not study.closes:
         links = {"beacon": study.beacon.margin_db, "answer": study.answer.margin_db, "communication": study.margin_db}
-        failing = [f"{name} {signed(margin, 'dB')}" for name, margin in links.items() if margin < 0.0]
+        failing = [f"{name} {_margin(study, margin, name)}" for name, margin in links.items() if margin < 0.0]
         if not failing:
             return f"Whether the link closes at {at} is not known: {IMPOSSIBLE}."
         return f"The link does not close: {', '.join(failing)}, at {at}."
-    margin, failed = signed(study.margin_db, "dB"), [r for r in study.requirements if not r.met]
+    margin, failed = _margin(study, study.margin_db, "judged"), [r for r in study.requirements if not r.met]
     if failed:
         names = " and ".join(f"{r.name} ({r.unknown or margin_text(r)})" for r in failed)
         return f"Not every requirement is met: {names}. The margin is {margin} at {at}.{_extrapolated(study)}"
     met = met_words(study.requirements)
     return f"The link closes, with a margin of {margin} at {at}, and {met}.{_extrapolated(study)}"
+
+
+def _margin(study: Study, margin_db: float, name: str) -> str:
+    """A margin with the sign that its number in the JSON has."""
+    judged = "judged" if name == "communication" else name
+    return with_sign(signed(margin_db, "dB"), study.file.sources, f"margin_db.{judged}")
 
 
 def _judged_at(study: Study) -> str:
@@ -326,9 +334,10 @@ def verdict_text(study: Study, width: int = 80, verbose: bool = False) -> str:
         verbose: adds everything else that the first part of the report says, and its warnings.
     """
     if not verbose:
-        return views_text([verdict_box(study), *short(study)], width)
+        return views_text(marked([verdict_box(study), *short(study)], study.file.sources), width)
     said = [*limits(study), *explanation(study)]
-    return views_text([verdict_box(study), *said, papers_loop_view(study), warnings_view(study)], width)
+    blocks: list[Block] = [verdict_box(study), *said, papers_loop_view(study), warnings_view(study)]
+    return views_text(marked(blocks, study.file.sources), width)
 
 
 def beyond_identified(study: Study, run: Run) -> str:
@@ -375,6 +384,7 @@ def ranked_warnings(study: Study) -> dict[str, list[str]]:
         "The day": [*_of_day(study), *map(Warned, _not_run(study))],
         "Other controllers": [*map(Warned, others)],
         "The paper's loop and figures": [] if judged else [*map(Warned, paper)],
+        "What was checked": [Warned(each.text) for each in placards(study.file.sources)],
     }
     weight = partial(_weight, study)
     ranked = {what: sorted(said, key=weight) for what, said in found.items() if said}

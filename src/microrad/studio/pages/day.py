@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import partial
 
 from nicegui import ui
 
+from microrad.core.progress import Progress
+from microrad.mission.file import LinkFile
+from microrad.mission.model import Source
 from microrad.orbit.day import DayStudy
 from microrad.studio import commands
 from microrad.studio.pages import layout
@@ -20,6 +24,7 @@ TITLE = "Day"
 PATH = "/day"
 
 _LOOK_S = 0.25
+_Computed = tuple[DayStudy, Mapping[str, Source]]
 
 
 def page(session: Session) -> None:
@@ -33,7 +38,7 @@ class DayPage:
     def __init__(self, session: Session) -> None:
         """Build the body, and have it follow the session."""
         self.session, self.shown = session, ""
-        self.latest: Latest[DayStudy] = shared(session, "day")
+        self.latest: Latest[_Computed] = shared(session, "day")
         layout.copy_buttons(lambda: commands.contacts(layout.file_of(session)))
         self._progress()
         with ui.column().classes("w-full") as self.results:
@@ -62,7 +67,7 @@ class DayPage:
         self.faults.text = draft.report if file is None else lacking
         self.faults.visible = file is None or bool(lacking)
         if file is not None and not lacking:
-            self.latest.ask(draft.sha256, partial(day_view.compute_day, file))
+            self.latest.ask(draft.sha256, partial(_computed, file))
 
     async def look(self) -> None:
         """Show how far it is, and the day once it is there."""
@@ -72,11 +77,11 @@ class DayPage:
         if state.result is None or key == self.shown:
             return
         self.shown = key
-        blocks = await in_thread(self.results, day_view.blocks, state.result)
+        blocks = await in_thread(self.results, day_view.blocks, *state.result)
         self.told.show_blocks(blocks, await in_thread(self.results, drawn, blocks))
         self.results.visible = True
 
-    def _show_progress(self, state: State[DayStudy]) -> None:
+    def _show_progress(self, state: State[_Computed]) -> None:
         step = f": {state.done} of {state.total}" if state.total else ""
         now = state.key == self.session.draft.sha256
         known = "The day of the mission as it stands." if now else "The day of the mission before this."
@@ -86,3 +91,8 @@ class DayPage:
         self.again.visible = not state.running and state.result is None and not self.faults.visible
         self.bar.value = state.done / state.total if state.total else 0.0
         layout.grey(self.results, not (now and state.result))
+
+
+def _computed(file: LinkFile, on_progress: Progress) -> _Computed:
+    """The day of a mission, with the sources of its inputs."""
+    return day_view.compute_day(file, on_progress), file.sources

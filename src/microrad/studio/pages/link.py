@@ -13,6 +13,7 @@ from microrad.link import study as link_study
 from microrad.link.study import LinkStudy
 from microrad.mission.file import LinkFile
 from microrad.report.links.views import budget_table
+from microrad.report.marks import Marks
 from microrad.report.view import Block
 from microrad.studio import commands
 from microrad.studio.pages import layout
@@ -86,9 +87,12 @@ class LinkPage(SliderPage[LinkView]):
         self._show_table()
 
     def _show_table(self) -> None:
-        for budget in self.view_now.budgets if self.view_now else ():
+        if self.view_now is None:
+            return
+        marks = Marks.of(self.view_now.sources)
+        for budget in self.view_now.budgets:
             if budget.name == self.which.value:
-                put(self.table, budget_table(budget))
+                put(self.table, marks.table(budget_table(budget)))
 
     async def _look(self) -> None:
         """Have the study of the links made once a draft rests, and show it once it is there."""

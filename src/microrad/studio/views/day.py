@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 from microrad.core.progress import Progress
 from microrad.link import study as link_study
 from microrad.mission.file import LinkFile
+from microrad.mission.model import Source
 from microrad.orbit import day as day_study
 from microrad.orbit.day import DayStudy
 from microrad.report.day.words import sentences
+from microrad.report.marks import marked
 from microrad.report.view import Block
 
 
@@ -34,10 +37,15 @@ def missing(file: LinkFile) -> str:
     return f"The mission has no {' and no '.join(lacking)}, so it has no day; microrad init writes such tables."
 
 
-def blocks(day: DayStudy) -> Sequence[Block]:
-    """The report's view of the day with its figures, of which the map is a picture."""
+def blocks(day: DayStudy, sources: Mapping[str, Source] = MappingProxyType({})) -> Sequence[Block]:
+    """The report's view of the day with its figures, of which the map is a picture.
+
+    Args:
+        day: what the links deliver.
+        sources: of each value of the mission, by its dotted key, for the signs of its numbers.
+    """
     from microrad.report.day.figures import day_figures
     from microrad.report.day.page import day_view
 
     figures = [each.static if each.name == "world-map" else each for each in day_figures(day)]
-    return day_view(day, sentences(day), figures).blocks
+    return marked(day_view(day, sentences(day), figures).blocks, sources)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,13 +11,17 @@ import numpy as np
 from microrad import link
 from microrad.core.arrays import Floats
 from microrad.core.units import format_quantity
+from microrad.link import compliance
 from microrad.link import study as link_study
 from microrad.link.pointing.outage import error_rad, required_error_rad
 from microrad.link.study import LinkStudy
 from microrad.mission.file import LinkFile
+from microrad.mission.model import Source
 from microrad.report.links import words
 from microrad.report.links.figures import link_figures
+from microrad.report.links.standard import standard_view
 from microrad.report.links.views import budgets_view, links_views
+from microrad.report.marks import Marks, marked
 from microrad.report.plotting.palette import VERMILION, WHITE
 from microrad.report.plotting.sheet import Axis, Field, Line
 from microrad.report.quantities import quantity, signed
@@ -68,6 +73,7 @@ class Margin:
     margin_db: float
     required_db: float
     possible: bool = True
+    sign: str = ""
 
     @property
     def met(self) -> bool:
@@ -76,8 +82,8 @@ class Margin:
 
     @property
     def words(self) -> str:
-        """The margin with its sign."""
-        return signed(self.margin_db, "dB")
+        """The margin with its sign, and behind it what it rests on less than others do."""
+        return f"{signed(self.margin_db, 'dB')} {self.sign}".rstrip()
 
     @property
     def needs(self) -> str:
@@ -100,13 +106,17 @@ class LinkView:
     budgets: tuple[link.LinkBudget, ...]
     margin_db: Floats
     contours: dict[float, Floats]
+    sources: Mapping[str, Source]
 
     @property
     def margins(self) -> tuple[Margin, ...]:
         """Each link against what it needs: the communication link its required margin, the others 0 dB."""
         needed = (self.data.requirement.margin_db, *[0.0] * len(self.budgets))
         pairs = zip(self.budgets, needed, strict=False)
-        return tuple(Margin(b.name, b.margin_db, need, b.possible) for b, need in pairs)
+        sign = Marks.of(self.sources).sign
+        return tuple(
+            Margin(b.name, b.margin_db, need, b.possible, sign(f"budgets.{b.name}.margin_db").sign) for b, need in pairs
+        )
 
 
 # ---------------------------------------------------------------------------------------------------------- computing
@@ -128,7 +138,8 @@ def view(file: LinkFile, frame: Frame | None = None) -> LinkView:
     budgets += [link.beam_budget(name, data.shared, beam, sources) for name, beam in beams if beam is not None]
     margin = link.margin_map(data, frame.data_rate_bit_s, frame.pointing_error_rad)
     levels = dict.fromkeys((0.0, data.requirement.margin_db))
-    return LinkView(data, frame, tuple(budgets), margin, {level: contour(data, frame, level) for level in levels})
+    contours = {level: contour(data, frame, level) for level in levels}
+    return LinkView(data, frame, tuple(budgets), margin, contours, sources)
 
 
 def frame_of(data: link.DataLink) -> Frame:
@@ -235,7 +246,12 @@ def _largest(data: link.DataLink) -> str:
 
 # --------------------------------------------------------------------------------------------------- the slower things
 def blocks(study: LinkStudy) -> tuple[Block, ...]:
-    """The report's views of the links but for the pointing, which has a page, and the lines of the budgets."""
+    """The report's views of the links but for the pointing, which has a page, and the lines of the budgets.
+
+    Behind them stands each standard that is known, folded.
+    """
     figures, own = link_figures(study), replace(study, open_loop=None)
     budgets, *others = links_views(own, figures, budgets=budgets_view(study, (), figures))
-    return (words.verdict(study), *budgets.blocks, *others)
+    held = (compliance.compliance(study, compliance.standard(name)) for name in compliance.standards())
+    standards = (replace(standard_view(each), folded=True) for each in held)
+    return tuple(marked((words.verdict(study), *budgets.blocks, *others, *standards), study.file.sources))

@@ -16,6 +16,7 @@ from microrad.link.study import PointAheadEffect
 from microrad.mission.file import LinkFile
 from microrad.report.links import views as links
 from microrad.report.links import words
+from microrad.report.marks import marked
 from microrad.report.plotting.palette import BLACK, BLUE, GREEN, GREY, ORANGE, SKY, VERMILION
 from microrad.report.plotting.sheet import Axis, Bars, Line, Mark, Rule, shortened
 from microrad.report.quantities import quantity
@@ -89,7 +90,7 @@ def blocks(v: PointingView) -> tuple[Block, ...]:
     said = links.pointing_view(v.budget)
     bare = "" if v.budget.reading else "The mission has no beacon, so nothing is to be covered."
     ahead = Soft("The mission has no table [point_ahead].") if v.ahead is None else words.point_ahead(v.ahead)
-    return told(bare, *(said.blocks if said else ()), View("Point-ahead", [ahead]))
+    return tuple(marked(told(bare, *(said.blocks if said else ()), View("Point-ahead", [ahead])), v.file.sources))
 
 
 # -------------------------------------------------------------------------------------------------------------- plots

@@ -63,8 +63,16 @@ def _are_units(cells: Sequence[str]) -> bool:
     return bool(filled) and filled <= _UNITS
 
 
-def layout_of(path: Path) -> Layout:
-    """Judge the layout from the first megabyte; raises `RecordingError` where it is no table of numbers."""
+def layout_of(path: Path, alone: bool = False) -> Layout:
+    """Judge the layout from the first megabyte.
+
+    Args:
+        path: The file.
+        alone: Whether there may be a single column.
+
+    Raises:
+        RecordingError: Where it is no table of numbers.
+    """
     head = read_head(path, _HEAD_BYTES + 1)
     head, complete = head[:_HEAD_BYTES], len(head) <= _HEAD_BYTES
     encoding = _encoding(path, head)
@@ -77,8 +85,10 @@ def layout_of(path: Path) -> Layout:
     typical = content[-200:]
     delimiter = Counter(_guess_delimiter(line) for line in typical).most_common(1)[0][0]
     columns = Counter(len(split(line, delimiter)) for line in typical).most_common(1)[0][0]
+    if columns == 1 and alone:
+        delimiter = ","  # a header of several words is one name
     first, headers = _header(path, lines, delimiter, columns)
-    if columns == 1:
+    if columns == 1 and not alone:
         raise RecordingError(
             f"{path}: only one column was found (line {first}: '{short(lines[first - 1])}'); drive and output must "
             "stand side by side, separated by comma, semicolon, tab or white space."
@@ -246,10 +256,10 @@ def _unknown_name(path: Path, layout: Layout, wanted: str, role: str) -> str:
 class TextSource(Source):
     """A text of numbers: CSV, or columns separated by semicolon, tab or white space."""
 
-    def __init__(self, path: Path) -> None:
-        """Judge the layout from the head, then walk once through the file for digest and regularity."""
+    def __init__(self, path: Path, alone: bool = False) -> None:
+        """Judge the layout from the head, then walk once through the file; a column may stand ``alone``."""
         self.path = path
-        self.layout = layout_of(path)
+        self.layout = layout_of(path, alone)
         self.names, self.units = self.layout.names, self.layout.units
         self.sha256, self._regular = _scan(path, self.layout)
 

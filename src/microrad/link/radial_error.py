@@ -5,6 +5,7 @@ Small angles: a radius is a length in the plane of the two axes.
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,6 +20,7 @@ SMALLEST_PROBABILITY = 1e-20
 
 RADIUS = Quantity("rad", least=0.0)
 _REACH = 12.0  # standard deviations about the bias that are integrated; 4e-33 lies beyond
+_STEPS = 4000  # of a radial error whose distribution is known
 _ROUNDING = 4.0 * float(np.finfo(np.float64).eps)
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(96)
 
@@ -229,3 +231,22 @@ def radial_quantile(jitter: Jitter, probability: ArrayLike) -> Floats:
         return float(brentq(missed, 0.0, highest, args=(p,), xtol=1e-300, rtol=_ROUNDING))
 
     return np.array([root(each) for each in p.ravel().tolist()]).reshape(p.shape)
+
+
+@lru_cache(maxsize=64)  # both ends of a link, its budget and each input that is moved ask for the same
+def radial_steps(jitter: Jitter) -> tuple[Floats, Floats]:
+    """Radial errors (rad) in steps that are small against their distribution, and the share of the time of each.
+
+    Args:
+        jitter: Bias and rms of the pointing error about each axis, in rad.
+    """
+    reach = jitter.static_rad + _REACH * max(jitter.rms_rad)
+    if reach == jitter.static_rad:
+        radius, share = np.array([reach]), np.ones(1)
+    else:
+        edges = np.linspace(0.0, reach, _STEPS + 1)
+        share = np.maximum(-np.diff(radial_survival(jitter, edges)), 0.0)
+        radius, share = (edges[1:] + edges[:-1]) / 2.0, share / np.sum(share)
+    for each in (radius, share):
+        each.setflags(write=False)  # it is shared
+    return radius, share

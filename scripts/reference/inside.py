@@ -1,0 +1,236 @@
+"""What the functions inside of microrad return while a case runs, each as one number.
+
+A command's output hides much: a start value that a search forgets, a branch that is taken twice in a thousand. So each
+function's first returned values, and some later ones, are held as well. Of a function that has another name now, or is
+called less often, nothing is compared: the inside may be put in order freely.
+"""
+
+import dataclasses
+import json
+import math
+import os
+import re
+import sys
+import threading
+import zlib
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from functools import partial
+from itertools import islice
+from pathlib import Path
+from types import CodeType, FrameType, MappingProxyType
+from typing import Any
+
+import numpy as np
+
+PACKAGE = f"{os.sep}microrad{os.sep}"
+CALLS = (1, 2, 3, 5, 10)
+"""Those of a function in a process whose values are taken."""
+
+PARTS = 300
+"""Of a value, at most."""
+
+DEEPEST = 5
+"""Records within records that are looked into."""
+
+SPREAD = 64
+"""Elements of an array that are taken, evenly."""
+
+SMALLEST = 1e-12
+"""A number below it counts as a rounding of 0."""
+
+NEAR = 2e-3
+"""By how much a value may be another one: two thousandths of a number that stands by itself."""
+
+MOST = 12
+"""Values of a function in a case that are held."""
+
+STEADY = 5e-5
+"""By how much it may differ between the machines that are played when it is written; else it is not held."""
+
+LEFT_OUT = (
+    *("cli.", "core.folder:read_bytes.<locals>.at_once", "core.units:printable", "campaign.run:_minutes"),
+    *("report.page.", "report.identification.page:identification_page", "core.folder:write_whole"),
+    *("export.flight.build:", "export.flight.write:", "loop.pointing_loop.ensemble:_Drawing"),
+)
+"""What they return hangs on the time, the compiler, threads, is the number of an open file, or a whole page."""
+
+_CHANGING = re.compile(r"[0-9a-f]{12,64}|\b\d+\.\d+\.\d+(?:\.dev\d+)?(?:\+\w+)?")
+"""Hashes and versions in words: they change with each edit of the code, and with each release."""
+
+Values = dict[str, dict[str, float]]
+"""By function, and by process and call of a case: `2.30` is the thirtieth call in its second command."""
+
+
+def value(of: object) -> float:
+    """A number that changes with each part of a value, by its relative change.
+
+    Args:
+        of: A number, words, an array, a record or what holds such.
+    """
+    return sum((1.0 + k * 0.6180339887498949 % 1.0) * part for k, part in enumerate(islice(_parts(of, 0), PARTS)))
+
+
+def _parts(of: Any, depth: int) -> Iterator[float]:
+    if of is None or depth > DEEPEST:
+        yield 0.5
+    elif isinstance(of, bool | int | float | complex | np.number | np.bool_):
+        yield from _array(np.atleast_1d(of)) if isinstance(of, complex) else (_magnitude(float(of)),)
+    elif isinstance(of, str):
+        yield zlib.crc32(_CHANGING.sub("", of).encode()) % 9973 / 997.3
+    elif isinstance(of, np.ndarray):
+        yield from _array(of)
+    else:
+        inner = _inner(of)
+        yield 0.1 * len(inner)
+        for each in inner:
+            yield from _parts(each, depth + 1)
+
+
+def _inner(of: Any) -> list[object]:
+    """What a value holds; nothing where it is of a library."""
+    own = partial(object.__getattribute__, of)  # a campaign notes what is read the usual way
+    if type(of) in (dict, MappingProxyType):
+        return [part for item in of.items() for part in item]
+    if isinstance(of, list | tuple):
+        return list(of)
+    if dataclasses.is_dataclass(of) and not isinstance(of, type):
+        return [own(field.name) for field in dataclasses.fields(of)]
+    return list(own("__dict__").values()) if type(of).__module__.startswith("microrad") else []
+
+
+def _array(of: np.ndarray[Any, Any]) -> Iterator[float]:
+    yield 0.1 * of.ndim
+    yield math.log1p(of.size)
+    if of.dtype.kind == "c":
+        yield from _array(of.real)
+        yield from _array(of.imag)
+    elif of.dtype.kind in "biuf" and of.size:
+        flat = of.ravel()[np.unique(np.linspace(0, of.size - 1, SPREAD).astype(int))].astype(float)
+        flat = np.nan_to_num(flat, nan=-7.0, posinf=1e30, neginf=-1e30)
+        weights = 1.0 + np.arange(flat.size) * 0.6180339887498949 % 1.0
+        yield _magnitude(float(np.sum(np.abs(flat) * (weights + 0.4 * (flat < 0)))))
+
+
+def _magnitude(number: float) -> float:
+    if not math.isfinite(number):
+        return 77.0 if math.isnan(number) else math.copysign(99.0, number)
+    return math.asinh(number / SMALLEST) if number >= 0.0 else 1.4 * math.asinh(-number / SMALLEST) + 0.3
+
+
+class Watch:
+    """Takes down what functions return, from ``begin`` on."""
+
+    def __init__(self) -> None:
+        """Nothing yet."""
+        self.values: Values = defaultdict(dict)
+        self._calls: dict[CodeType, int] = defaultdict(int)
+        self._names: dict[CodeType, str] = {}
+        self._is_busy = False
+
+    def begin(self) -> None:
+        """Watch, as on a machine of one core: work is cut into parts by their number, and threads take turns."""
+        os.cpu_count = lambda: 1
+        threading.setprofile(self._saw)
+        sys.setprofile(self._saw)
+
+    def end(self, file: Path) -> None:
+        """Watch no longer, and write what was seen."""
+        sys.setprofile(None)
+        threading.setprofile(None)
+        file.write_text(json.dumps(self.values), encoding="utf-8")
+
+    def _saw(self, frame: FrameType, event: str, returned: object) -> None:
+        if event != "return" or self._is_busy:
+            return
+        code = frame.f_code
+        name = self._names.get(code)
+        if name is None:
+            self._names[code] = name = _name(code)
+        if not name:
+            return
+        self._calls[code] += 1
+        if self._calls[code] not in CALLS:
+            return
+        self._is_busy = True
+        try:
+            found = returned
+            if found is None:  # what it has changed
+                found = [frame.f_locals.get(each) for each in code.co_varnames[: code.co_argcount]]
+            self.values[name][str(self._calls[code])] = round(value(found), 6)
+        except Exception:  # a value that is not whole yet is none
+            return
+        finally:
+            self._is_busy = False
+
+
+def _name(code: CodeType) -> str:
+    """Module and function of a piece of code of the package; empty for any other."""
+    _, package, inside = code.co_filename.rpartition(PACKAGE)
+    if not package or not inside.endswith(".py") or code.co_name.startswith("<"):
+        return ""
+    name = f"{inside.removesuffix('.py').replace(os.sep, '.')}:{code.co_qualname}"
+    return "" if name.startswith(LEFT_OUT) else name
+
+
+def gathered(folder: Path) -> Values:
+    """What the processes of a case have written."""
+    found: Values = defaultdict(dict)
+    for file in folder.glob("*.json"):
+        for name, values in json.loads(file.read_text(encoding="utf-8")).items():
+            found[name] |= {f"{file.stem}.{call}": each for call, each in values.items()}
+    return dict(found)
+
+
+def steady(runs: Sequence[Values]) -> Values:
+    """What all runs of a case agree on, each value once.
+
+    Args:
+        runs: Of the same case, on machines that round differently.
+    """
+    first, *others = runs
+    found: Values = {}
+    for name, values in first.items():
+        kept: dict[float, str] = {}  # the first call that returned it
+        for call, x in sorted(values.items(), key=lambda each: [int(n) for n in each[0].split(".")]):
+            if all(abs(x - each.get(name, {}).get(call, math.inf)) <= STEADY for each in others):
+                kept.setdefault(round(x, 2), call)
+        if kept:
+            found[name] = {call: values[call] for call in [*kept.values()][:MOST]}
+    return found
+
+
+def save(path: Path, values: Values) -> None:
+    """Write a file of the reference: a function and its values in a line."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    lines = [f"{name} {' '.join(f'{call}={x:.4f}' for call, x in values[name].items())}" for name in sorted(values)]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def load(path: Path) -> Values:
+    """A file of the reference; nothing where there is none."""
+    found: Values = {}
+    for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else []:
+        name, *values = line.split(" ")
+        found[name] = {call: float(x) for call, _, x in (each.partition("=") for each in values)}
+    return found
+
+
+def moved(case: str, was: Values, now: Values) -> list[str]:
+    """Functions that return something else than they did; those that are not called any more are left out.
+
+    Args:
+        case: Its name, in front of each.
+        was: The reference.
+        now: What they return now.
+    """
+    found = []
+    for name in sorted(was.keys() & now.keys()):
+        for call in was[name].keys() & now[name].keys():
+            old, new = was[name][call], now[name][call]
+            if abs(old - new) > NEAR:
+                found.append(
+                    f"{case}: inside of it {name} returns something else ({old:.4f} -> {new:.4f}, call {call})"
+                )
+                break
+    return found

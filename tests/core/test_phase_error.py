@@ -1,0 +1,83 @@
+"""Error ratios under a phase error against an own quadrature, simulated samples and their floor."""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy import integrate, stats
+
+from microrad.core import phase_error
+
+
+def averaged(amplitude, rms, quadratures):
+    """The mean over the phase, piece by piece around each change of sign."""
+
+    def seen(phase):
+        return math.cos(phase) - (math.sin(phase) if quadratures == 2 else 0.0)
+
+    first, near = math.pi / (2 * quadratures), (1.0, 3.0, 10.0, 30.0)
+    signs = [first + k * math.pi for k in range(-8, 9)]
+    edges = {k * rms / 2.0 for k in range(-30, 31)} | set(signs)
+    edges |= {at + side * far / amplitude for at in signs for side in (-1.0, 1.0) for far in near}
+    pieces = pairwise(sorted(edge for edge in edges if abs(edge) <= 15.0 * rms))
+    return math.fsum(
+        integrate.quad(
+            lambda x: stats.norm.pdf(x, scale=rms) * stats.norm.sf(amplitude * seen(x)), *ends, epsabs=0.0, epsrel=1e-11
+        )[0]
+        for ends in pieces
+    )
+
+
+@pytest.mark.promise("link-92")
+@pytest.mark.parametrize(
+    ("amplitude", "rms", "quadratures"),
+    [(6.0, 0.1, 1), (6.0, 0.2, 1), (8.5, 0.08, 2), (3.0, 0.7, 1), (50.0, 0.3, 2), (1e4, 0.3, 2), (20.0, 0.2, 1)],
+)
+def test_the_mean_ratio_is_that_of_an_own_quadrature(amplitude, rms, quadratures):
+    found = float(phase_error.bit_error_ratio(np.asarray(amplitude), rms, quadratures))
+    assert found == pytest.approx(averaged(amplitude, rms, quadratures), rel=1e-9, abs=0.0)
+
+
+@pytest.mark.promise("link-92")
+@pytest.mark.parametrize(("quadratures", "rms"), [(1, 0.5), (2, 0.25), (2, 0.9)])
+def test_the_mean_ratio_is_that_of_simulated_complex_samples(quadratures, rms):
+    random = np.random.Generator(np.random.Philox(key=quadratures))
+    samples, amplitude = 400_000, 2.2
+    bits = random.choice([-1.0, 1.0], (quadratures, samples))
+    sent = bits[0] + (1j * bits[1] if quadratures == 2 else 0.0)
+    noise = random.standard_normal(samples) + 1j * random.standard_normal(samples)
+    seen = amplitude * sent * np.exp(1j * rms * random.standard_normal(samples)) + noise
+    wrong = np.sign(seen.real) != bits[0]
+    if quadratures == 2:
+        wrong = np.concatenate([wrong, np.sign(seen.imag) != bits[1]])
+    found = float(phase_error.bit_error_ratio(np.asarray(amplitude), rms, quadratures))
+    # the two bits of a symbol share their phase: no more than twice the variance of independent ones
+    assert abs(found - wrong.mean()) < 4.0 * math.sqrt(2.0 * found / wrong.size)
+
+
+@pytest.mark.promise("link-92")
+@pytest.mark.parametrize(("quadratures", "rms"), [(1, 0.4), (2, 0.2), (2, 0.6), (1, 1.0)])
+def test_more_signal_ends_at_the_floor(quadratures, rms):
+    floor = phase_error.floor(rms, quadratures)
+    strong, stronger = phase_error.bit_error_ratio(np.array([1e3, 1e6]), rms, quadratures)
+    assert floor < stronger < strong
+    assert stronger == pytest.approx(floor, rel=1e-5)
+    phases = np.linspace(-13.0 * rms, 13.0 * rms, 2_000_001)
+    seen = np.cos(phases) - (np.sin(phases) if quadratures == 2 else 0.0)
+    share = integrate.trapezoid(np.where(seen < 0.0, stats.norm.pdf(phases, scale=rms), 0.0), phases)
+    assert floor == pytest.approx(share, rel=1e-3)
+
+
+@pytest.mark.promise("link-92")
+@pytest.mark.parametrize("quadratures", [1, 2])
+@pytest.mark.parametrize("ratio", [1e-3, 1e-9, 1e-15])
+def test_no_power_reaches_a_ratio_below_the_floor(quadratures, ratio):
+    most = phase_error.largest_rms_rad(ratio, quadratures)
+    assert math.isinf(phase_error.amplitude_for(ratio, most * 1.001, quadratures))
+    reached = phase_error.amplitude_for(ratio, most * 0.97, quadratures)
+    again = float(phase_error.bit_error_ratio(np.asarray(reached), most * 0.97, quadratures))
+    assert again == pytest.approx(ratio, rel=1e-9, abs=0.0)
+    clean = phase_error.amplitude_for(ratio, 0.0, quadratures)
+    assert clean == pytest.approx(stats.norm.isf(ratio), rel=1e-12)
+    assert reached > clean

@@ -1,0 +1,110 @@
+"""Capacity of pulse positions against sums over all counts, simulated words, and what is published."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from microrad.core.capacity import Code
+from microrad.core.pulse_capacity import least_pulse_counts, noiseless_bits, soft_bits
+from microrad.link import receivers
+
+
+def summed(order, pulse, background):
+    """Mutual information in bits by the sum over the counts of every slot, the pulse in the first."""
+    k = np.arange(0.0, math.ceil(pulse + background + 9.0 * math.sqrt(pulse + background) + 14.0))
+    empty, lit = stats.poisson.pmf(k, background), stats.poisson.pmf(k, pulse + background)
+    log_ratio = k * math.log1p(pulse / background)
+    told = 0.0
+    for others in itertools.product(range(k.size), repeat=order - 1):
+        weight = math.prod(empty[each] for each in others)
+        if weight > 1e-19:
+            total = np.logaddexp(log_ratio, np.logaddexp.reduce([log_ratio[each] for each in others]))
+            told += weight * float(lit @ (total - log_ratio))
+    return math.log2(order) - told / math.log(2.0)
+
+
+@pytest.mark.promise("link-91")
+@pytest.mark.parametrize(
+    ("order", "pulse", "background"),
+    [(2, 2.0, 0.5), (2, 0.1, 1.0), (2, 6.0, 20.0), (4, 1.0, 0.01), (4, 2.0, 0.5), (4, 0.02, 0.3)],
+)
+def test_the_integral_is_the_sum_over_all_counts(order, pulse, background):
+    # both take away terms of size log2 M: 1e-12 of it is their rounding and the tails that are cut
+    assert soft_bits(order, pulse, background) == pytest.approx(summed(order, pulse, background), rel=0.0, abs=1e-11)
+
+
+@pytest.mark.promise("link-91")
+@pytest.mark.parametrize(("order", "pulse", "background"), [(64, 3.0, 0.2), (16, 40.0, 100.0), (256, 2.0, 1e-3)])
+def test_capacity_is_what_simulated_words_tell(order, pulse, background):
+    random = np.random.Generator(np.random.Philox(key=order))
+    told = []
+    for _ in range(5):
+        counts = random.poisson(background, (10_000, order)).astype(float)
+        counts[:, 0] += random.poisson(pulse, 10_000)
+        above = (counts - counts[:, :1]) * math.log1p(pulse / background)
+        told.append(math.log2(order) - np.logaddexp.reduce(above, axis=1) / math.log(2.0))
+    told = np.concatenate(told)
+    assert abs(soft_bits(order, pulse, background) - told.mean()) < 4.0 * told.std() / math.sqrt(told.size)
+
+
+@pytest.mark.promise("link-91")
+@pytest.mark.parametrize("order", [2, 16, 1024])
+def test_without_background_it_is_the_erasure_channel(order):
+    expected = -math.expm1(-1.5) * math.log2(order)
+    assert noiseless_bits(order, 1.5) == pytest.approx(expected, rel=1e-14)
+    assert soft_bits(order, 1.5, 0.0) == pytest.approx(expected, rel=1e-14)
+    little = soft_bits(order, 1.5, 1e-13)
+    assert little < expected
+    assert little == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.promise("link-91")
+@pytest.mark.parametrize(
+    ("order", "rate", "bits_per_photon"), [(16, 0.5, 2.885), (64, 1 / 3, 4.933), (128, 0.5, 5.049)]
+)
+def test_bits_per_photon_without_background_are_those_published(order, rate, bits_per_photon):
+    assert rate * math.log2(order) / least_pulse_counts(order, rate, 0.0) == pytest.approx(bits_per_photon, abs=5e-4)
+
+
+@pytest.mark.promise("link-91")
+@pytest.mark.parametrize("background", [1e-12, 1e-3, 0.3, 30.0, 1e4])
+@pytest.mark.parametrize("order", [2, 64])
+def test_the_least_pulse_has_the_capacity_and_grows_with_background(order, background):
+    least = least_pulse_counts(order, 0.4, background)
+    assert soft_bits(order, least, background) == pytest.approx(0.4 * math.log2(order), rel=1e-9)
+    assert least_pulse_counts(order, 0.4, 0.5 * background) < least
+
+
+def test_in_much_background_it_is_the_capacity_of_gaussian_slots():
+    # counts of mean b: the same as M orthogonal signals with the signal over noise n^2 / b
+    random = np.random.Generator(np.random.Philox(key=9))
+    snr, order = 6.0, 4
+    noise = random.standard_normal((400_000, order))
+    noise[:, 0] += math.sqrt(snr)
+    above = math.sqrt(snr) * (noise - noise[:, :1])
+    told = math.log2(order) - np.logaddexp.reduce(above, axis=1) / math.log(2.0)
+    found = soft_bits(order, math.sqrt(snr * 1e6), 1e6)
+    assert abs(found - told.mean()) < 4.0 * told.std() / math.sqrt(told.size) + 5e-3  # the pulse's own noise
+
+
+@pytest.mark.promise("link-25")
+@pytest.mark.parametrize("background", [0.01, 1.0, 30.0])
+@pytest.mark.parametrize("code", [(0.5, 1e-6), (0.9, 1e-3)])
+def test_no_gain_in_background_passes_the_bound_which_is_near(code, background):
+    order, rate = 16, 1e6
+    counter = receivers.PpmCounting(
+        wavelength_m=1.55e-6,
+        bandwidth_hz=1e15,
+        bit_error_ratio=code[1],
+        order=order,
+        detection_efficiency=1.0,
+        dark_count_rate_hz=background * rate,
+        code_rate=code[0],
+        code_gap_db=0.0,
+    )
+    gain, bound = 10.0 ** (float(counter.net_gain_db(rate)) / 10.0), Code(*code).ppm_counting(order, background)
+    assert 10.0**-0.13 * bound < gain <= bound * (1.0 + 1e-9)
+    assert bound <= Code(*code).ppm_counting()

@@ -1,0 +1,89 @@
+"""Coded error ratio under simulated residuals: against whole runs in memory, and what is refused."""
+
+import math
+
+import numpy as np
+import pytest
+
+from link_files import link_file
+from microrad import link
+from microrad.link.fade_series import CodedLink, FadeSeries, code
+from microrad.link.pointing.coded_residual import CodedBeam, coded_asked
+from microrad.link.pointing.outage import Exposure
+from microrad.loop.disturbance import first_order
+from microrad.loop.pointing_loop.ensemble import Span
+from microrad.loop.pointing_loop.simulated_windows import ask
+from microrad.loop.pointing_loop.traces import trace
+from microrad.loop.workbench import Controller, Loop
+from microrad.mirror.model import Mirror
+from microrad.report.fine_pointing.simulated_windows import simulated_data, simulated_view
+from microrad.report.view import views_text
+
+LOOP = Loop(
+    mirror=Mirror.of(50e-6, [1.0], [1 / 3000**2, 2 * 0.1 / 3000, 1.0]),
+    rate_hz=1000.0,
+    vibration=first_order(160e-12, 5.0, convention="per-axis", name="vibration"),
+    sensor_noise_rad=0.5e-6,
+    steps_per_sample=2,
+)
+CONTROLLER = LOOP.assembled(Controller.pid(0.0, 5e5, rate_hz=1000.0))
+SPAN, RUNS = Span(3.3, 0.3, 1), 3
+CODE = code("ccsds-k7-1-2")
+
+
+def coded(span_s=0.0, on_axis_db=3.0, ahead_rad=5e-6, runs=RUNS):
+    kind = "block" if span_s else "none"
+    beam = CodedBeam(100e-6, ahead_rad, on_axis_db, CODE, 1e-5, kind, span_s)
+    (found,) = ask([coded_asked(beam, LOOP.parts, SPAN)], LOOP.parts, CONTROLLER, SPAN, runs)
+    return found
+
+
+@pytest.mark.promise("pointing-110")
+@pytest.mark.parametrize("span_s", [0.0, 0.02, 0.5])
+def test_the_ratio_is_that_of_whole_runs_in_memory(span_s):
+    ratios, costs = [], []
+    for run in range(RUNS):
+        error = trace(LOOP.parts, CONTROLLER, SPAN, run).error_rad[300:, 0]
+        power = np.exp(-2.0 * ((np.abs(error) + 5e-6) / 100e-6) ** 2)
+        series = FadeSeries.of(power, 1e-3, "run", unit="linear", normalised="as-given")
+        one = CodedLink(CODE, series, 1e6, "block" if span_s else "none", span_s)
+        needed = CODE.snr_for(1e-5)
+        ratios.append(one.mean_ratio(needed * 10.0**0.3))
+        costs.append([one.mean_ratio(needed * 10.0 ** (0.1 * db)) for db in (0.0, 20.0)])
+    found = coded(span_s)
+    assert found.ratio.value == pytest.approx(np.mean(ratios), rel=1e-9, abs=0.0)
+    assert found.ratio.low < found.ratio.value < found.ratio.high
+    assert np.mean(costs, axis=0)[1] < 1e-5 < np.mean(costs, axis=0)[0]
+    back = coded(span_s, on_axis_db=found.penalty_db)
+    assert back.ratio.value == pytest.approx(1e-5, rel=0.03, abs=0.0)
+    assert back.penalty_db == found.penalty_db
+
+
+def test_a_longer_interleaver_costs_less_and_one_beyond_the_run_is_refused():
+    assert coded(0.5).penalty_db < coded(0.0).penalty_db - 0.1
+    with pytest.raises(ValueError, match="the interleaver spans 4 s, longer than a run, of which 3 s are left"):
+        coded(4.0)
+    assert coded(ahead_rad=400e-6).penalty_db == math.inf
+    assert coded(runs=1).ratio.high == math.inf
+
+
+def test_the_beam_is_that_of_the_link(tmp_path):
+    table = {"code": "ccsds-k7-1-2", "interleaving": "block", "interleaver": "5 ms", "bit_error_ratio": 1e-6}
+    data = link.of(link_file(tmp_path, {"communication.fading": table}).mission)
+    beam, under = CodedBeam.of(data), Exposure.stated(data)
+    assert (beam.half_angle_rad, beam.on_axis_db) == (under.fall.half_angle_rad, under.on_axis_db)
+    assert (beam.target, beam.interleaving, beam.span_s) == (1e-6, "block", 5e-3)
+    with pytest.raises(ValueError, match=r"give it the table \[communication.fading\]"):
+        CodedBeam.of(link.of(link_file(tmp_path).mission))
+
+
+@pytest.mark.promise("pointing-110")
+def test_terminal_and_data_have_the_same():
+    found = coded(0.02)
+    data = simulated_data([], None, RUNS, (), found)["coded"]
+    assert data["ratio"] == {"value": found.ratio.value, "low": found.ratio.low, "high": found.ratio.high}
+    assert data["penalty_db"] == found.penalty_db
+    said = " ".join(views_text(simulated_view([], None, RUNS, (), found).blocks, 100).split())
+    assert "with a block interleaver over 20 ms, at 3.00 dB more on the axis" in said
+    assert f"power that pointing costs {found.penalty_db:.2f} dB" in said
+    assert "coded" not in simulated_data([], None, RUNS)

@@ -1,0 +1,352 @@
+"""Light into fibres and onto detectors: against overlap integrals of its own, random errors, and published figures."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.special import j0, j1
+
+from microrad.link import beams, coupling
+from microrad.link.coupling import Aberrations, BothEnds, Disk, Losses, Pupil, SingleModeFibre
+from microrad.link.pointing import MovingEnd, fades, fades_of_both
+from microrad.link.radial_error import Jitter, radial_steps
+
+WAVE_M, APERTURE_M, URAD = 1.55e-6, 0.15, 1e-6
+EVEN = Pupil(APERTURE_M, WAVE_M)
+BEST = replace(EVEN, truncation=coupling.best_truncation())
+BENT = Aberrations(defocus_m=60e-9, astigmatism_m=50e-9, coma_m=70e-9, spherical_m=-40e-9)
+ROUND = SingleModeFibre(replace(BEST, obscuration=0.3, aberrations=Aberrations(defocus_m=80e-9, spherical_m=30e-9)))
+UNLIKE = SingleModeFibre(replace(BEST, obscuration=0.3, aberrations=BENT, shift=0.1), 1.0 * URAD)
+DETECTOR = Disk(replace(EVEN, obscuration=0.3), 0.0, 9.0 * URAD)
+
+
+# --------------------------------------------------------------------------------------- integrals of the tests' own
+def pupil_points(pupil, radii, angles):
+    """Places in a pupil in Cartesian coordinates over its radius, and the area of each."""
+    node, weight = np.polynomial.legendre.leggauss(radii)
+    width = (pupil.stop - pupil.obscuration) / 2.0
+    rho, turn = pupil.obscuration + width * (node + 1.0), 2.0 * math.pi * np.arange(angles) / angles
+    area = np.repeat(weight * width * rho * 2.0 * math.pi / angles, angles)
+    return np.outer(rho, np.cos(turn)).ravel(), np.outer(rho, np.sin(turn)).ravel(), area
+
+
+def wave(pupil, x, y):
+    """The light in a pupil: Noll's polynomials in Cartesian coordinates."""
+    a, square = pupil.aberrations, x**2 + y**2
+    error = (
+        a.defocus_m * math.sqrt(3.0) * (2.0 * square - 1.0)
+        + a.astigmatism_m * math.sqrt(6.0) * (x**2 - y**2)
+        + a.coma_m * math.sqrt(8.0) * (3.0 * square * x - 2.0 * x)
+        + a.spherical_m * math.sqrt(5.0) * (6.0 * square**2 - 6.0 * square + 1.0)
+    )
+    return np.exp(2j * math.pi * error / pupil.wavelength_m)
+
+
+def overlap(fibre, x_rad, y_rad):
+    """Square of the overlap of the light with the mode, over the light in the open aperture."""
+    pupil, scale = fibre.pupil, math.pi * fibre.pupil.diameter_m / fibre.pupil.wavelength_m
+    x, y, area = pupil_points(pupil, 200, 256)
+    mode = math.sqrt(2.0 / math.pi) * pupil.truncation
+    mode = mode * np.exp(-(pupil.truncation**2) * ((x - pupil.shift) ** 2 + y**2))
+    tilt = np.exp(1j * scale * ((x_rad + fibre.offset_rad) * x + y_rad * y))
+    return abs(np.sum(area * mode * wave(pupil, x, y) * tilt)) ** 2 / (math.pi * (1.0 - pupil.obscuration**2))
+
+
+def fallen(disk, x_rad, y_rad, radii=24, angles=40):
+    """The light on a disk: the field at places in it by a sum over the pupil."""
+    pupil, scale = disk.pupil, math.pi * disk.pupil.diameter_m / disk.pupil.wavelength_m
+    x, y, area = pupil_points(pupil, 48, 72)
+    u, v, piece = pupil_points(Pupil(1.0, 1.0), radii, angles)
+    light = area * wave(pupil, x, y)
+    across = x_rad + disk.offset_rad + disk.radius_rad * u, y_rad + disk.radius_rad * v
+    field = np.exp(1j * scale * (np.outer(across[0], x) + np.outer(across[1], y))) @ light
+    total = np.sum(piece * np.abs(field) ** 2) * (disk.radius_rad * scale / (2.0 * math.pi)) ** 2
+    return total / (math.pi * (1.0 - pupil.obscuration**2))
+
+
+# --------------------------------------------------------------------------------------------------------- published
+def printed(value, text):
+    return f"{value:.{len(text.partition('.')[2])}f}" == text
+
+
+@pytest.mark.promise("link-73")
+def test_a_plane_wave_couples_as_published():
+    """Ruilier 1998, Dikmelik and Davidson 2005; the shares without turbulence agree with the overlap."""
+    best = coupling.best_truncation()
+    assert printed(best, "1.12091") and printed(float(SingleModeFibre(BEST).share(0.0)), "0.814529")
+    assert pytest.approx(best, abs=5e-5) == beams.BEST_TRUNCATION
+    of_turbulence = [coupling.turbulent_share(a, 1.0) for a in np.linspace(1.2, 1.27, 71)]
+    assert printed(max(of_turbulence), "0.44615")
+    assert coupling.turbulent_share(best, 0.0) == pytest.approx(float(SingleModeFibre(BEST).share(0.0)), rel=1e-12)
+    assert coupling.turbulent_share(best, 1e4) < 1e-3
+
+
+@pytest.mark.promise("link-72")
+def test_the_best_mode_behind_an_obscuration_is_that_of_a_search():
+    for hole in (0.0, 0.2, 0.5, 0.9):
+        best = coupling.best_truncation(hole)
+        shares = [
+            float(SingleModeFibre(Pupil(1.0, 1e-6, hole, truncation=a)).share(0.0)) for a in best + np.r_[-1:2] / 50
+        ]
+        assert shares[1] > shares[0] and shares[1] > shares[2]
+        closed = 2.0 * (math.exp(-((best * hole) ** 2)) - math.exp(-(best**2))) ** 2 / best**2 / (1.0 - hole**2)
+        assert shares[1] == pytest.approx(closed, rel=1e-12)
+
+
+@pytest.mark.promise("link-73")
+def test_light_on_a_detector_is_that_of_the_airy_pattern():
+    """1 - J0^2 - J1^2 (Rayleigh 1881): 0.8378 within the first dark ring."""
+    x = np.array([0.5, 2.0, 3.8317, 10.0, 60.0])
+    found = [float(Disk(EVEN, 0.0, each / EVEN.per_rad).share(0.0)) for each in x]
+    assert_allclose(found, 1.0 - j0(x) ** 2 - j1(x) ** 2, rtol=1e-7)
+    assert printed(found[2], "0.838")
+
+
+# --------------------------------------------------------------------------------------------- overlap by quadrature
+@pytest.mark.promise("link-72", "link-73", "link-74")
+@pytest.mark.parametrize(
+    "fibre",
+    [
+        SingleModeFibre(BEST),
+        SingleModeFibre(replace(BEST, truncation=0.4)),
+        SingleModeFibre(replace(BEST, truncation=2.5, obscuration=0.5), 3.0 * URAD),
+        ROUND,
+        UNLIKE,
+        SingleModeFibre(replace(BEST, shift=0.3)),
+        SingleModeFibre(replace(BEST, aberrations=Aberrations(200e-9, -775e-9, 775e-9, 300e-9))),
+    ],
+    ids=[
+        "best",
+        "wide",
+        "narrow, obscured, off axis",
+        "defocused",
+        "bent, tilted, off axis",
+        "tilted",
+        "as bent as may be",
+    ],
+)
+def test_a_fibre_takes_the_overlap_of_the_fields(fibre):
+    places = [(0.0, 0.0), (3.0, 0.0), (-4.0, 2.0), (0.0, 8.0)]
+    expected = [overlap(fibre, x * URAD, y * URAD) for x, y in places]
+    found = [float(fibre.share(x * URAD, y * URAD)) for x, y in places]
+    assert_allclose(found, expected, rtol=1e-6, atol=1e-9)
+
+
+@pytest.mark.promise("link-73")
+@pytest.mark.parametrize(
+    "disk",
+    [
+        Disk(EVEN, 0.0, 8.0 * URAD),
+        DETECTOR,
+        Disk(replace(EVEN, obscuration=0.3, aberrations=BENT), 2.0 * URAD, 8.0 * URAD),
+        Disk(coupling.narrowed(replace(EVEN, obscuration=0.2, aberrations=BENT), 0.1, 0.5), 0.0, 15.0 * URAD),
+    ],
+    ids=["even", "obscured", "bent, off axis", "multi-mode fibre of a narrow cone"],
+)
+def test_a_disk_takes_the_light_that_falls_on_it(disk):
+    places = [(0.0, 0.0), (5.0, 0.0), (-4.0, 6.0), (0.0, 12.0)]
+    expected = [fallen(disk, x * URAD, y * URAD) for x, y in places]
+    found = [float(disk.share(x * URAD, y * URAD)) for x, y in places]
+    assert_allclose(found, expected, rtol=1e-6, atol=1e-9)
+
+
+@pytest.mark.promise("link-72", "link-73")
+def test_all_light_falls_on_a_wide_detector_but_not_through_a_narrow_cone():
+    wide = Disk(replace(EVEN, obscuration=0.3, aberrations=BENT), 0.0, 2e-3)
+    beyond = 2.0 / (math.pi * EVEN.per_rad * 2e-3 * 0.7)  # an Airy pattern's far rings, of the edges of a ring
+    assert float(wide.share(0.0)) == pytest.approx(1.0 - beyond, abs=1e-4)
+    assert 1.0 - 3.0 * beyond < float(wide.share(1e-3)) < 1.0 - beyond
+    cone = coupling.narrowed(EVEN, 0.1, 0.5)
+    passed = (2.0 * 0.5 * math.tan(math.asin(0.1)) / APERTURE_M) ** 2
+    assert float(Disk(cone, 0.0, 2e-3).share(0.0)) == pytest.approx(passed, abs=3e-3)
+    assert coupling.narrowed(EVEN, 0.5, 0.5) == EVEN
+
+
+def test_beyond_the_edge_of_a_wide_detector_little_light_falls_on_it():
+    """By the mean of the far rings, of which 2 / (pi x) lie beyond x; an edge beyond 256 is more curved than it is."""
+    even = Pupil(1.0, WAVE_M)
+    for radius_rad, error in ((60e-6, 0.03), (200e-6, 0.25)):
+        disk, radius = Disk(even, 0.0, radius_rad), even.per_rad * radius_rad
+        for share in (1.2, 1.5):
+            at = share * radius
+            turn = np.linspace(-math.asin(1.0 / share), math.asin(1.0 / share), 20001)
+            chord = 2.0 * np.sqrt(np.maximum(radius**2 - (at * np.sin(turn)) ** 2, 0.0)) / (at**2 - radius**2)
+            expected = float(np.trapezoid(chord, turn)) / math.pi**2
+            assert float(disk.share(share * radius_rad)) == pytest.approx(expected, rel=error)
+        assert radius_rad < disk.error_rad(10.0) < 1.2 * radius_rad
+        assert 1.1 * radius_rad < disk.error_rad(28.0) < 2.0 * radius_rad
+        assert math.isinf(disk.error_rad(70.0))
+
+
+def test_a_mode_that_is_narrow_in_the_aperture_takes_its_part_or_nothing():
+    for a in (30.0, 1e3, 1e5):
+        assert float(SingleModeFibre(replace(EVEN, truncation=a)).share(0.0)) == pytest.approx(2.0 / a**2, rel=1e-9)
+    for gone in (replace(EVEN, truncation=100.0, obscuration=0.3), replace(BEST, shift=7.0)):
+        assert float(SingleModeFibre(gone).loss_db(0.0)) == pytest.approx(150.0)
+
+
+def test_off_its_axis_a_receiver_loses_what_its_far_field_as_a_transmitter_has_lost():
+    """Reciprocity, with the beam that leaves an aperture."""
+    for hole in (0.0, 0.4):
+        error = np.array([0.0, 2.0, 6.0, 11.0]) * URAD
+        far = beams.LitAperture(APERTURE_M, WAVE_M, 1.2, hole).loss_db(error)
+        fibre = SingleModeFibre(replace(EVEN, obscuration=hole, truncation=1.2))
+        assert_allclose(fibre.loss_db(error) - fibre.loss_db(0.0), far, rtol=1e-6, atol=1e-7)
+        assert fibre.error_rad(3.0) == pytest.approx(
+            beams.LitAperture(APERTURE_M, WAVE_M, 1.2, hole).error_rad(3.0), rel=1e-6
+        )
+
+
+@pytest.mark.promise("link-72")
+def test_a_static_error_counts_in_its_worst_direction():
+    angle = np.linspace(0.0, 2.0 * math.pi, 721)
+    every = UNLIKE.loss_db(4.0 * URAD * np.cos(angle), 4.0 * URAD * np.sin(angle))
+    assert UNLIKE.worst_loss_db(4.0 * URAD) == pytest.approx(float(np.max(every)), abs=1e-2)
+    assert np.max(every) - np.min(every) > 0.5
+    assert ROUND.worst_loss_db(4.0 * URAD) == pytest.approx(float(ROUND.loss_db(0.0, -4.0 * URAD)), abs=1e-12)
+
+
+# ------------------------------------------------------------------------------------------- against random errors
+SENT = Jitter((2.0 * URAD, 0.0), (1.5 * URAD, 2.5 * URAD))
+RECEIVED = Jitter((0.5 * URAD, -0.3 * URAD), (1.1 * URAD, 0.8 * URAD))
+BEAMS = {
+    "Gaussian": beams.GaussianFall(2.0 * WAVE_M / (math.pi * 0.05)),
+    "pattern": beams.LitAperture(0.05, WAVE_M, 1.12, 0.2),
+}
+
+
+def drawn(seed, count, wider, jitter):
+    """Errors of a wider jitter and the weights that make them those of the jitter itself."""
+    deviate = np.random.default_rng(seed).standard_normal((2, count)) * wider
+    weight = wider**2 * np.exp(-0.5 * np.sum(deviate**2, axis=0) * (1.0 - wider**-2))
+    x, y = (b + s * d for b, s, d in zip(jitter.bias_rad, jitter.rms_rad, deviate, strict=True))
+    return x, y, weight
+
+
+def of_both(beam, end, twin=False):
+    received = coupling.of_radii(end, *radial_steps(SENT)) if twin else coupling.of_jitter(end, RECEIVED)
+    return BothEnds(coupling.of_beam(beam, *radial_steps(SENT)), received)
+
+
+def sampled_db(beam, end, outage, found_db, twin=False):
+    """How far the loss that random errors exceed for the outage is from one (dB), and the error of that (dB)."""
+    wider = 1.0 if outage > 0.01 else 1.6 if outage > 1e-4 else 2.2
+    x, y, weight = drawn(1, 600_000, wider, SENT)
+    if twin:  # as far off the axis as the transmitter, from each direction
+        u, v, other = drawn(2, 600_000, wider, SENT)
+        turn = np.random.default_rng(3).uniform(0.0, 2.0 * math.pi, u.size)
+        u, v = np.hypot(u, v) * np.cos(turn), np.hypot(u, v) * np.sin(turn)
+    else:
+        u, v, other = drawn(2, 600_000, wider, RECEIVED)
+    sent = np.maximum.accumulate(beam.loss_db(np.linspace(0.0, 60.0 * URAD, 60001)))  # nothing is gained in a side lobe
+    loss = np.interp(np.hypot(x, y), np.linspace(0.0, 60.0 * URAD, 60001), sent) + end.loss_db(u, v) - end.loss_db(0.0)
+    hit = weight * other * (loss > found_db)
+    step = 0.05
+    near = np.mean(weight * other * (np.abs(loss - found_db) < step)) / (2.0 * step)  # share of the time for each dB
+    return (np.mean(hit) - outage) / near, np.std(hit) / math.sqrt(hit.size) / near
+
+
+@pytest.mark.promise("link-74")
+@pytest.mark.parametrize("outage", [0.1, 1e-3, 1e-6])
+@pytest.mark.parametrize("end", [ROUND, UNLIKE, DETECTOR], ids=["fibre", "bent fibre", "detector"])
+@pytest.mark.parametrize("beam", BEAMS.values(), ids=BEAMS)
+def test_both_ends_lose_what_random_errors_lose(beam, end, outage):
+    """By importance sampling; each within 0.01 dB, and what the samples leave open."""
+    found = of_both(beam, end)
+    off, spread = sampled_db(beam, end, outage, found.quantile_db(outage))
+    assert spread < 0.02 and abs(off) < 0.01 + 3.0 * spread
+    assert found.beyond(found.quantile_db(outage)) == pytest.approx(outage, rel=1e-6)
+
+
+@pytest.mark.promise("link-72", "link-75")
+def test_a_twin_loses_what_the_transmitters_errors_lose_there():
+    for end in (ROUND, UNLIKE):
+        found = of_both(BEAMS["Gaussian"], end, twin=True)
+        off, spread = sampled_db(BEAMS["Gaussian"], end, 1e-3, found.quantile_db(1e-3), twin=True)
+        assert spread < 0.02 and abs(off) < 0.01 + 3.0 * spread
+
+
+def test_the_mean_power_of_both_ends_is_the_product_of_the_means():
+    found = of_both(BEAMS["Gaussian"], UNLIKE)
+    x, y, _ = drawn(5, 600_000, 1.0, SENT)
+    u, v, _ = drawn(6, 600_000, 1.0, RECEIVED)
+    power = 10.0 ** (-(BEAMS["Gaussian"].loss_db(np.hypot(x, y)) + UNLIKE.loss_db(u, v) - UNLIKE.loss_db(0.0)) / 10.0)
+    assert found.mean_db == pytest.approx(-10.0 * math.log10(np.mean(power)), abs=0.01)
+    assert found.sum.mean_db == pytest.approx(found.mean_db, abs=1e-3)
+    assert float(found.sum.beyond(found.quantile_db(1e-3))) == pytest.approx(1e-3, rel=0.02)
+
+
+def test_one_end_that_stands_still_adds_its_loss():
+    still, moving = Losses.single(1.5), coupling.of_jitter(ROUND, RECEIVED)
+    alone = BothEnds(Losses.single(0.0), moving)
+    for outage in (0.3, 1e-5):
+        assert BothEnds(still, moving).quantile_db(outage) == pytest.approx(1.5 + alone.quantile_db(outage), abs=1e-8)
+    assert BothEnds(still, Losses.single(0.5)).quantile_db(0.1) == pytest.approx(2.0)
+    assert (
+        BothEnds(still, Losses.single(0.5)).beyond(1.9) == 1.0
+        and BothEnds(still, Losses.single(0.5)).beyond(2.1) == 0.0
+    )
+    unmoved = coupling.of_jitter(UNLIKE, Jitter((1.0 * URAD, 2.0 * URAD), (0.0, 0.0)))
+    assert unmoved.loss_db[0] == pytest.approx(float(UNLIKE.loss_db(1.0 * URAD, 2.0 * URAD) - UNLIKE.loss_db(0.0)))
+
+
+# ------------------------------------------------------------------------------------------------------------ fades
+OURS = MovingEnd(SENT, (600.0 * URAD, 900.0 * URAD), 12.0 * URAD)
+THEIRS = MovingEnd(RECEIVED, (200.0 * URAD, 500.0 * URAD), 5.0 * URAD)
+
+
+@pytest.mark.promise("link-74")
+def test_fades_of_both_ends_are_those_of_errors_and_velocities_drawn():
+    """The mean outward speed of the loss at its margin, by a narrow band of drawn errors."""
+    margin, band, count = 1.5, 0.03, 2_000_000
+    draw = np.random.default_rng(7).standard_normal
+    loss, speed = np.zeros(count), np.zeros(count)
+    for end in (OURS, THEIRS):
+        for b, s, v in zip(end.jitter.bias_rad, end.jitter.rms_rad, end.velocity_rms_rad_s, strict=True):
+            error = b + s * draw(count)
+            per = 20.0 / math.log(10.0) / end.half_angle_rad**2
+            loss += per * error**2
+            speed += 2.0 * per * error * v * draw(count)
+    there = np.abs(loss - margin) < band
+    rising = np.where(there, np.maximum(speed, 0.0), 0.0) / (2.0 * band)
+    found = fades_of_both(OURS, THEIRS, margin)
+    spread = np.std(rising) / math.sqrt(count)
+    assert float(found.per_second) == pytest.approx(np.mean(rising), abs=4.0 * spread) and spread < 0.02 * np.mean(
+        rising
+    )
+    assert float(found.share_of_time) == pytest.approx(np.mean(loss > margin), rel=0.01)
+    assert float(found.mean_duration_s) == pytest.approx(float(found.share_of_time / found.per_second))
+
+
+def test_fades_of_an_end_beside_one_that_hardly_moves_are_its_own():
+    tiny = Jitter((0.0, 0.0), (1e-10, 1e-10))
+    alone = fades(SENT, OURS.velocity_rms_rad_s, OURS.half_angle_rad, 3.0)
+    beside = fades_of_both(OURS, MovingEnd(tiny, (1e-9, 1e-9), 5.0 * URAD), 3.0)
+    assert float(beside.per_second) == pytest.approx(float(alone.per_second), rel=1e-3)
+    assert float(beside.share_of_time) == pytest.approx(float(alone.share_of_time), rel=1e-3)
+    other = fades_of_both(MovingEnd(tiny, (1e-9, 1e-9), 12.0 * URAD), OURS, 3.0)
+    assert float(other.per_second) == pytest.approx(float(alone.per_second), rel=1e-3)
+
+
+# --------------------------------------------------------------------------------------------------------- refusals
+@pytest.mark.promise("link-73")
+@pytest.mark.parametrize(
+    ("made", "said"),
+    [
+        (lambda: SingleModeFibre(EVEN), "the mode of a fibre has a radius"),
+        (lambda: Disk(EVEN), "the radius is 0 rad"),
+        (lambda: coupling.best_truncation(1.0), "the obscuration is 1"),
+        (lambda: coupling.turbulent_share(0.0, 1.0), "the truncation is 0"),
+        (lambda: coupling.turbulent_share(1.0, -1.0), "the ratio of the areas is -1"),
+        (lambda: coupling.narrowed(Pupil(0.15, 1e-6, 0.5), 0.05, 0.5), "no light passes"),
+        (lambda: Pupil(0.15, 1e-6, 1.0), "obscuration"),
+        (lambda: Pupil(0.15, 1e-6, truncation=4.0, shift=2.1), "truncation times shift is 8.4.*at most 8"),
+        (lambda: Pupil(0.15, 1e-6, aberrations=Aberrations(coma_m=-0.6e-6)), "coma_m is 600 nm.*half a wavelength"),
+        (lambda: Pupil(0.15, 1e-6, aberrations=Aberrations(defocus_m=math.nan)), "defocus_m"),
+    ],
+)
+def test_what_takes_no_light_is_refused(made, said):
+    with pytest.raises(ValueError, match=said):
+        made()

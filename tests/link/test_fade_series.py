@@ -1,0 +1,450 @@
+"""Coded error rate over series of received power: against bit-true simulations of the same, and what is refused."""
+
+import math
+from dataclasses import replace
+from itertools import pairwise
+
+import h5py
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.optimize import brentq
+
+import viterbi
+from microrad.link.fade_series import (
+    CodedLink,
+    FadeSeries,
+    FadeSeriesError,
+    Threshold,
+    code,
+    coded_fading,
+    read_fade_series,
+)
+from microrad.link.fade_series.coded import cost
+from microrad.link.fade_series.codes import mutual_information
+from microrad.link.fade_series.records import part
+from microrad.mission.codes import codes
+
+CODE = code("ccsds-k7-1-2")
+PERIOD_S, BITS = 1e-5, 512  # of a sample, and bits of information in one
+RATE = BITS / PERIOD_S
+
+
+def slow(samples, length, seed):
+    """A smooth Gaussian process of mean 0 and deviation 1 whose fades are about so many samples long."""
+    freq = np.fft.rfftfreq(samples)
+    white = np.fft.rfft(np.random.default_rng(seed).standard_normal(samples))
+    x = np.fft.irfft(white * np.exp(-((freq * length * math.pi) ** 2)), samples)
+    return (x - x.mean()) / x.std()
+
+
+def scintillation(samples, length, seed, deviation=0.5):
+    return np.exp(deviation * slow(samples, length, seed))
+
+
+def beam(samples, length, seed, jitter=0.4):
+    """A Gaussian beam that jitters about both axes, by so many half angles."""
+    return np.exp(-2.0 * jitter**2 * (slow(samples, length, seed) ** 2 + slow(samples, length, seed + 50) ** 2))
+
+
+def rayleigh(samples, length, seed):
+    return slow(samples, length, seed) ** 2 + slow(samples, length, seed + 50) ** 2
+
+
+def series_of(power, **others):
+    named = {"unit": "linear", "normalised": "mean", **others}
+    return FadeSeries.of(power, PERIOD_S, "series", **named)
+
+
+def linked(series, span=0, kind="block", coded=CODE, rate=RATE):
+    return CodedLink(coded, series, rate, kind if span else "none", span * PERIOD_S)
+
+
+def within_a_tenth(series, snr_db, span, runs, least=300):
+    """Whether the simulated error ratio is one that 0.1 dB more or less of power explains; over whole blocks."""
+    whole = part(series, 0, series.power.size // max(span, 1) * max(span, 1))
+    power, words = np.repeat(whole.power, 2 * BITS), whole.power.size // 4
+    wrong = bits = 0
+    for run in range(runs):
+        order = None
+        if span:
+            order = viterbi.block_order(power.size, span * 2 * BITS, (run, 2))
+        found = viterbi.wrong_bits(power, 10.0 ** (snr_db / 10.0), (run, 1), words, order)
+        wrong, bits = wrong + int(found.sum()), bits + found.size
+    assert wrong >= least
+    link = linked(series, span)
+    more, less = (link.mean_ratio(10.0 ** ((snr_db + each) / 10.0)) for each in (0.1, -0.1))
+    assert more < wrong / bits < less, (more, wrong / bits, less)
+    return wrong / bits
+
+
+def steps(samples, dark, seed):
+    """Powers of which so many are 16 dB below the others, at random."""
+    return np.where(np.random.default_rng(seed).random(samples) < dark, 0.025, 1.0)
+
+
+SLOW, FAST = scintillation(1024, 30, 1), beam(1024, 4, 3)
+
+
+@pytest.mark.promise("link-87")
+@pytest.mark.parametrize(
+    ("power", "snr_db", "span", "runs"),
+    [
+        (np.ones(1024), -0.4, 0, 1),
+        (SLOW, 2.5, 0, 2),
+        (SLOW, 2.3, 8, 2),  # below the fades
+        (SLOW, 2.0, 32, 2),  # about as long as they are
+        (SLOW, 1.3, 256, 2),  # above them
+        (FAST, 0.3, 64, 1),
+        (FAST, 0.0, 1024, 2),
+    ],
+)
+def test_the_error_ratio_is_that_of_a_bit_true_simulation_over_the_same_series(power, snr_db, span, runs):
+    assert 2e-4 < within_a_tenth(series_of(power), snr_db, span, runs) < 4e-3
+
+
+@pytest.mark.promise("link-87")
+@pytest.mark.parametrize(
+    ("power", "snr_db", "span"),
+    [(steps(1024, 0.4, 2), 0.0, 1024), (rayleigh(1024, 60, 2), 5.0, 100), (rayleigh(1024, 60, 2), 6.0, 30)],
+)
+def test_and_it_is_where_a_window_leaves_many_errors(power, snr_db, span):
+    """There the mutual information counts: without it 0.3 dB would be missed."""
+    assert 0.01 < within_a_tenth(series_of(power), snr_db, span, 1) < 0.1
+
+
+@pytest.mark.promise("link-87")
+def test_nearest_paths_over_exponential_powers_are_mistaken_as_with_so_many_receivers():
+    """Of ten independent exponential powers, added: Proakis, Digital Communications, equation 14-4-15."""
+    alone = replace(CODE, share=(0.0,) * len(CODE.share))
+    for snr in (0.5, 1.0, 2.0):
+        wrong = (1.0 - math.sqrt(snr / (1.0 + snr))) / 2.0
+        pairs = wrong**10 * sum(math.comb(9 + k, k) * (1.0 - wrong) ** k for k in range(10))
+        like = brentq(lambda each, pairs=pairs: math.log(0.5 * math.erfc(math.sqrt(10.0 * each)) / pairs), 0.01, 10.0)
+        quantiles = -np.log((np.arange(200_000) + 0.5) / 200_000)
+        means = [each.mean(keepdims=True) for each in alone.parts(snr * quantiles)]
+        assert float(alone.ratio(means)[0]) == pytest.approx(float(CODE.at(like)), rel=0.01, abs=0.0)
+
+
+@pytest.mark.promise("link-85")
+@pytest.mark.parametrize("kind", ["block", "convolutional"])
+def test_windows_are_those_of_their_interleaver(kind):
+    series, at = series_of(SLOW), {"block": range(0, 1017, 8), "convolutional": range(1017)}
+    parts = CODE.parts(1.6 * series.power)
+    means = [np.array([each[k : k + 8].mean() for k in at[kind]]) for each in parts]
+    assert_allclose(linked(series, 8, kind).ratios(1.6), CODE.ratio(means), rtol=1e-6)
+
+
+@pytest.mark.promise("link-87")
+@pytest.mark.endurance
+@pytest.mark.parametrize(
+    ("power", "snr_db", "span", "runs"),
+    [
+        (np.ones(1024), 0.45, 0, 40),
+        (SLOW, 4.0, 0, 40),
+        (SLOW, 4.5, 0, 60),
+        (SLOW, 4.0, 8, 40),
+        (SLOW, 3.2, 32, 40),
+        (SLOW, 2.6, 64, 40),
+        (SLOW, 1.5, 256, 40),
+        (SLOW, 1.3, 1024, 40),
+        (FAST, 15.4, 0, 10),
+        (FAST, 1.6, 32, 40),
+        (FAST, 1.2, 256, 40),
+        (beam(1024, 30, 3), 6.0, 0, 40),
+        (beam(1024, 30, 3), 5.7, 32, 20),
+        (beam(1024, 30, 3), 2.5, 128, 40),
+        (beam(1024, 30, 3), 1.2, 1024, 40),
+        (scintillation(1024, 30, 2, 0.9), 10.2, 0, 20),
+        (scintillation(1024, 30, 2, 0.9), 9.1, 32, 20),
+        (scintillation(1024, 30, 2, 0.9), 3.0, 1024, 40),
+    ],
+)
+def test_and_so_it_is_where_errors_are_rare(power, snr_db, span, runs):
+    ratio = within_a_tenth(series_of(power), snr_db, span, runs)
+    assert 3e-6 < ratio < 2e-3
+
+
+@pytest.mark.promise("link-87")
+def test_at_constant_power_the_code_has_the_published_gain_and_the_union_bound_above_it():
+    """4.2 dB of Eb/N0 at 1e-5 with eight levels of soft decision, CCSDS 130.1-G; as many as one likes gain a tenth."""
+    needed_db = 10.0 * math.log10(CODE.snr_for(1e-5) / CODE.rate)
+    assert 4.05 < needed_db < 4.2
+    for db in (0.0, 0.5, 1.0, 2.0):
+        snr = 10.0 ** (db / 10.0)
+        bound = sum(w * 0.5 * math.erfc(math.sqrt(d * snr)) for d, w in zip(CODE.distances, CODE.weights, strict=True))
+        assert 0.6 * bound < float(CODE.at(snr)) < bound
+    assert float(CODE.at(1e-6)) == pytest.approx(0.5, rel=1e-3, abs=0.0)
+    levels = np.linspace(-20.0, 8.0, 300)
+    assert np.all(np.diff(CODE.at(10.0 ** (levels / 10.0))) < 0.0)
+    assert_allclose(CODE.ratio(CODE.parts(10.0 ** (levels / 10.0))), CODE.at(10.0 ** (levels / 10.0)), rtol=2e-3)
+
+
+def test_the_distances_are_those_of_the_trellis():
+    """All paths from the state 0 back to it, counted by the weight of their symbols and by their ones."""
+    front, weights = {(32, sum(s < 0 for s in viterbi.signs(64))): (1, 1)}, {}
+    while front:
+        later = {}
+        for (state, distance), (paths, ones) in front.items():
+            for bit in (0, 1):
+                register = state | bit << 6
+                at = (register >> 1, distance + sum(s < 0 for s in viterbi.signs(register)))
+                if at[1] > 18:
+                    continue
+                more = ones + bit * paths
+                if at[0] == 0:
+                    weights[at[1]] = weights.get(at[1], 0) + more
+                else:
+                    p, o = later.get(at, (0, 0))
+                    later[at] = p + paths, o + more
+        front = later
+    assert sorted(weights.items()) == list(zip(CODE.distances, CODE.weights, strict=True))
+
+
+def test_the_mutual_information_is_that_of_a_quadrature():
+    x, w = np.polynomial.hermite_e.hermegauss(80)
+    for snr in (0.05, 0.3, 1.0, 3.0):
+        log = np.log2(1.0 + np.exp(-4.0 * snr - 2.0 * math.sqrt(2.0 * snr) * x))
+        exact = 1.0 - np.sum(w * log) / np.sum(w)
+        assert float(mutual_information(np.array(snr))) == pytest.approx(exact, rel=0.0, abs=1.5e-3)
+
+
+@pytest.mark.promise("link-87")
+def test_without_an_interleaver_the_mean_is_that_over_all_times_and_with_a_long_one_that_of_the_mixture():
+    series = series_of(SLOW)
+    alone = linked(series).mean_ratio(1.6)
+    assert alone == pytest.approx(float(np.mean(CODE.at(1.6 * series.power))), rel=2e-3, abs=0.0)
+    shuffled = series_of(np.random.default_rng(1).permutation(SLOW))
+    assert linked(shuffled).mean_ratio(1.6) == pytest.approx(alone, rel=1e-9, abs=0.0)
+    both = linked(series, 1024).mean_ratio(1.6), linked(shuffled, 1024).mean_ratio(1.6)
+    assert both[0] == pytest.approx(both[1], rel=1e-9, abs=0.0)
+    assert 0.0 < both[0] < 0.2 * alone
+    sliding = linked(series, 1000, "convolutional").mean_ratio(1.6)
+    assert 0.5 * both[0] < sliding < 2.0 * both[0]
+
+
+@pytest.mark.promise("link-86")
+def test_constant_power_costs_nothing_and_fades_cost_less_the_longer_the_interleaver():
+    found = coded_fading(linked(series_of(np.ones(1024)), 16), 1.0, 1e-5)
+    assert found.penalty_db == pytest.approx(0.0, abs=2e-3)
+    assert found.ratio.value < 1e-5
+    assert (found.lost.value, found.fades.share) == (0.0, 0.0)
+    assert np.allclose(found.curve.penalty_db, 0.0, atol=2e-3)
+    faded = coded_fading(linked(series_of(scintillation(1 << 15, 30, 7)), 64), 3.0, 1e-5)
+    costs = faded.curve.penalty_db
+    assert faded.curve.span_s[0] == 0.0
+    assert costs[0] > faded.penalty_db > costs[-1] > 0.3
+    assert all(b < a + 0.05 for a, b in pairwise(costs))
+    assert faded.margin_left_db == faded.margin_db - faded.penalty_db < 0.0
+    assert faded.ratio.low < faded.ratio.value < faded.ratio.high
+    assert faded.ratio.value > 1e-5
+    assert 0.0 < faded.lost.low < faded.lost.value < faded.lost.high < 0.5
+
+
+@pytest.mark.promise("link-86")
+def test_the_penalty_brings_the_mean_back_and_no_power_makes_up_for_darkness():
+    series = series_of(SLOW)
+    link = linked(series, 32)
+    penalty = link.penalty_db(1e-6)
+    snr = CODE.snr_for(1e-6) * 10.0 ** (penalty / 10.0)
+    assert link.mean_ratio(snr * 1.0005) < 1e-6 < link.mean_ratio(snr / 1.0005)
+    dark = np.ones(1024)
+    dark[100:140] = 0.0
+    assert linked(series_of(dark)).penalty_db(1e-6) == math.inf
+    assert linked(series_of(dark), 512).penalty_db(1e-6) < 2.0
+
+
+def test_what_the_fades_cost_is_found_once_for_all_rates_whose_words_are_as_many_samples():
+    series = series_of(SLOW)
+    found = cost(linked(series, 32), 1e-6)
+    assert cost(linked(series, 32, rate=3.0 * RATE), 1e-6) is found
+    assert cost(linked(series, 64), 1e-6) is not found
+    long = linked(series, rate=35.0 / (20.4 * PERIOD_S))
+    assert long.window == 20
+    assert cost(long, 1e-6)[0] == long.penalty_db(1e-6)
+    assert cost(linked(series), 1e-6)[0] == linked(series).penalty_db(1e-6) > found[0]
+
+
+def test_a_block_code_is_lost_where_its_words_hold_too_little():
+    """A word over ten samples of which some are dark: it needs the mean of the mutual information, counted by hand."""
+    power = np.ones(1000)
+    power[np.arange(1000) // 10 % 4 == 0] = 0.2
+    block = Threshold("a block code", 0.5, 10 * BITS, threshold_snr=0.5)
+    link = linked(series_of(power, normalised="as-given"), coded=block)
+    told = mutual_information(np.array([0.2, 1.0]) * 0.8), mutual_information(np.array(0.5))
+    assert told[0][0] < told[1] < told[0][1]
+    assert link.window == 10
+    assert link.mean_ratio(0.8) == 0.25
+    assert link.mean_ratio(2.6) == 0.0
+    assert link.penalty_db(0.1) == pytest.approx(10.0 * math.log10(5.0), abs=2e-3)
+    assert linked(series_of(power, normalised="as-given"), 40, coded=block).mean_ratio(0.8) == 0.0
+
+
+@pytest.mark.promise("link-86")
+def test_fades_are_counted_by_hand():
+    power = np.ones(1000)
+    for first, length in ((0, 3), (100, 1), (200, 4), (300, 10), (995, 5)):
+        power[first : first + length] = 0.1
+    found = series_of(power, normalised="largest").fades(0.5)
+    assert found.share == pytest.approx(0.023, rel=1e-12, abs=0.0)
+    assert found.per_second == pytest.approx(4 / 0.01, rel=1e-12, abs=0.0)
+    assert_allclose([found.mean_s, found.median_s, found.longest_s], [5e-5, 4e-5, 10e-5], rtol=1e-12)
+    assert found.unresolved == pytest.approx(1 / 23, rel=1e-12, abs=0.0)
+    assert math.isnan(series_of(np.ones(1000)).fades(0.5).mean_s)
+
+
+@pytest.mark.promise("link-86")
+def test_the_intervals_are_those_of_sixteen_parts():
+    """By Student's t with fifteen degrees of freedom: 2.947 deviations of the mean to either side for 99 %."""
+    series = series_of(scintillation(1 << 14, 30, 7))
+    link = linked(series, 64)
+    found = coded_fading(link, 3.0, 1e-5)
+    ratios = link.ratios(CODE.snr_for(1e-5) * 10.0**0.3)
+    parts = ratios.reshape(16, -1).mean(axis=1)
+    half = 2.9467 * np.std(parts, ddof=1) / 4.0
+    assert found.words == ratios.size
+    assert found.ratio.value == pytest.approx(np.mean(ratios), rel=1e-9, abs=0.0)
+    assert found.ratio.high == pytest.approx(np.mean(ratios) + half, rel=1e-4, abs=0.0)
+    assert found.ratio.low == pytest.approx(max(np.mean(ratios) - half, 0.0), rel=1e-4, abs=0.0)
+    assert found.lost.value == pytest.approx(np.mean(ratios > 1e-5), rel=1e-9, abs=0.0)
+    assert found.lost.low < found.lost.value < found.lost.high
+
+
+@pytest.mark.promise("link-85")
+def test_levels_and_normalisations():
+    levels = 10.0 * np.log10(SLOW)
+    assert_allclose(series_of(levels, unit="dB").power, series_of(SLOW).power, rtol=1e-12)
+    assert series_of(SLOW).power.mean() == pytest.approx(1.0, rel=1e-12, abs=0.0)
+    assert series_of(SLOW, normalised="largest").power.max() == 1.0
+    assert_allclose(series_of(SLOW, normalised="as-given").power, SLOW, rtol=1e-15)
+    with pytest.raises(ValueError, match="read-only"):
+        series_of(SLOW).power[0] = 1.0
+
+
+@pytest.mark.promise("link-88")
+@pytest.mark.parametrize(
+    ("power", "others", "words"),
+    [
+        (np.ones(100), {}, "the series has 100 samples; from 200 to 2000000 are taken"),
+        (np.ones((300, 2)), {}, r"have the shape \(300, 2\); give one series"),
+        (
+            np.r_[np.ones(300), -0.1],
+            {},
+            'sample 300 is -0.1, and 1 such samples .* \\(unit "dB" if these are levels\\)',
+        ),
+        (np.r_[np.ones(300), np.nan], {}, "sample 300 is nan, .* finite, 0 or above and at most"),
+        (np.r_[np.ones(300), 1e31], {}, r"sample 300 is 1e\+31, .* at most 1e\+30"),
+        (np.r_[np.ones(300), 400.0], {"unit": "dB"}, "sample 300 is 400, .* at most 300 dB"),
+        (np.zeros(300), {}, "no sample is above 0: there is no light"),
+        (np.ones(300), {"unit": "W"}, "the unit is 'W'; give one of linear, dB"),
+        (np.ones(300), {"normalised": "peak"}, "the normalisation is 'peak'; give one of mean, largest, as-given"),
+    ],
+)
+def test_a_series_that_is_none_is_refused(power, others, words):
+    with pytest.raises(FadeSeriesError, match=f"^series: .*{words}"):
+        series_of(power, **others)
+
+
+@pytest.mark.promise("link-88")
+def test_a_series_is_refused_that_is_shorter_than_a_word_or_an_interleaver_or_sampled_slower_than_its_fades():
+    series = series_of(SLOW)
+    with pytest.raises(FadeSeriesError, match=r"lasts 10\.24 ms and a code word, 35 bits, lasts 35 ms; give a series"):
+        linked(series, rate=1000.0)
+    assert linked(series, rate=3500.0).window == 1000
+    with pytest.raises(FadeSeriesError, match=r"lasts 10\.24 ms and the interleaver spans 10\.25 ms"):
+        linked(series, 1025)
+    with pytest.raises(FadeSeriesError, match="interleaving is 'block' and its span 0 s"):
+        CodedLink(CODE, series, RATE, "block")
+    coded_fading(linked(series), 3.0, 1e-6)
+    coarse = series_of(scintillation(1024, 0.1, 1))
+    words = r"sampled slower than its fades: (9\d|100) % of the time below -.* in fades of a single sample, 10 µs, and"
+    with pytest.raises(FadeSeriesError, match=words):
+        coded_fading(linked(coarse), 3.0, 1e-6)
+
+
+@pytest.mark.promise("link-88")
+@pytest.mark.parametrize(("alone", "refused"), [(10, False), (12, True)])
+def test_a_tenth_of_the_faded_time_may_be_in_fades_of_a_single_sample(alone, refused):
+    power = np.ones(2000)
+    power[100:190] = 0.05
+    power[300 : 300 + 20 * alone : 20] = 0.05
+    link = linked(series_of(power, normalised="largest"), 100)
+    if refused:
+        with pytest.raises(FadeSeriesError, match=r"12 % of the time below .* at most 10 % may be"):
+            coded_fading(link, 3.0, 1e-6)
+    else:
+        assert coded_fading(link, 3.0, 1e-6).fades.unresolved == pytest.approx(0.1, rel=1e-12, abs=0.0)
+
+
+@pytest.mark.promise("link-88")
+def test_a_series_of_two_million_samples_is_taken_and_a_longer_one_is_not():
+    assert series_of(np.ones(2_000_000)).power.size == 2_000_000
+    assert series_of(np.ones(200)).power.size == 200
+    for samples, advice in ((199, "give a longer one"), (2_000_001, "cut out a part")):
+        words = f"the series has {samples} samples; from 200 to 2000000 are taken: {advice}"
+        with pytest.raises(FadeSeriesError, match=words):
+            series_of(np.ones(samples))
+
+
+@pytest.mark.promise("link-85")
+@pytest.mark.parametrize("kind", ["csv", "times.csv", "npy", "h5"])
+def test_series_of_files_are_those_that_were_written(tmp_path, kind):
+    path = tmp_path / f"fades.{kind}"
+    given = {"period_s": PERIOD_S}
+    if kind == "csv":
+        path.write_text("power\n" + "\n".join(f"{x:.12g}" for x in SLOW) + "\n")
+    elif kind == "times.csv":
+        rows = (f"{k * PERIOD_S:.9g},{x:.12g}" for k, x in enumerate(SLOW))
+        path.write_text("time (s),power\n" + "\n".join(rows) + "\n")
+        given = {}
+    elif kind == "npy":
+        np.save(path, SLOW)
+    else:
+        with h5py.File(path, "w") as file:
+            file["received/power"] = SLOW
+            file["received/dt"] = PERIOD_S
+        given = {}
+    found = read_fade_series(path, unit="linear", normalised="as-given", **given)
+    assert_allclose(found.power, SLOW, rtol=1e-11)
+    assert found.period_s == pytest.approx(PERIOD_S, rel=1e-9, abs=0.0)
+    assert found.source == str(path)
+    assert len(found.sha256) == 64
+    if given:
+        with pytest.raises(FadeSeriesError, match="does not say how fast it was sampled; give the time between two"):
+            read_fade_series(path, unit="linear", normalised="mean")
+    else:
+        with pytest.raises(FadeSeriesError, match="two sample rates"):
+            read_fade_series(path, unit="linear", normalised="mean", period_s=2 * PERIOD_S)
+
+
+@pytest.mark.promise("link-88")
+def test_files_that_are_no_series_are_refused(tmp_path):
+    def refused(name, words, text=None, **others):
+        path = tmp_path / name
+        if text is not None:
+            path.write_text(text)
+        with pytest.raises(FadeSeriesError, match=words):
+            read_fade_series(path, **{"unit": "linear", "normalised": "mean", "period_s": 1e-3, **others})
+
+    refused("absent.csv", "there is no such file")
+    refused("empty.csv", "the file is empty", "")
+    refused("two.csv", "the file has 2 channels beside its time", "a,b\n" + "1,2\n" * 300)
+    refused("short.csv", "the series has 50 samples", "power\n" + "1\n" * 50)
+    refused("unit.csv", "the powers are in dB, and the unit given is 'linear'", "power (dB)\n" + "1\n" * 300)
+    times = [k * 1e-3 for k in range(300)]
+    times[150:] = [each + 5e-3 for each in times[150:]]
+    uneven = "time (s),power\n" + "".join(f"{t:.4f},1\n" for t in times)
+    refused("uneven.csv", "1 gap, about 5 samples lost", uneven, period_s=None)
+    np.save(tmp_path / "wide.npy", np.ones((300, 3)))
+    refused("wide.npy", "the file has 3 channels beside its time")
+    large = tmp_path / "large.csv"
+    with large.open("wb") as file:
+        file.truncate(200_000_001)
+    refused("large.csv", "the file has 200 MB and at most 200 MB are read")
+
+
+def test_the_code_has_the_paths_that_its_threshold_follows_from():
+    """The distance spectrum stands in two files: with the simulated table, and among the codes by name."""
+    own, named = code("ccsds-k7-1-2"), codes()["ccsds-k7-1-2"]
+    assert [*zip(own.distances, own.weights, strict=True)][: len(named.weights)] == [*named.weights]
+    assert own.rate == named.rate

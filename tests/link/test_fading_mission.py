@@ -1,0 +1,202 @@
+"""A series of received power that a mission names: its table, its numbers in the budget, what is refused."""
+
+import json
+import math
+import re
+import tomllib
+
+import numpy as np
+import pytest
+
+from link_files import data_with, link_file, received_with, written
+from microrad import link
+from microrad.link.fade_series import CodedLink, FadeSeriesError, code, coded_fading, read_fade_series
+from microrad.link.requirement import UNDER_FADES, of_links
+from microrad.link.study import run_link_study
+from microrad.mission.file import MissionError, named_files, with_contents
+from microrad.report.links.views import cost_text, links_views
+from places import ROOT
+
+PERIOD_S, TARGET = 1e-4, 1e-6
+TABLE = {
+    "series": "fades.csv",
+    "unit": "linear",
+    "normalised": "mean",
+    "code": "ccsds-k7-1-2",
+    "interleaving": "block",
+    "interleaver": "5 ms",
+    "bit_error_ratio": TARGET,
+}
+
+
+def said(call, code, *args):
+    """What a budget prints."""
+    found = call("budget", *args)
+    assert found.code == code
+    return found.out
+
+
+def fading(**others):
+    table = {key: value for key, value in {**TABLE, **others}.items() if value is not None}
+    return {"communication.fading": table}
+
+
+def fades(folder, deep=0.5):
+    """A file with fades of some milliseconds."""
+    time_s = PERIOD_S * np.arange(8000)
+    power = 1.0 + deep * np.sin(2.0 * math.pi * 30.0 * time_s) * np.cos(2.0 * math.pi * 1.5 * time_s)
+    rows = "".join(f"{t:.4f},{p:.9g}\n" for t, p in zip(time_s, power, strict=True))
+    (folder / "fades.csv").write_text("time (s),power\n" + rows)
+
+
+@pytest.mark.promise("readme-7", "link-85", "link-86")
+def test_the_study_has_what_the_series_makes_of_its_static_margin(tmp_path):
+    fades(tmp_path)
+    file = link_file(tmp_path, fading())
+    study = run_link_study(file)
+    static = link.communication_budget(study.data, file.sources).margin_db
+    series = read_fade_series(tmp_path / "fades.csv", unit="linear", normalised="mean", name="fades.csv")
+    assert series.period_s == pytest.approx(PERIOD_S, rel=1e-6, abs=0.0)
+    own = coded_fading(CodedLink(code("ccsds-k7-1-2"), series, 300e6, "block", 5e-3), static, TARGET)
+    found = study.fading
+    assert (found.penalty_db, found.ratio, found.lost) == (own.penalty_db, own.ratio, own.lost)
+    assert (found.margin_db, found.target, found.span_s, found.words) == (static, TARGET, 5e-3, 160)
+    assert 0.5 < found.penalty_db < 3.0
+    (judged,) = (each for each in of_links(study) if each.name == UNDER_FADES)
+    assert judged.actual == static - found.penalty_db
+    assert not judged.met
+    assert named_files(file.mission) == ("fades.csv",)
+    assert with_contents(file).contents[0].content == (tmp_path / "fades.csv").read_bytes()
+    jittered = link_file(
+        tmp_path,
+        fading(),
+        {"jitter": {"bias": ["0 rad", "0 rad"], "rms": ["2 urad", "2 urad"], "bandwidth": "100 Hz"}},
+        {"requirement.outage": 0.003},
+    )
+    assert run_link_study(jittered).fading.margin_left_db == found.margin_left_db
+
+
+@pytest.mark.promise("link-86")
+def test_terminal_csv_json_and_page_have_the_same_numbers(tmp_path, call):
+    fades(tmp_path)
+    path = written(tmp_path, data_with(fading()))
+    found = json.loads(said(call, 1, str(path), "--json"))["fading"]
+    assert 0.0 <= found["bit_error_ratio_interval"][0] < found["bit_error_ratio"]
+    assert found["bit_error_ratio"] < found["bit_error_ratio_interval"][1] < 1e-2
+    assert found["lost_interval"][0] <= found["lost"] <= found["lost_interval"][1]
+    assert found["margin_db"] == pytest.approx(found["static_margin_db"] - found["penalty_db"], rel=1e-12, abs=1e-12)
+    assert found["curve"]["span_s"][0] == 0.0
+    assert found["curve"]["penalty_db"][0] > found["penalty_db"] > found["curve"]["penalty_db"][-1]
+    assert found["fades"]["mean_s"] <= found["fades"]["ninetieth_s"] <= found["fades"]["longest_s"]
+    text = " ".join(said(call, 1, str(path)).split())
+    assert "Under the fades of fades.csv, ccsds-k7-1-2 with a block interleaver over 5 ms" in text
+    assert f"the fades cost {found['penalty_db']:.2f} dB" in text
+    assert f"Penalty of the fades,{-found['penalty_db']!r},dB" in said(call, 1, str(path), "--csv")
+    page = said(call, 1, str(path), "--html")
+    assert "What an interleaver brings" in page
+    assert cost_text(found["curve"]["penalty_db"][0]) in page
+    without = json.loads(said(call, 1, str(written(tmp_path, data_with({}))), "--json"))
+    assert "fading" not in without
+
+
+def test_fades_that_no_power_makes_up_for_are_said(tmp_path, call):
+    fades(tmp_path)
+    text = (tmp_path / "fades.csv").read_text().splitlines()
+    dark = [f"{line.split(',')[0]},0" if 3000 < k < 3200 else line for k, line in enumerate(text)]
+    (tmp_path / "fades.csv").write_text("\n".join(dark) + "\n")
+    study = run_link_study(link_file(tmp_path, fading(interleaving="none", interleaver=None)))
+    assert study.fading.penalty_db == math.inf
+    assert cost_text(study.fading.penalty_db) == "beyond any power"
+    (view,) = (each for each in links_views(study) if each.title == "Coded link under fades")
+    assert "without an interleaver" in view.blocks[0]
+    assert "the fades cost more than any power makes up for" in view.blocks[0]
+    assert json.loads(said(call, 1, str(tmp_path / "link.toml"), "--json"))["fading"]["penalty_db"] is None
+
+
+@pytest.mark.promise("link-85", "link-87")
+@pytest.mark.parametrize(
+    ("changes", "key", "words"),
+    [
+        (fading(interleaving="none"), "interleaver", 'does not belong to interleaving = "none"'),
+        (fading(interleaver=None), "interleaver", 'is missing, and interleaving = "block" needs it'),
+        (fading(bit_error_ratio=None), "bit_error_ratio", "is missing, and so is the table receiver"),
+        (fading(sampling="-1 us"), "sampling", "is not above 0 s"),
+        (fading(unit="W"), "unit", "is none of the choices"),
+        (fading(code="turbo"), "code", "is none of the choices"),
+        (fading() | received_with("homodyne bpsk"), "bit_error_ratio", "stands beside that of the table receiver"),
+        (
+            fading(bit_error_ratio=None) | received_with("counting ppm"),
+            "code",
+            'is of BPSK, and the receiver has modulation = "ppm"',
+        ),
+    ],
+)
+def test_a_table_that_does_not_fit_is_refused_with_its_line(tmp_path, changes, key, words):
+    with pytest.raises(MissionError) as refused:
+        link_file(tmp_path, changes)
+    (fault,) = refused.value.faults
+    assert fault.key == f"communication.fading.{key}"
+    assert words in fault.reason
+    assert fault.expected
+
+
+@pytest.mark.promise("link-85")
+def test_the_table_of_the_page_is_one_that_a_mission_takes(tmp_path):
+    page = (ROOT / "docs" / "link.md").read_text(encoding="utf-8")
+    (table,) = (each for each in re.findall(r"```toml\n(.*?)```", page, re.DOTALL) if "communication.fading" in each)
+    power = 1.0 + 0.5 * np.sin(2.0 * math.pi * 30.0 * PERIOD_S * np.arange(8000))
+    (tmp_path / "fades.csv").write_text("power\n" + "".join(f"{p:.9g}\n" for p in power))
+    given = tomllib.loads(table)["communication"]["fading"]
+    file = link_file(tmp_path, {"communication.fading": given})
+    found = run_link_study(file).fading
+    assert (found.span_s, found.target, found.words) == (5e-3, 1e-6, 160)
+    sliding = run_link_study(link_file(tmp_path, {"communication.fading": {**given, "interleaving": "convolutional"}}))
+    assert sliding.fading.words == 8000 - 50 + 1
+    unsaid = {key: value for key, value in given.items() if key != "sampling"}
+    with pytest.raises(FadeSeriesError, match="does not say how fast it was sampled"):
+        run_link_study(link_file(tmp_path, {"communication.fading": unsaid}))
+
+
+@pytest.mark.promise("link-99")
+def test_no_series_is_made_where_none_is_given(tmp_path):
+    fades(tmp_path)
+    assert run_link_study(link_file(tmp_path, fading())).fading.words > 0
+    bare = {"series": None, "unit": None, "normalised": None}
+    assert run_link_study(link_file(tmp_path, fading(**bare))).fading is None
+    for key, value in (("unit", "linear"), ("normalised", "mean"), ("sampling", "1 ms")):
+        with pytest.raises(MissionError) as refused:
+            link_file(tmp_path, fading(**{**bare, key: value}))
+        (fault,) = refused.value.faults
+        assert (fault.key, fault.reason) == (f"communication.fading.{key}", "stands without a series")
+
+
+@pytest.mark.promise("link-85")
+def test_a_receiver_has_the_target_of_the_series(tmp_path):
+    fades(tmp_path)
+    file = link_file(tmp_path, fading(bit_error_ratio=None), received_with("homodyne bpsk", bit_error_ratio=1e-5))
+    assert run_link_study(file).fading.target == 1e-5
+
+
+@pytest.mark.promise("link-88")
+@pytest.mark.parametrize(
+    ("others", "words"),
+    [
+        ({"series": "absent.csv"}, "absent.csv: there is no such file"),
+        ({"interleaver": "2 s"}, "fades.csv: the series lasts 800 ms and the interleaver spans 2 s; give a series"),
+        ({"sampling": "1 ms"}, "two sample rates"),
+        ({"unit": "dB", "series": "negative.csv"}, "the powers are in W, and the unit given is 'dB'"),
+    ],
+)
+def test_a_series_that_cannot_be_used_is_refused_with_the_line_that_names_it(tmp_path, call, others, words):
+    fades(tmp_path)
+    (tmp_path / "negative.csv").write_text("power (W)\n" + "1\n" * 300)
+    file = link_file(tmp_path, fading(**others))
+    line = file.sources["communication.fading.series"].line
+    assert file.text.splitlines()[line - 1].startswith("series = ")
+    with pytest.raises(FadeSeriesError) as refused:
+        run_link_study(file)
+    assert f"communication.fading, mission file, line {line}: " in str(refused.value)
+    assert words in str(refused.value)
+    told = call("budget", str(tmp_path / "link.toml"))
+    assert told.code == 2
+    assert words.partition(":")[0] in " ".join(told.err.split())

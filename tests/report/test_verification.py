@@ -1,0 +1,1137 @@
+"""The register of printed quantities, statuses, evidence, integrity of the files, and the command's page and data."""
+
+import ast
+import hashlib
+import importlib
+import inspect
+import json
+import math
+import random
+import re
+import shutil
+import subprocess
+from dataclasses import replace
+from html import unescape
+from importlib import resources
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from microrad.campaign.statistics import sensitivity, tails
+from microrad.core import integrity
+from microrad.core.units import format_quantity
+from microrad.lab.identify.linear import fit, uncertainty
+from microrad.lab.identify.selection import warnings
+from microrad.link import gains
+from microrad.link import study as link_study
+from microrad.link.acquisition import partner_search, sequence
+from microrad.mirror.hysteresis import PrandtlIshlinskii
+from microrad.mission.file import load_link, load_mission
+from microrad.report import foundation, marks, registry
+from microrad.report.links.budgets import links_csv, links_text
+from microrad.report.links.data import links_data
+from microrad.report.links.views import links_page
+from microrad.report.registry import Quantity, Status
+from microrad.report.study import chain, words
+from microrad.report.tables import Cell, Table
+from microrad.report.verification import (
+    check,
+    checks,
+    credibility,
+    dependences,
+    evidence,
+    findings,
+    page,
+    recorded,
+    standard,
+    sweeps,
+    warned,
+    workspace,
+)
+from microrad.report.verification.checks import measured
+from microrad.report.verification.evidence import Comparison, Referent
+from microrad.report.view import View
+from microrad.studio.views import link as studio_link
+from shipped import plain_study
+
+REFERENCES = sorted((Path(__file__).resolve().parents[2] / "reference").glob("*.json"))
+SUMS = {"count", "first", "last", "mean", "rms", "min", "max", "slope"}  # of an array in a reference
+
+
+def numbers_of(path):
+    """Dotted names of the numbers that a command printed, without the sums that stand for long arrays."""
+    held = {name: row[0] for name, row in json.loads(path.read_text(encoding="utf-8")).items()}
+    names = [n for n, v in held.items() if isinstance(v, int | float) and not isinstance(v, bool)]
+    return [
+        n.rpartition(".")[0] if n.rpartition(".")[2] in SUMS and n.rpartition(".")[0] + ".count" in held else n
+        for n in names
+    ]
+
+
+# ------------------------------------------------------------------------------------------------------- the register
+@pytest.mark.promise("verification-3", "verification-5")
+@pytest.mark.parametrize("path", REFERENCES, ids=lambda path: path.stem)
+def test_every_number_that_a_command_prints_is_registered(path):
+    names = numbers_of(path)
+    assert names
+    assert registry.unregistered(names) == []
+
+
+@pytest.mark.promise("verification-5")
+def test_what_nobody_has_registered_is_named():
+    assert registry.unregistered(["budget.budgets.Beacon.margin_db", "budget.fudge_factor"]) == ["budget.fudge_factor"]
+
+
+@pytest.mark.promise("verification-3")
+def test_the_first_entry_that_matches_has_a_name_and_places_do_not_count():
+    assert registry.quantity_of("run.day.contacts.3.start_s").title == "Begin and end of a contact"
+    assert registry.quantity_of("run.fine_pointing.controllers.LQG.margins.disk").title == "Disk margin"
+    assert registry.quantity_of("budget.tornado.communication.distance.low").given
+
+
+def test_every_registered_quantity_has_a_title_of_its_own():
+    results = [q for q in registry.quantities() if not q.given]
+    assert len({q.title for q in results}) == len(results) > 100
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [
+        ("a.margin_db", "dB"),
+        ("rate_bit_s", "bit/s"),
+        ("x.irradiance_w_m2", "W/m^2"),
+        ("share", ""),
+        ("v.needed_rad", "rad"),
+        ("v.received_photons_per_bit", "photon/bit"),
+        ("v.fades_per_s", "1/s"),
+        ("v.gain_rad_per_v", "rad/V"),
+        ("rms_by_source_rad.sensor noise", "rad"),
+        ("margin_db.static", "dB"),
+        ("v.seconds_in_state.data", "s"),
+        ("rows.3", ""),
+    ],
+)
+def test_the_unit_is_that_of_the_name(name, unit):
+    assert registry.unit_of(name) == unit
+
+
+def test_a_number_has_the_unit_that_stands_beside_it():
+    line = {"name": "Transmit power", "value": 37.0, "unit": "dBm", "margin_low_db": 1.0, "holds": True}
+    bare = {"name": "share", "value": 0.5, "unit": ""}
+    assert registry.stated_units({"lines": [line, bare]}) == {"lines.Transmit power.value": "dBm"}
+
+
+def test_figures_of_the_evidence_have_their_units(everything):
+    units = {c.quantity: c.unit for o in everything.outcomes for c in o.comparisons}
+    assert units["budget.budgets.Communication.lines.Transmit power.value"] == "dBm"
+    assert units["budget.budgets.Communication.received_photons_per_bit"] == "photon/bit"
+    assert units["run.requirements.beacon covers its partner.actual"] == "%"
+    bare = {name for name, unit in units.items() if not unit and name.endswith(".value")}
+    assert all(name.startswith("campaign.") or "Illumination" in name or "Clear-sky" in name for name in bare), bare
+
+
+# ----------------------------------------------------------------------------------------------------------- statuses
+def outcome(referent, holds, *quantities, name="one"):
+    made = [Comparison(q, "", 1.0, 1.0 if holds else 2.0, 0.1, "", "") for q in quantities]
+    return check.Outcome(check.Check(name, name, referent, "", "", iter), made)
+
+
+WHOLE = integrity.Integrity("commit 0")
+MARGIN, MODULUS = "budget.budgets.Beacon.margin_db", "run.x.margins.modulus"
+
+
+def status_of(title, *outcomes):
+    found = findings.found(outcomes, WHOLE, full=False, domains={})
+    return next(s for s in found.standings if s.quantity.title == title)
+
+
+@pytest.mark.promise("verification-4", "verification-5")
+def test_a_quantity_is_what_it_was_compared_with():
+    independent, measured = (outcome(r, True, MARGIN, name=r) for r in (Referent.INDEPENDENT, Referent.MEASUREMENT))
+    assert status_of("Link margin", independent).status is Status.VERIFIED
+    assert status_of("Link margin", outcome(Referent.PUBLISHED, True, MARGIN)).status is Status.VERIFIED
+    both = status_of("Link margin", independent, measured)
+    assert both.status is Status.VALIDATED
+    assert both.checks == (Referent.INDEPENDENT, Referent.MEASUREMENT)
+    assert status_of("Modulus margin", independent).status is Status.TRACED
+
+
+@pytest.mark.promise("verification-4", "verification-5")
+def test_one_comparison_that_does_not_hold_spoils_its_quantity_and_no_other():
+    held, missed = (
+        outcome(Referent.MEASUREMENT, True, MARGIN, MODULUS),
+        outcome(Referent.INDEPENDENT, False, MARGIN, name="b"),
+    )
+    assert status_of("Link margin", held, missed).status is Status.FAILED
+    assert status_of("Modulus margin", held, missed).status is Status.VALIDATED
+    found = findings.found([held, missed], WHOLE, full=False, domains={})
+    assert not found.ok
+    assert not found.holds
+    assert page.headline(found) == "This installation does not hold: 1 of 3 comparisons are beyond their tolerance."
+
+
+@pytest.mark.promise("verification-4")
+def test_a_quantity_without_source_or_comparison_is_founded_on_nothing(monkeypatch):
+    monkeypatch.setattr(findings, "quantities", lambda: (Quantity("bare", "x", ("bare",)),))
+    (only,) = findings.found([], WHOLE, full=False, domains={}).standings
+    assert only.status is Status.NONE
+
+
+@pytest.mark.promise("verification-4")
+@pytest.mark.parametrize(
+    ("obtained", "holds"), [(1.1, True), (0.9, True), (1.11, False), (math.nan, False), (math.inf, False)]
+)
+def test_a_comparison_holds_within_its_tolerance_on_both_sides(obtained, holds):
+    assert Comparison("", "", 1.0, obtained, 0.1, "", "").holds is holds
+
+
+@pytest.mark.promise("verification-9")
+def test_a_check_that_raises_or_compares_nothing_is_trouble_and_one_without_its_data_is_absent(tmp_path):
+    def raises(_):
+        raise RuntimeError("no such kernel\nand more")
+
+    def absent(_):
+        raise evidence.NotHereError("the record is not here")
+
+    of = {
+        name: check.Check(name, name, Referent.INDEPENDENT, "", "", run)
+        for name, run in (("a", raises), ("b", absent), ("c", lambda _: iter(())))
+    }
+    found = {name: check.run(each, workspace.Workspace(tmp_path, None)) for name, each in of.items()}
+    assert found["a"].trouble == "RuntimeError: no such kernel"
+    assert found["b"].absent == "the record is not here"
+    assert found["c"].trouble == "it compared nothing"
+    assert not any(each.holds for each in found.values())
+    v = findings.found([found["a"], found["b"]], WHOLE, full=False, domains={})
+    assert not v.holds
+    assert page.headline(v) == "This installation does not hold: 1 checks did not run (a)."
+    assert "Not run: b. The record is not here." in page.summary(v)
+    absent = findings.found([found["b"]], WHOLE, full=False, domains={})
+    assert absent.holds
+    assert page.headline(absent) == "All 0 comparisons that were made hold in this installation; 1 check was not run."
+
+
+# --------------------------------------------------------------------------------------------------------- the evidence
+@pytest.fixture(scope="module")
+def everything(tmp_path_factory):
+    """All evidence, run here and once."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(findings, "integrity", lambda: WHOLE)
+        return findings.verify()
+
+
+@pytest.mark.promise("verification-7")
+@pytest.mark.promise("verification-27")
+def test_all_evidence_holds(everything):
+    missed = [
+        (o.check.name, c.what, c.expected, c.obtained)
+        for o in everything.outcomes
+        for c in o.comparisons
+        if not c.holds
+    ]
+    assert missed == []
+    assert [o.check.name for o in everything.outcomes if o.trouble] == []
+    assert everything.ok
+
+
+@pytest.mark.promise("verification-19")
+def test_nine_in_ten_are_verified_or_better_and_few_are_founded_on_nothing(everything):
+    assert 0.9 <= everything.founded <= 1.0
+    assert everything.counts[Status.FAILED] == 0
+    by_status = {
+        status: {s.quantity.title for s in everything.standings if s.status is status and not s.quantity.given}
+        for status in (Status.NONE, Status.TRACED)
+    }
+    assert by_status[Status.NONE] == {"Residual under a sine", "Bench of the exported C"}
+    assert by_status[Status.TRACED] == {
+        "Photons per bit that the paper's figure implies",
+        "Noise of the receiver, line by line",
+        "Bound of all linear controllers",
+    }
+    named = [o for o in everything.outcomes if o.check.referent is not Referent.INDEPENDENT]
+    assert len(named) >= 12
+    assert everything.counts[Status.VALIDATED] >= 1 or any(o.absent for o in everything.outcomes)
+
+
+@pytest.mark.promise("verification-8")
+def test_each_comparison_is_of_a_registered_quantity_and_says_why_its_tolerance_is_what_it_is(everything):
+    compared = [c for o in everything.outcomes for c in o.comparisons]
+    assert registry.unregistered({c.quantity for c in compared} - {""}) == []
+    assert all(c.basis for c in compared)
+    reasons = "rounding", "half of the last printed digit", "five standard errors", "end of a search", "v / c"
+    assert [reason for reason in reasons if not any(reason in c.basis for c in compared)] == []
+    assert len({o.check.name for o in everything.outcomes}) == len(everything.outcomes) == len(checks.every())
+
+
+@pytest.mark.promise("verification-1", "verification-3")
+def failing(name, tmp_path):
+    """Comparisons of a check that do not hold, of a fresh installation's documents."""
+    (each,) = [c for c in checks.every() if c.name == name]
+    found = check.run(each, workspace.Workspace(tmp_path, None))
+    assert not found.trouble
+    assert found.comparisons
+    return [c.what for c in found.comparisons if not c.holds]
+
+
+FAULTS = {  # a mistake in the product, and the check that has to see it
+    "threshold of the answer": (partner_search, "THRESHOLD", lambda _: 4.5, "seen"),
+    "reach of the beam back": (partner_search, "_return_reach", lambda of: lambda *a: 1.03 * of(*a), "seen"),
+    "narrowest beam": (partner_search, "narrowest_half_angle_rad", lambda of: lambda *a: 0.9 * of(*a), "scan-light"),
+    "frames of a stage": (sequence, "frames_detection_probability", lambda _: lambda p, n: p, "stages"),
+    "variance of a tail": (tails, "_variance", lambda of: lambda *a: 1.3 * of(*a), "tails"),
+    "ranks": (sensitivity, "_ranks", lambda _: lambda x: x, "sensitivities"),
+    "first index": (sensitivity, "_ratio", lambda of: lambda s: tuple(0.85 * x for x in of(s)), "sensitivities"),
+    "error of a zero": (uncertainty, "_zero_errors", lambda of: lambda *a: 1.41 * of(*a), "known-mirror"),
+    "correlations": (warnings, "_correlations", lambda of: lambda *a: 0.9 * of(*a), "known-colour"),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_check_sees_a_mistake_in_what_it_checks(fault, monkeypatch, tmp_path):
+    module, name, change, of = FAULTS[fault]
+    monkeypatch.setattr(module, name, change(getattr(module, name)))
+    assert failing(of, tmp_path)
+
+
+def test_a_mission_gets_other_values_by_key_and_a_missing_key_is_named():
+    text = '[a]\nx = "1 m"  # paper\ny = 2\n[a.b]\nx = "1 m"\n'
+    assert workspace.with_values(text, {"a.b.x": "3"}) == '[a]\nx = "1 m"  # paper\ny = 2\n[a.b]\nx = 3  # example\n'
+    with pytest.raises(KeyError, match=r"a\.z"):
+        workspace.with_values(text, {"a.z": "3"})
+
+
+def test_data_and_page_say_the_same(everything):
+    data = page.verification_data(everything)
+    html = page.verification_page(everything)
+    assert data["ok"] is True
+    assert data["counts"]["verified"] == everything.counts[Status.VERIFIED]
+    assert page.headline(everything) in html
+    assert {q["name"] for q in data["quantities"]} == {s.quantity.title for s in everything.standings}
+    assert all(each["source"] for each in data["evidence"])
+    assert json.loads(json.dumps(data)) == data
+    assert "Evidence: margins" in html
+
+
+CHECKED = {  # what an independent method takes from the package: the very code whose results it checks, and its files
+    "light": {
+        *("microrad.link", "microrad.link.beams", "microrad.link.radial_error", "microrad.link.study"),
+        "microrad.mission.file",
+    },
+    "loop": {"microrad.core", "microrad.loop", "microrad.mirror", "microrad.mirror.hysteresis"},
+    "orbit": set(),
+    "pointing": set(),
+    "study": {"microrad.core"},
+    "residual": set(),
+    "search": {"microrad.link.study", "microrad.mission.file"},
+    "operation": {"microrad.link.study", "microrad.mission.file", "microrad.orbit", "microrad.orbit.day"},
+    "draws": {
+        *("microrad.campaign.file", "microrad.campaign.rows", "microrad.campaign.rows.evaluator"),
+        *(f"microrad.campaign.statistics{name}" for name in ("", ".cell", ".sensitivity")),
+    },
+    "identified": {
+        *("microrad.lab.recording", "microrad.lab.identify", "microrad.lab.identify.linear.fit"),
+        *(f"microrad.lab.identify.selection.{name}" for name in ("predictions", "warnings")),
+    },
+}
+"""Plants, loops, campaigns, fits and the key that is solved for are made by the package, and are what is checked."""
+
+
+@pytest.mark.promise("verification-6")
+@pytest.mark.parametrize("name", CHECKED)
+def test_an_independent_method_calls_nothing_but_what_it_checks(name):
+    own = "microrad.report.verification"
+    module = importlib.import_module(f"{own}.checks.{name}")
+    assert all(each.referent is Referent.INDEPENDENT for each in module.CHECKS)
+    tree = ast.parse(inspect.getsource(module))
+    taken = {n.module for n in ast.walk(tree) if isinstance(n, ast.ImportFrom) and n.module.startswith("microrad")}
+    assert not [n for n in ast.walk(tree) if isinstance(n, ast.Import) and "microrad" in ast.unparse(n)]
+    assert {each for each in taken if not each.startswith("microrad.report")} == CHECKED[name]
+    units = {n.module for n in ast.walk(ast.parse(inspect.getsource(workspace))) if isinstance(n, ast.ImportFrom)}
+    assert not {each for each in units if each.startswith("microrad.core.unit")}, "the second table of units is its own"
+
+
+@pytest.mark.promise("verification-7")
+@pytest.mark.promise("verification-27")
+def test_methods_are_those_that_the_page_names():
+    wanted = {
+        "budgets": "second table of units",
+        "far-field": "quadrature",
+        "jitter": "Draws of both axes",
+        "pointing-totals": "sorting draws",
+        "contacts": "every 2 s",
+        "passes": "As the contacts",
+        "queue": "half a second at a time",
+        "margins": "partial fractions",
+        "residuals": "integrals over frequency",
+        "loops": "adaptive solver",
+        "campaign": "quadrature",
+        "tails": "Normal powers and Rayleigh's distribution",
+        "sensitivities": "Ishigami's function",
+        "known-mirror": "Poles, zeros, gains and their errors of a linear mirror whose truth is known",
+        "known-plays": "Loops of play operators whose weights are known",
+    }
+    said = {each.name: f"{each.title}. {each.method}" for each in checks.every()}
+    assert "binomial sums" in said["campaign"] and "the noise that was added" in said["known-plays"]
+    assert {name: part in said[name] for name, part in wanted.items()} == dict.fromkeys(wanted, True)
+
+
+@pytest.mark.promise("verification-7")
+@pytest.mark.parametrize(("factor", "holds"), [(1.0, True), (1.0 + 1e-6, False)])
+def test_a_budget_with_a_fault_is_found_by_the_second_one(tmp_path, monkeypatch, factor, holds):
+    true = gains.free_space_loss_db
+    monkeypatch.setattr(gains, "free_space_loss_db", lambda *args: factor * true(*args))
+    (budgets,) = [each for each in checks.every() if each.name == "budgets"]
+    assert check.run(budgets, workspace.Workspace(tmp_path, None)).holds is holds
+
+
+def named(name):
+    return next(each for each in checks.every() if each.name == name)
+
+
+@pytest.mark.promise("verification-2", "verification-9")
+@pytest.mark.parametrize(("alike", "holds"), [(True, True), (False, False)])
+def test_recordings_come_from_the_folder_that_is_named(tmp_path, monkeypatch, alike, holds):
+    """A slow loop of two plays: its second half is that of the first one, or of another mirror."""
+    time_s = np.arange(4000) / 200.0
+    drive = 5.0 - 5.0 * np.cos(2.0 * np.pi * time_s)
+    output = 10.0 * PrandtlIshlinskii((0.0, 1.0), (0.8, 0.2)).response(drive, 5e-3)
+    output[2000:] *= 1.0 if alike else 1.1
+    rows = np.column_stack([drive, *np.zeros((3, 4000)), output])
+    (tmp_path / "piezo_1hz").mkdir()
+    np.savetxt(tmp_path / "piezo_1hz" / "Model_Vi_Do.dat", rows)
+    monkeypatch.setenv("MICRORAD_DATA", str(tmp_path))
+    monkeypatch.setattr(findings, "every", lambda: (named("piezo-loop"),))
+    monkeypatch.setattr(findings, "integrity", lambda: WHOLE)
+    found = findings.verify()
+    assert found.holds is holds
+    (standing,) = [s for s in found.standings if s.checks]
+    assert standing.status is (Status.VALIDATED if holds else Status.FAILED)
+
+
+@pytest.mark.promise("verification-9")
+def test_without_its_recordings_a_check_is_said_not_to_have_run(monkeypatch):
+    monkeypatch.delenv("MICRORAD_DATA", raising=False)
+    monkeypatch.setattr(findings, "every", lambda: tuple(map(named, ("piezo-loop", "cubespec", "hysteretic-spring"))))
+    monkeypatch.setattr(findings, "integrity", lambda: WHOLE)
+    found = findings.verify()
+    assert found.ok and found.counts[Status.VALIDATED] == 0
+    html = page.verification_page(found)
+    for name, file in (
+        ("piezo-loop", "piezo_1hz/Model_Vi_Do.dat"),
+        ("cubespec", "cubespec/u_100mV_train.npy"),
+        ("hysteretic-spring", "boucwen/train.h5"),
+    ):
+        assert f"Not run: {name}. The recording {file} is not here: MICRORAD_DATA names the folder that has it" in html
+        assert {o["name"]: o["absent"] for o in page.verification_data(found)["evidence"]}[name].startswith(
+            f"the recording {file}"
+        )
+
+
+@pytest.mark.promise("verification-25")
+def test_recordings_are_held_against_those_of_the_release(tmp_path, monkeypatch):
+    names = list(measured.SHA256)
+    assert {name for each in measured.HELD_OUT.values() for name in each.files} < set(names)
+    for name, text in zip(names[:2], ("the very one", "another"), strict=True):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text)
+    monkeypatch.setitem(measured.SHA256, names[0], hashlib.sha256(b"the very one").hexdigest())
+    held = measured.held_recordings(workspace.Workspace(tmp_path, tmp_path))
+    assert list(held.values()) == [measured.ALIKE, measured.OTHER, *[measured.ABSENT] * (len(names) - 2)]
+    assert set(measured.held_recordings(workspace.Workspace(tmp_path, None)).values()) == {measured.ABSENT}
+    v = findings.found([outcome(Referent.INDEPENDENT, True, MARGIN)], WHOLE, full=False, domains={}, files=held)
+    (other,) = [w.found for w in warned.warnings(v) if "of the release" in w.found]
+    assert other == f"Not the recordings of the release: {names[1]}."
+    assert page.verification_data(v)["recording_files"][names[1]]["here"] == measured.OTHER
+    assert measured.OTHER in page.verification_page(v)
+
+
+@pytest.mark.promise("verification-9")
+def test_of_the_mirror_of_a_satellite_the_last_record_is_predicted(tmp_path, monkeypatch):
+    asked = []
+    monkeypatch.setattr(measured, "_multisines", lambda workspace, amplitude_mv: list(range(6)))
+    monkeypatch.setattr(
+        fit, "fit_linear", lambda fitted, *args, **more: asked.append(fitted) or SimpleNamespace(modes=0)
+    )
+
+    def predicted(modes, held_out, drop):
+        assert held_out == 5
+        raise evidence.NotHereError("as far as that")
+
+    monkeypatch.setattr(fit, "output_error", predicted)
+    assert check.run(named("cubespec"), workspace.Workspace(tmp_path, None)).absent == "as far as that"
+    assert asked == [[0, 1, 2, 3, 4]]
+
+
+# ---------------------------------------------------------------------------------------------------------- credibility
+@pytest.mark.promise("verification-14")
+def test_reviews_by_oneself_count_as_none_and_there_are_eleven_factors(everything):
+    by_name = {f.name: f for f in everything.factors}
+    assert len(by_name) == len(everything.factors) == 11
+    none = "Development technical review", "Use and analysis technical review", "Use assessment"
+    assert [by_name[name].level for name in none] == [0, 0, 0]
+    assert all(f.reason and f.next_needs and 0 <= f.level <= 4 for f in everything.factors)
+
+
+@pytest.mark.promise("verification-14", "verification-29")
+def test_the_report_has_each_factor_by_itself():
+    found = findings.found([outcome(Referent.INDEPENDENT, True, MARGIN)], WHOLE, full=False, domains={})
+    shown, data = unescape(page.verification_page(found)), page.verification_data(found)
+    assert [each["name"] for each in data["credibility"]] == [f.name for f in found.factors]
+    for f in found.factors:
+        assert all(said in shown for said in (f.name, f.reason, f.next_needs))
+    assert {key for each in data["credibility"] for key in each} == {
+        *("assessment", "name", "level", "means", "why", "next", "next_means")
+    }
+    assert "There are none for uncertainty, sensitivities and levels of credibility" in shown
+    sums = {sum(f.level for f in found.factors), sum(f.level for f in found.factors) / 11}
+    assert not [key for key, value in data.items() if isinstance(value, int | float) and value in sums]
+    assert {key for key, value in data.items() if isinstance(value, int | float)} == {
+        "ok",
+        "full",
+        "verified_or_better",
+    }
+
+
+@pytest.mark.parametrize(
+    ("verified", "holds", "whole", "level"),
+    [(10, True, True, 2), (9, True, True, 1), (10, True, False, 1), (10, False, True, 0)],
+)
+def test_verification_has_the_level_that_the_evidence_gives(verified, holds, whole, level):
+    counts = dict.fromkeys(Status, 0) | {Status.VERIFIED: verified, Status.TRACED: 10 - verified}
+    found = {f.name: f.level for f in credibility.factors(counts, holds, whole, 0)}
+    assert found["Verification"] == level
+    assert found["Validation"] == 0
+
+
+@pytest.mark.promise("verification-14")
+@pytest.mark.parametrize(
+    ("holds", "measured", "published", "level"),
+    [(True, 0, 1, 1), (True, 1, 0, 1), (True, 0, 0, 0), (False, 1, 1, 0)],
+)
+def test_the_concept_is_validated_where_all_holds_and_something_was_compared_with_others(
+    holds, measured, published, level
+):
+    counts = dict.fromkeys(Status, 1)
+    (found,) = [f for f in credibility.factors(counts, holds, True, measured, published) if f.name == "Validation"]
+    assert found.level == level
+    assert f"published output ({published}) and with measurements ({measured})" in found.reason
+    assert ("similar terminal" in found.next_needs) is (level == 1)
+
+
+@pytest.mark.promise("verification-14")
+def test_a_level_of_all_quantities_is_not_claimed_where_some_are_not_compared(everything):
+    (found,) = [f for f in everything.factors if f.name == "Verification"]
+    left = everything.counts[Status.TRACED] + everything.counts[Status.NONE]
+    assert left > 0
+    assert found.level == 1
+    assert f"; {left} are not." in found.reason
+    assert found.next_means == "documented practice that evaluates all features and couplings"
+
+
+# --------------------------------------------------------------------------------------------- what the standard asks
+def reported(*outcomes, files=None):
+    return findings.found(outcomes, files or WHOLE, full=False, domains={})
+
+
+@pytest.mark.promise("verification-15")
+def test_each_requirement_is_answered_where_it_is_said():
+    docs = Path(__file__).resolve().parents[2] / "docs"
+    v = reported(outcome(Referent.INDEPENDENT, True, MARGIN))
+    anchors = {view.anchor for view in page.views(v)}
+    assert anchors == set(page.SECTIONS)
+    parts = (docs / "report.md").read_text(encoding="utf-8")
+    for r in standard.requirements():
+        assert set(r.sections) <= anchors
+        assert all((docs / f"{each}.md").is_file() for each in r.pages)
+        assert not r.part or f"| {r.part} |" in parts
+        places = {"here": r.sections, "part": r.sections or r.pages, "pages": r.pages, "mission": r.part}
+        assert places.get(r.stands, True), f"M&S {r.number} is answered nowhere"
+        assert r.said or r.stands in {"here", "pages", "mission"}, f"M&S {r.number}: what is lacking is not said"
+        assert r.text in standard.TEXTS
+    found = [number for r in standard.requirements() for number in r.numbers]
+    assert len(found) == len(set(found)), "a requirement stands twice"
+    gone = {number for r in standard.requirements() if r.stands == "gone" for number in r.numbers}
+    assert gone == {1, 2, 3, 4, 5, 7, 8, 20}
+    assert set(found) - gone == {6, *range(9, 20), *range(21, 52)}
+    assert len(set(found) - gone) == 43
+
+
+@pytest.mark.promise("verification-15")
+@pytest.mark.promise("verification-28", "verification-30")
+def test_requirements_are_counted_by_how_they_stand_and_each_says_what_its_title_is_by():
+    v = reported(outcome(Referent.INDEPENDENT, True, MARGIN))
+    shown, data = unescape(page.verification_page(v)), page.verification_data(v)
+    unmet = [number for r in standard.requirements() if r.stands == "open" for number in r.numbers]
+    assert "Of 43 requirements: " in shown and "This is no statement of compliance." in shown
+    assert f"{len(unmet)} not met." in shown
+    by = {number: r.text for r in standard.requirements() for number in r.numbers}
+    assert {number for number, text in by.items() if text == "told"} == {42, 44, 45, 46, 47, 51}
+    assert {each["text"] for each in data["requirements"]} == set(standard.TEXTS.values())
+    (waived,) = [w["found"] for w in data["warnings"] if w["letter"] == "g"]
+    assert all(re.search(rf"\b{number}\b", waived) for number in unmet)
+    assert data["decides"] == list(page.DECIDES)
+    assert all(said in shown for said in page.DECIDES)
+
+
+@pytest.mark.promise("verification-16")
+def test_each_occurrence_is_warned_of_with_its_impact_or_said_not_to_be_there():
+    good = page.verification_data(reported(outcome(Referent.INDEPENDENT, True, MARGIN)))["warnings"]
+    assert [w["letter"] for w in good if w["letter"] in "adf"] == ["a", "d", "f"]
+    assert all((w["impact"] != "") is (w["found"] != "None found.") for w in good)
+    assert {w["letter"] for w in good} == set("abcdefgh")
+
+    raised = replace(outcome(Referent.INDEPENDENT, True, MODULUS, name="two"), comparisons=(), trouble="it broke")
+    absent = replace(raised, check=replace(raised.check, name="three"), trouble="", absent="not here")
+    changed = integrity.Integrity("commit 0", changed=("a.py",))
+    bad = reported(outcome(Referent.INDEPENDENT, False, MARGIN), raised, absent, files=changed)
+    found = {letter: " ".join(w.found for w in warned.warnings(bad) if w.letter == letter) for letter in "ad"}
+    assert "one: beyond tolerance" in found["a"]
+    assert "only criteria" in found["a"]
+    assert "two did not run: it broke" in found["d"]
+    setup = [w.found for w in warned.warnings(bad) if w.letter == "f"]
+    assert len(setup) == 2
+    assert "three" in setup[1]
+    shown = unescape(page.verification_page(bad))
+    assert all(w.found in shown and w.impact in shown for w in warned.warnings(bad))
+
+
+@pytest.mark.promise("verification-17")
+def test_the_results_of_every_subject_have_an_estimate_of_uncertainty_or_the_statement_that_there_is_none():
+    subjects = list(dict.fromkeys(q.subject for q in registry.quantities() if not q.given))
+    assert [u.subject for u in standard.uncertainties()] == subjects
+    for u in standard.uncertainties():
+        assert ("No estimate" in u.estimate) is (u.kind == "none")
+        assert u.how
+
+
+@pytest.mark.promise("verification-18")
+def test_each_assumption_has_its_reason_and_what_follows_without_it():
+    v = reported(outcome(Referent.INDEPENDENT, True, MARGIN))
+    shown = unescape(page.verification_page(v))
+    assert standard.assumptions()
+    for a in standard.assumptions():
+        assert all(each and each in shown for each in (a.part, a.assumed, a.because, a.otherwise))
+    assert page.verification_data(v)["assumptions"][0]["assumed"] == standard.assumptions()[0].assumed
+
+
+@pytest.mark.promise("verification-14")
+def test_a_level_is_argued_by_the_standards_scale_and_the_next_one_is_the_next():
+    for f in reported(outcome(Referent.INDEPENDENT, True, MARGIN)).factors:
+        scale = [standard.level_means(f.name, level) for level in range(5)]
+        assert len(set(scale)) == 5
+        assert scale[0] == "insufficient evidence"
+        assert (f.means, f.next_means) == (scale[f.level], scale[f.level + 1])
+    highest = replace(f, level=4)
+    assert highest.next_means == ""
+
+
+def test_what_verification_needs_next_depends_on_where_it_stands():
+    counts = dict.fromkeys(Status, 0) | {Status.VERIFIED: 10}
+    at = {
+        f.level: f.next_needs
+        for holds, whole in ((True, True), (True, False), (False, True))
+        for f in credibility.factors(counts, holds, whole, 0)
+        if f.name == "Verification"
+    }
+    assert sorted(at) == [0, 1, 2]
+    assert len(set(at.values())) == 3
+
+
+# ------------------------------------------------------------------------------------------------------------ the files
+@pytest.fixture
+def package(tmp_path, monkeypatch):
+    """A package of two files with a record of them."""
+    folder = tmp_path / "microrad"
+    folder.mkdir()
+    (folder / "a.py").write_text("one = 1\n", encoding="utf-8")
+    (folder / "b.toml").write_text("two = 2\n", encoding="utf-8")
+    monkeypatch.setattr(integrity, "_PACKAGE", folder)
+    record = {name: integrity._sha256(folder / name) for name in ("a.py", "b.toml")}
+    monkeypatch.setattr(integrity, "_recorded", lambda: record)
+    monkeypatch.setattr(integrity, "other_versions", dict)
+    return folder
+
+
+@pytest.mark.promise("verification-12")
+def test_files_as_recorded_are_whole(package):
+    (package / "__pycache__").mkdir()
+    (package / "__pycache__" / "a.pyc").write_bytes(b"")
+    found = integrity.integrity()
+    assert found.whole
+    assert found.text == "Against the record of the wheel: every file as recorded."
+
+
+@pytest.mark.promise("verification-12")
+def test_a_changed_a_missing_and_an_added_file_are_named(package):
+    (package / "a.py").write_text("one = 2\n", encoding="utf-8")
+    (package / "b.toml").unlink()
+    (package / "c.py").write_text("", encoding="utf-8")
+    found = integrity.integrity()
+    assert (found.changed, found.missing, found.added) == (("a.py",), ("b.toml",), ("c.py",))
+    assert not found.whole
+    assert found.text == "Against the record of the wheel: 1 changed (a.py); 1 missing (b.toml); 1 added (c.py)."
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory):
+    """A copy of the whole package, and its record."""
+    folder = tmp_path_factory.mktemp("site") / "microrad"
+    shutil.copytree(integrity._PACKAGE, folder, ignore=shutil.ignore_patterns("__pycache__"))
+    record = {p.relative_to(folder).as_posix(): integrity._sha256(p) for p in folder.rglob("*") if p.is_file()}
+    return folder, record
+
+
+EDITS = {
+    "a constant": (r"(?<=[ (,=])\d+\.\d+(?=[ ),])", lambda found: f"{float(found[0]) + 1.0}"),
+    "a sign": (r"(?<= )\+(?= )", lambda _: "-"),
+    "a comparison": (r"(?<= )<(?= )", lambda _: "<="),
+    "a word": (r"\bmean\b", lambda _: "median"),
+}
+
+
+@pytest.mark.promise("verification-12")
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("edit", [*EDITS, "a removed file", "two swapped files"])
+def test_an_edit_of_the_installation_is_found_wherever_it_is(installed, monkeypatch, edit, seed):
+    folder, record = installed
+    monkeypatch.setattr(integrity, "_PACKAGE", folder)
+    monkeypatch.setattr(integrity, "_recorded", lambda: record)
+    monkeypatch.setattr(integrity, "other_versions", dict)
+    assert integrity.integrity().whole
+    draw = random.Random(f"{edit} {seed}")
+    data = sorted(p for p in folder.rglob("*") if p.suffix in {".toml", ".json"})
+    code = sorted(p for p in folder.rglob("*.py") if edit in EDITS and re.search(EDITS[edit][0], p.read_text("utf-8")))
+    chosen = draw.sample(code or data, 2)
+    before = {path: path.read_bytes() for path in chosen}
+    if edit in EDITS:
+        pattern, new = EDITS[edit]
+        text = before[chosen[0]].decode()
+        place = draw.choice([*re.finditer(pattern, text)])
+        chosen[0].write_text(text[: place.start()] + new(place) + text[place.end() :], encoding="utf-8")
+    elif edit == "a removed file":
+        chosen[0].unlink()
+    else:
+        chosen[0].write_bytes(before[chosen[1]])
+        chosen[1].write_bytes(before[chosen[0]])
+    found = integrity.integrity()
+    for path, content in before.items():
+        path.write_bytes(content)
+    touched = {path.relative_to(folder).as_posix() for path in chosen[: 1 + (edit == "two swapped files")]}
+    assert {*found.changed, *found.missing} == touched
+    assert not found.whole
+
+
+@pytest.mark.promise("verification-13")
+def test_another_library_is_named_beside_the_files(package, monkeypatch):
+    other = {"numpy": "numpy 3.0 (tested: 2.0)", "ruff": "ruff 1.0 (tested: 0.9)"}
+    monkeypatch.setattr(integrity, "other_versions", lambda: other)
+    found = integrity.integrity()
+    assert not found.whole
+    assert found.versions == ("numpy 3.0 (tested: 2.0)",), "that of a tool changes no number"
+    assert found.text.endswith("every file as recorded. Not the tested version: numpy 3.0 (tested: 2.0).")
+
+
+@pytest.mark.promise("verification-12")
+def test_from_its_source_the_files_are_held_against_the_commit(tmp_path, monkeypatch):
+    folder = tmp_path / "src" / "microrad"
+    folder.mkdir(parents=True)
+    (folder / "a.py").write_text("one = 1\n", encoding="utf-8")
+    (folder / "b.py").write_text("two = 2\n", encoding="utf-8")
+    monkeypatch.setattr(integrity, "_PACKAGE", folder)
+    monkeypatch.setattr(integrity, "_PROJECT", tmp_path)
+    monkeypatch.setattr(integrity, "_recorded", dict)
+    monkeypatch.setattr(integrity, "other_versions", dict)
+    assert integrity.integrity() == integrity.Integrity("")
+    assert not integrity.integrity().whole
+    who = ("-c", "user.name=a", "-c", "user.email=a@b.invalid")
+    for words_of_git in (("init", "-q"), ("add", "-A"), (*who, "commit", "-qm", "first")):
+        subprocess.run(["git", *words_of_git], cwd=tmp_path, check=True)
+    assert integrity.integrity().whole
+    (folder / "a.py").write_text("one = 3\n", encoding="utf-8")
+    (folder / "b.py").unlink()
+    (folder / "c.py").write_text("", encoding="utf-8")
+    found = integrity.integrity()
+    assert (found.changed, found.missing, found.added) == (("a.py",), ("b.py",), ("c.py",))
+
+
+# ---------------------------------------------------------------------------------------------------------- the domains
+def sources_of(text, tmp_path):
+    path = tmp_path / "mission.toml"
+    path.write_text(text, encoding="utf-8")
+    return load_mission(path).sources
+
+
+SHIPPED_TEXT = resources.files("microrad.mission").joinpath("missions", "leo-geo.toml").read_text("utf-8")
+
+
+@pytest.mark.promise("verification-11")
+def test_the_shipped_mission_has_no_placard(tmp_path):
+    assert foundation.placards(sources_of(SHIPPED_TEXT, tmp_path)) == []
+    view = foundation.foundation_view(sources_of(SHIPPED_TEXT, tmp_path))
+    assert "All inputs lie where" in str(view.blocks[2])
+
+
+@pytest.mark.promise("verification-11")
+def test_an_input_beyond_the_domain_says_which_limit_how_far_and_what_follows(tmp_path):
+    most = foundation.shipped()["domains"]["The links"]["extents"]["communication.distance"]["most"]
+    text = sweeps.changed(SHIPPED_TEXT, {"communication.distance": 384e6 / 42e6, "terminals.leo_aperture": 0.1})
+    near, far = foundation.placards(sources_of(text, tmp_path))
+    assert (near.key, far.key) == ("communication.distance", "terminals.leo_aperture")
+    assert near.value == pytest.approx(384e6)
+    assert near.text == (
+        f"communication.distance = 384000 km is {384e6 / most:.3g} times the largest at which the links were held"
+        f" against independent methods, {format_quantity(most, 'm', 3)}. Figures that depend on it are extrapolated"
+    )
+    assert "is below the least, by a factor of" in far.text
+
+
+@pytest.mark.promise("report-6")
+@pytest.mark.promise("verification-11")
+def test_the_report_and_its_warnings_carry_the_placards(tmp_path):
+    view = foundation.foundation_view(
+        sources_of(sweeps.changed(SHIPPED_TEXT, {"communication.distance": 9.0}), tmp_path)
+    )
+    assert "communication.distance" in str(view.blocks[2])
+    assert "outside the validated domain" in view.blocks[0]
+
+
+@pytest.mark.promise("verification-11")
+def test_placards_stand_among_the_warnings_of_a_study(monkeypatch):
+    """Those of the shipped study, had its link been nine times as long."""
+    study = plain_study()
+    assert "What was checked" not in words.ranked_warnings(study)
+    key = "communication.distance"
+    far = {**study.file.sources, key: replace(study.file.sources[key], value='"378000 km"')}
+    study = replace(study, file=replace(study.file, sources=far))
+    said = [each.text for each in foundation.placards(far)]
+    assert len(said) == 1 and said[0].startswith(f"{key} = 378000 km is ")
+    assert words.ranked_warnings(study)["What was checked"] == said
+    (rows,) = (block.rows for block in foundation.foundation_view(far).blocks if isinstance(block, Table))
+    assert {row[0]: row[2] for row in rows} == {
+        subject: str(counts.get("verified", 0)) for subject, counts in foundation.shipped()["statuses"].items()
+    }
+
+
+@pytest.mark.promise("verification-10")
+def test_draws_are_of_all_inputs_at_once_and_in_pairs_on_both_sides(monkeypatch):
+    drawn = []
+    monkeypatch.setattr(sweeps, "_held", lambda checks, factors: drawn.append(factors) or True)
+    factors = {"communication.distance": (0.5, 2.0), "terminals.leo_aperture": (0.1, 10.0)}
+    sweeps.swept([sweeps.Sweep("The links", ("budgets",), factors, 10)])
+    assert len(drawn) == 10
+    for one, other in zip(drawn[::2], drawn[1::2], strict=True):
+        for key in factors:
+            assert one[key] != 1.0 and one[key] * other[key] == pytest.approx(1.0), key
+
+
+@pytest.mark.promise("verification-10", "verification-11")
+def test_the_packaged_domains_are_of_the_sweeps_and_statuses_of_the_register():
+    held = foundation.shipped()
+    assert held["domains"].keys() == {sweep.part for sweep in sweeps.SWEEPS}
+    for sweep in sweeps.SWEEPS:
+        domain = held["domains"][sweep.part]
+        assert domain["checks"] == list(sweep.checks)
+        assert domain["extents"].keys() == sweep.factors.keys()
+        assert 0.6 * sweep.draws <= domain["inside"] <= domain["draws"] <= sweep.draws
+    counted = {subject: sum(counts.values()) for subject, counts in held["statuses"].items()}
+    results = [q.subject for q in registry.quantities() if not q.given]
+    assert counted == {subject: results.count(subject) for subject in dict.fromkeys(results)}
+
+
+def test_statuses_of_the_release_are_those_of_this_run(everything):
+    if any(o.absent for o in everything.outcomes):
+        pytest.skip("without the recordings a quantity that is validated at the release is not, here")
+    assert foundation.shipped()["statuses"] == everything.by_subject
+
+
+@pytest.mark.promise("verification-10")
+def test_a_sweep_ends_before_the_first_draw_that_does_not_hold(monkeypatch):
+    factors = {"communication.distance": (0.5, 2.0)}
+    monkeypatch.setattr(sweeps, "_held", lambda checks, factors: factors["communication.distance"] < 1.6)
+    found = sweeps.swept([sweeps.Sweep("The links", ("budgets",), factors, 40)])["The links"]
+    assert found["draws"] == 40
+    assert 0 < found["inside"] < 40
+    extent = found["extents"]["communication.distance"]
+    assert extent["unit"] == "m"
+    assert 42e6 <= extent["most"] <= 1.6 * 42e6
+    assert 42e6 / 1.6 <= extent["least"] <= 42e6, "as near the other way, though all of these hold"
+
+
+@pytest.mark.promise("verification-10")
+def test_a_swept_mission_is_judged_by_the_checks_and_a_refused_one_is_no_draw():
+    (budgets,) = [each for each in checks.every() if each.name == "budgets"]
+    assert sweeps._held([budgets], {"communication.distance": 0.5}) is True
+    assert sweeps._held([budgets], {"answer.divergence": 0.01}) is None, "below diffraction"
+
+
+def test_values_are_changed_in_their_own_table():
+    text = '[a]\nx = "2 m" # one\n\n[b]\nx = "2 m"\n'
+    assert sweeps.changed(f"\n{text}", {"b.x": 1.5}) == '\n[a]\nx = "2 m" # one\n\n[b]\nx = "3 m"\n'
+    with pytest.raises(KeyError, match=r"b\.y"):
+        sweeps.changed(f"\n{text}", {"b.y": 2.0})
+
+
+# ----------------------------------------------------------------------------------------- signs behind single numbers
+DEPENDS = {
+    "Link margin | Communication Margin": ["communication.distance"],
+    "Link margin | Beacon Margin": [],
+    "Received power | Communication Received power": ["communication.distance"],
+}
+
+
+@pytest.fixture
+def held(monkeypatch):
+    """Domains of the release with few dependences and one quantity on nothing."""
+    made = {**foundation.shipped(), "depends": DEPENDS, "bare": ["Stage of an acquisition"]}
+    monkeypatch.setattr(foundation, "shipped", lambda: made)
+    monkeypatch.setattr(marks, "shipped", lambda: made)
+    return made
+
+
+def marks_of(text, tmp_path):
+    return marks.Marks.of(sources_of(text, tmp_path))
+
+
+FAR = {"communication.distance": 384e6 / 42e6}
+
+
+@pytest.mark.promise("verification-20", "verification-21")
+def test_a_number_that_depends_on_an_input_beyond_the_domain_has_a_sign_and_no_other(tmp_path, held):
+    near, far = marks_of(SHIPPED_TEXT, tmp_path), marks_of(sweeps.changed(SHIPPED_TEXT, FAR), tmp_path)
+    margin = "budgets.Communication.totals.Margin.value"
+    assert near.sign(margin).sign == ""
+    assert near.legend is None
+    found = far.sign(margin)
+    assert (found.sign, found.inputs) == ("†", ("communication.distance",))
+    assert "times the largest at which" in found.why
+    assert far.sign("budgets.Beacon.totals.Margin.value").sign == ""
+    assert far.sign("requirements.beacon margin.required").sign == "", "told again"
+    assert far.sign("").sign == ""
+
+
+@pytest.mark.promise("verification-20", "verification-21", "verification-22")
+def test_a_number_of_a_quantity_on_nothing_has_a_sign_wherever_the_mission_is(tmp_path, held):
+    found = marks_of(SHIPPED_TEXT, tmp_path)
+    assert found.sign("acquisition.stages.x.longest_s").sign == "‡"
+    assert found.sign("acquisition.scan_radius_rad").sign == ""
+    (line,) = found.legend.lines
+    assert line.startswith("‡ Compared with nothing")
+    assert "Stage of an acquisition" in line
+
+
+def test_a_kind_that_the_shipped_mission_has_not_depends_on_what_its_quantity_does(tmp_path, held):
+    far = marks_of(sweeps.changed(SHIPPED_TEXT, FAR), tmp_path)
+    assert far.sign("budgets.Downlink.totals.Margin.value").sign == "†"
+    assert far.sign("budgets.Downlink.totals.Required power.value").sign == ""
+
+
+@pytest.mark.promise("verification-22")
+def test_signs_stand_behind_numbers_of_tables_and_of_their_folds(tmp_path, held):
+    names = {1: [f"budgets.Communication.totals.{name}.value" for name in ("Margin", "Required power")]}
+    rows = [("Margin", "3.00 dB"), ("Required power", "-3.00 dBm")]
+    table = Table("", ("line", "value"), rows, totals=2, folded="margin 3.00 dB; required -3.00 dBm", names=names)
+    far = marks_of(sweeps.changed(SHIPPED_TEXT, FAR), tmp_path)
+    (view,) = far.blocks([View("Budget", [table])])
+    (shown,) = view.blocks
+    assert str(shown.rows[0][1]) == "3.00 dB †"
+    assert "extrapolated" in shown.rows[0][1].hint
+    assert shown.rows[1] == ("Required power", "-3.00 dBm")
+    assert shown.folded == "margin 3.00 dB †; required -3.00 dBm"
+    assert marks_of(SHIPPED_TEXT, tmp_path).table(table).folded == table.folded
+    narrow = far.table(table.columns((1,)))
+    assert str(narrow.rows[0][0]) == "3.00 dB †", "names go with their columns"
+    marked = far.table(Table("", ("a", "b"), [("x", Cell("3.00 dB", "PASS"))], names=names)).rows[0][1]
+    assert str(marked) == "3.00 dB † PASS"
+    word = far.table(Table("", ("a", "b"), [("x", "unknown")], names=names)).rows[0][1]
+    assert word == "unknown", "a word is no number"
+
+
+@pytest.mark.promise("verification-22")
+def test_the_json_lists_the_paths_of_numbers_with_a_sign(tmp_path, held):
+    document = {
+        "budgets": [
+            {"name": name, "totals": [{"name": "Margin", "value": 3.0}, {"name": "Required power", "value": 1.0}]}
+            for name in ("Communication", "Beacon")
+        ],
+        "acquisition": {"stages": [{"name": "a", "longest_s": 1.0}, {"name": "b", "longest_s": 2.0}]},
+    }
+    beyond, bare = marks_of(sweeps.changed(SHIPPED_TEXT, FAR), tmp_path).data(document)
+    assert beyond["numbers"] == ["budgets.0.totals.0.value"]
+    assert (beyond["sign"], beyond["beyond"]) == ("†", ["communication.distance"])
+    assert "times the largest at which" in beyond["because"][0]
+    assert bare["numbers"] == ["acquisition.stages.*.longest_s"]
+    assert bare["quantities"] == ["Stage of an acquisition"]
+    (only,) = marks_of(SHIPPED_TEXT, tmp_path).data(document)
+    assert only["sign"] == "‡"
+
+
+@pytest.mark.promise("verification-21", "verification-22")
+def test_budgets_beyond_the_domain_say_so_at_each_number_in_text_page_and_json(tmp_path):
+    path = tmp_path / "far.toml"
+    near, far = (link_study.run_link_study(load_link(_written(path, text))) for text in _near_and_far())
+    assert "†" not in links_text(near, 80)
+    text = links_text(far, 80)
+    assert re.search(r"Margin +−[\d.]+ dB †", text)
+    assert re.search(r"Required power +−[\d.]+ dBm  ", text)
+    assert "† communication.distance = 384000 km is" in text
+    assert max(map(len, text.splitlines())) <= 80
+    page = links_page(far)
+    assert re.search(r'dB <span class="mark FAIL" title="communication.distance = 384000 km[^"]+">†</span>', page)
+    assert "†" not in links_page(near)
+    found = next(each for each in links_data(far)["marks"] if each["beyond"] == ["communication.distance"])
+    assert "budgets.0.margin_db" in found["numbers"]
+    assert not any("budgets.1" in each or "required_power" in each for each in found["numbers"])
+    assert all(each["beyond"] == [] for each in links_data(near)["marks"])
+
+
+@pytest.mark.promise("verification-22")
+def test_the_sentence_of_the_verdict_the_chain_and_the_studio_have_the_signs_and_csv_has_none(tmp_path):
+    study, key = plain_study(), "communication.distance"
+    far = {**study.file.sources, key: replace(study.file.sources[key], value='"378000 km"')}
+    beyond = replace(study, file=replace(study.file, sources=far))
+    for of, signed in ((study, False), (beyond, True)):
+        assert (" dB †" in words.headline(of)) == signed
+        assert any(" dB †" in line for stage in chain.stages(of) for line in stage.lines) == signed
+    link_views, links = [], []
+    for text in _near_and_far():
+        file = load_link(_written(tmp_path / "mission.toml", text))
+        link_views.append(studio_link.view(file))
+        links.append(link_study.run_link_study(file))
+    assert [view.margins[0].sign for view in link_views] == ["", "†"]
+    assert [view.margins[1].sign for view in link_views] == ["", ""]
+    assert "†" in links_text(links[1], 80)
+    assert "†" not in links_csv(links[1])
+
+
+def _near_and_far():
+    return SHIPPED_TEXT, sweeps.changed(SHIPPED_TEXT, FAR)
+
+
+def _written(path, text):
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+@pytest.mark.promise("verification-21")
+def test_the_packaged_dependences_are_of_registered_quantities_and_swept_inputs():
+    held = foundation.shipped()
+    titles = {q.title for q in registry.quantities() if not q.given}
+    assert {kind.partition(" | ")[0] for kind in held["depends"]} <= titles
+    assert set(held["bare"]) <= titles
+    keys = {key for sweep in sweeps.SWEEPS for key in sweep.factors}
+    assert {key for several in held["depends"].values() for key in several} == keys, "each moves something"
+    assert held["depends"]["Free-space loss | Communication Free-space loss"] == ["communication.distance"]
+    assert "fine_pointing.amplifier_bandwidth" in held["depends"]["Modulus margin"]
+    assert held["depends"]["Free-space loss | Beacon Free-space loss"] == []
+    by_distance = {kind for kind, keys in held["depends"].items() if "communication.distance" in keys}
+    assert {f"{of} | Communication {of}" for of in ("Received power", "Free-space loss")} <= by_distance
+    assert not any(word in kind for kind in by_distance for word in ("Beacon", "Answer", "ransmit"))
+
+
+@pytest.mark.promise("verification-21")
+def test_dependences_are_what_moves_where_one_input_is_changed(monkeypatch):
+    numbers = {"budget.budgets.Beacon.margin_db": 3.0, "budget.point_ahead.angle_rad": 1.0, "budget.rows": 2.0}
+
+    def made(folder, documents, key, factor):
+        if factor < 1.0 or key == "b":
+            return numbers | ({"budget.budgets.Beacon.margin_db": 3.0 * factor} if key == "a" else {})
+        return None if key else numbers
+
+    monkeypatch.setattr(dependences, "_numbers", made)
+    swept = sweeps.Sweep("x", (), {"a": (0.5, 2.0), "b": (0.5, 2.0)}, 1)
+    assert dependences.dependences([swept]) == {"Link margin | Beacon": ["a"], "Point-ahead angle": []}
+
+
+# -------------------------------------------------------------------------------------------------------- recordings
+def recording_of(drive, output, rate_hz, period=None):
+    return SimpleNamespace(drive=drive, output=output, rate_hz=rate_hz, period_samples=period)
+
+
+@pytest.mark.promise("verification-23")
+def test_the_domain_of_a_recording_is_its_amplitude_excited_band_rate_and_travel():
+    time = np.arange(2000) / 1000.0
+    drive = 1.5 + 2.0 * np.sin(2 * np.pi * 10.0 * time) + 0.3 * np.sin(2 * np.pi * 40.0 * time)
+    drive += 0.1 * np.sin(2 * np.pi * 90.0 * time)  # a twentieth of the largest: not excited
+    periodic = recording_of(drive[:, None], 3.0 * drive[:, None], 1000.0, 1000)
+    found = recorded.extents([periodic], 1e-6)
+    assert (found["frequency"]["least"], found["frequency"]["most"]) == (10.0, 40.0)
+    assert found["drive"]["most"] == pytest.approx(np.ptp(drive) / 2.0, rel=1e-3)
+    assert found["rate"] == {"unit": "Hz", "least": 1000.0, "most": 1000.0}
+    assert found["position"]["most"] == pytest.approx(3e-6 * np.ptp(drive), rel=1e-3)
+    plain = recording_of(
+        drive[:1930, None], drive[:1930, None], 1000.0
+    )  # no whole periods: the window's lines are wider
+    both = recorded.extents([periodic, plain], 1e-6)["frequency"]
+    assert 10.0 - 2 / 1.93 <= both["least"] <= 10.0
+    assert 40.0 <= both["most"] <= 40.0 + 2 / 1.93
+    still = recording_of(np.column_stack([drive, np.ones_like(drive)]), drive[:, None], 1000.0, 1000)
+    assert recorded.extents([still], 1e-6)["frequency"]["least"] == 10.0
+
+
+@pytest.mark.promise("verification-23")
+def test_a_comparison_with_a_recording_gives_its_domain_with_the_error_and_a_failed_one_none(monkeypatch):
+    drive = np.sin(np.arange(1000.0))[:, None]
+    held_out = measured.HeldOut("the mirror", ("a.npy",), lambda _: [recording_of(drive, drive, 10.0)], 1.0, ("x",))
+    monkeypatch.setattr(recorded, "HELD_OUT", {"one": held_out})
+    made = {holds: outcome(Referent.MEASUREMENT, holds, recorded._ERROR) for holds in (True, False)}
+    found = recorded.recorded(None, [made[True]])["one"]
+    assert found["records"] == ["a.npy"]
+    assert (found["inputs"], found["outputs"]) == (1, 1)
+    assert found["errors"] == [{"what": "", "unit": "", "error": 1.0, "allowed": 0.1}]
+    assert recorded.recorded(None, [made[False]]) == {}
+    assert recorded.recorded(None, [outcome(Referent.MEASUREMENT, True, MARGIN)]) == {}
+
+
+@pytest.mark.promise("verification-23")
+def test_without_the_recordings_the_stored_domain_stays(tmp_path, monkeypatch):
+    monkeypatch.delenv("MICRORAD_DATA", raising=False)
+    monkeypatch.setattr(findings, "integrity", lambda: WHOLE)
+    monkeypatch.setattr(findings, "every", lambda: [c for c in measured.CHECKS if c.name in measured.HELD_OUT])
+    monkeypatch.setattr(findings, "swept", lambda on_progress: {})
+    monkeypatch.setattr(findings, "dependences", lambda on_progress: {})
+    found = findings.verify(full=True)
+    assert [o.check.name for o in found.outcomes if o.absent] == list(measured.HELD_OUT)
+    assert found.recordings == foundation.shipped()["recordings"]
+    assert json.loads(page.domains_text(found))["recordings"] == foundation.shipped()["recordings"]
+    monkeypatch.setattr(findings, "recorded", lambda workspace, outcomes: {"cubespec": "new"})
+    changed = findings.verify(full=True).recordings
+    assert changed == {**foundation.shipped()["recordings"], "cubespec": "new"}
+    assert findings.verify().recordings == foundation.shipped()["recordings"]
+
+
+def test_the_packaged_domains_of_recordings_are_shown_with_their_errors():
+    v = findings.found([], WHOLE, full=False, domains={}, recordings=foundation.shipped()["recordings"])
+    html = page.verification_page(v)
+    assert "Measured: the hysteresis of a mirror" in html
+    assert "piezo_1hz/Model_Vi_Do.dat" in html
+    assert "Measured:" not in page.verification_page(findings.found([], WHOLE, full=False, domains={}))
+
+
+@pytest.mark.promise("verification-24")
+def test_a_mission_says_whether_its_mirror_works_within_what_was_measured(tmp_path, monkeypatch):
+    sources = sources_of(SHIPPED_TEXT, tmp_path)
+    hysteresis, linear = foundation.measured(sources)
+    assert not hysteresis.inside
+    told = marks.with_marks({}, sources)["mirror_model"]
+    assert [each["inside"] for each in told] == [hysteresis.inside, linear.inside]
+    assert "of travel" in hysteresis.said and not any("travel" in each for each in hysteresis.beyond + linear.beyond)
+    assert any("a drive amplitude of 6 V" in each and "times the largest" in each for each in hysteresis.beyond)
+    assert "There the error of the mirror model is not known" in linear.said
+    wide = json.loads(json.dumps(foundation.shipped()))
+    for record in wide["recordings"].values():
+        record["extents"]["drive"]["most"] = 6.0
+        record["extents"]["frequency"] = {"unit": "Hz", "least": 1.0, "most": 5e3}
+        record["extents"]["rate"]["most"] = 50e3
+    monkeypatch.setattr(foundation, "shipped", lambda: wide)
+    assert [each.inside for each in foundation.measured(sources)] == [True, True]
+    assert "0.835 % (2 % allowed)" in foundation.measured(sources)[0].said
+    assert "the error of the mirror model is validated" in foundation.measured(sources)[0].said
+    assert "the error of the mirror model is validated" in str(foundation.foundation_view(sources).blocks[1])
+    wide["recordings"]["cubespec"]["extents"]["frequency"]["least"] = 2.0
+    (_, below) = foundation.measured(sources)
+    assert below.beyond == ("a frequency of 1 Hz, 2 times below the least",)
+    wide["recordings"]["cubespec"]["extents"]["rate"]["most"] = 1.0
+    assert any(each.startswith("a rate of") for each in foundation.measured(sources)[1].beyond)
+    assert foundation.measured({}) == [], "no mirror"

@@ -1,0 +1,92 @@
+"""What functions return inside of a case is held: each part of it counts, what machines disagree on does not."""
+
+import json
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from microrad.link import gains
+from reference import inside
+
+
+@dataclass(frozen=True)
+class Record:
+    power_w: float
+    name: str
+    samples: np.ndarray
+    inner: tuple[complex, dict[str, int | None]]
+
+
+RECORD = Record(2.5e-9, "beacon", np.array([3.0, -1.0, 40.0]), (1.0 + 2.0j, {"rows": 3, "gone": None}))
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        replace(RECORD, power_w=2.53e-9),
+        replace(RECORD, power_w=-2.5e-9),
+        replace(RECORD, name="answer"),
+        replace(RECORD, samples=np.array([-1.0, 3.0, 40.0])),
+        replace(RECORD, samples=np.array([3.0, 1.0, 40.0])),
+        replace(RECORD, samples=np.array([3.0, -1.0, 40.0, 0.0])),
+        replace(RECORD, inner=(1.0 - 2.0j, {"rows": 3, "gone": None})),
+        replace(RECORD, inner=(1.0 + 2.0j, {"rows": 4, "gone": None})),
+        replace(RECORD, inner=(1.0 + 2.0j, {"rows": 3, "gone": 0})),
+        replace(RECORD, inner=(1.0 + 2.0j, {"rows": 3})),
+    ],
+)
+def test_each_part_of_a_value_moves_it_by_more_than_a_rounding(other):
+    assert abs(inside.value(other) - inside.value(RECORD)) > inside.NEAR
+    rounded = replace(RECORD, power_w=RECORD.power_w * (1 + 1e-9), samples=RECORD.samples * (1 - 1e-9))
+    assert abs(inside.value(rounded) - inside.value(RECORD)) < inside.STEADY
+
+
+def test_a_residue_of_rounding_counts_as_nothing_and_what_is_not_finite_is_told_apart():
+    assert inside.value(1e-17) == pytest.approx(inside.value(-3e-17), abs=inside.NEAR + 0.3)
+    different = {inside.value(x) for x in (np.nan, np.inf, -np.inf, 0.0)}
+    assert len(different) == 4
+
+
+def test_hashes_and_versions_are_no_part_of_a_value():
+    one, other = (f"microrad {version}, {digit * 64}" for version, digit in (("0.3.0.dev0", "a"), ("1.0.0", "7")))
+    assert inside.value(one) == inside.value(other) != inside.value("microrad, ")
+
+
+def watched(number, file):
+    """What the functions of the package return when one of them is called, as a case has it."""
+    watch = inside.Watch()
+    watch.begin()
+    try:
+        gains.aperture_gain_db(number, 1.55e-6)
+        gains.aperture_gain_db(2.0 * number, 1.55e-6)
+    finally:
+        watch.end(file)
+    return inside.gathered(file.parent)
+
+
+def test_a_function_that_returns_something_else_is_named_and_one_that_is_gone_is_not(tmp_path):
+    (tmp_path / "a").mkdir()
+    was = watched(0.05, tmp_path / "a" / "1.json")
+    assert was["link.gains:aperture_gain_db"] == {
+        "1.1": pytest.approx(32.9, abs=0.1),
+        "1.2": pytest.approx(32.96, abs=0.1),
+    }
+    inside.save(tmp_path / "reference.txt", was)
+    held = inside.load(tmp_path / "reference.txt")
+    assert inside.moved("budget", held, was) == []
+    (tmp_path / "b").mkdir()
+    [said] = inside.moved("budget", held, watched(0.056, tmp_path / "b" / "1.json"))
+    assert (
+        said.startswith("budget: inside of it link.gains:aperture_gain_db returns something else (")
+        and "call 1." in said
+    )
+    assert inside.moved("budget", {**held, "link.gains:old_name": {"1.1": 3.0}}, was) == []
+
+
+def test_only_what_all_machines_return_is_held_and_each_value_once(tmp_path):
+    one = {"f": {"1.1": 3.0, "1.2": 3.0, "2.1": 5.0, "1.10": 4.0}, "g": {"1.1": 1.0}}
+    other = {"f": {"1.1": 3.00001, "1.2": 3.0, "2.1": 5.1, "1.10": 4.0}, "g": {"1.1": 2.0}}
+    assert inside.steady([one, other]) == {"f": {"1.1": 3.0, "1.10": 4.0}}
+    assert inside.steady([one, {}]) == {}
+    assert json.loads(json.dumps(inside.steady([one, one])))["g"] == {"1.1": 1.0}
