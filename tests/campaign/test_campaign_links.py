@@ -83,12 +83,49 @@ def test_a_campaign_takes_what_a_budget_takes(tmp_path, name):
 
 def test_a_series_of_fades_goes_with_a_campaign_and_leaves_its_margins_alone(tmp_path):
     plain = rows(loaded(tmp_path, mission(tmp_path, "gallery").stem, POWER))
-    path = mission(tmp_path, "faded")
-    path.write_text(path.read_text(encoding="utf-8") + FADING, encoding="utf-8")
-    np.savetxt(tmp_path / "fades.csv", 1.0 + 0.5 * np.sin(np.arange(2000) / 40.0), header="power", comments="")
+    faded(tmp_path)
     campaign = loaded(tmp_path, "faded", POWER)
     np.testing.assert_array_equal(rows(campaign)["margin"], plain["margin"])
     assert "fades.csv" in named_files(campaign.mission.mission)
+
+
+def faded(folder, series=None):
+    path = mission(folder, "faded")
+    path.write_text(path.read_text(encoding="utf-8") + FADING, encoding="utf-8")
+    powers = 1.0 + 0.5 * np.sin(np.arange(2000) / 40.0) if series is None else series
+    np.savetxt(folder / "fades.csv", powers, header="power", comments="")
+
+
+@pytest.mark.promise("campaigns-64")
+def test_the_margin_under_fades_is_drawn_as_a_budget_has_it(tmp_path):
+    faded(tmp_path)
+    drawn = '[inputs."communication.fading.interleaver"]\ndistribution = "table"\nvalues = ["1 ms", "20 ms"]\n'
+    campaign = loaded(tmp_path, "faded", POWER + drawn)
+    assert "margin_under_fades" in campaign.keep
+    required = campaign.mission.mission.requirement.margin_db
+    (limit,) = (each for each in campaign.limits if each.output == "margin_under_fades")
+    assert (limit.least, limit.most, limit.source) == (required, None, "requirement.margin")
+    columns = rows(campaign)
+    for row in range(4):
+        values = {key: float(columns[key][row]) for key in columns if key.startswith("communication.")}
+        file = MissionBuilder(campaign).mission(0, values)
+        found = link_study.run_link_study(file).fading
+        assert columns["margin_under_fades"][row] == found.margin_left_db
+        assert found.margin_left_db < found.margin_db - 0.1
+        assert found.span_s == values["communication.fading.interleaver"]
+
+
+@pytest.mark.promise("campaigns-64")
+def test_a_margin_under_fades_needs_a_series_that_can_be_used(tmp_path):
+    mission(tmp_path, "gallery")
+    keep = HEAD + 'keep = ["margin", "margin_under_fades"]\n'
+    (found,) = faults(tmp_path, "gallery", POWER, keep)
+    assert (found.key, found.reason) == ("keep", "needs the mission's table [communication.fading] with a series")
+    assert "margin_under_fades" not in loaded(tmp_path, "gallery", POWER).keep
+    faded(tmp_path, np.ones(20))
+    (found,) = faults(tmp_path, "faded", POWER, keep)
+    assert found.key == "keep"
+    assert "fades.csv: the series has 20 samples; from 200" in found.reason
 
 
 def test_what_links_alone_have_not_is_refused_once(tmp_path):

@@ -227,7 +227,7 @@ def run_link_study(file: LinkFile, parts: kept.Kept = kept.NOTHING) -> LinkStudy
         point_ahead=point_ahead(data),
         beam_radius=beam_radius(data),
         finding=found,
-        fading=fading_of(data, link.communication_budget(data, sources).margin_db, file.path.parent, sources),
+        fading=fading_of(data, file.path.parent, sources),
     )
 
 

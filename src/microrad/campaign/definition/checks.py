@@ -10,9 +10,12 @@ from microrad.campaign.definition.tables import MOST_RUNS, CampaignTable, LimitT
 from microrad.campaign.definition.values import FILE_WORD, NotedError, ValueReader, quoted_near
 from microrad.campaign.records import Limit
 from microrad.core.units import format_quantity
+from microrad.link.fade_series import FadeSeriesError
+from microrad.link.fade_series import of_mission as fading_series
 from microrad.loop import controller_study, coupled_study
 from microrad.mirror import Variant
 from microrad.mission.fields import Quantity
+from microrad.mission.file import LinkFile
 from microrad.mission.model import LinkMission, Mission
 from microrad.mission.tables.fine_pointing import FinePointing
 from microrad.mission.tables.link import LinkRequirement
@@ -81,8 +84,16 @@ def kept(reader: ValueReader, raw: object, table: CampaignTable | None) -> tuple
     return tuple(name for name in OUTPUTS if name in raw)
 
 
+_OF_TABLES = (
+    ("beacon_margin", "beacon", "[beacon]"),
+    ("answer_margin", "answer", "[answer]"),
+    ("margin_under_fades", fading_series.KEY, "[communication.fading] with a series"),
+)
+"""Outputs that ask for a table of the mission: the output, the table's key, and the table in words."""
+
+
 def with_tables(reader: ValueReader, raw: object, keep: tuple[str, ...], absent: Collection[str]) -> tuple[str, ...]:
-    """The outputs to keep, by default without the margin of a beam that the mission has not; it is refused if asked.
+    """The outputs to keep, by default without those of a table that the mission has not; one is refused if asked for.
 
     Args:
         reader: where faults are noted.
@@ -90,14 +101,33 @@ def with_tables(reader: ValueReader, raw: object, keep: tuple[str, ...], absent:
         keep: the outputs to keep as far as the file says them.
         absent: tables that the mission of a cell has not.
     """
-    for name in ("beacon", "answer"):
-        output = f"{name}_margin"
+    for output, name, needed in _OF_TABLES:
         if output in keep and name in absent:
             if raw is not None:
-                expected = f"a mission with [{name}], or this output left out"
-                reader.fault("keep", output, f"needs the mission's table [{name}]", expected)
+                expected = f"a mission with {needed}, or this output left out"
+                reader.fault("keep", output, f"needs the mission's table {needed}", expected)
             keep = tuple(each for each in keep if each != output)
     return keep
+
+
+def check_fades(reader: ValueReader, keep: Sequence[str], files: Sequence[LinkFile]) -> None:
+    """A margin under fades only with series that can be read.
+
+    Args:
+        reader: where faults are noted.
+        keep: the outputs to keep.
+        files: the missions of the cells.
+    """
+    if "margin_under_fades" not in keep:
+        return
+    try:
+        for file in files:
+            table = file.mission.communication.fading
+            if table is not None and table.series is not None:
+                fading_series.series_of(table, file.path.parent)
+    except FadeSeriesError as error:
+        expected = "a series that can be used, or this output left out"
+        reader.fault("keep", "margin_under_fades", f"needs {fading_series.KEY}: {error}", expected)
 
 
 def check_day(reader: ValueReader, keep: Sequence[str], absent: Collection[str]) -> None:
@@ -138,6 +168,7 @@ def default_limits(
 def _required(keep: Sequence[str], r: LinkRequirement) -> tuple[Limit, ...]:
     wanted = (
         Limit("margin", r.margin_db, None, "requirement.margin"),
+        Limit("margin_under_fades", r.margin_db, None, "requirement.margin"),
         Limit("residual_quantile", None, r.pointing_error_rad, "requirement.pointing_error"),
     )
     return tuple(limit for limit in wanted if limit.output in keep)

@@ -27,6 +27,7 @@ _ALL = (
     Output("beyond_rate_share", "", "", "plant steps beyond the mirror's identified rate, over all steps", "residual"),
     Output("outside_share", "", "", "plant steps outside the mirror's identified drive range, over all", "residual"),
     Output("margin", "dB", "dB", "margin that the communication link keeps but for requirement.outage", "link"),
+    Output("margin_under_fades", "dB", "dB", "margin that the series of communication.fading leaves", "link"),
     Output("outage", "", "", "share of the time with less than 0 dB", "link"),
     Output("short", "", "", "share of the time with less than requirement.margin", "link"),
     Output("data_rate", "bit/s", "Mbit/s", "data rate that keeps requirement.margin but for the outage", "link"),

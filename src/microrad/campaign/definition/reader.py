@@ -17,6 +17,7 @@ from microrad.campaign.definition.tables import CampaignTable, VariableTable
 from microrad.campaign.definition.values import FILE_WORD, ValueReader, text_of
 from microrad.campaign.ledger import argument, is_ledger
 from microrad.campaign.records import CampaignError, Limit
+from microrad.link.fade_series import of_mission as fading_series
 from microrad.mirror import coupled
 from microrad.mission.file import LinkFile, MissionFile, check_table, mirror_of_loop, named_files, open_mission
 from microrad.mission.model import Mission
@@ -179,10 +180,13 @@ class _DefinitionReader:
         missions, required = [cell.file.mission for cell in cells], nominal.file.mission.requirement
         optional = ("beacon", "answer", "orbit", "operations")
         absent = [name for name in optional if any(getattr(m, name) is None for m in missions)]
+        fadings = [m.communication.fading for m in missions]
+        absent += [fading_series.KEY] * any(each is None or each.series is None for each in fadings)
         keep = checks.with_tables(self.reader, self.document.data.get("keep"), keep, absent)
         varying = [draw.key for draw in draws if any(touches_loop(draw.key, m) for m in missions)]
         if table.loop is not None:
             checks.check_loop(self.reader, table.loop, missions)
+        checks.check_fades(self.reader, keep, [cell.file for cell in cells])
         checks.check_day(self.reader, keep, absent)
         checks.check_tail(self.reader, table, varying, self.document.data)
         checks.check_minimise(self.reader, table)

@@ -11,6 +11,7 @@ from microrad import link
 from microrad.campaign.definition.outputs import OUTPUTS
 from microrad.core import kernels
 from microrad.core.arrays import Floats, Integers
+from microrad.link.fade_series.of_mission import fading_of
 from microrad.link.pointing.outage import Exposure, stated_outage
 from microrad.link.requirement import IMPOSSIBLE
 from microrad.loop import controller_study
@@ -46,6 +47,7 @@ def outputs(file: LinkFile, runs: ensemble.Ensemble | None, keep: Collection[str
     day = cache(lambda: _day(file, under()))
     known |= {
         "margin": lambda: under().margin_db,
+        "margin_under_fades": lambda: _margin_under_fades(file, data()),
         "outage": lambda: under().short_of(0.0),
         "short": lambda: under().short_of(m.requirement.margin_db),
         "data_rate": lambda: _rate(data(), under().outage_loss_db),
@@ -119,6 +121,12 @@ def _beam_margin(of: _Beam) -> float:
     if not found.possible:
         raise link.LinkError(f"{of.name}: {IMPOSSIBLE}")
     return found.margin_db
+
+
+def _margin_under_fades(file: LinkFile, data: link.DataLink) -> float:
+    found = fading_of(data, file.path.parent, file.sources)
+    assert found is not None  # the campaign file's own check
+    return found.margin_left_db
 
 
 def _rate(data: link.DataLink, loss_db: float) -> float:

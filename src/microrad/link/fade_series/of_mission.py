@@ -5,6 +5,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from microrad.link.budget.assembly import DataLink
+from microrad.link.budget.lines import communication_budget
 from microrad.link.fade_series.coded import CodedFading, CodedLink, coded_fading
 from microrad.link.fade_series.codes import code
 from microrad.link.fade_series.reader import read_fade_series
@@ -15,12 +16,13 @@ from microrad.mission.tables.link import Fading
 KEY = "communication.fading"
 
 
-def fading_of(data: DataLink, margin_db: float, folder: Path, sources: Mapping[str, Source]) -> CodedFading | None:
+def fading_of(data: DataLink, folder: Path, sources: Mapping[str, Source]) -> CodedFading | None:
     """The communication link under the series that the mission names, or None where it names none.
+
+    The static margin of its budget is that at power 1 of the series.
 
     Args:
         data: The communication link.
-        margin_db: Margin of its budget at constant power, in dB, which is that at power 1 of the series.
         folder: That of the mission file.
         sources: Where each value of the mission comes from, by its dotted key.
 
@@ -34,15 +36,24 @@ def fading_of(data: DataLink, margin_db: float, folder: Path, sources: Mapping[s
     target = table.bit_error_ratio if receiver is None else receiver.bit_error_ratio
     assert target is not None  # the table's own check
     try:
-        link = _coded(_series(table, folder), table, data.table.data_rate_bit_s)
-        return coded_fading(link, margin_db, target)
+        link = _coded(series_of(table, folder), table, data.table.data_rate_bit_s)
+        return coded_fading(link, communication_budget(data, sources).margin_db, target)
     except FadeSeriesError as error:
         own = sources.get(f"{KEY}.series")
         line = f", {own.file}, line {own.line}" if own is not None else ""
         raise FadeSeriesError(f"{KEY}{line}: {error}") from None
 
 
-def _series(table: Fading, folder: Path) -> FadeSeries:
+def series_of(table: Fading, folder: Path) -> FadeSeries:
+    """The series that a table names.
+
+    Args:
+        table: The table, which names one.
+        folder: That of the mission file.
+
+    Raises:
+        FadeSeriesError: For one that cannot be read or used.
+    """
     assert table.series is not None  # asked before
     path = folder / table.series
     try:
