@@ -88,13 +88,15 @@ def test_another_version_of_a_library_exits_with_1(call, folder, evidence):
 def test_domains_wait_for_full(call, tmp_path, evidence, monkeypatch):
     swept = {"The links": {"draws": 1, "inside": 1, "checks": [], "extents": {}}}
     monkeypatch.setattr(findings, "swept", lambda **options: swept)
+    monkeypatch.setattr(findings, "dependences", lambda **options: {"Link margin | Beacon": ["a"]})
     evidence()
     for words, full in ((("verify",), False), (("verify", "--full"), True)):
         data = json.loads(call(*words, "--output", tmp_path, "--json").out)
         assert data["full"] is full
         assert (data["domains"] == swept) is full
         assert (tmp_path / "domains.json").exists() is full
-    assert json.loads((tmp_path / "domains.json").read_text(encoding="utf-8"))["domains"] == swept
+    held = json.loads((tmp_path / "domains.json").read_text(encoding="utf-8"))
+    assert (held["domains"], held["depends"]) == (swept, {"Link margin | Beacon": ["a"]})
 
 
 def test_a_folder_that_is_a_file_is_refused_before_anything_runs(call, tmp_path, monkeypatch):
