@@ -14,7 +14,9 @@ from microrad.link.fade_series import CodedLink, FadeSeriesError, code, coded_fa
 from microrad.link.requirement import UNDER_FADES, of_links
 from microrad.link.study import run_link_study
 from microrad.mission.file import MissionError, named_files, with_contents
+from microrad.report.links.figures import link_figures
 from microrad.report.links.views import cost_text, links_views
+from microrad.report.plotting.sheet import Line, Rule
 from places import ROOT
 
 PERIOD_S, TARGET = 1e-4, 1e-6
@@ -94,9 +96,30 @@ def test_terminal_csv_json_and_page_have_the_same_numbers(tmp_path, call):
     assert f"Penalty of the fades,{-found['penalty_db']!r},dB" in said(call, 1, str(path), "--csv")
     page = said(call, 1, str(path), "--html")
     assert "What an interleaver brings" in page
+    assert "Extra power that brings the mean bit error ratio back to 1e-06 under fades.csv" in page
     assert cost_text(found["curve"]["penalty_db"][0]) in page
     without = json.loads(said(call, 1, str(written(tmp_path, data_with({}))), "--json"))
     assert "fading" not in without
+
+
+@pytest.mark.promise("link-100")
+def test_the_figure_has_the_curve_the_missions_own_span_and_what_the_margin_spares(tmp_path):
+    fades(tmp_path)
+    study = run_link_study(link_file(tmp_path, fading()))
+    figure = link_figures(study)[-1]
+    assert figure.name == "interleaver"
+    assert [*figure.columns["span (s)"]] == [*study.fading.curve.span_s]
+    assert [*figure.columns["power that the fades cost (dB)"]] == [*study.fading.curve.penalty_db]
+    (panel,) = figure.sheet.panels
+    curve, own = panel.all_of(Line)
+    assert [*curve.x] == [1e3 * each for each in study.fading.curve.span_s[1:]]
+    assert (own.x[0], own.y[0]) == (5.0, study.fading.penalty_db)
+    without, spare = panel.all_of(Rule)
+    required = study.file.mission.requirement.margin_db
+    assert (without.at, spare.at) == (study.fading.curve.penalty_db[0], study.fading.margin_db - required)
+    unspread = run_link_study(link_file(tmp_path, fading(interleaving="none", interleaver=None)))
+    assert len(link_figures(unspread)[-1].sheet.panels[0].all_of(Line)) == 1
+    assert "interleaver" not in [each.name for each in link_figures(run_link_study(link_file(tmp_path)))]
 
 
 def test_fades_that_no_power_makes_up_for_are_said(tmp_path, call):

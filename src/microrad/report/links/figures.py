@@ -9,8 +9,10 @@ from microrad.core.units import format_quantity
 from microrad.link import Swing, Tornado
 from microrad.link.acquisition.partner_search import Finding
 from microrad.link.acquisition.trade import Trade
+from microrad.link.fade_series.coded import CodedFading
 from microrad.link.requirement import time_kept
 from microrad.link.study import LinkStudy
+from microrad.report.links import words
 from microrad.report.plotting.figure import Figure
 from microrad.report.plotting.palette import BLACK, BLUE, ORANGE, VERMILION, WHITE
 from microrad.report.plotting.scales import limits
@@ -31,6 +33,8 @@ def link_figures(study: LinkStudy) -> tuple[Figure, ...]:
     figures = [tornado(study, t) for t in study.tornados if t.swings]
     if study.finding is not None and study.finding.trade is not None:
         figures.append(trade(study, study.finding, study.finding.trade))
+    if study.fading is not None:
+        figures.append(interleaver(study, study.fading))
     return tuple(figures)
 
 
@@ -131,3 +135,32 @@ def trade(study: LinkStudy, found: Finding, t: Trade) -> Figure:
         "scan, probability": t.scan_probability,
     }
     return Figure("wide-beam-or-scan", "Wide beacon or scan", caption, sheet, columns)
+
+
+def interleaver(study: LinkStudy, f: CodedFading) -> Figure:
+    """What fades cost a coded link against the span of its interleaver.
+
+    Args:
+        study: the links.
+        f: the coded link under a series of received power.
+    """
+    sheet, (panel,) = grid(6.4, 3.4)
+    span, cost = np.array(f.curve.span_s), np.array(f.curve.penalty_db)
+    drawn = np.where(np.isfinite(cost), cost, np.nan)
+    panel.add(Line(span[1:] * 1e3, drawn[1:], BLUE, marker="o", size=4.0, label="with an interleaver"))
+    if math.isfinite(cost[0]):
+        panel.add(Rule(float(cost[0]), False, ORANGE, "--", label="without one"))
+    spare = f.margin_db - study.file.mission.requirement.margin_db
+    panel.add(Rule(spare, False, VERMILION, ":", label="what the margin can spare"))
+    if f.span_s and math.isfinite(f.penalty_db):
+        own = np.array([f.span_s * 1e3]), np.array([f.penalty_db])
+        panel.add(Line(*own, BLACK, "", marker="D", size=7.0, label="this mission"))
+    panel.x = Axis("span of the interleaver (ms)", log=True)
+    panel.y, sheet.legend = Axis("power that the fades cost (dB)"), Legend("above", 2)
+    caption = (
+        f"Extra power that brings the mean bit error ratio back to {f.target:.3g} under {f.source}, over constant "
+        f"power, with {f.code}. A span that is long against the fades lets each code word see all powers that there "
+        "are. A span without a point costs more than any power makes up for."
+    )
+    columns: dict[str, Column] = {"span (s)": span, "power that the fades cost (dB)": cost}
+    return Figure(words.INTERLEAVER, "What an interleaver brings", caption, sheet, columns)

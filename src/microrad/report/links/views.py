@@ -77,7 +77,7 @@ def links_views(
         outage, said = stated_outage(study.data.requirement), words.under_jitter_sentence(under, study)
         performance = performance_view((under,), (), outage, [said])
     budgets = budgets or budgets_view(study, [budget_table(b) for b in study.budgets], figures)
-    fading = fading_view(study.fading)
+    fading = fading_view(study.fading, figures)
     return told(pointing_view(study.open_loop), budgets, performance, fading, acquisition_view(study.finding, figures))  # type: ignore[return-value]
 
 
@@ -285,8 +285,13 @@ def budgets_view(
 
 
 # -------------------------------------------------------------------------------------------------------------- fading
-def fading_view(f: CodedFading | None) -> View | None:
-    """The coded link under a series of received power, with what the span of an interleaver changes."""
+def fading_view(f: CodedFading | None, figures: Sequence[Figure] = ()) -> View | None:
+    """The coded link under a series of received power, with what the span of an interleaver changes.
+
+    Args:
+        f: the coded link under the series, if there is one.
+        figures: those of the links.
+    """
     if f is None:
         return None
     rows = [
@@ -316,7 +321,9 @@ def fading_view(f: CodedFading | None) -> View | None:
         [(quantity(span, "s") if span else "none", cost_text(cost)) for span, cost in spans],
         names={1: "fading.curve.penalty_db"},
     )
-    return View("Coded link under fades", (words.under_fades(f), found, fades, curve, Soft(words.fading_note(f))))
+    shown = [each for each in figures if each.name == words.INTERLEAVER]
+    said = told(words.under_fades(f), found, fades, curve, *shown, Soft(words.fading_note(f)))
+    return View("Coded link under fades", said)
 
 
 _FADES = ("share", "per_s", "mean_s", "median_s", "ninetieth_s", "longest_s")
@@ -520,7 +527,7 @@ def acquisition_view(found: Finding | None, figures: Sequence[Figure]) -> View |
     at = f"{100 * EARLY:g} % within"
     headings = ("way", "lock", "simulated", "mean time", "simulated", at)
     ways = Table("", headings, [_way(w) for w in found.ways], (0,), names=dict(enumerate(_WAYS, 1)))
-    trade = opened([f for f in figures if not f.name.startswith("tornado")], ())
+    trade = opened([f for f in figures if not f.name.startswith("tornado") and f.name != words.INTERLEAVER], ())
     stages = [view for w in found.ways for view in (_stages(w),)]
     return View("Acquisition", told(*acquisition_paragraphs(found), ways, *stages, *trade))
 

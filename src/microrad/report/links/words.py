@@ -15,6 +15,9 @@ from microrad.report.marks import with_sign
 from microrad.report.quantities import power_text, quantity, signed
 from microrad.report.requirements import advice_for_links, derived_words, first_warning, met_words, nearest
 
+INTERLEAVER = "interleaver"
+"""Name of the figure on what the span of an interleaver changes."""
+
 _WORTH_DB = 0.5  # of a margin: what another radius of the beam would have to bring
 
 

@@ -242,7 +242,7 @@ SUMMARY: Mapping[str, tuple[str, ...]] = {
 
 FIGURES: Mapping[str, tuple[str, ...]] = {
     "exact": ("claims-scan",),
-    "formula": ("fig2-margin-map", "{tornado,tornado-answer,tornado-beacon}", "wide-beam-or-scan"),
+    "formula": ("fig2-margin-map", "{tornado,tornado-answer,tornado-beacon}", "wide-beam-or-scan", "interleaver"),
     "linear theory": ("fine-pointing-sensitivity", "pointing-errors-{distribution,spectrum}"),
     "searched": ("pointing-errors-contributions",),
     "orbit": ("along-contact", "day-timeline", "world-map"),
