@@ -1,7 +1,9 @@
 """What functions return inside of a case is held: each part of it counts, what machines disagree on does not."""
 
 import json
+import os
 from dataclasses import dataclass, replace
+from importlib.util import module_from_spec, spec_from_loader
 
 import numpy as np
 import pytest
@@ -54,15 +56,68 @@ def test_hashes_and_versions_are_no_part_of_a_value():
 
 
 def watched(number, file):
-    """What the functions of the package return when one of them is called, as a case has it."""
-    watch = inside.Watch()
+    """What the functions of a module return when one of them is called, as a case has it."""
+    loader = inside.Telling(gains.__name__, gains.__file__)
+    telling = module_from_spec(spec_from_loader(gains.__name__, loader))
+    loader.exec_module(telling)
+    watch, cores = inside.Watch(), os.cpu_count
     watch.begin()
     try:
-        gains.aperture_gain_db(number, 1.55e-6)
-        gains.aperture_gain_db(2.0 * number, 1.55e-6)
+        telling.aperture_gain_db(number, 1.55e-6)
+        gains.aperture_gain_db(number, 1.55e-6)  # is not told
+        telling.aperture_gain_db(2.0 * number, 1.55e-6)
     finally:
         watch.end(file)
+        os.cpu_count = cores
     return inside.gathered(file.parent)
+
+
+TOLD = """
+def one(x):
+    def held():
+        return 3.0
+    if x > 1.0:
+        return held()
+    x = [2.0]
+
+class A:
+    def method(self):
+        return "word"
+
+def parts():
+    x = yield 1.0
+    yield
+"""
+
+
+def test_closures_methods_parts_of_a_generator_and_what_is_changed_are_told(tmp_path):
+    folder = tmp_path / "microrad"
+    folder.mkdir()
+    (folder / "new.py").write_text(TOLD, encoding="utf-8")
+    loader = inside.Telling("microrad.new", str(folder / "new.py"))
+    module = module_from_spec(spec_from_loader("microrad.new", loader))
+    loader.exec_module(module)
+    watch, cores = inside.Watch(), os.cpu_count
+    watch.begin()
+    try:
+        assert (module.one(2.0), module.one(0.0), module.A().method(), [*module.parts()]) == (
+            3.0,
+            None,
+            "word",
+            [1.0, None],
+        )
+    finally:
+        watch.end(tmp_path / "1.json")
+        os.cpu_count = cores
+    module.one(2.0)  # behind the end
+    assert {name: [*values] for name, values in watch.values.items()} == {
+        "new:one.<locals>.held": ["1"],
+        "new:one": ["1", "2"],
+        "new:A.method": ["1"],
+        "new:parts": ["1", "2", "3"],
+    }
+    assert watch.values["new:parts"]["1"] == round(inside.value(1.0), 6)
+    assert watch.values["new:one"]["2"] == round(inside.value([[2.0]]), 6)
 
 
 def test_a_function_that_returns_something_else_is_named_and_one_that_is_gone_is_not(tmp_path):

@@ -5,25 +5,31 @@ function's first returned values, and some later ones, are held as well. Of a fu
 called less often, nothing is compared: the inside may be put in order freely.
 """
 
+import ast
+import builtins
 import dataclasses
 import json
 import math
 import os
 import re
 import sys
-import threading
 import zlib
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from functools import partial
+from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
 from itertools import islice
 from pathlib import Path
-from types import CodeType, FrameType, MappingProxyType
+from types import CodeType, MappingProxyType
 from typing import Any
 
 import numpy as np
 
 PACKAGE = f"{os.sep}microrad{os.sep}"
+COMPILED = "microrad.core.kernels"
+SENDER = "__microrad_returning__"
+"""Name under which a module that is loaded by ``Telling`` finds what it tells."""
+
 CALLS = (1, 2, 3, 5, 10)
 """Those of a function in a process whose values are taken."""
 
@@ -119,58 +125,130 @@ def _magnitude(number: float) -> float:
 
 
 class Watch:
-    """Takes down what functions return, from ``begin`` on."""
+    """Takes down what functions return, from ``begin`` to ``end``."""
+
+    current: "Watch | None" = None
+    """The one that is told what functions return."""
 
     def __init__(self) -> None:
         """Nothing yet."""
         self.values: Values = defaultdict(dict)
-        self._calls: dict[CodeType, int] = defaultdict(int)
-        self._names: dict[CodeType, str] = {}
+        self._calls: dict[str, int] = defaultdict(int)
         self._is_busy = False
 
     def begin(self) -> None:
         """Watch, as on a machine of one core: work is cut into parts by their number, and threads take turns."""
         os.cpu_count = lambda: 1
-        threading.setprofile(self._saw)
-        sys.setprofile(self._saw)
+        Watch.current = self
 
     def end(self, file: Path) -> None:
         """Watch no longer, and write what was seen."""
-        sys.setprofile(None)
-        threading.setprofile(None)
+        Watch.current = None
         file.write_text(json.dumps(self.values), encoding="utf-8")
 
-    def _saw(self, frame: FrameType, event: str, returned: object) -> None:
-        if event != "return" or self._is_busy:
+    def saw(self, name: str, returned: object) -> None:
+        """A function returns something: its module and name, and what it is."""
+        if self._is_busy:
             return
-        code = frame.f_code
-        name = self._names.get(code)
-        if name is None:
-            self._names[code] = name = _name(code)
-        if not name:
-            return
-        self._calls[code] += 1
-        if self._calls[code] not in CALLS:
+        call = self._calls[name] = self._calls[name] + 1
+        if call not in CALLS:
             return
         self._is_busy = True
         try:
             found = returned
             if found is None:  # what it has changed
+                frame = sys._getframe(2)
+                code = frame.f_code
                 found = [frame.f_locals.get(each) for each in code.co_varnames[: code.co_argcount]]
-            self.values[name][str(self._calls[code])] = round(value(found), 6)
+            self.values[name][str(call)] = round(value(found), 6)
         except Exception:  # a value that is not whole yet is none
             return
         finally:
             self._is_busy = False
 
 
-def _name(code: CodeType) -> str:
-    """Module and function of a piece of code of the package; empty for any other."""
-    _, package, inside = code.co_filename.rpartition(PACKAGE)
-    if not package or not inside.endswith(".py") or code.co_name.startswith("<"):
-        return ""
-    name = f"{inside.removesuffix('.py').replace(os.sep, '.')}:{code.co_qualname}"
-    return "" if name.startswith(LEFT_OUT) else name
+def _returning(name: str, returned: object) -> object:
+    if Watch.current is not None:
+        Watch.current.saw(name, returned)
+    return returned
+
+
+setattr(builtins, SENDER, _returning)
+
+
+class Telling(SourceFileLoader):
+    """Loads a module of the package so that each function tells what it returns.
+
+    A profiler would be told of each call of the libraries as well: that takes as long as the cases themselves.
+    """
+
+    def get_code(self, fullname: str) -> CodeType:
+        """The module's code, never that of its bytecode file."""
+        path = self.get_filename(fullname)
+        tree = _Returns(path.rpartition(PACKAGE)[2]).visit(ast.parse(self.get_data(path), path))
+        return compile(ast.fix_missing_locations(tree), path, "exec", dont_inherit=True)
+
+
+class _Finder:
+    """Finds the package's modules for ``Telling``, but for those that are compiled to machine code."""
+
+    @staticmethod
+    def find_spec(name: str, path: Sequence[str] | None, target: object = None) -> ModuleSpec | None:
+        if name.partition(".")[0] != PACKAGE.strip(os.sep) or name.startswith(COMPILED):
+            return None
+        spec = PathFinder.find_spec(name, path)
+        if spec and spec.origin and isinstance(spec.loader, SourceFileLoader):
+            spec.loader = Telling(name, spec.origin)
+        return spec
+
+
+def tell() -> None:
+    """From now on modules of the package are loaded so that their functions tell what they return."""
+    sys.meta_path.insert(0, _Finder)
+
+
+class _Returns(ast.NodeTransformer):
+    """Sends what functions return and yield through ``_returning``; a lambda has no name."""
+
+    def __init__(self, file: str) -> None:
+        self.module = file.removesuffix(".py").replace(os.sep, ".")
+        self.inside: list[str] = []
+        self.name = ""
+
+    def visit_ClassDef(self, node: ast.ClassDef) -> ast.AST:
+        self.inside.append(node.name)
+        self.generic_visit(node)
+        self.inside.pop()
+        return node
+
+    def visit_Lambda(self, node: ast.Lambda) -> ast.AST:
+        return node
+
+    def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.AST:
+        outer = self.name
+        own = f"{self.module}:{'.'.join([*self.inside, node.name])}"
+        self.name = "" if own.startswith(LEFT_OUT) else own
+        self.inside += [node.name, "<locals>"]
+        node.body = [self.visit(each) for each in node.body]
+        del self.inside[-2:]
+        if self.name and not isinstance(node.body[-1], ast.Return | ast.Raise):
+            node.body.append(self._told(ast.Constant(None), node.body[-1]))
+        self.name = outer
+        return node
+
+    def visit_Return(self, node: ast.Return) -> ast.AST:
+        self.generic_visit(node)
+        return self._told(node.value or ast.Constant(None), node) if self.name else node
+
+    def visit_Yield(self, node: ast.Yield) -> ast.AST:
+        self.generic_visit(node)
+        return ast.copy_location(ast.Yield(self._sent(node.value or ast.Constant(None))), node) if self.name else node
+
+    def _told(self, returned: ast.expr, at: ast.stmt) -> ast.Return:
+        return ast.copy_location(ast.Return(self._sent(returned)), at)
+
+    def _sent(self, value: ast.expr) -> ast.expr:
+        return ast.Call(ast.Name(SENDER, ast.Load()), [ast.Constant(self.name), value], [])
 
 
 def gathered(folder: Path) -> Values:

@@ -33,6 +33,7 @@ def load(words: Sequence[str], folder: Path) -> None:
     """Run a command once in a process without threads, which the forks then have loaded."""
     global is_loaded  # noqa: PLW0603
     os.environ["MICRORAD_KEEP"] = "no"
+    inside.tell()
     for name in LIBRARIES:
         importlib.import_module(name)
     os.chdir(folder)
