@@ -126,6 +126,9 @@ def test_a_margin_under_fades_needs_a_series_that_can_be_used(tmp_path):
     (found,) = faults(tmp_path, "faded", POWER, keep)
     assert found.key == "keep"
     assert "fades.csv: the series has 20 samples; from 200" in found.reason
+    (tmp_path / "fades.csv").unlink()
+    (found,) = faults(tmp_path, "faded", POWER, keep)
+    assert (found.key, found.reason) == ("mission", "is named by the mission and does not exist")
 
 
 def test_what_links_alone_have_not_is_refused_once(tmp_path):

@@ -96,7 +96,7 @@ def test_terminal_csv_json_and_page_have_the_same_numbers(tmp_path, call):
     assert f"Penalty of the fades,{-found['penalty_db']!r},dB" in said(call, 1, str(path), "--csv")
     page = said(call, 1, str(path), "--html")
     assert "What an interleaver brings" in page
-    assert "Extra power that brings the mean bit error ratio back to 1e-06 under fades.csv" in page
+    assert "Extra power that brings the mean bit error ratio back to 10\u207b\u2076 under fades.csv" in page
     assert cost_text(found["curve"]["penalty_db"][0]) in page
     without = json.loads(said(call, 1, str(written(tmp_path, data_with({}))), "--json"))
     assert "fading" not in without

@@ -186,7 +186,6 @@ class _DefinitionReader:
         varying = [draw.key for draw in draws if any(touches_loop(draw.key, m) for m in missions)]
         if table.loop is not None:
             checks.check_loop(self.reader, table.loop, missions)
-        checks.check_fades(self.reader, keep, [cell.file for cell in cells])
         checks.check_day(self.reader, keep, absent)
         checks.check_tail(self.reader, table, varying, self.document.data)
         checks.check_minimise(self.reader, table)
@@ -200,6 +199,8 @@ class _DefinitionReader:
         checks.check_size(self.reader, rows, most, realisations)
         checks.check_repeats(self.reader, table, bool(self.inputs), rows, most)
         files = self._files(mission, cells, draws)
+        if not self.document.faults:  # each named file is there
+            checks.check_fades(self.reader, keep, [cell.file for cell in cells])
         if self.document.faults:
             return None
         warnings = [*_warnings(table, rows, loop_varies), *drawing.failing(draws, cells[0].data, most)]

@@ -16,7 +16,7 @@ from microrad.report.plotting.palette import BLACK, BLUE, GREEN, ORANGE
 from microrad.report.plotting.sheet import Legend, Line, Rule, Words, grid
 from microrad.report.quantities import given_angle, micro, percent, share_of_time
 from microrad.report.tables import Table
-from microrad.report.view import Soft, View
+from microrad.report.view import Soft, View, opened
 from microrad.study.study import Study
 
 SIGMAS = 2.576  # 99 %, as of the interval of the rms
@@ -100,7 +100,7 @@ def tail_view(fine: FinePointingStudy, required_rad: float, figures: Sequence[Fi
     Args:
         fine: the study.
         required_rad: largest radial error (rad) that is allowed for the mission's share of the time.
-        figures: figures of the tail, which stand at the end.
+        figures: figures of the tail, which stand folded at the end: the table has their quantiles.
     """
     shares = sorted({*SHARES, fine.quantile})
     shown = shown_of(fine)
@@ -124,7 +124,7 @@ def tail_view(fine: FinePointingStudy, required_rad: float, figures: Sequence[Fi
     )
     return View(
         "Monte Carlo tails",
-        (*tail_sentences(fine, int(shown[0][1].radial_counts.sum())), table, note, *figures),
+        (*tail_sentences(fine, int(shown[0][1].radial_counts.sum())), table, note, *opened(figures, ())),
         "tails",
     )
 

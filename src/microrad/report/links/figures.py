@@ -18,6 +18,7 @@ from microrad.report.plotting.palette import BLACK, BLUE, ORANGE, VERMILION, WHI
 from microrad.report.plotting.scales import limits
 from microrad.report.plotting.sheet import Axis, Legend, Line, Rule, Words, grid
 from microrad.report.plotting.swings import swing_bars, swing_legend
+from microrad.report.quantities import power_text
 from microrad.report.tables import Column
 
 MOST_BARS = 14
@@ -158,9 +159,9 @@ def interleaver(study: LinkStudy, f: CodedFading) -> Figure:
     panel.x = Axis("span of the interleaver (ms)", log=True)
     panel.y, sheet.legend = Axis("power that the fades cost (dB)"), Legend("above", 2)
     caption = (
-        f"Extra power that brings the mean bit error ratio back to {f.target:.3g} under {f.source}, over constant "
-        f"power, with {f.code}. A span that is long against the fades lets each code word see all powers that there "
-        "are. A span without a point costs more than any power makes up for."
+        f"Extra power that brings the mean bit error ratio back to {power_text(f.target)} under {f.source}, over "
+        f"constant power, with {f.code}. A span that is long against the fades lets each code word see all powers that "
+        "there are. A span without a point costs more than any power makes up for."
     )
     columns: dict[str, Column] = {"span (s)": span, "power that the fades cost (dB)": cost}
     return Figure(words.INTERLEAVER, "What an interleaver brings", caption, sheet, columns)
