@@ -297,7 +297,7 @@ def test_without_scripts_every_figure_is_its_picture(opened):
     here = opened(unfolded=False, java_script_enabled=False)
     assert len(here.figures("figure")) > 10
     shown = here.figures(":not(details) > figure:has(> script.plot)")
-    assert len(shown) > 4
+    assert len(shown) > 3
     assert all(visible(figure, "svg[role=img]") for figure in shown)
     assert here.page.query_selector(".interactive") is None
 
