@@ -58,10 +58,10 @@ LEFT_OUT = (
     *("cli.", "core.folder:read_bytes.<locals>.at_once", "core.units:printable", "campaign.run:_minutes"),
     *("report.page.", "report.identification.page:identification_page", "core.folder:write_whole"),
     *("export.flight.build:", "export.flight.write:", "loop.pointing_loop.ensemble:_Drawing"),
-    "campaign.engines.",
+    *("campaign.engines.", "mission.explain:_used"),
 )
-"""What they return hangs on the time, the compiler, threads, on which of two processes is first, is the number of an
-open file, or a whole page."""
+"""What they return hangs on the time, the compiler, threads, on which of two processes is first, on how the code is
+written, is the number of an open file, or a whole page."""
 
 _CHANGING = re.compile(r"[0-9a-f]{12,64}|\b\d+\.\d+\.\d+(?:\.dev\d+)?(?:\+\w+)?")
 """Hashes and versions in words: they change with each edit of the code, and with each release."""

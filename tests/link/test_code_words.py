@@ -1,6 +1,7 @@
 """Code words lost to pointing: against whole runs in memory, the closed form of the share of time, and the fades."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,13 +10,16 @@ from numpy.testing import assert_allclose
 from link_files import link_file
 from microrad import link
 from microrad.core.intervals import binomial_band, clustered_band
+from microrad.link.coupling import Aberrations, Pupil, SingleModeFibre
 from microrad.link.pointing import outage
 from microrad.link.pointing.code_words import FadeMargin, words_asked
+from microrad.link.pointing.light import Light
 from microrad.link.pointing.statistics import outage_probability, radius_of_loss_rad, transmission
 from microrad.link.radial_error import Jitter
 from microrad.loop.disturbance import first_order
 from microrad.loop.disturbance.windows import ErrorIndex
 from microrad.loop.pointing_loop.ensemble import Span
+from microrad.loop.pointing_loop.kernel_arrays import LANES
 from microrad.loop.pointing_loop.linear import close
 from microrad.loop.pointing_loop.simulated_windows import ask
 from microrad.loop.pointing_loop.traces import trace
@@ -33,7 +37,7 @@ LOOP = Loop(
 )
 CONTROLLER = LOOP.assembled(Controller.pid(0.0, 5e5, rate_hz=1000.0))
 SPAN = Span(3.3, 0.3, 1)
-MARGIN = FadeMargin(half_angle_rad=100e-6, ahead_rad=5e-6, loss_db=1.0)
+MARGIN = FadeMargin(Light(half_angle_rad=100e-6, ahead_rad=5e-6), loss_db=1.0)
 
 
 def lost(margin=MARGIN, word_s=0.02, span=SPAN, runs=3, **settings):
@@ -58,8 +62,37 @@ def test_words_are_those_of_whole_runs_in_memory():
     assert found == lost(threads=1)
 
 
+@pytest.mark.promise("link-75")
+def test_words_of_a_link_between_two_alike_are_those_of_pairs_of_runs_in_memory():
+    fibre = SingleModeFibre(Pupil(0.04, 1.55e-6, truncation=1.1))
+    margin = FadeMargin(replace(MARGIN.light, end=fibre), 3.0)
+    words, time = [], []
+    for run in range(3):
+        ours, theirs = (trace(LOOP.parts, CONTROLLER, SPAN, each).error_rad[300:, 0] for each in (run, LANES + run))
+        power = np.exp(-2.0 * ((np.abs(ours) + 5e-6) / 100e-6) ** 2)
+        power *= 10.0 ** (-0.1 * (fibre.loss_db(theirs) - fibre.loss_db(0.0)))
+        words.append(np.mean(power.reshape(-1, 20).mean(axis=1) < 10.0**-0.3))
+        time.append(np.mean(power < 10.0**-0.3))
+    found = lost(margin)
+    assert 0.01 < found.lost.value < found.time.value < 0.99
+    assert_allclose([found.lost.value, found.time.value], [np.mean(words), np.mean(time)], rtol=1e-12)
+    assert lost(replace(margin, light=MARGIN.light)).time.value < 0.5 * found.time.value
+
+
+@pytest.mark.promise("link-75")
+def test_the_light_between_two_alike_counts_the_direction_of_the_partners_error():
+    bent = SingleModeFibre(Pupil(0.15, 1.55e-6, 0.2, Aberrations(coma_m=100e-9), 1.1))
+    light = Light(100e-6, 0.0, bent)
+    rng = np.random.default_rng(3)
+    ours, theirs = rng.normal(0.0, 3e-6, (2, 50, 2, 4))
+    power = light.power(np.concatenate([ours, theirs], axis=1))
+    sent = np.exp(-2.0 * np.sum(ours**2, axis=1) / 100e-6**2)
+    assert_allclose(power, sent * bent.share(theirs[:, 0], theirs[:, 1]) / bent.share(0.0), rtol=1e-12)
+    assert not np.allclose(power, sent * bent.share(theirs[:, 1], theirs[:, 0]) / bent.share(0.0), rtol=1e-3)
+
+
 def test_the_share_of_time_is_that_of_a_gaussian_and_short_words_have_it_too():
-    margin = FadeMargin(100e-6, 0.0, 1.0)
+    margin = FadeMargin(Light(100e-6, 0.0), 1.0)
     found = lost(margin, 0.002, Span(10.3, 0.3, 1), 64)
     variance = windowed_in_all(close(LOOP.parts, CONTROLLER), ErrorIndex("APE"), at_samples=True)
     wanted = float(outage_probability(Jitter((0.0, 0.0), (math.sqrt(variance[0]), 0.0)), 100e-6, 1.0))
@@ -74,16 +107,15 @@ def test_the_margin_is_that_of_the_link_s_fades(tmp_path):
     data = link.of(link_file(tmp_path).mission)
     margin, under = FadeMargin.of(data), outage.Exposure.stated(data)
     reach = under.fall.error_rad(under.on_axis_db - data.requirement.margin_db)
-    assert margin.half_angle_rad == under.fall.half_angle_rad
-    assert float(transmission(reach, margin.half_angle_rad)) == pytest.approx(
-        10.0 ** (-0.1 * margin.loss_db), rel=1e-12, abs=0.0
-    )
-    assert float(radius_of_loss_rad(margin.half_angle_rad, margin.loss_db)) == pytest.approx(reach, rel=1e-12, abs=0.0)
+    angle = margin.light.half_angle_rad
+    assert angle == under.fall.half_angle_rad
+    assert float(transmission(reach, angle)) == pytest.approx(10.0 ** (-0.1 * margin.loss_db), rel=1e-12, abs=0.0)
+    assert float(radius_of_loss_rad(angle, margin.loss_db)) == pytest.approx(reach, rel=1e-12, abs=0.0)
 
 
 @pytest.mark.promise("pointing-40")
 def test_a_link_that_misses_its_margin_on_the_axis_loses_all_words():
-    found = lost(FadeMargin(100e-6, 0.0, -0.1))
+    found = lost(FadeMargin(Light(100e-6, 0.0), -0.1))
     assert (found.lost.value, found.time.value, found.lost.high) == (1.0, 1.0, 1.0)
     assert found.lost.low == pytest.approx(0.005 ** (1.0 / found.words), rel=1e-9, abs=0.0)
 

@@ -7,11 +7,14 @@ import pytest
 
 from link_files import link_file
 from microrad import link
+from microrad.link.coupling import Pupil, SingleModeFibre
 from microrad.link.fade_series import CodedLink, FadeSeries, code
 from microrad.link.pointing.coded_residual import CodedBeam, coded_asked
+from microrad.link.pointing.light import Light
 from microrad.link.pointing.outage import Exposure
 from microrad.loop.disturbance import first_order
 from microrad.loop.pointing_loop.ensemble import Span
+from microrad.loop.pointing_loop.kernel_arrays import LANES
 from microrad.loop.pointing_loop.simulated_windows import ask
 from microrad.loop.pointing_loop.traces import trace
 from microrad.loop.workbench import Controller, Loop
@@ -31,9 +34,9 @@ SPAN, RUNS = Span(3.3, 0.3, 1), 3
 CODE = code("ccsds-k7-1-2")
 
 
-def coded(span_s=0.0, on_axis_db=3.0, ahead_rad=5e-6, runs=RUNS):
+def coded(span_s=0.0, on_axis_db=3.0, ahead_rad=5e-6, runs=RUNS, end=None):
     kind = "block" if span_s else "none"
-    beam = CodedBeam(100e-6, ahead_rad, on_axis_db, CODE, 1e-5, kind, span_s)
+    beam = CodedBeam(Light(100e-6, ahead_rad, end), on_axis_db, CODE, 1e-5, kind, span_s)
     (found,) = ask([coded_asked(beam, LOOP.parts, SPAN)], LOOP.parts, CONTROLLER, SPAN, runs)
     return found
 
@@ -59,6 +62,18 @@ def test_the_ratio_is_that_of_whole_runs_in_memory(span_s):
     assert back.penalty_db == found.penalty_db
 
 
+@pytest.mark.promise("link-75")
+def test_the_ratio_of_a_link_between_two_alike_is_that_of_pairs_of_runs_in_memory():
+    fibre, ratios = SingleModeFibre(Pupil(0.15, 1.55e-6, truncation=1.1)), []
+    for run in range(RUNS):
+        ours, theirs = (trace(LOOP.parts, CONTROLLER, SPAN, each).error_rad[300:, 0] for each in (run, LANES + run))
+        power = np.exp(-2.0 * ((np.abs(ours) + 5e-6) / 100e-6) ** 2) * fibre.share(theirs) / fibre.share(0.0)
+        series = FadeSeries.of(power, 1e-3, "run", unit="linear", normalised="as-given")
+        ratios.append(CodedLink(CODE, series, 1e6, "block", 0.02).mean_ratio(CODE.snr_for(1e-5) * 10.0**0.3))
+    assert coded(0.02, end=fibre).ratio.value == pytest.approx(np.mean(ratios), rel=1e-9, abs=0.0)
+    assert coded(0.02, end=fibre).penalty_db > coded(0.02).penalty_db + 1.0
+
+
 def test_a_longer_interleaver_costs_less_and_one_beyond_the_run_is_refused():
     assert coded(0.5).penalty_db < coded(0.0).penalty_db - 0.1
     with pytest.raises(ValueError, match="the interleaver spans 4 s, longer than a run, of which 3 s are left"):
@@ -71,7 +86,7 @@ def test_the_beam_is_that_of_the_link(tmp_path):
     table = {"code": "ccsds-k7-1-2", "interleaving": "block", "interleaver": "5 ms", "bit_error_ratio": 1e-6}
     data = link.of(link_file(tmp_path, {"communication.fading": table}).mission)
     beam, under = CodedBeam.of(data), Exposure.stated(data)
-    assert (beam.half_angle_rad, beam.on_axis_db) == (under.fall.half_angle_rad, under.on_axis_db)
+    assert (beam.light.half_angle_rad, beam.on_axis_db) == (under.fall.half_angle_rad, under.on_axis_db)
     assert (beam.target, beam.interleaving, beam.span_s) == (1e-6, "block", 5e-3)
     with pytest.raises(ValueError, match=r"give it the table \[communication.fading\]"):
         CodedBeam.of(link.of(link_file(tmp_path).mission))

@@ -246,10 +246,28 @@ def test_runs_and_campaigns_draw_the_twins_loss_from_the_loops_errors(tmp_path):
     still = Jitter((0.0, 0.0), (4e-6, 0.0))
     shown = link_performance.performance(data, "loop", "", "", errors, still, None)
     assert shown.margin_db == pytest.approx(expected.margin_db, abs=1e-12)
-    told = Exposure.stated(data).on_axis_db - data.receive_pointing_db - data.requirement.margin_db
-    assert FadeMargin.of(data).loss_db == pytest.approx(told, abs=1e-12) and data.receive_pointing_db > 0.0
     alone = link.of(with_coupling(tmp_path, FIBRE, JITTER).mission)
     assert shown.margin_db < link_performance.performance(alone, "loop", "", "", errors, still, None).margin_db - 0.5
+
+
+@pytest.mark.promise("link-75")
+def test_words_and_coded_bits_of_a_twin_have_all_of_the_margin_and_of_another_what_its_errors_leave(tmp_path):
+    fading = {"communication.fading": {"code": "ccsds-k7-1-2", "interleaving": "none", "bit_error_ratio": 1e-6}}
+    receivers = (
+        {"twin": True},
+        {"jitter.bias": ["1 urad", "0 urad"], "jitter.rms": ["1 urad", "2 urad"], "jitter.bandwidth": "5 Hz"},
+    )
+    for own in receivers:
+        data = link.of(with_coupling(tmp_path, FIBRE | own, JITTER | fading).mission)
+        lost = 0.0 if "twin" in own else data.receive_pointing_db
+        assert data.receive_pointing_db > 0.1
+        on_axis_db = Exposure.stated(data).on_axis_db
+        words, beam = FadeMargin.of(data), CodedBeam.of(data)
+        assert words.loss_db == pytest.approx(on_axis_db - lost - data.requirement.margin_db, abs=1e-12)
+        assert beam.on_axis_db == pytest.approx(on_axis_db - lost, abs=1e-12)
+        ends = data.receiving.end if "twin" in own else None
+        assert words.light.end == beam.light.end == ends
+        assert words.light.half_angle_rad == pytest.approx(data.beam.fall.half_angle_rad, rel=1e-12)
 
 
 # ------------------------------------------------------------------------------------------------------- refusals

@@ -4,8 +4,9 @@ A code averages the light over its word: it is lost where the mean received powe
 margin asks for. The word begins anew behind each other one, from the end of the settling on.
 """
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,8 +14,8 @@ from microrad import link
 from microrad.core.arrays import Floats
 from microrad.core.intervals import Interval, clustered_band
 from microrad.core.units import format_quantity
+from microrad.link.pointing.light import Light
 from microrad.link.pointing.outage import Exposure, like_gaussian_db
-from microrad.link.pointing.statistics import transmission
 from microrad.loop.pointing_loop.ensemble import Span, control_samples
 from microrad.loop.pointing_loop.loop import PointingLoop
 from microrad.loop.pointing_loop.simulated_windows import CONFIDENCE, Question, Windows
@@ -24,12 +25,10 @@ from microrad.loop.pointing_loop.simulated_windows import CONFIDENCE, Question, 
 class FadeMargin:
     """What a Gaussian beam may lose to pointing errors until less than the required margin is left.
 
-    ``half_angle_rad`` is that at 1/e2 of intensity, ``ahead_rad`` an uncorrected point-ahead, which is added to the
-    length of every error, and ``loss_db`` what may be lost, below 0 where the margin is missed on the axis.
+    ``loss_db`` is what may be lost, below 0 where the margin is missed on the axis.
     """
 
-    half_angle_rad: float
-    ahead_rad: float
+    light: Light
     loss_db: float
 
     @classmethod
@@ -42,10 +41,15 @@ class FadeMargin:
         Raises:
             ValueError: For a data rate that the receiver does not take.
         """
-        under = Exposure.stated(data)
-        spare = under.on_axis_db - data.receive_pointing_db - data.requirement.margin_db
-        loss = spare if spare < 0.0 else like_gaussian_db(under.fall, spare)
-        return cls(under.fall.half_angle_rad, under.ahead_rad, loss)
+        under, light = Exposure.stated(data), Light.of(data)
+        spare = under.on_axis_db - light.given_db - data.requirement.margin_db
+        if spare <= 0.0:
+            return cls(light, spare)
+        like = like_gaussian_db(under.fall, spare)
+        if light.end is None:
+            return cls(light, like)
+        # the beam may lose any part of it: a Gaussian one that has lost the same where all is lost
+        return cls(replace(light, half_angle_rad=light.half_angle_rad * math.sqrt(spare / like)), spare)
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +98,7 @@ def words_asked(margin: FadeMargin, code_word_s: float, loop: PointingLoop, span
         of_words, of_time = found[0].T
         return LostWords(code_word_s, len(of_words) * words, _share(of_words, words), _share(of_time, samples))
 
-    return Question(lambda: [_Lost(margin, length)], answer)
+    return Question(lambda: [_Lost(margin, length)], answer, margin.light.end is not None)
 
 
 def _share(by_run: Floats, each: int) -> Interval:
@@ -112,8 +116,7 @@ class _Lost:
 
     def add(self, at: int, error: Floats) -> None:
         """Some control samples: see `Tally`."""
-        radius = np.sqrt(np.sum(error**2, axis=1)) + self._margin.ahead_rad
-        power = transmission(radius, self._margin.half_angle_rad)
+        power = self._margin.light.power(error)
         means = self._words.add(at, power) / self._words.length
         each = [means < self._least, power < self._least]
         self._hits = self._hits + np.array([np.sum(below, axis=0) for below in each])

@@ -15,8 +15,8 @@ from microrad.core.intervals import Interval
 from microrad.core.units import format_quantity
 from microrad.link.fade_series.coded import Interleaving
 from microrad.link.fade_series.codes import Convolutional, code
+from microrad.link.pointing.light import Light
 from microrad.link.pointing.outage import Exposure
-from microrad.link.pointing.statistics import transmission
 from microrad.loop.pointing_loop.ensemble import Span, control_samples
 from microrad.loop.pointing_loop.loop import PointingLoop
 from microrad.loop.pointing_loop.simulated_windows import Question, Windows, half_width
@@ -29,14 +29,11 @@ _EXTRA_DB = np.array([0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.
 class CodedBeam:
     """A coded link whose power falls with the pointing error as that of a Gaussian beam.
 
-    ``half_angle_rad`` is that at 1/e2 of intensity, ``ahead_rad`` an uncorrected point-ahead, which is added to the
-    length of every error. ``on_axis_db`` is by how much the power on the axis, less what the receiver's own pointing
-    costs, is above what the code needs for ``target`` at constant power. ``span_s`` is that of the interleaver, 0
-    without one.
+    ``on_axis_db`` is by how much the power on the axis, less what the receiver's own pointing is stated to cost, is
+    above what the code needs for ``target`` at constant power. ``span_s`` is that of the interleaver, 0 without one.
     """
 
-    half_angle_rad: float
-    ahead_rad: float
+    light: Light
     on_axis_db: float
     code: Convolutional
     target: float
@@ -56,12 +53,11 @@ class CodedBeam:
         table = data.table.fading
         if table is None:
             raise ValueError("the link has no code whose error rate is known: give it the table [communication.fading]")
-        under = Exposure.stated(data)
+        light = Light.of(data)
         target = table.bit_error_ratio if data.receiver is None else data.receiver.bit_error_ratio
         assert target is not None  # the table's own check
-        angles = under.fall.half_angle_rad, under.ahead_rad
-        above_db = under.on_axis_db - data.receive_pointing_db
-        return cls(*angles, above_db, code(table.code), target, table.interleaving, table.interleaver_s or 0.0)
+        above_db = Exposure.stated(data).on_axis_db - light.given_db
+        return cls(light, above_db, code(table.code), target, table.interleaving, table.interleaver_s or 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,7 +108,7 @@ def coded_asked(beam: CodedBeam, loop: PointingLoop, span: Span) -> Question[Cod
         cost = _cost_db(np.array([np.mean(each) for each in others]), beam.target)
         return CodedResidual(beam.code.name, beam.target, beam.interleaving, beam.span_s, beam.on_axis_db, ratio, cost)
 
-    return Question(lambda: [_Coded(beam, length)], answer)
+    return Question(lambda: [_Coded(beam, length)], answer, beam.light.end is not None)
 
 
 def _cost_db(ratios: Floats, target: float) -> float:
@@ -141,8 +137,7 @@ class _Coded:
 
     def add(self, at: int, error: Floats) -> None:
         """Some control samples: see `Tally`."""
-        radius = np.sqrt(np.sum(error**2, axis=1)) + self._beam.ahead_rad
-        power, code = transmission(radius, self._beam.half_angle_rad), self._beam.code
+        power, code = self._beam.light.power(error), self._beam.code
         ended = 0
         for k, (snr, windows) in enumerate(zip(self._snr, self._windows, strict=True)):
             parts = np.stack(code.parts(snr * power), axis=1)

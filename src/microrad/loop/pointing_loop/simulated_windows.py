@@ -47,11 +47,13 @@ class Tally(Protocol):
 class Question(Generic[_Answer]):
     """What is asked of runs: what counts of them, and what follows from it.
 
-    ``tallies`` makes what counts, for a batch of runs. ``answer`` takes the means of each, shape (runs, numbers).
+    ``tallies`` makes what counts, for a batch of runs. ``answer`` takes the means of each, shape (runs, numbers). With
+    ``twin`` each run is shown beside another one, the error of a second terminal like the first: its axes behind ours.
     """
 
     tallies: Callable[[], Sequence[Tally]]
     answer: Callable[[Sequence[Floats]], _Answer]
+    twin: bool = False
 
 
 def ask(
@@ -84,12 +86,16 @@ def ask(
     if runs < 1:
         raise ValueError(f"{runs} runs leave no errors: ask for 1 run or more, 2 for an interval")
 
+    beyond = -(-runs // LANES) * LANES  # the first run of a second terminal: none of the first one's
+
     def batch(first: int) -> list[Floats]:
-        counting = [tally for question in questions for tally in question.tallies()]
-        for at, error in _residual(loop, controller, span, first):
-            for each in counting:
-                each.add(at, error)
-        return [each.mean for each in counting]
+        counting = [(tally, question.twin) for question in questions for tally in question.tallies()]
+        terminals = [first, first + beyond] if any(twin for _, twin in counting) else [first]
+        for slices in zip(*(_residual(loop, controller, span, each) for each in terminals), strict=True):
+            at, errors = slices[0][0], [error for _, error in slices]
+            for tally, twin in counting:
+                tally.add(at, np.concatenate(errors, axis=1) if twin else errors[0])
+        return [tally.mean for tally, _ in counting]
 
     jobs = [partial(batch, first) for first in range(0, runs, LANES)]
 
