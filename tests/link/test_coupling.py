@@ -253,10 +253,10 @@ def sampled_db(beam, end, outage, found_db, twin=False):
 @pytest.mark.parametrize("end", [ROUND, UNLIKE, DETECTOR], ids=["fibre", "bent fibre", "detector"])
 @pytest.mark.parametrize("beam", BEAMS.values(), ids=BEAMS)
 def test_both_ends_lose_what_random_errors_lose(beam, end, outage):
-    """By importance sampling; each within 0.01 dB, and what the samples leave open."""
+    """By importance sampling: within 0.01 dB, of which the samples themselves leave no more than 0.007 dB open."""
     found = of_both(beam, end)
     off, spread = sampled_db(beam, end, outage, found.quantile_db(outage))
-    assert spread < 0.02 and abs(off) < 0.01 + 3.0 * spread
+    assert spread < 0.007 and abs(off) < 0.01
     assert found.beyond(found.quantile_db(outage)) == pytest.approx(outage, rel=1e-6)
 
 
