@@ -58,6 +58,7 @@ def margin_db(m, **at):
     "link-56",
     "link-58",
     "link-96",
+    "link-107",
     "link-76",
     "link-83",
     "link-89",
@@ -66,7 +67,7 @@ def test_every_example_prints_what_stands_below_it(monkeypatch, capsys):
     monkeypatch.chdir(ROOT)
     examples = re.findall(r"```python\n(.*?)```\n\n```text\n(.*?)```", PAGE, flags=re.DOTALL)
     assert len(examples) == PAGE.count("```python") > 9
-    assert len(examples) == PAGE.count("```python") == 14
+    assert len(examples) == PAGE.count("```python") == 15
     session: dict[str, object] = {}
     for code, printed in examples:
         exec(code, session)

@@ -1,0 +1,130 @@
+"""Fades of a scintillating light: how often its power is below a share of its mean."""
+
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from microrad.core.arrays import Floats
+from microrad.mission.fields import Bounded, Quantity, Share
+
+_LEAST_VARIANCE = 1e-12
+
+
+@dataclass(frozen=True, slots=True)
+class Fades(Bounded, ABC):
+    """Power over its mean."""
+
+    @abstractmethod
+    def below(self, power: ArrayLike) -> Floats:
+        """Share of the time with less power than each (over the mean)."""
+
+    @abstractmethod
+    def loss_db(self, outage: float) -> float:
+        """Loss against the mean power (dB) that is exceeded for a share of the time.
+
+        Args:
+            outage: The share, above 0 and below 1.
+
+        Raises:
+            ValueError: For a share that is not.
+        """
+
+
+@dataclass(frozen=True, slots=True)
+class LogNormal(Fades):
+    """Log-normal power, in weak turbulence and behind large apertures: its logarithm has the variance ln(1 + index).
+
+    ``index`` is the scintillation index, the variance of the power over the square of its mean.
+
+    Raises ValueError for an index below 0.
+    """
+
+    index: Annotated[float, Quantity("", least=0.0)]
+
+    def below(self, power: ArrayLike) -> Floats:
+        """See `Fades.below`."""
+        from scipy.special import ndtr
+
+        variance = max(math.log1p(self.index), _LEAST_VARIANCE)
+        with np.errstate(divide="ignore"):
+            log = np.log(np.asarray(power, dtype=np.float64))
+        return np.asarray(ndtr((log + variance / 2.0) / math.sqrt(variance)))
+
+    def loss_db(self, outage: float) -> float:
+        """See `Fades.loss_db`."""
+        from scipy.special import ndtri
+
+        Share("", above=0.0, below=1.0).check("the outage", outage)
+        variance = math.log1p(self.index)
+        return 10.0 / math.log(10.0) * (variance / 2.0 - math.sqrt(variance) * float(ndtri(outage)))
+
+
+@dataclass(frozen=True, slots=True)
+class GammaGamma(Fades):
+    """Gamma-gamma power, from weak to strong turbulence: the product of a large and a small scale, each Gamma.
+
+    Al-Habash, Andrews and Phillips 2001, Opt. Eng. 40, 1554. ``large`` and ``small`` are their parameters alpha and
+    beta; the scintillation index is 1 / alpha + 1 / beta + 1 / (alpha beta).
+
+    Raises ValueError for a parameter not above 0.
+    """
+
+    large: Annotated[float, Quantity("", above=0.0)]
+    small: Annotated[float, Quantity("", above=0.0)]
+
+    @classmethod
+    def of_plane_wave(cls, rytov: float) -> "GammaGamma":
+        """That of a plane wave at a point, with neither inner nor outer scale.
+
+        alpha = 1 / (exp(0.49 s / (1 + 1.11 s^(6/5))^(7/6)) - 1) and beta = 1 / (exp(0.51 s / (1 + 0.69 s^(6/5))^(5/6))
+        - 1), s the Rytov variance (Andrews and Phillips 2005, chapter 9).
+
+        Args:
+            rytov: Rytov variance of a plane wave, above 0.
+
+        Raises:
+            ValueError: For a variance not above 0.
+        """
+        Quantity("", above=0.0).check("the Rytov variance", rytov)
+        root = rytov**1.2
+        of_large = 0.49 * rytov / (1.0 + 1.11 * root) ** (7.0 / 6.0)
+        of_small = 0.51 * rytov / (1.0 + 0.69 * root) ** (5.0 / 6.0)
+        return cls(1.0 / math.expm1(of_large), 1.0 / math.expm1(of_small))
+
+    @property
+    def index(self) -> float:
+        """Scintillation index."""
+        return 1.0 / self.large + 1.0 / self.small + 1.0 / (self.large * self.small)
+
+    def below(self, power: ArrayLike) -> Floats:
+        """See `Fades.below`: the mean of the one scale's law over the other, by equal steps of its logarithm."""
+        from scipy.special import gammainc, gammaln
+
+        # that of the wider one, where the integrand is smooth
+        wide, narrow = sorted((self.large, self.small))
+        spread = math.sqrt(math.log1p(1.0 / wide)) + 1.0 / wide
+        log = np.linspace(-14.0 * spread - 4.0, math.log(60.0 / wide + 8.0), 4001)
+        density = np.exp(wide * (math.log(wide) + log) - wide * np.exp(log) - gammaln(wide))
+        weight = density * (log[1] - log[0])
+        at = np.asarray(power, dtype=np.float64)
+        share = gammainc(narrow, narrow * np.multiply.outer(at, np.exp(-log)))
+        return np.asarray(share @ (weight / np.sum(weight)))
+
+    def loss_db(self, outage: float) -> float:
+        """See `Fades.loss_db`."""
+        from scipy.optimize import brentq
+
+        Share("", above=0.0, below=1.0).check("the outage", outage)
+        wanted = math.log(outage)
+
+        def beyond(loss: float) -> float:
+            return math.log(max(float(self.below(10.0 ** (-loss / 10.0))), 1e-300)) - wanted
+
+        low, high = -20.0, 10.0
+        while beyond(high) > 0.0:
+            low, high = high, 2.0 * high
+        return float(brentq(beyond, low, high, xtol=1e-9))

@@ -1,0 +1,247 @@
+"""Turbulence in closed form: published digits, integrals over the spectrum, drawn powers, and what is refused."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.integrate import quad
+from scipy.special import j1, jv
+
+from microrad.link.turbulence import BuftonWind, Downlink, GammaGamma, HufnagelValley, LogNormal, SlantPath, Uplink
+
+ZENITH = SlantPath(HufnagelValley(), 0.5e-6, math.pi / 2.0, 500e3)
+LOW = SlantPath(HufnagelValley(ground_strength=5e-15, wind_rms_m_s=18.0), 1.55e-6, math.radians(35.0), 900e3)
+WIND = BuftonWind(slew_rad_s=5e-3)
+
+
+def over_height(function, path=LOW):
+    """Integral over height of a function of height and distance, times Cn2, along a path; by an adaptive quadrature."""
+    longer = 1.0 / math.sin(path.elevation_rad)
+    edges = [0.0, 50.0, 200.0, 1e3, 4e3, 9e3, 15e3, 25e3, 60e3]
+    total = 0.0
+    for low, high in itertools.pairwise(edges):
+        total += quad(
+            lambda h: float(path.profile.strength(h)) * function(h, h * longer) * longer, low, high, epsrel=1e-9
+        )[0]
+    return total
+
+
+@pytest.mark.promise("link-101")
+def test_the_5_7_profile_has_its_published_lengths():
+    assert f"{100.0 * ZENITH.fried_m:.4f}" == "4.9606"
+    assert f"{1e6 * ZENITH.isoplanatic_rad:.3f}" == "6.894"
+    k = 2.0 * math.pi / 0.5e-6
+    ended = quad(lambda h: float(ZENITH.profile.strength(h)) * h ** (5.0 / 3.0), 0.0, 20e3, limit=200, epsrel=1e-9)[0]
+    assert f"{1e6 * (2.914 * k**2 * ended) ** -0.6:.3f}" == "7.011"
+
+
+@pytest.mark.promise("link-101")
+def test_lengths_and_variances_are_integrals_along_the_path():
+    k = LOW.wavenumber
+    assert k == 2.0 * math.pi / 1.55e-6
+    assert_allclose(LOW.fried_m, (0.423 * k**2 * over_height(lambda h, z: 1.0)) ** -0.6, rtol=1e-7)
+    assert_allclose(LOW.isoplanatic_rad, (2.914 * k**2 * over_height(lambda h, z: z ** (5 / 3))) ** -0.6, rtol=1e-7)
+    assert_allclose(LOW.rytov, 2.25 * k ** (7 / 6) * over_height(lambda h, z: z ** (5 / 6)), rtol=1e-7)
+    between = over_height(lambda h, z: (z * (1.0 - z / 900e3)) ** (5 / 6))
+    assert_allclose(LOW.spherical_rytov, 2.25 * k ** (7 / 6) * between, rtol=1e-7)
+    speed = over_height(lambda h, z: float(WIND.speed_m_s(h)) ** (5 / 3))
+    assert_allclose(LOW.greenwood_hz(WIND), (0.1022 * k**2 * speed) ** 0.6, rtol=1e-7)
+
+
+@pytest.mark.promise("link-101")
+def test_the_profile_on_a_mountain_lacks_what_lies_below():
+    high = SlantPath(HufnagelValley(ground_m=2400.0), 0.5e-6, math.pi / 2.0, 500e3)
+    assert high.fried_m > 1.05 * ZENITH.fried_m
+    above = HufnagelValley(ground_m=2400.0).strength(1000.0) - 1.7e-14 * math.exp(-10.0)
+    sea = HufnagelValley(ground_strength=0.0).strength(3400.0)
+    assert above == pytest.approx(float(sea), rel=1e-12)
+
+
+@pytest.mark.promise("link-101")
+def test_the_wind_of_the_profile_is_that_of_bufton_from_5_to_20_km():
+    squared = quad(lambda h: (8.0 + 30.0 * math.exp(-(((h - 9400.0) / 4800.0) ** 2))) ** 2, 5e3, 20e3)[0]
+    assert BuftonWind(ground_m_s=8.0).rms_m_s == pytest.approx(math.sqrt(squared / 15e3), rel=1e-9)
+    assert float(WIND.speed_m_s(1000.0) - BuftonWind().speed_m_s(1000.0)) == pytest.approx(5.0)
+
+
+# ------------------------------------------------------------------------------------ against the spectrum of the air
+def of_spectrum(function):
+    """8 pi^2 k^2 times the integral of 0.033 kappa^(-8/3) and a function of kappa, in the logarithm of kappa."""
+    inner = quad(lambda t: math.exp(-5.0 / 3.0 * t) * function(math.exp(t)), -14.0, 12.0, limit=4000, epsrel=1e-7)[0]
+    return 8.0 * math.pi**2 * LOW.wavenumber**2 * 0.033 * inner
+
+
+@pytest.mark.promise("link-102")
+@pytest.mark.parametrize("diameter", [0.05, 0.3])
+def test_the_index_of_an_aperture_is_that_of_its_filter_on_the_spectrum(diameter):
+    """Of one thin layer at 8 km: with the filter of a Gaussian aperture exactly, with a round one within 15 %."""
+    layer = 8000.0
+
+    def waves(kappa):
+        return 1.0 - math.cos(layer * kappa**2 / LOW.wavenumber)
+
+    closed = Downlink(LOW)._closed(np.array([diameter**2 / 16.0]), np.array([layer / LOW.wavenumber]))[0]
+    soft = of_spectrum(lambda kappa: waves(kappa) * math.exp(-((kappa * diameter) ** 2) / 16.0))
+    assert closed == pytest.approx(soft, rel=2e-4)
+    hard = of_spectrum(lambda kappa: waves(kappa) * (2.0 * j1(kappa * diameter / 2.0) / (kappa * diameter / 2.0)) ** 2)
+    assert closed == pytest.approx(hard, rel=0.15)
+
+
+@pytest.mark.promise("link-102")
+def test_a_point_has_the_rytov_variance_and_wide_apertures_average():
+    light = Downlink(LOW)
+    assert light.index(0.0) == pytest.approx(LOW.rytov, rel=2e-3)  # 2.25 is 2.2533
+    assert light.index(0.0) > 1.5 * light.index(0.1) > 10.0 * light.index(0.8) > 0.0
+    # far beyond the Fresnel length the index falls as D^(-7/3)
+    assert light.index(8.0) / light.index(4.0) == pytest.approx(2.0 ** (-7.0 / 3.0), rel=1e-2)
+
+
+@pytest.mark.promise("link-103")
+@pytest.mark.parametrize("tilt", ["zernike", "gradient"])
+def test_the_angle_of_arrival_has_the_variance_of_its_filter_and_of_its_spectrum(tilt):
+    diameter, light = 0.25, Downlink(LOW)
+
+    def filtered(x):
+        return (8.0 * jv(2, x) / x**2) ** 2 if tilt == "zernike" else (2.0 * j1(x) / x) ** 2
+
+    # half of both axes: pi times 2 pi 0.033 kappa^(-2/3) filtered, over all layers
+    whole = quad(lambda t: math.exp(t / 3.0) * filtered(math.exp(t)), -40.0, math.log(300.0), limit=2000)[0]
+    wanted = 2.0 * math.pi**2 * 0.033 * (diameter / 2.0) ** (-1.0 / 3.0) * whole * over_height(lambda h, z: 1.0)
+    assert light.arrival_rms_rad(diameter, tilt) ** 2 == pytest.approx(wanted, rel=0.02)
+    freq = np.geomspace(1e-3, 3e4, 1500)
+    psd = light.arrival_psd_rad2_hz(freq, diameter, WIND, tilt)
+    below = 3.0 * freq[0] * psd[0]  # f^(-2/3) down to 0
+    found = np.trapezoid(psd * freq, np.log(freq)) + below
+    assert found == pytest.approx(wanted, rel=0.01)
+    slope = np.diff(np.log(psd)) / np.diff(np.log(freq))
+    assert slope[0] == pytest.approx(-2.0 / 3.0, abs=0.01)
+    assert slope[-50:].mean() == pytest.approx(-17.0 / 3.0 if tilt == "zernike" else -11.0 / 3.0, abs=0.1)
+
+
+# -------------------------------------------------------------------------------------------------------- the uplink
+@pytest.mark.promise("link-104")
+def test_the_index_of_a_beam_is_that_of_its_integral_over_the_spectrum():
+    """One thin layer at 10 km, on the axis and off it."""
+    up, layer = Uplink(LOW, 0.03), 10e3
+    k, length = LOW.wavenumber, LOW.range_m
+    far = 2.0 * length / (k * 0.03**2)
+    theta, width, xi = 1.0 / (1.0 + far**2), far / (1.0 + far**2), 1.0 - layer / length
+    a, b = width * length * xi**2 / k, length * xi * (1.0 - (1.0 - theta) * xi) / k
+    closed = up._closed(np.array([a]), np.array([b]))[0]
+    assert closed == pytest.approx(of_spectrum(lambda q: math.exp(-a * q**2) * (1.0 - math.cos(b * q**2))), rel=1e-3)
+    assert up.index(0.5) > up.index() > 0.0
+    spherical = Uplink(LOW, 1e-3)  # so small that it is a point
+    assert spherical.index() == pytest.approx(LOW.spherical_rytov, rel=1e-2)
+    of_axis = up.index(0.4) - up.index()
+    r = 0.4 * up.radius_m
+    from scipy.special import i0
+
+    def more(h, z):
+        left = 1.0 - z / length
+        damping, turn = width * length * left**2 / k, 2.0 * width * r * left
+        return of_spectrum(lambda q: math.exp(-damping * q**2) * (i0(min(turn * q, 700.0)) - 1.0) if q < 300.0 else 0.0)
+
+    height = np.array([20.0, 8000.0])
+    each = [more(h, h / math.sin(LOW.elevation_rad)) for h in height]
+    assert each[0] == pytest.approx(each[1], rel=0.03)  # nearly the same from all of the air
+    assert of_axis == pytest.approx(each[0] * over_height(lambda h, z: 1.0), rel=0.03)
+
+
+@pytest.mark.promise("link-104")
+def test_wander_has_the_constant_that_is_asked_for():
+    up = Uplink(LOW, 0.03)
+    radius = lambda z: 0.03 * math.hypot(1.0, 2.0 * z / (LOW.wavenumber * 0.03**2))  # noqa: E731
+    wanted = over_height(lambda h, z: (1.0 - z / 900e3) ** 2 * radius(z) ** (-1 / 3))
+    assert up.wander_rms_rad("dios-2004") ** 2 == pytest.approx(2.07 * wanted, rel=1e-7)
+    assert up.wander_rms_rad("andrews-phillips-2005") ** 2 == pytest.approx(7.25 * wanted, rel=1e-7)
+    with pytest.raises(ValueError, match='the convention "dios" is none of dios-2004, andrews-phillips-2005'):
+        up.wander_rms_rad("dios")
+
+
+@pytest.mark.promise("link-104")
+def test_the_spread_and_the_point_ahead_of_an_uplink():
+    up = Uplink(LOW, 0.03)
+    assert up.radius_m == pytest.approx(1.55e-6 * 900e3 / (math.pi * 0.03), rel=1e-4)
+    widened = 1.0 + (math.sqrt(8.0) * 0.03 / LOW.fried_m) ** (5.0 / 3.0)
+    assert up.spread_db == pytest.approx(10.0 * math.log10(widened**1.2), rel=1e-12)
+    assert up.anisoplanatic_rad2(LOW.isoplanatic_rad) == pytest.approx(1.0, rel=1e-12)
+    assert up.anisoplanatic_rad2(50e-6) == pytest.approx((50e-6 / LOW.isoplanatic_rad) ** (5 / 3), rel=1e-12)
+
+
+# ------------------------------------------------------------------------------------------------------------- fades
+@pytest.mark.promise("link-105")
+@pytest.mark.parametrize(
+    "fades", [GammaGamma(0.8, 0.5), GammaGamma(4.2, 1.4), GammaGamma(1.4, 4.2), GammaGamma(40, 30)]
+)
+def test_gamma_gamma_fades_are_those_of_drawn_powers(fades):
+    rng, count = np.random.default_rng(4), 400_000
+    power = rng.gamma(fades.large, 1.0 / fades.large, count) * rng.gamma(fades.small, 1.0 / fades.small, count)
+    assert np.var(power) == pytest.approx(fades.index, rel=0.05)
+    for at in (0.02, 0.2, 0.7, 1.6):
+        share = np.mean(power < at)
+        assert float(fades.below(at)) == pytest.approx(share, abs=5.0 * math.sqrt(share / count) + 1e-6)
+    for outage in (0.3, 1e-2):
+        assert 10.0 ** (-0.1 * fades.loss_db(outage)) == pytest.approx(np.quantile(power, outage), rel=0.03)
+    assert float(fades.below(10.0 ** (-0.1 * fades.loss_db(1e-6)))) == pytest.approx(1e-6, rel=1e-6)
+
+
+@pytest.mark.promise("link-105")
+def test_in_weak_turbulence_both_laws_agree_and_the_rytov_variance_is_the_index():
+    weak = GammaGamma.of_plane_wave(0.02)
+    assert weak.index == pytest.approx(0.02, rel=0.03)
+    assert weak.loss_db(1e-2) == pytest.approx(LogNormal(weak.index).loss_db(1e-2), rel=0.05)
+    assert GammaGamma.of_plane_wave(3.0).index == pytest.approx(1.2, abs=0.15)  # past the focus it falls towards 1
+    assert GammaGamma.of_plane_wave(400.0).index < GammaGamma.of_plane_wave(8.0).index
+    assert Downlink(LOW).at_point == GammaGamma.of_plane_wave(LOW.rytov)
+
+
+@pytest.mark.promise("link-105")
+def test_log_normal_fades_have_their_index():
+    fades, rng = LogNormal(0.2), np.random.default_rng(2)
+    variance = math.log(1.2)
+    power = np.exp(math.sqrt(variance) * rng.standard_normal(400_000) - variance / 2.0)
+    assert np.mean(power) == pytest.approx(1.0, abs=0.005) and np.var(power) == pytest.approx(0.2, rel=0.03)
+    assert float(fades.below(0.5)) == pytest.approx(np.mean(power < 0.5), rel=0.05)
+    assert fades.loss_db(0.01) == pytest.approx(-10.0 * math.log10(np.quantile(power, 0.01)), abs=0.05)
+    assert LogNormal(0.0).loss_db(0.01) == 0.0
+
+
+# ------------------------------------------------------------------------------------------------- regimes, refusals
+@pytest.mark.promise("link-106")
+def test_a_path_says_where_the_closed_forms_end():
+    assert ZENITH.regimes == ()
+    low = SlantPath(HufnagelValley(), 0.5e-6, math.radians(10.0), 1e6)
+    strong, flat = low.regimes
+    assert strong.startswith("strong turbulence: the Rytov variance is 5.8")
+    assert flat.startswith("an elevation of 10 deg: below 20 deg the air is not flat")
+    moderate = SlantPath(HufnagelValley(), 0.8e-6, math.radians(35.0), 1e6)
+    assert moderate.regimes[0].startswith("moderate turbulence: the Rytov variance is 0.376")
+
+
+@pytest.mark.promise("link-106")
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda: SlantPath(HufnagelValley(), 1e-6, math.radians(3.0), 1e6), "lower air is not flat"),
+        (lambda: SlantPath(HufnagelValley(), 1.55, math.pi / 2.0, 1e6), "SlantPath.wavelength_m"),
+        (lambda: HufnagelValley(ground_strength=-1e-14), "HufnagelValley.ground_strength"),
+        (lambda: BuftonWind(width_m=0.0), "BuftonWind.width_m"),
+        (lambda: Uplink(LOW, 0.0), "Uplink.waist_m"),
+        (lambda: Downlink(LOW).index(-0.1), "the aperture is -100 mm"),
+        (lambda: Downlink(LOW).arrival_rms_rad(0.2, "best"), 'the tilt "best" is none of zernike, gradient'),
+        (lambda: Downlink(LOW).arrival_psd_rad2_hz([0.0], 0.2, WIND), "the frequency is 0"),
+        (lambda: Downlink(LOW).arrival_psd_rad2_hz([1.0], 0.2, BuftonWind(0.0, 0.0)), "air at rest has no spectrum"),
+        (lambda: Uplink(LOW, 0.03).index(-1.0), "the distance off the axis is -1"),
+        (lambda: Uplink(LOW, 0.3).index(1.0), "above 1: the closed form is that of weak turbulence"),
+        (lambda: Uplink(LOW, 0.03).anisoplanatic_rad2(-1e-6), "the point-ahead angle is -1 µrad"),
+        (lambda: GammaGamma(0.0, 1.0), "GammaGamma.large"),
+        (lambda: GammaGamma.of_plane_wave(0.0), "the Rytov variance is 0"),
+        (lambda: LogNormal(0.1).loss_db(1.0), "the outage is 1"),
+        (lambda: GammaGamma(2.0, 1.0).loss_db(0.0), "the outage is 0"),
+    ],
+)
+def test_what_cannot_be_is_refused(call, said):
+    with pytest.raises(ValueError, match=said.replace("(", r"\(")):
+        call()
