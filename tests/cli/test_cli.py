@@ -1023,6 +1023,12 @@ def test_units_that_contradict_each_other_are_refused(refused, folder):
         "identify", path, "--input", 1, "--output", 2, "--rate", 1000, "--static", "--output-unit", "mrad"
     )
     assert "--output-unit is mrad and the files say urad" in message
+    same = folder / "same.csv"
+    same.write_text(path.read_text().replace("Tilt (urad)", "Tilt (mrad)"))
+    message = refused(
+        "identify", same, path, "--input", 1, "--output", 2, "--rate", 1000, "--static", "--output-unit", "mrad"
+    )
+    assert "--output-unit is mrad and the files say" in message
 
 
 def test_one_recording_for_fit_and_validation_is_refused(refused, folder):

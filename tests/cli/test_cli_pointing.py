@@ -10,9 +10,13 @@ import pytest
 
 import several_axes
 from link_files import FADING
+from microrad.cli import pointing as cli_pointing
+from microrad.cli.coupled_design import reach_share_percent
 from microrad.cli.windows import indices_of_mission
+from microrad.loop import coupled_study
 from microrad.loop.disturbance import olympus
 from microrad.loop.disturbance.windows import ErrorIndex, windowed_rms
+from microrad.mission.file import load_mission
 from microrad.report.fine_pointing import worst_case
 from places import ROOT
 from shipped import DEFAULT, without_fine_pointing
@@ -154,6 +158,12 @@ def test_windows_are_those_that_the_requirements_name_and_runs_leave_out_what_do
     code, out, _ = call("pointing", mission, "--simulate", "2")
     said = " ".join(out.split())
     assert (code, said.count("Longer than a run behind its settling, and left out: PDE 100 ms 300 s apart.")) == (0, 1)
+    span = load_mission(mission).mission.fine_pointing
+    room_s = span.duration_s - span.settle_s
+    long = NAMED.replace('spacing = "5 min"', f'spacing = "{room_s - 0.05:g} s"')  # 50 ms too much with the window
+    mission.write_text(DEFAULT.read_text("utf-8") + long, "utf-8")
+    code, out, _ = call("pointing", mission, "--simulate", "2", "--json")
+    assert (code, json.loads(out)["simulated"]["left_out"]) == (0, [f"PDE 100 ms {room_s - 0.05:.3g} s apart"])
     code, out, _ = call("pointing", mission, "--window", "1 s", "--json")
     assert times(json.loads(out)) == [("APE", None, None), ("MPE", 1.0, None), ("RPE", 1.0, None)]
 
@@ -289,6 +299,24 @@ def test_a_mirror_of_several_axes_has_windows_that_its_design_and_its_runs_agree
             linear, abs=2.0 * each["interval_rad"], rel=0.0
         )  # little hysteresis
         assert each["interval_rad"] < 0.15 * linear
+
+
+@pytest.mark.parametrize("name", ["PI", "LQG"])
+def test_the_controller_that_is_asked_for_is_the_one_that_is_designed(tmp_path, monkeypatch, name):
+    (tmp_path / "two-axes.toml").write_text(several_axes.TEXT, encoding="utf-8")
+    named = several_axes.mission_text(("[fine_pointing]\n", '[fine_pointing]\nmirror_file = "two-axes.toml"\n'))
+    (tmp_path / "m.toml").write_text(named, encoding="utf-8")
+
+    def design(scene, progress, names):
+        return SimpleNamespace(made=[SimpleNamespace(controller=each) for each in names])
+
+    monkeypatch.setattr(coupled_study, "design", design)
+    assert cli_pointing._designed(load_mission(tmp_path / "m.toml"), name)[1] == name
+
+
+@pytest.mark.parametrize(("still", "reach", "percent"), [(2.0, (-50.0, 50.0), 10.0), (2.0, (-20.0, 50.0), 25.0)])
+def test_the_share_of_a_drive_is_with_three_times_its_rms_of_the_nearer_end(still, reach, percent):
+    assert reach_share_percent(still, 1.0, reach) == pytest.approx(percent)
 
 
 IDENTIFIED = ROOT / "tests" / "corpus" / "0.2.0" / "mirrors" / "identified.toml"

@@ -290,6 +290,10 @@ def test_a_bomb_takes_no_memory(tmp_path):
     (why, remedy), peak = peak_bytes(lambda: refused(path, most_bytes=7_000_000))
     assert "unpacks to more than 7000000 bytes" in why and "without compression (-v6)" in remedy
     assert peak < 1_000_000
+    twice = data, data.replace(b"x\0", b"z\0")
+    MatlabFile(write(path, "<", *twice, compressed=True), 17_000_000, whole=True)
+    with pytest.raises(MatlabFileError, match="unpacks to more than"):
+        MatlabFile(path, 15_000_000, whole=True)
     behind = matrix("<", 6, (1, 1), b"x", doubles("<", [1.0])) + bytes(11_000_000)
     assert "unpacks to more than 10000000 bytes" in refused(write(path, "<", behind, compressed=True))[0]
     claim = data[:8] + data[8:].replace(struct.pack("<I", 8_000_000), struct.pack("<I", 8_000_008))

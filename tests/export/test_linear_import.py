@@ -398,6 +398,15 @@ def test_what_is_given_wrongly_is_refused(change, why, tmp_path):
         import_mat(save(tmp_path, **SHAPES["roots"]), replace(GIVEN, **change))
 
 
+def test_the_gain_may_be_taken_at_the_ends_of_the_band_and_all_refusals_are_told(tmp_path):
+    path = save(tmp_path, **SHAPES["roots"])
+    for at in (GIVEN.excited_from_hz, GIVEN.excited_to_hz):
+        (tmp_path / "mirror.toml").write_text(import_mat(path, replace(GIVEN, normalise_at_hz=at)), encoding="utf-8")
+        assert load_mirror(tmp_path / "mirror.toml").mirror.linear.normalise_at_hz == at
+    with pytest.raises(ExportError, match=r"would be refused: (name: .*; travel: |travel: .*; name: )"):
+        import_mat(path, replace(GIVEN, travel_rad=-1.0, name="x" * 201))
+
+
 def element(kind, data):
     return struct.pack("<II", kind, len(data)) + data + b"\0" * (-len(data) % 8)
 

@@ -270,6 +270,18 @@ def test_lvm_segments(tmp_path):
     np.testing.assert_allclose(read.drive[:, 0], DRIVE[334:667], atol=1e-12)
 
 
+def test_lvm_segments_of_one_clock_go_on_where_x0_says(tmp_path):
+    path, begins = lvm(tmp_path / "a.lvm", segments=3), TIME_S[[0, 334, 667]]
+    text = path.read_bytes()
+    for begin in begins[1:]:
+        text = text.replace(f"Time\t12:00:{begin:010.7f}".encode(), b"Time\t12:00:00.0000000")
+    head, *parts = text.split(b"X0\t0.0\t")
+    path.write_bytes(head + b"".join(f"X0\t{t}\t".encode() + each for t, each in zip(begins, parts, strict=True)))
+    check(read_recording(path, "drive", "output"))
+    path.write_bytes(text)
+    assert "The channels are '0/drive', '0/output', '1/drive'" in refusal(path, "drove", "output")
+
+
 def test_a_cell_of_a_later_lvm_segment_is_named_by_its_line(tmp_path):
     path = lvm(tmp_path / "a.lvm", segments=3)
     lines = path.read_bytes().split(b"\r\n")

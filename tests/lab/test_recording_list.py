@@ -192,6 +192,16 @@ from = "1.5 s"
     assert len(found) == len(words)
 
 
+def test_what_is_not_fitted_may_stand_before_what_is(tmp_path):
+    (tmp_path / "c.csv").write_text("u,y\n" + "".join(f"{u},{2 * u}\n" for u in np.sin(np.arange(3000) ** 1.4)))
+    entry = '[recording.{name}]\nfile = "c.csv"\ninput = "u"\noutput = "y"\nrate = "1 kHz"\n'
+    early = entry.format(name="a") + 'to = "1 s"\nrole = "validation"\n'
+    found = read_list(write_list(tmp_path, early + entry.format(name="b") + 'from = "1 s"\n'))
+    assert [each.samples for each in (*found.validation, *found.recordings)] == [1000, 2000]
+    told = faults(tmp_path, early + entry.format(name="b") + 'from = "0.9 s"\n')
+    assert "takes samples for validation that [recording.b] fits" in " ".join(told.values())
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [

@@ -186,6 +186,9 @@ def test_a_motion_that_grows_is_not_stationary_for_its_trend():
     assert found.fast.growth_p < 1e-6 and "in 8 equal parts differs" in found.reason
     ratio_alone = replace(found.fast, ratio_p=0.5)
     assert "grows" in ratio_alone.verdict and "over the recording" in ratio_alone.verdict
+    fallen = replace(ratio_alone, growth=1.0 / ratio_alone.growth)
+    assert fallen.verdict == ratio_alone.verdict.replace("grows", "falls")
+    assert replace(fallen, growth=0.9).verdict == ""
 
 
 @pytest.mark.promise("pointing-67")

@@ -138,6 +138,7 @@ def test_a_stable_loop_settles_in_time_and_an_unstable_one_grows(tmp_path):
     subject, _ = subject_of(file)
     calm = worst_case.worst_case(subject, 1, extent=Extent(draws=1, most_sensitive=1, sigmas=0.1)).verified_in_time
     assert (calm.theory, calm.linear, calm.with_hysteresis, calm.agrees) == ("settles", "settles", "settles", True)
+    assert not replace(calm, with_hysteresis="grows").agrees and not replace(calm, linear="grows").agrees
     wild = worst_case.worst_case(subject_of(file, values=(100.0, 1500.0))[0], 1, INDICES, SMALL)
     assert wild.unstable_corners > 0 and wild.smallest_modulus.value == 0.0
     assert wild.smallest_modulus.sigmas["bouc_wen.d1"] == pytest.approx(3.0)

@@ -538,7 +538,8 @@ def test_the_schema_has_the_kinds_of_plain_values():
         assert tables[name]["additionalProperties"] is False
 
 
-def test_the_highest_harmonic_of_a_wheel_is_judged_wherever_it_stands(refuse):
-    fault = refuse(edited(("wheels.harmonics", "[2000.0, 1.0]"), text=uncommented("fine_pointing.wheels")))
+@pytest.mark.parametrize("harmonics", ["[2000.0, 1.0]", "[1.0, 2000.0]"])
+def test_the_highest_harmonic_of_a_wheel_is_judged_wherever_it_stands(refuse, harmonics):
+    fault = refuse(edited(("wheels.harmonics", harmonics), text=uncommented("fine_pointing.wheels")))
     assert fault.key == "fine_pointing.wheels.speed"
     assert "puts harmonic 2000 at " in fault.reason

@@ -166,6 +166,8 @@ def test_one_comparison_that_does_not_hold_spoils_its_quantity_and_no_other():
     )
     assert status_of("Link margin", held, missed).status is Status.FAILED
     assert status_of("Modulus margin", held, missed).status is Status.VALIDATED
+    mixed = check.Outcome(held.check, [held.comparisons[0], missed.comparisons[0]])
+    assert status_of("Link margin", mixed).status is Status.FAILED
     found = findings.found([held, missed], WHOLE, full=False, domains={})
     assert not found.ok
     assert not found.holds

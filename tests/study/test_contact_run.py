@@ -662,6 +662,8 @@ def test_the_earlier_of_two_losses_counts(sampler, scene):
     for off, kept, what in ((15, 16, "spot"), (16, 16, "margin"), (3, 4, "spot")):
         loss, found = s._loss(time, np.where(np.arange(40) == off, 3e-3, 20e-6), margin, ends, 0)
         assert (found, loss.cause.split()[0]) == (kept, what)
+        light_s = 2.0 * float(ends.range_m[0]) / 299_792_458.0 if what == "margin" else 0.0  # there and back
+        assert loss.known_s - loss.time_s == pytest.approx(light_s, rel=1e-9, abs=1e-9)
 
 
 def test_what_the_mirror_does_behind_a_loss_is_not_in_its_mean_angle(sampler, scene):

@@ -78,6 +78,17 @@ def tuned_text(scene: "AnyScene", values: Mapping[str, float], margin: float | N
     return tuned_to(values, parameter_units(scene)) + larger_margin(margin)
 
 
+def reach_share_percent(still_v: float, rms_v: float, reach_v: tuple[float, float]) -> float:
+    """What a drive with three times its rms takes of the nearer end of its reach, in percent.
+
+    Args:
+        still_v: The drive that stands still (V), as a size.
+        rms_v: Rms about it (V).
+        reach_v: Ends of the reach, the lower one below 0 (V).
+    """
+    return 100.0 * (still_v + 3.0 * rms_v) / min(reach_v[1], -reach_v[0])
+
+
 def _text(
     scene: "CoupledScene",
     found: "CoupledDesigns",
@@ -112,7 +123,7 @@ def _text(
         scene.reach_v,
     )
     drives = [
-        (actuator.name, f"{known:.3g}", f"{rms:.3g}", f"{100.0 * (known + 3.0 * rms) / min(high, -low):.3g} %")
+        (actuator.name, f"{known:.3g}", f"{rms:.3g}", f"{reach_share_percent(known, rms, scene.reach_v):.3g} %")
         for actuator, known, rms in zip(scene.mirror.actuators, scene.static_v, best.drive_v.tolist(), strict=True)
     ]
     reach = f"{min(high, -low):.4g} V"
