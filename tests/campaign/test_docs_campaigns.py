@@ -289,7 +289,7 @@ def test_figures_of_the_page_are_those_of_the_program():
     import dask
     import distributed  # noqa: F401  brings its configuration
 
-    told("(`distributed.scheduler.allowed-failures` of Dask, 3)", "without any for 60 s", "does not answer for 20 s")
+    told("(`distributed.scheduler.allowed-failures` of Dask, 3)", "without any for 60 s", "no longer answers for 20 s")
     assert dask.config.get("distributed.scheduler.allowed-failures") == 3
     assert (cluster._NO_WORKERS_S, cluster._ANSWER_S) == (60.0, 20.0)
     told("less than 80 % of the variance", "Fewer than 64 good rows", "more than 20 000")
