@@ -149,7 +149,7 @@ def test_report_and_studio_draw_the_same_curve(tmp_path, monkeypatch, faded):
         assert len(shown) == faded
         for figure in shown:
             assert [*figure.columns["span (s)"]] == [*study.fading.curve.span_s]
-            assert figure.sheet == link_figures(study)[-1].sheet
+            assert figure.svg == link_figures(study)[-1].svg
 
 
 def test_fades_that_no_power_makes_up_for_are_said(tmp_path, call):
