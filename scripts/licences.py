@@ -18,12 +18,12 @@ _LONGEST = 50  # characters of a field that names a licence; a longer one is its
 
 HEAD = f"""# Licences of the dependencies
 
-microrad itself is under BSD-3-Clause. Of the packages below it copies nothing; its reports hold plotly.js, with its
+microrad itself is under BSD-3-Clause. It holds no source of the packages below; its reports hold plotly.js, with its
 licence (MIT). The packages are installed beside it, each under the licence that its metadata states; libraries inside a
 wheel have licences of their own, whose texts are in the wheel. `{PROJECT}` in the last column is what every
 installation has, the others come with an extra. Of what every installation has no package states the GPL or the LGPL.
-`npTDMS`, which reads and writes TDMS files, is under the LGPL and optional: the extra `lab` brings it, and without it
-everything else works. What only tests and benchmarks need is not listed. `scripts/licences.py` writes this page.
+`npTDMS`, which reads and writes TDMS files, is under the LGPL and optional: the extra `lab` brings it, and nothing
+but these files needs it. What only tests and benchmarks need is not listed. `scripts/licences.py` writes this page.
 <!-- promise: licences-1 -->
 
 | package | licence | brought by |

@@ -42,7 +42,7 @@ ASKING = {"socket", "http", "urllib", "ftplib", "requests", "httpx", "aiohttp", 
 """Modules by which a program asks others over the network."""
 
 
-@pytest.mark.promise("decisions-1", "readme-8")
+@pytest.mark.promise("decisions-1", "readme-8", "studio-30")
 def test_nothing_in_the_package_asks_the_network():
     """The studio answers, and quotes addresses; tables of the Earth's rotation are those that skyfield brings along."""
     found, loaded = set(), []

@@ -101,6 +101,7 @@ def test_every_key_is_there(site):
     assert "must be there" in page
 
 
+@pytest.mark.promise("decisions-5")
 def test_published_cases_are_within_their_tolerance(site):
     folder, _ = site
     text = text_of(folder / "validation.html")

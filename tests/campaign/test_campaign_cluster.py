@@ -3,6 +3,7 @@
 import json
 import os
 import random
+import signal
 import subprocess
 import sys
 import threading
@@ -264,6 +265,39 @@ def test_a_scheduler_that_goes_away_is_told(elsewhere):
     with no_hang(), pytest.raises(CampaignError, match=f"the scheduler at {elsewhere.address} is gone"):
         list(outcomes)
     one.close()
+
+
+@pytest.mark.promise("campaigns-56")
+@pytest.mark.skipif(not hasattr(signal, "SIGSTOP"), reason="no process can be stopped")
+def test_a_scheduler_that_is_there_and_silent_is_told(elsewhere, monkeypatch):
+    elsewhere.worker("--no-nanny")
+    one = connect(elsewhere, '{"0": "work", "else": "endless"}')
+    outcomes = one.outcomes(iter(chunks(*range(1000))))
+    assert next(outcomes).kind == "done"
+    elsewhere.scheduler.send_signal(signal.SIGSTOP)
+    monkeypatch.setattr(cluster, "_ANSWER_S", 0.5)
+    monkeypatch.setitem(DaskEngine._call.__kwdefaults__, "answer_s", 0.5)
+    words = rf"the scheduler at {elsewhere.address} is gone \(it did not answer for 0\.5 s\)"
+    with no_hang(), pytest.raises(CampaignError, match=words):
+        list(outcomes)
+    one.close()
+
+
+@pytest.mark.promise("campaigns-54", "campaigns-62")
+@pytest.mark.parametrize(
+    ("allowed", "words"), [(0, ""), (1, ", the last of 2 that it was tried on"), (3, ", the last of 4")]
+)
+def test_a_chunk_has_died_with_one_worker_more_than_the_scheduler_allows_to_fail(allowed, words):
+    """The scheduler gives it up by itself; a lower number loses fewer workers on it."""
+    last = "tcp://127.0.0.1:9"
+    flight = Flight(Job(0, 7), where=last)
+    engine = SimpleNamespace(_flights={0: flight}, _forgiven=set(), _drop=lambda serial: flight)
+    error = KilledWorker("job", SimpleNamespace(address=last), allowed)
+    (outcome,) = DaskEngine._failed(engine, 0, error, JobQueue(iter(())))
+    assert outcome.kind == "died"
+    assert outcome.reason.startswith(f"its worker at {last} ended{words}") and ("the last" in outcome.reason) == bool(
+        words
+    )
 
 
 def test_workers_elsewhere_serve_one_engine_after_another_and_forget(there):

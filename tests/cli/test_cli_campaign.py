@@ -3,9 +3,11 @@
 import json
 import re
 import shutil
+import socket
 import sqlite3
 import subprocess
 import sys
+from contextlib import closing
 
 import pytest
 
@@ -14,8 +16,10 @@ from command_line import listing
 from microrad.campaign import run
 from microrad.campaign.file import load_campaign
 from microrad.campaign.ledger import Ledger, mending
+from microrad.campaign.records import CampaignError
 from microrad.cli.campaign import campaigns
 from small_campaign import Here, without_worker
+from waiting import no_hang
 
 LIMIT = '[limits.margin]\nleast = "1 dB"\n'
 LINKS = HEAD.replace("256", "64") + POWER + LIMIT  # without a loop: a worker has its rows in milliseconds
@@ -164,6 +168,40 @@ def test_a_scheduler_that_is_not_there_leaves_no_ledger_behind(there, refused, m
     address = "tcp://127.0.0.1:1"
     said = refused("campaign", "run", "campaign.toml", "--ledger", "new.ledger", "--scheduler", address)
     assert said.count("\n") == 1 and f"no scheduler answers at {address}" in said
+
+
+@pytest.mark.promise("campaigns-56")
+def test_a_scheduler_that_takes_calls_and_says_nothing_is_refused(there, refused, monkeypatch):
+    monkeypatch.setattr("microrad.campaign.engines.cluster._CONNECT_S", 1.0)
+    with closing(socket.create_server(("127.0.0.1", 0))) as silent, no_hang():
+        address = f"tcp://127.0.0.1:{silent.getsockname()[1]}"
+        said = refused("campaign", "run", "campaign.toml", "--ledger", "new.ledger", "--scheduler", address)
+    assert (
+        said.count("\n") == 1 and f"no scheduler answers at {address} (TimeoutError: it did not answer for 1 s)" in said
+    )
+
+
+@pytest.mark.promise("campaigns-56")
+@pytest.mark.parametrize("another", [("--scheduler", "tcp://other:2"), ("--threads", "1")])
+def test_a_scheduler_that_goes_ends_the_command_and_another_or_none_goes_on(there, call, monkeypatch, another):
+    shortened(there)
+    asked = []
+
+    def gone(means, spec, late_s):
+        raise CampaignError(f"the scheduler at {means.scheduler} is gone")
+
+    with Ledger.open(there / "campaign.ledger", write=False) as book:
+        before = book.done()
+    monkeypatch.setattr(run.Means, "engine", gone)
+    ended = call("campaign", "resume", "campaign.ledger", "--scheduler", "tcp://head:1")
+    assert ended.code == 2 and "the scheduler at tcp://head:1 is gone" in ended.err
+    with Ledger.open(there / "campaign.ledger", write=False) as book:
+        assert book.done() == before
+    monkeypatch.setattr(run.Means, "engine", lambda means, spec, late_s: asked.append(means.scheduler) or Here(spec))
+    assert call("campaign", "resume", "campaign.ledger", *another).code == 0
+    assert asked == ["tcp://other:2" if "--scheduler" in another else None]
+    with Ledger.open(there / "campaign.ledger", write=False) as book:
+        assert book.done() > before
 
 
 @pytest.mark.parametrize("count", ["0", "-1", "two"])

@@ -1,5 +1,6 @@
 """What is installed and what is said of it: from the project's folder, in pinned versions, each file by its hash."""
 
+import ast
 import re
 import subprocess
 import sys
@@ -235,3 +236,33 @@ def test_the_page_of_licences_is_what_the_packages_state():
     assert stated.keys() & pinned.keys() <= listed.keys() <= pinned.keys()
     assert listed["nptdms"] == "| npTDMS | LGPL-3.0-only | lab |"
     assert not [row for row in listed.values() if "GPL" in row and row.endswith("| microrad |")]
+
+
+@pytest.mark.promise("licences-1")
+def test_only_files_of_tdms_need_nptdms_and_no_module_needs_it_to_be_loaded():
+    package, found = ROOT / "src" / "microrad", {}
+    for path in package.rglob("*.py"):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        for node in ast.walk(tree):
+            names = [each.name for each in node.names] if isinstance(node, ast.Import) else []
+            names += [node.module or ""] if isinstance(node, ast.ImportFrom) and not node.level else []
+            if "nptdms" in {name.partition(".")[0] for name in names}:
+                found.setdefault(path.relative_to(package).as_posix(), []).append(node in tree.body)
+    assert found.keys() == {"lab/recording/formats/tdms.py", "lab/bench/folder.py"}
+    assert not any(at_once for each in found.values() for at_once in each)
+
+
+@pytest.mark.promise("licences-1")
+def test_nothing_of_the_listed_packages_stands_in_the_package():
+    """What others wrote says so; of these are the script of reports, and the headers of FMI."""
+    package = ROOT / "src" / "microrad"
+    words = re.compile(rb"Copyright|SPDX-License|Licensed under")
+    others = {path for path in package.rglob("*") if path.is_file() and path.suffix != ".pyc"}
+    held = {path.relative_to(package).as_posix() for path in others if words.search(path.read_bytes())}
+    assert {name.rpartition("/")[0] for name in held} == {
+        "report/page/vendor",
+        "export/fmi/headers",
+        "export/templates",
+    }
+    listed = {canonicalize_name(row.split(" | ")[0][2:]) for row in rows_of(licences.PAGE.read_text(encoding="utf-8"))}
+    assert "numpy" in listed and not any("plotly" in name or "fmi" in name for name in listed)

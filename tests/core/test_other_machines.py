@@ -7,6 +7,7 @@ import sys
 
 import pytest
 
+from microrad.core import machine
 from shipped import SHIPPED
 
 _CASE = """
@@ -100,3 +101,37 @@ def test_a_processor_without_vectors_is_named_by_what_it_has():
     ran = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
     assert ran.stdout.strip()
     assert "AVX2" not in ran.stdout and "X86_V3" not in ran.stdout
+
+
+_DIGITS = """
+import numpy as np
+from microrad.mirror.hysteresis import BoucWen
+
+drive = 5.0 * np.sin(np.arange(2000) / 30.0)
+model = BoucWen(89e-6, 0.0, -22e-6, 4e-4, 2.4, 0.6, rate_limit_v_s=2000.0)
+for each in (np.exp(drive), model.response(drive, 1e-4)):
+    print(" ".join(value.hex() for value in each.tolist()))
+"""
+_LESS_OF_NUMPY = {"NPY_DISABLE_CPU_FEATURES": "X86_V3 X86_V4 AVX512_ICL AVX512_SPR"}
+_LESS_OF_THE_COMPILER = {"NUMBA_CPU_NAME": "x86-64-v2", "NUMBA_CPU_FEATURES": "+sse4.2,+avx,-fma"}
+
+
+@pytest.mark.promise("campaigns-57")
+@pytest.mark.skipif(
+    not {"AVX2", "X86_V3"} & set(re.findall(r"\w+", machine.machine()["instruction sets"])),
+    reason="this processor has nothing to be left unused",
+)
+def test_last_digits_of_arrays_and_of_hysteresis_are_those_of_a_kind_of_processor():
+    def digits(**less):
+        ran = subprocess.run(
+            [sys.executable, "-c", _DIGITS], env={**os.environ, **less}, capture_output=True, text=True, check=True
+        )
+        arrays, hysteresis = ([float.fromhex(each) for each in line.split()] for line in ran.stdout.splitlines())
+        return arrays, hysteresis
+
+    (arrays, hysteresis), again = digits(), digits()
+    assert again == (arrays, hysteresis)
+    other_arrays, _ = digits(**_LESS_OF_NUMPY)
+    assert other_arrays != arrays and other_arrays == pytest.approx(arrays, rel=1e-14)
+    _, other_hysteresis = digits(**_LESS_OF_THE_COMPILER)
+    assert other_hysteresis != hysteresis and other_hysteresis == pytest.approx(hysteresis, rel=1e-9, abs=1e-18)

@@ -1,6 +1,8 @@
 """The ladder for several channels: what it chooses, what it hands on bit for bit, how it stops, what it refuses."""
 
+import re
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -23,7 +25,7 @@ from microrad.mirror import model as mirror
 from microrad.mirror.hysteresis import PrandtlIshlinskii
 from microrad.mirror.model import Mirror
 from microrad.mission.file import load_coupled_mirror
-from places import DATA
+from places import DATA, ROOT
 
 CUBESPEC = DATA / "cubespec"
 needs_cubespec = pytest.mark.skipif(not CUBESPEC.exists(), reason=f"real recording cubespec absent: {CUBESPEC}")
@@ -96,8 +98,22 @@ def found(hysteretic_records):
     return result, told, heard
 
 
+@pytest.mark.promise("identify-65")
+def test_the_example_of_the_page_writes_the_file_of_a_mirror(hysteretic_records, monkeypatch, capsys, tmp_path):
+    """With the two smallest models of the ladder."""
+    quick = partial(identify_coupled, options=LadderOptions(axis_orders=(2,), linear_orders=(2,), stiffness_orders=()))
+    monkeypatch.setattr("microrad.lab.identify.coupled.identify_coupled", quick)
+    page = (ROOT / "docs" / "identify.md").read_text(encoding="utf-8")
+    (code,) = (each for each in re.findall(r"```python\n(.*?)```", page, re.DOTALL) if "identify_coupled" in each)
+    known = {"recordings": hysteretic_records}
+    exec(code, known)
+    assert known["found"].chosen in capsys.readouterr().out
+    mirror_file = load_coupled_mirror(tmp_path / "our.toml", text=known["text"])
+    assert (mirror_file.version, mirror_file.name) == (2, "our mirror")
+
+
 # ----------------------------------------------------------------------------------------------------------- the choice
-@pytest.mark.promise("hysteretic-stiffness-15")
+@pytest.mark.promise("hysteretic-stiffness-15", "hysteretic-stiffness-31")
 @pytest.mark.promise("identify-40", "identify-41", "identify-43")
 @pytest.mark.promise("identify-61")
 def test_hysteretic_stiffness_is_found_where_it_is(found):

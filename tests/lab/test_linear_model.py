@@ -249,6 +249,7 @@ def test_polish_finds_the_minimum_from_nearby():
     assert polish(problem, start, iterations=1).cost > 1e-9 * found.power
 
 
+@pytest.mark.promise("identify-50")
 def test_several_channels_share_their_poles():
     truth = mirror()
     fit = fit_linear(multisines(truth, noise=0.02), orders=[5, 7, 9])

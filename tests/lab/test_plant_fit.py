@@ -24,6 +24,7 @@ from microrad.lab.identify.hysteresis.structures import hysteretic_oscillator, o
 from microrad.lab.recording import read_recording, recording_from_arrays
 from microrad.mirror import model as mirror
 from microrad.mirror.hysteresis import PrandtlIshlinskii
+from microrad.mirror.model import Mirror
 from places import DATA
 from truths import plays, recorded, two_sines
 
@@ -158,6 +159,38 @@ def test_the_offset_of_a_sensor_is_no_parameter_and_drops_out():
     assert_allclose(with_offset.values, [2.0, 300.0, 5e4, 2e4, 300.0, 100.0], rtol=1e-4)
     held = fit_plant(structure, fit_records([low_pass(1, 0.0)], offset=False))
     assert np.max(np.abs(held.values / with_offset.values - 1)) > 0.01
+
+
+@pytest.mark.promise("identify-50")
+def test_a_structure_of_two_drives_and_two_outputs_is_fitted():
+    """Two actuators behind plays of their own, each of which turns the mirror about both axes."""
+    truth, thresholds = np.array([3e-5, 2e-5, 5e-6, -4e-6]), (0.5, 0.9)
+
+    def build(values):
+        return Mirror(
+            name="two axes",
+            A=np.zeros((0, 0)),
+            B=np.zeros((0, 2)),
+            E=np.zeros((0, 2)),
+            F=np.zeros((2, 0)),
+            G=np.eye(2),
+            C=np.zeros((2, 0)),
+            D=np.zeros((2, 2)),
+            K=np.array([[values[0], values[2]], [values[3], values[1]]]),
+            bouc_wen=(),
+            plays=tuple(PrandtlIshlinskii((0.0, r), (1.0, 0.3)) for r in thresholds),
+            inverse=(),
+        )
+
+    names = ("x", "y", "x from y", "y from x")
+    structure = Structure("two axes", tuple(map(Parameter, names, ("rad/V",) * 4, 1.2 * truth)), build)
+    drive = np.column_stack([two_sines(1200), two_sines(1200, freq_hz=3.1)]) - 5.0
+    run = FitRecord("", drive.copy(), np.zeros((1200, 2)), 1e-3, 1, 0, np.zeros((1200, 0)))
+    output = simulate_record(mirror.discretise(build(truth), 1e-3), run)
+    output = output + 1e-7 * np.random.Generator(np.random.Philox(6)).standard_normal(output.shape)
+    fit = fit_plant(structure, fit_records([recording_from_arrays(drive, output, 1000.0)]))
+    assert np.max(np.abs(fit.values - truth) / fit.standard_errors) < 4.0
+    assert np.max(fit.standard_errors / np.abs(truth)) < 0.01
 
 
 def test_what_is_not_identified_is_named():

@@ -1,5 +1,6 @@
 """The linear part of one axis: no pole more than the mirror has; delay, hold, creep and hysteresis are none of it."""
 
+import itertools
 import math
 from dataclasses import fields, replace
 from types import SimpleNamespace
@@ -12,7 +13,7 @@ from scipy.signal import chirp, lsim
 from microrad.lab.identify.hysteresis.joint import JointFit, fit_joint
 from microrad.lab.identify.hysteresis.plant_fit import coloured_scatter, held
 from microrad.lab.identify.hysteresis.structures import LinearPoles, Roots
-from microrad.lab.identify.linear import axis
+from microrad.lab.identify.linear import axis, pole_zero
 from microrad.lab.identify.linear.axis import fit_axis
 from microrad.lab.identify.linear.modal import late
 from microrad.lab.identify.linear.pole_zero import PoleZero, PoleZeroProblem, Root
@@ -116,6 +117,7 @@ def test_the_scan_ends_where_three_orders_in_a_row_gain_nothing():
     assert {total for _, total, _ in told} == {8 + 2}  # as many orders as are tried at most, and two steps behind them
 
 
+@pytest.mark.promise("identify-16")
 def test_what_a_record_cannot_show_is_no_pole():
     """A pair that rings for a third of the record, and a real pole slower than the fastest lag of creep."""
     drive = swept()
@@ -146,6 +148,24 @@ def test_what_the_estimate_of_a_narrow_resonance_adds_of_itself_is_taken_off():
     assert better.at.poles[0].damping == pytest.approx(0.01, rel=0.05)
 
 
+@pytest.mark.promise("identify-16")
+def test_what_is_not_needed_is_taken_away_one_by_one_as_long_as_the_criterion_falls(monkeypatch):
+    drive = swept()
+    response = replace(response_from_records([measured(drive, answer(drive, pair(420.0, 0.2)))]), hold="first-order")
+    spare = PoleZero((Root(420.0, 0.2), Root(60.0, None), Root(900.0, 0.5)), (Root(66.0, None), Root(950.0, 0.5)), 0.0)
+    seen, others = [], pole_zero._others
+    monkeypatch.setattr(pole_zero, "_others", lambda fit: seen.append(fit) or others(fit))
+    first = PoleZeroProblem(response, (), 0.6).fitted(spare)
+    left = pole_zero.pruned(first)
+    sizes = [fit.parameters for fit in seen]
+    assert seen[0] is first and seen[-1] is left and len(seen) > 2
+    assert all(after < before for before, after in itertools.pairwise(sizes))
+    assert all(after.criterion < before.criterion for before, after in itertools.pairwise(seen))
+    assert [round(each.frequency_hz) for each in left.at.poles] == [420] and left.at.zeros == ()
+    assert all(left.problem.fitted(other).criterion > left.criterion for other in others(left))
+
+
+@pytest.mark.promise("identify-16")
 def test_a_pole_and_a_zero_that_the_response_needs_stay():
     poles = [-2 * np.pi * 60.0 + 0j, *pair(1200.0, 0.3)]
     drive = swept()

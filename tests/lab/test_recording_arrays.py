@@ -1,5 +1,7 @@
 """Arrays with axes for channels, realisations and periods: what is read of them, and each refusal with its message."""
 
+import re
+
 import h5py
 import numpy as np
 import pytest
@@ -8,7 +10,7 @@ from scipy.io import savemat
 from microrad.lab.identify import IdentificationError
 from microrad.lab.identify.linear.response import response_from_periods
 from microrad.lab.recording import AXES, RecordingError, multisine_recordings, read_arrays
-from places import DATA
+from places import DATA, ROOT
 
 RATE_HZ = 1000.0
 SHAPE = (400, 2, 3, 2)  # samples, channels, realisations, periods
@@ -94,6 +96,22 @@ def test_outputs_in_a_file_of_their_own(tmp_path):
         ("drive[0]", "drive[1]"),
         ("output[0]", "output[1]", "output[2]"),
     )
+
+
+@pytest.mark.promise("recordings-33")
+def test_the_example_of_the_page_reads_each_realisation(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    np.save("u_100mV.npy", U)
+    np.save("y_100mV.npy", Y)
+    page = (ROOT / "docs" / "recordings.md").read_text(encoding="utf-8")
+    (code,) = (each for each in re.findall(r"```python\n(.*?)```", page, re.DOTALL) if "u_100mV.npy" in each)
+    known = {}
+    exec(code, known)
+    assert len(known["realisations"]) == len(WHOLE) == SHAPE[2]
+    for one, other in zip(known["realisations"], WHOLE, strict=True):
+        np.testing.assert_array_equal(one.drive, other.drive)
+        np.testing.assert_array_equal(one.output, other.output)
+        assert (one.rate_hz, one.period_samples) == (6400.0, SHAPE[0])
 
 
 def test_an_output_in_a_file_of_its_own_that_follows_no_drive(tmp_path):

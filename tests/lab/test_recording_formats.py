@@ -3,6 +3,7 @@
 import io
 import itertools
 import pickle
+import re
 import struct
 import sys
 import zipfile
@@ -21,6 +22,7 @@ from microrad.lab.recording import RecordingError, files, multisine_recordings, 
 from microrad.lab.recording.formats.lvm import LvmSource, _Blanks
 from microrad.lab.recording.reader import open_source
 from microrad.lab.recording.records import digest_of
+from places import ROOT
 
 N, RATE_HZ = 1000, 2000.0
 TIME_S = np.arange(N) / RATE_HZ
@@ -61,6 +63,22 @@ def test_tdms(tmp_path):
     check(read, ("bench/drive", "bench/output"))
     assert read.input_units == ("V",)
     check(read_recording(path, 0, 1, RATE_HZ), ("bench/drive", "bench/output"))
+
+
+@pytest.mark.promise("recordings-32")
+def test_the_example_of_the_page_reads_a_file_of_a_bench(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    every = {"wf_increment": 1 / RATE_HZ}
+    with TdmsWriter("loop.tdms") as file:
+        file.write_segment([ChannelObject("bench", *each, every) for each in (("drive", DRIVE), ("angle", OUTPUT))])
+    page = (ROOT / "docs" / "recordings.md").read_text(encoding="utf-8")
+    (code,) = (each for each in re.findall(r"```python\n(.*?)```", page, re.DOTALL) if "loop.tdms" in each)
+    known = {}
+    exec(code, known)
+    check(known["loop"], ("bench/drive", "bench/angle"))
+    rate, *findings = capsys.readouterr().out.splitlines()
+    assert float(rate) == pytest.approx(RATE_HZ)
+    assert findings and findings == [finding.message for finding in known["loop"].findings]
 
 
 @pytest.mark.parametrize("more", [{"NI_Number_Of_Scales": 2**31 - 1}, {"NI_Scale[999999999]_Scale_Type": "Linear"}])

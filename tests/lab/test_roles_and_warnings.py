@@ -163,8 +163,8 @@ def test_noise_passes_and_colour_does_not():
 @pytest.mark.promise("identify-28")
 def test_a_smooth_drive_gives_false_alarms_now_and_then():
     """Neighbouring lags of a sine say the same: A^2 of its two phases is chi-square, and 15 % exceed 1.96^2."""
-    alarms = [not residual_test(philox(s).standard_normal(1000), SINE[:1000]).independent for s in range(100)]
-    assert 0.02 < np.mean(alarms) < 0.2
+    alarms = [not residual_test(philox(s).standard_normal(1000), SINE[:1000]).independent for s in range(1000)]
+    assert 1 / 15 < np.mean(alarms) < 1 / 10  # about once in twelve
 
 
 def test_a_residual_of_zeros_is_no_reason_to_stop():
@@ -178,6 +178,10 @@ def test_shares_outside_are_counted():
     test = ResidualTest(100, 0.2, np.array([0.3, 0.1, -0.3, 0.0]), np.array([0.1, -0.25]))
     assert test.outside == (0.5, 0.5)
     assert not (test.white or test.independent)
+    for outside, passes in ((5, True), (6, False)):  # of fifty, a tenth
+        found = np.where(np.arange(50) < outside, 0.3, 0.1)
+        assert ResidualTest(100, 0.2, found, np.zeros(51)).white == passes
+        assert ResidualTest(100, 0.2, np.zeros(50), found).independent == passes
 
 
 # ------------------------------------------------------------------------------------------------------------ warnings

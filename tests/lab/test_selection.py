@@ -12,6 +12,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 import truths
 from microrad.core import kernels
 from microrad.lab import bench
+from microrad.lab import identify as identification
 from microrad.lab.bench.play import play_records, true_output
 from microrad.lab.identify import (
     FORMS,
@@ -38,6 +39,7 @@ from microrad.report.identification.parameters import parameter_rows
 from places import ROOT
 from truths import behind_resonance, bouc_wen, philox, plays, recorded, small_multisine
 
+PAGE = (ROOT / "docs" / "identify.md").read_text(encoding="utf-8")
 RATE = 4000.0
 THRESHOLDS, WEIGHTS = (0.0, 0.6, 1.9), (6e-5, 1.5e-5, 1e-5)
 FEW = ("prandtl_ishlinskii", "linear", "prandtl_ishlinskii_joint")
@@ -640,6 +642,27 @@ def test_an_exponent_comes_through_the_file(found, tmp_path):
     assert "held, not fitted" in text  # d2 and delta are 0 in the classical model
 
 
+@pytest.mark.promise("identify-62", "identify-63")
+def test_what_records_do_not_show_is_in_no_error_and_in_no_residual():
+    """A mirror that stops beyond the recorded drives, none of the models, gives the records of one of plays."""
+    found, left = [], []
+    for stop_v in (np.inf, 10.0):
+
+        def of_mirror(drive, stop_v=stop_v):
+            return plays(np.minimum(drive, stop_v), THRESHOLDS, WEIGHTS)
+
+        drives = [truths.two_sines(3000, freq_hz=freq_hz) for freq_hz in (2.0, 3.0)]
+        known, unseen = (recorded(each, of_mirror(each), name=f"{k}", seed=k) for k, each in enumerate(drives))
+        found.append(identify([known], models=("prandtl_ishlinskii",), validation=[unseen]))
+        other = 5.0 + 2.0 * (drives[0] - 5.0)
+        modelled, measured = found[-1].fit().response(other, 1e-3)[0], of_mirror(other)
+        left.append(100 * np.std(modelled - measured) / np.ptp(measured))
+    right, wrong = found
+    assert_array_equal(wrong.fit().standard_errors_rad_per_v, right.fit().standard_errors_rad_per_v)
+    assert wrong.score().held_out_rms_percent == right.score().held_out_rms_percent < 0.2
+    assert left[0] < 0.1 and left[1] > 5.0
+
+
 # ---------------------------------------------------------------------------------------------------- the virtual bench
 @pytest.fixture(scope="module")
 def paper():
@@ -690,6 +713,25 @@ def test_the_benchs_own_mirror_is_predicted_with_half_the_error_of_the_papers_mo
     assert isinstance(result.fit().model, PrandtlIshlinskii)
 
 
+@pytest.mark.promise("identify-64")
+@pytest.mark.usefixtures("unpolished")
+def test_the_example_of_the_page_writes_the_mirror_of_a_mission(monkeypatch, capsys, tmp_path):
+    """With two models and three records of its plan: all of them take minutes."""
+    names = ["small-multisine-1", "loops-40hz", "held-out-sine"]
+    load = bench.load_plan
+    monkeypatch.setattr(bench, "load_plan", lambda name: bench.select_records(load(name), names))
+    monkeypatch.setattr(identification, "MODELS", ("linear", "prandtl_ishlinskii"))
+    code = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)[0]
+    known = {}
+    exec(code, known)
+    found = known["found"]
+    assert [score.model for score in found.scores] == list(identification.MODELS)
+    assert [each.path for each in known["unseen"]] == names[2:]
+    assert capsys.readouterr().out == "\n".join([found.chosen, found.reason, *found.warnings, ""])
+    (tmp_path / "mirror.toml").write_text(known["text"], encoding="utf-8")
+    assert load_mirror(tmp_path / "mirror.toml").mirror.name == "our mirror"
+
+
 @pytest.mark.promise("identify-30")
 @pytest.mark.endurance
 def test_the_table_of_the_page_is_what_the_benchs_plan_gives():
@@ -698,7 +740,7 @@ def test_the_table_of_the_page_is_what_the_benchs_plan_gives():
     pairs = list(play_records(plan, seed=1))
     known, unseen = ([r for record, r in pairs if record.use == use] for use in ("identification", "validation"))
     result = identify(known, models=MODELS, validation=unseen)
-    page = (ROOT / "docs" / "identify.md").read_text(encoding="utf-8").partition("| model | fitted | held out |")[2]
+    page = PAGE.partition("| model | fitted | held out |")[2]
     rows = re.findall(r"^\| `(\w+)`(.*) \| ([\d.]+) \| ([\d.]+) \|$", page.partition("\n\n")[0], re.MULTILINE)
     assert [name for name, chosen, _, _ in rows if "chosen" in chosen] == [result.chosen]
     assert len(rows) == 11

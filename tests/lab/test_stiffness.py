@@ -354,7 +354,7 @@ def test_a_large_motion_in_one_mode_softens_the_other():
 
 @pytest.mark.promise("mirror-file-28")
 @pytest.mark.promise("identify-41")
-@pytest.mark.promise("hysteretic-stiffness-28")
+@pytest.mark.promise("hysteretic-stiffness-28", "hysteretic-stiffness-31")
 def test_the_resonance_falls_with_the_amplitude_as_the_truth_does(known):
     """Peak of the response to a small and to a large multisine: the same for the fit and the truth."""
     truth = hysteretic_truth()
@@ -388,6 +388,7 @@ def many(training):
 
 
 @pytest.mark.promise("mirror-file-39", "hysteretic-stiffness-6", "hysteretic-stiffness-7")
+@pytest.mark.promise("hysteresis-23", "hysteretic-stiffness-31")
 def test_no_fit_runs_away_where_its_plays_slide(many, training):
     """No combination of sliding plays grows; a thousand periods, and then ten times the drive, stay where they are."""
     m, sums = many.mirror, [sum(play.weights_rad_v) for play in many.mirror.plays]
@@ -544,6 +545,7 @@ def test_the_counts_of_the_page_are_those_of_such_mirrors(pairs, numbers):
 
 
 @pytest.mark.promise("hysteretic-stiffness-6", "hysteretic-stiffness-7")
+@pytest.mark.promise("hysteresis-23", "hysteretic-stiffness-31")
 @pytest.mark.parametrize("softening", [0.05, 0.5, 0.89])
 def test_springs_never_gain_energy(springs, softening):
     """The energy of the docstring falls along every free path, and its stiffness is above zero."""

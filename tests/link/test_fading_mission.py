@@ -4,19 +4,23 @@ import json
 import math
 import re
 import tomllib
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from link_files import data_with, link_file, received_with, written
-from microrad import link
+from microrad import link, report
 from microrad.link.fade_series import CodedLink, FadeSeriesError, code, coded_fading, read_fade_series
 from microrad.link.requirement import UNDER_FADES, of_links
 from microrad.link.study import run_link_study
 from microrad.mission.file import MissionError, named_files, with_contents
 from microrad.report.links.figures import link_figures
 from microrad.report.links.views import cost_text, links_views
+from microrad.report.plotting.figure import Figure
 from microrad.report.plotting.sheet import Line, Rule
+from microrad.report.view import View
+from microrad.studio.views import link as link_view
 from places import ROOT
 
 PERIOD_S, TARGET = 1e-4, 1e-6
@@ -78,7 +82,7 @@ def test_the_study_has_what_the_series_makes_of_its_static_margin(tmp_path):
     assert run_link_study(jittered).fading.margin_left_db == found.margin_left_db
 
 
-@pytest.mark.promise("link-86")
+@pytest.mark.promise("link-86", "link-100")
 def test_terminal_csv_json_and_page_have_the_same_numbers(tmp_path, call):
     fades(tmp_path)
     path = written(tmp_path, data_with(fading()))
@@ -120,6 +124,32 @@ def test_the_figure_has_the_curve_the_missions_own_span_and_what_the_margin_spar
     unspread = run_link_study(link_file(tmp_path, fading(interleaving="none", interleaver=None)))
     assert len(link_figures(unspread)[-1].sheet.panels[0].all_of(Line)) == 1
     assert "interleaver" not in [each.name for each in link_figures(run_link_study(link_file(tmp_path)))]
+
+
+@pytest.mark.promise("link-100")
+@pytest.mark.parametrize("faded", [True, False])
+def test_report_and_studio_draw_the_same_curve(tmp_path, monkeypatch, faded):
+    fades(tmp_path)
+    study = run_link_study(link_file(tmp_path, fading() if faded else {}))
+    for module, name in (
+        ("paper.bench", "bench_figures"),
+        ("paper.figures", "paper_figures"),
+        ("fine_pointing.figures", "fine_pointing_figures"),
+        ("fine_pointing.tails", "tail_figures"),
+    ):
+        monkeypatch.setattr(f"microrad.report.{module}.{name}", lambda *args: ())
+    of_report = report.study_figures(SimpleNamespace(links=study, error_budget=None, day=None)).links
+
+    def drawn(blocks):
+        for each in blocks:
+            yield from drawn(each.blocks) if isinstance(each, View) else [each]
+
+    for views in (links_views(study, of_report), link_view.blocks(study)):
+        shown = [each for each in drawn(views) if isinstance(each, Figure) and each.name == "interleaver"]
+        assert len(shown) == faded
+        for figure in shown:
+            assert [*figure.columns["span (s)"]] == [*study.fading.curve.span_s]
+            assert figure.svg == link_figures(study)[-1].svg
 
 
 def test_fades_that_no_power_makes_up_for_are_said(tmp_path, call):

@@ -3,19 +3,25 @@
 import re
 import runpy
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
 from learning_loops import CREEP, PLAYS, in_series, loop_of, resonance, softened
+from microrad.campaign.definition import checks
 from microrad.core import kernels, lti
 from microrad.loop import control, controller_study
 from microrad.loop.control import adaptive
+from microrad.loop.controller_study import designs
 from microrad.loop.pointing_loop import ensemble, kernel_arrays
 from microrad.loop.pointing_loop import loop as fine
 from microrad.mirror.hysteresis import NO_CREEP, BoucWen, Creep, PrandtlIshlinskii
+from microrad.mission.file import load_mission
+from microrad.mission.tables.mirror import PrandtlIshlinskiiTable
 from places import ROOT
+from shipped import SHIPPED
 
 
 @pytest.mark.promise("hysteresis-18", "pointing-25")
@@ -203,11 +209,7 @@ def test_a_model_that_is_to_be_reduced_keeps_its_slow_gain_and_the_bound_that_is
 @pytest.mark.promise("choose-7")
 @pytest.mark.promise("pointing-24")
 def test_it_is_offered_where_a_mirror_has_plays_and_a_mission_a_gauge():
-    import shipped
-    from microrad.mission.file import load_mission
-    from microrad.mission.tables.mirror import PrandtlIshlinskiiTable
-
-    mission = load_mission(shipped.SHIPPED).mission
+    mission = load_mission(SHIPPED).mission
     table, of = mission.fine_pointing, mission.mirror
     assert controller_study.offered(table, of) == controller_study.names(table)  # Bouc-Wen
 
@@ -222,3 +224,29 @@ def test_it_is_offered_where_a_mirror_has_plays_and_a_mission_a_gauge():
     assert controller_study.offered(blind, plays) == controller_study.names(blind)
     for other in (with_plays(widening_s=1e-3), with_plays((4e-5, -1e-6)), with_plays((0.0, 1e-6))):
         assert controller_study.offered(table, other) == controller_study.names(table)
+
+
+@pytest.mark.promise("pointing-24")
+def test_a_study_and_a_campaign_leave_it_out_where_it_is_offered(monkeypatch):
+    mission = load_mission(SHIPPED).mission
+    given = {"thresholds_v": (0.0, 1.0), "weights_rad_v": (4e-5, 1e-6), "widening_s": 0.0}
+    plays = PrandtlIshlinskiiTable.model_construct(**given)
+    table, of = mission.fine_pointing, mission.mirror.model_copy(update={"prandtl_ishlinskii": plays, "bouc_wen": None})
+    adaptive_name = controller_study.offered(table, of)[-1]
+    assert adaptive_name == "PI + adaptive inverse in series"
+
+    faults = []
+    reader = SimpleNamespace(fault=lambda *fault: faults.append(fault))
+    assert checks._has_controller(reader, "PI + inverse in series", table) and not faults
+    assert not checks._has_controller(reader, adaptive_name, table)
+    ((key, value, reason, *_),) = faults
+    assert (key, value, reason) == ("loop.controller", adaptive_name, "is no controller of the fine-pointing study")
+
+    def tell(wanted, f):
+        raise LookupError(*wanted)
+
+    monkeypatch.setattr(designs, "plants", lambda scene, seed: ())
+    monkeypatch.setattr(designs, "_groups", tell)
+    with pytest.raises(LookupError) as study:
+        controller_study.design_and_simulate(SimpleNamespace(table=table))
+    assert study.value.args == controller_study.names(table) and adaptive_name not in study.value.args

@@ -1,5 +1,7 @@
 """The worst case over an identified mirror: against one mirror at a time, scans by hand, and the loop in time."""
 
+import re
+import sys
 from dataclasses import replace
 from itertools import product
 
@@ -21,6 +23,7 @@ from microrad.mirror.hysteresis import rest_gain
 from microrad.mirror.model import linearised
 from microrad.mission.file import load_loop
 from microrad.report.fine_pointing.worst_case import worst_case_data, worst_case_text
+from places import benchmark
 from scenes import scene_of
 from shipped import DEFAULT
 
@@ -168,6 +171,19 @@ def test_a_sensor_slower_than_the_control_counts_as_in_a_design(file):
         expected, margin = by_itself(subject, axis, mirror)
         assert_allclose(rms, expected, rtol=1e-9)
         assert modulus == pytest.approx(margin, rel=1e-9, abs=0.0)
+
+
+@pytest.mark.promise("pointing-75")
+def test_the_benchmark_prints_how_long_two_thousand_mirrors_take(monkeypatch, capsys):
+    bench, told = benchmark("worst_case"), []
+    monkeypatch.setattr(bench, "tell", lambda what, do: told.append(what))  # each a command in a process of its own
+    monkeypatch.setattr(bench, "ONE_BY_ONE", 1)
+    monkeypatch.setattr(sys, "argv", ["benchmarks/worst_case.py"])
+    bench.main()
+    assert told[0] == "worst case, one axis, the whole command"
+    assert re.fullmatch(
+        r"figures of 2024 mirrors: \d+\.\d\d s at once, \d+\.\d s one by one\n", capsys.readouterr().out
+    )
 
 
 @pytest.mark.promise("pointing-75")

@@ -66,11 +66,18 @@ LISTED = {
     "contacts.py": "constellation sees four slots|1000 x 4",
     "link_conventions.py": "Where link budgets differ",
 }
-"""What `make benchmark` prints by README.md, and what of each benchmark says so."""
+"""What `make benchmark` prints by README.md: words of each benchmark on what it compares with or measures."""
+KEPT = {
+    "loop": "over C twin, a plant step",
+    "ensemble": "64 runs side by side: kernel over scalar C twin",
+    "frequency_response_fit": "time over scikit-rf",
+    "contacts": "1000 satellites with 4 slots",
+}
+"""Of those that keep figures, what the last release has of them."""
 
 
 @pytest.mark.promise("benchmarks-1", "readme-20")
-@pytest.mark.promise("identify-55")
+@pytest.mark.promise("decisions-5", "identify-55")
 def test_make_benchmark_runs_each_benchmark_and_what_the_readme_lists():
     text = (ROOT / "Makefile").read_text(encoding="utf-8")
     ran = set(re.findall(r"benchmarks/([\w.]+)", text.partition("\nbenchmark:")[2].partition("\n\n")[0]))
@@ -78,7 +85,21 @@ def test_make_benchmark_runs_each_benchmark_and_what_the_readme_lists():
     for name, words in LISTED.items():
         source = (ROOT / "benchmarks" / name).read_text(encoding="utf-8")
         assert [word for word in words.split("|") if word not in source] == [], name
+    rows = benchmarks.releases()[-1]["rows"]
+    for name, words in KEPT.items():
+        assert any(words in each["what"] and each["value"] > 0.0 for each in rows if each["benchmark"] == name), name
     assert {f"{each['benchmark']}.py" for release in benchmarks.releases() for each in release["rows"]} <= ran
+
+
+@pytest.mark.promise("decisions-5", "readme-20")
+def test_the_benchmark_of_conventions_prints_where_published_budgets_differ_term_by_term(capsys):
+    benchmark("link_conventions").compare()
+    said = capsys.readouterr().out
+    assert "Loss: exp(-G error^2)" in said and "MathWorks" in said and "Liang" in said
+    rows = re.findall(r"(?m)^(\w.*?) {2,}(-?[\d.]+) +(-?[\d.]+) +(-?[\d.]+)\b", said)
+    assert len(rows) > 20
+    for term, own, peer, difference in rows:
+        assert float(difference) == pytest.approx(float(own) - float(peer), abs=2e-4), term
 
 
 @pytest.mark.promise("benchmarks-1")

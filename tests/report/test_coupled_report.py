@@ -299,7 +299,7 @@ def test_range_delay_and_amplitude_dependence_are_said(page, data):
     assert ["200 mV", "2.104", "78.2", "0.1", "0.04"] in rows_of(page)
 
 
-@pytest.mark.promise("identify-45", "identify-47")
+@pytest.mark.promise("identify-45", "identify-47", "identify-50")
 def test_what_the_mirror_file_does_not_hold_is_said(found, page, data):
     said = words.not_held(found)
     assert data["not_in_the_mirror_file"] == said and all(sentence in plain(page) for sentence in said)

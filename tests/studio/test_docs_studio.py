@@ -6,7 +6,11 @@ import re
 import secrets
 import signal
 import sys
+from email.message import Message
+from http.cookiejar import CookieJar
 from pathlib import Path
+from types import SimpleNamespace
+from urllib.request import Request
 
 import pytest
 
@@ -31,7 +35,7 @@ from microrad.studio.views import mirror_form
 from microrad.studio.views.mirror_form import Form
 from places import ROOT
 from shipped import SHIPPED
-from studio.test_studio_guard import COOKIE, TOKEN, Inner, ask, guard
+from studio.test_studio_guard import COOKIE, PORT, TOKEN, Inner, ask, guard
 from studio_jobs import written
 
 PAGE = (ROOT / "docs" / "studio.md").read_text(encoding="utf-8")
@@ -207,6 +211,24 @@ def test_connections_are_neither_counted_nor_ended_for_their_silence():
     config = uvicorn.Config(None, **address.server_settings())
     assert config.limit_concurrency is None
     assert not any("header" in name and "timeout" in name for name in vars(config))  # a head may take for ever
+
+
+@pytest.mark.promise("studio-35")
+def test_browsers_show_the_token_to_every_port_of_the_address_and_to_no_other_name():
+    """The jar of the standard library keeps cookies as browsers do: by name and path, ports left out."""
+    reply = ask(guard(Inner()), query=f"token={TOKEN}", cookie=None)
+    answer, jar = Message(), CookieJar()
+    answer["Set-Cookie"] = reply.headers[b"set-cookie"].decode()
+    jar.extract_cookies(SimpleNamespace(info=lambda: answer), Request(f"http://127.0.0.1:{PORT}/"))
+
+    def shown(url):
+        jar.add_cookie_header(asked := Request(url))
+        return asked.get_header("Cookie")
+
+    assert shown(f"http://127.0.0.1:{PORT}/") == COOKIE
+    assert shown("http://127.0.0.1:9999/of/somebody/else") == COOKIE
+    assert shown(f"http://localhost:{PORT}/") is None
+    assert b"clear-site-data" not in reply.headers  # a service worker of another server there stays
 
 
 @pytest.mark.promise("studio-28")

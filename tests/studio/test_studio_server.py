@@ -10,8 +10,9 @@ import sys
 import threading
 import urllib.error
 import urllib.request
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -20,6 +21,7 @@ from microrad.mission.file import load_mission
 from microrad.mission.toml import MissionError
 from microrad.studio import server
 from microrad.studio.draft.draft import Draft, DraftError
+from microrad.studio.guard import signing
 from microrad.studio.guard.address import ExposureError
 from microrad.studio.guard.names import NameRefusedError
 from microrad.studio.jobs.queue import Order
@@ -380,10 +382,10 @@ main()
 
 
 @contextmanager
-def running(folder, *args, browser=None):
+def running(folder, *args, browser=None, code=HEARD):
     pytest.importorskip("nicegui")
     process = subprocess.Popen(
-        [sys.executable, "-c", HEARD, "studio", *(["--no-browser"] if browser is None else []), *args],
+        [sys.executable, "-c", code, "studio", *(["--no-browser"] if browser is None else []), *args],
         cwd=folder,
         env=os.environ | ({} if browser is None else {"BROWSER": str(browser)}),
         stdout=subprocess.PIPE,
@@ -420,6 +422,96 @@ def test_the_address_opens_the_studio_and_a_signal_ends_it(file, number):
     assert (process.returncode, out, err) == (0, "the studio is closed\n", "")
     kept = {name: data for name, data in listing(file.parent).items() if not name.startswith(STUDIO)}
     assert kept == before
+
+
+# A studio that starts a job, keeps a change, and notes what it opens to be written and whom it asks.
+WATCHED = """
+import os, sys
+from pathlib import Path
+from microrad.cli import main
+from microrad.studio.jobs.queue import Order
+from microrad.studio.session import Session
+
+notes = open(os.environ["NOTES"], "a", 1)
+ASKING = "socket.connect", "socket.getaddrinfo", "socket.gethostbyname", "socket.sendto", "socket.sendmsg"
+
+def hear(event, told):
+    if event in ASKING:
+        asked = told[0] if event.startswith("socket.get") else told[1]
+        notes.write(f"asks {asked!r}\\n")
+    elif event == "open" and isinstance(told[0], str) and told[2] & (os.O_WRONLY | os.O_RDWR | os.O_CREAT):
+        notes.write(f"writes {os.path.abspath(told[0])}\\n")
+
+sys.addaudithook(hear)
+session = Session(Path.cwd())
+session.set("terminals.leo_aperture", "6 cm")
+session.jobs.submit(Order("study", "t", ("presets",), Path.cwd()))
+main()
+"""
+
+
+def in_memory(pid, word):
+    """How often a word stands in what a process may write."""
+    found = 0
+    of = Path("/proc") / str(pid)
+    with (of / "mem").open("rb") as memory:
+        for line in (of / "maps").read_text().splitlines():
+            place, mode, *_ = line.split()
+            start, end = (int(each, 16) for each in place.split("-"))
+            with suppress(OSError, ValueError):  # it was given back meanwhile
+                if mode.startswith("rw"):
+                    memory.seek(start)
+                    found += memory.read(end - start).count(word)
+    return found
+
+
+@pytest.fixture(scope="module")
+def watched(tmp_path_factory):
+    """What a studio did, by its own notes and by what lies in its user's folders behind it."""
+    places = {name: tmp_path_factory.mktemp(name) for name in ("home", "temporary", "work", "notes")}
+    work, notes = places["work"], places["notes"] / "notes"
+    (work / "leo-geo.toml").write_bytes(SHIPPED.read_bytes())
+    with pytest.MonkeyPatch.context() as patch:
+        for name in [each for each in os.environ if each.startswith("XDG_")]:
+            patch.delenv(name)
+        patch.setenv("HOME", str(places["home"]))
+        patch.setenv("TMPDIR", str(places["temporary"]))
+        patch.setenv("NOTES", str(notes))
+        key = signing.key_file()
+        with running(work, code=WATCHED) as (process, url):
+            status, _ = asked(url, "")
+            ended = work / STUDIO / "jobs" / "1" / "exit.json"
+            until(ended.exists, "the end of the job")
+            draft = (work / STUDIO / "draft.json").read_text("utf-8")
+            tokens = in_memory(process.pid, url.rpartition("=")[2].encode()) if sys.platform == "linux" else None
+            process.send_signal(signal.SIGINT)
+            process.communicate(timeout=HANG_S)
+    assert (status, process.returncode, json.loads(ended.read_text("utf-8"))["code"]) == (200, 0, 0)
+    heard = [line.split(" ", 1) for line in notes.read_text("utf-8").splitlines()]
+    return SimpleNamespace(**places, key=key, draft=draft, tokens=tokens, heard=heard)
+
+
+@pytest.mark.promise("studio-6")
+def test_nothing_is_left_outside_of_the_folder_but_the_key_and_what_libraries_keep(watched):
+    left = {path for place in (watched.home, watched.temporary) for path in place.rglob("*") if path.is_file()}
+    assert {path for path in left if watched.home / ".cache" not in path.parents} == {watched.key}
+    opened = {Path(told) for what, told in watched.heard if what == "writes"}
+    assert any(watched.work / STUDIO in path.parents for path in opened)
+    own = watched.work, watched.home, watched.temporary, Path("/dev")
+    others = {path for path in opened if not any(place in path.parents for place in own)}
+    assert {path for path in others if "__pycache__" not in path.parts} == set()
+
+
+@pytest.mark.promise("studio-30")
+def test_a_studio_asks_nobody_but_for_its_own_address(watched):
+    assert {told for what, told in watched.heard if what == "asks"} == {"'127.0.0.1'"}
+
+
+@pytest.mark.promise("studio-34")
+@pytest.mark.skipif(sys.platform != "linux", reason="a process is a file on Linux alone")
+def test_another_program_of_the_user_reads_the_token_and_the_drafts(watched):
+    assert watched.tokens > 0
+    assert '"6 cm"' in json.loads(watched.draft)["text"]
 
 
 @pytest.mark.promise("studio-4")

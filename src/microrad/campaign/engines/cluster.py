@@ -5,6 +5,7 @@ scheduler's log of events when it begins a job (and waits until the scheduler kn
 side hears it and stops the worker of a job that is late.
 """
 
+import asyncio
 import logging
 import os
 import signal
@@ -12,7 +13,7 @@ import threading
 import time
 import uuid
 from collections.abc import Callable, Iterator
-from concurrent.futures import CancelledError
+from concurrent.futures import CancelledError, ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, field
 from hashlib import sha256
@@ -187,6 +188,17 @@ def _quiet() -> Callable[[], None]:
     return undo
 
 
+async def _asked(distributed: Any, address: str) -> None:
+    """Ask a scheduler who it is: a client waits for ever for one that takes its call and says nothing."""
+    scheduler = distributed.rpc(address)
+    try:
+        await asyncio.wait_for(scheduler.identity(), _CONNECT_S)
+    except TimeoutError:
+        raise TimeoutError(f"it did not answer for {_CONNECT_S:g} s") from None
+    finally:
+        await scheduler.close_rpc()
+
+
 class DaskEngine:
     """Runs jobs on the workers of the scheduler at ``address``.
 
@@ -229,6 +241,8 @@ class DaskEngine:
 
     def _connect(self, distributed: Any) -> Any:
         try:
+            with ThreadPoolExecutor(1) as thread:  # this one may have a loop already, as in a notebook
+                thread.submit(asyncio.run, _asked(distributed, self.address)).result()
             client = distributed.Client(self.address, timeout=_CONNECT_S, set_as_default=False)
             client.subscribe_topic(self._topic, self._hear)
             return client
