@@ -22,6 +22,7 @@ from microrad.lab.identify.stiffness.fit import (
     _expected_squares,
     _few,
     _further,
+    _in_si,
     _middle,
     _pole_errors,
     amplitude_classes,
@@ -77,6 +78,13 @@ def numbers():
         reach=np.array([1.0, 2.0, 3.0, 1.5]),
         delay_s=3e-4,
     )
+
+
+def test_changes_of_the_decays_of_pairs_and_real_poles_are_turned_for_a_mirror_file(numbers):
+    size = numbers.vector().size
+    turned = np.ones(size)
+    turned[:3] = -1.0
+    np.testing.assert_allclose(_in_si(numbers, np.eye(size), (1.0, 1.0)), np.diag(turned))
 
 
 STEADY = tangents.Steady("record", multisine(3), np.zeros((PERIOD, 2)), RATE_HZ, 2)
