@@ -1,5 +1,6 @@
 """The local engine: whatever a job does to its process, the others come out, and nothing is left behind."""
 
+import io
 import json
 import os
 import random
@@ -20,7 +21,7 @@ from microrad.campaign.engines import local
 from microrad.campaign.engines.cluster import Flight, late_flights
 from microrad.campaign.engines.jobs import Clock
 from microrad.campaign.engines.local import LocalEngine
-from microrad.campaign.engines.worker import Beat, Kind
+from microrad.campaign.engines.worker import Beat, Kind, Message, read_message, write_message
 from microrad.campaign.records import CampaignError, Job
 from small_campaign import hears_ctrl_c, import_path, killing
 from waiting import HANG_S, alive, beside, gone, no_hang, until
@@ -495,3 +496,11 @@ def test_a_job_that_is_done_begins_the_count_of_deaths_anew(engine, monkeypatch)
     killed = {str(number): "killed" for number in range(0, 24, 3)}  # each takes its process down, twice at most
     outcomes = run(engine(json.dumps(killed), threads=1), chunks(24))
     assert set(kinds(outcomes)) == set(map(int, killed))
+
+
+def test_a_message_that_ends_early_is_none():
+    whole = io.BytesIO()
+    write_message(whole, Message(Kind.BEAT, b"twelve bytes"))
+    for size in range(len(whole.getvalue())):
+        assert read_message(io.BytesIO(whole.getvalue()[:size])) is None
+    assert read_message(io.BytesIO(whole.getvalue())) == Message(Kind.BEAT, b"twelve bytes")

@@ -233,3 +233,10 @@ def test_results_of_another_kind_are_not_replaced(tmp_path):
     folder.check_folder(tmp_path, overwrite=True, kind="bench")
     with pytest.raises(folder.FolderError, match="holds files that are not results of microrad"):
         folder.check_folder(tmp_path, overwrite=True, kind="mission")
+
+
+def test_scratch_goes_with_the_error_that_ends_its_use():
+    with pytest.raises(RuntimeError, match="broken"), scratch("test") as place:
+        (place / "part").write_text("x")
+        raise RuntimeError("broken")
+    assert not place.exists()

@@ -8,6 +8,7 @@ import shutil
 import subprocess
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -481,3 +482,11 @@ def test_impulse_responses_by_doubling_are_the_powers():
     found = rounding.responses(row, A, 37)
     assert found.shape == (37, 2)
     assert found == pytest.approx(np.array([row @ np.linalg.matrix_power(A, j) for j in range(37)]), rel=1e-12)
+
+
+def test_a_slow_lag_of_compensated_sums_errs_by_what_a_step_adds_and_not_by_what_it_holds():
+    unit, keep, steps = rounding.UNIT, 1.0 - 1e-7, 200
+    law = SimpleNamespace(lag_actuator=np.zeros(1), lag_keep=np.array([keep]))
+    run = SimpleNamespace(lag=np.full((steps, 1), 30.0), added=np.zeros((steps, 1)))
+    found = rounding._lag_errors(law, run, np.zeros((steps, 1)))[-1, 0]
+    assert 0.0 < found <= 1.01 * steps * (1e-7 * 8.0 * unit * 30.0 + 4.0 * unit**2 * 30.0) < 0.1 * unit * 30.0

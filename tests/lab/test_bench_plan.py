@@ -3,6 +3,7 @@
 import contextlib
 import hashlib
 import re
+import tomllib
 from pathlib import Path
 from typing import get_args
 
@@ -343,3 +344,13 @@ def test_a_plan_has_so_many_samples_in_all(refuse, monkeypatch):
     monkeypatch.setattr(plan, "_MOST_SAMPLES", 100_000)
     (fault,) = refuse(TEXT).faults
     assert fault.reason == "makes a plan of more than 0.1 million samples"
+
+
+def test_a_plan_may_have_as_many_excitations_as_it_may_and_no_more(monkeypatch):
+    there = len(tomllib.loads((PLANS / "mirror-characterisation.toml").read_text(encoding="utf-8"))["excitation"])
+    monkeypatch.setattr(plan, "_MOST_EXCITATIONS", there)
+    assert load_plan("mirror-characterisation").records
+    monkeypatch.setattr(plan, "_MOST_EXCITATIONS", there - 1)
+    with pytest.raises(PlanError, match=f"has {there} tables") as caught:
+        load_plan("mirror-characterisation")
+    assert f"at most {there - 1}" in str(caught.value)

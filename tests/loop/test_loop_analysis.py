@@ -586,3 +586,15 @@ def test_a_plant_without_delay_is_refused():
     quick = DesignPlant(PERIOD, replace(plant.system, D=D), 1, 1e-4)
     with pytest.raises(ValueError, match="answers the command of its own sample: give it its delay"):
         analysis.close(quick, integrator(1.0))
+
+
+def test_of_several_crossings_the_gain_margins_are_those_nearest_to_one():
+    """A loop that crosses the negative real axis at 10, 20, 30 and 40 Hz, with so many times less or more than 1."""
+    sizes = np.array([0.2, 0.5, 3.0, 1.6])
+
+    def response(freq_hz):
+        return -np.interp(freq_hz, [10.0, 20.0, 30.0, 40.0], sizes) + 1j * np.sin(math.pi * np.asarray(freq_hz) / 10.0)
+
+    freq = np.linspace(5.0, 45.0, 401) + 1e-3
+    up, down = analysis._gain_margins(response, freq, response(freq))
+    assert (up, down) == (pytest.approx(2.0, rel=1e-6), pytest.approx(1.0 / 1.6, rel=1e-6))
