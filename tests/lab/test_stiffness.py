@@ -15,6 +15,7 @@ from microrad.lab.identify import fit_hysteretic_stiffness, fit_linear, output_e
 from microrad.lab.identify.linear.modal import ModalModel
 from microrad.lab.identify.linear.response import response_from_periods
 from microrad.lab.identify.records import IdentificationError
+from microrad.lab.identify.stiffness import fit as fit_of
 from microrad.lab.identify.stiffness import springs as springs_of
 from microrad.lab.identify.stiffness import tangents
 from microrad.lab.identify.stiffness.fit import (
@@ -725,6 +726,16 @@ def test_a_single_record_of_each_amplitude_has_no_errors(training):
     assert fit.moved is None and np.isnan(fit.delay_error_s) and np.isnan(fit.poles_error_rad_s.imag).all()
     assert fit.iterations == 2 and fit.costs[-1] < fit.costs[0]
     assert not fit.converged
+
+
+def test_a_search_that_ends_at_the_largest_softening_has_not_converged(training, monkeypatch):
+    options = StiffnessOptions(delay_s=7e-4, exchanges=0, few_first=0)
+    began = LinearStart(fit_linear(training[3:6], 4, exchanges=0).modes, 7e-4)
+    monkeypatch.setattr(Search, "minimise", lambda self, free, *rest: free)
+    for share, converged in ((0.99, True), (-1.0, False)):
+        monkeypatch.setattr(fit_of, "_AT_LIMIT", share)
+        fit = fit_hysteretic_stiffness(training, options=options, iterations=1, start=began)
+        assert fit.converged is converged
 
 
 def test_a_delay_that_is_given_is_kept(training):

@@ -448,3 +448,4 @@ def test_the_code_has_the_paths_that_its_threshold_follows_from():
     own, named = code("ccsds-k7-1-2"), codes()["ccsds-k7-1-2"]
     assert [*zip(own.distances, own.weights, strict=True)][: len(named.weights)] == [*named.weights]
     assert own.rate == named.rate
+    assert own.word_bits == 5 * 7  # what a decoder looks back, in bits of information

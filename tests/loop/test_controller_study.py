@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from numpy.testing import assert_allclose
 
 from microrad import mirror
 from microrad.loop import control, controller_study
-from microrad.loop.controller_study import designs, parts, results, scenario
+from microrad.loop.controller_study import designs, parts, promises, results, scenario
 from microrad.loop.disturbance import Misalignment
 from microrad.loop.pointing_loop import ensemble, traces
 from microrad.loop.pointing_loop.design import design_plant
@@ -63,6 +64,17 @@ def tuned():
     """Every design of the shipped mission, and what was said of the progress."""
     found, said = whole_study()
     return [v.design for v in found.fine_pointing.verified], [each for each in said if "tun" in each[2]]
+
+
+def test_what_does_not_keep_its_promise_is_tuned_again_but_for_the_baseline(monkeypatch):
+    made = [SimpleNamespace(name=name) for name in (controller_study.BASELINE, "LQG", "H-infinity")]
+    figures = [SimpleNamespace(holds=name == "H-infinity") for name in (each.name for each in made)]
+    again = SimpleNamespace(name="LQG", firmer=True), SimpleNamespace(holds=True)
+    monkeypatch.setattr(promises.designs, "design", lambda scene, on_progress, only: made)
+    monkeypatch.setattr(promises.results, "outlook", lambda scene, found, on_progress: figures)
+    monkeypatch.setattr(promises, "_firmer", lambda scene, broken, on_progress: again)
+    found = promises.design_and_promise(SimpleNamespace())
+    assert found == ((made[0], figures[0]), again, (made[2], figures[2]))
 
 
 @pytest.fixture(scope="module")
