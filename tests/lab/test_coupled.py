@@ -11,7 +11,7 @@ from scipy.linalg import block_diag
 
 from microrad.core import kernels
 from microrad.core.periodic import delayed
-from microrad.lab.identify.coupled import hysteretic, identify_coupled, ladder, linear, linear_errors
+from microrad.lab.identify.coupled import hysteretic, identify_coupled, ladder, linear, linear_errors, wiring
 from microrad.lab.identify.coupled.channels import _rounded_bias, channels
 from microrad.lab.identify.coupled.held_out import held_out_error, smallest_within_noise
 from microrad.lab.identify.coupled.ladder import LadderOptions
@@ -22,6 +22,7 @@ from microrad.lab.identify.stiffness.fit import amplitude_classes
 from microrad.lab.recording import Recording, multisine_recordings
 from microrad.mirror import coupled
 from microrad.mirror import model as mirror
+from microrad.mirror.coupled import Output
 from microrad.mirror.hysteresis import PrandtlIshlinskii
 from microrad.mirror.model import Mirror
 from microrad.mission.file import load_coupled_mirror
@@ -444,3 +445,11 @@ def test_a_drive_rests_where_it_begins_and_a_periodic_one_at_its_mean(period_sam
     drive[np.arange(512) % 256 >= 192] = 9.0
     records = [SimpleNamespace(drive=drive, period_samples=period_samples)]
     assert _rounded_bias(records) == pytest.approx([rest])
+
+
+def test_each_of_four_displacements_needs_its_place():
+    places = (0.01, 0.0), (0.0, 0.01), (-0.01, -0.01), None
+    outputs = [Output(f"y{k}", "displacement", position_m=place) for k, place in enumerate(places)]
+    with pytest.raises(IdentificationError, match="u.npy: .*3 of 4 displacements have a position"):
+        wiring._check_places("u.npy", outputs)
+    wiring._check_places("u.npy", outputs[:3])
