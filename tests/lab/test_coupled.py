@@ -450,6 +450,6 @@ def test_a_drive_rests_where_it_begins_and_a_periodic_one_at_its_mean(period_sam
 def test_each_of_four_displacements_needs_its_place():
     places = (0.01, 0.0), (0.0, 0.01), (-0.01, -0.01), None
     outputs = [Output(f"y{k}", "displacement", position_m=place) for k, place in enumerate(places)]
-    with pytest.raises(IdentificationError, match="u.npy: .*3 of 4 displacements have a position"):
+    with pytest.raises(IdentificationError, match=r"u\.npy: .*3 of 4 displacements have a position"):
         wiring._check_places("u.npy", outputs)
     wiring._check_places("u.npy", outputs[:3])
