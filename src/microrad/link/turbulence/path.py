@@ -229,7 +229,7 @@ class Uplink(_OnPath, Bounded):
 
     @property
     def spread_db(self) -> float:
-        """Loss of the mean power on the axis by the spread of the beam: 6/5 of (1 + (D0 / r0)^(5/3)), D0^2 = 8 W0^2.
+        """Loss of the mean power on the axis by the spread of the beam (dB): 12 lg(1 + (D0 / r0)^(5/3)), D0^2 = 8 W0^2.
 
         Andrews and Phillips 2005, chapter 12; wander is part of it. It holds for beams that the air can carry as a
         whole.
