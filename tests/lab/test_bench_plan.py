@@ -200,7 +200,7 @@ def test_a_plan_can_be_cut_down():
         ('^output_max = "180 V"', 'output_max = "150 V"', "limits.drive_max", "the amplifier, 0 V to 10 V at the"),
         ('^drive_max = "16 V"', 'drive_max = "10 V"', "limits.drive_max", "the converters, -4 V to 10 V at the drive"),
         ('^drive_min = "0 V"', 'drive_min = "-5 V"', "limits.drive_min", "the converters, -4 V to 16 V at the drive"),
-        ('^output_min = "-?[^"]*mrad"', 'output_min = "9 mrad"', "bench.converters.output_max", "is not above output_min"),
+        ('^output_min = "-?[^"]*mrad"', 'output_min = "9 mrad"', "bench.converters.output_max", "not above output_min"),
         ('^drive_max = "16 V"', 'drive_max = "-4 V"', "bench.converters.drive_max", "drive_min.*\n.*above -4 V"),
         ('^drive_max = "12 V"', 'drive_max = "-1 V"', "limits.drive_max", "is not above drive_min"),
         (r"^\[excitation.chirp\]", "[excitation.'a b']", "excitation.a b", "is no name that a file can have"),

@@ -913,7 +913,8 @@ def test_several_channels(tmp_path):
     assert (read.output_names, read.period_samples) == (("y[0]", "y[1]", "y[2]"), 500)
     assert "is given twice as input" in refusal(path, [0, 0], 2)
     assert "no output channel was given" in refusal(path, 0, [])
-    for period in (1, N + 1, 2.5):
+    assert "there is no input channel True" in refusal(path, True, 2)
+    for period in (1, N + 1, 2.5, True):
         assert "period" in refusal(path, 0, 2, period_samples=period)
 
 
@@ -937,6 +938,9 @@ def test_multisine_recordings():
     np.testing.assert_array_equal(read[1].output[512:], y[:, :, 1, 1])
     with pytest.raises(RecordingError, match="the same samples, realisations and periods"):
         multisine_recordings(u, y[:, :, :2], RATE_HZ)
+    for drive, output in ((u[..., 0], y), (u, y[..., 0]), (u[..., 0], y[..., 0])):
+        with pytest.raises(RecordingError, match=r"\(512, 2, 3\).*give \(samples, channels, realisations, periods\)"):
+            multisine_recordings(drive, output, RATE_HZ)
 
 
 def test_the_last_comment_of_as_many_words_names_the_columns(tmp_path):
