@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from microrad.core import lti
+from microrad.core.units import LEAST, MOST
 from microrad.lab.identify import IdentificationError, fit_frequency_response
 from microrad.lab.identify.linear.elements import ElementEquations
 from microrad.lab.identify.linear.modal import ModalModel
@@ -409,6 +410,16 @@ def spoilt(values, at, value):
 def test_refusals(freq, response, words, message):
     with pytest.raises(IdentificationError, match=message):
         fit_frequency_response(freq, response, **words)
+
+
+@pytest.mark.parametrize("largest", [MOST, 2.0 * LEAST])
+def test_a_response_of_any_size_that_has_a_unit_is_taken(largest):
+    response = largest / (1 + 1j * FREQ_HZ / 2000.0)
+    response *= largest / np.abs(response).max()
+    fit = fit_frequency_response(FREQ_HZ, response, 1)
+    np.testing.assert_allclose(fit.poles_rad_s, [-4000 * np.pi], rtol=1e-6)
+    with pytest.raises(IdentificationError, match="none has that in SI units"):
+        fit_frequency_response(FREQ_HZ, response * (1.001 if largest == MOST else 0.5), 1)
 
 
 def test_a_frequency_of_zero_is_taken():
