@@ -195,6 +195,10 @@ def tones(limits=LIMITS, *, lines=None, **changes):
         (lambda: chirp(stop_hz=1500.0), r"stop reaches 1.5 kHz, 6.67 samples a period at 10 kHz where .* asks for 10"),
         (lambda: chirp(stop_hz=1500.0), r"at most 1 kHz, or a rate of at least 15 kHz"),
         (lambda: chirp(start_hz=500.0), r"stop is not above start; would fit: a frequency above 500 Hz"),
+        (
+            lambda: chirp(duration_s=9e-4),
+            r"duration holds less than a thousandth of a period of 1 Hz; .*: at least 1 ms",
+        ),
         (lambda: chirp(offset_v=13.0), r"offset has 13 V, outside .*; would fit: 0 V to 12 V"),
         (lambda: chirp(duration_s=1e5), r"duration makes a record of 100000 s at 10 kHz; would fit: at most 2000 s"),
         (lambda: chirp(axis=1), r"axis is 2, but the bench has 1 input; would fit: 1 to 1"),
@@ -218,6 +222,10 @@ def tones(limits=LIMITS, *, lines=None, **changes):
 def test_a_design_beyond_a_limit_is_refused_with_what_would_fit(design, message):
     with pytest.raises(DesignError, match=message):
         design()
+
+
+def test_a_thousandth_of_a_period_is_enough_of_a_chirp():
+    assert chirp(duration_s=1e-3, amplitude_v=0.01).samples == 10
 
 
 def test_every_limit_that_is_broken_is_named_at_once():

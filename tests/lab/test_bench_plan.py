@@ -192,12 +192,16 @@ def test_a_plan_can_be_cut_down():
         ("^bits = 16", "bits = 2", "bench.converters.bits", "is below 4"),
         ('^formats = .*', 'formats = ["xls"]', "formats", "csv, lvm, tdms, mat, mat73, npz, hdf5"),
         ('^formats = .*', 'formats = []', "formats", "is no list of different file formats"),
+        ('^formats = .*', 'formats = ["csv", "csv"]', "formats", "is no list of different file formats"),
         ("^samples_per_period = 10", "samples_per_period = 2", "limits.samples_per_period", "is not above 2"),
         ("^samples_per_period = 10", "samples_per_period = 11", "excitation.chirp.stop", "at most 4.545 kHz"),
         ('^noise = .*', "", "bench.sensor", "noise and noise_share are both missing"),
         ('^noise = .*', 'noise = "1 urad"\nnoise_share = 0.1', "bench.sensor", "are both given"),
         ('^output_max = "180 V"', 'output_max = "150 V"', "limits.drive_max", "the amplifier, 0 V to 10 V at the"),
         ('^drive_max = "16 V"', 'drive_max = "10 V"', "limits.drive_max", "the converters, -4 V to 10 V at the drive"),
+        ('^drive_min = "0 V"', 'drive_min = "-5 V"', "limits.drive_min", "the converters, -4 V to 16 V at the drive"),
+        ('^output_min = "-?[^"]*mrad"', 'output_min = "9 mrad"', "bench.converters.output_max", "not above output_min"),
+        ('^drive_max = "16 V"', 'drive_max = "-4 V"', "bench.converters.drive_max", "drive_min.*\n.*above -4 V"),
         ('^drive_max = "12 V"', 'drive_max = "-1 V"', "limits.drive_max", "is not above drive_min"),
         (r"^\[excitation.chirp\]", "[excitation.'a b']", "excitation.a b", "is no name that a file can have"),
         (r"^\[excitation.chirp\]", "[excitation.loop-60hz]", "excitation", 'two records named "loop-60hz"'),
@@ -304,6 +308,23 @@ def test_a_plan_without_excitations_is_refused(refuse, ending):
     error = refuse(text)
     assert "excitation" in {fault.key for fault in error.faults}
     assert "[excitation.NAME]" in str(error)
+
+
+@pytest.mark.parametrize(
+    ("line", "missing"),
+    [
+        ("excitation = 5 V", False),
+        ("excitation.a = chirp", False),
+        ("[excitation.a", False),
+        ("excitations = 5 V", True),
+        ("[excitations.a", True),
+    ],
+)
+def test_excitations_are_missing_unless_their_own_line_is_broken(refuse, line, missing):
+    head = TEXT.partition("[excitation.chirp]")[0]
+    error = refuse(f"{head}{line}\n" if line.startswith("[") else f"{line}\n{head}")
+    assert any("[excitation.NAME]" in fault.expected for fault in error.faults) == missing
+    assert len(error.faults) == 1 + missing
 
 
 def test_a_file_that_is_not_there_is_told_with_the_packaged_plans(tmp_path):

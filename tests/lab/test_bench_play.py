@@ -137,6 +137,8 @@ def test_an_output_beyond_its_converter_is_refused(short):
         BenchError, match=r"'loop-100hz' moves the mirror over .* mrad, but .*take in -1 mrad to 1 mrad; w"
     ):
         play(plan, SEED)
+    with pytest.raises(BenchError, match=r"take in 500 .rad to 2 mrad; widen output_min and output_max, or drive less"):
+        play(with_sensor(short, converters_output_min_rad=5e-4), SEED)
 
 
 @pytest.mark.promise("bench-5", "bench-7", "bench-8", "bench-11")

@@ -15,6 +15,7 @@ from microrad.lab.identify.coupled import hysteretic, identify_coupled, ladder, 
 from microrad.lab.identify.coupled.channels import _rounded_bias, channels
 from microrad.lab.identify.coupled.held_out import held_out_error, smallest_within_noise
 from microrad.lab.identify.coupled.ladder import LadderOptions
+from microrad.lab.identify.coupled.mirror_file import coupled_file_text
 from microrad.lab.identify.linear.modal import ModalModel
 from microrad.lab.identify.linear.response import response_from_periods
 from microrad.lab.identify.records import IdentificationError
@@ -453,3 +454,55 @@ def test_each_of_four_displacements_needs_its_place():
     with pytest.raises(IdentificationError, match=r"u\.npy: .*3 of 4 displacements have a position"):
         wiring._check_places("u.npy", outputs)
     wiring._check_places("u.npy", outputs[:3])
+
+
+def test_a_bend_that_no_exchange_of_channels_explains_is_taken(hysteretic_records):
+    places = (0.01, 0.0), (0.0, 0.01), (-0.01, 0.0), (0.0, -0.01)
+    outputs = [Output(name, "displacement", position_m=place) for name, place in zip("abcd", places, strict=True)]
+    flat = np.array([[y, -x, 1.0] for x, y in places]) @ philox(3).standard_normal((3, 2))
+    response = response_from_periods(hysteretic_records)
+
+    def check(gain):
+        names, shape = tuple("abcd"), (response.freq_hz.size, 4, 2)
+        moved = np.broadcast_to(gain, shape).astype(complex)
+        found = replace(response, response=moved, standard_error=np.full(shape, 1e-6), output_names=names)
+        wiring.check_wiring("u.npy", found, outputs, None)
+
+    check(flat)
+    check(philox(4).standard_normal((4, 2)))
+    with pytest.raises(IdentificationError, match="50 % of what the outputs show is neither tilt nor piston"):
+        check(flat * [[1.0], [-1.0], [1.0], [1.0]])
+
+
+def test_one_record_of_no_period_may_be_left_to_fit_two_actuators(hysteretic_records):
+    once = [replace(each, period_samples=None) for each in hysteretic_records[:2]]
+    assert len(channels(once, (), "V", "rad", None).fitted) == 1
+    with pytest.raises(IdentificationError, match="2 records for 2 actuators: 1 held out"):
+        channels(hysteretic_records[:2], (), "V", "rad", None)
+
+
+def test_hysteretic_stiffness_begins_with_a_linear_model(hysteretic_records):
+    for start in (None, SimpleNamespace(modes=None)):
+        with pytest.raises(IdentificationError, match="no coupled linear model of this order to begin with"):
+            hysteretic.hysteretic_stiffness(hysteretic_records, start, lambda *_: None)
+
+
+def test_a_mirror_file_has_a_name_and_the_errors_that_there_are(found, hysteretic_records):
+    result, _, _ = found
+    for name in ("", " "):
+        with pytest.raises(IdentificationError, match="the mirror has no name; give one"):
+            coupled_file_text(result, hysteretic_records, name)
+    assert len(re.findall(r" V rms: .*by output", coupled_file_text(result, hysteretic_records, "a"))) == 2
+    own = result.candidate()
+    errors = np.where(np.arange(2)[:, None] == 0, np.nan, own.error_rms)
+    few = replace(result, candidates=(replace(own, error_rms=errors),))
+    (line,) = re.findall(r"at (\S+) V rms: .*by output", coupled_file_text(few, hysteretic_records, "a"))
+    assert float(line) == pytest.approx(result.amplitudes_v[1], rel=0.01)
+
+
+def test_a_candidate_is_found_by_its_name(found):
+    result, _, _ = found
+    assert result.candidate() is result.candidate(result.chosen)
+    assert result.candidate("coupled linear, order 2").name == "coupled linear, order 2"
+    with pytest.raises(IdentificationError, match="no model 'order 2' was fitted; there are per axis, order 2 each, "):
+        result.candidate("order 2")

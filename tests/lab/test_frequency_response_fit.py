@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from microrad.core import lti
+from microrad.core.units import LEAST, MOST
 from microrad.lab.identify import IdentificationError, fit_frequency_response
 from microrad.lab.identify.linear.elements import ElementEquations
 from microrad.lab.identify.linear.modal import ModalModel
@@ -398,6 +399,10 @@ def spoilt(values, at, value):
             "the table reaches 1000 Hz, half the sample rate of 2000 Hz or more; leave",
         ),
         (FREQ_HZ, FLAT, {"rate_hz": 0.0}, "the sample rate is 0 Hz; give a rate above 0"),
+        (FREQ_HZ, FLAT, {"rate_hz": np.inf}, "the sample rate is inf Hz; give a rate above 0"),
+        (FREQ_HZ, FLAT, {"rate_hz": np.nan}, "the sample rate is nan Hz; give a rate above 0"),
+        (FREQ_HZ, 1e31 * FLAT, {}, r"a magnitude below 1e-30 or above 1e\+30, and none has that in SI units"),
+        (FREQ_HZ, 1e-31 * FLAT, {}, r"a magnitude below 1e-30 or above 1e\+30, and none has that in SI units"),
         (FREQ_HZ, FLAT, {"hold": "zero-order"}, "a zero-order hold needs the sample rate; give rate_hz"),
         (FREQ_HZ, FLAT, {"hold": "second-order"}, "hold 'second-order' is not known; use zero-order, first-order or"),
     ],
@@ -405,6 +410,16 @@ def spoilt(values, at, value):
 def test_refusals(freq, response, words, message):
     with pytest.raises(IdentificationError, match=message):
         fit_frequency_response(freq, response, **words)
+
+
+@pytest.mark.parametrize("largest", [MOST, 2.0 * LEAST])
+def test_a_response_of_any_size_that_has_a_unit_is_taken(largest):
+    response = largest / (1 + 1j * FREQ_HZ / 2000.0)
+    response *= largest / np.abs(response).max()
+    fit = fit_frequency_response(FREQ_HZ, response, 1)
+    np.testing.assert_allclose(fit.poles_rad_s, [-4000 * np.pi], rtol=1e-6)
+    with pytest.raises(IdentificationError, match="none has that in SI units"):
+        fit_frequency_response(FREQ_HZ, response * (1.001 if largest == MOST else 0.5), 1)
 
 
 def test_a_frequency_of_zero_is_taken():

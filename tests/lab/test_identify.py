@@ -504,6 +504,7 @@ def test_units_are_refused(words, message):
         ({"hold_out": 0.0}, "hold_out\\) is 0.0"),
         ({"hold_out": 1.0}, "hold_out\\) is 1.0"),
         ({"hold_out": 0.999}, "5 samples to fit and 4995 to check"),
+        ({"hold_out": 0.001}, "4995 samples to fit and 5 to check"),
         ({"models": ("preisach",)}, "preisach"),
         ({"models": ()}, "cannot be used"),
         ({"models": ("bouc_wen", "bouc_wen")}, "each once"),
@@ -517,6 +518,8 @@ def test_identify_refuses(words, message):
 def test_other_refusals(fit_100hz):
     with pytest.raises(IdentificationError, match="no recording"):
         fit_bouc_wen([])
+    with pytest.raises(IdentificationError, match="no recording was given; name at least one"):
+        identify([])
     with pytest.raises(IdentificationError, match="0 starts"):
         fit_bouc_wen([record(100)], starts=0)
     with pytest.raises(IdentificationError, match="0 play operators"):
@@ -527,6 +530,28 @@ def test_other_refusals(fit_100hz):
     for split in (-1, 1, 5001):
         with pytest.raises(IdentificationError, match=f"split {split} "):
             predict(fit_100hz, record(100), split)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"drive": np.zeros((5000, 2))}, "2 drives and 1 outputs; one of each is identified here"),
+        ({"output": np.zeros((5000, 2))}, "1 drives and 2 outputs; one of each is identified here"),
+        ({"drive": np.ones((5000, 1))}, "drive or output is constant in the part that is fitted"),
+        ({"output": np.ones((5000, 1))}, "drive or output is constant in the part that is fitted"),
+    ],
+)
+def test_a_record_that_no_hysteresis_is_fitted_to(change, message):
+    with pytest.raises(IdentificationError, match=message):
+        fit_prandtl_ishlinskii([replace(record(100), **change)])
+
+
+def test_records_without_a_digest_may_be_given_twice():
+    twice = [record(100), replace(record(100), path="again")]
+    with pytest.raises(IdentificationError, match="again: the same data as "):
+        identify(twice, hold_out=1.0)
+    with pytest.raises(IdentificationError, match=r"hold_out\) is 1\.0"):
+        identify([replace(each, sha256="") for each in twice], hold_out=1.0)
 
 
 def test_a_drive_of_steps_has_a_rate(monkeypatch):

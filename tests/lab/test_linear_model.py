@@ -409,6 +409,10 @@ def test_refusals():
         fit_linear([])
     with pytest.raises(IdentificationError, match="1 amplitude given; at least two"):
         amplitude_dependence([fit_linear(records, 7, exchanges=0)])
+    fit = fit_linear(records, 7, exchanges=0)
+    assert amplitude_dependence([replace(fit, excited_hz=(1090.0, 1110.0))] * 2).resonance_hz == pytest.approx(1100.0)
+    with pytest.raises(IdentificationError, match="no resonance in the excited band, so there is none to follow"):
+        amplitude_dependence([replace(fit, excited_hz=(1110.0, 1900.0))] * 2)
 
 
 def test_progress_ends_at_its_total():

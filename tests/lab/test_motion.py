@@ -70,3 +70,5 @@ def test_more_than_three_axes_gaps_and_samples_that_are_no_number_are_refused(tm
     shaken = csv(tmp_path / "shaken.csv", "time,x (urad)", TIME + 3e-4 * np.sin(40 * np.arange(COUNT)), X)
     with pytest.raises(RecordingError, match=r"the steps scatter by .* resample to a constant step"):
         read_motion(shaken)
+    hardly = csv(tmp_path / "hardly.csv", "time,x (urad)", TIME + 3e-5 * np.sin(40 * np.arange(COUNT)), X)
+    assert read_motion(hardly).rate_hz == pytest.approx(500.0, rel=1e-3)

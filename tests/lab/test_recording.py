@@ -1,6 +1,8 @@
 """Recordings: what is read, and each refusal with its message."""
 
 import hashlib
+import os
+import re
 
 import numpy as np
 import pytest
@@ -94,6 +96,13 @@ def test_missing_file_offers_nearest_name(tmp_path):
 
 def test_directory(tmp_path):
     assert "directory" in refusal(tmp_path)
+
+
+def test_what_is_no_file(tmp_path):
+    os.mkfifo(tmp_path / "pipe.csv")
+    assert "is not a regular file; copy the data into a file first" in refusal(tmp_path / "pipe.csv")
+    message = refusal(tmp_path / f"{'a' * 300}.csv")
+    assert re.search(r"cannot be examined \(.*File name too long|there is no such file", message)
 
 
 def test_empty_file(tmp_path):
@@ -225,6 +234,17 @@ def test_decimal_commas_beside_separating_commas(tmp_path):
     assert "decimal commas" in refusal(write(tmp_path / "a.csv", rows, "drive,output"), 0, 1)
 
 
+def test_columns_beyond_the_header_are_no_decimal_commas(tmp_path):
+    rows = [f"{k},{u},{k},{y},{k},0.5" for k, (u, y) in enumerate(zip(DRIVE, OUTPUT, strict=True))]
+    assert read_recording(write(tmp_path / "a.csv", rows, "a,b,c"), 1, 3, 100.0).samples == N
+
+
+def test_time_that_stands_still(tmp_path):
+    rows = [f"2.5,{u!r},{y!r}" for u, y in zip(DRIVE.tolist(), OUTPUT.tolist(), strict=True)]
+    message = refusal(write(tmp_path / "a.csv", rows))
+    assert "column 0 ('time'): the time of all 400 samples is 2.5 s; write their true times" in message
+
+
 @pytest.mark.parametrize(("bad", "cells"), [("1.0,2.0", "2 cells"), ("1,2,3,4", "4 cells"), ("1.0", "1 cell")])
 @pytest.mark.parametrize("row", [0, 250, N - 1])
 def test_ragged_rows(tmp_path, bad, cells, row):
@@ -284,6 +304,9 @@ def test_arrays_under_the_same_checks():
     assert (made.path, made.samples, len(made.sha256)) == ("bench", N, 64)
     faults = {
         "shape": (DRIVE[:-1], OUTPUT, 100.0),
+        r"drive has shape \(0,\) and output \(0,\)": (DRIVE[:0], OUTPUT[:0], 100.0),
+        r"drive has shape \(400, 0\)": (np.zeros((N, 0)), OUTPUT, 100.0),
+        r"output \(400, 0\)": (DRIVE, np.zeros((N, 0)), 100.0),
         "sample 3 of the output is nan": (DRIVE, np.where(np.arange(N) == 3, np.nan, OUTPUT), 100.0),
         "constant": (np.ones(N), OUTPUT, 100.0),
         "sample rate": (DRIVE, OUTPUT, 0.0),

@@ -236,6 +236,16 @@ def test_what_no_recordings_can_be_made_of(tmp_path):
     assert "--axes (axes) is for arrays (NPY, NPZ, MAT, HDF5) and this file holds columns" in refusal(text, "u", "y")
 
 
+def test_an_array_of_a_name_that_stands_twice_is_named_in_full(tmp_path):
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w") as file:
+        file["a/u"], file["b/u"], file["y"] = U, U, Y
+    assert "no one array of inputs is named 'u'; the file holds 'a/u' of shape" in refusal(
+        path, "u", "y", rate_hz=RATE_HZ
+    )
+    assert read_arrays(path, "b/u", "y", rate_hz=RATE_HZ, axes=AXES)[0].input_names == ("b/u[0]", "b/u[1]")
+
+
 def test_two_files_of_other_rates_and_of_one_missing(tmp_path):
     np.savez(tmp_path / "u.npz", u=U, fs=RATE_HZ)
     np.savez(tmp_path / "y.npz", y=Y, fs=2 * RATE_HZ)

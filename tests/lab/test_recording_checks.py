@@ -673,3 +673,5 @@ def test_one_sample_that_was_written_twice_is_told_once():
     time_s = np.where(np.arange(N) == 431, 0.43, TIME_S)
     with pytest.raises(RecordingError, match=r"0\.001 s is usual, once in all; samples were written twice"):
         rate_of_time("loops.csv", "time", time_s, lambda row: f"row {row}")
+    with pytest.raises(RecordingError, match=r"row 301, time: 1\.001 s since the sample before.*2 gaps"):
+        rate_of_time("loops.csv", "time", time_s + (np.arange(N) > 300), lambda row: f"row {row}")

@@ -165,6 +165,7 @@ def test_tdms_without_increment_needs_a_rate(tmp_path):
         (lambda b: b[:-100], "is truncated: 100 of its"),
         (lambda b: b[:20], "has 20 of the 28 bytes of its lead-in"),
         (lambda b: b + b"TDSm12", "has 6 of the 28 bytes"),
+        (lambda b: b + b"TDS", "has 3 of the 28 bytes"),
         (lambda b: b + b"garbage" * 5, "should begin with 'TDSm' and begins with b'garb'"),
         (lambda b: b[:12] + b"\xff" * 8 + b[20:], "was never completed"),
         (lambda b: b[:8] + struct.pack("<l", 17) + b[12:], "states version 17"),
@@ -275,6 +276,12 @@ def test_lvm(tmp_path, x_columns, comma, comment):
     if not comment and x_columns != "Multi":
         other = lvm_read.read(str(path), read_from_pickle=False, dump_file=False)[0]["data"]
         np.testing.assert_array_equal(other[:, -2:], np.column_stack((read.drive, read.output)))
+
+
+def test_lvm_without_a_channel(tmp_path):
+    path = lvm(tmp_path / "a.lvm")
+    path.write_bytes(path.read_bytes().replace(b"X_Value\tdrive\toutput", b"X_Value\tComment"))
+    assert "the LVM file has headers and no channel; record again" in refusal(path, 0, 1)
 
 
 @pytest.mark.promise("recordings-4")
@@ -559,6 +566,8 @@ def test_arrays_of_objects_are_not_called_truncated(tmp_path):
     assert "'output' holds Python objects, which are pickled and not read" in message
     assert "save them as plain numbers, array.astype(float)" in message
     assert "truncated" not in message
+    np.save(tmp_path / "a.npy", np.full(N, None, dtype=object))
+    assert "'data' holds Python objects, which are pickled and not read" in refusal(tmp_path / "a.npy", 0, 1, RATE_HZ)
 
 
 @pytest.mark.promise("recordings-13")
@@ -913,7 +922,8 @@ def test_several_channels(tmp_path):
     assert (read.output_names, read.period_samples) == (("y[0]", "y[1]", "y[2]"), 500)
     assert "is given twice as input" in refusal(path, [0, 0], 2)
     assert "no output channel was given" in refusal(path, 0, [])
-    for period in (1, N + 1, 2.5):
+    assert "there is no input channel True" in refusal(path, True, 2)
+    for period in (1, N + 1, 2.5, True):
         assert "period" in refusal(path, 0, 2, period_samples=period)
 
 
@@ -937,6 +947,9 @@ def test_multisine_recordings():
     np.testing.assert_array_equal(read[1].output[512:], y[:, :, 1, 1])
     with pytest.raises(RecordingError, match="the same samples, realisations and periods"):
         multisine_recordings(u, y[:, :, :2], RATE_HZ)
+    for drive, output in ((u[..., 0], y), (u, y[..., 0]), (u[..., 0], y[..., 0])):
+        with pytest.raises(RecordingError, match=r"\(512, 2, 3\).*give \(samples, channels, realisations, periods\)"):
+            multisine_recordings(drive, output, RATE_HZ)
 
 
 def test_the_last_comment_of_as_many_words_names_the_columns(tmp_path):

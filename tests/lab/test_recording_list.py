@@ -8,6 +8,7 @@ from nptdms import ChannelObject, TdmsWriter
 
 from microrad.lab.recording import RecordingError
 from microrad.lab.recording.list_file import ListTable, RecordingsError, RecordingTable, read_list
+from microrad.mission.fields import MOST_ITEMS
 from places import ROOT
 
 N, RATE_HZ = 800, 1000.0
@@ -213,6 +214,53 @@ def test_what_is_not_fitted_may_stand_before_what_is(tmp_path):
 )
 def test_what_is_no_list(tmp_path, text, words):
     assert any(words in told for told in faults(tmp_path, text).values())
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("input = 1.5", "is no list of that kind; the name of a channel, its number from 0, or a list of them"),
+        ("input = []", "is no list of that kind; the name of a channel"),
+        ("input = [1.5]", "holds 1.5, which is no channel"),
+        ('input = ""', 'holds "", which is no channel'),
+        ("input = true", "holds true, which is no channel"),
+        ('time = ["t", "s"]', "is no column of this recording; one column, of a file without axes"),
+        ('positions = [["0 mm"]]', "has a place that is no pair; a list of x and y for each output"),
+        ('positions = [["0 mm", "1 mm", "2 mm"]]', "is no list of that kind; a list of x and y for each output"),
+        ("positions = []", "is no list of that kind; a list of x and y for each output"),
+        ("signs = [[true]]", "has an item that is none of 1, -1 and 0"),
+        ("signs = [[]]", "is no list of that kind; a list for each output, with 1, -1 or 0 for each input"),
+        ("signs = 1", "is no list of that kind; a list for each output"),
+    ],
+)
+def test_what_is_no_value_of_its_key(tmp_path, line, words):
+    common = {"input": "input = 1", "output": "output = 2"} | {line.partition(" ")[0]: line}
+    found = faults(tmp_path, "\n".join(common.values()) + '\n[recording.a]\nfile = "a.csv"\n')
+    (told,) = found.values()
+    assert words in told
+
+
+def test_a_key_takes_so_many_items_and_no_more(tmp_path):
+    text = 'input = {}\noutput = 2\n[recording.a]\nfile = "a.csv"\n'
+    assert "there is no such file" in refusal(tmp_path, text.format(list(range(MOST_ITEMS))))
+    (told,) = faults(tmp_path, text.format(list(range(MOST_ITEMS + 1)))).values()
+    assert "is no list of that kind" in told
+
+
+@pytest.mark.parametrize(
+    ("line", "missing"),
+    [
+        ("[recording.a", False),
+        ("recording = 1 kHz", False),
+        ("recording.a.file = a", False),
+        ("rate = 1 kHz", True),
+        ("recordings = 1 kHz", True),
+    ],
+)
+def test_tables_are_missing_unless_their_own_line_is_broken(tmp_path, line, missing):
+    told = faults(tmp_path, line + "\n").values()
+    assert any("is missing; a table [recording.NAME]" in each for each in told) == missing
+    assert any("is not TOML" in each or "is no table header" in each for each in told)
 
 
 def test_a_list_that_does_not_exist(tmp_path):

@@ -253,6 +253,8 @@ def test_periods_that_do_not_fit():
         response_from_periods([records[0], replace(records[1], period_samples=256)])
     with pytest.raises(IdentificationError, match="hold 2 periods of 512, and 2 are to be dropped"):
         response_from_periods(records, skip_periods=2)
+    with pytest.raises(IdentificationError, match="and -1 are to be dropped as transient; drop none or more"):
+        response_from_periods(records, skip_periods=-1)
     with pytest.raises(IdentificationError, match="1 records of one usable period for 1 inputs"):
         response_from_periods(records[:1], skip_periods=1)
     two = periodic(mirror(2), [(multisine(0), multisine(1))])

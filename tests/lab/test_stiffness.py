@@ -962,10 +962,17 @@ def test_other_arguments_that_cannot_be(training, known):
         fit_hysteretic_stiffness(training, options=StiffnessOptions(thresholds=(0.3, 0.1)))
     with pytest.raises(IdentificationError, match="0 springs were asked for; give at least 1"):
         fit_hysteretic_stiffness(training, options=StiffnessOptions(springs=0))
+    with pytest.raises(IdentificationError, match="one amplitude"):
+        fit_hysteretic_stiffness(training[:3], options=StiffnessOptions(springs=1))
+    for thresholds in ((), (0.0, 0.1), (0.1, 0.1)):
+        with pytest.raises(IdentificationError, match=re.escape(f"{list(thresholds)} do not ascend from above 0")):
+            fit_hysteretic_stiffness(training, options=StiffnessOptions(thresholds=thresholds))
     with pytest.raises(IdentificationError, match="0 steps a sample"):
         fit_hysteretic_stiffness(training, options=StiffnessOptions(sub_steps=0))
     with pytest.raises(IdentificationError, match=r"at 2000 Hz, where the model has 2 and 2 at 1000 Hz"):
         predicted_error(known[0], replace(training[0], rate_hz=2000.0))
+    with pytest.raises(IdentificationError, match=r"0: 2 inputs and 1 outputs at 1000 Hz, where the model has 2 and 2"):
+        predicted_error(known[0], replace(training[0], output=training[0].output[:, :1]))
 
 
 def test_an_operator_that_goes_on_is_the_same_within_its_old_reach():

@@ -168,6 +168,15 @@ def test_modal_response_is_that_of_the_state_space(hold):
 
 
 @pytest.mark.parametrize("hold", HOLDS)
+def test_a_hold_between_samples_needs_their_rate(hold):
+    if hold == "band-limited":
+        assert mirror().response(BAND_HZ, hold).shape[0] == BAND_HZ.size
+    else:
+        with pytest.raises(IdentificationError, match=f"a {hold} hold needs the sample rate; give rate_hz"):
+            mirror().response(BAND_HZ, hold)
+
+
+@pytest.mark.parametrize("hold", HOLDS)
 @pytest.mark.parametrize("pole", [-3.0, -1e3, -2e4, -2e5, -100 + 3000j, -1e5 + 1e5j])
 def test_derivative_by_the_pole(hold, pole):
     step = 1e-6 * abs(pole)

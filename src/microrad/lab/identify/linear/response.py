@@ -436,7 +436,8 @@ def _periods(records: Sequence[Recording], name: str, period: int, skip: int) ->
     if skip < 0 or count < 1:
         raise IdentificationError(
             f"{records[0].path}: {records[0].samples} samples hold {records[0].samples // period} periods of {period}, "
-            f"and {skip} are to be dropped as transient; nothing is left: record more periods."
+            f"and {skip} are to be dropped as transient; drop none or more and keep at least one, or record more "
+            "periods."
         )
     parts = [getattr(r, name)[skip * period : (skip + count) * period].reshape(count, period, -1) for r in records]
     return np.asarray(np.fft.rfft(np.stack(parts), axis=2) * (np.sqrt(2.0) / period))

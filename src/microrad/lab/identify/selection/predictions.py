@@ -111,9 +111,8 @@ def predict(fit: Fit, recording: Recording, split: int | None = None) -> Predict
         IdentificationError: For a split outside the recording.
     """
     drive, measured = recording.drive[:, 0] * fit.units.volts, recording.output[:, 0] * fit.units.radians
-    whole = split is None or split == 0
-    end = recording.samples if whole else split
-    if not (end and 2 <= end <= recording.samples):
+    end = recording.samples if split is None or split == 0 else split
+    if not 2 <= end <= recording.samples:
         raise IdentificationError(
             f"split {split} does not lie within the {recording.samples} samples of {recording.path}; give a number "
             "from 2 to that."

@@ -63,7 +63,7 @@ def for_validation(
     """Recordings to fit, and those for validation, among them each that has that role.
 
     Args:
-        recordings: Those given to be fitted.
+        recordings: Those given to be fitted, one or more.
         validation: Those given for validation.
 
     Raises:
@@ -76,7 +76,7 @@ def for_validation(
                 "role out."
             )
     fitted = [r for r in recordings if r.role != "validation"]
-    if recordings and not fitted:
+    if not fitted:
         raise IdentificationError(
             f"{recordings[0].path}: every recording has the role validation; leave one without a role, to be fitted."
         )

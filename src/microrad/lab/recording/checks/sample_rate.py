@@ -89,7 +89,12 @@ def rate_of_time(
     span = float(time_s[-1] - time_s[0])
     steps = np.diff(time_s)
     row = int(np.argmin(steps))
-    if steps[row] < 0 or span <= 0:
+    if not steps.any():
+        raise RecordingError(
+            f"{where}: {label}: the time of all {time_s.size} samples is {time_s[0]:.9g} s; write their true times, or "
+            "take the column out of the file and give the sample rate."
+        )
+    if steps[row] < 0:
         raise RecordingError(
             f"{where}: {place(row + 1)}, {label}: time runs back from {time_s[row]:.9g} to {time_s[row + 1]:.9g} s; "
             "two recordings may have been joined: cut them apart."
