@@ -373,6 +373,7 @@ def test_simulated_motion_fades_as_often_and_as_long_within_its_99_percent_inter
         (lambda: pf.uncoded_penalty_db(EQUAL, URAD, exponential(1e-9)), "even with 100 dB more power"),
         (lambda: pf.motion_of_spectrum([1.0], [[1.0], [1.0]]), "do not fit"),
         (lambda: pf.motion_of_spectrum([1.0, 2.0], [1.0, 1.0]), "do not fit"),
+        (lambda: pf.motion_of_spectrum([[1.0, 2.0]], [[1.0, 1.0]] * 2), r"frequencies of shape \(1, 2\) and"),
         (lambda: pf.motion_of_spectrum([1.0, 1.0], [[1.0, 1.0]] * 2), "the frequencies do not rise"),
         (lambda: pf.motion_of_spectrum([-1.0, 1.0], [[1.0, 1.0]] * 2), "the frequencies do not rise"),
         (lambda: pf.motion_of_spectrum([1.0, math.inf], [[1.0, 1.0]] * 2), "the frequencies do not rise"),

@@ -1,5 +1,6 @@
 """A loop by itself, without a mission: beside linear theory, the paper's loop, and one axis beside two."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -104,6 +105,7 @@ def test_damping_reads_the_gauge():
     ("changes", "said"),
     [
         ({"rate_hz": 0.0}, "rate_hz of a loop is 0.0: give a number above 0"),
+        ({"rate_hz": np.inf}, "rate_hz of a loop is inf: give a number above 0"),
         ({"slew_v_s": -1.0}, "slew_v_s of a loop is -1.0"),
         ({"steps_per_sample": 0}, "0 plant steps a sample: give 1 or more"),
         ({"drive_range_v": (1.0, 2.0)}, "rest, 0 V, has to lie inside"),
@@ -112,6 +114,7 @@ def test_damping_reads_the_gauge():
         ({"sensor_delay_s": 13e-6}, "sensor of the loop: its delay of 13 µs"),
         ({"sensor_noise_rad": -1.0}, "noise_rad"),
         ({"optics": [[1.0, 2.0]]}, r"optics of a loop has shape \(1, 2\): give finite numbers of shape \(axes, 1\)"),
+        ({"optics": [[np.nan]]}, r"optics of a loop has shape \(1, 1\): give finite numbers"),
         ({"optics": [[1.0], [1.0]], "gauge_noise_rad": 1e-7}, "one line-of-sight angle for each output"),
     ],
 )
@@ -126,8 +129,10 @@ def test_what_does_not_fit_a_loop_is_refused():
         ValueError, match=r"controller 'PID' has 2 inputs, 2 outputs .* a loop of 1 axes takes an error"
     ):
         LOOP.margins(Controller.pid(0.0, 1e6, rate_hz=10e3, axes=2))
-    with pytest.raises(ValueError, match=r"reference_rad has shape \(3, 2\): give finite samples of shape"):
-        LOOP.simulate(SLOW, 0.1, reference_rad=np.zeros((3, 2)))
+    for wanted in (np.zeros((3, 2)), np.zeros((3, 1, 1)), [], [0.0, np.nan]):
+        said = re.escape(f"reference_rad has shape {np.shape(wanted)}: give finite samples of shape (samples, 1)")
+        with pytest.raises(ValueError, match=said):
+            LOOP.simulate(SLOW, 0.1, reference_rad=wanted)
     with pytest.raises(ValueError, match="makes the loop unstable"):
         LOOP.margins(Controller.pid(1e6, rate_hz=10e3))
     with pytest.raises(ValueError, match=r"'H-infinity' cannot be tuned for a loop of one axis: choose one of PI"):
@@ -140,6 +145,10 @@ def test_what_does_not_fit_a_loop_is_refused():
         Controller.pid(np.nan, rate_hz=1e3)
     with pytest.raises(ValueError, match="a PID of 1 axes at 0 Hz"):
         Controller.pid(1.0, rate_hz=0)
+    with pytest.raises(ValueError, match=r"gains \(1\.0, 0\.0, 1\.0\) and a filter of -0\.001 s make no PID"):
+        Controller.pid(1.0, 0.0, 1.0, rate_hz=1e3, derivative_filter_s=-1e-3)
+    with pytest.raises(ValueError, match="a PID of 0 axes at 1000 Hz: give one axis or more"):
+        Controller.pid(1.0, rate_hz=1e3, axes=0)
     with pytest.raises(ValueError, match="an ensemble of 0 runs"):
         LOOP.ensemble(SLOW, 0, 0.1)
 
@@ -153,9 +162,16 @@ def test_a_mirror_of_parts_answers_and_refuses():
     assert_allclose(response, [50e-6, -500e-6j], rtol=1e-9, atol=1e-12)
     both = mirrors.combine(STRAIGHT, BENT).response(np.column_stack([drive, drive]), 1e-5)
     assert_allclose(both[:, 1], BENT.response(drive, 1e-5), rtol=0, atol=1e-12 * np.ptp(both))
-    with pytest.raises(ValueError, match=r"drive_v has shape \(3000, 2\): mirror 'straight' takes finite samples"):
-        STRAIGHT.response(np.column_stack([drive, drive]), 1e-5)
-    for numerator, denominator in (([1.0, 0.0, 0.0], [1.0, 1.0]), ([1.0], [1.0, -1.0]), ([1.0, 0.0], [1.0, 2.0, 3.0])):
+    for given in (np.column_stack([drive, drive]), drive[:, None, None], [], [1.0, np.nan]):
+        said = re.escape(f"drive_v has shape {np.shape(given)}: mirror 'straight' takes finite samples of shape")
+        with pytest.raises(ValueError, match=said):
+            STRAIGHT.response(given, 1e-5)
+    for numerator, denominator in (
+        ([1.0, 0.0, 0.0], [1.0, 1.0]),
+        ([1.0], [1.0, -1.0]),
+        ([1.0, 0.0], [1.0, 2.0, 3.0]),
+        ([1.0], [0.0, 1.0, 1.0]),
+    ):
         with pytest.raises(ValueError, match="give one that is proper and stable"):
             Mirror.of(1e-6, numerator, denominator)
 
@@ -164,6 +180,8 @@ def test_a_controller_of_another_rate_is_refused_and_a_tuned_one_taken_apart():
     with pytest.raises(ValueError, match=r"controller 'PID' is made for 1000 Hz, and this loop has 10000 Hz"):
         LOOP.simulate(Controller.pid(0.0, 1e6, rate_hz=1e3), 0.1)
     tuned = tune(LOOP, "PI")
+    with_no_rate = replace(Controller.pid(0.0, 1e6, rate_hz=1e3), rate_hz=None)
+    assert LOOP.simulate(with_no_rate, 0.1).error_rad.shape == (1000, 1)
     with pytest.raises(TypeError, match=r"give its \.controller"):
         LOOP.margins(tuned)
     with pytest.raises(ValueError, match=r"controller 'PI' is made for 10000 Hz, and this loop has 20000 Hz"):
