@@ -113,6 +113,8 @@ def test_what_the_loop_leaves_is_a_source_of_its_window(call, tmp_path):
         ([('window = "10 ms"\n', "")], (), 'is missing, and index = "RPE" needs it'),
         ([('index = "APE"', 'index = "APE"\nwindow = "1 s"')], (), 'does not belong to index = "APE"'),
         ([("with_loop = false", "with_loop = true"), ('index = "APE"', 'index = "AKE"')], (), "is of what is known"),
+        ([("gains = [1.0, 0.5]", "gains = []")], (), "error_budget.sources.alignment.gains"),
+        ([("gains = [1.0, 0.5]", "gains = [1, 1, 1, 1]")], (), "has 4 items"),
         ([('axes = "y"', 'axes = "z"')], (), "needs 3 axes, and the sources have 2"),
         ([("gains = [0.0, 1.0]", "gains = [1.0]")], (), "has 1 items, and others have 2"),
         ([('frequency = "0.2 mHz"', 'period = "1 h"')], (), 'is missing, and class = "periodic" needs it'),

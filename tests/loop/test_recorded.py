@@ -360,7 +360,7 @@ def test_other_orders_rates_and_lengths_are_refused(small, monkeypatch):
     with pytest.raises(ValueError, match="rates may differ 10000 times"):
         resampled(small.motion, 1e-8)
     monkeypatch.setattr(recorded, "_MOST_STEPS", 2 * samples.size)
-    assert resampled(small.motion, 2e-3).size == 2 * samples.size
+    assert resampled(small.motion, 2e-3).size == 2 * samples.size - 1
     with pytest.raises(ValueError, match=r"are not played every 0\.0019 s: .* 10000 steps are the most; cut the"):
         resampled(small.motion, 1.9e-3)
     refuse_short(small, 10.0)

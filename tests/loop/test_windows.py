@@ -303,7 +303,7 @@ def test_refusals():
     for none in ([], [0.0, math.nan] * 100):
         with pytest.raises(ValueError, match=r"a recorded motion has the shape .*: give one row of finite samples"):
             recorded_rms(none, 0.01, index)
-    with pytest.raises(ValueError, match="PDE: its times are shorter than two samples of 0.01 s"):
+    with pytest.raises(ValueError, match=r"PDE: its times are shorter than two samples of 0\.01 s"):
         recorded_rms(rad, 0.01, ErrorIndex("PDE", 0.1, 0.004))
     assert recorded_rms(rad, 0.01, ErrorIndex("PDE", 0.02, 0.01)) == 0.0
     with pytest.raises(ValueError, match='sided is "": say "one" or "two"'):

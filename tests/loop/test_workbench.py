@@ -99,6 +99,10 @@ def test_damping_reads_the_gauge():
     assert tune(gauged, "resonant damping").residual_rms_rad[0] < tune(LOOP, "PI").residual_rms_rad[0]
     with pytest.raises(ValueError, match="gauge"):
         tune(LOOP, "resonant damping")
+    s = SLOW.system
+    direct = lti.StateSpace(s.A, np.pad(s.B, ((0, 0), (0, 1))), s.C, np.array([[s.D[0, 0], 1.0]]))
+    with pytest.raises(ValueError, match="controller 'PID' reads a strain gauge, and this loop has none"):
+        LOOP.simulate(replace(SLOW, system=direct), 0.1)
 
 
 @pytest.mark.parametrize(
@@ -133,6 +137,11 @@ def test_what_does_not_fit_a_loop_is_refused():
         said = re.escape(f"reference_rad has shape {np.shape(wanted)}: give finite samples of shape (samples, 1)")
         with pytest.raises(ValueError, match=said):
             LOOP.simulate(SLOW, 0.1, reference_rad=wanted)
+    two = mirrors.combine(STRAIGHT, STRAIGHT)
+    with pytest.raises(ValueError, match="has 2 actuators and 2 axes: give one axis at a time"):
+        control.sampled_plant(two, LOOP.parts.drive, LOOP.parts.timing)
+    with pytest.raises(ValueError, match="of one axis with one actuator, not of 1 with 2: design each axis by itself"):
+        tune(replace(LOOP, mirror=two, optics=[[1.0, 0.0]]), "PI")
     with pytest.raises(ValueError, match="makes the loop unstable"):
         LOOP.margins(Controller.pid(1e6, rate_hz=10e3))
     with pytest.raises(ValueError, match=r"'H-infinity' cannot be tuned for a loop of one axis: choose one of PI"):
@@ -148,7 +157,7 @@ def test_what_does_not_fit_a_loop_is_refused():
     with pytest.raises(ValueError, match=r"gains \(1\.0, 0\.0, 1\.0\) and a filter of -0\.001 s make no PID"):
         Controller.pid(1.0, 0.0, 1.0, rate_hz=1e3, derivative_filter_s=-1e-3)
     with pytest.raises(ValueError, match="a PID of 0 axes at 1000 Hz: give one axis or more"):
-        Controller.pid(1.0, rate_hz=1e3, axes=0)
+        Controller.pid(1.0, rate_hz=1000, axes=0)
     with pytest.raises(ValueError, match="an ensemble of 0 runs"):
         LOOP.ensemble(SLOW, 0, 0.1)
 
@@ -200,6 +209,26 @@ def test_a_linear_system_is_a_mirror_and_gets_a_controller():
     assert 0.0 < runs.radial_rms_rad < 20e-6
     with pytest.raises(ValueError, match="linear system of mirror 'fitted' is not stable"):
         Mirror.of_system(lti.StateSpace(np.eye(1), np.eye(1), np.eye(1), np.zeros((1, 1))), "fitted")
+
+
+def test_a_system_without_states_is_a_mirror():
+    static = lti.StateSpace(np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), np.array([[5e-5]]))
+    assert_allclose(Mirror.of_system(static).response([1.0, 2.0], 1e-4), [5e-5, 1e-4], rtol=1e-12)
+
+
+@pytest.mark.parametrize("use", [Loop.margins, Loop.residual_rms_rad, lambda loop, of: loop.simulate(of, 0.01)])
+@pytest.mark.parametrize("axes", [1, 2])
+@pytest.mark.parametrize("key", ["A", "B", "C", "D", "anti-windup"])
+def test_a_controller_with_a_number_that_is_none_is_refused(key, axes, use):
+    """With two axes LAPACK said that an array must not contain it, and an anti-windup of it was taken."""
+    loop = replace(LOOP, mirror=mirrors.combine(*[STRAIGHT] * axes))
+    pid = Controller.pid(0.0, 5e6, rate_hz=10e3, axes=axes)
+    if key == "anti-windup":
+        wrong = replace(pid, anti_windup=pid.anti_windup * np.nan)
+    else:
+        wrong = replace(pid, system=replace(pid.system, **{key: getattr(pid.system, key) + np.inf}))
+    with pytest.raises(ValueError, match=f"controller 'PID': {key} holds a number that is not finite; look for a gain"):
+        use(loop, wrong)
 
 
 def test_a_delay_of_more_states_than_memory_is_refused():

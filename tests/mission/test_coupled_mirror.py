@@ -211,6 +211,8 @@ FAULTS = {
     ),
     "a number that is none": (("[25.0, -950.0]", "[25.0, nan]"), "matrices.B", "row 4: item 2", "numbers"),
     "a matrix in one row": ((B, "B = [1.0, 2.0]"), "matrices.B", "is no list of rows", "[[1.0, 0.0], [0.0, 1.0]]"),
+    "a matrix of one number": ((B, "B = 1.0"), "matrices.B", "is no list of rows", "[[1.0, 0.0], [0.0, 1.0]]"),
+    "a matrix of nothing": ((B, "B = []"), "matrices.B", "is no list of rows", "[[1.0, 0.0], [0.0, 1.0]]"),
     "no C": ((C, ""), "matrices", "has no C, so none of the 4 states is seen", "a row for each output"),
     # ---- hysteresis
     "an operator that acts on nothing": (

@@ -302,6 +302,7 @@ ONE_WRONG = [
     ("settle", '"1.99999 s"', "leaves no control sample behind settle", "would do"),
     ("geometry.layout", '"tripods"', "none of the choices", 'layout = "tripod"'),
     ("geometry.incidence", '"90 deg"', "grazes the mirror", "would do"),
+    ("geometry.incidence", '"100 deg"', "grazes the mirror", "would do"),
     ("geometry.incidence", '"-1 deg"', "below 0 deg", 'incidence = "5 deg"'),
     ("geometry.magnification", "0", "not above 0", "above 0"),
     ("geometry.magnification", '"10"', "not a plain number", "without quotes"),

@@ -287,6 +287,12 @@ def test_a_resolution_of_zero_is_an_ideal_converter(tmp_path):
         ("scenario.pid_frequencies", '["1 Hz", "1 Hz"]', "does not rise", "rising"),
         ("scenario.pid_frequencies", '["0 Hz", "1 Hz"]', "item 1", "above 0 Hz"),
         ("scenario.pid_frequencies", "[]", "not a list with something in it", "a list"),
+        (
+            "scenario.loop_frequencies",
+            '["20 mHz", "10 Hz"]',
+            "begins at 20 mHz, a period of over 2000000 control samples",
+            "frequencies of at least 25 mHz",
+        ),
         ("scenario.loop_frequencies", '["1 Hz", "25 kHz"]', "half of control.rate is 25 kHz", "below 25 kHz"),
         ("requirement.residual_statistic", '"mean"', "none of the choices", 'residual_statistic = "peak"'),
     ],
