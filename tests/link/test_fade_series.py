@@ -365,6 +365,18 @@ def test_a_series_is_refused_that_is_shorter_than_a_word_or_an_interleaver_or_sa
         coded_fading(linked(coarse), 3.0, 1e-6)
 
 
+def test_a_code_of_another_name_is_none():
+    with pytest.raises(ValueError, match='no code is called "ccsds"; there is ccsds-k7-1-2'):
+        code("ccsds")
+
+
+def test_a_short_file_without_times_is_told_that_it_is_short(tmp_path):
+    path = tmp_path / "short.csv"
+    path.write_text("power\n" + "1\n" * 199)
+    with pytest.raises(FadeSeriesError, match="the series has 199 samples; from 200"):
+        read_fade_series(path, unit="linear", normalised="mean")
+
+
 @pytest.mark.promise("link-88")
 @pytest.mark.parametrize(("alone", "refused"), [(10, False), (12, True)])
 def test_a_tenth_of_the_faded_time_may_be_in_fades_of_a_single_sample(alone, refused):

@@ -213,6 +213,9 @@ def test_a_linear_system_is_a_mirror_and_gets_a_controller():
 
 def test_a_system_without_states_is_a_mirror():
     static = lti.StateSpace(np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), np.array([[5e-5]]))
+    steep = lti.StateSpace(-np.eye(1), np.array([[1e150]]), np.array([[1e150]]), np.zeros((1, 1)))
+    with pytest.raises(ValueError, match=r"mirror 'steep' gives no finite output to this drive at a step of 0\.0001 s"):
+        Mirror.of_system(steep, "steep").response([0.0, 1e30, 1e30], 1e-4)
     assert_allclose(Mirror.of_system(static).response([1.0, 2.0], 1e-4), [5e-5, 1e-4], rtol=1e-12)
 
 

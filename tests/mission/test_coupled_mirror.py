@@ -676,6 +676,8 @@ def test_keys_of_version_2_in_a_mirror_of_one_axis(tmp_path):
         ("mirror.modes", foreign),
         ("mirror.matrices", foreign),
     ]
+    (too_large,) = told(f"{ONE_AXIS}\n# {' ' * 1_000_000}\n")
+    assert too_large[1].startswith("the mirror file ")
     unknown = "is no version of a mirror of one axis"
     assert told(f"version = 1\n{ONE_AXIS}") == [("mirror.version", unknown)]
     assert told(f"version = true\n{ONE_AXIS}") == [("mirror.version", unknown)]
@@ -692,6 +694,11 @@ def test_a_mirror_of_one_axis_is_none_of_several():
     assert [fault.key for fault in faults] == ["mirror.version"]
     assert "travel is a key of version 1: the file holds a mirror of one axis" in faults[0].reason
     assert "load_mirror reads this one" in faults[0].expected
+    faults = refusal(edited(("version = 2\n", 'travel = "2 mrad"\n')))
+    assert [(fault.key, fault.reason) for fault in faults] == [
+        ("mirror.version", "is missing"),
+        ("mirror.travel", "is a key of version 1, in a file of version 2"),
+    ]
 
 
 def test_a_number_whose_products_are_none_is_refused():

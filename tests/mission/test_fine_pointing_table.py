@@ -302,7 +302,6 @@ ONE_WRONG = [
     ("settle", '"1.99999 s"', "leaves no control sample behind settle", "would do"),
     ("geometry.layout", '"tripods"', "none of the choices", 'layout = "tripod"'),
     ("geometry.incidence", '"90 deg"', "grazes the mirror", "would do"),
-    ("geometry.incidence", '"100 deg"', "grazes the mirror", "would do"),
     ("geometry.incidence", '"-1 deg"', "below 0 deg", 'incidence = "5 deg"'),
     ("geometry.magnification", "0", "not above 0", "above 0"),
     ("geometry.magnification", '"10"', "not a plain number", "without quotes"),
@@ -357,6 +356,11 @@ def test_one_bad_value_is_one_fault_and_what_would_do_does(refuse, load, key, va
     assert fault.line
     if "would do" in fault.expected:
         _check_advice(load, text, fault)
+
+
+def test_an_incidence_along_the_mirror_is_refused_whatever_its_coupling(refuse):
+    fault = refuse(edited(("geometry.incidence", '"90 deg"'), ("geometry.coupling", "[6e-17, 0.0, 0.0, 1.0]")))
+    assert (fault.key, fault.reason[:17]) == ("fine_pointing.geometry.incidence", "grazes the mirror")
 
 
 def _check_advice(load, text, fault):

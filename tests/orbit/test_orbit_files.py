@@ -258,6 +258,7 @@ TLE_FAULTS = {
     "letters for digits": (f"{edited(LINE_1, 21, 'O79')}\n{LINE_2}", "day of the epoch", "columns 21 to 32", "'O79."),
     "letters in line 2": (f"{LINE_1}\n{edited(LINE_2, 9, ' 9x.')}", "line 2", "inclination", "digits belong there"),
     "a blank in the day": (f"{edited(LINE_1, 21, '0 9')}\n{LINE_2}", "day of the epoch", "columns 21 to 32", "'0 9"),
+    "a digit of another script": (f"{edited(LINE_1, 64, chr(0x663))}\n{LINE_2}", "line 1", "digits belong there"),
     "day 367": (f"{edited(LINE_1, 21, '367')}\n{LINE_2}", "day 367.5", "from 1 to 366"),
     "year 1960": (f"{edited(LINE_1, 19, '60')}\n{LINE_2}", "line 1", "1960", "outside"),
     "SGP4-XP": (f"{edited(LINE_1, 63, '4')}\n{LINE_2}", "another theory than SGP4"),

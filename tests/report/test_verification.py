@@ -1116,6 +1116,9 @@ def test_a_mission_says_whether_its_mirror_works_within_what_was_measured(tmp_pa
     sources = sources_of(SHIPPED_TEXT, tmp_path)
     hysteresis, linear = foundation.measured(sources)
     assert not hysteresis.inside
+    without_rate = {key: each for key, each in sources.items() if key not in ("control.rate", "fine_pointing.rate")}
+    assert any("a rate of 50 kHz" in each for each in linear.beyond)
+    assert not any("a rate of" in each for each in foundation.measured(without_rate)[1].beyond)
     told = marks.with_marks({}, sources)["mirror_model"]
     assert [each["inside"] for each in told] == [hysteresis.inside, linear.inside]
     assert "of travel" in hysteresis.said and not any("travel" in each for each in hysteresis.beyond + linear.beyond)
