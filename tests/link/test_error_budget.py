@@ -482,6 +482,13 @@ AT_2 = replace(FAST, A=np.diag([-2.0, -3.0]))
             lambda: contribution(source("transient", gains=AT_2, period_s=9.0, decay_s=0.5), APE),
             "is a pole of its transfer",
         ),
+        (
+            lambda: contribution(
+                source("transient", period_s=9.0, decay_s=0.5),
+                Requirement(ErrorIndex("PRE", 6.0, 13.0), axes=(0,), observation_s=7.0),
+            ),
+            "no two windows of 6 s so far apart lie within periods; give shorter ones",
+        ),
         (lambda: contributions([source("random"), source("constant", gains=np.ones(2))], APE), "give all as many"),
         (lambda: contributions([source("random")], replace(APE, axes=(1,))), "axis 1 is asked for"),
         (lambda: total([], APE), "a budget without a source"),

@@ -306,6 +306,13 @@ def test_one_bad_value_is_one_fault_with_key_value_line_and_advice(refuse, key, 
     assert expected in fault.expected
 
 
+def test_pointing_without_a_line_is_one_fault(refuse):
+    lines = r"(?s)\[pointing\.lines\..*?\n(?=\[(?!pointing\.lines))"
+    fault = the_fault(refuse(re.sub(lines, "[pointing.lines]\n\n", TEXT, count=1)))
+    assert (fault.key, fault.reason) == ("pointing.lines", "holds no error")
+    assert fault.expected == "a table such as [pointing.lines.body_pointing]"
+
+
 def test_a_whole_number_beyond_floats_is_no_gain(refuse):
     fault = the_fault(refuse(edited("amplifier.gain", "0x" + "f" * 300)))
     assert (fault.key, fault.value, fault.reason) == (

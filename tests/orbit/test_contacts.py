@@ -541,6 +541,11 @@ def test_gravity_turns_the_normal_of_an_orbit_and_with_it_the_body():
     np.testing.assert_allclose(np.cross(rate, now, axis=0), slope, rtol=0, atol=1e-4 * lift.max())
 
 
+def test_no_times_have_no_clearance():
+    none = np.zeros((3, 0))
+    assert FLAT.clearance_rad(none, none).shape == (0,)
+
+
 @pytest.mark.promise("day-17")
 def test_the_sun_behind_the_earth_does_not_blind():
     """At an equinox the Sun, the Earth and a slot are in one line once a day."""

@@ -578,7 +578,7 @@ def test_requirements_are_counted_by_how_they_stand_and_each_says_what_its_title
 
 
 @pytest.mark.promise("verification-16")
-def test_each_occurrence_is_warned_of_with_its_impact_or_said_not_to_be_there():
+def test_each_occurrence_is_warned_of_with_its_impact_or_said_not_to_be_there(monkeypatch):
     good = page.verification_data(reported(outcome(Referent.INDEPENDENT, True, MARGIN)))["warnings"]
     assert [w["letter"] for w in good if w["letter"] in "adf"] == ["a", "d", "f"]
     assert all((w["impact"] != "") is (w["found"] != "None found.") for w in good)
@@ -597,6 +597,10 @@ def test_each_occurrence_is_warned_of_with_its_impact_or_said_not_to_be_there():
     assert "three" in setup[1]
     shown = unescape(page.verification_page(bad))
     assert all(w.found in shown and w.impact in shown for w in warned.warnings(bad))
+    untold = f"{len(bad.bare)} quantities were compared with nothing and have no source."
+    assert untold in [w.found for w in warned.warnings(bad) if w.letter == "h"]
+    monkeypatch.setattr(findings.Verification, "bare", ())
+    assert not any("were compared with nothing" in w.found for w in warned.warnings(bad))
 
 
 @pytest.mark.promise("verification-17")
@@ -1044,6 +1048,12 @@ def test_dependences_are_what_moves_where_one_input_is_changed(monkeypatch):
     monkeypatch.setattr(dependences, "_numbers", made)
     swept = sweeps.Sweep("x", (), {"a": (0.5, 2.0), "b": (0.5, 2.0)}, 1)
     assert dependences.dependences([swept]) == {"Link margin | Beacon": ["a"], "Point-ahead angle": []}
+
+
+def test_a_name_that_is_gone_has_moved_where_others_of_its_kind_are_there():
+    first, second = (f"day.contacts.{number}.volume_bit" for number in (1, 2))
+    assert list(dependences._moved({first: 1.0, second: 2.0}, {first: 1.0})) == [second]
+    assert list(dependences._moved({first: 1.0, "contact.1.start_s": 0.0}, {first: 1.0})) == []
 
 
 # -------------------------------------------------------------------------------------------------------- recordings

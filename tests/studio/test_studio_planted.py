@@ -259,6 +259,19 @@ def test_a_key_that_others_may_know_or_that_is_damaged_is_told(own_key, jobs, tm
     assert stat.S_IMODE(own_key.stat().st_mode) == 0o600
 
 
+@pytest.mark.skipif(os.name != "posix", reason="no such owners")
+def test_a_key_and_a_folder_of_another_user_are_refused(own_key, tmp_path, monkeypatch):
+    code = signing.code(b"text")
+    assert plain_files.private(tmp_path / "own") == tmp_path / "own"
+    someone = os.geteuid() + 1
+    monkeypatch.setattr(os, "geteuid", lambda: someone)
+    with pytest.raises(signing.SigningError, match="is not this user's alone; remove it"):
+        signing.is_ours(b"text", code)
+    monkeypatch.setattr(os, "getuid", lambda: someone)
+    with pytest.raises(OSError, match="it is a link or belongs to somebody else; remove it"):
+        plain_files.private(tmp_path / "own")
+
+
 def test_a_place_that_cannot_take_the_key_is_told(own_key, tmp_path):
     own_key.parent.parent.write_text("a file", "utf-8")
     with pytest.raises(signing.SigningError, match=r"cannot be made: .*; give XDG_STATE_HOME a folder"):
