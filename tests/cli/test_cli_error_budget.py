@@ -100,6 +100,15 @@ def test_what_the_loop_leaves_is_a_source_of_its_window(call, tmp_path):
     assert {each["origin"] for each in loop} == {"the mission's fine-pointing loop under PI"}
 
 
+SOURCES, REQUIREMENTS = (
+    TABLE[TABLE.index(first) : TABLE.index(behind) if behind else None]
+    for first, behind in (
+        ("[error_budget.sources.alignment]", "[error_budget.requirements.code_word]"),
+        ("[error_budget.requirements.code_word]", None),
+    )
+)
+
+
 @pytest.mark.promise("pointing-53")
 @pytest.mark.parametrize(
     ("changes", "options", "words"),
@@ -113,6 +122,19 @@ def test_what_the_loop_leaves_is_a_source_of_its_window(call, tmp_path):
         ([('window = "10 ms"\n', "")], (), 'is missing, and index = "RPE" needs it'),
         ([('index = "APE"', 'index = "APE"\nwindow = "1 s"')], (), 'does not belong to index = "APE"'),
         ([("with_loop = false", "with_loop = true"), ('index = "APE"', 'index = "AKE"')], (), "is of what is known"),
+        ([("gains = [1.0, 0.5]", "gains = []")], (), "error_budget.sources.alignment.gains"),
+        ([("gains = [1.0, 0.5]", "gains = [1, 1, 1, 1]")], (), "has 4 items"),
+        ([(SOURCES, "")], (), "error_budget.sources\n    holds no source"),
+        ([(REQUIREMENTS, "[error_budget.requirements]\n")], (), "error_budget.requirements\n    holds none"),
+        (
+            [
+                ("with_loop = false", "with_loop = true"),
+                ("gains = [1.0, 0.5]", "gains = [1, 1, 0]"),
+                ("gains = [0.0, 1.0]", "gains = [0, 1, 0]"),
+            ],
+            (),
+            "has two axes, and the sources have 3",
+        ),
         ([('axes = "y"', 'axes = "z"')], (), "needs 3 axes, and the sources have 2"),
         ([("gains = [0.0, 1.0]", "gains = [1.0]")], (), "has 1 items, and others have 2"),
         ([('frequency = "0.2 mHz"', 'period = "1 h"')], (), 'is missing, and class = "periodic" needs it'),

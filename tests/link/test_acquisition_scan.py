@@ -275,6 +275,14 @@ REFUSALS = [
     (lambda: highest_speed(SEARCH, 0.0), r"the detection time is 0 s"),
     (lambda: gap_probability(Spiral(SEARCH, SURE, SLOW), -1e-6), r"the vibration's rms is -1 µrad: .* at least 0 rad"),
     (lambda: detection_times(Spiral(SEARCH, SURE, SLOW), -1e-6), r"the vibration's rms is -1 µrad"),
+    (
+        lambda: detection_times(Spiral(SEARCH, SURE, SLOW), 1e-200),
+        r"the vibration's rms is 1e-200 rad; what is below 1e-\d+ is 0: write that",
+    ),
+    (
+        lambda: detection_times(Spiral(SEARCH, Detector(1e-9, 0.99e-4), SLOW)),
+        r"stays on a target for 3\.64e\+06 looks, each of which detects it with a probability of 9\.9e-05: scan faster",
+    ),
     (lambda: Vibration(-1e-6, 1.0), r"Vibration\.rms_rad is -1 µrad: it must be finite, at least 0 rad"),
     (lambda: Vibration(1e-6, 0.0), r"Vibration\.correlation_time_s is 0 s: it must be finite, above 0 s"),
     (

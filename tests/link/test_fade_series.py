@@ -336,6 +336,7 @@ def test_levels_and_normalisations():
         (np.r_[np.ones(300), 1e31], {}, r"sample 300 is 1e\+31, .* at most 1e\+30"),
         (np.r_[np.ones(300), 400.0], {"unit": "dB"}, "sample 300 is 400, .* at most 300 dB"),
         (np.zeros(300), {}, "no sample is above 0: there is no light"),
+        (np.full(300, -np.inf), {"unit": "dB"}, "no sample is above 0: there is no light"),
         (np.ones(300), {"unit": "W"}, "the unit is 'W'; give one of linear, dB"),
         (np.ones(300), {"normalised": "peak"}, "the normalisation is 'peak'; give one of mean, largest, as-given"),
     ],
@@ -355,11 +356,25 @@ def test_a_series_is_refused_that_is_shorter_than_a_word_or_an_interleaver_or_sa
         linked(series, 1025)
     with pytest.raises(FadeSeriesError, match="interleaving is 'block' and its span 0 s"):
         CodedLink(CODE, series, RATE, "block")
+    with pytest.raises(FadeSeriesError, match="the interleaving is 'blocks'; give one of none, block"):
+        CodedLink(CODE, series, RATE, "blocks", 1e-3)
     coded_fading(linked(series), 3.0, 1e-6)
     coarse = series_of(scintillation(1024, 0.1, 1))
     words = r"sampled slower than its fades: (9\d|100) % of the time below -.* in fades of a single sample, 10 µs, and"
     with pytest.raises(FadeSeriesError, match=words):
         coded_fading(linked(coarse), 3.0, 1e-6)
+
+
+def test_a_code_of_another_name_is_none():
+    with pytest.raises(ValueError, match='no code is called "ccsds"; there is ccsds-k7-1-2'):
+        code("ccsds")
+
+
+def test_a_short_file_without_times_is_told_that_it_is_short(tmp_path):
+    path = tmp_path / "short.csv"
+    path.write_text("power\n" + "1\n" * 199)
+    with pytest.raises(FadeSeriesError, match="the series has 199 samples; from 200"):
+        read_fade_series(path, unit="linear", normalised="mean")
 
 
 @pytest.mark.promise("link-88")

@@ -223,6 +223,15 @@ def test_no_series_is_made_where_none_is_given(tmp_path):
         assert (fault.key, fault.reason) == (f"communication.fading.{key}", "stands without a series")
 
 
+@pytest.mark.parametrize(("key", "example"), [("unit", 'unit = "linear"'), ("normalised", 'normalised = "mean"')])
+def test_a_series_needs_its_unit_and_what_it_is_relative_to(tmp_path, key, example):
+    with pytest.raises(MissionError) as refused:
+        link_file(tmp_path, fading(**{key: None}))
+    (fault,) = refused.value.faults
+    assert (fault.key, fault.reason) == (f"communication.fading.{key}", "is missing, and series needs it")
+    assert fault.expected == f"{example} would do"
+
+
 @pytest.mark.promise("link-85")
 def test_a_receiver_has_the_target_of_the_series(tmp_path):
     fades(tmp_path)

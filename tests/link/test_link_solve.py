@@ -208,3 +208,10 @@ def test_a_wider_beam_in_the_same_aperture_has_its_own_best(tmp_path):
     beam = {"conventions.pointing_loss": "pattern", "communication.beam": {**GAUSSIAN, "radius": "8 mm"}}
     solution = solved(tmp_path, "communication.beam.radius", NO_BEAMS, beam, {"communication.data_rate": "100 Mbit/s"})
     assert 8e-3 < solution.solved.best < 0.05
+
+
+def test_a_margin_that_no_value_has_is_left_by_none(tmp_path):
+    m = link_file(tmp_path).mission
+    (distance,) = (each for each in variation.inputs(m, "communication") if each.shown == "communication.distance")
+    solved = variation.solve(m, (distance,), "m", lambda m: 0.0, 0.0, lambda m: False)
+    assert (solved.intervals, solved.best_db) == ((), -math.inf)

@@ -190,6 +190,11 @@ def test_a_transient_that_comes_and_goes_is_covered_more_often_than_budgeted(las
 
 
 @pytest.mark.promise("link-30", "link-31")
+def test_a_mission_without_pointing_errors_has_no_budget_of_them():
+    with pytest.raises(ValueError, match=r"the mission states no pointing errors; give it the table \[pointing\]"):
+        pointing.open_loop_budget(None, None, None, {})
+
+
 def test_the_words_of_a_line_say_what_was_calculated():
     temporal = error_classes.basis(stated("bias", "2-sigma", "radial"))
     assert temporal == (

@@ -365,6 +365,10 @@ def test_simulated_motion_fades_as_often_and_as_long_within_its_99_percent_inter
         ),
         (lambda: ps.best_divergence_for_static_error(1e-6, current_half_angle_rad=0.0), r"the half angle is 0 rad"),
         (lambda: pf.mean_error_ratio(EQUAL, 0.0, 0.0, exponential(1e-9)), r"the half angle is 0 rad: .* above 0 rad"),
+        (
+            lambda: pf.mean_error_ratio(EQUAL, 1e-200, 0.0, exponential(1e-9)),
+            r"the half angle is below 1e-\d+ rad, which",
+        ),
         (lambda: pf.mean_error_ratio(EQUAL, THETA, 0.0, lambda p: 0.5), "one value from 0 to 1 for each power"),
         (lambda: pf.mean_error_ratio(EQUAL, THETA, 0.0, lambda p: 1.1 + 0.0 * p), "one value from 0 to 1"),
         (lambda: pf.mean_error_ratio(EQUAL, THETA, 0.0, lambda p: np.nan * p), "one value from 0 to 1"),
@@ -373,6 +377,7 @@ def test_simulated_motion_fades_as_often_and_as_long_within_its_99_percent_inter
         (lambda: pf.uncoded_penalty_db(EQUAL, URAD, exponential(1e-9)), "even with 100 dB more power"),
         (lambda: pf.motion_of_spectrum([1.0], [[1.0], [1.0]]), "do not fit"),
         (lambda: pf.motion_of_spectrum([1.0, 2.0], [1.0, 1.0]), "do not fit"),
+        (lambda: pf.motion_of_spectrum([[1.0, 2.0]], [[1.0, 1.0]] * 2), r"frequencies of shape \(1, 2\) and"),
         (lambda: pf.motion_of_spectrum([1.0, 1.0], [[1.0, 1.0]] * 2), "the frequencies do not rise"),
         (lambda: pf.motion_of_spectrum([-1.0, 1.0], [[1.0, 1.0]] * 2), "the frequencies do not rise"),
         (lambda: pf.motion_of_spectrum([1.0, math.inf], [[1.0, 1.0]] * 2), "the frequencies do not rise"),

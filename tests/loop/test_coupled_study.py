@@ -128,7 +128,10 @@ def test_drawn_mirrors_follow_the_covariance_and_those_that_are_none_are_drawn_a
     assert_allclose(values.mean(axis=0), [18.0, 900.0, 0.04, 70e-6], atol=4.0 * np.max(errors / math.sqrt(400.0)))
     assert_allclose(np.std(values, axis=0) / errors, 1.0, atol=4.0 / math.sqrt(800.0))
     assert_allclose(np.corrcoef(values.T), correlation, atol=4.0 / math.sqrt(400.0))
-    assert coupled.draws(replace(mirror, known=None), 3, 3) == ()
+    unknown = replace(mirror, known=None)
+    assert coupled.draws(unknown, 3, 3) == ()
+    with pytest.raises(ValueError, match="has no table uncertainty, so nothing can be drawn; `microrad identify`"):
+        coupled.drawn(unknown, 3, 3)
     wild = replace(mirror.known, standard_errors=np.array([0.0, 0.0, 1e6, 0.0]))
     some = coupled.draws(replace(mirror, known=wild), 20, 3)
     assert {m.mirror.plays[0].weights_rad_v[2] for m in some} == {
@@ -392,6 +395,14 @@ FAULTS = {
     "an actuator that does nothing": (
         lambda m: replace(m, mirror=replace(m.mirror, B=m.mirror.B * np.array([1.0, 0.0]), E=0 * m.mirror.E)),
         "do not move the line of sight in both axes",
+    ),
+    "one actuator": (
+        lambda m: replace(
+            m,
+            actuators=m.actuators[:1],
+            mirror=replace(m.mirror, **{key: getattr(m.mirror, key)[:, :1] for key in "BDG"}),
+        ),
+        r"the 1 actuator\(s\) of .* do not move the line of sight in both axes",
     ),
     "a bias beyond the amplifier": (
         lambda m: replace(m, actuators=tuple(replace(a, bias_v=150.0) for a in m.actuators)),

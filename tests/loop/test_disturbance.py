@@ -19,6 +19,7 @@ from microrad.loop.disturbance import (
     MICIUS_EDGES_HZ,
     MICIUS_RMS_RAD,
     Disturbance,
+    Misalignment,
     Reference,
     SpectralLine,
     band_rms,
@@ -33,6 +34,7 @@ from microrad.loop.disturbance import (
     one_input,
     psd,
     read_table,
+    tables,
     wheels,
 )
 
@@ -496,6 +498,15 @@ def test_a_table_that_cannot_be_read_is_refused(tmp_path):
         read_table(tmp_path / "image.csv")
 
 
+def test_a_table_of_more_than_it_may_have_is_refused(tmp_path, monkeypatch):
+    path = write(tmp_path, "Hz,urad^2/Hz\n1,4\n2,3\n5,1\n")
+    monkeypatch.setattr(tables, "_MAX_BYTES", path.stat().st_size)
+    assert read_table(path)[0].tolist() == [1, 2, 5]
+    monkeypatch.setattr(tables, "_MAX_BYTES", path.stat().st_size - 1)
+    with pytest.raises(ValueError, match=r"spectrum\.csv: more than 0 MB; average the spectrum to fewer rows"):
+        read_table(path)
+
+
 @pytest.mark.promise("pointing-9")
 def test_a_table_goes_from_file_to_fit(tmp_path):
     f = np.geomspace(0.01, 100, 60)
@@ -567,7 +578,16 @@ FILTER = Disturbance("given", -np.eye(2), np.ones((2, 1)), np.ones((1, 2)), (), 
             "the density at 2 Hz is zero, which no filter has",
         ),
         (lambda: fit_table([1, 2, 3], [1, 1], convention="radial"), "3 frequencies and 2 densities"),
+        (
+            lambda: fit_table([0, 1, 2], [1e-12] * 3, convention="radial"),
+            "2 rows from 1 Hz, .*; give three rows or more of a spectrum",
+        ),
+        (
+            lambda: fit_table([1e-200, 1, 2, 3], [1e-12] * 4, convention="radial"),
+            "4 rows from 1e-200 Hz, .*; give three rows or more of a spectrum, in these units",
+        ),
         (lambda: band_rms(olympus(), [1]), r"edges of the bands are \[1.0\] Hz"),
+        (lambda: band_rms(olympus(), [[1, 2]]), r"edges of the bands are \[\[1.0, 2.0\]\] Hz"),
         (lambda: band_rms(replace(FILTER, A=np.array([[-1.0, 1], [0, -1]])), [0, 1]), '"given": poles coincide'),
         (combine, "no disturbance to combine; give one or more"),
         (lambda: replace(FILTER, A=np.eye(2)), 'filter of "given": a pole has the real part 1 rad/s'),
@@ -576,6 +596,9 @@ FILTER = Disturbance("given", -np.eye(2), np.ones((2, 1)), np.ones((1, 2)), (), 
             "a pole has the real part 0 rad/s, so its motion has no variance",
         ),
         (lambda: replace(FILTER, C=np.ones((2, 1))), r"A \(2, 2\), B \(2, 1\) and C \(2, 1\) do not fit together"),
+        (lambda: replace(FILTER, A=np.zeros((2, 3))), r"A \(2, 3\), B \(2, 1\) and C \(1, 2\) do not fit together"),
+        (lambda: replace(FILTER, B=np.ones(2)), r"B \(2,\) and C \(1, 2\) do not fit together"),
+        (lambda: replace(FILTER, B=np.ones((3, 1))), r"B \(3, 1\) and C \(1, 2\) do not fit together"),
         (lambda: replace(FILTER, B=np.full((2, 1), nan)), "A, B or C holds a number that is not finite"),
         (lambda: discretise(olympus(), 0.0), "step of a sampled disturbance is 0 s; give a finite number above zero"),
         (lambda: discretise(olympus(), nan), "step of a sampled disturbance is nan s"),
@@ -587,6 +610,14 @@ FILTER = Disturbance("given", -np.eye(2), np.ones((2, 1)), np.ones((1, 2)), (), 
             lambda: initial_state(discretise(FILTER, 1.0), np.zeros(1), np.zeros(0)),
             "needs 2 rows of normal numbers and 0",
         ),
+        (
+            lambda: initial_state(
+                discretise(replace(FILTER, lines=(SpectralLine(1, 50),)), 1e-3), np.zeros(4), np.zeros(0)
+            ),
+            "a start of 4 states with 1 lines needs 4 rows of normal numbers and 1 phases, not 4 and 0",
+        ),
+        (lambda: Misalignment(nan, 0), "a misalignment of nan rad and 0 rad/s; give finite numbers"),
+        (lambda: Misalignment(0, inf), "a misalignment of 0 rad and inf rad/s; give finite numbers"),
         (lambda: Reference(nan, 0, 1), "point_ahead_rad of a pointing reference is nan; give a finite number"),
         (lambda: Reference(0, 0, 0), "bandwidth of the body's loop in a pointing reference is 0 Hz"),
         (lambda: Reference(0, 0, 1, 1e-6, -1), "frequency of the sine in a pointing reference is -1 Hz"),

@@ -294,6 +294,10 @@ def test_it_is_designed_where_a_reference_is_known_and_has_the_margins_of_its_fe
 
 REFUSED = {
     "already": (lambda found: (found.loop, forward(found)), "has an inverse or a feedforward of the reference already"),
+    "with an inverse": (
+        lambda found: (found.loop, replace(integral(found), inverse=forward(found).forward)),
+        "has an inverse or a feedforward of the reference already",
+    ),
     "ahead of the linear part": (
         lambda found: (
             replace(

@@ -675,7 +675,7 @@ def test_a_design_plant_without_gauge_says_so_and_one_of_two_axes_is_refused():
     assert not plant.has_gauge
     assert_array_equal(plant.system.C[2], 0.0)
     assert_array_equal(plant.system.D[2], 0.0)
-    with pytest.raises(ValueError, match="a design needs a loop of one axis, not of 2: design each axis by itself"):
+    with pytest.raises(ValueError, match="of one axis with one actuator, not of 2 with 2: design each axis by itself"):
         design_plant(scenario(2))
 
 

@@ -18,6 +18,7 @@ from microrad.loop.disturbance import (
     discretise,
     olympus,
     psd,
+    recorded,
     recorded_fit,
     recorded_lines,
 )
@@ -352,12 +353,16 @@ def test_what_is_no_motion_is_refused(samples, step_s, words):
 
 
 @pytest.mark.promise("pointing-69")
-def test_other_orders_rates_and_lengths_are_refused(small):
+def test_other_orders_rates_and_lengths_are_refused(small, monkeypatch):
     samples = small.motion.samples_rad
     with pytest.raises(ValueError, match="a shaping filter of 0 states; give 1 to 24"):
         fit_recording(samples, 4e-3, order=0)
     with pytest.raises(ValueError, match="rates may differ 10000 times"):
         resampled(small.motion, 1e-8)
+    monkeypatch.setattr(recorded, "_MOST_STEPS", 2 * samples.size)
+    assert resampled(small.motion, 2e-3).size == 2 * samples.size - 1
+    with pytest.raises(ValueError, match=r"are not played every 0\.0019 s: .* 10000 steps are the most; cut the"):
+        resampled(small.motion, 1.9e-3)
     refuse_short(small, 10.0)
     with pytest.raises(ValueError, match=r'"small" lasts 20 s; the loop settles in 19 s, and ten times the .* record'):
         refuse_short(small, 19.0)

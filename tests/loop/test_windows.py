@@ -300,10 +300,19 @@ def test_refusals():
         recorded_rms(rad, 1.0, index)
     with pytest.raises(ValueError, match=r"has the shape \(5, 10\): give one row of finite samples"):
         recorded_rms(rad.reshape(5, 10), 0.01, index)
+    for none in ([], [0.0, math.nan] * 100):
+        with pytest.raises(ValueError, match=r"a recorded motion has the shape .*: give one row of finite samples"):
+            recorded_rms(none, 0.01, index)
+    with pytest.raises(ValueError, match=r"PDE: its times are shorter than two samples of 0\.01 s"):
+        recorded_rms(rad, 0.01, ErrorIndex("PDE", 0.1, 0.004))
+    assert recorded_rms(rad, 0.01, ErrorIndex("PDE", 0.02, 0.01)) == 0.0
     with pytest.raises(ValueError, match='sided is "": say "one" or "two"'):
         tabulated_rms([1.0, 2.0], [1.0, 1.0], index, "")
     with pytest.raises(ValueError, match="a density needs one finite value above 0 for each frequency above 0 Hz"):
         tabulated_rms([0.0, 2.0], [1.0, 1.0], index, "one")
+    for density in ([1.0], [1.0, math.nan], [1.0, 0.0]):
+        with pytest.raises(ValueError, match="a density needs one finite value above 0 for each frequency above 0 Hz"):
+            tabulated_rms([1.0, 2.0], density, index, "one")
     with pytest.raises(ValueError, match=r"pole of 0 rad/s: it is not stationary; give a stable system"):
         exposure(lti.StateSpace(np.zeros((1, 1)), np.ones((1, 1)), np.ones((1, 1)), np.zeros((1, 1))), 1.0)
     with pytest.raises(ValueError, match="direct term, so that its variance is infinite"):

@@ -1,5 +1,6 @@
 """A loop by itself, without a mission: beside linear theory, the paper's loop, and one axis beside two."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -98,12 +99,17 @@ def test_damping_reads_the_gauge():
     assert tune(gauged, "resonant damping").residual_rms_rad[0] < tune(LOOP, "PI").residual_rms_rad[0]
     with pytest.raises(ValueError, match="gauge"):
         tune(LOOP, "resonant damping")
+    s = SLOW.system
+    direct = lti.StateSpace(s.A, np.pad(s.B, ((0, 0), (0, 1))), s.C, np.array([[s.D[0, 0], 1.0]]))
+    with pytest.raises(ValueError, match="controller 'PID' reads a strain gauge, and this loop has none"):
+        LOOP.simulate(replace(SLOW, system=direct), 0.1)
 
 
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
         ({"rate_hz": 0.0}, "rate_hz of a loop is 0.0: give a number above 0"),
+        ({"rate_hz": np.inf}, "rate_hz of a loop is inf: give a number above 0"),
         ({"slew_v_s": -1.0}, "slew_v_s of a loop is -1.0"),
         ({"steps_per_sample": 0}, "0 plant steps a sample: give 1 or more"),
         ({"drive_range_v": (1.0, 2.0)}, "rest, 0 V, has to lie inside"),
@@ -112,6 +118,7 @@ def test_damping_reads_the_gauge():
         ({"sensor_delay_s": 13e-6}, "sensor of the loop: its delay of 13 µs"),
         ({"sensor_noise_rad": -1.0}, "noise_rad"),
         ({"optics": [[1.0, 2.0]]}, r"optics of a loop has shape \(1, 2\): give finite numbers of shape \(axes, 1\)"),
+        ({"optics": [[np.nan]]}, r"optics of a loop has shape \(1, 1\): give finite numbers"),
         ({"optics": [[1.0], [1.0]], "gauge_noise_rad": 1e-7}, "one line-of-sight angle for each output"),
     ],
 )
@@ -126,8 +133,15 @@ def test_what_does_not_fit_a_loop_is_refused():
         ValueError, match=r"controller 'PID' has 2 inputs, 2 outputs .* a loop of 1 axes takes an error"
     ):
         LOOP.margins(Controller.pid(0.0, 1e6, rate_hz=10e3, axes=2))
-    with pytest.raises(ValueError, match=r"reference_rad has shape \(3, 2\): give finite samples of shape"):
-        LOOP.simulate(SLOW, 0.1, reference_rad=np.zeros((3, 2)))
+    for wanted in (np.zeros((3, 2)), np.zeros((3, 1, 1)), [], [0.0, np.nan]):
+        said = re.escape(f"reference_rad has shape {np.shape(wanted)}: give finite samples of shape (samples, 1)")
+        with pytest.raises(ValueError, match=said):
+            LOOP.simulate(SLOW, 0.1, reference_rad=wanted)
+    two = mirrors.combine(STRAIGHT, STRAIGHT)
+    with pytest.raises(ValueError, match="has 2 actuators and 2 axes: give one axis at a time"):
+        control.sampled_plant(two, LOOP.parts.drive, LOOP.parts.timing)
+    with pytest.raises(ValueError, match="of one axis with one actuator, not of 1 with 2: design each axis by itself"):
+        tune(replace(LOOP, mirror=two, optics=[[1.0, 0.0]]), "PI")
     with pytest.raises(ValueError, match="makes the loop unstable"):
         LOOP.margins(Controller.pid(1e6, rate_hz=10e3))
     with pytest.raises(ValueError, match=r"'H-infinity' cannot be tuned for a loop of one axis: choose one of PI"):
@@ -140,6 +154,10 @@ def test_what_does_not_fit_a_loop_is_refused():
         Controller.pid(np.nan, rate_hz=1e3)
     with pytest.raises(ValueError, match="a PID of 1 axes at 0 Hz"):
         Controller.pid(1.0, rate_hz=0)
+    with pytest.raises(ValueError, match=r"gains \(1\.0, 0\.0, 1\.0\) and a filter of -0\.001 s make no PID"):
+        Controller.pid(1.0, 0.0, 1.0, rate_hz=1e3, derivative_filter_s=-1e-3)
+    with pytest.raises(ValueError, match="a PID of 0 axes at 1000 Hz: give one axis or more"):
+        Controller.pid(1.0, rate_hz=1000, axes=0)
     with pytest.raises(ValueError, match="an ensemble of 0 runs"):
         LOOP.ensemble(SLOW, 0, 0.1)
 
@@ -153,9 +171,16 @@ def test_a_mirror_of_parts_answers_and_refuses():
     assert_allclose(response, [50e-6, -500e-6j], rtol=1e-9, atol=1e-12)
     both = mirrors.combine(STRAIGHT, BENT).response(np.column_stack([drive, drive]), 1e-5)
     assert_allclose(both[:, 1], BENT.response(drive, 1e-5), rtol=0, atol=1e-12 * np.ptp(both))
-    with pytest.raises(ValueError, match=r"drive_v has shape \(3000, 2\): mirror 'straight' takes finite samples"):
-        STRAIGHT.response(np.column_stack([drive, drive]), 1e-5)
-    for numerator, denominator in (([1.0, 0.0, 0.0], [1.0, 1.0]), ([1.0], [1.0, -1.0]), ([1.0, 0.0], [1.0, 2.0, 3.0])):
+    for given in (np.column_stack([drive, drive]), drive[:, None, None], [], [1.0, np.nan]):
+        said = re.escape(f"drive_v has shape {np.shape(given)}: mirror 'straight' takes finite samples of shape")
+        with pytest.raises(ValueError, match=said):
+            STRAIGHT.response(given, 1e-5)
+    for numerator, denominator in (
+        ([1.0, 0.0, 0.0], [1.0, 1.0]),
+        ([1.0], [1.0, -1.0]),
+        ([1.0, 0.0], [1.0, 2.0, 3.0]),
+        ([1.0], [0.0, 1.0, 1.0]),
+    ):
         with pytest.raises(ValueError, match="give one that is proper and stable"):
             Mirror.of(1e-6, numerator, denominator)
 
@@ -164,6 +189,8 @@ def test_a_controller_of_another_rate_is_refused_and_a_tuned_one_taken_apart():
     with pytest.raises(ValueError, match=r"controller 'PID' is made for 1000 Hz, and this loop has 10000 Hz"):
         LOOP.simulate(Controller.pid(0.0, 1e6, rate_hz=1e3), 0.1)
     tuned = tune(LOOP, "PI")
+    with_no_rate = replace(Controller.pid(0.0, 1e6, rate_hz=1e3), rate_hz=None)
+    assert LOOP.simulate(with_no_rate, 0.1).error_rad.shape == (1000, 1)
     with pytest.raises(TypeError, match=r"give its \.controller"):
         LOOP.margins(tuned)
     with pytest.raises(ValueError, match=r"controller 'PI' is made for 10000 Hz, and this loop has 20000 Hz"):
@@ -182,6 +209,29 @@ def test_a_linear_system_is_a_mirror_and_gets_a_controller():
     assert 0.0 < runs.radial_rms_rad < 20e-6
     with pytest.raises(ValueError, match="linear system of mirror 'fitted' is not stable"):
         Mirror.of_system(lti.StateSpace(np.eye(1), np.eye(1), np.eye(1), np.zeros((1, 1))), "fitted")
+
+
+def test_a_system_without_states_is_a_mirror():
+    static = lti.StateSpace(np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), np.array([[5e-5]]))
+    steep = lti.StateSpace(-np.eye(1), np.array([[1e150]]), np.array([[1e150]]), np.zeros((1, 1)))
+    with pytest.raises(ValueError, match=r"mirror 'steep' gives no finite output to this drive at a step of 0\.0001 s"):
+        Mirror.of_system(steep, "steep").response([0.0, 1e30, 1e30], 1e-4)
+    assert_allclose(Mirror.of_system(static).response([1.0, 2.0], 1e-4), [5e-5, 1e-4], rtol=1e-12)
+
+
+@pytest.mark.parametrize("use", [Loop.margins, Loop.residual_rms_rad, lambda loop, of: loop.simulate(of, 0.01)])
+@pytest.mark.parametrize("axes", [1, 2])
+@pytest.mark.parametrize("key", ["A", "B", "C", "D", "anti-windup"])
+def test_a_controller_with_a_number_that_is_none_is_refused(key, axes, use):
+    """With two axes LAPACK said that an array must not contain it, and an anti-windup of it was taken."""
+    loop = replace(LOOP, mirror=mirrors.combine(*[STRAIGHT] * axes))
+    pid = Controller.pid(0.0, 5e6, rate_hz=10e3, axes=axes)
+    if key == "anti-windup":
+        wrong = replace(pid, anti_windup=pid.anti_windup * np.nan)
+    else:
+        wrong = replace(pid, system=replace(pid.system, **{key: getattr(pid.system, key) + np.inf}))
+    with pytest.raises(ValueError, match=f"controller 'PID': {key} holds a number that is not finite; look for a gain"):
+        use(loop, wrong)
 
 
 def test_a_delay_of_more_states_than_memory_is_refused():

@@ -128,6 +128,7 @@ def test_a_singular_coupling_is_refused_with_the_direction_that_is_not_driven():
         ({"coupling": ((1.0, 0.0),)}, "coupling is .* for none"),
         ({"layout": "tripod"}, "actuator_radius_m is None; give the radius of the circle on which the tripod's three"),
         ({"layout": "tripod", "actuator_radius_m": 0.0}, "actuator_radius_m is 0.0"),
+        ({"layout": "two-axis", "actuator_radius_m": -0.01}, "actuator_radius_m is -0.01"),
     ],
 )
 def test_what_is_no_geometry_is_refused(values, message):

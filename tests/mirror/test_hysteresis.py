@@ -187,6 +187,11 @@ def test_the_steepest_slope_of_plays_is_met_when_all_move():
     assert hysteresis.steepest_slope(mixed) == pytest.approx(0.089e-3)
 
 
+def test_plays_that_depend_on_the_rate_have_no_steepest_slope():
+    with pytest.raises(ValueError, match="that is fed back cannot depend on the rate: within a step it has no slope"):
+        hysteresis.steepest_slope(replace(PLAYS, widening_s=1e-3))
+
+
 def test_a_polynomial_adds_to_the_steepest_slope_what_it_has_at_its_reach():
     bent = replace(PLAYS, polynomial_rad=(2e-5, -1e-5, 3e-5), reach_v=2.0)
     added = hysteresis.steepest_slope(bent) - hysteresis.steepest_slope(PLAYS)

@@ -103,6 +103,11 @@ def test_what_a_model_cannot_take_is_refused():
         PrandtlIshlinskii((0.0, 1.0), (1e-6,))
     with pytest.raises(ValueError, match="give thresholds that rise from 0 V"):
         PrandtlIshlinskii((1.0, 0.0), (1e-6, 1e-6))
+    with pytest.raises(ValueError, match=r"thresholds \(-1\.0, 1\.0\) V with 2 weights make no Prandtl"):
+        PrandtlIshlinskii((-1.0, 1.0), (1e-6, 1e-6))
+    for constants in ((1.0,), (1.0, 0.0)):
+        with pytest.raises(ValueError, match=r"creep of 2 weights .*: give as many weights, and time constants"):
+            Creep((1e-6, 1e-6), constants).response([1.0], STEP)
     with pytest.raises(ValueError, match=r"thresholds cannot widen by -1\.0 s"):
         PrandtlIshlinskii((0.0,), (1e-6,), widening_s=-1.0)
     with pytest.raises(ValueError, match="d1 = 0 has no inverse"):

@@ -598,6 +598,7 @@ def test_a_softer_mirror_for_small_drives():
         ((5e-5, [1.0], [1e-320, 1e-4, 1.0]), r"begins with .*, nothing beside the others"),
         ((5e-5, [1.0], [1e-8, nan, 1.0]), "rows of finite coefficients"),
         ((5e-5, [1j], [1e-8, 1e-4, 1.0]), "numerator of mirror 'mirror': no array of real numbers"),
+        ((5e-5, [], [1e-8, 1e-4, 1.0]), "rows of finite coefficients"),
         ((5e-5, [[1.0]], [1e-8, 1e-4, 1.0]), "rows of finite coefficients"),
     ],
 )

@@ -120,6 +120,7 @@ THREE = [*TWO, "bouc_wen.beta"]
         (table(["linear.poles.3"], [0.1]), "names no item of a list of 2.*a number from 1 to 2"),
         (table(["linear.poles.0"], [0.1]), "names no item of a list of 2"),
         (table(["linear.poles.x"], [0.1]), "names no item of a list of 2"),
+        (table(["linear.poles.\u0661"], [0.1]), "names no item of a list of 2"),
         (table(["bouc_wen.d1.1"], [0.1]), "counts the items of a single value"),
         (table(["bouc_wen.d2"], [0.1]), "is 0 in this mirror, and nothing is relative to 0"),
         (table(["linear.pole_dampings.2"], [0.1]), "damping of a real root, 1 by definition"),
@@ -135,6 +136,8 @@ THREE = [*TWO, "bouc_wen.beta"]
         (table(THREE, [0.1] * 3, [0.9, 0.9, -0.9]), "not positive semidefinite: its smallest eigenvalue is -0.8"),
         (table([1], [0.1]), "is not a list of keys in quotes"),
         (table([], []), "is not a list of keys in quotes"),
+        (table('"bouc_wen.d1"', [0.1]), "is not a list of keys in quotes"),
+        (table(["bouc_wen.d1"] * 1001, [0.1]), "is a list of 1001 items"),
         ("[uncertainty]\nstandard_errors = [0.1]", r"is missing.*parameters = \[.bouc_wen.d1.*linear.poles.1"),
     ],
 )

@@ -211,6 +211,8 @@ FAULTS = {
     ),
     "a number that is none": (("[25.0, -950.0]", "[25.0, nan]"), "matrices.B", "row 4: item 2", "numbers"),
     "a matrix in one row": ((B, "B = [1.0, 2.0]"), "matrices.B", "is no list of rows", "[[1.0, 0.0], [0.0, 1.0]]"),
+    "a matrix of one number": ((B, "B = 1.0"), "matrices.B", "is no list of rows", "[[1.0, 0.0], [0.0, 1.0]]"),
+    "a matrix of nothing": ((B, "B = []"), "matrices.B", "is no list of rows", "[[1.0, 0.0], [0.0, 1.0]]"),
     "no C": ((C, ""), "matrices", "has no C, so none of the 4 states is seen", "a row for each output"),
     # ---- hysteresis
     "an operator that acts on nothing": (
@@ -674,6 +676,10 @@ def test_keys_of_version_2_in_a_mirror_of_one_axis(tmp_path):
         ("mirror.modes", foreign),
         ("mirror.matrices", foreign),
     ]
+    largest = f"{ONE_AXIS}\n#".ljust(1_000_000)
+    assert told(f"{largest} ") == [("", "the mirror file is larger than 1000 kB")]
+    (tmp_path / "mirror.toml").write_text(largest, encoding="utf-8")
+    assert load_mirror(tmp_path / "mirror.toml").text == largest
     unknown = "is no version of a mirror of one axis"
     assert told(f"version = 1\n{ONE_AXIS}") == [("mirror.version", unknown)]
     assert told(f"version = true\n{ONE_AXIS}") == [("mirror.version", unknown)]
@@ -690,6 +696,11 @@ def test_a_mirror_of_one_axis_is_none_of_several():
     assert [fault.key for fault in faults] == ["mirror.version"]
     assert "travel is a key of version 1: the file holds a mirror of one axis" in faults[0].reason
     assert "load_mirror reads this one" in faults[0].expected
+    faults = refusal(edited(("version = 2\n", 'travel = "2 mrad"\n')))
+    assert [(fault.key, fault.reason) for fault in faults] == [
+        ("mirror.version", "is missing"),
+        ("mirror.travel", "is a key of version 1, in a file of version 2"),
+    ]
 
 
 def test_a_number_whose_products_are_none_is_refused():

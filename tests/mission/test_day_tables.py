@@ -113,6 +113,7 @@ REFUSED = [
     (f"{KIRUNA}.height", "10 km", "is above 9 km", "a length with its unit"),
     ("operations.contact.number", 0, "is below 1", "from 1 to 100000"),
     ("operations.contact.window", "0 s", "is not above 0 s", "a time with its unit"),
+    ("operations.contact.hold", "2 s", "is not below window (2 s): a window would never show a loss", "below 2 s"),
     ("constellation.planes", 5, "does not divide satellites = 12", "a divisor of it"),
     ("constellation.phasing", 3, "is not below planes = 3", "0 to 2"),
     ("constellation.satellites", None, 'is missing, and pattern = "delta" needs it', "satellites = 1 would do"),

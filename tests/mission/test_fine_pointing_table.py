@@ -358,6 +358,11 @@ def test_one_bad_value_is_one_fault_and_what_would_do_does(refuse, load, key, va
         _check_advice(load, text, fault)
 
 
+def test_an_incidence_along_the_mirror_is_refused_whatever_its_coupling(refuse):
+    fault = refuse(edited(("geometry.incidence", '"90 deg"'), ("geometry.coupling", "[6e-17, 0.0, 0.0, 1.0]")))
+    assert (fault.key, fault.reason[:17]) == ("fine_pointing.geometry.incidence", "grazes the mirror")
+
+
 def _check_advice(load, text, fault):
     """The lines that the advice names make a good file."""
     table = fault.key.rpartition(".")[0].removeprefix("fine_pointing").lstrip(".")

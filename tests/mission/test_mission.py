@@ -287,6 +287,12 @@ def test_a_resolution_of_zero_is_an_ideal_converter(tmp_path):
         ("scenario.pid_frequencies", '["1 Hz", "1 Hz"]', "does not rise", "rising"),
         ("scenario.pid_frequencies", '["0 Hz", "1 Hz"]', "item 1", "above 0 Hz"),
         ("scenario.pid_frequencies", "[]", "not a list with something in it", "a list"),
+        (
+            "scenario.loop_frequencies",
+            '["20 mHz", "10 Hz"]',
+            "begins at 20 mHz, a period of over 2000000 control samples",
+            "frequencies of at least 25 mHz",
+        ),
         ("scenario.loop_frequencies", '["1 Hz", "25 kHz"]', "half of control.rate is 25 kHz", "below 25 kHz"),
         ("requirement.residual_statistic", '"mean"', "none of the choices", 'residual_statistic = "peak"'),
     ],
@@ -298,6 +304,13 @@ def test_one_bad_value_is_one_fault_with_key_value_line_and_advice(refuse, key, 
     assert fault.value[:10] == value[:10]
     assert reason in fault.reason
     assert expected in fault.expected
+
+
+def test_pointing_without_a_line_is_one_fault(refuse):
+    lines = r"(?s)\[pointing\.lines\..*?\n(?=\[(?!pointing\.lines))"
+    fault = the_fault(refuse(re.sub(lines, "[pointing.lines]\n\n", TEXT, count=1)))
+    assert (fault.key, fault.reason) == ("pointing.lines", "holds no error")
+    assert fault.expected == "a table such as [pointing.lines.body_pointing]"
 
 
 def test_a_whole_number_beyond_floats_is_no_gain(refuse):

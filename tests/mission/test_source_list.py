@@ -6,6 +6,7 @@ from zipfile import ZIP_DEFLATED, ZipFile
 import pytest
 
 from budget_files import HEADING, ROWS
+from microrad.mission import source_list
 from microrad.mission.source_list import COLUMNS, SourceListError, read_sources
 
 
@@ -26,6 +27,11 @@ def test_each_row_is_a_source_as_a_mission_states_it(tmp_path):
     assert wheels.corner_hz == 40.0
     assert last.gains == (0.5, -1.0)
     assert [found[0].origin, found[1].origin] == ["ground calibration", f"{path}, row 3"]
+
+
+def test_an_error_of_each_observation_is_spread(tmp_path):
+    (found,) = read_sources(listed(tmp_path, "a,per-observation,1 urad,,3-sigma,each,1,1"))
+    assert (found.source.kind, found.source.statistic) == ("per-observation", "3-sigma")
 
 
 def test_a_text_with_a_byte_order_mark_is_read_as_one_without(tmp_path):
@@ -103,6 +109,19 @@ def test_files_that_are_no_list_are_refused(tmp_path):
     (tmp_path / "other.xlsx").write_bytes(b"PK\x03\x04 nothing more")
     with pytest.raises(SourceListError, match="is no workbook"):
         read_sources(tmp_path / "other.xlsx")
+
+
+def test_a_list_has_so_many_rows_and_bytes_and_no_more(tmp_path, monkeypatch):
+    path = listed(tmp_path, *ROWS)
+    monkeypatch.setattr(source_list, "_MOST_BYTES", path.stat().st_size)
+    monkeypatch.setattr(source_list, "_MOST_ROWS", len(ROWS) + 1)
+    assert len(read_sources(path)) == len(ROWS)
+    monkeypatch.setattr(source_list, "_MOST_ROWS", len(ROWS))
+    with pytest.raises(SourceListError, match=f"more than {len(ROWS)} rows; give fewer sources"):
+        read_sources(path)
+    monkeypatch.setattr(source_list, "_MOST_BYTES", path.stat().st_size - 1)
+    with pytest.raises(SourceListError, match="is larger than 0 MB; give the list alone"):
+        read_sources(path)
 
 
 def test_a_workbook_that_unpacks_to_more_than_memory_has_is_refused(tmp_path):

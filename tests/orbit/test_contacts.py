@@ -159,6 +159,8 @@ def test_what_cannot_be_searched_is_refused():
         events.positive(np.sin, np.array([0.0, 2.0, 1.0]))
     with pytest.raises(OrbitError, match="at least 3"):
         events.positive(np.sin, np.array([0.0, 2.0]))
+    with pytest.raises(OrbitError, match=r"\(2, 4\) values at 3 times; give as many values as times"):
+        events.positive_rows(lambda t, row: t + row, np.arange(3.0), np.zeros((2, 4)))
     with pytest.raises(OrbitError, match="not finite at 2 s"):
         events.positive(lambda t: np.where(t == 2.0, np.nan, t), np.arange(4.0))
 
@@ -365,8 +367,9 @@ def test_the_steps_follow_the_perigee():
     assert coarse_step_s(SLOT, 0.0) == 960.0
     assert coarse_step_s(KeplerOrbit("GTO", EPOCH, 24400e3, 0.72, 0.1, 0.0, 0.0, 3.0, False), 0.0) == 30.0
     np.testing.assert_array_equal(coarse_times((10.0, 100.0), 60.0), [10.0, 32.5, 55.0, 77.5, 100.0])
-    with pytest.raises(OrbitError, match="from 5 s to 5 s holds no time"):
-        coarse_times((5.0, 5.0), 60.0)
+    for span_s in ((5.0, 5.0), (-math.inf, 5.0), (5.0, math.inf)):
+        with pytest.raises(OrbitError, match="holds no time; give a start and a later end"):
+            coarse_times(span_s, 60.0)
     with pytest.raises(OrbitError, match=r"in steps of 1e-06 s, more than 5e\+06 of them"):
         coarse_times(DAY, 1e-6)
 
@@ -538,6 +541,11 @@ def test_gravity_turns_the_normal_of_an_orbit_and_with_it_the_body():
     np.testing.assert_allclose(np.cross(rate, now, axis=0), slope, rtol=0, atol=1e-4 * lift.max())
 
 
+def test_no_times_have_no_clearance():
+    none = np.zeros((3, 0))
+    assert FLAT.clearance_rad(none, none).shape == (0,)
+
+
 @pytest.mark.promise("day-17")
 def test_the_sun_behind_the_earth_does_not_blind():
     """At an equinox the Sun, the Earth and a slot are in one line once a day."""
@@ -555,6 +563,7 @@ def test_the_sun_behind_the_earth_does_not_blind():
         ({"attitude": "spin"}, "attitude 'spin' is not known; write nadir, sun or free"),
         ({"boresight": (0.0, 0.0, 0.0)}, "has no direction"),
         ({"boresight": (0.0, math.nan, 1.0)}, "has no direction"),
+        ({"boresight": (0.0, 1.0)}, "has no direction; give three numbers"),
         (
             {"field_of_regard_rad": 0.0},
             "Limits.field_of_regard_rad is 0 deg: it must be finite, above 0 deg, at most 180 deg",

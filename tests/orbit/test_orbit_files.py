@@ -258,6 +258,7 @@ TLE_FAULTS = {
     "letters for digits": (f"{edited(LINE_1, 21, 'O79')}\n{LINE_2}", "day of the epoch", "columns 21 to 32", "'O79."),
     "letters in line 2": (f"{LINE_1}\n{edited(LINE_2, 9, ' 9x.')}", "line 2", "inclination", "digits belong there"),
     "a blank in the day": (f"{edited(LINE_1, 21, '0 9')}\n{LINE_2}", "day of the epoch", "columns 21 to 32", "'0 9"),
+    "a digit of another script": (f"{edited(LINE_1, 64, chr(0x663))}\n{LINE_2}", "line 1", "digits belong there"),
     "day 367": (f"{edited(LINE_1, 21, '367')}\n{LINE_2}", "day 367.5", "from 1 to 366"),
     "year 1960": (f"{edited(LINE_1, 19, '60')}\n{LINE_2}", "line 1", "1960", "outside"),
     "SGP4-XP": (f"{edited(LINE_1, 63, '4')}\n{LINE_2}", "another theory than SGP4"),
@@ -528,6 +529,10 @@ OMM_FAULTS = {
     "unit": (kvn({**FIELDS, "INCLINATION": "1 [rad]"}), "INCLINATION is in 'rad'", "'deg'"),
     "twice": (kvn(FIELDS) + "BSTAR = 3\n", "BSTAR is '3', but line"),
     "epoch": (kvn({**FIELDS, "EPOCH": "20 March 2026"}), "'20 March 2026', not a date and time"),
+    "minute": (kvn({**FIELDS, "EPOCH": "2026-03-20T12:60:00"}), "not a date and time"),
+    "second": (kvn({**FIELDS, "EPOCH": "2026-03-20T12:00:61"}), "not a date and time"),
+    "day 0 of the year": (kvn({**FIELDS, "EPOCH": "2025-000T12:00:00"}), "not a date and time"),
+    "a key without a value": (as_json({**FIELDS, "EPOCH": ""}), "EPOCH is missing in this mean-elements message"),
     "epoch not in the calendar": (kvn({**FIELDS, "EPOCH": "2026-02-30T00:00:00"}), "not a date and time"),
     "leap second": (kvn({**FIELDS, "EPOCH": "2026-03-20T23:59:60"}), "a second that does not exist"),
     "line": (kvn(FIELDS) + "what is this\n", "'what is this' is neither"),
@@ -929,6 +934,10 @@ def test_velocities_of_another_frame(tmp_path, frame):
             no_ephemeris(tmp_path, text, "are not those at which the positions are passed")
 
 
+def test_a_frame_that_does_not_turn_may_have_an_epoch(tmp_path):
+    ephemeris(tmp_path, HEAD + segment(GRID, REF_FRAME="EME2000", REF_FRAME_EPOCH=stamp(0)))
+
+
 def test_positions_that_no_satellite_passes(tmp_path):
     position_m, _ = truth(GRID)
     there = position_m.copy()
@@ -968,6 +977,9 @@ OEM_FAULTS = {
     "centre": (HEAD + segment(GRID, CENTER_NAME="MARS"), "CENTER_NAME is 'MARS'", "EARTH"),
     "frame": (HEAD + segment(GRID, REF_FRAME="MOD"), "line 10", "REF_FRAME is 'MOD'", "EME2000"),
     "frame held still": (HEAD + segment(GRID, REF_FRAME_EPOCH=stamp(0)), "REF_FRAME_EPOCH", "frame of date"),
+    "frame of the true equator held still": (
+        HEAD + segment(GRID, REF_FRAME="TOD", REF_FRAME_EPOCH=stamp(0)), "REF_FRAME_EPOCH holds TOD still"
+    ),
     "time system": (HEAD + segment(GRID, TIME_SYSTEM="TDB"), "TIME_SYSTEM is 'TDB'", "UTC, TAI, TT, GPS"),
     "Z in TAI": (HEAD + segment(GRID, TIME_SYSTEM="TAI", START_TIME=stamp(0) + "Z"), "ends in Z", "TAI"),
     "leap second of TAI": (HEAD + segment(GRID, TIME_SYSTEM="TAI", STOP_TIME="2016-12-31T23:59:60"), "no leap seconds"),

@@ -477,6 +477,7 @@ def test_a_huge_report_is_refused_before_it_is_read(tmp_path, monkeypatch):
         ({"mirror": ["mirror.toml"]}, "no mirror with file, sha256, text, text_sha256"),
         ({"inputs": {"a": 3}}, "no inputs as names with texts"),
         ({"inputs": {str(i): "" for i in range(17)}}, "more inputs than a mission names"),
+        ({"inputs": {"a": "x" * 4_000_001}}, "more inputs than a mission names"),
         ({"versions": 3}, "no versions as names with texts"),
         ({"machine": {"processor": 3}}, "no machine as names with texts"),
         ({"machine": 3}, "no machine as names with texts"),

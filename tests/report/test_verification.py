@@ -578,7 +578,7 @@ def test_requirements_are_counted_by_how_they_stand_and_each_says_what_its_title
 
 
 @pytest.mark.promise("verification-16")
-def test_each_occurrence_is_warned_of_with_its_impact_or_said_not_to_be_there():
+def test_each_occurrence_is_warned_of_with_its_impact_or_said_not_to_be_there(monkeypatch):
     good = page.verification_data(reported(outcome(Referent.INDEPENDENT, True, MARGIN)))["warnings"]
     assert [w["letter"] for w in good if w["letter"] in "adf"] == ["a", "d", "f"]
     assert all((w["impact"] != "") is (w["found"] != "None found.") for w in good)
@@ -597,6 +597,10 @@ def test_each_occurrence_is_warned_of_with_its_impact_or_said_not_to_be_there():
     assert "three" in setup[1]
     shown = unescape(page.verification_page(bad))
     assert all(w.found in shown and w.impact in shown for w in warned.warnings(bad))
+    untold = f"{len(bad.bare)} quantities were compared with nothing and have no source."
+    assert untold in [w.found for w in warned.warnings(bad) if w.letter == "h"]
+    monkeypatch.setattr(findings.Verification, "bare", ())
+    assert not any("were compared with nothing" in w.found for w in warned.warnings(bad))
 
 
 @pytest.mark.promise("verification-17")
@@ -1046,6 +1050,12 @@ def test_dependences_are_what_moves_where_one_input_is_changed(monkeypatch):
     assert dependences.dependences([swept]) == {"Link margin | Beacon": ["a"], "Point-ahead angle": []}
 
 
+def test_a_name_that_is_gone_has_moved_where_others_of_its_kind_are_there():
+    first, second = (f"day.contacts.{number}.volume_bit" for number in (1, 2))
+    assert list(dependences._moved({first: 1.0, second: 2.0}, {first: 1.0})) == [second]
+    assert list(dependences._moved({first: 1.0, "contact.1.start_s": 0.0}, {first: 1.0})) == []
+
+
 # -------------------------------------------------------------------------------------------------------- recordings
 def recording_of(drive, output, rate_hz, period=None):
     return SimpleNamespace(drive=drive, output=output, rate_hz=rate_hz, period_samples=period)
@@ -1116,6 +1126,9 @@ def test_a_mission_says_whether_its_mirror_works_within_what_was_measured(tmp_pa
     sources = sources_of(SHIPPED_TEXT, tmp_path)
     hysteresis, linear = foundation.measured(sources)
     assert not hysteresis.inside
+    without_rate = {key: each for key, each in sources.items() if key not in ("control.rate", "fine_pointing.rate")}
+    assert any("a rate of 50 kHz" in each for each in linear.beyond)
+    assert not any("a rate of" in each for each in foundation.measured(without_rate)[1].beyond)
     told = marks.with_marks({}, sources)["mirror_model"]
     assert [each["inside"] for each in told] == [hysteresis.inside, linear.inside]
     assert "of travel" in hysteresis.said and not any("travel" in each for each in hysteresis.beyond + linear.beyond)

@@ -207,6 +207,8 @@ def test_a_comment_behind_an_edited_list_stays_and_one_inside_it_is_not_lost(tmp
     assert draft.problems == ()
     with pytest.raises(DraftError, match=r"scenario.pid_frequencies holds comments between its items \(line \d+\)"):
         draft.set("scenario.pid_frequencies", "1 Hz")
+    sharp = draft.with_text(TEXT.replace('["1 Hz", "15 Hz"] ', '["1 Hz", "15 Hz#"] '))
+    assert '["1 Hz", "14 Hz"] ' in sharp.set("scenario.pid_frequencies", "1 Hz, 14 Hz").text
     open_end = draft.with_text(TEXT.replace('["1 Hz", "15 Hz"]', '["1 Hz", "15 Hz"'))
     assert len(open_end.problems) == 1
     assert open_end.set("scenario.pid_frequencies", "1 Hz, 15 Hz").text == TEXT

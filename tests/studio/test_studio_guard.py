@@ -544,6 +544,8 @@ def test_names_and_origins():
     for wrong in ("http://a", "a:80", "*", "a b", EVIL, ""):
         with pytest.raises(address.ExposureError, match="no name of a host"):
             address.hosts(80, (wrong,))
+    with pytest.raises(address.ExposureError, match="no name of a host"):
+        address.hosts(80, ())
 
 
 @pytest.mark.promise("studio-22")

@@ -22,7 +22,7 @@ pytest.importorskip("nicegui", reason="the studio is not installed (nicegui)")
 from nicegui.client import Client
 from nicegui.page import page as at
 
-from microrad.studio.pages import layout, mission, runs, runs_jobs
+from microrad.studio.pages import compare, layout, mission, runs, runs_jobs
 from microrad.studio.pages.sliders import SliderPage
 from waiting import until
 
@@ -52,6 +52,48 @@ def opened(session):
     yield enter
     for client in clients:
         client.delete()
+
+
+@pytest.fixture
+def told(monkeypatch):
+    """What pages refuse, in words."""
+    words = []
+    monkeypatch.setattr(layout, "refuse", words.append)
+    monkeypatch.setattr(mission, "_ask", lambda title, *_: words.append(title))
+    return words
+
+
+def test_a_folder_without_a_mission_has_none_to_open(session, told):
+    mission._open(session, told.append)
+    (session.folder / "leo-geo.toml").unlink()
+    mission._open(session, told.append)
+    assert told == [
+        f"Open a mission in {session.folder}",
+        f"There is no TOML file in {session.folder} yet; save this mission there first.",
+    ]
+
+
+def test_a_mission_with_every_table_gets_no_other_one(session, told, monkeypatch):
+    mission._add_table(session, told.append)
+    monkeypatch.setattr(mission, "offered", lambda draft: [])
+    mission._add_table(session, told.append)
+    assert told == [
+        "Add a table, with example values to be changed",
+        "This mission has every table that there is an example of.",
+    ]
+
+
+def test_a_budget_of_two_missions_needs_both_in_files(session, told):
+    page = SimpleNamespace(session=session)
+    assert compare._Page._action(page, True) is None
+    session.other = Draft.shipped(session.folder / "other.toml")
+    assert compare._Page._action(page, True) is None
+    assert told == [
+        "There is no other mission yet; choose one.",
+        "other.toml is not a file of this folder yet; save it there first.",
+    ]
+    session.other = Draft.open(session.folder / "leo-geo.toml")
+    assert compare._Page._action(page, True) == commands.budget(Path("leo-geo.toml"))
 
 
 def edited(page, text):

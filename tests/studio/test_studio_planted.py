@@ -13,6 +13,7 @@ import pytest
 from microrad.studio.guard import plain_files, signing
 from microrad.studio.jobs import files as jobs_files
 from microrad.studio.jobs import process as jobs_process
+from microrad.studio.jobs import queue
 from microrad.studio.jobs.queue import JobError, Jobs, Order
 from microrad.studio.session import Session
 from microrad.studio.views import mirror_form
@@ -257,6 +258,30 @@ def test_a_key_that_others_may_know_or_that_is_damaged_is_told(own_key, jobs, tm
     own_key.unlink()
     signing.code(b"text")
     assert stat.S_IMODE(own_key.stat().st_mode) == 0o600
+
+
+def test_a_queue_that_another_program_holds_takes_nothing(own_key, jobs, tmp_path, monkeypatch):
+    order = Order("study", "t", ("presets",), tmp_path)
+    monkeypatch.setattr(queue, "QUEUE_S", 0.0)
+    monkeypatch.setattr(queue, "start_waiting", lambda *_: None)
+    jobs.submit(order)
+    with jobs_files.held(jobs.folder / "lock", 0.0) as mine:
+        assert mine
+        with pytest.raises(JobError, match="is taken by another program; try again"):
+            jobs.submit(order)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="no such owners")
+def test_a_key_and_a_folder_of_another_user_are_refused(own_key, tmp_path, monkeypatch):
+    code = signing.code(b"text")
+    assert plain_files.private(tmp_path / "own") == tmp_path / "own"
+    someone = os.geteuid() + 1
+    monkeypatch.setattr(os, "geteuid", lambda: someone)
+    with pytest.raises(signing.SigningError, match="is not this user's alone; remove it"):
+        signing.is_ours(b"text", code)
+    monkeypatch.setattr(os, "getuid", lambda: someone)
+    with pytest.raises(OSError, match="it is a link or belongs to somebody else; remove it"):
+        plain_files.private(tmp_path / "own")
 
 
 def test_a_place_that_cannot_take_the_key_is_told(own_key, tmp_path):

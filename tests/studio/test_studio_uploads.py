@@ -25,7 +25,7 @@ from lab import test_recording_formats as formats
 from microrad.lab.live_fit import extremes
 from microrad.lab.recording import read_recording
 from microrad.studio.guard.names import NameRefusedError, safe_name, within
-from microrad.studio.recordings import reading
+from microrad.studio.recordings import process, reading
 from microrad.studio.recordings.reading import Columns, ReadingError, ReadingLimits, list_channels, view
 from microrad.studio.recordings.uploads import UploadError, UploadLimits, Uploads
 from waiting import HANG_S, gone, lines_of
@@ -590,6 +590,15 @@ def test_a_zip_bomb_is_refused_by_what_it_states(tmp_path):
     path = bomb(tmp_path / "bomb.npz", npy_header(25_000_000), 200)
     for columns in (None, Columns((0,), (1,), rate_hz=1e3)):
         assert "'u' states 2.5e+07 samples, and at most 2e+07 are read here; cut out" in refused(path, columns)
+
+
+def test_a_recording_of_as_many_samples_as_are_read_is_opened(tmp_path):
+    np.save(tmp_path / "a.npy", np.arange(300.0))
+    (tmp_path / "b.csv").write_text("a,b\n" + "1,2\n" * 300)
+    assert process.opened(tmp_path / "a.npy", {"limits": {"samples": 300}}).samples() == (300,)
+    assert process.opened(tmp_path / "b.csv", {"limits": {"samples": 1}}).samples() == (None, None)
+    with pytest.raises(process.RefusedError, match="'data' states 300 samples, and at most 299 are read here; cut out"):
+        process.opened(tmp_path / "a.npy", {"limits": {"samples": 299}})
 
 
 @linux

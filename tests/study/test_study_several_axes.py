@@ -24,6 +24,7 @@ from microrad.report.results.reproduce import reproduce
 from microrad.studio.views import controllers
 from microrad.study import study
 from several_axes import TEXT, mission_text, three_actuators
+from shipped import SHIPPED, without_fine_pointing
 
 NAMED = ("[fine_pointing]\n", '[fine_pointing]\nmirror_file = "mirror.toml"\n')
 SHORT = ('duration = "2 s" ', 'duration = "0.6 s" '), ('settle = "0.5 s"', 'settle = "0.2 s"')
@@ -241,3 +242,7 @@ def test_a_mirror_file_that_is_none_of_several_axes_is_refused(tmp_path, mirror,
 def test_the_studio_says_where_its_controllers_are(tmp_path):
     with pytest.raises(ValueError, match="microrad design has its controllers"):
         controllers.controller(load_mission(written(tmp_path)), "PI")
+    alone = tmp_path / "alone.toml"
+    alone.write_text(without_fine_pointing(SHIPPED.read_text("utf-8")), "utf-8")
+    with pytest.raises(ValueError, match=r"the mission has no table \[fine_pointing\]: microrad init writes one"):
+        controllers.controller(load_mission(alone), "PI")

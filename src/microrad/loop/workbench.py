@@ -358,6 +358,13 @@ class Loop:
                 f"of shape {controller.anti_windup.shape}: a loop of {axes} axes takes an error and gives a command "
                 f"for each, and an anti-windup of shape ({s.order}, {axes})"
             )
+        held = {"A": s.A, "B": s.B, "C": s.C, "D": s.D, "anti-windup": controller.anti_windup}
+        for key, matrix in held.items():
+            if not np.isfinite(matrix).all():
+                raise ValueError(
+                    f"controller {controller.name!r}: {key} holds a number that is not finite; look for a gain that is "
+                    "nan or infinite"
+                )
         return s
 
 

@@ -22,7 +22,10 @@ def design_plant(loop: PointingLoop) -> DesignPlant:
         ValueError: For a loop of more axes or actuators.
     """
     if loop.axes != 1 or loop.mirror.actuators != 1:
-        raise ValueError(f"a design needs a loop of one axis, not of {loop.axes}: design each axis by itself")
+        raise ValueError(
+            f"a design needs a loop of one axis with one actuator, not of {loop.axes} with {loop.mirror.actuators}: "
+            "design each axis by itself"
+        )
     sampled, disturbances = _sampled(loop, decoupling(loop))
     s, rows = sampled, np.zeros((1, sampled.order))
     gauge = np.zeros((1, s.B.shape[1]))

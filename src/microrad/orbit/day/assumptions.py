@@ -180,7 +180,7 @@ def _changes(own: Case, found: Found | None) -> Iterator[tuple[str, _Side, _Side
         yield "attitude of the satellite", held, None
     if leo.limits is not None and leo.limits.in_eclipse:
         yield "eclipse", orbiting("terminal off in it", "leo.limits.in_eclipse", False), None
-    if leo.kind == "circular" and leo.altitude_m is not None:
+    if leo.altitude_m is not None:
         yield scaled("orbit altitude", orbiting, "leo.altitude_m", leo.altitude_m, "m", (0.8, 1.2))
         if leo.local_time_s is not None:
             later = orbiting("6 h later", "leo.local_time_s", (leo.local_time_s + 21600.0) % 86400.0)
