@@ -46,6 +46,11 @@ def workers_here(pid=None):
     return found
 
 
+def workers_there(engine):
+    """Identities of the workers of an engine's scheduler, each start a new one."""
+    return {each["id"] for each in engine._client.scheduler_info()["workers"].values()}
+
+
 def chunks(*numbers):
     return [Job(0, n) for n in numbers]
 
@@ -185,9 +190,13 @@ def test_a_job_that_kills_its_worker_has_died_and_those_that_waited_there_come_o
     "silent", [pytest.param(101, marks=pytest.mark.endurance), 106], ids=["hangs", "keeps the lock"]
 )
 def test_a_job_without_a_sign_of_life_is_late_and_one_that_lasts_is_not(engine, silent):
+    until(lambda: len(workers_there(engine)) == 2, "two workers")
+    before = workers_there(engine)
     outcomes = run(engine, chunks(silent, 105, *range(6)))
     assert kinds(outcomes) == {silent: "late"}
     assert outcomes[silent].reason == "gave no sign of life for 5 s and was stopped"
+    until(lambda: len(workers_there(engine)) == 2, "the worker that its nanny has started again")
+    assert len(workers_there(engine) & before) == 1
 
 
 @pytest.mark.parametrize("looked", [False, True])

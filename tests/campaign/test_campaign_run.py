@@ -663,23 +663,27 @@ def test_the_rows_kept_in_time_are_the_worst_in_the_first_limits_output(short):
 
 
 class _Gone(Here):
-    """An engine whose scheduler goes away behind the first chunk."""
+    """An engine whose scheduler, or its last worker, goes away behind the first chunk."""
+
+    said = "the scheduler at tcp://head:1 is gone"
 
     def outcomes(self, jobs):
         yield next(super().outcomes(jobs))
-        raise CampaignError("the scheduler at tcp://head:1 is gone")
+        raise CampaignError(self.said)
 
 
-@pytest.mark.promise("campaigns-46", "campaigns-47", "campaigns-56")
-def test_an_engine_that_goes_away_leaves_what_is_done_and_another_goes_on(short, tmp_path, monkeypatch):
+@pytest.mark.promise("campaigns-46", "campaigns-47", "campaigns-53", "campaigns-56")
+@pytest.mark.parametrize("said", [_Gone.said, "the scheduler at tcp://head:1 had no worker for 60 s"])
+def test_an_engine_that_goes_away_leaves_what_is_done_and_another_goes_on(short, tmp_path, monkeypatch, said):
     path, _, undisturbed = short
+    monkeypatch.setattr(_Gone, "said", said)
     monkeypatch.setattr(run, "load_campaign", by_four)
     book = tmp_path / "campaign.ledger"
     with monkeypatch.context() as patched:
         patched.setattr(run.Means, "engine", lambda means, spec, late_s: _Gone(spec))
         with pytest.raises(CampaignError) as caught:
             run.run_campaign(path, book, run.Means(scheduler="tcp://head:1"))
-    words = f"the scheduler at tcp://head:1 is gone; 4 rows are in {book}. Go on with: microrad campaign resume"
+    words = f"{said}; 4 rows are in {book}. Go on with: microrad campaign resume"
     assert str(caught.value).startswith(words)
     assert len(chunks_in(book)) == 1
     without_worker(monkeypatch)

@@ -751,6 +751,9 @@ def test_the_header_says_what_it_is(shipped, tmp_path):
         "#define PI_INVERSE_IN_SERIES_RESOLUTION_V 0.000305\n",
         "optical_error_rad (rad): line-of-sight error (wanted less actual) from the optical sensor, by axis.",
         "go on stepping with an error of 0",
+        "the amplifier's input is the bias plus the command, and the mirror's angle rises with it.",
+        f"#define PI_INVERSE_IN_SERIES_BIAS_V {of.bias_v!r}\n",
+        "gives out the commands (V from the bias)",
     ):
         assert words.strip() in (text if "\n" in words else joined), words
     assert max(map(len, text.splitlines())) <= 120
@@ -924,6 +927,7 @@ def test_with_an_error_of_0_integrators_stay_and_a_rejected_reading_goes_on_driv
     begun[:, :2], rejected[:, :2] = 1e-6, nan
     state = code.begin()
     driven = code.replay(begun, state)[-1]
+    assert np.all(driven > 0.0)  # the angle rises with the command
     still = code.replay(opened, state)
     assert np.all(np.abs(still[-1]) > 1e-3)
     assert_allclose(still[-1000:], np.broadcast_to(still[-1], (1000, 2)), rtol=1e-9)

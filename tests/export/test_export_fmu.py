@@ -29,7 +29,7 @@ from microrad.core import kernels, lti
 from microrad.export import choice
 from microrad.export.flight.build import compiler
 from microrad.export.fmi import fmu
-from microrad.export.fmi.description import variables
+from microrad.export.fmi.description import plant_of, variables
 from microrad.export.records import ExportError, Origin, PlantUnit, Signal
 from microrad.loop import control
 from microrad.loop import sine_run as simulate
@@ -37,6 +37,7 @@ from microrad.loop.pointing_loop import kernel_arrays
 from microrad.loop.pointing_loop.loop import LoopController, PointingLoop
 from microrad.mirror import hysteresis
 from microrad.mirror import model as mirror
+from scenes import scene_of
 from slaves import Slave
 
 VERSIONS = ("2.0", "3.0")
@@ -194,9 +195,12 @@ def test_fmpy_finds_no_fault(archive, name, version):
     assert description.coSimulation.canGetAndSetFMUstate and description.coSimulation.canSerializeFMUstate
     listed = variables(UNITS[name](), version)
     assert [v.name for v in description.modelVariables] == [v.name for v in listed]
+    origin = plant_of(UNITS[name]()).origin
+    assert f"Mission: {origin.mission}, sha256 {origin.mission_sha256}." in description.description
     if name == "rich":
         assert description.modelName == "all there */ is"
-        assert 'Mission: a <mission> & "more", sha256 0' in description.description
+    else:
+        assert origin.mirror and description.modelName.startswith(origin.mirror)
     units = {v.name.removesuffix("[1]"): v.unit for v in description.modelVariables}
     output = "m" if name == "spring" else "rad"
     assert units[f"mirror_{output}"] == output and units["amplifier_slew_v_s"] == "V/s" and units["drive_v"] == "V"
@@ -270,6 +274,44 @@ def test_the_start_values_are_those_of_the_design(archive, version):
     assert start["amplifier_slew_v_s"] == pytest.approx(1000.0, rel=1e-14)
     assert start["bias_v"] == 6.0
     assert start["plant_step_s"] == 2e-5
+
+
+@pytest.mark.promise("export-30")
+def test_bias_limits_steps_and_delays_are_constants_that_can_be_read(slave):
+    unit, one = choice.loop_unit(tracking()), slave("loop", "3.0")
+    wanted = {
+        "bias_v": unit.plant.bias_v,
+        "plant_step_s": unit.plant.plant.step_s,
+        "control_period_s": unit.controller.period_s,
+        "computation_delay_s": unit.delay_steps * unit.plant.plant.step_s,
+        "command_minimum_v": unit.controller.minimum_v,
+        "command_maximum_v": unit.controller.maximum_v,
+    }
+    constants = [v.name for v in one.description.modelVariables if v.variability == "constant"]
+    assert {name: one.get(name)[0] for name in constants} == wanted
+    assert wanted["computation_delay_s"] > 0.0 and wanted["command_minimum_v"] < 0.0 < wanted["command_maximum_v"]
+    for name in constants:
+        with pytest.raises(FMICallException):
+            one.set(name, [1.0])
+        assert one.said[-1].endswith("cannot be set")
+
+
+@pytest.mark.promise("export-30")
+def test_sensor_noise_is_not_inside(slave):
+    """A loop at rest stays there until as much comes in as the mission's optical sensor has of noise."""
+    noise_rad = scene_of(designs.mission()).loop.optical.noise_rad
+    one, period_s = slave("pointing", "3.0"), choice.loop_unit(pointing()).controller.period_s
+
+    def moved(disturbance_rad):
+        found = []
+        for _ in range(50):
+            one.set("disturbance_rad", [disturbance_rad, disturbance_rad])
+            one.step(period_s)
+            found.append([one.get(name) for name in ("line_of_sight_rad", "command_v", "drive_v")])
+        return np.any(np.array(found) != 0.0)
+
+    assert not moved(0.0)
+    assert moved(noise_rad)
 
 
 @pytest.mark.promise("export-28")

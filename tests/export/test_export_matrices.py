@@ -515,7 +515,8 @@ def test_scipy_reads_the_same_numbers(written):
         assert record["Ts"].item() == m.period_s
         assert [name.item() for name in record["InputName"][:, 0]] == [p.name for p in m.inputs]
         assert [unit.item() for unit in record["OutputUnit"][:, 0]] == [p.unit for p in m.outputs]
-        assert record["MissionSha256"].item() == m.origin.mission_sha256
+        said = [record[key].item() for key in ("Mission", "MissionSha256", "Mirror")]
+        assert all(said) and said == [m.origin.mission, m.origin.mission_sha256, m.origin.mirror]
 
 
 @pytest.mark.promise("export-33")
@@ -668,7 +669,9 @@ def test_json_reads_back_to_the_last_bit(written):
                 np.array(each[key], dtype=float).reshape(getattr(m.system, key).shape).tobytes()
                 == getattr(m.system, key).tobytes()
             )
-        assert each["Ts_s"] == m.period_s and each["mission_sha256"] == m.origin.mission_sha256
+        assert each["Ts_s"] == m.period_s
+        said = [each[key] for key in ("mission", "mission_sha256", "mirror")]
+        assert said == [m.origin.mission, m.origin.mission_sha256, m.origin.mirror]
         assert each["inputs"] == [{"name": p.name, "unit": p.unit} for p in m.inputs]
     zpk = zero_pole_gain(found[0])
     entry = data["models"][0]["zero_pole_gain"]["entries"][0][0]

@@ -88,6 +88,7 @@ def test_displacements_become_angles_of_the_beam():
     assert piston is None
 
 
+@pytest.mark.promise("pointing-82")
 def test_drives_reach_as_far_as_every_actuator_allows():
     """Each rests at its own bias: none is driven beyond what the amplifier gives, on either side."""
     plain = three_actuators()
@@ -219,6 +220,17 @@ def test_margins_are_those_of_the_closed_loop_on_a_dense_grid(case):
     assert d.margins.modulus == pytest.approx(least, rel=2e-3)
     assert d.margins.disk.disk == pytest.approx(disk, rel=5e-3)
     assert d.margins.modulus >= scene.table.modulus_margin
+
+
+@pytest.mark.promise("pointing-82")
+@pytest.mark.parametrize("case", CASES, ids=IDS)
+def test_no_controller_reads_the_mirrors_own_sensors(case):
+    """Beside the optical sensor's two errors and the two references, a column for each output of the mirror."""
+    scene, d = chosen(case)
+    s, own = d.controller.system, slice(2, 2 + len(scene.rest.mirror.C))
+    assert s.D.shape[1] == own.stop + 2
+    assert not s.B[:, own].any() and not s.D[:, own].any()
+    assert s.B[:, :2].any()
 
 
 @pytest.mark.promise("pointing-78", "sampled-loop-8")
@@ -489,6 +501,7 @@ def test_design_prints_its_matrices(quick, call):
     scene = scene_of(two_axes())
     system = lti.StateSpace(*(np.array(found["matrices"][key]) for key in "ABCD"))
     assert system.D.shape == (2, 2 + 3 + 2)
+    assert not system.B[:, 2:5].any() and not system.D[:, 2:5].any()  # the mirror's own sensors
     axes = control.WholeController(
         "read", *_axis_parts(scene, _Read(system, np.array(found["matrices"]["anti_windup"])))
     )

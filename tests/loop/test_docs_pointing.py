@@ -24,6 +24,7 @@ from places import ROOT
     "pointing-76",
     "pointing-83",
     "pointing-86",
+    "pointing-111",
 )
 def test_every_controllers_worked_example_runs(tmp_path, monkeypatch, capsys):
     (tmp_path / "missions").symlink_to(ROOT / "missions")

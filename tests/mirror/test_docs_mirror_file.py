@@ -55,7 +55,7 @@ def test_comparison_names_its_tables():
         assert f"`[comparison.{key}]`" in section("`[comparison]`")
 
 
-@pytest.mark.promise("mirror-file-25", "mirror-file-26")
+@pytest.mark.promise("mirror-file-25", "mirror-file-26", "mirror-file-62")
 @pytest.mark.parametrize("number", range(len(OF_ONE_AXIS)))
 @pytest.mark.promise("mirror-file-58")
 def test_examples_load(number, tmp_path):
@@ -65,7 +65,7 @@ def test_examples_load(number, tmp_path):
     assert load_mirror(path).mirror.name == re.search('name = "(.*)"', OF_ONE_AXIS[number])[1]
 
 
-@pytest.mark.promise("mirror-file-28", "mirror-file-29", "mirror-file-32")
+@pytest.mark.promise("mirror-file-28", "mirror-file-29", "mirror-file-32", "mirror-file-63")
 def test_the_example_of_several_axes_runs_as_the_page_says(tmp_path, monkeypatch):
     """The lines of the page: actuator 1 tilts about x, by more for a larger drive, and little is seen elsewhere."""
     monkeypatch.chdir(tmp_path)

@@ -358,6 +358,29 @@ def test_each_heading_links_to_itself(report_page):
     assert [(anchor, link) for anchor, link in found if link != f"#{anchor}"] == []
 
 
+@pytest.mark.promise("report-9")
+def test_a_sign_beside_a_title_is_shown_under_the_pointer(folded_page):
+    page = folded_page.page
+    sign = "a => [getComputedStyle(a, '::before').content, getComputedStyle(a).opacity]"
+    for heading, link in (
+        ("main h2:has(> a.anchor)", "main h2 > a.anchor"),
+        ("main a.anchor.beside + details > summary", "main a.anchor.beside:has(+ details > summary)"),
+    ):
+        page.mouse.move(0, 0)
+        assert page.eval_on_selector(link, sign) == ['"#"', "0"]
+        page.locator(heading).first.hover()
+        assert page.eval_on_selector(link, sign) == ['"#"', "1"]
+
+
+@pytest.mark.promise("report-9")
+def test_what_is_folded_stands_behind_a_line_of_its_own(folded_page):
+    lines = "[...document.querySelectorAll('main details')].map(d => [d.open, d.firstElementChild])"
+    found = folded_page.page.evaluate(f"{lines}.map(([open, line]) => [open, line.tagName, line.textContent.trim()])")
+    assert len(found) > 25
+    assert {(is_open, tag) for is_open, tag, _ in found} == {(False, "SUMMARY")}
+    assert [words for _, _, words in found if len(words) < 5] == []
+
+
 BOXES = "[...document.querySelectorAll('.chain li')].map(each => Math.round(each.getBoundingClientRect().left))"
 
 

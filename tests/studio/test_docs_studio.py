@@ -86,7 +86,7 @@ def test_the_pages_of_the_table_are_there_with_their_commands():
         assert commands and commands <= found[title], title
 
 
-@pytest.mark.promise("studio-20")
+@pytest.mark.promise("studio-20", "studio-21")
 def test_the_limits_of_the_table_are_those_of_the_program():
     table = dict(rows("| what | at most |"))
     uploads, limits = UploadLimits(), ReadingLimits()
@@ -240,6 +240,12 @@ def test_a_job_of_yours_whose_notes_are_taken_away_waits_again(session):
     for name in ("started.json", "exit.json"):
         (folder / name).unlink()
     assert jobs_files.read_job(folder).state == "queued"
+    program = (sys.executable, "-c", "print('once more')")
+    jobs_process.run_job(folder, program)
+    assert jobs_files.read_job(folder).state == "done"
+    assert jobs_files.output(folder, "stdout") == "once more\n"
+    jobs_process.run_job(folder, program)  # with its notes it stays
+    assert jobs_files.output(folder, "stdout") == "once more\n"
 
 
 @pytest.mark.promise("studio-31")

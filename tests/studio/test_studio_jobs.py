@@ -107,6 +107,27 @@ def test_a_job_takes_what_the_command_line_has_kept_unless_the_environment_says_
         assert made_here == (keep == "yes")
 
 
+@pytest.mark.promise("studio-19")
+def test_a_job_keeps_its_parts_for_the_command_line_and_other_jobs_unless_the_environment_says_no(
+    tmp_path, monkeypatch
+):
+    """The part is the number of the process that made it."""
+    code = "import os; from microrad.core import kept; print(kept.of_user().part(os.getpid), os.getpid())"
+    for keep in ("yes", "no"):
+        monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / keep / "cache"))
+        monkeypatch.setenv("MICRORAD_KEEP", keep)
+        said = []
+        for number in (1, 2):
+            folder = written(tmp_path / keep / "jobs", number, cwd=str(tmp_path))
+            jobs_process.run_job(folder, python(code))
+            said.append(jobs_files.output(folder, "stdout").split())
+        (first, maker), (second, other) = said
+        assert first == maker != other
+        assert (second == maker) == (keep == "yes")
+        monkeypatch.setenv("MICRORAD_KEEP", "yes")
+        assert (str(kept.of_user().part(os.getpid)) == maker) == (keep == "yes")
+
+
 def test_of_a_long_output_its_end_is_read(tmp_path):
     (tmp_path / "stdout").write_text("".join(f"{k}\n" for k in range(100_000)))
     found = jobs_files.output(tmp_path, "stdout")
@@ -269,6 +290,24 @@ def test_a_command_that_does_not_listen_is_asked_harder_each_time(tmp_path, monk
     assert (job.state, job.code) == ("cancelled", -signal.SIGKILL)
     asked = [int(line) for line in jobs_files.output(folder, "stdout").split()]
     assert asked == [signal.SIGINT, signal.SIGTERM]
+
+
+@pytest.mark.promise("studio-17")
+@pytest.mark.parametrize("deaf", [False, True])
+def test_a_cancelled_command_leaves_no_results_and_a_killed_one_a_hidden_folder(tmp_path, deaf):
+    """The folder that a study writes into, cancelled in its midst."""
+    folder, place = written(tmp_path / "jobs", cwd=str(tmp_path)), tmp_path / "results"
+    ignored = "for n in (signal.SIGINT, signal.SIGTERM): signal.signal(n, signal.SIG_IGN)\n" if deaf else ""
+    code = (
+        f"import pathlib, signal, time; from microrad.core.folder import whole_folder\n{ignored}"
+        f"with whole_folder(pathlib.Path({str(place / 'found')!r}), False) as draft:\n"
+        "    (draft / 'report.html').touch()\n"
+        f"    pathlib.Path({str(folder / 'cancel')!r}).touch(); time.sleep({2.0 * HANG_S})\n"
+    )
+    jobs_process.run_job(folder, python(code), waits_s=(0.1, 0.1) if deaf else (HANG_S, HANG_S), look_s=0.02)
+    assert jobs_files.read_job(folder).state == "cancelled"
+    left = list(place.iterdir())
+    assert [bool(re.fullmatch(r"\.found-.*\.part", path.name)) for path in left] == [True] * deaf
 
 
 def test_what_a_command_has_started_is_stopped_with_it(tmp_path):

@@ -284,6 +284,18 @@ def test_a_key_and_a_folder_of_another_user_are_refused(own_key, tmp_path, monke
         plain_files.private(tmp_path / "own")
 
 
+@pytest.mark.promise("studio-23")
+def test_without_the_key_jobs_that_were_queued_before_are_shown_as_unreadable(own_key, jobs, started, tmp_path):
+    folder = written(jobs.folder, cwd=str(tmp_path))
+    assert jobs_files.read_job(folder).state == "queued"
+    own_key.unlink()
+    (job,) = jobs.listed()
+    assert (job.state, started) == ("unreadable", [])
+    jobs.submit(Order("study", "t", ("presets",), tmp_path))  # makes a new key
+    later, before = jobs.listed()
+    assert (later.state, before.state, started) == ("done", "unreadable", [later.folder])
+
+
 def test_a_place_that_cannot_take_the_key_is_told(own_key, tmp_path):
     own_key.parent.parent.write_text("a file", "utf-8")
     with pytest.raises(signing.SigningError, match=r"cannot be made: .*; give XDG_STATE_HOME a folder"):
