@@ -20,6 +20,7 @@ from microrad.campaign.file import load_campaign
 from microrad.campaign.ledger import file
 from microrad.campaign.records import CampaignError
 from microrad.campaign.rows import evaluate, loops, sampling
+from microrad.campaign.rows.evaluator import Evaluator
 from microrad.campaign.rows.missions import MissionBuilder
 from microrad.loop.pointing_loop.ensemble import Span
 from microrad.mission.file import MissionError, load_mission, named_files, open_mission
@@ -671,6 +672,14 @@ def test_a_mirror_file_that_the_mission_names_absolutely_does_not_go_to_a_worker
         campaign = load_campaign(path)
         with pytest.raises(CampaignError, match=f"depends on {name}, {told}") if told else nullcontext():
             bundle.packed(campaign, ())
+
+
+def test_a_row_whose_draws_make_no_mission_has_no_run_in_time(tmp_path):
+    campaign = loaded(tmp_path, HEAD + LOOP + POWER.replace("0.2 W", "2 W"))
+    columns, _ = sampling.rows(campaign, 0, 0, 256)
+    row = int(np.argmin(columns["communication.transmit_power"]))
+    with pytest.raises(CampaignError, match=r"communication\.transmit_power.*is not above 0 W"):
+        Evaluator(campaign, {}).trace(0, row, lambda: None)
 
 
 @pytest.mark.promise("campaigns-17")

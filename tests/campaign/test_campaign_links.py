@@ -389,6 +389,18 @@ def test_a_bundle_of_other_code_is_opened_to_be_read_alone(tmp_path):
     assert bundle.opened(other, any_code=True).campaign.rows == 4
 
 
+@pytest.mark.parametrize(("distance", "failed"), [("1 m", True), ("100 km", False)])
+def test_a_beacon_that_is_too_near_has_no_margin(tmp_path, distance, failed):
+    text = SHIPPED.read_text(encoding="utf-8")
+    (tmp_path / "near.toml").write_text(text, encoding="utf-8")
+    keep = HEAD + 'keep = ["beacon_margin"]\n'
+    drawn = '[inputs."beacon.receive_optics_loss"]\ndistribution = "uniform"\nlow = "1 dB"\nhigh = "2 dB"\n'
+    body = f'{drawn}[set]\n"beacon.distance" = "{distance}"\n'
+    found = Evaluator(loaded(tmp_path, "near", body, keep), {}).rows(0, range(4), lambda: None).failed
+    told = "beacon: its budget has more light arrive than was sent: the terminals are too near for it"
+    assert [each.reason for each in found] == [told] * (4 * failed)
+
+
 SERIES = '[inputs."communication.fading.series"]\ndistribution = "table"\nvalues = ["fades.csv", "{other}"]\n'
 
 
