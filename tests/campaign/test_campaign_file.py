@@ -4,7 +4,7 @@ import json
 import math
 import pickle
 import re
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -13,12 +13,14 @@ import pytest
 
 from campaign_files import HEAD, IDENTIFIED, LOOP, NOISE, POWER, UNCERTAINTY, loaded, written
 from microrad import link
+from microrad.campaign import bundle
 from microrad.campaign.definition import keys
 from microrad.campaign.definition.records import Variable
 from microrad.campaign.file import load_campaign
 from microrad.campaign.ledger import file
 from microrad.campaign.records import CampaignError
 from microrad.campaign.rows import evaluate, loops, sampling
+from microrad.campaign.rows.evaluator import Evaluator
 from microrad.campaign.rows.missions import MissionBuilder
 from microrad.loop.pointing_loop.ensemble import Span
 from microrad.mission.file import MissionError, load_mission, named_files, open_mission
@@ -148,6 +150,22 @@ def test_realisations_follow_from_whether_rows_share_their_loop(tmp_path, inputs
     assert (c.loop_varies, c.realisations) == (varies, realisations)
 
 
+@pytest.mark.promise("campaigns-19")
+@pytest.mark.parametrize(("realisations", "told"), [(63, 64), (64, 0), (65, 128), (128, 0)])
+def test_realisations_that_fill_their_batches_are_not_warned_of(tmp_path, realisations, told):
+    c = loaded(tmp_path, f"{HEAD}realisations = {realisations}\n{LOOP}{NOISE}")
+    assert [f"takes as long as {told}:" in warning for warning in c.warnings] == [True] * bool(told)
+
+
+@pytest.mark.promise("campaigns-7")
+def test_an_item_may_vary_in_a_list_of_set(tmp_path):
+    lists = (
+        '[set]\n"scenario.pid_frequencies" = ["2 Hz", "9 Hz"]\n[grid]\n"scenario.pid_frequencies.1" = ["3 Hz", "4 Hz"]'
+    )
+    cells = loaded(tmp_path, HEAD + POWER + lists).cells
+    assert [each.file.mission.scenario.pid_frequencies_hz for each in cells] == [(3.0, 9.0), (4.0, 9.0)]
+
+
 @pytest.mark.promise("campaigns-20")
 def test_random_rows_are_not_rounded(tmp_path):
     c = loaded(tmp_path, HEAD.replace("sobol", "random").replace("256", "301") + POWER)
@@ -261,6 +279,21 @@ ADDED = {
         "inputs.communication.transmit_power",
         "stands in [grid] too",
     ),
+    "a mirror in set and grid": (
+        '[set]\nmirror = "mirror.toml"\n[grid]\nmirror = ["mirror.toml", "plain.toml"]',
+        "grid.mirror",
+        "stands in [set] too",
+    ),
+    "an item of a list of a grid in set": (
+        '[set]\n"scenario.pid_frequencies.1" = "2 Hz"\n[grid]\n"scenario.pid_frequencies" = [["2 Hz"], ["3 Hz"]]',
+        "set.scenario.pid_frequencies.1",
+        "is an item of scenario.pid_frequencies, which stands in [grid] as a whole",
+    ),
+    "a list and its item in set": (
+        '[set]\n"scenario.pid_frequencies" = ["2 Hz"]\n"scenario.pid_frequencies.1" = "3 Hz"',
+        "set.scenario.pid_frequencies.1",
+        "is an item of scenario.pid_frequencies, which stands in [set] as a whole",
+    ),
     "a value of set": ('[set]\n"terminals.leo_aperture" = "5 kg"', "set.terminals.leo_aperture", "another kind"),
     "a word of set": ('[set]\n"conventions.strehl" = "ratios"', "set.conventions.strehl", "is none of the choices"),
     "a mirror that is no path": ("[set]\nmirror = 1", "set.mirror", "is no path"),
@@ -332,6 +365,26 @@ ADDED = {
         "inputs.jitter.rms",
         "is a list, whose items are drawn each by its own key",
     ),
+    "an input without a distribution": (
+        distributed("terminals.leo_aperture", 'low = "5 cm"\nhigh = "6 cm"'),
+        "inputs.terminals.leo_aperture.distribution",
+        "is missing",
+    ),
+    "a distribution that is a number": (
+        distributed("terminals.leo_aperture", 'distribution = 1\nlow = "5 cm"\nhigh = "6 cm"'),
+        "inputs.terminals.leo_aperture.distribution",
+        "is none of the choices",
+    ),
+    "a distribution that is a list": (
+        distributed("terminals.leo_aperture", 'distribution = ["uniform"]\nlow = "5 cm"\nhigh = "6 cm"'),
+        "inputs.terminals.leo_aperture.distribution",
+        "is none of the choices",
+    ),
+    "a table of one value without its list": (
+        distributed("terminals.leo_aperture", TABLE + 'values = "5 cm"'),
+        "inputs.terminals.leo_aperture.values",
+        "is not a list with something in it",
+    ),
     "a table without values": (
         distributed("terminals.leo_aperture", TABLE + "values = []"),
         "inputs.terminals.leo_aperture.values",
@@ -349,6 +402,16 @@ ADDED = {
     ),
     "too few weights": (
         distributed("terminals.leo_aperture", TABLE + 'values = ["5 cm", "6 cm"]\nweights = [1]'),
+        "inputs.terminals.leo_aperture.weights",
+        "each value its weight",
+    ),
+    "weights without their list": (
+        distributed("terminals.leo_aperture", TABLE + 'values = ["5 cm", "6 cm"]\nweights = 1'),
+        "inputs.terminals.leo_aperture.weights",
+        "each value its weight",
+    ),
+    "a weight in words": (
+        distributed("terminals.leo_aperture", TABLE + 'values = ["5 cm", "6 cm"]\nweights = [1, "2"]'),
         "inputs.terminals.leo_aperture.weights",
         "each value its weight",
     ),
@@ -372,12 +435,21 @@ ADDED = {
         "inputs.communication.transmit_power.drawn_as",
         "is no distribution that an input can be drawn as",
     ),
+    "drawn as what is drawn as something else": (
+        '[inputs."communication.transmit_power".drawn_as]\ndistribution = "normal"\nmean = "5 W"\n'
+        'deviation = "0.3 W"\n[inputs."communication.transmit_power".drawn_as.drawn_as]\ndistribution = "normal"\n'
+        'mean = "5 W"\ndeviation = "0.4 W"',
+        "inputs.communication.transmit_power.drawn_as",
+        "is no distribution that an input can be drawn as",
+    ),
     "no list of outputs": ("keep = []", "keep", "is not a list with something in it"),
+    "an output without its list": ('keep = "margin"', "keep", "is not a list with something in it"),
     "an unknown output": ('keep = ["margn"]', "keep", "is no output"),
     "an output of the loop without a loop": ('keep = ["residual_rms"]', "keep", "needs the fine-pointing loop"),
     "an unknown limit": ('[limits.margn]\nleast = "3 dB"', "limits.margn", "is no output"),
     "a limit of what is not kept": ('[limits.volume]\nleast = "3 GB"', "limits.volume", "is not kept"),
     "a limit without a value": ("[limits.margin]", "limits.margin", "has neither least nor most"),
+    "a limit that is no table": ('[limits]\nmargin = "3 dB"', "limits.margin", "has neither least nor most"),
     "a limit in another unit": ('[limits.margin]\nleast = "3 W"', "limits.margin.least", "another kind"),
     "limits the wrong way round": ('[limits.margin]\nleast = "3 dB"\nmost = "2 dB"', "limits.margin.most", "not above"),
     "a default limit that varies": (
@@ -564,6 +636,50 @@ def test_files_that_are_not_there_are_named(tmp_path):
     assert "does not exist" in faults(tmp_path, HEAD.replace("mission.toml", "none.toml"))[0].reason
     assert "does not exist" in faults(tmp_path, HEAD + '[grid]\nmirror = ["none.toml"]\n')[0].reason
     assert "is missing" in faults(tmp_path, HEAD.partition("\n")[2])[0].reason
+
+
+VIBRATION = '[set]\n"fine_pointing.vibration.spectrum" = "table"\n'
+OF_VIBRATION = '"fine_pointing.vibration.file" = '
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ('mission = "mission.toml"', 'mission = "{there}/mission.toml"'),
+        ("[inputs", '[set]\nmirror = "{there}/plain.toml"\n[inputs'),
+        ("[inputs", '[grid]\nmirror = ["mirror.toml", "{there}/plain.toml"]\n[inputs'),
+        ("[inputs", f'{VIBRATION}{OF_VIBRATION}"{{there}}/a.csv"\n[inputs'),
+        ("[inputs", f'{VIBRATION}[grid]\n{OF_VIBRATION}["a.csv", "{{there}}/a.csv"]\n[inputs'),
+    ],
+    ids=["mission", "mirror", "mirror of a grid", "vibration", "vibration of a grid"],
+)
+def test_a_file_named_by_an_absolute_path_does_not_go_to_a_worker(tmp_path, old, new):
+    (tmp_path / "a.csv").write_text("Hz, urad^2/Hz\n1, 1\n2, 1\n", encoding="utf-8")
+    told = rf"campaign\.toml depends on {tmp_path}/\w+\.\w+, an absolute path that another machine would not find"
+    absolute = (HEAD + POWER).replace(old, new.format(there=tmp_path), 1)
+    with pytest.raises(CampaignError, match=told):
+        bundle.packed(loaded(tmp_path, absolute), ())
+    beside = absolute.replace(f', "{tmp_path}/a.csv"', "").replace(f"{tmp_path}/", "")
+    assert bundle.opened(bundle.packed(loaded(tmp_path, beside), ())).campaign.rows == 256
+
+
+def test_a_mirror_file_that_the_mission_names_absolutely_does_not_go_to_a_worker(tmp_path):
+    path = written(tmp_path, HEAD + POWER)
+    whole = (tmp_path / "mission.toml").read_text(encoding="utf-8")
+    kept = "".join(f"\n[{each}" for each in whole.split("\n[")[1:] if not each.startswith("mirror"))
+    for name, told in ((tmp_path / "plain.toml", "an absolute path"), ("plain.toml", None)):
+        (tmp_path / "mission.toml").write_text(f'{whole.split("[")[0]}[mirror]\nfile = "{name}"\n{kept}')
+        campaign = load_campaign(path)
+        with pytest.raises(CampaignError, match=f"depends on {name}, {told}") if told else nullcontext():
+            bundle.packed(campaign, ())
+
+
+def test_a_row_whose_draws_make_no_mission_has_no_run_in_time(tmp_path):
+    campaign = loaded(tmp_path, HEAD + LOOP + POWER.replace("0.2 W", "2 W"))
+    columns, _ = sampling.rows(campaign, 0, 0, 256)
+    row = int(np.argmin(columns["communication.transmit_power"]))
+    with pytest.raises(CampaignError, match=r"communication\.transmit_power.*is not above 0 W"):
+        Evaluator(campaign, {}).trace(0, row, lambda: None)
 
 
 @pytest.mark.promise("campaigns-17")

@@ -167,6 +167,7 @@ def test_other_bytes_are_refused_by_what_they_are():
     data = packed(0)
     assert "is no chunk of microrad" in said(chunk_format.unpack_chunk, b"")
     assert "is no chunk of microrad" in said(chunk_format.unpack_chunk, b"PK" + data)
+    assert "is no chunk of microrad" in said(chunk_format.unpack_chunk, "a text of a damaged ledger" * 9)
     assert "damaged" in said(chunk_format.unpack_chunk, data[:-1])
     assert "these bytes are a trace, not a chunk" in said(chunk_format.unpack_chunk, chunk_format.pack_trace(TRACE))
     newer = data[:8] + (2).to_bytes(2, "little") + data[10:-32]

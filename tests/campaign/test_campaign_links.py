@@ -359,7 +359,16 @@ def test_chunks_of_impossible_size_are_refused(tmp_path, rows):
 
 @pytest.mark.parametrize(
     "change",
-    [{"files": {"a\0b": ""}}, {"files": {"../a": ""}}, {"files": []}, {"controllers": [{}]}, {"files": {"a": 7}}],
+    [
+        {"files": {"a\0b": ""}},
+        {"files": {"../a": ""}},
+        {"files": {"": ""}},
+        {"files": {"a/..": ""}},
+        {"campaign": "."},
+        {"files": []},
+        {"controllers": [{}]},
+        {"files": {"a": 7}},
+    ],
 )
 def test_a_bundle_of_a_stranger_is_refused(tmp_path, change):
     mission(tmp_path, "gallery")
@@ -369,6 +378,44 @@ def test_a_bundle_of_a_stranger_is_refused(tmp_path, change):
     for odd in (b"", b"7", b"{}", b"[" * 100_000):
         with pytest.raises(CampaignError, match="never"):
             bundle.opened(odd)
+
+
+def test_a_bundle_of_other_code_is_opened_to_be_read_alone(tmp_path):
+    mission(tmp_path, "gallery")
+    data = json.loads(bundle.packed(loaded(tmp_path, "gallery", DRAWN), ()))
+    other = json.dumps(data | {"code": "another"}).encode()
+    with pytest.raises(CampaignError, match=f"runs other code than the campaign: {data['code']} here, another there"):
+        bundle.opened(other)
+    assert bundle.opened(other, any_code=True).campaign.rows == 4
+
+
+@pytest.mark.parametrize(("distance", "failed"), [("1 m", True), ("100 km", False)])
+def test_a_beacon_that_is_too_near_has_no_margin(tmp_path, distance, failed):
+    text = SHIPPED.read_text(encoding="utf-8")
+    (tmp_path / "near.toml").write_text(text, encoding="utf-8")
+    keep = HEAD + 'keep = ["beacon_margin"]\n'
+    drawn = '[inputs."beacon.receive_optics_loss"]\ndistribution = "uniform"\nlow = "1 dB"\nhigh = "2 dB"\n'
+    body = f'{drawn}[set]\n"beacon.distance" = "{distance}"\n'
+    found = Evaluator(loaded(tmp_path, "near", body, keep), {}).rows(0, range(4), lambda: None).failed
+    told = "beacon: its budget has more light arrive than was sent: the terminals are too near for it"
+    assert [each.reason for each in found] == [told] * (4 * failed)
+
+
+SERIES = '[inputs."communication.fading.series"]\ndistribution = "table"\nvalues = ["fades.csv", "{other}"]\n'
+
+
+def test_each_file_that_is_drawn_belongs_to_the_campaign(tmp_path):
+    faded(tmp_path)
+    body = SERIES.format(other="deeper.csv")
+    (found,) = faults(tmp_path, "faded", body)
+    assert (found.key, found.reason) == ("mission", "is named by the mission and does not exist")
+    np.savetxt(tmp_path / "deeper.csv", 1.0 + 0.9 * np.sin(np.arange(2000) / 40.0), header="power", comments="")
+    campaign = loaded(tmp_path, "faded", body)
+    assert campaign.files[-2:] == (tmp_path / "fades.csv", tmp_path / "deeper.csv")
+    opened = bundle.opened(bundle.packed(campaign, ()))
+    assert sorted(set(rows(opened.campaign)["margin_under_fades"])) == sorted(set(rows(campaign)["margin_under_fades"]))
+    with pytest.raises(CampaignError, match=f"depends on {tmp_path / 'deeper.csv'}, an absolute path that another"):
+        bundle.packed(loaded(tmp_path, "faded", SERIES.format(other=tmp_path / "deeper.csv")), ())
 
 
 @pytest.mark.promise("campaigns-17")

@@ -1062,3 +1062,12 @@ def test_an_empty_file_is_replaced_and_a_foreign_one_is_not(tmp_path):
         path.write_bytes(content)
         with pytest.raises(frame.Refusal, match="was not written by microrad") if stays else nullcontext():
             frame.check_target(path, "choose another name", overwrite=True, begins=b"PK")
+    (tmp_path / "folder.zip").mkdir()
+    with pytest.raises(frame.Refusal, match=r"folder\.zip was not written by microrad and is left as it is"):
+        frame.check_target(tmp_path / "folder.zip", "choose another name", overwrite=True, begins=b"PK")
+
+
+def test_without_a_stderr_progress_goes_nowhere(monkeypatch):
+    monkeypatch.setattr(sys, "stderr", None)
+    with frame.progress_bar(0.0) as progress:
+        progress(1, 2, "rows")

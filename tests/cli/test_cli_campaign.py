@@ -366,6 +366,12 @@ def test_export_writes_and_replaces_only_what_it_wrote(there, call, refused, nam
     assert f"{name} was not written by microrad and is left as it is" in said
 
 
+def test_export_replaces_no_file_of_another_kind(there, refused):
+    (there / "rows.txt").write_text("my own table")
+    said = refused("campaign", "export", "campaign.ledger", "rows.txt", "--overwrite")
+    assert "rows.txt exists and is left as it is; choose another name." in said
+
+
 @pytest.mark.parametrize("name", ["rows.txt", "rows", "no/rows.csv", "."])
 def test_export_refuses_other_kinds_and_places(there, refused, name):
     assert name in refused("campaign", "export", "campaign.ledger", name)

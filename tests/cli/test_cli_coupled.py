@@ -301,6 +301,12 @@ def test_options_beside_a_list_are_refused(refused, folder):
     assert "list.toml is a list of recordings: give it alone, and name the other files in it" in message
 
 
+def test_signs_of_one_channel_are_refused(refused, folder):
+    listed = f'input = "ux"\noutput = 3\nsigns = [[1]]\n[recording.a]\nfile = "{table(folder)}"\n'
+    (folder / "list.toml").write_text(listed)
+    assert "positions and signs are for several outputs or drives" in refused("identify", "list.toml")
+
+
 def test_positions_and_outputs_apart_of_one_channel_are_refused(refused, folder):
     name = table(folder)
     one = ("--input", "ux", "--output", "3", "--position", "1 mm,2 mm")

@@ -244,6 +244,13 @@ def test_leading_zeros_do_not_count():
     assert_allclose(lti.frequency_response(padded, np.zeros(1)), 4.0 / 6.0, rtol=1e-15)
 
 
+def test_a_highest_power_that_is_nothing_beside_the_others_is_refused():
+    with pytest.raises(ValueError, match="the highest power of s has a coefficient of 1e-151, which is nothing beside"):
+        lti.modal_from_polynomials((1.0,), (1e-151, 1.0))
+    system = lti.modal_from_polynomials((1.0,), (2e-150, 1.0))
+    assert_allclose(lti.frequency_response(system, np.zeros(1)), 1.0, rtol=1e-15)
+
+
 # ------------------------------------------------------------------------------------------------- roots in, roots out
 def test_a_modal_form_from_roots_is_the_product_over_them_with_unit_magnitude_where_it_is_asked():
     zeros, poles = (np.roots(each).astype(complex) for each in (NUMERATOR, DENOMINATOR))
@@ -269,6 +276,13 @@ def test_a_modal_form_from_roots_is_the_product_over_them_with_unit_magnitude_wh
 def test_roots_without_a_modal_form_are_refused(zeros, poles, words):
     with pytest.raises(ValueError, match=words):
         lti.modal_from_roots(np.array(zeros, dtype=complex), np.array(poles, dtype=complex), 1.0)
+
+
+def test_a_single_pole_has_a_modal_form():
+    system = lti.modal_from_roots(np.zeros(0, dtype=complex), np.array([-2.0 * pi], dtype=complex), 1.0)
+    freq_hz = np.array([0.0, 1.0, 10.0])
+    wanted = np.sqrt(2.0 / (1.0 + freq_hz**2))
+    assert_allclose(np.abs(lti.frequency_response(system, freq_hz)[:, 0, 0]), wanted, rtol=1e-12)
 
 
 def by_size(roots):

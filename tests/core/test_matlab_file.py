@@ -239,6 +239,9 @@ def refused(path, **how):
         (matrix("<", 6, (3, 3), b"x", element("<", 8, bytes(72))), "numbers of type 8", ""),
         (matrix("<", 6, (1,) * 33, b"x", doubles("<", [1])), "a header of 132 bytes where at most 128", ""),
         (matrix("<", 6, (1, 1), b"x" * 5000, doubles("<", [1])), "a header of 5000 bytes where at most 4096", ""),
+        (matrix("<", 6, (1, 1), b"x", element("<", 8, b"")), "numbers of type 8", ""),
+        (element("<", 14, element("<", 6, b"")), "a header of type 6 with 0 bytes", ""),
+        (element("<", 14, element("<", 6, bytes(8)) + element("<", 5, bytes(6))), "header of type 5 with 6 bytes", ""),
         (matrix("<", 1, (1 << 30, 1 << 30), b"c"), "an element is cut off", ""),
         (matrix("<", 2, (1, 1), b"s", element("<", 5, bytes(4)), element("<", 1, b"abc")), "have no names", ""),
         (struct.pack("<II", 15, 5) + b"wrong", "incorrect header check", ""),
@@ -251,6 +254,31 @@ def test_damage_is_named(tmp_path, data, why, remedy):
     with pytest.raises(MatlabFileError, match=why) as caught:
         MatlabFile(path, MOST_BYTES, whole=True)
     assert remedy in caught.value.remedy and bool(remedy) == bool(caught.value.remedy)
+
+
+def test_a_structure_without_fields_is_read(tmp_path):
+    nameless = matrix("<", 2, (1, 1), b"s", element("<", 5, bytes(4)), element("<", 1, b""))
+    assert MatlabFile(write(tmp_path / "a.mat", "<", nameless), MOST_BYTES).variables["s"] == Structure(1, (), ())
+
+
+def test_a_file_that_gets_shorter_is_refused_when_its_numbers_are_read(tmp_path):
+    values = np.arange(200.0)
+    path = write(tmp_path / "a.mat", "<", matrix("<", 6, (200, 1), b"x", doubles("<", values)))
+    file, whole = MatlabFile(path, MOST_BYTES), path.read_bytes()
+    path.write_bytes(whole[:-9])
+    with pytest.raises(MatlabFileError, match="an element is cut off, 9 bytes"):
+        file.numbers(file.variables["x"])
+    path.write_bytes(whole)
+    np.testing.assert_array_equal(file.numbers(file.variables["x"])[:, 0], values)
+
+
+def test_packed_data_that_end_too_early_are_refused(tmp_path, monkeypatch):
+    data = matrix("<", 6, (200, 1), b"x", doubles("<", np.arange(200.0)))
+    for chunk in (1, 1 << 16):  # the first bytes alone unpack to nothing
+        monkeypatch.setattr(streams, "_CHUNK", chunk)
+        whole = write(tmp_path / "a.mat", "<", data, compressed=True)
+        np.testing.assert_array_equal(MatlabFile(whole, MOST_BYTES, whole=True).variables["x"][:, 0], np.arange(200.0))
+        assert "compressed data are cut off" in refused(write(whole, "<", data[:-9], compressed=True), whole=True)[0]
 
 
 def test_a_checksum_that_fails_is_refused_when_the_numbers_are_read(tmp_path, monkeypatch):

@@ -197,6 +197,10 @@ def test_what_has_no_digest_is_refused(value):
         digest((1, value))
 
 
+def test_a_function_that_holds_no_value_has_the_digest_of_its_name():
+    assert digest(holds_a_value) == digest(holds_a_value) != digest(test_what_has_no_digest_is_refused)
+
+
 def test_nothing_read_agrees_with_anything():
     assert Reads().agree(("anything",))
 

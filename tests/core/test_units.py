@@ -133,6 +133,7 @@ def test_what_is_read(text, unit, value):
         ("5 1/s", "s", 'is in "1/s", another kind of quantity', '"5 s"'),
         ("5 parsec", "m", 'no unit is called "parsec"', '"5 m"'),
         ("7 watt", "W", 'has "watt", which is written W here', '"7 W"'),
+        ("7 watt", "dB", 'no unit is called "watt"', '"5 dB"'),
         ("300 Mbps", "bit/s", 'has "Mbps", which is written Mbit/s here', '"300 Mbit/s"'),
         ("300 Mb/s", "bit/s", 'has "Mb/s", which is written Mbit/s here', '"300 Mbit/s"'),
         ("2 Gbits/sec", "bit/s", 'has "Gbits/sec", which is written Gbit/s here', '"2 Gbit/s"'),

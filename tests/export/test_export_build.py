@@ -151,13 +151,16 @@ def test_a_difference_beyond_the_bound_is_an_error(tmp_path: Path) -> None:
 
 
 @needs_compiler
-def test_a_failing_bench_s_first_lines_are_shown(tmp_path: Path) -> None:
+@pytest.mark.parametrize("status", [1, 3])
+def test_a_failing_bench_s_first_lines_are_shown(tmp_path: Path, status: int) -> None:
     printed = "".join(f'printf("line {i} of it\\n");' for i in range(20))
-    (written(tmp_path) / "gain_bench.c").write_text(f"#include <stdio.h>\nint main(void) {{ {printed} return 3; }}\n")
+    (written(tmp_path) / "gain_bench.c").write_text(
+        f"#include <stdio.h>\nint main(void) {{ {printed} return {status}; }}\n"
+    )
     with pytest.raises(ExportError) as caught:
         build.compile_and_run(tmp_path, "gain")
     shown = str(caught.value).splitlines()
-    assert shown[0] == f"the bench of gain in {tmp_path} failed with exit status 3:"
+    assert shown[0] == f"the bench of gain in {tmp_path} failed with exit status {status}:"
     assert shown[1:] == [f"  line {i} of it" for i in range(build.FIRST_LINES)] + ["  ... and 8 lines more"]
 
 

@@ -521,6 +521,27 @@ def test_poles_that_reach_the_circle_are_refused():
     assert after.real < 1.0
 
 
+def undamped(turn):
+    """An oscillator that neither grows nor decays."""
+    c, s = math.cos(turn), math.sin(turn)
+    return one_axis([[c, -s], [s, c]], [[1.0], [0.0]], [[1.0, 0.0]], [[1.0]])
+
+
+@pytest.mark.promise("export-17")
+def test_an_undamped_oscillator_is_refused_where_its_pole_leaves_the_circle():
+    with pytest.raises(ExportError, match=r"\|z\| = 1\.000000000 at 795\.8 Hz moves to \|z\| = 1\.000132075, and the"):
+        made(undamped(1.0), noise(), 12, beyond_a_count=True)
+    ((_, after), _) = made(undamped(0.5), noise(), 12, beyond_a_count=True).report.poles
+    assert abs(after) < 1.0
+
+
+@pytest.mark.parametrize(("turn", "bits"), [(0.3, 8), (0.3, 16), (1.0, 32), (2.0, 8)])
+def test_an_undamped_oscillator_is_compared_beside_its_own_frequency(turn, bits):
+    (output,) = made(undamped(turn), noise(), bits, beyond_a_count=True).report.outputs
+    assert 0.1 < output.response_error < 100.0
+    assert output.at_hz == pytest.approx(turn / (2.0 * math.pi * PERIOD_S), rel=1e-3)
+
+
 @pytest.mark.promise("export-17")
 def test_commands_that_stray_by_more_than_a_count_are_refused_unless_said():
     of = slow_design(0.999, resolution_v=1e-5)
@@ -540,6 +561,28 @@ def test_numbers_that_do_not_fit_are_refused():
     with pytest.raises(ExportError, match=r"'a design' does not fit into words of 32 bits.*single precision"):
         made(of, noise())
     assert made(replace(of, resolution_v=1e-3), noise()).converter[0].shift <= 62
+
+
+@pytest.mark.parametrize(
+    ("changes", "size", "why"),
+    [
+        ({"C": [[1e30]]}, 0.0, r"the numbers of a row are 2\^66 beyond the range of its sum"),
+        ({"windup": 1e30}, 1e-4, r"the numbers of a row are 2\^83 beyond the range of its sum"),
+        (
+            {"resolution_v": 1e-30},
+            1e-4,
+            "a count of its converter, or a number in the run, is nothing beside its words",
+        ),
+        ({}, 1e-296, "a number in the run, is nothing beside its words"),
+        ({}, 1e-320, "a number in the run, is nothing beside its words"),
+    ],
+)
+def test_what_is_beyond_a_word_is_said(changes, size, why):
+    of = {"A": [[0.9]], "B": [[1.0]], "C": [[1.0]], "D": [[1.0]], **changes}
+    with pytest.raises(ExportError, match=rf"'a design' does not fit into words of 32 bits: .*{why}; give more bits"):
+        made(one_axis(**of), noise(size=size))
+    taken = made(one_axis([[0.9]], [[1.0]], [[1.0]], [[1.0]]), noise(size=1e-285))
+    assert 950 < max(taken.input_scale) <= 1000
 
 
 def test_names_are_identifiers():

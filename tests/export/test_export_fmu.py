@@ -125,6 +125,11 @@ def spring():
     return replace(made, mirror=replace(made.mirror, plays=(BENT, *made.mirror.plays[1:])))
 
 
+def test_a_plant_of_another_loop_is_refused():
+    with pytest.raises(ExportError, match="has no loop 'tracking': one of fine_pointing, control that is a table of"):
+        choice.plant_unit(designs.mission(), "tracking")
+
+
 UNITS = {
     "mirror": lambda: choice.plant_unit(designs.mission(), "control"),
     "rich": rich_unit,

@@ -200,6 +200,16 @@ def test_a_sampled_model_has_no_zeros_that_rounding_made(zeros, tmp_path):
     assert difference(answer(tmp_path, text, INSIDE), by_roots(INSIDE, zeros, POLES, gain)) < 10.0 * lost
 
 
+def test_a_mode_beyond_a_quarter_of_the_rate_is_taken(tmp_path):
+    """Its poles have a negative real part, and are no single one that turns its sign each sample."""
+    pole = 2.0 * math.pi * 15e3 * complex(-0.3, 1.0)
+    mode = lti.modal_from_residues(np.array([pole, pole.conjugate()]), np.array([-1e4j, 1e4j]))
+    held = held_by_scipy(mode)
+    assert np.all(np.linalg.eigvals(held.A).real < 0.0)
+    text = import_mat(save(tmp_path, **{key: getattr(held, key) for key in "ABCD"}, Ts=PERIOD_S), GIVEN)
+    assert difference(answer(tmp_path, text, INSIDE), lti.frequency_response(mode, INSIDE)[:, 0, 0]) < NINE_DIGITS
+
+
 def test_rounding_of_full_matrices_makes_no_zeros_either(tmp_path):
     """At 500 kHz it leaves more of a leading coefficient than the exact arithmetic behind it takes for nothing."""
     p = np.array(POLES)
@@ -276,6 +286,12 @@ def test_linear_part_alone_has_no_drive_in_volts(models, tmp_path):
         import_mat(tmp_path / "models.mat", GIVEN, "linear_part")
 
 
+@pytest.mark.parametrize("unit", ["V", "", 3.0, np.array(["rad", "rad"], dtype=object)])
+def test_an_input_in_volts_or_in_no_unit_is_taken(tmp_path, unit):
+    path = save(tmp_path, **SHAPES["roots"], InputUnit=unit)
+    assert difference(answer(tmp_path, import_mat(path, GIVEN), BAND), by_roots(BAND)) < NINE_DIGITS
+
+
 # ------------------------------------------------------------------------------------------------------------- refusals
 def roots(poles=POLES, zeros=ZEROS, k=GAIN, **more):
     column = {key: np.array(each, dtype=complex).reshape(-1, 1) for key, each in (("z", zeros), ("p", poles))}
@@ -311,6 +327,8 @@ HIDING = {"A": np.diag([-1.0, -20.0]), "B": np.array([[1.0], [0.0]]), "C": np.on
         ({"num": [[1.0]], "den": [[1.0, 1e300]]}, "den holds a number that is not finite or beyond"),
         (states(A=csc_array(STATES.A)), "A is a sparse matrix"),
         (states(C="text"), "C is not a matrix of numbers"),
+        (states(A=np.ones((3, 3, 2))), "A is not a matrix of numbers"),
+        (states(InputUnit="rad"), "its input is in rad, and a mirror's drive is in V"),
         (states(C=np.array([[1.0, math.nan, 0.0]])), "C holds a number that is not finite"),
         (
             states(A=-np.diag(np.arange(1.0, 62.0)), B=np.ones((61, 1)), C=np.ones((1, 61))),
@@ -339,6 +357,7 @@ HIDING = {"A": np.diag([-1.0, -20.0]), "B": np.array([[1.0], [0.0]]), "C": np.on
         (roots(k=np.ones((2, 1))), "k has 2 gains"),
         (roots(k=math.inf), "k holds a number that is not finite"),
         (roots(k=0.0), "a gain of 0.0; the mirror does not move"),
+        ({"num": [[1e100]], "den": [[1e-250, 1.0]]}, "a gain of inf; the mirror does not move"),
         (roots(poles=[-300.0, -5.0 + 3.0j], zeros=[]), r"p has the complex root -5\+3j without its conjugate"),
         (roots(poles=[-300.0, -5.0 - 3.0j], zeros=[]), r"p has the complex root -5-3j without its conjugate"),
         (roots(zeros=[-5.0 + 3.0j, -5.1 - 3.0j]), "z has the complex root"),
@@ -438,6 +457,7 @@ def test_pickles_are_not_opened(tmp_path):
     [
         (python_control.ss(-np.eye(2), np.eye(2), np.eye(2), 0), "2 inputs and 2 outputs"),
         (python_control.tf([1.0], [1.0, -0.5], 0.01), "the band ends at 5000 Hz"),
+        (python_control.tf([1.0], [1.0, -0.5], None), "dt = None: continuous, or sampled how fast"),
         (python_control.tf([1.0], [1.0, -0.5], True), "dt = True: continuous, or sampled how fast"),
         (python_control.tf([1.0, 0.0, 0.0], [1.0, 1.0]), "2 zeros over 1 poles, not strictly proper"),
         (python_control.tf([1.0], [1.0, -5.0]), "unstable, a pole at 0.7958 Hz"),

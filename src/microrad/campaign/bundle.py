@@ -6,6 +6,7 @@ import json
 import os
 import platform
 import shutil
+import tomllib
 import weakref
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -17,6 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from microrad.campaign.definition.keys import MIRROR
 from microrad.campaign.definition.reader import read_definition
 from microrad.campaign.definition.records import CampaignFile
 from microrad.campaign.records import CampaignError
@@ -149,10 +151,13 @@ def _inside(folder: Path, name: str) -> Path:
 
 def _refuse_absolute(campaign: CampaignFile) -> None:
     """Every worker reads the bundle's own copies, which are found by relative names alone."""
-    named = [campaign.table.mission, *named_files(campaign.mission.mission)]
-    named += [cell.values["mirror"] for cell in campaign.cells if "mirror" in cell.values]
+    own = tomllib.loads(campaign.mission.text).get(MIRROR)
+    named = [campaign.table.mission, own.get("file") if isinstance(own, dict) else None]
+    named += [each.get(MIRROR) for each in (campaign.fixed, *(cell.values for cell in campaign.cells))]
+    named += [name for cell in campaign.cells for name in named_files(cell.file.mission)]
+    named += [name for draw in campaign.draws for name in draw.files]
     for name in named:
-        if Path(name).is_absolute():
+        if name is not None and Path(name).is_absolute():
             raise CampaignError(
                 f"{campaign.path} depends on {name}, an absolute path that another machine would not find: name the "
                 "file relative to the one that names it"

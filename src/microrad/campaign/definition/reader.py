@@ -9,7 +9,6 @@ from typing import Any
 from microrad.campaign.definition import checks
 from microrad.campaign.definition import draws as drawing
 from microrad.campaign.definition.cells import CellReader
-from microrad.campaign.definition.distributions import OneOf
 from microrad.campaign.definition.draws import DrawReader
 from microrad.campaign.definition.keys import MIRROR, MIRROR_FILE, flat, flat_tables, touches_loop
 from microrad.campaign.definition.records import CampaignFile, Cell, Draw, Variable
@@ -46,7 +45,7 @@ def read_definition(path: Path) -> tuple[CampaignFile, Document]:
         fault = Fault("", "", 0, f"the {FILE_WORD} {error.reason}", expected, file=clipped(str(path)))
         raise MissionError(path, [fault]) from None
     campaign = _DefinitionReader(document).read()
-    if campaign is None or document.faults:
+    if campaign is None:
         raise MissionError(path, document.faults)
     return campaign, document
 
@@ -233,9 +232,7 @@ class _DefinitionReader:
         """Every file that the campaign depends on; those that do not exist are noted."""
         folder = mission.path.parent
         named = [folder / name for cell in cells for name in named_files(cell.file.mission)]
-        for draw in draws:
-            if isinstance(draw.distribution, OneOf) and draw.key.endswith(".file"):
-                named += [folder / str(word) for word in draw.distribution.written]
+        named += [folder / name for draw in draws for name in draw.files]
         for path in dict.fromkeys(named):
             if not path.is_file():
                 self.reader.fault(

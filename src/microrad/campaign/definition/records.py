@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from microrad.campaign.definition.distributions import Distribution
+from microrad.campaign.definition.distributions import Distribution, OneOf
 from microrad.campaign.definition.keys import MIRROR
 from microrad.campaign.definition.outputs import OUTPUTS, TAIL_OUTPUTS, Output
 from microrad.campaign.definition.tables import CampaignTable
@@ -14,6 +14,9 @@ from microrad.mirror import coupled
 from microrad.mission.file import LinkFile
 from microrad.mission.model import Mission
 from microrad.mission.tables.mirror import Mirror
+
+_FILE_KEYS = (".file", ".mirror_file", ".series")
+"""How the keys of a mission end that name a file."""
 
 _LOG_RATIO = 10.0
 """A variable is searched on a logarithmic scale where its bounds are at least this far apart."""
@@ -60,6 +63,13 @@ class Draw:
     unit: str
     distribution: Distribution | None
     drawn_as: Distribution | None
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """The files that it draws from, as they are named; none of another key."""
+        if isinstance(self.distribution, OneOf) and self.key.endswith(_FILE_KEYS):
+            return tuple(str(word) for word in self.distribution.written)
+        return ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -266,10 +266,9 @@ def _terms(most: list[int], count: int) -> tuple[NDArray[np.int64], list[int]]:
 
 
 def _degrees(total: int, most: list[int]) -> Iterator[tuple[int, ...]]:
-    """All products of one total degree."""
+    """All products of one total degree, which ends with the last input."""
     if not most:
-        if total == 0:
-            yield ()
+        yield ()
         return
     for here in range(min(total, most[0]), -1, -1):
         if total - here <= sum(most[1:]):

@@ -187,9 +187,8 @@ class MatlabFile:
         kind, last, following = self._tag(stream, end)
         code = _TYPES.get(kind)
         size = last - stream.position
-        if code is None and size:
+        if code is None:
             raise MatlabFileError(f"numbers of type {kind}")
-        code = code or "u1"
         if size != count * int(code[1]):
             raise MatlabFileError(f"{size} bytes where {count} numbers of {code[1]} bytes are said to be")
         return code, last, following

@@ -90,9 +90,11 @@ def _refuse_what_does_not_fit(of: FlightController, made: FixedForm) -> None:
     worst = min((*made.state_shift, *made.output_shift), default=0)
     shifts = [c.shift for c in made.converter]
     if worst < 0 or any(not 1 <= s <= 62 for s in shifts) or max((*made.input_scale, *made.state_scale)) > 1000:
+        beyond = f"the numbers of a row are 2^{-worst} beyond the range of its sum"
+        why = beyond if worst < 0 else "a count of its converter, or a number in the run, is nothing beside its words"
         raise ExportError(
-            f"controller {of.name!r} does not fit into words of {made.bits} bits: the numbers of a row are "
-            f"2^{-worst} beyond the range of its sum; give more bits (up to {MOST_BITS}), or export single precision"
+            f"controller {of.name!r} does not fit into words of {made.bits} bits: {why}; give more bits (up to "
+            f"{MOST_BITS}), or export single precision"
         )
 
 
@@ -161,6 +163,7 @@ def _response_errors(of: FlightController, form: Sections, near: Sections) -> li
     """Largest relative error of each output's response and the frequency where it is."""
     freq = np.geomspace(1e-5, 0.5, 600) / of.period_s
     resonances = np.abs(np.angle(np.linalg.eigvals(form.A))) / (2.0 * math.pi * of.period_s)
+    resonances *= 1.0 + 1e-9  # an undamped oscillator has no response at its own
     freq = np.sort(np.concatenate([freq, resonances[resonances > freq[0]]]))
     before, after = (lti.frequency_response(s.system, freq, of.period_s) for s in (form, near))
     size, wrong = np.linalg.norm(before, axis=2), np.linalg.norm(after - before, axis=2)

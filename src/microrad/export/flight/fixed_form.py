@@ -12,6 +12,7 @@ readings, no sum leaves 64 bits, and what grows beyond its range stays at its en
 """
 
 import math
+import sys
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -158,7 +159,7 @@ def scaled(of: FlightController, form: Sections, inputs: Floats, ideal: Run, bit
 
 def _scale(size: float, word: int) -> int:
     """Finest power of two at which numbers up to ``size`` fit into a word."""
-    return math.floor(math.log2(word / size))
+    return math.floor(math.log2(min(word / size, sys.float_info.max)))
 
 
 def _or_reachable(peaks: Floats, rows: Floats, form: Sections, inputs: Floats) -> Floats:

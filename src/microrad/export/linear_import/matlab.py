@@ -115,7 +115,7 @@ def numbers(fields: dict[str, Any], key: str, source: str, *, is_complex: bool =
         raise ExportError(f"{source}: {key} has cells for {value.size} entries; choose one input and one output")
     if isinstance(value, Unread):
         raise ExportError(f"{source}: {key} is {value.kind}; {value.remedy}")
-    if not isinstance(value, np.ndarray) or value.dtype.kind not in "iufcb" or value.ndim != 2:
+    if not isinstance(value, np.ndarray) or value.ndim != 2:
         raise ExportError(f"{source}: {key} is not a matrix of numbers; save numbers")
     if value.dtype.kind == "c" and not is_complex:
         raise ExportError(

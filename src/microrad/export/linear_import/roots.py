@@ -61,7 +61,7 @@ def roots_of_fields(fields: dict[str, Any], source: str) -> Roots:
         ExportError: For what is not one system of one input (in V where its unit is named) and one output.
     """
     stated = fields.get("InputUnit")  # an export of microrad names its input's unit: a mirror takes volts
-    unit = stated.item() if isinstance(stated, np.ndarray) and stated.size == 1 else ""
+    unit = stated.item() if isinstance(stated, np.ndarray) and stated.size == 1 else stated
     if isinstance(unit, str) and unit not in ("V", ""):
         raise ExportError(
             f"{source}: its input is in {unit}, and a mirror's drive is in V; choose the one from drive to angle"
