@@ -691,6 +691,23 @@ def test_an_engine_that_goes_away_leaves_what_is_done_and_another_goes_on(short,
     assert table(book) == undisturbed
 
 
+class _Faulty(Here):
+    """An engine with a fault behind the first chunk."""
+
+    def outcomes(self, jobs):
+        yield next(super().outcomes(jobs))
+        raise RuntimeError("a fault")
+
+
+def test_a_fault_of_an_engine_comes_out_as_it_is_and_the_campaign_has_stopped(short, tmp_path, monkeypatch):
+    monkeypatch.setattr(run, "load_campaign", by_four)
+    monkeypatch.setattr(run.Means, "engine", lambda means, spec, late_s: _Faulty(spec))
+    with pytest.raises(RuntimeError, match=r"^a fault$"):
+        run.run_campaign(short[0], tmp_path / "campaign.ledger", run.Means())
+    assert len(chunks_in(tmp_path / "campaign.ledger")) == 1
+    assert summarise_campaign(tmp_path / "campaign.ledger").progress.state == "stopped"
+
+
 @pytest.mark.promise("campaigns-35")
 def test_rows_take_8_bytes_a_value_and_about_twice_as_many_while_they_are_put_together(tmp_path):
     cell, names, rows = CellRows(load_campaign(campaign_file(tmp_path)), 0), ("row", "weight", "margin", "x", "y"), 1000

@@ -821,7 +821,9 @@ def test_doctor_names_what_is_wrong_and_what_to_do(call, monkeypatch):
 
 def test_doctor_finds_an_old_library(monkeypatch):
     monkeypatch.setattr(
-        installation.metadata, "requires", lambda name: ["numpy>=99.1", "notthere>=1", 'ruff>=1; extra == "test"']
+        installation.metadata,
+        "requires",
+        lambda name: ["numpy>=99.1", "notthere>=1", "typer", 'ruff>=1; extra == "test"'],
     )
     old, absent = list(installation._libraries())[1:]
     assert (old.ok, absent.ok) == (False, False)
@@ -954,6 +956,11 @@ def test_bench_writes_recordings_that_identify_takes_as_a_folder(call, folder):
     assert "virtual bench" in (folder / "plan-bench-mirror.html").read_text(encoding="utf-8")
     listed = json.loads(call("bench", "plan.toml", "--seed", "3", "--overwrite", "--json").out)
     assert [Path(f).name for f in listed["files"]] == ["loop-60hz.npz", "loop-80hz.npz", "unseen.npz"]
+    manifest = folder / "plan-bench" / "manifest.json"
+    manifest.write_text(manifest.read_text(encoding="utf-8").replace('"identification"', '"validation"'), "utf-8")
+    unfitted = call("identify", "plan-bench", "--mirror-file", "other.toml")
+    assert unfitted.code == 2
+    assert "every recording is for validation: leave one to be fitted." in unfitted.err
 
 
 def test_bench_refusals(refused, folder):
