@@ -33,6 +33,9 @@ SENDER = "__microrad_returning__"
 CALLS = (1, 2, 3, 5, 10)
 """Those of a function in a process whose values are taken."""
 
+FIRST_CALLS = 3
+"""Those alone in a campaign."""
+
 PARTS = 300
 """Of a value, at most."""
 
@@ -57,6 +60,7 @@ STEADY = 5e-5
 LEFT_OUT = (
     *("cli.", "core.folder:read_bytes.<locals>.at_once", "core.units:printable", "campaign.run:_minutes"),
     *("report.page.", "report.identification.page:identification_page", "core.folder:write_whole"),
+    "core.folder:_left_behind",
     *("export.flight.build:", "export.flight.write:", "loop.pointing_loop.ensemble:_Drawing"),
     *("campaign.engines.", "mission.explain:_used"),
 )
@@ -277,6 +281,15 @@ def steady(runs: Sequence[Values]) -> Values:
                 kept.setdefault(round(x, 2), call)
         if kept:
             found[name] = {call: values[call] for call in [*kept.values()][:MOST]}
+    return found
+
+
+def of_first_calls(values: Values) -> Values:
+    """The values of a campaign that are held: how many rows go together later hangs on the time that they take."""
+    found = {}
+    for name, calls in values.items():
+        if first := {call: x for call, x in calls.items() if int(call.split(".")[1]) <= FIRST_CALLS}:
+            found[name] = first
     return found
 
 

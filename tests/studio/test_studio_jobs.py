@@ -297,7 +297,8 @@ def test_a_command_that_does_not_listen_is_asked_harder_each_time(tmp_path, monk
 def test_a_cancelled_command_leaves_no_results_and_a_killed_one_a_hidden_folder(tmp_path, deaf):
     """The folder that a study writes into, cancelled in its midst."""
     folder, place = written(tmp_path / "jobs", cwd=str(tmp_path)), tmp_path / "results"
-    ignored = "for n in (signal.SIGINT, signal.SIGTERM): signal.signal(n, signal.SIG_IGN)\n" if deaf else ""
+    hears = "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # whether the tests themselves hear it or not
+    ignored = "for n in (signal.SIGINT, signal.SIGTERM): signal.signal(n, signal.SIG_IGN)\n" if deaf else hears
     code = (
         f"import pathlib, signal, time; from microrad.core.folder import whole_folder\n{ignored}"
         f"with whole_folder(pathlib.Path({str(place / 'found')!r}), False) as draft:\n"
