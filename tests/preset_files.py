@@ -6,7 +6,7 @@ from microrad.mission.presets import preset_text
 from microrad.mission.toml import scan
 
 NAMES = (
-    *("click", "crosslink", "dsoc", "leo-hicali", "llcd", "oicets-artemis"),
+    *("click", "crosslink", "dsoc", "ground-downlink", "leo-hicali", "llcd", "oicets-artemis"),
     *("paper", "qpsk-crosslink", "sda-crosslink", "sentinel1-edrs", "spot4-artemis", "tbird"),
 )
 
@@ -44,6 +44,7 @@ COUNTER = {
 
 EXAMPLES = {
     "paper": {},
+    "ground-downlink": {},
     "dsoc": {
         **BODY,
         **LOSSES,

@@ -16,7 +16,7 @@ from microrad.core.budget import total_db
 from microrad.link import gains, requirement
 from microrad.link import study as link_study
 from microrad.mission.file import load_mission
-from microrad.mission.tables.link import Channel
+from microrad.mission.tables.channel import Channel
 from microrad.report.links import words as links_words
 from places import ROOT
 

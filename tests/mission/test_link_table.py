@@ -525,7 +525,8 @@ def test_the_schema_describes_the_links_keys(schema):
         "properties"
     ].keys()
     assert {"leo_obscuration", "geo_obscuration", "leo_name"} <= tables["Terminals"]["properties"].keys()
-    assert {"zenith_transmission", "elevation"} == tables["Channel"]["properties"].keys()
+    keys = {"zenith_transmission", "aerosol_depth", "angstrom_exponent", "absorption", "elevation", "altitude"}
+    assert keys | {"station", "height", "turbulence"} == tables["Channel"]["properties"].keys()
     receiver = tables["Receiver"]["properties"]
     others = {"background", "code", "inter_symbol_loss"}
     assert {key for table in RECEIVERS.values() for key in table} | others == receiver.keys()

@@ -491,6 +491,7 @@ def test_a_rate_of_the_line_of_sight_beyond_that_of_the_loop_is_said(day, given_
     beam = SimpleNamespace(distance_m=44_100e3)
     m = SimpleNamespace(
         communication=beam,
+        range_m=lambda table: table.distance_m,
         beacon=None,
         answer=None,
         point_ahead=None,

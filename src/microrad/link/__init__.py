@@ -1,11 +1,13 @@
 """Link budgets: of the beacon, its answer and the communication link, and what follows from them."""
 
-from microrad.link.budget.assembly import DataLink, LinkError, Shared, assembled, jitter_of, of, required_dbm
+from microrad.link.budget.air import LinkError
+from microrad.link.budget.assembly import DataLink, Shared, assembled, jitter_of, of, required_dbm
 from microrad.link.budget.lines import DEEPEST_DB, LinkBudget, beam_budget, communication_budget, tracking_light_w
 from microrad.link.budget.maps import (
     IdealReceiver,
     SensitivityReading,
     convention_maps,
+    farther_db,
     ideal_receivers,
     implied_sensitivity,
     largest_data_rate,
@@ -34,6 +36,7 @@ __all__ = [
     "beam_passes",
     "communication_budget",
     "convention_maps",
+    "farther_db",
     "ideal_receivers",
     "implied_sensitivity",
     "jitter_of",

@@ -214,6 +214,30 @@ def clear_sky_loss_db(zenith_transmission: float, elevation_rad: float) -> float
     return 0.0 - 10.0 * math.log10(zenith_transmission) * air_mass(elevation_rad)
 
 
+def rayleigh_depth(wavelength_m: float, height_m: float) -> float:
+    """Optical depth to the zenith by the scattering of molecules (Hansen and Travis 1974, Space Sci. Rev. 16, 527).
+
+    It is 0.008569 L^-4 (1 + 0.0113 L^-2 + 0.00013 L^-4) exp(-height / 8434.5 m), L the wavelength in um.
+
+    Args:
+        wavelength_m: Wavelength, in m.
+        height_m: Height of the station above the sea, in m.
+    """
+    square = (wavelength_m * 1e6) ** -2
+    return 0.008569 * square**2 * (1.0 + 0.0113 * square + 0.00013 * square**2) * math.exp(-height_m / 8434.5)
+
+
+def aerosol_depth(wavelength_m: float, depth_at_1um: float, exponent: float) -> float:
+    """Optical depth to the zenith of haze: that at 1 um times the wavelength in um to minus the exponent (Angstrom).
+
+    Args:
+        wavelength_m: Wavelength, in m.
+        depth_at_1um: Optical depth at 1 um.
+        exponent: Angstrom's exponent.
+    """
+    return depth_at_1um * math.pow(wavelength_m * 1e6, -exponent)
+
+
 def photon_energy_j(wavelength_m: float) -> float:
     """Energy (J) of one photon, h c / lambda."""
     return PLANCK_J_S * SPEED_OF_LIGHT_M_S / wavelength_m

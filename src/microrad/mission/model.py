@@ -13,12 +13,14 @@ from pydantic import Field
 
 from microrad.core.units import format_quantity
 from microrad.mission.fields import Problem, Quantity, Several, Share, Table
+from microrad.mission.ground import GroundPath, ground_fits, path_of, range_of
 from microrad.mission.tables.acquisition import Acquisition
+from microrad.mission.tables.channel import Channel
 from microrad.mission.tables.error_budget import ErrorBudget
 from microrad.mission.tables.fine_pointing import FinePointing, clock_problems
 from microrad.mission.tables.link import (
     Beacon,
-    Channel,
+    Beam,
     Communication,
     LinkConventions,
     LinkRequirement,
@@ -287,6 +289,7 @@ LINK_RELATIONS: tuple[Relation, ...] = (
     (("pointing", "beacon"), _cone_fits),
     (("jitter", "requirement"), _outage_given),
     (("terminals", "communication", "requirement"), _coupling_fits),
+    (("orbit", "channel", "communication", "beacon", "answer", "requirement"), ground_fits),
     (("orbit", "operations"), _needs_orbit("operations")),
     (("orbit", "constellation"), _needs_orbit("constellation")),
     (("operations", "acquisition"), _scan_there),
@@ -323,6 +326,15 @@ class LinkMission(Table):
     orbit: Orbits | None = None
     operations: Operations | None = None
     constellation: Constellation | None = None
+
+    @property
+    def path(self) -> GroundPath | None:
+        """The path of its links through the air; None where there is no air."""
+        return path_of(self.orbit, self.channel)
+
+    def range_m(self, beam: Beam) -> float:
+        """Distance (m) of the terminals for one of its links: as that table says, or as the path has it."""
+        return range_of(beam, self.path)
 
     @classmethod
     def relations(cls) -> tuple[Relation, ...]:

@@ -12,7 +12,7 @@ from microrad.mission.tables.operations import Constellation, Downlink
 from microrad.mission.tables.orbit import Orbits, OrbitTable, VisibilityLimits
 from microrad.orbit.base import Orbit, OrbitError, required
 from microrad.orbit.earth.epoch import Epoch
-from microrad.orbit.earth.figure import EARTH_RADIUS_M, Earth, Station
+from microrad.orbit.earth.figure import EARTH_RADIUS_M, Earth, GroundSite, Station
 from microrad.orbit.files import read_elements, read_oem
 from microrad.orbit.propagation.analytic import (
     GeostationarySlot,
@@ -109,6 +109,10 @@ def _tail(orbit: Orbit, epoch: Epoch, duration_s: float) -> float:
 
 def _orbit(t: OrbitTable, name: str, epoch: Epoch, folder: Path, contents: Contents) -> Orbit:
     """The orbit that a table describes, whose own checks have seen to the keys of each kind."""
+    if t.kind == "station":
+        assert t.latitude_rad is not None and t.longitude_rad is not None  # the table's own check
+        assert t.height_m is not None and t.mask_rad is not None
+        return GroundSite(Station(name, t.latitude_rad, t.longitude_rad, t.height_m, t.mask_rad), epoch)
     if t.longitude_rad is not None:
         return GeostationarySlot(name, epoch, t.longitude_rad)
     if t.file is None:

@@ -200,7 +200,7 @@ def find_partner(
         return_coverage=_possible(_return_coverage(shared, light, radii[2])),
         lock=a.lock_probability,
     )
-    timing = _timing(shared.terminals, a, beacon.table.distance_m)
+    timing = _timing(shared.terminals, a, shared.range_m(beacon.table))
     sigma = max(math.hypot(b, s) for b, s in zip(error.bias_rad, error.rms_rad, strict=True))
     wide = _solved("wide beacon", sequence.paper_sequence(timing, chances), a)
     scanned = None
@@ -243,7 +243,7 @@ def _on_axis_margin_db(budget: link.LinkBudget) -> float:
 def _return_reach(data: link.DataLink) -> float:
     """How far off its axis the narrow beam back suffices: out to 1/e2 at most, and as far as its margin goes."""
     fall = data.beam.fall
-    received_dbm = link.received_on_axis_dbm(data) - data.receive_pointing_db
+    received_dbm = link.received_on_axis_dbm(data) - data.added_db
     margin_db = received_dbm - float(link.required_dbm(data, data.table.data_rate_bit_s))
     return 0.0 if margin_db <= 0.0 else min(fall.half_angle_rad, fall.error_rad(margin_db))
 
@@ -349,15 +349,15 @@ def _sender(shared: link.Shared, beacon: Sent, a: Acquisition, s: ScanTable) -> 
     the power, as noise that does not depend on the light has it. Every loss but those off the axis is in the power.
     The beam is as narrow as the radius out to which it is used, but no narrower than diffraction at its aperture.
     """
-    beam = beacon.table
+    beam, range_m = beacon.table, shared.range_m(beacon.table)
     half = half_angle_rad(beam.divergence_rad, shared.conventions.divergence)
     least = narrowest_half_angle_rad(shared.terminals.leo_aperture_m, beam.wavelength_m)
     area = math.pi / 4.0 * shared.terminals.geo_aperture_m**2
     margin_db = min(max(_on_axis_margin_db(beacon.budget), -_DEEPEST_MARGIN_DB), _DEEPEST_MARGIN_DB)
     on_axis = beam.required_power_w * 10.0 ** (margin_db / 10.0) / area
     beams = Beams(
-        power_w=on_axis * math.pi * (half * beam.distance_m) ** 2 / 2.0,
-        range_m=beam.distance_m,
+        power_w=on_axis * math.pi * (half * range_m) ** 2 / 2.0,
+        range_m=range_m,
         narrow_half_angle_rad=max(s.beam_radius_rad, least),
         beam_radius_rad=s.beam_radius_rad,
         overlap=s.overlap,

@@ -10,18 +10,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from microrad.core.arrays import Floats
-from microrad.core.errors import MicroradError
 from microrad.link import coupling, gains, receivers
 from microrad.link.beams import GaussianFall, LitAperture
+from microrad.link.budget import air
 from microrad.link.radial_error import Jitter, radial_quantile, radial_steps
 from microrad.mission.fields import Quantity
+from microrad.mission.ground import GroundPath, range_of
 from microrad.mission.model import LinkMission
 from microrad.mission.tables import pointing as pointing_table
+from microrad.mission.tables.channel import Channel
 from microrad.mission.tables.coupling import Coupling
 from microrad.mission.tables.link import (
     QUADRATURES,
     Beam,
-    Channel,
     Communication,
     LinkConventions,
     LinkRequirement,
@@ -36,12 +37,6 @@ SLOWEST_BIT_S = 1.0
 """Data rate from which on a link is one."""
 
 
-class LinkError(MicroradError):
-    """A question to which this link has no answer; the message says by how many decibels."""
-
-    page = "link"
-
-
 @dataclass(frozen=True, slots=True)
 class TransmittedBeam:
     """What leaves an aperture: gain on the axis, relative to an isotropic antenna, and how it falls off."""
@@ -52,23 +47,63 @@ class TransmittedBeam:
 
 @dataclass(frozen=True, slots=True)
 class Shared:
-    """What a mission's links share: the terminals at their ends, the air between them, point-ahead, conventions."""
+    """What a mission's links share: the terminals at their ends, the air between them, point-ahead, conventions.
+
+    ``path`` is that through the air, None in vacuum. ``outage`` is the share of the time that fades may take.
+    """
 
     terminals: Terminals
     conventions: LinkConventions
     channel: Channel | None
     point_ahead: PointAhead | None
+    path: GroundPath | None = None
+    outage: float | None = None
 
     @classmethod
     def of(cls, m: LinkMission) -> "Shared":
         """What the links of this mission share."""
-        return cls(m.terminals, m.conventions, m.channel, m.point_ahead)
+        return cls(m.terminals, m.conventions, m.channel, m.point_ahead, m.path, m.requirement.outage)
 
     @property
-    def clear_sky_db(self) -> float:
-        """Loss of a clear atmosphere on the path; 0 in vacuum."""
-        air = self.channel
-        return 0.0 if air is None else gains.clear_sky_loss_db(air.zenith_transmission, air.elevation_rad)
+    def sky(self) -> air.Sky | None:
+        """The air on the path; None in vacuum."""
+        ahead = self.point_ahead
+        angle = 0.0 if ahead is None else pointing_table.point_ahead_rad(ahead.transverse_velocity_m_s)
+        return None if self.channel is None or self.path is None else air.Sky(self.channel, self.path, angle)
+
+    def clear_sky_db(self, wavelength_m: float) -> float:
+        """Loss (dB) of a clear atmosphere on the path at a wavelength (m); 0 in vacuum."""
+        sky = self.sky
+        return 0.0 if sky is None else sky.clear_db(wavelength_m)
+
+    def range_m(self, beam: Beam) -> float:
+        """Distance (m) of the terminals for one of the links."""
+        return range_of(beam, self.path)
+
+    def turbulent(
+        self, beam: Beam, sender: str, half_angle_rad: float, end: coupling.End | None
+    ) -> air.Turbulent | None:
+        """What turbulence does to one of the links; None in still air.
+
+        Args:
+            beam: The table of the link.
+            sender: The terminal that it leaves, "leo" or "geo".
+            half_angle_rad: Its half angle at 1/e2 of intensity (rad).
+            end: What takes the light in the focus; None where it takes all.
+
+        Raises:
+            LinkError: For turbulence beyond a closed form.
+        """
+        sky = self.sky
+        slant = None if sky is None else sky.slant(beam.wavelength_m, self.range_m(beam))
+        if sky is None or slant is None:
+            return None
+        table = sky.channel.turbulence
+        assert table is not None  # else the path has no turbulence
+        if sky.path.station == sender:
+            return air.uplink(table, slant, half_angle_rad, sky.point_ahead_rad)
+        aperture = self.terminals.leo_aperture_m if sender == "geo" else self.terminals.geo_aperture_m
+        return air.downlink(table, slant, air.Receives(aperture, end))
 
     @property
     def point_ahead_rad(self) -> float:
@@ -129,7 +164,8 @@ class DataLink:
 
     ``receiver`` is None where its sensitivity is given as measured. ``receiving`` is None where all of the light falls
     on the detector. ``receive_pointing_db`` is what the receiver's own pointing costs: by its static error, or what
-    its losses add to those by the transmitter's stated error, both together exceeded for the outage.
+    its losses add to those by the transmitter's stated error, both together exceeded for the outage. ``turbulent`` is
+    what the air does, None where it is still or there is none, and ``fade_db`` what its fades add to those two.
     """
 
     shared: Shared
@@ -140,6 +176,39 @@ class DataLink:
     receiver: receivers.Receiver | None
     receiving: Receiving | None
     receive_pointing_db: float
+    turbulent: air.Turbulent | None = None
+    fade_db: float = 0.0
+
+    @property
+    def added_db(self) -> float:
+        """What the receiver's pointing and the fades add to the loss by the transmitter's pointing."""
+        return self.receive_pointing_db + self.fade_db
+
+    @property
+    def range_m(self) -> float:
+        """Distance of the terminals (m)."""
+        return self.shared.range_m(self.table)
+
+    @property
+    def air_db(self) -> float:
+        """Loss of the mean power in the air: by a clear sky, by a wider beam, and by a wavefront that is taken less."""
+        clear, turbulent = self.shared.clear_sky_db(self.table.wavelength_m), self.turbulent
+        return clear if turbulent is None else clear + turbulent.spread_db + turbulent.wavefront_db
+
+    def both_ends(self, radius_rad: Floats, share: Floats) -> coupling.BothEnds:
+        """Losses by pointing at either end, and by fades, where the transmitter has these errors.
+
+        Args:
+            radius_rad: Radial pointing errors of the transmitter (rad), without an uncorrected point-ahead.
+            share: The share of the time of each.
+        """
+        sent = coupling.of_beam(self.beam.fall, radius_rad + self.shared.point_ahead_rad, share)
+        return _both_ends(sent, self.receiving, self.turbulent, radius_rad, share)
+
+    @property
+    def is_random(self) -> bool:
+        """Whether more is lost at random than by the transmitter's pointing."""
+        return self.turbulent is not None or (self.receiving is not None and self.receiving.is_random)
 
     @property
     def coupling_db(self) -> float:
@@ -171,13 +240,34 @@ def assembled(
     """
     beam = communication_beam(shared.terminals, table, shared.conventions.pointing_loss)
     receiving = None if table.coupling is None else _receiving(shared.terminals, table.coupling, table.wavelength_m)
-    lost = 0.0
-    if receiving is not None:
+    turbulent = shared.turbulent(table, "leo", beam.fall.half_angle_rad, None if receiving is None else receiving.end)
+    lost, fade, ahead = 0.0, 0.0, shared.point_ahead_rad
+    if receiving is not None and not receiving.is_random:
+        lost = receiving.static_db
+    if turbulent is not None or (receiving is not None and receiving.is_random):
         sent = None if jitter is None else jitter_of(jitter)
-        stated = (sent, table.pointing_error_rad, shared.point_ahead_rad, requirement.outage)
-        lost = receiving.static_db if not receiving.is_random else _added_db(receiving, beam.fall, *stated)
+        stated = (beam.fall, sent, table.pointing_error_rad, ahead, requirement.outage)
+        if receiving is not None and receiving.is_random:
+            lost = _added_db(receiving, None, *stated)
+        if turbulent is not None:
+            fade = _added_db(receiving, turbulent, *stated) - lost
     receiver = _receiver(shared.terminals, table)
-    return DataLink(shared, table, requirement, jitter, beam, receiver, receiving, lost)
+    return DataLink(shared, table, requirement, jitter, beam, receiver, receiving, lost, turbulent, fade)
+
+
+def at_elevation(data: DataLink, elevation_rad: float) -> DataLink:
+    """The communication link where its satellite stands higher or lower above the station.
+
+    Args:
+        data: The communication link, with a station and an altitude.
+        elevation_rad: The elevation (rad).
+
+    Raises:
+        LinkError: For turbulence beyond a closed form.
+    """
+    assert data.shared.path is not None  # there is a station
+    shared = replace(data.shared, path=data.shared.path.at(elevation_rad))
+    return assembled(shared, data.table, data.requirement, data.jitter)
 
 
 def jitter_of(table: JitterTable) -> Jitter:
@@ -188,22 +278,38 @@ def jitter_of(table: JitterTable) -> Jitter:
 
 @lru_cache(maxsize=256)  # most inputs that are moved leave both ends' errors alone
 def _added_db(
-    receiving: Receiving,
+    receiving: Receiving | None,
+    turbulent: air.Turbulent | None,
     fall: LitAperture | GaussianFall,
     jitter: Jitter | None,
     error_rad: float,
     ahead_rad: float,
     outage: float | None,
 ) -> float:
-    """What the receiver's random error adds to the loss that the transmitter's exceeds for the outage."""
-    assert outage is not None  # a mission with such a receiver has to state it
+    """What the receiver's random error and fades add to the loss that the transmitter's exceeds for the outage."""
+    assert outage is not None  # a mission with such a receiver, or with turbulence, has to state it
     if jitter is None:
         radius, share = np.array([error_rad]), np.ones(1)
     else:
         radius, share = radial_steps(jitter)
         error_rad = float(radial_quantile(jitter, max(outage, RAREST)))
-    both = coupling.BothEnds(coupling.of_beam(fall, radius + ahead_rad, share), receiving.losses(radius, share))
+    both = _both_ends(coupling.of_beam(fall, radius + ahead_rad, share), receiving, turbulent, radius, share)
     return both.quantile_db(outage) - float(fall.loss_db(error_rad + ahead_rad))
+
+
+def _both_ends(
+    sent: coupling.Losses,
+    receiving: Receiving | None,
+    turbulent: air.Turbulent | None,
+    radius_rad: Floats,
+    share: Floats,
+) -> coupling.BothEnds:
+    received = coupling.Losses.single(0.0) if receiving is None else receiving.losses(radius_rad, share)
+    if turbulent is not None:
+        fades = air.losses(turbulent.fades)
+        alone = received.loss_db.size == 1
+        received = fades.moved(float(received.loss_db[0])) if alone else coupling.BothEnds(received, fades).sum
+    return coupling.BothEnds(sent, received)
 
 
 def _receiving(terminals: Terminals, table: Coupling, wavelength_m: float) -> Receiving:

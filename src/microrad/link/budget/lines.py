@@ -12,6 +12,7 @@ import numpy as np
 from microrad.core.budget import Line, total_db
 from microrad.core.units import format_input, format_quantity
 from microrad.link import coupling, gains
+from microrad.link.budget.air import UPLINK, Turbulent
 from microrad.link.budget.assembly import DataLink, Shared, check_grid, strehl_db
 from microrad.link.budget.receiver_lines import (
     GIVEN,
@@ -44,7 +45,8 @@ _COUPLED = "area pi D^2 / 4; what takes its light stands below"
 CHOSEN = "chosen for this evaluation"
 STREHL_LOSS, POINTING_LOSS, POINT_AHEAD_LOSS = "Strehl loss", "Pointing loss", "Point-ahead loss"
 COUPLING_LOSS, RECEIVE_POINTING_LOSS = "Coupling loss", "Receive pointing loss"
-FREE_SPACE_LOSS, CLEAR_SKY_LOSS = "Free-space loss", "Clear-sky loss"
+FREE_SPACE_LOSS, CLEAR_SKY_LOSS, SPREAD_LOSS = "Free-space loss", "Clear-sky loss", "Turbulence spread loss"
+WAVEFRONT_LOSS, FADE_LOSS = "Turbulence coupling loss", "Turbulence fade"
 DEEPEST_DB = 20.0  # pointing loss beyond which side lobes and scatter decide, not the main lobe
 WIDEST_RAD = 0.1  # half angle or error beyond which a small angle is none
 _CUT_DB = 0.1  # gain beyond which it counts that the aperture cuts a beam that is taken as whole
@@ -133,10 +135,13 @@ def communication_budget(
     rate, rate_source = given_or_own(beam.data_rate_bit_s, data_rate_bit_s, write.source("data_rate"), given_source)
     check_grid(np.asarray(rate), np.asarray(error))
     with_ahead = float(data.beam.fall.loss_db(error + data.shared.point_ahead_rad))
-    transmit = write.transmit(_lit_gain(write, data), _pointing_line(data, error, error_source), with_ahead)
+    pointing, turbulent = _pointing_line(data, error, error_source), data.turbulent
+    transmit = write.transmit(_lit_gain(write, data), pointing, with_ahead, turbulent)
     receive = (
         *write.receive("geo"),
         *_coupling_lines(write, data),
+        *write.wavefront(turbulent, "" if beam.coupling is None else beam.coupling.into),
+        *write.fade(turbulent, data.fade_db, data.jitter is None),
         write.loss("Tracking split loss", "tracking_split_loss"),
         write.loss("Implementation loss", "implementation_loss"),
         *inter_symbol_lines(beam, write.source),
@@ -184,8 +189,11 @@ def _gaussian_budget(write: "Writer", beam: Beacon, receiver: str) -> LinkBudget
     with_ahead = float(gains.gaussian_pointing_loss_db(error + write.shared.point_ahead_rad, half))
     level = gains.dbm(beam.required_power_w)
     required = Line("Required power", level, "dBm", "as given", write.source("required_power"), GIVEN)
-    transmit = write.transmit((gain,), pointing, with_ahead)
-    return _budget(write.table.capitalize(), transmit, write.receive(receiver), (required,), beam)
+    turbulent = write.shared.turbulent(beam, write.end, half, None)
+    transmit = write.transmit((gain,), pointing, with_ahead, turbulent)
+    lost = 0.0 if turbulent is None else turbulent.fades.loss_db(write.shared.outage or 0.5)
+    receive = (*write.receive(receiver), *write.fade(turbulent, lost, alone=True))
+    return _budget(write.table.capitalize(), transmit, receive, (required,), beam)
 
 
 def _cut_by_aperture(half_angle_rad: float, aperture_m: float, wavelength_m: float) -> str:
@@ -296,13 +304,16 @@ class Writer:
             lines.append(Line(name, value, "dB", basis, source, regime))
         return (*lines, self.loss("Receive optics loss", "receive_optics_loss"))
 
-    def transmit(self, gain: tuple[Line, ...], pointing: Line, with_ahead_db: float) -> tuple[Line, ...]:
+    def transmit(
+        self, gain: tuple[Line, ...], pointing: Line, with_ahead_db: float, turbulent: Turbulent | None
+    ) -> tuple[Line, ...]:
         """Lines of everything up to the receiving aperture.
 
         Args:
             gain: Lines of the transmitting aperture's gain.
             pointing: Line of the pointing loss, negative in dB.
             with_ahead_db: Pointing loss in dB, positive, once an uncorrected point-ahead is added to the error.
+            turbulent: What turbulence does, None in still air.
         """
         beam = self.beam
         power = f"P = {format_input(beam.transmit_power_w, 'W')}"
@@ -318,30 +329,95 @@ class Writer:
             self._ahead(with_ahead_db, pointing.value),
             self._space(),
             *channel,
+            *self.spread(turbulent),
         )
 
     def _space(self) -> Line:
-        beam = self.beam
-        basis = f"(lambda / (4 pi R))^2, R = {format_input(beam.distance_m, 'm')}"
-        value = -gains.free_space_loss_db(beam.distance_m, beam.wavelength_m)
-        largest = max(self.shared.terminals.leo_aperture_m, self.shared.terminals.geo_aperture_m)
+        beam, shared = self.beam, self.shared
+        range_m = shared.range_m(beam)
+        basis, path = f"(lambda / (4 pi R))^2, R = {format_input(range_m, 'm')}", shared.path
+        source = self.source("distance")
+        if path is not None and beam.distance_m is None:
+            basis += f" at {math.degrees(path.elevation_rad):.4g} deg of elevation"
+            source = source_text(self.sources, *path.sources)
+        elif path is not None:
+            basis += f": {format_quantity(path.altitude_of(range_m), 'm')} up, at the elevation of the channel"
+        value = -gains.free_space_loss_db(range_m, beam.wavelength_m)
+        largest = max(shared.terminals.leo_aperture_m, shared.terminals.geo_aperture_m)
         far = gains.far_field_m(largest, beam.wavelength_m)
-        near = (
-            "" if beam.distance_m >= far else f"nearer than the far field, which begins at {format_quantity(far, 'm')}"
-        )
-        return Line(FREE_SPACE_LOSS, value, "dB", basis, self.source("distance"), "vacuum, far field", near)
+        near = "" if range_m >= far else f"nearer than the far field, which begins at {format_quantity(far, 'm')}"
+        doubts = _both(near, "" if path is None else path.doubt)
+        return Line(FREE_SPACE_LOSS, value, "dB", basis, source, "vacuum, far field", doubts)
 
     def _channel(self) -> Line:
-        channel = self.shared.channel
-        assert channel is not None
-        mass = gains.air_mass(channel.elevation_rad)
-        basis = (
-            f"T^m, T = {channel.zenith_transmission:g} to the zenith, air mass m = {mass:.3f} (Kasten and Young 1989)"
-        )
-        source = source_text(self.sources, "channel.zenith_transmission", "channel.elevation")
-        regime = "clear sky, from 10 degrees of elevation; no turbulence, no clouds"
-        doubt = "turbulence is not in this budget: scintillation and beam wander come on top"
-        return Line(CLEAR_SKY_LOSS, 0.0 - self.shared.clear_sky_db, "dB", basis, source, regime, doubt)
+        shared, channel, path = self.shared, self.shared.channel, self.shared.path
+        assert channel is not None and path is not None
+        mass = gains.air_mass(path.elevation_rad)
+        if channel.zenith_transmission is not None:
+            basis, keys = f"T^m, T = {channel.zenith_transmission:g} to the zenith", ["channel.zenith_transmission"]
+        else:
+            basis = "Rayleigh scattering (Hansen and Travis 1974), haze and absorption, times m"
+            keys = [f"channel.{key}" for key in ("aerosol_depth", "angstrom_exponent", "absorption")]
+        basis += f", air mass m = {mass:.3f} (Kasten and Young 1989)"
+        source = source_text(self.sources, *keys, path.sources[0])
+        still = channel.turbulence is None
+        regime = f"clear sky, from 10 degrees of elevation; {'no turbulence, ' if still else ''}no clouds"
+        doubt = "turbulence is not in this budget: scintillation and beam wander come on top" if still else ""
+        value = 0.0 - shared.clear_sky_db(self.beam.wavelength_m)
+        return Line(CLEAR_SKY_LOSS, value, "dB", basis, source, regime, doubt)
+
+    def spread(self, turbulent: Turbulent | None) -> tuple[Line, ...]:
+        """Line of what a turbulent path takes of an uplink by a wider beam; none for a downlink."""
+        if turbulent is None or turbulent.direction != UPLINK:
+            return ()
+        r0 = format_quantity(turbulent.path.fried_m, "m", 3)
+        table = self.shared.channel
+        modes = 0 if table is None or table.turbulence is None else table.turbulence.corrected_modes
+        basis = f"12 lg(1 + (D0 / r0)^(5/3)), D0 = sqrt(8) W0, r0 = {r0}"
+        regime = "mean power on the axis, wander in it (Andrews and Phillips 2005)"
+        if modes:
+            basis += f", or what {modes} corrected modes and the point-ahead angle leave, if that is less"
+        value = 0.0 - turbulent.spread_db
+        return (Line(SPREAD_LOSS, value, "dB", basis, self._turbulence_source(), regime, _both(*turbulent.doubts)),)
+
+    def wavefront(self, turbulent: Turbulent | None, into: str) -> tuple[Line, ...]:
+        """Line of what a fibre or detector takes less of a turbulent wavefront.
+
+        Args:
+            turbulent: What turbulence does, None in still air.
+            into: What takes the light, "" where it takes all.
+        """
+        if turbulent is None or not into or turbulent.direction == UPLINK:
+            return ()
+        r0 = format_quantity(turbulent.path.fried_m, "m", 3)
+        basis, regime = f"mean power into the {into}, r0 = {r0}", "Kolmogorov's turbulence, long exposure"
+        value = 0.0 - turbulent.wavefront_db
+        return (Line(WAVEFRONT_LOSS, value, "dB", basis, self._turbulence_source(), regime),)
+
+    def fade(self, turbulent: Turbulent | None, loss_db: float, alone: bool) -> tuple[Line, ...]:
+        """Line of the fades of the air.
+
+        Args:
+            turbulent: What turbulence does, None in still air.
+            loss_db: The loss, positive.
+            alone: Whether nothing else is random.
+        """
+        if turbulent is None:
+            return ()
+        outage = self.shared.outage or 0.0
+        basis = f"scintillation index {turbulent.index:.3g}"
+        if turbulent.direction == UPLINK:
+            basis += f", wander of {format_quantity(turbulent.wander_rad, 'rad', 3)} rms"
+        said = "exceeded" if alone else "what it adds to the pointing loss, all together exceeded"
+        basis += f"; {said} for {100.0 * outage:g} % of the time"
+        source = f"{self._turbulence_source()}; {source_text(self.sources, 'requirement.outage')}"
+        doubts = _both(*turbulent.doubts) if turbulent.direction != UPLINK else ""
+        return (Line(FADE_LOSS, 0.0 - loss_db, "dB", basis, source, "weak turbulence, by its index", doubts),)
+
+    def _turbulence_source(self) -> str:
+        keys = ("ground_strength", "wind_rms", "fades")
+        there = [f"channel.turbulence.{key}" for key in keys if f"channel.turbulence.{key}" in self.sources]
+        return source_text(self.sources, *there)
 
     def _ahead(self, with_ahead_db: float, pointing_db: float) -> Line:
         ahead = self.shared.point_ahead
@@ -467,7 +543,7 @@ def _budget(
     margin = received_dbm - required.value
     mispointing = (STREHL_LOSS, POINTING_LOSS, POINT_AHEAD_LOSS)
     on_axis = [line for line in transmit if line.name not in mispointing]
-    path = (POINTING_LOSS, POINT_AHEAD_LOSS, FREE_SPACE_LOSS, CLEAR_SKY_LOSS)
+    path = (POINTING_LOSS, POINT_AHEAD_LOSS, FREE_SPACE_LOSS, CLEAR_SKY_LOSS, SPREAD_LOSS)
     leaving = [line for line in transmit if line.name not in path]
     return LinkBudget(
         name=name,

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -11,11 +12,12 @@ from numpy.typing import ArrayLike
 from microrad.core.arrays import Floats
 from microrad.core.units import format_quantity
 from microrad.link import gains
+from microrad.link.budget.air import LinkError
 from microrad.link.budget.assembly import (
     SLOWEST_BIT_S,
     DataLink,
-    LinkError,
     assembled,
+    at_elevation,
     check_grid,
     rate_at_power,
     required_dbm,
@@ -28,6 +30,8 @@ from microrad.mission.tables.link import Communication
 
 BIT_ERROR_RATIO = 1e-9
 """Bit error ratio at which ideal receivers are compared."""
+
+_ELEVATIONS = 17  # at which the air is looked at, from the zenith to that of the budget
 
 QUANTUM_LIMIT_DB = 10.0 * math.log10(2.0)
 """Noise figure of an ideal phase-insensitive amplifier at high gain."""
@@ -48,8 +52,8 @@ def received_on_axis_dbm(data: DataLink, strehl_loss_db: float | None = None) ->
         + beam.implementation_loss_db
         + (0.0 if beam.receiver is None else beam.receiver.inter_symbol_loss_db or 0.0)
         + (strehl_db(beam, data.shared.conventions.strehl) if strehl_loss_db is None else strehl_loss_db)
-        + gains.free_space_loss_db(beam.distance_m, beam.wavelength_m)
-        + data.shared.clear_sky_db
+        + gains.free_space_loss_db(data.range_m, beam.wavelength_m)
+        + data.air_db
         + gains.obscuration_loss_db(terminals.geo_obscuration or 0.0)
         + data.coupling_db
     )
@@ -57,17 +61,52 @@ def received_on_axis_dbm(data: DataLink, strehl_loss_db: float | None = None) ->
     return gains.dbm(beam.transmit_power_w) + data.beam.gain_db + receiving - losses
 
 
+def farther_db(data: DataLink, range_m: ArrayLike) -> Floats:
+    """What the communication link loses more than budgeted where its terminals are further apart, in dB.
+
+    In vacuum that is 20 lg of the ratio of the ranges. Down to a station the elevation goes with the range, and so do
+    absorption, scattering and turbulence: they are found at some elevations, and interpolated between them over the
+    inverse of its sine. Below the elevation of the budget the air stays as it is there.
+
+    Args:
+        data: The communication link.
+        range_m: Ranges (m), any shape.
+
+    Raises:
+        LinkError: For turbulence beyond a closed form.
+    """
+    distance, path = np.asarray(range_m, dtype=np.float64), data.shared.path
+    farther: Floats = 20.0 * np.log10(distance / data.range_m)
+    if path is None or path.satellite_radius_m is None or path.elevation_rad >= math.pi / 2.0:
+        return farther
+    longer, added = _air_over_elevation(data)
+    nearest = path.range_at(math.pi / 2.0)
+    elevation = np.array([path.elevation_at(max(each, nearest)) for each in distance.ravel()])
+    at = np.interp(1.0 / np.sin(np.maximum(elevation, path.elevation_rad)), longer, added)
+    return np.asarray(farther + at.reshape(distance.shape))
+
+
+@lru_cache(maxsize=64)  # a contact asks for it window by window
+def _air_over_elevation(data: DataLink) -> tuple[Floats, Floats]:
+    """Inverse sines of some elevations, and what the air takes there more than at that of the budget (dB)."""
+    assert data.shared.path is not None
+    longer = np.linspace(1.0, 1.0 / math.sin(data.shared.path.elevation_rad), _ELEVATIONS)
+    own = data.air_db + data.fade_db
+    there = [at_elevation(data, math.asin(min(1.0 / each, 1.0))) for each in longer[:-1]]
+    return longer, np.array([*(each.air_db + each.fade_db - own for each in there), 0.0])
+
+
 def pointing_loss_db(data: DataLink, pointing_error_rad: ArrayLike) -> Floats:
     """Loss (positive, dB) of the communication link at each pointing error, with an uncorrected point-ahead added.
 
-    What the receiver's own pointing costs is in it, the same at each error.
+    What the receiver's own pointing costs is in it, and what fades add, the same at each error.
 
     Args:
         data: The communication link.
         pointing_error_rad: Radial pointing errors, in rad, any shape.
     """
     error = np.asarray(pointing_error_rad, dtype=np.float64)
-    return data.beam.fall.loss_db(error + data.shared.point_ahead_rad) + data.receive_pointing_db
+    return data.beam.fall.loss_db(error + data.shared.point_ahead_rad) + data.added_db
 
 
 def margin_map(data: DataLink, data_rate_bit_s: ArrayLike, pointing_error_rad: ArrayLike) -> Floats:
@@ -217,7 +256,7 @@ def implied_sensitivity(data: DataLink) -> tuple[SensitivityReading, ...]:
         for loss in ("gaussian", "gain"):
             error = requirement.pointing_error_rad + data.shared.point_ahead_rad
             lost = float(gains.pointing_loss_db(error, aperture, wavelength, loss))
-            level = on_axis - lost - data.receive_pointing_db - requirement.margin_db - rate_dbm
+            level = on_axis - lost - data.added_db - requirement.margin_db - rate_dbm
             readings.append(SensitivityReading(loss, strehl, float(10.0 ** (level / 10.0))))
     return tuple(readings)
 

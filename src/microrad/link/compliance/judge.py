@@ -135,7 +135,7 @@ def mean_irradiance_w_m2(study: LinkStudy, distance_m: float) -> float:
     """
     budget, under = study.communication, study.under_jitter
     mean_db = _pointing_db(budget) if under is None else under.mean_loss_db
-    return _on_axis(budget) * float(10.0 ** (-mean_db / 10.0)) * (study.data.table.distance_m / distance_m) ** 2
+    return _on_axis(budget) * float(10.0 ** (-mean_db / 10.0)) * (study.data.range_m / distance_m) ** 2
 
 
 def acquisition_irradiance_w_m2(study: LinkStudy, distance_m: float) -> float | None:
@@ -158,7 +158,7 @@ def acquisition_irradiance_w_m2(study: LinkStudy, distance_m: float) -> float | 
         wide, narrow = half_angle_rad(m.beacon.divergence_rad, m.conventions.divergence), study.finding.scanned
         edge = m.acquisition.scan.beam_radius_rad / narrow.half_angle_rad
         light = _on_axis(study.beacon) * (wide / narrow.half_angle_rad) ** 2 * math.exp(-2.0 * edge**2)
-    return light * (m.beacon.distance_m / distance_m) ** 2
+    return light * (m.range_m(m.beacon) / distance_m) ** 2
 
 
 def _scans(study: LinkStudy) -> bool:
@@ -195,13 +195,13 @@ def _acquisition_irradiance(study: LinkStudy, asked: Asked) -> _Has:
         return _Has(None, "the mission has no table beacon")
     assert study.file.mission.beacon is not None
     what = "edge of the scan's beam" if _scans(study) else "beacon at beacon.pointing_error"
-    return _Has(value, _moved(what, study.file.mission.beacon.distance_m, asked.distance_m))
+    return _Has(value, _moved(what, study.file.mission.range_m(study.file.mission.beacon), asked.distance_m))
 
 
 def _mean_irradiance(study: LinkStudy, asked: Asked) -> _Has:
     assert asked.distance_m is not None
     what = "at communication.pointing_error, which is static" if study.under_jitter is None else "mean under the jitter"
-    own = study.data.table.distance_m
+    own = study.data.range_m
     return _Has(mean_irradiance_w_m2(study, asked.distance_m), _moved(what, own, asked.distance_m))
 
 
@@ -212,7 +212,7 @@ def _moved(what: str, own_m: float, asked_m: float) -> str:
 
 
 def _largest_irradiance(study: LinkStudy, asked: Asked) -> _Has:
-    value, own = _on_axis(study.communication), study.data.table.distance_m
+    value, own = _on_axis(study.communication), study.data.range_m
     nearest = own * math.sqrt(value / asked.values[0])
     reached = f"nearer than {format_quantity(nearest, 'm')} there is more than is allowed"
     return _Has(value, f"on the axis at {format_quantity(own, 'm')}; {reached}")

@@ -50,6 +50,10 @@ class Losses:
         """One loss (dB) all the time."""
         return cls(np.array([loss_db]), np.ones(1))
 
+    def moved(self, loss_db: float) -> "Losses":
+        """The losses with one more (dB), which is there all the time."""
+        return Losses(self.loss_db + loss_db, self.share)
+
     @property
     def mean_db(self) -> float:
         """Loss of the mean power."""

@@ -34,7 +34,7 @@ class Light:
         receiving, angles = data.receiving, (data.beam.fall.half_angle_rad, data.shared.point_ahead_rad)
         if receiving is not None and receiving.twin:
             return cls(*angles, receiving.end)
-        return cls(*angles, None, data.receive_pointing_db)
+        return cls(*angles, None, data.added_db)
 
     def power(self, error_rad: Floats) -> Floats:
         """The light at each sample, without what is only stated, shape (samples, runs).

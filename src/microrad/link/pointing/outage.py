@@ -22,8 +22,8 @@ class Exposure:
     ``on_axis_db`` is its margin without any. ``ahead_rad`` is an uncorrected point-ahead, which is added to the length
     of every error. ``quantile_rad`` is the error that is exceeded for the mission's outage, and ``beyond`` gives the
     share of the time with a larger error than one in rad. ``lost_db`` is sent over received power without any error.
-    ``received_db`` is what the receiver's own static error costs it. Where that has a distribution, ``both`` are the
-    losses at either end, of whose sum everything is; ``share`` is the outage then.
+    ``received_db`` is what the receiver's own static error costs it. Where that has a distribution, or the light fades
+    in the air, ``both`` are the losses at either end, of whose sum everything is; ``share`` is the outage then.
     """
 
     fall: beams.OffAxis
@@ -60,10 +60,9 @@ class Exposure:
         lost_db = gains.dbm(data.table.transmit_power_w) - received_dbm
         fall, ahead, receiving = data.beam.fall, data.shared.point_ahead_rad, data.receiving
         both, received, outage = None, 0.0, 0.0
-        if receiving is not None and receiving.is_random:
+        if data.is_random:
             own, outage = errors(), stated_outage(data.requirement)
-            sent = coupling.of_beam(fall, own.radius_rad + ahead, own.share)
-            both = coupling.BothEnds(sent, receiving.losses(own.radius_rad, own.share))
+            both = data.both_ends(own.radius_rad, own.share)
         elif receiving is not None:
             received = receiving.static_db
         return cls(fall, on_axis_db, lost_db, ahead, quantile_rad, beyond, received, both, outage)
@@ -335,6 +334,8 @@ def _fades(
     """How often the loss exceeds the margin, for how long, and what to doubt of it."""
     if motion is None or margin_db < 0.0:
         return math.nan, math.nan, ""
+    if data.turbulent is not None:
+        return math.nan, math.nan, "fades are not counted: those of the air have no spectrum here"
     fall, velocity = data.beam.fall, motion.velocity_rms_rad_s
     sent = pointing.MovingEnd(jitter, velocity, fall.half_angle_rad)
     moves, random = max(jitter.rms_rad) > 0.0, data.receiving is not None and data.receiving.is_random

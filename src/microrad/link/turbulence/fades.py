@@ -12,6 +12,7 @@ from microrad.core.arrays import Floats
 from microrad.mission.fields import Bounded, Quantity, Share
 
 _LEAST_VARIANCE = 1e-12
+_EDGES = (0.0, 1.0, 3.0, 6.0, 12.0, 25.0, 50.0)  # of -ln U: beyond lies 2e-22 of the time
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,7 +23,6 @@ class Fades(Bounded, ABC):
     def below(self, power: ArrayLike) -> Floats:
         """Share of the time with less power than each (over the mean)."""
 
-    @abstractmethod
     def loss_db(self, outage: float) -> float:
         """Loss against the mean power (dB) that is exceeded for a share of the time.
 
@@ -32,6 +32,18 @@ class Fades(Bounded, ABC):
         Raises:
             ValueError: For a share that is not.
         """
+        from scipy.optimize import brentq
+
+        Share("", above=0.0, below=1.0).check("the outage", outage)
+        wanted = math.log(outage)
+
+        def beyond(loss: float) -> float:
+            return math.log(max(float(self.below(10.0 ** (-loss / 10.0))), 1e-300)) - wanted
+
+        low, high = -20.0, 10.0
+        while beyond(high) > 0.0:
+            low, high = high, 2.0 * high
+        return float(brentq(beyond, low, high, xtol=1e-9))
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,6 +107,22 @@ class GammaGamma(Fades):
         of_small = 0.51 * rytov / (1.0 + 0.69 * root) ** (5.0 / 6.0)
         return cls(1.0 / math.expm1(of_large), 1.0 / math.expm1(of_small))
 
+    @classmethod
+    def of_index(cls, index: float) -> "GammaGamma":
+        """That of a scintillation index, split between the scales as that of a weak plane wave is, 0.49 to 0.51.
+
+        alpha = 1 / (exp(0.49 s) - 1) and beta = 1 / (exp(0.51 s) - 1) with s = ln(1 + index), so that the index is met.
+
+        Args:
+            index: The scintillation index, above 0.
+
+        Raises:
+            ValueError: For an index not above 0.
+        """
+        Quantity("", above=0.0).check("the scintillation index", index)
+        spread = math.log1p(index)
+        return cls(1.0 / math.expm1(0.49 * spread), 1.0 / math.expm1(0.51 * spread))
+
     @property
     def index(self) -> float:
         """Scintillation index."""
@@ -114,17 +142,28 @@ class GammaGamma(Fades):
         share = gammainc(narrow, narrow * np.multiply.outer(at, np.exp(-log)))
         return np.asarray(share @ (weight / np.sum(weight)))
 
-    def loss_db(self, outage: float) -> float:
-        """See `Fades.loss_db`."""
-        from scipy.optimize import brentq
 
-        Share("", above=0.0, below=1.0).check("the outage", outage)
-        wanted = math.log(outage)
+@dataclass(frozen=True, slots=True)
+class Wandering(Fades):
+    """Power at a satellite of a beam that scintillates and, independently of that, wanders.
 
-        def beyond(loss: float) -> float:
-            return math.log(max(float(self.below(10.0 ** (-loss / 10.0))), 1e-300)) - wanted
+    ``still`` are the fades of the beam that does not wander. ``beam`` is the square of its half angle at 1/e2 over
+    twice the mean square of the radial wander. The wander is normal about both axes, so that the power is U^(1 / beam)
+    with an even U, and its mean is beam / (beam + 1).
 
-        low, high = -20.0, 10.0
-        while beyond(high) > 0.0:
-            low, high = high, 2.0 * high
-        return float(brentq(beyond, low, high, xtol=1e-9))
+    Raises ValueError for a ratio not above 0.
+    """
+
+    still: Fades
+    beam: Annotated[float, Quantity("", above=0.0)]
+
+    def below(self, power: ArrayLike) -> Floats:
+        """See `Fades.below`: the mean over the logarithm of U, by Gauss and Legendre."""
+        node, weight = np.polynomial.legendre.leggauss(40)
+        edges = np.array(_EDGES)
+        half = np.diff(edges)[:, None] / 2.0
+        rare = (edges[:-1, None] + half * (node + 1.0)).ravel()  # -ln U
+        share = (half * weight).ravel() * np.exp(-rare)
+        mean = self.beam / (self.beam + 1.0)
+        at = np.multiply.outer(np.asarray(power, dtype=np.float64), mean * np.exp(rare / self.beam))
+        return np.asarray(self.still.below(at) @ (share / np.sum(share)))

@@ -14,9 +14,6 @@ from microrad.mission.fields import OrWord, Problem, Quantity, Share, Table, Who
 from microrad.mission.tables.coupling import Coupling
 from microrad.mission.tables.mirror import ANGLE_MOST, Angle, Name
 
-LOWEST_ELEVATION_RAD = math.radians(10.0)
-"""Elevation below which a plane-parallel atmosphere is no model of the path."""
-
 # the upper bounds are no limits of technology: they catch a wrong prefix, "5 km" for an aperture of 5 cm
 AngleOrZero = Annotated[float, Quantity("rad", "urad", least=0.0, most=ANGLE_MOST)]
 Power = Annotated[float, Quantity("W", above=0.0, most=1e6)]
@@ -75,15 +72,6 @@ class LinkConventions(Table):
     )
 
 
-class Channel(Table):
-    """A path through a clear sky. Turbulence, clouds and scattering into the receiver are outside; absent: vacuum."""
-
-    zenith_transmission: Efficiency = Field(description="of the clear atmosphere straight up, at the links' wavelength")
-    elevation_rad: Annotated[float, Quantity("rad", "deg", least=LOWEST_ELEVATION_RAD, most=ANGLE_MOST)] = Field(
-        description="of the satellite above the horizon"
-    )
-
-
 class BeamShape(Table):
     """How a beam lights the aperture that it leaves."""
 
@@ -111,7 +99,9 @@ class Beam(Table):
         default=None, description="rms, in place of strehl"
     )
     pointing_error_rad: AngleOrZero = Field(description="off the line of sight, radial")
-    distance_m: Distance = Field(description="between the terminals")
+    distance_m: Distance | None = Field(
+        default=None, description="between the terminals; absent where it follows from a station and an altitude"
+    )
     transmit_optics_loss_db: Loss = Field(description="from the laser to the transmitting telescope's exit")
     receive_optics_loss_db: Loss = Field(description="from the receiving telescope's entrance to the detector")
 

@@ -12,6 +12,7 @@ from pydantic_core import CoreSchema
 
 from microrad.core.units import UnitError
 from microrad.mission.fields import OrWord, Problem, Quantity, Several, Switch, Table
+from microrad.mission.tables.channel import LOWEST_ELEVATION_RAD
 from microrad.mission.tables.mirror import Name
 
 HIGHEST_MASK_RAD = math.radians(89.0)
@@ -110,6 +111,7 @@ _NEEDS: dict[str, dict[str, str]] = {
     "elements": {"file": '"satellite.tle"'},
     "ephemeris": {"file": '"satellite.oem"'},
     "geostationary": {"longitude": '"143 deg"'},
+    "station": {"latitude": '"28.3 deg"', "longitude": '"-16.5 deg"', "height": '"2400 m"', "mask": '"20 deg"'},
 }
 """The keys that each kind of orbit needs, with a value that could stand there."""
 _MAY_HAVE: dict[str, tuple[str, ...]] = {
@@ -118,14 +120,15 @@ _MAY_HAVE: dict[str, tuple[str, ...]] = {
     "elements": ("object",),
     "ephemeris": ("object",),
     "geostationary": (),
+    "station": (),
 }
 
 
 class OrbitTable(Table):
     """The orbit of one terminal."""
 
-    kind: Literal["circular", "keplerian", "elements", "ephemeris", "geostationary"] = Field(
-        description="elements: a TLE or an OMM, by SGP4; ephemeris: a CCSDS OEM"
+    kind: Literal["circular", "keplerian", "elements", "ephemeris", "geostationary", "station"] = Field(
+        description="elements: a TLE or an OMM, by SGP4; ephemeris: a CCSDS OEM; station: on the ground"
     )
     altitude_m: Annotated[float, Quantity("m", "km", least=1e5, most=1e9)] | None = Field(
         default=None, description="above the equatorial radius of 6378.137 km"
@@ -152,7 +155,16 @@ class OrbitTable(Table):
         default=None, description="j2: node, perigee and anomaly drift as the Earth's flattening has it"
     )
     longitude_rad: Annotated[float, Quantity("rad", "deg", least=-math.pi, most=2.0 * math.pi)] | None = Field(
-        default=None, description="of the slot, east of Greenwich"
+        default=None, description="of the slot or the station, east of Greenwich"
+    )
+    latitude_rad: Annotated[float, Quantity("rad", "deg", least=-math.pi / 2, most=math.pi / 2)] | None = Field(
+        default=None, description="of the station, geodetic, north positive"
+    )
+    height_m: Annotated[float, Quantity("m", "m", least=-500.0, most=9000.0)] | None = Field(
+        default=None, description="of the station above the ellipsoid"
+    )
+    mask_rad: Annotated[float, Quantity("rad", "deg", least=LOWEST_ELEVATION_RAD, most=HIGHEST_MASK_RAD)] | None = (
+        Field(default=None, description="lowest elevation at which the link is used, and at which it is budgeted")
     )
     file: Name | None = Field(default=None, description="seen from the mission file")
     object: Name | None = Field(default=None, description="which satellite of the file; not needed where it has one")
@@ -161,6 +173,8 @@ class OrbitTable(Table):
     def problems(self) -> Iterator[Problem]:
         """The keys of the kind of orbit, and no others."""
         yield from self.choice_problems(f'kind = "{self.kind}"', _NEEDS[self.kind], (*_MAY_HAVE[self.kind], "limits"))
+        if self.kind == "station" and self.limits is not None and self.limits.attitude != "free":
+            yield Problem("limits.attitude", f'is "{self.limits.attitude}", and a station has none', '"free"')
         if "node" not in _MAY_HAVE[self.kind]:
             return
         if self.inclination_rad == SUN_SYNCHRONOUS and self.gravity == "two-body":
@@ -189,3 +203,15 @@ class Orbits(Table):
     )
     leo: OrbitTable
     geo: OrbitTable
+
+    @property
+    def station(self) -> str:
+        """Which terminal stands on the ground, "leo" or "geo"; "" where both fly."""
+        return next((end for end in ("leo", "geo") if getattr(self, end).kind == "station"), "")
+
+    def problems(self) -> Iterator[Problem]:
+        """At most one terminal on the ground."""
+        if self.leo.kind == self.geo.kind == "station":
+            yield Problem(
+                "geo.kind", 'is "station", as is leo.kind: one of the two has to fly', "another kind of orbit"
+            )

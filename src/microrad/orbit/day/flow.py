@@ -82,8 +82,8 @@ class Way:
 def closings(o: Operations, data: link.DataLink, loss: PointingLoss) -> tuple[Closing, ...]:
     """The data rates of the link, highest first, each with how far it reaches; what the receiver refuses is left out.
 
-    The link closes where it has the margin that the mission demands (`operations.margin`); the margin falls by 20 log10
-    of the range.
+    The link closes where it has the margin that the mission demands (`operations.margin`); how the margin falls with
+    the range says `link.farther_db`.
 
     Args:
         o: The mission's table of operations, with the margin and, where given, the rates.
@@ -98,8 +98,26 @@ def closings(o: Operations, data: link.DataLink, loss: PointingLoss) -> tuple[Cl
             continue
         margin = available - float(link.required_dbm(data, rate))
         spare = margin - o.margin_db
-        found.append(Closing(rate, margin, data.table.distance_m * 10.0 ** (spare / 20.0)))
+        found.append(Closing(rate, margin, _reach_m(data, spare)))
     return tuple(found)
+
+
+def _reach_m(data: link.DataLink, spare_db: float) -> float:
+    """The range (m) at which a link has lost what it had to spare at the budgeted one."""
+    from scipy.optimize import brentq
+
+    budgeted, path = data.range_m, data.shared.path
+    alone = budgeted * float(10.0 ** (spare_db / 20.0))
+    if path is None or path.satellite_radius_m is None or spare_db >= 0.0:
+        return alone  # behind the budgeted elevation the air stays as it is there
+    nearest = path.range_at(math.pi / 2.0)
+
+    def left(range_m: float) -> float:
+        return spare_db - float(link.farther_db(data, range_m))
+
+    if left(nearest) <= 0.0:
+        return nearest * float(10.0 ** (left(nearest) / 20.0))
+    return float(brentq(left, nearest, budgeted, xtol=1e-3))
 
 
 def rate_table(found: tuple[Closing, ...]) -> operations.RateTable | None:

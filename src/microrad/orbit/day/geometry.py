@@ -225,10 +225,10 @@ def beyond_the_mission(m: LinkMission, seen: View) -> tuple[str, ...]:
     if not seen.encounters:
         return ()
     ahead, rate, furthest = (seen.largest(n) for n in ("point_ahead_most_rad", "rate_most_rad_s", "range_most_m"))
-    checks = [("communication.distance", m.communication.distance_m, furthest, "m", "range")]
+    checks = [("communication.distance", m.range_m(m.communication), furthest, "m", "range")]
     for name, beam in (("beacon", m.beacon), ("answer", m.answer)):
         if beam is not None:
-            checks.append((f"{name}.distance", beam.distance_m, furthest, "m", "range"))
+            checks.append((f"{name}.distance", m.range_m(beam), furthest, "m", "range"))
     if m.point_ahead is not None:
         velocity = ahead * SPEED_OF_LIGHT_M_S / 2.0
         given = m.point_ahead.transverse_velocity_m_s

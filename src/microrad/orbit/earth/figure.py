@@ -240,6 +240,38 @@ class Station(Bounded):
         return np.stack((level * np.cos(angle), level * np.sin(angle), np.full_like(angle, rise)))
 
 
+@dataclass(frozen=True, slots=True)
+class GroundSite:
+    """A station as one end of a link: it moves as the Earth turns. Times count from ``epoch``."""
+
+    station: Station
+    epoch: Epoch
+
+    @property
+    def name(self) -> str:
+        """What the station is called in tables and messages."""
+        return self.station.name
+
+    def states(self, time_s: Floats) -> States:
+        """Position and velocity in TEME, see `Station.position`."""
+        return self.station.position(self.epoch, np.asarray(time_s, dtype=np.float64))
+
+    def above_mask(self, station_m: Floats, satellite_m: Floats) -> Floats:
+        """Sine of a satellite's elevation less that of the mask, shape (n,).
+
+        Args:
+            station_m: Positions of the station in TEME, m, shape (3, n).
+            satellite_m: Those of the satellite at the same times, likewise.
+        """
+        s = self.station
+        square, sine = FLATTENING * (2.0 - FLATTENING), math.sin(s.latitude_rad)
+        normal = EARTH_RADIUS_M / math.sqrt(1.0 - square * sine * sine)
+        level, pole = normal + s.height_m, normal * (1.0 - square) + s.height_m
+        up = np.stack((station_m[0] / level, station_m[1] / level, station_m[2] / pole))
+        line = satellite_m - station_m
+        return np.asarray(np.sum(up * line, axis=0) / np.sqrt(_square(line)) - math.sin(s.mask_rad))
+
+
 def elevation_rad(station: Station, epoch: Epoch, time_s: Floats, position_m: Floats) -> Floats:
     """Elevation of positions over a station's horizon, rad, shape (n,); negative below it.
 

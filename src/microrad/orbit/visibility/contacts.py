@@ -18,6 +18,7 @@ from microrad.orbit.earth.figure import (
     MU_M3_S2,
     ROTATION_RAD_S,
     Earth,
+    GroundSite,
     Station,
     elevation_rad,
 )
@@ -73,6 +74,8 @@ def coarse_step_s(orbit: Orbit, time_s: float) -> float:
     Raises:
         OrbitError: For a state that falls straight to the Earth's centre.
     """
+    if isinstance(orbit, GroundSite):
+        return 60.0
     position, velocity = (vector[:, 0] for vector in orbit.states(np.array([time_s])))
     with np.errstate(over="ignore", invalid="ignore"):  # of a state that is no number
         momentum = np.cross(position, velocity)
@@ -213,7 +216,12 @@ def contacts_with_each(
 def _clearance_rad(
     terminals: Sequence[Terminal], earth: Earth, time_s: Floats, row: Rows, first_m: Floats, second_m: Floats
 ) -> Floats:
-    """By how much the line from the first terminal to that of each row clears the Earth; raises OrbitError."""
+    """By how much the line from the first terminal to that of each row clears the Earth; raises OrbitError.
+
+    A station sees what stands above its mask.
+    """
+    if any(isinstance(each.orbit, GroundSite) for each in terminals):
+        return _above_masks(terminals, earth, time_s, row, first_m, second_m)
     try:
         return earth.clearance_rad(first_m, second_m)
     except OrbitError:
@@ -228,6 +236,24 @@ def _clearance_rad(
             f"{earth.grazing_height_m / 1e3:.6g} km that lines of sight must clear; lower orbit.grazing_height, or "
             "raise the orbit"
         ) from None
+
+
+def _above_masks(
+    terminals: Sequence[Terminal], earth: Earth, time_s: Floats, row: Rows, first_m: Floats, second_m: Floats
+) -> Floats:
+    """As `_clearance_rad`, but where one end is a station: sine of the elevation less that of its mask."""
+    own, found = terminals[0].orbit, np.empty(row.size)
+    for index in np.unique(row):
+        chosen, other = row == index, terminals[index + 1]
+        first, second = first_m[:, chosen], second_m[:, chosen]
+        if isinstance(own, GroundSite):
+            found[chosen] = own.above_mask(first, second)
+        elif isinstance(other.orbit, GroundSite):
+            found[chosen] = other.orbit.above_mask(second, first)
+        else:
+            pair, alone = (terminals[0], other), np.zeros(int(np.sum(chosen)), dtype=row.dtype)
+            found[chosen] = _clearance_rad(pair, earth, time_s[chosen], alone, first, second)
+    return found
 
 
 def _spare(furthest_m: float, _time_s: Floats, _row: Rows, first_m: Floats, second_m: Floats) -> Floats:

@@ -23,7 +23,7 @@ def relay(study: Study) -> dict[str, Any]:
     said = ", ".join(f"{name} {format_quantity(value, 'rad', 3)}" for name, value, _ in errors)
     return {
         "height": max(420.0, 230.0 + 26.0 * len(errors)),
-        "range": quantity(m.communication.distance_m, "m"),
+        "range": quantity(m.range_m(m.communication), "m"),
         "sequence": sequence,
         "errors": [
             {"text": f"{name} {format_quantity(value, 'rad', 3)}", "width": _BAR * value / most, "colour": colour}

@@ -180,7 +180,7 @@ def links_tables(study: Study) -> tuple[Table, Soft]:
 
     strehl = "dB" if m.conventions.strehl == "decibel" else "as a ratio"
     power, wavelength = both(b.transmit_power_w, c.transmit_power_w, "W"), both(b.wavelength_m, c.wavelength_m, "m")
-    error, distance = both(b.pointing_error_rad, c.pointing_error_rad, "rad"), both(b.distance_m, c.distance_m, "m")
+    error, distance = both(b.pointing_error_rad, c.pointing_error_rad, "rad"), both(m.range_m(b), m.range_m(c), "m")
     leo, geo = (format_quantity(a, "m") for a in (t.leo_aperture_m, t.geo_aperture_m))
     margins = quantity(study.beacon.margin_db, "dB"), quantity(study.static.margin_db, "dB")
     rows = [

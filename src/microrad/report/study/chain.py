@@ -48,13 +48,13 @@ def _angle(value_rad: float) -> str:
 
 def _orbit(study: Study) -> Stage:
     m, day = study.file.mission, study.day
-    lines = [f"{quantity(m.communication.distance_m, 'm')} as budgeted"]
+    lines = [f"{quantity(m.range_m(m.communication), 'm')} as budgeted"]
     if day is not None:
         reach = max((e.range_most_m for e in day.encounters), default=math.nan)
         lines = [f"{len(day.relay.contacts)} contacts in {day.view.days * 24:.4g} h"]
         lines.append(f"{day.relay.contact_s / 60:.0f} min in view of the relay")
         far = "" if math.isnan(reach) else f", up to {quantity(reach, 'm')}"
-        lines.append(f"{quantity(m.communication.distance_m, 'm')}{far}")
+        lines.append(f"{quantity(m.range_m(m.communication), 'm')}{far}")
     if m.point_ahead is not None:
         ahead = pointing.point_ahead_rad(m.point_ahead.transverse_velocity_m_s)
         lines.append(f"point-ahead {_angle(ahead)}, {'corrected' if m.point_ahead.corrected else 'NOT corrected'}")

@@ -431,7 +431,7 @@ def _of_day(study: Study) -> list[Warned]:
         return []
     furthest = max((e.range_most_m for e in day.encounters), default=math.nan)
     beams = {"communication": m.communication, "beacon": m.beacon, "answer": m.answer}
-    costs = {name: 20.0 * math.log10(furthest / b.distance_m) for name, b in beams.items() if b is not None}
+    costs = {name: 20.0 * math.log10(furthest / m.range_m(b)) for name, b in beams.items() if b is not None}
     return [
         Warned(text, cost_db=next((db for name, db in costs.items() if text.startswith(f"{name}.distance")), 0.0))
         for text in day.warnings

@@ -172,8 +172,8 @@ class Sampler:
     def margin_db(self, radial_rad: Floats, sight: Sight) -> Floats:
         """Margin of the communication link at the mission's data rate, for radial errors and where they occur.
 
-        Free-space loss goes with the square of the range. A point-ahead that the mission does not correct adds to the
-        length of every error, as it does in the mission's budget, and is that of the geometry here.
+        What is lost more than budgeted goes with the range (`link.farther_db`). A point-ahead that the mission does not
+        correct adds to the length of every error, as it does in the mission's budget, and is that of the geometry here.
 
         Args:
             radial_rad: Radial pointing errors, in rad, of a shape that broadcasts against the sight.
@@ -182,7 +182,7 @@ class Sampler:
         fall, ahead = self.data.beam.fall, self.data.shared.point_ahead
         on_axis = float(link.margin_of_error(self.data, 0.0)) + float(fall.loss_db(self.data.shared.point_ahead_rad))
         missed = sight.point_ahead_rad if ahead is not None and not ahead.corrected else 0.0
-        farther = 20.0 * np.log10(sight.range_m / self.data.table.distance_m)
+        farther = link.farther_db(self.data, sight.range_m)
         return np.asarray(on_axis - farther - fall.loss_db(radial_rad + missed))
 
     def _loss(

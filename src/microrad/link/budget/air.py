@@ -1,0 +1,232 @@
+"""What the air between a station and a satellite does to one beam: absorption, spread, wavefront, fades."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from microrad.core.errors import MicroradError
+from microrad.link import coupling, gains
+from microrad.link.turbulence import (
+    BuftonWind,
+    Downlink,
+    Fades,
+    GammaGamma,
+    HufnagelValley,
+    LogNormal,
+    SlantPath,
+    Uplink,
+    Wandering,
+    seeing,
+)
+from microrad.mission.ground import GroundPath
+from microrad.mission.tables.channel import Channel, TurbulenceTable
+
+UPLINK, DOWNLINK = "uplink", "downlink"
+_LEAST_SHARE, _FADES = 1e-15, 3000  # of a fade that is told from none, and how many losses stand for all
+_NO_INDEX = 1e-12
+
+
+class LinkError(MicroradError):
+    """A question to which this link has no answer; the message says by how many decibels, or beyond which limit."""
+
+    page = "link"
+
+
+@dataclass(frozen=True, slots=True)
+class Sky:
+    """The air on the path of a mission's links. ``point_ahead_rad`` is by how far the uplink leads the downlink."""
+
+    channel: Channel
+    path: GroundPath
+    point_ahead_rad: float
+
+    def clear_db(self, wavelength_m: float) -> float:
+        """Loss (dB) by absorption and scattering in a clear sky at a wavelength (m)."""
+        channel, elevation = self.channel, self.path.elevation_rad
+        if channel.zenith_transmission is not None:
+            return gains.clear_sky_loss_db(channel.zenith_transmission, elevation)
+        depth = gains.rayleigh_depth(wavelength_m, self.path.height_m)
+        depth += gains.aerosol_depth(wavelength_m, channel.aerosol_depth or 0.0, channel.angstrom_exponent or 0.0)
+        to_zenith: float = gains.DB_PER_NEPER * depth + (channel.absorption_db or 0.0)
+        return to_zenith * gains.air_mass(elevation)
+
+    def slant(self, wavelength_m: float, range_m: float) -> SlantPath | None:
+        """The turbulence on the path of a beam of this wavelength over this range (both m); None in still air."""
+        table = self.channel.turbulence
+        if table is None:
+            return None
+        wind = table.wind_rms_m_s
+        profile = HufnagelValley(
+            table.ground_strength, wind_of(table).rms_m_s if wind is None else wind, self.path.height_m
+        )
+        return SlantPath(profile, wavelength_m, self.path.elevation_rad, range_m)
+
+
+def wind_of(table: TurbulenceTable, slew_rad_s: float = 0.0) -> BuftonWind:
+    """The wind over height: that of the table, or Bufton's with the jet scaled to the table's root mean square.
+
+    Args:
+        table: The mission's table on turbulence.
+        slew_rad_s: How fast the line of sight turns (rad/s).
+    """
+    if table.wind is not None:
+        w = table.wind
+        return BuftonWind(w.ground_m_s, w.jet_m_s, w.peak_m, w.width_m, slew_rad_s)
+    assert table.wind_rms_m_s is not None  # the table's own check
+    usual = BuftonWind()
+    scale = table.wind_rms_m_s / usual.rms_m_s
+    return BuftonWind(scale * usual.ground_m_s, scale * usual.jet_m_s, usual.peak_m, usual.width_m, slew_rad_s)
+
+
+@dataclass(frozen=True, slots=True)
+class Receives:
+    """What takes the light of a downlink at the station: its aperture, and the fibre or detector in its focus."""
+
+    diameter_m: float
+    end: coupling.End | None
+
+
+@dataclass(frozen=True, slots=True)
+class Turbulent:
+    """What turbulence does to one beam, ``direction`` "uplink" or "downlink".
+
+    ``spread_db`` is the loss of the mean power by a wider beam, and ``wavefront_db`` that by a wavefront which the
+    fibre or detector takes less of. ``fades`` are those of the power over its mean, with the scintillation ``index``.
+    ``wander_rad`` is the radial rms of an uplink's wander, ``arrival_rad`` the angle of arrival of a downlink about one
+    axis, rms. ``other_wander_db`` is by how much the fade would be deeper by the other convention of wander.
+    ``doubts`` say beyond what the closed forms are used.
+    """
+
+    direction: str
+    path: SlantPath
+    index: float
+    fades: Fades
+    spread_db: float = 0.0
+    wavefront_db: float = 0.0
+    wander_rad: float = 0.0
+    arrival_rad: float = 0.0
+    doubts: tuple[str, ...] = ()
+
+
+@lru_cache(maxsize=1024)
+def downlink(table: TurbulenceTable, path: SlantPath, receives: Receives) -> Turbulent:
+    """Turbulence on a beam from the satellite.
+
+    Args:
+        table: The mission's table on turbulence.
+        path: The path.
+        receives: What takes the light.
+
+    Raises:
+        LinkError: For turbulence beyond a closed form.
+    """
+    down = Downlink(path)
+    index = _index(lambda: down.index(receives.diameter_m), path)
+    doubts = list(path.regimes)
+    wavefront, doubt = _wavefront_db(table, path, receives)
+    doubts += [doubt] if doubt else []
+    arrival = down.arrival_rms_rad(receives.diameter_m, table.tilt)
+    return Turbulent(
+        DOWNLINK,
+        path,
+        index,
+        _law(table, index),
+        wavefront_db=wavefront,
+        arrival_rad=arrival,
+        doubts=tuple(doubts),
+    )
+
+
+@lru_cache(maxsize=1024)
+def uplink(table: TurbulenceTable, path: SlantPath, half_angle_rad: float, point_ahead_rad: float) -> Turbulent:
+    """Turbulence on a beam from the station, taken as the Gaussian one with its far field.
+
+    Args:
+        table: The mission's table on turbulence.
+        path: The path.
+        half_angle_rad: Half angle of the beam at 1/e2 of intensity without turbulence (rad).
+        point_ahead_rad: By how far the beam leads the light that the station's adaptive optics measures (rad).
+
+    Raises:
+        LinkError: For turbulence beyond a closed form.
+    """
+    up = Uplink(path, path.wavelength_m / (math.pi * half_angle_rad))
+    index, doubts = _index(up.index, path), list(path.regimes)
+    spread = up.spread_db
+    if table.corrected_modes:
+        diameter = math.sqrt(8.0) * up.waist_m
+        variance = _residual_rad2(table.corrected_modes, diameter / path.fried_m)
+        ahead = up.anisoplanatic_rad2(point_ahead_rad)
+        spread = min(spread, gains.DB_PER_NEPER * (variance + ahead))
+        if ahead > 1.0:
+            doubts.append(
+                f"the point-ahead angle is {point_ahead_rad / path.isoplanatic_rad:.2g} isoplanatic angles: adaptive "
+                "optics measures other air than the beam goes through"
+            )
+    wander = up.wander_rms_rad(table.wander)
+    widened = half_angle_rad * 10.0 ** (spread / 20.0)
+    fades = _law(table, index)
+    if wander > 0.0:
+        fades = Wandering(fades, widened**2 / (2.0 * wander**2))
+    return Turbulent(UPLINK, path, index, fades, spread_db=spread, wander_rad=wander, doubts=tuple(doubts))
+
+
+def _index(of: Callable[[], float], path: SlantPath) -> float:
+    try:
+        return max(of(), _NO_INDEX)
+    except ValueError as error:
+        degrees = math.degrees(path.elevation_rad)
+        raise LinkError(
+            f"turbulence on the path at {degrees:.3g} deg of elevation: {error}; give a higher elevation or mask, "
+            "or a weaker channel.turbulence"
+        ) from None
+
+
+def _law(table: TurbulenceTable, index: float) -> Fades:
+    return LogNormal(index) if table.fades == "log-normal" else GammaGamma.of_index(index)
+
+
+def _wavefront_db(table: TurbulenceTable, path: SlantPath, receives: Receives) -> tuple[float, str]:
+    """Loss of the mean power into the fibre or detector, and what to doubt of it."""
+    end, over = receives.end, receives.diameter_m / path.fried_m
+    if end is None:
+        return 0.0, ""
+    variance = _residual_rad2(table.corrected_modes, over)
+    if isinstance(end, coupling.SingleModeFibre):
+        if table.corrected_modes:
+            doubt = (
+                "" if variance <= 1.0 else f"a residual of {math.sqrt(variance):.2g} rad rms, above 1: Marechal's ends"
+            )
+            return gains.DB_PER_NEPER * variance, doubt
+        truncation = end.pupil.truncation
+        areas = (seeing.COHERENCE * over / 2.0) ** 2
+        share = coupling.turbulent_share(truncation, areas) / coupling.turbulent_share(truncation, 0.0)
+        return -10.0 * math.log10(share), ""
+    if not isinstance(end, coupling.Disk) or table.corrected_modes > seeing.TILT_MODES:
+        return gains.DB_PER_NEPER * min(variance, 1.0), ""
+    disk = end.radius_rad, receives.diameter_m, path.wavelength_m
+    share = seeing.encircled(*disk, path.fried_m, tilt_taken_out=bool(table.corrected_modes))
+    still = seeing.encircled(*disk, math.inf)
+    return max(10.0 * math.log10(still / share), 0.0), ""
+
+
+def _residual_rad2(modes: int, over: float) -> float:
+    """Phase variance (rad^2) that is left over an aperture of so many r0 (Noll 1976, table IV)."""
+    return seeing.residual(modes) * math.pow(over, 5.0 / 3.0)
+
+
+@lru_cache(maxsize=256)
+def losses(fades: Fades) -> coupling.Losses:
+    """Fades as losses against the mean power, with their shares of the time.
+
+    Args:
+        fades: The fades.
+    """
+    deepest, highest = fades.loss_db(_LEAST_SHARE), fades.loss_db(1.0 - 1e-12)
+    edge = np.linspace(highest, deepest, _FADES + 1)
+    share = -np.diff(fades.below(10.0 ** (-edge / 10.0)))
+    there = share > 0.0
+    return coupling.Losses.of(((edge[1:] + edge[:-1]) / 2.0)[there], share[there])
