@@ -25,7 +25,7 @@ from microrad.mission.ground import GroundPath
 from microrad.mission.tables.channel import Channel, TurbulenceTable
 
 UPLINK, DOWNLINK = "uplink", "downlink"
-_LEAST_SHARE, _FADES = 1e-15, 3000  # of a fade that is told from none, and how many losses stand for all
+_LEAST_SHARE, _FADES = 1e-15, 1000  # of a fade that is told from none, and how many losses stand for all
 _NO_INDEX = 1e-12
 
 

@@ -206,7 +206,8 @@ def contacts_with_each(
         shared.append((RANGE, both(partial(_spare, furthest_m))))
     found = []
     for place, relay in enumerate(relays):
-        kept = [(cause, intervals[place]) for cause, intervals in shared]
+        hidden = hidden_by(satellite, relay)
+        kept = [(hidden if cause == EARTH else cause, intervals[place]) for cause, intervals in shared]
         for one, other in ((satellite, relay), (relay, satellite)):
             kept.extend(conditions(Side(one, other, earth, epoch), time_s))
         found.append(_combined(kept, span_s))
@@ -236,6 +237,26 @@ def _clearance_rad(
             f"{earth.grazing_height_m / 1e3:.6g} km that lines of sight must clear; lower orbit.grazing_height, or "
             "raise the orbit"
         ) from None
+
+
+def hidden_by(first: Terminal, second: Terminal) -> str:
+    """What hides two terminals from one another, in words: the Earth, or the mask of a station.
+
+    Args:
+        first: One terminal.
+        second: The other one.
+    """
+    site = next((each.orbit for each in (first, second) if isinstance(each.orbit, GroundSite)), None)
+    return EARTH if site is None else mask_of(site.station)
+
+
+def mask_of(station: Station) -> str:
+    """What begins and ends a contact at the elevation mask of a station, in words.
+
+    Args:
+        station: The station.
+    """
+    return f"elevation mask of {station.name}"
 
 
 def _above_masks(
@@ -307,7 +328,7 @@ def passes(orbit: Orbit, station: Station, epoch: Epoch, span_s: Span) -> tuple[
     """
     step = coarse_step_s(orbit, span_s[0])
     time_s = coarse_times(span_s, step)
-    mask = f"elevation mask of {station.name}"
+    mask = mask_of(station)
 
     def elevation(time: Floats) -> Floats:
         return elevation_rad(station, epoch, time, orbit.states(time).position_m)
