@@ -69,9 +69,6 @@ def ground_link(m: LinkMission, sources: Mapping[str, Source], data: link.DataLi
         m: The mission's tables on its links.
         sources: Where each value of the mission comes from, by its dotted key.
         data: Its communication link.
-
-    Raises:
-        LinkError: For turbulence beyond a closed form.
     """
     path = m.path
     if path is None or not path.station:

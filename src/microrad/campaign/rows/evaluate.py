@@ -111,7 +111,8 @@ class _Beam:
     @classmethod
     def of(cls, name: str, shared: link.Shared, beam: Beacon | None, sources: Mapping[str, Source]) -> "_Beam":
         """The beam; of point-ahead it is told by the angle that is left alone."""
-        tables = beam, shared.point_ahead_rad, shared.terminals, shared.conventions, shared.channel
+        air = None if shared.sky is None else (shared.sky, shared.outage)
+        tables = beam, shared.point_ahead_rad, shared.terminals, shared.conventions, air
         return cls(name, tables, shared, beam, sources)
 
 

@@ -15,7 +15,7 @@ from microrad.mission.fields import Bounded, Quantity, Share
 
 _LEAST_VARIANCE = 1e-12
 _NOTHING = 45.0  # exponent of a density of which nothing is left
-_SCALES, _POINTS = 300, 1200  # of the wider scale, and of the spline
+_SCALES, _MOST_SCALES, _POINTS = 120, 4000, 400  # of the wider scale, and of the spline
 _LEAST_SHARE = 1e-18
 _EDGES = (0.0, 1.0, 3.0, 6.0, 12.0, 25.0, 50.0)  # of -ln U: beyond lies 2e-22 of the time
 
@@ -157,7 +157,8 @@ def _gamma_gamma(wide: float, narrow: float) -> tuple[float, float, Callable[[Fl
         return wide * (math.expm1(log) - log) - _NOTHING
 
     edges = brentq(falls, -_NOTHING / wide - 2.0, 0.0), brentq(falls, 0.0, math.log(_NOTHING / wide + 2.0) + 2.0)
-    scale = np.linspace(*edges, _SCALES)
+    steps = 3.0 * math.sqrt(narrow) * (edges[1] - edges[0])  # the narrower law is a step as wide as 1 / sqrt(narrow)
+    scale = np.linspace(*edges, min(max(_SCALES, int(steps)), _MOST_SCALES))
     density = np.exp(wide * (math.log(wide) + scale) - wide * np.exp(scale) - gammaln(wide))
     weight = density / np.sum(density)
     spread = math.sqrt(math.log1p(1.0 / wide) + math.log1p(1.0 / narrow))
