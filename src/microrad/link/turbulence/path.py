@@ -29,13 +29,13 @@ WEAK = 0.3
 LOWEST_RAD = math.radians(20.0)
 """Elevation down to which flat air and weak turbulence hold as a rule."""
 
-_RYTOV = 8.7019  # 4 pi^2 0.033 |Gamma(-5/6)|
+_SPECTRUM = 0.033
+_RYTOV = 4.0 * math.pi**2 * _SPECTRUM * 1.2 * math.gamma(1.0 / 6.0)  # |Gamma(-5/6)| is 6/5 Gamma(1/6)
 _PHASE = 0.423  # of Fried's parameter, and ...
 _ANGLE = 2.914  # ... of the isoplanatic angle
 _GREENWOOD = 0.1022
 _ZERNIKE, _GRADIENT = 0.18164, 0.16997  # of (lambda / D)^2 (D / r0)^(5/3), about one axis
 _WANDER: dict[str, float] = {"dios-2004": 2.07, "andrews-phillips-2005": 7.25}
-_SPECTRUM = 0.033
 _ACROSS = (1e-5, 60.0, 601)  # of the table of the angle of arrival: pi D f / v from, to, and how many
 
 
