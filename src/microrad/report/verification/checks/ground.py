@@ -95,7 +95,7 @@ def _aperture(distance_m: float, k: float) -> float:
     """Variance by a layer of strength 1 over k^2, behind a Gaussian aperture of the same filter as the round one."""
     damping = _APERTURE_M**2 / 16.0
     both = complex(damping, distance_m / k) ** (5.0 / 6.0)
-    return 4.0 * math.pi**2 * 0.033 * 2.0 * math.gamma(1.0 / 6.0) * 0.6 * (both.real - damping ** (5.0 / 6.0))
+    return float(4.0 * math.pi**2 * 0.033 * 1.2 * math.gamma(1.0 / 6.0) * (both.real - damping ** (5.0 / 6.0)))
 
 
 def _for_any_strength(variance: float) -> float:
