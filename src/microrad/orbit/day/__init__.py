@@ -1,4 +1,4 @@
-"""What a link delivers in a day: contacts, acquisition, rates, volume and latency, by relay and by direct downlink."""
+"""What a link delivers in a day: contacts, acquisition, rates, volume and latency, by relay and to the ground."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -16,6 +16,7 @@ from microrad.orbit.day import flow
 from microrad.orbit.day.assumptions import NOTHING, Case, Known, Numbers, Swing, swings
 from microrad.orbit.day.flow import Closing, PointingLoss, Way
 from microrad.orbit.day.geometry import Encounter, View, beyond_the_mission, encounter, short_tail, times, view
+from microrad.orbit.day.optical import Sky, optical, optical_passes, sky
 
 __all__ = [
     "NOTHING",
@@ -24,6 +25,7 @@ __all__ = [
     "Encounter",
     "Numbers",
     "PointingLoss",
+    "Sky",
     "Swing",
     "Way",
     "given_loss",
@@ -37,12 +39,13 @@ __all__ = [
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DayStudy:
-    """The span of a mission by both ways, and the assumptions that move the comparison, the weightiest first.
+    """The span of a mission by its ways, and the assumptions that move the comparison, the weightiest first.
 
     ``operations`` is the mission's table, ``data`` its communication link. ``encounters`` are the contacts of the relay
     as it grants them, with what their line of sight reaches. ``closings`` are the laser's rates, highest first, with
     how far each reaches under ``loss``; ``derived`` are the inputs of the laser link that were chosen for its margin
-    (`requirement.derived_from`), so that its reach follows from that choice.
+    (`requirement.derived_from`), so that its reach follows from that choice. ``direct`` is the radio downlink and
+    ``optical`` that by optical ground stations under the ``sky``; each is None in a mission without it.
     """
 
     operations: Operations
@@ -54,6 +57,8 @@ class DayStudy:
     derived: tuple[str, ...]
     relay: Way
     direct: Way | None
+    optical: Way | None
+    sky: Sky | None
     swings: tuple[Swing, ...]
     warnings: tuple[str, ...]
 
@@ -61,6 +66,11 @@ class DayStudy:
     def ratio(self) -> float:
         """Volume that the relay could carry over that of the direct downlink (`flow.ratio`); nan without one."""
         return float("nan") if self.direct is None else flow.ratio(self.relay.capacity_bit, self.direct.capacity_bit)
+
+    @property
+    def ways(self) -> tuple[Way, ...]:
+        """The relay, and the ways to the ground that the mission has."""
+        return tuple(way for way in (self.relay, self.direct, self.optical) if way is not None)
 
 
 def given_loss(links: LinkStudy) -> PointingLoss:
@@ -126,10 +136,10 @@ def run_day_study(
             "a number up to that, or a longer orbit.duration"
         )
     closing = flow.closings(o, links.data, loss)
-    heard = flow.station_passes(o.downlink, seen.pair)
+    heard, lit = flow.station_passes(o.downlink, seen.pair), optical_passes(o.optical, seen.pair)
     relay = flow.relay(o, seen, flow.rate_table(closing), loss.outage, found, 1.0)
     assert m.orbit is not None  # else there are no terminals
-    known = Known(Case(o, m.orbit, links.data, loss), pair_of, seen, heard, found)
+    known = Known(Case(o, m.orbit, links.data, loss), pair_of, seen, heard, lit, found)
     return DayStudy(
         operations=o,
         data=links.data,
@@ -140,6 +150,8 @@ def run_day_study(
         encounters=tuple(encounter(seen.pair, contact, m.communication.wavelength_m) for contact in relay.contacts),
         relay=relay,
         direct=flow.direct(o, seen, heard),
+        optical=optical(o, seen, lit),
+        sky=sky(o, seen.pair),
         swings=swings(known, on_progress),
         warnings=(*beyond_the_mission(m, seen), *short_tail(seen.pair)),
     )
