@@ -139,7 +139,7 @@ def run_day_study(
     heard, lit = flow.station_passes(o.downlink, seen.pair), optical_passes(o.optical, seen.pair)
     relay = flow.relay(o, seen, flow.rate_table(closing), loss.outage, found, 1.0)
     assert m.orbit is not None  # else there are no terminals
-    known = Known(Case(o, m.orbit, links.data, loss), pair_of, seen, heard, lit, found)
+    known = Known(Case(o, m.orbit, links.data, loss), pair_of, seen, heard, found, lit)
     return DayStudy(
         operations=o,
         data=links.data,

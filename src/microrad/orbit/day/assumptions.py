@@ -100,8 +100,8 @@ class Known:
     pair_of: Callable[[Orbits], orbit.Pair]
     seen: geometry.View
     heard: tuple[flow.StationPass, ...]
-    lit: tuple[OpticalPass, ...]
     found: Found | None
+    lit: tuple[OpticalPass, ...] = ()
     weather_runs: int = 1
     optical: tuple[float, float] | None = None
 
