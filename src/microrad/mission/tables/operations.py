@@ -140,8 +140,20 @@ class RelayTable(Table):
     longitude_rad: Longitude = Field(description="of its slot, east positive")
 
 
+class SharedStationTable(StationTable):
+    """A ground station that the satellites of the constellation share beside the relays."""
+
+    data_rate_bit_s: DataRate = Field(description="from a satellite to the ground, above the mask")
+    terminals: Annotated[int, Whole("", least=1, most=100)] = Field(
+        description="of this station, each serves one satellite at a time"
+    )
+    availability: Availability = Field(
+        description="share of the time in which it can be used, one number or twelve by month; a factor on its volumes"
+    )
+
+
 class Constellation(Table):
-    """Many satellites that share some relays."""
+    """Many satellites that share some relays and ground stations."""
 
     pattern: Literal["delta", "star", "file"] = Field(
         description="delta, star: Walker's patterns around orbit.leo (circular or keplerian), nodes over 360 or "
@@ -166,17 +178,20 @@ class Constellation(Table):
     )
     shortest_s: Seconds = Field(description="session that is worth its overhead")
     relays: dict[str, RelayTable] = Field(description="one table for each, [constellation.relays.NAME]")
+    stations: dict[str, SharedStationTable] = Field(
+        default_factory=dict, description="one table for each, [constellation.stations.NAME]; none: relays alone"
+    )
 
     def __hash__(self) -> int:
         """Of what is in it, in its order."""
-        own = (getattr(self, name) for name in type(self).model_fields if name != "relays")
-        return hash((*own, tuple(self.relays.items())))
+        own = (getattr(self, name) for name in type(self).model_fields if name not in ("relays", "stations"))
+        return hash((*own, tuple(self.relays.items()), tuple(self.stations.items())))
 
     def problems(self) -> Iterator[Problem]:
         """The keys of the pattern, and no others; planes that divide the satellites."""
         from_file = self.pattern == "file"
         needed = {"file": '"satellites.tle"'} if from_file else {"satellites": "1", "planes": "1", "phasing": "1"}
-        yield from self.choice_problems(f'pattern = "{self.pattern}"', needed)
+        yield from self.choice_problems(f'pattern = "{self.pattern}"', needed, ("stations",))
         if self.satellites and self.planes and self.satellites % self.planes:
             yield Problem("planes", f"does not divide satellites = {self.satellites}", "a divisor of it")
         if self.planes and self.phasing is not None and self.phasing >= self.planes:
@@ -188,3 +203,6 @@ class Constellation(Table):
             yield Problem("session", "is below shortest", f"at least {format_quantity(self.shortest_s, 's')}")
         if not self.relays:
             yield Problem("relays", "holds no relay", "a table such as [constellation.relays.east]")
+        for name in self.stations:
+            if name in self.relays:
+                yield Problem(f"stations.{name}", "is the name of a relay, too", "a name of its own")

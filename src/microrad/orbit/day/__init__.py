@@ -68,6 +68,11 @@ class DayStudy:
         return float("nan") if self.direct is None else flow.ratio(self.relay.capacity_bit, self.direct.capacity_bit)
 
     @property
+    def optical_ratio(self) -> float:
+        """Volume that the relay could carry over that of the optical downlink (`flow.ratio`); nan without one."""
+        return float("nan") if self.optical is None else flow.ratio(self.relay.capacity_bit, self.optical.capacity_bit)
+
+    @property
     def ways(self) -> tuple[Way, ...]:
         """The relay, and the ways to the ground that the mission has."""
         return tuple(way for way in (self.relay, self.direct, self.optical) if way is not None)

@@ -277,7 +277,11 @@ def _of_optical(down: OpticalDownlink, operated: _Edit, scaled: _Scaled) -> Iter
         name = next(iter(given))
         fewer = operated(f"without {name}", key, {n: s for n, s in given.items() if n != name})
         yield "optical ground stations", fewer, None
-    yield scaled("time that weather holds", operated, "optical.weather_s", down.weather_s, "s")
+    shorter, longer = (
+        operated(f"{factor * down.weather_s / 3600.0:.3g} h", "optical.weather_s", factor * down.weather_s)
+        for factor in (0.5, 2.0)
+    )
+    yield "time that weather holds", shorter, longer
 
 
 def _held(own: VisibilityLimits | None) -> VisibilityLimits:
