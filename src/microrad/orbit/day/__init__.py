@@ -9,6 +9,7 @@ from microrad.core.units import format_quantity
 from microrad.link.acquisition.partner_search import Found
 from microrad.link.requirement import derived_from
 from microrad.link.study import LinkStudy
+from microrad.mission.file import LinkFile
 from microrad.mission.tables.operations import Operations
 from microrad.orbit import operations
 from microrad.orbit.base import required
@@ -30,6 +31,7 @@ __all__ = [
     "Way",
     "given_loss",
     "loss_at",
+    "optical_alone",
     "relay",
     "run_day_study",
     "times",
@@ -118,6 +120,22 @@ def relay(links: LinkStudy, loss: PointingLoss) -> Way:
     return flow.relay(o, seen, flow.rate_table(flow.closings(o, links.data, loss)), loss.outage, found, 1.0)
 
 
+def optical_alone(file: LinkFile) -> Way | None:
+    """The way by the optical downlink alone: what `run_day_study` finds of it; None in a mission without one.
+
+    Args:
+        file: The mission, with the files that it names.
+
+    Raises:
+        OrbitError: Without the table `orbit`, and for orbits that do not hold.
+        OperationsError: Without the table `operations`.
+    """
+    m = file.mission
+    pair = orbit.pair(m.orbit, m.terminals, file.path.parent, file.contents)
+    o = required(m.operations, "operations", operations.OperationsError)
+    return optical(o, pair, optical_passes(o.optical, pair))
+
+
 def run_day_study(
     links: LinkStudy, loss: PointingLoss | None = None, on_progress: Progress = lambda done, total, what: None
 ) -> DayStudy:
@@ -155,7 +173,7 @@ def run_day_study(
         encounters=tuple(encounter(seen.pair, contact, m.communication.wavelength_m) for contact in relay.contacts),
         relay=relay,
         direct=flow.direct(o, seen, heard),
-        optical=optical(o, seen, lit),
+        optical=optical(o, seen.pair, lit),
         sky=sky(o, seen.pair),
         swings=swings(known, on_progress),
         warnings=(*beyond_the_mission(m, seen), *short_tail(seen.pair)),

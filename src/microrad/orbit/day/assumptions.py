@@ -141,7 +141,7 @@ def _by_optical(case: Case, known: Known, seen: geometry.View, moved: bool) -> t
         return known.optical
     there = not moved and o.optical.stations is own.optical.stations
     passes = known.lit if there else optical_passes(o.optical, seen.pair)
-    way = optical(o.with_value("runs", known.weather_runs), seen, passes)
+    way = optical(o.with_value("runs", known.weather_runs), seen.pair, passes)
     assert way is not None  # the mission has the table
     return way.capacity_bit, way.slow_s
 

@@ -267,7 +267,7 @@ def _way(
         contact_s=sum(c.duration_s for c in shown),
         gap_s=longest_gap_s(contacts, seen.pair),
         carried=np.array([[carried_bit(s, end_s) for s in services[:inside]] for services in runs]),
-        histories=[history(o, seen, services, delay_s) for services in runs],
+        histories=[history(o, seen.pair, services, delay_s) for services in runs],
         failed=failed,
     )
 
@@ -283,18 +283,17 @@ def carried_bit(service: operations.Service, end_s: float) -> float:
 
 
 def history(
-    o: Operations, seen: View, services: Sequence[operations.Service], delay_s: float
+    o: Operations, pair: orbit.Pair, services: Sequence[operations.Service], delay_s: float
 ) -> operations.StoreHistory:
     """The store in one run: the instrument fills it over the span, and contacts empty it to the end of the tail.
 
     Args:
         o: The mission's table of operations.
-        seen: The contacts of the two terminals, for the span and its tail.
+        pair: The two terminals, for the span and its tail.
         services: What the contacts carry, in order.
         delay_s: From the satellite to the user, s.
     """
-    span, whole = seen.pair.span_s, seen.pair.whole_s
-    return operations.deliver(o.instrument_rate_bit_s, span, o.store_bit, services, whole, delay_s)
+    return operations.deliver(o.instrument_rate_bit_s, pair.span_s, o.store_bit, services, pair.whole_s, delay_s)
 
 
 def way_of(

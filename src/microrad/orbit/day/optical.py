@@ -12,7 +12,7 @@ from microrad.core.arrays import Floats
 from microrad.mission.tables.operations import Operations, OpticalDownlink
 from microrad.orbit import operations
 from microrad.orbit.day.flow import Way, carried_bit, history, one_at_a_time, way_of
-from microrad.orbit.day.geometry import View, cut_at, longest_gap_s
+from microrad.orbit.day.geometry import cut_at, longest_gap_s
 from microrad.orbit.day.weather import Site, Weather, any_clear, clear_spells, correlation, mean_availability
 from microrad.orbit.operations.rates import Range
 from microrad.orbit.visibility.events import union
@@ -81,7 +81,7 @@ def constant_rate(down: OpticalDownlink) -> operations.RateTable:
 
 
 def optical(
-    o: Operations, seen: View, passes: Sequence[OpticalPass], rates: operations.RateTable | None = None
+    o: Operations, pair: orbit.Pair, passes: Sequence[OpticalPass], rates: operations.RateTable | None = None
 ) -> Way | None:
     """The way by the optical downlink, or None without one: each run draws the weather over the stations.
 
@@ -95,14 +95,14 @@ def optical(
 
     Args:
         o: The mission's table of operations.
-        seen: The contacts of the two terminals, for the span.
+        pair: The two terminals, for the span and its tail.
         passes: The passes over all stations.
         rates: The data rates by range; that of the table (`constant_rate`) by default.
     """
     down = o.optical
     if down is None:
         return None
-    rates, pair = constant_rate(down) if rates is None else rates, seen.pair
+    rates = constant_rate(down) if rates is None else rates
     whole = [operations.service(rates, (p.each.start_s, p.each.end_s), p.range_m, 1.0) for p in passes]
     weather, end_s = weather_of(down, pair.epoch), pair.span_s[1]
     carried, in_use_s, gaps_s, histories = np.zeros((o.runs, len(passes))), [], [], []
@@ -113,7 +113,7 @@ def optical(
             carried[run, k] += carried_bit(service, end_s) if start < end_s else 0.0
         in_use_s.append(sum(max(min(end, end_s) - start, 0.0) for start, end, _ in used))
         gaps_s.append(longest_gap_s([orbit.Contact(start, end, "", "") for start, end, _ in used], pair))
-        histories.append(history(o, seen, services, down.delay_s))
+        histories.append(history(o, pair, services, down.delay_s))
     served = sorted(np.flatnonzero(carried.any(axis=0)).tolist(), key=lambda k: (passes[k].each.start_s, k))
     names = tuple(down.stations)
     return way_of(

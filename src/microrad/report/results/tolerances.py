@@ -189,7 +189,7 @@ SUMMARY: Mapping[str, tuple[str, ...]] = {
         "links.acquisition.ways[].runs",
         "day.{duration_s,outage,rates[].rate_bit_s,relay.contacts,direct.contacts,optical.contacts}",
         "contact.{losses,windows[].seconds}",
-        "constellation.{contacts,sessions,satellites[].sessions,duration_s}",
+        "constellation.{contacts,sessions,satellites[].sessions,stations[].sessions,duration_s}",
         "fine_pointing.{quantile,required_rad,controllers[].parameters[].value}",
     ),
     "linear theory": (
@@ -224,6 +224,7 @@ SUMMARY: Mapping[str, tuple[str, ...]] = {
         "day.{assumptions[].*,sky.sites[].drawn,sky.any_clear_drawn}",
         "contact.{seconds_in_state.*,log[].time_s}",
         "constellation.{volume_bit,relays[].use,satellites[].with_data_s,satellites[].volume_bit}",
+        "constellation.stations[].{use,volume_bit}",
     ),
     "orbit": (
         "day.{contacts[].*,direct.passes[].*,optical.passes[].*,visible_share,median_contact_s,closed_form_contact_s}",
