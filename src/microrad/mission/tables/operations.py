@@ -179,7 +179,7 @@ class Constellation(Table):
     shortest_s: Seconds = Field(description="session that is worth its overhead")
     relays: dict[str, RelayTable] = Field(description="one table for each, [constellation.relays.NAME]")
     stations: dict[str, SharedStationTable] = Field(
-        default_factory=dict, description="one table for each, [constellation.stations.NAME]; none: relays alone"
+        default={}, description="one table for each, [constellation.stations.NAME]; none: relays alone"
     )
 
     def __hash__(self) -> int:

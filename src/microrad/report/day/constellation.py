@@ -91,9 +91,8 @@ def satellites_table(plan: ConstellationPlan) -> Table:
 
 def constellation_view(plan: ConstellationPlan) -> View:
     """Who is served when."""
-    return View(
-        "A constellation", told(*plan_sentences(plan), satellites_table(plan), partners_table(plan)), folded=True
-    )
+    blocks = told(*plan_sentences(plan), satellites_table(plan), partners_table(plan))
+    return View("A constellation", blocks, folded=True)
 
 
 def plan_text(plan: ConstellationPlan, width: int) -> str:
