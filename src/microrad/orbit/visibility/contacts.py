@@ -341,6 +341,22 @@ def passes(orbit: Orbit, station: Station, epoch: Epoch, span_s: Span) -> tuple[
     return tuple(found)
 
 
+def station_range(orbit: Orbit, station: Station, epoch: Epoch) -> Callable[[Floats], Floats]:
+    """What gives the range in m from a station to a satellite at times in s, both of shape (n,).
+
+    Args:
+        orbit: Orbit of the satellite.
+        station: The station.
+        epoch: Instant from which all times count.
+    """
+
+    def range_m(time_s: Floats) -> Floats:
+        line = orbit.states(time_s).position_m - station.position(epoch, time_s).position_m
+        return np.asarray(np.sqrt(dot(line, line)))
+
+    return range_m
+
+
 # -------------------------------------------------------------------------------------------------------------- by hand
 class CoplanarContact(NamedTuple):
     """One contact, the time from the start of one to the start of the next, and the ranges while in contact."""
