@@ -5,7 +5,14 @@
 
 from microrad.orbit.base import OrbitError
 from microrad.orbit.earth.epoch import Epoch
-from microrad.orbit.earth.figure import EARTH_RADIUS_M, GEOSTATIONARY_RADIUS_M, Earth, Station, subpoint
+from microrad.orbit.earth.figure import (
+    EARTH_RADIUS_M,
+    GEOSTATIONARY_RADIUS_M,
+    Earth,
+    GroundSite,
+    Station,
+    subpoint,
+)
 from microrad.orbit.earth.sun import sun_direction
 from microrad.orbit.from_mission import Pair, pair, relays, repeats, satellites, stations
 from microrad.orbit.propagation.analytic import GeostationarySlot, KeplerOrbit, circular
@@ -30,6 +37,7 @@ __all__ = [
     "Earth",
     "Epoch",
     "GeostationarySlot",
+    "GroundSite",
     "KeplerOrbit",
     "LineOfSight",
     "OrbitError",

@@ -19,8 +19,8 @@ from microrad.link.turbulence.fades import GammaGamma
 from microrad.link.turbulence.profile import BuftonWind, HufnagelValley, heights
 from microrad.mission.fields import Bounded, Quantity
 
-Wander = Literal["dios-2004", "andrews-phillips-2005"]
-"""Which constant the beam's wander has: 2.07 or 7.25; the literature does not agree."""
+Wander = Literal["dios-2004", "itu-r-p1622", "andrews-phillips-2005"]
+"""Which constant the beam's wander has: 2.07, 3.43 or 7.25; the literature does not agree."""
 Tilt = Literal["zernike", "gradient"]
 """Which angle of arrival a sensor sees: that of the plane that fits best, or the mean of the slopes (of a centroid)."""
 
@@ -35,7 +35,7 @@ _PHASE = 0.423  # of Fried's parameter, and ...
 _ANGLE = 2.914  # ... of the isoplanatic angle
 _GREENWOOD = 0.1022
 _ZERNIKE, _GRADIENT = 0.18164, 0.16997  # of (lambda / D)^2 (D / r0)^(5/3), about one axis
-_WANDER: dict[str, float] = {"dios-2004": 2.07, "andrews-phillips-2005": 7.25}
+_WANDER: dict[str, float] = {"dios-2004": 2.07, "itu-r-p1622": 2.08**2 / math.cbrt(2.0), "andrews-phillips-2005": 7.25}
 _ACROSS = (1e-5, 60.0, 601)  # of the table of the angle of arrival: pi D f / v from, to, and how many
 
 
@@ -286,8 +286,9 @@ class Uplink(_OnPath, Bounded):
     def wander_rms_rad(self, convention: Wander) -> float:
         """How far the beam's middle wanders, radial rms angle as seen from the station (rad).
 
-        c times the integral of Cn2 (1 - z / L)^2 W(z)^(-1/3), W the beam's radius without turbulence: c is 2.07 (Dios
-        et al. 2004, Appl. Opt. 43, 3866) or 7.25 (Andrews and Phillips 2005, chapter 12).
+        Its square is c times the integral of Cn2 (1 - z / L)^2 W(z)^(-1/3), W the beam's radius without turbulence: c
+        is 2.07 (Dios et al. 2004, Appl. Opt. 43, 3866), 2.08^2 2^(-1/3) (ITU-R P.1622, of the diameter 2 W) or 7.25
+        (Andrews and Phillips 2005, chapter 12).
 
         Args:
             convention: Which constant.

@@ -40,8 +40,8 @@ class TurbulenceTable(Table):
     fades: Literal["log-normal", "gamma-gamma"] = Field(
         description="law of the power at one scintillation index; gamma-gamma has the deeper fades"
     )
-    wander: Literal["dios-2004", "andrews-phillips-2005"] = Field(
-        description="constant of the uplink's beam wander: 2.07 or 7.25"
+    wander: Literal["dios-2004", "itu-r-p1622", "andrews-phillips-2005"] = Field(
+        description="constant of the uplink's beam wander: 2.07, 3.43 or 7.25"
     )
     tilt: Literal["zernike", "gradient"] = Field(
         description="angle of arrival: of the plane that fits best, or the mean of the slopes, as a centroid has it"

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from microrad import link, orbit
 from microrad.core.units import format_quantity
 from microrad.link.acquisition.partner_search import Found
+from microrad.mission.ground import path_of
 from microrad.mission.tables.operations import Downlink, Operations, OpticalDownlink
 from microrad.mission.tables.orbit import HIGHEST_MASK_RAD, Orbits, VisibilityLimits
 from microrad.orbit.day import flow, geometry
@@ -122,6 +123,7 @@ def numbers(case: Case, known: Known) -> Numbers:
     moved = case.orbits is not known.own.orbits
     if moved:
         seen = geometry.view(known.pair_of(case.orbits), case.data.table.wavelength_m)
+        case = replace(case, data=_on(case.data, case.orbits))
     if moved or (o.downlink and own.downlink and o.downlink.stations is not own.downlink.stations):
         heard = flow.station_passes(o.downlink, seen.pair)
     rates = flow.rate_table(flow.closings(o, case.data, case.loss))
@@ -129,6 +131,14 @@ def numbers(case: Case, known: Known) -> Numbers:
     direct = flow.direct(o, seen, heard)
     radio = (math.nan, math.nan) if direct is None else (direct.capacity_bit, direct.slow_s)
     return Numbers(relay.capacity_bit, radio[0], relay.slow_s, radio[1], *_by_optical(case, known, seen, moved))
+
+
+def _on(data: link.DataLink, orbits: Orbits) -> link.DataLink:
+    """The link on other orbits: to a station its range and its air follow from them."""
+    if data.shared.path is None:
+        return data
+    shared = replace(data.shared, path=path_of(orbits, data.shared.channel))
+    return link.assembled(shared, data.table, data.requirement, data.jitter)
 
 
 def _by_optical(case: Case, known: Known, seen: geometry.View, moved: bool) -> tuple[float, float]:
@@ -215,14 +225,17 @@ def _changes(own: Case, found: Found | None) -> Iterator[tuple[str, _Side, _Side
     yield "pointing loss", ("0 dB", replace(own, loss=none)), ("3 dB more", replace(own, loss=more))
     if found is not None:
         yield "time of acquisition", ("half", replace(own, slower=0.5)), ("twice", replace(own, slower=2.0))
+    flies, site = orbits.station != "leo", orbits.station
     if o.relay_share == 1.0:
-        yield "share of each contact that the relay grants", operated("half", "relay_share", 0.5), None
-    if orbits.grazing_height_m > 0.0:
+        partner = {"geo": "station", "leo": "satellite"}.get(site, "relay")
+        yield f"share of each contact that the {partner} grants", operated("half", "relay_share", 0.5), None
+    if orbits.grazing_height_m > 0.0 and not site:
         yield scaled("grazing height", orbiting, "grazing_height_m", orbits.grazing_height_m, "m", (0.0, 2.0))
-    if leo.limits is None or leo.limits.attitude == "free":
-        held = orbiting("nadir, 60 deg about zenith", "leo.limits", _held(leo.limits))
+    if flies and (leo.limits is None or leo.limits.attitude == "free"):
+        side = "nadir" if site else "zenith"
+        held = orbiting(f"nadir, 60 deg about {side}", "leo.limits", _held(leo.limits, 1.0 if site else -1.0))
         yield "attitude of the satellite", held, None
-    if leo.limits is not None and leo.limits.in_eclipse:
+    if flies and leo.limits is not None and leo.limits.in_eclipse:
         yield "eclipse", orbiting("terminal off in it", "leo.limits.in_eclipse", False), None
     if leo.altitude_m is not None:
         yield scaled("orbit altitude", orbiting, "leo.altitude_m", leo.altitude_m, "m", (0.8, 1.2))
@@ -284,9 +297,9 @@ def _of_optical(down: OpticalDownlink, operated: _Edit, scaled: _Scaled) -> Iter
     yield "time that weather holds", shorter, longer
 
 
-def _held(own: VisibilityLimits | None) -> VisibilityLimits:
-    """The limits of a body that does not turn to its partner, with a terminal on top of it."""
-    given = {"attitude": "nadir", "boresight": [0.0, 0.0, -1.0], "field_of_regard": "60 deg", "in_eclipse": True}
+def _held(own: VisibilityLimits | None, down: float) -> VisibilityLimits:
+    """The limits of a body that does not turn to its partner, with a terminal above it, or below it (``down`` 1)."""
+    given = {"attitude": "nadir", "boresight": [0.0, 0.0, down], "field_of_regard": "60 deg", "in_eclipse": True}
     held = VisibilityLimits.model_validate(given | {"slew_limit": "10 deg/s", "sun_exclusion": "0 deg"})
     if own is None:
         return held

@@ -13,7 +13,7 @@ from microrad.mission.tables.operations import Downlink, Operations
 from microrad.orbit import operations
 from microrad.orbit.day.geometry import View, cut_at, longest_gap_s
 
-RELAY, DIRECT = "relay", "direct downlink"
+DIRECT = "direct downlink"
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,7 +165,7 @@ def relay(
     locks = np.array([_locks(found, len(whole), o.seed, run, slower) for run in range(o.runs)])
     runs = [[base.locked_at(base.start_s + lock) for base, lock in zip(bases, row, strict=True)] for row in locks]
     failed = float(np.mean(np.isinf(locks[:, : _of_span(whole, seen)]).sum(axis=1)))
-    return _way(RELAY, whole, (), runs, o, seen, o.relay_delay_s, failed)
+    return _way(seen.partner, whole, (), runs, o, seen, o.relay_delay_s, failed)
 
 
 def _of_span(contacts: tuple[orbit.Contact, ...], seen: View) -> int:
@@ -185,7 +185,7 @@ def _granted(seen: View, share: float) -> list[tuple[orbit.Contact, Callable[[Fl
     for c, range_m in pairs:
         parts = [(c.start_s, c.end_s)] if not c.start_s < end < c.end_s else [(c.start_s, end), (end, c.end_s)]
         for first, last in parts:
-            cut = orbit.Contact(first, first + share * (last - first), c.begins, "end of the relay's share")
+            cut = orbit.Contact(first, first + share * (last - first), c.begins, f"end of the {seen.partner}'s share")
             found.append((cut, range_m))
     return found
 

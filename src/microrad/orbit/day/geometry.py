@@ -60,6 +60,13 @@ class View:
     closed_form: orbit.CoplanarContact | None
 
     @property
+    def partner(self) -> str:
+        """What the other end of the link is: a relay, a station on the ground, or a station's satellite."""
+        if isinstance(self.pair.geo.orbit, orbit.GroundSite):
+            return "station"
+        return "satellite" if isinstance(self.pair.leo.orbit, orbit.GroundSite) else "relay"
+
+    @property
     def duration_s(self) -> float:
         """The span that is looked at."""
         return self.pair.span_s[1]

@@ -89,6 +89,9 @@ def ground_track(
 
 def _relay(pair: orbit.Pair, time_s: Floats, turned_rad: Floats, height_m: float | None) -> Outline:
     """The relay with the limit of what it sees, or with its own way over the Earth."""
+    site = pair.geo.orbit
+    if isinstance(site, orbit.GroundSite):
+        return _station(site.station, height_m)
     far_m = pair.geo.orbit.states(time_s).position_m
     under = orbit.subpoint(far_m, turned_rad)
     if not isinstance(pair.geo.orbit, orbit.GeostationarySlot) and _moves(under.latitude_rad, under.longitude_rad):

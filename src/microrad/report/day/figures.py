@@ -481,9 +481,9 @@ def _assumptions_figure(day: DayStudy) -> Figure:
     swings = sorted(day.swings, key=lambda s: -s.of_relay)
     if day.direct is not None:
         bars = [Assumed(_label(s), s.at_low.ratio, s.at_high.ratio) for s in swings]
-        return assumptions(bars, day.ratio, "volume by relay over volume direct")
+        return assumptions(bars, day.ratio, f"volume by {day.view.partner} over volume direct")
     bars = [Assumed(_label(s), s.at_low.relay_bit / 8e12, s.at_high.relay_bit / 8e12) for s in swings]
-    return assumptions(bars, day.relay.capacity_bit / 8e12, "volume by the relay (TB)")
+    return assumptions(bars, day.relay.capacity_bit / 8e12, f"volume by the {day.view.partner} (TB)")
 
 
 def _optical_figure(day: DayStudy, way: Way) -> Figure:

@@ -92,7 +92,8 @@ def ways_table(day: DayStudy) -> Table:
     names = {place: [f"day.{way}.{name}" if name else "" for name in of] for place, way in enumerate(keys, 1)}
     carried = " and ".join(f"{volume(w.capacity_bit)} by {w.name}" for w in ways)
     folded = f"What the ways could carry: {carried}; line by line"
-    title = "Relay and direct downlink" if day.optical is None else "Relay and downlinks"
+    first = day.view.partner.capitalize()
+    title = f"{first} and direct downlink" if day.optical is None else f"{first} and downlinks"
     return Table(title, ("", *(w.name for w in ways)), rows, (0,), folded=folded, names=names)
 
 
@@ -122,7 +123,8 @@ def assumptions_table(day: DayStudy) -> Table:
         if text != NOTHING
     ]
     behind = () if day.optical is None else ("optical", "99 %\noptical")
-    headings = ("assumption", "changed to", "relay", "direct", "ratio", "99 % by\nrelay", "99 %\ndirect", *behind)
+    way = day.view.partner
+    headings = ("assumption", "changed to", way, "direct", "ratio", f"99 % by\n{way}", "99 %\ndirect", *behind)
     of = ("relay_could_carry_bit", "direct_could_carry_bit", "", "relay_latency_99_percent_s")
     names = {place: f"day.{name}" if name else "" for place, name in enumerate((*of, "direct_latency_99_percent_s"), 2)}
     if day.optical is not None:

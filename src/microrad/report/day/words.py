@@ -20,7 +20,7 @@ def headline(day: DayStudy) -> list[str]:
     relay, span = day.relay, duration(day.view.duration_s)
     whole = day.operations is None or day.operations.relay_share == 1.0
     said = (
-        f"In {span} the relay {_how_much(day, relay, whole)}, and could carry "
+        f"In {span} the {day.view.partner} {_how_much(day, relay, whole)}, and could carry "
         f"{volume(relay.capacity_bit)}{_a_day(day, volume(relay.capacity_bit / day.view.days))}"
     )
     parts = [said]
@@ -29,9 +29,9 @@ def headline(day: DayStudy) -> list[str]:
         stations = ", ".join(down.stations) if down else ""
         carried = f"{volume(d.capacity_bit)}{_a_day(day, volume(d.capacity_bit / day.view.days))}"
         ground = f"The ground ({stations}) {_how_much(day, d)}, and could carry {carried}"
-        parts.append(f"{ground}{_compared(day.ratio)}")
+        parts.append(f"{ground}{_compared(day, day.ratio)}")
     if day.optical is not None:
-        parts.append(f"{_optical_words(day, day.optical)}{_compared(day.optical_ratio)}")
+        parts.append(f"{_optical_words(day, day.optical)}{_compared(day, day.optical_ratio)}")
     return [f"{'. '.join(parts)}."]
 
 
@@ -69,11 +69,11 @@ def percent(share: float) -> str:
     return f"{100.0 * share:.1f} %"
 
 
-def _compared(ratio: float) -> str:
+def _compared(day: DayStudy, ratio: float) -> str:
     """The direct downlink against the relay, in words; nothing where one of them carries nothing."""
     if not 0.0 < ratio < math.inf:
         return ""
-    return f"; the relay could carry {ratio:.3g} times as much"
+    return f"; the {day.view.partner} could carry {ratio:.3g} times as much"
 
 
 def times(count: float) -> str:
@@ -116,12 +116,12 @@ def contact_words(day: DayStudy) -> str:
             "coplanar circular orbits."
         )
     ahead, rate = v.largest("point_ahead_most_rad"), v.largest("rate_most_rad_s")
-    parts = ""
+    parts, hidden = "", "the Earth" if v.partner == "relay" else "the mask"
     if v.rises < len(v.encounters):
-        parts = f" It rises {times(v.rises)} only: a limit other than the Earth cuts some contacts in two."
+        parts = f" It rises {times(v.rises)} only: a limit other than {hidden} cuts some contacts in two."
     at_a_time = "" if math.isnan(v.median_s) else f" {duration(v.median_s)} at a time (median),"
     return (
-        f"The relay is in view for {100 * v.visible_share:.1f} % of the time,{at_a_time} and out of it for "
+        f"The {v.partner} is in view for {100 * v.visible_share:.1f} % of the time,{at_a_time} and out of it for "
         f"{duration(v.gap_s)} at most. Range {kilometres(least)} to "
         f"{kilometres(v.largest('range_most_m'))} km, point-ahead up to {quantity(ahead, 'rad')}, line of sight up to "
         f"{quantity(rate, 'rad/s')}, Doppler shift up to {quantity(doppler, 'Hz')} either way.{parts}{hand}"
@@ -170,7 +170,7 @@ def kilometres(range_m: float) -> str:
 def latency_words(day: DayStudy) -> list[str]:
     """How long the instrument's data take to the user."""
     made = volume(day.relay.generated_bit)
-    said = [f"What becomes of the {made} that the instrument makes: by the relay {_arrived(day.relay)}"]
+    said = [f"What becomes of the {made} that the instrument makes: by the {day.view.partner} {_arrived(day.relay)}"]
     if day.direct is not None:
         said.append(f"by the direct downlink {_arrived(day.direct)}")
     if day.optical is not None:
@@ -197,8 +197,8 @@ def assumption_words(day: DayStudy) -> list[str]:
     found = []
     both = day.direct is not None and day.direct.capacity_bit > 0.0
     if moving:
-        what = "ratio of the two volumes" if both else "relay's volume"
-        named = "; ".join(f"{s.name} ({_ends(s, both)})" for s in moving[:3])
+        what = "ratio of the two volumes" if both else f"{day.view.partner}'s volume"
+        named = "; ".join(f"{s.name} ({_ends(s, both, day.view.partner)})" for s in moving[:3])
         found.append(f"What matters most to the {what}, each assumption changed alone: {named}.")
     if weighty := sorted((s for s in day.swings if s.of_optical > MATTERS), key=lambda s: -s.of_optical):
         named = "; ".join(f"{s.name} ({_optical_ends(s)})" for s in weighty[:3])
@@ -206,7 +206,7 @@ def assumption_words(day: DayStudy) -> list[str]:
     waits = sorted(day.swings, key=lambda s: -_wait_factor(s))
     if waits and _wait_factor(waits[0]) > MATTERS:
         s = waits[0]
-        by = [f"within {_both(s, 'relay_slow_s')} by the relay"]
+        by = [f"within {_both(s, 'relay_slow_s')} by the {day.view.partner}"]
         if day.direct is not None:
             by.append(f"within {_both(s, 'direct_slow_s')} directly")
         if day.optical is not None:
@@ -217,10 +217,10 @@ def assumption_words(day: DayStudy) -> list[str]:
     return found
 
 
-def _ends(s: Swing, ratio: bool) -> str:
+def _ends(s: Swing, ratio: bool, partner: str) -> str:
     def shown(n: Numbers) -> str:
         if n.relay_bit == 0.0:
-            return "nothing by relay"
+            return f"nothing by {partner}"
         return (ratio_text(n) or "nothing direct") if ratio else volume(n.relay_bit)
 
     return f"{s.low}: {shown(s.at_low)}, {s.high}: {shown(s.at_high)}"

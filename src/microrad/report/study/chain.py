@@ -52,7 +52,7 @@ def _orbit(study: Study) -> Stage:
     if day is not None:
         reach = max((e.range_most_m for e in day.encounters), default=math.nan)
         lines = [f"{len(day.relay.contacts)} contacts in {day.view.days * 24:.4g} h"]
-        lines.append(f"{day.relay.contact_s / 60:.0f} min in view of the relay")
+        lines.append(f"{day.relay.contact_s / 60:.0f} min in view of the {day.view.partner}")
         far = "" if math.isnan(reach) else f", up to {quantity(reach, 'm')}"
         lines.append(f"{quantity(m.range_m(m.communication), 'm')}{far}")
     if m.point_ahead is not None:
@@ -158,7 +158,7 @@ def _volume(study: Study) -> Stage:
         return Stage("Volume", (text, "no orbits given: no volume a day"))
     relay, direct = day.relay, day.direct
     lines = [
-        f"{_signed(study, volume(relay.capacity_bit), 'day.relay.could_carry_bit')} possible by the relay",
+        f"{_signed(study, volume(relay.capacity_bit), 'day.relay.could_carry_bit')} possible by the {day.view.partner}",
         f"{_signed(study, volume(relay.arrived_bit), 'day.relay.arrived_bit')} of the instrument's",
     ]
     if direct is not None:
