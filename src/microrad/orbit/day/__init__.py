@@ -17,7 +17,7 @@ from microrad.orbit.day import flow
 from microrad.orbit.day.assumptions import NOTHING, Case, Known, Numbers, Swing, swings
 from microrad.orbit.day.flow import Closing, PointingLoss, Way
 from microrad.orbit.day.geometry import Encounter, View, beyond_the_mission, encounter, short_tail, times, view
-from microrad.orbit.day.optical import Sky, optical, optical_passes, sky
+from microrad.orbit.day.network import Sky, optical, optical_passes, sky
 
 __all__ = [
     "NOTHING",

@@ -11,7 +11,7 @@ from microrad.mission.ground import path_of
 from microrad.mission.tables.operations import Downlink, Operations, OpticalDownlink
 from microrad.mission.tables.orbit import HIGHEST_MASK_RAD, Orbits, VisibilityLimits
 from microrad.orbit.day import flow, geometry
-from microrad.orbit.day.optical import OpticalPass, optical, optical_passes
+from microrad.orbit.day.network import OpticalPass, optical, optical_passes
 
 _SKIES = 20  # drawn for each case: the same ones for all of them
 _RUNS = 4  # of each case: what an acquisition takes is little beside what is varied

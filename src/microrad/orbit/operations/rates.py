@@ -103,8 +103,8 @@ class Service(Bounded):
         """The part of the contact in a span that it overlaps; the contact itself where the span holds all of it."""
         if start_s <= self.start_s and end_s >= self.end_s:
             return self
-        inside = (start_s < self.edges_s) & (self.edges_s < end_s)
-        edges = np.concatenate(([max(start_s, self.start_s)], self.edges_s[inside], [min(end_s, self.end_s)]))
+        start, end = max(start_s, self.start_s), min(end_s, self.end_s)
+        edges = np.concatenate(([start], self.edges_s[(start < self.edges_s) & (self.edges_s < end)], [end]))
         piece = np.searchsorted(self.edges_s, edges[:-1], side="right") - 1
         return Service(edges, self.rate_bit_s[piece], self.availability)
 

@@ -1,0 +1,304 @@
+"""The optical downlink of a day: the network's rule second by second, the radio's volumes under a clear sky, words."""
+
+import math
+
+import numpy as np
+import pytest
+
+from day_files import ALONE, KIRUNA, day_file
+from microrad import orbit
+from microrad.link import study as link_study
+from microrad.orbit import day as day_study
+from microrad.orbit import operations
+from microrad.orbit.day import flow, network
+from microrad.orbit.day import weather as skies
+from microrad.report import registry
+from microrad.report.day.data import day_csv, day_data
+from microrad.report.day.figures import day_figures
+from microrad.report.day.page import day_text
+from microrad.report.day.tables import sky_table
+from microrad.report.day.words import sentences
+from microrad.report.quantities import duration
+from optical_files import SITES, TENERIFE_SITE, optical
+
+SETUP = {"operations.downlink.setup": "30 s", "operations.downlink.delay": "1 s"}
+RADIO_OF_THREE = {
+    "operations.downlink.stations": SITES,
+    "operations.downlink.data_rate": "100 Mbit/s",
+    **SETUP,
+}
+NO_RADIO = {"operations.downlink": None}
+
+
+def of(folder, *changes):
+    """The table of operations and the terminals of a mission."""
+    m = day_file(folder, ALONE, *changes).mission
+    return m.operations, orbit.pair(m.orbit, m.terminals, folder)
+
+
+def way_of(folder, *changes, rates=None):
+    o, pair = of(folder, *changes)
+    return network.optical(o, pair, network.optical_passes(o.optical, pair), rates)
+
+
+# ------------------------------------------------------------------------------------------------- second by second
+def used_seconds(o, pair, run):
+    """The seconds in which data flow by each station, and how many uses there are: a machine that looks each second."""
+    down, time_s = o.optical, np.arange(0.0, pair.whole_s[1]) + 0.5
+    spells = skies.clear_spells(network.weather_of(down, pair.epoch), pair.whole_s, o.seed, run)
+    usable = np.zeros((len(down.stations), time_s.size), dtype=int)
+    for k, station in enumerate(orbit.stations(down)):
+        found = orbit.passes(pair.leo.orbit, station, pair.epoch, pair.whole_s)
+        for windows in (spells[k], [(c.start_s, c.end_s) for c in found]):
+            inside = np.zeros(time_s.size, dtype=int)
+            for begin, end in windows:
+                inside[math.ceil(begin - 0.5) : math.ceil(end - 0.5)] = 1
+            usable[k] += inside
+    usable = usable == 2
+    current, since, taken, flows = None, np.zeros(len(usable), dtype=int), 0, np.zeros(usable.shape, dtype=bool)
+    uses = 0
+    for second in np.flatnonzero(usable.any(axis=0)):
+        for k in range(len(usable)):
+            if usable[k, second] and not usable[k, second - 1]:
+                since[k] = second
+        if current is None or not usable[current, second] or not usable[current, second - 1]:
+            current = min((since[k], k) for k in range(len(usable)) if usable[k, second])[1]
+            taken, uses = second, uses + 1
+        flows[current, second] = second - taken >= down.setup_s
+    return flows, time_s, uses
+
+
+@pytest.mark.parametrize("weather", ["2 h", "5 min"])
+def test_the_network_is_used_as_a_machine_that_looks_each_second_uses_it(tmp_path, weather):
+    o, pair = of(tmp_path, optical({"kiruna": 0.6, "tromso": 0.6, "tenerife": 0.5}, weather=weather))
+    o = o.with_value("runs", 3)
+    way = network.optical(o, pair, network.optical_passes(o.optical, pair))
+    rate, inside, found, several = o.optical.data_rate_bit_s, pair.span_s[1], [], 0
+    for run in range(3):
+        flows, time_s, uses = used_seconds(o, pair, run)
+        found.append(rate * np.sum(flows[:, time_s < inside]))
+        several = max(several, uses)
+    assert several > 8
+    assert way.capacity_bit == pytest.approx(np.mean(found), abs=2.0 * several * rate)
+    assert way.capacity_spread_bit == pytest.approx((min(found), max(found)), abs=2.0 * several * rate)
+    assert min(found) < 0.95 * max(found)
+
+
+def test_who_rises_first_is_kept_and_the_next_takes_over():
+    spans = [(10.0, 20.0, 0), (12.0, 30.0, 1), (5.0, 8.0, 2), (13.0, 25.0, 3), (29.0, 31.0, 4)]
+    kept = [(5.0, 8.0, 2), (10.0, 20.0, 0), (20.0, 30.0, 1), (30.0, 31.0, 4)]
+    assert flow.one_at_a_time(spans) == kept == flow.one_at_a_time(reversed(spans))
+
+
+# ------------------------------------------------------------------------------------------------- beside the radio
+def test_under_a_clear_sky_the_network_carries_what_the_radio_of_the_same_stations_does(tmp_path):
+    o, pair = of(tmp_path, RADIO_OF_THREE, optical(1.0))
+    radio = flow.direct(o, _seen(pair), flow.station_passes(o.downlink, pair))
+    light = network.optical(o, pair, network.optical_passes(o.optical, pair))
+    assert light.capacity_bit == pytest.approx(radio.capacity_bit, rel=1e-9)
+    assert light.capacity_spread_bit == pytest.approx((radio.capacity_bit,) * 2, rel=1e-9)
+    assert (light.contact_s, light.gap_s) == pytest.approx((radio.contact_s, radio.gap_s), rel=1e-9)
+    for name in ("median_s", "slow_s", "lost_bit", "on_board_bit"):
+        assert getattr(light, name) == pytest.approx(getattr(radio, name), rel=1e-9), name
+    assert radio.capacity_bit > 1e11 and len(set(light.stations)) == 3
+    half = network.optical(o, pair, network.optical_passes(o.optical, pair), _steps((50e6, math.inf)))
+    assert half.capacity_bit == pytest.approx(0.5 * radio.capacity_bit, rel=1e-9)
+
+
+def _seen(pair):
+    from microrad.orbit.day.geometry import View
+
+    return View(pair, (), (), (), np.zeros((0, 2)), None)
+
+
+def _steps(*steps):
+    return operations.RateTable(tuple(operations.Step(*step) for step in steps))
+
+
+def test_under_clouds_for_ever_the_network_carries_nothing(tmp_path):
+    way = way_of(tmp_path, optical(0.0))
+    assert (way.capacity_bit, way.contact_s, way.contacts, way.arrived_bit) == (0.0, 0.0, (), 0.0)
+    assert way.gap_s == 86400.0 and math.isinf(way.median_s)
+    assert way_of(tmp_path, optical(0.5)).capacity_bit > 0.0
+
+
+def test_a_months_clouds_end_with_it(tmp_path):
+    """The shipped day goes on to 12 h UTC of the next one: from midnight on there are no clouds."""
+    turn = {"orbit.epoch": "2026-03-31T12:00:00Z", "orbit.leo.local_time": "10.5 h"}
+    by_month = [0.0] * 3 + [1.0] + [0.0] * 8
+    o, pair = of(tmp_path, turn, optical(by_month))
+    way = network.optical(o, pair, network.optical_passes(o.optical, pair))
+    clear = way_of(tmp_path, turn, optical(1.0))
+    later = [bit for c, bit in zip(clear.contacts, clear.carried_bit, strict=True) if c.start_s > 43200.0]
+    assert min(c.end_s for c in way.contacts) > 43200.0
+    assert way.capacity_bit == pytest.approx(sum(later), rel=1e-9) and way.capacity_bit < 0.8 * clear.capacity_bit
+    assert network.sky(o, pair).availability == pytest.approx((0.5,) * 3, rel=1e-12)
+
+
+def test_rates_fall_with_the_range_to_the_station(tmp_path):
+    o, pair = of(tmp_path, optical({"tenerife": 1.0}))
+    passes = network.optical_passes(o.optical, pair)
+    table = _steps((1e9, 700e3), (1e8, 1200e3))
+    way = network.optical(o, pair, passes, table)
+    rate, time_s = o.optical.data_rate_bit_s, np.arange(0.0, 86400.0) + 0.5
+    (station,) = orbit.stations(o.optical)
+    place = pair.leo.orbit.states(time_s).position_m - station.position(pair.epoch, time_s).position_m
+    range_m, flows = np.linalg.norm(place, axis=0), np.zeros(time_s.size, dtype=bool)
+    for each, _, _ in passes:
+        flows |= (time_s >= each.start_s + o.optical.setup_s) & (time_s < each.end_s)
+    expected = np.sum(np.where(range_m <= 700e3, 1e9, np.where(range_m <= 1200e3, 1e8, 0.0))[flows])
+    assert way.capacity_bit == pytest.approx(expected, abs=4e9 * len(passes))
+    assert expected > 20e9 and rate == 1e8
+
+
+# --------------------------------------------------------------------------------------------------------------- draws
+def test_weather_changes_no_acquisition_and_a_seed_repeats(tmp_path):
+    plain = link_study.run_link_study(day_file(tmp_path, ALONE))
+    clouded = link_study.run_link_study(day_file(tmp_path, ALONE, optical(0.5)))
+    relays = [day_study.relay(each, day_study.given_loss(each)) for each in (plain, clouded)]
+    assert relays[0].capacity_spread_bit == relays[1].capacity_spread_bit
+    first, again = (day_study.optical_alone(clouded.file) for _ in range(2))
+    assert np.array_equal(first.carried_bit, again.carried_bit)
+    other = way_of(tmp_path, optical(0.5), {"operations.seed": 2})
+    assert not np.array_equal(first.carried_bit, other.carried_bit)
+    assert day_study.optical_alone(plain.file) is None
+
+
+def test_the_order_of_stations_does_not_matter(tmp_path):
+    shares = {"kiruna": 0.5, "tromso": 0.6, "tenerife": 0.4}
+    first = way_of(tmp_path, optical(shares))
+    turned = way_of(tmp_path, optical(dict(reversed(shares.items()))))
+    assert turned.capacity_bit == pytest.approx(first.capacity_bit, rel=1e-12)
+    assert turned.stations == first.stations
+
+
+def test_every_run_has_a_sky_of_its_own(tmp_path):
+    o, pair = of(tmp_path, optical(0.5))
+    passes = network.optical_passes(o.optical, pair)
+    several = network.optical(o, pair, passes)
+    alone = [network.optical(o.with_value("runs", n), pair, passes).capacity_bit * n for n in range(1, 5)]
+    assert len(set(np.round(np.diff([0.0, *alone])))) > 1
+    assert several.capacity_spread_bit[0] < several.capacity_bit < several.capacity_spread_bit[1]
+
+
+def test_the_sky_over_the_stations(tmp_path):
+    o, pair = of(tmp_path, optical({"kiruna": 0.5, "tromso": 0.6, "tenerife": 0.4}, weather="1 min"))
+    sky = network.sky(o, pair)
+    assert sky.names == ("kiruna", "tromso", "tenerife") and sky.availability == (0.5, 0.6, 0.4)
+    assert sky.drawn == pytest.approx((0.5, 0.6, 0.4), abs=0.02) and sky.drawn != (0.5, 0.6, 0.4)
+    assert sky.any_independent == pytest.approx(1.0 - 0.5 * 0.4 * 0.6, rel=1e-12)
+    assert sky.any_drawn == pytest.approx(sky.any_clear, abs=0.02)
+    assert sky.any_clear < sky.any_independent - 0.05  # kiruna and tromso lie 220 km apart
+    apart = skies.distances_m(network.weather_of(o.optical, pair.epoch).sites)[0, 1]
+    assert sky.correlation[0, 1] == pytest.approx(math.exp(-apart / 500e3), rel=1e-12)
+    assert apart == pytest.approx(217e3, abs=5e3)
+
+
+# ------------------------------------------------------------------------------------------------------------- service
+def test_a_part_of_a_contact_carries_what_it_has_there():
+    whole = operations.Service(np.array([0.0, 10.0, 20.0, 30.0]), np.array([1.0, 2.0, 3.0]), 0.5)
+    for start, end, expected in ((5.0, 25.0, 0.5 * (5 + 20 + 15)), (10.0, 20.0, 10.0), (12.0, 13.0, 1.0)):
+        part = whole.within(start, end)
+        assert (part.start_s, part.end_s) == (start, end)
+        assert part.capacity_bit == pytest.approx(expected, rel=1e-12)
+    assert whole.within(-1.0, 31.0) is whole
+    assert whole.within(-1.0, 10.0).edges_s.tolist() == [0.0, 10.0]
+
+
+# -------------------------------------------------------------------------------------------------- the whole day, told
+def whole_day(folder, *changes):
+    return day_study.run_day_study(link_study.run_link_study(day_file(folder, ALONE, *changes)))
+
+
+@pytest.fixture(scope="module")
+def day(tmp_path_factory):
+    """A day with relay, radio and an optical network under clouds."""
+    folder = tmp_path_factory.mktemp("day")
+    clouds = {"kiruna": 0.4, "tenerife": 0.7}
+    return day_study.run_day_study(
+        link_study.run_link_study(day_file(folder, ALONE, optical(clouds, data_rate="10 Gbit/s")))
+    )
+
+
+@pytest.fixture(scope="module")
+def without_radio(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("day")
+    return day_study.run_day_study(
+        link_study.run_link_study(day_file(folder, ALONE, NO_RADIO, optical({"tenerife": 0.7})))
+    )
+
+
+def swing_of(day, name):
+    return next(s for s in day.swings if s.name == name)
+
+
+def test_the_day_has_three_ways_under_one_instrument(day, without_radio):
+    assert [way.name for way in day.ways] == ["relay", "direct downlink", "optical downlink"]
+    assert [way.name for way in without_radio.ways] == ["relay", "optical downlink"]
+    made = {way.generated_bit for way in day.ways}
+    assert max(made) == pytest.approx(min(made), rel=1e-12)
+    assert day.optical_ratio == pytest.approx(day.relay.capacity_bit / day.optical.capacity_bit)
+    assert math.isnan(without_radio.ratio) and without_radio.optical_ratio > 1.0
+
+
+def test_each_assumption_of_the_network_is_a_day_of_its_own(day, tmp_path):
+    sky = swing_of(day, "availability of the optical stations")
+    clear = way_of(tmp_path, optical({"kiruna": 1.0, "tenerife": 1.0}, data_rate="10 Gbit/s"))
+    half = way_of(tmp_path, optical({"kiruna": 0.2, "tenerife": 0.35}, data_rate="10 Gbit/s"))
+    assert (sky.at_low.optical_bit, sky.at_high.optical_bit) == pytest.approx((half.capacity_bit, clear.capacity_bit))
+    assert sky.here.optical_bit == day.optical.capacity_bit
+    fewer = swing_of(day, "optical ground stations")
+    alone = way_of(tmp_path, optical({"tenerife": 0.7}, data_rate="10 Gbit/s"))
+    assert fewer.low == "without kiruna" and fewer.at_low.optical_bit == pytest.approx(alone.capacity_bit, rel=0.5)
+    rate = swing_of(day, "optical data rate to ground")
+    assert (rate.of_optical, rate.of_relay) == (pytest.approx(4.0), 1.0)
+    length = swing_of(day, "correlation length of clouds")
+    assert (length.low, length.high) == ("none", "1000 km")
+    assert swing_of(day, "time that weather holds").high == "4 h"
+    assert swing_of(day, "pointing loss").of_optical == 1.0 and swing_of(day, "orbit altitude").of_optical > 1.0
+    assert swing_of(day, "availability of the optical stations").factor == sky.of_optical > 1.5
+
+
+def test_the_words_name_the_network_its_sky_and_what_matters(day, without_radio):
+    said = " ".join(sentences(day))
+    assert "Optical ground stations (kiruna, tenerife) are in use for" in said
+    assert "by the weather drawn; the relay could carry" in said
+    assert "At least one of the 2 optical stations is clear for 82.0 % of the time" in said
+    assert f"by the optical downlink half arrives within {duration(day.optical.median_s)}" in said
+    assert "What matters most to the optical downlink's volume: optical data rate to ground (" in said
+    alone = " ".join(sentences(without_radio))
+    assert "The sky over tenerife is clear for 70.0 % of the time" in alone
+    assert "The ground (" not in alone and "directly" not in alone
+
+
+def test_tables_csv_and_data_have_the_third_way(day, without_radio):
+    text = day_text(day, 160)
+    for words in ("Relay and downlinks", "optical downlink", "tenerife, optical", "Clear sky over the stations"):
+        assert words in text
+    assert sky_table(day).rows[-2][0] == "any of them"
+    data = day_data(day)
+    assert data["optical"]["could_carry_bit"] == day.optical.capacity_bit
+    assert [each["name"] for each in data["sky"]["sites"]] == ["kiruna", "tenerife"]
+    assert data["sky"]["any_clear"] == day.sky.any_clear
+    names = [name for name, _ in registry.flattened({"day": data}) if ".optical" in name or ".sky" in name]
+    assert len(names) > 30 and registry.unregistered(names) == []
+    lines = day_csv(day).splitlines()
+    assert sum(line.startswith("optical downlink,") for line in lines) == len(day.optical.contacts) > 0
+    assert {figure.name for figure in day_figures(day)} >= {"assumptions", "optical-assumptions", "world-map"}
+    assert "direct downlink" not in day_text(without_radio, 160)
+
+
+def test_a_day_without_a_network_says_nothing_of_one(tmp_path):
+    quiet = whole_day(tmp_path, {"orbit.duration": "6 h"})
+    assert (quiet.optical, quiet.sky) == (None, None) and math.isnan(quiet.optical_ratio)
+    assert "optical" not in repr(day_data(quiet)) and "ptical" not in " ".join(sentences(quiet))
+    assert sky_table(quiet) is None and [way.name for way in quiet.ways] == ["relay", "direct downlink"]
+
+
+def test_the_stations_of_a_network_may_stand_where_the_radios_do(tmp_path):
+    assert KIRUNA.startswith("operations.downlink")
+    both = day_file(
+        tmp_path, ALONE, optical({"tenerife": 0.5}), {"operations.downlink.stations": {"tenerife": TENERIFE_SITE}}
+    )
+    o = both.mission.operations
+    assert orbit.stations(o.optical) == orbit.stations(o.downlink)
