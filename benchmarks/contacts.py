@@ -1,4 +1,4 @@
-"""What contacts cost: one day of one pair at 1 s, a constellation and how it grows, a week beside skyfield.
+"""What contacts cost: a day of one pair at 1 s, a constellation and how it grows, ground stations, a week of passes.
 
     python benchmarks/contacts.py
 
@@ -6,6 +6,7 @@ The pair is that of the paper's mission. The constellation sees four slots over 
 1000 x 4 are 4000 searches. Memory is the largest of this process, before and after.
 """
 
+import math
 import resource
 import statistics
 import tempfile
@@ -19,12 +20,23 @@ from skyfield.api import EarthSatellite, load, wgs84
 from microrad import orbit
 from microrad.mission.file import load_mission
 from microrad.orbit import constellation, files, operations
+from microrad.orbit.day.weather import Site
 from microrad.orbit.propagation import mean_elements
 from recorded import record
 
 FILE = load_mission(Path(__file__).resolve().parents[1] / "missions" / "leo-geo.toml")
 DAY_S = 86400.0
 FURTHEST_M = 42_002e3  # to where the paper's link has its 3 dB
+SITES = (
+    ("kiruna", 67.9, 21.0),
+    ("tenerife", 28.3, -16.5),
+    ("svalbard", 78.2, 15.4),
+    ("hartebeesthoek", -25.9, 27.7),
+    ("haleakala", 20.7, -156.3),
+    ("sutherland", -32.4, 20.8),
+    ("nemea", 37.8, 22.6),
+    ("fairbanks", 64.8, -147.7),
+)  # name, latitude and longitude in degrees
 PAIR_TARGET_S, CONSTELLATION_TARGET_S = 0.3, 60.0
 ISS = (
     "1 25544U 98067A   19343.69339541  .00001764  00000-0  38792-4 0  9991",
@@ -93,6 +105,43 @@ def many() -> None:
     print(f"planned: within reach, with sessions; at most {CONSTELLATION_TARGET_S:g} s for 1000 satellites")
 
 
+def with_stations() -> None:
+    """What eight ground stations add to a day of 1000 satellites with four slots: processor time, in turns."""
+    m = FILE.mission
+    pair = orbit.pair(m.orbit, m.terminals, FILE.path.parent)
+    table = m.constellation.model_copy(update={"satellites": 1000, "planes": 25, "phasing": 1})
+    own = list(orbit.satellites(table, m.orbit, pair.epoch, FILE.path.parent))
+    rates = operations.RateTable((operations.Step(10e9, math.inf),))
+    ground = []
+    for name, latitude, longitude in SITES:
+        station = orbit.Station(name, math.radians(latitude), math.radians(longitude), 500.0, math.radians(10.0))
+        site = Site(name, station.latitude_rad, station.longitude_rad, (0.7,))
+        ground.append(constellation.Ground(station, site, rates, 1))
+
+    for limits, bar, what in ((pair.geo.limits, 2.0, "all limits"), (orbit.UNLIMITED, None, "Earth alone")):
+        slots = [
+            orbit.Terminal(orbit.GeostationarySlot(f"slot {k}", pair.epoch, 0.5 * np.pi * k), limits, f"slot {k}")
+            for k in range(4)
+        ]
+        satellites = own if bar else [orbit.Terminal(each.orbit, orbit.UNLIMITED, each.name) for each in own]
+
+        def planned(stations: list[constellation.Ground], satellites=satellites, slots=slots) -> float:
+            began = time.process_time()
+            span = (0.0, DAY_S)
+            seen = constellation.opportunities(
+                satellites, slots, pair.earth, pair.epoch, span, FURTHEST_M, stations=stations
+            )
+            operations.schedule(seen, 1000, 4 + len(stations), 1, operations.Rules(60.0, 180.0, 600.0), 0.0)
+            return time.process_time() - began
+
+        alone, both = (sum(times) for times in zip(*((planned([]), planned(ground)) for _ in range(2)), strict=True))
+        print(
+            f"1000 satellites, 4 slots, {what}: {alone / 2:.1f} s; with 8 stations {both / 2:.1f} s, {both / alone:.2f}"
+        )
+        if bar:
+            record("1000 satellites with 4 slots and 8 stations over 4 slots, time", both / alone, at_most=bar)
+
+
 def beside_skyfield() -> None:
     """Passes over one station in a week, from the same element set."""
     scale = load.timescale(builtin=True)
@@ -114,6 +163,7 @@ def beside_skyfield() -> None:
 def main() -> None:
     one_pair()
     many()
+    with_stations()
     beside_skyfield()
 
 

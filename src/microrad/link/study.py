@@ -17,6 +17,7 @@ from microrad.link.acquisition.partner_search import Finding, Sent, Tracking, an
 from microrad.link.budget import assembly
 from microrad.link.fade_series.coded import CodedFading
 from microrad.link.fade_series.of_mission import fading_of
+from microrad.link.ground import GroundLink, ground_link
 from microrad.link.pointing.outage import (
     Performance,
     error_rad,
@@ -69,7 +70,7 @@ class LinkStudy:
     the noise terms of the communication receiver at the received power, where it is given by what it is made of.
     ``data`` is the communication link assembled. ``tornados`` has one of each budget, in the same order.
     ``beam_radius`` is None unless the mission has one. ``fading`` is the link under a series of received power, at its
-    static margin.
+    static margin. ``ground`` is what there is to say of links to a station.
     """
 
     file: LinkFile
@@ -87,6 +88,7 @@ class LinkStudy:
     beam_radius: BeamRadius | None
     finding: Finding | None
     fading: CodedFading | None = None
+    ground: GroundLink | None = None
 
     @property
     def budgets(self) -> tuple[link.LinkBudget, ...]:
@@ -228,6 +230,7 @@ def run_link_study(file: LinkFile, parts: kept.Kept = kept.NOTHING) -> LinkStudy
         beam_radius=beam_radius(data),
         finding=found,
         fading=fading_of(data, file.path.parent, sources),
+        ground=ground_link(m, sources, data),
     )
 
 

@@ -19,6 +19,8 @@ from microrad.core.units import UnitError, format_quantity, kind_of, parse_quant
 
 MOST_ITEMS = 1000
 """Items of a list beyond which it is taken for a mistake."""
+MONTHS = 12
+"""Of a year, for values by month (`Monthly`)."""
 
 _LARGEST = 1e100  # plain number: products of three are still floats
 
@@ -298,6 +300,37 @@ class Several:
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         """An array of what each item is."""
         return {"type": "array", "minItems": 1, "items": self.each.__get_pydantic_json_schema__(schema, handler)}
+
+
+@dataclass(frozen=True, slots=True)
+class Monthly(Several):
+    """One number that holds all year, or a list of twelve, January to December; read as a tuple of 1 or of 12."""
+
+    def read(self, value: object) -> tuple[float, ...]:
+        """The one number, or the twelve; raises `UnitError` or `ProblemsError`."""
+        if not isinstance(value, list | tuple):
+            try:
+                return (self.each.read(value),)
+            except UnitError as error:
+                raise UnitError(value, error.reason, self.wanted, error.example) from None
+        if len(value) != MONTHS:
+            raise ProblemsError(Problem("", f"is a list of {len(value)}, and a year has {MONTHS} months", self.wanted))
+        return Several.read(self, value)
+
+    @property
+    def wanted(self) -> str:
+        """What the key expects, in words."""
+        return f"{self.each.wanted}, or a list of {MONTHS} such, January to December"
+
+    @property
+    def example(self) -> str:
+        """One number."""
+        return self.each.example
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        """One item, or an array of twelve."""
+        one = self.each.__get_pydantic_json_schema__(schema, handler)
+        return {"anyOf": [one, {"type": "array", "minItems": MONTHS, "maxItems": MONTHS, "items": one}]}
 
 
 def _plain_number(value: object) -> float:

@@ -9,7 +9,15 @@ from microrad.orbit.earth.figure import EARTH_RADIUS_M, GEOSTATIONARY_RADIUS_M, 
 from microrad.orbit.earth.sun import sun_direction
 from microrad.orbit.from_mission import Pair, pair, relays, repeats, satellites, stations
 from microrad.orbit.propagation.analytic import GeostationarySlot, KeplerOrbit, circular
-from microrad.orbit.visibility.contacts import Contact, CoplanarContact, Pass, contacts, coplanar_contact, passes
+from microrad.orbit.visibility.contacts import (
+    Contact,
+    CoplanarContact,
+    Pass,
+    contacts,
+    coplanar_contact,
+    passes,
+    station_range,
+)
 from microrad.orbit.visibility.limits import UNLIMITED, Terminal
 from microrad.orbit.visibility.line_of_sight import LineOfSight, sight
 
@@ -38,6 +46,7 @@ __all__ = [
     "repeats",
     "satellites",
     "sight",
+    "station_range",
     "stations",
     "subpoint",
     "sun_direction",

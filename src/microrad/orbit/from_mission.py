@@ -8,7 +8,7 @@ from pathlib import Path
 
 from microrad.mission.file import NamedFile, content_of
 from microrad.mission.tables.link import Terminals
-from microrad.mission.tables.operations import Constellation, Downlink
+from microrad.mission.tables.operations import Constellation, Downlink, OpticalDownlink
 from microrad.mission.tables.orbit import Orbits, OrbitTable, VisibilityLimits
 from microrad.orbit.base import Orbit, OrbitError, required
 from microrad.orbit.earth.epoch import Epoch
@@ -151,10 +151,10 @@ def _limits(t: VisibilityLimits | None) -> Limits:
     )
 
 
-def stations(downlink: Downlink) -> tuple[Station, ...]:
-    """The ground stations of a mission's direct downlink."""
+def stations(of: Downlink | OpticalDownlink | Constellation) -> tuple[Station, ...]:
+    """The ground stations of a mission's direct downlink, by radio or optical, or those of its constellation."""
     return tuple(
-        Station(name, s.latitude_rad, s.longitude_rad, s.height_m, s.mask_rad) for name, s in downlink.stations.items()
+        Station(name, s.latitude_rad, s.longitude_rad, s.height_m, s.mask_rad) for name, s in of.stations.items()
     )
 
 

@@ -4,7 +4,7 @@ import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any
 
-from microrad.campaign.definition.keys import nearest
+from microrad.campaign.definition.keys import OPTICAL, nearest
 from microrad.campaign.definition.outputs import OUTPUTS, RADIUS
 from microrad.campaign.definition.tables import MOST_RUNS, CampaignTable, LimitTable, LoopTable
 from microrad.campaign.definition.values import FILE_WORD, NotedError, ValueReader, quoted_near
@@ -88,6 +88,7 @@ _OF_TABLES = (
     ("beacon_margin", "beacon", "[beacon]"),
     ("answer_margin", "answer", "[answer]"),
     ("margin_under_fades", fading_series.KEY, "[communication.fading] with a series"),
+    ("optical_volume", OPTICAL, f"[{OPTICAL}]"),
 )
 """Outputs that ask for a table of the mission: the output, the table's key, and the table in words."""
 

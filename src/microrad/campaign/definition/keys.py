@@ -7,7 +7,7 @@ from typing import Any, get_args, get_origin
 
 from pydantic.fields import FieldInfo
 
-from microrad.mission.fields import OrWord, Quantity, Several, Share, Table, Whole
+from microrad.mission.fields import Monthly, OrWord, Quantity, Several, Share, Table, Whole
 from microrad.mission.file import kind_of
 from microrad.mission.model import LinkMission, Mission
 
@@ -15,6 +15,9 @@ MIRROR = "mirror"
 """What a campaign calls the mirror as a whole: the key of mirror files, and of the covariance of an identification.
 
 Its covariance is that of the mirror that the loop has: of several axes where the mission names one (`MIRROR_FILE`)."""
+
+OPTICAL = "operations.optical"
+"""Key of the optical downlink, which an output of the day needs."""
 
 MIRROR_FILE = "fine_pointing.mirror_file"
 """Key of the file of a mirror of several axes."""
@@ -117,6 +120,8 @@ def _find(table: type[Table], parts: tuple[str, ...], at: int, data: object) -> 
         return Key(".".join(parts), table, rule.each, _item(parts, inside))
     if kind is None and not is_last:
         raise UnknownKeyError(f"goes on behind {'.'.join(parts[: at + 1])}, which holds a value", "the key without it")
+    if isinstance(rule, Monthly) and not isinstance(inside, list):
+        rule = rule.each
     if kind is None:
         return Key(".".join(parts), table, rule)
     if is_last:

@@ -35,6 +35,7 @@ _ALL = (
     Output("answer_margin", "dB", "dB", "margin of the answer as budgeted", "link"),
     Output("volume", "bit", "GB", "what the relay could carry in the mission's span", "day"),
     Output("contact_time", "s", "min", "time in contact with the relay in that span", "day"),
+    Output("optical_volume", "bit", "GB", "what the optical downlink could carry in that span, on average", "day"),
 )
 
 OUTPUTS: dict[str, Output] = {output.name: output for output in _ALL}

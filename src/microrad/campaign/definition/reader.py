@@ -10,7 +10,7 @@ from microrad.campaign.definition import checks
 from microrad.campaign.definition import draws as drawing
 from microrad.campaign.definition.cells import CellReader
 from microrad.campaign.definition.draws import DrawReader
-from microrad.campaign.definition.keys import MIRROR, MIRROR_FILE, flat, flat_tables, touches_loop
+from microrad.campaign.definition.keys import MIRROR, MIRROR_FILE, OPTICAL, flat, flat_tables, touches_loop
 from microrad.campaign.definition.records import CampaignFile, Cell, Draw, Variable
 from microrad.campaign.definition.tables import CampaignTable, VariableTable
 from microrad.campaign.definition.values import FILE_WORD, ValueReader, text_of
@@ -179,6 +179,7 @@ class _DefinitionReader:
         missions, required = [cell.file.mission for cell in cells], nominal.file.mission.requirement
         optional = ("beacon", "answer", "orbit", "operations")
         absent = [name for name in optional if any(getattr(m, name) is None for m in missions)]
+        absent += [OPTICAL] * any(m.operations is None or m.operations.optical is None for m in missions)
         fadings = [m.communication.fading for m in missions]
         absent += [fading_series.KEY] * any(each is None or each.series is None for each in fadings)
         keep = checks.with_tables(self.reader, self.document.data.get("keep"), keep, absent)

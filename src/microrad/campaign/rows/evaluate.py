@@ -55,6 +55,7 @@ def outputs(file: LinkFile, runs: ensemble.Ensemble | None, keep: Collection[str
         "answer_margin": lambda: _beam_margin(_Beam.of("answer", link.Shared.of(m), m.answer, file.sources)),
         "volume": lambda: day().capacity_bit,
         "contact_time": lambda: day().contact_s,
+        "optical_volume": lambda: _optical_bit(file),
     }
     return {name: known[name]() for name in OUTPUTS if name in keep}
 
@@ -111,7 +112,8 @@ class _Beam:
     @classmethod
     def of(cls, name: str, shared: link.Shared, beam: Beacon | None, sources: Mapping[str, Source]) -> "_Beam":
         """The beam; of point-ahead it is told by the angle that is left alone."""
-        tables = beam, shared.point_ahead_rad, shared.terminals, shared.conventions, shared.channel
+        air = None if shared.sky is None else (shared.sky, shared.outage)
+        tables = beam, shared.point_ahead_rad, shared.terminals, shared.conventions, air
         return cls(name, tables, shared, beam, sources)
 
 
@@ -137,6 +139,15 @@ def _rate(data: link.DataLink, loss_db: float) -> float:
 
 
 # ----------------------------------------------------------------------------------------------------------------- day
+def _optical_bit(file: LinkFile) -> float:
+    """What the optical downlink could carry."""
+    from microrad.orbit import day as day_study
+
+    way = day_study.optical_alone(file)
+    assert way is not None  # the campaign file's own check
+    return way.capacity_bit
+
+
 def _day(file: LinkFile, under: Exposure) -> "day_study.Way":
     """What the relay takes under this pointing; nothing where the link has no contact."""
     from microrad.link import study as link_study

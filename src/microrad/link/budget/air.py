@@ -1,13 +1,11 @@
 """What the air between a station and a satellite does to one beam: absorption, spread, wavefront, fades."""
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
-from microrad.core.errors import MicroradError
 from microrad.link import coupling, gains
 from microrad.link.turbulence import (
     BuftonWind,
@@ -25,14 +23,8 @@ from microrad.mission.ground import GroundPath
 from microrad.mission.tables.channel import Channel, TurbulenceTable
 
 UPLINK, DOWNLINK = "uplink", "downlink"
-_LEAST_SHARE, _FADES = 1e-15, 3000  # of a fade that is told from none, and how many losses stand for all
+_LEAST_SHARE, _FADES = 1e-15, 1000  # of a fade that is told from none, and how many losses stand for all
 _NO_INDEX = 1e-12
-
-
-class LinkError(MicroradError):
-    """A question to which this link has no answer; the message says by how many decibels, or beyond which limit."""
-
-    page = "link"
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,12 +111,9 @@ def downlink(table: TurbulenceTable, path: SlantPath, receives: Receives) -> Tur
         table: The mission's table on turbulence.
         path: The path.
         receives: What takes the light.
-
-    Raises:
-        LinkError: For turbulence beyond a closed form.
     """
     down = Downlink(path)
-    index = _index(lambda: down.index(receives.diameter_m), path)
+    index = max(down.index(receives.diameter_m), _NO_INDEX)
     doubts = list(path.regimes)
     wavefront, doubt = _wavefront_db(table, path, receives)
     doubts += [doubt] if doubt else []
@@ -149,12 +138,9 @@ def uplink(table: TurbulenceTable, path: SlantPath, half_angle_rad: float, point
         path: The path.
         half_angle_rad: Half angle of the beam at 1/e2 of intensity without turbulence (rad).
         point_ahead_rad: By how far the beam leads the light that the station's adaptive optics measures (rad).
-
-    Raises:
-        LinkError: For turbulence beyond a closed form.
     """
     up = Uplink(path, path.wavelength_m / (math.pi * half_angle_rad))
-    index, doubts = _index(up.index, path), list(path.regimes)
+    index, doubts = max(up.index(), _NO_INDEX), list(path.regimes)
     spread = up.spread_db
     if table.corrected_modes:
         diameter = math.sqrt(8.0) * up.waist_m
@@ -172,17 +158,6 @@ def uplink(table: TurbulenceTable, path: SlantPath, half_angle_rad: float, point
     if wander > 0.0:
         fades = Wandering(fades, widened**2 / (2.0 * wander**2))
     return Turbulent(UPLINK, path, index, fades, spread_db=spread, wander_rad=wander, doubts=tuple(doubts))
-
-
-def _index(of: Callable[[], float], path: SlantPath) -> float:
-    try:
-        return max(of(), _NO_INDEX)
-    except ValueError as error:
-        degrees = math.degrees(path.elevation_rad)
-        raise LinkError(
-            f"turbulence on the path at {degrees:.3g} deg of elevation: {error}; give a higher elevation or mask, "
-            "or a weaker channel.turbulence"
-        ) from None
 
 
 def _law(table: TurbulenceTable, index: float) -> Fades:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from microrad.core.arrays import Floats
+from microrad.core.errors import MicroradError
 from microrad.link import coupling, gains, receivers
 from microrad.link.beams import GaussianFall, LitAperture
 from microrad.link.budget import air
@@ -35,6 +36,12 @@ RAREST = 1e-16
 """Share of the time below which an outage is none that is told from it."""
 SLOWEST_BIT_S = 1.0
 """Data rate from which on a link is one."""
+
+
+class LinkError(MicroradError):
+    """A question to which this link has no answer; the message says by how many decibels."""
+
+    page = "link"
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,9 +97,6 @@ class Shared:
             sender: The terminal that it leaves, "leo" or "geo".
             half_angle_rad: Its half angle at 1/e2 of intensity (rad).
             end: What takes the light in the focus; None where it takes all.
-
-        Raises:
-            LinkError: For turbulence beyond a closed form.
         """
         sky = self.sky
         slant = None if sky is None else sky.slant(beam.wavelength_m, self.range_m(beam))
@@ -261,9 +265,6 @@ def at_elevation(data: DataLink, elevation_rad: float) -> DataLink:
     Args:
         data: The communication link, with a station and an altitude.
         elevation_rad: The elevation (rad).
-
-    Raises:
-        LinkError: For turbulence beyond a closed form.
     """
     assert data.shared.path is not None  # there is a station
     shared = replace(data.shared, path=data.shared.path.at(elevation_rad))

@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike
 from microrad.core.arrays import Floats
 from microrad.core.units import format_quantity
 from microrad.link import gains
-from microrad.link.budget.air import LinkError
 from microrad.link.budget.assembly import (
     SLOWEST_BIT_S,
     DataLink,
+    LinkError,
     assembled,
     at_elevation,
     check_grid,
@@ -71,9 +71,6 @@ def farther_db(data: DataLink, range_m: ArrayLike) -> Floats:
     Args:
         data: The communication link.
         range_m: Ranges (m), any shape.
-
-    Raises:
-        LinkError: For turbulence beyond a closed form.
     """
     distance, path = np.asarray(range_m, dtype=np.float64), data.shared.path
     farther: Floats = 20.0 * np.log10(distance / data.range_m)

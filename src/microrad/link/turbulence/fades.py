@@ -2,7 +2,9 @@
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Annotated
 
 import numpy as np
@@ -12,6 +14,9 @@ from microrad.core.arrays import Floats
 from microrad.mission.fields import Bounded, Quantity, Share
 
 _LEAST_VARIANCE = 1e-12
+_NOTHING = 45.0  # exponent of a density of which nothing is left
+_SCALES, _MOST_SCALES, _POINTS = 120, 4000, 400  # of the wider scale, and of the spline
+_LEAST_SHARE = 1e-18
 _EDGES = (0.0, 1.0, 3.0, 6.0, 12.0, 25.0, 50.0)  # of -ln U: beyond lies 2e-22 of the time
 
 
@@ -129,18 +134,38 @@ class GammaGamma(Fades):
         return 1.0 / self.large + 1.0 / self.small + 1.0 / (self.large * self.small)
 
     def below(self, power: ArrayLike) -> Floats:
-        """See `Fades.below`: the mean of the one scale's law over the other, by equal steps of its logarithm."""
-        from scipy.special import gammainc, gammaln
+        """See `Fades.below`: by a spline of the logarithm, and a power law where it is below 1e-18."""
+        low, high, spline = _gamma_gamma(*sorted((self.large, self.small)))
+        with np.errstate(divide="ignore"):
+            log = np.log(np.asarray(power, dtype=np.float64))
+        inside = spline(np.clip(log, low, high)) + min(self.large, self.small) * np.minimum(log - low, 0.0)
+        return np.asarray(np.minimum(np.exp(inside), 1.0))
 
-        # that of the wider one, where the integrand is smooth
-        wide, narrow = sorted((self.large, self.small))
-        spread = math.sqrt(math.log1p(1.0 / wide)) + 1.0 / wide
-        log = np.linspace(-14.0 * spread - 4.0, math.log(60.0 / wide + 8.0), 4001)
-        density = np.exp(wide * (math.log(wide) + log) - wide * np.exp(log) - gammaln(wide))
-        weight = density * (log[1] - log[0])
-        at = np.asarray(power, dtype=np.float64)
-        share = gammainc(narrow, narrow * np.multiply.outer(at, np.exp(-log)))
-        return np.asarray(share @ (weight / np.sum(weight)))
+
+@lru_cache(maxsize=256)  # most inputs of a link leave its fades alone
+def _gamma_gamma(wide: float, narrow: float) -> tuple[float, float, Callable[[Floats], Floats]]:
+    """Logarithms of the power from and to, and the logarithm of the share below it as a spline over that.
+
+    The share is the mean of the narrower scale's law over the wider one, by equal steps of the logarithm, which is as
+    exact as the integrand is smooth.
+    """
+    from scipy.interpolate import CubicSpline
+    from scipy.optimize import brentq
+    from scipy.special import gammainc, gammaln
+
+    def falls(log: float) -> float:
+        return wide * (math.expm1(log) - log) - _NOTHING
+
+    edges = brentq(falls, -_NOTHING / wide - 2.0, 0.0), brentq(falls, 0.0, math.log(_NOTHING / wide + 2.0) + 2.0)
+    steps = 3.0 * math.sqrt(narrow) * (edges[1] - edges[0])  # the narrower law is a step as wide as 1 / sqrt(narrow)
+    scale = np.linspace(*edges, min(max(_SCALES, int(steps)), _MOST_SCALES))
+    density = np.exp(wide * (math.log(wide) + scale) - wide * np.exp(scale) - gammaln(wide))
+    weight = density / np.sum(density)
+    spread = math.sqrt(math.log1p(1.0 / wide) + math.log1p(1.0 / narrow))
+    log = np.linspace(-42.0 / wide - 9.0 * spread, 9.5 * spread, _POINTS)
+    share = gammainc(narrow, narrow * np.exp(np.subtract.outer(log, scale))) @ weight
+    there = share > _LEAST_SHARE
+    return float(log[there][0]), float(log[-1]), CubicSpline(log[there], np.log(share[there]))
 
 
 @dataclass(frozen=True, slots=True)

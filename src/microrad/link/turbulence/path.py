@@ -29,13 +29,13 @@ WEAK = 0.3
 LOWEST_RAD = math.radians(20.0)
 """Elevation down to which flat air and weak turbulence hold as a rule."""
 
-_RYTOV = 8.7019  # 4 pi^2 0.033 |Gamma(-5/6)|
+_SPECTRUM = 0.033
+_RYTOV = 4.0 * math.pi**2 * _SPECTRUM * 1.2 * math.gamma(1.0 / 6.0)  # |Gamma(-5/6)| is 6/5 Gamma(1/6)
 _PHASE = 0.423  # of Fried's parameter, and ...
 _ANGLE = 2.914  # ... of the isoplanatic angle
 _GREENWOOD = 0.1022
 _ZERNIKE, _GRADIENT = 0.18164, 0.16997  # of (lambda / D)^2 (D / r0)^(5/3), about one axis
 _WANDER: dict[str, float] = {"dios-2004": 2.07, "andrews-phillips-2005": 7.25}
-_SPECTRUM = 0.033
 _ACROSS = (1e-5, 60.0, 601)  # of the table of the angle of arrival: pi D f / v from, to, and how many
 
 
@@ -107,8 +107,8 @@ class SlantPath(Bounded):
         if self.rytov > WEAK:
             kind = "strong" if self.rytov > 1.0 else "moderate"
             said.append(
-                f"{kind} turbulence: the Rytov variance is {self.rytov:.3g}; the indices of apertures and beams are "
-                f"those of weak turbulence, up to {WEAK:g}"
+                f"{kind} turbulence: the Rytov variance is {self.rytov:.3g}, above {WEAK:g}; an index is that for any "
+                "strength (Andrews and Phillips), but spread and wander are those of weak turbulence"
             )
         if self.elevation_rad < LOWEST_RAD:
             low, least = (f"{math.degrees(each):.3g} deg" for each in (self.elevation_rad, LOWEST_RAD))
@@ -141,8 +141,8 @@ class Downlink(_OnPath):
         """Fades at a point, from weak to strong turbulence."""
         return GammaGamma.of_plane_wave(self.path.rytov)
 
-    def index(self, diameter_m: float) -> float:
-        """Scintillation index of the power in an aperture, in weak turbulence.
+    def variance(self, diameter_m: float) -> float:
+        """Variance of the logarithm of the power in an aperture, by the theory of weak turbulence.
 
         The aperture is taken as Gaussian of the same area's filter, exp(-(kappa D)^2 / 16) (Andrews and Phillips 2005,
         chapter 12).
@@ -151,12 +151,23 @@ class Downlink(_OnPath):
             diameter_m: Diameter D (m), 0 for a point.
 
         Raises:
-            ValueError: For a negative diameter, and an index above 1.
+            ValueError: For a negative diameter.
         """
         Quantity("m", least=0.0).check("the aperture", diameter_m)
         _, distance, strength = self.path.layers()
         damping = np.full(distance.shape, diameter_m**2 / 16.0)
-        return _weak(float(strength @ self._closed(damping, distance / self.path.wavenumber)))
+        return float(strength @ self._closed(damping, distance / self.path.wavenumber))
+
+    def index(self, diameter_m: float) -> float:
+        """Scintillation index of the power in an aperture, from weak to strong turbulence: `saturated` of its variance.
+
+        Args:
+            diameter_m: Diameter D (m), 0 for a point.
+
+        Raises:
+            ValueError: For a negative diameter.
+        """
+        return saturated(self.variance(diameter_m), 1.11)
 
     def arrival_rms_rad(self, diameter_m: float, tilt: Tilt = "zernike") -> float:
         """Angle of arrival in an aperture about one axis, rms (rad).
@@ -237,8 +248,12 @@ class Uplink(_OnPath, Bounded):
         widened = (math.sqrt(8.0) * self.waist_m / self.path.fried_m) ** (5.0 / 3.0)
         return 12.0 * math.log10(1.0 + widened)
 
-    def index(self, off_axis: float = 0.0) -> float:
-        """Scintillation index at the satellite in weak turbulence, for a beam that does not wander.
+    def index(self) -> float:
+        """Scintillation index on the axis, from weak to strong turbulence: `saturated` of its variance."""
+        return saturated(self.variance(), 0.56 * (1.0 + 1.0 / (1.0 + self._fresnel**2)))
+
+    def variance(self, off_axis: float = 0.0) -> float:
+        """Variance of the logarithm of the intensity at the satellite in weak turbulence, of a beam without wander.
 
         With Lambda and Theta of the beam at the satellite and xi = 1 - z / L the exponents are a = Lambda L xi^2 / k
         and b = L xi (1 - (1 - Theta) xi) / k; off the axis by r the index grows by 8.70 k^2 times the integral of Cn2
@@ -248,7 +263,7 @@ class Uplink(_OnPath, Bounded):
             off_axis: How far the satellite is off the axis, over the beam's radius there.
 
         Raises:
-            ValueError: For a negative distance, and an index above 1.
+            ValueError: For a negative distance.
         """
         from scipy.special import hyp1f1
 
@@ -266,7 +281,7 @@ class Uplink(_OnPath, Bounded):
             * float(strength @ damping ** (5.0 / 6.0))
             * (1.0 - hyp1f1(-5.0 / 6.0, 1.0, 2.0 * off_axis**2))
         )
-        return _weak(float(variance + more))
+        return float(variance + more)
 
     def wander_rms_rad(self, convention: Wander) -> float:
         """How far the beam's middle wanders, radial rms angle as seen from the station (rad).
@@ -299,11 +314,19 @@ class Uplink(_OnPath, Bounded):
         return float((point_ahead_rad / self.path.isoplanatic_rad) ** (5.0 / 3.0))
 
 
-def _weak(index: float) -> float:
-    """An index; refused where weak turbulence gives more than there can be in it."""
-    if index > 1.0:
-        raise ValueError(f"a scintillation index of {index:.3g}, above 1: the closed form is that of weak turbulence")
-    return index
+def saturated(variance: float, large: float) -> float:
+    """Scintillation index from weak to strong turbulence, of the variance that the theory of weak turbulence has.
+
+    exp(0.49 s / (1 + c s^(6/5))^(7/6) + 0.51 s / (1 + 0.69 s^(6/5))^(5/6)) - 1, s the variance (Andrews and Phillips
+    2005, chapter 12): it is s where turbulence is weak, and falls towards 1 where it is strong.
+
+    Args:
+        variance: The variance s.
+        large: The constant c of the large scales: 1.11 of a plane wave, 0.56 (1 + Theta) of an uplink.
+    """
+    root = math.pow(variance, 1.2)
+    of_large = 0.49 * variance / math.pow(1.0 + large * root, 7.0 / 6.0)
+    return math.expm1(of_large + 0.51 * variance / math.pow(1.0 + 0.69 * root, 5.0 / 6.0))
 
 
 def _known(what: str, name: str, names: tuple[str, ...]) -> None:

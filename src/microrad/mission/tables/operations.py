@@ -7,12 +7,15 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from microrad.core.units import format_quantity
-from microrad.mission.fields import Problem, Quantity, Several, Table, Whole
+from microrad.mission.fields import Monthly, Problem, Quantity, Several, Table, Whole
 from microrad.mission.tables.mirror import Name
 from microrad.mission.tables.orbit import HIGHEST_MASK_RAD, Seconds
 
 DataRate = Annotated[float, Quantity("bit/s", "Mbit/s", above=0.0)]
+Availability = Annotated[tuple[float, ...], Monthly(Quantity("", least=0.0, most=1.0))]
 Longitude = Annotated[float, Quantity("rad", "deg", least=-math.pi, most=2.0 * math.pi)]
+MOST_SITES = 100
+"""Stations of an optical network; the work grows as the square of their number."""
 
 
 class StationTable(Table):
@@ -44,6 +47,41 @@ class Downlink(Table):
         """At least one station."""
         if not self.stations:
             yield Problem("stations", "holds no station", "a table such as [operations.downlink.stations.kiruna]")
+
+
+class OpticalStationTable(StationTable):
+    """A ground station with a telescope, of the optical downlink."""
+
+    availability: Availability = Field(description="share of the time without clouds, one number or twelve by month")
+
+
+class OpticalDownlink(Table):
+    """The optical downlink that the relay is set against: one station at a time, of those without clouds."""
+
+    data_rate_bit_s: DataRate = Field(description="from the satellite to the ground, above the mask of a clear station")
+    setup_s: Seconds = Field(description="from when a station takes over until data flow")
+    delay_s: Seconds = Field(description="from the station to the user")
+    weather_s: Annotated[float, Quantity("s", "h", above=0.0, most=31536000.0)] = Field(
+        description="how long clouds or a clear sky last: they are drawn anew after each such time"
+    )
+    correlation_length_m: Annotated[float, Quantity("m", "km", least=0.0, most=1e8)] = Field(
+        description="of clouds: two sites are correlated by exp(-distance / length); 0 km: independent"
+    )
+    stations: dict[str, OpticalStationTable] = Field(
+        description="one table for each, [operations.optical.stations.NAME]"
+    )
+
+    def __hash__(self) -> int:
+        """Of what is in it, in its order."""
+        own = (getattr(self, name) for name in type(self).model_fields if name != "stations")
+        return hash((*own, tuple(self.stations.items())))
+
+    def problems(self) -> Iterator[Problem]:
+        """At least one station, and no more than a joint distribution is made for."""
+        if not self.stations:
+            yield Problem("stations", "holds no station", "a table such as [operations.optical.stations.tenerife]")
+        if len(self.stations) > MOST_SITES:
+            yield Problem("stations", f"holds {len(self.stations)} stations", f"at most {MOST_SITES}")
 
 
 class ContactTable(Table):
@@ -89,9 +127,10 @@ class Operations(Table):
         description="of the span, each with acquisitions drawn"
     )
     seed: Annotated[int, Whole("", least=0, most=2**63 - 1)] = Field(
-        description="of the random numbers of acquisitions and outages"
+        description="of the random numbers of acquisitions, outages and weather"
     )
     downlink: Downlink | None = None
+    optical: OpticalDownlink | None = None
     contact: ContactTable | None = None
 
 
@@ -101,8 +140,20 @@ class RelayTable(Table):
     longitude_rad: Longitude = Field(description="of its slot, east positive")
 
 
+class SharedStationTable(StationTable):
+    """A ground station that the satellites of the constellation share beside the relays."""
+
+    data_rate_bit_s: DataRate = Field(description="from a satellite to the ground, above the mask")
+    terminals: Annotated[int, Whole("", least=1, most=100)] = Field(
+        description="of this station, each serves one satellite at a time"
+    )
+    availability: Availability = Field(
+        description="share of the time in which it can be used, one number or twelve by month; a factor on its volumes"
+    )
+
+
 class Constellation(Table):
-    """Many satellites that share some relays."""
+    """Many satellites that share some relays and ground stations."""
 
     pattern: Literal["delta", "star", "file"] = Field(
         description="delta, star: Walker's patterns around orbit.leo (circular or keplerian), nodes over 360 or "
@@ -127,17 +178,20 @@ class Constellation(Table):
     )
     shortest_s: Seconds = Field(description="session that is worth its overhead")
     relays: dict[str, RelayTable] = Field(description="one table for each, [constellation.relays.NAME]")
+    stations: dict[str, SharedStationTable] = Field(
+        default={}, description="one table for each, [constellation.stations.NAME]; none: relays alone"
+    )
 
     def __hash__(self) -> int:
         """Of what is in it, in its order."""
-        own = (getattr(self, name) for name in type(self).model_fields if name != "relays")
-        return hash((*own, tuple(self.relays.items())))
+        own = (getattr(self, name) for name in type(self).model_fields if name not in ("relays", "stations"))
+        return hash((*own, tuple(self.relays.items()), tuple(self.stations.items())))
 
     def problems(self) -> Iterator[Problem]:
         """The keys of the pattern, and no others; planes that divide the satellites."""
         from_file = self.pattern == "file"
         needed = {"file": '"satellites.tle"'} if from_file else {"satellites": "1", "planes": "1", "phasing": "1"}
-        yield from self.choice_problems(f'pattern = "{self.pattern}"', needed)
+        yield from self.choice_problems(f'pattern = "{self.pattern}"', needed, ("stations",))
         if self.satellites and self.planes and self.satellites % self.planes:
             yield Problem("planes", f"does not divide satellites = {self.satellites}", "a divisor of it")
         if self.planes and self.phasing is not None and self.phasing >= self.planes:
@@ -149,3 +203,6 @@ class Constellation(Table):
             yield Problem("session", "is below shortest", f"at least {format_quantity(self.shortest_s, 's')}")
         if not self.relays:
             yield Problem("relays", "holds no relay", "a table such as [constellation.relays.east]")
+        for name in self.stations:
+            if name in self.relays:
+                yield Problem(f"stations.{name}", "is the name of a relay, too", "a name of its own")

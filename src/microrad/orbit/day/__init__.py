@@ -1,4 +1,4 @@
-"""What a link delivers in a day: contacts, acquisition, rates, volume and latency, by relay and by direct downlink."""
+"""What a link delivers in a day: contacts, acquisition, rates, volume and latency, by relay and to the ground."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -9,6 +9,7 @@ from microrad.core.units import format_quantity
 from microrad.link.acquisition.partner_search import Found
 from microrad.link.requirement import derived_from
 from microrad.link.study import LinkStudy
+from microrad.mission.file import LinkFile
 from microrad.mission.tables.operations import Operations
 from microrad.orbit import operations
 from microrad.orbit.base import required
@@ -16,6 +17,7 @@ from microrad.orbit.day import flow
 from microrad.orbit.day.assumptions import NOTHING, Case, Known, Numbers, Swing, swings
 from microrad.orbit.day.flow import Closing, PointingLoss, Way
 from microrad.orbit.day.geometry import Encounter, View, beyond_the_mission, encounter, short_tail, times, view
+from microrad.orbit.day.optical import Sky, optical, optical_passes, sky
 
 __all__ = [
     "NOTHING",
@@ -24,10 +26,12 @@ __all__ = [
     "Encounter",
     "Numbers",
     "PointingLoss",
+    "Sky",
     "Swing",
     "Way",
     "given_loss",
     "loss_at",
+    "optical_alone",
     "relay",
     "run_day_study",
     "times",
@@ -37,12 +41,13 @@ __all__ = [
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DayStudy:
-    """The span of a mission by both ways, and the assumptions that move the comparison, the weightiest first.
+    """The span of a mission by its ways, and the assumptions that move the comparison, the weightiest first.
 
     ``operations`` is the mission's table, ``data`` its communication link. ``encounters`` are the contacts of the relay
     as it grants them, with what their line of sight reaches. ``closings`` are the laser's rates, highest first, with
     how far each reaches under ``loss``; ``derived`` are the inputs of the laser link that were chosen for its margin
-    (`requirement.derived_from`), so that its reach follows from that choice.
+    (`requirement.derived_from`), so that its reach follows from that choice. ``direct`` is the radio downlink and
+    ``optical`` that by optical ground stations under the ``sky``; each is None in a mission without it.
     """
 
     operations: Operations
@@ -54,6 +59,8 @@ class DayStudy:
     derived: tuple[str, ...]
     relay: Way
     direct: Way | None
+    optical: Way | None
+    sky: Sky | None
     swings: tuple[Swing, ...]
     warnings: tuple[str, ...]
 
@@ -61,6 +68,16 @@ class DayStudy:
     def ratio(self) -> float:
         """Volume that the relay could carry over that of the direct downlink (`flow.ratio`); nan without one."""
         return float("nan") if self.direct is None else flow.ratio(self.relay.capacity_bit, self.direct.capacity_bit)
+
+    @property
+    def optical_ratio(self) -> float:
+        """Volume that the relay could carry over that of the optical downlink (`flow.ratio`); nan without one."""
+        return float("nan") if self.optical is None else flow.ratio(self.relay.capacity_bit, self.optical.capacity_bit)
+
+    @property
+    def ways(self) -> tuple[Way, ...]:
+        """The relay, and the ways to the ground that the mission has."""
+        return tuple(way for way in (self.relay, self.direct, self.optical) if way is not None)
 
 
 def given_loss(links: LinkStudy) -> PointingLoss:
@@ -103,6 +120,22 @@ def relay(links: LinkStudy, loss: PointingLoss) -> Way:
     return flow.relay(o, seen, flow.rate_table(flow.closings(o, links.data, loss)), loss.outage, found, 1.0)
 
 
+def optical_alone(file: LinkFile) -> Way | None:
+    """The way by the optical downlink alone: what `run_day_study` finds of it; None in a mission without one.
+
+    Args:
+        file: The mission, with the files that it names.
+
+    Raises:
+        OrbitError: Without the table `orbit`, and for orbits that do not hold.
+        OperationsError: Without the table `operations`.
+    """
+    m = file.mission
+    pair = orbit.pair(m.orbit, m.terminals, file.path.parent, file.contents)
+    o = required(m.operations, "operations", operations.OperationsError)
+    return optical(o, pair, optical_passes(o.optical, pair))
+
+
 def run_day_study(
     links: LinkStudy, loss: PointingLoss | None = None, on_progress: Progress = lambda done, total, what: None
 ) -> DayStudy:
@@ -126,10 +159,10 @@ def run_day_study(
             "a number up to that, or a longer orbit.duration"
         )
     closing = flow.closings(o, links.data, loss)
-    heard = flow.station_passes(o.downlink, seen.pair)
+    heard, lit = flow.station_passes(o.downlink, seen.pair), optical_passes(o.optical, seen.pair)
     relay = flow.relay(o, seen, flow.rate_table(closing), loss.outage, found, 1.0)
     assert m.orbit is not None  # else there are no terminals
-    known = Known(Case(o, m.orbit, links.data, loss), pair_of, seen, heard, found)
+    known = Known(Case(o, m.orbit, links.data, loss), pair_of, seen, heard, found, lit)
     return DayStudy(
         operations=o,
         data=links.data,
@@ -140,6 +173,8 @@ def run_day_study(
         encounters=tuple(encounter(seen.pair, contact, m.communication.wavelength_m) for contact in relay.contacts),
         relay=relay,
         direct=flow.direct(o, seen, heard),
+        optical=optical(o, seen.pair, lit),
+        sky=sky(o, seen.pair),
         swings=swings(known, on_progress),
         warnings=(*beyond_the_mission(m, seen), *short_tail(seen.pair)),
     )

@@ -1,28 +1,33 @@
 """Which assumption moves the comparison of relay and direct downlink most: each one changed alone."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 
 from microrad import link, orbit
 from microrad.core.units import format_quantity
 from microrad.link.acquisition.partner_search import Found
-from microrad.mission.tables.operations import Operations
+from microrad.mission.tables.operations import Downlink, Operations, OpticalDownlink
 from microrad.mission.tables.orbit import HIGHEST_MASK_RAD, Orbits, VisibilityLimits
 from microrad.orbit.day import flow, geometry
+from microrad.orbit.day.optical import OpticalPass, optical, optical_passes
 
+_SKIES = 20  # drawn for each case: the same ones for all of them
 _RUNS = 4  # of each case: what an acquisition takes is little beside what is varied
+_CLOUDS_M = 500e3  # a correlation length for a mission that has none
 NOTHING = "as it is"
 
 
 @dataclass(frozen=True, slots=True)
 class Numbers:
-    """What one case comes to; nan for the direct downlink of a mission that has none."""
+    """What one case comes to; nan for a downlink that the mission does not have."""
 
     relay_bit: float
     direct_bit: float
     relay_slow_s: float
     direct_slow_s: float
+    optical_bit: float = math.nan
+    optical_slow_s: float = math.nan
 
     @property
     def ratio(self) -> float:
@@ -46,15 +51,31 @@ class Swing:
 
     @property
     def factor(self) -> float:
-        """Largest over smallest ratio of the volumes, as it is and at both sides.
+        """The larger of `of_relay` and `of_optical`."""
+        return max(self.of_relay, self.of_optical)
+
+    @property
+    def of_relay(self) -> float:
+        """Largest over smallest ratio of relay and direct downlink, as it is and at both sides.
 
         Without a direct downlink, and where that carries nothing in any case, it is the relay's volume that counts.
         Infinite where one of them is nothing.
         """
         every = self.here, self.at_low, self.at_high
         alone = not any(n.direct_bit > 0.0 for n in every)
-        low, *_, high = sorted(n.relay_bit if alone else n.ratio for n in every)
-        return 1.0 if low == high else high / low if low > 0.0 else math.inf
+        return _spread(n.relay_bit if alone else n.ratio for n in every)
+
+    @property
+    def of_optical(self) -> float:
+        """Largest over smallest volume of the optical downlink, likewise; 1 without one."""
+        every = self.here, self.at_low, self.at_high
+        return 1.0 if math.isnan(self.here.optical_bit) else _spread(n.optical_bit for n in every)
+
+
+def _spread(values: Iterable[float]) -> float:
+    """Largest over smallest; infinite where the smallest is nothing."""
+    low, *_, high = sorted(values)
+    return 1.0 if low == high else high / low if low > 0.0 else math.inf
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,13 +91,19 @@ class Case:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Known:
-    """What holds for every case with the same orbits and stations as the ``own`` one: contacts, passes, acquisition."""
+    """What holds for every case with the same orbits and stations as the ``own`` one: contacts, passes, acquisition.
+
+    ``weather_runs`` is how many skies are drawn for a case, and ``optical`` what its own optical downlink comes to.
+    """
 
     own: Case
     pair_of: Callable[[Orbits], orbit.Pair]
     seen: geometry.View
     heard: tuple[flow.StationPass, ...]
     found: Found | None
+    lit: tuple[OpticalPass, ...] = ()
+    weather_runs: int = 1
+    optical: tuple[float, float] | None = None
 
 
 def numbers(case: Case, known: Known) -> Numbers:
@@ -100,9 +127,23 @@ def numbers(case: Case, known: Known) -> Numbers:
     rates = flow.rate_table(flow.closings(o, case.data, case.loss))
     relay = flow.relay(o, seen, rates, case.loss.outage, known.found, case.slower)
     direct = flow.direct(o, seen, heard)
-    if direct is None:
-        return Numbers(relay.capacity_bit, math.nan, relay.slow_s, math.nan)
-    return Numbers(relay.capacity_bit, direct.capacity_bit, relay.slow_s, direct.slow_s)
+    radio = (math.nan, math.nan) if direct is None else (direct.capacity_bit, direct.slow_s)
+    return Numbers(relay.capacity_bit, radio[0], relay.slow_s, radio[1], *_by_optical(case, known, seen, moved))
+
+
+def _by_optical(case: Case, known: Known, seen: geometry.View, moved: bool) -> tuple[float, float]:
+    """Volume and slow latency of the optical downlink; those of the mission's own case where it sees no difference."""
+    o, own = case.operations, known.own.operations
+    if o.optical is None or own.optical is None:
+        return math.nan, math.nan
+    same = o.optical is own.optical and o.instrument_rate_bit_s == own.instrument_rate_bit_s and not moved
+    if same and known.optical is not None:
+        return known.optical
+    there = not moved and o.optical.stations is own.optical.stations
+    passes = known.lit if there else optical_passes(o.optical, seen.pair)
+    way = optical(o.with_value("runs", known.weather_runs), seen.pair, passes)
+    assert way is not None  # the mission has the table
+    return way.capacity_bit, way.slow_s
 
 
 def swings(known: Known, on_progress: Callable[[int, int, str], None]) -> tuple[Swing, ...]:
@@ -110,8 +151,10 @@ def swings(known: Known, on_progress: Callable[[int, int, str], None]) -> tuple[
 
     Data rates and the time of acquisition are halved and doubled, the margin, the grazing height and the masks go to 0
     and to twice, the pointing loss to 0 and 3 dB up, the altitude a fifth down and up; attitude, eclipse, local time,
-    stations and what the relay grants are replaced. An orbit from a file stays as it is. A change that would leave no
-    orbit is not made: one that decays, or lies below the surface that lines of sight must clear.
+    stations and what the relay grants are replaced; the sky over the optical stations is half as often clear and free
+    of clouds, its correlation none and twice, one of its stations is left out, each with the same numbers drawn. An
+    orbit from a file stays as it is. A change that would leave no orbit is not made: one that decays, or lies below the
+    surface that lines of sight must clear.
 
     Args:
         known: The mission's own case with its contacts, passes and acquisition.
@@ -119,8 +162,9 @@ def swings(known: Known, on_progress: Callable[[int, int, str], None]) -> tuple[
     """
     o = known.own.operations
     own = replace(known.own, operations=o.with_value("runs", min(o.runs, _RUNS)))
-    known = replace(known, own=own)
+    known = replace(known, own=own, weather_runs=min(o.runs, _SKIES))
     here = numbers(own, known)
+    known = replace(known, optical=(here.optical_bit, here.optical_slow_s))
 
     def end(side: _Side) -> tuple[str, Numbers]:
         try:
@@ -186,10 +230,19 @@ def _changes(own: Case, found: Found | None) -> Iterator[tuple[str, _Side, _Side
             later = orbiting("6 h later", "leo.local_time_s", (leo.local_time_s + 21600.0) % 86400.0)
             yield "local time of the node", later, None
     yield scaled("instrument data rate", operated, "instrument_rate_bit_s", o.instrument_rate_bit_s, "bit/s")
-    if o.downlink is None:
-        return
-    yield scaled("radio data rate", operated, "downlink.data_rate_bit_s", o.downlink.data_rate_bit_s, "bit/s")
-    given, key = o.downlink.stations, "downlink.stations"
+    if o.downlink is not None:
+        yield from _of_radio(o.downlink, operated, scaled)
+    if o.optical is not None:
+        yield from _of_optical(o.optical, operated, scaled)
+
+
+_Scaled = Callable[..., tuple[str, _Side, _Side]]
+
+
+def _of_radio(down: Downlink, operated: _Edit, scaled: _Scaled) -> Iterator[tuple[str, _Side, _Side]]:
+    """The assumptions of the radio downlink."""
+    yield scaled("radio data rate", operated, "downlink.data_rate_bit_s", down.data_rate_bit_s, "bit/s")
+    given, key = down.stations, "downlink.stations"
     name, first = next(iter(given.items()))
     across = first.longitude_rad - math.copysign(math.pi, first.longitude_rad)
     opposite = first.model_copy(update={"latitude_rad": -first.latitude_rad, "longitude_rad": across})
@@ -201,6 +254,34 @@ def _changes(own: Case, found: Found | None) -> Iterator[tuple[str, _Side, _Side
         for factor in (0.0, 2.0)
     ]
     yield "elevation mask", operated("0 deg", key, masks[0]), operated("twice", key, masks[1])
+
+
+def _of_optical(down: OpticalDownlink, operated: _Edit, scaled: _Scaled) -> Iterator[tuple[str, _Side, _Side]]:
+    """The assumptions of the optical downlink."""
+    yield scaled("optical data rate to ground", operated, "optical.data_rate_bit_s", down.data_rate_bit_s, "bit/s")
+    given, key = down.stations, "optical.stations"
+
+    def sky(text: str, factor: float, at_least: float = 0.0) -> tuple[str, Case]:
+        made = {
+            n: s.with_value("availability", tuple(max(factor * a, at_least) for a in s.availability))
+            for n, s in given.items()
+        }
+        return operated(text, key, made)
+
+    yield "availability of the optical stations", sky("half", 0.5), sky("no clouds", 1.0, 1.0)
+    if len(given) > 1:
+        length = "optical.correlation_length_m"
+        alone = operated("none", length, 0.0) if down.correlation_length_m else None
+        twice = 2.0 * down.correlation_length_m or _CLOUDS_M
+        yield "correlation length of clouds", alone, operated(format_quantity(twice, "m", 3), length, twice)
+        name = next(iter(given))
+        fewer = operated(f"without {name}", key, {n: s for n, s in given.items() if n != name})
+        yield "optical ground stations", fewer, None
+    shorter, longer = (
+        operated(f"{factor * down.weather_s / 3600.0:.3g} h", "optical.weather_s", factor * down.weather_s)
+        for factor in (0.5, 2.0)
+    )
+    yield "time that weather holds", shorter, longer
 
 
 def _held(own: VisibilityLimits | None) -> VisibilityLimits:

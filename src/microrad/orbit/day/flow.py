@@ -1,7 +1,7 @@
 """From contacts to data: rates that the link closes at, acquisitions drawn, the store, volumes and latencies."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -237,16 +237,32 @@ def direct(o: Operations, seen: View, passes: tuple[StationPass, ...]) -> Way | 
     down = o.downlink
     if down is None:
         return None
-    kept, names, services, until = [], [], [], -math.inf
-    for each, name in sorted(passes, key=lambda item: (item[0].start_s, item[0].end_s)):
-        start, begins = max(each.start_s, until), each.begins if each.start_s >= until else "station free"
-        if each.end_s > start:
-            kept.append(replace(each, start_s=start, begins=begins))
-            names.append(name)
-            whole = operations.Service(np.array([start, each.end_s]), np.array([down.data_rate_bit_s]), 1.0)
-            services.append(whole.locked_at(start + down.setup_s))
-            until = each.end_s
+    kept, names, services = [], [], []
+    for start, end, place in one_at_a_time((each.start_s, each.end_s, k) for k, (each, _) in enumerate(passes)):
+        each, name = passes[place]
+        begins = each.begins if start == each.start_s else "station free"
+        kept.append(replace(each, start_s=start, begins=begins))
+        names.append(name)
+        whole = operations.Service(np.array([start, end]), np.array([down.data_rate_bit_s]), 1.0)
+        services.append(whole.locked_at(start + down.setup_s))
     return _way(DIRECT, tuple(kept), tuple(names), [services], o, seen, down.delay_s, 0.0)
+
+
+def one_at_a_time(spans: Iterable[tuple[float, float, int]]) -> list[tuple[float, float, int]]:
+    """The spans that are used where only one can be at a time: the first to begin is kept to its end.
+
+    At its end the one that began first among those that last longer takes over, for what is left of it.
+
+    Args:
+        spans: Start and end in s of each, and a number that tells it apart; in any order.
+    """
+    kept, until = [], -math.inf
+    for start, end, which in sorted(spans):
+        begin = max(start, until)
+        if end > begin:
+            kept.append((begin, end, which))
+            until = end
+    return kept
 
 
 # ----------------------------------------------------------------------------------------------------------------- way
@@ -260,23 +276,74 @@ def _way(
     delay_s: float,
     failed: float,
 ) -> Way:
-    span, whole = seen.pair.span_s, seen.pair.whole_s
-    histories = [
-        operations.deliver(o.instrument_rate_bit_s, span, o.store_bit, services, whole, delay_s) for services in runs
-    ]
-    inside = _of_span(contacts, seen)
-    before = [
-        [float(np.dot(s.mean_rate_bit_s, np.diff(np.minimum(s.edges_s, span[1])))) for s in services[:inside]]
-        for services in runs
-    ]  # what each contact could carry before the end of the span
-    carried = np.array(before).reshape(len(runs), -1)
-    total, shown = carried.sum(axis=1), tuple(cut_at(c, span[1]) for c in contacts[:inside])
-    return Way(
+    end_s, inside = seen.pair.span_s[1], _of_span(contacts, seen)
+    shown = tuple(cut_at(c, end_s) for c in contacts[:inside])
+    return way_of(
         name=name,
         contacts=shown,
         stations=stations[:inside],
         contact_s=sum(c.duration_s for c in shown),
         gap_s=longest_gap_s(contacts, seen.pair),
+        carried=np.array([[carried_bit(s, end_s) for s in services[:inside]] for services in runs]),
+        histories=[history(o, seen.pair, services, delay_s) for services in runs],
+        failed=failed,
+    )
+
+
+def carried_bit(service: operations.Service, end_s: float) -> float:
+    """What a contact could carry before the end of the span, bit.
+
+    Args:
+        service: What the contact carries.
+        end_s: End of the span, s.
+    """
+    return float(np.dot(service.mean_rate_bit_s, np.diff(np.minimum(service.edges_s, end_s))))
+
+
+def history(
+    o: Operations, pair: orbit.Pair, services: Sequence[operations.Service], delay_s: float
+) -> operations.StoreHistory:
+    """The store in one run: the instrument fills it over the span, and contacts empty it to the end of the tail.
+
+    Args:
+        o: The mission's table of operations.
+        pair: The two terminals, for the span and its tail.
+        services: What the contacts carry, in order.
+        delay_s: From the satellite to the user, s.
+    """
+    return operations.deliver(o.instrument_rate_bit_s, pair.span_s, o.store_bit, services, pair.whole_s, delay_s)
+
+
+def way_of(
+    name: str,
+    contacts: tuple[orbit.Contact, ...],
+    stations: tuple[str, ...],
+    contact_s: float,
+    gap_s: float,
+    carried: Floats,
+    histories: Sequence[operations.StoreHistory],
+    failed: float = 0.0,
+) -> Way:
+    """A way down from its runs.
+
+    Args:
+        name: What it is called.
+        contacts: Those of the span, cut at its end.
+        stations: The station of each, where they are passes.
+        contact_s: Time in contact, s.
+        gap_s: Longest time without one, s.
+        carried: What each contact could carry in each run, bit, shape (runs, contacts).
+        histories: The store in each run.
+        failed: Contacts without acquisition, the mean of the runs.
+    """
+    carried = carried.reshape(len(histories), -1)
+    total = carried.sum(axis=1)
+    return Way(
+        name=name,
+        contacts=contacts,
+        stations=stations,
+        contact_s=contact_s,
+        gap_s=gap_s,
         carried_bit=carried.mean(axis=0),
         capacity_bit=float(total.mean()),
         capacity_spread_bit=(float(total.min()), float(total.max())),

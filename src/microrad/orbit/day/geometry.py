@@ -13,7 +13,7 @@ from microrad.core.units import SPEED_OF_LIGHT_M_S, format_quantity
 from microrad.mission.model import LinkMission
 from microrad.orbit.earth.sun import shadow_rad
 from microrad.orbit.from_mission import TAIL_S
-from microrad.orbit.visibility.contacts import EARTH, END, START, coarse_step_s, coarse_times
+from microrad.orbit.visibility.contacts import END, START, coarse_step_s, coarse_times, hidden_by
 from microrad.orbit.visibility.events import positive
 
 _C = TypeVar("_C", bound=orbit.Contact)
@@ -90,7 +90,8 @@ class View:
 
         A contact that the Sun or a limit cuts in two counts once.
         """
-        return sum(EARTH in e.contact.begins or START in e.contact.begins for e in self.encounters)
+        hidden = hidden_by(self.pair.leo, self.pair.geo)
+        return sum(hidden in e.contact.begins or START in e.contact.begins for e in self.encounters)
 
     @property
     def median_s(self) -> float:

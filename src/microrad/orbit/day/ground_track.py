@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from microrad import orbit
 from microrad.core.arrays import Floats
-from microrad.mission.tables.operations import Downlink
+from microrad.mission.tables.operations import Downlink, OpticalDownlink
 from microrad.orbit.day.flow import Way
 from microrad.orbit.day.geometry import View
 
@@ -54,13 +54,16 @@ class GroundTrack:
     stations: tuple[Outline, ...]
 
 
-def ground_track(seen: View, ways: tuple[Way, ...], downlink: Downlink | None) -> GroundTrack:
+def ground_track(
+    seen: View, ways: tuple[Way, ...], downlink: Downlink | None, optical: OpticalDownlink | None = None
+) -> GroundTrack:
     """The track of the mission's satellite over its span, of a day at most.
 
     Args:
         seen: The terminals, and when they see each other.
         ways: The ways down, each shown where it is open.
         downlink: The mission's ground stations; None without any.
+        optical: Its optical ground stations, likewise.
     """
     pair = seen.pair
     time_s = np.arange(0.0, min(seen.duration_s, LONGEST_S), STEP_S)
@@ -73,13 +76,14 @@ def ground_track(seen: View, ways: tuple[Way, ...], downlink: Downlink | None) -
         found[way.name] = np.zeros(time_s.size, dtype=bool)
         for contact in way.contacts:
             found[way.name] |= (contact.start_s <= time_s) & (time_s <= contact.end_s)
+    heard = [station for of in (downlink, optical) if of is not None for station in orbit.stations(of)]
     return GroundTrack(
         time_s=time_s,
         latitude_rad=own.latitude_rad,
         longitude_rad=own.longitude_rad,
         open=found,
         relay=_relay(pair, time_s, turned, height_m),
-        stations=tuple(_station(s, height_m) for s in (() if downlink is None else orbit.stations(downlink))),
+        stations=tuple(_station(s, height_m) for s in heard),
     )
 
 

@@ -38,8 +38,8 @@ _LONGEST_LINE = 200  # characters; ION reads lines of at most 255
 class PlannedSession:
     """A session as it is announced: data flows from `locked_s` to `end_s` at `rate_bit_s`.
 
-    `volume_bit` is the data expected, which may be less than rate times duration (outages, an empty store). The ranges
-    are the smallest and the largest from lock to end.
+    `relay` is the name of a relay or of a ground station. `volume_bit` is the data expected, which may be less than
+    rate times duration (outages, clouds, an empty store). The ranges are the smallest and the largest from lock to end.
     """
 
     satellite: str
@@ -106,7 +106,7 @@ def contact_plan(sessions: Sequence[PlannedSession], utc: Utc, satellites: Seque
         sessions: The sessions, in any order.
         utc: Gives the UTC text of a time in s since the mission's epoch.
         satellites: Names of all satellites, numbered from 1 in this order.
-        relays: Names of all relays, numbered behind the satellites.
+        relays: Names of all relays and ground stations, numbered behind the satellites.
 
     Raises:
         OperationsError: For a session of more than 2^32 - 1 byte/s.

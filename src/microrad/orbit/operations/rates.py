@@ -99,6 +99,15 @@ class Service(Bounded):
         edges = np.concatenate(([self.start_s, lock_s], self.edges_s[after]))
         return Service(edges, np.concatenate(([0.0], self.rate_bit_s[first - 1 :])), self.availability)
 
+    def within(self, start_s: float, end_s: float) -> "Service":
+        """The part of the contact in a span that it overlaps; the contact itself where the span holds all of it."""
+        if start_s <= self.start_s and end_s >= self.end_s:
+            return self
+        inside = (start_s < self.edges_s) & (self.edges_s < end_s)
+        edges = np.concatenate(([max(start_s, self.start_s)], self.edges_s[inside], [min(end_s, self.end_s)]))
+        piece = np.searchsorted(self.edges_s, edges[:-1], side="right") - 1
+        return Service(edges, self.rate_bit_s[piece], self.availability)
+
 
 def service(table: RateTable, contact: tuple[float, float], range_m: Range, availability: float) -> Service:
     """What a contact carries: the table's rate at the range of each moment.

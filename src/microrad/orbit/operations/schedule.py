@@ -61,8 +61,9 @@ class _Plan:
     unserved and has had no data since. So each place is pushed and popped once.
     """
 
-    def __init__(self, opportunities: Opportunities, size: tuple[int, int, int], rules: Rules, start_s: float) -> None:
-        satellites, relays, terminals = size
+    def __init__(
+        self, opportunities: Opportunities, satellites: int, terminals: Sequence[int], rules: Rules, start_s: float
+    ) -> None:
         self.rules = rules
         self.satellite: list[int] = opportunities.satellite.tolist()
         self.relay: list[int] = opportunities.relay.tolist()
@@ -71,8 +72,8 @@ class _Plan:
         self.data_s = [0.0] * satellites  # had so far
         self.served = [False] * satellites
         self.visible: list[list[int]] = [[] for _ in range(satellites)]  # opportunities under way
-        self.queue: list[list[_Waiting]] = [[] for _ in range(relays)]
-        self.free = [list(range(terminals)) for _ in range(relays)]
+        self.queue: list[list[_Waiting]] = [[] for _ in terminals]
+        self.free = [list(range(count)) for count in terminals]
         self.events: list[tuple[float, int, int, int]] = []  # time, relay, terminal, session
         self.rows: list[list[float]] = []  # satellite, relay, terminal, start, end
         self.until: list[float] = []  # end of each session's opportunity
@@ -208,7 +209,12 @@ class _Plan:
 
 
 def schedule(
-    opportunities: Opportunities, satellites: int, relays: int, terminals: int, rules: Rules, start_s: float
+    opportunities: Opportunities,
+    satellites: int,
+    relays: int,
+    terminals: int | Sequence[int],
+    rules: Rules,
+    start_s: float,
 ) -> Sessions:
     """Share the terminals of the relays among satellites of one terminal each, by a fixed rule.
 
@@ -225,12 +231,13 @@ def schedule(
     Args:
         opportunities: When each satellite could use each relay, in order of their start.
         satellites: Number of satellites.
-        relays: Number of relays.
-        terminals: Number of terminals on each relay.
+        relays: Number of relays, ground stations among them.
+        terminals: Number of terminals on each relay, one for all or one for each.
         rules: How a terminal is shared.
         start_s: Start of the span, s.
     """
-    plan = _Plan(opportunities, (satellites, relays, terminals), rules, start_s)
+    each = [terminals] * relays if isinstance(terminals, int) else terminals
+    plan = _Plan(opportunities, satellites, each, rules, start_s)
     starts, place = opportunities.start_s.tolist(), 0
     while place < len(starts) or plan.events:
         first, now = place, min([*starts[place : place + 1], *(event[0] for event in plan.events[:1])])

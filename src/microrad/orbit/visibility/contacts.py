@@ -206,7 +206,8 @@ def contacts_with_each(
         shared.append((RANGE, both(partial(_spare, furthest_m))))
     found = []
     for place, relay in enumerate(relays):
-        kept = [(cause, intervals[place]) for cause, intervals in shared]
+        hidden = hidden_by(satellite, relay)
+        kept = [(hidden if cause == EARTH else cause, intervals[place]) for cause, intervals in shared]
         for one, other in ((satellite, relay), (relay, satellite)):
             kept.extend(conditions(Side(one, other, earth, epoch), time_s))
         found.append(_combined(kept, span_s))
@@ -236,6 +237,26 @@ def _clearance_rad(
             f"{earth.grazing_height_m / 1e3:.6g} km that lines of sight must clear; lower orbit.grazing_height, or "
             "raise the orbit"
         ) from None
+
+
+def hidden_by(first: Terminal, second: Terminal) -> str:
+    """What hides two terminals from one another, in words: the Earth, or the mask of a station.
+
+    Args:
+        first: One terminal.
+        second: The other one.
+    """
+    site = next((each.orbit for each in (first, second) if isinstance(each.orbit, GroundSite)), None)
+    return EARTH if site is None else mask_of(site.station)
+
+
+def mask_of(station: Station) -> str:
+    """What begins and ends a contact at the elevation mask of a station, in words.
+
+    Args:
+        station: The station.
+    """
+    return f"elevation mask of {station.name}"
 
 
 def _above_masks(
@@ -307,7 +328,7 @@ def passes(orbit: Orbit, station: Station, epoch: Epoch, span_s: Span) -> tuple[
     """
     step = coarse_step_s(orbit, span_s[0])
     time_s = coarse_times(span_s, step)
-    mask = f"elevation mask of {station.name}"
+    mask = mask_of(station)
 
     def elevation(time: Floats) -> Floats:
         return elevation_rad(station, epoch, time, orbit.states(time).position_m)
@@ -318,6 +339,22 @@ def passes(orbit: Orbit, station: Station, epoch: Epoch, span_s: Span) -> tuple[
         begins, ends = START if start == span_s[0] else mask, END if end == span_s[1] else mask
         found.append(Pass(start, end, begins, ends, float(highest), float(when)))
     return tuple(found)
+
+
+def station_range(orbit: Orbit, station: Station, epoch: Epoch) -> Callable[[Floats], Floats]:
+    """What gives the range in m from a station to a satellite at times in s, both of shape (n,).
+
+    Args:
+        orbit: Orbit of the satellite.
+        station: The station.
+        epoch: Instant from which all times count.
+    """
+
+    def range_m(time_s: Floats) -> Floats:
+        line = orbit.states(time_s).position_m - station.position(epoch, time_s).position_m
+        return np.asarray(np.sqrt(dot(line, line)))
+
+    return range_m
 
 
 # -------------------------------------------------------------------------------------------------------------- by hand

@@ -49,17 +49,37 @@ def day_data(day: DayStudy) -> dict[str, Any]:
         "rates": [fields(c, "rate_bit_s", "margin_db", "largest_range_m") for c in day.closings],
         "relay": _way_data(day.relay),
         "direct": None if day.direct is None else {**_way_data(day.direct), "passes": _passes_data(day, day.direct)},
+        **({} if day.optical is None else _optical_data(day, day.optical)),
         "assumptions": [
             {
                 "name": s.name,
                 "factor": s.factor,
-                "low": {"value": s.low, **_numbers_data(s.at_low)},
-                "high": {"value": s.high, **_numbers_data(s.at_high)},
+                "low": {"value": s.low, **_numbers_data(s.at_low, day)},
+                "high": {"value": s.high, **_numbers_data(s.at_high, day)},
             }
             for s in day.swings
         ],
         "warnings": list(day.warnings),
         "verdict": words.sentences(day),
+    }
+
+
+def _optical_data(day: DayStudy, way: Way) -> dict[str, Any]:
+    """The optical downlink and the sky over it; a mission without them has none of these keys."""
+    sky = day.sky
+    assert sky is not None  # both or none
+    return {
+        "optical": {**_way_data(way), "passes": _passes_data(day, way)},
+        "sky": {
+            "sites": [
+                {"name": name, "availability": given, "drawn": drawn}
+                for name, given, drawn in zip(sky.names, sky.availability, sky.drawn, strict=True)
+            ],
+            "any_clear": sky.any_clear,
+            "any_clear_drawn": sky.any_drawn,
+            "any_clear_independent": sky.any_independent,
+            "correlation": sky.correlation.tolist(),
+        },
     }
 
 
@@ -109,24 +129,27 @@ def _way_data(w: Way) -> dict[str, Any]:
     }
 
 
-def _numbers_data(n: Numbers) -> dict[str, float]:
+def _numbers_data(n: Numbers, day: DayStudy) -> dict[str, float]:
+    more = {"optical_could_carry_bit": n.optical_bit, "optical_latency_99_percent_s": n.optical_slow_s}
     return {
         "relay_could_carry_bit": n.relay_bit,
         "direct_could_carry_bit": n.direct_bit,
         "relay_latency_99_percent_s": n.relay_slow_s,
         "direct_latency_99_percent_s": n.direct_slow_s,
+        **({} if day.optical is None else more),
     }
 
 
 def day_csv(day: DayStudy) -> str:
-    """One line a contact by either way, each number with every digit."""
+    """One line a contact by any way, each number with every digit."""
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
     writer.writerow(("by", "with", *_COLUMNS))
     whole = day_data(day)
     rows = [(day.relay.name, day.view.pair.geo.name, each) for each in whole["contacts"]]
-    if day.direct is not None:
-        rows += [(day.direct.name, each["station"], each) for each in whole["direct"]["passes"]]
+    for to_ground, key in ((day.direct, "direct"), (day.optical, "optical")):
+        if to_ground is not None:
+            rows += [(to_ground.name, each["station"], each) for each in whole[key]["passes"]]
     for way, partner, each in sorted(rows, key=lambda row: row[2]["start_s"]):
         writer.writerow([way, spreadsheet_text(partner), *(each.get(key, "") for key in _COLUMNS.values())])
     return buffer.getvalue().rstrip("\n")

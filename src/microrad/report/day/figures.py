@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -393,22 +394,19 @@ def day_figures(day: DayStudy, run: ContactRun | None = None) -> tuple[Figure, .
         run: one of its contacts, simulated, or None.
     """
     found = [contacts_figure(day), *_along_figure(day), _volume_figure(day), _latency_figure(day), ground_map(day)]
-    found.append(_assumptions_figure(day))
+    found += [_assumptions_figure(day), *(() if day.optical is None else (_optical_figure(day, day.optical),))]
     return tuple(found if run is None else [*found, _contact_run_figure(day, run)])
-
-
-def _ways(day: DayStudy) -> tuple[Way, ...]:
-    return (day.relay,) if day.direct is None else (day.relay, day.direct)
 
 
 def contacts_figure(day: DayStudy) -> Figure:
     """Contacts with the relay and with each station, and the eclipses, over the span of a day."""
     span = day.view.pair.span_s
     rows = [(day.relay.name, spans(day.relay.contacts, span[1]))]
-    if day.direct is not None:
-        for station in dict.fromkeys(day.direct.stations):
-            own = tuple(c for c, s in zip(day.direct.contacts, day.direct.stations, strict=True) if s == station)
-            rows.append((f"direct: {station}", spans(own, span[1])))
+    for way, kind in ((day.direct, "direct"), (day.optical, "optical")):
+        for station in dict.fromkeys(() if way is None else way.stations):
+            assert way is not None
+            own = tuple(c for c, s in zip(way.contacts, way.stations, strict=True) if s == station)
+            rows.append((f"{kind}: {station}", spans(own, span[1])))
     rows.append((f"eclipse of {day.view.pair.leo.name}", day.view.umbra_s))
     return timeline(rows, span, day.view.pair.epoch.text)
 
@@ -442,14 +440,14 @@ def _volume_figure(day: DayStudy) -> Figure:
     history = day.relay.history
     cumulative = {"made by the instrument": (history.time_s, history.generated_bit)}
     stored = {}
-    for way in _ways(day):
+    for way in day.ways:
         cumulative[way.name] = way.history.time_s, way.history.delivered_bit
         stored[way.name] = way.history.time_s, way.history.stored_bit
     return data_volume(cumulative, stored)
 
 
 def _latency_figure(day: DayStudy) -> Figure:
-    return latency({way.name: _distribution(way) for way in _ways(day)})
+    return latency({way.name: _distribution(way) for way in day.ways})
 
 
 def _distribution(way: Way) -> tuple[Floats, Floats]:
@@ -466,7 +464,7 @@ def _distribution(way: Way) -> tuple[Floats, Floats]:
 def ground_map(day: DayStudy) -> Figure:
     """The world with the ground track, the relay and the stations."""
     o = day.operations
-    track = ground_track(day.view, _ways(day), None if o is None else o.downlink)
+    track = ground_track(day.view, day.ways, None if o is None else o.downlink, None if o is None else o.optical)
     places = Places(track.latitude_rad, track.longitude_rad)
     relay, stations = dict([_marked(track.relay)]), dict(_marked(station) for station in track.stations)
     first_s = LONGEST_S if day.view.duration_s > LONGEST_S else None
@@ -479,12 +477,21 @@ def _marked(each: Outline) -> tuple[str, Marked]:
 
 
 def _assumptions_figure(day: DayStudy) -> Figure:
-    """The bars stand in the order of `Swing.factor`, as the words about them do."""
+    """The bars stand in the order in which assumptions move the comparison, as the words about them do."""
+    swings = sorted(day.swings, key=lambda s: -s.of_relay)
     if day.direct is not None:
-        bars = [Assumed(_label(s), s.at_low.ratio, s.at_high.ratio) for s in day.swings]
+        bars = [Assumed(_label(s), s.at_low.ratio, s.at_high.ratio) for s in swings]
         return assumptions(bars, day.ratio, "volume by relay over volume direct")
-    bars = [Assumed(_label(s), s.at_low.relay_bit / 8e12, s.at_high.relay_bit / 8e12) for s in day.swings]
+    bars = [Assumed(_label(s), s.at_low.relay_bit / 8e12, s.at_high.relay_bit / 8e12) for s in swings]
     return assumptions(bars, day.relay.capacity_bit / 8e12, "volume by the relay (TB)")
+
+
+def _optical_figure(day: DayStudy, way: Way) -> Figure:
+    """The same of the optical downlink's volume, for those assumptions that move it."""
+    swings = sorted((s for s in day.swings if s.of_optical > 1.0), key=lambda s: -s.of_optical)
+    bars = [Assumed(_label(s), s.at_low.optical_bit / 8e12, s.at_high.optical_bit / 8e12) for s in swings]
+    found = assumptions(bars, way.capacity_bit / 8e12, "volume by the optical downlink (TB)")
+    return replace(found, name="optical-assumptions", title="What the assumptions decide for the optical downlink")
 
 
 def _label(swing: Swing) -> str:

@@ -7,7 +7,7 @@ from microrad.link.study import LinkStudy
 from microrad.mission.model import Source
 from microrad.orbit.day import DayStudy
 from microrad.report.day import words
-from microrad.report.day.tables import assumptions_table, contacts_table, ways_table
+from microrad.report.day.tables import assumptions_table, contacts_table, sky_table, ways_table
 from microrad.report.marks import marked
 from microrad.report.plotting.figure import Figure
 from microrad.report.view import Points, Verdict, View, opened, told, views_text
@@ -56,7 +56,7 @@ def day_view(
         more: views at the end.
         warned: whether the day's warnings stand elsewhere on the page.
     """
-    tables = (ways_table(day), contacts_table(day), assumptions_table(day))
+    tables = (ways_table(day), contacts_table(day), sky_table(day), assumptions_table(day))
     return View(
         "What the link delivers",
         told(

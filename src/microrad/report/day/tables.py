@@ -1,10 +1,10 @@
-"""A day of the link as tables: every contact, relay and direct downlink side by side, and each assumption changed."""
+"""A day of the link as tables: every contact, the ways side by side, the sky, and each assumption changed."""
 
 import math
 
 from microrad.orbit import Contact, Pass
 from microrad.orbit.day import NOTHING, DayStudy, Encounter, Numbers
-from microrad.report.day.words import contact_time, kilometres, ratio_text
+from microrad.report.day.words import contact_time, kilometres, percent, ratio_text
 from microrad.report.quantities import duration, volume
 from microrad.report.tables import Table
 
@@ -24,16 +24,17 @@ CONTACT_COLUMNS = (
 
 
 def contacts_table(day: DayStudy) -> Table:
-    """Each contact by both ways, in the order of their rise."""
+    """Each contact by every way, in the order of their rise."""
     rows = [
         (e.contact.start_s, _relay_row(day, e, bit))
         for e, bit in zip(day.encounters, day.relay.carried_bit, strict=True)
     ]
-    if day.direct is not None:
-        d = day.direct
+    for way, behind in ((day.direct, ""), (day.optical, ", optical")):
+        if way is None:
+            continue
         rows += [
-            (c.start_s, _row(day, station, c, ("", "", "", "", f"{math.degrees(c.highest_rad):.1f}"), bit))
-            for c, station, bit in zip(d.contacts, d.stations, d.carried_bit, strict=True)
+            (c.start_s, _row(day, station + behind, c, ("", "", "", "", f"{math.degrees(c.highest_rad):.1f}"), bit))
+            for c, station, bit in zip(way.contacts, way.stations, way.carried_bit, strict=True)
             if isinstance(c, Pass)
         ]
     found = [row for _, row in sorted(rows, key=lambda item: item[0])]
@@ -68,8 +69,8 @@ def _relay_row(day: DayStudy, e: Encounter, bit: float) -> tuple[str, ...]:
 
 
 def ways_table(day: DayStudy) -> Table:
-    """Relay and direct downlink side by side."""
-    ways = (day.relay,) if day.direct is None else (day.relay, day.direct)
+    """Relay and downlinks side by side."""
+    ways = day.ways
     rows = [
         ("contacts", *(str(len(w.contacts)) for w in ways)),
         ("time in contact", *(contact_time(w.contact_s) for w in ways)),
@@ -87,31 +88,53 @@ def ways_table(day: DayStudy) -> Table:
     of = ["contacts", "contact_s", "longest_gap_s", "could_carry_bit", "contacts_without_acquisition"]
     of += ["generated_bit", "lost_bit", "", "on_board_at_end_bit", "arrived_bit", "latency_median_s"]
     of.append("latency_99_percent_s")
-    names = {
-        place: [f"day.{way}.{name}" if name else "" for name in of] for place, way in enumerate(("relay", "direct"), 1)
-    }
+    keys = ["relay", *(["direct"] if day.direct else []), *(["optical"] if day.optical else [])]
+    names = {place: [f"day.{way}.{name}" if name else "" for name in of] for place, way in enumerate(keys, 1)}
     carried = " and ".join(f"{volume(w.capacity_bit)} by {w.name}" for w in ways)
     folded = f"What the ways could carry: {carried}; line by line"
-    return Table("Relay and direct downlink", ("", *(w.name for w in ways)), rows, (0,), folded=folded, names=names)
+    title = "Relay and direct downlink" if day.optical is None else "Relay and downlinks"
+    return Table(title, ("", *(w.name for w in ways)), rows, (0,), folded=folded, names=names)
+
+
+def sky_table(day: DayStudy) -> Table | None:
+    """How often each optical station is clear, and any of them; None without any."""
+    if day.sky is None:
+        return None
+    s = day.sky
+    rows = [(n, percent(a), percent(d)) for n, a, d in zip(s.names, s.availability, s.drawn, strict=True)]
+    rows.append(("any of them", percent(s.any_clear), percent(s.any_drawn)))
+    rows.append(("any of them, were clouds independent", percent(s.any_independent), ""))
+    given, drawn = ([f"day.sky.sites.{n}.{of}" for n in s.names] for of in ("availability", "drawn"))
+    names = {
+        1: [*given, "day.sky.any_clear", "day.sky.any_clear_independent"],
+        2: [*drawn, "day.sky.any_clear_drawn", ""],
+    }
+    headings, folded = ("optical station", "clear", "in the runs"), "Share of the time without clouds"
+    return Table("Clear sky over the stations", headings, rows, (0,), folded=folded, names=names)
 
 
 def assumptions_table(day: DayStudy) -> Table:
     """Each assumption with both of its values and what they come to."""
     rows = [
-        (s.name, text, *_numbers(n, day.direct is not None))
+        (s.name, text, *_numbers(n, day.direct is not None, day.optical is not None))
         for s in day.swings
         for text, n in ((s.low, s.at_low), (s.high, s.at_high))
         if text != NOTHING
     ]
-    headings = ("assumption", "changed to", "relay", "direct", "ratio", "99 % by\nrelay", "99 %\ndirect")
+    behind = () if day.optical is None else ("optical", "99 %\noptical")
+    headings = ("assumption", "changed to", "relay", "direct", "ratio", "99 % by\nrelay", "99 %\ndirect", *behind)
     of = ("relay_could_carry_bit", "direct_could_carry_bit", "", "relay_latency_99_percent_s")
     names = {place: f"day.{name}" if name else "" for place, name in enumerate((*of, "direct_latency_99_percent_s"), 2)}
+    if day.optical is not None:
+        more = ("optical_could_carry_bit", "optical_latency_99_percent_s")
+        names |= {place: f"day.{name}" for place, name in enumerate(more, len(headings) - 2)}
     folded = "One assumption changed, all others as they are"
     return Table("One assumption changed", headings, rows, (0, 1), folded=folded, names=names)
 
 
-def _numbers(n: Numbers, direct: bool) -> tuple[str, ...]:
+def _numbers(n: Numbers, direct: bool, optical: bool) -> tuple[str, ...]:
+    more = (volume(n.optical_bit), duration(n.optical_slow_s)) if optical else ()
     if not direct:
-        return volume(n.relay_bit), "", "", duration(n.relay_slow_s), ""
+        return volume(n.relay_bit), "", "", duration(n.relay_slow_s), "", *more
     waits = duration(n.relay_slow_s), duration(n.direct_slow_s)
-    return volume(n.relay_bit), volume(n.direct_bit), ratio_text(n), *waits
+    return volume(n.relay_bit), volume(n.direct_bit), ratio_text(n), *waits, *more

@@ -2,7 +2,7 @@
 
 import math
 
-from microrad.orbit.day import Closing, DayStudy, Numbers, Swing, Way
+from microrad.orbit.day import NOTHING, Closing, DayStudy, Numbers, Swing, Way
 from microrad.report.quantities import duration, quantity, volume
 
 MATTERS = 1.1
@@ -11,24 +11,62 @@ MATTERS = 1.1
 
 def sentences(day: DayStudy) -> list[str]:
     """The answers of the day, a sentence each."""
-    return [*headline(day), contact_words(day), rate_words(day), *latency_words(day), *assumption_words(day)]
+    said = [*headline(day), contact_words(day), rate_words(day), *sky_words(day)]
+    return [*said, *latency_words(day), *assumption_words(day)]
 
 
 def headline(day: DayStudy) -> list[str]:
-    """What the relay and the direct downlink could carry."""
+    """What the relay and the downlinks could carry."""
     relay, span = day.relay, duration(day.view.duration_s)
     whole = day.operations is None or day.operations.relay_share == 1.0
     said = (
         f"In {span} the relay {_how_much(day, relay, whole)}, and could carry "
         f"{volume(relay.capacity_bit)}{_a_day(day, volume(relay.capacity_bit / day.view.days))}"
     )
-    if day.direct is None:
-        return [f"{said}."]
-    d, down = day.direct, day.operations.downlink if day.operations else None
-    stations = ", ".join(down.stations) if down else ""
-    carried = f"{volume(d.capacity_bit)}{_a_day(day, volume(d.capacity_bit / day.view.days))}"
-    ground = f"The ground ({stations}) {_how_much(day, d)}, and could carry {carried}"
-    return [f"{said}. {ground}{_compared(day.ratio)}."]
+    parts = [said]
+    if day.direct is not None:
+        d, down = day.direct, day.operations.downlink if day.operations else None
+        stations = ", ".join(down.stations) if down else ""
+        carried = f"{volume(d.capacity_bit)}{_a_day(day, volume(d.capacity_bit / day.view.days))}"
+        ground = f"The ground ({stations}) {_how_much(day, d)}, and could carry {carried}"
+        parts.append(f"{ground}{_compared(day.ratio)}")
+    if day.optical is not None:
+        parts.append(f"{_optical_words(day, day.optical)}{_compared(day.optical_ratio)}")
+    return [f"{'. '.join(parts)}."]
+
+
+def _optical_words(day: DayStudy, way: Way) -> str:
+    """What the optical stations could carry, the mean of the drawn skies and how far those part."""
+    down, days = day.operations.optical, day.view.days
+    assert down is not None  # the way is of this table
+    stations = f"Optical ground stations ({', '.join(down.stations)})"
+    if not way.contacts:
+        return f"{stations} are never used"
+    least, most = (volume(bit) for bit in way.capacity_spread_bit)
+    spread = "" if least == most else f", from {least} to {most} by the weather drawn"
+    return (
+        f"{stations} are in use for {contact_time(way.contact_s)}{_a_day(day, contact_time(way.contact_s / days))}, "
+        f"and could carry {volume(way.capacity_bit)}{_a_day(day, volume(way.capacity_bit / days))}{spread}"
+    )
+
+
+def sky_words(day: DayStudy) -> list[str]:
+    """How often some optical station is clear; nothing without any."""
+    sky = day.sky
+    if sky is None:
+        return []
+    drawn = f"{percent(sky.any_drawn)} in the {day.operations.runs} drawn skies"
+    if len(sky.names) == 1:
+        return [f"The sky over {sky.names[0]} is clear for {percent(sky.any_clear)} of the time ({drawn})."]
+    return [
+        f"At least one of the {len(sky.names)} optical stations is clear for {percent(sky.any_clear)} of the time "
+        f"({drawn}); with clouds that are independent from site to site it would be {percent(sky.any_independent)}."
+    ]
+
+
+def percent(share: float) -> str:
+    """A share of the time."""
+    return f"{100.0 * share:.1f} %"
 
 
 def _compared(ratio: float) -> str:
@@ -135,6 +173,8 @@ def latency_words(day: DayStudy) -> list[str]:
     said = [f"What becomes of the {made} that the instrument makes: by the relay {_arrived(day.relay)}"]
     if day.direct is not None:
         said.append(f"by the direct downlink {_arrived(day.direct)}")
+    if day.optical is not None:
+        said.append(f"by the optical downlink {_arrived(day.optical)}")
     return ["; ".join(said) + "."]
 
 
@@ -153,19 +193,24 @@ def _arrived(way: Way) -> str:
 
 def assumption_words(day: DayStudy) -> list[str]:
     """Which assumption matters most, for the volumes and for the latencies."""
-    moving = [s for s in day.swings if s.factor > MATTERS]
+    moving = sorted((s for s in day.swings if s.of_relay > MATTERS), key=lambda s: -s.of_relay)
     found = []
     both = day.direct is not None and day.direct.capacity_bit > 0.0
     if moving:
         what = "ratio of the two volumes" if both else "relay's volume"
         named = "; ".join(f"{s.name} ({_ends(s, both)})" for s in moving[:3])
         found.append(f"What matters most to the {what}, each assumption changed alone: {named}.")
+    if weighty := sorted((s for s in day.swings if s.of_optical > MATTERS), key=lambda s: -s.of_optical):
+        named = "; ".join(f"{s.name} ({_optical_ends(s)})" for s in weighty[:3])
+        found.append(f"What matters most to the optical downlink's volume: {named}.")
     waits = sorted(day.swings, key=lambda s: -_wait_factor(s))
     if waits and _wait_factor(waits[0]) > MATTERS:
         s = waits[0]
         by = [f"within {_both(s, 'relay_slow_s')} by the relay"]
         if day.direct is not None:
             by.append(f"within {_both(s, 'direct_slow_s')} directly")
+        if day.optical is not None:
+            by.append(f"within {_both(s, 'optical_slow_s')} by the optical downlink")
         found.append(
             f"How late data arrive depends most on {s.name}: with {s.low} or {s.high}, 99 % arrive {', '.join(by)}."
         )
@@ -181,6 +226,11 @@ def _ends(s: Swing, ratio: bool) -> str:
     return f"{s.low}: {shown(s.at_low)}, {s.high}: {shown(s.at_high)}"
 
 
+def _optical_ends(s: Swing) -> str:
+    ends = ((s.low, s.at_low), (s.high, s.at_high))
+    return ", ".join(f"{text}: {volume(n.optical_bit)}" for text, n in ends if text != NOTHING)
+
+
 def ratio_text(n: Numbers) -> str:
     """Volume by relay over volume direct; nothing where the latter is none."""
     return f"{n.ratio:.3g}" if n.direct_bit > 0.0 else ""
@@ -194,7 +244,7 @@ def _both(s: Swing, name: str) -> str:
 def _wait_factor(s: Swing) -> float:
     """Largest over smallest 99 % latency, as it is and at both sides, of the way that an assumption changes more."""
     factors = [1.0]
-    for name in ("relay_slow_s", "direct_slow_s"):
+    for name in ("relay_slow_s", "direct_slow_s", "optical_slow_s"):
         low, middle, high = sorted(getattr(n, name) for n in (s.here, s.at_low, s.at_high))
         if low > 0.0 and low != high and not math.isnan(low + middle + high):
             factors.append(high / low)

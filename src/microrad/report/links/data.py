@@ -14,6 +14,7 @@ from microrad.link.pointing.outage import Performance
 from microrad.link.requirement import met, of_links
 from microrad.link.study import LinkStudy, Solution
 from microrad.report.data import fields
+from microrad.report.links.ground import ground_data
 from microrad.report.links.standard import standard_data
 from microrad.report.marks import with_marks
 from microrad.report.requirements import requirement_data
@@ -70,6 +71,7 @@ def budgets_data(study: LinkStudy) -> dict[str, Any]:
         "acquisition": None if study.finding is None else finding_data(study.finding),
         "under_jitter": None if study.under_jitter is None else performance_data(study.under_jitter),
         **({} if study.fading is None else {"fading": fading_data(study.fading)}),
+        **({} if study.ground is None else {"ground": ground_data(study.ground)}),
         "warnings": list(study.warnings),
     }
 

@@ -13,6 +13,7 @@ from microrad.link.fade_series.coded import CodedFading
 from microrad.link.requirement import time_kept
 from microrad.link.study import LinkStudy
 from microrad.report.links import words
+from microrad.report.links.ground import over_elevation
 from microrad.report.plotting.figure import Figure
 from microrad.report.plotting.palette import BLACK, BLUE, ORANGE, VERMILION, WHITE
 from microrad.report.plotting.scales import limits
@@ -34,6 +35,8 @@ def link_figures(study: LinkStudy) -> tuple[Figure, ...]:
     figures = [tornado(study, t) for t in study.tornados if t.swings]
     if study.finding is not None and study.finding.trade is not None:
         figures.append(trade(study, study.finding, study.finding.trade))
+    if study.ground is not None and len(study.ground.elevations) > 1:
+        figures.append(over_elevation(study, study.ground))
     if study.fading is not None:
         figures.append(interleaver(study, study.fading))
     return tuple(figures)

@@ -18,6 +18,8 @@ from microrad.link.pointing.outage import Performance, stated_outage
 from microrad.link.requirement import met, of_links
 from microrad.link.study import LinkStudy, Solution
 from microrad.report.links import words
+from microrad.report.links.ground import ground_view
+from microrad.report.links.lines import LINES, line_names, lines_table
 from microrad.report.links.standard import standard_view
 from microrad.report.marks import marked
 from microrad.report.plotting.figure import Figure
@@ -32,7 +34,6 @@ if TYPE_CHECKING:
 RAREST_FADE_HZ = 1.0 / (365.25 * 86400.0)
 """Fades rarer than one in a year are not counted."""
 
-_LINES = ("line", "value", "basis", "source", "holds for")
 _NO_VALUE = "\u2013"
 
 
@@ -78,7 +79,8 @@ def links_views(
         performance = performance_view((under,), (), outage, [said])
     budgets = budgets or budgets_view(study, [budget_table(b) for b in study.budgets], figures)
     fading = fading_view(study.fading, figures)
-    return told(pointing_view(study.open_loop), budgets, performance, fading, acquisition_view(study.finding, figures))  # type: ignore[return-value]
+    acquisition, own = acquisition_view(study.finding, figures), pointing_view(study.open_loop)
+    return told(own, budgets, ground_view(study, figures), performance, fading, acquisition)  # type: ignore[return-value]
 
 
 # ------------------------------------------------------------------------------------------------------------ pointing
@@ -155,39 +157,6 @@ def coverage(p: OpenLoopPointing) -> list[str]:
 
 
 # ------------------------------------------------------------------------------------------------------------- budgets
-def lines_table(title: str, lines: Sequence[Line], totals: Sequence[Line] = (), names: Sequence[str] = ()) -> Table:
-    """Lines of a budget with its sums; a page shows the sums, and the lines when it is asked.
-
-    Args:
-        title: what a page shows in place of the folded lines, before the sums.
-        lines: the lines.
-        totals: their sums.
-        names: dotted ones of all of these in the JSON.
-    """
-    sums = "; ".join(f"{line.name.lower()} {quantity(line.value, line.unit)}" for line in totals)
-    rows = [_row(line) for line in (*lines, *totals)]
-    folded = f"{title}: {sums}" if sums else title
-    named = {1: names} if names else {}
-    return Table(title, _LINES, rows, (0, 2, 3, 4), totals=len(totals), folded=folded, names=named)
-
-
-def line_names(name: str, lines: Sequence[Line], totals: Sequence[Line] = ()) -> list[str]:
-    """The dotted names of lines and their sums in the JSON.
-
-    Args:
-        name: dotted, of the record that has both.
-        lines: the lines.
-        totals: their sums.
-    """
-    named = (("lines", lines), ("totals", totals))
-    return [f"{name}.{of}.{line.name}.value" for of, several in named for line in several]
-
-
-def _row(line: Line) -> tuple[str | Cell, ...]:
-    name = Cell(line.name, "!", line.warning) if line.warning else line.name
-    return name, quantity(line.value, line.unit), line.basis, line.source, line.regime
-
-
 def budget_table(budget: LinkBudget) -> Table:
     """A budget line by line."""
     return lines_table(budget.name, budget.lines, budget.totals, _names(budget))
@@ -218,7 +187,7 @@ def paired_tables(budget: LinkBudget, other: LinkBudget, headings: tuple[str, st
     margins = ", ".join(
         f"{quantity(b.margin_db, 'dB')} {heading}" for b, heading in zip((budget, other), headings, strict=True)
     )
-    columns, folded = ("line", *headings, *_LINES[2:]), f"{budget.name}: margin {margins}"
+    columns, folded = ("line", *headings, *LINES[2:]), f"{budget.name}: margin {margins}"
     lines = line_names(f"budgets.{budget.name}", budget.lines)
     lines += [f"budgets.{budget.name}.totals.{name}.value" for name in names]
     of = {1: lines, 2: lines}

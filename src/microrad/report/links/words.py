@@ -11,6 +11,7 @@ from microrad.link.fade_series.coded import CodedFading
 from microrad.link.pointing.outage import Performance, error_rad, required_error_rad
 from microrad.link.requirement import of_links, time_kept
 from microrad.link.study import BeamRadius, LinkStudy, PointAheadEffect, Solution
+from microrad.report.links import ground
 from microrad.report.marks import with_sign
 from microrad.report.quantities import power_text, quantity, signed
 from microrad.report.requirements import advice_for_links, derived_words, first_warning, met_words, nearest
@@ -42,12 +43,16 @@ def short(study: LinkStudy) -> list[str]:
     if m.jitter is not None:
         error = quantity(error_rad(study.data), "rad")
         at = f"for {time_kept(m.requirement)} under the jitter, an error of {error}"
+    if study.data.turbulent is not None:
+        at += ", with the fades of the air"
     said = [
         f"The margin is the power received over the power needed, for communication {at}.",
         *consequences(study)[:2],
     ]
     if study.fading is not None:
         said.append(under_fades(study.fading))
+    if study.ground is not None:
+        said += ground.sentences(study, study.ground)[:2]
     r = nearest(found)
     which = "Nearest to its limit is" if r.met else "What limits it is"
     said.append(f"{which} the {r.name}, by {r.because}{advice_for_links(study, r)}.")

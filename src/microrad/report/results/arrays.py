@@ -305,6 +305,8 @@ def _day(day: DayStudy, run: ContactRun | None, plan: ConstellationPlan | None) 
     found[f"{relay}"] = _day_way(day.relay)
     if day.direct is not None:
         found |= {"passes": _passes(day.direct), f"{direct}": _day_way(day.direct)}
+    if day.optical is not None:
+        found |= {"optical_passes": _passes(day.optical), "optical_downlink": _day_way(day.optical)}
     found |= {} if run is None else {"contact_run": _contact_run(run)}
     found |= {} if plan is None else {"sessions": _sessions(plan)}
     epoch = {"epoch": day.view.pair.epoch.text}
@@ -390,9 +392,11 @@ def _day_way(way: Way) -> Group:
 
 def _assumptions(day: DayStudy) -> Group:
     found: dict[str, tuple[str, str, Any]] = {}
+    keys = [("relay_bit", "bit"), ("direct_bit", "bit"), ("relay_slow_s", "s"), ("direct_slow_s", "s")]
+    keys += [] if day.optical is None else [("optical_bit", "bit"), ("optical_slow_s", "s")]
     for side in ("low", "high"):
         found[side] = (TEXT, f"{side} side of the change", side)
-        for key, unit in (("relay_bit", "bit"), ("direct_bit", "bit"), ("relay_slow_s", "s"), ("direct_slow_s", "s")):
+        for key, unit in keys:
             name = key.rpartition("_")[0].replace("slow", "latency_99_percent")
             found[f"{name}_{side}"] = (unit, f"{name.replace('_', ' ')} with the {side} side", f"at_{side}.{key}")
     names = variables("assumption", day.swings, assumption=(TEXT, "what is changed", "name"))

@@ -163,6 +163,9 @@ def _volume(study: Study) -> Stage:
     ]
     if direct is not None:
         lines.append(f"{_signed(study, volume(direct.capacity_bit), 'day.direct.could_carry_bit')} direct to ground")
+    if day.optical is not None:
+        most = _signed(study, volume(day.optical.capacity_bit), "day.optical.could_carry_bit")
+        lines.append(f"{most} by optical stations")
     return Stage("Volume", tuple(lines))
 
 

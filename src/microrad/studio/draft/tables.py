@@ -94,7 +94,9 @@ def _examples() -> dict[str, str]:
     own = resources.files(__package__).joinpath("optional_tables.toml").read_text("utf-8")
     shipped = resources.files("microrad.mission").joinpath("missions", "leo-geo.toml").read_text("utf-8")
     active = dict(_blocks(shipped))
-    found = {name: _whole(name, active) for name in active} | dict(_blocks(own)) | _uncommented(shipped)
+    added = dict(_blocks(own))
+    found = {name: _whole(name, active) for name in active} | {name: _with_inner(name, added) for name in added}
+    found |= _uncommented(shipped)
     return {name: found[name] for name in sorted(found, key=lambda name: name.count("."))}
 
 
@@ -109,7 +111,12 @@ def _uncommented(text: str) -> dict[str, str]:
 
 def _whole(name: str, blocks: dict[str, str]) -> str:
     """A table's block; that of an outermost one with the blocks of its inner tables behind it."""
-    inner = [] if "." in name else [text for each, text in blocks.items() if each.startswith(f"{name}.")]
+    return blocks[name] if "." in name else _with_inner(name, blocks)
+
+
+def _with_inner(name: str, blocks: dict[str, str]) -> str:
+    """A table's block with those of its inner tables behind it."""
+    inner = (text for each, text in blocks.items() if each.startswith(f"{name}."))
     return "\n\n".join((blocks[name], *inner))
 
 

@@ -8,6 +8,7 @@ def every() -> tuple[Check, ...]:
     from microrad.report.verification.checks import (
         draws,
         fades,
+        ground,
         identified,
         light,
         loop,
@@ -28,6 +29,7 @@ def every() -> tuple[Check, ...]:
             published,
             light,
             fades,
+            ground,
             pointing,
             search,
             loop,
