@@ -5,7 +5,7 @@ import re
 import numpy as np
 
 from microrad.core import lti
-from microrad.link import tracking_light_w
+from microrad.link import arrival_of, tracking_light_w
 from microrad.loop import coupled_study
 from microrad.mirror import coupled
 from microrad.mirror.coupled import Actuator, CoupledMirror, Output
@@ -39,7 +39,7 @@ def two_axes():
 
 def scene_of(mirror, *changes):
     file = mission(*changes)
-    return coupled_study.scene(file, mirror, tracking_light_w(file))
+    return coupled_study.scene(file, mirror, tracking_light_w(file), arrival_of(file))
 
 
 def three_actuators(hysteresis=0.05):

@@ -21,14 +21,14 @@ def design_of_several_axes(mission: "MissionFile", mirror: "CoupledMirror", acce
         accept: Whether designs count whose linear figure the simulation does not bear out.
         as_json: Whether the text is to be JSON.
     """
-    from microrad.link import tracking_light_w
+    from microrad.link import arrival_of, tracking_light_w
     from microrad.loop import coupled_study
     from microrad.mirror import coupled
     from microrad.report.fine_pointing.words import left_out
 
     plant = coupled.of(mirror)
     with progress_bar() as progress, refusal_of(mission.path):
-        scene = coupled_study.scene(mission, plant, tracking_light_w(mission))
+        scene = coupled_study.scene(mission, plant, tracking_light_w(mission), arrival_of(mission))
         found, left = coupled_study.design_and_promise(scene, progress)
     marks = [each.worst.mark(accept) for each in left]
     named = zip(found.made, left, strict=True)

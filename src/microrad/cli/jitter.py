@@ -57,7 +57,7 @@ def jitter(
     """
     from microrad import mirror as mirror_room
     from microrad.lab.recording import read_motion
-    from microrad.link import tracking_light_w
+    from microrad.link import arrival_of, tracking_light_w
     from microrad.loop import controller_study
     from microrad.loop.pointing_loop.played import recorded_residual
     from microrad.mission.file import load_loop
@@ -69,7 +69,8 @@ def jitter(
     names = [] if axes is None else [name.strip() for name in axes.split(",")]
     motion = read_motion(recording, names, rate, time=time, unit=unit)
     with progress_bar() as progress, refusal_of(mission.path):
-        scene = controller_study.scene(mission, mirror_room.of(mission.mission), tracking_light_w(mission))
+        light = tracking_light_w(mission), arrival_of(mission)
+        scene = controller_study.scene(mission, mirror_room.of(mission.mission), *light)
         fits = _fits(motion, scene.table.settle_s, progress)
         (made,) = controller_study.design(scene, progress, [controller])
         alone = controller_study.on_one_axis(made, scene)

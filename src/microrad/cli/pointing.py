@@ -59,7 +59,7 @@ def design(
     its simulated figure is more than 1.5 times its linear one.
     """
     from microrad import mirror as mirror_room
-    from microrad.link import tracking_light_w
+    from microrad.link import arrival_of, tracking_light_w
     from microrad.loop import controller_study
     from microrad.mirror.summary import unknown_dynamics
     from microrad.mission.file import load_loop
@@ -68,7 +68,8 @@ def design(
     if several is not None:
         return design_of_several_axes(mission, several, accept, as_json)
     with progress_bar() as progress, refusal_of(mission.path):
-        scene = controller_study.scene(mission, mirror_room.of(mission.mission), tracking_light_w(mission))
+        light = tracking_light_w(mission), arrival_of(mission)
+        scene = controller_study.scene(mission, mirror_room.of(mission.mission), *light)
         offered = controller_study.offered(scene.table, mission.mission.mirror)
         designs, left = zip(*controller_study.design_and_promise(scene, progress, offered), strict=True)
     marks = [each.mark(accept) for each in left]
@@ -171,11 +172,12 @@ def pointing(
 def _designed(mission: "MissionFile", controller: str) -> "tuple[AnyScene, LoopController]":
     """The mission's loop, and one of its controllers."""
     from microrad import mirror as mirror_room
-    from microrad.link import tracking_light_w
+    from microrad.link import arrival_of, tracking_light_w
     from microrad.loop import controller_study, coupled_study
 
     with progress_bar() as progress, refusal_of(mission.path):
-        scene = coupled_study.of_mission(mission, mirror_room.of(mission.mission), tracking_light_w(mission))
+        light = tracking_light_w(mission), arrival_of(mission)
+        scene = coupled_study.of_mission(mission, mirror_room.of(mission.mission), *light)
         if isinstance(scene, coupled_study.CoupledScene):
             (both,) = coupled_study.design(scene, progress, [controller]).made
             return scene, both.controller

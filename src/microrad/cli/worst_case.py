@@ -47,7 +47,7 @@ def worst_case(
     The exit code is 1 when the loop is unstable on one of them.
     """
     from microrad import mirror as mirror_room
-    from microrad.link import tracking_light_w
+    from microrad.link import arrival_of, tracking_light_w
     from microrad.loop import controller_study, coupled_study
     from microrad.loop import worst_case as search
     from microrad.mirror import coupled
@@ -56,16 +56,17 @@ def worst_case(
 
     mission, several = load_loop(file, mirror)
     with progress_bar() as progress, refusal_of(mission.path):
-        indices, light = indices_of(window or [], spacing or []), tracking_light_w(mission)
+        indices = indices_of(window or [], spacing or [])
+        light = tracking_light_w(mission), arrival_of(mission)
         if several is None:
             known = search.of_table(mission.mission.mirror)
-            scene = controller_study.scene(mission, mirror_room.of(mission.mission), light)
+            scene = controller_study.scene(mission, mirror_room.of(mission.mission), *light)
             (made,) = controller_study.design(scene, progress, [controller])
             subject, seed = search.of_scene(scene, known, made), scene.table.seed
         else:
             plant = coupled.of(several)
             known = search.of_several_axes(plant)
-            whole = coupled_study.scene(mission, plant, light)
+            whole = coupled_study.scene(mission, plant, *light)
             (both,) = coupled_study.design(whole, progress, [controller]).made
             subject, seed = search.of_coupled_scene(whole, known, both), whole.table.seed
         found = search.worst_case(subject, seed, indices, on_progress=progress)

@@ -32,7 +32,7 @@ from microrad.export.records import (
     Signal,
     Vectors,
 )
-from microrad.link import tracking_light_w
+from microrad.link import arrival_of, tracking_light_w
 from microrad.loop import control, controller_study, coupled_study, paper_cases, sine_run
 from microrad.loop.paper_cases import PID, PID_WITH_INVERSE
 from microrad.loop.pointing_loop.kernel_arrays import forward_arrays
@@ -161,7 +161,7 @@ def choose(
         mirrors = mirror.of(m)
         if name in (PID, PID_WITH_INVERSE):
             return _paper_loop(source(file), paper_cases.of(m, mirrors), name)
-        scene = controller_study.scene(file, mirrors, tracking_light_w(file))
+        scene = controller_study.scene(file, mirrors, tracking_light_w(file), arrival_of(file))
         ((design, left),) = controller_study.design_and_promise(scene, on_progress, only=(name,))
         return PointingChoice(source(file), scene, design.tuned, design.controller, left)
     except ValueError as error:
@@ -185,7 +185,7 @@ def choose_coupled(
     """
     of = source(file, given)
     try:
-        scene = coupled_study.scene(file, given, tracking_light_w(file))
+        scene = coupled_study.scene(file, given, tracking_light_w(file), arrival_of(file))
         found, (left,) = coupled_study.design_and_promise(scene, on_progress, only=(name,))
         (design,) = found.made
     except ValueError as error:
@@ -405,11 +405,11 @@ def plant_unit(file: MissionFile, loop: str, given: coupled.CoupledMirror | None
         )
     try:
         if given is not None:
-            made = coupled_study.scene(file, given, tracking_light_w(file)).loop
+            made = coupled_study.scene(file, given, tracking_light_w(file), arrival_of(file)).loop
             return _plant_unit(source(file, given), made.mirror, made.optics, made.drive, made.timing)
         mirrors = mirror.of(file.mission)
         if loop == LOOPS[0]:
-            made = controller_study.scene(file, mirrors, tracking_light_w(file)).loop
+            made = controller_study.scene(file, mirrors, tracking_light_w(file), arrival_of(file)).loop
             return _plant_unit(source(file), made.mirror, made.optics, made.drive, made.timing)
         one = _paper_loop(source(file), paper_cases.of(file.mission, mirrors), PID)
         return _plant_unit(one.source, one.mirror, np.eye(one.mirror.axes), one.setup.drive, one.setup.timing)

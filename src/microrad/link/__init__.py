@@ -1,5 +1,6 @@
 """Link budgets: of the beacon, its answer and the communication link, and what follows from them."""
 
+from microrad.link.budget.arrival import arrival_of
 from microrad.link.budget.assembly import DataLink, LinkError, Shared, assembled, jitter_of, of, required_dbm
 from microrad.link.budget.lines import DEEPEST_DB, LinkBudget, beam_budget, communication_budget, tracking_light_w
 from microrad.link.budget.maps import (
@@ -30,6 +31,7 @@ __all__ = [
     "Shared",
     "Swing",
     "Tornado",
+    "arrival_of",
     "assembled",
     "beam_budget",
     "beam_passes",

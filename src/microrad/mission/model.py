@@ -361,6 +361,12 @@ class Mission(LinkMission):
     scenario: Scenario
     fine_pointing: FinePointing | None = None
 
+    @property
+    def loop_in_turbulence(self) -> bool:
+        """Whether the light that its fine-pointing loop tracks comes down through turbulent air: to a station."""
+        turbulent = self.channel is not None and self.channel.turbulence is not None
+        return turbulent and self.fine_pointing is not None and self.path is not None and self.path.station == "leo"
+
     @classmethod
     def relations(cls) -> tuple[Relation, ...]:
         """What has to fit between its tables."""

@@ -60,11 +60,12 @@ def design(file: Path) -> Action:
     """The controllers of the fine-pointing loop."""
     python = _joined(
         "from microrad import load_mission, mirror",
-        "from microrad.link import tracking_light_w",
+        "from microrad.link import arrival_of, tracking_light_w",
         "from microrad.loop import controller_study",
         "",
         f"mission = load_mission({str(file)!r})",
-        "scene = controller_study.scene(mission, mirror.of(mission.mission), tracking_light_w(mission))",
+        "light = tracking_light_w(mission), arrival_of(mission)",
+        "scene = controller_study.scene(mission, mirror.of(mission.mission), *light)",
         "designs = controller_study.design(scene)",
         "for design, left in zip(designs, controller_study.outlook(scene, designs)):",
         "    linear_urad, simulated_urad = left.linear_rad * 1e6, left.simulated_rad * 1e6",

@@ -189,7 +189,7 @@ def run_study(
     cases = paper_cases.of(m, mirrors)
 
     def scene() -> controller_study.AnyScene:
-        return coupled_study.of_mission(file, mirrors, link.tracking_light_w(file))
+        return coupled_study.of_mission(file, mirrors, link.tracking_light_w(file), link.arrival_of(file))
 
     def linked() -> tuple[link_study.LinkStudy, MarginMap]:
         found = link_study.run_link_study(file, parts)

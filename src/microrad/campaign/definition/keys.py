@@ -29,6 +29,8 @@ _NOT_OF_THE_LOOP = frozenset(
     )
 )
 _OF_THE_QUAD_CELL = frozenset({"answer", "terminals"})
+_OF_THE_PATH = frozenset({"channel", "orbit"})
+_OF_THE_AIR = ("answer.wavelength", "channel.", "orbit.leo.", "orbit.geo.longitude", "terminals.leo_aperture")
 
 
 class UnknownKeyError(Exception):
@@ -278,7 +280,9 @@ def flat_tables(data: Mapping[str, Any], inner: tuple[str, ...], prefix: str = "
 def touches_loop(key: str, m: LinkMission) -> bool:
     """Whether the fine-pointing loop depends on a key: on all but those of the tables that it never looks into.
 
-    Aperture and wavelength matter to it where its optical sensor is a quad cell. Links alone have no loop.
+    Aperture and wavelength matter to it where its optical sensor is a quad cell, and so do air and orbits between a
+    station and a satellite. Where the light that it tracks comes down through turbulent air, what moves its angle
+    matters. Links alone have no loop.
 
     Args:
         key: a key of the mission.
@@ -287,6 +291,8 @@ def touches_loop(key: str, m: LinkMission) -> bool:
     if not isinstance(m, Mission):
         return False
     table = key.partition(".")[0]
-    if table in _OF_THE_QUAD_CELL:
+    if m.loop_in_turbulence and key.startswith(_OF_THE_AIR):
+        return True
+    if table in _OF_THE_QUAD_CELL or (m.path is not None and table in _OF_THE_PATH):
         return m.fine_pointing is not None and m.fine_pointing.optical_sensor.quad_cell is not None
     return table not in _NOT_OF_THE_LOOP

@@ -9,7 +9,7 @@ from microrad.campaign.definition.tables import LoopTable
 from microrad.campaign.records import CampaignError
 from microrad.campaign.rows.missions import MissionBuilder
 from microrad.core.progress import Progress
-from microrad.link import tracking_light_w
+from microrad.link import arrival_of, tracking_light_w
 from microrad.loop import controller_study, coupled_study
 from microrad.loop.control import AxisController
 from microrad.loop.pointing_loop.ensemble import Span
@@ -83,12 +83,12 @@ def mission_loop(file: LinkFile, table: LoopTable, seed: int, several_axes: Coup
         several_axes: a mirror that is drawn, in place of that of the mission.
     """
     assert isinstance(file, MissionFile)
-    light_w = tracking_light_w(file)
+    light_w, arrival = tracking_light_w(file), arrival_of(file)
     scene: controller_study.AnyScene
     if several_axes is None:
-        scene = coupled_study.of_mission(file, mirror.of(file.mission), light_w)
+        scene = coupled_study.of_mission(file, mirror.of(file.mission), light_w, arrival)
     else:
-        scene = coupled_study.scene(file, several_axes, light_w)
+        scene = coupled_study.scene(file, several_axes, light_w, arrival)
     if isinstance(scene, controller_study.Scene) and table.axes == "one":
         scene = replace(scene, loop=scene.axis)
     return MissionLoop(table, scene, scene.on(table.mirror), span(table, settings(file), seed))

@@ -107,7 +107,12 @@ def table(given: FinePointing | None) -> FinePointing:
     return given
 
 
-def scene(file: MissionFile, mirrors: MirrorParts, received_power_w: float | None) -> Scene:
+def scene(
+    file: MissionFile,
+    mirrors: MirrorParts,
+    received_power_w: float | None,
+    arrival: disturbance.Arrival | None = None,
+) -> Scene:
     """The fine-pointing loop of a mission, assembled once.
 
     Args:
@@ -115,6 +120,8 @@ def scene(file: MissionFile, mirrors: MirrorParts, received_power_w: float | Non
         mirrors: The mission's mirror, `mirror.of`.
         received_power_w: Light on the tracking sensor (W), `link.tracking_light_w`; None where the table gives the
             sensor's noise.
+        arrival: Spectrum of the angle at which that light arrives, `link.arrival_of`; None where the terminal flies or
+            the air is still.
 
     Raises:
         ValueError: The mission has no such loop, or it cannot be built; says why.
@@ -123,7 +130,7 @@ def scene(file: MissionFile, mirrors: MirrorParts, received_power_w: float | Non
     chain = optics(f, m.conventions.mirror_angle)
     one = mirrors.own[Variant.GIVEN].plant
     base, period = control.drive_from_mission(m), 1.0 / f.rate_hz
-    each_axis = disturbances(f, file.path.parent, file.contents)
+    each_axis = disturbances(file, f, arrival)
     gauge = f.strain_gauge
     loop = fine.PointingLoop(
         mirror=mirror.combine(*[one] * chain.outputs),
@@ -190,24 +197,33 @@ def with_mirror(loop: fine.PointingLoop, mirrors: MirrorParts, variant: Variant)
     return replace(loop, mirror=mirror.combine(*[mirrors.own[variant].plant] * loop.mirror.actuators))
 
 
-def disturbances(f: FinePointing, folder: Path, contents: tuple[NamedFile, ...]) -> tuple[disturbance.Disturbance, ...]:
-    """Vibration, wheels and body pointing of one axis.
+def disturbances(
+    file: MissionFile, f: FinePointing, arrival: disturbance.Arrival | None
+) -> tuple[disturbance.Disturbance, ...]:
+    """Vibration, wheels and body pointing of one axis, and the angle at which the tracked light arrives.
 
     Args:
-        f: The mission's fine-pointing table.
-        folder: Folder that a file of the vibration is named from.
-        contents: Files that are held already; they are not read again.
+        file: The mission, with the folder that a file of the vibration is named from, and files that are held already.
+        f: Its fine-pointing table.
+        arrival: Spectrum of the angle of arrival, None where the tracked light comes through no turbulent air.
 
     Raises:
-        ValueError: The file cannot be read, or no filter has its spectrum.
+        ValueError: The file cannot be read, no filter has its spectrum, or the angle of arrival is missing.
     """
     body = f.body
-    found = [vibration(f.vibration, folder, contents)]
+    found = [vibration(f.vibration, file.path.parent, file.contents)]
     if f.wheels is not None:
         w = f.wheels
         found.append(disturbance.wheels(w.speed_hz, w.harmonics, w.coefficients_rad_hz2, convention=w.convention))
     body_error = disturbance.body_pointing(body.error_rad, body.sigmas, body.bandwidth_hz, convention=body.convention)
     found.append(replace(body_error, name=BODY_POINTING))
+    if arrival is not None:
+        found.append(disturbance.angle_of_arrival(arrival))
+    elif file.mission.loop_in_turbulence:
+        raise ValueError(
+            "the tracked light comes down through the turbulence of channel.turbulence: give the spectrum of its angle "
+            "of arrival, which link.arrival_of has"
+        )
     return tuple(found)
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from microrad.core.arrays import Floats
-from microrad.loop import control
+from microrad.loop import control, disturbance
 from microrad.loop.controller_study import scenario
 from microrad.loop.coupled_study.whole import alone
 from microrad.loop.pointing_loop.design import read_each_sample, whole_plant
@@ -87,7 +87,12 @@ class CoupledScene(scenario.AnyScene):
         return tuple(np.abs(drives).tolist())
 
 
-def scene(file: MissionFile, mirror: CoupledMirror, received_power_w: float | None) -> CoupledScene:
+def scene(
+    file: MissionFile,
+    mirror: CoupledMirror,
+    received_power_w: float | None,
+    arrival: disturbance.Arrival | None = None,
+) -> CoupledScene:
     """The fine-pointing loop of a mission with a mirror of several axes, assembled once.
 
     The delay of the mirror's recordings stays out: the mission's own delay and amplifier take its place. The drives
@@ -98,6 +103,8 @@ def scene(file: MissionFile, mirror: CoupledMirror, received_power_w: float | No
         mirror: The mirror.
         received_power_w: Light on the tracking sensor (W), `link.tracking_light_w`; None where the table gives the
             sensor's noise.
+        arrival: Spectrum of the angle at which that light arrives, `link.arrival_of`; None where the terminal flies
+            or the air is still.
 
     Raises:
         ValueError: The mission has no such loop, or the mirror cannot be its mirror; says why.
@@ -121,7 +128,7 @@ def scene(file: MissionFile, mirror: CoupledMirror, received_power_w: float | No
             f"{drive.maximum_v:g} V about their bias, and rest has to lie inside: set amplifier.output_min, "
             "amplifier.output_max and amplifier.gain for this mirror"
         )
-    each_axis = scenario.disturbances(f, file.path.parent, file.contents)
+    each_axis = scenario.disturbances(file, f, arrival)
     period = 1.0 / f.rate_hz
     loop = PointingLoop(
         mirror=mirror.mirror,
@@ -166,7 +173,12 @@ def _stroke(
     )
 
 
-def of_mission(file: MissionFile, mirrors: MirrorParts, received_power_w: float | None) -> scenario.AnyScene:
+def of_mission(
+    file: MissionFile,
+    mirrors: MirrorParts,
+    received_power_w: float | None,
+    arrival: disturbance.Arrival | None = None,
+) -> scenario.AnyScene:
     """The fine-pointing loop of a mission: with the mirror of several axes that it names, else its mirror on each axis.
 
     Args:
@@ -174,14 +186,16 @@ def of_mission(file: MissionFile, mirrors: MirrorParts, received_power_w: float 
         mirrors: The mission's mirror, `mirror.of`.
         received_power_w: Light on the tracking sensor (W), `link.tracking_light_w`; None where the table gives the
             sensor's noise.
+        arrival: Spectrum of the angle at which that light arrives, `link.arrival_of`; None where the terminal flies
+            or the air is still.
 
     Raises:
         ValueError: The mission has no such loop, or it cannot be built; says why.
     """
     several = mirror_of_loop(file)
     if several is None:
-        return scenario.scene(file, mirrors, received_power_w)
-    return scene(file, coupled.of(several), received_power_w)
+        return scenario.scene(file, mirrors, received_power_w, arrival)
+    return scene(file, coupled.of(several), received_power_w, arrival)
 
 
 def _gains(mirror: CoupledMirror, drive_range_v: tuple[float, float]) -> tuple[list[float], ...]:

@@ -17,7 +17,7 @@ import numpy as np
 from microrad import mirror
 from microrad.core import lti
 from microrad.core.arrays import Floats
-from microrad.link import tracking_light_w
+from microrad.link import arrival_of, tracking_light_w
 from microrad.loop import control, controller_study, paper_cases
 from microrad.loop import sine_run as simulate
 from microrad.loop.controller_study import parts
@@ -94,7 +94,7 @@ def _controller(file: MissionFile, name: str) -> Controller:
             "has its controllers, and a run of the mission simulates them"
         )
     else:
-        made = _fine(controller_study.scene(file, mirrors, tracking_light_w(file)), name)
+        made = _fine(controller_study.scene(file, mirrors, tracking_light_w(file), arrival_of(file)), name)
     text = "" if file.mirror_file is None else file.mirror_file.text
     return replace(made, warnings=mirror_warnings(mirrors.table.linear is not None, text))
 

@@ -41,7 +41,7 @@ def _closed(file: LinkFile) -> ClosedLoop:
         raise ValueError("error_budget.with_loop is true, and the mission has no mirror and no loop to be a source")
     if mirror_of_loop(file) is not None:
         raise ValueError("the loop's mirror has several axes: microrad run has the budget with what that loop leaves")
-    scene = controller_study.scene(file, mirror.of(file.mission), link.tracking_light_w(file))
+    scene = controller_study.scene(file, mirror.of(file.mission), link.tracking_light_w(file), link.arrival_of(file))
     return close(scene.theory, kept.of_user().part(_designed, scene).controller)
 
 
