@@ -155,8 +155,9 @@ def test_wander_has_the_constant_that_is_asked_for():
     radius = lambda z: 0.03 * math.hypot(1.0, 2.0 * z / (LOW.wavenumber * 0.03**2))  # noqa: E731
     wanted = over_height(lambda h, z: (1.0 - z / 900e3) ** 2 * radius(z) ** (-1 / 3))
     assert up.wander_rms_rad("dios-2004") ** 2 == pytest.approx(2.07 * wanted, rel=1e-7)
+    assert up.wander_rms_rad("itu-r-p1622") ** 2 == pytest.approx(3.4339 * wanted, rel=1e-4)
     assert up.wander_rms_rad("andrews-phillips-2005") ** 2 == pytest.approx(7.25 * wanted, rel=1e-7)
-    with pytest.raises(ValueError, match='the convention "dios" is none of dios-2004, andrews-phillips-2005'):
+    with pytest.raises(ValueError, match='the convention "dios" is none of dios-2004, itu-r-p1622, andrews-phillips-2005'):
         up.wander_rms_rad("dios")
 
 
