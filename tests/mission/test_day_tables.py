@@ -25,6 +25,7 @@ from microrad.mission.file import MissionError, load_link, load_mission
 from microrad.mission.tables.operations import Constellation, Downlink
 from microrad.orbit import operations
 from microrad.orbit.base import required
+from optical_files import KIRUNA_SITE, optical, shared_stations
 from shipped import SHIPPED, edited_file, without_fine_pointing
 
 
@@ -42,10 +43,34 @@ def without(table, key):
     return {k: v for k, v in table.items() if k != key}
 
 
+NETWORK = "operations.optical"
+AT_KIRUNA = {**KIRUNA_SITE, "availability": 0.5}
+SHARED_KIRUNA = {**AT_KIRUNA, "terminals": 1, "data_rate": "1 Gbit/s"}
+WITH_STATIONS = optical({"kiruna": 0.5}) | {"constellation.stations": {"kiruna": SHARED_KIRUNA}}
+
+
 # -------------------------------------------------------------------------------------------------- one key at a time
 ANGLE = "an angle with its unit"
 REFUSED = [
     # key, value, reason, advice; a value of None takes the key out
+    (f"{NETWORK}.weather", "0 h", "is not above 0 s", 'weather = "5 h"'),
+    (f"{NETWORK}.correlation_length", "-1 km", "is below 0 m", 'correlation_length = "5 km"'),
+    (f"{NETWORK}.correlation_length", "500", "is a number without a unit", 'correlation_length = "500 km"'),
+    (f"{NETWORK}.data_rate", None, "is missing", "a data rate with its unit"),
+    (f"{NETWORK}.stations", {}, "holds no station", "a table such as [operations.optical.stations.tenerife]"),
+    (f"{NETWORK}.stations", {f"s{k}": AT_KIRUNA for k in range(101)}, "holds 101 stations", "at most 100"),
+    (f"{NETWORK}.stations.kiruna.availability", 1.01, "is above 1", "at most 1, or a list of 12 such, January to"),
+    (f"{NETWORK}.stations.kiruna.availability", -0.01, "is below 0", "at least 0"),
+    (f"{NETWORK}.stations.kiruna.availability", "70 %", "is not a plain number", "a number without quotes"),
+    (f"{NETWORK}.stations.kiruna.availability", [0.5] * 11, "is a list of 11, and a year has 12 months", "December"),
+    (f"{NETWORK}.stations.kiruna.availability", [0.5] * 11 + [1.5], "item 12: 1.5 is above 1", "a list of 12"),
+    (f"{NETWORK}.stations.kiruna.availability", None, "is missing", "a list of 12 such, January to December"),
+    (f"{NETWORK}.stations.kiruna.mask", "95 deg", "is above", "an angle with its unit"),
+    ("constellation.stations.kiruna.terminals", 0, "is below 1", "a whole number without quotes, from 1 to 100"),
+    ("constellation.stations.kiruna.terminals", None, "is missing", "a whole number without quotes"),
+    ("constellation.stations.kiruna.data_rate", "0 bit/s", "is not above 0 bit/s", "a data rate with its unit"),
+    ("constellation.stations.kiruna.availability", 2, "is above 1", "a list of 12 such"),
+    ("constellation.stations.east", SHARED_KIRUNA, "is the name of a relay, too", "a name of its own"),
     ("orbit.epoch", "2026-03-20T12:00:00", "is not a date and time with a Z for UTC", f"epoch = {EPOCH}"),
     ("orbit.epoch", "2026-03-20T12:00:00+00:00", "is not a date and time with a Z for UTC", f"epoch = {EPOCH}"),
     ("orbit.epoch", "2026-02-30T12:00:00Z", "is no date: day is out of range for month", f"epoch = {EPOCH}"),
@@ -129,13 +154,15 @@ REFUSED = [
 @pytest.mark.promise("day-7", "day-8", "day-16")
 @pytest.mark.parametrize(("key", "value", "reason", "advice"), REFUSED)
 def test_a_key_is_refused_with_its_value_the_reason_and_what_to_do(tmp_path, key, value, reason, advice):
-    path = day_path(tmp_path, {key: value})
+    path = day_path(
+        tmp_path, WITH_STATIONS if key.startswith((NETWORK, "constellation.stations")) else {}, {key: value}
+    )
     (fault,) = faults(path)
     assert fault.key == key
     assert fault.reason.startswith(reason)
     assert advice in fault.expected
     line = path.read_text(encoding="utf-8").splitlines()[fault.line - 1]
-    if value is None or value == {}:
+    if value is None or isinstance(value, dict):
         assert fault.value == ""
         assert line.startswith("[")  # the header of the table that lacks it
     else:
@@ -535,3 +562,24 @@ def test_tables_with_stations_and_relays_are_hashed_by_what_is_in_them(tmp_path)
     assert hash(one.constellation) != hash(other.constellation)
     assert isinstance(one.constellation, Constellation)
     assert isinstance(one.operations.downlink, Downlink)
+
+
+# ------------------------------------------------------------------------------------------- stations under the weather
+def test_availability_is_one_number_or_twelve(tmp_path):
+    by_month = [0.05 * month for month in range(1, 13)]
+    for given, taken in ((0.7, (0.7,)), (1, (1.0,)), (by_month, tuple(by_month))):
+        o = day_file(tmp_path, optical({"kiruna": given})).mission.operations
+        assert o.optical.stations["kiruna"].availability == taken
+
+
+def test_the_tables_of_stations_are_equal_and_hashed_by_what_is_in_them(tmp_path):
+    made = [day_file(tmp_path, WITH_STATIONS).mission for _ in range(2)]
+    other = day_file(tmp_path, optical({"kiruna": 0.6}) | shared_stations("kiruna")).mission
+    for table in (lambda m: m.operations.optical, lambda m: m.constellation):
+        assert table(made[0]) == table(made[1]) and hash(table(made[0])) == hash(table(made[1]))
+        assert table(made[0]) != table(other) and hash(table(made[0])) != hash(table(other))
+
+
+def test_a_constellation_needs_no_station_and_a_day_no_network(tmp_path):
+    m = day_file(tmp_path).mission
+    assert m.operations.optical is None and m.constellation.stations == {}

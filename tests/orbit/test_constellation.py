@@ -4,6 +4,8 @@ import csv
 import io
 import itertools
 import math
+import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,7 +17,15 @@ from microrad.orbit import constellation, files, operations
 from microrad.orbit import day as day_study
 from microrad.orbit.constellation import opportunities
 from microrad.orbit.propagation import mean_elements
-from microrad.report.day.constellation import plan_data, plan_sentences, plan_text, satellites_table
+from microrad.report import registry
+from microrad.report.day.constellation import (
+    partners_table,
+    plan_data,
+    plan_sentences,
+    plan_text,
+    satellites_table,
+)
+from optical_files import shared_stations
 
 SIX_HOURS = {"orbit.duration": "6 h"}
 TWO_TERMINALS = {"constellation.terminals": 2}
@@ -321,3 +331,131 @@ def test_the_tables_that_a_plan_needs(tmp_path):
     links = link_study.run_link_study(day_file(tmp_path, {"constellation": None}))
     with pytest.raises(operations.OperationsError, match=r"no table \[constellation\]"):
         constellation.run_constellation(links.file, loss)
+
+
+# ------------------------------------------------------------------------------------------------------ ground stations
+THREE_SITES = ("kiruna", "tromso", "tenerife")
+STATIONS = shared_stations(*THREE_SITES)
+
+
+@pytest.fixture(scope="module")
+def with_stations(tmp_path_factory):
+    return planned(tmp_path_factory.mktemp("plan"), SIX_HOURS, STATIONS)[0]
+
+
+def grounds_of(folder, *changes):
+    file = day_file(folder, SIX_HOURS, STATIONS, *changes)
+    pair, own, relays = made(folder, SIX_HOURS, STATIONS, *changes)
+    return pair, own, relays, constellation.grounds(file.mission.constellation)
+
+
+def test_contacts_with_stations_are_their_passes_one_by_one(tmp_path):
+    pair, own, relays, ground = grounds_of(tmp_path)
+    whole = (0.0, 86400.0)
+    rows = as_rows(opportunities(own, relays, pair.earth, pair.epoch, whole, stations=ground))
+    count = 0
+    for (k, satellite), (j, each) in itertools.product(enumerate(own), enumerate(ground, len(relays))):
+        alone = [(p.start_s, p.end_s) for p in orbit.passes(satellite.orbit, each.station, pair.epoch, whole)]
+        mine = [(start, end) for s, r, start, end in rows if (s, r) == (k, j)]
+        np.testing.assert_allclose(np.reshape(mine, (-1, 2)), np.reshape(alone, (-1, 2)), rtol=0, atol=1e-6)
+        count += len(mine)
+    assert count > 200
+    relays_alone = as_rows(opportunities(own, relays, pair.earth, pair.epoch, whole))
+    assert relays_alone == [row for row in rows if row[1] < len(relays)]
+
+
+def test_stations_alone_and_none_at_all(tmp_path):
+    pair, own, _, ground = grounds_of(tmp_path)
+    alone = as_rows(opportunities(own[:2], (), pair.earth, pair.epoch, pair.span_s, stations=ground))
+    assert {row[1] for row in alone} <= {0, 1, 2} and alone
+    assert as_rows(opportunities(own[:2], (), pair.earth, pair.epoch, pair.span_s)) == []
+
+
+def test_a_station_is_in_reach_up_to_the_range_of_its_lowest_rate(tmp_path):
+    pair, own, relays, ground = grounds_of(tmp_path)
+    rates = operations.RateTable((operations.Step(1e9, 800e3), operations.Step(1e8, 1200e3)))
+    near = [replace(ground[0], rates=rates), *ground[1:]]
+    rows = as_rows(opportunities(own, relays, pair.earth, pair.epoch, pair.span_s, stations=near))
+    time_s, station = np.arange(0.0, 21600.0) + 0.5, ground[0].station
+    place, up = station.position(pair.epoch, time_s).position_m, station.vertical(pair.epoch, time_s)
+    total = 0
+    for k, satellite in enumerate(own):
+        line = satellite.orbit.states(time_s).position_m - place
+        range_m = np.linalg.norm(line, axis=0)
+        high = np.sum(line * up, axis=0) > range_m * math.sin(station.mask_rad)
+        seen = np.zeros(time_s.size, dtype=bool)
+        mine = [(start, end) for s, r, start, end in rows if (s, r) == (k, len(relays))]
+        for start, end in mine:
+            seen |= (start <= time_s) & (time_s <= end)
+        assert np.sum(seen != (high & (range_m <= 1200e3))) <= 2 * len(mine)
+        total += int(np.sum(high) - np.sum(seen))
+    assert total > 500  # seconds above the mask and too far
+
+
+def test_each_partner_has_terminals_of_its_own():
+    zeros = np.zeros(6, dtype=np.int64)
+    views = operations.Opportunities(np.arange(6), zeros.copy(), np.zeros(6), np.full(6, 100.0))
+    views.relay[3:] = 1
+    rules = operations.Rules(1.0, 50.0, 100.0)
+    found = operations.schedule(views, 6, 2, [1, 2], rules, 0.0)
+    assert sorted(zip(found.relay.tolist(), found.terminal.tolist(), strict=True)) == [(0, 0), (1, 0), (1, 1)]
+    one, each = (operations.schedule(views, 6, 2, count, rules, 0.0) for count in (2, [2, 2]))
+    for name in ("satellite", "relay", "terminal", "start_s", "end_s"):
+        assert np.array_equal(getattr(one, name), getattr(each, name)), name
+    assert one.relay.size == 4
+
+
+def test_relays_and_stations_share_the_satellites(with_stations, plan):
+    p = with_stations
+    assert (p.relays, p.stations, p.station_terminals) == (("east", "west"), THREE_SITES, (1, 1, 1))
+    assert p.by_relay.sessions.size == 2 and p.by_station.sessions.size == 3
+    assert np.sum(p.by_relay.sessions) + np.sum(p.by_station.sessions) == len(p.planned)
+    assert np.sum(p.by_relay.volume_bit) + np.sum(p.by_station.volume_bit) == pytest.approx(p.volume_bit, rel=1e-12)
+    assert np.all(p.by_station.sessions > 3) and p.volume_bit > plan.volume_bit
+    assert (plan.stations, plan.station_use.size) == ((), 0)
+    for index, count in ((p.sessions.satellite, len(p.satellites)), (p.sessions.relay * 10 + p.sessions.terminal, 60)):
+        for one in range(count):
+            mine = np.flatnonzero(index == one)
+            begins, ends = p.sessions.start_s[mine], p.sessions.end_s[mine]
+            assert np.all(begins[1:] >= ends[:-1] - 1e-9)
+    seconds = sum(s.end_s - s.start_s for s in p.planned if s.relay == "tenerife")
+    assert p.station_use[2] == pytest.approx(seconds / 21600.0, rel=1e-12)
+
+
+def test_a_station_has_its_rate_and_its_volume_is_the_expected_one(tmp_path, with_stations):
+    at = [s for s in with_stations.planned if s.relay == "tenerife"]
+    for one in at:
+        assert one.volume_bit == pytest.approx(1e9 * (one.end_s - one.locked_s), rel=1e-12)
+        assert 500e3 < one.range_min_m <= one.range_max_m < 2000e3
+    cloudy = planned(tmp_path, SIX_HOURS, shared_stations(*THREE_SITES, availability=[0.0] * 2 + [0.4] + [0.0] * 9))[0]
+    assert [s.start_s for s in cloudy.planned] == [s.start_s for s in with_stations.planned]
+    np.testing.assert_allclose(cloudy.by_station.volume_bit, 0.4 * with_stations.by_station.volume_bit, rtol=1e-12)
+    np.testing.assert_array_equal(cloudy.by_relay.volume_bit, with_stations.by_relay.volume_bit)
+    assert np.all(cloudy.by_station.volume_bit > 0.0)
+
+
+def test_plan_table_data_and_contact_plan_name_the_stations(with_stations, plan):
+    said = " ".join(plan_sentences(with_stations))
+    count = sum(s.relay in THREE_SITES for s in with_stations.planned)
+    assert "12 satellites share 2 relays of one terminal each and 3 ground stations of 3 terminals in all: in" in said
+    assert f"Of these, {count} sessions are with ground stations" in said
+    assert "ground station" not in " ".join(plan_sentences(plan))
+    rows = partners_table(with_stations).rows
+    assert [row[0] for row in rows] == ["east", "west", *THREE_SITES] and partners_table(plan) is None
+    assert [row[2] for row in rows[2:]] == [str(n) for n in with_stations.by_station.sessions]
+    data = plan_data(with_stations)
+    assert [each["name"] for each in data["stations"]] == list(THREE_SITES) and "stations" not in plan_data(plan)
+    assert sum(each["volume_bit"] for each in data["stations"]) == pytest.approx(
+        float(np.sum(with_stations.by_station.volume_bit))
+    )
+    names = [name for name, _ in registry.flattened({"constellation": data})]
+    assert registry.unregistered(names) == []
+    text = with_stations.contact_plan().splitlines()
+    assert [line for line in text if line.startswith("# node 1") and "kiruna" in line] == ['# node 15 is "kiruna"']
+    assert any(re.fullmatch(r"a contact \+\d+ \+\d+ \d+ 17 125000000", line) for line in text)
+
+
+def test_a_satellite_and_a_station_of_one_name_are_refused(tmp_path):
+    clash = {"constellation.stations": {"1-1": STATIONS["constellation.stations"]["kiruna"]}}
+    with pytest.raises(orbit.OrbitError, match='a satellite and a station are called "1-1"; give each its own name'):
+        planned(tmp_path, SIX_HOURS, clash)
