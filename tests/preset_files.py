@@ -6,7 +6,7 @@ from microrad.mission.presets import preset_text
 from microrad.mission.toml import scan
 
 NAMES = (
-    *("click", "crosslink", "dsoc", "ground-downlink", "leo-hicali", "llcd", "oicets-artemis"),
+    *("click", "crosslink", "dsoc", "ground-downlink", "leo-hicali", "llcd", "oicets-artemis", "opals"),
     *("paper", "qpsk-crosslink", "sda-crosslink", "sentinel1-edrs", "spot4-artemis", "tbird"),
 )
 
@@ -119,7 +119,20 @@ EXAMPLES = {
         "channel.zenith_transmission": "0.9",
         "channel.elevation": '"40 deg"',
         "communication.transmit_power": '"1 W"',
-        "communication.distance": '"800 km"',
+    },
+    "opals": {
+        **OWN,
+        **SENSITIVITY,
+        **ERROR,
+        **HOLE,
+        **LOSSES,
+        "terminals.leo_aperture": '"2 mm"',
+        "channel.zenith_transmission": "0.9",
+        "channel.turbulence.ground_strength": "1.7e-14",
+        "channel.turbulence.wind_rms": '"21 m/s"',
+        "answer.pointing_error": '"50 urad"',
+        "answer.receive_optics_loss": '"3 dB"',
+        "answer.required_power": '"10 pW"',
     },
     "click": {
         **BODY,
