@@ -230,6 +230,11 @@ GIVEN = {
     "beacon.required_power": '"10 pW"',
     "channel.zenith_transmission": "0.8",
     "channel.elevation": '"40 deg"',
+    "channel.turbulence.ground_strength": "1.2e-14",
+    "channel.turbulence.wind_rms": '"19 m/s"',
+    "answer.pointing_error": '"40 urad"',
+    "answer.receive_optics_loss": '"1 dB"',
+    "answer.required_power": '"10 pW"',
     "communication.transmit_power": '"1 W"',
     "communication.strehl": "0.9",
     "communication.pointing_error": '"5 urad"',
@@ -470,7 +475,7 @@ def export_matrices(place: Place) -> Any:
 
 # ---------------------------------------------------------------------------------------------------------------- list
 PRESETS = (
-    *("click", "crosslink", "dsoc", "leo-hicali", "llcd", "oicets-artemis"),
+    *("click", "crosslink", "dsoc", "ground-downlink", "leo-hicali", "llcd", "oicets-artemis", "opals"),
     *("paper", "qpsk-crosslink", "sda-crosslink", "sentinel1-edrs", "spot4-artemis", "tbird"),
 )
 

@@ -21,7 +21,7 @@ from sgp4.api import WGS72, Satrec
 from sgp4.exporter import export_omm, export_tle
 
 from reference import told
-from reference.cases import GALLERY, NO_DAY, Case, Place, arrays, without
+from reference.cases import GALLERY, NO_DAY, ROOT, Case, Place, arrays, without
 from reference.scenes import BUDGET, PAPER, SHORT, TWO_AXES, edited, generic
 
 PROGRAMS = Path(__file__).parent / "programs"
@@ -30,6 +30,7 @@ PROGRAMS = Path(__file__).parent / "programs"
 DAY_TABLES = "acquisition", "orbit", "operations", "constellation"
 LOOP_TABLES = "fine_pointing", "mirror", "amplifier", "control", "scenario"
 WITHOUT_LOOP = dict.fromkeys(("conventions.residual", "conventions.mirror_angle", "requirement.residual_statistic"))
+GROUND = (ROOT / "src/microrad/mission/missions/presets/ground-downlink.toml").read_text(encoding="utf-8")
 LINKS_ALONE = edited(without(PAPER, *DAY_TABLES, *LOOP_TABLES), WITHOUT_LOOP)
 BY_FILE = {"constellation.pattern": '"file"', "constellation.file": '"satellites.tle"'}
 BY_FILE |= {f"constellation.{key}": None for key in ("satellites", "planes", "phasing")}
@@ -861,6 +862,58 @@ def refused_orbits(place: Place) -> list[str]:
     return found + listed(place, "contacts", place.write("mission.toml", edited(text, {}, more)))
 
 
+# -------------------------------------------------------------------------------------------------------------- ground
+FIBRE = """
+[communication.coupling]
+into = "single-mode fibre"
+mode_radius = "best"
+"""
+UP = {
+    "orbit.leo.kind": '"station"',
+    **{f"orbit.leo.{key}": None for key in ("altitude", "inclination", "local_time", "phase", "gravity")},
+    "orbit.leo.latitude": '"41.3 deg"',
+    "orbit.leo.longitude": '"12.7 deg"',
+    "orbit.leo.height": '"730 m"',
+    "orbit.leo.mask": '"23 deg"',
+    "orbit.geo.kind": '"circular"',
+    **{f"orbit.geo.{key}": None for key in ("latitude", "longitude", "height", "mask")},
+    "orbit.geo.altitude": '"570 km"',
+    "orbit.geo.inclination": '"63 deg"',
+    "orbit.geo.node": '"17 deg"',
+    "orbit.geo.phase": '"71 deg"',
+    "orbit.geo.gravity": '"j2"',
+}
+IN_GROUND: Mapping[str, tuple[str, Changes]] = {
+    "down": ("", {}),
+    "fibre": (FIBRE, {"channel.turbulence.corrected_modes": "21", "channel.turbulence.fades": '"log-normal"'}),
+    "no-optics": (FIBRE, {"channel.turbulence.tilt": '"gradient"', "jitter.bandwidth": '"31 Hz"'}),
+    "up": ("", UP | {"channel.turbulence.wander": '"itu-r-p1622"'}),
+}
+REFUSED_GROUND: Mapping[str, Changes] = {
+    "distance": {"communication.distance": '"1000 km"'},
+    "elevation": {"channel.elevation": '"20 deg"'},
+    "mask": {"orbit.geo.mask": '"5 deg"'},
+    "modes": {"channel.turbulence.corrected_modes": "2"},
+    "wind": {"channel.turbulence.wind_rms": None},
+    "outage": {"requirement.outage": None, "jitter.bias": None},
+    "sky": {"channel.zenith_transmission": "0.9"},
+    "limits": {"orbit.geo.height": None},
+}
+
+
+def ground(place: Place) -> list[str]:
+    """A link to a station down and up, into a fibre, in still air, and with faults."""
+    text, found = generic(GROUND, 71), list[str]()
+    for name, (more, changes) in IN_GROUND.items():
+        path = place.write(f"{name}.toml", edited(text, changes, more))
+        found += place.told("budget", path, "--verbose") + place.told("contacts", path)
+    still = place.write("still.toml", without(text, r"channel\.turbulence"))
+    found += place.told("budget", still)
+    for name, changes in REFUSED_GROUND.items():
+        found += place.told("budget", place.write(f"{name}.toml", edited(GROUND, changes)))
+    return found
+
+
 # --------------------------------------------------------------------------------------------------------------- loops
 SOURCES = """name,class,size,rate,statistic,axes,x,y,corner,frequency,period,decay,origin
 mounting,constant,2.1 urad,,3-sigma,each,1,0.5,,,,,ground calibration
@@ -980,6 +1033,7 @@ CASES: Mapping[str, Case] = {
     "export-refused": Case(refused_exports),
     "orbits": Case(orbits, quick=False),
     "orbits-refused": Case(refused_orbits),
+    "ground": Case(ground),
     "loops": Case(loops, quick=False),
     "design-axes": Case(design_of_axes, quick=False),
     "library-links": Case(links_by_numbers),
