@@ -128,8 +128,10 @@ def pointing(
     from microrad.mission.file import MissionFile, load_link, load_mission
     from microrad.report.error_budget.data import budget_data
     from microrad.report.error_budget.page import budget_view
+    from microrad.report.fine_pointing.data import arrival as arrival_data
     from microrad.report.fine_pointing.simulated_windows import simulated_data, simulated_view
     from microrad.report.fine_pointing.windows import windows_data, windows_text
+    from microrad.report.fine_pointing.words import arrival
     from microrad.report.view import views_text
 
     mission = load_link(file)
@@ -152,7 +154,9 @@ def pointing(
             closed = close(scene.theory, made)
             errors = windowed_errors(closed, indices)
         data["controller"] = controller
-        told("indices", lambda: windows_data(errors), lambda: windows_text(errors, controller, width()))
+        said = arrival(scene.loop)
+        told("indices", lambda: windows_data(errors), lambda: windows_text(errors, controller, width(), said))
+        data |= arrival_data(scene)
         if simulate is not None:
             kept, left_out = (indices, []) if window or spacing else _fitting(scene, indices)
             errors_of_runs, lost, coded = _simulated(loop, scene, made, kept, simulate)

@@ -269,6 +269,19 @@ def _needs_operations(operations: Operations | None, constellation: Constellatio
         yield Problem("constellation", reason, "the table [operations], which microrad init writes")
 
 
+def _leo_flies(
+    orbit: Orbits | None, operations: Operations | None, constellation: Constellation | None
+) -> Iterator[Problem]:
+    """What only a terminal that flies can have: stations below it, and others like it."""
+    if orbit is None or orbit.station != "leo":
+        return
+    beside = {} if operations is None else {f"operations.{name}": getattr(operations, name) for name in _BELOW}
+    for key, table in {**beside, "constellation": constellation}.items():
+        if table is not None:
+            reason = 'stands beside orbit.leo of kind "station", and means a satellite there'
+            yield Problem(key, reason, "the table removed, or the station as orbit.geo and the satellite as orbit.leo")
+
+
 def _scan_there(operations: Operations | None, acquisition: Acquisition | None) -> Iterator[Problem]:
     """A scan that the mission has."""
     there = acquisition is not None and acquisition.scan is not None
@@ -277,6 +290,9 @@ def _scan_there(operations: Operations | None, acquisition: Acquisition | None) 
     reason = 'is "scan", and the mission has no table acquisition.scan'
     yield Problem("operations.acquisition", reason, 'the table [acquisition.scan], or "wide beacon"')
 
+
+_BELOW = ("downlink", "optical")
+"""Ways from a satellite straight to the ground, tables of the operations."""
 
 Relation = tuple[tuple[str, ...], Callable[..., Iterator[Problem]]]
 
@@ -294,6 +310,7 @@ LINK_RELATIONS: tuple[Relation, ...] = (
     (("orbit", "constellation"), _needs_orbit("constellation")),
     (("operations", "acquisition"), _scan_there),
     (("operations", "constellation"), _needs_operations),
+    (("orbit", "operations", "constellation"), _leo_flies),
 )
 """What has to fit between tables of the link: their names, and a check that takes them and yields what does not."""
 

@@ -35,7 +35,7 @@ def arrival_of(file: MissionFile) -> Arrival | None:
         file: The mission.
 
     Raises:
-        ValueError: For air that rests somewhere over the station: it has no spectrum.
+        ValueError: For air that rests somewhere over the station, which has no spectrum, and a wind that is none.
     """
     m, f = file.mission, file.mission.fine_pointing
     if f is None or m.channel is None or m.channel.turbulence is None or not m.loop_in_turbulence:
@@ -44,7 +44,11 @@ def arrival_of(file: MissionFile) -> Arrival | None:
     assert shared.sky is not None  # there is a path
     slant = shared.sky.slant(m.answer.wavelength_m, shared.range_m(m.answer))
     assert slant is not None  # there is turbulence
-    down, wind = Downlink(slant), air.wind_of(table, f.reference.line_of_sight_rate_rad_s)
+    down = Downlink(slant)
+    try:
+        wind = air.wind_of(table, f.reference.line_of_sight_rate_rad_s)
+    except ValueError as error:
+        raise ValueError(f"channel.turbulence.wind_rms has no wind over height that holds: {error}") from None
     speed = wind.speed_m_s(slant.layers()[0])
     if not float(np.min(speed)) > 0.0:
         raise ValueError(

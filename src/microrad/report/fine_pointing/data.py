@@ -17,6 +17,7 @@ from microrad.loop.controller_study import (
     Verified,
     families,
 )
+from microrad.loop.disturbance import ANGLE_OF_ARRIVAL
 from microrad.mirror.geometry import StrokeBudget
 from microrad.report.data import fields, finite
 from microrad.report.fine_pointing.words import room
@@ -51,8 +52,15 @@ def fine_pointing_data(fine: FinePointingStudy, required: float) -> dict[str, An
         "stroke": {name: [_stroke(axis) for axis in several] for name, several in stroke.items()},
         "sines": [_sine(s, required) for s in fine.sines],
     }
+    found |= arrival(fine.scene)
     plain: dict[str, Any] = finite(found)
     return plain
+
+
+def arrival(scene: AnyScene) -> dict[str, Any]:
+    """The angle of arrival of an axis before the loop, by its key; nothing where the loop has none."""
+    here = [each for each in scene.loop.disturbances[0] if each.name == ANGLE_OF_ARRIVAL]
+    return {"angle_of_arrival": fields(here[0], "rms_rad", "basis", "source")} if here else {}
 
 
 def parameter_units(scene: AnyScene) -> dict[str, str]:

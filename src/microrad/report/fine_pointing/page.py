@@ -35,6 +35,7 @@ def fine_pointing_view(fine: FinePointingStudy, required: float, figures: Sequen
         told(
             verdict,
             Soft(setting(fine)),
+            *words.arrival(fine.scene.loop),
             residuals_view(fine, required),
             designs_view(fine),
             sources_view(fine),

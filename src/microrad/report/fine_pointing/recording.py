@@ -10,6 +10,7 @@ from microrad.loop.disturbance.recorded_fit import FITTED, RecordedFit
 from microrad.loop.pointing_loop.loop import PointingLoop
 from microrad.loop.pointing_loop.played import AGREEMENT, RecordedResidual
 from microrad.report.data import fields
+from microrad.report.fine_pointing.words import arrival, listed
 from microrad.report.quantities import angle, micro, minus, percent
 from microrad.report.tables import Table, tables_text
 
@@ -36,9 +37,10 @@ def recording_text(path: str, axes: Sequence[RecordedAxis], loop: PointingLoop, 
     """
     first = axes[0].fit.motion
     duration, rate = format_quantity(first.duration_s, "s"), format_quantity(2.0 * first.half_rate_hz, "Hz")
+    own = ["vibration", "wheels", *(["angle of arrival"] if arrival(loop) else []), "body"]
     about = (
-        f"Recording {path}: {duration} at {rate}, each channel one axis, in place of the mission's vibration, wheels "
-        "and body. Angles in µrad rms, drift in µrad/s."
+        f"Recording {path}: {duration} at {rate}, each channel one axis, in place of the mission's {listed(own)}. "
+        "Angles in µrad rms, drift in µrad/s."
     )
     tables = [_motions(axes), _fits(axes), _left(axes, controller)]
     return f"{tables_text([], [about], width).strip()}\n\n{tables_text(tables, sentences(axes, loop), width).strip()}"

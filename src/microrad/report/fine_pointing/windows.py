@@ -28,13 +28,14 @@ def index_text(index: ErrorIndex) -> str:
     return index_name(index).replace("\n", " ")
 
 
-def windows_text(errors: Sequence[WindowedErrors], controller: str, width: int) -> str:
+def windows_text(errors: Sequence[WindowedErrors], controller: str, width: int, said: Sequence[str] = ()) -> str:
     """What is left by the loop, what there is without it, and what the rational forms make of that, for a terminal.
 
     Args:
         errors: One for each index.
         controller: Name of the loop's controller.
         width: Columns of the terminal.
+        said: Sentences on the loop's disturbances, above the tables.
     """
     heads = [index_name(each.index) for each in errors]
     left = _by_source(f"Left by the loop under {controller}", heads, [each.left for each in errors])
@@ -48,7 +49,7 @@ def windows_text(errors: Sequence[WindowedErrors], controller: str, width: int) 
     filters = Table("Without the loop, by linear filters", ("index", "exact", "rational", "off by"), rows)
     about = f"Radial rms in µrad, in theory: {BY_GAINS}."
     tables = tables_text([left, before, filters], [], width)
-    return f"{tables_text([], [about], width).strip()}\n\n{tables.rstrip()}"
+    return f"{tables_text([], [about, *said], width).strip()}\n\n{tables.rstrip()}"
 
 
 def _by_source(title: str, heads: Sequence[str], columns: Sequence[dict[str, float]]) -> Table:

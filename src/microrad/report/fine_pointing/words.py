@@ -8,6 +8,7 @@ from microrad.core.units import format_quantity
 from microrad.loop.control.tuning import MARGIN
 from microrad.loop.controller_study import BASELINE, AnyScene, FinePointingStudy, Scene, Verified
 from microrad.loop.coupled_study import CoupledScene
+from microrad.loop.disturbance import ANGLE_OF_ARRIVAL
 from microrad.loop.pointing_loop.loop import PointingLoop
 from microrad.mirror import Variant
 from microrad.mirror.geometry import StrokeBudget
@@ -99,6 +100,17 @@ def room(fine: FinePointingStudy) -> Room:
 def source_name(name: str) -> str:
     """What a source of error is called in a sentence: a spectrum by its satellite's name is a vibration."""
     return f"vibration ({name})" if name == "OLYMPUS" else name
+
+
+def arrival(loop: PointingLoop) -> list[str]:
+    """What the angle of arrival is, how large and whose, in sentences; none where the loop has none."""
+    found = next((each for each in loop.disturbances[0] if each.name == ANGLE_OF_ARRIVAL), None)
+    if found is None:
+        return []
+    return [
+        f"Angle of arrival, {angle(found.rms_rad)} rms per axis before the loop: the tracked light comes down through "
+        f"the air of channel.turbulence, {found.basis.partition('; fit of')[0]}. Source: {found.source}."
+    ]
 
 
 def listed(items: Sequence[str]) -> str:
