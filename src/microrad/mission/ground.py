@@ -197,7 +197,7 @@ def ground_fits(
     for name, beam in beams.items():
         if beam is None:
             continue
-        if beam.distance_m is None and not known and not (end and channel is None):
+        if beam.distance_m is None and not known and not end:
             yield Problem(f"{name}.distance", "is missing", 'distance = "42000 km" would do')
         if beam.distance_m is not None and known and path is not None and path.elevation_rad > 0.0:
             keys = " and ".join(path.sources)
@@ -231,8 +231,6 @@ def _station_problems(orbit: Orbits, channel: Channel | None, end: str) -> Itera
         where = "below the horizon" if path.elevation_rad <= 0.0 else f"below orbit.{end}.mask of {mask}"
         reason = f"leaves the satellite at an elevation of {shown} over the station, {where}"
         yield Problem(f"orbit.{flying}.longitude", reason, "a slot that the station sees, or another station")
-    if path is not None and path.satellite_radius_m is not None and path.satellite_radius_m <= path.station_radius_m:
-        yield Problem(f"orbit.{flying}", "lies below the station", "a higher orbit")
 
 
 def _without_station(channel: Channel) -> Iterator[Problem]:

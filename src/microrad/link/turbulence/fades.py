@@ -17,7 +17,8 @@ _LEAST_VARIANCE = 1e-12
 _NOTHING = 45.0  # exponent of a density of which nothing is left
 _SCALES, _MOST_SCALES, _POINTS = 120, 4000, 400  # of the wider scale, and of the spline
 _LEAST_SHARE = 1e-18
-_EDGES = (0.0, 1.0, 3.0, 6.0, 12.0, 25.0, 50.0)  # of -ln U: beyond lies 2e-22 of the time
+_MOST_EXPONENT = 600.0  # of a power that is still a number
+_EDGES = (0.0, 1.0, 2.0, 3.5, 5.0, 7.0, 9.0, 11.5, 14.0, 17.0, 21.0, 28.0, 50.0)  # of -ln U: 2e-22 lies beyond
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +47,8 @@ class Fades(Bounded, ABC):
             return math.log(max(float(self.below(10.0 ** (-loss / 10.0))), 1e-300)) - wanted
 
         low, high = -20.0, 10.0
+        while beyond(low) < 0.0:
+            low = 2.0 * low
         while beyond(high) > 0.0:
             low, high = high, 2.0 * high
         return float(brentq(beyond, low, high, xtol=1e-9))
@@ -184,11 +187,12 @@ class Wandering(Fades):
 
     def below(self, power: ArrayLike) -> Floats:
         """See `Fades.below`: the mean over the logarithm of U, by Gauss and Legendre."""
-        node, weight = np.polynomial.legendre.leggauss(40)
+        node, weight = np.polynomial.legendre.leggauss(24)
         edges = np.array(_EDGES)
         half = np.diff(edges)[:, None] / 2.0
         rare = (edges[:-1, None] + half * (node + 1.0)).ravel()  # -ln U
         share = (half * weight).ravel() * np.exp(-rare)
         mean = self.beam / (self.beam + 1.0)
-        at = np.multiply.outer(np.asarray(power, dtype=np.float64), mean * np.exp(rare / self.beam))
+        needed = mean * np.exp(np.minimum(rare / self.beam, _MOST_EXPONENT))
+        at = np.multiply.outer(np.asarray(power, dtype=np.float64), needed)
         return np.asarray(self.still.below(at) @ (share / np.sum(share)))
