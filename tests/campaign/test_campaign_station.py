@@ -1,4 +1,4 @@
-"""Which keys of a mission its loop depends on, where that loop stands on the ground under turbulent air or a quad cell."""
+"""Which keys of a mission its loop depends on, where that loop stands on the ground under turbulent air."""
 
 import pytest
 
