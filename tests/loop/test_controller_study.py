@@ -79,7 +79,7 @@ def test_what_does_not_keep_its_promise_is_tuned_again_but_for_the_baseline(monk
 
 
 def test_what_is_tuned_again_is_tuned_for_the_larger_margin_and_with_the_same_plants(monkeypatch):
-    """The margins of `SHARES` between 0.5 and 1; the one that leaves least of those that keep their promise is taken."""
+    """The margins of `SHARES` between 0.5 and 1; of those that keep their promise the one that leaves least."""
     asked, said, plants = [], [], object()
     table = SimpleNamespace(seed=7, modulus_margin=0.5, model_copy=lambda update: update["modulus_margin"])
     scene = SimpleNamespace(table=table)
