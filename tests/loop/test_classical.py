@@ -501,3 +501,10 @@ def test_a_filter_beyond_half_the_rate_is_refused():
         ValueError, match=r"second-order section at 2600 Hz: .* below 2500 Hz, or raise the control rate"
     ):
         PI_NOTCH.build(RESONANT, np.array([161.0, 373.0, 2600.0, 0.05, 1.76]))
+
+
+@pytest.mark.parametrize("freq_hz", [0.0, -10.0, 2500.0, 2600.0, float("nan")])
+def test_a_peak_stands_between_rest_and_half_the_rate(freq_hz):
+    with pytest.raises(ValueError, match=rf"a peak filter at {freq_hz:g} Hz: a controller with a period of 0.0002 s"):
+        filters.peak(freq_hz, 0.05, 1.0, 2e-4)
+    assert filters.peak(2499.0, 0.05, 1.0, 2e-4).order == 2

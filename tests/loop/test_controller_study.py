@@ -23,7 +23,8 @@ from microrad.loop.pointing_loop.loop import assemble
 from microrad.mirror import hysteresis
 from microrad.mirror import spread as mirror_spread
 from microrad.mission.file import load_mission
-from microrad.mission.tables.fine_pointing import MisalignmentTable
+from microrad.mission.model import Source
+from microrad.mission.tables.fine_pointing import MisalignmentTable, WheelsTable
 from scenes import scene_of
 from shipped import SHIPPED, whole_study
 from shipped import edited_file as edited_shipped
@@ -75,6 +76,74 @@ def test_what_does_not_keep_its_promise_is_tuned_again_but_for_the_baseline(monk
     monkeypatch.setattr(promises, "_firmer", lambda scene, broken, on_progress: again)
     found = promises.design_and_promise(SimpleNamespace())
     assert found == ((made[0], figures[0]), again, (made[2], figures[2]))
+
+
+def test_what_is_tuned_again_is_tuned_for_the_larger_margin_and_with_the_same_plants(monkeypatch):
+    """The margins of `SHARES` between 0.5 and 1; of those that keep their promise the one that leaves least."""
+    asked, said, plants = [], [], object()
+    table = SimpleNamespace(seed=7, modulus_margin=0.5, model_copy=lambda update: update["modulus_margin"])
+    scene = SimpleNamespace(table=table)
+    broken = designs.Design("LQG", None, None)
+
+    def tune(name, margin, of):
+        asked.append((name, margin, of))
+        return SimpleNamespace(controller=("axis", margin))
+
+    def outlook(where, made):
+        assert where is scene
+        return [SimpleNamespace(holds=True, simulated_rad=abs(each.margin - 0.7)) for each in made]
+
+    monkeypatch.setattr(promises.designs, "plants", lambda where, seed: plants if (where, seed) == (scene, 7) else None)
+    monkeypatch.setattr(promises.designs, "tune", tune)
+    monkeypatch.setattr(promises.designs, "build", lambda name, where, controller: (name, where, controller))
+    monkeypatch.setattr(promises.results, "outlook", outlook)
+    made, figure = promises._firmer(scene, broken, lambda *each: said.append(each))
+    wanted = [0.5 + share * 0.5 for share in promises.SHARES]
+    assert asked == [("LQG", margin, plants) for margin in wanted]
+    assert said == [(0, 1, "tuning LQG for a larger margin")] * len(wanted)
+    best = min(wanted, key=lambda margin: abs(margin - 0.7))
+    assert (made.margin, figure.simulated_rad) == (best, abs(best - 0.7))
+    assert (made.name, made.controller) == ("LQG", ("LQG", scene, ("axis", best)))
+
+
+@pytest.mark.parametrize(("speed_hz", "lines"), [(999.0, (999.0, 1998.0)), (1000.0, (1000.0,)), (2000.0, ())])
+def test_peaks_stand_at_the_lines_of_the_wheels_below_two_fifths_of_the_rate(file, monkeypatch, speed_hz, lines):
+    """At a control rate of 5 kHz up to 2 kHz; a loop without wheels, or without lines there, has none."""
+    fine = file.mission.fine_pointing
+    given = {"speed": f"{speed_hz} Hz", "harmonics": [1.0, 2.0], "coefficients": ["1e-12 rad/Hz^2"] * 2}
+    wheels = WheelsTable.model_validate(given | {"convention": "per-axis"})
+    assert fine.rate_hz == 5000.0
+    monkeypatch.setattr(designs.control, "peak_family", lambda lines: SimpleNamespace(name="peaks", lines=lines))
+    turning = designs.families(fine.model_copy(update={"wheels": wheels}))
+    without = designs.families(fine.model_copy(update={"wheels": None}))
+    assert [f.name for f in turning[: len(without)]] == [f.name for f in without]
+    assert len(turning) - len(without) == bool(lines)
+    assert not lines or turning[-1].lines == lines
+
+
+def test_the_misalignment_is_a_source_of_the_bias_only_where_the_mission_states_it(file):
+    found = {
+        given: scenario.demand_sources(file.mission.pointing, {key: Source(1, "a calibration") for key in given})
+        for given in ((), scenario.MISALIGNMENT_KEYS[:1], scenario.MISALIGNMENT_KEYS[1:])
+    }
+    assert ["a calibration" in each["bias_rad"] for each in found.values()] == [False, True, True]
+    assert all("a calibration" not in each["body_pointing_rad"] for each in found.values())
+
+
+def test_the_sensor_of_a_mission_has_the_tables_numbers(file):
+    """Noise, field of view and one count each its own, and read at every second control sample, late."""
+    changed = {
+        "noise_rad": 3e-6,
+        "field_of_view_rad": 2e-3,
+        "rate_hz": 2500.0,
+        "delay_s": 80e-6,
+        "resolution_rad": 5e-8,
+    }
+    fine = file.mission.fine_pointing
+    sensed = fine.optical_sensor.model_copy(update=changed)
+    made = scenario.optical_sensor(fine.model_copy(update={"optical_sensor": sensed}), None, 1550e-9, 0.03)
+    assert (made.noise_rad, made.field_of_view_rad, made.resolution_rad) == (3e-6, 2e-3, 5e-8)
+    assert (made.every, made.delay_steps) == (2, round(80e-6 / fine.plant_step_s))
 
 
 @pytest.fixture(scope="module")

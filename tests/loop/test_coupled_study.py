@@ -416,6 +416,14 @@ FAULTS = {
         ),
         r"the 1 actuator\(s\) of .* do not move the line of sight in both axes",
     ),
+    "a bias at the end of the amplifier": (
+        lambda m: replace(m, actuators=tuple(replace(a, bias_v=0.0) for a in m.actuators)),
+        "takes the actuators of .* from 0 V to ",
+    ),
+    "a bias at the other end of the amplifier": (
+        lambda m: replace(m, actuators=tuple(replace(a, bias_v=100.0) for a in m.actuators)),
+        " V to 0 V about their bias",
+    ),
     "a bias beyond the amplifier": (
         lambda m: replace(m, actuators=tuple(replace(a, bias_v=150.0) for a in m.actuators)),
         "rest has to lie inside: set amplifier.output_min, amplifier.output_max and amplifier.gain",
@@ -523,3 +531,13 @@ def test_design_refuses_a_mirror_that_does_not_fit_the_mission(folder, refused):
     (folder / "two-axes.toml").write_text(TEXT, encoding="utf-8")
     told = refused("design", DEFAULT, "--mirror", "two-axes.toml")
     assert "rest has to lie inside: set amplifier.output_min" in told
+
+
+def test_the_margins_of_the_whole_are_told_as_those_of_one_loop():
+    """Gain and phase are what the disk margin of 0.5 promises: a factor of 0.6 or 5/3, and 28 degrees."""
+    margins = whole.WholeMargins(0.4, control.MultiloopMargin(0.5, 10.0), 70.0)
+    told = coupled_study.CoupledDesign("LQG", {}, None, margins, np.zeros(2), np.zeros(2)).loop_margins
+    assert (told.disk, told.modulus, told.bandwidth_hz, told.peak) == (0.5, 0.4, 70.0, 2.5)
+    assert (told.gain_down, told.gain_up) == pytest.approx((0.6, 5.0 / 3.0), rel=1e-12)
+    assert told.phase_rad == pytest.approx(2.0 * math.atan(0.25), rel=1e-12)
+    assert all(math.isnan(each) for each in (told.delay_s, told.crossover_hz, told.peak_hz))

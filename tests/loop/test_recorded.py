@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -25,8 +26,9 @@ from microrad.loop.disturbance import (
 from microrad.loop.disturbance.recorded import density, edge_s, recorded_motion, resampled
 from microrad.loop.disturbance.recorded_fit import fit_recording
 from microrad.loop.disturbance.recorded_lines import find_lines
-from microrad.loop.disturbance.recorded_tests import stationarity, whiteness
+from microrad.loop.disturbance.recorded_tests import one_step_residual, stationarity, whiteness
 from microrad.loop.disturbance.terms import Term, term_filter
+from microrad.loop.pointing_loop import played
 from microrad.loop.pointing_loop.ensemble import Span, simulate
 from microrad.loop.pointing_loop.linear import close, stationary
 from microrad.loop.pointing_loop.played import play, recorded_residual, refuse_short
@@ -237,6 +239,56 @@ def test_simulated_without_hysteresis_a_recording_leaves_what_is_played_and_with
     spread = float(np.std(runs.rms_rad))  # one recording against runs of 10 s
     assert abs(found - runs.axis_rms_rad[0]) < 3.0 * spread
     assert found > left.simulated_rms_rad + 6.0 * spread  # which is no wide net
+
+
+@pytest.mark.parametrize(
+    ("known_hz", "missing_rad2", "reason"),
+    [
+        ((100.0,), 0.0, "near 300"),
+        ((300.0,), 0.0, "near 100"),
+        ((100.0,), 1e-13, "near 300"),
+        ((100.0, 300.0), -1.0, "near 20"),  # the fit's spectrum, which the motion lacks
+        ((0.6, 300.0), 0.0, "near 100"),  # a line in one of the first bins
+        ((100.0, 300.0), 1e-15, "the fit has"),
+        ((100.0, 300.0), 1e-12, "near 20"),
+    ],
+)
+def test_the_reason_names_what_the_fit_lacks_and_none_of_its_lines(known_hz, missing_rad2, reason):
+    """A motion of two tones and a little noise that the loop leaves as it is, fitted with lines and a spectrum."""
+    time = np.arange(20_000) * 1e-3
+    amplitude = {100.0: 3e-6, 300.0: 2e-6, 0.6: 0.0}
+    moved = sum(a * np.sin(2.0 * math.pi * f * time) for f, a in amplitude.items())
+    moved = moved + 1e-9 * np.random.default_rng(3).standard_normal(time.size)
+    lines = tuple(SpectralLine(amplitude[f], f) for f in known_hz)
+    known = Disturbance("fit", *term_filter(Term("band-pass", 1e-14, 200.0, 0.3)), lines, "", "test")
+    fit = SimpleNamespace(stationarity=SimpleNamespace(reason=""), motion=SimpleNamespace(half_rate_hz=500.0))
+    assert played._reason(fit, known, moved, moved, 1e-3, missing_rad2).startswith(reason)
+
+
+@pytest.mark.parametrize("step_s", [0.0, -1e-4, math.nan])
+def test_a_motion_is_not_resampled_at_no_step(step_s, small):
+    with pytest.raises(ValueError, match="the step of a resampled motion"):
+        resampled(small.motion, step_s)
+
+
+def test_each_frequency_that_sampling_folds_onto_another_is_counted_once():
+    """Sampled at 1 kHz, 900, 1100, 1900, 2100 Hz and so on look like 100 Hz."""
+    images = np.array(recorded_fit._images(np.array([100.0, 250.0]), 1000.0))
+    assert images.shape == (2 * recorded_fit._FOLDED, 2)
+    assert_allclose(images[:4, 0], [900.0, 1100.0, 1900.0, 2100.0])
+    assert_allclose(images[:4, 1], [750.0, 1250.0, 1750.0, 2250.0])
+
+
+@pytest.mark.parametrize("kept", [0.6, -0.6])
+def test_what_the_past_of_a_motion_cannot_predict_is_what_drove_it(kept):
+    """A motion that keeps a share of the sample before, with its spectrum: slow where positive, fast where negative."""
+    driven, step = np.random.default_rng(5).standard_normal(4000), 1e-3
+    moved = lfilter([3e-6], [1.0, -kept], driven)
+    freq = np.fft.rfftfreq(driven.size, step)
+    density_rad2_hz = 2.0 * step * 9e-12 / np.abs(1.0 - kept * np.exp(-2j * np.pi * freq * step)) ** 2
+    found = one_step_residual(density_rad2_hz, moved, step)
+    cut = driven.size // 50
+    assert_allclose(found, driven[cut : driven.size - cut], atol=0.1)  # the tapered ends reach a little way in
 
 
 def test_drift_that_the_loop_lets_through_is_named(small):

@@ -4,6 +4,7 @@ import math
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -509,7 +510,7 @@ def test_a_specification_out_of_reach_is_refused_with_what_was_reached():
     assert 0.4 < margin < 0.91
     assert 150.0 < bandwidth < 901.0
     assert margin < 0.9 or bandwidth < 900.0
-    with pytest.raises(ValueError, match=r"a modulus margin of 0\.999 is asked for, the nearest reaches 0\.9"):
+    with pytest.raises(ValueError, match=r"a modulus margin of 0\.999 is asked for, the nearest reaches 0\.9\d* with"):
         tuning.tune(family(least=300.0), [PLAIN], Specification(0.999), seed=1)
 
 
@@ -551,3 +552,66 @@ def test_candidates_that_cannot_be_built_are_left_out():
 def test_a_grid_of_the_wrong_shape_is_refused():
     with pytest.raises(ValueError, match=r"1 rows of values for the parameters of PI \(integral, proportional\): give"):
         tuning.grid_best(PI, [PLAIN], HALF, [[1.0, 2.0]])
+
+
+@pytest.mark.parametrize(("before", "overstated", "after"), [(0.2, 0.5, 0.5), (0.5, 0.2, 0.5), (0.0, 1.0, 1.0)])
+def test_a_margin_that_was_overstated_is_asked_for_with_something_to_spare(monkeypatch, before, overstated, after):
+    """The search takes the larger of what it has overstated so far, and more; then it settles again."""
+    trial, looked = SimpleNamespace(score=1.0, values=(2.0,), place=np.zeros(1)), []
+    judge = SimpleNamespace(optimism=before, of=lambda values, place: trial, at=lambda place: trial)
+
+    def holds(search, found):
+        looked.append(search.optimism)
+        return len(looked) == 2
+
+    monkeypatch.setattr(tuning, "settle", lambda search, found, models: found)
+    monkeypatch.setattr(tuning, "_holds", holds)
+    monkeypatch.setattr(tuning, "_overstated", lambda search, found: overstated)
+    assert tuning.settled(judge, [trial]) is trial
+    assert looked == [before, pytest.approx(after * (1.0 + tuning.HEADROOM), rel=1e-12)]
+    assert tuning.HEADROOM > 0.0
+
+
+@pytest.mark.parametrize(
+    ("pole", "modulus", "bandwidth_hz", "holds"),
+    [
+        (0.99, 0.5, 100.0, True),
+        (1.0, 0.5, 100.0, False),
+        (0.99, 0.499, 100.0, False),
+        (0.99, 0.5, 99.9, False),
+        (0.99, 0.7, 200.0, True),
+    ],
+)
+def test_a_trial_holds_at_the_very_specification_on_every_plant(pole, modulus, bandwidth_hz, holds):
+    plants = [SimpleNamespace(modulus=m, bandwidth_hz=b) for m, b in ((0.9, 900.0), (modulus, bandwidth_hz))]
+    judge = SimpleNamespace(specification=Specification(0.5, bandwidth_hz=100.0), margins=lambda trial: plants)
+    trial = SimpleNamespace(verdict=SimpleNamespace(pole=pole), modulus=0.8)
+    assert tuning._holds(judge, trial) is holds
+    assert tuning._overstated(judge, trial) == (1.0 if pole == 1.0 else 0.8 / modulus)
+
+
+@pytest.mark.parametrize(
+    ("place", "costs", "said"),
+    [
+        (0.0, 1.0, ["least"]),
+        (1e-4, 1.0, ["least"]),
+        (1.0, 1.0, ["most"]),
+        (0.9999, 1.0, ["most"]),
+        (1e-3, 1.0, []),
+        (1.0 - 1e-3, 1.0, []),
+        (0.5, 1.0, []),
+        (0.0, 0.0, []),
+        (1.0, -1.0, []),
+    ],
+)
+def test_a_parameter_is_bound_where_a_step_away_from_its_end_costs(place, costs, said):
+    away = []
+
+    def at(where):
+        away.append(where.tolist())
+        return SimpleNamespace(score=3.0 + costs)
+
+    trial = SimpleNamespace(place=np.array([0.3, place]), cost=3.0)
+    assert tuning._pressed(SimpleNamespace(at=at), trial, 1) == said
+    assert all(each == [0.3, pytest.approx(0.05 if place < 0.5 else 0.95, abs=2e-4)] for each in away)
+    assert trial.place[1] == place

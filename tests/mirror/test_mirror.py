@@ -21,6 +21,7 @@ from microrad.mirror import summary as mirror_summary
 from microrad.mirror.hysteresis import BoucWen, Creep, PrandtlIshlinskii
 from microrad.mirror.model import Mirror
 from microrad.mission.file import load_mission
+from microrad.mission.tables.mirror import PrandtlIshlinskiiTable
 from shipped import SHIPPED, edited
 
 STEP = 20e-6
@@ -562,6 +563,44 @@ def test_the_summary_of_a_static_mirror_has_no_linear_part(tmp_path):
     assert reversals.startswith("not physical at reversals")
     assert dynamics == mirror_summary.unknown_dynamics(m.mirror) != ""
     assert "gain at DC" not in str(summary)
+
+
+@pytest.mark.parametrize(
+    ("model", "says"),
+    [
+        (PrandtlIshlinskii((0.0, 1.0), (2e-5, 1e-5)), "valid to 250 V/s"),
+        (PrandtlIshlinskii((0.0, 1.0), (2e-5, 1e-5), 1e-4, 250.0), "rate in the hysteresis held at 250 V/s"),
+        (PRINTED, "rate in the hysteresis held at 250 V/s"),
+    ],
+)
+def test_a_model_that_knows_no_rate_is_valid_to_the_limit_and_the_others_are_held_there(table, model, says):
+    summary = replace(mirror_summary.summarise(table), model=model, rate_limit_v_s=250.0)
+    assert f"\n  {says}" in str(summary)
+
+
+@pytest.mark.parametrize(("damps", "unstable"), [(1e2, False), (-1e2, True)])
+def test_a_pole_is_called_unstable_where_it_grows(table, damps, unstable):
+    changed = {"numerator": (1e8,), "denominator": (1.0, damps, 1e8)}
+    made = table.model_copy(update={"linear": table.linear.model_copy(update=changed)})
+    warnings = [each for each in mirror_summary.summarise(made).warnings if "unstable" in each]
+    assert warnings == ["unstable pole at 1.59e+03 Hz"] * unstable
+
+
+@pytest.mark.parametrize("bottom", [[1.0, 2.0, 3.0], 4.0])
+def test_a_plain_number_is_a_polynomial_of_one_coefficient(bottom):
+    one, listed = (Mirror.of(50e-6, top, bottom) for top in (2.0, [2.0]))
+    for key in "ABCD":
+        assert_allclose(getattr(one, key), getattr(listed, key), rtol=0.0)
+
+
+@pytest.mark.parametrize(("widening_s", "limit_v_s"), [(0.0, inf), (1e-4, 300.0)])
+def test_plays_are_held_at_the_rate_limit_only_where_they_widen(table, widening_s, limit_v_s):
+    plays = PrandtlIshlinskiiTable(
+        thresholds=["0 V", "1 V"], weights=["2 urad/V", "1 urad/V"], widening=f"{widening_s} s"
+    )
+    made = table.model_copy(update={"bouc_wen": None, "prandtl_ishlinskii": plays})
+    found = mirror.hysteresis_model(made, 300.0, 6.0)
+    assert (found.widening_s, found.rate_limit_v_s) == (widening_s, limit_v_s)
 
 
 @pytest.mark.promise("mirror-file-17")

@@ -9,6 +9,7 @@ import re
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -21,10 +22,13 @@ from microrad.lab.identify.selection.candidates import Refused
 from microrad.lab.recording import Recording
 from microrad.mirror.coupled import Actuator, CoupledMirror, Known, Output
 from microrad.mirror.model import Mirror
+from microrad.report.identification import coupled as coupled_page
+from microrad.report.identification import coupled_figures as coupled_figures_module
 from microrad.report.identification import coupled_words as words
 from microrad.report.identification.coupled_figures import MOST, bands, coupled_figures, error_over_parameters
 from microrad.report.identification.terminal import MOST_LINES
 from microrad.report.plotting.sheet import Area, Line, Rule, Span
+from microrad.report.tables import Cell
 from report_pages import assert_sound, without_scripts
 
 RATE_HZ, PERIOD = 1000.0, 256
@@ -540,3 +544,55 @@ def test_of_many_channels_the_first_are_drawn(found, tmp_path):
     assert all(any(f"y{k}" in cell for row in rows_of(page) for cell in row) for k in range(outputs))
     text = report.coupled_identification_text(many)
     assert len(text.splitlines()) <= MOST_LINES and max(map(len, text.splitlines())) <= 80
+
+
+def test_what_the_best_linear_model_leaves_counts_from_rest_on(found):
+    """A line below 1 Hz belongs to it, too."""
+    response = next(each for each in found.responses if each is not None)
+    low = replace(response, freq_hz=response.freq_hz * (0.5 / response.freq_hz[0]))
+    moved = replace(found, responses=tuple(None if each is None else low for each in found.responses))
+    assert low.freq_hz[0] < 1.0
+    first = words._floor_powers(moved, np.array([0.0, 1.0]))[0]
+    assert np.nanmin(first) > 0.0
+    rest = words._floor_powers(moved, np.array([1.0, np.inf]))[0]
+    assert np.all(words.linear_floor(moved) > np.sqrt(rest[:, 0]))
+
+
+def test_poles_beyond_what_was_excited_are_said_to_be_extrapolated(monkeypatch):
+    shown = [
+        SimpleNamespace(real=True, excited=True, texts=("1 Hz", "2", "3", "4")),
+        SimpleNamespace(real=False, excited=False, texts=("5 Hz", "6", "7", "8")),
+    ]
+    monkeypatch.setattr(coupled_page.words, "poles", lambda own: shown)
+    inside, outside = coupled_page._poles(None).rows
+    assert [inside[0], *inside[1:5], inside[6]] == ["real pole", "1 Hz", "2", "3", "4", ""]
+    assert [outside[0], *outside[1:5], outside[6]] == ["pair", "5 Hz", "6", "7", "8", "extrapolated"]
+    assert [inside[5], outside[5]] == [Cell("", "yes"), Cell("", "no")]
+
+
+@pytest.mark.parametrize("sizes", [(MOST, MOST), (MOST + 1, MOST), (MOST, MOST + 1)])
+def test_what_is_not_drawn_is_said_wherever_outputs_or_drives_are_too_many(sizes):
+    model = SimpleNamespace(outputs=[None] * sizes[0], actuators=[None] * sizes[1])
+    said = coupled_figures_module._left_out(SimpleNamespace(candidate=lambda: SimpleNamespace(model=model)))
+    drawn = f" Of {sizes[0]} outputs and {sizes[1]} drives the first {MOST} are drawn."
+    assert said == ("" if sizes == (MOST, MOST) else drawn)
+
+
+def test_gain_and_resonance_are_drawn_over_the_drive_in_the_units_of_their_axes():
+    """Drives of 10 and 300 mV, gains of 2 and 3 urad/V, resonances of 100 and 90 Hz, one error not known."""
+    drive, gain, error = np.array([0.01, 0.3]), np.array([2e-6, 3e-6]), np.array([0.5, np.nan])
+    found = AmplitudeDependence(drive, gain, np.array([100.0, 90.0]), error, np.array([0.1, 0.2]))
+    left, right = coupled_figures_module.amplitude(found, "rad").sheet.panels
+    assert (left.x.title, left.y.title, right.y.title) == ("drive, rms (mV)", "gain (µrad/V)", "main resonance (Hz)")
+    (one,), (other,) = left.marks, right.marks
+    assert one.x == pytest.approx([10.0, 300.0]) and one.y == pytest.approx([2.0, 3.0])
+    assert other.x == pytest.approx([10.0, 300.0]) and other.y == pytest.approx([100.0, 90.0])
+    assert other.y_arms == pytest.approx(np.array([[0.5, 0.0], [0.5, 0.0]]))
+
+
+def test_every_curve_of_a_response_stands_within_its_axis(found):
+    figure = coupled_figures(found)["response"]
+    lows = {panel.y.low for panel in figure.sheet.panels}
+    curves = [m.y for panel in figure.sheet.panels for m in panel.marks if getattr(m, "label", "").endswith("rms")]
+    assert len(lows) == 1 and len(curves) == len(figure.sheet.panels)
+    assert lows.pop() == pytest.approx(min(np.nanmin(each) for each in curves) / 1.5, rel=1e-12)

@@ -8,6 +8,7 @@ import re
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ from microrad.core.units import format_quantity
 from microrad.lab.identify import Refused, identify, mirror_file_text
 from microrad.lab.identify.statistics import rounded_to_error
 from microrad.lab.recording import Finding, recording_from_arrays
-from microrad.report.identification import figures, words
+from microrad.report.identification import figures, parameters, words
 from microrad.report.identification import page as identification_page
 from microrad.report.identification.figures import identification_figures
 from microrad.report.identification.page import BEGINS
@@ -576,3 +577,39 @@ def test_the_report_package_stays_light_to_import():
     code = "import sys, microrad.report; print([m for m in ('contourpy', 'jinja2', 'xarray') if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize(("fitted", "damping", "names"), [
+    ((), 0.3, ["pole 1", "pole 1 damping", "zero 1"]),
+    ((), -0.3, ["pole 1", "pole 1 damping", "zero 1"]),
+    ((), 1.0, ["pole 1", "zero 1"]),
+    ((), -1.0, ["pole 1", "zero 1"]),
+    (("zero 1",), 0.3, ["pole 1", "pole 1 damping"]),
+    (("pole 1",), 0.3, ["zero 1"]),
+])  # fmt: skip
+def test_a_real_pole_that_was_held_has_no_damping(fitted, damping, names):
+    poles = SimpleNamespace(frequencies_hz=[900.0], dampings=[damping])
+    zeros = SimpleNamespace(frequencies_hz=[400.0], dampings=[1.0])
+    fit = SimpleNamespace(
+        structure=SimpleNamespace(parameters=[SimpleNamespace(name=name) for name in fitted]),
+        linear=SimpleNamespace(poles=poles, zeros=zeros),
+        creep=SimpleNamespace(time_constants_s=[0.5, 7.0]),
+    )
+    rows = parameters._held(fit)
+    assert [row.name for row in rows] == [*names, "creep lag 1", "creep lag 2"]
+    values = {"pole 1": (900.0, "Hz"), "pole 1 damping": (damping, ""), "zero 1": (400.0, "Hz")}
+    assert [(row.value, row.unit) for row in rows] == [*(values[name] for name in names), (0.5, "s"), (7.0, "s")]
+    assert all(math.isnan(row.standard_error) for row in rows)
+    assert [row.note for row in rows[-2:]] == ["chosen", "chosen"]
+    assert len(parameters._held(SimpleNamespace(**{**vars(fit), "linear": None}))) == 2
+
+
+@pytest.mark.parametrize(("sources", "said"), [(1, "1 recording, mirror"), (2, "2 recordings, mirror")])
+def test_the_page_counts_its_recordings(full, monkeypatch, sources, said):
+    monkeypatch.setattr(identification_page, "identification_figures", lambda *args, **more: {})
+    monkeypatch.setattr(identification_page, "page_of", lambda title, kind, of, *more, **named: str(of))
+    found = replace(full, sources=full.sources[:1] * sources)
+    made = identification_page.identification_page(
+        found, mirror_file=Path("m.toml"), mirror_text="", title="", written="bouc_wen"
+    )
+    assert made.startswith(said)

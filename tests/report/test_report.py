@@ -29,6 +29,7 @@ from microrad.report.quantities import minus
 from microrad.report.requirements import nearest, nearness
 from microrad.report.study import chain, page, words
 from microrad.report.study import contributors as requirement_views
+from microrad.report.study import data as study_data
 from microrad.report.tables import Table
 from microrad.report.view import Verbatim
 from microrad.study import study
@@ -750,3 +751,56 @@ def test_a_cost_without_a_data_rate_is_said_in_decibels_alone():
     cost = Cost("sine of 25 Hz", "PID", "given", -1.5, math.nan)
     assert words._rate_lost(cost) == ""
     assert words._rate_lost(replace(cost, data_rate_bit_s=-252.4e6)) == " or 252 Mbit/s"
+
+
+@pytest.mark.parametrize(("finding", "reading"), [(False, False), (True, False), (False, True), (True, True)])
+def test_how_the_partner_is_found_is_said_where_both_the_ways_and_the_reading_are_known(finding, reading):
+    outcome = SimpleNamespace(success_probability=0.98765, mean_time_s=12.0)
+    ways = [
+        SimpleNamespace(name="stare", outcome=outcome, possible=True),
+        SimpleNamespace(name="spiral", outcome=None, possible=False),
+    ]
+    of = SimpleNamespace(
+        links=SimpleNamespace(finding=SimpleNamespace(ways=ways) if finding else None),
+        open_loop=SimpleNamespace(reading=SimpleNamespace(coverage=0.75) if reading else None),
+    )
+    said = words.found(of)
+    assert bool(said) == (finding and reading)
+    if said:
+        assert "the stare locks with a probability of 0.9877, in 12 s on average; the spiral never locks." in said
+        assert "with a probability of 0.75, biases" in said
+
+
+@pytest.mark.parametrize(
+    ("simulated_db", "budgeted_db", "fine"),
+    [(20.1, 1.0, True), (1.0, 20.1, False), (20.0, 99.0, True), (99.0, 20.0, False)],
+)
+@pytest.mark.parametrize(("jitter", "under_db", "said_db"), [(False, 2.0, None), (True, 2.0, 1.0), (True, 5.0, 0.0)])
+def test_what_the_verdict_leaves_out_is_said_with_what_it_may_cost(
+    simulated_db, budgeted_db, fine, jitter, under_db, said_db
+):
+    """A jitter beside a simulated residual, and a pointing loss beyond the main lobe, of whichever case is judged."""
+    of = plain_study()
+    mission = of.file.mission.model_copy(update={"jitter": object() if jitter else None})
+    made = SimpleNamespace(
+        file=SimpleNamespace(mission=mission),
+        fine_case=SimpleNamespace(outage_loss_db=simulated_db) if fine else None,
+        achieved=SimpleNamespace(loss_db=lambda *lines: budgeted_db),
+        communication=SimpleNamespace(margin_db=under_db),
+        margin_db=3.0,
+    )
+    found = words._of_verdict(made)
+    deep = (simulated_db if fine else budgeted_db) > 20.0
+    assert [each.about for each in found] == ["verdict"] * (jitter + deep)
+    if jitter:
+        assert found[0].text.startswith("[jitter] is not in this verdict")
+        assert found[0].cost_db == said_db
+    if deep:
+        assert "the verdict's pointing loss of 20.10 dB is beyond 20 dB" in found[-1].text and found[-1].cost_db == 20.1
+
+
+def test_a_list_of_errors_is_in_the_summary_where_the_study_has_one(monkeypatch):
+    of = plain_study()
+    assert "error_budget" not in report.summary(replace(of, error_budget=None))
+    monkeypatch.setattr(study_data, "budget_data", lambda budget: {"of": budget})
+    assert report.summary(replace(of, error_budget="a list"))["error_budget"] == {"of": "a list"}

@@ -19,12 +19,14 @@ from microrad.loop.controller_study import designs
 from microrad.loop.pointing_loop.loop import assemble
 from microrad.mission.file import load_mission, with_contents
 from microrad.orbit import day as day_study
+from microrad.orbit.day.assumptions import Numbers
 from microrad.orbit.operations import OperationsError
 from microrad.report.day import tables
 from microrad.report.day import words as day_words
 from microrad.report.day.contact_run import contact_sentences, windows_table
 from microrad.report.day.figures import day_figures
 from microrad.report.quantities import duration, volume
+from microrad.report.results import arrays
 from microrad.report.results.manifest import manifest_of
 from microrad.study import contact_run, study
 from scenes import scene_of
@@ -362,3 +364,82 @@ def test_the_manifest_has_the_hash_of_each_file_that_the_mission_names_as_it_was
     assert made["inputs"] == {"a.tle": "elements"}
     assert "seed 1 of [operations], 20 runs" in made["randomness"]
     assert manifest_of(found, {}, tmp_path / "out")["inputs_sha256"] == {}
+
+
+NUMBERS = Numbers(relay_bit=8e9, direct_bit=4e9, relay_slow_s=60.0, direct_slow_s=30.0)
+
+
+@pytest.mark.parametrize(
+    ("capacity_bit", "said"),
+    [(None, "relay's volume"), (0.0, "relay's volume"), (4e9, "ratio of the two volumes")],
+)
+def test_what_matters_most_is_said_of_the_ratio_only_where_both_ways_carry_something(capacity_bit, said):
+    swing = SimpleNamespace(
+        name="the store", low="1 GB", high="2 GB", factor=1.5, here=NUMBERS, at_low=NUMBERS, at_high=NUMBERS
+    )
+    direct = None if capacity_bit is None else SimpleNamespace(capacity_bit=capacity_bit)
+    (found,) = day_words.assumption_words(SimpleNamespace(swings=[swing], direct=direct))
+    assert found.startswith(f"What matters most to the {said}, each assumption changed alone: the store (1 GB: ")
+    steady = replace_namespace(swing, factor=day_words.MATTERS)
+    assert day_words.assumption_words(SimpleNamespace(swings=[steady], direct=direct)) == []
+
+
+@pytest.mark.parametrize("direct", [None, object()])
+def test_how_late_data_arrive_is_said_of_the_ways_that_there_are(direct):
+    late = replace(NUMBERS, relay_slow_s=120.0)
+    swing = SimpleNamespace(
+        name="a delay", low="0 s", high="60 s", factor=1.0, here=NUMBERS, at_low=NUMBERS, at_high=late
+    )
+    direct = None if direct is None else SimpleNamespace(capacity_bit=0.0)
+    (found,) = day_words.assumption_words(SimpleNamespace(swings=[swing], direct=direct))
+    ways = f"within {duration(60.0)} or {duration(120.0)} by the relay"
+    ways += "" if direct is None else f", within {duration(30.0)} directly"
+    assert found.endswith(f"with 0 s or 60 s, 99 % arrive {ways}.")
+
+
+def replace_namespace(of, **changes):
+    """A copy with other values."""
+    return SimpleNamespace(**{**vars(of), **changes})
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({}, "half arrives within 1.0 min, and 99 % within 2.0 min"),
+        ({"arrived_bit": 0.0}, "nothing arrives"),
+        ({"median_s": math.inf, "slow_s": math.inf}, "less than half arrives, and less than 99 % by the end"),
+        ({"slow_s": math.inf}, "half arrives within 1.0 min, and less than 99 % by the end"),
+        ({"on_board_bit": 1.0}, "half arrives within 1.0 min, and 99 % within 2.0 min"),
+        (
+            {"on_board_bit": 8e9},
+            "half arrives within 1.0 min, and 99 % within 2.0 min, 1 GB are still on board at the end",
+        ),
+        (
+            {"lost_bit": 16e9, "on_board_bit": 8e9},
+            "4 GB arrive (of what is kept half arrives within 1.0 min, and 99 % within 2.0 min), 2 GB find the store "
+            "full, 1 GB are still on board at the end",
+        ),
+    ],
+)
+def test_what_becomes_of_the_data_is_said_of_each_part_that_there_is(changes, said):
+    way = SimpleNamespace(arrived_bit=32e9, median_s=60.0, slow_s=120.0, on_board_bit=0.0, lost_bit=0.0)
+    for name, made in {"1.0 min": 60.0, "2.0 min": 120.0}.items():
+        said = said.replace(name, duration(made))
+    for name, made in {"4 GB": 32e9, "2 GB": 16e9, "1 GB": 8e9}.items():
+        said = said.replace(name, volume(made))
+    assert day_words._arrived(replace_namespace(way, **changes)) == said
+
+
+def test_each_number_of_a_way_stands_under_its_own_name():
+    """Five histories and three single numbers, all different."""
+    history = SimpleNamespace(
+        **{f"{name}_{'s' if name == 'time' else 'bit'}": np.array([k, k + 0.5]) for k, name in enumerate(HISTORY)}
+    )
+    way = SimpleNamespace(history=history, capacity_bit=7.0, median_s=8.0, slow_s=9.0)
+    found = arrays._day_way(way).to_xarray()
+    assert [found[name].values.tolist() for name in HISTORY] == [[k, k + 0.5] for k in range(len(HISTORY))]
+    assert [float(found[name]) for name in ("could_carry", "latency_median", "latency_99_percent")] == [7.0, 8.0, 9.0]
+    assert [found[name].units for name in ("stored", "latency_99_percent")] == ["bit", "s"]
+
+
+HISTORY = ("time", "generated", "delivered", "stored", "lost")

@@ -807,6 +807,44 @@ def test_the_report_and_its_warnings_carry_the_placards(tmp_path):
     assert "on records that are held out" in general
 
 
+@pytest.mark.parametrize(("inputs", "drives"), [(1, "1 drive of"), (2, "2 drives of")])
+@pytest.mark.parametrize("beyond", [(), ("a rate of 2 kHz, 2 times the largest",)])
+def test_a_mirror_that_was_measured_elsewhere_is_told_with_its_drives_and_limits(inputs, drives, beyond):
+    extents = {
+        "drive": {"least": 1.0, "most": 5.0, "unit": "V"},
+        "frequency": {"least": 2.0, "most": 2.0, "unit": "Hz"},
+        "position": {"least": 1e-6, "most": 3e-6, "unit": "m"},
+        "rate": {"least": 1e3, "most": 1e3, "unit": "Hz"},
+    }
+    record = {"part": "the mirror model", "inputs": inputs, "extents": extents, "errors": []}
+    found = foundation._measured(record, beyond)
+    assert (found.part, found.inside, found.beyond) == ("the mirror model", not beyond, beyond)
+    assert f"with {drives} 1 V to 5 V amplitude, 2 Hz and 1 µm to 3 µm of travel, sampled at 1 kHz." in found.said
+    assert ("goes beyond that, with a rate of 2 kHz, 2 times the largest" in found.said) == bool(beyond)
+    assert ("lies within that" in found.said) != bool(beyond)
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "said"),
+    [
+        ("drive", [], []),
+        ("drive", [10.0], []),
+        ("drive", [10.005], []),
+        ("drive", [20.0, 0.5], ["a drive amplitude of 20 V, 2 times the largest"]),
+        ("frequency", [2.0, 10.0], []),
+        ("frequency", [1.9985], []),
+        ("frequency", [0.5, 4.0], ["a frequency of 500 mV, 4 times below the least"]),
+        (
+            "frequency",
+            [0.5, 40.0],
+            ["a frequency of 40 V, 4 times the largest", "a frequency of 500 mV, 4 times below the least"],
+        ),
+    ],
+)
+def test_a_value_is_beyond_an_extent_at_its_far_end_and_a_frequency_at_both(name, values, said):
+    assert list(foundation._past(name, values, {"least": 2.0, "most": 10.0, "unit": "V"})) == said
+
+
 @pytest.mark.promise("verification-11")
 def test_placards_stand_among_the_warnings_of_a_study(monkeypatch):
     """Those of the shipped study, had its link been nine times as long."""
