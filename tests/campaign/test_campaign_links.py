@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from day_files import ALONE, day_file, day_path
 from link_files import FADING
 from microrad import link
 from microrad.campaign import bundle, run
@@ -29,6 +30,7 @@ from microrad.mission.fields import Several
 from microrad.mission.file import load_link, named_files, open_mission
 from microrad.mission.toml import MissionError
 from microrad.orbit import day as day_study
+from optical_files import optical
 from preset_files import NAMES as PRESETS
 from preset_files import completed
 from shipped import SHIPPED, without_fine_pointing
@@ -432,3 +434,28 @@ def test_a_row_of_the_day_has_what_that_day_delivers(tmp_path):
         relay = day_study.run_day_study(link_study.run_link_study(own)).relay
         assert (volume_bit, contact_s) == pytest.approx((relay.capacity_bit, relay.contact_s), rel=1e-12)
     assert found["volume"][0] != found["volume"][1] and found["contact_time"][0] > 3600.0
+
+
+@pytest.mark.promise("campaigns-17", "day-53")
+def test_a_row_has_what_the_optical_downlink_carries_at_its_clouds(tmp_path):
+    """The availability of a station is drawn, a number or an item of the twelve, and the volume is that of the day."""
+    names = "operations.optical.stations.tenerife.availability", "operations.optical.stations.kiruna.availability.3"
+    day_path(tmp_path, ALONE, optical({"tenerife": 0.5, "kiruna": [0.5] * 12}))
+    drawn = "".join(f'[inputs."{name}"]\ndistribution = "uniform"\nlow = 0.1\nhigh = 0.9\n' for name in names)
+    found = rows(loaded(tmp_path, "day", drawn, HEAD + 'keep = ["optical_volume"]\n'), 3)
+    (tmp_path / "own").mkdir()
+    for one, other, volume_bit in zip(*(found[name] for name in (*names, "optical_volume")), strict=True):
+        clouds = {"tenerife": float(one), "kiruna": [0.5, 0.5, float(other), *[0.5] * 9]}
+        way = day_study.optical_alone(day_file(tmp_path / "own", ALONE, optical(clouds)))
+        assert volume_bit == pytest.approx(way.capacity_bit, rel=1e-12)
+    assert len(set(found["optical_volume"])) == 3
+
+
+def test_an_optical_volume_needs_an_optical_downlink(tmp_path):
+    text = without_fine_pointing(SHIPPED.read_text(encoding="utf-8"))
+    (tmp_path / "whole.toml").write_text(text, encoding="utf-8")
+    body = POWER.replace("0.1 W", "4 W").replace("0.3 W", "6 W")
+    (found,) = faults(tmp_path, "whole", body, HEAD + 'keep = ["optical_volume"]\n')
+    assert (found.key, found.reason) == ("keep", "needs the mission's table [operations.optical]")
+    assert found.expected == "a mission with [operations.optical], or this output left out"
+    assert loaded(tmp_path, "whole", body, HEAD + 'keep = ["volume"]\n').keep == ("volume",)

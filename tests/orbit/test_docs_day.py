@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.stats import multivariate_normal
 
 from microrad import link, orbit
 from microrad.core.units import SPEED_OF_LIGHT_M_S
@@ -27,7 +28,7 @@ PAGE = (ROOT / "docs" / "day.md").read_text(encoding="utf-8")
 SAID = " ".join(re.sub(r"\n- | *<!-- promise: day-\d+ -->", " ", PAGE).split())
 TABLES = re.findall(r"```toml\n(.*?)```", PAGE, flags=re.DOTALL)
 ORBITS = TABLES[0].split("\n\n")
-LIMITS, OPERATIONS = TABLES[1:]
+LIMITS, OPERATIONS, OPTICAL, SHARED = TABLES[1:]
 TEXT = (ROOT / "missions" / "paper.toml").read_text(encoding="utf-8")
 ELEMENTS = """DEMO
 1 90001U 26001A   26079.50000000  .00000000  00000-0  50000-4 0  9997
@@ -247,6 +248,53 @@ def test_rates_share_and_store(replaced, links, day):
     kept = small.direct
     told(f"direct downlink loses {kept.lost_bit / 8e9:.1f} of {kept.generated_bit / 8e9:.1f} GB")
     assert kept.latency.delivered_bit + kept.latency.missing_bit == pytest.approx(kept.generated_bit - kept.lost_bit)
+
+
+@pytest.fixture(scope="module")
+def under_clouds(folder):
+    """The day of the shipped mission with the page's optical ground stations."""
+    text = TEXT[: TEXT.index("[constellation]")] + TEXT[TEXT.index("[mirror]") :] + "\n" + OPTICAL
+    (folder / "clouds.toml").write_text(text, encoding="utf-8")
+    return day_study.run_day_study(link_study.run_link_study(missionfile.load_link(folder / "clouds.toml")))
+
+
+@pytest.mark.promise("day-44", "day-45", "day-52")
+def test_what_the_optical_ground_stations_carry(under_clouds):
+    way, sky = under_clouds.optical, under_clouds.sky
+    least, most = (f"{bit / 8e9:.0f}" for bit in way.capacity_spread_bit)
+    told(f"has {way.capacity_bit / 8e9:.0f} GB by the optical downlink, from {least} to {most} GB by the weather drawn")
+    told(f"in {way.contact_s / 60:.0f} min of use, 99 % of the instrument's data within {way.slow_s / 3600:.1f} h")
+    told(f"is clear for {100 * sky.any_clear:.1f} % of the time, {100 * sky.any_independent:.1f} % with independent")
+    (clouds,) = (s for s in under_clouds.swings if s.name == "availability of the optical stations")
+    bit, slow_s = clouds.at_high.optical_bit, clouds.at_high.optical_slow_s
+    told(f"Without clouds it had {bit / 8e9:.0f} GB, 99 % within {slow_s / 3600:.2f} h")
+    assert clouds.high == "no clouds" and sky.availability == (0.7, 0.5)
+
+
+@pytest.mark.promise("day-46", "day-51")
+def test_the_sky_of_the_page(under_clouds):
+    sky, (tenerife, calern) = under_clouds.sky, orbit.stations(under_clouds.operations.optical)
+    across = math.cos(tenerife.latitude_rad) * math.cos(calern.latitude_rad)
+    cosine = math.sin(tenerife.latitude_rad) * math.sin(calern.latitude_rad)
+    cosine += across * math.cos(tenerife.longitude_rad - calern.longitude_rad)
+    apart_m = orbit.EARTH_RADIUS_M * math.acos(cosine)
+    assert sky.correlation[0, 1] == pytest.approx(math.exp(-apart_m / 1e6), rel=1e-9)
+    joint = multivariate_normal.cdf([0.0, -0.524400512708041], cov=sky.correlation)  # both cloudy: 0.5 and 0.3
+    assert sky.any_clear == pytest.approx(1.0 - joint, abs=1e-6) and sky.any_independent == pytest.approx(0.85)
+
+
+@pytest.mark.promise("day-54", "day-55")
+def test_the_stations_of_the_constellation_on_the_page(folder):
+    text = TEXT[: TEXT.index("[mirror]")].replace('duration = "24 h"', 'duration = "6 h"')
+    (folder / "shared.toml").write_text(text + TEXT[TEXT.index("[mirror]") :] + "\n" + SHARED, encoding="utf-8")
+    file = missionfile.load_link(folder / "shared.toml")
+    loss = day_study.PointingLoss(2.23, 0.0, "given")
+    plan = constellation.run_constellation(file, loss)
+    assert (plan.stations, plan.station_terminals) == (("svalbard",), (2,))
+    at = [s for s in plan.planned if s.relay == "svalbard"]
+    assert len(at) == plan.by_station.sessions[0] > 10
+    for one in at:
+        assert one.volume_bit == pytest.approx(0.6e9 * (one.end_s - one.locked_s), rel=1e-12)
 
 
 @pytest.mark.promise("day-19")

@@ -68,6 +68,7 @@ def used_seconds(o, pair, run):
     return flows, time_s, uses
 
 
+@pytest.mark.promise("day-49")
 @pytest.mark.parametrize("weather", ["2 h", "5 min"])
 def test_the_network_is_used_as_a_machine_that_looks_each_second_uses_it(tmp_path, weather):
     o, pair = of(tmp_path, optical({"kiruna": 0.6, "tromso": 0.6, "tenerife": 0.5}, weather=weather))
@@ -90,6 +91,7 @@ def test_who_rises_first_is_kept_and_the_next_takes_over():
     assert flow.one_at_a_time(spans) == kept == flow.one_at_a_time(reversed(spans))
 
 
+@pytest.mark.promise("day-49", "day-50")
 # ------------------------------------------------------------------------------------------------- beside the radio
 def test_under_a_clear_sky_the_network_carries_what_the_radio_of_the_same_stations_does(tmp_path):
     o, pair = of(tmp_path, RADIO_OF_THREE, optical(1.0))
@@ -122,6 +124,7 @@ def test_under_clouds_for_ever_the_network_carries_nothing(tmp_path):
     assert way_of(tmp_path, optical(0.5)).capacity_bit > 0.0
 
 
+@pytest.mark.promise("day-47")
 def test_a_months_clouds_end_with_it(tmp_path):
     """The shipped day goes on to 12 h UTC of the next one: from midnight on there are no clouds."""
     turn = {"orbit.epoch": "2026-03-31T12:00:00Z", "orbit.leo.local_time": "10.5 h"}
@@ -151,6 +154,7 @@ def test_rates_fall_with_the_range_to_the_station(tmp_path):
     assert expected > 20e9 and rate == 1e8
 
 
+@pytest.mark.promise("day-48")
 # --------------------------------------------------------------------------------------------------------------- draws
 def test_weather_changes_no_acquisition_and_a_seed_repeats(tmp_path):
     plain = link_study.run_link_study(day_file(tmp_path, ALONE))
@@ -172,6 +176,7 @@ def test_the_order_of_stations_does_not_matter(tmp_path):
     assert turned.stations == first.stations
 
 
+@pytest.mark.promise("day-46", "day-50")
 def test_every_run_has_a_sky_of_its_own(tmp_path):
     o, pair = of(tmp_path, optical(0.5))
     passes = network.optical_passes(o.optical, pair)
@@ -181,6 +186,7 @@ def test_every_run_has_a_sky_of_its_own(tmp_path):
     assert several.capacity_spread_bit[0] < several.capacity_bit < several.capacity_spread_bit[1]
 
 
+@pytest.mark.promise("day-51")
 def test_the_sky_over_the_stations(tmp_path):
     o, pair = of(tmp_path, optical({"kiruna": 0.5, "tromso": 0.6, "tenerife": 0.4}, weather="1 min"))
     sky = network.sky(o, pair)

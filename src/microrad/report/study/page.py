@@ -154,9 +154,8 @@ def _readings(study: Study) -> View:
 def _not_in_study(study: Study) -> View:
     fine = study.fine_pointing is not None
     left = "Turbulence" if fine else "Vibration, sensor noise and turbulence"
-    day = (
-        "contact times" if study.day is None else "light time in the times of contacts, drag, weather over the stations"
-    )
+    sky = "weather over the stations" if study.day is None or study.day.sky is None else "weather over radio stations"
+    day = "contact times" if study.day is None else f"light time in the times of contacts, drag, {sky}"
     sines = "" if fine else " The residual is that of one axis tracking clean sines."
     return View(
         "Not in this study",
