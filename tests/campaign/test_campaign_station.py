@@ -1,4 +1,4 @@
-"""Which keys of a mission its loop depends on, where that loop stands on the ground under turbulent air."""
+"""Keys that the loop of a mission depends on, where it stands on the ground."""
 
 import pytest
 
