@@ -165,27 +165,34 @@ def _law(table: TurbulenceTable, index: float) -> Fades:
 
 
 def _wavefront_db(table: TurbulenceTable, path: SlantPath, receives: Receives) -> tuple[float, str]:
-    """Loss of the mean power into the fibre or detector, and what to doubt of it."""
-    end, over = receives.end, receives.diameter_m / path.fried_m
-    if end is None:
+    """Loss of the mean power into the fibre or detector, and what to doubt of it.
+
+    Adaptive optics leaves Marechal's loss, or that without it (of a disk, that with the tilt alone taken out), if that
+    is less.
+    """
+    if receives.end is None:
         return 0.0, ""
-    variance = _residual_rad2(table.corrected_modes, over)
-    if isinstance(end, coupling.SingleModeFibre):
-        if table.corrected_modes:
-            doubt = (
-                "" if variance <= 1.0 else f"a residual of {math.sqrt(variance):.2g} rad rms, above 1: Marechal's ends"
-            )
-            return gains.DB_PER_NEPER * variance, doubt
-        truncation = end.pupil.truncation
-        areas = (seeing.COHERENCE * over / 2.0) ** 2
-        share = coupling.turbulent_share(truncation, areas) / coupling.turbulent_share(truncation, 0.0)
-        return -10.0 * math.log10(share), ""
-    if not isinstance(end, coupling.Disk) or table.corrected_modes > seeing.TILT_MODES:
-        return gains.DB_PER_NEPER * min(variance, 1.0), ""
-    disk = end.radius_rad, receives.diameter_m, path.wavelength_m
-    share = seeing.encircled(*disk, path.fried_m, tilt_taken_out=bool(table.corrected_modes))
-    still = seeing.encircled(*disk, math.inf)
-    return max(10.0 * math.log10(still / share), 0.0), ""
+    modes, over = table.corrected_modes, receives.diameter_m / path.fried_m
+    is_fibre = isinstance(receives.end, coupling.SingleModeFibre)
+    seen = _fibre_db(receives.end, over) if is_fibre else _disk_db(path, receives, bool(modes))
+    if modes <= (0 if is_fibre else seeing.TILT_MODES):
+        return seen, ""
+    variance = _residual_rad2(modes, over)
+    doubt = "" if variance <= 1.0 else f"a residual of {math.sqrt(variance):.2g} rad rms, above 1: Marechal's ends"
+    return min(gains.DB_PER_NEPER * variance, seen), doubt
+
+
+def _fibre_db(fibre: coupling.End, over: float) -> float:
+    truncation, areas = fibre.pupil.truncation, (seeing.COHERENCE * over / 2.0) ** 2
+    share = coupling.turbulent_share(truncation, areas) / coupling.turbulent_share(truncation, 0.0)
+    return -10.0 * math.log10(share)
+
+
+def _disk_db(path: SlantPath, receives: Receives, tilt_taken_out: bool) -> float:
+    assert isinstance(receives.end, coupling.Disk)  # there is no other end
+    disk = receives.end.radius_rad, receives.diameter_m, path.wavelength_m
+    share = seeing.encircled(*disk, path.fried_m, tilt_taken_out=tilt_taken_out)
+    return max(10.0 * math.log10(seeing.encircled(*disk, math.inf) / share), 0.0)
 
 
 def _residual_rad2(modes: int, over: float) -> float:
