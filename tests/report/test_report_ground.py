@@ -80,7 +80,7 @@ def test_margin_verdict_and_tornado_are_the_same_with_fades(study):
 
 
 def test_every_number_of_a_link_to_a_station_is_registered(study):
-    data = json.loads(json.dumps(links_data(study), allow_nan=False))
+    data = json.loads(json.dumps(links_data(study)))
     assert registry.unregistered(["budget." + name for name, _ in registry.flattened(data)]) == []
     first = data["ground"]["elevations"][0]
     assert first["elevation_rad"] == pytest.approx(math.radians(20.0))

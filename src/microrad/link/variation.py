@@ -21,6 +21,8 @@ LINK_TABLES = (
     "communication.coupling",
     "communication.coupling.jitter",
     "channel",
+    "channel.turbulence",
+    "channel.turbulence.wind",
     "point_ahead",
 )
 """The tables with the inputs of the communication link."""
@@ -211,7 +213,7 @@ def beam_tornado(m: LinkMission, sources: Mapping[str, Source], name: str) -> tu
     Raises:
         ValueError: If the mission has no such beam.
     """
-    tables = ("terminals", name, "channel", "point_ahead")
+    tables = ("terminals", name, *(each for each in LINK_TABLES if each.startswith("channel")), "point_ahead")
     return swings(m, sources, tables, m.conventions.strehl, beam_margin(name, sources), divergence_possible(name))
 
 

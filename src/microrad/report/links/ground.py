@@ -65,9 +65,8 @@ def sentences(study: LinkStudy, g: GroundLink) -> list[str]:
         if not closing:
             said.append(f"At no elevation has it the required {required:g} dB.")
         elif closing[0] is not first:
-            said.append(
-                f"It has the required {required:g} dB from {degrees(closing[0].elevation_rad)} on, of those below."
-            )
+            from_there = degrees(closing[0].elevation_rad)
+            said.append(f"Of the elevations below it has the required {required:g} dB from {from_there} on.")
     worst = max(((abs(db), of, c) for c in g.conventions for of, db in c.gained_db.items()), default=None, key=_size)
     if worst is not None and worst[0] > 0.0:
         cost, of, convention = worst

@@ -132,7 +132,7 @@ def _profile(workspace: Workspace) -> Iterator[Comparison]:
 
     path = SlantPath(HufnagelValley(), 0.5e-6, math.pi / 2.0, 500e3)
     half = "half a unit in the last printed digit"
-    name = "budget.ground.elevations.*"
+    name = "budget.ground.elevations.0"
     yield Comparison(f"{name}.fried_m", "r0 of the profile 5/7 at 0.5 um", 0.049606, path.fried_m, 5e-7, "m", half)
     angle = path.isoplanatic_rad
     yield Comparison(f"{name}.isoplanatic_rad", "isoplanatic angle of it", 6.894e-6, angle, 5e-10, "rad", half)
@@ -145,7 +145,7 @@ def _book(workspace: Workspace) -> Iterator[Comparison]:
     zenith = math.radians(30.0)
     path = SlantPath(HufnagelValley(), 1.06e-6, math.pi / 2.0 - zenith, 38.5e6 / math.cos(zenith))
     up, down, half = Uplink(path, 0.02), Downlink(path), "half a unit in the last printed digit"
-    name = "budget.ground.elevations.*"
+    name = "budget.ground.elevations.0"
     angle = path.isoplanatic_rad
     yield Comparison(f"{name}.isoplanatic_rad", "isoplanatic angle", 13.5e-6, angle, 0.05e-6, "rad", half)
     yield Comparison(f"{name}.index", "downlink at a point", 0.13, down.index(0.0), 5e-3, "", half)
@@ -178,7 +178,7 @@ def _recommendation(workspace: Workspace) -> Iterator[Comparison]:
         what = f"{wind:g} m/s, {wavelength_um:g} um"
         close = 5e-3 + 0.016 * printed
         why = "half a unit in the last printed digit, and 1.6 % for what lies above 20 km"
-        yield Comparison("budget.ground.elevations.*.rytov", what, printed, path.rytov, close, "", why)
+        yield Comparison("budget.ground.elevations.0.rytov", what, printed, path.rytov, close, "", why)
 
 
 def _paper(workspace: Workspace) -> Iterator[Comparison]:
@@ -212,7 +212,7 @@ def _paper(workspace: Workspace) -> Iterator[Comparison]:
     half = "half a unit in the last printed digit"
     what = "distance to the zenith"
     above = path.range_at(math.pi / 2.0)
-    yield Comparison("budget.ground.elevations.*.range_m", what, 549e3, above, 500.0, "m", half)
+    yield Comparison("budget.ground.elevations.0.range_m", what, 549e3, above, 500.0, "m", half)
 
 
 CHECKS = (
