@@ -10,7 +10,10 @@ from microrad.link.budget.lines import beam_budget
 from microrad.link.receivers import RateError
 from microrad.mission.fields import Quantity, Several, Share, Table, rule_of_field
 from microrad.mission.model import LinkMission, Source, source_text
-from microrad.mission.tables.link import divergence_fits
+from microrad.mission.tables.link import divergence_fits, half_angle_rad
+
+AIR_TABLES = ("channel", "channel.turbulence", "channel.turbulence.wind")
+"""The tables with the inputs of the air."""
 
 LINK_TABLES = (
     "terminals",
@@ -20,9 +23,7 @@ LINK_TABLES = (
     "communication.beam",
     "communication.coupling",
     "communication.coupling.jitter",
-    "channel",
-    "channel.turbulence",
-    "channel.turbulence.wind",
+    *AIR_TABLES,
     "point_ahead",
 )
 """The tables with the inputs of the communication link."""
@@ -119,15 +120,16 @@ def _table(tables: Table, name: str) -> Table | None:
 
 
 def beam_passes(m: LinkMission) -> bool:
-    """Whether the obscuration lets some of the data's beam pass, and the receiver can take and do with some light."""
+    """Whether obscuration and air let the data's beam pass, and the receiver can take and do with some light."""
     beam, receiver = m.communication, m.communication.receiver
     if receiver is not None and not receiver.reaches_ratio:
         return False
     try:
-        communication_beam(m.terminals, beam, m.conventions.pointing_loss)
+        sent, end = communication_beam(m.terminals, beam, m.conventions.pointing_loss), None
         if beam.coupling is not None:
-            receiving_end(m.terminals, beam.coupling, beam.wavelength_m)
-    except ValueError:
+            end = receiving_end(m.terminals, beam.coupling, beam.wavelength_m)
+        Shared.of(m).turbulent(beam, "leo", sent.fall.half_angle_rad, end)
+    except ValueError:  # turbulence beyond a closed form is one
         return False
     return True
 
@@ -146,9 +148,22 @@ def margin_or_none(of: _Link, margin_db: Callable[[_Link], float]) -> float:
 
 
 def divergence_possible(name: str) -> Callable[[Any], bool]:
-    """A check of a mission: whether the aperture of its beacon, or of its answer, can make the divergence."""
-    too_narrow = divergence_fits(name, "geo" if name == "answer" else "leo")
-    return lambda m: not any(too_narrow(m.conventions, m.terminals, getattr(m, name)))
+    """A check of a mission: whether its beacon, or its answer, has an aperture wide enough, and air that it passes."""
+    sender = "geo" if name == "answer" else "leo"
+    too_narrow = divergence_fits(name, sender)
+
+    def possible(m: LinkMission) -> bool:
+        beam = getattr(m, name)
+        if any(too_narrow(m.conventions, m.terminals, beam)):
+            return False
+        try:
+            half = half_angle_rad(beam.divergence_rad, m.conventions.divergence)
+            Shared.of(m).turbulent(beam, sender, half, None)
+        except ValueError:  # turbulence beyond a closed form
+            return False
+        return True
+
+    return possible
 
 
 RELATIVE = 0.1
@@ -213,7 +228,7 @@ def beam_tornado(m: LinkMission, sources: Mapping[str, Source], name: str) -> tu
     Raises:
         ValueError: If the mission has no such beam.
     """
-    tables = ("terminals", name, *(each for each in LINK_TABLES if each.startswith("channel")), "point_ahead")
+    tables = ("terminals", name, *AIR_TABLES, "point_ahead", "requirement")
     return swings(m, sources, tables, m.conventions.strehl, beam_margin(name, sources), divergence_possible(name))
 
 

@@ -1,0 +1,400 @@
+"""Links to a station as whole budgets: by hand, against drawn losses, over elevation, and by each road to a margin."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.special import ndtr, ndtri
+
+from ground_files import FIBRE, PHOTODIODE, STILL, TYPED, UP, WIND, ground_file
+from microrad import link
+from microrad.link import study as link_study
+from microrad.link.ground import ground_link
+from microrad.link.pointing import outage
+from microrad.link.turbulence import HufnagelValley
+from microrad.link.variation import divergence_possible
+
+deg = math.pi / 180.0
+DB = 10.0 / math.log(10.0)
+PLANCK, LIGHT_M_S = 6.62607015e-34, 299792458.0
+STATIC = {"jitter": None, "channel.turbulence.fades": "log-normal"}
+RISING = (*UP.items(), ("terminals.leo_aperture", "12 cm"), ("terminals.geo_aperture", "8 cm"))
+RISING = {**dict(RISING), "terminals.geo_obscuration": None}
+
+
+def lg(value):
+    return 10.0 * math.log10(value)
+
+
+def lines_of(budget):
+    return {line.name: line.value for line in budget.lines}
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    return link_study.run_link_study(ground_file(tmp_path_factory.mktemp("ground")))
+
+
+# --------------------------------------------------------------------------------------------------- a path by hand
+class Path:
+    """The mission's path with the formulas of Andrews and Phillips, each integral over height by a quadrature."""
+
+    def __init__(self, wavelength_m, elevation=20.0 * deg):
+        sea = 2393.0
+        square = 1.0 / 298.257223563 * (2.0 - 1.0 / 298.257223563)
+        sine, cosine = math.sin(28.3 * deg), math.cos(28.3 * deg)
+        normal = 6378137.0 / math.sqrt(1.0 - square * sine**2)
+        own = math.hypot((normal + sea) * cosine, (normal * (1.0 - square) + sea) * sine)
+        rise, level = own * math.sin(elevation), own * math.cos(elevation)
+        self.range_m = math.sqrt((6378137.0 + 500e3) ** 2 - level**2) - rise
+        self.k, self.wavelength_m, self.slant = 2.0 * math.pi / wavelength_m, wavelength_m, 1.0 / math.sin(elevation)
+        self.r0 = (0.423 * self.k**2 * self.over(lambda z: 1.0)) ** -0.6
+
+    @staticmethod
+    def strength(height):
+        sea = height + 2393.0
+        jet = 0.00594 * (21.0 / 27.0) ** 2 * (1e-5 * sea) ** 10 * math.exp(-sea / 1000.0)
+        return jet + 2.7e-16 * math.exp(-sea / 1500.0) + 1.7e-14 * math.exp(-height / 100.0)
+
+    def over(self, function):
+        """Integral of Cn2 times a function of the distance from the station, along the path."""
+        edges = (0.0, 200.0, 1e3, 4e3, 9e3, 15e3, 25e3, 60e3)
+        parts = itertools.pairwise(edges)
+        along = lambda h: self.strength(h) * function(h * self.slant) * self.slant  # noqa: E731
+        return sum(quad(along, *part, epsrel=1e-8)[0] for part in parts)
+
+    def averaged_index(self, diameter):
+        a = diameter**2 / 16.0
+        wave = lambda z: ((a + 1j * z / self.k) ** (5.0 / 6.0)).real - a ** (5.0 / 6.0)  # noqa: E731
+        return 8.70 * self.k**2 * self.over(wave)
+
+    def index_of_beam(self, waist):
+        far = 2.0 * self.range_m / (self.k * waist**2)
+        theta, width = 1.0 / (1.0 + far**2), far / (1.0 + far**2)
+
+        def wave(z):
+            xi = 1.0 - z / self.range_m
+            a = width * self.range_m * xi**2 / self.k
+            b = self.range_m * xi * (1.0 - (1.0 - theta) * xi) / self.k
+            return ((a + 1j * b) ** (5.0 / 6.0)).real - a ** (5.0 / 6.0)
+
+        return 8.70 * self.k**2 * self.over(wave)
+
+    def wander_rad2(self, waist):
+        far = 2.0 / (self.k * waist**2)
+        return 2.07 * self.over(
+            lambda z: (1.0 - z / self.range_m) ** 2 * (waist * math.hypot(1.0, far * z)) ** (-1.0 / 3.0)
+        )
+
+
+def normal_loss_db(index, outage_share):
+    variance = math.log(1.0 + index)
+    return DB * (variance / 2.0 - math.sqrt(variance) * ndtri(outage_share))
+
+
+def clear_db(wavelength_m, mass):
+    um = wavelength_m * 1e6
+    rayleigh = 0.008569 * um**-4 * (1.0 + 0.0113 * um**-2 + 0.00013 * um**-4) * math.exp(-2393.0 / 8434.5)
+    return mass * (DB * (rayleigh + 0.05 * um**-1.3) + 0.05)
+
+
+MASS = 1.0 / (math.sin(20.0 * deg) + 0.50572 * (20.0 + 6.07995) ** -1.6364)
+
+
+def test_a_downlink_is_the_sum_of_its_lines_by_hand(tmp_path):
+    data = link.of(ground_file(tmp_path, STATIC).mission)
+    budget = link.communication_budget(data, {})
+    wave = 1.55e-6
+    path = Path(wave)
+    wanted = {
+        "Transmit power": 30.0,
+        "satellite aperture gain": 2.0 * lg(math.pi * 0.05 / wave),
+        "Transmit optics loss": -0.97,
+        "Strehl loss": -DB * (2.0 * math.pi * 80e-9 / wave) ** 2,
+        "Pointing loss": -DB * 2.0 * (10e-6 / (2.0 * wave / (math.pi * 0.05))) ** 2,
+        "Point-ahead loss": 0.0,
+        "Free-space loss": -2.0 * lg(4.0 * math.pi * path.range_m / wave),
+        "Clear-sky loss": -clear_db(wave, MASS),
+        "Tenerife aperture gain": 2.0 * lg(math.pi * 0.4 / wave),
+        "Tenerife obscuration loss": lg(1.0 - 0.3**2),
+        "Receive optics loss": -0.97,
+        "Turbulence fade": -normal_loss_db(path.averaged_index(0.4), 0.01),
+        "Tracking split loss": -0.46,
+        "Implementation loss": -3.0,
+    }
+    assert lines_of(budget) == pytest.approx(wanted, abs=2e-3)
+    assert wanted["Turbulence fade"] < -1.5
+    needed = lg(500.0 * PLANCK * LIGHT_M_S / wave * 10e9 * 1e3)
+    assert budget.margin_db == pytest.approx(sum(wanted.values()) - needed, abs=4e-3)
+    assert budget.margin_db == pytest.approx(sum(lines_of(budget).values()) - needed, abs=1e-6)
+
+
+def wandering_loss_db(index, beam, share):
+    """The loss of a share of the time, by the integral over the radial wander, halved until it is found."""
+    variance = math.log(1.0 + index)
+
+    def below(db):
+        def each(x):
+            at = math.log(beam / (beam + 1.0)) - db / DB + x / beam
+            return math.exp(-x) * ndtr((at + variance / 2.0) / math.sqrt(variance))
+
+        return quad(each, 0.0, 12.0, epsrel=1e-9)[0] + quad(each, 12.0, 40.0, epsrel=1e-9)[0]
+
+    low, high = -10.0, 40.0
+    for _ in range(45):
+        middle = (low + high) / 2.0
+        low, high = (middle, high) if below(middle) > share else (low, middle)
+    return low
+
+
+def test_an_uplink_is_the_sum_of_its_lines_by_hand(tmp_path):
+    data = link.of(ground_file(tmp_path, STATIC, RISING).mission)
+    budget = link.communication_budget(data, {})
+    wave = 1.55e-6
+    path, half, waist = Path(wave), 2.0 * wave / (math.pi * 0.12), 0.06
+    spread = 12.0 * math.log10(1.0 + (math.sqrt(8.0) * waist / path.r0) ** (5.0 / 3.0))
+    beam = half**2 * 10.0 ** (spread / 10.0) / (2.0 * path.wander_rad2(waist))
+    wanted = {
+        "Transmit power": 30.0,
+        "satellite aperture gain": 2.0 * lg(math.pi * 0.12 / wave),
+        "Transmit optics loss": -0.97,
+        "Strehl loss": -DB * (2.0 * math.pi * 80e-9 / wave) ** 2,
+        "Pointing loss": -DB * 2.0 * (10e-6 / half) ** 2,
+        "Point-ahead loss": 0.0,
+        "Free-space loss": -2.0 * lg(4.0 * math.pi * path.range_m / wave),
+        "Clear-sky loss": -clear_db(wave, MASS),
+        "Turbulence spread loss": -spread,
+        "Tenerife aperture gain": 2.0 * lg(math.pi * 0.08 / wave),
+        "Receive optics loss": -0.97,
+        "Turbulence fade": -wandering_loss_db(path.index_of_beam(waist), beam, 0.01),
+        "Tracking split loss": -0.46,
+        "Implementation loss": -3.0,
+    }
+    assert lines_of(budget) == pytest.approx(wanted, abs=5e-3)
+    assert spread > 2.0 and wanted["Turbulence fade"] < -3.0
+    # the answer comes down, and falls on the station's telescope: it does not spread, and its fades are averaged
+    answer = lines_of(link.beam_budget("answer", data.shared, ground_file(tmp_path, STATIC, RISING).mission.answer, {}))
+    assert "Turbulence spread loss" not in answer
+    assert answer["Turbulence fade"] == pytest.approx(
+        -normal_loss_db(Path(1.06e-6).averaged_index(0.12), 0.01), abs=2e-3
+    )
+    assert answer["Clear-sky loss"] == pytest.approx(-clear_db(1.06e-6, MASS), abs=1e-3)
+
+
+def test_a_fade_stands_at_the_outage_of_the_mission(tmp_path):
+    index = Path(1.55e-6).averaged_index(0.4)
+    for share in (0.1, 1e-4):
+        data = link.of(ground_file(tmp_path, STATIC, {"requirement.outage": share}).mission)
+        assert data.fade_db == pytest.approx(normal_loss_db(index, share), abs=2e-3)
+
+
+# ------------------------------------------------------------------------------------------------------ drawn losses
+@pytest.mark.parametrize("share", [1e-2, 1e-3])
+def test_jitter_a_receiver_of_its_own_and_fades_lose_together_what_drawn_losses_do(tmp_path, share):
+    """Three losses are drawn independently and added; the sum is read where it is exceeded for the outage."""
+    jitter = {"bias": ["0.2 urad", "0 urad"], "rms": ["0.5 urad", "0.5 urad"], "bandwidth": "50 Hz"}
+    changes = {
+        "channel.turbulence.fades": "log-normal",
+        "communication.coupling": {**FIBRE, "jitter": jitter},
+        "requirement.outage": share,
+    }
+    data = link.of(ground_file(tmp_path, changes).mission)
+    rng, count = np.random.default_rng(11), 400_000
+    sent = np.hypot(2e-6 + 2e-6 * rng.standard_normal(count), 2e-6 * rng.standard_normal(count))
+    lost = DB * 2.0 * (sent / (2.0 * 1.55e-6 / (math.pi * 0.05))) ** 2
+    end = data.receiving.end
+    x, y = 0.2e-6 + 0.5e-6 * rng.standard_normal(count), 0.5e-6 * rng.standard_normal(count)
+    received = end.loss_db(x, y) - float(end.loss_db(0.0))
+    variance = math.log1p(Path(1.55e-6).averaged_index(0.4))
+    faded = -DB * (math.sqrt(variance) * rng.standard_normal(count) - variance / 2.0)
+    wanted = np.quantile(lost + received + faded, 1.0 - share)
+    alone = np.quantile(lost, 1.0 - share)
+    stated = outage.Exposure.stated(data)
+    assert stated.outage_loss_db == pytest.approx(wanted, abs=0.03 if share > 5e-3 else 0.12)
+    assert data.added_db == pytest.approx(wanted - alone, abs=0.05 if share > 5e-3 else 0.15)
+    without = np.quantile(lost + received, 1.0 - share)
+    assert data.fade_db == pytest.approx(wanted - without, abs=0.05 if share > 5e-3 else 0.15)
+    assert data.receive_pointing_db == pytest.approx(without - alone, abs=0.05 if share > 5e-3 else 0.15)
+    assert data.fade_db > 0.3 and data.receive_pointing_db > 0.3
+
+
+# ---------------------------------------------------------------------------------------------- one margin, many roads
+@pytest.mark.parametrize("changes", [{}, RISING, {"communication.coupling": PHOTODIODE}, STATIC, STILL, TYPED])
+def test_each_road_to_a_margin_ends_at_the_same_one(tmp_path, changes):
+    file = ground_file(tmp_path, changes)
+    m = file.mission
+    data = link.of(m)
+    error, rate = outage.error_rad(data), data.table.data_rate_bit_s
+    budget = link.communication_budget(data, file.sources, error).margin_db
+    exposure = outage.Exposure.stated(data)
+    assert exposure.margin_db == pytest.approx(budget, abs=1e-9)
+    assert float(link.margin_map(data, [rate], [error])[0, 0]) == pytest.approx(budget, abs=1e-9)
+    assert outage.margin_db(data) == pytest.approx(budget, abs=1e-9)
+    assert float(link.farther_db(data, data.range_m)) == pytest.approx(0.0, abs=1e-9)
+    if m.jitter is not None:
+        assert exposure.short_of(budget) == pytest.approx(0.01, rel=1e-4)
+    assert exposure.short_of(budget - 2.0) < exposure.short_of(budget + 0.5)
+
+
+def test_the_study_has_the_same_margin_as_its_tornado_and_its_figures(study):
+    own = study.communication.margin_db
+    assert study.under_jitter.margin_db == pytest.approx(own, abs=1e-9)
+    assert study.under_jitter.short == pytest.approx(outage.Exposure.stated(study.data).short_of(3.0), rel=1e-9)
+    assert study.ground.elevations[0].margin_db == pytest.approx(own, abs=1e-9)
+    tornado, answer = study.tornados
+    assert (tornado.margin_db, answer.margin_db) == (own, study.answer.margin_db)
+    keys = {each.key for each in tornado.swings}
+    assert {"channel.turbulence.wind_rms", "channel.turbulence.ground_strength", "channel.aerosol_depth"} <= keys
+    assert {"channel.absorption", "answer.wavelength", "requirement.outage"} <= {each.key for each in answer.swings}
+    assert math.isnan(study.under_jitter.fades_per_s)
+    assert study.under_jitter.fade_warning == "fades are not counted: those of the air have no spectrum here"
+
+
+def test_air_that_hardly_moves_light_costs_what_still_air_costs(tmp_path, monkeypatch):
+    whole = HufnagelValley.strength
+    monkeypatch.setattr(HufnagelValley, "strength", lambda profile, height: 1e-14 * whole(profile, height))
+    few = {"channel.turbulence.ground_strength": 1.234e-14}  # of which nothing is kept from another test
+    for changes in ({}, RISING, {"communication.coupling": FIBRE}, {"communication.coupling": PHOTODIODE}):
+        for fades in ("log-normal", "gamma-gamma"):
+            calm = link.of(ground_file(tmp_path, few, changes, {"channel.turbulence.fades": fades}).mission)
+            still = link.of(ground_file(tmp_path, changes, STILL).mission)
+            assert calm.turbulent is not None and still.turbulent is None
+            assert outage.margin_db(calm) == pytest.approx(outage.margin_db(still), abs=2e-4)
+            assert calm.air_db == pytest.approx(still.air_db, abs=1e-6)
+
+
+def test_a_swing_ends_where_weak_turbulence_does(tmp_path):
+    """The index is 0.96 at this wind; a tenth more of it, or a tenth less of the wavelength, is beyond the formula."""
+    strong = {
+        "orbit.geo.mask": "10 deg",
+        "terminals.geo_aperture": "2 cm",
+        "communication.wavelength": "1.06 um",
+        "channel.turbulence.wind_rms": "16 m/s",
+    }
+    m = ground_file(tmp_path, strong).mission
+    data = link.of(m)
+    assert 0.9 < data.turbulent.index < 1.0
+    assert link.beam_passes(m)
+    stronger = m.with_value("channel.turbulence.wind_rms_m_s", 17.6)
+    assert not link.beam_passes(stronger)
+    with pytest.raises(link.LinkError, match="turbulence on the path at 10 deg of elevation: a scintillation index of"):
+        link.of(stronger)
+    tables = ("channel.turbulence",)
+    margin = lambda moved: outage.margin_db(link.of(moved))  # noqa: E731
+    (wind,) = [s for s in link.swings(m, {}, tables, "ratio", margin, link.beam_passes) if s.key.endswith("wind_rms")]
+    assert wind.low == pytest.approx(14.4)
+    assert 16.0 < wind.high < 17.6
+    answers = ground_file(tmp_path, strong, {"channel.turbulence.wind_rms": "10 m/s"}).mission
+    possible = divergence_possible("answer")
+    assert possible(answers)
+    assert not possible(answers.with_value("channel.turbulence.wind_rms_m_s", 60.0))
+    assert not possible(answers.with_value("answer.divergence_rad", 1e-7))  # narrower than its aperture makes it
+
+
+# ----------------------------------------------------------------------------------------------------- over elevation
+def test_what_a_higher_satellite_gains_is_the_margin_of_a_mission_at_that_elevation(tmp_path):
+    data = link.of(ground_file(tmp_path).mission)
+    path, own = data.shared.path, outage.margin_db(data)
+    nodes = np.linspace(1.0, 1.0 / math.sin(20.0 * deg), 17)
+    for place, longer in enumerate(nodes[1:-1:4]):
+        for inverse, close in ((longer, 1e-9), (longer + 0.4 * (nodes[1] - nodes[0]), 3e-3)):
+            elevation = math.asin(1.0 / inverse)
+            higher = ground_file(tmp_path, {"orbit.geo.mask": f"{elevation / deg:.12f} deg"}).mission
+            there = link.of(higher)
+            assert there.range_m == pytest.approx(path.range_at(elevation), abs=1e-3)
+            gained = outage.margin_db(there) - own
+            assert float(link.farther_db(data, there.range_m)) == pytest.approx(-gained, abs=max(close, 1e-7)), place
+            assert gained > 20.0 * math.log10(data.range_m / there.range_m) + 0.05  # the air is thinner, too
+
+
+def test_behind_the_elevation_of_the_budget_the_range_alone_counts(tmp_path):
+    data = link.of(ground_file(tmp_path).mission)
+    farther = link.farther_db(data, [data.range_m, 1.5 * data.range_m, 10.0 * data.range_m])
+    assert farther == pytest.approx([0.0, 20.0 * math.log10(1.5), 20.0], abs=1e-9)
+    nearest = data.shared.path.range_at(math.pi / 2.0)
+    above, nearer = link.farther_db(data, [nearest, nearest / 2.0])
+    assert nearer == pytest.approx(above - 20.0 * math.log10(2.0), abs=1e-9)
+    assert link.farther_db(data, np.full((2, 3), data.range_m)).shape == (2, 3)
+    vacuum = link.of(ground_file(tmp_path, {**TYPED, "channel": None, **FAR}).mission)
+    assert float(link.farther_db(vacuum, 500e3)) == pytest.approx(-20.0 * math.log10(2.0), abs=1e-12)
+
+
+FAR = {"communication.distance": "1000 km", "answer.distance": "1000 km"}
+
+
+def test_the_table_over_elevation_is_that_of_missions_at_each(study, tmp_path):
+    elevations = [each.elevation_rad / deg for each in study.ground.elevations]
+    assert elevations == pytest.approx([20.0, 30.0, 45.0, 60.0, 90.0])
+    for each in study.ground.elevations[1:3]:
+        there = link.of(ground_file(tmp_path, {"orbit.geo.mask": f"{each.elevation_rad / deg:g} deg"}).mission)
+        assert each.margin_db == pytest.approx(outage.margin_db(there), abs=1e-9)
+        assert (each.range_m, each.air_db) == pytest.approx((there.range_m, there.air_db), rel=1e-12)
+        assert each.fade_db == pytest.approx(there.fade_db, abs=1e-9)
+        path = there.turbulent.path
+        assert (each.fried_m, each.isoplanatic_rad) == pytest.approx((path.fried_m, path.isoplanatic_rad), rel=1e-12)
+        assert (each.rytov, each.index) == pytest.approx((path.rytov, there.turbulent.index), rel=1e-12)
+    # the path is shorter by the ratio of the sines: r0 goes with its power 3 / 5
+    first, last = study.ground.elevations[0], study.ground.elevations[-1]
+    assert last.fried_m / first.fried_m == pytest.approx(math.sin(20.0 * deg) ** -0.6, rel=1e-9)
+    assert last.rytov / first.rytov == pytest.approx(math.sin(20.0 * deg) ** (11.0 / 6.0), rel=1e-9)
+
+
+# -------------------------------------------------------------------------------------------------------- conventions
+def test_what_a_convention_costs_is_what_the_changed_file_has_less(tmp_path):
+    """Both laws of fades, both constants of wander and both tilts, for the data upwards and the answer down."""
+    file = ground_file(tmp_path, RISING)
+    found = ground_link(file.mission, file.sources, link.of(file.mission)).conventions
+    assert [(each.key, each.given, each.other) for each in found] == [
+        ("channel.turbulence.fades", "gamma-gamma", "log-normal"),
+        ("channel.turbulence.wander", "dios-2004", "andrews-phillips-2005"),
+        ("channel.turbulence.tilt", "zernike", "gradient"),
+    ]
+
+    def margins(*changes):
+        f = ground_file(tmp_path, RISING, *changes)
+        data = link.of(f.mission)
+        answer = link.beam_budget("answer", data.shared, f.mission.answer, f.sources)
+        return {"Communication": outage.margin_db(data), "Answer": answer.margin_db}
+
+    own = margins()
+    for each in found:
+        other = margins({each.key: each.other})
+        assert each.gained_db == pytest.approx({name: other[name] - own[name] for name in own}, abs=1e-9)
+    fades, wander, tilt = found
+    assert fades.gained_db["Communication"] > 0.01
+    assert wander.gained_db["Communication"] < -1.0 and wander.gained_db["Answer"] == 0.0
+    assert set(tilt.gained_db.values()) == {0.0}  # it moves the angle of arrival alone
+
+
+def test_still_air_has_elevations_and_no_conventions(tmp_path):
+    file = ground_file(tmp_path, STILL)
+    g = ground_link(file.mission, file.sources, link.of(file.mission))
+    assert (g.beams, g.conventions) == ((), ())
+    assert len(g.elevations) == 5 and all(math.isnan(each.index) and each.fade_db == 0.0 for each in g.elevations)
+    slot = {"orbit.leo": {"kind": "geostationary", "longitude": "-10 deg"}}
+    file = ground_file(tmp_path, slot)
+    fixed = ground_link(file.mission, file.sources, link.of(file.mission))
+    assert len(fixed.elevations) == 1  # it stands where it stands
+    file = ground_file(tmp_path, TYPED, FAR, {"channel.altitude": None})
+    assert len(ground_link(file.mission, file.sources, link.of(file.mission)).elevations) == 1
+
+
+def test_the_wind_of_a_table_is_taken_for_the_profile_and_the_greenwood_frequency(tmp_path):
+    """Bufton's wind in full, and its root mean square from 5 to 20 km alone, are the same air."""
+    square = quad(lambda h: (5.0 + 30.0 * math.exp(-(((h - 9400.0) / 4800.0) ** 2))) ** 2, 5e3, 20e3)[0] / 15e3
+    by_table = {"channel.turbulence.wind_rms": None, "channel.turbulence.wind": WIND}
+    by_rms = {"channel.turbulence.wind_rms": f"{math.sqrt(square):.9f} m/s"}
+    usual, stated = (ground_file(tmp_path, each) for each in (by_table, by_rms))
+    lines = {}
+    for name, file in (("usual", usual), ("stated", stated)):
+        (_, found), _ = ground_link(file.mission, file.sources, link.of(file.mission)).beams
+        lines[name] = {line.name: line.value for line in found}
+    assert lines["usual"] == pytest.approx(lines["stated"], rel=1e-6)
+    calm = {**by_table, "channel.turbulence.wind": {**WIND, "jet": "0 m/s", "ground": "1 m/s"}}
+    file = ground_file(tmp_path, calm)
+    (_, found), _ = ground_link(file.mission, file.sources, link.of(file.mission)).beams
+    slow = {line.name: line.value for line in found}
+    assert slow["Greenwood frequency"] < 0.2 * lines["usual"]["Greenwood frequency"]
+    assert slow["Scintillation index"] < 0.5 * lines["usual"]["Scintillation index"]
