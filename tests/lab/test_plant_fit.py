@@ -21,7 +21,7 @@ from microrad.lab.identify.hysteresis.plant_fit import (
     upsampled,
 )
 from microrad.lab.identify.hysteresis.structures import hysteretic_oscillator, one_axis
-from microrad.lab.recording import read_recording, recording_from_arrays
+from microrad.lab.recording import Recording, read_recording, recording_from_arrays
 from microrad.mirror import model as mirror
 from microrad.mirror.hysteresis import PrandtlIshlinskii
 from microrad.mirror.model import Mirror
@@ -300,3 +300,68 @@ def _less(run):
     """The record less a play of 2 V, so that its weight would be below 0."""
     less = plays(run.drive[:, 0] + 5.0, (2.0,), (1e-5,))[:, None]
     return replace(run, output=run.output - less)
+
+
+PERIOD = 8
+
+
+def repeated(periods, more=0, period=PERIOD):
+    """A ramp drive of some periods, the output another one in each of them."""
+    drive = np.tile(np.arange(PERIOD, dtype=float), periods + 1)[: periods * PERIOD + more]
+    output = drive + 10.0 * np.floor(np.arange(drive.size) / PERIOD)
+    return recording_of(drive, output, period)
+
+
+def recording_of(drive, output, period):
+    return Recording("made up", "", drive[:, None], output[:, None], 100.0, ("u",), ("y",), period)
+
+
+@pytest.mark.parametrize(
+    ("periods", "more", "period", "repeats"),
+    [
+        (2, 0, PERIOD, True),
+        (3, 5, PERIOD, True),
+        (1, PERIOD - 1, PERIOD, False),
+        (3, 0, None, False),
+        (3, 0, PERIOD - 1, False),
+    ],
+)
+@pytest.mark.parametrize("hold", ["band-limited", "linear"])
+def test_of_a_drive_that_repeats_itself_the_mean_period_behind_the_first_is_fitted(
+    periods, more, period, repeats, hold
+):
+    recording = repeated(periods, more, period)
+    (made,) = fit_records([recording], factor=4, hold=hold, drop=3, offset=True)
+    if not repeats:
+        assert (made.first, len(made.output)) == (3, recording.samples)
+        assert made.nuisance.shape == (recording.samples - 3, 1)
+        return
+    assert (made.first, made.output.shape, made.drive.shape[0]) == (PERIOD, (2 * PERIOD, 1), 2 * PERIOD * 4)
+    middle = 10.0 * np.mean(np.arange(1, periods))  # of the periods behind the first one
+    assert_allclose(made.output[PERIOD:, 0], np.arange(PERIOD) + middle)
+    assert_allclose(made.drive[: PERIOD * 4], made.drive[PERIOD * 4 :])
+    if hold == "linear":  # back to 0 V at the next period
+        assert_allclose(made.drive[::4, 0], np.tile(np.arange(PERIOD), 2))
+        assert_allclose(made.drive[PERIOD * 4 - 4 : PERIOD * 4].ravel(), [7.0, 5.25, 3.5, 1.75])
+    assert_allclose(made.nuisance, 1.0 / np.sqrt(PERIOD))
+
+
+@pytest.mark.parametrize(("off", "repeats"), [(0.0, True), (5e-6, True), (9e-6, False)])
+def test_a_drive_repeats_itself_to_a_millionth_of_its_largest(off, repeats):
+    recording = repeated(2)
+    drive = recording.drive.copy()
+    drive[PERIOD + 3] += off  # of at most 7
+    (made,) = fit_records([recording_of(drive[:, 0], recording.output[:, 0], PERIOD)])
+    assert (made.first == PERIOD) is repeats
+
+
+@pytest.mark.parametrize(("drop", "left"), [(13, True), (14, True), (15, False), (16, False)])
+def test_a_recording_of_which_all_but_one_sample_is_left_out_is_refused(drop, left):
+    recording = repeated(2, period=None)
+    if left:
+        assert len(fit_records([recording], drop=drop)[0].nuisance) == 16 - drop
+    else:
+        with pytest.raises(
+            IdentificationError, match=f"16 samples, of which the first {drop} are left out: nothing is"
+        ):
+            fit_records([recording], drop=drop)

@@ -7,12 +7,10 @@ import pytest
 
 from microrad.lab.identify import IdentificationError
 from microrad.lab.identify.coupled.wiring import check_wiring
-from microrad.lab.identify.linear.response import response_from_periods
+from microrad.lab.identify.linear.response import FrequencyResponse, response_from_periods
 from microrad.lab.recording import AXES, read_arrays
 from microrad.mirror.coupled import Output
 from places import DATA
-
-pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason=f"real recordings are not at {DATA}")
 
 SIGNS = ((-1, 1, -1), (1, -1, -1), (-1, -1, 1))
 OUTPUTS = tuple(Output(f"y{k}", "displacement") for k in range(3))
@@ -20,6 +18,8 @@ OUTPUTS = tuple(Output(f"y{k}", "displacement") for k in range(3))
 
 @pytest.fixture(scope="module")
 def response():
+    if not DATA.is_dir():
+        pytest.skip(f"real recordings are not at {DATA}")
     u, y = (DATA / "cubespec" / f"{name}_300mV_train.npy" for name in "uy")
     recordings = read_arrays(u, rate_hz=6400.0, axes=AXES, output_path=y, part_s=(1.28, None))
     return response_from_periods(recordings)
@@ -79,3 +79,116 @@ def test_places_of_three_sensors_agree_with_anything_and_two_or_a_line_do_not_do
     assert message.startswith("u.npy: the positions do not give the tilts: all displacements lie on one line")
     angles = [replace(output, quantity="angle") for output in placed((0.01, 0.0), (0.0, 0.01), (-0.01, -0.01))]
     assert "positions are those of displacements, and the outputs are angles" in refusal(response, outputs=angles)
+
+
+# ------------------------------------------------------------------------------------------------ responses made up
+def made(gain, error=0.01, lines=20):
+    """The same real gain (outputs, drives) at every line, with one standard error."""
+    gain = np.array(gain, dtype=float)
+    shape = (lines, *gain.shape)
+    return FrequencyResponse(
+        np.arange(1.0, lines + 1.0),
+        np.tile(gain.astype(complex), (lines, 1, 1)),
+        np.full(shape, error),
+        None,
+        None,
+        np.ones(shape[:2]),
+        np.tile(np.eye(shape[2], dtype=complex), (lines, 1, 1)),
+        np.zeros(shape[:2]),
+        np.ones(shape[2]),
+        (1.0, float(lines)),
+        "made up",
+        100.0,
+        tuple(f"u{k}" for k in range(shape[2])),
+        tuple(f"y{k}" for k in range(shape[1])),
+    )
+
+
+TWO = [Output(f"y{k}", "displacement") for k in range(2)]
+GAIN = ((2.0, 1.0), (-3.0, 4.0))
+
+
+@pytest.mark.parametrize(
+    ("signs", "message"),
+    [
+        (((1, 1), (-1, 1)), ""),
+        (((0, 0), (0, 0)), ""),
+        (((1, 1), (0, -1)), "the output 'y1' rises with the drive 'u1', and `signs` says that it does not"),
+        (((1, 1), (1, 1)), "the output 'y1' falls with the drive 'u0', and `signs` says that it does not"),
+        (((-1, 0), (0, 0)), "the output 'y0' rises with the drive 'u0'"),
+        (((1, 1), (1, -1)), "where the output 'y1' is reversed or the inputs 'u0' and 'u1' are swapped: check"),
+        (((-1, 1), (1, 1)), "it would agree where the outputs 'y0' and 'y1' are swapped: check"),
+        (((1, 1), (1, -1)), "the output 'y1' rises with the drive 'u1'"),
+        (((-1, 0), (-1, 0)), "where the output 'y0' is reversed: check the wiring, or correct signs."),
+        (((-1, -1), (1, -1)), "no single sensor reversed or pair of channels swapped explains it: check the wiring"),
+    ],
+)
+def test_the_drive_and_the_output_that_contradict_a_sign_are_named(signs, message):
+    if message:
+        assert message in refusal(made(GAIN), signs, TWO)
+    else:
+        check_wiring("u.npy", made(GAIN), TWO, signs)
+
+
+@pytest.mark.parametrize(("gain", "certain"), [(-0.49, False), (-0.51, True), (0.49, False)])
+def test_a_sign_is_one_from_five_standard_errors_on(gain, certain):
+    """Of ten lines, each with an error of sqrt(10) * 0.1."""
+    response = made(((gain,),), error=0.1 * np.sqrt(10.0))
+    moving = response.response.copy()
+    moving[10:] = 5.0  # beyond the lowest lines: it moves, and the other way
+    response = replace(response, response=moving)
+    if certain:
+        assert "the output 'y0' falls with the drive 'u0'" in refusal(response, ((1,),), TWO[:1])
+    else:
+        check_wiring("u.npy", response, TWO[:1], ((1,),))
+
+
+@pytest.mark.parametrize(("times", "moves"), [(1.41, False), (1.42, True)])
+@pytest.mark.parametrize("drive", [0, 1])
+def test_a_drive_moves_something_from_twice_the_power_of_the_noise_on(times, moves, drive):
+    """In the sum over the lines or in the middle one, and in any output."""
+    gain = np.array(GAIN)
+    gain[:, drive] = 0.0
+    gain[1, drive] = times * 0.1
+    if moves:
+        check_wiring("u.npy", made(gain, error=0.1), TWO, None)
+    else:
+        assert f"the drive 'u{drive}' moves nothing" in refusal(made(gain, error=0.1), None, TWO)
+
+
+PLACES = ((0.01, 0.0), (0.0, 0.02), (-0.03, 0.01), (0.0, -0.02), (0.02, 0.03), (-0.01, -0.02))
+
+
+def placed_at(places):
+    return [Output(f"y{k}", "displacement", place) for k, place in enumerate(places)]
+
+
+def tilted(places, tilt=(2.0, -1.0), piston=0.5):
+    """What displacements at these places show of a tilt about x, then y, and a piston; one drive."""
+    return np.array([[tilt[0] * 100.0 * y - tilt[1] * 100.0 * x + piston] for x, y in places])
+
+
+@pytest.mark.parametrize(
+    ("turn", "message"),
+    [
+        (lambda g: g, ""),
+        (lambda g: g * [[1], [1], [1], [-1], [1], [1]], "the output 'y3' is reversed"),
+        (lambda g: g[[0, 1, 4, 3, 2, 5]], "the outputs 'y2' and 'y4' are swapped"),
+        (lambda g: g * [[1], [-1], [1], [-1], [1], [1]], ""),  # bent, and no single turn explains it
+    ],
+)
+def test_four_displacements_that_do_not_stay_flat_are_refused_with_what_explains_it(turn, message):
+    response = made(turn(tilted(PLACES)))
+    if message:
+        told = refusal(response, None, placed_at(PLACES))
+        assert message in told and "% of what the outputs show is neither tilt nor piston" in told
+        assert told.endswith("or correct positions.")
+    else:
+        check_wiring("u.npy", response, placed_at(PLACES), None)
+
+
+def test_positions_of_displacements_that_are_known_in_part_or_of_angles_are_refused():
+    angle = Output("y1", "angle")
+    told = refusal(made(GAIN), None, [placed_at(PLACES)[0], angle])
+    assert "positions are those of displacements, and the outputs are angles" in told
+    assert "the positions do not give the tilts" in refusal(made(GAIN), None, placed_at(PLACES)[:2])
