@@ -232,7 +232,6 @@ def test_each_road_to_a_margin_ends_at_the_same_one(tmp_path, changes):
     assert exposure.margin_db == pytest.approx(budget, abs=1e-9)
     assert float(link.margin_map(data, [rate], [error])[0, 0]) == pytest.approx(budget, abs=1e-9)
     assert outage.margin_db(data) == pytest.approx(budget, abs=1e-9)
-    assert float(link.farther_db(data, data.range_m)) == pytest.approx(0.0, abs=1e-9)
     if m.jitter is not None:
         assert exposure.short_of(budget) == pytest.approx(0.01, rel=1e-4)
     assert exposure.short_of(budget - 2.0) < exposure.short_of(budget + 0.5)
@@ -293,15 +292,40 @@ def test_a_swing_ends_where_weak_turbulence_does(tmp_path):
     assert not possible(answers.with_value("answer.divergence_rad", 1e-7))  # narrower than its aperture makes it
 
 
+@pytest.mark.parametrize("velocity", ["0 m/s", "500 m/s", "7.5 km/s"])
+def test_more_corrected_modes_never_cost_an_uplink_its_margin(tmp_path, velocity):
+    """Adaptive optics takes tilt out, too, and with it the wander; the point-ahead angle leaves some of both."""
+    wide = {**RISING, "terminals.leo_aperture": "30 cm", "point_ahead.transverse_velocity": velocity}
+    found = []
+    for modes in (0, 3, 6, 20, 100, 1000):
+        data = link.of(ground_file(tmp_path, STATIC, wide, {"channel.turbulence.corrected_modes": modes}).mission)
+        found.append(data.turbulent)
+    lost = [each.spread_db + each.fades.loss_db(0.01) for each in found]
+    assert np.all(np.diff(lost) < 1e-9)
+    assert np.all(np.diff([each.wander_rad for each in found]) <= 0.0)
+    if velocity == "0 m/s":
+        assert lost[-1] < lost[0] - 10.0
+        # the variance of 1000 modes, all of it tilt of a wavefront over sqrt(8) waists of 15 cm
+        diameter = math.sqrt(8.0) * 0.15
+        variance = 0.2944 * 1000 ** (-math.sqrt(3.0) / 2.0) * (diameter / found[0].path.fried_m) ** (5.0 / 3.0)
+        assert found[-1].spread_db == pytest.approx(DB * variance, rel=1e-9)
+        angle = math.sqrt(variance) * 2.0 * 1.55e-6 / (math.pi * diameter)
+        assert found[-1].wander_rad == pytest.approx(angle, rel=1e-9)
+    if velocity == "7.5 km/s":  # five isoplanatic angles ahead the beam goes through other air
+        assert lost[-1] == lost[0]
+        assert "the point-ahead angle is" in found[-1].doubts[-1]
+
+
 # ----------------------------------------------------------------------------------------------------- over elevation
 def test_what_a_higher_satellite_gains_is_the_margin_of_a_mission_at_that_elevation(tmp_path):
-    data = link.of(ground_file(tmp_path).mission)
+    quick = {"channel.turbulence.fades": "log-normal"}
+    data = link.of(ground_file(tmp_path, quick).mission)
     path, own = data.shared.path, outage.margin_db(data)
     nodes = np.linspace(1.0, 1.0 / math.sin(20.0 * deg), 17)
     for place, longer in enumerate(nodes[1:-1:4]):
         for inverse, close in ((longer, 1e-9), (longer + 0.4 * (nodes[1] - nodes[0]), 3e-3)):
             elevation = math.asin(1.0 / inverse)
-            higher = ground_file(tmp_path, {"orbit.geo.mask": f"{elevation / deg:.12f} deg"}).mission
+            higher = ground_file(tmp_path, quick, {"orbit.geo.mask": f"{elevation / deg:.12f} deg"}).mission
             there = link.of(higher)
             assert there.range_m == pytest.approx(path.range_at(elevation), abs=1e-3)
             gained = outage.margin_db(there) - own
@@ -310,7 +334,7 @@ def test_what_a_higher_satellite_gains_is_the_margin_of_a_mission_at_that_elevat
 
 
 def test_behind_the_elevation_of_the_budget_the_range_alone_counts(tmp_path):
-    data = link.of(ground_file(tmp_path).mission)
+    data = link.of(ground_file(tmp_path, STATIC).mission)
     farther = link.farther_db(data, [data.range_m, 1.5 * data.range_m, 10.0 * data.range_m])
     assert farther == pytest.approx([0.0, 20.0 * math.log10(1.5), 20.0], abs=1e-9)
     nearest = data.shared.path.range_at(math.pi / 2.0)
@@ -384,8 +408,8 @@ def test_still_air_has_elevations_and_no_conventions(tmp_path):
 def test_the_wind_of_a_table_is_taken_for_the_profile_and_the_greenwood_frequency(tmp_path):
     """Bufton's wind in full, and its root mean square from 5 to 20 km alone, are the same air."""
     square = quad(lambda h: (5.0 + 30.0 * math.exp(-(((h - 9400.0) / 4800.0) ** 2))) ** 2, 5e3, 20e3)[0] / 15e3
-    by_table = {"channel.turbulence.wind_rms": None, "channel.turbulence.wind": WIND}
-    by_rms = {"channel.turbulence.wind_rms": f"{math.sqrt(square):.9f} m/s"}
+    by_table = {"channel.turbulence.wind_rms": None, **STATIC, "channel.turbulence.wind": WIND}
+    by_rms = {**STATIC, "channel.turbulence.wind_rms": f"{math.sqrt(square):.9f} m/s"}
     usual, stated = (ground_file(tmp_path, each) for each in (by_table, by_rms))
     lines = {}
     for name, file in (("usual", usual), ("stated", stated)):

@@ -133,6 +133,9 @@ def downlink(table: TurbulenceTable, path: SlantPath, receives: Receives) -> Tur
 def uplink(table: TurbulenceTable, path: SlantPath, half_angle_rad: float, point_ahead_rad: float) -> Turbulent:
     """Turbulence on a beam from the station, taken as the Gaussian one with its far field.
 
+    What adaptive optics leaves of the wavefront spreads the beam less, and makes it wander by no more than if all of
+    that were tilt: of a radial rms angle s, tilt has the phase variance (pi D s / (2 lambda))^2 (Noll 1976).
+
     Args:
         table: The mission's table on turbulence.
         path: The path.
@@ -141,18 +144,18 @@ def uplink(table: TurbulenceTable, path: SlantPath, half_angle_rad: float, point
     """
     up = Uplink(path, path.wavelength_m / (math.pi * half_angle_rad))
     index, doubts = max(up.index(), _NO_INDEX), list(path.regimes)
-    spread = up.spread_db
+    spread, wander = up.spread_db, up.wander_rms_rad(table.wander)
     if table.corrected_modes:
         diameter = math.sqrt(8.0) * up.waist_m
         variance = _residual_rad2(table.corrected_modes, diameter / path.fried_m)
         ahead = up.anisoplanatic_rad2(point_ahead_rad)
         spread = min(spread, gains.DB_PER_NEPER * (variance + ahead))
+        wander = min(wander, math.sqrt(variance + ahead) * 2.0 * path.wavelength_m / (math.pi * diameter))
         if ahead > 1.0:
             doubts.append(
                 f"the point-ahead angle is {point_ahead_rad / path.isoplanatic_rad:.2g} isoplanatic angles: adaptive "
                 "optics measures other air than the beam goes through"
             )
-    wander = up.wander_rms_rad(table.wander)
     widened = half_angle_rad * 10.0 ** (spread / 20.0)
     fades = _law(table, index)
     if wander > 0.0:

@@ -1,0 +1,178 @@
+"""What is shown of a link to a station: text, page, JSON, CSV and figure, against the records they are made from."""
+
+import csv
+import io
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from ground_files import STILL, TYPED, UP, ground_file
+from microrad import link
+from microrad.link import study as link_study
+from microrad.link.ground import ground_link
+from microrad.report.links import ground
+from microrad.report.links.budgets import links_csv, links_text
+from microrad.report.links.data import links_data
+from microrad.report.links.figures import link_figures
+from microrad.report.links.views import links_page
+from microrad.report.quantities import quantity, signed
+from microrad.report.view import views_text
+
+deg = math.pi / 180.0
+QUICK = {"channel.turbulence.fades": "log-normal"}
+FLYING = {"orbit.geo": {"kind": "geostationary", "longitude": "0 deg"}, "operations": None}
+BESIDE = {"channel.elevation": "20 deg", "channel.station": "geo", "channel.height": "0 m"}
+FAR = {"communication.distance": "900 km", "answer.distance": "900 km"}
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    return link_study.run_link_study(ground_file(tmp_path_factory.mktemp("ground"), QUICK))
+
+
+def of_file(folder, *changes):
+    """What there is to say of a mission's links to a station, and its budget, without all else of a study."""
+    file = ground_file(folder, QUICK, *changes)
+    data = link.of(file.mission)
+    return ground_link(file.mission, file.sources, data), link.communication_budget(data, file.sources)
+
+
+def with_ground(study, g):
+    """A study with another record of its links to a station."""
+    return SimpleNamespace(file=study.file, ground=g)
+
+
+def one_line(text):
+    return " ".join(text.split())
+
+
+# ---------------------------------------------------------------------------------------------------------- the text
+def test_a_terminal_of_80_columns_has_the_section(study):
+    text = links_text(study, 80, verbose=True)
+    assert max(len(row) for row in text.split("\n")) <= 80
+    section = text[text.index("Down to the station") : text.index("What pointing costs the link")]
+    first, last = study.ground.elevations[0], study.ground.elevations[-1]
+    said = one_line(section)
+    assert "The links are budgeted at 20 deg of elevation, 1200 km from Tenerife." in said
+    gained = quantity(last.margin_db - first.margin_db, "dB")
+    assert f"The communication link has {gained} more at 90 deg." in said
+    for each in study.ground.elevations:
+        row = next(line for line in section.split("\n") if line.startswith(f" {each.elevation_rad / deg:.0f} deg"))
+        shown = (quantity(each.air_db, "dB"), quantity(each.fade_db, "dB"), signed(each.margin_db, "dB"))
+        assert all(value in row for value in shown)
+    for title in ("Communication over elevation", "Turbulence on the path: Communication", "path: Answer"):
+        assert title in section
+    assert "What other conventions would change" in section
+    assert "clouds are outside" in said
+    brief = one_line(links_text(study, 80))
+    assert "with the fades of the air" in brief and f"has {gained} more at 90 deg" in brief
+
+
+def test_the_budgets_lines_stand_in_the_csv_in_full(study):
+    rows = list(csv.DictReader(io.StringIO(links_csv(study))))
+    values = {(row["budget"], row["line"]): row for row in rows}
+    fade = values["Communication", "Turbulence fade"]
+    assert float(fade["value"]) == -study.data.fade_db
+    assert "exceeded for 1 % of the time" in fade["basis"]
+    spread = values["Answer", "Turbulence spread loss"]
+    assert -0.5 < float(spread["value"]) < 0.0 and "D0 = sqrt(8) W0" in spread["basis"]
+    assert ("Communication", "Turbulence spread loss") not in values
+    assert "1198 km at 20 deg of elevation" in values["Communication", "Free-space loss"]["basis"]
+    assert "wander of" in values["Answer", "Turbulence fade"]["basis"]
+    assert values["Answer", "Clear-sky loss"]["warning"] == ""
+
+
+def test_the_json_has_the_records_values(study):
+    found = links_data(study)["ground"]
+    assert set(found) == {"end", "station", "elevations", "beams", "conventions"}
+    assert (found["end"], found["station"]) == ("geo", "Tenerife")
+    names = {"elevation_rad", "range_m", "air_db", "fade_db", "fried_m", "isoplanatic_rad", "rytov", "index"}
+    for row, record in zip(found["elevations"], study.ground.elevations, strict=True):
+        assert row == {name: getattr(record, name) for name in (*names, "margin_db")}
+    lines = {each["name"]: {line["name"]: line["value"] for line in each["lines"]} for each in found["beams"]}
+    assert list(lines) == ["Communication", "Answer"]
+    assert lines["Communication"]["Fried's parameter"] == study.data.turbulent.path.fried_m
+    assert "Angle of arrival" in lines["Communication"] and "Beam wander" in lines["Answer"]
+    assert [each["key"] for each in found["conventions"]] == [
+        f"channel.turbulence.{name}" for name in ("fades", "wander", "tilt")
+    ]
+    assert all(set(each["gained_db"]) == {"Communication", "Answer"} for each in found["conventions"])
+
+
+def test_the_page_has_the_figure_and_its_columns_are_the_margins(study):
+    figure = next(each for each in link_figures(study) if each.name == ground.OVER_ELEVATION)
+    wanted = [each.margin_db for each in study.ground.elevations]
+    assert figure.columns["margin (dB)"] == pytest.approx(wanted, abs=0.0)
+    assert figure.columns["elevation (deg)"] == pytest.approx([20.0, 30.0, 45.0, 60.0, 90.0])
+    assert figure.columns["lost to fades (dB)"] == pytest.approx([each.fade_db for each in study.ground.elevations])
+    margin, without = figure.sheet.panels[0].marks[:2]
+    assert np.asarray(without.y) - np.asarray(margin.y) == pytest.approx(figure.columns["lost to fades (dB)"])
+    page = links_page(study)
+    assert "Down to the station" in page and "Margin over elevation" in page
+
+
+# ------------------------------------------------------------------------------------------------------- other missions
+def test_a_station_that_sends_has_its_section_under_another_name(study, tmp_path):
+    g, budget = of_file(tmp_path, UP)
+    shown = views_text([ground.ground_view(with_ground(study, g))], 80)
+    assert "Up from the station" in shown and "Down to the station" not in shown
+    assert "Turbulence spread loss" in {line.name for line in budget.lines}
+
+
+def test_still_air_shows_no_turbulence(study, tmp_path):
+    g, budget = of_file(tmp_path, STILL)
+    shown = views_text([ground.ground_view(with_ground(study, g))], 80)
+    assert "Communication over elevation" in shown
+    assert not any(word in shown for word in ("r0", "index", "Turbulence on the path", "convention", "fades  "))
+    (sky,) = [line for line in budget.lines if line.name == "Clear-sky loss"]
+    assert sky.warning == "turbulence is not in this budget: scintillation and beam wander come on top"
+    assert "no turbulence" in sky.regime
+    rows = ground.ground_data(g)["elevations"]
+    assert all(row["index"] is None and row["fried_m"] is None and row["rytov"] is None for row in rows)
+    assert all(row["fade_db"] == 0.0 and row["air_db"] > 0.0 for row in rows)
+
+
+def test_a_link_that_closes_only_higher_up_says_from_where(study, tmp_path):
+    g, _ = of_file(tmp_path, {"communication.transmit_power": "80 mW"})
+    said = ground.sentences(with_ground(study, g), g)
+    first = next(each for each in g.elevations if each.margin_db >= 3.0)
+    assert first is not g.elevations[0]
+    at = f"{first.elevation_rad / deg:.0f} deg"
+    assert said[2] == f"It has the required 3 dB from {at} on, of those below."
+    weak, _ = of_file(tmp_path, {"communication.transmit_power": "1 mW"})
+    assert ground.sentences(with_ground(study, weak), weak)[2] == "At no elevation has it the required 3 dB."
+
+
+def test_the_convention_that_matters_most_is_named_with_what_it_moves(study, tmp_path):
+    g, _ = of_file(tmp_path, UP, {"terminals.leo_aperture": "10 cm", "terminals.geo_obscuration": None})
+    wander = next(each for each in g.conventions if each.key.endswith("wander"))
+    cost = quantity(abs(wander.gained_db["Communication"]), "dB")
+    assert ground.sentences(with_ground(study, g), g)[-1] == (
+        "Of the conventions that the literature leaves open, channel.turbulence.wander matters most: "
+        f'"andrews-phillips-2005" in place of "dios-2004" moves the margin of communication by {cost}.'
+    )
+
+
+def test_a_typed_elevation_has_its_range_and_says_the_keys_that_it_follows_from(tmp_path):
+    g, budget = of_file(tmp_path, TYPED)
+    (space,) = [line for line in budget.lines if line.name == "Free-space loss"]
+    assert "R = 1188 km at 20 deg of elevation" in space.basis
+    assert space.source.count("mission file") == 2 and space.warning == ""
+    assert len(g.elevations) == 5
+    given, budget = of_file(tmp_path, TYPED, {"channel.altitude": None, **FAR})
+    (space,) = [line for line in budget.lines if line.name == "Free-space loss"]
+    # 900 km at 20 deg are 363 km up, by the law of cosines
+    own = 6378137.0 + 2393.0
+    up = math.sqrt(own**2 + 900e3**2 + 2.0 * own * 900e3 * math.sin(20.0 * deg)) - 6378137.0
+    assert f"R = 900 km: {up / 1e3:.1f} km up, at the elevation of the channel" in space.basis
+    assert len(given.elevations) == 1
+
+
+def test_an_elevation_typed_beside_flying_orbits_is_flagged_with_the_range(tmp_path):
+    _, budget = of_file(tmp_path, FLYING, BESIDE, FAR)
+    (space,) = [line for line in budget.lines if line.name == "Free-space loss"]
+    assert "typed beside the table orbit" in space.warning
+    assert "from 500 km up the range at 20 deg is 1193 km" in space.warning
+    assert any("1193 km" in each for each in budget.warnings)
