@@ -438,7 +438,7 @@ def test_plan_table_data_and_contact_plan_name_the_stations(with_stations, plan)
     said = " ".join(plan_sentences(with_stations))
     count = sum(s.relay in THREE_SITES for s in with_stations.planned)
     assert "12 satellites share 2 relays of one terminal each and 3 ground stations of 3 terminals in all: in" in said
-    assert f"Of these, {count} sessions are with ground stations" in said
+    assert f"{count} of the sessions are with ground stations" in said
     assert "ground station" not in " ".join(plan_sentences(plan))
     rows = partners_table(with_stations).rows
     assert [row[0] for row in rows] == ["east", "west", *THREE_SITES] and partners_table(plan) is None

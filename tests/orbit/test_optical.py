@@ -1,6 +1,7 @@
 """The optical downlink of a day: the network's rule second by second, the radio's volumes under a clear sky, words."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from microrad.report.day.page import day_text
 from microrad.report.day.tables import sky_table
 from microrad.report.day.words import sentences
 from microrad.report.quantities import duration
+from microrad.report.results import arrays, tolerances
 from optical_files import SITES, TENERIFE_SITE, optical
 
 SETUP = {"operations.downlink.setup": "30 s", "operations.downlink.delay": "1 s"}
@@ -289,10 +291,16 @@ def test_tables_csv_and_data_have_the_third_way(day, without_radio):
     assert data["sky"]["any_clear"] == day.sky.any_clear
     names = [name for name, _ in registry.flattened({"day": data}) if ".optical" in name or ".sky" in name]
     assert len(names) > 30 and registry.unregistered(names) == []
+    places = {re.sub(r"\.(\d+)", r"[\1]", path) for _, path, _ in registry.placed({"day": data})}
+    assert [place for place in places if tolerances.stated(place) is None] == []
+    assert {tolerances.stated_for_figure(figure.name) for figure in day_figures(day)} & {None} == set()
     lines = day_csv(day).splitlines()
     assert sum(line.startswith("optical downlink,") for line in lines) == len(day.optical.contacts) > 0
     assert {figure.name for figure in day_figures(day)} >= {"assumptions", "optical-assumptions", "world-map"}
     assert "direct downlink" not in day_text(without_radio, 160)
+    groups = arrays._day(day, None, None)
+    assert {"day/optical_downlink", "day/optical_passes", "day/direct_downlink"} <= set(groups)
+    assert "optical_low" in repr(groups["day/assumptions"])
 
 
 def test_a_day_without_a_network_says_nothing_of_one(tmp_path):

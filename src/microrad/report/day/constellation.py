@@ -52,7 +52,7 @@ def _stations_words(plan: ConstellationPlan) -> list[str]:
     count = int(np.sum(plan.by_station.sessions))
     used = ", ".join(f"{name} {100 * use:.0f} %" for name, use in zip(plan.stations, plan.station_use, strict=True))
     return [
-        f"Of these, {count} sessions are with ground stations, above their masks, and are expected to carry "
+        f"{count} of the sessions are with ground stations, above their masks, and are expected to carry "
         f"{volume(float(np.sum(plan.by_station.volume_bit)))} under their availability. Terminals in use: {used}."
     ]
 

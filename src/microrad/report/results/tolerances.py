@@ -236,7 +236,7 @@ SUMMARY: Mapping[str, tuple[str, ...]] = {
         "margin_db.{beacon,answer,communication_as_budgeted,communication_static}",
         "{largest_data_rate_bit_s,largest_pointing_error_rad,implied_sensitivity_photon_bit[],links.*}",
         "fine_pointing.stroke.*",
-        "day.sky.{any_clear,any_clear_independent,sites[].availability,correlation[]}",
+        "day.sky.{any_clear,any_clear_independent,sites[].availability,correlation[][]}",
     ),
 }
 """Where each kind of number stands in a summary, the first that fits: [] is any place of a list, * any name or names,
@@ -251,7 +251,7 @@ FIGURES: Mapping[str, tuple[str, ...]] = {
     "run": ("comparison", "fig5-hysteresis-loops", "fig6-pid", "fig8-inverse", "fig4-chirp", "fig5-bench-loops"),
     "added": ("fine-pointing-budget", "fine-pointing-errors"),
     "link": ("contact-run",),
-    "volume": ("assumptions", "data-volume"),
+    "volume": ("assumptions", "optical-assumptions", "data-volume"),
     "spectrum": ("fine-pointing-spectrum",),
     "curve": ("monte-carlo-tail", "latency"),
 }
