@@ -412,8 +412,12 @@ def test_counts_in_the_lines_are_roots_of_their_means():
     assert lines["Signal shot noise, pulse"].value ** 2 == near(0.5 * 16e-9 * slot_s / PHOTON_J)
     assert lines["Background shot noise"].value ** 2 == near(0.5 * 1e-11 * slot_s / PHOTON_J)
     assert lines["Dark counts"].value ** 2 == near(1e5 * slot_s)
-    marks, spaces = NOISY_COUNTER.noise_lines(1e-9, 1e8)[:2]
-    assert (marks.value / spaces.value) ** 2 == near(15.0)
+    marks, spaces, background, dark = NOISY_COUNTER.noise_lines(1e-9, 1e8)
+    counter = NOISY_COUNTER
+    counts = counter.detection_efficiency * 1e-9 / PHOTON_J / 1e8  # of a symbol, the mean of a mark and a space
+    assert [marks.value**2, spaces.value**2] == near([counts * 2.0 * 15.0 / 16.0, counts * 2.0 / 16.0])
+    assert background.value**2 == near(counts * counter.background_power_w / 1e-9)
+    assert dark.value**2 == near(counter.dark_count_rate_hz / 1e8)
     assert {line.unit for line in (*lines.values(), marks, spaces)} == {"count"}
 
 
