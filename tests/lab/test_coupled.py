@@ -12,6 +12,7 @@ from scipy.linalg import block_diag
 from microrad.core import kernels
 from microrad.core.periodic import delayed
 from microrad.lab.identify.coupled import hysteretic, identify_coupled, ladder, linear, linear_errors, wiring
+from microrad.lab.identify.coupled import mirror_file as coupled_mirror_file
 from microrad.lab.identify.coupled.channels import _rounded_bias, channels
 from microrad.lab.identify.coupled.held_out import held_out_error, smallest_within_noise
 from microrad.lab.identify.coupled.ladder import LadderOptions
@@ -506,3 +507,38 @@ def test_a_candidate_is_found_by_its_name(found):
     assert result.candidate("coupled linear, order 2").name == "coupled linear, order 2"
     with pytest.raises(IdentificationError, match="no model 'order 2' was fitted; there are per axis, order 2 each, "):
         result.candidate("order 2")
+
+
+def test_a_mirror_file_says_what_it_was_found_from_and_what_is_wrong_with_it():
+    model = SimpleNamespace(outputs=[Output("y", "displacement"), Output("z", "displacement")])
+    own = SimpleNamespace(
+        model=model, parameters=7, error_share=0.0123, error_rms=np.array([[1e-9, 2e-9], [np.nan, np.nan]])
+    )
+    found = SimpleNamespace(
+        candidate=lambda: own,
+        chosen="linear",
+        held_out=("b.csv",),
+        amplitudes_v=np.array([0.1, 0.3]),
+        stopped=True,
+        reason="the least.",
+        warnings=("one", "two"),
+        refused=[SimpleNamespace(model="plays", reason="too few")],
+    )
+    recordings = [SimpleNamespace(path=path, sha256=path[0] * 4) for path in ("a.csv", "b.csv")]
+    assert list(coupled_mirror_file._origin(found, recordings)) == [
+        "Mirror identified from 2 recording(s), model linear.",
+        "  a.csv (fitted)",
+        "  sha256 aaaa",
+        "  b.csv (held out)",
+        "  sha256 bbbb",
+        "7 parameters; error on held-out records 1.23 % of the output (rms).",
+        "  at 0.1 V rms: 1e-09, 2e-09 m (rms, by output)",
+        "The identification was stopped before its end: larger models were not fitted.",
+        "Choice: the least.",
+        "Warning: one",
+        "Warning: two",
+        "Not fitted: plays, too few",
+    ]
+    assert coupled_mirror_file._unit(found) == "m"
+    model.outputs = [Output("y", "angle")]
+    assert coupled_mirror_file._unit(found) == "rad"

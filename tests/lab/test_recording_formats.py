@@ -969,3 +969,13 @@ def test_an_lvm_channel_has_the_time_column_before_itself(tmp_path):
     source = LvmSource(path)
     assert source.names[1::2] == ("drive", "output")
     assert [source.find_time([channel]) for channel in (1, 3)] == [0, 2]
+
+
+def test_a_sample_of_a_part_is_counted_in_the_file(tmp_path):
+    np.savez(tmp_path / "a.npz", drive=DRIVE, output=np.where(np.arange(N) != 600, OUTPUT, np.nan), fs=RATE_HZ)
+    whole, later, last = (
+        refusal(tmp_path / "a.npz", "drive", "output", part_s=part_s).partition(": ")[2]
+        for part_s in ((0.0, None), (0.05, None), (0.299, 0.49))
+    )
+    assert whole == later == last
+    assert "600" in whole or "601" in whole
