@@ -11,6 +11,7 @@ from scipy.linalg import block_diag
 
 from microrad.core import kernels
 from microrad.core.periodic import delayed
+from microrad.lab.identify.coupled import held_out as held_out_module
 from microrad.lab.identify.coupled import hysteretic, identify_coupled, ladder, linear, linear_errors, wiring
 from microrad.lab.identify.coupled import mirror_file as coupled_mirror_file
 from microrad.lab.identify.coupled.channels import _rounded_bias, channels
@@ -542,3 +543,27 @@ def test_a_mirror_file_says_what_it_was_found_from_and_what_is_wrong_with_it():
     assert coupled_mirror_file._unit(found) == "m"
     model.outputs = [Output("y", "angle")]
     assert coupled_mirror_file._unit(found) == "rad"
+
+
+def test_squares_of_records_are_averaged_by_their_amplitude():
+    """Squares of 1 and 49 at the first amplitude, 4 and none at the last, and no record at the one between."""
+    records = SimpleNamespace(amplitudes_v=np.array([0.1, 0.2, 0.3]), held_class=np.array([0, 2, 0]))
+    found = held_out_module._rms_by_amplitude(
+        records, [np.array([1.0, 9.0]), np.array([4.0, np.nan]), np.array([49.0, 9.0])]
+    )
+    np.testing.assert_allclose(found, [[5.0, 3.0], [np.nan, np.nan], [2.0, np.nan]])
+
+
+@pytest.mark.parametrize(("period", "known"), [(None, False), (0, False), (4, True), (6, True), (7, False)])
+def test_the_noise_of_a_period_is_known_from_two_on(period, known):
+    """What two periods of 6 samples or three of 4 have apart; a mean that drifts from one to the next is none of it."""
+    output = np.column_stack([np.arange(12.0), np.tile([1.0, -1.0], 6)])
+    output[:6, 1] += [2.0, -2.0, 0.0, 0.0, 0.0, 0.0]
+    record = Recording("r", "", output[:, :1], output, 1.0, ("u",), ("y", "z"), period)
+    found = held_out_module._period_scatter(record)
+    if not known:
+        assert np.isnan(found).all() and found.shape == (2,)
+    else:
+        assert found[0] == pytest.approx(0.0, abs=1e-15)
+        periods = output[: 12 // period * period, 1].reshape(-1, period)
+        assert found[1] == pytest.approx(np.mean(np.var(periods - periods.mean(axis=1)[:, None], axis=0, ddof=1)))
