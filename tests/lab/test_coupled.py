@@ -11,7 +11,9 @@ from scipy.linalg import block_diag
 
 from microrad.core import kernels
 from microrad.core.periodic import delayed
+from microrad.lab.identify.coupled import held_out as held_out_module
 from microrad.lab.identify.coupled import hysteretic, identify_coupled, ladder, linear, linear_errors, wiring
+from microrad.lab.identify.coupled import mirror_file as coupled_mirror_file
 from microrad.lab.identify.coupled.channels import _rounded_bias, channels
 from microrad.lab.identify.coupled.held_out import held_out_error, smallest_within_noise
 from microrad.lab.identify.coupled.ladder import LadderOptions
@@ -506,3 +508,62 @@ def test_a_candidate_is_found_by_its_name(found):
     assert result.candidate("coupled linear, order 2").name == "coupled linear, order 2"
     with pytest.raises(IdentificationError, match="no model 'order 2' was fitted; there are per axis, order 2 each, "):
         result.candidate("order 2")
+
+
+def test_a_mirror_file_says_what_it_was_found_from_and_what_is_wrong_with_it():
+    model = SimpleNamespace(outputs=[Output("y", "displacement"), Output("z", "displacement")])
+    own = SimpleNamespace(
+        model=model, parameters=7, error_share=0.0123, error_rms=np.array([[1e-9, 2e-9], [np.nan, np.nan]])
+    )
+    found = SimpleNamespace(
+        candidate=lambda: own,
+        chosen="linear",
+        held_out=("b.csv",),
+        amplitudes_v=np.array([0.1, 0.3]),
+        stopped=True,
+        reason="the least.",
+        warnings=("one", "two"),
+        refused=[SimpleNamespace(model="plays", reason="too few")],
+    )
+    recordings = [SimpleNamespace(path=path, sha256=path[0] * 4) for path in ("a.csv", "b.csv")]
+    assert list(coupled_mirror_file._origin(found, recordings)) == [
+        "Mirror identified from 2 recording(s), model linear.",
+        "  a.csv (fitted)",
+        "  sha256 aaaa",
+        "  b.csv (held out)",
+        "  sha256 bbbb",
+        "7 parameters; error on held-out records 1.23 % of the output (rms).",
+        "  at 0.1 V rms: 1e-09, 2e-09 m (rms, by output)",
+        "The identification was stopped before its end: larger models were not fitted.",
+        "Choice: the least.",
+        "Warning: one",
+        "Warning: two",
+        "Not fitted: plays, too few",
+    ]
+    assert coupled_mirror_file._unit(found) == "m"
+    model.outputs = [Output("y", "angle")]
+    assert coupled_mirror_file._unit(found) == "rad"
+
+
+def test_squares_of_records_are_averaged_by_their_amplitude():
+    """Squares of 1 and 49 at the first amplitude, 4 and none at the last, and no record at the one between."""
+    records = SimpleNamespace(amplitudes_v=np.array([0.1, 0.2, 0.3]), held_class=np.array([0, 2, 0]))
+    found = held_out_module._rms_by_amplitude(
+        records, [np.array([1.0, 9.0]), np.array([4.0, np.nan]), np.array([49.0, 9.0])]
+    )
+    np.testing.assert_allclose(found, [[5.0, 3.0], [np.nan, np.nan], [2.0, np.nan]])
+
+
+@pytest.mark.parametrize(("period", "known"), [(None, False), (0, False), (4, True), (6, True), (7, False)])
+def test_the_noise_of_a_period_is_known_from_two_on(period, known):
+    """What two periods of 6 samples or three of 4 have apart; a mean that drifts from one to the next is none of it."""
+    output = np.column_stack([np.arange(12.0), np.tile([1.0, -1.0], 6)])
+    output[:6, 1] += [2.0, -2.0, 0.0, 0.0, 0.0, 0.0]
+    record = Recording("r", "", output[:, :1], output, 1.0, ("u",), ("y", "z"), period)
+    found = held_out_module._period_scatter(record)
+    if not known:
+        assert np.isnan(found).all() and found.shape == (2,)
+    else:
+        assert found[0] == pytest.approx(0.0, abs=1e-15)
+        periods = output[: 12 // period * period, 1].reshape(-1, period)
+        assert found[1] == pytest.approx(np.mean(np.var(periods - periods.mean(axis=1)[:, None], axis=0, ddof=1)))

@@ -11,6 +11,7 @@ import pytest
 from microrad.core import lti
 from microrad.core.units import LEAST, MOST
 from microrad.lab.identify import IdentificationError, fit_frequency_response
+from microrad.lab.identify.linear import frequency_fit
 from microrad.lab.identify.linear.elements import ElementEquations
 from microrad.lab.identify.linear.modal import ModalModel
 from microrad.lab.identify.linear.polish import FrequencyEquations, fit_outputs, normal_equations, pack, polish, unpack
@@ -525,3 +526,19 @@ def test_beside_scikit_rf_it_leaves_what_the_page_says(build):
     assert ratios == pytest.approx([float(to_table), float(to_truth)], abs=1.5e-3)
     if ratios[0] > 1.0005:
         assert min(table.response.shape[1:]) in (2, 3) and 0.10 <= 1.0 - ratios[1] <= 0.18
+
+
+@pytest.mark.parametrize(
+    ("large", "small", "said"),
+    [
+        ((3e-3, 4e-3), (1e-3, 1e-3), "leaves 3.54 times as much where the response is large"),  # rms of 3 and 4 over 1
+        ((3e-3, 3e-3), (1e-3, 1e-3), ""),
+        ((1e-3, 1e-3), (3e-3, 4e-3), ""),
+        ((1e-12, 1e-12), (0.0, 0.0), ""),
+    ],
+)
+def test_noise_is_not_alike_where_more_than_three_times_as_much_is_left_of_what_is_large(large, small, said):
+    response = np.array([10.0, -10.0, 1.0, 1.0j]).reshape(4, 1, 1)
+    found = frequency_fit._uneven(response, np.array([*large, *small], dtype=complex).reshape(4, 1, 1))
+    assert len(found) == bool(said) and said in "".join(found)
+    assert frequency_fit._uneven(np.ones((4, 1, 1), dtype=complex), response) == ()

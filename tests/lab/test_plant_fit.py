@@ -1,6 +1,6 @@
 """The joint fit on the Bouc-Wen benchmark, against an oracle that knows nothing of the kernels, and its uncertainty."""
 
-from dataclasses import replace
+from dataclasses import astuple, replace
 from math import pi
 
 import numpy as np
@@ -8,6 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from microrad.lab.identify import IdentificationError
+from microrad.lab.identify.hysteresis import structures
 from microrad.lab.identify.hysteresis.plant_fit import (
     FitRecord,
     Parameter,
@@ -23,7 +24,7 @@ from microrad.lab.identify.hysteresis.plant_fit import (
 from microrad.lab.identify.hysteresis.structures import hysteretic_oscillator, one_axis
 from microrad.lab.recording import Recording, read_recording, recording_from_arrays
 from microrad.mirror import model as mirror
-from microrad.mirror.hysteresis import PrandtlIshlinskii
+from microrad.mirror.hysteresis import BoucWen, PrandtlIshlinskii
 from microrad.mirror.model import Mirror
 from places import DATA
 from truths import plays, recorded, two_sines
@@ -365,3 +366,39 @@ def test_a_recording_of_which_all_but_one_sample_is_left_out_is_refused(drop, le
             IdentificationError, match=f"16 samples, of which the first {drop} are left out: nothing is"
         ):
             fit_records([recording], drop=drop)
+
+
+MODEL = BoucWen(3e-5, 1e-6, -2e-5, -2e-6, 0.5, 0.2, 400.0, 6.0, 0.1, -0.05, 2.0)
+RATES = ("d2", "delta")
+SHAPES = ("gamma", "eta", "exponent")
+
+
+@pytest.mark.parametrize("free", [(), RATES, SHAPES, RATES + SHAPES])
+@pytest.mark.parametrize("admissible", [False, True])
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_a_model_is_what_its_parameters_make_of_it_whatever_is_free(free, admissible, sign):
+    """What is not free stays; what is free moves by itself, and ratios to alpha go with it."""
+    model = replace(MODEL, d1_rad_v=sign * 3e-5, epsilon_rad_v=sign * -2e-5)
+    parameters, make = structures._bouc_wen_part(model, free, admissible)
+    assert [p.name.split()[0] for p in parameters] == ["d1", "epsilon", "alpha", "beta", *free]
+    values = np.array([p.start for p in parameters])
+    if not admissible:
+        assert parameters[1].scale == 2e-5  # the size of a slope does not hang on its sign
+        again = make(values)
+        assert_allclose(astuple(again), astuple(model), rtol=1e-12)
+    assert all(p.lower <= p.start <= p.upper for p in parameters)
+    values[2] *= 2.0
+    moved = make(values)
+    assert moved.alpha_1_v == pytest.approx(1.0) and moved.beta_1_v == pytest.approx(0.4)
+    for name in ("gamma", "eta"):
+        kept = getattr(model, f"{name}_1_v")
+        assert getattr(moved, f"{name}_1_v") == pytest.approx(kept * (2.0 if name in free else 1.0))
+    assert (moved.d2_s_v, moved.delta_s_v, moved.exponent) == (model.d2_s_v, model.delta_s_v, model.exponent)
+
+
+@pytest.mark.parametrize(("limit_v_s", "most"), [(400.0, 1.0 / 400.0), (np.inf, 1.0)])
+def test_what_depends_on_the_rate_is_searched_as_far_as_the_fastest_drive_shows_it(limit_v_s, most):
+    parameters, _ = structures._bouc_wen_part(replace(MODEL, rate_limit_v_s=limit_v_s), RATES, False)
+    d2, delta = parameters[-2:]
+    assert (d2.lower, d2.upper) == pytest.approx((-most, most))
+    assert (delta.lower, delta.upper) == pytest.approx((-3.0 * most, 10.0 * most))

@@ -14,6 +14,7 @@ from microrad.lab.recording import (
     read_recording,
     recording_from_arrays,
 )
+from microrad.lab.recording.checks import sample_rate
 from microrad.lab.recording.checks.channel import _trend, drift
 from microrad.lab.recording.checks.sample_rate import rate_of_time
 from places import DATA
@@ -675,3 +676,66 @@ def test_one_sample_that_was_written_twice_is_told_once():
         rate_of_time("loops.csv", "time", time_s, lambda row: f"row {row}")
     with pytest.raises(RecordingError, match=r"row 301, time: 1\.001 s since the sample before.*2 gaps"):
         rate_of_time("loops.csv", "time", time_s + (np.arange(N) > 300), lambda row: f"row {row}")
+
+
+# ------------------------------------------------------------------------------------------------- steps of a time
+def steps_found(steps, resolution_s=0.0):
+    steps = np.array(steps, dtype=float)
+    found = sample_rate._steps("a.csv", "time", steps, float(np.mean(steps)), resolution_s, lambda row: f"row {row}")
+    return [(finding.kind, finding.row, finding.refused) for finding in found], "".join(
+        finding.message for finding in found
+    )
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({}, ""),
+        ({40: 1.49e-3}, "scatter"),
+        (
+            {40: 2e-3},
+            "row 41, time: 0.002 s since the sample before, where 0.001 s is usual; 1 gap, about 1 samples lost",
+        ),
+        ({40: 2e-3, 60: 4e-3}, "row 41, .* 2 gaps, about 4 samples lost"),
+        ({40: 0.0}, "row 41, time: 0 s since the sample before, where 0.001 s is usual, once in all"),
+        ({40: 0.0, 50: 1e-4}, "row 41, .* 2 times in all"),
+        ({40: 2e-3, 50: 0.0}, "row 41, .* 1 gap,"),
+        ({40: 0.0, 50: 2e-3}, "row 41, .* once in all"),
+    ],
+)
+def test_the_first_step_that_is_too_long_or_too_short_is_named(changed, message):
+    steps = np.full(100, 1e-3)
+    for row, step in changed.items():
+        steps[row] = step
+    if message in ("", "scatter"):
+        found, text = steps_found(steps)
+        assert ("scatter" in text) == bool(message) and len(found) == bool(message)
+    else:
+        with pytest.raises(RecordingError, match=message):
+            steps_found(steps)
+
+
+@pytest.mark.parametrize("jitter", [0.9, 1.1])
+@pytest.mark.parametrize(("limit", "refused"), [(sample_rate._JITTER_NOTE, False), (sample_rate._JITTER_REFUSED, True)])
+def test_steps_that_scatter_are_told_and_those_that_scatter_much_refused(jitter, limit, refused):
+    """Every other step is longer and the others shorter; the one that is most astray is named."""
+    share = jitter * limit
+    steps = 1e-3 * (1.0 + share * (-1.0) ** np.arange(1000))
+    steps[500] *= 1.0 + 0.2 * share
+    steps[501] *= 1.0 - 0.2 * share * (1.0 + share) / (1.0 - share)
+    found, text = steps_found(steps)
+    if not refused and jitter < 1.0:
+        assert found == []
+        return
+    assert found == [("jitter", 501, refused and jitter > 1.0)]
+    assert f"the steps scatter by {100 * share:.2g} % rms of 0.001 s, most at row 501" in text
+
+
+def test_what_the_digits_of_a_time_explain_is_no_scatter():
+    """Times printed to 0.1 ms at a step of 0.32 ms; the same steps of a time that is exact scatter by 12 %."""
+    steps = np.diff(np.round(np.arange(2001) * 0.32e-3 + 1e-5, 4))
+    assert steps_found(steps, 1e-4) == ([], "")
+    found, text = steps_found(steps)
+    assert [(kind, refused) for kind, _, refused in found] == [("jitter", True)] and "scatter by 12 % rms" in text
+    coarse, text = steps_found(np.diff(np.floor(np.arange(2001) * 0.35)) * 1e-3, 1e-3)
+    assert coarse == [("jitter", None, False)] and "printed to 0.001 s, coarser than the step of 0.00035 s" in text

@@ -8,6 +8,7 @@ import struct
 import sys
 import zipfile
 import zlib
+from pathlib import Path
 
 import h5py
 import lvm_read
@@ -19,6 +20,7 @@ from scipy.io import savemat
 from scipy.sparse import csc_array
 
 from microrad.lab.recording import RecordingError, files, multisine_recordings, read_in, read_recording
+from microrad.lab.recording.formats import text as text_format
 from microrad.lab.recording.formats.lvm import LvmSource, _Blanks
 from microrad.lab.recording.reader import open_source
 from microrad.lab.recording.records import digest_of
@@ -363,7 +365,15 @@ def test_lvm_of_many_segments(tmp_path):
     check(read_recording(path, "drive", "output"))
 
 
-@pytest.mark.parametrize(("bad", "words"), [("x", "'x' is not a finite number"), ("", "the cell is empty")])
+@pytest.mark.parametrize(
+    ("bad", "words"),
+    [
+        ("x", "'x' is not a finite number"),
+        ("", "the cell is empty"),
+        ("nan", "'nan' is not a finite number"),
+        ("-inf", "'-inf' is not a finite number"),
+    ],
+)
 def test_lvm_bad_cell(tmp_path, bad, words):
     def spoil(body):
         body[400] = f"\t1.0\t{bad}"
@@ -969,3 +979,40 @@ def test_an_lvm_channel_has_the_time_column_before_itself(tmp_path):
     source = LvmSource(path)
     assert source.names[1::2] == ("drive", "output")
     assert [source.find_time([channel]) for channel in (1, 3)] == [0, 2]
+
+
+def test_a_sample_of_a_part_is_counted_in_the_file(tmp_path):
+    np.savez(tmp_path / "a.npz", drive=DRIVE, output=np.where(np.arange(N) != 600, OUTPUT, np.nan), fs=RATE_HZ)
+    whole, later, last = (
+        refusal(tmp_path / "a.npz", "drive", "output", part_s=part_s).partition(": ")[2]
+        for part_s in ((0.0, None), (0.05, None), (0.299, 0.49))
+    )
+    assert whole == later == last
+    assert "600" in whole or "601" in whole
+
+
+@pytest.mark.parametrize(
+    ("x_columns", "segments", "gap_s", "used", "own"),
+    [
+        ("One", 1, 0.0, "drive", "X_Value"),
+        ("One", 3, 0.0, "drive", None),  # joined: the segments' own times begin anew
+        ("One", 3, 0.1, "2/drive", "2/X_Value"),
+        ("No", 1, 0.0, "drive", None),
+    ],
+)
+def test_an_lvm_channel_has_the_time_of_its_own_segment(tmp_path, x_columns, segments, gap_s, used, own):
+    source = LvmSource(lvm(tmp_path / "a.lvm", x_columns=x_columns, segments=segments, gap_s=gap_s))
+    assert source.find_time([]) is None
+    found = source.find_time([source.names.index(used)])
+    assert (None if found is None else source.names[found]) == own
+
+
+def test_a_text_whose_head_ends_within_a_character_is_utf_8():
+    path, most = Path("a.csv"), text_format._HEAD_BYTES
+    whole = b"drive,angle\n" + b"1," * (most // 2)
+    for cut in (1, 2, 3):  # bytes of a character of four
+        head = whole[: most - cut] + "\U0001f642".encode()[:cut]
+        assert (len(head), text_format._encoding(path, head)) == (most, "utf-8-sig")
+    assert text_format._encoding(path, "µrad".encode("latin-1") + whole[: most - 4]) == "latin-1"
+    assert text_format._encoding(path, "µrad".encode()) == "utf-8-sig"
+    assert text_format._encoding(path, "1 µ".encode()[:-1]) == "latin-1"  # a whole file that ends so is none

@@ -309,3 +309,26 @@ def test_the_list_of_the_documentation_is_read(tmp_path):
     keys = {info.alias or name for name, info in (ListTable.model_fields | RecordingTable.model_fields).items()}
     table = page.partition("| key | |")[2].partition("\n\n")[0]
     assert keys - {"recording"} <= set(re.findall(r"`(\w+)`", table))
+
+
+@pytest.mark.parametrize(
+    ("drives", "outputs", "message"),
+    [
+        ("mV", "um", ""),
+        ("V", "um", "the drive is to be read in V and the file says mV"),
+        ("mV", "mm", "the output is to be read in mm and the file says um"),
+        ("mV", None, ""),
+        (None, "mm", "the output is to be read in mm and the file says um"),
+        (None, "um", ""),
+    ],
+)
+def test_drives_and_outputs_are_each_held_against_their_own_unit(tmp_path, drives, outputs, message):
+    write_csv(tmp_path / "a.csv", "t,ux (mV),uy (mV),x (um),y (um)")
+    units = {"input_unit": drives, "output_unit": outputs}
+    stated = "".join(f'{key} = "{unit}"\n' for key, unit in units.items() if unit is not None)
+    text = f'input = [1, 2]\noutput = [3, 4]\n{stated}[recording.a]\nfile = "a.csv"\n'
+    if message:
+        assert message in refusal(tmp_path, text)
+    else:
+        (found,) = read_list(write_list(tmp_path, text)).recordings
+        assert (found.input_units, found.output_units) == (("mV", "mV"), ("um", "um"))

@@ -5,6 +5,7 @@ import json
 import math
 import re
 import threading
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -16,6 +17,7 @@ from microrad import link
 from microrad.link import study as link_study
 from microrad.link.fade_series import FadeSeriesError
 from microrad.link.pointing import outage as under_jitter
+from microrad.mission.fields import Quantity, Share
 from microrad.orbit import day as day_study
 from microrad.report.day import figures as day_plots
 from microrad.report.plotting.figure import Figure
@@ -119,6 +121,107 @@ def test_what_is_no_quantity_has_no_slider(draft, typed):
     rate = slider_of(draft, "communication.data_rate")
     assert rate.scale == "logarithmic"
     assert rate.holding(typed).scale == "none"
+
+
+LENGTH, POWER, RATIO = Quantity("m", above=0.0, most=10.0), Quantity("W", least=0.0), Quantity("", least=-1.0, most=3.0)
+
+
+def ranged(rule, typed, unit, value):
+    return sliders._ranged(sliders.Slider("a.key", "Key", typed, rule, unit, "none", value))
+
+
+@pytest.mark.parametrize(
+    ("rule", "unit", "value", "scale", "low", "high"),
+    [
+        (LENGTH, "cm", 5.0, "logarithmic", 1.0, 20.0),  # 1.25 and 20, each to the next 1, 2 or 5 outwards
+        (LENGTH, "cm", 6.0, "logarithmic", 1.0, 50.0),
+        (LENGTH, "cm", 250.0, "logarithmic", 50.0, 1000.0),  # to the very bound
+        (LENGTH, "cm", 251.0, "none", 0.0, 0.0),
+        (LENGTH, "m", 1.5, "logarithmic", 0.2, 10.0),
+        (LENGTH, "m", 0.0, "none", 0.0, 0.0),
+        (Quantity("m", least=0.03), "cm", 5.0, "logarithmic", 3.0, 20.0),
+        (POWER, "dBm", -80.0, "linear", -90.0, -70.0),
+        (Quantity("W", least=1e-12), "dBm", -85.0, "linear", -90.0, -75.0),
+        (Quantity("W", least=1e-12, most=1e-11), "dBW", -115.0, "linear", -120.0, -110.0),
+        (RATIO, "", 0.0, "linear", -1.0, 3.0),
+        (RATIO, "", -1.0, "linear", -1.0, 3.0),
+        (RATIO, "", 0.5, "logarithmic", 0.1, 2.0),
+        (RATIO, "", 0.8, "none", 0.0, 0.0),
+        (Quantity("", least=-1.0), "", 0.0, "none", 0.0, 0.0),
+        (Quantity("m", least=-1.0, most=3.0), "m", 0.0, "none", 0.0, 0.0),
+        (Share("", below=1.0), "", 0.25, "logarithmic", 0.05, 1.0),
+        (Share("", below=1.0), "", 0.26, "none", 0.0, 0.0),
+    ],
+)
+def test_a_slider_reaches_four_times_up_and_down_or_ten_decibels_within_its_bounds(rule, unit, value, scale, low, high):
+    found = ranged(rule, f"{value:g} {unit}".strip(), unit, value)
+    assert found.scale == scale
+    assert (found.low, found.high) == pytest.approx((low, high), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("value", "down", "away"),
+    [
+        (1.0, 1.0, -1.0),
+        (1.9, 1.0, -2.0),
+        (2.0, 2.0, -2.0),
+        (2.1, 2.0, -5.0),
+        (0.049, 0.02, -0.05),
+        (60.0, 50.0, -100.0),
+    ],
+)
+def test_the_ends_of_a_slider_are_one_two_or_five_times_a_power_of_ten(value, down, away):
+    assert sliders._round_down(value) == pytest.approx(down, rel=1e-12)
+    assert sliders._round_down(-value) == pytest.approx(away, rel=1e-12)
+
+
+@pytest.mark.parametrize(("span", "decimals"), [(20.0, 2), (1.0, 3), (100.0, 1), (1000.0, 0), (0.5, 4), (0.0, 2)])
+def test_positions_of_a_linear_slider_are_told_apart(span, decimals):
+    assert sliders._decimals(span) == decimals
+
+
+def test_the_positions_of_a_slider_lie_evenly_on_its_scale_and_end_with_it():
+    """A length from 1 to 20 cm by factors, a ratio from -1 to 3 by steps, a level from -90 to -70 dBm by 0.1 dB."""
+    length, ratio = ranged(LENGTH, "5 cm", "cm", 5.0), ranged(RATIO, "0", "", 0.0)
+    level = ranged(POWER, "-80 dBm", "dBm", -80.0)
+    assert (length.steps, ratio.steps, level.steps) == (240, 240, 200)
+    assert (length.position, ratio.position, level.position) == (round(240 * math.log(5, 20)), 60, 100)
+    assert [length.at(p) for p in (-5, 0, 120, 240, 900)] == ["1 cm", "1 cm", "4.47 cm", "20 cm", "20 cm"]
+    assert [ratio.at(p) for p in (0, 60, 120, 180, 240)] == ["-1", "0", "1", "2", "3"]
+    assert [level.at(p) for p in (0, 1, 100, 200)] == ["-90 dBm", "-89.9 dBm", "-80 dBm", "-70 dBm"]
+    assert replace(length, value=0.5).position == 0 and replace(length, value=30.0).position == 240
+    assert replace(length, scale="none").position == 0
+
+
+@pytest.mark.parametrize(
+    ("typed", "scale", "low", "high"),
+    [
+        ("20 cm", "logarithmic", 1.0, 20.0),
+        ("25 cm", "logarithmic", 1.0, 25.0),
+        ("0.5 cm", "logarithmic", 0.5, 20.0),
+        ("0 cm", "none", 1.0, 20.0),
+        ("-1 cm", "none", 1.0, 20.0),
+        ("80 mm", "logarithmic", 20.0, 500.0),
+        ("5", "none", 1.0, 20.0),
+    ],
+)
+def test_a_slider_that_holds_another_value_keeps_its_range_or_begins_anew(typed, scale, low, high):
+    held = ranged(LENGTH, "5 cm", "cm", 5.0).holding(typed)
+    assert (held.typed, held.scale) == (typed, scale)
+    assert (held.low, held.high) == pytest.approx((low, high), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("key", "label"),
+    [
+        ("terminals.leo_aperture", "LEO aperture"),
+        ("terminals.aperture_of_geo", "Aperture of GEO"),
+        ("communication.data_rate", "Data rate"),
+        ("confidence", "Confidence"),
+    ],
+)
+def test_a_key_is_called_by_its_words(key, label):
+    assert sliders.label(key) == label
 
 
 def test_a_share_near_one_has_no_slider_and_a_small_one_does_not_reach_one(draft):

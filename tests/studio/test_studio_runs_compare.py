@@ -444,3 +444,51 @@ def test_no_link_in_the_studios_folder_is_followed(session, draft, tmp_path_fact
 def test_each_table_of_the_form_is_named_as_in_the_text(draft):
     names = {key.partition(".")[0] for key in draft.values if "." in key}
     assert names == set(re.findall(r"^\[([a-z_]+)", draft.text, re.MULTILINE))
+
+
+@pytest.mark.parametrize(
+    ("here", "there", "change"),
+    [
+        (Number("m", 3.0, "dB"), Number("m", 5.0, "dB"), "+2 dB"),
+        (Number("m", 5.0, "dB"), Number("m", 3.0, "dB"), "-2 dB"),
+        (Number("m", 5.0, "dB"), Number("m", 5.0 + 1e-9, "dB"), "same"),
+        (Number("m", 0.2, ""), Number("m", 0.9, ""), "+0.7"),
+        (Number("m", 0.2, ""), None, ""),
+        (None, Number("m", 0.2, ""), ""),
+    ],
+)
+def test_the_change_is_the_second_less_the_first_with_its_sign(here, there, change):
+    both = [[each] if each else [] for each in (here, there)]
+    ((name, first, second, found),) = compare_view.beside(*both)
+    assert name == "m"
+    assert found.replace("\u2212", "-").replace(".00", "") == change
+    assert (first, second) == tuple("none" if each is None else each.text for each in (here, there))
+
+
+def test_numbers_stand_in_the_order_of_the_first_then_of_the_second_with_what_is_required():
+    met, missed = (Number(name, 1.0, "", "2", passes) for name, passes in (("a", True), ("b", False)))
+    rows = compare_view.beside([missed, Number("c", 3.0, "")], [met, missed])
+    assert [row[0] for row in rows] == ["b", "c", "a"]
+    assert rows[0][1:3] == (Cell("1, required 2", "FAIL"),) * 2
+    assert rows[2][1:3] == ("none", Cell("1, required 2", "PASS"))
+
+
+@pytest.mark.parametrize(("keys", "said"), [(0, compare_view._ABSENT), (1, "1 key"), (2, "2 keys")])
+def test_a_table_is_counted_by_its_keys(keys, said):
+    assert compare_view._count(keys) == said
+
+
+def test_a_study_tells_only_requirements_that_have_both_numbers(tmp_path):
+    """And it is met where all are, those without numbers, too."""
+    row = {"name": "margin", "actual": 4.0, "required": 3.0, "unit": "dB", "met": True}
+    without = [row | {"name": "a", "actual": None}, row | {"name": "b", "required": None}]
+    for last, met in ((True, True), (False, False)):
+        rows = [row, *without, row | {"name": "z", "actual": 1.0, "met": last}]
+        found = compare_view._found(tmp_path / "manifest.json", {"requirements": rows, "verdict": "closes"})
+        assert (found.folder, found.verdict, found.met) == (tmp_path.name, "closes", met)
+        assert [(n.name, n.value, n.unit, n.met) for n in found.numbers] == [
+            ("margin", 4.0, "dB", True),
+            ("z", 1.0, "dB", last),
+        ]
+    rows = [row, row | {"name": "a", "actual": None, "met": False}]
+    assert not compare_view._found(tmp_path / "manifest.json", {"requirements": rows, "verdict": ""}).met

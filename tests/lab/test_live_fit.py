@@ -1,0 +1,77 @@
+"""What the page that looks on is shown of a fit: two periods of each loop, and the extremes of its residual."""
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from microrad.lab import live_fit
+from microrad.lab.identify.selection.predictions import Prediction
+from microrad.lab.recording import Recording
+
+STEP_S = 0.01
+
+
+def judged(periods=5, samples=100, start=20, split=60, count=1):
+    """A sine of some periods in each recording; the model leaves a ramp, and 9 rad before it counts."""
+    time = np.arange(samples) / samples
+    drive = 3.0 + np.sin(2.0 * np.pi * periods * time)
+    left = np.where(np.arange(samples) < start, 9.0, 1e-3 * np.arange(samples))
+    made = [
+        Recording(f"folder/r{k}.csv", "", drive[:, None], drive[:, None], 1.0 / STEP_S, ("u",), ("y",))
+        for k in range(count)
+    ]
+    predictions = tuple(Prediction(5.0 * drive, 5.0 * drive + left, start, split, 0) for _ in range(count))
+    score = SimpleNamespace(fit_rms_percent=1.5, held_out_rms_percent=2.5)
+    return SimpleNamespace(model="plays", score=score, predictions=predictions, recordings=tuple(made))
+
+
+@pytest.mark.parametrize(("periods", "shown"), [(5, 40), (4, 50), (2, 100), (1, 100)])
+def test_the_last_two_periods_of_the_drive_are_shown(periods, shown):
+    of = judged(periods)
+    (loop,) = live_fit.thin_fit(of).loops
+    assert loop.name == "r0.csv"
+    assert loop.drive == pytest.approx(of.recordings[0].drive[-shown:, 0], rel=1e-6)
+    assert loop.measured_rad == pytest.approx(of.predictions[0].measured_rad[-shown:], rel=1e-6)
+    assert loop.model_rad == pytest.approx(of.predictions[0].model_rad[-shown:], rel=1e-6)
+
+
+def test_the_residual_is_shown_from_where_it_counts_with_its_times():
+    (loop,) = live_fit.thin_fit(judged()).loops
+    assert loop.time_s == pytest.approx(STEP_S * np.arange(20, 100))
+    assert loop.residual_rad == pytest.approx(1e-3 * np.arange(20, 100), rel=1e-6)
+    assert loop.split_s == pytest.approx(0.6)
+
+
+def test_six_recordings_are_shown_with_the_errors_of_the_model():
+    found = live_fit.thin_fit(judged(count=8))
+    assert [loop.name for loop in found.loops] == [f"r{k}.csv" for k in range(6)]
+    assert (found.model, found.fit_rms_percent, found.held_out_rms_percent) == ("plays", 1.5, 2.5)
+
+
+@pytest.mark.parametrize("samples", [9, 10, 11, 1000])
+def test_of_a_long_column_the_extremes_of_each_stretch_are_kept_and_a_short_one_whole(samples):
+    falling, spiked = -np.arange(samples, dtype=float), np.zeros(samples)
+    spiked[samples // 2], spiked[samples // 3] = 7.0, -7.0
+    rows = live_fit.extremes([falling, spiked], 10)
+    if samples <= 10:
+        assert rows.tolist() == list(range(samples))
+        return
+    assert np.all(np.diff(rows) > 0) and {0, samples - 1, samples // 2, samples // 3} <= {*rows.tolist()}
+    assert len(rows) <= 2 * 10 + 2
+    edges = np.linspace(0, samples, 6).astype(int)
+    assert {*edges[:-1].tolist(), *(edges[1:] - 1).tolist()} <= {*rows.tolist()}
+
+
+def test_a_fit_is_added_to_the_file_beside_the_progress_and_nowhere_without_one(tmp_path):
+    live_fit.live_fit_writer(None)(judged())
+    live_fit.live_fit_writer("")(judged())
+    write = live_fit.live_fit_writer(str(tmp_path / "progress"))
+    for _ in range(2):
+        write(judged())
+    assert [path.name for path in tmp_path.iterdir()] == [live_fit.LIVE_FITS]
+    first, second = (tmp_path / live_fit.LIVE_FITS).read_text(encoding="ascii").splitlines()
+    assert first == second and '"model": "plays"' in first
+    live_fit.live_fit_writer(str(tmp_path / "missing" / "progress"))(judged())
+    assert not Path(tmp_path / "missing").exists()
