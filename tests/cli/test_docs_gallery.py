@@ -1,6 +1,6 @@
 """docs/gallery.md: each example is walked through as it stands, prints what stands there, and has no other figure.
 
-Four of the six are walked through by `make endurance` alone: the commands and functions in them have tests of
+Four of the seven are walked through by `make endurance` alone: the commands and functions in them have tests of
 their own.
 That of the recorded mirror takes its recordings from the folder that MICRORAD_DATA names; it is walked through once
 more with recordings that are made here and a smaller search.
@@ -13,6 +13,7 @@ import shlex
 import shutil
 import subprocess
 import sys
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 
@@ -41,7 +42,7 @@ PAGE, REPORT = (
     for name in ("gallery.md", "report.md")
 )
 EXAMPLES = {text.partition("\n")[0]: text.partition("\n")[2] for text in PAGE.split("\n## ")[1:]}
-PAPER, LAB, FLIGHT, CHOICE, CROSSLINK, CONSTELLATION = EXAMPLES
+PAPER, LAB, FLIGHT, CHOICE, CROSSLINK, CONSTELLATION, GROUND = EXAMPLES
 BLOCK = re.compile(r"(?ms)^```(\w+)\n(.*?)^```|((?:^    \S[^\n]*\n)+)")
 FIGURE = re.compile(r"\d+(?:\.\d+)?(?: (?:%|dB|deg|min|h|cm|[µmMkGT]?(?:rad|bit|m|W|V|Hz|s|B))(?:/s)?(?!\w))?")
 DERIVED = {
@@ -51,6 +52,24 @@ DERIVED = {
     CHOICE: {"29 %": 100 * (5.66 / 4.40 - 1.0), "5 %": 100 * 0.05},
     CROSSLINK: {"1081 km": 580 * 10 ** (5.41 / 20), "80 mm": 5 * 16, "0.96 deg/s": math.degrees(16.8e-3)},
     CONSTELLATION: {},
+    GROUND: {
+        "7.5 dB": 9.04 - (1.22 - 0.06) - (0.52 - 0.18),
+        "1.16 dB": 1.22 - 0.06,
+        "0.34 dB": 0.52 - 0.18,
+        "21.1 dB": 10 * math.log10(68.2e9 / 535e6),
+        "5.98 dB": 4.76 + 2.44 - 1.22,
+        "11.6 dB": 10 * math.log10((40 / 5 * 5 / 10) ** 2 * (1 - 0.3**2)),  # less the obscuration
+        "3.43 dB": 4.58 - 1.15,
+        "1.91 dB": 3.29 - 1.38,
+        "0.94 dB": 1.40 - 0.46,
+        "3.87 dB": -(3.29 - 7.16),
+        "1.56 dB": -(1.40 - 2.96),
+        "2.9 W": 10 ** ((3 - (1.40 - 2.96)) / 10),
+        "4.9 W": 10 ** ((3 - (3.29 - 7.16)) / 10),
+        "27 %": 100 * (1 - 141 / 193),
+        "14.5 Gbit/s": 14.5 * 1,
+        "9.6 TB": 141e-3 * 68.2 / 1,
+    },
 }
 """What the prose works out from the figures that it shows, as it is written."""
 REQUIRED = {"10 µrad", "3 dB"}
@@ -61,6 +80,7 @@ GIVEN = {
     CHOICE: {*REQUIRED, "99.7 %"},
     CROSSLINK: {"45 deg", "1 deg/s"},
     CONSTELLATION: {"100 Mbit/s", "300 Mbit/s"},
+    GROUND: {"300 Mbit/s", "5 deg", "40 cm"},
 }
 """What the prose takes from the files."""
 
@@ -295,23 +315,35 @@ def test_a_constellations_day(walk):
         assert f'"{rate}"' in re.search(r"(?m)^# rates = .*$", walk.known["text"])[0]
 
 
+@pytest.mark.promise("gallery-1", "gallery-26", "gallery-27", "gallery-28", "gallery-29", "gallery-30", "gallery-31")
+@pytest.mark.promise("gallery-32", "gallery-33", "gallery-34", "gallery-35", "gallery-37", "gallery-38", "gallery-39")
+def test_down_to_the_ground_or_up_to_the_relay(walk, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "120")  # as wide as the page
+    walk.through(EXAMPLES[GROUND])
+    m = load_link(Path("leo-geo.toml")).mission
+    assert {f"{m.communication.data_rate_bit_s / 1e6:g} Mbit/s"} <= GIVEN[GROUND]
+    (kiruna,) = m.operations.downlink.stations.values()
+    assert f"{math.degrees(kiruna.mask_rad):g} deg" in GIVEN[GROUND]
+
+
 @pytest.mark.promise("gallery-1")
 def test_four_examples_wait_for_endurance():
     text = Path(__file__).read_text(encoding="utf-8")
     waiting = re.findall(r"@pytest\.mark\.endurance\n(?:@.*\n)*def (test_\w+)\(", text)
     walks = dict(re.findall(r"(?m)^def (test_\w+)\(walk.*\n(?:    .*\n|\n)*?    .*?EXAMPLES\[(\w+)\]", text))
-    assert len(set(walks.values())) == len(EXAMPLES) == 6
+    assert len(set(walks.values())) == len(EXAMPLES) == 7
     assert {walks[name] for name in waiting} == {"LAB", "FLIGHT", "CHOICE", "CONSTELLATION"}
-    assert {walks[name] for name in walks.keys() - set(waiting)} == {"PAPER", "CROSSLINK"}
+    assert {walks[name] for name in walks.keys() - set(waiting)} == {"PAPER", "CROSSLINK", "GROUND"}
     assert "(four of them in `make endurance` alone" in " ".join(PAGE.split())
 
 
 @pytest.mark.promise("readme-6")
 def test_the_questions_are_those_of_the_readme():
     text = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
-    said = re.search(r"works six questions from the first command to what to do about the answer: (.*?)\.", text)[1]
+    said = re.search(r"works seven questions from the first command to what to do about the answer: (.*?)\.", text)[1]
     asked = ", ".join(title[:1].lower() + title[1:] for title in EXAMPLES)
-    assert PAGE.partition("\n\n")[2].startswith("Six questions") and len(EXAMPLES) == 6
+    asked = asked.replace("ground, or up to the relay?", "ground or up to the relay")
+    assert PAGE.partition("\n\n")[2].startswith("Seven questions") and len(EXAMPLES) == 7
     words = [
         re.sub(r"^(a|an|the) ", "", each.replace("does the paper's mission close", "paper's mission: does it close?"))
         for each in said.split(", ")
@@ -390,3 +422,34 @@ def test_the_crosslink_keeps_all_that_its_preset_knows():
     ends = m.orbit.leo, m.orbit.geo
     apart, slewing = ends[1].node_rad - ends[0].node_rad, {end.limits.slew_limit_rad_s for end in ends}
     assert {f"{math.degrees(apart):g} deg", *(f"{math.degrees(each):g} deg/s" for each in slewing)} == GIVEN[CROSSLINK]
+
+
+@pytest.mark.promise("gallery-29", "gallery-30")
+def test_the_uplink_is_the_downlink_the_other_way():
+    up = tomllib.loads((GALLERY / "ground-uplink.toml").read_text(encoding="utf-8"))
+    down = tomllib.loads(presets.preset_text("ground-downlink"))
+    assert [up[each] for each in ("channel", "jitter", "conventions", "requirement")] == [
+        down[each] for each in ("channel", "jitter", "conventions", "requirement")
+    ]
+    assert (up["orbit"].pop("leo"), up["orbit"].pop("geo")) == (down["orbit"].pop("geo"), down["orbit"].pop("leo"))
+    assert up["orbit"] == down["orbit"]
+    assert up["communication"].pop("data_rate") == "500 Mbit/s"
+    assert down["communication"].pop("data_rate") == "10 Gbit/s"
+    assert up["communication"] == down["communication"]
+    ends = [[each["terminals"][end] for end in ("leo_aperture", "geo_aperture")] for each in (up, down)]
+    assert ends == [["10 cm", "5 cm"], ["5 cm", "40 cm"]] and "40 cm" in GIVEN[GROUND]
+    assert down["terminals"]["geo_obscuration"] == 0.3
+
+
+@pytest.mark.promise("gallery-36")
+def test_the_table_of_ways_is_what_the_runs_print():
+    runs = [" ".join(run.split()) for run in EXAMPLES[GROUND].split("    microrad contacts leo-geo.toml\n")[1:]]
+    late = "half arrives within (.*?), and 99 % within (.*?)[;.,] "
+    relay = rf"relay is in view 15 times, (.*?) in all, and could carry (.*?)\. .*()by the relay {late}"
+    radio = rf"is in view 10 times, (.*?) in all, and could carry (.*?); .*()by the direct downlink {late}"
+    optical = rf"in use for (.*?), and could carry (.*?), .*? clear for (.*?) of .*by the optical downlink {late}"
+    shown = [relay, runs[0]], [radio, runs[0]], *([optical, run] for run in runs)
+    rows = re.findall(r"(?m)^\| \w+,? .*\d \w+ \|$", EXAMPLES[GROUND])
+    assert [re.split(r" *\| *", row)[2:-1] for row in rows] == [
+        list(re.search(pattern, run).groups()) for pattern, run in shown
+    ]
