@@ -64,7 +64,8 @@ def used_seconds(o, pair, run):
             if usable[k, second] and not usable[k, second - 1]:
                 since[k] = second
         if current is None or not usable[current, second] or not usable[current, second - 1]:
-            current = min((since[k], k) for k in range(len(usable)) if usable[k, second])[1]
+            could = [k for k in range(len(usable)) if usable[k, second]]
+            current = min((since[k], np.argmin(usable[k, second:]), k) for k in could)[2]
             taken, uses = second, uses + 1
         flows[current, second] = second - taken >= down.setup_s
     return flows, time_s, uses
