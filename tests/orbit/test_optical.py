@@ -64,14 +64,15 @@ def used_seconds(o, pair, run):
             if usable[k, second] and not usable[k, second - 1]:
                 since[k] = second
         if current is None or not usable[current, second] or not usable[current, second - 1]:
-            current = min((since[k], k) for k in range(len(usable)) if usable[k, second])[1]
+            could = [k for k in range(len(usable)) if usable[k, second]]
+            current = min((since[k], np.argmin(usable[k, second:]), k) for k in could)[2]
             taken, uses = second, uses + 1
         flows[current, second] = second - taken >= down.setup_s
     return flows, time_s, uses
 
 
 @pytest.mark.promise("day-49")
-@pytest.mark.parametrize("weather", ["2 h", "5 min"])
+@pytest.mark.parametrize("weather", ["2 h", "90 s"])
 def test_the_network_is_used_as_a_machine_that_looks_each_second_uses_it(tmp_path, weather):
     o, pair = of(tmp_path, optical({"kiruna": 0.6, "tromso": 0.6, "tenerife": 0.5}, weather=weather))
     o = o.with_value("runs", 3)
@@ -82,8 +83,8 @@ def test_the_network_is_used_as_a_machine_that_looks_each_second_uses_it(tmp_pat
         found.append(rate * np.sum(flows[:, time_s < inside]))
         several = max(several, uses)
     assert several > 8
-    assert way.capacity_bit == pytest.approx(np.mean(found), abs=2.0 * several * rate)
-    assert way.capacity_spread_bit == pytest.approx((min(found), max(found)), abs=2.0 * several * rate)
+    assert way.capacity_bit == pytest.approx(np.mean(found), abs=several * rate)
+    assert way.capacity_spread_bit == pytest.approx((min(found), max(found)), abs=several * rate)
     assert min(found) < 0.95 * max(found)
 
 

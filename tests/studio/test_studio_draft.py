@@ -14,6 +14,7 @@ from microrad.mission.model import Mission
 from microrad.mission.presets import preset_text
 from microrad.mission.toml import value_of
 from microrad.studio.draft import draft as drafts
+from microrad.studio.draft import tables
 from microrad.studio.draft.draft import Draft, DraftError
 from microrad.studio.draft.keys import key_of, keys_in
 from shipped import DEFAULT, SHIPPED, without_fine_pointing
@@ -511,3 +512,16 @@ def test_a_mission_without_fine_pointing_is_a_draft_too(tmp_path):
     draft = Draft.shipped(tmp_path / "m.toml").with_text(without_fine_pointing(TEXT))
     assert draft.problems == ()
     assert not any(key.startswith("fine_pointing") for key in draft.values)
+
+
+@pytest.mark.parametrize("name", ["operations.optical", "constellation.stations.svalbard"])
+def test_stations_that_are_offered_make_a_mission_without_faults(tmp_path, name):
+    draft = Draft.shipped(tmp_path / "m.toml")
+    assert name in tables.offered(draft)
+    added = tables.with_table(draft, name)
+    assert added.problems == () and f"[{name}]" in added.text and name not in tables.offered(added)
+    availability = f"{name}{'.stations.nemea' if 'optical' in name else ''}.availability"
+    for typed in ("0.25", "[0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.25]"):
+        assert added.set(availability, typed).problems == ()
+    (fault,) = added.set(availability, "1.5").problems
+    assert fault.key == availability and "a list of 12 such" in fault.expected

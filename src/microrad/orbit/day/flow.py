@@ -251,7 +251,8 @@ def direct(o: Operations, seen: View, passes: tuple[StationPass, ...]) -> Way | 
 def one_at_a_time(spans: Iterable[tuple[float, float, int]]) -> list[tuple[float, float, int]]:
     """The spans that are used where only one can be at a time: the first to begin is kept to its end.
 
-    At its end the one that began first among those that last longer takes over, for what is left of it.
+    At its end the one that began first among those that last longer takes over, for what is left of it. Of two that
+    begin at one moment, as under a sky that clears, the one that ends first is used, then the other.
 
     Args:
         spans: Start and end in s of each, and a number that tells it apart; in any order.
