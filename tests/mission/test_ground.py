@@ -319,6 +319,17 @@ def test_each_of_several_distances_is_refused(tmp_path):
     assert [each.key for each in faults(ground_path(tmp_path, typed))] == ["communication.distance", "answer.distance"]
 
 
+def test_turbulence_is_not_left_before_the_light_is_above_it(tmp_path):
+    typed = {**TYPED, "channel.altitude": None, "answer.distance": "100 km"}
+    (fault,) = faults(ground_path(tmp_path, typed, {"communication.distance": "99 km"}))
+    assert fault.key == "communication.distance"
+    assert fault.reason == "is below 100 km, up to which the air of channel.turbulence reaches"
+    assert 'distance = "1000 km" would do' in fault.expected
+    assert ground_file(tmp_path, typed, {"communication.distance": "100 km"}).mission
+    still = {"communication.distance": "99 km", "channel.turbulence": None}
+    assert ground_file(tmp_path, typed, still).mission
+
+
 def test_what_is_refused_at_one_value_is_taken_at_the_next(tmp_path):
     assert ground_file(tmp_path, SLOT).mission.path.elevation_rad > 20.0 * deg
     assert ground_file(tmp_path, LOW, {"orbit.geo.mask": "15 deg"}).mission.path.elevation_rad > 15.0 * deg

@@ -129,7 +129,8 @@ def test_figures_of_the_evidence_have_their_units(everything):
     assert units["budget.budgets.Communication.received_photons_per_bit"] == "photon/bit"
     assert units["run.requirements.beacon covers its partner.actual"] == "%"
     bare = {name for name, unit in units.items() if not unit and name.endswith(".value")}
-    assert all(name.startswith("campaign.") or "Illumination" in name or "Clear-sky" in name for name in bare), bare
+    ratios = ("Illumination", "Clear-sky", "Scintillation index")
+    assert all(name.startswith("campaign.") or any(each in name for each in ratios) for name in bare), bare
 
 
 # ----------------------------------------------------------------------------------------------------------- statuses
@@ -251,6 +252,9 @@ def test_nine_in_ten_are_verified_or_better_and_few_are_founded_on_nothing(every
         "Photons per bit that the paper's figure implies",
         "Noise of the receiver, line by line",
         "Bound of all linear controllers",
+        "Angle of arrival",
+        "Share of the time without clouds",
+        "Correlation of clouds",
     }
     named = [o for o in everything.outcomes if o.check.referent is not Referent.INDEPENDENT]
     assert len(named) >= 12

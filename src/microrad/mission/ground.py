@@ -12,6 +12,7 @@ from microrad.mission.tables.orbit import Orbits, OrbitTable
 
 EQUATORIAL_RADIUS_M, _FLATTENING = 6378137.0, 1.0 / 298.257223563  # WGS 84
 _GEOSTATIONARY_M = 42164.17e3
+_AIR_M = 100e3
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,6 +200,9 @@ def ground_fits(
             continue
         if beam.distance_m is None and not known and not end:
             yield Problem(f"{name}.distance", "is missing", 'distance = "42000 km" would do')
+        if beam.distance_m is not None and beam.distance_m < _AIR_M and channel is not None and channel.turbulence:
+            reason = f"is below {format_quantity(_AIR_M, 'm')}, up to which the air of channel.turbulence reaches"
+            yield Problem(f"{name}.distance", reason, 'distance = "1000 km" would do')
         if beam.distance_m is not None and known and path is not None and path.elevation_rad > 0.0:
             keys = " and ".join(path.sources)
             true = format_quantity(path.range_at(path.elevation_rad), "m")

@@ -88,8 +88,7 @@ class Turbulent:
     ``spread_db`` is the loss of the mean power by a wider beam, and ``wavefront_db`` that by a wavefront which the
     fibre or detector takes less of. ``fades`` are those of the power over its mean, with the scintillation ``index``.
     ``wander_rad`` is the radial rms of an uplink's wander, ``arrival_rad`` the angle of arrival of a downlink about one
-    axis, rms. ``other_wander_db`` is by how much the fade would be deeper by the other convention of wander.
-    ``doubts`` say beyond what the closed forms are used.
+    axis, rms. ``doubts`` say beyond what the closed forms are used.
     """
 
     direction: str
