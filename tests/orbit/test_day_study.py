@@ -14,6 +14,7 @@ from microrad.orbit import EARTH_RADIUS_M
 from microrad.orbit import day as day_study
 from microrad.orbit.day import NOTHING, Numbers, PointingLoss, Swing, assumptions, flow, geometry, given_loss
 from microrad.orbit.earth import figure
+from microrad.orbit.from_mission import TAIL_S
 from microrad.orbit.propagation.ephemeris import EphemerisOrbit
 
 C_M_S = 299_792_458.0
@@ -478,7 +479,8 @@ def test_constants_that_the_contacts_exceed_are_said(quick):
     ]
     assert said[0].startswith("communication.distance is 40000 km, and the contacts reach a range of 440")
     assert said[0].endswith(f" km, which costs {20.0 * math.log10(44036.0 / 40000.0):.2f} dB more than budgeted")
-    assert "velocity across the line of sight of 10.6" in said[2]
+    assert "velocity across the line of sight of 10.6" in said[2] and "dB" not in said[2]
+    assert "dB more than budgeted" in said[1]
     enough = {"communication.distance": "44100 km", "point_ahead.transverse_velocity": "10.7 km/s"}
     assert quick({"orbit.duration": "8 h"}, enough).warnings == ()
 
@@ -754,3 +756,27 @@ def test_a_contact_cut_by_the_sun_counts_as_one_rise(quick):
     assert (len(found.view.encounters), found.view.rises) == (15, 14)
     free = quick({"orbit.leo.limits.sun_exclusion": "0 deg", "orbit.geo.limits.sun_exclusion": "0 deg"})
     assert (len(free.view.encounters), free.view.rises) == (14, 14)
+
+
+@pytest.mark.parametrize(("tail_s", "said"), [(TAIL_S, 0), (TAIL_S - 1.0, 1), (0.0, 1)])
+def test_a_tail_as_long_as_it_may_be_is_not_spoken_of(tail_s, said):
+    assert len(geometry.short_tail(SimpleNamespace(tail_s=tail_s))) == said
+
+
+@pytest.mark.parametrize(("factor", "said"), [(1.0, 0), (0.9902, 0), (0.9899, 1)])
+def test_constants_are_exceeded_from_a_hundredth_on_each_by_its_own_measure(factor, said):
+    seen = {"point_ahead_most_rad": 50e-6, "rate_most_rad_s": 200e-6, "range_most_m": 44e6}
+    view = SimpleNamespace(encounters=[0], largest=seen.__getitem__)
+    beam = SimpleNamespace(distance_m=44e6 * factor)
+    m = SimpleNamespace(
+        communication=beam,
+        beacon=beam,
+        answer=beam,
+        point_ahead=SimpleNamespace(transverse_velocity_m_s=25e-6 * 299_792_458.0 * factor),
+        fine_pointing=SimpleNamespace(reference=SimpleNamespace(line_of_sight_rate_rad_s=200e-6 * factor)),
+    )
+    texts = geometry.beyond_the_mission(m, view)
+    keys = ["communication", "beacon", "answer", "point_ahead", "fine_pointing"]
+    assert [text.partition(".")[0] for text in texts] == keys * said
+    assert [("dB more than budgeted" in text) for text in texts] == [True, True, True, False, False] * said
+    assert geometry.beyond_the_mission(m, SimpleNamespace(encounters=[], largest=seen.__getitem__)) == ()
