@@ -780,3 +780,32 @@ def test_constants_are_exceeded_from_a_hundredth_on_each_by_its_own_measure(fact
     assert [text.partition(".")[0] for text in texts] == keys * said
     assert [("dB more than budgeted" in text) for text in texts] == [True, True, True, False, False] * said
     assert geometry.beyond_the_mission(m, SimpleNamespace(encounters=[], largest=seen.__getitem__)) == ()
+
+
+@pytest.mark.parametrize(
+    ("changes", "gone", "one_sided"),
+    [
+        ({"operations.margin_db": 0.0}, (), "margin demanded of the laser link"),
+        ({"operations.relay_share": 0.5}, ("share of each contact that the relay grants",), ""),
+        ({"orbit.grazing_height_m": 0.0}, ("grazing height",), ""),
+        ({"orbit.leo.limits.in_eclipse": False}, ("eclipse",), ""),
+        ({"orbit.leo.limits.attitude": "nadir"}, ("attitude of the satellite",), ""),
+        ({"orbit.leo.limits": None}, ("eclipse",), ""),
+        ({"orbit.leo.local_time_s": None}, ("local time of the node",), ""),
+        ({"orbit.leo.altitude_m": None}, ("orbit altitude", "local time of the node"), ""),
+        ({"operations.downlink": None}, ("radio data rate", "ground stations", "elevation mask"), ""),
+    ],
+)
+def test_an_assumption_that_the_mission_does_not_make_is_not_changed(links, day, changes, gone, one_sided):
+    m = links.file.mission
+    tables = {"operations": m.operations, "orbit": m.orbit}
+    for key, value in changes.items():
+        table, _, name = key.partition(".")
+        tables[table] = tables[table].with_value(name, value)
+    own = assumptions.Case(tables["operations"], tables["orbit"], links.data, day.loss)
+    found = {name: sides for name, *sides in assumptions._changes(own, links.finding.wide)}
+    assert CHANGED.keys() - found.keys() == set(gone)
+    alone = {"share of each contact that the relay grants", "attitude of the satellite", "eclipse", one_sided}
+    alone |= {"local time of the node", "ground stations"}  # it has one station
+    assert {name for name, sides in found.items() if None in sides} == alone & found.keys()
+    assert "time of acquisition" not in {name for name, *_ in assumptions._changes(own, None)}

@@ -1102,3 +1102,21 @@ def test_state_vectors_outside_of_a_segment_and_within_one_another_are_no_states
     for changed in (outside, nested):
         assert changed != text
         np.testing.assert_array_equal(ephemeris(tmp_path, changed).states(GRID[:5] + 1.0).position_m, plain.position_m)
+
+
+@pytest.mark.parametrize("name", ["1 BIT", "1 OF A NAME OF 30 LETTERS, SO", "N" * 31, "N" * 60, "ONE 1 TWO"])
+def test_a_name_before_two_lines_is_any_that_is_no_line_itself(tmp_path, name):
+    (found,) = elements(tmp_path, f"{name}\n{LINE_1}\n{LINE_2}")
+    assert (found.name, found.catalogue_number) == (name, "90001")
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("1 OF A NAME OF 31 LETTERS, OR SO", "69 characters, this one 32"),
+        ("N" * 61, "begin with '1 '"),
+        ("2 BIT", "'1 '"),
+    ],
+)
+def test_a_name_that_may_be_a_line_is_taken_for_one(tmp_path, name, words):
+    refused(tmp_path, f"{name}\n{LINE_1}\n{LINE_2}", "line 1", words)
