@@ -240,3 +240,9 @@ def test_scratch_goes_with_the_error_that_ends_its_use():
         (place / "part").write_text("x")
         raise RuntimeError("broken")
     assert not place.exists()
+
+
+def test_others_may_read_and_enter_a_folder_of_results_and_not_change_it(tmp_path):
+    with whole_folder(tmp_path / "results", False) as draft:
+        assert draft.stat().st_mode & 0o777 == 0o700
+    assert (tmp_path / "results").stat().st_mode & 0o777 == 0o755

@@ -81,3 +81,14 @@ def test_no_power_reaches_a_ratio_below_the_floor(quadratures, ratio):
     clean = phase_error.amplitude_for(ratio, 0.0, quadratures)
     assert clean == pytest.approx(stats.norm.isf(ratio), rel=1e-12)
     assert reached > clean
+
+
+@pytest.mark.parametrize("quadratures", [1, 2])
+@pytest.mark.parametrize("ratio", [1e-3, 1e-9, 1e-15])
+@pytest.mark.parametrize("rms_rad", [1e-12, 1e-9, 1e-7, 1e-5])
+def test_a_phase_error_that_nobody_could_see_needs_as_much_as_none(rms_rad, ratio, quadratures):
+    clean = phase_error.amplitude_for(ratio, 0.0, quadratures)
+    # to second order the loss is that of the mean of the cosine and of what the sine adds: some amplitude^2 rms^2
+    assert phase_error.amplitude_for(ratio, rms_rad, quadratures) == pytest.approx(
+        clean, rel=clean**2 * rms_rad**2 + 1e-11
+    )

@@ -14,6 +14,7 @@ from microrad.orbit import EARTH_RADIUS_M
 from microrad.orbit import day as day_study
 from microrad.orbit.day import NOTHING, Numbers, PointingLoss, Swing, assumptions, flow, geometry, given_loss
 from microrad.orbit.earth import figure
+from microrad.orbit.from_mission import TAIL_S
 from microrad.orbit.propagation.ephemeris import EphemerisOrbit
 
 C_M_S = 299_792_458.0
@@ -478,7 +479,8 @@ def test_constants_that_the_contacts_exceed_are_said(quick):
     ]
     assert said[0].startswith("communication.distance is 40000 km, and the contacts reach a range of 440")
     assert said[0].endswith(f" km, which costs {20.0 * math.log10(44036.0 / 40000.0):.2f} dB more than budgeted")
-    assert "velocity across the line of sight of 10.6" in said[2]
+    assert "velocity across the line of sight of 10.6" in said[2] and "dB" not in said[2]
+    assert "dB more than budgeted" in said[1]
     enough = {"communication.distance": "44100 km", "point_ahead.transverse_velocity": "10.7 km/s"}
     assert quick({"orbit.duration": "8 h"}, enough).warnings == ()
 
@@ -755,3 +757,56 @@ def test_a_contact_cut_by_the_sun_counts_as_one_rise(quick):
     assert (len(found.view.encounters), found.view.rises) == (15, 14)
     free = quick({"orbit.leo.limits.sun_exclusion": "0 deg", "orbit.geo.limits.sun_exclusion": "0 deg"})
     assert (len(free.view.encounters), free.view.rises) == (14, 14)
+
+
+@pytest.mark.parametrize(("tail_s", "said"), [(TAIL_S, 0), (TAIL_S - 1.0, 1), (0.0, 1)])
+def test_a_tail_as_long_as_it_may_be_is_not_spoken_of(tail_s, said):
+    assert len(geometry.short_tail(SimpleNamespace(tail_s=tail_s))) == said
+
+
+@pytest.mark.parametrize(("factor", "said"), [(1.0, 0), (0.9902, 0), (0.9899, 1)])
+def test_constants_are_exceeded_from_a_hundredth_on_each_by_its_own_measure(factor, said):
+    seen = {"point_ahead_most_rad": 50e-6, "rate_most_rad_s": 200e-6, "range_most_m": 44e6}
+    view = SimpleNamespace(encounters=[0], largest=seen.__getitem__)
+    beam = SimpleNamespace(distance_m=44e6 * factor)
+    m = SimpleNamespace(
+        communication=beam,
+        beacon=beam,
+        answer=beam,
+        point_ahead=SimpleNamespace(transverse_velocity_m_s=25e-6 * 299_792_458.0 * factor),
+        fine_pointing=SimpleNamespace(reference=SimpleNamespace(line_of_sight_rate_rad_s=200e-6 * factor)),
+    )
+    texts = geometry.beyond_the_mission(m, view)
+    keys = ["communication", "beacon", "answer", "point_ahead", "fine_pointing"]
+    assert [text.partition(".")[0] for text in texts] == keys * said
+    assert [("dB more than budgeted" in text) for text in texts] == [True, True, True, False, False] * said
+    assert geometry.beyond_the_mission(m, SimpleNamespace(encounters=[], largest=seen.__getitem__)) == ()
+
+
+@pytest.mark.parametrize(
+    ("changes", "gone", "one_sided"),
+    [
+        ({"operations.margin_db": 0.0}, (), "margin demanded of the laser link"),
+        ({"operations.relay_share": 0.5}, ("share of each contact that the relay grants",), ""),
+        ({"orbit.grazing_height_m": 0.0}, ("grazing height",), ""),
+        ({"orbit.leo.limits.in_eclipse": False}, ("eclipse",), ""),
+        ({"orbit.leo.limits.attitude": "nadir"}, ("attitude of the satellite",), ""),
+        ({"orbit.leo.limits": None}, ("eclipse",), ""),
+        ({"orbit.leo.local_time_s": None}, ("local time of the node",), ""),
+        ({"orbit.leo.altitude_m": None}, ("orbit altitude", "local time of the node"), ""),
+        ({"operations.downlink": None}, ("radio data rate", "ground stations", "elevation mask"), ""),
+    ],
+)
+def test_an_assumption_that_the_mission_does_not_make_is_not_changed(links, day, changes, gone, one_sided):
+    m = links.file.mission
+    tables = {"operations": m.operations, "orbit": m.orbit}
+    for key, value in changes.items():
+        table, _, name = key.partition(".")
+        tables[table] = tables[table].with_value(name, value)
+    own = assumptions.Case(tables["operations"], tables["orbit"], links.data, day.loss)
+    found = {name: sides for name, *sides in assumptions._changes(own, links.finding.wide)}
+    assert CHANGED.keys() - found.keys() == set(gone)
+    alone = {"share of each contact that the relay grants", "attitude of the satellite", "eclipse", one_sided}
+    alone |= {"local time of the node", "ground stations"}  # it has one station
+    assert {name for name, sides in found.items() if None in sides} == alone & found.keys()
+    assert "time of acquisition" not in {name for name, *_ in assumptions._changes(own, None)}

@@ -131,6 +131,25 @@ def test_an_availability_that_is_no_share_is_refused(availability):
         Service(np.array([0.0, 1.0]), np.array([1.0]), availability)
 
 
+@pytest.mark.parametrize(("lock_s", "edges", "rates"), [
+    (5.0, [10.0, 20.0, 40.0], [3.0, 2.0]),
+    (10.0, [10.0, 20.0, 40.0], [3.0, 2.0]),
+    (15.0, [10.0, 15.0, 20.0, 40.0], [0.0, 3.0, 2.0]),
+    (20.0, [10.0, 20.0, 40.0], [0.0, 2.0]),
+    (39.0, [10.0, 39.0, 40.0], [0.0, 2.0]),
+    (40.0, [10.0, 40.0], [0.0]),
+])  # fmt: skip
+def test_lock_at_an_edge_leaves_no_piece_of_no_length(lock_s, edges, rates):
+    got = Service(np.array([10.0, 20.0, 40.0]), np.array([3.0, 2.0]), 0.5).locked_at(lock_s)
+    assert (got.edges_s.tolist(), got.rate_bit_s.tolist(), got.availability) == (edges, rates, 0.5)
+
+
+@pytest.mark.parametrize("availability", [0.0, 1.0])
+def test_an_availability_of_all_or_nothing_is_one(availability):
+    got = Service(np.array([0.0, 2.0]), np.array([3.0]), availability)
+    assert got.capacity_bit == 6.0 * availability
+
+
 # ---------------------------------------------------------------------------------------------------------------- store
 def served(*pieces):
     """Contacts, each a list of (duration, rate) from a start."""
@@ -494,3 +513,37 @@ def test_a_rate_that_ion_cannot_keep_is_refused():
     words = r"the session of 'LEO 1' with 'GEO 1' has 4e\+10 bit/s; ION takes at most 3.43597e\+10 bit/s"
     with pytest.raises(OperationsError, match=words):
         plan_of([planned(rate_bit_s=4e10)])
+
+
+def test_the_reference_of_the_contact_plan_is_the_epoch_to_its_second():
+    text = plan_of([planned(locked_s=12.25, end_s=99.75)], lambda t: utc(t + 34.8))
+    assert text.splitlines()[3] == "@ 2026/03/20-12:00:34"
+    assert read_plan(text)[1][0][:2] == (14, 100)
+
+
+@pytest.mark.parametrize(
+    ("locked_s", "end_s", "rate_bit_s", "left"),
+    [
+        (12.5, 13.9, 8.0, "no whole second with data"),  # from 13 s to 13 s
+        (12.5, 14.0, 8.0, ""),
+        (12.0, 13.0, 8.0, ""),
+        (12.0, 13.0, 7.9, "no whole byte a second"),
+        (12.5, 13.9, 7.9, "no whole byte a second"),
+    ],
+)
+def test_a_contact_of_one_second_with_one_byte_is_the_least(locked_s, end_s, rate_bit_s, left):
+    text = plan_of([planned(locked_s=locked_s, end_s=end_s, rate_bit_s=rate_bit_s)])
+    assert len(read_plan(text)[1]) == (not left)
+    assert (f"left out, {left}:" in text) is bool(left)
+
+
+def test_the_largest_rate_that_ion_keeps_is_taken():
+    most = 8 * (2**32 - 1)
+    assert read_plan(plan_of([planned(rate_bit_s=float(most) + 7.0)]))[1][0][4] == 2**32 - 1
+    with pytest.raises(OperationsError, match="ION takes at most"):
+        plan_of([planned(rate_bit_s=float(most) + 8.0)])
+
+
+def test_the_light_time_of_a_whole_light_second_is_that_second():
+    for range_m, light_s in ((299_792_458.0, 1), (299_792_459.0, 2), (1.0, 1)):
+        assert read_plan(plan_of([planned(range_max_m=range_m)]))[2][0][4] == light_s

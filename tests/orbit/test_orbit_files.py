@@ -6,6 +6,7 @@ import json
 import math
 import os
 import pickle
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -25,6 +26,7 @@ from microrad.orbit.base import OrbitError, States
 from microrad.orbit.earth.epoch import Epoch
 from microrad.orbit.files import messages, oem, read_elements, read_oem
 from microrad.orbit.files.elements import _EXPECTED, checksum
+from microrad.orbit.propagation import mean_elements
 from microrad.orbit.propagation.mean_elements import Sgp4Orbit, closest_elements
 
 EPOCH = Epoch("2026-03-20T12:00:00Z")
@@ -1045,3 +1047,76 @@ def test_ephemeris_of_sgp4_states(tmp_path):
     sampled, direct = again.states(time_s), orbit.states(time_s)
     assert np.max(np.linalg.norm(sampled.position_m - direct.position_m, axis=0)) < 1e-3
     assert np.max(np.linalg.norm(sampled.velocity_m_s - direct.velocity_m_s, axis=0)) < 1e-5
+
+
+# ---------------------------------------------------------------------------------------------------------- the bounds
+@pytest.mark.parametrize("kind", ["", "0", "2", "3"])
+def test_each_type_of_ephemeris_that_is_sgp4_is_taken(tmp_path, kind):
+    (found,) = elements(tmp_path, as_json({**FIELDS, "EPHEMERIS_TYPE": kind}))
+    assert found == elements(tmp_path, as_json(FIELDS), found.name)[0]
+
+
+@pytest.mark.parametrize("kind", ["1", "4", "6", "02"])
+def test_each_other_type_of_ephemeris_is_refused(tmp_path, kind):
+    refused(tmp_path, as_json({**FIELDS, "EPHEMERIS_TYPE": kind}), f"the type of the ephemeris is {kind}")
+
+
+REVOLUTION_A_DAY = 2.0 * math.pi / 86400.0
+
+
+@pytest.mark.parametrize(
+    ("changes", "wrong"),
+    [
+        ({"eccentricity": 0.0}, ""),
+        ({"eccentricity": -1e-9}, "eccentricity is -1e-09"),
+        ({"eccentricity": 1.0}, "eccentricity is 1,"),
+        ({"inclination_rad": 0.0}, ""),
+        ({"inclination_rad": math.pi}, ""),
+        ({"inclination_rad": math.pi + 1e-6}, "inclination is 180.00006"),
+        ({"inclination_rad": -1e-6}, "inclination is -5.7"),
+        ({"mean_motion_rad_s": 1.001e-3 * REVOLUTION_A_DAY}, ""),
+        ({"mean_motion_rad_s": 0.999e-3 * REVOLUTION_A_DAY}, "mean motion is 0.000999"),
+        ({"mean_motion_rad_s": 19.999 * REVOLUTION_A_DAY}, ""),
+        ({"mean_motion_rad_s": 20.001 * REVOLUTION_A_DAY}, "mean motion is 20.001"),
+        ({"drag_per_earth_radius": -1.0}, ""),
+        ({"drag_per_earth_radius": 0.999}, ""),
+        ({"drag_per_earth_radius": 1.0}, "B* is 1,"),
+        ({"drag_per_earth_radius": -1.001}, "B* is -1.001"),
+    ],
+)
+def test_elements_are_taken_up_to_their_bounds(tmp_path, changes, wrong):
+    given = replace(elements(tmp_path, NAMED)[0], **changes)
+    if not wrong:
+        assert mean_elements.checked(given) is given
+        return
+    with pytest.raises(OrbitError, match=re.escape(wrong)):
+        mean_elements.checked(given)
+
+
+def test_state_vectors_outside_of_a_segment_and_within_one_another_are_no_states(tmp_path):
+    text = oem_xml(GRID)
+    plain = ephemeris(tmp_path, text).states(GRID[:5] + 1.0)
+    first = text[text.index("<stateVector>") : text.index("</stateVector>") + len("</stateVector>")]
+    outside = text.replace("<body>", f"<body><data>{first}</data>")
+    nested = text.replace(first, f"<stateVector>{first}</stateVector>")
+    for changed in (outside, nested):
+        assert changed != text
+        np.testing.assert_array_equal(ephemeris(tmp_path, changed).states(GRID[:5] + 1.0).position_m, plain.position_m)
+
+
+@pytest.mark.parametrize("name", ["1 BIT", "1 OF A NAME OF 30 LETTERS, SO", "N" * 31, "N" * 60, "ONE 1 TWO"])
+def test_a_name_before_two_lines_is_any_that_is_no_line_itself(tmp_path, name):
+    (found,) = elements(tmp_path, f"{name}\n{LINE_1}\n{LINE_2}")
+    assert (found.name, found.catalogue_number) == (name, "90001")
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("1 OF A NAME OF 31 LETTERS, OR SO", "69 characters, this one 32"),
+        ("N" * 61, "begin with '1 '"),
+        ("2 BIT", "'1 '"),
+    ],
+)
+def test_a_name_that_may_be_a_line_is_taken_for_one(tmp_path, name, words):
+    refused(tmp_path, f"{name}\n{LINE_1}\n{LINE_2}", "line 1", words)

@@ -191,7 +191,7 @@ def outside_of(key: Key, drawn: Distribution) -> Outside:
     rule = key.numeric
     if rule is None or not isinstance(drawn, distributions.Normal):
         return Outside(0.0, "")
-    above, below = (0.0, rule.below) if isinstance(rule, Share) else (rule.above, None)
+    above, below = (0.0 if rule.least is None else None, rule.below) if isinstance(rule, Share) else (rule.above, None)
     ends = (
         (-1.0, above, "not above"),
         (-1.0, rule.least, "below"),

@@ -176,7 +176,7 @@ def _xml_drafts(path: Path, text: str) -> Iterator[_Draft]:
             container.append(given.key[1:])
             if given.key == "<segment" and "oem" in container:
                 draft = _Draft(given.place)
-            elif given.key == "<stateVector":
+            elif given.key == "<stateVector" and draft is not None:
                 row = {}
         elif row is not None:
             messages.add_field(row, given, path)

@@ -1,0 +1,450 @@
+"""What a campaign file has to have, check by check: each condition by itself, and each limit at its very value."""
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from microrad.campaign.definition import checks, distributions, draws
+from microrad.campaign.definition.distributions import LogUniform, Normal, OneOf, Uniform, uncovered
+from microrad.campaign.definition.outputs import OUTPUTS, RADIUS
+from microrad.campaign.definition.values import NotedError
+from microrad.campaign.records import Limit
+from microrad.mirror import Variant
+from microrad.mission.fields import Quantity, Share
+from microrad.mission.file import load_mission
+from shipped import SHIPPED
+
+
+class Noting:
+    """A reader that notes faults, and reads numbers as they are."""
+
+    def __init__(self):
+        self.noted = []
+
+    def fault(self, key, value, reason, expected, nearest=""):
+        self.noted.append((key, value, reason, expected, nearest))
+        return NotedError()
+
+    def is_output(self, at, name, *others):
+        known = name in OUTPUTS or name in others
+        if not known:
+            self.fault(at, name, "is no output", "")
+        return known
+
+    def table(self, at, model, raw):
+        return model.model_validate(raw)
+
+    def numbers(self, at, raw):
+        return tuple(float(value) for _, value in raw.values())
+
+    def number(self, at, rule, raw, example=""):
+        return float(raw)
+
+    def each(self, read, items):
+        return tuple(read(*item) for item in items)
+
+    @property
+    def keys(self):
+        return [key for key, *_ in self.noted]
+
+
+# ----------------------------------------------------------------------------------------------------------- the loop
+def loop(**changes):
+    given = {"controller": "PI", "axes": "both", "mirror": Variant.GIVEN, "duration_s": None, "settle_s": None}
+    return SimpleNamespace(**(given | changes))
+
+
+@pytest.fixture
+def mission(monkeypatch):
+    """A mission with a loop whose controllers are known by name."""
+    whole = load_mission(SHIPPED).mission
+
+    def changed(mirror_file=None, duration_s=2.0, settle_s=0.5, comparison=True):
+        fine = SimpleNamespace(mirror_file=mirror_file, duration_s=duration_s, settle_s=settle_s)
+        mirror = SimpleNamespace(comparison=comparison, name="A")
+        return whole.model_copy(update={"fine_pointing": fine, "mirror": mirror})
+
+    monkeypatch.setattr(checks.controller_study, "names", lambda fine: ("PI", "LQG"))
+    monkeypatch.setattr(checks.coupled_study, "names", lambda fine: ("PI", "MIMO"))
+    return changed
+
+
+@pytest.mark.parametrize(
+    ("table", "fine", "key"),
+    [
+        ({}, {}, None),
+        ({"controller": "LQG"}, {}, None),
+        ({"controller": "MIMO"}, {}, "loop.controller"),
+        ({"controller": "MIMO"}, {"mirror_file": "a.toml"}, None),
+        ({"controller": "LQG"}, {"mirror_file": "a.toml"}, "loop.controller"),
+        ({"axes": "one"}, {}, None),
+        ({"axes": "one"}, {"mirror_file": "a.toml"}, "loop.axes"),
+        ({"mirror": Variant.COMPARISON}, {"mirror_file": "a.toml"}, "loop.mirror"),
+        ({"mirror": Variant.STRAIGHT}, {"mirror_file": "a.toml"}, None),
+        ({"mirror": Variant.COMPARISON}, {}, None),
+        ({"mirror": Variant.COMPARISON}, {"comparison": None}, "loop.mirror"),
+        ({"mirror": Variant.STRAIGHT}, {"comparison": None}, None),
+        ({}, {"duration_s": 0.5}, "loop.duration"),  # all of it settling
+        ({}, {"duration_s": 0.501}, None),
+        ({"duration_s": 0.4}, {}, "loop.duration"),
+        ({"duration_s": 0.6}, {"duration_s": 0.1}, None),
+        ({"settle_s": 2.0}, {}, "loop.duration"),
+        ({"settle_s": 1.9}, {}, None),
+        ({"settle_s": 0.0}, {"duration_s": 0.1}, None),  # no settling is not the mission's
+        ({"duration_s": 3.0, "settle_s": 3.0}, {}, "loop.duration"),
+    ],
+)
+def test_a_loop_has_its_controller_its_mirror_and_time_behind_the_settling(mission, table, fine, key):
+    reader = Noting()
+    checks.check_loop(reader, loop(**table), [mission(), mission(**fine)])
+    if table.get("controller", "PI") == "MIMO":  # which the first mission does not have
+        reader = Noting()
+        checks.check_loop(reader, loop(**table), [mission(**fine)])
+    assert reader.keys == [key] * (key is not None)
+
+
+def test_every_mission_of_the_cells_needs_a_loop(mission):
+    links = SimpleNamespace(fine_pointing=mission().fine_pointing)  # no whole mission
+    without = mission().model_copy(update={"fine_pointing": None})
+    for other in (links, without):
+        reader = Noting()
+        checks.check_loop(reader, loop(), [mission(), other, other])
+        assert reader.keys == ["loop"]
+        assert "[fine_pointing]" in reader.noted[0][2]
+
+
+# ------------------------------------------------------------------------------------------------------------ outputs
+def of_group(*groups):
+    return tuple(name for name, output in OUTPUTS.items() if output.group in groups)
+
+
+def test_what_is_kept_by_default_hangs_on_the_loop():
+    looped, still = SimpleNamespace(loop=object()), SimpleNamespace(loop=None)
+    reader = Noting()
+    assert checks.kept(reader, None, looped) == checks.kept(reader, None, None) == of_group("residual", "link")
+    assert checks.kept(reader, None, still) == of_group("link")
+    assert checks.kept(reader, ["volume", "margin"], still) == tuple(n for n in OUTPUTS if n in ("volume", "margin"))
+    assert reader.noted == []
+    residual = of_group("residual")[0]
+    assert checks.kept(reader, [residual], looped) == checks.kept(reader, [residual], None) == (residual,)
+    assert reader.noted == []
+    assert checks.kept(reader, [residual, "margin"], still) == tuple(n for n in OUTPUTS if n in (residual, "margin"))
+    assert [(key, value) for key, value, *_ in reader.noted] == [("keep", residual)]
+
+
+@pytest.mark.parametrize("raw", [[], "margin", {}, 0])
+def test_nothing_to_keep_is_no_list(raw):
+    reader = Noting()
+    assert checks.kept(reader, raw, None) == ()
+    assert reader.keys == ["keep"]
+
+
+@pytest.mark.parametrize("raw", [None, ["a list of the file"]])
+def test_an_output_of_a_table_that_a_mission_has_not_goes_or_is_refused(raw):
+    keep, reader = ("margin", "beacon_margin", "answer_margin"), Noting()
+    assert checks.with_tables(reader, raw, keep, ()) == checks.with_tables(reader, raw, keep, ("orbit",)) == keep
+    assert reader.noted == []
+    assert checks.with_tables(reader, raw, keep, ("beacon",)) == ("margin", "answer_margin")
+    assert checks.with_tables(reader, raw, ("margin", "answer_margin"), ("beacon",)) == ("margin", "answer_margin")
+    assert [(key, value) for key, value, *_ in reader.noted] == [("keep", "beacon_margin")] * (raw is not None)
+
+
+@pytest.mark.parametrize(
+    ("keep", "absent", "refused"),
+    [
+        (("volume",), (), False),
+        (("volume",), ("orbit",), True),
+        (("volume",), ("operations",), True),
+        (("volume",), ("beacon",), False),
+        (("margin",), ("orbit", "operations"), False),
+        (("margin", "volume"), ("orbit", "operations"), True),
+    ],
+)
+def test_the_day_needs_both_of_its_tables(keep, absent, refused):
+    reader = Noting()
+    checks.check_day(reader, keep, absent)
+    assert [(key, value) for key, value, *_ in reader.noted] == [("keep", ["volume"])] * refused
+
+
+# ------------------------------------------------------------------------------------------------------------- limits
+REQUIRED = SimpleNamespace(margin_db=3.0, pointing_error_rad=1e-5)
+
+
+def test_the_mission_requires_a_least_margin_and_a_most_residual_of_what_is_kept():
+    margin = Limit("margin", 3.0, None, "requirement.margin")
+    faded = Limit("margin_under_fades", 3.0, None, "requirement.margin")
+    residual = Limit("residual_quantile", None, 1e-5, "requirement.pointing_error")
+    reader = Noting()
+    every = ["residual_quantile", "margin", "margin_under_fades", "volume"]
+    assert checks.default_limits(reader, every, REQUIRED, {}) == (margin, faded, residual)
+    assert checks.default_limits(reader, ["margin", "volume"], REQUIRED, {}) == (margin,)
+    assert reader.noted == []
+    varied = {"inputs": {"requirement.margin": {}}, "grid": {"requirement.outage": {}}}
+    assert checks.default_limits(reader, ["margin", "residual_quantile"], REQUIRED, varied) == (margin, residual)
+    assert reader.keys == ["inputs.requirement.margin"]
+
+
+@pytest.mark.parametrize(
+    ("given", "varied", "told"),
+    [
+        ((), (), ["margin", "residual_quantile"]),
+        (("margin",), (), ["residual_quantile"]),
+        (("residual_quantile",), (), ["margin"]),
+        ((), ("requirement.margin",), ["residual_quantile"]),
+        ((), ("requirement.pointing_error",), ["margin"]),
+        (("margin",), ("requirement.pointing_error",), []),
+    ],
+)
+def test_each_required_limit_that_is_neither_given_nor_varied_is_told(given, varied, told):
+    said = list(checks.unchecked(given, ["margin", "residual_quantile"], REQUIRED, varied))
+    assert [each.split()[3].rstrip(",") for each in said] == told
+    for each in said:
+        assert ('least = "3 dB"' if "margin," in each else 'most = "10 µrad"') in each
+
+
+@pytest.mark.parametrize(
+    ("raw", "least", "most"),
+    [({"least": 1}, 1.0, None), ({"most": 2}, None, 2.0), ({"least": 1, "most": 2}, 1.0, 2.0)],
+)
+def test_a_limit_has_either_side_or_both(raw, least, most):
+    assert checks.limit(Noting(), "margin", raw, ["margin"]) == Limit("margin", least, most, "campaign file")
+
+
+@pytest.mark.parametrize(
+    ("name", "raw", "keep", "key"),
+    [
+        ("margin", {"least": 2, "most": 2}, ["margin"], "limits.margin.most"),
+        ("margin", {"least": 2.1, "most": 2}, ["margin"], "limits.margin.most"),
+        ("margin", {}, ["margin"], "limits.margin"),
+        ("margin", 5, ["margin"], "limits.margin"),
+        ("margin", {"least": 2}, ["volume"], "limits.margin"),
+        ("margins", {"least": 2}, ["margins"], "limits.margins"),
+        (RADIUS, {"least": 2}, [RADIUS], f"limits.{RADIUS}"),
+    ],
+)
+def test_a_limit_that_holds_nothing_is_refused(name, raw, keep, key):
+    reader = Noting()
+    with pytest.raises(NotedError):
+        checks.limit(reader, name, raw, keep)
+    assert reader.keys == [key]
+
+
+@pytest.mark.parametrize(
+    ("output", "looped", "keep", "keys"),
+    [
+        ("margin", False, ["margin"], []),
+        ("margin", True, ["volume"], ["precision.output"]),
+        (RADIUS, True, ["margin"], []),
+        (RADIUS, False, ["margin"], ["precision.output"]),
+        ("margins", True, ["margins"], ["precision.output"]),
+    ],
+)
+def test_a_precision_is_of_a_kept_output_or_of_the_radius_of_a_loop(output, looped, keep, keys):
+    reader, wanted = Noting(), SimpleNamespace(output=output, half_width=0.25)
+    found = checks.half_width(reader, SimpleNamespace(precision=wanted, loop=looped or None), keep)
+    assert reader.keys == keys
+    assert math.isnan(found) if output == "margins" else found == 0.25
+    assert math.isnan(checks.half_width(reader, SimpleNamespace(precision=None, loop=None), keep))
+
+
+# -------------------------------------------------------------------------------------------------------------- whole
+@pytest.mark.parametrize(
+    ("tail", "looped", "varying", "present", "keys"),
+    [
+        (False, False, ["a"], ["keep"], []),
+        (True, True, [], [], []),
+        (True, False, [], [], ["tail"]),
+        (True, True, ["a", "b"], [], ["inputs.a", "inputs.b"]),
+        (True, True, [], ["keep", "runs"], ["keep"]),
+        (True, True, [], ["limits", "precision", "realisations"], ["limits", "precision", "realisations"]),
+        (True, False, ["a"], ["limits"], ["tail", "inputs.a", "limits"]),
+    ],
+)
+def test_a_tail_has_a_loop_that_is_the_same_in_all_rows_and_nothing_beside_it(tail, looped, varying, present, keys):
+    reader = Noting()
+    table = SimpleNamespace(tail=object() if tail else None, loop=object() if looped else None)
+    checks.check_tail(reader, table, varying, dict.fromkeys(present))
+    assert reader.keys == keys
+
+
+@pytest.mark.parametrize(
+    ("is_drawn", "looped", "runs", "rows", "most_rows", "key"),
+    [
+        (False, False, 256, 256, 256, "runs"),
+        (True, False, 256, 256, 256, None),
+        (False, True, 256, 256, 256, None),
+        (False, False, 1, 1, 1, None),
+        (False, False, 1, 16, 16, "sampling"),
+        (False, False, 1, 1, 9, "precision.at_most"),
+        (False, False, 2, 2, 2, "runs"),
+    ],
+)
+def test_more_than_one_row_needs_something_that_makes_rows_differ(is_drawn, looped, runs, rows, most_rows, key):
+    for precision in (None, object()):
+        reader = Noting()
+        table = SimpleNamespace(loop=object() if looped else None, runs=runs, precision=precision)
+        checks.check_repeats(reader, table, is_drawn, rows, most_rows)
+        assert reader.keys == [key] * (key is not None)
+        for _, _, reason, expected, _ in reader.noted:
+            assert f"makes {most_rows} rows" in reason
+            assert ("and no [precision]" in expected) is (precision is not None)
+
+
+@pytest.mark.parametrize(
+    ("minimise", "key", "nearest"),
+    [
+        ("margin", None, ""),
+        ("-margin", None, ""),
+        ("beam.radius", None, ""),
+        ("-beam.radius", None, ""),
+        ("margn", "optimise.minimise", '"margin"'),
+        ("-margn", "optimise.minimise", '"-margin"'),
+        ("--margin", "optimise.minimise", '"-margin"'),
+        ("zzzzzz", "optimise.minimise", ""),
+    ],
+)
+def test_an_optimisation_minimises_an_output_or_a_variable_or_their_opposite(minimise, key, nearest):
+    reader = Noting()
+    optimise = SimpleNamespace(minimise=minimise, variables={"beam.radius": 0})
+    checks.check_minimise(reader, SimpleNamespace(optimise=optimise))
+    assert [(each[0], each[4]) for each in reader.noted] == [(key, nearest)] * (key is not None)
+    checks.check_minimise(reader, SimpleNamespace(optimise=None))
+    assert len(reader.noted) == (key is not None)
+
+
+def test_an_optimisation_has_variables():
+    reader = Noting()
+    checks.check_minimise(reader, SimpleNamespace(optimise=SimpleNamespace(minimise="margin", variables={})))
+    assert reader.keys == ["optimise.variables"]
+
+
+@pytest.mark.parametrize(
+    ("rows", "most_rows", "realisations", "keys"),
+    [
+        (16, 16, 1, []),
+        (16, 15, 1, ["precision.at_most"]),
+        (16, 2**16, 2**16, []),
+        (16, 2**16 + 1, 2**16, ["runs"]),
+        (2**17, 2**16 + 1, 2**16, ["precision.at_most", "runs"]),
+    ],
+)
+def test_a_campaign_has_no_more_runs_than_there_are_numbers_for(rows, most_rows, realisations, keys):
+    reader = Noting()
+    checks.check_size(reader, rows, most_rows, realisations)
+    assert reader.keys == keys
+
+
+# -------------------------------------------------------------------------------------------------------------- draws
+@pytest.mark.parametrize(
+    ("low", "high", "is_log", "key"),
+    [
+        (1.0, 2.0, False, None),
+        (2.0, 2.0, False, "at.high"),
+        (2.0, 1.0, False, "at.high"),
+        (0.0, 1.0, False, None),
+        (-1.0, 1.0, False, None),
+        (0.0, 1.0, True, "at.low"),
+        (-1.0, 1.0, True, "at.low"),
+        (1e-9, 1.0, True, None),
+    ],
+)
+def test_a_range_goes_up_and_has_logarithms_where_it_needs_them(low, high, is_log, key):
+    reader = Noting()
+    if key is None:
+        assert draws.bounds_of(reader, "at", Quantity(""), low, high, is_log) == (low, high)
+        return
+    with pytest.raises(NotedError):
+        draws.bounds_of(reader, "at", Quantity(""), low, high, is_log)
+    assert reader.keys == [key]
+
+
+@pytest.mark.parametrize(
+    ("rule", "mean", "share", "where"),
+    [
+        (Quantity("dB", above=1.0), 0.0, 0.841345, "not above 1 dB"),
+        (Quantity("dB", least=1.0), 0.0, 0.841345, "below 1 dB"),
+        (Quantity("dB", most=1.0), 0.0, 0.158655, "above 1 dB"),
+        (Share(""), 0.0, 0.5 + 0.158655, "not above 0 or not below 1"),
+        (Share("", least=0.0), 0.0, 0.5 + 0.158655, "below 0 or not below 1"),  # 0 itself is one
+        (Share("", least=0.5), 0.0, 0.691462 + 0.158655, "below 0.5 or not below 1"),
+        (Share("", below=2.0), 1.0, 2 * 0.158655, "not above 0 or not below 2"),
+        (Quantity("dB", least=-1.0, most=1.0), 0.0, 2 * 0.158655, "below -1 dB or above 1 dB"),
+        (Quantity("dB", least=-3.0, most=0.0), 0.0, 0.5 + 0.00135, "above 0 dB"),  # less than a hundredth is not said
+        (Quantity("dB"), 0.0, 0.0, ""),
+    ],
+)
+def test_draws_outside_of_a_key_are_counted_on_each_side_of_it(rule, mean, share, where):
+    key = SimpleNamespace(numeric=rule, unit=rule.unit)
+    found = draws.outside_of(key, Normal(mean, 1.0))
+    assert found.share == pytest.approx(share, abs=1e-6)
+    assert found.where == where
+    assert draws.outside_of(key, Uniform(-9.0, 9.0)).share == 0.0
+    assert draws.outside_of(SimpleNamespace(numeric=None, unit=""), Normal(mean, 1.0)).share == 0.0
+
+
+@pytest.mark.parametrize(
+    ("wanted", "drawn", "reason"),
+    [
+        (Normal(0.0, 1.0), Normal(5.0, 1.0), ""),
+        (Normal(0.0, 2.0), Normal(0.0, math.sqrt(2.0) * 0.9999), "is too narrow"),
+        (Normal(0.0, 2.0), Normal(0.0, math.sqrt(2.0) * 1.0001), ""),
+        (Normal(0.0, 1.0), Uniform(-9.0, 9.0), "never draws far out"),
+        (Uniform(1.0, 2.0), Normal(0.0, 1.0), ""),
+        (Uniform(1.0, 2.0), Uniform(1.0, 2.0), ""),
+        (Uniform(1.0, 2.0), LogUniform(1.0, 2.0), ""),
+        (Uniform(1.0, 2.0), Uniform(1.1, 2.0), "does not reach"),
+        (LogUniform(1.0, 2.0), Uniform(1.0, 1.9), "does not reach"),
+        (Uniform(1.0, 2.0), OneOf((1.0, 2.0), (0.5, 0.5), (1, 2), False), "does not draw every value"),
+        (OneOf((1.0, 2.0), (0.5, 0.5), (1, 2), False), Uniform(0.0, 3.0), "does not draw every value"),
+        (
+            OneOf((1.0, 2.0), (0.5, 0.5), (1, 2), False),
+            OneOf((2.0, 3.0, 1.0), (0.1, 0.1, 0.8), (2, 3, 1), False),
+            "",
+        ),
+        (
+            OneOf((1.0, 2.0, 3.0), (0.1, 0.1, 0.8), (1, 2, 3), False),
+            OneOf((1.0, 2.0), (0.5, 0.5), (1, 2), False),
+            "does not draw every value",
+        ),
+        (OneOf((1.0, 2.0), (0.5, 0.5), ("a", "b"), True), OneOf((1.0, 2.0), (0.1, 0.9), ("a", "b"), True), ""),
+        (
+            OneOf((1.0, 2.0), (0.5, 0.5), ("a", "b"), True),
+            OneOf((1.0, 2.0), (0.5, 0.5), ("b", "a"), True),
+            "does not draw every value",
+        ),
+        (
+            OneOf((1.0, 2.0), (0.5, 0.5), ("a", "b"), True),
+            OneOf((1.0, 2.0), (0.5, 0.5), (1, 2), False),
+            "does not draw every value",
+        ),
+    ],
+)
+def test_what_is_drawn_in_place_of_another_reaches_all_of_it(wanted, drawn, reason):
+    found = uncovered(wanted, drawn)
+    assert found.startswith(reason) if reason else found == ""
+
+
+def test_densities_end_with_their_range_whose_ends_belong_to_it():
+    value = np.array([0.999, 1.0, 2.0, 4.0, 4.001])
+    uniform, log_uniform = Uniform(1.0, 4.0), LogUniform(1.0, 4.0)
+    inside = -math.log(3.0)
+    np.testing.assert_allclose(uniform.log_density(value), [-math.inf, inside, inside, inside, -math.inf])
+    own = [-math.log(x * math.log(4.0)) for x in (1.0, 2.0, 4.0)]
+    np.testing.assert_allclose(log_uniform.log_density(value), [-math.inf, *own, -math.inf])
+    assert log_uniform.at(np.array([0.0, 0.5, 1.0])).tolist() == pytest.approx([1.0, 2.0, 4.0], rel=1e-15)
+    assert uniform.at(np.array([0.0, 0.5, 1.0])).tolist() == [1.0, 2.5, 4.0]
+
+
+def test_a_value_of_a_list_is_drawn_from_the_share_below_it_on():
+    one = OneOf((5.0, 3.0, 9.0), (0.25, 0.5, 0.25), (5, 3, 9), False)
+    shares = np.array([0.0, 0.2499, 0.25, 0.7499, 0.75, 1.0])
+    assert one.at(shares).tolist() == [5.0, 5.0, 3.0, 3.0, 9.0, 9.0]
+    density = np.exp(one.log_density(np.array([5.0, 3.0, 9.0, 4.0])))
+    np.testing.assert_allclose(density, [0.25, 0.5, 0.25, 0.0])
+    assert one.words("dB") == "one of 5 dB, 3 dB, 9 dB, weights 0.25, 0.5, 0.25"
+    even = OneOf((1.0, 2.0), (0.5, 0.5), ("near", "far"), True)
+    assert even.words("dB") == "one of 1 = near, 2 = far"
+    assert OneOf((1.5, 2.0), (0.5, 0.5), (1.5, 2), False).words("") == "one of 1.5, 2"
+    assert distributions.quantity(2e-6, "rad") == "2 µrad"
