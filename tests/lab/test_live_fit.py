@@ -60,6 +60,10 @@ def test_of_a_long_column_the_extremes_of_each_stretch_are_kept_and_a_short_one_
         return
     assert np.all(np.diff(rows) > 0) and {0, samples - 1, samples // 2, samples // 3} <= {*rows.tolist()}
     assert len(rows) <= 2 * 10 + 2
+    inner = np.where(np.arange(samples) == 1, 3.0, np.where(np.arange(samples) == samples - 2, -3.0, 0.0))
+    inner[0], inner[-1] = 1.0, -1.0  # neither end is an extreme of a long stretch
+    inner[2:-2] -= np.linspace(1.0, 0.9, samples - 4)
+    assert {0, 1, samples - 2, samples - 1} <= {*live_fit.extremes([inner], 10).tolist()}
     edges = np.linspace(0, samples, 6).astype(int)
     assert {*edges[:-1].tolist(), *(edges[1:] - 1).tolist()} <= {*rows.tolist()}
 

@@ -334,6 +334,8 @@ def test_of_a_drive_that_repeats_itself_the_mean_period_behind_the_first_is_fitt
     recording = repeated(periods, more, period)
     (made,) = fit_records([recording], factor=4, hold=hold, drop=3, offset=True)
     if not repeats:
+        from_rest = replace(recording, drive=recording.drive + 5.0)  # the first value is where it rests
+        assert_allclose(fit_records([from_rest], factor=4, hold=hold)[0].drive, made.drive, atol=1e-12)
         assert (made.first, len(made.output)) == (3, recording.samples)
         assert made.nuisance.shape == (recording.samples - 3, 1)
         return

@@ -251,13 +251,14 @@ def test_simulated_without_hysteresis_a_recording_leaves_what_is_played_and_with
         ((0.6, 300.0), 0.0, "near 100"),  # a line in one of the first bins
         ((100.0, 300.0), 1e-15, "the fit has"),
         ((100.0, 300.0), 1e-12, "near 20"),
+        ((100.0, 300.0, 600.0), 1e-13, "near"),  # a line above half the rate is none of the spectrum there
     ],
 )
 def test_the_reason_names_what_the_fit_lacks_and_none_of_its_lines(known_hz, missing_rad2, reason):
     """A motion of two tones and a little noise that the loop leaves as it is, fitted with lines and a spectrum."""
     time = np.arange(20_000) * 1e-3
-    amplitude = {100.0: 3e-6, 300.0: 2e-6, 0.6: 0.0}
-    moved = sum(a * np.sin(2.0 * math.pi * f * time) for f, a in amplitude.items())
+    amplitude = {100.0: 3e-6, 300.0: 2e-6, 0.6: 0.0, 600.0: 1e-6}
+    moved = sum(amplitude[f] * np.sin(2.0 * math.pi * f * time) for f in (100.0, 300.0))
     moved = moved + 1e-9 * np.random.default_rng(3).standard_normal(time.size)
     lines = tuple(SpectralLine(amplitude[f], f) for f in known_hz)
     known = Disturbance("fit", *term_filter(Term("band-pass", 1e-14, 200.0, 0.3)), lines, "", "test")

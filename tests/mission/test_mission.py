@@ -9,6 +9,7 @@ import re
 import subprocess
 import sys
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,7 @@ from hypothesis import strategies as st
 from microrad.core import lti
 from microrad.core.units import UnitError
 from microrad.mirror import model as mirror
+from microrad.mission import toml
 from microrad.mission.fields import Quantity
 from microrad.mission.file import MissionError, assumptions, load_coupled_mirror, load_mirror, load_mission
 from microrad.mission.model import Mission, Source, mission_schema, source_text
@@ -1072,3 +1074,54 @@ def test_a_linear_part_by_roots_is_the_one_by_coefficients(tmp_path):
 def test_roots_that_do_not_fit_are_told(refuse, changes, key, reason):
     faults = refuse(with_roots(*changes)).faults
     assert any(f.key == f"mirror.linear.{key}" and reason in f.reason for f in faults), faults
+
+
+@pytest.mark.parametrize(
+    ("count", "head", "tail"),
+    [
+        (1, "1 fault to correct", ""),
+        (2, "2 faults to correct", ""),
+        (50, "50 f", ""),
+        (51, "51 f", "and 1 more"),
+        (60, "60 f", "and 10 more"),
+    ],
+)
+def test_fifty_faults_are_shown_and_the_others_counted(count, head, tail):
+    """In the order of their lines, those of the file itself first."""
+    path = Path("m.toml")
+    faults = [
+        toml.Fault("key", "", line, f"is wrong on {line}", "another", file="m.toml") for line in range(count, 1, -1)
+    ]
+    faults.append(toml.Fault("key", "", 1, "is wrong elsewhere", "another", file="a.toml"))
+    error = MissionError(path, faults)
+    text = str(error)
+    assert text.startswith(f"m.toml: {head}")
+    assert [fault.line for fault in error.faults] == [*range(2, count + 1), 1]
+    assert text.count("is wrong") == min(count, 50)
+    assert text.splitlines()[-1] == tail if tail else "more" not in text
+
+
+def test_faults_stand_by_file_and_line_those_of_the_file_itself_first():
+    places = [("z.toml", 1), ("a.toml", 9), ("m.toml", 8), ("a.toml", 2), ("m.toml", 7)]
+    error = MissionError(Path("m.toml"), [toml.Fault("", "", line, "", "", file=name) for name, line in places])
+    assert [(fault.file, fault.line) for fault in error.faults] == [places[k] for k in (4, 2, 3, 1, 0)]
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({}, None),
+        ({"depth": toml._MAX_DEPTH}, None),
+        ({"depth": toml._MAX_DEPTH + 1}, f"is nested {toml._MAX_DEPTH + 1} brackets deep"),
+        ({"key": "k" * toml._MAX_KEY}, None),
+        ({"key": "k" * (toml._MAX_KEY + 1)}, f"is a key of {toml._MAX_KEY + 1} characters"),
+        ({"value": "1" * toml._MAX_NUMBER}, None),
+        ({"value": "1" * (toml._MAX_NUMBER + 1)}, f"is a number of {toml._MAX_NUMBER + 1} characters"),
+        ({"value": "-" + "1" * toml._MAX_NUMBER}, f"is a number of {toml._MAX_NUMBER + 1} characters"),
+        ({"value": '"' + "1" * toml._MAX_NUMBER + '"'}, None),
+    ],
+)
+def test_a_statement_is_too_large_beyond_its_limits_and_not_at_them(changes, reason):
+    statement = replace(toml.Statement("key", "key", 1, 1, "1"), **changes)
+    found = toml._oversize(statement)
+    assert (None if found is None else found[0]) == reason

@@ -35,6 +35,7 @@ from microrad.report.links.views import (
     pointing_view,
     residuals_sentence,
 )
+from microrad.report.plotting import palette
 from microrad.report.quantities import apart, quantity
 from microrad.report.study.page import cost_view
 from microrad.report.tables import Table
@@ -612,3 +613,34 @@ def test_the_noise_of_a_receiver_has_its_table(tmp_path, plain, name):
 
 def test_figures_name_their_data_only_where_they_stand_beside_the_page(plain):
     assert "figures/tornado.csv" not in links_page(plain)
+
+
+@pytest.mark.parametrize(
+    ("ends", "lost_db"),
+    [
+        ([(1.0, 5.0)], 0.0),
+        ([(1.0, 3.5)], 0.0),
+        ([(2.9, 5.0)], 0.0),
+        ([(3.0, 3.0)], 2.0),
+        ([(2.5, 3.1)], 2.0),
+        ([(-math.inf, 9.0)], -6.0),
+        ([], 2.0),
+    ],
+)
+def test_the_bar_of_an_input_that_leaves_no_link_ends_beyond_all_others(ends, lost_db):
+    """About a margin of 3 dB: half as far again as the longest bar, and at least 1 dB."""
+    shown = [SimpleNamespace(margin_low_db=low, margin_high_db=high) for low, high in ends]
+    assert link_module._lost(shown, 3.0) == pytest.approx(lost_db)
+
+
+@pytest.mark.parametrize(
+    ("colour", "opacity", "made"),
+    [
+        ("#102030", 1.0, "#102030"),
+        ("#102030", 0.5, "rgba(16,32,48,0.5)"),
+        ("#102030", 0.0, "rgba(16,32,48,0)"),
+        ("", 0.5, ""),
+    ],
+)
+def test_a_colour_is_written_with_its_opacity_where_it_has_one(colour, opacity, made):
+    assert palette.clear(colour, opacity) == made

@@ -139,6 +139,8 @@ def ranged(rule, typed, unit, value):
         (LENGTH, "cm", 251.0, "none", 0.0, 0.0),
         (LENGTH, "m", 1.5, "logarithmic", 0.2, 10.0),
         (LENGTH, "m", 0.0, "none", 0.0, 0.0),
+        (Quantity("m", above=0.0, most=12.0), "m", 2.6, "logarithmic", 0.5, 12.0),
+        (Quantity("m", above=1.0), "m", 3.0, "logarithmic", 1.0, 20.0),
         (Quantity("m", least=0.03), "cm", 5.0, "logarithmic", 3.0, 20.0),
         (POWER, "dBm", -80.0, "linear", -90.0, -70.0),
         (Quantity("W", least=1e-12), "dBm", -85.0, "linear", -90.0, -75.0),
@@ -189,6 +191,10 @@ def test_the_positions_of_a_slider_lie_evenly_on_its_scale_and_end_with_it():
     assert [length.at(p) for p in (-5, 0, 120, 240, 900)] == ["1 cm", "1 cm", "4.47 cm", "20 cm", "20 cm"]
     assert [ratio.at(p) for p in (0, 60, 120, 180, 240)] == ["-1", "0", "1", "2", "3"]
     assert [level.at(p) for p in (0, 1, 100, 200)] == ["-90 dBm", "-89.9 dBm", "-80 dBm", "-70 dBm"]
+    exact = ranged(LENGTH, "5.037 cm", "cm", 5.037)
+    assert exact.at(exact.position) == "5.037 cm" and exact.at(exact.position + 1) != "5.037 cm"
+    narrow = ranged(Quantity("m", least=1.234, most=12.36), "3 m", "m", 3.0)
+    assert (narrow.at(0), narrow.at(240)) == ("1.234 m", "12.36 m")  # rounded, they would lie outside
     assert replace(length, value=0.5).position == 0 and replace(length, value=30.0).position == 240
     assert replace(length, scale="none").position == 0
 
