@@ -375,23 +375,35 @@ NUMBERS = Numbers(relay_bit=8e9, direct_bit=4e9, relay_slow_s=60.0, direct_slow_
 )
 def test_what_matters_most_is_said_of_the_ratio_only_where_both_ways_carry_something(capacity_bit, said):
     swing = SimpleNamespace(
-        name="the store", low="1 GB", high="2 GB", factor=1.5, here=NUMBERS, at_low=NUMBERS, at_high=NUMBERS
+        name="the store",
+        low="1 GB",
+        high="2 GB",
+        of_relay=1.5,
+        of_optical=1.0,
+        here=NUMBERS,
+        at_low=NUMBERS,
+        at_high=NUMBERS,
     )
     direct = None if capacity_bit is None else SimpleNamespace(capacity_bit=capacity_bit)
-    (found,) = day_words.assumption_words(SimpleNamespace(swings=[swing], direct=direct))
+    (found,) = day_words.assumption_words(day_of(swing, direct))
     assert found.startswith(f"What matters most to the {said}, each assumption changed alone: the store (1 GB: ")
-    steady = replace_namespace(swing, factor=day_words.MATTERS)
-    assert day_words.assumption_words(SimpleNamespace(swings=[steady], direct=direct)) == []
+    steady = replace_namespace(swing, of_relay=day_words.MATTERS)
+    assert day_words.assumption_words(day_of(steady, direct)) == []
+
+
+def day_of(swing, direct):
+    """A day to a relay, without an optical downlink, of which one assumption is changed."""
+    return SimpleNamespace(swings=[swing], direct=direct, optical=None, view=SimpleNamespace(partner="relay"))
 
 
 @pytest.mark.parametrize("direct", [None, object()])
 def test_how_late_data_arrive_is_said_of_the_ways_that_there_are(direct):
     late = replace(NUMBERS, relay_slow_s=120.0)
     swing = SimpleNamespace(
-        name="a delay", low="0 s", high="60 s", factor=1.0, here=NUMBERS, at_low=NUMBERS, at_high=late
+        name="a delay", low="0 s", high="60 s", of_relay=1.0, of_optical=1.0, here=NUMBERS, at_low=NUMBERS, at_high=late
     )
     direct = None if direct is None else SimpleNamespace(capacity_bit=0.0)
-    (found,) = day_words.assumption_words(SimpleNamespace(swings=[swing], direct=direct))
+    (found,) = day_words.assumption_words(day_of(swing, direct))
     ways = f"within {duration(60.0)} or {duration(120.0)} by the relay"
     ways += "" if direct is None else f", within {duration(30.0)} directly"
     assert found.endswith(f"with 0 s or 60 s, 99 % arrive {ways}.")
