@@ -134,6 +134,14 @@ def _gains() -> Iterator[Formula]:
     yield Formula(
         f"{g}clear_sky_loss_db", r"-10\, m \lg T", "Beer and Lambert", "reduction", "one transmission for the whole sky"
     )
+    yield Formula(
+        f"{g}rayleigh_depth",
+        r"0.008569\, \lambda^{-4} (1 + 0.0113 \lambda^{-2} + 0.00013 \lambda^{-4})\, e^{-h / 8434.5\,\mathrm{m}}",
+        "Hansen and Travis 1974",
+        "exact",
+        "lambda in um; the pressure falls with an isothermal scale height",
+    )
+    yield Formula(f"{g}aerosol_depth", r"\beta\, \lambda^{-\alpha}", "Angstrom 1929", "exact", "lambda in um")
     yield Formula(f"{g}photon_energy_j", r"h c / \lambda", "Planck", "exact")
 
 

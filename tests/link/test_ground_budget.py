@@ -103,6 +103,7 @@ def clear_db(wavelength_m, mass):
 MASS = 1.0 / (math.sin(20.0 * deg) + 0.50572 * (20.0 + 6.07995) ** -1.6364)
 
 
+@pytest.mark.promise("link-110", "link-111")
 def test_a_downlink_is_the_sum_of_its_lines_by_hand(tmp_path):
     data = link.of(ground_file(tmp_path, STATIC).mission)
     budget = link.communication_budget(data, {})
@@ -149,6 +150,14 @@ def wandering_loss_db(index, beam, share):
     return low
 
 
+def for_any_strength(variance, scales=0.56):
+    """Index of a wide uplink, of the variance of weak turbulence; with 1.11 that of a downlink."""
+    root = variance**1.2
+    large = 0.49 * variance / (1.0 + scales * root) ** (7.0 / 6.0)
+    return math.exp(large + 0.51 * variance / (1.0 + 0.69 * root) ** (5.0 / 6.0)) - 1.0
+
+
+@pytest.mark.promise("link-111")
 def test_an_uplink_is_the_sum_of_its_lines_by_hand(tmp_path):
     data = link.of(ground_file(tmp_path, STATIC, RISING).mission)
     budget = link.communication_budget(data, {})
@@ -168,7 +177,7 @@ def test_an_uplink_is_the_sum_of_its_lines_by_hand(tmp_path):
         "Turbulence spread loss": -spread,
         "Tenerife aperture gain": 2.0 * lg(math.pi * 0.08 / wave),
         "Receive optics loss": -0.97,
-        "Turbulence fade": -wandering_loss_db(path.index_of_beam(waist), beam, 0.01),
+        "Turbulence fade": -wandering_loss_db(for_any_strength(path.index_of_beam(waist)), beam, 0.01),
         "Tracking split loss": -0.46,
         "Implementation loss": -3.0,
     }
@@ -178,7 +187,7 @@ def test_an_uplink_is_the_sum_of_its_lines_by_hand(tmp_path):
     answer = lines_of(link.beam_budget("answer", data.shared, ground_file(tmp_path, STATIC, RISING).mission.answer, {}))
     assert "Turbulence spread loss" not in answer
     assert answer["Turbulence fade"] == pytest.approx(
-        -normal_loss_db(Path(1.06e-6).averaged_index(0.12), 0.01), abs=2e-3
+        -normal_loss_db(for_any_strength(Path(1.06e-6).averaged_index(0.12), 1.11), 0.01), abs=2e-3
     )
     assert answer["Clear-sky loss"] == pytest.approx(-clear_db(1.06e-6, MASS), abs=1e-3)
 
@@ -192,6 +201,7 @@ def test_a_fade_stands_at_the_outage_of_the_mission(tmp_path):
 
 # ------------------------------------------------------------------------------------------------------ drawn losses
 @pytest.mark.parametrize("share", [1e-2, 1e-3])
+@pytest.mark.promise("link-111")
 def test_jitter_a_receiver_of_its_own_and_fades_lose_together_what_drawn_losses_do(tmp_path, share):
     """Three losses are drawn independently and added; the sum is read where it is exceeded for the outage."""
     jitter = {"bias": ["0.2 urad", "0 urad"], "rms": ["0.5 urad", "0.5 urad"], "bandwidth": "50 Hz"}
@@ -222,6 +232,7 @@ def test_jitter_a_receiver_of_its_own_and_fades_lose_together_what_drawn_losses_
 
 # ---------------------------------------------------------------------------------------------- one margin, many roads
 @pytest.mark.parametrize("changes", [{}, RISING, {"communication.coupling": PHOTODIODE}, STATIC, STILL, TYPED])
+@pytest.mark.promise("link-112")
 def test_each_road_to_a_margin_ends_at_the_same_one(tmp_path, changes):
     file = ground_file(tmp_path, changes)
     m = file.mission
@@ -237,6 +248,7 @@ def test_each_road_to_a_margin_ends_at_the_same_one(tmp_path, changes):
     assert exposure.short_of(budget - 2.0) < exposure.short_of(budget + 0.5)
 
 
+@pytest.mark.promise("link-112")
 def test_the_study_has_the_same_margin_as_its_tornado_and_its_figures(study):
     own = study.communication.margin_db
     assert study.under_jitter.margin_db == pytest.approx(own, abs=1e-9)
@@ -264,32 +276,15 @@ def test_air_that_hardly_moves_light_costs_what_still_air_costs(tmp_path, monkey
             assert calm.air_db == pytest.approx(still.air_db, abs=1e-6)
 
 
-def test_a_swing_ends_where_weak_turbulence_does(tmp_path):
-    """The index is 0.96 at this wind; a tenth more of it, or a tenth less of the wavelength, is beyond the formula."""
-    strong = {
-        "orbit.geo.mask": "10 deg",
-        "terminals.geo_aperture": "2 cm",
-        "communication.wavelength": "1.06 um",
-        "channel.turbulence.wind_rms": "16 m/s",
-    }
-    m = ground_file(tmp_path, strong).mission
-    data = link.of(m)
-    assert 0.9 < data.turbulent.index < 1.0
+def test_a_swing_ends_where_the_path_has_no_closed_form(tmp_path):
+    """Turbulence has closed forms from 0.1 to 100 um: beyond, there is no link to look at."""
+    m = ground_file(tmp_path).mission
     assert link.beam_passes(m)
-    stronger = m.with_value("channel.turbulence.wind_rms_m_s", 17.6)
-    assert not link.beam_passes(stronger)
-    with pytest.raises(link.LinkError, match="turbulence on the path at 10 deg of elevation: a scintillation index of"):
-        link.of(stronger)
-    tables = ("channel.turbulence",)
-    margin = lambda moved: outage.margin_db(link.of(moved))  # noqa: E731
-    (wind,) = [s for s in link.swings(m, {}, tables, "ratio", margin, link.beam_passes) if s.key.endswith("wind_rms")]
-    assert wind.low == pytest.approx(14.4)
-    assert 16.0 < wind.high < 17.6
-    answers = ground_file(tmp_path, strong, {"channel.turbulence.wind_rms": "10 m/s"}).mission
+    assert not link.beam_passes(m.with_value("communication.wavelength_m", 2e-4))
     possible = divergence_possible("answer")
-    assert possible(answers)
-    assert not possible(answers.with_value("channel.turbulence.wind_rms_m_s", 60.0))
-    assert not possible(answers.with_value("answer.divergence_rad", 1e-7))  # narrower than its aperture makes it
+    assert possible(m)
+    assert not possible(m.with_value("answer.wavelength_m", 2e-4))
+    assert not possible(m.with_value("answer.divergence_rad", 1e-7))  # narrower than its aperture makes it
 
 
 @pytest.mark.parametrize("velocity", ["0 m/s", "500 m/s", "7.5 km/s"])
@@ -366,12 +361,14 @@ def test_the_table_over_elevation_is_that_of_missions_at_each(study, tmp_path):
 
 
 # -------------------------------------------------------------------------------------------------------- conventions
+@pytest.mark.promise("link-113")
 def test_what_a_convention_costs_is_what_the_changed_file_has_less(tmp_path):
-    """Both laws of fades, both constants of wander and both tilts, for the data upwards and the answer down."""
+    """Both laws of fades, all constants of wander and both tilts, for the data upwards and the answer down."""
     file = ground_file(tmp_path, RISING)
     found = ground_link(file.mission, file.sources, link.of(file.mission)).conventions
     assert [(each.key, each.given, each.other) for each in found] == [
         ("channel.turbulence.fades", "gamma-gamma", "log-normal"),
+        ("channel.turbulence.wander", "dios-2004", "itu-r-p1622"),
         ("channel.turbulence.wander", "dios-2004", "andrews-phillips-2005"),
         ("channel.turbulence.tilt", "zernike", "gradient"),
     ]
@@ -386,7 +383,8 @@ def test_what_a_convention_costs_is_what_the_changed_file_has_less(tmp_path):
     for each in found:
         other = margins({each.key: each.other})
         assert each.gained_db == pytest.approx({name: other[name] - own[name] for name in own}, abs=1e-9)
-    fades, wander, tilt = found
+    fades, less, wander, tilt = found
+    assert wander.gained_db["Communication"] < less.gained_db["Communication"] < 0.0
     assert fades.gained_db["Communication"] > 0.01
     assert wander.gained_db["Communication"] < -1.0 and wander.gained_db["Answer"] == 0.0
     assert set(tilt.gained_db.values()) == {0.0}  # it moves the angle of arrival alone

@@ -144,6 +144,7 @@ def wavefront_db(folder, *changes):
     return data.turbulent.wavefront_db, data
 
 
+@pytest.mark.promise("link-111")
 def test_a_fibre_takes_of_turbulent_light_what_pairs_of_places_have_in_common(tmp_path):
     """The mean power is the mean of the field's coherence over pairs of places, each with the mode's amplitude there.
 
@@ -177,6 +178,7 @@ def test_more_corrected_modes_never_take_more_light(tmp_path, taken):
     assert found[0] > found[-1] >= 0.0
 
 
+@pytest.mark.promise("link-111")
 def test_what_adaptive_optics_leaves_of_a_fibre_is_marechals(tmp_path):
     changes = {"communication.coupling": FIBRE, "channel.turbulence.corrected_modes": 100}
     lost, data = wavefront_db(tmp_path, changes)

@@ -87,6 +87,7 @@ def test_the_round_earth_is_wrong_by_no_more_than_the_plumb_line_leans(latitude,
     assert max(wrong) < 0.011 * path.range_at(e)  # 0.1 dB at most
 
 
+@pytest.mark.promise("link-108")
 def test_a_geostationary_satellite_stands_where_its_position_has_it(tmp_path):
     """The slot's radius is 42 164.17 km here, and there follows from the Earth's mass and turn: 2 m apart or less."""
     for slot in ("-10 deg", "20 deg", "-60 deg"):
@@ -101,6 +102,7 @@ def test_a_geostationary_satellite_stands_where_its_position_has_it(tmp_path):
         assert m.range_m(m.communication) == pytest.approx(apart, abs=18e3)
 
 
+@pytest.mark.promise("link-108")
 def test_an_eccentric_orbit_counts_with_its_apogee(tmp_path):
     orbit = {
         "kind": "keplerian",
@@ -119,6 +121,7 @@ def test_an_eccentric_orbit_counts_with_its_apogee(tmp_path):
     assert m.path.sources == ("orbit.geo.mask", "orbit.leo.semi_major_axis")
 
 
+@pytest.mark.promise("link-108")
 def test_the_path_is_that_of_the_station_at_its_mask_at_either_end(tmp_path):
     down, up = (ground_file(tmp_path, each).mission for each in ({}, UP))
     assert (down.path.station, up.path.station) == ("geo", "leo")
@@ -132,6 +135,7 @@ def test_the_path_is_that_of_the_station_at_its_mask_at_either_end(tmp_path):
     assert higher.range_m(higher.answer) < 0.7 * down.range_m(down.answer)
 
 
+@pytest.mark.promise("link-108")
 def test_elements_take_the_altitude_of_the_channel(tmp_path):
     elements = {"orbit.leo": {"kind": "elements", "file": "a.tle"}, "channel.altitude": "550 km"}
     m = ground_file(tmp_path, elements).mission
@@ -139,6 +143,7 @@ def test_elements_take_the_altitude_of_the_channel(tmp_path):
     assert m.path.sources == ("orbit.geo.mask", "channel.altitude")
 
 
+@pytest.mark.promise("link-109")
 def test_a_typed_elevation_has_the_range_of_its_altitude(tmp_path):
     m = ground_file(tmp_path, TYPED).mission
     low, high = EQUATOR_M + 2393.0, EQUATOR_M + 500e3
@@ -306,6 +311,7 @@ def faults(path):
 
 
 @pytest.mark.parametrize(("changes", "keys", "reason", "advice"), REFUSED)
+@pytest.mark.promise("link-108", "link-110")
 def test_what_does_not_fit_is_refused_by_its_key_and_with_what_to_do(tmp_path, changes, keys, reason, advice):
     found = faults(ground_path(tmp_path, changes))
     assert sorted(each.key for each in found) == sorted(keys.split())
@@ -314,6 +320,7 @@ def test_what_does_not_fit_is_refused_by_its_key_and_with_what_to_do(tmp_path, c
         assert advice in each.expected
 
 
+@pytest.mark.promise("link-108")
 def test_each_of_several_distances_is_refused(tmp_path):
     typed = {"communication.distance": "1000 km", "answer.distance": "900 km"}
     assert [each.key for each in faults(ground_path(tmp_path, typed))] == ["communication.distance", "answer.distance"]
@@ -364,6 +371,7 @@ def test_a_file_without_a_station_reads_as_it_did(tmp_path):
     assert 'distance = "42000 km" would do' in fault.expected
 
 
+@pytest.mark.promise("link-109")
 def test_an_elevation_typed_beside_orbits_that_both_fly_is_doubted_with_the_range_of_the_lower(tmp_path):
     flying = {"orbit.geo": {"kind": "geostationary", "longitude": "0 deg"}, "operations": None}
     typed = {"channel.elevation": "20 deg", "channel.station": "geo", "channel.height": "0 m"}
@@ -376,6 +384,7 @@ def test_an_elevation_typed_beside_orbits_that_both_fly_is_doubted_with_the_rang
     assert ground_file(tmp_path).mission.path.doubt == ""
 
 
+@pytest.mark.promise("link-110")
 def test_turbulence_takes_the_values_of_its_file(tmp_path):
     table = ground_file(tmp_path).mission.channel.turbulence
     assert isinstance(table, TurbulenceTable)

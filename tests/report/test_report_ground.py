@@ -131,3 +131,29 @@ def test_where_the_required_margin_begins_is_said(tmp_path, margin, said):
     )
     text = " ".join(sentences(study, study.ground))
     assert ("required" not in text) if said is None else (said in text)
+
+
+@pytest.mark.promise("link-114")
+@pytest.mark.parametrize(
+    ("change", "line", "said"),
+    [
+        (('mask = "20 deg"', 'mask = "12 deg"'), "Turbulence fade", "below 20 deg the air is not flat"),
+        (
+            ("ground_strength = 1.7e-14", "ground_strength = 5e-13"),
+            "Turbulence fade",
+            "turbulence: the Rytov variance is",
+        ),
+        (("corrected_modes = 0", "corrected_modes = 21"), "Turbulence spread loss", "the point-ahead angle is"),
+    ],
+)
+def test_a_line_says_beyond_what_the_closed_forms_are_used(tmp_path, change, line, said):
+    found = run_link_study(file_of(tmp_path, change))
+    lines = [each for b in found.budgets for each in b.lines if each.name == line]
+    assert any(said in each.warning for each in lines), [each.warning for each in lines]
+    assert any(said in warning for warning in found.warnings)
+
+
+@pytest.mark.promise("link-114")
+def test_within_the_closed_forms_nothing_is_flagged(study):
+    data = next(each for each in study.communication.lines if each.name == "Turbulence fade")
+    assert data.warning == ""
