@@ -2,6 +2,7 @@
 
 import io
 import json
+import math
 import os
 import random
 import signal
@@ -18,7 +19,7 @@ import pytest
 
 from microrad.campaign.engines import jobs as engine_jobs
 from microrad.campaign.engines import local
-from microrad.campaign.engines.cluster import Flight, late_flights
+from microrad.campaign.engines.cluster import DaskEngine, Flight, late_flights
 from microrad.campaign.engines.jobs import Clock
 from microrad.campaign.engines.local import LocalEngine
 from microrad.campaign.engines.worker import Beat, Kind, Message, read_message, write_message
@@ -504,3 +505,267 @@ def test_a_message_that_ends_early_is_none():
     for size in range(len(whole.getvalue())):
         assert read_message(io.BytesIO(whole.getvalue()[:size])) is None
     assert read_message(io.BytesIO(whole.getvalue())) == Message(Kind.BEAT, b"twelve bytes")
+
+
+# -------------------------------------------------------------------------------------------- decisions, one by one
+@pytest.mark.parametrize(
+    ("silent_s", "late"),
+    [
+        ([10.0, 6.0], []),  # as long as may be
+        ([10.1, 5.0], [0]),  # the neighbour half as long
+        ([10.1, 5.1], [0, 1]),
+        ([5.1, 10.1, 4.9], [0, 1]),
+        ([9.9, 9.9], []),
+    ],
+)
+def test_a_flight_is_late_beyond_its_time_and_a_neighbour_beyond_half_of_it(silent_s, late):
+    flights = {k: Flight(Job(0, k), 100.0 - silent) for k, silent in enumerate(silent_s)}
+    flights[9] = Flight(Job(0, 9))  # it waits
+    assert late_flights(flights, 100.0, 10.0) == late
+    assert late_flights({}, 100.0, 10.0) == late_flights({9: flights[9]}, 100.0, 10.0) == []
+
+
+@pytest.mark.parametrize(
+    ("code", "words"),
+    [
+        (0, "ended with exit code 0"),
+        (3, "ended with exit code 3"),
+        (-int(signal.SIGKILL), "was ended by SIGKILL (if nobody stopped it, the machine ran out of memory)"),
+        (-int(signal.SIGTERM), "was ended by SIGTERM"),
+        (-1000, "was ended by signal 1000"),
+    ],
+)
+def test_the_end_of_a_process_in_words(code, words):
+    assert local._exit_words(code) == words
+
+
+@pytest.mark.parametrize(
+    ("lines", "said"),
+    [
+        ([], ""),
+        ([" ", ""], ""),
+        (["a", " b ", "", "c"], "a / b / c"),
+        (["1", "2", "3", "4", "5"], "2 / 3 / 4 / 5"),  # the last four
+        (["0", "Fatal Python error: x", "2", "3", "4", "5", "6"], "Fatal Python error: x / 2 / 3 / 4"),
+        (["Fatal Python error: x", "2", "3", "4", "5", "6"], "Fatal Python error: x / 2 / 3 / 4"),
+    ],
+)
+def test_the_last_words_of_a_process_are_its_last_lines_or_those_of_its_crash(lines, said):
+    worker = SimpleNamespace(_lines=lines, process=SimpleNamespace(returncode=1))
+    words = local._WorkerProcess.ending(worker)
+    assert words == "ended with exit code 1" + (f"; its last words: {said}" if said else "")
+
+
+def a_worker(job=None, *, ready=True, begun=True, heard_s=0.0, code=-9):
+    """A worker process that is none."""
+    made = object.__new__(local._WorkerProcess)
+    made.job, made.ready, made.begun, made.heard_s = job, ready, begun, heard_s
+    made.process, made._lines = SimpleNamespace(returncode=code), []
+    made.kill = lambda: None
+    return made
+
+
+class Queue(list):
+    """Jobs that are put back."""
+
+    put_back = list.append
+
+
+def an_engine(*workers, processes=2, late_s=10.0, now_s=0.0):
+    """An engine of such workers, at a time of its clock."""
+    made = object.__new__(LocalEngine)
+    made._workers, made._processes, made._late_s, made._code = list(workers), processes, late_s, ""
+    made._deaths = made._false_starts = 0
+    made._clock, made._closed = SimpleNamespace(now=lambda: now_s), False
+    return made
+
+
+@pytest.mark.parametrize(
+    ("ready", "silent_s", "late"),
+    [(True, 10.0, False), (True, 10.1, True), (False, 10.1, False), (False, 300.0, False), (False, 300.1, True)],
+)
+def test_a_worker_has_longer_to_start_than_a_job_to_show_a_sign_of_life(ready, silent_s, late):
+    worker, idle = a_worker(Job(0, 1), ready=ready), a_worker(None)
+    engine, queue = an_engine(worker, idle, now_s=silent_s), Queue()
+    outcomes = list(engine._stop_the_late(queue))
+    assert [(each.kind, each.reason) for each in outcomes] == [
+        ("late", "gave no sign of life for 10 s and was stopped")
+    ] * late
+    assert engine._workers == ([idle] if late else [worker, idle])
+    assert queue == []
+
+
+def test_a_job_that_had_not_begun_when_its_worker_ended_starts_again():
+    job, queue = Job(0, 1), Queue()
+
+    def lost(worker):
+        return list(an_engine(worker)._lost(worker, queue, "died"))
+
+    assert lost(a_worker(job, begun=False)) == []
+    assert queue == [job]
+    queue.clear()
+    (died,) = lost(a_worker(job))
+    assert (died.job, died.kind) == (job, "died") and died.reason.startswith("its worker process was ended by SIGKILL")
+    assert lost(a_worker(None)) == [] and queue == []
+
+
+@pytest.mark.parametrize(
+    ("processes", "ready", "code", "ends"),
+    [
+        (1, False, 1, 3),  # it ends by itself before it can work
+        (3, False, 0, 4),  # all may end for one reason
+        (1, False, -9, 20),  # killed
+        (1, True, 1, 20),
+        (11, True, 1, 22),
+    ],
+)
+def test_an_engine_gives_up_after_so_many_ends_in_a_row(processes, ready, code, ends):
+    engine, queue = an_engine(processes=processes), Queue()
+    for _ in range(ends - 1):
+        list(engine._lost(a_worker(ready=ready, code=code), queue, "died"))
+    with pytest.raises(CampaignError, match=f"worker processes ended {ends} times without a job done between"):
+        list(engine._lost(a_worker(ready=ready, code=code), queue, "died"))
+
+
+def test_messages_mean_what_they_say_and_those_of_a_stopped_worker_nothing():
+    job, queue = Job(0, 1), Queue()
+    worker, stopped = a_worker(job, ready=False), a_worker(Job(0, 2))
+    engine = an_engine(worker)
+    engine._deaths, engine._false_starts = 5, 2
+    assert (
+        list(engine._take(stopped, Message(Kind.DONE, b"x"), queue)) == list(engine._take(stopped, None, queue)) == []
+    )
+    assert list(engine._take(worker, Message(Kind.READY, b"code"), queue)) == []
+    assert (worker.ready, engine._code, engine._deaths) == (True, "code", 5)
+    (done,) = engine._take(worker, Message(Kind.DONE, b"result"), queue)
+    assert (done.job, done.kind, done.payload, done.reason) == (job, "done", b"result", "")
+    assert (worker.job, engine._deaths, engine._false_starts) == (None, 0, 0)
+    assert list(engine._take(worker, Message(Kind.DONE, b"again"), queue)) == []  # it has no job
+    worker.job = job
+    (raised,) = engine._take(worker, Message(Kind.RAISED, b"why"), queue)
+    assert (raised.kind, raised.payload, raised.reason) == ("raised", b"", "why")
+    with pytest.raises(CampaignError, match="not to be opened"):
+        list(engine._take(worker, Message(Kind.REFUSED, b"not to be opened"), queue))
+    with pytest.raises(CampaignError, match="it began with code, now it is other"):
+        list(engine._take(worker, Message(Kind.READY, b"other"), queue))
+    worker.job = job
+    (died,) = engine._take(worker, None, queue)
+    assert (died.kind, engine._workers) == ("died", [])
+
+
+def a_cluster(**changes):
+    """The engine of a cluster without any, at second 100 of its clock."""
+    made = object.__new__(DaskEngine)
+    given = {
+        "address": "tcp://here", "_late_s": 10.0, "_flights": {}, "_futures": {}, "_forgiven": set(), "_threads": {},
+        "_installed": set(), "_looked_s": -math.inf, "_closed": False, "_workers_seen_s": 0.0,
+        "_clock": SimpleNamespace(now=lambda: 100.0), "_name": "work", "_topic": "topic",
+        "_client": SimpleNamespace(status="running", scheduler=SimpleNamespace(ncores="ncores")),
+    }  # fmt: skip
+    for name, value in (given | changes).items():
+        setattr(made, name, value)
+    return made
+
+
+@pytest.mark.parametrize(("seen_s", "told"), [(40.0, False), (39.9, True)])
+def test_a_minute_without_workers_counts_from_the_last_that_was_seen(seen_s, told):
+    engine = a_cluster(_workers_seen_s=seen_s)
+    if told:
+        with pytest.raises(CampaignError, match="had no worker for 60 s"):
+            engine._count_workers()
+    else:
+        engine._count_workers()
+    there = a_cluster(_threads={"a": 1}, _workers_seen_s=0.0)
+    there._count_workers()
+    assert there._workers_seen_s == 100.0
+
+
+def test_a_look_installs_what_is_new_and_forgets_what_is_gone():
+    engine = a_cluster(_installed={"old", "gone"})
+    engine._flights = {1: Flight(Job(0, 1), 90.0, "gone"), 2: Flight(Job(0, 2), 90.0, "old"), 3: Flight(Job(0, 3))}
+    given = []
+    engine._call = lambda what, *args, **options: {"old": 2, "new": 1}
+    engine._install = given.append
+    engine._look()
+    assert (engine._threads, given, engine._installed) == ({"old": 2, "new": 1}, [["new"]], {"old"})
+    assert [flight.begun for flight in engine._flights.values()] == [False, True, False]
+    engine._call = lambda what, *args, **options: {}
+    engine._look()  # within a second of the last look: not asked
+    assert engine._threads == {"old": 2, "new": 1}
+    engine._closed = True
+    with pytest.raises(CampaignError, match="the workers were stopped"):
+        engine._look()
+
+
+@pytest.mark.parametrize(
+    ("error", "status", "told"),
+    [(OSError(), "running", False), (TimeoutError(), "running", True), (OSError(), "closed", True)],
+)
+def test_a_scheduler_that_does_not_answer_is_gone_and_one_whose_call_broke_is_asked_again(error, status, told):
+    engine = a_cluster()
+
+    def call(*args, **options):
+        engine._client.status = status
+        raise error
+
+    engine._call = call
+    if told:
+        with pytest.raises(CampaignError, match=r"the scheduler at tcp://here is gone \(it did not answer for 20 s\)"):
+            engine._look()
+    else:
+        engine._look()
+    assert engine._threads == {}
+
+
+def test_the_neighbours_of_a_late_job_are_forgiven_where_they_ran_and_nowhere_else():
+    engine, killed = a_cluster(), []
+    engine._flights = {
+        1: Flight(Job(0, 1), 80.0, "here"),
+        2: Flight(Job(0, 2), 99.0, "here"),
+        3: Flight(Job(0, 3), 99.0, "there"),
+        4: Flight(Job(0, 4)),
+    }
+    engine._futures = {k: SimpleNamespace(status="finished") for k in engine._flights}
+    engine._look = lambda: None
+    engine._kill = killed.append
+    (late,) = engine._stop_the_late()
+    assert (late.job, late.kind, late.reason) == (Job(0, 1), "late", "gave no sign of life for 10 s and was stopped")
+    assert (killed, engine._forgiven, list(engine._flights)) == (["here"], {2}, [2, 3, 4])
+    assert engine._looked_s == -math.inf
+    assert list(engine._stop_the_late()) == [] and killed == ["here"]
+
+
+def test_a_sign_of_life_is_that_of_a_job_under_way():
+    engine = a_cluster(_flights={1: Flight(Job(0, 1))})
+    engine._hear((0.0, (1, "here")))
+    engine._hear((0.0, (2, "there")))
+    assert engine._flights == {1: Flight(Job(0, 1), 100.0, "here")}
+
+
+@pytest.mark.parametrize(("threads", "under_way"), [({}, 0), ({"a": 1}, 2), ({"a": 1, "b": 2}, 6)])
+def test_two_jobs_a_thread_are_under_way(threads, under_way):
+    engine = a_cluster(_threads=threads, _serial=0)
+    launched = []
+
+    def launch(serial, job):
+        engine._flights[serial] = Flight(job)
+        launched.append(serial)
+
+    engine._launch = launch
+    engine._feed(engine_jobs.JobQueue(Job(0, k) for k in range(100)))
+    assert launched == list(range(1, under_way + 1))
+    few = a_cluster(_threads={"a": 4}, _serial=0)
+    few._launch = lambda serial, job: few._flights.update({serial: Flight(job)})
+    few._feed(engine_jobs.JobQueue(Job(0, k) for k in range(3)))
+    assert len(few._flights) == 3
+
+
+def test_a_job_put_back_is_the_next_and_its_iterator_is_asked_again():
+    more = []
+    queue = engine_jobs.JobQueue(iter(lambda: more.pop(0) if more else None, "never"))
+    assert queue.next() is None
+    more += [Job(0, 1), Job(0, 2)]
+    assert queue.next() == Job(0, 1)
+    queue.put_back(Job(0, 7))
+    queue.put_back(Job(0, 8))
+    assert [queue.next() for _ in range(4)] == [Job(0, 8), Job(0, 7), Job(0, 2), None]

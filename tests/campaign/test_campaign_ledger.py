@@ -185,6 +185,14 @@ def test_columns_of_unequal_length_are_refused():
     )
 
 
+@pytest.mark.parametrize("shapes", [((4,), (3,)), ((2, 2), (2, 2)), ((), ())], ids=str)
+def test_columns_of_unequal_length_or_more_axes_are_not_read_either(shapes):
+    columns = {f"column {name}": np.zeros(shape) for name, shape in zip(("row", "margin"), shapes, strict=True)}
+    header = {"cell": 1, "number": 2, "columns": ["row", "margin"], "failed": []}
+    data = chunk_format.pack("chunk", header, columns | {"survival": np.zeros(0), "survival_square": np.zeros(0)})
+    assert f"chunk 2 of cell 1 has columns of shapes {sorted(set(shapes))}" in said(chunk_format.unpack_chunk, data)
+
+
 def forged(kind, header, table):
     """Bytes of a record with the right checksum, whatever is in it."""
     words = json.dumps({"arrays": table, "rest": 0, "header": header}).encode()

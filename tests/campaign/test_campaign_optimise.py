@@ -15,10 +15,11 @@ from scipy.stats import beta, norm
 import budgets
 from campaign_files import HEAD, LOOP, POWER, loaded
 from microrad import link
+from microrad.campaign.optimisation import search
 from microrad.campaign.optimisation.campaign import _CandidateRows
-from microrad.campaign.optimisation.candidates import Problem, Variable
+from microrad.campaign.optimisation.candidates import Candidate, Kept, Problem, Variable, judged
 from microrad.campaign.optimisation.search import optimise
-from microrad.campaign.records import CampaignError, Limit
+from microrad.campaign.records import CampaignError, Interval, Limit
 from microrad.campaign.rows import loops
 from microrad.campaign.rows.evaluator import Evaluator
 from microrad.core import threads as in_threads
@@ -760,3 +761,147 @@ def test_it_searches_from_several_places(monkeypatch):
     optimise(asked, as_rows(two_wells), as_rows(two_wells), quiet)
     assert {method for method, _ in searched} == {"COBYQA"}
     assert len({start for _, start in searched}) > 2
+
+
+# ------------------------------------------------------------------------------------------------ one candidate
+def of_rows(limit, values, confidence, weight=None):
+    """How rows with these margins stand to a limit."""
+    rows = np.array(values, dtype=float)
+    columns = {"margin": rows} | ({} if weight is None else {"weight": np.array(weight, dtype=float)})
+    asked = problem(limits=(limit,), confidence=confidence, minimise="margin")
+    return judged(asked, {"x0": 0.5}, columns)
+
+
+@pytest.mark.parametrize(
+    ("limit", "value", "excess"),
+    [
+        (Limit("margin", 3.0, None, ""), 2.0, -1.0),  # of five rows one may miss it: the second from below decides
+        (Limit("margin", None, 3.0, ""), 4.0, -1.0),
+        (Limit("margin", 2.0, 4.0, ""), 2.0, 0.0),  # 1 and 5 are one outside
+        (Limit("margin", 2.0, None, ""), 2.0, 0.0),
+        (Limit("margin", None, 4.0, ""), 4.0, 0.0),
+        (Limit("margin", 1.5, None, ""), 2.0, 0.5),
+    ],
+)
+def test_the_row_that_decides_is_the_first_that_may_not_miss_the_limit(limit, value, excess):
+    found = of_rows(limit, [3.0, 1.0, 5.0, 2.0, 4.0], 0.8 if None in (limit.least, limit.most) else 0.6)
+    (kept,) = found.kept
+    assert (kept.value, kept.excess, kept.holds) == (value, excess, excess >= 0.0)
+    assert (found.feasible, found.cost, found.refused) == (kept.holds, 3.0, "")
+
+
+def test_weights_move_the_row_that_decides_and_a_row_without_a_result_has_missed():
+    limit = Limit("margin", 3.0, None, "")
+    assert of_rows(limit, [1.0, 2.0, 3.0, 4.0], 0.75, [1.0, 1.0, 1.0, 1.0]).kept[0].value == 2.0
+    assert of_rows(limit, [1.0, 2.0, 3.0, 4.0], 0.75, [0.5, 0.4, 1.0, 2.1]).kept[0].value == 3.0
+    lost = of_rows(limit, [9.0, math.nan, 3.0, 4.0], 0.75)
+    assert lost.kept[0].value == 3.0 and lost.feasible and lost.kept[0].share.value == 0.75
+    more = of_rows(limit, [9.0, math.nan, math.nan, 4.0], 0.75)
+    assert more.kept[0].excess == -math.inf and math.isnan(more.kept[0].value) and not more.feasible
+    none = of_rows(limit, [math.nan] * 4, 0.75)
+    assert none.refused == "no row has a margin" and not none.feasible
+
+
+@pytest.mark.parametrize(("rows", "confidence", "taken"), [(10, 0.9, True), (9, 0.9, False), (1000, 0.999, True)])
+def test_as_many_rows_as_one_may_miss_of_are_enough(rows, confidence, taken):
+    limit, values = Limit("margin", 0.0, None, ""), np.ones(rows)
+    if taken:
+        assert of_rows(limit, values, confidence).feasible
+        return
+    with pytest.raises(CampaignError, match=f"{rows} rows cannot tell whether 90 % of them .* draw at least 10"):
+        of_rows(limit, values, confidence)
+    asked = problem(limits=(), confidence=confidence, minimise="margin")
+    assert judged(asked, {"x0": 0.5}, {"margin": values}).feasible  # without a limit nothing is to be told
+
+
+def test_a_limit_agrees_from_the_end_of_its_interval_on_and_says_what_is_wanted():
+    share = Interval(0.9, 0.85, 0.95, 0.95)
+    kept = Kept(Limit("residual_quantile", None, 1e-5, ""), 9e-6, 1e-6, share)
+    assert (kept.agrees(0.95), kept.agrees(0.951), kept.agrees(0.85)) == (True, False, True)
+    assert kept.wanted == "residual_quantile <= 10 µrad"
+    assert Kept(Limit("margin", 3.0, None, ""), 3.0, 0.0, share).wanted == "margin >= 3 dB"
+
+
+@pytest.mark.parametrize(
+    ("minimise", "name", "unit", "sign"),
+    [
+        ("x0", "x0", "", 1.0),
+        ("-x0", "x0", "", -1.0),
+        ("margin", "margin", "dB", 1.0),
+        ("-margin", "margin", "dB", -1.0),
+    ],
+)
+def test_a_cost_is_a_variable_or_the_mean_of_an_output_either_way(minimise, name, unit, sign):
+    asked = problem(minimise=minimise, limits=())
+    assert (asked.cost_name, asked.cost_unit, asked.sign) == (name, unit, sign)
+    columns = {"margin": np.array([1.0, math.nan, 4.0]), "weight": np.array([3.0, 5.0, 1.0])}
+    assert judged(asked, {"x0": 0.5}, columns).cost == (0.5 if name == "x0" else 1.75)
+
+
+@pytest.mark.parametrize(
+    ("numbers", "bounds", "width"),
+    [
+        ([0.0, 1.0, 2.0, 3.0, 4.0], (), 2.0),
+        ([0.0, 1.0, 1.0, 1.0, 4.0], (), 4.0),  # the quartiles agree
+        ([2.0, 2.0, -2.0 + 4.0], (), 2.0),
+        ([-3.0, -3.0], (1.0, 5.0), 5.0),
+        ([-3.0, -3.0], (1.0,), 3.0),
+        ([math.inf, 1.0, 3.0, math.nan], (), 1.0),
+        ([math.inf], (), 1.0),
+        ([0.0, 0.0], (), 1.0),
+        ([], (7.0,), 7.0),
+    ],
+)
+def test_a_large_step_is_that_of_the_quartiles_or_what_is_left_of_it(numbers, bounds, width):
+    assert search._spread(numbers, bounds) == width
+
+
+def a_search(places):
+    """A search whose known candidates are given by their place, cost and excess over one limit."""
+    asked = problem(limits=(Limit("margin", 3.0, None, ""),))
+    share = Interval(0.9, 0.8, 1.0, 0.95)
+    made = search._Search(asked, never, quiet, cost_scale=2.0, scales=np.array([4.0]))
+    for number, (place, cost, excess) in enumerate(places):
+        kept = () if excess is None else (Kept(asked.limits[0], 3.0 + excess, excess, share),)
+        candidate = Candidate({"x0": place}, cost, kept, "refused" if excess is None else "")
+        made.known[bytes([number])] = np.array([place]), candidate
+    return made
+
+
+def test_the_best_is_the_cheapest_that_keeps_its_limits_or_misses_them_least():
+    found = a_search([(0.1, 5.0, 0.0), (0.2, 4.0, 0.1), (0.3, 1.0, -0.1), (0.4, 0.0, None)])
+    assert found.best().values == {"x0": 0.2}
+    assert [c.values["x0"] for _, c in found.accepted] == [0.1, 0.2, 0.3]
+    missed = a_search([(0.1, 1.0, -0.4), (0.2, 9.0, -0.2), (0.3, 0.0, None)])
+    assert missed.best().values == {"x0": 0.2}
+    assert a_search([(0.3, 0.0, None)]).best() is None
+    known = missed.trace[0]
+    assert missed.cost(known) == 0.5 and missed.excess(known).tolist() == [-0.1]
+    assert missed.violation(known) == pytest.approx(0.1) and missed.score(known) == pytest.approx(0.5 + 1.0)
+    far = a_search([(0.1, 1.0, -1e9), (0.2, 1.0, 1e9)])
+    assert [far.excess(c).tolist() for c in far.trace] == [[-search.FARTHEST], [search.FARTHEST]]
+    assert far.violation(far.trace[1]) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("place", "excess", "missed", "names"),
+    [
+        (0.5, 0.079, True, ("margin",)),  # within 0.02 of the scale, which is 4
+        (0.5, 0.081, True, ()),
+        (0.5, 0.079, False, ()),  # no candidate missed it
+        (0.019, 1.0, True, ("x0 at its low",)),
+        (0.021, 1.0, True, ()),
+        (0.981, 1.0, True, ("x0 at its high",)),
+        (0.979, 1.0, True, ()),
+        (0.0, 0.0, True, ("margin", "x0 at its low")),
+    ],
+)
+def test_what_binds_an_optimum_is_near_and_has_kept_others_from_being_one(place, excess, missed, names):
+    found = a_search([(place, 1.0, excess), (0.4, 0.5, -1.0 if missed else 1.0)])
+    assert search._bound_by(found, found.trace[0]) == names
+
+
+def test_searches_set_out_apart_from_the_most_promising_on():
+    found = a_search([(0.5, 4.0, 1.0), (0.52, 2.0, 1.0), (0.9, 3.0, 1.0), (0.38, 1.0, 1.0), (0.1, 0.0, -40.0)])
+    assert [float(place[0]) for place in found.starts()] == [0.38, 0.9, 0.1]
+    assert [float(place[0]) for place in a_search([(0.38, 1.0, 1.0), (0.54, 2.0, 1.0)]).starts()] == [0.38, 0.54]

@@ -30,7 +30,7 @@ from microrad.campaign.records import CampaignError, Outcome
 from microrad.campaign.rows import evaluate
 from microrad.campaign.rows.evaluator import Evaluator
 from microrad.campaign.rows.loops import controllers
-from microrad.campaign.rows.plan import planned
+from microrad.campaign.rows.plan import Plan, planned
 from microrad.campaign.statistics.cell import CellRows
 from microrad.campaign.statistics.sensitivity import sensitivity
 from microrad.campaign.statistics.summary import summarise_campaign
@@ -796,3 +796,174 @@ high = "9 urad"
         for cell in cells
     )
     assert found.sensitivities[0] == first != second
+
+
+# ------------------------------------------------------------------------------------------- decisions, one by one
+@pytest.mark.parametrize(
+    ("seconds", "words"),
+    [(0.4, "0 s"), (89.9, "90 s"), (90.0, "2 min"), (5399.0, "90 min"), (5400.0, "1.5 h"), (36000.0, "10.0 h")],
+)
+def test_the_time_left_is_told_in_its_unit(seconds, words):
+    assert run._minutes(seconds) == words
+
+
+def test_the_pace_is_that_of_the_rows_done_here(monkeypatch):
+    monkeypatch.setattr(run, "time", SimpleNamespace(monotonic=lambda: 110.0))
+    pace = run._Pace(done=150, spent_s=30.0, began_s=100.0, here=50)
+    assert pace.words(250, "margin 1 %: 3 dB") == "5 rows/s, 20 s left, margin 1 %: 3 dB"
+    assert pace.words(150, "") == "5 rows/s, 0 s left"
+    assert pace.seconds == 40.0
+    assert run._Pace(done=150, spent_s=30.0, began_s=100.0).words(250, "x") == "rows"
+    assert run._Pace(done=150, spent_s=30.0, began_s=110.0, here=50).words(250, "x") == "rows"
+
+
+class Book(list):
+    """A ledger that notes what is put into it."""
+
+    def chunks(self, cell):
+        return (each for each in self if each.cell == cell)
+
+
+def a_chunk(number, rows, margin, cell=0):
+    columns = {"row": np.array(rows, dtype=float), "weight": np.ones(len(rows)), "margin": np.array(margin)}
+    return records.Chunk(cell, number, columns, (), np.zeros(0), np.zeros(0))
+
+
+def a_runner(least=3.0, most=None, **table):
+    """A runner without an engine, of two cells with four rows a chunk."""
+    made = object.__new__(run._Runner)
+    given = {"loop": object(), "tail": None, "worst": 2, "seed": 7, "precision": None}
+    limits = (records.Limit("margin", least, most, ""),)
+    made.campaign = SimpleNamespace(table=SimpleNamespace(**(given | table)), limits=limits, cells=[0, 1])
+    made.plan = SimpleNamespace(
+        rows_of=lambda number: range(4 * number, 4 * number + 4), chunks=lambda cell, rows: [0] * -(-rows // 4)
+    )
+    made.book, made.pace, made.total = Book(), run._Pace(0, 0.0), 16
+    return made
+
+
+@pytest.mark.parametrize(
+    ("least", "most", "worst"),
+    [(3.0, None, [(3, 1.0), (0, 2.0)]), (None, 3.0, [(4, 9.0), (1, 5.0)]), (3.0, 4.0, [(3, 1.0), (0, 2.0)])],
+)
+def test_the_worst_rows_are_the_least_where_a_limit_is_a_least_and_the_first_of_equal_ones(least, most, worst):
+    made = a_runner(least, most)
+    made.book += [a_chunk(1, [4, 5], [9.0, 2.0]), a_chunk(0, [0, 1, 2, 3], [2.0, 5.0, np.nan, 1.0])]
+    made.book += [a_chunk(0, [0, 1], [0.0, 99.0], cell=1)]
+    assert made._worst(0) == worst
+    for other in ({"loop": None}, {"tail": object()}, {"worst": 0}):
+        without = a_runner(least, most, **other)
+        without.book += made.book
+        assert without._worst(0) == []
+    unlimited = a_runner()
+    unlimited.campaign.limits = ()
+    unlimited.book += made.book
+    assert unlimited._worst(0) == []
+
+
+@pytest.mark.parametrize(("least", "most", "said"), [(3.0, None, "margin 1 %: 1 dB"), (None, 3.0, "margin 99 %: 9 dB")])
+def test_the_quantile_shown_is_renewed_with_a_tenth_more_rows_or_at_the_end(least, most, said):
+    made = a_runner(least, most)
+    made.pace.here = made.pace.done = 4
+    assert made._interim(chunk_format.pack_chunk(a_chunk(0, range(4), [1.0, 9.0, 5.0, 5.0]))) == said
+    made.pace.quantile = "as it was"
+    for here, total, shown in ((4.39, 16, "as it was"), (4.4, 16, said), (4.6, 16, "as it was"), (4.6, 4.6, said)):
+        made.pace.quantile = "as it was"
+        made.pace.here = made.pace.done = here
+        made.total = total
+        assert made._interim(chunk_format.pack_chunk(a_chunk(1, [9], [5.0]))) == shown
+    lost = a_runner(least, most)
+    assert lost._interim(chunk_format.pack_chunk(a_chunk(0, [0], [np.nan]))) == said.partition(":")[0] + ": -"
+    lost.campaign.limits = ()
+    assert lost._interim(b"") == ""
+
+
+def test_rows_of_a_chunk_by_themselves_are_tried_twice_and_what_is_lost_is_said(monkeypatch):
+    made, tried, kept = a_runner(), [], []
+
+    def outcomes(jobs):
+        for job in jobs:
+            tried.append(job.row)
+            lost = () if job.row == 4 or tried.count(6) == 2 else (records.Failed(job.row, 7, 1, "no number"),)
+            chunk = a_chunk(1, [job.row], [float(job.row)])
+            if job.row == 5:
+                yield Outcome(job, "died", reason=f"ended, {tried.count(5)}")
+            else:
+                yield Outcome(job, "done", chunk_format.pack_chunk(replace(chunk, failed=lost)))
+
+    monkeypatch.setattr(run.sampling, "rows", lambda campaign, cell, row, count: ({}, np.array([1.0])))
+    made.campaign.outputs = [SimpleNamespace(name="margin")]
+    made._outcomes = outcomes
+    made._keep = lambda job, payload: kept.append((job, chunk_format.unpack_chunk(payload)))
+    made._by_rows(records.Job(0, 1))
+    ((job, chunk),) = kept
+    assert tried == [4, 5, 6, 7, 5, 6, 7]
+    assert job == records.Job(0, 1) and chunk.columns["row"].tolist() == [4.0, 5.0, 6.0, 7.0]
+    np.testing.assert_array_equal(chunk.columns["margin"], [4.0, np.nan, 6.0, 7.0])
+    failed = [(each.row, each.attempts, each.reason) for each in chunk.failed]
+    assert failed == [(5, 2, "ended, 2")]
+
+
+def test_a_cell_is_precise_by_the_first_rows_of_a_round_and_never_without_a_precision(monkeypatch):
+    seen = []
+
+    class Rows:
+        def __init__(self, campaign, cell, chunks):
+            seen.append([chunk.number for chunk in chunks])
+
+        def is_precise(self):
+            return True
+
+    monkeypatch.setattr(run, "CellRows", Rows)
+    made = a_runner(precision=object())
+    made.book += [a_chunk(number, [4 * number], [1.0]) for number in (0, 2, 1, 3)]
+    assert made._precise(0, 8) and made._precise(0, 9) and seen == [[0, 1], [0, 2, 1]]
+    assert not a_runner()._precise(0, 8)
+
+
+def test_traces_that_are_no_longer_among_the_worst_go_and_those_that_are_there_stay():
+    made, dropped, put, asked = a_runner(), [], [], []
+    there = records.WorstTrace(0, 3, "margin", 1.0, np.zeros(1), np.zeros((1, 1)), np.zeros((1, 1)))
+    old = replace(there, row=8)
+    made._worst = lambda cell: [(3, 1.0), (0, 2.0)] if cell == 0 else [(3, 5.0)]
+    made.book = SimpleNamespace(traces=lambda: (there, old), drop_trace=dropped.append, put_trace=put.append)
+
+    def outcomes(jobs):
+        asked.extend(jobs)
+        for job in jobs:
+            found = replace(there, cell=job.cell, row=job.row, output="", value=np.nan)
+            done = job.cell == 0
+            yield Outcome(job, "done" if done else "died", chunk_format.pack_trace(found) if done else b"")
+
+    made._outcomes = outcomes
+    made._traces()
+    assert dropped == [old]
+    assert [(job.cell, job.row, job.kind) for job in asked] == [(0, 0, "trace"), (1, 3, "trace")]
+    assert [(each.cell, each.row, each.output, each.value) for each in put] == [(0, 0, "margin", 2.0)]
+
+
+@pytest.mark.parametrize(
+    ("row_s", "largest", "rows"),
+    [
+        (0.0, 64, 64),
+        (1e-3, 4096, 1024),
+        (1e-3, 16, 16),
+        (0.1, 64, 16),
+        (0.25, 64, 8),
+        (0.26, 64, 4),
+        (1.0, 64, 2),
+        (1.01, 64, 1),
+        (5.0, 64, 1),
+    ],
+)
+def test_a_timed_chunk_lasts_two_seconds_at_most(row_s, largest, rows):
+    assert Plan(4, largest, (10,), True).timed_chunk(row_s) == rows
+
+
+def test_chunks_of_a_plan_cover_its_rows_and_end_with_the_last():
+    plan = Plan(4, 8, (8, 10), False)
+    assert [[job.number for job in plan.chunks(3, rows)] for rows in (0, 1, 4, 5, 8, 10)] == [
+        [], [0], [0], [0, 1], [0, 1], [0, 1, 2],
+    ]  # fmt: skip
+    assert {job.cell for job in plan.chunks(3, 9)} == {3}
+    assert [plan.rows_of(number) for number in (0, 1, 2)] == [range(0, 4), range(4, 8), range(8, 10)]

@@ -1,6 +1,8 @@
 """Statistics of rows: quantiles against those of NumPy, and every interval against how often it holds the truth."""
 
 import math
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,7 +10,9 @@ from numpy.testing import assert_allclose
 from scipy import stats
 
 from microrad.campaign.definition.outputs import OUTPUTS
-from microrad.campaign.records import Progress
+from microrad.campaign.records import Chunk, Failed, Limit, Progress
+from microrad.campaign.statistics import summary
+from microrad.campaign.statistics.cell import CellRows, _missed
 from microrad.campaign.statistics.intervals import (
     Moments,
     _tails,
@@ -22,8 +26,9 @@ from microrad.campaign.statistics.intervals import (
     quantile_interval,
     share_interval,
 )
-from microrad.campaign.statistics.summary import progress
+from microrad.campaign.statistics.summary import _sample, progress
 from microrad.core.arrays import Floats
+from microrad.mirror import Variant
 from truths import philox
 
 SHARES = (0.0, 1e-3, 0.01, 0.3, 0.5, 0.9, 0.997, 0.9999, 1.0)
@@ -282,3 +287,208 @@ def test_a_rare_share_does_not_hang_on_heavy_rows_far_from_it(seed: int) -> None
     assert missed.low < 1.0 - truth < missed.high and missed.value == pytest.approx(1.0 - found.value, abs=1e-15)
     alone = np.sum(weight * hit) / np.sum(weight)
     assert abs(found.value / truth - 1.0) < 0.25 and abs(alone / truth - 1.0) > abs(found.value / truth - 1.0)
+
+
+# ------------------------------------------------------------------------------------------------ of a whole campaign
+@pytest.mark.parametrize(
+    ("done", "notes", "written", "wanted"),
+    [
+        (0, {}, False, Progress(0, 64, 0.0, math.nan, math.nan, "waiting")),
+        (0, {"seconds": 2.0, "state": "running"}, True, Progress(0, 64, 2.0, 0.0, math.nan, "running")),
+        (64, {"seconds": 8.0, "state": "running"}, True, Progress(64, 64, 8.0, 8.0, 0.0, "running")),
+        (80, {"seconds": 8.0, "state": "stopped"}, False, Progress(80, 80, 8.0, 10.0, 0.0, "stopped")),
+        (80, {"seconds": 8.0, "state": "complete"}, True, Progress(80, 80, 8.0, 10.0, 0.0, "complete")),
+        (32, {"seconds": 8.0, "state": "stopped"}, True, Progress(32, 64, 8.0, 4.0, 8.0, "stopped")),
+        (32, {"seconds": 0.0, "state": "waiting"}, False, Progress(32, 64, 0.0, math.nan, math.nan, "waiting")),
+    ],
+)
+def test_the_pace_is_that_of_the_rows_in_their_time(done, notes, written, wanted) -> None:
+    found = progress(done, 64, notes, written)
+    for name in ("rows_done", "rows_total", "seconds", "rows_per_s", "left_s", "state"):
+        assert getattr(found, name) == getattr(wanted, name) or math.isnan(getattr(wanted, name)), name
+        assert str(getattr(found, name)) == str(getattr(wanted, name))
+
+
+def a_chunk(number: int, rows, failed=(), weight=None, survival=(), **columns) -> Chunk:
+    size = len(rows)
+    weights = np.ones(size) if weight is None else np.array(weight, dtype=float)
+    given = {name: np.array(each, dtype=float) for name, each in columns.items()}
+    sums = np.array(survival, dtype=float)
+    lost = tuple(Failed(row, 1, 1, "lost") for row in failed)
+    return Chunk(0, number, {"row": np.array(rows, dtype=float), "weight": weights, **given}, lost, sums, sums**2)
+
+
+def a_campaign(outputs=("margin",), **changes):
+    table = {"tail": None, "loop": None, "sampling": "random", "precision": None}
+    given = {
+        "cells": [SimpleNamespace(values={"distance": "40000 km"}), SimpleNamespace(values={})],
+        "outputs": [OUTPUTS[name] for name in outputs],
+        "limits": (Limit("margin", 3.0, None, "campaign file"),),
+        "inputs": (SimpleNamespace(key="power"),),
+        "block": 2,
+        "half_width": 0.0,
+        "warnings": (),
+        "draws": (),
+    }
+    return SimpleNamespace(**(given | changes), table=SimpleNamespace(**table))
+
+
+def test_chunks_in_any_order_are_the_rows_of_a_cell_in_theirs() -> None:
+    parts = [
+        a_chunk(1, [4, 5], [5], margin=[4.0, math.nan], survival=[1.0, 2.0]),
+        a_chunk(0, [0, 2], [2], margin=[1.0, math.nan], survival=[10.0, 20.0]),
+        a_chunk(2, [1, 9], [9, 1], margin=[2.0, 3.0]),  # without a run in time
+    ]
+    for order in ((0, 1, 2), (2, 1, 0), (1, 2, 0)):
+        cell = CellRows(a_campaign(), 0, [parts[k] for k in order])
+        whole = cell.whole()
+        assert whole is not None
+        assert whole.columns["row"].tolist() == [0, 1, 2, 4, 5, 9]
+        np.testing.assert_array_equal(whole.columns["margin"], [1.0, 2.0, math.nan, 4.0, math.nan, 3.0])
+        assert [each.row for each in whole.failed] == [1, 2, 5, 9]
+        assert (whole.survival.tolist(), whole.survival_square.tolist()) == ([11.0, 22.0], [101.0, 404.0])
+        assert (cell.rows, cell.failed) == (6, 4)
+        cell.take(a_chunk(3, [10], margin=[7.0], survival=[0.0, 1.0]))
+        again = cell.whole()
+        assert again is not None and again.columns["row"].tolist() == [0, 1, 2, 4, 5, 9, 10]
+        assert again.survival.tolist() == [11.0, 23.0]
+    assert CellRows(a_campaign(), 0).whole() is None
+    assert CellRows(a_campaign(), 0).rows == CellRows(a_campaign(), 0).failed == CellRows(a_campaign(), 0).worth == 0
+
+
+@pytest.mark.parametrize(
+    ("least", "most", "missed"),
+    [
+        (3.0, None, [1.0, 0.0, 0.0, math.nan]),
+        (None, 3.0, [0.0, 0.0, 1.0, math.nan]),
+        (3.0, 3.5, [1.0, 0.0, 1.0, math.nan]),
+        (None, None, [0.0, 0.0, 0.0, math.nan]),
+    ],
+)
+def test_a_value_at_its_limit_keeps_it(least, most, missed) -> None:
+    values = np.array([2.9, 3.0, 4.0, math.nan])
+    np.testing.assert_array_equal(_missed(Limit("margin", least, most, ""), values), missed)
+
+
+def test_a_row_misses_its_limits_where_it_misses_any_of_them() -> None:
+    limits = (Limit("margin", 3.0, None, ""), Limit("data_rate", None, 5.0, ""))
+    campaign = a_campaign(("margin", "data_rate"), limits=limits)
+    chunk = a_chunk(0, range(5), [4], margin=[2, 4, 4, 2, math.nan], data_rate=[4, 6, 4, 6, math.nan])
+    found = CellRows(campaign, 0, [chunk]).summary()
+    assert (found.missed.value, found.missed_by["margin"].value, found.missed_by["data_rate"].value) == (0.75, 0.5, 0.5)
+    assert (found.rows, found.failed, found.values, found.tail) == (5, 1, {"distance": "40000 km"}, None)
+    assert list(found.outputs) == ["margin", "data_rate"]
+    assert CellRows(campaign, 0, [chunk]).summary(()).outputs == {}
+    nothing = CellRows(campaign, 1).summary()
+    assert (nothing.rows, nothing.outputs, nothing.missed_by, nothing.label) == (0, {}, {}, "")
+    assert math.isnan(nothing.missed.value)
+
+
+def test_rows_are_worth_their_weights_over_the_heaviest() -> None:
+    chunk = a_chunk(0, range(4), [3], weight=[1.0, 2.0, 2.0, 9.0], margin=[1.0, 2.0, 3.0, math.nan])
+    assert CellRows(a_campaign(), 0, [chunk]).worth == pytest.approx(25.0 / 9.0)
+    lost = a_chunk(0, [0], [0], margin=[math.nan])
+    assert CellRows(a_campaign(), 0, [lost]).worth == 0.0
+
+
+def test_a_quantile_is_precise_up_to_its_half_width() -> None:
+    chunk = a_chunk(0, range(400), margin=philox(23).normal(size=400))
+    in_order = ordered(chunk.columns["margin"])
+    band = quantile_interval(in_order, 0.9, 0.95)
+    half = (band.high - band.low) / 2.0
+    for asked, enough in ((half, True), (half * (1 - 1e-9), False), (half * 2, True)):
+        campaign = a_campaign(half_width=asked)
+        campaign.table.precision = SimpleNamespace(output="margin", quantile=0.9, confidence=0.95)
+        cell = CellRows(campaign, 0, [chunk])
+        assert cell.is_precise() is enough
+        said = cell.precision_words()
+        assert said.startswith("90 % quantile of margin with distance = 40000 km: ")
+        assert ("NOT as precise" in said) is not enough and "at 95 % confidence" in said
+        assert not CellRows(campaign, 0).is_precise() and CellRows(campaign, 0).precision_words() == ""
+        lost = CellRows(campaign, 0, [a_chunk(0, [0], [0], margin=[math.nan])])
+        assert not lost.is_precise() and lost.precision_words() == ""
+        few = CellRows(campaign, 0, [a_chunk(0, range(3), margin=[1.0, 2.0, 3.0])])
+        assert not few.is_precise() and "unknown" in few.precision_words()  # so few rows have no upper end
+    assert not CellRows(a_campaign(), 0, [chunk]).is_precise()
+    assert CellRows(a_campaign(), 0, [chunk]).precision_words() == ""
+
+
+@pytest.mark.parametrize(("each", "every"), [(2000, 1), (2001, 2), (4000, 2), (4001, 3)])
+def test_a_sample_is_of_every_so_many_rows_of_each_cell(each, every) -> None:
+    campaign = a_campaign()
+    cells = [CellRows(campaign, k, [a_chunk(0, range(each), margin=np.arange(each) + k)]) for k in range(2)]
+    found = _sample(cells)
+    rows = np.arange(0, each, every)
+    np.testing.assert_array_equal(found["row"], np.tile(rows, 2))
+    np.testing.assert_array_equal(found["cell"], np.repeat([0.0, 1.0], rows.size))
+    np.testing.assert_array_equal(found["margin"], np.concatenate([rows, rows + 1]))
+    assert _sample([CellRows(campaign, 0)]) == {}
+    alone = _sample([CellRows(campaign, 0), cells[1]])  # the other cell has no rows yet
+    assert set(alone["cell"]) == {1.0} and alone["row"].size == math.ceil(each / max(math.ceil(each / 4000), 1))
+
+
+def test_sensitivities_are_of_limited_outputs_over_equal_rows_of_drawn_inputs(monkeypatch) -> None:
+    monkeypatch.setattr(summary, "sensitivity", lambda inputs, values, name: (name, *inputs, values.sum()))
+    chunk = a_chunk(0, range(3), margin=[1, 2, 3], data_rate=[4, 5, 6], power=[7, 8, 9])
+    twice = (*(Limit(name, 1.0, None, "") for name in ("data_rate", "margin", "data_rate")),)
+    campaign = a_campaign(("margin", "data_rate"), limits=twice)
+
+    def found(of, *chunks):
+        return summary._sensitivities(of, CellRows(of, 0, chunks))
+
+    assert found(campaign, chunk) == (("data_rate", "power", 15.0), ("margin", "power", 6.0))
+    assert found(campaign) == found(a_campaign(limits=()), chunk) == found(a_campaign(inputs=()), chunk) == ()
+    weighted = replace(chunk, columns={**chunk.columns, "weight": np.array([1.0, 1.0, 1.1])})
+    assert found(campaign, weighted) == ()
+
+
+@pytest.mark.parametrize(
+    ("limits", "rows"),
+    [
+        ((), [3, 2, 1, 4]),
+        ((Limit("margin", 1.0, None, ""),), [3, 2, 1, 4]),
+        ((Limit("residual", None, 1.0, ""), Limit("margin", 1.0, None, "")), [1, 2, 3, 4]),
+        ((Limit("margin", 1.0, 2.0, ""),), [1, 2, 3, 4]),
+        ((Limit("margin", 1.0, None, ""), Limit("residual", None, 1.0, "")), [3, 2, 1, 4]),
+    ],
+)
+def test_the_worst_is_the_largest_where_the_first_limit_is_a_most(limits, rows) -> None:
+    traces = [
+        SimpleNamespace(cell=c, row=r, value=v) for c, r, v in ((1, 4, 0.5), (0, 2, 2.0), (0, 3, 1.0), (0, 1, 3.0))
+    ]
+    found = summary._worst_first(limits, traces)
+    assert [(each.cell, each.row) for each in found] == [(int(row == 4), row) for row in rows]
+    same = [SimpleNamespace(cell=0, row=r, value=1.0) for r in (5, 2, 9)]
+    assert [each.row for each in summary._worst_first(limits, same)] == [2, 5, 9]
+
+
+def test_what_is_said_of_rows_lost_extrapolated_and_weighted() -> None:
+    campaign = a_campaign(warnings=("of the file",))
+    plain = CellRows(campaign, 0, [a_chunk(0, range(3), margin=[1, 2, 3], outside_share=[0, 0, 0])])
+    assert summary._warnings(campaign, [plain]) == ("of the file",)
+    lost = CellRows(campaign, 1, [a_chunk(0, range(2), [1], margin=[1, math.nan], outside_share=[0, 0.1])])
+    _, failed, outside = summary._warnings(campaign, [plain, lost])
+    assert failed == "1 of 5 rows have no result; the figures are those of the others."
+    assert "the drive leaves the range" in outside
+    fast = CellRows(campaign, 0, [a_chunk(0, range(2), margin=[1, 2], beyond_rate_share=[0, 1e-9])])
+    assert [("moves faster" in each) for each in summary._warnings(campaign, [fast])] == [False, True]
+    drawn = a_campaign(draws=(SimpleNamespace(drawn_as=None), SimpleNamespace(drawn_as=object())))
+    whole = a_chunk(0, range(2), [1], margin=[1, math.nan])
+    cells = [CellRows(drawn, 0, [a_chunk(0, range(4), margin=[1, 2, 3, 4])]), CellRows(drawn, 1, [whole])]
+    assert "worth 1 equal ones" in summary._warnings(drawn, cells)[-1]  # the cell that is worth least
+    none = CellRows(drawn, 1, [a_chunk(0, [0], [0], margin=[math.nan])])
+    assert "worth 4 equal ones" in summary._warnings(drawn, [cells[0], none])[-1]  # not one without a row
+    even = a_campaign(draws=(SimpleNamespace(drawn_as=None),))
+    assert summary._warnings(even, [plain]) == ()
+
+
+@pytest.mark.parametrize(
+    ("axes", "mirror", "runs", "words"),
+    [
+        ("one", Variant.GIVEN, 1, "PI, one axis, 1 run a row"),
+        ("both", Variant.COMPARISON, 2, "PI, both axes, mirror: comparison, 2 runs a row"),
+        ("both", Variant.STRAIGHT, 64, "PI, both axes, mirror: no hysteresis, 64 runs a row"),
+    ],
+)
+def test_the_loop_of_a_campaign_in_words(axes, mirror, runs, words) -> None:
+    assert summary._loop_words(SimpleNamespace(controller="PI", axes=axes, mirror=mirror), runs) == words

@@ -387,3 +387,75 @@ def test_an_uncorrected_point_ahead_takes_its_part_of_what_the_link_bears(monkey
     assert found.outage_loss_db == pytest.approx(float(fall.loss_db(7e-6)), rel=1e-12)
     assert found.short_of(0.0) == pytest.approx(fall.error_rad(on_axis) - ahead, rel=1e-9)
     assert found.short_of(3.0) == pytest.approx(fall.error_rad(on_axis - 3.0) - ahead, rel=1e-9)
+
+
+# ---------------------------------------------------------------------------------------------- where a share is met
+@pytest.mark.parametrize(
+    ("falling", "probability", "radius"),
+    [
+        ([1.0, 0.5, 0.25], 1.0, 0.0),  # at the first radius, and not before it
+        ([1.0, 0.5, 0.25], 0.5, 1.0),
+        ([1.0, 0.5, 0.25], 0.25, 2.0),
+        ([1.0, 0.5, 0.25], 0.24, math.nan),
+        ([0.5, 0.25, 0.1], 0.51, math.nan),
+        ([1.0, 0.25, 0.1], 0.5, math.sqrt(0.5)),  # its logarithm is linear in the square
+        ([1.0, 0.5, 0.0], 0.25, math.sqrt(1.0 + 0.5 * 3.0)),  # beside a share of 0 it is itself linear
+        ([1.0, 1.0, 0.5], 1.0, 1.0),
+        ([0.5, 0.5, 0.5], 0.5, 1.0),
+        ([], 0.5, math.nan),
+        ([0.3], 0.3, 0.0),
+    ],
+)
+def test_the_radius_of_a_share_is_where_the_falling_share_meets_it(falling, probability, radius) -> None:
+    found = tails._crossing(np.arange(float(len(falling))), np.array(falling), probability)
+    assert found == pytest.approx(radius, rel=1e-12, nan_ok=True)
+
+
+@pytest.mark.parametrize(
+    ("share", "size", "held"),
+    [
+        ([0.9, 0.5, 0.1, 0.01], [100.0, 100.0, 300.0, 900.0], [100.0, 100.0, 300.0, 300.0]),
+        ([0.9, 0.5, 0.1, 0.01], [400.0, 100.0, 150.0, 900.0], [400.0, 100.0, 100.0, 100.0]),  # too few events at 0.1
+        ([0.9, 0.5, 0.1, 0.01], [400.0, 100.0, 150.0, 50.0], [400.0, 100.0, 100.0, 50.0]),  # never made larger
+        ([0.99, 0.9, 0.5, 0.1], [900.0, 500.0, 40.0, 10.0], [500.0, 500.0, 40.0, 10.0]),  # few misses at 0.99
+        ([0.5, 0.1], [30.0, 9.0], [30.0, 9.0]),  # nowhere enough events
+        ([1.0, 0.5, 0.0], [math.nan, 40.0, math.nan], [40.0, 40.0, 40.0]),
+    ],
+)
+def test_the_errors_that_a_share_is_worth_are_held_where_few_events_are_left(share, size, held) -> None:
+    np.testing.assert_array_equal(tails._held(np.array(share), np.array(size)), held)
+
+
+def test_the_rest_of_a_falling_share_is_no_more_and_its_ends_follow() -> None:
+    share, low, high = tails._falling(
+        np.array([0.9, 0.4, 0.5, 0.1]), np.array([0.8, 0.2, 0.3, -0.1]), np.array([1.2, 0.6, 0.5, 0.7])
+    )
+    assert share.tolist() == [0.9, 0.4, 0.4, 0.1]
+    assert low.tolist() == [0.8, 0.3, 0.3, 0.0]
+    assert high.tolist() == [1.0, 0.6, 0.5, 0.5]
+
+
+@pytest.mark.parametrize(
+    ("error", "value", "low", "high"),
+    [
+        (0.5, 0.9, 0.8, 1.0),  # before all draws
+        (1.0, 0.5, 0.4, 0.95),  # a draw at the error is not larger
+        (1.5, 0.5, 0.4, 0.95),
+        (2.5, 0.1, 0.05, 0.6),
+        (3.0, 0.0, 0.0, 0.2),
+        (9.0, 0.0, 0.0, 0.2),
+    ],
+)
+def test_what_is_beyond_an_error_counts_the_draws_that_are_larger(error, value, low, high) -> None:
+    band = tails._Band(*(np.array(each) for each in ([0.9, 0.5, 0.1], [0.8, 0.4, 0.05], [0.95, 0.6, 0.2], [9.0] * 3)))
+    assert tails._beyond(np.array([1.0, 2.0, 3.0]), band, error, 0.99) == Interval(value, low, high, 0.99)
+
+
+def test_the_worth_of_a_tail_is_that_of_its_smallest_known_probability() -> None:
+    band = tails._Band(np.array([1.0, 0.5, 0.1]), np.zeros(3), np.ones(3), np.array([7.0, 8.0, 9.0]))
+    known, unknown = Interval(1.0, 0.0, 2.0, 0.99), Interval(math.nan, 0.0, 2.0, 0.99)
+    assert tails._effective(band, {0.6: known, 0.2: known}) == 8.0
+    assert tails._effective(band, {0.6: known, 0.2: unknown}) == 7.0
+    assert tails._effective(band, {1.0: known}) == 7.0
+    assert tails._effective(band, {0.05: known}) == 9.0
+    assert math.isnan(tails._effective(band, {0.2: unknown})) and math.isnan(tails._effective(band, {}))

@@ -4,6 +4,7 @@ import math
 import re
 from dataclasses import replace
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -761,3 +762,38 @@ def test_a_mission_without_what_a_contact_needs_is_refused(file, run, finding):
     beam = file.mission.communication.model_copy(update={"data_rate_bit_s": math.nan})
     with pytest.raises(ValueError, match='"largest" has to be solved for first'):
         run(contact(), settings(), mission=file.mission.model_copy(update={"communication": beam}))
+
+
+@pytest.mark.parametrize("missing", ["", "table", "acquisition", "finding", "loop", "contacts"])
+def test_a_contact_runs_where_the_mission_has_all_that_it_needs(monkeypatch, missing):
+    asked = SimpleNamespace(slew_angle_rad=1.0, slew_rate_rad_s=0.1, windows=3, window_s=2.0, hold_s=0.5, number=2)
+    contacts = [SimpleNamespace(start_s=10.0 * k, end_s=10.0 * k + 5.0, begins=f"b{k}", ends=f"e{k}") for k in (1, 2)]
+    day = SimpleNamespace(
+        relay=SimpleNamespace(contacts=[] if missing == "contacts" else contacts),
+        view=SimpleNamespace(pair=SimpleNamespace(span_s=(-7.0, 90.0))),
+    )
+    fine = SimpleNamespace(
+        scene=SimpleNamespace(table=SimpleNamespace(settle_s=0.3)), best=SimpleNamespace(design="the best")
+    )
+    monkeypatch.setattr(sequence, "run_contact", lambda *given: given)
+
+    def ran(number):
+        asked.number = number
+        return sequence.of_mission(
+            SimpleNamespace(contact=None if missing == "table" else asked, seed=5, acquisition="scan"),
+            None if missing == "acquisition" else SimpleNamespace(attempts=4),
+            "the link",
+            day,
+            None if missing == "finding" else "the acquisition",
+            None if missing == "loop" else fine,
+        )
+
+    if missing:
+        assert ran(1) is None
+        return
+    data, found, scene, design, of, how = ran(2)
+    assert (data, found, scene, design) == ("the link", "the acquisition", fine.scene, "the best")
+    assert (of.start_s, of.end_s, of.begins, of.ends, of.free_from_s) == (20.0, 25.0, "b2", "e2", 15.0)
+    assert (how.seed, how.attempts, how.way, how.settle_s, how.hold_s, how.window_s) == (5, 4, "scan", 0.3, 0.5, 2.0)
+    assert (how.slew_angle_rad, how.slew_rate_rad_s, how.windows) == (1.0, 0.1, 3)
+    assert ran(1)[4].free_from_s == -7.0  # before the first the body is free from the beginning
