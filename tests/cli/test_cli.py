@@ -4,6 +4,7 @@ import ctypes
 import errno
 import importlib
 import json
+import math
 import os
 import pkgutil
 import shlex
@@ -14,6 +15,7 @@ import time
 from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
@@ -24,7 +26,7 @@ from nptdms import ChannelObject, TdmsWriter
 import microrad
 from command_line import listing
 from microrad import cli, report
-from microrad.cli import frame, installation, lab
+from microrad.cli import frame, installation, lab, recordings
 from microrad.lab import identify
 from microrad.loop import control, controller_study
 from microrad.loop.controller_study import designs
@@ -1078,3 +1080,144 @@ def test_without_a_stderr_progress_goes_nowhere(monkeypatch):
     monkeypatch.setattr(sys, "stderr", None)
     with frame.progress_bar(0.0) as progress:
         progress(1, 2, "rows")
+
+
+# ------------------------------------------------------------------------------------------------- parts of the frame
+@pytest.mark.parametrize(("met", "closes"), [(True, False), (False, True), (True, True), (False, False)])
+def test_the_exit_code_says_what_it_was_asked_to_judge(met, closes):
+    assert frame.Judged.REQUIREMENTS.code(met=met, closes=closes) == (0 if met else 1)
+    assert frame.Judged.CLOSES.code(met=met, closes=closes) == (0 if closes else 1)
+
+
+def test_what_is_no_finite_number_is_null_wherever_it_stands():
+    data = {"a": [1.5, math.nan, (math.inf, -math.inf)], "b": {"c": math.nan, "d": True}, "e": "nan", "f": 3, "g": None}
+    found = {"a": [1.5, None, [None, None]], "b": {"c": None, "d": True}, "e": "nan", "f": 3, "g": None}
+    assert json.loads(frame.json_text(data)) == found
+
+
+def test_a_line_of_progress_is_said_in_every_interval_and_none_in_the_first(monkeypatch, capsys):
+    now = SimpleNamespace(s=100.0)
+    monkeypatch.setattr(frame, "time", SimpleNamespace(monotonic=lambda: now.s))
+    progress = frame._progress_lines(10.0)
+    for second in (100.0, 109.9, 110.0, 119.9, 120.0, 121.0):
+        now.s = second
+        progress(int(second), 200, "rows")
+    assert capsys.readouterr().err.splitlines() == ["microrad: 110 of 200: rows", "microrad: 120 of 200: rows"]
+
+
+def test_a_record_of_progress_is_left_out_only_within_a_phase_and_never_the_last(monkeypatch, tmp_path):
+    now = SimpleNamespace(s=100.0)
+    monkeypatch.setattr(frame, "time", SimpleNamespace(monotonic=lambda: now.s, time=lambda: now.s + 0.00049))
+    steps = [
+        (100.0, 0, 9, "a", True),
+        (100.1, 1, 9, "a", False),
+        (100.21, 2, 9, "a", True),
+        (100.3, 3, 9, "b", True),
+        (100.31, 3, 8, "b", True),
+        (100.32, 4, 8, "b", False),
+        (100.33, 8, 8, "b", True),
+    ]
+    with (tmp_path / "progress").open("ab", buffering=0) as file:
+        progress = frame._progress_records(file)
+        for now.s, done, total, what, _ in steps:
+            progress(done, total, what)
+    found = [json.loads(line) for line in (tmp_path / "progress").read_text().splitlines()]
+    assert found == [
+        {"at": round(at_s, 3), "done": done, "total": total, "what": what}
+        for at_s, done, total, what, kept in steps
+        if kept
+    ]
+
+
+@pytest.mark.parametrize(("size", "begins_anew"), [(frame._PROGRESS_BYTES, False), (frame._PROGRESS_BYTES + 1, True)])
+def test_a_long_file_of_progress_begins_anew(tmp_path, size, begins_anew):
+    path = tmp_path / "progress"
+    path.write_bytes(b"\n" * size)
+    with path.open("ab", buffering=0) as file:
+        frame._progress_records(file)(1, 2, "rows")
+    assert (path.stat().st_size < size) is begins_anew
+    assert json.loads(path.read_text().strip())["done"] == 1
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "said"),
+    [
+        (KeyboardInterrupt(), 130, "interrupted, nothing was written"),
+        (KeyboardInterrupt("stopped at row 3"), 130, "stopped at row 3"),
+        (
+            OSError(errno.ENOSPC, "No space left", "out.csv"),
+            2,
+            "out.csv: No space left; nothing was written there. Check",
+        ),
+        (OSError("gone"), 2, "microrad: gone; nothing was written. Check free space"),
+        (frame.Refusal("give a file"), 2, "microrad: give a file\n"),
+        (MemoryError(), 2, "not enough memory"),
+        (MemoryError("too many rows"), 2, "too many rows"),
+        (ValueError("of a library"), 70, "a fault of microrad or of its installation"),
+        (TypeError("no"), 70, "a fault of microrad or of its installation"),
+    ],
+)
+def test_each_kind_of_failure_has_its_exit_code_and_its_words(capsys, error, code, said):
+    assert frame._failed(error) == code
+    err = capsys.readouterr().err
+    assert said in err and err.startswith("microrad: " if code != frame.BUG else f"{type(error).__name__}: ")
+
+
+def test_an_error_of_ours_is_an_answer_where_it_is_a_value_error_and_an_interrupted_import_is_none(capsys):
+    of_microrad = {"__module__": "microrad.somewhere"}
+    answer, fault = (type("Odd", (kind,), of_microrad)("not so") for kind in (ValueError, RuntimeError))
+    assert (frame._failed(answer), frame._failed(fault)) == (frame.REFUSED, frame.BUG)
+    capsys.readouterr()
+    broken = ImportError("half a module")
+    broken.__cause__ = KeyboardInterrupt()
+    assert frame._failed(broken) == frame.INTERRUPTED
+    assert capsys.readouterr().err == "microrad: interrupted, nothing was written\n"
+
+
+def test_an_error_behind_which_an_interrupt_stands_is_one():
+    for link in ("__cause__", "__context__"):
+        first, second = ValueError(), ImportError()
+        setattr(first, link, second)
+        assert not frame.interrupted(first)
+        setattr(second, link, KeyboardInterrupt())
+        assert frame.interrupted(first)
+    assert not frame.interrupted(None)
+
+
+@pytest.mark.parametrize(("columns", "width"), [("60", 80), ("80", 80), ("133", 133)])
+def test_tables_are_as_wide_as_the_terminal_and_at_least_eighty_columns(monkeypatch, columns, width):
+    monkeypatch.setenv("COLUMNS", columns)
+    assert frame.width() == width
+
+
+def made_up(inputs, outputs):
+    return SimpleNamespace(drive=np.zeros((2, inputs)), output=np.zeros((2, outputs)))
+
+
+@pytest.mark.parametrize(("inputs", "outputs", "several"), [(1, 1, False), (2, 1, True), (1, 2, True)])
+@pytest.mark.parametrize("validation", [False, True])
+def test_recordings_have_several_channels_where_any_has(inputs, outputs, several, validation):
+    plain, other = made_up(1, 1), made_up(inputs, outputs)
+    given = recordings.Given((plain,), (other,)) if validation else recordings.Given((plain, other), ())
+    assert (given.channels, given.several_channels) == ((inputs, outputs), several)
+    assert given.every == (plain, other)
+
+
+@pytest.mark.parametrize("places", [None, 1, 2, 3])
+def test_there_is_a_position_for_each_output_or_none(monkeypatch, places):
+    from microrad.lab import recording
+
+    together = []
+    monkeypatch.setattr(recording, "check_together", lambda *parts: together.append(parts))
+    positions = None if places is None else ((0.0, 0.0),) * places
+    given = recordings.Given((made_up(1, 2),), (), positions_m=positions)
+    if places in (None, 2):
+        assert recordings._together(given) is given
+    else:
+        with pytest.raises(frame.Refusal, match=f"--position is given {places} times and there are 2 outputs"):
+            recordings._together(given)
+    assert together == [(given.recordings, ())]
+    alone = recordings.Given((made_up(1, 1),), ())
+    assert recordings._together(alone) is alone and len(together) == 1
+    with pytest.raises(frame.Refusal, match="every recording is for validation: leave one to be fitted"):
+        recordings._together(recordings.Given((), (made_up(1, 1),)))
