@@ -126,6 +126,9 @@ def test_still_air_shows_no_turbulence(study, tmp_path):
     shown = views_text([ground.ground_view(with_ground(study, g))], 80)
     assert "Communication over elevation" in shown
     assert not any(word in shown for word in ("r0", "index", "Turbulence on the path", "convention", "fades  "))
+    for each in g.elevations:
+        row = next(line for line in shown.split("\n") if line.startswith(f" {each.elevation_rad / deg:.0f} deg"))
+        assert row.split()[-2:] == signed(each.margin_db, "dB").split()
     (sky,) = [line for line in budget.lines if line.name == "Clear-sky loss"]
     assert sky.warning == "turbulence is not in this budget: scintillation and beam wander come on top"
     assert "no turbulence" in sky.regime
