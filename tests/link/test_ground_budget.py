@@ -266,6 +266,16 @@ def test_the_study_has_the_same_margin_as_its_tornado_and_its_figures(study):
     assert study.under_jitter.fade_warning == "fades are not counted: those of the air have no spectrum here"
 
 
+def test_the_static_margin_beside_a_jitter_is_that_of_a_file_without_it(study, tmp_path):
+    """What fades add to the losses of a jitter is less than what they take alone."""
+    alone = link.of(ground_file(tmp_path, {"jitter": None}).mission)
+    line = study.communication.totals[-1]
+    assert line.name == "Static margin"
+    assert line.value == pytest.approx(outage.margin_db(alone), abs=1e-9)
+    assert line.value == pytest.approx(link.communication_budget(alone, {}).margin_db, abs=1e-9)
+    assert alone.fade_db > study.data.fade_db + 0.5
+
+
 def test_air_that_hardly_moves_light_costs_what_still_air_costs(tmp_path, monkeypatch):
     whole = HufnagelValley.strength
     monkeypatch.setattr(HufnagelValley, "strength", lambda profile, height: 1e-14 * whole(profile, height))
