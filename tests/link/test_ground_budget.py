@@ -192,6 +192,21 @@ def test_an_uplink_is_the_sum_of_its_lines_by_hand(tmp_path):
     assert answer["Clear-sky loss"] == pytest.approx(-clear_db(1.06e-6, MASS), abs=1e-3)
 
 
+def test_air_takes_of_the_irradiance_above_it_and_nothing_of_what_leaves_the_terminal(tmp_path):
+    """A far-field test of the terminal measures no spread; the irradiance at the satellite has it, and no fades."""
+    budgets = []
+    for air in ({}, STILL):
+        data = link.of(ground_file(tmp_path, STATIC, RISING, air).mission)
+        budgets.append(link.communication_budget(data, {}))
+    moved, still = budgets
+    assert moved.radiant_intensity_w_sr == pytest.approx(still.radiant_intensity_w_sr, rel=1e-12)
+    spread = moved.loss_db("Turbulence spread loss")
+    assert lg(still.irradiance_w_m2 / moved.irradiance_w_m2) == pytest.approx(spread, abs=1e-9)
+    fade = moved.loss_db("Turbulence fade")
+    assert still.margin_db - moved.margin_db == pytest.approx(spread + fade, abs=1e-9)
+    assert spread > 1.0 and fade > 1.0
+
+
 def test_a_fade_stands_at_the_outage_of_the_mission(tmp_path):
     index = Path(1.55e-6).averaged_index(0.4)
     for share in (0.1, 1e-4):
@@ -261,6 +276,16 @@ def test_the_study_has_the_same_margin_as_its_tornado_and_its_figures(study):
     assert {"channel.absorption", "answer.wavelength", "requirement.outage"} <= {each.key for each in answer.swings}
     assert math.isnan(study.under_jitter.fades_per_s)
     assert study.under_jitter.fade_warning == "fades are not counted: those of the air have no spectrum here"
+
+
+def test_the_static_margin_beside_a_jitter_is_that_of_a_file_without_it(study, tmp_path):
+    """What fades add to the losses of a jitter is less than what they take alone."""
+    alone = link.of(ground_file(tmp_path, {"jitter": None}).mission)
+    line = study.communication.totals[-1]
+    assert line.name == "Static margin"
+    assert line.value == pytest.approx(outage.margin_db(alone), abs=1e-9)
+    assert line.value == pytest.approx(link.communication_budget(alone, {}).margin_db, abs=1e-9)
+    assert alone.fade_db > study.data.fade_db + 0.5
 
 
 def test_air_that_hardly_moves_light_costs_what_still_air_costs(tmp_path, monkeypatch):

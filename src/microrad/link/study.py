@@ -244,9 +244,10 @@ def communication_budget(data: link.DataLink, sources: Mapping[str, Source]) -> 
     Raises:
         ValueError: For a data rate that the receiver does not take.
     """
-    static = link.communication_budget(data, sources)
     if data.jitter is None:
-        return static
+        return link.communication_budget(data, sources)
+    alone = data if data.turbulent is None else link.assembled(data.shared, data.table, data.requirement, None)
+    static = link.communication_budget(alone, sources)  # what fades add to a jitter is not what they take alone
     stated = source_text(sources, "jitter.bias", "jitter.rms", "requirement.outage")
     given = f"error that the jitter exceeds for {100 * stated_outage(data.requirement):g} % of the time: {stated}"
     found = link.communication_budget(data, sources, pointing_error_rad=error_rad(data), given_source=given)
