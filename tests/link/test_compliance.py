@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -407,3 +408,95 @@ def test_the_rows_stand_in_the_order_of_the_standard_and_are_counted(studied):
     assert [each.asked for each in found.held] == list(SDA.requirements)
     words = ("meets", "does not meet", "not said", "outside microrad")
     assert [found.count(word) for word in words] == [5, 2, 7, 3]
+
+
+# ------------------------------------------------------------------------------------------------- limits, one by one
+STEP = 1e-6  # far beyond rounding
+
+
+@pytest.mark.parametrize(
+    ("comparison", "values", "value", "met"),
+    [
+        ("at least", (2.0,), 2.0 - STEP, False),
+        ("at least", (2.0,), 3.0, True),
+        ("at most", (2.0,), 2.0 + STEP, False),
+        ("at most", (2.0,), 1.0, True),
+        ("between", (1.0, 2.0), 1.0, True),
+        ("between", (1.0, 2.0), 2.0, True),
+        ("between", (1.0, 2.0), 1.0 - STEP, False),
+        ("between", (1.0, 2.0), 2.0 + STEP, False),
+        ("between", (1.0, 2.0), 1.0 - 1e-10, True),
+        ("between", (1.0, 2.0), 2.0 + 1e-10, True),
+        ("on the grid", (5.0, 1.0), 0.0, True),
+        ("on the grid", (5.0, 1.0), -STEP, False),
+        ("one of", (0.5, 0.75), 0.75, True),
+        ("one of", (0.5, 0.75), 0.5, True),
+        ("one of", (0.5, 0.75), 0.7504, True),  # three decimals
+        ("one of", (0.5, 0.75), 0.7516, False),
+        ("one of", (0.5, 0.75), 0.6, False),
+    ],
+)
+def test_what_is_asked_for_holds_up_to_its_ends(comparison, values, value, met):
+    wanted = replace(asked("divergence"), comparison=comparison, values=values, texts=("a word",))
+    assert judge._met(wanted, judge._Has(value, "")) is met
+    assert judge._met(wanted, judge._Has(None, "", "a word")) and not judge._met(wanted, judge._Has(None, "", "other"))
+
+
+@pytest.mark.parametrize(
+    ("has", "judgement"),
+    [
+        (judge._Has(1.0, "why"), "meets"),
+        (judge._Has(3.0, "why"), "does not meet"),
+        (judge._Has(0.0, "why"), "meets"),  # a number like any other
+        (judge._Has(1.0, "why", certain=False), "not said"),
+        (judge._Has(None, "why", "a word"), "meets"),
+        (judge._Has(None, "why", "other"), "does not meet"),
+        (judge._Has(None, "why", "a word", certain=False), "not said"),
+        (judge._Has(None, "why"), "not said"),
+    ],
+)
+def test_a_number_or_a_word_is_judged_where_it_is_certain(monkeypatch, has, judgement):
+    wanted = replace(asked("divergence"), comparison="at most", values=(2.0,), texts=("a word",))
+    monkeypatch.setitem(judge._CHECKS, "divergence", lambda study, of: has)
+    found = judge._held(None, wanted)
+    assert (found.judgement, found.value, found.text, found.why) == (judgement, has.value, has.text, "why")
+    outside = judge._held(None, replace(wanted, outside="not looked at"))
+    assert (outside.judgement, outside.value, outside.why) == ("outside microrad", None, "not looked at")
+
+
+@pytest.mark.parametrize(
+    ("operations", "acquisition", "finding", "scanned", "scans"),
+    [
+        (True, "scan", True, True, True),
+        (True, "wide beacon", True, True, False),
+        (True, "scan", True, False, False),
+        (True, "scan", False, False, False),
+        (False, "", True, True, False),
+    ],
+)
+def test_a_mission_scans_where_it_says_so_and_has_a_scan(operations, acquisition, finding, scanned, scans):
+    o = SimpleNamespace(acquisition=acquisition) if operations else None
+    found = SimpleNamespace(scanned=object() if scanned else None) if finding else None
+    study = SimpleNamespace(file=SimpleNamespace(mission=SimpleNamespace(operations=o)), finding=found)
+    assert judge._scans(study) is scans
+
+
+@pytest.mark.parametrize(
+    ("text", "wavelength_m", "half_m"),
+    [
+        ('"1550 nm"', 1550e-9, 0.5e-9),
+        ('"1550.0 nm"', 1550e-9, 0.05e-9),
+        ('"1550.12 nm"', 1550.12e-9, 0.005e-9),
+        ('"1.55 um"', 1.55e-6, 0.005e-6),
+        ('"1.550e-6 m"', 1.55e-6, 0.0005e-6),
+        ('"0.155e-5 m"', 1.55e-6, 0.0005e-5),
+        ('"1550e-9 m"', 1550e-9, 0.5e-9),
+        ('"1550 nm"', 1551e-9, 0.0),  # it was changed since
+        ("largest", 1550e-9, 0.0),
+        (None, 1550e-9, 0.0),
+    ],
+)
+def test_half_a_unit_of_the_last_digit_is_what_the_text_leaves_open(text, wavelength_m, half_m):
+    sources = {} if text is None else {"communication.wavelength": SimpleNamespace(value=text)}
+    study = SimpleNamespace(file=SimpleNamespace(sources=sources))
+    assert judge._half_digit_m(study, wavelength_m) == pytest.approx(half_m, rel=1e-12, abs=0.0)

@@ -22,7 +22,7 @@ from microrad.loop.pointing_loop import ensemble, traces
 from microrad.loop.pointing_loop.loop import assemble
 from microrad.mission.file import LinkFile, load_mission
 from microrad.study.contact_run import sequence
-from microrad.study.contact_run.records import STATES, Contact, Loss, Settings, Sight
+from microrad.study.contact_run.records import STATES, Contact, ContactRun, Loss, Settings, Sight, State, Transition
 from microrad.study.contact_run.windows import MovingReference, Sampler, first_run, plan
 from scenes import scene_of
 from shipped import SHIPPED, edited_file
@@ -797,3 +797,199 @@ def test_a_contact_runs_where_the_mission_has_all_that_it_needs(monkeypatch, mis
     assert (how.seed, how.attempts, how.way, how.settle_s, how.hold_s, how.window_s) == (5, 4, "scan", 0.3, 0.5, 2.0)
     assert (how.slew_angle_rad, how.slew_rate_rad_s, how.windows) == (1.0, 0.1, 3)
     assert ran(1)[4].free_from_s == -7.0  # before the first the body is free from the beginning
+
+
+# -------------------------------------------------------------------------------------------- limits, one by one
+@pytest.mark.parametrize(
+    ("changes", "name"),
+    [
+        ({"slew_angle_rad": 0.0}, ""),
+        ({"slew_angle_rad": math.pi}, ""),
+        ({"slew_angle_rad": -1e-9}, "slew_angle_rad"),
+        ({"slew_angle_rad": math.pi + 1e-9}, "slew_angle_rad"),
+        ({"slew_rate_rad_s": 1e-9}, ""),
+        ({"slew_rate_rad_s": 0.0}, "slew_rate_rad_s"),
+        ({"slew_rate_rad_s": math.inf}, "slew_rate_rad_s"),
+        ({"windows": 1}, ""),
+        ({"windows": 100_000}, ""),
+        ({"windows": 0}, "windows"),
+        ({"windows": 100_001}, "windows"),
+        ({"window_s": 0.0, "hold_s": 0.0}, "window_s"),
+        ({"window_s": math.inf}, "window_s"),
+        ({"settle_s": 0.0}, ""),
+        ({"settle_s": -1e-9}, "settle_s"),
+        ({"hold_s": 0.0}, ""),
+        ({"hold_s": -1e-9}, "hold_s"),
+        ({"hold_s": 0.4}, "hold_s"),
+        ({"hold_s": 0.399}, ""),
+        ({"seed": 0}, ""),
+        ({"seed": 2**63 - 1}, ""),
+        ({"seed": -1}, "seed"),
+        ({"seed": 2**63}, "seed"),
+        ({"way": "scan"}, ""),
+        ({"way": "beacon"}, "way"),
+    ],
+)
+def test_settings_are_taken_up_to_their_bounds(changes, name):
+    if not name:
+        assert settings(**changes) == replace(settings(), **changes)
+        return
+    with pytest.raises(ValueError, match=f"^{name} of a contact run is "):
+        settings(**changes)
+
+
+@pytest.mark.parametrize(
+    ("start_s", "end_s", "free_s", "refused"),
+    [
+        (5.0, 5.1, 5.0, ""),
+        (5.0, 5.0, 0.0, "has no length"),
+        (5.0, 4.0, 0.0, "has no length"),
+        (-math.inf, 5.0, -9.0, "has no length"),
+        (5.0, math.inf, 0.0, "has no length"),
+        (5.0, 6.0, 5.1, "free_from_s is 5.1 s"),
+        (5.0, 6.0, -math.inf, "free_from_s is -inf s"),
+    ],
+)
+def test_a_contact_has_a_length_and_a_body_that_is_free_by_then(start_s, end_s, free_s, refused):
+    if not refused:
+        assert Contact(start_s, end_s, "", "", free_s, steady()).free_from_s == free_s
+        return
+    with pytest.raises(ValueError, match=re.escape(refused)):
+        Contact(start_s, end_s, "", "", free_s, steady())
+
+
+@pytest.mark.parametrize(
+    ("values", "refused"),
+    [
+        ((1e-9, 0.0, 0.0), ""),
+        ((0.0, 1.0, 1.0), "range_m = 0"),
+        ((1.0, -1e-9, 1.0), "rate_rad_s = -1e-09"),
+        ((1.0, 1.0, -1e-9), "point_ahead_rad = -1e-09"),
+        ((1.0, math.inf, 1.0), "rate_rad_s = inf"),
+    ],
+)
+def test_a_line_of_sight_has_a_range_above_nothing_and_rates_that_may_be_none(values, refused):
+    of = contact(geometry=steady(*values))
+    if not refused:
+        assert [float(each[0]) for each in of.sight(np.zeros(2))] == list(values)
+        return
+    with pytest.raises(ValueError, match=re.escape(refused)):
+        of.sight(np.zeros(2))
+
+
+@pytest.mark.parametrize(
+    ("length_s", "wanted", "begins", "each_s"),
+    [
+        (10.0, 3, [0.0, 4.0, 8.0], 2.0),
+        (6.0, 3, [0.0, 2.0, 4.0], 2.0),  # they just fit
+        (5.9, 3, [0.0, 3.9], 2.0),
+        (4.0, 1, [0.0], 2.0),
+        (2.0, 3, [0.0], 2.0),
+        (1.5, 3, [0.0], 1.5),
+    ],
+)
+def test_windows_are_as_many_as_fit_from_the_begin_to_the_end(length_s, wanted, begins, each_s):
+    found = plan(100.0, 100.0 + length_s, settings(windows=wanted, window_s=2.0))
+    assert_allclose([begin for begin, _ in found], 100.0 + np.array(begins))
+    assert_allclose([length for _, length in found], each_s)
+
+
+def test_a_log_ends_with_its_contact_and_goes_on_from_there_no_more():
+    log = sequence.Log(contact(1000.0, 600.0))
+    assert log.go(900.0, State.SLEW, "a") and log.since_s == 900.0 and log.state == State.SLEW
+    assert log.go(1599.9, State.BEACON, "b")
+    assert not log.go(1600.0, State.DETECT, "c")
+    assert not log.go(1200.0, State.DETECT, "d")
+    log.finish()
+    found = [(each.time_s, each.state, each.to) for each in log.entries]
+    assert found == [
+        (900.0, State.IDLE, State.SLEW),
+        (1599.9, State.SLEW, State.BEACON),
+        (1600.0, State.BEACON, State.END),
+    ]
+    assert log.entries[-1].cause == "the contact ends: eclipse of LEO"
+    late = sequence.Log(contact(1000.0, 600.0))
+    assert not late.go(1700.0, State.SLEW, "a") and late.entries[-1].time_s == 1600.0
+    whole = sequence.Log(contact(1000.0, 600.0))
+    whole.finish()
+    assert [(each.time_s, each.to) for each in whole.entries] == [(1600.0, State.END)]
+
+
+@pytest.mark.parametrize(
+    ("free_s", "slew", "beacon", "words"),
+    [
+        (0.0, 900.0, 1000.0, "ends when the contact begins"),
+        (900.0, 900.0, 1000.0, "ends when the contact begins"),  # free in time to the second
+        (900.5, 900.5, 1000.5, "as soon as the body is free"),
+        (1000.0, 1000.0, 1100.0, "as soon as the body is free"),
+    ],
+)
+def test_a_slew_ends_with_the_begin_of_its_contact_where_the_body_is_free_in_time(free_s, slew, beacon, words):
+    log = sequence.Log(contact(1000.0, 600.0, free_from_s=free_s))
+    assert sequence._turn(log, settings(slew_angle_rad=1.0, slew_rate_rad_s=0.01))
+    assert [(each.time_s, each.to) for each in log.entries] == [(slew, State.SLEW), (beacon, State.BEACON)]
+    assert words in log.entries[0].cause
+    late = log.entries[1].cause
+    after = {1000.0: "the contact begins", 1000.5: "500 ms after the", 1100.0: "100 s after the contact began"}
+    assert after[beacon] in late
+    assert LIMB in late
+
+
+@pytest.mark.parametrize(("losses", "goes_on"), [(1, True), (2, True), (3, False), (4, False)])
+def test_as_many_losses_in_a_row_as_attempts_are_the_end(losses, goes_on):
+    acquired = []
+
+    class Acquire:
+        attempts = 3
+
+        def __call__(self):
+            acquired.append(1)
+            return True
+
+    log = sequence.Log(contact(1000.0, 600.0))
+    log.go(1100.0, State.DATA, "")
+    assert sequence._regain(log, Acquire(), Loss(1200.0, 1201.0, 1201.5, "dark"), losses) is goes_on
+    assert [(each.time_s, each.to) for each in log.entries[1:]] == [
+        (1201.0, State.LOSS),
+        (1201.5, State.REACQUIRE if goes_on else State.END),
+    ]
+    assert len(acquired) == goes_on
+    assert "the light has gone there and back, 500 ms" in log.entries[-1].cause
+    own = sequence.Log(contact(1000.0, 600.0))
+    own.go(1100.0, State.DATA, "")
+    sequence._regain(own, Acquire(), Loss(1200.0, 1201.0, 1201.0, "off"), losses)
+    assert "seen by its own sensor" in own.entries[-1].cause
+    over = sequence.Log(contact(1000.0, 600.0))
+    over.go(1100.0, State.DATA, "")
+    assert not sequence._regain(over, Acquire(), Loss(1599.0, 1600.0, 1601.0, "dark"), 1)
+    assert over.entries[-1].to == State.END and len(over.entries) == 2
+
+
+def test_the_sums_of_a_contact_are_those_of_its_log_and_its_windows():
+    steps = [
+        (900.0, State.IDLE, State.SLEW), (1000.0, State.SLEW, State.BEACON), (1010.0, State.BEACON, State.DATA),
+        (1100.0, State.DATA, State.LOSS), (1101.0, State.LOSS, State.REACQUIRE), (1111.0, State.REACQUIRE, State.DATA),
+        (1600.0, State.DATA, State.END),
+    ]  # fmt: skip
+    log = tuple(Transition(time_s, state, to, "") for time_s, state, to in steps)
+    windows = tuple(SimpleNamespace(seconds=s, share_below=share) for s, share in ((3.0, 0.5), (1.0, 0.1)))
+    run = ContactRun(contact(1000.0, 600.0), log, windows)
+    spent = {"slew": 100.0, "beacon": 10.0, "data": 90.0 + 489.0, "loss": 1.0, "re-acquire": 10.0}
+    assert {str(state): time for state, time in run.seconds.items() if time} == spent
+    assert (run.data_s, run.data_share, run.losses, run.first_data_s) == (579.0, 579.0 / 600.0, 1, 1010.0)
+    assert (run.sampled_s, run.losses_per_s, run.share_below) == (4.0, 0.25, pytest.approx(0.4))
+    assert run.bits(10.0) == pytest.approx(10.0 * 579.0 * 0.6)
+    none = ContactRun(contact(1000.0, 600.0), log[:2], ())
+    assert (none.sampled_s, none.losses_per_s, none.share_below, none.data_s, none.bits(9.0)) == (0, 0.0, 0.0, 0.0, 0.0)
+    assert math.isnan(none.first_data_s)
+
+
+@pytest.mark.parametrize(
+    ("holds", "length", "begin"),
+    [
+        ("110111", 2, 0), ("110111", 3, 3), ("110111", 4, None), ("0001", 1, 3), ("0", 1, None), ("", 1, None),
+        ("1111", 4, 0), ("1111", 5, None), ("0110110", 2, 1),
+    ],
+)  # fmt: skip
+def test_a_run_is_long_enough_from_its_length_on(holds, length, begin):
+    assert first_run(np.array([each == "1" for each in holds], dtype=bool), length) == begin

@@ -1,5 +1,6 @@
 """The whole study: requirements, claims and margins of the shipped mission, and of missions that differ from it."""
 
+import math
 import re
 from dataclasses import replace
 from math import log10, pi
@@ -508,3 +509,77 @@ def test_nothing_that_a_loop_must_do_is_met_by_a_mirror_without_dynamics():
     assert "resonances and its lag are not known" in unknown_dynamics(bare.mirror)
     assert unknown_dynamics(bare.mirror) in summarise(bare.mirror).warnings
     assert not any("linear part" in text for text in summarise(known.mirror).warnings)
+
+
+# ---------------------------------------------------------------------------------------- whether a mission closes
+@pytest.mark.parametrize(
+    ("beacon", "answer", "possible", "margin_db", "closes"),
+    [
+        (True, True, True, 0.0, True),
+        (True, True, True, -0.9e-9, True),
+        (True, True, True, -1.1e-9, False),
+        (False, True, True, 5.0, False),
+        (True, False, True, 5.0, False),
+        (True, True, False, 5.0, False),
+    ],
+)
+@pytest.mark.parametrize("fine", [False, True])
+def test_a_mission_closes_with_all_three_links_under_the_judged_loop(beacon, answer, possible, margin_db, closes, fine):
+    judged, other = SimpleNamespace(possible=possible), SimpleNamespace(possible=not possible)
+    whole = SimpleNamespace(
+        beacon=SimpleNamespace(closes=beacon),
+        answer=SimpleNamespace(closes=answer),
+        achieved=other if fine else judged,
+        fine_case=judged if fine else None,
+        margin_db=margin_db,
+    )
+    assert study.Study.closes.fget(whole) is closes
+
+
+def test_the_margin_is_that_of_the_judged_loop_and_all_requirements_have_to_be_met():
+    achieved, fine = SimpleNamespace(margin_db=1.0), SimpleNamespace(margin_db=2.0)
+    assert study.Study.margin_db.fget(SimpleNamespace(achieved=achieved, fine_case=None)) == 1.0
+    assert study.Study.margin_db.fget(SimpleNamespace(achieved=achieved, fine_case=fine)) == 2.0
+    met, missed = SimpleNamespace(met=True), SimpleNamespace(met=False)
+    for lines, all_met in (((), True), ((met, met), True), ((met, missed), False), ((missed, met), False)):
+        assert study.Study.met.fget(SimpleNamespace(requirements=lines)) is all_met
+
+
+@pytest.mark.parametrize(
+    ("highest", "most"), [(math.inf, 30.0), (3e9, 10.0), (9e9, 30.0), (3e8, 1.0)], ids=["none", "slow", "fast", "at it"]
+)
+def test_a_map_of_the_margin_goes_as_far_as_the_receiver_does_and_to_three_times_the_larger_error(
+    monkeypatch, highest, most
+):
+    for name in ("margin_map", "convention_maps", "implied_sensitivity", "ideal_receivers"):
+        monkeypatch.setattr(study.link, name, lambda *given: None)
+    monkeypatch.setattr(study.link_study, "largest_rate", lambda data: 7.0)
+    monkeypatch.setattr(study.link, "largest_pointing_error", lambda data, margin, rate: (margin, rate))
+    receiver = None if math.isinf(highest) else SimpleNamespace(highest_data_rate_bit_s=highest)
+    for allowed, budgeted in ((2e-6, 5e-6), (5e-6, 2e-6)):
+        data = SimpleNamespace(
+            requirement=SimpleNamespace(pointing_error_rad=allowed, margin_db=3.0),
+            table=SimpleNamespace(data_rate_bit_s=3e8, pointing_error_rad=budgeted),
+            receiver=receiver,
+        )
+        found = study.margin_map(data, {})
+        assert found.data_rate_bit_s[[0, -1]] == pytest.approx([1e7, most * 3e8], rel=1e-12)
+        assert found.pointing_error_rad[[0, -1]].tolist() == pytest.approx([0.0, 15e-6], rel=1e-12)
+        assert found.largest_error_rad == (3.0, 3e8) and found.largest_rate_bit_s == 7.0
+
+    def none(*given):
+        raise study.link.LinkError("not even on axis")
+
+    monkeypatch.setattr(study.link, "largest_pointing_error", none)
+    assert math.isnan(study.margin_map(data, {}).largest_error_rad)
+
+
+def test_the_paper_loop_is_judged_where_there_is_no_other_and_stands_beside_it_else(monkeypatch):
+    monkeypatch.setattr(study.requirement, "of_beams", lambda links: ("beam",))
+    monkeypatch.setattr(study.requirement, "of_fading", lambda links: ("fading",))
+    monkeypatch.setattr(study.verdict, "of_fine_pointing", lambda *given: ("fine",))
+    links = SimpleNamespace(data=SimpleNamespace(requirement=None), file=SimpleNamespace(sources=None))
+    paper = ("residual",)
+    assert study.judged(links, paper, None, None) == (("beam", "fading", "residual"), ())
+    assert study.judged(links, paper, object(), None) == (("beam", "fading", "residual"), ())
+    assert study.judged(links, paper, object(), object()) == (("beam", "fading", "fine"), paper)

@@ -1,0 +1,88 @@
+"""What residuals cost the link: with hysteresis against without, and what a sine and an ensemble stand for."""
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from microrad.link.pointing import Jitter
+from microrad.loop.pointing_loop.ensemble import bin_edges_rad
+from microrad.mirror import Variant
+from microrad.study import pointing_penalty
+
+
+def case(source, controller, mirror, margin_db, rate=0.0):
+    return SimpleNamespace(
+        source=source, controller=controller, mirror=mirror, margin_db=margin_db, data_rate_bit_s=rate
+    )
+
+
+def test_hysteresis_costs_what_the_same_loop_has_more_without_it():
+    cases = (
+        case("sine", "PI", Variant.STRAIGHT, 5.0, 9.0),
+        case("sine", "PI", Variant.GIVEN, 3.0, 4.0),
+        case("sine", "PI", Variant.COMPARISON, 4.5, 8.0),
+        case("sine", "LQG", Variant.GIVEN, 2.0, 1.0),  # not run without
+        case("noise", "PI", Variant.GIVEN, 1.0, 1.0),
+        case("noise", "LQG", Variant.STRAIGHT, 7.0, 1.0),
+        case("noise", "LQG", Variant.GIVEN, 6.0, 0.5),
+    )
+    found = [(c.source, c.controller, c.mirror, c.margin_db, c.data_rate_bit_s) for c in pointing_penalty.costs(cases)]
+    assert found == [
+        ("sine", "PI", "given", -2.0, -5.0),
+        ("sine", "PI", "comparison", -0.5, -1.0),
+        ("noise", "LQG", "given", -1.0, -0.5),
+    ]
+    held = pointing_penalty.LinkPerformance(0.003, 1e-6, cases, ())
+    assert held.case("noise", "LQG", "given") is cases[6]
+    assert held.case("noise", "LQG", "comparison") is held.case("other", "PI", "given") is None
+
+
+@pytest.fixture
+def told(monkeypatch):
+    """What the link's performance is asked for."""
+    monkeypatch.setattr(pointing_penalty, "performance", lambda *given: given)
+
+
+@pytest.mark.parametrize("radial", [False, True])
+def test_a_sine_is_its_steady_error_on_one_axis_or_on_two_alike(told, radial):
+    error = np.array([[9.0, 0.0], [1.0, 7.0], [-3.0, 7.0], [5.0, 7.0]])
+    run = SimpleNamespace(
+        freq_hz=25.0, controller="PID", mirror="given", trace=SimpleNamespace(error_rad=error, steady=slice(1, None))
+    )
+    data, source, controller, mirror, spread, jitter, motion = pointing_penalty._sine("link", radial, run)
+    assert (data, source, controller, mirror, motion) == ("link", "sine of 25 Hz", "PID", "given", None)
+    np.testing.assert_allclose(spread.radius_rad, np.array([1.0, 3.0, 5.0]) * (math.sqrt(2.0) if radial else 1.0))
+    np.testing.assert_allclose(spread.share, 1.0 / 3.0)
+    rms = math.sqrt((0.0 + 16.0 + 16.0) / 3.0)
+    assert jitter.bias_rad == (1.0, radial * 1.0)
+    assert jitter.rms_rad == pytest.approx((rms, radial * rms))
+
+
+@pytest.mark.parametrize("axes", [1, 2])
+@pytest.mark.parametrize("mirror", [Variant.GIVEN, Variant.STRAIGHT])
+def test_an_ensemble_is_its_mean_and_what_moves_about_it(told, monkeypatch, axes, mirror):
+    counts = np.zeros(bin_edges_rad().size - 1, dtype=np.int64)
+    counts[[3, 10]] = 4, 1
+    left = SimpleNamespace(axis_mean_rad=(3.0, -1.0)[:axes], axis_rms_rad=(5.0, 1.0)[:axes], radial_counts=counts)
+    verified = SimpleNamespace(
+        simulated={mirror: left}, spectrum_rad2_hz=np.array([[1.0, 4.0], [2.0, 5.0], [3.0, 6.0]])[:, :axes],
+        design=SimpleNamespace(name="LQG"),
+    )  # fmt: skip
+    monkeypatch.setattr(pointing_penalty.pointing, "motion_of_spectrum", lambda freq, psd: (freq, psd.tolist()))
+    fine = SimpleNamespace(freq_hz="frequencies")
+    _, source, name, of, spread, jitter, motion = pointing_penalty._fine("link", fine, verified, mirror)
+    assert (source, name, of) == ("vibration and noise", "LQG", mirror)
+    assert jitter == Jitter((3.0, -1.0 * (axes == 2)), (4.0, 0.0))
+    second = [4.0, 5.0, 6.0] if axes == 2 else [0.0, 0.0, 0.0]
+    known = ("frequencies", [[1.0, 2.0, 3.0], second])
+    assert motion == (known if mirror is Variant.GIVEN else None)
+    edges = bin_edges_rad()
+    assert spread.share.sum() == pytest.approx(1.0)
+    assert np.sum(spread.share[spread.radius_rad < edges[4]]) == pytest.approx(0.8)
+    there = spread.radius_rad[spread.share > 0.0]
+    assert edges[3] < there.min() and there.max() < edges[11]
+    mean_square = np.sum(spread.share * spread.radius_rad**2)
+    exact = 0.8 * (edges[3] ** 2 + edges[4] ** 2) / 2 + 0.2 * (edges[10] ** 2 + edges[11] ** 2) / 2
+    assert mean_square == pytest.approx(exact, rel=1e-12)
