@@ -85,7 +85,7 @@ def test_the_filter_follows_the_spectrum(scene, at_hz):
 @pytest.mark.promise("pointing-113")
 @pytest.mark.parametrize(
     ("tilt", "aperture", "rate"),
-    [("zernike", "5 cm", "0 urad/s"), ("zernike", "40 cm", "15 mrad/s"), ("gradient", "40 cm", "0 urad/s")],
+    [("zernike", "5 cm", "0 urad/s"), ("gradient", "40 cm", "15 mrad/s")],
 )
 def test_what_a_loop_leaves_of_it_is_that_of_the_spectrum(tmp_path, tilt, aperture, rate):
     """Behind a high pass of first order, as a loop of that crossover has it: within a few per cent."""

@@ -43,6 +43,7 @@ def ends(found):
 
 @pytest.mark.parametrize("flying", [LOW, OVAL])
 @pytest.mark.parametrize("station", [TEIDE, KIRUNA, SOUTH])
+@pytest.mark.promise("link-115")
 def test_a_contact_with_a_station_is_a_pass_over_it(flying, station):
     found = contacts(free(flying), site(station), EARTH, EPOCH, DAY)
     over = passes(flying, station, EPOCH, DAY)
@@ -154,6 +155,7 @@ def test_a_day_carries_what_its_passes_last(day):
     assert furthest == pytest.approx(day.data.range_m, abs=7e3)
 
 
+@pytest.mark.promise("link-115")
 def test_how_far_each_rate_reaches_is_where_it_has_lost_what_it_had_to_spare(tmp_path):
     m = ground_file(tmp_path, {"channel.turbulence.fades": "log-normal"}).mission
     data = link.of(m)
