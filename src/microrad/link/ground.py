@@ -148,7 +148,7 @@ def _lines(table: TurbulenceTable, t: Turbulent, source: str) -> list[Line]:
             "Greenwood frequency",
             path.greenwood_hz(wind_of(table)),
             "Hz",
-            "(0.102 k^2 times that of Cn2 v^(5/3))^(3/5)",
+            "(0.102 k^2 times that of Cn2 v^(5/3))^(3/5), in air that the satellite does not turn through",
             source,
             regime,
         ),
