@@ -323,6 +323,8 @@ def test_sampled_plant_of_several_axes_is_what_their_controller_was_designed_for
     assert [p.name for p in m.outputs] == [f"{n}_rad_{i}" for n in ("line_of_sight", "optical_error") for i in (0, 1)]
     assert m.system.order < designed.system.order
     assert "a mode that no output shows" in forms(m).zero_pole_gain  # the piston of the plate
+    every = plate.scene.loop.optical.every
+    assert (f"a sensor that delivers every {every} samples" in m.meaning) is (every > 1)
 
 
 @pytest.mark.promise("export-34")
