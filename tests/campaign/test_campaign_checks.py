@@ -6,13 +6,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from microrad.campaign.definition import checks, distributions, draws
+from microrad.campaign.definition import checks, distributions, draws, keys
 from microrad.campaign.definition.distributions import LogUniform, Normal, OneOf, Uniform, uncovered
 from microrad.campaign.definition.outputs import OUTPUTS, RADIUS
 from microrad.campaign.definition.values import NotedError
 from microrad.campaign.records import Limit
 from microrad.mirror import Variant
-from microrad.mission.fields import Quantity, Share
+from microrad.mission.fields import OrWord, Quantity, Several, Share, Table, Whole
 from microrad.mission.file import load_mission
 from shipped import SHIPPED
 
@@ -448,3 +448,113 @@ def test_a_value_of_a_list_is_drawn_from_the_share_below_it_on():
     assert even.words("dB") == "one of 1 = near, 2 = far"
     assert OneOf((1.5, 2.0), (0.5, 0.5), (1.5, 2), False).words("") == "one of 1.5, 2"
     assert distributions.quantity(2e-6, "rad") == "2 µrad"
+
+
+# --------------------------------------------------------------------------------------------------------------- keys
+@pytest.mark.parametrize(
+    ("items", "shares"),
+    [
+        (["4 urad", "2 urad"], (1.0, 0.5)),
+        (["2 urad", "0 urad"], (1.0, 0.0)),
+        (["3 urad"], (1.0,)),
+        (["0 urad", "0 urad"], ()),
+        (["4 urad", "-2 urad"], ()),
+        (["4 urad", "2 m"], ()),
+        ([], ()),
+        ("4 urad", ()),
+        (None, ()),
+    ],
+)
+def test_a_list_is_one_number_where_its_items_have_a_share_of_the_largest(items, shares):
+    key = keys.Key("jitter.rms", Table, Several(Quantity("rad")))
+    found = keys.as_one(key, items)
+    assert found.shares == shares
+    if not shares:
+        assert found is key
+        return
+    assert (found.numeric, found.unit) == (Quantity("rad"), "rad")
+    written = found.written(1e-6)
+    assert written == [f"{1e-6 * share!r} rad" for share in shares]
+    single = keys.Key("jitter.rms", Table, Quantity("rad"))
+    assert keys.as_one(single, items) is single
+    whole = keys.Key("a.list", Table, Several(Whole("")))
+    assert keys.as_one(whole, items) is whole
+
+
+def test_a_value_is_written_in_the_way_of_its_key():
+    assert keys.Key("a", Table, Whole("")).written(3.0) == 3
+    assert isinstance(keys.Key("a", Table, Whole("")).written(3.0), int)
+    assert keys.Key("a", Table, Quantity("m")).written(0.1) == "0.1 m"
+    assert keys.Key("a", Table, Quantity("")).written(0.1) == 0.1
+    assert keys.Key("a", Table, None).written(0.1) == 0.1
+    assert keys.Key("a", Table, Several(Quantity("m"))).unit == ""
+    word = keys.Key("a", Table, OrWord("m", "km", above=0.0, word="largest"))
+    assert word.numeric == Quantity("m", "km", above=0.0)
+    assert keys.Key("a", Table, Whole("")).numeric is None and keys.Key("a", Table, None).numeric is None
+    assert keys.Key("a", Table, Share("")).numeric == Share("")
+    assert keys.Key("a.b.c", Table, None).name == "c"
+
+
+@pytest.mark.parametrize(
+    ("last", "count", "place"),
+    [
+        ("1", 2, 1), ("2", 2, 2), ("3", 2, None), ("0", 2, None), ("01", 20, None), ("-1", 2, None), ("x", 2, None),
+        ("10", 10, 10), ("11", 10, None), ("\u0662", 9, None), ("1", 0, None), ("9" * 5000, 9, None),
+    ],
+)  # fmt: skip
+def test_an_item_has_its_place_from_one_on(last, count, place):
+    parts, items = ("table", "list", last), list(range(count))
+    if place is not None:
+        assert keys._item(parts, items) == place
+        return
+    with pytest.raises(keys.UnknownKeyError, match=f"is no item of table.list, a list of {count}"):
+        keys._item(parts, items)
+    with pytest.raises(keys.UnknownKeyError, match="a list of 0"):
+        keys._item(parts, "no list")
+
+
+def test_long_lists_are_shown_by_their_first_and_last_item():
+    assert keys.item_keys("a", 3) == ["a.1", "a.2", "a.3"]
+    assert keys.item_keys("a", 4) == ["a.1", "a.4"]
+    assert keys.item_keys("a", 1) == ["a.1"]
+
+
+def test_a_value_is_put_at_its_key_and_the_rest_stays():
+    data = {"a": {"b": 1, "c": {"d": 2}}, "list": [5, 6, 7], "e": 9}
+    assert keys.put(data, "a.c.d", 3) == {"a": {"b": 1, "c": {"d": 3}}, "list": [5, 6, 7], "e": 9}
+    assert keys.put(data, "a.new.x", 3)["a"] == {"b": 1, "c": {"d": 2}, "new": {"x": 3}}
+    assert keys.put(data, "list.2", 0)["list"] == [5, 0, 7]
+    assert keys.put(data, "list", 0)["list"] == 0
+    assert keys.put(data, "e.f", 1)["e"] == {"f": 1}
+    assert data == {"a": {"b": 1, "c": {"d": 2}}, "list": [5, 6, 7], "e": 9}
+    assert [keys.within(data, key) for key in ("a.c.d", "a.x", "e.f", "list")] == [2, None, None, [5, 6, 7]]
+    assert keys.flat(data) == {"a.b": 1, "a.c.d": 2, "list": [5, 6, 7], "e": 9}
+
+
+def test_tables_are_those_that_hold_a_value_and_inner_ones_belong_to_theirs():
+    given = {"a": {"b": {"low": 1, "drawn_as": {"low": 2}}}, "c": {}, "d": 4, "e": {"low": 1, "f": {"low": 3}}}
+    assert keys.flat_tables(given, ("drawn_as",)) == {
+        "a.b": {"low": 1, "drawn_as": {"low": 2}},
+        "c": {},
+        "d": 4,
+        "e": {"low": 1},
+        "e.f": {"low": 3},
+    }
+    assert keys.flat_tables({"a": {"drawn_as": {"x": 1}}}, ()) == {"a.drawn_as": {"x": 1}}
+
+
+@pytest.mark.parametrize(
+    ("key", "touches", "with_cell"),
+    [
+        ("communication.distance", False, False), ("jitter.rms", False, False), ("requirement.margin", False, False),
+        ("fine_pointing.sample_rate", True, True), ("mirror.gain", True, True), ("name", False, False),
+        ("answer.transmit_power", False, True), ("terminals.leo_aperture", False, True), ("amplifier.gain", True, True),
+    ],
+)  # fmt: skip
+def test_the_loop_depends_on_its_own_tables_and_on_light_where_it_has_a_quad_cell(key, touches, with_cell):
+    whole = load_mission(SHIPPED).mission
+    for cell, expected in ((None, touches), (object(), with_cell)):
+        fine = SimpleNamespace(optical_sensor=SimpleNamespace(quad_cell=cell))
+        assert keys.touches_loop(key, whole.model_copy(update={"fine_pointing": fine})) is expected
+    assert keys.touches_loop(key, whole.model_copy(update={"fine_pointing": None})) is touches
+    assert keys.touches_loop(key, SimpleNamespace()) is False  # links alone

@@ -27,7 +27,7 @@ from microrad.campaign.file import load_campaign
 from microrad.campaign.ledger import Ledger, chunk_format, mending
 from microrad.campaign.ledger.file import is_written
 from microrad.campaign.records import CampaignError, Outcome
-from microrad.campaign.rows import evaluate
+from microrad.campaign.rows import evaluate, evaluator
 from microrad.campaign.rows.evaluator import Evaluator
 from microrad.campaign.rows.loops import controllers
 from microrad.campaign.rows.plan import Plan, planned
@@ -967,3 +967,99 @@ def test_chunks_of_a_plan_cover_its_rows_and_end_with_the_last():
     ]  # fmt: skip
     assert {job.cell for job in plan.chunks(3, 9)} == {3}
     assert [plan.rows_of(number) for number in (0, 1, 2)] == [range(0, 4), range(4, 8), range(8, 10)]
+
+
+# ------------------------------------------------------------------------------------------------------ rows by groups
+@pytest.mark.parametrize(("took_s", "slow"), [(9.9, False), (10.0, False), (10.1, True)])
+def test_a_row_may_take_its_limit_from_its_own_start_on(monkeypatch, took_s, slow):
+    now, beats = [100.0], []
+    monkeypatch.setattr(evaluator, "time", SimpleNamespace(monotonic=lambda: now[0]))
+    watch = evaluator._Watch(lambda: beats.append(now[0]), 10.0, began_s=0.0)
+    watch.start()
+    now[0] += took_s
+    if slow:
+        with pytest.raises(evaluator.SlowRowError, match="took longer than row_limit, 10 s"):
+            watch()
+    else:
+        watch()
+    assert beats == [100.0, 100.0 + took_s]
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (ValueError("no  power\nis left"), "no power is left"),
+        (evaluator.SlowRowError("took longer"), "took longer"),
+        (ValueError(""), "ValueError: "),
+        (KeyError("a"), "KeyError: 'a'"),
+        (RuntimeError("x"), "RuntimeError: x"),
+    ],
+)
+def test_an_error_of_a_row_is_told_by_its_kind_where_it_was_not_written_for_a_user(error, words):
+    assert evaluator._words(error) == words
+
+
+def an_evaluator(outputs, simulated, *, loop=True, tail=False, keys="aabba"):
+    """An evaluator of five rows from number 10 on, whose loops, outputs and runs are given."""
+    made = object.__new__(Evaluator)
+    table = SimpleNamespace(loop=object() if loop else None, tail=object() if tail else None, seed=3, row_limit_s=9.0)
+    made.campaign, made.names = SimpleNamespace(table=table), ("margin",)
+    weight = np.array([1.0, 2.0, 1.0, 1.0, 1.0])
+    drawn = evaluator._Rows(0, 10, {"power": np.arange(5.0)}, weight, ["file"] * 5, [None] * 5, list(keys))
+    made._drawn = lambda cell, rows: drawn
+    made._simulated = simulated
+    made._outputs = outputs
+    return made
+
+
+def curve(value):
+    return np.full(kernels.BINS, value)
+
+
+def test_rows_that_share_a_loop_are_simulated_together_and_one_that_fails_is_tried_again_alone():
+    groups, tried = [], []
+
+    def simulated(drawn, group, watch):
+        groups.append((group.start, group.stop))
+        if (group.start, group.stop) == (2, 4):
+            raise RuntimeError("together")
+        return "runs"
+
+    def outputs(file, runs, row):
+        tried.append(row)
+        if row == 14:
+            return {"margin": np.nan}, curve(9.0)
+        if row == 11 and tried.count(11) == 1:
+            raise ValueError("at first")
+        return {"margin": float(row)}, curve(0.5)
+
+    made = an_evaluator(outputs, simulated)
+    found = made.rows(0, range(10, 15), lambda: None, number=6)
+    assert groups == [(0, 2), (1, 2), (2, 4), (2, 3), (3, 4), (4, 5), (4, 5)]
+    assert (found.cell, found.number, found.columns["row"].tolist()) == (0, 6, [10.0, 11.0, 12.0, 13.0, 14.0])
+    np.testing.assert_array_equal(found.columns["margin"], [10.0, 11.0, 12.0, 13.0, np.nan])
+    assert [(each.row, each.seed, each.attempts, each.reason) for each in found.failed] == [
+        (14, 3, 2, "gives nan for margin")
+    ]
+    np.testing.assert_allclose(found.survival, 0.5 * (1.0 + 2.0 + 1.0 + 1.0))  # weights of the four good rows
+    np.testing.assert_allclose(found.survival_square, 0.25 * (1.0 + 4.0 + 1.0 + 1.0))
+    groups.clear(), tried.clear()
+    once = made.rows(0, range(10, 15), lambda: None, attempts=1)
+    assert groups == [(0, 2), (2, 4), (4, 5)]
+    assert [(each.row, each.attempts, each.reason) for each in once.failed] == [
+        (11, 1, "at first"), (12, 1, "RuntimeError: together"), (13, 1, "RuntimeError: together"),
+        (14, 1, "gives nan for margin"),
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(("loop", "tail", "bins"), [(True, False, kernels.BINS), (True, True, 0), (False, False, 0)])
+def test_rows_have_a_curve_where_a_loop_runs_for_a_time(loop, tail, bins):
+    groups = []
+
+    def simulated(drawn, group, watch):
+        groups.append(len(group))
+
+    made = an_evaluator(lambda *given: ({"margin": 1.0}, None), simulated, loop=loop, tail=tail)
+    found = made.rows(0, range(10, 15), lambda: None)
+    assert found.survival.size == found.survival_square.size == bins and not found.survival.any()
+    assert groups == ([2, 2, 1] if loop else [1, 1, 1, 1, 1])

@@ -230,3 +230,48 @@ def test_a_compiler_that_cannot_be_started_is_said(tmp_path: Path, monkeypatch: 
     monkeypatch.setenv("CC", str(broken))
     with pytest.raises(ExportError, match=r"broken-cc cannot be run in .*: Exec format error"):
         build.compile_and_run(written(tmp_path), "gain")
+
+
+# ------------------------------------------------------------------------------------- what a bench says, without one
+WHOLE = (
+    "samples 3\nlargest_difference_v {}\npeak_command_v 3.5\nbound_v 1e-3\nsaturated 4\nrate_clamped 5\nrejected 6\n"
+    "faults 7\nworst_step_ns 11\nmedian_step_ns 20.5\nclock_ns 18\ncycles_per_ns 2.5\n"
+)
+
+
+@pytest.mark.parametrize(
+    ("code", "difference", "words"),
+    [
+        (0, "2e-4", ""),
+        (0, "1e-3", ""),
+        (1, "1.1e-3", r"commands up to 0\.0011 V off the recorded run, and its bound is 0\.001 V"),
+        (1, "1e-3", "the bench of gain in .* failed with exit status 1:"),  # something else, within the bound
+        (2, "1.1e-3", "the bench of gain in .* failed with exit status 2:"),
+        (-11, "1.1e-3", "the bench of gain in .* was ended by signal 11:"),
+    ],
+)
+def test_a_difference_is_blamed_where_the_bench_says_so_and_it_is_beyond_the_bound(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: int, difference: str, words: str
+) -> None:
+    asked = []
+    monkeypatch.setattr(build, "_compile", lambda folder, name: folder / f"{name}_bench")
+    monkeypatch.setattr(
+        build, "run", lambda command, folder: (asked.append(command), (code, WHOLE.format(difference)))[1]
+    )
+    written(tmp_path)
+    if words:
+        with pytest.raises(ExportError, match=words):
+            build.compile_and_run(tmp_path, "gain", 1)
+    else:
+        found = build.compile_and_run(tmp_path, "gain", 1)
+        assert found == replace(EXPECTED, largest_difference_v=float(difference))
+    assert asked == [(str(tmp_path / "gain_bench"), "vectors.csv", "1")]
+
+
+@pytest.mark.parametrize(("lines", "more"), [(0, []), (1, []), (12, []), (13, ["  ... and 1 lines more"])])
+def test_a_failure_shows_the_first_lines_and_how_many_there_are_more(lines: int, more: list[str]) -> None:
+    assert build.FIRST_LINES == 12
+    text = "\n \n".join(f"line {k}" for k in range(lines))
+    shown = str(build._failure("what", text)).splitlines()
+    first = [f"  line {k}" for k in range(min(lines, 12))] or ["  (it wrote nothing)"]
+    assert shown == ["what:", *first, *more]

@@ -357,12 +357,25 @@ def test_the_coefficients_are_within_half_a_step_and_rows_within_a_word():
     ):
         step = np.exp2(columns[None, : a.shape[1]] - np.array(rows.scale)[:, None])
         assert np.all(np.abs(a - b) <= 0.5 * step + 1e-15)
+        still = np.eye(*b.shape) if rows is fixed.state else 0.0  # the whole numbers are those of the change
+        np.testing.assert_allclose(b, rows.value * step + still, rtol=1e-15, atol=0.0)
         sums = np.sum(np.abs(rows.value), axis=1)
         assert np.all(sums <= fixed.word)
         assert np.median(sums) > fixed.word / 4
     assert np.any(near.A != form.A)
     assert min(fixed.state_shift) >= 0
     assert max(fixed.state_shift) <= fixed.bits - 1
+
+
+@pytest.mark.parametrize("name", ["LQG", "PI + inverse"])
+def test_the_makefile_compiles_the_sources_and_looks_at_the_headers(name):
+    of, form, _ = shipped(name)
+    files = fixed_code(of, form, form_of(name), "loop")
+    lines = dict(line.split(" = ", 1) for line in files["Makefile"].splitlines() if " = " in line)
+    for key, ending in (("SOURCES", ".c"), ("HEADERS", ".h")):
+        assert sorted(lines[key].split()) == sorted(file for file in files if file.endswith(ending))
+    assert {"loop_fixed.c", "loop_fixed_bench.c", "loop_fixed.h", "Makefile"} <= files.keys()
+    assert ("loop_inverse.c" in files) is (name != "LQG")
 
 
 def test_a_row_that_rounds_up_beyond_a_word_takes_a_coarser_scale():

@@ -20,6 +20,8 @@ from microrad.core import lti
 from microrad.export import choice, matrices
 from microrad.export.linear_import.matlab import load
 from microrad.export.matrices import files as matrices_files
+from microrad.export.matrices import forms as matrix_forms
+from microrad.export.matrices import structure
 from microrad.export.matrices.forms import LinearModel, Port, forms, polynomials
 from microrad.export.matrices.models import (
     CONTROLLER,
@@ -321,6 +323,8 @@ def test_sampled_plant_of_several_axes_is_what_their_controller_was_designed_for
     assert [p.name for p in m.outputs] == [f"{n}_rad_{i}" for n in ("line_of_sight", "optical_error") for i in (0, 1)]
     assert m.system.order < designed.system.order
     assert "a mode that no output shows" in forms(m).zero_pole_gain  # the piston of the plate
+    every = plate.scene.loop.optical.every
+    assert (f"a sensor that delivers every {every} samples" in m.meaning) is (every > 1)
 
 
 @pytest.mark.promise("export-34")
@@ -466,6 +470,78 @@ def test_unstable_models_are_refused_as_coefficients_alone(made, where):
 def test_orders_beyond_floats_are_refused():
     with pytest.raises(ExportError, match=r"101 states .* takes 100"):
         polynomials(model(np.diag(-np.arange(1.0, 102.0)), np.ones((101, 1)), np.ones((1, 101))).system)
+
+
+def test_as_many_states_as_are_taken_are_taken(monkeypatch):
+    monkeypatch.setattr(matrix_forms, "MOST_STATES", 3)
+    made = [model(np.diag(-np.arange(1.0, n + 1.0)), np.ones((n, 1)), np.ones((1, n))).system for n in (3, 4)]
+    assert [float(each) for each in polynomials(made[0])[1]] == [1.0, 6.0, 11.0, 6.0]
+    with pytest.raises(ExportError, match=r"4 states .* takes 3"):
+        polynomials(made[1])
+
+
+@pytest.mark.parametrize(
+    ("pole", "period_s", "unstable"),
+    [
+        (1.0, 0.01, False),
+        (-1.0, 0.01, False),
+        (1.0 + 0.9e-9, 0.01, False),  # but for rounding
+        (1.0 + 1.1e-9, 0.01, True),
+        (-1.0 - 1.1e-9, 0.01, True),
+        (0.0, 0.0, False),
+        (-5.0, 0.0, False),
+        (1e-12, 0.0, True),
+        (5.0, 0.0, True),
+    ],
+)
+def test_integrators_are_stable_and_what_lies_beyond_them_is_not(pole, period_s, unstable):
+    system = lti.StateSpace(np.diag([-0.5, pole]), np.ones((2, 1)), np.ones((1, 2)), np.zeros((1, 1)))
+    if not unstable:
+        structure.refuse_unstable(system, period_s, "made")
+        return
+    with pytest.raises(ExportError, match=r"^made: unstable, ") as refused:
+        structure.refuse_unstable(system, period_s, "made")
+    assert structure.pole_text(pole, period_s) in str(refused.value)  # the pole that is meant
+
+
+def test_an_undamped_pair_is_stable_and_one_that_grows_is_not():
+    for decay, unstable in ((0.0, False), (-1.0, False), (1e-6, True)):
+        A = np.array([[decay, 100.0], [-100.0, decay]])
+        system = lti.StateSpace(A, np.ones((2, 1)), np.ones((1, 2)), np.zeros((1, 1)))
+        if unstable:
+            with pytest.raises(ExportError, match=r"unstable, 15\.92 Hz with a damping ratio of -1e-08"):
+                structure.refuse_unstable(system, 0.0, "made")
+        else:
+            structure.refuse_unstable(system, 0.0, "made")
+
+
+@pytest.mark.parametrize(
+    ("pole", "period_s", "text"),
+    [
+        (-10.0, 0.0, "1.592 Hz with a damping ratio of 1"),
+        (10.0, 0.0, "1.592 Hz with a damping ratio of -1"),
+        (complex(-3.0, 4.0), 0.0, "0.7958 Hz with a damping ratio of 0.6"),
+        (0.0, 0.0, "0 Hz with a damping ratio of 1"),
+        (0.5, 0.01, "|z| = 0.5 at 0 Hz"),
+        (-0.5, 0.01, "|z| = 0.5 at 50 Hz"),
+        (complex(0.0, -0.25), 0.01, "|z| = 0.25 at 25 Hz"),
+    ],
+)
+def test_a_root_in_words(pole, period_s, text):
+    assert structure.pole_text(pole, period_s) == text
+
+
+@pytest.mark.parametrize("key", ["A", "B", "C", "D"])
+@pytest.mark.parametrize(("number", "refused"), [(1e100, False), (1.01e100, True), (np.inf, True), (np.nan, True)])
+def test_each_matrix_has_numbers_that_floats_can_multiply(monkeypatch, key, number, refused):
+    system = model(np.diag([-1.0, -2.0]), [[1], [1]], [[1, 1]]).system
+    changed = replace(system, **{key: getattr(system, key) + np.full(getattr(system, key).shape, number)})
+    monkeypatch.setattr(structure, "_balanced", lambda given: (np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0))))
+    if refused:
+        with pytest.raises(ExportError, match=r"made: it holds a number that is not finite or beyond 1e\+100"):
+            structure.refuse_hidden(changed, 0.0, "made")
+    else:
+        structure.refuse_hidden(changed, 0.0, "made")
 
 
 # ----------------------------------------------------------------------------------------------------------------- .mat

@@ -456,6 +456,8 @@ def test_pickles_are_not_opened(tmp_path):
     ("system", "why"),
     [
         (python_control.ss(-np.eye(2), np.eye(2), np.eye(2), 0), "2 inputs and 2 outputs"),
+        (python_control.tf([[[1.0], [2.0]]], [[[1.0, 5.0], [1.0, 6.0]]]), "2 inputs and 1 outputs"),
+        (python_control.tf([[[1.0]], [[2.0]]], [[[1.0, 5.0]], [[1.0, 6.0]]]), "1 inputs and 2 outputs"),
         (python_control.tf([1.0], [1.0, -0.5], 0.01), "the band ends at 5000 Hz"),
         (python_control.tf([1.0], [1.0, -0.5], None), "dt = None: continuous, or sampled how fast"),
         (python_control.tf([1.0], [1.0, -0.5], True), "dt = True: continuous, or sampled how fast"),

@@ -11,7 +11,7 @@ from scipy import integrate, signal, stats
 from microrad.core import lti
 from microrad.link.error_budget.assembly import source_of
 from microrad.link.error_budget.budget import budget, shares, total
-from microrad.link.error_budget.contributions import Requirement, contribution, contributions
+from microrad.link.error_budget.contributions import Requirement, _at_its_worst, contribution, contributions
 from microrad.link.error_budget.correlation import Correlation
 from microrad.link.error_budget.distributions import Bundle, case
 from microrad.link.error_budget.sources import ErrorSource, Spread
@@ -348,6 +348,14 @@ def test_noise_at_its_worst_time_has_as_many_sigma_as_hold_the_confidence():
     required = replace(APE, interpretation="ensemble")
     found = total(contributions([source("random", 2.0)], required), required)
     assert found.quantile_rad == pytest.approx(2.0 * stats.norm.ppf(0.5 * (1.0 + P)))
+
+
+@pytest.mark.parametrize("gains", [[1.0], [1.0, 0.5], [0.25, 0.5, 1.0]])
+def test_noise_at_its_worst_time_is_that_of_each_axis(gains):
+    required = replace(APE, axes=tuple(range(min(len(gains), 2))), interpretation="ensemble")
+    of = source("random", 2.0, gains=np.array(gains))
+    sigmas = stats.norm.ppf(0.5 * (1.0 + P))
+    np.testing.assert_allclose(_at_its_worst(of, required).mean, sigmas * np.array([gains]))
 
 
 # -------------------------------------------------------------------------------------------------------------- totals

@@ -2,6 +2,7 @@
 
 import json
 import math
+import os
 import re
 import tomllib
 from types import SimpleNamespace
@@ -11,7 +12,7 @@ import pytest
 
 from link_files import data_with, link_file, received_with, written
 from microrad import link, report
-from microrad.link.fade_series import CodedLink, FadeSeriesError, code, coded_fading, read_fade_series
+from microrad.link.fade_series import CodedLink, FadeSeriesError, code, coded_fading, of_mission, read_fade_series
 from microrad.link.requirement import UNDER_FADES, of_links
 from microrad.link.study import run_link_study
 from microrad.mission.file import MissionError, named_files, with_contents
@@ -262,3 +263,23 @@ def test_a_series_that_cannot_be_used_is_refused_with_the_line_that_names_it(tmp
     told = call("budget", str(tmp_path / "link.toml"))
     assert told.code == 2
     assert words.partition(":")[0] in " ".join(told.err.split())
+
+
+@pytest.mark.parametrize("changed", ["size", "time", "nothing"])
+def test_a_series_is_read_again_where_its_file_has_changed_in_size_or_time(tmp_path, changed):
+    table = link_file(tmp_path, fading()).mission.communication.fading
+    place = tmp_path / "fades.csv"
+
+    def write(last, moment_s):
+        rows = [f"{PERIOD_S * k:.4f},{1 + k % 2}" for k in range(256)]
+        place.write_text("\n".join(["time (s),power", *rows[:-1], f"{PERIOD_S * 255:.4f},{last}", ""]))
+        os.utime(place, ns=(moment_s * 10**9, moment_s * 10**9))
+        return of_mission.series_of(table, tmp_path)
+
+    first = write("2", 1000)
+    again = write("2.5" if changed == "size" else "3", 1001 if changed == "time" else 1000)
+    assert (again is first) is (changed == "nothing")  # then nobody can tell
+    assert of_mission.series_of(table, tmp_path) is again
+    place.unlink()
+    with pytest.raises(FadeSeriesError):
+        of_mission.series_of(table, tmp_path)

@@ -355,6 +355,7 @@ def test_where_nothing_is_left_it_says_how_much_is_missing():
     missing = (26 - 26 + 3 * ramp, 6 + 3 * math.hypot(10, ramp) - 26, 50 - 26)
     assert [each.missing_rad / URAD for each in lost] == pytest.approx(missing)
     assert [each.largest_rad for each in lost] == [0.0, 0.0, 0.0]
+    assert [(each.name, each.stated_rad) for each in lost] == [(line.name, line.error_rad) for line in LINES]
     # the others alone just meet it
     (just, _) = summation.allocate(LINES[:2], 20 * URAD, rule="ecss-axis", confidence=THREE_SIGMA)
     assert (just.missing_rad, just.note) == (0.0, "")

@@ -425,6 +425,8 @@ def test_day_is_never_night_and_the_shadow_ends_where_its_cone_does():
     assert sun.shadow_rad(-1.0001 * tip_m * light, light, "sphere")[0] < 0.0
     with pytest.raises(OrbitError, match=r"sample 0 is at 0\.9\d* Earth radii, inside the Earth"):
         sun.shadow_rad(6e6 * light, light, "sphere")
+    with pytest.raises(OrbitError, match=r"sample 1 is at 0\.5\d* Earth radii"):  # the deepest
+        sun.shadow_rad(np.array([[6e6, 3.5e6, 9e6]]) * light, np.repeat(light, 3, axis=1), "sphere")
 
 
 def test_the_sun_is_as_wide_as_the_almanac_says():

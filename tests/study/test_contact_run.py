@@ -993,3 +993,40 @@ def test_the_sums_of_a_contact_are_those_of_its_log_and_its_windows():
 )  # fmt: skip
 def test_a_run_is_long_enough_from_its_length_on(holds, length, begin):
     assert first_run(np.array([each == "1" for each in holds], dtype=bool), length) == begin
+
+
+@pytest.mark.parametrize(("lost_s", "left_s"), [(1597.0, 2.0), (1598.5, 0.5), (1590.0, 2.0)])
+def test_a_window_behind_a_loss_ends_with_its_contact(lost_s, left_s):
+    """A window of 2 s at the begin of data, one behind its loss and one right before the end of the contact."""
+    log, asked = sequence.Log(contact(1000.0, 600.0)), []
+    log.go(1100.0, State.DATA, "")
+
+    class Acquire:
+        attempts = 5
+
+        def __call__(self):
+            return log.go(lost_s + 1.0, State.DATA, "")
+
+    def made(start_s, length_s, loss=None):
+        return SimpleNamespace(start_s=start_s, seconds=length_s, loss=loss)
+
+    def windows(planned):
+        asked.extend(planned)
+        (first, length), *others = planned
+        return [made(first, length, Loss(lost_s, lost_s, lost_s, "dark")), *(made(*each) for each in others)]
+
+    def window(number, start_s, length_s):
+        asked.append((number, start_s, length_s))
+        return made(start_s, length_s)
+
+    sampler = SimpleNamespace(
+        settings=settings(windows=2, window_s=2.0),
+        windows=windows,
+        window=window,
+        loop=SimpleNamespace(timing=SimpleNamespace(period_s=1e-3)),
+    )
+    found = sequence._data(log, Acquire(), sampler)
+    assert asked == [(1100.0, 2.0), (1598.0, 2.0), (2, lost_s + 1.0, left_s)]
+    behind = [each.start_s for each in found]
+    last = [1598.0] if lost_s + 3.0 <= 1598.0 else []  # it would begin before the one behind the loss has ended
+    assert behind == [1100.0, lost_s + 1.0, *last]
