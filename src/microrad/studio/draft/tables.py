@@ -95,7 +95,7 @@ def _examples() -> dict[str, str]:
     shipped = resources.files("microrad.mission").joinpath("missions", "leo-geo.toml").read_text("utf-8")
     active = dict(_blocks(shipped))
     added = dict(_blocks(own))
-    found = {name: _whole(name, active) for name in active} | {name: _with_inner(name, added) for name in added}
+    found = {name: _whole(name, active) for name in active} | {name: _with_named(name, added) for name in added}
     found |= _uncommented(shipped)
     return {name: found[name] for name in sorted(found, key=lambda name: name.count("."))}
 
@@ -111,13 +111,14 @@ def _uncommented(text: str) -> dict[str, str]:
 
 def _whole(name: str, blocks: dict[str, str]) -> str:
     """A table's block; that of an outermost one with the blocks of its inner tables behind it."""
-    return blocks[name] if "." in name else _with_inner(name, blocks)
-
-
-def _with_inner(name: str, blocks: dict[str, str]) -> str:
-    """A table's block with those of its inner tables behind it."""
-    inner = (text for each, text in blocks.items() if each.startswith(f"{name}."))
+    inner = [] if "." in name else [text for each, text in blocks.items() if each.startswith(f"{name}.")]
     return "\n\n".join((blocks[name], *inner))
+
+
+def _with_named(name: str, blocks: dict[str, str]) -> str:
+    """A table's block with those of its stations behind it; other inner tables are added by themselves."""
+    named = (text for each, text in blocks.items() if each.startswith(f"{name}.stations."))
+    return "\n\n".join((blocks[name], *named))
 
 
 def _blocks(text: str) -> Iterator[tuple[str, str]]:
