@@ -33,7 +33,7 @@ def test_every_controllers_worked_example_runs(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     text = (ROOT / "docs" / "pointing.md").read_text(encoding="utf-8")
     blocks = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
-    assert len(blocks) == 14
+    assert len(blocks) == 15
     budget, table = re.findall(r"```toml\n(.*?)```", text, flags=re.DOTALL)
     shipped = (ROOT / "missions" / "leo-geo.toml").read_text(encoding="utf-8")
     asked = load_mission("m.toml", text=shipped + budget).mission.error_budget
@@ -46,7 +46,7 @@ def test_every_controllers_worked_example_runs(tmp_path, monkeypatch, capsys):
     for block in blocks:
         exec(block, session)
     printed = capsys.readouterr().out
-    assert printed.count("\n") == 16 and "nan" not in printed
+    assert printed.count("\n") == 17 and "nan" not in printed
     assert "hysteresis is a Bouc-Wen model" in printed
     assert "mean of an axis over 1 s: 5.8005 urad, by the rational filter +9.7%" in printed
     constants = {name: getattr(control, name) for name in dir(control) if name.isupper()}

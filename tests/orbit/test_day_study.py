@@ -773,6 +773,7 @@ def test_constants_are_exceeded_from_a_hundredth_on_each_by_its_own_measure(fact
         communication=beam,
         beacon=beam,
         answer=beam,
+        range_m=lambda table: table.distance_m,
         point_ahead=SimpleNamespace(transverse_velocity_m_s=25e-6 * 299_792_458.0 * factor),
         fine_pointing=SimpleNamespace(reference=SimpleNamespace(line_of_sight_rate_rad_s=200e-6 * factor)),
     )

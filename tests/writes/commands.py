@@ -619,6 +619,7 @@ WRITERS = {
     "report/identification/page.py": "identify",
     "report/verification/checks/draws.py": "missions and campaigns in a folder among the temporary files",
     "report/verification/checks/fades.py": "missions in a folder among the temporary files",
+    "report/verification/checks/ground.py": "missions in a folder among the temporary files",
     "report/verification/checks/operation.py": "missions in a folder among the temporary files",
     "report/verification/checks/search.py": "missions in a folder among the temporary files",
     "report/verification/workspace.py": "the shipped mission in a folder among the temporary files",

@@ -56,7 +56,7 @@ class TransmittedBeam:
 class Shared:
     """What a mission's links share: the terminals at their ends, the air between them, point-ahead, conventions.
 
-    ``path`` is that through the air, None in vacuum. ``outage`` is the share of the time that fades may take.
+    ``path`` is that through the air, None in vacuum. ``outage`` is the share of the time that fades of the air may take.
     """
 
     terminals: Terminals
@@ -69,14 +69,18 @@ class Shared:
     @classmethod
     def of(cls, m: LinkMission) -> "Shared":
         """What the links of this mission share."""
-        return cls(m.terminals, m.conventions, m.channel, m.point_ahead, m.path, m.requirement.outage)
+        fades = m.channel is not None and m.channel.turbulence is not None
+        outage = m.requirement.outage if fades else None
+        return cls(m.terminals, m.conventions, m.channel, m.point_ahead, m.path, outage)
 
     @property
     def sky(self) -> air.Sky | None:
         """The air on the path; None in vacuum."""
+        if self.channel is None or self.path is None:
+            return None
         ahead = self.point_ahead
         angle = 0.0 if ahead is None else pointing_table.point_ahead_rad(ahead.transverse_velocity_m_s)
-        return None if self.channel is None or self.path is None else air.Sky(self.channel, self.path, angle)
+        return air.Sky(self.channel, self.path, angle)
 
     def clear_sky_db(self, wavelength_m: float) -> float:
         """Loss (dB) of a clear atmosphere on the path at a wavelength (m); 0 in vacuum."""
