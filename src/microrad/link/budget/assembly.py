@@ -56,7 +56,7 @@ class TransmittedBeam:
 class Shared:
     """What a mission's links share: the terminals at their ends, the air between them, point-ahead, conventions.
 
-    ``path`` is that through the air, None in vacuum. ``outage`` is the share of the time that fades of the air may take.
+    ``path`` is that through the air, None in vacuum. ``outage`` is the share of the time that fades may take.
     """
 
     terminals: Terminals
