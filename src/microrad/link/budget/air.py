@@ -23,7 +23,7 @@ from microrad.mission.ground import GroundPath
 from microrad.mission.tables.channel import Channel, TurbulenceTable
 
 UPLINK, DOWNLINK = "uplink", "downlink"
-_LEAST_SHARE, _FADES = 1e-15, 1000  # of a fade that is told from none, and how many losses stand for all
+_LEAST_SHARE, _FADES = 1e-15, 1600  # of a fade that is told from none, and how many losses stand for all
 _NO_INDEX = 1e-12
 
 
@@ -210,7 +210,8 @@ def losses(fades: Fades) -> coupling.Losses:
         fades: The fades.
     """
     deepest, highest = fades.loss_db(_LEAST_SHARE), fades.loss_db(1.0 - 1e-12)
-    edge = np.linspace(highest, deepest, _FADES + 1)
+    ends = math.floor(highest * 10.0) / 10.0, math.ceil(deepest * 10.0) / 10.0  # the same however a processor rounds
+    edge = np.linspace(*ends, _FADES + 1)
     share = -np.diff(fades.below(10.0 ** (-edge / 10.0)))
     there = share > 0.0
     return coupling.Losses.of(((edge[1:] + edge[:-1]) / 2.0)[there], share[there])

@@ -51,7 +51,7 @@ class Fades(Bounded, ABC):
             low = 2.0 * low
         while beyond(high) > 0.0:
             low, high = high, 2.0 * high
-        return float(brentq(beyond, low, high, xtol=1e-9))
+        return float(brentq(beyond, low, high, xtol=1e-12))
 
 
 @dataclass(frozen=True, slots=True)
