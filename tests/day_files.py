@@ -1,10 +1,9 @@
 """Missions with the tables of a day: the shipped ones with keys changed, element sets and ephemerides."""
 
 import tomllib
-from copy import deepcopy
 from datetime import datetime, timedelta
 
-from link_files import written
+from link_files import with_keys, written
 from microrad.mission.file import load_link
 from shipped import SHIPPED
 
@@ -61,16 +60,7 @@ def day_data(*changes):
     del data["conventions"]["residual"], data["conventions"]["mirror_angle"], data["requirement"]["residual_statistic"]
     del data["acquisition"]["scan"]
     data["acquisition"]["runs"] = 100
-    for dotted, value in [item for each in changes for item in each.items()]:
-        *tables, key = dotted.split(".")
-        table = data
-        for name in tables:
-            table = table.setdefault(name, {})
-        if value is None:
-            table.pop(key, None)
-        else:
-            table[key] = deepcopy(value)
-    return data
+    return with_keys(data, *changes)
 
 
 def day_path(folder, *changes):

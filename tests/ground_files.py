@@ -3,7 +3,7 @@
 import tomllib
 from copy import deepcopy
 
-from link_files import written
+from link_files import with_keys, written
 from microrad.mission.file import load_link
 from microrad.mission.presets import preset_text
 
@@ -32,17 +32,7 @@ WIND = {"ground": "5 m/s", "jet": "30 m/s", "peak": "9.4 km", "width": "4.8 km"}
 
 def ground_data(*changes):
     """The tables of that mission with dotted keys given; None takes a key out."""
-    data = deepcopy(_SHIPPED)
-    for dotted, value in [item for each in changes for item in each.items()]:
-        *tables, key = dotted.split(".")
-        table = data
-        for name in tables:
-            table = table.setdefault(name, {})
-        if value is None:
-            table.pop(key, None)
-        else:
-            table[key] = deepcopy(value)
-    return data
+    return with_keys(deepcopy(_SHIPPED), *changes)
 
 
 def ground_path(folder, *changes):

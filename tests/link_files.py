@@ -2,6 +2,7 @@
 
 import json
 import tomllib
+from copy import deepcopy
 
 from microrad.mission.file import load_link
 from microrad.mission.model import LinkMission
@@ -72,15 +73,20 @@ def data_with(changes):
     for key in ("conventions.residual", "conventions.mirror_angle", "requirement.residual_statistic"):
         table, _, name = key.partition(".")
         del data[table][name]  # of the loop
-    for dotted, value in changes.items():
+    return with_keys(data, changes)
+
+
+def with_keys(data, *changes):
+    """The tables, with dotted keys given in them; None takes a key out."""
+    for dotted, value in [item for each in changes for item in each.items()]:
         *tables, key = dotted.split(".")
         table = data
         for name in tables:
             table = table.setdefault(name, {})
         if value is None:
-            table.pop(key)
+            table.pop(key, None)
         else:
-            table[key] = value
+            table[key] = deepcopy(value)
     return data
 
 

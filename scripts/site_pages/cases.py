@@ -211,7 +211,7 @@ def receivers() -> Iterator[Case]:
 def orbit() -> Iterator[Case]:
     """The published verification of SGP4, and the geometry of a low orbit and a slot."""
     yield from evidence("sgp4")
-    from microrad.orbit.earth.figure import EARTH_RADIUS_M
+    from microrad.core.earth import EARTH_RADIUS_M
     from microrad.orbit.propagation import analytic
     from microrad.orbit.visibility.contacts import coplanar_contact
 

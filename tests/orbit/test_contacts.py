@@ -11,18 +11,11 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
+from microrad.core.earth import EARTH_RADIUS_M, FLATTENING, GEOSTATIONARY_RADIUS_M
 from microrad.mission.tables.pointing import point_ahead_rad
 from microrad.orbit.base import OrbitError, States
 from microrad.orbit.earth.epoch import Epoch
-from microrad.orbit.earth.figure import (
-    EARTH_RADIUS_M,
-    FLATTENING,
-    GEOSTATIONARY_RADIUS_M,
-    Earth,
-    Station,
-    elevation_rad,
-    gravity,
-)
+from microrad.orbit.earth.figure import Earth, Station, elevation_rad, gravity
 from microrad.orbit.earth.sun import shadow_rad, sun_direction
 from microrad.orbit.propagation.analytic import GeostationarySlot, KeplerOrbit, circular
 from microrad.orbit.visibility import events, limits

@@ -20,6 +20,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
+from microrad.core.earth import EARTH_RADIUS_M, GEOSTATIONARY_RADIUS_M, MU_M3_S2, ROTATION_RAD_S
 from microrad.core.units import SPEED_OF_LIGHT_M_S
 from microrad.orbit.base import OrbitError
 from microrad.orbit.earth import epoch, sun
@@ -30,7 +31,7 @@ from microrad.orbit.propagation import analytic
 START = Epoch("2026-03-20T12:00:00Z")
 DAY_S = 86400.0
 MINUTE_S = 60.0
-RE = earth.EARTH_RADIUS_M
+RE = EARTH_RADIUS_M
 SPHERE, OBLATE = earth.Earth("sphere", 0.0), earth.Earth("oblate", 0.0)
 LEO = analytic.circular("LEO", START, 500e3, 0.0, 0.3, 1.2, False)
 SLOT = analytic.GeostationarySlot("GEO", START, 0.4)
@@ -163,7 +164,7 @@ def test_the_earth_turns_as_in_astropy(text):
     wanted = instants.utc.sidereal_time("mean", "greenwich", model="IAU1982").rad
     angle = Epoch(text).earth_rotation_rad(time_s)
     assert np.max(np.abs(wrapped(angle - wanted))) < one_microradian
-    np.testing.assert_allclose(np.diff(angle), earth.ROTATION_RAD_S * np.diff(time_s), rtol=1e-6)
+    np.testing.assert_allclose(np.diff(angle), ROTATION_RAD_S * np.diff(time_s), rtol=1e-6)
 
 
 @pytest.mark.promise("day-9")
@@ -215,8 +216,8 @@ def test_the_tables_of_time_are_read_only_when_an_instant_needs_them():
 
 # ---- Earth
 def test_the_geostationary_radius_follows_from_the_sidereal_rotation():
-    assert round(earth.GEOSTATIONARY_RADIUS_M / 1e3, 2) == 42_164.17
-    assert 2.0 * math.pi / earth.ROTATION_RAD_S == pytest.approx(86164.0905, abs=1e-3)
+    assert round(GEOSTATIONARY_RADIUS_M / 1e3, 2) == 42_164.17
+    assert 2.0 * math.pi / ROTATION_RAD_S == pytest.approx(86164.0905, abs=1e-3)
 
 
 @pytest.mark.parametrize("j2", [False, True])
@@ -224,7 +225,7 @@ def test_gravity_is_the_slope_of_its_potential(j2):
     def potential(r):
         square = np.sum(r * r, axis=0)
         flat = earth.J2 * RE**2 / square * (1.5 * r[2] ** 2 / square - 0.5) if j2 else 0.0
-        return earth.MU_M3_S2 / np.sqrt(square) * (1.0 - flat)
+        return MU_M3_S2 / np.sqrt(square) * (1.0 - flat)
 
     r, step = 7.2e6 * directions(1, 30), 30.0
     slope = [(potential(r + step * e) - potential(r - step * e)) / (2.0 * step) for e in np.eye(3)[:, :, None]]
@@ -499,8 +500,8 @@ def test_two_bodies_move_as_integration_says(name):
 def elements(r, v):
     """Osculating semi-major axis, node, perigee and mean anomaly."""
     h = np.cross(r, v, axis=0)
-    e = np.cross(v, h, axis=0) / earth.MU_M3_S2 - r / length(r)
-    axis = 1.0 / (2.0 / length(r) - np.sum(v * v, axis=0) / earth.MU_M3_S2)
+    e = np.cross(v, h, axis=0) / MU_M3_S2 - r / length(r)
+    axis = 1.0 / (2.0 / length(r) - np.sum(v * v, axis=0) / MU_M3_S2)
     node = np.arctan2(h[0], -h[1])
     n = np.stack((np.cos(node), np.sin(node), 0.0 * node))
     m = np.cross(h / length(h), n, axis=0)
@@ -685,8 +686,8 @@ def limits_of_first_contact(surface):
 def test_the_contact_of_an_equatorial_orbit_at_500_km_and_a_slot_lasts_as_computed_by_hand(shape, height_m, minutes):
     start, end = limits_of_first_contact(earth.Earth(shape, height_m))
     assert (end - start) / MINUTE_S == pytest.approx(minutes, abs=half_a_hundredth_minute)
-    synodic = 2.0 * math.pi / (LEO.mean_motion_rad_s - earth.ROTATION_RAD_S)
-    radii = (LEO.semi_major_axis_m, earth.GEOSTATIONARY_RADIUS_M)
+    synodic = 2.0 * math.pi / (LEO.mean_motion_rad_s - ROTATION_RAD_S)
+    radii = (LEO.semi_major_axis_m, GEOSTATIONARY_RADIUS_M)
     closed = synodic / math.pi * sum(math.acos((RE + height_m) / r) for r in radii)
     assert end - start == pytest.approx(closed, abs=1e-3)
 
@@ -747,7 +748,7 @@ def test_a_station_stands_where_astropy_has_it_and_turns_with_the_earth(site):
     x, y, z = (c.to_value("m") for c in fixed)
     wanted = np.stack((np.cos(angle) * x - np.sin(angle) * y, np.sin(angle) * x + np.cos(angle) * y, 0.0 * angle + z))
     np.testing.assert_allclose(states.position_m, wanted, rtol=0.0, atol=ten_micrometres)
-    axis = np.array([[0.0], [0.0], [earth.ROTATION_RAD_S]])
+    axis = np.array([[0.0], [0.0], [ROTATION_RAD_S]])
     np.testing.assert_allclose(states.velocity_m_s, np.cross(axis, wanted, axis=0), rtol=0.0, atol=1e-9)
     below = earth.subpoint(states.position_m, angle)
     np.testing.assert_allclose(below.height_m, site[2], rtol=0.0, atol=ten_micrometres)

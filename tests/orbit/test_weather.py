@@ -9,9 +9,9 @@ from scipy.special import ndtri
 from scipy.stats import multivariate_normal
 
 from microrad import orbit
+from microrad.core.earth import EARTH_RADIUS_M
 from microrad.orbit.day import weather as skies
 from microrad.orbit.day.weather import Site, Weather
-from microrad.orbit.earth.figure import EARTH_RADIUS_M
 
 EPOCH = orbit.Epoch("2026-03-20T12:00:00Z")
 HOLDS_S, MANY = 60.0, 40_000

@@ -4,14 +4,13 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
+from microrad.core.earth import EARTH_RADIUS_M, GEOSTATIONARY_RADIUS_M, place_m
 from microrad.core.units import format_quantity
 from microrad.mission.fields import Problem
 from microrad.mission.tables.channel import Channel
 from microrad.mission.tables.link import Beacon, Beam, Communication, LinkRequirement
 from microrad.mission.tables.orbit import Orbits, OrbitTable
 
-EQUATORIAL_RADIUS_M, _FLATTENING = 6378137.0, 1.0 / 298.257223563  # WGS 84
-_GEOSTATIONARY_M = 42164.17e3
 _AIR_M = 100e3
 
 
@@ -54,7 +53,7 @@ class GroundPath:
         """Altitude (m) over the equatorial radius of a satellite that is at a range (m) at the budget's elevation."""
         own = self.station_radius_m
         square = own**2 + range_m**2 + 2.0 * own * range_m * math.sin(self.elevation_rad)
-        return math.sqrt(square) - EQUATORIAL_RADIUS_M
+        return math.sqrt(square) - EARTH_RADIUS_M
 
     def at(self, elevation_rad: float) -> "GroundPath":
         """The path at another elevation (rad)."""
@@ -68,10 +67,7 @@ def geocentric_radius_m(latitude_rad: float, height_m: float) -> float:
         latitude_rad: Geodetic latitude (rad).
         height_m: Height above the ellipsoid (m).
     """
-    square = _FLATTENING * (2.0 - _FLATTENING)
-    sine, cosine = math.sin(latitude_rad), math.cos(latitude_rad)
-    normal = EQUATORIAL_RADIUS_M / math.sqrt(1.0 - square * sine**2)
-    return math.hypot((normal + height_m) * cosine, (normal * (1.0 - square) + height_m) * sine)
+    return math.hypot(*place_m(latitude_rad, height_m))
 
 
 def path_of(orbit: Orbits | None, channel: Channel | None) -> GroundPath | None:
@@ -90,9 +86,9 @@ def path_of(orbit: Orbits | None, channel: Channel | None) -> GroundPath | None:
         elevation, height = channel.elevation_rad, channel.height_m or 0.0
         if elevation is None:
             return None
-        radius = None if channel.altitude_m is None else EQUATORIAL_RADIUS_M + channel.altitude_m
+        radius = None if channel.altitude_m is None else EARTH_RADIUS_M + channel.altitude_m
         keys = ("channel.elevation",) if radius is None else ("channel.elevation", "channel.altitude")
-        own = EQUATORIAL_RADIUS_M + height
+        own = EARTH_RADIUS_M + height
         path = GroundPath(channel.station or "", elevation, height, own, radius, keys)
         return path if orbit is None else replace(path, doubt=_beside(path, orbit))
     end = orbit.station
@@ -121,7 +117,7 @@ def _beside(path: GroundPath, orbit: Orbits) -> str:
     said = "elevation and distance are typed beside the table orbit, in which both terminals fly"
     if orbit.leo.altitude_m is None:
         return said
-    low = replace(path, satellite_radius_m=EQUATORIAL_RADIUS_M + orbit.leo.altitude_m)
+    low = replace(path, satellite_radius_m=EARTH_RADIUS_M + orbit.leo.altitude_m)
     at = f"{math.degrees(path.elevation_rad):.4g} deg"
     range_m = format_quantity(low.range_at(path.elevation_rad), "m")
     return f"{said}: from {format_quantity(orbit.leo.altitude_m, 'm')} up the range at {at} is {range_m}"
@@ -143,26 +139,24 @@ def range_of(beam: Beam, path: GroundPath | None) -> float:
 def _satellite_radius_m(orbit: OrbitTable, channel: Channel) -> tuple[float | None, str]:
     """The satellite's largest distance from the Earth's centre, and the key that says it."""
     if orbit.kind == "geostationary":
-        return _GEOSTATIONARY_M, "longitude"
+        return GEOSTATIONARY_RADIUS_M, "longitude"
     if orbit.semi_major_axis_m is not None:
         return orbit.semi_major_axis_m * (1.0 + (orbit.eccentricity or 0.0)), "semi_major_axis"
     altitude = channel.altitude_m if orbit.altitude_m is None else orbit.altitude_m
-    return None if altitude is None else EQUATORIAL_RADIUS_M + altitude, "altitude"
+    return None if altitude is None else EARTH_RADIUS_M + altitude, "altitude"
 
 
 def _slot_elevation_rad(site: OrbitTable, slot: OrbitTable) -> float:
     """Elevation (rad) of a geostationary satellite above a station's horizon, below 0 where the Earth hides it."""
     latitude, height = site.latitude_rad or 0.0, site.height_m or 0.0
     apart = (slot.longitude_rad or 0.0) - (site.longitude_rad or 0.0)
-    square = _FLATTENING * (2.0 - _FLATTENING)
-    sine, cosine = math.sin(latitude), math.cos(latitude)
-    normal = EQUATORIAL_RADIUS_M / math.sqrt(1.0 - square * sine**2)
+    across, along = place_m(latitude, height)
     line = (
-        _GEOSTATIONARY_M * math.cos(apart) - (normal + height) * cosine,
-        _GEOSTATIONARY_M * math.sin(apart),
-        -(normal * (1.0 - square) + height) * sine,
+        GEOSTATIONARY_RADIUS_M * math.cos(apart) - across,
+        GEOSTATIONARY_RADIUS_M * math.sin(apart),
+        -along,
     )
-    return math.asin((cosine * line[0] + sine * line[2]) / math.hypot(*line))
+    return math.asin((math.cos(latitude) * line[0] + math.sin(latitude) * line[2]) / math.hypot(*line))
 
 
 # -------------------------------------------------------------------------------------------------------- what must fit

@@ -3,16 +3,10 @@
 `operations` makes data of contacts, and `day` says what a link delivers in a day.
 """
 
+from microrad.core.earth import EARTH_RADIUS_M, GEOSTATIONARY_RADIUS_M
 from microrad.orbit.base import OrbitError
 from microrad.orbit.earth.epoch import Epoch
-from microrad.orbit.earth.figure import (
-    EARTH_RADIUS_M,
-    GEOSTATIONARY_RADIUS_M,
-    Earth,
-    GroundSite,
-    Station,
-    subpoint,
-)
+from microrad.orbit.earth.figure import Earth, GroundSite, Station, subpoint
 from microrad.orbit.earth.sun import sun_direction
 from microrad.orbit.from_mission import Pair, pair, relays, repeats, satellites, stations
 from microrad.orbit.propagation.analytic import GeostationarySlot, KeplerOrbit, circular

@@ -6,13 +6,14 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from microrad.core.earth import EARTH_RADIUS_M
 from microrad.mission.file import NamedFile, content_of
 from microrad.mission.tables.link import Terminals
 from microrad.mission.tables.operations import Constellation, Downlink, OpticalDownlink
 from microrad.mission.tables.orbit import Orbits, OrbitTable, VisibilityLimits
 from microrad.orbit.base import Orbit, OrbitError, required
 from microrad.orbit.earth.epoch import Epoch
-from microrad.orbit.earth.figure import EARTH_RADIUS_M, Earth, GroundSite, Station
+from microrad.orbit.earth.figure import Earth, GroundSite, Station
 from microrad.orbit.files import read_elements, read_oem
 from microrad.orbit.propagation.analytic import (
     GeostationarySlot,

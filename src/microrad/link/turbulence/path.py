@@ -8,7 +8,7 @@ import math
 from abc import ABC
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Annotated, Literal, get_args
+from typing import Annotated, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,11 +18,7 @@ from microrad.link.gains import checked
 from microrad.link.turbulence.fades import GammaGamma
 from microrad.link.turbulence.profile import BuftonWind, HufnagelValley, heights
 from microrad.mission.fields import Bounded, Quantity
-
-Wander = Literal["dios-2004", "itu-r-p1622", "andrews-phillips-2005"]
-"""Which constant the beam's wander has: 2.07, 3.43 or 7.25; the literature does not agree."""
-Tilt = Literal["zernike", "gradient"]
-"""Which angle of arrival a sensor sees: that of the plane that fits best, or the mean of the slopes (of a centroid)."""
+from microrad.mission.tables.channel import Tilt, Wander
 
 WEAK = 0.3
 """Rytov variance up to which turbulence is weak, and the closed forms of an index hold."""

@@ -12,6 +12,11 @@ from microrad.mission.tables.mirror import ANGLE_MOST
 LOWEST_ELEVATION_RAD = math.radians(10.0)
 """Elevation below which a plane-parallel atmosphere is no model of the path."""
 
+Wander = Literal["dios-2004", "itu-r-p1622", "andrews-phillips-2005"]
+"""Which constant the beam's wander has: 2.07, 3.43 or 7.25; the literature does not agree."""
+Tilt = Literal["zernike", "gradient"]
+"""Which angle of arrival a sensor sees: that of the plane that fits best, or the mean of the slopes (of a centroid)."""
+
 _Speed = Annotated[float, Quantity("m/s", "m/s", least=0.0, most=200.0)]
 _Height = Annotated[float, Quantity("m", "km", least=0.0, most=30e3)]
 
@@ -40,10 +45,8 @@ class TurbulenceTable(Table):
     fades: Literal["log-normal", "gamma-gamma"] = Field(
         description="law of the power at one scintillation index; gamma-gamma has the deeper fades"
     )
-    wander: Literal["dios-2004", "itu-r-p1622", "andrews-phillips-2005"] = Field(
-        description="constant of the uplink's beam wander: 2.07, 3.43 or 7.25"
-    )
-    tilt: Literal["zernike", "gradient"] = Field(
+    wander: Wander = Field(description="constant of the uplink's beam wander: 2.07, 3.43 or 7.25")
+    tilt: Tilt = Field(
         description="angle of arrival: of the plane that fits best, or the mean of the slopes, as a centroid has it"
     )
     corrected_modes: Annotated[int, Whole("", least=0, most=1000)] = Field(

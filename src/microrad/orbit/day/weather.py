@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from microrad import orbit
 from microrad.core.arrays import Floats
+from microrad.core.earth import EARTH_RADIUS_M
 from microrad.mission.fields import MONTHS
 from microrad.orbit.earth.epoch import LAST_DAY
-from microrad.orbit.earth.figure import EARTH_RADIUS_M
 
 WEATHER = 2
 """Purpose of the random numbers of the weather, the top word of their counter; those of acquisitions have 0 there."""

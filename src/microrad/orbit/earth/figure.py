@@ -7,22 +7,13 @@ from typing import Annotated, Literal, NamedTuple, get_args
 import numpy as np
 
 from microrad.core.arrays import Floats
+from microrad.core.earth import EARTH_RADIUS_M, FLATTENING, MU_M3_S2, ROTATION_RAD_S, place_m
 from microrad.mission.fields import Quantity, Share
 from microrad.orbit.base import Bounded, OrbitError, States
 from microrad.orbit.earth.epoch import Epoch
 
-EARTH_RADIUS_M = 6378137.0
-"""Equatorial radius (WGS84)."""
-FLATTENING = 1.0 / 298.257223563
-"""(a - b) / a of the ellipsoid (WGS84)."""
-MU_M3_S2 = 3.986004418e14
-"""Gravitational constant times mass of the Earth, atmosphere included (WGS84)."""
 J2 = 1.08262668355e-3
 """Unnormalised second zonal harmonic (EGM96)."""
-ROTATION_RAD_S = 2.0 * math.pi * 1.002737909350795 / 86400.0
-"""Rate of Greenwich mean sidereal time (Aoki et al. 1982): against the moving equinox, as TEME is; 7.292115855e-5."""
-GEOSTATIONARY_RADIUS_M = (MU_M3_S2 / ROTATION_RAD_S**2) ** (1.0 / 3.0)
-"""Radius at which a two-body circular orbit turns with the Earth, 42 164.17 km."""
 
 Shape = Literal["oblate", "sphere"]
 """Figure of the Earth: the ellipsoid of WGS84, or a sphere of its equatorial radius."""
@@ -215,11 +206,7 @@ class Station(Bounded):
         Raises:
             OrbitError: For a time outside the tables of `Epoch`.
         """
-        square = FLATTENING * (2.0 - FLATTENING)
-        sine = math.sin(self.latitude_rad)
-        normal = EARTH_RADIUS_M / math.sqrt(1.0 - square * sine * sine)
-        across = (normal + self.height_m) * math.cos(self.latitude_rad)
-        z = (normal * (1.0 - square) + self.height_m) * sine
+        across, z = place_m(self.latitude_rad, self.height_m)
         angle = epoch.earth_rotation_rad(time_s) + self.longitude_rad
         x, y = across * np.cos(angle), across * np.sin(angle)
         velocity = np.stack((-ROTATION_RAD_S * y, ROTATION_RAD_S * x, np.zeros_like(x)))
@@ -256,20 +243,14 @@ class GroundSite:
         """Position and velocity in TEME, see `Station.position`."""
         return self.station.position(self.epoch, np.asarray(time_s, dtype=np.float64))
 
-    def above_mask(self, station_m: Floats, satellite_m: Floats) -> Floats:
-        """Sine of a satellite's elevation less that of the mask, shape (n,).
+    def above_mask(self, time_s: Floats, satellite_m: Floats) -> Floats:
+        """Elevation of a satellite less that of the mask, rad, shape (n,).
 
         Args:
-            station_m: Positions of the station in TEME, m, shape (3, n).
-            satellite_m: Those of the satellite at the same times, likewise.
+            time_s: Times after the epoch, s, shape (n,).
+            satellite_m: Positions of the satellite in TEME at these times, m, shape (3, n).
         """
-        s = self.station
-        square, sine = FLATTENING * (2.0 - FLATTENING), math.sin(s.latitude_rad)
-        normal = EARTH_RADIUS_M / math.sqrt(1.0 - square * sine * sine)
-        level, pole = normal + s.height_m, normal * (1.0 - square) + s.height_m
-        up = np.stack((station_m[0] / level, station_m[1] / level, station_m[2] / pole))
-        line = satellite_m - station_m
-        return np.asarray(np.sum(up * line, axis=0) / np.sqrt(_square(line)) - math.sin(s.mask_rad))
+        return elevation_rad(self.station, self.epoch, time_s, satellite_m) - self.station.mask_rad
 
 
 def elevation_rad(station: Station, epoch: Epoch, time_s: Floats, position_m: Floats) -> Floats:

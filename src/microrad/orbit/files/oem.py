@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 
 from microrad.core.arrays import Floats
+from microrad.core.earth import MU_M3_S2, ROTATION_RAD_S
 from microrad.orbit.base import OrbitError, States
 from microrad.orbit.earth.epoch import Epoch
-from microrad.orbit.earth.figure import MU_M3_S2, ROTATION_RAD_S
 from microrad.orbit.files import messages
 from microrad.orbit.propagation.ephemeris import SLACK_S, EphemerisOrbit, Segment
 

@@ -7,10 +7,11 @@ from typing import Annotated
 import numpy as np
 
 from microrad.core.arrays import Floats
+from microrad.core.earth import EARTH_RADIUS_M, GEOSTATIONARY_RADIUS_M, MU_M3_S2, ROTATION_RAD_S
 from microrad.mission.fields import Quantity, Share
 from microrad.orbit.base import Bounded, OrbitError, States
 from microrad.orbit.earth.epoch import DAY_S, Epoch
-from microrad.orbit.earth.figure import EARTH_RADIUS_M, GEOSTATIONARY_RADIUS_M, J2, MU_M3_S2, ROTATION_RAD_S
+from microrad.orbit.earth.figure import J2
 
 LOWEST_PERIGEE_M = 120e3
 """Height over the equatorial radius below which the air ends an orbit within about one turn."""

@@ -9,19 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from microrad.core.arrays import Floats
+from microrad.core.earth import EARTH_RADIUS_M, GEOSTATIONARY_RADIUS_M, MU_M3_S2, ROTATION_RAD_S
 from microrad.core.units import format_quantity
 from microrad.orbit.base import Orbit, OrbitError, States
 from microrad.orbit.earth.epoch import Epoch
-from microrad.orbit.earth.figure import (
-    EARTH_RADIUS_M,
-    GEOSTATIONARY_RADIUS_M,
-    MU_M3_S2,
-    ROTATION_RAD_S,
-    Earth,
-    GroundSite,
-    Station,
-    elevation_rad,
-)
+from microrad.orbit.earth.figure import Earth, GroundSite, Station, elevation_rad
 from microrad.orbit.visibility.events import Intervals, Rows, intersection, largest, positive, positive_rows
 from microrad.orbit.visibility.limits import Condition, Side, Terminal, conditions
 from microrad.orbit.visibility.line_of_sight import dot
@@ -262,18 +254,18 @@ def mask_of(station: Station) -> str:
 def _above_masks(
     terminals: Sequence[Terminal], earth: Earth, time_s: Floats, row: Rows, first_m: Floats, second_m: Floats
 ) -> Floats:
-    """As `_clearance_rad`, but where one end is a station: sine of the elevation less that of its mask."""
+    """As `_clearance_rad`, but where one end is a station: the elevation less that of its mask."""
     own, found = terminals[0].orbit, np.empty(row.size)
     for index in np.unique(row):
         chosen, other = row == index, terminals[index + 1]
-        first, second = first_m[:, chosen], second_m[:, chosen]
+        time, first, second = time_s[chosen], first_m[:, chosen], second_m[:, chosen]
         if isinstance(own, GroundSite):
-            found[chosen] = own.above_mask(first, second)
+            found[chosen] = own.above_mask(time, second)
         elif isinstance(other.orbit, GroundSite):
-            found[chosen] = other.orbit.above_mask(second, first)
+            found[chosen] = other.orbit.above_mask(time, first)
         else:
             pair, alone = (terminals[0], other), np.zeros(int(np.sum(chosen)), dtype=row.dtype)
-            found[chosen] = _clearance_rad(pair, earth, time_s[chosen], alone, first, second)
+            found[chosen] = _clearance_rad(pair, earth, time, alone, first, second)
     return found
 
 

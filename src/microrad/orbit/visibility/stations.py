@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from microrad.core.arrays import Floats
+from microrad.core.earth import place_m
 from microrad.orbit.base import Orbit
 from microrad.orbit.earth.epoch import Epoch
-from microrad.orbit.earth.figure import EARTH_RADIUS_M, FLATTENING, Station
+from microrad.orbit.earth.figure import Station
 from microrad.orbit.visibility.contacts import Span, coarse_times
 from microrad.orbit.visibility.events import Intervals, Rows, intersection, positive_rows
 
@@ -37,10 +38,8 @@ class StationRows:
         latitude, longitude, height, mask = np.array(
             [(s.latitude_rad, s.longitude_rad, s.height_m, s.mask_rad) for s in stations], dtype=np.float64
         ).T.reshape(4, -1)
-        square, sine = FLATTENING * (2.0 - FLATTENING), np.sin(latitude)
-        normal = EARTH_RADIUS_M / np.sqrt(1.0 - square * sine * sine)
-        across, along = (normal + height) * np.cos(latitude), (normal * (1.0 - square) + height) * sine
-        return cls(epoch, longitude, across, along, np.cos(latitude), sine, mask)
+        across, along = np.array([place_m(*each) for each in zip(latitude, height, strict=True)]).reshape(-1, 2).T
+        return cls(epoch, longitude, across, along, np.cos(latitude), np.sin(latitude), mask)
 
     def lines(self, rotation_rad: Floats, row: Rows, position_m: Floats) -> tuple[Floats, Floats]:
         """Rise over the horizon and distance along it, m, both of the shape of the times and rows that are given.

@@ -183,10 +183,11 @@ def _recommendation(workspace: Workspace) -> Iterator[Comparison]:
 
 def _paper(workspace: Workspace) -> Iterator[Comparison]:
     """The power for 3 dB at 40 degrees, with the paper's gains, pointing and clouds and our range and loss of space."""
+    from microrad.core.earth import EARTH_RADIUS_M
     from microrad.link import gains
-    from microrad.mission.ground import EQUATORIAL_RADIUS_M, GroundPath
+    from microrad.mission.ground import GroundPath
 
-    elevation, station = math.radians(40.0), EQUATORIAL_RADIUS_M + 1e3
+    elevation, station = math.radians(40.0), EARTH_RADIUS_M + 1e3
     path = GroundPath("geo", elevation, 1e3, station, station + 549e3, ())
     transmit, receive, wavelength_um = 16.0 / 15e-6**2, (math.pi * 0.08 / 1550e-9) ** 2, 1.55
     a = -0.000545 * wavelength_um**2 + 0.002 * wavelength_um - 0.0038
