@@ -7,10 +7,10 @@ from typing import get_args
 
 from microrad import link
 from microrad.core.budget import Line
-from microrad.link.budget.air import UPLINK, Turbulent, wind_of
+from microrad.link.budget.air import UPLINK, Turbulent, source_of_air, wind_of
 from microrad.link.budget.assembly import at_elevation
 from microrad.link.pointing.outage import margin_db
-from microrad.mission.model import LinkMission, Source, source_text
+from microrad.mission.model import LinkMission, Source
 from microrad.mission.tables.channel import TurbulenceTable
 from microrad.mission.tables.link import half_angle_rad
 
@@ -85,9 +85,8 @@ def ground_link(m: LinkMission, sources: Mapping[str, Source], data: link.DataLi
 
 
 def _at(data: link.DataLink, elevation_rad: float) -> AtElevation:
-    there, turbulent = at_elevation(data, elevation_rad), data.turbulent
-    if there.turbulent is not None:
-        turbulent = there.turbulent
+    there = at_elevation(data, elevation_rad)
+    turbulent = there.turbulent
     return AtElevation(
         elevation_rad,
         there.range_m,
@@ -115,13 +114,8 @@ def _beams(m: LinkMission, sources: Mapping[str, Source], data: link.DataLink) -
     table = None if m.channel is None else m.channel.turbulence
     if table is None:
         return []
-    stated = [key for key in ("ground_strength", "wind_rms") if f"channel.turbulence.{key}" in sources]
-    source = source_text(sources, *(f"channel.turbulence.{key}" for key in stated))
-    found = []
-    for name, turbulent in _of_beams(m, data).items():
-        if turbulent is not None:
-            found.append((name, tuple(_lines(table, turbulent, source))))
-    return found
+    source, of_beams = source_of_air(sources), _of_beams(m, data).items()
+    return [(name, tuple(_lines(table, each, source))) for name, each in of_beams if each is not None]
 
 
 def _lines(table: TurbulenceTable, t: Turbulent, source: str) -> list[Line]:
@@ -153,7 +147,7 @@ def _lines(table: TurbulenceTable, t: Turbulent, source: str) -> list[Line]:
             regime,
         ),
         Line("Rytov variance", path.rytov, "", "2.25 k^(7/6) times the integral of Cn2 z^(5/6)", source, "plane wave"),
-        Line("Scintillation index", t.index, "", _index_basis(t), source, "weak turbulence", "; ".join(path.regimes)),
+        Line("Scintillation index", t.index, "", _index_basis(t), source, "any strength", "; ".join(path.regimes)),
     ]
     if t.direction == UPLINK:
         found.append(Line("Beam wander", t.wander_rad, "rad", f"radial rms, {table.wander}", source, regime))

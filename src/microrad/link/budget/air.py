@@ -1,6 +1,7 @@
 """What the air between a station and a satellite does to one beam: absorption, spread, wavefront, fades."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -20,6 +21,7 @@ from microrad.link.turbulence import (
     seeing,
 )
 from microrad.mission.ground import GroundPath
+from microrad.mission.model import Source, source_text
 from microrad.mission.tables.channel import Channel, TurbulenceTable
 
 UPLINK, DOWNLINK = "uplink", "downlink"
@@ -55,6 +57,18 @@ class Sky:
             table.ground_strength, wind_of(table).rms_m_s if wind is None else wind, self.path.height_m
         )
         return SlantPath(profile, wavelength_m, self.path.elevation_rad, range_m)
+
+
+def source_of_air(sources: Mapping[str, Source], *more: str) -> str:
+    """Where the turbulence and the wind of a mission come from, as one text.
+
+    Args:
+        sources: Where each value of the mission comes from, by its dotted key.
+        *more: Other keys of its table on turbulence.
+    """
+    wind = (f"wind.{key}" for key in ("ground", "jet", "peak", "width"))
+    keys = (f"channel.turbulence.{key}" for key in ("ground_strength", "wind_rms", *wind, *more))
+    return source_text(sources, *(key for key in keys if key in sources))
 
 
 def wind_of(table: TurbulenceTable, slew_rad_s: float = 0.0) -> BuftonWind:

@@ -12,7 +12,6 @@ from microrad.link.budget.assembly import Shared
 from microrad.link.turbulence import Downlink
 from microrad.loop.disturbance.arrival import Arrival
 from microrad.mission.file import MissionFile
-from microrad.mission.model import source_text
 
 LOWEST_HZ = 0.1
 """Frequency from which on the spectrum is taken: below, the outer scale of the air flattens it, and a loop follows."""
@@ -71,7 +70,7 @@ def arrival_of(file: MissionFile) -> Arrival | None:
         f"light of {light} in {size} at {elevation} of elevation, r0 {format_quantity(slant.fried_m, 'm', 3)}, wind "
         f"{format_quantity(wind.ground_m_s, 'm/s', 3)} at the ground and {format_quantity(wind.rms_m_s, 'm/s', 3)} rms "
         f"from 5 to 20 km, tilt {table.tilt}",
-        source_text(file.sources, *_keys(file)),
+        air.source_of_air(file.sources, "tilt"),
     )
 
 
@@ -93,10 +92,3 @@ def _frequencies(
     last = min(float(looked[np.argmax(above < _LEFT_OUT * rms_rad**2)]), most_hz)
     first = min(LOWEST_HZ, _BELOW_HIGHEST * last)
     return np.geomspace(first, last, 1 + math.ceil(_A_DECADE * math.log10(last / first)))
-
-
-def _keys(file: MissionFile) -> tuple[str, ...]:
-    """Keys of the mission that the air of the spectrum follows from, those that it gives."""
-    wind = (f"wind.{key}" for key in ("ground", "jet", "peak", "width"))
-    of_air = (f"channel.turbulence.{key}" for key in ("ground_strength", "wind_rms", *wind, "tilt"))
-    return tuple(key for key in of_air if key in file.sources)

@@ -12,7 +12,7 @@ import numpy as np
 from microrad.core.budget import Line, total_db
 from microrad.core.units import format_input, format_quantity
 from microrad.link import coupling, gains
-from microrad.link.budget.air import UPLINK, Turbulent
+from microrad.link.budget.air import UPLINK, Turbulent, source_of_air
 from microrad.link.budget.assembly import DataLink, Shared, check_grid, strehl_db
 from microrad.link.budget.receiver_lines import (
     GIVEN,
@@ -378,7 +378,7 @@ class Writer:
         if modes:
             basis += f", or what {modes} corrected modes and the point-ahead angle leave, if that is less"
         value = 0.0 - turbulent.spread_db
-        return (Line(SPREAD_LOSS, value, "dB", basis, self._turbulence_source(), regime, _both(*turbulent.doubts)),)
+        return (Line(SPREAD_LOSS, value, "dB", basis, source_of_air(self.sources), regime, _both(*turbulent.doubts)),)
 
     def wavefront(self, turbulent: Turbulent | None, into: str) -> tuple[Line, ...]:
         """Line of what a fibre or detector takes less of a turbulent wavefront.
@@ -392,7 +392,7 @@ class Writer:
         r0 = format_quantity(turbulent.path.fried_m, "m", 3)
         basis, regime = f"mean power into the {into}, r0 = {r0}", "Kolmogorov's turbulence, long exposure"
         value = 0.0 - turbulent.wavefront_db
-        return (Line(WAVEFRONT_LOSS, value, "dB", basis, self._turbulence_source(), regime),)
+        return (Line(WAVEFRONT_LOSS, value, "dB", basis, source_of_air(self.sources), regime),)
 
     def fade(self, turbulent: Turbulent | None, loss_db: float, alone: bool) -> tuple[Line, ...]:
         """Line of the fades of the air.
@@ -410,14 +410,9 @@ class Writer:
             basis += f", wander of {format_quantity(turbulent.wander_rad, 'rad', 3)} rms"
         said = "exceeded" if alone else "what it adds to the pointing loss, all together exceeded"
         basis += f"; {said} for {100.0 * outage:g} % of the time"
-        source = f"{self._turbulence_source()}; {source_text(self.sources, 'requirement.outage')}"
+        source = f"{source_of_air(self.sources, 'fades')}; {source_text(self.sources, 'requirement.outage')}"
         doubts = _both(*turbulent.doubts) if turbulent.direction != UPLINK else ""
-        return (Line(FADE_LOSS, 0.0 - loss_db, "dB", basis, source, "weak turbulence, by its index", doubts),)
-
-    def _turbulence_source(self) -> str:
-        keys = ("ground_strength", "wind_rms", "fades")
-        there = [f"channel.turbulence.{key}" for key in keys if f"channel.turbulence.{key}" in self.sources]
-        return source_text(self.sources, *there)
+        return (Line(FADE_LOSS, 0.0 - loss_db, "dB", basis, source, "any strength, by its index", doubts),)
 
     def _ahead(self, with_ahead_db: float, pointing_db: float) -> Line:
         ahead = self.shared.point_ahead

@@ -37,15 +37,17 @@ def ground_view(study: LinkStudy, figures: Sequence[Figure] = ()) -> View | None
         lines_table(f"Turbulence on the path: {name}", lines, names=_named(name, lines)) for name, lines in g.beams
     ]
     shown = [each for each in figures if each.name == OVER_ELEVATION]
+    note = _TURBULENT if g.beams else _STILL
     title = "Down to the station" if g.end == "geo" else "Up from the station"
-    return View(title, told(Points(sentences(study, g)), _elevations(g), *shown, *tables, _conventions(g), _NOTE))
+    return View(title, told(Points(sentences(study, g)), _elevations(g), *shown, *tables, _conventions(g), note))
 
 
-_NOTE = Soft(
-    "Closed forms of weak turbulence over flat air; clouds are outside. Lost in the air is the mean power, by "
-    "absorption, scattering, a wider beam and a wavefront that a fibre takes less of; to fades is lost what they add "
-    "for the mission's outage."
+_TURBULENT = Soft(
+    "Closed forms over flat air; a scintillation index is that of any strength, spread and wander those of weak "
+    "turbulence; clouds are outside. Lost in the air is the mean power, by absorption, scattering, a wider beam and a "
+    "wavefront that a fibre takes less of; to fades is lost what they add for the mission's outage."
 )
+_STILL = Soft("Flat and still air without clouds. Lost in it is what absorption and scattering take.")
 
 
 def sentences(study: LinkStudy, g: GroundLink) -> list[str]:
