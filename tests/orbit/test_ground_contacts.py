@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,11 +12,13 @@ from microrad import link, orbit
 from microrad.link import study as link_study
 from microrad.orbit import Epoch, Station
 from microrad.orbit import day as day_study
-from microrad.orbit.day import PointingLoss, flow
+from microrad.orbit.day import PointingLoss, flow, geometry
+from microrad.orbit.day.ground_track import ground_track
 from microrad.orbit.earth.figure import Earth, GroundSite
 from microrad.orbit.propagation.analytic import GeostationarySlot, KeplerOrbit, circular
 from microrad.orbit.visibility.contacts import contacts, contacts_with_each, passes
 from microrad.orbit.visibility.limits import UNLIMITED, Terminal
+from microrad.report.day.figures import ground_map
 
 DAY = (0.0, 86400.0)
 EPOCH = Epoch("2026-03-20T12:00:00Z")
@@ -181,3 +184,20 @@ def test_in_still_air_the_reach_grows_with_the_elevation_too(tmp_path):
         there = replace(air, path=path.at(max(path.elevation_at(reach), path.elevation_rad)))
         gained = air.clear_db(1.55e-6) - there.clear_db(1.55e-6)
         assert 20.0 * math.log10(reach / data.range_m) - gained == pytest.approx(spare, abs=2e-3)
+
+
+@pytest.mark.parametrize("changes", [{}, UP])
+def test_a_map_shows_the_satellites_track_and_the_station_but_no_relay(tmp_path, changes):
+    file = ground_file(tmp_path, changes)
+    m = file.mission
+    seen = geometry.view(orbit.pair(m.orbit, m.terminals, tmp_path), m.communication.wavelength_m)
+    track = ground_track(seen, (), None)
+    assert track.relay is None
+    (outline,) = track.stations
+    assert outline.name == m.terminals.called(m.orbit.station)
+    assert math.degrees(float(outline.latitude_rad[0])) == pytest.approx(28.3)
+    assert np.ptp(np.degrees(track.latitude_rad)) > 160.0  # it goes over the poles
+    figure = ground_map(SimpleNamespace(view=seen, ways=(), operations=None))
+    explained = [each.label for each in figure.sheet.legend.only]
+    assert "station, its horizon" in explained
+    assert not any("relay" in label for label in explained)

@@ -41,7 +41,8 @@ class Outline:
 class GroundTrack:
     """Where the satellite stands over the Earth, and which ways are open to it there; arrays of shape (n,).
 
-    A relay that stands still has a line around it, within which a satellite at the mean height of the track sees it.
+    A relay that stands still has a line around it, within which a satellite at the mean height of the track sees it;
+    a link to a station has no relay, and its station is the first of the others.
     The line around a station is its elevation mask. Neither has a line where the satellite's height varies by
     `SAME_HEIGHT`.
     """
@@ -50,7 +51,7 @@ class GroundTrack:
     latitude_rad: Floats
     longitude_rad: Floats
     open: dict[str, NDArray[np.bool_]]
-    relay: Outline
+    relay: Outline | None
     stations: tuple[Outline, ...]
 
 
@@ -68,7 +69,9 @@ def ground_track(
     pair = seen.pair
     time_s = np.arange(0.0, min(seen.duration_s, LONGEST_S), STEP_S)
     turned = pair.epoch.earth_rotation_rad(time_s)
-    own = orbit.subpoint(pair.leo.orbit.states(time_s).position_m, turned)
+    partner = [each.orbit.station for each in (pair.leo, pair.geo) if isinstance(each.orbit, orbit.GroundSite)]
+    flying = pair.geo if isinstance(pair.leo.orbit, orbit.GroundSite) else pair.leo
+    own = orbit.subpoint(flying.orbit.states(time_s).position_m, turned)
     mean_m = float(np.mean(own.height_m))  # or None, where the height varies too much for one to stand for all
     height_m = mean_m if np.ptp(own.height_m) < SAME_HEIGHT * (orbit.EARTH_RADIUS_M + mean_m) else None
     found = {}
@@ -82,16 +85,13 @@ def ground_track(
         latitude_rad=own.latitude_rad,
         longitude_rad=own.longitude_rad,
         open=found,
-        relay=_relay(pair, time_s, turned, height_m),
-        stations=tuple(_station(s, height_m) for s in heard),
+        relay=None if partner else _relay(pair, time_s, turned, height_m),
+        stations=tuple(_station(s, height_m) for s in (*partner, *heard)),
     )
 
 
 def _relay(pair: orbit.Pair, time_s: Floats, turned_rad: Floats, height_m: float | None) -> Outline:
     """The relay with the limit of what it sees, or with its own way over the Earth."""
-    site = pair.geo.orbit
-    if isinstance(site, orbit.GroundSite):
-        return _station(site.station, height_m)
     far_m = pair.geo.orbit.states(time_s).position_m
     under = orbit.subpoint(far_m, turned_rad)
     if not isinstance(pair.geo.orbit, orbit.GeostationarySlot) and _moves(under.latitude_rad, under.longitude_rad):

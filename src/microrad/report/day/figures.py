@@ -466,7 +466,7 @@ def ground_map(day: DayStudy) -> Figure:
     o = day.operations
     track = ground_track(day.view, day.ways, None if o is None else o.downlink, None if o is None else o.optical)
     places = Places(track.latitude_rad, track.longitude_rad)
-    relay, stations = dict([_marked(track.relay)]), dict(_marked(station) for station in track.stations)
+    relay, stations = ({} if track.relay is None else dict([_marked(track.relay)])), dict(map(_marked, track.stations))
     first_s = LONGEST_S if day.view.duration_s > LONGEST_S else None
     return world_map(places, track.open, relay, stations, first_s)
 
