@@ -161,6 +161,17 @@ LOW = {"orbit.leo": {"kind": "geostationary", "longitude": "45 deg"}}
 NO_AIR = {"channel.aerosol_depth": None, "channel.angstrom_exponent": None, "channel.absorption": None}
 FREE = {"attitude": "nadir", "boresight": [0.0, 0.0, 1.0], "field_of_regard": "60 deg", "slew_limit": "1 deg/s"}
 FREE |= {"sun_exclusion": "0 deg", "in_eclipse": True}
+MANY = {
+    "pattern": "delta",
+    "satellites": 2,
+    "planes": 1,
+    "phasing": 0,
+    "terminals": 1,
+    "overhead": "60 s",
+    "session": "10 min",
+    "shortest": "3 min",
+    "relays": {"east": {"longitude": "143 deg"}},
+}
 REFUSED = [
     (BOTH_DOWN, "orbit.geo.kind", 'is "station", as is leo.kind: one of the two has to fly', "another kind of orbit"),
     (
@@ -178,6 +189,12 @@ REFUSED = [
     ({"channel.station": "geo"}, "channel.station", "stands beside orbit.geo, of which it follows", "removed"),
     ({"channel.height": "0 m"}, "channel.height", "stands beside orbit.geo, of which it follows", "removed"),
     ({"channel.altitude": "500 km"}, "channel.altitude", "stands beside orbit.leo, of which it follows", "removed"),
+    (
+        {"constellation": MANY},
+        "constellation",
+        'stands beside orbit.geo of kind "station", and means a satellite there',
+        "the table removed, or a relay as orbit.geo",
+    ),
     (
         {"communication.distance": "1000 km"},
         "communication.distance",

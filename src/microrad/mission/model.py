@@ -269,17 +269,19 @@ def _needs_operations(operations: Operations | None, constellation: Constellatio
         yield Problem("constellation", reason, "the table [operations], which microrad init writes")
 
 
-def _leo_flies(
+def _both_fly(
     orbit: Orbits | None, operations: Operations | None, constellation: Constellation | None
 ) -> Iterator[Problem]:
-    """What only a terminal that flies can have: stations below it, and others like it."""
-    if orbit is None or orbit.station != "leo":
+    """What only terminals that fly can have: relays in slots, and of our own stations below it."""
+    if orbit is None or not orbit.station:
         return
-    beside = {} if operations is None else {f"operations.{name}": getattr(operations, name) for name in _BELOW}
+    own = orbit.station == "leo"
+    beside = {f"operations.{name}": getattr(operations, name) for name in _BELOW} if own and operations else {}
     for key, table in {**beside, "constellation": constellation}.items():
         if table is not None:
-            reason = 'stands beside orbit.leo of kind "station", and means a satellite there'
-            yield Problem(key, reason, "the table removed, or the station as orbit.geo and the satellite as orbit.leo")
+            reason = f'stands beside orbit.{orbit.station} of kind "station", and means a satellite there'
+            other = "or the station as orbit.geo and the satellite as orbit.leo" if own else "or a relay as orbit.geo"
+            yield Problem(key, reason, f"the table removed, {other}")
 
 
 def _scan_there(operations: Operations | None, acquisition: Acquisition | None) -> Iterator[Problem]:
@@ -310,7 +312,7 @@ LINK_RELATIONS: tuple[Relation, ...] = (
     (("orbit", "constellation"), _needs_orbit("constellation")),
     (("operations", "acquisition"), _scan_there),
     (("operations", "constellation"), _needs_operations),
-    (("orbit", "operations", "constellation"), _leo_flies),
+    (("orbit", "operations", "constellation"), _both_fly),
 )
 """What has to fit between tables of the link: their names, and a check that takes them and yields what does not."""
 
