@@ -34,13 +34,15 @@ from microrad.report.campaign import figures as drawing
 from microrad.report.campaign import numbers as campaign_numbers
 from microrad.report.campaign import page as campaign_module
 from microrad.report.campaign import tables as campaign_tables
+from microrad.report.campaign import text as campaign_terminal
 from microrad.report.campaign import words as campaign_words
 from microrad.report.campaign.data import campaign_data
 from microrad.report.campaign.numbers import share, value
 from microrad.report.campaign.page import campaign_figures, campaign_page
 from microrad.report.campaign.tables import failed_table
 from microrad.report.campaign.text import campaign_text
-from microrad.report.plotting.sheet import Line
+from microrad.report.plotting.palette import BLACK, WHITE
+from microrad.report.plotting.sheet import Axis, Field, Line, Panel, Rule, Span
 from report_pages import assert_sound, without_scripts
 
 NAME = 'LEO <b>"A&B"</b> $x$'
@@ -949,3 +951,599 @@ def test_the_same_summary_gives_the_same_page_twice():
     again = without_scripts(campaign_page(CASES["few rows"]()))
     assert again == made("few rows").html
     assert again != made("one row").html
+
+
+# ------------------------------------------------------------------------------------------------- limits and few rows
+UNKNOWN = Interval(math.nan, math.nan, math.nan, CONFIDENCE)
+
+
+def a_tail(**changes):
+    """Radii of 1, 2 and 3 µrad, the last one never exceeded."""
+    given = Tail(
+        np.array([1e-6, 2e-6, 3e-6]),
+        np.array([0.5, 0.1, 0.0]),
+        np.array([0.4, 0.05, 0.0]),
+        np.array([0.6, 0.2, 0.01]),
+        {0.1: Interval(2e-6, 1.5e-6, 2.5e-6, CONFIDENCE)},
+        CONFIDENCE,
+        "a method",
+        math.nan,
+    )
+    return replace(given, **changes)
+
+
+@pytest.mark.parametrize(
+    ("probability", "said"),
+    [(1e-3, "0.1 %"), (9.9e-4, "9.9×10⁻⁴"), (0.95, "95.0 %"), (0.89, "89 %"), (1.0 - 1e-12, "100.00000000 %")],
+)
+def test_a_probability_has_a_power_below_a_thousandth_and_more_digits_from_nine_tenths_on(probability, said):
+    assert share(probability) == said
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "unit", "name", "said"),
+    [
+        (math.nan, 2.0, "dB", "margin", "at most 2.00 dB"),
+        (0.5, math.nan, "dB", "margin", "at least 0.50 dB"),
+        (math.nan, math.nan, "dB", "margin", ""),
+        (0.5, 2.0, "dB", "margin", "0.50 dB to 2.00 dB"),
+        (1e-12, 0.2, "", "outage", "10⁻¹² to 20 %"),
+        (9e-13, 0.2, "", "outage", "0 % to 20 %"),
+        (0.0, 1e-4, "1", "lost_share", "0 to 10⁻⁴"),
+        (9e-13, math.nan, "", "outage", "at least 0"),
+        (9e-13, 0.2, "", "mirror.alpha", "9e-13 to 0.2"),
+    ],
+)
+def test_an_interval_names_the_ends_that_are_known(low, high, unit, name, said):
+    found = Interval(1.0, low, high, CONFIDENCE)
+    assert campaign_numbers.ends(found, unit, name) == said
+    own = value(1.0, unit, name)
+    assert campaign_numbers.with_ends(found, unit, name) == (f"{own} ({said})" if said else own)
+
+
+@pytest.mark.parametrize(
+    ("largest", "unit", "name", "factor", "label"),
+    [
+        (1e-3, "", "outage", 100.0, "%"),
+        (9.9e-4, "", "outage", 1.0, "share"),
+        (0.3, "1", "lost_share", 100.0, "%"),
+        (0.3, "1", "mirror.alpha", 1.0, ""),
+        (0.3, "rad", "outage", 1e3, "mrad"),
+        (3.0, "dB", "margin", 1.0, "dB"),
+        (7200.0, "s", "wait", 1.0 / 3600.0, "h"),
+        (7199.0, "s", "wait", 1.0 / 60.0, "min"),
+        (120.0, "s", "wait", 1.0 / 60.0, "min"),
+        (119.0, "s", "wait", 1.0, "s"),
+        (-119.0, "s", "wait", 1.0, "s"),
+    ],
+)
+def test_an_axis_changes_its_unit_at_a_round_value(largest, unit, name, factor, label):
+    found = campaign_numbers.scale_of(np.array([largest, math.inf, 0.0]), unit, name)
+    assert found.factor == pytest.approx(factor, rel=1e-12)
+    assert found.label == label
+    assert found.title("output") == (f"output ({label})" if label else "output")
+
+
+def test_a_limit_of_two_sides_names_both():
+    assert campaign_numbers.limit_text(Limit("margin", 3.0, 5.0, ""), "dB") == "margin ≥ 3.00 dB and ≤ 5.00 dB"
+    assert campaign_numbers.limit_text(Limit("data_rate", None, 5e6, ""), "bit/s") == "data_rate (possible) ≤ 5 Mbit/s"
+
+
+def test_a_cell_whose_misses_are_not_known_is_the_best_only_where_no_other_is():
+    summary = summary_of(2, grid=APERTURES, rows=16)
+    blind = replace(summary.cells[0], missed=UNKNOWN)
+    worse = replace(summary.cells[1], missed=Interval(0.9, 0.8, 1.0, CONFIDENCE))
+    assert campaign_words.best(replace(summary, cells=(blind, worse))) is worse
+    assert campaign_words.best(replace(summary, cells=(blind, blind))) is blind
+    same = replace(worse, values={})
+    assert campaign_words.best(replace(summary, cells=(worse, same))) is worse
+    said = campaign_words.headline(replace(summary, cells=(blind, worse, replace(worse, missed=proportion(0, 16)))))
+    assert f"; {worse.label} least often, in 10 % (" in said
+
+
+@pytest.mark.parametrize(
+    ("radius_rad", "found"),
+    [
+        (0.9e-6, None),
+        (1e-6, (0.5, 0.4, 0.6)),
+        (2e-6, (0.1, 0.05, 0.2)),
+        (2.5e-6, (0.0, 0.0, 0.105)),
+        (3e-6, (0.0, 0.0, 0.01)),
+    ],
+)
+def test_the_tail_is_read_from_its_first_radius_to_the_largest_error_seen(radius_rad, found):
+    past = campaign_words.beyond(a_tail(), radius_rad)
+    if found is None:
+        assert past is None
+    else:
+        assert (past.value, past.low, past.high) == pytest.approx(found, rel=1e-9)
+        assert past.confidence == CONFIDENCE
+
+
+def test_a_low_end_of_the_tail_that_is_nothing_is_0():
+    assert campaign_words.beyond(a_tail(low=np.array([0.4, 0.0, 0.0])), 2e-6).low == 0.0
+
+
+def test_the_verdict_passes_only_where_all_rows_are_there_and_keep_the_limits():
+    kept = summary_of(2, rows=16, shift_db=30.0)
+    assert campaign_words.verdict(kept) == "pass"
+    cell = replace(kept.cells[0], rows=17, failed=1)
+    assert campaign_words.verdict(replace(kept, cells=(cell,))) == "open"
+    assert campaign_words.verdict(replace(kept, progress=replace(kept.progress, state="running"))) == "open"
+    none = summary_of(2, rows=16, failed=16)
+    for state, failed, word in (
+        ("waiting", (), "open"),
+        ("running", (), "open"),
+        ("stopped", (), "fail"),
+        ("complete", (), "fail"),
+        ("running", none.failed, "fail"),
+    ):
+        at = replace(none, failed=failed, progress=replace(none.progress, state=state))
+        assert campaign_words.verdict(at) == word
+
+
+def test_the_only_row_that_failed_is_called_so():
+    assert campaign_words.headline(summary_of(2, rows=1, failed=1)) == "No row has results: the only one failed."
+
+
+def test_a_tail_alone_that_does_not_know_its_radius_says_so():
+    summary = tail_alone()
+    (cell,) = summary.cells
+    blind = replace(cell, tail=replace(cell.tail, wanted={1e-6: UNKNOWN}))
+    said = campaign_words.headline(replace(summary, cells=(blind,)))
+    assert said == "The radius that is wanted is not known from these rows."
+    with_outputs = replace(summary_of(2, limits=(), rows=16))
+    assert campaign_words.headline(with_outputs) == "16 rows with results; no limit is set."
+
+
+def test_three_limits_are_counted():
+    three = (*LIMITS, Limit("beyond_share", None, 0.5, "campaign"))
+    assert "rows keep all 3 limits" in campaign_words.headline(summary_of(2, limits=three, rows=16, shift_db=30.0))
+
+
+@pytest.mark.parametrize(
+    ("missed", "rows", "failed", "said"),
+    [
+        (0.0, 1, 0, "The only row keeps it; at 99 % confidence at least 50 % of all draws do"),
+        (0.0, 4, 0, "All 4 rows keep it; at 99 % confidence at least 50 % of all draws do"),
+        (0.0, 5, 1, "All other 4 rows keep it; at 99 % confidence at least 50 % of all draws do"),
+        (0.0, 2, 1, "The only other row keeps it; at 99 % confidence at least 50 % of all draws do"),
+        (1.0, 1, 0, "The only row misses it; at 99 % confidence at most 80 % of all draws do"),
+        (1.0, 4, 0, "None of 4 rows keeps it; at 99 % confidence at most 80 % of all draws do"),
+        (1.0, 5, 1, "None of the other 4 rows keeps it; at 99 % confidence at most 80 % of all draws do"),
+        (1.0, 2, 1, "The only other row misses it; at 99 % confidence at most 80 % of all draws do"),
+        (0.3, 4, 0, "70 % of the rows keep it (50 % to 80 % at 99 % confidence)"),
+        (0.3, 5, 1, "70 % of the other 4 rows keep it (50 % to 80 % at 99 % confidence)"),
+    ],
+)
+def test_how_many_rows_keep_a_limit_is_said_for_one_row_and_many_with_failed_ones_or_none(missed, rows, failed, said):
+    cell = replace(summary_of(2, rows=4).cells[0], rows=rows, failed=failed)
+    found = replace(cell, missed=Interval(missed, 0.2, 0.5, CONFIDENCE))
+    assert campaign_words._kept(found, "it") == said
+    alone = replace(cell, missed=Interval(missed, math.nan, math.nan, CONFIDENCE))
+    assert campaign_words._kept(alone, "it") == said.split(";")[0].split(" (")[0]
+
+
+def test_an_input_at_the_least_index_is_named_and_one_below_is_not():
+    summary = summary_of(2)
+    index = Interval(campaign_words.MATTERS, 0.0, 0.1, 0.95)
+    each = replace(summary.sensitivities[0], first={}, total={"a": index, "b": replace(index, value=0.0499)}, note="")
+    found = replace(summary, sensitivities=(each,))
+    assert campaign_words.leading(found, "margin") == ["a"]
+    assert campaign_words.leading(found, "other") == []
+    said = "What matters most to margin (total Sobol index): a 0.05 (0.00 to 0.10)."
+    assert campaign_words.matters(found) == [said]
+    weak = replace(each, total={"b": replace(index, value=0.0499)})
+    for note, end in (("", "."), ("few rows", "; few rows.")):
+        told = campaign_words.matters(replace(summary, sensitivities=(replace(weak, note=note),)))
+        assert told == [f"No input by itself decides margin{end}"]
+    four = replace(each, total={key: replace(index, value=0.9 - 0.1 * k) for k, key in enumerate("abcd")})
+    assert campaign_words.matters(replace(summary, sensitivities=(four,)))[0].count("(0.00 to 0.10)") == 3
+    assert [key for key, _ in campaign_tables.ranked(four)] == ["a", "b", "c", "d"]
+    unknown = replace(each, total={"a": index, "b": UNKNOWN})
+    assert [key for key, _ in campaign_tables.ranked(unknown)] == ["a"]
+    assert campaign_tables.index_text(UNKNOWN) == campaign_tables.index_text(None) == ""
+
+
+def test_without_a_limit_the_first_three_outputs_have_what_matters_to_them():
+    summary = summary_of(2, limits=())
+    each = replace(summary.sensitivities[0], note="", first={}, total={"a": Interval(0.9, 0.8, 1.0, 0.95)})
+    four = replace(summary, sensitivities=tuple(replace(each, output=name) for name in "pqrs"))
+    assert [said.split(" (")[0] for said in campaign_words.matters(four)] == [
+        f"What matters most to {name}" for name in "pqr"
+    ]
+
+
+def test_the_tail_is_told_at_the_bounds_of_residuals_alone():
+    summary = summary_of(2, rows=16)
+    cell = replace(summary.cells[0], tail=a_tail())
+    radius = "The radial error exceeds 2.00 µrad with probability 10 % (1.50 µrad to 2.50 µrad at 99 % confidence)."
+
+    def told(*limits, tail=cell.tail):
+        return campaign_words.tail_sentences(replace(summary, limits=limits), replace(cell, tail=tail))
+
+    at = "The radial error is beyond 2 µrad with probability 10 % (5 % to 20 % at 99 % confidence)."
+    assert told(Limit("residual_rms", None, 2e-6, "")) == [radius, at]
+    assert told(Limit("point_ahead", None, 2e-6, "")) == [radius]
+    assert told(Limit("residual_rms", 1e-6, None, "")) == [radius]
+    assert told(Limit("residual_rms", None, 0.5e-6, "")) == [radius]  # below its radii
+    assert told(tail=replace(cell.tail, wanted={0.1: UNKNOWN})) == []
+    bare = replace(cell.tail, wanted={0.1: Interval(2e-6, math.nan, math.nan, CONFIDENCE)})
+    assert told(tail=bare) == ["The radial error exceeds 2.00 µrad with probability 10 %."]
+    beyond = {2e-6: Interval(0.1, 0.05, 0.2, CONFIDENCE)}
+    assert told(tail=replace(cell.tail, beyond=beyond))[1] == at
+    worth = replace(cell.tail, beyond=beyond, variance={2e-6: 0.009})
+    assert told(tail=worth)[1] == (
+        f"{at} The variance of that estimate is 0.009, that of 10 draws without importance sampling."
+    )
+
+
+def test_what_the_tail_knows_is_of_the_least_probability_whose_radius_is_known():
+    known = {1e-2: Interval(1e-6, 1e-6, 1e-6, CONFIDENCE), 1e-6: UNKNOWN}
+    said = campaign_words.tail_method(a_tail(wanted=known, effective_runs=128.0))
+    assert said == "It comes from a method. It knows 1 % as well as 130 independent samples of the error would."
+    none = a_tail(wanted={1e-6: UNKNOWN}, effective_runs=128.0)
+    assert campaign_words.tail_method(none) == "It comes from a method."
+
+
+@pytest.mark.parametrize(
+    ("count", "said"),
+    [(1e9, "1 billion"), (1e6, "1 million"), (999_000.0, "1000000"), (990_000.0, "990000"), (2.5e9, "2.5 billion")],
+)
+def test_a_large_number_is_spoken_from_a_million_on(count, said):
+    assert campaign_words._many(count) == said
+
+
+def test_a_campaign_at_its_last_row_still_counts_of_all():
+    summary = replace(summary_of(0, rows=4), progress=Progress(4, 4, 1.0, 0.0, 0.0, "running"))
+    assert campaign_words.progress_words(summary) == "Running: 4 of 4 rows, 0 s left."
+    done = replace(summary, progress=Progress(1, 1, 1.0, 0.0, 0.0, "complete"))
+    assert campaign_words.progress_words(done) == "Complete: 1 row in 1 s."
+
+
+@pytest.mark.parametrize(
+    ("inputs", "loop", "fixed", "said"),
+    [
+        (0, "", {}, ["no drawn inputs", "No loop is simulated: the links are at their budgeted errors."]),
+        (1, "LQG", {"a": "1", "b": "2"}, ["1 drawn input", "Loop: LQG.", "Set: a = 1, b = 2."]),
+        (2, "LQG", {}, ["2 drawn inputs", "Loop: LQG."]),
+    ],
+)
+def test_how_the_rows_were_made_counts_inputs_and_names_the_loop_and_what_is_set(inputs, loop, fixed, said):
+    summary = replace(summary_of(inputs, rows=4), loop=loop, fixed=fixed, seed=7)
+    drawn_, *rest = said
+    assert campaign_words.setting(summary) == [f"Sampling sobol, {drawn_}, seed 7.", *rest]
+
+
+def test_an_output_without_rows_is_neither_the_same_in_every_row_nor_explained():
+    cell = summary_of(2, rows=16).cells[0]
+    same = cell.outputs["beacon_margin"]
+    none = replace(same, rows=0)
+    empty = replace(cell, outputs={"beacon_margin": none})
+    assert campaign_words.few_values(empty) == []
+    assert campaign_words.few_values(None) == []
+    assert campaign_tables.meanings_table(empty).rows == campaign_tables.meanings_table(None).rows == []
+    told = campaign_tables.meanings_table(replace(cell, outputs={"beacon_margin": same})).rows
+    assert told == [("beacon_margin", same.meaning)]
+    wide = replace(empty, outputs={"margin": replace(cell.outputs["margin"], rows=0)})
+    assert campaign_tables.output_table(wide, 3).rows == []
+
+
+def test_two_rows_may_have_two_values_and_one_row_has_one():
+    two = replace(output_summary("lost_share", np.array([0.0, 0.25])), deviation=0.25 / math.sqrt(2.0))
+    assert campaign_words.two_values(two) == pytest.approx(0.5)
+    assert campaign_words.two_values(replace(two, rows=1)) is None
+    assert campaign_words.two_values(replace(two, most=two.least)) is None
+
+
+# ---------------------------------------------------------------------------------------------------- tables in detail
+def test_a_limit_that_no_row_knows_has_no_line_in_the_table():
+    summary = summary_of(2, rows=16)
+    cell = replace(summary.cells[0], missed_by={"margin": Interval(0.25, 0.1, 0.5, CONFIDENCE)})
+    found = campaign_tables.limit_table(summary, cell)
+    assert found.headings == ("limit", "missed by", "99 % interval", "from")
+    assert found.rows == [("margin ≥ 3.00 dB", "25 %", "10 % to 50 %", "requirement.margin")]
+
+
+def test_a_quantile_that_an_output_does_not_have_is_left_empty():
+    cell = summary_of(2, rows=16).cells[0]
+    margin, other = cell.outputs["margin"], cell.outputs["residual_quantile"]
+    found = replace(cell, outputs={"margin": margin, "other": replace(other, quantiles={})})
+    assert [row[3:] for row in campaign_tables.output_table(found, 1).rows][1] == ("",)
+    odd = replace(margin, quantiles={0.2: margin.quantiles[0.5], 0.5: margin.quantiles[0.5]})
+    assert campaign_tables.chosen_quantiles([odd], 2) == [0.2, 0.5]
+    assert campaign_tables.chosen_quantiles([odd], 1) == [0.5]
+    one = replace(margin, quantiles={0.99: margin.quantiles[0.99], 0.5: margin.quantiles[0.5]})
+    assert campaign_tables.chosen_quantiles([one], 9) == [0.5]  # half of a pair
+
+
+def test_combinations_have_columns_of_limits_only_where_there_are_limits_and_rows():
+    summary = summary_of(2, grid={"mirror": ("a", "b")}, rows=16, shift_db=30.0)
+    (first, second), free = summary.cells, replace(summary, limits=())
+    gone = replace(second, rows=3, failed=3)
+    said = campaign_tables.cell_table(summary, (first, gone))
+    assert said.headings == ("mirror", "keep all", "rows", "failed")
+    assert said.rows[0] == ("a", campaign_numbers.share_ends(proportion(16, 16)), "16", "0")
+    assert said.rows[1] == ("b", "", "0", "3")
+    assert campaign_tables.cell_table(free, (first, gone)).headings == ("mirror", "rows", "failed")
+    assert campaign_tables.cell_table(free, (first, gone)).rows == [("a", "16", "0"), ("b", "0", "3")]
+    bare = replace(first, missed_by={}, outputs={"margin": first.outputs["margin"]})
+    limited = campaign_tables.limited_table(summary, (first, gone, bare))
+    mean = value(first.outputs["margin"].mean.value, "dB")
+    assert limited.rows[0][:3] == ("a", mean, "0 %")
+    assert limited.rows[1] == ("b", "", "", "", "")
+    assert limited.rows[2] == ("a", mean, "", "", "")
+
+
+def test_a_table_of_the_terminal_keeps_the_columns_that_fit_to_the_last_one():
+    headings, rows = ("aa", "b", "c"), [("1", "22", "3")]
+    assert campaign_terminal._wide(headings, rows) == 14
+    assert campaign_terminal._narrowed(headings, rows, 1, 14).headings == headings
+    assert campaign_terminal._narrowed(headings, rows, 1, 13) == (("aa", "b"), [("1", "22")])
+    assert campaign_terminal._narrowed(headings, rows, 2, 1).headings == ("aa", "b")
+
+
+def test_combinations_stand_in_one_table_from_the_width_that_it_takes():
+    summary = summary_of(2, grid={"mirror": ("a", "b")}, rows=16)
+    (whole,) = campaign_terminal._over_the_grid(summary, 1000)
+    wide = campaign_terminal._wide(whole.headings, whole.rows)
+    assert [t.title for t in campaign_terminal._over_the_grid(summary, wide)] == ["Combinations"]
+    assert [t.title for t in campaign_terminal._over_the_grid(summary, wide - 1)] == [
+        "Combinations",
+        "Limits by combination",
+    ]
+    free = replace(summary, limits=())
+    assert [t.title for t in campaign_terminal._over_the_grid(free, 10)] == ["Combinations"]
+
+
+# -------------------------------------------------------------------------------------------------- pictures in detail
+def marks(figure, panel=0):
+    """The marks of a panel of a picture, or of a panel alone."""
+    return figure.sheet.panels[panel].marks
+
+
+def limit_marks(found):
+    """Where the lines of a limit stand among marks, and the labels of those that are in the legend alone."""
+    labelled = [mark for mark in found if mark.label.startswith("limit")]
+    return [m.at for m in labelled if isinstance(m, Rule)], [m.label for m in labelled if isinstance(m, Line)]
+
+
+def test_a_key_that_is_the_end_of_another_needs_its_whole_length():
+    keys = ["a.loop.gain", "loop.gain", "b.loop.rate"]
+    assert [drawing.label_of(key, keys) for key in keys] == ["a.loop.gain", "loop.gain", "loop.rate"]
+
+
+@pytest.mark.parametrize(
+    ("least", "most", "at", "far"),
+    [
+        (-1.0, None, [-1.0], []),
+        (-1.01, None, [], ["limit ≥ −1.01 dB,\nfar from here"]),
+        (None, 2.0, [2.0], []),
+        (None, 2.01, [], ["limit ≤ 2.01 dB,\nfar from here"]),
+        (0.5, 3.0, [0.5], ["limit ≤ 3.00 dB,\nfar from here"]),
+    ],
+)
+def test_a_limit_is_drawn_as_far_away_as_the_rows_are_wide_and_told_beyond(least, most, at, far):
+    output = output_summary("margin", np.linspace(0.0, 1.0, 41))
+    found = marks(drawing.distribution(output, Limit("margin", least, most, "")))
+    assert limit_marks(found) == (at, far)
+    shaded = [(mark.low, mark.high) for mark in found if isinstance(mark, Span)]
+    assert shaded == [(-math.inf, bound) if bound == least else (bound, math.inf) for bound in at]
+
+
+def tail_of(*limits, **changes):
+    """The marks of the picture of `a_tail`."""
+    summary = replace(summary_of(2, rows=16), limits=limits)
+    (figure,) = drawing.tail(summary, replace(summary.cells[0], tail=a_tail(**changes)))
+    return marks(figure)
+
+
+def test_the_limit_of_a_tail_is_the_least_upper_bound_of_a_residual():
+    rms, quantile = Limit("residual_rms", None, 3e-6, ""), Limit("residual_quantile", None, 2e-6, "")
+    assert limit_marks(tail_of(rms)) == ([pytest.approx(3.0)], [])
+    assert limit_marks(tail_of(rms, quantile)) == ([pytest.approx(2.0)], [])
+    assert limit_marks(tail_of(Limit("residual_rms", 1e-6, None, ""))) == ([], [])
+    assert limit_marks(tail_of(Limit("point_ahead", None, 2e-6, ""))) == ([], [])
+    assert limit_marks(tail_of(replace(rms, most=4e-6))) == ([pytest.approx(4.0)], [])  # twice the largest error seen
+    assert limit_marks(tail_of(replace(rms, most=4.1e-6))) == ([], ["limit ≤ 4.1 µrad,\nfar from here"])
+
+
+def test_a_radius_of_the_tail_is_marked_where_it_is_known_with_the_ends_that_are():
+    both, alone = Interval(2e-6, 1.5e-6, 2.6e-6, CONFIDENCE), Interval(1.8e-6, math.nan, math.nan, CONFIDENCE)
+    found = [mark for mark in tail_of(wanted={0.1: both, 0.2: alone, 1e-6: UNKNOWN}) if getattr(mark, "marker", "")]
+    assert [mark.label for mark in found] == ["10 %: 2.00 µrad", "20 %: 1.80 µrad"]
+    assert [(mark.x[0], mark.y[0]) for mark in found] == [pytest.approx((2.0, 0.1)), pytest.approx((1.8, 0.2))]
+    np.testing.assert_allclose(found[0].x_arms, [[0.5], [0.6]], rtol=1e-9)
+    assert found[1].x_arms is None
+
+
+def test_an_index_that_is_not_known_has_no_bar():
+    index = Interval(0.5, 0.4, 0.7, 0.95)
+    each = Sensitivity("margin", 64, {"a": index, "b": UNKNOWN}, {"b": index}, {}, 0.9, "")
+    first, arms, total, _ = drawing._index_bars(each, ["a", "b"])
+    assert (first.label, total.label) == ("first order", "total")
+    assert first.end.tolist() == total.end.tolist() == [0.5]
+    assert first.at == pytest.approx([-0.19])
+    assert total.at == pytest.approx([1.19])
+    assert arms.x_arms.ravel() == pytest.approx([0.1, 0.2])
+    (alone, _) = drawing._index_bars(replace(each, total={}), ["a", "b"])
+    assert alone.at == pytest.approx([0.0])
+    assert alone.breadth == pytest.approx([0.76])
+
+
+@pytest.mark.parametrize(
+    ("column", "wide"),
+    [
+        ([1.0, 30.0], False),
+        ([1.0, 31.0], True),
+        ([0.0, 31.0], False),
+        ([-1.0, 31.0], False),
+        ([math.nan, 1.0, 31.0], True),
+        ([math.nan], False),
+        ([], False),
+    ],
+)
+def test_an_axis_is_logarithmic_from_a_ratio_of_30_on_where_all_values_are_positive(column, wide):
+    assert drawing._wide(np.array(column)) is wide
+
+
+def test_a_grid_of_one_combination_has_no_picture():
+    summary = summary_of(1, grid={"mirror": ("a",)}, rows=16)
+    assert drawing.grid(summary) == ()
+    assert campaign_figures(summary)["grid"] == ()
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "maps"),
+    [(1, 4, False), (2, 2, True), (12, 2, True), (13, 2, False), (12, 8, True), (9, 9, False), (2, 12, True)],
+)
+def test_a_grid_of_two_keys_is_a_map_as_far_as_its_fields_can_be_read(first, second, maps):
+    cell = summary_of(0, rows=4, loop=False).cells[0]
+    texts_ = [(f"a{k}", f"b{m}") for k in range(first) for m in range(second)]
+    cells = tuple(replace(cell, values=dict(zip(("one.x", "two.y"), pair, strict=True))) for pair in texts_)
+    (figure,) = drawing.grid(replace(summary_of(0, rows=4, loop=False), cells=cells))
+    panel = figure.sheet.panels[0]
+    fields = [mark for mark in panel.marks if isinstance(mark, Field)]
+    assert len(fields) == maps
+    assert ("a number in each field" in figure.caption) is maps
+    if maps:  # the key of more values goes down
+        assert fields[0].z.shape == (max(first, second), min(first, second))
+        assert (panel.x.title, panel.y.title) == (("one.x", "two.y") if first < second else ("two.y", "one.x"))
+        assert list(panel.x.ticks.values())[-1] == (f"a{first - 1}" if first < second else f"b{second - 1}")
+
+
+def test_the_combinations_that_are_not_drawn_are_counted():
+    summary = summary_of(0, rows=4, loop=False)
+    for count, said in ((drawing.MOST_CELLS, ""), (drawing.MOST_CELLS + 1, " The first 40 of 41 combinations.")):
+        cells = tuple(replace(summary.cells[0], values={"a.b": str(k)}) for k in range(count))
+        (figure,) = drawing.grid(replace(summary, cells=cells))
+        assert figure.caption.endswith(f"or of all values.{said}")
+        assert marks(figure)[0].x.size == drawing.MOST_CELLS
+
+
+def test_a_limit_that_no_combination_has_leaves_the_medians_of_the_first_outputs():
+    summary = summary_of(1, grid=APERTURES, rows=16)
+    names = [each.name for each in drawing._shown_cells(summary, summary.cells)]
+    assert names == ["rows that miss a limit", "median margin", "median residual_quantile"]
+    other = replace(summary, limits=(Limit("volume", 1.0, None, ""),))
+    names = [each.name for each in drawing._shown_cells(other, summary.cells)]
+    assert names == ["rows that miss a limit", "median margin", "median beacon_margin"]
+    names = [each.name for each in drawing._shown_cells(replace(summary, limits=()), summary.cells)]
+    assert names == ["median margin", "median beacon_margin", "median residual_quantile"]
+    one = replace(summary, limits=(LIMITS[0], Limit("volume", 1.0, None, "")))
+    missed, median = drawing._shown_cells(one, (summary.cells[0], replace(summary.cells[1], failed=16, outputs={})))
+    assert median.name == "median margin"
+    assert missed.of[0] == summary.cells[0].missed
+    assert math.isnan(missed.of[1].value) and math.isnan(median.of[1].value)
+
+
+def test_a_combination_without_a_median_has_its_mean_between_all_values():
+    output = output_summary("margin", np.linspace(0.0, 1.0, 41))
+    mean = replace(output.mean, value=0.4)
+    no_median = replace(output, mean=mean, quantiles={0.01: output.quantiles[0.01]})
+    for each in (no_median, replace(output, mean=mean, rows=0)):
+        found = drawing._span(each)
+        assert (found.value, found.low, found.high) == (0.4, 0.0, 1.0)
+    known = {p: Interval(p, p, p, CONFIDENCE) for p in (0.003, 0.05, 0.5, 0.95, 0.999)}
+    found = drawing._span(replace(output, mean=mean, quantiles=known))
+    assert (found.value, found.low, found.high) == (0.5, 0.003, 0.999)
+    blind = {**known, 0.003: UNKNOWN, 0.999: UNKNOWN, 0.95: UNKNOWN}
+    found = drawing._span(replace(output, mean=mean, quantiles=blind))
+    assert (found.value, found.low, found.high) == (0.5, 0.05, 1.0)
+
+
+@pytest.mark.parametrize(("at", "drawn_at"), [(-1.0, [-1.0]), (-1.01, []), (2.0, [2.0]), (2.01, []), (0.5, [0.5])])
+def test_a_row_for_each_combination_has_the_limits_that_are_near(at, drawn_at):
+    panel = Panel(0, 0, x=Axis("x", low=0.0, high=1.0))
+    summary = replace(summary_of(0, rows=4), limits=(Limit("margin", at, None, ""),))
+    shown = drawing.Shown("median margin", campaign_numbers.Scale(1.0, "dB"), ())
+    assert [rule.at for rule in drawing._limit_lines(panel, summary, shown)] == drawn_at
+    assert drawing._limit_lines(panel, summary, shown._replace(name="median other")) == []
+
+
+def test_a_field_of_a_map_is_dark_below_the_middle_and_its_number_is_white_there():
+    field, *words = drawing._numbered(np.array([[1.0, 2.0, 3.0, math.nan]]))
+    assert (field.low, field.high) == (1.0, 3.0)
+    assert [word.text for word in words] == ["1", "2", "3", "none"]
+    assert [word.colour for word in words] == [WHITE, BLACK, BLACK, BLACK]
+    assert [(word.x, word.y) for word in words] == [(0, 0), (1, 0), (2, 0), (3, 0)]
+    same, *words = drawing._numbered(np.array([[4.0]]))
+    assert (same.low, same.high) == (4.0, 5.0)
+    assert words[0].colour == WHITE
+    none, *words = drawing._numbered(np.array([[math.nan]]))
+    assert (none.low, none.high) == (0.0, 1.0)
+    assert words[0].text == "none"
+
+
+@pytest.mark.parametrize(("start", "rest", "cut"), [(3.0, 1.0, False), (3.1, 1.0, True), (5.0, 0.0, False)])
+def test_the_begin_of_a_worst_row_is_cut_above_three_times_the_rest(start, rest, cut):
+    error = np.full((40, 1), rest * 1e-6)
+    error[1, 0] = -start * 1e-6
+    trace = replace(trace_of(0), time_s=np.arange(40) * 1e-3, error_rad=error, drive_v=np.zeros((40, 1)))
+    error[1], error[0] = 0.0, error[1].copy()
+    figure = drawing.worst(summary_of(2, rows=4), trace, 1)
+    assert ("cut off" in figure.caption) is cut
+    assert figure.sheet.panels[0].y.high == (pytest.approx(1.1 * rest) if cut else None)
+
+
+def test_the_worst_rows_are_counted_in_words_to_the_sixth():
+    said = [drawing._rank(number) for number in (1, 2, 6, 7)]
+    assert said == ["worst ", "second worst ", "sixth worst ", "7th worst "]
+
+
+# ---------------------------------------------------------------------------------------------- the page's own choices
+def test_the_page_of_a_grid_without_limits_has_one_table_of_combinations():
+    summary = summary_of(2, grid={"mirror": ("a", "b")}, rows=16)
+    for limits, tables in ((LIMITS, 2), ((), 1)):
+        *_, view, detail = campaign_module._grid(replace(summary, limits=limits), summary.cells[0], ())
+        assert view.title == "Every combination"
+        assert len(view.blocks) == tables
+        assert detail == "Below in detail: mirror = a, the first of those that miss a limit least."
+    (view,) = campaign_module._grid(summary, None, ())
+    assert len(view.blocks) == 2
+
+
+def test_an_output_is_drawn_from_three_rows_on_that_differ():
+    output = output_summary("margin", np.array([0.0, 0.3, 1.0]))
+    assert campaign_module._spread(output)
+    for other in (
+        replace(output, rows=2, deviation=0.6),
+        replace(output, most=output.least),
+        replace(output, edges=output.edges[:2]),
+        replace(output, counts=np.zeros(40)),
+    ):
+        assert not campaign_module._spread(other)
+
+
+def test_no_region_is_drawn_where_no_input_differs():
+    summary = summary_of(2, rows=64, shift_db=-0.6)
+    assert len(campaign_module.region(summary)) == 1
+    same = {key: np.full(64, 1.0) if key in INPUTS else column for key, column in summary.sample.items()}
+    assert campaign_module.region(replace(summary, sample=same)) == ()
+    kept = {key: column for key, column in summary.sample.items() if key != "communication.transmit_power"}
+    (figure,) = campaign_module.region(replace(summary, sample=kept))
+    assert next(iter(figure.columns)) == "communication.pointing_error"
+    assert len(figure.columns) == 2
+
+
+def test_the_region_is_of_the_limit_most_often_missed_and_of_the_cell_most_evenly_split():
+    summary = summary_of(2, grid={"mirror": ("a", "b", "c")}, rows=16)
+    shares = ((1.0, 0.2), (0.1, 0.7), (0.4, 0.9))
+    names = ("margin", "residual_quantile")
+
+    def split(*shares):
+        cells = [
+            replace(
+                cell,
+                missed=Interval(of[0], of[0], of[0], CONFIDENCE),
+                missed_by={n: Interval(s, s, s, CONFIDENCE) for n, s in zip(names, of, strict=True)},
+            )
+            for cell, of in zip(summary.cells, shares, strict=True)
+        ]
+        limit, number = campaign_module._split(replace(summary, cells=tuple(cells))) or (None, None)
+        return limit and limit.output, number
+
+    assert split(*shares) == ("residual_quantile", 1)  # in the cell shown in detail
+    assert split((0.0, 0.0), (0.1, 0.2), (0.9, 0.9)) in (("margin", 1), ("margin", 2), ("residual_quantile", 1))
+    assert split((0.0, 0.0), (0.1, 0.4), (1.0, 0.8)) == ("residual_quantile", 1)
+    assert split((0.0, 1.0), (1.0, 0.0), (0.0, 0.0)) == (None, None)
