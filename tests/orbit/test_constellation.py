@@ -6,6 +6,7 @@ import itertools
 import math
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -459,3 +460,50 @@ def test_a_satellite_and_a_station_of_one_name_are_refused(tmp_path):
     clash = {"constellation.stations": {"1-1": STATIONS["constellation.stations"]["kiruna"]}}
     with pytest.raises(orbit.OrbitError, match='a satellite and a station are called "1-1"; give each its own name'):
         planned(tmp_path, SIX_HOURS, clash)
+
+
+@pytest.mark.parametrize(
+    ("satellites", "relays", "terminals", "sites", "at_sites", "said"),
+    [
+        (1, 1, 1, 0, (), "1 satellite shares 1 relay of one terminal: in"),
+        (2, 1, 3, 0, (), "2 satellites share 1 relay of 3 terminals: in"),
+        (1, 2, 2, 1, (1,), "1 satellite shares 2 relays of 2 terminals each and 1 ground station of one terminal: in"),
+        (1, 1, 1, 1, (2,), "1 satellite shares 1 relay of one terminal and 1 ground station of 2 terminals: in"),
+        (1, 1, 1, 2, (1, 1), "one terminal and 2 ground stations of 2 terminals in all: in"),
+        (1, 1, 1, 2, (1, 0), "one terminal and 2 ground stations of one terminal in all: in"),
+    ],
+)
+def test_the_words_count_one_and_several(plan, satellites, relays, terminals, sites, at_sites, said):
+    names = [f"n{k}" for k in range(9)]
+    few = with_other(
+        plan,
+        satellites=names[:satellites],
+        relays=names[:relays],
+        use=np.full(relays, 0.5),
+        terminals=terminals,
+        stations=names[:sites],
+        station_terminals=at_sites,
+        station_use=np.full(sites, 0.25),
+        by_station=SimpleNamespace(sessions=np.zeros(sites), volume_bit=np.zeros(sites)),
+    )
+    assert said in plan_sentences(few)[0]
+    assert ("n0 25 %" in " ".join(plan_sentences(few))) is (sites > 0)
+
+
+@pytest.mark.parametrize(("count", "cut"), [(40, False), (41, True)])
+def test_as_many_satellites_as_a_table_has_are_not_cut(plan, count, cut):
+    one = {name: np.repeat(getattr(plan.by_satellite, name)[:1], count) for name in OF_A_SATELLITE}
+    many = with_other(plan, satellites=[f"s{k}" for k in range(count)], by_satellite=SimpleNamespace(**one))
+    assert ("satellites; --csv has every session." in plan_text(many, 120)) is cut
+
+
+OF_A_SATELLITE = ("sessions", "served_s", "longest_gap_s", "volume_bit", "busy_s")
+SAID_OF_A_PLAN = (
+    "satellites", "relays", "use", "terminals", "stations", "opportunities", "by_satellite", "span_s", "planned",
+    "volume_bit", "loss"
+)  # fmt: skip
+
+
+def with_other(plan, **changes):
+    """What the words say of a plan, some of it changed."""
+    return SimpleNamespace(**{name: getattr(plan, name) for name in SAID_OF_A_PLAN} | changes)

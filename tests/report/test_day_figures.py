@@ -2,12 +2,15 @@
 
 import csv
 import math
+from types import SimpleNamespace
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 
 from microrad.report import columns_csv
+from microrad.report.day import figures
+from microrad.report.day import world_map as world
 from microrad.report.day.figures import (
     MOST_BARS,
     Assumed,
@@ -22,7 +25,7 @@ from microrad.report.day.figures import (
 )
 from microrad.report.day.world_map import Marked, Places, broken, land, odd, other_side, world_map
 from microrad.report.plotting import scales
-from microrad.report.plotting.sheet import Area, Bars, Line, shortened
+from microrad.report.plotting.sheet import Area, Bars, Line, Rule, shortened
 from microrad.report.plotting.swings import in_lines
 from microrad.report.quantities import duration
 
@@ -509,3 +512,120 @@ def test_the_hidden_region_is_what_lies_beyond_the_outline(latitude, longitude, 
                 assert odd(rings, (x, y)) == (winding(rings, x, y) % 2 == 1) == (away > 0.0), (x, y)
                 compared += 1
     assert compared > 400
+
+
+# ------------------------------------------------------------------------------------------ limits of what is drawn
+@pytest.mark.parametrize(
+    ("largest", "log"), [(50.0, False), (50.1, True), (1.0, False), (math.nan, False), (0.0, False)]
+)
+def test_errors_are_on_a_logarithmic_axis_beyond_fifty_times_their_median(largest, log):
+    one = np.ones(3)
+    windows = Windows(np.arange(3.0), one, np.array([1.0, 1.0, largest]))
+    panel = panels(contact_run([("data", 0.0, 9.0)], windows))[-1]
+    assert panel.y.log is log
+    assert panel.y.low == (None if log else 0.0)
+
+
+def test_errors_that_are_all_nothing_are_on_a_linear_axis():
+    none = np.zeros(3)
+    panel = panels(contact_run([("data", 0.0, 9.0)], Windows(np.arange(3.0), none, none)))[-1]
+    assert panel.y.log is False
+
+
+@pytest.mark.parametrize(("doppler", "ruled"), [((-1.0, 1.0), 1), ((0.0, 1.0), 0), ((-1.0, 0.0), 0), ((1.0, 2.0), 0)])
+def test_a_line_at_zero_is_drawn_where_a_curve_crosses_it(doppler, ruled):
+    ones = np.ones(2)
+    figure = along_contact(np.array([0.0, 60.0]), ones, ones, ones, np.array(doppler) * 1e9, **THIRD)
+    assert [len(panel.all_of(Rule)) for panel in panels(figure)] == [0, 0, 0, ruled]
+    assert (panels(figure)[0].x.low, panels(figure)[0].x.high) == (0.0, 1.0)
+    at_once = along_contact(np.zeros(1), *[np.ones(1)] * 4, **THIRD)
+    assert panels(at_once)[0].x.high == 1e-3
+
+
+def test_a_volume_without_a_curve_since_the_start_or_with_an_empty_one_is_drawn():
+    curve = np.array([3600.0, 7200.0]), np.array([0.0, 8e9])
+    for cumulative, stored in (
+        ({}, {"relay": curve}),
+        ({"relay": curve}, {}),
+        ({"none": (NOTHING, NOTHING), "relay": curve}, {}),
+    ):
+        figure = data_volume(cumulative, stored)
+        above = panels(figure)[0]
+        assert (above.x.low, above.x.high) == (1.0, 2.0)
+        assert "volume (bit)" not in figure.columns
+    assert set(data_volume({}, {}).columns) == {"time (s)", "volume (bit)"}
+
+
+@pytest.mark.parametrize(("wanted", "found"), [(0.5, 2.0), (0.8, 3.0), (0.81, math.inf), (0.2, 1.0), (0.1, 1.0)])
+def test_a_share_that_the_last_latency_just_reaches_is_reached(wanted, found):
+    assert reached_s(np.array([1.0, 2.0, 3.0]), np.array([0.2, 0.5, 0.8]), wanted) == pytest.approx(found)
+    assert reached_s(NOTHING, NOTHING, wanted) == math.inf
+
+
+@pytest.mark.parametrize(
+    ("value", "below"),
+    [(1.0, 1.0), (1.99, 1.0), (2.0, 2.0), (4.99, 2.0), (5.0, 5.0), (9.99, 5.0), (10.0, 10.0), (0.03, 0.02)],
+)
+def test_an_axis_begins_at_the_next_of_1_2_and_5(value, below):
+    assert figures._round_below(value) == pytest.approx(below, rel=1e-12)
+
+
+def test_lengths_of_time_at_both_ends_of_an_axis_are_marked():
+    every = {"s": (1, 2, 5), "min": (1, 2)}
+    assert figures._durations(every, 1.0, 120.0) == {1.0: "1 s", 2.0: "2 s", 5.0: "5 s", 60.0: "1 min", 120.0: "2 min"}
+    assert figures._durations(every, 1.1, 119.0) == {2.0: "2 s", 5.0: "5 s", 60.0: "1 min"}
+
+
+def some_swing(name, low, high, of_relay=1.0, of_optical=1.0):
+    numbers = SimpleNamespace(ratio=2.0, relay_bit=8e12, optical_bit=16e12)
+    both = {"at_low": numbers, "at_high": SimpleNamespace(ratio=4.0, relay_bit=16e12, optical_bit=32e12)}
+    return SimpleNamespace(name=name, low=low, high=high, of_relay=of_relay, of_optical=of_optical, **both)
+
+
+def test_the_assumptions_move_the_ratio_or_the_relays_volume_where_nothing_else_comes_down():
+    swings = [some_swing("a", "1", figures.NOTHING, 1.5), some_swing("b", "1", "2", 2.0)]
+    swings += [some_swing("c", figures.NOTHING, figures.NOTHING, 1.1, 3.0)]
+    relay = SimpleNamespace(capacity_bit=24e12)
+    day = SimpleNamespace(swings=swings, direct=object(), ratio=3.0, relay=relay, view=SimpleNamespace(partner="relay"))
+    both = figures._assumptions_figure(day)
+    assert [*both.columns][:4] == ["as assumed", "b: 1 / 2, lower", "a: 1, lower", "c, lower"]
+    assert [column[0] for column in both.columns.values()] == [3.0, *[2.0] * 3, *[4.0] * 3]
+    assert both.caption.startswith("Volume by relay over volume direct: ")
+    day.direct = None
+    alone = figures._assumptions_figure(day)
+    assert [column[0] for column in alone.columns.values()] == [3.0, *[1.0] * 3, *[2.0] * 3]
+    assert alone.caption.startswith("Volume by the relay (TB): ")
+    optical = figures._optical_figure(day, SimpleNamespace(capacity_bit=8e12))
+    assert {key: column[0] for key, column in optical.columns.items()} == {
+        "as assumed": 1.0, "c, lower": 2.0, "c, higher": 4.0
+    }  # fmt: skip
+
+
+def test_a_state_that_takes_no_time_has_no_bar():
+    log = [SimpleNamespace(to=to, time_s=at) for to, at in (("slew", 10.0), ("beacon", 10.0), ("data", 12.0))]
+    log.append(SimpleNamespace(to="idle", time_s=15.0))
+    window = SimpleNamespace(start_s=12.0, seconds=1.0, rms_rad=1e-6, largest_rad=3e-6)
+    run = SimpleNamespace(contact=SimpleNamespace(start_s=10.0), log=log, windows=[window])
+    asked = SimpleNamespace(requirement=SimpleNamespace(pointing_error_rad=10e-6))
+    found = figures._contact_run_figure(SimpleNamespace(data=asked), run)
+    assert not any("slew" in text for text in texts(found))
+    assert "required: 10 µrad" in texts(found)
+    assert panels(found)[-1].all_of(Line)[0].x == pytest.approx([2.5 / 60.0])
+
+
+@pytest.mark.parametrize(
+    ("value", "sides", "said"),
+    [(0, "WE", "0°"), (180, "WE", "180°"), (-180, "WE", "180°"), (60.5, "WE", "60.5° E"), (-60, "WE", "60° W")],
+)
+def test_an_angle_on_the_map_names_its_side(value, sides, said):
+    assert world._degrees(value, sides) == said
+
+
+def test_a_line_along_a_meridian_over_the_equator_is_no_line_over_a_pole():
+    x, y = broken(np.array([0.0, 120.0]), np.array([10.0, -10.0]))
+    assert x.tolist() == [0.0, 120.0] and y.tolist() == [10.0, -10.0]
+    x, y = broken(np.array([-90.0, 90.0]), np.array([0.0, 10.0]))
+    assert not np.isnan(x).any()
+    x, y = broken(np.array([180.0, -180.0]), np.array([5.0, 7.0]))  # one place, named twice
+    assert x[1] == 180.0 and np.isnan(x[2]) and x[3] == -180.0
+    assert y[1] == y[3] == 5.0

@@ -455,3 +455,319 @@ def test_each_number_of_a_way_stands_under_its_own_name():
 
 
 HISTORY = ("time", "generated", "delivered", "stored", "lost")
+
+
+# ---------------------------------------------------------------------------------------------------- words in detail
+def a_way(**changes):
+    """A way of three contacts in half an hour each."""
+    given = SimpleNamespace(
+        contacts=range(3),
+        contact_s=5400.0,
+        capacity_bit=8e12,
+        capacity_spread_bit=(4e12, 8e12),
+        generated_bit=8e9,
+        arrived_bit=0.0,
+    )
+    return replace_namespace(given, **changes)
+
+
+def a_day(**changes):
+    """A day to a relay that has everything, and no downlink."""
+    view = SimpleNamespace(days=1.0, duration_s=86400.0, partner="relay")
+    given = SimpleNamespace(
+        view=view,
+        relay=a_way(),
+        direct=None,
+        optical=None,
+        ratio=math.nan,
+        optical_ratio=math.nan,
+        operations=SimpleNamespace(relay_share=1.0, downlink=None, optical=None, runs=20, margin_db=3.0),
+    )
+    return replace_namespace(given, **changes)
+
+
+STATIONS = SimpleNamespace(stations={"kiruna": 1, "tromso": 2})
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({}, "In 24 h the relay is in view 3 times, 90 min in all, and could carry 1 TB."),
+        ({"operations": None}, "In 24 h the relay is in view 3 times, 90 min in all, and could carry 1 TB."),
+        (
+            {"operations": SimpleNamespace(relay_share=0.5)},
+            "In 24 h the relay grants the link 3 times, 90 min in all, and could carry 1 TB.",
+        ),
+        (
+            {"operations": SimpleNamespace(relay_share=0.5), "relay": a_way(contacts=(), capacity_bit=0.0)},
+            "In 24 h the relay never grants the link, and could carry 0 B.",
+        ),
+        (
+            {"relay": a_way(contacts=(), capacity_bit=0.0)},
+            "In 24 h the relay is never in view, and could carry 0 B.",
+        ),
+        (
+            {
+                "operations": SimpleNamespace(relay_share=0.5, downlink=STATIONS, optical=None),
+                "direct": a_way(contacts=range(1), contact_s=600.0, capacity_bit=8e9),
+                "ratio": 1000.0,
+            },
+            "In 24 h the relay grants the link 3 times, 90 min in all, and could carry 1 TB. The ground (kiruna, "
+            "tromso) is in view once, 10 min in all, and could carry 1 GB; the relay could carry 1e+03 times as much.",
+        ),
+        (
+            {"operations": None, "direct": a_way(contacts=(), capacity_bit=0.0), "ratio": math.inf},
+            "In 24 h the relay is in view 3 times, 90 min in all, and could carry 1 TB. The ground () is never in "
+            "view, and could carry 0 B.",
+        ),
+        (
+            {
+                "operations": SimpleNamespace(relay_share=1.0, optical=STATIONS),
+                "optical": a_way(),
+                "optical_ratio": 2.0,
+            },
+            "In 24 h the relay is in view 3 times, 90 min in all, and could carry 1 TB. Optical ground stations "
+            "(kiruna, tromso) are in use for 90 min, and could carry 1 TB, from 500 GB to 1 TB by the weather drawn; "
+            "the relay could carry 2 times as much.",
+        ),
+        (
+            {
+                "operations": SimpleNamespace(relay_share=1.0, optical=STATIONS),
+                "optical": a_way(capacity_spread_bit=(8e12, 8e12)),
+                "optical_ratio": 0.0,
+            },
+            "In 24 h the relay is in view 3 times, 90 min in all, and could carry 1 TB. Optical ground stations "
+            "(kiruna, tromso) are in use for 90 min, and could carry 1 TB.",
+        ),
+        (
+            {"operations": SimpleNamespace(relay_share=1.0, optical=STATIONS), "optical": a_way(contacts=())},
+            "In 24 h the relay is in view 3 times, 90 min in all, and could carry 1 TB. Optical ground stations "
+            "(kiruna, tromso) are never used.",
+        ),
+    ],
+)
+def test_the_headline_says_what_each_way_could_carry_and_how_they_compare(changes, said):
+    assert day_words.headline(a_day(**changes)) == [said]
+
+
+def test_the_headline_of_two_days_has_each_number_by_the_day_too():
+    two = SimpleNamespace(days=2.0, duration_s=172800.0, partner="relay")
+    operations = SimpleNamespace(relay_share=1.0, optical=STATIONS)
+    (said,) = day_words.headline(a_day(view=two, operations=operations, optical=a_way()))
+    relay = "In 48 h the relay is in view 3 times, 90 min in all (1.5 times, 45 min a day), and could carry 1 TB (500 "
+    assert said.startswith(relay + "GB a day). Optical ground stations")
+    assert "in use for 90 min (45 min a day), and could carry 1 TB (500 GB a day), from 500 GB to 1 TB by" in said
+
+
+@pytest.mark.parametrize(
+    ("count", "said"),
+    [
+        (0, "never"),
+        (1, "once"),
+        (2, "2 times"),
+        (2.345, "2.35 times"),
+        (99.95, "100 times"),
+        (100.0, "100 times"),
+        (1234, "1234 times"),
+    ],
+)
+def test_a_count_of_a_hundred_and_more_has_all_of_its_digits(count, said):
+    assert day_words.times(count) == said
+
+
+@pytest.mark.parametrize(("time_s", "said"), [(0.0, "0 min"), (59_940.0, "999 min"), (60_000.0, "16.7 h")])
+def test_a_time_in_contact_is_in_hours_from_a_thousand_minutes_on(time_s, said):
+    assert day_words.contact_time(time_s) == said
+
+
+@pytest.mark.parametrize(("ratio", "said"), [(0.0, ""), (math.inf, ""), (math.nan, ""), (0.5, "0.5")])
+def test_two_ways_are_compared_where_both_carry_something(ratio, said):
+    told = day_words._compared(a_day(), ratio)
+    assert told == (f"; the relay could carry {said} times as much" if said else "")
+
+
+def sky_of(*names):
+    return SimpleNamespace(names=names, any_drawn=0.5, any_clear=0.75, any_independent=0.9)
+
+
+def test_the_sky_of_one_station_is_told_by_its_name_and_that_of_several_beside_independent_clouds():
+    assert day_words.sky_words(a_day(sky=None)) == []
+    assert day_words.sky_words(a_day(sky=sky_of("kiruna"))) == [
+        "The sky over kiruna is clear for 75.0 % of the time (50.0 % in the 20 drawn skies)."
+    ]
+    assert day_words.sky_words(a_day(sky=sky_of("kiruna", "tromso"))) == [
+        "At least one of the 2 optical stations is clear for 75.0 % of the time (50.0 % in the 20 drawn skies); with "
+        "clouds that are independent from site to site it would be 90.0 %."
+    ]
+
+
+def contacts_of(partner="relay", rises=1, closed_form=None, median_s=600.0, encounters=2):
+    """A view of contacts between 500 km and 2000 km."""
+    largest = {
+        "doppler_most_hz": 2e9,
+        "point_ahead_most_rad": 50e-6,
+        "rate_most_rad_s": 1e-3,
+        "range_most_m": 2e6,
+    }
+    return SimpleNamespace(
+        encounters=[SimpleNamespace(range_least_m=5e5 * (k + 1)) for k in range(encounters)],
+        largest=largest.__getitem__,
+        closed_form=closed_form,
+        partner=partner,
+        rises=rises,
+        median_s=median_s,
+        visible_share=0.25,
+        gap_s=3600.0,
+        pair=SimpleNamespace(leo=SimpleNamespace(name="LEO"), geo=SimpleNamespace(name="GEO")),
+    )
+
+
+def test_the_words_of_the_contacts_name_what_else_cuts_them():
+    def told(**changes):
+        return day_words.contact_words(a_day(view=contacts_of(**changes)))
+
+    whole = (
+        "The relay is in view for 25.0 % of the time, 10 min at a time (median), and out of it for 60 min at most. "
+        "Range 500 to 2000 km, point-ahead up to 50 µrad, line of sight up to 1 mrad/s, Doppler shift up to 2 GHz "
+        "either way."
+    )
+    assert told(rises=2) == told(rises=3) == whole
+    cut = " It rises once only: a limit other than {} cuts some contacts in two."
+    assert told() == whole + cut.format("the Earth")
+    assert told(partner="station") == whole.replace("The relay", "The station") + cut.format("the mask")
+    assert told(rises=2, median_s=math.nan) == whole.replace(" 10 min at a time (median),", "")
+    form = SimpleNamespace(duration_s=2700.0)
+    assert told(rises=2, closed_form=form) == whole + (
+        " Over the equator a contact would take 45.00 min, by the formula for coplanar circular orbits."
+    )
+    assert told(encounters=0) == (
+        "There is no contact: within the span and the limits of the mission, LEO and GEO do not see one another."
+    )
+
+
+@pytest.mark.parametrize(
+    ("reach_m", "furthest_m", "derived", "outage", "said"),
+    [
+        ([2e6], 2e6, (), 0.0, "100 Mbit/s at every range of the contacts."),
+        ([2e6], 2e6, ("a choice",), 0.0, "100 Mbit/s at every range of the contacts."),
+        ([1.9e6], 2e6, (), 0.0, "100 Mbit/s up to 1900 km. Beyond that no data flow: the contacts reach 2000 km."),
+        ([2e6], 0.0, (), 0.0, "100 Mbit/s up to 2000 km."),
+        (
+            [0.0],
+            2e6,
+            ("a choice",),
+            0.0,
+            "100 Mbit/s up to 0 km. Beyond that no data flow: the contacts reach 2000 km.",
+        ),
+        ([1e6, 3e6], 2e6, (), 0.0, "100 Mbit/s up to 1000 km; 200 Mbit/s at every range of the contacts."),
+        (
+            [1e6, 1.5e6],
+            2e6,
+            ("this", "that"),
+            0.01,
+            "100 Mbit/s up to 1000 km; 200 Mbit/s up to 1500 km; 1 % of the time is lost in outage. Beyond that no "
+            "data flow: the contacts reach 2000 km. How far it reaches, and so the volume, follows from this; that.",
+        ),
+    ],
+)
+def test_a_rate_reaches_a_range_or_every_range_of_the_contacts(reach_m, furthest_m, derived, outage, said):
+    closings = [SimpleNamespace(rate_bit_s=1e8 * (k + 1), largest_range_m=m) for k, m in enumerate(reach_m)]
+    day = a_day(
+        view=SimpleNamespace(largest={"range_most_m": furthest_m}.__getitem__),
+        closings=closings,
+        derived=derived,
+        loss=SimpleNamespace(outage=outage, loss_db=1.5, source="a test"),
+    )
+    begin = "With a pointing loss of 1.50 dB (a test) the laser link has the demanded 3 dB for "
+    assert day_words.rate_words(day) == begin + said
+    none = replace_namespace(day, closings=[])
+    assert day_words.rate_words(none) == "The receiver takes none of the mission's data rates."
+
+
+def swing_of(**changes):
+    """An assumption that changes nothing."""
+    given = {
+        "name": "a", "low": "l", "high": "h", "of_relay": 1.0, "of_optical": 1.0, "here": NUMBERS, "at_low": NUMBERS,
+        "at_high": NUMBERS
+    }  # fmt: skip
+    return SimpleNamespace(**given | changes)
+
+
+def test_what_matters_to_the_optical_downlink_is_named_above_the_least_factor():
+    wet = replace(NUMBERS, optical_bit=8e9)
+    sides = {"low": day_words.NOTHING, "at_low": wet, "at_high": replace(wet, optical_bit=16e9)}
+    swings = [swing_of(name=f"a{k}", of_optical=1.2 + 0.1 * k, **sides) for k in range(4)]
+    day = replace_namespace(day_of(None, None), swings=swings)
+    assert day_words.assumption_words(day) == [
+        "What matters most to the optical downlink's volume: a3 (h: 2 GB); a2 (h: 2 GB); a1 (h: 2 GB)."
+    ]
+    least = replace_namespace(day, swings=[swing_of(of_optical=day_words.MATTERS)])
+    assert day_words.assumption_words(least) == []
+
+
+@pytest.mark.parametrize(
+    ("low", "ratio", "said"),
+    [
+        (NUMBERS, True, "l: 2, h: 2"),
+        (NUMBERS, False, "l: 1 GB, h: 1 GB"),
+        (replace(NUMBERS, relay_bit=0.0), True, "l: nothing by relay, h: 2"),
+        (replace(NUMBERS, direct_bit=0.0), True, "l: nothing direct, h: 2"),
+        (replace(NUMBERS, direct_bit=0.0), False, "l: 1 GB, h: 1 GB"),
+    ],
+)
+def test_a_side_of_an_assumption_that_carries_nothing_says_by_which_way(low, ratio, said):
+    assert day_words._ends(swing_of(at_low=low), ratio, "relay") == said
+
+
+@pytest.mark.parametrize(
+    ("slow_s", "factor"), [(60.0, 1.0), (120.0, 2.0), (30.0, 2.0), (0.0, 1.0), (math.nan, 1.0), (math.inf, math.inf)]
+)
+def test_a_wait_counts_where_both_sides_have_one(slow_s, factor):
+    assert day_words._wait_factor(swing_of(at_low=replace(NUMBERS, relay_slow_s=slow_s))) == factor
+
+
+def test_a_wait_of_the_least_factor_is_not_named_and_a_longer_one_by_every_way():
+    least = swing_of(at_low=replace(NUMBERS, relay_slow_s=66.0), here=NUMBERS)
+    assert day_words._wait_factor(least) == pytest.approx(day_words.MATTERS, rel=1e-9)
+    late = swing_of(at_low=replace(NUMBERS, relay_slow_s=120.0, optical_slow_s=60.0))
+    day = replace_namespace(day_of(late, None), optical=object())
+    (said,) = day_words.assumption_words(day)
+    assert said.startswith("How late data arrive depends most on a: with l or h, 99 % arrive within ")
+    assert said.count(" or ") >= 2 and said.endswith("by the optical downlink.")
+
+
+def run_of(**changes):
+    """A contact of ten minutes with data in the half of it."""
+    given = SimpleNamespace(
+        contact=SimpleNamespace(start_s=100.0, end_s=700.0),
+        seconds={contact_run.State.LOCK: 2.0, contact_run.State.DATA: 300.0},
+        data_s=300.0,
+        first_data_s=130.0,
+        losses=0,
+        losses_per_s=0.0,
+        data_share=0.5,
+        windows=range(4),
+        sampled_s=1.5,
+        bits=lambda rate: 300.0 * rate,
+        log=[SimpleNamespace(cause="given up")],
+    )
+    return replace_namespace(given, **changes)
+
+
+def test_a_contact_has_its_volume_at_a_single_rate_and_its_losses_where_there_are_some():
+    begin = (
+        "Contact 2 (10 min) under PI: data begin 30 s after the rise, 2 s of it to lock, and flow for 5 min, 50.0 % of "
+        "the contact"
+    )
+    end = (
+        ". The fine loop is simulated in 4 windows, 1.5 s in all, with the point-ahead and the rate of the line of "
+        "sight of each; "
+    )
+    kept, at = "lock is never lost in them.", ": 3.75 GB at 100 Mbit/s"
+    assert contact_sentences(run_of(), 2, "PI", 1e8) == [f"{begin}{at}{end}{kept}"]
+    assert contact_sentences(run_of(), 2, "PI", None) == [f"{begin}{end}{kept}"]
+    for count, said in ((1, "once"), (3, "3 times")):
+        lost = f"lock is lost {said} in them, once in 50 s, which the time between them does not show."
+        assert contact_sentences(run_of(losses=count, losses_per_s=0.02), 2, "PI", None) == [f"{begin}{end}{lost}"]
+    none = contact_sentences(run_of(data_s=0.0), 2, "PI", 1e8)
+    assert none == ["Contact 2 of 10 min never comes to data: given up."]
