@@ -596,3 +596,163 @@ def test_every_curve_of_a_response_stands_within_its_axis(found):
     curves = [m.y for panel in figure.sheet.panels for m in panel.marks if getattr(m, "label", "").endswith("rms")]
     assert len(lows) == 1 and len(curves) == len(figure.sheet.panels)
     assert lows.pop() == pytest.approx(min(np.nanmin(each) for each in curves) / 1.5, rel=1e-12)
+
+
+# ----------------------------------------------------------------------------------------------- limits and one or none
+def test_a_page_without_warnings_says_so(found):
+    assert list(coupled_page._views(replace(found, warnings=()))[0].blocks[0].lines) == ["No warnings."]
+    assert list(coupled_page._views(found)[0].blocks[0].lines) == list(found.warnings)
+
+
+def at_amplitudes(count, known=None):
+    """The identification with the first amplitude so many times."""
+    own = replace(found_of().candidate(), error_rms=np.repeat(OUTPUT_RMS[:1], count, axis=0))
+    if known is not None:
+        own.error_rms[known:] = np.nan
+    return found_of(
+        candidates=(own,),
+        within_noise=(own.name,),
+        amplitudes_v=0.1 * np.arange(1.0, count + 1),
+        output_rms=np.repeat(OUTPUT_RMS[:1], count, axis=0),
+        noise_rms=np.repeat(NOISE_RMS[:1], count, axis=0),
+        responses=(None,) * count,
+        modelled=(None,) * count,
+    )
+
+
+def test_the_amplitudes_are_columns_as_long_as_there_is_room():
+    for count, columns in ((5, 5), (6, 0)):
+        headings = coupled_page._candidates(at_amplitudes(count)).headings
+        assert sum(heading.startswith("at ") for heading in headings) == columns
+    assert len(coupled_page._candidates(at_amplitudes(2), short=True).headings) == 4
+
+
+def test_a_terminal_has_the_first_rows_and_the_last():
+    assert [list(coupled_page._few(count)) for count in (3, 4, 5, 9)] == [
+        [0, 1, 2],
+        [0, 1, 2, 3],
+        [0, 1, 2, 4],
+        [0, 1, 2, 8],
+    ]
+
+
+@pytest.mark.parametrize(("count", "folded"), [(12, ""), (13, "All 13 held-out records")])
+def test_many_records_are_folded(found, count, folded):
+    own = replace(found.candidate(), record_share=np.full((count, 2), 0.1))
+    many = replace(found, candidates=(own,), held_out=tuple(f"r{k}" for k in range(count)))
+    assert coupled_page._records(many).folded == folded
+
+
+def test_without_a_known_error_there_is_no_table_of_bands():
+    unknown = at_amplitudes(2, known=0)
+    assert coupled_page._bands(unknown) is None
+
+
+@pytest.mark.parametrize(
+    ("bias_v", "low_v", "high_v", "said"),
+    [(5.00049, 4.5, 5.5, 5.0), (5.0006, 4.5, 5.5, 5.001), (-1e-5, -0.5, 0.5, 0.0), (5.00049, 5.0, 5.0, 5.00049)],
+)
+def test_a_bias_is_told_to_a_thousandth_of_the_range(bias_v, low_v, high_v, said):
+    assert str(coupled_page._bias(Actuator("a", bias_v, low_v, high_v, 1.0))) == str(said)
+
+
+@pytest.mark.parametrize(("lines", "more"), [(60, None), (61, "1 more line are"), (62, "2 more lines are")])
+def test_a_mirror_file_is_shown_to_its_sixtieth_line(found, lines, more):
+    text = "\n".join(["x" * 160, "y" * 161, *["z"] * (lines - 2)])
+    file = coupled_page._origin(found, Path("m.toml"), text).blocks[1]
+    shown = file.blocks[0].text.splitlines()
+    assert len(shown) == 60
+    assert (shown[0], shown[1]) == ("x" * 160, "y" * 150 + " …")
+    assert file.blocks[1].startswith(f"{more} in the file") if more else len(file.blocks) == 1
+
+
+@pytest.mark.parametrize(
+    ("values", "unit", "size"),
+    [([0.0, np.nan], "m", 1.0), ([np.nan], "m", 1.0), ([2e-6, np.nan], "µm", 1e-6), ([-2e-3], "mm", 1e-3)],
+)
+def test_a_column_has_the_unit_of_its_largest_value(values, unit, size):
+    found = words.scale(values, "m")
+    assert (found.unit, found.size) == (unit, pytest.approx(size))
+    assert (found.text(np.nan), found.text(-1.2346 * size)) == ("", "\u22121.23")
+
+
+def test_a_pole_at_the_edge_of_the_band_was_excited():
+    for low_hz, high_hz, excited in ((2.0, 9.0, True), (1.0, 2.0, True), (2.1, 9.0, False), (1.0, 1.9, False)):
+        assert words._pole(complex(-4.0 * np.pi, 0.0), 0.1 + 0.0j, low_hz, high_hz).excited is excited
+
+
+@pytest.mark.parametrize(("share", "sound"), [(0.4999, True), (0.5, False), (0.6, False)])
+def test_a_model_that_leaves_half_of_the_output_is_of_no_use(found, share, sound):
+    own = replace(found.candidate(), error_share=share)
+    assert words.sound(replace(found, candidates=(own,))) is sound
+    assert words.sound(replace(found, candidates=(own,), stopped=True)) is None
+
+
+def test_the_error_is_told_at_up_to_four_amplitudes_then_at_three():
+    said = [words.by_amplitude(at_amplitudes(count)) for count in (1, 4, 5)]
+    assert [text.count(" rms drive") for text in said] == [1, 4, 3]
+    assert said[2].startswith("It leaves 1.58 µm rms (100 % of the output) at 100 mV rms drive, ")
+    assert " at 300 mV rms drive and " in said[2] and said[2].endswith(" at 500 mV rms drive.")
+    assert words.by_amplitude(at_amplitudes(2, known=0)) == ""
+    assert words.by_amplitude(at_amplitudes(2, known=1)).count(" rms drive") == 1
+
+
+@pytest.mark.parametrize(
+    ("held", "fitted", "said"),
+    [
+        (1, 1, "This rests on r0; 1 other record were fitted."),
+        (2, 2, "This rests on r0 and r1; 2 other records were fitted."),
+        (4, 2, "This rests on r0, r1, r2 and r3; 2 other records were fitted."),
+        (5, 2, "This rests on r0, r1, r2, r3 and 1 more; 2 other records were fitted."),
+    ],
+)
+def test_the_verdict_rests_on_four_named_records_and_a_number_of_others(found, held, fitted, said):
+    names = tuple(f"r{k}" for k in range(5))
+    assert words.rests_on(replace(found, held_out=names[:held], fitted=names[:fitted])) == said
+
+
+@pytest.mark.parametrize(
+    ("error_s", "said"), [(5e-6, "200 µs ± 5 µs late"), (0.0, "200 µs late"), (np.nan, "200 µs late")]
+)
+def test_a_delay_has_its_error_where_that_is_known(found, error_s, said):
+    assert words.delay_text(replace(found.candidate(), delay_error_s=error_s)).startswith(f"The drive acts {said}.")
+
+
+@pytest.mark.parametrize(
+    ("outputs", "ways"),
+    [
+        ([("displacement", True)] * 4, False),
+        ([("displacement", True)] * 3, True),
+        ([("displacement", False)] * 4, True),
+        ([("angle", False)] * 4, True),
+        ([("displacement", True)] * 3 + [("angle", False)], True),
+    ],
+)
+def test_which_way_round_the_channels_are_is_open_without_four_sensors_of_known_places(found, outputs, ways):
+    channels = tuple(Output(f"y{k}", what, (0.01, 0.0) if placed else None) for k, (what, placed) in enumerate(outputs))
+    model = SimpleNamespace(outputs=channels, excited_hz=(1.0, 2.0), known=object())
+    said = words.not_held(replace(found, candidates=(replace(found.candidate(), model=model),)))
+    assert any(text.startswith("Which way round") for text in said) is ways
+    placeless = any(what == "displacement" and not placed for what, placed in outputs)
+    assert any(text.startswith("A geometry") for text in said) is placeless
+
+
+def test_noise_at_the_least_share_is_said_and_not_drawn(monkeypatch):
+    found = found_of()
+    least = min(each.error_share for each in found.candidates)
+    for noise, drawn in (
+        (least / coupled_figures_module._FAR, False),
+        (1.01 * least / coupled_figures_module._FAR, True),
+    ):
+        monkeypatch.setattr(coupled_figures_module, "_share", lambda rms, found, noise=noise: noise)
+        figure = error_over_parameters(found)
+        assert any(rule.label == "noise" for rule in figure.sheet.panels[0].all_of(Rule)) is drawn
+        assert ("lies far below" in figure.caption) is not drawn
+
+
+def test_bands_of_many_amplitudes_are_those_of_the_first_the_middle_and_the_last():
+    for count, drives in ((MOST, ["100 mV", "200 mV", "300 mV", "400 mV"]), (MOST + 1, ["100 mV", "300 mV", "500 mV"])):
+        found = at_amplitudes(count)
+        own = replace(found.candidate(), band_error_rms=np.ones((count, 2, 2)))
+        titles = [panel.title for panel in bands(replace(found, candidates=(own,))).sheet.panels]
+        assert [title.rpartition(", ")[2] for title in titles[::2]] == drives

@@ -33,7 +33,7 @@ from microrad.report.identification.parameters import (
 )
 from microrad.report.plotting.interactive import plot_of
 from microrad.report.plotting.palette import BLUE, MOST_POINTS, SKY, VERMILION
-from microrad.report.plotting.sheet import Line
+from microrad.report.plotting.sheet import Line, Span
 from report_pages import assert_sound, without_scripts
 
 RATE_HZ = 2000.0
@@ -613,3 +613,232 @@ def test_the_page_counts_its_recordings(full, monkeypatch, sources, said):
         found, mirror_file=Path("m.toml"), mirror_text="", title="", written="bouc_wen"
     )
     assert made.startswith(said)
+
+
+# ----------------------------------------------------------------------------------------------- limits and one or none
+def a_recording(counts):
+    """A recording whose drive crosses its middle so often in each of its eighths."""
+    parts = [np.r_[(-1.0) ** np.arange(count), np.full(40 - count, (-1.0) ** count)] for count in counts]
+    drive = np.concatenate(parts)
+    return recording_from_arrays(drive, drive, RATE_HZ, "counted")
+
+
+@pytest.mark.parametrize(
+    ("counts", "told"),
+    [
+        ((1, 1, 2, 3, 4, 4, 5, 6), True),
+        ((1, 1, 2, 3, 4, 4, 5, 5), False),
+        ((0, 0, 1, 2, 3, 4, 5, 6), True),
+        ((0, 0, 1, 2, 3, 4, 5, 5), False),
+        ((2, 2, 3, 4, 5, 6, 7, 10), False),
+        ((1, 2, 1, 3, 4, 5, 6, 9), False),
+    ],
+)
+def test_a_chirp_crosses_its_middle_ever_more_often_by_more_than_five_times(counts, told):
+    recording = a_recording(counts)
+    assert figures.is_chirp(recording) is told
+    assert figures.is_chirp(replace(recording, period_samples=160)) is False
+
+
+def test_a_frequency_is_that_of_the_line_where_the_drive_crosses_too_seldom_or_noise_crosses_too():
+    t = np.arange(1000) / 1000.0
+    two = words.sine_of(np.cos(2 * np.pi * 2 * t + 1.58), 1000.0)
+    assert two.freq_hz == pytest.approx(2.0, rel=1e-9)
+    ripple = np.sin(2 * np.pi * 40.3 * t) + 0.3 * np.sin(2 * np.pi * 430.0 * t + 0.4)
+    assert words.sine_of(ripple, 1000.0).freq_hz == pytest.approx(40.0, rel=1e-9)
+    assert words.sine_of(np.sin(2 * np.pi * 40.3 * t), 1000.0).freq_hz == pytest.approx(40.3, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("value", "span", "rounded"),
+    [(6.00049, 12.0, 6.0), (6.0051, 12.0, 6.01), (-0.001, 12.0, 0.0), (1.23456, 0.0, 1.23456)],
+)
+def test_a_voltage_is_told_to_a_thousandth_of_its_range(value, span, rounded):
+    found = words._rounded(value, span)
+    assert found == pytest.approx(rounded, abs=1e-9)
+    assert math.copysign(1.0, found) == 1.0
+
+
+def score(percent):
+    return SimpleNamespace(held_out_rms_percent=percent)
+
+
+@pytest.mark.parametrize(
+    ("own", "line", "admissible", "sound"),
+    [(1.0, 2.0, True, True), (2.0, 2.0, True, False), (3.0, 2.0, True, False), (1.0, 2.0, False, False)],
+)
+def test_a_choice_is_sound_where_it_is_admissible_and_better_than_a_line(own, line, admissible, sound):
+    fit = SimpleNamespace(admissible=admissible)
+    found = SimpleNamespace(score=lambda: score(own), straight_line=score(line), fit=lambda: fit)
+    assert words.sound(found) is sound
+
+
+def test_an_error_is_compared_where_the_choice_leaves_some():
+    for own, said in ((2.0, "200 µrad rms (4 %), 2 times as much"), (0.0, "200 µrad rms (4 %)")):
+        assert words._times(score(4.0), SimpleNamespace(score=lambda own=own: score(own), span_rad=5e-3)) == said
+
+
+def test_why_there_is_no_linear_part_depends_on_the_recordings():
+    def said(*roles):
+        return words.no_linear(SimpleNamespace(sources=[SimpleNamespace(role=role) for role in roles]))
+
+    assert said("loops", "broadband") == (
+        "No model with a linear part was asked for, so the broadband recordings were not used."
+    )
+    assert said("loops").startswith("No recording is broadband, ")
+
+
+def test_without_a_linear_part_there_are_no_gains():
+    assert words.gains(None) == []
+
+
+def test_a_name_stays_on_its_line():
+    assert words.one_line("a\nb\tc\u2028d é") == "a b c d é"
+
+
+def a_linear(poles, errors, zeros=()):
+    return SimpleNamespace(
+        excited_hz=(10.0, 20.0),
+        poles_rad_s=2 * np.pi * np.array(poles),
+        poles_error_rad_s=2 * np.pi * np.array(errors),
+        zeros_rad_s=2 * np.pi * np.array(zeros),
+        zeros_error_rad_s=np.zeros(len(zeros)),
+        dc_gain=np.array([[1e-3]]),
+        dc_gain_error=np.array([[1e-4]]),
+        edge_gain=np.array([[2e-3]]),
+        edge_gain_error=np.array([[1e-4]]),
+    )
+
+
+def test_roots_are_excited_in_the_band_and_real_ones_have_a_damping_of_1():
+    poles = [-9.9 + 0j, -20.1 + 0j, -9.0 + 12.0j, -9.0 - 12.0j]
+    linear = a_linear(poles, [0.1, 0.2, 1.5, 1.5], [12.0 + 0j, 0j])
+    found = words.roots(linear)
+    assert [(r.kind, r.freq_hz, r.damping, r.damping_error, r.excited) for r in found[:3]] == [
+        ("pole", pytest.approx(9.9), 1.0, 0.0, False),
+        ("pole", pytest.approx(15.0), pytest.approx(0.6), pytest.approx(0.1), True),
+        ("pole", pytest.approx(20.1), 1.0, 0.0, False),
+    ]
+    assert [(r.kind, r.freq_hz, r.excited) for r in found[3:]] == [
+        ("zero", 0.0, False),
+        ("zero", pytest.approx(12.0), True),
+    ]
+    assert math.isnan(found[3].damping) and found[4].damping == -1.0
+    rows = identification_page._roots(linear).rows
+    assert [row[0] for row in rows] == [
+        "pole, real",
+        "pole pair",
+        "pole, real",
+        "zero pair",
+        "zero, real",
+        "gain at zero frequency",
+        "gain at 10 Hz",
+    ]
+    assert [row[4] for row in rows[:3]] == ["", "0.1", ""]
+    assert [row[-1] for row in rows] == ["extrapolated", "", "extrapolated", "extrapolated", "", "extrapolated", ""]
+
+
+def test_a_root_at_no_frequency_is_not_drawn():
+    (panel,) = figures.poles(a_linear([-15.0 + 0j], [1.0], [0j])).sheet.panels
+    assert [line.label for line in panel.all_of(Line)] == ["poles"]
+    assert (panel.x.low, panel.x.high) == (pytest.approx(3.0), pytest.approx(60.0))
+
+
+def test_a_page_without_warnings_or_orders_says_so(monkeypatch):
+    monkeypatch.setattr(words, "fit_warnings", lambda fit: [])
+    none = SimpleNamespace(warnings=(), fit=lambda written: None, refused=())
+    (points,) = identification_page._warnings(none, "linear").blocks
+    assert list(points.lines) == ["No warnings."]
+    refused = SimpleNamespace(**{**vars(none), "warnings": ("one",), "refused": [Refused("linear", "short")]})
+    said, which, points = identification_page._warnings(refused, "linear").blocks
+    assert (list(said.lines), list(points.lines)) == (["one"], ["linear: short"])
+    assert which == "Models that these recordings cannot support:"
+    assert identification_page._scan(SimpleNamespace(scan=(), order=2)) is None
+    order = {"parameters": 5, "chi_square": 12.0, "criterion": 7.0, "output_error_rms": 1e-6}
+    scan = [SimpleNamespace(order=k, freedom=3 * k, **order) for k in (0, 2)]
+    assert identification_page._scan(SimpleNamespace(scan=scan, order=2)).rows == [
+        ("0", "5", "12", "7", "1 µrad", ""),
+        ("2", "5", "2", "7", "1 µrad", "chosen"),
+    ]
+
+
+def joint(correlation):
+    count = len(correlation)
+    return SimpleNamespace(
+        fit=SimpleNamespace(correlation=correlation),
+        structure=SimpleNamespace(parameters=[SimpleNamespace(name=f"p{k}") for k in range(count)]),
+        condition_number=12.0,
+        colour_inflation=2.0,
+    )
+
+
+def test_correlated_parameters_are_told_from_the_least_on_the_strongest_first(monkeypatch):
+    monkeypatch.setattr(parameters, "starts_text", lambda fit: "one start")
+    matrix = np.eye(3)
+    matrix[1, 0], matrix[2, 0], matrix[2, 1] = parameters.HIGH_CORRELATION, -0.99, 0.1
+    assert parameters.correlations(joint(matrix)) == [("p2", "p0", -0.99), ("p1", "p0", parameters.HIGH_CORRELATION)]
+    end = "Condition number 12; the variances are inflated 2 times for the colour of the residual."
+    assert parameters.notes(joint(np.eye(3))) == ["One start.", end]
+    for count, more in ((4, ""), (5, " and 4 pairs more")):  # six pairs, ten pairs
+        _, said, last = parameters.notes(joint(np.full((count, count), 0.999)))
+        assert said.endswith(f"+0.999{more}.") and said.count(" and p") == 6
+        assert last == end
+
+
+def test_a_long_name_of_a_recording_is_cut_in_its_middle():
+    assert figures._short("/folder/" + "a" * 36) == "a" * 36
+    assert figures._short("/folder/" + "a" * 20 + "b" * 17) == "a" * 20 + "…" + "b" * 15
+    none = [None] * figures.MOST_RECORDINGS
+    assert (figures._not_drawn(none), figures._not_drawn([*none, None])) == ("", " 1 more recordings are not drawn.")
+
+
+def shown_of(drive, sine=None, role="loops"):
+    return figures.Shown("name", role, drive, drive, 1000.0, sine, None)
+
+
+@pytest.mark.parametrize(
+    ("role", "excited", "freq_hz", "spans", "title"),
+    [
+        ("broadband", (10.0, 20.0), 40.0, 1, ""),
+        ("broadband", None, 40.0, 0, "40 Hz"),
+        ("loops", (10.0, 20.0), 40.0, 0, "40 Hz"),
+        ("loops", (10.0, 20.0), None, 0, ""),
+    ],
+)
+def test_a_spectrum_has_the_excited_band_or_the_frequency_of_its_sine(role, excited, freq_hz, spans, title):
+    drive = np.sin(0.25 * np.arange(400.0))
+    found = SimpleNamespace(linear=excited and SimpleNamespace(excited_hz=excited))
+    sine = freq_hz and words.Sine(freq_hz, 1.0)
+    _, right = figures.excitation([shown_of(drive, sine, role)], found).sheet.panels
+    assert len(right.all_of(Span)) == spans
+    assert right.title == title
+
+
+def test_the_last_period_of_a_steady_sine_is_drawn_and_the_last_swings_of_others():
+    t = np.arange(4000) / 1000.0
+    steady, growing = np.sin(2 * np.pi * 50 * t), (1 + t) * np.sin(2 * np.pi * 50 * t)
+    part = slice(100, 4000)
+    assert figures._stretch(shown_of(steady, words.Sine(50.0, 1.0)), part) == slice(3979, 4000)
+    assert figures._stretch(shown_of(steady, words.Sine(50.0, 1.0)), slice(3990, 4000)) == slice(3990, 4000)
+    for one in (shown_of(growing, words.Sine(50.0, 5.0)), shown_of(steady)):
+        crossings = np.diff(one.drive_v[part] > one.drive_v.mean()).sum()
+        assert figures._stretch(one, part) == slice(4000 - 3900 * 40 // crossings, 4000)
+    for count, kept in ((40, 200), (41, 200 * 40 // 41)):
+        drive = np.r_[(-1.0) ** np.arange(count), np.full(200 - count, (-1.0) ** count)]
+        assert figures._stretch(shown_of(drive), slice(0, 200)) == slice(200 - kept, 200)
+
+
+def test_the_time_response_is_to_the_chirp_where_there_is_one(full, recordings, monkeypatch):
+    title = figures.time_response(full, recordings).title
+    assert title.startswith("Time response to the chirp, fit ") and title.endswith(" %")
+    monkeypatch.setattr(figures, "is_chirp", lambda recording: False)
+    assert figures.time_response(full, recordings).title.startswith("Time response of the linear part, fit ")
+    assert figures.time_response(replace(full, linear=None), recordings) is None
+    assert figures.time_response(full, recordings[:3]) is None
+
+
+def test_without_files_the_data_name_none(full):
+    data = report.identification_data(full, full.chosen)
+    assert (data["mirror_file"], data["report_file"]) == (None, None)
+    both = report.identification_data(full, full.chosen, mirror_file=Path("a.toml"), report_file=Path("b.html"))
+    assert (both["mirror_file"], both["report_file"]) == ("a.toml", "b.html")

@@ -659,7 +659,7 @@ def test_the_words_of_the_contacts_name_what_else_cuts_them():
             0.0,
             "100 Mbit/s up to 0 km. Beyond that no data flow: the contacts reach 2000 km.",
         ),
-        ([1e6, 3e6], 2e6, (), 0.0, "100 Mbit/s up to 1000 km; 200 Mbit/s at every range of the contacts."),
+        ([1e6, 3e6], 2e6, ("this",), 0.0, "100 Mbit/s up to 1000 km; 200 Mbit/s at every range of the contacts."),
         (
             [1e6, 1.5e6],
             2e6,
@@ -771,3 +771,12 @@ def test_a_contact_has_its_volume_at_a_single_rate_and_its_losses_where_there_ar
         assert contact_sentences(run_of(losses=count, losses_per_s=0.02), 2, "PI", None) == [f"{begin}{end}{lost}"]
     none = contact_sentences(run_of(data_s=0.0), 2, "PI", 1e8)
     assert none == ["Contact 2 of 10 min never comes to data: given up."]
+
+
+def test_what_becomes_of_the_data_is_said_by_each_way_that_there_is():
+    made = "What becomes of the 1 GB that the instrument makes: by the relay nothing arrives"
+    direct, optical = "; by the direct downlink nothing arrives", "; by the optical downlink nothing arrives"
+    assert day_words.latency_words(a_day()) == [f"{made}."]
+    assert day_words.latency_words(a_day(direct=a_way())) == [f"{made}{direct}."]
+    assert day_words.latency_words(a_day(optical=a_way())) == [f"{made}{optical}."]
+    assert day_words.latency_words(a_day(direct=a_way(), optical=a_way())) == [f"{made}{direct}{optical}."]
