@@ -728,7 +728,9 @@ def test_a_wait_counts_where_both_sides_have_one(slow_s, factor):
 
 def test_a_wait_of_the_least_factor_is_not_named_and_a_longer_one_by_every_way():
     least = swing_of(at_low=replace(NUMBERS, relay_slow_s=66.0), here=NUMBERS)
-    assert day_words._wait_factor(least) == pytest.approx(day_words.MATTERS, rel=1e-9)
+    assert day_words._wait_factor(least) == day_words.MATTERS  # 66 s over 60 s
+    assert day_words.assumption_words(day_of(least, None)) == []
+    assert day_words.assumption_words(replace_namespace(day_of(least, None), swings=[])) == []
     late = swing_of(at_low=replace(NUMBERS, relay_slow_s=120.0, optical_slow_s=60.0))
     day = replace_namespace(day_of(late, None), optical=object())
     (said,) = day_words.assumption_words(day)

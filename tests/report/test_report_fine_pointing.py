@@ -8,6 +8,7 @@ import tempfile
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,13 +19,16 @@ from microrad import report
 from microrad.loop import control, controller_study
 from microrad.loop.control.tuning import MARGIN
 from microrad.loop.controller_study import Difference, ErrorBudget, FinePointingStudy, Part, Residual, Sine, Verified
+from microrad.loop.disturbance.windows import ErrorIndex
 from microrad.loop.pointing_loop.design import design_plant
 from microrad.loop.pointing_loop.ensemble import COUNTERS, bin_edges_rad
 from microrad.loop.pointing_loop.linear import close, residual_spectrum, stationary
 from microrad.loop.pointing_loop.loop import ReferenceFilter, assemble, with_inverse
 from microrad.report import quantities
-from microrad.report.fine_pointing import figures, words
+from microrad.report.fine_pointing import data as plain_data
+from microrad.report.fine_pointing import figures, simulated_windows, windows, words, worst_case
 from microrad.report.fine_pointing import page as section
+from microrad.report.fine_pointing import recording as recorded
 from microrad.report.fine_pointing.figures import fine_pointing_figures
 from microrad.report.requirements import requirement_table
 from microrad.report.results.arrays import study_netcdf
@@ -823,3 +827,393 @@ def test_a_sensor_slower_than_the_control_has_no_sensitivity_drawn(plain, fine):
     optical = replace(fine.scene.loop.optical, every=2)
     slow = replace(fine, scene=replace(fine.scene, loop=replace(fine.scene.loop, optical=optical)))
     assert [f.name[14:] for f in fine_pointing_figures(with_fine(plain, slow))] == ["spectrum", "errors", "budget"]
+
+
+# ----------------------------------------------------------------------------------------------- limits, and other ways
+def ns(**values):
+    return SimpleNamespace(**values)
+
+
+def left_of(rms_rad, quantile_rad=1e-6, **more):
+    return ns(rms_rad=rms_rad, quantile_rad=quantile_rad, shares={}, **more)
+
+
+def verified(name, theory_rad, given_rad, **others):
+    """A controller with what theory and the variants of the mirror leave of it."""
+    simulated = {"given": left_of(given_rad)} | {key: left_of(*both) for key, both in others.items()}
+    return ns(design=ns(name=name), theory=ns(radial_rms_rad=theory_rad), simulated=simulated)
+
+
+def loops_of(optimum_rad, *every):
+    return ns(optimum_rad=optimum_rad, verified=every, best=every[-1], quantile=0.997)
+
+
+@pytest.mark.parametrize(("bound_rad", "holds"), [(1.01, True), (1.0101, False), (0.5, True)])
+def test_a_bound_holds_up_to_a_hundredth_above_what_a_design_reaches(bound_rad, holds):
+    found = words.room(loops_of(bound_rad, verified("PI", 2.0, 4.0), verified("LQG", 1.0, 3.0)))
+    assert found.holds is holds
+    assert (found.baseline.design.name, found.nearest.design.name) == ("PI", "LQG")
+    assert found.at_nearest == pytest.approx(max(0.0, 1.0 - bound_rad))
+    assert found.at_baseline == pytest.approx(1.0 - bound_rad / 2.0)
+    assert (found.with_hysteresis, found.gained) == (pytest.approx(1.0 - bound_rad / 4.0), pytest.approx(0.25))
+
+
+@pytest.mark.parametrize(
+    ("items", "said"), [([], ""), (["a"], "a"), (["a", "b"], "a and b"), (["a", "b", "c"], "a, b and c")]
+)
+def test_one_several_and_none_are_listed(items, said):
+    assert words.listed(items) == said
+
+
+def test_what_the_best_controller_leaves_on_other_mirrors_is_held_against_the_requirement():
+    alone = loops_of(1e-6, verified("PI", 2e-6, 4e-6))
+    assert words._other_variants(alone, 5e-6) == []
+    both = {"comparison": (1e-6, 5e-6), "no hysteresis": (1e-6, 5.01e-6)}
+    assert words._other_variants(loops_of(1e-6, verified("PI", 2e-6, 4e-6, **both)), 5e-6) == [
+        "The same controller leaves 5.00 µrad on the comparison model and 5.01 µrad without hysteresis (missed)."
+    ]
+
+
+def room_of(**changes):
+    of = verified("PI", 2e-6, 4e-6)
+    given = {"at_baseline": 0.5, "at_nearest": 0.5, "with_hysteresis": 0.5, "gained": 0.1, "holds": True}
+    return words.Room(of, of, **given | changes)
+
+
+@pytest.mark.parametrize(
+    ("changes", "better", "settled", "hysteresis"),
+    [
+        ({}, False, False, False),
+        ({"at_baseline": 0.2, "with_hysteresis": 0.2}, False, False, False),
+        ({"at_baseline": 0.19, "with_hysteresis": 0.19}, True, False, False),
+        ({"at_nearest": 0.05}, False, False, False),
+        ({"at_nearest": 0.049}, False, True, False),
+        ({"with_hysteresis": 0.52}, False, False, True),
+        ({"at_baseline": 0.0, "with_hysteresis": 0.01}, True, False, False),
+    ],
+)
+def test_theory_says_what_is_settled_below_its_limits(monkeypatch, changes, better, settled, hysteresis):
+    monkeypatch.setattr(words, "room", lambda fine: room_of(**changes))
+    said = " ".join(words.theory(loops_of(1e-6, verified("PI", 2e-6, 4e-6))))
+    assert ("no linear controller can be 20 % better" in said) is better
+    assert ("is settled" in said) is settled
+    assert ("On the mission's mirror hysteresis brings the baseline to 4.00 µrad" in said) is hysteresis
+
+
+def test_hysteresis_that_a_controller_does_not_undo_gains_nothing(monkeypatch):
+    monkeypatch.setattr(words, "room", lambda fine: room_of(with_hysteresis=0.9, gained=-0.1))
+    assert words.theory(loops_of(1e-6, verified("PI", 2e-6, 4e-6)))[-1].endswith("at most 90 % lower; PI is 0 % lower.")
+
+
+def test_a_sine_is_tracked_where_its_error_is_the_one_required():
+    def sine(controller, freq_hz, quantile_rad, variant="given"):
+        return ns(controller=controller, freq_hz=freq_hz, quantile_rad=quantile_rad, variant=variant)
+
+    sines = [sine("PI", 1.0, 5e-6), sine("LQG", 1.0, 1e-6), sine("PI", 2.0, 5.01e-6), sine("LQG", 2.0, 5e-6)]
+    sines += [sine("PI", 3.0, 7e-6), sine("LQG", 3.0, 6e-6), sine("LQG", 3.0, 1e-6, "no hysteresis")]
+    said = words.tracked(ns(sines=sines), 5e-6)
+    assert said == (
+        "While a sine of the paper is tracked on the mission's mirror, the requirement is met at 1 Hz by all "
+        "controllers; at 2 Hz by LQG; at 3 Hz by none (least: 6.00 µrad, LQG)."
+    )
+    assert words.tracked(ns(sines=[]), 5e-6) == ""
+
+
+def stroke_axis(needed_rad, margin_rad=1e-6, fits_rss=True, travel_rad=2e-3, **more):
+    given = {"travel_angle": "mechanical", "usable_share": 1.0, "available_rad": 0.5e-3, "label": "axis x"}
+    own = {"needed_rad": needed_rad, "margin_rad": margin_rad, "fits": margin_rad >= 0.0, "fits_rss": fits_rss}
+    return ns(travel_rad=travel_rad, **given | own | more)
+
+
+def stroke_words(on_mirror, elsewhere):
+    return words.stroke(ns(scene=ns(stroke=on_mirror, stroke_without_point_ahead=elsewhere)))
+
+
+@pytest.mark.parametrize(
+    ("on_mirror_rad", "elsewhere_rad", "covers"),
+    [
+        ([1e-3], [0.5e-3], "covers both"),
+        ([1.01e-3], [1e-3], "covers only the second"),
+        ([0.5e-3, 1.01e-3], [0.5e-3, 1e-3], "covers only the second"),
+        ([1.01e-3], [0.5e-3, 1.01e-3], "covers neither"),
+    ],
+)
+def test_a_travel_covers_what_is_needed_to_its_last_half(on_mirror_rad, elsewhere_rad, covers):
+    said = stroke_words(*([stroke_axis(each) for each in several] for several in (on_mirror_rad, elsewhere_rad)))
+    most = [quantities.angle(max(several)) for several in (on_mirror_rad, elsewhere_rad)]
+    assert said[0] == (
+        "The travel of 2 mrad from stop to stop (mechanical angle) is 1 mrad to either side; the worst case needs "
+        f"{most[0]} with the point-ahead on the mirror and {most[1]} with the point-ahead elsewhere: the travel "
+        f"{covers}."
+    )
+    assert len(said) == 3
+
+
+def test_the_papers_travel_has_its_claim_judged_where_it_covers_and_the_drive_does_not():
+    paper = {"travel_rad": words.PAPER_TRAVEL_RAD}
+    fits, misses, large = (
+        stroke_axis(1e-3, **paper),
+        stroke_axis(1e-3, -1e-6, **paper),
+        stroke_axis(2e-3, -1e-6, **paper),
+    )
+    claim = "So the claim holds for the travel, and not for the drive that the mirror was identified with."
+    for on_mirror, elsewhere, judged in (
+        ((fits,), (fits,), False),
+        ((misses,), (fits,), True),
+        ((fits,), (fits, misses), True),
+        ((large,), (fits,), False),
+    ):
+        said = stroke_words(on_mirror, elsewhere)
+        assert said[0].startswith("The paper says that a travel of 2.5 mrad")
+        assert (claim in said) is judged
+    assert claim not in stroke_words((stroke_axis(0.5e-3, -1e-6),), (stroke_axis(0.5e-3),))
+
+
+def test_the_drive_is_told_of_a_mirror_of_one_axis_alone():
+    """A mirror of several axes has no single bias."""
+    said = stroke_words((stroke_axis(1e-3, usable_share=0.5),), (stroke_axis(1e-3),))
+    assert not any("reaches" in each for each in said)
+
+
+def test_a_worst_case_that_misses_names_the_least_margin_and_what_its_root_sum_square_does():
+    fits, misses = stroke_axis(1e-3, 0.0), stroke_axis(1e-3, -2e-6, label="axis y")
+    assert words._fit("here", (fits,)) == "Here the worst case fits, with 0 µrad to spare on axis x."
+    end = "Here the worst case misses by 2.00 µrad on axis y; the root sum square "
+    assert words._fit("here", (fits, misses)) == f"{end}fits."
+    assert words._fit("here", (stroke_axis(1e-3, 1e-6, False), misses)) == f"{end}does not fit either."
+
+
+def test_what_a_mirror_was_recorded_to_counts_from_half_of_the_control_rate():
+    def said(delay_s, most_hz):
+        scene = ns(mirror=ns(delay_s=delay_s, excited_hz=(1.0, most_hz)), table=ns(rate_hz=5000.0))
+        return words.left_out(scene)
+
+    assert said(0.0, 2500.0) == []
+    assert said(1e-4, 2500.0) == [
+        "the recordings' delay of 100 µs is left out; fine_pointing.delay and fine_pointing.amplifier_bandwidth stand "
+        "for the flight's own"
+    ]
+    assert said(0.0, 2499.0) == [
+        "the mirror was recorded up to 2.499 kHz, and half of the control rate is 2.5 kHz: between them the model is a "
+        "guess"
+    ]
+
+
+@pytest.mark.parametrize(
+    ("straight_rad", "warns"), [(2.19e-6, False), (2.21e-6, True), (1.81e-6, False), (1.79e-6, True)]
+)
+def test_theory_is_contradicted_by_more_than_a_tenth_either_way(straight_rad, warns):
+    both = {"no hysteresis": (straight_rad, 1e-6)}
+    fine = loops_of(1e-6, verified("PI", 2e-6, 4e-6, **both))
+    fine.budget = ns(linear=True)
+    assert len(words._theory_warnings(fine)) == warns
+
+
+@pytest.mark.parametrize(
+    ("half_rad", "said"),
+    [(0.0, "1.87"), (math.inf, "1.87"), (math.nan, "1.87"), (0.00001e-6, "1.866 ± 0.001"), (1e-6, "2 ± 1")],
+)
+def test_an_interval_is_told_where_it_is_known(half_rad, said):
+    assert section.with_interval(ns(rms_rad=1.8664e-6, rms_interval_rad=half_rad)) == said
+
+
+def test_a_value_at_the_requirement_passes():
+    assert (section._mark(1e-5, 1e-5), section._mark(1.0001e-5, 1e-5)) == ("PASS", "FAIL")
+    sine = ns(controller="PI", variant="given", freq_hz=1.0, rms_rad=1e-6, quantile_rad=1e-5)
+    assert section._sine(sine, 1e-5) == section.Cell("1.00 / 10.0", "PASS")
+    assert section._sine(None, 1e-5) == ""
+    assert plain_data._sine(sine, 1e-5)["met"] is True
+    assert plain_data._sine(sine, 0.9999e-5)["met"] is False
+    left = ns(rms_rad=1e-6, rms_interval_rad=0.0, axis_rms_rad=(1e-6,), quantile_rad=1e-5, largest_rad=2e-5, shares={})
+    assert plain_data._residual(left, 1e-5)["met"] is True
+    assert plain_data._residual(left, 0.9999e-5)["met"] is False
+
+
+@pytest.mark.parametrize(
+    ("variance", "total", "said"),
+    [(0.0, 1.0, "0 %"), (4e-4, 1.0, "< 0.1 %"), (6e-4, 1.0, "0.1 %"), (1.0, 2.0, "50.0 %"), (0.0, 0.0, "0 %")],
+)
+def test_a_share_of_the_variance_is_told_to_a_tenth_of_a_per_cent(variance, total, said):
+    assert section._variance_share(variance, total) == said
+
+
+def budget(full_rad, *differences, linear=False):
+    parts = [ns(name=name, added_rad=added_rad) for name, added_rad in differences]
+    return ns(budget=ns(together_rad=1.1e-6, combined_rad=1e-6, full_rad=full_rad, linear=linear, differences=parts))
+
+
+def test_a_budget_says_where_its_loop_is_not_linear():
+    begin = "Without hysteresis the parts combine to what they leave together, to within 10 %."
+    end = "than the parts combine to, so it is not linear (10 % is the limit)"
+    assert section.budget_sentences(budget(1.05e-6, linear=True)) == [
+        begin,
+        "With it they still do, to within 5 %: the loop counts as linear.",
+    ]
+    assert section.budget_sentences(budget(1.5e-6)) == [begin, f"The full loop leaves 50 % more {end}."]
+    assert section.budget_sentences(budget(0.5e-6))[1] == f"The full loop leaves 50 % less {end}."
+    several = (section.DELAY, 1e-6), ("hysteresis", 0.0151e-6), ("quantisation", 0.015e-6), ("saturation", 1e-6)
+    assert section.budget_sentences(budget(1.5e-6, *several))[1] == (
+        f"The full loop leaves 50 % more {end}: hysteresis adds 0.015 µrad and saturation adds 1.00 µrad."
+    )
+
+
+@pytest.mark.parametrize(
+    ("worst", "rss", "said"),
+    [(True, True, "yes / yes"), (False, True, "no / yes"), (False, False, "no / no"), (True, False, "yes / no")],
+)
+def test_worst_case_and_root_sum_square_fit_each_by_itself(worst, rss, said):
+    assert section._yes(worst, rss) == said
+
+
+def test_a_magnification_without_bound_is_any():
+    def told(worst, rss):
+        return section._magnification(ns(largest_magnification=worst, largest_magnification_rss=rss))
+
+    assert told(math.inf, math.inf) == "any / any"
+    assert told(12.5, math.inf) == "12.50 / any"
+    assert told(12.5, 13.0) == "12.50 / 13.00"
+
+
+def test_a_mirror_that_may_not_be_relied_on_meets_nothing(fine):
+    class Unknown:
+        """The scene of a mirror whose dynamics are not known."""
+
+        unknown_dynamics = "its dynamics are not known"
+
+        def __getattr__(self, name):
+            return getattr(fine.scene, name)
+
+    blind = replace(fine, scene=Unknown())
+    for of, met in ((fine, True), (blind, False)):
+        assert plain_data.fine_pointing_data(of, REQUIRED_RAD)["met"] is met
+    assert words.not_reliable(fine.scene) == []
+    assert words.not_reliable(blind.scene) == ["Not to be relied on: its dynamics are not known."]
+    assert words.result(blind, REQUIRED_RAD)[0] == words.not_reliable(blind.scene)[0]
+
+
+def worst_case_of(**changes):
+    return ns(**{"corners_left_out": 0, "unstable_draws": 0, "unstable_corners": 0} | changes)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({}, []),
+        ({"corners_left_out": 2}, ["2 corners are no mirrors and are left out."]),
+        (
+            {"unstable_draws": 1},
+            ["The loop is unstable on 1 of the draws and on 0 of the corners: no margin, and an error without bound."],
+        ),
+        (
+            {"unstable_corners": 3},
+            ["The loop is unstable on 0 of the draws and on 3 of the corners: no margin, and an error without bound."],
+        ),
+    ],
+)
+def test_a_loop_that_is_unstable_somewhere_says_where(changes, said):
+    assert worst_case._unstable(worst_case_of(**changes)) == said
+
+
+@pytest.mark.parametrize(
+    ("linear", "full", "agrees", "said"),
+    [
+        ("settles", "settles", True, "settles, as its largest pole says"),
+        ("grows", "grows", True, "does not settle, as its largest pole says"),
+        (
+            "settles",
+            "grows",
+            False,
+            "settles without hysteresis and limits, and does not settle with them, against what its largest pole says",
+        ),
+    ],
+)
+def test_how_the_worst_loop_does_in_time_is_told_once_where_both_do_the_same(linear, full, agrees, said):
+    seen = ns(linear=linear, with_hysteresis=full, agrees=agrees, seconds=0.5, offset_rad=1e-6, pole=0.99)
+    assert worst_case.in_time(seen) == (
+        "Simulated at the smallest margin for 500 ms, from an offset of 1.00 µrad, without disturbances: the loop "
+        f"{said} (|z| = 0.990000)."
+    )
+
+
+def test_what_is_not_finite_is_unstable():
+    assert (worst_case._error(math.inf), worst_case._error(1e-6)) == ("unstable", "1 µrad")
+    assert (worst_case._change(math.inf), worst_case._change(0.05)) == ("unstable", "5 %")
+    assert worst_case._change(math.nan) == "unstable"
+
+
+@pytest.mark.parametrize(
+    ("changes", "rows", "spread"),
+    [
+        ({}, ("10⁻⁶ to 10⁻⁴", "3.00 dB"), "with a block interleaver over 5 ms"),
+        ({"interleaving": "none"}, ("10⁻⁶ to 10⁻⁴", "3.00 dB"), "without an interleaver"),
+        ({"penalty_db": math.inf}, ("10⁻⁶ to 10⁻⁴", "beyond 20 dB"), "with a block interleaver over 5 ms"),
+        ({"high": math.inf}, ("unknown", "3.00 dB"), "with a block interleaver over 5 ms"),
+    ],
+)
+def test_a_coded_link_says_what_is_not_known_of_it(changes, rows, spread):
+    given = {"interleaving": "block", "penalty_db": 3.0, "high": 1e-4} | changes
+    ratio = ns(value=1e-5, low=1e-6, high=given.pop("high"))
+    coded = ns(code="LDPC", on_axis_db=2.0, target=1e-6, span_s=5e-3, ratio=ratio, **given)
+    table, points = simulated_windows._coded(coded)
+    assert table.rows == [("mean bit error ratio", "10⁻⁵", rows[0]), ("power that pointing costs", rows[1], "")]
+    assert points.lines[0].startswith(f"LDPC, BPSK with soft decisions, {spread}, at 2.00 dB more on the axis")
+
+
+def test_windows_are_held_against_linear_filters_where_both_are_known():
+    def error(kind, window_s, rational, before):
+        return ns(index=ErrorIndex(kind, window_s), left={"a": 1e-6}, before={"a": before}, rational=rational)
+
+    errors = [error("MPE", 1.0, 2e-6, 1e-6), error("RPE", 2.0, math.nan, 1e-6), error("MPE", 3.0, 2e-6, 0.0)]
+    errors.append(error("APE", None, 2e-6, 1e-6))
+    text = windows.windows_text(errors, "PI", 120)
+    shown = text.split("by linear filters")[1]
+    assert "MPE 1 s" in shown and "100 %" in shown
+    assert not any(other in shown for other in ("RPE", "3 s", "APE"))
+
+
+def recorded_axis(name, lines=(), white=True, stationary=True):
+    motion = ns(name=name, mean_rad=1e-6, slope_rad_s=2e-6, rest_rad=np.array([3e-6, -3e-6]))
+    fit = ns(
+        motion=motion,
+        disturbance=ns(lines=lines),
+        order=4,
+        worst_db=-0.5,
+        whiteness=ns(white=white, p_value=0.25),
+        stationarity=ns(stationary=stationary),
+    )
+    played = ns(rms_rad=3e-6, mean_rad=1e-7)
+    left = ns(played=played, fitted_rms_rad=4e-6, difference=-0.25, simulated_rms_rad=5e-6, noise_rms_rad=6e-6)
+    return recorded.RecordedAxis(fit, left)
+
+
+def test_two_axes_of_a_recording_have_their_radial_error_too():
+    one, other = recorded_axis("x"), recorded_axis("y")
+    row = ("x", "3.00", "4.00", "\u221225 %", "5.00", "0.100", "6.00")
+    alone = recorded._left([one], "PI")
+    assert (alone.rows, alone.totals) == ([row], False)
+    both = recorded._left([one, other], "PI")
+    assert both.rows == [row, ("y", *row[1:]), ("radial", "4.24", "5.66", "\u221225 %", "7.07", "", "8.49")]
+    assert both.totals
+
+
+def test_what_was_recorded_and_fitted_stands_by_axis():
+    line = ns(freq_hz=40.0, amplitude_rad=1e-6)
+    axes = [recorded_axis("x", [line, line]), recorded_axis("y", white=False), recorded_axis("z", stationary=False)]
+    assert [row[4] for row in recorded._motions(axes).rows] == ["40 Hz: 1.00\n40 Hz: 1.00", "none", "none"]
+    assert recorded._motions(axes).rows[0][:4] == ("x", "1.00", "2.00", "3.00")
+    assert recorded._fits(axes).rows == [
+        ("x", "4", "\u22120.50 dB", "yes, p = 0.25", "yes"),
+        ("y", "4", "\u22120.50 dB", "no, p = 0.25", "yes"),
+        ("z", "4", "\u22120.50 dB", "yes, p = 0.25", "no"),
+    ]
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_the_data_of_a_recording_have_a_radial_error_where_there_are_two_axes(monkeypatch, count):
+    monkeypatch.setattr(recorded, "_axis_data", lambda each: {})
+    monkeypatch.setattr(recorded, "sentences", lambda axes, loop: [])
+    axis = recorded_axis("x")
+    axis.fit.motion.half_rate_hz, axis.fit.motion.duration_s = 500.0, 3.0
+    data = recorded.recording_data("a.csv", "0" * 64, [axis] * count, None)
+    assert (data["rate_hz"], len(data["axes"])) == (1000.0, count)
+    assert ("radial" in data) is (count == 2)

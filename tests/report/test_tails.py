@@ -94,3 +94,29 @@ def test_the_curve_falls_to_the_last_sample_seen():
     assert share[at] == pytest.approx(0.1, abs=0.02)
     wider = replace(left, radial_counts=np.roll(left.radial_counts, 16))  # an octave of the square
     assert tails.survival(wider)[0] == pytest.approx(radius * math.sqrt(2.0), rel=1e-12)
+
+
+def test_without_a_scatter_or_samples_nothing_is_known_of_the_tail():
+    left = residual(4)
+    none = replace(left, radial_counts=np.zeros_like(left.radial_counts))
+    for blind in (none, replace(left, rms_interval_rad=0.0), replace(left, rms_interval_rad=math.nan)):
+        assert math.isnan(tails.independent_samples(blind))
+    blind = replace(left, rms_interval_rad=math.inf)
+    share, *ends = tails.beyond(blind, true_quantile_rad(0.9))
+    assert share == pytest.approx(0.1, abs=0.05) and all(math.isnan(end) for end in ends)
+    sure = replace(left, rms_interval_rad=1e-20)
+    assert tails.independent_samples(sure) == left.radial_counts.sum()  # no more than there are
+
+
+@pytest.mark.parametrize(("independent", "known"), [(20.0, True), (19.9, False), (math.nan, False)])
+def test_a_quantile_has_an_interval_from_ten_samples_beyond_it_on(monkeypatch, independent, known):
+    monkeypatch.setattr(tails, "independent_samples", lambda left: independent)
+    q = tails.quantile(residual(5, runs=2), 0.5)
+    assert math.isnan(q.low_rad) is not known
+    assert math.isnan(q.high_rad) is not known
+
+
+def test_what_is_not_known_of_a_tail_is_said_shortly():
+    assert tails._share((0.01, math.nan, math.nan)) == "1 %"
+    assert (tails._count(math.nan), tails._count(12345.0)) == ("unknown", "12000")
+    assert tails.cell(tails.Quantile(0.5, 1e-6, 0.5e-6, 2e-6)) == "1.00\n0.500 to 2.00"
