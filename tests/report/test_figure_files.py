@@ -55,6 +55,8 @@ def test_numbers_end_early_and_stay_empty_where_there_are_none():
     third = np.array([1.0 / 3.0])
     assert report.columns_csv({"a": third, "b": 2e-9 * third}) == b"a,b\r\n0.333333333,6.66666667e-10\r\n"
     assert report.columns_csv({"a": third, "b": ("c",)}) == b"a,b\r\n0.333333333,c\r\n"
+    assert report.columns_csv({"a": np.array([1.0, float("nan"), 2.0])}) == b'a\r\n1\r\n""\r\n2\r\n'
+    assert report.columns_csv({}) == b"\r\n"
     named = {"input": ("a,b", "c"), **made}
     assert [*csv.reader(report.columns_csv(named).decode().splitlines())] == [
         ["input", "a (m)", "b"],

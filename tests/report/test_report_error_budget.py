@@ -2,6 +2,7 @@
 
 import io
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +12,8 @@ from budget_files import kept_study, looped_study
 from microrad import report
 from microrad.link.error_budget import ErrorSource, Requirement, Spread, assembly
 from microrad.loop.disturbance.windows import ErrorIndex
-from microrad.report.error_budget import figures
+from microrad.report.error_budget import figures, page
+from microrad.report.error_budget import words as budget_words
 from microrad.report.error_budget.data import budget_data
 from microrad.report.error_budget.page import budget_view
 from microrad.report.plotting.sheet import Bars, Line, Rule
@@ -209,3 +211,89 @@ def test_a_list_without_limits_has_no_marks_and_says_nothing_of_what_may_be(tmp_
     assert [str(cell) for cell in requirements.rows[0][2:]][2] == ""
     (inner,) = (block for block in view.blocks if isinstance(block, View))
     assert "may be" not in inner.blocks[1].headings
+
+
+# ------------------------------------------------------------------------------------------------- limits and nothing
+def share_of(key, part_rad, kind="random"):
+    of = SimpleNamespace(name=key, kind=kind)
+    return SimpleNamespace(key=(key, kind), part_rad=part_rad, contribution=of, growth=0.5)
+
+
+def judged_of(*parts, total_rad=1e-6, rules_rad=1e-6, name="total", limit_rad=None):
+    required = Requirement(ErrorIndex("APE"), P, limit_rad=limit_rad)
+    total = SimpleNamespace(quantile_rad=total_rad, by_rules_rad=rules_rad, required=required)
+    curves = {"size_rad": np.linspace(0.0, total_rad, 3), "beyond": np.array([1.0, 0.5, 0.0])}
+    return SimpleNamespace(name=name, total=total, shares=[share_of(*part) for part in parts], **curves)
+
+
+def test_a_budget_of_nothing_is_drawn():
+    none = judged_of(("a", 0.0), total_rad=0.0, rules_rad=0.0)
+    (panel,) = figures.contributions([none]).sheet.panels
+    assert (panel.x.low, panel.x.high) == (0.0, 1.0)
+    assert figures._weight(none, {("a", "random"): 1.0}, ("a", "random")) == 0.0
+    (panel,) = figures.distributions([none]).sheet.panels
+    assert panel.x.high == 1.0
+    assert budget_words._too_small([none]) == []
+    freq = np.geomspace(1.0, 10.0, 3)
+    budget = SimpleNamespace(freq_hz=freq, spectra={"a": np.zeros(3)}, lines_hz={}, judged=[])
+    above, _ = figures.spectra(budget).sheet.panels
+    assert (above.y.low, above.y.high) == (1e-6, 3.0)
+    budget.spectra = {"a": np.full(3, 1e-12), "b": np.array([2e-12, np.nan, 0.0])}
+    above, _ = figures.spectra(budget).sheet.panels
+    assert (above.y.low, above.y.high) == (pytest.approx(2e-6), pytest.approx(6.0))
+
+
+def test_bars_to_both_sides_have_room_for_their_numbers():
+    (panel,) = figures.contributions([judged_of(("a", 2e-6), ("b", -1e-6))]).sheet.panels
+    assert (panel.x.low, panel.x.high) == (pytest.approx(-1.1), pytest.approx(1.35 * 2.0))
+
+
+@pytest.mark.parametrize(
+    ("count", "rows", "others"), [(15, 15, ""), (16, 16, ""), (17, 16, "2 others"), (18, 16, "3 others")]
+)
+def test_sixteen_sources_are_drawn_by_themselves(count, rows, others):
+    parts = [(f"s{k:02d}", (count - k) * 1e-6) for k in range(count)]
+    (panel,) = figures.contributions([judged_of(*parts)]).sheet.panels
+    names = list(panel.y.words.values())
+    assert len(names) == rows
+    assert names[0] == "s00"
+    assert (names[-1] == others) is bool(others)
+
+
+@pytest.mark.parametrize(
+    ("count", "across"), [(1, [(0, 0)]), (3, [(0, 0), (0, 1), (0, 2)]), (4, [(0, 0), (0, 1), (1, 0), (1, 1)])]
+)
+def test_four_requirements_stand_two_by_two(count, across):
+    every = [judged_of(("a", 1e-6), name=f"r{k}") for k in range(count)]
+    assert [(p.row, p.column) for p in figures.contributions(every).sheet.panels] == across
+    five = [judged_of(("a", 1e-6), name=f"r{k}") for k in range(5)]
+    assert [p.column for p in figures.contributions(five).sheet.panels] == [0, 1, 2, 0, 1]
+
+
+@pytest.mark.parametrize(("limit_rad", "rules"), [(None, 0), (2e-6, 1)])
+def test_a_limit_is_drawn_where_there_is_one(limit_rad, rules):
+    (panel,) = figures.distributions([judged_of(("a", 1e-6), limit_rad=limit_rad)]).sheet.panels
+    drawn = [rule.at for rule in panel.all_of(Rule) if rule.label == "limit"]
+    assert drawn == ([] if limit_rad is None else [pytest.approx(2.0)])
+    assert (panel.x.low, panel.x.high) == (0.0, pytest.approx(1.1))
+
+
+@pytest.mark.parametrize(
+    ("total_rad", "limit_rad", "mark"), [(1e-6, 1e-6, "PASS"), (1.001e-6, 1e-6, "FAIL"), (1e-6, None, "")]
+)
+def test_a_total_at_its_limit_passes(total_rad, limit_rad, mark):
+    assert page._marked(total_rad, limit_rad).mark == mark
+    assert budget_words.limit_text(limit_rad) == ("" if limit_rad is None else "1.00")
+
+
+def test_a_source_that_a_requirement_does_not_count_has_empty_cells():
+    assert page._contribution(None) == ("", "")
+    assert page._contribution(share_of("a", 1e-6)) == ("1.00", "50 %")
+
+
+@pytest.mark.parametrize(
+    ("rules_rad", "said"),
+    [(1e-6, []), (0.9991e-6, []), (0.99e-6, ["The rules are too small for total (1 %)."]), (1.1e-6, [])],
+)
+def test_rules_are_too_small_by_more_than_a_thousandth(rules_rad, said):
+    assert budget_words._too_small([judged_of(rules_rad=rules_rad)]) == said

@@ -644,3 +644,122 @@ def test_the_bar_of_an_input_that_leaves_no_link_ends_beyond_all_others(ends, lo
 )
 def test_a_colour_is_written_with_its_opacity_where_it_has_one(colour, opacity, made):
     assert palette.clear(colour, opacity) == made
+
+
+# ----------------------------------------------------------------------------------------------- limits and other ways
+def fading_of(**changes):
+    """A coded link under fades whose interleaver spans 10 ms."""
+    given = {
+        "ratio": SimpleNamespace(value=1e-7),
+        "lost": SimpleNamespace(value=0.25),
+        "penalty_db": 2.0,
+        "margin_left_db": 1.0,
+        "margin_db": 5.0,
+        "code": "LDPC",
+        "source": "a series",
+        "target": 1e-6,
+        "span_s": 0.01,
+        "curve": SimpleNamespace(span_s=(0.0, 0.01, 0.1), penalty_db=(6.0, 2.0, math.inf)),
+    }
+    return SimpleNamespace(**given | changes)
+
+
+def with_fading(plain, **changes):
+    return SimpleNamespace(file=plain.file, fading=fading_of(**changes))
+
+
+def test_a_number_of_the_fades_that_is_not_finite_has_no_row(plain):
+    def rows(**changes):
+        return [(line.name, line.value, line.unit) for line in budget_views.fading_lines(with_fading(plain, **changes))]
+
+    ratio, windows = ("Mean bit error ratio", 1e-7, ""), ("Windows above the target", 0.25, "")
+    assert rows() == [ratio, windows, ("Penalty of the fades", -2.0, "dB"), ("Margin under the fades", 1.0, "dB")]
+    assert rows(penalty_db=math.inf, margin_left_db=-math.inf) == [ratio, windows]
+    assert budget_views.fading_lines(SimpleNamespace(fading=None)) == []
+
+
+def test_lines_have_the_open_loop_and_the_tracking_sensor_where_the_links_have_them(plain):
+    names = {name for name, _ in budget_views.lines(plain)}
+    assert {"Open-loop pointing", "Tracking sensor"} <= names
+    without = {name for name, _ in budget_views.lines(replace(plain, open_loop=None))}
+    assert names - without == {"Open-loop pointing"}
+    blind = {name for name, _ in budget_views.lines(replace(plain, tracking=None))}
+    assert names - blind == {"Tracking sensor"}
+    angle = plain.tracking.noise_equivalent_angle
+    told = [line for _, line in budget_views.lines(plain)]
+    other = replace(plain, tracking=replace(plain.tracking, noise_equivalent_angle=None))
+    assert (angle in told) and [line for _, line in budget_views.lines(other)] == [x for x in told if x is not angle]
+
+
+@pytest.mark.parametrize("own", [None, object()])
+def test_the_source_of_the_jitter_is_the_table_it_is_in(plain, monkeypatch, own):
+    monkeypatch.setattr(budget_views, "source_text", lambda sources, *keys: ", ".join(keys))
+    p = SimpleNamespace(mean_loss_db=0.5, uncoded_penalty_db=math.nan, outage=0.1, short=0.2)
+    study = SimpleNamespace(under_jitter=p, data=SimpleNamespace(jitter=own), file=plain.file)
+    found = budget_views.jitter_lines(study)
+    table = "communication.coupling.jitter" if own is None else "jitter"
+    assert {line.source for line in found} == {f"{table}.bias, {table}.rms, requirement.outage"}
+    assert [(line.name, line.value) for line in found] == [
+        ("Mean pointing loss", -0.5),
+        ("Outage", 0.1),
+        ("Below required margin", 0.2),
+    ]
+    assert found[0].warning.startswith("the penalty without a code is unknown") and found[1].warning == ""
+    p.uncoded_penalty_db = 3.0
+    known = budget_views.jitter_lines(study)
+    assert (known[0].warning, known[1].name, known[1].value) == ("", "Penalty without a code", -3.0)
+    assert budget_views.jitter_lines(SimpleNamespace(under_jitter=None)) == []
+
+
+@pytest.mark.parametrize(
+    ("changes", "labels"),
+    [
+        ({}, ["with an interleaver", "without one", "what the margin can spare", "this mission"]),
+        ({"span_s": 0.0}, ["with an interleaver", "without one", "what the margin can spare"]),
+        ({"penalty_db": math.inf}, ["with an interleaver", "without one", "what the margin can spare"]),
+        (
+            {"curve": SimpleNamespace(span_s=(0.0, 0.01), penalty_db=(math.inf, 2.0))},
+            ["with an interleaver", "what the margin can spare", "this mission"],
+        ),
+    ],
+)
+def test_what_no_power_makes_up_for_has_no_mark_over_the_interleaver(plain, changes, labels):
+    figure = link_module.interleaver(with_fading(plain, **changes), fading_of(**changes))
+    (panel,) = figure.sheet.panels
+    assert [mark.label for mark in panel.marks] == labels
+    spare = next(mark for mark in panel.marks if mark.label == "what the margin can spare")
+    assert spare.at == pytest.approx(5.0 - plain.file.mission.requirement.margin_db)
+    if not changes:
+        line, rule = panel.marks[:2]
+        assert line.x == pytest.approx([10.0, 100.0]) and line.y[0] == 2.0 and math.isnan(line.y[1])
+        assert rule.at == 6.0
+
+
+def test_figures_are_of_what_the_links_have(plain, monkeypatch):
+    for name in ("tornado", "trade", "over_elevation", "interleaver"):
+        monkeypatch.setattr(link_module, name, lambda *of, name=name: name)
+    some, none = SimpleNamespace(swings=(1,)), SimpleNamespace(swings=())
+    two, one = SimpleNamespace(elevations=(1, 2)), SimpleNamespace(elevations=(1,))
+    links_of = {"tornados": (some, none), "finding": None, "ground": None, "fading": None}
+    for changes, drawn in (
+        ({}, ["tornado"]),
+        ({"tornados": (none,)}, []),
+        ({"finding": SimpleNamespace(trade=None)}, ["tornado"]),
+        ({"finding": SimpleNamespace(trade=1)}, ["tornado", "trade"]),
+        ({"ground": two}, ["tornado", "over_elevation"]),
+        ({"ground": one}, ["tornado"]),
+        ({"fading": 1}, ["tornado", "interleaver"]),
+    ):
+        assert list(link_figures(SimpleNamespace(**links_of | changes))) == drawn
+
+
+@pytest.mark.parametrize(("required_db", "shown"), [(1.0, 0), (1.01, 1), (4.99, 1), (5.0, 0)])
+def test_the_required_margin_is_marked_strictly_within_the_axis(plain, monkeypatch, required_db, shown):
+    monkeypatch.setattr(link_module, "limits", lambda *of: (1.0, 5.0))
+    m = plain.file.mission
+    requirement = m.requirement.model_copy(update={"margin_db": required_db})
+    file = replace(plain.file, mission=m.model_copy(update={"requirement": requirement}))
+    figure = link_module.tornado(replace(plain, file=file), plain.tornados[0])
+    assert texts(figure).count("required") == shown
+    other = link_module.tornado(replace(plain, file=file), plain.tornados[1])
+    assert "required" not in texts(other)

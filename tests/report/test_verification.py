@@ -52,7 +52,7 @@ from microrad.report.verification import (
 )
 from microrad.report.verification.checks import measured
 from microrad.report.verification.evidence import Comparison, Referent
-from microrad.report.view import View
+from microrad.report.view import Points, View
 from microrad.studio.views import link as studio_link
 from shipped import plain_study
 
@@ -1200,3 +1200,61 @@ def test_a_mission_says_whether_its_mirror_works_within_what_was_measured(tmp_pa
     wide["recordings"]["cubespec"]["extents"]["rate"]["most"] = 1.0
     assert any(each.startswith("a rate of") for each in foundation.measured(sources)[1].beyond)
     assert foundation.measured({}) == [], "no mirror"
+
+
+def test_a_placard_says_how_far_below_the_least_an_input_is():
+    def said(value):
+        return foundation.Placard("The links", "a.key", value, 2.0, "m").text
+
+    end = " at which the links were held against independent methods, 2 m. Figures that depend on it are extrapolated"
+    assert said(5.0) == f"a.key = 5 m is 2.5 times the largest{end}"
+    assert said(0.5) == f"a.key = 500 mm is below the least, by a factor of 4,{end}"
+    assert said(0.0) == f"a.key = 0 m is below the least{end}"
+
+
+@pytest.mark.parametrize(
+    ("value", "limit"),
+    [
+        ("4 m", None),
+        ("4.003 m", None),
+        ("4.005 m", 4.0),
+        ("2 m", None),
+        ("1.999 m", None),
+        ("1.99 m", 2.0),
+        ("largest", None),
+    ],
+)
+def test_an_input_is_within_a_domain_to_a_thousandth_beyond_its_ends(monkeypatch, value, limit):
+    extents = {"a": {"unit": "m", "least": 2.0, "most": 4.0}, "not.there": {"unit": "m", "least": 2.0, "most": 4.0}}
+    made = {**foundation.shipped(), "domains": {"The links": {"extents": extents}}}
+    monkeypatch.setattr(foundation, "shipped", lambda: made)
+    found = foundation.placards({"a": SimpleNamespace(value=f'"{value}"')})
+    assert [each.limit for each in found] == ([] if limit is None else [limit])
+
+
+def test_the_farthest_input_stands_first_whichever_way_it_is_off(monkeypatch):
+    extents = {key: {"unit": "m", "least": 2.0, "most": 4.0} for key in "abcd"}
+    made = {**foundation.shipped(), "domains": {"The links": {"extents": extents}}}
+    monkeypatch.setattr(foundation, "shipped", lambda: made)
+    values = {"a": "8 m", "b": "0.1 m", "c": "12 m", "d": "0 m"}
+    found = foundation.placards({key: SimpleNamespace(value=f'"{value}"') for key, value in values.items()})
+    assert [each.key for each in found] == ["d", "b", "c", "a"]
+
+
+def test_a_placard_that_a_sign_tells_is_not_told_again(monkeypatch):
+    one, other = (foundation.Placard("The links", key, 5.0, 2.0, "m") for key in "ab")
+    monkeypatch.setattr(foundation, "placards", lambda sources: [one, other])
+
+    def blocks(signs=None):
+        return foundation.foundation_view({}, signs).blocks
+
+    (points,) = (block for block in blocks() if isinstance(block, Points))
+    assert list(points.lines) == [f"{one.text}.", f"{other.text}."]
+    assert "Behind a number:" not in blocks()
+    sign = f"* {one.text}."
+    (points,) = (block for block in blocks(Points([sign])) if isinstance(block, Points))
+    assert list(points.lines) == [sign, f"{other.text}."]
+    assert "Behind a number:" in blocks(Points([sign]))
+    monkeypatch.setattr(foundation, "placards", lambda sources: [])
+    assert not any(isinstance(block, Points) for block in blocks())
+    assert "All inputs lie where the parts of the chain were held against independent methods." in blocks()
