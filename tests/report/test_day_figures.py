@@ -629,3 +629,107 @@ def test_a_line_along_a_meridian_over_the_equator_is_no_line_over_a_pole():
     x, y = broken(np.array([180.0, -180.0]), np.array([5.0, 7.0]))  # one place, named twice
     assert x[1] == 180.0 and np.isnan(x[2]) and x[3] == -180.0
     assert y[1] == y[3] == 5.0
+
+
+def test_curves_of_several_ways_share_an_axis_and_the_unit_of_the_largest():
+    small = np.array([7200.0, 10800.0]), np.array([0.0, 8e9])
+    large = np.array([0.0, 3600.0]), np.array([0.0, 80e9])
+    for curves in ({"a": small, "b": large}, {"b": large, "a": small}):
+        above, below = panels(data_volume(curves, {"a": small}))
+        assert above.y.title == "since the start (GB)"
+        assert {line.label: line.y[-1] for line in above.all_of(Line)} == {
+            "a": pytest.approx(1.0),
+            "b": pytest.approx(10.0),
+        }
+        assert (above.x.low, above.x.high, above.y.low) == (0.0, 3.0, pytest.approx(-0.2))
+        assert (below.x.low, below.x.high, below.y.low) == (0.0, 3.0, pytest.approx(-0.02))
+    none = data_volume({"a": (small[0], np.zeros(2))}, {})
+    assert [panel.y.low for panel in panels(none)] == [-0.02, -0.02]
+
+
+def test_a_share_that_is_not_reached_has_no_mark():
+    curves = {"relay": (np.array([1.0, 2.0]), np.array([0.25, 0.75])), "none": (np.array([0.0]), np.array([1.0]))}
+    (panel,) = panels(latency({"relay": curves["relay"]}))
+    marked_ = [(line.marker, line.x[0], line.y[0]) for line in panel.all_of(Line) if line.marker]
+    assert marked_ == [("o", pytest.approx(1.5), 50.0)]
+    assert panel.all_of(Line)[0].label == f"relay: median {duration(1.5)}, 75 % arrive"
+    (panel,) = panels(latency({"relay": (np.array([1.0, 2.0]), np.array([0.2, 0.4]))}))
+    assert panel.all_of(Line)[0].label == "relay: 40 % arrive"
+    assert not [line for line in panel.all_of(Line) if line.marker]
+    assert "nothing was delivered" in texts(latency({"none": curves["none"]}))
+    assert "nothing was delivered" in texts(latency({"none": (np.array([1.0]), np.array([0.0]))}))
+    assert set(latency({}).columns) == {"latency (s)", "share"}
+
+
+def test_three_wide_ticks_are_too_few_and_four_enough():
+    def ticks(least_s, most_s):
+        return [*panels(latency({"a": (np.array([least_s, most_s]), np.array([0.1, 1.0]))}))[0].x.ticks.values()]
+
+    assert ticks(2.0, 400.0) == ["1 s", "2 s", "5 s", "10 s", "20 s", "30 s", "1 min", "2 min", "5 min"]
+    assert ticks(2.0, 500.0) == ["1 s", "10 s", "1 min", "10 min"]
+
+
+def test_as_many_assumptions_as_there_is_room_for_leave_none_to_the_data():
+    for count, said in ((MOST_BARS, False), (MOST_BARS + 1, True)):
+        figure = assumptions([Assumed(f"a{k}", 1.0, 2.0) for k in range(count)], 1.5, "ratio")
+        assert ("1 more, which change less, are in the data only." in figure.caption) is said
+    assert "ratio: no finite value" in texts(assumptions([Assumed("a", 1.0, 2.0)], math.inf, "ratio"))
+    assert "no assumption was varied" in texts(assumptions([], 1.0, "ratio"))
+
+
+def test_a_row_without_intervals_says_none_and_an_empty_timeline_has_its_columns():
+    figure = timeline([("relay", np.empty((0, 2))), ("direct: a", np.array([[0.0, 600.0]]))], SPAN_S, EPOCH)
+    words_ = [mark.text for mark in panels(figure)[0].marks if hasattr(mark, "text")]
+    assert words_ == ["none", f"1 · {duration(600.0)}"]
+    assert set(figure.columns) == {f"{name}, {end} (s)" for name in ("relay", "direct: a") for end in ("start", "end")}
+    assert set(timeline([], SPAN_S, EPOCH).columns) == {"start (s)", "end (s)"}
+
+
+@pytest.mark.parametrize(("end_h", "step_h"), [(12.0, 1.0), (12.1, 2.0), (24.0, 2.0), (24.1, 3.0)])
+def test_hours_are_marked_about_a_dozen_times(end_h, step_h):
+    assert figures._hours(0.0, 3600.0 * end_h)[1] == step_h
+
+
+def test_a_state_of_no_known_name_has_a_colour_that_no_state_has():
+    states = [("data", 0.0, 10.0), ("other", 10.0, 20.0), ("third", 20.0, 30.0)]
+    above = panels(contact_run(states, Windows(NOTHING, NOTHING, NOTHING)))[0]
+    known, other, third = (bars.colour for bars in above.all_of(Bars))
+    assert known == figures._STATES["data"]
+    assert not {other, third} & set(figures._STATES.values()) and other != third
+    assert (above.x.low, above.x.high) == (0.0, 0.5)
+
+
+def a_log_and_view(**changes):
+    view = SimpleNamespace(
+        encounters=[SimpleNamespace(contact=SimpleNamespace(start_s=float(k))) for k in range(3)],
+        pair=SimpleNamespace(
+            leo=SimpleNamespace(orbit=0),
+            geo=SimpleNamespace(orbit=0),
+            epoch=SimpleNamespace(utc=lambda at: f"{at:.0f}T"),
+        ),
+    )
+    data = SimpleNamespace(table=SimpleNamespace(wavelength_m=1.0))
+    return SimpleNamespace(**{"view": view, "data": data} | changes)
+
+
+@pytest.mark.parametrize(
+    ("operations", "number"),
+    [
+        (None, 1),
+        (SimpleNamespace(contact=None), 1),
+        (SimpleNamespace(contact=SimpleNamespace(number=3)), 3),
+    ],
+)
+def test_the_contact_drawn_is_the_one_the_mission_names_or_the_first(monkeypatch, operations, number):
+    seen = SimpleNamespace(
+        time_s=np.array([10.0]), range_m=1, point_ahead_rad=2, rate_rad_s=3, doppler_hz=lambda wavelength_m: 4
+    )
+    monkeypatch.setattr(figures.orbit, "sight", lambda *of: seen)
+    monkeypatch.setattr(figures, "times", lambda contact: None)
+    monkeypatch.setattr(figures, "along_contact", lambda *of, number, rise_utc: (of, number, rise_utc))
+    ((of, drawn, rise),) = figures._along_figure(a_log_and_view(operations=operations))
+    assert (drawn, rise, of[1:]) == (number, f"{number - 1} ", (1, 2, 3, 4))
+    assert of[0] == [10.0 - (number - 1)]
+    none = a_log_and_view(operations=operations)
+    none.view.encounters = []
+    assert figures._along_figure(none) == []
