@@ -905,3 +905,111 @@ def test_searches_set_out_apart_from_the_most_promising_on():
     found = a_search([(0.5, 4.0, 1.0), (0.52, 2.0, 1.0), (0.9, 3.0, 1.0), (0.38, 1.0, 1.0), (0.1, 0.0, -40.0)])
     assert [float(place[0]) for place in found.starts()] == [0.38, 0.9, 0.1]
     assert [float(place[0]) for place in a_search([(0.38, 1.0, 1.0), (0.54, 2.0, 1.0)]).starts()] == [0.38, 0.54]
+
+
+# --------------------------------------------------------------------------------------------- words of what was found
+def kept_by(value, low, high, excess=1.0, limit=MARGIN):
+    return Kept(limit, 3.5, excess, Interval(value, low, high, 0.95))
+
+
+def found_with(best_kept=(), fresh_kept=(), **changes):
+    """An optimum at x0 = 0.5 that costs as much, checked by fresh rows."""
+    best = Candidate({"x0": 0.5}, 0.5, tuple(best_kept))
+    given = {
+        "problem": problem(),
+        "best": best,
+        "fresh": Candidate({"x0": 0.5}, 0.25, tuple(fresh_kept)),
+        "bound_by": (),
+        "evaluations": 12,
+        "refused": 0,
+        "reason": "",
+        "warnings": (),
+        "trace": (),
+    }
+    return search.Optimum(**given | changes)
+
+
+def test_without_a_candidate_the_text_has_the_reason_and_the_count_alone():
+    assert optimum_text(found_with(best=None, fresh=None, reason="none is a mission", refused=12)).splitlines() == [
+        "NO DESIGN KEEPS THE LIMITS: none is a mission",
+        "",
+        "12 candidates, 12 of them no mission",
+    ]
+
+
+def test_the_text_ends_with_what_binds_the_count_and_the_warnings():
+    plain = optimum_text(found_with())
+    assert "Bound by" not in plain and plain.splitlines()[-1] == "12 candidates"
+    assert "deciding row" not in plain and "The best of the designs tried" not in plain
+    said = optimum_text(found_with(bound_by=("x0", "margin"), refused=1, warnings=("one", "two"))).splitlines()
+    assert said[-6:] == [
+        "",
+        "Bound by: x0, margin",
+        "",
+        "12 candidates, 1 of them no mission",
+        "warning: one",
+        "warning: two",
+    ]
+
+
+def test_a_design_that_misses_a_limit_stands_as_the_best_of_those_tried():
+    missed = found_with([kept_by(0.5, 0.4, 0.6, -1.0)], fresh=None, reason="too few rows")
+    said = optimum_text(missed).splitlines()
+    assert said[:3] == ["NO DESIGN KEEPS THE LIMITS: too few rows", "", "The best of the designs tried:"]
+    assert "It has not been checked with fresh rows." not in said
+    assert re.search(r"\nmargin ≥ 3 dB  searched  3\.50 dB +50 % +40 to 60 %\n", optimum_text(missed))
+    assert optimum_data(missed)["check"] == ""
+    assert optimum_data(missed)["fresh"] is None
+
+
+ERROR = Limit("residual_quantile", None, 1e-5, "test")
+SHORT, LOW = (kept_by(0.98, 0.97, 0.995, -1.0), kept_by(0.5, 0.4, 0.6, -1.0, ERROR))
+
+
+WITHIN = f"below 99 %: this agrees within its interval; {SLACK}."
+LESS = f"which is less often than the 99 % wanted; {SLACK}."
+
+
+@pytest.mark.parametrize(
+    ("fresh", "said"),
+    [
+        ([], "There is no limit for fresh rows to check."),
+        ([kept_by(0.999, 0.99, 1.0)], "Fresh rows agree."),
+        ([kept_by(0.99, 0.985, 0.99)], "Fresh rows agree."),
+        ([SHORT], f"Fresh rows keep margin ≥ 3 dB in 98 % (97 to 99.5 %), {WITHIN}"),
+        ([SHORT, LOW], f"Fresh rows keep residual_quantile ≤ 10 µrad in 50 % (40 to 60 %), {LESS}"),
+        (
+            [kept_by(0.5, 0.4, 0.6), LOW],
+            "Fresh rows keep margin ≥ 3 dB in 50 % (40 to 60 %) and residual_quantile ≤ 10 µrad in 50 % (40 to 60 %), "
+            + LESS,
+        ),
+        (
+            [SHORT, kept_by(0.98, 0.97, 0.99, -1.0, ERROR)],
+            "Fresh rows keep margin ≥ 3 dB in 98 % (97 to 99.5 %) and residual_quantile ≤ 10 µrad in 98 % (97 to 99 "
+            f"%), {WITHIN}",
+        ),
+    ],
+)
+def test_fresh_rows_are_said_to_agree_to_the_end_of_their_interval(fresh, said):
+    assert fresh_rows_sentence(found_with(fresh_kept=fresh)) == said
+
+
+def test_what_an_output_costs_is_told_of_the_rows_that_were_searched_and_of_fresh_ones():
+    asked = problem(minimise="-margin", limits=())
+    searched = "\nmargin (mean over the rows): 0.50 dB of the searched rows"
+    both = optimum_text(found_with(problem=asked))
+    assert f"{searched}, 0.25 dB of fresh rows\n" in both
+    assert both.startswith("largest margin (mean over the rows): 0.50 dB\n")
+    for fresh in (None, Candidate({"x0": 0.5}, math.nan, (), "no row has a margin")):
+        alone = optimum_text(found_with(problem=asked, fresh=fresh))
+        assert f"{searched}\n" in alone and "of fresh rows" not in alone
+        assert alone.startswith("NOT CONFIRMED: largest margin")
+    assert "mean over" not in optimum_text(found_with(problem=problem(limits=())))
+
+
+def test_a_variable_has_its_unit_and_the_range_it_was_searched_in():
+    asked = problem(variables=(Variable("x0", "m", 0.01, 2.0),), limits=())
+    said = optimum_text(found_with(problem=asked))
+    assert said.startswith("least x0: 500 mm\n")
+    assert re.search(r"\nx0 +500 mm +10 mm to 2 m\n", said)
+    assert re.search(r"\nx0 +0\.5 +0 to 1\n", optimum_text(found_with()))
