@@ -30,6 +30,7 @@ from microrad.report.fine_pointing import figures, simulated_windows, windows, w
 from microrad.report.fine_pointing import page as section
 from microrad.report.fine_pointing import recording as recorded
 from microrad.report.fine_pointing.figures import fine_pointing_figures
+from microrad.report.plotting.sheet import Panel, Rule
 from microrad.report.requirements import requirement_table
 from microrad.report.results.arrays import study_netcdf
 from microrad.report.results.manifest import manifest_of
@@ -1217,3 +1218,23 @@ def test_the_data_of_a_recording_have_a_radial_error_where_there_are_two_axes(mo
     data = recorded.recording_data("a.csv", "0" * 64, [axis] * count, None)
     assert (data["rate_hz"], len(data["axes"])) == (1000.0, count)
     assert ("radial" in data) is (count == 2)
+
+
+@pytest.mark.parametrize(("noise", "lines"), [(0.0, False), (1e-18, False), (0.0, True)])
+def test_a_spectrum_has_the_sensors_noise_and_the_word_on_wheels_where_there_are_any(
+    plain, fine, monkeypatch, noise, lines
+):
+    monkeypatch.setattr(figures, "_noise_density", lambda fine: noise)
+    monkeypatch.setattr(figures, "_lines", lambda fine: lines)
+    drawn = {figure.name: figure for figure in fine_pointing_figures(with_fine(plain, fine))}["fine-pointing-spectrum"]
+    rules = [rule.at for rule in drawn.sheet.panels[0].all_of(Rule) if rule.label == "sensor noise"]
+    assert rules == ([pytest.approx(noise * 1e12)] if noise else [])
+    assert drawn.caption.endswith("Lines of the reaction wheel are not in the spectrum before the loop.") is lines
+
+
+def test_a_sensitivity_has_the_margin_that_is_asked_for_where_one_is():
+    for table, labels in ((None, [""]), (ns(modulus_margin=0.5), ["", "1 / modulus margin asked for (0.5)"])):
+        panel = Panel(0, 0)
+        figures._ceiling(panel, ns(fine_pointing=table))
+        assert [rule.label for rule in panel.all_of(Rule)] == labels
+        assert [rule.at for rule in panel.all_of(Rule)] == [1.0, 2.0][: len(labels)]
