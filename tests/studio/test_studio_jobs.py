@@ -602,7 +602,7 @@ def test_the_process_runs_its_job_and_goes_on_with_the_queue_even_on_a_full_disk
 @pytest.mark.parametrize("leads", [True, False])
 def test_a_command_whose_watcher_is_gone_ends_its_group_where_it_leads_one(monkeypatch, leads):
     ended, (read, write) = [], os.pipe()
-    os.write(write, b"x" * 5000)
+    os.write(write, b"x" * 15_000)
     os.close(write)
     monkeypatch.setattr(command.os, "getpgrp", lambda: os.getpid() if leads else 1)
     monkeypatch.setattr(command.os, "killpg", lambda *sent: ended.append(sent))
