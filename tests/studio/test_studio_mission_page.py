@@ -29,6 +29,7 @@ from nicegui.page import page as at
 
 from microrad.studio.pages import compare, layout, mission, mission_form, runs, runs_jobs
 from microrad.studio.pages.sliders import SliderPage
+from studio_pages import buttons, here, texts
 from waiting import until
 
 LEO, GEO = "terminals.leo_aperture", "terminals.geo_aperture"
@@ -311,9 +312,6 @@ def test_a_study_of_a_file_that_another_program_has_changed_is_not_run(session, 
 def test_a_campaign_that_was_cancelled_goes_on_and_one_that_is_done_gets_its_report(session, monkeypatch):
     asked = []
 
-    async def here(page, work, *args):
-        return work(*args)
-
     async def clicked():
         with client:
             for job, click in ((stopped, "_go_on"), (done, "_write_page")):
@@ -357,11 +355,6 @@ def test_nothing_is_saved_through_a_link_that_has_come_in_the_files_place(sessio
 
 
 # ------------------------------------------------------------------------------------------------------ the form's rows
-def texts(place):
-    """What the elements within a place say, those that say something."""
-    return [each.text for each in place.descendants() if getattr(each, "text", "")]
-
-
 @pytest.fixture
 def tab():
     """A page that elements are put on."""
@@ -604,10 +597,6 @@ def test_faults_are_counted_and_no_more_are_told_than_are_left_out(session, open
 
 
 # ---------------------------------------------------------------------------------------------------------------- files
-def buttons(place):
-    return {each.text: each for each in place.descendants() if isinstance(each, ui.button)}
-
-
 def test_a_mission_goes_back_to_its_file_where_that_is_there_and_differs(session, tab):
     def back():
         with ui.row() as place:
