@@ -273,7 +273,7 @@ def test_a_name_is_bound_and_told_as_browsers_write_it(monkeypatch, exposed, bou
     [
         (
             errno.EADDRINUSE,
-            "port 80 is in use, perhaps by another studio; give another one with --port, or leave --port",
+            "port 80 is in use, perhaps by another studio; give another one with --port, or leave",
         ),
         (errno.EACCES, "port 80 is not open to this user; give one from 1024 on with --port"),
         (errno.EADDRNOTAVAIL, "'h' port 80 cannot be listened on: the reason; give an address of this machine"),

@@ -846,9 +846,7 @@ def test_windows_hold_a_sample_each_and_no_more_together_than_memory_does(sample
     monkeypatch.setattr(drawn_windows, "MOST_SAMPLES", samples)
     assert replace(made).settings == made.settings
     monkeypatch.setattr(drawn_windows, "MOST_SAMPLES", samples - 1)
-    with pytest.raises(
-        ValueError, match=r"^4 windows of 400 ms hold 8e\+03 control samples of a contact run, which may"
-    ):
+    with pytest.raises(ValueError, match=r"^4 windows of 400 ms hold 8e\+03 control samples of a contact run"):
         replace(made)
     short = settings(window_s=0.6 * period, hold_s=0.0)
     assert replace(made, settings=replace(short, windows=1)).settings.window_s == 0.6 * period
