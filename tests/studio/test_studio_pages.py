@@ -157,6 +157,18 @@ def test_the_choice_is_that_of_the_other_mission_where_it_can_be_chosen(session,
     assert (compared.choice.value, compared._name(session.other)) == (compare._SAVED, "leo-geo.toml (saved)")
 
 
+def test_a_choice_that_cannot_be_read_stays_chosen_beside_its_reason(session, compared):
+    (session.folder / "b.toml").write_bytes(b"\xff")
+    session.other = Draft.shipped(session.inside(compare._SHIPPED))
+    compared._look()
+    assert compared.choice.value == compare._SHIPPED
+    compared.choice.set_options(compared._options(), value="file b.toml")
+    assert compared.fault.text != ""
+    (session.folder / "d.toml").write_text(TEXT, "utf-8")  # there are other options now
+    compared._look()
+    assert (compared.choice.value, "file d.toml" in compared.choice.options) == ("file b.toml", True)
+
+
 def test_the_tables_are_those_of_what_was_asked_last(session, compared):
     asyncio.run(compared._show(compared.asked))
     assert compared.seen.pop() == [Soft("Choose the mission that this one is to be compared with.")]
@@ -291,6 +303,15 @@ def test_a_campaign_is_run_from_a_file_or_goes_on_from_its_ledger(session, tab, 
     assert len(asked.orders) == 2
 
 
+def test_an_example_that_was_written_is_chosen(session, tab):
+    (session.folder / "a.toml").write_text('mission = "leo-geo.toml"', "utf-8")
+    campaign = runs._Campaign(session)
+    asyncio.run(campaign._look())
+    assert campaign.file.value == "a.toml"
+    asyncio.run(campaign._example())
+    assert campaign.file.value == "campaign.toml"
+
+
 def test_an_example_that_cannot_be_written_says_why(session, tab):
     campaign = runs._Campaign(session)
     session.change(Draft.shipped(session.inside("unsaved.toml")))
@@ -377,6 +398,7 @@ def test_results_of_a_job_are_shown_here_or_saved(session, cards):
     job = Job(1, session.folder, "done", "study", "t", (), session.folder, ("x.nc", "none.nc", "page.html"))
     card = shown(runs_jobs._Card(cards, job), job)
     assert texts(card.results) == ["Save x.nc", "Show page.html here", "page.html in a tab of its own"]
+    assert card.results.visible
     links = [each.props["href"] for each in card.results.descendants() if isinstance(each, ui.link)]
     assert links == ["/results/1/0", "/results/1/2"]
 
@@ -454,7 +476,7 @@ def test_the_list_has_a_card_for_each_job_the_newest_first(session, cards, monke
     async def twice():
         async with cards._busy:
             monkeypatch.setattr(session.jobs, "listed", lambda: (one,))
-            await cards.refresh()
+            await asyncio.wait_for(cards.refresh(), 5.0)  # and not wait for the other one
 
     asyncio.run(twice())
     assert cards._cards == {}
