@@ -160,6 +160,66 @@ def test_channels_are_guessed_by_unit_then_by_name(listing, drive, output, units
     assert found.name == "loop 1-mirror"
 
 
+def test_a_channel_without_samples_is_not_guessed_and_unit_and_name_together_count_most():
+    empty = ChannelInfo("drive", "V", 0)
+    assert mirror_form.first_setting(replace(listed(("x", "")), channels=(empty,)), "a").drive is None
+    text = ChannelInfo("u", "", None)
+    assert mirror_form.first_setting(replace(listed(("x", "")), channels=(empty, text)), "a").drive == 1
+    for channels, drive, output in (
+        ((("a", "V"), ("drive", "V"), ("b", "mrad"), ("angle", "mrad")), 1, 3),
+        ((("drive", ""), ("a", "V"), ("angle", ""), ("b", "mrad")), 1, 3),
+        ((("a", "V"), ("b", "mV"), ("c", "mrad"), ("d", "urad")), 0, 2),
+        ((("a", ""), ("my_drive", ""), ("drive", ""), ("tilt", "")), 1, 3),
+    ):
+        found = mirror_form.first_setting(listed(*channels), "a")
+        assert (found.drive, found.output) == (drive, output)
+
+
+def test_the_form_for_the_recording_that_is_shown_already_stays_as_it_is():
+    form = mirror_form.shown(Form(), IN_MRAD, "a", "a.csv", alone=True)
+    typed = replace(form, setting=replace(form.setting, rate="7 Hz", output=3))
+    assert mirror_form.shown(typed, IN_MRAD, "a", "a.csv") is typed
+    assert mirror_form.shown(typed, IN_MRAD, "b", "b.csv").setting.rate == ""
+    assert mirror_form.shown(typed, IN_MRAD, "a", "a.csv", alone=True).setting.output == 1
+
+
+def test_a_unit_that_is_typed_together_with_its_channel_stays():
+    form = mirror_form.shown(Form(), listed(("u", "V"), ("y", "mrad"), ("v", "mV"), ("z", "um")), "a", "a", alone=True)
+    listing = listed(("u", "V"), ("y", "mrad"), ("v", "mV"), ("z", "um"))
+
+    def units(**changes):
+        found = mirror_form.edited(form, listing, replace(form.setting, **changes)).setting
+        return found.drive_unit, found.output_unit
+
+    assert units(drive=2) == ("mV", "mrad")
+    assert units(output=3) == ("V", "um")
+    assert units(drive_unit="mV") == ("mV", "mrad")
+    assert units(output=3, output_unit="mm") == ("V", "mm")
+    apart = replace(form, setting=replace(form.setting, drive_unit="mV"))
+    again = mirror_form.edited(apart, listing, replace(apart.setting, drive=2, drive_unit="V")).setting
+    assert (again.drive, again.drive_unit) == (2, "V")
+
+
+@pytest.mark.parametrize(
+    ("said", "channel"), [("0", 0), ("3", 3), ("4", 7), ("", 7), ("None", 7), ("-1", 7), ("\u00b2", 7), ("\u0663", 7)]
+)
+def test_a_channel_that_was_set_is_taken_where_there_is_one(said, channel):
+    """The form may have come with the folder."""
+    form = Form(chosen={f"{mirror_form._about(IN_MRAD)} drive": said})
+    assert mirror_form._channel(form, IN_MRAD, "drive", 7) == channel
+    assert mirror_form._channel(form, IN_MRAD, "output", None) is None
+
+
+def test_a_channel_of_a_text_has_no_length():
+    channels = (ChannelInfo("u", "V", None), ChannelInfo("1", "", 0), ChannelInfo("", "V", 5), ChannelInfo("0", "", 1))
+    assert mirror_form.labels(Listing(channels, None, ())) == {
+        0: "0: u (V)",
+        1: "column 1, 0 samples",
+        2: "column 2 (V), 5 samples",
+        3: "3: 0, 1 samples",
+    }
+
+
 def test_a_rate_is_taken_from_the_file_where_it_states_one_alone():
     assert mirror_form.first_setting(listed(rates=(200.0,)), "a").rate == "200 Hz"
     assert mirror_form.first_setting(listed(rates=(200.0, 100.0)), "a").rate == ""
@@ -236,7 +296,9 @@ def test_a_channel_brings_its_unit_unless_it_was_set_for_it():
         ),
         (Setting(0, 1, output_unit="urad"), "leave", None),
         (Setting(0, 3, output_unit="urad"), "fit", None),
+        (Setting(0, 4, output_unit="urad"), "fit", None),
         (Setting(0, 9, output_unit="urad"), "fit", None),
+        (Setting(9, 1, drive_unit="mV"), "fit", None),
     ],
 )
 def test_units_that_a_recording_denies_are_refused(tmp_path, setting, use, words):
@@ -277,6 +339,7 @@ def test_the_reader_s_words_name_the_fields_of_the_form(tmp_path):
         (Setting(0, 1, output_unit="um"), "lever arm: the output is a length (µm) and a mirror needs an angle"),
         (Setting(0, 1, output_unit="um", lever_arm="5 V"), 'lever arm: "5 V" is in "V"'),
         (Setting(0, 1, output_unit="um", lever_arm="-5 mm"), "lever arm: -5 mm is not above 0"),
+        (Setting(0, 1, output_unit="m", lever_arm="0 mm"), "lever arm: 0 mm is not above 0; type a length such as 50"),
         (Setting(0, 1, name=" "), "name of the mirror: it has none; type one, such as stage-x"),
         (Setting(0, 1, name="../up"), "'../up.toml' is not taken: its name holds a path; choose another name"),
         (Setting(0, 1, name="there"), "name of the mirror: there.html is there already and is left as it is"),
@@ -332,6 +395,7 @@ def test_a_form_that_somebody_else_has_written_holds_what_can_be_chosen(tmp_path
     path, link = tmp_path / "form.json", '<a href="https://evil.example">V</a>'
     odd = Setting(-1, -2, "5 kHz", link, link, accept=("drift", link), name="a")
     mirror_form.keep_form(path, Form(odd, {"a": "zzz", "b": "check"}, chosen={"output_unit": link}))
+    assert mirror_form._possible(Form(Setting(0, 0))).setting == Setting(0, 0)
     found = mirror_form.kept_form(path)
     assert found.setting == Setting(None, None, "5 kHz", "V", "mrad", accept=("drift",), name="a")
     assert found.uses == {"b": "check"}
@@ -463,6 +527,12 @@ def test_a_mirror_in_two_places_of_the_text_and_one_that_is_missing(tmp_path):
     assert with_mirror_file(without, tmp_path / "s.toml").text == (
         '[amplifier]\ngain = 2\n\n[mirror]\nfile = "s.toml"\n'
     )
+    for text, lead in (("", "\n"), ("[amplifier]\n", "[amplifier]\n\n"), ("[mirrors]", "[mirrors]\n\n")):
+        assert with_mirror_file(draft.with_text(text), tmp_path / "s.toml").text == f'{lead}[mirror]\nfile = "s.toml"\n'
+    windows = with_mirror_file(replace(draft, text="a = 1\r\nb = 1"), tmp_path / "s.toml").text
+    assert windows == 'a = 1\r\nb = 1\r\n\r\n[mirror]\r\nfile = "s.toml"\r\n'
+    inline = draft.with_text('[mirror]\nnot toml\nname = "a"\n\n[mirror.linear]\n# gone\nx = 1\nnot toml\n[other]')
+    assert with_mirror_file(inline, tmp_path / "s.toml").text == '[mirror]\nfile = "s.toml"\nnot toml\n[other]'
 
 
 # ------------------------------------------------------------------------------------------------------------- control
@@ -632,6 +702,134 @@ def test_plots_carry_units_limits_and_both_variants(pi, answers):
     assert titles(control_view.gain_plot(pi)) == ["frequency (Hz)", "|L|, loop gain"]
     assert control_view.answer_words(answers.step, "Error").startswith(f"Error: {WITH} ")
     assert control_view.answer_words({}, "Error") == ""
+
+
+def made(**changes):
+    """A controller of three frequencies that nobody has tuned."""
+    margins = SimpleNamespace(bandwidth_hz=20.0, crossover_hz=30.0)
+    freq, one = np.array([1.0, 10.0, 100.0]), np.array([0.5, 1.0, 2.0])
+    limits = ((-6.0, 6.0), (-6.0, 6.0), 5000.0, 2e-3)
+    found = control_view.Controller("PI", margins, "", 1e-6, (), 0.5, freq, one, one, *limits, (), None)
+    return replace(found, **changes)
+
+
+def curve(error_rad, begin_s=0.0, **changes):
+    """Two samples of one axis."""
+    time_s, wanted = begin_s + np.array([0.0, 2e-3]), np.array([1e-6, 1e-6])
+    error, drive = np.array([[0.0], [error_rad]]), np.array([[1.0], [2.0]])
+    return replace(control_view.Curve(time_s, wanted, wanted - error[:, 0], error, drive), **changes)
+
+
+@pytest.mark.parametrize(("asked", "rules"), [(0.5, [2.0]), (math.nan, []), (1.0, [1.0])])
+def test_the_margin_asked_for_is_drawn_where_one_was(asked, rules):
+    assert straight(control_view.sensitivity_plot(made(asked_modulus=asked)), "margin asked for") == rules
+
+
+@pytest.mark.parametrize(("at", "drawn"), [(20.0, True), (math.inf, False), (math.nan, False), (0.0, False)])
+def test_the_frequency_of_a_margin_is_drawn_where_there_is_one(at, drawn):
+    of = made(margins=SimpleNamespace(bandwidth_hz=at, crossover_hz=at))
+    for draw, name in ((control_view.sensitivity_plot, "bandwidth"), (control_view.gain_plot, "crossover")):
+        shapes = draw(of)["layout"]["shapes"]
+        assert [each["x0"] for each in shapes if name in each.get("name", "")] == [20.0] * drawn
+        assert [each.get("name") for each in shapes if name in each.get("name", "")] == [f"{name} 20 Hz"] * drawn
+
+
+def test_what_is_to_be_followed_is_drawn_where_something_is():
+    still, shaken = curve(1e-6), curve(1e-6, disturbance_rad=np.array([[2e-6], [3e-6]]))
+    for curves, names in (
+        ({WITH: still}, [WITH]),
+        ({WITH: shaken, WITHOUT: shaken}, ["to be followed", WITH, WITHOUT]),
+        ({WITH: still, WITHOUT: shaken}, ["to be followed", WITH, WITHOUT]),
+    ):
+        drawn = control_view.motion_plot(control_view.Answers({}, {}, curves))
+        assert [trace["name"] for trace in drawn["data"]] == names
+    assert drawn["data"][0]["y"] == [2.0, 3.0]
+    nothing = control_view.Answers({}, {}, {})
+    for draw in (control_view.motion_plot, control_view.jitter_plot, control_view.step_plot, control_view.sine_plot):
+        assert draw(nothing)["layout"]["annotations"][0]["text"].startswith("Nothing disturbs this loop, or nothing")
+
+
+def test_the_wanted_angle_of_a_step_is_drawn_once():
+    drawn = control_view.step_plot(control_view.Answers({WITH: curve(0.0), WITHOUT: curve(1e-6)}, {}, {}))
+    assert [(each["name"], each["y"]) for each in drawn["data"]] == [
+        ("wanted", [1.0, 1.0]),
+        (WITH, [1.0, 1.0]),
+        (WITHOUT, [1.0, 0.0]),
+    ]
+
+
+def test_a_drive_is_drawn_over_the_time_that_is_asked_for_within_finite_limits():
+    assert control_view.drive_plot(made(), {})["layout"]["annotations"][0]["text"].startswith("Nothing disturbs")
+    curves = {WITH: curve(1e-6, begin_s=0.5)}
+    over_ms, over_s = (control_view.drive_plot(made(), curves, *axis) for axis in ((), (control_view.SECONDS,)))
+    assert (over_ms["data"][0]["x"], over_s["data"][0]["x"]) == ([0.0, 2.0], [0.5, 0.502])
+    assert over_ms["data"][0]["y"] == [1.0, 2.0]
+    assert titles(over_ms)[0] == "time (ms)"
+    assert straight(over_ms, "range of the identification") == []
+    open_end = made(limits_v=(-math.inf, 6.0), identified_v=(0.0, math.inf))
+    shown = control_view.drive_plot(open_end, curves)
+    assert straight(shown, "amplifier's limits") == [6.0]
+    assert straight(shown, "range of the identification") == [0.0]
+
+
+@pytest.mark.parametrize(("peaks", "lost"), [((2e-3,), False), ((2.001e-3,), True), ((1e-3, 3e-3), True), ((), False)])
+def test_a_sensor_loses_sight_only_beyond_its_field_of_view(peaks, lost):
+    curves = {variant: curve(peak) for variant, peak in zip((WITH, WITHOUT), peaks, strict=False)}
+    words = control_view.answer_words(curves, "Error", 2e-3)
+    assert ("The sensor sees errors up to 2 mrad: beyond" in words) == lost
+    assert words.startswith("Error: with hysteresis") == bool(peaks)
+
+
+def test_rms_and_peak_are_those_of_the_radial_error():
+    error = np.array([[3e-6, 4e-6], [0.0, 0.0]])
+    found = replace(curve(0.0), error_rad=error)
+    assert found.peak_rad == pytest.approx(5e-6)
+    assert found.rms_rad == pytest.approx(5e-6 / math.sqrt(2.0))
+
+
+@pytest.mark.parametrize(
+    ("asked", "told"),
+    [
+        (("1 nrad", "100 mrad", "0.1 Hz"), None),
+        (("100 mrad", "1 nrad", "10 kHz"), None),
+        (("0.99 nrad", "1 urad", "1 Hz"), "step: 0.99 nrad is outside 1 nrad to 100 mrad"),
+        (("1 urad", "101 mrad", "1 Hz"), "amplitude of the sine: 101 mrad is outside 1 nrad to 100 mrad"),
+        (("1 urad", "1 urad", " 0.099 Hz "), "frequency of the sine: 0.099 Hz is outside 100 mHz to 10 kHz"),
+        (("1 urad", "1 urad", "10.1 kHz"), "frequency of the sine: 10.1 kHz is outside 100 mHz to 10 kHz"),
+    ],
+)
+def test_what_is_asked_may_lie_at_the_very_ends(asked, told):
+    if told is None:
+        found = control_view.ask_of(*asked, 50_000.0)
+        assert (found.step_rad, found.sine_rad) == pytest.approx((1e-9, 0.1) if asked[0] == "1 nrad" else (0.1, 1e-9))
+        assert found.seed == 1
+        return
+    with pytest.raises(control_view.AskError) as refusal:
+        control_view.ask_of(*asked, 50_000.0)
+    assert str(refusal.value) == f"{told}; type one between"
+
+
+def test_only_so_many_controllers_are_kept_the_last_ones(monkeypatch):
+    asked = []
+    monkeypatch.setattr(control_model, "_kept", {})
+    monkeypatch.setattr(control_model, "_MOST_KEPT", 2)
+    monkeypatch.setattr(control_model, "_controller", lambda file, name: asked.append(name) or name)
+    file = SimpleNamespace(sha256="m", mirror_file=None)
+    assert [control_model.controller(file, name) for name in "abacba"] == [*"abacba"]
+    assert asked == [*"abca"]
+
+
+def test_a_sensor_that_is_slower_than_the_control_has_no_response_by_frequency():
+    slow = SimpleNamespace(optical=SimpleNamespace(every=2))
+    assert control_model._responses(slow, None, np.array([1.0])) == (None, None)
+
+
+def test_the_mirror_s_own_file_and_its_missing_dynamics_are_told_with_a_controller(tmp_path):
+    (tmp_path / "stage.toml").write_text("# Warning: odd.\n" + MIRROR)
+    draft = with_mirror_file(Draft.shipped(tmp_path / "m.toml"), tmp_path / "stage.toml")
+    found = control_model.controller(draft.file(), PID)
+    assert found.warnings == control_model.mirror_warnings(False, "# Warning: odd.")
+    assert len(found.warnings) == 2
 
 
 @pytest.mark.promise("studio-12")

@@ -4,6 +4,7 @@ import json
 import math
 import threading
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -281,6 +282,91 @@ def test_whatever_else_a_ledger_may_hold_is_told(growing, monkeypatch):
     monkeypatch.setattr(Interim, "look", look)
     told = f"{growing.path.name} is no ledger that microrad wrote: its contents cannot be read (TypeError: odd)"
     assert LiveCampaigns().look(growing.path).fault == told
+
+
+def told(*cells, done, total=100, state="running"):
+    """A summary as far as its rows go: (rows, failed) of each cell."""
+    rows = [SimpleNamespace(rows=n, failed=lost) for n, lost in cells]
+    return SimpleNamespace(cells=rows, progress=SimpleNamespace(rows_done=done, rows_total=total, state=state))
+
+
+def test_rows_are_counted_over_all_cells_and_those_not_read_yet_are_behind():
+    nothing = Live()
+    assert (nothing.rows, nothing.failed, nothing.behind) == (0, 0, False)
+    for done, behind in ((5, False), (6, True)):
+        live = Live(told((2, 1), (3, 1), done=done))
+        assert (live.rows, live.failed, live.behind) == (5, 2, behind)
+
+
+class Read:
+    """In place of the reader of a ledger: what it finds at each look."""
+
+    def __init__(self, *found):
+        self.found, self.paths = list(found), []
+
+    def __call__(self, path):
+        self.paths.append(path)
+        return self
+
+    def look(self, most_s):
+        found = self.found.pop(0)
+        if isinstance(found, Exception):
+            raise found
+        return found
+
+
+def test_a_reader_that_is_behind_reads_on_at_once_and_otherwise_rests(tmp_path, monkeypatch):
+    now, part, whole = [100.0], told((1, 0), done=9), told((9, 0), done=9)
+    reader = Read(part, whole, whole)
+    monkeypatch.setattr(interim, "Interim", reader)
+    monkeypatch.setattr(campaign_live, "time", SimpleNamespace(monotonic=lambda: now[0]))
+    path, tabs = tmp_path / "x.ledger", LiveCampaigns()
+    path.touch()
+    assert [tabs.look(path).rows for _ in range(3)] == [1, 9, 9]
+    assert len(reader.found) == 1
+    now[0] += campaign_live._PAUSE_S - 0.01
+    tabs.look(path)
+    assert len(reader.found) == 1
+    now[0] += 0.01
+    tabs.look(path)
+    assert (reader.found, reader.paths) == ([], [path])  # opened once
+
+
+def test_a_fault_keeps_what_was_read_and_is_named_where_it_has_no_words(tmp_path, at_once, monkeypatch):
+    rows = told((1, 0), done=1)
+    monkeypatch.setattr(interim, "Interim", Read(rows, OSError(), ValueError("the words"), rows, rows))
+    path, tabs = tmp_path / "x.ledger", LiveCampaigns()
+    path.touch()
+    found = [tabs.look(path) for _ in range(5)]
+    assert [(each.rows, each.fault) for each in found] == [(1, ""), (1, "OSError"), (1, "the words"), (1, ""), (1, "")]
+    assert found[4] is found[3]
+
+
+def test_the_ledgers_looked_at_last_are_kept_in_mind(tmp_path, monkeypatch):
+    monkeypatch.setattr(campaign_live, "_MOST", 2)
+    tabs = LiveCampaigns()
+    for name in "abacb":
+        tabs.look(tmp_path / name)
+        if name == "c":
+            assert [path.name for path in tabs._readers] == ["a", "c"]
+    assert [path.name for path in tabs._readers] == ["c", "b"]
+
+
+# -------------------------------------------------------------------------------------------------------- on the page
+@pytest.mark.parametrize(
+    ("rows", "done", "total", "state", "words"),
+    [
+        (1, 1, 1, "complete", "Of the only row"),
+        (2, 2, 2, "complete", "Of all 2 rows"),
+        (1, 2, 2, "complete", "Of 1 row so far (2 are wanted); the others in the ledger are being read"),
+        (1, 1, 1, "running", "Of 1 row so far"),
+        (3, 3, 4, "stopped", "Of 3 rows so far (4 are wanted)"),
+        (3, 4, 3, "running", "Of 3 rows so far; the others in the ledger are being read"),
+    ],
+)
+def test_of_how_many_rows_the_figures_are(rows, done, total, state, words):
+    summary = told((rows, 0), done=done, total=total, state=state)
+    assert campaign_view._rows(Live(summary), summary) == words
 
 
 # -------------------------------------------------------------------------------------------------------- on the page

@@ -21,7 +21,7 @@ from microrad.mission.fields import Quantity, Share
 from microrad.orbit import day as day_study
 from microrad.report.day import figures as day_plots
 from microrad.report.plotting.figure import Figure
-from microrad.report.plotting.sheet import Axis, Line, Rule, grid
+from microrad.report.plotting.sheet import Axis, Line, Rule, Sheet, grid
 from microrad.report.tables import Table
 from microrad.report.view import Soft, View
 from microrad.studio.draft.draft import Draft
@@ -77,6 +77,26 @@ def test_a_margin_that_was_solved_for_is_met_whatever_rounding_leaves():
     )
     assert (missed.met, solved.met, short.met) == (False, True, False)
     assert solved.needs == "needs 3 dB: met"
+
+
+def test_a_margin_is_worded_with_its_sign_and_its_mark():
+    margin = link_view.Margin("beacon", 2.0, 0.0, sign="!")
+    assert (margin.words, margin.needs) == ("+2.00 dB !", "needs 0 dB: met")
+    assert replace(margin, margin_db=-1.0, sign="").words == "\u22121.00 dB"
+    assert replace(margin, margin_db=-1.0).needs == "needs 0 dB: MISSED"
+    assert not replace(margin, possible=False).met
+
+
+@pytest.mark.parametrize(
+    ("required", "words"),
+    [
+        (3.0, "Solid line: the required 3 dB. Dashed line: 0 dB. Dot: the working point."),
+        (0.0, "Solid line: the required 0 dB. Dot: the working point."),
+        (-1.5, "Solid line: the required -1.5 dB. Dashed line: 0 dB. Dot: the working point."),
+    ],
+)
+def test_the_key_of_the_map_names_the_lines_that_it_has(required, words):
+    assert link_view.map_key(required) == words
 
 
 def test_a_link_with_more_light_received_than_sent_is_missed(draft):
@@ -151,6 +171,12 @@ def ranged(rule, typed, unit, value):
         (RATIO, "", 0.8, "none", 0.0, 0.0),
         (Quantity("", least=-1.0), "", 0.0, "none", 0.0, 0.0),
         (Quantity("m", least=-1.0, most=3.0), "m", 0.0, "none", 0.0, 0.0),
+        (RATIO, "", -2.0, "none", 0.0, 0.0),
+        (Quantity("", most=3.0), "", 0.0, "none", 0.0, 0.0),
+        (Quantity("", least=-3.0, most=0.0), "", 0.0, "linear", -3.0, 0.0),
+        (Quantity("m", least=100.0), "m", 1.0, "none", 0.0, 0.0),  # below what the mission takes
+        (Quantity("m", least=5.0), "m", 1.0, "none", 0.0, 0.0),
+        (POWER, "W", 1.0, "logarithmic", 0.2, 5.0),
         (Share("", below=1.0), "", 0.25, "logarithmic", 0.05, 1.0),
         (Share("", below=1.0), "", 0.26, "none", 0.0, 0.0),
     ],
@@ -215,6 +241,63 @@ def test_a_slider_that_holds_another_value_keeps_its_range_or_begins_anew(typed,
     held = ranged(LENGTH, "5 cm", "cm", 5.0).holding(typed)
     assert (held.typed, held.scale) == (typed, scale)
     assert (held.low, held.high) == pytest.approx((low, high), rel=1e-12)
+
+
+@pytest.mark.parametrize(("typed", "low", "high"), [("-0.5", -1.0, 3.0), ("-2", -2.0, 3.0), ("4", -1.0, 4.0)])
+def test_a_linear_slider_holds_what_is_not_above_zero(typed, low, high):
+    held = ranged(RATIO, "0", "", 0.0).holding(typed)
+    assert (held.scale, held.value, held.low, held.high) == ("linear", float(typed), low, high)
+
+
+@pytest.mark.parametrize(
+    ("typed", "si", "found"),
+    [
+        ("5 cm", "m", (5.0, "cm")),
+        (" -.5e1cm ", "m", (-5.0, "cm")),
+        ("5", "", (5.0, "")),
+        ("5", "m", None),
+        ("5 cm", "", None),
+        ("5 V", "m", None),
+        ("1e999", "", None),
+        ("1e999 m", "m", None),
+        ("1e308 m", "m", (1e308, "m")),
+        ("a", "", None),
+    ],
+)
+def test_a_number_is_read_with_the_unit_of_its_kind(typed, si, found):
+    assert sliders.read(typed, si) == found
+
+
+def test_only_numbers_and_quantities_have_sliders(draft):
+    unknown = draft.with_text(draft.text + "\n[more]\nx = 1\n")
+    assert sliders.slider(unknown.values["more.x"]) is None
+    for key in ("name", "conventions.strehl", "acquisition.attempts", "scenario.pid_frequencies", "orbit.epoch"):
+        assert slider_of(draft, key) is None
+    assert slider_of(draft, "beacon.strehl").rule.unit == ""
+    word = slider_of(draft.set("communication.data_rate", "largest"), "communication.data_rate")
+    assert (word.typed, word.scale, word.position, word.at(0)) == ("largest", "none", 0, "largest")
+
+
+@pytest.mark.parametrize(
+    ("rule", "unit", "low", "high"),
+    [
+        (LENGTH, "cm", 0.0, 1000.0),
+        (LENGTH, "m", 0.0, 10.0),
+        (LENGTH, "potatoes", 0.0, 10.0),
+        (Quantity("m"), "cm", -math.inf, math.inf),
+        (POWER, "dBm", -math.inf, math.inf),
+        (Quantity("W", least=1e-3, most=1.0), "dBm", 0.0, 30.0),
+        (Quantity("W", least=1e-3, most=1.0), "dBW", -30.0, 0.0),
+        (Share("", below=1.0), "", -math.inf, 1.0),
+    ],
+)
+def test_the_bounds_of_a_slider_are_those_of_the_mission_in_its_unit(rule, unit, low, high):
+    assert sliders._bounds(rule, unit) == (pytest.approx(low, abs=1e-12), pytest.approx(high, abs=1e-12))
+
+
+def test_a_slider_in_decibels_has_a_position_at_least():
+    narrow = ranged(Quantity("dB", least=0.0, most=0.0), "0 dB", "dB", 0.0)
+    assert (narrow.scale, narrow.steps) == ("linear", 1)
 
 
 @pytest.mark.parametrize(
@@ -336,6 +419,23 @@ def test_the_frame_stands_still_until_the_working_point_leaves_it(draft, view):
     assert far.frame.data_rate_bit_s[0] < 90e9 < far.frame.data_rate_bit_s[-1]
 
 
+def test_a_working_point_at_the_very_edge_of_the_frame_lies_within(view):
+    rate, error = view.data.table.data_rate_bit_s, view.data.requirement.pointing_error_rad
+    for rates, most, within in (
+        ((rate, 2.0 * rate), error, True),
+        ((0.5 * rate, rate), error, True),
+        ((1.001 * rate, 2.0 * rate), error, False),
+        ((0.5 * rate, 0.999 * rate), error, False),
+        ((0.5 * rate, 2.0 * rate), 0.999 * error, False),
+    ):
+        assert link_view.Frame(np.array(rates), np.array([0.0, most])).holds(view.data) is within
+    strict = replace(
+        view.data, requirement=view.data.requirement.model_copy(update={"pointing_error_rad": 2.0 * error})
+    )
+    assert not link_view.Frame(np.array([rate, rate]), np.array([0.0, 1.5 * error])).holds(strict)
+    assert link_view.Frame(np.array([rate, rate]), np.array([0.0, 2.0 * error])).holds(strict)
+
+
 def test_the_frame_moves_for_a_required_error_beyond_it(draft, view):
     beyond_rad = 3.0 * view.frame.pointing_error_rad[-1]
     strict = link_view.view(draft.set("requirement.pointing_error", f"{1e6 * beyond_rad:.9g} urad").link(), view.frame)
@@ -389,10 +489,14 @@ def test_the_plots_are_plain_data_with_units_on_their_axes(view, draft, figures)
     assert drawn["map"]["data"][0]["z"][0][0] == pytest.approx(view.margin_db[0, 0], abs=0.006)
 
 
-def test_the_words_of_the_map_name_both_ways_out_and_that_there_is_none(draft, view):
+def test_the_words_of_the_map_name_both_ways_out_and_that_there_is_none(draft, view, monkeypatch):
     assert link_view.map_words(view).startswith("At 300 Mbit/s and 10 µrad the communication link has +3.43 dB.")
     dark = link_view.view(draft.set("communication.transmit_power", "10 mW").link())
     assert "no pointing error at 300 Mbit/s" in link_view.map_words(dark)
+    assert "At most " in link_view.map_words(dark)
+    monkeypatch.setattr(link_study, "largest_rate", lambda data: math.nan)
+    assert "No data rate will do at 10 µrad, or " in link_view.map_words(view)
+    assert "No data rate will do at 10 µrad, and no pointing error at 300 Mbit/s, for" in link_view.map_words(dark)
 
 
 def test_sliders_are_those_of_the_links_and_the_seldom_moved_stand_behind(draft):
@@ -473,7 +577,29 @@ def test_without_beacon_and_point_ahead_the_page_says_so(tmp_path):
     names = [line["name"] for line in lines(pointing_view.coverage_plot(found))]
     assert names[0] == "inside this angle"
     assert not any("beacon" in name for name in names)
+    drawn = pointing_view.lines_plot(found)
+    assert not any("beacon" in shape.get("name", "") for shape in drawn["layout"]["shapes"])
+    assert math.isnan(found.half_angle_rad)
     assert len(link_view.view(bare).margins) == 1
+
+
+def test_the_angles_go_beyond_the_widest_of_totals_and_beacon(draft):
+    for divergence, name in (("2000 urad", "beacon"), ("100 urad", "ECSS, two axes")):
+        shown = pointing_view.coverage_plot(pointing_view.view(draft.set("beacon.divergence", divergence).link()))
+        ends = {shape["name"]: shape["x0"] for shape in shown["layout"]["shapes"] if shape.get("name")}
+        widest = max(ends, key=ends.get)
+        assert widest.startswith(name)
+        assert shown["data"][0]["x"][-1] == pytest.approx(1.25 * ends[widest], rel=1e-3)
+
+
+def test_a_line_without_a_width_is_drawn_all_the_same(draft):
+    """Nothing is to be covered, and still there is an axis."""
+    found = pointing_view.view(draft.link())
+    nothing = SimpleNamespace(total_rad=lambda rule: 0.0, coverage=np.ones_like, confidence=0.997, reading=None)
+    shown = pointing_view.coverage_plot(replace(found, budget=nothing))
+    assert shown["data"][0]["x"][-1] == pytest.approx(1.0)
+    endless = SimpleNamespace(**{**vars(nothing), "total_rad": lambda rule: math.inf if rule == "exact" else 1e-4})
+    assert pointing_view.coverage_plot(replace(found, budget=endless))["data"][0]["x"][-1] == pytest.approx(125.0)
 
 
 @pytest.mark.promise("studio-12")
@@ -578,6 +704,10 @@ def test_a_name_in_a_plot_is_no_markup():
     assert plots.empty("<b>")["layout"]["annotations"][0]["text"] == "&lt;b&gt;"
 
 
+def test_a_sheet_without_panels_says_its_heading():
+    assert plots.figure(Sheet(6.0, 4.0, heading="no rows")) == plots.empty("no rows")
+
+
 def test_panels_of_a_sheet_stand_where_the_sheet_has_them():
     at = np.array([0.0, 1.0])
     sheet, (above, below) = grid(6.0, 4.0, 2, share_x=True)
@@ -656,6 +786,38 @@ def test_a_cancelled_question_can_be_asked_again_and_an_error_is_kept():
     latest.ask("a", refuse)
     state = latest.wait(HANG_S)
     assert (state.error, state.result) == ("no day; give it an orbit", None)
+    latest.ask("a", lambda progress: 7)  # it is answered already
+    assert latest.wait(HANG_S).error == "no day; give it an orbit"
+    latest.cancel()  # nothing is running
+    assert latest.state.key == "a"
+    latest.ask("b", lambda progress: 0)
+    assert latest.wait(HANG_S).result == 0
+    latest.ask("b", lambda progress: 1)  # nothing is a result, too
+    assert latest.wait(HANG_S).result == 0
+    latest.ask("c", lambda progress: None)
+    assert not latest.wait(HANG_S).running
+    latest.ask("c", lambda progress: 3)
+    assert latest.wait(HANG_S).result == 3
+
+
+def test_a_question_that_is_being_worked_on_is_not_begun_again():
+    latest, go = Latest(), threading.Event()
+    latest.ask("a", lambda progress: (go.wait(HANG_S), 1)[1])
+    first = latest._thread
+    latest.ask("a", lambda progress: 2)
+    assert latest._thread is first and latest.state.running
+    go.set()
+    assert latest.wait(HANG_S).result == 1
+
+
+def test_a_question_that_the_memory_does_not_suffice_for_says_so():
+    def large(progress):
+        raise MemoryError
+
+    latest = Latest()
+    latest.ask("a", large)
+    assert latest.wait(HANG_S).error == "the memory does not suffice; make the mission smaller"
+    assert not latest.state.running
 
 
 def test_what_pages_share_belongs_to_its_owner():

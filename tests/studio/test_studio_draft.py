@@ -16,7 +16,7 @@ from microrad.mission.toml import value_of
 from microrad.studio.draft import draft as drafts
 from microrad.studio.draft import tables
 from microrad.studio.draft.draft import Draft, DraftError
-from microrad.studio.draft.keys import key_of, keys_in
+from microrad.studio.draft.keys import key_of, keys_in, loose_toml, typed_from
 from shipped import DEFAULT, SHIPPED, without_fine_pointing
 
 TEXT = SHIPPED.read_text("utf-8")
@@ -162,6 +162,55 @@ def test_what_is_typed_as_it_stands_changes_nothing(draft):
         assert draft.set(key, f" {value.raw} ") is draft
 
 
+@pytest.mark.parametrize(
+    ("key", "typed", "raw"),
+    [
+        ("mirror.uncertainty.parameters", "a, b", '["a", "b"]'),
+        ("mirror.uncertainty.parameters", "1, 2", '["1", "2"]'),
+        ("mirror.uncertainty.parameters", "[1, 2]", '["1", "2"]'),
+        ("mirror.uncertainty.standard_errors", " 0.1, 0.2 ", "[0.1, 0.2]"),
+        ("mirror.uncertainty.standard_errors", "a, 0.2", '["a", 0.2]'),
+        ("scenario.pid_frequencies", "1 Hz,, 15 Hz, ", '["1 Hz", "15 Hz"]'),
+        ("scenario.pid_frequencies", "1 Hz # slow, 15 Hz", '["1 Hz # slow", "15 Hz"]'),
+        ("scenario.pid_frequencies", "1 Hz]\nx = [2", '["1 Hz]\\nx = [2"]'),
+        ("scenario.pid_frequencies", "'1 Hz', '15 Hz'", "['1 Hz', '15 Hz']"),
+        ("scenario.pid_frequencies", "'1 Hz', 15 Hz", "\"'1 Hz', 15 Hz\""),
+        ("scenario.pid_frequencies", '["1 Hz", "15 Hz"] # no', '"[\\"1 Hz\\", \\"15 Hz\\"] # no"'),
+        ("orbit.leo.limits.in_eclipse", " true ", "true"),
+        ("orbit.leo.limits.in_eclipse", "yes", '"yes"'),
+        ("name", "true", '"true"'),
+        ("conventions.strehl", "'ratio'", "'ratio'"),
+    ],
+)
+def test_what_is_typed_is_quoted_where_its_kind_asks_for_text(key, typed, raw):
+    assert key_of(key).toml(typed) == raw
+
+
+@pytest.mark.parametrize(
+    ("typed", "raw"),
+    [(" 5 ", "5"), ("a b", '"a b"'), ('"a"', '"a"'), ("[1, 2]", "[1, 2]"), ("1 # no", '"1 # no"'), ("", '""')],
+)
+def test_a_value_of_a_key_that_nobody_knows_stays_where_it_is_toml(typed, raw):
+    assert loose_toml(typed) == raw
+
+
+@pytest.mark.parametrize(
+    ("raw", "typed"),
+    [
+        ("[true, false]", "true, false"),
+        ("[1.50, 'a', 2]", "1.50, a, 2"),
+        ("[[1], 2]", "[[1], 2]"),
+        ("[]", ""),
+        ("true", "true"),
+        ("1e3", "1e3"),
+        ("'a, b'", "a, b"),
+        ("{a = 1}", "{a = 1}"),
+    ],
+)
+def test_a_value_is_shown_as_one_types_it(raw, typed):
+    assert typed_from(raw) == typed
+
+
 @pytest.mark.promise("studio-12")
 @pytest.mark.parametrize(
     ("key", "typed"),
@@ -230,6 +279,36 @@ def test_line_ends_and_a_byte_order_mark_stay(tmp_path, mark, ends):
     assert after.count(added) == 1
     assert after.replace(added, b"") == content.replace(b'leo_aperture = "5 cm"', b'leo_aperture = "8 cm"')
     assert draft.with_text(TEXT) is draft
+
+
+@pytest.mark.parametrize(
+    ("old", "typed", "new"),
+    [
+        ("\ufeffa = 1\n", "\ufeffa = 2\n", "\ufeffa = 2\n"),
+        ("\ufeffa = 1\n", "a = 2\n", "\ufeffa = 2\n"),
+        ("a = 1\n", "\ufeffa = 2\n", "\ufeffa = 2\n"),
+        ("a = 1\r\nb = 1\r\n", "a = 2\nb = 1\n", "a = 2\r\nb = 1\r\n"),
+        ("a = 1\r\nb = 1\n", "a = 2\nb = 1\n", "a = 2\nb = 1\n"),
+        ("a = 1\r\n", "a = 2\r\nb = 1\n", "a = 2\r\nb = 1\n"),
+        ("a = 1\n", "a = 2\nb = 1\n", "a = 2\nb = 1\n"),
+    ],
+)
+def test_another_text_gets_the_line_ends_and_the_mark_of_the_file_where_those_are_clear(tmp_path, old, typed, new):
+    assert Draft(old, tmp_path / "m.toml", ()).with_text(typed).text == new
+
+
+def test_of_a_key_that_stands_twice_the_first_line_counts(draft):
+    (value,) = (
+        each
+        for key, each in draft.with_text("[terminals]\nleo_aperture = 1\nleo_aperture = 2\n").values.items()
+        if key == APERTURE
+    )
+    assert (value.raw, value.line) == ("1", 2)
+
+
+@pytest.mark.parametrize(("text", "source"), [("x = 1 # a book", "a book"), ("x = 1", "")])
+def test_a_value_has_a_source_where_it_has_a_comment(draft, text, source):
+    assert draft.with_text(text).values["x"].source == source
 
 
 def test_a_value_without_a_comment_keeps_the_line_end_behind_it(tmp_path):
@@ -480,6 +559,26 @@ def test_a_full_disk_leaves_the_file_as_it_was(draft, tmp_path, monkeypatch):
     with pytest.raises(DraftError, match="No space left on device; check free space and permissions, or save under"):
         draft.set(APERTURE, "8 cm").save()
     assert hashlib.sha256((tmp_path / "m.toml").read_bytes()).hexdigest() == draft.sha256
+
+
+def test_a_fault_of_the_disk_that_has_no_number_is_told_in_its_own_words(draft, monkeypatch):
+    def odd(path, text, mode):
+        raise OSError("the disk is odd")
+
+    monkeypatch.setattr(drafts, "write_whole", odd)
+    with pytest.raises(DraftError, match=r"m\.toml cannot be written: the disk is odd; check free space"):
+        draft.set(APERTURE, "8 cm").save()
+
+
+def test_what_became_of_the_file_on_disk(draft, tmp_path):
+    path, new = tmp_path / "m.toml", draft.set(APERTURE, "8 cm")
+    assert (draft.on_disk(), new.on_disk()) == ("", "")
+    path.write_bytes(new.text.encode())
+    assert (draft.on_disk(), new.on_disk()) == ("changed", "")  # as it would be saved
+    path.unlink()
+    assert (draft.on_disk(), Draft.shipped(path).on_disk()) == ("gone", "")
+    path.mkdir()
+    assert (draft.on_disk(), Draft.shipped(path).on_disk()) == ("changed", "changed")
 
 
 @pytest.mark.skipif(os.name != "posix", reason="POSIX has modes of files")

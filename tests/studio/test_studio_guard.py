@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from browser import new_context, watched
-from microrad.studio.guard import address, policy
+from microrad.studio.guard import address, answers, policy
 from microrad.studio.guard.middleware import Guard, Limits
 from waiting import HANG_S, until
 
@@ -280,6 +280,22 @@ def test_start_and_stop_of_the_server_pass():
     assert [scope["type"] for scope in inner.scopes] == ["lifespan"]
 
 
+def test_what_is_neither_a_request_nor_the_server_s_own_is_not_passed_on():
+    inner = Inner()
+    exchange(guard(inner), {"type": "other"}, [])
+    assert inner.scopes == []
+
+
+@pytest.mark.parametrize("extensions", [None, {}, {"other": {}}])
+def test_a_handshake_that_cannot_be_answered_in_words_is_closed(extensions):
+    scope = {"type": "websocket", "path": "/", "query_string": b"", "headers": headers_of({"cookie": None}, True)}
+    if extensions is not None:
+        scope["extensions"] = extensions
+    for told in ({}, {"extensions": None}):
+        sent = exchange(guard(Inner()), told | scope, []).sent
+        assert sent == [{"type": "websocket.close", "code": 1008}]
+
+
 @pytest.mark.parametrize("path", ["/\x1b[2J", "/a\r\nb", "/\0", "/\u202e"])
 def test_a_path_that_does_not_print_is_refused(path):
     inner = Inner()
@@ -504,6 +520,22 @@ def test_html_is_escaped_in_refusals():
     assert "h" * 81 not in long
 
 
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [(80 * "h", 80 * "h"), (81 * "h", 80 * "h" + "..."), ("a\tb\u202e", "a?b?"), ("", "")],
+)
+def test_what_was_sent_is_shown_in_at_most_eighty_characters(text, shown):
+    assert answers.short(text) == shown
+
+
+def test_a_template_of_an_environment_that_keeps_none_is_signed():
+    from jinja2 import DictLoader, Environment
+
+    environment = Environment(loader=DictLoader({"page": "<script>"}), cache_size=0)
+    policy.sign_template(environment, "page")
+    assert "nonce=" in environment.loader.get_source(environment, "page")[0]
+
+
 def test_only_the_templates_own_scripts_are_signed():
     from jinja2 import DictLoader, Environment
 
@@ -554,6 +586,11 @@ def test_tokens_cannot_be_guessed_and_short_ones_are_refused():
     assert len(address.new_token()) >= 43
     with pytest.raises(ValueError, match="32 characters"):
         Guard(Inner(), (HOST,), (PAGE,), "short")
+    with pytest.raises(ValueError, match="32 characters"):
+        Guard(Inner(), (HOST,), (PAGE,), 31 * "x")
+    made = Guard(Inner(), (HOST,), (PAGE,), 32 * "x")
+    assert (made.limits, made.documents, made.cookie) == (Limits(), (), f"microrad_studio_{PORT}")
+    assert (made.limits.of("/"), made.limits.of(UPLOAD)) == (address.MESSAGE_BYTES, 200_065_536)
     for hosts, pages in (((), (PAGE,)), ((HOST,), ()), ((), ()), ((HOST,), (PAGE, PAGE))):
         with pytest.raises(ValueError, match="needs hosts, their origins"):
             Guard(Inner(), hosts, pages, TOKEN)

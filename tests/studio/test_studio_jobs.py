@@ -11,11 +11,14 @@ import subprocess
 import sys
 from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
+from microrad.campaign.engines import worker
 from microrad.campaign.statistics.interim import Interim
 from microrad.core import kept
+from microrad.studio.jobs import command
 from microrad.studio.jobs import files as jobs_files
 from microrad.studio.jobs import process as jobs_process
 from microrad.studio.jobs import queue as jobs_module
@@ -221,6 +224,52 @@ def test_progress_that_nothing_counts_to_is_not_believed(tmp_path, wrong):
     assert jobs_files.read_progress(tmp_path) == jobs_files.Progress(1, 2, "x", None)
 
 
+@pytest.mark.parametrize(
+    ("notes", "rate"),
+    [
+        (((0.0, 0, 100, "x"), (60.0, 30, 100, "x")), 0.5),
+        (((0.0, 0, 100, "x"), (60.5, 30, 100, "x")), None),  # more than a minute ago
+        (((0.0, 50, 100, "x"), (1.0, 10, 100, "x"), (3.0, 20, 100, "x")), 5.0),  # it began anew
+        (((0.0, 5, 100, "x"), (10.0, 5, 100, "x")), None),
+        (((5.0, 1, 100, "x"), (5.0, 3, 100, "x")), None),
+        (((0.0, 1, 4, "x"), (2.0, 2, 4, "x")), 0.5),  # few, but of one kind
+        (((0.0, 1, 19, "a"), (2.0, 2, 19, "b")), None),
+        (((0.0, 1, 20, "a"), (2.0, 2, 20, "b")), 0.5),
+        (((0.0, 1, 40, "a"), (2.0, 2, 41, "a")), None),
+    ],
+)
+def test_the_rate_is_taken_over_what_belongs_to_the_last_note(tmp_path, notes, rate):
+    found = progress_of(tmp_path, *notes)
+    assert (found.done, found.total, found.what) == notes[-1][1:]
+    assert found.rate_1_s == (None if rate is None else pytest.approx(rate))
+
+
+@pytest.mark.parametrize(
+    ("note", "known"),
+    [
+        ({"done": 10**15 - 1}, True),
+        ({"done": 10**15}, False),
+        ({"total": 10**15 - 1}, True),
+        ({"total": 10**15}, False),
+        ({"done": 0, "total": 0}, True),
+        ({"done": -1}, False),
+        ({"total": -1}, False),
+    ],
+)
+def test_progress_counts_to_what_a_program_counts_to(tmp_path, note, known):
+    said = {"at": 1.0, "done": 1, "total": 2, "what": "x"} | note
+    (tmp_path / jobs_files.PROGRESS).write_text(json.dumps(said), "utf-8")
+    wanted = jobs_files.Progress(said["done"], said["total"], "x", None) if known else None
+    assert jobs_files.read_progress(tmp_path) == wanted
+
+
+@pytest.mark.parametrize(
+    ("done", "total", "share"), [(0, 0, 0.0), (3, 0, 0.0), (3, 4, 0.75), (5, 4, 1.0), (-1, 4, 0.0)]
+)
+def test_the_share_of_the_work_lies_between_nothing_and_all(done, total, share):
+    assert jobs_files.Progress(done, total, "x").share == share
+
+
 def test_a_line_of_progress_that_is_being_written_is_not_read(tmp_path):
     assert progress_of(tmp_path, (1.0, 3, 10, "x"), more='\n{"at": 2.0, "do').done == 3
     assert progress_of(tmp_path, more='{"at": 2.0, "do') is None
@@ -364,6 +413,227 @@ def test_who_looks_at_the_list_starts_what_nobody_started(studio, tmp_path):
     assert jobs_files.read_job(studio.folder / "1").state == "queued"
     assert studio.listed()[0].state in ("running", "done")
     assert ended(studio.folder / "1").state == "done"
+
+
+# -------------------------------------------------------------------------------------------- what a folder alone says
+@pytest.mark.parametrize(
+    ("asked", "code", "printed", "state"),
+    [
+        (False, None, "", "lost"),
+        (True, None, "", "cancelled"),
+        (True, 0, "", "done"),
+        (True, 1, "", "cancelled"),
+        (True, 1, "the verdict", "done"),
+        (False, 1, "", "done"),
+        (True, 2, "the verdict", "cancelled"),
+        (False, 2, "the verdict", "failed"),
+        (False, "0", "", "failed"),
+    ],
+)
+def test_the_state_of_a_job_whose_process_is_gone(tmp_path, asked, code, printed, state):
+    folder = written(tmp_path / "jobs")
+    jobs_files.note(folder / "started.json")
+    (folder / "stdout").write_text(printed, "utf-8")
+    if asked:
+        (folder / "cancel").touch()
+    if code is not None:
+        jobs_files.note(folder / "exit.json", code=code)
+    job = jobs_files.read_job(folder)
+    assert (job.state, job.cancelling) == (state, False)
+
+
+def test_a_running_job_that_is_asked_to_stop_is_cancelling(tmp_path):
+    folder = written(tmp_path / "jobs")
+    jobs_files.note(folder / "started.json")
+    with jobs_files.held(folder / "alive", 0.0):
+        assert not jobs_files.read_job(folder).cancelling
+        (folder / "cancel").touch()
+        job = jobs_files.read_job(folder)
+    assert (job.state, job.cancelling, job.words, job.ended) == ("running", True, "", "")
+
+
+@pytest.mark.parametrize(
+    ("said", "code", "words"),
+    [
+        ("", 3, "it ended with exit code 3 and said nothing"),
+        (" \n\n", 0, "it ended with exit code 0 and said nothing"),
+        ("", -15, "its process was ended by signal 15; signal 9 is often that of a machine out of memory"),
+        ("Traceback\nValueError: odd\n\n", -9, "ValueError: odd"),
+        ("microrad: one\nnoise\nmicrorad: two\n\n    more\n", 2, "two\n    more"),
+    ],
+)
+def test_a_failed_job_tells_its_last_words(tmp_path, said, code, words):
+    (tmp_path / "stderr").write_text(said, "utf-8")
+    assert jobs_files._words(tmp_path, "failed", code) == words
+    assert jobs_files._words(tmp_path, "done", code) == jobs_files._words(tmp_path, "cancelled", code) == ""
+
+
+def test_a_lock_that_cannot_be_taken_for_another_reason_is_told(tmp_path, monkeypatch):
+    words = r"alive cannot be locked: unable to open .*; check free space and permissions"
+    with pytest.raises(JobError, match=words), jobs_files.held(tmp_path / "none" / "alive", 0.0):
+        pass
+    monkeypatch.setattr(jobs_files, "_is_busy", lambda error: False)
+    words = "alive cannot be locked: database is locked; check"
+    path = tmp_path / "alive"
+    with jobs_files.held(path, 0.0), pytest.raises(JobError, match=words), jobs_files.held(path, 0.0):
+        pass
+
+
+def test_what_does_not_happen_is_waited_for_no_longer_than_told():
+    left = [False, False, True]
+    assert jobs_files.wait_for(lambda: left.pop(0), HANG_S, 0.0)
+    assert left == []
+    assert not jobs_files.wait_for(lambda: False, 0.0, 0.001)
+    assert jobs_files.wait_for(lambda: True, -1.0)
+
+
+def test_a_number_below_one_is_that_of_no_job_and_one_removed_meanwhile_is_not_listed(studio, monkeypatch):
+    for number in (0, -1):
+        (studio.folder / str(number)).mkdir()
+        with pytest.raises(JobError, match=f"there is no job {number} any more; it was removed, or never started"):
+            studio.get(number)
+    monkeypatch.setattr(jobs_module, "job_folders", lambda folder: [folder / "7"])
+    assert studio.listed() == ()
+
+
+# ------------------------------------------------------------------------------------- the process, without starting it
+@pytest.fixture
+def waiting_job(tmp_path):
+    return written(tmp_path / "jobs", cwd=str(tmp_path), arguments=["presets"])
+
+
+def noted(folder):
+    return sorted(each.name for each in folder.iterdir() if each.name not in ("job.json", "job.code", "alive"))
+
+
+@pytest.mark.parametrize("how", ["another has it", "another had it"])
+def test_a_job_that_another_process_was_quicker_to_take_is_left_to_it(waiting_job, monkeypatch, how):
+    @contextmanager
+    def held(path, patience_s):
+        if how == "another had it":
+            jobs_files.note(waiting_job / "started.json")
+        yield how == "another had it"
+
+    monkeypatch.setattr(jobs_process, "held", held)
+    jobs_process.run_job(waiting_job, python("print(1)"))
+    assert noted(waiting_job) == ["started.json"] * (how == "another had it")
+
+
+def test_a_job_cancelled_before_its_process_came_ends_without_a_command(waiting_job):
+    (waiting_job / "cancel").touch()
+    jobs_process.run_job(waiting_job, python("print(1)"))
+    job = jobs_files.read_job(waiting_job)
+    assert (job.state, job.code, noted(waiting_job)) == ("cancelled", 130, ["cancel", "exit.json", "started.json"])
+
+
+def test_a_queue_that_is_held_starts_nothing(waiting_job, monkeypatch):
+    started = []
+    monkeypatch.setattr(jobs_process, "QUEUE_S", 0.0)
+    monkeypatch.setattr(jobs_process, "_start", lambda folder: started.append(folder) or shutil.rmtree(folder))
+    with jobs_files.held(waiting_job.parent / "lock", 0.0):
+        jobs_process.start_waiting(waiting_job.parent)
+    assert started == []
+    jobs_process.start_waiting(waiting_job.parent)
+    assert started == [waiting_job]
+
+
+@pytest.mark.parametrize("begins", [True, False])
+def test_a_process_that_cannot_even_begin_ends_its_job(waiting_job, monkeypatch, begins):
+    class Process:
+        def __init__(self, command, **settings):
+            assert command[-1] == str(waiting_job)
+            if begins:
+                jobs_files.note(waiting_job / "started.json")
+
+        def poll(self):
+            return None if begins else 1
+
+    monkeypatch.setattr(jobs_process, "_started", [])
+    monkeypatch.setattr(jobs_process.subprocess, "Popen", Process)
+    monkeypatch.setattr(jobs_process, "_START_S", HANG_S)
+    jobs_process._start(waiting_job)
+    assert noted(waiting_job) == ["exit.json"] * (not begins) + ["started.json", "stderr"]
+    if not begins:
+        assert (jobs_files.read_job(waiting_job).state, jobs_files.read_job(waiting_job).code) == ("failed", 70)
+
+
+@pytest.mark.parametrize(
+    ("given", "found"), [(f"a{os.pathsep}{os.pathsep}/b", ["a", "/b"]), ("", None), (os.pathsep, None), (None, None)]
+)
+def test_a_job_finds_modules_where_this_process_does(folder, monkeypatch, given, found):
+    monkeypatch.delenv("PYTHONPATH", raising=False)
+    if given is not None:
+        monkeypatch.setenv("PYTHONPATH", given)
+    there = jobs_process._environment()
+    wanted = given if found is None else os.pathsep.join(str(folder / each) for each in found)
+    assert there.get("PYTHONPATH") == wanted
+    assert (there["PYTHONIOENCODING"], there["PYTHONUNBUFFERED"]) == ("utf-8:replace", "1")
+
+
+def test_without_groups_a_signal_goes_to_the_command_alone(monkeypatch):
+    sent = []
+    command = SimpleNamespace(pid=7, send_signal=lambda number: sent.append(("command", number)))
+    monkeypatch.setattr(jobs_process.os, "killpg", lambda group, number: sent.append((group, number)))
+    jobs_process._signal(command, 2)
+    monkeypatch.delattr(jobs_process.os, "killpg")
+    jobs_process._signal(command, 15)
+    assert sent == [(7, 2), ("command", 15)]
+
+
+@pytest.mark.parametrize("nice", [True, False])
+def test_the_process_runs_its_job_and_goes_on_with_the_queue_even_on_a_full_disk(monkeypatch, tmp_path, nice):
+    done = []
+
+    def full(folder):
+        done.append(folder)
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(jobs_process.signal, "signal", lambda number, handler: done.append(number))
+    monkeypatch.setattr(jobs_process.os, "nice", done.append)
+    if not nice:
+        monkeypatch.delattr(jobs_process.os, "nice")
+    monkeypatch.setattr(jobs_process, "run_job", full)
+    monkeypatch.setattr(jobs_process, "start_waiting", done.append)
+    monkeypatch.setattr(sys, "argv", ["x", str(tmp_path / "3")])
+    jobs_process.main()
+    assert done == [signal.SIGINT, signal.SIGTERM, *[5] * nice, tmp_path / "3", tmp_path]
+
+
+@pytest.mark.parametrize("leads", [True, False])
+def test_a_command_whose_watcher_is_gone_ends_its_group_where_it_leads_one(monkeypatch, leads):
+    ended, (read, write) = [], os.pipe()
+    os.write(write, b"x" * 15_000)
+    os.close(write)
+    monkeypatch.setattr(command.os, "getpgrp", lambda: os.getpid() if leads else 1)
+    monkeypatch.setattr(command.os, "killpg", lambda *sent: ended.append(sent))
+    monkeypatch.setattr(command.os, "_exit", ended.append)
+    command.end_with(read)
+    monkeypatch.delattr(command.os, "killpg")
+    command.end_with(read)
+    assert os.read(read, 1) == b""
+    os.close(read)
+    assert ended == [*[(os.getpid(), signal.SIGKILL)] * leads, 1, 1]
+
+
+@pytest.mark.parametrize("dies", [True, False])
+def test_a_command_watches_its_watcher_where_the_system_does_not(monkeypatch, dies):
+    ran, watched = [], []
+
+    class Thread:
+        def __init__(self, target, args, daemon, name):
+            watched.append((target, args, daemon))
+
+        def start(self):
+            watched.append("started")
+
+    monkeypatch.setattr(worker, "die_with_parent", lambda number: ran.append(number) or dies)
+    monkeypatch.setattr(command, "_taken_stdin", lambda: 9)
+    monkeypatch.setattr(command, "threading", SimpleNamespace(Thread=Thread))
+    monkeypatch.setattr(command.runpy, "run_module", lambda name, **how: ran.append((name, *sys.argv)))
+    monkeypatch.setattr(sys, "argv", ["command", "12", "run", "m.toml"])
+    command.main()
+    assert ran == [12, ("microrad", "microrad", "run", "m.toml")]
+    assert watched == ([] if dies else [(command.end_with, (9,), True), "started"])
 
 
 # ------------------------------------------------------------------------------------------------------------- crashes

@@ -3,14 +3,18 @@
 import asyncio
 import os
 import threading
+from contextlib import contextmanager
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
+from microrad.mission.presets import preset_text
+from microrad.mission.toml import Fault
 from microrad.studio import commands
 from microrad.studio.draft import draft as drafts
 from microrad.studio.draft.draft import Draft, DraftError
+from microrad.studio.draft.keys import key_of
 from microrad.studio.guard.names import NameRefusedError
 from microrad.studio.jobs.queue import Job
 from microrad.studio.session import Session
@@ -19,11 +23,13 @@ from shipped import SHIPPED
 
 pytest.importorskip("nicegui", reason="the studio is not installed (nicegui)")
 
+from nicegui import ui
 from nicegui.client import Client
 from nicegui.page import page as at
 
-from microrad.studio.pages import compare, layout, mission, runs, runs_jobs
+from microrad.studio.pages import compare, layout, mission, mission_form, runs, runs_jobs
 from microrad.studio.pages.sliders import SliderPage
+from studio_pages import buttons, here, texts
 from waiting import until
 
 LEO, GEO = "terminals.leo_aperture", "terminals.geo_aperture"
@@ -306,9 +312,6 @@ def test_a_study_of_a_file_that_another_program_has_changed_is_not_run(session, 
 def test_a_campaign_that_was_cancelled_goes_on_and_one_that_is_done_gets_its_report(session, monkeypatch):
     asked = []
 
-    async def here(page, work, *args):
-        return work(*args)
-
     async def clicked():
         with client:
             for job, click in ((stopped, "_go_on"), (done, "_write_page")):
@@ -349,3 +352,441 @@ def test_nothing_is_saved_through_a_link_that_has_come_in_the_files_place(sessio
     assert not outside.exists() if content is None else outside.read_text("utf-8") == content
     session.save("other.toml")
     assert '"6 cm"' in session.inside("other.toml").read_text("utf-8")
+
+
+# ------------------------------------------------------------------------------------------------------ the form's rows
+@pytest.fixture
+def tab():
+    """A page that elements are put on."""
+    client = Client(at("/"), request=None)
+    with client:
+        yield client
+    client.delete()
+
+
+def test_keys_are_counted_to_their_outermost_tables_with_their_faults(session):
+    assert [mission_form.table_of(key) for key in ("name", "a.b", "a.b.c")] == ["general", "a", "a"]
+    draft = session.draft.with_text('name = "x"\n[terminals]\nleo_aperture = 5\n[empty]\n[later]\nx = 1\n')
+    found = mission_form.tables(draft)
+    assert list(found)[:3] == ["general", "terminals", "later"]
+    assert found["terminals"] >= 1 and found["later"] == 1
+    assert sum(found.values()) == len(draft.problems)
+    assert mission_form.tables(session.draft) == dict.fromkeys(mission_form.tables(session.draft), 0)
+
+
+@pytest.mark.parametrize(
+    ("nearest", "words"), [("", "is unknown; expected: a key"), ("b", "is unknown; did you mean b? expected: a key")]
+)
+def test_a_fault_names_the_key_that_it_resembles(nearest, words):
+    assert mission_form.fault_words(Fault("a", "1", 3, "is unknown", "a key", nearest)) == words
+
+
+def test_a_key_is_looked_for_in_name_value_and_comment_and_none_may_have_the_text(opened):
+    page = opened()
+    for sought, keys in ((" LEO_Aperture ", [LEO]), ("paper: table 2", None), ("5 cm", None), ("nowhere", [])):
+        with page.section:
+            page.form.show("terminals", sought)
+        assert page.form.sought == sought.strip().lower()
+        assert LEO in page.form._rows if keys is None else list(page.form._rows) == keys
+        assert ("No key has this text." in texts(page.form._place)) == (keys == [])
+        assert "Another key" not in [each.props.get("label") for each in page.form._place.descendants()]
+    with page.section:
+        page.form.show("no_table")
+    assert texts(page.form._place) == ["This table has no keys of its own."]
+    with page.section:
+        page.form.show("orbit")
+    assert [text for text in texts(page.form._place) if text.startswith("[")][:2] == ["[orbit]", "[orbit.leo]"]
+    with page.section:
+        page.form.show("general")
+    assert "General" in texts(page.form._place)
+
+
+def test_a_row_that_does_not_match_any_more_stays_while_its_key_is_typed(session, opened):
+    page = opened()
+    with page.section:
+        page.form.show("terminals", "5 cm")
+        before = dict(page.form._rows)
+        assert {LEO, GEO} <= set(before)
+        page.form._typed(LEO, "6 cm")
+    assert session.draft.values[LEO].typed == "6 cm"
+    assert page.form._rows == before
+    with page.section:
+        page.form._typed(GEO, "6 cm")
+        page.form.show("terminals", "6 cm")
+        page.form._typed(LEO, "66 cm")
+        session.set("beacon.divergence", "6 cm")
+        page.form.refresh()
+    assert "beacon.divergence" in page.form._rows  # one that has come to match gets a row
+
+
+def test_a_row_takes_over_what_another_tab_sets_but_not_where_it_is_typed_in(session, opened):
+    page = opened()
+    session.set(LEO, "6 cm")
+    page.form.refresh(LEO)
+    assert (field(page, LEO), page.form._rows[LEO].typed) == ("5 cm", "5 cm")
+    page.form.refresh()
+    assert (field(page, LEO), page.form._rows[LEO].typed) == ("6 cm", "6 cm")
+
+
+@pytest.mark.parametrize(
+    ("key", "given", "typed"),
+    [
+        ("orbit.leo.limits.in_eclipse", False, "false"),
+        (LEO, None, ""),
+        (LEO, "", ""),
+        (LEO, 5, "5"),
+        (LEO, "5 cm", "5 cm"),
+    ],
+)
+def test_what_a_field_gives_is_set_as_it_is_typed(session, opened, key, given, typed):
+    page, revision = opened(), session.revision
+    with page.section:
+        page.form.show(mission_form.table_of(key))
+        page.form._typed("no.key", "1")
+        page.form._typed(key, given)
+    assert session.draft.values[key].typed == typed
+    assert (session.revision != revision) == (typed != "5 cm")
+
+
+def test_what_cannot_be_set_stands_in_its_row(session, opened, monkeypatch):
+    def refuse(key, typed):
+        raise OSError("the disk is full")
+
+    page = opened()
+    monkeypatch.setattr(session, "set", refuse)
+    page.form._typed(LEO, "6 cm")
+    row = page.form._rows[LEO]
+    assert (row.said, row.note.text, "error" in row.field.props) == ("the disk is full",) * 2 + (True,)
+    assert "wrong" in row.note.classes
+    page.form.judge()
+    assert "error" not in row.field.props and "wrong" not in row.note.classes
+    assert row.note.text.endswith("paper: Table 2")
+
+
+def test_a_line_is_removed_and_one_that_is_there_no_more_is_refused(session, opened, told):
+    page = opened()
+    with page.section:
+        page.form._drop(LEO)
+        assert LEO not in session.draft.values and LEO not in page.form._rows
+        assert "\nleo_aperture = " not in page.editor.value
+        page.form._drop(LEO)
+    assert len(told) == 1 and told[0].startswith(f"{LEO} has no line of its own")
+
+
+def test_a_key_is_added_with_an_example_or_with_a_text_to_be_given(session, opened, told):
+    page, key = opened(), key_of("terminals.leo_obscuration")
+    with page.section:
+        page.form._add(None)
+        assert not session.draft.changed
+        page.form._add(key)
+        assert session.draft.values[key.key].typed == key.example != ""
+        assert key.key in page.form._rows and "leo_obscuration" in page.editor.value
+        session.edit(lambda draft: draft.without("name"))
+        page.form._add(key_of("name"))
+        assert session.draft.values["name"].typed == "to be given"
+        page.form._add(key_of("fine_pointing.wheels.speed"))
+    assert len(told) == 1 and "fine_pointing.wheels" in told[0]
+
+
+def test_keys_that_a_table_needs_are_offered_as_such(session, opened):
+    page = opened()
+    with page.section:
+        page.form._drop(LEO)
+    (choice,) = (each for each in page.form._place.descendants() if each.props.get("label") == "Another key")
+    assert choice.options[LEO] == f"{LEO} (needed)"
+    assert choice.options["terminals.leo_obscuration"] == "terminals.leo_obscuration"
+    assert all(name.startswith("terminals.") for name in choice.options)
+    choice.value = LEO
+    assert mission_form._about(key_of(LEO)) in texts(page.form._place)
+
+
+@pytest.mark.parametrize(
+    ("key", "typed", "options"),
+    [
+        ("conventions.strehl", "ratio", ["decibel", "ratio", "unused"]),
+        ("conventions.strehl", "odd", ["decibel", "ratio", "unused", "odd"]),
+        ("orbit.leo.limits.in_eclipse", "true", ["true", "false"]),
+        ("orbit.leo.limits.in_eclipse", "perhaps", None),
+        (LEO, "6 cm", None),
+        ("more.unknown", "1", None),
+    ],
+)
+def test_a_choice_has_its_options_and_a_text_has_a_line(session, tab, key, typed, options):
+    draft = session.draft.with_text(TEXT + "[more]\nunknown = 1\n").set(key, typed)
+    found = mission_form._field(draft.values[key])
+    assert found.value == typed
+    assert getattr(found, "options", None) == options
+    other = draft.set(key, "zzz").values[key]
+    mission_form._put(found, other)
+    assert found.value == "zzz"
+    assert getattr(found, "options", None) == (None if options is None else [*options, "zzz"])
+    mission_form._put(found, other)
+    assert getattr(found, "options", None) == (None if options is None else [*options, "zzz"])
+
+
+def test_a_key_is_explained_by_what_it_is_and_takes(session):
+    choice, quantity = key_of("conventions.strehl"), key_of("control.delay")
+    assert mission_form._about(choice) == (choice.description or choice.wanted)
+    assert mission_form._about(quantity) == "from sampling to the changed output; a time with its unit, at least 0 s"
+    bare = SimpleNamespace(kind="choice", description="", wanted='"a" or "b"')
+    assert mission_form._about(bare) == '"a" or "b"'
+    assert mission_form._about(SimpleNamespace(kind="text", description="", wanted="text")) == "text"
+    values = session.draft.with_text(TEXT + "[more]\nunknown = 1\n").values
+    assert mission_form._explained(values["more.unknown"]) == "a key that no mission has"
+    assert mission_form._explained(values[LEO]) == f"{mission_form._about(key_of(LEO))}\n{values[LEO].source}"
+
+
+# ------------------------------------------------------------------------------------------------------- list and text
+def chosen(page):
+    return [name for name, (button, _) in page.entries.items() if "aria-current" in button.props]
+
+
+def test_the_table_that_is_shown_is_marked_unless_a_key_is_looked_for(opened):
+    page = opened()
+    with page.section:
+        page._show("beacon")
+        assert chosen(page) == ["beacon"]
+        page._search(SimpleNamespace(value=" Divergence"))
+        assert (chosen(page), page.form.sought, page.form.table) == ([], "divergence", "beacon")
+        assert "beacon.divergence" in page.form._rows
+        rows = page.form._rows
+        page._search(SimpleNamespace(value="DIVERGENCE "))
+        assert page.form._rows is rows  # nothing is new
+        page._search(SimpleNamespace(value=None))
+        assert (chosen(page), page.form.sought) == (["beacon"], "")
+
+
+def test_the_text_is_scrolled_to_the_key_or_the_line_that_is_gone_to(session, opened, monkeypatch):
+    page, lines = opened(), []
+    monkeypatch.setattr(page.editor, "reveal_line", lines.append)
+    page._reveal("no.key")
+    page._reveal(LEO)
+    assert lines == [session.draft.values[LEO].line]
+    with page.section:
+        page._go("beacon.divergence", 0)
+        assert page.form.table == "beacon"
+        first = next(value.line for key, value in session.draft.values.items() if key.startswith("beacon."))
+        assert lines[1:] == [first]
+        page._go("beacon.divergence", 7)
+        assert lines[2:] == [first, 7]
+        page._go("beacon", 0)
+        assert page.form.table == "beacon"
+        page._go("name", 0)
+    assert page.form.table == "general"
+
+
+def test_a_table_that_the_text_has_no_more_is_not_shown_any_longer(opened):
+    page = opened()
+    assert page.form.table == "terminals"
+    edited(page, 'name = "x"\n[beacon]\ndivergence = "1 urad"\n')
+    assert page.form.table == "general"
+    with page.section:
+        page.form.show("beacon")
+    edited(page, 'name = "y"\n[beacon]\ndivergence = "1 urad"\n')
+    assert page.form.table == "beacon"
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 50, 51])
+def test_faults_are_counted_and_no_more_are_told_than_are_left_out(session, opened, count):
+    session.change(session.draft.with_text(TEXT + "".join(f"k{n} = 1\n" for n in range(count))))
+    found = texts(opened().faults)
+    words = {0: "No faults.", 1: "1 fault to correct"}.get(count, f"{count} faults to correct")
+    assert found[0] == words
+    assert sum(text.startswith("line ") for text in found) == min(count, 50)
+    assert [text for text in found if text.startswith("and ")] == (["and 1 more"] if count == 51 else [])
+
+
+# ---------------------------------------------------------------------------------------------------------------- files
+def test_a_mission_goes_back_to_its_file_where_that_is_there_and_differs(session, tab):
+    def back():
+        with ui.row() as place:
+            mission.file_buttons(session, lambda table: None)
+        return buttons(place)["Back to the saved file"].enabled
+
+    assert not back()
+    session.set(LEO, "6 cm")
+    assert back()
+    session.reopen()
+    session.draft.path.write_text(TEXT.replace('"5 cm"', '"7 cm"'), "utf-8")
+    assert back()
+    session.draft.path.unlink()
+    assert not back()
+    session.set(LEO, "6 cm")
+    assert not back()
+
+
+@pytest.fixture
+def dialogs(monkeypatch, tab):
+    """Dialogs that are opened: title, verb, what is done, what stands in them."""
+    found = []
+
+    @contextmanager
+    def dialog(title, verb, do):
+        with ui.column() as place:
+            yield do
+        found.append(SimpleNamespace(title=title, verb=verb, do=do, place=place))
+
+    monkeypatch.setattr(mission, "_dialog", dialog)
+    return found
+
+
+def select(dialog):
+    return next(each for each in dialog.place.descendants() if isinstance(each, ui.select))
+
+
+def test_a_new_mission_begins_from_the_shipped_one_or_from_a_preset_under_a_free_name(session, dialogs):
+    shown = []
+    mission._new(session, shown.append)
+    (dialog,) = dialogs
+    choice = select(dialog)
+    assert (dialog.title, dialog.verb, choice.value) == ("Begin a new mission", "Begin", "shipped mission")
+    assert choice.options["shipped mission"] == "the shipped mission, with mirror, loop and orbit"
+    assert texts(dialog.place) == []  # nothing is lost
+    dialog.do()
+    assert (session.draft.path.name, session.draft.text) == ("leo-geo-2.toml", Draft.shipped("").text)
+    choice.value = "tbird"
+    dialog.do()
+    assert (session.draft.path.name, session.draft.text) == ("tbird.toml", preset_text("tbird"))
+    assert shown == ["", ""]
+
+
+def test_what_will_be_lost_is_said_before_another_mission_is_opened(session, dialogs):
+    session.set(LEO, "6 cm")
+    mission._open(session, lambda table: None)
+    mission._new(session, lambda table: None)
+    assert [texts(each.place) for each in dialogs] == [["Changes that are not saved will be lost."]] * 2
+    assert select(dialogs[0]).options == ["leo-geo.toml"]
+    dialogs[0].do()
+    assert session.draft.text == TEXT
+
+
+def test_an_added_table_is_shown(session, dialogs):
+    shown = []
+    mission._add_table(session, shown.append)
+    select(dialogs[0]).value = "[channel]"
+    dialogs[0].do()
+    assert shown == ["[channel]"]
+    assert "[channel]" in session.draft.text
+
+
+def test_going_back_says_whether_changes_are_lost(session, dialogs):
+    shown = []
+    mission._revert(session, shown.append)
+    session.set(LEO, "6 cm")
+    mission._revert(session, shown.append)
+    assert [(each.title, each.verb) for each in dialogs] == [
+        ("Open leo-geo.toml again as it is on disk now?", "Open again"),
+        ("Open leo-geo.toml again and lose the changes?", "Lose the changes"),
+    ]
+    dialogs[1].do()
+    assert (session.draft.text, shown) == (TEXT, [""])
+
+
+@pytest.mark.parametrize(("typed", "name"), [("b", "b.toml"), ("b.toml", "b.toml"), ("b.txt", "b.txt.toml")])
+def test_a_mission_is_saved_under_a_name_with_its_ending(session, dialogs, typed, name):
+    shown = []
+    mission._save_as(session, shown.append)
+    (given,) = (each for each in dialogs[0].place.descendants() if isinstance(each, ui.input))
+    assert given.value == "leo-geo.toml"
+    for wrong, words in (
+        ("../b", "its name holds a path; choose another name"),
+        ("", "it has no name"),
+        (None, "no na"),
+    ):
+        given.value = wrong
+        with pytest.raises(ValueError, match=words):
+            dialogs[0].do()
+    assert shown == []
+    given.value = typed
+    dialogs[0].do()
+    assert (session.draft.path, shown) == (session.folder / name, [""])
+    assert session.draft.path.read_text("utf-8") == TEXT
+
+
+def test_a_dialog_says_why_it_cannot_and_closes_once_it_can(tab):
+    left = [ValueError("no"), OSError("full"), None]
+
+    def do():
+        error = left.pop(0)
+        if error is not None:
+            raise error
+
+    with mission._dialog("Title", "Do it", do) as go:
+        (dialog,) = (each for each in tab.layout.client.elements.values() if isinstance(each, ui.dialog))
+    said = []
+    for _ in range(3):
+        go()
+        said.append(([text for text in texts(dialog) if text in ("no", "full")], dialog.value))
+    assert said == [(["no"], True), (["full"], True), ([], False)]
+    assert {"Title", "Do it", "Cancel"} <= set(texts(dialog))
+
+
+# ----------------------------------------------------------------------------------------------- the frame of each page
+@pytest.mark.parametrize(
+    ("changed", "faults", "disk", "words"),
+    [
+        (False, 0, "", "saved"),
+        (True, 0, "", "not saved"),
+        (False, 1, "", "saved, 1 fault to correct"),
+        (True, 2, "", "not saved, 2 faults to correct"),
+        (False, 0, "changed", "changed on disk; open it again"),
+        (True, 0, "changed", "not saved, changed on disk; open it again"),
+        (False, 0, "gone", "not saved, gone from disk"),
+    ],
+)
+def test_the_frame_says_whether_the_mission_is_saved(changed, faults, disk, words):
+    assert layout._words(SimpleNamespace(changed=changed, problems=[0] * faults), disk) == words
+
+
+def test_a_mission_can_be_saved_where_it_differs_from_its_file(session, tab):
+    def save():
+        with ui.row() as place:
+            layout._state(session)
+        return buttons(place)["Save"].enabled
+
+    assert not save()
+    session.set(LEO, "6 cm")
+    assert save()
+    session.save()
+    assert not save()
+    session.draft.path.unlink()
+    assert save()
+
+
+def test_a_command_of_a_mission_that_is_not_saved_is_copied_with_a_warning(session, monkeypatch):
+    said = []
+    monkeypatch.setattr(layout.ui, "notify", lambda words, **how: said.append((words, how["type"])))
+    assert layout.file_of(session) == Path("leo-geo.toml")
+    assert said == []
+    session.set(LEO, "6 cm")
+    assert layout.file_of(session) == Path("leo-geo.toml")
+    assert said == [("The command reads the file: save the mission first, for the same numbers.", "warning")]
+
+
+@pytest.mark.parametrize("python", [False, True])
+@pytest.mark.parametrize("refused", ["", "not allowed"])
+def test_what_is_copied_is_said_once_the_browser_has_done_it(monkeypatch, python, refused):
+    said, sent, action = [], [], commands.budget(Path("m.toml"))
+
+    async def run(code, timeout):
+        sent.append(code)
+        return refused
+
+    monkeypatch.setattr(layout.ui, "notify", lambda words, **how: said.append((words, how["type"])))
+    monkeypatch.setattr(layout.ui, "run_javascript", run)
+    asyncio.run(layout._copy(None, python))
+    assert said == sent == []
+    asyncio.run(layout._copy(action, python))
+    text = action.python if python else action.command
+    first = f"Copied: {text.splitlines()[0]}{' ...' if python else ''}"
+    assert said == [(f"Not copied, not allowed: {text}", "negative") if refused else (first, "positive")]
+
+
+def test_a_refusal_is_shown_and_nothing_done_is_told_from_done(monkeypatch, session):
+    said = []
+    monkeypatch.setattr(layout, "refuse", said.append)
+    assert layout.attempt(lambda: None) and layout.save_draft(session)
+    assert not layout.attempt(lambda: session.inside("../x"))
+    monkeypatch.setattr(session, "save", lambda: Path("/nowhere/x").read_text())
+    assert not layout.save_draft(session)
+    assert len(said) == 2 and "is outside of" in said[0] and "No such file" in said[1]

@@ -7,6 +7,7 @@ import stat
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -296,6 +297,25 @@ def test_without_the_key_jobs_that_were_queued_before_are_shown_as_unreadable(ow
     assert (later.state, before.state, started) == ("done", "unreadable", [later.folder])
 
 
+def test_a_key_that_another_process_is_just_writing_is_waited_for(own_key, monkeypatch):
+    code, whole = signing.code(b"text"), own_key.read_bytes()
+    own_key.write_bytes(whole[:-1])
+    monkeypatch.setattr(signing.time, "sleep", lambda s: own_key.write_bytes(whole))
+    assert signing.is_ours(b"text", code)
+    monkeypatch.setattr(signing, "_PATIENCE_S", -1.0)
+    for wrong in (whole[:-1], whole + b"0"):
+        own_key.write_bytes(wrong)
+        with pytest.raises(signing.SigningError, match="is damaged; remove it"):
+            signing.is_ours(b"text", code)
+
+
+def test_a_key_that_is_removed_as_it_is_made_is_told(own_key, monkeypatch):
+    monkeypatch.setattr(signing, "_key", lambda: None)
+    with pytest.raises(signing.SigningError, match=r"studio-key was removed at once; try again$"):
+        signing.code(b"text")
+    assert not signing.is_ours(b"text", signing._code(b"", b"text"))
+
+
 def test_a_place_that_cannot_take_the_key_is_told(own_key, tmp_path):
     own_key.parent.parent.write_text("a file", "utf-8")
     with pytest.raises(signing.SigningError, match=r"cannot be made: .*; give XDG_STATE_HOME a folder"):
@@ -345,6 +365,12 @@ def test_a_relative_state_home_is_ignored(monkeypatch):
     assert signing.key_file() == Path.home() / ".local" / "state" / "microrad" / "studio-key"
     monkeypatch.setenv("XDG_STATE_HOME", "/there")
     assert signing.key_file() == Path("/there/microrad/studio-key")
+
+
+@pytest.mark.parametrize("environment", [{}, {"LOCALAPPDATA": ""}])
+def test_windows_keeps_the_key_below_the_home_where_no_other_place_is_named(monkeypatch, environment):
+    monkeypatch.setattr(signing, "os", SimpleNamespace(name="nt", environ=environment))
+    assert signing._state_folder() == Path.home() / "AppData" / "Local"
 
 
 def test_a_user_without_a_home_is_told(monkeypatch, jobs, tmp_path):

@@ -7,6 +7,7 @@ import tomllib
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -101,6 +102,28 @@ def test_an_example_above_keys_of_another_table_goes_to_the_end(draft):
     assert tomllib.loads(got.text)["channel"]["elevation"] == "30 deg"
 
 
+@pytest.mark.parametrize("end", ["", "\n", "\n\n[beacon]\n"])
+def test_an_example_at_the_very_end_of_a_text_comes_to_life_there(draft, end):
+    got = with_table(draft.with_text(f'# [channel]\n# elevation = "30 deg"{end}'), "channel")
+    assert got.text == f'[channel]\nelevation = "30 deg"{end}'
+
+
+@pytest.mark.parametrize(
+    "text", ["# [channel]\n\n# elevation = 1\n", "# [no_table]\n# x = 1\n", "# [channel] of air\n# elevation = 1\n"]
+)
+def test_a_comment_that_is_no_example_stays_one(draft, text):
+    """A header without keys below it, a table that no mission has, words about a table."""
+    found = draft.with_text(text)
+    assert "no_table" not in offered(found)
+    assert with_table(found, "channel").text.startswith(text.rstrip() + "\n\n")
+
+
+def test_an_inner_table_is_offered_where_another_inner_one_of_its_table_is_there(draft):
+    for header, there in (("[fine_pointing.body]", True), ("[fine_pointing]", True), ("[fine_pointings]", False)):
+        assert ("fine_pointing.wheels" in offered(draft.with_text(f"{header}\n"))) == there
+    assert "fine_pointing.body" not in offered(draft.with_text("[fine_pointing.body.inner]\n"))
+
+
 # --------------------------------------------------------------------------------------------------------------- runs
 def test_a_name_that_nothing_has_yet(session):
     assert runs_view.free_name(session, "found") == "found"
@@ -117,6 +140,42 @@ def test_a_name_that_a_waiting_job_will_take_is_taken(session, monkeypatch):
     assert runs_view.free_name(session, "found") == "found-2"
     monkeypatch.setattr(type(session.jobs), "listed", lambda self: (replace(job, state="cancelled"),))
     assert runs_view.free_name(session, "found") == "found"
+
+
+def test_a_result_without_a_name_takes_none(session, monkeypatch):
+    job = Job(1, session.folder, "running", results=("", "x/y.html"))
+    monkeypatch.setattr(type(session.jobs), "listed", lambda self: (job,))
+    assert (runs_view.free_name(session, "x"), runs_view.free_name(session, "y")) == ("x-2", "y")
+
+
+def test_a_campaign_file_may_be_as_large_as_any_that_is_read(session, monkeypatch):
+    text = 'mission = "leo-geo.toml"\n'
+    (session.folder / "c.toml").write_text(text, "utf-8")
+    monkeypatch.setattr(runs_view, "MAX_BYTES", len(text) - 1)
+    assert runs_view.campaign_files(session) == ()
+    monkeypatch.setattr(runs_view, "MAX_BYTES", len(text))
+    assert runs_view.campaign_files(session) == ("c.toml",)
+
+
+@pytest.mark.parametrize(
+    ("text", "names"),
+    [
+        ("mission = 'm.toml'", True),
+        ("mission = 3", False),
+        ("[a]\nmission = 'm'", False),
+        ("x = 1\r\nmission = 'm'", True),
+    ],
+)
+def test_a_campaign_file_names_a_mission_in_quotes_at_its_root(session, text, names):
+    (session.folder / "c.toml").write_bytes(text.encode())
+    assert ("c.toml" in runs_view.campaign_files(session)) == names
+
+
+def test_ledgers_are_files_in_the_order_of_their_names(session):
+    (session.folder / "folder.ledger").mkdir()
+    for name in ("b.ledger", "a.ledger", "x.ledger-wal"):
+        (session.folder / name).touch()
+    assert runs_view.ledgers(session) == ("a.ledger", "b.ledger")
 
 
 def test_campaign_files_are_told_from_missions(session):
@@ -166,6 +225,19 @@ def test_progress_in_words():
     assert runs_view.progress_words(Progress(3, 12, "rows", 0.5)) == "25 %, 3 of 12 rows; 0.5 a second, 18 s left"
 
 
+@pytest.mark.parametrize(
+    ("share", "words"),
+    [(0.0, "0 %"), (0.001, "0.1 %"), (0.0994, "9.9 %"), (0.1, "10 %"), (0.104, "10 %"), (1.0, "100 %")],
+)
+def test_a_small_share_has_a_decimal(share, words):
+    assert runs_view._percent(share) == words
+
+
+@pytest.mark.parametrize(("rate", "words"), [(None, "50 %, 2 of 4 rows"), (0.0, "50 %, 2 of 4 rows")])
+def test_without_a_rate_nobody_knows_how_long_it_takes(rate, words):
+    assert runs_view.progress_words(Progress(2, 4, "rows", rate)) == words
+
+
 def test_the_state_of_a_job_in_words(tmp_path):
     job = Job(1, tmp_path, "done", "study", code=1)
     assert runs_view.state_words(job) == "done: not every requirement is met"
@@ -186,6 +258,11 @@ def test_the_times_of_a_job_in_words(tmp_path):
     assert runs_view.time_words(job) == "started 2026-03-20 12:01:00 UTC, 2.08 min"
     now = datetime(2026, 3, 20, 12, 1, 30, tzinfo=UTC)
     assert runs_view.time_words(replace(job, ended=""), lambda: now).endswith(", 30 s")
+    assert runs_view.time_words(replace(job, ended="odd"), lambda: now).endswith(", 30 s")
+    assert runs_view.time_words(replace(job, started="odd")) == "started "
+    assert runs_view.time_words(replace(job, ended="2026-03-20T12:00:59Z")).endswith(", 0 s")  # a clock was set
+    assert runs_view.time_words(replace(job, ended="")).startswith("started 2026-03-20 12:01:00 UTC, ")
+    assert runs_view.time_words(replace(job, started="", queued="odd")) == "put in the queue "
 
 
 def test_a_campaigns_own_pace_does_not_stand_beside_that_of_the_job():
@@ -248,6 +325,14 @@ def test_the_ledger_of_a_campaign_lies_in_the_folder(session, tmp_path_factory):
     assert runs_view.ledger_path(session, Job(1, folder, "done", "study", results=("x.ledger",))) is None
 
 
+def test_the_ledger_is_the_result_of_a_campaign_that_ends_like_one(session):
+    job = Job(1, session.folder, "done", "campaign", cwd=session.folder, results=("x.html", "x.ledger"))
+    assert runs_view.ledger_of(job) == "x.ledger"
+    assert runs_view.ledger_of(replace(job, results=("x.html",))) is None
+    assert runs_view.ledger_of(replace(job, kind="study")) is None
+    assert runs_view.ledger_path(session, replace(job, results=())) is None
+
+
 def test_a_ledger_that_is_named_like_an_option_is_none():
     action = commands.campaign_report(Path("-x.ledger"), Path("--help"))
     assert action.arguments == ("campaign", "report", "./-x.ledger", "./--help", "--overwrite")
@@ -298,6 +383,95 @@ def test_a_table_of_one_mission_alone_is_one_difference(draft):
     assert found == ("[channel]", "not given", "2 keys")
     (found,) = compare_view.differences(there, draft)
     assert found[1:] == ("2 keys", "not given")
+
+
+def test_a_key_of_one_mission_alone_is_not_given_in_the_other(draft):
+    fewer = draft.without("terminals.leo_aperture").without("name")
+    for here, there, order in ((draft, fewer, 1), (fewer, draft, -1)):
+        found = {row[0]: row[1:][::order] for row in compare_view.differences(here, there)}
+        assert {*found} == {"name", "terminals.leo_aperture"}
+        assert found["terminals.leo_aperture"] == ("5 cm\npaper: Table 2", "not given")
+        assert found["name"][1] == "not given"
+
+
+@pytest.mark.parametrize(
+    ("here", "there", "same"),
+    [
+        ("1", "1.0", True),
+        ("1", "2", False),
+        ("1", "true", False),
+        ("'a'", '"a"', True),
+        ("'1'", "1", False),
+        ("[1, 2]", "[1,2]", True),
+        ("not toml", "not toml", True),
+        ("not toml", "nor this", False),
+    ],
+)
+def test_a_value_of_a_key_that_nobody_knows_differs_by_what_toml_makes_of_it(draft, here, there, same):
+    ours, theirs = (draft.with_text(f"unknown = {each}\n") for each in (here, there))
+    assert (compare_view.differences(ours, theirs) == []) == same
+
+
+def test_a_quantity_that_is_none_differs_by_its_text(draft):
+    parsec, again = draft.set("terminals.leo_aperture", "5 parsec"), draft.set("terminals.leo_aperture", "6 parsec")
+    assert [row[0] for row in compare_view.differences(parsec, again)] == ["terminals.leo_aperture"]
+    assert compare_view.differences(parsec, parsec.with_text(parsec.text)) == []
+
+
+def study_of(margin_db, possible=True, **parts):
+    """What a study of the links of a mission comes to, as far as it is compared; it has the `parts`."""
+    budget = SimpleNamespace(name="Communication", margin_db=margin_db, received_power_w=1e-9)
+    beam = SimpleNamespace(name="Beacon", margin_db=0.0, received_power_w=1e-12)
+    mission = SimpleNamespace(
+        requirement=SimpleNamespace(margin_db=3.0), communication=SimpleNamespace(data_rate_bit_s=3e8)
+    )
+    outcome = SimpleNamespace(success_probability=0.9, mean_time_s=12.0)
+    built = {
+        "open_loop": SimpleNamespace(rss_rad=3e-4),
+        "finding": SimpleNamespace(wide=SimpleNamespace(outcome=outcome, possible=possible)),
+    }
+    return SimpleNamespace(
+        file=SimpleNamespace(mission=mission),
+        budgets=[budget, beam],
+        communication=budget,
+        largest_rate_bit_s=4e8,
+        **{name: built[name] if name in parts else None for name in built},
+    )
+
+
+NUMBERS = ("Communication: margin", "Communication: received power", "Beacon: margin", "Beacon: received power")
+RATES = ("Data rate", "Largest data rate with the required margin")
+POINTED = ("Open-loop pointing error, root sum square",)
+PROBABLE, MEAN = ("Acquisition by the wide beacon: probability",), ("Acquisition by the wide beacon: mean time",)
+
+
+@pytest.mark.parametrize(
+    ("parts", "possible", "more"),
+    [
+        ((), True, ()),
+        (("open_loop",), True, POINTED),
+        (("finding",), True, PROBABLE + MEAN),
+        (("finding",), False, PROBABLE),
+        (("open_loop", "finding"), True, POINTED + PROBABLE + MEAN),
+    ],
+)
+def test_a_mission_is_compared_by_what_it_has(draft, monkeypatch, parts, possible, more):
+    study = study_of(3.0, possible, **dict.fromkeys(parts))
+    monkeypatch.setattr(compare_view.link_study, "run_link_study", lambda file: study)
+    found = compare_view.link_numbers(draft)
+    assert tuple(each.name for each in found) == NUMBERS + RATES + more
+    assert found[2].text == "0.00 dB" and found[2].required == "0.00 dB"
+    shown = {each.name: (each.value, each.unit) for each in found}
+    assert [shown[name] for name in RATES] == [(3e8, "bit/s"), (4e8, "bit/s")]
+    assert shown.get(POINTED[0], (3e-4, "rad")) == (3e-4, "rad")
+    assert (shown.get(PROBABLE[0], (0.9, "")), shown.get(MEAN[0], (12.0, "s"))) == ((0.9, ""), (12.0, "s"))
+
+
+@pytest.mark.parametrize(("margin_db", "met"), [(3.0, True), (3.0 - 1e-10, True), (2.999, False), (3.1, True)])
+def test_a_margin_met_but_for_rounding_is_met(draft, monkeypatch, margin_db, met):
+    monkeypatch.setattr(compare_view.link_study, "run_link_study", lambda file: study_of(margin_db))
+    margin, _, beacon, *_ = compare_view.link_numbers(draft)
+    assert (margin.required, margin.met, beacon.met) == ("3.00 dB", met, True)
 
 
 @pytest.mark.promise("studio-12")
@@ -374,6 +548,43 @@ def test_the_study_of_exactly_this_text_is_found(session, draft):
         os.utime(session.folder / older / "manifest.json", (1e9, 1e9))
         os.utime(session.folder / latest / "manifest.json", (2e9, 2e9))
         assert compare_view.finished_study(session, draft).folder == latest
+
+
+def finished(session, draft, folder, **summary):
+    """The manifest of a finished study of the draft in a folder of the working folder."""
+    rows = [{"name": "margin", "unit": "dB", "required": 3.0, "actual": 4.0, "met": True}]
+    data = {"mission": {"sha256": draft.sha256}, "summary": {"verdict": "it closes", "requirements": rows} | summary}
+    (session.folder / folder).mkdir()
+    path = session.folder / folder / "manifest.json"
+    path.write_text(json.dumps(data), "utf-8")
+    return path
+
+
+def test_finished_studies_stand_beside_each_other(session, draft):
+    there = draft.set("terminals.leo_aperture", "6 cm").set("beacon.strehl", "0.5")
+    finished(session, draft, "first")
+    _, verdicts, differ = compare_view.blocks(session, draft, there, ("a.toml", "b.toml"))
+    verdict, none, table = verdicts.blocks
+    assert (verdict.headline, verdict.good) == ("a.toml: it closes (first)", True)
+    assert none.text == "b.toml: no study of this text is in the folder; the page Runs makes one."
+    assert table.headings == ("number", "in a.toml", "in b.toml", "change")
+    assert table.rows == [("margin", Cell("4.00 dB, required 3.00 dB", "PASS"), "none", "")]
+    assert differ.blocks[0].startswith("2 keys differ; ")
+    swapped = compare_view.blocks(session, there, draft, ("b.toml", "a.toml"))[1].blocks[2]
+    assert swapped.rows[0][1:3] == ("none", Cell("4.00 dB, required 3.00 dB", "PASS"))
+
+
+def test_only_manifests_of_a_size_that_microrad_writes_are_read_and_not_too_many(session, draft, monkeypatch):
+    size = finished(session, draft, "a").stat().st_size
+    for most, found in ((size, True), (size - 1, False)):
+        monkeypatch.setattr(compare_view, "_MOST_BYTES", most)
+        assert (compare_view.finished_study(session, draft) is not None) == found
+    monkeypatch.setattr(compare_view, "_MOST_BYTES", size)
+    (session.folder / "0").mkdir()
+    (session.folder / "0" / "manifest.json").write_text("{}", "utf-8")
+    for most, found in ((2, True), (1, False)):
+        monkeypatch.setattr(compare_view, "_MOST_FOLDERS", most)
+        assert (compare_view.finished_study(session, draft) is not None) == found
 
 
 def test_a_study_with_a_requirement_that_is_not_known_is_not_met(session, draft):

@@ -1,6 +1,8 @@
 """The studio's session, its server and its command: what is kept, what is refused, how it begins and ends."""
 
+import errno
 import json
+import logging
 import os
 import shutil
 import signal
@@ -185,6 +187,7 @@ def test_only_the_missions_of_the_folder_itself_are_listed(file):
         path = file.parent / name
         path.parent.mkdir(exist_ok=True)
         path.write_text("", "utf-8")
+    (file.parent / "folder.toml").mkdir()
     assert [path.name for path in Session(file.parent).missions()] == ["b.toml", "leo-geo.toml"]
 
 
@@ -245,6 +248,62 @@ def test_an_address_is_named_as_browsers_write_it(typed, name):
         host, port = entrance.listener.getsockname()
         assert (host, entrance.names) == ("127.0.0.1", (f"{name}:{port}",))
         assert entrance.url == f"http://{name}:{port}/?token={entrance.token}"
+
+
+@pytest.mark.parametrize(
+    ("exposed", "bound", "name"),
+    [
+        (None, "127.0.0.1", "127.0.0.1"),
+        ("localhost", "127.0.0.1", "localhost"),  # whatever the name stands for here
+        ("127.1", "127.0.0.1", "127.0.0.1"),
+        ("::1", "::1", "[::1]"),
+        ("lab.example", "lab.example", "lab.example"),
+    ],
+)
+def test_a_name_is_bound_and_told_as_browsers_write_it(monkeypatch, exposed, bound, name):
+    asked = []
+    listener = SimpleNamespace(getsockname=lambda: ("", 8123))
+    monkeypatch.setattr(server, "_bound", lambda *place: asked.append(place) or listener)
+    assert server.listen(7, exposed).names == (f"{name}:8123",)
+    assert asked == [(bound, 7)]
+
+
+@pytest.mark.parametrize(
+    ("number", "words"),
+    [
+        (
+            errno.EADDRINUSE,
+            "port 80 is in use, perhaps by another studio; give another one with --port, or leave",
+        ),
+        (errno.EACCES, "port 80 is not open to this user; give one from 1024 on with --port"),
+        (errno.EADDRNOTAVAIL, "'h' port 80 cannot be listened on: the reason; give an address of this machine"),
+    ],
+)
+def test_a_port_that_cannot_be_taken_says_what_to_do(number, words):
+    assert server._unbound("h", 80, OSError(number, "the reason")).startswith(words)
+
+
+def test_a_websocket_that_was_refused_is_no_news_for_the_terminal():
+    def record(words, *args):
+        return logging.LogRecord("x", logging.ERROR, "", 0, words, args, None)
+
+    assert not server._is_news(record("opening handshake failed: %s", "connection closed without completing handshake"))
+    assert server._is_news(record("the disk is full"))
+
+
+@pytest.mark.skipif(os.name != "posix", reason="no terminals that hang up")
+def test_a_closed_terminal_ends_the_server_unless_it_is_to_outlive_it(monkeypatch):
+    heard, before = [], [signal.SIG_DFL]
+    monkeypatch.setattr(server.signal, "getsignal", lambda number: before[0])
+    monkeypatch.setattr(server.signal, "signal", lambda *how: heard.append(how))
+    server._end_with_terminal(print)
+    before[0] = signal.SIG_IGN
+    server._end_with_terminal(print)
+    assert heard == [(signal.SIGHUP, print)]
+    before[0] = signal.SIG_DFL
+    monkeypatch.delattr(server.signal, "SIGHUP")
+    server._end_with_terminal(print)
+    assert len(heard) == 1
 
 
 def test_what_is_no_name_of_a_host_is_refused(monkeypatch):
@@ -312,6 +371,19 @@ def test_only_results_of_a_job_within_the_folder_are_shown(file, tmp_path_factor
     page = file.parent / "page.html"
     assert found == [None, page, *[None] * 5, page, None]  # none is counted from the end
     assert server.result(session, 2, 0) is None
+
+
+def test_a_page_is_shown_and_any_other_result_is_saved(file):
+    pytest.importorskip("starlette")
+    session = Session(file.parent)
+    for name in ("page.html", "data.nc"):
+        (file.parent / name).write_text("x", "utf-8")
+    written(session.jobs.folder, cwd=str(file.parent), results=("page.html", "data.nc", "gone.html"))
+    show = server._documents(session)
+    page, data, gone = (show(1, place) for place in range(3))
+    assert (gone.status_code, gone.body) == (404, b"This result is not there any more.")
+    assert page.headers["content-disposition"] == 'inline; filename="page.html"'
+    assert data.headers["content-disposition"] == 'attachment; filename="data.nc"'
 
 
 def test_a_number_that_no_job_can_have_shows_nothing(file):

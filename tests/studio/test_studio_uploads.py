@@ -7,15 +7,17 @@ import json
 import math
 import os
 import shutil
+import signal
 import stat
 import struct
 import subprocess
 import sys
 import tempfile
 import zipfile
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -24,8 +26,10 @@ from scipy.io import savemat
 from lab import test_recording_formats as formats
 from microrad.lab.live_fit import extremes
 from microrad.lab.recording import read_recording
+from microrad.studio.guard import names
 from microrad.studio.guard.names import NameRefusedError, safe_name, within
 from microrad.studio.recordings import process, reading
+from microrad.studio.recordings import uploads as recording_uploads
 from microrad.studio.recordings.reading import Columns, ReadingError, ReadingLimits, list_channels, view
 from microrad.studio.recordings.uploads import UploadError, UploadLimits, Uploads
 from waiting import HANG_S, gone, lines_of
@@ -106,6 +110,21 @@ def test_odd_names_are_refused_in_words(name, why):
 def test_names_beside_the_refused_ones_are_taken():
     for name in ("..x.csv"[2:], "x..csv", "console.csv", "com.csv", "com10.csv", "x" * 160, "µ" * 80):
         assert safe_name(name) == name
+
+
+def test_a_long_name_is_shown_by_its_first_sixty_characters():
+    assert names.shown(60 * "x") == f"'{60 * 'x'}'"
+    assert names.shown(61 * "x") == f"'{60 * 'x'}...'"
+    assert names.shown("") == "''"
+
+
+@pytest.mark.parametrize("name", ["a<b", "a:b", "a?", "a*.csv", 'a"b', "a|b", "a>b"])
+def test_windows_takes_some_characters_less(monkeypatch, name):
+    assert safe_name(name) == name or os.name == "nt"
+    monkeypatch.setattr(names, "os", SimpleNamespace(name="nt"))
+    with pytest.raises(NameRefusedError, match=r'its name holds one of < > : " \| \? \*; rename it'):
+        safe_name(name)
+    assert safe_name("a-b.csv") == "a-b.csv"
 
 
 @pytest.mark.promise("studio-22")
@@ -249,6 +268,43 @@ def test_a_full_disk_is_said(tmp_path):
     with pytest.raises(UploadError, match=r"'x.csv' could not be stored: No space left on device"):
         save(Uploads(tmp_path, LIMITS), "x.csv", b"1", OSError(28, "No space left on device"))
     assert everything(tmp_path) == []
+
+
+def test_a_fault_of_the_disk_without_a_number_is_said_in_its_own_words(tmp_path):
+    with pytest.raises(UploadError, match=r"'x.csv' could not be stored: odd$"):
+        save(Uploads(tmp_path, LIMITS), "x.csv", b"1", OSError("odd"))
+
+
+def test_blocks_are_written_once_there_are_enough_of_them(tmp_path, monkeypatch):
+    written, write = [], Uploads._write
+
+    async def noted(self, file, name, waiting):
+        written.append(bytes(waiting))
+        await write(self, file, name, waiting)
+
+    monkeypatch.setattr(recording_uploads, "_BLOCK_BYTES", 4)
+    monkeypatch.setattr(Uploads, "_write", noted)
+    found = save(Uploads(tmp_path, LIMITS), "x.csv", b"abc", b"d", b"efghi", b"j")
+    assert written == [b"abcd", b"efghi", b"j"]
+    assert (found.path.read_bytes(), found.size) == (b"abcdefghij", 10)
+    assert Uploads(tmp_path).limits == UploadLimits() == UploadLimits(200_000_000, 20, 1_000_000_000)
+
+
+@posix
+def test_only_a_folder_with_a_key_for_its_name_is_the_place_of_a_recording(tmp_path):
+    uploads = Uploads(tmp_path / "uploads", LIMITS)
+    key, (other, linked, short) = save(uploads, "x.csv", b"1").key, ("0" * 16, "1" * 16, "2" * 15)
+    (uploads.folder / other).write_bytes(b"a file")
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "elsewhere" / "y.csv").write_bytes(b"2")
+    (uploads.folder / linked).symlink_to(tmp_path / "elsewhere")
+    (uploads.folder / short).mkdir()
+    (uploads.folder / short / "z.csv").write_bytes(b"3")
+    assert [each.key for each in uploads.listed()] == [key]
+    assert uploads._total() == 1
+    (uploads.folder / key / "x.csv").rename(uploads.folder / key / ".part")
+    (uploads.folder / key / "folder").mkdir()
+    assert uploads.listed() == ()
 
 
 def test_a_disk_that_is_full_before_a_file_is_there_is_said(tmp_path):
@@ -564,6 +620,73 @@ def test_pickles_are_not_loaded(tmp_path, suffix):
     assert not trace.exists()
     np.load(path, allow_pickle=True)["arr_0"] if suffix == "npz" else np.load(path, allow_pickle=True)
     assert trace.exists()  # it would have
+
+
+@pytest.mark.parametrize(
+    ("names", "time"),
+    [(("time", "u"), 0), (("u", "t [s]"), 1), (("u", "y"), None), (("Time", "time"), 0)],
+)
+def test_the_first_channel_that_is_plainly_time_is_told(tmp_path, names, time):
+    (tmp_path / "a.csv").write_text(",".join(names) + "\n" + "1,2\n2,3\n" * 5, "utf-8")
+    request = {"limits": {"samples": 100, "channels": 9}}
+    found = process.channels(tmp_path / "a.csv", request)
+    assert ([each["name"] for each in found["channels"]], found["time"], found["rates_hz"]) == ([*names], time, [])
+    assert found["channels"][0]["samples"] is None
+    request["limits"]["channels"] = 1
+    assert len(process.channels(tmp_path / "a.csv", request)["channels"]) == 1
+
+
+def test_rates_that_a_file_states_are_told_once_each_and_only_finite_ones(monkeypatch):
+    rates = [100.0, 200.0, 100.0, math.inf, math.nan]
+    source = SimpleNamespace(
+        names=["a"] * 5,
+        units=["V"] * 5,
+        samples=lambda: [3] * 5,
+        rates=lambda which: [SimpleNamespace(rate_hz=rates[k]) for k in which],
+    )
+    monkeypatch.setattr(process, "opened", lambda path, request: source)
+    assert process.channels(Path("a"), {"limits": {"channels": 9}})["rates_hz"] == [100.0, 200.0]
+    assert process.channels(Path("a"), {"limits": {"channels": 1}})["rates_hz"] == [100.0]
+
+
+@posix
+@pytest.mark.parametrize(("allowed", "soft", "hard"), [(-1, 20, 21), (20, 20, 20), (5, 5, 5), (100, 20, 21)])
+def test_a_process_never_asks_for_more_than_the_system_lets_it(monkeypatch, allowed, soft, hard):
+    resource, asked, alarms = pytest.importorskip("resource"), {}, []
+    monkeypatch.setattr(resource, "getrlimit", lambda what: (0, allowed if what == resource.RLIMIT_CPU else -1))
+    monkeypatch.setattr(resource, "setrlimit", lambda what, bounds: asked.update({what: bounds}))
+    monkeypatch.setattr(signal, "alarm", alarms.append)
+    assert resource.RLIM_INFINITY == -1
+    process.limit({"cpu_s": 20, "memory_bytes": 1000, "wall_s": 40})
+    assert (asked[resource.RLIMIT_CPU], asked[resource.RLIMIT_AS]) == ((soft, hard), (1000, 1000))
+    assert asked[resource.RLIMIT_FSIZE] == asked[resource.RLIMIT_CORE] == (0, 0)
+    assert alarms == [45]
+
+
+def test_a_request_is_refused_where_it_is_longer_than_the_reader_takes(tmp_path, monkeypatch):
+    asked = []
+    monkeypatch.setattr(reading, "_run", lambda text, limits, name: asked.append(text) or (b'{"refused": "no"}', 0))
+    for more in (0, -1):
+        if asked:
+            monkeypatch.setattr(reading, "_MAX_REQUEST_BYTES", len(asked[0]) + more)
+        with pytest.raises(ReadingError, match="too long; give their numbers" if more else r"^no$"):
+            list_channels(tmp_path / "a.csv")
+        if more == 0:
+            monkeypatch.setattr(reading, "_MAX_REQUEST_BYTES", len(asked[0]))
+            with pytest.raises(ReadingError, match=r"^no$"):
+                list_channels(tmp_path / "a.csv")
+    said = json.loads(asked[0])
+    assert (said["task"], said["name"], said["folder"]) == ("channels", "a.csv", str(tmp_path))
+    assert said["limits"] == asdict(ReadingLimits())
+    own = ReadingLimits(points=7)
+    with pytest.raises(ReadingError, match="give their numbers"):
+        view(tmp_path / "a.csv", Columns((0,), (1,)), own)
+    monkeypatch.setattr(reading, "_MAX_REQUEST_BYTES", 10_000)
+    for limits, points in ((own, 7), (None, ReadingLimits().points)):
+        with pytest.raises(ReadingError, match=r"^no$"):
+            view(tmp_path / "a.csv", Columns((0,), (1,)), limits)
+        assert json.loads(asked[-1])["limits"]["points"] == points
+        assert json.loads(asked[-1])["columns"]["inputs"] == [0]
 
 
 # -------------------------------------------------------------------------------------------------------------- bombs

@@ -22,6 +22,7 @@ from microrad.loop.pointing_loop import ensemble, traces
 from microrad.loop.pointing_loop.loop import assemble
 from microrad.mission.file import LinkFile, load_mission
 from microrad.study.contact_run import sequence
+from microrad.study.contact_run import windows as drawn_windows
 from microrad.study.contact_run.records import STATES, Contact, ContactRun, Loss, Settings, Sight, State, Transition
 from microrad.study.contact_run.windows import MovingReference, Sampler, first_run, plan
 from scenes import scene_of
@@ -836,6 +837,29 @@ def test_settings_are_taken_up_to_their_bounds(changes, name):
         return
     with pytest.raises(ValueError, match=f"^{name} of a contact run is "):
         settings(**changes)
+
+
+def test_windows_hold_a_sample_each_and_no_more_together_than_memory_does(sampler, monkeypatch):
+    made = sampler(how=settings(windows=4, window_s=0.4))
+    period = made.loop.timing.period_s
+    samples = 4 * 0.4 / period
+    monkeypatch.setattr(drawn_windows, "MOST_SAMPLES", samples)
+    assert replace(made).settings == made.settings
+    monkeypatch.setattr(drawn_windows, "MOST_SAMPLES", samples - 1)
+    with pytest.raises(ValueError, match=r"^4 windows of 400 ms hold 8e\+03 control samples of a contact run"):
+        replace(made)
+    short = settings(window_s=0.6 * period, hold_s=0.0)
+    assert replace(made, settings=replace(short, windows=1)).settings.window_s == 0.6 * period
+    with pytest.raises(ValueError, match="less than a control period"):
+        replace(made, settings=settings(window_s=0.4 * period, hold_s=0.0))
+    assert made.windows([(1000.0, 0.4 * period), (1001.0, 0.4 * period)]) == [None, None]
+
+
+def test_where_the_mission_has_no_point_ahead_none_is_missed(sampler):
+    made = sampler()
+    none = replace(made, data=replace(made.data, shared=replace(made.data.shared, point_ahead=None)))
+    far, near = (none.margin_db(np.zeros(2), steady(42e6, 0.0, ahead)(np.zeros(2))) for ahead in (30e-6, 0.0))
+    assert_allclose(far, near, rtol=1e-12)
 
 
 @pytest.mark.parametrize(

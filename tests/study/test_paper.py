@@ -126,7 +126,11 @@ def point(**errors):
     [
         ({}, "++++-"),
         ({"inverse_peak": {15.0: 9.9e-6, 25.0: 9.9e-6}}, "+++++"),
+        ({"inverse_peak": {15.0: 10e-6, 25.0: 10e-6}}, "+++++"),
+        ({"inverse_peak": {15.0: 10.1e-6, 25.0: 9.9e-6}}, "++++-"),
         ({"pid_rms": {1.0: 0.905e-6, 15.0: 14.4e-6}}, "-+++-"),
+        ({"pid_rms": {1.0: 1.0e-6, 15.0: 14.1e-6}}, "-+++-"),
+        ({"added_rms": {1.0: 1.7e-6, 15.0: 1.7e-6}}, "+-++-"),
         ({"added_rms": {1.0: 1.8e-6, 15.0: 1.7e-6}}, "+-++-"),
         ({"pid_peak": {15.0: 22.4e-6, 25.0: 35e-6}}, "++++-"),
         ({"pid_peak": {15.0: 22.6e-6, 25.0: 35e-6}}, "++-+-"),
@@ -150,6 +154,7 @@ def test_together_names_the_largest_set():
 
 def test_the_scan_applies_to_a_linear_part_with_bouc_wen(tmp_path, mission):
     assert paper.applies(mission.mirror)
+    assert not paper.applies(mission.mirror.model_copy(update={"bouc_wen": None}))
     text = SHIPPED.read_text()
     linear = text[text.index("[mirror.linear]") : text.index("[mirror.bouc_wen]")]
     assert not paper.applies(

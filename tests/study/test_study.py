@@ -536,6 +536,53 @@ def test_a_mission_closes_with_all_three_links_under_the_judged_loop(beacon, ans
     assert study.Study.closes.fget(whole) is closes
 
 
+@pytest.mark.parametrize(
+    ("with_loop", "loop", "closed"), [(True, True, True), (True, False, False), (False, True, False)]
+)
+def test_a_budget_of_errors_has_the_loop_where_it_is_asked_for_and_there_is_one(monkeypatch, with_loop, loop, closed):
+    fine = SimpleNamespace(
+        scene=SimpleNamespace(theory="theory"), best=SimpleNamespace(design=SimpleNamespace(controller="best"))
+    )
+    judged = []
+    monkeypatch.setattr(study, "close", lambda *of: of)
+    monkeypatch.setattr(study.error_budget, "judge", lambda *of: judged.append(of) or "judged")
+    asked = SimpleNamespace(with_loop=with_loop)
+    assert study.pointing_errors(asked, fine if loop else None) == "judged"
+    assert judged == [(asked, ("theory", "best") if closed else None)]
+
+
+@pytest.mark.parametrize(
+    ("orbit", "operations", "constellation", "repeats", "found"),
+    [
+        (True, True, True, True, ("day", "contact", "plan")),
+        (True, True, True, False, ("day", "contact", None)),
+        (True, True, False, True, ("day", "contact", None)),
+        (False, True, True, True, (None, None, None)),
+        (True, False, True, True, (None, None, None)),
+    ],
+)
+def test_a_mission_delivers_what_its_orbit_operations_and_constellation_allow(
+    monkeypatch, orbit, operations, constellation, repeats, found
+):
+    mission = SimpleNamespace(
+        orbit="orbit" if orbit else None,
+        operations="operations" if operations else None,
+        constellation="relays" if constellation else None,
+        acquisition="acquisition",
+    )
+    links = SimpleNamespace(file=SimpleNamespace(mission=mission), data="data", finding="finding")
+    monkeypatch.setattr(study.orbit, "repeats", lambda *of: repeats)
+    monkeypatch.setattr(study.day_study, "run_day_study", lambda of, loss: ("day", loss))
+    monkeypatch.setattr(study.contact_run, "of_mission", lambda *of: ("contact", *of))
+    monkeypatch.setattr(study.constellation, "run_constellation", lambda file, loss: ("plan", loss))
+    day, contact, plan = study.delivered(links, "loss", "fine")
+    assert tuple(each and each[0] for each in (day, contact, plan)) == found
+    if day is not None:
+        assert day[1] == "loss"
+        assert contact[1:] == ("operations", "acquisition", "data", ("day", "loss"), "finding", "fine")
+    assert plan in (None, ("plan", "loss"))
+
+
 def test_the_margin_is_that_of_the_judged_loop_and_all_requirements_have_to_be_met():
     achieved, fine = SimpleNamespace(margin_db=1.0), SimpleNamespace(margin_db=2.0)
     assert study.Study.margin_db.fget(SimpleNamespace(achieved=achieved, fine_case=None)) == 1.0

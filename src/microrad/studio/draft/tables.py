@@ -50,7 +50,7 @@ def with_table(draft: Draft, name: str) -> Draft:
 def _has_home(name: str, there: set[str]) -> bool:
     """Whether the table belongs to none, or to one that is there: an inner table alone would only bring faults."""
     outer = name.split(".")[:-1]
-    return not outer or outer[0] in there or any(each.startswith(f"{outer[0]}.") for each in there)
+    return not outer or outer[0] in there
 
 
 def _tables(text: str) -> set[str]:

@@ -1,0 +1,1238 @@
+"""The pages beside that of the mission as the server builds them, without a browser."""
+
+import asyncio
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from microrad.mission.presets import preset_text
+from microrad.report.tables import Table
+from microrad.report.view import Drawing, Points, Soft, Verdict, View
+from microrad.studio import commands
+from microrad.studio.draft.draft import Draft
+from microrad.studio.jobs.files import Job, Progress
+from microrad.studio.jobs.queue import JobError
+from microrad.studio.recordings.reading import ChannelInfo, Listing
+from microrad.studio.recordings.reading import View as Read
+from microrad.studio.recordings.uploads import UploadLimits
+from microrad.studio.session import Session
+from microrad.studio.views import day as day_view
+from microrad.studio.views import link as link_view
+from microrad.studio.views import mirror_form
+from microrad.studio.views.campaign import Figures
+from microrad.studio.views.latest import State
+from microrad.studio.views.mirror_form import Form, Setting
+from microrad.studio.views.plots import empty
+from microrad.studio.views.runs import Others
+from microrad.studio.views.sliders import Attempt
+from shipped import SHIPPED, links_alone
+
+pytest.importorskip("nicegui", reason="the studio is not installed (nicegui)")
+
+from nicegui import ui
+from nicegui.client import Client
+from nicegui.page import page as at
+
+from microrad.studio.pages import (
+    compare,
+    control,
+    day,
+    drop,
+    elements,
+    in_thread,
+    layout,
+    link,
+    mirror,
+    mirror_job,
+    pointing,
+    runs,
+    runs_jobs,
+    sliders,
+)
+from studio_pages import here, texts
+
+LEO = "terminals.leo_aperture"
+TEXT = SHIPPED.read_text("utf-8")
+
+
+@pytest.fixture
+def session(tmp_path):
+    """The paper's mission, saved."""
+    (tmp_path / "leo-geo.toml").write_text(TEXT, "utf-8")
+    return Session(tmp_path)
+
+
+@pytest.fixture
+def tab(monkeypatch):
+    """A page that elements are put on, whose handlers wait for no thread."""
+    for module in (compare, control, day, link, mirror, mirror_job, pointing, runs, runs_jobs, sliders):
+        if hasattr(module, "in_thread"):
+            monkeypatch.setattr(module, "in_thread", here)
+        if hasattr(module, "background_tasks"):
+            monkeypatch.setattr(module, "background_tasks", SimpleNamespace(create=_left, create_lazy=_left))
+    client = Client(at("/"), request=None)
+    with client:
+        yield client
+    client.delete()
+
+
+def _left(task, **_):
+    """A task that is not begun."""
+    task.close()
+
+
+@pytest.fixture
+def told(monkeypatch):
+    """What pages refuse, in words."""
+    words = []
+    monkeypatch.setattr(layout, "refuse", words.append)
+    return words
+
+
+# -------------------------------------------------------------------------------------------------------------- compare
+@pytest.fixture
+def compared(session, tab, monkeypatch):
+    """The page of the comparison; what its tables show."""
+    monkeypatch.setattr(compare.compare_view, "blocks", lambda session, *two: two)
+    page = compare._Page(session)
+    page.seen = []
+    monkeypatch.setattr(page.told, "show_blocks", page.seen.append)
+    return page
+
+
+def test_a_mission_is_compared_with_its_file_others_and_presets(session, compared):
+    (session.folder / "b.toml").write_text(TEXT, "utf-8")
+    (session.folder / "c.toml").write_text('mission = "leo-geo.toml"', "utf-8")
+    found = compared._options()
+    assert list(found)[:2] == ["file b.toml", compare._SHIPPED]
+    assert (found["file b.toml"], found[compare._PRESET + "tbird"].partition(":")[0]) == ("b.toml", "tbird")
+    assert not {"file leo-geo.toml", "file c.toml", compare._SAVED} & set(found)
+    session.set(LEO, "6 cm")
+    assert compared._options()[compare._SAVED] == "leo-geo.toml as it is saved"
+    session.draft.path.unlink()
+    assert compare._SAVED not in compared._options()
+
+
+def test_the_other_mission_is_the_one_that_was_chosen(session, compared):
+    (session.folder / "b.toml").write_text(TEXT.replace('"5 cm"', '"7 cm"'), "utf-8")
+    session.set(LEO, "6 cm")
+    assert compared._draft(compare._SAVED).values[LEO].typed == "5 cm"
+    assert compared._draft("file b.toml").values[LEO].typed == "7 cm"
+    assert compared._draft(compare._SHIPPED).text == Draft.shipped("").text
+    assert compared._draft(compare._PRESET + "tbird").text == preset_text("tbird")
+
+
+def test_a_choice_is_taken_once_and_one_that_cannot_be_read_says_why(session, compared):
+    (session.folder / "b.toml").write_text(TEXT, "utf-8")
+    for value in (None, ""):
+        compared._chosen(SimpleNamespace(value=value))
+        assert (session.other, compared.shown) == (None, None)
+    compared._chosen(SimpleNamespace(value="file b.toml"))
+    first = session.other
+    assert (first.path.name, compared.shown, compared.fault.text) == ("b.toml", "file b.toml", "")
+    compared._chosen(SimpleNamespace(value="file b.toml"))
+    assert session.other is first
+    compared._chosen(SimpleNamespace(value="file none.toml"))
+    assert "does not exist" in compared.fault.text
+    assert session.other is first
+    compared._chosen(SimpleNamespace(value=compare._SHIPPED))
+    assert compared.fault.text == ""
+
+
+def test_the_choice_is_that_of_the_other_mission_where_it_can_be_chosen(session, compared):
+    (session.folder / "b.toml").write_text(TEXT, "utf-8")
+    assert compared._compared(compared._options()) is None
+    session.other = Draft.open(session.folder / "b.toml")
+    compared._look()
+    assert (compared.choice.value, compared.shown) == ("file b.toml", "file b.toml")
+    assert compared._name(session.other) == "b.toml"
+    (session.folder / "b.toml").unlink()
+    compared._look()
+    assert compared.choice.value is None
+    session.other = Draft.open(session.draft.path)
+    session.set(LEO, "6 cm")
+    compared._look()
+    assert (compared.choice.value, compared._name(session.other)) == (compare._SAVED, "leo-geo.toml (saved)")
+
+
+def test_a_choice_that_cannot_be_read_stays_chosen_beside_its_reason(session, compared):
+    (session.folder / "b.toml").write_bytes(b"\xff")
+    session.other = Draft.shipped(session.inside(compare._SHIPPED))
+    compared._look()
+    assert compared.choice.value == compare._SHIPPED
+    compared.choice.set_options(compared._options(), value="file b.toml")
+    assert compared.fault.text != ""
+    (session.folder / "d.toml").write_text(TEXT, "utf-8")  # there are other options now
+    compared._look()
+    assert (compared.choice.value, "file d.toml" in compared.choice.options) == ("file b.toml", True)
+
+
+def test_the_tables_are_those_of_what_was_asked_last(session, compared):
+    asyncio.run(compared._show(compared.asked))
+    assert compared.seen.pop() == [Soft("Choose the mission that this one is to be compared with.")]
+    session.other = session.draft
+    asyncio.run(compared._show(compared.asked - 1))
+    assert compared.seen == []
+    asyncio.run(compared._show(compared.asked))
+    assert compared.seen == [(session.draft, session.draft, ("leo-geo.toml", "leo-geo.toml (saved)"))]
+
+
+def test_the_budget_of_each_mission_is_copied_from_its_file(session, compared, told, monkeypatch):
+    said = []
+    monkeypatch.setattr(layout, "file_of", lambda session: said.append(1) or Path("mine.toml"))
+    assert compared._action(other=False) == commands.budget(Path("mine.toml"))
+    session.other = session.draft
+    assert compared._action(other=True) == commands.budget(Path("leo-geo.toml"))
+    assert (said, told) == ([1], [])
+    session.draft.path.unlink()
+    assert compared._action(other=False) is None
+    assert told == ["leo-geo.toml is not a file of this folder yet; save it there first."]
+
+
+# ----------------------------------------------------------------------------------------------------------------- runs
+@pytest.fixture
+def asked(session, monkeypatch):
+    """Orders that are queued; `asked.refusal` is raised in place of it."""
+    found = []
+
+    def submit(order):
+        if refusals:
+            raise refusals.pop()
+        found.append(order)
+
+    refusals = []
+    monkeypatch.setattr(session.jobs, "submit", submit)
+    return SimpleNamespace(orders=found, refusals=refusals)
+
+
+def test_a_study_is_run_into_a_free_folder_once_the_mission_is_saved(session, tab, asked, told):
+    study = runs._Study(session)
+    assert (study.button.text, study.button.enabled, study.fault.text) == ("Run the study", True, "")
+    assert study.about.text == "Everything that follows from leo-geo.toml: verdict, figures, report."
+    asyncio.run(study._name())
+    assert study.folder.value == "leo-geo-study"
+    for wrong, words in (
+        ("../x", "its name holds a path; choose another name"),
+        ("", "it has no name"),
+        (None, "no na"),
+    ):
+        study.folder.value = wrong
+        asyncio.run(study._run())
+        assert words in study.fault.text
+    assert asked.orders == []
+    study.folder.value = "leo-geo-study"
+    (session.folder / "leo-geo-study").mkdir()
+    session.set(LEO, "6 cm")
+    study._look()
+    assert study.button.text == "Save and run the study"
+    asyncio.run(study._run())
+    (order,) = asked.orders
+    assert order.arguments == commands.study(Path("leo-geo.toml"), Path("leo-geo-study")).arguments
+    assert order.kind == "study"
+    assert not session.draft.changed
+    assert (study.folder.value, study.fault.text) == ("leo-geo-study-2", "")
+    asked.refusals.append(JobError("no room"))
+    asyncio.run(study._run())
+    assert (told, study.folder.value) == (["no room"], "leo-geo-study-2")
+
+
+def test_a_study_of_a_mission_with_faults_or_that_cannot_be_saved_is_not_run(session, tab, asked, told, monkeypatch):
+    study = runs._Study(session)
+    study.folder.value = "found"
+    session.set(LEO, "5 parsec")
+    study._look()
+    assert not study.button.enabled and "parsec" in study.fault.text
+    asyncio.run(study._run())
+    session.set(LEO, "6 cm")
+
+    def full():
+        raise OSError("the disk is full")
+
+    monkeypatch.setattr(session, "save", full)
+    asyncio.run(study._run())
+    assert (asked.orders, told) == ([], ["the disk is full"])
+
+
+def test_a_folder_that_was_typed_meanwhile_stays(session, tab, monkeypatch):
+    study = runs._Study(session)
+
+    async def slow(page, work, *args):
+        study.folder.value = "mine"
+        return work(*args)
+
+    monkeypatch.setattr(runs, "in_thread", slow)
+    asyncio.run(study._name())
+    assert study.folder.value == "mine"
+
+
+def test_a_campaign_is_run_from_a_file_or_goes_on_from_its_ledger(session, tab, asked, told):
+    campaign = runs._Campaign(session)
+    asyncio.run(campaign._look())
+    assert not campaign.button.enabled
+    campaign.ledger.value = "x.ledger"
+    asyncio.run(campaign._run())
+    said = "There is no campaign file in this folder yet; write an example, and change it."
+    assert (campaign.fault.text, asked.orders) == (said, [])
+    asyncio.run(campaign._example())
+    assert (campaign.file.value, campaign.ledger.value) == ("campaign.toml", "campaign.ledger")
+    assert campaign.button.enabled and campaign.ledger.enabled and campaign.fault.text == ""
+    asyncio.run(campaign._run())
+    (session.folder / "x.ledger").touch()
+    asyncio.run(campaign._look())
+    assert campaign.file.options == ["campaign.toml", "x.ledger (go on)"]
+    assert campaign.file.value == "campaign.toml"
+    campaign.file.value = "x.ledger (go on)"
+    asyncio.run(campaign._name())
+    assert (campaign.ledger.value, campaign.ledger.enabled) == ("x.ledger", False)
+    asyncio.run(campaign._run())
+    assert [each.arguments for each in asked.orders] == [
+        commands.campaign(Path("campaign.toml"), Path("campaign.ledger")).arguments,
+        commands.resume(Path("x.ledger")).arguments,
+    ]
+    assert {each.kind for each in asked.orders} == {"campaign"}
+    (session.folder / "x.ledger").unlink()
+    (session.folder / "campaign.ledger").touch()
+    asyncio.run(campaign._look())
+    assert (campaign.file.value, campaign.ledger.value) == ("campaign.toml", "campaign-2.ledger")
+    for wrong, words in (("../x", "holds a path; choose another name"), (None, "it has no name")):
+        campaign.ledger.value = wrong
+        asyncio.run(campaign._run())
+        assert words in campaign.fault.text
+    assert len(asked.orders) == 2
+
+
+def test_an_example_that_was_written_is_chosen(session, tab):
+    (session.folder / "a.toml").write_text('mission = "leo-geo.toml"', "utf-8")
+    campaign = runs._Campaign(session)
+    asyncio.run(campaign._look())
+    assert campaign.file.value == "a.toml"
+    asyncio.run(campaign._example())
+    assert campaign.file.value == "campaign.toml"
+
+
+def test_an_example_that_cannot_be_written_says_why(session, tab):
+    campaign = runs._Campaign(session)
+    session.change(Draft.shipped(session.inside("unsaved.toml")))
+    asyncio.run(campaign._example())
+    assert campaign.fault.text.startswith("unsaved.toml is not saved yet")
+    assert campaign.file.value is None
+
+
+@pytest.mark.parametrize(
+    ("state", "code", "look"),
+    [
+        ("done", 0, "yes"),
+        ("done", 1, "no"),
+        ("failed", 2, "no"),
+        ("lost", None, "no"),
+        ("unreadable", None, "no"),
+        ("cancelled", 130, "soft"),
+        ("queued", None, "soft"),
+        ("running", None, "soft"),
+    ],
+)
+def test_the_state_of_a_job_has_a_colour(tmp_path, state, code, look):
+    assert runs_jobs._class(Job(1, tmp_path, state, code=code)) == look
+
+
+@pytest.fixture
+def cards(session, tab, monkeypatch):
+    """A list of jobs whose cards are made by hand; the first has printed something."""
+    monkeypatch.setattr(session.jobs, "output", lambda number: " said\n" if number == 1 else "")
+    return runs_jobs.JobList(session, lambda address, title: None)
+
+
+def shown(card, job, beside=Others()):  # noqa: B008
+    asyncio.run(card.show(job, beside))
+    return card
+
+
+def test_a_card_shows_what_a_job_is_and_can(session, cards):
+    job = Job(
+        1, session.folder, "queued", "study", "mine", ("run", "m.toml"), session.folder, queued="2026-03-20T12:00:00Z"
+    )
+    card = shown(runs_jobs._Card(cards, job), job)
+    assert {"1. mine", "microrad run m.toml"} <= set(texts(card.element))
+    assert (card.bar.visible, card.cancel.visible, card.drop.visible, card.details.visible) == (
+        False,
+        True,
+        False,
+        False,
+    )
+    assert card.state.text == "waiting for the job before it"
+    running = replace(job, state="running", progress=Progress(1, 4, "rows"), started="2026-03-20T12:00:00Z")
+    shown(card, running)
+    assert (card.bar.visible, card.bar.value, card.progress.text) == (True, 0.25, "25 %, 1 of 4 rows")
+    assert card.cancel.visible and not card.drop.visible and not card.fault.visible
+    shown(card, replace(running, cancelling=True))
+    assert (card.cancel.visible, card.drop.visible, card.state.text) == (False, False, "stopping ...")
+    failed = replace(running, state="failed", code=2, words="the reason")
+    shown(card, failed)
+    assert (card.cancel.visible, card.drop.visible, card.bar.visible) == (False, True, False)
+    assert (card.fault.text, card.fault.visible, card.said.text, card.details.visible) == (
+        "the reason",
+        True,
+        "said",
+        True,
+    )
+    assert "no" in card.state.classes and "soft" not in card.state.classes
+    shown(card, replace(failed, words="another"))  # it had ended before
+    assert card.details.visible
+
+
+def test_a_job_that_printed_nothing_has_nothing_unfolded(session, cards):
+    job = Job(2, session.folder, "done", "identification", "mine")
+    card = shown(runs_jobs._Card(cards, job), job)
+    assert not card.details.visible and "open" not in card.details.props
+    study = runs_jobs._Card(cards, replace(job, kind="study"))
+    assert "open" in study.details.props
+    shown(card, replace(job, title="x"))
+    assert not card.details.visible
+
+
+def test_results_of_a_job_are_shown_here_or_saved(session, cards):
+    for name in ("page.html", "x.nc"):
+        (session.folder / name).touch()
+    job = Job(1, session.folder, "done", "study", "t", (), session.folder, ("x.nc", "none.nc", "page.html"))
+    card = shown(runs_jobs._Card(cards, job), job)
+    assert texts(card.results) == ["Save x.nc", "Show page.html here", "page.html in a tab of its own"]
+    assert card.results.visible
+    links = [each.props["href"] for each in card.results.descendants() if isinstance(each, ui.link)]
+    assert links == ["/results/1/0", "/results/1/2"]
+
+
+@pytest.mark.parametrize(
+    ("state", "there", "beside", "visible", "opens"),
+    [
+        ("running", True, {"newest": True, "latest": True}, ("figures",), True),
+        ("running", False, {"newest": True, "latest": False}, ("figures",), True),
+        ("queued", False, {"newest": True, "latest": True}, (), None),
+        ("queued", True, {"newest": True, "latest": False}, ("figures",), False),
+        ("done", True, {"newest": True, "latest": True}, ("figures", "page"), True),
+        ("done", True, {"newest": True, "latest": False}, ("figures", "page"), False),
+        ("done", False, {"newest": True, "latest": True}, (), None),
+        ("cancelled", True, {"newest": True, "latest": False}, ("figures", "again"), False),
+        ("failed", True, {"newest": True, "latest": True}, ("figures", "again"), True),
+        ("lost", True, {"newest": True, "latest": True}, ("figures", "again"), True),
+        ("lost", False, {"newest": True, "latest": True}, (), None),
+        ("done", True, {}, (), None),
+    ],
+)
+def test_a_campaign_shows_its_figures_and_the_way_on(session, cards, state, there, beside, visible, opens):
+    if there:
+        (session.folder / "x.ledger").touch()
+    job = Job(2, session.folder, state, "campaign", "t", ("campaign",), session.folder, ("x.ledger",))
+    card = shown(runs_jobs._Card(cards, job), job, Others(**beside))
+    assert tuple(name for name in ("figures", "page", "again") if getattr(card, name).visible) == visible
+    assert (None if card._panel is None else card._panel.open) == opens
+    assert card.figures.text == ("Hide its figures" if opens else "Show its figures")
+    assert card.results.visible == bool(beside)
+    card._toggle()
+    assert (None if card._panel is None else card._panel.open) == (None if opens is None else not opens)
+    assert card.figures.text == ("Show its figures" if opens or opens is None else "Hide its figures")
+    if card._panel is not None:
+        card._panel.open = True
+        shown(card, replace(job, title="x"), Others())  # another job goes on with the ledger
+        assert (card._panel.open, card.figures.text) == (False, "Show its figures")
+
+
+def test_a_report_of_a_campaign_is_linked_once_it_is_written(session, cards):
+    (session.folder / "x.ledger").touch()
+    job = Job(2, session.folder, "done", "campaign", "t", ("campaign",), session.folder, ("x.ledger",))
+    card = runs_jobs._Card(cards, job)
+    report = Job(3, session.folder, "running", "export", results=("x.html",))
+    shown(card, job, Others(newest=True, report=report))
+    assert (texts(card.report), card.page.visible) == (["Its report is written by job 3: running"], False)
+    shown(card, job, Others(newest=True, report=replace(report, state="done")))
+    assert texts(card.report) == ["Show x.html here", "x.html in a tab of its own"]
+    shown(card, job, Others(newest=True))
+    assert (texts(card.report), card.page.visible) == ([], True)
+
+
+def test_a_card_without_a_job_yet_has_no_ledger_to_go_on_from(session, cards, asked):
+    job = Job(2, session.folder, "cancelled", "campaign", "t", ("campaign",), session.folder, ("x.ledger",))
+    card = runs_jobs._Card(cards, job)
+    asyncio.run(card._go_on())
+    assert asked.orders == []
+    shown(card, replace(job, kind="study"))
+    asyncio.run(card._go_on())
+    assert asked.orders == []
+    shown(card, job)
+    asyncio.run(card._go_on())
+    assert [order.arguments for order in asked.orders] == [commands.resume(Path("x.ledger")).arguments]
+
+
+def test_the_list_has_a_card_for_each_job_the_newest_first(session, cards, monkeypatch):
+    one, two = (Job(number, session.folder, "queued", "study", f"job {number}") for number in (1, 2))
+    for jobs, left in (((), []), ((one,), [1]), ((two, one), [2, 1]), ((two,), [2]), ((), [])):
+        monkeypatch.setattr(session.jobs, "listed", lambda jobs=jobs: jobs)
+        asyncio.run(cards.refresh())
+        headings = [text for text in texts(cards._place) if ". job" in text]
+        assert headings == [f"{number}. job {number}" for number in left]
+        assert cards._empty.visible == (not jobs)
+
+    async def twice():
+        async with cards._busy:
+            monkeypatch.setattr(session.jobs, "listed", lambda: (one,))
+            await asyncio.wait_for(cards.refresh(), 5.0)  # and not wait for the other one
+
+    asyncio.run(twice())
+    assert cards._cards == {}
+
+
+def found_figures(*names):
+    return Figures("Of 3 rows so far", "So far", (Soft("told"),), {name: empty(name) for name in names})
+
+
+def test_the_figures_of_a_campaign_keep_what_was_chosen(session, tab, monkeypatch):
+    panel = runs_jobs.CampaignPanel(session, session.folder / "x.ledger")
+    drawn = []
+    monkeypatch.setattr(panel._plot, "show", drawn.append)
+    assert (panel.open, panel._drawn.visible, panel._fault.visible) == (False, False, False)
+    panel._draw()
+    assert drawn == []
+    panel._show(found_figures("a"))
+    assert (panel._chosen.value, panel._chosen.visible, panel._drawn.visible) == ("a", False, True)
+    assert panel._plot.props["aria-label"] == "Distribution over the rows: a"
+    panel._show(found_figures("a", "b"))
+    panel._chosen.value = "b"
+    panel._show(found_figures("c", "b"))
+    assert (panel._chosen.value, panel._chosen.visible) == ("b", True)
+    assert panel._plot.props["aria-label"] == "Distribution over the rows: b"
+    panel._show(found_figures("c", "d"))
+    assert panel._chosen.value == "c"
+    before = len(drawn)
+    panel._show(found_figures())
+    assert (panel._chosen.value, panel._drawn.visible, len(drawn)) == (None, False, before)
+    assert (panel._rows.text, panel._headline.text) == ("Of 3 rows so far", "So far")
+    panel._clear()
+    assert (panel._rows.text, panel._headline.visible) == ("No row is in the ledger yet.", False)
+
+
+def test_a_panel_tells_the_fault_of_its_ledger(session, tab, monkeypatch):
+    panel = runs_jobs.CampaignPanel(session, session.folder / "x.ledger")
+    live = SimpleNamespace(fault="damaged")
+    looked = []
+    monkeypatch.setattr(session.campaigns, "look", lambda path: live)
+    monkeypatch.setattr(runs_jobs, "figures", lambda live: looked.append(live) or found_figures("a"))
+    asyncio.run(panel._look())
+    asyncio.run(panel._look())
+    assert (looked, panel._fault.text, panel._fault.visible) == ([live], "damaged", True)
+    live = SimpleNamespace(fault="")
+    monkeypatch.setattr(runs_jobs, "figures", lambda live: None)
+    asyncio.run(panel._look())
+    assert (panel._fault.visible, panel._rows.text) == (False, "No row is in the ledger yet.")
+
+
+# -------------------------------------------------------------------------------------------------------------- control
+class Found(SimpleNamespace):
+    """A controller, as far as the page asks it."""
+
+
+def controller(name, **more):
+    given = {"name": name, "rate_hz": 5000.0, "sensitivity": None, "loop_gain": None, "warnings": ()}
+    return Found(**(given | {"ask": lambda ask, variants: (ask, variants)} | more))
+
+
+@pytest.fixture
+def controls(session, tab, monkeypatch):
+    """The page of the controllers; `made` are what it had tuned, `drawn` the answers that it drew."""
+    made, drawn = [], []
+
+    def built(file, name):
+        made.append(name)
+        if name in refusals:
+            raise ValueError(f"{name}: no")
+        return controller(name)
+
+    refusals = set()
+    monkeypatch.setattr(control, "_controller", built)
+    monkeypatch.setattr(control, "_names", lambda table: ("baseline", "PI", "PID", "inverse"))
+    monkeypatch.setattr(control, "_blocks", lambda found: tuple(Soft(f"{k}: {v}") for k, v in found.items()))
+    monkeypatch.setattr(control.ControlPage, "_controller", lambda self, found: drawn.append(found.name))
+    monkeypatch.setattr(control.ControlPage, "_answers", lambda self, found, answers: drawn.append(answers))
+    page = control.ControlPage(session)
+    page.made, page.drawn, page.refusals = made, drawn, refusals
+    return page
+
+
+def behind(page):
+    return {name for name, plot in page.plots.items() if "behind" in plot.classes}
+
+
+def test_the_controllers_of_a_mission_are_offered_and_one_of_them_is_shown(session, controls):
+    page = controls
+    assert page.file is None
+    asyncio.run(page.tune_all())
+    asyncio.run(page.show())
+    assert page.made == []
+    asyncio.run(page.reload())
+    assert (page.name.options, page.name.value) == (["baseline", "PI", "PID", "inverse"], "PI")
+    scenario = page.file.mission.scenario
+    assert page.amplitude.value == f"{1e6 * scenario.amplitude_rad:g} urad"
+    assert page.frequency.value == f"{scenario.pid_frequencies_hz[-1]:g} Hz"
+    assert (page.made, page.drawn[0]) == (["PI"], "PI")
+    ask, variants = page.drawn[1]
+    assert (ask.step_rad, variants) == (pytest.approx(1e-4), control.control_view.SHOWN["both"])
+    assert page.found["baseline"] == "not looked at yet"
+    before = page.round
+    asyncio.run(page.reload())
+    assert (page.made, page.round) == (["PI"], before)  # nothing is new
+
+
+def test_what_was_chosen_and_typed_stays_for_another_mission(session, controls, monkeypatch):
+    page = controls
+    asyncio.run(page.reload())
+    page.filling = True  # no task for what is put in by hand
+    page.name.value, page.amplitude.value, page.variants.value = "PID", "7 urad", "with"
+    page.filling = False
+    session.set(LEO, "6 cm")
+    asyncio.run(page.reload())
+    assert (page.name.value, page.amplitude.value, page.made) == ("PID", "7 urad", ["PI", "PID"])
+    assert page.drawn[-1][1] == control.control_view.SHOWN["with"]
+    monkeypatch.setattr(control, "_names", lambda table: ("one", "two", "three"))
+    session.set(LEO, "7 cm")
+    asyncio.run(page.reload())
+    assert page.name.value == "one"  # of so few the first
+    session.set(LEO, "7 parsec")
+    asyncio.run(page.reload())
+    assert "parsec" in page.words.text
+    assert page.name.value == "one" and page.made == ["PI", "PID", "one"]
+
+
+def test_a_controller_that_cannot_be_built_says_why_in_its_row(session, controls):
+    page = controls
+    page.refusals.add("PI")
+    asyncio.run(page.reload())
+    assert page.found["PI"] == "PI: no"
+    assert page.fault.text == "PI cannot be built for this mission; the table says why."
+    assert (behind(page), page.state.text, page.drawn) == (set(page.plots), "", [])
+    page.refusals.clear()
+    asyncio.run(page.show())
+    assert (behind(page), page.fault.text, page.state.text) == (set(), "", "")
+    page.step.value = "5 V"
+    asyncio.run(page.show())
+    assert page.fault.text.startswith("step: ")
+    assert behind(page) == set(page.plots) - {"sensitivity", "gain"}
+    assert "behind" not in page.notes.classes and "behind" in page.told_step.classes
+
+
+def test_grey_plots_make_the_words_and_notes_about_them_grey(controls):
+    for plots, told, notes in ((["step"], True, False), (["gain", "step"], True, True), ([], False, False)):
+        controls._dim(plots)
+        assert behind(controls) == set(plots)
+        assert ("behind" in controls.told_sine.classes, "behind" in controls.notes.classes) == (told, notes)
+
+
+def test_all_controllers_are_tuned_one_after_the_other_until_that_is_stopped(session, controls, monkeypatch):
+    page = controls
+    asyncio.run(page.reload())
+    page.made.clear()
+    page.refusals.add("PID")
+    asyncio.run(page.tune_all())
+    assert page.made == ["baseline", "PI", "PID", "inverse"]
+    assert (page.tune.visible, page.stop.visible, page.found["PID"]) == (True, False, "PID: no")
+    assert page.found["PI"].name == "PI"
+    page.made.clear()
+
+    async def stopped(element, work, *args):
+        if page.made:
+            page.stop_all()
+        return work(*args)
+
+    monkeypatch.setattr(control, "in_thread", stopped)
+    asyncio.run(page.tune_all())
+    assert page.made == ["baseline", "PI"]
+    assert (page.tune.visible, page.stop.visible) == (True, False)
+
+
+def test_an_answer_to_an_older_question_is_not_shown(session, controls, monkeypatch):
+    page = controls
+    asyncio.run(page.reload())
+    page.drawn.clear()
+
+    async def late(element, work, *args):
+        page.question += 1
+        return work(*args)
+
+    monkeypatch.setattr(control, "in_thread", late)
+    asyncio.run(page.show())
+    assert page.drawn == []
+    monkeypatch.setattr(control, "in_thread", here)
+
+    async def later(element, work, *args):
+        if work is not control._controller:
+            page.question += 1
+        return work(*args)
+
+    monkeypatch.setattr(control, "in_thread", later)
+    asyncio.run(page.show())
+    assert page.drawn == ["PI"]
+
+
+def test_a_controller_of_the_mission_before_does_not_get_a_row(session, controls):
+    page = controls
+    asyncio.run(page.reload())
+    asyncio.run(page._tuned(object(), "baseline"))
+    assert page.found["baseline"] == "not looked at yet"
+
+
+# ------------------------------------------------------------------------------------------------------------------ day
+@pytest.fixture
+def days(session, tab, monkeypatch):
+    """The page of the day, whose questions are kept and not answered."""
+    page = day.DayPage(session)
+    page.asked = []
+    monkeypatch.setattr(page, "latest", SimpleNamespace(ask=lambda key, work: page.asked.append(key), state=State()))
+    return page
+
+
+@pytest.mark.parametrize(
+    ("state", "words", "share"),
+    [
+        ({}, "Not computed.", 0.0),
+        ({"running": True}, "Computing, links", 0.0),
+        ({"running": True, "done": 1, "total": 4, "what": "passes"}, "Computing, passes: 1 of 4", 0.25),
+        ({"error": "no orbit"}, "no orbit", 0.0),
+        ({"result": (1,)}, "The day of the mission before this.", 0.0),
+        ({"result": (1,), "now": True}, "The day of the mission as it stands.", 0.0),
+        ({"now": True}, "Not computed.", 0.0),
+    ],
+)
+def test_the_day_says_how_far_it_is_and_whose_it_is(session, days, state, words, share):
+    now = state.pop("now", False)
+    for faulty in (False, True):
+        days.faults.visible = faulty
+        days._show_progress(State(session.draft.sha256 if now else "before", **state))
+        assert (days.state.text, days.bar.value) == (words, share)
+        running, known = state.get("running", False), "result" in state
+        assert days.bar.visible == days.cancel.visible == running
+        assert days.again.visible == (not running and not known and not faulty)
+        assert ("behind" in days.results.classes) == (not (now and known))
+
+
+def test_the_day_of_a_mission_that_has_none_is_not_asked_for(session, days):
+    days.reload()
+    assert (days.asked, days.faults.visible, days.faults.text) == ([session.draft.sha256], False, "")
+    session.set(LEO, "5 parsec")
+    days.reload()
+    assert len(days.asked) == 1 and days.faults.visible and "parsec" in days.faults.text
+    session.change(session.draft.with_text(links_alone(TEXT)))
+    days.reload()
+    assert (len(days.asked), days.faults.visible) == (1, True)
+    assert days.faults.text == day_view.missing(session.link()) != ""
+    session.change(session.draft.with_text(TEXT))
+    days.reload()
+    assert (len(days.asked), days.faults.visible) == (2, False)
+
+
+# --------------------------------------------------------------------------------------------------- links and pointing
+@pytest.fixture
+def links(session, tab, monkeypatch):
+    """The page of the links, whose study is asked for by hand."""
+    monkeypatch.setattr(layout, "follow", lambda session, show: lambda: None)
+    page = link.LinkPage(session)
+    page.asked, page.put = [], []
+    page.study = SimpleNamespace(state=State(), ask=lambda key, work: page.asked.append(key))
+    monkeypatch.setattr(link, "put", lambda table, of: page.put.append(of))
+    monkeypatch.setattr(link, "_told", lambda result: ((Soft(result),), {}))
+    return page
+
+
+def test_the_budget_that_was_chosen_stays_while_the_mission_has_it(session, links, monkeypatch):
+    page = links
+    page._show_table()
+    page._tabs()
+    assert (page.put, page.which.options, page.which.value) == ([], [], None)
+    page.view_now = link_view.view(session.link())
+    page._tabs()
+    assert page.which.options == ["Communication", "Beacon", "Answer"]
+    assert (page.which.value, len(page.put)) == ("Communication", 2)
+    page.which.value = "Answer"
+    page.view_now = replace(page.view_now, budgets=page.view_now.budgets[::2])
+    page._tabs()
+    assert (page.which.options, page.which.value) == (["Communication", "Answer"], "Answer")
+    page.view_now = replace(page.view_now, budgets=page.view_now.budgets[:1])
+    page._tabs()
+    assert page.which.value == "Communication"
+    assert page.put[-1].title == page.put[0].title
+
+
+@pytest.mark.parametrize(
+    ("state", "shown", "words", "grey"),
+    [
+        ({}, "", "", True),
+        ({"running": True}, "", "Computing acquisition and what moves the margins ...", True),
+        ({"error": "no light"}, "", "no light", True),
+        ({"error": "no light"}, "x", "no light", True),
+        ({"result": "r", "key": "before"}, "before", "Of the mission before this:", True),
+        ({"result": "r", "key": "now"}, "", "", False),
+        ({"key": "now"}, "x", "Of the mission before this:", True),
+    ],
+)
+def test_what_follows_from_the_links_is_that_of_the_mission_or_says_so(session, links, state, shown, words, grey):
+    key = session.draft.sha256 if state.get("key") == "now" else state.get("key", "")
+    links.shown = session.draft.sha256 if shown == "now" else shown
+    links.study.state = State(**(state | {"key": key}))
+    asyncio.run(links._look())
+    assert (links.state.text, links.state.visible) == (words, bool(words))
+    assert ("behind" in links.told.classes) == grey
+    assert ("r" in texts(links.told)) == (state.get("result") is not None and key != shown)
+
+
+def test_the_study_of_the_links_is_asked_for_once_the_mission_rests(session, links, monkeypatch):
+    now = [100.0]
+    monkeypatch.setattr(link, "time", SimpleNamespace(monotonic=lambda: now[0]))
+    links._ask_study()
+    now[0] += link._REST_S
+    links._ask_study()
+    assert links.asked == []
+    now[0] += 0.01
+    links._ask_study()
+    assert links.asked == [session.draft.sha256]
+    links.study.state = State(session.draft.sha256)
+    links._ask_study()
+    assert len(links.asked) == 1
+    session.set(LEO, "5 parsec")
+    links._ask_study()
+    now[0] += 2.0 * link._REST_S
+    links._ask_study()
+    assert len(links.asked) == 1  # a mission with faults has none
+
+
+def test_a_budget_of_errors_that_comes_late_is_not_shown(session, tab, monkeypatch):
+    monkeypatch.setattr(layout, "follow", lambda session, show: lambda: None)
+    page = pointing.PointingPage(session)
+    view = SimpleNamespace(file=None)
+    monkeypatch.setattr(pointing, "_budget", lambda file, table: View("", [Soft(table)]))
+    page.view_now, page.state.text = object(), "Computing ..."
+    asyncio.run(page._errors(view, "late"))
+    assert (page.state.text, texts(page.budget)) == ("Computing ...", [])
+    page.view_now = view
+    asyncio.run(page._errors(view, "in time"))
+    assert (page.state.text, texts(page.budget)) == ("", ["in time"])
+
+    def refuse(file, table):
+        raise ValueError("of several axes")
+
+    monkeypatch.setattr(pointing, "_budget", refuse)
+    asyncio.run(page._errors(view, ""))
+    assert texts(page.budget) == ["of several axes"]
+
+
+# -------------------------------------------------------------------------------------------------------------- sliders
+class Board(sliders.SliderPage):
+    """A page of sliders whose view is the file itself."""
+
+    def build(self):
+        self.shows = []
+        self.label = ui.label()
+        self.dimmed = (self.label,)
+
+    async def show(self, view):
+        self.shows.append(view)
+
+    def show_rest(self, view):
+        self.shows.append("rest")
+
+
+@pytest.fixture
+def board(session, tab, monkeypatch):
+    monkeypatch.setattr(layout, "follow", lambda session, show: lambda: None)
+    monkeypatch.setattr(sliders, "pause", lambda page, seconds: asyncio.sleep(0))
+    return Board(session, link_view.sliders, lambda file: file)
+
+
+def test_a_view_is_shown_once_and_a_mission_without_one_says_why(session, board):
+    draft, wrong = session.draft, session.draft.set(LEO, "5 parsec")
+
+    def answer(*found):
+        asyncio.run(board._answer(Attempt(*found)))
+        return board._faults.text, board._faults.visible, "behind" in board.label.classes, len(board.shows)
+
+    board.board.show(link_view.sliders(draft))
+    first, visible, grey, count = answer(wrong, None)
+    assert (first, visible, grey, count) == (sliders._NONE, True, True, 0)  # the fault stands beside its slider
+    assert answer(draft, 1)[1:] == (False, False, 1)
+    assert board.shows == [1] and board.view_now == 1
+    assert answer(draft, 2)[1:] == (False, False, 1)  # of the same text
+    assert answer(draft, None, "no light")[:3] == (f"{sliders._OLD}\nno light", True, True)
+    assert answer(draft, 3)[1:] == (False, False, 2)
+    unknown = draft.with_text(draft.text + "[more]\nx = 1\n")
+    words = answer(unknown, None)[0].split("\n")
+    assert words[0] == sliders._OLD and "more" in words[1]
+    assert answer(unknown, 4)[1:] == (False, False, 3)
+
+
+def test_what_is_read_is_shown_for_the_view_that_stands(board):
+    board.view_now = view = object()
+    asyncio.run(board._rest(object()))
+    assert board.shows == []
+    asyncio.run(board._rest(view))
+    assert board.shows == ["rest"]
+
+
+def test_a_slider_that_is_let_go_where_it_was_writes_nothing(session, tab, monkeypatch):
+    tried, written = [], []
+
+    async def attempt(key, typed):
+        tried.append(typed)
+
+    async def write(key, typed):
+        written.append(typed)
+        if typed == "8 cm":
+            row._begin("9 cm")  # it is moved again meanwhile
+
+    row = sliders.SliderRow(link_view.sliders(session.draft)["Telescopes"][0], attempt, write)
+    monkeypatch.setattr(row, "run_method", lambda *sent: None)
+    asyncio.run(row._let_go("5 cm"))
+    assert (written, row.busy) == ([], False)
+    asyncio.run(row._tried("6 cm"))
+    assert (tried, row.busy, row.typed) == (["6 cm"], True, "6 cm")
+    asyncio.run(row._let_go("5 cm"))
+    assert (written, row.busy) == (["5 cm"], False)  # it was moved, and back
+    asyncio.run(row._let_go("7 cm"))
+    assert (written[-1], row.busy, row.slider.typed) == ("7 cm", False, "7 cm")
+    asyncio.run(row._let_go("8 cm"))
+    assert (row.busy, row.typed) == (True, "9 cm")
+    row.show(replace(row.slider, typed="5 cm"))
+    assert row.typed == "9 cm"  # what is being moved stays
+    row.busy = False
+    row.show(replace(row.slider, typed="5 cm"))
+    assert (row.typed, row.slider.typed) == ("5 cm", "5 cm")
+
+
+# --------------------------------------------------------------------------------------------------------------- mirror
+CHANNELS = Listing((ChannelInfo("drive [V]", "", 9), ChannelInfo("angle [mrad]", "", 9)), None, (200.0,))
+
+
+@pytest.fixture
+def bench(session, tab, monkeypatch):
+    """The page of the mirror with recordings that are read at once; `files` are what lies in the folder."""
+    monkeypatch.setattr(mirror.reading, "list_channels", lambda path: answers.get(path.name, CHANNELS))
+    monkeypatch.setattr(mirror.reading, "view", lambda path, columns: seen.append((path.name, columns)) or READ)
+    monkeypatch.setattr(mirror.mirror_view, "recording_plot", lambda view, setting: empty("loop"))
+    monkeypatch.setattr(mirror.mirror_view, "time_plot", lambda view, setting: empty("time"))
+    answers, seen, files = {}, [], {}
+    page = mirror.MirrorPage(session)
+
+    def listed():
+        return tuple(files.values())
+
+    def remove(key):
+        del files[key]
+
+    uploads = SimpleNamespace(listed=listed, get=files.__getitem__, remove=remove)
+    monkeypatch.setattr(page, "uploads", uploads)
+    page.files, page.read, page.answers = files, seen, answers
+    return page
+
+
+READ = Read(300, 100.0, ("it drifts",), (0, 1), ((0.0, 1.0),), ((0.0, 1.0),))
+
+
+def put_in(page, *names):
+    for name in names:
+        path = page.session.folder / "up" / name
+        page.files[name[0]] = SimpleNamespace(key=name[0], name=name, path=path, size=1)
+
+
+def test_a_recording_that_comes_is_shown_and_measured(bench):
+    put_in(bench, "a.csv")
+    asyncio.run(bench.take(bench.files["a"]))
+    assert bench.form.seen == "a"
+    assert (bench.fields["drive"].value, bench.fields["output"].value) == (0, 1)
+    assert bench.fields["drive"].options == mirror_form.labels(CHANNELS)
+    assert [name for name, _ in bench.read] == ["a.csv"]
+    assert bench.about.text == "300 samples at 100 Hz, 3 s."
+    assert texts(bench.findings) == ["It drifts."]
+    assert [each.text for each in bench.list.descendants() if "seen" in getattr(each, "classes", ())] == ["a.csv"]
+    asyncio.run(bench._measured())
+    assert len(bench.read) == 1  # it is shown already
+    put_in(bench, "b.csv")
+    asyncio.run(bench.take(bench.files["b"]))
+    assert (bench.form.seen, bench.form.setting.name) == ("b", "a-mirror")
+    assert "b.csv" in texts(bench.list)
+
+
+def test_a_file_that_is_no_recording_is_thrown_away_in_words(bench, monkeypatch):
+    def refuse(path):
+        raise mirror.reading.ReadingError("a.csv: the file is empty")
+
+    put_in(bench, "a.csv")
+    with monkeypatch.context() as patch:
+        patch.setattr(mirror.reading, "list_channels", refuse)
+        asyncio.run(bench.take(bench.files["a"]))
+    assert (bench.refused.text, bench.files, bench.form.seen) == ("a.csv: the file is empty", {}, "")
+    put_in(bench, "b.csv")
+    asyncio.run(bench.take(bench.files["b"]))
+    assert bench.refused.text == ""
+
+
+def test_the_other_recordings_are_read_one_by_one_but_for_those_left_out(bench):
+    put_in(bench, "a.csv", "b.csv", "c.csv", "d.csv")
+    asyncio.run(bench.check())
+    assert bench.read == []  # no channel is chosen yet
+    asyncio.run(bench.take(bench.files["a"]))
+    bench.use("b", "leave")
+    for _ in range(4):
+        asyncio.run(bench.check())
+    assert [name for name, _ in bench.read] == ["a.csv", "c.csv", "d.csv"]
+
+
+def test_the_fault_of_a_recording_stands_below_it_unless_it_is_left_out(bench, monkeypatch):
+    def refuse(path, columns):
+        raise mirror.reading.ReadingError(f"{path.name}: odd")
+
+    put_in(bench, "a.csv", "b.csv")
+    asyncio.run(bench.take(bench.files["a"]))
+    monkeypatch.setattr(mirror.reading, "view", refuse)
+    asyncio.run(bench.check())
+    asyncio.run(bench.look())
+    assert "b.csv: odd" in texts(bench.list)
+    bench.use("b", "leave")
+    asyncio.run(bench.look())
+    assert "b.csv: odd" not in texts(bench.list)
+
+
+def test_what_cannot_be_measured_says_why_and_shows_nothing(bench, monkeypatch):
+    shows = []
+    monkeypatch.setattr(bench.loop, "show", shows.append)
+    put_in(bench, "a.csv")
+    asyncio.run(bench.take(bench.files["a"]))
+    assert shows == [empty("loop")]
+    bench.keep(replace(bench.form, setting=replace(bench.form.setting, output=None)))
+    asyncio.run(bench._measured())
+    assert (bench.words.text, bench.about.text, texts(bench.findings)) == ("output: choose the channel", "", [])
+    assert shows[1] == mirror.mirror_view.nothing()
+    assert not bench.action()
+    asyncio.run(bench.start())
+    asyncio.run(bench.remove("a"))
+    assert (bench.form.seen, bench.fields["drive"].options) == ("", {})
+
+
+def test_a_late_answer_about_a_recording_is_dropped(bench, monkeypatch):
+    shows = []
+    put_in(bench, "a.csv")
+    monkeypatch.setattr(bench, "_show", lambda *found: shows.append(found))
+
+    async def late(key, setting):
+        bench.question += 1
+        return None, ""
+
+    monkeypatch.setattr(bench, "_look_into", late)
+    asyncio.run(bench._measured())
+    assert shows == []
+
+
+def test_what_is_typed_in_the_form_is_taken_over_and_kept(bench):
+    put_in(bench, "a.csv")
+    asyncio.run(bench.take(bench.files["a"]))
+    bench.filling = True
+    assert bench.typed() is None
+    bench.fields["output_unit"].value, bench.fields["rate"].value = "um", "5 kHz"
+    bench.fields["accept"].value = None
+    bench.filling = False
+    asyncio.run(bench.typed())
+    setting = mirror_form.kept_form(bench.path).setting
+    assert (setting.output_unit, setting.rate, setting.accept) == ("um", "5 kHz", ())
+    assert bench.fields["lever_arm"].enabled
+    bench.filling = True
+    bench.fields["accept"].value, bench.fields["output_unit"].value = ["drift"], "urad"
+    bench.filling = False
+    asyncio.run(bench.typed())
+    assert bench.form.setting.accept == ("drift",)
+    assert not bench.fields["lever_arm"].enabled and not bench.filling
+
+
+def test_what_another_tab_typed_is_shown_unless_it_cannot_be_kept_here(bench):
+    mirror_form.keep_form(bench.path, Form(Setting(name="theirs")))
+    bench.kept = False
+    asyncio.run(bench.look())
+    assert bench.form.setting.name == "mirror"
+    bench.kept = True
+    asyncio.run(bench.look())
+    assert (bench.form.setting.name, bench.fields["name"].value) == ("theirs", "theirs")
+
+
+def test_the_recording_that_is_shown_is_one_that_is_there(bench):
+    put_in(bench, "a.csv", "b.csv")
+    asyncio.run(bench.look())
+    assert bench.form.seen == "b"
+    bench.keep(replace(bench.form, seen="gone"))
+    asyncio.run(bench.look())
+    assert bench.form.seen == "b"
+    asyncio.run(bench.see("a"))
+    asyncio.run(bench.look())
+    assert bench.form.seen == "a"
+
+
+@pytest.mark.parametrize(("name", "told"), [('a"b.csv', "a b.csv"), ("µ_1-2.x y", "µ_1-2.x y"), ("<i>", " i ")])
+def test_a_name_inside_of_a_property_is_harmless(name, told):
+    assert mirror._attribute(name) == told
+
+
+# ---------------------------------------------------------------------------------------------------- an identification
+def fits(*names, loops=1):
+    """Each leaves less than the one before of what no fit has seen."""
+    seen = tuple(SimpleNamespace(name=f"{k}.csv") for k in range(loops))
+    return tuple(SimpleNamespace(model=name, loops=seen, held_out_rms_percent=5.0 - n) for n, name in enumerate(names))
+
+
+@pytest.fixture
+def job_view(session, tab, monkeypatch):
+    """The panel of the identifications; `drawn` are model and recording as they were drawn."""
+    view = mirror_job.JobView(session)
+    view.jobs, view.read, view.drawn_fits, view.end_of = [], {}, [], None
+    monkeypatch.setattr(session.jobs, "listed", lambda: tuple(view.jobs))
+    monkeypatch.setattr(session.jobs, "output", lambda number: "")
+    monkeypatch.setattr(mirror_job.mirror_view, "read_fits", lambda folder: view.read.get(folder.name, ()))
+    monkeypatch.setattr(mirror_job.mirror_view, "score_rows", lambda fits, chosen: [])
+    monkeypatch.setattr(mirror_job.mirror_view, "state_words", lambda job, best: f"{job.state} {best and best.model}")
+    monkeypatch.setattr(mirror_job.mirror_view, "outcome", lambda text: view.end_of)
+    monkeypatch.setattr(
+        mirror_job.mirror_view, "loop_plot", lambda fit, k, unit: view.drawn_fits.append((fit.model, k, unit)) or {}
+    )
+    monkeypatch.setattr(mirror_job.mirror_view, "residual_plot", lambda fit, k: {})
+    return view
+
+
+def identified(folder, number, state="running", **more):
+    given = {"arguments": ("identify", "a", "--input-unit", "mV"), "results": ("stage.toml", "stage.html")}
+    return Job(number, folder / str(number), state, "identification", f"job {number}", **(given | more))
+
+
+def test_the_newest_identification_is_shown_until_another_one_is_chosen(session, job_view):
+    view = job_view
+    asyncio.run(view.look())
+    assert (view.which.visible, view.number) == (False, 0)
+    view.jobs = [Job(9, session.folder, "running", "study"), identified(session.folder, 2)]
+    asyncio.run(view.look())
+    assert (view.number, view.which.visible, view.which.options) == (2, False, {2: "2: job 2 (running)"})
+    assert view.bar.visible and view.cancel.visible and not view.live.visible
+    view.jobs.append(identified(session.folder, 1, "done"))
+    asyncio.run(view.look())
+    assert (view.number, view.which.visible, view.which.value) == (2, True, 2)
+    for value, number in ((None, 2), (2, 2), (1, 1)):
+        asyncio.run(view.choose(SimpleNamespace(value=value)))
+        assert (view.number, view.which.value) == (number, number)
+    assert not view.bar.visible and not view.cancel.visible
+    view.jobs.pop()
+    asyncio.run(view.look())
+    assert view.number == 2
+
+
+def test_a_model_and_a_recording_are_drawn_as_they_were_chosen(session, job_view):
+    view = job_view
+    view.jobs, view.read = [identified(session.folder, 1, progress=Progress(1, 4, "x"))], {"1": fits("a", "b", loops=2)}
+    asyncio.run(view.look())
+    assert view.drawn_fits == [("b", 0, "mV")]  # the best so far
+    assert (view.bar.value, view.live.visible, view.recording.visible) == (0.25, True, True)
+    assert view.model.options == {-1: "best so far", 0: "a", 1: "b"}
+    view.draw()
+    assert len(view.drawn_fits) == 1  # it is drawn already
+    view.model.value = 0
+    view.draw()
+    view.recording.value = 1
+    view.draw()
+    assert view.drawn_fits[-2:] == [("a", 0, "mV"), ("a", 1, "mV")]
+    view.read = {"1": fits("a", loops=1)}
+    asyncio.run(view.look())
+    assert (view.recording.value, view.recording.visible) == (0, False)
+    assert view.drawn_fits[-1][:2] == ("a", 0)
+
+
+def test_an_identification_that_has_found_a_mirror_leads_into_the_mission(session, job_view, told, monkeypatch):
+    view, said = job_view, []
+    view.jobs, view.read = [identified(session.folder, 1, "done")], {"1": fits("a", "b")}
+    view.end_of = ("a", ("the verdict",))
+    asyncio.run(view.look())
+    assert (view.chosen, view.words.text, view.drawn_fits) == ("a", "done a", [("a", 0, "mV")])
+    assert view.model.options[-1] == "the chosen one"
+    assert texts(view.end) == ["Use this mirror in the mission", "Open the report", "Mirror file stage.toml"]
+    monkeypatch.setattr(mirror_job.ui, "notify", lambda words, **how: said.append(words))
+    view.use(session.folder / "stage.toml")
+    assert 'file = "stage.toml"' in session.draft.text
+    assert said == ["[mirror] of the mission names stage.toml now; save the mission to keep it."]
+    monkeypatch.setattr(session, "edit", lambda how: session.inside("../x"))
+    view.use(session.folder / "stage.toml")
+    assert len(said) == len(told) == 1
+    view.jobs = [identified(session.folder, 1, "failed")]
+    asyncio.run(view.look())
+    assert (view.chosen, texts(view.end)) == ("", [])
+
+
+def test_an_identification_without_a_fit_yet_draws_nothing(session, job_view):
+    job_view.draw()
+    job_view.model.value = -1
+    job_view.jobs = [identified(session.folder, 1, "done")]
+    asyncio.run(job_view.look())
+    assert (job_view.drawn_fits, job_view.chosen, job_view.bar.value) == ([], "", 0.0)
+
+
+# ------------------------------------------------------------------------------------------- what the pages are made of
+@pytest.mark.parametrize(
+    ("name", "words", "said"),
+    [
+        ("a.csv", "refused", "a.csv: refused"),
+        ("n" * 61, "w" * 401, f"{'n' * 60}: {'w' * 400}"),
+        ("a.csv", "", "the file 'a.csv' has more than 200 MB; cut out the part"),
+    ],
+)
+def test_a_file_that_the_page_has_stopped_says_why(tmp_path, name, words, said):
+    found = []
+    field = drop.Drop.__new__(drop.Drop)
+    field._refused = found.append
+    field._uploads = mirror.Uploads(tmp_path / "uploads", UploadLimits())
+    field._unsent(SimpleNamespace(args=[name, words]))
+    assert found[0].startswith(said)
+    assert len(found[0]) == len(said) or not words
+
+
+def test_blocks_of_the_same_form_change_in_place_and_others_are_built_anew(tab):
+    made = elements.Blocks()
+    made.show_blocks((Soft("one"), Verdict("good", (), True)))
+    first = list(made.default_slot.children)
+    assert [each.text for each in first] == ["one", "good"]
+    made.show_blocks((Soft("two"), Verdict("better", (), True)))
+    assert list(made.default_slot.children) == first
+    assert [each.text for each in first] == ["two", "better"]
+    made.show_blocks((Soft("two"),))
+    assert len(made.default_slot.children) == 1 and made.default_slot.children[0] is not first[0]
+    made.show_blocks((Points(("a", "b")), View("Title", (Table("", ("x",), [("1",)]),), folded=True)))
+    assert texts(made)[:2] == ["a", "b"]
+
+
+def test_a_picture_that_changes_is_shown_in_its_place(tab):
+    drawing = Drawing("map", "A map", "its caption", "<svg/>")
+    made = elements.Blocks()
+    made.show_blocks((drawing,), {"map": "data:1"})
+    (picture,) = (each for each in made.descendants() if "src" in each.props)
+    assert (picture.props["src"], picture.props["alt"]) == ("data:1", "A map")
+    made.show_blocks((drawing,), {"map": "data:2"})
+    assert picture.props["src"] == "data:2"
+
+
+def test_a_figure_begins_empty_or_with_what_it_is_given(tab):
+    assert elements.Figure("of what").props["begin"] == empty("")
+    given = elements.Figure("of what", empty("given"))
+    assert (given.props["begin"], given.props["aria-label"]) == (empty("given"), "of what")
+
+
+@pytest.mark.parametrize(
+    ("deleted", "stopping", "cancelling", "ends"),
+    [(False, False, 0, False), (True, False, 0, True), (False, True, 0, True), (False, False, 1, True)],
+)
+def test_whoever_waits_on_a_page_that_is_gone_is_ended(monkeypatch, deleted, stopping, cancelling, ends):
+    monkeypatch.setattr(in_thread, "app", SimpleNamespace(is_stopping=stopping))
+    for task in (SimpleNamespace(cancelling=lambda: cancelling), None):
+        monkeypatch.setattr(in_thread.asyncio, "current_task", lambda task=task: task)
+        gone = ends and not (task is None and cancelling)
+        found = False
+        try:
+            in_thread.stay(SimpleNamespace(is_deleted=deleted))
+        except asyncio.CancelledError:
+            found = True
+        assert found == gone
