@@ -340,6 +340,12 @@ def test_a_difference_of_models_may_be_chance_where_the_noise_is_coloured():
     assert may_be_chance([white], [white])
 
 
+def test_residuals_of_nothing_and_of_one_pair_have_a_colour_too():
+    assert colour_inflation([np.zeros(100)]) == 1.0
+    assert colour_inflation([np.array([1.0, 1.0, -1.0, -1.0])]) == pytest.approx(1.5)  # lags 0 and 1: 1 and 1 / 4
+    assert colour_inflation([np.array([1.0, -1.0, 1.0, -1.0])]) == 1.0  # never less than white
+
+
 def test_a_residual_of_one_step_is_not_taken_round_from_its_end_to_its_begin():
     """Halves of -1 and 1 have the autocorrelation 1 - 3 k / n up to the middle, whose sum to n / 3 is n / 6."""
     step = np.repeat([-1.0, 1.0], 600)
@@ -530,6 +536,12 @@ def test_other_refusals(fit_100hz):
     for split in (-1, 1, 5001):
         with pytest.raises(IdentificationError, match=f"split {split} "):
             predict(fit_100hz, record(100), split)
+    assert [predict(fit_100hz, record(100), split).split for split in (2, 5000)] == [2, 5000]
+    with pytest.raises(IdentificationError, match="no recording was given"):
+        identify([], models=candidates.MODELS)  # all of them may be asked for at once
+    for models in ((), ("bouc_wen", "bouc_wen"), ("bouc_wen", "other")):
+        with pytest.raises(IdentificationError, match=r"cannot be used; name each once, out of prandtl_ishlinskii, "):
+            identify([], models=models)
 
 
 @pytest.mark.parametrize(
