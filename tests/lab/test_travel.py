@@ -7,7 +7,7 @@ import pytest
 
 from microrad.lab.identify import IdentificationError, identify
 from microrad.lab.identify.travel import check_travel
-from microrad.lab.recording import recording_from_arrays
+from microrad.lab.recording import Recording, recording_from_arrays
 
 WAVE = 5 + 5 * np.sin(np.arange(4000) * 0.02)
 
@@ -43,7 +43,7 @@ def test_an_absurd_unit_is_told(per_rad, unit, options, words):
 def test_a_quarter_turn_itself_is_taken_and_the_largest_distance_counts():
     def moved(most):
         output = np.column_stack((1e-3 * WAVE, np.where(WAVE > 5, most, 0.0)))
-        return recording_from_arrays(WAVE, output, 1000.0, "edge.csv")
+        return Recording("edge.csv", "", WAVE[:, None], output, 1000.0, ("u",), ("output 0", "output 1"))
 
     check_travel([moved(math.pi / 2)], "rad")
     with pytest.raises(IdentificationError, match=r"^edge\.csv: the output 'output 1' moves by 1\.571 rad, a tilt of "):
