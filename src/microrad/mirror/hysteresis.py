@@ -229,11 +229,8 @@ class BoucWen(_FromRest):
         return self._rising().reversal_slope_rad_v() >= 0.0
 
     def _rising(self) -> "BoucWen":
-        """The model turned over where its output falls with the drive: h changes its sign as well."""
-        if self.d1_rad_v >= 0.0:
-            return self
-        turned = {name: -getattr(self, name) for name in ("d1_rad_v", "epsilon_rad_v", "beta_1_v", "gamma_1_v")}
-        return replace(self, **turned)
+        """The model, turned over where its output falls with the drive."""
+        return self if self.d1_rad_v >= 0.0 else sign_reversed(self)
 
     @property
     def row(self) -> tuple[float, ...]:
@@ -513,6 +510,17 @@ def scaled(model: BoucWen | PrandtlIshlinskii, times: float) -> BoucWen | Prandt
         weights = tuple(times * w for w in model.weights_rad_v)
         return replace(model, weights_rad_v=weights, polynomial_rad=(times * c1, times * c2, times * c3))
     return replace(model, d1_rad_v=times * model.d1_rad_v, epsilon_rad_v=times * model.epsilon_rad_v)
+
+
+def sign_reversed(model: BoucWen) -> BoucWen:
+    """The model of a sensor turned over: -h has the terms of h with the signs of epsilon, beta and gamma changed."""
+    return replace(
+        model,
+        d1_rad_v=-model.d1_rad_v,
+        epsilon_rad_v=-model.epsilon_rad_v,
+        beta_1_v=-model.beta_1_v,
+        gamma_1_v=-model.gamma_1_v,
+    )
 
 
 def slow_gain(model: BoucWen | PrandtlIshlinskii) -> float:
