@@ -27,7 +27,7 @@ from microrad.lab.identify import (
     mirror_file_text,
     predict,
 )
-from microrad.lab.identify.hysteresis.bouc_wen import _bound_gradient, _not_identified
+from microrad.lab.identify.hysteresis.bouc_wen import PARAMETERS, _bound_gradient, _not_identified
 from microrad.lab.identify.hysteresis.plant_fit import _not_identified as _not_identified_jointly
 from microrad.lab.identify.mirror_file import _names
 from microrad.lab.identify.records import fastest_rate, lead, si_records, transient
@@ -163,6 +163,51 @@ def test_what_counts_as_not_identified(error, between, named):
     assert ("p0" in dict(_not_identified_jointly(structure, values, covariance))) == named
     structure.parameters[3].upper = values[3]
     assert "at its bound" in dict(_not_identified_jointly(structure, values, covariance))["p3"]
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "fact"),
+    [
+        (2.0, 1.0, None),
+        (2.0, 1.25, "relative standard error 62 %"),
+        (-2.0, 1.25, "relative standard error 62 %"),
+        (-2.0, 2.0, "relative standard error 100 %"),
+        (2.0, 2.5, "not told from 0: standard error 2.5 mm"),
+        (-3.0, 0.5, "at its bound, -3 mm"),
+        (3.0, 0.5, "at its bound, 3 mm"),
+    ],
+)
+def test_why_a_parameter_of_a_mirror_is_not_identified(value, error, fact):
+    """Half of the size is enough, and all of it is still more than nothing; a bound goes before either."""
+    structure = SimpleNamespace(parameters=[SimpleNamespace(name="p", lower=-3.0, upper=3.0, unit="mm")])
+    found = _not_identified_jointly(structure, np.array([value]), np.array([[error**2]]))
+    assert found == ([] if fact is None else [("p", fact)])
+
+
+def test_why_a_parameter_of_eq_3_is_not_identified():
+    values = np.array(PAPER)
+    size = 0.01 * np.abs(values)
+
+    def found(one_rate=False, at_bound=False, **errors):
+        own = np.where([name in errors for name in PARAMETERS], [errors.get(name, 0.0) for name in PARAMETERS], 0.01)
+        spread = own * np.abs(values)
+        return dict(_not_identified(values, np.diag(spread**2), one_rate, at_bound))
+
+    assert found(d1=0.6)["d1"].startswith("relative standard error 60 %: a large hysteresis that settles soon after")
+    assert found(d2=0.6)["d2"].startswith("relative standard error 60 %: its effect on the output is below the noise")
+    assert found(delta=0.6)["delta"].startswith("relative standard error 60 %: the loops widen too little with rate")
+    one_rate = found(one_rate=True, d2=0.6, delta=0.6, alpha=0.6)
+    assert "hold loops of one rate only" in one_rate["d2"] and "hold loops of one rate only" in one_rate["delta"]
+    assert "hold loops of one rate only" not in one_rate["alpha"]
+    for name in ("epsilon", "alpha", "beta"):
+        assert "separate its parts; record small loops" in found(**{name: 0.6})[name]
+        bound = found(at_bound=True, **{name: 0.6})[name]
+        assert "separate its parts (on the bound of the admissible slope); record small loops" in bound
+    between = np.eye(6)
+    between[4, 5] = between[5, 4] = -0.97
+    told = dict(_not_identified(values, size[:, None] * between * size, False, False))
+    assert set(told) == {"alpha", "beta"}
+    assert told["alpha"].startswith("correlation 0.970 with beta: loops fix the settled hysteresis")
 
 
 @pytest.mark.promise("identify-27")
@@ -340,6 +385,12 @@ def test_a_difference_of_models_may_be_chance_where_the_noise_is_coloured():
     assert may_be_chance([white], [white])
 
 
+def test_residuals_of_nothing_and_of_one_pair_have_a_colour_too():
+    assert colour_inflation([np.zeros(100)]) == 1.0
+    assert colour_inflation([np.array([1.0, 1.0, -1.0, -1.0])]) == pytest.approx(1.5)  # lags 0 and 1: 1 and 1 / 4
+    assert colour_inflation([np.array([1.0, -1.0, 1.0, -1.0])]) == 1.0  # never less than white
+
+
 def test_a_residual_of_one_step_is_not_taken_round_from_its_end_to_its_begin():
     """Halves of -1 and 1 have the autocorrelation 1 - 3 k / n up to the middle, whose sum to n / 3 is n / 6."""
     step = np.repeat([-1.0, 1.0], 600)
@@ -487,6 +538,7 @@ def test_output_units(fit_100hz, unit, factor):
         ({"output_unit": "um"}, "--lever-arm, lever_arm_m"),
         ({"output_unit": "um", "lever_arm_m": 0.0}, "positive length"),
         ({"output_unit": "um", "lever_arm_m": math.nan}, "positive length"),
+        ({"output_unit": "um", "lever_arm_m": math.inf}, r"the lever arm is inf m; give a positive length in metres\."),
         ({"output_unit": "mrad", "lever_arm_m": 0.1}, "already an angle"),
         ({"output_unit": "deg"}, "output unit 'deg'"),
         ({"input_unit": "kV"}, "input unit 'kV'"),
@@ -524,12 +576,19 @@ def test_other_refusals(fit_100hz):
         fit_bouc_wen([record(100)], starts=0)
     with pytest.raises(IdentificationError, match="0 play operators"):
         fit_prandtl_ishlinskii([record(100)], operators=0)
+    assert fit_prandtl_ishlinskii([record(100)], operators=1).thresholds_v.tolist() == [0.0]
     ramp = np.linspace(0, 1, 500)
     with pytest.raises(IdentificationError, match="never reverses"):
         fit_bouc_wen([recording_from_arrays(ramp, ramp**2, 100.0)])
     for split in (-1, 1, 5001):
         with pytest.raises(IdentificationError, match=f"split {split} "):
             predict(fit_100hz, record(100), split)
+    assert [predict(fit_100hz, record(100), split).split for split in (2, 5000)] == [2, 5000]
+    with pytest.raises(IdentificationError, match="no recording was given"):
+        identify([], models=candidates.MODELS)  # all of them may be asked for at once
+    for models in ((), ("bouc_wen", "bouc_wen"), ("bouc_wen", "other")):
+        with pytest.raises(IdentificationError, match=r"cannot be used; name each once, out of prandtl_ishlinskii, "):
+            identify([], models=models)
 
 
 @pytest.mark.parametrize(

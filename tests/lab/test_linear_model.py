@@ -477,6 +477,8 @@ def test_cubespec_softens_with_amplitude(cubespec):
         (38.114738, 1e-9, "38.115"),
         (38.114738, 0.0, "38.115"),
         (38.114738, math.nan, "38.115"),
+        (38.114738, math.inf, "38.115"),
+        (38.114738, -1.0, "38.115"),
     ],
 )
 def test_a_value_is_printed_with_the_digits_that_its_error_leaves(value, error, shown):

@@ -38,6 +38,72 @@ RATE_HZ, FINE = 750.0, 20
 NAMES = ("mass", "damping", "stiffness", "slope", "decay", "asymmetry")
 
 
+def test_the_change_of_order_one_is_a_size_or_the_start_or_one():
+    assert Parameter("p", "", -3.0).scale == 3.0
+    assert Parameter("p", "", -3.0, size=2.0).scale == 2.0
+    assert Parameter("p", "", 0.0, size=2.0).scale == 2.0
+    assert Parameter("p", "", 0.0).scale == 1.0
+
+
+@pytest.mark.parametrize(
+    ("sign", "bounds"), [(1.0, (0.0, np.inf)), (-1.0, (-np.inf, 0.0)), (0.0, (0.0, np.inf)), (-0.0, (0.0, np.inf))]
+)
+def test_weights_of_plays_stay_on_the_side_where_they_begin(sign, bounds):
+    """The size of one that begins at nothing is a hundredth of the sum, or of 1 rad/V where there is none."""
+    model = PrandtlIshlinskii((0.0, 2.0), (sign * 5e-5, 0.0))
+    first, second = one_axis("plays", model).parameters
+    assert [(p.lower, p.upper) for p in (first, second)] == [bounds] * 2
+    assert (first.name, second.name, first.unit) == ("weight at 0 V", "weight at 2 V", "rad/V")
+    assert (first.scale, second.scale) == pytest.approx((5e-5, 5e-7) if sign else (0.01, 0.01))
+
+
+@pytest.mark.parametrize(
+    ("thresholds", "limit", "most"), [((0.0, 4.0), 200.0, 0.02), ((0.0, 4.0), np.inf, 4.0), ((0.0,), np.inf, 1.0)]
+)
+def test_a_widening_is_searched_up_to_three_times_the_largest_threshold_over_the_fastest_rate(thresholds, limit, most):
+    model = PrandtlIshlinskii(thresholds, (5e-5,) * len(thresholds), rate_limit_v_s=limit)
+    found = one_axis("plays", model, free=("widening",)).parameters[-1]
+    assert (found.name, found.unit, found.lower) == ("widening", "s", 0.0)
+    assert (found.start, found.upper, found.scale) == pytest.approx((0.01 * most, 3.0 * most, 0.1 * most))
+    wide = one_axis("plays", replace(model, widening_s=0.5 * most), free=("widening",)).parameters[-1]
+    assert wide.start == 0.5 * most
+
+
+def periodic_record(periods, tail=0, off=0.0):
+    """Periods of 100 samples, of which the second is off by a share of the largest drive."""
+    one = np.sin(2 * pi * np.arange(100) / 100)
+    drive = np.concatenate([np.tile(one, periods), one[:tail]])
+    drive[125:126] += off
+    column = drive[:, None]
+    return Recording("periodic", "", column, column.copy(), 1000.0, ("u",), ("y",), 100)
+
+
+@pytest.mark.parametrize(
+    ("record", "repeats"),
+    [
+        (periodic_record(2), True),
+        (periodic_record(3, 50), True),
+        (periodic_record(1, 99), False),
+        (replace(periodic_record(3), period_samples=None), False),
+        (periodic_record(2, off=0.5e-6), True),
+        (periodic_record(2, off=2e-6), False),
+    ],
+)
+def test_two_whole_periods_of_one_drive_become_one(record, repeats):
+    (run,) = fit_records([record])
+    assert (len(run.drive), run.first) == ((200, 100) if repeats else (record.samples, 0))
+
+
+def test_a_record_of_which_all_is_left_out_is_refused():
+    record = replace(periodic_record(2), period_samples=None)
+    assert fit_records([record], drop=198)[0].first == 198
+    for drop in (199, 200):
+        with pytest.raises(
+            IdentificationError, match=rf"^periodic: 200 samples, of which the first {drop} are left out"
+        ):
+            fit_records([record], drop=drop)
+
+
 def started(factors):
     return hysteretic_oscillator(**dict(zip(NAMES, (PUBLISHED * factors).tolist(), strict=True)))
 

@@ -1,6 +1,7 @@
 """What a recording serves for, judged by its drive, and what speaks against a model."""
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -9,10 +10,12 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.signal import lfilter
 
 import truths
-from microrad.lab.identify import identify
+from microrad.lab.identify import FORMS, IdentificationError, JointFit, Units, identify
+from microrad.lab.identify.records import si_records
+from microrad.lab.identify.selection import roles as selection_roles
 from microrad.lab.identify.selection import warnings
 from microrad.lab.identify.selection.predictions import Prediction, Score
-from microrad.lab.identify.selection.roles import is_broadband, roles, whole_periods
+from microrad.lab.identify.selection.roles import is_broadband, roles, single_period, whole_periods
 from microrad.lab.identify.selection.warnings import ResidualTest, residual_test, residual_warnings
 from microrad.lab.recording import Recording
 from truths import philox
@@ -110,8 +113,43 @@ def test_a_part_of_a_periodic_record_is_cut_to_whole_periods():
     whole = recording(np.tile(multisine(1.0)[:1000], 4), period=1000)
     cut = whole_periods(replace(whole, drive=whole.drive[:2700], output=whole.output[:2700]))
     assert (cut.samples, cut.period_samples) == (2000, 1000)
-    short = whole_periods(replace(whole, drive=whole.drive[:1700], output=whole.output[:1700]))
-    assert (short.samples, short.period_samples) == (1700, None)
+    for samples, left in ((1700, (1700, None)), (1999, (1999, None)), (2000, (2000, 1000)), (3000, (3000, 1000))):
+        short = whole_periods(replace(whole, drive=whole.drive[:samples], output=whole.output[:samples]))
+        assert (short.samples, short.period_samples) == left
+    assert whole_periods(recording(SINE)).period_samples is None
+
+
+@pytest.mark.parametrize(("samples", "single"), [(1000, True), (1999, True), (2000, False), (4000, False)])
+def test_two_whole_periods_are_not_a_single_one(samples, single):
+    whole = recording(np.tile(multisine(1.0)[:1000], 4), period=1000)
+    cut = replace(whole, drive=whole.drive[:samples], output=whole.output[:samples])
+    assert single_period([cut]) is single
+    assert not single_period([cut, cut])
+    assert not single_period([replace(cut, period_samples=None)])
+    assert not single_period([])
+
+
+def test_exactly_half_of_the_largest_drive_is_small():
+    wide = multisine(1.0)
+    large, half = recording(np.where(np.arange(8000) % 2, 1.0, -1.0) * np.ptp(wide)), recording(wide)
+    assert np.ptp(half.drive) == 0.5 * np.ptp(large.drive)
+    assert roles([large, half]).broadband == [half]
+
+
+@pytest.mark.parametrize(("filled", "wide"), [([1] * 11, True), ([1] * 10, False), ([1] * 10 + [0] + [1] * 10, False)])
+def test_more_than_a_decade_without_a_gap_is_broadband(monkeypatch, filled, wide):
+    monkeypatch.setattr(selection_roles, "_filled", lambda record: np.array([0, *filled, 0], dtype=bool))
+    assert is_broadband(recording(WIDE["noise"])) is wide
+
+
+def test_a_role_of_broadband_is_refused_for_what_fills_no_more_than_a_sine(monkeypatch):
+    one, other = replace(recording(WIDE["noise"]), role="broadband"), recording(SINE)
+    monkeypatch.setattr(selection_roles, "_filled", lambda record: np.array([0, 1, 1, 1, 1, 0], dtype=bool))
+    with pytest.raises(IdentificationError, match=r"^record: its role is broadband and its drive is a sine"):
+        roles([one, other])
+    assert roles([other, (as_loop := replace(other, role="loops"))]).loops == [other, as_loop]
+    monkeypatch.setattr(selection_roles, "_filled", lambda record: np.array([0, 1, 1, 1, 1, 1], dtype=bool))
+    assert roles([one, other]).broadband == [one]
 
 
 # ----------------------------------------------------------------------------------------------------------- residuals
@@ -197,6 +235,79 @@ def test_drift_of_a_record_and_its_error():
     assert "2 % of the peak-to-peak output) in 1 s" in found[0]
     assert warnings.drift([quiet], [record], 1e-3)[1] == []
     assert warnings.drift([moving], [record], 1.0)[1] == []  # significant, and of no consequence
+    falling = Prediction(np.zeros(2000), noise - 2 * trend, 0, 1000, 0)
+    least, found = warnings.drift([moving, falling, quiet], [record] * 3, 1e-3)
+    assert least == pytest.approx(-4e-5, rel=0.05)
+    assert ["drifts by 2" in found[0], "drifts by -4" in found[1], len(found)] == [True, True, 2]
+    assert "(-4 % of the peak-to-peak output) in 1 s: creep beyond" in found[1].replace("-4.0 %", "-4 %")
+
+
+@pytest.mark.parametrize(
+    ("share", "noise", "told"), [(0.0019, 0.0, 0), (0.0021, 0.0, 1), (0.0021, 0.1, 0), (0.1, 0.1, 1)]
+)
+def test_a_drift_is_told_above_a_fifth_of_a_per_cent_and_three_standard_errors(share, noise, told):
+    """The error of the trend of 2000 samples of white noise is sqrt(12 / 2000) of it, 0.8 % here."""
+    residual = share * np.linspace(-0.5, 0.5, 2000) + noise * philox(8).standard_normal(2000)
+    seen = Prediction(np.zeros(2000), residual, 0, 1000, 0)
+    assert len(warnings.drift([seen], [recording(SINE[:2000])], 1.0)[1]) == told
+
+
+@pytest.mark.parametrize(("start", "told"), [(0, 0), (200, 0), (201, 1)])
+def test_what_is_not_judged_is_told_above_a_fifth_of_the_record(start, told):
+    record = recording(SINE[:1000])
+    seen = Prediction(np.zeros(1000), np.zeros(1000), start, start, 0)
+    assert (
+        warnings.set_aside_warnings([record], [seen])
+        == [
+            "record: the first 201 of 1000 samples are not judged, because what the mirror remembers from before is "
+            "not known until the drive has swept its range once; begin a record for validation with its largest sweep."
+        ]
+        * told
+    )
+
+
+def test_the_range_of_drives_and_rates_is_told_to_a_thousandth():
+    """A sine over the range of 10 V moves at most at pi 10 V times its frequency."""
+    drives, rates = warnings.range_warnings((-0.00001, 10.00004), 500.0)
+    assert drives.startswith("Valid for drives from 0 V to 10 V; outside")
+    assert rates.startswith("Not valid above 500 V/s, the fastest rate of the recordings: ")
+    assert rates.endswith("reaches it at 15.92 Hz.")
+    assert warnings.range_warnings((-123.456, 1234.56), 1.0)[0].startswith("Valid for drives from -123 V to 1235 V")
+    assert warnings.range_warnings((0.12346, 0.23457), 1.0)[0].startswith("Valid for drives from 0.1235 V to 0.2346 V")
+
+
+@pytest.mark.parametrize(("noisy", "told"), [(0.2, 0), (0.21, 1)])
+def test_a_drive_is_called_noisy_above_a_fifth_of_the_fastest_rate(monkeypatch, noisy, told):
+    monkeypatch.setattr(warnings, "noisiness", lambda records: noisy)
+    records = si_records([recording(SINE), recording(STAIRCASE)], Units())
+    (found,) = warnings.rate_warnings(records, None) or ("",)
+    assert found.startswith("The drive is noisy: its rate from sample to sample scatters by 21 %") == bool(told)
+
+
+@pytest.mark.parametrize(
+    ("name", "linear", "depends"),
+    [
+        ("prandtl_ishlinskii_creep", None, False),
+        ("bouc_wen_classical", None, False),
+        ("prandtl_ishlinskii_rate", None, True),
+        ("bouc_wen_asymmetric", None, True),
+        ("prandtl_ishlinskii_joint", "a linear part", True),
+    ],
+)
+def test_a_joint_model_without_rate_and_linear_part_is_one_average_loop(name, linear, depends):
+    """Loops of 7 Hz and of 14 Hz."""
+    fit = object.__new__(JointFit)
+    for key, value in {"form": FORMS[name], "linear": linear}.items():
+        object.__setattr__(fit, key, value)
+    records = si_records([recording(SINE), recording(np.tile(SINE[::2], 2))], Units())
+    found = warnings.rate_warnings(records, fit)
+    assert warnings.depends_on_rate(fit) is depends
+    assert len(found) == (not depends)
+    assert all(
+        re.match(r"The loops have peak rates from 2[\d.]+ V/s to 4[\d.]+ V/s, and the model does", t) for t in found
+    )
+    (one,) = warnings.rate_warnings(records[:1], fit)
+    assert one.startswith("One loop rate only (peaks from 2")
 
 
 def test_scores_that_speak_against_a_model():
@@ -205,16 +316,21 @@ def test_scores_that_speak_against_a_model():
     (worse,) = warnings.score_warnings(replace(good, held_out_rms_percent=1.6), line)
     assert "grows from 1.00 % on the fitted samples to 1.60 %" in worse
     assert "No model is better than a straight line" in warnings.score_warnings(Score("m", 1.9, 3.0, 2.1, 3.0), line)[0]
+    assert len(warnings.score_warnings(Score("m", 2.0, 3.0, 2.0, 3.0), line)) == 1  # no better than the line
+    assert warnings.score_warnings(Score("m", 1.0, 3.0, 1.5, 3.0), line) == []  # half as much again is not too much
 
 
 def test_held_out_samples_beyond_the_fitted_drives_are_counted():
     record = recording(np.concatenate([np.linspace(0, 10, 100), [10.1, 10.3, -0.5], np.zeros(97)]))
     seen = Prediction(np.zeros(200), np.zeros(200), 0, 100, 0)
-    from microrad.lab.identify import Units
-
     (text,) = warnings.held_out_warnings([record], Units(), (0.0, 10.0), [seen])
     assert text.startswith("2 held-out samples")  # 10.1 is within the margin of 2 %
     assert warnings.held_out_warnings([record], Units(), (-1.0, 11.0), [seen]) == []
+    edge = recording([99.0, -99.0, 51.0, -1.0, 51.5, -1.5, 60.0])
+    behind = Prediction(np.zeros(7), np.zeros(7), 0, 2, 0)
+    (text,) = warnings.held_out_warnings([edge], Units(), (0.0, 50.0), [behind])
+    assert text.startswith("3 held-out samples lie outside")  # 1 V is the margin of 50 V, and belongs to the range
+    assert warnings.held_out_warnings([edge], Units("mV"), (0.0, 50.0), [behind]) == []
 
 
 @pytest.mark.promise("identify-26")

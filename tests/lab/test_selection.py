@@ -10,7 +10,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import truths
-from microrad.core import kernels
+from microrad.core import kernels, lti
 from microrad.lab import bench
 from microrad.lab import identify as identification
 from microrad.lab.bench.play import play_records, true_output
@@ -33,7 +33,7 @@ from microrad.lab.identify.selection.candidates import refit
 from microrad.lab.identify.selection.choice import choose_best
 from microrad.lab.identify.statistics import propagated
 from microrad.mirror import model as mirror
-from microrad.mirror.hysteresis import PrandtlIshlinskii
+from microrad.mirror.hysteresis import BoucWen, PrandtlIshlinskii
 from microrad.mission.file import load_mirror
 from microrad.report.identification.parameters import parameter_rows
 from places import ROOT
@@ -748,6 +748,173 @@ def test_the_table_of_the_page_is_what_the_benchs_plan_gives():
         score = result.score(name)
         assert score.fit_rms_percent == pytest.approx(float(fitted), rel=0.01, abs=5e-4)
         assert score.held_out_rms_percent == pytest.approx(float(held_out), rel=0.01, abs=5e-4)
+
+
+@pytest.mark.parametrize(
+    ("held_out", "spread", "residual", "told"),
+    [
+        (9.0, 2.0, 2.0, False),
+        (9.01, 2.0, 1.0, False),
+        (9.01, 2.0, 1.01, True),
+        (20.0, 2.0, 2.0, True),
+    ],
+)
+def test_a_model_is_unsupported_where_a_line_does_as_well_and_half_of_the_output_is_left(
+    held_out, spread, residual, told
+):
+    """Nine tenths of the line's error and half of the output are enough; what was fitted does not count."""
+    turns = np.where(np.arange(100) % 2, 1.0, -1.0)
+    measured = np.concatenate([np.full(100, 50.0), 7.0 + spread * turns])
+    seen = predictions.Prediction(measured - np.concatenate([np.full(100, 9.0), residual * turns]), measured, 0, 100, 0)
+    score, line = (predictions.Score(name, 1.0, 1.0, rms, 1.0) for name, rms in (("m", held_out), ("line", 10.0)))
+    text = choice._unsupported(score, line, [seen])
+    assert bool(text) == told
+    if told:
+        assert text.startswith(
+            f"the recordings do not support a model: the chosen one, m, leaves {residual:.3g} rad rms of 2 rad on "
+            f"the held-out samples, where a straight line does as well ({50 * residual:.0f} %, at most 50 % is a "
+            "model). It follows the part that was fitted"
+        )
+
+
+def test_the_reason_of_a_choice_names_those_that_only_chance_makes_better():
+    def scored(name, rms):
+        return predictions.Score(name, 0.5, 1.0, rms, 2.0)
+
+    line, found = (
+        scored("straight line", 9.0),
+        [scored("a", 1.0), scored("b", 0.96), scored("c", 0.97), scored("d", 2.0)],
+    )
+    assert choice._reason(found, line, 1) == (
+        "b leaves 0.96 % of the peak-to-peak output (rms) on the held-out samples, against 1 % by a, 0.97 % by c, 2 % "
+        "by d, 9 % by a straight line."
+    )
+    assert choice._reason(found, line, 0).endswith(
+        "9 % by a straight line. The difference to b and c is below two standard errors; among such models those that "
+        "never move the wrong way after a reversal go first, then those with fewer parameters."
+    )
+    alike = [scored("a", 1.0), scored("b", 1.0)]
+    assert "The difference" not in choice._reason(alike, line, 0)
+
+
+def test_the_mirror_of_an_identification_is_that_of_the_chosen_model(found):
+    assert found.mirror is found.fit("prandtl_ishlinskii_joint").mirror
+    assert found.mirror.A.size > 0
+    static = replace(found, chosen="prandtl_ishlinskii")
+    assert static.mirror.A.size == 0
+    assert static.mirror.plays == (static.model,) == (found.fit("prandtl_ishlinskii").model,)
+    assert static.mirror.name == "prandtl_ishlinskii"
+    assert (static.fit(), static.score().model) == (found.fits[0], "prandtl_ishlinskii")
+
+
+def test_a_model_that_was_not_fitted_is_refused_with_its_own_reason(found):
+    known = "there are prandtl_ishlinskii, linear, prandtl_ishlinskii_joint."
+    refused = (candidates.Refused("bouc_wen", "of another."), candidates.Refused("bouc_wen_joint", "of its own."))
+    other = replace(found, refused=refused)
+    for model, why in (("bouc_wen_joint", ": of its own"), ("bouc_wen_creep", "")):
+        with pytest.raises(IdentificationError) as caught:
+            other.fit(model)
+        assert str(caught.value) == f"no model '{model}' was fitted{why}; {known}"
+
+
+@pytest.mark.parametrize(
+    ("poles_hz", "zeros_hz", "kept"),
+    [
+        ((0.5, 80.0), (0.6,), ((80.0,), ())),
+        ((0.5, 0.7, 80.0), (0.6,), ((0.5, 0.7, 80.0), (0.6,))),  # one more pole than zeros: that is no flank
+        ((0.5, 80.0), (1.5,), ((0.5, 80.0), (1.5,))),
+        ((2.0, 80.0), (1.5,), ((2.0, 80.0), (1.5,))),
+        ((5.0, 80.0), (999.0,), ((5.0, 80.0), (999.0,))),
+        ((5.0, 80.0), (1001.0,), ((5.0, 80.0), ())),
+    ],
+)
+def test_what_lies_below_the_band_and_above_the_rate_is_left_out_of_the_linear_part(poles_hz, zeros_hz, kept):
+    """Excited from 1 Hz to 400 Hz at 1 kHz: the middle of the band is 20 Hz, without a resonance."""
+    zeros, poles = (-2 * np.pi * np.array(each, dtype=complex) for each in (zeros_hz, poles_hz))
+    found = poles_of(lti.modal_from_roots(zeros, poles, 20.0), (1.0, 400.0), 1000.0)
+    for roots, frequencies_hz in zip((found.poles, found.zeros), kept, strict=True):
+        assert_allclose(roots.frequencies_hz, frequencies_hz, rtol=1e-6)
+        assert roots.dampings == (1.0,) * len(frequencies_hz)
+    assert found.normalise_at_hz == pytest.approx(20.0)
+
+
+def test_the_linear_part_is_normalised_below_a_tenth_of_its_lowest_resonance_and_within_the_band():
+    for f, at in ((90.0, 3.0), (5.0, 1.0), (8000.0, 20.0)):
+        pair = 2 * np.pi * f * np.array([-0.1 + 0.995j, -0.1 - 0.995j])
+        found = poles_of(lti.modal_from_roots(np.array([]), pair, 1.0), (1.0, 400.0), 1000.0)
+        assert found.normalise_at_hz == pytest.approx(at, rel=1e-2)
+        assert found.poles.dampings == pytest.approx((0.1,), rel=1e-2)
+
+
+def joint_fit_of(**parts):
+    """What of a joint fit is looked at."""
+    fit = object.__new__(JointFit)
+    for key, value in parts.items():
+        object.__setattr__(fit, key, value)
+    return fit
+
+
+@pytest.mark.parametrize(
+    ("weights", "admissible"),
+    [
+        ((6e-5, 1e-5), True),
+        ((6e-5, 0.0), True),
+        ((6e-5, -1e-5), False),
+        ((-6e-5, -1e-5), True),
+        ((-6e-5, 1e-5), False),
+        ((-6e-5, 0.0), True),
+    ],
+)
+def test_plays_of_one_sign_are_admissible(weights, admissible):
+    fit = joint_fit_of(model=PrandtlIshlinskii((0.0, 1.0), weights))
+    assert fit.admissible is admissible
+    assert fit.falling is (weights[0] < 0)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize(("epsilon", "admissible"), [(-8.0, True), (-8.0078125, True), (-8.0083, False), (8.0, True)])
+def test_a_joint_bouc_wen_model_is_admissible_up_to_a_thousandth_of_its_gain(sign, epsilon, admissible):
+    """The slope behind a reversal is 16 + 2 epsilon, down to -0.016."""
+    fit = joint_fit_of(model=BoucWen(16.0 * sign, 0.0, epsilon * sign, 0.0, 1.0, 0.0))
+    assert fit.admissible is admissible
+    assert fit.falling is (sign < 0)
+
+
+@pytest.mark.parametrize(("samples", "named"), [(1000, True), (999, False)])
+def test_creep_asks_for_a_second(samples, named):
+    drive = np.sin(np.arange(samples) * 0.1)
+    records = [SimpleNamespace(drive_v=drive, step_s=1e-3)]
+    models = ["prandtl_ishlinskii", "prandtl_ishlinskii_creep"]
+    names, refused = candidates.supported_models(models, records, has_linear=False)
+    assert names == models[: 1 + named]
+    assert [each.model for each in refused] == models[1 + named :]
+
+
+def test_poles_of_a_response_are_known_as_it_knows_them_and_no_better():
+    """Of a pair half of the squared error lies along the root; a real root has all of it, and no damping to err in."""
+    linear = LinearPoles(Roots((100.0, 40.0), (0.3, 1.0)), Roots((60.0,), (1.0,)), 3.0)
+    names = ("weight", "pole 1", "pole 1 damping", "pole 2", "zero 1", "delay")
+    parameters = [SimpleNamespace(name=name) for name in names]
+    own = np.array([1.0, 1e-3, 1e-6, 50.0, 1e-3, 1e-9])
+    between = np.full((6, 6), 0.25) + 0.75 * np.eye(6)
+    known = SimpleNamespace(covariance=own[:, None] * between * own, standard_errors=own)
+    fit = joint_fit_of(fit=known, linear=linear, structure=SimpleNamespace(parameters=parameters))
+    turn = 2 * np.pi
+    response = SimpleNamespace(
+        delay_error_s=1e-6,
+        poles_rad_s=turn * np.array([-41.0, -30 + 95j, -30 - 95j]),
+        poles_error_rad_s=turn * np.array([3.0, 2.0, 2.0]),
+        zeros_rad_s=turn * np.array([-61.0 + 0j]),
+        zeros_error_rad_s=turn * np.array([0.5]),
+    )
+    found = candidates._held_covariance(fit, response)
+    half = 2.0 / np.sqrt(2.0)
+    assert_allclose(np.sqrt(np.diag(found)), [1.0, half, half / 100.0, 50.0, 0.5, 1e-6], rtol=1e-12)
+    size = np.sqrt(np.diag(found))
+    assert_allclose(found / np.outer(size, size), between, rtol=1e-12)
+    empty = SimpleNamespace(**{**vars(response), "zeros_rad_s": np.empty(0), "zeros_error_rad_s": np.empty(0)})
+    assert np.sqrt(candidates._held_covariance(fit, empty)[4, 4]) == pytest.approx(1e-3)
+    assert candidates._held_covariance(fit, None) is known.covariance
 
 
 def test_what_a_choice_rests_on_has_its_errors_in_microradians():

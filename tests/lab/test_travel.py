@@ -7,7 +7,7 @@ import pytest
 
 from microrad.lab.identify import IdentificationError, identify
 from microrad.lab.identify.travel import check_travel
-from microrad.lab.recording import recording_from_arrays
+from microrad.lab.recording import Recording, recording_from_arrays
 
 WAVE = 5 + 5 * np.sin(np.arange(4000) * 0.02)
 
@@ -38,6 +38,24 @@ def test_an_absurd_unit_is_told(per_rad, unit, options, words):
     assert words in message
     assert "--output-unit" in message
     assert ("--lever-arm" in message) == bool(options)
+
+
+def test_a_quarter_turn_itself_is_taken_and_the_largest_distance_counts():
+    def moved(most):
+        output = np.column_stack((1e-3 * WAVE, np.where(WAVE > 5, most, 0.0)))
+        return Recording("edge.csv", "", WAVE[:, None], output, 1000.0, ("u",), ("output 0", "output 1"))
+
+    check_travel([moved(math.pi / 2)], "rad")
+    with pytest.raises(IdentificationError, match=r"^edge\.csv: the output 'output 1' moves by 1\.571 rad, a tilt of "):
+        check_travel([moved(math.nextafter(math.pi / 2, 2.0))], "rad")
+    places = [(0.0, 0.0), (0.003, 0.004), (0.006, 0.008), (0.0, 0.001)]
+    check_travel([moved(15.0)], "mm", positions_m=places)
+    with pytest.raises(IdentificationError, match=r"moves by 16 mm over 10 mm, .*\(--lever-arm, --position\)\.$"):
+        check_travel([moved(16.0)], "mm", positions_m=places)
+    check_travel([moved(1e6)], "mm", positions_m=places[:1])
+    check_travel([moved(150.0)], "mm", 0.1, places)  # the lever arm goes before
+    with pytest.raises(IdentificationError, match=r"a tilt of 1\.6 rad, .*\(--output-unit, output_unit\)\.$"):
+        check_travel([moved(1.6e6)], "urad")
 
 
 def test_a_length_without_an_arm_and_an_unknown_unit_are_not_judged():

@@ -10,9 +10,9 @@ import truths
 from microrad.lab.identify import IdentificationError, identify
 from microrad.lab.identify.selection.predictions import Prediction, evidence
 from microrad.lab.identify.selection.roles import roles
-from microrad.lab.identify.selection.splits import split_points
+from microrad.lab.identify.selection.splits import split_points, split_warnings
 from microrad.lab.identify.selection.warnings import use_warnings
-from microrad.lab.recording import recording_from_arrays
+from microrad.lab.recording import Recording, recording_from_arrays
 
 RATE = 2000.0
 PLAYS = ("prandtl_ishlinskii",)
@@ -65,6 +65,86 @@ def test_a_growing_loop_is_split_behind_its_largest_sweep_and_others_in_the_midd
     assert split_points([too_late], None, validated=False) == [5000]
     found = identify([growing([1, 2, 3, 4])], models=PLAYS)
     assert not any("lie outside the fitted drive range" in w for w in found.warnings)
+
+
+def of_drive(drive):
+    """A recording of any length, unchecked."""
+    column = np.asarray(drive, dtype=float)[:, None]
+    return Recording("record", "", column, column.copy(), RATE, ("u",), ("y",))
+
+
+@pytest.mark.parametrize(
+    ("samples", "hold_out", "validated", "split"),
+    [
+        (200, 0.5, False, 100),
+        (199, 0.5, False, None),
+        (198, 0.5, False, None),
+        (1000, 0.1, False, 900),
+        (1000, 0.101, False, 899),
+        (999, 0.1, False, 899),
+        (900, 0.1, False, None),
+        (1000, 0.9, False, 100),
+        (990, 0.9, False, None),
+        (100, 0.0, True, 100),
+        (99, 0.0, True, None),
+    ],
+)
+def test_each_part_has_a_hundred_samples_or_the_split_is_refused(samples, hold_out, validated, split):
+    record = of_drive(np.sin(np.arange(samples)))
+    if split is not None:
+        assert split_points([record], hold_out, validated=validated) == [split]
+        return
+    with pytest.raises(IdentificationError, match=r"^record: \d+ samples to fit and \d+ to check; each part needs at "):
+        split_points([record], hold_out, validated=validated)
+
+
+@pytest.mark.parametrize("validated", [False, True])
+@pytest.mark.parametrize("hold_out", [-0.1, 0.0, 1.0, 1.5, float("nan")])
+def test_a_share_that_is_none_is_refused_and_nothing_is_one_beside_validation(hold_out, validated):
+    record = of_drive(np.sin(np.arange(1000)))
+    if validated and hold_out == 0.0:
+        assert split_points([record], hold_out, validated=True) == [1000]
+        return
+    with pytest.raises(IdentificationError, match=r"^--hold-out \(hold_out\) is .*; give the share of each recording"):
+        split_points([record], hold_out, validated=validated)
+
+
+@pytest.mark.parametrize(
+    ("drive", "split"),
+    [
+        ([0, *[9] * 1999, *[10] * 2000], 2000),  # nine tenths by the middle are enough
+        ([0, *[8.99] * 1999, *[10] * 2000], 2001),
+        ([0, *[8.9] * 1999, *[9.89] * 500, *[9.9] * 500, *[10] * 1000], 2501),  # it ends where 99 % are swept
+        ([0, *[5] * 3798, *[10] * 201], 3800),  # a twentieth is left to judge by
+        ([0, *[5] * 3799, *[10] * 200], 2000),
+        ([0, *[5] * 898, *[10] * 101], 900),  # a hundred samples are left
+        ([0, *[5] * 899, *[10] * 100], 500),
+    ],
+)
+def test_the_split_waits_for_nine_tenths_of_the_range_while_enough_is_left(drive, split):
+    assert split_points([of_drive(drive)], None, validated=False) == [split]
+
+
+def test_a_split_behind_the_middle_is_told_and_so_is_a_part_of_the_range():
+    def told(drive, split, volts=1.0):
+        return split_warnings([of_drive(drive)], [split], volts)
+
+    late = [0, *[5] * 2498, *[10] * 1501]
+    assert split_points([of_drive(late)], None, validated=False) == [2500]
+    assert told(late, 2500) == [
+        "record: the last 38 % are held out instead of half, because only then has the drive swept its range in the "
+        "fitted part."
+    ]
+    assert told(late, 2499) == [
+        "record: the fitted part sweeps 0 V to 5 V of the 0 V to 10 V that were recorded; hold less out, record more "
+        "periods, or give another recording for validation."
+    ]
+    assert "sweeps 0 V to 0.005 V of the 0 V to 0.01 V" in told(late, 2499, 1e-3)[0]
+    assert told(late, 3000) == []  # as it was asked for
+    assert told(late, 4000) == []  # nothing is held out
+    nine_tenths = [0, *[9] * 1999, *[10] * 2000]
+    assert told(nine_tenths, 2000) == told(nine_tenths, 1000) == []
+    assert len(told([0, *[8.99] * 1999, *[10] * 2000], 2000)) == 1
 
 
 # --------------------------------------------------------------------------------------------------------------- roles

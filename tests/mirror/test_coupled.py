@@ -13,7 +13,7 @@ import oracles
 from microrad.core import lti
 from microrad.mirror import coupled
 from microrad.mirror.coupled import Actuator, CoupledMirror, Known, Output
-from microrad.mirror.coupled.spread import changed
+from microrad.mirror.coupled.spread import accepted, changed, directions, drawn, draws, is_one, moved
 from microrad.mirror.hysteresis import BoucWen, PrandtlIshlinskii
 from microrad.mirror.model import Mirror
 from microrad.mission.file import MissionError, load_coupled_mirror
@@ -472,6 +472,167 @@ def test_places_that_do_not_span_the_tilts_are_refused(places, reason):
 
 def test_places_almost_on_a_line_still_span():
     assert np.isfinite(coupled.tilts_and_piston(placed((0.0, 0.0), (0.01, 1e-5), (0.02, 0.0)))).all()
+
+
+def one_state(decay=-1.0, gain=0.0, play=None, thresholds=(0.0, 1.0)):
+    """One real mode, and plays that it drives and that drive it."""
+    plain = made(0, modes=1, actuators=1, outputs=1, bouc_wen=0, plays=1)
+    plays = PrandtlIshlinskii(thresholds, (gain, -2.0 * gain)) if play is None else play
+    parts = {"A": np.array([[decay]]), "B": np.ones((1, 1)), "E": np.ones((1, 1)), "F": np.ones((1, 1))}
+    return replace(plain, mirror=replace(plain.mirror, **parts, C=np.ones((1, 1)), G=np.zeros((1, 1)), plays=(plays,)))
+
+
+@pytest.mark.parametrize(
+    ("mirror", "one"),
+    [
+        (one_state(), True),
+        (one_state(decay=0.0), False),
+        (one_state(gain=1.0), False),  # the first play, which never sticks, takes all of the decay
+        (one_state(gain=0.99), True),
+        (one_state(gain=-1.0), False),  # both together do, where they slide
+        (one_state(gain=-0.99), True),
+        (one_state(thresholds=(0.0, 0.0)), False),
+        (made(0, modes=0), True),
+        (made(0, modes=0, plays=0), True),
+    ],
+)
+def test_a_mirror_that_grows_or_whose_thresholds_meet_is_none(mirror, one):
+    assert is_one(mirror) is one
+
+
+@pytest.mark.parametrize(
+    ("model", "one"),
+    [
+        (BoucWen(0.1, 0.0, 0.1, 0.0, 2.0, 0.5), True),
+        (BoucWen(0.1, 0.0, 0.1, 0.0, 2.0, 1.999), True),
+        (BoucWen(0.1, 0.0, 0.1, 0.0, 2.0, 2.0), False),
+        (BoucWen(0.1, 0.0, 0.1, 0.0, 2.0, -2.0), False),
+        (BoucWen(0.1, 0.0, 0.1, 0.0, 2.0, 1.5, gamma_1_v=0.4), True),
+        (BoucWen(0.1, 0.0, 0.1, 0.0, 2.0, 1.5, gamma_1_v=0.5), False),
+        (BoucWen(0.1, 0.0, 0.1, 0.0, 2.0, 1.5, gamma_1_v=-0.5), False),
+        (BoucWen(0.1, 0.0, 0.1, 0.0, 2.0, 1.5, gamma_1_v=0.5, eta_1_v=0.5), True),
+        (BoucWen(0.1, 0.0, 0.1, 0.0, 2.0, 1.5, eta_1_v=0.5), False),
+        (BoucWen(0.1, 0.0, 0.1, 0.0, 2.0, 0.5, exponent=0.999), False),
+    ],
+)
+def test_a_mirror_whose_hysteresis_grows_without_bound_is_none(model, one):
+    plain = made(0, modes=0, plays=0)
+    assert is_one(replace(plain, mirror=replace(plain.mirror, bouc_wen=(model,)))) is one
+
+
+def test_every_number_of_a_mirror_is_changed_where_its_key_says():
+    mirror = whole()
+    own = mirror.mirror
+    by = {
+        "matrices.B.2.1": 0.5,
+        "matrices.B.1.2": -0.25,
+        "matrices.K.3.2": 0.125,
+        "hysteresis.2.thresholds.2": 0.25,
+        "hysteresis.2.weights.2": -1.0,
+        "hysteresis.3.polynomial.2": 0.5,
+        "recording.delay": 1e-4,
+    }
+    found = changed(mirror, by)
+    for name in "ABCDEFGK":
+        expected = getattr(own, name).copy()
+        if name == "B":
+            expected[1, 0] += 0.5
+            expected[0, 1] -= 0.25
+        if name == "K":
+            expected[2, 1] += 0.125
+        np.testing.assert_array_equal(getattr(found.mirror, name), expected)
+    _, second, third = found.mirror.bank
+    assert second == replace(own.bank[1], thresholds_v=(0.2, 0.65), weights_rad_v=(0.3, -1.1))
+    assert third == replace(own.bank[2], polynomial_rad=(0.1, 0.3, 1 / 3))
+    assert found.mirror.bank[0] == own.bank[0]
+    assert found.delay_s == pytest.approx(mirror.delay_s + 1e-4)
+    same(changed(mirror, {}), mirror)
+
+
+def test_what_is_at_least_0_stays_so_and_a_decay_keeps_a_tenth():
+    mirror = whole()
+    by = {
+        "hysteresis.2.thresholds.1": -1.0,
+        "hysteresis.2.weights.1": -1.0,
+        "hysteresis.2.widening": -1.0,
+        "hysteresis.1.epsilon": -1.0,
+        "recording.delay": -1.0,
+    }
+    found = changed(mirror, by)
+    plays = found.mirror.bank[1]
+    assert (plays.thresholds_v, plays.weights_rad_v, plays.widening_s) == ((0.0, 0.4), (0.0, -0.1), 0.0)
+    assert found.mirror.bank[0].epsilon_rad_v == -1.02
+    assert found.delay_s == 0.0
+
+    roots = [(-20.0, 30.0), (-10.0, -40.0), (-5.0, 0.0)]
+    modal = replace(mirror, mirror=replace(mirror.mirror, A=lti.modal_matrix(roots)))
+    for key, change, at, expected in (
+        ("decay.1", 5.0, 0, (-25.0, 30.0)),
+        ("decay.1", -17.0, 0, (-3.0, 30.0)),
+        ("decay.1", -19.0, 0, (-2.0, 30.0)),
+        ("decay.3", -50.0, 2, (-0.5, 0.0)),
+        ("frequency.1", -12.0, 0, (-20.0, 18.0)),
+        ("frequency.2", 5.0, 1, (-10.0, -35.0)),
+        ("frequency.2", -5.0, 1, (-10.0, -45.0)),
+        ("frequency.2", 50.0, 1, (-10.0, -1e-9)),
+        ("frequency.1", -50.0, 0, (-20.0, 1e-9)),
+    ):
+        moved_roots = coupled.modes(changed(modal, {f"modes.{key}": change}).mirror.A)
+        assert moved_roots[at] == pytest.approx(expected, rel=1e-12), key
+        assert [each for i, each in enumerate(moved_roots) if i != at] == [r for i, r in enumerate(roots) if i != at]
+
+
+def known_by_each():
+    """The whole mirror, with an error of each number that it names."""
+    mirror = whole()
+    return replace(mirror, known=replace(mirror.known, standard_errors=np.array([1e-6, 0.1, 0.5, 3e-3, 0.05])))
+
+
+def test_a_mirror_is_moved_by_its_errors_along_the_directions_that_it_is_known_in():
+    mirror = known_by_each()
+    assert directions(mirror) == 3
+    normals = np.array([0.5, -1.0, 0.25])
+    by = mirror.known.standard_errors * (mirror.known.factor @ normals)
+    found = moved(mirror, normals)
+    same(found, replace(changed(mirror, dict(zip(mirror.known.parameters, by.tolist(), strict=True))), known=None))
+    assert found.mirror.B[1, 0] - mirror.mirror.B[1, 0] == pytest.approx(by[2])
+    same(moved(mirror, np.zeros(3)), replace(mirror, known=None))
+
+
+def test_draws_are_mirrors_and_the_first_ones_are_alike_for_a_larger_count():
+    mirror = known_by_each()
+    two, three = (draws(mirror, count, 4) for count in (2, 3))
+    assert len(two) == 2 and len(three) == 3
+    for one, other in zip(two, three, strict=False):
+        same(one, other)
+    assert not np.array_equal(three[0].mirror.B, three[1].mirror.B)
+    for found, normals in drawn(mirror, 2, 4):
+        same(found, moved(mirror, normals))
+    np.testing.assert_array_equal(accepted(mirror, np.zeros((2, 3)), lambda i: iter(())), np.zeros((2, 3)))
+    unknown = replace(mirror, known=None)
+    assert draws(unknown, 3, 4) == ()
+    for ask in (lambda: drawn(unknown, 1, 0), lambda: directions(unknown), lambda: moved(unknown, np.zeros(3))):
+        with pytest.raises(ValueError, match=r'the mirror "made of draws" has no table uncertainty'):
+            ask()
+
+
+def test_a_draw_that_is_no_mirror_is_drawn_again_and_without_end_refused(monkeypatch):
+    """Of an exponent of 1 half of the draws lie below it."""
+    plain = whole()
+    first = replace(plain.mirror.bouc_wen[0], exponent=1.0)
+    known = Known(("hysteresis.1.exponent",), np.array([0.1]), np.ones((1, 1)))
+    mirror = replace(plain, mirror=replace(plain.mirror, bouc_wen=(first,)), known=known)
+    asked = []
+
+    def again(row):
+        asked.append(row)
+        return iter(np.array([[-0.5], [0.25], [0.75]]))
+
+    found = accepted(mirror, np.array([[1.0], [-1.0], [0.0]]), again)
+    np.testing.assert_array_equal(found, [[1.0], [0.25], [0.0]])
+    monkeypatch.setattr("microrad.mirror.coupled.spread.TRIES", 2)
+    with pytest.raises(ValueError, match=r"^2 draws from the uncertainty of 'made of draws' in a row run away, have"):
+        accepted(mirror, np.array([[-1.0]]), again)
 
 
 def test_every_change_of_an_element_is_made():

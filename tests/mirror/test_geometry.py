@@ -101,8 +101,9 @@ def test_a_singular_coupling_is_refused_with_the_direction_that_is_not_driven():
     both_move_the_diagonal = Geometry("optical", coupling=((1.0, 1.0), (1.0, 1.0 + 1e-6)))
     with pytest.raises(
         ValueError,
-        match=r"two-axis mirror is singular: at 135\.0 degrees from x towards y it moves the line of sight "
-        r"4e\+06 times less .*at most 10000.* check coupling and incidence_rad",
+        match=r"^geometry: the two-axis mirror is singular: at 135\.0 degrees from x towards y it moves the line of "
+        r"sight 4e\+06 times less than across that direction \(at most 10000 can be decoupled\); check coupling and "
+        r"incidence_rad$",
     ):
         geometry.outputs_matrix(both_move_the_diagonal)
     with pytest.raises(ValueError, match=r"tripod mirror is singular: at 90\.0 degrees .* inf times less"):
@@ -111,6 +112,25 @@ def test_a_singular_coupling_is_refused_with_the_direction_that_is_not_driven():
         )
     nearly = Geometry("optical", coupling=((1.0, 0.0), (0.0, 2e-4)))  # 5000 times, still invertible
     assert geometry.outputs_matrix(nearly)[1, 1] == pytest.approx(5000.0, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("coupling", "words"),
+    [
+        (((1.0, -1.0), (-1.0, 1.0 + 1e-6)), r"45\.0 degrees .* 4e\+06 times less"),
+        (((-1.0, 1.0), (1.0, -1.0 - 1e-6)), r"45\.0 degrees .* 4e\+06 times less"),
+        (((0.0, 0.0), (0.0, -1.0)), r"0\.0 degrees .* inf times less"),
+        (((0.0, 0.0), (0.0, 0.0)), "[0-9.]+ degrees .* inf times less"),
+    ],
+)
+def test_the_direction_that_is_not_driven_is_named_from_x_towards_y_in_a_half_turn(coupling, words):
+    with pytest.raises(ValueError, match=f"mirror is singular: at {words}"):
+        geometry.outputs_matrix(Geometry("optical", coupling=coupling))
+
+
+def test_a_tripod_has_three_outputs_and_another_mirror_two():
+    assert Geometry("optical", layout="tripod", actuator_radius_m=0.01).outputs == 3
+    assert Geometry("optical", actuator_radius_m=0.01).outputs == Geometry("optical").outputs == 2
 
 
 @pytest.mark.parametrize(
@@ -127,7 +147,8 @@ def test_a_singular_coupling_is_refused_with_the_direction_that_is_not_driven():
         ({"coupling": ((1.0, 0.0), (0.0, math.nan))}, "coupling is .*nan.*; give two rows of two finite numbers"),
         ({"coupling": ((1.0, 0.0),)}, "coupling is .* for none"),
         ({"layout": "tripod"}, "actuator_radius_m is None; give the radius of the circle on which the tripod's three"),
-        ({"layout": "tripod", "actuator_radius_m": 0.0}, "actuator_radius_m is 0.0"),
+        ({"layout": "tripod", "actuator_radius_m": 0.0}, "actuator_radius_m is 0.0; .*, in m and above 0$"),
+        ({"layout": "tripod", "actuator_radius_m": math.inf}, "actuator_radius_m is inf"),
         ({"layout": "two-axis", "actuator_radius_m": -0.01}, "actuator_radius_m is -0.01"),
     ],
 )
@@ -183,8 +204,38 @@ def test_point_ahead_on_the_mirror_takes_its_share_on_its_axis_alone():
     assert y.total_rad == pytest.approx(300e-6, rel=1e-12)
     elsewhere = stroke_budget(Geometry("optical"), demand(on_mirror=False), **PAPER)[0].lines[1]
     assert elsewhere.value == 0.0  # a term made elsewhere is still a line
-    assert "made by another mirror" in elsewhere.basis
-    assert "71 µrad" in elsewhere.basis
+    assert elsewhere.basis == "half range at the line of sight: x 71 µrad, y 0 rad; made by another mirror"
+    assert x.lines[1].basis == "half range at the line of sight: x 71 µrad, y 0 rad; along (1, 0)"
+    assert y.lines[1].basis == "half range at the line of sight: x 71 µrad, y 0 rad; along (0, 1)"
+    assert {line.regime for line in x.lines} == {"both axes at their worst together"}
+
+
+def test_a_need_that_is_just_met_fits_and_the_least_more_does_not():
+    """In the worst case and in the root sum square, each by its own sum."""
+    wanted = demand(bias=(400e-6, 0.0))
+
+    def on(travel_rad, usable_rad=None):
+        return stroke_budget(
+            Geometry("optical"), wanted, travel_rad=travel_rad, travel_angle="optical", usable_travel_rad=usable_rad
+        )[0]
+
+    needed, rss = on(1e-2).needed_rad, on(1e-2).needed_rss_rad
+    assert (needed, rss) == (pytest.approx(700e-6, rel=1e-12), pytest.approx(500e-6, rel=1e-12))
+    for x in (on(2.0 * needed), on(1e-2, 2.0 * needed), on(2.0 * needed, 2.0 * needed)):
+        assert (x.margin_rad, x.fits, x.fits_rss) == (0.0, True, True)
+    for x in (on(2.0 * rss), on(1e-2, 2.0 * rss)):
+        assert (x.margin_rss_rad, x.fits, x.fits_rss) == (0.0, False, True)
+    assert not on(1.999 * needed).fits
+    assert not on(1.999 * rss).fits_rss
+
+
+def test_the_budget_of_a_tripod_is_that_of_its_actuators():
+    tripod = Geometry("mechanical", layout="tripod", actuator_radius_m=0.02)
+    budgets = stroke_budget(tripod, demand(), travel_rad=2.5e-3, travel_angle="mechanical")
+    assert [b.name for b in budgets] == [b.label for b in budgets] == ["actuator 1", "actuator 2", "actuator 3"]
+    assert [b.label for b in stroke_budget(Geometry("optical"), demand(), **PAPER)] == ["axis x", "axis y"]
+    # 300 µrad outside along x are 150 µrad of tilt, and as much of actuator 1's extension over the radius
+    assert budgets[0].needed_rad == pytest.approx(150e-6, rel=1e-12)
 
 
 def test_magnification_multiplies_and_a_mechanical_angle_halves():
@@ -263,7 +314,13 @@ def test_lines_carry_their_sources_and_no_demand_leaves_any_magnification():
     [
         ({"travel_rad": 0.0}, "travel_rad is 0; give the range from stop to stop, above 0 rad"),
         ({"travel_rad": math.nan}, "travel_rad is nan"),
-        ({"usable_travel_rad": 3e-3}, r"usable_travel_rad is 0\.003, of a travel of 2\.5 mrad .* not beyond it"),
+        ({"travel_rad": math.inf}, "travel_rad is inf"),
+        (
+            {"usable_travel_rad": 3e-3},
+            r"usable_travel_rad is 0\.003, of a travel of 2\.5 mrad from stop to stop; give what the drive range "
+            "leaves of that travel, above 0 rad and not beyond it$",
+        ),
+        ({"usable_travel_rad": 0.0}, "usable_travel_rad is 0, of a travel"),
         ({"usable_travel_rad": math.nan}, "usable_travel_rad is nan"),
         ({"travel_angle": "line-of-sight"}, 'travel_angle is \'line-of-sight\'; choose "optical" or "mechanical"'),
     ],

@@ -9,7 +9,8 @@ from numpy.testing import assert_allclose
 
 import oracles
 from microrad import mirror
-from microrad.mirror.hysteresis import BoucWen, Creep, PrandtlIshlinskii
+from microrad.core.units import LEAST, MOST
+from microrad.mirror.hysteresis import BoucWen, Creep, PrandtlIshlinskii, secant_gain, steepest_slope
 from oracles import bouc_wen_response, lag_response, widening_play_response
 
 BOUC_WEN = BoucWen(50e-6, 0.0, -8e-6, 4e-4, 0.3, 0.1, rate_limit_v_s=2000.0, bias_v=5.0)
@@ -80,8 +81,107 @@ def test_only_a_model_that_never_turns_is_admissible():
     assert not replace(BOUC_WEN, epsilon_rad_v=-40e-6).admissible
     assert replace(BOUC_WEN, d1_rad_v=-50e-6, epsilon_rad_v=8e-6).admissible
     assert PLAYS.admissible
-    assert replace(PLAYS, weights_rad_v=(40e-6, -30e-6, 4e-6)).admissible
-    assert not replace(PLAYS, weights_rad_v=(40e-6, -50e-6, 30e-6)).admissible
+    for sign in (1.0, -1.0):
+        of = {
+            weights: tuple(sign * w for w in weights)
+            for weights in ((4.0, -3.0, 1.0), (4.0, -4.0, 1.0), (4.0, -5.0, 3.0))
+        }
+        assert [replace(PLAYS, weights_rad_v=weights).admissible for weights in of.values()] == [True, True, False]
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize(("epsilon", "stays"), [(-7.5, True), (-8.0, True), (-8.5, False), (8.0, True)])
+def test_a_model_that_only_just_stands_still_behind_a_reversal_is_admissible(sign, epsilon, stays):
+    """Both decays are 1 per volt, so that h turns by twice epsilon: at 8 of 16 nothing is left of the slope."""
+    model = BoucWen(16.0 * sign, 0.0, epsilon * sign, 0.0, 1.0, 0.0)
+    assert model.reversal_slope_rad_v() == sign * (16.0 + 2.0 * epsilon)
+    assert model.admissible is stays
+
+
+def test_a_model_that_only_just_stands_still_has_no_wrong_way_and_no_rate_to_spare():
+    model = BoucWen(16.0, 0.0, -8.0, 0.0, 1.0, 0.0)
+    assert (model.wrong_way_rad, model.admissible_rate_v_s) == (0.0, math.inf)
+    assert replace(model, delta_s_v=1e-3).admissible_rate_v_s == 0.0
+    assert replace(model, epsilon_rad_v=-4.0, delta_s_v=1e-3).admissible_rate_v_s == pytest.approx(1e3 * math.log(2.0))
+    assert replace(model, epsilon_rad_v=-4.0, delta_s_v=-1e-3).admissible_rate_v_s == math.inf
+
+
+@pytest.mark.parametrize(("gamma_1_v", "eta_1_v"), [(0.5, 0.2), (-0.5, 0.2), (0.1, -0.6)])
+@pytest.mark.parametrize("epsilon", [-1.0, -0.55, -0.4, -0.25, 0.4])
+def test_an_asymmetric_model_is_as_admissible_turned_over(epsilon, gamma_1_v, eta_1_v):
+    """A sensor turned over turns the signs of d1, epsilon, beta and gamma: the same mirror."""
+    model = BoucWen(1.0, 0.0, epsilon, 0.0, 1.0, 0.2, gamma_1_v=gamma_1_v, eta_1_v=eta_1_v)
+    turned = BoucWen(-1.0, 0.0, -epsilon, 0.0, 1.0, -0.2, gamma_1_v=-gamma_1_v, eta_1_v=eta_1_v)
+    assert_allclose(turned.response(DRIVE, STEP), -model.response(DRIVE, STEP), rtol=1e-12)
+    assert model.admissible is turned.admissible is (model.reversal_slope_rad_v() >= 0.0)
+    assert model.wrong_way_rad == turned.wrong_way_rad
+    assert (model.wrong_way_rad > 0.0) == (not model.admissible)
+    for delta in (0.0, 1e-3):
+        rates = {replace(each, delta_s_v=delta).admissible_rate_v_s for each in (model, turned)}
+        assert len(rates) == 1 and (rates == {0.0}) == (not model.admissible)
+
+
+@pytest.mark.parametrize("gain", [50e-6, -50e-6])
+def test_a_gain_by_itself_turns_with_its_drive_at_once(gain):
+    """Nothing is divided by the decays, which are 0."""
+    straight = mirror.Mirror.of(gain).bouc_wen[0]
+    assert straight.admissible
+    assert straight.reversal_slope_rad_v(1e3) == gain
+    assert (straight.settled_rad, straight.wrong_way_rad, straight.admissible_rate_v_s) == (
+        0.0,
+        0.0,
+        math.inf,
+    )
+    assert steepest_slope(straight) == 50e-6
+    assert replace(straight, exponent=2.0).settled_rad == 0.0
+
+
+def test_the_steepest_slope_of_h_where_a_decay_is_0():
+    """h grows by epsilon a volt where it does not decay, and is taken within a volt; then it falls with its decay."""
+    model = BoucWen(1.0, 0.0, -0.5, 0.0, 0.0, 0.0)
+    assert steepest_slope(model) == 1.5
+    assert steepest_slope(replace(model, alpha_1_v=1.0, beta_1_v=1.0)) == 1.0 + 0.5 * (1.0 + 2.0)
+    assert steepest_slope(replace(model, alpha_1_v=1.0)) == 1.0 + 0.5 * 2.0
+    growing = replace(model, alpha_1_v=1.0, beta_1_v=2.0)  # decays 3 and -1
+    assert steepest_slope(growing) == pytest.approx(1.0 + 0.5 * (1.0 + 3.0 * (math.e - 1.0)))
+    assert steepest_slope(replace(model, beta_1_v=1.0)) == pytest.approx(1.0 + 0.5 * math.e)
+
+
+def test_where_plays_lose_their_slope_the_secant_is_the_slow_gain():
+    """Behind 2 rad the operator holds, or falls: no drive makes a larger output."""
+    assert secant_gain(PrandtlIshlinskii((0.0, 1.0), (2.0, -2.0)), 3.0) == 0.0
+    assert secant_gain(PrandtlIshlinskii((0.0, 1.0), (2.0, -3.0)), 3.0) == -1.0
+    assert secant_gain(PrandtlIshlinskii((0.0, 1.0), (2.0, -3.0)), 1.0) == 2.0
+
+
+@pytest.mark.parametrize("least", [True, False])
+def test_steps_and_loops_are_taken_at_the_ends_of_what_a_number_may_be(least):
+    end, beyond = (LEAST, 0.5 * LEAST) if least else (MOST, 2.0 * MOST)
+    assert PLAYS.response([1.0, 2.0], end)[1] == pytest.approx(86e-6)
+    assert PLAYS.loop(1.0, end, 8).freq_hz == end
+    assert np.ptp(PLAYS.loop(end, 1.0, 8).output_rad) > 0.0
+    for call in (
+        lambda: PLAYS.response([1.0], beyond),
+        lambda: PLAYS.loop(1.0, beyond),
+        lambda: PLAYS.loop(beyond, 1.0),
+    ):
+        with pytest.raises(
+            ValueError, match=r"step_s is .* above 0|of a loop is .* (V|Hz): give a finite number above 0"
+        ):
+            call()
+    with pytest.raises(ValueError, match=r"^amplitude_v of a loop is .* V: "):
+        PLAYS.loop(beyond, 1.0)
+    with pytest.raises(ValueError, match=r"^a loop of 7 samples a period has no shape: give 8 or more, better 500$"):
+        PLAYS.loop(1.0, 1.0, 7)
+
+
+def test_a_loop_that_does_not_settle_is_that_of_the_period_1024():
+    model = BoucWen(0.0, 0.0, 8e-6, 0.0, 1e-4, 0.0, gamma_1_v=1e-5)
+    one = np.sin(2.0 * np.pi * np.arange(1, 9) / 8)
+    run = model.response(np.tile(one, 4096), 1.0 / 8)
+    found = model.loop(1.0, 1.0, 8).output_rad
+    assert_allclose(found, run[1023 * 8 : 1024 * 8], rtol=0, atol=1e-9 * np.ptp(found))
+    assert np.max(np.abs(run[-8:] - found)) > 1e-3 * np.ptp(found)
 
 
 @pytest.mark.promise("choose-3")

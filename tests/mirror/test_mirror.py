@@ -13,6 +13,7 @@ from scipy.signal import lsim
 import oracles
 from loops import side_by_side
 from microrad.core import kernels, lti
+from microrad.core.units import LEAST, MOST
 from microrad.loop import control
 from microrad.loop import sine_run as simulate
 from microrad.mirror import hysteresis
@@ -531,10 +532,117 @@ def test_the_summary_warns_of_the_papers_mirror(table):
     assert zero.startswith("zero at 0.0672 Hz lies outside")
     assert gain.startswith("gain at DC 0.16255 is not the gain in the band, 0.079")
     assert_allclose([summary.dc_gain, summary.normalised_by], [0.16255, 0.08305], atol=5e-6)
-    text = str(summary)
-    assert text.count("warning: ") == 4
-    assert "pole at 2543 Hz, damping 0.357" in text
-    assert "zero at 56.64 Hz" in text
+    assert str(summary).split("\n") == [
+        "Core Tomorrow piezo fast steering mirror: cascade, Bouc-Wen hysteresis",
+        "  linear part divided by 0.08305, its magnitude at 2 Hz",
+        "  gain at DC 0.16255, in the flat band from 1 to 254 Hz 0.07917 to 0.08315",
+        "  pole at 2543 Hz, damping 0.357",
+        "  pole at 1553 Hz, damping 1.000",
+        "  pole at 54.22 Hz, damping 1.000",
+        "  pole at 0.03431 Hz, damping 1.000",
+        "  zero at 56.64 Hz, damping 1.000",
+        "  zero at 0.06719 Hz, damping 1.000",
+        "  rate in the hysteresis held at 3770 V/s; clamped samples are counted",
+        *(f"  warning: {each}" for each in summary.warnings),
+    ]
+    assert reversal.endswith("so the modelled mirror first moves the wrong way, by 9.2 µrad on a slow drive")
+    assert pole.endswith("(1 to 5000 Hz): drift fitted as dynamics")
+
+
+def with_linear(table, **changed):
+    """The mirror with another linear part, of roots where they are given."""
+    if "poles_hz" in changed:
+        none = {"zeros_hz": None, "zero_dampings": None}
+        changed = {"numerator": None, "denominator": None, **none, **changed}
+    return table.model_copy(update={"linear": table.linear.model_copy(update=changed)})
+
+
+def about_the_linear_part(table, **changed):
+    """The warnings of such a mirror about its linear part."""
+    return mirror_summary.summarise(with_linear(table, **changed)).warnings[1:]
+
+
+@pytest.mark.parametrize(
+    ("pole_hz", "words"),
+    [
+        (0.5, ["pole at 0.5 Hz lies outside the excited band (1 to 4096 Hz): drift fitted as dynamics"]),
+        (1.0, []),
+        (4096.0, []),
+        (8192.0, ["pole at 8.19e+03 Hz lies outside the excited band (1 to 4096 Hz): extrapolated"]),
+    ],
+)
+def test_a_root_at_an_end_of_the_excited_band_lies_in_it(table, pole_hz, words):
+    """Roots of powers of two, which 2 pi scales without rounding; the gain at DC is another matter."""
+    found = about_the_linear_part(table, poles_hz=(pole_hz,), pole_dampings=(1.0,), excited_to_hz=4096.0)
+    assert [each for each in found if not each.startswith("gain at DC")] == words
+
+
+@pytest.mark.parametrize(("share", "warned"), [(0.88, True), (0.92, False), (1.08, False), (1.12, True)])
+def test_a_gain_at_dc_of_a_tenth_below_the_band_is_warned_of_as_above_it(table, share, warned):
+    """A zero beside a slow pole at 1 mHz: the gain at DC is that in the band times their ratio."""
+    roots = {"poles_hz": (1e-3, 4e4), "pole_dampings": (1.0, 1.0)}
+    made = with_linear(table, **roots, zeros_hz=(share * 1e-3,), zero_dampings=(1.0,))
+    summary = mirror_summary.summarise(made)
+    assert summary.dc_gain == pytest.approx(share, rel=1e-4)
+    said = [each for each in summary.warnings if each.startswith("gain at DC")]
+    assert [each[: each.index(",")] for each in said] == [
+        f"gain at DC {summary.dc_gain:.5f} is not the gain in the band"
+    ] * warned
+
+
+@pytest.mark.parametrize(
+    ("poles_hz", "damping", "band"),
+    [
+        ((2000.0,), 0.5, (1.0, 200.0)),
+        ((5.0,), 0.5, (1.0, 1.0)),
+        ((2000.0,), 1.0, (1.0, 5000.0)),
+        ((8e4,), 0.1, (1.0, 5000.0)),
+    ],
+)
+def test_the_flat_band_ends_at_a_tenth_of_the_lowest_resonance_and_within_what_was_excited(
+    table, poles_hz, damping, band
+):
+    summary = mirror_summary.summarise(with_linear(table, poles_hz=poles_hz, pole_dampings=(damping,)))
+    assert_allclose(summary.flat_band_hz, band, rtol=1e-12)
+
+
+def test_a_zero_at_rest_is_real(table):
+    """A washout passes no constant: its zero has no size to take a damping of."""
+    summary = mirror_summary.summarise(with_linear(table, numerator=(1.0, 0.0), denominator=(1.0, 1e4, 1e8)))
+    assert "\n  zero at 0 Hz, damping 1.000\n" in str(summary)
+    assert summary.dc_gain == pytest.approx(0.0, abs=1e-12)
+
+
+def test_the_summary_of_plays_says_what_creep_adds(table):
+    """15 % of 80 µrad/V in the end."""
+    plays = PrandtlIshlinskii((0.0, 1.0), (60e-6, 20e-6))
+    creep = Creep((8e-6, 3e-6, 1e-6), (0.1, 1.0, 25.0))
+    text = str(replace(mirror_summary.summarise(table), model=plays, creep=creep))
+    assert text.startswith("Core Tomorrow piezo fast steering mirror: cascade, Prandtl-Ishlinskii hysteresis\n")
+    assert "\n  creep adds 15 % of the gain in the long run, with lags from 0.1 s to 25 s\n" in text
+    assert "creep" not in str(mirror_summary.summarise(table))
+
+
+def test_a_slope_that_only_just_stays_is_not_warned_of(table):
+    """Both decays are 1 per volt: half of the slope at rest is 8 of 16, and nothing is left of it there."""
+    of = {"d1_rad_v": 16e-6, "epsilon_rad_v": -8e-6, "alpha_1_v": 1.0, "beta_1_v": 0.0}
+
+    def warned(rate_limit_v_s, **changed):
+        bouc_wen = table.bouc_wen.model_copy(update=of | changed)
+        made = table.model_copy(update={"bouc_wen": bouc_wen, "rate_limit_v_s": rate_limit_v_s, "linear": None})
+        return [each for each in mirror_summary.summarise(made).warnings if "reversal" in each]
+
+    assert warned(100.0, delta_s_v=0.0) == []
+    (wrong,) = warned(100.0, delta_s_v=0.0, epsilon_rad_v=-9e-6)
+    assert wrong.startswith(
+        "not physical at reversals: the local slope falls to -0.002 mrad/V against d1 = 0.016 mrad/V"
+    )
+    limit = hysteresis.BoucWen(16e-6, 0.0, -4e-6, 1e-3, 1.0, 0.0).admissible_rate_v_s
+    assert 693.0 < limit < 694.0
+    assert warned(limit, delta_s_v=1e-3, epsilon_rad_v=-4e-6) == []
+    assert warned(limit + 1e-6, delta_s_v=1e-3, epsilon_rad_v=-4e-6) == [
+        "the slope after a reversal stays positive only up to 693 V/s before the reversal"
+    ]
 
 
 def test_the_summary_warns_of_nothing_when_there_is_nothing(tmp_path):
@@ -584,6 +692,47 @@ def test_a_pole_is_called_unstable_where_it_grows(table, damps, unstable):
     made = table.model_copy(update={"linear": table.linear.model_copy(update=changed)})
     warnings = [each for each in mirror_summary.summarise(made).warnings if "unstable" in each]
     assert warnings == ["unstable pole at 1.59e+03 Hz"] * unstable
+
+
+@pytest.mark.parametrize(
+    ("model", "counts"),
+    [
+        (PLAYS, [1, 2]),
+        (PrandtlIshlinskii((0.0,), (0.06e-3,)), [1]),
+        (PrandtlIshlinskii((0.4, 1.5), (0.06e-3, 0.02e-3)), [2]),
+    ],
+)
+def test_plays_are_split_only_into_a_gain_and_what_is_left(model, counts):
+    """Behind an additive linear part: what has no play at 0, or no other, stays one operator."""
+    whole = mirror.assemble("axis", "additive", RESONANT[0], model)
+    assert [len(each.thresholds_v) for each in whole.plays] == counts
+    assert [w for each in whole.plays for w in each.weights_rad_v] == list(model.weights_rad_v)
+    assert whole.K[0].tolist() == [0.0, 1.0][: len(counts)]
+    assert not mirror.assemble("axis", "additive", RESONANT[0], ADMISSIBLE).bouc_wen[0].epsilon_rad_v
+
+
+def test_one_drive_of_a_mirror_of_two_outputs_is_answered_by_both():
+    system = lti.StateSpace(np.diag([-100.0, -300.0]), np.ones((2, 1)), np.diag([100.0, 600.0]), np.zeros((2, 1)))
+    two = Mirror.of_system(system)
+    drive = zigzag(4)
+    found = two.response(drive, STEP)
+    assert found.shape == (drive.size, 2)
+    assert_array_equal(found, two.response(drive[:, None], STEP))
+    for j in range(2):
+        one = lti.StateSpace(system.A, system.B, system.C[j : j + 1], np.zeros((1, 1)))
+        assert Mirror.of_system(one).response(drive, STEP).shape == drive.shape
+        assert Mirror.of_system(one).response(drive[:, None], STEP).shape == (drive.size, 1)
+        assert_allclose(Mirror.of_system(one).response(drive, STEP), found[:, j], rtol=1e-12, atol=1e-18)
+
+
+def test_a_step_that_is_too_long_for_what_is_fed_back_names_one_that_keeps_half_of_an_error():
+    with pytest.raises(
+        ValueError, match=r"^mirror 'stiffening': .* no contraction at a step of 0\.01 s; use"
+    ) as caught:
+        mirror.discretise(stiffening(20.0), 0.01)
+    named = float(re.search(r"at most (\S+) s, or", str(caught.value))[1])
+    assert mirror.contraction(stiffening(20.0), named) < 0.5 <= mirror.contraction(stiffening(20.0), 2.01 * named)
+    mirror.discretise(stiffening(20.0), named)
 
 
 @pytest.mark.parametrize("bottom", [[1.0, 2.0, 3.0], 4.0])
@@ -638,6 +787,11 @@ def test_a_softer_mirror_for_small_drives():
         ((5e-5, [1.0], [1e-8, nan, 1.0]), "rows of finite coefficients"),
         ((5e-5, [1j], [1e-8, 1e-4, 1.0]), "numerator of mirror 'mirror': no array of real numbers"),
         ((5e-5, [], [1e-8, 1e-4, 1.0]), "rows of finite coefficients"),
+        ((5e-5, [1.0], [0.0, 1.0]), "a numerator of 1 and a denominator of 2 coefficients: give one that is proper"),
+        ((5e-5, [1.0], [1.0, 0.0]), "a denominator of 2 coefficients: give one that is proper and stable"),
+        ((5e-5, [1.0, 0.0], [1.0, 1e4, 1e8]), "a numerator of 2 and .* and that passes a constant"),
+        ((5e-5, [1.0, 1.0, 1.0], [1.0, 1.0]), "a numerator of 3 and a denominator of 2 coefficients: give one that"),
+        ((5e-5, [1.0, 2.0], [1.0, 1.0]), "numerator of order 1 over denominator of order 1: not strictly proper"),
         ((5e-5, [[1.0]], [1e-8, 1e-4, 1.0]), "rows of finite coefficients"),
     ],
 )
@@ -650,9 +804,25 @@ def test_a_mirror_refuses_drives_steps_and_frequencies_that_are_none():
     found = Mirror.of(5e-5, [1.0], [1 / 6000**2, 0.8 / 6000, 1.0])
     for call in (
         lambda: found.response([1.0, 2.0], nan),
+        lambda: found.response([1.0, 2.0], 0.5 * LEAST),
+        lambda: found.response([1.0, 2.0], 2.0 * MOST),
         lambda: found.response([1.0, 2.0j], 1e-4),
         lambda: found.frequency_response([1.0, nan]),
         lambda: found.frequency_response([[1.0, 2.0]]),
     ):
         with pytest.raises(ValueError, match="give"):
             call()
+    straight = Mirror.of(5e-5)
+    for step_s in (LEAST, MOST):
+        assert_allclose(straight.response([1.0, 2.0], step_s), [5e-5, 1e-4])
+
+
+@pytest.mark.parametrize("real", [0.0, 1.0])
+def test_a_linear_system_without_decay_is_refused(real):
+    system = lti.StateSpace(np.array([[real]]), np.ones((1, 1)), np.ones((1, 1)), np.zeros((1, 1)))
+    with pytest.raises(
+        ValueError, match="linear system of mirror 'mine' is not stable: every pole has to have a decay"
+    ):
+        Mirror.of_system(system, "mine")
+    through = lti.StateSpace(np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), np.array([[3e-5]]))
+    assert_allclose(Mirror.of_system(through).response([2.0], 1.0), [6e-5])

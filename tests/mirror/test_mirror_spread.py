@@ -293,6 +293,45 @@ def test_the_spread_of_the_slow_gain_follows_from_the_table(read):
     assert mirror_spread.relative_spread(read(PLAYS + table(["linear.poles.1", "creep.weights"], [0.1, 0.2]))) == 0.0
 
 
+def test_parameters_are_values_in_si_units_and_a_list_that_scales_together_is_its_factor(read):
+    mirror = read(BOUC_WEN + table(NAMES, ERRORS))
+    assert mirror_spread.parameter_units(mirror) == dict(zip(NAMES, ("rad/V", "rad/V", "Hz", "", ""), strict=True))
+    assert mirror_spread.parameter_units(read(PLAYS + table(["prandtl_ishlinskii.weights.3"], [0.1]))) == {
+        "prandtl_ishlinskii.weights.3": "rad/V"
+    }
+    assert_allclose(mirror_spread.values(mirror), [80e-6, -30e-6, 150.0, 0.35, 2e-6])
+    own = np.array([80e-6, -30e-6, 150.0, 0.35, 1.0])
+    normals = np.array([np.zeros(5), [1.0, -1.0, 0.5, 0.25, 2.0]])
+    found = mirror_spread.parameters(mirror, normals, lambda row: iter(()))
+    assert_allclose(found[0], own)
+    assert_allclose(found[1] / own - 1.0, np.array(ERRORS) * normals[1], rtol=1e-9)
+    assert mirror_spread.parameters(mirror, np.zeros((0, 5)), lambda row: iter(())).shape == (0, 5)
+    for ask in (mirror_spread.parameter_units, mirror_spread.values, mirror_spread.relative_covariance):
+        with pytest.raises(ValueError, match="has no table uncertainty"):
+            ask(read(BOUC_WEN))
+
+
+def test_a_row_that_is_no_mirror_is_drawn_again(read):
+    mirror = read(BOUC_WEN + table(["linear.pole_dampings.1", "bouc_wen.d1"], [1.0, 0.5]))
+    again = {0: [], 1: [[5.0, 0.0], [0.0, -2.0], [0.5, 1.0], [0.0, 0.0]]}
+    found = mirror_spread.parameters(mirror, np.array([[1.0, 0.0], [3.0, 0.0]]), lambda row: iter(np.array(again[row])))
+    assert_allclose(found, [[0.7, 80e-6], [0.525, 120e-6]])
+
+
+def test_a_mirror_is_moved_by_factors_or_is_none(read):
+    mirror = read(BOUC_WEN + table(NAMES, ERRORS))
+    by = np.array([2.0, 0.5, 3.0, 2.0, 4.0])
+    found = mirror_spread.moved(mirror, by)
+    assert_allclose(drawn_values([found])[0], by * drawn_values([mirror])[0])
+    assert found.creep.weights_rad_v == (8e-6, 4e-6)
+    assert (found.uncertainty, found.linear.poles_hz) == (None, (450.0, 400.0))
+    assert mirror_spread.moved(mirror, np.ones(5)) == mirror.model_copy(update={"uncertainty": None})
+    for at, factor in ((0, 0.0), (4, 0.0), (1, -1.0), (3, 2.9)):  # 2.9 x 0.35 is no damping of a pair
+        assert mirror_spread.moved(mirror, np.where(np.arange(5) == at, factor, 1.0)) is None
+    with pytest.raises(ValueError, match="has no table uncertainty"):
+        mirror_spread.moved(read(BOUC_WEN), np.ones(1))
+
+
 # ------------------------------------------------------------------------------------------- written by identification
 def written(read, found):
     return read(mirror_file_text(found, "m"))

@@ -226,7 +226,11 @@ class BoucWen(_FromRest):
     @property
     def admissible(self) -> bool:
         """Whether the output never moves against a slow drive behind a reversal."""
-        return self.reversal_slope_rad_v() * math.copysign(1.0, self.d1_rad_v) >= 0.0
+        return self._rising().reversal_slope_rad_v() >= 0.0
+
+    def _rising(self) -> "BoucWen":
+        """The model, turned over where its output falls with the drive."""
+        return self if self.d1_rad_v >= 0.0 else sign_reversed(self)
 
     @property
     def row(self) -> tuple[float, ...]:
@@ -269,6 +273,8 @@ class BoucWen(_FromRest):
         side: for Eq. 3 dh/du = 2 alpha epsilon e / (alpha + beta sign(epsilon)), with e = exp(delta |rate|). The lower
         one of the two directions where they differ.
         """
+        if self.epsilon_rad_v == 0.0:
+            return self.d1_rad_v
         growth = math.exp(self.delta_s_v * min(abs(rate_v_s), self.rate_limit_v_s))
         return self.d1_rad_v + self.epsilon_rad_v * growth * self._swing(min if self.epsilon_rad_v > 0.0 else max)
 
@@ -287,12 +293,13 @@ class BoucWen(_FromRest):
     @property
     def admissible_rate_v_s(self) -> float:
         """Fastest rate at which the slope after a reversal is not negative; 0 if there is none, inf if it never is."""
-        swing = self.d1_rad_v - self.reversal_slope_rad_v()
+        d1 = abs(self.d1_rad_v)
+        swing = d1 - self._rising().reversal_slope_rad_v()
         if swing <= 0.0:
             return math.inf
-        if swing > self.d1_rad_v:
+        if swing > d1:
             return 0.0
-        return math.inf if self.delta_s_v <= 0.0 else math.log(self.d1_rad_v / swing) / self.delta_s_v
+        return math.inf if self.delta_s_v <= 0.0 else math.log(d1 / swing) / self.delta_s_v
 
     @property
     def wrong_way_rad(self) -> float:
@@ -302,9 +309,10 @@ class BoucWen(_FromRest):
         with e = |epsilon|, then -e + k' |h| w; k and k' are the decays on the two sides of zero (alpha + beta and
         alpha - beta in Eq. 3). The output turns where dh/ds = -d1, and went d1 ds less far than h.
         """
-        if self.reversal_slope_rad_v() >= 0.0:
+        model = self._rising()
+        if model.reversal_slope_rad_v() >= 0.0:
             return 0.0
-        return max(self._wrong_way(rising) for rising in (1.0, -1.0))
+        return max(model._wrong_way(rising) for rising in (1.0, -1.0))
 
     def _wrong_way(self, rising: float) -> float:
         """The distance behind a branch that ran in the direction ``rising``; epsilon < 0, so h lies against it."""
@@ -504,6 +512,17 @@ def scaled(model: BoucWen | PrandtlIshlinskii, times: float) -> BoucWen | Prandt
     return replace(model, d1_rad_v=times * model.d1_rad_v, epsilon_rad_v=times * model.epsilon_rad_v)
 
 
+def sign_reversed(model: BoucWen) -> BoucWen:
+    """The model of a sensor turned over: -h has the terms of h with the signs of epsilon, beta and gamma changed."""
+    return replace(
+        model,
+        d1_rad_v=-model.d1_rad_v,
+        epsilon_rad_v=-model.epsilon_rad_v,
+        beta_1_v=-model.beta_1_v,
+        gamma_1_v=-model.gamma_1_v,
+    )
+
+
 def slow_gain(model: BoucWen | PrandtlIshlinskii) -> float:
     """Gain for slow, large drives (rad/V): d1, or the sum of the weights; a polynomial ends at its reach."""
     return model.d1_rad_v if isinstance(model, BoucWen) else math.fsum(model.weights_rad_v)
@@ -590,7 +609,7 @@ def steepest_slope(model: BoucWen | PrandtlIshlinskii) -> float:
     slope = abs(model.epsilon_rad_v) * math.exp(max(model.delta_s_v, 0.0) * rate)
     if min(decays) > 0.0:
         slope *= 1.0 + max(decays) / min(decays)
-    elif any(decays):
+    else:
         steepened = (math.e - 1.0) * max(decays) / max(-min(decays), 1e-300)
         slope *= max(math.e, 1.0 + steepened) if min(decays) < 0.0 else 1.0 + max(decays)
     return abs(model.d1_rad_v) * math.exp(abs(model.d2_s_v) * rate) + slope

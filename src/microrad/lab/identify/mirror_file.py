@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from microrad.core import kernels
 from microrad.core.arrays import Floats
-from microrad.lab.identify.hysteresis.bouc_wen import PARAMETERS, BoucWenFit, sign_reversed
+from microrad.lab.identify.hysteresis.bouc_wen import PARAMETERS, BoucWenFit
 from microrad.lab.identify.hysteresis.joint import JointFit
 from microrad.lab.identify.hysteresis.prandtl_ishlinskii import PrandtlIshlinskiiFit
 from microrad.lab.identify.hysteresis.structures import LinearPoles
@@ -21,7 +21,7 @@ from microrad.lab.identify.selection.choice import Identification
 from microrad.lab.identify.selection.predictions import Fit
 from microrad.lab.identify.selection.warnings import fit_warnings
 from microrad.lab.identify.statistics import central_differences, correlation, propagated
-from microrad.mirror.hysteresis import BoucWen, PrandtlIshlinskii, scaled, slow_gain
+from microrad.mirror.hysteresis import BoucWen, PrandtlIshlinskii, scaled, sign_reversed, slow_gain
 
 _LOST = 100.0  # relative standard error of a value that is as good as held
 _LOOSEST = 1.0  # relative standard error that the file gives to a combination of parameters at most

@@ -16,7 +16,7 @@ Both positive is alpha > |beta|, hence a bounded h, whatever the signs. At a rat
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -40,7 +40,7 @@ from microrad.lab.identify.records import (
 )
 from microrad.lab.identify.statistics import Estimate, central_differences, colour_inflation, correlation, percent
 from microrad.lab.recording import Recording
-from microrad.mirror.hysteresis import BoucWen
+from microrad.mirror.hysteresis import BoucWen, sign_reversed
 
 SLOPE_TOLERANCE = 1e-3
 _LOWER = np.array([-1.0, -3.0, math.log(0.05), math.log(0.05)])
@@ -221,17 +221,6 @@ def stacked_output(problem: BoucWenProblem, values: Floats) -> Floats:
 def k_settled(values: Floats) -> float:
     """Decay (1/V) towards the settled loop, alpha + sign(epsilon) beta."""
     return float(values[4] + math.copysign(1.0, values[2]) * values[5])
-
-
-def sign_reversed(model: BoucWen) -> BoucWen:
-    """The model of a sensor turned over: -h has the terms of h with the signs of epsilon, beta and gamma changed."""
-    return replace(
-        model,
-        d1_rad_v=-model.d1_rad_v,
-        epsilon_rad_v=-model.epsilon_rad_v,
-        beta_1_v=-model.beta_1_v,
-        gamma_1_v=-model.gamma_1_v,
-    )
 
 
 def made_rising(model: BoucWen) -> BoucWen:
