@@ -5,10 +5,14 @@ import json
 import re
 import shutil
 import zipfile
+from types import SimpleNamespace
 
 import pytest
 
-from microrad.export.flight import build
+from microrad.cli import export as cli_export
+from microrad.export import choice
+from microrad.export.flight import build, write
+from microrad.export.fmi import fmu
 from microrad.loop import controller_study
 from microrad.mission.file import load_mirror, load_mission
 from shipped import SHIPPED, without_fine_pointing
@@ -211,3 +215,108 @@ def test_the_controllers_are_those_of_design_and_of_the_table_control(mission, r
     listed = said.partition("it has: ")[2].split("; ")
     assert listed == [*controller_study.offered(m.fine_pointing, m.mirror), "PID", "PID + inverse"]
     assert len(listed) > 6
+
+
+# ------------------------------------------------------------------------------------------ what goes without saying
+@pytest.fixture
+def loaded(monkeypatch):
+    """Sets the loop that the command sees: with a table [fine_pointing] or none, with a mirror of several axes."""
+
+    def load(fine_pointing, several=None):
+        found = SimpleNamespace(mission=SimpleNamespace(fine_pointing=fine_pointing)), several
+        monkeypatch.setattr(cli_export, "_loaded", lambda file, mirror: found)
+
+    return load
+
+
+@pytest.mark.parametrize(
+    ("loop", "given", "controller", "name"),
+    [
+        (("loop", None), (), "PI + inverse", "pi_inverse"),
+        ((None, None), (), "PID + inverse", "pid_inverse"),
+        (("loop", "mirror"), (), "PI + notch", "pi_notch"),
+        (("loop", "mirror"), ("--controller", "LQG"), "LQG", "lqg"),
+        ((None, None), ("--controller", "PID", "--name", "Mine"), "PID", "Mine"),
+    ],
+)
+def test_code_is_of_the_controller_that_the_loop_of_the_mission_suggests(
+    call, folder, loaded, monkeypatch, loop, given, controller, name
+):
+    written = []
+    loaded(*loop)
+    monkeypatch.setattr(cli_export, "_chosen", lambda mission, mirror, wanted, progress: (mirror, wanted))
+    monkeypatch.setattr(write, "export_flight", lambda chosen, to, **options: written.append((chosen, to, options)))
+    monkeypatch.setattr(write, "export_data", lambda found: {})
+    monkeypatch.setattr(write, "report_text", lambda found: "report")
+    result = call("export", "c", "some/day.toml", *given)
+    ((chosen, to, options),) = written
+    assert (result.code, result.out) == (0, f"report\n\nday-{name}\n")
+    assert (chosen, str(to), options["name"]) == ((loop[1], controller), f"day-{name}", name)
+    assert (options["precision"], options["overwrite"], options["accept"]) == ("double", False, False)
+    result = call("export", "c", "day.toml", *given, "--output", "out", "--overwrite", "--accept", "--json")
+    _, to, options = written[-1]
+    assert json.loads(result.out) == {"folder": "out"}
+    assert (str(to), options["overwrite"], options["accept"]) == ("out", True, True)
+
+
+@pytest.mark.parametrize(
+    ("table", "given", "of", "name"),
+    [
+        ("loop", (), "fine_pointing", "mirror"),
+        (None, (), "control", "mirror"),
+        ("loop", ("--loop", "control"), "control", "mirror"),
+        (None, ("--loop", "fine_pointing", "--name", "fsm"), "fine_pointing", "fsm"),
+        ("loop", ("--controller", "LQG"), "LQG", "lqg_loop"),
+        ("loop", ("--controller", "LQG", "--name", "fsm"), "LQG", "fsm"),
+    ],
+)
+def test_a_unit_is_of_the_loop_that_the_mission_has(call, folder, loaded, monkeypatch, table, given, of, name):
+    written = []
+    loaded(table, "axes")
+    monkeypatch.setattr(choice, "plant_unit", lambda mission, table, several: (table, several))
+    monkeypatch.setattr(choice, "loop_unit", lambda chosen: chosen)
+    monkeypatch.setattr(cli_export, "_promised", lambda mission, several, name, accept, progress: (name, several))
+    monkeypatch.setattr(fmu, "write_unit", lambda *args: written.append(args) or SimpleNamespace(words="written"))
+    assert call("export", "fmu", "some/day.toml", *given) == (0, "written\n", "")
+    ((unit, path, version, called),) = written
+    assert (unit, str(path), version, called) == ((of, "axes"), f"day-{name}.fmu", "2.0", name)
+
+
+@pytest.mark.parametrize(
+    ("table", "several", "name", "coupled"),
+    [
+        (None, None, "PID", False),
+        (SimpleNamespace(mirror_file="m.toml"), None, "LQG", False),
+        (SimpleNamespace(mirror_file="m.toml"), "axes", "LQG", True),
+        (SimpleNamespace(mirror_file="m.toml"), "axes", "PID", False),
+        (SimpleNamespace(mirror_file="m.toml"), "axes", "PID + inverse", False),
+        (SimpleNamespace(mirror_file=None), "axes", "PID", True),
+        (SimpleNamespace(mirror_file=None), "axes", "LQG", True),
+        (None, "axes", "PID + inverse", True),
+    ],
+)
+def test_the_papers_loop_has_the_missions_own_mirror_unless_another_is_given_by_hand(
+    monkeypatch, table, several, name, coupled
+):
+    mission = SimpleNamespace(mission=SimpleNamespace(fine_pointing=table))
+    monkeypatch.setattr(choice, "choose", lambda *args: ("one axis", *args))
+    monkeypatch.setattr(choice, "choose_coupled", lambda *args: ("several axes", *args))
+    found = cli_export._chosen(mission, several, name, "progress")
+    axes = ("several axes", mission, several) if coupled else ("one axis", mission)
+    assert found == (*axes, name, "progress")
+
+
+@pytest.mark.parametrize(("given", "name"), [((), "model 3"), (("--name", "fsm"), "fsm")])
+def test_an_imported_mirror_is_called_as_its_file_or_as_is_said(call, folder, monkeypatch, given, name):
+    taken = []
+    monkeypatch.setattr(
+        "microrad.export.linear_import.import_mat", lambda file, said, variable: taken.append((said, variable)) or "#"
+    )
+    result = call("import", "sub/model 3.mat", *IMPORT, *given)
+    next_is = "microrad run leo-geo.toml --mirror 'model 3-mirror.toml'"
+    assert (result.code, result.out) == (0, f"model 3-mirror.toml written. Next: {next_is}\n")
+    ((said, variable),) = taken
+    assert (said.name, variable, said.output_unit) == (name, None, "rad")
+    numbers = said.travel_rad, said.rate_limit_v_s, said.bias_v, said.drive_min_v, said.drive_max_v
+    assert numbers == pytest.approx((2.5e-3, 3770.0, 6.0, 0.0, 12.0), rel=1e-12)
+    assert (said.excited_from_hz, said.excited_to_hz, said.normalise_at_hz) == (1.0, 5000.0, 2.0)

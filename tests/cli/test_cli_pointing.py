@@ -6,14 +6,17 @@ import subprocess
 import sys
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 import several_axes
 from link_files import FADING
+from microrad.cli import coupled_design
 from microrad.cli import pointing as cli_pointing
 from microrad.cli.coupled_design import reach_share_percent
 from microrad.cli.windows import indices_of_mission
-from microrad.loop import coupled_study
+from microrad.loop import controller_study, coupled_study
+from microrad.loop.controller_study import Outlook
 from microrad.loop.disturbance import olympus
 from microrad.loop.disturbance.windows import ErrorIndex, windowed_rms
 from microrad.mission.file import load_mission
@@ -363,8 +366,162 @@ def test_a_spacing_goes_before_the_windows_that_requirements_name(monkeypatch):
     monkeypatch.setattr("microrad.link.error_budget.assembly.requirement_of", lambda table: named)
     table = SimpleNamespace(with_loop=True, requirements={"data": None})
     assert [each.window_s for each in indices_of_mission(table, [], [])] == [None, 0.02]
+    assert [each.window_s for each in indices_of_mission(table, [3.0], [])] == [None, 3.0, 3.0]
     found = indices_of_mission(table, [], [2.0])
     assert [(each.kind, each.window_s, each.spacing_s) for each in found if each.kind == "PDE"] == [
         ("PDE", 0.01, 2.0),
         ("PDE", 1.0, 2.0),
     ]
+
+
+DEFAULT_WINDOWS = [("APE", None), ("MPE", 0.01), ("RPE", 0.01), ("MPE", 1.0), ("RPE", 1.0)]
+
+
+@pytest.mark.parametrize(
+    ("with_loop", "stated", "found"),
+    [
+        (True, [("RPE", 0.5), ("APE", None), ("MPE", 2.0), ("RPE", 0.5)], [("APE", None), ("RPE", 0.5), ("MPE", 2.0)]),
+        (True, [("APE", None)], DEFAULT_WINDOWS),
+        (True, [("RKE", 0.5), ("MPE", 2.0)], [("APE", None), ("MPE", 2.0)]),
+        (False, [("RPE", 0.5)], DEFAULT_WINDOWS),
+    ],
+)
+def test_windows_are_those_of_the_requirements_on_the_loop_each_once(monkeypatch, with_loop, stated, found):
+    monkeypatch.setattr(
+        "microrad.link.error_budget.assembly.requirement_of", lambda each: SimpleNamespace(index=ErrorIndex(*each))
+    )
+    table = SimpleNamespace(with_loop=with_loop, requirements=dict(enumerate(stated)))
+    assert [(each.kind, each.window_s) for each in indices_of_mission(table, [], [])] == found
+    assert [(each.kind, each.window_s) for each in indices_of_mission(None, [], [])] == DEFAULT_WINDOWS
+
+
+def test_an_index_whose_times_just_fit_into_a_run_is_simulated():
+    scene = SimpleNamespace(table=SimpleNamespace(duration_s=2.0, settle_s=0.5))
+    fits = [ErrorIndex("APE"), ErrorIndex("MPE", 1.5), ErrorIndex("PDE", 0.5, 1.0)]
+    too_long = [ErrorIndex("MPE", 1.75), ErrorIndex("PDE", 0.5, 1.25)]
+    assert cli_pointing._fitting(scene, [*fits, *too_long]) == (fits, too_long)
+
+
+@pytest.mark.parametrize(
+    ("given", "windows", "spacings"),
+    [((), [], []), (("--window", "2 s"), [2.0], []), (("--spacing", "1 min"), [], [60.0])],
+)
+def test_times_that_are_given_are_not_left_out_of_the_runs(call, monkeypatch, given, windows, spacings):
+    """Without any, the indices that fit are simulated; with some, all of them, which is refused where one is long."""
+    asked, ran = [], []
+
+    def indices(table, *times):
+        asked.append((table, *times))
+        return ["index"]
+
+    def simulated(loop, scene, made, indices, runs):
+        ran.append((indices, runs))
+        return (), None, None
+
+    monkeypatch.setattr(cli_pointing, "indices_of_mission", indices)
+    monkeypatch.setattr(cli_pointing, "stated_beside", lambda mission, sources, indices: None)
+    monkeypatch.setattr(
+        cli_pointing, "_designed", lambda mission, name: (SimpleNamespace(theory=None, loop=None), None)
+    )
+    monkeypatch.setattr(cli_pointing, "_fitting", lambda scene, indices: (["fits"], ["left out"]))
+    monkeypatch.setattr(cli_pointing, "_simulated", simulated)
+    monkeypatch.setattr("microrad.loop.pointing_loop.linear.close", lambda theory, made: None)
+    monkeypatch.setattr("microrad.loop.pointing_loop.windows.windowed_errors", lambda closed, indices: None)
+    monkeypatch.setattr("microrad.report.fine_pointing.words.arrival", lambda loop: "")
+    monkeypatch.setattr("microrad.report.fine_pointing.data.arrival", lambda scene: {})
+    monkeypatch.setattr("microrad.report.fine_pointing.windows.windows_data", lambda errors: [])
+    monkeypatch.setattr(
+        "microrad.report.fine_pointing.simulated_windows.simulated_view", lambda *found: SimpleNamespace(blocks=())
+    )
+    monkeypatch.setattr(
+        "microrad.report.fine_pointing.simulated_windows.simulated_data",
+        lambda errors, lost, runs, left_out, coded: {"left_out": left_out},
+    )
+    result = call("pointing", DEFAULT, *given, "--simulate", "3", "--json")
+    assert (result.code, asked[0][1:]) == (0, (windows, spacings))
+    assert ran == [(["index"] if given else ["fits"], 3)]
+    assert json.loads(result.out)["simulated"] == {"left_out": [] if given else ["left out"]}
+
+
+# ------------------------------------------------------------------------------------------------ promises of a design
+HELD, BROKEN = Outlook(1e-6, 1.5e-6), Outlook(1e-6, 1.75e-6)
+
+
+@pytest.mark.parametrize(
+    ("figures", "accept", "marks", "code"),
+    [
+        ((HELD, HELD), (), ["", ""], 0),
+        ((HELD, BROKEN), (), ["", "refused"], 1),
+        ((HELD, BROKEN), ("--accept",), ["", "accepted"], 0),
+    ],
+)
+@pytest.mark.parametrize("axes", [1, 2])
+def test_a_design_that_the_mirror_does_not_bear_out_is_refused_unless_it_is_accepted(
+    call, monkeypatch, tmp_path, axes, figures, accept, marks, code
+):
+    made = (SimpleNamespace(name="PI"), SimpleNamespace(name="LQG"))
+    several = [SimpleNamespace(worst=each, holds=each.holds) for each in figures]
+    refused = {"Youla": "no Youla here"} if axes == 2 else {}
+    found = SimpleNamespace(made=made, refused=refused)
+    file, module = DEFAULT, coupled_design if axes == 2 else cli_pointing
+    if axes == 2:
+        (tmp_path / "two-axes.toml").write_text(several_axes.TEXT, encoding="utf-8")
+        named = several_axes.mission_text(("[fine_pointing]\n", '[fine_pointing]\nmirror_file = "two-axes.toml"\n'))
+        file = tmp_path / "m.toml"
+        file.write_text(named, encoding="utf-8")
+    monkeypatch.setattr(coupled_study, "design_and_promise", lambda scene, progress: (found, several))
+    monkeypatch.setattr(controller_study, "design_and_promise", lambda *args: list(zip(made, figures, strict=True)))
+    monkeypatch.setattr(module, "_data", lambda design, left, mark: {"name": design.name, "mark": mark})
+    result = call("design", file, "--json", *accept)
+    data = json.loads(result.out)
+    assert (result.code, [each["mark"] for each in data["controllers"]]) == (code, marks)
+    broken = [said for said in data["warnings"] if "as linear theory says" in said]
+    assert bool(broken) == (BROKEN in figures) and set(refused.values()) <= set(data["warnings"])
+    for said in broken:
+        assert said.startswith("more than 1.5 times as much as") and "by LQG (1.75 times): " in said
+        assert ("accepted as they are" in said, "--accept" in said) == (bool(accept), not accept)
+
+
+def made(gain_up=2.0, margin=None, **more):
+    """A design of one axis, as far as it is printed."""
+    margins = SimpleNamespace(
+        **{"modulus": 0.5, "gain_up": gain_up, "phase_rad": 0.5 * math.pi, "delay_s": 1e-3, "crossover_hz": 90.0},
+        **{"bandwidth_hz": 120.0, "disk": 0.4},
+    )
+    matrices = SimpleNamespace(**{each: np.full((1, 1), k) for k, each in enumerate("ABCD")})
+    controller = SimpleNamespace(system=matrices, anti_windup=np.full((1, 1), 9.0), **more)
+    tuned = SimpleNamespace(values={"gain": 3.0}, margins=margins, bound_by=("modulus margin",))
+    return SimpleNamespace(name="PI", inverse=False, tuned=tuned, margin=margin, controller=controller)
+
+
+@pytest.mark.parametrize(("gain_up", "db", "words"), [(math.inf, None, "none"), (10.0, 20.0, "20.0 dB")])
+def test_a_gain_that_may_rise_without_end_is_none_in_the_data_and_in_the_text(monkeypatch, gain_up, db, words):
+    design, left = made(gain_up), Outlook(1e-6, 1.75e-6)
+    data = cli_pointing._data(design, left, "refused")
+    assert data["margins"]["gain_up_db"] == (None if db is None else pytest.approx(db))
+    assert data["margins"]["phase_deg"] == pytest.approx(90.0)
+    assert (data["residual_rms_rad_per_axis"], data["simulated_rms_rad_per_axis"]) == (1e-6, 1.75e-6)
+    assert data["matrices"] == {"A": [[0]], "B": [[1]], "C": [[2]], "D": [[3]], "anti_windup": [[9.0]]}
+    assert "tuned_for_modulus_margin" not in data
+    assert cli_pointing._data(made(margin=0.7), left, "")["tuned_for_modulus_margin"] == 0.7
+    monkeypatch.setattr(cli_pointing, "tuned_text", lambda scene, values, margin: f"{values} {margin}")
+    scene = SimpleNamespace(loop=SimpleNamespace(timing=SimpleNamespace(period_s=2e-4)))
+    told = cli_pointing._text(scene, (design,), (left,), ["refused"], ["mind the step"])
+    row = next(line for line in told.splitlines() if line.split()[:2] == ["PI", "1.000"])
+    assert row.split() == ["PI", "1.000", "1.750", "refused", "0.500", "90°", *words.split(), "120", "Hz"]
+    assert "One axis at 5 kHz" in told and "Warning: mind the step." in told
+
+
+def test_a_larger_margin_and_drives_of_hysteresis_are_data_of_a_design_of_several_axes_where_it_has_them():
+    left = SimpleNamespace(axes=(Outlook(1e-6, 2e-6), Outlook(3e-6, 4e-6)))
+    for margin, forward in ((None, None), (0.7, SimpleNamespace(drives=np.full((1, 2), 5.0)))):
+        margins = SimpleNamespace(modulus=0.5, disk=SimpleNamespace(disk=0.4, freq_hz=80.0), bandwidth_hz=120.0)
+        one = made(margin=margin, forward=forward)
+        design = SimpleNamespace(
+            name="PI", tuned={}, margin=margin, margins=margins, controller=one.controller, drive_v=np.ones(2)
+        )
+        data = coupled_design._data(design, left, "mark")
+        assert (data["residual_rms_rad"], data["simulated_rms_rad"]) == ([1e-6, 3e-6], [2e-6, 4e-6])
+        assert data.get("tuned_for_modulus_margin") == margin
+        assert data["matrices"].get("drives_of_hysteresis") == (None if forward is None else [[5.0, 5.0]])
+        assert (data["margins"]["disk"], data["margins"]["disk_hz"]) == (0.4, 80.0)
