@@ -443,7 +443,12 @@ def test_bands_have_edges_that_rise_and_an_rms_each(refuse, edges, rms, key, rea
     ("key", "value", "reason", "expected"),
     [
         ("speed", '"0 Hz"', "not above 0 Hz", "above 0 Hz"),
-        ("speed", '"6.25 kHz"', "puts harmonic 2 at 12.5 kHz, not below half of 1 / fine_pointing.plant_step", "would do"),
+        (
+            "speed",
+            '"6.25 kHz"',
+            "puts harmonic 2 at 12.5 kHz, not below half of 1 / fine_pointing.plant_step",
+            "would do",
+        ),
         ("speed", '"20 kHz"', "puts harmonic 2 at 40 kHz, not below half of 1 / fine_pointing.plant_step", "would do"),
         ("harmonics", "[1.0, 0.0]", "item 2", "above 0"),
         ("harmonics", "[1.0]", "has 2 items where harmonics has 1", "1 of them, one coefficient for each harmonic"),
