@@ -1092,6 +1092,13 @@ def test_a_list_that_scales_together_is_one_column(tmp_path):
     assert [(each.key, each.unit) for each in c.inputs] == [("mirror.linear.poles", "")]
     m = MissionBuilder(c).mission(0, {"mirror.linear.poles": 1.5}).mission
     assert m.mirror.linear.poles_hz == (1500.0, 3000.0)
+    plain = text.replace('"linear.poles"', '"linear.pole_dampings"').replace("[0.5, 1.0]", "[0.5, 0.25]")
+    (tmp_path / "mirror.toml").write_text(plain, encoding="utf-8")
+    c = load_campaign(path)
+    m = MissionBuilder(c).mission(0, {"mirror.linear.pole_dampings": 1.5}).mission
+    assert m.mirror.linear.pole_dampings == (0.75, 0.375)
+    with pytest.raises(CampaignError, match=r"the row is no mission: mirror\.linear\.pole_dampings = .* above 1"):
+        MissionBuilder(c).mission(0, {"mirror.linear.pole_dampings": 2.5})
 
 
 # ---------------------------------------------------------------------------------------------------------- same loop?
