@@ -252,6 +252,7 @@ def test_keys_that_do_not_fit_together(tmp_path, name):
     [
         (LIMITS, {**HELD, "boresight": [0.1, 0.0, 0.0]}),
         (LIMITS, {**HELD, "boresight": [0.0, -0.1, 0.0]}),
+        (LIMITS, {**HELD, "boresight": [0.06, 0.0, -0.0801]}),
         ("constellation.session", "180 s"),
         ("constellation.shortest", "60.1 s"),
         ("constellation.phasing", 2),

@@ -384,6 +384,33 @@ def test_what_meets_a_limit_of_the_table_is_taken(load, key, value):
     assert isinstance(load(edited((key, value))), FinePointing)
 
 
+@pytest.mark.parametrize(
+    ("changes", "key"),
+    [
+        ([("body.bandwidth", '"10 kHz"')], "body.bandwidth"),
+        (
+            [("vibration.spectrum", '"first-order"'), ("vibration.level", '"1 urad^2/Hz"')]
+            + [("vibration.corner", '"10 kHz"')],
+            "vibration.corner",
+        ),
+        (
+            [("vibration.spectrum", '"bands"'), ("vibration.edges", '["1 Hz", "10 kHz"]')]
+            + [("vibration.rms", '["1 urad"]')],
+            "vibration.edges",
+        ),
+        ([("wheels.speed", '"5 kHz"')], "wheels.speed"),
+    ],
+)
+def test_what_stands_at_half_the_rate_of_the_plant_is_refused_and_a_hertz_below_it_taken(refuse, load, changes, key):
+    """A plant step of 50 us, of which half the rate is 10 kHz to the last bit."""
+    text = uncommented("fine_pointing.wheels")
+    fault = refuse(edited(("plant_step", '"50 us"'), *changes, text=text))
+    assert fault.key == f"fine_pointing.{key}"
+    assert "not below half of 1 / fine_pointing.plant_step (10 kHz)" in fault.reason
+    below = [(name, value.replace("10 kHz", "9.999 kHz").replace('"5 kHz"', '"4.999 kHz"')) for name, value in changes]
+    assert isinstance(load(edited(("plant_step", '"50 us"'), *below, text=text)), FinePointing)
+
+
 def test_an_incidence_along_the_mirror_is_refused_whatever_its_coupling(refuse):
     fault = refuse(edited(("geometry.incidence", '"90 deg"'), ("geometry.coupling", "[6e-17, 0.0, 0.0, 1.0]")))
     assert (fault.key, fault.reason[:17]) == ("fine_pointing.geometry.incidence", "grazes the mirror")
