@@ -800,3 +800,5 @@ def test_a_plant_of_one_axis_says_that_its_sensor_is_slow_and_has_a_gauge_only_w
             slow = "; a sensor that delivers every 2 samples counts as one of more delay"
             assert plant.meaning.endswith(slow) is (every == 2)
             assert ("every" in plant.meaning) is (every == 2)
+            np.testing.assert_array_equal(plant.system.C[:2], of(pointing, SAMPLED_PLANT).system.C[:2])
+            np.testing.assert_array_equal(plant.system.A, of(pointing, SAMPLED_PLANT).system.A)

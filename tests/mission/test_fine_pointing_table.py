@@ -389,13 +389,19 @@ def test_what_meets_a_limit_of_the_table_is_taken(load, key, value):
     [
         ([("body.bandwidth", '"10 kHz"')], "body.bandwidth"),
         (
-            [("vibration.spectrum", '"first-order"'), ("vibration.level", '"1 urad^2/Hz"')]
-            + [("vibration.corner", '"10 kHz"')],
+            [
+                ("vibration.spectrum", '"first-order"'),
+                ("vibration.level", '"1 urad^2/Hz"'),
+                ("vibration.corner", '"10 kHz"'),
+            ],
             "vibration.corner",
         ),
         (
-            [("vibration.spectrum", '"bands"'), ("vibration.edges", '["1 Hz", "10 kHz"]')]
-            + [("vibration.rms", '["1 urad"]')],
+            [
+                ("vibration.spectrum", '"bands"'),
+                ("vibration.edges", '["1 Hz", "10 kHz"]'),
+                ("vibration.rms", '["1 urad"]'),
+            ],
             "vibration.edges",
         ),
         ([("wheels.speed", '"5 kHz"')], "wheels.speed"),
