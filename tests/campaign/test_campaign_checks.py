@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from microrad.campaign.definition import checks, distributions, draws, keys
+from microrad.campaign.definition import checks, distributions, draws, keys, values
 from microrad.campaign.definition.distributions import LogUniform, Normal, OneOf, Uniform, uncovered
 from microrad.campaign.definition.outputs import OUTPUTS, RADIUS
 from microrad.campaign.definition.values import NotedError
@@ -448,6 +448,23 @@ def test_a_value_of_a_list_is_drawn_from_the_share_below_it_on():
     assert even.words("dB") == "one of 1 = near, 2 = far"
     assert OneOf((1.5, 2.0), (0.5, 0.5), (1.5, 2), False).words("") == "one of 1.5, 2"
     assert distributions.quantity(2e-6, "rad") == "2 µrad"
+
+
+@pytest.mark.parametrize(
+    ("share", "words"),
+    [(0.12345, "12.3 %"), (0.1, "10 %"), (0.099, "9.9 %"), (0.056789, "5.7 %"), (1.0, "100 %"), (1.234e-5, "0.0012 %")],
+)
+def test_a_small_share_is_told_with_one_digit_less(share, words):
+    assert draws._percent(share) == words
+
+
+@pytest.mark.parametrize(
+    ("value", "number"),
+    [(1, True), (-2.5, True), (0, True), (True, False), (False, False), ("1", False), (None, False), (math.nan, False),
+     (math.inf, False), (-math.inf, False), ([1], False)],
+)  # fmt: skip
+def test_a_number_is_plain_and_finite(value, number):
+    assert values.is_number(value) is number
 
 
 # --------------------------------------------------------------------------------------------------------------- keys

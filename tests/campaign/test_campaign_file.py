@@ -14,7 +14,7 @@ import pytest
 from campaign_files import HEAD, IDENTIFIED, LOOP, NOISE, POWER, UNCERTAINTY, loaded, written
 from microrad import link
 from microrad.campaign import bundle
-from microrad.campaign.definition import keys
+from microrad.campaign.definition import cells, draws, keys
 from microrad.campaign.definition.records import Variable
 from microrad.campaign.file import load_campaign
 from microrad.campaign.ledger import file
@@ -420,6 +420,47 @@ ADDED = {
         "inputs.terminals.leo_aperture.weights",
         "each value its weight",
     ),
+    "a weight that is true": (
+        distributed("terminals.leo_aperture", TABLE + 'values = ["5 cm", "6 cm"]\nweights = [1, true]'),
+        "inputs.terminals.leo_aperture.weights",
+        "each value its weight",
+    ),
+    "a weight without end": (
+        distributed("terminals.leo_aperture", TABLE + 'values = ["5 cm", "6 cm"]\nweights = [1, inf]'),
+        "inputs.terminals.leo_aperture.weights",
+        "each value its weight",
+    ),
+    "a weight that is none": (
+        distributed("terminals.leo_aperture", TABLE + 'values = ["5 cm", "6 cm"]\nweights = [nan, 1]'),
+        "inputs.terminals.leo_aperture.weights",
+        "each value its weight",
+    ),
+    "a group of named tables": (
+        distributed("pointing.lines", 'distribution = "uniform"\nlow = 1\nhigh = 2'),
+        "inputs.pointing.lines",
+        "is a group of named tables and no value",
+    ),
+    "a named table": (
+        distributed("pointing.lines.body_pointing", 'distribution = "uniform"\nlow = 1\nhigh = 2'),
+        "inputs.pointing.lines.body_pointing",
+        "is a table and no value",
+    ),
+    "a named table that is not there": (
+        distributed("pointing.lines.body_pointings.error", 'distribution = "uniform"\nlow = 1\nhigh = 2'),
+        "inputs.pointing.lines.body_pointings.error",
+        "is no key of [pointing.lines]",
+    ),
+    "a list of no other end": (
+        distributed("scenario.pid_frequencies.0", 'distribution = "uniform"\nlow = "1 Hz"\nhigh = "2 Hz"'),
+        "inputs.scenario.pid_frequencies.0",
+        "is no item of scenario.pid_frequencies",
+    ),
+    "a set that is no table": ("set = 1", "set", "is no table"),
+    "a grid that is no table": ('grid = ["5 cm"]', "grid", "is no table"),
+    "limits that are no table": ('limits = "3 dB"', "limits", "is no table"),
+    "a mirror of no name in set": ('[set]\nmirror = ""', "set.mirror", "is no path"),
+    "a mirror of no name in a grid": ('[grid]\nmirror = ["mirror.toml", ""]', "grid.mirror", "is no path"),
+    "equal limits": ('[limits.margin]\nleast = "3 dB"\nmost = "3 dB"', "limits.margin.most", "not above"),
     "drawn too narrow": (
         '[inputs."communication.transmit_power".drawn_as]\ndistribution = "normal"\nmean = "4 W"\ndeviation = "0.1 W"',
         "inputs.communication.transmit_power.drawn_as",
@@ -545,6 +586,62 @@ def placed(text, added):
     head, _, rest = text.partition("[inputs")
     tables = tables if tables.startswith("[") or not tables else f"[{tables}"
     return f"{head}{root}\n[inputs{rest}{tables}\n"
+
+
+def test_a_plain_number_that_would_do_is_shown_without_quotes_and_a_quantity_with_them(tmp_path):
+    for key, low, shown in (("communication.strehl", '"x"', "low = 1.0"), ("beacon.strehl", "-1", "low = 5.0")):
+        body = f'distribution = "uniform"\nlow = {low}\nhigh = 0.5'
+        (fault,) = faults(tmp_path, HEAD + distributed(key, body))
+        assert fault.key == f"inputs.{key}.low"
+        assert fault.expected.endswith(f"; for example {shown}")
+    (fault,) = faults(tmp_path, HEAD + POWER.replace('"5 W"', "5.0"))
+    assert fault.expected.endswith('; for example mean = "5 W"')
+
+
+@pytest.mark.parametrize(
+    ("mission", "reason"), [('""', "is of the wrong kind"), ("1", "is of the wrong kind"), (None, "is missing")]
+)
+def test_a_campaign_without_the_name_of_its_mission_is_refused_in_one_fault(tmp_path, mission, reason):
+    line = "" if mission is None else f"mission = {mission}\n"
+    (fault,) = faults(tmp_path, HEAD.replace('mission = "mission.toml"\n', line) + POWER)
+    assert fault.key == "mission"
+    assert reason in fault.reason
+
+
+def test_variables_that_are_no_table_are_refused(tmp_path):
+    text = '[optimise]\nminimise = "margin"\nconfidence = 0.99\nrows = 64\nevaluations = 10\nvariables = 1\n'
+    assert [fault.key for fault in faults(tmp_path, HEAD + POWER + text)] == ["optimise.variables"]
+
+
+def test_draws_of_which_exactly_half_are_none_are_taken_with_a_warning(tmp_path):
+    loss = distributed(
+        "communication.implementation_loss", 'distribution = "normal"\nmean = "0 dB"\ndeviation = "1 dB"'
+    )
+    (warning,) = loaded(tmp_path, HEAD + loss).warnings
+    assert warning.startswith("50 % of the draws of communication.implementation_loss are below 0 dB: those rows")
+
+
+def test_a_grid_and_a_table_may_have_as_much_as_their_limits_say(tmp_path, monkeypatch):
+    sizes = '"5 cm", "6 cm"'
+    grid = f'{HEAD}{POWER}[grid]\n"terminals.leo_aperture" = [{sizes}]\n'
+    table = HEAD + distributed("terminals.leo_aperture", f"{TABLE}values = [{sizes}]")
+    monkeypatch.setattr(cells, "MOST_CELLS", 2)
+    monkeypatch.setattr(draws, "MOST_ITEMS", 2)
+    assert len(loaded(tmp_path, grid).cells) == 2
+    assert loaded(tmp_path, table).draws[0].distribution.values == (0.05, 0.06)
+    assert [fault.key for fault in faults(tmp_path, table.replace(sizes, f'{sizes}, "7 cm"'))] == [
+        "inputs.terminals.leo_aperture.values"
+    ]
+    monkeypatch.setattr(cells, "MOST_CELLS", 1)
+    (fault,) = faults(tmp_path, grid)
+    assert (fault.key, fault.reason, fault.expected) == ("grid", "has 2 cells", "at most 1")
+    one = HEAD + POWER + distributed("terminals.leo_aperture", f'{TABLE}values = ["5 cm"]')
+    assert loaded(tmp_path, one).draws[1].distribution.probabilities == (1.0,)
+
+
+def test_a_precision_may_end_with_its_first_round(tmp_path):
+    wanted = '[precision]\noutput = "margin"\nquantile = 0.1\nhalf_width = "1 dB"\nconfidence = 0.9\nat_most = 256\n'
+    assert loaded(tmp_path, HEAD + POWER + wanted).most_rows == 256
 
 
 @pytest.mark.promise("campaigns-8")
@@ -995,6 +1092,15 @@ def test_a_list_that_scales_together_is_one_column(tmp_path):
     assert [(each.key, each.unit) for each in c.inputs] == [("mirror.linear.poles", "")]
     m = MissionBuilder(c).mission(0, {"mirror.linear.poles": 1.5}).mission
     assert m.mirror.linear.poles_hz == (1500.0, 3000.0)
+    plain = text.replace('"linear.poles"', '"linear.pole_dampings"').replace("[0.5, 1.0]", "[0.5, 0.25]")
+    (tmp_path / "mirror.toml").write_text(plain, encoding="utf-8")
+    c = load_campaign(path)
+    m = MissionBuilder(c).mission(0, {"mirror.linear.pole_dampings": 1.5}).mission
+    assert m.mirror.linear.pole_dampings == (0.75, 0.375)
+    with pytest.raises(
+        CampaignError, match=r"mirror\.linear\.pole_dampings = \[1\.25, 0\.625\] item 1: 1\.25 is above 1"
+    ):
+        MissionBuilder(c).mission(0, {"mirror.linear.pole_dampings": 2.5})
 
 
 # ---------------------------------------------------------------------------------------------------------- same loop?

@@ -459,3 +459,12 @@ def test_an_optical_volume_needs_an_optical_downlink(tmp_path):
     assert (found.key, found.reason) == ("keep", "needs the mission's table [operations.optical]")
     assert found.expected == "a mission with [operations.optical], or this output left out"
     assert loaded(tmp_path, "whole", body, HEAD + 'keep = ["volume"]\n').keep == ("volume",)
+
+
+def test_rows_of_the_day_stand_in_small_chunks(tmp_path):
+    mission(tmp_path, "gallery")
+    campaign = loaded(tmp_path, "gallery", DRAWN, EVEN.replace("64", "4096"))
+    for keep, rows, timed in ((("volume",), 8, False), (("margin", "volume"), 8, False), (("margin",), 1024, True)):
+        plan = planned(replace(campaign, keep=keep))
+        assert (plan.chunk_rows, plan.largest_chunk, plan.is_timed) == (rows, rows, timed)
+    assert planned(replace(campaign, keep=("volume",), rows=4)).largest_chunk == 4

@@ -125,6 +125,8 @@ def test_moments_of_nothing_one_the_same_and_without_end() -> None:
     assert moments(np.array([math.nan])).count == 0
     assert moments(np.array([2.0])).mean == 2.0
     assert math.isnan(moments(np.array([2.0])).deviation)
+    assert math.isnan(moments(np.array([2.0])).mean_variance) and math.isnan(moments(np.zeros(0)).mean_variance)
+    assert moments(np.array([2.0, 4.0])).mean_variance == 1.0
     same = moments(np.full(12, 0.1))
     assert (same.mean, same.deviation) == (0.1, 0.0)
     assert moments(np.array([1.0, -math.inf])).least == -math.inf
@@ -154,6 +156,11 @@ def test_mean_of_independent_rows_has_students_interval() -> None:
     exact = stats.ttest_1samp(values, 0.0).confidence_interval(0.9)
     assert_allclose([found.low, found.high], [exact.low, exact.high], rtol=1e-12)
     assert math.isnan(mean_interval(moments(values[:1]), 0.9).low)
+    two = mean_interval(moments(np.array([2.0, 4.0])), 0.9)
+    assert (two.value, two.high) == (3.0, pytest.approx(3.0 + stats.t.ppf(0.95, 1), rel=1e-9))
+    assert two.low == pytest.approx(6.0 - two.high, rel=1e-9)
+    assert mean_interval(moments(values), 0.9, Moments()).value == moments(values).mean
+    assert math.isnan(mean_interval(moments(values), 0.9, moments(values[:1])).low)
 
 
 @pytest.mark.promise("campaigns-21", "campaigns-32")

@@ -275,3 +275,10 @@ def test_a_failure_shows_the_first_lines_and_how_many_there_are_more(lines: int,
     shown = str(build._failure("what", text)).splitlines()
     first = [f"  line {k}" for k in range(min(lines, 12))] or ["  (it wrote nothing)"]
     assert shown == ["what:", *first, *more]
+
+
+@pytest.mark.parametrize(
+    ("code", "words"), [(1, "failed with exit status 1"), (-1, "was ended by signal 1"), (-9, "was ended by signal 9")]
+)
+def test_an_ending_is_told_by_its_status_or_its_signal(code: int, words: str) -> None:
+    assert build._ending(code) == words

@@ -8,6 +8,7 @@ import subprocess
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from math import inf, nan, pi
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -796,6 +797,10 @@ def test_words_of_a_mission_cannot_become_code(shipped, tmp_path):
     assert "#error c" not in plain
     assert "evil" in files["x" * 31 + ".h"]
     assert comment("a */ b") == "a * / b"
+    assert comment("a /* b") == "a / * b"
+    assert comment("a /*/ b */* c") == "a / * / b * / * c"
+    assert comment("what??/ C:\\new\nline") == "what? ?/ C:/new line"
+    assert comment("") == comment(" ") == ""
     assert comment("word " * 40, " * ").count("\n * ") == 1
 
 
@@ -883,6 +888,11 @@ def test_limits_are_never_rounded_outwards(shipped, tmp_path):
         (inf, "1.7976931348623157e+308", "3.4028235e+38f"),
         (1e-40, "1e-40", "0.0f"),
         (5e-324, "0.0", "0.0f"),
+        (-inf, "-1.7976931348623157e+308", "-3.4028235e+38f"),
+        (3.4028234663852886e38, "3.4028234663852886e+38", "3.4028235e+38f"),
+        (2.0**-126, "1.1754943508222875e-38", "1.1754944e-38f"),
+        (-(2.0**-127), "-5.877471754111438e-39", "0.0f"),
+        (2.0**-1022, "2.2250738585072014e-308", "0.0f"),
         (1 / 3, "0.3333333333333333", "0.33333334f"),
     ],
 )
@@ -939,3 +949,47 @@ def test_with_an_error_of_0_integrators_stay_and_a_rejected_reading_goes_on_driv
     wanted = code.replay(np.concatenate([begun, begun]))[500:]
     assert_array_equal(gone_on, wanted)
     assert np.all(np.abs(gone_on[-1]) > 1.5 * np.abs(driven))
+
+
+def held_to(low, high, step, precision="double"):
+    of = SimpleNamespace(name="c", minimum_v=low, maximum_v=high, resolution_v=step)
+    found = c_code._limits(of, precision)
+    return found.minimum, found.maximum, found.resolution, found.lowest, found.highest, found.rest
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "step", "lowest", "highest", "rest"),
+    [
+        (-1.0, 2.0, 0.0, -1.0, 2.0, 0.0),
+        (-1.0, 2.0, 0.75, -0.75, 1.5, 0.0),
+        (-1.5, 1.5, 0.75, -1.5, 1.5, 0.0),
+        (-1.4999999, 1.4999999, 0.75, -1.4999999, 1.4999999, 0.0),  # a millionth of a step beyond is rounding
+        (-inf, 2.0, 0.75, -inf, 1.5, 0.0),
+        (-1.0, inf, 0.75, -0.75, inf, 0.0),
+        (-inf, inf, 0.75, -inf, inf, 0.0),
+        (0.5, 1.5, 0.75, 0.75, 1.5, 0.75),
+        (-1.5, -0.5, 0.75, -1.5, -0.75, -0.75),
+        (0.75, 0.75, 0.75, 0.75, 0.75, 0.75),
+        (3.0, 3.0, 0.0, 3.0, 3.0, 3.0),
+    ],
+)
+def test_the_outermost_commands_are_counts_of_the_converter_within_the_limits(low, high, step, lowest, highest, rest):
+    assert held_to(low, high, step) == (low, high, step, lowest, highest, rest)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "step", "at"), [(0.1, 0.7, 0.75, " at a resolution of 0.75 V"), (2.0, 1.0, 0.0, "")]
+)
+def test_limits_between_which_no_command_lies_are_told_with_the_resolution_where_there_is_one(low, high, step, at):
+    words = f"controller 'c': no command lies between its limits of {low:g} V and {high:g} V{at}; see the mission's"
+    with pytest.raises(ExportError, match=f"^{re.escape(words)}"):
+        held_to(low, high, step)
+
+
+def test_limits_in_single_precision_are_never_outside_of_the_controllers():
+    assert held_to(-0.5, 0.5, 0.0, "single")[:2] == (-0.5, 0.5)
+    for size in (0.1, 0.3, 0.7, 1.1):
+        least, most = held_to(-size, size, 0.0, "single")[:2]
+        assert -size <= least < -size * (1.0 - 2e-7) and size * (1.0 - 2e-7) < most <= size
+        assert float(np.float32(most)) == most == -least
+    assert held_to(-inf, inf, 0.0, "single")[:2] == (-inf, inf)

@@ -30,6 +30,7 @@ from microrad.export.matrices.models import (
     MIRROR,
     MIRROR_AT_REST,
     SAMPLED_PLANT,
+    _pointing_models,
     axis_plant,
 )
 from microrad.export.matrices.structure import without_copies
@@ -784,3 +785,20 @@ def test_model_of_the_mirror_is_the_mirrors_own_loop(file):
     m = file.mission.mirror
     made = mirror.from_mission(m, mirror.hysteresis_model(m, m.rate_limit_v_s, m.bias_v)).linear_loop
     assert np.array_equal(of(file, MIRROR).system.A, made.A)
+
+
+def test_a_plant_of_one_axis_says_that_its_sensor_is_slow_and_has_a_gauge_only_where_there_is_one(pointing):
+    """Nothing else of the model hangs on either."""
+    scene = pointing.scene
+    for every in (1, 2):
+        for gauge in (scene.axis.gauge, None):
+            loop = replace(scene.loop, optical=replace(scene.loop.optical, every=every))
+            other = SimpleNamespace(axis=replace(scene.axis, gauge=gauge), loop=loop, table=scene.table)
+            plant, _ = _pointing_models(replace(pointing, scene=other))
+            names = ["line_of_sight_rad", "optical_error_rad", "gauge_rad"]
+            assert [port.name for port in plant.outputs] == names[: 2 + (gauge is not None)]
+            slow = "; a sensor that delivers every 2 samples counts as one of more delay"
+            assert plant.meaning.endswith(slow) is (every == 2)
+            assert ("every" in plant.meaning) is (every == 2)
+            np.testing.assert_array_equal(plant.system.C[:2], of(pointing, SAMPLED_PLANT).system.C[:2])
+            np.testing.assert_array_equal(plant.system.A, of(pointing, SAMPLED_PLANT).system.A)

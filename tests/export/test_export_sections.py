@@ -513,6 +513,11 @@ def test_other_names_are_refused_with_the_reason_and_an_example(name, why):
         ("\u2014", "controller"),
         ("disturbance observer with a very long name indeed", "disturbance_observer_with"),
         ("y" * 60, "y" * 26),
+        ("y" * 26, "y" * 26),
+        ("y" * 27, "y" * 26),
+        (f"{'y' * 26} end", "y" * 26),
+        (f"{'y' * 13} {'z' * 20}", "y" * 13),
+        (f"{'y' * 12} {'z' * 20}", f"{'y' * 12}_{'z' * 13}"),
     ],
 )
 def test_suggested_names_resemble_the_text_and_can_be_borne(text, name):

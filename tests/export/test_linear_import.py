@@ -18,7 +18,8 @@ from scipy.sparse import csc_array
 
 from microrad.core import lti
 from microrad.export import choice, matrices
-from microrad.export.linear_import import Given, import_control, import_mat, mirror_file
+from microrad.export.linear_import import Given, import_control, import_mat, matlab, mirror_file
+from microrad.export.linear_import import roots as roots_module
 from microrad.export.matrices.forms import floats, polynomials
 from microrad.export.records import ExportError
 from microrad.mirror import model as mirror
@@ -315,6 +316,7 @@ HIDING = {"A": np.diag([-1.0, -20.0]), "B": np.array([[1.0], [0.0]]), "C": np.on
 @pytest.mark.parametrize(
     ("fields", "why"),
     [
+        ({}, r"has no linear system; it holds nothing, and none with A B C D, z p k or num den"),
         ({"note": "text"}, r"has no linear system; it holds note, and none with A B C D, z p k or num den"),
         ({"A": np.eye(2)}, r"has no linear system; it holds A"),
         ({"s": np.array([(1, 2), (3, 4)], dtype=[("num", "O"), ("den", "O")])}, "an array of 2 structures"),
@@ -407,6 +409,7 @@ def test_what_is_no_linear_mirror_is_refused(fields, why, tmp_path):
         ({"bias_v": 20.0}, r"would be refused: .*bias is outside drive_min to drive_max"),
         ({"normalise_at_hz": 0.5}, r"the gain is taken at 0\.5 Hz .*not in the band of 1 Hz to 5000 Hz"),
         ({"normalise_at_hz": 9000.0}, r"the gain is taken at 9000 Hz .*not in the band of 1 Hz to 5000 Hz"),
+        ({"excited_from_hz": 5000.0}, r"the band begins at 5000 Hz and ends at 5000 Hz; give its lower end first"),
         ({"excited_from_hz": 9000.0}, r"the band begins at 9000 Hz and ends at 5000 Hz; give its lower end first"),
         ({"drive_min_v": 12.0, "drive_max_v": 0.0}, r"would be refused: drive_max is not above drive_min"),
         ({"name": "x" * 201}, "would be refused: name: "),
@@ -424,6 +427,51 @@ def test_the_gain_may_be_taken_at_the_ends_of_the_band_and_all_refusals_are_told
         assert load_mirror(tmp_path / "mirror.toml").mirror.linear.normalise_at_hz == at
     with pytest.raises(ExportError, match=r"would be refused: (name: .*; travel: |travel: .*; name: )"):
         import_mat(path, replace(GIVEN, travel_rad=-1.0, name="x" * 201))
+
+
+def test_a_band_may_end_at_half_the_rate_of_a_sampled_model(tmp_path):
+    A, B, C, D, _ = cont2discrete((STATES.A, STATES.B, STATES.C, STATES.D), 1e-4, method="zoh")
+    text = import_mat(save(tmp_path, A=A, B=B, C=C, D=D, Ts=1e-4), GIVEN)
+    wanted = lti.frequency_response(STATES, INSIDE[INSIDE < 4.9e3])[:, 0, 0]
+    assert difference(answer(tmp_path, text, INSIDE[INSIDE < 4.9e3]), wanted) < NINE_DIGITS
+
+
+def test_a_model_of_the_highest_order_is_taken_and_one_more_is_not(tmp_path, monkeypatch):
+    monkeypatch.setattr(roots_module, "MOST_ORDER", 3)
+    assert import_mat(save(tmp_path, **SHAPES["coefficients"]), GIVEN)
+    assert import_mat(save(tmp_path, **SHAPES["states"]), GIVEN)
+    monkeypatch.setattr(roots_module, "MOST_ORDER", 2)
+    with pytest.raises(ExportError, match="order 3, and a mirror has at most 2; reduce the model"):
+        import_mat(save(tmp_path, **SHAPES["coefficients"]), GIVEN)
+    with pytest.raises(ExportError, match="3 states, and a mirror has at most 2; reduce the model"):
+        import_mat(save(tmp_path, **SHAPES["states"]), GIVEN)
+
+
+def test_a_file_has_so_many_bytes_and_no_more_and_is_there(tmp_path, monkeypatch):
+    path = save(tmp_path, **SHAPES["roots"])
+    size = path.stat().st_size
+    monkeypatch.setattr(matlab, "MOST_BYTES", size)
+    assert import_mat(path, GIVEN)
+    monkeypatch.setattr(matlab, "MOST_BYTES", size - 1)
+    with pytest.raises(ExportError, match=f"has {size} bytes; a linear model has at most {size - 1}: is it a rec"):
+        import_mat(path, GIVEN)
+    with pytest.raises(ExportError, match=r"none\.mat cannot be read \(No such file or directory\); check the path"):
+        import_mat(tmp_path / "none.mat", GIVEN)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_number_may_be_as_large_as_those_of_a_mission(sign):
+    assert matlab.numbers({"k": np.array([[sign * 1e100]])}, "k", "m").item() == sign * 1e100
+    for value in (sign * 1.001e100, sign * math.inf, math.nan):
+        with pytest.raises(ExportError, match="m: k holds a number that is not finite or beyond 1e\\+100"):
+            matlab.numbers({"k": np.array([[value]])}, "k", "m")
+
+
+def test_a_name_of_several_lines_adds_none_to_the_file():
+    system = python_control.tf(np.poly(ZEROS).real * GAIN, np.poly(POLES).real)
+    text = import_control(system, GIVEN, "our\nbias = 1\x1b[0m\u2028model")
+    assert "imported from our bias = 1 [0m model" in text
+    assert text.count("\n") == import_control(system, GIVEN, "our model").count("\n")
 
 
 def element(kind, data):

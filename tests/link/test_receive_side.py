@@ -298,6 +298,15 @@ def test_words_and_coded_bits_of_a_twin_have_all_of_the_margin_and_of_another_wh
             "coupling.angular_error turns the fibre's mode out of the aperture: beyond 819.4 mrad",
         ),
         (FIBRE | {"coma": "-0.8 um"}, {}, "coupling.coma is above half the wavelength (775 nm)"),
+        (FIBRE | {"defocus": "775.1 nm"}, {}, "coupling.defocus is above half the wavelength (775 nm)"),
+        (FIBRE | {"astigmatism": "-775.1 nm"}, {}, "coupling.astigmatism is above half the wavelength (775 nm)"),
+        (FIBRE | {"spherical": "775.1 nm"}, {}, "coupling.spherical is above half the wavelength (775 nm)"),
+        (FIBRE | {"angular_error": "1 mrad"}, {}, "focal_length is missing"),
+        (MULTI | {"detector_radius": "1 um"}, {}, 'detector_radius or into = "detector"'),
+        (DETECTOR | {"focus": "1 um"}, {}, "coupling.focus is no key of [communication.coupling]"),
+        (FIBRE | {"jitter": THEIRS, "twin": True}, {}, "jitter stands beside twin: both say how the receiver points"),
+        (FIBRE | {"jitter": THEIRS, "pointing_error": "1 urad"}, {}, "pointing_error stands beside jitter"),
+        (FIBRE | {"twin": True}, {"requirement.outage": None}, "requirement.outage is missing"),
         (FIBRE | {"jitter": THEIRS}, {"requirement.outage": None}, "requirement.outage is missing"),
         (
             MULTI | {"numerical_aperture": 0.05},
@@ -311,3 +320,20 @@ def test_what_does_not_fit_is_refused_with_its_key(tmp_path, table, changes, sai
         with_coupling(tmp_path, table, changes)
     key, _, reason = said.partition(" ")
     assert key in str(refused.value) and reason in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("table", "changes"),
+    [
+        (FIBRE | {"defocus": "775 nm", "coma": "-775 nm"}, {}),
+        (FIBRE | {"lateral_error": "0 um", "angular_error": "0 mrad"}, {}),
+        (FIBRE | {"focal_length": "50 cm", "angular_error": "0.819 rad"}, {}),
+        (FIBRE | {"mode_radius": "5 um", "focal_length": "50 cm", "angular_error": "0.668 rad"}, {}),
+        (FIBRE | {"twin": False, "pointing_error": "1 urad"}, {}),
+        (FIBRE | {"twin": False}, {"requirement.outage": None}),
+        (MULTI | {"numerical_aperture": 0.0625}, {"terminals.geo_obscuration": 0.5}),
+        (MULTI | {"numerical_aperture": 0.01}, {}),
+    ],
+)
+def test_what_meets_a_limit_of_the_coupling_is_taken(tmp_path, table, changes):
+    assert with_coupling(tmp_path, table, changes).mission.communication.coupling.into == table["into"]

@@ -4,9 +4,11 @@ import re
 
 import pytest
 
+from microrad.mission.fields import ProblemsError, Quantity
 from microrad.mission.file import MissionError, load_coupled_mirror, load_mirror, load_mission
-from microrad.mission.tables.coupled_mirror import CoupledMirror, in_order, parameters
-from microrad.mission.tables.coupled_parts import ModesTable
+from microrad.mission.tables import coupled_parts
+from microrad.mission.tables.coupled_mirror import CoupledMirror, in_order, on_a_line, parameters
+from microrad.mission.tables.coupled_parts import HysteresisTable, ModesTable, UncertaintyTable
 from microrad.mission.toml import scan
 from places import ROOT
 from waiting import no_hang
@@ -85,6 +87,18 @@ FAULTS = {
     ),
     "a key that is none": (("steps_per_sample", "steps_a_sample"), "recording.steps_a_sample", "is no key", "one of"),
     # ---- channels
+    "a bias below the range": (
+        ('bias = "50 V" ', 'bias = "-1 mV" '),
+        "actuators.1.bias",
+        "is outside drive_min to drive_max (0 V to 100 V)",
+        "0 V to 100 V",
+    ),
+    "a range of nothing": (
+        ('drive_max = "100 V"', 'drive_max = "0 V"'),
+        "actuators.1.drive_max",
+        "is not above drive_min (0 V)",
+        "a voltage above 0 V",
+    ),
     "a bias out of range": (
         ('bias = "50 V" ', 'bias = "150 V" '),
         "actuators.1.bias",
@@ -126,6 +140,12 @@ FAULTS = {
         "recording.excited_to",
         "is above half the rate (1 kHz)",
         "at most 1 kHz",
+    ),
+    "a band of one frequency": (
+        ('excited_from = "1 Hz"', 'excited_from = "500 Hz"'),
+        "recording.excited_to",
+        "is not above excited_from",
+        "a band that goes up",
     ),
     "a band that falls": (
         ('excited_from = "1 Hz"', 'excited_from = "700 Hz"'),
@@ -287,6 +307,42 @@ FAULTS = {
         'is missing, and model = "plays" needs it',
         "weights = [0.8, 0.1]",
     ),
+    "plays without thresholds": (
+        ('thresholds = ["0.5 V", "2 V", "8 V"]\nweights = [0.03', "weights = [0.03"),
+        "hysteresis.1.thresholds",
+        'is missing, and model = "plays" needs it',
+        'thresholds = ["0 V", "1 V"]',
+    ),
+    "a Bouc-Wen model without alpha": (
+        (PLAYS, BOUC_WEN.replace('alpha = "2 1/V"\n', "")),
+        "hysteresis.2.alpha",
+        'is missing, and model = "bouc-wen" needs it',
+        'alpha = "2 1/V"',
+    ),
+    "a Bouc-Wen model without beta": (
+        (PLAYS, BOUC_WEN.replace('beta = "0.5 1/V"\n', "")),
+        "hysteresis.2.beta",
+        'is missing, and model = "bouc-wen" needs it',
+        'beta = "0.5 1/V"',
+    ),
+    "a Bouc-Wen model that does not decay": (
+        (PLAYS, BOUC_WEN.replace("0.5 1/V", "-2 1/V")),
+        "hysteresis.2.alpha",
+        "is not above what beta, gamma and eta take off it (2 1/V), so h would grow without bound",
+        "above 2 1/V",
+    ),
+    "a Bouc-Wen model that grows on one side": (
+        (PLAYS, f'{BOUC_WEN}gamma = "1.5 1/V"\n'),
+        "hysteresis.2.alpha",
+        "is not above what beta, gamma and eta take off it (2 1/V)",
+        "above 2 1/V",
+    ),
+    "a Bouc-Wen model that grows in one direction": (
+        (PLAYS, f'{BOUC_WEN}eta = "-1.5 1/V"\n'),
+        "hysteresis.2.alpha",
+        "is not above what beta, gamma and eta take off it (2 1/V)",
+        "above 2 1/V",
+    ),
     "a Bouc-Wen model that grows": (
         (PLAYS, BOUC_WEN.replace("0.5 1/V", "2.5 1/V")),
         "hysteresis.2.alpha",
@@ -304,6 +360,30 @@ FAULTS = {
         "hysteresis.2.rate_limit",
         "the element depends on the rate",
         'rate_limit = "1 kV/s"',
+    ),
+    "plays that widen without a limit": (
+        ("weights = [0.03, 0.03, 0.04]", 'weights = [0.03, 0.03, 0.04]\nwidening = "1 us"'),
+        "hysteresis.1.rate_limit",
+        "is missing, and the element depends on the rate",
+        'rate_limit = "1 kV/s"',
+    ),
+    "a gain with the rate without a limit": (
+        (PLAYS, f'{BOUC_WEN}d2 = "-1e-4 s/V"\n'),
+        "hysteresis.2.rate_limit",
+        "is missing, and the element depends on the rate",
+        'rate_limit = "1 kV/s"',
+    ),
+    "plays that widen with what is fed back": (
+        ("weights = [0.03, 0.03, 0.04]", 'weights = [0.03, 0.03, 0.04]\nwidening = "1 us"\nrate_limit = "1 kV/s"'),
+        "hysteresis.1.widening",
+        "makes an element depend on the rate that row 1 of F feeds back",
+        "this line removed, or a row of zeros in F",
+    ),
+    "a gain with the rate that is fed back": (
+        (PLAYS, f'{BOUC_WEN}d2 = "1e-4 s/V"\nrate_limit = "1 kV/s"\n'),
+        "hysteresis.2.d2",
+        "row 2 of F feeds back",
+        "this line removed, or a row of zeros in F",
     ),
     "a rate that is fed back": (
         (PLAYS, f'{BOUC_WEN}delta = "1e-4 s/V"\nrate_limit = "1 kV/s"\n'),
@@ -329,6 +409,12 @@ FAULTS = {
         "uncertainty.parameters",
         'has "hysteresis.1.weights.4", which is no parameter of this mirror',
         'such as "hysteresis.1.weights.',
+    ),
+    "a name that is like no other": (
+        ("hysteresis.1.weights.3", "zzz"),
+        "uncertainty.parameters",
+        'has "zzz", which is no parameter of this mirror',
+        'such as "modes.decay.1"',
     ),
     "a name that stands twice among the parameters": (
         ('"hysteresis.1.weights.3"', '"modes.decay.1"'),
@@ -418,6 +504,32 @@ def test_what_is_wrong_is_told_once_with_its_key_and_a_remedy(name):
     parts = key.split(".")
     there = [".".join(parts[:n]) for n in range(len(parts), 0, -1) if ".".join(parts[:n]) in lines]
     assert fault.line == (lines[there[0]] if there else 0)
+
+
+WEIGHTS = "weights = [0.03, 0.03, 0.04]"
+AT_A_LIMIT = {
+    "a bias at the lowest drive": [('bias = "50 V" ', 'bias = "0 V" ')],
+    "a bias at the highest drive": [('bias = "50 V" ', 'bias = "100 V" ')],
+    "a band up to half the rate": [('excited_to = "500 Hz"', 'excited_to = "1 kHz"')],
+    "a polynomial alone": [(WEIGHTS, 'weights = [0.0, 0.0, 0.0]\npolynomial = [0, 0.1, 0]\nreach = "1 V"')],
+    "a gain alone": [(PLAYS, BOUC_WEN.replace("-0.01", "0.0"))],
+    "a slope alone": [(PLAYS, BOUC_WEN.replace("0.02", "0.0"))],
+    "a decay above what takes off it": [(PLAYS, BOUC_WEN.replace("0.5 1/V", "-1.999 1/V"))],
+    "an exponent of 1": [(PLAYS, f"{BOUC_WEN}exponent = 1.0\n")],
+    "an exponent of 100": [(PLAYS, f"{BOUC_WEN}exponent = 100.0\n")],
+    "rates of 0 without a limit": [(PLAYS, f'{BOUC_WEN}d2 = "0 s/V"\ndelta = "0 s/V"\n')],
+    "an element that acts on an output alone": [
+        (E, "E = [[0.0, 0.0], [-900.0, 0.0], [0.0, 0.0], [0.0, 0.0]]\nK = [[0.0, 0.0], [0.0, 0.0], [0.0, 1.0]]")
+    ],
+    "an element that a drive alone feeds": [
+        (F, "F = [[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0]]\nG = [[0.0, 0.0], [0.0, 1.0]]")
+    ],
+}
+
+
+@pytest.mark.parametrize("name", AT_A_LIMIT)
+def test_what_meets_a_limit_is_taken(name):
+    assert loaded(edited(*AT_A_LIMIT[name])).states == 4
 
 
 @pytest.mark.promise("mirror-file-5", "mirror-file-29")
@@ -556,6 +668,86 @@ def test_a_stiffness_at_the_edge_of_running_away():
             assert loaded(text).states == 4
         else:
             assert "run away" in refusal(text)[0].reason
+
+
+def one_mode(**element):
+    """A mirror of one real mode of 1 1/s, which is its own element's drive."""
+    actuator = {"name": "a", "bias": "0 V", "drive_min": "-1 V", "drive_max": "1 V", "rate_limit": "1 V/s"}
+    recording = {"delay": "0 s", "rate": "1 kHz", "steps_per_sample": 1}
+    return {
+        "version": 2,
+        "name": "one mode",
+        "actuators": {"1": actuator},
+        "outputs": {"1": {"name": "o", "quantity": "angle"}},
+        "recording": {**recording, "excited_from": "1 Hz", "excited_to": "10 Hz"},
+        "modes": {"decay": ["1 1/s"], "frequency": ["0 rad/s"]},
+        "matrices": {"B": [[1.0]], "C": [[1.0]], "E": [[1.0]], "F": [[1.0]]},
+        "hysteresis": {"1": element},
+    }
+
+
+@pytest.mark.parametrize(("of", "stable"), [(0.5, True), (0.999, True), (1.0, False), (1.5, False)])
+def test_a_mode_that_neither_dies_out_nor_grows_is_refused(of, stable):
+    """x' = -x + gain x: the gain of a Bouc-Wen model for large drives is d1, that of plays the sum of their weights."""
+    for element in (
+        {"model": "bouc-wen", "d1": of, "epsilon": -0.1, "alpha": "2 1/V", "beta": "0.5 1/V"},
+        {"model": "plays", "thresholds": ["0 V", "1 V"], "weights": [of - 0.25, 0.25]},
+        {"model": "plays", "thresholds": ["0 V"], "weights": [of]},
+    ):
+        if stable:
+            assert CoupledMirror.model_validate(one_mode(**element)).states == 1
+        else:
+            with pytest.raises(ValueError, match="makes the mirror run away: where its elements slide it grows by"):
+                CoupledMirror.model_validate(one_mode(**element))
+
+
+@pytest.mark.parametrize(
+    ("weights", "polynomial", "gain"),
+    [([0.5, 0.25], None, 0.5), ([0.0, 0.25], None, 0.0), ([0.0, 0.0], [0.0, 0.1, 0.0], 0.0)],
+)
+def test_the_play_without_a_threshold_is_the_linear_gain(weights, polynomial, gain):
+    table = {"model": "plays", "thresholds": ["0 V", "1 V"], "weights": weights}
+    more = {} if polynomial is None else {"polynomial": polynomial, "reach": "2 V"}
+    assert HysteresisTable.model_validate({**table, **more}).linear_gain == gain
+
+
+def test_a_matrix_has_so_many_rows_and_no_more(monkeypatch):
+    monkeypatch.setattr(coupled_parts, "_MANY", 3)
+    rule = coupled_parts._Matrix(Quantity(""))
+    assert rule.read([[1.0], [2.0], [3.0]]) == ((1.0,), (2.0,), (3.0,))
+    with pytest.raises(ProblemsError) as refused:
+        rule.read([[1.0]] * 4)
+    assert [(p.reason, p.expected) for p in refused.value.problems] == [("has 4 rows", "at most 3 rows")]
+
+
+@pytest.mark.parametrize(("height", "alike"), [(0.0, True), (8.6e-5, True), (8.7e-5, False), (1.0, False)])
+def test_places_lie_on_a_line_up_to_a_ten_thousandth_of_its_length(height, alike):
+    """Of (0, 0), (1, 0) and (1/2, h) the spread across the line is 2 h / sqrt 3 of that along it."""
+    for k in (1.0, -1.0, 1e-3):
+        assert on_a_line([(0.0, 0.0), (k, 0.0), (0.5 * k, height * k)]) == alike
+
+
+def uncertain(**more):
+    """Three parameters of some mirror."""
+    known = {"parameters": ["a", "b", "c"], "standard_errors": [0.1, 0.0, 0.1]}
+    return UncertaintyTable.model_validate({**known, **more})
+
+
+@pytest.mark.parametrize("length", [1.0 + 0.9e-6, 1.0 - 0.9e-6])
+def test_a_row_of_a_factor_may_miss_its_length_by_a_millionth(length):
+    assert uncertain(factor=[[1.0], [length], [-1.0]]).factor[1] == (length,)
+    further = 1.0 + 1.2 * (length - 1.0)
+    with pytest.raises(ValueError, match=f"row 2 has the length {further:.7g}, so the correlation with itself is not"):
+        uncertain(factor=[[1.0], [further], [-1.0]])
+
+
+def test_a_correlation_may_be_indefinite_by_what_two_decimals_leave():
+    """Three values of one correlation r to each other have the eigenvalues 1 - r and 1 + 2 r."""
+    for each in (-1.0, 1.0):
+        assert uncertain(correlation=[each, each, 1.0]).correlation_matrix[0, 1] == each
+    assert uncertain(correlation=[-0.504] * 3).correlation_matrix.tolist()[2] == [-0.504, -0.504, 1.0]
+    with pytest.raises(ValueError, match=r"is not positive semidefinite: its smallest eigenvalue is -0\.012"):
+        uncertain(correlation=[-0.506] * 3)
 
 
 @pytest.mark.promise("mirror-file-50")

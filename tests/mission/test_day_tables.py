@@ -144,6 +144,7 @@ REFUSED = [
     ("constellation.satellites", None, 'is missing, and pattern = "delta" needs it', "satellites = 1 would do"),
     ("constellation.file", "a.tle", 'does not belong to pattern = "delta"', "this line removed"),
     ("constellation.shortest", "60 s", "is not above overhead: such a session would carry no data", "more than 60 s"),
+    ("constellation.session", "179.9 s", "is below shortest", "at least 180 s"),
     ("constellation.session", "60 s", "is below shortest", "at least 180 s"),
     ("constellation.terminals", 0, "is below 1", "from 1 to 100"),
     ("constellation.relays", {}, "holds no relay", "[constellation.relays.east]"),
@@ -206,6 +207,10 @@ OTHERWISE = {
         {LIMITS: {**HELD, "boresight": [0.0, 0.0, 0.0]}},
         (f"{LIMITS}.boresight", "[0.0, 0.0, 0.0]", "has no direction", "boresight = [0.0, 0.0, -1.0]"),
     ),
+    "boresight of next to nothing": (
+        {LIMITS: {**HELD, "boresight": [0.06, 0.0, -0.0799]}},
+        (f"{LIMITS}.boresight", "[0.06, 0.0, -0.0799]", "has no direction", "boresight = [0.0, 0.0, -1.0]"),
+    ),
     "boresight of two": (
         {LIMITS: {**HELD, "boresight": [0.0, 1.0]}},
         (f"{LIMITS}.boresight", "[0.0, 1.0]", "has 2 items", "three: boresight = [0.0, 0.0, -1.0]"),
@@ -240,6 +245,31 @@ def test_keys_that_do_not_fit_together(tmp_path, name):
     assert (fault.key, fault.value) == (key, value)
     assert fault.reason.startswith(reason)
     assert advice in fault.expected
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        (LIMITS, {**HELD, "boresight": [0.1, 0.0, 0.0]}),
+        (LIMITS, {**HELD, "boresight": [0.0, -0.1, 0.0]}),
+        (LIMITS, {**HELD, "boresight": [0.06, 0.0, -0.0801]}),
+        ("constellation.session", "180 s"),
+        ("constellation.shortest", "60.1 s"),
+        ("constellation.phasing", 2),
+        ("constellation.phasing", 0),
+        ("constellation.planes", 12),
+        ("operations.contact.hold", "1.99 s"),
+        ("operations.downlink.stations.kiruna.mask", "89 deg"),
+    ],
+)
+def test_what_meets_a_limit_of_a_day_is_taken(tmp_path, key, value):
+    assert load_link(day_path(tmp_path, {key: value})).mission.orbit is not None
+
+
+def test_a_hundred_stations_are_taken(tmp_path):
+    many = {f"s{k}": AT_KIRUNA for k in range(100)}
+    file = load_link(day_path(tmp_path, WITH_STATIONS, {f"{NETWORK}.stations": many}))
+    assert len(file.mission.operations.optical.stations) == 100
 
 
 def test_another_kind_of_orbit_says_every_key_that_is_missing_and_every_one_too_many(tmp_path):

@@ -280,6 +280,7 @@ ONE_WRONG = [
     ("delay", '"190 us"', "no whole number of plant_step", "would do"),
     ("delay", '"-20 us"', "below 0 s", "at least 0 s"),
     ("plant_step", '"30 us"', "does not divide the control period 1 / fine_pointing.rate (200 µs)", "would do"),
+    ("plant_step", '"0.1999 ns"', "more than 1000000 times into the control period or the delay", "nearer to 1 /"),
     ("plant_step", '"1e-20 s"', "more than 1000000 times", "nearer to 1 / fine_pointing.rate"),
     ("amplifier_bandwidth", '"0 Hz"', "not above 0 Hz", "above 0 Hz"),
     ("drive_resolution", '"-1 mV"', "below 0 V", 'drive_resolution = "5 mV"'),
@@ -298,6 +299,7 @@ ONE_WRONG = [
     ("seed", "9223372036854775808", "above 9223372036854775807", "from 0 to 9223372036854775807"),
     ("duration", "10", "number without a unit", 'duration = "10 s"'),
     ("duration", '"1e8 s"', "more than 100000000 samples of fine_pointing.rate", "would do"),
+    ("duration", '"20000.0002 s"', "more than 100000000 samples of fine_pointing.rate", "would do"),
     ("settle", '"2 s"', "not less than duration (2 s)", "would do"),
     ("settle", '"1.99999 s"', "leaves no control sample behind settle", "would do"),
     ("geometry.layout", '"tripods"', "none of the choices", 'layout = "tripod"'),
@@ -334,6 +336,8 @@ ONE_WRONG = [
     ("optical_sensor.rate", '"2 kHz"', "does not divide", 'rate = "1.66666666667 kHz" would do'),
     ("optical_sensor.rate", '"1 mHz"', "less than fine_pointing.rate (5 kHz) divided by 1000000", "would do"),
     ("optical_sensor.delay", '"90 us"', "no whole number of plant_step", 'delay = "80 µs" would do'),
+    ("optical_sensor.rate", '"4.999 mHz"', "less than fine_pointing.rate (5 kHz) divided by 1000000", "would do"),
+    ("optical_sensor.delay", '"40.00004 s"', "more than 1000000 times fine_pointing.plant_step", "would do"),
     ("optical_sensor.delay", '"1e9 s"', "more than 1000000 times fine_pointing.plant_step", "would do"),
     ("strain_gauge.noise", "0.1", "number without a unit", '"0.1 urad"'),
     ("reference.point_ahead", '"-71 urad"', "below 0 rad", "at least 0 rad"),
@@ -356,6 +360,61 @@ def test_one_bad_value_is_one_fault_and_what_would_do_does(refuse, load, key, va
     assert fault.line
     if "would do" in fault.expected:
         _check_advice(load, text, fault)
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("duration", '"20000 s"'),
+        ("settle", '"0 s"'),
+        ("settle", '"1.9998 s"'),
+        ("reference_filter", '"2.499 kHz"'),
+        ("delay", '"40 s"'),
+        ("delay", '"0 s"'),
+        ("plant_step", '"200 us"'),
+        ("plant_step", '"0.2 ns"'),
+        ("optical_sensor.rate", '"5 mHz"'),
+        ("optical_sensor.delay", '"40 s"'),
+        ("body.bandwidth", '"12.49 kHz"'),
+        ("reference.rate_feedforward", "1.0"),
+        ("reference.rate_feedforward", "0.0"),
+    ],
+)
+def test_what_meets_a_limit_of_the_table_is_taken(load, key, value):
+    assert isinstance(load(edited((key, value))), FinePointing)
+
+
+@pytest.mark.parametrize(
+    ("changes", "key"),
+    [
+        ([("body.bandwidth", '"10 kHz"')], "body.bandwidth"),
+        (
+            [
+                ("vibration.spectrum", '"first-order"'),
+                ("vibration.level", '"1 urad^2/Hz"'),
+                ("vibration.corner", '"10 kHz"'),
+            ],
+            "vibration.corner",
+        ),
+        (
+            [
+                ("vibration.spectrum", '"bands"'),
+                ("vibration.edges", '["1 Hz", "10 kHz"]'),
+                ("vibration.rms", '["1 urad"]'),
+            ],
+            "vibration.edges",
+        ),
+        ([("wheels.speed", '"5 kHz"')], "wheels.speed"),
+    ],
+)
+def test_what_stands_at_half_the_rate_of_the_plant_is_refused_and_a_hertz_below_it_taken(refuse, load, changes, key):
+    """A plant step of 50 us, of which half the rate is 10 kHz to the last bit."""
+    text = uncommented("fine_pointing.wheels")
+    fault = refuse(edited(("plant_step", '"50 us"'), *changes, text=text))
+    assert fault.key == f"fine_pointing.{key}"
+    assert "not below half of 1 / fine_pointing.plant_step (10 kHz)" in fault.reason
+    below = [(name, value.replace("10 kHz", "9.999 kHz").replace('"5 kHz"', '"4.999 kHz"')) for name, value in changes]
+    assert isinstance(load(edited(("plant_step", '"50 us"'), *below, text=text)), FinePointing)
 
 
 def test_an_incidence_along_the_mirror_is_refused_whatever_its_coupling(refuse):
@@ -400,6 +459,7 @@ def test_a_spectrum_that_lacks_a_key_names_a_line_that_would_do(refuse, load, ch
         ('["0 Hz", "1 Hz", "2 Hz"]', '["1 urad"]', "rms", "has 1 item where edges has 3", "2 items, one for each band"),
         ('["1 Hz", "0 Hz"]', '["1 urad"]', "edges", "does not rise", "rising"),
         ('["-1 Hz", "0 Hz"]', '["1 urad"]', "edges", "item 1", "at least 0 Hz"),
+        ('["1 Hz", "12.5 kHz"]', '["1 urad"]', "edges", "reaches 12.5 kHz, not below half of", "edges that end below"),
         ('["1 Hz", "30 kHz"]', '["1 urad"]', "edges", "reaches 30 kHz, not below half of 1 / fine_pointing.plant_step",
          "edges that end below 12.5 kHz, at 2.5 kHz for example"),
     ],
@@ -416,6 +476,12 @@ def test_bands_have_edges_that_rise_and_an_rms_each(refuse, edges, rms, key, rea
     ("key", "value", "reason", "expected"),
     [
         ("speed", '"0 Hz"', "not above 0 Hz", "above 0 Hz"),
+        (
+            "speed",
+            '"6.25 kHz"',
+            "puts harmonic 2 at 12.5 kHz, not below half of 1 / fine_pointing.plant_step",
+            "would do",
+        ),
         ("speed", '"20 kHz"', "puts harmonic 2 at 40 kHz, not below half of 1 / fine_pointing.plant_step", "would do"),
         ("harmonics", "[1.0, 0.0]", "item 2", "above 0"),
         ("harmonics", "[1.0]", "has 2 items where harmonics has 1", "1 of them, one coefficient for each harmonic"),

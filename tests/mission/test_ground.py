@@ -220,6 +220,12 @@ REFUSED = [
         "a slot that the station sees, or another station",
     ),
     (
+        {**BEYOND, "communication.distance": "40000 km"},  # no range follows of an elevation below the horizon
+        "orbit.leo.longitude",
+        "leaves the satellite at an elevation of -65.13 deg over the station, below the horizon",
+        "a slot that the station sees, or another station",
+    ),
+    (
         LOW,
         "orbit.leo.longitude",
         "leaves the satellite at an elevation of 16.51 deg over the station, below orbit.geo.mask of 20 deg",

@@ -259,6 +259,7 @@ def test_a_resolution_of_zero_is_an_ideal_converter(tmp_path):
         ("amplifier.bandwidth", '"0 Hz"', "not above 0 Hz", "above 0 Hz"),
         ("amplifier.bandwidth", "inf", "number without a unit", '"5 Hz"'),
         ("amplifier.output_max", '"0 V"', "not above output_min", "above 0 V"),
+        ("mirror.drive_max", '"0 V"', "not above drive_min (0 V)", "a voltage above 0 V"),
         ("conventions.strehl", '"decibels"', "none of the choices", 'strehl = "decibel" or strehl = "ratio"'),
         ("conventions.strehl", "1", "none of the choices", 'strehl = "decibel"'),
         ("mirror.composition", '"cascaded"', "none of the choices", 'composition = "cascade"'),
@@ -279,7 +280,15 @@ def test_a_resolution_of_zero_is_an_ideal_converter(tmp_path):
         ),
         ("mirror.linear.denominator", "5", "not a list", "a list"),
         ("mirror.linear.normalise_at", '"10 kHz"', "outside excited_from to excited_to (1 Hz to 5 kHz)", "1 Hz to"),
+        ("mirror.linear.normalise_at", '"0.9 Hz"', "outside excited_from to excited_to (1 Hz to 5 kHz)", "1 Hz to"),
         ("mirror.linear.excited_to", '"0.5 Hz"', "not above excited_from", "goes up"),
+        ("mirror.linear.excited_to", '"1 Hz"', "not above excited_from", "goes up"),
+        (
+            "mirror.linear.denominator",
+            "[1e-100, 1e10, 2e50, 1e20, 1, 1]",
+            "begins with a factor that is nothing beside others: 1e-100 of 2e+50",
+            "coefficients of at most 1e+150 times the first one",
+        ),
         ("control.rate", '"0 Hz"', "not above 0 Hz", "above 0 Hz"),
         ("control.plant_step", '"7 us"', "does not divide the control period", "would do"),
         ("control.plant_step", '"1e-20 s"', "more than 1000000 times", "nearer"),
@@ -344,6 +353,8 @@ def test_a_bias_outside_the_amplifier_names_both(refuse):
     ("key", "value", "fault_key", "reason"),
     [
         ("mirror.bias", '"13 V"', "mirror.bias", "is outside drive_min to drive_max (0 V to 12 V)"),
+        ("mirror.drive_min", '"9 V"', "mirror.bias", "is outside drive_min to drive_max (9 V to 12 V)"),
+        ("mirror.bouc_wen.alpha", '"34.635 1/V"', "mirror.bouc_wen.alpha", "not above the size of beta (34.63 1/V)"),
         ("mirror.drive_max", '"-1 V"', "mirror.drive_max", "is not above drive_min (0 V)"),
         (
             "mirror.bouc_wen.alpha",
@@ -372,6 +383,28 @@ def test_what_a_mirror_was_identified_for_fits_together(refuse, key, value, faul
     fault = the_fault(refuse(edited(key, value)))
     assert fault.key == fault_key
     assert reason in fault.reason
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("mirror.bias", '"0 V"'),
+        ("mirror.bias", '"12 V"'),
+        ("mirror.linear.normalise_at", '"1 Hz"'),
+        ("mirror.linear.normalise_at", '"5 kHz"'),
+        ("mirror.linear.numerator", "[0, 1, 2, 3, 4, 5]"),
+        ("mirror.linear.denominator", "[1e-100, 1e10, 9e49, 1e20, 1, 1]"),
+        ("mirror.bouc_wen.alpha", '"34.636 1/V"'),
+        ("mirror.bouc_wen.beta", '"34.635 1/V"\nexponent = 1.0'),
+        ("mirror.bouc_wen.beta", '"34.635 1/V"\nexponent = 100.0'),
+        ("scenario.loop_frequencies", '["25 mHz", "24.9 kHz"]'),
+        ("control.plant_step", '"20 us"'),
+    ],
+)
+def test_what_meets_a_limit_of_a_mission_is_taken(tmp_path, key, value):
+    path = tmp_path / "limit.toml"
+    path.write_text(edited(key, value), encoding="utf-8")
+    assert key in load_mission(path).sources
 
 
 @pytest.mark.promise("mirror-file-17", "mirror-file-18")
@@ -1058,7 +1091,20 @@ def test_a_linear_part_by_roots_is_the_one_by_coefficients(tmp_path):
     [
         ([('poles = ["0.0343 Hz", ', "poles = [")], "pole_dampings", "has 4 items where poles has 3"),
         ([("pole_dampings = [1, 1, 1, 0.357]", "pole_dampings = [1, 1, 1, -0.357]")], "pole_dampings", "unstable pole"),
+        ([("pole_dampings = [1, 1, 1, 0.357]", "pole_dampings = [1, 1, 1, 0]")], "pole_dampings", "unstable pole"),
+        ([("pole_dampings = [1, 1, 1, 0.357]\n", "")], "pole_dampings", "has 0 items where poles has 4"),
+        ([("zero_dampings = [1, 1]\n", "")], "zero_dampings", "has 0 items where zeros has 2"),
+        ([('zeros = ["0.0672 Hz", "56.64 Hz"]\n', "")], "zero_dampings", "has 2 items where zeros has 0"),
+        ([("zeros = [", "denominator = [1]\nzeros = [")], "denominator", "stands beside poles"),
         ([("zero_dampings = [1, 1]", "zero_dampings = [1, 2]")], "zero_dampings", "is above 1"),
+        (
+            [
+                ('zeros = ["0.0672 Hz", "56.64 Hz"]', 'zeros = ["1 Hz", "2 Hz", "3 Hz"]'),
+                ("zero_dampings = [1, 1]", "zero_dampings = [0.5, 0.5, -1]"),
+            ],
+            "zeros",
+            "makes 5 zeros over 5 poles",
+        ),
         (
             [
                 ('zeros = ["0.0672 Hz", "56.64 Hz"]', 'zeros = ["1 Hz", "2 Hz", "3 Hz"]'),
@@ -1074,6 +1120,17 @@ def test_a_linear_part_by_roots_is_the_one_by_coefficients(tmp_path):
 def test_roots_that_do_not_fit_are_told(refuse, changes, key, reason):
     faults = refuse(with_roots(*changes)).faults
     assert any(f.key == f"mirror.linear.{key}" and reason in f.reason for f in faults), faults
+
+
+def test_a_linear_part_by_roots_may_have_no_zeros_and_one_fewer_than_poles(tmp_path):
+    path = tmp_path / "roots.toml"
+    for changes, count in (
+        ([('zeros = ["0.0672 Hz", "56.64 Hz"]\n', ""), ("zero_dampings = [1, 1]\n", "")], 0),
+        ([("zero_dampings = [1, 1]", "zero_dampings = [0.5, -0.5]")], 4),
+    ):
+        path.write_text(with_roots(*changes), encoding="utf-8")
+        zeros, poles = load_mission(path).mission.mirror.linear.roots
+        assert (len(zeros), len(poles)) == (count, 5)
 
 
 @pytest.mark.parametrize(

@@ -92,8 +92,6 @@ class Coupling(Table):
             allowed += ["angular_error", "focal_length"]
             if self.lateral_error_m or self.angular_error_rad or not math.isnan(self.mode_radius_m or math.nan):
                 needed["focal_length"] = '"50 cm"'
-        elif self.lateral_error_m:
-            needed["focal_length"] = '"50 cm"'
         yield from self.choice_problems(choice, needed, allowed, _belongs)
         said = {
             "pointing_error": self.pointing_error_rad is not None,
