@@ -642,7 +642,7 @@ def test_a_chirp_crosses_its_middle_ever_more_often_by_more_than_five_times(coun
 
 def test_a_frequency_is_that_of_the_line_where_the_drive_crosses_too_seldom_or_noise_crosses_too():
     t = np.arange(1000) / 1000.0
-    two = words.sine_of(np.cos(2 * np.pi * 2 * t + 1.58), 1000.0)
+    two = words.sine_of(np.cos(2 * np.pi * 2 * t - 1.56), 1000.0)  # rises through its middle once
     assert two.freq_hz == pytest.approx(2.0, rel=1e-9)
     ripple = np.sin(2 * np.pi * 40.3 * t) + 0.3 * np.sin(2 * np.pi * 430.0 * t + 0.4)
     assert words.sine_of(ripple, 1000.0).freq_hz == pytest.approx(40.0, rel=1e-9)

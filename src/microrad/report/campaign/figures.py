@@ -195,8 +195,8 @@ def _tail_marks(panel: Panel, summary: CampaignSummary, found: Tail) -> None:
             arms = _arms([radius], 1e6) if numbers.ends(radius, "rad") else None
             label = f"{numbers.share(p)}: {numbers.value(radius.value, 'rad')}"
             panel.add(Line(*at, colour, "", label=label, marker=marker, x_arms=arms))
-    limits = [limit for limit in summary.limits if limit.most is not None and limit.output.startswith("residual")]
-    for bound in sorted({limit.most for limit in limits if limit.most is not None})[:1]:
+    residuals = [limit.most for limit in summary.limits if limit.output.startswith("residual")]
+    for bound in sorted(most for most in residuals if most is not None)[:1]:
         label = _limit_label("most", bound, "rad", "")
         near = bound <= 2.0 * float(found.radius_rad[found.survival > 0.0].max())
         panel.add(Rule(bound * 1e6, True, label=label, **_LIMIT) if near else _far(label))
