@@ -189,7 +189,7 @@ def content_beside(manifest: ReadManifest, name: str) -> bytes | None:
         name: as the manifest has it.
     """
     path = manifest.path.parent / name
-    fits = plain(name) and path.is_file() and path.stat().st_size < MOST_BYTES
+    fits = plain(name) and path.is_file() and path.stat().st_size <= MOST_BYTES
     return read_bytes(path, MOST_BYTES) if fits else None
 
 
